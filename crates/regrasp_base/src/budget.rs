@@ -1,0 +1,76 @@
+//! Work budgets. Budgets count work, so that the same seed gives the same plan; a deadline may only cut.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// Why a search stopped before it was done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Interrupt {
+    /// The work allowed is used up: the same on every machine.
+    WorkSpent,
+    /// The deadline of the caller has passed: depends on the machine, and the plan says so.
+    Deadline,
+    /// The caller asked to stop.
+    Cancelled,
+}
+
+/// How much a search may do. One unit of work is one configuration looked at (kinematics and collision).
+#[derive(Debug, Clone)]
+pub struct Budget {
+    /// Units of work allowed.
+    pub max_work: u64,
+    /// Wall-clock instant after which the search is cut.
+    pub deadline: Option<Instant>,
+    /// Set by the caller, from any thread, to stop the search.
+    pub cancelled: Arc<AtomicBool>,
+}
+
+impl Budget {
+    /// Only work is limited: fully reproducible.
+    pub fn work(max_work: u64) -> Self {
+        Budget { max_work, deadline: None, cancelled: Arc::new(AtomicBool::new(false)) }
+    }
+
+    /// No limit but cancellation.
+    pub fn unlimited() -> Self {
+        Budget::work(u64::MAX)
+    }
+
+    /// The same budget with a deadline.
+    pub fn with_deadline(mut self, deadline: Instant) -> Self {
+        self.deadline = Some(deadline);
+        self
+    }
+
+    /// Err when `work_done` units are too many, the deadline has passed or the caller cancelled.
+    ///
+    /// The clock is read on every call (about 25 ns); call it once per unit of work that costs more than that.
+    pub fn check(&self, work_done: u64) -> Result<(), Interrupt> {
+        if work_done >= self.max_work {
+            return Err(Interrupt::WorkSpent);
+        }
+        if self.cancelled.load(Ordering::Relaxed) {
+            return Err(Interrupt::Cancelled);
+        }
+        match self.deadline {
+            Some(deadline) if Instant::now() >= deadline => Err(Interrupt::Deadline),
+            _ => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_limit_is_named() {
+        assert_eq!(Budget::work(3).check(2), Ok(()));
+        assert_eq!(Budget::work(3).check(3), Err(Interrupt::WorkSpent));
+        assert_eq!(Budget::unlimited().with_deadline(Instant::now()).check(0), Err(Interrupt::Deadline));
+        let budget = Budget::unlimited();
+        budget.cancelled.store(true, Ordering::Relaxed);
+        assert_eq!(budget.check(0), Err(Interrupt::Cancelled));
+    }
+}

@@ -1,0 +1,94 @@
+//! Files: read with a cap, hashed, written whole or not at all.
+
+use crate::diagnostic::{Diagnostic, InputError, Place};
+use sha2::{Digest, Sha256};
+use std::fs;
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+
+/// Largest input file that is read, in bytes.
+pub const MAX_FILE_BYTES: u64 = 256 << 20;
+
+/// Reads a whole regular file of at most [`MAX_FILE_BYTES`].
+///
+/// Errors: not found, a directory, a pipe or device, too large, not readable (`F001`).
+pub fn read(path: &Path) -> Result<Vec<u8>, InputError> {
+    let fail = |problem: String| InputError::from(Diagnostic::new("F001", Place::file(path), problem));
+    let metadata = fs::metadata(path).map_err(|error| fail(format!("cannot be read: {error}")))?;
+    if !metadata.is_file() {
+        return Err(fail("is not a regular file".into()));
+    }
+    if metadata.len() > MAX_FILE_BYTES {
+        return Err(fail(format!("has {} bytes, more than the limit of {MAX_FILE_BYTES}", metadata.len())));
+    }
+    let file = fs::File::open(path).map_err(|error| fail(format!("cannot be opened: {error}")))?;
+    let mut bytes = Vec::new();
+    file.take(MAX_FILE_BYTES + 1)
+        .read_to_end(&mut bytes)
+        .map_err(|error| fail(format!("cannot be read: {error}")))?;
+    if bytes.len() as u64 > MAX_FILE_BYTES {
+        return Err(fail(format!("grew past the limit of {MAX_FILE_BYTES} bytes while it was read")));
+    }
+    Ok(bytes)
+}
+
+/// Reads a UTF-8 text file; a byte order mark is dropped. Errors: as [`read`], and not UTF-8 (`F002`).
+pub fn read_text(path: &Path) -> Result<String, InputError> {
+    text_of(path, read(path)?)
+}
+
+/// The UTF-8 text of `bytes`, which came from `path`; a byte order mark is dropped.
+pub fn text_of(path: &Path, bytes: Vec<u8>) -> Result<String, InputError> {
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let offset = error.utf8_error().valid_up_to();
+        let encoding = match error.as_bytes() {
+            [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => "it looks like UTF-16",
+            _ => "it may be Latin-1",
+        };
+        Diagnostic::new("F002", Place::file(path), format!("is not UTF-8 at byte {offset}; {encoding}"))
+            .expected("UTF-8 text")
+            .fix("save it again as UTF-8, e.g. iconv -f UTF-16 -t UTF-8")
+    })?;
+    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
+}
+
+/// SHA-256 of `bytes`, as 64 lower-case hexadecimal digits.
+pub fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Writes `bytes` to `path` through a temporary file beside it, synced and renamed: the file is whole or unchanged.
+pub fn write_atomic(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let name = path.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "path has no file name"))?;
+    let mut temporary_name = name.to_owned();
+    temporary_name.push(format!(".{}.tmp", std::process::id()));
+    let temporary: PathBuf = path.with_file_name(temporary_name);
+    let result = (|| {
+        let mut file = fs::File::create(&temporary)?;
+        file.write_all(bytes)?;
+        file.sync_all()?;
+        fs::rename(&temporary, path)
+    })();
+    if result.is_err() {
+        // Best effort: the error that matters is the first one.
+        let _ = fs::remove_file(&temporary);
+    }
+    result
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sha256_of_the_standard_example() {
+        assert_eq!(sha256(b"abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+    }
+
+    #[test]
+    fn a_failed_write_leaves_nothing_behind() {
+        let missing = std::env::temp_dir().join("regrasp_no_such_dir").join("plan.json");
+        assert!(write_atomic(&missing, b"x").is_err());
+        assert!(!missing.exists());
+    }
+}

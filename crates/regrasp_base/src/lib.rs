@@ -1,0 +1,16 @@
+//! What every floor of the tower may use and none may know more than.
+//!
+//! Keyed random numbers, work budgets, diagnostics about input files, files that are written whole or not at all.
+
+/// Random numbers keyed by (seed, purpose, index).
+pub mod random;
+/// Work budgets, deadlines and interruption.
+pub mod budget;
+/// Errors in input files: every cause, with file, line, element, value seen, value expected and fix.
+pub mod diagnostic;
+/// Reading with a size cap, hashing, and writing through a temporary file.
+pub mod files;
+
+pub use budget::{Budget, Interrupt};
+pub use diagnostic::{Diagnostic, InputError, Place};
+pub use random::Rng;

@@ -1,0 +1,1 @@
+//! Separation of shapes, at rest and along motions.

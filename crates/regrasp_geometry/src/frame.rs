@@ -1,0 +1,94 @@
+//! Poses, and motion between two poses.
+
+use nalgebra::{Isometry3, Point3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
+
+/// A rigid transform, named `parent_from_child` where it is used.
+pub type Pose = Isometry3<f64>;
+/// A point, named after its frame where it is used (`point_in_object`).
+pub type Point = Point3<f64>;
+/// A free vector.
+pub type Vector = Vector3<f64>;
+/// A vector of length one.
+pub type UnitVector = Unit<Vector3<f64>>;
+
+/// The pose with origin at `position` and orientation `quat_xyzw`, which must be of length one within 1e-9.
+pub fn pose_from(position: [f64; 3], quat_xyzw: [f64; 4]) -> Pose {
+    let [x, y, z, w] = quat_xyzw;
+    let rotation = UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z));
+    Pose::from_parts(Translation3::from(Vector::from(position)), rotation)
+}
+
+/// Position and orientation of `pose` as `(position, quat_xyzw)` with `w >= 0`.
+pub fn parts_of(pose: &Pose) -> ([f64; 3], [f64; 4]) {
+    let q = pose.rotation.coords;
+    let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
+    (pose.translation.vector.into(), [sign * q.x, sign * q.y, sign * q.z, sign * q.w])
+}
+
+/// The motion between waypoints: position linear, orientation by the shortest great circle, at `t` in `[0, 1]`.
+///
+/// At a turn of exactly pi the two shortest ways are equally long; the one that the quaternions' signs give is taken.
+pub fn interpolate_pose(from: &Pose, to: &Pose, t: f64) -> Pose {
+    let translation = from.translation.vector.lerp(&to.translation.vector, t);
+    let rotation_vector = rotation_between(from, to);
+    Pose::from_parts(
+        Translation3::from(translation),
+        UnitQuaternion::from_scaled_axis(rotation_vector * t) * from.rotation,
+    )
+}
+
+/// Rotation vector, in the parent frame, that turns `from` into `to`; its length is at most pi.
+pub fn rotation_between(from: &Pose, to: &Pose) -> Vector {
+    let mut delta = (to.rotation * from.rotation.inverse()).into_inner();
+    if delta.w < 0.0 {
+        delta = -delta;
+    }
+    let half_sine = delta.imag().norm();
+    if half_sine < 1e-12 {
+        return 2.0 * delta.imag();
+    }
+    delta.imag() * (2.0 * half_sine.atan2(delta.w) / half_sine)
+}
+
+/// Distance between poses: translation plus `length` times the angle between them.
+pub fn pose_distance(a: &Pose, b: &Pose, length: f64) -> f64 {
+    (a.translation.vector - b.translation.vector).norm() + length * rotation_between(a, b).norm()
+}
+
+/// Any two unit vectors that make a right-handed frame `(x, y, normal)` with `normal`.
+pub fn tangents(normal: &UnitVector) -> (UnitVector, UnitVector) {
+    // Duff et al. 2017, "Building an orthonormal basis, revisited".
+    let n = normal.as_ref();
+    let sign = 1f64.copysign(n.z);
+    let a = -1.0 / (sign + n.z);
+    let b = n.x * n.y * a;
+    (
+        Unit::new_unchecked(Vector::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x)),
+        Unit::new_unchecked(Vector::new(b, sign + n.y * n.y * a, -n.y)),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn interpolation_meets_both_ends_and_turns_at_constant_rate() {
+        let from = pose_from([0.1, 0.0, 0.2], [0.0, 0.0, 0.0, 1.0]);
+        let to = Pose::new(Vector::new(0.0, 0.3, 0.1), Vector::new(0.4, -1.2, 0.7));
+        assert!(pose_distance(&interpolate_pose(&from, &to, 0.0), &from, 1.0) < 1e-12);
+        assert!(pose_distance(&interpolate_pose(&from, &to, 1.0), &to, 1.0) < 1e-12);
+        let half = interpolate_pose(&from, &to, 0.5);
+        let whole = rotation_between(&from, &to).norm();
+        assert!((rotation_between(&from, &half).norm() - 0.5 * whole).abs() < 1e-12);
+    }
+
+    #[test]
+    fn tangents_make_a_right_handed_frame() {
+        for direction in [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [0.3, -0.5, 0.2], [1.0, 0.0, 0.0]] {
+            let normal = Unit::new_normalize(Vector::from(direction));
+            let (x, y) = tangents(&normal);
+            assert!((x.cross(&y) - normal.as_ref()).norm() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,1 @@
+//! Volume, centre of mass and inertia of solids.

@@ -1,0 +1,145 @@
+//! A hand: a palm and serial fingers, with everything the planners ask for prepared once.
+
+use crate::kinematics::chain::Chain;
+use crate::robot::{LinkId, Robot};
+use regrasp_geometry::shape::PlacedShape;
+use regrasp_geometry::{Point, Pose, Shape};
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+/// Index of a finger in [`Hand::fingers`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct FingerId(pub usize);
+
+/// What the fingertip is, for contact.
+#[derive(Debug, Clone, PartialEq)]
+pub enum TipShape {
+    /// A sharp tip: contact at one point of the link (paper 000, section 3.1).
+    Point,
+    /// A ball: contact anywhere on it that the object's normal selects.
+    Sphere {
+        /// Radius.
+        radius: f64,
+    },
+    /// The convex hull of the tip link's own collision geometry, in the tip frame.
+    Hull(Arc<regrasp_geometry::ConvexHull>),
+}
+
+/// A fingertip.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tip {
+    /// Link that carries the tip, as the user names it.
+    pub link: LinkId,
+    /// Its shape.
+    pub shape: TipShape,
+    /// The point of the tip (its centre, for a sphere), in the frame of the chain's last moving body.
+    pub center_in_body: Point,
+}
+
+impl Tip {
+    /// Distance from [`Tip::center_in_body`] to the contact, for tips where it is the same in all directions.
+    pub fn radius(&self) -> f64 {
+        match self.shape {
+            TipShape::Sphere { radius } => radius,
+            TipShape::Point | TipShape::Hull(_) => 0.0,
+        }
+    }
+}
+
+/// A collision shape of a finger.
+#[derive(Debug, Clone)]
+pub struct FingerShape {
+    /// Moving body that carries it: `0` is the body after the first joint.
+    pub body: usize,
+    /// The link it belongs to.
+    pub link: LinkId,
+    /// The shape, placed in the frame of its body. Convex.
+    pub placed: PlacedShape,
+    /// True for the shapes of the tip link, the only ones that may touch the object.
+    pub is_tip: bool,
+}
+
+/// A serial finger.
+#[derive(Debug, Clone)]
+pub struct Finger {
+    /// Name, unique in the hand.
+    pub name: String,
+    /// The chain from the hand's base to the last moving body.
+    pub chain: Chain,
+    /// The tip.
+    pub tip: Tip,
+    /// Collision shapes of the moving bodies.
+    pub shapes: Vec<FingerShape>,
+    /// Posture the finger takes when nothing else is asked of it: one value per coordinate.
+    pub rest: Vec<f64>,
+}
+
+/// A shape of the palm (everything that no finger joint moves).
+#[derive(Debug, Clone)]
+pub struct PalmShape {
+    /// The link it belongs to.
+    pub link: LinkId,
+    /// The shape, placed in the hand's base frame. Convex.
+    pub placed: PlacedShape,
+}
+
+/// A palm and serial fingers. All poses are in the frame of [`Hand::base`].
+#[derive(Debug, Clone)]
+pub struct Hand {
+    /// The robot it was made from.
+    pub robot: Arc<Robot>,
+    /// The link whose frame is the hand frame.
+    pub base: LinkId,
+    /// Fingers, in the order of the hand file.
+    pub fingers: Vec<Finger>,
+    /// The palm.
+    pub palm: Vec<PalmShape>,
+    /// Pairs of links (smaller index first) that are never tested against each other.
+    pub allowed_pairs: BTreeSet<(LinkId, LinkId)>,
+}
+
+impl Hand {
+    /// Names of the independent joints, finger by finger: the order of every joint vector.
+    pub fn joint_names(&self) -> Vec<String> {
+        self.fingers.iter().flat_map(|finger| finger.chain.names.iter().cloned()).collect()
+    }
+
+    /// Number of independent joints.
+    pub fn n_joints(&self) -> usize {
+        self.fingers.iter().map(|finger| finger.chain.n_coordinates()).sum()
+    }
+
+    /// The finger called `name`.
+    pub fn finger_named(&self, name: &str) -> Option<FingerId> {
+        self.fingers.iter().position(|finger| finger.name == name).map(FingerId)
+    }
+
+    /// True when links `a` and `b` are never tested against each other.
+    pub fn may_touch(&self, a: LinkId, b: LinkId) -> bool {
+        a == b || self.allowed_pairs.contains(&(a.min(b), a.max(b)))
+    }
+
+    /// The same hand with its base placed at `world_from_hand`: every pose it gives is then in the world.
+    #[must_use]
+    pub fn placed_at(mut self, world_from_hand: &Pose) -> Self {
+        for finger in &mut self.fingers {
+            finger.chain.place_at(world_from_hand);
+        }
+        for shape in &mut self.palm {
+            shape.placed.parent_from_shape = world_from_hand * shape.placed.parent_from_shape;
+        }
+        self
+    }
+}
+
+/// The convex shape that stands for `shape` in the hand: a mesh becomes its hull, which contains it.
+///
+/// Errors: a mesh without an inside.
+pub fn convex_of(shape: &Shape) -> Result<Shape, regrasp_geometry::hull::HullError> {
+    match shape {
+        Shape::Mesh(mesh) => {
+            Ok(Shape::Convex(Arc::new(regrasp_geometry::ConvexHull::new(mesh.vertices())?)))
+        }
+        convex => Ok(convex.clone()),
+    }
+}

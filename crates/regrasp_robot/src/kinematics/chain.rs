@@ -1,0 +1,163 @@
+//! Serial chains, forward kinematics and Jacobians.
+
+use nalgebra::{Matrix3xX, Translation3, UnitQuaternion};
+use regrasp_geometry::{Point, Pose, UnitVector, Vector};
+
+/// How a chain joint moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Motion {
+    /// Turns about the axis, in radians.
+    Turn,
+    /// Slides along the axis, in metres.
+    Slide,
+}
+
+/// One moving joint of a chain. Fixed joints are folded into `parent_from_joint`.
+#[derive(Debug, Clone)]
+pub struct ChainJoint {
+    /// Pose of the joint frame at position zero in the frame of the body before it (the hand base, for the first).
+    pub parent_from_joint: Pose,
+    /// Axis, in the joint frame.
+    pub axis: UnitVector,
+    /// How it moves.
+    pub motion: Motion,
+    /// Coordinate of the finger that drives it.
+    pub coordinate: usize,
+    /// Position is `multiplier * coordinate + offset`; 1 and 0 for independent joints.
+    pub multiplier: f64,
+    /// See `multiplier`.
+    pub offset: f64,
+}
+
+/// A serial chain of moving joints, driven by as many or fewer independent coordinates.
+#[derive(Debug, Clone)]
+pub struct Chain {
+    /// Moving joints, base first. Body `i` is what joint `i` carries; its frame is the joint's child frame.
+    pub joints: Vec<ChainJoint>,
+    /// Names of the independent joints, one per coordinate.
+    pub names: Vec<String>,
+    /// Lowest value of each coordinate, couplings included; minus infinity for continuous joints.
+    pub lower: Vec<f64>,
+    /// Highest value of each coordinate.
+    pub upper: Vec<f64>,
+}
+
+impl Chain {
+    /// Number of independent coordinates.
+    pub fn n_coordinates(&self) -> usize {
+        self.lower.len()
+    }
+
+    /// True when every coordinate keeps `margin` (in its unit) from its limits.
+    pub fn within_limits(&self, coordinates: &[f64], margin: f64) -> bool {
+        coordinates
+            .iter()
+            .zip(self.lower.iter().zip(&self.upper))
+            .all(|(&q, (&lower, &upper))| q >= lower + margin && q <= upper - margin)
+    }
+
+    /// Smallest distance of a coordinate from one of its limits; negative outside.
+    pub fn limit_distance(&self, coordinates: &[f64]) -> f64 {
+        coordinates
+            .iter()
+            .zip(self.lower.iter().zip(&self.upper))
+            .map(|(&q, (&lower, &upper))| (q - lower).min(upper - q))
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Poses of the bodies in the base frame, written to `base_from_body` (one per joint).
+    pub fn forward(&self, coordinates: &[f64], base_from_body: &mut Vec<Pose>) {
+        base_from_body.clear();
+        let mut parent = Pose::identity();
+        for joint in &self.joints {
+            let position = joint.multiplier * coordinates[joint.coordinate] + joint.offset;
+            parent = parent * joint.parent_from_joint * joint_motion(joint, position);
+            base_from_body.push(parent);
+        }
+    }
+
+    /// Position, in the base frame, of `point_in_body` of the last body.
+    pub fn tip(&self, coordinates: &[f64], point_in_body: &Point) -> Point {
+        let mut poses = Vec::with_capacity(self.joints.len());
+        self.forward(coordinates, &mut poses);
+        poses.last().map_or(*point_in_body, |pose| pose * point_in_body)
+    }
+
+    /// Jacobian of a point of the last body: 3 rows, one column per coordinate, in the base frame.
+    ///
+    /// `base_from_body` are the poses at the configuration, `point_in_base` the point.
+    pub fn jacobian(&self, base_from_body: &[Pose], point_in_base: &Point) -> Matrix3xX<f64> {
+        let mut jacobian = Matrix3xX::zeros(self.n_coordinates());
+        for (joint, pose) in self.joints.iter().zip(base_from_body) {
+            let axis = pose.rotation * joint.axis.into_inner();
+            let column: Vector = match joint.motion {
+                Motion::Turn => axis.cross(&(point_in_base - Point::from(pose.translation.vector))),
+                Motion::Slide => axis,
+            };
+            let mut target = jacobian.column_mut(joint.coordinate);
+            target += joint.multiplier * column;
+        }
+        jacobian
+    }
+
+    /// Moves the base of the chain: later results are in the frame in which the base is at `parent_from_base`.
+    pub fn place_at(&mut self, parent_from_base: &Pose) {
+        if let Some(first) = self.joints.first_mut() {
+            first.parent_from_joint = parent_from_base * first.parent_from_joint;
+        }
+    }
+}
+
+/// Pose of the child frame in the joint frame at `position`.
+fn joint_motion(joint: &ChainJoint, position: f64) -> Pose {
+    match joint.motion {
+        Motion::Turn => Pose::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&joint.axis, position)),
+        Motion::Slide => Pose::from_parts(Translation3::from(joint.axis.into_inner() * position), UnitQuaternion::identity()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chain() -> Chain {
+        let joint = |z: f64, axis: Vector, motion, coordinate, multiplier| ChainJoint {
+            parent_from_joint: Pose::new(Vector::new(0.01, 0.0, z), Vector::new(0.1, -0.2, 0.3)),
+            axis: UnitVector::new_normalize(axis),
+            motion,
+            coordinate,
+            multiplier,
+            offset: 0.05,
+        };
+        Chain {
+            joints: vec![
+                joint(0.0, Vector::x(), Motion::Turn, 0, 1.0),
+                joint(0.05, Vector::new(0.0, 1.0, 0.2), Motion::Turn, 1, 1.0),
+                joint(0.04, Vector::z(), Motion::Slide, 2, 1.0),
+                joint(0.03, Vector::y(), Motion::Turn, 1, 0.7),
+            ],
+            names: vec!["a".into(), "b".into(), "c".into()],
+            lower: vec![-1.0; 3],
+            upper: vec![1.0; 3],
+        }
+    }
+
+    #[test]
+    fn jacobian_agrees_with_finite_differences() {
+        let chain = chain();
+        let point = Point::new(0.01, 0.02, 0.03);
+        let coordinates = [0.3, -0.4, 0.01];
+        let mut poses = Vec::new();
+        chain.forward(&coordinates, &mut poses);
+        let tip = chain.tip(&coordinates, &point);
+        let jacobian = chain.jacobian(&poses, &tip);
+        for k in 0..3 {
+            let step = 1e-6;
+            let (mut low, mut high) = (coordinates, coordinates);
+            low[k] -= step;
+            high[k] += step;
+            let difference = (chain.tip(&high, &point) - chain.tip(&low, &point)) / (2.0 * step);
+            assert!((difference - jacobian.column(k)).norm() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,16 @@
+//! Robots as read, hands as planned with, and their kinematics. Knows no object and no contact.
+//!
+//! Models never change after loading; poses and joint values live with the caller.
+
+/// Links and joints of a robot, as read.
+pub mod robot;
+/// A hand: a palm and serial fingers.
+pub mod hand;
+/// Forward kinematics, Jacobians, inverse kinematics and motion bounds of serial chains.
+pub mod kinematics;
+/// Readers: URDF, SRDF, `package://` paths, hand files.
+pub mod import;
+
+pub use hand::{Finger, FingerId, FingerShape, Hand, Tip, TipShape};
+pub use kinematics::chain::{Chain, ChainJoint, Motion};
+pub use robot::{Joint, JointId, JointKind, Limits, Link, LinkId, Mimic, Robot};

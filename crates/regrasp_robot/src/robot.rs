@@ -1,0 +1,123 @@
+//! Links and joints of a robot, as read.
+
+use regrasp_geometry::shape::PlacedShape;
+use regrasp_geometry::{Pose, UnitVector};
+
+/// Index of a link in [`Robot::links`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct LinkId(pub usize);
+
+/// Index of a joint in [`Robot::joints`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct JointId(pub usize);
+
+/// A rigid body.
+#[derive(Debug, Clone)]
+pub struct Link {
+    /// Name, unique in the robot.
+    pub name: String,
+    /// Collision geometry, placed in the link frame. Meshes are kept as read.
+    pub collision: Vec<PlacedShape>,
+    /// The joint that carries this link; none for the root.
+    pub parent_joint: Option<JointId>,
+}
+
+/// How a joint moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum JointKind {
+    /// No motion.
+    Fixed,
+    /// Turns about its axis, within limits.
+    Revolute,
+    /// Turns about its axis, without limits.
+    Continuous,
+    /// Slides along its axis, within limits.
+    Prismatic,
+}
+
+/// What a joint may do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Lowest position, in radians or metres.
+    pub lower: f64,
+    /// Highest position, in radians or metres.
+    pub upper: f64,
+    /// Highest speed, in rad/s or m/s, where given.
+    pub velocity: Option<f64>,
+    /// Highest torque or force, in N m or N, where given.
+    pub effort: Option<f64>,
+}
+
+/// A joint that follows another: `position = multiplier * position(joint) + offset`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mimic {
+    /// The joint followed; never itself a mimic joint (chains are resolved on loading).
+    pub joint: JointId,
+    /// Factor.
+    pub multiplier: f64,
+    /// Offset, in radians or metres.
+    pub offset: f64,
+}
+
+/// A joint between two links.
+#[derive(Debug, Clone)]
+pub struct Joint {
+    /// Name, unique in the robot.
+    pub name: String,
+    /// How it moves.
+    pub kind: JointKind,
+    /// The link that carries it.
+    pub parent: LinkId,
+    /// The link that it carries.
+    pub child: LinkId,
+    /// Pose of the joint frame (the child's frame at position zero) in the parent link's frame.
+    pub parent_from_joint: Pose,
+    /// Axis, in the joint frame.
+    pub axis: UnitVector,
+    /// Limits; always present for revolute and prismatic joints.
+    pub limits: Option<Limits>,
+    /// The coupling, for a joint that is not independent.
+    pub mimic: Option<Mimic>,
+}
+
+/// A tree of links and joints, as read.
+#[derive(Debug, Clone)]
+pub struct Robot {
+    /// Name.
+    pub name: String,
+    /// Links in document order.
+    pub links: Vec<Link>,
+    /// Joints in document order.
+    pub joints: Vec<Joint>,
+    /// The link that no joint carries.
+    pub root: LinkId,
+}
+
+impl Robot {
+    /// The link called `name`.
+    pub fn link_named(&self, name: &str) -> Option<LinkId> {
+        self.links.iter().position(|link| link.name == name).map(LinkId)
+    }
+
+    /// The joint called `name`.
+    pub fn joint_named(&self, name: &str) -> Option<JointId> {
+        self.joints.iter().position(|joint| joint.name == name).map(JointId)
+    }
+
+    /// Joints from the root to `link`, root first.
+    pub fn joints_to(&self, link: LinkId) -> Vec<JointId> {
+        let mut joints = Vec::new();
+        let mut current = link;
+        while let Some(joint) = self.links[current.0].parent_joint {
+            joints.push(joint);
+            current = self.joints[joint.0].parent;
+        }
+        joints.reverse();
+        joints
+    }
+
+    /// Joints carried by `link`, in document order.
+    pub fn joints_from(&self, link: LinkId) -> impl Iterator<Item = JointId> + '_ {
+        self.joints.iter().enumerate().filter(move |(_, joint)| joint.parent == link).map(|(i, _)| JointId(i))
+    }
+}
