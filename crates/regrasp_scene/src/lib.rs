@@ -1,1 +1,12 @@
-//! (placeholder)
+//! Robots, objects and obstacles, the scene file, and who may touch whom. Knows no planner.
+
+/// The object that is manipulated.
+pub mod object;
+/// The scene: hand, object, obstacles.
+pub mod scene;
+/// What is asked: start and goal of the object, and how the grasps are given.
+pub mod query;
+
+pub use object::Object;
+pub use query::{GraspRequest, InHandQuery};
+pub use scene::{InputFile, Obstacle, Scene};

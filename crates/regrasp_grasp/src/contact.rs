@@ -1,0 +1,12 @@
+//! Contacts of fingertips on the object.
+
+use regrasp_geometry::{Point, UnitVector};
+
+/// A contact on the object.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contact {
+    /// Where, in the object frame.
+    pub point_in_object: Point,
+    /// Outward normal of the object there, in the object frame.
+    pub normal_in_object: UnitVector,
+}

@@ -1,0 +1,1 @@
+//! The checker: starts from files, shares no decision with the planner.

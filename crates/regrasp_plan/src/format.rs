@@ -1,0 +1,1 @@
+//! Reading and writing `plan.json`, and its JSON Schema.

@@ -1,0 +1,182 @@
+//! The plan and its parts. `docs/plan-format.md` and `schema/plan.schema.json` say the same.
+//!
+//! Between two waypoints every joint moves linearly and the object's pose as `interpolate_pose` says, both with the
+//! same parameter.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Value of [`Plan::format`].
+pub const FORMAT: &str = "regrasp-plan";
+/// Value of [`Plan::format_version`] that this version writes.
+pub const FORMAT_VERSION: u32 = 1;
+
+/// A pose on disk.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PoseData {
+    /// Position, in metres.
+    pub position: [f64; 3],
+    /// Orientation as a unit quaternion, x y z w, with w >= 0.
+    pub quat_xyzw: [f64; 4],
+}
+
+impl From<&regrasp_geometry::Pose> for PoseData {
+    fn from(pose: &regrasp_geometry::Pose) -> Self {
+        let (position, quat_xyzw) = regrasp_geometry::frame::parts_of(pose);
+        PoseData { position, quat_xyzw }
+    }
+}
+
+impl From<&PoseData> for regrasp_geometry::Pose {
+    fn from(data: &PoseData) -> Self {
+        regrasp_geometry::pose_from(data.position, data.quat_xyzw)
+    }
+}
+
+/// A file the plan was made from.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PlanInput {
+    /// What it is for: `scene`, `hand`, `urdf`, `srdf`, `mesh`.
+    pub role: String,
+    /// How the scene names it: relative to the scene file, or `package://`.
+    pub name: String,
+    /// SHA-256 of its bytes, lower-case hexadecimal.
+    pub sha256: String,
+}
+
+/// What a finger does at a waypoint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ContactMode {
+    /// Holds the object; the contact is fixed on the object.
+    Fixed,
+    /// Holds the object; the contact travels because the fingertip rolls without slipping.
+    Rolling,
+    /// Does not touch the object.
+    Free,
+}
+
+/// Contact of one finger at one waypoint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ContactState {
+    /// What the finger does.
+    pub mode: ContactMode,
+    /// Contact point in the object frame, in metres; absent when the finger is free.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub point_in_object: Option<[f64; 3]>,
+    /// Outward normal of the object there, in the object frame; absent when the finger is free.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal_in_object: Option<[f64; 3]>,
+}
+
+/// The state of hand and object at one moment.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Waypoint {
+    /// Positions of all joints, in the order of [`Plan::joint_names`], in radians or metres.
+    pub joints: Vec<f64>,
+    /// Pose of the object in the world.
+    pub world_from_object: PoseData,
+    /// One entry per finger, in the order of [`Plan::fingers`].
+    pub contacts: Vec<ContactState>,
+}
+
+/// Kind of a segment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SegmentKind {
+    /// All fingers hold, the grasp stays, the object moves (paper 000, section 3.2).
+    Transfer,
+    /// The object stays, one finger moves to another contact, the others hold.
+    Regrasp,
+}
+
+/// A piece of motion.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Segment {
+    /// Its kind.
+    pub kind: SegmentKind,
+    /// The finger that moves, in a regrasp.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub moving_finger: Option<String>,
+    /// At least two; the first is the last of the segment before.
+    pub waypoints: Vec<Waypoint>,
+}
+
+/// What the plan promises; the checker holds it to these numbers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Promises {
+    /// Largest distance of a holding fingertip from its contact at and between waypoints, in metres.
+    pub contact_tolerance: f64,
+    /// Friction coefficient used for closure.
+    pub friction: f64,
+    /// Closure margin that every holding set keeps (see `regrasp_grasp::margin`); dimensionless.
+    pub required_margin: f64,
+    /// Smallest margin that the planner found along the plan: a lower bound of the Ferrari-Canny radius.
+    pub kept_margin: f64,
+    /// Length by which torques are divided in the margin, in metres.
+    pub torque_scale: f64,
+}
+
+/// Counts of the search.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Statistics {
+    /// Nodes of the roadmap or tree when the search ended.
+    pub nodes: u64,
+    /// Configurations sampled.
+    pub samples: u64,
+    /// Configurations looked at (kinematics and collision): the unit of the work budget.
+    pub work: u64,
+    /// Restarts used.
+    pub restarts: u64,
+    /// Transfers in the plan.
+    pub transfers: u64,
+    /// Single-finger relocations in the plan.
+    pub relocations: u64,
+    /// True when a wall-clock limit cut something, so that another machine may find another plan.
+    pub cut_by_time: bool,
+    /// Attempts that failed, by cause.
+    pub failures: std::collections::BTreeMap<String, u64>,
+}
+
+/// A plan: how to take the object from start to goal.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    /// Always `regrasp-plan`.
+    pub format: String,
+    /// Version of the format.
+    pub format_version: u32,
+    /// Tool and version that wrote it.
+    pub tool: String,
+    /// Kind of task: `in_hand`.
+    pub task: String,
+    /// Method that planned it.
+    pub method: String,
+    /// Seed.
+    pub seed: u64,
+    /// Settings of the planner, as they were used.
+    pub settings: serde_json::Value,
+    /// Files it was made from, the scene file first.
+    pub inputs: Vec<PlanInput>,
+    /// What it promises.
+    pub promises: Promises,
+    /// Names of the joints, in the order of every joint vector.
+    pub joint_names: Vec<String>,
+    /// Names of the fingers, in the order of every contact list.
+    pub fingers: Vec<String>,
+    /// Object pose asked for at the start.
+    pub start: PoseData,
+    /// Object pose asked for at the goal.
+    pub goal: PoseData,
+    /// The motion, in order; never empty.
+    pub segments: Vec<Segment>,
+    /// Counts of the search.
+    pub statistics: Statistics,
+}

@@ -1,0 +1,1 @@
+//! Readers: URDF, SRDF, `package://` paths, hand files.

@@ -1,0 +1,29 @@
+//! The object that is manipulated.
+
+use regrasp_geometry::{Point, Shape, Surface};
+
+/// A rigid object. Its frame is the frame of its shape.
+#[derive(Debug, Clone)]
+pub struct Object {
+    /// Name.
+    pub name: String,
+    /// Its shape.
+    pub shape: Shape,
+    /// The surface that fingertips touch.
+    pub surface: Surface,
+    /// Mass, in kilograms.
+    pub mass: f64,
+    /// Centre of mass, in the object frame.
+    pub center_of_mass: Point,
+    /// Coulomb friction coefficient between fingertips and object.
+    pub friction: f64,
+    /// Contacts keep this distance from creases of the surface, in metres.
+    pub edge_distance: f64,
+}
+
+impl Object {
+    /// Largest distance of a point of the object from its centre of mass: the torque scale of grasp quality.
+    pub fn radius(&self) -> f64 {
+        self.shape.reach_from(&self.center_of_mass)
+    }
+}

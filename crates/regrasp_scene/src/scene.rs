@@ -1,0 +1,43 @@
+//! The scene: hand, object, obstacles.
+
+use crate::object::Object;
+use regrasp_geometry::shape::PlacedShape;
+use regrasp_robot::Hand;
+use std::path::PathBuf;
+
+/// Something fixed in the world that nothing may touch.
+#[derive(Debug, Clone)]
+pub struct Obstacle {
+    /// Name, unique in the scene.
+    pub name: String,
+    /// Its shape, placed in the world.
+    pub placed: PlacedShape,
+}
+
+/// A file that the scene was made from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct InputFile {
+    /// What it is for: `scene`, `hand`, `urdf`, `srdf`, `mesh`.
+    pub role: String,
+    /// How the scene names it: relative to the scene file, or `package://`.
+    pub name: String,
+    /// Where it was found.
+    pub path: PathBuf,
+    /// SHA-256 of its bytes.
+    pub sha256: String,
+}
+
+/// Everything a planner plans in. Never changes after loading.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// Name: the scene file's name without its extension.
+    pub name: String,
+    /// The hand, already placed in the world: every pose it gives is in the world frame.
+    pub hand: Hand,
+    /// The object.
+    pub object: Object,
+    /// Obstacles.
+    pub obstacles: Vec<Obstacle>,
+    /// The files it was read from, the scene file first.
+    pub inputs: Vec<InputFile>,
+}
