@@ -178,7 +178,8 @@ impl Diagnostics {
 pub fn printable(text: &str) -> String {
     text.chars()
         .map(|c| {
-            let hostile = (c.is_control() && c != '\n') || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+            let hostile =
+                (c.is_control() && c != '\n') || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
             if hostile { '\u{fffd}' } else { c }
         })
         .collect()

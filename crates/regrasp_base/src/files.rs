@@ -23,9 +23,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>, InputError> {
     }
     let file = fs::File::open(path).map_err(|error| fail(format!("cannot be opened: {error}")))?;
     let mut bytes = Vec::new();
-    file.take(MAX_FILE_BYTES + 1)
-        .read_to_end(&mut bytes)
-        .map_err(|error| fail(format!("cannot be read: {error}")))?;
+    file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(|error| fail(format!("cannot be read: {error}")))?;
     if bytes.len() as u64 > MAX_FILE_BYTES {
         return Err(fail(format!("grew past the limit of {MAX_FILE_BYTES} bytes while it was read")));
     }

@@ -2,14 +2,14 @@
 //!
 //! Keyed random numbers, work budgets, diagnostics about input files, files that are written whole or not at all.
 
-/// Random numbers keyed by (seed, purpose, index).
-pub mod random;
 /// Work budgets, deadlines and interruption.
 pub mod budget;
 /// Errors in input files: every cause, with file, line, element, value seen, value expected and fix.
 pub mod diagnostic;
 /// Reading with a size cap, hashing, and writing through a temporary file.
 pub mod files;
+/// Random numbers keyed by (seed, purpose, index).
+pub mod random;
 
 pub use budget::{Budget, Interrupt};
 pub use diagnostic::{Diagnostic, InputError, Place};

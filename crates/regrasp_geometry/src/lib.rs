@@ -2,24 +2,24 @@
 //!
 //! Everything is `f64`, in metres. Transforms are `parent_from_child`.
 
-/// Poses, and motion between two poses.
-pub mod frame;
-/// Triangle meshes as read, validated, with their statistics.
-pub mod mesh;
-/// Convex hulls with adjacency, for support queries.
-pub mod hull;
-/// The shapes a link, an object or an obstacle can have.
-pub mod shape;
-/// Readers of mesh files: STL and OBJ.
-pub mod import;
-/// Surfaces one can sample by area, walk by geodesics, and ask for normals, curvature and creases.
-pub mod surface;
-/// Volume, centre of mass and inertia of solids.
-pub mod mass;
 /// Separation of shapes, at rest and along motions.
 pub mod collision;
+/// Poses, and motion between two poses.
+pub mod frame;
+/// Convex hulls with adjacency, for support queries.
+pub mod hull;
+/// Readers of mesh files: STL and OBJ.
+pub mod import;
+/// Volume, centre of mass and inertia of solids.
+pub mod mass;
+/// Triangle meshes as read, validated, with their statistics.
+pub mod mesh;
 /// Distance and penetration by parry: the checker's second way of knowing.
 pub mod reference;
+/// The shapes a link, an object or an obstacle can have.
+pub mod shape;
+/// Surfaces one can sample by area, walk by geodesics, and ask for normals, curvature and creases.
+pub mod surface;
 
 pub use frame::{Point, Pose, UnitVector, Vector, interpolate_pose, pose_from};
 pub use hull::ConvexHull;

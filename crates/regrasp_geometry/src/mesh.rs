@@ -210,7 +210,8 @@ mod tests {
     use super::*;
 
     fn tetrahedron() -> (Vec<Point>, Vec<[u32; 3]>) {
-        let vertices = vec![Point::origin(), Point::new(1.0, 0.0, 0.0), Point::new(0.0, 1.0, 0.0), Point::new(0.0, 0.0, 1.0)];
+        let vertices =
+            vec![Point::origin(), Point::new(1.0, 0.0, 0.0), Point::new(0.0, 1.0, 0.0), Point::new(0.0, 0.0, 1.0)];
         (vertices, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
     }
 

@@ -137,9 +137,7 @@ impl Hand {
 /// Errors: a mesh without an inside.
 pub fn convex_of(shape: &Shape) -> Result<Shape, regrasp_geometry::hull::HullError> {
     match shape {
-        Shape::Mesh(mesh) => {
-            Ok(Shape::Convex(Arc::new(regrasp_geometry::ConvexHull::new(mesh.vertices())?)))
-        }
+        Shape::Mesh(mesh) => Ok(Shape::Convex(Arc::new(regrasp_geometry::ConvexHull::new(mesh.vertices())?))),
         convex => Ok(convex.clone()),
     }
 }

@@ -2,14 +2,14 @@
 //!
 //! Models never change after loading; poses and joint values live with the caller.
 
-/// Links and joints of a robot, as read.
-pub mod robot;
 /// A hand: a palm and serial fingers.
 pub mod hand;
-/// Forward kinematics, Jacobians, inverse kinematics and motion bounds of serial chains.
-pub mod kinematics;
 /// Readers: URDF, SRDF, `package://` paths, hand files.
 pub mod import;
+/// Forward kinematics, Jacobians, inverse kinematics and motion bounds of serial chains.
+pub mod kinematics;
+/// Links and joints of a robot, as read.
+pub mod robot;
 
 pub use hand::{Finger, FingerId, FingerShape, Hand, Tip, TipShape};
 pub use kinematics::chain::{Chain, ChainJoint, Motion};

@@ -2,10 +2,10 @@
 
 /// The object that is manipulated.
 pub mod object;
-/// The scene: hand, object, obstacles.
-pub mod scene;
 /// What is asked: start and goal of the object, and how the grasps are given.
 pub mod query;
+/// The scene: hand, object, obstacles.
+pub mod scene;
 
 pub use object::Object;
 pub use query::{GraspRequest, InHandQuery};

@@ -111,8 +111,12 @@ impl Chain {
 /// Pose of the child frame in the joint frame at `position`.
 fn joint_motion(joint: &ChainJoint, position: f64) -> Pose {
     match joint.motion {
-        Motion::Turn => Pose::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&joint.axis, position)),
-        Motion::Slide => Pose::from_parts(Translation3::from(joint.axis.into_inner() * position), UnitQuaternion::identity()),
+        Motion::Turn => {
+            Pose::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&joint.axis, position))
+        }
+        Motion::Slide => {
+            Pose::from_parts(Translation3::from(joint.axis.into_inner() * position), UnitQuaternion::identity())
+        }
     }
 }
 
