@@ -1,4 +1,8 @@
 //! Forward kinematics, Jacobians, inverse kinematics and motion bounds of serial chains.
 
+/// Frames as rotation matrix and translation, for the hottest paths.
+pub mod body_frame;
 /// Serial chains, forward kinematics and Jacobians.
 pub mod chain;
+/// Sine and cosine together, the same bits on every machine.
+mod trig;
