@@ -4,5 +4,7 @@
 pub mod body_frame;
 /// Serial chains, forward kinematics and Jacobians.
 pub mod chain;
+/// Finger inverse kinematics to a point.
+pub mod finger_ik;
 /// Sine and cosine together, the same bits on every machine.
 mod trig;
