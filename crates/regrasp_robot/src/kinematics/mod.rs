@@ -6,5 +6,8 @@ pub mod body_frame;
 pub mod chain;
 /// Finger inverse kinematics to a point.
 pub mod finger_ik;
+/// Chains for tests.
+#[cfg(test)]
+mod samples;
 /// Sine and cosine together, the same bits on every machine.
 mod trig;

@@ -176,3 +176,6 @@ impl FingerIk {
         self.chain.last_frame(coordinates).transform_point(&self.center_in_body)
     }
 }
+
+#[cfg(test)]
+mod tests;
