@@ -101,11 +101,18 @@ impl NumericIk {
 
     /// A solution from one of the nearest seeds, in random order.
     pub fn solve_random(&self, target: &Point, settings: &IkSettings, rng: &mut Rng) -> Option<Coordinates> {
-        let mut nearest = self.nearest_seeds::<N_TRIES>(target, settings.preference.as_ref(), N_TRIES);
+        let preference = settings.preference.as_ref();
+        let mut nearest = self.nearest_seeds::<N_TRIES>(target, preference, N_TRIES);
         // Only the better half competes for the first try: the far seeds are there for hard targets.
         let half = nearest.len().div_ceil(2);
         rng.shuffle(&mut nearest[..half]);
-        nearest.into_iter().find_map(|seed| self.from_seed(target, seed, settings.preference.as_ref(), settings))
+        let found = nearest.into_iter().find_map(|seed| self.from_seed(target, seed, preference, settings));
+        if found.is_some() || preference.is_none() {
+            return found;
+        }
+        // The preference chose seeds too far from the target: reaching it comes first.
+        let nearest = self.nearest_seeds::<N_TRIES>(target, None, N_TRIES);
+        nearest.into_iter().find_map(|seed| self.from_seed(target, seed, None, settings))
     }
 
     /// Different solutions: the first follows the preference, the others are where random seeds led.

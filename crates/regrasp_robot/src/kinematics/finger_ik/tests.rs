@@ -165,6 +165,7 @@ fn a_margin_removes_what_is_too_near_to_the_limits() {
 #[test]
 fn tracking_stays_on_the_branch_or_refuses() {
     let mut rng = Rng::keyed(5, "track", 0);
+    let mut n_reached = 0;
     for _ in 0..60 {
         let (chain, center) = random_turning(3, 2.5, &mut rng);
         let ik = FingerIk::new(&chain, &center);
@@ -185,7 +186,10 @@ fn tracking_stays_on_the_branch_or_refuses() {
             let known = from.iter().zip(&to).map(|(a, b)| a + share * (b - a));
             assert!(known.zip(q).all(|(a, b)| (a - b).abs() < 1e-6), "left the branch; {outcome:?}");
         }
+        n_reached += path.len();
     }
+    println!("{n_reached} of 2400 waypoints before a singularity");
+    assert!(n_reached > 1200);
 }
 
 /// Share of random reachable targets that are solved, with `preference` or not.
@@ -217,7 +221,7 @@ fn numeric_solves_nearly_all_reachable_targets_of_allegro() {
         assert!(!ik.is_closed_form() && ik.is_redundant());
         let (plain, turned) = (success(&ik, 2000, false, &mut rng), success(&ik, 2000, true, &mut rng));
         println!("{tip}: {:.1} % solved, {:.1} % with a random preference", 100.0 * plain, 100.0 * turned);
-        assert!(plain >= 0.97 && turned >= 0.95, "{tip}: {plain} {turned}");
+        assert!(plain >= 0.97 && turned >= 0.99, "{tip}: {plain} {turned}");
     }
 }
 
