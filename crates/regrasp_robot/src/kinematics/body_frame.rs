@@ -38,13 +38,13 @@ impl BodyFrame {
     /// `point_in_base` of a point given in the body.
     #[inline]
     pub fn transform_point(&self, point_in_body: &Point) -> Point {
-        Point::from(self.rotation * point_in_body.coords + self.translation)
+        Point::from(apply(&self.rotation, &point_in_body.coords) + self.translation)
     }
 
     /// `vector_in_base` of a vector given in the body.
     #[inline]
     pub fn transform_vector(&self, vector_in_body: &Vector) -> Vector {
-        self.rotation * vector_in_body
+        apply(&self.rotation, vector_in_body)
     }
 
     /// `point_in_body` of a point given in the base frame.
@@ -64,8 +64,8 @@ impl BodyFrame {
     #[must_use]
     pub fn compose(&self, body_from_child: &BodyFrame) -> BodyFrame {
         BodyFrame {
-            rotation: self.rotation * body_from_child.rotation,
-            translation: self.rotation * body_from_child.translation + self.translation,
+            rotation: product(&self.rotation, &body_from_child.rotation),
+            translation: apply(&self.rotation, &body_from_child.translation) + self.translation,
         }
     }
 }
@@ -83,6 +83,13 @@ pub(super) struct PreparedJoint {
 
 #[derive(Debug, Clone)]
 enum PreparedMotion {
+    /// The axis is the joint frame's own x, y or z (0, 1, 2), or its opposite: only two columns mix.
+    TurnAligned {
+        /// Rotation of the joint frame in the parent body, unless it is the identity.
+        rotation: Option<Matrix3<f64>>,
+        axis: usize,
+        sign: f64,
+    },
     /// `parent_from_child` rotation is `constant + sin(q) * sine + cos(q) * cosine`.
     Turn { constant: Matrix3<f64>, sine: Matrix3<f64>, cosine: Matrix3<f64> },
     /// Constant rotation; the translation grows by `q * axis_in_parent`.
@@ -93,6 +100,11 @@ impl PreparedJoint {
     pub(super) fn new(joint: &ChainJoint) -> Self {
         let rotation = *joint.parent_from_joint.rotation.to_rotation_matrix().matrix();
         let motion = match joint.motion {
+            Motion::Turn if joint.axis.amax() == 1.0 => {
+                let axis = joint.axis.iamax();
+                let rotation = (rotation != Matrix3::identity()).then_some(rotation);
+                PreparedMotion::TurnAligned { rotation, axis, sign: joint.axis[axis] }
+            }
             Motion::Turn => {
                 let cross = joint.axis.cross_matrix();
                 let cross_squared = cross * cross;
@@ -118,19 +130,71 @@ impl PreparedJoint {
     pub(super) fn child_frame(&self, base_from_parent: &BodyFrame, coordinates: &[f64]) -> BodyFrame {
         let position = self.multiplier * coordinates[self.coordinate] + self.offset;
         match &self.motion {
+            PreparedMotion::TurnAligned { rotation, axis, sign } => {
+                let (s, c) = sin_cos(position);
+                let s = s * sign;
+                let joint = match rotation {
+                    Some(rotation) => product(&base_from_parent.rotation, rotation),
+                    None => base_from_parent.rotation,
+                };
+                let column = |k: usize| [joint[(0, k)], joint[(1, k)], joint[(2, k)]];
+                let mix = |first: [f64; 3], second: [f64; 3]| {
+                    let turned: [f64; 3] = std::array::from_fn(|i| c * first[i] + s * second[i]);
+                    let next: [f64; 3] = std::array::from_fn(|i| c * second[i] - s * first[i]);
+                    (turned, next)
+                };
+                let [x, y, z] = [column(0), column(1), column(2)];
+                let columns = match axis {
+                    0 => {
+                        let (y, z) = mix(y, z);
+                        [x, y, z]
+                    }
+                    1 => {
+                        let (z, x) = mix(z, x);
+                        [x, y, z]
+                    }
+                    _ => {
+                        let (x, y) = mix(x, y);
+                        [x, y, z]
+                    }
+                };
+                BodyFrame {
+                    rotation: Matrix3::from(columns),
+                    translation: apply(&base_from_parent.rotation, &self.translation) + base_from_parent.translation,
+                }
+            }
             PreparedMotion::Turn { constant, sine, cosine } => {
                 let (s, c) = sin_cos(position);
                 let parent_from_child = constant + sine * s + cosine * c;
                 BodyFrame {
-                    rotation: base_from_parent.rotation * parent_from_child,
-                    translation: base_from_parent.rotation * self.translation + base_from_parent.translation,
+                    rotation: product(&base_from_parent.rotation, &parent_from_child),
+                    translation: apply(&base_from_parent.rotation, &self.translation) + base_from_parent.translation,
                 }
             }
             PreparedMotion::Slide { rotation, axis_in_parent } => BodyFrame {
-                rotation: base_from_parent.rotation * rotation,
-                translation: base_from_parent.rotation * (self.translation + axis_in_parent * position)
+                rotation: product(&base_from_parent.rotation, rotation),
+                translation: apply(&base_from_parent.rotation, &(self.translation + axis_in_parent * position))
                     + base_from_parent.translation,
             },
         }
     }
+}
+
+/// Matrix times vector, written out: the general product of the library is not unrolled.
+#[inline(always)]
+fn apply(a: &Matrix3<f64>, v: &Vector) -> Vector {
+    Vector::new(
+        a.m11 * v.x + a.m12 * v.y + a.m13 * v.z,
+        a.m21 * v.x + a.m22 * v.y + a.m23 * v.z,
+        a.m31 * v.x + a.m32 * v.y + a.m33 * v.z,
+    )
+}
+
+/// Matrix times matrix, written out.
+#[inline(always)]
+fn product(a: &Matrix3<f64>, b: &Matrix3<f64>) -> Matrix3<f64> {
+    let column = |x: f64, y: f64, z: f64| {
+        [a.m11 * x + a.m12 * y + a.m13 * z, a.m21 * x + a.m22 * y + a.m23 * z, a.m31 * x + a.m32 * y + a.m33 * z]
+    };
+    Matrix3::from([column(b.m11, b.m21, b.m31), column(b.m12, b.m22, b.m32), column(b.m13, b.m23, b.m33)])
 }

@@ -181,7 +181,17 @@ mod tests {
 
     #[test]
     fn frames_agree_with_poses() {
-        let mut chain = chain();
+        for axis in [Vector::x(), Vector::y(), Vector::z(), -Vector::x(), -Vector::y(), -Vector::z()] {
+            let mut joints = chain().joints;
+            joints[1].axis = UnitVector::new_normalize(axis);
+            joints[1].parent_from_joint.rotation = UnitQuaternion::identity();
+            joints[3].axis = UnitVector::new_normalize(axis);
+            compare(Chain::new(joints, chain().names, chain().lower, chain().upper));
+        }
+        compare(chain());
+    }
+
+    fn compare(mut chain: Chain) {
         chain.place_at(&Pose::new(Vector::new(0.1, 0.2, -0.3), Vector::new(1.0, -0.4, 0.2)));
         let mut rng = regrasp_base::Rng::keyed(1, "frames", 0);
         let (mut poses, mut frames) = (Vec::new(), [BodyFrame::IDENTITY; 4]);
@@ -190,9 +200,10 @@ mod tests {
             chain.forward(&coordinates, &mut poses);
             chain.forward_frames(&coordinates, &mut frames);
             for (pose, frame) in poses.iter().zip(&frames) {
-                assert!((pose.to_homogeneous() - frame.to_pose().to_homogeneous()).abs().max() < 1e-13);
+                let difference = (pose.to_homogeneous() - frame.to_pose().to_homogeneous()).abs().max();
+                assert!(difference < 1e-13, "{difference:e}");
                 let point = Point::new(0.3, -0.1, 0.2);
-                assert!((pose * point - frame.transform_point(&point)).norm() < 1e-14);
+                assert!((pose * point - frame.transform_point(&point)).norm() < 1e-13);
                 assert!((pose.inverse() * point - frame.inverse_transform_point(&point)).norm() < 1e-13);
             }
         }

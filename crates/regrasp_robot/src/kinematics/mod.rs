@@ -6,6 +6,8 @@ pub mod body_frame;
 pub mod chain;
 /// Finger inverse kinematics to a point.
 pub mod finger_ik;
+/// Bounds on the motion of shapes while coordinates move along a line.
+pub mod motion_bound;
 /// Chains for tests.
 #[cfg(test)]
 mod samples;

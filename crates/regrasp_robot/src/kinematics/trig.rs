@@ -36,13 +36,12 @@ pub fn sin_cos(angle: f64) -> (f64, f64) {
                     + z * (2.480_158_728_947_673e-5
                         + z * (-2.755_731_435_139_066_3e-7
                             + z * (2.087_572_321_298_175e-9 + z * -1.135_964_755_778_819_5e-11)))));
-    let (mut s, mut c) = if quadrant & 1 == 0 { (sine, cosine) } else { (cosine, sine) };
-    if quadrant & 2 != 0 {
-        s = -s;
-    }
-    if (quadrant.wrapping_add(1)) & 2 != 0 {
-        c = -c;
-    }
+    // Without branches: the quadrant of a joint angle can't be predicted.
+    let swap = 0u64.wrapping_sub(quadrant & 1);
+    let (sine, cosine) = (sine.to_bits(), cosine.to_bits());
+    let difference = (sine ^ cosine) & swap;
+    let s = f64::from_bits((sine ^ difference) ^ ((quadrant & 2) << 62));
+    let c = f64::from_bits((cosine ^ difference) ^ ((quadrant.wrapping_add(1) & 2) << 62));
     (s, c)
 }
 
