@@ -11,7 +11,6 @@
 pub(crate) mod assemble;
 /// `hand.toml`, and hands guessed from a bare URDF.
 pub mod hand_file;
-mod mesh_stand_in;
 /// `package://` and relative paths, below allowed folders.
 pub mod resolve;
 /// SRDF: groups, end effectors, pairs of links that are not tested.

@@ -129,7 +129,7 @@ impl Meshes {
             let sha256 = files::sha256(&bytes);
             let input = LoadedInput { role: "mesh".into(), name: name.to_owned(), path: resolved.path.clone(), sha256 };
             self.inputs.push(input);
-            crate::import::mesh_stand_in::read_mesh(&resolved.path, &bytes).map(Arc::new)
+            regrasp_geometry::import::read_mesh(&resolved.path, &bytes).map(Arc::new)
         });
         self.read.insert(resolved.path, mesh.clone());
         mesh
