@@ -1,4 +1,5 @@
 //! Inverse kinematics against brute force: a dense grid of seeds, each polished by plain Newton steps.
+#![allow(clippy::print_stdout)] // measured rates
 
 use super::*;
 use crate::kinematics::samples::*;

@@ -8,11 +8,11 @@
 use super::quartic::roots_in_unit;
 use super::{Coordinates, IkSettings, POSITION_TOLERANCE};
 use crate::kinematics::body_frame::BodyFrame;
-use crate::kinematics::chain::{Chain, Motion};
+use crate::kinematics::chain::{Chain, ChainJoint, JointLine, Motion};
 use arrayvec::ArrayVec;
 use nalgebra::Matrix3;
 use regrasp_geometry::{Point, Vector};
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 /// Axes closer to meeting (share of the arm's length) or to parallel (sine) than this are treated as such; the
 /// substitution at the end repairs the difference.
@@ -38,6 +38,34 @@ struct Wave {
 impl Wave {
     fn at(&self, c: f64, s: f64) -> f64 {
         self.constant + self.cosine * c + self.sine * s
+    }
+}
+
+/// The angles that a joint can have, as an arc: angles outside are seen by two products, without an arc tangent.
+#[derive(Debug, Clone, Copy)]
+struct Window {
+    /// Cosine and sine of the arc's middle.
+    middle: (f64, f64),
+    /// Cosine of half its length; below -1 when it is the full circle.
+    cosine: f64,
+}
+
+impl Window {
+    fn new(joint: &ChainJoint, chain: &Chain) -> Self {
+        let at = |coordinate: f64| joint.multiplier * coordinate + joint.offset;
+        let (a, b) = (at(chain.lower[joint.coordinate]), at(chain.upper[joint.coordinate]));
+        let half = 0.5 * (b - a).abs() + 1e-6;
+        if half < PI {
+            let (sine, cosine) = (0.5 * (a + b)).sin_cos();
+            Window { middle: (cosine, sine), cosine: half.cos() }
+        } else {
+            Window { middle: (1.0, 0.0), cosine: -2.0 }
+        }
+    }
+
+    /// False when the angle whose cosine and sine are `c / length` and `s / length` is outside.
+    fn may_hold(&self, c: f64, s: f64, length: f64) -> bool {
+        c * self.middle.0 + s * self.middle.1 >= self.cosine * length - 1e-12 * length
     }
 }
 
@@ -73,6 +101,8 @@ pub struct ThreeR {
     twist_height: Wave,
     /// Per joint: coordinate, multiplier, offset.
     drives: [(usize, f64, f64); 3],
+    /// Per joint: the angles within its limits.
+    windows: [Window; 3],
     center_in_body: Point,
 }
 
@@ -158,6 +188,7 @@ impl ThreeR {
             half_square,
             twist_height,
             drives: joints.each_ref().map(|joint| (joint.coordinate, joint.multiplier, joint.offset)),
+            windows: joints.each_ref().map(|joint| Window::new(joint, chain)),
             center_in_body: *center_in_body,
         })
     }
@@ -248,6 +279,9 @@ impl ThreeR {
         known_is_y: bool,
         branches: &mut Branches,
     ) {
+        if !self.windows[2].may_hold(joint_3.0, joint_3.1, 1.0) {
+            return;
+        }
         let (x, y) = (self.x.at(joint_3.0, joint_3.1), self.y.at(joint_3.0, joint_3.1));
         let length_squared = x * x + y * y;
         let rest = length_squared - known * known;
@@ -276,17 +310,22 @@ impl ThreeR {
         rho: (f64, f64),
         branches: &mut Branches,
     ) {
-        let within = |joint: usize, angle: f64| {
+        let within = |joint: usize, s: f64, c: f64, length: f64| {
+            if !self.windows[joint].may_hold(c, s, length) {
+                return None;
+            }
+            let angle = s.atan2(c);
             let (k, multiplier, offset) = self.drives[joint];
             in_limits(angle, multiplier, offset, chain.lower[k] + limit_margin, chain.upper[k] - limit_margin)
         };
-        let Some(q3) = within(2, s.atan2(c)) else { return };
+        // Length of an unnormalised cosine and sine; rounding apart, of the turned arm it is the square of its length.
+        let Some(q3) = within(2, s, c, 1.0) else { return };
         let (x, y, height) = (self.x.at(c, s), self.y.at(c, s), self.height.at(c, s));
-        let Some(q2) = within(1, (x * rho.1 - y * rho.0).atan2(x * rho.0 + y * rho.1)) else { return };
+        let Some(q2) = within(1, x * rho.1 - y * rho.0, x * rho.0 + y * rho.1, x * x + y * y) else { return };
         let before = self.e1 * (self.offset + rho.0) + self.e2 * rho.1 + self.axis_2 * height;
         let turned = self.axis_1.dot(&before.cross(from_axis));
         let straight = before.dot(from_axis) - self.axis_1.dot(&before) * self.axis_1.dot(from_axis);
-        let Some(q1) = within(0, turned.atan2(straight)) else { return };
+        let Some(q1) = within(0, turned, straight, (turned * turned + straight * straight).sqrt()) else { return };
         let mut coordinates = [0.0; 3];
         for (q, drive) in [q1, q2, q3].into_iter().zip(&self.drives) {
             coordinates[drive.0] = q;
@@ -332,13 +371,11 @@ impl ThreeR {
 
     /// Jacobian of the tip, one column per coordinate.
     fn jacobian(&self, chain: &Chain, coordinates: &[f64]) -> Matrix3<f64> {
-        let mut frames = [BodyFrame::IDENTITY; 3];
-        chain.forward_frames(coordinates, &mut frames);
-        let tip = frames[2].transform_point(&self.center_in_body).coords;
+        let mut lines: ArrayVec<JointLine, 3> = ArrayVec::new();
+        let tip = chain.joint_lines(coordinates, &mut lines).transform_point(&self.center_in_body).coords;
         let mut jacobian = Matrix3::zeros();
-        for (joint, frame) in chain.joints.iter().zip(&frames) {
-            let axis = frame.rotation * joint.axis.into_inner();
-            jacobian.set_column(joint.coordinate, &(axis.cross(&(tip - frame.translation)) * joint.multiplier));
+        for (drive, line) in self.drives.iter().zip(&lines) {
+            jacobian.set_column(drive.0, &(line.axis.cross(&(tip - line.origin)) * drive.1));
         }
         jacobian
     }
