@@ -126,7 +126,7 @@ impl PreparedJoint {
     }
 
     /// `base_from_child`, where `base_from_parent` is given.
-    #[inline]
+    #[inline(always)]
     pub(super) fn child_frame(&self, base_from_parent: &BodyFrame, coordinates: &[f64]) -> BodyFrame {
         let position = self.multiplier * coordinates[self.coordinate] + self.offset;
         match &self.motion {
