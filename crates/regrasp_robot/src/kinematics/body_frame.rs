@@ -137,29 +137,14 @@ impl PreparedJoint {
                     Some(rotation) => product(&base_from_parent.rotation, rotation),
                     None => base_from_parent.rotation,
                 };
-                let column = |k: usize| [joint[(0, k)], joint[(1, k)], joint[(2, k)]];
-                let mix = |first: [f64; 3], second: [f64; 3]| {
-                    let turned: [f64; 3] = std::array::from_fn(|i| c * first[i] + s * second[i]);
-                    let next: [f64; 3] = std::array::from_fn(|i| c * second[i] - s * first[i]);
-                    (turned, next)
-                };
-                let [x, y, z] = [column(0), column(1), column(2)];
-                let columns = match axis {
-                    0 => {
-                        let (y, z) = mix(y, z);
-                        [x, y, z]
-                    }
-                    1 => {
-                        let (z, x) = mix(z, x);
-                        [x, y, z]
-                    }
-                    _ => {
-                        let (x, y) = mix(x, y);
-                        [x, y, z]
-                    }
+                let (x, y, z) = (joint.column(0), joint.column(1), joint.column(2));
+                let (x, y, z) = match axis {
+                    0 => (x.into(), y * c + z * s, z * c - y * s),
+                    1 => (x * c - z * s, y.into(), z * c + x * s),
+                    _ => (x * c + y * s, y * c - x * s, z.into()),
                 };
                 BodyFrame {
-                    rotation: Matrix3::from(columns),
+                    rotation: Matrix3::new(x.x, y.x, z.x, x.y, y.y, z.y, x.z, y.z, z.z),
                     translation: apply(&base_from_parent.rotation, &self.translation) + base_from_parent.translation,
                 }
             }
@@ -193,8 +178,16 @@ fn apply(a: &Matrix3<f64>, v: &Vector) -> Vector {
 /// Matrix times matrix, written out.
 #[inline(always)]
 fn product(a: &Matrix3<f64>, b: &Matrix3<f64>) -> Matrix3<f64> {
-    let column = |x: f64, y: f64, z: f64| {
-        [a.m11 * x + a.m12 * y + a.m13 * z, a.m21 * x + a.m22 * y + a.m23 * z, a.m31 * x + a.m32 * y + a.m33 * z]
-    };
-    Matrix3::from([column(b.m11, b.m21, b.m31), column(b.m12, b.m22, b.m32), column(b.m13, b.m23, b.m33)])
+    let entry = |x: f64, y: f64, z: f64, p: f64, q: f64, r: f64| x * p + y * q + z * r;
+    Matrix3::new(
+        entry(a.m11, a.m12, a.m13, b.m11, b.m21, b.m31),
+        entry(a.m11, a.m12, a.m13, b.m12, b.m22, b.m32),
+        entry(a.m11, a.m12, a.m13, b.m13, b.m23, b.m33),
+        entry(a.m21, a.m22, a.m23, b.m11, b.m21, b.m31),
+        entry(a.m21, a.m22, a.m23, b.m12, b.m22, b.m32),
+        entry(a.m21, a.m22, a.m23, b.m13, b.m23, b.m33),
+        entry(a.m31, a.m32, a.m33, b.m11, b.m21, b.m31),
+        entry(a.m31, a.m32, a.m33, b.m12, b.m22, b.m32),
+        entry(a.m31, a.m32, a.m33, b.m13, b.m23, b.m33),
+    )
 }
