@@ -26,6 +26,7 @@ const POLISHED: f64 = 1e-12;
 
 /// All branches: a 3R chain reaches a point in at most four ways.
 pub type Branches = ArrayVec<Coordinates, 8>;
+type Candidates = ArrayVec<[f64; 3], 8>;
 
 /// `constant + cosine * cos(q3) + sine * sin(q3)`.
 #[derive(Debug, Clone, Copy)]
@@ -196,6 +197,21 @@ impl ThreeR {
     /// Every branch within the limits.
     pub fn solve_all(&self, chain: &Chain, target: &Point, limit_margin: f64) -> Branches {
         let mut branches = Branches::new();
+        for mut candidate in self.candidates(chain, target, limit_margin) {
+            let error = self.tip_error(chain, target, &candidate);
+            if self.polish(chain, target, error, &mut candidate) && bring_inside(chain, limit_margin, &mut candidate) {
+                let is_same = |other: &Coordinates| other.iter().zip(&candidate).all(|(a, b)| (a - b).abs() < SAME);
+                if !branches.iter().any(is_same) {
+                    branches.push(candidate.into_iter().collect());
+                }
+            }
+        }
+        branches
+    }
+
+    /// Every branch within the limits as the formulas give it; coinciding ones twice.
+    fn candidates(&self, chain: &Chain, target: &Point, limit_margin: f64) -> Candidates {
+        let mut candidates = Candidates::new();
         let from_axis = target.coords - self.origin_1;
         // Distance and height equations: rho . e1 * offset = distance(q3), rho . e2 * twist_sine = rise(q3).
         let distance = Wave {
@@ -212,13 +228,13 @@ impl ThreeR {
             Axes::Meeting => {
                 for (c, s) in zeros_of(&distance) {
                     let rho_y = rise.at(c, s) / self.twist_sine;
-                    self.both_signs(chain, &from_axis, target, limit_margin, (c, s), rho_y, true, &mut branches);
+                    self.both_signs(chain, &from_axis, limit_margin, (c, s), rho_y, true, &mut candidates);
                 }
             }
             Axes::Parallel => {
                 for (c, s) in zeros_of(&rise) {
                     let rho_x = distance.at(c, s) / self.offset;
-                    self.both_signs(chain, &from_axis, target, limit_margin, (c, s), rho_x, false, &mut branches);
+                    self.both_signs(chain, &from_axis, limit_margin, (c, s), rho_x, false, &mut candidates);
                 }
             }
             Axes::Skew => {
@@ -226,11 +242,11 @@ impl ThreeR {
                 let rho_y = scaled(&rise, 1.0 / self.twist_sine);
                 for (c, s) in circle_zeros(&rho_x, &rho_y, &self.x, &self.y) {
                     let rho = (rho_x.at(c, s), rho_y.at(c, s));
-                    self.finish(chain, &from_axis, target, limit_margin, (c, s), rho, &mut branches);
+                    self.finish(chain, &from_axis, limit_margin, (c, s), rho, &mut candidates);
                 }
             }
         }
-        branches
+        candidates
     }
 
     /// The branch continuous with `seed`.
@@ -241,30 +257,43 @@ impl ThreeR {
         seed: &[f64],
         settings: &IkSettings,
     ) -> Option<Coordinates> {
-        let mut near: Option<Coordinates> = None;
+        let mut near = [0.0; 3];
         let mut n_near = 0;
-        for mut branch in self.solve_all(chain, target, settings.limit_margin) {
+        for mut candidate in self.candidates(chain, target, settings.limit_margin) {
             let mut largest: f64 = 0.0;
             for &(k, multiplier, _) in &self.drives {
                 let turn = TAU / multiplier.abs();
-                let unwound = branch[k] + ((seed[k] - branch[k]) / turn).round() * turn;
-                if unwound >= chain.lower[k] + settings.limit_margin
-                    && unwound <= chain.upper[k] - settings.limit_margin
-                {
-                    branch[k] = unwound;
+                // Joints with more than a full turn of room go on from where they are.
+                if (candidate[k] - seed[k]).abs() > 0.5 * turn {
+                    let unwound = candidate[k] + ((seed[k] - candidate[k]) / turn).round() * turn;
+                    if unwound >= chain.lower[k] + settings.limit_margin
+                        && unwound <= chain.upper[k] - settings.limit_margin
+                    {
+                        candidate[k] = unwound;
+                    }
                 }
-                largest = largest.max((branch[k] - seed[k]).abs());
+                largest = largest.max((candidate[k] - seed[k]).abs());
             }
             if largest <= settings.max_step {
                 n_near += 1;
-                near = Some(branch);
+                near = candidate;
             }
         }
         // Two branches within reach of one step meet in a singularity nearby: which one is continuous is not known.
-        let near = near.filter(|_| n_near == 1)?;
-        let before = self.jacobian(chain, seed).determinant();
-        let after = self.jacobian(chain, &near).determinant();
-        (before * after > 0.0).then_some(near)
+        if n_near != 1 {
+            return None;
+        }
+        let (tip, mut jacobian) = self.tip_and_jacobian(chain, &near);
+        let error = target.coords - tip;
+        if error.norm_squared() >= POLISHED * POLISHED {
+            if !self.polish(chain, target, error, &mut near) {
+                return None;
+            }
+            jacobian = self.tip_and_jacobian(chain, &near).1;
+        }
+        let before = self.tip_and_jacobian(chain, seed).1.determinant();
+        let same_side = before * jacobian.determinant() > 0.0;
+        (same_side && bring_inside(chain, settings.limit_margin, &mut near)).then(|| near.into_iter().collect())
     }
 
     /// One component of the rotated arm is known; the other follows from its length, up to the sign.
@@ -272,12 +301,11 @@ impl ThreeR {
         &self,
         chain: &Chain,
         from_axis: &Vector,
-        target: &Point,
         limit_margin: f64,
         joint_3: (f64, f64),
         known: f64,
         known_is_y: bool,
-        branches: &mut Branches,
+        candidates: &mut Candidates,
     ) {
         if !self.windows[2].may_hold(joint_3.0, joint_3.1, 1.0) {
             return;
@@ -291,24 +319,22 @@ impl ThreeR {
         let other = rest.max(0.0).sqrt();
         for other in [other, -other] {
             let rho = if known_is_y { (other, known) } else { (known, other) };
-            self.finish(chain, from_axis, target, limit_margin, joint_3, rho, branches);
+            self.finish(chain, from_axis, limit_margin, joint_3, rho, candidates);
             if other == 0.0 {
                 break;
             }
         }
     }
 
-    /// Joint 2 turns the arm's `(x, y)` to `rho`, joint 1 brings it to the target; keeps what is within the limits
-    /// and holds when substituted.
+    /// Joint 2 turns the arm's `(x, y)` to `rho`, joint 1 brings it to the target; keeps what is within the limits.
     fn finish(
         &self,
         chain: &Chain,
         from_axis: &Vector,
-        target: &Point,
         limit_margin: f64,
         (c, s): (f64, f64),
         rho: (f64, f64),
-        branches: &mut Branches,
+        candidates: &mut Candidates,
     ) {
         let within = |joint: usize, s: f64, c: f64, length: f64| {
             if !self.windows[joint].may_hold(c, s, length) {
@@ -330,37 +356,27 @@ impl ThreeR {
         for (q, drive) in [q1, q2, q3].into_iter().zip(&self.drives) {
             coordinates[drive.0] = q;
         }
-        if !self.polish(chain, target, &mut coordinates) {
-            return;
-        }
-        for (k, q) in coordinates.iter_mut().enumerate() {
-            let inside = q.max(chain.lower[k] + limit_margin).min(chain.upper[k] - limit_margin);
-            if (inside - *q).abs() > LIMIT_ROUNDING {
-                return;
-            }
-            *q = inside;
-        }
-        let known = branches.iter().any(|other| other.iter().zip(&coordinates).all(|(a, b)| (a - b).abs() < SAME));
-        if !known && !branches.is_full() {
-            branches.push(coordinates.into_iter().collect());
+        if !candidates.is_full() {
+            candidates.push(coordinates);
         }
     }
 
     /// Newton steps until the tip is on the target; false when it is not reached.
-    fn polish(&self, chain: &Chain, target: &Point, coordinates: &mut [f64; 3]) -> bool {
-        let mut error = target - chain.last_frame(coordinates).transform_point(&self.center_in_body);
+    fn polish(&self, chain: &Chain, target: &Point, error: Vector, coordinates: &mut [f64; 3]) -> bool {
+        let mut error = error;
         for _ in 0..4 {
             if error.norm_squared() < POLISHED * POLISHED {
                 return true;
             }
-            let Some(step) = self.jacobian(chain, coordinates).try_inverse().map(|inverse| inverse * error) else {
+            let (_, jacobian) = self.tip_and_jacobian(chain, coordinates);
+            let Some(step) = jacobian.try_inverse().map(|inverse| inverse * error) else {
                 break;
             };
             if !step.iter().all(|change| change.abs() < 0.1) {
                 break;
             }
             let moved = [coordinates[0] + step.x, coordinates[1] + step.y, coordinates[2] + step.z];
-            let moved_error = target - chain.last_frame(&moved).transform_point(&self.center_in_body);
+            let moved_error = self.tip_error(chain, target, &moved);
             if moved_error.norm_squared() >= error.norm_squared() {
                 break;
             }
@@ -369,16 +385,31 @@ impl ThreeR {
         error.norm_squared() < POSITION_TOLERANCE * POSITION_TOLERANCE
     }
 
-    /// Jacobian of the tip, one column per coordinate.
-    fn jacobian(&self, chain: &Chain, coordinates: &[f64]) -> Matrix3<f64> {
+    /// From the tip to the target.
+    fn tip_error(&self, chain: &Chain, target: &Point, coordinates: &[f64; 3]) -> Vector {
+        target - chain.last_frame(coordinates).transform_point(&self.center_in_body)
+    }
+
+    /// The tip, and its Jacobian with one column per coordinate.
+    fn tip_and_jacobian(&self, chain: &Chain, coordinates: &[f64]) -> (Vector, Matrix3<f64>) {
         let mut lines: ArrayVec<JointLine, 3> = ArrayVec::new();
         let tip = chain.joint_lines(coordinates, &mut lines).transform_point(&self.center_in_body).coords;
         let mut jacobian = Matrix3::zeros();
         for (drive, line) in self.drives.iter().zip(&lines) {
             jacobian.set_column(drive.0, &(line.axis.cross(&(tip - line.origin)) * drive.1));
         }
-        jacobian
+        (tip, jacobian)
     }
+}
+
+/// Removes rounding beyond the limits; false when it is more than rounding.
+fn bring_inside(chain: &Chain, limit_margin: f64, coordinates: &mut [f64; 3]) -> bool {
+    coordinates.iter_mut().enumerate().all(|(k, q)| {
+        let inside = q.max(chain.lower[k] + limit_margin).min(chain.upper[k] - limit_margin);
+        let excess = (inside - *q).abs();
+        *q = inside;
+        excess <= LIMIT_ROUNDING
+    })
 }
 
 /// Points of two lines that are nearest to each other; for parallel lines the second line's own point and its foot.
