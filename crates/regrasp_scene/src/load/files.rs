@@ -54,7 +54,9 @@ impl<'a> Files<'a> {
         }
         if name.trim().is_empty() {
             return Err(Box::new(
-                entry.error("S110", found, "is empty").expected("a path relative to the scene file, or package://NAME/PATH"),
+                entry
+                    .error("S110", found, "is empty")
+                    .expected("a path relative to the scene file, or package://NAME/PATH"),
             ));
         }
         let path = self.scene.parent().unwrap_or(Path::new("")).join(name);

@@ -116,7 +116,8 @@ fn placed(
     table: &Table,
     found: &mut Found,
 ) -> Option<(Shape, f64, Point)> {
-    let needs_solid = read.origin == Origin::Center || given_center.is_none() || matches!(mass, Some(GivenMass::Density(_)));
+    let needs_solid =
+        read.origin == Origin::Center || given_center.is_none() || matches!(mass, Some(GivenMass::Density(_)));
     let solid: Option<SolidProperties> = if needs_solid {
         match solid_properties(&read.shape) {
             Ok(solid) => Some(solid),
@@ -164,14 +165,19 @@ fn center_is_inside(shape: &Shape, center: &Point, entry: &Entry, found: &mut Fo
     }
     let diagnostic = entry
         .error("S107", found, format!("is {:?}, outside the object", [center.x, center.y, center.z]))
-        .expected(format!("a point of the object frame between {:.4?} and {:.4?}", low.coords.as_slice(), high.coords.as_slice()));
+        .expected(format!(
+            "a point of the object frame between {:.4?} and {:.4?}",
+            low.coords.as_slice(),
+            high.coords.as_slice()
+        ));
     found.diagnostics.push(diagnostic);
     None
 }
 
 /// Reads `[[obstacles]]`. Errors: two of one name (`S112`).
 pub(super) fn obstacles(root: &mut Table, files: &mut Files, found: &mut Found) -> Vec<Obstacle> {
-    let entries = root.optional("obstacles").and_then(|entry| entry.entries(found, "tables [[obstacles]]")).unwrap_or_default();
+    let entries =
+        root.optional("obstacles").and_then(|entry| entry.entries(found, "tables [[obstacles]]")).unwrap_or_default();
     let mut obstacles: Vec<Obstacle> = Vec::new();
     for entry in entries {
         let Some(obstacle) = obstacle(&entry, files, found) else { continue };
@@ -194,7 +200,8 @@ fn obstacle(entry: &Entry, files: &mut Files, found: &mut Found) -> Option<Obsta
     table.finish(found);
     let (name, read, pose) = (name?, read?, pose?);
     if read.origin != Origin::File {
-        let diagnostic = entry.error("S107", found, "has a mesh with an origin").fix("place the obstacle by its position instead");
+        let diagnostic =
+            entry.error("S107", found, "has a mesh with an origin").fix("place the obstacle by its position instead");
         found.diagnostics.push(diagnostic);
         return None;
     }
