@@ -54,12 +54,15 @@ impl<'a> Files<'a> {
         }
         if name.trim().is_empty() {
             return Err(Box::new(
-                entry.error("S110", found, "is empty").expected("a path relative to the scene file, or package://NAME/PATH"),
+                entry
+                    .error("S110", found, "is empty")
+                    .expected("a path relative to the scene file, or package://NAME/PATH"),
             ));
         }
         let path = self.scene.parent().unwrap_or(Path::new("")).join(name);
         if path.is_file() {
-            return Ok((path, Vec::new()));
+            let remark = format!("{} is an absolute path \"{name}\": the scene works on this machine only", entry.name);
+            return Ok((path, if Path::new(name).is_absolute() { vec![remark] } else { Vec::new() }));
         }
         let problem = if path.exists() { "is not a file" } else { "does not exist" };
         Err(Box::new(
