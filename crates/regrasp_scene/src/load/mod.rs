@@ -9,6 +9,7 @@ mod files;
 mod object;
 mod pose;
 mod shape;
+mod stand_in;
 mod table;
 mod task;
 mod units;
