@@ -310,7 +310,7 @@ fn make_chain(
     found: &mut Diagnostics,
 ) -> Option<Chain> {
     let independent: Vec<JointId> = joints.iter().copied().filter(|j| robot.joints[j.0].mimic.is_none()).collect();
-    let mut chain = Chain { joints: Vec::new(), names: Vec::new(), lower: Vec::new(), upper: Vec::new() };
+    let mut chain = Chain::new(Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for id in &independent {
         let joint = &robot.joints[id.0];
         chain.names.push(joint.name.clone());
@@ -361,7 +361,7 @@ fn make_chain(
             complete = false;
         }
     }
-    complete.then_some(chain)
+    complete.then(|| Chain::new(chain.joints, chain.names, chain.lower, chain.upper))
 }
 
 fn rest_posture(spec: &FingerSpec, chain: &Chain, found: &mut Diagnostics) -> Vec<f64> {
