@@ -3,6 +3,7 @@
 //! Fixed joints are folded into bodies. A finger is the serial chain from the base to its tip link. What no finger
 //! joint moves is palm; moving joints that belong to no finger are held at the position nearest to zero.
 
+use super::tip_split;
 use crate::hand::{Finger, FingerShape, Hand, PalmShape, Tip, TipShape, convex_of};
 use crate::kinematics::chain::{Chain, ChainJoint, Motion};
 use crate::robot::{Joint, JointId, JointKind, LinkId, Robot};
@@ -41,7 +42,7 @@ pub(crate) struct FingerSpec {
 }
 
 /// A tip to be made; points are in the frame of the tip link.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub(crate) enum TipSpec {
     Sphere { radius: f64, center: Point },
     Point { position: Point },
@@ -250,17 +251,25 @@ fn make_finger(
     found: &mut Diagnostics,
 ) -> Option<Finger> {
     let chain = make_chain(robot, spec, joints, carried, found)?;
+    let tip_at = carried.get(&spec.tip_link)?;
     let mut shapes = Vec::new();
     for (&link, at) in carried {
         let Body::Finger { finger, body } = at.body else { continue };
-        if finger == index {
-            let placed = hulls.of_link(link, &at.body_from_link, found);
-            let is_tip = link == spec.tip_link;
-            shapes.extend(placed.into_iter().map(|placed| FingerShape { body, link, placed, is_tip }));
+        if finger != index {
+            continue;
+        }
+        let placed = hulls.of_link(link, &at.body_from_link, found);
+        match &spec.tip {
+            TipSpec::Sphere { radius, center } if link == spec.tip_link => {
+                shapes.extend(tip_split::split(placed, link, body, &(tip_at.body_from_link * center), *radius));
+            }
+            _ => {
+                let is_tip = link == spec.tip_link;
+                shapes.extend(placed.into_iter().map(|placed| FingerShape { body, link, placed, is_tip }));
+            }
         }
     }
     shapes.sort_by_key(|shape| (shape.body, shape.link));
-    let tip_at = carried.get(&spec.tip_link)?;
     let (center, shape) = match &spec.tip {
         TipSpec::Sphere { radius, center } => (center, TipShape::Sphere { radius: *radius }),
         TipSpec::Point { position } => (position, TipShape::Point),
