@@ -61,7 +61,8 @@ impl<'a> Files<'a> {
         }
         let path = self.scene.parent().unwrap_or(Path::new("")).join(name);
         if path.is_file() {
-            return Ok((path, Vec::new()));
+            let remark = format!("{} is an absolute path \"{name}\": the scene works on this machine only", entry.name);
+            return Ok((path, if Path::new(name).is_absolute() { vec![remark] } else { Vec::new() }));
         }
         let problem = if path.exists() { "is not a file" } else { "does not exist" };
         Err(Box::new(
@@ -81,7 +82,7 @@ impl<'a> Files<'a> {
     pub fn mesh(&mut self, entry: &Entry, found: &mut Found) -> Option<TriangleMesh> {
         let path = self.locate(entry, found)?;
         let read = files::read(&path).and_then(|bytes| {
-            let mesh = regrasp_geometry::import::read_mesh(&path, &bytes)?;
+            let mesh = super::stand_in::read_mesh(&path, &bytes)?;
             Ok((bytes, mesh))
         });
         match read {

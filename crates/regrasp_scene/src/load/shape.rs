@@ -62,7 +62,7 @@ pub(super) fn shape(table: &mut Table, files: &mut Files, found: &mut Found) -> 
     let shape = primitive(kind, &mut inside, found);
     inside.finish(found);
     let shape = shape?;
-    has_likely_size(&shape, kind, found).then(|| ReadShape { shape, origin: Origin::File })
+    has_likely_size(&shape, kind, found).then_some(ReadShape { shape, origin: Origin::File })
 }
 
 fn primitive(kind: &Entry, table: &mut Table, found: &mut Found) -> Option<Shape> {
@@ -164,7 +164,7 @@ fn mesh(kind: &Entry, files: &mut Files, found: &mut Found) -> Option<ReadShape>
             }
         },
     };
-    has_likely_size(&shape, kind, found).then(|| ReadShape { shape, origin })
+    has_likely_size(&shape, kind, found).then_some(ReadShape { shape, origin })
 }
 
 /// One factor, or one per axis; negative mirrors. Errors: zero (`S107`).
