@@ -1,4 +1,5 @@
 //! Bundled and shared hands against published dimensions.
+#![allow(clippy::print_stdout)] // says when it skips
 
 use regrasp_base::Rng;
 use regrasp_geometry::Point;

@@ -101,12 +101,6 @@ pub(crate) struct Meshes {
 }
 
 impl Meshes {
-    /// Meshes below the allowed folders of `options`.
-    #[cfg(test)]
-    pub(crate) fn new(options: &LoadOptions) -> Self {
-        Meshes { options: options.clone(), read: BTreeMap::new(), inputs: Vec::new() }
-    }
-
     /// The mesh file called `name` in the reader's file; remarks go to `notes`.
     fn get(
         &mut self,
