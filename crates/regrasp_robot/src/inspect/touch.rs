@@ -115,7 +115,8 @@ impl<'h> Touch<'h> {
                 .iter()
                 .map(|finger| {
                     let ends = finger.chain.lower.iter().zip(&finger.chain.upper);
-                    ends.map(|(low, high)| rng.uniform(low.max(-PI), high.min(PI))).collect()
+                    let finite = |end: f64| if end.is_finite() { end } else { PI.copysign(end) };
+                    ends.map(|(&low, &high)| rng.uniform(finite(low), finite(high))).collect()
                 })
                 .collect();
             for (count, touches) in counts.iter_mut().zip(self.touching(&posture)) {
