@@ -15,7 +15,7 @@ use regrasp_base::Rng;
 use regrasp_geometry::{Point, Vector};
 
 /// Seeds in the table.
-const N_SEEDS: usize = 192;
+const N_SEEDS: usize = 96;
 /// Seeds tried for one solution before giving up.
 const N_TRIES: usize = 6;
 /// Newton steps from one seed.
@@ -23,7 +23,7 @@ const MAX_STEPS: usize = 16;
 /// Newton steps of a warm start.
 const MAX_WARM_STEPS: usize = 8;
 /// First steps of each solution that also follow the preference, from a seed and from a warm start.
-const PREFERENCE_STEPS: [usize; 2] = [5, 1];
+const PREFERENCE_STEPS: [usize; 2] = [3, 1];
 /// Longest change of a coordinate in one step, in radians or metres.
 const LONGEST_STEP: f64 = 0.6;
 /// Solutions closer than this in every coordinate are one; for redundant chains, and for others.
