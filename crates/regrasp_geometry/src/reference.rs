@@ -23,6 +23,9 @@ mod tests;
 /// Distances below this, in m, are always computed, even when less is asked for.
 const SMALLEST_MAX: f64 = 1e-6;
 
+/// Penetration, in m, that is looked at a second time.
+const SHALLOW: f64 = 1e-5;
+
 /// Steps that widen a slab.
 const MAX_STEPS: usize = 40;
 
@@ -268,6 +271,7 @@ fn between_convex(a: &Convex, b: &Convex, a_from_b: &ParryPose, max: f64) -> Ans
     let margins = a.margin + b.margin;
     let first_axis = a_from_b.translation.try_normalize().unwrap_or(ParryVector::X);
     let mut simplex = VoronoiSimplex::new();
+    let mut shallow = Answer::Unresolved;
     // GJK may stall on curved shapes; a start from another side mostly helps.
     for axis in [first_axis, ParryVector::new(0.36, 0.48, 0.8), ParryVector::new(-0.8, 0.36, 0.48)] {
         simplex.reset(CsoPoint::from_shapes(a_from_b, &a.core, &b.core, axis));
@@ -275,7 +279,14 @@ fn between_convex(a: &Convex, b: &Convex, a_from_b: &ParryPose, max: f64) -> Ans
         let (axes, reached) = match result {
             GJKResult::ClosestPoints(p, q, axis) => ([(q - p).normalize_or_zero(), axis], (q - p).length()),
             GJKResult::NoIntersection(axis) | GJKResult::Proximity(axis) => ([axis, axis], f64::INFINITY),
-            GJKResult::Intersection => return penetration(a, b, a_from_b, &simplex),
+            GJKResult::Intersection => {
+                // Curved shapes nearly in touch can look so from one side.
+                match penetration(a, b, a_from_b, &simplex) {
+                    Answer::Penetrating(depth) if depth < SHALLOW => shallow = Answer::Penetrating(depth),
+                    answer => return answer,
+                }
+                continue;
+            }
         };
         // The width of the widest slab confirmed is a lower bound of the distance, `reached` an upper bound.
         let gap = widest_slab(a, b, a_from_b, &axes, reached - margins);
@@ -286,7 +297,7 @@ fn between_convex(a: &Convex, b: &Convex, a_from_b: &ParryPose, max: f64) -> Ans
             return Answer::Penetrating(margins - reached);
         }
     }
-    Answer::Unresolved
+    shallow
 }
 
 /// Width of the widest slab found between `a` and `b`, starting across `axes`; not above zero when none separates them.
@@ -340,11 +351,12 @@ fn penetration(a: &Convex, b: &Convex, a_from_b: &ParryPose, simplex: &VoronoiSi
     match EPA::new().closest_points(a_from_b, &a.core, &b.core, simplex) {
         Some((p, q, normal)) => {
             // GJK takes the narrowest gaps for contact; the axis found may still separate.
-            let gap = widest_slab(a, b, a_from_b, &[normal, -normal], f64::INFINITY);
+            let depth = -(q - p).dot(normal);
+            let reached = if depth < SHALLOW { SHALLOW } else { f64::INFINITY };
+            let gap = widest_slab(a, b, a_from_b, &[normal, -normal], reached);
             if gap > 0.0 {
                 return Answer::SeparatedBy(gap);
             }
-            let depth = -(q - p).dot(normal);
             if depth.is_finite() {
                 Answer::Penetrating(depth.max(0.0) + a.margin + b.margin)
             } else {
