@@ -62,7 +62,7 @@ fn placed_at(a: &Shape, b: &Shape, gap: f64, rng: &mut Rng) -> (Pose, Pose, Poin
 }
 
 /// Runs `n` pairs of each two kinds; returns how many were unresolved although apart by 1e-9 m or more, and for how many
-/// the lower bound was off by more than 2e-8 m.
+/// the lower bound was off by more than 2e-8 m or a gap of 1e-6 m was not seen.
 fn cross_check(n: usize) -> (usize, usize) {
     let (mut n_unresolved, mut n_loose) = (0, 0);
     for kind_a in 0..N_KINDS {
@@ -99,15 +99,19 @@ fn cross_check(n: usize) -> (usize, usize) {
                         }
                     }
                     Answer::Penetrating(depth) => {
-                        // What is apart by a nanometre may count as touching.
-                        assert!(gap <= 1e-12 || (gap < 2e-9 && depth < 1e-9), "{names:?} {depth}");
+                        // What is apart by a micrometre or less may, rarely, count as touching.
+                        assert!(gap <= 1e-12 || (gap < 2e-6 && depth < SHALLOW), "{names:?} {depth}");
+                        n_loose += usize::from(gap > 2e-9);
                         let on_b = world_from_a.inverse_transform_point(&nearest_of_b);
                         let inside = -Surface::of(&a).unwrap().signed_distance(&on_b);
-                        assert!(depth >= 0.0 && depth <= -gap * (1.0 + 1e-6) + 1e-9, "{names:?} {depth} {inside}");
+                        assert!(
+                            depth >= 0.0 && (gap > 0.0 || depth <= -gap * (1.0 + 1e-6) + SHALLOW),
+                            "{names:?} {depth} {inside}"
+                        );
                     }
                     Answer::Unresolved => n_unresolved += usize::from(gap >= 1e-9),
                 }
-                if gap.abs() >= 1e-6 && answer != Answer::Unresolved && back != Answer::Unresolved {
+                if gap.abs() > 2e-6 && answer != Answer::Unresolved && back != Answer::Unresolved {
                     let is_apart = |answer: Answer| matches!(answer, Answer::SeparatedBy(_));
                     assert_eq!(is_apart(answer), is_apart(back), "{names:?}");
                 }
