@@ -283,6 +283,7 @@ fn between_convex(a: &Convex, b: &Convex, a_from_b: &ParryPose, max: f64) -> Ans
                 // Curved shapes nearly in touch can look so from one side.
                 match penetration(a, b, a_from_b, &simplex) {
                     Answer::Penetrating(depth) if depth < SHALLOW => shallow = Answer::Penetrating(depth),
+                    Answer::Unresolved => {}
                     answer => return answer,
                 }
                 continue;
@@ -357,7 +358,10 @@ fn penetration(a: &Convex, b: &Convex, a_from_b: &ParryPose, simplex: &VoronoiSi
             if gap > 0.0 {
                 return Answer::SeparatedBy(gap);
             }
-            if depth.is_finite() {
+            // Along the axis of least penetration the shapes overlap by just the depth; EPA sometimes finds another
+            // (parry#378).
+            let overlap = -slab(a, b, a_from_b, normal).0 - a.margin - b.margin;
+            if (overlap - depth).abs() <= 1e-6 + 1e-3 * depth {
                 Answer::Penetrating(depth.max(0.0) + a.margin + b.margin)
             } else {
                 Answer::Unresolved
