@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// Number of pieces of the finest chain.
 const PIECES: usize = 32;
 /// Sweeps per level; the coarse levels converge in fewer.
-const MAX_SWEEPS: usize = 60;
+const MAX_SWEEPS: usize = 100;
 /// Number of pieces of the coarsest chain that is straightened.
 const COARSEST: usize = 8;
 
@@ -40,18 +40,26 @@ pub(super) fn straightened(
             points = refined(&points, &surface);
         }
         straighten(&mut points, &surface);
-        let length = length_of(&points, &surface);
+        if !is_even(&points) {
+            // It jumped across a thin solid.
+            continue;
+        }
+        let length = lengths_of(&points, &surface)[points.len() - 1];
         if length.is_finite() && best.as_ref().is_none_or(|(shortest, _)| length < *shortest) {
             best = Some((length, points));
         }
     }
     let (_, mut points) = best?;
     while points.len() <= PIECES {
-        points = refined(&points, &surface);
+        let finer = refined(&points, &surface);
+        points = finer.clone();
         straighten(&mut points, &surface);
+        if !is_even(&points) {
+            points = finer;
+        }
     }
-    let length = length_of(&points, &surface);
-    Some(Geodesic::smooth(points, length, Arc::new(surface)))
+    let lengths = lengths_of(&points, &surface);
+    Some(Geodesic::smooth(points, lengths, Arc::new(surface)))
 }
 
 /// The chain with a point between each two.
@@ -63,6 +71,13 @@ fn refined(points: &[Point], surface: &impl SurfaceKind) -> Vec<Point> {
     }
     finer.extend(points.last());
     finer
+}
+
+/// Whether no piece is longer than twice the mean, as in a chain pulled straight.
+fn is_even(points: &[Point]) -> bool {
+    let pieces = || points.windows(2).map(|pair| (pair[1] - pair[0]).norm());
+    let mean = pieces().sum::<f64>() / (points.len() - 1) as f64;
+    pieces().all(|piece| piece <= 2.0 * mean)
 }
 
 /// Moves each inner point towards the middle of its neighbours until that moves nothing.
@@ -79,21 +94,23 @@ fn straighten(points: &mut [Point], surface: &impl SurfaceKind) {
             moved = moved.max((target - points[i]).norm());
             points[i] = target;
         }
-        if moved < 1e-5 * size {
+        if moved < 1e-6 * size {
             break;
         }
     }
 }
 
-/// Length of the arcs over the chords, from the turn of the normal between their ends.
-fn length_of(points: &[Point], surface: &impl SurfaceKind) -> f64 {
+/// Length up to each point, along the arcs over the chords, from the turn of the normal between their ends.
+fn lengths_of(points: &[Point], surface: &impl SurfaceKind) -> Vec<f64> {
     let mut length = 0.0;
+    let mut lengths = vec![length];
     let mut normal = surface.project(&points[0]).normal_in_object;
     for pair in points.windows(2) {
         let next = surface.project(&pair[1]).normal_in_object;
         let half = 0.5 * normal.cross(&next).norm().atan2(normal.dot(&next));
         length += (pair[1] - pair[0]).norm() * if half < 1e-6 { 1.0 } else { half / half.sin() };
+        lengths.push(length);
         normal = next;
     }
-    length
+    lengths
 }
