@@ -145,7 +145,11 @@ fn without_loops(strip: &[u32]) -> Vec<u32> {
     let mut place_of = BTreeMap::new();
     for &i in strip {
         match place_of.get(&i) {
-            Some(&place) => kept.drain(place + 1..).for_each(|dropped| drop(place_of.remove(&dropped))),
+            Some(&place) => {
+                for dropped in kept.drain(place + 1..) {
+                    place_of.remove(&dropped);
+                }
+            }
             None => {
                 place_of.insert(i, kept.len());
                 kept.push(i);

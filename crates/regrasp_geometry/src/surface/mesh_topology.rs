@@ -107,8 +107,7 @@ impl Topology {
         // First across the edge that leaves the vertex, then, unless the fan closed, across the one that enters it.
         for side in [0, 2] {
             let mut at = i;
-            loop {
-                let Some(corner) = self.corner_at(at, vertex) else { break };
+            while let Some(corner) = self.corner_at(at, vertex) {
                 let edge = (corner + side) % 3;
                 let next = self.neighbours[at][edge];
                 if next == NONE || is_barrier(at, edge) {
