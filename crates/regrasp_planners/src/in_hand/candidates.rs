@@ -1,6 +1,7 @@
 //! Contacts that a finger could take, and how far it could follow with them.
 
 use super::model::Model;
+use super::relocate::{Foothold, lift_is_within_reach};
 use super::transfer::ik_settings;
 use super::workspace::{TipMode, Workspace, tip_target};
 use regrasp_base::Rng;
@@ -64,7 +65,7 @@ pub fn draw_contact(model: &Model, finger: usize, world_from_object: &Placement,
     Some(Contact { point_in_object: hit.point_in_object, normal_in_object: hit.normal_in_object })
 }
 
-/// Joints of `finger` at `contact`, clear of everything but the other fingers; the workspace has the object in place.
+/// Joints of `finger` at `contact` from which it can be lifted again, clear of everything but the other fingers; the workspace has the object in place.
 pub fn reach(
     workspace: &mut Workspace,
     finger: usize,
@@ -76,6 +77,9 @@ pub fn reach(
     let normal = UnitVector::new_unchecked(world_from_object.vector(&contact.normal_in_object));
     let target = tip_target(world_from_object, contact, model.fingers[finger].tip_radius);
     let joints = model.fingers[finger].ik.solve_random(&target, &ik_settings(model, finger, normal), rng)?;
+    if !lift_is_within_reach(model, world_from_object, finger, &Foothold { contact, joints: &joints }) {
+        return None;
+    }
     workspace.set_finger(finger, &joints);
     let mode = TipMode::Near { finger, normal_in_world: normal.into_inner() };
     workspace.finger_alone_is_clear(finger, mode).then_some(joints)

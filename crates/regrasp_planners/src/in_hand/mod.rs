@@ -108,6 +108,6 @@ fn solve(
     let (start, mut steps) = match search.model().settings.method {
         Method::Gait | Method::Visibility | Method::Classic => gait::grow(search, start, goal)?,
     };
-    shorten::shorten(search, &start, &mut steps, goal.is_none())?;
+    shorten::shorten(search, &start, &mut steps, goal.is_none());
     Ok((start, steps))
 }
