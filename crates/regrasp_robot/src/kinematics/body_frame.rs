@@ -1,0 +1,120 @@
+//! Joints with their constant parts multiplied out, for the hottest paths.
+//!
+//! A turning joint's whole motion is three precomputed matrices (Rodrigues' formula): `R(q) = A + sin(q) B + cos(q) C`.
+
+use super::chain::{ChainJoint, Motion};
+use super::trig::sin_cos;
+use nalgebra::Matrix3;
+use regrasp_geometry::Vector;
+pub use regrasp_geometry::collision::Placement as BodyFrame;
+use regrasp_geometry::collision::placement::{apply, product};
+
+/// A chain joint with its constant parts multiplied out.
+#[derive(Debug, Clone)]
+pub(super) struct PreparedJoint {
+    coordinate: usize,
+    multiplier: f64,
+    offset: f64,
+    /// Origin of the joint frame in the parent body.
+    translation: Vector,
+    motion: PreparedMotion,
+}
+
+#[derive(Debug, Clone)]
+enum PreparedMotion {
+    /// The axis is the joint frame's own x, y or z (0, 1, 2), or its opposite: only two columns mix.
+    TurnAligned {
+        /// Rotation of the joint frame in the parent body, unless it is the identity.
+        rotation: Option<Matrix3<f64>>,
+        axis: usize,
+        sign: f64,
+    },
+    /// `parent_from_child` rotation is `constant + sin(q) * sine + cos(q) * cosine`.
+    Turn { constant: Matrix3<f64>, sine: Matrix3<f64>, cosine: Matrix3<f64> },
+    /// Constant rotation; the translation grows by `q * axis_in_parent`.
+    Slide { rotation: Matrix3<f64>, axis_in_parent: Vector },
+}
+
+impl PreparedJoint {
+    pub(super) fn new(joint: &ChainJoint) -> Self {
+        let rotation = *joint.parent_from_joint.rotation.to_rotation_matrix().matrix();
+        let motion = match joint.motion {
+            Motion::Turn if joint.axis.amax() == 1.0 => {
+                let axis = joint.axis.iamax();
+                let rotation = (rotation != Matrix3::identity()).then_some(rotation);
+                PreparedMotion::TurnAligned { rotation, axis, sign: joint.axis[axis] }
+            }
+            Motion::Turn => {
+                let cross = joint.axis.cross_matrix();
+                let cross_squared = cross * cross;
+                PreparedMotion::Turn {
+                    constant: rotation * (Matrix3::identity() + cross_squared),
+                    sine: rotation * cross,
+                    cosine: -(rotation * cross_squared),
+                }
+            }
+            Motion::Slide => PreparedMotion::Slide { rotation, axis_in_parent: rotation * joint.axis.into_inner() },
+        };
+        PreparedJoint {
+            coordinate: joint.coordinate,
+            multiplier: joint.multiplier,
+            offset: joint.offset,
+            translation: joint.parent_from_joint.translation.vector,
+            motion,
+        }
+    }
+
+    /// `base_from_child`, where `base_from_parent` is given.
+    #[inline]
+    pub(super) fn child_frame(&self, base_from_parent: &BodyFrame, coordinates: &[f64]) -> BodyFrame {
+        let position = self.multiplier * coordinates[self.coordinate] + self.offset;
+        match &self.motion {
+            PreparedMotion::TurnAligned { rotation, axis, sign } => {
+                let (s, c) = sin_cos(position);
+                let s = s * sign;
+                let joint = match rotation {
+                    Some(rotation) => product(&base_from_parent.rotation, rotation),
+                    None => base_from_parent.rotation,
+                };
+                let column = |k: usize| [joint[(0, k)], joint[(1, k)], joint[(2, k)]];
+                let mix = |first: [f64; 3], second: [f64; 3]| {
+                    let turned: [f64; 3] = std::array::from_fn(|i| c * first[i] + s * second[i]);
+                    let next: [f64; 3] = std::array::from_fn(|i| c * second[i] - s * first[i]);
+                    (turned, next)
+                };
+                let [x, y, z] = [column(0), column(1), column(2)];
+                let columns = match axis {
+                    0 => {
+                        let (y, z) = mix(y, z);
+                        [x, y, z]
+                    }
+                    1 => {
+                        let (z, x) = mix(z, x);
+                        [x, y, z]
+                    }
+                    _ => {
+                        let (x, y) = mix(x, y);
+                        [x, y, z]
+                    }
+                };
+                BodyFrame {
+                    rotation: Matrix3::from(columns),
+                    translation: apply(&base_from_parent.rotation, &self.translation) + base_from_parent.translation,
+                }
+            }
+            PreparedMotion::Turn { constant, sine, cosine } => {
+                let (s, c) = sin_cos(position);
+                let parent_from_child = constant + sine * s + cosine * c;
+                BodyFrame {
+                    rotation: product(&base_from_parent.rotation, &parent_from_child),
+                    translation: apply(&base_from_parent.rotation, &self.translation) + base_from_parent.translation,
+                }
+            }
+            PreparedMotion::Slide { rotation, axis_in_parent } => BodyFrame {
+                rotation: product(&base_from_parent.rotation, rotation),
+                translation: apply(&base_from_parent.rotation, &(self.translation + axis_in_parent * position))
+                    + base_from_parent.translation,
+            },
+        }
+    }
+}
