@@ -18,15 +18,17 @@ pub const MAX_FINGERS: usize = 6;
 
 /// A finger, prepared.
 #[derive(Debug)]
-pub struct FingerModel {
+pub struct FingerModel<'a> {
     /// Inverse kinematics of the tip's centre.
-    pub ik: FingerIk,
+    pub ik: &'a FingerIk,
     /// Radius of the ball tip; zero for a sharp one.
     pub tip_radius: f64,
     /// Indices of its bodies in [`Model::bodies`].
     pub bodies: std::ops::Range<usize>,
     /// Pairs that a motion of this finger alone can bring together.
     pub pairs: Vec<usize>,
+    /// Of these, the pairs with each other finger.
+    pub pairs_with: Vec<Vec<usize>>,
     /// Tip centre at rest, in the world: where the finger likes to work.
     pub tip_at_rest: Point,
 }
@@ -85,7 +87,7 @@ pub struct Model<'a> {
     /// The scene.
     pub scene: &'a Scene,
     /// Fingers.
-    pub fingers: Vec<FingerModel>,
+    pub fingers: Vec<FingerModel<'a>>,
     /// Bodies: fingers first, then palm, object, obstacles.
     pub bodies: Vec<Body>,
     /// Index of the object's body.
@@ -129,7 +131,8 @@ impl<'a> Model<'a> {
                 add(&part.placed.shape, &part.placed.parent_from_shape, part.body, part.link, name, part.is_tip);
             }
             if let TipShape::Sphere { radius } = finger.tip.shape {
-                let place = Pose::from_parts(finger.tip.center_in_body.coords.into(), nalgebra::UnitQuaternion::identity());
+                let place =
+                    Pose::from_parts(finger.tip.center_in_body.coords.into(), nalgebra::UnitQuaternion::identity());
                 let is_there = finger.shapes.iter().any(|part| {
                     part.is_tip
                         && matches!(part.placed.shape, Shape::Sphere { radius: r } if (r - radius).abs() < 1e-9)
@@ -140,22 +143,30 @@ impl<'a> Model<'a> {
                     add(&Shape::Sphere { radius }, &place, link, finger.tip.link, "tip ball", true);
                 }
             }
-            let ik = FingerIk::new(&finger.chain, &finger.tip.center_in_body);
+            let ik = &finger.ik;
             fingers.push(FingerModel {
                 tip_radius: finger.tip.radius(),
                 tip_at_rest: ik.tip(&finger.rest),
                 ik,
                 bodies: first..bodies.len(),
                 pairs: Vec::new(),
+                pairs_with: Vec::new(),
             });
         }
         let n_finger_bodies = bodies.len();
         for part in &hand.palm {
-            bodies.push(fixed_body(&part.placed.shape, &part.placed.parent_from_shape, &hand.robot.links[part.link.0].name));
+            bodies.push(fixed_body(
+                &part.placed.shape,
+                &part.placed.parent_from_shape,
+                &hand.robot.links[part.link.0].name,
+            ));
             links.push((part.link, false));
         }
         let object = bodies.len();
-        bodies.push(Body { carrier: Carrier::Object, ..fixed_body(&scene.object.shape, &Pose::identity(), &scene.object.name) });
+        bodies.push(Body {
+            carrier: Carrier::Object,
+            ..fixed_body(&scene.object.shape, &Pose::identity(), &scene.object.name)
+        });
         for obstacle in &scene.obstacles {
             bodies.push(fixed_body(&obstacle.placed.shape, &obstacle.placed.parent_from_shape, &obstacle.name));
         }
@@ -169,6 +180,15 @@ impl<'a> Model<'a> {
         }
         for (f, finger) in fingers.iter_mut().enumerate() {
             let moves = |body: usize| matches!(bodies[body].carrier, Carrier::Finger { finger, .. } if finger == f);
+            let between = |pair: &Pair, g: usize| {
+                let carried_by = |body: usize, which: usize| matches!(bodies[body].carrier, Carrier::Finger { finger, .. } if finger == which);
+                g != f
+                    && ((carried_by(pair.a, f) && carried_by(pair.b, g))
+                        || (carried_by(pair.a, g) && carried_by(pair.b, f)))
+            };
+            finger.pairs_with = (0..scene.hand.fingers.len())
+                .map(|g| (0..pairs.len()).filter(|&p| between(&pairs[p], g)).collect())
+                .collect();
             finger.pairs = (0..pairs.len()).filter(|&p| moves(pairs[p].a) || moves(pairs[p].b)).collect();
         }
         Model {
@@ -244,7 +264,9 @@ fn pair_of(
     if on_hand(a) && on_hand(b) {
         let palm_only = a >= n_finger_bodies && b >= n_finger_bodies;
         let one_link = match (&bodies[a].carrier, &bodies[b].carrier) {
-            (Carrier::Finger { finger: f, link: i, .. }, Carrier::Finger { finger: g, link: j, .. }) => f == g && i == j,
+            (Carrier::Finger { finger: f, link: i, .. }, Carrier::Finger { finger: g, link: j, .. }) => {
+                f == g && i == j
+            }
             _ => false,
         };
         if palm_only || one_link || scene.hand.may_touch(links[a].0, links[b].0) {

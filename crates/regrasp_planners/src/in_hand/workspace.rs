@@ -160,6 +160,20 @@ impl<'a> Workspace<'a> {
         model.fingers[finger].pairs.iter().all(|&pair| self.is_between_fingers(pair) || self.pair_is_clear(pair, mode))
     }
 
+    /// True when two fingers with these joints are clear of each other.
+    pub fn fingers_are_clear(&mut self, first: (usize, &Coordinates), second: (usize, &Coordinates)) -> bool {
+        self.work += 1;
+        let model = self.model;
+        let (f, g) = (first.0.min(second.0), first.0.max(second.0));
+        place_finger(model, &mut self.now, first.0, first.1);
+        place_finger(model, &mut self.now, second.0, second.1);
+        self.next.clone_from(&self.now);
+        self.motion.fill(0.0);
+        self.deviation.fill(0.0);
+        self.slack.fill(f64::NEG_INFINITY);
+        model.fingers[f].pairs_with[g].iter().all(|&pair| self.pair_is_clear(pair, TipMode::AllHold))
+    }
+
     fn is_between_fingers(&self, pair: usize) -> bool {
         let pair = &self.model.pairs[pair];
         match (&self.model.bodies[pair.a].carrier, &self.model.bodies[pair.b].carrier) {
@@ -238,11 +252,9 @@ impl<'a> Workspace<'a> {
                 // A point at distance r from the origin turns with acceleration turn^2 r per unit time squared.
                 self.deviation[object] = turn * turn * model.object_reach / 8.0;
                 let body = &model.bodies[object];
-                self.motion[object] = self.now.placements[object].displacement(
-                    &self.next.placements[object],
-                    &body.center,
-                    body.radius,
-                ) + self.deviation[object];
+                self.motion[object] =
+                    self.now.placements[object].displacement(&self.next.placements[object], &body.center, body.radius)
+                        + self.deviation[object];
             }
             Some(finger) => {
                 self.motion.fill(0.0);
@@ -281,9 +293,7 @@ impl<'a> Workspace<'a> {
             (Some(finger), TipMode::Near { finger: near, normal_in_world }) if finger == near => {
                 self.tip_is_clear(index, finger, Some(normal_in_world))
             }
-            (Some(finger), TipMode::Away { finger: away, clearance }) if finger == away => {
-                self.apart(index, clearance)
-            }
+            (Some(finger), TipMode::Away { finger: away, clearance }) if finger == away => self.apart(index, clearance),
             (Some(finger), _) => self.tip_is_clear(index, finger, None),
             (None, _) => self.apart(index, required),
         };
@@ -326,6 +336,18 @@ impl<'a> Workspace<'a> {
             self.slack[index] = at_next;
             return true;
         }
+        // The best direction at `now` may separate at `next` as well.
+        let mut best_now = self.directions[index];
+        let hints = &mut self.hints[index];
+        let answer = separation(&a.shape, from_a, &b.shape, from_b, required_at_ends, ENOUGH, &mut best_now, hints);
+        if matches!(answer, Answer::SeparatedBy(_)) {
+            let gap = gap_along(&best_now, &a.shape, at_a, &b.shape, at_b, hints);
+            if gap >= required_at_ends {
+                self.directions[index] = best_now;
+                self.slack[index] = gap;
+                return true;
+            }
+        }
         self.trees_apart(index, required)
     }
 
@@ -346,7 +368,9 @@ impl<'a> Workspace<'a> {
         // Whatever the moment, one of the two ends is at most half of the motion away.
         let needed = required + 0.5 * relative_motion;
         let mut smallest = 0.0;
-        if tree.is_apart(&body.shape, &now, needed, &mut smallest) && tree.is_apart(&body.shape, &next, needed, &mut smallest) {
+        if tree.is_apart(&body.shape, &now, needed, &mut smallest)
+            && tree.is_apart(&body.shape, &next, needed, &mut smallest)
+        {
             self.slack[index] = smallest;
             return true;
         }
@@ -361,9 +385,7 @@ impl<'a> Workspace<'a> {
         let allowed = self.model.settings.contact_allowance - self.deviation[pair.a] - self.deviation[pair.b];
         for configuration in [&self.now, &self.next] {
             let (at_tip, at_object) = (&configuration.placements[pair.a], &configuration.placements[pair.b]);
-            let normal = normal_in_world.unwrap_or_else(|| {
-                at_object.vector(&self.contacts[finger].normal_in_object)
-            });
+            let normal = normal_in_world.unwrap_or_else(|| at_object.vector(&self.contacts[finger].normal_in_object));
             // The gap along the inward normal, from tip to object.
             let inward = -normal;
             let gap = gap_along(&inward, &tip.shape, at_tip, &object.shape, at_object, &mut self.hints[index]);
@@ -403,15 +425,19 @@ impl<'a> Workspace<'a> {
             let (a, b) = (&self.model.bodies[pair.a], &self.model.bodies[pair.b]);
             let (at_a, at_b) = (&self.now.placements[pair.a], &self.now.placements[pair.b]);
             let mut direction = self.directions[index];
-            let answer = separation(
-                &a.shape, at_a, &b.shape, at_b, 1e-9, f64::INFINITY, &mut direction, &mut self.hints[index],
-            );
+            let answer =
+                separation(&a.shape, at_a, &b.shape, at_b, 1e-9, f64::INFINITY, &mut direction, &mut self.hints[index]);
             let mut distance = if let Answer::SeparatedBy(d) = answer { d } else { 0.0 };
             if distance < self.model.settings.clearance
                 && let (Some(tree), body, at_body, at_mesh) = (&b.tree, a, at_a, at_b)
             {
                 let mut smallest = 0.0;
-                if tree.is_apart(&body.shape, &at_mesh.inverse_then(at_body), self.model.settings.clearance, &mut smallest) {
+                if tree.is_apart(
+                    &body.shape,
+                    &at_mesh.inverse_then(at_body),
+                    self.model.settings.clearance,
+                    &mut smallest,
+                ) {
                     distance = distance.max(smallest);
                 }
             }

@@ -3,7 +3,7 @@
 //! A bare URDF is accepted too; its fingers and tips are then guessed as `inspect` does.
 
 use super::assemble::{FingerSpec, HandSpec, TipSpec, assemble};
-use super::resolve::{ResolveOptions, resolve};
+use super::resolve::{ResolveOptions, resolve_own};
 use super::srdf::load_srdf;
 use super::toml_table::{Need, Table, TomlReader};
 use super::urdf::{LoadedRobot, load_robot};
@@ -79,8 +79,10 @@ fn load_bare_urdf(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
         "{}: fingers and tips were guessed; `regrasp inspect -o hand.toml` writes them down",
         path.display()
     ));
-    let (hand, more) = assemble(&robot, &spec, path)?;
+    let (mut hand, more) = assemble(&robot, &spec, path)?;
     notes.extend(more);
+    crate::inspect::rest::bend_towards_palm(&mut hand);
+    refuse_wrong_unit(&hand, path)?;
     Ok(LoadedHand { hand, inputs, notes })
 }
 
@@ -106,7 +108,7 @@ fn load_hand_file(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
     let mut notes = Vec::new();
     let urdf = reader.text(table, "urdf", Need::Required);
     let robot = urdf.and_then(|(urdf, offset)| {
-        let loaded = resolve(urdf, path, reader.place(offset), &options.resolve)
+        let loaded = resolve_own(urdf, path, reader.place(offset), &options.resolve)
             .map_err(|error| InputError::from(error.element("key", "urdf")))
             .and_then(|resolved| {
                 notes.extend(resolved.notes);
@@ -131,7 +133,7 @@ fn load_hand_file(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
     let Some(robot) = robot else { return Err(only_error(reader.found, path)) };
     let mut spec = read_spec(&mut reader, table, &robot);
     if let Some((srdf, offset)) = reader.text(table, "srdf", Need::Optional) {
-        let loaded = resolve(srdf, path, reader.place(offset), &options.resolve)
+        let loaded = resolve_own(srdf, path, reader.place(offset), &options.resolve)
             .map_err(|error| InputError::from(error.element("key", "srdf")))
             .and_then(|resolved| load_srdf(&resolved.path, &robot, options.lenient));
         match loaded {
@@ -147,7 +149,31 @@ fn load_hand_file(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
     reader.found.into_result(())?;
     let (hand, more) = assemble(&robot, &spec, path)?;
     notes.extend(more);
+    refuse_wrong_unit(&hand, path)?;
     Ok(LoadedHand { hand, inputs, notes })
+}
+
+/// Refuses hands whose joints and tips are spread over less than a centimetre or more than five metres.
+///
+/// Arms with hands are a metre or two; a hand written in millimetres is a hundred metres or more.
+fn refuse_wrong_unit(hand: &Hand, path: &Path) -> Result<(), InputError> {
+    let span = crate::inspect::span(hand);
+    if (0.01..=5.0).contains(&span) {
+        return Ok(());
+    }
+    let (guess, factor) = if span > 5.0 {
+        ("is probably in millimetres", "0.001")
+    } else {
+        ("is probably scaled down too often", "1000")
+    };
+    Err(Diagnostic::new(
+        "U216",
+        Place::file(path),
+        format!("the joints and tips of the hand are spread over {span:.4} m"),
+    )
+    .expected(format!("a hand in metres; this one {guess}"))
+    .fix(format!("multiply every length of the URDF by {factor}"))
+    .into())
 }
 
 /// The gathered problems as an error; there is at least one.
@@ -159,7 +185,7 @@ fn only_error(found: Diagnostics, path: &Path) -> InputError {
 }
 
 fn refuse_other_format(reader: &mut TomlReader, table: Table) {
-    if let Some((format, offset)) = reader.text(table, "format", Need::Required)
+    if let Some((format, offset)) = reader.text(table, "format", Need::Optional)
         && format != FORMAT
     {
         let place = reader.place(offset);
@@ -169,14 +195,19 @@ fn refuse_other_format(reader: &mut TomlReader, table: Table) {
                 .expected(format!("\"{FORMAT}\"")),
         );
     }
+    if table.get("format").is_none() {
+        reader.missing(table, "format", &format!("format = \"{FORMAT}\""));
+    }
     let Some(version) = table.get("version") else {
         reader.missing(table, "version", &format!("version = {VERSION}"));
         return;
     };
-    if reader.finite(version, "version").is_some_and(|seen| seen != VERSION as f64) {
+    if let Some(seen) = reader.finite(version, "version")
+        && seen != VERSION as f64
+    {
         let place = reader.place(version.span().start);
         reader.found.push(
-            Diagnostic::new("U204", place, "is a version that this program does not know")
+            Diagnostic::new("U204", place, format!("is {seen}, which this program does not know"))
                 .element("key", "version")
                 .expected(format!("{VERSION}")),
         );

@@ -61,6 +61,20 @@ pub fn resolve(name: &str, model: &Path, place: Place, options: &ResolveOptions)
     within(name, &folder.join(name), &folder, &[], place, options)
 }
 
+/// The file that the user's own file `file` names: as [`resolve`], but any local path is allowed.
+///
+/// Errors: as [`resolve`], without refusals of places outside the folders.
+pub fn resolve_own(name: &str, file: &Path, place: Place, options: &ResolveOptions) -> Result<Resolved, Diagnostic> {
+    let folder = folder_of(file);
+    if name.trim().is_empty() || name.contains("://") {
+        return resolve(name, file, place, options);
+    }
+    match existing(&folder.join(name)) {
+        Some((path, notes)) => Ok(Resolved { path, notes }),
+        None => resolve(name, file, place, options),
+    }
+}
+
 /// The folder that holds `model`.
 fn folder_of(model: &Path) -> PathBuf {
     match model.parent() {
@@ -207,7 +221,7 @@ fn within(
         let hint = same_name_near(folder, Path::new(name))
             .map_or(String::new(), |found| format!("a file of that name is at {}", found.display()));
         return Err(Diagnostic::new("U101", place, format!("\"{name}\" not found; looked in: {}", path.display()))
-            .expected("a path relative to the model file, or package://NAME/PATH")
+            .expected("a path relative to this file, or package://NAME/PATH")
             .fix(hint));
     };
     let real = fs::canonicalize(&path)

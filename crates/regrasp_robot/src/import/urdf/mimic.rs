@@ -39,6 +39,10 @@ fn read_mimic(
 ) -> Option<Mimic> {
     let node = child(draft.node, "mimic")?;
     let element = ("joint", draft.name);
+    if draft.kind == JointKind::Fixed {
+        reader.note(node, element, "is fixed; its <mimic> is not used");
+        return None;
+    }
     let [multiplier] = reader.numbers(node, "multiplier", Some([1.0]), element)?;
     let [offset] = reader.numbers(node, "offset", Some([0.0]), element)?;
     let leader = node.attribute("joint").unwrap_or_default();
@@ -90,8 +94,8 @@ fn follow(
     let mut coupling = direct[id.0]?;
     let mut names = vec![format!("\"{}\"", draft.name), format!("\"{}\"", joints[coupling.joint.0].name)];
     while let Some(next) = direct[coupling.joint.0] {
-        if next.joint == id || coupling.joint == id || names.len() > joints.len() {
-            names.push(format!("\"{}\"", joints[next.joint.0].name));
+        let closed = coupling.joint == id;
+        if closed || names.len() > joints.len() {
             let place = reader.place(draft.node);
             reader.found.push(
                 Diagnostic::new("U141", place, format!("joints follow each other in a cycle: {}", names.join(" -> ")))
