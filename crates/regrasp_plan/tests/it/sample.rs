@@ -3,7 +3,7 @@
 
 use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_geometry::shape::PlacedShape;
-use regrasp_geometry::{Point, Pose, Shape, UnitVector, Vector};
+use regrasp_geometry::{Point, Pose, Shape, Vector};
 use regrasp_plan::plan::{FORMAT, FORMAT_VERSION, PlanInput, PoseData, Promises, Statistics};
 use regrasp_plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
 use regrasp_robot::hand::PalmShape;
@@ -120,22 +120,18 @@ fn hand() -> Hand {
                     shapes.push(FingerShape { body: j.min(2), link: link(j), placed, is_tip: j == 3 });
                 }
             }
-            Finger {
-                name: format!("f{f}"),
-                chain: Chain::new(
-                    joints,
-                    (0..3).map(|j| format!("f{f}_j{j}")).collect(),
-                    LIMITS.iter().map(|(low, _)| low.to_radians()).collect(),
-                    LIMITS.iter().map(|(_, high)| high.to_radians()).collect(),
-                ),
-                tip: Tip {
-                    link: link(3),
-                    shape: TipShape::Sphere { radius: TIP_RADIUS },
-                    center_in_body: Point::new(0.0, 0.0, DISTAL),
-                },
-                shapes,
-                rest: vec![0.0, -0.3, 1.0],
-            }
+            let chain = Chain::new(
+                joints,
+                (0..3).map(|j| format!("f{f}_j{j}")).collect(),
+                LIMITS.iter().map(|(low, _)| low.to_radians()).collect(),
+                LIMITS.iter().map(|(_, high)| high.to_radians()).collect(),
+            );
+            let tip = Tip {
+                link: link(3),
+                shape: TipShape::Sphere { radius: TIP_RADIUS },
+                center_in_body: Point::new(0.0, 0.0, DISTAL),
+            };
+            Finger::new(format!("f{f}"), chain, tip, shapes, vec![0.0, -0.3, 1.0])
         })
         .collect();
     let mut allowed_pairs = std::collections::BTreeSet::new();
@@ -303,10 +299,4 @@ pub fn query(plan: &Plan) -> InHandQuery {
         start_grasp: GraspRequest::Automatic,
         goal_grasp: GraspRequest::Automatic,
     }
-}
-
-/// `vector` as a unit vector.
-#[allow(dead_code)]
-pub fn unit(vector: Vector) -> UnitVector {
-    UnitVector::new_normalize(vector)
 }
