@@ -1,1 +1,4 @@
-//! The checker: starts from files, shares no decision with the planner.
+//! The checker: a second way of knowing whether a plan may be carried out. Shares no decision with the planner.
+
+/// Force closure with margin, by exact second-order cones.
+pub mod closure;
