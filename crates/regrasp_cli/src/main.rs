@@ -12,6 +12,8 @@ mod gait_chart;
 mod interrupt;
 /// Models from disk, with what the environment says about packages.
 mod load;
+/// What the checker said.
+mod judge;
 /// What is printed while a search runs.
 mod progress;
 /// How a command ends, other than well.
