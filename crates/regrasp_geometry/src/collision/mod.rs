@@ -1,1 +1,19 @@
 //! Separation of shapes, at rest and along motions.
+//!
+//! Every answer is of one of three kinds: separated by at least a distance, penetrating, or unresolved; unresolved
+//! counts as collision. A separation is always proved by a direction: the supports of both shapes along it are at
+//! least that far apart, whatever the search that found the direction did.
+
+/// The search for a separating direction (GJK).
+pub mod gjk;
+/// Convex shapes against triangle meshes, through a tree of boxes.
+pub mod mesh_tree;
+/// Rotation matrix and translation of a shape: the form that support queries want.
+pub mod placement;
+/// Support functions of convex shapes.
+pub mod support;
+
+pub use gjk::{Answer, separation};
+pub use mesh_tree::MeshTree;
+pub use placement::Placement;
+pub use support::gap_along;

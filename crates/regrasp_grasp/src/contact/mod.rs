@@ -1,5 +1,8 @@
 //! Contacts of fingertips on the object.
 
+/// Point contact with Coulomb friction: the exact second-order cone.
+pub mod friction_cone;
+
 use regrasp_geometry::{Point, UnitVector};
 
 /// A contact on the object.
