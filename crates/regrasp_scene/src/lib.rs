@@ -1,5 +1,9 @@
 //! Robots, objects and obstacles, the scene file, and who may touch whom. Knows no planner.
 
+/// Who may not touch whom.
+pub mod collision_pairs;
+/// The scene file.
+pub mod load;
 /// The object that is manipulated.
 pub mod object;
 /// What is asked: start and goal of the object, and how the grasps are given.
@@ -7,6 +11,8 @@ pub mod query;
 /// The scene: hand, object, obstacles.
 pub mod scene;
 
+pub use collision_pairs::{CollisionPairs, FingerShapeId, collision_pairs};
+pub use load::{Goal, InHandTask, LoadedScene, StartOrientation, load_scene};
 pub use object::Object;
 pub use query::{GraspRequest, InHandQuery};
 pub use scene::{InputFile, Obstacle, Scene};

@@ -1,0 +1,97 @@
+//! The files that a scene file names: found, read once, hashed.
+
+use super::table::{Entry, Found};
+use crate::scene::InputFile;
+use regrasp_base::Diagnostic;
+use regrasp_base::files;
+use regrasp_geometry::TriangleMesh;
+use regrasp_robot::import::{LoadOptions, resolve};
+use std::path::{Path, PathBuf};
+
+/// Files found so far, for [`crate::Scene::inputs`].
+pub(super) struct Files<'a> {
+    scene: &'a Path,
+    /// Where packages are.
+    pub options: &'a LoadOptions,
+    /// In the order in which they were read, the scene file first.
+    pub inputs: Vec<InputFile>,
+}
+
+impl<'a> Files<'a> {
+    /// No file yet but the scene file itself, with its bytes.
+    pub fn new(scene: &'a Path, bytes: &[u8], options: &'a LoadOptions) -> Self {
+        let name = scene.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        let mut files = Files { scene, options, inputs: Vec::new() };
+        files.record("scene", name, scene, bytes);
+        files
+    }
+
+    /// The file that `entry` names: `package://NAME/PATH`, or a path relative to the scene file's folder and nothing else.
+    ///
+    /// Errors: empty (`S110`), not found or fetched from elsewhere (`S110`, `U101`).
+    pub fn locate(&self, entry: &Entry, found: &mut Found) -> Option<PathBuf> {
+        let name = entry.text(found)?;
+        match self.find(name, entry, found) {
+            Ok((path, notes)) => {
+                for note in notes {
+                    found.note(&entry.span, note);
+                }
+                Some(path)
+            }
+            Err(diagnostic) => {
+                found.diagnostics.push(*diagnostic);
+                None
+            }
+        }
+    }
+
+    fn find(&self, name: &str, entry: &Entry, found: &Found) -> Result<(PathBuf, Vec<String>), Box<Diagnostic>> {
+        if name.contains("://") {
+            let place = found.place(&entry.span);
+            let resolved = resolve::resolve(name, self.scene, place, &self.options.resolve)
+                .map_err(|diagnostic| Box::new(diagnostic.element("key", &entry.name)))?;
+            return Ok((resolved.path, resolved.notes));
+        }
+        if name.trim().is_empty() {
+            return Err(Box::new(
+                entry.error("S110", found, "is empty").expected("a path relative to the scene file, or package://NAME/PATH"),
+            ));
+        }
+        let path = self.scene.parent().unwrap_or(Path::new("")).join(name);
+        if path.is_file() {
+            return Ok((path, Vec::new()));
+        }
+        let problem = if path.exists() { "is not a file" } else { "does not exist" };
+        Err(Box::new(
+            entry
+                .error("S110", found, format!("\"{name}\" {problem}; looked at {}", path.display()))
+                .expected("a path relative to the scene file, or package://NAME/PATH with --package NAME=DIR"),
+        ))
+    }
+
+    /// Notes that `path` was read.
+    pub fn record(&mut self, role: &str, name: String, path: &Path, bytes: &[u8]) {
+        let sha256 = files::sha256(bytes);
+        self.inputs.push(InputFile { role: role.to_owned(), name, path: path.to_owned(), sha256 });
+    }
+
+    /// The mesh in the file that `entry` names, in the file's frame and unit.
+    pub fn mesh(&mut self, entry: &Entry, found: &mut Found) -> Option<TriangleMesh> {
+        let path = self.locate(entry, found)?;
+        let read = files::read(&path).and_then(|bytes| {
+            let mesh = regrasp_geometry::import::read_mesh(&path, &bytes)?;
+            Ok((bytes, mesh))
+        });
+        match read {
+            Ok((bytes, mesh)) => {
+                let name = entry.text(found)?.to_owned();
+                self.record("mesh", name, &path, &bytes);
+                Some(mesh)
+            }
+            Err(error) => {
+                found.diagnostics.extend(error);
+                None
+            }
+        }
+    }
+}

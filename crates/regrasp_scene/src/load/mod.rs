@@ -1,0 +1,156 @@
+//! The scene file. `docs/scene-format.md` says what it may contain.
+//!
+//! Codes: S100 not TOML, S101 unknown key, S102 missing key, S103 wrong type, S104 unknown word, S105 another format,
+//! S106 exactly one of several, S107 number out of range, S110 file not found, S112 name used twice, S120 unknown joint
+//! or finger, S121 joint or finger missing; M201 units, M202 to M204 unusable mesh, M210 no volume; P302 out of reach,
+//! P303 joint limit; V001 not finite, V002 quaternion not of length one, V003 zero quaternion.
+
+mod files;
+mod object;
+mod pose;
+mod shape;
+mod table;
+mod task;
+mod units;
+
+#[cfg(test)]
+mod tests;
+
+pub use task::{Goal, InHandTask, StartOrientation};
+
+use crate::scene::{InputFile, Scene};
+use files::Files;
+use regrasp_base::InputError;
+use regrasp_geometry::Pose;
+use regrasp_robot::import::{LoadOptions, load_hand};
+use regrasp_robot::Hand;
+use std::path::Path;
+use table::{Found, Table};
+
+/// Value of `format` in a scene file.
+pub const FORMAT: &str = "regrasp-scene";
+/// Value of `format_version` that this version reads.
+pub const FORMAT_VERSION: f64 = 1.0;
+
+/// A scene file, read.
+#[derive(Debug, Clone)]
+pub struct LoadedScene {
+    /// What the planner plans in.
+    pub scene: Scene,
+    /// What is asked.
+    pub task: InHandTask,
+    /// Things worth knowing that are no errors, each with its place.
+    pub notes: Vec<String>,
+}
+
+/// Reads the scene file at `path` and every file it names.
+///
+/// Errors: every cause found, in this file and in those it names.
+pub fn load_scene(path: &Path, options: &LoadOptions) -> Result<LoadedScene, InputError> {
+    let bytes = regrasp_base::files::read(path)?;
+    let mut files = Files::new(path, &bytes, options);
+    let text = regrasp_base::files::text_of(path, bytes)?;
+    let mut found = Found::new(path, &text);
+    let document = found.parse();
+    let parts = document.as_ref().and_then(|document| read(Table::root(document), &mut files, &mut found));
+    let (notes, diagnostics) = (found.notes, found.diagnostics);
+    let parts = diagnostics.into_result(parts)?;
+    let Parts { hand, object, obstacles, task } = parts.expect("what could not be read has left a diagnostic");
+    let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    let scene = Scene { name, hand, object, obstacles, inputs: files.inputs };
+    Ok(LoadedScene { scene, task, notes })
+}
+
+struct Parts {
+    hand: Hand,
+    object: crate::object::Object,
+    obstacles: Vec<crate::scene::Obstacle>,
+    task: InHandTask,
+}
+
+/// Reads the whole file; none if anything is missing, with the reason in `found`.
+fn read(mut root: Table, files: &mut Files, found: &mut Found) -> Option<Parts> {
+    header(&mut root, found);
+    let hand = hand(&mut root, files, found);
+    let object = object::object(&mut root, files, found);
+    let obstacles = object::obstacles(&mut root, files, found);
+    let start = task::start(&mut root, hand.as_ref(), found);
+    let task = task::task(&mut root, start, hand.as_ref(), found);
+    if let (Some(hand), Some(object)) = (&hand, &object) {
+        units::check_sizes(hand, object, &mut root, found);
+        if let Some(task) = &task {
+            units::check_reach(hand, object, task, &mut root, found);
+        }
+    }
+    root.finish(found);
+    Some(Parts { hand: hand?, object: object?, obstacles, task: task? })
+}
+
+/// `format`, `format_version`, `task`. Errors: missing (`S102`), another format, version or task (`S105`).
+fn header(root: &mut Table, found: &mut Found) {
+    let format = root.required(found, "format", "add format = \"regrasp-scene\" as the first line");
+    let version = root.required(found, "format_version", "add format_version = 1");
+    let task = root.required(found, "task", "add task = \"in_hand\"");
+    let mut wrong = Vec::new();
+    if let Some(entry) = format
+        && let Some(text) = entry.text(found)
+        && text != FORMAT
+    {
+        wrong.push((entry, format!("is \"{text}\""), format!("\"{FORMAT}\"")));
+    }
+    if let Some(entry) = version
+        && let Some(number) = entry.number(found)
+        && number != FORMAT_VERSION
+    {
+        wrong.push((entry, format!("is {number}"), format!("{FORMAT_VERSION}, the version that this program reads")));
+    }
+    if let Some(entry) = task
+        && let Some(text) = entry.text(found)
+        && text != "in_hand"
+    {
+        wrong.push((entry, format!("is \"{text}\""), "\"in_hand\", the only task that this version plans".to_owned()));
+    }
+    for (entry, problem, expected) in wrong {
+        let diagnostic = entry.error("S105", found, problem).expected(expected);
+        found.diagnostics.push(diagnostic);
+    }
+}
+
+/// `[hand]`: the hand of the file named, placed in the world, with its rest posture.
+fn hand(root: &mut Table, files: &mut Files, found: &mut Found) -> Option<Hand> {
+    let mut table = root.required(found, "hand", "add [hand] with file = \"hand.toml\"")?.table(found)?;
+    let file = table.required(found, "file", "add file = \"hand.toml\" or a .urdf");
+    let pose = match table.optional("world_from_hand") {
+        Some(entry) => entry.table(found).and_then(|mut inside| {
+            let pose = pose::pose(&mut inside, found);
+            inside.finish(found);
+            pose
+        }),
+        None => Some(Pose::identity()),
+    };
+    let rest = table.optional("rest");
+    table.finish(found);
+    let file = file?;
+    let path = files.locate(&file, found)?;
+    let loaded = match load_hand(&path, files.options) {
+        Ok(loaded) => loaded,
+        Err(error) => {
+            found.diagnostics.extend(error);
+            return None;
+        }
+    };
+    found.notes.extend(loaded.notes);
+    let name_in_scene = file.text(found)?.to_owned();
+    for input in loaded.inputs {
+        let name = if input.path == path { name_in_scene.clone() } else { input.name };
+        files.inputs.push(InputFile { role: input.role, name, path: input.path, sha256: input.sha256 });
+    }
+    let mut hand = loaded.hand;
+    if let Some(entry) = rest {
+        let mut values = task::joint_values(&entry.table(found)?, &hand, false, found)?.into_iter();
+        for finger in &mut hand.fingers {
+            finger.rest = values.by_ref().take(finger.rest.len()).collect();
+        }
+    }
+    Some(hand.placed_at(&pose?))
+}

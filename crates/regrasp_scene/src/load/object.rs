@@ -1,0 +1,202 @@
+//! `[object]` and `[[obstacles]]`.
+
+use super::files::Files;
+use super::pose;
+use super::shape::{self, Origin, ReadShape};
+use super::table::{Entry, Found, Table};
+use crate::object::Object;
+use crate::scene::Obstacle;
+use regrasp_geometry::mass::{SolidProperties, solid_properties};
+use regrasp_geometry::shape::PlacedShape;
+use regrasp_geometry::surface::DEFAULT_CREASE_ANGLE;
+use regrasp_geometry::{Point, Shape, Surface};
+
+/// Contacts keep this distance from creases when the file says nothing, in metres (in-hand-notes section 1).
+const DEFAULT_EDGE_DISTANCE: f64 = 0.004;
+/// Friction coefficients above this are noted: no known pair of materials has them.
+const UNLIKELY_FRICTION: f64 = 2.0;
+/// Masses above this are noted, in kilograms.
+const UNLIKELY_MASS: f64 = 20.0;
+
+/// Reads `[object]`.
+pub(super) fn object(root: &mut Table, files: &mut Files, found: &mut Found) -> Option<Object> {
+    let fix = "add [object] with name, a shape such as sphere = { radius = 0.03 }, mass and friction";
+    let mut table = root.required(found, "object", fix)?.table(found)?;
+    let name = table.optional("name").and_then(|entry| entry.text(found)).unwrap_or("object").to_owned();
+    let read = shape::shape(&mut table, files, found);
+    let friction = table.required(found, "friction", "add friction = 0.8").and_then(|entry| friction(&entry, found));
+    let edge_distance = match table.optional("edge_distance") {
+        Some(entry) => entry.number_that(found, "a length of 0 or more, in metres", |x| x >= 0.0),
+        None => Some(DEFAULT_EDGE_DISTANCE),
+    };
+    let crease_angle = match table.optional("crease_angle_deg") {
+        Some(entry) => {
+            entry.number_that(found, "degrees between 1 and 180", |x| (1.0..=180.0).contains(&x)).map(f64::to_radians)
+        }
+        None => Some(DEFAULT_CREASE_ANGLE),
+    };
+    let given_mass = mass(&mut table, found);
+    let center = table.optional("center_of_mass");
+    let given_center = center.as_ref().map(|entry| entry.numbers::<3>(found).map(Point::from));
+    let placed = read.and_then(|read| placed(read, given_mass.as_ref(), &given_center, &table, found));
+    table.finish(found);
+
+    let (shape, mass, center_of_mass) = placed?;
+    let edge_distance = edge_distance?;
+    if let Some(center) = &center {
+        center_is_inside(&shape, &center_of_mass, center, found)?;
+    }
+    let surface = match Surface::with_crease_angle(&shape, crease_angle?) {
+        Ok(surface) => surface,
+        Err(error) => {
+            let diagnostic = regrasp_base::Diagnostic::new("M204", found.place(&root.span), error.to_string())
+                .element("table", "object");
+            found.diagnostics.push(diagnostic);
+            return None;
+        }
+    };
+    Some(Object { name, shape, surface, mass, center_of_mass, friction: friction?, edge_distance })
+}
+
+fn friction(entry: &Entry, found: &mut Found) -> Option<f64> {
+    let friction = entry.number_that(found, "a friction coefficient of 0 or more", |x| x >= 0.0)?;
+    if friction == 0.0 {
+        found.note(&entry.span, "friction 0: fingertips can only push along the normal");
+    } else if friction > UNLIKELY_FRICTION {
+        found.note(&entry.span, format!("friction {friction} is more than any known pair of materials has"));
+    }
+    Some(friction)
+}
+
+/// What the file says about the mass.
+enum GivenMass {
+    /// Kilograms.
+    Mass(f64),
+    /// Kilograms per cubic metre.
+    Density(f64),
+}
+
+fn mass(table: &mut Table, found: &mut Found) -> Option<GivenMass> {
+    let entries = table.present(&["mass", "density"]);
+    match entries.as_slice() {
+        [entry] if entry.name.ends_with("density") => entry
+            .number_that(found, "a density above 0, in kg/m^3 (water has 1000)", |x| x > 0.0)
+            .map(GivenMass::Density),
+        [entry] => {
+            let mass = entry.number_that(found, "a mass of 0 or more, in kilograms", |x| x >= 0.0)?;
+            if mass == 0.0 {
+                found.note(&entry.span, "mass 0: the object has no weight");
+            } else if mass > UNLIKELY_MASS {
+                found.note(&entry.span, format!("mass {mass} kg is much for a hand; masses are in kilograms"));
+            }
+            Some(GivenMass::Mass(mass))
+        }
+        [] => {
+            let diagnostic = table
+                .error("S102", found, "has neither mass nor density")
+                .fix("add mass = 0.1, in kilograms, or density = 1000, in kg/m^3");
+            found.diagnostics.push(diagnostic);
+            None
+        }
+        [_, second, ..] => {
+            let diagnostic = second.error("S106", found, "cannot stand beside object.mass").fix("keep one of them");
+            found.diagnostics.push(diagnostic);
+            None
+        }
+    }
+}
+
+/// Shape in the object frame, mass and centre of mass, where the volume is asked for only if something needs it.
+///
+/// Errors: the shape has no volume and something needs it (`M210`).
+fn placed(
+    read: ReadShape,
+    mass: Option<&GivenMass>,
+    given_center: &Option<Option<Point>>,
+    table: &Table,
+    found: &mut Found,
+) -> Option<(Shape, f64, Point)> {
+    let needs_solid = read.origin == Origin::Center || given_center.is_none() || matches!(mass, Some(GivenMass::Density(_)));
+    let solid: Option<SolidProperties> = if needs_solid {
+        match solid_properties(&read.shape) {
+            Ok(solid) => Some(solid),
+            Err(error) => {
+                let diagnostic = table
+                    .error("M210", found, format!("has no volume: {error}"))
+                    .expected("a closed mesh, where center_of_mass, density or origin = \"center\" ask for its volume")
+                    .fix("mesh = { ..., solid = \"hull\" }, or give mass and center_of_mass");
+                found.diagnostics.push(diagnostic);
+                return None;
+            }
+        }
+    } else {
+        None
+    };
+    let shift = match read.origin {
+        Origin::File => nalgebra::zero(),
+        Origin::Center => -solid.as_ref()?.center_of_mass.coords,
+        Origin::Point(point) => -point,
+    };
+    let shape = match shape::shifted(&read.shape, shift) {
+        Ok(shape) => shape,
+        Err(reason) => {
+            let diagnostic = table.error("M202", found, format!("cannot be moved to its origin: {reason}"));
+            found.diagnostics.push(diagnostic);
+            return None;
+        }
+    };
+    let center = match given_center {
+        Some(center) => (*center)?,
+        None => solid.as_ref()?.center_of_mass + shift,
+    };
+    let mass = match mass? {
+        GivenMass::Mass(mass) => *mass,
+        GivenMass::Density(density) => density * solid.as_ref()?.volume,
+    };
+    Some((shape, mass, center))
+}
+
+/// Reports a given centre of mass outside the object's bounds (`S107`): a mistake of frame or unit.
+fn center_is_inside(shape: &Shape, center: &Point, entry: &Entry, found: &mut Found) -> Option<()> {
+    let (low, high) = shape.bounds();
+    if (0..3).all(|k| center[k] >= low[k] && center[k] <= high[k]) {
+        return Some(());
+    }
+    let diagnostic = entry
+        .error("S107", found, format!("is {:?}, outside the object", [center.x, center.y, center.z]))
+        .expected(format!("a point of the object frame between {:.4?} and {:.4?}", low.coords.as_slice(), high.coords.as_slice()));
+    found.diagnostics.push(diagnostic);
+    None
+}
+
+/// Reads `[[obstacles]]`. Errors: two of one name (`S112`).
+pub(super) fn obstacles(root: &mut Table, files: &mut Files, found: &mut Found) -> Vec<Obstacle> {
+    let entries = root.optional("obstacles").and_then(|entry| entry.entries(found, "tables [[obstacles]]")).unwrap_or_default();
+    let mut obstacles: Vec<Obstacle> = Vec::new();
+    for entry in entries {
+        let Some(obstacle) = obstacle(&entry, files, found) else { continue };
+        if obstacles.iter().any(|other| other.name == obstacle.name) {
+            let diagnostic = entry
+                .error("S112", found, format!("has the name \"{}\", as another obstacle", obstacle.name))
+                .expected("names that differ");
+            found.diagnostics.push(diagnostic);
+        }
+        obstacles.push(obstacle);
+    }
+    obstacles
+}
+
+fn obstacle(entry: &Entry, files: &mut Files, found: &mut Found) -> Option<Obstacle> {
+    let mut table = entry.table(found)?;
+    let name = table.required(found, "name", "add name = \"table\"").and_then(|entry| entry.text(found));
+    let read = shape::shape(&mut table, files, found);
+    let pose = pose::pose(&mut table, found);
+    table.finish(found);
+    let (name, read, pose) = (name?, read?, pose?);
+    if read.origin != Origin::File {
+        let diagnostic = entry.error("S107", found, "has a mesh with an origin").fix("place the obstacle by its position instead");
+        found.diagnostics.push(diagnostic);
+        return None;
+    }
+    Some(Obstacle { name: name.to_owned(), placed: PlacedShape { parent_from_shape: pose, shape: read.shape } })
+}

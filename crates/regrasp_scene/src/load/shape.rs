@@ -1,0 +1,230 @@
+//! The shape of an object or obstacle in a scene file: exactly one of the keys `sphere`, `box`, `cylinder`, `capsule`,
+//! `ellipsoid`, `mesh`.
+
+use super::files::Files;
+use super::table::{Entry, Found, Table, one_of};
+use regrasp_geometry::{ConvexHull, Shape, TriangleMesh, Vector};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Keys that name a kind of shape.
+const KINDS: [&str; 6] = ["sphere", "box", "cylinder", "capsule", "ellipsoid", "mesh"];
+/// Larger shapes are taken for a mistake of units, in metres (reliability R15).
+const MAX_EXTENT: f64 = 3.0;
+/// Smaller shapes are taken for a mistake of units, in metres (reliability R15).
+const MIN_EXTENT: f64 = 2e-3;
+
+/// What stands for the inside of a mesh.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Solid {
+    /// What its triangles enclose.
+    Mesh,
+    /// Its convex hull.
+    Hull,
+}
+
+/// Where the object frame lies in the frame of a mesh file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Origin {
+    /// At the origin of the mesh file.
+    File,
+    /// At the centre of volume.
+    Center,
+    /// At a point of the scaled mesh file.
+    Point(Vector),
+}
+
+/// A shape as read, not yet moved to its origin.
+pub(super) struct ReadShape {
+    /// The shape, in the frame of the file.
+    pub shape: Shape,
+    /// Where its frame is to lie.
+    pub origin: Origin,
+    /// Where it stands in the scene file.
+    pub span: Range<usize>,
+}
+
+/// Reads the shape of `table`. Errors: none or several kinds (`S106`), bad lengths (`S107`), bad meshes (`M2xx`).
+pub(super) fn shape(table: &mut Table, files: &mut Files, found: &mut Found) -> Option<ReadShape> {
+    let kinds = table.present(&KINDS);
+    let [kind] = kinds.as_slice() else {
+        let names: Vec<&str> = kinds.iter().map(|kind| kind.name.as_str()).collect();
+        let problem =
+            if names.is_empty() { "has no shape".to_owned() } else { format!("has {} shapes: {}", names.len(), names.join(", ")) };
+        let diagnostic = table.error("S106", found, problem).expected(format!("exactly one of {}", one_of(&KINDS)));
+        found.diagnostics.push(diagnostic);
+        return None;
+    };
+    if kind.name.ends_with(".mesh") || kind.name == "mesh" {
+        return mesh(kind, files, found);
+    }
+    let mut inside = kind.table(found)?;
+    let shape = primitive(kind, &mut inside, found);
+    inside.finish(found);
+    let shape = shape?;
+    has_likely_size(&shape, kind, found).then(|| ReadShape { shape, origin: Origin::File, span: kind.span.clone() })
+}
+
+fn primitive(kind: &Entry, table: &mut Table, found: &mut Found) -> Option<Shape> {
+    let name = kind.name.rsplit('.').next().unwrap_or_default();
+    match name {
+        "sphere" => Some(Shape::Sphere { radius: length(table, "radius", found)? }),
+        "box" => Some(Shape::Cuboid { half_extents: lengths(table, "size", found)? * 0.5 }),
+        "ellipsoid" => Some(Shape::Ellipsoid { radii: lengths(table, "radii", found)? }),
+        _ => {
+            let (radius, length) = (length(table, "radius", found), length(table, "length", found));
+            let (radius, half_length) = (radius?, length? * 0.5);
+            Some(match name {
+                "cylinder" => Shape::Cylinder { half_length, radius },
+                _ => Shape::Capsule { half_length, radius },
+            })
+        }
+    }
+}
+
+fn length(table: &mut Table, key: &'static str, found: &mut Found) -> Option<f64> {
+    table.required(found, key, &format!("add {key} = ..., in metres"))?.length(found)
+}
+
+fn lengths(table: &mut Table, key: &'static str, found: &mut Found) -> Option<Vector> {
+    let entries = table.required(found, key, &format!("add {key} = [x, y, z], in metres"))?;
+    let lengths = Vector::from(entries.numbers::<3>(found)?);
+    if lengths.min() > 0.0 {
+        return Some(lengths);
+    }
+    let diagnostic =
+        entries.error("S107", found, format!("has the length {}", lengths.min())).expected("lengths above 0, in metres");
+    found.diagnostics.push(diagnostic);
+    None
+}
+
+/// Reports a shape whose size can only be a mistake of units (`M201`).
+fn has_likely_size(shape: &Shape, entry: &Entry, found: &mut Found) -> bool {
+    let (low, high) = shape.bounds();
+    let size = high - low;
+    let extent = size.max();
+    let (is_large, is_small) = (extent > MAX_EXTENT, extent < MIN_EXTENT);
+    if !is_large && !is_small {
+        return true;
+    }
+    let (unit, scale) = if is_large { ("millimetres", "0.001") } else { ("kilometres or a scale applied twice", "1000") };
+    let fix = if matches!(shape, Shape::Mesh(_) | Shape::Convex(_)) {
+        format!("it is probably in {unit}: mesh = {{ file = ..., scale = {scale} }}")
+    } else {
+        format!("lengths are in metres: multiply them by {scale}")
+    };
+    let diagnostic = entry
+        .error("M201", found, format!("is {:.4} x {:.4} x {:.4} m", size.x, size.y, size.z))
+        .expected(format!("a largest extent between {MIN_EXTENT} m and {MAX_EXTENT} m"))
+        .fix(fix);
+    found.diagnostics.push(diagnostic);
+    false
+}
+
+fn mesh(kind: &Entry, files: &mut Files, found: &mut Found) -> Option<ReadShape> {
+    let mut table = kind.table(found)?;
+    let file = table.required(found, "file", "add file = \"...\", relative to the scene file or package://NAME/PATH");
+    let scale = match table.optional("scale") {
+        Some(entry) => scale(&entry, found),
+        None => Some(Vector::repeat(1.0)),
+    };
+    let solid = match table.optional("solid") {
+        Some(entry) => entry.choice(found, &["mesh", "hull"]).map(|word| match word {
+            "hull" => Solid::Hull,
+            _ => Solid::Mesh,
+        }),
+        None => Some(Solid::Mesh),
+    };
+    let origin = match table.optional("origin") {
+        Some(entry) => origin(&entry, found),
+        None => Some(Origin::File),
+    };
+    table.finish(found);
+    let read = file.and_then(|entry| files.mesh(&entry, found));
+    let (mesh, scale, solid, origin) = (read?, scale?, solid?, origin?);
+    let scaled = match mesh.scaled(scale) {
+        Ok(scaled) => oriented(scaled, kind, found),
+        Err(error) => {
+            let diagnostic = kind.error("M202", found, format!("cannot be scaled by {scale:?}: {error}"));
+            found.diagnostics.push(diagnostic);
+            return None;
+        }
+    };
+    note_statistics(&scaled, kind, found);
+    let shape = match solid {
+        Solid::Mesh => Shape::Mesh(Arc::new(scaled)),
+        Solid::Hull => match ConvexHull::new(scaled.vertices()) {
+            Ok(hull) => Shape::Convex(Arc::new(hull)),
+            Err(error) => {
+                let diagnostic = kind.error("M203", found, error.to_string()).fix("give a mesh that has an inside");
+                found.diagnostics.push(diagnostic);
+                return None;
+            }
+        },
+    };
+    has_likely_size(&shape, kind, found).then(|| ReadShape { shape, origin, span: kind.span.clone() })
+}
+
+/// One factor, or one per axis; negative mirrors. Errors: zero (`S107`).
+fn scale(entry: &Entry, found: &mut Found) -> Option<Vector> {
+    let scale = if entry.is_number() { Vector::repeat(entry.number(found)?) } else { entry.numbers::<3>(found)?.into() };
+    if scale.iter().all(|factor| *factor != 0.0) {
+        return Some(scale);
+    }
+    let diagnostic = entry.error("S107", found, "has a factor of 0, which leaves nothing").expected("factors other than 0");
+    found.diagnostics.push(diagnostic);
+    None
+}
+
+fn origin(entry: &Entry, found: &mut Found) -> Option<Origin> {
+    if entry.as_text().is_some() {
+        return Some(match entry.choice(found, &["file", "center"])? {
+            "center" => Origin::Center,
+            _ => Origin::File,
+        });
+    }
+    entry.numbers::<3>(found).map(|point| Origin::Point(point.into()))
+}
+
+/// A closed mesh wound inside out is turned, with a note.
+fn oriented(mesh: TriangleMesh, kind: &Entry, found: &mut Found) -> TriangleMesh {
+    if mesh.statistics().is_watertight() && mesh.signed_volume() < 0.0 {
+        found.note(&kind.span, "the triangles are wound inside out; they were turned");
+        return mesh.flipped();
+    }
+    mesh
+}
+
+fn note_statistics(mesh: &TriangleMesh, kind: &Entry, found: &mut Found) {
+    let statistics = mesh.statistics();
+    let counts = [
+        (statistics.zero_area_dropped, "triangles of zero area were dropped"),
+        (statistics.non_manifold_edges, "edges have more than two triangles"),
+        (statistics.flipped_edges, "edges have triangles wound against each other"),
+        (statistics.open_edges, "edges are open"),
+    ];
+    let remarks: Vec<String> =
+        counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")).collect();
+    if !remarks.is_empty() {
+        found.note(&kind.span, format!("mesh: {}", remarks.join(", ")));
+    }
+}
+
+/// `shape` with every point moved by `shift`. Panics for shapes that are not polyhedra: they have their own origin.
+pub(super) fn shifted(shape: &Shape, shift: Vector) -> Result<Shape, String> {
+    match shape {
+        Shape::Mesh(mesh) => {
+            let vertices = mesh.vertices().iter().map(|vertex| vertex + shift).collect();
+            let mesh = TriangleMesh::new(vertices, mesh.triangles().to_vec()).map_err(|error| error.to_string())?;
+            Ok(Shape::Mesh(Arc::new(mesh)))
+        }
+        Shape::Convex(hull) => {
+            let vertices: Vec<_> = hull.vertices().iter().map(|vertex| vertex + shift).collect();
+            ConvexHull::new(&vertices).map(|hull| Shape::Convex(Arc::new(hull))).map_err(|error| error.to_string())
+        }
+        primitive => {
+            assert!(shift == Vector::zeros(), "a primitive has its origin at its centre");
+            Ok(primitive.clone())
+        }
+    }
+}

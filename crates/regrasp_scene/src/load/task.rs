@@ -1,0 +1,293 @@
+//! `[start]` and `[goal]`: what is asked, and how a seed resolves what the file leaves open.
+
+use super::pose;
+use super::table::{Entry, Found, Table, suggestion};
+use crate::query::{GraspRequest, InHandQuery};
+use nalgebra::{Translation3, UnitQuaternion};
+use regrasp_base::Rng;
+use regrasp_geometry::frame::rotation_between;
+use regrasp_geometry::{Point, Pose, Vector, pose_from};
+use regrasp_robot::Hand;
+
+/// A start position may be drawn from a ball of at most this radius, in metres.
+const MAX_POSITION_WITHIN: f64 = 1.0;
+/// Start and goal nearer than this are the same, in metres.
+const SAME_POSITION: f64 = 1e-9;
+/// Start and goal nearer than this are the same, in radians.
+const SAME_ANGLE: f64 = 1e-9;
+
+/// Orientation at the start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StartOrientation {
+    /// As the file says.
+    Given,
+    /// Drawn uniformly over all rotations, by seed; then the file's orientation is applied first.
+    Random,
+}
+
+/// Where the object has to go.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Goal {
+    /// To a pose of the world.
+    Pose(Pose),
+    /// Turned about its own origin, by world axes, and moved.
+    Turn {
+        /// Rotation, in the world frame, applied after the start orientation.
+        rotation: UnitQuaternion<f64>,
+        /// Displacement of the object's origin, in the world frame.
+        shift: Vector,
+    },
+}
+
+/// The in-hand task of a scene file, before a seed resolves its randomness.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InHandTask {
+    /// Object pose at the start, before the draw.
+    pub world_from_object_start: Pose,
+    /// The start position is drawn uniformly from the ball of this radius, in metres; 0 for none.
+    pub position_within: f64,
+    /// Start orientation.
+    pub start_orientation: StartOrientation,
+    /// Grasp at the start.
+    pub start_grasp: GraspRequest,
+    /// Where the object has to go.
+    pub goal: Goal,
+    /// Grasp at the goal.
+    pub goal_grasp: GraspRequest,
+}
+
+impl InHandTask {
+    /// The query of `seed`: the same on every machine and for every number of threads.
+    pub fn query(&self, seed: u64) -> InHandQuery {
+        let mut start = self.world_from_object_start;
+        if self.position_within > 0.0 {
+            let mut rng = Rng::keyed(seed, "start_position", 0);
+            let direction = Vector::from(rng.direction());
+            // The cube root makes the draw uniform in the ball.
+            start.translation.vector += direction * (self.position_within * rng.unit().cbrt());
+        }
+        if self.start_orientation == StartOrientation::Random {
+            let drawn = Rng::keyed(seed, "start_orientation", 0).quat_xyzw();
+            start.rotation = pose_from([0.0; 3], drawn).rotation * start.rotation;
+        }
+        let goal = match &self.goal {
+            Goal::Pose(pose) => *pose,
+            Goal::Turn { rotation, shift } => {
+                Pose::from_parts(Translation3::from(start.translation.vector + shift), rotation * start.rotation)
+            }
+        };
+        InHandQuery {
+            world_from_object_start: start,
+            world_from_object_goal: goal,
+            start_grasp: self.start_grasp.clone(),
+            goal_grasp: self.goal_grasp.clone(),
+        }
+    }
+}
+
+/// `[start]`, as far as the file says it.
+pub(super) struct Start {
+    pose: Option<Pose>,
+    position_within: f64,
+    orientation: StartOrientation,
+    grasp: GraspRequest,
+}
+
+/// Reads `[start]`. `hand` is none when the hand file was refused; then grasps are not looked into.
+pub(super) fn start(root: &mut Table, hand: Option<&Hand>, found: &mut Found) -> Option<Start> {
+    let mut table = root.required(found, "start", "add [start] with position = [x, y, z]")?.table(found)?;
+    let pose = pose::pose(&mut table, found);
+    let expected = format!("a radius from 0 to {MAX_POSITION_WITHIN} metres");
+    let position_within = table
+        .optional("position_within")
+        .and_then(|entry| entry.number_that(found, &expected, |x| (0.0..=MAX_POSITION_WITHIN).contains(&x)));
+    let is_random = table.optional("random_orientation").and_then(|entry| entry.boolean(found));
+    let grasp = grasp(&mut table, hand, found);
+    table.finish(found);
+    Some(Start {
+        pose,
+        position_within: position_within.unwrap_or(0.0),
+        orientation: if is_random == Some(true) { StartOrientation::Random } else { StartOrientation::Given },
+        grasp,
+    })
+}
+
+/// Reads `[goal]` and joins it with the start.
+pub(super) fn task(root: &mut Table, start: Option<Start>, hand: Option<&Hand>, found: &mut Found) -> Option<InHandTask> {
+    let fix = "add [goal] with turn = { axis = \"x\", angle_deg = 90 } or position and quat_xyzw";
+    let mut table = root.required(found, "goal", fix)?.table(found)?;
+    let absolute = table.present(&["position", "quat_xyzw", "quat_wxyz"]);
+    let relative = table.present(&["turn", "move"]);
+    let goal = match (absolute.first(), relative.first()) {
+        (Some(absolute), Some(relative)) => {
+            let diagnostic = relative
+                .error("S106", found, format!("cannot stand beside {}", absolute.name))
+                .expected("either position and quat_xyzw, or turn and move");
+            found.diagnostics.push(diagnostic);
+            None
+        }
+        (None, None) => {
+            let diagnostic = table.error("S102", found, "says neither a pose nor a turn").fix(fix);
+            found.diagnostics.push(diagnostic);
+            None
+        }
+        (Some(_), None) => pose::pose(&mut table, found).map(Goal::Pose),
+        (None, Some(_)) => relative_goal(&mut table, found),
+    };
+    let goal_grasp = grasp(&mut table, hand, found);
+    let span = table.span.clone();
+    table.finish(found);
+    let (start, goal) = (start?, goal?);
+    let task = InHandTask {
+        world_from_object_start: start.pose?,
+        position_within: start.position_within,
+        start_orientation: start.orientation,
+        start_grasp: start.grasp,
+        goal,
+        goal_grasp,
+    };
+    if is_goal_start(&task) {
+        found.note(&span, "the goal pose is the start pose: there is nothing to turn");
+    }
+    Some(task)
+}
+
+fn relative_goal(table: &mut Table, found: &mut Found) -> Option<Goal> {
+    let rotation = match table.optional("turn") {
+        Some(entry) => pose::turn(&entry, found),
+        None => Some(UnitQuaternion::identity()),
+    };
+    let shift = match table.optional("move") {
+        Some(entry) => entry.numbers::<3>(found).map(Vector::from),
+        None => Some(Vector::zeros()),
+    };
+    Some(Goal::Turn { rotation: rotation?, shift: shift? })
+}
+
+fn is_goal_start(task: &InHandTask) -> bool {
+    let is_fixed = task.position_within == 0.0 && task.start_orientation == StartOrientation::Given;
+    if !is_fixed && matches!(task.goal, Goal::Pose(_)) {
+        return false;
+    }
+    let query = task.query(0);
+    let (start, goal) = (&query.world_from_object_start, &query.world_from_object_goal);
+    (start.translation.vector - goal.translation.vector).norm() < SAME_POSITION
+        && rotation_between(start, goal).norm() < SAME_ANGLE
+}
+
+/// `grasp = "automatic"`, `{ joints = {...} }` or `{ contacts = {...} }`.
+fn grasp(table: &mut Table, hand: Option<&Hand>, found: &mut Found) -> GraspRequest {
+    let Some(entry) = table.optional("grasp") else { return GraspRequest::Automatic };
+    if entry.as_text().is_some() {
+        entry.choice(found, &["automatic"]);
+        return GraspRequest::Automatic;
+    }
+    given_grasp(&entry, hand, found).unwrap_or(GraspRequest::Automatic)
+}
+
+fn given_grasp(entry: &Entry, hand: Option<&Hand>, found: &mut Found) -> Option<GraspRequest> {
+    let mut table = entry.table(found)?;
+    let kinds = table.present(&["joints", "contacts"]);
+    table.finish(found);
+    let [kind] = kinds.as_slice() else {
+        let diagnostic = entry
+            .error("S106", found, format!("says {} of joints and contacts", if kinds.is_empty() { "neither" } else { "both" }))
+            .expected("\"automatic\", { joints = { name = value } } or { contacts = { finger = [x, y, z] } }");
+        found.diagnostics.push(diagnostic);
+        return None;
+    };
+    let values = kind.table(found)?;
+    let hand = hand?;
+    if kind.name.ends_with("joints") {
+        joint_values(&values, hand, true, found).map(GraspRequest::Joints)
+    } else {
+        contact_points(&values, hand, found).map(GraspRequest::Contacts)
+    }
+}
+
+/// Joint positions in the order of `Hand::joint_names`, from a table of names.
+///
+/// Errors: unknown joint (`S120`), outside limits (`P303`), and, where `all_needed`, missing joints (`S121`).
+/// Joints that may be missing and are keep the value of `Finger::rest`.
+pub(super) fn joint_values(table: &Table, hand: &Hand, all_needed: bool, found: &mut Found) -> Option<Vec<f64>> {
+    let names = hand.joint_names();
+    let mut values: Vec<Option<f64>> = vec![None; names.len()];
+    let limits: Vec<(f64, f64)> = hand
+        .fingers
+        .iter()
+        .flat_map(|finger| finger.chain.lower.iter().copied().zip(finger.chain.upper.iter().copied()))
+        .collect();
+    let mut is_good = true;
+    for (name, entry) in table.all() {
+        let Some(index) = names.iter().position(|known| known == name) else {
+            let problem =
+                format!("is not a joint of the hand{}", suggestion(name, names.iter().map(String::as_str)));
+            let diagnostic = entry.error("S120", found, problem).expected(names.join(", "));
+            found.diagnostics.push(diagnostic);
+            is_good = false;
+            continue;
+        };
+        let Some(value) = entry.number(found) else {
+            is_good = false;
+            continue;
+        };
+        match (values.get_mut(index), limits.get(index)) {
+            (Some(slot), Some((lower, upper))) if value >= *lower && value <= *upper => *slot = Some(value),
+            (_, Some((lower, upper))) => {
+                let diagnostic = entry
+                    .error("P303", found, format!("is {value}, outside the joint's limits"))
+                    .expected(format!("{lower} to {upper} (radians or metres)"));
+                found.diagnostics.push(diagnostic);
+                is_good = false;
+            }
+            _ => is_good = false,
+        }
+    }
+    let missing: Vec<&str> =
+        names.iter().zip(&values).filter(|(_, value)| value.is_none()).map(|(name, _)| name.as_str()).collect();
+    if all_needed && is_good && !missing.is_empty() {
+        let diagnostic = table
+            .error("S121", found, format!("has no value for {}", missing.join(", ")))
+            .expected("a value for every joint of every finger");
+        found.diagnostics.push(diagnostic);
+        return None;
+    }
+    let rest = hand.fingers.iter().flat_map(|finger| finger.rest.iter().copied());
+    is_good.then(|| values.into_iter().zip(rest).map(|(value, rest)| value.unwrap_or(rest)).collect())
+}
+
+/// One contact point per finger, in the object frame, from a table of finger names.
+///
+/// Errors: unknown finger (`S120`), missing fingers (`S121`).
+fn contact_points(table: &Table, hand: &Hand, found: &mut Found) -> Option<Vec<Point>> {
+    let mut points: Vec<Option<Point>> = vec![None; hand.fingers.len()];
+    let mut is_good = true;
+    for (name, entry) in table.all() {
+        let slot = hand.finger_named(name).and_then(|finger| points.get_mut(finger.0));
+        let Some(slot) = slot else {
+            let names: Vec<&str> = hand.fingers.iter().map(|finger| finger.name.as_str()).collect();
+            let problem = format!("is not a finger of the hand{}", suggestion(name, names.iter().copied()));
+            let diagnostic = entry.error("S120", found, problem).expected(names.join(", "));
+            found.diagnostics.push(diagnostic);
+            is_good = false;
+            continue;
+        };
+        *slot = entry.numbers::<3>(found).map(Point::from);
+        is_good &= slot.is_some();
+    }
+    let missing: Vec<&str> = hand
+        .fingers
+        .iter()
+        .zip(&points)
+        .filter(|(_, point)| point.is_none())
+        .map(|(finger, _)| finger.name.as_str())
+        .collect();
+    if is_good && !missing.is_empty() {
+        let diagnostic = table
+            .error("S121", found, format!("has no contact for {}", missing.join(", ")))
+            .expected("a contact for every finger");
+        found.diagnostics.push(diagnostic);
+        return None;
+    }
+    points.into_iter().collect()
+}

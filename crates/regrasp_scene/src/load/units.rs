@@ -1,0 +1,110 @@
+//! Mistakes of units that show only when hand, object and task are seen together (reliability R15).
+
+use super::table::{Found, Table};
+use super::task::{Goal, InHandTask, StartOrientation};
+use crate::object::Object;
+use regrasp_geometry::{Point, Pose};
+use regrasp_robot::Hand;
+
+/// Hand and object may differ in size by this factor (reliability R15).
+const MAX_SIZE_RATIO: f64 = 20.0;
+
+/// Reports a hand and an object that cannot both be in metres (`M201`).
+pub(super) fn check_sizes(hand: &Hand, object: &Object, root: &mut Table, found: &mut Found) {
+    let (low, high) = object.shape.bounds();
+    let (hand_size, object_size) = (size_of(hand), (high - low).max());
+    let ratio = hand_size / object_size;
+    if (1.0 / MAX_SIZE_RATIO..=MAX_SIZE_RATIO).contains(&ratio) {
+        return;
+    }
+    let Some(entry) = root.optional("object") else { return };
+    // Powers of ten only: the factor that was forgotten, not the one that would make it fit.
+    let scale = 10f64.powi(if ratio > 1.0 { 3 } else { -3 });
+    let diagnostic = entry
+        .error("M201", found, format!("is {object_size:.4} m large, the hand {hand_size:.4} m: one of them is in another unit"))
+        .expected(format!("sizes that differ by a factor of at most {MAX_SIZE_RATIO}"))
+        .fix(format!("lengths are in metres; a mesh in another unit takes scale = {scale}"));
+    found.diagnostics.push(diagnostic);
+}
+
+/// Reports start and goal positions that no finger can reach whatever its joints do (`P302`).
+pub(super) fn check_reach(hand: &Hand, object: &Object, task: &InHandTask, root: &mut Table, found: &mut Found) {
+    let query = task.query(0);
+    let object_reach = object.shape.reach_from(&Point::origin());
+    let slack = task.position_within * 2.0;
+    let is_goal_fixed = matches!(task.goal, Goal::Pose(_)) || task.start_orientation == StartOrientation::Given;
+    let ends = [("start", query.world_from_object_start), ("goal", query.world_from_object_goal)];
+    for (key, pose) in ends {
+        if key == "goal" && !is_goal_fixed {
+            continue;
+        }
+        let Some((distance, reach)) = beyond_reach(hand, &pose, object_reach + slack) else { continue };
+        let Some(entry) = root.optional(key) else { continue };
+        let p = pose.translation.vector;
+        let mut diagnostic = entry
+            .error("P302", found, format!("position [{}, {}, {}] is {distance:.3} m from the hand", p.x, p.y, p.z))
+            .expected(format!("at most {reach:.3} m, the reach of its fingers and the size of the object"));
+        if distance / 1000.0 < reach {
+            diagnostic = diagnostic.fix(format!(
+                "positions are in metres: [{}, {}, {}] if these were millimetres",
+                p.x / 1000.0,
+                p.y / 1000.0,
+                p.z / 1000.0
+            ));
+        }
+        found.diagnostics.push(diagnostic);
+        // One cause: the goal follows the start.
+        return;
+    }
+}
+
+/// Distance of the object from the nearest finger base, and the reach, when no finger can touch the object there.
+fn beyond_reach(hand: &Hand, pose: &Pose, object_reach: f64) -> Option<(f64, f64)> {
+    let position = Point::from(pose.translation.vector);
+    let mut nearest: Option<(f64, f64)> = None;
+    for finger in &hand.fingers {
+        let Some(first) = finger.chain.joints.first() else { continue };
+        let base = Point::from(first.parent_from_joint.translation.vector);
+        let reach = finger_reach(finger) + object_reach;
+        let distance = (position - base).norm();
+        if distance <= reach {
+            return None;
+        }
+        if nearest.is_none_or(|(other, _)| distance < other) {
+            nearest = Some((distance, reach));
+        }
+    }
+    nearest
+}
+
+/// Upper bound of the distance of the tip's contact from the first joint, whatever the joints do, in metres.
+fn finger_reach(finger: &regrasp_robot::Finger) -> f64 {
+    let chain = &finger.chain;
+    let links: f64 = chain.joints.iter().skip(1).map(|joint| joint.parent_from_joint.translation.vector.norm()).sum();
+    let slides: f64 = chain
+        .joints
+        .iter()
+        .filter(|joint| joint.motion == regrasp_robot::Motion::Slide)
+        .map(|joint| {
+            let range = chain.lower.get(joint.coordinate).zip(chain.upper.get(joint.coordinate));
+            let position = |q: f64| (joint.multiplier * q + joint.offset).abs();
+            range.map_or(0.0, |(lower, upper)| position(*lower).max(position(*upper)))
+        })
+        .sum();
+    links + slides + finger.tip.center_in_body.coords.norm() + finger.tip.radius()
+}
+
+/// Largest distance between two of: finger bases, fingertips at rest, palm shapes; in metres.
+fn size_of(hand: &Hand) -> f64 {
+    let mut points = Vec::new();
+    for finger in &hand.fingers {
+        points.extend(finger.chain.joints.first().map(|joint| Point::from(joint.parent_from_joint.translation.vector)));
+        points.push(finger.chain.tip(&finger.rest, &finger.tip.center_in_body));
+    }
+    for shape in &hand.palm {
+        let (low, high) = shape.placed.shape.bounds();
+        points.extend([low, high].map(|corner| shape.placed.parent_from_shape * corner));
+    }
+    let pairs = points.iter().flat_map(|a| points.iter().map(move |b| (a - b).norm()));
+    pairs.fold(0.0, f64::max)
+}
