@@ -10,10 +10,10 @@ mod commands;
 mod gait_chart;
 /// Ctrl-C, SIGTERM, and the promise to stop within 100 ms.
 mod interrupt;
+/// What the checker said, in words and as an event.
+mod judge;
 /// Models from disk, with what the environment says about packages.
 mod load;
-/// What the checker said.
-mod judge;
 /// What is printed while a search runs.
 mod progress;
 /// How a command ends, other than well.
