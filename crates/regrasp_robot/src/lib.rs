@@ -6,11 +6,14 @@
 pub mod hand;
 /// Readers: URDF, SRDF, `package://` paths, hand files.
 pub mod import;
+/// What a robot and a hand are like: joints, meshes, units, fingers guessed, links that always or never touch.
+pub mod inspect;
 /// Forward kinematics, Jacobians, inverse kinematics and motion bounds of serial chains.
 pub mod kinematics;
 /// Links and joints of a robot, as read.
 pub mod robot;
 
 pub use hand::{Finger, FingerId, FingerShape, Hand, Tip, TipShape};
+pub use import::{LoadOptions, LoadedHand, LoadedInput, LoadedRobot, ResolveOptions, load_hand, load_robot};
 pub use kinematics::chain::{Chain, ChainJoint, Motion};
 pub use robot::{Joint, JointId, JointKind, Limits, Link, LinkId, Mimic, Robot};

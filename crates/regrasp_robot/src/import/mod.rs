@@ -1,1 +1,28 @@
 //! Readers: URDF, SRDF, `package://` paths, hand files.
+//!
+//! Own readers over an XML and a TOML parser, because every message must name file, line, element, value and fix.
+//! They read files that the caller names and files that those name, below allowed folders; no environment, no
+//! subprocess, no network.
+//!
+//! Codes: U10x files and XML, U11x numbers and attributes, U12x joints, U13x the tree, U14x couplings, U15x geometry,
+//! U16x SRDF, U2xx hand files, V001 numbers that are not finite.
+
+/// A hand from a robot and the choice of its fingers.
+pub(crate) mod assemble;
+/// `hand.toml`, and hands guessed from a bare URDF.
+pub mod hand_file;
+mod mesh_stand_in;
+/// `package://` and relative paths, below allowed folders.
+pub mod resolve;
+/// SRDF: groups, end effectors, pairs of links that are not tested.
+pub mod srdf;
+/// TOML tables with the places of their keys and values.
+mod toml_table;
+/// URDF.
+pub mod urdf;
+/// XML elements and attributes with their places.
+pub(crate) mod xml;
+
+pub use hand_file::{LoadOptions, LoadedHand, LoadedInput, load_hand};
+pub use resolve::ResolveOptions;
+pub use urdf::{LoadedRobot, load_robot};

@@ -1,0 +1,466 @@
+//! A [`Hand`] from a robot and the choice of its fingers.
+//!
+//! Fixed joints are folded into bodies. A finger is the serial chain from the base to its tip link. What no finger
+//! joint moves is palm; moving joints that belong to no finger are held at the position nearest to zero.
+
+use crate::hand::{Finger, FingerShape, Hand, PalmShape, Tip, TipShape, convex_of};
+use crate::kinematics::chain::{Chain, ChainJoint, Motion};
+use crate::robot::{Joint, JointId, JointKind, LinkId, Robot};
+use nalgebra::{Translation3, UnitQuaternion};
+use regrasp_base::diagnostic::{Diagnostics, did_you_mean};
+use regrasp_base::{Diagnostic, InputError, Place};
+use regrasp_geometry::shape::PlacedShape;
+use regrasp_geometry::{ConvexHull, Point, Pose, Shape, TriangleMesh};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::path::Path;
+use std::sync::Arc;
+
+/// What is a finger of a hand, by the ids of a robot.
+#[derive(Debug, Clone)]
+pub(crate) struct HandSpec {
+    /// The link whose frame is the hand frame.
+    pub base: LinkId,
+    /// The fingers.
+    pub fingers: Vec<FingerSpec>,
+    /// Pairs of links that are never tested, smaller id first.
+    pub allow: BTreeSet<(LinkId, LinkId)>,
+}
+
+/// A finger to be made.
+#[derive(Debug, Clone)]
+pub(crate) struct FingerSpec {
+    pub name: String,
+    pub tip_link: LinkId,
+    /// First joint of the chain; moving joints before it are held. The first after the base where none is given.
+    pub first_joint: Option<JointId>,
+    pub tip: TipSpec,
+    /// Rest posture by joint name, with the place of each name; the rest in the middle of the limits.
+    pub rest: Vec<(String, f64, Place)>,
+    /// Where it stands, for messages.
+    pub place: Place,
+}
+
+/// A tip to be made; points are in the frame of the tip link.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum TipSpec {
+    Sphere { radius: f64, center: Point },
+    Point { position: Point },
+    Hull { center: Point },
+}
+
+/// A rigid body of a hand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Body {
+    Palm,
+    Finger { finger: usize, body: usize },
+}
+
+/// Where a link is: its body, and its pose in the body's frame (the base frame, for the palm).
+#[derive(Debug, Clone, Copy)]
+struct Carried {
+    body: Body,
+    body_from_link: Pose,
+}
+
+/// The hand, and remarks. Errors: `U206`..`U212`.
+pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Result<(Hand, Vec<String>), InputError> {
+    let mut found = Diagnostics::default();
+    let mut notes = Vec::new();
+    let moving = moving_joints(robot, spec, &mut found);
+    // Every later step needs the chains.
+    std::mem::take(&mut found).into_result(())?;
+    let owner: BTreeMap<JointId, (usize, usize)> = moving
+        .iter()
+        .enumerate()
+        .flat_map(|(finger, joints)| joints.iter().enumerate().map(move |(body, &joint)| (joint, (finger, body))))
+        .collect();
+    let carried = carry(robot, spec.base, &owner, file, &mut found, &mut notes);
+    let mut hulls = Hulls { robot, file, made: Vec::new() };
+    let mut fingers = Vec::new();
+    for (index, (finger, joints)) in spec.fingers.iter().zip(&moving).enumerate() {
+        fingers.extend(make_finger(robot, index, finger, joints, &carried, &mut hulls, &mut found));
+    }
+    let mut palm = Vec::new();
+    for (&link, at) in carried.iter().filter(|(_, at)| at.body == Body::Palm) {
+        let shapes = hulls.of_link(link, &at.body_from_link, &mut found);
+        palm.extend(shapes.into_iter().map(|placed| PalmShape { link, placed }));
+    }
+    let mut allowed_pairs = spec.allow.clone();
+    allowed_pairs.extend(adjacent_pairs(robot, &carried, &moving));
+    let outside = robot.links.len() - carried.len();
+    if outside > 0 {
+        let base = &robot.links[spec.base.0].name;
+        notes.push(format!("{outside} links are not carried by base link \"{base}\" and are not part of the hand"));
+    }
+    for finger in &spec.fingers {
+        let link = &robot.links[finger.tip_link.0];
+        if link.collision.is_empty() {
+            notes.push(format!("finger \"{}\": tip link \"{}\" has no collision geometry", finger.name, link.name));
+        }
+    }
+    found.into_result((Hand { robot: robot.clone(), base: spec.base, fingers, palm, allowed_pairs }, notes))
+}
+
+/// The moving joints of each finger, base first.
+fn moving_joints(robot: &Robot, spec: &HandSpec, found: &mut Diagnostics) -> Vec<Vec<JointId>> {
+    let base_path = robot.joints_to(spec.base);
+    let mut chains: Vec<Vec<JointId>> = Vec::new();
+    for (index, finger) in spec.fingers.iter().enumerate() {
+        let say = |code, problem: String, expected: &str, fix: String| {
+            Diagnostic::new(code, finger.place.clone(), problem)
+                .element("finger", &finger.name)
+                .expected(expected)
+                .fix(fix)
+        };
+        if finger.name.is_empty() || spec.fingers[..index].iter().any(|other| other.name == finger.name) {
+            found.push(say("U211", "the name is empty or used twice".into(), "a name of its own", String::new()));
+        }
+        let path = robot.joints_to(finger.tip_link);
+        let base_name = &robot.links[spec.base.0].name;
+        let tip_name = &robot.links[finger.tip_link.0].name;
+        let mut joints = Vec::new();
+        if !path.starts_with(&base_path) {
+            let problem = format!("tip link \"{tip_name}\" is not carried by base link \"{base_name}\"");
+            found.push(say("U206", problem, "a tip link below the base link", String::new()));
+        } else {
+            let below = &path[base_path.len()..];
+            let first = finger.first_joint.map(|joint| below.iter().position(|&other| other == joint));
+            if let Some(None) = first {
+                let joint = finger.first_joint.map_or("", |joint| &robot.joints[joint.0].name);
+                let problem = format!("first joint \"{joint}\" is not between \"{base_name}\" and \"{tip_name}\"");
+                found.push(say("U206", problem, "a joint of the finger", String::new()));
+            }
+            let from = first.flatten().unwrap_or(0);
+            joints.extend(below[from..].iter().copied().filter(|j| robot.joints[j.0].kind != JointKind::Fixed));
+            if joints.is_empty() {
+                let problem = format!("no joint moves between \"{base_name}\" and \"{tip_name}\"");
+                found.push(say("U207", problem, "at least one moving joint", String::new()));
+            }
+        }
+        if let Some((other, shared)) = chains
+            .iter()
+            .enumerate()
+            .find_map(|(other, chain)| joints.iter().find(|joint| chain.contains(joint)).map(|&joint| (other, joint)))
+        {
+            let problem =
+                format!("joint \"{}\" moves finger \"{}\" too", robot.joints[shared.0].name, spec.fingers[other].name);
+            let last_shared = joints.iter().rev().find(|joint| chains[other].contains(joint)).unwrap_or(&shared);
+            let below = &robot.links[robot.joints[last_shared.0].child.0].name;
+            let fix = format!("base_link = \"{below}\", so that shared joints belong to no finger");
+            found.push(say("U208", problem, "fingers that share no joint", fix));
+        }
+        chains.push(joints);
+    }
+    chains
+}
+
+/// Walks from the base over all joints that are not on the way to another part of the robot.
+fn carry(
+    robot: &Robot,
+    base: LinkId,
+    owner: &BTreeMap<JointId, (usize, usize)>,
+    file: &Path,
+    found: &mut Diagnostics,
+    notes: &mut Vec<String>,
+) -> BTreeMap<LinkId, Carried> {
+    let mut carried = BTreeMap::from([(base, Carried { body: Body::Palm, body_from_link: Pose::identity() })]);
+    let mut waiting = VecDeque::from([base]);
+    while let Some(link) = waiting.pop_front() {
+        let at = carried[&link];
+        if let Some(up) = robot.links[link.0].parent_joint {
+            let joint = &robot.joints[up.0];
+            if joint.kind == JointKind::Fixed && !carried.contains_key(&joint.parent) {
+                let body_from_link = at.body_from_link * joint.parent_from_joint.inverse();
+                carried.insert(joint.parent, Carried { body: at.body, body_from_link });
+                waiting.push_back(joint.parent);
+            }
+        }
+        for id in robot.joints_from(link) {
+            let joint = &robot.joints[id.0];
+            if carried.contains_key(&joint.child) {
+                continue;
+            }
+            let child = match owner.get(&id) {
+                Some(&(finger, body)) => {
+                    Carried { body: Body::Finger { finger, body }, body_from_link: Pose::identity() }
+                }
+                None => {
+                    let held = held_at(robot, id, owner, file, found, notes);
+                    let body_from_link = at.body_from_link * joint.parent_from_joint * held;
+                    Carried { body: at.body, body_from_link }
+                }
+            };
+            carried.insert(joint.child, child);
+            waiting.push_back(joint.child);
+        }
+    }
+    carried
+}
+
+/// The motion of a joint that belongs to no finger, at the position where it is held.
+fn held_at(
+    robot: &Robot,
+    id: JointId,
+    owner: &BTreeMap<JointId, (usize, usize)>,
+    file: &Path,
+    found: &mut Diagnostics,
+    notes: &mut Vec<String>,
+) -> Pose {
+    let joint = &robot.joints[id.0];
+    if joint.kind == JointKind::Fixed {
+        return Pose::identity();
+    }
+    let position = match joint.mimic {
+        Some(mimic) if owner.contains_key(&mimic.joint) => {
+            let problem = format!(
+                "follows finger joint \"{}\" but is on no finger: linkages are not supported",
+                robot.joints[mimic.joint.0].name
+            );
+            found.push(
+                Diagnostic::new("U209", Place::file(file), problem)
+                    .element("joint", &joint.name)
+                    .expected("followers on the chain of the joint they follow")
+                    .fix("make it type=\"fixed\", or leave its link out"),
+            );
+            return Pose::identity();
+        }
+        Some(mimic) => mimic.multiplier * nearest_to_zero(&robot.joints[mimic.joint.0]) + mimic.offset,
+        None => nearest_to_zero(joint),
+    };
+    notes.push(format!("joint \"{}\" belongs to no finger; held at {position}", joint.name));
+    match joint.kind {
+        JointKind::Prismatic => {
+            Pose::from_parts(Translation3::from(joint.axis.into_inner() * position), UnitQuaternion::identity())
+        }
+        _ => Pose::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&joint.axis, position)),
+    }
+}
+
+fn nearest_to_zero(joint: &Joint) -> f64 {
+    joint.limits.map_or(0.0, |limits| 0.0f64.clamp(limits.lower, limits.upper))
+}
+
+fn make_finger(
+    robot: &Robot,
+    index: usize,
+    spec: &FingerSpec,
+    joints: &[JointId],
+    carried: &BTreeMap<LinkId, Carried>,
+    hulls: &mut Hulls,
+    found: &mut Diagnostics,
+) -> Option<Finger> {
+    let chain = make_chain(robot, spec, joints, carried, found)?;
+    let mut shapes = Vec::new();
+    for (&link, at) in carried {
+        let Body::Finger { finger, body } = at.body else { continue };
+        if finger == index {
+            let placed = hulls.of_link(link, &at.body_from_link, found);
+            let is_tip = link == spec.tip_link;
+            shapes.extend(placed.into_iter().map(|placed| FingerShape { body, link, placed, is_tip }));
+        }
+    }
+    shapes.sort_by_key(|shape| (shape.body, shape.link));
+    let tip_at = carried.get(&spec.tip_link)?;
+    let (center, shape) = match &spec.tip {
+        TipSpec::Sphere { radius, center } => (center, TipShape::Sphere { radius: *radius }),
+        TipSpec::Point { position } => (position, TipShape::Point),
+        TipSpec::Hull { center } => {
+            let center_in_body = tip_at.body_from_link * center;
+            let points: Vec<Point> = shapes.iter().filter(|s| s.is_tip).flat_map(|s| corners(&s.placed)).collect();
+            let moved: Vec<Point> = points.iter().map(|p| Point::from(p - center_in_body)).collect();
+            match ConvexHull::new(&moved) {
+                Ok(hull) => (center, TipShape::Hull(Arc::new(hull))),
+                Err(error) => {
+                    found.push(
+                        Diagnostic::new("U210", spec.place.clone(), format!("tip link has no hull: {error}"))
+                            .element("finger", &spec.name)
+                            .expected("box or mesh collision geometry on the tip link")
+                            .fix("shape = \"sphere\" for a round tip"),
+                    );
+                    return None;
+                }
+            }
+        }
+    };
+    let rest = rest_posture(spec, &chain, found);
+    let tip = Tip { link: spec.tip_link, shape, center_in_body: tip_at.body_from_link * center };
+    Some(Finger { name: spec.name.clone(), chain, tip, shapes, rest })
+}
+
+/// Corner points of a polyhedral shape in the parent's frame; none for round shapes.
+fn corners(placed: &PlacedShape) -> Vec<Point> {
+    let points = match &placed.shape {
+        Shape::Convex(hull) => hull.vertices().to_vec(),
+        Shape::Cuboid { half_extents: h } => (0..8)
+            .map(|k| {
+                let sign = |bit: usize| if k >> bit & 1 == 0 { -1.0 } else { 1.0 };
+                Point::new(sign(0) * h.x, sign(1) * h.y, sign(2) * h.z)
+            })
+            .collect(),
+        _ => Vec::new(),
+    };
+    points.iter().map(|p| placed.parent_from_shape * p).collect()
+}
+
+fn make_chain(
+    robot: &Robot,
+    spec: &FingerSpec,
+    joints: &[JointId],
+    carried: &BTreeMap<LinkId, Carried>,
+    found: &mut Diagnostics,
+) -> Option<Chain> {
+    let independent: Vec<JointId> = joints.iter().copied().filter(|j| robot.joints[j.0].mimic.is_none()).collect();
+    let mut chain = Chain { joints: Vec::new(), names: Vec::new(), lower: Vec::new(), upper: Vec::new() };
+    for id in &independent {
+        let joint = &robot.joints[id.0];
+        chain.names.push(joint.name.clone());
+        chain.lower.push(joint.limits.map_or(f64::NEG_INFINITY, |limits| limits.lower));
+        chain.upper.push(joint.limits.map_or(f64::INFINITY, |limits| limits.upper));
+    }
+    let mut complete = true;
+    for id in joints {
+        let joint = &robot.joints[id.0];
+        let (leader, multiplier, offset) =
+            joint.mimic.map_or((*id, 1.0, 0.0), |mimic| (mimic.joint, mimic.multiplier, mimic.offset));
+        let Some(coordinate) = independent.iter().position(|other| *other == leader) else {
+            let problem = format!(
+                "joint \"{}\" follows joint \"{}\", which is on another finger or on none",
+                joint.name, robot.joints[leader.0].name
+            );
+            found.push(
+                Diagnostic::new("U209", spec.place.clone(), problem)
+                    .element("finger", &spec.name)
+                    .expected("followers on the chain of the joint they follow"),
+            );
+            complete = false;
+            continue;
+        };
+        if let (Some(_), Some(limits)) = (joint.mimic, joint.limits) {
+            let ends = [limits.lower, limits.upper].map(|position| (position - offset) / multiplier);
+            chain.lower[coordinate] = chain.lower[coordinate].max(ends[0].min(ends[1]));
+            chain.upper[coordinate] = chain.upper[coordinate].min(ends[0].max(ends[1]));
+        }
+        let parent = carried.get(&joint.parent)?;
+        chain.joints.push(ChainJoint {
+            parent_from_joint: parent.body_from_link * joint.parent_from_joint,
+            axis: joint.axis,
+            motion: if joint.kind == JointKind::Prismatic { Motion::Slide } else { Motion::Turn },
+            coordinate,
+            multiplier,
+            offset,
+        });
+    }
+    for (k, name) in chain.names.iter().enumerate() {
+        if chain.lower[k] > chain.upper[k] {
+            let problem = format!("the joints that follow joint \"{name}\" leave it no position");
+            found.push(
+                Diagnostic::new("U143", spec.place.clone(), problem)
+                    .element("finger", &spec.name)
+                    .expected("limits that overlap"),
+            );
+            complete = false;
+        }
+    }
+    complete.then_some(chain)
+}
+
+fn rest_posture(spec: &FingerSpec, chain: &Chain, found: &mut Diagnostics) -> Vec<f64> {
+    let mut rest: Vec<f64> = (0..chain.n_coordinates())
+        .map(|k| {
+            let (lower, upper) = (chain.lower[k], chain.upper[k]);
+            if lower.is_finite() && upper.is_finite() { 0.5 * (lower + upper) } else { 0.0 }
+        })
+        .collect();
+    for (name, value, place) in &spec.rest {
+        let Some(k) = chain.names.iter().position(|other| other == name) else {
+            let meant = did_you_mean(name, chain.names.iter().map(String::as_str));
+            found.push(
+                Diagnostic::new(
+                    "U205",
+                    place.clone(),
+                    format!("finger \"{}\" has no independent joint \"{name}\"", spec.name),
+                )
+                .element("key", "rest")
+                .expected(format!("one of {}", chain.names.join(", ")))
+                .fix(meant.map_or(String::new(), |meant| format!("did you mean {meant}?"))),
+            );
+            continue;
+        };
+        if *value < chain.lower[k] || *value > chain.upper[k] {
+            found.push(
+                Diagnostic::new("U212", place.clone(), format!("rest position {value} is outside the limits"))
+                    .element("joint", name)
+                    .expected(format!("{}..{}", chain.lower[k], chain.upper[k])),
+            );
+            continue;
+        }
+        rest[k] = *value;
+    }
+    rest
+}
+
+/// Pairs of links of one body, and of bodies that follow each other with nothing but bodies without shapes between.
+fn adjacent_pairs(
+    robot: &Robot,
+    carried: &BTreeMap<LinkId, Carried>,
+    moving: &[Vec<JointId>],
+) -> BTreeSet<(LinkId, LinkId)> {
+    let mut links_of: BTreeMap<Body, Vec<LinkId>> = BTreeMap::new();
+    for (&link, at) in carried.iter().filter(|(link, _)| !robot.links[link.0].collision.is_empty()) {
+        links_of.entry(at.body).or_default().push(link);
+    }
+    let mut pairs = BTreeSet::new();
+    let mut add = |a: &[LinkId], b: &[LinkId]| {
+        pairs.extend(a.iter().flat_map(|&x| b.iter().map(move |&y| (x.min(y), x.max(y)))).filter(|(x, y)| x != y));
+    };
+    for links in links_of.values() {
+        add(links, links);
+    }
+    for (finger, joints) in moving.iter().enumerate() {
+        let bodies = (0..joints.len()).map(|body| Body::Finger { finger, body });
+        let with_shapes: Vec<&Vec<LinkId>> =
+            std::iter::once(Body::Palm).chain(bodies).filter_map(|body| links_of.get(&body)).collect();
+        for pair in with_shapes.windows(2) {
+            add(pair[0], pair[1]);
+        }
+    }
+    pairs
+}
+
+/// Convex collision shapes of links; each mesh gets its hull once.
+struct Hulls<'a> {
+    robot: &'a Robot,
+    file: &'a Path,
+    made: Vec<(Arc<TriangleMesh>, Shape)>,
+}
+
+impl Hulls<'_> {
+    fn of_link(&mut self, link: LinkId, body_from_link: &Pose, found: &mut Diagnostics) -> Vec<PlacedShape> {
+        let robot = self.robot;
+        let link = &robot.links[link.0];
+        let mut placed = Vec::new();
+        for collision in &link.collision {
+            match self.convex(&collision.shape) {
+                Ok(shape) => {
+                    placed.push(PlacedShape { parent_from_shape: body_from_link * collision.parent_from_shape, shape });
+                }
+                Err(error) => found.push(
+                    Diagnostic::new("U210", Place::file(self.file), format!("a collision mesh has no hull: {error}"))
+                        .element("link", &link.name)
+                        .expected("a mesh that encloses a volume"),
+                ),
+            }
+        }
+        placed
+    }
+
+    fn convex(&mut self, shape: &Shape) -> Result<Shape, regrasp_geometry::hull::HullError> {
+        let Shape::Mesh(mesh) = shape else { return convex_of(shape) };
+        if let Some((_, hull)) = self.made.iter().find(|(known, _)| Arc::ptr_eq(known, mesh)) {
+            return Ok(hull.clone());
+        }
+        let hull = convex_of(shape)?;
+        self.made.push((mesh.clone(), hull.clone()));
+        Ok(hull)
+    }
+}

@@ -1,0 +1,301 @@
+//! `package://` and relative paths of model files, below allowed folders.
+//!
+//! Order for `package://NAME/REST`: the packages given by name; the search paths (`DIR/NAME`, `DIR` itself when it is
+//! called NAME, `DIR/share/NAME`); the folder above the model whose `package.xml` has that name; a folder of that name
+//! beside the model or one of the folders above it. Nothing is executed and nothing is fetched.
+
+use regrasp_base::{Diagnostic, Place};
+use std::ffi::OsStr;
+use std::fs;
+use std::path::{Component, Path, PathBuf};
+
+/// How many folders above the model are looked at.
+const MAX_WALK_UP: usize = 8;
+/// How many directory entries the search for a file of the same name looks at.
+const MAX_ENTRIES_FOR_HINT: usize = 2_000;
+/// Folder names that hold models inside a package, whose parent then belongs to the model.
+const MODEL_FOLDERS: [&str; 3] = ["urdf", "robots", "robot"];
+
+/// Where packages are.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ResolveOptions {
+    /// Packages given by name and folder; looked at first, and allowed as roots of every path.
+    pub packages: Vec<(String, PathBuf)>,
+    /// Folders such as the entries of `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`, in order.
+    pub search_paths: Vec<PathBuf>,
+}
+
+/// A file found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Resolved {
+    /// The file.
+    pub path: PathBuf,
+    /// Remarks: another case of letters, a folder that stood in for a package.
+    pub notes: Vec<String>,
+}
+
+/// The file that `name`, found in the model file `model`, means.
+///
+/// Errors (without element): `U101` not found, with every path tried; `U102` no file name; `U103` refused because it is
+/// fetched, absolute or leaves the allowed folders.
+pub fn resolve(name: &str, model: &Path, place: Place, options: &ResolveOptions) -> Result<Resolved, Diagnostic> {
+    if name.trim().is_empty() {
+        return Err(Diagnostic::new("U102", place, "the file name is empty").expected("a path or package://NAME/PATH"));
+    }
+    let folder = folder_of(model);
+    if let Some(rest) = name.strip_prefix("package://").or_else(|| name.strip_prefix("model://")) {
+        return in_package(name, rest, &folder, place, options);
+    }
+    if let Some((scheme, path)) = name.split_once("://") {
+        if scheme != "file" {
+            return Err(Diagnostic::new(
+                "U103",
+                place,
+                format!("\"{name}\" would have to be fetched; models are never fetched"),
+            )
+            .expected("a file")
+            .fix("download it and name the file"));
+        }
+        return within(name, Path::new(path), &folder, &[], place, options);
+    }
+    within(name, &folder.join(name), &folder, &[], place, options)
+}
+
+/// The folder that holds `model`.
+fn folder_of(model: &Path) -> PathBuf {
+    match model.parent() {
+        Some(parent) if parent != Path::new("") => parent.to_owned(),
+        _ => PathBuf::from("."),
+    }
+}
+
+fn in_package(
+    name: &str,
+    rest: &str,
+    folder: &Path,
+    place: Place,
+    options: &ResolveOptions,
+) -> Result<Resolved, Diagnostic> {
+    let (package, inside) = match rest.split_once('/') {
+        Some((package, inside)) if !package.is_empty() && !inside.trim_matches('/').is_empty() => (package, inside),
+        _ => {
+            return Err(Diagnostic::new("U102", place, format!("\"{name}\" has no path after the package name"))
+                .expected("package://NAME/PATH"));
+        }
+    };
+    let inside = Path::new(inside.trim_start_matches('/'));
+    let mut tried = Vec::new();
+    for (source, root) in package_roots(package, folder, options, &mut tried) {
+        let (path, mut notes) = match existing(&root.join(inside)) {
+            Some(found) => found,
+            None => {
+                tried.push(format!("{source}: {} (no such file)", root.join(inside).display()));
+                continue;
+            }
+        };
+        if source == Source::FolderOfThatName {
+            notes.push(format!("package \"{package}\" has no package.xml; the folder {} is taken", root.display()));
+        }
+        let resolved = within(name, &path, folder, &[root], place, options)?;
+        return Ok(Resolved { path: resolved.path, notes });
+    }
+    let numbered: Vec<String> = tried.iter().enumerate().map(|(i, text)| format!("({}) {text}", i + 1)).collect();
+    let hint = same_name_near(folder, inside)
+        .map_or(String::new(), |p| format!(" (a file of that name is at {})", p.display()));
+    Err(Diagnostic::new("U101", place, format!("\"{name}\" not found; looked in: {}", numbered.join(" ")))
+        .fix(format!("--package {package}=DIR{hint}")))
+}
+
+/// Where a candidate for a package comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Source {
+    Given,
+    SearchPath,
+    PackageXml,
+    FolderOfThatName,
+}
+
+impl std::fmt::Display for Source {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Source::Given => "--package",
+            Source::SearchPath => "package search path",
+            Source::PackageXml => "package.xml above the model",
+            Source::FolderOfThatName => "folder of that name",
+        })
+    }
+}
+
+/// Folders that may be package `package`, in the order of the module's documentation; what is absent goes to `tried`.
+fn package_roots(
+    package: &str,
+    folder: &Path,
+    options: &ResolveOptions,
+    tried: &mut Vec<String>,
+) -> Vec<(Source, PathBuf)> {
+    let mut roots = Vec::new();
+    let given: Vec<_> = options.packages.iter().filter(|(name, _)| name == package).collect();
+    if given.is_empty() {
+        tried.push(format!("--package {package}: not given"));
+    }
+    roots.extend(given.iter().map(|(_, root)| (Source::Given, root.clone())));
+    if options.search_paths.is_empty() {
+        tried.push("ROS_PACKAGE_PATH, AMENT_PREFIX_PATH: not set".into());
+    }
+    for base in &options.search_paths {
+        let own = (base.file_name() == Some(OsStr::new(package))).then(|| base.clone());
+        let candidates = own.into_iter().chain([base.join(package), base.join("share").join(package)]);
+        let before = roots.len();
+        roots.extend(candidates.filter(|dir| dir.is_dir()).map(|dir| (Source::SearchPath, dir)));
+        if roots.len() == before {
+            tried.push(format!("package search path: {} (no folder {package})", base.display()));
+        }
+    }
+    if package.contains('\\') || !matches!(Path::new(package).components().next(), Some(Component::Normal(_))) {
+        tried.push(format!("\"{package}\" is not a folder name"));
+        return roots;
+    }
+    let above = folders_above(folder);
+    let named = above.iter().find(|dir| package_name(dir).as_deref() == Some(package));
+    match named {
+        Some(dir) => roots.push((Source::PackageXml, dir.clone())),
+        None => tried.push(format!("package.xml above the model: none says <name>{package}</name>")),
+    }
+    let before = roots.len();
+    for dir in &above {
+        if dir.file_name() == Some(OsStr::new(package)) {
+            roots.push((Source::FolderOfThatName, dir.clone()));
+        }
+        if dir.join(package).is_dir() {
+            roots.push((Source::FolderOfThatName, dir.join(package)));
+        }
+    }
+    if roots.len() == before {
+        tried.push(format!("folder of that name: {} and folders above (none called {package})", folder.display()));
+    }
+    roots
+}
+
+/// `folder` and at most [`MAX_WALK_UP`] folders above it, as absolute paths where the folder exists.
+fn folders_above(folder: &Path) -> Vec<PathBuf> {
+    let absolute = fs::canonicalize(folder).unwrap_or_else(|_| folder.to_owned());
+    absolute.ancestors().take(MAX_WALK_UP + 1).map(Path::to_owned).collect()
+}
+
+/// The name in `dir/package.xml`.
+fn package_name(dir: &Path) -> Option<String> {
+    let path = dir.join("package.xml");
+    if !path.is_file() {
+        return None;
+    }
+    let text = regrasp_base::files::read_text(&path).ok()?;
+    let document = super::xml::parse(&path, &text).ok()?;
+    let name = super::xml::child(document.root_element(), "name")?.text()?.trim().to_owned();
+    Some(name)
+}
+
+/// `path` when its canonical form is a file below an allowed folder.
+fn within(
+    name: &str,
+    path: &Path,
+    folder: &Path,
+    more_roots: &[PathBuf],
+    place: Place,
+    options: &ResolveOptions,
+) -> Result<Resolved, Diagnostic> {
+    let Some((path, notes)) = existing(path) else {
+        let hint = same_name_near(folder, Path::new(name))
+            .map_or(String::new(), |found| format!("a file of that name is at {}", found.display()));
+        return Err(Diagnostic::new("U101", place, format!("\"{name}\" not found; looked in: {}", path.display()))
+            .expected("a path relative to the model file, or package://NAME/PATH")
+            .fix(hint));
+    };
+    let real = fs::canonicalize(&path)
+        .map_err(|error| Diagnostic::new("U101", place.clone(), format!("\"{name}\" cannot be followed: {error}")))?;
+    let allowed = allowed_roots(folder, more_roots, options);
+    if !allowed.iter().any(|root| real.starts_with(root)) {
+        let roots: Vec<String> = allowed.iter().map(|root| root.display().to_string()).collect();
+        return Err(Diagnostic::new(
+            "U103",
+            place,
+            format!("\"{name}\" leads to {}, outside the model's folders", real.display()),
+        )
+        .expected(format!("a file below {}", roots.join(" or ")))
+        .fix("--package NAME=DIR with a DIR that contains both, or move the file"));
+    }
+    Ok(Resolved { path, notes })
+}
+
+/// Canonical folders that files may come from: the model's own, its package's, and those given or found by name.
+fn allowed_roots(folder: &Path, more_roots: &[PathBuf], options: &ResolveOptions) -> Vec<PathBuf> {
+    let above = folders_above(folder);
+    let mut roots: Vec<PathBuf> = above.first().cloned().into_iter().collect();
+    if let Some(package) = above.iter().find(|dir| dir.join("package.xml").is_file()) {
+        roots.push(package.clone());
+    } else if let [own, parent, ..] = above.as_slice()
+        && own.file_name().is_some_and(|name| MODEL_FOLDERS.iter().any(|known| name == *known))
+    {
+        roots.push(parent.clone());
+    }
+    let named = options.packages.iter().map(|(_, root)| root).chain(more_roots);
+    roots.extend(named.filter_map(|root| fs::canonicalize(root).ok()));
+    roots.dedup();
+    roots
+}
+
+/// `path` when there is a file, else the only file whose path differs in the case of letters alone, with a remark.
+fn existing(path: &Path) -> Option<(PathBuf, Vec<String>)> {
+    if path.is_file() {
+        return Some((path.to_owned(), Vec::new()));
+    }
+    let mut found = PathBuf::new();
+    for component in path.components() {
+        let next = found.join(component);
+        let Component::Normal(wanted) = component else {
+            found = next;
+            continue;
+        };
+        if next.exists() {
+            found = next;
+            continue;
+        }
+        let wanted = wanted.to_str()?.to_lowercase();
+        let parent = if found.as_os_str().is_empty() { Path::new(".") } else { &found };
+        let mut same = fs::read_dir(parent)
+            .ok()?
+            .take(MAX_ENTRIES_FOR_HINT)
+            .filter_map(Result::ok)
+            .filter(|entry| entry.file_name().to_str().is_some_and(|name| name.to_lowercase() == wanted));
+        let entry = same.next()?;
+        if same.next().is_some() {
+            return None;
+        }
+        found.push(entry.file_name());
+    }
+    let remark =
+        format!("{} does not exist, {} is taken: the case of letters differs", path.display(), found.display());
+    found.is_file().then(|| (found, vec![remark]))
+}
+
+/// A file with the same last name below the model's folder or the one above it.
+fn same_name_near(folder: &Path, wanted: &Path) -> Option<PathBuf> {
+    let name = wanted.file_name()?;
+    let mut left = MAX_ENTRIES_FOR_HINT;
+    let mut waiting = vec![folder.to_owned()];
+    while let Some(dir) = waiting.pop() {
+        let mut entries: Vec<PathBuf> =
+            fs::read_dir(dir).ok()?.take(left).filter_map(Result::ok).map(|entry| entry.path()).collect();
+        left = left.saturating_sub(entries.len());
+        entries.sort();
+        for path in entries {
+            let Ok(metadata) = fs::symlink_metadata(&path) else { continue };
+            if metadata.is_file() && path.file_name() == Some(name) {
+                return Some(path);
+            }
+            if metadata.is_dir() {
+                waiting.push(path);
+            }
+        }
+    }
+    None
+}

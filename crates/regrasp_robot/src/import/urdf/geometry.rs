@@ -1,0 +1,159 @@
+//! Poses and collision geometry of a URDF.
+
+use super::Meshes;
+use crate::import::xml::{Named, Reader, child, children};
+use nalgebra::{Translation3, UnitQuaternion};
+use regrasp_base::{Diagnostic, InputError};
+use regrasp_geometry::shape::PlacedShape;
+use regrasp_geometry::{Pose, Shape, TriangleMesh, Vector};
+use roxmltree::Node;
+use std::sync::Arc;
+
+/// Tags of geometry that are read.
+const SHAPES: [&str; 5] = ["box", "cylinder", "sphere", "capsule", "mesh"];
+
+/// The pose in the `<origin>` of `node`; the identity where there is none.
+///
+/// `rpy` is roll, pitch, yaw about the fixed axes: `R = Rz(yaw) Ry(pitch) Rx(roll)`.
+pub(super) fn read_origin(reader: &mut Reader, node: Node, element: Named) -> Option<Pose> {
+    let Some(origin) = child(node, "origin") else { return Some(Pose::identity()) };
+    let xyz = reader.numbers(origin, "xyz", Some([0.0; 3]), element);
+    let rpy = reader.numbers(origin, "rpy", Some([0.0; 3]), element);
+    let ([x, y, z], [roll, pitch, yaw]) = (xyz?, rpy?);
+    Some(Pose::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_euler_angles(roll, pitch, yaw)))
+}
+
+/// The collision geometry of the link at `node`; problems go to the reader.
+pub(super) fn read_collisions(reader: &mut Reader, node: Node, link: &str, meshes: &mut Meshes) -> Vec<PlacedShape> {
+    let element = ("link", link);
+    let mut placed = Vec::new();
+    for collision in children(node, "collision") {
+        reader.note_misspelt_children(collision, &["origin", "geometry"], element);
+        let parent_from_shape = read_origin(reader, collision, element);
+        let shape = match child(collision, "geometry") {
+            Some(geometry) => read_shape(reader, geometry, element, meshes),
+            None => {
+                let place = reader.place(collision);
+                let problem = "<collision> has no <geometry>";
+                drop_or_refuse(reader, collision, element, Diagnostic::new("U150", place, problem).into());
+                None
+            }
+        };
+        if let (Some(parent_from_shape), Some(shape)) = (parent_from_shape, shape) {
+            placed.push(PlacedShape { parent_from_shape, shape });
+        }
+    }
+    placed
+}
+
+/// The shape in a `<geometry>`.
+fn read_shape(reader: &mut Reader, geometry: Node, element: Named, meshes: &mut Meshes) -> Option<Shape> {
+    let known = geometry.children().find(|c| c.is_element() && SHAPES.contains(&c.tag_name().name()));
+    let Some(node) = known else {
+        let seen: Vec<String> =
+            geometry.children().filter(Node::is_element).map(|c| format!("<{}>", c.tag_name().name())).collect();
+        let seen = if seen.is_empty() { "nothing".into() } else { seen.join(", ") };
+        let place = reader.place(geometry);
+        let diagnostic = Diagnostic::new("U150", place, format!("<geometry> has {seen} that can be read"))
+            .expected("one of <box>, <cylinder>, <sphere>, <capsule>, <mesh>");
+        drop_or_refuse(reader, geometry, element, diagnostic.into());
+        return None;
+    };
+    match node.tag_name().name() {
+        "box" => {
+            let size = reader.numbers::<3>(node, "size", None, element)?;
+            for length in size {
+                refuse_non_positive(reader, node, "size", length, element)?;
+            }
+            Some(Shape::Cuboid { half_extents: Vector::from(size) / 2.0 })
+        }
+        "sphere" => Some(Shape::Sphere { radius: positive(reader, node, "radius", element)? }),
+        "mesh" => read_mesh(reader, node, element, meshes),
+        round => {
+            let radius = positive(reader, node, "radius", element);
+            let half_length = positive(reader, node, "length", element).map(|length| length / 2.0);
+            let (radius, half_length) = (radius?, half_length?);
+            Some(match round {
+                "capsule" => Shape::Capsule { half_length, radius },
+                _ => Shape::Cylinder { half_length, radius },
+            })
+        }
+    }
+}
+
+fn positive(reader: &mut Reader, node: Node, name: &str, element: Named) -> Option<f64> {
+    let [value] = reader.numbers::<1>(node, name, None, element)?;
+    refuse_non_positive(reader, node, name, value, element)
+}
+
+fn refuse_non_positive(reader: &mut Reader, node: Node, name: &str, value: f64, element: Named) -> Option<f64> {
+    if value > 0.0 {
+        return Some(value);
+    }
+    let (tag, place) = (node.tag_name().name(), reader.attribute_place(node, name));
+    reader.found.push(
+        Diagnostic::new("U151", place, format!("{name} of <{tag}> is {value}"))
+            .element(element.0, element.1)
+            .expected("a length above 0, in metres"),
+    );
+    None
+}
+
+fn read_mesh(reader: &mut Reader, node: Node, element: Named, meshes: &mut Meshes) -> Option<Shape> {
+    let scale = reader.numbers(node, "scale", Some([1.0; 3]), element);
+    let scale = scale.and_then(|scale| {
+        if scale.iter().all(|s| *s != 0.0) {
+            return Some(Vector::from(scale));
+        }
+        let place = reader.attribute_place(node, "scale");
+        let seen = node.attribute("scale").unwrap_or_default();
+        reader.found.push(
+            Diagnostic::new("U152", place, format!("scale of <mesh> is \"{seen}\""))
+                .element(element.0, element.1)
+                .expected("three factors that are not 0"),
+        );
+        None
+    });
+    let name = reader.required(node, "filename", element)?;
+    let place = reader.attribute_place(node, "filename");
+    let found = meshes.get(name, reader.file, place.clone(), &mut reader.notes);
+    let scale = scale?;
+    let scaled = found.and_then(|mesh| {
+        if scale == Vector::repeat(1.0) {
+            return Ok(mesh);
+        }
+        let scaled: Result<TriangleMesh, _> = mesh.scaled(scale);
+        scaled.map(Arc::new).map_err(|error| {
+            Diagnostic::new("U152", place, format!("\"{name}\" cannot be scaled by {scale:?}: {error}")).into()
+        })
+    });
+    match scaled {
+        Ok(mesh) => {
+            if scale.x * scale.y * scale.z < 0.0 {
+                reader.note(
+                    node,
+                    element,
+                    format!("\"{name}\" is mirrored by its scale; its triangles are turned back"),
+                );
+            }
+            Some(Shape::Mesh(mesh))
+        }
+        Err(error) => {
+            drop_or_refuse(reader, node, element, error);
+            None
+        }
+    }
+}
+
+/// Reports `error`, or drops the geometry with a note when the reader is lenient.
+fn drop_or_refuse(reader: &mut Reader, node: Node, element: Named, error: InputError) {
+    if reader.lenient {
+        let causes: Vec<&str> = error.diagnostics.iter().map(|d| d.problem.as_str()).collect();
+        reader.note(node, element, format!("collision geometry dropped: {}", causes.join("; ")));
+        return;
+    }
+    for diagnostic in error.diagnostics {
+        let named = diagnostic.element.is_empty();
+        reader.found.push(if named { diagnostic.element(element.0, element.1) } else { diagnostic });
+    }
+}

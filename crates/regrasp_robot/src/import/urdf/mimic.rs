@@ -1,0 +1,133 @@
+//! Joints of a URDF that follow others.
+
+use super::joint::DraftJoint;
+use crate::import::xml::{Reader, child};
+use crate::robot::{Joint, JointId, JointKind, Mimic};
+use regrasp_base::Diagnostic;
+use regrasp_base::diagnostic::did_you_mean;
+use std::collections::BTreeMap;
+
+/// The joints with their couplings; a joint that follows a follower follows the leader of the chain.
+///
+/// Reports: unknown leader (`U140`), cycle (`U141`), multiplier 0 (`U142`), limits that leave no position (`U143`),
+/// a leader that cannot move (`U144`).
+pub(super) fn resolve(reader: &mut Reader, mut joints: Vec<Joint>, drafts: &[DraftJoint]) -> Vec<Joint> {
+    let index: BTreeMap<String, JointId> =
+        joints.iter().enumerate().map(|(i, joint)| (joint.name.clone(), JointId(i))).collect();
+    let mut direct: Vec<Option<Mimic>> = vec![None; joints.len()];
+    for draft in drafts {
+        if let Some(&id) = index.get(draft.name) {
+            direct[id.0] = read_mimic(reader, draft, &joints, &index);
+        }
+    }
+    for draft in drafts {
+        let Some(&id) = index.get(draft.name) else { continue };
+        if joints[id.0].kind == JointKind::Fixed {
+            continue;
+        }
+        joints[id.0].mimic = follow(reader, id, draft, &joints, &direct);
+    }
+    refuse_empty_ranges(reader, &joints, drafts);
+    joints
+}
+
+fn read_mimic(
+    reader: &mut Reader,
+    draft: &DraftJoint,
+    joints: &[Joint],
+    index: &BTreeMap<String, JointId>,
+) -> Option<Mimic> {
+    let node = child(draft.node, "mimic")?;
+    let element = ("joint", draft.name);
+    let [multiplier] = reader.numbers(node, "multiplier", Some([1.0]), element)?;
+    let [offset] = reader.numbers(node, "offset", Some([0.0]), element)?;
+    let leader = node.attribute("joint").unwrap_or_default();
+    let place = reader.attribute_place(node, "joint");
+    let Some(&joint) = index.get(leader) else {
+        // A leader that exists but could not be read has its own message.
+        let unreadable = draft.node.parent().is_some_and(|robot| {
+            robot.children().any(|other| other.has_tag_name("joint") && other.attribute("name") == Some(leader))
+        });
+        if !unreadable {
+            let meant = did_you_mean(leader, index.keys().map(String::as_str));
+            reader.found.push(
+                Diagnostic::new("U140", place, format!("follows joint \"{leader}\", which does not exist"))
+                    .element("joint", draft.name)
+                    .expected("the name of a joint")
+                    .fix(meant.map_or(String::new(), |meant| format!("did you mean \"{meant}\"?"))),
+            );
+        }
+        return None;
+    };
+    if multiplier == 0.0 {
+        reader.found.push(
+            Diagnostic::new("U142", place, format!("follows joint \"{leader}\" with multiplier 0"))
+                .element("joint", draft.name)
+                .expected("a multiplier that is not 0")
+                .fix("type=\"fixed\" if it does not move"),
+        );
+        return None;
+    }
+    if joints[joint.0].kind == JointKind::Fixed {
+        reader.found.push(
+            Diagnostic::new("U144", place, format!("follows joint \"{leader}\", which is fixed"))
+                .element("joint", draft.name)
+                .expected("a joint that moves"),
+        );
+        return None;
+    }
+    Some(Mimic { joint, multiplier, offset })
+}
+
+/// The coupling of joint `id` to the first independent joint of its chain of leaders.
+fn follow(
+    reader: &mut Reader,
+    id: JointId,
+    draft: &DraftJoint,
+    joints: &[Joint],
+    direct: &[Option<Mimic>],
+) -> Option<Mimic> {
+    let mut coupling = direct[id.0]?;
+    let mut names = vec![format!("\"{}\"", draft.name), format!("\"{}\"", joints[coupling.joint.0].name)];
+    while let Some(next) = direct[coupling.joint.0] {
+        if next.joint == id || coupling.joint == id || names.len() > joints.len() {
+            names.push(format!("\"{}\"", joints[next.joint.0].name));
+            let place = reader.place(draft.node);
+            reader.found.push(
+                Diagnostic::new("U141", place, format!("joints follow each other in a cycle: {}", names.join(" -> ")))
+                    .element("joint", draft.name)
+                    .expected("a joint at the end that follows no other"),
+            );
+            return None;
+        }
+        coupling = Mimic {
+            joint: next.joint,
+            multiplier: coupling.multiplier * next.multiplier,
+            offset: coupling.multiplier * next.offset + coupling.offset,
+        };
+        names.push(format!("\"{}\"", joints[next.joint.0].name));
+    }
+    Some(coupling)
+}
+
+/// Reports followers whose own limits leave their leader no position.
+fn refuse_empty_ranges(reader: &mut Reader, joints: &[Joint], drafts: &[DraftJoint]) {
+    for draft in drafts {
+        let Some(follower) = joints.iter().find(|joint| joint.name == draft.name) else { continue };
+        let (Some(mimic), Some(own)) = (follower.mimic, follower.limits) else { continue };
+        let leader = &joints[mimic.joint.0];
+        let Some(limits) = leader.limits else { continue };
+        let ends = [limits.lower, limits.upper].map(|q| mimic.multiplier * q + mimic.offset);
+        let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+        if high < own.lower || low > own.upper {
+            let place = reader.place(draft.node);
+            let problem = format!(
+                "follows joint \"{}\" to {low}..{high}, outside its own limits {}..{}",
+                leader.name, own.lower, own.upper
+            );
+            reader.found.push(
+                Diagnostic::new("U143", place, problem).element("joint", draft.name).expected("ranges that overlap"),
+            );
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! URDF. Form: <http://wiki.ros.org/urdf/XML>, with the `<capsule>` of URDF 1.2 (`length` is that of the cylinder).
+//!
+//! Read: links with collision geometry, joints, limits, couplings. Not read: inertia, visuals, transmissions, sensors.
+//! Every problem of a file is reported in one run.
+
+mod geometry;
+mod joint;
+mod mimic;
+mod tree;
+
+use super::hand_file::{LoadOptions, LoadedInput};
+use super::xml::{Reader, children, parse};
+use crate::robot::{Link, Robot};
+use regrasp_base::{Diagnostic, InputError, files};
+use regrasp_geometry::TriangleMesh;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Most links in a robot.
+const MAX_LINKS: usize = 1_000;
+
+/// A robot with what it was read from.
+#[derive(Debug, Clone)]
+pub struct LoadedRobot {
+    /// The robot.
+    pub robot: Robot,
+    /// The URDF and its collision meshes, each once.
+    pub inputs: Vec<LoadedInput>,
+    /// Remarks: what was normalised, defaulted or (when lenient) dropped.
+    pub notes: Vec<String>,
+}
+
+/// Reads the URDF file at `path` and the collision meshes that it names.
+///
+/// Errors: every problem of the file and its meshes (`U1xx`, `V001`, `M2xx`), or `F00x` when it cannot be read.
+pub fn load_robot(path: &Path, options: &LoadOptions) -> Result<LoadedRobot, InputError> {
+    let bytes = files::read(path)?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let input = LoadedInput { role: "urdf".into(), name, path: path.to_owned(), sha256: files::sha256(&bytes) };
+    let text = files::text_of(path, bytes)?;
+    let mut meshes = Meshes { options: options.clone(), read: BTreeMap::new(), inputs: vec![input] };
+    let (robot, notes) = parse_robot(path, &text, options.lenient, &mut meshes)?;
+    Ok(LoadedRobot { robot, inputs: meshes.inputs, notes })
+}
+
+/// Reads `text`, the content of the URDF file `path`.
+pub(crate) fn parse_robot(
+    path: &Path,
+    text: &str,
+    lenient: bool,
+    meshes: &mut Meshes,
+) -> Result<(Robot, Vec<String>), InputError> {
+    let document = parse(path, text)?;
+    let root = document.root_element();
+    let mut reader = Reader::new(path, lenient);
+    if !root.has_tag_name("robot") {
+        let problem = format!("the outermost element is <{}>", root.tag_name().name());
+        return Err(Diagnostic::new("U106", reader.place(root), problem).expected("<robot name=\"...\">").into());
+    }
+    reader.note_misspelt_children(root, &["link", "joint", "material", "transmission", "gazebo"], ("robot", ""));
+    let name = root.attribute("name").unwrap_or_default().to_owned();
+
+    let mut links = Vec::new();
+    let mut link_nodes = Vec::new();
+    for node in children(root, "link") {
+        let Some(link_name) = reader.required(node, "name", ("link", "")) else { continue };
+        if links.len() == MAX_LINKS {
+            let place = reader.place(node);
+            reader.found.push(Diagnostic::new("U105", place, format!("has more than {MAX_LINKS} links")));
+            break;
+        }
+        reader.note_misspelt_children(node, &["inertial", "visual", "collision"], ("link", link_name));
+        let collision = geometry::read_collisions(&mut reader, node, link_name, meshes);
+        links.push(Link { name: link_name.to_owned(), collision, parent_joint: None });
+        link_nodes.push(node);
+    }
+    if links.is_empty() {
+        let place = reader.place(root);
+        reader.found.push(Diagnostic::new("U130", place, "has no <link>").expected("at least one link with a name"));
+    }
+    let draft_joints = joint::read_joints(&mut reader, root);
+    tree::refuse_duplicates(&mut reader, "link", links.iter().map(|l| l.name.as_str()).zip(link_nodes.iter().copied()));
+    tree::refuse_duplicates(&mut reader, "joint", draft_joints.iter().map(|j| (j.name, j.node)));
+    let (joints, root_link) = tree::assemble(&mut reader, root, &mut links, &link_nodes, &draft_joints);
+    let joints = mimic::resolve(&mut reader, joints, &draft_joints);
+    let joints = joint::freeze_unmoving(&mut reader, joints, &draft_joints);
+    let Reader { found, notes, .. } = reader;
+    let root_link = found.into_result(root_link)?;
+    // Without a problem there is a root: `assemble` reports its absence.
+    let root = root_link.ok_or_else(|| Diagnostic::new("U134", regrasp_base::Place::file(path), "has no root link"))?;
+    Ok((Robot { name, links, joints, root }, notes))
+}
+
+/// Collision meshes, read once each.
+pub(crate) struct Meshes {
+    options: LoadOptions,
+    read: BTreeMap<PathBuf, Result<Arc<TriangleMesh>, InputError>>,
+    /// The URDF and every mesh read so far.
+    inputs: Vec<LoadedInput>,
+}
+
+impl Meshes {
+    /// Meshes below the allowed folders of `options`.
+    #[cfg(test)]
+    pub(crate) fn new(options: &LoadOptions) -> Self {
+        Meshes { options: options.clone(), read: BTreeMap::new(), inputs: Vec::new() }
+    }
+
+    /// The mesh file called `name` in the reader's file; remarks go to `notes`.
+    fn get(
+        &mut self,
+        name: &str,
+        model: &Path,
+        place: regrasp_base::Place,
+        notes: &mut Vec<String>,
+    ) -> Result<Arc<TriangleMesh>, InputError> {
+        let resolved = super::resolve::resolve(name, model, place, &self.options.resolve)?;
+        for note in resolved.notes {
+            if !notes.contains(&note) {
+                notes.push(note);
+            }
+        }
+        if let Some(known) = self.read.get(&resolved.path) {
+            return known.clone();
+        }
+        let bytes = files::read(&resolved.path);
+        let mesh = bytes.and_then(|bytes| {
+            let sha256 = files::sha256(&bytes);
+            let input = LoadedInput { role: "mesh".into(), name: name.to_owned(), path: resolved.path.clone(), sha256 };
+            self.inputs.push(input);
+            crate::import::mesh_stand_in::read_mesh(&resolved.path, &bytes).map(Arc::new)
+        });
+        self.read.insert(resolved.path, mesh.clone());
+        mesh
+    }
+}

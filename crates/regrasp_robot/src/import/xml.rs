@@ -1,0 +1,246 @@
+//! XML elements and attributes with their places, and every problem gathered.
+
+use regrasp_base::diagnostic::Diagnostics;
+use regrasp_base::{Diagnostic, InputError, Place};
+use roxmltree::Node;
+use std::path::Path;
+
+/// Most XML nodes in a file.
+const MAX_NODES: u32 = 1_000_000;
+/// Deepest nesting of elements; URDF and SRDF need 6.
+const MAX_DEPTH: usize = 64;
+
+/// The XML tree of `text`, the content of `file`.
+///
+/// Errors: not well formed (`U100`), a document type declaration (`U104`), too deep or too large (`U105`).
+pub(crate) fn parse<'a>(file: &Path, text: &'a str) -> Result<roxmltree::Document<'a>, InputError> {
+    refuse_deep_nesting(file, text)?;
+    let options = roxmltree::ParsingOptions { allow_dtd: false, nodes_limit: MAX_NODES, ..Default::default() };
+    roxmltree::Document::parse_with_options(text, options).map_err(|error| {
+        let at = error.pos();
+        let place = Place { file: file.to_owned(), line: Some(at.row), column: Some(at.col) };
+        match error {
+            roxmltree::Error::DtdDetected => Diagnostic::new("U104", place, "has a document type declaration (DTD)")
+                .expected("plain XML without entities")
+                .fix("remove the <!DOCTYPE ...> line"),
+            roxmltree::Error::NodesLimitReached => {
+                Diagnostic::new("U105", place, format!("has more than {MAX_NODES} XML nodes"))
+            }
+            other => {
+                // The library's text ends in " at ROW:COL", which the place says already.
+                let text = other.to_string();
+                let problem = text.rsplit_once(" at ").map_or(text.as_str(), |(problem, _)| problem);
+                let xacro =
+                    if file.extension().is_some_and(|e| e == "xacro") { "expand it with xacro first" } else { "" };
+                Diagnostic::new("U100", place, format!("is not well-formed XML: {problem}")).fix(xacro)
+            }
+        }
+        .into()
+    })
+}
+
+/// Counts open tags without a tree, so that hostile nesting cannot exhaust the stack of the parser.
+fn refuse_deep_nesting(file: &Path, text: &str) -> Result<(), InputError> {
+    let bytes = text.as_bytes();
+    let (mut depth, mut at) = (0usize, 0usize);
+    let skip_past =
+        |from: usize, end: &str| text.get(from..).and_then(|rest| rest.find(end)).map(|k| from + k + end.len());
+    while let Some(open) = text.get(at..).and_then(|rest| rest.find('<')).map(|k| at + k) {
+        let rest = &bytes[open..];
+        let end = if rest.starts_with(b"<!--") {
+            skip_past(open + 4, "-->")
+        } else if rest.starts_with(b"<![CDATA[") {
+            skip_past(open, "]]>")
+        } else {
+            tag_end(bytes, open)
+        };
+        let Some(end) = end else { return Ok(()) };
+        match rest.get(1) {
+            Some(b'/') => depth = depth.saturating_sub(1),
+            Some(b'!' | b'?') => {}
+            _ if bytes[end - 2] == b'/' => {}
+            _ => depth += 1,
+        }
+        if depth > MAX_DEPTH {
+            let place = Place::at_offset(file, text, open);
+            return Err(Diagnostic::new("U105", place, format!("nests more than {MAX_DEPTH} elements")).into());
+        }
+        at = end;
+    }
+    Ok(())
+}
+
+/// Index after the `>` that ends the tag at `open`; quoted values may contain `>`.
+fn tag_end(bytes: &[u8], open: usize) -> Option<usize> {
+    let mut quote = None;
+    for (k, &byte) in bytes.iter().enumerate().skip(open + 1) {
+        match (quote, byte) {
+            (None, b'>') => return Some(k + 1),
+            (None, b'"' | b'\'') => quote = Some(byte),
+            (Some(q), _) if q == byte => quote = None,
+            _ => {}
+        }
+    }
+    None
+}
+
+/// A file under reading: its problems and remarks so far.
+pub(crate) struct Reader<'a> {
+    /// The file, as the user named it.
+    pub file: &'a Path,
+    /// Problems.
+    pub found: Diagnostics,
+    /// Remarks that do not stop the reading.
+    pub notes: Vec<String>,
+    /// Whether what cannot be used is dropped with a note where that is safe.
+    pub lenient: bool,
+}
+
+/// What a message calls the thing it is about: `("joint", "j2")`.
+pub(crate) type Named<'a> = (&'a str, &'a str);
+
+impl<'a> Reader<'a> {
+    pub fn new(file: &'a Path, lenient: bool) -> Self {
+        Reader { file, found: Diagnostics::default(), notes: Vec::new(), lenient }
+    }
+
+    /// Where `node` begins.
+    pub fn place(&self, node: Node) -> Place {
+        let at = node.document().text_pos_at(node.range().start);
+        Place { file: self.file.to_owned(), line: Some(at.row), column: Some(at.col) }
+    }
+
+    /// Where attribute `name` of `node` stands, else where the node begins.
+    pub fn attribute_place(&self, node: Node, name: &str) -> Place {
+        let Some(attribute) = node.attribute_node(name) else { return self.place(node) };
+        let at = node.document().text_pos_at(attribute.range().start);
+        Place { file: self.file.to_owned(), line: Some(at.row), column: Some(at.col) }
+    }
+
+    /// A remark with its place.
+    pub fn note(&mut self, node: Node, element: Named, remark: impl AsRef<str>) {
+        let place = self.place(node);
+        self.notes.push(format!("{place} {} \"{}\": {}", element.0, element.1, remark.as_ref()));
+    }
+
+    /// The value of attribute `name`, which must be there and not be blank (`U112`).
+    pub fn required<'n>(&mut self, node: Node<'n, '_>, name: &str, element: Named) -> Option<&'n str> {
+        match node.attribute(name).map(str::trim) {
+            Some(value) if !value.is_empty() => node.attribute(name),
+            seen => {
+                let tag = node.tag_name().name();
+                let problem = match seen {
+                    None => format!("<{tag}> has no attribute {name}"),
+                    Some(_) => format!("<{tag}> has an empty attribute {name}"),
+                };
+                let place = self.place(node);
+                self.found.push(
+                    Diagnostic::new("U112", place, problem)
+                        .element(element.0, element.1)
+                        .expected(format!("<{tag} {name}=\"...\">")),
+                );
+                None
+            }
+        }
+    }
+
+    /// The number in attribute `name`; none where the attribute is missing or the number is bad.
+    pub fn number(&mut self, node: Node, name: &str, element: Named) -> Option<f64> {
+        let text = node.attribute(name)?;
+        let place = self.attribute_place(node, name);
+        self.read_number(text, name, place, element)
+    }
+
+    /// The `N` numbers in attribute `name`, or `default` where the attribute is missing; none where one is bad.
+    pub fn numbers<const N: usize>(
+        &mut self,
+        node: Node,
+        name: &str,
+        default: Option<[f64; N]>,
+        element: Named,
+    ) -> Option<[f64; N]> {
+        let Some(text) = node.attribute(name) else {
+            if default.is_none() {
+                self.required_missing(node, name, element);
+            }
+            return default;
+        };
+        let place = self.attribute_place(node, name);
+        let words: Vec<&str> = text.split_ascii_whitespace().collect();
+        if words.len() != N {
+            let tag = node.tag_name().name();
+            self.found.push(
+                Diagnostic::new("U111", place, format!("{name} of <{tag}> has {} numbers: \"{text}\"", words.len()))
+                    .element(element.0, element.1)
+                    .expected(format!("{N} numbers separated by spaces"))
+                    .fix(if text.contains(',') { "separate numbers by spaces, not by commas" } else { "" }),
+            );
+            return None;
+        }
+        let values: Vec<f64> =
+            words.iter().filter_map(|word| self.read_number(word, name, place.clone(), element)).collect();
+        values.try_into().ok()
+    }
+
+    fn required_missing(&mut self, node: Node, name: &str, element: Named) {
+        let (tag, place) = (node.tag_name().name(), self.place(node));
+        self.found.push(
+            Diagnostic::new("U112", place, format!("<{tag}> has no attribute {name}"))
+                .element(element.0, element.1)
+                .expected(format!("<{tag} {name}=\"...\">")),
+        );
+    }
+
+    /// A finite number. `U110`: not a number, or too large for one; `V001`: NaN or infinite.
+    fn read_number(&mut self, text: &str, name: &str, place: Place, element: Named) -> Option<f64> {
+        let trimmed = text.trim();
+        let looks_decimal =
+            trimmed.bytes().all(|b| b.is_ascii_digit() || matches!(b, b'+' | b'-' | b'.' | b'e' | b'E'));
+        let diagnostic = match trimmed.parse::<f64>() {
+            Ok(value) if value.is_finite() => return Some(value),
+            Ok(_) if looks_decimal => {
+                Diagnostic::new("U110", place, format!("{name} \"{trimmed}\" is too large for a number"))
+            }
+            Ok(value) => {
+                let seen = if value.is_nan() { "NaN" } else { "infinite" };
+                Diagnostic::new("V001", place, format!("{name} is {seen}")).expected("a finite number")
+            }
+            Err(_) => {
+                let with_point = trimmed.replace(',', ".");
+                let meant = (trimmed.matches(',').count() == 1 && with_point.parse::<f64>().is_ok())
+                    .then(|| format!("write {with_point}"));
+                Diagnostic::new("U110", place, format!("cannot read {name} \"{trimmed}\" as a number"))
+                    .expected("a decimal number such as 0.05")
+                    .fix(meant.unwrap_or_default())
+            }
+        };
+        self.found.push(diagnostic.element(element.0, element.1));
+        None
+    }
+
+    /// Remarks on children of `node` that are a slip of the keyboard away from one of `known`.
+    pub fn note_misspelt_children(&mut self, node: Node, known: &[&str], element: Named) {
+        for child in node.children().filter(Node::is_element) {
+            let tag = child.tag_name().name();
+            if known.contains(&tag) || child.tag_name().namespace().is_some() {
+                continue;
+            }
+            if let Some(meant) = regrasp_base::diagnostic::did_you_mean(tag, known.iter().copied()) {
+                self.note(child, element, format!("<{tag}> is not known and not read; did you mean <{meant}>?"));
+            }
+        }
+    }
+}
+
+/// The child elements of `node` called `tag`.
+pub(crate) fn children<'a, 'input: 'a>(
+    node: Node<'a, 'input>,
+    tag: &'static str,
+) -> impl Iterator<Item = Node<'a, 'input>> {
+    node.children().filter(move |child| child.has_tag_name(tag))
+}
+
+/// The first child element of `node` called `tag`.
+pub(crate) fn child<'a, 'input: 'a>(node: Node<'a, 'input>, tag: &'static str) -> Option<Node<'a, 'input>> {
+    children(node, tag).next()
+}

@@ -1,0 +1,119 @@
+//! Fingers and tips guessed from a robot alone.
+//!
+//! A finger ends at a moving joint below which nothing moves. Its tip link is the one whose collision geometry reaches
+//! farthest from that joint.
+
+use super::tip_sphere::fit_tip;
+use crate::import::assemble::{FingerSpec, HandSpec, TipSpec};
+use crate::robot::{JointId, JointKind, LinkId, Robot};
+use nalgebra::{Translation3, UnitQuaternion};
+use regrasp_base::{Diagnostic, InputError, Place};
+use regrasp_geometry::{Point, Pose};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// The hand that `robot` seems to be. Errors: nothing in it moves (`U214`).
+pub(crate) fn guess_hand(robot: &Robot, file: &Path) -> Result<HandSpec, InputError> {
+    let last_joints = last_moving_joints(robot);
+    if last_joints.is_empty() {
+        return Err(Diagnostic::new("U214", Place::file(file), "has no joint that moves, so no finger")
+            .expected("a hand with moving fingers")
+            .into());
+    }
+    let base = base_link(robot, &last_joints);
+    let mut fingers: Vec<FingerSpec> = Vec::new();
+    for &last in &last_joints {
+        let child = robot.joints[last.0].child;
+        let (tip_link, tip) = guess_tip(robot, child);
+        let link_name = &robot.links[tip_link.0].name;
+        let name = finger_name(link_name);
+        let name = if fingers.iter().any(|other| other.name == name) { link_name.clone() } else { name };
+        fingers.push(FingerSpec { name, tip_link, first_joint: None, tip, rest: Vec::new(), place: Place::file(file) });
+    }
+    let mut spec = HandSpec { base, fingers, allow: BTreeSet::new() };
+    super::rest::bend_towards_palm(robot, &mut spec);
+    Ok(spec)
+}
+
+/// Moving joints below which nothing moves, in document order.
+fn last_moving_joints(robot: &Robot) -> Vec<JointId> {
+    let moves = |id: JointId| robot.joints[id.0].kind != JointKind::Fixed;
+    let mut above_another: BTreeSet<JointId> = BTreeSet::new();
+    for link in 0..robot.links.len() {
+        let path: Vec<JointId> = robot.joints_to(LinkId(link)).into_iter().filter(|&j| moves(j)).collect();
+        if let Some((_, above)) = path.split_last() {
+            above_another.extend(above);
+        }
+    }
+    (0..robot.joints.len()).map(JointId).filter(|&j| moves(j) && !above_another.contains(&j)).collect()
+}
+
+/// The root, or the link after the last moving joint that all fingers share.
+fn base_link(robot: &Robot, last_joints: &[JointId]) -> LinkId {
+    let paths: Vec<Vec<JointId>> =
+        last_joints.iter().map(|joint| robot.joints_to(robot.joints[joint.0].child)).collect();
+    let Some((first, others)) = paths.split_first() else { return robot.root };
+    let shared = first
+        .iter()
+        .take(first.len().saturating_sub(1))
+        .enumerate()
+        .take_while(|&(k, joint)| !others.is_empty() && others.iter().all(|path| path.get(k) == Some(joint)))
+        .map(|(_, &joint)| joint)
+        .filter(|joint| robot.joints[joint.0].kind != JointKind::Fixed)
+        .last();
+    shared.map_or(robot.root, |joint| robot.joints[joint.0].child)
+}
+
+/// The tip link of the body that `child` is the first link of, and its tip in the link's frame.
+fn guess_tip(robot: &Robot, child: LinkId) -> (LinkId, TipSpec) {
+    let links = rigid_links(robot, child);
+    let mut farthest: Option<(f64, LinkId, Point)> = None;
+    for (link, body_from_link) in &links {
+        for placed in &robot.links[link.0].collision {
+            let body_from_shape = body_from_link * placed.parent_from_shape;
+            let from_joint = body_from_shape.inverse() * Point::origin();
+            let point = body_from_shape * super::tip_sphere::farthest_point(&placed.shape, &from_joint);
+            let reach = point.coords.norm();
+            if farthest.is_none_or(|(best, _, _)| reach > best) {
+                farthest = Some((reach, *link, point));
+            }
+        }
+    }
+    if let Some((_, link, point)) = farthest {
+        let body_from_link = links.iter().find(|(other, _)| *other == link).map_or(Pose::identity(), |(_, pose)| *pose);
+        let point_in_link = body_from_link.inverse() * point;
+        let joint_in_link = body_from_link.inverse() * Point::origin();
+        return (link, fit_tip(&robot.links[link.0].collision, &joint_in_link, &point_in_link));
+    }
+    // Without geometry the frame farthest from the joint is the tip.
+    let far = links.iter().fold(None, |best: Option<(f64, LinkId)>, (link, pose)| {
+        let reach = pose.translation.vector.norm();
+        if best.is_none_or(|(most, _)| reach > most) { Some((reach, *link)) } else { best }
+    });
+    (far.map_or(child, |(_, link)| link), TipSpec::Point { position: Point::origin() })
+}
+
+/// Links that move with `link` and hang below it, with their poses in its frame.
+pub(super) fn rigid_links(robot: &Robot, link: LinkId) -> Vec<(LinkId, Pose)> {
+    let identity = Pose::from_parts(Translation3::identity(), UnitQuaternion::identity());
+    let mut links = vec![(link, identity)];
+    let mut next = 0;
+    while next < links.len() {
+        let (current, pose) = links[next];
+        for id in robot.joints_from(current) {
+            let joint = &robot.joints[id.0];
+            if joint.kind == JointKind::Fixed {
+                links.push((joint.child, pose * joint.parent_from_joint));
+            }
+        }
+        next += 1;
+    }
+    links
+}
+
+/// A short name from that of the tip link.
+fn finger_name(link: &str) -> String {
+    let short = link.replace("link_", "").replace("_link", "").replace("_tip", "").replace("tip_", "");
+    let short = short.trim_matches('_');
+    if short.is_empty() { link.to_owned() } else { short.to_owned() }
+}
