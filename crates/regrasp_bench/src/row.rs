@@ -2,6 +2,8 @@
 
 use cpu_time::ProcessTime;
 use regrasp_base::Budget;
+use regrasp_plan::Plan;
+use regrasp_plan::check::{CheckSettings, check};
 use regrasp_planners::{Failure, InHandSettings, Progress, plan_in_hand};
 use regrasp_scene::{InHandQuery, Scene};
 use serde::{Deserialize, Serialize};
@@ -128,6 +130,9 @@ pub fn run(problem: Problem, settings: &RunSettings) -> Row {
             row.status = "solved".into();
             row.transfers = plan.statistics.transfers;
             row.relocations = plan.statistics.relocations;
+            if settings.judge == Judge::Checker {
+                judge(problem, &plan, &mut row);
+            }
         }
         Err(failure) => {
             row.status = status_of(&failure);
@@ -136,4 +141,16 @@ pub fn run(problem: Problem, settings: &RunSettings) -> Row {
         }
     }
     row
+}
+
+fn judge(problem: Problem, plan: &Plan, row: &mut Row) {
+    let started = Instant::now();
+    let report = check(problem.scene, Some(problem.query), plan, &CheckSettings::default());
+    row.check_s = Some(started.elapsed().as_secs_f64());
+    row.accepted = Some(report.accepted());
+    row.min_margin = report.min_margin;
+    row.min_clearance = report.min_clearance.as_ref().map(|clearance| clearance.distance);
+    if let Some(violation) = report.violations.first() {
+        row.cause = violation.to_string();
+    }
 }

@@ -9,7 +9,6 @@ use crate::talk::Talk;
 use regrasp::base::{Diagnostic, Place, files};
 use regrasp::plan::{Plan, format};
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 /// Judges; exit code 1 when the plan is rejected.
 pub fn run(arguments: &args::Check, common: &Common, talk: &Talk) -> Result<(), Stop> {
@@ -21,10 +20,7 @@ pub fn run(arguments: &args::Check, common: &Common, talk: &Talk) -> Result<(), 
         None => find_scene(&arguments.plan, &plan)?,
     };
     let loaded = load::scene(&scene_path, common, talk)?;
-    let started = Instant::now();
-    let verdict = judge::judge(&loaded.scene, &plan);
-    judge::say(&verdict, started.elapsed(), talk);
-    if verdict.is_accepted() { Ok(()) } else { Err(Stop::Rejected) }
+    if judge::judge(&loaded, &plan, talk)?.accepted() { Ok(()) } else { Err(Stop::Rejected) }
 }
 
 /// The scene that the plan names: beside the plan, in one of the folders above it, or in the current folder.

@@ -1,9 +1,10 @@
 //! `regrasp demo`: plan and check a turn of a bundled object in a bundled hand; no files needed.
 
-use super::plan::{Limits, available_threads, judged, say_query, search};
+use super::plan::{Limits, available_threads, say_query, search};
 use crate::args::{self, Common};
 use crate::gait_chart;
 use crate::interrupt;
+use crate::judge;
 use crate::load;
 use crate::stop::Stop;
 use crate::talk::Talk;
@@ -39,11 +40,11 @@ pub fn run(arguments: &args::Demo, common: &Common, talk: &Talk) -> Result<(), S
     say_query(&query, arguments.seed, settings.n_threads, talk);
     let limits = Limits { max_work: MAX_WORK, time_limit: None, cancelled };
     let plan = search(&loaded.scene, &query, &settings, arguments.seed, &limits, talk)?;
-    if !judged(&loaded.scene, &plan, talk).is_accepted() {
-        return Err(Stop::Rejected);
-    }
     let bytes = format::to_json(&plan);
     let (plan_path, chart_path) = (folder.join("plan.json"), folder.join("gait.svg"));
+    if !judge::judge_bytes(&plan_path, bytes.as_bytes(), &scene_path, &load::options(common), talk)?.accepted() {
+        return Err(Stop::Rejected);
+    }
     write(&plan_path, bytes.as_bytes())?;
     write(&chart_path, gait_chart::svg(&plan).as_bytes())?;
     let sha256 = files::sha256(bytes.as_bytes());

@@ -2,7 +2,7 @@
 
 use crate::args::{self, Common};
 use crate::interrupt;
-use crate::judge::{self, Verdict};
+use crate::judge;
 use crate::load;
 use crate::progress::ProgressLines;
 use crate::stop::Stop;
@@ -33,9 +33,11 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
 
     let limits = Limits { max_work: arguments.search.max_work, time_limit: arguments.search.time_limit, cancelled };
     let plan = search(&loaded.scene, &query, &settings, arguments.seed, &limits, talk)?;
-    let verdict = judged(&loaded.scene, &plan, talk);
     let bytes = format::to_json(&plan);
-    if !verdict.is_accepted() {
+    // Judged is what will be written, in a scene read afresh: the checker starts from files.
+    let plan_path = arguments.output.as_deref().unwrap_or(Path::new("plan.json"));
+    let report = judge::judge_bytes(plan_path, bytes.as_bytes(), &arguments.scene, &load::options(common), talk)?;
+    if !report.accepted() {
         return Err(rejected(arguments.output.as_deref(), &bytes, talk));
     }
     let Some(path) = &arguments.output else {
@@ -138,14 +140,6 @@ pub fn search(
         json!({ "seconds": seconds, "statistics": plan.statistics, "kept_margin": plan.promises.kept_margin }),
     );
     Ok(plan)
-}
-
-/// Has the checker judge `plan`, and says what it said.
-pub fn judged(scene: &Scene, plan: &Plan, talk: &Talk) -> Verdict {
-    let started = Instant::now();
-    let verdict = judge::judge(scene, plan);
-    judge::say(&verdict, started.elapsed(), talk);
-    verdict
 }
 
 /// Keeps a rejected plan for a bug report, beside where the plan would have gone: never under its name.
