@@ -87,7 +87,7 @@ fn right_inverse(grasp_map: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     }
     let inverse = eigen.eigenvectors * Matrix6::from_diagonal(&eigen.eigenvalues.map(f64::recip))
         * eigen.eigenvectors.transpose();
-    Some(grasp_map.transpose() * inverse)
+    Some(grasp_map.transpose() * DMatrix::from_column_slice(6, 6, inverse.as_slice()))
 }
 
 /// Forces that solve the cone program of the module's header, as the solver says, unverified.
