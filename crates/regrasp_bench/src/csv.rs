@@ -7,8 +7,25 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 const COLUMNS: [&str; 19] = [
-    "scene", "method", "seed", "status", "plan_s", "plan_cpu_s", "floor_s", "check_s", "accepted", "nodes", "samples",
-    "work", "restarts", "transfers", "relocations", "min_margin", "min_clearance", "angle_left_deg", "cause",
+    "scene",
+    "method",
+    "seed",
+    "status",
+    "plan_s",
+    "plan_cpu_s",
+    "floor_s",
+    "check_s",
+    "accepted",
+    "nodes",
+    "samples",
+    "work",
+    "restarts",
+    "transfers",
+    "relocations",
+    "min_margin",
+    "min_clearance",
+    "angle_left_deg",
+    "cause",
 ];
 
 /// The header line.
@@ -98,17 +115,33 @@ pub fn read(path: &Path) -> Result<Vec<Row>, InputError> {
     }
     records
         .map(|(line, fields)| {
-            row_of(&fields).ok_or_else(|| {
-                Diagnostic::new("V021", Place::line(path, line), "is not a row of a benchmark").into()
-            })
+            row_of(&fields)
+                .ok_or_else(|| Diagnostic::new("V021", Place::line(path, line), "is not a row of a benchmark").into())
         })
         .collect()
 }
 
 fn row_of(fields: &[String]) -> Option<Row> {
     let [
-        scene, method, seed, status, plan_s, plan_cpu_s, floor_s, check_s, accepted, nodes, samples, work, restarts,
-        transfers, relocations, min_margin, min_clearance, angle_left_deg, cause,
+        scene,
+        method,
+        seed,
+        status,
+        plan_s,
+        plan_cpu_s,
+        floor_s,
+        check_s,
+        accepted,
+        nodes,
+        samples,
+        work,
+        restarts,
+        transfers,
+        relocations,
+        min_margin,
+        min_clearance,
+        angle_left_deg,
+        cause,
     ] = fields
     else {
         return None;

@@ -35,11 +35,11 @@ pub fn compare(problem: Problem, settings: &InHandSettings, budget: &Budget, thr
     for &n_threads in threads {
         let settings = InHandSettings { n_threads, ..settings.clone() };
         let silent = |_: Progress| {};
-        let (status, bytes) =
-            match plan_in_hand(problem.scene, problem.query, &settings, problem.seed, budget, &silent) {
-                Ok(plan) => ("solved".to_owned(), regrasp_plan::format::to_json(&plan)),
-                Err(failure) => (status_of(&failure), serde_json::to_string(&failure).unwrap_or_default()),
-            };
+        let (status, bytes) = match plan_in_hand(problem.scene, problem.query, &settings, problem.seed, budget, &silent)
+        {
+            Ok(plan) => ("solved".to_owned(), regrasp_plan::format::to_json(&plan)),
+            Err(failure) => (status_of(&failure), serde_json::to_string(&failure).unwrap_or_default()),
+        };
         if comparison.status.is_empty() {
             comparison.status = status;
         }

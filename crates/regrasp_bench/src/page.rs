@@ -36,9 +36,10 @@ fn table(summaries: &[Summary], out: &mut String) {
          |---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for summary in summaries {
-        let [min, median, mean, max] = summary.plan_cpu_s.map_or(["-".to_owned(), "-".into(), "-".into(), "-".into()], |s| {
-            [ms(s.min), ms(s.median), ms(s.mean), ms(s.max)]
-        });
+        let [min, median, mean, max] =
+            summary.plan_cpu_s.map_or(["-".to_owned(), "-".into(), "-".into(), "-".into()], |s| {
+                [ms(s.min), ms(s.median), ms(s.mean), ms(s.max)]
+            });
         let dash = || "-".to_owned();
         let _ = writeln!(
             out,
@@ -94,7 +95,8 @@ fn ratios(parts: &[(String, Vec<Row>)], out: &mut String) {
     };
     let mut lines = String::new();
     for summary in summaries.iter().filter(|summary| summary.method == "classic") {
-        let (Some(classic), Some(faithful)) = (mean(&summary.scene, "classic"), mean(&summary.scene, "visibility")) else {
+        let (Some(classic), Some(faithful)) = (mean(&summary.scene, "classic"), mean(&summary.scene, "visibility"))
+        else {
             continue;
         };
         let _ = writeln!(
@@ -139,7 +141,10 @@ mod tests {
             ..Row::default()
         };
         let page = markdown(&[
-            ("docs/benchmarks/classic.csv".into(), vec![row("classic", "solved", 0.3), row("classic", "time_limit", 9.0)]),
+            (
+                "docs/benchmarks/classic.csv".into(),
+                vec![row("classic", "solved", 0.3), row("classic", "time_limit", 9.0)],
+            ),
             ("v.csv".into(), vec![row("visibility", "solved", 0.003)]),
         ]);
         assert!(page.contains("| tight\\|sphere | 300 (1/2) | 3.00 (1/1) | 100 |"), "{page}");

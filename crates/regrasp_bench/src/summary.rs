@@ -106,7 +106,15 @@ pub fn table(summaries: &[Summary]) -> String {
     let width = summaries.iter().map(|summary| summary.scene.len()).max().unwrap_or(0).max(5);
     let mut out = format!(
         "{:<width$}  {:<10}  {:>9}  {:>9}  {:>34}  {:>6}  {:>9}  {:>7}  {:>7}\n",
-        "scene", "method", "solved", "accepted", "plan cpu ms min/median/mean/max", "floors", "check ms", "margin", "gap mm"
+        "scene",
+        "method",
+        "solved",
+        "accepted",
+        "plan cpu ms min/median/mean/max",
+        "floors",
+        "check ms",
+        "margin",
+        "gap mm"
     );
     for summary in summaries {
         let times = summary.plan_cpu_s.map_or("-".into(), |spread| {
@@ -158,7 +166,8 @@ mod tests {
             accepted: Some(time < 2.5),
             ..Row::default()
         };
-        let rows = [row("a", "solved", 1.0), row("b", "solved", 9.0), row("a", "time_limit", 100.0), row("a", "solved", 3.0)];
+        let rows =
+            [row("a", "solved", 1.0), row("b", "solved", 9.0), row("a", "time_limit", 100.0), row("a", "solved", 3.0)];
         let summaries = summarise(&rows);
         assert_eq!(summaries.len(), 2);
         let a = &summaries[0];

@@ -20,10 +20,7 @@ pub fn options(common: &Common) -> LoadOptions {
     let mut search_paths = entries(std::env::var_os("ROS_PACKAGE_PATH"));
     search_paths.extend(entries(std::env::var_os("AMENT_PREFIX_PATH")));
     search_paths.retain(|path| !path.as_os_str().is_empty());
-    LoadOptions {
-        resolve: ResolveOptions { packages: common.packages.clone(), search_paths },
-        lenient: common.lenient,
-    }
+    LoadOptions { resolve: ResolveOptions { packages: common.packages.clone(), search_paths }, lenient: common.lenient }
 }
 
 /// Reads a scene and says what was read.
@@ -137,7 +134,9 @@ pub fn scene_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Stop> {
             .and_then(|entries| entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<Vec<_>, _>>());
         let mut inside = match entries {
             Ok(inside) => inside,
-            Err(error) => return Err(Stop::argument("A501", "SCENE", format!("{}: {error}", path.display()), "a folder")),
+            Err(error) => {
+                return Err(Stop::argument("A501", "SCENE", format!("{}: {error}", path.display()), "a folder"));
+            }
         };
         inside.retain(|file| file.is_file() && file.extension().is_some_and(|extension| extension == "toml"));
         inside.sort();

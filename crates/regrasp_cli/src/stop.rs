@@ -1,7 +1,7 @@
 //! How a command ends, other than well.
 
-use regrasp::{Failure, InputError};
 use regrasp::base::{Diagnostic, Place};
+use regrasp::{Failure, InputError};
 use std::path::Path;
 
 /// Why a command stopped; each has its exit code.
@@ -40,7 +40,12 @@ impl Stop {
     }
 
     /// An argument that makes no sense (`A5xx`).
-    pub fn argument(code: &'static str, argument: &str, problem: impl Into<String>, expected: impl Into<String>) -> Stop {
+    pub fn argument(
+        code: &'static str,
+        argument: &str,
+        problem: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> Stop {
         let place = Place::file("command line");
         Stop::BadInput(Diagnostic::new(code, place, problem).element("argument", argument).expected(expected).into())
     }

@@ -54,9 +54,7 @@ impl Talk {
     /// Data for stdout. Errors: stdout cannot be written to; a reader that went away is no error.
     pub fn data(&self, text: &str) -> Result<(), Stop> {
         match self.write_stdout(text) {
-            Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-                Err(Stop::unwritable("stdout".as_ref(), &error))
-            }
+            Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Stop::unwritable("stdout".as_ref(), &error)),
             _ => Ok(()),
         }
     }

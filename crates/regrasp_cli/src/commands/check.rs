@@ -46,7 +46,8 @@ fn find_scene(plan_path: &Path, plan: &Plan) -> Result<PathBuf, Stop> {
     }
     let mut candidates: Vec<PathBuf> = Vec::new();
     for folder in &folders {
-        for candidate in [folder.join(name), folder.join("scenes").join(name), folder.join("scenes/allegro").join(name)] {
+        for candidate in [folder.join(name), folder.join("scenes").join(name), folder.join("scenes/allegro").join(name)]
+        {
             if candidate.is_file() && !candidates.contains(&candidate) {
                 candidates.push(candidate);
             }

@@ -7,10 +7,10 @@ use crate::load;
 use crate::progress::ProgressLines;
 use crate::stop::Stop;
 use crate::talk::{Talk, counted, grouped};
-use regrasp::planners::FailureKind;
-use regrasp::plan::format;
-use regrasp::{Budget, Failure, InHandQuery, InHandSettings, Plan, Scene};
 use regrasp::base::files;
+use regrasp::plan::format;
+use regrasp::planners::FailureKind;
+use regrasp::{Budget, Failure, InHandQuery, InHandSettings, Plan, Scene};
 use serde_json::json;
 use std::fmt::Write;
 use std::io;
@@ -209,8 +209,8 @@ pub fn failure_text(failure: &Failure) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use regrasp::planners::{Cause, NearestMiss};
     use regrasp::plan::plan::PoseData;
+    use regrasp::planners::{Cause, NearestMiss};
 
     #[test]
     fn a_failure_is_told_with_causes_nearest_miss_and_advice() {
@@ -231,7 +231,9 @@ mod tests {
             statistics: Default::default(),
         };
         let text = failure_text(&failure);
-        for part in ["not a proof", "within 61 deg and 1.2 mm", "4 000 attempts", "75.0 %  finger \"thumb\"", "try: more time"] {
+        for part in
+            ["not a proof", "within 61 deg and 1.2 mm", "4 000 attempts", "75.0 %  finger \"thumb\"", "try: more time"]
+        {
             assert!(text.contains(part), "{part} is missing in\n{text}");
         }
     }
