@@ -116,6 +116,15 @@ impl Robot {
         joints
     }
 
+    /// Pose of `link` in the frame of the last moving link on the way to it (or of the root), which it is fixed to.
+    pub fn fixed_pose_in_body(&self, link: LinkId) -> Pose {
+        let joints = self.joints_to(link).into_iter().rev();
+        joints
+            .map(|joint| &self.joints[joint.0])
+            .take_while(|joint| joint.kind == JointKind::Fixed)
+            .fold(Pose::identity(), |pose, joint| joint.parent_from_joint * pose)
+    }
+
     /// Joints carried by `link`, in document order.
     pub fn joints_from(&self, link: LinkId) -> impl Iterator<Item = JointId> + '_ {
         self.joints.iter().enumerate().filter(move |(_, joint)| joint.parent == link).map(|(i, _)| JointId(i))

@@ -1,6 +1,37 @@
 //! Surfaces one can sample by area, walk by geodesics, and ask for normals, curvature and creases.
+//!
+//! Each kind of surface is a file with the same functions in the same order ([`SurfaceKind`]). Points and normals are
+//! in the shape's own frame, called the object frame here.
 
-use crate::frame::{Point, UnitVector};
+mod bvh;
+mod capsule;
+mod cuboid;
+mod cylinder;
+mod ellipsoid;
+mod geodesic;
+mod mesh;
+mod mesh_curvature;
+mod mesh_geodesic;
+mod mesh_topology;
+mod settle;
+mod smooth_geodesic;
+mod sphere;
+
+#[cfg(test)]
+mod tests;
+
+use crate::frame::{Point, UnitVector, Vector};
+use crate::mesh::TriangleMesh;
+use crate::shape::Shape;
+use regrasp_base::Rng;
+use std::sync::Arc;
+
+pub use geodesic::Geodesic;
+pub use mesh::{MeshRepairs, MeshSurface};
+
+/// Edges of a mesh whose triangles turn by more than this are creases, in radians; by hand: an icosphere of 162
+/// vertices (20 degrees) is smooth, an octagonal prism (45 degrees) is not.
+pub const DEFAULT_CREASE_ANGLE: f64 = 30.0 * std::f64::consts::PI / 180.0;
 
 /// A point of an object's surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,6 +44,181 @@ pub struct SurfacePoint {
     pub facet: u32,
 }
 
-/// The surface of a shape.
+impl SurfacePoint {
+    pub(crate) fn new(point_in_object: Point, normal_in_object: UnitVector, facet: u32) -> Self {
+        SurfacePoint { point_in_object, normal_in_object, facet }
+    }
+}
+
+/// Why a shape has no usable surface.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SurfaceError {
+    /// A length is zero, negative, NaN or infinite.
+    #[error("the {kind} has a length of {value} m; every length has to be positive and finite")]
+    Length {
+        /// Kind of shape.
+        kind: &'static str,
+        /// The offending length.
+        value: f64,
+    },
+    /// The polyhedron cannot be made into a mesh.
+    #[error("the polyhedron has no surface: {0}")]
+    Mesh(#[from] crate::mesh::MeshError),
+    /// Triangles are wound so that no side can be called outside, as on a Moebius strip.
+    #[error("the mesh has no outside: its triangles cannot be wound alike (triangle {triangle}); repair the mesh")]
+    NotOrientable {
+        /// Where the contradiction was found.
+        triangle: usize,
+    },
+    /// All triangles lie inside other parts of the mesh.
+    #[error("no triangle of the mesh lies on its outer surface")]
+    NoOuterSurface,
+}
+
+/// The functions every kind of surface has, in the order in which each file has them.
+trait SurfaceKind: std::fmt::Debug + Send + Sync {
+    fn area(&self) -> f64;
+    fn sample(&self, rng: &mut Rng) -> SurfacePoint;
+    fn cast_ray(&self, origin: &Point, direction: &UnitVector) -> Option<SurfacePoint>;
+    fn project(&self, point: &Point) -> SurfacePoint;
+    fn signed_distance(&self, point: &Point) -> f64;
+    fn crease_distance(&self, at: &SurfacePoint) -> f64;
+    fn same_face(&self, a: &SurfacePoint, b: &SurfacePoint) -> bool;
+    fn curvature(&self, at: &SurfacePoint) -> [f64; 2];
+    fn geodesic(&self, a: &SurfacePoint, b: &SurfacePoint) -> Option<Geodesic>;
+}
+
+/// The outer surface of a shape.
 #[derive(Debug, Clone)]
-pub struct Surface {}
+pub struct Surface {
+    kind: Arc<dyn SurfaceKind>,
+    mesh: Option<Arc<MeshSurface>>,
+}
+
+impl Surface {
+    /// The surface of `shape`, with creases of meshes at [`DEFAULT_CREASE_ANGLE`].
+    pub fn of(shape: &Shape) -> Result<Self, SurfaceError> {
+        Surface::with_crease_angle(shape, DEFAULT_CREASE_ANGLE)
+    }
+
+    /// The surface of `shape`; edges of meshes that turn by more than `crease_angle` (radians) are creases.
+    pub fn with_crease_angle(shape: &Shape, crease_angle: f64) -> Result<Self, SurfaceError> {
+        let kind: Arc<dyn SurfaceKind> = match shape {
+            Shape::Sphere { radius } => {
+                Arc::new(sphere::SphereSurface { radius: checked_length(shape.kind(), *radius)? })
+            }
+            Shape::Capsule { half_length, radius } => Arc::new(capsule::CapsuleSurface {
+                half_length: checked_length(shape.kind(), *half_length)?,
+                radius: checked_length(shape.kind(), *radius)?,
+            }),
+            Shape::Cuboid { half_extents } => {
+                Arc::new(cuboid::CuboidSurface { half_extents: checked_lengths(shape.kind(), *half_extents)? })
+            }
+            Shape::Cylinder { half_length, radius } => Arc::new(cylinder::CylinderSurface {
+                half_length: checked_length(shape.kind(), *half_length)?,
+                radius: checked_length(shape.kind(), *radius)?,
+            }),
+            Shape::Ellipsoid { radii } => {
+                Arc::new(ellipsoid::EllipsoidSurface { radii: checked_lengths(shape.kind(), *radii)? })
+            }
+            Shape::Convex(hull) => {
+                let mesh = TriangleMesh::new(hull.vertices().to_vec(), hull.triangles().to_vec())?;
+                return Surface::of_mesh(&mesh, crease_angle);
+            }
+            Shape::Mesh(mesh) => return Surface::of_mesh(mesh, crease_angle),
+        };
+        Ok(Surface { kind, mesh: None })
+    }
+
+    fn of_mesh(mesh: &TriangleMesh, crease_angle: f64) -> Result<Self, SurfaceError> {
+        let mesh = Arc::new(MeshSurface::new(mesh, crease_angle)?);
+        Ok(Surface { kind: mesh.clone(), mesh: Some(mesh) })
+    }
+
+    /// The triangles behind the surface of a mesh or convex polyhedron; None for the other kinds.
+    pub fn mesh(&self) -> Option<&MeshSurface> {
+        self.mesh.as_deref()
+    }
+
+    /// Area, in m^2.
+    pub fn area(&self) -> f64 {
+        self.kind.area()
+    }
+
+    /// A point drawn uniformly by area.
+    pub fn sample(&self, rng: &mut Rng) -> SurfacePoint {
+        self.kind.sample(rng)
+    }
+
+    /// The first point of the surface on the ray from `origin` along `direction`, at a distance above zero, from inside
+    /// or outside.
+    pub fn cast_ray(&self, origin: &Point, direction: &UnitVector) -> Option<SurfacePoint> {
+        self.kind.cast_ray(origin, direction)
+    }
+
+    /// The point of the surface nearest to `point`, from inside or outside.
+    pub fn project(&self, point: &Point) -> SurfacePoint {
+        self.kind.project(point)
+    }
+
+    /// Distance of `point` from the surface, negative inside. An open mesh has its inside behind its triangles.
+    pub fn signed_distance(&self, point: &Point) -> f64 {
+        self.kind.signed_distance(point)
+    }
+
+    /// The contact of a ball of radius `tip_radius` that touches the surface near `near` and penetrates nowhere; its
+    /// normal points from the contact to the ball's centre. See `settle.rs`. None when no such ball is within reach.
+    pub fn settle(&self, near: &SurfacePoint, tip_radius: f64) -> Option<SurfacePoint> {
+        settle::settle(self, near, tip_radius)
+    }
+
+    /// Straight-line distance to the nearest crease (edge of a box, rim of a cylinder, sharp or open edge of a mesh);
+    /// infinite on smooth surfaces.
+    pub fn crease_distance(&self, at: &SurfacePoint) -> f64 {
+        self.kind.crease_distance(at)
+    }
+
+    /// True when no crease divides the faces of `a` and `b`. On a mesh a face is what one can reach without crossing a
+    /// crease; a crease that ends within a face may still be crossed by the geodesic.
+    pub fn same_face(&self, a: &SurfacePoint, b: &SurfacePoint) -> bool {
+        self.kind.same_face(a, b)
+    }
+
+    /// Principal curvatures, larger first, in 1/m, positive where the solid is convex.
+    pub fn curvature(&self, at: &SurfacePoint) -> [f64; 2] {
+        self.kind.curvature(at)
+    }
+
+    /// A shortest path on the surface. None when none exists (parts not connected) or its direction is undefined
+    /// (antipodal points of a sphere).
+    pub fn geodesic(&self, a: &SurfacePoint, b: &SurfacePoint) -> Option<Geodesic> {
+        self.kind.geodesic(a, b)
+    }
+}
+
+fn checked_length(kind: &'static str, value: f64) -> Result<f64, SurfaceError> {
+    if value.is_finite() && value > 0.0 { Ok(value) } else { Err(SurfaceError::Length { kind, value }) }
+}
+
+fn checked_lengths(kind: &'static str, values: Vector) -> Result<Vector, SurfaceError> {
+    for value in values.iter() {
+        checked_length(kind, *value)?;
+    }
+    Ok(values)
+}
+
+/// `v / |v|`, or `otherwise` when `v` is zero.
+fn unit_or(v: Vector, otherwise: UnitVector) -> UnitVector {
+    UnitVector::try_new(v, 1e-300).unwrap_or(otherwise)
+}
+
+/// The roots, in order, of `a t^2 + 2 b t + c`, without cancellation; None when there is none.
+fn quadratic_roots(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
+    let discriminant = b * b - a * c;
+    if discriminant < 0.0 || a == 0.0 {
+        return None;
+    }
+    let q = -(b + discriminant.sqrt().copysign(b));
+    let (first, second) = (q / a, if q == 0.0 { 0.0 } else { c / q });
+    Some(if first <= second { [first, second] } else { [second, first] })
+}

@@ -1,23 +1,63 @@
-//! In-hand manipulation by grasp subspaces. Paper 000: Saut, Sahbani, Perdereau, Advanced Robotics 25 (2011).
+//! In-hand manipulation by grasp subspaces. Paper 000: Saut, Sahbani, Perdereau, Advanced Robotics 25 (2011); paper 004:
+//! Sahbani, Saut, Perdereau (2007).
 
+/// Attempts, one after the other or several at once.
+mod attempts;
+/// Contacts that a finger could take, and how far it could follow with them.
+mod candidates;
+/// Combinations of candidates: closure, release, worth.
+mod combine;
+/// Start and goal as the query gives them.
+mod endpoints;
+/// The gait tree.
+mod gait;
+/// Grasps at a given object pose.
+mod grasps;
+/// The scene prepared for planning.
+mod model;
+/// The plan as it is written to a file.
+mod record;
+/// Sequences of relocations from one grasp to another.
+mod regrasp;
+/// The relocation of one finger.
+mod relocate;
+/// What all methods share.
+mod search;
 /// Settings.
 pub mod settings;
+/// Random shortcuts.
+mod shorten;
+/// Points of GS_n and the motions between them.
+mod state;
+/// Why attempts failed.
+mod tally;
+/// Transfer paths.
+mod transfer;
+/// Validating a plan once at the planner's resolution: the floor of planning time.
+mod validate;
+/// Configurations and continuous collision tests.
+mod workspace;
 
-pub use settings::{InHandSettings, Method};
+pub use settings::{Alpha, InHandSettings, Method, ReleaseRule};
+pub use validate::validate_once;
 
 use crate::failure::Failure;
-use regrasp_base::Budget;
+use attempts::{Left, run_attempts};
+use endpoints::{End, given_grasp, refuse_buried_object, refuse_impossible};
+use model::Model;
+use regrasp_base::{Budget, Rng};
 use regrasp_plan::Plan;
 use regrasp_scene::{InHandQuery, Scene};
+use search::Search;
 
 /// What a running search tells its caller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
-    /// Nodes so far.
+    /// Nodes so far, in this attempt.
     pub nodes: u64,
-    /// Configurations looked at so far.
+    /// Configurations looked at so far, in this attempt.
     pub work: u64,
-    /// Restarts so far.
+    /// Index of the attempt.
     pub restarts: u64,
     /// Angle from the goal of the nearest pose reached, in radians.
     pub angle_left: f64,
@@ -25,14 +65,49 @@ pub struct Progress {
 
 /// Plans how the hand takes the object from start to goal.
 ///
-/// `progress` is called now and then, from whichever thread is searching.
+/// The plan is the same for the same scene, query, settings and seed on any number of threads. `progress` is called now
+/// and then, from whichever thread is searching. Panics if `settings.validate()` fails.
 pub fn plan_in_hand(
-    _scene: &Scene,
-    _query: &InHandQuery,
-    _settings: &InHandSettings,
-    _seed: u64,
-    _budget: &Budget,
-    _progress: &(dyn Fn(Progress) + Sync),
+    scene: &Scene,
+    query: &InHandQuery,
+    settings: &InHandSettings,
+    seed: u64,
+    budget: &Budget,
+    progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Plan, Failure> {
-    unreachable!("written next")
+    settings.validate().expect("settings are validated where they are read");
+    let model = Model::new(scene, settings);
+    let (start_pose, goal_pose) = (query.world_from_object_start, query.world_from_object_goal);
+    refuse_impossible(&model)?;
+    refuse_buried_object(&model, End::Start, &start_pose)?;
+    refuse_buried_object(&model, End::Goal, &goal_pose)?;
+    let mut rng = Rng::keyed(seed, "given_grasps", 0);
+    let start_grasp = given_grasp(&model, End::Start, &start_pose, &query.start_grasp, &mut rng)?;
+    let goal_grasp = given_grasp(&model, End::Goal, &goal_pose, &query.goal_grasp, &mut rng)?;
+
+    let found = run_attempts(settings.n_threads, settings.restart_work, budget.max_work, |index, work, winner| {
+        let poses = (start_pose, goal_pose);
+        let mut search = Search::new(&model, poses, (seed, index), (budget, work), winner, progress);
+        let solution = solve(&mut search, start_grasp.clone(), goal_grasp.as_ref());
+        (solution, Left::of(&search))
+    });
+    match found {
+        Ok(((start, steps), left, n_restarts)) => {
+            Ok(record::record(&model, query, seed, &start, &steps, left.statistics(n_restarts)))
+        }
+        Err((interrupt, left, n_attempts)) => Err(left.failure(&model, query, interrupt, n_attempts)),
+    }
+}
+
+/// One attempt: search, then shortcuts.
+fn solve(
+    search: &mut Search,
+    start: Option<state::GraspState>,
+    goal: Option<&state::GraspState>,
+) -> Result<(state::GraspState, Vec<state::Step>), search::Stop> {
+    let (start, mut steps) = match search.model().settings.method {
+        Method::Gait | Method::Visibility | Method::Classic => gait::grow(search, start, goal)?,
+    };
+    shorten::shorten(search, &start, &mut steps, goal.is_none())?;
+    Ok((start, steps))
 }

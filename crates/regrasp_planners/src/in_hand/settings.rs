@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Gait tree: transfer as far as possible, relocate with look-ahead, restart. The default, by measurement.
+    /// Gait tree: relocate with look-ahead, transfer as far as possible, restart. The default, by measurement.
     Gait,
     /// Paper 000: visibility PRM in GS_n, components joined by transfer-regrasp paths, dichotomic decomposition.
     Visibility,
@@ -14,20 +14,151 @@ pub enum Method {
     Classic,
 }
 
-/// Settings of [`super::plan_in_hand`].
+/// How often `connect_components` is tried instead of `explore` (paper 000, section 5.2): alpha is the share of
+/// `explore`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Alpha {
+    /// The same all along.
+    Constant {
+        /// Value, in `[0, 1]`.
+        value: f64,
+    },
+    /// From `start`, less by `step` at each attempt to merge components, down to `end` (paper 000, box: 0.5, 0.005, 0.3).
+    Decreasing {
+        /// First value.
+        start: f64,
+        /// Decrement per attempt.
+        step: f64,
+        /// Last value.
+        end: f64,
+    },
+    /// Inverse to the size of the graph: `max(end, start / (1 + nodes / scale))` (paper 000, section 5.2, last remark).
+    Adaptive {
+        /// Value of the empty graph.
+        start: f64,
+        /// Lowest value.
+        end: f64,
+        /// Number of nodes at which the value is halved.
+        scale: f64,
+    },
+}
+
+/// When a finger may let go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ReleaseRule {
+    /// Where the other fingers are closed; grasps in between need closure of all only. The default: on real hands the
+    /// paper's rule leaves too little (real-hands-notes, 2e).
+    WhereOthersHold,
+    /// Every set of n-1 fingers is closed in every grasp (paper 000, section 4.2.2).
+    EverywhereEveryFinger,
+}
+
+/// Settings of [`super::plan_in_hand`]. Lengths in metres, angles in radians.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct InHandSettings {
     /// Algorithm.
     pub method: Method,
     /// Threads that may search at once; the plan does not depend on it. At least 1.
+    #[serde(skip)]
     pub n_threads: usize,
-    /// Closure margin asked of every holding set; dimensionless, in [0, 1). See `regrasp_grasp::margin`.
+    /// When a finger may let go; the methods of paper 000 always use the paper's rule.
+    pub release_rule: ReleaseRule,
+    /// Closure margin asked of every holding set; dimensionless, in `[0, 1)`. See `regrasp_grasp::margin`. By hand:
+    /// 0.005 is about a tenth of what a good grasp of three has.
     pub closure_margin: f64,
+    /// Longest step of the object or a fingertip between waypoints (in-hand-notes, 4.10: 2 to 3 mm).
+    pub step: f64,
+    /// Distance that bodies keep which do not touch. By hand.
+    pub clearance: f64,
+    /// How far the tip link of a holding finger may press into the object in the model. By hand: well below the
+    /// contact tolerance of 0.5 mm.
+    pub contact_allowance: f64,
+    /// Distance kept from joint limits (in-hand-notes, 4.4).
+    pub limit_margin: f64,
+    /// Largest change of a joint in one step that counts as continuous (real-hands-notes, 5.3).
+    pub joint_step: f64,
+    /// Heights to lift a finger to, tried in this order (in-hand-notes, 4.4, and real-hands-notes, 2).
+    pub lift_heights: Vec<f64>,
+    /// Attempts of RRT-Connect for a moving finger (in-hand-notes, 4.8).
+    pub rrt_iterations: usize,
+    /// How far the object may wander from the straight way from start to goal (in-hand-notes, 1: 12 mm).
+    pub wander_distance: f64,
+    /// How far it may turn away from it, standard deviation (in-hand-notes, 3: 0.4 rad).
+    pub wander_angle: f64,
+    /// Share of extensions towards the goal, the others towards a pose nearby (real-hands-notes, 2: 0.75).
+    pub goal_share: f64,
+    /// New contacts looked at per finger and extension. By measurement, see docs/benchmarks.md.
+    pub candidates: usize,
+    /// Of these, how many are kept for combining.
+    pub candidates_kept: usize,
+    /// Work after which a search starts again with another start grasp; doubled every eighth time.
+    pub restart_work: u64,
+    /// Random shortcuts tried on the plan found (in-hand-notes, 3).
+    pub shortcuts: usize,
+    /// Schedule of alpha, for the methods of paper 000.
+    pub alpha: Alpha,
 }
 
 impl Default for InHandSettings {
     fn default() -> Self {
-        InHandSettings { method: Method::Gait, n_threads: 1, closure_margin: 0.005 }
+        InHandSettings {
+            method: Method::Gait,
+            n_threads: 1,
+            release_rule: ReleaseRule::WhereOthersHold,
+            closure_margin: 0.005,
+            step: 0.003,
+            clearance: 0.0002,
+            contact_allowance: 0.0003,
+            limit_margin: 0.01,
+            joint_step: 0.4,
+            lift_heights: vec![0.006, 0.0024, 0.001, 0.0004],
+            rrt_iterations: 100,
+            wander_distance: 0.012,
+            wander_angle: 0.4,
+            goal_share: 0.7,
+            candidates: 6,
+            candidates_kept: 3,
+            restart_work: 40_000,
+            shortcuts: 20,
+            alpha: Alpha::Constant { value: 0.9 },
+        }
+    }
+}
+
+impl InHandSettings {
+    /// What is wrong with the settings, if anything: one sentence per field.
+    pub fn validate(&self) -> Result<(), String> {
+        let positive = [
+            ("step", self.step),
+            ("clearance", self.clearance),
+            ("joint_step", self.joint_step),
+            ("wander_distance", self.wander_distance),
+            ("wander_angle", self.wander_angle),
+        ];
+        for (name, value) in positive {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(format!("{name} is {value}; it must be positive and finite"));
+            }
+        }
+        for (name, value) in [
+            ("closure_margin", self.closure_margin),
+            ("contact_allowance", self.contact_allowance),
+            ("limit_margin", self.limit_margin),
+            ("goal_share", self.goal_share),
+        ] {
+            if !(0.0..=1.0).contains(&value) {
+                return Err(format!("{name} is {value}; it must be between 0 and 1"));
+            }
+        }
+        if self.n_threads == 0 || self.candidates == 0 || self.candidates_kept == 0 || self.restart_work == 0 {
+            return Err("n_threads, candidates, candidates_kept and restart_work must be at least 1".into());
+        }
+        if self.lift_heights.is_empty() || self.lift_heights.iter().any(|h| !(*h > 0.0 && *h < 0.2)) {
+            return Err("lift_heights must be a list of heights between 0 and 0.2 m".into());
+        }
+        Ok(())
     }
 }

@@ -3,6 +3,7 @@
 //! Fixed joints are folded into bodies. A finger is the serial chain from the base to its tip link. What no finger
 //! joint moves is palm; moving joints that belong to no finger are held at the position nearest to zero.
 
+use super::tip_split;
 use crate::hand::{Finger, FingerShape, Hand, PalmShape, Tip, TipShape, convex_of};
 use crate::kinematics::chain::{Chain, ChainJoint, Motion};
 use crate::robot::{Joint, JointId, JointKind, LinkId, Robot};
@@ -41,7 +42,7 @@ pub(crate) struct FingerSpec {
 }
 
 /// A tip to be made; points are in the frame of the tip link.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub(crate) enum TipSpec {
     Sphere { radius: f64, center: Point },
     Point { position: Point },
@@ -250,17 +251,25 @@ fn make_finger(
     found: &mut Diagnostics,
 ) -> Option<Finger> {
     let chain = make_chain(robot, spec, joints, carried, found)?;
+    let tip_at = carried.get(&spec.tip_link)?;
     let mut shapes = Vec::new();
     for (&link, at) in carried {
         let Body::Finger { finger, body } = at.body else { continue };
-        if finger == index {
-            let placed = hulls.of_link(link, &at.body_from_link, found);
-            let is_tip = link == spec.tip_link;
-            shapes.extend(placed.into_iter().map(|placed| FingerShape { body, link, placed, is_tip }));
+        if finger != index {
+            continue;
+        }
+        let placed = hulls.of_link(link, &at.body_from_link, found);
+        match &spec.tip {
+            TipSpec::Sphere { radius, center } if link == spec.tip_link => {
+                shapes.extend(tip_split::split(placed, link, body, &(tip_at.body_from_link * center), *radius));
+            }
+            _ => {
+                let is_tip = link == spec.tip_link;
+                shapes.extend(placed.into_iter().map(|placed| FingerShape { body, link, placed, is_tip }));
+            }
         }
     }
     shapes.sort_by_key(|shape| (shape.body, shape.link));
-    let tip_at = carried.get(&spec.tip_link)?;
     let (center, shape) = match &spec.tip {
         TipSpec::Sphere { radius, center } => (center, TipShape::Sphere { radius: *radius }),
         TipSpec::Point { position } => (position, TipShape::Point),
@@ -310,12 +319,12 @@ fn make_chain(
     found: &mut Diagnostics,
 ) -> Option<Chain> {
     let independent: Vec<JointId> = joints.iter().copied().filter(|j| robot.joints[j.0].mimic.is_none()).collect();
-    let mut chain = Chain { joints: Vec::new(), names: Vec::new(), lower: Vec::new(), upper: Vec::new() };
+    let (mut chain_joints, mut names, mut lower, mut upper) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for id in &independent {
         let joint = &robot.joints[id.0];
-        chain.names.push(joint.name.clone());
-        chain.lower.push(joint.limits.map_or(f64::NEG_INFINITY, |limits| limits.lower));
-        chain.upper.push(joint.limits.map_or(f64::INFINITY, |limits| limits.upper));
+        names.push(joint.name.clone());
+        lower.push(joint.limits.map_or(f64::NEG_INFINITY, |limits| limits.lower));
+        upper.push(joint.limits.map_or(f64::INFINITY, |limits| limits.upper));
     }
     let mut complete = true;
     for id in joints {
@@ -337,11 +346,11 @@ fn make_chain(
         };
         if let (Some(_), Some(limits)) = (joint.mimic, joint.limits) {
             let ends = [limits.lower, limits.upper].map(|position| (position - offset) / multiplier);
-            chain.lower[coordinate] = chain.lower[coordinate].max(ends[0].min(ends[1]));
-            chain.upper[coordinate] = chain.upper[coordinate].min(ends[0].max(ends[1]));
+            lower[coordinate] = lower[coordinate].max(ends[0].min(ends[1]));
+            upper[coordinate] = upper[coordinate].min(ends[0].max(ends[1]));
         }
         let parent = carried.get(&joint.parent)?;
-        chain.joints.push(ChainJoint {
+        chain_joints.push(ChainJoint {
             parent_from_joint: parent.body_from_link * joint.parent_from_joint,
             axis: joint.axis,
             motion: if joint.kind == JointKind::Prismatic { Motion::Slide } else { Motion::Turn },
@@ -350,8 +359,8 @@ fn make_chain(
             offset,
         });
     }
-    for (k, name) in chain.names.iter().enumerate() {
-        if chain.lower[k] > chain.upper[k] {
+    for (k, name) in names.iter().enumerate() {
+        if lower[k] > upper[k] {
             let problem = format!("the joints that follow joint \"{name}\" leave it no position");
             found.push(
                 Diagnostic::new("U143", spec.place.clone(), problem)
@@ -361,7 +370,7 @@ fn make_chain(
             complete = false;
         }
     }
-    complete.then_some(chain)
+    complete.then(|| Chain::new(chain_joints, names, lower, upper))
 }
 
 fn rest_posture(spec: &FingerSpec, chain: &Chain, found: &mut Diagnostics) -> Vec<f64> {

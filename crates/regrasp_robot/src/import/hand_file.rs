@@ -3,7 +3,7 @@
 //! A bare URDF is accepted too; its fingers and tips are then guessed as `inspect` does.
 
 use super::assemble::{FingerSpec, HandSpec, TipSpec, assemble};
-use super::resolve::{ResolveOptions, resolve};
+use super::resolve::{ResolveOptions, resolve_own};
 use super::srdf::load_srdf;
 use super::toml_table::{Need, Table, TomlReader};
 use super::urdf::{LoadedRobot, load_robot};
@@ -79,8 +79,9 @@ fn load_bare_urdf(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
         "{}: fingers and tips were guessed; `regrasp inspect -o hand.toml` writes them down",
         path.display()
     ));
-    let (hand, more) = assemble(&robot, &spec, path)?;
+    let (mut hand, more) = assemble(&robot, &spec, path)?;
     notes.extend(more);
+    crate::inspect::rest::bend_towards_palm(&mut hand);
     Ok(LoadedHand { hand, inputs, notes })
 }
 
@@ -106,7 +107,7 @@ fn load_hand_file(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
     let mut notes = Vec::new();
     let urdf = reader.text(table, "urdf", Need::Required);
     let robot = urdf.and_then(|(urdf, offset)| {
-        let loaded = resolve(urdf, path, reader.place(offset), &options.resolve)
+        let loaded = resolve_own(urdf, path, reader.place(offset), &options.resolve)
             .map_err(|error| InputError::from(error.element("key", "urdf")))
             .and_then(|resolved| {
                 notes.extend(resolved.notes);
@@ -131,7 +132,7 @@ fn load_hand_file(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
     let Some(robot) = robot else { return Err(only_error(reader.found, path)) };
     let mut spec = read_spec(&mut reader, table, &robot);
     if let Some((srdf, offset)) = reader.text(table, "srdf", Need::Optional) {
-        let loaded = resolve(srdf, path, reader.place(offset), &options.resolve)
+        let loaded = resolve_own(srdf, path, reader.place(offset), &options.resolve)
             .map_err(|error| InputError::from(error.element("key", "srdf")))
             .and_then(|resolved| load_srdf(&resolved.path, &robot, options.lenient));
         match loaded {

@@ -16,6 +16,7 @@ mod mesh_stand_in;
 pub mod resolve;
 /// SRDF: groups, end effectors, pairs of links that are not tested.
 pub mod srdf;
+mod tip_split;
 /// TOML tables with the places of their keys and values.
 mod toml_table;
 /// URDF.

@@ -61,6 +61,20 @@ pub fn resolve(name: &str, model: &Path, place: Place, options: &ResolveOptions)
     within(name, &folder.join(name), &folder, &[], place, options)
 }
 
+/// The file that the user's own file `file` names: as [`resolve`], but any local path is allowed.
+///
+/// Errors: as [`resolve`], without refusals of places outside the folders.
+pub fn resolve_own(name: &str, file: &Path, place: Place, options: &ResolveOptions) -> Result<Resolved, Diagnostic> {
+    let folder = folder_of(file);
+    if name.trim().is_empty() || name.contains("://") {
+        return resolve(name, file, place, options);
+    }
+    match existing(&folder.join(name)) {
+        Some((path, notes)) => Ok(Resolved { path, notes }),
+        None => resolve(name, file, place, options),
+    }
+}
+
 /// The folder that holds `model`.
 fn folder_of(model: &Path) -> PathBuf {
     match model.parent() {

@@ -26,13 +26,13 @@ pub(crate) fn guess_hand(robot: &Robot, file: &Path) -> Result<HandSpec, InputEr
         let child = robot.joints[last.0].child;
         let (tip_link, tip) = guess_tip(robot, child);
         let link_name = &robot.links[tip_link.0].name;
-        let name = finger_name(link_name);
-        let name = if fingers.iter().any(|other| other.name == name) { link_name.clone() } else { name };
+        let mut name = finger_name(link_name, fingers.len() + 1);
+        if fingers.iter().any(|other| other.name == name) {
+            name.clone_from(link_name);
+        }
         fingers.push(FingerSpec { name, tip_link, first_joint: None, tip, rest: Vec::new(), place: Place::file(file) });
     }
-    let mut spec = HandSpec { base, fingers, allow: BTreeSet::new() };
-    super::rest::bend_towards_palm(robot, &mut spec);
-    Ok(spec)
+    Ok(HandSpec { base, fingers, allow: BTreeSet::new() })
 }
 
 /// Moving joints below which nothing moves, in document order.
@@ -111,9 +111,9 @@ pub(super) fn rigid_links(robot: &Robot, link: LinkId) -> Vec<(LinkId, Pose)> {
     links
 }
 
-/// A short name from that of the tip link.
-fn finger_name(link: &str) -> String {
+/// A short name from that of the tip link, or a number where that has no letters left.
+fn finger_name(link: &str, number: usize) -> String {
     let short = link.replace("link_", "").replace("_link", "").replace("_tip", "").replace("tip_", "");
     let short = short.trim_matches('_');
-    if short.is_empty() { link.to_owned() } else { short.to_owned() }
+    if short.contains(|c: char| c.is_alphabetic()) { short.to_owned() } else { format!("finger_{number}") }
 }

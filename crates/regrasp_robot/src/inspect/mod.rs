@@ -1,8 +1,208 @@
-//! What a robot and a hand are like.
+//! What a robot and a hand are like: joints, limits, meshes, units, fingers and tips, links that always or never touch.
 
 /// Fingers and tips guessed from a robot alone.
 pub(crate) mod guess;
+/// A hand as the text of a `hand.toml`.
+pub mod hand_text;
 /// Rest postures.
-mod rest;
+pub(crate) mod rest;
+/// Joints and meshes as tables, and what looks like a wrong unit.
+pub mod robot_table;
 /// Spheres fitted to the distal end of a link.
 mod tip_sphere;
+/// Which links touch.
+mod touch;
+
+use crate::hand::{Hand, TipShape};
+use crate::import::{LoadOptions, LoadedInput, load_hand, load_robot};
+use crate::robot::LinkId;
+use regrasp_base::{InputError, Rng};
+use serde::Serialize;
+use std::collections::BTreeSet;
+use std::path::Path;
+
+pub use hand_text::hand_file_text;
+pub use robot_table::{Follows, JointRow, MeshRow, RobotInspection, inspect_robot};
+
+/// How a hand is inspected.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InspectSettings {
+    /// Postures drawn to find links that always or never touch. 10,000 as MoveIt's setup assistant.
+    pub n_postures: usize,
+}
+
+impl Default for InspectSettings {
+    fn default() -> Self {
+        InspectSettings { n_postures: 10_000 }
+    }
+}
+
+/// A finger.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FingerRow {
+    /// Name.
+    pub name: String,
+    /// Independent joints, base first.
+    pub joints: Vec<String>,
+    /// The link that carries the tip.
+    pub tip_link: String,
+    /// `sphere`, `point` or `mesh`.
+    pub tip_shape: &'static str,
+    /// Radius of the tip, in metres; 0 for other shapes.
+    pub tip_radius: f64,
+    /// Centre of the tip in the frame of the last moving body, in metres.
+    pub tip_center_in_body: [f64; 3],
+    /// Rest posture.
+    pub rest: Vec<f64>,
+}
+
+/// Two links and how often they touch.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PairRow {
+    /// The links, by name, in document order.
+    pub links: [String; 2],
+    /// Share of the postures in which they touch, between 0 and 1.
+    pub share: f64,
+}
+
+/// Pairs of links that no finger joint alone separates, over random postures.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PairTable {
+    /// How many postures were drawn.
+    pub n_postures: usize,
+    /// Pairs that touched in every posture.
+    pub always: Vec<[String; 2]>,
+    /// Pairs that touched in some.
+    pub sometimes: Vec<PairRow>,
+    /// Pairs that touched in none.
+    pub never: Vec<[String; 2]>,
+    /// Pairs that touch in the rest posture.
+    pub at_rest: Vec<[String; 2]>,
+    /// Ids of the pairs of `always`, for [`hand_file_text`].
+    #[serde(skip)]
+    pub always_ids: BTreeSet<(LinkId, LinkId)>,
+}
+
+/// What a hand is like.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct HandInspection {
+    /// The link whose frame is the hand frame.
+    pub base: String,
+    /// Fingers.
+    pub fingers: Vec<FingerRow>,
+    /// Links of the palm that have collision geometry.
+    pub palm: Vec<String>,
+    /// Largest distance between two joints or tips at rest, in metres.
+    pub span: f64,
+    /// Which links touch.
+    pub pairs: PairTable,
+}
+
+/// What a hand, or a robot that may be one, is like.
+#[derive(Debug, Clone)]
+pub struct Inspection {
+    /// The robot.
+    pub robot: RobotInspection,
+    /// The hand with what is said about it, or why the robot is no hand.
+    pub hand: Result<(Hand, HandInspection), InputError>,
+    /// Files read.
+    pub inputs: Vec<LoadedInput>,
+    /// Remarks.
+    pub notes: Vec<String>,
+}
+
+/// Inspects the hand file or URDF at `path`. Errors: a file that cannot be read as a robot.
+pub fn inspect(
+    path: &Path,
+    options: &LoadOptions,
+    settings: &InspectSettings,
+    rng: &mut Rng,
+) -> Result<Inspection, InputError> {
+    match load_hand(path, options) {
+        Ok(loaded) => {
+            let robot = inspect_robot(&loaded.hand.robot, path);
+            let table = inspect_hand(&loaded.hand, settings, rng);
+            Ok(Inspection { robot, hand: Ok((loaded.hand, table)), inputs: loaded.inputs, notes: loaded.notes })
+        }
+        Err(no_hand) => {
+            // A hand file without a hand has nothing else to show; a URDF may still be a robot.
+            if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
+                return Err(no_hand);
+            }
+            let loaded = load_robot(path, options)?;
+            let robot = inspect_robot(&loaded.robot, path);
+            Ok(Inspection { robot, hand: Err(no_hand), inputs: loaded.inputs, notes: loaded.notes })
+        }
+    }
+}
+
+/// Fingers, span and touching links of `hand`.
+pub fn inspect_hand(hand: &Hand, settings: &InspectSettings, rng: &mut Rng) -> HandInspection {
+    let name = |link: LinkId| hand.robot.links[link.0].name.clone();
+    let fingers = hand
+        .fingers
+        .iter()
+        .map(|finger| FingerRow {
+            name: finger.name.clone(),
+            joints: finger.chain.names.clone(),
+            tip_link: name(finger.tip.link),
+            tip_shape: match finger.tip.shape {
+                TipShape::Sphere { .. } => "sphere",
+                TipShape::Point => "point",
+                TipShape::Hull(_) => "mesh",
+            },
+            tip_radius: finger.tip.radius(),
+            tip_center_in_body: finger.tip.center_in_body.coords.into(),
+            rest: finger.rest.clone(),
+        })
+        .collect();
+    let mut palm: Vec<String> = hand.palm.iter().map(|shape| name(shape.link)).collect();
+    palm.dedup();
+    HandInspection {
+        base: name(hand.base),
+        fingers,
+        palm,
+        span: span(hand),
+        pairs: count_touching(hand, settings.n_postures, rng),
+    }
+}
+
+/// Largest distance between two joint origins or tip centres of `hand` at rest, in metres.
+pub fn span(hand: &Hand) -> f64 {
+    let mut points = Vec::new();
+    let mut poses = Vec::new();
+    for finger in &hand.fingers {
+        finger.chain.forward(&finger.rest, &mut poses);
+        points.extend(poses.iter().map(|pose| pose.translation.vector));
+        points.push(finger.chain.tip(&finger.rest, &finger.tip.center_in_body).coords);
+    }
+    let farthest = |from: &regrasp_geometry::Vector| points.iter().map(|p| (p - from).norm()).fold(0.0, f64::max);
+    points.iter().map(farthest).fold(0.0, f64::max)
+}
+
+fn count_touching(hand: &Hand, n_postures: usize, rng: &mut Rng) -> PairTable {
+    let touch = touch::Touch::new(hand);
+    let counts = touch.count(n_postures, rng);
+    let names = |(a, b): (LinkId, LinkId)| [a, b].map(|link| hand.robot.links[link.0].name.clone());
+    let rest: Vec<Vec<f64>> = hand.fingers.iter().map(|finger| finger.rest.clone()).collect();
+    let at_rest = touch.touching(&rest);
+    let mut table = PairTable {
+        n_postures,
+        always: Vec::new(),
+        sometimes: Vec::new(),
+        never: Vec::new(),
+        at_rest: touch.pairs.iter().zip(at_rest).filter(|(_, touches)| *touches).map(|(&p, _)| names(p)).collect(),
+        always_ids: BTreeSet::new(),
+    };
+    for (&pair, &count) in touch.pairs.iter().zip(&counts) {
+        match count {
+            0 => table.never.push(names(pair)),
+            n if n == n_postures => {
+                table.always.push(names(pair));
+                table.always_ids.insert(pair);
+            }
+            n => table.sometimes.push(PairRow { links: names(pair), share: n as f64 / n_postures as f64 }),
+        }
+    }
+    table
+}

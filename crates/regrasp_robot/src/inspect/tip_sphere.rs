@@ -80,9 +80,9 @@ pub(super) fn fit_tip(shapes: &[PlacedShape], joint: &Point, end: &Point) -> Tip
     }
 }
 
-/// To a micrometre: meshes are not better than that, and files stay readable.
+/// To a hundredth of a millimetre: facets are not better than that, and files stay readable.
 fn round(value: f64) -> f64 {
-    (value * 1e6).round() / 1e6 + 0.0
+    (value * 1e5).round() / 1e5 + 0.0
 }
 
 /// The ball that most vertices near the distal end lie on.

@@ -1,5 +1,6 @@
 //! Serial chains, forward kinematics and Jacobians.
 
+use super::body_frame::{BodyFrame, PreparedJoint};
 use nalgebra::{Matrix3xX, Translation3, UnitQuaternion};
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 
@@ -30,6 +31,8 @@ pub struct ChainJoint {
 }
 
 /// A serial chain of moving joints, driven by as many or fewer independent coordinates.
+///
+/// Made by [`Chain::new`]; the public fields are for reading. To change joints, make a new chain.
 #[derive(Debug, Clone)]
 pub struct Chain {
     /// Moving joints, base first. Body `i` is what joint `i` carries; its frame is the joint's child frame.
@@ -40,9 +43,21 @@ pub struct Chain {
     pub lower: Vec<f64>,
     /// Highest value of each coordinate.
     pub upper: Vec<f64>,
+    /// The joints as forward kinematics wants them.
+    prepared: Vec<PreparedJoint>,
 }
 
 impl Chain {
+    /// A chain of `joints`, base first, driven by one coordinate per name, each within `lower..=upper`.
+    ///
+    /// Panics unless `names`, `lower` and `upper` are equally long and every joint's coordinate is among them.
+    pub fn new(joints: Vec<ChainJoint>, names: Vec<String>, lower: Vec<f64>, upper: Vec<f64>) -> Self {
+        assert!(names.len() == lower.len() && lower.len() == upper.len(), "one name and two limits per coordinate");
+        assert!(joints.iter().all(|joint| joint.coordinate < lower.len()), "a joint without a coordinate");
+        let prepared = joints.iter().map(PreparedJoint::new).collect();
+        Chain { joints, names, lower, upper, prepared }
+    }
+
     /// Number of independent coordinates.
     pub fn n_coordinates(&self) -> usize {
         self.lower.len()
@@ -76,11 +91,28 @@ impl Chain {
         }
     }
 
+    /// Frames of the bodies in the base frame, one per joint: [`Chain::forward`] at a fraction of its time.
+    ///
+    /// Panics unless `base_from_body` has one place per joint.
+    #[inline]
+    pub fn forward_frames(&self, coordinates: &[f64], base_from_body: &mut [BodyFrame]) {
+        assert_eq!(base_from_body.len(), self.prepared.len(), "one frame per joint");
+        let mut parent = BodyFrame::IDENTITY;
+        for (joint, frame) in self.prepared.iter().zip(base_from_body) {
+            parent = joint.child_frame(&parent, coordinates);
+            *frame = parent;
+        }
+    }
+
+    /// Frame of the last body in the base frame; the base frame itself for a chain without joints.
+    #[inline]
+    pub fn last_frame(&self, coordinates: &[f64]) -> BodyFrame {
+        self.prepared.iter().fold(BodyFrame::IDENTITY, |parent, joint| joint.child_frame(&parent, coordinates))
+    }
+
     /// Position, in the base frame, of `point_in_body` of the last body.
     pub fn tip(&self, coordinates: &[f64], point_in_body: &Point) -> Point {
-        let mut poses = Vec::with_capacity(self.joints.len());
-        self.forward(coordinates, &mut poses);
-        poses.last().map_or(*point_in_body, |pose| pose * point_in_body)
+        self.last_frame(coordinates).transform_point(point_in_body)
     }
 
     /// Jacobian of a point of the last body: 3 rows, one column per coordinate, in the base frame.
@@ -104,6 +136,7 @@ impl Chain {
     pub fn place_at(&mut self, parent_from_base: &Pose) {
         if let Some(first) = self.joints.first_mut() {
             first.parent_from_joint = parent_from_base * first.parent_from_joint;
+            self.prepared[0] = PreparedJoint::new(first);
         }
     }
 }
@@ -133,16 +166,46 @@ mod tests {
             multiplier,
             offset: 0.05,
         };
-        Chain {
-            joints: vec![
+        Chain::new(
+            vec![
                 joint(0.0, Vector::x(), Motion::Turn, 0, 1.0),
                 joint(0.05, Vector::new(0.0, 1.0, 0.2), Motion::Turn, 1, 1.0),
                 joint(0.04, Vector::z(), Motion::Slide, 2, 1.0),
                 joint(0.03, Vector::y(), Motion::Turn, 1, 0.7),
             ],
-            names: vec!["a".into(), "b".into(), "c".into()],
-            lower: vec![-1.0; 3],
-            upper: vec![1.0; 3],
+            vec!["a".into(), "b".into(), "c".into()],
+            vec![-1.0; 3],
+            vec![1.0; 3],
+        )
+    }
+
+    #[test]
+    fn frames_agree_with_poses() {
+        for axis in [Vector::x(), Vector::y(), Vector::z(), -Vector::x(), -Vector::y(), -Vector::z()] {
+            let mut joints = chain().joints;
+            joints[1].axis = UnitVector::new_normalize(axis);
+            joints[1].parent_from_joint.rotation = UnitQuaternion::identity();
+            joints[3].axis = UnitVector::new_normalize(axis);
+            compare(Chain::new(joints, chain().names, chain().lower, chain().upper));
+        }
+        compare(chain());
+    }
+
+    fn compare(mut chain: Chain) {
+        chain.place_at(&Pose::new(Vector::new(0.1, 0.2, -0.3), Vector::new(1.0, -0.4, 0.2)));
+        let mut rng = regrasp_base::Rng::keyed(1, "frames", 0);
+        let (mut poses, mut frames) = (Vec::new(), [BodyFrame::IDENTITY; 4]);
+        for _ in 0..200 {
+            let coordinates: [f64; 3] = std::array::from_fn(|_| rng.uniform(-8.0, 8.0));
+            chain.forward(&coordinates, &mut poses);
+            chain.forward_frames(&coordinates, &mut frames);
+            for (pose, frame) in poses.iter().zip(&frames) {
+                let difference = (pose.to_homogeneous() - frame.to_pose().to_homogeneous()).abs().max();
+                assert!(difference < 1e-13, "{difference:e}");
+                let point = Point::new(0.3, -0.1, 0.2);
+                assert!((pose * point - frame.transform_point(&point)).norm() < 1e-13);
+                assert!((pose.inverse() * point - frame.inverse_transform_point(&point)).norm() < 1e-13);
+            }
         }
     }
 

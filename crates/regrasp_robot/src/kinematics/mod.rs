@@ -1,4 +1,15 @@
 //! Forward kinematics, Jacobians, inverse kinematics and motion bounds of serial chains.
 
+/// Frames as rotation matrix and translation, for the hottest paths.
+pub mod body_frame;
 /// Serial chains, forward kinematics and Jacobians.
 pub mod chain;
+/// Finger inverse kinematics to a point.
+pub mod finger_ik;
+/// Bounds on the motion of shapes while coordinates move along a line.
+pub mod motion_bound;
+/// Chains for tests.
+#[cfg(test)]
+mod samples;
+/// Sine and cosine together, the same bits on every machine.
+mod trig;

@@ -13,9 +13,6 @@ mod table;
 mod task;
 mod units;
 
-#[cfg(test)]
-mod tests;
-
 pub use task::{Goal, InHandTask, StartOrientation};
 
 use crate::scene::{InputFile, Scene};

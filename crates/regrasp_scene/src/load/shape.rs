@@ -4,7 +4,6 @@
 use super::files::Files;
 use super::table::{Entry, Found, Table, one_of};
 use regrasp_geometry::{ConvexHull, Shape, TriangleMesh, Vector};
-use std::ops::Range;
 use std::sync::Arc;
 
 /// Keys that name a kind of shape.
@@ -40,8 +39,6 @@ pub(super) struct ReadShape {
     pub shape: Shape,
     /// Where its frame is to lie.
     pub origin: Origin,
-    /// Where it stands in the scene file.
-    pub span: Range<usize>,
 }
 
 /// Reads the shape of `table`. Errors: none or several kinds (`S106`), bad lengths (`S107`), bad meshes (`M2xx`).
@@ -62,7 +59,7 @@ pub(super) fn shape(table: &mut Table, files: &mut Files, found: &mut Found) -> 
     let shape = primitive(kind, &mut inside, found);
     inside.finish(found);
     let shape = shape?;
-    has_likely_size(&shape, kind, found).then(|| ReadShape { shape, origin: Origin::File, span: kind.span.clone() })
+    has_likely_size(&shape, kind, found).then(|| ReadShape { shape, origin: Origin::File })
 }
 
 fn primitive(kind: &Entry, table: &mut Table, found: &mut Found) -> Option<Shape> {
@@ -162,7 +159,7 @@ fn mesh(kind: &Entry, files: &mut Files, found: &mut Found) -> Option<ReadShape>
             }
         },
     };
-    has_likely_size(&shape, kind, found).then(|| ReadShape { shape, origin, span: kind.span.clone() })
+    has_likely_size(&shape, kind, found).then(|| ReadShape { shape, origin })
 }
 
 /// One factor, or one per axis; negative mirrors. Errors: zero (`S107`).

@@ -114,7 +114,11 @@ fn read_mesh(reader: &mut Reader, node: Node, element: Named, meshes: &mut Meshe
         );
         None
     });
-    let name = reader.required(node, "filename", element)?;
+    // An empty name is the resolver's to refuse.
+    let name = match node.attribute("filename") {
+        Some(name) => name,
+        None => reader.required(node, "filename", element)?,
+    };
     let place = reader.attribute_place(node, "filename");
     let found = meshes.get(name, reader.file, place.clone(), &mut reader.notes);
     let scale = scale?;

@@ -39,6 +39,10 @@ fn read_mimic(
 ) -> Option<Mimic> {
     let node = child(draft.node, "mimic")?;
     let element = ("joint", draft.name);
+    if draft.kind == JointKind::Fixed {
+        reader.note(node, element, "is fixed; its <mimic> is not used");
+        return None;
+    }
     let [multiplier] = reader.numbers(node, "multiplier", Some([1.0]), element)?;
     let [offset] = reader.numbers(node, "offset", Some([0.0]), element)?;
     let leader = node.attribute("joint").unwrap_or_default();

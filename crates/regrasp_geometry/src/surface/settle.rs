@@ -1,0 +1,38 @@
+//! The contact of a ball that really touches a surface.
+//!
+//! The ball starts with its centre along the normal of a given point and is pushed out of whatever it penetrates until
+//! its nearest surface point is one radius away. On convex smooth surfaces that is at once; in grooves it slides until
+//! it touches both walls; at edges and vertices the normal ends within the normal cone.
+
+use super::{Surface, SurfacePoint};
+use crate::frame::UnitVector;
+
+/// How near the ball's surface is to the object's when settled, in m.
+const TOLERANCE: f64 = 1e-9;
+/// Pushes before giving up; wide grooves take 2 to 20.
+const MAX_PUSHES: usize = 100;
+
+pub(super) fn settle(surface: &Surface, near: &SurfacePoint, tip_radius: f64) -> Option<SurfacePoint> {
+    if tip_radius == 0.0 {
+        return Some(*near);
+    }
+    let mut center = near.point_in_object + near.normal_in_object.as_ref() * tip_radius;
+    for push in 0..MAX_PUSHES {
+        let nearest = surface.project(&center);
+        let away = center - nearest.point_in_object;
+        let distance = away.norm();
+        if distance < TOLERANCE || (push == 0 && surface.signed_distance(&center) < 0.0) {
+            return None;
+        }
+        // The start is one radius from `near`, so the ball can only be too close, never too far, but for rounding.
+        if (distance - tip_radius).abs() <= TOLERANCE {
+            let settled = nearest.point_in_object;
+            let slid = (settled - near.point_in_object).norm();
+            let is_outside = push == 0 || surface.signed_distance(&center) > 0.0;
+            let normal = UnitVector::new_unchecked(away / distance);
+            return (slid <= tip_radius && is_outside).then(|| SurfacePoint::new(settled, normal, nearest.facet));
+        }
+        center = nearest.point_in_object + away * (tip_radius / distance);
+    }
+    None
+}

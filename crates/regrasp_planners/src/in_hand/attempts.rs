@@ -1,0 +1,158 @@
+//! Attempts, one after the other or several at once: the lowest that succeeds makes the plan, whatever the threads.
+
+use super::model::Model;
+use super::search::{Search, Stop};
+use super::tally::Tally;
+use crate::failure::{Failure, NearestMiss};
+use regrasp_geometry::frame;
+use regrasp_plan::plan::{PoseData, Statistics};
+use regrasp_scene::InHandQuery;
+use regrasp_base::Interrupt;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// What an attempt left behind, whether it succeeded or not.
+#[derive(Debug, Default, Clone)]
+pub struct Left {
+    /// Why its attempts failed.
+    pub tally: Tally,
+    /// Units of work.
+    pub work: u64,
+    /// Nodes.
+    pub n_nodes: u64,
+    /// Samples.
+    pub n_samples: u64,
+    /// The state nearest to the goal, with its distance.
+    pub nearest: Option<(f64, super::state::GraspState)>,
+}
+
+impl Left {
+    /// What `search` leaves.
+    pub fn of(search: &Search) -> Self {
+        Left {
+            tally: search.tally.clone(),
+            work: search.workspace.work,
+            n_nodes: search.n_nodes,
+            n_samples: search.n_samples,
+            nearest: search.nearest.clone(),
+        }
+    }
+
+    /// Counts for the plan file.
+    pub fn statistics(&self, n_restarts: usize) -> Statistics {
+        Statistics {
+            nodes: self.n_nodes,
+            samples: self.n_samples,
+            work: self.work,
+            restarts: n_restarts as u64,
+            failures: self.tally.counts(),
+            ..Statistics::default()
+        }
+    }
+
+    /// The failure that all attempts together are.
+    pub fn failure(self, model: &Model, query: &InHandQuery, interrupt: Interrupt, n_attempts: usize) -> Failure {
+        let limit = match interrupt {
+            Interrupt::WorkSpent => "work budget",
+            Interrupt::Deadline => "time limit",
+            Interrupt::Cancelled => "interruption",
+        };
+        let goal = &query.world_from_object_goal;
+        let nearest_miss = self.nearest.as_ref().map(|(_, state)| NearestMiss {
+            world_from_object: PoseData::from(&state.world_from_object),
+            angle_left: frame::rotation_between(&state.world_from_object, goal).norm(),
+            distance_left: (state.world_from_object.translation.vector - goal.translation.vector).norm(),
+            joints: state.joints.iter().flatten().copied().collect(),
+        });
+        let reached = nearest_miss.as_ref().map_or("no grasp was found at the start pose".to_owned(), |miss| {
+            format!(
+                "the object came within {:.1} degrees and {:.1} mm of the goal",
+                miss.angle_left.to_degrees(),
+                miss.distance_left * 1e3
+            )
+        });
+        let causes = self.tally.causes(model);
+        let advice = match causes.first() {
+            Some(cause) if nearest_miss.is_none() => {
+                format!("move the start pose to where the fingers reach around the object (mostly: {})", cause.reason)
+            }
+            Some(cause) => format!("allow more time, or ease what stops it most: {}", cause.reason),
+            None => "allow more time".into(),
+        };
+        Failure {
+            kind: interrupt.into(),
+            message: format!("no plan within the {limit} (not a proof), {n_attempts} attempts: {reached}"),
+            advice,
+            causes,
+            nearest_miss,
+            statistics: Statistics {
+                cut_by_time: interrupt != Interrupt::WorkSpent,
+                ..self.statistics(n_attempts.saturating_sub(1))
+            },
+        }
+    }
+
+    fn add(&mut self, other: Left) {
+        self.tally.merge(&other.tally);
+        self.work += other.work;
+        self.n_nodes += other.n_nodes;
+        self.n_samples += other.n_samples;
+        if let Some((distance, _)) = &other.nearest
+            && self.nearest.as_ref().is_none_or(|(least, _)| distance < least)
+        {
+            self.nearest = other.nearest;
+        }
+    }
+}
+
+/// Work that attempt `index` may do: `base`, growing so that hard queries get long attempts too.
+pub fn work_of_attempt(base: u64, index: usize) -> u64 {
+    base.saturating_mul(1 + index as u64 / 4)
+}
+
+/// Runs attempts until one succeeds or the budget ends.
+///
+/// `run(index, work_limit, winner)` is one attempt. The result is that of the lowest index that succeeded, with what
+/// all attempts up to it left behind; so it is the same on any number of threads.
+pub fn run_attempts<T: Send>(
+    n_threads: usize,
+    base_work: u64,
+    max_work: u64,
+    run: impl Fn(usize, u64, &AtomicUsize) -> (Result<T, Stop>, Left) + Sync,
+) -> Result<(T, Left, usize), (Interrupt, Left, usize)> {
+    let winner = AtomicUsize::new(usize::MAX);
+    let one = |index: usize, limit: u64| {
+        let outcome = run(index, limit, &winner);
+        if outcome.0.is_ok() {
+            winner.fetch_min(index, Ordering::Relaxed);
+        }
+        outcome
+    };
+    let mut left = Left::default();
+    let (mut index, mut planned) = (0usize, 0u64);
+    loop {
+        let mut round = Vec::with_capacity(n_threads);
+        while round.len() < n_threads.max(1) && planned < max_work {
+            let limit = work_of_attempt(base_work, index).min(max_work - planned);
+            planned += limit;
+            round.push((index, limit));
+            index += 1;
+        }
+        if round.is_empty() {
+            return Err((Interrupt::WorkSpent, left, index));
+        }
+        let outcomes: Vec<_> = if round.len() == 1 {
+            round.iter().map(|&(index, limit)| one(index, limit)).collect()
+        } else {
+            round.par_iter().with_max_len(1).map(|&(index, limit)| one(index, limit)).collect()
+        };
+        for (&(index, _), (result, from_attempt)) in round.iter().zip(outcomes) {
+            left.add(from_attempt);
+            match result {
+                Ok(value) => return Ok((value, left, index)),
+                Err(Stop::Budget(interrupt)) => return Err((interrupt, left, index)),
+                Err(Stop::Restart | Stop::Overtaken) => {}
+            }
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! Contacts that a finger could take, and how far it could follow with them.
+
+use super::model::Model;
+use super::transfer::ik_settings;
+use super::workspace::{TipMode, Workspace, tip_target};
+use regrasp_base::Rng;
+use regrasp_geometry::collision::Placement;
+use regrasp_geometry::{Point, Pose, UnitVector, Vector, interpolate_pose};
+use regrasp_grasp::Contact;
+use regrasp_robot::kinematics::finger_ik::{Coordinates, IkSettings};
+
+/// Moments of the way to the target at which a finger is asked whether it can still follow.
+const LOOK_AHEAD: usize = 6;
+/// Largest change of a joint between such moments.
+const LOOK_AHEAD_STEP: f64 = 1.0;
+/// How strongly rays are drawn towards the finger. By hand: half of the rays fall within 55 degrees.
+const PULL: f64 = 0.9;
+
+/// A contact that a finger can take, with everything else ignored but object, palm and obstacles.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// The contact.
+    pub contact: Contact,
+    /// Joints there.
+    pub joints: Coordinates,
+    /// Share of the way to the target that the finger can follow with it.
+    pub follow: f64,
+}
+
+/// The way of the object that is looked ahead along.
+#[derive(Debug, Clone)]
+pub struct Way {
+    moments: Vec<(Pose, Placement)>,
+}
+
+impl Way {
+    /// The way from `from` to `to`, at [`LOOK_AHEAD`] moments after the start.
+    pub fn new(from: &Pose, to: &Pose) -> Self {
+        let moments = (1..=LOOK_AHEAD)
+            .map(|k| {
+                let pose = interpolate_pose(from, to, k as f64 / LOOK_AHEAD as f64);
+                (pose, Placement::from(&pose))
+            })
+            .collect();
+        Way { moments }
+    }
+}
+
+/// Draws a contact on the object that lies towards `finger`, with the object at `world_from_object`.
+///
+/// A ray from a random inner point within a wide cone about the finger's working place: twice as quick as drawing by
+/// area (in-hand-notes, 5). Every point of the surface can be drawn.
+pub fn draw_contact(model: &Model, finger: usize, world_from_object: &Placement, rng: &mut Rng) -> Option<Contact> {
+    let object = &model.scene.object;
+    let inner = object.center_of_mass + Vector::from(rng.direction()) * (0.4 * model.frame.torque_scale * rng.unit());
+    let towards = world_from_object.point_to_child(&model.fingers[finger].tip_at_rest) - inner;
+    let direction = towards.normalize() * PULL + Vector::from(rng.direction());
+    let direction = UnitVector::try_new(direction, 1e-9)?;
+    let hit = object.surface.cast_ray(&inner, &direction)?;
+    let hit = object.surface.settle(&hit, model.fingers[finger].tip_radius)?;
+    if object.surface.crease_distance(&hit) < object.edge_distance {
+        return None;
+    }
+    Some(Contact { point_in_object: hit.point_in_object, normal_in_object: hit.normal_in_object })
+}
+
+/// Joints of `finger` at `contact`, clear of everything but the other fingers; the workspace has the object in place.
+pub fn reach(
+    workspace: &mut Workspace,
+    finger: usize,
+    contact: &Contact,
+    world_from_object: &Placement,
+    rng: &mut Rng,
+) -> Option<Coordinates> {
+    let model = workspace.model;
+    let normal = UnitVector::new_unchecked(world_from_object.vector(&contact.normal_in_object));
+    let target = tip_target(world_from_object, contact, model.fingers[finger].tip_radius);
+    let joints = model.fingers[finger].ik.solve_random(&target, &ik_settings(model, finger, normal), rng)?;
+    workspace.set_finger(finger, &joints);
+    let mode = TipMode::Near { finger, normal_in_world: normal.into_inner() };
+    workspace.finger_alone_is_clear(finger, mode).then_some(joints)
+}
+
+/// Share of the way along which `finger` can keep `contact`, looked at alone and only now and then.
+pub fn follow_share(workspace: &mut Workspace, finger: usize, contact: &Contact, joints: &Coordinates, way: &Way) -> f64 {
+    let model = workspace.model;
+    let mut current = joints.clone();
+    let mut n_followed = 0;
+    for (pose, world_from_object) in &way.moments {
+        let normal = world_from_object.vector(&contact.normal_in_object);
+        // Moments are far apart; what matters here is reach, not continuity, so the step may be larger.
+        let settings =
+            IkSettings { max_step: LOOK_AHEAD_STEP, ..ik_settings(model, finger, UnitVector::new_unchecked(normal)) };
+        let target = tip_target(world_from_object, contact, model.fingers[finger].tip_radius);
+        let Some(next) = model.fingers[finger].ik.solve_near(&target, &current, &settings) else { break };
+        workspace.place_object_and_finger(pose, finger, &next);
+        if !workspace.finger_alone_is_clear(finger, TipMode::Near { finger, normal_in_world: normal }) {
+            break;
+        }
+        current = next;
+        n_followed += 1;
+    }
+    f64::from(n_followed) / LOOK_AHEAD as f64
+}
+
+/// New candidates of `finger`, the ones that follow farthest first; at most `n_kept` of `n_drawn`.
+///
+/// The workspace has the object at `world_from_object`; it is left with the object and the finger anywhere.
+pub fn draw_candidates(
+    workspace: &mut Workspace,
+    finger: usize,
+    world_from_object: &Pose,
+    way: &Way,
+    n_drawn: usize,
+    n_kept: usize,
+    rng: &mut Rng,
+) -> Vec<Candidate> {
+    let placement = Placement::from(world_from_object);
+    let mut found: Vec<Candidate> = Vec::with_capacity(n_drawn);
+    let mut n_tries = 0;
+    while found.len() < n_drawn && n_tries < 8 * n_drawn {
+        n_tries += 1;
+        let Some(contact) = draw_contact(workspace.model, finger, &placement, rng) else { continue };
+        workspace.place_object(world_from_object);
+        let Some(joints) = reach(workspace, finger, &contact, &placement, rng) else { continue };
+        let follow = follow_share(workspace, finger, &contact, &joints, way);
+        found.push(Candidate { contact, joints, follow });
+    }
+    // Stable: equal shares stay in the order drawn.
+    found.sort_by(|a, b| b.follow.total_cmp(&a.follow));
+    found.truncate(n_kept);
+    found
+}
+
+/// A random pose near the way from `start` to `goal` (in-hand-notes, 3: biased poses).
+pub fn draw_pose(model: &Model, start: &Pose, goal: &Pose, rng: &mut Rng) -> Pose {
+    let along = interpolate_pose(start, goal, rng.unit());
+    let shift = Vector::from(rng.direction()) * (model.settings.wander_distance * rng.unit().cbrt());
+    let turn = Vector::new(rng.normal(), rng.normal(), rng.normal()) * model.settings.wander_angle;
+    let center = along * model.scene.object.center_of_mass;
+    let rotation = nalgebra::UnitQuaternion::from_scaled_axis(turn) * along.rotation;
+    // Turn about the centre of mass, then shift.
+    let origin: Point = center + shift - rotation * model.scene.object.center_of_mass.coords;
+    Pose::from_parts(origin.coords.into(), rotation)
+}

@@ -1,0 +1,238 @@
+//! Start and goal as the query gives them: what is wrong with them is said before any search.
+
+use super::model::{Carrier, Model};
+use super::state::GraspState;
+use super::transfer::ik_settings;
+use super::workspace::{Contacts, HandJoints, TipMode, Workspace, tip_target};
+use super::combine::releasable;
+use crate::failure::{Failure, FailureKind};
+use regrasp_base::Rng;
+use regrasp_geometry::collision::{Answer, Placement, separation};
+use regrasp_geometry::{Point, Pose, UnitVector, Vector};
+use regrasp_grasp::{Contact, closure};
+use regrasp_robot::kinematics::finger_ik::Coordinates;
+use regrasp_scene::GraspRequest;
+
+/// Distance of a given fingertip from the surface, and of a given contact point, that still counts as touching.
+const TOUCHING: f64 = 1e-4;
+/// Fingers that hard point contacts need: three hold while one is away (paper 004, section III).
+const LEAST_FINGERS: usize = 4;
+
+/// Which end of the query.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum End {
+    /// The start.
+    Start,
+    /// The goal.
+    Goal,
+}
+
+impl End {
+    fn name(self) -> &'static str {
+        match self {
+            End::Start => "start",
+            End::Goal => "goal",
+        }
+    }
+
+    fn failure(self, message: String, advice: &str) -> Failure {
+        let kind = match self {
+            End::Start => FailureKind::StartInvalid,
+            End::Goal => FailureKind::GoalInvalid,
+        };
+        refusal(kind, message, advice)
+    }
+}
+
+fn refusal(kind: FailureKind, message: String, advice: &str) -> Failure {
+    Failure {
+        kind,
+        message,
+        advice: advice.into(),
+        causes: Vec::new(),
+        nearest_miss: None,
+        statistics: Default::default(),
+    }
+}
+
+/// Refuses hands that can never do it with hard point contacts.
+pub fn refuse_impossible(model: &Model) -> Result<(), Failure> {
+    let n = model.n_fingers();
+    if n >= LEAST_FINGERS {
+        return Ok(());
+    }
+    let hold = if n == 0 { "none".to_owned() } else { (n - 1).to_string() };
+    Err(refusal(
+        FailureKind::Impossible,
+        format!(
+            "the hand has {n} fingers with hard point contacts: while one is away only {hold} hold, and fewer than three \
+             hard points cannot hold an object (it can turn about the line through two of them). {n} hard fingers can \
+             never change their grasp"
+        ),
+        "use a hand with at least 4 fingers; soft fingertips, of which two can hold, are not supported yet",
+    ))
+}
+
+/// Refuses an object pose at which the object itself is in collision with palm or obstacles.
+pub fn refuse_buried_object(model: &Model, end: End, world_from_object: &Pose) -> Result<(), Failure> {
+    let object = &model.bodies[model.object];
+    let at_object = Placement::from(world_from_object).then(&object.carrier_from_body);
+    for pair in &model.pairs {
+        let other = if pair.a == model.object { pair.b } else if pair.b == model.object { pair.a } else { continue };
+        let body = &model.bodies[other];
+        if !matches!(body.carrier, Carrier::World) {
+            continue;
+        }
+        let mut direction = Vector::zeros();
+        let clearance = model.settings.clearance;
+        let answer = separation(
+            &object.shape, &at_object, &body.shape, &body.carrier_from_body, clearance, clearance, &mut direction, &mut [0; 2],
+        );
+        let exactly_apart = || {
+            let tree_apart = |tree: &regrasp_geometry::collision::MeshTree, mesh_at: &Placement, shape, at: &Placement| {
+                tree.is_apart(shape, &mesh_at.inverse_then(at), clearance, &mut 0.0)
+            };
+            object.tree.as_ref().is_some_and(|tree| tree_apart(tree, &at_object, &body.shape, &body.carrier_from_body))
+                || body.tree.as_ref().is_some_and(|tree| tree_apart(tree, &body.carrier_from_body, &object.shape, &at_object))
+        };
+        if !matches!(answer, Answer::SeparatedBy(_)) && !exactly_apart() {
+            return Err(end.failure(
+                format!(
+                    "at the {} the object \"{}\" is in collision with \"{}\", or nearer than {} m; nothing was moved",
+                    end.name(), object.name, body.name, clearance
+                ),
+                "move the object away from it, or make the clearance smaller",
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// The grasp that the query gives at one end; None where the planner chooses.
+pub fn given_grasp(
+    model: &Model,
+    end: End,
+    world_from_object: &Pose,
+    request: &GraspRequest,
+    rng: &mut Rng,
+) -> Result<Option<GraspState>, Failure> {
+    let state = match request {
+        GraspRequest::Automatic => return Ok(None),
+        GraspRequest::Joints(values) => from_joints(model, end, world_from_object, values)?,
+        GraspRequest::Contacts(points) => from_contacts(model, end, world_from_object, points, rng)?,
+    };
+    let margin = closure::closure_margin(&state.contacts, &model.frame);
+    if margin < model.settings.closure_margin {
+        return Err(end.failure(
+            format!(
+                "the {} grasp is not force closed with the margin asked for: {margin:.4} of {}, at friction {}",
+                end.name(), model.settings.closure_margin, model.frame.friction
+            ),
+            "move the contacts apart, or ask for a smaller margin",
+        ));
+    }
+    if end == End::Start && releasable(model, &state.contacts) == 0 {
+        return Err(end.failure(
+            "in the start grasp no finger may let go: no n-1 of the fingers are force closed".into(),
+            "choose other contacts, or let the planner choose (grasp = \"automatic\")",
+        ));
+    }
+    let mut workspace = Workspace::new(model);
+    workspace.set(world_from_object, &state.joints, &state.contacts);
+    if !workspace.is_clear(TipMode::AllHold) {
+        let pair = workspace.blocking_pair.map(|p| &model.pairs[p]);
+        let names = pair.map_or(("?", "?"), |p| (model.bodies[p.a].name.as_str(), model.bodies[p.b].name.as_str()));
+        return Err(end.failure(
+            format!("at the {} \"{}\" and \"{}\" collide; nothing was moved", end.name(), names.0, names.1),
+            "choose other contacts or joints",
+        ));
+    }
+    Ok(Some(state))
+}
+
+fn from_joints(model: &Model, end: End, world_from_object: &Pose, values: &[f64]) -> Result<GraspState, Failure> {
+    let placement = Placement::from(world_from_object);
+    let (mut joints, mut contacts) = (HandJoints::new(), Contacts::new());
+    let mut rest = values;
+    for (f, finger) in model.fingers.iter().enumerate() {
+        let name = &model.scene.hand.fingers[f].name;
+        let chain = finger.ik.chain();
+        let n = chain.n_coordinates();
+        assert!(rest.len() >= n, "joint vectors have one value per joint");
+        let (own, others) = rest.split_at(n);
+        rest = others;
+        let own: Coordinates = own.iter().copied().collect();
+        if !chain.within_limits(&own, 0.0) {
+            return Err(end.failure(
+                format!("at the {} finger \"{name}\" is outside its joint limits", end.name()),
+                "give joint positions within the limits; regrasp inspect prints them",
+            ));
+        }
+        let tip = placement.point_to_child(&finger.ik.tip(&own));
+        let surface = &model.scene.object.surface;
+        let distance = surface.signed_distance(&tip) - finger.tip_radius;
+        if distance.abs() > TOUCHING {
+            return Err(end.failure(
+                format!("at the {} the tip of finger \"{name}\" is {:.2} mm off the surface", end.name(), distance * 1e3),
+                "correct the joints or give contacts",
+            ));
+        }
+        let foot = surface.project(&tip);
+        let away = tip - foot.point_in_object;
+        let normal_in_object = match UnitVector::try_new(away, 1e-6) {
+            Some(normal) if finger.tip_radius > 0.0 => normal,
+            _ => foot.normal_in_object,
+        };
+        // The contact that the tip has as it stands: no finger moves by the rounding of the given joints.
+        let point_in_object = tip - normal_in_object.into_inner() * finger.tip_radius;
+        contacts.push(Contact { point_in_object, normal_in_object });
+        joints.push(own);
+    }
+    Ok(GraspState { world_from_object: *world_from_object, contacts, joints })
+}
+
+fn from_contacts(
+    model: &Model,
+    end: End,
+    world_from_object: &Pose,
+    points: &[Point],
+    rng: &mut Rng,
+) -> Result<GraspState, Failure> {
+    let placement = Placement::from(world_from_object);
+    let (mut joints, mut contacts) = (HandJoints::new(), Contacts::new());
+    for (f, point) in points.iter().enumerate() {
+        let name = &model.scene.hand.fingers[f].name;
+        let surface = &model.scene.object.surface;
+        let foot = surface.project(point);
+        let distance = (point - foot.point_in_object).norm();
+        if distance > TOUCHING {
+            return Err(end.failure(
+                format!("the {} contact of finger \"{name}\" is {:.2} mm off the surface", end.name(), distance * 1e3),
+                "give a point on the surface, in the object frame",
+            ));
+        }
+        let foot = surface.settle(&foot, model.fingers[f].tip_radius).unwrap_or(foot);
+        let contact = Contact { point_in_object: foot.point_in_object, normal_in_object: foot.normal_in_object };
+        let mut workspace = Workspace::new(model);
+        workspace.place_object(world_from_object);
+        let reached = (0..REACH_TRIES)
+            .find_map(|_| super::candidates::reach(&mut workspace, f, &contact, &placement, rng));
+        let Some(own) = reached else {
+            let normal = UnitVector::new_unchecked(placement.vector(&contact.normal_in_object));
+            let target = tip_target(&placement, &contact, model.fingers[f].tip_radius);
+            let reachable =
+                model.fingers[f].ik.solve_random(&target, &ik_settings(model, f, normal), rng).is_some();
+            let why = if reachable { "only in collision" } else { "not at all within its joint limits" };
+            return Err(end.failure(
+                format!("finger \"{name}\" reaches its {} contact {why}", end.name()),
+                "choose another contact, or another pose of the object",
+            ));
+        };
+        contacts.push(contact);
+        joints.push(own);
+    }
+    Ok(GraspState { world_from_object: *world_from_object, contacts, joints })
+}
+
+/// Postures tried for a given contact.
+const REACH_TRIES: usize = 20;

@@ -1,0 +1,264 @@
+//! The scene prepared for planning: fingers with inverse kinematics, bodies with bounds, pairs to keep apart.
+//!
+//! Built once per query, shared by all threads, never changed.
+
+use regrasp_geometry::collision::{MeshTree, Placement};
+use regrasp_geometry::{ConvexHull, Point, Pose, Shape, Vector};
+use regrasp_grasp::GraspFrame;
+use regrasp_robot::TipShape;
+use regrasp_robot::kinematics::finger_ik::FingerIk;
+use regrasp_robot::kinematics::motion_bound::MotionBound;
+use regrasp_scene::Scene;
+use std::sync::Arc;
+
+use super::settings::InHandSettings;
+
+/// Most fingers a hand may have.
+pub const MAX_FINGERS: usize = 6;
+
+/// A finger, prepared.
+#[derive(Debug)]
+pub struct FingerModel {
+    /// Inverse kinematics of the tip's centre.
+    pub ik: FingerIk,
+    /// Radius of the ball tip; zero for a sharp one.
+    pub tip_radius: f64,
+    /// Indices of its bodies in [`Model::bodies`].
+    pub bodies: std::ops::Range<usize>,
+    /// Pairs that a motion of this finger alone can bring together.
+    pub pairs: Vec<usize>,
+    /// Tip centre at rest, in the world: where the finger likes to work.
+    pub tip_at_rest: Point,
+}
+
+/// What moves a body.
+#[derive(Debug)]
+pub enum Carrier {
+    /// Moving body `link` of a finger.
+    Finger {
+        /// Which finger.
+        finger: usize,
+        /// Index of the moving body in the finger's chain.
+        link: usize,
+        /// Bounds of its motion.
+        bound: MotionBound,
+    },
+    /// The object.
+    Object,
+    /// Nothing: palm and obstacles.
+    World,
+}
+
+/// A shape with what collision tests ask about it.
+#[derive(Debug)]
+pub struct Body {
+    /// Convex shape; for a mesh, its hull.
+    pub shape: Shape,
+    /// The exact triangles, where the hull is not the mesh.
+    pub tree: Option<MeshTree>,
+    /// Pose in its carrier's frame.
+    pub carrier_from_body: Placement,
+    /// Centre of the bounding ball, in the body frame.
+    pub center: Point,
+    /// Radius of the bounding ball.
+    pub radius: f64,
+    /// What moves it.
+    pub carrier: Carrier,
+    /// Name for messages.
+    pub name: String,
+}
+
+/// Two bodies that are kept apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Pair {
+    /// First body.
+    pub a: usize,
+    /// Second body.
+    pub b: usize,
+    /// The finger whose tip touches the object, when the pair is a fingertip and the object.
+    pub tip_of: Option<usize>,
+}
+
+/// The scene, prepared.
+#[derive(Debug)]
+pub struct Model<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Fingers.
+    pub fingers: Vec<FingerModel>,
+    /// Bodies: fingers first, then palm, object, obstacles.
+    pub bodies: Vec<Body>,
+    /// Index of the object's body.
+    pub object: usize,
+    /// Pairs to keep apart.
+    pub pairs: Vec<Pair>,
+    /// What closure is asked about; friction as planned with.
+    pub frame: GraspFrame,
+    /// Largest distance of a point of the object from its frame's origin: bounds its motion when it turns.
+    pub object_reach: f64,
+    /// Settings.
+    pub settings: InHandSettings,
+}
+
+impl<'a> Model<'a> {
+    /// Prepares `scene`.
+    pub fn new(scene: &'a Scene, settings: &InHandSettings) -> Self {
+        let hand = &scene.hand;
+        assert!(hand.fingers.len() <= MAX_FINGERS, "hands of more than {MAX_FINGERS} fingers");
+        let mut bodies = Vec::new();
+        let mut links = Vec::new();
+        let mut fingers = Vec::new();
+        for (f, finger) in hand.fingers.iter().enumerate() {
+            let first = bodies.len();
+            let mut add = |shape: &Shape, body_from_shape: &Pose, link: usize, id, name: &str, is_tip: bool| {
+                let (center, radius) = shape.bounding_sphere();
+                let bound = MotionBound::new(&finger.chain, link, &(body_from_shape * center), radius);
+                bodies.push(Body {
+                    shape: shape.clone(),
+                    tree: None,
+                    carrier_from_body: Placement::from(body_from_shape),
+                    center,
+                    radius,
+                    carrier: Carrier::Finger { finger: f, link, bound },
+                    name: format!("{name} ({})", finger.name),
+                });
+                links.push((id, is_tip));
+            };
+            for part in &finger.shapes {
+                let name = &hand.robot.links[part.link.0].name;
+                add(&part.placed.shape, &part.placed.parent_from_shape, part.body, part.link, name, part.is_tip);
+            }
+            if let TipShape::Sphere { radius } = finger.tip.shape {
+                let place = Pose::from_parts(finger.tip.center_in_body.coords.into(), nalgebra::UnitQuaternion::identity());
+                let is_there = finger.shapes.iter().any(|part| {
+                    part.is_tip
+                        && matches!(part.placed.shape, Shape::Sphere { radius: r } if (r - radius).abs() < 1e-9)
+                        && (part.placed.parent_from_shape.translation.vector - place.translation.vector).norm() < 1e-9
+                });
+                if !is_there {
+                    let link = finger.chain.joints.len() - 1;
+                    add(&Shape::Sphere { radius }, &place, link, finger.tip.link, "tip ball", true);
+                }
+            }
+            let ik = FingerIk::new(&finger.chain, &finger.tip.center_in_body);
+            fingers.push(FingerModel {
+                tip_radius: finger.tip.radius(),
+                tip_at_rest: ik.tip(&finger.rest),
+                ik,
+                bodies: first..bodies.len(),
+                pairs: Vec::new(),
+            });
+        }
+        let n_finger_bodies = bodies.len();
+        for part in &hand.palm {
+            bodies.push(fixed_body(&part.placed.shape, &part.placed.parent_from_shape, &hand.robot.links[part.link.0].name));
+            links.push((part.link, false));
+        }
+        let object = bodies.len();
+        bodies.push(Body { carrier: Carrier::Object, ..fixed_body(&scene.object.shape, &Pose::identity(), &scene.object.name) });
+        for obstacle in &scene.obstacles {
+            bodies.push(fixed_body(&obstacle.placed.shape, &obstacle.placed.parent_from_shape, &obstacle.name));
+        }
+        let mut pairs = Vec::new();
+        for a in 0..bodies.len() {
+            for b in a + 1..bodies.len() {
+                if let Some(pair) = pair_of(scene, &bodies, &links, a, b, n_finger_bodies, object) {
+                    pairs.push(pair);
+                }
+            }
+        }
+        for (f, finger) in fingers.iter_mut().enumerate() {
+            let moves = |body: usize| matches!(bodies[body].carrier, Carrier::Finger { finger, .. } if finger == f);
+            finger.pairs = (0..pairs.len()).filter(|&p| moves(pairs[p].a) || moves(pairs[p].b)).collect();
+        }
+        Model {
+            scene,
+            fingers,
+            object,
+            pairs,
+            frame: GraspFrame {
+                center_of_mass: scene.object.center_of_mass,
+                torque_scale: scene.object.radius(),
+                friction: scene.object.friction,
+            },
+            object_reach: bodies[object].center.coords.norm() + bodies[object].radius,
+            bodies,
+            settings: settings.clone(),
+        }
+    }
+
+    /// Number of fingers.
+    pub fn n_fingers(&self) -> usize {
+        self.fingers.len()
+    }
+
+    /// Length by which angles of object poses are weighed against distances: the object's radius.
+    pub fn turn_length(&self) -> f64 {
+        self.frame.torque_scale
+    }
+}
+
+/// A body that nothing moves.
+fn fixed_body(shape: &Shape, world_from_shape: &Pose, name: &str) -> Body {
+    let (convex, tree) = match shape {
+        Shape::Mesh(mesh) => match ConvexHull::new(mesh.vertices()) {
+            // The hull is only a first test; the triangles decide.
+            Ok(hull) => (Shape::Convex(Arc::new(hull)), Some(MeshTree::new(mesh))),
+            // A flat mesh has no hull: a box around it is the first test.
+            Err(_) => {
+                let (low, high) = mesh.bounds();
+                let half = ((high - low) / 2.0).map(|h: f64| h.max(1e-9));
+                let shift = Vector::from(nalgebra::center(&low, &high).coords);
+                let placed = Pose::from_parts(shift.into(), nalgebra::UnitQuaternion::identity());
+                return Body {
+                    tree: Some(MeshTree::new(mesh)),
+                    ..fixed_body(&Shape::Cuboid { half_extents: half }, &(world_from_shape * placed), name)
+                };
+            }
+        },
+        convex => (convex.clone(), None),
+    };
+    let (center, radius) = convex.bounding_sphere();
+    Body {
+        shape: convex,
+        tree,
+        carrier_from_body: Placement::from(world_from_shape),
+        center,
+        radius,
+        carrier: Carrier::World,
+        name: name.to_owned(),
+    }
+}
+
+/// The pair `(a, b)` if it is one to keep apart.
+fn pair_of(
+    scene: &Scene,
+    bodies: &[Body],
+    links: &[(regrasp_robot::LinkId, bool)],
+    a: usize,
+    b: usize,
+    n_finger_bodies: usize,
+    object: usize,
+) -> Option<Pair> {
+    let on_hand = |body: usize| body < object;
+    if on_hand(a) && on_hand(b) {
+        let palm_only = a >= n_finger_bodies && b >= n_finger_bodies;
+        let one_link = match (&bodies[a].carrier, &bodies[b].carrier) {
+            (Carrier::Finger { finger: f, link: i, .. }, Carrier::Finger { finger: g, link: j, .. }) => f == g && i == j,
+            _ => false,
+        };
+        if palm_only || one_link || scene.hand.may_touch(links[a].0, links[b].0) {
+            return None;
+        }
+        return Some(Pair { a, b, tip_of: None });
+    }
+    let moving = |body: usize| !matches!(bodies[body].carrier, Carrier::World);
+    if !moving(a) && !moving(b) {
+        return None;
+    }
+    let tip_of = match bodies[a].carrier {
+        Carrier::Finger { finger, .. } if b == object && links[a].1 => Some(finger),
+        _ => None,
+    };
+    Some(Pair { a, b, tip_of })
+}

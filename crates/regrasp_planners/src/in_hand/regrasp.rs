@@ -1,0 +1,120 @@
+//! Sequences of relocations from one grasp to another, the object standing still: which finger first.
+
+use super::candidates::Candidate;
+use super::combine::{Choice, ClosureTable};
+use super::relocate::{Foothold, relocate};
+use super::state::{GraspState, Motion, Step};
+use super::workspace::Workspace;
+use regrasp_base::Rng;
+use regrasp_robot::kinematics::finger_ik::Coordinates;
+
+/// Relocations already tried from one state: what moved before decides what is in the way.
+#[derive(Debug, Default)]
+pub struct Tried {
+    /// (options of all fingers before, finger, option after) and the path, if there is one.
+    known: Vec<(Choice, usize, usize, Option<Vec<Coordinates>>)>,
+}
+
+/// Relocates fingers one at a time from option 0 of each to `goal`; each leaves only where the others are closed.
+///
+/// Depth first over the orders; what failed once is not tried again. `start` holds the options 0.
+pub fn regrasp(
+    workspace: &mut Workspace,
+    start: &GraspState,
+    options: &[Vec<Candidate>],
+    goal: &Choice,
+    table: &mut ClosureTable,
+    tried: &mut Tried,
+    rng: &mut Rng,
+) -> Option<Vec<Step>> {
+    let mut current: Choice = goal.iter().map(|_| 0).collect();
+    let mut dead: Vec<Choice> = Vec::new();
+    let mut order: Vec<(usize, usize)> = Vec::new();
+    if !search(workspace, start, options, goal, table, tried, rng, &mut current, &mut dead, &mut order) {
+        return None;
+    }
+    let mut steps = Vec::with_capacity(order.len());
+    let mut state = start.clone();
+    for (finger, which) in order {
+        let option = &options[finger][goal[finger]];
+        let path = tried.known[which].3.clone()?;
+        state = state.with_finger(finger, option.contact, option.joints.clone());
+        steps.push(Step { motion: Motion::Regrasp { finger, path }, end: state.clone() });
+    }
+    Some(steps)
+}
+
+fn search(
+    workspace: &mut Workspace,
+    start: &GraspState,
+    options: &[Vec<Candidate>],
+    goal: &Choice,
+    table: &mut ClosureTable,
+    tried: &mut Tried,
+    rng: &mut Rng,
+    current: &mut Choice,
+    dead: &mut Vec<Choice>,
+    order: &mut Vec<(usize, usize)>,
+) -> bool {
+    if current == goal {
+        return true;
+    }
+    if dead.contains(current) {
+        return false;
+    }
+    let all = (1u32 << options.len()) - 1;
+    for finger in 0..options.len() {
+        if current[finger] == goal[finger] || !table.is_closed(current, all & !(1 << finger)) {
+            continue;
+        }
+        let which = try_relocation(workspace, start, options, current, finger, goal[finger], tried, rng);
+        if tried.known[which].3.is_none() {
+            continue;
+        }
+        let before = std::mem::replace(&mut current[finger], goal[finger]);
+        order.push((finger, which));
+        if search(workspace, start, options, goal, table, tried, rng, current, dead, order) {
+            return true;
+        }
+        order.pop();
+        current[finger] = before;
+    }
+    dead.push(current.clone());
+    false
+}
+
+/// Index in `tried` of the relocation of `finger` from where `current` has it to `option`.
+fn try_relocation(
+    workspace: &mut Workspace,
+    start: &GraspState,
+    options: &[Vec<Candidate>],
+    current: &Choice,
+    finger: usize,
+    option: usize,
+    tried: &mut Tried,
+    rng: &mut Rng,
+) -> usize {
+    let known = tried.known.iter().position(|(c, f, o, _)| c == current && *f == finger && *o == option);
+    if let Some(which) = known {
+        return which;
+    }
+    let mut state = start.clone();
+    for (f, &taken) in current.iter().enumerate() {
+        if taken != 0 {
+            state.contacts[f] = options[f][taken].contact;
+            state.joints[f].clone_from(&options[f][taken].joints);
+        }
+    }
+    workspace.set(&state.world_from_object, &state.joints, &state.contacts);
+    let to = &options[finger][option];
+    let path = relocate(
+        workspace,
+        &state.world_from_object,
+        finger,
+        Foothold { contact: &state.contacts[finger], joints: &state.joints[finger] },
+        Foothold { contact: &to.contact, joints: &to.joints },
+        rng,
+    );
+    tried.known.push((current.clone(), finger, option, path));
+    tried.known.len() - 1
+}

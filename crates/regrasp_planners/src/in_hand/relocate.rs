@@ -1,0 +1,242 @@
+//! The relocation of one finger while the others hold the object still: off along the normal, over, down along the
+//! normal (paper 000, section 4.2.3; the ways over are from in-hand-notes, 4.8).
+
+use super::model::Model;
+use super::transfer::ik_settings;
+use super::workspace::{TipMode, Workspace};
+use regrasp_base::Rng;
+use regrasp_geometry::collision::Placement;
+use regrasp_geometry::{Point, Pose, UnitVector, Vector};
+use regrasp_grasp::Contact;
+use regrasp_roadmap::rrt_connect::{RrtSettings, rrt_connect};
+use regrasp_robot::kinematics::finger_ik::Coordinates;
+
+/// Longest step of a joint along a joint line, in radians or metres.
+const JOINT_LINE_STEP: f64 = 0.08;
+
+/// One end of a relocation.
+#[derive(Debug, Clone)]
+pub struct Foothold<'a> {
+    /// The contact.
+    pub contact: &'a Contact,
+    /// Joints of the finger there.
+    pub joints: &'a Coordinates,
+}
+
+/// Moves `finger` from one foothold to another, with everything else where `workspace` has it.
+///
+/// Returns the joints after the start, the last ones being exactly those of the goal. The workspace is left with the
+/// finger anywhere.
+pub fn relocate(
+    workspace: &mut Workspace,
+    world_from_object: &Pose,
+    finger: usize,
+    from: Foothold,
+    to: Foothold,
+    rng: &mut Rng,
+) -> Option<Vec<Coordinates>> {
+    let model = workspace.model;
+    let placement = Placement::from(world_from_object);
+    for &height in &model.settings.lift_heights {
+        let Some(up) = lift(workspace, &placement, finger, &from, height) else { continue };
+        let Some(mut down) = lift(workspace, &placement, finger, &to, height) else { continue };
+        let mode = TipMode::Away { finger, clearance: tip_clearance(model, height) };
+        let (Some(above_start), Some(above_goal)) = (up.last().cloned(), down.pop()) else { continue };
+        let Some(over) = pass_over(workspace, &placement, finger, &above_start, &above_goal, height, mode, rng) else {
+            continue;
+        };
+        let mut path = up;
+        path.extend(over);
+        down.reverse();
+        path.extend(down);
+        path.push(to.joints.clone());
+        return Some(path);
+    }
+    None
+}
+
+/// Clearance of a free tip that passes at `height`.
+fn tip_clearance(model: &Model, height: f64) -> f64 {
+    model.settings.clearance.min(0.5 * height)
+}
+
+/// Joints after the contact, from it straight up along the normal; the last ones are at `height` and clear.
+fn lift(
+    workspace: &mut Workspace,
+    world_from_object: &Placement,
+    finger: usize,
+    foothold: &Foothold,
+    height: f64,
+) -> Option<Vec<Coordinates>> {
+    let model = workspace.model;
+    let normal = world_from_object.vector(&foothold.contact.normal_in_object);
+    let base = world_from_object.point(&foothold.contact.point_in_object) + normal * model.fingers[finger].tip_radius;
+    let mode = TipMode::Near { finger, normal_in_world: normal };
+    let settings = ik_settings(model, finger, UnitVector::new_unchecked(normal));
+    workspace.set_finger(finger, foothold.joints);
+    let n_steps = (height / model.settings.step).ceil().max(1.0) as usize;
+    let mut path = Vec::with_capacity(n_steps);
+    let mut joints = foothold.joints.clone();
+    for k in 1..=n_steps {
+        let target = base + normal * (height * k as f64 / n_steps as f64);
+        joints = model.fingers[finger].ik.solve_near(&target, &joints, &settings)?;
+        if !workspace.step_finger(finger, &joints, mode) {
+            return None;
+        }
+        path.push(joints.clone());
+    }
+    let clear = TipMode::Away { finger, clearance: tip_clearance(model, height) };
+    workspace.finger_is_clear(finger, clear).then_some(path)
+}
+
+/// From above one contact to above the other: along the surface, else straight in the joints, else by RRT-Connect.
+fn pass_over(
+    workspace: &mut Workspace,
+    world_from_object: &Placement,
+    finger: usize,
+    start: &Coordinates,
+    goal: &Coordinates,
+    height: f64,
+    mode: TipMode,
+    rng: &mut Rng,
+) -> Option<Vec<Coordinates>> {
+    slide(workspace, world_from_object, finger, start, goal, height, mode)
+        .or_else(|| {
+            let mut path = Vec::new();
+            workspace.set_finger(finger, start);
+            joint_line(workspace, finger, start, goal, mode, &mut path).then_some(path)
+        })
+        .or_else(|| around(workspace, finger, start, goal, mode, rng))
+}
+
+/// Follows the surface at `height`: the tip turns about the object's centre of mass and is pushed out where it comes
+/// too low.
+fn slide(
+    workspace: &mut Workspace,
+    world_from_object: &Placement,
+    finger: usize,
+    start: &Coordinates,
+    goal: &Coordinates,
+    height: f64,
+    mode: TipMode,
+) -> Option<Vec<Coordinates>> {
+    let model = workspace.model;
+    let ik = &model.fingers[finger].ik;
+    let away = model.fingers[finger].tip_radius + height;
+    let center = model.frame.center_of_mass;
+    let arm = |joints: &Coordinates| world_from_object.point_to_child(&ik.tip(joints)) - center;
+    let (first, last) = (arm(start), arm(goal));
+    let (first_length, last_length) = (first.norm(), last.norm());
+    let angle = first.angle(&last);
+    if !(angle < 2.6) || first_length == 0.0 || last_length == 0.0 {
+        return None;
+    }
+    let length = angle * first_length.max(last_length) + (first_length - last_length).abs();
+    let n_steps = (length / (1.5 * model.settings.step)).ceil().max(1.0) as usize;
+    workspace.set_finger(finger, start);
+    let mut path = Vec::with_capacity(n_steps + 1);
+    let mut joints = start.clone();
+    for k in 1..n_steps {
+        let t = k as f64 / n_steps as f64;
+        let direction = turned(&(first / first_length), &(last / last_length), angle, t);
+        let mut tip = center + direction * (first_length + t * (last_length - first_length));
+        let normal = push_out(model, &mut tip, away)?;
+        let settings = ik_settings(model, finger, UnitVector::new_unchecked(world_from_object.vector(&normal)));
+        joints = ik.solve_near(&world_from_object.point(&tip), &joints, &settings)?;
+        if !workspace.step_finger(finger, &joints, mode) {
+            return None;
+        }
+        path.push(joints.clone());
+    }
+    joint_line(workspace, finger, &joints, goal, mode, &mut path).then_some(path)
+}
+
+/// Direction at share `t` of the turn from `from` to `to`, unit vectors `angle` apart.
+fn turned(from: &Vector, to: &Vector, angle: f64, t: f64) -> Vector {
+    if angle < 1e-9 {
+        return *from;
+    }
+    (from * ((1.0 - t) * angle).sin() + to * (t * angle).sin()) / angle.sin()
+}
+
+/// Moves `tip` (object frame) out to the distance `away` from the surface if it is nearer; the direction of the surface.
+fn push_out(model: &Model, tip: &mut Point, away: f64) -> Option<Vector> {
+    let surface = &model.scene.object.surface;
+    for _ in 0..4 {
+        let distance = surface.signed_distance(tip);
+        let foot = surface.project(tip);
+        let outward = if distance > 1e-6 {
+            (*tip - foot.point_in_object) / distance
+        } else {
+            foot.normal_in_object.into_inner()
+        };
+        if distance >= away - 1e-6 {
+            return Some(outward);
+        }
+        *tip = foot.point_in_object + outward * away;
+    }
+    None
+}
+
+/// Straight in the joints; appends the joints after the start.
+fn joint_line(
+    workspace: &mut Workspace,
+    finger: usize,
+    start: &Coordinates,
+    goal: &Coordinates,
+    mode: TipMode,
+    path: &mut Vec<Coordinates>,
+) -> bool {
+    let ik = &workspace.model.fingers[finger].ik;
+    let largest = start.iter().zip(goal).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
+    let tip_motion = (ik.tip(goal) - ik.tip(start)).norm();
+    let n_steps = (largest / JOINT_LINE_STEP).max(tip_motion / (2.0 * workspace.model.settings.step)).ceil().max(1.0);
+    for k in 1..=n_steps as usize {
+        let t = k as f64 / n_steps;
+        let joints: Coordinates =
+            if t >= 1.0 { goal.clone() } else { start.iter().zip(goal).map(|(a, b)| a + t * (b - a)).collect() };
+        if !workspace.step_finger(finger, &joints, mode) {
+            return false;
+        }
+        path.push(joints);
+    }
+    true
+}
+
+/// By RRT-Connect in the finger's joints.
+fn around(
+    workspace: &mut Workspace,
+    finger: usize,
+    start: &Coordinates,
+    goal: &Coordinates,
+    mode: TipMode,
+    rng: &mut Rng,
+) -> Option<Vec<Coordinates>> {
+    let model = workspace.model;
+    let chain = model.fingers[finger].ik.chain();
+    let margin = model.settings.limit_margin;
+    let lower: Vec<f64> = chain.lower.iter().zip(start).map(|(l, q)| (l + margin).max(q - 3.2)).collect();
+    let upper: Vec<f64> = chain.upper.iter().zip(start).map(|(u, q)| (u - margin).min(q + 3.2)).collect();
+    let settings = RrtSettings { max_iterations: model.settings.rrt_iterations, ..RrtSettings::default() };
+    let as_joints = |q: &[f64]| -> Coordinates { q.iter().copied().collect() };
+    let corners = rrt_connect(
+        start,
+        goal,
+        &lower,
+        &upper,
+        |from, to| {
+            workspace.set_finger(finger, &as_joints(from));
+            joint_line(workspace, finger, &as_joints(from), &as_joints(to), mode, &mut Vec::new())
+        },
+        &settings,
+        rng,
+    )?;
+    let mut path = Vec::new();
+    workspace.set_finger(finger, start);
+    for pair in corners.windows(2) {
+        if !joint_line(workspace, finger, &as_joints(&pair[0]), &as_joints(&pair[1]), mode, &mut path) {
+            return None;
+        }
+    }
+    Some(path)
+}

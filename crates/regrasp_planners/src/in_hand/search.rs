@@ -1,0 +1,123 @@
+//! What all methods of the in-hand planner share: scratch memory, random numbers, budget, tally.
+
+use super::model::Model;
+use super::state::GraspState;
+use super::tally::Tally;
+use super::workspace::Workspace;
+use super::Progress;
+use regrasp_base::{Budget, Interrupt, Rng};
+use regrasp_geometry::{Pose, frame};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// One running search.
+pub struct Search<'a> {
+    /// Scratch memory; `workspace.work` counts.
+    pub workspace: Workspace<'a>,
+    /// Random numbers of this attempt.
+    pub rng: Rng,
+    /// Why attempts failed.
+    pub tally: Tally,
+    /// The state nearest to the goal pose so far, with its distance.
+    pub nearest: Option<(f64, GraspState)>,
+    /// Nodes made.
+    pub n_nodes: u64,
+    /// Grasps and contacts sampled.
+    pub n_samples: u64,
+    /// Start pose of the query.
+    pub start: Pose,
+    /// Goal pose of the query.
+    pub goal: Pose,
+    /// Index of the attempt.
+    pub attempt: usize,
+    budget: &'a Budget,
+    work_limit: u64,
+    /// The lowest attempt that has found a plan: later ones may stop.
+    winner: &'a AtomicUsize,
+    progress: &'a (dyn Fn(Progress) + Sync),
+    next_report: u64,
+}
+
+/// Why an attempt ends without a plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stop {
+    /// Its share of work is used up: another attempt may do better.
+    Restart,
+    /// An earlier attempt has a plan.
+    Overtaken,
+    /// The caller's limits.
+    Budget(Interrupt),
+}
+
+/// Work between two reports of progress.
+const REPORT_EVERY: u64 = 20_000;
+
+impl<'a> Search<'a> {
+    /// Attempt `attempt`, with at most `work_limit` units of work.
+    pub fn new(
+        model: &'a Model<'a>,
+        (start, goal): (Pose, Pose),
+        (seed, attempt): (u64, usize),
+        (budget, work_limit): (&'a Budget, u64),
+        winner: &'a AtomicUsize,
+        progress: &'a (dyn Fn(Progress) + Sync),
+    ) -> Self {
+        Search {
+            workspace: Workspace::new(model),
+            rng: Rng::keyed(seed, "attempt", attempt as u64),
+            tally: Tally::default(),
+            nearest: None,
+            n_nodes: 0,
+            n_samples: 0,
+            start,
+            goal,
+            attempt,
+            budget,
+            work_limit,
+            winner,
+            progress,
+            next_report: REPORT_EVERY,
+        }
+    }
+
+    /// The scene, prepared.
+    pub fn model(&self) -> &'a Model<'a> {
+        self.workspace.model
+    }
+
+    /// Err when this attempt is to stop. To be called at least every few hundred units of work.
+    pub fn check(&mut self) -> Result<(), Stop> {
+        let work = self.workspace.work;
+        if work >= self.next_report {
+            self.next_report = work + REPORT_EVERY;
+            let angle_left =
+                self.nearest.as_ref().map_or(std::f64::consts::PI, |(_, state)| self.angle_left(state));
+            (self.progress)(Progress { nodes: self.n_nodes, work, restarts: self.attempt as u64, angle_left });
+        }
+        if self.winner.load(Ordering::Relaxed) < self.attempt {
+            return Err(Stop::Overtaken);
+        }
+        match self.budget.check(work.min(self.budget.max_work - 1)) {
+            Err(interrupt) => Err(Stop::Budget(interrupt)),
+            Ok(()) if work >= self.work_limit => Err(Stop::Restart),
+            Ok(()) => Ok(()),
+        }
+    }
+
+    /// Distance between poses, with angles weighed by the object's radius.
+    pub fn distance(&self, a: &Pose, b: &Pose) -> f64 {
+        frame::pose_distance(a, b, self.model().turn_length())
+    }
+
+    /// Angle between a state and the goal pose.
+    pub fn angle_left(&self, state: &GraspState) -> f64 {
+        frame::rotation_between(&state.world_from_object, &self.goal).norm()
+    }
+
+    /// Takes note of a state, for the nearest miss.
+    pub fn note(&mut self, state: &GraspState) {
+        let distance = self.distance(&state.world_from_object, &self.goal);
+        if self.nearest.as_ref().is_none_or(|(least, _)| distance < *least) {
+            self.nearest = Some((distance, state.clone()));
+        }
+    }
+}

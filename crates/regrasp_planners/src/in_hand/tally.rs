@@ -1,0 +1,81 @@
+//! Why attempts failed: counted on the way, told when no plan is found.
+
+use super::model::Model;
+use crate::failure::Cause;
+
+/// A reason for which an attempt of the search failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Reason {
+    /// No contact was found that a finger reaches, clear of object, palm and obstacles.
+    NoContact(usize),
+    /// The contacts found make no closed grasp with a finger that may let go.
+    NotClosed,
+    /// A closed grasp was found, but the fingers find no free way to it in any order.
+    NoWayOver,
+    /// A transfer stopped at once: a finger reaches no farther.
+    OutOfReach,
+    /// A transfer stopped at once: this pair of bodies was too near.
+    TooNear(usize),
+}
+
+/// Counts per reason.
+#[derive(Debug, Clone, Default)]
+pub struct Tally {
+    counts: std::collections::BTreeMap<Reason, u64>,
+}
+
+impl Tally {
+    /// One more failure for `reason`.
+    pub fn add(&mut self, reason: Reason) {
+        *self.counts.entry(reason).or_default() += 1;
+    }
+
+    /// Adds another tally.
+    pub fn merge(&mut self, other: &Tally) {
+        for (&reason, count) in &other.counts {
+            *self.counts.entry(reason).or_default() += count;
+        }
+    }
+
+    /// The causes in words, commonest first.
+    pub fn causes(&self, model: &Model) -> Vec<Cause> {
+        let total: u64 = self.counts.values().sum();
+        let finger_name = |f: usize| model.scene.hand.fingers[f].name.as_str();
+        let mut causes: Vec<Cause> = self
+            .counts
+            .iter()
+            .map(|(&reason, &count)| Cause {
+                reason: match reason {
+                    Reason::NoContact(f) => format!("finger \"{}\" finds no contact it reaches", finger_name(f)),
+                    Reason::NotClosed => "no closed grasp of which a finger may let go".into(),
+                    Reason::NoWayOver => "no free way for the fingers to the next grasp".into(),
+                    Reason::OutOfReach => "a finger reaches no farther while the object moves".into(),
+                    Reason::TooNear(pair) => {
+                        let pair = &model.pairs[pair];
+                        format!("\"{}\" comes too near \"{}\"", model.bodies[pair.a].name, model.bodies[pair.b].name)
+                    }
+                },
+                count,
+                share: count as f64 / total as f64,
+            })
+            .collect();
+        causes.sort_by(|a, b| b.count.cmp(&a.count));
+        causes
+    }
+
+    /// Counts by reason, without names of bodies: for statistics.
+    pub fn counts(&self) -> std::collections::BTreeMap<String, u64> {
+        let mut counts = std::collections::BTreeMap::new();
+        for (reason, count) in &self.counts {
+            let key = match reason {
+                Reason::NoContact(_) => "no_contact",
+                Reason::NotClosed => "not_closed",
+                Reason::NoWayOver => "no_way_over",
+                Reason::OutOfReach => "out_of_reach",
+                Reason::TooNear(_) => "too_near",
+            };
+            *counts.entry(key.to_owned()).or_default() += count;
+        }
+        counts
+    }
+}

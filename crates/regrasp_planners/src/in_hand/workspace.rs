@@ -1,0 +1,463 @@
+//! One configuration of hand and object at a time, and continuous collision tests of the step to the next.
+//!
+//! A step moves every joint linearly and the object by `interpolate_pose`. Along it each point of a body stays within a
+//! known deviation of the straight line between its two end positions. So if one direction separates two bodies at both
+//! ends by more than their deviations, it separates them all along: two support evaluations prove a step. Where bodies
+//! are far apart the distance known from before, less what both have moved since, proves it for nothing.
+
+use super::model::{Carrier, MAX_FINGERS, Model};
+use arrayvec::ArrayVec;
+use regrasp_geometry::collision::{Answer, Placement, gap_along, separation};
+use regrasp_geometry::{Point, Pose, Vector, frame, interpolate_pose};
+use regrasp_grasp::Contact;
+use regrasp_robot::kinematics::finger_ik::Coordinates;
+
+/// Joint positions of all fingers.
+pub type HandJoints = ArrayVec<Coordinates, MAX_FINGERS>;
+/// One contact per finger.
+pub type Contacts = ArrayVec<Contact, MAX_FINGERS>;
+
+/// What the fingertips do during a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum TipMode {
+    /// All tips hold; each may press into the object by the contact allowance, along its normal.
+    AllHold,
+    /// One finger is leaving or reaching the contact with this outward normal, in the world.
+    Near {
+        /// The finger.
+        finger: usize,
+        /// Outward normal of the object at the contact.
+        normal_in_world: Vector,
+    },
+    /// One finger is away and keeps this clearance; the others hold.
+    Away {
+        /// The finger.
+        finger: usize,
+        /// Distance that its tip keeps from the object, in metres.
+        clearance: f64,
+    },
+}
+
+/// Largest number of times a step is halved before it counts as a collision.
+const MAX_HALVINGS: u32 = 4;
+/// Separation beyond which a search for a better direction stops, in metres.
+const ENOUGH: f64 = 0.004;
+
+/// A configuration: placements of all bodies and the numbers they came from.
+#[derive(Debug, Clone)]
+struct Configuration {
+    joints: HandJoints,
+    world_from_object: Pose,
+    placements: Vec<Placement>,
+}
+
+/// Scratch memory of one search thread.
+#[derive(Debug)]
+pub struct Workspace<'a> {
+    /// The scene, prepared.
+    pub model: &'a Model<'a>,
+    now: Configuration,
+    next: Configuration,
+    /// Direction that last separated each pair, from `a` to `b`, in the world.
+    directions: Vec<Vector>,
+    hints: Vec<[u32; 2]>,
+    /// Lower bound of each pair's distance now.
+    slack: Vec<f64>,
+    /// How far each body moves at most in the current step.
+    motion: Vec<f64>,
+    /// How far its points stray at most from straight lines in the current step.
+    deviation: Vec<f64>,
+    contacts: Contacts,
+    /// Configurations looked at.
+    pub work: u64,
+    /// The pair that stopped the last failed step.
+    pub blocking_pair: Option<usize>,
+}
+
+impl<'a> Workspace<'a> {
+    /// Fresh scratch memory for `model`.
+    pub fn new(model: &'a Model<'a>) -> Self {
+        let placements: Vec<Placement> = model.bodies.iter().map(|body| body.carrier_from_body).collect();
+        let joints = model.scene.hand.fingers.iter().map(|finger| finger.rest.iter().copied().collect()).collect();
+        let now = Configuration { joints, world_from_object: Pose::identity(), placements };
+        Workspace {
+            next: now.clone(),
+            now,
+            directions: vec![Vector::zeros(); model.pairs.len()],
+            hints: vec![[0; 2]; model.pairs.len()],
+            slack: vec![f64::NEG_INFINITY; model.pairs.len()],
+            motion: vec![0.0; model.bodies.len()],
+            deviation: vec![0.0; model.bodies.len()],
+            contacts: Contacts::new(),
+            work: 0,
+            blocking_pair: None,
+            model,
+        }
+    }
+
+    /// Joint positions now.
+    pub fn joints(&self) -> &HandJoints {
+        &self.now.joints
+    }
+
+    /// Goes to a configuration, without any test. `contacts` are where the fingers hold.
+    pub fn set(&mut self, world_from_object: &Pose, joints: &HandJoints, contacts: &Contacts) {
+        self.contacts.clone_from(contacts);
+        self.blocking_pair = None;
+        place_object(self.model, &mut self.now, world_from_object);
+        for finger in 0..self.model.n_fingers() {
+            place_finger(self.model, &mut self.now, finger, &joints[finger]);
+        }
+        self.slack.fill(f64::NEG_INFINITY);
+    }
+
+    /// Puts one finger somewhere, without any test.
+    pub fn set_finger(&mut self, finger: usize, joints: &Coordinates) {
+        place_finger(self.model, &mut self.now, finger, joints);
+        for &pair in &self.model.fingers[finger].pairs {
+            self.slack[pair] = f64::NEG_INFINITY;
+        }
+    }
+
+    /// Puts the object somewhere, without any test; what pairs knew of each other is forgotten.
+    pub fn place_object(&mut self, world_from_object: &Pose) {
+        place_object(self.model, &mut self.now, world_from_object);
+        self.slack.fill(f64::NEG_INFINITY);
+    }
+
+    /// Puts the object and one finger somewhere, without any test.
+    pub fn place_object_and_finger(&mut self, world_from_object: &Pose, finger: usize, joints: &Coordinates) {
+        place_object(self.model, &mut self.now, world_from_object);
+        self.set_finger(finger, joints);
+    }
+
+    /// True when no pair is too near now.
+    pub fn is_clear(&mut self, mode: TipMode) -> bool {
+        self.work += 1;
+        self.next.clone_from(&self.now);
+        self.motion.fill(0.0);
+        self.deviation.fill(0.0);
+        (0..self.model.pairs.len()).all(|pair| self.pair_is_clear(pair, mode))
+    }
+
+    /// True when no pair of one finger is too near now.
+    pub fn finger_is_clear(&mut self, finger: usize, mode: TipMode) -> bool {
+        self.work += 1;
+        self.next.clone_from(&self.now);
+        self.motion.fill(0.0);
+        self.deviation.fill(0.0);
+        let model = self.model;
+        model.fingers[finger].pairs.iter().all(|&pair| self.pair_is_clear(pair, mode))
+    }
+
+    /// True when one finger is clear of the object, the palm and obstacles now, whatever the other fingers do.
+    pub fn finger_alone_is_clear(&mut self, finger: usize, mode: TipMode) -> bool {
+        self.work += 1;
+        self.next.clone_from(&self.now);
+        self.motion.fill(0.0);
+        self.deviation.fill(0.0);
+        let model = self.model;
+        model.fingers[finger].pairs.iter().all(|&pair| self.is_between_fingers(pair) || self.pair_is_clear(pair, mode))
+    }
+
+    fn is_between_fingers(&self, pair: usize) -> bool {
+        let pair = &self.model.pairs[pair];
+        match (&self.model.bodies[pair.a].carrier, &self.model.bodies[pair.b].carrier) {
+            (Carrier::Finger { finger: f, .. }, Carrier::Finger { finger: g, .. }) => f != g,
+            _ => false,
+        }
+    }
+
+    /// Moves everything to the next configuration if the step is clear; stays otherwise.
+    pub fn step(&mut self, world_from_object: &Pose, joints: &HandJoints, mode: TipMode) -> bool {
+        place_object(self.model, &mut self.next, world_from_object);
+        for finger in 0..self.model.n_fingers() {
+            place_finger(self.model, &mut self.next, finger, &joints[finger]);
+        }
+        self.try_step(None, mode, MAX_HALVINGS)
+    }
+
+    /// Moves one finger if the step is clear; stays otherwise.
+    pub fn step_finger(&mut self, finger: usize, joints: &Coordinates, mode: TipMode) -> bool {
+        self.next.clone_from(&self.now);
+        place_finger(self.model, &mut self.next, finger, joints);
+        self.try_step(Some(finger), mode, MAX_HALVINGS)
+    }
+
+    /// Tests the step from `now` to `next`; on success `now` becomes `next`. Only pairs of `moving` are looked at.
+    fn try_step(&mut self, moving: Option<usize>, mode: TipMode, halvings: u32) -> bool {
+        self.work += 1;
+        self.bound_motion(moving);
+        let model = self.model;
+        let is_clear = match moving {
+            Some(finger) => model.fingers[finger].pairs.iter().all(|&pair| self.pair_is_clear(pair, mode)),
+            None => (0..model.pairs.len()).all(|pair| self.pair_is_clear(pair, mode)),
+        };
+        if is_clear {
+            std::mem::swap(&mut self.now, &mut self.next);
+            return true;
+        }
+        // Pairs tested before the one that failed have their slack at `next`; it is not known at `now` any more.
+        self.slack.fill(f64::NEG_INFINITY);
+        let blocking = self.blocking_pair;
+        if halvings == 0 || !blocking.is_none_or(|pair| self.end_is_clear(pair, mode)) {
+            return false;
+        }
+        let (start, goal) = (self.now.clone(), self.next.clone());
+        self.next = midway(model, &start, &goal);
+        if self.try_step(moving, mode, halvings - 1) {
+            self.next = goal;
+            if self.try_step(moving, mode, halvings - 1) {
+                return true;
+            }
+        }
+        self.now = start;
+        self.slack.fill(f64::NEG_INFINITY);
+        false
+    }
+
+    /// True when the pair is clear at `next` by itself: only then can shorter steps help.
+    fn end_is_clear(&mut self, pair: usize, mode: TipMode) -> bool {
+        self.motion.fill(0.0);
+        self.deviation.fill(0.0);
+        let is_clear = self.pair_is_clear(pair, mode);
+        self.slack[pair] = f64::NEG_INFINITY;
+        is_clear
+    }
+
+    /// Fills `motion` and `deviation` for the step from `now` to `next`.
+    fn bound_motion(&mut self, moving: Option<usize>) {
+        let model = self.model;
+        match moving {
+            None => {
+                for finger in 0..model.n_fingers() {
+                    self.bound_finger_motion(finger);
+                }
+                let turn = frame::rotation_between(&self.now.world_from_object, &self.next.world_from_object).norm();
+                let object = model.object;
+                // A point at distance r from the origin turns with acceleration turn^2 r per unit time squared.
+                self.deviation[object] = turn * turn * model.object_reach / 8.0;
+                let body = &model.bodies[object];
+                self.motion[object] = self.now.placements[object].displacement(
+                    &self.next.placements[object],
+                    &body.center,
+                    body.radius,
+                ) + self.deviation[object];
+            }
+            Some(finger) => {
+                self.motion.fill(0.0);
+                self.deviation.fill(0.0);
+                self.bound_finger_motion(finger);
+            }
+        }
+    }
+
+    fn bound_finger_motion(&mut self, finger: usize) {
+        let mut change = Coordinates::new();
+        for (a, b) in self.now.joints[finger].iter().zip(&self.next.joints[finger]) {
+            change.push((b - a).abs());
+        }
+        for index in self.model.fingers[finger].bodies.clone() {
+            let body = &self.model.bodies[index];
+            let Carrier::Finger { bound, .. } = &body.carrier else { unreachable!("bodies of a finger") };
+            self.deviation[index] = bound.chord_deviation(&change);
+            self.motion[index] =
+                self.now.placements[index].displacement(&self.next.placements[index], &body.center, body.radius)
+                    + self.deviation[index];
+        }
+    }
+
+    /// True when the pair stays apart during the step from `now` to `next`; its slack is then the one at `next`.
+    #[inline]
+    fn pair_is_clear(&mut self, index: usize, mode: TipMode) -> bool {
+        let pair = self.model.pairs[index];
+        let motion = self.motion[pair.a] + self.motion[pair.b];
+        let required = self.model.settings.clearance;
+        self.slack[index] -= motion;
+        if self.slack[index] > required {
+            return true;
+        }
+        let is_clear = match (pair.tip_of, mode) {
+            (Some(finger), TipMode::Near { finger: near, normal_in_world }) if finger == near => {
+                self.tip_is_clear(index, finger, Some(normal_in_world))
+            }
+            (Some(finger), TipMode::Away { finger: away, clearance }) if finger == away => {
+                self.apart(index, clearance)
+            }
+            (Some(finger), _) => self.tip_is_clear(index, finger, None),
+            (None, _) => self.apart(index, required),
+        };
+        if !is_clear {
+            self.blocking_pair = Some(index);
+        }
+        is_clear
+    }
+
+    /// Proves that the pair keeps `required` all along the step.
+    fn apart(&mut self, index: usize, required: f64) -> bool {
+        let pair = self.model.pairs[index];
+        let (a, b) = (&self.model.bodies[pair.a], &self.model.bodies[pair.b]);
+        let motion = self.motion[pair.a] + self.motion[pair.b];
+        let (at_a, at_b) = (&self.next.placements[pair.a], &self.next.placements[pair.b]);
+        let between = (at_a.point(&a.center) - at_b.point(&b.center)).norm() - a.radius - b.radius;
+        if between > required + motion {
+            self.slack[index] = between;
+            return true;
+        }
+        let required_at_ends = required + self.deviation[pair.a] + self.deviation[pair.b];
+        let hints = &mut self.hints[index];
+        let direction = self.directions[index];
+        let mut at_next = gap_along(&direction, &a.shape, at_a, &b.shape, at_b, hints);
+        if !(at_next >= required_at_ends && direction != Vector::zeros()) {
+            let mut better = direction;
+            let answer = separation(&a.shape, at_a, &b.shape, at_b, required_at_ends, ENOUGH, &mut better, hints);
+            self.directions[index] = better;
+            match answer {
+                Answer::SeparatedBy(d) => at_next = d,
+                Answer::TooNear | Answer::Unresolved => return self.trees_apart(index, required),
+            }
+        }
+        let (from_a, from_b) = (&self.now.placements[pair.a], &self.now.placements[pair.b]);
+        // What is known at `next` less all motion may be enough; else the same direction must separate at `now`.
+        if at_next - motion >= required
+            || gap_along(&self.directions[index], &a.shape, from_a, &b.shape, from_b, &mut self.hints[index])
+                >= required_at_ends
+        {
+            self.slack[index] = at_next;
+            return true;
+        }
+        self.trees_apart(index, required)
+    }
+
+    /// The last word where a hull is larger than its mesh: exact triangles, with the relative motion of the step.
+    fn trees_apart(&mut self, index: usize, required: f64) -> bool {
+        let pair = self.model.pairs[index];
+        let (mesh, other) = match (&self.model.bodies[pair.a].tree, &self.model.bodies[pair.b].tree) {
+            (_, Some(_)) => (pair.b, pair.a),
+            (Some(_), None) => (pair.a, pair.b),
+            (None, None) => return false,
+        };
+        let Some(tree) = &self.model.bodies[mesh].tree else { return false };
+        let body = &self.model.bodies[other];
+        let now = self.now.placements[mesh].inverse_then(&self.now.placements[other]);
+        let next = self.next.placements[mesh].inverse_then(&self.next.placements[other]);
+        let relative_motion =
+            now.displacement(&next, &body.center, body.radius) + self.deviation[mesh] + self.deviation[other];
+        // Whatever the moment, one of the two ends is at most half of the motion away.
+        let needed = required + 0.5 * relative_motion;
+        let mut smallest = 0.0;
+        if tree.is_apart(&body.shape, &now, needed, &mut smallest) && tree.is_apart(&body.shape, &next, needed, &mut smallest) {
+            self.slack[index] = smallest;
+            return true;
+        }
+        false
+    }
+
+    /// Proves that a tip in contact presses into the object by no more than the allowance, along the contact normal.
+    fn tip_is_clear(&mut self, index: usize, finger: usize, normal_in_world: Option<Vector>) -> bool {
+        let pair = self.model.pairs[index];
+        let (tip, object) = (&self.model.bodies[pair.a], &self.model.bodies[pair.b]);
+        self.slack[index] = f64::NEG_INFINITY;
+        let allowed = self.model.settings.contact_allowance - self.deviation[pair.a] - self.deviation[pair.b];
+        for configuration in [&self.now, &self.next] {
+            let (at_tip, at_object) = (&configuration.placements[pair.a], &configuration.placements[pair.b]);
+            let normal = normal_in_world.unwrap_or_else(|| {
+                at_object.vector(&self.contacts[finger].normal_in_object)
+            });
+            // The gap along the inward normal, from tip to object.
+            let inward = -normal;
+            let gap = gap_along(&inward, &tip.shape, at_tip, &object.shape, at_object, &mut self.hints[index]);
+            if gap >= -allowed {
+                continue;
+            }
+            let Some(tree) = &object.tree else { return false };
+            let object_from_tip = at_object.inverse_then(at_tip);
+            let normal_in_object = at_object.vector_to_child(&normal);
+            let in_tip = object_from_tip.vector_to_child(&-normal_in_object);
+            let lowest = normal_in_object.dot(&object_from_tip.translation)
+                - regrasp_geometry::collision::support::support_value(&tip.shape, &in_tip, &mut self.hints[index][0]);
+            let mut smallest = 0.0;
+            let is_apart = tree.all_near(&tip.shape, &object_from_tip, 0.0, &mut smallest, &mut |corners| {
+                let highest = corners.iter().map(|p| normal_in_object.dot(&p.coords)).fold(f64::NEG_INFINITY, f64::max);
+                lowest - highest >= -allowed
+            });
+            if !is_apart {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Lower bound of the distance over all pairs that are not contacts, now, and the pair; in metres.
+    pub fn min_clearance(&mut self, mode: TipMode) -> (f64, Option<usize>) {
+        let mut least = (f64::INFINITY, None);
+        for (index, pair) in self.model.pairs.iter().enumerate() {
+            let skip = match (pair.tip_of, mode) {
+                (Some(finger), TipMode::Away { finger: away, .. }) => finger != away,
+                (Some(_), _) => true,
+                _ => false,
+            };
+            if skip {
+                continue;
+            }
+            let (a, b) = (&self.model.bodies[pair.a], &self.model.bodies[pair.b]);
+            let (at_a, at_b) = (&self.now.placements[pair.a], &self.now.placements[pair.b]);
+            let mut direction = self.directions[index];
+            let answer = separation(
+                &a.shape, at_a, &b.shape, at_b, 1e-9, f64::INFINITY, &mut direction, &mut self.hints[index],
+            );
+            let mut distance = if let Answer::SeparatedBy(d) = answer { d } else { 0.0 };
+            if distance < self.model.settings.clearance
+                && let (Some(tree), body, at_body, at_mesh) = (&b.tree, a, at_a, at_b)
+            {
+                let mut smallest = 0.0;
+                if tree.is_apart(&body.shape, &at_mesh.inverse_then(at_body), self.model.settings.clearance, &mut smallest) {
+                    distance = distance.max(smallest);
+                }
+            }
+            if distance < least.0 {
+                least = (distance, Some(index));
+            }
+        }
+        least
+    }
+}
+
+fn place_object(model: &Model, configuration: &mut Configuration, world_from_object: &Pose) {
+    configuration.world_from_object = *world_from_object;
+    configuration.placements[model.object] =
+        Placement::from(world_from_object).then(&model.bodies[model.object].carrier_from_body);
+}
+
+fn place_finger(model: &Model, configuration: &mut Configuration, finger: usize, joints: &Coordinates) {
+    configuration.joints[finger].clone_from(joints);
+    let chain = model.fingers[finger].ik.chain();
+    let mut frames = [Placement::identity(); MAX_BODIES];
+    let n_bodies = chain.joints.len();
+    chain.forward_frames(joints, &mut frames[..n_bodies]);
+    for index in model.fingers[finger].bodies.clone() {
+        let body = &model.bodies[index];
+        let Carrier::Finger { link, .. } = body.carrier else { unreachable!("bodies of a finger") };
+        configuration.placements[index] = frames[link].then(&body.carrier_from_body);
+    }
+}
+
+/// Most moving joints of a finger.
+const MAX_BODIES: usize = 16;
+
+fn midway(model: &Model, from: &Configuration, to: &Configuration) -> Configuration {
+    let mut middle = from.clone();
+    place_object(model, &mut middle, &interpolate_pose(&from.world_from_object, &to.world_from_object, 0.5));
+    for finger in 0..model.n_fingers() {
+        let joints: Coordinates =
+            from.joints[finger].iter().zip(&to.joints[finger]).map(|(a, b)| 0.5 * (a + b)).collect();
+        place_finger(model, &mut middle, finger, &joints);
+    }
+    middle
+}
+
+/// The tip centre that touches `contact` with the object at `world_from_object`, in the world.
+#[inline]
+pub fn tip_target(world_from_object: &Placement, contact: &Contact, tip_radius: f64) -> Point {
+    world_from_object.point(&(contact.point_in_object + contact.normal_in_object.into_inner() * tip_radius))
+}

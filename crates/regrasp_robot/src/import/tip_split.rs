@@ -1,0 +1,130 @@
+//! Which collision shapes of a tip link are the tip.
+//!
+//! Only the tip may touch the object. Where the tip link is a whole phalanx, what lies behind its ball is not the tip.
+
+use crate::hand::FingerShape;
+use crate::robot::LinkId;
+use nalgebra::{Translation3, UnitQuaternion};
+use regrasp_geometry::shape::PlacedShape;
+use regrasp_geometry::{ConvexHull, Point, Pose, Shape, UnitVector};
+use std::sync::Arc;
+
+/// A shape that reaches at most this many radii from the centre belongs to the tip as a whole.
+const WHOLE_WITHIN: f64 = 2.0;
+/// A phalanx is cut this many radii behind the centre. A neck as wide as the ball then stands out of it by 0.12 radii,
+/// which nothing covers; cutting at the centre would forbid contacts on the side of the ball.
+const CUT_BEHIND: f64 = 0.5;
+
+/// The shapes of a tip link with a ball of `radius` at `center`, all in the frame of `body`, whose joint is the origin.
+///
+/// A phalanx is replaced by its part behind the ball, which is not tip, and by the ball, which is.
+pub(crate) fn split(
+    placed: Vec<PlacedShape>,
+    link: LinkId,
+    body: usize,
+    center: &Point,
+    radius: f64,
+) -> Vec<FingerShape> {
+    let whole = |placed: PlacedShape, is_tip: bool| FingerShape { body, link, placed, is_tip };
+    let Some(axis) = UnitVector::try_new(center.coords, 1e-6) else {
+        return placed.into_iter().map(|placed| whole(placed, true)).collect();
+    };
+    let mut shapes = Vec::new();
+    for placed in placed {
+        let center_in_shape = placed.parent_from_shape.inverse() * center;
+        if placed.shape.reach_from(&center_in_shape) <= WHOLE_WITHIN * radius {
+            shapes.push(whole(placed, true));
+            continue;
+        }
+        match behind(&placed, center, &axis, radius) {
+            Behind::All => shapes.push(whole(placed, false)),
+            Behind::Part(part) => shapes.push(whole(part, false)),
+            Behind::Unknown => shapes.push(whole(placed, true)),
+        }
+    }
+    if shapes.iter().all(|shape| !shape.is_tip) {
+        let parent_from_shape = Pose::from_parts(Translation3::from(center.coords), UnitQuaternion::identity());
+        shapes.push(whole(PlacedShape { parent_from_shape, shape: Shape::Sphere { radius } }, true));
+    }
+    shapes
+}
+
+/// What of a shape lies behind the cut.
+enum Behind {
+    All,
+    Part(PlacedShape),
+    /// The shape cannot be cut.
+    Unknown,
+}
+
+fn behind(placed: &PlacedShape, center: &Point, axis: &UnitVector, radius: f64) -> Behind {
+    let cut = center - axis.into_inner() * (CUT_BEHIND * radius);
+    match &placed.shape {
+        Shape::Capsule { half_length, radius } => {
+            let ends = [-half_length, *half_length].map(|z| placed.parent_from_shape * Point::new(0.0, 0.0, z));
+            shorten_capsule(ends, &cut, axis, *radius)
+        }
+        Shape::Convex(hull) => {
+            let points: Vec<Point> = hull.vertices().iter().map(|p| placed.parent_from_shape * p).collect();
+            cut_polyhedron(&points, hull.triangles(), &cut, axis)
+        }
+        Shape::Cuboid { half_extents: h } => {
+            let corner = |k: usize| {
+                let sign = |bit: usize| if k >> bit & 1 == 0 { -1.0 } else { 1.0 };
+                placed.parent_from_shape * Point::new(sign(0) * h.x, sign(1) * h.y, sign(2) * h.z)
+            };
+            let points: Vec<Point> = (0..8).map(corner).collect();
+            match ConvexHull::new(&points) {
+                Ok(hull) => cut_polyhedron(hull.vertices(), hull.triangles(), &cut, axis),
+                Err(_) => Behind::Unknown,
+            }
+        }
+        _ => Behind::Unknown,
+    }
+}
+
+/// The capsule whose core ends at the cut.
+fn shorten_capsule(ends: [Point; 2], cut: &Point, axis: &UnitVector, radius: f64) -> Behind {
+    let ahead = ends.map(|end| axis.dot(&(end - cut)));
+    let (near, far) = if ahead[0] < ahead[1] { (0, 1) } else { (1, 0) };
+    if ahead[far] <= 0.0 {
+        return Behind::All;
+    }
+    if ahead[near] >= 0.0 {
+        return Behind::Unknown;
+    }
+    let end = ends[near] + (ends[far] - ends[near]) * (ahead[near] / (ahead[near] - ahead[far]));
+    let along = end - ends[near];
+    let rotation = UnitQuaternion::rotation_between(&nalgebra::Vector3::z(), &along)
+        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&nalgebra::Vector3::x_axis(), std::f64::consts::PI));
+    let middle = nalgebra::center(&end, &ends[near]);
+    let shape = Shape::Capsule { half_length: 0.5 * along.norm(), radius };
+    Behind::Part(PlacedShape {
+        parent_from_shape: Pose::from_parts(Translation3::from(middle.coords), rotation),
+        shape,
+    })
+}
+
+/// The hull of the points behind the cut and of the edges' crossings with it.
+fn cut_polyhedron(points: &[Point], triangles: &[[u32; 3]], cut: &Point, axis: &UnitVector) -> Behind {
+    let ahead: Vec<f64> = points.iter().map(|p| axis.dot(&(p - cut))).collect();
+    if ahead.iter().all(|&a| a <= 0.0) {
+        return Behind::All;
+    }
+    let mut kept: Vec<Point> = points.iter().zip(&ahead).filter(|(_, a)| **a <= 0.0).map(|(p, _)| *p).collect();
+    for corners in triangles {
+        for k in 0..3 {
+            let (i, j) = (corners[k] as usize, corners[(k + 1) % 3] as usize);
+            if ahead[i] < 0.0 && ahead[j] > 0.0 {
+                kept.push(points[i] + (points[j] - points[i]) * (ahead[i] / (ahead[i] - ahead[j])));
+            }
+        }
+    }
+    match ConvexHull::new(&kept) {
+        Ok(hull) => {
+            let shape = Shape::Convex(Arc::new(hull));
+            Behind::Part(PlacedShape { parent_from_shape: Pose::identity(), shape })
+        }
+        Err(_) => Behind::Unknown,
+    }
+}

@@ -1,0 +1,109 @@
+//! A hand as the text of a `hand.toml`.
+
+use crate::hand::{Finger, Hand, TipShape};
+use crate::import::hand_file::{FORMAT, VERSION};
+use crate::robot::LinkId;
+use regrasp_geometry::Point;
+use std::collections::BTreeSet;
+use std::fmt::Write;
+
+/// The text of a hand file that gives `hand` when it is loaded.
+///
+/// `urdf` is how the file names the URDF: a path relative to the hand file. `allow` are pairs of links to be excused
+/// beyond the adjacent ones, such as those of [`super::PairTable::always`].
+pub fn hand_file_text(hand: &Hand, urdf: &str, allow: &BTreeSet<(LinkId, LinkId)>) -> String {
+    let robot = &hand.robot;
+    let name = |link: LinkId| quoted(&robot.links[link.0].name);
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    let _ = writeln!(
+        text,
+        "# Hand \"{}\": written by `regrasp inspect`; edit freely. Metres and radians.",
+        comment(&robot.name)
+    );
+    let _ = writeln!(text, "format = {}\nversion = {VERSION}\nurdf = {}", quoted(FORMAT), quoted(urdf));
+    let _ = writeln!(text, "base_link = {}", name(hand.base));
+    if !allow.is_empty() {
+        let _ = writeln!(
+            text,
+            "\n# Pairs of links that are never tested against each other, beside adjacent ones.\nallow = ["
+        );
+        for &(a, b) in allow {
+            let _ = writeln!(text, "    [{}, {}],", name(a), name(b));
+        }
+        let _ = writeln!(text, "]");
+    }
+    for finger in &hand.fingers {
+        let _ = writeln!(text, "\n[[fingers]]\nname = {}\ntip_link = {}", quoted(&finger.name), name(finger.tip.link));
+        if let Some(first) = first_joint_if_needed(hand, finger) {
+            let _ = writeln!(text, "first_joint = {}", quoted(&first));
+        }
+        let _ = writeln!(text, "# In the frame of the tip link.\ntip = {}", tip_text(hand, finger));
+        let rest: Vec<String> = (0..finger.rest.len())
+            .map(|k| {
+                let rounded = (finger.rest[k] * 1e4).round() / 1e4 + 0.0;
+                let inside = rounded >= finger.chain.lower[k] && rounded <= finger.chain.upper[k];
+                let value = if inside { rounded } else { finger.rest[k] };
+                format!("{} = {}", quoted(&finger.chain.names[k]), number(value))
+            })
+            .collect();
+        let _ = writeln!(text, "rest = {{ {} }}", rest.join(", "));
+    }
+    text
+}
+
+fn tip_text(hand: &Hand, finger: &Finger) -> String {
+    let body_from_link = hand.robot.fixed_pose_in_body(finger.tip.link);
+    let [x, y, z] = (body_from_link.inverse() * finger.tip.center_in_body).coords.into();
+    // A micrometre: finer than any hand is made.
+    let point = Point::new(x, y, z).map(|c| (c * 1e6).round() / 1e6 + 0.0);
+    let point = format!("[{}, {}, {}]", number(point.x), number(point.y), number(point.z));
+    match &finger.tip.shape {
+        TipShape::Sphere { radius } => {
+            format!("{{ shape = \"sphere\", radius = {}, center = {point} }}", number(*radius))
+        }
+        TipShape::Point => format!("{{ shape = \"point\", position = {point} }}"),
+        TipShape::Hull(_) => format!("{{ shape = \"mesh\", center = {point} }}"),
+    }
+}
+
+/// The first joint of the chain, where moving joints between it and the base belong to no finger.
+fn first_joint_if_needed(hand: &Hand, finger: &Finger) -> Option<String> {
+    let robot = &hand.robot;
+    let above = robot.joints_to(hand.base).len();
+    let moving: Vec<_> = robot
+        .joints_to(finger.tip.link)
+        .into_iter()
+        .skip(above)
+        .filter(|joint| robot.joints[joint.0].kind != crate::robot::JointKind::Fixed)
+        .collect();
+    let held = moving.len().checked_sub(finger.chain.joints.len())?;
+    (held > 0).then(|| moving.get(held).map(|joint| robot.joints[joint.0].name.clone())).flatten()
+}
+
+/// A number that TOML reads as a float.
+fn number(value: f64) -> String {
+    format!("{value:?}")
+}
+
+/// A TOML string.
+fn quoted(text: &str) -> String {
+    let mut quoted = String::from("\"");
+    for c in text.chars() {
+        match c {
+            '"' => quoted.push_str("\\\""),
+            '\\' => quoted.push_str("\\\\"),
+            c if c.is_control() => {
+                let _ = write!(quoted, "\\u{:04X}", u32::from(c));
+            }
+            c => quoted.push(c),
+        }
+    }
+    quoted.push('"');
+    quoted
+}
+
+/// `text` on one line.
+fn comment(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}

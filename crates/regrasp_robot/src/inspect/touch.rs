@@ -1,0 +1,127 @@
+//! Which links of a hand touch each other, in one posture and over many.
+
+use crate::hand::Hand;
+use crate::robot::LinkId;
+use regrasp_base::Rng;
+use regrasp_geometry::collision::{Answer, Placement, separation};
+use regrasp_geometry::shape::PlacedShape;
+use regrasp_geometry::{Point, Pose, Vector};
+use std::collections::BTreeSet;
+use std::f64::consts::PI;
+
+/// Pairs of links of a hand that are tested against each other, with everything needed to test them.
+pub(crate) struct Touch<'h> {
+    hand: &'h Hand,
+    shapes: Vec<BodyShape<'h>>,
+    /// The pairs, smaller link first.
+    pub pairs: Vec<(LinkId, LinkId)>,
+    /// Per pair, the pairs of shapes.
+    shape_pairs: Vec<Vec<(usize, usize)>>,
+}
+
+struct BodyShape<'h> {
+    link: LinkId,
+    /// Finger and body; none for the palm.
+    body: Option<(usize, usize)>,
+    placed: &'h PlacedShape,
+    center: Point,
+    radius: f64,
+}
+
+impl<'h> Touch<'h> {
+    /// All pairs of links of different bodies that are not allowed to touch.
+    pub fn new(hand: &'h Hand) -> Self {
+        let mut shapes: Vec<BodyShape> = Vec::new();
+        let mut add = |link, body, placed: &'h PlacedShape| {
+            let (center, radius) = placed.shape.bounding_sphere();
+            shapes.push(BodyShape { link, body, placed, center, radius });
+        };
+        for shape in &hand.palm {
+            add(shape.link, None, &shape.placed);
+        }
+        for (f, finger) in hand.fingers.iter().enumerate() {
+            for shape in &finger.shapes {
+                add(shape.link, Some((f, shape.body)), &shape.placed);
+            }
+        }
+        let mut pairs = BTreeSet::new();
+        for (i, a) in shapes.iter().enumerate() {
+            for b in &shapes[..i] {
+                if a.body != b.body && !hand.may_touch(a.link, b.link) {
+                    pairs.insert((a.link.min(b.link), a.link.max(b.link)));
+                }
+            }
+        }
+        let pairs: Vec<(LinkId, LinkId)> = pairs.into_iter().collect();
+        let shape_pairs = pairs
+            .iter()
+            .map(|&(a, b)| {
+                let of_link = |link: LinkId| {
+                    let all = shapes.iter().enumerate();
+                    all.filter(move |(_, shape)| shape.link == link).map(|(i, _)| i)
+                };
+                of_link(a).flat_map(|i| of_link(b).map(move |j| (i, j))).collect()
+            })
+            .collect();
+        Touch { hand, shapes, pairs, shape_pairs }
+    }
+
+    /// Per pair, whether it touches (or cannot be proved apart) in `posture`: one joint vector per finger.
+    pub fn touching(&self, posture: &[Vec<f64>]) -> Vec<bool> {
+        let bodies: Vec<Vec<Pose>> = self
+            .hand
+            .fingers
+            .iter()
+            .zip(posture)
+            .map(|(finger, coordinates)| {
+                let mut poses = Vec::new();
+                finger.chain.forward(coordinates, &mut poses);
+                poses
+            })
+            .collect();
+        let placements: Vec<(Placement, Point)> = self
+            .shapes
+            .iter()
+            .map(|shape| {
+                let pose = match shape.body {
+                    None => shape.placed.parent_from_shape,
+                    Some((finger, body)) => bodies[finger][body] * shape.placed.parent_from_shape,
+                };
+                let rotation = pose.rotation.to_rotation_matrix().into_inner();
+                (Placement { rotation, translation: pose.translation.vector }, pose * shape.center)
+            })
+            .collect();
+        let touches = |&(i, j): &(usize, usize)| {
+            let (a, b) = (&self.shapes[i], &self.shapes[j]);
+            if (placements[i].1 - placements[j].1).norm() > a.radius + b.radius {
+                return false;
+            }
+            let (mut direction, mut hints) = (Vector::zeros(), [0, 0]);
+            let (shape_a, shape_b) = (&a.placed.shape, &b.placed.shape);
+            let (at_a, at_b) = (&placements[i].0, &placements[j].0);
+            let answer = separation(shape_a, at_a, shape_b, at_b, 0.0, 0.0, &mut direction, &mut hints);
+            !matches!(answer, Answer::SeparatedBy(_))
+        };
+        self.shape_pairs.iter().map(|pairs| pairs.iter().any(touches)).collect()
+    }
+
+    /// Per pair, in how many of `n_postures` postures, uniform in the limits, it touches.
+    pub fn count(&self, n_postures: usize, rng: &mut Rng) -> Vec<usize> {
+        let mut counts = vec![0; self.pairs.len()];
+        for _ in 0..n_postures {
+            let posture: Vec<Vec<f64>> = self
+                .hand
+                .fingers
+                .iter()
+                .map(|finger| {
+                    let ends = finger.chain.lower.iter().zip(&finger.chain.upper);
+                    ends.map(|(low, high)| rng.uniform(low.max(-PI), high.min(PI))).collect()
+                })
+                .collect();
+            for (count, touches) in counts.iter_mut().zip(self.touching(&posture)) {
+                *count += usize::from(touches);
+            }
+        }
+        counts
+    }
+}

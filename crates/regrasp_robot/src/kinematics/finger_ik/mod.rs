@@ -1,0 +1,181 @@
+//! Finger inverse kinematics to a point: joints that bring the tip's centre to a target (paper 000, section 3.1).
+//!
+//! Chains of three independent turning joints have a closed form with all branches; every other chain is solved by
+//! damped Newton steps from a table of seeds.
+
+/// Damped Newton steps from a table of seeds, with a preferred direction of the last body in the null space.
+mod numeric;
+/// Real roots of polynomials of degree four and less.
+mod quartic;
+/// Closed form for chains of three turning joints.
+mod three_r;
+
+use super::chain::Chain;
+use arrayvec::ArrayVec;
+use numeric::NumericIk;
+use regrasp_base::Rng;
+use regrasp_geometry::{Point, UnitVector};
+use three_r::ThreeR;
+
+/// Most coordinates that a finger may have.
+pub const MAX_COORDINATES: usize = 12;
+
+/// Values of a finger's coordinates, in radians or metres.
+pub type Coordinates = ArrayVec<f64, MAX_COORDINATES>;
+
+/// Distance of the tip's centre from the target, in metres, that a solution never exceeds.
+pub const POSITION_TOLERANCE: f64 = 1e-8;
+
+/// Where the last body should point, for chains that can choose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Preference {
+    /// Wanted direction, in the base frame, of the line from the last joint to the tip's centre. For a contact: the
+    /// inward normal of the object there, so that the distal link stays on the outer side.
+    pub tip_axis_in_base: UnitVector,
+    /// Share of the full correction made in each step, `0..=1`.
+    pub weight: f64,
+}
+
+/// What is asked of a solution besides reaching the target.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct IkSettings {
+    /// Distance kept from the limits, in the coordinate's unit.
+    pub limit_margin: f64,
+    /// Where the last body should point; only chains with more than three coordinates can follow.
+    pub preference: Option<Preference>,
+    /// Largest change of a coordinate that still counts as the same branch, in the coordinate's unit; for
+    /// [`FingerIk::solve_near`] and [`FingerIk::track`]. Default 0.4 (real-hands-notes.md, section 5).
+    pub max_step: f64,
+}
+
+impl Default for IkSettings {
+    fn default() -> Self {
+        IkSettings { limit_margin: 0.0, preference: None, max_step: 0.4 }
+    }
+}
+
+/// Inverse kinematics of one finger, prepared.
+#[derive(Debug, Clone)]
+pub struct FingerIk {
+    chain: Chain,
+    center_in_body: Point,
+    method: Method,
+}
+
+#[derive(Debug, Clone)]
+enum Method {
+    ClosedForm(Box<ThreeR>),
+    Numeric(Box<NumericIk>),
+}
+
+impl FingerIk {
+    /// Prepares the inverse kinematics of `center_in_body`, a point of the chain's last body.
+    ///
+    /// Panics if the chain has more than [`MAX_COORDINATES`] coordinates.
+    pub fn new(chain: &Chain, center_in_body: &Point) -> Self {
+        assert!(chain.n_coordinates() <= MAX_COORDINATES, "a finger of more than {MAX_COORDINATES} coordinates");
+        let method = match ThreeR::new(chain, center_in_body) {
+            Some(closed_form) => Method::ClosedForm(Box::new(closed_form)),
+            None => Method::Numeric(Box::new(NumericIk::new(chain, center_in_body))),
+        };
+        FingerIk { chain: chain.clone(), center_in_body: *center_in_body, method }
+    }
+
+    /// The chain solved.
+    pub fn chain(&self) -> &Chain {
+        &self.chain
+    }
+
+    /// True for chains solved in closed form: [`FingerIk::solve_all`] then misses no branch.
+    pub fn is_closed_form(&self) -> bool {
+        matches!(self.method, Method::ClosedForm(_))
+    }
+
+    /// True when a target leaves freedom: more than three coordinates.
+    pub fn is_redundant(&self) -> bool {
+        self.chain.n_coordinates() > 3
+    }
+
+    /// All solutions within the limits, appended to `solutions`. In closed form every branch, in a fixed order; for
+    /// other chains what a search from all seeds finds, best first (one per self-motion branch at most roughly).
+    pub fn solve_all(&self, target_in_base: &Point, settings: &IkSettings, solutions: &mut Vec<Coordinates>) {
+        match &self.method {
+            Method::ClosedForm(ik) => {
+                solutions.extend(ik.solve_all(&self.chain, target_in_base, settings.limit_margin))
+            }
+            Method::Numeric(ik) => ik.solve_all(target_in_base, settings, solutions),
+        }
+    }
+
+    /// One solution, at random among the branches; none when no branch was found.
+    pub fn solve_random(&self, target_in_base: &Point, settings: &IkSettings, rng: &mut Rng) -> Option<Coordinates> {
+        match &self.method {
+            Method::ClosedForm(ik) => {
+                let branches = ik.solve_all(&self.chain, target_in_base, settings.limit_margin);
+                match branches.len() {
+                    0 => None,
+                    1 => branches.into_iter().next(),
+                    n_branches => branches.into_iter().nth(rng.below(n_branches)),
+                }
+            }
+            Method::Numeric(ik) => ik.solve_random(target_in_base, settings, rng),
+        }
+    }
+
+    /// Up to `n_wanted` different solutions at random, appended to `solutions`: branches, and for redundant chains
+    /// also different values along the null space.
+    pub fn solve_many(
+        &self,
+        target_in_base: &Point,
+        n_wanted: usize,
+        settings: &IkSettings,
+        rng: &mut Rng,
+        solutions: &mut Vec<Coordinates>,
+    ) {
+        match &self.method {
+            Method::ClosedForm(ik) => {
+                let mut branches = ik.solve_all(&self.chain, target_in_base, settings.limit_margin);
+                rng.shuffle(&mut branches);
+                solutions.extend(branches.into_iter().take(n_wanted));
+            }
+            Method::Numeric(ik) => ik.solve_many(target_in_base, n_wanted, settings, rng, solutions),
+        }
+    }
+
+    /// The solution continuous with `seed`: same branch, no coordinate moved by more than `settings.max_step`.
+    ///
+    /// None when there is no such solution, and near a singularity where it can't be told from its neighbour.
+    pub fn solve_near(&self, target_in_base: &Point, seed: &[f64], settings: &IkSettings) -> Option<Coordinates> {
+        match &self.method {
+            Method::ClosedForm(ik) => ik.solve_near(&self.chain, target_in_base, seed, settings),
+            Method::Numeric(ik) => ik.solve_near(target_in_base, seed, settings),
+        }
+    }
+
+    /// Follows `targets` from `start` with [`FingerIk::solve_near`], appending one solution per target.
+    ///
+    /// Errors: index of the first target that can't be reached on the branch; the solutions before it are kept.
+    pub fn track(
+        &self,
+        start: &[f64],
+        targets_in_base: &[Point],
+        settings: &IkSettings,
+        solutions: &mut Vec<Coordinates>,
+    ) -> Result<(), usize> {
+        let mut current: Coordinates = start.iter().copied().collect();
+        for (i, target) in targets_in_base.iter().enumerate() {
+            current = self.solve_near(target, &current, settings).ok_or(i)?;
+            solutions.push(current.clone());
+        }
+        Ok(())
+    }
+
+    /// The tip's centre at `coordinates`, in the base frame.
+    #[inline]
+    pub fn tip(&self, coordinates: &[f64]) -> Point {
+        self.chain.last_frame(coordinates).transform_point(&self.center_in_body)
+    }
+}
+
+#[cfg(test)]
+mod tests;

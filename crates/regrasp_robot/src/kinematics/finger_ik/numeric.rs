@@ -1,0 +1,408 @@
+//! Damped Newton steps from a table of seeds, with a preferred direction of the last body in the null space.
+//!
+//! Levenberg-Marquardt with the damping tied to the squared error (Fan, Yuan 2005), which keeps the quadratic
+//! convergence; coordinates that would leave their limits are set on them and taken out of the step. The null-space
+//! term is Liegeois' gradient projection (1977) with the Gauss-Newton length.
+
+use super::{Coordinates, IkSettings, MAX_COORDINATES, POSITION_TOLERANCE, Preference};
+use crate::kinematics::body_frame::BodyFrame;
+use crate::kinematics::chain::{Chain, Motion};
+use arrayvec::ArrayVec;
+use nalgebra::Matrix3;
+use regrasp_base::Rng;
+use regrasp_geometry::{Point, Vector};
+
+/// Seeds in the table.
+const N_SEEDS: usize = 192;
+/// Seeds tried for one solution before giving up.
+const N_TRIES: usize = 6;
+/// Newton steps from one seed.
+const MAX_STEPS: usize = 16;
+/// Newton steps of a warm start.
+const MAX_WARM_STEPS: usize = 8;
+/// First steps of each solution that also follow the preference, from a seed and from a warm start.
+const PREFERENCE_STEPS: [usize; 2] = [5, 1];
+/// Residual at which the iteration stops, in metres; the step before it was already below its square root.
+const CONVERGED: f64 = 1e-10;
+/// Longest change of a coordinate in one step, in radians or metres.
+const LONGEST_STEP: f64 = 0.6;
+/// Solutions closer than this in every coordinate are one; for redundant chains, and for others.
+const SAME: [f64; 2] = [0.05, 1e-5];
+
+/// A configuration tried first for targets near its tip.
+#[derive(Debug, Clone)]
+struct Seed {
+    tip: Vector,
+    tip_axis: Vector,
+    coordinates: Coordinates,
+}
+
+/// The tip and how it moves with each coordinate.
+struct State {
+    tip: Vector,
+    tip_axis: Vector,
+    /// Derivative of the tip by each coordinate.
+    slides: [Vector; MAX_COORDINATES],
+    /// Rotation of the last body by each coordinate.
+    spins: [Vector; MAX_COORDINATES],
+}
+
+/// Numeric inverse kinematics of one chain, prepared.
+#[derive(Debug, Clone)]
+pub struct NumericIk {
+    chain: Chain,
+    center_in_body: Point,
+    tip_axis_in_body: Vector,
+    /// Length that a deviation of one radian from the preferred direction counts for when seeds are chosen.
+    length: f64,
+    seeds: Vec<Seed>,
+}
+
+/// What one solution may use.
+struct Effort {
+    max_steps: usize,
+    preference_steps: usize,
+}
+
+impl NumericIk {
+    /// Prepares the seed table.
+    pub fn new(chain: &Chain, center_in_body: &Point) -> Self {
+        let tip_axis_in_body = center_in_body.coords.try_normalize(0.0).unwrap_or_else(Vector::z);
+        let length = center_in_body.coords.norm();
+        let mut ik = NumericIk {
+            chain: chain.clone(),
+            center_in_body: *center_in_body,
+            tip_axis_in_body,
+            length,
+            seeds: vec![],
+        };
+        for i in 0..N_SEEDS {
+            let coordinates: Coordinates = (0..chain.n_coordinates())
+                .map(|k| {
+                    let (lower, upper) = search_range(chain.lower[k], chain.upper[k]);
+                    lower + (upper - lower) * halton(i + 1, k)
+                })
+                .collect();
+            let state = ik.state(&coordinates);
+            ik.seeds.push(Seed { tip: state.tip, tip_axis: state.tip_axis, coordinates });
+        }
+        ik
+    }
+
+    /// Different solutions from all seeds, nearest seed first.
+    pub fn solve_all(&self, target: &Point, settings: &IkSettings, solutions: &mut Vec<Coordinates>) {
+        let first = solutions.len();
+        for seed in self.nearest_seeds::<N_SEEDS>(target, settings.preference.as_ref(), N_SEEDS) {
+            if let Some(found) = self.from_seed(target, seed, settings.preference.as_ref(), settings) {
+                self.push_new(found, first, solutions);
+            }
+        }
+    }
+
+    /// A solution from one of the nearest seeds, in random order.
+    pub fn solve_random(&self, target: &Point, settings: &IkSettings, rng: &mut Rng) -> Option<Coordinates> {
+        let preference = settings.preference.as_ref();
+        let mut nearest = self.nearest_seeds::<N_TRIES>(target, preference, N_TRIES);
+        // Only the better half competes for the first try: the far seeds are there for hard targets.
+        let half = nearest.len().div_ceil(2);
+        rng.shuffle(&mut nearest[..half]);
+        let found = nearest.into_iter().find_map(|seed| self.from_seed(target, seed, preference, settings));
+        if found.is_some() || preference.is_none() {
+            return found;
+        }
+        // The preference chose seeds too far from the target: reaching it comes first.
+        let nearest = self.nearest_seeds::<N_TRIES>(target, None, N_TRIES);
+        nearest.into_iter().find_map(|seed| self.from_seed(target, seed, None, settings))
+    }
+
+    /// Different solutions: the first follows the preference, the others are where random seeds led.
+    pub fn solve_many(
+        &self,
+        target: &Point,
+        n_wanted: usize,
+        settings: &IkSettings,
+        rng: &mut Rng,
+        solutions: &mut Vec<Coordinates>,
+    ) {
+        let first = solutions.len();
+        let mut preference = settings.preference.as_ref();
+        let mut nearest = self.nearest_seeds::<32>(target, preference, (4 * n_wanted).clamp(N_TRIES, 32));
+        let half = nearest.len().div_ceil(2);
+        rng.shuffle(&mut nearest[1..half]);
+        for seed in nearest {
+            if solutions.len() - first >= n_wanted {
+                break;
+            }
+            if let Some(found) = self.from_seed(target, seed, preference, settings) {
+                self.push_new(found, first, solutions);
+                preference = None;
+            }
+        }
+    }
+
+    /// The solution that Newton steps reach from `seed`, if no coordinate moves further than allowed.
+    pub fn solve_near(&self, target: &Point, seed: &[f64], settings: &IkSettings) -> Option<Coordinates> {
+        let effort = Effort { max_steps: MAX_WARM_STEPS, preference_steps: PREFERENCE_STEPS[1] };
+        let found = self.refine(target, seed, settings.preference.as_ref(), settings, &effort)?;
+        if found.iter().zip(seed).any(|(a, b)| (a - b).abs() > settings.max_step) {
+            return None;
+        }
+        // Without redundancy the branches are separated by the sign of the Jacobian's determinant.
+        if found.len() == 3 {
+            let determinant = |state: State| Matrix3::from_columns(&state.slides[..3]).determinant();
+            if determinant(self.state(&found)) * determinant(self.state(seed)) <= 0.0 {
+                return None;
+            }
+        }
+        Some(found)
+    }
+
+    fn from_seed(
+        &self,
+        target: &Point,
+        seed: usize,
+        preference: Option<&Preference>,
+        settings: &IkSettings,
+    ) -> Option<Coordinates> {
+        let effort = Effort { max_steps: MAX_STEPS, preference_steps: PREFERENCE_STEPS[0] };
+        self.refine(target, &self.seeds[seed].coordinates, preference, settings, &effort)
+    }
+
+    fn push_new(&self, found: Coordinates, first: usize, solutions: &mut Vec<Coordinates>) {
+        let same = if self.chain.n_coordinates() > 3 { SAME[0] } else { SAME[1] };
+        let known = solutions[first..].iter().any(|other| other.iter().zip(&found).all(|(a, b)| (a - b).abs() < same));
+        if !known {
+            solutions.push(found);
+        }
+    }
+
+    /// Indices of the `n` seeds nearest to the target, nearest first.
+    fn nearest_seeds<const N: usize>(
+        &self,
+        target: &Point,
+        preference: Option<&Preference>,
+        n: usize,
+    ) -> ArrayVec<usize, N> {
+        let mut nearest: ArrayVec<(f64, usize), N> = ArrayVec::new();
+        let n = n.min(N);
+        for (i, seed) in self.seeds.iter().enumerate() {
+            let mut score = (seed.tip - target.coords).norm_squared();
+            if let Some(wish) = preference {
+                score += self.length * self.length * wish.weight * (1.0 - seed.tip_axis.dot(&wish.tip_axis_in_base));
+            }
+            if nearest.len() == n {
+                if nearest.last().is_none_or(|last| score >= last.0) {
+                    continue;
+                }
+                nearest.pop();
+            }
+            let place = nearest.partition_point(|other| other.0 <= score);
+            nearest.insert(place, (score, i));
+        }
+        nearest.into_iter().map(|(_, i)| i).collect()
+    }
+
+    fn state(&self, coordinates: &[f64]) -> State {
+        let mut frames = [BodyFrame::IDENTITY; 2 * MAX_COORDINATES];
+        let n_joints = self.chain.joints.len();
+        let mut spilled;
+        let frames = if n_joints <= frames.len() {
+            &mut frames[..n_joints]
+        } else {
+            spilled = vec![BodyFrame::IDENTITY; n_joints];
+            &mut spilled[..]
+        };
+        self.chain.forward_frames(coordinates, frames);
+        let last = frames.last().copied().unwrap_or(BodyFrame::IDENTITY);
+        let tip = last.transform_point(&self.center_in_body).coords;
+        let mut state = State {
+            tip,
+            tip_axis: last.transform_vector(&self.tip_axis_in_body),
+            slides: [Vector::zeros(); MAX_COORDINATES],
+            spins: [Vector::zeros(); MAX_COORDINATES],
+        };
+        for (joint, frame) in self.chain.joints.iter().zip(frames.iter()) {
+            let axis = frame.transform_vector(&joint.axis) * joint.multiplier;
+            match joint.motion {
+                Motion::Turn => {
+                    state.slides[joint.coordinate] += axis.cross(&(tip - frame.translation));
+                    state.spins[joint.coordinate] += axis;
+                }
+                Motion::Slide => state.slides[joint.coordinate] += axis,
+            }
+        }
+        state
+    }
+
+    /// Newton steps from `start` until the tip is on the target.
+    fn refine(
+        &self,
+        target: &Point,
+        start: &[f64],
+        preference: Option<&Preference>,
+        settings: &IkSettings,
+        effort: &Effort,
+    ) -> Option<Coordinates> {
+        let n = self.chain.n_coordinates();
+        let mut lower = [0.0; MAX_COORDINATES];
+        let mut upper = [0.0; MAX_COORDINATES];
+        let mut coordinates = Coordinates::new();
+        for k in 0..n {
+            lower[k] = self.chain.lower[k] + settings.limit_margin;
+            upper[k] = self.chain.upper[k] - settings.limit_margin;
+            if lower[k] > upper[k] {
+                return None;
+            }
+            coordinates.push(start[k].clamp(lower[k], upper[k]));
+        }
+        for i in 0..=effort.max_steps {
+            let state = self.state(&coordinates);
+            let error = target.coords - state.tip;
+            let wish = preference.filter(|_| n > 3 && i < effort.preference_steps);
+            if wish.is_none() && error.norm_squared() < CONVERGED * CONVERGED {
+                return Some(coordinates);
+            }
+            if i == effort.max_steps {
+                return (error.norm_squared() < POSITION_TOLERANCE * POSITION_TOLERANCE).then_some(coordinates);
+            }
+            let step = bounded_step(&state, &error, wish, &coordinates, &lower[..n], &upper[..n])?;
+            for k in 0..n {
+                coordinates[k] = (coordinates[k] + step[k]).clamp(lower[k], upper[k]);
+            }
+        }
+        None
+    }
+}
+
+/// The step to the target, with coordinates that would leave their limits set on them.
+fn bounded_step(
+    state: &State,
+    error: &Vector,
+    preference: Option<&Preference>,
+    coordinates: &[f64],
+    lower: &[f64],
+    upper: &[f64],
+) -> Option<[f64; MAX_COORDINATES]> {
+    let n = coordinates.len();
+    let mut step = [0.0; MAX_COORDINATES];
+    let mut free = [true; MAX_COORDINATES];
+    let mut left = *error;
+    loop {
+        free_step(state, &left, preference, &free[..n], &mut step)?;
+        let mut worst = None;
+        let mut worst_excess = 0.0;
+        for k in (0..n).filter(|&k| free[k]) {
+            let moved = coordinates[k] + step[k];
+            let excess = (lower[k] - moved).max(moved - upper[k]);
+            if excess > worst_excess {
+                (worst, worst_excess) = (Some(k), excess);
+            }
+        }
+        let Some(k) = worst else { return Some(step) };
+        free[k] = false;
+        step[k] = (coordinates[k] + step[k]).clamp(lower[k], upper[k]) - coordinates[k];
+        left -= state.slides[k] * step[k];
+    }
+}
+
+/// Damped least-squares step of the free coordinates, with the preference in their null space.
+fn free_step(
+    state: &State,
+    error: &Vector,
+    preference: Option<&Preference>,
+    free: &[bool],
+    step: &mut [f64; MAX_COORDINATES],
+) -> Option<()> {
+    let slides = &state.slides;
+    let n = free.len();
+    let (mut xx, mut xy, mut xz, mut yy, mut yz, mut zz) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    for k in (0..n).filter(|&k| free[k]) {
+        let s = &slides[k];
+        xx += s.x * s.x;
+        xy += s.x * s.y;
+        xz += s.x * s.z;
+        yy += s.y * s.y;
+        yz += s.y * s.z;
+        zz += s.z * s.z;
+    }
+    let damping = 0.01 * error.norm_squared() + 1e-10 * (xx + yy + zz);
+    let (xx, yy, zz) = (xx + damping, yy + damping, zz + damping);
+    let (c_xx, c_xy, c_xz) = (yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy);
+    let determinant = xx * c_xx + xy * c_xy + xz * c_xz;
+    if determinant <= 0.0 {
+        return None;
+    }
+    let (c_yy, c_yz, c_zz) = (xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy);
+    let solve = |e: &Vector| {
+        Vector::new(
+            c_xx * e.x + c_xy * e.y + c_xz * e.z,
+            c_xy * e.x + c_yy * e.y + c_yz * e.z,
+            c_xz * e.x + c_yz * e.y + c_zz * e.z,
+        ) / determinant
+    };
+    let pull = solve(error);
+    let mut longest: f64 = 0.0;
+    for k in (0..n).filter(|&k| free[k]) {
+        step[k] = slides[k].dot(&pull);
+        longest = longest.max(step[k].abs());
+    }
+    if longest > LONGEST_STEP {
+        for k in (0..n).filter(|&k| free[k]) {
+            step[k] *= LONGEST_STEP / longest;
+        }
+    }
+    if let Some(wish) = preference {
+        let turn = state.tip_axis.cross(&wish.tip_axis_in_base);
+        let mut gradient = [0.0; MAX_COORDINATES];
+        let mut moved = Vector::zeros();
+        for k in (0..n).filter(|&k| free[k]) {
+            gradient[k] = state.spins[k].dot(&turn);
+            moved += slides[k] * gradient[k];
+        }
+        let back = solve(&moved);
+        let mut spin = Vector::zeros();
+        let mut gain = 0.0;
+        for k in (0..n).filter(|&k| free[k]) {
+            let projected = gradient[k] - slides[k].dot(&back);
+            gain += gradient[k] * projected;
+            gradient[k] = projected;
+            spin += state.spins[k] * projected;
+        }
+        let curvature = spin.cross(&state.tip_axis).norm_squared();
+        if curvature > 1e-12 && gain > 0.0 {
+            let mut length = wish.weight * gain / curvature;
+            let longest = (0..n).filter(|&k| free[k]).map(|k| gradient[k].abs()).fold(0.0, f64::max) * length;
+            if longest > LONGEST_STEP {
+                length *= LONGEST_STEP / longest;
+            }
+            for k in (0..n).filter(|&k| free[k]) {
+                step[k] += length * gradient[k];
+            }
+        }
+    }
+    Some(())
+}
+
+/// The limits, or one turn where there are none.
+fn search_range(lower: f64, upper: f64) -> (f64, f64) {
+    use std::f64::consts::PI;
+    match (lower.is_finite(), upper.is_finite()) {
+        (true, true) => (lower, upper),
+        (true, false) => (lower, lower + 2.0 * PI),
+        (false, true) => (upper - 2.0 * PI, upper),
+        (false, false) => (-PI, PI),
+    }
+}
+
+/// Element `i` of the van der Corput sequence in the `k`-th prime base (Halton 1960).
+fn halton(i: usize, k: usize) -> f64 {
+    const PRIMES: [usize; MAX_COORDINATES] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37];
+    let base = PRIMES[k];
+    let (mut rest, mut value, mut place) = (i, 0.0, 1.0);
+    while rest > 0 {
+        place /= base as f64;
+        value += place * (rest % base) as f64;
+        rest /= base;
+    }
+    value
+}

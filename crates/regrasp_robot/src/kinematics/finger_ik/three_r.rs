@@ -1,0 +1,427 @@
+//! Closed form for chains of three turning joints, general geometry.
+//!
+//! Pieper 1968 (Craig, Introduction to Robotics, section 4.6): height along axis 1 and distance from it don't depend
+//! on joint 1. Written about axis 2 they are two equations, linear in the rotated arm, whose right sides are linear in
+//! the sine and cosine of joint 3. When axes 1 and 2 meet, or are parallel, one of them is free of joint 2 and gives
+//! joint 3 at once (the usual finger); else squaring gives a quartic.
+
+use super::quartic::roots_in_unit;
+use super::{Coordinates, IkSettings, POSITION_TOLERANCE};
+use crate::kinematics::body_frame::BodyFrame;
+use crate::kinematics::chain::{Chain, Motion};
+use arrayvec::ArrayVec;
+use nalgebra::Matrix3;
+use regrasp_geometry::{Point, Vector};
+use std::f64::consts::TAU;
+
+/// Axes closer to meeting (share of the arm's length) or to parallel (sine) than this are treated as such; the
+/// substitution at the end repairs the difference.
+const DEGENERATE: f64 = 1e-7;
+/// Solutions closer than this in every coordinate are one, in radians.
+const SAME: f64 = 1e-6;
+/// Rounding must not lose a solution that sits on its limit; in radians.
+const LIMIT_ROUNDING: f64 = 1e-9;
+/// Residual below which no Newton step is taken, in metres.
+const POLISHED: f64 = 1e-12;
+
+/// All branches: a 3R chain reaches a point in at most four ways.
+pub type Branches = ArrayVec<Coordinates, 8>;
+
+/// `constant + cosine * cos(q3) + sine * sin(q3)`.
+#[derive(Debug, Clone, Copy)]
+struct Wave {
+    constant: f64,
+    cosine: f64,
+    sine: f64,
+}
+
+impl Wave {
+    fn at(&self, c: f64, s: f64) -> f64 {
+        self.constant + self.cosine * c + self.sine * s
+    }
+}
+
+/// How axes 1 and 2 lie to each other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Axes {
+    Meeting,
+    Parallel,
+    Skew,
+}
+
+/// The closed form of one chain, prepared. Everything is in the base frame with all joint angles zero.
+#[derive(Debug, Clone)]
+pub struct ThreeR {
+    axes: Axes,
+    /// Axis of joint 1 and the foot on it of the common normal of axes 1 and 2.
+    axis_1: Vector,
+    origin_1: Vector,
+    /// Orthonormal basis: `e1` along the common normal, `e2`, and axis 2.
+    e1: Vector,
+    e2: Vector,
+    axis_2: Vector,
+    /// Length of the common normal, and `axis_1 . e2` (sine of the twist).
+    offset: f64,
+    twist_sine: f64,
+    /// Components of the arm (tip from the foot of the common normal on axis 2) along `e1`, `e2`, `axis_2`.
+    x: Wave,
+    y: Wave,
+    height: Wave,
+    /// `|offset|^2 + |arm|^2`, halved.
+    half_square: Wave,
+    /// `axis_1 . arm` as far as it doesn't turn with joint 2.
+    twist_height: Wave,
+    /// Per joint: coordinate, multiplier, offset.
+    drives: [(usize, f64, f64); 3],
+    center_in_body: Point,
+}
+
+impl ThreeR {
+    /// None unless the chain has three turning joints with a coordinate each and can move its tip in three directions.
+    pub fn new(chain: &Chain, center_in_body: &Point) -> Option<Self> {
+        let joints: &[_; 3] = chain.joints.as_slice().try_into().ok()?;
+        let mut driven = [false; 3];
+        for joint in joints {
+            if joint.motion != Motion::Turn || joint.multiplier == 0.0 || chain.n_coordinates() != 3 {
+                return None;
+            }
+            driven[joint.coordinate] = true;
+        }
+        if driven.contains(&false) {
+            return None;
+        }
+        let mut frame = BodyFrame::IDENTITY;
+        let mut axes = [Vector::zeros(); 3];
+        let mut origins = [Vector::zeros(); 3];
+        for (i, joint) in joints.iter().enumerate() {
+            frame = frame.compose(&BodyFrame::from_pose(&joint.parent_from_joint));
+            axes[i] = frame.transform_vector(&joint.axis);
+            origins[i] = frame.translation;
+        }
+        let tip = frame.transform_point(center_in_body).coords;
+        let scale = (tip - origins[2]).norm() + (origins[2] - origins[1]).norm() + (origins[1] - origins[0]).norm();
+        let [axis_1, axis_2, axis_3] = axes;
+        let cross = axis_1.cross(&axis_2);
+        let twist = cross.norm();
+        let (origin_1, origin_2) = feet_of_common_normal(&origins[0], &axis_1, &origins[1], &axis_2);
+        let normal = origin_2 - origin_1;
+        let offset = normal.norm();
+        let kind = match (twist < DEGENERATE, offset < DEGENERATE * scale) {
+            (true, true) => return None,
+            (true, false) => Axes::Parallel,
+            (false, true) => Axes::Meeting,
+            (false, false) => Axes::Skew,
+        };
+        let e1 = if kind == Axes::Meeting { cross / twist } else { normal / offset };
+        let e1 = (e1 - axis_2 * axis_2.dot(&e1)).normalize();
+        let e2 = axis_2.cross(&e1);
+        let lever = tip - origins[2];
+        let along = axis_3 * axis_3.dot(&lever);
+        let shoulder = origins[2] - origin_2;
+        let wave = |direction: &Vector| Wave {
+            constant: direction.dot(&(shoulder + along)),
+            cosine: direction.dot(&(lever - along)),
+            sine: direction.dot(&axis_3.cross(&lever)),
+        };
+        let (x, y, height) = (wave(&e1), wave(&e2), wave(&axis_2));
+        let reach = wave(&shoulder);
+        let half_square = Wave {
+            constant: 0.5 * (offset * offset + shoulder.norm_squared() + lever.norm_squared()) + shoulder.dot(&along),
+            cosine: reach.cosine,
+            sine: reach.sine,
+        };
+        let cosine = axis_1.dot(&axis_2);
+        let twist_height =
+            Wave { constant: cosine * height.constant, cosine: cosine * height.cosine, sine: cosine * height.sine };
+        let first = match kind {
+            Axes::Meeting => half_square,
+            Axes::Parallel => twist_height,
+            Axes::Skew => x,
+        };
+        let amplitude = first.cosine.hypot(first.sine);
+        let needed = if kind == Axes::Meeting { scale * scale } else { scale };
+        if kind != Axes::Skew && amplitude < 1e-9 * needed {
+            return None;
+        }
+        Some(ThreeR {
+            axes: kind,
+            axis_1,
+            origin_1,
+            e1,
+            e2,
+            axis_2,
+            offset,
+            twist_sine: axis_1.dot(&e2),
+            x,
+            y,
+            height,
+            half_square,
+            twist_height,
+            drives: joints.each_ref().map(|joint| (joint.coordinate, joint.multiplier, joint.offset)),
+            center_in_body: *center_in_body,
+        })
+    }
+
+    /// Every branch within the limits.
+    pub fn solve_all(&self, chain: &Chain, target: &Point, limit_margin: f64) -> Branches {
+        let mut branches = Branches::new();
+        let from_axis = target.coords - self.origin_1;
+        // Distance and height equations: rho . e1 * offset = distance(q3), rho . e2 * twist_sine = rise(q3).
+        let distance = Wave {
+            constant: 0.5 * from_axis.norm_squared() - self.half_square.constant,
+            cosine: -self.half_square.cosine,
+            sine: -self.half_square.sine,
+        };
+        let rise = Wave {
+            constant: self.axis_1.dot(&from_axis) - self.twist_height.constant,
+            cosine: -self.twist_height.cosine,
+            sine: -self.twist_height.sine,
+        };
+        match self.axes {
+            Axes::Meeting => {
+                for (c, s) in zeros_of(&distance) {
+                    let rho_y = rise.at(c, s) / self.twist_sine;
+                    self.both_signs(chain, &from_axis, target, limit_margin, (c, s), rho_y, true, &mut branches);
+                }
+            }
+            Axes::Parallel => {
+                for (c, s) in zeros_of(&rise) {
+                    let rho_x = distance.at(c, s) / self.offset;
+                    self.both_signs(chain, &from_axis, target, limit_margin, (c, s), rho_x, false, &mut branches);
+                }
+            }
+            Axes::Skew => {
+                let rho_x = scaled(&distance, 1.0 / self.offset);
+                let rho_y = scaled(&rise, 1.0 / self.twist_sine);
+                for (c, s) in circle_zeros(&rho_x, &rho_y, &self.x, &self.y) {
+                    let rho = (rho_x.at(c, s), rho_y.at(c, s));
+                    self.finish(chain, &from_axis, target, limit_margin, (c, s), rho, &mut branches);
+                }
+            }
+        }
+        branches
+    }
+
+    /// The branch continuous with `seed`.
+    pub fn solve_near(
+        &self,
+        chain: &Chain,
+        target: &Point,
+        seed: &[f64],
+        settings: &IkSettings,
+    ) -> Option<Coordinates> {
+        let mut near: Option<Coordinates> = None;
+        let mut n_near = 0;
+        for mut branch in self.solve_all(chain, target, settings.limit_margin) {
+            let mut largest: f64 = 0.0;
+            for &(k, multiplier, _) in &self.drives {
+                let turn = TAU / multiplier.abs();
+                let unwound = branch[k] + ((seed[k] - branch[k]) / turn).round() * turn;
+                if unwound >= chain.lower[k] + settings.limit_margin
+                    && unwound <= chain.upper[k] - settings.limit_margin
+                {
+                    branch[k] = unwound;
+                }
+                largest = largest.max((branch[k] - seed[k]).abs());
+            }
+            if largest <= settings.max_step {
+                n_near += 1;
+                near = Some(branch);
+            }
+        }
+        // Two branches within reach of one step meet in a singularity nearby: which one is continuous is not known.
+        let near = near.filter(|_| n_near == 1)?;
+        let before = self.jacobian(chain, seed).determinant();
+        let after = self.jacobian(chain, &near).determinant();
+        (before * after > 0.0).then_some(near)
+    }
+
+    /// One component of the rotated arm is known; the other follows from its length, up to the sign.
+    fn both_signs(
+        &self,
+        chain: &Chain,
+        from_axis: &Vector,
+        target: &Point,
+        limit_margin: f64,
+        joint_3: (f64, f64),
+        known: f64,
+        known_is_y: bool,
+        branches: &mut Branches,
+    ) {
+        let (x, y) = (self.x.at(joint_3.0, joint_3.1), self.y.at(joint_3.0, joint_3.1));
+        let length_squared = x * x + y * y;
+        let rest = length_squared - known * known;
+        if rest < -1e-9 * length_squared {
+            return;
+        }
+        let other = rest.max(0.0).sqrt();
+        for other in [other, -other] {
+            let rho = if known_is_y { (other, known) } else { (known, other) };
+            self.finish(chain, from_axis, target, limit_margin, joint_3, rho, branches);
+            if other == 0.0 {
+                break;
+            }
+        }
+    }
+
+    /// Joint 2 turns the arm's `(x, y)` to `rho`, joint 1 brings it to the target; keeps what is within the limits
+    /// and holds when substituted.
+    fn finish(
+        &self,
+        chain: &Chain,
+        from_axis: &Vector,
+        target: &Point,
+        limit_margin: f64,
+        (c, s): (f64, f64),
+        rho: (f64, f64),
+        branches: &mut Branches,
+    ) {
+        let within = |joint: usize, angle: f64| {
+            let (k, multiplier, offset) = self.drives[joint];
+            in_limits(angle, multiplier, offset, chain.lower[k] + limit_margin, chain.upper[k] - limit_margin)
+        };
+        let Some(q3) = within(2, s.atan2(c)) else { return };
+        let (x, y, height) = (self.x.at(c, s), self.y.at(c, s), self.height.at(c, s));
+        let Some(q2) = within(1, (x * rho.1 - y * rho.0).atan2(x * rho.0 + y * rho.1)) else { return };
+        let before = self.e1 * (self.offset + rho.0) + self.e2 * rho.1 + self.axis_2 * height;
+        let turned = self.axis_1.dot(&before.cross(from_axis));
+        let straight = before.dot(from_axis) - self.axis_1.dot(&before) * self.axis_1.dot(from_axis);
+        let Some(q1) = within(0, turned.atan2(straight)) else { return };
+        let mut coordinates = [0.0; 3];
+        for (q, drive) in [q1, q2, q3].into_iter().zip(&self.drives) {
+            coordinates[drive.0] = q;
+        }
+        if !self.polish(chain, target, &mut coordinates) {
+            return;
+        }
+        for (k, q) in coordinates.iter_mut().enumerate() {
+            let inside = q.max(chain.lower[k] + limit_margin).min(chain.upper[k] - limit_margin);
+            if (inside - *q).abs() > LIMIT_ROUNDING {
+                return;
+            }
+            *q = inside;
+        }
+        let known = branches.iter().any(|other| other.iter().zip(&coordinates).all(|(a, b)| (a - b).abs() < SAME));
+        if !known && !branches.is_full() {
+            branches.push(coordinates.into_iter().collect());
+        }
+    }
+
+    /// Newton steps until the tip is on the target; false when it is not reached.
+    fn polish(&self, chain: &Chain, target: &Point, coordinates: &mut [f64; 3]) -> bool {
+        let mut error = target - chain.last_frame(coordinates).transform_point(&self.center_in_body);
+        for _ in 0..4 {
+            if error.norm_squared() < POLISHED * POLISHED {
+                return true;
+            }
+            let Some(step) = self.jacobian(chain, coordinates).try_inverse().map(|inverse| inverse * error) else {
+                break;
+            };
+            if !step.iter().all(|change| change.abs() < 0.1) {
+                break;
+            }
+            let moved = [coordinates[0] + step.x, coordinates[1] + step.y, coordinates[2] + step.z];
+            let moved_error = target - chain.last_frame(&moved).transform_point(&self.center_in_body);
+            if moved_error.norm_squared() >= error.norm_squared() {
+                break;
+            }
+            (*coordinates, error) = (moved, moved_error);
+        }
+        error.norm_squared() < POSITION_TOLERANCE * POSITION_TOLERANCE
+    }
+
+    /// Jacobian of the tip, one column per coordinate.
+    fn jacobian(&self, chain: &Chain, coordinates: &[f64]) -> Matrix3<f64> {
+        let mut frames = [BodyFrame::IDENTITY; 3];
+        chain.forward_frames(coordinates, &mut frames);
+        let tip = frames[2].transform_point(&self.center_in_body).coords;
+        let mut jacobian = Matrix3::zeros();
+        for (joint, frame) in chain.joints.iter().zip(&frames) {
+            let axis = frame.rotation * joint.axis.into_inner();
+            jacobian.set_column(joint.coordinate, &(axis.cross(&(tip - frame.translation)) * joint.multiplier));
+        }
+        jacobian
+    }
+}
+
+/// Points of two lines that are nearest to each other; for parallel lines the second line's own point and its foot.
+fn feet_of_common_normal(p1: &Vector, a1: &Vector, p2: &Vector, a2: &Vector) -> (Vector, Vector) {
+    let between = p2 - p1;
+    let cosine = a1.dot(a2);
+    let sine_squared = a1.cross(a2).norm_squared();
+    if sine_squared < DEGENERATE * DEGENERATE {
+        return (p1 + a1 * a1.dot(&between), *p2);
+    }
+    let (along_1, along_2) = (a1.dot(&between), a2.dot(&between));
+    let t1 = (along_1 - cosine * along_2) / sine_squared;
+    let t2 = (cosine * along_1 - along_2) / sine_squared;
+    (p1 + a1 * t1, p2 + a2 * t2)
+}
+
+fn scaled(wave: &Wave, factor: f64) -> Wave {
+    Wave { constant: wave.constant * factor, cosine: wave.cosine * factor, sine: wave.sine * factor }
+}
+
+/// The at most two `(cos, sin)` where a wave vanishes.
+fn zeros_of(wave: &Wave) -> ArrayVec<(f64, f64), 2> {
+    let mut zeros = ArrayVec::new();
+    let square = wave.cosine * wave.cosine + wave.sine * wave.sine;
+    let rest = square - wave.constant * wave.constant;
+    if rest < -1e-9 * square {
+        return zeros;
+    }
+    let root = rest.max(0.0).sqrt();
+    for root in [root, -root] {
+        let c = (-wave.constant * wave.cosine - wave.sine * root) / square;
+        let s = (-wave.constant * wave.sine + wave.cosine * root) / square;
+        zeros.push((c, s));
+        if root == 0.0 {
+            break;
+        }
+    }
+    zeros
+}
+
+/// The `(cos, sin)` where `a^2 + b^2 = x^2 + y^2`.
+fn circle_zeros(a: &Wave, b: &Wave, x: &Wave, y: &Wave) -> ArrayVec<(f64, f64), 16> {
+    let (mut constant, mut cosine, mut sine, mut cc, mut cs, mut ss) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    for (sign, w) in [(1.0, a), (1.0, b), (-1.0, x), (-1.0, y)] {
+        constant += sign * w.constant * w.constant;
+        cosine += sign * 2.0 * w.constant * w.cosine;
+        sine += sign * 2.0 * w.constant * w.sine;
+        cc += sign * w.cosine * w.cosine;
+        cs += sign * 2.0 * w.cosine * w.sine;
+        ss += sign * w.sine * w.sine;
+    }
+    let mut zeros = ArrayVec::new();
+    // Half-angle substitution on the right half circle, and on the left one turned by pi.
+    for side in [1.0, -1.0] {
+        let (cosine, sine) = (side * cosine, side * sine);
+        let quartic = [
+            constant + cosine + cc,
+            2.0 * (sine + cs),
+            2.0 * (constant - cc) + 4.0 * ss,
+            2.0 * (sine - cs),
+            constant - cosine + cc,
+        ];
+        for t in roots_in_unit(&quartic) {
+            let scale = side / (1.0 + t * t);
+            zeros.push(((1.0 - t * t) * scale, 2.0 * t * scale));
+        }
+    }
+    zeros
+}
+
+/// The coordinate in `lower..=upper` whose joint angle equals `angle` up to whole turns; the one nearest to the
+/// principal value when there are several.
+fn in_limits(angle: f64, multiplier: f64, offset: f64, lower: f64, upper: f64) -> Option<f64> {
+    let turn = TAU / multiplier.abs();
+    let coordinate = (angle - offset) / multiplier;
+    for n_turns in [0.0, -1.0, 1.0, -2.0, 2.0] {
+        let turned = coordinate + n_turns * turn;
+        if turned >= lower - LIMIT_ROUNDING && turned <= upper + LIMIT_ROUNDING {
+            return Some(turned.max(lower).min(upper));
+        }
+    }
+    None
+}

@@ -1,0 +1,130 @@
+//! Every bundled scene loads, and its object starts where the notes say.
+
+use crate::support::{repository, shared_models, with_models};
+use regrasp_geometry::{Point, Pose};
+use regrasp_robot::import::LoadOptions;
+use regrasp_scene::{GraspRequest, LoadedScene, load_scene};
+use std::path::{Path, PathBuf};
+
+/// The `.toml` files of `scenes/folder`, sorted.
+fn scenes_in(folder: &str) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(repository().join("scenes").join(folder)).unwrap();
+    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
+    paths.sort();
+    paths
+}
+
+fn load(path: &Path, options: &LoadOptions) -> LoadedScene {
+    load_scene(path, options).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn center_in_world(loaded: &LoadedScene, world_from_object: &Pose) -> Point {
+    world_from_object * loaded.scene.object.center_of_mass
+}
+
+#[test]
+fn scenes_of_the_bundled_hands_load_without_models() {
+    let paths = scenes_in("");
+    assert_eq!(paths.len(), 8);
+    for path in paths {
+        let loaded = load(&path, &LoadOptions::default());
+        assert_eq!(loaded.notes, Vec::<String>::new(), "{}", path.display());
+        assert_eq!(loaded.scene.hand.fingers.len(), 4);
+        let query = loaded.task.query(7);
+        let start = center_in_world(&loaded, &query.world_from_object_start);
+        assert!((start - Point::new(0.0, 0.0, 0.078)).norm() < 1e-12);
+        assert_eq!(query.start_grasp, GraspRequest::Automatic);
+        let roles: Vec<&str> = loaded.scene.inputs.iter().map(|input| input.role.as_str()).collect();
+        assert_eq!(roles, ["scene", "hand", "urdf"]);
+        for input in &loaded.scene.inputs {
+            assert_eq!(input.sha256, regrasp_base::files::sha256(&std::fs::read(&input.path).unwrap()));
+            assert!(!Path::new(&input.name).is_absolute(), "{}", input.name);
+        }
+    }
+}
+
+#[test]
+fn allegro_scenes_start_at_home_and_turn_by_what_their_name_says() {
+    let Some(models) = shared_models() else { return };
+    let options = with_models(&models);
+    let paths = scenes_in("allegro");
+    assert_eq!(paths.len(), 19);
+    let home = Point::new(0.082, 0.003, 0.005);
+    for path in paths {
+        let loaded = load(&path, &options);
+        assert_eq!(loaded.scene.hand.fingers.len(), 4);
+        assert_eq!(loaded.scene.hand.n_joints(), 16);
+        let name = path.file_stem().unwrap().to_str().unwrap();
+        let wanted_angle = if name.contains("_180") { 180f64 } else { 90.0 };
+        let wanted_axis = match name.chars().last() {
+            Some('x') => nalgebra::Vector3::x(),
+            Some('y') => nalgebra::Vector3::y(),
+            _ => nalgebra::Vector3::z(),
+        };
+        let mut starts = Vec::new();
+        for seed in 0..20 {
+            let query = loaded.task.query(seed);
+            let start = center_in_world(&loaded, &query.world_from_object_start);
+            assert!((start - home).norm() <= 0.005 + 1e-6, "{name} {start}");
+            let goal = center_in_world(&loaded, &query.world_from_object_goal);
+            assert!((start - goal).norm() < 1e-6, "{name} turns in place");
+            let turn = query.world_from_object_goal.rotation * query.world_from_object_start.rotation.inverse();
+            let expected = nalgebra::UnitQuaternion::from_scaled_axis(wanted_axis * wanted_angle.to_radians());
+            assert!(turn.angle_to(&expected) < 1e-9, "{name}");
+            starts.push(start);
+        }
+        assert!(starts.windows(2).all(|pair| (pair[0] - pair[1]).norm() > 1e-6), "{name} varies with the seed");
+    }
+}
+
+#[test]
+fn scanned_objects_have_their_sizes_and_lie_aligned() {
+    let Some(models) = shared_models() else { return };
+    // Extents along the world axes at the start, as trimesh and a minimum-area rectangle give them.
+    let expected =
+        [("rubiks_x", [0.0581, 0.0590, 0.0579]), ("apple_z", [0.0754, 0.0749, 0.0719]), ("can_y", [0.05, 0.05, 0.08])];
+    for (name, extents) in expected {
+        let loaded = load(&repository().join(format!("scenes/allegro/{name}.toml")), &with_models(&models));
+        let rotation = loaded.task.query(0).world_from_object_start.rotation;
+        let (mut low, mut high) = (Point::from([f64::INFINITY; 3]), Point::from([f64::NEG_INFINITY; 3]));
+        let vertices = match &loaded.scene.object.shape {
+            regrasp_geometry::Shape::Mesh(mesh) => mesh.vertices(),
+            regrasp_geometry::Shape::Convex(hull) => hull.vertices(),
+            other => panic!("{name} is a {}", other.kind()),
+        };
+        for vertex in vertices {
+            low = low.inf(&(rotation * vertex));
+            high = high.sup(&(rotation * vertex));
+        }
+        for k in 0..3 {
+            assert!((high[k] - low[k] - extents[k]).abs() < 5e-4, "{name} {:?}", high - low);
+        }
+    }
+}
+
+#[test]
+fn three_fingered_hands_load() {
+    let Some(models) = shared_models() else { return };
+    for folder in ["dclaw", "trifinger"] {
+        let loaded = load(&repository().join(format!("scenes/{folder}/sphere32_z.toml")), &with_models(&models));
+        assert_eq!(loaded.scene.hand.fingers.len(), 3);
+        assert_eq!(loaded.scene.hand.n_joints(), 9);
+    }
+}
+
+/// Home is out in front of the palm and below the fingertips: all tips are balls of 12 mm, and at the grasp of the notes
+/// (real-hands-notes section 1) they touch a sphere of 32 mm at (82, 1, 1) mm.
+#[test]
+fn the_allegro_grasp_of_the_notes_touches_the_sphere() {
+    let Some(models) = shared_models() else { return };
+    let loaded = load(&repository().join("scenes/allegro/sphere32_x.toml"), &with_models(&models));
+    let degrees =
+        [[-10.0, 31.0, 98.0, 51.0], [7.0, 10.0, 95.0, 43.0], [1.0, 51.0, 91.0, 19.0], [76.0, 58.0, 32.0, 96.0f64]];
+    let center = Point::new(0.082, 0.001, 0.001);
+    for (finger, degrees) in loaded.scene.hand.fingers.iter().zip(degrees) {
+        let tip = finger.chain.tip(&degrees.map(f64::to_radians), &finger.tip.center_in_body);
+        // The notes give whole degrees: half a degree over 150 mm is 1.3 mm.
+        assert!(((tip - center).norm() - 0.044).abs() < 0.003, "{} {}", finger.name, (tip - center).norm());
+    }
+}

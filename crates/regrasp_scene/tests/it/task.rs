@@ -1,0 +1,91 @@
+//! How a seed resolves what the scene file leaves open.
+
+use crate::support::{Folder, GOOD};
+use regrasp_geometry::{Point, Vector};
+use regrasp_scene::{GraspRequest, InHandTask};
+
+fn task(text: &str) -> InHandTask {
+    Folder::new().load(text).unwrap_or_else(|error| panic!("{error}")).task
+}
+
+#[test]
+fn start_positions_fill_the_ball_evenly() {
+    let task = task(&GOOD.replace("0.078]", "0.078]\nposition_within = 0.01"));
+    let n_seeds = 4000;
+    let (mut sum, mut n_inner) = (Vector::zeros(), 0);
+    for seed in 0..n_seeds {
+        let offset = task.query(seed).world_from_object_start.translation.vector - Vector::new(0.0, 0.0, 0.078);
+        assert!(offset.norm() <= 0.01);
+        sum += offset;
+        n_inner += usize::from(offset.norm() < 0.005);
+    }
+    // An eighth of the ball lies within half its radius; standard deviations are 2.6e-4 m and 0.0052.
+    assert!((sum / n_seeds as f64).norm() < 6e-4);
+    assert!((n_inner as f64 / n_seeds as f64 - 0.125).abs() < 0.026);
+    assert_eq!(task.query(3), task.query(3));
+    assert_ne!(task.query(3), task.query(4));
+}
+
+#[test]
+fn random_orientations_have_no_preferred_direction() {
+    let task = task(&GOOD.replace("0.078]", "0.078]\nrandom_orientation = true"));
+    let n_seeds = 4000;
+    let sum: Vector = (0..n_seeds).map(|seed| task.query(seed).world_from_object_start.rotation * Vector::z()).sum();
+    // Each component has variance 1/3: the mean's standard deviation is 0.0091.
+    assert!((sum / n_seeds as f64).norm() < 0.05);
+    let query = task.query(5);
+    let turn = query.world_from_object_goal.rotation * query.world_from_object_start.rotation.inverse();
+    assert!((turn * Vector::y() - Vector::z()).norm() < 1e-12, "90 degrees about the world's x");
+}
+
+#[test]
+fn goals_are_absolute_or_relative() {
+    let absolute = "position = [0.0, 0.01, 0.08]\nquat_wxyz = [0.0, 0.0, 0.0, 1.0]";
+    let text = GOOD.replace("turn = { axis = \"x\", angle_deg = 90 }", absolute);
+    let goal = task(&text).query(0).world_from_object_goal;
+    assert_eq!(goal.translation.vector, Vector::new(0.0, 0.01, 0.08));
+    assert!((goal.rotation * Vector::x() + Vector::x()).norm() < 1e-12, "half a turn about z");
+
+    let text = GOOD.replace("angle_deg = 90 }", "angle_deg = 90 }\nmove = [0.0, 0.0, 0.01]");
+    let goal = task(&text).query(0).world_from_object_goal;
+    assert!((goal.translation.vector - Vector::new(0.0, 0.0, 0.088)).norm() < 1e-15);
+
+    let text = GOOD.replace("axis = \"x\", angle_deg = 90", "axis = [0, 0, 2], angle_deg = -90");
+    let goal = task(&text).query(0).world_from_object_goal;
+    assert!((goal.rotation * Vector::y() - Vector::x()).norm() < 1e-12);
+}
+
+#[test]
+fn grasps_are_read_by_name() {
+    let contacts = "{ contacts = { south = [0, -0.032, 0], east = [0.032, 0, 0], west = [-0.032, 0, 0], north = [0, 0.032, 0] } }";
+    let query = task(&GOOD.replace("0.078]", &format!("0.078]\ngrasp = {contacts}"))).query(0);
+    let expected = [[0.032, 0.0, 0.0], [0.0, 0.032, 0.0], [-0.032, 0.0, 0.0], [0.0, -0.032, 0.0]].map(Point::from);
+    assert_eq!(query.start_grasp, GraspRequest::Contacts(expected.to_vec()));
+    assert_eq!(query.goal_grasp, GraspRequest::Automatic);
+
+    let mut joints = String::new();
+    for (finger, abduction) in [("west", 0.3), ("east", 0.1), ("south", 0.4), ("north", 0.2)] {
+        joints.push_str(&format!(
+            "{finger}_abduction = {abduction}, {finger}_proximal_flexion = 0.5, {finger}_distal_flexion = 0.6, "
+        ));
+    }
+    let text = format!("{GOOD}grasp = {{ joints = {{ {} }} }}\n", joints.trim_end_matches(", "));
+    let GraspRequest::Joints(values) = task(&text).query(0).goal_grasp else { panic!("joints were given") };
+    assert_eq!(values, [0.1, 0.5, 0.6, 0.2, 0.5, 0.6, 0.3, 0.5, 0.6, 0.4, 0.5, 0.6]);
+}
+
+#[test]
+fn hand_pose_and_rest_posture_take_effect() {
+    let folder = Folder::new();
+    let plain = folder.load(GOOD).unwrap().scene.hand;
+    let text = GOOD.replace(
+        "file = \"hand.toml\"",
+        "file = \"hand.toml\"\nworld_from_hand = { position = [0.1, 0.0, 0.0], quat_xyzw = [0, 0, 1, 0] }\nrest = { west_abduction = 0.25 }",
+    );
+    let moved = folder.load(&text.replace("[0.0, 0.0, 0.078]", "[0.1, 0.0, 0.078]")).unwrap().scene.hand;
+    assert_eq!(moved.fingers[2].rest[0], 0.25);
+    assert_eq!(moved.fingers[2].rest[1], plain.fingers[2].rest[1]);
+    let tip = |hand: &regrasp_robot::Hand| hand.fingers[0].chain.tip(&[0.1, 0.2, 0.3], &hand.fingers[0].tip.center_in_body);
+    let (before, after) = (tip(&plain), tip(&moved));
+    assert!((after - Point::new(0.1 - before.x, -before.y, before.z)).norm() < 1e-12);
+}
