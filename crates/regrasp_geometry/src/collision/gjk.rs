@@ -368,7 +368,7 @@ mod tests {
         for gap in [1e-12, 1e-9, 1e-6, 1e-3] {
             let at_b =
                 Placement { rotation: nalgebra::Matrix3::identity(), translation: Vector::new(0.02 + gap, 0.0, 0.0) };
-            match distance(&cube, &Placement::identity(), &cube, &at_b) {
+            match distance(&cube, &Placement::IDENTITY, &cube, &at_b) {
                 Answer::SeparatedBy(d) => assert!((d - gap).abs() <= 1e-15),
                 other => assert!(gap <= 1e-9, "{other:?} at {gap}"),
             }

@@ -78,6 +78,12 @@ pub(super) struct Bvh {
 
 impl Bvh {
     pub fn new(boxes: &[Aabb]) -> Self {
+        // A little padding, so that no ray runs within the very plane of a side.
+        let whole = boxes.iter().fold(Aabb::empty(), |all, b| all.union(b));
+        let padding = Vector::repeat(1e-13 * whole.low.abs().sup(&whole.high.abs()).max());
+        let pad = |b: &Aabb| Aabb { low: b.low - padding, high: b.high + padding };
+        let boxes: Vec<Aabb> = boxes.iter().map(pad).collect();
+        let boxes = &boxes[..];
         let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
         let mut nodes = Vec::with_capacity(boxes.len() / 2 + 1);
         let root = build(boxes, &mut order, 0, &mut nodes, 0);

@@ -88,7 +88,7 @@ fn first_strip(mesh: &MeshSurface, a: &SurfacePoint, b: &SurfacePoint) -> Option
             if j == NONE {
                 continue;
             }
-            let middle = nalgebra::center(&corners[k], &corners[(k + 1) % 3]);
+            let middle = toward(&corners[k], &corners[(k + 1) % 3], &at, &goal_point);
             let next_cost = cost[here] + (middle - at).norm();
             if next_cost < cost[j as usize] {
                 cost[j as usize] = next_cost;
@@ -343,4 +343,15 @@ fn legs(
         start = end;
     }
     legs
+}
+
+/// The point of the edge `pq`, but for its ends, that comes nearest to lying straight between `at` and `goal`.
+fn toward(p: &Point, q: &Point, at: &Point, goal: &Point) -> Point {
+    let (edge, way) = (q - p, goal - at);
+    let (a, b, c) = (edge.norm_squared(), edge.dot(&way), way.norm_squared());
+    let from = at - p;
+    let (d, e) = (edge.dot(&from), way.dot(&from));
+    let denominator = a * c - b * b;
+    let share = if denominator > 1e-12 * a * c { (d * c - b * e) / denominator } else { 0.5 };
+    p + edge * share.clamp(0.05, 0.95)
 }

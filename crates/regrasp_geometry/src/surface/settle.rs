@@ -30,7 +30,7 @@ pub(super) fn settle(surface: &Surface, near: &SurfacePoint, tip_radius: f64) ->
             let slid = (settled - near.point_in_object).norm();
             let is_outside = push == 0 || surface.signed_distance(&center) > 0.0;
             let normal = UnitVector::new_unchecked(away / distance);
-            return (slid <= tip_radius && is_outside).then(|| SurfacePoint::new(settled, normal, nearest.facet));
+            return (slid <= 2.0 * tip_radius && is_outside).then(|| SurfacePoint::new(settled, normal, nearest.facet));
         }
         center = nearest.point_in_object + away * (tip_radius / distance);
     }

@@ -8,7 +8,7 @@ use regrasp_base::Rng;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 use regrasp_grasp::Contact;
-use regrasp_roadmap::rrt_connect::{RrtSettings, rrt_connect};
+use regrasp_roadmap::rrt_connect::{RrtConnect, RrtSettings};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 
 /// Longest step of a joint along a joint line, in radians or metres.
@@ -219,18 +219,10 @@ fn around(
     let upper: Vec<f64> = chain.upper.iter().zip(start).map(|(u, q)| (u - margin).min(q + 3.2)).collect();
     let settings = RrtSettings { max_iterations: model.settings.rrt_iterations, ..RrtSettings::default() };
     let as_joints = |q: &[f64]| -> Coordinates { q.iter().copied().collect() };
-    let corners = rrt_connect(
-        start,
-        goal,
-        &lower,
-        &upper,
-        |from, to| {
-            workspace.set_finger(finger, &as_joints(from));
-            joint_line(workspace, finger, &as_joints(from), &as_joints(to), mode, &mut Vec::new())
-        },
-        &settings,
-        rng,
-    )?;
+    let corners = RrtConnect::new().plan(start, goal, &lower, &upper, &settings, rng, |from, to| {
+        workspace.set_finger(finger, &as_joints(from));
+        joint_line(workspace, finger, &as_joints(from), &as_joints(to), mode, &mut Vec::new())
+    })?;
     let mut path = Vec::new();
     workspace.set_finger(finger, start);
     for pair in corners.windows(2) {

@@ -432,7 +432,7 @@ fn place_object(model: &Model, configuration: &mut Configuration, world_from_obj
 fn place_finger(model: &Model, configuration: &mut Configuration, finger: usize, joints: &Coordinates) {
     configuration.joints[finger].clone_from(joints);
     let chain = model.fingers[finger].ik.chain();
-    let mut frames = [Placement::identity(); MAX_BODIES];
+    let mut frames = [Placement::IDENTITY; MAX_BODIES];
     let n_bodies = chain.joints.len();
     chain.forward_frames(joints, &mut frames[..n_bodies]);
     for index in model.fingers[finger].bodies.clone() {

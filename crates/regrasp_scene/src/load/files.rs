@@ -54,12 +54,15 @@ impl<'a> Files<'a> {
         }
         if name.trim().is_empty() {
             return Err(Box::new(
-                entry.error("S110", found, "is empty").expected("a path relative to the scene file, or package://NAME/PATH"),
+                entry
+                    .error("S110", found, "is empty")
+                    .expected("a path relative to the scene file, or package://NAME/PATH"),
             ));
         }
         let path = self.scene.parent().unwrap_or(Path::new("")).join(name);
         if path.is_file() {
-            return Ok((path, Vec::new()));
+            let remark = format!("{} is an absolute path \"{name}\": the scene works on this machine only", entry.name);
+            return Ok((path, if Path::new(name).is_absolute() { vec![remark] } else { Vec::new() }));
         }
         let problem = if path.exists() { "is not a file" } else { "does not exist" };
         Err(Box::new(
@@ -79,7 +82,7 @@ impl<'a> Files<'a> {
     pub fn mesh(&mut self, entry: &Entry, found: &mut Found) -> Option<TriangleMesh> {
         let path = self.locate(entry, found)?;
         let read = files::read(&path).and_then(|bytes| {
-            let mesh = regrasp_geometry::import::read_mesh(&path, &bytes)?;
+            let mesh = super::stand_in::read_mesh(&path, &bytes)?;
             Ok((bytes, mesh))
         });
         match read {

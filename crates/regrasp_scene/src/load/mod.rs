@@ -9,6 +9,7 @@ mod files;
 mod object;
 mod pose;
 mod shape;
+mod stand_in;
 mod table;
 mod task;
 mod units;
@@ -19,8 +20,8 @@ use crate::scene::{InputFile, Scene};
 use files::Files;
 use regrasp_base::InputError;
 use regrasp_geometry::Pose;
-use regrasp_robot::import::{LoadOptions, load_hand};
 use regrasp_robot::Hand;
+use regrasp_robot::import::{LoadOptions, load_hand};
 use std::path::Path;
 use table::{Found, Table};
 

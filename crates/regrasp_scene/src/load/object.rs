@@ -3,10 +3,10 @@
 use super::files::Files;
 use super::pose;
 use super::shape::{self, Origin, ReadShape};
+use super::stand_in::{SolidProperties, solid_properties};
 use super::table::{Entry, Found, Table};
 use crate::object::Object;
 use crate::scene::Obstacle;
-use regrasp_geometry::mass::{SolidProperties, solid_properties};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::surface::DEFAULT_CREASE_ANGLE;
 use regrasp_geometry::{Point, Shape, Surface};
@@ -25,7 +25,8 @@ pub(super) fn object(root: &mut Table, files: &mut Files, found: &mut Found) -> 
     let name = table.optional("name").and_then(|entry| entry.text(found)).unwrap_or("object").to_owned();
     let read = shape::shape(&mut table, files, found);
     let friction = table.required(found, "friction", "add friction = 0.8").and_then(|entry| friction(&entry, found));
-    let edge_distance = match table.optional("edge_distance") {
+    let edge_entry = table.optional("edge_distance");
+    let edge_distance = match &edge_entry {
         Some(entry) => entry.number_that(found, "a length of 0 or more, in metres", |x| x >= 0.0),
         None => Some(DEFAULT_EDGE_DISTANCE),
     };
@@ -39,6 +40,16 @@ pub(super) fn object(root: &mut Table, files: &mut Files, found: &mut Found) -> 
     let center = table.optional("center_of_mass");
     let given_center = center.as_ref().map(|entry| entry.numbers::<3>(found).map(Point::from));
     let placed = read.and_then(|read| placed(read, given_mass.as_ref(), &given_center, &table, found));
+    let no_room = placed.as_ref().zip(edge_distance).and_then(|((shape, ..), distance)| no_room(shape, distance));
+    if let Some(room) = no_room {
+        let (distance, expected) = (edge_distance?, format!("an edge_distance below {room} m"));
+        let problem = format!("edge_distance {distance} m leaves no place for a contact");
+        let diagnostic = match &edge_entry {
+            Some(entry) => entry.error("S107", found, problem),
+            None => table.error("S107", found, problem),
+        };
+        found.diagnostics.push(diagnostic.expected(expected));
+    }
     table.finish(found);
 
     let (shape, mass, center_of_mass) = placed?;
@@ -66,6 +77,17 @@ fn friction(entry: &Entry, found: &mut Found) -> Option<f64> {
         found.note(&entry.span, format!("friction {friction} is more than any known pair of materials has"));
     }
     Some(friction)
+}
+
+/// The distance below which contacts of a primitive with edges have a place, when `edge_distance` is not below it.
+fn no_room(shape: &Shape, edge_distance: f64) -> Option<f64> {
+    let room = match shape {
+        // Of all points the middle of the largest face is farthest from the edges, by half its shorter side.
+        Shape::Cuboid { half_extents } => half_extents.sum() - half_extents.max() - half_extents.min(),
+        Shape::Cylinder { half_length, radius } => half_length.max(*radius),
+        _ => return None,
+    };
+    (edge_distance >= room).then_some(room)
 }
 
 /// What the file says about the mass.
@@ -116,7 +138,8 @@ fn placed(
     table: &Table,
     found: &mut Found,
 ) -> Option<(Shape, f64, Point)> {
-    let needs_solid = read.origin == Origin::Center || given_center.is_none() || matches!(mass, Some(GivenMass::Density(_)));
+    let needs_solid =
+        read.origin == Origin::Center || given_center.is_none() || matches!(mass, Some(GivenMass::Density(_)));
     let solid: Option<SolidProperties> = if needs_solid {
         match solid_properties(&read.shape) {
             Ok(solid) => Some(solid),
@@ -164,14 +187,19 @@ fn center_is_inside(shape: &Shape, center: &Point, entry: &Entry, found: &mut Fo
     }
     let diagnostic = entry
         .error("S107", found, format!("is {:?}, outside the object", [center.x, center.y, center.z]))
-        .expected(format!("a point of the object frame between {:.4?} and {:.4?}", low.coords.as_slice(), high.coords.as_slice()));
+        .expected(format!(
+            "a point of the object frame between {:.4?} and {:.4?}",
+            low.coords.as_slice(),
+            high.coords.as_slice()
+        ));
     found.diagnostics.push(diagnostic);
     None
 }
 
 /// Reads `[[obstacles]]`. Errors: two of one name (`S112`).
 pub(super) fn obstacles(root: &mut Table, files: &mut Files, found: &mut Found) -> Vec<Obstacle> {
-    let entries = root.optional("obstacles").and_then(|entry| entry.entries(found, "tables [[obstacles]]")).unwrap_or_default();
+    let entries =
+        root.optional("obstacles").and_then(|entry| entry.entries(found, "tables [[obstacles]]")).unwrap_or_default();
     let mut obstacles: Vec<Obstacle> = Vec::new();
     for entry in entries {
         let Some(obstacle) = obstacle(&entry, files, found) else { continue };
@@ -194,7 +222,8 @@ fn obstacle(entry: &Entry, files: &mut Files, found: &mut Found) -> Option<Obsta
     table.finish(found);
     let (name, read, pose) = (name?, read?, pose?);
     if read.origin != Origin::File {
-        let diagnostic = entry.error("S107", found, "has a mesh with an origin").fix("place the obstacle by its position instead");
+        let diagnostic =
+            entry.error("S107", found, "has a mesh with an origin").fix("place the obstacle by its position instead");
         found.diagnostics.push(diagnostic);
         return None;
     }

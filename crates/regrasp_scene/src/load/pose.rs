@@ -22,7 +22,8 @@ pub(super) fn quaternion(table: &mut Table, found: &mut Found) -> Option<[f64; 4
     let entries = table.present(&["quat_xyzw", "quat_wxyz"]);
     let [entry] = entries.as_slice() else {
         if let [first, second, ..] = entries.as_slice() {
-            let diagnostic = second.error("S106", found, format!("says the same as {}", first.name)).fix("keep one of them");
+            let diagnostic =
+                second.error("S106", found, format!("says the same as {}", first.name)).fix("keep one of them");
             found.diagnostics.push(diagnostic);
             return None;
         }
@@ -62,10 +63,12 @@ pub(super) fn pose(table: &mut Table, found: &mut Found) -> Option<Pose> {
 /// `{ axis, angle_deg }`: a turn about an axis of the world.
 pub(super) fn turn(entry: &Entry, found: &mut Found) -> Option<UnitQuaternion<f64>> {
     let mut table = entry.table(found)?;
-    let axis = table.required(found, "axis", "add axis = \"x\", \"y\", \"z\" or [x, y, z]").and_then(|entry| axis(&entry, found));
-    let angle = table.required(found, "angle_deg", "add angle_deg = 90").and_then(|entry| {
-        entry.number_that(found, "degrees between -360 and 360", |angle| angle.abs() <= 360.0)
-    });
+    let axis = table
+        .required(found, "axis", "add axis = \"x\", \"y\", \"z\" or [x, y, z]")
+        .and_then(|entry| axis(&entry, found));
+    let angle = table
+        .required(found, "angle_deg", "add angle_deg = 90")
+        .and_then(|entry| entry.number_that(found, "degrees between -360 and 360", |angle| angle.abs() <= 360.0));
     table.finish(found);
     Some(UnitQuaternion::from_axis_angle(&axis?, angle?.to_radians()))
 }

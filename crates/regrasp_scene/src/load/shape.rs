@@ -46,8 +46,11 @@ pub(super) fn shape(table: &mut Table, files: &mut Files, found: &mut Found) -> 
     let kinds = table.present(&KINDS);
     let [kind] = kinds.as_slice() else {
         let names: Vec<&str> = kinds.iter().map(|kind| kind.name.as_str()).collect();
-        let problem =
-            if names.is_empty() { "has no shape".to_owned() } else { format!("has {} shapes: {}", names.len(), names.join(", ")) };
+        let problem = if names.is_empty() {
+            "has no shape".to_owned()
+        } else {
+            format!("has {} shapes: {}", names.len(), names.join(", "))
+        };
         let diagnostic = table.error("S106", found, problem).expected(format!("exactly one of {}", one_of(&KINDS)));
         found.diagnostics.push(diagnostic);
         return None;
@@ -59,7 +62,7 @@ pub(super) fn shape(table: &mut Table, files: &mut Files, found: &mut Found) -> 
     let shape = primitive(kind, &mut inside, found);
     inside.finish(found);
     let shape = shape?;
-    has_likely_size(&shape, kind, found).then(|| ReadShape { shape, origin: Origin::File })
+    has_likely_size(&shape, kind, found).then_some(ReadShape { shape, origin: Origin::File })
 }
 
 fn primitive(kind: &Entry, table: &mut Table, found: &mut Found) -> Option<Shape> {
@@ -89,8 +92,9 @@ fn lengths(table: &mut Table, key: &'static str, found: &mut Found) -> Option<Ve
     if lengths.min() > 0.0 {
         return Some(lengths);
     }
-    let diagnostic =
-        entries.error("S107", found, format!("has the length {}", lengths.min())).expected("lengths above 0, in metres");
+    let diagnostic = entries
+        .error("S107", found, format!("has the length {}", lengths.min()))
+        .expected("lengths above 0, in metres");
     found.diagnostics.push(diagnostic);
     None
 }
@@ -104,7 +108,8 @@ fn has_likely_size(shape: &Shape, entry: &Entry, found: &mut Found) -> bool {
     if !is_large && !is_small {
         return true;
     }
-    let (unit, scale) = if is_large { ("millimetres", "0.001") } else { ("kilometres or a scale applied twice", "1000") };
+    let (unit, scale) =
+        if is_large { ("millimetres", "0.001") } else { ("kilometres or a scale applied twice", "1000") };
     let fix = if matches!(shape, Shape::Mesh(_) | Shape::Convex(_)) {
         format!("it is probably in {unit}: mesh = {{ file = ..., scale = {scale} }}")
     } else {
@@ -159,16 +164,18 @@ fn mesh(kind: &Entry, files: &mut Files, found: &mut Found) -> Option<ReadShape>
             }
         },
     };
-    has_likely_size(&shape, kind, found).then(|| ReadShape { shape, origin })
+    has_likely_size(&shape, kind, found).then_some(ReadShape { shape, origin })
 }
 
 /// One factor, or one per axis; negative mirrors. Errors: zero (`S107`).
 fn scale(entry: &Entry, found: &mut Found) -> Option<Vector> {
-    let scale = if entry.is_number() { Vector::repeat(entry.number(found)?) } else { entry.numbers::<3>(found)?.into() };
+    let scale =
+        if entry.is_number() { Vector::repeat(entry.number(found)?) } else { entry.numbers::<3>(found)?.into() };
     if scale.iter().all(|factor| *factor != 0.0) {
         return Some(scale);
     }
-    let diagnostic = entry.error("S107", found, "has a factor of 0, which leaves nothing").expected("factors other than 0");
+    let diagnostic =
+        entry.error("S107", found, "has a factor of 0, which leaves nothing").expected("factors other than 0");
     found.diagnostics.push(diagnostic);
     None
 }

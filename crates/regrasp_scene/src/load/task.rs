@@ -113,7 +113,12 @@ pub(super) fn start(root: &mut Table, hand: Option<&Hand>, found: &mut Found) ->
 }
 
 /// Reads `[goal]` and joins it with the start.
-pub(super) fn task(root: &mut Table, start: Option<Start>, hand: Option<&Hand>, found: &mut Found) -> Option<InHandTask> {
+pub(super) fn task(
+    root: &mut Table,
+    start: Option<Start>,
+    hand: Option<&Hand>,
+    found: &mut Found,
+) -> Option<InHandTask> {
     let fix = "add [goal] with turn = { axis = \"x\", angle_deg = 90 } or position and quat_xyzw";
     let mut table = root.required(found, "goal", fix)?.table(found)?;
     let absolute = table.present(&["position", "quat_xyzw", "quat_wxyz"]);
@@ -191,7 +196,11 @@ fn given_grasp(entry: &Entry, hand: Option<&Hand>, found: &mut Found) -> Option<
     table.finish(found);
     let [kind] = kinds.as_slice() else {
         let diagnostic = entry
-            .error("S106", found, format!("says {} of joints and contacts", if kinds.is_empty() { "neither" } else { "both" }))
+            .error(
+                "S106",
+                found,
+                format!("says {} of joints and contacts", if kinds.is_empty() { "neither" } else { "both" }),
+            )
             .expected("\"automatic\", { joints = { name = value } } or { contacts = { finger = [x, y, z] } }");
         found.diagnostics.push(diagnostic);
         return None;
@@ -220,8 +229,7 @@ pub(super) fn joint_values(table: &Table, hand: &Hand, all_needed: bool, found: 
     let mut is_good = true;
     for (name, entry) in table.all() {
         let Some(index) = names.iter().position(|known| known == name) else {
-            let problem =
-                format!("is not a joint of the hand{}", suggestion(name, names.iter().map(String::as_str)));
+            let problem = format!("is not a joint of the hand{}", suggestion(name, names.iter().map(String::as_str)));
             let diagnostic = entry.error("S120", found, problem).expected(names.join(", "));
             found.diagnostics.push(diagnostic);
             is_good = false;

@@ -21,7 +21,11 @@ pub(super) fn check_sizes(hand: &Hand, object: &Object, root: &mut Table, found:
     // Powers of ten only: the factor that was forgotten, not the one that would make it fit.
     let scale = 10f64.powi(if ratio > 1.0 { 3 } else { -3 });
     let diagnostic = entry
-        .error("M201", found, format!("is {object_size:.4} m large, the hand {hand_size:.4} m: one of them is in another unit"))
+        .error(
+            "M201",
+            found,
+            format!("is {object_size:.4} m large, the hand {hand_size:.4} m: one of them is in another unit"),
+        )
         .expected(format!("sizes that differ by a factor of at most {MAX_SIZE_RATIO}"))
         .fix(format!("lengths are in metres; a mesh in another unit takes scale = {scale}"));
     found.diagnostics.push(diagnostic);

@@ -1,0 +1,423 @@
+//! Bad scene files (reliability B4): one clear message each, with file, line, element, value and what would be right.
+
+use crate::support::{Folder, GOOD, cube};
+
+/// The good scene with `from` replaced, which must be there.
+fn with(from: &str, to: &str) -> String {
+    assert!(GOOD.contains(from), "{from}");
+    GOOD.replacen(from, to, 1)
+}
+
+#[track_caller]
+fn refused(text: &str, expected: &str) {
+    assert_eq!(Folder::new().messages(text), expected);
+}
+
+#[track_caller]
+fn refused_with(text: &str, parts: &[&str]) {
+    let messages = Folder::new().messages(text);
+    for part in parts {
+        assert!(messages.contains(part), "`{part}` is not in:\n{messages}");
+    }
+    assert_eq!(messages.lines().filter(|line| !line.starts_with("  fix:")).count(), 1, "one message:\n{messages}");
+}
+
+#[track_caller]
+fn noted(text: &str, part: &str) {
+    let notes = Folder::new().load(text).unwrap_or_else(|error| panic!("{error}")).notes;
+    assert!(notes.iter().any(|note| note.contains(part)), "`{part}` is not in {notes:?}");
+}
+
+#[test]
+fn the_good_scene_is_good() {
+    let loaded = Folder::new().load(GOOD).unwrap();
+    assert_eq!(loaded.notes, Vec::<String>::new());
+    assert_eq!(loaded.scene.object.edge_distance, 0.004);
+}
+
+#[test]
+fn unknown_key() {
+    refused(
+        &with("friction = 0.8", "friction = 0.8\nfricton = 0.7"),
+        "S101 scene.toml:13:1 key \"object.fricton\": is not a key that exists here; expected name, sphere, box, cylinder, capsule, \
+         ellipsoid, mesh, friction, edge_distance, crease_angle_deg, mass, density or center_of_mass\n  fix: did you mean friction?",
+    );
+}
+
+#[test]
+fn bare_quaternion() {
+    refused_with(
+        &with("0.078]", "0.078]\nquat = [0, 0, 0, 1]"),
+        &["S101 scene.toml:16:1 key \"start.quat\"", "fix: write quat_xyzw = [x, y, z, w] or quat_wxyz = [w, x, y, z]"],
+    );
+}
+
+#[test]
+fn decimal_comma() {
+    refused_with(
+        &with("friction = 0.8", "friction = 0,8"),
+        &["S100 scene.toml:12:", "fix: write 0.8 with a point, not a comma"],
+    );
+}
+
+#[test]
+fn missing_keys() {
+    refused(
+        &with("friction = 0.8\n", ""),
+        "S102 scene.toml:8:1 table \"object\": has no `friction`\n  fix: add friction = 0.8",
+    );
+    refused(
+        &with("mass = 0.1\n", ""),
+        "S102 scene.toml:8:1 table \"object\": has neither mass nor density\n  fix: add mass = 0.1, in kilograms, or density = 1000, in kg/m^3",
+    );
+    refused_with(
+        &with("position = [0.0, 0.0, 0.078]\n", ""),
+        &["S102 scene.toml:14:1 table \"start\": has no `position`"],
+    );
+    refused_with(
+        &with("turn = { axis = \"x\", angle_deg = 90 }", ""),
+        &["S102 scene.toml:17:1 table \"goal\": says neither a pose nor a turn"],
+    );
+}
+
+#[test]
+fn wrong_type() {
+    refused(
+        &with("friction = 0.8", "friction = \"0.8\""),
+        "S103 scene.toml:12:12 key \"object.friction\": is \"0.8\", a string; expected a number",
+    );
+    refused_with(
+        &with("[0.0, 0.0, 0.078]", "[0.0, 0.078]"),
+        &["S103 scene.toml:15:12 key \"start.position\": has 2 values"],
+    );
+}
+
+#[test]
+fn another_format_version_or_task() {
+    refused_with(
+        &with("regrasp-scene", "regrasp-plan"),
+        &["S105 scene.toml:1:10 key \"format\": is \"regrasp-plan\"", "\"regrasp-scene\""],
+    );
+    refused_with(
+        &with("format_version = 1", "format_version = 2"),
+        &["S105 scene.toml:2:18 key \"format_version\": is 2; expected 1"],
+    );
+    refused_with(
+        &with("\"in_hand\"", "\"dual_arm\""),
+        &["S105 scene.toml:3:8 key \"task\": is \"dual_arm\"; expected \"in_hand\""],
+    );
+}
+
+#[test]
+fn no_shape_or_two() {
+    refused_with(
+        &with("sphere = { radius = 0.032 }\n", ""),
+        &["S106 scene.toml:8:1 table \"object\": has no shape; expected exactly one of sphere, box,"],
+    );
+    refused_with(
+        &with("mass = 0.1", "box = { size = [0.05, 0.05, 0.05] }\nmass = 0.1"),
+        &["S106", "has 2 shapes: object.sphere, object.box"],
+    );
+}
+
+#[test]
+fn lengths_of_zero_or_less() {
+    refused(
+        &with("radius = 0.032", "radius = -0.032"),
+        "S107 scene.toml:10:21 key \"object.sphere.radius\": is -0.032; expected a length above 0, in metres",
+    );
+    refused_with(
+        &with("sphere = { radius = 0.032 }", "box = { size = [0.05, 0, 0.05] }"),
+        &["S107", "key \"object.box.size\": has the length 0"],
+    );
+}
+
+#[test]
+fn friction_below_zero_is_refused_and_odd_friction_is_noted() {
+    refused(
+        &with("friction = 0.8", "friction = -0.8"),
+        "S107 scene.toml:12:12 key \"object.friction\": is -0.8; expected a friction coefficient of 0 or more",
+    );
+    noted(&with("friction = 0.8", "friction = 0"), "scene.toml:12:12: friction 0");
+    noted(&with("friction = 0.8", "friction = 1e9"), "friction 1000000000 is more than");
+}
+
+#[test]
+fn mass_below_zero_is_refused_and_odd_mass_is_noted() {
+    refused_with(&with("mass = 0.1", "mass = -1"), &["S107 scene.toml:11:8 key \"object.mass\": is -1"]);
+    refused_with(
+        &with("mass = 0.1", "mass = 0.1\ndensity = 500"),
+        &["S106 scene.toml:12:11 key \"object.density\": cannot stand beside object.mass"],
+    );
+    noted(&with("mass = 0.1", "mass = 0"), "mass 0");
+    noted(&with("mass = 0.1", "mass = 250"), "masses are in kilograms");
+}
+
+#[test]
+fn numbers_that_are_not_finite() {
+    refused(
+        &with("friction = 0.8", "friction = nan"),
+        "V001 scene.toml:12:12 key \"object.friction\": is nan; expected a finite number",
+    );
+    refused_with(&with("0.078]", "inf]"), &["V001 scene.toml:15:23 key \"start.position[2]\": is inf"]);
+    refused_with(&with("mass = 0.1", "mass = 1e999"), &["V001 scene.toml:11:8 key \"object.mass\": is 1e999"]);
+}
+
+#[test]
+fn quaternions_off_length_one() {
+    let quat = |q: &str| with("0.078]", &format!("0.078]\nquat_xyzw = {q}"));
+    refused(
+        &quat("[0, 0, 0, 0]"),
+        "V003 scene.toml:16:13 key \"start.quat_xyzw\": is the zero quaternion, which is no rotation\n  fix: no rotation is quat_xyzw = [0, 0, 0, 1]",
+    );
+    refused(
+        &quat("[0, 0, 1, 1]"),
+        "V002 scene.toml:16:13 key \"start.quat_xyzw\": has length 1.414214; expected a unit quaternion (length 1 within 0.01)\n  \
+         fix: divided by its length it is [0.000000000, 0.000000000, 0.707106781, 0.707106781]",
+    );
+    refused_with(&quat("[1e200, 1e200, 0, 0]"), &["V002"]);
+    refused_with(&quat("[0, 0, 0, 1]\nquat_wxyz = [1, 0, 0, 0]"), &["S106", "says the same as start.quat_xyzw"]);
+    noted(&quat("[0, 0, 0.7071, 0.7071]"), "has length 0.999990 and was normalised");
+}
+
+#[test]
+fn goal_at_the_start_is_noted() {
+    noted(&with("angle_deg = 90", "angle_deg = 0"), "the goal pose is the start pose");
+    noted(
+        &with("turn = { axis = \"x\", angle_deg = 90 }", "position = [0.0, 0.0, 0.078]"),
+        "the goal pose is the start pose",
+    );
+}
+
+#[test]
+fn goal_said_twice() {
+    refused_with(
+        &with("turn =", "position = [0, 0, 0.08]\nturn ="),
+        &["S106 scene.toml:19:8 key \"goal.turn\": cannot stand beside goal.position"],
+    );
+}
+
+#[test]
+fn bad_axis() {
+    refused_with(
+        &with("axis = \"x\"", "axis = \"X\""),
+        &["S104 scene.toml:18:17 key \"goal.turn.axis\": is \"X\"", "expected x, y or z"],
+    );
+    refused_with(&with("axis = \"x\"", "axis = [0, 0, 0]"), &["S107", "is the zero vector"]);
+    refused_with(
+        &with("angle_deg = 90", "angle_deg = 5156"),
+        &["S107", "is 5156; expected degrees between -360 and 360"],
+    );
+}
+
+#[test]
+fn positions_in_millimetres() {
+    refused_with(
+        &with("[0.0, 0.0, 0.078]", "[0, 0, 78]"),
+        &[
+            "P302 scene.toml:14:1 key \"start\": position [0, 0, 78] is 78.000 m from the hand",
+            "[0, 0, 0.078] if these were millimetres",
+        ],
+    );
+    refused_with(
+        &with("angle_deg = 90 }", "angle_deg = 90 }\nmove = [0, 0, 10]"),
+        &["P302", "key \"goal\"", "position [0, 0, 10.078]"],
+    );
+}
+
+#[test]
+fn objects_of_impossible_size() {
+    refused_with(
+        &with("radius = 0.032", "radius = 32"),
+        &[
+            "M201 scene.toml:10:10 key \"object.sphere\": is 64.0000 x 64.0000 x 64.0000 m",
+            "lengths are in metres: multiply them by 0.001",
+        ],
+    );
+    refused_with(&with("radius = 0.032", "radius = 0.000032"), &["M201", "multiply them by 1000"]);
+    // 3 mm passes by itself, but not beside a hand of 0.1 m.
+    refused_with(
+        &with("radius = 0.032", "radius = 0.0015"),
+        &["M201 scene.toml:8:1 key \"object\": is 0.0030 m large, the hand 0.", "scale = 1000"],
+    );
+}
+
+#[test]
+fn a_mesh_in_millimetres() {
+    let folder = Folder::new();
+    folder.write("mm.obj", &cube(20.0, 12));
+    let messages = folder.messages(&with("sphere = { radius = 0.032 }", "mesh = { file = \"mm.obj\" }"));
+    assert_eq!(
+        messages,
+        "M201 scene.toml:10:8 key \"object.mesh\": is 40.0000 x 40.0000 x 40.0000 m; expected a largest extent between 0.002 m and 3 m\n  \
+         fix: it is probably in millimetres: mesh = { file = ..., scale = 0.001 }"
+    );
+    let scaled =
+        folder.load(&with("sphere = { radius = 0.032 }", "mesh = { file = \"mm.obj\", scale = 0.001 }")).unwrap();
+    assert!((scaled.scene.object.center_of_mass.coords - nalgebra::Vector3::repeat(0.02)).norm() < 1e-12);
+}
+
+#[test]
+fn scale_of_zero_is_refused_and_a_mirror_is_not() {
+    let mesh = |scale: &str| {
+        with("sphere = { radius = 0.032 }", &format!("mesh = {{ file = \"cube.obj\", scale = {scale} }}"))
+    };
+    refused_with(&mesh("0"), &["S107", "key \"object.mesh.scale\": has a factor of 0"]);
+    let folder = Folder::new();
+    let loaded = folder.load(&mesh("[-1, 1, 2]")).unwrap();
+    assert!((loaded.scene.object.center_of_mass - nalgebra::Point3::new(-0.02, 0.02, 0.04)).norm() < 1e-12);
+}
+
+#[test]
+fn a_mesh_wound_inside_out_is_turned_with_a_note() {
+    let folder = Folder::new();
+    let turned: String = cube(0.02, 12)
+        .lines()
+        .map(|line| match line.split(' ').collect::<Vec<_>>().as_slice() {
+            ["f", a, b, c] => format!("f {a} {c} {b}\n"),
+            _ => format!("{line}\n"),
+        })
+        .collect();
+    folder.write("cube.obj", &turned);
+    let loaded = folder.load(&with("sphere = { radius = 0.032 }", "mesh = { file = \"cube.obj\" }")).unwrap();
+    assert!(loaded.notes.iter().any(|note| note.contains("wound inside out")), "{:?}", loaded.notes);
+}
+
+#[test]
+fn an_open_mesh_needs_a_hull_or_its_mass_and_centre() {
+    let mesh = |more: &str| with("sphere = { radius = 0.032 }", &format!("mesh = {{ file = \"open.obj\"{more} }}"));
+    refused_with(
+        &mesh(""),
+        &[
+            "M210 scene.toml:8:1 table \"object\": has no volume",
+            "fix: mesh = { ..., solid = \"hull\" }, or give mass and center_of_mass",
+        ],
+    );
+    let folder = Folder::new();
+    let hull = folder.load(&mesh(", solid = \"hull\"")).unwrap();
+    assert!((hull.scene.object.center_of_mass.coords - nalgebra::Vector3::repeat(0.02)).norm() < 1e-12);
+    let given = mesh("").replace("mass = 0.1", "mass = 0.1\ncenter_of_mass = [0.02, 0.02, 0.02]");
+    assert_eq!(folder.load(&given).unwrap().scene.object.center_of_mass, nalgebra::Point3::from([0.02; 3]));
+}
+
+#[test]
+fn origin_of_a_mesh_moves_it() {
+    let mesh = |origin: &str| {
+        with("sphere = { radius = 0.032 }", &format!("mesh = {{ file = \"cube.obj\", origin = {origin} }}"))
+    };
+    let folder = Folder::new();
+    let centered = folder.load(&mesh("\"center\"")).unwrap().scene.object;
+    assert!(centered.center_of_mass.coords.norm() < 1e-12);
+    assert!((centered.shape.bounds().1 - nalgebra::Point3::from([0.02; 3])).norm() < 1e-12);
+    let moved = folder.load(&mesh("[0.0, 0.0, 0.04]")).unwrap().scene.object;
+    assert!((moved.center_of_mass - nalgebra::Point3::new(0.02, 0.02, -0.02)).norm() < 1e-12);
+    refused_with(&mesh("\"centre\""), &["S104", "did you mean \"center\"?"]);
+}
+
+#[test]
+fn centre_of_mass_outside_the_object() {
+    refused_with(
+        &with("mass = 0.1", "mass = 0.1\ncenter_of_mass = [0, 0, 20]"),
+        &["S107 scene.toml:12:18 key \"object.center_of_mass\": is [0.0, 0.0, 20.0], outside the object"],
+    );
+}
+
+#[test]
+fn meshes_that_are_no_meshes() {
+    let mesh = with("sphere = { radius = 0.032 }", "mesh = { file = \"bad.obj\" }");
+    let folder = Folder::new();
+    for content in ["", "v 0 0 0\n", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"] {
+        folder.write("bad.obj", content);
+        let messages = folder.messages(&mesh);
+        assert!(messages.contains("bad.obj"), "{content:?}: {messages}");
+    }
+    refused_with(&mesh, &["S110 scene.toml:10:17 key \"object.mesh.file\": \"bad.obj\" does not exist; looked at "]);
+    refused_with(&mesh.replace("bad.obj", "."), &["S110", "is not a file"]);
+    refused_with(&mesh.replace("bad.obj", ""), &["S110", "is empty"]);
+}
+
+#[test]
+fn packages_that_are_not_given() {
+    let text = with("\"hand.toml\"", "\"package://no_such_package/hand.toml\"");
+    refused_with(
+        &text,
+        &[
+            "U101 scene.toml:6:8 key \"hand.file\"",
+            "--package no_such_package: not given",
+            "fix: --package no_such_package=DIR",
+        ],
+    );
+    refused_with(&with("\"hand.toml\"", "\"https://example.org/hand.toml\""), &["U103", "never fetched"]);
+}
+
+#[test]
+fn faults_of_the_hand_file_keep_their_own_place() {
+    let folder = Folder::new();
+    folder.write("hand.toml", "format = \"regrasp hand\"\nversion = 1\n");
+    let messages = folder.messages(GOOD);
+    assert!(messages.contains("hand.toml") && messages.contains("urdf"), "{messages}");
+}
+
+#[test]
+fn grasps_with_wrong_names_or_counts() {
+    let grasp = |text: &str| with("0.078]", &format!("0.078]\ngrasp = {text}"));
+    refused_with(&grasp("\"auto\""), &["S104 scene.toml:16:9 key \"start.grasp\": is \"auto\"", "expected automatic"]);
+    refused_with(&grasp("{}"), &["S106", "says neither of joints and contacts"]);
+    refused_with(&grasp("{ contacts = { east = [0, 0, 0] } }"), &["S121", "has no contact for north, west, south"]);
+    let contacts = "{ contacts = { est = [0, 0, 0], north = [0, 0, 0], west = [0, 0, 0], south = [0, 0, 0] } }";
+    refused_with(&grasp(contacts), &["S120", "is not a finger of the hand (did you mean \"east\"?)"]);
+    refused_with(&grasp("{ joints = { east_abduction = 0 } }"), &["S121", "has no value for east_proximal_flexion, "]);
+    refused_with(
+        &grasp("{ joints = { east_abduction = 30 } }"),
+        &["P303", "key \"start.grasp.joints.east_abduction\": is 30, outside the joint's limits"],
+    );
+    refused_with(
+        &grasp("{ joints = { east_abducton = 0 } }"),
+        &["S120", "is not a joint of the hand (did you mean \"east_abduction\"?)"],
+    );
+}
+
+#[test]
+fn obstacles_of_one_name() {
+    let obstacle = "\n[[obstacles]]\nname = \"wall\"\nbox = { size = [0.1, 0.1, 0.01] }\nposition = [0, 0, 0.5]\n";
+    refused_with(
+        &format!("{GOOD}{obstacle}{obstacle}"),
+        &["S112 scene.toml:25:1", "has the name \"wall\", as another obstacle"],
+    );
+}
+
+#[test]
+fn edges_that_leave_no_room_for_contacts() {
+    refused_with(
+        &with("sphere = { radius = 0.032 }", "box = { size = [0.007, 0.007, 0.05] }"),
+        &["S107", "edge_distance", "leaves no place for a contact"],
+    );
+}
+
+#[test]
+fn files_that_are_no_text() {
+    let folder = Folder::new();
+    let path = std::env::temp_dir().join("regrasp_no_such_scene.toml");
+    let error = regrasp_scene::load_scene(&path, &Default::default()).unwrap_err().to_string();
+    assert!(error.starts_with("F001") && error.contains("cannot be read"), "{error}");
+    let error = regrasp_scene::load_scene(&std::env::temp_dir(), &Default::default()).unwrap_err().to_string();
+    assert!(error.contains("is not a regular file"), "{error}");
+    assert!(folder.messages("\u{0}").starts_with("S100"));
+    // A byte order mark is no fault.
+    assert!(folder.load(&format!("\u{feff}{GOOD}")).is_ok());
+}
+
+#[test]
+fn every_cause_is_found_in_one_run() {
+    let text = GOOD
+        .replace("friction = 0.8", "friction = -1")
+        .replace("radius = 0.032", "radius = 0")
+        .replace("angle_deg = 90", "angle = 90")
+        .replace("[0.0, 0.0, 0.078]", "[0.0, 0.0, nan]");
+    let messages = Folder::new().messages(&text);
+    for part in
+        ["object.friction", "object.sphere.radius", "has no `angle_deg`", "goal.turn.angle\"", "start.position[2]"]
+    {
+        assert!(messages.contains(part), "`{part}` is not in:\n{messages}");
+    }
+}

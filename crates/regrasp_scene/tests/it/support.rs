@@ -11,6 +11,7 @@ pub fn repository() -> PathBuf {
 }
 
 /// The shared models; says SKIPPED when they are absent.
+#[allow(clippy::print_stdout, reason = "a skipped test has to say so")]
 pub fn shared_models() -> Option<PathBuf> {
     if let Some(given) = std::env::var_os("REGRASP_MODELS") {
         return Some(PathBuf::from(given));

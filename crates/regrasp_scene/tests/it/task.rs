@@ -57,7 +57,8 @@ fn goals_are_absolute_or_relative() {
 
 #[test]
 fn grasps_are_read_by_name() {
-    let contacts = "{ contacts = { south = [0, -0.032, 0], east = [0.032, 0, 0], west = [-0.032, 0, 0], north = [0, 0.032, 0] } }";
+    let contacts =
+        "{ contacts = { south = [0, -0.032, 0], east = [0.032, 0, 0], west = [-0.032, 0, 0], north = [0, 0.032, 0] } }";
     let query = task(&GOOD.replace("0.078]", &format!("0.078]\ngrasp = {contacts}"))).query(0);
     let expected = [[0.032, 0.0, 0.0], [0.0, 0.032, 0.0], [-0.032, 0.0, 0.0], [0.0, -0.032, 0.0]].map(Point::from);
     assert_eq!(query.start_grasp, GraspRequest::Contacts(expected.to_vec()));
@@ -85,7 +86,8 @@ fn hand_pose_and_rest_posture_take_effect() {
     let moved = folder.load(&text.replace("[0.0, 0.0, 0.078]", "[0.1, 0.0, 0.078]")).unwrap().scene.hand;
     assert_eq!(moved.fingers[2].rest[0], 0.25);
     assert_eq!(moved.fingers[2].rest[1], plain.fingers[2].rest[1]);
-    let tip = |hand: &regrasp_robot::Hand| hand.fingers[0].chain.tip(&[0.1, 0.2, 0.3], &hand.fingers[0].tip.center_in_body);
+    let tip =
+        |hand: &regrasp_robot::Hand| hand.fingers[0].chain.tip(&[0.1, 0.2, 0.3], &hand.fingers[0].tip.center_in_body);
     let (before, after) = (tip(&plain), tip(&moved));
     assert!((after - Point::new(0.1 - before.x, -before.y, before.z)).norm() < 1e-12);
 }
