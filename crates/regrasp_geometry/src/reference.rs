@@ -34,3 +34,54 @@ fn thickness_of(points: &[Point]) -> f64 {
     let normal = along.cross(&(c - a)).normalize();
     farthest(&|p| normal.dot(&(p - a)).abs()).0.min(width)
 }
+
+/// TEMPORARY stand-in until branch `geometry` is merged.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Answer {
+    /// Separated.
+    SeparatedBy(f64),
+    /// Penetrating.
+    Penetrating(f64),
+    /// Unresolved.
+    Unresolved,
+}
+
+/// TEMPORARY stand-in.
+#[derive(Clone)]
+pub struct ReferenceShape(parry3d_f64::shape::SharedShape);
+
+impl ReferenceShape {
+    /// TEMPORARY stand-in.
+    pub fn new(shape: &crate::Shape) -> Self {
+        use parry3d_f64::shape::SharedShape;
+        ReferenceShape(match shape {
+            crate::Shape::Sphere { radius } => SharedShape::ball(*radius),
+            crate::Shape::Capsule { half_length, radius } => SharedShape::capsule_z(*half_length, *radius),
+            crate::Shape::Cuboid { half_extents: h } => SharedShape::cuboid(h.x, h.y, h.z),
+            _ => unimplemented!(),
+        })
+    }
+}
+
+/// TEMPORARY stand-in.
+pub fn distance(
+    a: &ReferenceShape,
+    pose_a: &crate::Pose,
+    b: &ReferenceShape,
+    pose_b: &crate::Pose,
+    max: f64,
+) -> Answer {
+    let convert = |pose: &crate::Pose| {
+        let (t, q) = (pose.translation.vector, pose.rotation.coords);
+        parry3d_f64::math::Pose {
+            translation: ParryVector::new(t.x, t.y, t.z),
+            rotation: parry3d_f64::math::Rotation::from_xyzw(q.x, q.y, q.z, q.w),
+        }
+    };
+    match parry3d_f64::query::contact(&convert(pose_a), &*a.0, &convert(pose_b), &*b.0, max) {
+        Ok(None) => Answer::SeparatedBy(max),
+        Ok(Some(contact)) if contact.dist > 0.0 => Answer::SeparatedBy(contact.dist),
+        Ok(Some(contact)) => Answer::Penetrating(-contact.dist),
+        Err(_) => Answer::Unresolved,
+    }
+}

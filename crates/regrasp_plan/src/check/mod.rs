@@ -3,16 +3,24 @@
 //! It shares no decision with the planner: own forward kinematics from the robot's joints, own closed forms of
 //! surfaces, force closure by exact cones with a certificate, distances by parry, and motion bounds between waypoints.
 
+/// Everything that can collide, and which pairs must not.
+pub mod bodies;
 /// Force closure with margin, by exact second-order cones.
 pub mod closure;
+/// No collision at any moment.
+pub mod collision;
 /// Fingertips on their contacts, and contacts on the object.
 pub mod contact;
 /// What can be judged from the waypoints alone.
 pub mod continuity;
 /// The checker's own forward kinematics and motion bounds.
 pub mod kinematics;
+/// Lifting and landing of moving fingertips.
+pub mod lift;
 /// The scene as the checker sees it.
 pub mod model;
+/// One step between two waypoints, and certificates of separation.
+pub mod motion;
 /// What the plan promises, and whether the promises may be made and are kept.
 pub mod promises;
 /// Distance from the object's surface and the normals there.
@@ -176,4 +184,11 @@ fn judge(
     contact::check_contacts(&scene.object, model, plan, settings, log);
     report.min_margin = promises::check_closure(&scene.object, model, plan, settings, log);
     promises::check_promises(&scene.object, plan, settings, report.min_margin, log);
+    match bodies::Bodies::new(scene, model) {
+        Err(message) => log.push(Violation::new(ViolationKind::WrongScene, message)),
+        Ok(bodies) => {
+            (report.min_clearance, report.n_distances) =
+                collision::check_collision(&bodies, model, plan, settings, log);
+        }
+    }
 }

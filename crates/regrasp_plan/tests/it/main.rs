@@ -1,0 +1,5 @@
+//! Tests of plan files and of the checker.
+
+mod check;
+mod format;
+mod sample;
