@@ -47,7 +47,7 @@ pub fn cheapest_path(
 ) -> Option<CheapestPath> {
     let mut costs: Vec<f64> = Vec::new();
     let mut parents: Vec<usize> = Vec::new();
-    let mut reach = |costs: &mut Vec<f64>, parents: &mut Vec<usize>, node: usize| {
+    let reach = |costs: &mut Vec<f64>, parents: &mut Vec<usize>, node: usize| {
         if node >= costs.len() {
             costs.resize(node + 1, f64::INFINITY);
             parents.resize(node + 1, usize::MAX);

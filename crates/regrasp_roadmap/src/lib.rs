@@ -3,20 +3,20 @@
 //! The one generic seam is [`Space`]: sample, distance, connect. Searches over joint values of one finger take plain
 //! slices and a closure instead ([`rrt_connect`]).
 
-/// What a space must answer.
-pub mod space;
+/// Cheapest paths in a graph.
+pub mod astar;
 /// Connected components of a growing graph.
 pub mod components;
 /// Nearest neighbours, by looking at all.
 pub mod nearest;
-/// Cheapest paths in a graph.
-pub mod astar;
 /// Two trees that grow towards each other, in a box of real coordinates.
 pub mod rrt_connect;
-/// A roadmap that keeps only samples that see nothing known or join what was apart.
-pub mod visibility_prm;
 /// Shortcuts.
 pub mod smoothing;
+/// What a space must answer.
+pub mod space;
+/// A roadmap that keeps only samples that see nothing known or join what was apart.
+pub mod visibility_prm;
 
 pub use astar::{CheapestPath, cheapest_path};
 pub use components::Components;

@@ -5,6 +5,7 @@
 use crate::nearest::squared_distance;
 use crate::smoothing::shorten_polyline;
 use regrasp_base::Rng;
+use std::cell::Cell;
 
 /// Settings of [`RrtConnect::plan`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -116,49 +117,148 @@ impl RrtConnect {
         if is_valid(start, goal) {
             return Some(vec![start.to_vec(), goal.to_vec()]);
         }
-        let mut n_checks = 1;
-        let mut counted = |a: &[f64], b: &[f64]| {
-            n_checks += 1;
-            (is_valid(a, b), n_checks >= settings.max_checks)
+        // Nothing is valid once the checks are used up.
+        let checks_left = Cell::new(settings.max_checks);
+        let mut check = |a: &[f64], b: &[f64]| {
+            checks_left.set(checks_left.get().saturating_sub(1));
+            checks_left.get() > 0 && is_valid(a, b)
         };
         self.trees[0].restart(start);
         self.trees[1].restart(goal);
-        let mut active = 0;
-        for _ in 0..settings.max_iterations {
+        let mut meeting = None;
+        for iteration in 0..settings.max_iterations {
+            if checks_left.get() == 0 {
+                break;
+            }
             self.sample.clear();
             self.sample.extend(lower.iter().zip(upper).map(|(&low, &high)| rng.uniform(low, high)));
-            let [first, second] = &mut self.trees;
-            let (growing, other) = if active == 0 { (first, second) } else { (second, first) };
-            let mut spent = false;
-            let mut check = |a: &[f64], b: &[f64]| {
-                let (valid, last) = counted(a, b);
-                spent |= last;
-                valid
+            let [from_start, from_goal] = &mut self.trees;
+            let start_grows = iteration % 2 == 0;
+            let (growing, other) = if start_grows { (from_start, from_goal) } else { (from_goal, from_start) };
+            let node = match extend(growing, &self.sample, settings.step, &mut self.next, &mut check) {
+                Extension::Reached(node) | Extension::Advanced(node) => node,
+                Extension::Trapped => continue,
             };
-            let mut met = None;
-            if let Extension::Reached(node) | Extension::Advanced(node) =
-                extend(growing, &self.sample, settings.step, &mut self.next, &mut check)
-            {
-                self.sample.clear();
-                self.sample.extend_from_slice(growing.point(node, dimension));
-                if let Some(meeting) = connect(other, &self.sample, settings.step, &mut self.next, &mut check, &mut || false)
-                {
-                    met = Some((node, meeting));
-                }
+            let target = growing.point(node, dimension);
+            if let Some(met) = connect(other, target, settings.step, &mut self.next, &mut check) {
+                meeting = Some(if start_grows { (node, met) } else { (met, node) });
+                break;
             }
-            if let Some((node, meeting)) = met {
-                let (from_start, from_goal) = if active == 0 { (node, meeting) } else { (meeting, node) };
-                let mut path = self.trees[0].way_to_root(from_start, dimension);
-                path.reverse();
-                path.extend(self.trees[1].way_to_root(from_goal, dimension).into_iter().skip(1));
-                shorten_polyline(&mut path, settings.n_shortcuts, rng, is_valid);
-                return Some(path);
-            }
-            if spent {
-                return None;
-            }
-            active = 1 - active;
         }
-        None
+        let (in_start_tree, in_goal_tree) = meeting?;
+        let mut path = self.trees[0].way_to_root(in_start_tree, dimension);
+        path.reverse();
+        path.extend(self.trees[1].way_to_root(in_goal_tree, dimension).into_iter().skip(1));
+        shorten_polyline(&mut path, settings.n_shortcuts, rng, is_valid);
+        Some(path)
+    }
+}
+
+/// EXTEND of the paper: one step from the nearest node towards `target`.
+fn extend(
+    tree: &mut Tree,
+    target: &[f64],
+    step: f64,
+    next: &mut Vec<f64>,
+    is_valid: &mut impl FnMut(&[f64], &[f64]) -> bool,
+) -> Extension {
+    let near = tree.nearest(target);
+    extend_from(tree, near, target, step, next, is_valid)
+}
+
+/// CONNECT of the paper: steps towards `target` until it is reached; the node there.
+fn connect(
+    tree: &mut Tree,
+    target: &[f64],
+    step: f64,
+    next: &mut Vec<f64>,
+    is_valid: &mut impl FnMut(&[f64], &[f64]) -> bool,
+) -> Option<usize> {
+    let mut near = tree.nearest(target);
+    loop {
+        match extend_from(tree, near, target, step, next, is_valid) {
+            Extension::Reached(node) => return Some(node),
+            Extension::Advanced(node) => near = node,
+            Extension::Trapped => return None,
+        }
+    }
+}
+
+/// One step from `near` towards `target`.
+fn extend_from(
+    tree: &mut Tree,
+    near: usize,
+    target: &[f64],
+    step: f64,
+    next: &mut Vec<f64>,
+    is_valid: &mut impl FnMut(&[f64], &[f64]) -> bool,
+) -> Extension {
+    let from = tree.point(near, target.len());
+    let distance = squared_distance(from, target).sqrt();
+    let reached = distance <= step;
+    next.clear();
+    if reached {
+        next.extend_from_slice(target);
+    } else {
+        next.extend(from.iter().zip(target).map(|(a, b)| a + (b - a) * (step / distance)));
+    }
+    if !is_valid(from, next) {
+        return Extension::Trapped;
+    }
+    let node = tree.push(next, near);
+    if reached { Extension::Reached(node) } else { Extension::Advanced(node) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::toy_world::Toy;
+
+    #[test]
+    fn finds_a_path_exactly_where_flood_fill_does() {
+        let mut rng = Rng::keyed(1, "rrt_toy", 0);
+        let mut search = RrtConnect::new();
+        let settings = RrtSettings { max_iterations: 4000, max_checks: 200_000, step: 0.7, n_shortcuts: 20 };
+        let (mut n_connected, mut n_cut) = (0, 0);
+        for _ in 0..120 {
+            let toy = Toy::random(7, 0.35, &mut rng);
+            let (start, goal) = (toy.free_point(&mut rng), toy.free_point(&mut rng));
+            let colours = toy.flood();
+            let connected = colours[toy.cell(&start)] == colours[toy.cell(&goal)];
+            let path =
+                search.plan(&start, &goal, &[0.0; 2], &[toy.size(); 2], &settings, &mut rng, |a, b| toy.sees(a, b));
+            assert_eq!(path.is_some(), connected, "{start:?} to {goal:?}");
+            let Some(path) = path else {
+                n_cut += 1;
+                continue;
+            };
+            assert!(path.windows(2).all(|w| toy.sees(&w[0], &w[1])));
+            assert_eq!((&path[0], &path[path.len() - 1]), (&start, &goal));
+            n_connected += 1;
+        }
+        assert!(n_connected > 30 && n_cut > 15, "{n_connected} {n_cut}");
+    }
+
+    #[test]
+    fn the_budget_is_kept_and_the_same_stream_gives_the_same_path() {
+        let mut rng = Rng::keyed(2, "rrt_toy", 0);
+        let toy = Toy::new(3, &[(1, 0), (1, 1), (1, 2)]);
+        let mut n_checks = 0;
+        let settings = RrtSettings { max_iterations: usize::MAX, max_checks: 500, step: 0.2, n_shortcuts: 5 };
+        let cut = RrtConnect::new().plan(&[0.5; 2], &[2.5; 2], &[0.0; 2], &[3.0; 2], &settings, &mut rng, |a, b| {
+            n_checks += 1;
+            n_checks > 1_000_000 || toy.sees(a, b)
+        });
+        assert!(cut.is_none() && n_checks <= 501, "{n_checks}");
+        let toy = Toy::new(3, &[(1, 0), (1, 1)]);
+        let mut search = RrtConnect::new();
+        let settings = RrtSettings { max_iterations: 500, ..RrtSettings::default() };
+        let mut run = || {
+            let mut rng = Rng::keyed(3, "rrt_toy", 0);
+            search.plan(&[0.5; 2], &[2.5, 0.5], &[0.0; 2], &[3.0; 2], &settings, &mut rng, |a, b| toy.sees(a, b))
+        };
+        let first = run();
+        assert!(first.is_some());
+        assert_eq!(first, run());
     }
 }

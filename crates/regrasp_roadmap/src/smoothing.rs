@@ -95,7 +95,10 @@ mod tests {
         let length: f64 = path.windows(2).map(|w| distance(&w[0], &w[1])).sum();
         let taut = 2.0 * 0.5f64.hypot(0.5) + 1.0;
         assert!(length >= taut - 1e-12 && length < 1.03 * taut, "{length} against {taut}");
-        assert_eq!((path[0].as_slice(), path[path.len() - 1].as_slice()), ([0.5, 1.5].as_slice(), [2.5, 1.5].as_slice()));
+        assert_eq!(
+            (path[0].as_slice(), path[path.len() - 1].as_slice()),
+            ([0.5, 1.5].as_slice(), [2.5, 1.5].as_slice())
+        );
     }
 
     #[test]
