@@ -319,11 +319,7 @@ fn make_chain(
     found: &mut Diagnostics,
 ) -> Option<Chain> {
     let independent: Vec<JointId> = joints.iter().copied().filter(|j| robot.joints[j.0].mimic.is_none()).collect();
-<<<<<<< HEAD
     let (mut chain_joints, mut names, mut lower, mut upper) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-=======
-    let mut chain = Chain::new(Vec::new(), Vec::new(), Vec::new(), Vec::new());
->>>>>>> scene
     for id in &independent {
         let joint = &robot.joints[id.0];
         names.push(joint.name.clone());
@@ -374,11 +370,7 @@ fn make_chain(
             complete = false;
         }
     }
-<<<<<<< HEAD
     complete.then(|| Chain::new(chain_joints, names, lower, upper))
-=======
-    complete.then(|| Chain::new(chain.joints, chain.names, chain.lower, chain.upper))
->>>>>>> scene
 }
 
 fn rest_posture(spec: &FingerSpec, chain: &Chain, found: &mut Diagnostics) -> Vec<f64> {
