@@ -72,11 +72,8 @@ pub struct Demo {
 /// `regrasp inspect`
 #[derive(Debug, Args)]
 pub struct Inspect {
-    /// URDF file
+    /// URDF file, or a hand file
     pub urdf: PathBuf,
-    /// SRDF file whose disabled pairs are taken over
-    #[arg(long, value_name = "FILE")]
-    pub srdf: Option<PathBuf>,
     /// Write a hand file
     #[arg(short, long, value_name = "hand.toml")]
     pub output: Option<PathBuf>,

@@ -1,74 +1,13 @@
-//! Frames as rotation matrix and translation, for the hottest paths.
+//! Joints with their constant parts multiplied out, for the hottest paths.
 //!
-//! Composing and applying them takes about half the work of quaternion poses, and a joint's whole motion is three
-//! precomputed matrices (Rodrigues' formula): `R(q) = A + sin(q) B + cos(q) C`.
+//! A turning joint's whole motion is three precomputed matrices (Rodrigues' formula): `R(q) = A + sin(q) B + cos(q) C`.
 
 use super::chain::{ChainJoint, Motion};
 use super::trig::sin_cos;
-use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
-use regrasp_geometry::{Point, Pose, Vector};
-
-/// Pose of a body in the base frame: `base_from_body` as rotation matrix and translation.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BodyFrame {
-    /// Columns are the body's axes in the base frame.
-    pub rotation: Matrix3<f64>,
-    /// The body's origin in the base frame.
-    pub translation: Vector,
-}
-
-impl BodyFrame {
-    /// The base frame itself.
-    pub const IDENTITY: BodyFrame = BodyFrame {
-        rotation: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
-        translation: Vector::new(0.0, 0.0, 0.0),
-    };
-
-    /// The same pose as a matrix.
-    pub fn from_pose(pose: &Pose) -> Self {
-        BodyFrame { rotation: *pose.rotation.to_rotation_matrix().matrix(), translation: pose.translation.vector }
-    }
-
-    /// The same pose with a quaternion.
-    pub fn to_pose(&self) -> Pose {
-        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(self.rotation));
-        Pose::from_parts(Translation3::from(self.translation), rotation)
-    }
-
-    /// `point_in_base` of a point given in the body.
-    #[inline]
-    pub fn transform_point(&self, point_in_body: &Point) -> Point {
-        Point::from(apply(&self.rotation, &point_in_body.coords) + self.translation)
-    }
-
-    /// `vector_in_base` of a vector given in the body.
-    #[inline]
-    pub fn transform_vector(&self, vector_in_body: &Vector) -> Vector {
-        apply(&self.rotation, vector_in_body)
-    }
-
-    /// `point_in_body` of a point given in the base frame.
-    #[inline]
-    pub fn inverse_transform_point(&self, point_in_base: &Point) -> Point {
-        Point::from(self.rotation.tr_mul(&(point_in_base.coords - self.translation)))
-    }
-
-    /// `vector_in_body` of a vector given in the base frame.
-    #[inline]
-    pub fn inverse_transform_vector(&self, vector_in_base: &Vector) -> Vector {
-        self.rotation.tr_mul(vector_in_base)
-    }
-
-    /// `base_from_child`, where `self` is `base_from_body` and `body_from_child` is given.
-    #[inline]
-    #[must_use]
-    pub fn compose(&self, body_from_child: &BodyFrame) -> BodyFrame {
-        BodyFrame {
-            rotation: product(&self.rotation, &body_from_child.rotation),
-            translation: apply(&self.rotation, &body_from_child.translation) + self.translation,
-        }
-    }
-}
+use nalgebra::Matrix3;
+use regrasp_geometry::Vector;
+pub use regrasp_geometry::collision::Placement as BodyFrame;
+use regrasp_geometry::collision::placement::{apply, product};
 
 /// A chain joint with its constant parts multiplied out.
 #[derive(Debug, Clone)]
@@ -178,23 +117,4 @@ impl PreparedJoint {
             },
         }
     }
-}
-
-/// Matrix times vector, written out: the general product of the library is not unrolled.
-#[inline(always)]
-fn apply(a: &Matrix3<f64>, v: &Vector) -> Vector {
-    Vector::new(
-        a.m11 * v.x + a.m12 * v.y + a.m13 * v.z,
-        a.m21 * v.x + a.m22 * v.y + a.m23 * v.z,
-        a.m31 * v.x + a.m32 * v.y + a.m33 * v.z,
-    )
-}
-
-/// Matrix times matrix, written out.
-#[inline(always)]
-fn product(a: &Matrix3<f64>, b: &Matrix3<f64>) -> Matrix3<f64> {
-    let column = |x: f64, y: f64, z: f64| {
-        [a.m11 * x + a.m12 * y + a.m13 * z, a.m21 * x + a.m22 * y + a.m23 * z, a.m31 * x + a.m32 * y + a.m33 * z]
-    };
-    Matrix3::from([column(b.m11, b.m21, b.m31), column(b.m12, b.m22, b.m32), column(b.m13, b.m23, b.m33)])
 }

@@ -112,7 +112,7 @@ impl Chain {
 
     /// Position, in the base frame, of `point_in_body` of the last body.
     pub fn tip(&self, coordinates: &[f64], point_in_body: &Point) -> Point {
-        self.last_frame(coordinates).transform_point(point_in_body)
+        self.last_frame(coordinates).point(point_in_body)
     }
 
     /// Jacobian of a point of the last body: 3 rows, one column per coordinate, in the base frame.
@@ -203,8 +203,8 @@ mod tests {
                 let difference = (pose.to_homogeneous() - frame.to_pose().to_homogeneous()).abs().max();
                 assert!(difference < 1e-13, "{difference:e}");
                 let point = Point::new(0.3, -0.1, 0.2);
-                assert!((pose * point - frame.transform_point(&point)).norm() < 1e-13);
-                assert!((pose.inverse() * point - frame.inverse_transform_point(&point)).norm() < 1e-13);
+                assert!((pose * point - frame.point(&point)).norm() < 1e-13);
+                assert!((pose.inverse() * point - frame.point_to_child(&point)).norm() < 1e-13);
             }
         }
     }

@@ -128,7 +128,7 @@ mod tests {
             let mut at = |share: f64| {
                 let q: Vec<f64> = from.iter().zip(&change).map(|(a, d)| a + share * d).collect();
                 chain.forward_frames(&q, &mut frames);
-                frames[body].transform_point(&point)
+                frames[body].point(&point)
             };
             let (start, end) = (at(0.0), at(1.0));
             let (mut travel, mut deviation): (f64, f64) = (0.0, 0.0);
@@ -188,7 +188,7 @@ mod tests {
             let change: Vec<f64> = (0..3).map(|_| rng.uniform(-0.1, 0.1)).collect();
             let at = |share: f64| {
                 let q: Vec<f64> = from.iter().zip(&change).map(|(a, d)| a + share * d).collect();
-                chain.last_frame(&q).transform_point(&center)
+                chain.last_frame(&q).point(&center)
             };
             let middle = at(0.0) + (at(1.0) - at(0.0)) * 0.5;
             travel += (at(1.0) - at(0.0)).norm() / bound.first_order(&change);

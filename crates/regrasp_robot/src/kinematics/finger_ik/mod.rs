@@ -173,7 +173,7 @@ impl FingerIk {
     /// The tip's centre at `coordinates`, in the base frame.
     #[inline]
     pub fn tip(&self, coordinates: &[f64]) -> Point {
-        self.chain.last_frame(coordinates).transform_point(&self.center_in_body)
+        self.chain.last_frame(coordinates).point(&self.center_in_body)
     }
 }
 

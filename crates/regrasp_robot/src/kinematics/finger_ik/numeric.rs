@@ -214,15 +214,15 @@ impl NumericIk {
         };
         self.chain.forward_frames(coordinates, frames);
         let last = frames.last().copied().unwrap_or(BodyFrame::IDENTITY);
-        let tip = last.transform_point(&self.center_in_body).coords;
+        let tip = last.point(&self.center_in_body).coords;
         let mut state = State {
             tip,
-            tip_axis: last.transform_vector(&self.tip_axis_in_body),
+            tip_axis: last.vector(&self.tip_axis_in_body),
             slides: [Vector::zeros(); MAX_COORDINATES],
             spins: [Vector::zeros(); MAX_COORDINATES],
         };
         for (joint, frame) in self.chain.joints.iter().zip(frames.iter()) {
-            let axis = frame.transform_vector(&joint.axis) * joint.multiplier;
+            let axis = frame.vector(&joint.axis) * joint.multiplier;
             match joint.motion {
                 Motion::Turn => {
                     state.slides[joint.coordinate] += axis.cross(&(tip - frame.translation));

@@ -94,11 +94,11 @@ impl ThreeR {
         let mut axes = [Vector::zeros(); 3];
         let mut origins = [Vector::zeros(); 3];
         for (i, joint) in joints.iter().enumerate() {
-            frame = frame.compose(&BodyFrame::from_pose(&joint.parent_from_joint));
-            axes[i] = frame.transform_vector(&joint.axis);
+            frame = frame.then(&BodyFrame::from(&joint.parent_from_joint));
+            axes[i] = frame.vector(&joint.axis);
             origins[i] = frame.translation;
         }
-        let tip = frame.transform_point(center_in_body).coords;
+        let tip = frame.point(center_in_body).coords;
         let scale = (tip - origins[2]).norm() + (origins[2] - origins[1]).norm() + (origins[1] - origins[0]).norm();
         let [axis_1, axis_2, axis_3] = axes;
         let cross = axis_1.cross(&axis_2);
@@ -309,7 +309,7 @@ impl ThreeR {
 
     /// Newton steps until the tip is on the target; false when it is not reached.
     fn polish(&self, chain: &Chain, target: &Point, coordinates: &mut [f64; 3]) -> bool {
-        let mut error = target - chain.last_frame(coordinates).transform_point(&self.center_in_body);
+        let mut error = target - chain.last_frame(coordinates).point(&self.center_in_body);
         for _ in 0..4 {
             if error.norm_squared() < POLISHED * POLISHED {
                 return true;
@@ -321,7 +321,7 @@ impl ThreeR {
                 break;
             }
             let moved = [coordinates[0] + step.x, coordinates[1] + step.y, coordinates[2] + step.z];
-            let moved_error = target - chain.last_frame(&moved).transform_point(&self.center_in_body);
+            let moved_error = target - chain.last_frame(&moved).point(&self.center_in_body);
             if moved_error.norm_squared() >= error.norm_squared() {
                 break;
             }
@@ -334,7 +334,7 @@ impl ThreeR {
     fn jacobian(&self, chain: &Chain, coordinates: &[f64]) -> Matrix3<f64> {
         let mut frames = [BodyFrame::IDENTITY; 3];
         chain.forward_frames(coordinates, &mut frames);
-        let tip = frames[2].transform_point(&self.center_in_body).coords;
+        let tip = frames[2].point(&self.center_in_body).coords;
         let mut jacobian = Matrix3::zeros();
         for (joint, frame) in chain.joints.iter().zip(&frames) {
             let axis = frame.rotation * joint.axis.into_inner();
