@@ -38,7 +38,10 @@ refused!(
   <mesh filename="package://allegro/meshes/tip.stl"/>
 </geometry></collision></link>
 </robot>"#,
-    []
+    [
+        r#"U101 hand.urdf:3:9 link "a": "package://allegro/meshes/tip.stl" not found; looked in: (1) --package allegro: not given (2) ROS_PACKAGE_PATH, AMENT_PREFIX_PATH: not set (3) package.xml above the model: none says <name>allegro</name> (4) folder of that name: . and folders above (none called allegro)
+  fix: --package allegro=DIR"#
+    ]
 );
 
 refused!(
@@ -48,7 +51,9 @@ refused!(
   <mesh filename="package://allegro"/>
 </geometry></collision></link>
 </robot>"#,
-    []
+    [
+        r#"U102 hand.urdf:3:9 link "a": "package://allegro" has no path after the package name; expected package://NAME/PATH"#
+    ]
 );
 
 refused!(
@@ -58,7 +63,7 @@ refused!(
   <mesh filename=""/>
 </geometry></collision></link>
 </robot>"#,
-    []
+    [r#"U102 hand.urdf:3:9 link "a": the file name is empty; expected a path or package://NAME/PATH"#]
 );
 
 refused!(
@@ -68,7 +73,7 @@ refused!(
   <mesh/>
 </geometry></collision></link>
 </robot>"#,
-    []
+    [r#"U112 hand.urdf:3:3 link "a": <mesh> has no attribute filename; expected <mesh filename="...">"#]
 );
 
 refused!(
@@ -78,7 +83,10 @@ refused!(
   <mesh filename="http://example.com/tip.stl"/>
 </geometry></collision></link>
 </robot>"#,
-    []
+    [
+        r#"U103 hand.urdf:3:9 link "a": "http://example.com/tip.stl" would have to be fetched; models are never fetched; expected a file
+  fix: download it and name the file"#
+    ]
 );
 
 refused!(
@@ -88,7 +96,9 @@ refused!(
   <mesh filename="tip.stl"/>
 </geometry></collision></link>
 </robot>"#,
-    []
+    [
+        r#"U101 hand.urdf:3:9 link "a": "tip.stl" not found; looked in: tip.stl; expected a path relative to the model file, or package://NAME/PATH"#
+    ]
 );
 
 refused!(
@@ -102,7 +112,7 @@ refused!(
 <origin xyz="0 NaN 0"/>
 </joint>
 </robot>"#,
-    []
+    [r#"V001 hand.urdf:7:9 joint "j": xyz is NaN; expected a finite number"#]
 );
 
 refused!(
@@ -116,7 +126,7 @@ refused!(
 <limit lower="-1" upper="inf"/>
 </joint>
 </robot>"#,
-    []
+    [r#"V001 hand.urdf:7:19 joint "j": upper is infinite; expected a finite number"#]
 );
 
 refused!(
@@ -130,7 +140,8 @@ refused!(
 <limit lower="0,05" upper="1"/>
 </joint>
 </robot>"#,
-    []
+    [r#"U110 hand.urdf:7:8 joint "j": cannot read lower "0,05" as a number; expected a decimal number such as 0.05
+  fix: write 0.05"#]
 );
 
 refused!(
@@ -143,7 +154,8 @@ refused!(
 <axis xyz="0,0,1"/><limit lower="-1" upper="1"/>
 </joint>
 </robot>"#,
-    []
+    [r#"U111 hand.urdf:6:7 joint "j": xyz of <axis> has 1 numbers: "0,0,1"; expected 3 numbers separated by spaces
+  fix: separate numbers by spaces, not by commas"#]
 );
 
 refused!(
@@ -157,7 +169,7 @@ refused!(
 <limit lower="0x10" upper="20"/>
 </joint>
 </robot>"#,
-    []
+    [r#"U110 hand.urdf:7:8 joint "j": cannot read lower "0x10" as a number; expected a decimal number such as 0.05"#]
 );
 
 refused!(
@@ -171,7 +183,7 @@ refused!(
 <limit lower="0" upper="1e999"/>
 </joint>
 </robot>"#,
-    []
+    [r#"U110 hand.urdf:7:18 joint "j": upper "1e999" is too large for a number"#]
 );
 
 refused!(
@@ -185,7 +197,7 @@ refused!(
 <limit lower="" upper="1"/>
 </joint>
 </robot>"#,
-    []
+    [r#"U110 hand.urdf:7:8 joint "j": cannot read lower "" as a number; expected a decimal number such as 0.05"#]
 );
 
 refused!(
@@ -195,7 +207,7 @@ refused!(
   <box size="1 2"/>
 </geometry></collision></link>
 </robot>"#,
-    []
+    [r#"U111 hand.urdf:3:8 link "a": size of <box> has 2 numbers: "1 2"; expected 3 numbers separated by spaces"#]
 );
 
 refused!(
@@ -205,7 +217,7 @@ refused!(
   <box/>
 </geometry></collision></link>
 </robot>"#,
-    []
+    [r#"U112 hand.urdf:3:3 link "a": <box> has no attribute size; expected <box size="...">"#]
 );
 
 refused!(
@@ -215,7 +227,7 @@ refused!(
   <sphere radius="-0.01"/>
 </geometry></collision></link>
 </robot>"#,
-    []
+    [r#"U151 hand.urdf:3:11 link "a": radius of <sphere> is -0.01; expected a length above 0, in metres"#]
 );
 
 refused!(
@@ -225,7 +237,9 @@ refused!(
   <cone radius="0.01"/>
 </geometry></collision></link>
 </robot>"#,
-    []
+    [
+        r#"U150 hand.urdf:2:27 link "a": <geometry> has only <cone>, which is not known; expected one of <box>, <cylinder>, <sphere>, <capsule>, <mesh>"#
+    ]
 );
 
 refused!(
@@ -234,7 +248,7 @@ refused!(
 <link name="a">
 <collision/></link>
 </robot>"#,
-    []
+    [r#"U150 hand.urdf:3:1 link "a": <collision> has no <geometry>"#]
 );
 
 refused!(
@@ -247,7 +261,10 @@ refused!(
 <axis xyz="0 0 1"/>
 </joint>
 </robot>"#,
-    []
+    [
+        r#"U120 hand.urdf:4:1 joint "j": is revolute but has no <limit>; expected <limit lower="..." upper="..." effort="..." velocity="..."/>
+  fix: add the limit, or type="continuous" if it turns without end"#
+    ]
 );
 
 refused!(
@@ -261,7 +278,10 @@ refused!(
 <limit effort="1" velocity="1"/>
 </joint>
 </robot>"#,
-    []
+    [
+        r#"U120 hand.urdf:7:1 joint "j": is revolute but has a <limit> without lower and upper; expected <limit lower="..." upper="..." effort="..." velocity="..."/>
+  fix: add the limit, or type="continuous" if it turns without end"#
+    ]
 );
 
 refused!(
@@ -274,7 +294,10 @@ refused!(
 <axis xyz="0 0 1"/>
 </joint>
 </robot>"#,
-    []
+    [
+        r#"U120 hand.urdf:4:1 joint "j": is prismatic but has no <limit>; expected <limit lower="..." upper="..." effort="..." velocity="..."/>
+  fix: add the limit"#
+    ]
 );
 
 refused!(
@@ -288,7 +311,8 @@ refused!(
 <limit lower="1" upper="-1"/>
 </joint>
 </robot>"#,
-    []
+    [r#"U121 hand.urdf:7:8 joint "j": lower limit 1 is above upper limit -1; expected lower <= upper
+  fix: swap them: lower="-1" upper="1""#]
 );
 
 refused!(
@@ -301,7 +325,7 @@ refused!(
 <axis xyz="0 0 0"/><limit lower="-1" upper="1"/>
 </joint>
 </robot>"#,
-    []
+    [r#"U122 hand.urdf:6:7 joint "j": axis "0 0 0" has length 0; expected a direction, such as "0 0 1""#]
 );
 
 refused!(
@@ -314,7 +338,10 @@ refused!(
 
 </joint>
 </robot>"#,
-    []
+    [
+        r#"U125 hand.urdf:4:17 joint "j": unsupported joint type "planar"; expected revolute, continuous, prismatic or fixed
+  fix: type="fixed", or --lenient to hold it fixed"#
+    ]
 );
 
 refused!(
@@ -327,7 +354,10 @@ refused!(
 
 </joint>
 </robot>"#,
-    []
+    [
+        r#"U125 hand.urdf:4:17 joint "j": unsupported joint type "floating"; expected revolute, continuous, prismatic or fixed
+  fix: type="fixed", or --lenient to hold it fixed"#
+    ]
 );
 
 refused!(
@@ -340,7 +370,8 @@ refused!(
 
 </joint>
 </robot>"#,
-    []
+    [r#"U126 hand.urdf:4:17 joint "j": unknown joint type "revolut"; expected revolute, continuous, prismatic or fixed
+  fix: did you mean "revolute"?"#]
 );
 
 refused!(
@@ -350,7 +381,7 @@ refused!(
 <link name="b"/>
 <joint name="j"><parent link="a"/><child link="b"/></joint>
 </robot>"#,
-    []
+    [r#"U112 hand.urdf:4:1 joint "j": <joint> has no attribute type; expected <joint type="...">"#]
 );
 
 refused!(
@@ -360,7 +391,7 @@ refused!(
 <link name="b"/>
 <joint type="fixed"><parent link="a"/><child link="b"/></joint>
 </robot>"#,
-    []
+    [r#"U112 hand.urdf:4:1: <joint> has no attribute name; expected <joint name="...">"#]
 );
 
 refused!(
@@ -369,7 +400,7 @@ refused!(
 <link/>
 <link name="a"/>
 </robot>"#,
-    []
+    [r#"U112 hand.urdf:2:1: <link> has no attribute name; expected <link name="...">"#]
 );
 
 refused!(
@@ -379,7 +410,7 @@ refused!(
 <link name="b"/>
 <joint name="j" type="fixed"><parent link="a"/></joint>
 </robot>"#,
-    []
+    [r#"U112 hand.urdf:4:1 joint "j": has no <child>; expected <child link="..."/>"#]
 );
 
 refused!(
@@ -389,7 +420,8 @@ refused!(
 <link name="b"/>
 <joint name="j" type="fixed"><parent link="plam"/><child link="b"/></joint>
 </robot>"#,
-    []
+    [r#"U132 hand.urdf:4:30 joint "j": parent link "plam" does not exist; expected the name of a <link>
+  fix: did you mean "palm"?"#]
 );
 
 refused!(
@@ -399,7 +431,7 @@ refused!(
 <joint name="j" type="fixed"><parent link="a"/>
 <child link="finger"/></joint>
 </robot>"#,
-    []
+    [r#"U132 hand.urdf:4:1 joint "j": child link "finger" does not exist; expected the name of a <link>"#]
 );
 
 refused!(
@@ -408,7 +440,8 @@ refused!(
 <link name="a"/>
 <link name="b"/>
 </robot>"#,
-    []
+    [r#"U133 hand.urdf:1:1: has 2 roots: "a", "b"; expected one link that no joint carries
+  fix: join them by fixed joints, or remove links that are not used"#]
 );
 
 refused!(
@@ -419,7 +452,9 @@ refused!(
 <joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>
 <joint name="k" type="fixed"><parent link="b"/><child link="a"/></joint>
 </robot>"#,
-    []
+    [
+        r#"U134 hand.urdf:2:1 link "a": links carry each other in a cycle: "a" -> "b" -> "a"; expected a tree with one root"#
+    ]
 );
 
 refused!(
@@ -428,7 +463,7 @@ refused!(
 <link name="a"/>
 <joint name="j" type="fixed"><parent link="a"/><child link="a"/></joint>
 </robot>"#,
-    []
+    [r#"U134 hand.urdf:2:1 link "a": links carry each other in a cycle: "a" -> "a"; expected a tree with one root"#]
 );
 
 refused!(
@@ -440,7 +475,9 @@ refused!(
 <joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>
 <joint name="k" type="fixed"><parent link="b"/><child link="a"/></joint>
 </robot>"#,
-    []
+    [
+        r#"U134 hand.urdf:3:1 link "a": links carry each other in a cycle: "a" -> "b" -> "a"; expected a tree with one root"#
+    ]
 );
 
 refused!(
@@ -451,7 +488,9 @@ refused!(
 <joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>
 <joint name="k" type="fixed"><parent link="a"/><child link="b"/></joint>
 </robot>"#,
-    []
+    [
+        r#"U135 hand.urdf:5:1 joint "k": carries link "b", which joint "j" carries already; expected a tree: every link carried by one joint"#
+    ]
 );
 
 refused!(
@@ -462,7 +501,7 @@ refused!(
 <link name="b"/>
 <joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>
 </robot>"#,
-    []
+    [r#"U131 hand.urdf:4:1 link "b": the name is used already on line 3; expected a name of its own for every link"#]
 );
 
 refused!(
@@ -474,7 +513,7 @@ refused!(
 <joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>
 <joint name="j" type="fixed"><parent link="a"/><child link="c"/></joint>
 </robot>"#,
-    []
+    [r#"U131 hand.urdf:6:1 joint "j": the name is used already on line 5; expected a name of its own for every joint"#]
 );
 
 refused!(
@@ -482,7 +521,7 @@ refused!(
     r#"<robot name="r">
 
 </robot>"#,
-    []
+    [r#"U130 hand.urdf:1:1: has no <link>; expected at least one link with a name"#]
 );
 
 refused!(
@@ -493,7 +532,8 @@ refused!(
 <joint name="follow" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/><limit lower="-1" upper="1"/>
 <mimic joint="laed"/></joint>
 </robot>"#,
-    []
+    [r#"U140 hand.urdf:5:8 joint "follow": follows joint "laed", which does not exist; expected the name of a joint
+  fix: did you mean "lead"?"#]
 );
 
 refused!(
@@ -504,7 +544,8 @@ refused!(
 <joint name="follow" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/><limit lower="-1" upper="1"/>
 <mimic joint="lead" multiplier="0"/></joint>
 </robot>"#,
-    []
+    [r#"U142 hand.urdf:5:8 joint "follow": follows joint "lead" with multiplier 0; expected a multiplier that is not 0
+  fix: type="fixed" if it does not move"#]
 );
 
 refused!(
@@ -515,7 +556,10 @@ refused!(
 <joint name="follow" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/><limit lower="-1" upper="1"/>
 <mimic joint="lead"/></joint>
 </robot>"#,
-    []
+    [
+        r#"U141 hand.urdf:3:1 joint "lead": joints follow each other in a cycle: "lead" -> "follow" -> "lead"; expected a joint at the end that follows no other"#,
+        r#"U141 hand.urdf:4:1 joint "follow": joints follow each other in a cycle: "follow" -> "lead" -> "follow"; expected a joint at the end that follows no other"#
+    ]
 );
 
 refused!(
@@ -526,7 +570,9 @@ refused!(
 <joint name="follow" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/><limit lower="-1" upper="1"/>
 <mimic joint="follow"/></joint>
 </robot>"#,
-    []
+    [
+        r#"U141 hand.urdf:4:1 joint "follow": joints follow each other in a cycle: "follow" -> "follow"; expected a joint at the end that follows no other"#
+    ]
 );
 
 refused!(
@@ -537,7 +583,7 @@ refused!(
 <joint name="follow" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/><limit lower="-1" upper="1"/>
 <mimic joint="lead"/></joint>
 </robot>"#,
-    []
+    [r#"U144 hand.urdf:5:8 joint "follow": follows joint "lead", which is fixed; expected a joint that moves"#]
 );
 
 refused!(
@@ -548,7 +594,9 @@ refused!(
 <joint name="follow" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/><limit lower="-1" upper="1"/>
 <mimic joint="lead" offset="5"/></joint>
 </robot>"#,
-    []
+    [
+        r#"U143 hand.urdf:4:1 joint "follow": follows joint "lead" to 4..6, outside its own limits -1..1; expected ranges that overlap"#
+    ]
 );
 
 refused!(
@@ -558,27 +606,32 @@ refused!(
   <mesh filename="box.obj" scale="1 0 1"/>
 </geometry></collision></link>
 </robot>"#,
-    []
+    [r#"U152 hand.urdf:3:28 link "a": scale of <mesh> is "1 0 1"; expected three factors that are not 0"#]
 );
 
 refused!(
     an_entity_bomb,
     r#"<!DOCTYPE lolz [<!ENTITY lol "lol"><!ENTITY lol2 "&lol;&lol;">]>
 <robot name="&lol2;"/>"#,
-    []
+    [r#"U104 hand.urdf:1:1: has a document type declaration (DTD); expected plain XML without entities
+  fix: remove the <!DOCTYPE ...> line"#]
 );
 
-refused!(another_root_element, r#"<sdf version="1.6"/>"#, []);
+refused!(
+    another_root_element,
+    r#"<sdf version="1.6"/>"#,
+    [r#"U106 hand.urdf:1:1: the outermost element is <sdf>; expected <robot name="...">"#]
+);
 
 refused!(
     a_truncated_file,
     r#"<robot name="r">
 <link name="a"/>
 <joi"#,
-    []
+    [r#"U100 hand.urdf:1:1: is not well-formed XML: the root node was opened but never closed"#]
 );
 
-refused!(an_empty_file, r#""#, []);
+refused!(an_empty_file, r#""#, [r#"U100 hand.urdf: is empty"#]);
 
 refused!(
     two_problems_in_one_run,
@@ -590,7 +643,14 @@ refused!(
 <axis xyz="0 0 0"/>
 <limit lower="0,05" upper="1"/>
 </joint>
-<joint name="k" type="planar"><parent link="a"/><child link="x"/></joint>
+<joint name="k" type="planar"><parent link="a"/><child link="finger_7"/></joint>
 </robot>"#,
-    []
+    [
+        r#"U122 hand.urdf:6:7 joint "j": axis "0 0 0" has length 0; expected a direction, such as "0 0 1""#,
+        r#"U110 hand.urdf:7:8 joint "j": cannot read lower "0,05" as a number; expected a decimal number such as 0.05
+  fix: write 0.05"#,
+        r#"U125 hand.urdf:9:17 joint "k": unsupported joint type "planar"; expected revolute, continuous, prismatic or fixed
+  fix: type="fixed", or --lenient to hold it fixed"#,
+        r#"U132 hand.urdf:9:49 joint "k": child link "finger_7" does not exist; expected the name of a <link>"#
+    ]
 );

@@ -14,6 +14,9 @@ const MAX_DEPTH: usize = 64;
 ///
 /// Errors: not well formed (`U100`), a document type declaration (`U104`), too deep or too large (`U105`).
 pub(crate) fn parse<'a>(file: &Path, text: &'a str) -> Result<roxmltree::Document<'a>, InputError> {
+    if text.trim().is_empty() {
+        return Err(Diagnostic::new("U100", Place::file(file), "is empty").into());
+    }
     refuse_deep_nesting(file, text)?;
     let options = roxmltree::ParsingOptions { allow_dtd: false, nodes_limit: MAX_NODES, ..Default::default() };
     roxmltree::Document::parse_with_options(text, options).map_err(|error| {
@@ -125,23 +128,15 @@ impl<'a> Reader<'a> {
 
     /// The value of attribute `name`, which must be there and not be blank (`U112`).
     pub fn required<'n>(&mut self, node: Node<'n, '_>, name: &str, element: Named) -> Option<&'n str> {
-        match node.attribute(name).map(str::trim) {
-            Some(value) if !value.is_empty() => node.attribute(name),
-            seen => {
-                let tag = node.tag_name().name();
-                let problem = match seen {
-                    None => format!("<{tag}> has no attribute {name}"),
-                    Some(_) => format!("<{tag}> has an empty attribute {name}"),
-                };
-                let place = self.place(node);
-                self.found.push(
-                    Diagnostic::new("U112", place, problem)
-                        .element(element.0, element.1)
-                        .expected(format!("<{tag} {name}=\"...\">")),
-                );
-                None
-            }
-        }
+        let (tag, place) = (node.tag_name().name(), self.place(node));
+        let problem = match node.attribute(name) {
+            Some(value) if !value.trim().is_empty() => return Some(value),
+            Some(_) => format!("<{tag}> has an empty attribute {name}"),
+            None => format!("<{tag}> has no attribute {name}"),
+        };
+        let diagnostic = Diagnostic::new("U112", place, problem).expected(format!("<{tag} {name}=\"...\">"));
+        self.found.push(named(diagnostic, element));
+        None
     }
 
     /// The number in attribute `name`; none where the attribute is missing or the number is bad.
@@ -161,12 +156,12 @@ impl<'a> Reader<'a> {
     ) -> Option<[f64; N]> {
         let Some(text) = node.attribute(name) else {
             if default.is_none() {
-                self.required_missing(node, name, element);
+                self.required(node, name, element);
             }
             return default;
         };
         let place = self.attribute_place(node, name);
-        let words: Vec<&str> = text.split_ascii_whitespace().collect();
+        let words: Vec<&str> = if N == 1 { vec![text] } else { text.split_ascii_whitespace().collect() };
         if words.len() != N {
             let tag = node.tag_name().name();
             self.found.push(
@@ -180,15 +175,6 @@ impl<'a> Reader<'a> {
         let values: Vec<f64> =
             words.iter().filter_map(|word| self.read_number(word, name, place.clone(), element)).collect();
         values.try_into().ok()
-    }
-
-    fn required_missing(&mut self, node: Node, name: &str, element: Named) {
-        let (tag, place) = (node.tag_name().name(), self.place(node));
-        self.found.push(
-            Diagnostic::new("U112", place, format!("<{tag}> has no attribute {name}"))
-                .element(element.0, element.1)
-                .expected(format!("<{tag} {name}=\"...\">")),
-        );
     }
 
     /// A finite number. `U110`: not a number, or too large for one; `V001`: NaN or infinite.
@@ -230,6 +216,11 @@ impl<'a> Reader<'a> {
             }
         }
     }
+}
+
+/// `diagnostic` about `element`, where that has a name.
+fn named(diagnostic: Diagnostic, element: Named) -> Diagnostic {
+    if element.1.is_empty() { diagnostic } else { diagnostic.element(element.0, element.1) }
 }
 
 /// The child elements of `node` called `tag`.

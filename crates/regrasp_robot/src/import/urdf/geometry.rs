@@ -52,10 +52,13 @@ fn read_shape(reader: &mut Reader, geometry: Node, element: Named, meshes: &mut 
     let Some(node) = known else {
         let seen: Vec<String> =
             geometry.children().filter(Node::is_element).map(|c| format!("<{}>", c.tag_name().name())).collect();
-        let seen = if seen.is_empty() { "nothing".into() } else { seen.join(", ") };
+        let problem = match seen.as_slice() {
+            [] => "<geometry> is empty".to_owned(),
+            seen => format!("<geometry> has only {}, which is not known", seen.join(", ")),
+        };
         let place = reader.place(geometry);
-        let diagnostic = Diagnostic::new("U150", place, format!("<geometry> has {seen} that can be read"))
-            .expected("one of <box>, <cylinder>, <sphere>, <capsule>, <mesh>");
+        let diagnostic =
+            Diagnostic::new("U150", place, problem).expected("one of <box>, <cylinder>, <sphere>, <capsule>, <mesh>");
         drop_or_refuse(reader, geometry, element, diagnostic.into());
         return None;
     };

@@ -52,15 +52,16 @@ fn read_joint<'a, 'input: 'a>(reader: &mut Reader<'a>, node: Node<'a, 'input>) -
         }
         _ => Some(None),
     };
+    // What could not be read has its message; a stand-in lets the rest of the file be looked at in the same run.
     Some(DraftJoint {
         node,
         name,
         parent: parent?,
         child: child?,
-        kind: kind?,
-        parent_from_joint: parent_from_joint?,
-        axis: axis?,
-        limits: limits?,
+        kind: kind.unwrap_or(JointKind::Continuous),
+        parent_from_joint: parent_from_joint.unwrap_or_else(Pose::identity),
+        axis: axis.unwrap_or_else(Vector::x_axis),
+        limits: limits.flatten(),
     })
 }
 

@@ -94,8 +94,8 @@ fn follow(
     let mut coupling = direct[id.0]?;
     let mut names = vec![format!("\"{}\"", draft.name), format!("\"{}\"", joints[coupling.joint.0].name)];
     while let Some(next) = direct[coupling.joint.0] {
-        if next.joint == id || coupling.joint == id || names.len() > joints.len() {
-            names.push(format!("\"{}\"", joints[next.joint.0].name));
+        let closed = coupling.joint == id;
+        if closed || names.len() > joints.len() {
             let place = reader.place(draft.node);
             reader.found.push(
                 Diagnostic::new("U141", place, format!("joints follow each other in a cycle: {}", names.join(" -> ")))
