@@ -307,9 +307,10 @@ fn all_numbers(plan: &Plan) -> impl Iterator<Item = f64> + '_ {
     let promises = [p.contact_tolerance, p.friction, p.required_margin, p.kept_margin, p.torque_scale];
     let waypoints = plan.segments.iter().flat_map(|segment| &segment.waypoints);
     promises.into_iter().chain(pose(&plan.start)).chain(pose(&plan.goal)).chain(waypoints.flat_map(move |waypoint| {
-        let contacts = waypoint.contacts.iter().flat_map(|contact| {
-            contact.point_in_object.into_iter().chain(contact.normal_in_object).flatten()
-        });
+        let contacts = waypoint
+            .contacts
+            .iter()
+            .flat_map(|contact| contact.point_in_object.into_iter().chain(contact.normal_in_object).flatten());
         waypoint.joints.iter().copied().chain(pose(&waypoint.world_from_object)).chain(contacts)
     }))
 }

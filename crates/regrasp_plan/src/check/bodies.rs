@@ -86,7 +86,8 @@ const WORLD: usize = 1;
 impl Bodies {
     /// Reads all shapes of `scene`. Err with a message when a mesh of the hand has no inside.
     pub fn new(scene: &Scene, model: &Model) -> Result<Self, String> {
-        let mut bodies = Bodies { carriers: vec![Carrier::Object, Carrier::World], items: Vec::new(), pairs: Vec::new() };
+        let mut bodies =
+            Bodies { carriers: vec![Carrier::Object, Carrier::World], items: Vec::new(), pairs: Vec::new() };
         bodies.add_hand(scene, model)?;
         let object = &scene.object;
         bodies.add(&object.name, Owner::Object, OBJECT, &Pose::identity(), &object.shape);

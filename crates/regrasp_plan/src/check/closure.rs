@@ -44,8 +44,7 @@ pub fn margin(contacts: &[Contact], body: &Body) -> f64 {
     let mut best: f64 = 0.0;
     for subset in 0u32..1 << n_contacts {
         if subset.count_ones() >= 3 {
-            let chosen: Vec<Contact> =
-                (0..n_contacts).filter(|i| subset >> i & 1 == 1).map(|i| contacts[i]).collect();
+            let chosen: Vec<Contact> = (0..n_contacts).filter(|i| subset >> i & 1 == 1).map(|i| contacts[i]).collect();
             best = best.max(margin_of_all(&chosen, body));
         }
     }
@@ -56,8 +55,7 @@ pub fn margin(contacts: &[Contact], body: &Body) -> f64 {
 pub fn margin_of_all(contacts: &[Contact], body: &Body) -> f64 {
     let grasp_map = grasp_map(contacts, body);
     let Some(right_inverse) = right_inverse(&grasp_map) else { return 0.0 };
-    let shares: Vec<f64> =
-        (0..contacts.len()).map(|i| right_inverse.view((3 * i, 0), (3, 6)).norm()).collect();
+    let shares: Vec<f64> = (0..contacts.len()).map(|i| right_inverse.view((3 * i, 0), (3, 6)).norm()).collect();
     let Some(forces) = internal_forces(&grasp_map, &shares, body.friction) else { return 0.0 };
     substituted_margin(&grasp_map, &right_inverse, &shares, forces, body.friction)
 }
@@ -68,7 +66,8 @@ fn grasp_map(contacts: &[Contact], body: &Body) -> DMatrix<f64> {
     for (i, contact) in contacts.iter().enumerate() {
         let (x, y) = tangents(&contact.normal_in_object);
         let arm = (contact.point_in_object - body.center_of_mass) / body.torque_scale;
-        for (j, direction) in [-contact.normal_in_object.into_inner(), x.into_inner(), y.into_inner()].iter().enumerate()
+        for (j, direction) in
+            [-contact.normal_in_object.into_inner(), x.into_inner(), y.into_inner()].iter().enumerate()
         {
             map.view_mut((0, 3 * i + j), (3, 1)).copy_from(direction);
             map.view_mut((3, 3 * i + j), (3, 1)).copy_from(&arm.cross(direction));
@@ -85,7 +84,8 @@ fn right_inverse(grasp_map: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     if !eigen.eigenvalues.iter().all(|&value| value > floor) {
         return None;
     }
-    let inverse = eigen.eigenvectors * Matrix6::from_diagonal(&eigen.eigenvalues.map(f64::recip))
+    let inverse = eigen.eigenvectors
+        * Matrix6::from_diagonal(&eigen.eigenvalues.map(f64::recip))
         * eigen.eigenvectors.transpose();
     Some(grasp_map.transpose() * DMatrix::from_column_slice(6, 6, inverse.as_slice()))
 }
@@ -131,8 +131,7 @@ fn solve(
         ..DefaultSettings::default()
     };
     let quadratic = CscMatrix::zeros((n_variables, n_variables));
-    let mut solver =
-        DefaultSolver::new(&quadratic, cost, &sparse(constraints), right_side, cones, settings).ok()?;
+    let mut solver = DefaultSolver::new(&quadratic, cost, &sparse(constraints), right_side, cones, settings).ok()?;
     solver.solve();
     let solution = solver.solution.x;
     (solution.len() == n_variables && solution.iter().all(|x| x.is_finite())).then_some(solution)

@@ -34,9 +34,8 @@ pub fn check_collision(
         // Segments may fail to meet; what was known before says nothing then.
         tracks.iter_mut().for_each(|track| track.bound = f64::NEG_INFINITY);
         let moving = moving_finger(model, segment).filter(|_| segment.kind == SegmentKind::Regrasp);
-        let free = moving.and_then(|f| {
-            free_part(bodies, &model.fingers[f], f, segment, s, settings, log, &mut n_distances)
-        });
+        let free =
+            moving.and_then(|f| free_part(bodies, &model.fingers[f], f, segment, s, settings, log, &mut n_distances));
         for (w, ends) in segment.waypoints.windows(2).enumerate() {
             let mut step = Step::new(bodies, &ends[0], &ends[1]);
             for (pair, track) in bodies.pairs.iter().zip(&mut tracks) {
@@ -74,8 +73,20 @@ fn pieces(w: usize, free: Option<FreePart>, may_touch: bool, tolerance: f64) -> 
         return vec![(0.0, 1.0, 0.0)];
     }
     let Some(((first, from), (last, to))) = free else { return vec![(0.0, 1.0, -tolerance)] };
-    let from = if w < first { 1.0 } else if w == first { from } else { 0.0 };
-    let to = if w > last { 0.0 } else if w == last { to } else { 1.0 };
+    let from = if w < first {
+        1.0
+    } else if w == first {
+        from
+    } else {
+        0.0
+    };
+    let to = if w > last {
+        0.0
+    } else if w == last {
+        to
+    } else {
+        1.0
+    };
     if from >= to {
         return vec![(0.0, 1.0, -tolerance)];
     }

@@ -112,7 +112,8 @@ pub fn check_contacts(object: &Object, model: &Model, plan: &Plan, settings: &Ch
                 };
                 let nearest = surface::nearest(&object.shape, &Point::from(point));
                 if nearest.distance > settings.surface_tolerance {
-                    let message = format!("the contact of finger \"{name}\" is {:.3e} m off the surface", nearest.distance);
+                    let message =
+                        format!("the contact of finger \"{name}\" is {:.3e} m off the surface", nearest.distance);
                     log.push(tell(Kind::ContactOffSurface, message, nearest.distance, settings.surface_tolerance));
                     continue;
                 }

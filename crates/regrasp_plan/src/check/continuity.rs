@@ -108,8 +108,11 @@ pub fn pose_between(from: &Pose, to: &Pose, t: f64) -> Pose {
     let a = from.rotation.coords;
     let b = if a.dot(&to.rotation.coords) < 0.0 { -to.rotation.coords } else { to.rotation.coords };
     let angle = 2.0 * (a - b).norm().atan2((a + b).norm());
-    let (at_a, at_b) =
-        if angle < 1e-9 { (1.0 - t, t) } else { (((1.0 - t) * angle).sin() / angle.sin(), (t * angle).sin() / angle.sin()) };
+    let (at_a, at_b) = if angle < 1e-9 {
+        (1.0 - t, t)
+    } else {
+        (((1.0 - t) * angle).sin() / angle.sin(), (t * angle).sin() / angle.sin())
+    };
     let coords = a * at_a + b * at_b;
     let rotation = nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::from_vector(coords));
     let position = from.translation.vector * (1.0 - t) + to.translation.vector * t;

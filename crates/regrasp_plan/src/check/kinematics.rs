@@ -60,12 +60,7 @@ impl Path {
     /// The path to `link`, in a robot whose root stands at `world_from_root`.
     ///
     /// Err with a message when a joint's coupling leads nowhere.
-    pub fn new(
-        robot: &Robot,
-        link: LinkId,
-        world_from_root: &Pose,
-        joint_names: &[String],
-    ) -> Result<Self, String> {
+    pub fn new(robot: &Robot, link: LinkId, world_from_root: &Pose, joint_names: &[String]) -> Result<Self, String> {
         let mut pending = world_from_root.to_homogeneous();
         let mut joints = Vec::new();
         for id in robot.joints_to(link) {
@@ -186,7 +181,10 @@ pub fn world_from_root(hand: &Hand) -> Result<Pose, String> {
         if let Some(other) = &found {
             let difference = (other.to_homogeneous() - world_from_root.to_homogeneous()).norm();
             if difference > 1e-9 {
-                return Err(format!("finger \"{}\" stands elsewhere than its robot says, by {difference:.3e}", finger.name));
+                return Err(format!(
+                    "finger \"{}\" stands elsewhere than its robot says, by {difference:.3e}",
+                    finger.name
+                ));
             }
         }
         found.get_or_insert(world_from_root);

@@ -38,7 +38,8 @@ pub fn free_part(
     let n_steps = segment.waypoints.len() - 1;
     let mut search = Search { bodies, finger, f, segment, s, settings, log, n_distances };
     let lifted = search.run(&segment.waypoints[0], (0..n_steps).map(|w| (w, Direction::Forward)).collect());
-    let landing = search.run(&segment.waypoints[n_steps], (0..n_steps).rev().map(|w| (w, Direction::Backward)).collect());
+    let landing =
+        search.run(&segment.waypoints[n_steps], (0..n_steps).rev().map(|w| (w, Direction::Backward)).collect());
     let (Some(lifted), Some(landing)) = (lifted, landing) else {
         search.report(Moment::at(s, 0), "never gets clear of the object".into(), 0.0, settings.lift_clearance);
         return None;
@@ -106,7 +107,8 @@ impl Search<'_> {
                     self.report(at, message, sideways, allowed);
                     reported = true;
                 }
-                let nearest = pairs.iter().map(|pair| step.measure(pair, t).unwrap_or(0.0)).fold(f64::INFINITY, f64::min);
+                let nearest =
+                    pairs.iter().map(|pair| step.measure(pair, t).unwrap_or(0.0)).fold(f64::INFINITY, f64::min);
                 if nearest >= self.settings.lift_clearance {
                     *self.n_distances += step.n_distances;
                     return Some((w, t));

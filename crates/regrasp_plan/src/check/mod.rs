@@ -21,6 +21,8 @@ pub mod lift;
 pub mod model;
 /// One step between two waypoints, and certificates of separation.
 pub mod motion;
+/// Plans broken in one known way each.
+pub mod mutation;
 /// What the plan promises, and whether the promises may be made and are kept.
 pub mod promises;
 /// Distance from the object's surface and the normals there.

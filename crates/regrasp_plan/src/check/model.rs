@@ -80,7 +80,10 @@ impl Model {
                 TipShape::Point => 0.0,
                 TipShape::Sphere { radius } => radius,
                 TipShape::Hull(_) => {
-                    return Err(format!("the tip of finger \"{}\" is not a ball; this version judges balls", finger.name));
+                    return Err(format!(
+                        "the tip of finger \"{}\" is not a ball; this version judges balls",
+                        finger.name
+                    ));
                 }
             };
             let coordinates = first..first + finger.chain.n_coordinates();

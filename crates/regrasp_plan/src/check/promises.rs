@@ -91,13 +91,7 @@ pub fn check_closure(
 }
 
 /// Promises that no plan may make, and promises that this plan does not keep.
-pub fn check_promises(
-    object: &Object,
-    plan: &Plan,
-    settings: &CheckSettings,
-    min_margin: Option<f64>,
-    log: &mut Log,
-) {
+pub fn check_promises(object: &Object, plan: &Plan, settings: &CheckSettings, min_margin: Option<f64>, log: &mut Log) {
     let promises = &plan.promises;
     if promises.friction > object.friction {
         let message = format!("the plan counts on friction {}, the scene has {}", promises.friction, object.friction);

@@ -39,10 +39,8 @@ fn cuboid(point: &Point, half_extents: &Vector) -> Nearest {
     let beyond = point.coords.abs() - half_extents;
     let outside = beyond.map(|x| x.max(0.0)).norm();
     let distance = if beyond.max() <= 0.0 { -beyond.max() } else { outside };
-    let normals = (0..3)
-        .filter(|&k| beyond[k] >= beyond.max() - 1e-6)
-        .map(|k| Vector::ith(k, point[k].signum()))
-        .collect();
+    let normals =
+        (0..3).filter(|&k| beyond[k] >= beyond.max() - 1e-6).map(|k| Vector::ith(k, point[k].signum())).collect();
     Nearest { distance, normals }
 }
 
@@ -88,7 +86,8 @@ fn triangles(vertices: &[Point], triangles: &[[u32; 3]], point: &Point) -> Neare
 pub fn distance_to_triangle(point: &Point, corners: &[Point; 3]) -> f64 {
     let [a, b, c] = corners;
     let normal = (b - a).cross(&(c - a));
-    let inside = [(a, b), (b, c), (c, a)].iter().all(|(from, to)| (*to - *from).cross(&(point - *from)).dot(&normal) >= 0.0);
+    let inside =
+        [(a, b), (b, c), (c, a)].iter().all(|(from, to)| (*to - *from).cross(&(point - *from)).dot(&normal) >= 0.0);
     if inside {
         return ((point - a).dot(&normal) / normal.norm()).abs();
     }

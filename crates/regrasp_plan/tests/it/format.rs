@@ -60,9 +60,13 @@ fn every_kind_of_damage_is_named_with_its_place() {
         ("C404", cut(&|p| drop(p.segments[0].waypoints[2].contacts.pop())), format!("plan.json:{third_line}:")),
         ("C405", cut(&|p| p.goal.quat_xyzw[3] += 1e-6), "goal".into()),
         ("C405", cut(&|p| p.goal.quat_xyzw = p.goal.quat_xyzw.map(|x| -x)), "w < 0".into()),
-        ("C405", cut(&|p| {
-            p.segments[0].waypoints[2].contacts[1].normal_in_object = Some([0.0, 0.0, 0.9]);
-        }), format!("plan.json:{third_line}:")),
+        (
+            "C405",
+            cut(&|p| {
+                p.segments[0].waypoints[2].contacts[1].normal_in_object = Some([0.0, 0.0, 0.9]);
+            }),
+            format!("plan.json:{third_line}:"),
+        ),
         ("C406", cut(&|p| p.segments.clear()), "segments".into()),
         ("C406", cut(&|p| p.segments[1].waypoints.truncate(1)), "segments[1].waypoints".into()),
         ("C407", cut(&|p| p.segments[0].waypoints[2].contacts[0].mode = ContactMode::Free), "is free but".into()),

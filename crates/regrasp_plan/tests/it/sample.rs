@@ -59,10 +59,12 @@ fn robot() -> Robot {
             (hand_from_finger(f), Vector::x_axis(), JointKind::Revolute, vec![]),
             (up(0.0), Vector::y_axis(), JointKind::Revolute, vec![capsule(PROXIMAL, 0.007)]),
             (up(PROXIMAL), Vector::y_axis(), JointKind::Revolute, vec![capsule(DISTAL, 0.004)]),
-            (up(DISTAL), Vector::x_axis(), JointKind::Fixed, vec![PlacedShape {
-                parent_from_shape: Pose::identity(),
-                shape: Shape::Sphere { radius: TIP_RADIUS },
-            }]),
+            (
+                up(DISTAL),
+                Vector::x_axis(),
+                JointKind::Fixed,
+                vec![PlacedShape { parent_from_shape: Pose::identity(), shape: Shape::Sphere { radius: TIP_RADIUS } }],
+            ),
         ];
         let mut parent = LinkId(0);
         for (j, (parent_from_joint, axis, kind, collision)) in parts.into_iter().enumerate() {
@@ -139,7 +141,9 @@ fn hand() -> Hand {
     let mut allowed_pairs = std::collections::BTreeSet::new();
     for f in 0..N_FINGERS {
         let link = |j: usize| LinkId(1 + 4 * f + j);
-        for (a, b) in [(LinkId(0), link(0)), (link(0), link(1)), (link(1), link(2)), (link(2), link(3)), (LinkId(0), link(1))] {
+        for (a, b) in
+            [(LinkId(0), link(0)), (link(0), link(1)), (link(1), link(2)), (link(2), link(3)), (LinkId(0), link(1))]
+        {
             allowed_pairs.insert((a, b));
         }
     }
