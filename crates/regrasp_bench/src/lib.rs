@@ -6,6 +6,8 @@
 pub mod csv;
 /// The same bytes on any number of threads.
 pub mod determinism;
+/// The checker against good and broken plans.
+pub mod mutations;
 /// `docs/benchmarks.md` from CSV files.
 pub mod page;
 /// One seed of one scene: plan, judge, measure.

@@ -91,6 +91,9 @@ pub struct Search {
     /// Algorithm [default: the best by measurement]
     #[arg(long, value_parser = PossibleValuesParser::new(METHODS))]
     pub method: Option<String>,
+    /// All settings of the planner, as a plan file has them; other flags go before it
+    #[arg(long, value_name = "FILE.json")]
+    pub settings: Option<PathBuf>,
     /// Closure margin asked of every holding set, in [0, 1)
     #[arg(long, value_parser = margin)]
     pub margin: Option<f64>,

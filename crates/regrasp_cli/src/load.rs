@@ -3,6 +3,7 @@
 use crate::args::{Common, Search};
 use crate::stop::Stop;
 use crate::talk::{Talk, counted, grouped};
+use regrasp::base::{Diagnostic, Place};
 use regrasp::geometry::Shape;
 use regrasp::robot::import::{LoadOptions, ResolveOptions};
 use regrasp::scene::{LoadedScene, load_scene};
@@ -35,9 +36,16 @@ pub fn scene(path: &Path, common: &Common, talk: &Talk) -> Result<LoadedScene, S
     Ok(loaded)
 }
 
-/// Settings of the planner as the arguments say.
-pub fn settings(search: &Search, n_threads: usize) -> InHandSettings {
-    let mut settings = InHandSettings { n_threads, ..InHandSettings::default() };
+/// Settings of the planner: defaults, then the settings file, then the flags.
+pub fn settings(search: &Search, n_threads: usize) -> Result<InHandSettings, Stop> {
+    let mut settings = match &search.settings {
+        Some(path) => {
+            let text = regrasp::base::files::read_text(path)?;
+            serde_json::from_str(&text).map_err(|error| settings_error(path, &error))?
+        }
+        None => InHandSettings::default(),
+    };
+    settings.n_threads = n_threads;
     // The argument parser lets only the planner's own spellings through; a test holds the two lists together.
     if let Some(method) = search.method.as_deref().and_then(|name| serde_json::from_value(name.into()).ok()) {
         settings.method = method;
@@ -45,7 +53,16 @@ pub fn settings(search: &Search, n_threads: usize) -> InHandSettings {
     if let Some(margin) = search.margin {
         settings.closure_margin = margin;
     }
-    settings
+    match settings.validate() {
+        Ok(()) => Ok(settings),
+        Err(problem) => Err(Stop::argument("A503", "--settings", problem, "settings as in a plan file")),
+    }
+}
+
+fn settings_error(path: &Path, error: &serde_json::Error) -> Stop {
+    let place = Place { file: path.to_owned(), line: Some(error.line() as u32), column: Some(error.column() as u32) };
+    let diagnostic = Diagnostic::new("A504", place, error.to_string());
+    Stop::BadInput(diagnostic.expected("a JSON object like \"settings\" in a plan file").into())
 }
 
 /// Says what a scene is made of.

@@ -29,7 +29,7 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
         None => None,
     };
     let settings = RunSettings {
-        planner: load::settings(&arguments.search, arguments.threads),
+        planner: load::settings(&arguments.search, arguments.threads)?,
         max_work: arguments.search.max_work,
         time_limit: arguments.search.time_limit,
         judge: if arguments.no_check { Judge::Skip } else { Judge::Checker },

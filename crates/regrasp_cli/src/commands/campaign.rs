@@ -5,14 +5,16 @@ use crate::interrupt;
 use crate::load;
 use crate::stop::Stop;
 use crate::talk::Talk;
-use regrasp::Budget;
 use regrasp::scene::LoadedScene;
+use regrasp::{Budget, plan_in_hand};
 use regrasp_bench::Problem;
 use regrasp_bench::determinism::compare;
+use regrasp_bench::mutations::Campaign;
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 /// Runs the campaign asked for; exit code 1 when it finds fault.
 pub fn run(arguments: &args::Campaign, common: &Common, talk: &Talk) -> Result<(), Stop> {
@@ -42,7 +44,7 @@ fn determinism(
     cancelled: &Arc<AtomicBool>,
     talk: &Talk,
 ) -> Result<(), Stop> {
-    let settings = load::settings(search, 1);
+    let settings = load::settings(search, 1)?;
     let budget = Budget { max_work: search.max_work, deadline: None, cancelled: Arc::clone(cancelled) };
     let (mut n_same, mut n_solved) = (0, 0);
     for i in 0..queries {
@@ -73,14 +75,39 @@ fn determinism(
     if n_same == queries && n_solved > 0 { Ok(()) } else { Err(Stop::Rejected) }
 }
 
-/// Broken plans must be rejected, good ones accepted.
+/// Good plans (plan `i` is seed `i / n` of scene `i % n`) must be accepted, broken ones rejected.
 fn mutations(
-    _scenes: &[LoadedScene],
-    _mutants: u64,
-    _good: u64,
-    _search: &Search,
-    _cancelled: &Arc<AtomicBool>,
-    _talk: &Talk,
+    scenes: &[LoadedScene],
+    mutants: u64,
+    good: u64,
+    search: &Search,
+    cancelled: &Arc<AtomicBool>,
+    talk: &Talk,
 ) -> Result<(), Stop> {
-    Err(Stop::Internal("waits for branch plan".into()))
+    let settings = load::settings(search, 1)?;
+    let mut campaign = Campaign::default();
+    let mut unsolved = 0;
+    for i in 0..good {
+        let LoadedScene { scene, task, .. } = &scenes[(i % scenes.len() as u64) as usize];
+        let seed = i / scenes.len() as u64;
+        let query = task.query(seed);
+        let deadline = search.time_limit.map(|limit| Instant::now() + limit);
+        let budget = Budget { max_work: search.max_work, deadline, cancelled: Arc::clone(cancelled) };
+        match plan_in_hand(scene, &query, &settings, seed, &budget, &|_| {}) {
+            Ok(plan) => campaign.add(Problem { scene, query: &query, seed }, &plan, mutants),
+            Err(_) => unsolved += 1,
+        }
+        if cancelled.load(Ordering::Relaxed) {
+            return Err(Stop::Interrupted);
+        }
+        if (i + 1) % 50 == 0 {
+            talk.say(format!("{} of {good} plans, {} mutants", i + 1, campaign.n_mutants()));
+        }
+    }
+    talk.event("campaign", json!({ "campaign": campaign, "unsolved": unsolved }));
+    if !talk.is_json() {
+        talk.data(&campaign.table())?;
+        talk.data(&format!("{unsolved} queries had no plan\n"))?;
+    }
+    if campaign.is_clean() { Ok(()) } else { Err(Stop::Rejected) }
 }

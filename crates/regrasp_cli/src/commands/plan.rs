@@ -28,7 +28,7 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
     let loaded = load::scene(&arguments.scene, common, talk)?;
     let query = loaded.task.query(arguments.seed);
     let n_threads = arguments.threads.unwrap_or_else(available_threads);
-    let settings = load::settings(&arguments.search, n_threads);
+    let settings = load::settings(&arguments.search, n_threads)?;
     say_query(&query, arguments.seed, n_threads, talk);
 
     let limits = Limits { max_work: arguments.search.max_work, time_limit: arguments.search.time_limit, cancelled };
