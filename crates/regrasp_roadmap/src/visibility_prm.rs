@@ -222,6 +222,7 @@ impl<P: Clone, M: Clone> VisibilityPrm<P, M> {
 }
 
 #[cfg(test)]
+#[allow(clippy::print_stdout)] // measured rates
 mod tests {
     use super::*;
     use crate::toy_world::Toy;

@@ -97,7 +97,7 @@ refused!(
 </geometry></collision></link>
 </robot>"#,
     [
-        r#"U101 hand.urdf:3:9 link "a": "tip.stl" not found; looked in: tip.stl; expected a path relative to the model file, or package://NAME/PATH"#
+        r#"U101 hand.urdf:3:9 link "a": "tip.stl" not found; looked in: tip.stl; expected a path relative to this file, or package://NAME/PATH"#
     ]
 );
 

@@ -12,6 +12,8 @@ use std::sync::Arc;
 const PIECES: usize = 32;
 /// Sweeps per level; the coarse levels converge in fewer.
 const MAX_SWEEPS: usize = 60;
+/// Number of pieces of the coarsest chain that is straightened.
+const COARSEST: usize = 8;
 
 /// The shortest of the straightened chains from `a` to `b` that start on different sides of the solid.
 pub(super) fn straightened(
@@ -48,7 +50,8 @@ fn straighten(start: Point, end: Point, side: Point, surface: &impl SurfaceKind)
         let n = points.len() - 1;
         // Over-relaxation of a chain of n points (Young 1954).
         let relaxation = 2.0 / (1.0 + (std::f64::consts::PI / n as f64).sin());
-        for _ in 0..MAX_SWEEPS {
+        // Relaxed while it is coarse, a chain slips over to another side.
+        for _ in 0..if n < COARSEST { 0 } else { MAX_SWEEPS } {
             let mut moved: f64 = 0.0;
             for i in 1..n {
                 let middle = nalgebra::center(&points[i - 1], &points[i + 1]);

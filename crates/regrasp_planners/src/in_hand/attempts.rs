@@ -4,11 +4,11 @@ use super::model::Model;
 use super::search::{Search, Stop};
 use super::tally::Tally;
 use crate::failure::{Failure, NearestMiss};
+use rayon::prelude::*;
+use regrasp_base::Interrupt;
 use regrasp_geometry::frame;
 use regrasp_plan::plan::{PoseData, Statistics};
 use regrasp_scene::InHandQuery;
-use regrasp_base::Interrupt;
-use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What an attempt left behind, whether it succeeded or not.

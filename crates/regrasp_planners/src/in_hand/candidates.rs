@@ -82,7 +82,13 @@ pub fn reach(
 }
 
 /// Share of the way along which `finger` can keep `contact`, looked at alone and only now and then.
-pub fn follow_share(workspace: &mut Workspace, finger: usize, contact: &Contact, joints: &Coordinates, way: &Way) -> f64 {
+pub fn follow_share(
+    workspace: &mut Workspace,
+    finger: usize,
+    contact: &Contact,
+    joints: &Coordinates,
+    way: &Way,
+) -> f64 {
     let model = workspace.model;
     let mut current = joints.clone();
     let mut n_followed = 0;

@@ -1,10 +1,10 @@
 //! Start and goal as the query gives them: what is wrong with them is said before any search.
 
+use super::combine::releasable;
 use super::model::{Carrier, Model};
 use super::state::GraspState;
 use super::transfer::ik_settings;
 use super::workspace::{Contacts, HandJoints, TipMode, Workspace, tip_target};
-use super::combine::releasable;
 use crate::failure::{Failure, FailureKind};
 use regrasp_base::Rng;
 use regrasp_geometry::collision::{Answer, Placement, separation};
@@ -78,7 +78,13 @@ pub fn refuse_buried_object(model: &Model, end: End, world_from_object: &Pose) -
     let object = &model.bodies[model.object];
     let at_object = Placement::from(world_from_object).then(&object.carrier_from_body);
     for pair in &model.pairs {
-        let other = if pair.a == model.object { pair.b } else if pair.b == model.object { pair.a } else { continue };
+        let other = if pair.a == model.object {
+            pair.b
+        } else if pair.b == model.object {
+            pair.a
+        } else {
+            continue;
+        };
         let body = &model.bodies[other];
         if !matches!(body.carrier, Carrier::World) {
             continue;
@@ -86,20 +92,34 @@ pub fn refuse_buried_object(model: &Model, end: End, world_from_object: &Pose) -
         let mut direction = Vector::zeros();
         let clearance = model.settings.clearance;
         let answer = separation(
-            &object.shape, &at_object, &body.shape, &body.carrier_from_body, clearance, clearance, &mut direction, &mut [0; 2],
+            &object.shape,
+            &at_object,
+            &body.shape,
+            &body.carrier_from_body,
+            clearance,
+            clearance,
+            &mut direction,
+            &mut [0; 2],
         );
         let exactly_apart = || {
-            let tree_apart = |tree: &regrasp_geometry::collision::MeshTree, mesh_at: &Placement, shape, at: &Placement| {
-                tree.is_apart(shape, &mesh_at.inverse_then(at), clearance, &mut 0.0)
-            };
+            let tree_apart =
+                |tree: &regrasp_geometry::collision::MeshTree, mesh_at: &Placement, shape, at: &Placement| {
+                    tree.is_apart(shape, &mesh_at.inverse_then(at), clearance, &mut 0.0)
+                };
             object.tree.as_ref().is_some_and(|tree| tree_apart(tree, &at_object, &body.shape, &body.carrier_from_body))
-                || body.tree.as_ref().is_some_and(|tree| tree_apart(tree, &body.carrier_from_body, &object.shape, &at_object))
+                || body
+                    .tree
+                    .as_ref()
+                    .is_some_and(|tree| tree_apart(tree, &body.carrier_from_body, &object.shape, &at_object))
         };
         if !matches!(answer, Answer::SeparatedBy(_)) && !exactly_apart() {
             return Err(end.failure(
                 format!(
                     "at the {} the object \"{}\" is in collision with \"{}\", or nearer than {} m; nothing was moved",
-                    end.name(), object.name, body.name, clearance
+                    end.name(),
+                    object.name,
+                    body.name,
+                    clearance
                 ),
                 "move the object away from it, or make the clearance smaller",
             ));
@@ -126,7 +146,9 @@ pub fn given_grasp(
         return Err(end.failure(
             format!(
                 "the {} grasp is not force closed with the margin asked for: {margin:.4} of {}, at friction {}",
-                end.name(), model.settings.closure_margin, model.frame.friction
+                end.name(),
+                model.settings.closure_margin,
+                model.frame.friction
             ),
             "move the contacts apart, or ask for a smaller margin",
         ));
@@ -173,7 +195,11 @@ fn from_joints(model: &Model, end: End, world_from_object: &Pose, values: &[f64]
         let distance = surface.signed_distance(&tip) - finger.tip_radius;
         if distance.abs() > TOUCHING {
             return Err(end.failure(
-                format!("at the {} the tip of finger \"{name}\" is {:.2} mm off the surface", end.name(), distance * 1e3),
+                format!(
+                    "at the {} the tip of finger \"{name}\" is {:.2} mm off the surface",
+                    end.name(),
+                    distance * 1e3
+                ),
                 "correct the joints or give contacts",
             ));
         }
@@ -215,13 +241,12 @@ fn from_contacts(
         let contact = Contact { point_in_object: foot.point_in_object, normal_in_object: foot.normal_in_object };
         let mut workspace = Workspace::new(model);
         workspace.place_object(world_from_object);
-        let reached = (0..REACH_TRIES)
-            .find_map(|_| super::candidates::reach(&mut workspace, f, &contact, &placement, rng));
+        let reached =
+            (0..REACH_TRIES).find_map(|_| super::candidates::reach(&mut workspace, f, &contact, &placement, rng));
         let Some(own) = reached else {
             let normal = UnitVector::new_unchecked(placement.vector(&contact.normal_in_object));
             let target = tip_target(&placement, &contact, model.fingers[f].tip_radius);
-            let reachable =
-                model.fingers[f].ik.solve_random(&target, &ik_settings(model, f, normal), rng).is_some();
+            let reachable = model.fingers[f].ik.solve_random(&target, &ik_settings(model, f, normal), rng).is_some();
             let why = if reachable { "only in collision" } else { "not at all within its joint limits" };
             return Err(end.failure(
                 format!("finger \"{name}\" reaches its {} contact {why}", end.name()),

@@ -127,9 +127,8 @@ fn extend(search: &mut Search, tree: &mut Vec<Node>, node: usize, target: &Pose)
     let mut tried = Tried::default();
     let mut rng = Rng::child(&search.rng, "relocation", 0);
     for combination in &ranked {
-        let steps = regrasp(
-            &mut search.workspace, &state, &options, &combination.choice, &mut table, &mut tried, &mut rng,
-        );
+        let steps =
+            regrasp(&mut search.workspace, &state, &options, &combination.choice, &mut table, &mut tried, &mut rng);
         match steps {
             Some(steps) => {
                 search.rng.bits();
@@ -151,9 +150,8 @@ fn options_of(search: &mut Search, state: &GraspState, finger: usize, way: &Way)
     let mut options = vec![Candidate { contact, joints, follow }];
     let pose = &state.world_from_object;
     workspace.place_object(pose);
-    let new = draw_candidates(
-        workspace, finger, pose, way, settings.candidates, settings.candidates_kept, &mut search.rng,
-    );
+    let new =
+        draw_candidates(workspace, finger, pose, way, settings.candidates, settings.candidates_kept, &mut search.rng);
     if new.is_empty() {
         search.tally.add(Reason::NoContact(finger));
     }

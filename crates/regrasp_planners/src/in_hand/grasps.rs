@@ -26,7 +26,13 @@ pub fn draw_grasp(search: &mut Search, world_from_object: &Pose, target: &Pose) 
         for finger in 0..model.n_fingers() {
             let (n_drawn, n_kept) = (settings.candidates, settings.candidates_kept + 1);
             let found = draw_candidates(
-                &mut search.workspace, finger, world_from_object, &way, n_drawn, n_kept, &mut search.rng,
+                &mut search.workspace,
+                finger,
+                world_from_object,
+                &way,
+                n_drawn,
+                n_kept,
+                &mut search.rng,
             );
             search.n_samples += found.len() as u64;
             if found.is_empty() {

@@ -129,7 +129,8 @@ impl<'a> Model<'a> {
                 add(&part.placed.shape, &part.placed.parent_from_shape, part.body, part.link, name, part.is_tip);
             }
             if let TipShape::Sphere { radius } = finger.tip.shape {
-                let place = Pose::from_parts(finger.tip.center_in_body.coords.into(), nalgebra::UnitQuaternion::identity());
+                let place =
+                    Pose::from_parts(finger.tip.center_in_body.coords.into(), nalgebra::UnitQuaternion::identity());
                 let is_there = finger.shapes.iter().any(|part| {
                     part.is_tip
                         && matches!(part.placed.shape, Shape::Sphere { radius: r } if (r - radius).abs() < 1e-9)
@@ -151,11 +152,18 @@ impl<'a> Model<'a> {
         }
         let n_finger_bodies = bodies.len();
         for part in &hand.palm {
-            bodies.push(fixed_body(&part.placed.shape, &part.placed.parent_from_shape, &hand.robot.links[part.link.0].name));
+            bodies.push(fixed_body(
+                &part.placed.shape,
+                &part.placed.parent_from_shape,
+                &hand.robot.links[part.link.0].name,
+            ));
             links.push((part.link, false));
         }
         let object = bodies.len();
-        bodies.push(Body { carrier: Carrier::Object, ..fixed_body(&scene.object.shape, &Pose::identity(), &scene.object.name) });
+        bodies.push(Body {
+            carrier: Carrier::Object,
+            ..fixed_body(&scene.object.shape, &Pose::identity(), &scene.object.name)
+        });
         for obstacle in &scene.obstacles {
             bodies.push(fixed_body(&obstacle.placed.shape, &obstacle.placed.parent_from_shape, &obstacle.name));
         }
@@ -244,7 +252,9 @@ fn pair_of(
     if on_hand(a) && on_hand(b) {
         let palm_only = a >= n_finger_bodies && b >= n_finger_bodies;
         let one_link = match (&bodies[a].carrier, &bodies[b].carrier) {
-            (Carrier::Finger { finger: f, link: i, .. }, Carrier::Finger { finger: g, link: j, .. }) => f == g && i == j,
+            (Carrier::Finger { finger: f, link: i, .. }, Carrier::Finger { finger: g, link: j, .. }) => {
+                f == g && i == j
+            }
             _ => false,
         };
         if palm_only || one_link || scene.hand.may_touch(links[a].0, links[b].0) {

@@ -33,9 +33,8 @@ pub fn record(
                 statistics.transfers += 1;
                 kept_margin = kept_margin.min(closure::closure_margin(&state.contacts, &model.frame));
                 let mut waypoints = vec![waypoint(&state.world_from_object, &state.joints, &state.contacts, None)];
-                waypoints.extend(
-                    moments.iter().map(|m| waypoint(&m.world_from_object, &m.joints, &state.contacts, None)),
-                );
+                waypoints
+                    .extend(moments.iter().map(|m| waypoint(&m.world_from_object, &m.joints, &state.contacts, None)));
                 segments.push(Segment { kind: SegmentKind::Transfer, moving_finger: None, waypoints });
             }
             Motion::Regrasp { finger, path } => {

@@ -165,11 +165,8 @@ fn push_out(model: &Model, tip: &mut Point, away: f64) -> Option<Vector> {
     for _ in 0..4 {
         let distance = surface.signed_distance(tip);
         let foot = surface.project(tip);
-        let outward = if distance > 1e-6 {
-            (*tip - foot.point_in_object) / distance
-        } else {
-            foot.normal_in_object.into_inner()
-        };
+        let outward =
+            if distance > 1e-6 { (*tip - foot.point_in_object) / distance } else { foot.normal_in_object.into_inner() };
         if distance >= away - 1e-6 {
             return Some(outward);
         }

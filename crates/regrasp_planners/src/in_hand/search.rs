@@ -1,10 +1,10 @@
 //! What all methods of the in-hand planner share: scratch memory, random numbers, budget, tally.
 
+use super::Progress;
 use super::model::Model;
 use super::state::GraspState;
 use super::tally::Tally;
 use super::workspace::Workspace;
-use super::Progress;
 use regrasp_base::{Budget, Interrupt, Rng};
 use regrasp_geometry::{Pose, frame};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -89,8 +89,7 @@ impl<'a> Search<'a> {
         let work = self.workspace.work;
         if work >= self.next_report {
             self.next_report = work + REPORT_EVERY;
-            let angle_left =
-                self.nearest.as_ref().map_or(std::f64::consts::PI, |(_, state)| self.angle_left(state));
+            let angle_left = self.nearest.as_ref().map_or(std::f64::consts::PI, |(_, state)| self.angle_left(state));
             (self.progress)(Progress { nodes: self.n_nodes, work, restarts: self.attempt as u64, angle_left });
         }
         if self.winner.load(Ordering::Relaxed) < self.attempt {

@@ -23,12 +23,7 @@ fn cost(steps: &[Step]) -> (usize, usize) {
 }
 
 /// Tries `settings.shortcuts` random shortcuts on `steps` from `start`. `end_is_free` when any grasp will do at the end.
-pub fn shorten(
-    search: &mut Search,
-    start: &GraspState,
-    steps: &mut Vec<Step>,
-    end_is_free: bool,
-) -> Result<(), Stop> {
+pub fn shorten(search: &mut Search, start: &GraspState, steps: &mut Vec<Step>, end_is_free: bool) -> Result<(), Stop> {
     for _ in 0..search.model().settings.shortcuts {
         if steps.len() < 2 {
             return Ok(());
@@ -51,10 +46,17 @@ pub fn shorten(
 }
 
 /// A cheaper way from `from` to `to` (to its pose only, when `free`), if one of the direct ones is feasible.
-fn direct(search: &mut Search, from: &GraspState, to: &GraspState, free: bool, old: (usize, usize)) -> Option<Vec<Step>> {
+fn direct(
+    search: &mut Search,
+    from: &GraspState,
+    to: &GraspState,
+    free: bool,
+    old: (usize, usize),
+) -> Option<Vec<Step>> {
     let n_changed = from.contacts.iter().zip(&to.contacts).filter(|(a, b)| a != b).count();
     let moves = search.distance(&from.world_from_object, &to.world_from_object) > 0.0;
-    if free && old > (0, usize::from(moves))
+    if free
+        && old > (0, usize::from(moves))
         && let Some(step) = whole_transfer(search, from, &to.world_from_object)
     {
         return Some(vec![step]);
@@ -115,8 +117,7 @@ pub fn regrasp_transfer(
             follow_contact(model, finger, &to.contacts[finger], &before, &to.joints[finger])?
         });
     }
-    let middle =
-        GraspState { world_from_object: from.world_from_object, contacts: to.contacts.clone(), joints };
+    let middle = GraspState { world_from_object: from.world_from_object, contacts: to.contacts.clone(), joints };
     let mut steps = change_grasp(search, from, &middle, false, rng)?;
     let last = steps.last().map_or(from, |step| &step.end).clone();
     if search.distance(&from.world_from_object, &to.world_from_object) > 0.0 {

@@ -29,8 +29,7 @@ fn segment_is_valid(model: &Model, workspace: &mut Workspace, segment: &Segment)
     let (Some(first), Some(last)) = (segment.waypoints.first(), segment.waypoints.last()) else { return false };
     let Some(contacts) = contacts_of(first) else { return false };
     let moving = segment.moving_finger.as_ref().and_then(|name| model.scene.hand.finger_named(name)).map(|id| id.0);
-    let holding: Vec<Contact> =
-        (0..contacts.len()).filter(|&f| Some(f) != moving).map(|f| contacts[f]).collect();
+    let holding: Vec<Contact> = (0..contacts.len()).filter(|&f| Some(f) != moving).map(|f| contacts[f]).collect();
     if closure::closure_margin(&holding, &model.frame) < model.settings.closure_margin {
         return false;
     }
@@ -47,7 +46,8 @@ fn segment_is_valid(model: &Model, workspace: &mut Workspace, segment: &Segment)
                 let joints = &joints_of(model, waypoint)[finger];
                 let before = model.fingers[finger].ik.tip(&workspace.joints()[finger]);
                 let after = model.fingers[finger].ik.tip(joints);
-                let over = ends.iter().find(|end| end.height_over(&before).is_some() && end.height_over(&after).is_some());
+                let over =
+                    ends.iter().find(|end| end.height_over(&before).is_some() && end.height_over(&after).is_some());
                 let mode = match over {
                     Some(end) => TipMode::Near { finger, normal_in_world: end.normal.into_inner() },
                     None => TipMode::Away { finger, clearance: 0.0 },

@@ -238,11 +238,9 @@ impl<'a> Workspace<'a> {
                 // A point at distance r from the origin turns with acceleration turn^2 r per unit time squared.
                 self.deviation[object] = turn * turn * model.object_reach / 8.0;
                 let body = &model.bodies[object];
-                self.motion[object] = self.now.placements[object].displacement(
-                    &self.next.placements[object],
-                    &body.center,
-                    body.radius,
-                ) + self.deviation[object];
+                self.motion[object] =
+                    self.now.placements[object].displacement(&self.next.placements[object], &body.center, body.radius)
+                        + self.deviation[object];
             }
             Some(finger) => {
                 self.motion.fill(0.0);
@@ -281,9 +279,7 @@ impl<'a> Workspace<'a> {
             (Some(finger), TipMode::Near { finger: near, normal_in_world }) if finger == near => {
                 self.tip_is_clear(index, finger, Some(normal_in_world))
             }
-            (Some(finger), TipMode::Away { finger: away, clearance }) if finger == away => {
-                self.apart(index, clearance)
-            }
+            (Some(finger), TipMode::Away { finger: away, clearance }) if finger == away => self.apart(index, clearance),
             (Some(finger), _) => self.tip_is_clear(index, finger, None),
             (None, _) => self.apart(index, required),
         };
@@ -326,6 +322,18 @@ impl<'a> Workspace<'a> {
             self.slack[index] = at_next;
             return true;
         }
+        // The best direction at `now` may separate at `next` as well.
+        let mut best_now = self.directions[index];
+        let hints = &mut self.hints[index];
+        let answer = separation(&a.shape, from_a, &b.shape, from_b, required_at_ends, ENOUGH, &mut best_now, hints);
+        if matches!(answer, Answer::SeparatedBy(_)) {
+            let gap = gap_along(&best_now, &a.shape, at_a, &b.shape, at_b, hints);
+            if gap >= required_at_ends {
+                self.directions[index] = best_now;
+                self.slack[index] = gap;
+                return true;
+            }
+        }
         self.trees_apart(index, required)
     }
 
@@ -346,7 +354,9 @@ impl<'a> Workspace<'a> {
         // Whatever the moment, one of the two ends is at most half of the motion away.
         let needed = required + 0.5 * relative_motion;
         let mut smallest = 0.0;
-        if tree.is_apart(&body.shape, &now, needed, &mut smallest) && tree.is_apart(&body.shape, &next, needed, &mut smallest) {
+        if tree.is_apart(&body.shape, &now, needed, &mut smallest)
+            && tree.is_apart(&body.shape, &next, needed, &mut smallest)
+        {
             self.slack[index] = smallest;
             return true;
         }
@@ -361,9 +371,7 @@ impl<'a> Workspace<'a> {
         let allowed = self.model.settings.contact_allowance - self.deviation[pair.a] - self.deviation[pair.b];
         for configuration in [&self.now, &self.next] {
             let (at_tip, at_object) = (&configuration.placements[pair.a], &configuration.placements[pair.b]);
-            let normal = normal_in_world.unwrap_or_else(|| {
-                at_object.vector(&self.contacts[finger].normal_in_object)
-            });
+            let normal = normal_in_world.unwrap_or_else(|| at_object.vector(&self.contacts[finger].normal_in_object));
             // The gap along the inward normal, from tip to object.
             let inward = -normal;
             let gap = gap_along(&inward, &tip.shape, at_tip, &object.shape, at_object, &mut self.hints[index]);
@@ -403,15 +411,19 @@ impl<'a> Workspace<'a> {
             let (a, b) = (&self.model.bodies[pair.a], &self.model.bodies[pair.b]);
             let (at_a, at_b) = (&self.now.placements[pair.a], &self.now.placements[pair.b]);
             let mut direction = self.directions[index];
-            let answer = separation(
-                &a.shape, at_a, &b.shape, at_b, 1e-9, f64::INFINITY, &mut direction, &mut self.hints[index],
-            );
+            let answer =
+                separation(&a.shape, at_a, &b.shape, at_b, 1e-9, f64::INFINITY, &mut direction, &mut self.hints[index]);
             let mut distance = if let Answer::SeparatedBy(d) = answer { d } else { 0.0 };
             if distance < self.model.settings.clearance
                 && let (Some(tree), body, at_body, at_mesh) = (&b.tree, a, at_a, at_b)
             {
                 let mut smallest = 0.0;
-                if tree.is_apart(&body.shape, &at_mesh.inverse_then(at_body), self.model.settings.clearance, &mut smallest) {
+                if tree.is_apart(
+                    &body.shape,
+                    &at_mesh.inverse_then(at_body),
+                    self.model.settings.clearance,
+                    &mut smallest,
+                ) {
                     distance = distance.max(smallest);
                 }
             }

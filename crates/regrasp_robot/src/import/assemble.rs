@@ -280,8 +280,12 @@ fn make_finger(
             match ConvexHull::new(&moved) {
                 Ok(hull) => (center, TipShape::Hull(Arc::new(hull))),
                 Err(error) => {
+                    let problem = match moved.as_slice() {
+                        [] => "tip link has no collision geometry with corners".to_owned(),
+                        _ => format!("tip link has no hull: {error}"),
+                    };
                     found.push(
-                        Diagnostic::new("U210", spec.place.clone(), format!("tip link has no hull: {error}"))
+                        Diagnostic::new("U210", spec.place.clone(), problem)
                             .element("finger", &spec.name)
                             .expected("box or mesh collision geometry on the tip link")
                             .fix("shape = \"sphere\" for a round tip"),

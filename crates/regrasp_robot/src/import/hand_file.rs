@@ -82,6 +82,7 @@ fn load_bare_urdf(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
     let (mut hand, more) = assemble(&robot, &spec, path)?;
     notes.extend(more);
     crate::inspect::rest::bend_towards_palm(&mut hand);
+    refuse_wrong_unit(&hand, path)?;
     Ok(LoadedHand { hand, inputs, notes })
 }
 
@@ -148,7 +149,31 @@ fn load_hand_file(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
     reader.found.into_result(())?;
     let (hand, more) = assemble(&robot, &spec, path)?;
     notes.extend(more);
+    refuse_wrong_unit(&hand, path)?;
     Ok(LoadedHand { hand, inputs, notes })
+}
+
+/// Refuses hands whose joints and tips are spread over less than a centimetre or more than five metres.
+///
+/// Arms with hands are a metre or two; a hand written in millimetres is a hundred metres or more.
+fn refuse_wrong_unit(hand: &Hand, path: &Path) -> Result<(), InputError> {
+    let span = crate::inspect::span(hand);
+    if (0.01..=5.0).contains(&span) {
+        return Ok(());
+    }
+    let (guess, factor) = if span > 5.0 {
+        ("is probably in millimetres", "0.001")
+    } else {
+        ("is probably scaled down too often", "1000")
+    };
+    Err(Diagnostic::new(
+        "U216",
+        Place::file(path),
+        format!("the joints and tips of the hand are spread over {span:.4} m"),
+    )
+    .expected(format!("a hand in metres; this one {guess}"))
+    .fix(format!("multiply every length of the URDF by {factor}"))
+    .into())
 }
 
 /// The gathered problems as an error; there is at least one.
@@ -160,7 +185,7 @@ fn only_error(found: Diagnostics, path: &Path) -> InputError {
 }
 
 fn refuse_other_format(reader: &mut TomlReader, table: Table) {
-    if let Some((format, offset)) = reader.text(table, "format", Need::Required)
+    if let Some((format, offset)) = reader.text(table, "format", Need::Optional)
         && format != FORMAT
     {
         let place = reader.place(offset);
@@ -170,14 +195,19 @@ fn refuse_other_format(reader: &mut TomlReader, table: Table) {
                 .expected(format!("\"{FORMAT}\"")),
         );
     }
+    if table.get("format").is_none() {
+        reader.missing(table, "format", &format!("format = \"{FORMAT}\""));
+    }
     let Some(version) = table.get("version") else {
         reader.missing(table, "version", &format!("version = {VERSION}"));
         return;
     };
-    if reader.finite(version, "version").is_some_and(|seen| seen != VERSION as f64) {
+    if let Some(seen) = reader.finite(version, "version")
+        && seen != VERSION as f64
+    {
         let place = reader.place(version.span().start);
         reader.found.push(
-            Diagnostic::new("U204", place, "is a version that this program does not know")
+            Diagnostic::new("U204", place, format!("is {seen}, which this program does not know"))
                 .element("key", "version")
                 .expected(format!("{VERSION}")),
         );

@@ -221,7 +221,7 @@ fn within(
         let hint = same_name_near(folder, Path::new(name))
             .map_or(String::new(), |found| format!("a file of that name is at {}", found.display()));
         return Err(Diagnostic::new("U101", place, format!("\"{name}\" not found; looked in: {}", path.display()))
-            .expected("a path relative to the model file, or package://NAME/PATH")
+            .expected("a path relative to this file, or package://NAME/PATH")
             .fix(hint));
     };
     let real = fs::canonicalize(&path)

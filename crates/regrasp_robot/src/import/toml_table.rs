@@ -63,12 +63,12 @@ impl TomlReader<'_> {
 
     /// Reports that `key` has a value of the wrong type (`U203`).
     pub fn wrong_type(&mut self, value: &Spanned<DeValue>, key: &str, expected: &str) {
-        let seen = value.get_ref().type_str();
-        self.found.push(
-            Diagnostic::new("U203", self.place(value.span().start), format!("is a {seen}"))
-                .element("key", key)
-                .expected(expected),
-        );
+        let seen = match value.get_ref() {
+            DeValue::Array(items) => format!("is a list of {}", items.len()),
+            other => format!("is a {}", other.type_str()).replace("a integer", "an integer"),
+        };
+        self.found
+            .push(Diagnostic::new("U203", self.place(value.span().start), seen).element("key", key).expected(expected));
     }
 
     /// The text of `key` and its offset; reports another type, and absence when `required`.

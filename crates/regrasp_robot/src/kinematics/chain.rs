@@ -1,6 +1,7 @@
 //! Serial chains, forward kinematics and Jacobians.
 
 use super::body_frame::{BodyFrame, PreparedJoint};
+use arrayvec::ArrayVec;
 use nalgebra::{Matrix3xX, Translation3, UnitQuaternion};
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 
@@ -28,6 +29,15 @@ pub struct ChainJoint {
     pub multiplier: f64,
     /// See `multiplier`.
     pub offset: f64,
+}
+
+/// Where a joint's axis is.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct JointLine {
+    /// Direction, of unit length, in the base frame.
+    pub axis: Vector,
+    /// The origin of the joint's body, in the base frame: on the axis, for turning joints.
+    pub origin: Vector,
 }
 
 /// A serial chain of moving joints, driven by as many or fewer independent coordinates.
@@ -108,6 +118,23 @@ impl Chain {
     #[inline]
     pub fn last_frame(&self, coordinates: &[f64]) -> BodyFrame {
         self.prepared.iter().fold(BodyFrame::IDENTITY, |parent, joint| joint.child_frame(&parent, coordinates))
+    }
+
+    /// Axes of the joints in the base frame, appended to `lines`; the frame of the last body.
+    ///
+    /// Panics if there are more joints than `lines` has room for.
+    #[inline]
+    pub(crate) fn joint_lines<const N: usize>(
+        &self,
+        coordinates: &[f64],
+        lines: &mut ArrayVec<JointLine, N>,
+    ) -> BodyFrame {
+        let mut frame = BodyFrame::IDENTITY;
+        for (joint, prepared) in self.joints.iter().zip(&self.prepared) {
+            frame = prepared.child_frame(&frame, coordinates);
+            lines.push(JointLine { axis: frame.vector(&joint.axis), origin: frame.translation });
+        }
+        frame
     }
 
     /// Position, in the base frame, of `point_in_body` of the last body.

@@ -104,6 +104,7 @@ fn longest_slide(chain: &Chain, i: usize) -> f64 {
 }
 
 #[cfg(test)]
+#[allow(clippy::print_stdout)] // measured tightness
 mod tests {
     use super::*;
     use crate::kinematics::body_frame::BodyFrame;

@@ -1,11 +1,14 @@
-//! Mistakes of units that show only when hand, object and task are seen together (reliability R15).
+//! Mistakes that show only when hand, object and task are seen together: units (reliability R15), reach, contacts.
 
 use super::table::{Found, Table};
 use super::task::{Goal, InHandTask, StartOrientation};
 use crate::object::Object;
+use crate::query::GraspRequest;
 use regrasp_geometry::{Point, Pose};
 use regrasp_robot::Hand;
 
+/// Given contacts may be off the surface by this much, in metres: the contact tolerance of plans (issue 2).
+const CONTACT_TOLERANCE: f64 = 5e-4;
 /// Hand and object may differ in size by this factor (reliability R15).
 const MAX_SIZE_RATIO: f64 = 20.0;
 
@@ -59,6 +62,32 @@ pub(super) fn check_reach(hand: &Hand, object: &Object, task: &InHandTask, root:
         found.diagnostics.push(diagnostic);
         // One cause: the goal follows the start.
         return;
+    }
+}
+
+/// Reports given contacts that do not lie on the object's surface (`P304`), with distance and side.
+pub(super) fn check_contacts(hand: &Hand, object: &Object, task: &InHandTask, root: &mut Table, found: &mut Found) {
+    for (key, grasp) in [("start", &task.start_grasp), ("goal", &task.goal_grasp)] {
+        let GraspRequest::Contacts(points) = grasp else { continue };
+        let Some(entry) = root.optional(key) else { continue };
+        for (finger, point) in hand.fingers.iter().zip(points) {
+            let distance = object.surface.signed_distance(point);
+            if distance.abs() <= CONTACT_TOLERANCE {
+                continue;
+            }
+            let side = if distance > 0.0 { "outside" } else { "inside" };
+            let nearest = object.surface.project(point).point_in_object;
+            let problem = format!(
+                "contact of finger \"{}\" is {:.2} mm {side} the object's surface",
+                finger.name,
+                distance.abs() * 1000.0
+            );
+            let diagnostic = entry
+                .error("P304", found, problem)
+                .expected(format!("a point of the surface within {} mm", CONTACT_TOLERANCE * 1000.0))
+                .fix(format!("the nearest point is [{:.6}, {:.6}, {:.6}]", nearest.x, nearest.y, nearest.z));
+            found.diagnostics.push(diagnostic);
+        }
     }
 }
 

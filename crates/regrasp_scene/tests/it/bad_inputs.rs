@@ -378,6 +378,21 @@ fn grasps_with_wrong_names_or_counts() {
 }
 
 #[test]
+fn contacts_off_the_surface() {
+    let contacts =
+        "{ contacts = { east = [0.0381, 0, 0], north = [0, 0.032, 0], west = [-0.032, 0, 0], south = [0, -0.03, 0] } }";
+    let messages = Folder::new().messages(&with("0.078]", &format!("0.078]\ngrasp = {contacts}")));
+    for part in [
+        "P304 scene.toml:14:1 key \"start\": contact of finger \"east\" is 6.10 mm outside the object's surface",
+        "contact of finger \"south\" is 2.00 mm inside",
+        "fix: the nearest point is [0.032000, 0.000000, 0.000000]",
+    ] {
+        assert!(messages.contains(part), "`{part}` is not in:\n{messages}");
+    }
+    assert_eq!(messages.matches("P304").count(), 2);
+}
+
+#[test]
 fn obstacles_of_one_name() {
     let obstacle = "\n[[obstacles]]\nname = \"wall\"\nbox = { size = [0.1, 0.1, 0.01] }\nposition = [0, 0, 0.5]\n";
     refused_with(

@@ -92,4 +92,15 @@ proptest! {
         }
         let _ = FOLDER.load(&String::from_utf8_lossy(&bytes));
     }
+
+    #[test]
+    fn contacts_anywhere(point in any::<[f64; 3]>(), shape in prop::sample::select(vec![
+        "sphere = { radius = 0.03 }", "box = { size = [0.05, 0.04, 0.03] }", "cylinder = { radius = 0.02, length = 0.1 }",
+        "capsule = { radius = 0.02, length = 0.1 }", "ellipsoid = { radii = [0.02, 0.03, 0.04] }", "mesh = { file = \"cube.obj\" }",
+    ])) {
+        let at = format!("{point:?}");
+        let grasp = format!("0.078]\ngrasp = {{ contacts = {{ east = {at}, north = {at}, west = {at}, south = {at} }} }}");
+        let text = GOOD.replace("sphere = { radius = 0.032 }", shape).replace("0.078]", &grasp);
+        let _ = FOLDER.load(&text);
+    }
 }

@@ -202,7 +202,7 @@ fn compare(surface: &Surface, mesh: &Surface) {
         worst = worst.max(1.0 / ratio);
     }
     // Ours may be shorter than the mesh's, which can be caught on the wrong side, but not longer.
-    assert!(longest < 1.002, "{surface:?}: {longest}");
+    assert!(longest < 1.004, "{surface:?}: {longest}");
     assert!(worst < 1.1, "{surface:?}: {worst}");
 }
 

@@ -71,9 +71,10 @@ enum Method {
 impl FingerIk {
     /// Prepares the inverse kinematics of `center_in_body`, a point of the chain's last body.
     ///
-    /// Panics if the chain has more than [`MAX_COORDINATES`] coordinates.
+    /// Panics if the chain has more than [`MAX_COORDINATES`] coordinates or twice as many joints.
     pub fn new(chain: &Chain, center_in_body: &Point) -> Self {
         assert!(chain.n_coordinates() <= MAX_COORDINATES, "a finger of more than {MAX_COORDINATES} coordinates");
+        assert!(chain.joints.len() <= 2 * MAX_COORDINATES, "a finger of more than {} joints", 2 * MAX_COORDINATES);
         let method = match ThreeR::new(chain, center_in_body) {
             Some(closed_form) => Method::ClosedForm(Box::new(closed_form)),
             None => Method::Numeric(Box::new(NumericIk::new(chain, center_in_body))),

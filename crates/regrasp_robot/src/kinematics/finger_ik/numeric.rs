@@ -3,10 +3,12 @@
 //! Levenberg-Marquardt with the damping tied to the squared error (Fan, Yuan 2005), which keeps the quadratic
 //! convergence; coordinates that would leave their limits are set on them and taken out of the step. The null-space
 //! term is Liegeois' gradient projection (1977) with the Gauss-Newton length.
+//!
+//! The inner functions are compiled for each usual number of coordinates; chains with other numbers run in the next
+//! larger one, with coordinates that move nothing.
 
 use super::{Coordinates, IkSettings, MAX_COORDINATES, POSITION_TOLERANCE, Preference};
-use crate::kinematics::body_frame::BodyFrame;
-use crate::kinematics::chain::{Chain, Motion};
+use crate::kinematics::chain::{Chain, JointLine, Motion};
 use arrayvec::ArrayVec;
 use nalgebra::Matrix3;
 use regrasp_base::Rng;
@@ -22,8 +24,6 @@ const MAX_STEPS: usize = 16;
 const MAX_WARM_STEPS: usize = 8;
 /// First steps of each solution that also follow the preference, from a seed and from a warm start.
 const PREFERENCE_STEPS: [usize; 2] = [5, 1];
-/// Residual at which the iteration stops, in metres; the step before it was already below its square root.
-const CONVERGED: f64 = 1e-10;
 /// Longest change of a coordinate in one step, in radians or metres.
 const LONGEST_STEP: f64 = 0.6;
 /// Solutions closer than this in every coordinate are one; for redundant chains, and for others.
@@ -38,13 +38,13 @@ struct Seed {
 }
 
 /// The tip and how it moves with each coordinate.
-struct State {
+struct State<const N: usize> {
     tip: Vector,
     tip_axis: Vector,
     /// Derivative of the tip by each coordinate.
-    slides: [Vector; MAX_COORDINATES],
+    slides: [Vector; N],
     /// Rotation of the last body by each coordinate.
-    spins: [Vector; MAX_COORDINATES],
+    spins: [Vector; N],
 }
 
 /// Numeric inverse kinematics of one chain, prepared.
@@ -55,6 +55,8 @@ pub struct NumericIk {
     tip_axis_in_body: Vector,
     /// Length that a deviation of one radian from the preferred direction counts for when seeds are chosen.
     length: f64,
+    /// Bound on the tip's distance from any joint of the chain; infinite with sliding joints. In metres.
+    reach: f64,
     seeds: Vec<Seed>,
 }
 
@@ -69,11 +71,15 @@ impl NumericIk {
     pub fn new(chain: &Chain, center_in_body: &Point) -> Self {
         let tip_axis_in_body = center_in_body.coords.try_normalize(0.0).unwrap_or_else(Vector::z);
         let length = center_in_body.coords.norm();
+        let links = chain.joints.iter().skip(1).map(|joint| joint.parent_from_joint.translation.vector.norm());
+        let slides = chain.joints.iter().any(|joint| joint.motion == Motion::Slide);
+        let reach = if slides { f64::INFINITY } else { links.sum::<f64>() + length };
         let mut ik = NumericIk {
             chain: chain.clone(),
             center_in_body: *center_in_body,
             tip_axis_in_body,
             length,
+            reach,
             seeds: vec![],
         };
         for i in 0..N_SEEDS {
@@ -83,7 +89,7 @@ impl NumericIk {
                     lower + (upper - lower) * halton(i + 1, k)
                 })
                 .collect();
-            let state = ik.state(&coordinates);
+            let state = ik.state::<MAX_COORDINATES>(&coordinates);
             ik.seeds.push(Seed { tip: state.tip, tip_axis: state.tip_axis, coordinates });
         }
         ik
@@ -93,7 +99,7 @@ impl NumericIk {
     pub fn solve_all(&self, target: &Point, settings: &IkSettings, solutions: &mut Vec<Coordinates>) {
         let first = solutions.len();
         for seed in self.nearest_seeds::<N_SEEDS>(target, settings.preference.as_ref(), N_SEEDS) {
-            if let Some(found) = self.from_seed(target, seed, settings.preference.as_ref(), settings) {
+            if let Some(found) = self.solve_from_seed(target, seed, settings.preference.as_ref(), settings) {
                 self.push_new(found, first, solutions);
             }
         }
@@ -106,13 +112,13 @@ impl NumericIk {
         // Only the better half competes for the first try: the far seeds are there for hard targets.
         let half = nearest.len().div_ceil(2);
         rng.shuffle(&mut nearest[..half]);
-        let found = nearest.into_iter().find_map(|seed| self.from_seed(target, seed, preference, settings));
+        let found = nearest.into_iter().find_map(|seed| self.solve_from_seed(target, seed, preference, settings));
         if found.is_some() || preference.is_none() {
             return found;
         }
         // The preference chose seeds too far from the target: reaching it comes first.
         let nearest = self.nearest_seeds::<N_TRIES>(target, None, N_TRIES);
-        nearest.into_iter().find_map(|seed| self.from_seed(target, seed, None, settings))
+        nearest.into_iter().find_map(|seed| self.solve_from_seed(target, seed, None, settings))
     }
 
     /// Different solutions: the first follows the preference, the others are where random seeds led.
@@ -133,7 +139,7 @@ impl NumericIk {
             if solutions.len() - first >= n_wanted {
                 break;
             }
-            if let Some(found) = self.from_seed(target, seed, preference, settings) {
+            if let Some(found) = self.solve_from_seed(target, seed, preference, settings) {
                 self.push_new(found, first, solutions);
                 preference = None;
             }
@@ -149,7 +155,7 @@ impl NumericIk {
         }
         // Without redundancy the branches are separated by the sign of the Jacobian's determinant.
         if found.len() == 3 {
-            let determinant = |state: State| Matrix3::from_columns(&state.slides[..3]).determinant();
+            let determinant = |state: State<3>| Matrix3::from_columns(&state.slides).determinant();
             if determinant(self.state(&found)) * determinant(self.state(seed)) <= 0.0 {
                 return None;
             }
@@ -157,7 +163,7 @@ impl NumericIk {
         Some(found)
     }
 
-    fn from_seed(
+    fn solve_from_seed(
         &self,
         target: &Point,
         seed: usize,
@@ -202,30 +208,17 @@ impl NumericIk {
         nearest.into_iter().map(|(_, i)| i).collect()
     }
 
-    fn state(&self, coordinates: &[f64]) -> State {
-        let mut frames = [BodyFrame::IDENTITY; 2 * MAX_COORDINATES];
-        let n_joints = self.chain.joints.len();
-        let mut spilled;
-        let frames = if n_joints <= frames.len() {
-            &mut frames[..n_joints]
-        } else {
-            spilled = vec![BodyFrame::IDENTITY; n_joints];
-            &mut spilled[..]
-        };
-        self.chain.forward_frames(coordinates, frames);
-        let last = frames.last().copied().unwrap_or(BodyFrame::IDENTITY);
+    fn state<const N: usize>(&self, coordinates: &[f64]) -> State<N> {
+        let mut lines: ArrayVec<JointLine, { 2 * MAX_COORDINATES }> = ArrayVec::new();
+        let last = self.chain.joint_lines(coordinates, &mut lines);
         let tip = last.point(&self.center_in_body).coords;
-        let mut state = State {
-            tip,
-            tip_axis: last.vector(&self.tip_axis_in_body),
-            slides: [Vector::zeros(); MAX_COORDINATES],
-            spins: [Vector::zeros(); MAX_COORDINATES],
-        };
-        for (joint, frame) in self.chain.joints.iter().zip(frames.iter()) {
-            let axis = frame.vector(&joint.axis) * joint.multiplier;
+        let tip_axis = last.vector(&self.tip_axis_in_body);
+        let mut state = State { tip, tip_axis, slides: [Vector::zeros(); N], spins: [Vector::zeros(); N] };
+        for (joint, line) in self.chain.joints.iter().zip(&lines) {
+            let axis = line.axis * joint.multiplier;
             match joint.motion {
                 Motion::Turn => {
-                    state.slides[joint.coordinate] += axis.cross(&(tip - frame.translation));
+                    state.slides[joint.coordinate] += axis.cross(&(tip - line.origin));
                     state.spins[joint.coordinate] += axis;
                 }
                 Motion::Slide => state.slides[joint.coordinate] += axis,
@@ -243,81 +236,104 @@ impl NumericIk {
         settings: &IkSettings,
         effort: &Effort,
     ) -> Option<Coordinates> {
+        match self.chain.n_coordinates() {
+            ..=3 => self.refine_in::<3>(target, start, preference, settings, effort),
+            4 => self.refine_in::<4>(target, start, preference, settings, effort),
+            5 => self.refine_in::<5>(target, start, preference, settings, effort),
+            _ => self.refine_in::<MAX_COORDINATES>(target, start, preference, settings, effort),
+        }
+    }
+
+    fn refine_in<const N: usize>(
+        &self,
+        target: &Point,
+        start: &[f64],
+        preference: Option<&Preference>,
+        settings: &IkSettings,
+        effort: &Effort,
+    ) -> Option<Coordinates> {
         let n = self.chain.n_coordinates();
-        let mut lower = [0.0; MAX_COORDINATES];
-        let mut upper = [0.0; MAX_COORDINATES];
-        let mut coordinates = Coordinates::new();
+        let mut limits = [(0.0, 0.0); N];
+        let mut coordinates = [0.0; N];
         for k in 0..n {
-            lower[k] = self.chain.lower[k] + settings.limit_margin;
-            upper[k] = self.chain.upper[k] - settings.limit_margin;
-            if lower[k] > upper[k] {
+            let (lower, upper) =
+                (self.chain.lower[k] + settings.limit_margin, self.chain.upper[k] - settings.limit_margin);
+            if lower > upper {
                 return None;
             }
-            coordinates.push(start[k].clamp(lower[k], upper[k]));
+            limits[k] = (lower, upper);
+            coordinates[k] = start[k].clamp(lower, upper);
         }
-        for i in 0..=effort.max_steps {
-            let state = self.state(&coordinates);
+        for i in 0..effort.max_steps {
+            let state = self.state::<N>(&coordinates);
             let error = target.coords - state.tip;
             let wish = preference.filter(|_| n > 3 && i < effort.preference_steps);
-            if wish.is_none() && error.norm_squared() < CONVERGED * CONVERGED {
-                return Some(coordinates);
+            let step = bounded_step(&state, &error, wish, &coordinates, &limits)?;
+            let (mut left, mut turned) = (error, 0.0);
+            for k in 0..N {
+                coordinates[k] = (coordinates[k] + step[k]).clamp(limits[k].0, limits[k].1);
+                left -= state.slides[k] * step[k];
+                turned += step[k].abs() * state.spins[k].norm();
             }
-            if i == effort.max_steps {
-                return (error.norm_squared() < POSITION_TOLERANCE * POSITION_TOLERANCE).then_some(coordinates);
-            }
-            let step = bounded_step(&state, &error, wish, &coordinates, &lower[..n], &upper[..n])?;
-            for k in 0..n {
-                coordinates[k] = (coordinates[k] + step[k]).clamp(lower[k], upper[k]);
+            // The rest of a linear step is at most half the square of the turn times the reach: no need to look.
+            if wish.is_none() && left.norm() + 0.5 * turned * turned * self.reach < 0.5 * POSITION_TOLERANCE {
+                return Some(coordinates[..n].iter().copied().collect());
             }
         }
-        None
+        let error = target.coords - self.state::<N>(&coordinates).tip;
+        (error.norm() < POSITION_TOLERANCE).then(|| coordinates[..n].iter().copied().collect())
     }
 }
 
 /// The step to the target, with coordinates that would leave their limits set on them.
-fn bounded_step(
-    state: &State,
+#[inline]
+fn bounded_step<const N: usize>(
+    state: &State<N>,
     error: &Vector,
     preference: Option<&Preference>,
-    coordinates: &[f64],
-    lower: &[f64],
-    upper: &[f64],
-) -> Option<[f64; MAX_COORDINATES]> {
-    let n = coordinates.len();
-    let mut step = [0.0; MAX_COORDINATES];
-    let mut free = [true; MAX_COORDINATES];
+    coordinates: &[f64; N],
+    limits: &[(f64, f64); N],
+) -> Option<[f64; N]> {
+    let mut step = [0.0; N];
+    // Columns of coordinates that are set on a limit become zero: they don't move any more.
+    let mut slides = state.slides;
+    let mut spins = state.spins;
+    let mut free = [true; N];
     let mut left = *error;
     loop {
-        free_step(state, &left, preference, &free[..n], &mut step)?;
+        let moved = free_step(&slides, &spins, &state.tip_axis, &left, preference)?;
         let mut worst = None;
         let mut worst_excess = 0.0;
-        for k in (0..n).filter(|&k| free[k]) {
-            let moved = coordinates[k] + step[k];
-            let excess = (lower[k] - moved).max(moved - upper[k]);
-            if excess > worst_excess {
-                (worst, worst_excess) = (Some(k), excess);
+        for k in 0..N {
+            if free[k] {
+                step[k] = moved[k];
+                let goal = coordinates[k] + step[k];
+                let excess = (limits[k].0 - goal).max(goal - limits[k].1);
+                if excess > worst_excess {
+                    (worst, worst_excess) = (Some(k), excess);
+                }
             }
         }
         let Some(k) = worst else { return Some(step) };
         free[k] = false;
-        step[k] = (coordinates[k] + step[k]).clamp(lower[k], upper[k]) - coordinates[k];
-        left -= state.slides[k] * step[k];
+        step[k] = (coordinates[k] + step[k]).clamp(limits[k].0, limits[k].1) - coordinates[k];
+        left -= slides[k] * step[k];
+        slides[k] = Vector::zeros();
+        spins[k] = Vector::zeros();
     }
 }
 
-/// Damped least-squares step of the free coordinates, with the preference in their null space.
-fn free_step(
-    state: &State,
+/// Damped least-squares step, with the preference in its null space.
+#[inline]
+fn free_step<const N: usize>(
+    slides: &[Vector; N],
+    spins: &[Vector; N],
+    tip_axis: &Vector,
     error: &Vector,
     preference: Option<&Preference>,
-    free: &[bool],
-    step: &mut [f64; MAX_COORDINATES],
-) -> Option<()> {
-    let slides = &state.slides;
-    let n = free.len();
+) -> Option<[f64; N]> {
     let (mut xx, mut xy, mut xz, mut yy, mut yz, mut zz) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-    for k in (0..n).filter(|&k| free[k]) {
-        let s = &slides[k];
+    for s in slides {
         xx += s.x * s.x;
         xy += s.x * s.y;
         xz += s.x * s.z;
@@ -329,7 +345,8 @@ fn free_step(
     let (xx, yy, zz) = (xx + damping, yy + damping, zz + damping);
     let (c_xx, c_xy, c_xz) = (yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy);
     let determinant = xx * c_xx + xy * c_xy + xz * c_xz;
-    if determinant <= 0.0 {
+    // Also false for NaN, from a target that is none.
+    if determinant.is_nan() || determinant <= 0.0 {
         return None;
     }
     let (c_yy, c_yz, c_zz) = (xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy);
@@ -341,46 +358,33 @@ fn free_step(
         ) / determinant
     };
     let pull = solve(error);
-    let mut longest: f64 = 0.0;
-    for k in (0..n).filter(|&k| free[k]) {
-        step[k] = slides[k].dot(&pull);
-        longest = longest.max(step[k].abs());
-    }
+    let mut step: [f64; N] = std::array::from_fn(|k| slides[k].dot(&pull));
+    let longest = longest_of(&step);
     if longest > LONGEST_STEP {
-        for k in (0..n).filter(|&k| free[k]) {
-            step[k] *= LONGEST_STEP / longest;
-        }
+        step.iter_mut().for_each(|change| *change *= LONGEST_STEP / longest);
     }
     if let Some(wish) = preference {
-        let turn = state.tip_axis.cross(&wish.tip_axis_in_base);
-        let mut gradient = [0.0; MAX_COORDINATES];
-        let mut moved = Vector::zeros();
-        for k in (0..n).filter(|&k| free[k]) {
-            gradient[k] = state.spins[k].dot(&turn);
-            moved += slides[k] * gradient[k];
-        }
+        let turn = tip_axis.cross(&wish.tip_axis_in_base);
+        let gradient: [f64; N] = std::array::from_fn(|k| spins[k].dot(&turn));
+        let moved = slides.iter().zip(&gradient).fold(Vector::zeros(), |sum, (slide, g)| sum + slide * *g);
         let back = solve(&moved);
-        let mut spin = Vector::zeros();
-        let mut gain = 0.0;
-        for k in (0..n).filter(|&k| free[k]) {
-            let projected = gradient[k] - slides[k].dot(&back);
-            gain += gradient[k] * projected;
-            gradient[k] = projected;
-            spin += state.spins[k] * projected;
-        }
-        let curvature = spin.cross(&state.tip_axis).norm_squared();
+        let projected: [f64; N] = std::array::from_fn(|k| gradient[k] - slides[k].dot(&back));
+        let gain: f64 = gradient.iter().zip(&projected).map(|(g, p)| g * p).sum();
+        let spin = spins.iter().zip(&projected).fold(Vector::zeros(), |sum, (spin, p)| sum + spin * *p);
+        let curvature = spin.cross(tip_axis).norm_squared();
         if curvature > 1e-12 && gain > 0.0 {
-            let mut length = wish.weight * gain / curvature;
-            let longest = (0..n).filter(|&k| free[k]).map(|k| gradient[k].abs()).fold(0.0, f64::max) * length;
-            if longest > LONGEST_STEP {
-                length *= LONGEST_STEP / longest;
-            }
-            for k in (0..n).filter(|&k| free[k]) {
-                step[k] += length * gradient[k];
+            let length = wish.weight * gain / curvature;
+            let length = length.min(LONGEST_STEP / longest_of(&projected));
+            for k in 0..N {
+                step[k] += length * projected[k];
             }
         }
     }
-    Some(())
+    Some(step)
+}
+
+fn longest_of<const N: usize>(step: &[f64; N]) -> f64 {
+    step.iter().fold(0.0, |longest, change| change.abs().max(longest))
 }
 
 /// The limits, or one turn where there are none.

@@ -8,11 +8,11 @@
 use super::quartic::roots_in_unit;
 use super::{Coordinates, IkSettings, POSITION_TOLERANCE};
 use crate::kinematics::body_frame::BodyFrame;
-use crate::kinematics::chain::{Chain, Motion};
+use crate::kinematics::chain::{Chain, ChainJoint, JointLine, Motion};
 use arrayvec::ArrayVec;
 use nalgebra::Matrix3;
 use regrasp_geometry::{Point, Vector};
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 /// Axes closer to meeting (share of the arm's length) or to parallel (sine) than this are treated as such; the
 /// substitution at the end repairs the difference.
@@ -26,6 +26,7 @@ const POLISHED: f64 = 1e-12;
 
 /// All branches: a 3R chain reaches a point in at most four ways.
 pub type Branches = ArrayVec<Coordinates, 8>;
+type Candidates = ArrayVec<[f64; 3], 8>;
 
 /// `constant + cosine * cos(q3) + sine * sin(q3)`.
 #[derive(Debug, Clone, Copy)]
@@ -38,6 +39,34 @@ struct Wave {
 impl Wave {
     fn at(&self, c: f64, s: f64) -> f64 {
         self.constant + self.cosine * c + self.sine * s
+    }
+}
+
+/// The angles that a joint can have, as an arc: angles outside are seen by two products, without an arc tangent.
+#[derive(Debug, Clone, Copy)]
+struct Window {
+    /// Cosine and sine of the arc's middle.
+    middle: (f64, f64),
+    /// Cosine of half its length; below -1 when it is the full circle.
+    cosine: f64,
+}
+
+impl Window {
+    fn new(joint: &ChainJoint, chain: &Chain) -> Self {
+        let at = |coordinate: f64| joint.multiplier * coordinate + joint.offset;
+        let (a, b) = (at(chain.lower[joint.coordinate]), at(chain.upper[joint.coordinate]));
+        let half = 0.5 * (b - a).abs() + 1e-6;
+        if half < PI {
+            let (sine, cosine) = (0.5 * (a + b)).sin_cos();
+            Window { middle: (cosine, sine), cosine: half.cos() }
+        } else {
+            Window { middle: (1.0, 0.0), cosine: -2.0 }
+        }
+    }
+
+    /// False when the angle whose cosine and sine are `c / length` and `s / length` is outside.
+    fn may_hold(&self, c: f64, s: f64, length: f64) -> bool {
+        c * self.middle.0 + s * self.middle.1 >= self.cosine * length - 1e-12 * length
     }
 }
 
@@ -73,6 +102,8 @@ pub struct ThreeR {
     twist_height: Wave,
     /// Per joint: coordinate, multiplier, offset.
     drives: [(usize, f64, f64); 3],
+    /// Per joint: the angles within its limits.
+    windows: [Window; 3],
     center_in_body: Point,
 }
 
@@ -158,6 +189,7 @@ impl ThreeR {
             half_square,
             twist_height,
             drives: joints.each_ref().map(|joint| (joint.coordinate, joint.multiplier, joint.offset)),
+            windows: joints.each_ref().map(|joint| Window::new(joint, chain)),
             center_in_body: *center_in_body,
         })
     }
@@ -165,6 +197,21 @@ impl ThreeR {
     /// Every branch within the limits.
     pub fn solve_all(&self, chain: &Chain, target: &Point, limit_margin: f64) -> Branches {
         let mut branches = Branches::new();
+        for mut candidate in self.candidates(chain, target, limit_margin) {
+            let error = self.tip_error(chain, target, &candidate);
+            if self.polish(chain, target, error, &mut candidate) && bring_inside(chain, limit_margin, &mut candidate) {
+                let is_same = |other: &Coordinates| other.iter().zip(&candidate).all(|(a, b)| (a - b).abs() < SAME);
+                if !branches.iter().any(is_same) {
+                    branches.push(candidate.into_iter().collect());
+                }
+            }
+        }
+        branches
+    }
+
+    /// Every branch within the limits as the formulas give it; coinciding ones twice.
+    fn candidates(&self, chain: &Chain, target: &Point, limit_margin: f64) -> Candidates {
+        let mut candidates = Candidates::new();
         let from_axis = target.coords - self.origin_1;
         // Distance and height equations: rho . e1 * offset = distance(q3), rho . e2 * twist_sine = rise(q3).
         let distance = Wave {
@@ -181,13 +228,13 @@ impl ThreeR {
             Axes::Meeting => {
                 for (c, s) in zeros_of(&distance) {
                     let rho_y = rise.at(c, s) / self.twist_sine;
-                    self.both_signs(chain, &from_axis, target, limit_margin, (c, s), rho_y, true, &mut branches);
+                    self.both_signs(chain, &from_axis, limit_margin, (c, s), rho_y, true, &mut candidates);
                 }
             }
             Axes::Parallel => {
                 for (c, s) in zeros_of(&rise) {
                     let rho_x = distance.at(c, s) / self.offset;
-                    self.both_signs(chain, &from_axis, target, limit_margin, (c, s), rho_x, false, &mut branches);
+                    self.both_signs(chain, &from_axis, limit_margin, (c, s), rho_x, false, &mut candidates);
                 }
             }
             Axes::Skew => {
@@ -195,11 +242,11 @@ impl ThreeR {
                 let rho_y = scaled(&rise, 1.0 / self.twist_sine);
                 for (c, s) in circle_zeros(&rho_x, &rho_y, &self.x, &self.y) {
                     let rho = (rho_x.at(c, s), rho_y.at(c, s));
-                    self.finish(chain, &from_axis, target, limit_margin, (c, s), rho, &mut branches);
+                    self.finish(chain, &from_axis, limit_margin, (c, s), rho, &mut candidates);
                 }
             }
         }
-        branches
+        candidates
     }
 
     /// The branch continuous with `seed`.
@@ -210,30 +257,43 @@ impl ThreeR {
         seed: &[f64],
         settings: &IkSettings,
     ) -> Option<Coordinates> {
-        let mut near: Option<Coordinates> = None;
+        let mut near = [0.0; 3];
         let mut n_near = 0;
-        for mut branch in self.solve_all(chain, target, settings.limit_margin) {
+        for mut candidate in self.candidates(chain, target, settings.limit_margin) {
             let mut largest: f64 = 0.0;
             for &(k, multiplier, _) in &self.drives {
                 let turn = TAU / multiplier.abs();
-                let unwound = branch[k] + ((seed[k] - branch[k]) / turn).round() * turn;
-                if unwound >= chain.lower[k] + settings.limit_margin
-                    && unwound <= chain.upper[k] - settings.limit_margin
-                {
-                    branch[k] = unwound;
+                // Joints with more than a full turn of room go on from where they are.
+                if (candidate[k] - seed[k]).abs() > 0.5 * turn {
+                    let unwound = candidate[k] + ((seed[k] - candidate[k]) / turn).round() * turn;
+                    if unwound >= chain.lower[k] + settings.limit_margin
+                        && unwound <= chain.upper[k] - settings.limit_margin
+                    {
+                        candidate[k] = unwound;
+                    }
                 }
-                largest = largest.max((branch[k] - seed[k]).abs());
+                largest = largest.max((candidate[k] - seed[k]).abs());
             }
             if largest <= settings.max_step {
                 n_near += 1;
-                near = Some(branch);
+                near = candidate;
             }
         }
         // Two branches within reach of one step meet in a singularity nearby: which one is continuous is not known.
-        let near = near.filter(|_| n_near == 1)?;
-        let before = self.jacobian(chain, seed).determinant();
-        let after = self.jacobian(chain, &near).determinant();
-        (before * after > 0.0).then_some(near)
+        if n_near != 1 {
+            return None;
+        }
+        let (tip, mut jacobian) = self.tip_and_jacobian(chain, &near);
+        let error = target.coords - tip;
+        if error.norm_squared() >= POLISHED * POLISHED {
+            if !self.polish(chain, target, error, &mut near) {
+                return None;
+            }
+            jacobian = self.tip_and_jacobian(chain, &near).1;
+        }
+        let before = self.tip_and_jacobian(chain, seed).1.determinant();
+        let same_side = before * jacobian.determinant() > 0.0;
+        (same_side && bring_inside(chain, settings.limit_margin, &mut near)).then(|| near.into_iter().collect())
     }
 
     /// One component of the rotated arm is known; the other follows from its length, up to the sign.
@@ -241,13 +301,15 @@ impl ThreeR {
         &self,
         chain: &Chain,
         from_axis: &Vector,
-        target: &Point,
         limit_margin: f64,
         joint_3: (f64, f64),
         known: f64,
         known_is_y: bool,
-        branches: &mut Branches,
+        candidates: &mut Candidates,
     ) {
+        if !self.windows[2].may_hold(joint_3.0, joint_3.1, 1.0) {
+            return;
+        }
         let (x, y) = (self.x.at(joint_3.0, joint_3.1), self.y.at(joint_3.0, joint_3.1));
         let length_squared = x * x + y * y;
         let rest = length_squared - known * known;
@@ -257,71 +319,64 @@ impl ThreeR {
         let other = rest.max(0.0).sqrt();
         for other in [other, -other] {
             let rho = if known_is_y { (other, known) } else { (known, other) };
-            self.finish(chain, from_axis, target, limit_margin, joint_3, rho, branches);
+            self.finish(chain, from_axis, limit_margin, joint_3, rho, candidates);
             if other == 0.0 {
                 break;
             }
         }
     }
 
-    /// Joint 2 turns the arm's `(x, y)` to `rho`, joint 1 brings it to the target; keeps what is within the limits
-    /// and holds when substituted.
+    /// Joint 2 turns the arm's `(x, y)` to `rho`, joint 1 brings it to the target; keeps what is within the limits.
     fn finish(
         &self,
         chain: &Chain,
         from_axis: &Vector,
-        target: &Point,
         limit_margin: f64,
         (c, s): (f64, f64),
         rho: (f64, f64),
-        branches: &mut Branches,
+        candidates: &mut Candidates,
     ) {
-        let within = |joint: usize, angle: f64| {
+        let within = |joint: usize, s: f64, c: f64, length: f64| {
+            if !self.windows[joint].may_hold(c, s, length) {
+                return None;
+            }
+            let angle = s.atan2(c);
             let (k, multiplier, offset) = self.drives[joint];
             in_limits(angle, multiplier, offset, chain.lower[k] + limit_margin, chain.upper[k] - limit_margin)
         };
-        let Some(q3) = within(2, s.atan2(c)) else { return };
+        // Length of an unnormalised cosine and sine; rounding apart, of the turned arm it is the square of its length.
+        let Some(q3) = within(2, s, c, 1.0) else { return };
         let (x, y, height) = (self.x.at(c, s), self.y.at(c, s), self.height.at(c, s));
-        let Some(q2) = within(1, (x * rho.1 - y * rho.0).atan2(x * rho.0 + y * rho.1)) else { return };
+        let Some(q2) = within(1, x * rho.1 - y * rho.0, x * rho.0 + y * rho.1, x * x + y * y) else { return };
         let before = self.e1 * (self.offset + rho.0) + self.e2 * rho.1 + self.axis_2 * height;
         let turned = self.axis_1.dot(&before.cross(from_axis));
         let straight = before.dot(from_axis) - self.axis_1.dot(&before) * self.axis_1.dot(from_axis);
-        let Some(q1) = within(0, turned.atan2(straight)) else { return };
+        let Some(q1) = within(0, turned, straight, (turned * turned + straight * straight).sqrt()) else { return };
         let mut coordinates = [0.0; 3];
         for (q, drive) in [q1, q2, q3].into_iter().zip(&self.drives) {
             coordinates[drive.0] = q;
         }
-        if !self.polish(chain, target, &mut coordinates) {
-            return;
-        }
-        for (k, q) in coordinates.iter_mut().enumerate() {
-            let inside = q.max(chain.lower[k] + limit_margin).min(chain.upper[k] - limit_margin);
-            if (inside - *q).abs() > LIMIT_ROUNDING {
-                return;
-            }
-            *q = inside;
-        }
-        let known = branches.iter().any(|other| other.iter().zip(&coordinates).all(|(a, b)| (a - b).abs() < SAME));
-        if !known && !branches.is_full() {
-            branches.push(coordinates.into_iter().collect());
+        if !candidates.is_full() {
+            candidates.push(coordinates);
         }
     }
 
     /// Newton steps until the tip is on the target; false when it is not reached.
-    fn polish(&self, chain: &Chain, target: &Point, coordinates: &mut [f64; 3]) -> bool {
-        let mut error = target - chain.last_frame(coordinates).point(&self.center_in_body);
+    fn polish(&self, chain: &Chain, target: &Point, error: Vector, coordinates: &mut [f64; 3]) -> bool {
+        let mut error = error;
         for _ in 0..4 {
             if error.norm_squared() < POLISHED * POLISHED {
                 return true;
             }
-            let Some(step) = self.jacobian(chain, coordinates).try_inverse().map(|inverse| inverse * error) else {
+            let (_, jacobian) = self.tip_and_jacobian(chain, coordinates);
+            let Some(step) = jacobian.try_inverse().map(|inverse| inverse * error) else {
                 break;
             };
             if !step.iter().all(|change| change.abs() < 0.1) {
                 break;
             }
             let moved = [coordinates[0] + step.x, coordinates[1] + step.y, coordinates[2] + step.z];
-            let moved_error = target - chain.last_frame(&moved).point(&self.center_in_body);
+            let moved_error = self.tip_error(chain, target, &moved);
             if moved_error.norm_squared() >= error.norm_squared() {
                 break;
             }
@@ -330,18 +385,31 @@ impl ThreeR {
         error.norm_squared() < POSITION_TOLERANCE * POSITION_TOLERANCE
     }
 
-    /// Jacobian of the tip, one column per coordinate.
-    fn jacobian(&self, chain: &Chain, coordinates: &[f64]) -> Matrix3<f64> {
-        let mut frames = [BodyFrame::IDENTITY; 3];
-        chain.forward_frames(coordinates, &mut frames);
-        let tip = frames[2].point(&self.center_in_body).coords;
-        let mut jacobian = Matrix3::zeros();
-        for (joint, frame) in chain.joints.iter().zip(&frames) {
-            let axis = frame.rotation * joint.axis.into_inner();
-            jacobian.set_column(joint.coordinate, &(axis.cross(&(tip - frame.translation)) * joint.multiplier));
-        }
-        jacobian
+    /// From the tip to the target.
+    fn tip_error(&self, chain: &Chain, target: &Point, coordinates: &[f64; 3]) -> Vector {
+        target - chain.last_frame(coordinates).point(&self.center_in_body)
     }
+
+    /// The tip, and its Jacobian with one column per coordinate.
+    fn tip_and_jacobian(&self, chain: &Chain, coordinates: &[f64]) -> (Vector, Matrix3<f64>) {
+        let mut lines: ArrayVec<JointLine, 3> = ArrayVec::new();
+        let tip = chain.joint_lines(coordinates, &mut lines).point(&self.center_in_body).coords;
+        let mut jacobian = Matrix3::zeros();
+        for (drive, line) in self.drives.iter().zip(&lines) {
+            jacobian.set_column(drive.0, &(line.axis.cross(&(tip - line.origin)) * drive.1));
+        }
+        (tip, jacobian)
+    }
+}
+
+/// Removes rounding beyond the limits; false when it is more than rounding.
+fn bring_inside(chain: &Chain, limit_margin: f64, coordinates: &mut [f64; 3]) -> bool {
+    coordinates.iter_mut().enumerate().all(|(k, q)| {
+        let inside = q.max(chain.lower[k] + limit_margin).min(chain.upper[k] - limit_margin);
+        let excess = (inside - *q).abs();
+        *q = inside;
+        excess <= LIMIT_ROUNDING
+    })
 }
 
 /// Points of two lines that are nearest to each other; for parallel lines the second line's own point and its foot.

@@ -1,0 +1,282 @@
+//! Every bad hand file and SRDF is refused with its message.
+
+use regrasp_robot::import::srdf::{joints_of_group, load_srdf};
+use regrasp_robot::{LoadOptions, load_hand, load_robot};
+use std::fs;
+use std::path::Path;
+
+/// Two fingers of two joints on a base that turns; `lower` mimics in finger `b`.
+const URDF: &str = r#"<robot name="pincer">
+<link name="arm"/><link name="palm"/>
+<link name="a1"/><link name="a2"/><link name="a_tip"/><link name="b1"/><link name="b2"/>
+<joint name="wrist" type="revolute"><parent link="arm"/><child link="palm"/><axis xyz="0 0 1"/><limit lower="-1" upper="1"/></joint>
+<joint name="ja1" type="revolute"><parent link="palm"/><child link="a1"/><origin xyz="0.03 0 0"/><axis xyz="0 1 0"/><limit lower="-1" upper="1"/></joint>
+<joint name="ja2" type="revolute"><parent link="a1"/><child link="a2"/><origin xyz="0 0 0.05"/><axis xyz="0 1 0"/><limit lower="-1" upper="1"/></joint>
+<joint name="ja_tip" type="fixed"><parent link="a2"/><child link="a_tip"/><origin xyz="0 0 0.04"/></joint>
+<joint name="jb1" type="revolute"><parent link="palm"/><child link="b1"/><origin xyz="-0.03 0 0"/><axis xyz="0 1 0"/><limit lower="-1" upper="1"/></joint>
+<joint name="jb2" type="revolute"><parent link="b1"/><child link="b2"/><origin xyz="0 0 0.05"/><axis xyz="0 1 0"/><limit lower="-1" upper="1"/><mimic joint="jb1" multiplier="-2" offset="0.5"/></joint>
+</robot>"#;
+
+const HEAD: &str = "format = \"regrasp hand\"\nversion = 1\nurdf = \"hand.urdf\"\n";
+const POINT: &str = "tip = { shape = \"point\" }";
+
+fn write_files(folder: &Path, hand: &str) -> std::path::PathBuf {
+    fs::write(folder.join("hand.urdf"), URDF).unwrap();
+    let path = folder.join("hand.toml");
+    fs::write(&path, hand).unwrap();
+    path
+}
+
+/// The messages for `hand` as `hand.toml`, with the folder left out.
+fn messages(hand: &str) -> Vec<String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = write_files(folder.path(), hand);
+    let error = load_hand(&path, &LoadOptions::default()).expect_err("the file is bad");
+    let prefix = format!("{}/", folder.path().display());
+    error.diagnostics.iter().map(|d| d.to_string().replace(&prefix, "")).collect()
+}
+
+/// A hand file with fingers `a` and `b`, where `more` stands in finger `a`.
+fn with_finger(more: &str) -> String {
+    format!(
+        "{HEAD}base_link = \"palm\"\n[[fingers]]\nname = \"a\"\n{more}\n[[fingers]]\nname = \"b\"\ntip_link = \"b2\"\n{POINT}\n"
+    )
+}
+
+macro_rules! refused {
+    ($name:ident, $text:expr, [$($message:expr),* $(,)?]) => {
+        #[test]
+        fn $name() {
+            let expected: Vec<&str> = vec![$($message),*];
+            assert_eq!(messages(&$text), expected);
+        }
+    };
+}
+
+refused!(
+    text_that_is_not_toml,
+    "format = \n",
+    ["U200 hand.toml:1:10: is not valid TOML: string values must be quoted, expected literal string"]
+);
+refused!(
+    an_empty_file,
+    "",
+    [
+        r#"U202 hand.toml:1:1 key "format": is missing; expected format = "regrasp hand""#,
+        r#"U202 hand.toml:1:1 key "version": is missing; expected version = 1"#,
+        r#"U202 hand.toml:1:1 key "urdf": is missing; expected urdf = "...""#
+    ]
+);
+refused!(
+    a_key_that_is_misspelt,
+    format!("basse_link = \"palm\"\n{}", with_finger(&format!("tip_link = \"a_tip\"\n{POINT}\ncolour = 1"))),
+    [
+        r#"U201 hand.toml:1:1 key "basse_link": is not a key of this table; expected one of format, version, urdf, srdf, base_link, allow, fingers
+  fix: did you mean base_link?"#,
+        r#"U201 hand.toml:10:1 key "colour": is not a key of this table; expected one of name, tip_link, first_joint, tip, rest"#
+    ]
+);
+refused!(
+    another_version,
+    with_finger(&format!("tip_link = \"a_tip\"\n{POINT}")).replace("version = 1", "version = 2"),
+    [r#"U204 hand.toml:2:11 key "version": is 2, which this program does not know; expected 1"#]
+);
+refused!(
+    a_urdf_that_is_not_there,
+    with_finger(&format!("tip_link = \"a_tip\"\n{POINT}")).replace("hand.urdf", "gone.urdf"),
+    [
+        r#"U101 hand.toml:3:8 key "urdf": "gone.urdf" not found; looked in: gone.urdf; expected a path relative to this file, or package://NAME/PATH"#
+    ]
+);
+refused!(
+    a_link_that_is_misspelt,
+    with_finger(&format!("tip_link = \"a_tpi\"\n{POINT}")),
+    [r#"U205 hand.toml:7:12 key "tip_link": the robot has no link "a_tpi"; expected the name of a link of the URDF
+  fix: did you mean "a_tip"?"#]
+);
+refused!(
+    no_fingers,
+    HEAD,
+    [r#"U202 hand.toml:1:1 key "fingers": is missing; expected at least one [[fingers]] table"#]
+);
+refused!(
+    no_tip,
+    with_finger("tip_link = \"a_tip\""),
+    [
+        r#"U202 hand.toml:5:1 key "tip": is missing; expected tip = { shape = "sphere", radius = 0.012, center = [0, 0, 0] }"#
+    ]
+);
+refused!(
+    a_tip_shape_that_is_misspelt,
+    with_finger("tip_link = \"a_tip\"\ntip = { shape = \"spere\", radius = 0.01 }"),
+    [r#"U213 hand.toml:8:17 key "shape": is "spere"; expected "sphere", "point" or "mesh"
+  fix: did you mean "sphere"?"#]
+);
+refused!(
+    a_negative_tip_radius,
+    with_finger("tip_link = \"a_tip\"\ntip = { shape = \"sphere\", radius = -0.01 }"),
+    [r#"U213 hand.toml:8:36 key "radius": is -0.01; expected a length above 0, in metres
+  fix: shape = "point" for a sharp tip"#]
+);
+refused!(
+    a_tip_radius_of_nan,
+    with_finger("tip_link = \"a_tip\"\ntip = { shape = \"sphere\", radius = nan }"),
+    [r#"V001 hand.toml:8:36 key "radius": is NaN; expected a finite number"#]
+);
+refused!(
+    a_tip_radius_in_words,
+    with_finger("tip_link = \"a_tip\"\ntip = { shape = \"sphere\", radius = \"big\" }"),
+    [r#"U203 hand.toml:8:36 key "radius": is a string; expected a number"#]
+);
+refused!(
+    a_center_of_two_numbers,
+    with_finger("tip_link = \"a_tip\"\ntip = { shape = \"sphere\", radius = 0.01, center = [0, 1] }"),
+    [r#"U203 hand.toml:8:51 key "center": is a list of 2; expected three numbers: [x, y, z]"#]
+);
+refused!(
+    a_hull_of_nothing,
+    with_finger("tip_link = \"a_tip\"\ntip = { shape = \"mesh\" }"),
+    [
+        r#"U210 hand.toml:5:1 finger "a": tip link has no collision geometry with corners; expected box or mesh collision geometry on the tip link
+  fix: shape = "sphere" for a round tip"#
+    ]
+);
+refused!(
+    a_rest_position_outside_the_limits,
+    with_finger(&format!("tip_link = \"a_tip\"\n{POINT}\nrest = {{ ja1 = 2.0, ja3 = 0 }}")),
+    [
+        r#"U212 hand.toml:9:10 joint "ja1": rest position 2 is outside the limits; expected -1..1"#,
+        r#"U205 hand.toml:9:21 key "rest": finger "a" has no independent joint "ja3"; expected one of ja1, ja2
+  fix: did you mean ja1?"#
+    ]
+);
+refused!(
+    a_rest_position_of_a_follower,
+    with_finger(&format!("tip_link = \"a_tip\"\n{POINT}")).replace("\"b2\"\n", "\"b2\"\nrest = { jb2 = 0.0 }\n"),
+    [r#"U205 hand.toml:12:10 key "rest": finger "b" has no independent joint "jb2"; expected one of jb1
+  fix: did you mean jb1?"#]
+);
+refused!(
+    a_pair_that_is_none,
+    format!(
+        "{}\n",
+        with_finger(&format!("tip_link = \"a_tip\"\n{POINT}"))
+            .replace("base_link", "allow = [[\"a1\"], [\"a1\", \"b3\"]]\nbase_link")
+    ),
+    [
+        r#"U203 hand.toml:4:10 key "allow": is a list of 1; expected pairs of link names: [["link_a", "link_b"], ...]"#,
+        r#"U205 hand.toml:4:25 key "allow": the robot has no link "b3"; expected the name of a link of the URDF
+  fix: did you mean "b1"?"#
+    ]
+);
+refused!(
+    two_fingers_of_one_name,
+    with_finger(&format!("tip_link = \"a_tip\"\n{POINT}")).replace("\"b\"", "\"a\""),
+    [r#"U211 hand.toml:9:1 finger "a": the name is empty or used twice; expected a name of its own"#]
+);
+refused!(
+    fingers_that_share_a_joint,
+    with_finger(&format!("tip_link = \"a_tip\"\n{POINT}")).replace("\"palm\"", "\"arm\""),
+    [r#"U208 hand.toml:9:1 finger "b": joint "wrist" moves finger "a" too; expected fingers that share no joint
+  fix: base_link = "palm", so that shared joints belong to no finger"#]
+);
+refused!(
+    a_tip_that_the_base_does_not_carry,
+    with_finger(&format!("tip_link = \"arm\"\n{POINT}")),
+    [
+        r#"U206 hand.toml:5:1 finger "a": tip link "arm" is not carried by base link "palm"; expected a tip link below the base link"#
+    ]
+);
+refused!(
+    a_tip_that_does_not_move,
+    with_finger(&format!("tip_link = \"palm\"\n{POINT}")),
+    [r#"U207 hand.toml:5:1 finger "a": no joint moves between "palm" and "palm"; expected at least one moving joint"#]
+);
+refused!(
+    a_chain_that_starts_after_its_leader,
+    with_finger(&format!("tip_link = \"a_tip\"\n{POINT}")).replace("\"b2\"\n", "\"b2\"\nfirst_joint = \"jb2\"\n"),
+    [
+        r#"U209 hand.toml:9:1 finger "b": joint "jb2" follows joint "jb1", which is on another finger or on none; expected followers on the chain of the joint they follow"#
+    ]
+);
+
+#[test]
+fn a_good_hand_file_gives_chains_with_couplings() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = with_finger(&format!("tip_link = \"a_tip\"\n{POINT}\nrest = {{ ja1 = 0.25 }}"));
+    let loaded = load_hand(&write_files(folder.path(), &text), &LoadOptions::default()).unwrap();
+    let hand = loaded.hand;
+    assert_eq!(hand.joint_names(), ["ja1", "ja2", "jb1"]);
+    assert_eq!(hand.fingers[0].rest, [0.25, 0.0]);
+    // jb2 = -2 jb1 + 0.5 within -1..1 leaves jb1 within -0.25..0.75.
+    let b = &hand.fingers[1].chain;
+    assert!((b.lower[0] + 0.25).abs() < 1e-15 && (b.upper[0] - 0.75).abs() < 1e-15);
+    // The last link is at z 0.05 of the first, turned by jb1 about y.
+    let mut poses = Vec::new();
+    b.forward(&[0.4], &mut poses);
+    let turned: f64 = 0.4;
+    let expected = nalgebra::Vector3::new(-0.03 + 0.05 * turned.sin(), 0.0, 0.05 * turned.cos());
+    assert!((poses[1].translation.vector - expected).norm() < 1e-15);
+    let angle = poses[1].rotation.scaled_axis().y;
+    assert!((angle - (0.4 + (-2.0 * 0.4 + 0.5))).abs() < 1e-12, "{angle}");
+    let roles: Vec<&str> = loaded.inputs.iter().map(|input| input.role.as_str()).collect();
+    assert_eq!(roles, ["hand", "urdf"]);
+    assert_eq!(loaded.inputs[1].sha256, regrasp_base::files::sha256(URDF.as_bytes()));
+}
+
+#[test]
+fn a_hand_in_millimetres_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = write_files(folder.path(), &with_finger(&format!("tip_link = \"a_tip\"\n{POINT}")));
+    fs::write(folder.path().join("hand.urdf"), URDF.replace("0.0", "").replace("xyz=\"0 0 5\"", "xyz=\"0 0 50\""))
+        .unwrap();
+    let error = load_hand(&path, &LoadOptions::default()).unwrap_err();
+    assert_eq!(error.diagnostics[0].code, "U216", "{error}");
+    assert_eq!(error.diagnostics[0].fix, "multiply every length of the URDF by 0.001");
+}
+
+const SRDF: &str = r#"<robot name="pincer">
+<group name="a"><chain base_link="palm" tip_link="a_tip"/></group>
+<group name="both"><group name="a"/><joint name="jb1"/><link name="b1"/></group>
+<end_effector name="hand" group="both" parent_link="arm"/>
+<disable_collisions link1="b1" link2="a1" reason="Never"/>
+</robot>"#;
+
+#[test]
+fn an_srdf_gives_groups_end_effectors_and_pairs() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = format!("srdf = \"hand.srdf\"\n{}", with_finger(&format!("tip_link = \"a_tip\"\n{POINT}")));
+    let path = write_files(folder.path(), &text);
+    fs::write(folder.path().join("hand.srdf"), SRDF).unwrap();
+    let hand = load_hand(&path, &LoadOptions::default()).unwrap().hand;
+    let link = |name: &str| hand.robot.link_named(name).unwrap();
+    assert!(hand.may_touch(link("a1"), link("b1")));
+    assert!(!hand.may_touch(link("a2"), link("b1")));
+    let srdf = load_srdf(&folder.path().join("hand.srdf"), &hand.robot, false).unwrap().srdf;
+    let names: Vec<&str> =
+        joints_of_group(&srdf, &hand.robot, "both").iter().map(|j| hand.robot.joints[j.0].name.as_str()).collect();
+    assert_eq!(names, ["jb1", "ja1", "ja2"]);
+    assert_eq!(srdf.end_effectors[0].parent_link, link("arm"));
+    assert_eq!(srdf.disabled_pairs[0].reason, "Never");
+}
+
+#[test]
+fn unknown_names_in_an_srdf_are_errors_or_notes() {
+    let folder = tempfile::tempdir().unwrap();
+    write_files(folder.path(), "");
+    let robot = load_robot(&folder.path().join("hand.urdf"), &LoadOptions::default()).unwrap().robot;
+    let path = folder.path().join("hand.srdf");
+    let bad =
+        SRDF.replace("a_tip", "a_tipp").replace("\"jb1\"", "\"jx_9\"").replace("group=\"both\"", "group=\"bohh\"");
+    fs::write(&path, bad).unwrap();
+    let prefix = format!("{}/", folder.path().display());
+    let error = load_srdf(&path, &robot, false).unwrap_err();
+    let seen: Vec<String> = error.diagnostics.iter().map(|d| d.to_string().replace(&prefix, "")).collect();
+    let expected = [
+        "U161 hand.srdf:2:41 group \"a\": tip_link \"a_tipp\" is not a link of the robot; expected the name of a link\n  fix: did you mean \"a_tip\"?",
+        "U162 hand.srdf:3:44 group \"both\": name \"jx_9\" is not a joint of the robot; expected the name of a joint\n  fix: --lenient to skip it",
+        "U163 hand.srdf:4:27 end_effector \"hand\": group \"bohh\" is not a group of the robot; expected the name of a group\n  fix: did you mean \"both\"?",
+    ];
+    assert_eq!(seen, expected);
+    assert_eq!(load_srdf(&path, &robot, true).unwrap().notes.len(), 3);
+}
