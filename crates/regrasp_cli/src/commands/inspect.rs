@@ -43,7 +43,8 @@ pub fn run(arguments: &args::Inspect, common: &Common, talk: &Talk) -> Result<()
     match (&found.hand, &arguments.output) {
         (Err(error), Some(_)) => Err(Stop::BadInput(error.clone())),
         (Ok((hand, table)), Some(path)) => {
-            let text = hand_file_text(hand, &name_of_urdf(path, &found, &arguments.urdf), &table.pairs.always_ids);
+            let urdf = name_of_urdf(path, &found, &arguments.urdf, &common.packages);
+            let text = hand_file_text(hand, &urdf, &table.pairs.always_ids);
             files::write_atomic(path, text.as_bytes()).map_err(|error| Stop::unwritable(path, &error))?;
             talk.event("written", json!({ "path": path }));
             talk.say(format!("wrote  {}", path.display()));
@@ -53,15 +54,22 @@ pub fn run(arguments: &args::Inspect, common: &Common, talk: &Talk) -> Result<()
     }
 }
 
-/// How the hand file at `hand_file` names the URDF: relative to itself.
-fn name_of_urdf(hand_file: &Path, found: &Inspection, asked: &Path) -> String {
+/// How the hand file at `hand_file` names the URDF: within a package given, else relative to itself.
+fn name_of_urdf(hand_file: &Path, found: &Inspection, asked: &Path, packages: &[(String, PathBuf)]) -> String {
     let urdf = found.inputs.iter().find(|input| input.role == "urdf").map_or(asked, |input| &input.path);
     let absolute = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let urdf = absolute(urdf);
+    let slashed = |path: &Path| path.to_string_lossy().replace('\\', "/");
+    for (name, folder) in packages {
+        if let Ok(inside) = urdf.strip_prefix(absolute(folder)) {
+            return format!("package://{name}/{}", slashed(inside));
+        }
+    }
     let folder = match hand_file.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => absolute(parent),
         _ => absolute(Path::new(".")),
     };
-    relative(&absolute(urdf), &folder).to_string_lossy().replace('\\', "/")
+    slashed(&relative(&urdf, &folder))
 }
 
 /// `target` as seen from `folder`, both absolute.
@@ -183,6 +191,9 @@ fn hand_part(hand: &HandInspection, out: &mut String) {
     }
     for pair in pairs.sometimes.iter().take(PAIRS_SHOWN) {
         let _ = writeln!(out, "  {:>7.2} %  {} and {}", 100.0 * pair.share, pair.links[0], pair.links[1]);
+    }
+    if pairs.sometimes.len() > PAIRS_SHOWN {
+        let _ = writeln!(out, "  and {} more that touch sometimes; all of them with --json", pairs.sometimes.len() - PAIRS_SHOWN);
     }
     for [a, b] in &pairs.at_rest {
         let _ = writeln!(out, "  at rest    {a} and {b} touch in the rest posture");
