@@ -159,7 +159,7 @@ fn substituted_margin(
 ) -> f64 {
     let mut forces = &forces - right_inverse * (grasp_map * &forces);
     let total: f64 = (0..shares.len()).map(|i| forces[3 * i]).sum();
-    if !(total > 1e-3) {
+    if total.is_nan() || total <= 1e-3 {
         return 0.0;
     }
     forces /= total;

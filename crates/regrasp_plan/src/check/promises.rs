@@ -121,7 +121,7 @@ pub fn check_promises(object: &Object, plan: &Plan, settings: &CheckSettings, mi
         let message = format!("torque scale {}, the object's radius is {scale}", promises.torque_scale);
         broken("torque_scale", promises.torque_scale, scale, message);
     }
-    if !(promises.friction >= 0.0) {
+    if promises.friction < 0.0 {
         let message = format!("friction {} is negative", promises.friction);
         broken("friction", promises.friction, 0.0, message);
     }
