@@ -1,7 +1,7 @@
 //! What the checker said, in words and as an event.
 
 use crate::stop::Stop;
-use crate::talk::{Talk, counted, grouped};
+use crate::talk::{Talk, counted, duration, grouped};
 use regrasp::plan::check::{CheckSettings, Report, check};
 use regrasp::plan::format;
 use regrasp::robot::import::LoadOptions;
@@ -45,10 +45,11 @@ fn say(report: &Report, elapsed: Duration, talk: &Talk) {
         format!("{:.2} mm ({} and {})", 1e3 * clearance.distance, clearance.pair[0], clearance.pair[1])
     });
     talk.say(format!(
-        "check  {}   {} waypoints, {} distances, exact cones   {seconds:.2} s",
+        "check  {}   {} waypoints, {} distances, exact cones   {}",
         if report.accepted() { "ACCEPTED" } else { "REJECTED" },
         grouped(report.n_waypoints as u64),
         grouped(report.n_distances),
+        duration(seconds),
     ));
     talk.say(format!(
         "       closure margin {margin}, clearance {clearance}, fingertips within {:.3} mm of their contacts",

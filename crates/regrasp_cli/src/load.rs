@@ -2,7 +2,7 @@
 
 use crate::args::{Common, Search};
 use crate::stop::Stop;
-use crate::talk::{Talk, counted, grouped};
+use crate::talk::{Talk, counted, duration, grouped};
 use regrasp::base::{Diagnostic, Place};
 use regrasp::geometry::Shape;
 use regrasp::robot::import::{LoadOptions, ResolveOptions};
@@ -71,11 +71,12 @@ fn say_scene(scene: &Scene, seconds: f64, talk: &Talk) {
     let n_mimic = hand.robot.joints.iter().filter(|joint| joint.mimic.is_some()).count();
     let n_shapes = hand.palm.len() + hand.fingers.iter().map(|finger| finger.shapes.len()).sum::<usize>();
     talk.say(format!(
-        "hand   {}   {} ({n_mimic} mimic)   {}   {}   loaded in {seconds:.2} s",
+        "hand   {}   {} ({n_mimic} mimic)   {}   {}   loaded in {}",
         hand.robot.name,
         counted(hand.n_joints(), "joint"),
         counted(hand.fingers.len(), "finger"),
         counted(n_shapes, "collision shape"),
+        duration(seconds),
     ));
     let object = &scene.object;
     talk.say(format!(

@@ -79,7 +79,7 @@ impl Talk {
                 }
             }
             Stop::Rejected => {}
-            Stop::Interrupted => self.line_to_stderr("interrupted; nothing was written"),
+            Stop::Interrupted => self.line_to_stderr("interrupted"),
             Stop::Internal(message) => {
                 self.event("internal_error", json!({ "message": message }));
                 self.line_to_stderr(&format!(
@@ -126,6 +126,11 @@ pub fn grouped(n: u64) -> String {
         out.push(digit);
     }
     out
+}
+
+/// Seconds, or milliseconds when they are few.
+pub fn duration(seconds: f64) -> String {
+    if seconds < 0.1 { format!("{:.1} ms", 1e3 * seconds) } else { format!("{seconds:.2} s") }
 }
 
 /// `1 finger`, `2 fingers`.

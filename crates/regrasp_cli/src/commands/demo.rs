@@ -51,8 +51,7 @@ pub fn run(arguments: &args::Demo, common: &Common, talk: &Talk) -> Result<(), S
     talk.event("written", json!({ "path": plan_path, "sha256": sha256, "chart": chart_path }));
     talk.say(format!("wrote  {}   sha256 {sha256}", plan_path.display()));
     talk.say(format!("chart  {}   which finger holds when; open it in a browser", chart_path.display()));
-    talk.say(format!("again  regrasp plan {} --seed 1 -o plan.json", scene_path.display()));
-    talk.say(format!("judge  regrasp check {}", plan_path.display()));
+    talk.say(format!("next   regrasp check {}", plan_path.display()));
     Ok(())
 }
 

@@ -193,7 +193,11 @@ fn hand_part(hand: &HandInspection, out: &mut String) {
         let _ = writeln!(out, "  {:>7.2} %  {} and {}", 100.0 * pair.share, pair.links[0], pair.links[1]);
     }
     if pairs.sometimes.len() > PAIRS_SHOWN {
-        let _ = writeln!(out, "  and {} more that touch sometimes; all of them with --json", pairs.sometimes.len() - PAIRS_SHOWN);
+        let _ = writeln!(
+            out,
+            "  and {} more that touch sometimes; all of them with --json",
+            pairs.sometimes.len() - PAIRS_SHOWN
+        );
     }
     for [a, b] in &pairs.at_rest {
         let _ = writeln!(out, "  at rest    {a} and {b} touch in the rest posture");

@@ -6,7 +6,7 @@ use crate::judge;
 use crate::load;
 use crate::progress::ProgressLines;
 use crate::stop::Stop;
-use crate::talk::{Talk, counted, grouped};
+use crate::talk::{Talk, counted, duration, grouped};
 use regrasp::base::files;
 use regrasp::plan::format;
 use regrasp::planners::FailureKind;
@@ -128,12 +128,13 @@ pub fn search(
     let seconds = started.elapsed().as_secs_f64();
     let waypoints: usize = plan.segments.iter().map(|segment| segment.waypoints.len()).sum();
     talk.say(format!(
-        "plan   {}, {}, {} waypoints, closure margin {:.4}{}   {seconds:.3} s",
+        "plan   {}, {}, {} waypoints, closure margin {:.4}{}   {}",
         counted(plan.statistics.transfers as usize, "transfer"),
         counted(plan.statistics.relocations as usize, "relocation"),
         grouped(waypoints as u64),
         plan.promises.kept_margin,
-        if plan.statistics.cut_by_time { ", cut by the time limit" } else { "" }
+        if plan.statistics.cut_by_time { ", cut by the time limit" } else { "" },
+        duration(seconds),
     ));
     talk.event(
         "plan",

@@ -70,7 +70,7 @@ fn urdf_package_path_without_a_file() {
 
 #[test]
 fn urdf_mesh_without_a_name() {
-    edit_is_refused("hand.urdf", PALM_SHAPE, &palm_mesh(""), "U112", &["palm", "empty", "filename"]);
+    edit_is_refused("hand.urdf", PALM_SHAPE, &palm_mesh(""), "U102", &["palm", "empty"]);
 }
 
 #[test]

@@ -103,3 +103,15 @@ impl Run {
 pub fn repository() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
 }
+
+/// The shared models, if they are here: `REGRASP_MODELS`, else `../shared/models` beside the repository or above it.
+pub fn models() -> Option<PathBuf> {
+    let named = std::env::var_os("REGRASP_MODELS").map(PathBuf::from);
+    let root = repository().canonicalize().expect("the repository is there");
+    let near = root.ancestors().map(|folder| folder.join("../shared/models"));
+    let found = named.into_iter().chain(near).find(|folder| folder.is_dir());
+    if found.is_none() {
+        println!("SKIPPED: no shared models");
+    }
+    found.and_then(|folder| folder.canonicalize().ok())
+}
