@@ -5,6 +5,7 @@ use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 use regrasp_robot::kinematics::body_frame::BodyFrame;
 use regrasp_robot::kinematics::finger_ik::{FingerIk, IkSettings, Preference};
+use regrasp_robot::kinematics::motion_bound::MotionBound;
 use regrasp_robot::{Chain, ChainJoint, Motion};
 use std::hint::black_box;
 use std::time::Instant;
@@ -82,7 +83,7 @@ fn main() {
             postures.iter().map(moved).collect()
         };
         let (near_1, near_5) = (near(0.001, &mut rng), near(0.005, &mut rng));
-        let wish = settings_with(Vector::new(-1.0, 0.0, 0.3));
+        let wish = settings_with(Vector::new(1.0, 0.3, 0.0));
         let mut poses = Vec::new();
         report(&format!("{name}: forward (poses)"), &postures, |q| {
             chain.forward(black_box(q), &mut poses);
@@ -113,7 +114,17 @@ fn main() {
         report(&format!("{name}: solve_near, 5 mm, with preference"), &near_5, |(q, target)| {
             black_box(ik.solve_near(black_box(target), q, &wish));
         });
+        let last = chain.joints.len() - 1;
+        let bound = MotionBound::new(&chain, last, &center, 0.005);
+        report(&format!("{name}: motion bounds, both orders"), &postures, |q| {
+            black_box(bound.first_order(black_box(q)) + bound.chord_deviation(black_box(q)));
+        });
         let n_tracked = near_5.iter().filter(|(q, target)| ik.solve_near(target, q, &settings).is_some()).count();
+        let tip_axis = |q: &[f64]| chain.last_frame(q).transform_vector(&center.coords.normalize());
+        let wanted = Vector::new(1.0, 0.3, 0.0).normalize();
+        let solved: Vec<_> = targets.iter().filter_map(|target| ik.solve_random(target, &wish, &mut rng)).collect();
+        let mean = solved.iter().map(|q| tip_axis(q).dot(&wanted)).sum::<f64>() / solved.len() as f64;
+        println!("{name}: {} of 512 solved, mean cosine to the preference {mean:.3}", solved.len());
         println!("{name}: 5 mm steps followed: {n_tracked} of {} (the others may be out of reach)", near_5.len());
     }
 }

@@ -1,6 +1,7 @@
 //! A hand: a palm and serial fingers, with everything the planners ask for prepared once.
 
 use crate::kinematics::chain::Chain;
+use crate::kinematics::finger_ik::FingerIk;
 use crate::robot::{LinkId, Robot};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Point, Pose, Shape};
@@ -72,6 +73,16 @@ pub struct Finger {
     pub shapes: Vec<FingerShape>,
     /// Posture the finger takes when nothing else is asked of it: one value per coordinate.
     pub rest: Vec<f64>,
+    /// Inverse kinematics of the tip's centre.
+    pub ik: FingerIk,
+}
+
+impl Finger {
+    /// A finger with its inverse kinematics prepared.
+    pub fn new(name: String, chain: Chain, tip: Tip, shapes: Vec<FingerShape>, rest: Vec<f64>) -> Self {
+        let ik = FingerIk::new(&chain, &tip.center_in_body);
+        Finger { name, chain, tip, shapes, rest, ik }
+    }
 }
 
 /// A shape of the palm (everything that no finger joint moves).
@@ -124,6 +135,7 @@ impl Hand {
     pub fn placed_at(mut self, world_from_hand: &Pose) -> Self {
         for finger in &mut self.fingers {
             finger.chain.place_at(world_from_hand);
+            finger.ik = FingerIk::new(&finger.chain, &finger.tip.center_in_body);
         }
         for shape in &mut self.palm {
             shape.placed.parent_from_shape = world_from_hand * shape.placed.parent_from_shape;

@@ -3,6 +3,7 @@
 use super::candidates::Candidate;
 use super::model::{MAX_FINGERS, Model};
 use super::settings::ReleaseRule;
+use super::workspace::Workspace;
 use arrayvec::ArrayVec;
 use regrasp_grasp::{Contact, closure};
 
@@ -95,14 +96,51 @@ pub struct Ranked {
     pub worth: f64,
 }
 
-/// The best closed combinations of `options`, best first. Option 0 of a finger is free when `keeps_first`, others cost.
+/// Which options of two fingers are in each other's way, found out when first asked for.
+#[derive(Debug)]
+struct ClashTable {
+    n_fingers: usize,
+    n_options: usize,
+    known: Vec<Option<bool>>,
+}
+
+impl ClashTable {
+    fn new(options: &[Vec<Candidate>]) -> Self {
+        let n_options = options.iter().map(Vec::len).max().unwrap_or(0);
+        let n_fingers = options.len();
+        ClashTable { n_fingers, n_options, known: vec![None; (n_fingers * n_options).pow(2)] }
+    }
+
+    fn is_clear(&mut self, workspace: &mut Workspace, options: &[Vec<Candidate>], choice: &Choice) -> bool {
+        (0..choice.len()).all(|f| (f + 1..choice.len()).all(|g| self.pair(workspace, options, f, g, choice)))
+    }
+
+    fn pair(
+        &mut self,
+        workspace: &mut Workspace,
+        options: &[Vec<Candidate>],
+        f: usize,
+        g: usize,
+        choice: &Choice,
+    ) -> bool {
+        let (a, b) = (choice[f], choice[g]);
+        let index = ((f * self.n_fingers + g) * self.n_options + a) * self.n_options + b;
+        *self.known[index]
+            .get_or_insert_with(|| workspace.fingers_are_clear((f, &options[f][a].joints), (g, &options[g][b].joints)))
+    }
+}
+
+/// The best closed combinations of `options` that fit together, best first. Option 0 of a finger is free when
+/// `keeps_first`, others cost.
 pub fn rank(
-    model: &Model,
+    workspace: &mut Workspace,
     options: &[Vec<Candidate>],
     table: &mut ClosureTable,
     keeps_first: bool,
     n_wanted: usize,
 ) -> Vec<Ranked> {
+    let model = workspace.model;
+    let mut clashes = ClashTable::new(options);
     let n = options.len();
     let all = (1u32 << n) - 1;
     let n_choices: usize = options.iter().map(Vec::len).product();
@@ -134,6 +172,9 @@ pub fn rank(
         let n_releasable = table.n_releasable(&candidate.choice);
         let rule = model.settings.release_rule;
         if n_releasable == 0 || (rule == ReleaseRule::EverywhereEveryFinger && n_releasable < n) {
+            continue;
+        }
+        if !clashes.is_clear(workspace, options, &candidate.choice) {
             continue;
         }
         candidate.worth += RELEASE_BONUS * (n_releasable - 1) as f64 / (n - 1) as f64;

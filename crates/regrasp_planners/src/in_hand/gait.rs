@@ -119,7 +119,7 @@ fn extend(search: &mut Search, tree: &mut Vec<Node>, node: usize, target: &Pose)
         options.push(options_of(search, &state, finger, &way));
     }
     let mut table = ClosureTable::new(model, &options);
-    let ranked = rank(model, &options, &mut table, true, COMBINATIONS);
+    let ranked = rank(&mut search.workspace, &options, &mut table, true, COMBINATIONS);
     if ranked.is_empty() {
         search.tally.add(Reason::NotClosed);
         return None;

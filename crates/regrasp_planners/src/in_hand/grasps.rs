@@ -45,7 +45,7 @@ pub fn draw_grasp(search: &mut Search, world_from_object: &Pose, target: &Pose) 
             continue;
         }
         let mut table = ClosureTable::new(model, &options);
-        let ranked = rank(model, &options, &mut table, false, 4);
+        let ranked = rank(&mut search.workspace, &options, &mut table, false, 4);
         if ranked.is_empty() {
             search.tally.add(Reason::NotClosed);
         }

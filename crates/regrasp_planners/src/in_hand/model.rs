@@ -18,15 +18,17 @@ pub const MAX_FINGERS: usize = 6;
 
 /// A finger, prepared.
 #[derive(Debug)]
-pub struct FingerModel {
+pub struct FingerModel<'a> {
     /// Inverse kinematics of the tip's centre.
-    pub ik: FingerIk,
+    pub ik: &'a FingerIk,
     /// Radius of the ball tip; zero for a sharp one.
     pub tip_radius: f64,
     /// Indices of its bodies in [`Model::bodies`].
     pub bodies: std::ops::Range<usize>,
     /// Pairs that a motion of this finger alone can bring together.
     pub pairs: Vec<usize>,
+    /// Of these, the pairs with each other finger.
+    pub pairs_with: Vec<Vec<usize>>,
     /// Tip centre at rest, in the world: where the finger likes to work.
     pub tip_at_rest: Point,
 }
@@ -85,7 +87,7 @@ pub struct Model<'a> {
     /// The scene.
     pub scene: &'a Scene,
     /// Fingers.
-    pub fingers: Vec<FingerModel>,
+    pub fingers: Vec<FingerModel<'a>>,
     /// Bodies: fingers first, then palm, object, obstacles.
     pub bodies: Vec<Body>,
     /// Index of the object's body.
@@ -141,13 +143,14 @@ impl<'a> Model<'a> {
                     add(&Shape::Sphere { radius }, &place, link, finger.tip.link, "tip ball", true);
                 }
             }
-            let ik = FingerIk::new(&finger.chain, &finger.tip.center_in_body);
+            let ik = &finger.ik;
             fingers.push(FingerModel {
                 tip_radius: finger.tip.radius(),
                 tip_at_rest: ik.tip(&finger.rest),
                 ik,
                 bodies: first..bodies.len(),
                 pairs: Vec::new(),
+                pairs_with: Vec::new(),
             });
         }
         let n_finger_bodies = bodies.len();
@@ -177,6 +180,15 @@ impl<'a> Model<'a> {
         }
         for (f, finger) in fingers.iter_mut().enumerate() {
             let moves = |body: usize| matches!(bodies[body].carrier, Carrier::Finger { finger, .. } if finger == f);
+            let between = |pair: &Pair, g: usize| {
+                let carried_by = |body: usize, which: usize| matches!(bodies[body].carrier, Carrier::Finger { finger, .. } if finger == which);
+                g != f
+                    && ((carried_by(pair.a, f) && carried_by(pair.b, g))
+                        || (carried_by(pair.a, g) && carried_by(pair.b, f)))
+            };
+            finger.pairs_with = (0..scene.hand.fingers.len())
+                .map(|g| (0..pairs.len()).filter(|&p| between(&pairs[p], g)).collect())
+                .collect();
             finger.pairs = (0..pairs.len()).filter(|&p| moves(pairs[p].a) || moves(pairs[p].b)).collect();
         }
         Model {

@@ -160,6 +160,20 @@ impl<'a> Workspace<'a> {
         model.fingers[finger].pairs.iter().all(|&pair| self.is_between_fingers(pair) || self.pair_is_clear(pair, mode))
     }
 
+    /// True when two fingers with these joints are clear of each other.
+    pub fn fingers_are_clear(&mut self, first: (usize, &Coordinates), second: (usize, &Coordinates)) -> bool {
+        self.work += 1;
+        let model = self.model;
+        let (f, g) = (first.0.min(second.0), first.0.max(second.0));
+        place_finger(model, &mut self.now, first.0, first.1);
+        place_finger(model, &mut self.now, second.0, second.1);
+        self.next.clone_from(&self.now);
+        self.motion.fill(0.0);
+        self.deviation.fill(0.0);
+        self.slack.fill(f64::NEG_INFINITY);
+        model.fingers[f].pairs_with[g].iter().all(|&pair| self.pair_is_clear(pair, TipMode::AllHold))
+    }
+
     fn is_between_fingers(&self, pair: usize) -> bool {
         let pair = &self.model.pairs[pair];
         match (&self.model.bodies[pair.a].carrier, &self.model.bodies[pair.b].carrier) {

@@ -297,7 +297,7 @@ fn make_finger(
     };
     let rest = rest_posture(spec, &chain, found);
     let tip = Tip { link: spec.tip_link, shape, center_in_body: tip_at.body_from_link * center };
-    Some(Finger { name: spec.name.clone(), chain, tip, shapes, rest })
+    Some(Finger::new(spec.name.clone(), chain, tip, shapes, rest))
 }
 
 /// Corner points of a polyhedral shape in the parent's frame; none for round shapes.

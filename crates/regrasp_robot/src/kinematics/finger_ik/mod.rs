@@ -7,6 +7,8 @@
 mod numeric;
 /// Real roots of polynomials of degree four and less.
 mod quartic;
+/// Cells of space that a tip can reach.
+mod reach_map;
 /// Closed form for chains of three turning joints.
 mod three_r;
 

@@ -7,6 +7,7 @@
 //! The inner functions are compiled for each usual number of coordinates; chains with other numbers run in the next
 //! larger one, with coordinates that move nothing.
 
+use super::reach_map::ReachMap;
 use super::{Coordinates, IkSettings, MAX_COORDINATES, POSITION_TOLERANCE, Preference};
 use crate::kinematics::chain::{Chain, JointLine, Motion};
 use arrayvec::ArrayVec;
@@ -15,7 +16,7 @@ use regrasp_base::Rng;
 use regrasp_geometry::{Point, Vector};
 
 /// Seeds in the table.
-const N_SEEDS: usize = 192;
+const N_SEEDS: usize = 96;
 /// Seeds tried for one solution before giving up.
 const N_TRIES: usize = 6;
 /// Newton steps from one seed.
@@ -23,7 +24,7 @@ const MAX_STEPS: usize = 16;
 /// Newton steps of a warm start.
 const MAX_WARM_STEPS: usize = 8;
 /// First steps of each solution that also follow the preference, from a seed and from a warm start.
-const PREFERENCE_STEPS: [usize; 2] = [5, 1];
+const PREFERENCE_STEPS: [usize; 2] = [3, 1];
 /// Longest change of a coordinate in one step, in radians or metres.
 const LONGEST_STEP: f64 = 0.6;
 /// Solutions closer than this in every coordinate are one; for redundant chains, and for others.
@@ -58,6 +59,7 @@ pub struct NumericIk {
     /// Bound on the tip's distance from any joint of the chain; infinite with sliding joints. In metres.
     reach: f64,
     seeds: Vec<Seed>,
+    reach_map: ReachMap,
 }
 
 /// What one solution may use.
@@ -81,6 +83,7 @@ impl NumericIk {
             length,
             reach,
             seeds: vec![],
+            reach_map: ReachMap::new(chain, center_in_body, search_range),
         };
         for i in 0..N_SEEDS {
             let coordinates: Coordinates = (0..chain.n_coordinates())
@@ -97,6 +100,9 @@ impl NumericIk {
 
     /// Different solutions from all seeds, nearest seed first.
     pub fn solve_all(&self, target: &Point, settings: &IkSettings, solutions: &mut Vec<Coordinates>) {
+        if !self.reach_map.may_reach(target) {
+            return;
+        }
         let first = solutions.len();
         for seed in self.nearest_seeds::<N_SEEDS>(target, settings.preference.as_ref(), N_SEEDS) {
             if let Some(found) = self.solve_from_seed(target, seed, settings.preference.as_ref(), settings) {
@@ -107,6 +113,9 @@ impl NumericIk {
 
     /// A solution from one of the nearest seeds, in random order.
     pub fn solve_random(&self, target: &Point, settings: &IkSettings, rng: &mut Rng) -> Option<Coordinates> {
+        if !self.reach_map.may_reach(target) {
+            return None;
+        }
         let preference = settings.preference.as_ref();
         let mut nearest = self.nearest_seeds::<N_TRIES>(target, preference, N_TRIES);
         // Only the better half competes for the first try: the far seeds are there for hard targets.
@@ -130,6 +139,9 @@ impl NumericIk {
         rng: &mut Rng,
         solutions: &mut Vec<Coordinates>,
     ) {
+        if !self.reach_map.may_reach(target) {
+            return;
+        }
         let first = solutions.len();
         let mut preference = settings.preference.as_ref();
         let mut nearest = self.nearest_seeds::<32>(target, preference, (4 * n_wanted).clamp(N_TRIES, 32));
@@ -399,7 +411,7 @@ fn search_range(lower: f64, upper: f64) -> (f64, f64) {
 }
 
 /// Element `i` of the van der Corput sequence in the `k`-th prime base (Halton 1960).
-fn halton(i: usize, k: usize) -> f64 {
+pub(super) fn halton(i: usize, k: usize) -> f64 {
     const PRIMES: [usize; MAX_COORDINATES] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37];
     let base = PRIMES[k];
     let (mut rest, mut value, mut place) = (i, 0.0, 1.0);
