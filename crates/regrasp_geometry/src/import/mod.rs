@@ -135,6 +135,7 @@ fn coordinates<'w>(
     faults: &mut Faults,
 ) -> Point {
     let mut point = Point::origin();
+    let mut words = words.take(3).collect::<Vec<_>>().into_iter();
     for k in 0..3 {
         let Some(word) = words.next() else {
             faults.at_line(code, line, format!("a vertex has {k} coordinates"), "three numbers");
