@@ -225,6 +225,21 @@ fn a_good_hand_file_gives_chains_with_couplings() {
 }
 
 #[test]
+fn joints_before_the_first_are_held_and_written_down_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = format!(
+        "{HEAD}[[fingers]]\nname = \"a\"\ntip_link = \"a_tip\"\nfirst_joint = \"ja1\"\n{POINT}\n[[fingers]]\nname = \"b\"\ntip_link = \"b2\"\nfirst_joint = \"jb1\"\n{POINT}\n"
+    );
+    let loaded = load_hand(&write_files(folder.path(), &text), &LoadOptions::default()).unwrap();
+    assert_eq!(loaded.hand.joint_names(), ["ja1", "ja2", "jb1"]);
+    assert!(loaded.notes.contains(&"joint \"wrist\" belongs to no finger; held at 0".to_owned()), "{:?}", loaded.notes);
+    let written = regrasp_robot::inspect::hand_file_text(&loaded.hand, "hand.urdf", &Default::default());
+    let again = load_hand(&write_files(folder.path(), &written), &LoadOptions::default()).unwrap().hand;
+    assert_eq!(again.joint_names(), loaded.hand.joint_names());
+    assert_eq!(again.fingers[0].tip, loaded.hand.fingers[0].tip);
+}
+
+#[test]
 fn a_hand_in_millimetres_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = write_files(folder.path(), &with_finger(&format!("tip_link = \"a_tip\"\n{POINT}")));

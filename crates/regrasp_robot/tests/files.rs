@@ -128,6 +128,14 @@ fn files_outside_the_models_folders_are_refused() {
         let code = code(load(&urdf));
         assert!(["U101", "U102", "U103"].contains(&code.as_str()), "{name} {code}");
     }
+    // Nor does a search path let a package name climb out of it.
+    let mut options = LoadOptions::default();
+    options.resolve.search_paths = vec![root.join("model")];
+    let urdf = write(root, "model/hand.urdf", with_mesh("package://../secret.obj"));
+    assert_eq!(code(load_with(&urdf, &options)), "U101");
+    // A folder at the root of the file system is no package.
+    let urdf = write(root, "model/hand.urdf", with_mesh("package://etc/passwd"));
+    assert_eq!(code(load(&urdf)), "U101");
     // A package given by name is allowed wherever it is.
     let urdf = write(root, "model/hand.urdf", with_mesh("../secret.obj"));
     let resolve = ResolveOptions { packages: vec![("all".into(), root.to_owned())], ..Default::default() };

@@ -1,7 +1,11 @@
 //! Bundled and shared hands against published dimensions.
+#![allow(clippy::print_stdout)] // says when it skips
 
+use regrasp_base::Rng;
 use regrasp_geometry::Point;
-use regrasp_robot::{LoadOptions, TipShape, load_hand};
+use regrasp_robot::inspect::{InspectSettings, hand_file_text, inspect};
+use regrasp_robot::{Hand, LoadOptions, TipShape, load_hand, load_robot};
+use std::fs;
 use std::path::{Path, PathBuf};
 
 /// A bundled hand.
@@ -73,5 +77,158 @@ fn allegro_has_the_published_joint_positions_and_tips() {
         assert!((radius - 0.012).abs() < 1e-4, "{} {radius}", finger.name);
         let expected = Point::new(0.0, 0.0, last_to_tip_frame[k] / 1e3 - 0.012);
         assert!((finger.tip.center_in_body - expected).norm() < 1e-4, "{}", finger.tip.center_in_body);
+    }
+}
+
+/// Files below `folder` that end in `.urdf`, sorted.
+fn urdfs_below(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut waiting = vec![folder.to_owned()];
+    while let Some(dir) = waiting.pop() {
+        for entry in fs::read_dir(dir).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                waiting.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "urdf") {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+#[test]
+fn every_shared_robot_is_read_or_refused_for_a_missing_package() {
+    let Some(models) = shared_models() else { return };
+    let all = urdfs_below(&models);
+    assert!(all.len() >= 20, "{}", all.len());
+    let mut n_refused = 0;
+    for path in all {
+        match load_robot(&path, &LoadOptions::default()) {
+            Ok(loaded) => {
+                // What was read is a tree that reaches every link.
+                let robot = &loaded.robot;
+                assert_eq!(robot.joints.len() + 1, robot.links.len(), "{}", path.display());
+                assert!((0..robot.links.len()).all(|k| {
+                    let joints = robot.joints_to(regrasp_robot::LinkId(k));
+                    joints.first().is_none_or(|joint| robot.joints[joint.0].parent == robot.root)
+                }));
+            }
+            Err(error) => {
+                n_refused += 1;
+                let missing = "package://motion_bench_maker/";
+                assert!(error.diagnostics.iter().all(|d| d.code == "U101" && d.problem.contains(missing)), "{error}");
+                let package = ("motion_bench_maker".to_owned(), models.join("benchmarks/mbm_configs"));
+                let resolve = regrasp_robot::ResolveOptions { packages: vec![package], ..Default::default() };
+                // Only the folder names inside the package differ from the original's.
+                let error = load_robot(&path, &LoadOptions { resolve, lenient: false }).unwrap_err();
+                assert!(error.to_string().contains("--package: "), "{error}");
+            }
+        }
+    }
+    assert_eq!(n_refused, 3);
+}
+
+#[test]
+fn independent_joints_of_shared_robots_are_as_listed() {
+    let Some(models) = shared_models() else { return };
+    // INDEX.md: links, independent joints, mimic joints.
+    for (file, links, independent, followers) in [
+        ("hands/shadow/shadow_right.urdf", 33, 24, 0),
+        ("hands/barrett/barrett.urdf", 9, 8, 0),
+        ("hands/trifingeredu/trifingeredu.urdf", 17, 9, 0),
+        ("robots/pr2/pr2.urdf", 82, 20, 10),
+        ("robots/baxter/baxter.urdf", 49, 14, 0),
+        ("robots/tiago_dual_hey5/tiago_dual.urdf", 130, 101, 0),
+        ("robots/dual_iiwa14/dual_iiwa14_spheres.urdf", 21, 14, 0),
+    ] {
+        let robot = load_robot(&models.join(file), &LoadOptions::default()).unwrap().robot;
+        let moving: Vec<_> = robot.joints.iter().filter(|j| j.kind != regrasp_robot::JointKind::Fixed).collect();
+        let n_followers = moving.iter().filter(|joint| joint.mimic.is_some()).count();
+        let seen = (robot.links.len(), moving.len() - n_followers, n_followers);
+        assert_eq!(seen, (links, independent, followers), "{file}");
+    }
+}
+
+/// Largest difference of corresponding tips, bases and limits of two hands, at rest and at mid-range.
+fn difference(a: &Hand, b: &Hand) -> f64 {
+    let mut largest: f64 = 0.0;
+    for (x, y) in a.fingers.iter().zip(&b.fingers) {
+        assert_eq!(x.chain.names, y.chain.names);
+        assert_eq!((x.name.as_str(), x.tip.link, x.shapes.len()), (y.name.as_str(), y.tip.link, y.shapes.len()));
+        for q in [x.rest.clone(), x.chain.lower.clone(), x.chain.upper.clone()] {
+            let tips = (x.chain.tip(&q, &x.tip.center_in_body), y.chain.tip(&q, &y.tip.center_in_body));
+            largest = largest.max((tips.0 - tips.1).norm());
+        }
+        largest = largest.max((x.tip.radius() - y.tip.radius()).abs());
+    }
+    largest
+}
+
+#[test]
+fn the_hand_file_that_inspect_writes_works_unedited() {
+    let Some(models) = shared_models() else { return };
+    // Radius of the tip, and distance of its centre from the last joint, from the prototype's notes.
+    for (file, n_fingers, radius, distances) in [
+        ("allegro/allegro_left.urdf", 4, 0.012, vec![0.0267, 0.0267, 0.0267, 0.0423]),
+        ("allegro/allegro_right.urdf", 4, 0.012, vec![0.0267, 0.0267, 0.0267, 0.0423]),
+        ("dclaw/dclaw.urdf", 3, 0.010, vec![0.073; 3]),
+        ("trifingerpro/trifingerpro.urdf", 3, 0.010, vec![0.1611; 3]),
+    ] {
+        let path = models.join("hands").join(file);
+        let mut rng = Rng::keyed(1, "inspect", 0);
+        let seen = inspect(&path, &LoadOptions::default(), &InspectSettings { n_postures: 500 }, &mut rng).unwrap();
+        let (hand, table) = seen.hand.unwrap();
+        assert_eq!(seen.robot.suspicions, []);
+        assert_eq!(hand.fingers.len(), n_fingers, "{file}");
+        for (finger, distance) in hand.fingers.iter().zip(distances) {
+            assert!((finger.tip.radius() - radius).abs() < 1e-4, "{file} {:?}", finger.tip);
+            assert!((finger.tip.center_in_body.coords.norm() - distance).abs() < 1e-4, "{file} {:?}", finger.tip);
+            assert!(finger.shapes.iter().any(|shape| shape.is_tip), "{file}");
+        }
+        assert!(table.pairs.at_rest.is_empty(), "{file} {:?}", table.pairs.at_rest);
+        let text = hand_file_text(&hand, &path.display().to_string(), &table.pairs.always_ids);
+        let folder = tempfile::tempdir().unwrap();
+        let written = folder.path().join("hand.toml");
+        fs::write(&written, &text).unwrap();
+        let again = load_hand(&written, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}\n{text}"));
+        assert!(difference(&hand, &again.hand) < 2e-6, "{file} {}", difference(&hand, &again.hand));
+        assert_eq!(again.hand.allowed_pairs.len(), hand.allowed_pairs.len() + table.pairs.always_ids.len());
+    }
+}
+
+#[test]
+fn a_straight_finger_of_a_bundled_hand_touches_nothing() {
+    for name in ["wide_four_finger", "tight_four_finger"] {
+        let mut rng = Rng::keyed(1, "inspect", 0);
+        let seen =
+            inspect(&bundled(name), &LoadOptions::default(), &InspectSettings { n_postures: 2_000 }, &mut rng).unwrap();
+        let (mut hand, table) = seen.hand.unwrap();
+        assert!(table.pairs.always.is_empty() && table.pairs.at_rest.is_empty());
+        // Fingers are far enough apart that random postures touch in less than a tenth of all cases.
+        assert!(table.pairs.sometimes.iter().all(|row| row.share < 0.1), "{:?}", table.pairs.sometimes);
+        for finger in &mut hand.fingers {
+            finger.rest = vec![0.0; 3];
+        }
+        let straight = regrasp_robot::inspect::inspect_hand(&hand, &InspectSettings { n_postures: 0 }, &mut rng);
+        assert!(straight.pairs.at_rest.is_empty(), "{:?}", straight.pairs.at_rest);
+    }
+}
+
+#[test]
+fn trifinger_first_joints_meet_on_the_axis() {
+    let Some(models) = shared_models() else { return };
+    let hand = load_hand(&models.join("hands/trifingerpro/trifingerpro.urdf"), &LoadOptions::default()).unwrap().hand;
+    for finger in &hand.fingers {
+        // FACTS.md: first axes pass through (0, 0, 290) mm; segments 53.2 and 167.7, last joint to tip 161.1 mm.
+        let mut poses = Vec::new();
+        finger.chain.forward(&[0.0; 3], &mut poses);
+        let origins: Vec<_> = poses.iter().map(|pose| pose.translation.vector).collect();
+        assert!((origins[0] - nalgebra::Vector3::new(0.0, 0.0, 0.29)).norm() < 1e-9);
+        assert!(((origins[1] - origins[0]).norm() - 0.0532).abs() < 0.06e-3);
+        assert!(((origins[2] - origins[1]).norm() - 0.1677).abs() < 0.06e-3);
+        let tip = finger.chain.tip(&[0.0; 3], &finger.tip.center_in_body);
+        assert!(((tip.coords - origins[2]).norm() - 0.1611).abs() < 0.06e-3);
     }
 }

@@ -3,12 +3,12 @@
 //! Fixed joints are folded into bodies. A finger is the serial chain from the base to its tip link. What no finger
 //! joint moves is palm; moving joints that belong to no finger are held at the position nearest to zero.
 
+use super::finger_chain::{make_chain, rest_posture};
 use super::tip_split;
 use crate::hand::{Finger, FingerShape, Hand, PalmShape, Tip, TipShape, convex_of};
-use crate::kinematics::chain::{Chain, ChainJoint, Motion};
 use crate::robot::{Joint, JointId, JointKind, LinkId, Robot};
 use nalgebra::{Translation3, UnitQuaternion};
-use regrasp_base::diagnostic::{Diagnostics, did_you_mean};
+use regrasp_base::diagnostic::Diagnostics;
 use regrasp_base::{Diagnostic, InputError, Place};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{ConvexHull, Point, Pose, Shape, TriangleMesh};
@@ -58,9 +58,9 @@ enum Body {
 
 /// Where a link is: its body, and its pose in the body's frame (the base frame, for the palm).
 #[derive(Debug, Clone, Copy)]
-struct Carried {
+pub(super) struct Carried {
     body: Body,
-    body_from_link: Pose,
+    pub(super) body_from_link: Pose,
 }
 
 /// The hand, and remarks. Errors: `U206`..`U212`.
@@ -313,103 +313,6 @@ fn corners(placed: &PlacedShape) -> Vec<Point> {
         _ => Vec::new(),
     };
     points.iter().map(|p| placed.parent_from_shape * p).collect()
-}
-
-fn make_chain(
-    robot: &Robot,
-    spec: &FingerSpec,
-    joints: &[JointId],
-    carried: &BTreeMap<LinkId, Carried>,
-    found: &mut Diagnostics,
-) -> Option<Chain> {
-    let independent: Vec<JointId> = joints.iter().copied().filter(|j| robot.joints[j.0].mimic.is_none()).collect();
-    let (mut chain_joints, mut names, mut lower, mut upper) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    for id in &independent {
-        let joint = &robot.joints[id.0];
-        names.push(joint.name.clone());
-        lower.push(joint.limits.map_or(f64::NEG_INFINITY, |limits| limits.lower));
-        upper.push(joint.limits.map_or(f64::INFINITY, |limits| limits.upper));
-    }
-    let mut complete = true;
-    for id in joints {
-        let joint = &robot.joints[id.0];
-        let (leader, multiplier, offset) =
-            joint.mimic.map_or((*id, 1.0, 0.0), |mimic| (mimic.joint, mimic.multiplier, mimic.offset));
-        let Some(coordinate) = independent.iter().position(|other| *other == leader) else {
-            let problem = format!(
-                "joint \"{}\" follows joint \"{}\", which is on another finger or on none",
-                joint.name, robot.joints[leader.0].name
-            );
-            found.push(
-                Diagnostic::new("U209", spec.place.clone(), problem)
-                    .element("finger", &spec.name)
-                    .expected("followers on the chain of the joint they follow"),
-            );
-            complete = false;
-            continue;
-        };
-        if let (Some(_), Some(limits)) = (joint.mimic, joint.limits) {
-            let ends = [limits.lower, limits.upper].map(|position| (position - offset) / multiplier);
-            lower[coordinate] = lower[coordinate].max(ends[0].min(ends[1]));
-            upper[coordinate] = upper[coordinate].min(ends[0].max(ends[1]));
-        }
-        let parent = carried.get(&joint.parent)?;
-        chain_joints.push(ChainJoint {
-            parent_from_joint: parent.body_from_link * joint.parent_from_joint,
-            axis: joint.axis,
-            motion: if joint.kind == JointKind::Prismatic { Motion::Slide } else { Motion::Turn },
-            coordinate,
-            multiplier,
-            offset,
-        });
-    }
-    for (k, name) in names.iter().enumerate() {
-        if lower[k] > upper[k] {
-            let problem = format!("the joints that follow joint \"{name}\" leave it no position");
-            found.push(
-                Diagnostic::new("U143", spec.place.clone(), problem)
-                    .element("finger", &spec.name)
-                    .expected("limits that overlap"),
-            );
-            complete = false;
-        }
-    }
-    complete.then(|| Chain::new(chain_joints, names, lower, upper))
-}
-
-fn rest_posture(spec: &FingerSpec, chain: &Chain, found: &mut Diagnostics) -> Vec<f64> {
-    let mut rest: Vec<f64> = (0..chain.n_coordinates())
-        .map(|k| {
-            let (lower, upper) = (chain.lower[k], chain.upper[k]);
-            if lower.is_finite() && upper.is_finite() { 0.5 * (lower + upper) } else { 0.0 }
-        })
-        .collect();
-    for (name, value, place) in &spec.rest {
-        let Some(k) = chain.names.iter().position(|other| other == name) else {
-            let meant = did_you_mean(name, chain.names.iter().map(String::as_str));
-            found.push(
-                Diagnostic::new(
-                    "U205",
-                    place.clone(),
-                    format!("finger \"{}\" has no independent joint \"{name}\"", spec.name),
-                )
-                .element("key", "rest")
-                .expected(format!("one of {}", chain.names.join(", ")))
-                .fix(meant.map_or(String::new(), |meant| format!("did you mean {meant}?"))),
-            );
-            continue;
-        };
-        if *value < chain.lower[k] || *value > chain.upper[k] {
-            found.push(
-                Diagnostic::new("U212", place.clone(), format!("rest position {value} is outside the limits"))
-                    .element("joint", name)
-                    .expected(format!("{}..{}", chain.lower[k], chain.upper[k])),
-            );
-            continue;
-        }
-        rest[k] = *value;
-    }
-    rest
 }
 
 /// Pairs of links of one body, and of bodies that follow each other with nothing but bodies without shapes between.

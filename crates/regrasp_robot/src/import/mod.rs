@@ -9,9 +9,9 @@
 
 /// A hand from a robot and the choice of its fingers.
 pub(crate) mod assemble;
+mod finger_chain;
 /// `hand.toml`, and hands guessed from a bare URDF.
 pub mod hand_file;
-mod mesh_stand_in;
 /// `package://` and relative paths, below allowed folders.
 pub mod resolve;
 /// SRDF: groups, end effectors, pairs of links that are not tested.

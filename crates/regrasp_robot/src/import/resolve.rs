@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 /// How many folders above the model are looked at.
-const MAX_WALK_UP: usize = 8;
+const MAX_WALK_UP: usize = 5;
 /// How many directory entries the search for a file of the same name looks at.
 const MAX_ENTRIES_FOR_HINT: usize = 2_000;
 /// Folder names that hold models inside a package, whose parent then belongs to the model.
@@ -147,6 +147,10 @@ fn package_roots(
     options: &ResolveOptions,
     tried: &mut Vec<String>,
 ) -> Vec<(Source, PathBuf)> {
+    if package.contains('\\') || !matches!(Path::new(package).components().next(), Some(Component::Normal(_))) {
+        tried.push(format!("\"{package}\" is not a folder name"));
+        return Vec::new();
+    }
     let mut roots = Vec::new();
     let given: Vec<_> = options.packages.iter().filter(|(name, _)| name == package).collect();
     if given.is_empty() {
@@ -164,10 +168,6 @@ fn package_roots(
         if roots.len() == before {
             tried.push(format!("package search path: {} (no folder {package})", base.display()));
         }
-    }
-    if package.contains('\\') || !matches!(Path::new(package).components().next(), Some(Component::Normal(_))) {
-        tried.push(format!("\"{package}\" is not a folder name"));
-        return roots;
     }
     let above = folders_above(folder);
     let named = above.iter().find(|dir| package_name(dir).as_deref() == Some(package));
@@ -190,10 +190,11 @@ fn package_roots(
     roots
 }
 
-/// `folder` and at most [`MAX_WALK_UP`] folders above it, as absolute paths where the folder exists.
+/// `folder` and at most [`MAX_WALK_UP`] folders above it, as absolute paths where the folder exists; never the root of
+/// the file system, beside whose folders every name would be a package.
 fn folders_above(folder: &Path) -> Vec<PathBuf> {
     let absolute = fs::canonicalize(folder).unwrap_or_else(|_| folder.to_owned());
-    absolute.ancestors().take(MAX_WALK_UP + 1).map(Path::to_owned).collect()
+    absolute.ancestors().take(MAX_WALK_UP + 1).filter(|dir| dir.parent().is_some()).map(Path::to_owned).collect()
 }
 
 /// The name in `dir/package.xml`.
@@ -297,8 +298,8 @@ fn same_name_near(folder: &Path, wanted: &Path) -> Option<PathBuf> {
     let mut left = MAX_ENTRIES_FOR_HINT;
     let mut waiting = vec![folder.to_owned()];
     while let Some(dir) = waiting.pop() {
-        let mut entries: Vec<PathBuf> =
-            fs::read_dir(dir).ok()?.take(left).filter_map(Result::ok).map(|entry| entry.path()).collect();
+        let Ok(listed) = fs::read_dir(dir) else { continue };
+        let mut entries: Vec<PathBuf> = listed.take(left).filter_map(Result::ok).map(|entry| entry.path()).collect();
         left = left.saturating_sub(entries.len());
         entries.sort();
         for path in entries {

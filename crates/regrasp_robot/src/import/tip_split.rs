@@ -128,3 +128,70 @@ fn cut_polyhedron(points: &[Point], triangles: &[[u32; 3]], cut: &Point, axis: &
         Err(_) => Behind::Unknown,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    const RADIUS: f64 = 0.01;
+
+    /// Points on a capsule along x from 0.02 to `CENTER` with a ball of `RADIUS` at its end: a phalanx.
+    fn phalanx_points() -> Vec<Point> {
+        let mut points = Vec::new();
+        for k in 0..24 {
+            let (sin, cos) = (f64::from(k) * std::f64::consts::TAU / 24.0).sin_cos();
+            points.push(Point::new(0.02, RADIUS * cos, RADIUS * sin));
+            for elevation in 0..6 {
+                let (up, out) = (f64::from(elevation) * std::f64::consts::FRAC_PI_2 / 6.0).sin_cos();
+                points.push(Point::new(0.07 + RADIUS * up, RADIUS * out * cos, RADIUS * out * sin));
+            }
+        }
+        points.push(Point::new(0.08, 0.0, 0.0));
+        points
+    }
+
+    #[test]
+    fn a_phalanx_is_cut_behind_its_ball_and_nothing_else_is_lost() {
+        let center = Point::new(0.07, 0.0, 0.0);
+        let points = phalanx_points();
+        let whole = Arc::new(ConvexHull::new(&points).unwrap());
+        let placed = PlacedShape { parent_from_shape: Pose::identity(), shape: Shape::Convex(whole.clone()) };
+        let shapes = split(vec![placed], LinkId(3), 1, &center, RADIUS);
+        assert_eq!(shapes.iter().map(|s| s.is_tip).collect::<Vec<_>>(), [false, true]);
+        let Shape::Convex(rest) = &shapes[0].placed.shape else { panic!("{:?}", shapes[0]) };
+        assert!(rest.vertices().iter().all(|p| p.x <= 0.07 - CUT_BEHIND * RADIUS + 1e-12));
+        let mut rng = regrasp_base::Rng::keyed(1, "split", 0);
+        let mut hints = [0, 0];
+        // By support in random directions the part lies in the whole, and reaches the cut.
+        for _ in 0..500 {
+            let direction = Vector3::new(rng.normal(), rng.normal(), rng.normal()).normalize();
+            let part = direction.dot(&rest.support(&direction, &mut hints[0]).coords);
+            assert!(part <= direction.dot(&whole.support(&direction, &mut hints[1]).coords) + 1e-12);
+        }
+        // What neither part nor ball covers stands out of the ball by no more than its own width at the cut allows.
+        let uncovered = points
+            .iter()
+            .filter(|p| p.x > 0.07 - CUT_BEHIND * RADIUS)
+            .map(|p| (p - center).norm() - RADIUS)
+            .fold(0.0, f64::max);
+        assert!(uncovered <= 0.12 * RADIUS, "{uncovered}");
+    }
+
+    #[test]
+    fn a_capsule_is_shortened_to_the_cut_and_a_small_tip_is_left_whole() {
+        let turned = UnitQuaternion::from_axis_angle(&nalgebra::Vector3::y_axis(), std::f64::consts::FRAC_PI_2);
+        let at = |x: f64| Pose::from_parts(Translation3::new(x, 0.0, 0.0), turned);
+        let capsule =
+            PlacedShape { parent_from_shape: at(0.04), shape: Shape::Capsule { half_length: 0.03, radius: RADIUS } };
+        let ball = PlacedShape { parent_from_shape: at(0.07), shape: Shape::Sphere { radius: RADIUS } };
+        let shapes = split(vec![capsule, ball.clone()], LinkId(3), 1, &Point::new(0.07, 0.0, 0.0), RADIUS);
+        assert_eq!(shapes.len(), 2);
+        assert_eq!((shapes[1].is_tip, &shapes[1].placed), (true, &ball));
+        let Shape::Capsule { half_length, radius } = shapes[0].placed.shape else { panic!("{:?}", shapes[0]) };
+        assert!(!shapes[0].is_tip && radius == RADIUS);
+        let ends = [-half_length, half_length].map(|z| shapes[0].placed.parent_from_shape * Point::new(0.0, 0.0, z));
+        let (low, high) = (ends[0].x.min(ends[1].x), ends[0].x.max(ends[1].x));
+        assert!((low - 0.01).abs() < 1e-12 && (high - 0.065).abs() < 1e-12, "{low} {high}");
+    }
+}

@@ -115,7 +115,8 @@ impl<'h> Touch<'h> {
                 .iter()
                 .map(|finger| {
                     let ends = finger.chain.lower.iter().zip(&finger.chain.upper);
-                    ends.map(|(low, high)| rng.uniform(low.max(-PI), high.min(PI))).collect()
+                    let finite = |end: f64| if end.is_finite() { end } else { PI.copysign(end) };
+                    ends.map(|(&low, &high)| rng.uniform(finite(low), finite(high))).collect()
                 })
                 .collect();
             for (count, touches) in counts.iter_mut().zip(self.touching(&posture)) {
@@ -123,5 +124,68 @@ impl<'h> Touch<'h> {
             }
         }
         counts
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::import::{LoadOptions, load_hand};
+    use regrasp_geometry::Shape;
+    use std::path::Path;
+
+    /// Points along the core of a sphere or capsule, and its radius.
+    fn core(shape: &Shape, world_from_shape: &Pose) -> Option<(Vec<Point>, f64)> {
+        let (half_length, radius) = match shape {
+            Shape::Sphere { radius } => (0.0, *radius),
+            Shape::Capsule { half_length, radius } => (*half_length, *radius),
+            _ => return None,
+        };
+        let at = |k: i32| world_from_shape * Point::new(0.0, 0.0, half_length * f64::from(k) / 100.0);
+        Some(((-100..=100).map(at).collect(), radius))
+    }
+
+    #[test]
+    fn fingers_of_capsules_touch_where_their_cores_are_near() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/hands/wide_four_finger/hand.toml");
+        let hand = load_hand(&path, &LoadOptions::default()).unwrap().hand;
+        let touch = Touch::new(&hand);
+        let mut rng = Rng::keyed(7, "touch", 0);
+        let (mut n_touching, mut n_apart) = (0, 0);
+        for _ in 0..150 {
+            let posture: Vec<Vec<f64>> = hand
+                .fingers
+                .iter()
+                .map(|f| f.chain.lower.iter().zip(&f.chain.upper).map(|(&l, &h)| rng.uniform(l, h)).collect())
+                .collect();
+            let touching = touch.touching(&posture);
+            let cores: Vec<_> = touch
+                .shapes
+                .iter()
+                .map(|shape| {
+                    let (finger, body) = shape.body?;
+                    let mut poses = Vec::new();
+                    hand.fingers[finger].chain.forward(&posture[finger], &mut poses);
+                    core(&shape.placed.shape, &(poses[body] * shape.placed.parent_from_shape))
+                })
+                .collect();
+            for (pair, touches) in touching.into_iter().enumerate() {
+                let gaps: Option<Vec<f64>> = touch.shape_pairs[pair]
+                    .iter()
+                    .map(|&(i, j)| {
+                        let ((a, r), (b, s)) = (cores[i].as_ref()?, cores[j].as_ref()?);
+                        let distances = a.iter().flat_map(|p| b.iter().map(move |q| (p - q).norm()));
+                        Some(distances.fold(f64::INFINITY, f64::min) - r - s)
+                    })
+                    .collect();
+                // The palm is no capsule; gaps of less than half a sampling step decide nothing.
+                let Some(gap) = gaps.map(|gaps| gaps.into_iter().fold(f64::INFINITY, f64::min)) else { continue };
+                if gap.abs() > 0.3e-3 {
+                    assert_eq!(touches, gap < 0.0, "{:?} {gap}", touch.pairs[pair]);
+                    *(if touches { &mut n_touching } else { &mut n_apart }) += 1;
+                }
+            }
+        }
+        assert!(n_touching > 50 && n_apart > 1_000, "{n_touching} {n_apart}");
     }
 }

@@ -101,12 +101,6 @@ pub(crate) struct Meshes {
 }
 
 impl Meshes {
-    /// Meshes below the allowed folders of `options`.
-    #[cfg(test)]
-    pub(crate) fn new(options: &LoadOptions) -> Self {
-        Meshes { options: options.clone(), read: BTreeMap::new(), inputs: Vec::new() }
-    }
-
     /// The mesh file called `name` in the reader's file; remarks go to `notes`.
     fn get(
         &mut self,
@@ -129,7 +123,7 @@ impl Meshes {
             let sha256 = files::sha256(&bytes);
             let input = LoadedInput { role: "mesh".into(), name: name.to_owned(), path: resolved.path.clone(), sha256 };
             self.inputs.push(input);
-            crate::import::mesh_stand_in::read_mesh(&resolved.path, &bytes).map(Arc::new)
+            regrasp_geometry::import::read_mesh(&resolved.path, &bytes).map(Arc::new)
         });
         self.read.insert(resolved.path, mesh.clone());
         mesh
