@@ -84,23 +84,31 @@ pub const OBJECT: usize = 0;
 const WORLD: usize = 1;
 
 impl Bodies {
-    /// Reads all shapes of `scene`. Err with a message when a mesh of the hand has no inside.
+    /// Reads all shapes of `scene`. Err with a message when a shape cannot be used for queries.
     pub fn new(scene: &Scene, model: &Model) -> Result<Self, String> {
         let mut bodies =
             Bodies { carriers: vec![Carrier::Object, Carrier::World], items: Vec::new(), pairs: Vec::new() };
         bodies.add_hand(scene, model)?;
         let object = &scene.object;
-        bodies.add(&object.name, Owner::Object, OBJECT, &Pose::identity(), &object.shape);
+        bodies.add(&object.name, Owner::Object, OBJECT, &Pose::identity(), &object.shape)?;
         for obstacle in &scene.obstacles {
             let placed = &obstacle.placed;
-            bodies.add(&obstacle.name, Owner::Obstacle, WORLD, &placed.parent_from_shape, &placed.shape);
+            bodies.add(&obstacle.name, Owner::Obstacle, WORLD, &placed.parent_from_shape, &placed.shape)?;
         }
         bodies.add_pairs(scene);
         Ok(bodies)
     }
 
-    fn add(&mut self, name: &str, owner: Owner, carrier: usize, carrier_from_shape: &Pose, shape: &Shape) -> &mut Item {
+    fn add(
+        &mut self,
+        name: &str,
+        owner: Owner,
+        carrier: usize,
+        carrier_from_shape: &Pose,
+        shape: &Shape,
+    ) -> Result<&mut Item, String> {
         let (center, radius) = shape.bounding_sphere();
+        let reference = ReferenceShape::new(shape).map_err(|error| format!("\"{name}\": {error}"))?;
         self.items.push(Item {
             name: name.to_owned(),
             owner,
@@ -108,13 +116,13 @@ impl Bodies {
             link: None,
             body_depth: 0,
             is_tip: false,
-            shape: ReferenceShape::new(shape),
+            shape: reference,
             carrier_from_shape: *carrier_from_shape,
             center: carrier_from_shape * center,
             radius,
             spin_radius: if matches!(shape, Shape::Sphere { .. }) { 0.0 } else { radius },
         });
-        self.items.last_mut().expect("an item was just added")
+        Ok(self.items.last_mut().expect("an item was just added"))
     }
 
     fn add_hand(&mut self, scene: &Scene, model: &Model) -> Result<(), String> {
@@ -134,7 +142,7 @@ impl Bodies {
             let carrier = self.carriers.len() - 1;
             for placed in &link.collision {
                 let shape = convex_of(&placed.shape).map_err(|error| format!("link \"{}\": {error}", link.name))?;
-                let item = self.add(&link.name, owner, carrier, &placed.parent_from_shape, &shape);
+                let item = self.add(&link.name, owner, carrier, &placed.parent_from_shape, &shape)?;
                 (item.link, item.body_depth, item.is_tip) = (Some(LinkId(l)), body_depth, is_tip);
             }
         }
@@ -145,7 +153,7 @@ impl Bodies {
                 let ball = Shape::Sphere { radius: finger.radius };
                 let carrier = self.carriers.len() - 1;
                 let name = format!("tip of {}", finger.name);
-                let item = self.add(&name, Owner::Finger(f), carrier, &at, &ball);
+                let item = self.add(&name, Owner::Finger(f), carrier, &at, &ball)?;
                 (item.link, item.body_depth, item.is_tip) = (Some(finger.tip_link), finger.path.joints.len(), true);
             }
         }

@@ -117,8 +117,7 @@ pub fn check_contacts(object: &Object, model: &Model, plan: &Plan, settings: &Ch
                     log.push(tell(Kind::ContactOffSurface, message, nearest.distance, settings.surface_tolerance));
                     continue;
                 }
-                let angle_to = |face: &Vector| face.angle(&Vector::from(normal));
-                let angle = nearest.normals.iter().map(angle_to).fold(f64::INFINITY, f64::min);
+                let angle = surface::angle_to_cone(&Vector::from(normal), &nearest.normals);
                 if angle > settings.normal_tolerance {
                     let message = format!("the normal of finger \"{name}\" is {angle:.3e} rad off the surface's");
                     log.push(tell(Kind::ContactNormalWrong, message, angle, settings.normal_tolerance));

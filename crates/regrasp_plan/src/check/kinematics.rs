@@ -18,19 +18,21 @@ pub struct PathJoint {
     pub axis: Vector,
     /// True for a sliding joint.
     pub slides: bool,
-    /// Index in the joint vector; none for a joint that stays at `offset`.
+    /// Index in the joint vector; none for a joint that no finger drives.
     pub coordinate: Option<usize>,
     /// Position is `multiplier * coordinate + offset`.
     pub multiplier: f64,
     /// See `multiplier`.
     pub offset: f64,
+    /// Position of the driving joint when no finger drives it: the allowed one nearest to zero.
+    pub at_rest: f64,
     /// Largest size of the position, for sliding joints.
     pub largest_slide: f64,
 }
 
 impl PathJoint {
     fn position(&self, joints: &[f64]) -> f64 {
-        self.coordinate.map_or(0.0, |k| self.multiplier * joints[k]) + self.offset
+        self.multiplier * self.coordinate.map_or(self.at_rest, |k| joints[k]) + self.offset
     }
 
     fn rate(&self, from: &[f64], to: &[f64]) -> f64 {
@@ -85,6 +87,7 @@ impl Path {
                 coordinate: joint_names.iter().position(|name| *name == driver.name),
                 multiplier,
                 offset,
+                at_rest: driver.limits.map_or(0.0, |limits| 0f64.max(limits.lower).min(limits.upper)),
                 largest_slide: joint.limits.map_or(0.0, |limits| limits.lower.abs().max(limits.upper.abs())),
             });
             pending = Matrix4::identity();

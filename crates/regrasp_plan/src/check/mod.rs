@@ -13,6 +13,8 @@ pub mod collision;
 pub mod contact;
 /// What can be judged from the waypoints alone.
 pub mod continuity;
+/// `regrasp check`: everything is read afresh from files.
+pub mod files;
 /// The checker's own forward kinematics and motion bounds.
 pub mod kinematics;
 /// Lifting and landing of moving fingertips.
@@ -30,6 +32,7 @@ pub mod surface;
 /// What can be wrong with a plan.
 pub mod violation;
 
+pub use files::{CheckedFiles, check_files};
 pub use violation::{Moment, Violation, ViolationKind};
 
 use crate::plan::Plan;

@@ -4,11 +4,17 @@ use crate::check::bodies::{Bodies, Carrier, Item, OBJECT, Pair};
 use crate::check::continuity::{pose_between, pose_difference};
 use crate::check::kinematics::{Rates, pose_of};
 use crate::plan::Waypoint;
-use regrasp_geometry::reference::{Answer, distance};
-use regrasp_geometry::{Point, Pose};
+use nalgebra::Translation3;
+use regrasp_geometry::reference::{Answer, distance, point_distance};
+use regrasp_geometry::{Point, Pose, Vector};
 
 /// Farther apart than this, pairs are not measured exactly, in metres.
 const SEARCH_DISTANCE: f64 = 0.03;
+
+/// How far a pair is shifted when its distance is not resolved, in metres, and the directions tried.
+const NUDGE: f64 = 1e-5;
+const NUDGES: [[f64; 3]; 6] =
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
 
 /// A step between two waypoints. Its parameter runs from 0 to 1.
 pub struct Step<'a> {
@@ -151,16 +157,29 @@ impl<'a> Step<'a> {
     }
 
     /// Signed distance of the two items, negative when they overlap, cut at a search distance; None when unresolved.
+    ///
+    /// A ball against the object is asked for its centre's distance, which is as good at touching as elsewhere.
     pub fn measure(&mut self, pair: &Pair, t: f64) -> Option<f64> {
         let (a, b) = (&self.bodies.items[pair.a], &self.bodies.items[pair.b]);
         let pose_a = self.pose(a.carrier, t) * a.carrier_from_shape;
         let pose_b = self.pose(b.carrier, t) * b.carrier_from_shape;
         self.n_distances += 1;
-        match distance(&a.shape, &pose_a, &b.shape, &pose_b, SEARCH_DISTANCE) {
+        if a.spin_radius == 0.0 && pair.tip_of.is_some() {
+            let center = Point::from(pose_a.translation.vector);
+            return Some(point_distance(&b.shape, &pose_b, &center) - a.radius).filter(|distance| distance.is_finite());
+        }
+        let signed = |pose_a: &Pose| match distance(&a.shape, pose_a, &b.shape, &pose_b, SEARCH_DISTANCE) {
             Answer::SeparatedBy(distance) => Some(distance),
             Answer::Penetrating(depth) => Some(-depth),
             Answer::Unresolved => None,
-        }
+        };
+        // A shift changes the distance by at most its length, and a pair that is hard to tell is easier beside it.
+        signed(&pose_a).or_else(|| {
+            NUDGES.iter().find_map(|nudge| {
+                let shift = Vector::from(*nudge) * NUDGE;
+                signed(&(Translation3::from(shift) * pose_a)).map(|distance| distance - NUDGE)
+            })
+        })
     }
 }
 

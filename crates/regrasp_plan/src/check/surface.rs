@@ -7,7 +7,7 @@ use regrasp_geometry::{Point, Shape, Vector};
 pub struct Nearest {
     /// Distance of the point from the surface, never negative, in metres. First order for ellipsoids.
     pub distance: f64,
-    /// Outward unit normals of the faces that come that near, within a nanometre or, for primitives, a micrometre.
+    /// Outward unit normals of the faces that come that near, within a tenth of a micrometre (primitives: a micrometre).
     pub normals: Vec<Vector>,
 }
 
@@ -59,27 +59,73 @@ fn cylinder(point: &Point, half_length: f64, radius: f64) -> Nearest {
     Nearest { distance, normals }
 }
 
+/// Two faces whose distances differ by less than this, in metres, both count as nearest.
+const SAME_DISTANCE: f64 = 1e-7;
+
 fn triangles(vertices: &[Point], triangles: &[[u32; 3]], point: &Point) -> Nearest {
     let corners = |triangle: &[u32; 3]| triangle.map(|i| vertices[i as usize]);
     let mut best = f64::INFINITY;
-    let distances: Vec<f64> = triangles
+    let mut near: Vec<(f64, usize)> = Vec::new();
+    for (index, triangle) in triangles.iter().enumerate() {
+        let corners = corners(triangle);
+        // A corner farther than the longest edge and the best so far cannot belong to a nearer triangle.
+        let reach = (corners[1] - corners[0]).norm_squared().max((corners[2] - corners[0]).norm_squared()).sqrt();
+        if (corners[0] - point).norm() - reach > best + SAME_DISTANCE {
+            continue;
+        }
+        let distance = distance_to_triangle(point, &corners);
+        best = best.min(distance);
+        near.push((distance, index));
+    }
+    let outward = if signed_volume(vertices, triangles) < 0.0 { -1.0 } else { 1.0 };
+    let normals = near
         .iter()
-        .map(|triangle| {
-            let distance = distance_to_triangle(point, &corners(triangle));
-            best = best.min(distance);
-            distance
-        })
-        .collect();
-    let normals = triangles
-        .iter()
-        .zip(&distances)
-        .filter(|(_, distance)| **distance <= best + 1e-9)
-        .map(|(triangle, _)| {
-            let [a, b, c] = corners(triangle);
-            (b - a).cross(&(c - a)).normalize()
+        .filter(|(distance, _)| *distance <= best + SAME_DISTANCE)
+        .map(|(_, index)| {
+            let [a, b, c] = corners(&triangles[*index]);
+            (b - a).cross(&(c - a)).normalize() * outward
         })
         .collect();
     Nearest { distance: best, normals }
+}
+
+/// Six times the volume; negative when the triangles are wound inside out.
+fn signed_volume(vertices: &[Point], triangles: &[[u32; 3]]) -> f64 {
+    let origin = vertices[0];
+    triangles
+        .iter()
+        .map(|triangle| {
+            let [a, b, c] = triangle.map(|i| vertices[i as usize] - origin);
+            a.dot(&b.cross(&c))
+        })
+        .sum()
+}
+
+/// Angle between `direction` and the cone that `normals` span: where a ball touches an edge or a corner, its normal is
+/// anywhere in between.
+pub fn angle_to_cone(direction: &Vector, normals: &[Vector]) -> f64 {
+    let mut best = normals.iter().map(|normal| normal.angle(direction)).fold(f64::INFINITY, f64::min);
+    for (i, a) in normals.iter().enumerate() {
+        for (j, b) in normals.iter().enumerate().take(i) {
+            // Foot of the direction on the plane of the two, if it falls between them.
+            let pole = a.cross(b);
+            if pole.norm() > 1e-9 {
+                let foot = direction - pole * (pole.dot(direction) / pole.norm_squared());
+                if a.cross(&foot).dot(&pole) >= 0.0 && foot.cross(b).dot(&pole) >= 0.0 {
+                    best = best.min(foot.angle(direction));
+                }
+            }
+            for c in normals.iter().take(j) {
+                let corners = nalgebra::Matrix3::from_columns(&[*a, *b, *c]);
+                if let Some(shares) = corners.try_inverse().map(|inverse| inverse * direction)
+                    && shares.min() >= 0.0
+                {
+                    return 0.0;
+                }
+            }
+        }
+    }
+    best
 }
 
 /// Distance from a point to a triangle: the plane's when the foot is inside, else the nearest edge's.
@@ -142,10 +188,26 @@ mod tests {
             let point = Point::from(Vector::from_fn(|_, _| rng.uniform(-0.06, 0.06)));
             let (a, b) = (nearest(&cuboid, &point), nearest(&mesh, &point));
             assert!((a.distance - b.distance).abs() < 1e-12, "{point} {} {}", a.distance, b.distance);
-            if a.distance < 0.0 || (point.coords.abs() - half).max() < -1e-3 {
-                assert!(b.normals.iter().any(|n| (n - a.normals[0]).norm() < 1e-9));
-            }
+            assert!(a.normals.iter().all(|n| b.normals.iter().any(|m| (n - m).norm() < 1e-9)) || a.normals.len() > 1);
         }
+    }
+
+    #[test]
+    fn an_edge_and_a_corner_have_cones_of_normals() {
+        let normals = [Vector::x(), Vector::y(), Vector::z()];
+        let mut rng = Rng::keyed(3, "surface", 0);
+        for _ in 0..500 {
+            let direction = Vector::from(rng.direction());
+            // The nearest point of the positive octant, by clamping.
+            let clamped = direction.map(|x| x.max(0.0));
+            let expected = if clamped.norm() > 0.0 {
+                clamped.angle(&direction)
+            } else {
+                normals.map(|n| n.angle(&direction)).into_iter().fold(f64::INFINITY, f64::min)
+            };
+            assert!((angle_to_cone(&direction, &normals) - expected).abs() < 1e-9);
+        }
+        assert!(angle_to_cone(&Vector::new(1.0, 1.0, 0.1).normalize(), &normals[..2]) > 0.05);
     }
 
     #[test]

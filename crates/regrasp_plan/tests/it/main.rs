@@ -2,5 +2,6 @@
 
 mod check;
 mod format;
+mod motion;
 mod mutation;
 mod sample;

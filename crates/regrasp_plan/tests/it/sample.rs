@@ -122,12 +122,12 @@ fn hand() -> Hand {
             }
             Finger {
                 name: format!("f{f}"),
-                chain: Chain {
+                chain: Chain::new(
                     joints,
-                    names: (0..3).map(|j| format!("f{f}_j{j}")).collect(),
-                    lower: LIMITS.iter().map(|(low, _)| low.to_radians()).collect(),
-                    upper: LIMITS.iter().map(|(_, high)| high.to_radians()).collect(),
-                },
+                    (0..3).map(|j| format!("f{f}_j{j}")).collect(),
+                    LIMITS.iter().map(|(low, _)| low.to_radians()).collect(),
+                    LIMITS.iter().map(|(_, high)| high.to_radians()).collect(),
+                ),
                 tip: Tip {
                     link: link(3),
                     shape: TipShape::Sphere { radius: TIP_RADIUS },
@@ -165,8 +165,8 @@ fn object() -> Object {
     }
 }
 
-fn surface_of(_shape: &Shape) -> regrasp_geometry::Surface {
-    regrasp_geometry::Surface {}
+fn surface_of(shape: &Shape) -> regrasp_geometry::Surface {
+    regrasp_geometry::Surface::of(shape).expect("a sphere has a surface")
 }
 
 pub fn scene() -> Scene {
