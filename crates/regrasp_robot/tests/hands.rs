@@ -232,3 +232,40 @@ fn trifinger_first_joints_meet_on_the_axis() {
         assert!(((tip.coords - origins[2]).norm() - 0.1611).abs() < 0.06e-3);
     }
 }
+
+#[test]
+fn frames_agree_with_products_of_matrices() {
+    let Some(models) = shared_models() else { return };
+    // Origins of frames, from Rodrigues matrices over the URDF's numbers in another language; rpy is Rz Ry Rx.
+    let cases: [(&str, &str, &[f64], [f64; 3]); 4] = [
+        (
+            "allegro/allegro_right.urdf",
+            "link_15.0_tip",
+            &[0.5, 0.3, 0.7, -0.1],
+            [0.070675302, 0.13480602, -0.022035439],
+        ),
+        ("allegro/allegro_left.urdf", "link_3.0_tip", &[0.2, 0.3, 0.7, 0.4], [0.084685085, 0.068908312, 0.09191265]),
+        ("dclaw/dclaw.urdf", "link_f2_head", &[0.2, 0.3, 0.7], [0.042826327, 0.07204462, 0.221787349]),
+        (
+            "trifingerpro/trifingerpro.urdf",
+            "finger_tip_link_240",
+            &[0.2, 0.3, -0.7],
+            [-0.043043628, 0.003601154, -0.021324676],
+        ),
+    ];
+    for (file, link, coordinates, expected) in cases {
+        let hand = load_hand(&models.join("hands").join(file), &LoadOptions::default()).unwrap().hand;
+        let link = hand.robot.link_named(link).unwrap();
+        let last = *hand
+            .robot
+            .joints_to(link)
+            .iter()
+            .rfind(|j| hand.robot.joints[j.0].kind != regrasp_robot::JointKind::Fixed)
+            .unwrap();
+        let name = &hand.robot.joints[last.0].name;
+        let finger = hand.fingers.iter().find(|finger| finger.chain.names.last() == Some(name)).unwrap();
+        let origin_in_body = Point::from(hand.robot.fixed_pose_in_body(link).translation.vector);
+        let origin = finger.chain.tip(coordinates, &origin_in_body);
+        assert!((origin.coords - nalgebra::Vector3::from(expected)).norm() < 2e-9, "{file} {origin}");
+    }
+}
