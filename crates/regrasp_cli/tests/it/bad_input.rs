@@ -446,7 +446,7 @@ fn mesh_in_millimetres() {
 
 #[test]
 fn mesh_file_of_no_bytes() {
-    mesh_is_refused("mug.stl", "", "M2", "mug.stl", &["empty"]);
+    mesh_is_refused("mug.stl", "", "M202", "mug.stl", &["empty"]);
 }
 
 #[test]
@@ -465,27 +465,27 @@ fn stl_with_a_corner_that_is_not_a_number() {
         bytes.extend(x.to_le_bytes());
     }
     bytes.extend([0, 0]);
-    mesh_is_refused("mug.stl", bytes, "M2", "mug.stl", &["NaN"]);
+    mesh_is_refused("mug.stl", bytes, "M203", "mug.stl", &["NaN"]);
 }
 
 #[test]
 fn obj_with_index_zero() {
-    mesh_is_refused("mug.obj", TETRAHEDRON.replace("f 1 2 4", "f 0 2 4"), "M2", "mug.obj:6", &["0"]);
+    mesh_is_refused("mug.obj", TETRAHEDRON.replace("f 1 2 4", "f 0 2 4"), "M241", "mug.obj:6", &["0"]);
 }
 
 #[test]
 fn obj_with_an_index_out_of_range() {
-    mesh_is_refused("mug.obj", TETRAHEDRON.replace("f 1 2 4", "f 1 2 44"), "M2", "mug.obj:6", &["44", "4"]);
+    mesh_is_refused("mug.obj", TETRAHEDRON.replace("f 1 2 4", "f 1 2 44"), "M241", "mug.obj:6", &["44", "4"]);
 }
 
 #[test]
 fn obj_with_a_number_that_cannot_be_read() {
-    mesh_is_refused("mug.obj", TETRAHEDRON.replace("v 0 0.05 0", "v 0 0,05 0"), "M2", "mug.obj:3", &["0,05"]);
+    mesh_is_refused("mug.obj", TETRAHEDRON.replace("v 0 0.05 0", "v 0 0,05 0"), "M240", "mug.obj:3", &["0,05", "0.05"]);
 }
 
 #[test]
 fn mesh_without_area() {
-    mesh_is_refused("mug.obj", "v 0 0 0\nv 0.01 0 0\nv 0.02 0 0\nf 1 2 3\n", "M2", "mug.obj", &["area"]);
+    mesh_is_refused("mug.obj", "v 0 0 0\nv 0.01 0 0\nv 0.02 0 0\nf 1 2 3\n", "M202", "mug.obj", &["area"]);
 }
 
 #[test]

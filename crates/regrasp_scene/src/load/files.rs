@@ -82,7 +82,7 @@ impl<'a> Files<'a> {
     pub fn mesh(&mut self, entry: &Entry, found: &mut Found) -> Option<TriangleMesh> {
         let path = self.locate(entry, found)?;
         let read = files::read(&path).and_then(|bytes| {
-            let mesh = super::stand_in::read_mesh(&path, &bytes)?;
+            let mesh = regrasp_geometry::import::read_mesh(&path, &bytes)?;
             Ok((bytes, mesh))
         });
         match read {

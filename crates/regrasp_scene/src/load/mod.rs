@@ -9,7 +9,6 @@ mod files;
 mod object;
 mod pose;
 mod shape;
-mod stand_in;
 mod table;
 mod task;
 mod units;

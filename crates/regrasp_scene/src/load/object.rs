@@ -3,7 +3,7 @@
 use super::files::Files;
 use super::pose;
 use super::shape::{self, Origin, ReadShape};
-use super::stand_in::{SolidProperties, solid_properties};
+use regrasp_geometry::mass::{Solid, solid_properties};
 use super::table::{Entry, Found, Table};
 use crate::object::Object;
 use crate::scene::Obstacle;
@@ -140,7 +140,7 @@ fn placed(
 ) -> Option<(Shape, f64, Point)> {
     let needs_solid =
         read.origin == Origin::Center || given_center.is_none() || matches!(mass, Some(GivenMass::Density(_)));
-    let solid: Option<SolidProperties> = if needs_solid {
+    let solid: Option<Solid> = if needs_solid {
         match solid_properties(&read.shape) {
             Ok(solid) => Some(solid),
             Err(error) => {
