@@ -15,7 +15,7 @@ SEEDS ?= 200
 ALLEGRO_SEEDS ?= 20
 CLASSIC_SEEDS ?= 20
 
-.PHONY: all demo test bench campaign fuzz docs release
+.PHONY: all demo pictures test bench campaign fuzz docs release
 
 all: release
 
@@ -25,6 +25,10 @@ release:
 # Plans a sphere turn, checks it, says what it did, writes $(OUT)/demo.
 demo: release
 	$(REGRASP) demo -o $(OUT)/demo
+
+# The pictures of the README.
+pictures: demo
+	mkdir -p docs/pictures && cp $(OUT)/demo/gait.svg docs/pictures/demo-gait.svg
 
 test:
 	cargo test --locked --workspace
@@ -51,7 +55,7 @@ FUZZ_RUNS ?= 1000000
 fuzz:
 	for target in $(FUZZ_TARGETS); do \
 	  mkdir -p fuzz/corpus/$$target && cp -n fuzz/seeds/$$target/* fuzz/corpus/$$target/ ; \
-	  cargo +nightly fuzz run --sanitizer none $$target -- -runs=$(FUZZ_RUNS) -max_len=4096 -timeout=1 -rss_limit_mb=512 || exit 1 ; \
+	  cargo +nightly fuzz run --sanitizer none $$target -- -runs=$(FUZZ_RUNS) -max_len=4096 -timeout=5 -rss_limit_mb=1024 || exit 1 ; \
 	done
 
 docs:

@@ -105,6 +105,8 @@ pub fn repository() -> &'static Path {
 }
 
 /// The shared models, if they are here: `REGRASP_MODELS`, else `../shared/models` beside the repository or above it.
+// A test that skips says so where the test runner shows it.
+#[allow(clippy::print_stdout)]
 pub fn models() -> Option<PathBuf> {
     let named = std::env::var_os("REGRASP_MODELS").map(PathBuf::from);
     let root = repository().canonicalize().expect("the repository is there");
