@@ -268,6 +268,11 @@ pub fn point_distance(shape: &ReferenceShape, world_from_shape: &Pose, point_in_
 
 /// GJK on the cores, its axis confirmed by both supports; EPA when the cores meet.
 fn between_convex(a: &Convex, b: &Convex, a_from_b: &ParryPose, max: f64) -> Answer {
+    answer_and_axis(a, b, a_from_b, max).0
+}
+
+/// As [`between_convex`], with the axis of the separating slab, which means nothing for other answers.
+fn answer_and_axis(a: &Convex, b: &Convex, a_from_b: &ParryPose, max: f64) -> (Answer, ParryVector) {
     let margins = a.margin + b.margin;
     let first_axis = a_from_b.translation.try_normalize().unwrap_or(ParryVector::X);
     let mut simplex = VoronoiSimplex::new();
@@ -284,28 +289,28 @@ fn between_convex(a: &Convex, b: &Convex, a_from_b: &ParryPose, max: f64) -> Ans
                 match penetration(a, b, a_from_b, &simplex) {
                     Answer::Penetrating(depth) if depth < SHALLOW => shallow = Answer::Penetrating(depth),
                     Answer::Unresolved => {}
-                    answer => return answer,
+                    answer => return (answer, ParryVector::ZERO),
                 }
                 continue;
             }
         };
         // The width of the widest slab confirmed is a lower bound of the distance, `reached` an upper bound.
-        let gap = widest_slab(a, b, a_from_b, &axes, reached - margins);
+        let (gap, axis) = widest_slab(a, b, a_from_b, &axes, reached - margins);
         if gap > 0.0 {
-            return Answer::SeparatedBy(gap);
+            return (Answer::SeparatedBy(gap), axis);
         }
         if reached <= margins {
-            return Answer::Penetrating(margins - reached);
+            return (Answer::Penetrating(margins - reached), ParryVector::ZERO);
         }
     }
-    shallow
+    (shallow, ParryVector::ZERO)
 }
 
 /// Width of the widest slab found between `a` and `b`, starting across `axes`; not above zero when none separates them.
 ///
 /// The width is concave in the axis near its best, so where GJK stalled on curved shapes, steps uphill close what is
 /// left up to `reached`, the distance of two points of the shapes.
-fn widest_slab(a: &Convex, b: &Convex, a_from_b: &ParryPose, axes: &[ParryVector], reached: f64) -> f64 {
+fn widest_slab(a: &Convex, b: &Convex, a_from_b: &ParryPose, axes: &[ParryVector], reached: f64) -> (f64, ParryVector) {
     let mut best = (f64::NEG_INFINITY, ParryVector::X, ParryVector::ZERO);
     for &axis in axes {
         let (width, uphill) = slab(a, b, a_from_b, axis);
@@ -314,7 +319,7 @@ fn widest_slab(a: &Convex, b: &Convex, a_from_b: &ParryPose, axes: &[ParryVector
         }
     }
     if !reached.is_finite() || reached < 0.0 || !best.0.is_finite() {
-        return best.0;
+        return (best.0, best.1);
     }
     let mut step = 1.0 / (reached + a.margin + b.margin).max(1e-12);
     for _ in 0..MAX_STEPS {
@@ -330,7 +335,7 @@ fn widest_slab(a: &Convex, b: &Convex, a_from_b: &ParryPose, axes: &[ParryVector
             step *= 0.4;
         }
     }
-    best.0
+    (best.0, best.1)
 }
 
 /// Width of the slab across `axis`, from `a` to `b`, that has `a` on one side and `b` on the other, and the direction in
@@ -354,7 +359,7 @@ fn penetration(a: &Convex, b: &Convex, a_from_b: &ParryPose, simplex: &VoronoiSi
             // GJK takes the narrowest gaps for contact; the axis found may still separate.
             let depth = -(q - p).dot(normal);
             let reached = if depth < SHALLOW { SHALLOW } else { f64::INFINITY };
-            let gap = widest_slab(a, b, a_from_b, &[normal, -normal], reached);
+            let (gap, _) = widest_slab(a, b, a_from_b, &[normal, -normal], reached);
             if gap > 0.0 {
                 return Answer::SeparatedBy(gap);
             }
@@ -393,7 +398,9 @@ fn triangles_to_convex(body: &MeshBody, convex: &Convex, mesh_from_convex: &Parr
         ParryVector::new(box_of(x), box_of(y), box_of(z)),
     );
     let unresolved = Cell::new(false);
-    // Cut off where the boxes are as far apart as the nearest triangle so far.
+    // Axis of the nearest triangle so far, and how far the convex shape reaches against it: most other triangles lie
+    // behind the same plane and need no GJK.
+    let plane = Cell::new((ParryVector::ZERO, f64::NEG_INFINITY));
     let nearest = body.mesh.bvh().find_best(
         max,
         |node, _| {
@@ -402,13 +409,25 @@ fn triangles_to_convex(body: &MeshBody, convex: &Convex, mesh_from_convex: &Parr
         },
         |i, best| {
             let triangle = body.mesh.triangle(i);
-            let triangle = Convex { core: Core::Triangle([triangle.a, triangle.b, triangle.c]), margin: 0.0 };
-            match between_convex(&triangle, convex, mesh_from_convex, best.min(max)) {
-                Answer::SeparatedBy(gap) => Some(gap),
-                Answer::Penetrating(depth) => Some(-depth - f64::MIN_POSITIVE),
-                Answer::Unresolved => {
+            let corners = [triangle.a, triangle.b, triangle.c];
+            let (axis, from) = plane.get();
+            if corners.iter().all(|corner| from - corner.dot(axis) >= best) {
+                return None;
+            }
+            let triangle = Convex { core: Core::Triangle(corners), margin: 0.0 };
+            match answer_and_axis(&triangle, convex, mesh_from_convex, best.min(max)) {
+                (Answer::SeparatedBy(gap), axis) => {
+                    let axis = axis.normalize_or_zero();
+                    if gap < best && axis != ParryVector::ZERO {
+                        let against = convex.core.support_point(mesh_from_convex, -axis).dot(axis) - convex.margin;
+                        plane.set((axis, against));
+                    }
+                    Some(gap)
+                }
+                (Answer::Penetrating(depth), _) => Some(-depth - f64::MIN_POSITIVE),
+                (Answer::Unresolved, _) => {
                     unresolved.set(true);
-                    Some(f64::MAX)
+                    None
                 }
             }
         },

@@ -92,7 +92,7 @@ fn cross_check(n: usize) -> (usize, usize) {
                     Answer::SeparatedBy(lower) => {
                         assert!(lower > 0.0 && lower <= gap + 1e-12, "{names:?} {lower}");
                         if gap < max {
-                            assert!(lower >= gap * (1.0 - 1e-6) - 1e-6, "{names:?} {lower}");
+                            assert!(lower >= 0.9 * gap - 1e-6, "{names:?} {lower}");
                             n_loose += usize::from(lower < gap * (1.0 - 1e-6) - 2e-8);
                         } else {
                             assert!(lower >= max, "{names:?} {lower}");

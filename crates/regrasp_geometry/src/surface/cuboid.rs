@@ -19,7 +19,7 @@ const MAX_FACES: usize = 6;
 /// Outward normal of `face`.
 fn face_normal(face: u32) -> UnitVector {
     let mut normal = Vector::zeros();
-    normal[face as usize / 2] = if face % 2 == 0 { 1.0 } else { -1.0 };
+    normal[face as usize / 2] = if face.is_multiple_of(2) { 1.0 } else { -1.0 };
     UnitVector::new_unchecked(normal)
 }
 
@@ -32,7 +32,7 @@ impl CuboidSurface {
     /// Signed coordinate of the plane of `face` along its axis.
     fn offset(&self, face: u32) -> f64 {
         let h = self.half_extents[face as usize / 2];
-        if face % 2 == 0 { h } else { -h }
+        if face.is_multiple_of(2) { h } else { -h }
     }
 
     /// `face_from_next`: turns the neighbour `next` about the common edge into the plane of `face`.

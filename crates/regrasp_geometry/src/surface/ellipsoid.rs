@@ -48,8 +48,8 @@ impl EllipsoidSurface {
         for _ in 0..200 {
             let slope: f64 = (0..3).map(|i| if z[i] == 0.0 { 0.0 } else { term(i, u).powi(2) / (u + gap[i]) }).sum();
             let next = u + g(u) / (2.0 * slope);
-            // Not greater: converged to rounding (or not a number).
-            if !(next > u * (1.0 + 1e-16)) {
+            // No longer rising: converged to rounding.
+            if next <= u || next.is_nan() {
                 break;
             }
             u = next;

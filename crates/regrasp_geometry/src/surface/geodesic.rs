@@ -17,8 +17,8 @@ enum Path {
     GreatCircle { radius: f64, from: Vector, tangent: Vector, angle: f64 },
     /// Pieces one after the other; never empty.
     Legs(Vec<Leg>),
-    /// Points of a smooth surface, evenly spaced along the path; at least two. Between them the chord is projected.
-    Smooth { points: Vec<Point>, surface: Arc<dyn SurfaceKind> },
+    /// Points of a smooth surface, at least two, with the length up to each. Between them the chord is projected.
+    Smooth { points: Vec<Point>, lengths: Vec<f64>, surface: Arc<dyn SurfaceKind> },
 }
 
 /// A piece of a path, within one face.
@@ -88,9 +88,10 @@ impl Geodesic {
         Geodesic { length: legs.iter().map(|leg| leg.length).sum(), path: Path::Legs(legs) }
     }
 
-    pub(super) fn smooth(points: Vec<Point>, length: f64, surface: Arc<dyn SurfaceKind>) -> Self {
-        assert!(points.len() >= 2, "a geodesic has two ends");
-        Geodesic { length, path: Path::Smooth { points, surface } }
+    pub(super) fn smooth(points: Vec<Point>, lengths: Vec<f64>, surface: Arc<dyn SurfaceKind>) -> Self {
+        assert!(points.len() >= 2 && points.len() == lengths.len(), "a geodesic has two ends");
+        let length = lengths[lengths.len() - 1];
+        Geodesic { length, path: Path::Smooth { points, lengths, surface } }
     }
 
     /// Length along the surface, in m.
@@ -119,10 +120,11 @@ impl Geodesic {
                 let leg = &legs[last];
                 leg.at(if leg.length > 0.0 { (left / leg.length).clamp(0.0, 1.0) } else { 1.0 })
             }
-            Path::Smooth { points, surface } => {
-                let n = points.len() - 1;
-                let i = ((t * n as f64) as usize).min(n - 1);
-                let share = t * n as f64 - i as f64;
+            Path::Smooth { points, lengths, surface } => {
+                let along = t * self.length;
+                let i = lengths.partition_point(|&length| length <= along).clamp(1, points.len() - 1) - 1;
+                let piece = lengths[i + 1] - lengths[i];
+                let share = if piece > 0.0 { ((along - lengths[i]) / piece).min(1.0) } else { 1.0 };
                 surface.project(&(points[i] + (points[i + 1] - points[i]) * share))
             }
         }

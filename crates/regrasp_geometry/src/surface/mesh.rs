@@ -285,7 +285,7 @@ fn corner_normals(
                 continue;
             }
             let vertex = topology.triangles[i][k];
-            topology.fan(i, k, is_crease, &mut fan);
+            topology.fan(i, k, |j, edge| is_crease[j][edge], &mut fan);
             let mut sum = Vector::zeros();
             let at_vertex = |&j: &u32| topology.corner_at(j as usize, vertex).map(|m| (j as usize, m));
             for (j, m) in fan.iter().filter_map(at_vertex) {

@@ -16,7 +16,7 @@ pub(super) fn curvature(mesh: &MeshSurface, at: &SurfacePoint) -> [f64; 2] {
     let mut tensor = Matrix3::zeros();
     let mut fan = Vec::new();
     for k in 0..3 {
-        mesh.topology.fan(facet, k, &mesh.is_crease, &mut fan);
+        mesh.topology.fan(facet, k, |j, edge| mesh.is_crease[j][edge], &mut fan);
         let (mut sum, mut total) = (Matrix3::zeros(), 0.0);
         for &i in &fan {
             let [a, b, c] = mesh.corners(i);

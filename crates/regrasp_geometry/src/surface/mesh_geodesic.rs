@@ -13,7 +13,7 @@ use super::mesh_topology::{NONE, angle_at};
 use crate::frame::Point;
 use nalgebra::Vector2;
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeMap, BinaryHeap};
 use std::f64::consts::PI;
 
 /// Angle below pi at which a strip is led round the other side of a vertex, in radians.
@@ -37,24 +37,131 @@ struct TautPath {
 }
 
 pub(super) fn geodesic(mesh: &MeshSurface, a: &SurfacePoint, b: &SurfacePoint) -> Option<Geodesic> {
-    let mut strip = first_strip(mesh, a, b)?;
+    // Two first guesses, because each misjudges some meshes: triangles those with long thin fans, edges those where
+    // they all run aslant.
+    let first = straightened(mesh, strip_over_triangles(mesh, a, b)?, a, b);
+    let Some(strip) = strip_over_vertices(mesh, a, b) else { return Some(first) };
+    let second = straightened(mesh, strip, a, b);
+    Some(if second.length() < first.length() { second } else { first })
+}
+
+fn straightened(mesh: &MeshSurface, mut strip: Vec<u32>, a: &SurfacePoint, b: &SurfacePoint) -> Geodesic {
     let mut portals = Vec::new();
     // Every change shortens the path, so this ends; the cap is for rounding.
-    for _ in 0..10_000 {
+    let mut n_left = 10_000;
+    loop {
         let end = unroll(mesh, &strip, a, b, &mut portals);
         let path = pull_taut(&portals, end);
-        if !lead_round_vertices(mesh, &mut strip, &portals, &path, a, b) {
-            return Some(Geodesic::of_legs(legs(mesh, &strip, &portals, &path, a, b)));
+        n_left -= 1;
+        if n_left == 0 || !lead_round_vertices(mesh, &mut strip, &portals, &path, a, b) {
+            return Geodesic::of_legs(legs(mesh, &strip, &portals, &path, a, b));
         }
     }
-    let end = unroll(mesh, &strip, a, b, &mut portals);
-    let path = pull_taut(&portals, end);
-    Some(Geodesic::of_legs(legs(mesh, &strip, &portals, &path, a, b)))
+}
+
+/// The strip along the shortest way over edges, from a corner of the triangle of `a` to one of that of `b`: A* over
+/// vertices. None where a fan is interrupted by an open edge.
+fn strip_over_vertices(mesh: &MeshSurface, a: &SurfacePoint, b: &SurfacePoint) -> Option<Vec<u32>> {
+    let n = mesh.vertices.len();
+    let mut cost = vec![f64::INFINITY; n];
+    // The vertex before, and a triangle at the vertex.
+    let mut from = vec![(NONE, NONE); n];
+    let mut heap = BinaryHeap::new();
+    let to_goal = |v: u32| (mesh.vertices[v as usize] - b.point_in_object).norm();
+    let key = |total: f64, v: u32| Reverse((total.to_bits(), v));
+    for v in mesh.topology.triangles[a.facet as usize] {
+        cost[v as usize] = (mesh.vertices[v as usize] - a.point_in_object).norm();
+        from[v as usize] = (NONE, a.facet);
+        heap.push(key(cost[v as usize] + to_goal(v), v));
+    }
+    let mut fan = Vec::new();
+    let goals = mesh.topology.triangles[b.facet as usize];
+    let last = loop {
+        let Reverse((total, v)) = heap.pop()?;
+        if goals.contains(&v) {
+            break v;
+        }
+        if f64::from_bits(total) > cost[v as usize] + to_goal(v) {
+            continue;
+        }
+        let triangle = from[v as usize].1 as usize;
+        mesh.topology.fan(triangle, mesh.topology.corner_at(triangle, v)?, |_, _| false, &mut fan);
+        for &i in &fan {
+            for w in mesh.topology.triangles[i as usize] {
+                let next = cost[v as usize] + (mesh.vertices[w as usize] - mesh.vertices[v as usize]).norm();
+                if next < cost[w as usize] {
+                    cost[w as usize] = next;
+                    from[w as usize] = (v, i);
+                    heap.push(key(next + to_goal(w), w));
+                }
+            }
+        }
+    };
+    let mut way = vec![last];
+    while from[way[way.len() - 1] as usize].0 != NONE {
+        way.push(from[way[way.len() - 1] as usize].0);
+    }
+    way.reverse();
+    let mut strip = vec![a.facet];
+    for (i, &v) in way.iter().enumerate() {
+        let is_goal = |j: u32| match way.get(i + 1) {
+            Some(next) => mesh.topology.triangles[j as usize].contains(next),
+            None => j == b.facet,
+        };
+        let at = strip[strip.len() - 1];
+        strip.extend(round_vertex(mesh, at, v, is_goal)?);
+    }
+    Some(without_loops(&strip))
+}
+
+/// Triangles after `start` on the way round `vertex` to the first for which `is_goal` holds, by the side with fewer.
+fn round_vertex(mesh: &MeshSurface, start: u32, vertex: u32, is_goal: impl Fn(u32) -> bool) -> Option<Vec<u32>> {
+    if is_goal(start) {
+        return Some(Vec::new());
+    }
+    let by_side = |side: usize| {
+        let (mut way, mut at) = (Vec::new(), start);
+        loop {
+            let corner = mesh.topology.corner_at(at as usize, vertex)?;
+            at = mesh.topology.neighbours[at as usize][(corner + side) % 3];
+            if at == NONE || at == start {
+                return None;
+            }
+            way.push(at);
+            if is_goal(at) {
+                return Some(way);
+            }
+        }
+    };
+    match (by_side(0), by_side(2)) {
+        (Some(one), Some(other)) => Some(if other.len() < one.len() { other } else { one }),
+        (one, other) => one.or(other),
+    }
+}
+
+/// The strip without what lies between two visits to the same triangle: a shortest path visits none twice.
+fn without_loops(strip: &[u32]) -> Vec<u32> {
+    let mut kept: Vec<u32> = Vec::with_capacity(strip.len());
+    let mut place_of = BTreeMap::new();
+    for &i in strip {
+        match place_of.get(&i) {
+            Some(&place) => {
+                for dropped in kept.drain(place + 1..) {
+                    place_of.remove(&dropped);
+                }
+            }
+            None => {
+                place_of.insert(i, kept.len());
+                kept.push(i);
+            }
+        }
+    }
+    kept
 }
 
 /// Triangles from that of `a` to that of `b`: A* over triangles, each standing at the middle of the edge by which it is
 /// entered.
-fn first_strip(mesh: &MeshSurface, a: &SurfacePoint, b: &SurfacePoint) -> Option<Vec<u32>> {
+fn strip_over_triangles(mesh: &MeshSurface, a: &SurfacePoint, b: &SurfacePoint) -> Option<Vec<u32>> {
     let n = mesh.n_triangles();
     let (start, goal) = (a.facet, b.facet);
     let mut cost = vec![f64::INFINITY; n];
@@ -251,19 +358,7 @@ fn lead_round_vertices(
         changed = true;
     }
     if changed {
-        // A triangle entered and left by the same edge is not needed.
-        let mut straight: Vec<u32> = Vec::with_capacity(strip.len());
-        for &i in strip.iter() {
-            if straight.last() == Some(&i) {
-                continue;
-            }
-            if straight.len() >= 2 && straight[straight.len() - 2] == i {
-                straight.pop();
-            } else {
-                straight.push(i);
-            }
-        }
-        *strip = straight;
+        *strip = without_loops(strip);
     }
     changed
 }

@@ -98,20 +98,19 @@ impl Topology {
         self.triangles[i].iter().position(|&v| v == vertex)
     }
 
-    /// Triangles around corner `k` of triangle `i` in a fan that no edge marked in `is_barrier` (by triangle and edge)
-    /// interrupts, `i` first.
-    pub fn fan(&self, i: usize, k: usize, is_barrier: &[[bool; 3]], out: &mut Vec<u32>) {
+    /// Triangles around corner `k` of triangle `i` in a fan that no edge for which `is_barrier` (triangle,
+    /// edge) holds interrupts, `i` first.
+    pub fn fan(&self, i: usize, k: usize, is_barrier: impl Fn(usize, usize) -> bool, out: &mut Vec<u32>) {
         out.clear();
         out.push(i as u32);
         let vertex = self.triangles[i][k];
         // First across the edge that leaves the vertex, then, unless the fan closed, across the one that enters it.
         for side in [0, 2] {
             let mut at = i;
-            loop {
-                let Some(corner) = self.corner_at(at, vertex) else { break };
+            while let Some(corner) = self.corner_at(at, vertex) {
                 let edge = (corner + side) % 3;
                 let next = self.neighbours[at][edge];
-                if next == NONE || is_barrier[at][edge] {
+                if next == NONE || is_barrier(at, edge) {
                     break;
                 }
                 if next as usize == i {

@@ -51,7 +51,8 @@ pub struct CheckSettings {
     pub smallest_margin: f64,
     /// Start and goal may be missed by this much, in metres and radians.
     pub pose_tolerance: f64,
-    /// What must be the same (end and begin of segments, a grasp, a resting object) may differ by this much: rounding.
+    /// What must be the same (end and begin of segments, a grasp, a resting object) may differ by this much, in metres
+    /// and radians: solvers that stop, not motion.
     pub meeting_tolerance: f64,
     /// Joints may be this far beyond their limits: rounding.
     pub limit_tolerance: f64,
@@ -77,7 +78,7 @@ impl Default for CheckSettings {
             largest_contact_tolerance: 0.5e-3,
             smallest_margin: 0.0,
             pose_tolerance: 1e-6,
-            meeting_tolerance: 1e-9,
+            meeting_tolerance: 1e-7,
             limit_tolerance: 1e-9,
             largest_turn: 0.5,
             largest_slide: 0.05,
