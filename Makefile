@@ -1,6 +1,6 @@
 # Everything a developer runs. Needs Rust (and cargo-fuzz with a nightly toolchain for `fuzz` only).
 
-MODELS ?= $(abspath ../shared/models)
+MODELS ?= $(or $(REGRASP_MODELS),$(abspath ../shared/models))
 ifneq ($(wildcard $(MODELS)),)
 export REGRASP_MODELS := $(MODELS)
 PACKAGES := --package models=$(MODELS)
