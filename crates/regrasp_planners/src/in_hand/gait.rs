@@ -8,9 +8,10 @@ use super::candidates::{Candidate, Way, draw_candidates, draw_pose, follow_share
 use super::combine::{ClosureTable, rank};
 use super::grasps::draw_grasp;
 use super::regrasp::{Tried, regrasp};
+use super::relocate::{Foothold, can_lift};
 use super::search::{Search, Stop};
 use super::shorten::change_grasp;
-use super::state::{GraspState, Motion, Step};
+use super::state::{GraspState, Moment, Motion, Step};
 use super::tally::Reason;
 use super::transfer::transfer;
 use regrasp_base::Rng;
@@ -173,8 +174,7 @@ fn advance(
     let share = transfer(&mut search.workspace, &from, target, &mut moments);
     let is_whole = share >= 1.0;
     if !is_whole {
-        // The very last moment is at a limit or against something: a step back leaves room to lift fingers.
-        moments.pop();
+        back_off(search, &from, &mut moments);
     }
     if let (Some(last), true) = (moments.last(), share > LEAST_SHARE) {
         let end = GraspState {
@@ -194,6 +194,36 @@ fn advance(
     tree.push(Node { state, parent, steps, to_goal, n_tries: 0 });
     Some(tree.len() - 1)
 }
+
+/// Shortens a transfer that stopped at a limit or against something to where most fingers can be lifted.
+fn back_off(search: &mut Search, from: &GraspState, moments: &mut Vec<Moment>) {
+    let n_fingers = search.model().n_fingers();
+    let mut best: Option<(usize, usize)> = None;
+    for back in BACK_OFFS {
+        if back >= moments.len() {
+            break;
+        }
+        let moment = &moments[moments.len() - 1 - back];
+        let mut n_liftable = 0;
+        for finger in 0..n_fingers {
+            search.workspace.set(&moment.world_from_object, &moment.joints, &from.contacts);
+            let foothold = Foothold { contact: &from.contacts[finger], joints: &moment.joints[finger] };
+            let can = can_lift(&mut search.workspace, &moment.world_from_object, finger, &foothold);
+            n_liftable += usize::from(can);
+        }
+        if best.is_none_or(|(_, most)| n_liftable > most) {
+            best = Some((back, n_liftable));
+        }
+        if n_liftable == n_fingers {
+            break;
+        }
+    }
+    let back = best.map_or(moments.len(), |(back, _)| back);
+    moments.truncate(moments.len() - back);
+}
+
+/// Steps back from the end of a stopped transfer that are looked at.
+const BACK_OFFS: [usize; 5] = [0, 1, 2, 4, 7];
 
 /// The start state and all steps from the root to `node`, then `last`.
 fn trace(mut tree: Vec<Node>, mut node: usize, last: Vec<Step>) -> (GraspState, Vec<Step>) {

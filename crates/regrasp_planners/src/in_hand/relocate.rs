@@ -9,10 +9,27 @@ use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 use regrasp_grasp::Contact;
 use regrasp_roadmap::rrt_connect::{RrtConnect, RrtSettings};
-use regrasp_robot::kinematics::finger_ik::Coordinates;
+use regrasp_robot::kinematics::finger_ik::{Coordinates, IkSettings};
 
 /// Longest step of a joint along a joint line, in radians or metres.
 const JOINT_LINE_STEP: f64 = 0.08;
+
+/// Distance that a free finger keeps from its joint limits: less than a holding one, so that it can get away.
+const FREE_LIMIT_MARGIN: f64 = 1e-4;
+
+/// Inverse kinematics of a finger that is on its way.
+fn free_ik_settings(model: &Model, finger: usize, normal_in_world: UnitVector) -> IkSettings {
+    IkSettings { limit_margin: FREE_LIMIT_MARGIN, ..ik_settings(model, finger, normal_in_world) }
+}
+
+/// True when `finger` can leave its contact, with everything where `workspace` has it; it is left anywhere.
+pub fn can_lift(workspace: &mut Workspace, world_from_object: &Pose, finger: usize, from: &Foothold) -> bool {
+    let placement = Placement::from(world_from_object);
+    lift(workspace, &placement, finger, from, LEAST_LIFT).is_some()
+}
+
+/// Height that counts as having left, in metres.
+const LEAST_LIFT: f64 = 0.001;
 
 /// One end of a relocation.
 #[derive(Debug, Clone)]
@@ -72,7 +89,7 @@ fn lift(
     let normal = world_from_object.vector(&foothold.contact.normal_in_object);
     let base = world_from_object.point(&foothold.contact.point_in_object) + normal * model.fingers[finger].tip_radius;
     let mode = TipMode::Near { finger, normal_in_world: normal };
-    let settings = ik_settings(model, finger, UnitVector::new_unchecked(normal));
+    let settings = free_ik_settings(model, finger, UnitVector::new_unchecked(normal));
     workspace.set_finger(finger, foothold.joints);
     let n_steps = (height / model.settings.step).ceil().max(1.0) as usize;
     let mut path = Vec::with_capacity(n_steps);
@@ -141,7 +158,7 @@ fn slide(
         let direction = turned(&(first / first_length), &(last / last_length), angle, t);
         let mut tip = center + direction * (first_length + t * (last_length - first_length));
         let normal = push_out(model, &mut tip, away)?;
-        let settings = ik_settings(model, finger, UnitVector::new_unchecked(world_from_object.vector(&normal)));
+        let settings = free_ik_settings(model, finger, UnitVector::new_unchecked(world_from_object.vector(&normal)));
         joints = ik.solve_near(&world_from_object.point(&tip), &joints, &settings)?;
         if !workspace.step_finger(finger, &joints, mode) {
             return None;
@@ -211,7 +228,7 @@ fn around(
 ) -> Option<Vec<Coordinates>> {
     let model = workspace.model;
     let chain = model.fingers[finger].ik.chain();
-    let margin = model.settings.limit_margin;
+    let margin = FREE_LIMIT_MARGIN;
     let lower: Vec<f64> = chain.lower.iter().zip(start).map(|(l, q)| (l + margin).max(q - 3.2)).collect();
     let upper: Vec<f64> = chain.upper.iter().zip(start).map(|(u, q)| (u - margin).min(q + 3.2)).collect();
     let settings = RrtSettings { max_iterations: model.settings.rrt_iterations, ..RrtSettings::default() };
