@@ -3,7 +3,6 @@
 
 use super::candidates::Candidate;
 use super::combine::{Choice, ClosureTable};
-use super::model::Model;
 use super::regrasp::{Tried, regrasp};
 use super::search::{Search, Stop};
 use super::state::{GraspState, Motion, Step};
