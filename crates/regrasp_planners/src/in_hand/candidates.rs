@@ -52,13 +52,25 @@ impl Way {
 /// A ray from a random inner point within a wide cone about the finger's working place: twice as quick as drawing by
 /// area (in-hand-notes, 5). Every point of the surface can be drawn.
 pub fn draw_contact(model: &Model, finger: usize, world_from_object: &Placement, rng: &mut Rng) -> Option<Contact> {
+    (0..RAYS).find_map(|_| draw_contact_once(model, finger, world_from_object, rng))
+}
+
+/// Rays drawn for one contact: most of those that miss the finger's reach cost little.
+const RAYS: usize = 24;
+
+fn draw_contact_once(model: &Model, finger: usize, world_from_object: &Placement, rng: &mut Rng) -> Option<Contact> {
     let object = &model.scene.object;
     let inner = object.center_of_mass + Vector::from(rng.direction()) * (0.4 * model.frame.torque_scale * rng.unit());
     let towards = world_from_object.point_to_child(&model.fingers[finger].tip_at_rest) - inner;
     let direction = towards.normalize() * PULL + Vector::from(rng.direction());
     let direction = UnitVector::try_new(direction, 1e-9)?;
     let hit = object.surface.cast_ray(&inner, &direction)?;
-    let hit = object.surface.settle(&hit, model.fingers[finger].tip_radius)?;
+    let finger_model = &model.fingers[finger];
+    let rough = Contact { point_in_object: hit.point_in_object, normal_in_object: hit.normal_in_object };
+    if !finger_model.ik.may_reach(&tip_target(world_from_object, &rough, finger_model.tip_radius)) {
+        return None;
+    }
+    let hit = object.surface.settle(&hit, finger_model.tip_radius)?;
     if object.surface.crease_distance(&hit) < object.edge_distance {
         return None;
     }

@@ -100,6 +100,11 @@ impl NumericIk {
         ik
     }
 
+    /// False when the tip surely cannot come to `target`.
+    pub fn may_reach(&self, target: &Point) -> bool {
+        self.reach_map.may_reach(target)
+    }
+
     /// Different solutions from all seeds, nearest seed first.
     pub fn solve_all(&self, target: &Point, settings: &IkSettings, solutions: &mut Vec<Coordinates>) {
         if !self.reach_map.may_reach(target) {
