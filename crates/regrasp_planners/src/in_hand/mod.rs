@@ -15,6 +15,8 @@ mod gait;
 mod grasps;
 /// The scene prepared for planning.
 mod model;
+/// Candidates gathered at one pose.
+mod pool;
 /// The plan as it is written to a file.
 mod record;
 /// Sequences of relocations from one grasp to another.

@@ -90,6 +90,8 @@ pub struct InHandSettings {
     pub wander_angle: f64,
     /// Share of extensions towards the goal, the others towards a pose nearby (real-hands-notes, 2: 0.75).
     pub goal_share: f64,
+    /// Share of extensions whose relocations need not bring the object on: they turn the grasp over in dead ends.
+    pub aimless_share: f64,
     /// New contacts looked at per finger and extension. By measurement, see docs/benchmarks.md.
     pub candidates: usize,
     /// Of these, how many are kept for combining.
@@ -119,6 +121,7 @@ impl Default for InHandSettings {
             wander_distance: 0.012,
             wander_angle: 0.4,
             goal_share: 0.7,
+            aimless_share: 0.5,
             candidates: 6,
             candidates_kept: 3,
             restart_work: 40_000,
