@@ -36,19 +36,44 @@ struct Node {
     to_goal: f64,
     /// Extensions tried from here.
     n_tries: u32,
-    /// Index of the pool of its pose.
-    pool: usize,
+    /// Index of its pose in [`Tree::places`].
+    place: usize,
+}
+
+/// A pose of the object that nodes stand at.
+struct Place {
+    pool: Pool,
+    nodes: Vec<usize>,
+    /// Extensions tried from its nodes.
+    n_tries: u32,
+    /// True for the goal pose, where there is nothing left to do.
+    is_goal: bool,
 }
 
 /// The tree, or rather trees: one per start grasp.
 struct Tree {
     nodes: Vec<Node>,
-    /// One per pose; the first is that of the start.
-    pools: Vec<Pool>,
+    /// Poses; the first is that of the start.
+    places: Vec<Place>,
     /// Start grasps tried.
     n_sown: u32,
     /// True when the planner chooses the start grasp.
     start_is_free: bool,
+}
+
+impl Tree {
+    fn add_place(&mut self, search: &Search, world_from_object: &Pose) -> usize {
+        let pool = Pool::new(world_from_object, &search.goal, search.model().n_fingers());
+        let is_goal = search.distance(world_from_object, &search.goal) < REACHED;
+        self.places.push(Place { pool, nodes: Vec::new(), n_tries: 0, is_goal });
+        self.places.len() - 1
+    }
+
+    fn add_node(&mut self, node: Node) -> usize {
+        self.places[node.place].nodes.push(self.nodes.len());
+        self.nodes.push(node);
+        self.nodes.len() - 1
+    }
 }
 
 /// Looks for a sequence of motions from `start` (or from a grasp of its own choice) to the goal pose, and there to the
@@ -59,8 +84,9 @@ pub fn grow(
     goal_grasp: Option<&GraspState>,
 ) -> Result<(GraspState, Vec<Step>), Stop> {
     let goal = search.goal;
-    let pools = vec![Pool::new(&search.start, &goal, search.model().n_fingers())];
-    let mut tree = Tree { nodes: Vec::new(), pools, n_sown: 0, start_is_free: start.is_none() };
+    let mut tree = Tree { nodes: Vec::new(), places: Vec::new(), n_sown: 0, start_is_free: start.is_none() };
+    let start_pose = search.start;
+    tree.add_place(search, &start_pose);
     let mut fresh = start.and_then(|state| root(search, &mut tree, state));
     loop {
         if let Some(node) = fresh {
@@ -82,6 +108,8 @@ pub fn grow(
         fresh = match pick(search, &tree, &target) {
             Some(node) => {
                 tree.nodes[node].n_tries += 1;
+                let place = tree.nodes[node].place;
+                tree.places[place].n_tries += 1;
                 extend(search, &mut tree, node, &target)
             }
             None => sow(search, &mut tree),
@@ -93,8 +121,7 @@ pub fn grow(
 fn root(search: &mut Search, tree: &mut Tree, state: GraspState) -> Option<usize> {
     search.note(&state);
     let to_goal = search.distance(&state.world_from_object, &search.goal);
-    tree.nodes.push(Node { state, parent: None, steps: Vec::new(), to_goal, n_tries: 0, pool: 0 });
-    let node = tree.nodes.len() - 1;
+    let node = tree.add_node(Node { state, parent: None, steps: Vec::new(), to_goal, n_tries: 0, place: 0 });
     let goal = search.goal;
     advance(search, tree, node, &goal, Vec::new()).or(Some(node))
 }
@@ -107,11 +134,11 @@ fn sow(search: &mut Search, tree: &mut Tree) -> Option<usize> {
     search.workspace.place_object(&pose);
     let mut options = Vec::with_capacity(model.n_fingers());
     for finger in 0..model.n_fingers() {
-        if !tree.pools[0].grow(search, finger) {
+        if !tree.places[0].pool.grow(search, finger) {
             search.tally.add(Reason::NoContact(finger));
             return None;
         }
-        options.push(tree.pools[0].choose(finger, model.settings.candidates_kept + 1, &mut search.rng));
+        options.push(tree.places[0].pool.choose(finger, model.settings.candidates_kept + 1, &mut search.rng));
     }
     match choose_grasp(search, &pose, &options) {
         Some(state) => root(search, tree, state),
@@ -136,34 +163,36 @@ fn finish(search: &mut Search, state: &GraspState, goal_grasp: Option<&GraspStat
 /// Distance to the goal below which it is reached; the last transfer ends exactly there (real-hands-notes, 5.1).
 const REACHED: f64 = 1e-9;
 
-/// The node to extend: often the nearest to the target with a fee for each try, else any; None for a new start grasp.
+/// The node to extend; None for a new start grasp.
+///
+/// Poses are weighed, not nodes: a pose collects grasps quickly, and what stands there often fails alike. Often it is the
+/// nearest pose to the target, with a fee for each try, else any; of its nodes one of those tried least.
 fn pick(search: &mut Search, tree: &Tree, target: &Pose) -> Option<usize> {
-    if tree.nodes.is_empty() {
-        return None;
-    }
-    if search.rng.chance(0.35) {
-        let mut least_tried = search.rng.below(tree.nodes.len());
-        for _ in 0..2 {
-            let other = search.rng.below(tree.nodes.len());
-            if tree.nodes[other].n_tries < tree.nodes[least_tried].n_tries {
-                least_tried = other;
+    let places = &tree.places;
+    let mut chosen = None;
+    if search.rng.chance(ANYWHERE_SHARE) {
+        chosen = Some(search.rng.below(places.len()));
+    } else {
+        let fee = search.model().settings.try_fee * search.model().turn_length();
+        let mut least = f64::INFINITY;
+        if tree.start_is_free {
+            least = search.distance(&search.start, target) + fee * f64::from(tree.n_sown);
+        }
+        for (index, place) in places.iter().enumerate() {
+            let distance = search.distance(place.pool.world_from_object(), target) + fee * f64::from(place.n_tries);
+            if distance < least && !place.nodes.is_empty() && !place.is_goal {
+                (least, chosen) = (distance, Some(index));
             }
         }
-        return Some(least_tried);
     }
-    let fee = 0.1 * search.model().turn_length();
-    let mut best = (f64::INFINITY, None);
-    if tree.start_is_free {
-        best.0 = search.distance(&search.start, target) + fee * f64::from(tree.n_sown);
-    }
-    for (index, node) in tree.nodes.iter().enumerate() {
-        let distance = search.distance(&node.state.world_from_object, target) + fee * f64::from(node.n_tries);
-        if distance < best.0 && node.to_goal > REACHED {
-            best = (distance, Some(index));
-        }
-    }
-    best.1
+    let nodes = &places[chosen?].nodes;
+    let draw = |search: &mut Search| (!nodes.is_empty()).then(|| nodes[search.rng.below(nodes.len())]);
+    let (one, other) = (draw(search)?, draw(search)?);
+    Some(if tree.nodes[other].n_tries < tree.nodes[one].n_tries { other } else { one })
 }
+
+/// Share of extensions from a pose taken at random.
+const ANYWHERE_SHARE: f64 = 0.25;
 
 /// One extension: candidates for every finger, the best combinations, their relocations, the transfer.
 fn extend(search: &mut Search, tree: &mut Tree, node: usize, target: &Pose) -> Option<usize> {
@@ -171,10 +200,10 @@ fn extend(search: &mut Search, tree: &mut Tree, node: usize, target: &Pose) -> O
     let state = tree.nodes[node].state.clone();
     let to_goal = *target == search.goal;
     let elsewhere = (!to_goal).then(|| Way::new(&state.world_from_object, target));
-    let pool = tree.nodes[node].pool;
+    let place = tree.nodes[node].place;
     let mut options = Vec::with_capacity(model.n_fingers());
     for finger in 0..model.n_fingers() {
-        options.push(options_of(search, &mut tree.pools[pool], elsewhere.as_ref(), &state, finger));
+        options.push(options_of(search, &mut tree.places[place].pool, elsewhere.as_ref(), &state, finger));
     }
     let mut table = ClosureTable::new(model, &options);
     let present = options.iter().map(|of_finger| of_finger[0].follow).fold(1.0, f64::min);
@@ -239,7 +268,7 @@ fn options_of(
 /// Transfers from the end of `steps` towards `target` and adds a node where that ends.
 fn advance(search: &mut Search, tree: &mut Tree, parent: usize, target: &Pose, mut steps: Vec<Step>) -> Option<usize> {
     let from = steps.last().map_or(&tree.nodes[parent].state, |step| &step.end).clone();
-    let mut pool = tree.nodes[parent].pool;
+    let mut place = tree.nodes[parent].place;
     let mut moments = Vec::new();
     let share = transfer(&mut search.workspace, &from, target, &mut moments);
     if share < 1.0 {
@@ -251,8 +280,7 @@ fn advance(search: &mut Search, tree: &mut Tree, parent: usize, target: &Pose, m
             contacts: from.contacts.clone(),
             joints: last.joints.clone(),
         };
-        tree.pools.push(Pool::new(&last.world_from_object, &search.goal, search.model().n_fingers()));
-        pool = tree.pools.len() - 1;
+        place = tree.add_place(search, &last.world_from_object);
         steps.push(Step { motion: Motion::Transfer(moments), end });
     } else {
         match search.workspace.blocking_pair.take() {
@@ -262,8 +290,7 @@ fn advance(search: &mut Search, tree: &mut Tree, parent: usize, target: &Pose, m
     }
     let state = steps.last()?.end.clone();
     let to_goal = search.distance(&state.world_from_object, &search.goal);
-    tree.nodes.push(Node { state, parent: Some(parent), steps, to_goal, n_tries: 0, pool });
-    Some(tree.nodes.len() - 1)
+    Some(tree.add_node(Node { state, parent: Some(parent), steps, to_goal, n_tries: 0, place }))
 }
 
 /// Shortens a transfer that stopped at a limit or against something to where most fingers that may let go can be lifted.

@@ -53,11 +53,7 @@ pub fn draw_grasp(search: &mut Search, world_from_object: &Pose, target: &Pose) 
 }
 
 /// The best grasp that `options` make, closed and clear.
-pub fn choose_grasp(
-    search: &mut Search,
-    world_from_object: &Pose,
-    options: &[Vec<Candidate>],
-) -> Option<GraspState> {
+pub fn choose_grasp(search: &mut Search, world_from_object: &Pose, options: &[Vec<Candidate>]) -> Option<GraspState> {
     let model = search.model();
     let mut table = ClosureTable::new(model, options);
     let ranked = rank(&mut search.workspace, options, &mut table, None, GRASPS_TRIED);

@@ -27,6 +27,11 @@ impl Pool {
         }
     }
 
+    /// Its pose.
+    pub fn world_from_object(&self) -> &Pose {
+        &self.world_from_object
+    }
+
     /// The way to the goal.
     pub fn way(&self) -> &Way {
         &self.way
@@ -37,7 +42,13 @@ impl Pool {
         let n_drawn = search.model().settings.candidates;
         let pool = &mut self.of_finger[finger];
         let new = draw_candidates(
-            &mut search.workspace, finger, &self.world_from_object, &self.way, n_drawn, n_drawn, &mut search.rng,
+            &mut search.workspace,
+            finger,
+            &self.world_from_object,
+            &self.way,
+            n_drawn,
+            n_drawn,
+            &mut search.rng,
         );
         search.n_samples += new.len() as u64;
         pool.extend(new);

@@ -90,6 +90,8 @@ pub struct InHandSettings {
     pub wander_angle: f64,
     /// Share of extensions towards the goal, the others towards a pose nearby (real-hands-notes, 2: 0.75).
     pub goal_share: f64,
+    /// What a try at a pose costs when the next pose is chosen, as a share of the object's radius.
+    pub try_fee: f64,
     /// Share of extensions whose relocations need not bring the object on: they turn the grasp over in dead ends.
     pub aimless_share: f64,
     /// New contacts looked at per finger and extension. By measurement, see docs/benchmarks.md.
@@ -121,6 +123,7 @@ impl Default for InHandSettings {
             wander_distance: 0.012,
             wander_angle: 0.4,
             goal_share: 0.7,
+            try_fee: 0.1,
             aimless_share: 0.5,
             candidates: 6,
             candidates_kept: 3,
