@@ -191,6 +191,27 @@ impl<'a> Workspace<'a> {
         self.try_step(None, mode, MAX_HALVINGS)
     }
 
+    /// Goes to a configuration with other contacts; true when it is clear.
+    ///
+    /// What lies between is not tested: contacts that slide are no motion that is carried out (paths in GS_n, paper 000,
+    /// section 4.1). How far bodies move only spares tests of what is far apart.
+    pub fn slide(&mut self, world_from_object: &Pose, joints: &HandJoints, contacts: &Contacts) -> bool {
+        self.work += 1;
+        self.contacts.clone_from(contacts);
+        place_object(self.model, &mut self.next, world_from_object);
+        for finger in 0..self.model.n_fingers() {
+            place_finger(self.model, &mut self.next, finger, &joints[finger]);
+        }
+        self.bound_motion(None);
+        for (slack, pair) in self.slack.iter_mut().zip(&self.model.pairs) {
+            *slack -= self.motion[pair.a] + self.motion[pair.b];
+        }
+        self.now.clone_from(&self.next);
+        self.motion.fill(0.0);
+        self.deviation.fill(0.0);
+        (0..self.model.pairs.len()).all(|pair| self.pair_is_clear(pair, TipMode::AllHold))
+    }
+
     /// Moves one finger if the step is clear; stays otherwise.
     pub fn step_finger(&mut self, finger: usize, joints: &Coordinates, mode: TipMode) -> bool {
         self.next.clone_from(&self.now);
