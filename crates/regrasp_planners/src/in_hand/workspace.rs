@@ -40,6 +40,8 @@ pub enum TipMode {
 
 /// Largest number of times a step is halved before it counts as a collision.
 const MAX_HALVINGS: u32 = 4;
+/// Directions tried between two that each separate at one end of a step.
+const MAX_BETWEEN: usize = 5;
 /// Separation beyond which a search for a better direction stops, in metres.
 const ENOUGH: f64 = 0.004;
 
@@ -368,8 +370,37 @@ impl<'a> Workspace<'a> {
                 self.slack[index] = gap;
                 return true;
             }
+            if self.apart_between(index, best_now, required_at_ends) {
+                return true;
+            }
         }
         self.trees_apart(index, required)
+    }
+
+    /// Looks for a direction that separates at both ends, between `best_now`, which does at `now`, and the stored one,
+    /// which does at `next`: long links that turn have both no room for the other's.
+    fn apart_between(&mut self, index: usize, best_now: Vector, required_at_ends: f64) -> bool {
+        let pair = self.model.pairs[index];
+        let (a, b) = (&self.model.bodies[pair.a].shape, &self.model.bodies[pair.b].shape);
+        let (mut good_now, mut good_next) = (best_now, self.directions[index]);
+        let hints = &mut self.hints[index];
+        for _ in 0..MAX_BETWEEN {
+            let Some(middle) = (good_now + good_next).try_normalize(1e-6) else { return false };
+            let (now, next) = (&self.now.placements, &self.next.placements);
+            let gap_now = gap_along(&middle, a, &now[pair.a], b, &now[pair.b], hints);
+            let gap_next = gap_along(&middle, a, &next[pair.a], b, &next[pair.b], hints);
+            match (gap_now >= required_at_ends, gap_next >= required_at_ends) {
+                (true, true) => {
+                    self.directions[index] = middle;
+                    self.slack[index] = gap_next;
+                    return true;
+                }
+                (true, false) => good_now = middle,
+                (false, true) => good_next = middle,
+                (false, false) => return false,
+            }
+        }
+        false
     }
 
     /// The last word where a hull is larger than its mesh: exact triangles, with the relative motion of the step.
