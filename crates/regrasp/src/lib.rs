@@ -1,1 +1,19 @@
-//! (placeholder)
+//! `regrasp`: plans what a multi-fingered hand has to do to turn an object, and judges the plan independently.
+//!
+//! Load a scene, plan, check:
+//! [`scene`] reads files, [`planners`] plans, [`plan`] holds the plan and its checker. Frames, units and the glossary are in
+//! `CONVENTIONS.md`; the tower of crates is in `ARCHITECTURE.md`.
+
+pub use regrasp_base as base;
+pub use regrasp_geometry as geometry;
+pub use regrasp_grasp as grasp;
+pub use regrasp_plan as plan;
+pub use regrasp_planners as planners;
+pub use regrasp_roadmap as roadmap;
+pub use regrasp_robot as robot;
+pub use regrasp_scene as scene;
+
+pub use regrasp_base::{Budget, InputError};
+pub use regrasp_plan::Plan;
+pub use regrasp_planners::{Failure, InHandSettings, Method, plan_in_hand};
+pub use regrasp_scene::{InHandQuery, Scene};

@@ -1,1 +1,19 @@
-//! (placeholder)
+//! Scenes times seeds to tables, and campaigns that try the tool itself. Prints nothing; `regrasp_cli` does.
+//!
+//! Times are taken around calls, in wall-clock and in processor time of the process; planners never see a clock.
+
+/// Rows as CSV, written whole or appended one by one, and read back.
+pub mod csv;
+/// The same bytes on any number of threads.
+pub mod determinism;
+/// The checker against good and broken plans.
+pub mod mutations;
+/// `docs/benchmarks.md` from CSV files.
+pub mod page;
+/// One seed of one scene: plan, judge, measure.
+pub mod row;
+/// Smallest, median, mean and largest per scene and method.
+pub mod summary;
+
+pub use row::{Problem, Row, RunSettings, run};
+pub use summary::{Spread, Summary, summarise};

@@ -120,7 +120,7 @@ fn main() {
             black_box(bound.first_order(black_box(q)) + bound.chord_deviation(black_box(q)));
         });
         let n_tracked = near_5.iter().filter(|(q, target)| ik.solve_near(target, q, &settings).is_some()).count();
-        let tip_axis = |q: &[f64]| chain.last_frame(q).transform_vector(&center.coords.normalize());
+        let tip_axis = |q: &[f64]| chain.last_frame(q).vector(&center.coords.normalize());
         let wanted = Vector::new(1.0, 0.3, 0.0).normalize();
         let solved: Vec<_> = targets.iter().filter_map(|target| ik.solve_random(target, &wish, &mut rng)).collect();
         let mean = solved.iter().map(|q| tip_axis(q).dot(&wanted)).sum::<f64>() / solved.len() as f64;

@@ -1,1 +1,200 @@
-//! The checker: starts from files, shares no decision with the planner.
+//! The checker: a second way of knowing whether a plan may be carried out.
+//!
+//! It shares no decision with the planner: own forward kinematics from the robot's joints, own closed forms of
+//! surfaces, force closure by exact cones with a certificate, distances by parry, and motion bounds between waypoints.
+
+/// Everything that can collide, and which pairs must not.
+pub mod bodies;
+/// Force closure with margin, by exact second-order cones.
+pub mod closure;
+/// No collision at any moment.
+pub mod collision;
+/// Fingertips on their contacts, and contacts on the object.
+pub mod contact;
+/// What can be judged from the waypoints alone.
+pub mod continuity;
+/// `regrasp check`: everything is read afresh from files.
+pub mod files;
+/// The checker's own forward kinematics and motion bounds.
+pub mod kinematics;
+/// Lifting and landing of moving fingertips.
+pub mod lift;
+/// The scene as the checker sees it.
+pub mod model;
+/// One step between two waypoints, and certificates of separation.
+pub mod motion;
+/// Plans broken in one known way each.
+pub mod mutation;
+/// What the plan promises, and whether the promises may be made and are kept.
+pub mod promises;
+/// Distance from the object's surface and the normals there.
+pub mod surface;
+/// What can be wrong with a plan.
+pub mod violation;
+
+pub use files::{CheckedFiles, check_files};
+pub use violation::{Moment, Violation, ViolationKind};
+
+use crate::plan::Plan;
+use model::Model;
+use regrasp_scene::{InHandQuery, Scene};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How strict the checker is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CheckSettings {
+    /// Largest contact tolerance that a plan may promise, in metres. Issue 2: 0.5 mm.
+    pub largest_contact_tolerance: f64,
+    /// Closure margin asked of every holding set even if the plan promises less; dimensionless.
+    pub smallest_margin: f64,
+    /// Start and goal may be missed by this much, in metres and radians.
+    pub pose_tolerance: f64,
+    /// What must be the same (end and begin of segments, a grasp, a resting object) may differ by this much, in metres
+    /// and radians: solvers that stop, not motion.
+    pub meeting_tolerance: f64,
+    /// Joints may be this far beyond their limits: rounding.
+    pub limit_tolerance: f64,
+    /// Largest turn of a joint or of the object in one step, in radians.
+    pub largest_turn: f64,
+    /// Largest slide of a joint or of the object in one step, in metres.
+    pub largest_slide: f64,
+    /// Contacts may be this far off the object's surface, in metres.
+    pub surface_tolerance: f64,
+    /// Contact normals may be this far off the surface's, in radians.
+    pub normal_tolerance: f64,
+    /// Motion that is too small to be divided further when distances stay unresolved, in metres.
+    pub resolution: f64,
+    /// A lifted fingertip must get this far from the object before it may go anywhere, in metres.
+    pub lift_clearance: f64,
+    /// Most violations of a kind that are reported one by one.
+    pub most_per_kind: usize,
+}
+
+impl Default for CheckSettings {
+    fn default() -> Self {
+        CheckSettings {
+            largest_contact_tolerance: 0.5e-3,
+            smallest_margin: 0.0,
+            pose_tolerance: 1e-6,
+            meeting_tolerance: 1e-7,
+            limit_tolerance: 1e-9,
+            largest_turn: 0.5,
+            largest_slide: 0.05,
+            surface_tolerance: 1e-5,
+            normal_tolerance: 1e-3,
+            resolution: 0.05e-3,
+            lift_clearance: 0.1e-3,
+            most_per_kind: 20,
+        }
+    }
+}
+
+/// The smallest distance found at a waypoint between two things that must not touch.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Clearance {
+    /// Distance, in metres.
+    pub distance: f64,
+    /// The pair.
+    pub pair: [String; 2],
+    /// When.
+    pub at: Moment,
+}
+
+/// What the checker says.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+pub struct Report {
+    /// What is wrong, at most some of each kind; empty when the plan is accepted.
+    pub violations: Vec<Violation>,
+    /// How many violations were found, those not listed included.
+    pub n_violations: usize,
+    /// Smallest closure margin of a holding set; none when none was judged.
+    pub min_margin: Option<f64>,
+    /// Smallest distance at a waypoint of a pair that must not touch; between waypoints it is certified to be positive.
+    pub min_clearance: Option<Clearance>,
+    /// Largest distance of a holding fingertip from its contact, in metres, certified between waypoints.
+    pub max_contact_error: f64,
+    /// Waypoints judged.
+    pub n_waypoints: usize,
+    /// Distances measured.
+    pub n_distances: u64,
+}
+
+impl Report {
+    /// True when nothing is wrong.
+    pub fn accepted(&self) -> bool {
+        self.n_violations == 0
+    }
+}
+
+/// Gathers violations, some of each kind.
+#[derive(Debug, Default)]
+pub struct Log {
+    found: Vec<Violation>,
+    count: usize,
+    most_per_kind: usize,
+}
+
+impl Log {
+    /// Adds one, if fewer than the most of its kind are listed; counts it anyway.
+    pub fn push(&mut self, violation: Violation) {
+        self.count += 1;
+        if self.found.iter().filter(|other| other.kind == violation.kind).count() < self.most_per_kind {
+            self.found.push(violation);
+        }
+    }
+}
+
+/// Judges `plan` in `scene`; with a `query`, also whether it answers that query.
+///
+/// `scene` must be loaded afresh from the files: the hashes in `scene.inputs` are compared with those of the plan.
+pub fn check(scene: &Scene, query: Option<&InHandQuery>, plan: &Plan, settings: &CheckSettings) -> Report {
+    let mut log = Log { most_per_kind: settings.most_per_kind, ..Log::default() };
+    let mut report = Report::default();
+    promises::check_inputs(plan, &scene.inputs, &mut log);
+    match Model::new(scene) {
+        Err(message) => log.push(Violation::new(ViolationKind::WrongScene, message)),
+        Ok(model) => {
+            continuity::check_form(&model, plan, &mut log);
+            let form_is_sound = !log.found.iter().any(|violation| {
+                use ViolationKind::{EmptySegment, NotANumber, WrongScene};
+                matches!(violation.kind, EmptySegment | NotANumber | WrongScene)
+            });
+            // Everything else indexes by joint, finger and waypoint.
+            if form_is_sound {
+                judge(scene, query, plan, settings, &model, &mut log, &mut report);
+            }
+        }
+    }
+    report.n_violations = log.count;
+    report.violations = log.found;
+    report
+}
+
+fn judge(
+    scene: &Scene,
+    query: Option<&InHandQuery>,
+    plan: &Plan,
+    settings: &CheckSettings,
+    model: &Model,
+    log: &mut Log,
+    report: &mut Report,
+) {
+    report.n_waypoints = plan.segments.iter().map(|segment| segment.waypoints.len()).sum();
+    continuity::check_ends(query, plan, settings, log);
+    continuity::check_meeting(plan, settings, log);
+    continuity::check_joints(model, plan, settings, log);
+    continuity::check_roles(model, plan, settings, log);
+    report.max_contact_error = contact::check_tips(model, plan, log);
+    contact::check_contacts(&scene.object, model, plan, settings, log);
+    report.min_margin = promises::check_closure(&scene.object, model, plan, settings, log);
+    promises::check_promises(&scene.object, plan, settings, report.min_margin, log);
+    match bodies::Bodies::new(scene, model) {
+        Err(message) => log.push(Violation::new(ViolationKind::WrongScene, message)),
+        Ok(bodies) => {
+            (report.min_clearance, report.n_distances) =
+                collision::check_collision(&bodies, model, plan, settings, log);
+        }
+    }
+}

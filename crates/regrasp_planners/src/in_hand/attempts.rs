@@ -24,6 +24,8 @@ pub struct Left {
     pub n_samples: u64,
     /// The state nearest to the goal, with its distance.
     pub nearest: Option<(f64, super::state::GraspState)>,
+    /// True when a wall-clock limit cut something that a plan was found without.
+    pub cut_by_time: bool,
 }
 
 impl Left {
@@ -35,6 +37,7 @@ impl Left {
             n_nodes: search.n_nodes,
             n_samples: search.n_samples,
             nearest: search.nearest.clone(),
+            cut_by_time: search.cut_by_time,
         }
     }
 
@@ -45,6 +48,7 @@ impl Left {
             samples: self.n_samples,
             work: self.work,
             restarts: n_restarts as u64,
+            cut_by_time: self.cut_by_time,
             failures: self.tally.counts(),
             ..Statistics::default()
         }
@@ -97,6 +101,7 @@ impl Left {
         self.work += other.work;
         self.n_nodes += other.n_nodes;
         self.n_samples += other.n_samples;
+        self.cut_by_time |= other.cut_by_time;
         if let Some((distance, _)) = &other.nearest
             && self.nearest.as_ref().is_none_or(|(least, _)| distance < least)
         {

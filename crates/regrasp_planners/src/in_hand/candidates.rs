@@ -1,6 +1,7 @@
 //! Contacts that a finger could take, and how far it could follow with them.
 
 use super::model::Model;
+use super::relocate::{Foothold, lift_is_within_reach};
 use super::transfer::ik_settings;
 use super::workspace::{TipMode, Workspace, tip_target};
 use regrasp_base::Rng;
@@ -51,20 +52,32 @@ impl Way {
 /// A ray from a random inner point within a wide cone about the finger's working place: twice as quick as drawing by
 /// area (in-hand-notes, 5). Every point of the surface can be drawn.
 pub fn draw_contact(model: &Model, finger: usize, world_from_object: &Placement, rng: &mut Rng) -> Option<Contact> {
+    (0..RAYS).find_map(|_| draw_contact_once(model, finger, world_from_object, rng))
+}
+
+/// Rays drawn for one contact: most of those that miss the finger's reach cost little.
+const RAYS: usize = 24;
+
+fn draw_contact_once(model: &Model, finger: usize, world_from_object: &Placement, rng: &mut Rng) -> Option<Contact> {
     let object = &model.scene.object;
     let inner = object.center_of_mass + Vector::from(rng.direction()) * (0.4 * model.frame.torque_scale * rng.unit());
     let towards = world_from_object.point_to_child(&model.fingers[finger].tip_at_rest) - inner;
     let direction = towards.normalize() * PULL + Vector::from(rng.direction());
     let direction = UnitVector::try_new(direction, 1e-9)?;
     let hit = object.surface.cast_ray(&inner, &direction)?;
-    let hit = object.surface.settle(&hit, model.fingers[finger].tip_radius)?;
+    let finger_model = &model.fingers[finger];
+    let rough = Contact { point_in_object: hit.point_in_object, normal_in_object: hit.normal_in_object };
+    if !finger_model.ik.may_reach(&tip_target(world_from_object, &rough, finger_model.tip_radius)) {
+        return None;
+    }
+    let hit = object.surface.settle(&hit, finger_model.tip_radius)?;
     if object.surface.crease_distance(&hit) < object.edge_distance {
         return None;
     }
     Some(Contact { point_in_object: hit.point_in_object, normal_in_object: hit.normal_in_object })
 }
 
-/// Joints of `finger` at `contact`, clear of everything but the other fingers; the workspace has the object in place.
+/// Joints of `finger` at `contact` from which it can be lifted again, clear of everything but the other fingers; the workspace has the object in place.
 pub fn reach(
     workspace: &mut Workspace,
     finger: usize,
@@ -76,6 +89,9 @@ pub fn reach(
     let normal = UnitVector::new_unchecked(world_from_object.vector(&contact.normal_in_object));
     let target = tip_target(world_from_object, contact, model.fingers[finger].tip_radius);
     let joints = model.fingers[finger].ik.solve_random(&target, &ik_settings(model, finger, normal), rng)?;
+    if !lift_is_within_reach(model, world_from_object, finger, &Foothold { contact, joints: &joints }) {
+        return None;
+    }
     workspace.set_finger(finger, &joints);
     let mode = TipMode::Near { finger, normal_in_world: normal.into_inner() };
     workspace.finger_alone_is_clear(finger, mode).then_some(joints)

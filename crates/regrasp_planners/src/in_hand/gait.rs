@@ -5,10 +5,10 @@
 //! real hands.
 
 use super::candidates::{Candidate, Way, draw_candidates, draw_pose, follow_share};
-use super::combine::{ClosureTable, rank};
+use super::combine::{ClosureTable, rank, releasable};
 use super::grasps::draw_grasp;
 use super::regrasp::{Tried, regrasp};
-use super::relocate::{Foothold, can_lift};
+use super::relocate::{Foothold, can_lift, lift_is_within_reach};
 use super::search::{Search, Stop};
 use super::shorten::change_grasp;
 use super::state::{GraspState, Moment, Motion, Step};
@@ -16,9 +16,10 @@ use super::tally::Reason;
 use super::transfer::transfer;
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;
+use regrasp_geometry::collision::Placement;
 
 /// Combinations whose relocations are tried in one extension.
-const COMBINATIONS: usize = 6;
+const COMBINATIONS: usize = 16;
 /// Least share of a transfer that is worth a node.
 const LEAST_SHARE: f64 = 0.05;
 
@@ -148,8 +149,13 @@ fn options_of(search: &mut Search, state: &GraspState, finger: usize, way: &Way)
     let workspace = &mut search.workspace;
     let (contact, joints) = (state.contacts[finger], state.joints[finger].clone());
     let follow = follow_share(workspace, finger, &contact, &joints, way);
-    let mut options = vec![Candidate { contact, joints, follow }];
     let pose = &state.world_from_object;
+    let foothold = Foothold { contact: &contact, joints: &joints };
+    let is_stuck = !lift_is_within_reach(workspace.model, &Placement::from(pose), finger, &foothold);
+    let mut options = vec![Candidate { contact, joints, follow }];
+    if is_stuck {
+        return options;
+    }
     workspace.place_object(pose);
     let new =
         draw_candidates(workspace, finger, pose, way, settings.candidates, settings.candidates_kept, &mut search.rng);
@@ -195,26 +201,28 @@ fn advance(
     Some(tree.len() - 1)
 }
 
-/// Shortens a transfer that stopped at a limit or against something to where most fingers can be lifted.
+/// Shortens a transfer that stopped at a limit or against something to where most fingers that may let go can be lifted.
 fn back_off(search: &mut Search, from: &GraspState, moments: &mut Vec<Moment>) {
     let n_fingers = search.model().n_fingers();
-    let mut best: Option<(usize, usize)> = None;
+    let releasable = releasable(search.model(), &from.contacts);
+    let n_releasable = releasable.count_ones();
+    let mut best: Option<(usize, u32)> = None;
     for back in BACK_OFFS {
         if back >= moments.len() {
             break;
         }
         let moment = &moments[moments.len() - 1 - back];
         let mut n_liftable = 0;
-        for finger in 0..n_fingers {
+        for finger in (0..n_fingers).filter(|finger| releasable & (1 << finger) != 0) {
             search.workspace.set(&moment.world_from_object, &moment.joints, &from.contacts);
             let foothold = Foothold { contact: &from.contacts[finger], joints: &moment.joints[finger] };
             let can = can_lift(&mut search.workspace, &moment.world_from_object, finger, &foothold);
-            n_liftable += usize::from(can);
+            n_liftable += u32::from(can);
         }
         if best.is_none_or(|(_, most)| n_liftable > most) {
             best = Some((back, n_liftable));
         }
-        if n_liftable == n_fingers {
+        if n_liftable == n_releasable {
             break;
         }
     }

@@ -3,7 +3,7 @@
 
 use super::model::Model;
 use super::transfer::ik_settings;
-use super::workspace::{TipMode, Workspace};
+use super::workspace::{TipMode, Workspace, tip_target};
 use regrasp_base::Rng;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
@@ -26,6 +26,14 @@ fn free_ik_settings(model: &Model, finger: usize, normal_in_world: UnitVector) -
 pub fn can_lift(workspace: &mut Workspace, world_from_object: &Pose, finger: usize, from: &Foothold) -> bool {
     let placement = Placement::from(world_from_object);
     lift(workspace, &placement, finger, from, LEAST_LIFT).is_some()
+}
+
+/// True when the finger's joints let it leave a foothold at all, whatever is in the way.
+pub fn lift_is_within_reach(model: &Model, world_from_object: &Placement, finger: usize, from: &Foothold) -> bool {
+    let normal = world_from_object.vector(&from.contact.normal_in_object);
+    let tip = tip_target(world_from_object, from.contact, model.fingers[finger].tip_radius);
+    let settings = free_ik_settings(model, finger, UnitVector::new_unchecked(normal));
+    model.fingers[finger].ik.solve_near(&(tip + normal * LEAST_LIFT), from.joints, &settings).is_some()
 }
 
 /// Height that counts as having left, in metres.

@@ -29,6 +29,8 @@ pub struct Search<'a> {
     pub goal: Pose,
     /// Index of the attempt.
     pub attempt: usize,
+    /// True when a wall-clock limit cut something that a plan was found without.
+    pub cut_by_time: bool,
     budget: &'a Budget,
     work_limit: u64,
     /// The lowest attempt that has found a plan: later ones may stop.
@@ -71,6 +73,7 @@ impl<'a> Search<'a> {
             start,
             goal,
             attempt,
+            cut_by_time: false,
             budget,
             work_limit,
             winner,

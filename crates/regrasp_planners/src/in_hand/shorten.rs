@@ -3,13 +3,12 @@
 
 use super::candidates::Candidate;
 use super::combine::{Choice, ClosureTable};
-use super::model::Model;
 use super::regrasp::{Tried, regrasp};
 use super::search::{Search, Stop};
 use super::state::{GraspState, Motion, Step};
 use super::transfer::{follow_contact, transfer};
 use super::workspace::HandJoints;
-use regrasp_base::Rng;
+use regrasp_base::{Interrupt, Rng};
 use regrasp_geometry::Pose;
 use regrasp_geometry::collision::Placement;
 
@@ -23,12 +22,17 @@ fn cost(steps: &[Step]) -> (usize, usize) {
 }
 
 /// Tries `settings.shortcuts` random shortcuts on `steps` from `start`. `end_is_free` when any grasp will do at the end.
-pub fn shorten(search: &mut Search, start: &GraspState, steps: &mut Vec<Step>, end_is_free: bool) -> Result<(), Stop> {
+///
+/// A plan that is already there is never given up: the caller's limits only end the shortening.
+pub fn shorten(search: &mut Search, start: &GraspState, steps: &mut Vec<Step>, end_is_free: bool) {
     for _ in 0..search.model().settings.shortcuts {
         if steps.len() < 2 {
-            return Ok(());
+            return;
         }
-        search.check()?;
+        if let Err(Stop::Budget(interrupt)) = search.check() {
+            search.cut_by_time |= interrupt != Interrupt::WorkSpent;
+            return;
+        }
         let first = search.rng.below(steps.len() - 1);
         let last = if end_is_free && search.rng.chance(0.3) {
             steps.len() - 1
@@ -42,7 +46,6 @@ pub fn shorten(search: &mut Search, start: &GraspState, steps: &mut Vec<Step>, e
             steps.splice(first..=last, detour);
         }
     }
-    Ok(())
 }
 
 /// A cheaper way from `from` to `to` (to its pose only, when `free`), if one of the direct ones is feasible.
@@ -91,7 +94,8 @@ pub fn transfer_regrasp(
     let mut steps = Vec::new();
     let mut state = from.clone();
     if search.distance(&from.world_from_object, &to.world_from_object) > 0.0 {
-        let step = whole_transfer(search, from, &to.world_from_object)?;
+        let mut step = whole_transfer(search, from, &to.world_from_object)?;
+        settle_postures(&mut step, to);
         state = step.end.clone();
         steps.push(step);
     }
@@ -122,7 +126,7 @@ pub fn regrasp_transfer(
     let last = steps.last().map_or(from, |step| &step.end).clone();
     if search.distance(&from.world_from_object, &to.world_from_object) > 0.0 {
         let mut step = whole_transfer(search, &last, &to.world_from_object)?;
-        if !free && !settle_posture(model, &mut step, to) {
+        if !free && !settle_postures(&mut step, to) {
             return None;
         }
         steps.push(step);
@@ -130,19 +134,22 @@ pub fn regrasp_transfer(
     Some(steps)
 }
 
-/// Ends a transfer in exactly the posture of `to`, if it is there already but for rounding.
-fn settle_posture(model: &Model, step: &mut Step, to: &GraspState) -> bool {
-    let same = (0..model.n_fingers())
-        .all(|f| step.end.joints[f].iter().zip(&to.joints[f]).all(|(a, b)| (a - b).abs() < SAME_POSTURE));
-    if same {
-        step.end.joints.clone_from(&to.joints);
-        if let Motion::Transfer(moments) = &mut step.motion
-            && let Some(last) = moments.last_mut()
-        {
-            last.joints.clone_from(&to.joints);
+/// Ends a transfer in exactly the postures of `to` where it is there already but for rounding; true if everywhere.
+fn settle_postures(step: &mut Step, to: &GraspState) -> bool {
+    let mut all = true;
+    for (joints, wanted) in step.end.joints.iter_mut().zip(&to.joints) {
+        let is_there = joints.iter().zip(wanted).all(|(a, b)| (a - b).abs() < SAME_POSTURE);
+        if is_there {
+            joints.clone_from(wanted);
         }
+        all &= is_there;
     }
-    same
+    if let Motion::Transfer(moments) = &mut step.motion
+        && let Some(last) = moments.last_mut()
+    {
+        last.joints.clone_from(&step.end.joints);
+    }
+    all
 }
 
 /// Relocations that turn the grasp of `state` into that of `to`, the object standing still.

@@ -461,44 +461,6 @@ impl<'a> Workspace<'a> {
         }
         true
     }
-
-    /// Lower bound of the distance over all pairs that are not contacts, now, and the pair; in metres.
-    pub fn min_clearance(&mut self, mode: TipMode) -> (f64, Option<usize>) {
-        let mut least = (f64::INFINITY, None);
-        for (index, pair) in self.model.pairs.iter().enumerate() {
-            let skip = match (pair.tip_of, mode) {
-                (Some(finger), TipMode::Away { finger: away, .. }) => finger != away,
-                (Some(_), _) => true,
-                _ => false,
-            };
-            if skip {
-                continue;
-            }
-            let (a, b) = (&self.model.bodies[pair.a], &self.model.bodies[pair.b]);
-            let (at_a, at_b) = (&self.now.placements[pair.a], &self.now.placements[pair.b]);
-            let mut direction = self.directions[index];
-            let answer =
-                separation(&a.shape, at_a, &b.shape, at_b, 1e-9, f64::INFINITY, &mut direction, &mut self.hints[index]);
-            let mut distance = if let Answer::SeparatedBy(d) = answer { d } else { 0.0 };
-            if distance < self.model.settings.clearance
-                && let (Some(tree), body, at_body, at_mesh) = (&b.tree, a, at_a, at_b)
-            {
-                let mut smallest = 0.0;
-                if tree.is_apart(
-                    &body.shape,
-                    &at_mesh.inverse_then(at_body),
-                    self.model.settings.clearance,
-                    &mut smallest,
-                ) {
-                    distance = distance.max(smallest);
-                }
-            }
-            if distance < least.0 {
-                least = (distance, Some(index));
-            }
-        }
-        least
-    }
 }
 
 fn place_object(model: &Model, configuration: &mut Configuration, world_from_object: &Pose) {

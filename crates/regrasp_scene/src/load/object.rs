@@ -3,10 +3,10 @@
 use super::files::Files;
 use super::pose;
 use super::shape::{self, Origin, ReadShape};
-use regrasp_geometry::mass::{Solid, solid_properties};
 use super::table::{Entry, Found, Table};
 use crate::object::Object;
 use crate::scene::Obstacle;
+use regrasp_geometry::mass::{Solid, solid_properties};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::surface::DEFAULT_CREASE_ANGLE;
 use regrasp_geometry::{Point, Shape, Surface};

@@ -94,6 +94,15 @@ impl FingerIk {
         matches!(self.method, Method::ClosedForm(_))
     }
 
+    /// False when the tip surely cannot come to `target_in_base`; costs a look. True says nothing.
+    #[inline]
+    pub fn may_reach(&self, target_in_base: &Point) -> bool {
+        match &self.method {
+            Method::ClosedForm(_) => true,
+            Method::Numeric(ik) => ik.may_reach(target_in_base),
+        }
+    }
+
     /// True when a target leaves freedom: more than three coordinates.
     pub fn is_redundant(&self) -> bool {
         self.chain.n_coordinates() > 3

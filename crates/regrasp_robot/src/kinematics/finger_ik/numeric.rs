@@ -25,6 +25,8 @@ const MAX_STEPS: usize = 16;
 const MAX_WARM_STEPS: usize = 8;
 /// First steps of each solution that also follow the preference, from a seed and from a warm start.
 const PREFERENCE_STEPS: [usize; 2] = [3, 1];
+/// First steps that may make little headway.
+const CRAWL_STEPS: usize = 3;
 /// Longest change of a coordinate in one step, in radians or metres.
 const LONGEST_STEP: f64 = 0.6;
 /// Solutions closer than this in every coordinate are one; for redundant chains, and for others.
@@ -96,6 +98,11 @@ impl NumericIk {
             ik.seeds.push(Seed { tip: state.tip, tip_axis: state.tip_axis, coordinates });
         }
         ik
+    }
+
+    /// False when the tip surely cannot come to `target`.
+    pub fn may_reach(&self, target: &Point) -> bool {
+        self.reach_map.may_reach(target)
     }
 
     /// Different solutions from all seeds, nearest seed first.
@@ -276,9 +283,16 @@ impl NumericIk {
             limits[k] = (lower, upper);
             coordinates[k] = start[k].clamp(lower, upper);
         }
+        let mut error_before = f64::INFINITY;
         for i in 0..effort.max_steps {
             let state = self.state::<N>(&coordinates);
             let error = target.coords - state.tip;
+            // Newton steps at least halve the error once they are near; what still crawls is out of reach.
+            let error_now = error.norm();
+            if i > CRAWL_STEPS && error_now > 0.5 * error_before {
+                return None;
+            }
+            error_before = error_now;
             let wish = preference.filter(|_| n > 3 && i < effort.preference_steps);
             let step = bounded_step(&state, &error, wish, &coordinates, &limits)?;
             let (mut left, mut turned) = (error, 0.0);

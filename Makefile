@@ -1,0 +1,62 @@
+# Everything a developer runs. Needs Rust (and cargo-fuzz with a nightly toolchain for `fuzz` only).
+
+MODELS ?= $(or $(REGRASP_MODELS),$(abspath ../shared/models))
+ifneq ($(wildcard $(MODELS)),)
+export REGRASP_MODELS := $(MODELS)
+PACKAGES := --package models=$(MODELS)
+endif
+
+REGRASP := target/release/regrasp
+OUT ?= out
+
+WIDE := $(addprefix scenes/,$(addsuffix .toml,sphere_90x sphere_180z sphere_180x box_90x box_180z box_180x))
+TIGHT := $(addprefix scenes/,$(addsuffix .toml,tight_sphere_180z tight_box_90x))
+SEEDS ?= 200
+ALLEGRO_SEEDS ?= 20
+CLASSIC_SEEDS ?= 20
+
+.PHONY: all demo pictures test bench campaign fuzz docs release
+
+all: release
+
+release:
+	cargo build --release --locked -p regrasp_cli
+
+# Plans a sphere turn, checks it, says what it did, writes $(OUT)/demo.
+demo: release
+	$(REGRASP) demo -o $(OUT)/demo
+
+# The pictures of the README.
+pictures: demo
+	mkdir -p docs/pictures && cp $(OUT)/demo/gait.svg docs/pictures/demo-gait.svg
+
+test:
+	cargo test --locked --workspace
+
+# Writes docs/benchmarks.md and docs/benchmarks/*.csv. One thread, so that times compare.
+bench: release
+	$(REGRASP) bench $(WIDE) $(TIGHT) --seeds $(SEEDS) --threads 1 --time-limit 20 --csv docs/benchmarks/wide.csv
+	$(REGRASP) bench scenes/tight_sphere_180z.toml --method visibility --seeds $(CLASSIC_SEEDS) --threads 1 --time-limit 60 --csv docs/benchmarks/visibility.csv
+	$(REGRASP) bench scenes/tight_sphere_180z.toml --method classic --seeds $(CLASSIC_SEEDS) --threads 1 --time-limit 60 --csv docs/benchmarks/classic.csv
+ifneq ($(PACKAGES),)
+	$(REGRASP) bench scenes/allegro $(PACKAGES) --seeds $(ALLEGRO_SEEDS) --threads 1 --time-limit 20 --csv docs/benchmarks/allegro.csv
+endif
+	$(REGRASP) bench --page docs/benchmarks.md docs/benchmarks/*.csv
+
+# Slow: same bytes on 1, 2 and 8 threads (100 queries), and the checker against broken and good plans.
+campaign: release
+	$(REGRASP) campaign determinism $(WIDE) --queries 100 --threads 1,2,8
+	$(REGRASP) campaign mutations $(WIDE) --mutants 100 --good 1000
+
+FUZZ_TARGETS := urdf srdf hand_toml scene_toml stl obj plan_json
+FUZZ_RUNS ?= 1000000
+
+# Needs a nightly toolchain and cargo-fuzz (cargo install cargo-fuzz).
+fuzz:
+	for target in $(FUZZ_TARGETS); do \
+	  mkdir -p fuzz/corpus/$$target && cp -n fuzz/seeds/$$target/* fuzz/corpus/$$target/ ; \
+	  cargo +nightly fuzz run --sanitizer none $$target -- -runs=$(FUZZ_RUNS) -max_len=4096 -timeout=5 -rss_limit_mb=1024 || exit 1 ; \
+	done
+
+docs:
+	RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace --no-deps

@@ -1,0 +1,170 @@
+//! One seed of one scene: plan, judge, measure.
+
+use cpu_time::ProcessTime;
+use regrasp_base::Budget;
+use regrasp_plan::Plan;
+use regrasp_plan::check::{CheckSettings, check};
+use regrasp_planners::in_hand::validate_once;
+use regrasp_planners::{Failure, InHandSettings, Progress, plan_in_hand};
+use regrasp_scene::{InHandQuery, Scene};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+/// A scene and one query in it.
+#[derive(Debug, Clone, Copy)]
+pub struct Problem<'a> {
+    /// Scene.
+    pub scene: &'a Scene,
+    /// Query of this seed.
+    pub query: &'a InHandQuery,
+    /// Seed.
+    pub seed: u64,
+}
+
+/// How to run.
+#[derive(Debug, Clone)]
+pub struct RunSettings {
+    /// Settings of the planner, with its number of threads.
+    pub planner: InHandSettings,
+    /// Work allowed per seed.
+    pub max_work: u64,
+    /// Wall-clock time allowed per seed.
+    pub time_limit: Option<Duration>,
+    /// Whether plans are judged.
+    pub judge: Judge,
+    /// Set from outside to stop.
+    pub cancelled: Arc<AtomicBool>,
+}
+
+/// Whether plans are judged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Judge {
+    /// By the independent checker.
+    Checker,
+    /// Not at all.
+    Skip,
+}
+
+/// What came of one seed of one scene. Times in seconds, lengths in metres.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Scene.
+    pub scene: String,
+    /// Method.
+    pub method: String,
+    /// Seed.
+    pub seed: u64,
+    /// `solved`, or the kind of failure.
+    pub status: String,
+    /// Wall-clock time of the planner.
+    pub plan_s: f64,
+    /// Processor time of the process during planning, all threads together.
+    pub plan_cpu_s: f64,
+    /// Processor time to validate the final plan once at the planner's resolution.
+    pub floor_s: Option<f64>,
+    /// Wall-clock time of the checker.
+    pub check_s: Option<f64>,
+    /// The checker's verdict.
+    pub accepted: Option<bool>,
+    /// Nodes of the search.
+    pub nodes: u64,
+    /// Configurations sampled.
+    pub samples: u64,
+    /// Configurations looked at.
+    pub work: u64,
+    /// Restarts.
+    pub restarts: u64,
+    /// Transfers in the plan.
+    pub transfers: u64,
+    /// Single-finger relocations in the plan.
+    pub relocations: u64,
+    /// Smallest closure margin that the checker found.
+    pub min_margin: Option<f64>,
+    /// Smallest clearance that the checker found.
+    pub min_clearance: Option<f64>,
+    /// Angle left at the nearest miss, in degrees.
+    pub angle_left_deg: Option<f64>,
+    /// Commonest cause of a failure, or first violation of a rejected plan.
+    pub cause: String,
+}
+
+/// The word for a failure's kind, as its JSON spells it.
+pub fn status_of(failure: &Failure) -> String {
+    serde_json::to_value(failure.kind).ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
+}
+
+/// The word for a method, as settings spell it.
+pub fn method_name(settings: &InHandSettings) -> String {
+    serde_json::to_value(settings.method).ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
+}
+
+/// Plans one seed, judges the plan, and measures both.
+pub fn run(problem: Problem, settings: &RunSettings) -> Row {
+    let mut row = Row {
+        scene: problem.scene.name.clone(),
+        method: method_name(&settings.planner),
+        seed: problem.seed,
+        ..Row::default()
+    };
+    let started = (Instant::now(), ProcessTime::now());
+    let budget = Budget {
+        max_work: settings.max_work,
+        deadline: settings.time_limit.map(|limit| started.0 + limit),
+        cancelled: Arc::clone(&settings.cancelled),
+    };
+    let silent = |_: Progress| {};
+    let outcome = plan_in_hand(problem.scene, problem.query, &settings.planner, problem.seed, &budget, &silent);
+    row.plan_s = started.0.elapsed().as_secs_f64();
+    row.plan_cpu_s = started.1.elapsed().as_secs_f64();
+    let statistics = match &outcome {
+        Ok(plan) => &plan.statistics,
+        Err(failure) => &failure.statistics,
+    };
+    row.nodes = statistics.nodes;
+    row.samples = statistics.samples;
+    row.work = statistics.work;
+    row.restarts = statistics.restarts;
+    match outcome {
+        Ok(plan) => {
+            row.status = "solved".into();
+            row.transfers = plan.statistics.transfers;
+            row.relocations = plan.statistics.relocations;
+            row.floor_s = floor(problem.scene, &plan, &settings.planner);
+            if settings.judge == Judge::Checker {
+                judge(problem, &plan, &mut row);
+            }
+        }
+        Err(failure) => {
+            row.status = status_of(&failure);
+            row.angle_left_deg = failure.nearest_miss.as_ref().map(|miss| miss.angle_left.to_degrees());
+            row.cause = failure.causes.first().map_or(failure.message.clone(), |cause| cause.reason.clone());
+        }
+    }
+    row
+}
+
+fn judge(problem: Problem, plan: &Plan, row: &mut Row) {
+    let started = Instant::now();
+    let report = check(problem.scene, Some(problem.query), plan, &CheckSettings::default());
+    row.check_s = Some(started.elapsed().as_secs_f64());
+    row.accepted = Some(report.accepted());
+    row.min_margin = report.min_margin;
+    row.min_clearance = report.min_clearance.as_ref().map(|clearance| clearance.distance);
+    if let Some(violation) = report.violations.first() {
+        row.cause = violation.to_string();
+    }
+}
+
+/// Processor time to validate `plan` once at the planner's resolution, the least of three; none if it does not pass.
+fn floor(scene: &Scene, plan: &Plan, settings: &InHandSettings) -> Option<f64> {
+    let mut least: Option<f64> = None;
+    for _ in 0..3 {
+        let started = ProcessTime::now();
+        validate_once(scene, plan, settings).ok()?;
+        let seconds = started.elapsed().as_secs_f64();
+        least = Some(least.map_or(seconds, |least| least.min(seconds)));
+    }
+    least
+}

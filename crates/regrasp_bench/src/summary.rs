@@ -1,0 +1,178 @@
+//! Smallest, median, mean and largest per scene and method.
+
+use crate::row::Row;
+use serde::Serialize;
+
+/// Smallest, median, mean and largest of some numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Spread {
+    /// Smallest.
+    pub min: f64,
+    /// Median; the mean of the middle two for an even count.
+    pub median: f64,
+    /// Mean.
+    pub mean: f64,
+    /// Largest.
+    pub max: f64,
+}
+
+impl Spread {
+    /// None when there are no numbers.
+    pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
+        let mut sorted: Vec<f64> = values.into_iter().collect();
+        sorted.sort_by(f64::total_cmp);
+        let (&min, &max) = (sorted.first()?, sorted.last()?);
+        let n = sorted.len();
+        let median = 0.5 * (sorted[(n - 1) / 2] + sorted[n / 2]);
+        Some(Spread { min, median, mean: sorted.iter().sum::<f64>() / n as f64, max })
+    }
+}
+
+/// All seeds of one scene and method. Times in seconds.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// Scene.
+    pub scene: String,
+    /// Method.
+    pub method: String,
+    /// Seeds run.
+    pub runs: usize,
+    /// Seeds with a plan.
+    pub solved: usize,
+    /// Plans that the checker accepted; none when it was not asked.
+    pub accepted: Option<usize>,
+    /// Wall-clock time of the planner over the solved seeds.
+    pub plan_s: Option<Spread>,
+    /// Processor time of the planner over the solved seeds.
+    pub plan_cpu_s: Option<Spread>,
+    /// Mean processor time of planning over mean floor, over the solved seeds.
+    pub floor_multiple: Option<f64>,
+    /// Wall-clock time of the checker.
+    pub check_s: Option<Spread>,
+    /// Nodes over the solved seeds.
+    pub nodes: Option<Spread>,
+    /// Transfers per plan.
+    pub transfers: Option<Spread>,
+    /// Relocations per plan.
+    pub relocations: Option<Spread>,
+    /// Smallest closure margin of any accepted plan.
+    pub min_margin: Option<f64>,
+    /// Smallest clearance of any accepted plan, in metres.
+    pub min_clearance: Option<f64>,
+}
+
+/// One summary per scene and method, in the order in which they first appear.
+pub fn summarise(rows: &[Row]) -> Vec<Summary> {
+    let mut keys: Vec<(&str, &str)> = Vec::new();
+    for row in rows {
+        if !keys.contains(&(&row.scene, &row.method)) {
+            keys.push((&row.scene, &row.method));
+        }
+    }
+    keys.iter().map(|key| summary_of(key, rows)).collect()
+}
+
+fn summary_of(&(scene, method): &(&str, &str), rows: &[Row]) -> Summary {
+    let runs: Vec<&Row> = rows.iter().filter(|row| row.scene == scene && row.method == method).collect();
+    let solved: Vec<&Row> = runs.iter().copied().filter(|row| row.status == "solved").collect();
+    let over = |value: fn(&Row) -> f64| Spread::of(solved.iter().map(|row| value(row)));
+    let smallest = |value: fn(&Row) -> Option<f64>| solved.iter().filter_map(|row| value(row)).reduce(f64::min);
+    let floored: Vec<&&Row> = solved.iter().filter(|row| row.floor_s.is_some()).collect();
+    let floor: f64 = floored.iter().filter_map(|row| row.floor_s).sum();
+    let planned: f64 = floored.iter().map(|row| row.plan_cpu_s).sum();
+    Summary {
+        scene: scene.to_owned(),
+        method: method.to_owned(),
+        runs: runs.len(),
+        solved: solved.len(),
+        accepted: solved
+            .iter()
+            .any(|row| row.accepted.is_some())
+            .then(|| solved.iter().filter(|row| row.accepted == Some(true)).count()),
+        plan_s: over(|row| row.plan_s),
+        plan_cpu_s: over(|row| row.plan_cpu_s),
+        floor_multiple: (floor > 0.0).then(|| planned / floor),
+        check_s: Spread::of(solved.iter().filter_map(|row| row.check_s)),
+        nodes: over(|row| row.nodes as f64),
+        transfers: over(|row| row.transfers as f64),
+        relocations: over(|row| row.relocations as f64),
+        min_margin: smallest(|row| row.min_margin),
+        min_clearance: smallest(|row| row.min_clearance),
+    }
+}
+
+/// The summaries as a table of fixed columns, for a terminal.
+pub fn table(summaries: &[Summary]) -> String {
+    let width = summaries.iter().map(|summary| summary.scene.len()).max().unwrap_or(0).max(5);
+    let mut out = format!(
+        "{:<width$}  {:<10}  {:>9}  {:>9}  {:>34}  {:>6}  {:>9}  {:>7}  {:>7}\n",
+        "scene",
+        "method",
+        "solved",
+        "accepted",
+        "plan cpu ms min/median/mean/max",
+        "floors",
+        "check ms",
+        "margin",
+        "gap mm"
+    );
+    for summary in summaries {
+        let times = summary.plan_cpu_s.map_or("-".into(), |spread| {
+            format!("{}/{}/{}/{}", ms(spread.min), ms(spread.median), ms(spread.mean), ms(spread.max))
+        });
+        out.push_str(&format!(
+            "{:<width$}  {:<10}  {:>9}  {:>9}  {times:>34}  {:>6}  {:>9}  {:>7}  {:>7}\n",
+            summary.scene,
+            summary.method,
+            format!("{}/{}", summary.solved, summary.runs),
+            summary.accepted.map_or("-".into(), |n| format!("{n}/{}", summary.solved)),
+            summary.floor_multiple.map_or("-".into(), |x| format!("{x:.1}")),
+            summary.check_s.map_or("-".into(), |spread| ms(spread.mean)),
+            summary.min_margin.map_or("-".into(), |x| format!("{x:.4}")),
+            summary.min_clearance.map_or("-".into(), |x| format!("{:.3}", 1e3 * x)),
+        ));
+    }
+    out
+}
+
+/// Seconds as milliseconds with three significant digits.
+pub(crate) fn ms(seconds: f64) -> String {
+    let value = 1e3 * seconds;
+    match value {
+        x if x >= 100.0 => format!("{x:.0}"),
+        x if x >= 10.0 => format!("{x:.1}"),
+        x => format!("{x:.2}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spread_of_a_known_list() {
+        assert_eq!(Spread::of([]), None);
+        assert_eq!(Spread::of([4.0, 1.0, 2.0, 5.0]), Some(Spread { min: 1.0, median: 3.0, mean: 3.0, max: 5.0 }));
+    }
+
+    #[test]
+    fn failures_do_not_enter_the_times_and_groups_stay_apart() {
+        let row = |method: &str, status: &str, time| Row {
+            scene: "s".into(),
+            method: method.into(),
+            status: status.into(),
+            plan_cpu_s: time,
+            floor_s: Some(0.5),
+            accepted: Some(time < 2.5),
+            ..Row::default()
+        };
+        let rows =
+            [row("a", "solved", 1.0), row("b", "solved", 9.0), row("a", "time_limit", 100.0), row("a", "solved", 3.0)];
+        let summaries = summarise(&rows);
+        assert_eq!(summaries.len(), 2);
+        let a = &summaries[0];
+        assert_eq!((a.runs, a.solved, a.accepted), (3, 2, Some(1)));
+        assert_eq!(a.plan_cpu_s.map(|spread| spread.mean), Some(2.0));
+        assert_eq!(a.floor_multiple, Some(4.0));
+    }
+}

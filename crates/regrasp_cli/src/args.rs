@@ -1,0 +1,267 @@
+//! Arguments. The spellings are a promise to scripts.
+
+use clap::builder::PossibleValuesParser;
+use clap::{Args, Parser, Subcommand};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Methods of the in-hand planner, as `regrasp_planners::Method` spells them.
+pub const METHODS: [&str; 3] = ["gait", "visibility", "classic"];
+
+/// Most threads that may be asked for.
+const MAX_THREADS: i64 = 1024;
+
+/// Plans how a multi-fingered hand turns an object, and judges plans independently.
+#[derive(Debug, Parser)]
+#[command(name = "regrasp", version, max_term_width = 110, arg_required_else_help = true)]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+    /// What every command takes.
+    #[command(flatten)]
+    pub common: Common,
+}
+
+/// What every command takes.
+#[derive(Debug, Args)]
+pub struct Common {
+    /// Where package://NAME/... is; may be repeated
+    #[arg(long = "package", value_name = "NAME=DIR", global = true, value_parser = package)]
+    pub packages: Vec<(String, PathBuf)>,
+    /// One JSON object per line on stdout, no talk
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// No talk; errors are still shown
+    #[arg(long, global = true)]
+    pub quiet: bool,
+    /// Drop what cannot be understood in robot files and list it, instead of refusing
+    #[arg(long, global = true)]
+    pub lenient: bool,
+}
+
+/// Commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Plan and check a turn of a bundled object in a bundled hand
+    Demo(Demo),
+    /// Show what a hand is like and write a hand file for it
+    Inspect(Inspect),
+    /// Plan a scene, check the plan, then write it
+    Plan(Plan),
+    /// Judge a plan from the files alone; exit code 0 accepted, 1 rejected
+    Check(Check),
+    /// Plan scenes with many seeds and tabulate
+    Bench(Bench),
+    /// Long tests of the tool itself: determinism, and the checker against broken plans
+    #[command(hide = true)]
+    Campaign(Campaign),
+}
+
+/// `regrasp demo`
+#[derive(Debug, Args)]
+pub struct Demo {
+    /// Folder for scene, plan and picture
+    #[arg(short, long, value_name = "DIR", default_value = "regrasp-demo")]
+    pub output: PathBuf,
+    /// Seed
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+}
+
+/// `regrasp inspect`
+#[derive(Debug, Args)]
+pub struct Inspect {
+    /// URDF file, or a hand file
+    pub urdf: PathBuf,
+    /// Write a hand file
+    #[arg(short, long, value_name = "hand.toml")]
+    pub output: Option<PathBuf>,
+    /// Postures sampled for the pairs of links that always or never touch
+    #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    pub samples: u32,
+    /// Seed of the sampled postures
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+}
+
+/// How to search.
+#[derive(Debug, Args)]
+pub struct Search {
+    /// Algorithm [default: the best by measurement]
+    #[arg(long, value_parser = PossibleValuesParser::new(METHODS))]
+    pub method: Option<String>,
+    /// All settings of the planner, as a plan file has them; other flags go before it
+    #[arg(long, value_name = "FILE.json")]
+    pub settings: Option<PathBuf>,
+    /// Closure margin asked of every holding set, in [0, 1)
+    #[arg(long, value_parser = margin)]
+    pub margin: Option<f64>,
+    /// Wall-clock limit in seconds (per seed, in bench); it may only cut
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub time_limit: Option<Duration>,
+    /// Work limit, in configurations looked at: the same on every machine
+    #[arg(long, value_name = "N", default_value_t = 20_000_000)]
+    pub max_work: u64,
+}
+
+/// `regrasp plan`
+#[derive(Debug, Args)]
+pub struct Plan {
+    /// Scene file
+    pub scene: PathBuf,
+    /// Plan file [default: stdout]
+    #[arg(short, long, value_name = "plan.json")]
+    pub output: Option<PathBuf>,
+    /// Seed
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// Threads [default: all cores]; the plan does not depend on it
+    #[arg(long, value_parser = threads)]
+    pub threads: Option<usize>,
+    /// How to search.
+    #[command(flatten)]
+    pub search: Search,
+}
+
+/// `regrasp check`
+#[derive(Debug, Args)]
+pub struct Check {
+    /// Plan file
+    pub plan: PathBuf,
+    /// Scene file [default: the one that the plan names, beside the plan or in the current folder]
+    #[arg(long, value_name = "FILE")]
+    pub scene: Option<PathBuf>,
+}
+
+/// `regrasp bench`
+#[derive(Debug, Args)]
+pub struct Bench {
+    /// Scene files, or folders of them; CSV files with --page
+    #[arg(required = true, value_name = "SCENE")]
+    pub scenes: Vec<PathBuf>,
+    /// Seeds per scene: 0, 1, ...
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..))]
+    pub seeds: u64,
+    /// First seed
+    #[arg(long, default_value_t = 0)]
+    pub first_seed: u64,
+    /// Threads of one search
+    #[arg(long, default_value = "1", value_parser = threads)]
+    pub threads: usize,
+    /// How to search.
+    #[command(flatten)]
+    pub search: Search,
+    /// Write one row per scene and seed
+    #[arg(long, value_name = "FILE")]
+    pub csv: Option<PathBuf>,
+    /// Do not judge the plans
+    #[arg(long)]
+    pub no_check: bool,
+    /// Make a Markdown page of CSV files that were written before; plans nothing
+    #[arg(long, value_name = "FILE")]
+    pub page: Option<PathBuf>,
+}
+
+/// `regrasp campaign`
+#[derive(Debug, Args)]
+pub struct Campaign {
+    /// Which.
+    #[command(subcommand)]
+    pub kind: CampaignKind,
+}
+
+/// Campaigns.
+#[derive(Debug, Subcommand)]
+pub enum CampaignKind {
+    /// The same bytes on any number of threads
+    Determinism {
+        /// Scene files
+        #[arg(required = true)]
+        scenes: Vec<PathBuf>,
+        /// Queries in all, spread over the scenes
+        #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..))]
+        queries: u64,
+        /// Numbers of threads to compare
+        #[arg(long, value_delimiter = ',', default_value = "1,2,8", value_parser = threads)]
+        threads: Vec<usize>,
+        /// How to search.
+        #[command(flatten)]
+        search: Search,
+    },
+    /// Broken plans must be rejected, good ones accepted
+    Mutations {
+        /// Scene files
+        #[arg(required = true)]
+        scenes: Vec<PathBuf>,
+        /// Broken plans per kind
+        #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..))]
+        mutants: u64,
+        /// Good plans
+        #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..))]
+        good: u64,
+        /// How to search.
+        #[command(flatten)]
+        search: Search,
+    },
+}
+
+fn package(text: &str) -> Result<(String, PathBuf), String> {
+    match text.split_once('=') {
+        Some((name, folder)) if !name.is_empty() && !folder.is_empty() => Ok((name.to_owned(), PathBuf::from(folder))),
+        _ => Err("expected NAME=DIR, such as allegro=/models/allegro".into()),
+    }
+}
+
+fn seconds(text: &str) -> Result<Duration, String> {
+    let value: f64 = text.parse().map_err(|_| "expected a number of seconds".to_owned())?;
+    if !(value > 0.0 && value <= 1e7) {
+        return Err(format!("is {value}; expected a number of seconds between 0 (exclusive) and 1e7"));
+    }
+    Ok(Duration::from_secs_f64(value))
+}
+
+fn margin(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(value) if (0.0..1.0).contains(&value) => Ok(value),
+        _ => Err("expected a number in [0, 1)".into()),
+    }
+}
+
+fn threads(text: &str) -> Result<usize, String> {
+    match text.parse::<i64>() {
+        Ok(n) if (1..=MAX_THREADS).contains(&n) => Ok(n as usize),
+        _ => Err(format!("expected a number of threads between 1 and {MAX_THREADS}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_arguments_are_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn methods_are_those_of_the_planner() {
+        for name in METHODS {
+            let value = serde_json::Value::from(name);
+            assert!(serde_json::from_value::<regrasp::Method>(value).is_ok(), "{name}");
+        }
+    }
+
+    #[test]
+    fn nonsense_is_refused() {
+        for text in ["0", "-1", "inf", "NaN", "1,5", ""] {
+            assert!(seconds(text).is_err(), "{text}");
+        }
+        for text in ["0", "-3", "10000", "two"] {
+            assert!(threads(text).is_err(), "{text}");
+        }
+        assert_eq!(package("a=b=c"), Ok(("a".into(), "b=c".into())));
+        assert!(package("=b").is_err() && package("a").is_err());
+    }
+}

@@ -1,0 +1,113 @@
+//! `regrasp campaign`: long tests of the tool itself.
+
+use crate::args::{self, CampaignKind, Common, Search};
+use crate::interrupt;
+use crate::load;
+use crate::stop::Stop;
+use crate::talk::Talk;
+use regrasp::scene::LoadedScene;
+use regrasp::{Budget, plan_in_hand};
+use regrasp_bench::Problem;
+use regrasp_bench::determinism::compare;
+use regrasp_bench::mutations::Campaign;
+use serde_json::json;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// Runs the campaign asked for; exit code 1 when it finds fault.
+pub fn run(arguments: &args::Campaign, common: &Common, talk: &Talk) -> Result<(), Stop> {
+    let cancelled = interrupt::flag()?;
+    match &arguments.kind {
+        CampaignKind::Determinism { scenes, queries, threads, search } => {
+            let loaded = load_all(scenes, common, talk)?;
+            determinism(&loaded, *queries, threads, search, &cancelled, talk)
+        }
+        CampaignKind::Mutations { scenes, mutants, good, search } => {
+            let loaded = load_all(scenes, common, talk)?;
+            mutations(&loaded, *mutants, *good, search, &cancelled, talk)
+        }
+    }
+}
+
+fn load_all(scenes: &[PathBuf], common: &Common, talk: &Talk) -> Result<Vec<LoadedScene>, Stop> {
+    load::scene_files(scenes)?.iter().map(|path| load::scene(path, common, talk)).collect()
+}
+
+/// Query `i` is seed `i / n` of scene `i % n`.
+fn determinism(
+    scenes: &[LoadedScene],
+    queries: u64,
+    threads: &[usize],
+    search: &Search,
+    cancelled: &Arc<AtomicBool>,
+    talk: &Talk,
+) -> Result<(), Stop> {
+    let settings = load::settings(search, 1)?;
+    let budget = Budget { max_work: search.max_work, deadline: None, cancelled: Arc::clone(cancelled) };
+    let (mut n_same, mut n_solved) = (0, 0);
+    for i in 0..queries {
+        let LoadedScene { scene, task, .. } = &scenes[(i % scenes.len() as u64) as usize];
+        let seed = i / scenes.len() as u64;
+        let comparison = compare(Problem { scene, query: &task.query(seed), seed }, &settings, &budget, threads);
+        if cancelled.load(Ordering::Relaxed) {
+            return Err(Stop::Interrupted);
+        }
+        n_same += u64::from(comparison.is_same());
+        n_solved += u64::from(comparison.status == "solved");
+        talk.event(
+            "comparison",
+            json!({ "scene": comparison.scene, "seed": seed, "status": comparison.status, "digests": comparison.digests }),
+        );
+        if !comparison.is_same() {
+            talk.say(format!("DIFFERENT   {} seed {seed}: {:?}", comparison.scene, comparison.digests));
+        }
+    }
+    let counts: Vec<String> = threads.iter().map(usize::to_string).collect();
+    let line = format!(
+        "determinism: {n_same} of {queries} queries give the same bytes on {} threads ({n_solved} solved)\n",
+        counts.join(", ")
+    );
+    if !talk.is_json() {
+        talk.data(&line)?;
+    }
+    if n_same == queries && n_solved > 0 { Ok(()) } else { Err(Stop::Rejected) }
+}
+
+/// Good plans (plan `i` is seed `i / n` of scene `i % n`) must be accepted, broken ones rejected.
+fn mutations(
+    scenes: &[LoadedScene],
+    mutants: u64,
+    good: u64,
+    search: &Search,
+    cancelled: &Arc<AtomicBool>,
+    talk: &Talk,
+) -> Result<(), Stop> {
+    let settings = load::settings(search, 1)?;
+    let mut campaign = Campaign::default();
+    let mut unsolved = 0;
+    for i in 0..good {
+        let LoadedScene { scene, task, .. } = &scenes[(i % scenes.len() as u64) as usize];
+        let seed = i / scenes.len() as u64;
+        let query = task.query(seed);
+        let deadline = search.time_limit.map(|limit| Instant::now() + limit);
+        let budget = Budget { max_work: search.max_work, deadline, cancelled: Arc::clone(cancelled) };
+        match plan_in_hand(scene, &query, &settings, seed, &budget, &|_| {}) {
+            Ok(plan) => campaign.add(Problem { scene, query: &query, seed }, &plan, mutants),
+            Err(_) => unsolved += 1,
+        }
+        if cancelled.load(Ordering::Relaxed) {
+            return Err(Stop::Interrupted);
+        }
+        if (i + 1) % 50 == 0 {
+            talk.say(format!("{} of {good} plans, {} mutants", i + 1, campaign.n_mutants()));
+        }
+    }
+    talk.event("campaign", json!({ "campaign": campaign, "unsolved": unsolved }));
+    if !talk.is_json() {
+        talk.data(&campaign.table())?;
+        talk.data(&format!("{unsolved} queries had no plan\n"))?;
+    }
+    if campaign.is_clean() { Ok(()) } else { Err(Stop::Rejected) }
+}

@@ -1,0 +1,64 @@
+//! `regrasp demo`: plan and check a turn of a bundled object in a bundled hand; no files needed.
+
+use super::plan::{Limits, available_threads, say_query, search};
+use crate::args::{self, Common};
+use crate::gait_chart;
+use crate::interrupt;
+use crate::judge;
+use crate::load;
+use crate::stop::Stop;
+use crate::talk::Talk;
+use regrasp::InHandSettings;
+use regrasp::base::files;
+use regrasp::plan::format;
+use serde_json::json;
+use std::path::Path;
+
+/// Work that the demo may do: hundreds of times what it needs.
+const MAX_WORK: u64 = 5_000_000;
+/// The scene, relative to the output folder.
+const SCENE: &str = "scenes/sphere_180z.toml";
+/// The files of the repository that the demo needs, so that an installed binary needs no repository.
+const FILES: [(&str, &str); 3] = [
+    (SCENE, include_str!("../../../../scenes/sphere_180z.toml")),
+    ("assets/hands/wide_four_finger/hand.toml", include_str!("../../../../assets/hands/wide_four_finger/hand.toml")),
+    ("assets/hands/wide_four_finger/hand.urdf", include_str!("../../../../assets/hands/wide_four_finger/hand.urdf")),
+];
+
+/// Writes the bundled files, plans, checks, writes plan and picture.
+pub fn run(arguments: &args::Demo, common: &Common, talk: &Talk) -> Result<(), Stop> {
+    let cancelled = interrupt::flag()?;
+    let folder = &arguments.output;
+    talk.say(format!("demo   a four-finger hand turns a ball by 180 degrees; everything goes to {}", folder.display()));
+    for (name, text) in FILES {
+        write(&folder.join(name), text.as_bytes())?;
+    }
+    let scene_path = folder.join(SCENE);
+    let loaded = load::scene(&scene_path, common, talk)?;
+    let query = loaded.task.query(arguments.seed);
+    let settings = InHandSettings { n_threads: available_threads(), ..InHandSettings::default() };
+    say_query(&query, arguments.seed, settings.n_threads, talk);
+    let limits = Limits { max_work: MAX_WORK, time_limit: None, cancelled };
+    let plan = search(&loaded.scene, &query, &settings, arguments.seed, &limits, talk)?;
+    let bytes = format::to_json(&plan);
+    let (plan_path, chart_path) = (folder.join("plan.json"), folder.join("gait.svg"));
+    if !judge::judge_bytes(&plan_path, bytes.as_bytes(), &scene_path, &load::options(common), talk)?.accepted() {
+        return Err(Stop::Rejected);
+    }
+    write(&plan_path, bytes.as_bytes())?;
+    write(&chart_path, gait_chart::svg(&plan).as_bytes())?;
+    let sha256 = files::sha256(bytes.as_bytes());
+    talk.event("written", json!({ "path": plan_path, "sha256": sha256, "chart": chart_path }));
+    talk.say(format!("wrote  {}   sha256 {sha256}", plan_path.display()));
+    talk.say(format!("chart  {}   which finger holds when; open it in a browser", chart_path.display()));
+    talk.say(format!("next   regrasp check {}", plan_path.display()));
+    Ok(())
+}
+
+/// Writes a file and the folders above it.
+fn write(path: &Path, bytes: &[u8]) -> Result<(), Stop> {
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder).map_err(|error| Stop::unwritable(folder, &error))?;
+    }
+    files::write_atomic(path, bytes).map_err(|error| Stop::unwritable(path, &error))
+}

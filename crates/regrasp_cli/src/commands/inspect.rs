@@ -1,0 +1,217 @@
+//! `regrasp inspect`: what a hand is like, and a hand file for it.
+
+use super::plan::refuse_unwritable;
+use crate::args::{self, Common};
+use crate::interrupt;
+use crate::load;
+use crate::stop::Stop;
+use crate::talk::{Talk, counted, grouped};
+use regrasp::base::{Rng, files};
+use regrasp::robot::inspect::{
+    HandInspection, InspectSettings, Inspection, JointRow, RobotInspection, hand_file_text, inspect,
+};
+use serde_json::json;
+use std::fmt::Write;
+use std::path::{Component, Path, PathBuf};
+
+/// Pairs of links that are listed one by one.
+const PAIRS_SHOWN: usize = 24;
+
+/// Prints the report on stdout; writes the hand file when asked.
+pub fn run(arguments: &args::Inspect, common: &Common, talk: &Talk) -> Result<(), Stop> {
+    if let Some(path) = &arguments.output {
+        refuse_unwritable(path)?;
+    }
+    interrupt::flag()?;
+    let settings = InspectSettings { n_postures: arguments.samples as usize };
+    let mut rng = Rng::keyed(arguments.seed, "inspect", 0);
+    let found = inspect(&arguments.urdf, &load::options(common), &settings, &mut rng)?;
+    for note in &found.notes {
+        talk.note(note);
+    }
+    talk.event(
+        "inspection",
+        json!({
+            "robot": found.robot,
+            "hand": found.hand.as_ref().ok().map(|(_, table)| table),
+            "no_hand": found.hand.as_ref().err().map(|error| &error.diagnostics),
+        }),
+    );
+    if !talk.is_json() {
+        talk.data(&report(&found))?;
+    }
+    match (&found.hand, &arguments.output) {
+        (Err(error), Some(_)) => Err(Stop::BadInput(error.clone())),
+        (Ok((hand, table)), Some(path)) => {
+            let urdf = name_of_urdf(path, &found, &arguments.urdf, &common.packages);
+            let text = hand_file_text(hand, &urdf, &table.pairs.always_ids);
+            files::write_atomic(path, text.as_bytes()).map_err(|error| Stop::unwritable(path, &error))?;
+            talk.event("written", json!({ "path": path }));
+            talk.say(format!("wrote  {}", path.display()));
+            Ok(())
+        }
+        (_, None) => Ok(()),
+    }
+}
+
+/// How the hand file at `hand_file` names the URDF: within a package given, else relative to itself.
+fn name_of_urdf(hand_file: &Path, found: &Inspection, asked: &Path, packages: &[(String, PathBuf)]) -> String {
+    let urdf = found.inputs.iter().find(|input| input.role == "urdf").map_or(asked, |input| &input.path);
+    let absolute = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let urdf = absolute(urdf);
+    let slashed = |path: &Path| path.to_string_lossy().replace('\\', "/");
+    for (name, folder) in packages {
+        if let Ok(inside) = urdf.strip_prefix(absolute(folder)) {
+            return format!("package://{name}/{}", slashed(inside));
+        }
+    }
+    let folder = match hand_file.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => absolute(parent),
+        _ => absolute(Path::new(".")),
+    };
+    slashed(&relative(&urdf, &folder))
+}
+
+/// `target` as seen from `folder`, both absolute.
+fn relative(target: &Path, folder: &Path) -> PathBuf {
+    let (target_parts, folder_parts): (Vec<Component>, Vec<Component>) =
+        (target.components().collect(), folder.components().collect());
+    let shared = target_parts.iter().zip(&folder_parts).take_while(|(a, b)| a == b).count();
+    if shared == 0 {
+        return target.to_owned();
+    }
+    let up = std::iter::repeat_n(Component::ParentDir, folder_parts.len() - shared);
+    up.chain(target_parts[shared..].iter().copied()).collect()
+}
+
+/// The whole report.
+fn report(found: &Inspection) -> String {
+    let mut out = String::new();
+    robot_part(&found.robot, &mut out);
+    match &found.hand {
+        Ok((_, table)) => hand_part(table, &mut out),
+        Err(error) => {
+            let _ = writeln!(out, "\nnot a hand as it stands:\n{error}");
+        }
+    }
+    regrasp::base::diagnostic::printable(&out)
+}
+
+fn robot_part(robot: &RobotInspection, out: &mut String) {
+    let n_mimic = robot.joints.iter().filter(|joint| joint.follows.is_some()).count();
+    let n_fixed = robot.joints.iter().filter(|joint| joint.kind == "fixed").count();
+    let _ = writeln!(
+        out,
+        "robot {}: {}, {} ({} independent, {n_mimic} mimic, {n_fixed} fixed), root link {}\n",
+        robot.name,
+        counted(robot.n_links, "link"),
+        counted(robot.joints.len(), "joint"),
+        robot.joints.len() - n_mimic - n_fixed,
+        robot.root
+    );
+    let width = robot.joints.iter().map(|joint| joint.name.chars().count()).max().unwrap_or(0).clamp(5, 40);
+    let _ = writeln!(
+        out,
+        "{:<width$}  {:<10}  {:>9} {:>9}  {:>8} {:>8}  parent -> child",
+        "joint", "type", "lower", "upper", "speed", "effort"
+    );
+    for joint in robot.joints.iter().filter(|joint| joint.kind != "fixed") {
+        joint_line(joint, width, out);
+    }
+    if !robot.meshes.is_empty() {
+        let _ = writeln!(out, "\nmeshes (size in cm)");
+    }
+    for mesh in &robot.meshes {
+        let [x, y, z] = mesh.size.map(|length| 100.0 * length);
+        let _ = writeln!(
+            out,
+            "  {:>7} triangles  {:<14}  {x:.1} x {y:.1} x {z:.1}  {}",
+            grouped(mesh.n_triangles as u64),
+            if mesh.watertight { "watertight" } else { "not watertight" },
+            mesh.links.join(", ")
+        );
+    }
+    for suspicion in &robot.suspicions {
+        let _ = writeln!(out, "\nsuspicious: {suspicion}");
+    }
+}
+
+fn joint_line(joint: &JointRow, width: usize, out: &mut String) {
+    let number = |value: Option<f64>| value.map_or("-".to_owned(), |x| format!("{x:.4}"));
+    let _ = write!(
+        out,
+        "{:<width$}  {:<10}  {:>9} {:>9}  {:>8} {:>8}  {} -> {}",
+        joint.name,
+        joint.kind,
+        number(joint.lower),
+        number(joint.upper),
+        number(joint.velocity),
+        number(joint.effort),
+        joint.parent,
+        joint.child
+    );
+    if let Some(follows) = &joint.follows {
+        let _ = write!(out, "  = {} * {} + {}", follows.multiplier, follows.joint, follows.offset);
+    }
+    out.push('\n');
+}
+
+fn hand_part(hand: &HandInspection, out: &mut String) {
+    let _ = writeln!(
+        out,
+        "\nhand on {}: {}, span {:.1} cm",
+        hand.base,
+        counted(hand.fingers.len(), "finger"),
+        100.0 * hand.span
+    );
+    for finger in &hand.fingers {
+        let tip = match finger.tip_shape {
+            "sphere" => format!("ball of radius {:.1} mm", 1e3 * finger.tip_radius),
+            shape => shape.to_owned(),
+        };
+        let _ = writeln!(
+            out,
+            "  {:<10}  tip {} ({tip})  joints {}",
+            finger.name,
+            finger.tip_link,
+            finger.joints.join(", ")
+        );
+    }
+    let pairs = &hand.pairs;
+    let _ = writeln!(
+        out,
+        "\nlinks over {} random postures: {} always touch, {} sometimes, {} never",
+        grouped(pairs.n_postures as u64),
+        counted(pairs.always.len(), "pair"),
+        pairs.sometimes.len(),
+        pairs.never.len()
+    );
+    for [a, b] in pairs.always.iter().take(PAIRS_SHOWN) {
+        let _ = writeln!(out, "  always     {a} and {b}: excused in the hand file");
+    }
+    for pair in pairs.sometimes.iter().take(PAIRS_SHOWN) {
+        let _ = writeln!(out, "  {:>7.2} %  {} and {}", 100.0 * pair.share, pair.links[0], pair.links[1]);
+    }
+    if pairs.sometimes.len() > PAIRS_SHOWN {
+        let _ = writeln!(
+            out,
+            "  and {} more that touch sometimes; all of them with --json",
+            pairs.sometimes.len() - PAIRS_SHOWN
+        );
+    }
+    for [a, b] in &pairs.at_rest {
+        let _ = writeln!(out, "  at rest    {a} and {b} touch in the rest posture");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_are_seen_from_the_hand_file() {
+        let seen = |target: &str, folder: &str| relative(Path::new(target), Path::new(folder));
+        assert_eq!(seen("/a/b/hand.urdf", "/a/b"), PathBuf::from("hand.urdf"));
+        assert_eq!(seen("/a/b/hand.urdf", "/a/c/d"), PathBuf::from("../../b/hand.urdf"));
+    }
+}

@@ -1,0 +1,25 @@
+//! One file per command.
+
+mod bench;
+mod campaign;
+mod check;
+mod demo;
+mod inspect;
+pub mod plan;
+
+use crate::args::{Arguments, Command};
+use crate::stop::Stop;
+use crate::talk::Talk;
+
+/// Runs the command asked for.
+pub fn run(arguments: &Arguments, talk: &Talk) -> Result<(), Stop> {
+    let common = &arguments.common;
+    match &arguments.command {
+        Command::Demo(demo) => demo::run(demo, common, talk),
+        Command::Inspect(inspect) => inspect::run(inspect, common, talk),
+        Command::Plan(plan) => plan::run(plan, common, talk),
+        Command::Check(check) => check::run(check, common, talk),
+        Command::Bench(bench) => bench::run(bench, common, talk),
+        Command::Campaign(campaign) => campaign::run(campaign, common, talk),
+    }
+}

@@ -1,0 +1,250 @@
+//! `regrasp plan`: plan a scene, check the plan, then write it.
+
+use crate::args::{self, Common};
+use crate::interrupt;
+use crate::judge;
+use crate::load;
+use crate::progress::ProgressLines;
+use crate::stop::Stop;
+use crate::talk::{Talk, counted, duration, grouped};
+use regrasp::base::files;
+use regrasp::plan::format;
+use regrasp::planners::FailureKind;
+use regrasp::{Budget, Failure, InHandQuery, InHandSettings, Plan, Scene};
+use serde_json::json;
+use std::fmt::Write;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+/// Plans, checks, writes.
+pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), Stop> {
+    if let Some(path) = &arguments.output {
+        refuse_unwritable(path)?;
+    }
+    let cancelled = interrupt::flag()?;
+    let loaded = load::scene(&arguments.scene, common, talk)?;
+    let query = loaded.task.query(arguments.seed);
+    let n_threads = arguments.threads.unwrap_or_else(available_threads);
+    let settings = load::settings(&arguments.search, n_threads)?;
+    say_query(&query, arguments.seed, n_threads, talk);
+
+    let limits = Limits { max_work: arguments.search.max_work, time_limit: arguments.search.time_limit, cancelled };
+    let plan = search(&loaded.scene, &query, &settings, arguments.seed, &limits, talk)?;
+    let bytes = format::to_json(&plan);
+    // Judged is what will be written, in a scene read afresh: the checker starts from files.
+    let plan_path = arguments.output.as_deref().unwrap_or(Path::new("plan.json"));
+    let report = judge::judge_bytes(plan_path, bytes.as_bytes(), &arguments.scene, &load::options(common), talk)?;
+    if !report.accepted() {
+        return Err(rejected(arguments.output.as_deref(), &bytes, talk));
+    }
+    let Some(path) = &arguments.output else {
+        return if talk.is_json() {
+            talk.event("written", json!({ "sha256": files::sha256(bytes.as_bytes()), "plan": plan }));
+            Ok(())
+        } else {
+            talk.data(&bytes)
+        };
+    };
+    files::write_atomic(path, bytes.as_bytes()).map_err(|error| Stop::unwritable(path, &error))?;
+    let sha256 = files::sha256(bytes.as_bytes());
+    talk.event("written", json!({ "path": path, "sha256": sha256 }));
+    talk.say(format!("wrote  {}   sha256 {sha256}", path.display()));
+    Ok(())
+}
+
+/// What a search may use.
+#[derive(Debug, Clone)]
+pub struct Limits {
+    /// Configurations looked at.
+    pub max_work: u64,
+    /// Wall-clock time.
+    pub time_limit: Option<Duration>,
+    /// Set by Ctrl-C.
+    pub cancelled: Arc<AtomicBool>,
+}
+
+/// Threads of this machine.
+pub fn available_threads() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get)
+}
+
+/// Refuses a path that cannot be written, before any work is done (`F003`).
+pub fn refuse_unwritable(path: &Path) -> Result<(), Stop> {
+    let fail = |error: io::Error| Err(Stop::unwritable(path, &error));
+    if path.is_dir() {
+        return fail(io::Error::from(io::ErrorKind::IsADirectory));
+    }
+    let Some(name) = path.file_name() else {
+        return fail(io::Error::new(io::ErrorKind::InvalidInput, "the path has no file name"));
+    };
+    let mut probe_name = name.to_owned();
+    probe_name.push(format!(".{}.probe", std::process::id()));
+    let probe = path.with_file_name(probe_name);
+    match std::fs::File::create_new(&probe).and_then(|_| std::fs::remove_file(&probe)) {
+        Ok(()) => Ok(()),
+        Err(error) => fail(error),
+    }
+}
+
+/// Says what is asked.
+pub fn say_query(query: &InHandQuery, seed: u64, n_threads: usize, talk: &Talk) {
+    let (start, goal) = (&query.world_from_object_start, &query.world_from_object_goal);
+    let angle = start.rotation.angle_to(&goal.rotation);
+    let distance = (goal.translation.vector - start.translation.vector).norm();
+    talk.say(format!(
+        "query  rotation {:.0} deg, translation {:.1} mm, seed {seed}, {}",
+        angle.to_degrees(),
+        1e3 * distance,
+        counted(n_threads, "thread")
+    ));
+    talk.event("query", json!({ "angle": angle, "distance": distance, "seed": seed, "threads": n_threads }));
+}
+
+/// Searches, with progress, and says what was found.
+pub fn search(
+    scene: &Scene,
+    query: &InHandQuery,
+    settings: &InHandSettings,
+    seed: u64,
+    limits: &Limits,
+    talk: &Talk,
+) -> Result<Plan, Stop> {
+    let lines = ProgressLines::new(talk);
+    let started = Instant::now();
+    let budget = Budget {
+        max_work: limits.max_work,
+        deadline: limits.time_limit.map(|limit| started + limit),
+        cancelled: Arc::clone(&limits.cancelled),
+    };
+    let report = |progress| lines.report(progress);
+    let plan = match regrasp::plan_in_hand(scene, query, settings, seed, &budget, &report) {
+        Ok(plan) => plan,
+        Err(failure) if failure.kind == FailureKind::Interrupted => return Err(Stop::Interrupted),
+        Err(failure) => return Err(Stop::NoPlan(Box::new(failure))),
+    };
+    let seconds = started.elapsed().as_secs_f64();
+    let waypoints: usize = plan.segments.iter().map(|segment| segment.waypoints.len()).sum();
+    talk.say(format!(
+        "plan   {}, {}, {} waypoints, closure margin {:.4}{}   {}",
+        counted(plan.statistics.transfers as usize, "transfer"),
+        counted(plan.statistics.relocations as usize, "relocation"),
+        grouped(waypoints as u64),
+        plan.promises.kept_margin,
+        if plan.statistics.cut_by_time { ", cut by the time limit" } else { "" },
+        duration(seconds),
+    ));
+    talk.event(
+        "plan",
+        json!({ "seconds": seconds, "statistics": plan.statistics, "kept_margin": plan.promises.kept_margin }),
+    );
+    Ok(plan)
+}
+
+/// Keeps a rejected plan for a bug report, beside where the plan would have gone: never under its name.
+fn rejected(output: Option<&Path>, bytes: &str, talk: &Talk) -> Stop {
+    if let Some(path) = output {
+        let kept = rejected_path(path);
+        match files::write_atomic(&kept, bytes.as_bytes()) {
+            Ok(()) => {
+                talk.event("rejected", json!({ "path": kept }));
+                talk.say(format!("kept   {}   for a bug report; it is not a plan", kept.display()));
+            }
+            Err(error) => talk.note(&format!("{} cannot be written: {error}", kept.display())),
+        }
+    }
+    Stop::Rejected
+}
+
+/// `plan.json` becomes `plan.json.rejected.json`.
+fn rejected_path(path: &Path) -> PathBuf {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(".rejected.json");
+    path.with_file_name(name)
+}
+
+/// A failure for people: what, why most often, how near, what to try.
+pub fn failure_text(failure: &Failure) -> String {
+    let heading = match failure.kind {
+        FailureKind::StartInvalid => "NO PLAN: the start is not valid",
+        FailureKind::GoalInvalid => "NO PLAN: the goal is not valid",
+        FailureKind::Impossible => "NO PLAN: impossible with this hand and these contacts",
+        FailureKind::WorkSpent => "NO PLAN within the work allowed (not a proof)",
+        FailureKind::TimeLimit => "NO PLAN within the time limit (not a proof)",
+        FailureKind::Interrupted => "interrupted",
+    };
+    let mut out = format!("{heading}\n  {}\n", failure.message);
+    if let Some(miss) = &failure.nearest_miss {
+        let _ = writeln!(
+            out,
+            "  nearest: the object came within {:.0} deg and {:.1} mm of the goal",
+            miss.angle_left.to_degrees(),
+            1e3 * miss.distance_left
+        );
+    }
+    if !failure.causes.is_empty() {
+        let tried: u64 = failure.causes.iter().map(|cause| cause.count).sum();
+        let _ = writeln!(out, "  {} attempts failed:", grouped(tried));
+        for cause in failure.causes.iter().take(8) {
+            let _ = writeln!(out, "    {:>5.1} %  {}", 100.0 * cause.share, cause.reason);
+        }
+    }
+    let statistics = &failure.statistics;
+    if statistics.work > 0 {
+        let _ = writeln!(
+            out,
+            "  searched: {} nodes, {} configurations, {}",
+            grouped(statistics.nodes),
+            grouped(statistics.work),
+            counted(statistics.restarts as usize, "restart")
+        );
+    }
+    if !failure.advice.is_empty() {
+        let _ = writeln!(out, "  try: {}", failure.advice);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use regrasp::plan::plan::PoseData;
+    use regrasp::planners::{Cause, NearestMiss};
+
+    #[test]
+    fn a_failure_is_told_with_causes_nearest_miss_and_advice() {
+        let failure = Failure {
+            kind: FailureKind::TimeLimit,
+            message: "no way in 2 s".into(),
+            advice: "more time: --time-limit 20".into(),
+            causes: vec![
+                Cause { reason: "finger \"thumb\" cannot reach a new contact".into(), count: 3000, share: 0.75 },
+                Cause { reason: "closure lost".into(), count: 1000, share: 0.25 },
+            ],
+            nearest_miss: Some(NearestMiss {
+                world_from_object: PoseData { position: [0.0; 3], quat_xyzw: [0.0, 0.0, 0.0, 1.0] },
+                angle_left: 61f64.to_radians(),
+                distance_left: 0.0012,
+                joints: vec![],
+            }),
+            statistics: Default::default(),
+        };
+        let text = failure_text(&failure);
+        for part in
+            ["not a proof", "within 61 deg and 1.2 mm", "4 000 attempts", "75.0 %  finger \"thumb\"", "try: more time"]
+        {
+            assert!(text.contains(part), "{part} is missing in\n{text}");
+        }
+    }
+
+    #[test]
+    fn a_path_that_cannot_be_written_is_refused_and_a_good_one_left_as_it_was() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(refuse_unwritable(&folder.path().join("missing").join("plan.json")).is_err());
+        assert!(refuse_unwritable(folder.path()).is_err());
+        assert!(refuse_unwritable(&folder.path().join("plan.json")).is_ok());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}

@@ -1,0 +1,168 @@
+//! Models from disk, with what the environment says about packages: libraries read no environment.
+
+use crate::args::{Common, Search};
+use crate::stop::Stop;
+use crate::talk::{Talk, counted, duration, grouped};
+use regrasp::base::{Diagnostic, Place};
+use regrasp::geometry::Shape;
+use regrasp::robot::import::{LoadOptions, ResolveOptions};
+use regrasp::scene::{LoadedScene, load_scene};
+use regrasp::{InHandSettings, Scene};
+use serde_json::json;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// How files are read: the packages given, then `ROS_PACKAGE_PATH`, then `AMENT_PREFIX_PATH`.
+pub fn options(common: &Common) -> LoadOptions {
+    let entries = |value: Option<OsString>| -> Vec<PathBuf> {
+        value.map(|value| std::env::split_paths(&value).collect()).unwrap_or_default()
+    };
+    let mut search_paths = entries(std::env::var_os("ROS_PACKAGE_PATH"));
+    search_paths.extend(entries(std::env::var_os("AMENT_PREFIX_PATH")));
+    search_paths.retain(|path| !path.as_os_str().is_empty());
+    LoadOptions { resolve: ResolveOptions { packages: common.packages.clone(), search_paths }, lenient: common.lenient }
+}
+
+/// Reads a scene and says what was read.
+pub fn scene(path: &Path, common: &Common, talk: &Talk) -> Result<LoadedScene, Stop> {
+    let started = Instant::now();
+    let loaded = load_scene(path, &options(common))?;
+    for note in &loaded.notes {
+        talk.note(note);
+    }
+    let seconds = started.elapsed().as_secs_f64();
+    say_scene(&loaded.scene, seconds, talk);
+    Ok(loaded)
+}
+
+/// Settings of the planner: defaults, then the settings file, then the flags.
+pub fn settings(search: &Search, n_threads: usize) -> Result<InHandSettings, Stop> {
+    let mut settings = match &search.settings {
+        Some(path) => {
+            let text = regrasp::base::files::read_text(path)?;
+            serde_json::from_str(&text).map_err(|error| settings_error(path, &error))?
+        }
+        None => InHandSettings::default(),
+    };
+    settings.n_threads = n_threads;
+    // The argument parser lets only the planner's own spellings through; a test holds the two lists together.
+    if let Some(method) = search.method.as_deref().and_then(|name| serde_json::from_value(name.into()).ok()) {
+        settings.method = method;
+    }
+    if let Some(margin) = search.margin {
+        settings.closure_margin = margin;
+    }
+    match settings.validate() {
+        Ok(()) => Ok(settings),
+        Err(problem) => Err(Stop::argument("A503", "--settings", problem, "settings as in a plan file")),
+    }
+}
+
+fn settings_error(path: &Path, error: &serde_json::Error) -> Stop {
+    let place = Place { file: path.to_owned(), line: Some(error.line() as u32), column: Some(error.column() as u32) };
+    let diagnostic = Diagnostic::new("A504", place, error.to_string());
+    Stop::BadInput(diagnostic.expected("a JSON object like \"settings\" in a plan file").into())
+}
+
+/// Says what a scene is made of.
+fn say_scene(scene: &Scene, seconds: f64, talk: &Talk) {
+    let hand = &scene.hand;
+    let n_mimic = hand.robot.joints.iter().filter(|joint| joint.mimic.is_some()).count();
+    let n_shapes = hand.palm.len() + hand.fingers.iter().map(|finger| finger.shapes.len()).sum::<usize>();
+    talk.say(format!(
+        "hand   {}   {} ({n_mimic} mimic)   {}   {}   loaded in {}",
+        hand.robot.name,
+        counted(hand.n_joints(), "joint"),
+        counted(hand.fingers.len(), "finger"),
+        counted(n_shapes, "collision shape"),
+        duration(seconds),
+    ));
+    let object = &scene.object;
+    talk.say(format!(
+        "object {}   {}   {:.3} kg   friction {}",
+        object.name,
+        shape_text(&object.shape),
+        object.mass,
+        object.friction
+    ));
+    if !scene.obstacles.is_empty() {
+        talk.say(format!("world  {}", counted(scene.obstacles.len(), "obstacle")));
+    }
+    talk.event(
+        "loaded",
+        json!({
+            "scene": scene.name,
+            "hand": hand.robot.name,
+            "joints": hand.joint_names(),
+            "fingers": hand.fingers.iter().map(|finger| finger.name.as_str()).collect::<Vec<_>>(),
+            "object": object.name,
+            "shape": object.shape.kind(),
+            "obstacles": scene.obstacles.len(),
+            "seconds": seconds,
+            "inputs": scene.inputs.iter().map(|input| json!({
+                "role": input.role, "name": input.name, "path": input.path, "sha256": input.sha256,
+            })).collect::<Vec<_>>(),
+        }),
+    );
+}
+
+/// A shape in words, with its size in centimetres.
+pub fn shape_text(shape: &Shape) -> String {
+    let cm = |length: f64| format!("{:.1}", 100.0 * length);
+    match shape {
+        Shape::Sphere { radius } => format!("sphere, diameter {} cm", cm(2.0 * radius)),
+        Shape::Capsule { half_length, radius } => {
+            format!("capsule, {} cm long, diameter {} cm", cm(2.0 * (half_length + radius)), cm(2.0 * radius))
+        }
+        Shape::Cuboid { half_extents: h } => {
+            format!("box, {} x {} x {} cm", cm(2.0 * h.x), cm(2.0 * h.y), cm(2.0 * h.z))
+        }
+        Shape::Cylinder { half_length, radius } => {
+            format!("cylinder, {} cm high, diameter {} cm", cm(2.0 * half_length), cm(2.0 * radius))
+        }
+        Shape::Ellipsoid { radii: r } => {
+            format!("ellipsoid, {} x {} x {} cm", cm(2.0 * r.x), cm(2.0 * r.y), cm(2.0 * r.z))
+        }
+        Shape::Convex(hull) => format!("convex, {}", counted(hull.vertices().len(), "corner")),
+        Shape::Mesh(mesh) => {
+            let (low, high) = mesh.bounds();
+            let size = high - low;
+            format!(
+                "{} triangles, {}, {} x {} x {} cm",
+                grouped(mesh.triangles().len() as u64),
+                if mesh.statistics().is_watertight() { "watertight" } else { "not watertight" },
+                cm(size.x),
+                cm(size.y),
+                cm(size.z)
+            )
+        }
+    }
+}
+
+/// Scene files named directly, and those in folders named (`*.toml` directly inside, by name).
+pub fn scene_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Stop> {
+    let mut found = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            found.push(path.clone());
+            continue;
+        }
+        let entries = std::fs::read_dir(path)
+            .and_then(|entries| entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<Vec<_>, _>>());
+        let mut inside = match entries {
+            Ok(inside) => inside,
+            Err(error) => {
+                return Err(Stop::argument("A501", "SCENE", format!("{}: {error}", path.display()), "a folder"));
+            }
+        };
+        inside.retain(|file| file.is_file() && file.extension().is_some_and(|extension| extension == "toml"));
+        inside.sort();
+        if inside.is_empty() {
+            let problem = format!("{} holds no scene files", path.display());
+            return Err(Stop::argument("A502", "SCENE", problem, "a folder with *.toml in it"));
+        }
+        found.extend(inside);
+    }
+    Ok(found)
+}

@@ -1,0 +1,150 @@
+//! Data to stdout, talk to stderr; with `--json` one JSON object per line on stdout and only errors on stderr.
+//!
+//! Everything that came from a file goes through `printable` on its way to a terminal.
+
+use crate::stop::Stop;
+use regrasp::base::diagnostic::printable;
+use serde_json::{Value, json};
+use std::io::{self, IsTerminal, Write};
+use std::sync::Mutex;
+
+/// Where output goes.
+#[derive(Debug)]
+pub struct Talk {
+    json: bool,
+    quiet: bool,
+    // Progress may come from a search thread while the main thread talks.
+    lock: Mutex<()>,
+}
+
+impl Talk {
+    /// How to talk.
+    pub fn new(json: bool, quiet: bool) -> Self {
+        Talk { json, quiet, lock: Mutex::new(()) }
+    }
+
+    /// True with `--json`.
+    pub fn is_json(&self) -> bool {
+        self.json
+    }
+
+    /// True when somebody may be watching stderr.
+    pub fn is_watched(&self) -> bool {
+        io::stderr().is_terminal()
+    }
+
+    /// A line of talk: nothing with `--quiet` or `--json`.
+    pub fn say(&self, line: impl AsRef<str>) {
+        if !self.quiet && !self.json {
+            self.line_to_stderr(line.as_ref());
+        }
+    }
+
+    /// An event for programs: a line of JSON on stdout, only with `--json`.
+    pub fn event(&self, name: &str, mut fields: Value) {
+        if self.json {
+            if let Some(map) = fields.as_object_mut() {
+                map.insert("event".into(), json!(name));
+            }
+            // A reader that went away is no reason to change the exit code.
+            let _ = self.write_stdout(&format!("{fields}\n"));
+        }
+    }
+
+    /// Data for stdout. Errors: stdout cannot be written to; a reader that went away is no error.
+    pub fn data(&self, text: &str) -> Result<(), Stop> {
+        match self.write_stdout(text) {
+            Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Stop::unwritable("stdout".as_ref(), &error)),
+            _ => Ok(()),
+        }
+    }
+
+    /// A remark that a user should not miss: shown unless `--quiet`, and an event.
+    pub fn note(&self, text: &str) {
+        self.say(format!("note   {text}"));
+        self.event("note", json!({ "text": text }));
+    }
+
+    /// Says why the command stopped. Errors are shown even with `--quiet`.
+    pub fn stop(&self, stop: &Stop) {
+        match stop {
+            Stop::BadInput(error) => {
+                self.event("error", json!({ "diagnostics": error.diagnostics }));
+                self.line_to_stderr(&format!("error: {error}"));
+            }
+            Stop::NoPlan(failure) => {
+                self.event("no_plan", json!({ "failure": failure }));
+                if !self.json {
+                    self.line_to_stderr(crate::commands::plan::failure_text(failure).trim_end());
+                }
+            }
+            Stop::Rejected => {}
+            Stop::Interrupted => self.line_to_stderr("interrupted"),
+            Stop::Internal(message) => {
+                self.event("internal_error", json!({ "message": message }));
+                self.line_to_stderr(&format!(
+                    "internal error: {}\n\
+                     This is a bug in regrasp, not in your files. Please report it with the command line, the files it \
+                     names, and this text:\n  regrasp {} on {} {}, {}",
+                    message.trim(),
+                    env!("CARGO_PKG_VERSION"),
+                    std::env::consts::OS,
+                    std::env::consts::ARCH,
+                    concat!(env!("CARGO_PKG_REPOSITORY"), "/issues"),
+                ));
+            }
+        }
+    }
+
+    /// The last event: the exit code.
+    pub fn result(&self, exit_code: u8) {
+        self.event("result", json!({ "exit_code": exit_code }));
+    }
+
+    fn write_stdout(&self, text: &str) -> io::Result<()> {
+        let _guard = self.lock.lock();
+        let mut stdout = io::stdout().lock();
+        stdout.write_all(text.as_bytes())?;
+        stdout.flush()
+    }
+
+    fn line_to_stderr(&self, line: &str) {
+        let _guard = self.lock.lock();
+        // A closed stderr leaves nobody to tell.
+        let _ = writeln!(io::stderr(), "{}", printable(line));
+    }
+}
+
+/// `n` with a thin separation of thousands: 12 004.
+pub fn grouped(n: u64) -> String {
+    let digits = n.to_string();
+    let mut out = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            out.push(' ');
+        }
+        out.push(digit);
+    }
+    out
+}
+
+/// Seconds, or milliseconds when they are few.
+pub fn duration(seconds: f64) -> String {
+    if seconds < 0.1 { format!("{:.1} ms", 1e3 * seconds) } else { format!("{seconds:.2} s") }
+}
+
+/// `1 finger`, `2 fingers`.
+pub fn counted(n: usize, noun: &str) -> String {
+    format!("{} {noun}{}", grouped(n as u64), if n == 1 { "" } else { "s" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thousands_are_set_apart() {
+        assert_eq!([0, 999, 1000, 1234567].map(grouped).join("|"), "0|999|1 000|1 234 567");
+        assert_eq!(counted(1, "joint") + &counted(0, "joint"), "1 joint0 joints");
+    }
+}

@@ -1,0 +1,192 @@
+//! Everything that can collide, and which pairs must not.
+
+use crate::check::kinematics::Path;
+use crate::check::model::Model;
+use regrasp_geometry::reference::ReferenceShape;
+use regrasp_geometry::{Point, Pose, Shape};
+use regrasp_robot::LinkId;
+use regrasp_robot::hand::convex_of;
+use regrasp_scene::Scene;
+
+/// What carries an item.
+#[derive(Debug, Clone)]
+pub enum Carrier {
+    /// A link of the hand.
+    Link(Path),
+    /// The object.
+    Object,
+    /// Nothing: it stands in the world.
+    World,
+}
+
+/// Who an item belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Owner {
+    /// The finger of this index.
+    Finger(usize),
+    /// The palm: what no finger joint moves.
+    Palm,
+    /// The object.
+    Object,
+    /// An obstacle.
+    Obstacle,
+}
+
+/// A shape on its carrier.
+pub struct Item {
+    /// Name for messages.
+    pub name: String,
+    /// Who it belongs to.
+    pub owner: Owner,
+    /// Index in [`Bodies::carriers`].
+    pub carrier: usize,
+    /// The link, for shapes of the hand.
+    link: Option<LinkId>,
+    /// Number of moving joints before it.
+    body_depth: usize,
+    /// True for what may touch the object while the finger holds.
+    pub is_tip: bool,
+    /// The shape.
+    pub shape: ReferenceShape,
+    /// Pose of the shape in the carrier's frame.
+    pub carrier_from_shape: Pose,
+    /// Centre of a ball that contains the shape, in the carrier's frame.
+    pub center: Point,
+    /// Radius of that ball.
+    pub radius: f64,
+    /// How far a turn about the centre can carry a point of the shape: zero for balls.
+    pub spin_radius: f64,
+}
+
+/// Two items that must not touch, or touch only as fingertip and object.
+#[derive(Debug, Clone, Copy)]
+pub struct Pair {
+    /// Index of the first item; a finger's, where one of the two is.
+    pub a: usize,
+    /// Index of the second item.
+    pub b: usize,
+    /// The finger whose tip it is, for a fingertip against the object.
+    pub tip_of: Option<usize>,
+}
+
+/// Items and pairs of a scene.
+pub struct Bodies {
+    /// Carriers; the object is the first, the world the second.
+    pub carriers: Vec<Carrier>,
+    /// Items.
+    pub items: Vec<Item>,
+    /// Pairs to judge.
+    pub pairs: Vec<Pair>,
+}
+
+/// Index of the object in [`Bodies::carriers`].
+pub const OBJECT: usize = 0;
+const WORLD: usize = 1;
+
+impl Bodies {
+    /// Reads all shapes of `scene`. Err with a message when a shape cannot be used for queries.
+    pub fn new(scene: &Scene, model: &Model) -> Result<Self, String> {
+        let mut bodies =
+            Bodies { carriers: vec![Carrier::Object, Carrier::World], items: Vec::new(), pairs: Vec::new() };
+        bodies.add_hand(scene, model)?;
+        let object = &scene.object;
+        bodies.add(&object.name, Owner::Object, OBJECT, &Pose::identity(), &object.shape)?;
+        for obstacle in &scene.obstacles {
+            let placed = &obstacle.placed;
+            bodies.add(&obstacle.name, Owner::Obstacle, WORLD, &placed.parent_from_shape, &placed.shape)?;
+        }
+        bodies.add_pairs(scene);
+        Ok(bodies)
+    }
+
+    fn add(
+        &mut self,
+        name: &str,
+        owner: Owner,
+        carrier: usize,
+        carrier_from_shape: &Pose,
+        shape: &Shape,
+    ) -> Result<&mut Item, String> {
+        let (center, radius) = shape.bounding_sphere();
+        let reference = ReferenceShape::new(shape).map_err(|error| format!("\"{name}\": {error}"))?;
+        self.items.push(Item {
+            name: name.to_owned(),
+            owner,
+            carrier,
+            link: None,
+            body_depth: 0,
+            is_tip: false,
+            shape: reference,
+            carrier_from_shape: *carrier_from_shape,
+            center: carrier_from_shape * center,
+            radius,
+            spin_radius: if matches!(shape, Shape::Sphere { .. }) { 0.0 } else { radius },
+        });
+        Ok(self.items.last_mut().expect("an item was just added"))
+    }
+
+    fn add_hand(&mut self, scene: &Scene, model: &Model) -> Result<(), String> {
+        let robot = &scene.hand.robot;
+        for (l, link) in robot.links.iter().enumerate() {
+            let path = Path::new(robot, LinkId(l), &model.world_from_root, &model.joint_names)?;
+            // A link is a finger's when one of that finger's coordinates moves it.
+            let owner = path
+                .joints
+                .iter()
+                .filter_map(|joint| joint.coordinate)
+                .find_map(|k| model.fingers.iter().position(|finger| finger.coordinates.contains(&k)))
+                .map_or(Owner::Palm, Owner::Finger);
+            let body_depth = path.joints.len();
+            let is_tip = matches!(owner, Owner::Finger(f) if model.fingers[f].tip_link.0 == l);
+            self.carriers.push(Carrier::Link(path));
+            let carrier = self.carriers.len() - 1;
+            for placed in &link.collision {
+                let shape = convex_of(&placed.shape).map_err(|error| format!("link \"{}\": {error}", link.name))?;
+                let item = self.add(&link.name, owner, carrier, &placed.parent_from_shape, &shape)?;
+                (item.link, item.body_depth, item.is_tip) = (Some(LinkId(l)), body_depth, is_tip);
+            }
+        }
+        for (f, finger) in model.fingers.iter().enumerate() {
+            if finger.radius > 0.0 {
+                self.carriers.push(Carrier::Link(finger.path.clone()));
+                let at = Pose::translation(finger.center.x, finger.center.y, finger.center.z);
+                let ball = Shape::Sphere { radius: finger.radius };
+                let carrier = self.carriers.len() - 1;
+                let name = format!("tip of {}", finger.name);
+                let item = self.add(&name, Owner::Finger(f), carrier, &at, &ball)?;
+                (item.link, item.body_depth, item.is_tip) = (Some(finger.tip_link), finger.path.joints.len(), true);
+            }
+        }
+        Ok(())
+    }
+
+    fn add_pairs(&mut self, scene: &Scene) {
+        for a in 0..self.items.len() {
+            for b in 0..self.items.len() {
+                let (first, second) = (&self.items[a], &self.items[b]);
+                let judged = match (first.owner, second.owner) {
+                    (Owner::Finger(f), Owner::Finger(g)) if f == g => {
+                        // Neighbouring bodies share a joint and always overlap there.
+                        a < b && first.body_depth.abs_diff(second.body_depth) > 1
+                    }
+                    (Owner::Finger(_), Owner::Finger(_)) => a < b,
+                    (Owner::Finger(_), Owner::Palm) => first.body_depth > 1,
+                    (Owner::Finger(_) | Owner::Object, Owner::Obstacle) => true,
+                    (Owner::Finger(_), Owner::Object) | (Owner::Object, Owner::Palm) => true,
+                    _ => false,
+                };
+                let allowed = match (first.link, second.link) {
+                    (Some(p), Some(q)) => scene.hand.may_touch(p, q),
+                    _ => false,
+                };
+                if judged && !allowed {
+                    let tip_of = match (first.owner, second.owner) {
+                        (Owner::Finger(f), Owner::Object) if first.is_tip => Some(f),
+                        _ => None,
+                    };
+                    self.pairs.push(Pair { a, b, tip_of });
+                }
+            }
+        }
+    }
+}

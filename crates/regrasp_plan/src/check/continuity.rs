@@ -1,0 +1,360 @@
+//! What can be judged from the waypoints alone: names, numbers, start and goal, meeting of segments, limits, jumps, and
+//! which finger may change what.
+
+use crate::check::model::Model;
+use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
+use crate::check::{CheckSettings, Log};
+use crate::plan::{ContactMode, ContactState, FORMAT, FORMAT_VERSION, Plan, PoseData, Segment, SegmentKind, Waypoint};
+use regrasp_geometry::{Pose, UnitVector, Vector};
+use regrasp_scene::{GraspRequest, InHandQuery};
+
+/// Names, vector lengths and numbers. When this finds something, nothing else can be judged.
+pub fn check_form(model: &Model, plan: &Plan, log: &mut Log) {
+    if plan.format != FORMAT || plan.format_version != FORMAT_VERSION || plan.task != "in_hand" {
+        let message = format!(
+            "format \"{}\" version {} task \"{}\" is not \"{FORMAT}\" {FORMAT_VERSION} \"in_hand\"",
+            plan.format, plan.format_version, plan.task
+        );
+        log.push(Violation::new(Kind::WrongScene, message));
+    }
+    let fingers: Vec<&str> = model.fingers.iter().map(|finger| finger.name.as_str()).collect();
+    if plan.joint_names != model.joint_names {
+        let message = format!("the plan's joints are {:?}, the scene's {:?}", plan.joint_names, model.joint_names);
+        log.push(Violation::new(Kind::WrongScene, message));
+    }
+    if plan.fingers != fingers {
+        let message = format!("the plan's fingers are {:?}, the scene's {fingers:?}", plan.fingers);
+        log.push(Violation::new(Kind::WrongScene, message));
+    }
+    if plan.segments.is_empty() {
+        log.push(Violation::new(Kind::EmptySegment, "the plan has no segment"));
+    }
+    for (name, pose) in [("start", &plan.start), ("goal", &plan.goal)] {
+        if !is_pose(pose) {
+            log.push(Violation::new(Kind::NotANumber, format!("the {name} pose is not a pose")).subjects([name]));
+        }
+    }
+    let p = &plan.promises;
+    let promises = [p.contact_tolerance, p.friction, p.required_margin, p.kept_margin, p.torque_scale];
+    if !promises.iter().all(|x| x.is_finite()) {
+        log.push(Violation::new(Kind::NotANumber, "a promise is not a number"));
+    }
+    for (s, segment) in plan.segments.iter().enumerate() {
+        if segment.waypoints.len() < 2 {
+            let message = format!("the segment has {} waypoints, at least 2 make a motion", segment.waypoints.len());
+            log.push(Violation::new(Kind::EmptySegment, message).when(Moment::at(s, 0)));
+        }
+        for (w, waypoint) in segment.waypoints.iter().enumerate() {
+            check_waypoint_form(plan, waypoint, Moment::at(s, w), log);
+        }
+    }
+}
+
+fn check_waypoint_form(plan: &Plan, waypoint: &Waypoint, at: Moment, log: &mut Log) {
+    if waypoint.joints.len() != plan.joint_names.len() || waypoint.contacts.len() != plan.fingers.len() {
+        let message = format!(
+            "{} joints and {} contacts, but {} joint names and {} fingers",
+            waypoint.joints.len(),
+            waypoint.contacts.len(),
+            plan.joint_names.len(),
+            plan.fingers.len()
+        );
+        log.push(Violation::new(Kind::WrongScene, message).when(at));
+    }
+    if !waypoint.joints.iter().all(|x| x.is_finite()) || !is_pose(&waypoint.world_from_object) {
+        log.push(Violation::new(Kind::NotANumber, "joints or object pose are not numbers, or no rotation").when(at));
+    }
+    for (finger, contact) in plan.fingers.iter().zip(&waypoint.contacts) {
+        let complete = match contact.mode {
+            ContactMode::Free => contact.point_in_object.is_none() && contact.normal_in_object.is_none(),
+            ContactMode::Fixed | ContactMode::Rolling => match (contact.point_in_object, contact.normal_in_object) {
+                (Some(point), Some(normal)) => {
+                    point.iter().all(|x| x.is_finite()) && (Vector::from(normal).norm() - 1.0).abs() < 1e-9
+                }
+                _ => false,
+            },
+        };
+        if !complete {
+            let message = format!("the contact of finger \"{finger}\" is not one: {contact:?}");
+            log.push(Violation::new(Kind::NotANumber, message).when(at).subjects([finger.as_str()]));
+        }
+        if contact.mode == ContactMode::Rolling {
+            let message = format!("finger \"{finger}\" rolls; this version judges fixed contacts only");
+            log.push(Violation::new(Kind::ModeNotSupported, message).when(at).subjects([finger.as_str()]));
+        }
+    }
+}
+
+fn is_pose(pose: &PoseData) -> bool {
+    let length = pose.quat_xyzw.iter().map(|x| x * x).sum::<f64>().sqrt();
+    pose.position.iter().all(|x| x.is_finite()) && (length - 1.0).abs() < 1e-9
+}
+
+/// Distance and angle between two poses.
+pub fn pose_difference(a: &PoseData, b: &PoseData) -> (f64, f64) {
+    let (a, b) = (Pose::from(a), Pose::from(b));
+    let (p, q) = (a.rotation.coords, b.rotation.coords);
+    let q = if p.dot(&q) < 0.0 { -q } else { q };
+    ((a.translation.vector - b.translation.vector).norm(), 4.0 * (p - q).norm().atan2((p + q).norm()))
+}
+
+fn poses_agree(a: &PoseData, b: &PoseData, tolerance: f64) -> bool {
+    let (distance, angle) = pose_difference(a, b);
+    distance <= tolerance && angle <= tolerance
+}
+
+/// The pose `t` of the way between two waypoints: position linear, orientation by the shorter great circle.
+pub fn pose_between(from: &Pose, to: &Pose, t: f64) -> Pose {
+    let a = from.rotation.coords;
+    let b = if a.dot(&to.rotation.coords) < 0.0 { -to.rotation.coords } else { to.rotation.coords };
+    let angle = 2.0 * (a - b).norm().atan2((a + b).norm());
+    let (at_a, at_b) = if angle < 1e-9 {
+        (1.0 - t, t)
+    } else {
+        (((1.0 - t) * angle).sin() / angle.sin(), (t * angle).sin() / angle.sin())
+    };
+    let coords = a * at_a + b * at_b;
+    let rotation = nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::from_vector(coords));
+    let position = from.translation.vector * (1.0 - t) + to.translation.vector * t;
+    Pose::from_parts(nalgebra::Translation3::from(position), rotation)
+}
+
+/// Start and goal: the plan against the query, and the first and last waypoint against the plan's own header.
+pub fn check_ends(query: Option<&InHandQuery>, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
+    let Some((first, last)) = ends(plan) else { return };
+    let last_moment = Moment::at(plan.segments.len() - 1, plan.segments.last().map_or(0, |s| s.waypoints.len() - 1));
+    let sides = [
+        (Kind::StartMismatch, "start", &plan.start, first, Moment::at(0, 0)),
+        (Kind::GoalMismatch, "goal", &plan.goal, last, last_moment),
+    ];
+    for (kind, name, asked, waypoint, at) in sides {
+        let (distance, angle) = pose_difference(asked, &waypoint.world_from_object);
+        if distance > settings.pose_tolerance || angle > settings.pose_tolerance {
+            let message = format!("the object is {distance:.3e} m and {angle:.3e} rad from the {name} asked for");
+            let violation = Violation::new(kind, message).when(at).subjects(["object"]);
+            log.push(violation.amount(distance.max(angle), settings.pose_tolerance));
+        }
+        let Some(query) = query else { continue };
+        let (pose, grasp) = match kind {
+            Kind::StartMismatch => (&query.world_from_object_start, &query.start_grasp),
+            _ => (&query.world_from_object_goal, &query.goal_grasp),
+        };
+        let (distance, angle) = pose_difference(&PoseData::from(pose), asked);
+        if distance > settings.pose_tolerance || angle > settings.pose_tolerance {
+            let message = format!("the plan's {name} is {distance:.3e} m and {angle:.3e} rad from the scene's");
+            let violation = Violation::new(kind, message).subjects(["object"]);
+            log.push(violation.amount(distance.max(angle), settings.pose_tolerance));
+        }
+        let error = grasp_error(grasp, waypoint);
+        if error > settings.pose_tolerance {
+            let message = format!("the {name} grasp is {error:.3e} (m or rad) from the one asked for");
+            log.push(Violation::new(kind, message).when(at).amount(error, settings.pose_tolerance));
+        }
+    }
+}
+
+fn grasp_error(asked: &GraspRequest, waypoint: &Waypoint) -> f64 {
+    match asked {
+        GraspRequest::Automatic => 0.0,
+        GraspRequest::Joints(joints) if joints.len() != waypoint.joints.len() => f64::INFINITY,
+        GraspRequest::Joints(joints) => {
+            joints.iter().zip(&waypoint.joints).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        }
+        GraspRequest::Contacts(points) if points.len() != waypoint.contacts.len() => f64::INFINITY,
+        GraspRequest::Contacts(points) => points
+            .iter()
+            .zip(&waypoint.contacts)
+            .map(|(asked, contact)| {
+                contact.point_in_object.map_or(f64::INFINITY, |point| (Vector::from(point) - asked.coords).norm())
+            })
+            .fold(0.0, f64::max),
+    }
+}
+
+fn ends(plan: &Plan) -> Option<(&Waypoint, &Waypoint)> {
+    Some((plan.segments.first()?.waypoints.first()?, plan.segments.last()?.waypoints.last()?))
+}
+
+/// Every segment begins where the one before ends.
+pub fn check_meeting(plan: &Plan, settings: &CheckSettings, log: &mut Log) {
+    for (s, pair) in plan.segments.windows(2).enumerate() {
+        let (Some(end), Some(begin)) = (pair[0].waypoints.last(), pair[1].waypoints.first()) else { continue };
+        let joints = end.joints.iter().zip(&begin.joints).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let (distance, angle) = pose_difference(&end.world_from_object, &begin.world_from_object);
+        let gap = joints.max(distance).max(angle);
+        let contacts_meet =
+            end.contacts.iter().zip(&begin.contacts).all(|(a, b)| contacts_agree(a, b, settings.meeting_tolerance));
+        if gap > settings.meeting_tolerance || !contacts_meet {
+            let message = format!(
+                "begins where segment {s} does not end: joints {joints:.3e}, object {distance:.3e} m and {angle:.3e} rad, contacts {}",
+                if contacts_meet { "the same" } else { "others" }
+            );
+            let violation = Violation::new(Kind::SegmentsDoNotMeet, message).when(Moment::at(s + 1, 0));
+            log.push(violation.amount(gap, settings.meeting_tolerance));
+        }
+    }
+}
+
+/// True when both hold at the same place with the same normal, or both are free.
+pub fn contacts_agree(a: &ContactState, b: &ContactState, tolerance: f64) -> bool {
+    let near = |p: Option<[f64; 3]>, q: Option<[f64; 3]>| match (p, q) {
+        (Some(p), Some(q)) => (Vector::from(p) - Vector::from(q)).norm() <= tolerance,
+        (None, None) => true,
+        _ => false,
+    };
+    a.mode == b.mode && near(a.point_in_object, b.point_in_object) && near(a.normal_in_object, b.normal_in_object)
+}
+
+/// Limits at every waypoint (motion between is linear, so they hold there too), and steps that are jumps.
+pub fn check_joints(model: &Model, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
+    for (s, segment) in plan.segments.iter().enumerate() {
+        for (w, waypoint) in segment.waypoints.iter().enumerate() {
+            for row in &model.limits {
+                let position = row.multiplier * waypoint.joints[row.coordinate] + row.offset;
+                let beyond = (row.lower - position).max(position - row.upper);
+                if beyond > settings.limit_tolerance {
+                    let message = format!(
+                        "joint \"{}\" is at {position:.6}, {beyond:.3e} beyond [{:.6}, {:.6}]",
+                        row.name, row.lower, row.upper
+                    );
+                    let violation = Violation::new(Kind::JointLimit, message).when(Moment::at(s, w));
+                    log.push(violation.subjects([row.name.as_str()]).amount(beyond, settings.limit_tolerance));
+                }
+            }
+        }
+        for (w, pair) in segment.waypoints.windows(2).enumerate() {
+            let at = Moment::at(s, w);
+            for (k, name) in model.joint_names.iter().enumerate() {
+                let step = (pair[1].joints[k] - pair[0].joints[k]).abs();
+                let limit = if model.slides[k] { settings.largest_slide } else { settings.largest_turn };
+                if step > limit {
+                    let message = format!("joint \"{name}\" moves {step:.4} in one step");
+                    log.push(
+                        Violation::new(Kind::JointJump, message).when(at).subjects([name.as_str()]).amount(step, limit),
+                    );
+                }
+            }
+            let (distance, angle) = pose_difference(&pair[0].world_from_object, &pair[1].world_from_object);
+            if distance > settings.largest_slide || angle > settings.largest_turn {
+                let message = format!("the object moves {distance:.4} m and {angle:.4} rad in one step");
+                let violation = Violation::new(Kind::JointJump, message).when(at).subjects(["object"]);
+                log.push(violation.amount(distance.max(angle), settings.largest_turn));
+            }
+        }
+    }
+}
+
+/// Who may change what: the grasp stays in a transfer; in a regrasp only the moving finger changes.
+pub fn check_roles(model: &Model, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
+    for (s, segment) in plan.segments.iter().enumerate() {
+        match segment.kind {
+            SegmentKind::Transfer => {
+                if segment.moving_finger.is_some() {
+                    let message = "a transfer names a moving finger";
+                    log.push(Violation::new(Kind::WrongMovingFinger, message).when(Moment::at(s, 0)));
+                }
+                for finger in 0..model.fingers.len() {
+                    check_holding(model, segment, s, finger, settings, log);
+                }
+            }
+            SegmentKind::Regrasp => check_regrasp_roles(model, segment, s, settings, log),
+        }
+    }
+}
+
+fn check_regrasp_roles(model: &Model, segment: &Segment, s: usize, settings: &CheckSettings, log: &mut Log) {
+    let first = &segment.waypoints[0];
+    let last_index = segment.waypoints.len() - 1;
+    let moving = moving_finger(model, segment);
+    if moving.is_none() {
+        let message = format!("moving finger {:?} is none of the hand's", segment.moving_finger);
+        log.push(Violation::new(Kind::WrongMovingFinger, message).when(Moment::at(s, 0)));
+    }
+    for (w, waypoint) in segment.waypoints.iter().enumerate() {
+        if !poses_agree(&first.world_from_object, &waypoint.world_from_object, settings.meeting_tolerance) {
+            let (distance, angle) = pose_difference(&first.world_from_object, &waypoint.world_from_object);
+            let message = format!("the object has moved {distance:.3e} m and {angle:.3e} rad since the regrasp began");
+            let violation = Violation::new(Kind::ObjectMovesInRegrasp, message).when(Moment::at(s, w));
+            log.push(violation.subjects(["object"]).amount(distance.max(angle), settings.meeting_tolerance));
+        }
+    }
+    for (f, finger) in model.fingers.iter().enumerate() {
+        if Some(f) != moving {
+            check_holding(model, segment, s, f, settings, log);
+            for (w, waypoint) in segment.waypoints.iter().enumerate() {
+                let moved = finger.coordinates.clone().map(|k| (waypoint.joints[k] - first.joints[k]).abs());
+                let moved = moved.fold(0.0, f64::max);
+                if moved > settings.meeting_tolerance {
+                    let message = format!("finger \"{}\" moves {moved:.3e} while another one relocates", finger.name);
+                    let violation = Violation::new(Kind::WrongMovingFinger, message).when(Moment::at(s, w));
+                    let violation = violation.subjects([finger.name.as_str()]);
+                    log.push(violation.amount(moved, settings.meeting_tolerance));
+                    break;
+                }
+            }
+            continue;
+        }
+        for (w, waypoint) in segment.waypoints.iter().enumerate() {
+            let expected = if w == 0 || w == last_index { ContactMode::Fixed } else { ContactMode::Free };
+            if waypoint.contacts[f].mode != expected {
+                let message = format!(
+                    "moving finger \"{}\" is {:?}, but must be {expected:?} here",
+                    finger.name, waypoint.contacts[f].mode
+                );
+                let violation = Violation::new(Kind::WrongContactMode, message).when(Moment::at(s, w));
+                log.push(violation.subjects([finger.name.as_str()]));
+            }
+        }
+    }
+}
+
+/// Finger `f` holds the same contact all through the segment.
+fn check_holding(model: &Model, segment: &Segment, s: usize, f: usize, settings: &CheckSettings, log: &mut Log) {
+    let name = model.fingers[f].name.as_str();
+    let first = &segment.waypoints[0].contacts[f];
+    for (w, waypoint) in segment.waypoints.iter().enumerate() {
+        let contact = &waypoint.contacts[f];
+        if contact.mode == ContactMode::Free {
+            let message = format!("finger \"{name}\" is free, but must hold");
+            log.push(Violation::new(Kind::WrongContactMode, message).when(Moment::at(s, w)).subjects([name]));
+        } else if first.mode != ContactMode::Free && !contacts_agree(first, contact, settings.meeting_tolerance) {
+            let message = format!("the contact of finger \"{name}\" is not the one with which the segment began");
+            log.push(Violation::new(Kind::GraspChanges, message).when(Moment::at(s, w)).subjects([name]));
+        }
+    }
+}
+
+/// Index of the finger that moves in a segment.
+pub fn moving_finger(model: &Model, segment: &Segment) -> Option<usize> {
+    let name = segment.moving_finger.as_deref()?;
+    model.fingers.iter().position(|finger| finger.name == name)
+}
+
+/// The contact as the closure test takes it.
+pub fn contact_of(state: &ContactState) -> Option<regrasp_grasp::Contact> {
+    Some(regrasp_grasp::Contact {
+        point_in_object: state.point_in_object?.into(),
+        normal_in_object: UnitVector::new_normalize(Vector::from(state.normal_in_object?)),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use regrasp_base::Rng;
+
+    #[test]
+    fn the_motion_between_waypoints_is_the_one_that_plans_mean() {
+        let mut rng = Rng::keyed(1, "pose_between", 0);
+        for _ in 0..500 {
+            let mut pose = || {
+                let position = std::array::from_fn(|_| rng.uniform(-0.1, 0.1));
+                regrasp_geometry::pose_from(position, rng.quat_xyzw())
+            };
+            let (a, b) = (pose(), pose());
+            let t = rng.unit();
+            let (ours, theirs) = (pose_between(&a, &b, t), regrasp_geometry::interpolate_pose(&a, &b, t));
+            assert!((ours.to_homogeneous() - theirs.to_homogeneous()).norm() < 1e-9);
+        }
+    }
+}

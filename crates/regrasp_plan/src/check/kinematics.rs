@@ -1,0 +1,196 @@
+//! The checker's own forward kinematics, straight from the robot's joints, and bounds of how far things move.
+//!
+//! Matrices are 4 x 4 and rotations are Rodrigues' formula; nothing here asks `regrasp_robot::Chain` for more than
+//! where the hand stands.
+
+use nalgebra::{Matrix3, Matrix4, Rotation3, Translation3, UnitQuaternion};
+use regrasp_geometry::{Point, Pose, Vector};
+use regrasp_robot::{Hand, JointKind, LinkId, Robot};
+
+/// A moving joint on the way from the root to a link, reduced to what forward kinematics needs.
+#[derive(Debug, Clone)]
+pub struct PathJoint {
+    /// Index in `Robot::joints`.
+    pub joint: usize,
+    /// Pose of the joint frame at zero in the frame of the joint before it (the world, for the first).
+    pub parent_from_joint: Matrix4<f64>,
+    /// Axis, in the joint frame.
+    pub axis: Vector,
+    /// True for a sliding joint.
+    pub slides: bool,
+    /// Index in the joint vector; none for a joint that no finger drives.
+    pub coordinate: Option<usize>,
+    /// Position is `multiplier * coordinate + offset`.
+    pub multiplier: f64,
+    /// See `multiplier`.
+    pub offset: f64,
+    /// Position of the driving joint when no finger drives it: the allowed one nearest to zero.
+    pub at_rest: f64,
+    /// Largest size of the position, for sliding joints.
+    pub largest_slide: f64,
+}
+
+impl PathJoint {
+    fn position(&self, joints: &[f64]) -> f64 {
+        self.multiplier * self.coordinate.map_or(self.at_rest, |k| joints[k]) + self.offset
+    }
+
+    fn rate(&self, from: &[f64], to: &[f64]) -> f64 {
+        self.coordinate.map_or(0.0, |k| (self.multiplier * (to[k] - from[k])).abs())
+    }
+}
+
+/// The moving joints from the root of the robot to a link.
+#[derive(Debug, Clone)]
+pub struct Path {
+    /// Joints, root first.
+    pub joints: Vec<PathJoint>,
+    /// Pose of the link in the frame of the last moving joint's child (in the world, if nothing moves it).
+    pub last_from_link: Matrix4<f64>,
+}
+
+/// Bounds over one step between two waypoints, whose parameter runs from 0 to 1.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Rates {
+    /// Largest speed of a point, in metres per step.
+    pub speed: f64,
+    /// Largest acceleration of a point, in metres per step squared.
+    pub acceleration: f64,
+}
+
+impl Path {
+    /// The path to `link`, in a robot whose root stands at `world_from_root`.
+    ///
+    /// Err with a message when a joint's coupling leads nowhere.
+    pub fn new(robot: &Robot, link: LinkId, world_from_root: &Pose, joint_names: &[String]) -> Result<Self, String> {
+        let mut pending = world_from_root.to_homogeneous();
+        let mut joints = Vec::new();
+        for id in robot.joints_to(link) {
+            let joint = &robot.joints[id.0];
+            pending *= joint.parent_from_joint.to_homogeneous();
+            if joint.kind == JointKind::Fixed {
+                continue;
+            }
+            let (driver, multiplier, offset) = match &joint.mimic {
+                Some(mimic) => (mimic.joint.0, mimic.multiplier, mimic.offset),
+                None => (id.0, 1.0, 0.0),
+            };
+            let driver = robot.joints.get(driver).ok_or("a coupled joint follows one that does not exist")?;
+            if joint.mimic.is_some() && driver.mimic.is_some() {
+                return Err(format!("joint \"{}\" follows a joint that follows another", joint.name));
+            }
+            joints.push(PathJoint {
+                joint: id.0,
+                parent_from_joint: pending,
+                axis: joint.axis.into_inner(),
+                slides: joint.kind == JointKind::Prismatic,
+                coordinate: joint_names.iter().position(|name| *name == driver.name),
+                multiplier,
+                offset,
+                at_rest: driver.limits.map_or(0.0, |limits| 0f64.max(limits.lower).min(limits.upper)),
+                largest_slide: joint.limits.map_or(0.0, |limits| limits.lower.abs().max(limits.upper.abs())),
+            });
+            pending = Matrix4::identity();
+        }
+        Ok(Path { joints, last_from_link: pending })
+    }
+
+    /// Pose of the link in the world.
+    pub fn world_from_link(&self, joints: &[f64]) -> Matrix4<f64> {
+        let mut frame = Matrix4::<f64>::identity();
+        for joint in &self.joints {
+            frame = frame * joint.parent_from_joint * motion(joint, joint.position(joints));
+        }
+        frame * self.last_from_link
+    }
+
+    /// True when some joint of the path moves between two joint vectors.
+    pub fn moves(&self, from: &[f64], to: &[f64]) -> bool {
+        self.joints.iter().any(|joint| joint.rate(from, to) > 0.0)
+    }
+
+    /// Bounds for every point within `radius` of `center` (in the link frame) while the joints go from `from` to `to`.
+    ///
+    /// The point is a sum of vectors, each fixed in one body. A body turned by joints of rates `r_i` turns such a
+    /// vector of length `l` with speed at most `(sum r_i) l` and acceleration at most `(sum r_i)^2 l`, because every
+    /// second derivative of a product of rotations is a product of matrices of norm at most one.
+    pub fn rates(&self, center: &Point, radius: f64, from: &[f64], to: &[f64]) -> Rates {
+        let mut rates = Rates::default();
+        let mut turning = 0.0;
+        for (k, joint) in self.joints.iter().enumerate() {
+            let rate = joint.rate(from, to);
+            let mut length = match self.joints.get(k + 1) {
+                Some(next) => next.parent_from_joint.fixed_view::<3, 1>(0, 3).norm(),
+                None => (self.last_from_link.transform_point(center).coords).norm() + radius,
+            };
+            let mut sliding = 0.0;
+            if joint.slides {
+                length += joint.largest_slide.max(joint.position(from).abs()).max(joint.position(to).abs());
+                sliding = rate;
+            } else {
+                turning += rate;
+            }
+            rates.speed += turning * length + sliding;
+            rates.acceleration += turning * turning * length + 2.0 * turning * sliding;
+        }
+        rates
+    }
+}
+
+/// Pose of the child frame in the joint frame at `position`.
+fn motion(joint: &PathJoint, position: f64) -> Matrix4<f64> {
+    let mut pose = Matrix4::<f64>::identity();
+    if joint.slides {
+        pose.fixed_view_mut::<3, 1>(0, 3).copy_from(&(joint.axis * position));
+    } else {
+        let cross = joint.axis.cross_matrix();
+        let (sine, cosine) = position.sin_cos();
+        let rotation = Matrix3::identity() + cross * sine + cross * cross * (1.0 - cosine);
+        pose.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
+    }
+    pose
+}
+
+/// `matrix` as a pose; its rotation part must be a rotation up to rounding.
+pub fn pose_of(matrix: &Matrix4<f64>) -> Pose {
+    let rotation = Rotation3::from_matrix_unchecked(matrix.fixed_view::<3, 3>(0, 0).into_owned());
+    let translation: Vector = matrix.fixed_view::<3, 1>(0, 3).into_owned();
+    Pose::from_parts(Translation3::from(translation), UnitQuaternion::from_rotation_matrix(&rotation))
+}
+
+/// Where the hand's root stands, found from where its first finger begins and confirmed by the other ones.
+///
+/// The hand stores its place only in its chains. Err when the chains contradict each other.
+pub fn world_from_root(hand: &Hand) -> Result<Pose, String> {
+    let robot = &hand.robot;
+    let mut found: Option<Pose> = None;
+    for finger in &hand.fingers {
+        let mut root_from_joint = Pose::identity();
+        let mut below_base = hand.base == robot.root;
+        let mut first_moving = None;
+        for id in robot.joints_to(finger.tip.link) {
+            let joint = &robot.joints[id.0];
+            root_from_joint *= joint.parent_from_joint;
+            if joint.kind != JointKind::Fixed && below_base {
+                first_moving = Some(id);
+                break;
+            }
+            below_base |= joint.child == hand.base;
+        }
+        let (Some(_), Some(first)) = (first_moving, finger.chain.joints.first()) else {
+            return Err(format!("finger \"{}\" has no moving joint below the hand's base", finger.name));
+        };
+        let world_from_root = first.parent_from_joint * root_from_joint.inverse();
+        if let Some(other) = &found {
+            let difference = (other.to_homogeneous() - world_from_root.to_homogeneous()).norm();
+            if difference > 1e-9 {
+                return Err(format!(
+                    "finger \"{}\" stands elsewhere than its robot says, by {difference:.3e}",
+                    finger.name
+                ));
+            }
+        }
+        found.get_or_insert(world_from_root);
+    }
+    found.ok_or_else(|| "the hand has no finger".to_owned())
+}

@@ -1,0 +1,133 @@
+//! The scene as the checker sees it: paths to links, joint limits and fingertips, straight from the robot.
+
+use crate::check::kinematics::{Path, world_from_root};
+use nalgebra::Matrix4;
+use regrasp_geometry::{Point, Pose};
+use regrasp_robot::{JointKind, LinkId, TipShape};
+use regrasp_scene::Scene;
+
+/// A fingertip that touches with a ball; a sharp tip is a ball of radius zero.
+#[derive(Debug, Clone)]
+pub struct FingerModel {
+    /// Name of the finger.
+    pub name: String,
+    /// Path to the last moving body, in whose frame [`FingerModel::center`] is.
+    pub path: Path,
+    /// Centre of the ball.
+    pub center: Point,
+    /// Radius of the ball.
+    pub radius: f64,
+    /// The link that may touch the object.
+    pub tip_link: LinkId,
+    /// First and one past the last index of this finger's coordinates in a joint vector.
+    pub coordinates: std::ops::Range<usize>,
+    /// Indices in `Robot::joints` of all moving joints on the path.
+    pub moving_joints: Vec<usize>,
+}
+
+impl FingerModel {
+    /// Centre of the tip's ball in the world.
+    pub fn center_in_world(&self, joints: &[f64]) -> Point {
+        self.path.world_from_link(joints).transform_point(&self.center)
+    }
+}
+
+/// The limits of one joint, as a function of the coordinate that drives it.
+#[derive(Debug, Clone)]
+pub struct LimitRow {
+    /// Name of the joint.
+    pub name: String,
+    /// Index in the joint vector.
+    pub coordinate: usize,
+    /// Position is `multiplier * coordinate + offset`.
+    pub multiplier: f64,
+    /// See `multiplier`.
+    pub offset: f64,
+    /// Lowest position.
+    pub lower: f64,
+    /// Highest position.
+    pub upper: f64,
+}
+
+/// Everything about the hand that is not a shape.
+#[derive(Debug, Clone)]
+pub struct Model {
+    /// Names of the coordinates of a joint vector.
+    pub joint_names: Vec<String>,
+    /// True where the coordinate slides.
+    pub slides: Vec<bool>,
+    /// Fingers, in the order of the hand.
+    pub fingers: Vec<FingerModel>,
+    /// Limits of all joints that have some.
+    pub limits: Vec<LimitRow>,
+    /// Where the robot's root stands.
+    pub world_from_root: Pose,
+}
+
+impl Model {
+    /// Reads the hand of `scene`. Err with a message when the hand contradicts itself or has tips that are no balls.
+    pub fn new(scene: &Scene) -> Result<Self, String> {
+        let hand = &scene.hand;
+        let robot = &hand.robot;
+        let joint_names = hand.joint_names();
+        let world_from_root = world_from_root(hand)?;
+        let mut fingers = Vec::new();
+        let mut first = 0;
+        for finger in &hand.fingers {
+            let mut path = Path::new(robot, finger.tip.link, &world_from_root, &joint_names)?;
+            path.last_from_link = Matrix4::identity();
+            let radius = match finger.tip.shape {
+                TipShape::Point => 0.0,
+                TipShape::Sphere { radius } => radius,
+                TipShape::Hull(_) => {
+                    return Err(format!(
+                        "the tip of finger \"{}\" is not a ball; this version judges balls",
+                        finger.name
+                    ));
+                }
+            };
+            let coordinates = first..first + finger.chain.n_coordinates();
+            first = coordinates.end;
+            fingers.push(FingerModel {
+                name: finger.name.clone(),
+                moving_joints: path.joints.iter().map(|joint| joint.joint).collect(),
+                path,
+                center: finger.tip.center_in_body,
+                radius,
+                tip_link: finger.tip.link,
+                coordinates,
+            });
+        }
+        let mut slides = Vec::new();
+        for name in &joint_names {
+            let id = robot.joint_named(name).ok_or_else(|| format!("the robot has no joint \"{name}\""))?;
+            slides.push(robot.joints[id.0].kind == JointKind::Prismatic);
+        }
+        Ok(Model { slides, limits: limit_rows(scene, &joint_names)?, joint_names, fingers, world_from_root })
+    }
+}
+
+fn limit_rows(scene: &Scene, joint_names: &[String]) -> Result<Vec<LimitRow>, String> {
+    let robot = &scene.hand.robot;
+    let mut rows = Vec::new();
+    for (i, joint) in robot.joints.iter().enumerate() {
+        let (driver, multiplier, offset) = match &joint.mimic {
+            Some(mimic) => (mimic.joint.0, mimic.multiplier, mimic.offset),
+            None => (i, 1.0, 0.0),
+        };
+        let driver_name = &robot.joints.get(driver).ok_or("a coupled joint follows one that does not exist")?.name;
+        let Some(coordinate) = joint_names.iter().position(|name| name == driver_name) else { continue };
+        let bounded = matches!(joint.kind, JointKind::Revolute | JointKind::Prismatic);
+        if let (true, Some(limits)) = (bounded, &joint.limits) {
+            rows.push(LimitRow {
+                name: joint.name.clone(),
+                coordinate,
+                multiplier,
+                offset,
+                lower: limits.lower,
+                upper: limits.upper,
+            });
+        }
+    }
+    Ok(rows)
+}

@@ -1,0 +1,263 @@
+//! One step between two waypoints: where everything is in between, and how far it can have come.
+
+use crate::check::bodies::{Bodies, Carrier, Item, OBJECT, Pair};
+use crate::check::continuity::{pose_between, pose_difference};
+use crate::check::kinematics::{Rates, pose_of};
+use crate::plan::Waypoint;
+use nalgebra::Translation3;
+use regrasp_geometry::reference::{Answer, distance, point_distance};
+use regrasp_geometry::{Point, Pose, Vector};
+
+/// Farther apart than this, pairs are not measured exactly, in metres.
+const SEARCH_DISTANCE: f64 = 0.03;
+
+/// How far a pair is shifted when its distance is not resolved, in metres, and the directions tried.
+const NUDGE: f64 = 1e-5;
+const NUDGES: [[f64; 3]; 6] =
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
+
+/// A step between two waypoints. Its parameter runs from 0 to 1.
+pub struct Step<'a> {
+    bodies: &'a Bodies,
+    from: &'a Waypoint,
+    to: &'a Waypoint,
+    object_from: Pose,
+    object_to: Pose,
+    /// How far the object's origin moves, in metres.
+    shift: f64,
+    /// How far the object turns, in radians.
+    turn: f64,
+    /// Per carrier, the poses asked for so far.
+    poses: Vec<Vec<(f64, Pose)>>,
+    /// Per carrier, whether it moves at all in this step.
+    moves: Vec<bool>,
+    /// Per item, its bounds in the world.
+    rates: Vec<Rates>,
+    /// Distances measured so far.
+    pub n_distances: u64,
+}
+
+impl<'a> Step<'a> {
+    /// The step from one waypoint to the next.
+    pub fn new(bodies: &'a Bodies, from: &'a Waypoint, to: &'a Waypoint) -> Self {
+        let (shift, turn) = pose_difference(&from.world_from_object, &to.world_from_object);
+        let moves: Vec<bool> = bodies
+            .carriers
+            .iter()
+            .map(|carrier| match carrier {
+                Carrier::Link(path) => path.moves(&from.joints, &to.joints),
+                Carrier::Object => shift > 0.0 || turn > 0.0,
+                Carrier::World => false,
+            })
+            .collect();
+        let rates = bodies
+            .items
+            .iter()
+            .map(|item| match &bodies.carriers[item.carrier] {
+                _ if !moves[item.carrier] => Rates::default(),
+                Carrier::Link(path) => {
+                    let center = item.center;
+                    path.rates(&center, item.spin_radius, &from.joints, &to.joints)
+                }
+                Carrier::Object => {
+                    let reach = item.center.coords.norm() + item.spin_radius;
+                    Rates { speed: shift + turn * reach, acceleration: turn * turn * reach }
+                }
+                Carrier::World => Rates::default(),
+            })
+            .collect();
+        Step {
+            bodies,
+            from,
+            to,
+            object_from: Pose::from(&from.world_from_object),
+            object_to: Pose::from(&to.world_from_object),
+            shift,
+            turn,
+            poses: vec![Vec::new(); bodies.carriers.len()],
+            moves,
+            rates,
+            n_distances: 0,
+        }
+    }
+
+    /// Pose of a carrier in the world.
+    pub fn pose(&mut self, carrier: usize, t: f64) -> Pose {
+        if let Some((_, pose)) = self.poses[carrier].iter().rev().find(|(at, _)| *at == t) {
+            return *pose;
+        }
+        let pose = match &self.bodies.carriers[carrier] {
+            Carrier::Link(path) => {
+                let joints: Vec<f64> =
+                    self.from.joints.iter().zip(&self.to.joints).map(|(a, b)| a + t * (b - a)).collect();
+                pose_of(&path.world_from_link(&joints))
+            }
+            Carrier::Object => pose_between(&self.object_from, &self.object_to, t),
+            Carrier::World => Pose::identity(),
+        };
+        self.poses[carrier].push((t, pose));
+        pose
+    }
+
+    fn center(&mut self, item: usize, t: f64) -> Point {
+        let item = &self.bodies.items[item];
+        self.pose(item.carrier, t) * item.center
+    }
+
+    /// Speed of an item's fastest point, in metres per step.
+    pub fn speed(&self, item: usize) -> f64 {
+        self.rates[item].speed
+    }
+
+    /// True when the two items do not move.
+    pub fn rests(&self, pair: &Pair) -> bool {
+        let moves = |item: usize| self.moves[self.bodies.items[item].carrier];
+        !moves(pair.a) && !moves(pair.b)
+    }
+
+    /// Distance between the chords' ends: how far the two can have come nearer from `t0` to `t1`, judged by where they
+    /// are at these two moments only.
+    pub fn chord(&mut self, pair: &Pair, t0: f64, t1: f64) -> f64 {
+        if self.bodies.items[pair.b].carrier == OBJECT {
+            // Seen from the object, so that what travels with it is at rest.
+            let item = &self.bodies.items[pair.a];
+            let mut seen = |t: f64| self.pose(OBJECT, t).inverse() * self.pose(item.carrier, t);
+            return chord_of(item, &seen(t0), &seen(t1));
+        }
+        let mut sum = 0.0;
+        for item in [pair.a, pair.b] {
+            let item = &self.bodies.items[item];
+            if self.moves[item.carrier] {
+                let (p0, p1) = (self.pose(item.carrier, t0), self.pose(item.carrier, t1));
+                sum += chord_of(item, &p0, &p1);
+            }
+        }
+        sum
+    }
+
+    /// How far a point of the pair can stray from its chord in an interval of length one; in one of length `h` it is
+    /// `h^2` times that.
+    pub fn stray(&mut self, pair: &Pair) -> f64 {
+        let (a, b) = (self.rates[pair.a], self.rates[pair.b]);
+        if self.bodies.items[pair.b].carrier != OBJECT {
+            return (a.acceleration + b.acceleration) / 8.0;
+        }
+        // Second derivative of R^T (p - o) with constant angular velocity w and velocity o':
+        // p'' - 2 w x (p' - o') + w x (w x (p - o)).
+        let item = &self.bodies.items[pair.a];
+        let arm = (self.center(pair.a, 0.0) - self.object_from * Point::origin()).norm();
+        let arm = arm + item.spin_radius + a.speed + self.shift;
+        (a.acceleration + 2.0 * self.turn * (a.speed + self.shift) + self.turn * self.turn * arm) / 8.0
+    }
+
+    /// Distance between the balls that contain the two items: a lower bound of theirs.
+    pub fn ball_distance(&mut self, pair: &Pair, t: f64) -> f64 {
+        let gap = (self.center(pair.a, t) - self.center(pair.b, t)).norm();
+        gap - self.bodies.items[pair.a].radius - self.bodies.items[pair.b].radius
+    }
+
+    /// Signed distance of the two items, negative when they overlap, cut at a search distance; None when unresolved.
+    ///
+    /// A ball against the object is asked for its centre's distance, which is as good at touching as elsewhere.
+    pub fn measure(&mut self, pair: &Pair, t: f64) -> Option<f64> {
+        let (a, b) = (&self.bodies.items[pair.a], &self.bodies.items[pair.b]);
+        let pose_a = self.pose(a.carrier, t) * a.carrier_from_shape;
+        let pose_b = self.pose(b.carrier, t) * b.carrier_from_shape;
+        self.n_distances += 1;
+        if a.spin_radius == 0.0 && pair.tip_of.is_some() {
+            let center = Point::from(pose_a.translation.vector);
+            return Some(point_distance(&b.shape, &pose_b, &center) - a.radius).filter(|distance| distance.is_finite());
+        }
+        let signed = |pose_a: &Pose| match distance(&a.shape, pose_a, &b.shape, &pose_b, SEARCH_DISTANCE) {
+            Answer::SeparatedBy(distance) => Some(distance),
+            Answer::Penetrating(depth) => Some(-depth),
+            Answer::Unresolved => None,
+        };
+        // A shift changes the distance by at most its length, and a pair that is hard to tell is easier beside it.
+        signed(&pose_a).or_else(|| {
+            NUDGES.iter().find_map(|nudge| {
+                let shift = Vector::from(*nudge) * NUDGE;
+                signed(&(Translation3::from(shift) * pose_a)).map(|distance| distance - NUDGE)
+            })
+        })
+    }
+}
+
+fn chord_of(item: &Item, from: &Pose, to: &Pose) -> f64 {
+    let shift = (to * item.center - from * item.center).norm();
+    if item.spin_radius == 0.0 {
+        return shift;
+    }
+    let (p, q) = (from.rotation.coords, to.rotation.coords);
+    let q = if p.dot(&q) < 0.0 { -q } else { q };
+    // The chord of a turn by angle x at radius one is 2 sin(x / 2); |p - q| = 2 sin(x / 4).
+    let quarter = (0.5 * (p - q).norm()).min(1.0);
+    shift + item.spin_radius * 4.0 * quarter * (1.0 - quarter * quarter).sqrt()
+}
+
+/// Where a pair comes too near.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Breach {
+    /// When, in the step.
+    pub t: f64,
+    /// Signed distance there; none when it could not be resolved.
+    pub distance: Option<f64>,
+}
+
+/// Certifies that `pair` stays farther apart than `floor` from `t0` to `t1`, given a lower bound of its distance at `t0`.
+///
+/// Ok: a lower bound at `t1`. For any time between, distance at an end minus the way from there bounds the distance;
+/// the two ways together are at most the chord plus twice the stray.
+pub fn certify(
+    step: &mut Step,
+    pair: &Pair,
+    (t0, t1): (f64, f64),
+    bound: f64,
+    floor: f64,
+    resolution: f64,
+) -> Result<f64, Breach> {
+    let whole_stray = step.stray(pair);
+    certify_piece(step, pair, (t0, t1), (bound, None), whole_stray, floor, resolution)
+}
+
+fn certify_piece(
+    step: &mut Step,
+    pair: &Pair,
+    (t0, t1): (f64, f64),
+    (bound, known_end): (f64, Option<f64>),
+    whole_stray: f64,
+    floor: f64,
+    resolution: f64,
+) -> Result<f64, Breach> {
+    let chord = step.chord(pair, t0, t1);
+    let stray = whole_stray * (t1 - t0) * (t1 - t0);
+    let needed = floor + chord + stray;
+    if bound > needed {
+        return Ok(known_end.unwrap_or(bound - chord));
+    }
+    let ball = step.ball_distance(pair, t0);
+    if ball > needed {
+        return Ok(known_end.unwrap_or(ball - chord));
+    }
+    let mut measure = |t: f64| match step.measure(pair, t) {
+        Some(distance) if distance > floor => Ok(distance),
+        distance => Err(Breach { t, distance }),
+    };
+    let start = measure(t0)?;
+    if start > needed {
+        return Ok(known_end.unwrap_or(start - chord));
+    }
+    let end = match known_end {
+        Some(end) => end,
+        None => measure(t1)?,
+    };
+    if 0.5 * (start + end - chord) - stray > floor {
+        return Ok(end);
+    }
+    if chord + 2.0 * stray < resolution {
+        return Err(Breach { t: t0, distance: Some(start.min(end)) });
+    }
+    let middle = 0.5 * (t0 + t1);
+    let at_middle = certify_piece(step, pair, (t0, middle), (start, None), whole_stray, floor, resolution)?;
+    certify_piece(step, pair, (middle, t1), (at_middle, Some(end)), whole_stray, floor, resolution)
+}

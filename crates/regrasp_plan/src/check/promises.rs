@@ -1,0 +1,128 @@
+//! What the plan promises: input files, friction, tolerance, closure margin.
+
+use crate::check::closure::{Body, margin};
+use crate::check::continuity::{contact_of, moving_finger};
+use crate::check::model::Model;
+use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
+use crate::check::{CheckSettings, Log};
+use crate::plan::{ContactMode, Plan, SegmentKind};
+use regrasp_scene::{InputFile, Object};
+use std::collections::BTreeMap;
+
+/// How much smaller than promised a margin may come out: two solvers, one number.
+const MARGIN_TOLERANCE: f64 = 1e-9;
+/// How far the kept margin may be above the one found here before it is a broken promise.
+const KEPT_MARGIN_TOLERANCE: f64 = 1e-6;
+
+/// The files of the plan against those of the scene as loaded now.
+pub fn check_inputs(plan: &Plan, inputs: &[InputFile], log: &mut Log) {
+    for input in &plan.inputs {
+        match inputs.iter().find(|file| file.role == input.role && file.name == input.name) {
+            None => {
+                let message = format!("{} \"{}\" is not among the scene's files", input.role, input.name);
+                log.push(Violation::new(Kind::InputHashMismatch, message).subjects([input.name.as_str()]));
+            }
+            Some(file) if file.sha256 != input.sha256 => {
+                let message = format!(
+                    "{} \"{}\" has sha256 {}, the plan was made from {}",
+                    input.role, input.name, file.sha256, input.sha256
+                );
+                log.push(Violation::new(Kind::InputHashMismatch, message).subjects([input.name.as_str()]));
+            }
+            Some(_) => {}
+        }
+    }
+    for file in inputs {
+        if !plan.inputs.iter().any(|input| input.role == file.role && input.name == file.name) {
+            let message = format!("the scene reads {} \"{}\", the plan was made without it", file.role, file.name);
+            log.push(Violation::new(Kind::InputHashMismatch, message).subjects([file.name.as_str()]));
+        }
+    }
+}
+
+/// Closure of the holding fingers in every segment; the smallest margin. Contacts are constant in a segment.
+pub fn check_closure(
+    object: &Object,
+    model: &Model,
+    plan: &Plan,
+    settings: &CheckSettings,
+    log: &mut Log,
+) -> Option<f64> {
+    let body = Body {
+        center_of_mass: object.center_of_mass,
+        torque_scale: object.radius(),
+        friction: plan.promises.friction.min(object.friction),
+    };
+    let required = plan.promises.required_margin.max(settings.smallest_margin);
+    let mut known: BTreeMap<Vec<[u64; 6]>, f64> = BTreeMap::new();
+    let mut smallest: Option<f64> = None;
+    for (s, segment) in plan.segments.iter().enumerate() {
+        let moving = moving_finger(model, segment);
+        // A waypoint may break the roles; closure is judged for what really holds there.
+        for (w, waypoint) in segment.waypoints.iter().enumerate() {
+            let holding: Vec<usize> = (0..model.fingers.len())
+                .filter(|&f| segment.kind == SegmentKind::Transfer || Some(f) != moving)
+                .filter(|&f| waypoint.contacts[f].mode != ContactMode::Free)
+                .collect();
+            let contacts: Vec<_> = holding.iter().filter_map(|&f| contact_of(&waypoint.contacts[f])).collect();
+            let key: Vec<[u64; 6]> = contacts
+                .iter()
+                .map(|c| {
+                    let (p, n) = (c.point_in_object, c.normal_in_object);
+                    [p.x, p.y, p.z, n.x, n.y, n.z].map(f64::to_bits)
+                })
+                .collect();
+            let is_new = !known.contains_key(&key);
+            let found = *known.entry(key).or_insert_with(|| margin(&contacts, &body));
+            smallest = Some(smallest.map_or(found, |least: f64| least.min(found)));
+            if is_new && !(found > 0.0 && found >= required - MARGIN_TOLERANCE) {
+                let names: Vec<&str> = holding.iter().map(|&f| model.fingers[f].name.as_str()).collect();
+                let message = if found > 0.0 {
+                    format!("fingers {names:?} hold with margin {found:.6}, {required:.6} is required")
+                } else {
+                    format!("fingers {names:?} are not proved to be force closed")
+                };
+                let violation = Violation::new(Kind::ClosureLost, message).when(Moment::at(s, w));
+                log.push(violation.subjects(names).amount(found, required));
+            }
+        }
+    }
+    smallest
+}
+
+/// Promises that no plan may make, and promises that this plan does not keep.
+pub fn check_promises(object: &Object, plan: &Plan, settings: &CheckSettings, min_margin: Option<f64>, log: &mut Log) {
+    let promises = &plan.promises;
+    if promises.friction > object.friction {
+        let message = format!("the plan counts on friction {}, the scene has {}", promises.friction, object.friction);
+        let violation = Violation::new(Kind::FrictionAboveScene, message);
+        log.push(violation.amount(promises.friction, object.friction));
+    }
+    let mut broken = |name: &str, amount: f64, limit: f64, message: String| {
+        log.push(Violation::new(Kind::PromiseBroken, message).subjects([name]).amount(amount, limit));
+    };
+    if !(promises.contact_tolerance > 0.0 && promises.contact_tolerance <= settings.largest_contact_tolerance) {
+        let limit = settings.largest_contact_tolerance;
+        let message = format!("contact tolerance {:e} m, at most {limit:e} is accepted", promises.contact_tolerance);
+        broken("contact_tolerance", promises.contact_tolerance, limit, message);
+    }
+    if !(promises.required_margin >= 0.0 && promises.kept_margin >= promises.required_margin) {
+        let message = format!("keeps margin {}, requires {}", promises.kept_margin, promises.required_margin);
+        broken("kept_margin", promises.kept_margin, promises.required_margin, message);
+    }
+    if let Some(found) = min_margin
+        && promises.kept_margin > found + KEPT_MARGIN_TOLERANCE
+    {
+        let message = format!("the plan says it keeps margin {}, found is {found}", promises.kept_margin);
+        broken("kept_margin", promises.kept_margin, found, message);
+    }
+    let scale = object.radius();
+    if (promises.torque_scale - scale).abs() > 1e-9 * scale {
+        let message = format!("torque scale {}, the object's radius is {scale}", promises.torque_scale);
+        broken("torque_scale", promises.torque_scale, scale, message);
+    }
+    if promises.friction < 0.0 {
+        let message = format!("friction {} is negative", promises.friction);
+        broken("friction", promises.friction, 0.0, message);
+    }
+}

@@ -1,0 +1,138 @@
+//! What can be wrong with a plan: kind, moment, who, how much.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use std::fmt;
+
+/// A moment of a plan: `fraction` of the way from waypoint `waypoint` to the next one of segment `segment`.
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Serialize, JsonSchema)]
+pub struct Moment {
+    /// Index of the segment, from 0.
+    pub segment: usize,
+    /// Index of the waypoint in the segment, from 0.
+    pub waypoint: usize,
+    /// In `[0, 1)`.
+    pub fraction: f64,
+}
+
+impl Moment {
+    /// Exactly at a waypoint.
+    pub fn at(segment: usize, waypoint: usize) -> Self {
+        Moment { segment, waypoint, fraction: 0.0 }
+    }
+}
+
+impl fmt::Display for Moment {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "segment {}, waypoint {}", self.segment, self.waypoint)?;
+        if self.fraction > 0.0 { write!(f, " + {:.4}", self.fraction) } else { Ok(()) }
+    }
+}
+
+/// Kind of a violation. A kind never changes its meaning.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ViolationKind {
+    /// A file that the plan was made from is missing, or is another one now.
+    InputHashMismatch,
+    /// The plan is of another hand or scene: joint names, finger names, task.
+    WrongScene,
+    /// A number is NaN or infinite, or a rotation or normal is not of length one.
+    NotANumber,
+    /// The plan does not begin where it was asked to.
+    StartMismatch,
+    /// The plan does not end where it was asked to.
+    GoalMismatch,
+    /// A segment does not begin where the one before ends.
+    SegmentsDoNotMeet,
+    /// No segment, or a segment with fewer than two waypoints.
+    EmptySegment,
+    /// A joint is beyond a limit.
+    JointLimit,
+    /// A joint moves so far between two waypoints that it is a jump.
+    JointJump,
+    /// The object moves in a regrasp.
+    ObjectMovesInRegrasp,
+    /// A contact that should stay changes.
+    GraspChanges,
+    /// A finger holds where it should be free, or is free where it should hold.
+    WrongContactMode,
+    /// In a regrasp, a finger moves that should not, or the moving finger has no name.
+    WrongMovingFinger,
+    /// A mode of contact that this version cannot judge.
+    ModeNotSupported,
+    /// A holding fingertip is not on its contact.
+    ContactOffTip,
+    /// A contact is not on the object's surface.
+    ContactOffSurface,
+    /// A contact's normal is not the surface's.
+    ContactNormalWrong,
+    /// A contact is nearer to an edge of the object than the scene allows.
+    ContactTooNearEdge,
+    /// The holding fingers are not closed with the margin that the plan promises.
+    ClosureLost,
+    /// The plan counts on more friction than the scene has.
+    FrictionAboveScene,
+    /// Two things touch that must not.
+    Collision,
+    /// A moving finger does not leave or reach its contact along the normal side, or never leaves the object.
+    LandingOrLiftingNotFree,
+    /// A promise is not one that a plan may make, or is not kept.
+    PromiseBroken,
+}
+
+/// One thing that is wrong.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Violation {
+    /// What kind of thing.
+    pub kind: ViolationKind,
+    /// When, where it has a moment.
+    pub at: Option<Moment>,
+    /// Who: a joint, a finger, a file, or the two things of a pair.
+    pub subjects: Vec<String>,
+    /// In words, with the numbers.
+    pub message: String,
+    /// How much, in metres, radians or as the kind says; NaN is never written.
+    pub amount: Option<f64>,
+    /// What would have been allowed, in the same unit.
+    pub limit: Option<f64>,
+}
+
+impl Violation {
+    /// A violation without a moment and without an amount.
+    pub fn new(kind: ViolationKind, message: impl Into<String>) -> Self {
+        Violation { kind, at: None, subjects: Vec::new(), message: message.into(), amount: None, limit: None }
+    }
+
+    /// The same, at a moment.
+    #[must_use]
+    pub fn when(mut self, at: Moment) -> Self {
+        self.at = Some(at);
+        self
+    }
+
+    /// The same, naming who takes part.
+    #[must_use]
+    pub fn subjects<'a>(mut self, subjects: impl IntoIterator<Item = &'a str>) -> Self {
+        self.subjects = subjects.into_iter().map(str::to_owned).collect();
+        self
+    }
+
+    /// The same, with how much and what would be allowed.
+    #[must_use]
+    pub fn amount(mut self, amount: f64, limit: f64) -> Self {
+        self.amount = amount.is_finite().then_some(amount);
+        self.limit = limit.is_finite().then_some(limit);
+        self
+    }
+}
+
+impl fmt::Display for Violation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:?}", self.kind)?;
+        if let Some(at) = &self.at {
+            write!(f, " at {at}")?;
+        }
+        write!(f, ": {}", regrasp_base::diagnostic::printable(&self.message))
+    }
+}

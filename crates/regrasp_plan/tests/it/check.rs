@@ -1,0 +1,84 @@
+//! The checker accepts a plan that is good by construction, and says what it cannot judge.
+
+use crate::sample;
+use regrasp_geometry::Shape;
+use regrasp_plan::check::Moment;
+use regrasp_plan::check::{CheckSettings, ViolationKind, check, check_files};
+use regrasp_plan::format::to_json;
+use regrasp_robot::import::LoadOptions;
+use regrasp_scene::{GraspRequest, InHandQuery};
+use std::path::Path;
+
+#[test]
+fn a_good_plan_is_accepted() {
+    let scene = sample::scene();
+    let plan = sample::plan(&scene);
+    let report = check(&scene, Some(&sample::query(&plan)), &plan, &CheckSettings::default());
+    assert!(report.accepted(), "{report:#?}");
+    assert!(report.min_margin.unwrap() > 0.005);
+    assert!(report.max_contact_error < 0.1e-3);
+}
+
+#[test]
+fn a_plan_of_another_scene_is_rejected_and_a_missing_scene_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("plan.json");
+    let plan = sample::plan(&sample::scene());
+    std::fs::write(&path, to_json(&plan)).unwrap();
+    let (options, settings) = (LoadOptions::default(), CheckSettings::default());
+    let missing = check_files(&path, None, &options, &settings).unwrap_err().to_string();
+    assert!(missing.contains("C420") && missing.contains("sample.scene") && missing.contains("--scene"), "{missing}");
+    let other = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/sphere_90x.toml");
+    let checked = check_files(&path, Some(&other), &options, &settings).unwrap();
+    let kinds: Vec<_> = checked.report.violations.iter().map(|violation| violation.kind).collect();
+    assert!(kinds.contains(&ViolationKind::InputHashMismatch) && kinds.contains(&ViolationKind::WrongScene));
+    let mut escaping = plan.clone();
+    escaping.inputs[0].name = "../secret.toml".into();
+    std::fs::write(&path, to_json(&escaping)).unwrap();
+    let refused = check_files(&path, None, &options, &settings).unwrap_err().to_string();
+    assert!(refused.contains("not below"), "{refused}");
+}
+
+#[test]
+fn a_plan_is_held_to_the_query() {
+    let scene = sample::scene();
+    let plan = sample::plan(&scene);
+    let first = &plan.segments[0].waypoints[0];
+    let points = first.contacts.iter().map(|c| c.point_in_object.unwrap().into()).collect::<Vec<_>>();
+    let judge = |change: &dyn Fn(&mut InHandQuery)| {
+        let mut query = sample::query(&plan);
+        change(&mut query);
+        let report = check(&scene, Some(&query), &plan, &CheckSettings::default());
+        report.violations.iter().map(|violation| violation.kind).collect::<Vec<_>>()
+    };
+    assert!(judge(&|query| query.start_grasp = GraspRequest::Joints(first.joints.clone())).is_empty());
+    assert!(judge(&|query| query.start_grasp = GraspRequest::Contacts(points.clone())).is_empty());
+    let turned = |query: &mut InHandQuery| {
+        query.world_from_object_goal.rotation *= nalgebra::UnitQuaternion::new(nalgebra::Vector3::x() * 1e-4)
+    };
+    assert_eq!(judge(&turned), [ViolationKind::GoalMismatch]);
+    let other_joints =
+        |query: &mut InHandQuery| query.start_grasp = GraspRequest::Joints(vec![0.0; first.joints.len()]);
+    assert_eq!(judge(&other_joints), [ViolationKind::StartMismatch]);
+    let other_contacts = |query: &mut InHandQuery| query.goal_grasp = GraspRequest::Contacts(points.clone());
+    assert_eq!(judge(&other_contacts), [ViolationKind::GoalMismatch]);
+}
+
+#[test]
+fn a_contact_near_an_edge_is_reported() {
+    let mut scene = sample::scene();
+    let half_extents = nalgebra::Vector3::repeat(sample::OBJECT_RADIUS);
+    scene.object.shape = Shape::Cuboid { half_extents };
+    scene.object.edge_distance = 0.004;
+    let mut plan = sample::plan(&scene);
+    let r = sample::OBJECT_RADIUS;
+    for (y, reported) in [(r - 0.005, false), (r - 0.003, true)] {
+        let contact = &mut plan.segments[0].waypoints[0].contacts[0];
+        (contact.point_in_object, contact.normal_in_object) = (Some([r, y, 0.0]), Some([1.0, 0.0, 0.0]));
+        let report = check(&scene, None, &plan, &CheckSettings { most_per_kind: 1000, ..CheckSettings::default() });
+        let found = report.violations.iter().any(|v| {
+            v.kind == ViolationKind::ContactTooNearEdge && v.at == Some(Moment::at(0, 0)) && v.subjects == ["f0"]
+        });
+        assert_eq!(found, reported);
+    }
+}

@@ -1,0 +1,123 @@
+//! Plan files: what is written is read back the same, what is broken is refused with its place, nothing panics.
+
+use crate::sample;
+use proptest::prelude::*;
+use regrasp_plan::format::{from_json, schema, to_json};
+use regrasp_plan::{ContactMode, Plan};
+use std::path::Path;
+use std::sync::LazyLock;
+
+static GOOD: LazyLock<(Plan, String)> = LazyLock::new(|| {
+    let plan = sample::plan(&sample::scene());
+    let text = to_json(&plan);
+    (plan, text)
+});
+
+fn read(text: &str) -> Result<Plan, String> {
+    from_json(Path::new("plan.json"), text.as_bytes()).map_err(|error| error.to_string())
+}
+
+#[test]
+fn a_plan_survives_the_file_bit_by_bit() {
+    let (plan, text) = &*GOOD;
+    let back = read(text).unwrap();
+    assert_eq!(&back, plan);
+    assert_eq!(&to_json(&back), text);
+    let n_waypoints: usize = plan.segments.iter().map(|segment| segment.waypoints.len()).sum();
+    assert_eq!(text.lines().filter(|line| line.trim_start().starts_with("{\"joints\"")).count(), n_waypoints);
+    assert_eq!(serde_json::from_str::<serde_json::Value>(text).unwrap(), serde_json::to_value(plan).unwrap());
+}
+
+#[test]
+fn the_schema_in_the_repository_is_the_one_of_the_types() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../schema/plan.schema.json");
+    let written = std::fs::read_to_string(&path).unwrap_or_default();
+    if written != schema() && std::env::var_os("REGRASP_WRITE_SCHEMA").is_some() {
+        std::fs::write(&path, schema()).unwrap();
+    }
+    assert_eq!(std::fs::read_to_string(&path).unwrap_or_default(), schema(), "run with REGRASP_WRITE_SCHEMA=1");
+}
+
+#[test]
+fn every_kind_of_damage_is_named_with_its_place() {
+    let (plan, text) = &*GOOD;
+    let cut = |f: &dyn Fn(&mut Plan)| {
+        let mut plan = plan.clone();
+        f(&mut plan);
+        to_json(&plan)
+    };
+    let waypoint_line = text.lines().position(|line| line.contains("{\"joints\"")).unwrap() + 1;
+    let third_line = waypoint_line + 2;
+    let cases: Vec<(&str, String, String)> = vec![
+        ("C401", "{".into(), "plan.json:1:".into()),
+        ("C401", text.replacen("\"seed\": 0", "\"seed\": -1", 1), "plan.json:7:".into()),
+        ("C401", text.replacen("\"seed\": 0", "\"sede\": 0", 1), "sede".into()),
+        ("C401", text.replacen("\"friction\":0.8", "\"friction\":1e999", 1), "out of range".into()),
+        ("C402", text.replacen("regrasp-plan", "other-plan", 1), "plan.json:2:13".into()),
+        ("C402", "{}".into(), "format".into()),
+        ("C403", text.replacen("\"format_version\": 1", "\"format_version\": 2", 1), "plan.json:3:21".into()),
+        ("C404", cut(&|p| p.segments[0].waypoints[2].joints.truncate(3)), format!("plan.json:{third_line}:")),
+        ("C404", cut(&|p| p.segments[0].waypoints[2].contacts.truncate(3)), format!("plan.json:{third_line}:")),
+        ("C405", cut(&|p| p.goal.quat_xyzw[3] += 1e-6), "goal".into()),
+        ("C405", cut(&|p| p.goal.quat_xyzw = p.goal.quat_xyzw.map(|x| -x)), "w < 0".into()),
+        (
+            "C405",
+            cut(&|p| {
+                p.segments[0].waypoints[2].contacts[1].normal_in_object = Some([0.0, 0.0, 0.9]);
+            }),
+            format!("plan.json:{third_line}:"),
+        ),
+        ("C406", cut(&|p| p.segments.clear()), "segments".into()),
+        ("C406", cut(&|p| p.segments[1].waypoints.truncate(1)), "segments[1].waypoints".into()),
+        ("C407", cut(&|p| p.segments[0].waypoints[2].contacts[0].mode = ContactMode::Free), "is free but".into()),
+        ("C407", cut(&|p| p.segments[0].waypoints[2].contacts[0].point_in_object = None), "lacks".into()),
+        ("C408", cut(&|p| p.segments[1].moving_finger = Some("thumb".into())), "thumb".into()),
+        ("C408", cut(&|p| p.segments[1].moving_finger = None), "without".into()),
+        ("C408", cut(&|p| p.segments[0].moving_finger = Some("f0".into())), "transfer".into()),
+        ("C408", cut(&|p| p.joint_names[1] = p.joint_names[0].clone()), "twice".into()),
+        ("C409", cut(&|p| p.promises.friction = -0.1), "promises.friction".into()),
+        ("C409", cut(&|p| p.inputs[0].sha256 = "abc".into()), "abc".into()),
+        ("C409", cut(&|p| p.segments[0].waypoints[2].joints[0] = 1e9), format!("plan.json:{third_line}:")),
+        ("C410", cut(&|p| p.fingers = (0..65).map(|i| i.to_string()).collect()), "65".into()),
+    ];
+    for (code, text, part) in cases {
+        let message = read(&text).unwrap_err();
+        assert!(message.contains(code) && message.contains(&part), "wanted {code} and {part:?} in:\n{message}");
+    }
+}
+
+#[test]
+fn a_file_full_of_damage_gives_a_short_answer() {
+    let mut plan = GOOD.0.clone();
+    plan.segments.iter_mut().flat_map(|s| &mut s.waypoints).for_each(|w| w.joints.clear());
+    let message = read(&to_json(&plan)).unwrap_err();
+    assert_eq!(message.lines().count(), 20, "{message}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn damaged_files_never_panic(
+        edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0u8..4), 1..12),
+    ) {
+        let mut bytes = GOOD.1.clone().into_bytes();
+        for (place, byte, how) in edits {
+            let at = place.index(bytes.len());
+            match how {
+                0 => bytes[at] = byte,
+                1 => bytes[at] = b"0123456789-eE.,:[]{}\"ntf"[byte as usize % 24],
+                2 => { bytes.remove(at); }
+                _ => bytes.truncate((at + 1).max(bytes.len() / 2)),
+            }
+        }
+        if let Ok(plan) = from_json(Path::new("plan.json"), &bytes) {
+            prop_assert!(from_json(Path::new("plan.json"), to_json(&plan).as_bytes()).is_ok());
+        }
+    }
+
+    #[test]
+    fn arbitrary_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        prop_assert!(from_json(Path::new("plan.json"), &bytes).is_err());
+    }
+}

@@ -1,0 +1,7 @@
+//! Tests of plan files and of the checker.
+
+mod check;
+mod format;
+mod motion;
+mod mutation;
+mod sample;

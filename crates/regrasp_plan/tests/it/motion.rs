@@ -1,0 +1,138 @@
+//! Kinematics against the planner's, motion bounds against sampling, certificates against brute force.
+
+use crate::sample;
+use regrasp_base::Rng;
+use regrasp_geometry::reference::{Answer, distance};
+use regrasp_geometry::shape::PlacedShape;
+use regrasp_geometry::{Pose, Shape, Vector};
+use regrasp_plan::check::bodies::{Bodies, Owner};
+use regrasp_plan::check::model::Model;
+use regrasp_plan::check::motion::{Step, certify};
+use regrasp_plan::plan::PoseData;
+use regrasp_plan::{Plan, Waypoint};
+use regrasp_scene::Scene;
+use regrasp_scene::scene::Obstacle;
+
+fn random_joints(scene: &Scene, rng: &mut Rng) -> Vec<f64> {
+    let chains = scene.hand.fingers.iter().map(|finger| &finger.chain);
+    chains.flat_map(|chain| chain.lower.iter().zip(&chain.upper)).map(|(low, high)| rng.uniform(*low, *high)).collect()
+}
+
+#[test]
+fn tips_are_where_the_chains_say() {
+    let scene = sample::scene();
+    let model = Model::new(&scene).unwrap();
+    let mut rng = Rng::keyed(1, "tips", 0);
+    for _ in 0..200 {
+        let joints = random_joints(&scene, &mut rng);
+        for (finger, ours) in scene.hand.fingers.iter().zip(&model.fingers) {
+            let theirs = finger.chain.tip(&joints[ours.coordinates.clone()], &finger.tip.center_in_body);
+            assert!((ours.center_in_world(&joints) - theirs).norm() < 1e-12);
+        }
+    }
+}
+
+/// A waypoint near another one: joints within `turn`, object within `turn` too.
+fn neighbour(waypoint: &Waypoint, turn: f64, rng: &mut Rng) -> Waypoint {
+    let mut other = waypoint.clone();
+    other.joints.iter_mut().for_each(|q| *q += rng.uniform(-turn, turn));
+    let pose = Pose::from(&waypoint.world_from_object);
+    let mut small = || Vector::from_fn(|_, _| rng.uniform(-turn, turn));
+    let moved = pose * Pose::new(small() * 0.05, small());
+    other.world_from_object = PoseData::from(&moved);
+    other
+}
+
+fn samples(plan: &Plan) -> Vec<Waypoint> {
+    plan.segments.iter().flat_map(|segment| segment.waypoints.iter().step_by(5).cloned()).collect()
+}
+
+#[test]
+fn chords_and_strays_bound_the_true_motion() {
+    let scene = sample::scene();
+    let model = Model::new(&scene).unwrap();
+    let bodies = Bodies::new(&scene, &model).unwrap();
+    let mut rng = Rng::keyed(2, "motion", 0);
+    let mut tightest: f64 = 0.0;
+    for waypoint in samples(&sample::plan(&scene)) {
+        let other = neighbour(&waypoint, 0.3, &mut rng);
+        let mut step = Step::new(&bodies, &waypoint, &other);
+        for pair in &bodies.pairs {
+            let (a, b) = (&bodies.items[pair.a], &bodies.items[pair.b]);
+            let stray = step.stray(pair);
+            let (t0, t1) = (0.3, 0.3 + rng.uniform(0.05, 0.6));
+            let chord = step.chord(pair, t0, t1);
+            // Relative position of a point of each, seen from b, may not leave the chord's neighbourhood.
+            let point_a = a.center + Vector::from(rng.direction()) * a.spin_radius;
+            let point_b = b.center + Vector::from(rng.direction()) * b.spin_radius;
+            let mut gap = |t: f64| step.pose(a.carrier, t) * point_a - step.pose(b.carrier, t) * point_b;
+            let (first, last) = (gap(t0).norm(), gap(t1).norm());
+            assert!((first - last).abs() <= chord + 1e-12, "{} {}", a.name, b.name);
+            let h = t1 - t0;
+            for k in 0..=20 {
+                let share = k as f64 / 20.0;
+                let now = gap(t0 + share * h).norm();
+                let bound = (first - share * chord).max(last - (1.0 - share) * chord) - stray * h * h;
+                assert!(now >= bound - 1e-12, "{} {}: {now} < {bound}", a.name, b.name);
+                tightest = tightest.max(bound / now);
+            }
+        }
+    }
+    assert!(tightest > 0.9, "the bounds are loose everywhere: {tightest}");
+}
+
+#[test]
+fn what_is_certified_is_clear_and_what_is_clear_is_certified() {
+    let mut scene = sample::scene();
+    // A needle that the fingers pass: 0.2 mm thick.
+    scene.obstacles.push(Obstacle {
+        name: "needle".into(),
+        placed: PlacedShape {
+            parent_from_shape: sample::world_from_hand() * Pose::translation(0.055, 0.01, 0.07),
+            shape: Shape::Capsule { half_length: 0.02, radius: 0.1e-3 },
+        },
+    });
+    let model = Model::new(&scene).unwrap();
+    let bodies = Bodies::new(&scene, &model).unwrap();
+    let mut rng = Rng::keyed(3, "motion", 0);
+    let resolution = 0.05e-3;
+    let (mut certified, mut refused, mut in_between) = (0, 0, 0);
+    let waypoints = samples(&sample::plan(&scene));
+    for round in 0..30 {
+        let waypoint = &waypoints[round % waypoints.len()];
+        let other = neighbour(waypoint, 0.4, &mut rng);
+        let mut step = Step::new(&bodies, waypoint, &other);
+        for pair in bodies.pairs.iter().filter(|pair| pair.tip_of.is_none()) {
+            let (a, b) = (&bodies.items[pair.a], &bodies.items[pair.b]);
+            let mut smallest = f64::INFINITY;
+            let mut ends = f64::INFINITY;
+            for k in 0..=400 {
+                let t = k as f64 / 400.0;
+                let pose_a = step.pose(a.carrier, t) * a.carrier_from_shape;
+                let pose_b = step.pose(b.carrier, t) * b.carrier_from_shape;
+                let signed = match distance(&a.shape, &pose_a, &b.shape, &pose_b, 0.5) {
+                    Answer::SeparatedBy(d) => d,
+                    Answer::Penetrating(d) => -d,
+                    Answer::Unresolved => panic!("unresolved"),
+                };
+                smallest = smallest.min(signed);
+                if k == 0 || k == 400 {
+                    ends = ends.min(signed);
+                }
+            }
+            match certify(&mut step, pair, (0.0, 1.0), f64::NEG_INFINITY, 0.0, resolution) {
+                Ok(_) => {
+                    certified += 1;
+                    assert!(smallest > 0.0, "{} and {} certified, but {smallest}", a.name, b.name);
+                }
+                Err(breach) => {
+                    refused += 1;
+                    assert!(smallest < resolution, "{} and {} refused at {smallest}: {breach:?}", a.name, b.name);
+                    in_between += usize::from(ends > 0.0);
+                }
+            }
+        }
+    }
+    assert!(bodies.items.iter().any(|item| item.owner == Owner::Obstacle));
+    assert!(certified > 500 && refused > 30 && in_between > 5, "{certified} {refused} {in_between}");
+}

@@ -1,0 +1,61 @@
+//! Every mutant of a good plan is rejected, for a reason that fits.
+
+use crate::sample;
+use regrasp_base::Rng;
+use regrasp_plan::check::mutation::mutants;
+use regrasp_plan::check::{CheckSettings, ViolationKind, check};
+use std::collections::{BTreeMap, BTreeSet};
+
+#[test]
+fn every_mutant_is_rejected_for_a_fitting_reason() {
+    let scene = sample::scene();
+    let plan = sample::plan(&scene);
+    let query = sample::query(&plan);
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut kinds = BTreeSet::new();
+    let mut wrong = Vec::new();
+    for round in 0..30 {
+        for mutant in mutants(&plan, &scene, &mut Rng::keyed(1, "mutation", round)) {
+            // Header mutants also change what was asked for, so the query is only given for the others.
+            let report = check(&scene, Some(&query), &mutant.plan, &CheckSettings::default());
+            let found: BTreeSet<ViolationKind> = report.violations.iter().map(|v| v.kind).collect();
+            *counts.entry(mutant.name).or_default() += 1;
+            if !mutant.expected.iter().any(|kind| found.contains(kind)) {
+                wrong.push(format!("{}: wanted one of {:?}, found {found:?}", mutant.name, mutant.expected));
+            }
+            kinds.extend(found.into_iter().filter(|kind| mutant.expected.contains(kind)));
+        }
+    }
+    assert!(wrong.is_empty(), "{} mutants wrongly judged:\n{}", wrong.len(), wrong.join("\n"));
+    assert!(counts.len() >= 40, "{counts:?}");
+    for (name, count) in counts {
+        assert!(count >= 5, "{name} was only made {count} times");
+    }
+    use ViolationKind::*;
+    for kind in [
+        InputHashMismatch,
+        WrongScene,
+        NotANumber,
+        StartMismatch,
+        GoalMismatch,
+        SegmentsDoNotMeet,
+        EmptySegment,
+        JointLimit,
+        JointJump,
+        ObjectMovesInRegrasp,
+        GraspChanges,
+        WrongContactMode,
+        WrongMovingFinger,
+        ModeNotSupported,
+        ContactOffTip,
+        ContactOffSurface,
+        ContactNormalWrong,
+        ClosureLost,
+        FrictionAboveScene,
+        Collision,
+        LandingOrLiftingNotFree,
+        PromiseBroken,
+    ] {
+        assert!(kinds.contains(&kind), "{kind:?} was never the reason");
+    }
+}

@@ -1,0 +1,302 @@
+//! A four-finger hand, a sphere, and a plan that is good by construction: built by code, with closed-form inverse
+//! kinematics written here and nowhere else.
+
+use nalgebra::{Translation3, UnitQuaternion};
+use regrasp_geometry::shape::PlacedShape;
+use regrasp_geometry::{Point, Pose, Shape, Vector};
+use regrasp_plan::plan::{FORMAT, FORMAT_VERSION, PlanInput, PoseData, Promises, Statistics};
+use regrasp_plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
+use regrasp_robot::hand::PalmShape;
+use regrasp_robot::{
+    Chain, ChainJoint, Finger, FingerShape, Hand, Joint, JointId, JointKind, Limits, Link, LinkId, Motion, Robot, Tip,
+    TipShape,
+};
+use regrasp_scene::scene::InputFile;
+use regrasp_scene::{GraspRequest, InHandQuery, Object, Scene};
+use std::sync::Arc;
+
+pub const N_FINGERS: usize = 4;
+const BASE_RADIUS: f64 = 0.045;
+const PROXIMAL: f64 = 0.058;
+const DISTAL: f64 = 0.050;
+pub const TIP_RADIUS: f64 = 0.005;
+pub const OBJECT_RADIUS: f64 = 0.032;
+const LIMITS: [(f64, f64); 3] = [(-35.0, 35.0), (-75.0, 60.0), (5.0, 115.0)];
+
+/// Where finger `f` begins: x inward, z along the outstretched finger.
+fn hand_from_finger(f: usize) -> Pose {
+    let angle = std::f64::consts::FRAC_PI_2 * f as f64;
+    let position = Vector::new(BASE_RADIUS * angle.cos(), BASE_RADIUS * angle.sin(), 0.0);
+    let turn = UnitQuaternion::from_axis_angle(&Vector::z_axis(), angle + std::f64::consts::PI);
+    Pose::from_parts(Translation3::from(position), turn)
+}
+
+fn up(z: f64) -> Pose {
+    Pose::translation(0.0, 0.0, z)
+}
+
+pub fn world_from_hand() -> Pose {
+    Pose::new(Vector::new(0.1, -0.2, 0.3), Vector::new(0.2, -0.1, 0.4))
+}
+
+fn robot() -> Robot {
+    let palm = PlacedShape {
+        parent_from_shape: up(-0.02),
+        shape: Shape::Cuboid { half_extents: Vector::new(0.05, 0.05, 0.01) },
+    };
+    let mut robot = Robot {
+        name: "sample".into(),
+        links: vec![Link { name: "palm".into(), collision: vec![palm], parent_joint: None }],
+        joints: Vec::new(),
+        root: LinkId(0),
+    };
+    let capsule = |length: f64, radius: f64| PlacedShape {
+        parent_from_shape: up(0.5 * length),
+        shape: Shape::Capsule { half_length: 0.5 * length, radius },
+    };
+    for f in 0..N_FINGERS {
+        let parts = [
+            (hand_from_finger(f), Vector::x_axis(), JointKind::Revolute, vec![]),
+            (up(0.0), Vector::y_axis(), JointKind::Revolute, vec![capsule(PROXIMAL, 0.007)]),
+            (up(PROXIMAL), Vector::y_axis(), JointKind::Revolute, vec![capsule(DISTAL, 0.004)]),
+            (
+                up(DISTAL),
+                Vector::x_axis(),
+                JointKind::Fixed,
+                vec![PlacedShape { parent_from_shape: Pose::identity(), shape: Shape::Sphere { radius: TIP_RADIUS } }],
+            ),
+        ];
+        let mut parent = LinkId(0);
+        for (j, (parent_from_joint, axis, kind, collision)) in parts.into_iter().enumerate() {
+            let child = LinkId(robot.links.len());
+            let limits = LIMITS.get(j).map(|(low, high)| Limits {
+                lower: low.to_radians(),
+                upper: high.to_radians(),
+                velocity: None,
+                effort: None,
+            });
+            let joint = JointId(robot.joints.len());
+            robot.links.push(Link { name: format!("f{f}_l{j}"), collision, parent_joint: Some(joint) });
+            robot.joints.push(Joint {
+                name: format!("f{f}_j{j}"),
+                kind,
+                parent,
+                child,
+                parent_from_joint,
+                axis,
+                limits,
+                mimic: None,
+            });
+            parent = child;
+        }
+    }
+    robot
+}
+
+fn hand() -> Hand {
+    let robot = robot();
+    let fingers = (0..N_FINGERS)
+        .map(|f| {
+            let link = |j: usize| LinkId(1 + 4 * f + j);
+            let joints = (0..3)
+                .map(|j| {
+                    let joint = &robot.joints[4 * f + j];
+                    ChainJoint {
+                        parent_from_joint: joint.parent_from_joint,
+                        axis: joint.axis,
+                        motion: Motion::Turn,
+                        coordinate: j,
+                        multiplier: 1.0,
+                        offset: 0.0,
+                    }
+                })
+                .collect();
+            let mut shapes = Vec::new();
+            for j in 0..4 {
+                for placed in &robot.links[link(j).0].collision {
+                    let body_from_link = if j == 3 { up(DISTAL) } else { Pose::identity() };
+                    let parent_from_shape = body_from_link * placed.parent_from_shape;
+                    let placed = PlacedShape { parent_from_shape, shape: placed.shape.clone() };
+                    shapes.push(FingerShape { body: j.min(2), link: link(j), placed, is_tip: j == 3 });
+                }
+            }
+            let chain = Chain::new(
+                joints,
+                (0..3).map(|j| format!("f{f}_j{j}")).collect(),
+                LIMITS.iter().map(|(low, _)| low.to_radians()).collect(),
+                LIMITS.iter().map(|(_, high)| high.to_radians()).collect(),
+            );
+            let tip = Tip {
+                link: link(3),
+                shape: TipShape::Sphere { radius: TIP_RADIUS },
+                center_in_body: Point::new(0.0, 0.0, DISTAL),
+            };
+            Finger::new(format!("f{f}"), chain, tip, shapes, vec![0.0, -0.3, 1.0])
+        })
+        .collect();
+    let mut allowed_pairs = std::collections::BTreeSet::new();
+    for f in 0..N_FINGERS {
+        let link = |j: usize| LinkId(1 + 4 * f + j);
+        for (a, b) in
+            [(LinkId(0), link(0)), (link(0), link(1)), (link(1), link(2)), (link(2), link(3)), (LinkId(0), link(1))]
+        {
+            allowed_pairs.insert((a, b));
+        }
+    }
+    let palm = robot.links[0].collision.iter().map(|p| PalmShape { link: LinkId(0), placed: p.clone() }).collect();
+    Hand { robot: Arc::new(robot), base: LinkId(0), fingers, palm, allowed_pairs }
+}
+
+/// The object: a sphere whose centre of mass is its centre.
+fn object() -> Object {
+    let shape = Shape::Sphere { radius: OBJECT_RADIUS };
+    Object {
+        name: "ball".into(),
+        surface: surface_of(&shape),
+        shape,
+        mass: 0.1,
+        center_of_mass: Point::origin(),
+        friction: 0.8,
+        edge_distance: 0.0,
+    }
+}
+
+fn surface_of(shape: &Shape) -> regrasp_geometry::Surface {
+    regrasp_geometry::Surface::of(shape).expect("a sphere has a surface")
+}
+
+pub fn scene() -> Scene {
+    Scene {
+        name: "sample".into(),
+        hand: hand().placed_at(&world_from_hand()),
+        object: object(),
+        obstacles: Vec::new(),
+        inputs: ["scene", "urdf"]
+            .map(|role| InputFile {
+                role: role.into(),
+                name: format!("sample.{role}"),
+                path: format!("sample.{role}").into(),
+                sha256: regrasp_base::files::sha256(role.as_bytes()),
+            })
+            .to_vec(),
+    }
+}
+
+/// Joints of finger `f` that bring its tip's centre to `center_in_hand`.
+fn finger_joints(f: usize, center_in_hand: &Point) -> [f64; 3] {
+    let p = hand_from_finger(f).inverse() * center_in_hand;
+    let h = p.y.hypot(p.z);
+    let cosine = (p.x * p.x + h * h - PROXIMAL * PROXIMAL - DISTAL * DISTAL) / (2.0 * PROXIMAL * DISTAL);
+    assert!(cosine.abs() < 1.0, "finger {f} cannot reach {center_in_hand}");
+    let bend = cosine.acos();
+    let lean = p.x.atan2(h) - (DISTAL * bend.sin()).atan2(PROXIMAL + DISTAL * bend.cos());
+    [(-p.y).atan2(p.z), lean, bend]
+}
+
+/// Contacts by direction from the centre of the sphere, in the object frame.
+type Grasp = [Vector; N_FINGERS];
+
+fn waypoint(hand_from_object: &Pose, grasp: &Grasp, lifted: Option<(usize, Vector)>) -> Waypoint {
+    let mut joints = Vec::new();
+    let mut contacts = Vec::new();
+    for f in 0..N_FINGERS {
+        let free = lifted.filter(|(finger, _)| *finger == f);
+        let direction = grasp[f].normalize();
+        let center = free.map_or(direction * (OBJECT_RADIUS + TIP_RADIUS), |(_, center)| center);
+        joints.extend(finger_joints(f, &(hand_from_object * Point::from(center))));
+        contacts.push(match free {
+            Some(_) => ContactState { mode: ContactMode::Free, point_in_object: None, normal_in_object: None },
+            None => ContactState {
+                mode: ContactMode::Fixed,
+                point_in_object: Some((direction * OBJECT_RADIUS).into()),
+                normal_in_object: Some(direction.into()),
+            },
+        });
+    }
+    Waypoint { joints, world_from_object: PoseData::from(&(world_from_hand() * hand_from_object)), contacts }
+}
+
+fn transfer(from: &Pose, turn: &Vector, shift: &Vector, grasp: &Grasp, n_steps: usize) -> (Segment, Pose) {
+    let pose_at = |t: f64| {
+        let rotation = UnitQuaternion::from_scaled_axis(turn * t) * from.rotation;
+        Pose::from_parts(Translation3::from(from.translation.vector + shift * t), rotation)
+    };
+    let waypoints = (0..=n_steps).map(|k| waypoint(&pose_at(k as f64 / n_steps as f64), grasp, None)).collect();
+    (Segment { kind: SegmentKind::Transfer, moving_finger: None, waypoints }, pose_at(1.0))
+}
+
+fn regrasp(pose: &Pose, grasp: &Grasp, finger: usize, to: Vector, lift: f64) -> (Segment, Grasp) {
+    let (from, to) = (grasp[finger].normalize(), to.normalize());
+    let mut after = *grasp;
+    after[finger] = to;
+    let touch = OBJECT_RADIUS + TIP_RADIUS;
+    let mut waypoints = vec![waypoint(pose, grasp, None)];
+    let n_steps = 6;
+    let mut free = |center: Vector| waypoints.push(waypoint(pose, grasp, Some((finger, center))));
+    (1..=n_steps).for_each(|k| free(from * (touch + lift * k as f64 / n_steps as f64)));
+    let n_slide = 1 + (from.angle(&to) * (touch + lift) / 0.002) as usize;
+    for k in 1..=n_slide {
+        let t = k as f64 / n_slide as f64;
+        free((from * (1.0 - t) + to * t).normalize() * (touch + lift));
+    }
+    (1..n_steps).for_each(|k| free(to * (touch + lift * (1.0 - k as f64 / n_steps as f64))));
+    waypoints.push(waypoint(pose, &after, None));
+    (Segment { kind: SegmentKind::Regrasp, moving_finger: Some(format!("f{finger}")), waypoints }, after)
+}
+
+fn around(azimuth_deg: f64, elevation_deg: f64) -> Vector {
+    let (a, e) = (azimuth_deg.to_radians(), elevation_deg.to_radians());
+    Vector::new(a.cos() * e.cos(), a.sin() * e.cos(), e.sin())
+}
+
+/// Transfer, relocation of two fingers, transfer.
+pub fn plan(scene: &Scene) -> Plan {
+    let start = Pose::translation(0.0, 0.0, 0.078);
+    let grasp = [around(5.0, -5.0), around(80.0, 6.0), around(178.0, -4.0), around(272.0, 3.0)];
+    let (first, pose) = transfer(&start, &Vector::new(0.02, 0.03, 0.2), &Vector::new(0.001, -0.001, 0.002), &grasp, 10);
+    let (second, grasp) = regrasp(&pose, &grasp, 1, around(65.0, 2.0), 0.004);
+    let (third, grasp) = regrasp(&pose, &grasp, 3, around(255.0, -6.0), 0.002);
+    let (fourth, goal) = transfer(&pose, &Vector::new(-0.05, 0.0, 0.15), &Vector::new(0.0, 0.002, -0.002), &grasp, 8);
+    let segments = vec![first, second, third, fourth];
+    let joint_names = scene.hand.joint_names();
+    let mut plan = Plan {
+        format: FORMAT.into(),
+        format_version: FORMAT_VERSION,
+        tool: "test".into(),
+        task: "in_hand".into(),
+        method: "by hand".into(),
+        seed: 0,
+        settings: serde_json::json!({"lift": 0.004}),
+        inputs: scene
+            .inputs
+            .iter()
+            .map(|file| PlanInput { role: file.role.clone(), name: file.name.clone(), sha256: file.sha256.clone() })
+            .collect(),
+        promises: Promises {
+            contact_tolerance: 0.1e-3,
+            friction: 0.8,
+            required_margin: 0.005,
+            kept_margin: 0.005,
+            torque_scale: OBJECT_RADIUS,
+        },
+        joint_names,
+        fingers: (0..N_FINGERS).map(|f| format!("f{f}")).collect(),
+        start: PoseData::from(&(world_from_hand() * start)),
+        goal: PoseData::from(&(world_from_hand() * goal)),
+        segments,
+        statistics: Statistics::default(),
+    };
+    plan.statistics.transfers = 2;
+    plan.statistics.relocations = 2;
+    plan
+}
+
+/// The query that [`plan`] answers.
+pub fn query(plan: &Plan) -> InHandQuery {
+    InHandQuery {
+        world_from_object_start: Pose::from(&plan.start),
+        world_from_object_goal: Pose::from(&plan.goal),
+        start_grasp: GraspRequest::Automatic,
+        goal_grasp: GraspRequest::Automatic,
+    }
+}
