@@ -33,6 +33,8 @@ mod record;
 mod regrasp;
 /// The relocation of one finger.
 mod relocate;
+#[cfg(test)]
+mod roadmap_tests;
 /// What all methods share.
 mod search;
 /// Settings.
