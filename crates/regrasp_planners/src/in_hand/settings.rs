@@ -104,6 +104,9 @@ pub struct InHandSettings {
     pub shortcuts: usize,
     /// Schedule of alpha, for the methods of paper 000.
     pub alpha: Alpha,
+    /// Share of the poses that the methods of paper 000 draw around the way from start to goal. The others are turned
+    /// anyhow, as the paper has all (section 4.2.2): with 0 both methods take several times as long, `Classic` most.
+    pub guided_share: f64,
 }
 
 impl Default for InHandSettings {
@@ -130,6 +133,7 @@ impl Default for InHandSettings {
             restart_work: 40_000,
             shortcuts: 20,
             alpha: Alpha::Constant { value: 0.9 },
+            guided_share: 0.9,
         }
     }
 }
@@ -154,6 +158,7 @@ impl InHandSettings {
             ("contact_allowance", self.contact_allowance),
             ("limit_margin", self.limit_margin),
             ("goal_share", self.goal_share),
+            ("guided_share", self.guided_share),
         ] {
             if !(0.0..=1.0).contains(&value) {
                 return Err(format!("{name} is {value}; it must be between 0 and 1"));
