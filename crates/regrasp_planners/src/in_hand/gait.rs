@@ -6,7 +6,7 @@
 use super::candidates::draw_pose;
 use super::link::reversed;
 use super::search::{Search, Stop};
-use super::shorten::change_grasp;
+use super::shorten::{change_grasp, whole_transfer};
 use super::state::{GraspState, Step};
 use super::tree::Tree;
 use regrasp_base::Rng;
@@ -52,7 +52,9 @@ pub fn grow(
                 let state = trees[0].nodes[node].state.clone();
                 search.note(&state);
             }
-            if let Some(solution) = meet(search, &trees, growing, node, &target) {
+            if let Some(solution) =
+                meet(search, &trees, growing, node, &target).or_else(|| bridge(search, &trees, growing, node))
+            {
                 return Ok(solution);
             }
         }
@@ -70,11 +72,29 @@ fn draw_target(search: &mut Search, trees: &[Tree; 2], growing: usize) -> Target
         return Target::Anywhere(draw_pose(search.model(), &search.start, &search.goal, &mut search.rng));
     }
     if other.places.len() > 1 && search.rng.chance(OTHER_SHARE) {
-        return Target::Other(search.rng.below(other.places.len()));
+        return Target::Other(nearest_of_some(search, &trees[growing], other));
     }
     Target::Aim
 }
 
+/// Of some places of the other tree, the one nearest to the growing tree.
+fn nearest_of_some(search: &mut Search, tree: &Tree, other: &Tree) -> usize {
+    let mut best = (f64::INFINITY, 0);
+    for _ in 0..OTHERS_LOOKED_AT {
+        let index = search.rng.below(other.places.len());
+        let pose = other.places[index].pool.world_from_object();
+        for place in &tree.places {
+            let distance = search.distance(place.pool.world_from_object(), pose);
+            if distance < best.0 && !other.places[index].nodes.is_empty() {
+                best = (distance, index);
+            }
+        }
+    }
+    best.1
+}
+
+/// Places of the other tree that are compared before one is aimed at.
+const OTHERS_LOOKED_AT: usize = 3;
 /// Share of purposeful extensions that aim at what the other tree has reached.
 const OTHER_SHARE: f64 = 0.4;
 
@@ -99,16 +119,38 @@ fn meet(
     if place == 0 && other.root_is_free {
         return Some(in_order(growing, tree.trace(node), Vec::new(), None));
     }
+    let (there, join) = join(search, state, other, place)?;
+    Some(in_order(growing, tree.trace(node), join, Some(other.trace(there))))
+}
+
+/// From a new node straight to the nearest pose of the other tree, and there into one of its grasps.
+fn bridge(search: &mut Search, trees: &[Tree; 2], growing: usize, node: usize) -> Option<(GraspState, Vec<Step>)> {
+    let (tree, other) = (&trees[growing], &trees[1 - growing]);
+    let state = &tree.nodes[node].state;
+    let mut nearest = (f64::INFINITY, None);
+    for (index, place) in other.places.iter().enumerate() {
+        let distance = search.distance(&state.world_from_object, place.pool.world_from_object());
+        if distance < nearest.0 && !place.nodes.is_empty() {
+            nearest = (distance, Some(index));
+        }
+    }
+    let place = nearest.1?;
+    let step = whole_transfer(search, state, other.places[place].pool.world_from_object())?;
+    let (there, join) = join(search, &step.end, other, place)?;
+    let (root, mut steps) = tree.trace(node);
+    steps.push(step);
+    Some(in_order(growing, (root, steps), join, Some(other.trace(there))))
+}
+
+/// Relocations from `state` into the grasp of one of the nodes at `place` of `other`, which has the same object pose.
+fn join(search: &mut Search, state: &GraspState, other: &Tree, place: usize) -> Option<(usize, Vec<Step>)> {
     let nodes = &other.places[place].nodes;
-    for _ in 0..JOINS.min(nodes.len()) {
+    (0..JOINS.min(nodes.len())).find_map(|_| {
         let there = nodes[search.rng.below(nodes.len())];
         let mut rng = Rng::child(&search.rng, "join", 0);
         search.rng.bits();
-        if let Some(join) = change_grasp(search, state, &other.nodes[there].state, false, &mut rng) {
-            return Some(in_order(growing, tree.trace(node), join, Some(other.trace(there))));
-        }
-    }
-    None
+        Some((there, change_grasp(search, state, &other.nodes[there].state, false, &mut rng)?))
+    })
 }
 
 /// From the start to the goal, whichever tree was growing: the way in the growing tree, the join, the way back in the
