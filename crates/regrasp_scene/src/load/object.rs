@@ -60,7 +60,7 @@ pub(super) fn object(root: &mut Table, files: &mut Files, found: &mut Found) -> 
     let surface = match Surface::with_crease_angle(&shape, crease_angle?) {
         Ok(surface) => surface,
         Err(error) => {
-            let diagnostic = regrasp_base::Diagnostic::new("M204", found.place(&root.span), error.to_string())
+            let diagnostic = regrasp_base::Diagnostic::new("M207", found.place(&root.span), error.to_string())
                 .element("table", "object");
             found.diagnostics.push(diagnostic);
             return None;
@@ -163,7 +163,7 @@ fn placed(
     let shape = match shape::shifted(&read.shape, shift) {
         Ok(shape) => shape,
         Err(reason) => {
-            let diagnostic = table.error("M202", found, format!("cannot be moved to its origin: {reason}"));
+            let diagnostic = table.error("M205", found, format!("cannot be moved to its origin: {reason}"));
             found.diagnostics.push(diagnostic);
             return None;
         }
