@@ -53,11 +53,11 @@ pub(super) fn object(root: &mut Table, files: &mut Files, found: &mut Found) -> 
     table.finish(found);
 
     let (shape, mass, center_of_mass) = placed?;
-    let edge_distance = edge_distance?;
+    let (edge_distance, crease_angle) = (edge_distance?, crease_angle?);
     if let Some(center) = &center {
         center_is_inside(&shape, &center_of_mass, center, found)?;
     }
-    let surface = match Surface::with_crease_angle(&shape, crease_angle?) {
+    let surface = match Surface::with_crease_angle(&shape, crease_angle) {
         Ok(surface) => surface,
         Err(error) => {
             let diagnostic = regrasp_base::Diagnostic::new("M207", found.place(&root.span), error.to_string())
@@ -66,7 +66,7 @@ pub(super) fn object(root: &mut Table, files: &mut Files, found: &mut Found) -> 
             return None;
         }
     };
-    Some(Object { name, shape, surface, mass, center_of_mass, friction: friction?, edge_distance })
+    Some(Object { name, shape, surface, mass, center_of_mass, friction: friction?, edge_distance, crease_angle })
 }
 
 fn friction(entry: &Entry, found: &mut Found) -> Option<f64> {
