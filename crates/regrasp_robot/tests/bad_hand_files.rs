@@ -71,7 +71,7 @@ refused!(
     a_key_that_is_misspelt,
     format!("basse_link = \"palm\"\n{}", with_finger(&format!("tip_link = \"a_tip\"\n{POINT}\ncolour = 1"))),
     [
-        r#"U201 hand.toml:1:1 key "basse_link": is not a key of this table; expected one of format, version, urdf, srdf, base_link, allow, fingers
+        r#"U201 hand.toml:1:1 key "basse_link": is not a key of this table; expected one of format, format_version, urdf, srdf, base_link, allow, fingers
   fix: did you mean base_link?"#,
         r#"U201 hand.toml:10:1 key "colour": is not a key of this table; expected one of name, tip_link, first_joint, tip, rest"#
     ]
