@@ -184,6 +184,7 @@ mod tests {
     }
 
     #[test]
+    #[allow(clippy::print_stdout, reason = "says that it was skipped")]
     fn scanned_objects_have_the_edges_that_their_surfaces_have() {
         let models = std::env::var_os("REGRASP_MODELS").map(PathBuf::from).or_else(|| {
             Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().map(|up| up.join("shared/models")).find(|p| p.is_dir())
