@@ -111,6 +111,27 @@ impl<P: Clone, M: Clone> VisibilityPrm<P, M> {
         edge
     }
 
+    /// Removes the edge that [`VisibilityPrm::edge_between`] gives, if there is one; components may fall apart. Indices
+    /// of later edges go down by one.
+    pub fn remove_edge_between(&mut self, from: usize, to: usize) -> Option<Edge<M>> {
+        let joins = |edge: &Edge<M>| (edge.from, edge.to) == (from, to) || (edge.from, edge.to) == (to, from);
+        let cheapest = (0..self.edges.len())
+            .filter(|&index| joins(&self.edges[index]))
+            .min_by(|&a, &b| self.edges[a].cost.total_cmp(&self.edges[b].cost))?;
+        let removed = self.edges.remove(cheapest);
+        self.components = Components::new();
+        self.edges_of = vec![Vec::new(); self.nodes.len()];
+        for _ in &self.nodes {
+            self.components.push();
+        }
+        for (index, edge) in self.edges.iter().enumerate() {
+            self.edges_of[edge.from].push(index);
+            self.edges_of[edge.to].push(index);
+            self.components.join(edge.from, edge.to);
+        }
+        Some(removed)
+    }
+
     /// Adds a node that is no guard and links it to the nearest node that it sees in each component.
     ///
     /// For a start or goal: its component tells whether the roadmap sees it.
@@ -299,5 +320,21 @@ mod tests {
         assert_eq!((path.nodes, path.cost), (vec![0, 1], 2.0));
         let (edge, forward) = roadmap.edge_between(0, 1).expect("the edge");
         assert_eq!((edge.motion, forward), (2.0, false));
+    }
+
+    #[test]
+    fn a_removed_edge_splits_and_a_parallel_one_keeps_together() {
+        let mut roadmap: VisibilityPrm<Vec<f64>, f64> = VisibilityPrm::new();
+        for i in 0..3 {
+            roadmap.add_node(vec![f64::from(i)], true);
+        }
+        roadmap.add_edge(0, 1, 5.0, 5.0);
+        roadmap.add_edge(1, 0, 2.0, 2.0);
+        roadmap.add_edge(1, 2, 1.0, 1.0);
+        assert_eq!(roadmap.remove_edge_between(0, 1).expect("the cheaper edge").motion, 2.0);
+        assert_eq!(roadmap.path(0, 2).expect("the dearer edge is left").cost, 6.0);
+        assert_eq!(roadmap.remove_edge_between(1, 0).expect("the dearer edge").motion, 5.0);
+        assert!(roadmap.path(0, 2).is_none() && roadmap.components().n_components() == 2);
+        assert!(roadmap.path(2, 1).is_some() && roadmap.remove_edge_between(0, 1).is_none());
     }
 }

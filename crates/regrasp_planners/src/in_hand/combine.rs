@@ -130,16 +130,18 @@ impl ClashTable {
     }
 }
 
-/// The best closed combinations of `options` that fit together, best first. Option 0 of a finger is free when
-/// `keeps_first`, others cost.
+/// The best closed combinations of `options` that fit together, best first. With `least_follow`, option 0 of a finger is
+/// where it is, others cost a relocation, and all must follow at least that share of the way.
 pub fn rank(
     workspace: &mut Workspace,
     options: &[Vec<Candidate>],
     table: &mut ClosureTable,
-    keeps_first: bool,
+    least_follow: Option<f64>,
     n_wanted: usize,
 ) -> Vec<Ranked> {
     let model = workspace.model;
+    let keeps_first = least_follow.is_some();
+    let least_follow = least_follow.unwrap_or(0.0);
     let mut clashes = ClashTable::new(options);
     let n = options.len();
     let all = (1u32 << n) - 1;
@@ -157,6 +159,9 @@ pub fn rank(
             continue;
         }
         let follow = (0..n).map(|f| options[f][choice[f]].follow).fold(1.0, f64::min);
+        if follow < least_follow {
+            continue;
+        }
         rough.push(Ranked { choice, worth: follow - RELOCATION_FEE * n_moved as f64 });
     }
     rough.sort_by(|a, b| b.worth.total_cmp(&a.worth));

@@ -44,23 +44,33 @@ pub fn draw_grasp(search: &mut Search, world_from_object: &Pose, target: &Pose) 
         if options.len() < model.n_fingers() {
             continue;
         }
-        let mut table = ClosureTable::new(model, &options);
-        let ranked = rank(&mut search.workspace, &options, &mut table, false, 4);
-        if ranked.is_empty() {
-            search.tally.add(Reason::NotClosed);
-        }
-        for combination in ranked {
-            let chosen = |f: usize| &options[f][combination.choice[f]];
-            let contacts: Contacts = (0..options.len()).map(|f| chosen(f).contact).collect();
-            let joints: HandJoints = (0..options.len()).map(|f| chosen(f).joints.clone()).collect();
-            search.workspace.set(world_from_object, &joints, &contacts);
-            if search.workspace.is_clear(TipMode::AllHold) {
-                return Ok(Some(GraspState { world_from_object: *world_from_object, contacts, joints }));
-            }
-            if let Some(pair) = search.workspace.blocking_pair {
-                search.tally.add(Reason::TooNear(pair));
-            }
+        match choose_grasp(search, world_from_object, &options) {
+            Some(state) => return Ok(Some(state)),
+            None => search.tally.add(Reason::NotClosed),
         }
     }
     Ok(None)
 }
+
+/// The best grasp that `options` make, closed and clear.
+pub fn choose_grasp(search: &mut Search, world_from_object: &Pose, options: &[Vec<Candidate>]) -> Option<GraspState> {
+    let model = search.model();
+    let mut table = ClosureTable::new(model, options);
+    let ranked = rank(&mut search.workspace, options, &mut table, None, GRASPS_TRIED);
+    for combination in ranked {
+        let chosen = |f: usize| &options[f][combination.choice[f]];
+        let contacts: Contacts = (0..options.len()).map(|f| chosen(f).contact).collect();
+        let joints: HandJoints = (0..options.len()).map(|f| chosen(f).joints.clone()).collect();
+        search.workspace.set(world_from_object, &joints, &contacts);
+        if search.workspace.is_clear(TipMode::AllHold) {
+            return Some(GraspState { world_from_object: *world_from_object, contacts, joints });
+        }
+        if let Some(pair) = search.workspace.blocking_pair {
+            search.tally.add(Reason::TooNear(pair));
+        }
+    }
+    None
+}
+
+/// Closed grasps that are tested for collision.
+const GRASPS_TRIED: usize = 4;

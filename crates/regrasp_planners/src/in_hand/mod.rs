@@ -5,22 +5,38 @@
 mod attempts;
 /// Contacts that a finger could take, and how far it could follow with them.
 mod candidates;
+/// The baseline of paper 000.
+mod classic;
 /// Combinations of candidates: closure, release, worth.
 mod combine;
+/// Joining components of a roadmap.
+mod connect;
+/// Paths in GS_n cut into transfers and regrasps.
+mod decompose;
 /// Start and goal as the query gives them.
 mod endpoints;
+/// Sampling GS_n.
+mod explore;
 /// The gait tree.
 mod gait;
+/// Linear paths in GS_n.
+mod grasp_path;
 /// Grasps at a given object pose.
 mod grasps;
+/// Links between grasps.
+mod link;
 /// The scene prepared for planning.
 mod model;
+/// Candidates gathered at one pose.
+mod pool;
 /// The plan as it is written to a file.
 mod record;
 /// Sequences of relocations from one grasp to another.
 mod regrasp;
 /// The relocation of one finger.
 mod relocate;
+#[cfg(test)]
+mod roadmap_tests;
 /// What all methods share.
 mod search;
 /// Settings.
@@ -35,6 +51,8 @@ mod tally;
 mod transfer;
 /// Validating a plan once at the planner's resolution: the floor of planning time.
 mod validate;
+/// The method of paper 000.
+mod visibility;
 /// Configurations and continuous collision tests.
 mod workspace;
 
@@ -76,7 +94,7 @@ pub fn plan_in_hand(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Plan, Failure> {
     settings.validate().expect("settings are validated where they are read");
-    let model = Model::new(scene, settings);
+    let model = Model::new(scene, &effective(settings));
     let (start_pose, goal_pose) = (query.world_from_object_start, query.world_from_object_goal);
     refuse_impossible(&model)?;
     refuse_buried_object(&model, End::Start, &start_pose)?;
@@ -85,7 +103,8 @@ pub fn plan_in_hand(
     let start_grasp = given_grasp(&model, End::Start, &start_pose, &query.start_grasp, &mut rng)?;
     let goal_grasp = given_grasp(&model, End::Goal, &goal_pose, &query.goal_grasp, &mut rng)?;
 
-    let found = run_attempts(settings.n_threads, settings.restart_work, budget.max_work, |index, work, winner| {
+    let base_work = if settings.method == Method::Gait { settings.restart_work } else { budget.max_work };
+    let found = run_attempts(settings.n_threads, base_work, budget.max_work, |index, work, winner| {
         let poses = (start_pose, goal_pose);
         let mut search = Search::new(&model, poses, (seed, index), (budget, work), winner, progress);
         let solution = solve(&mut search, start_grasp.clone(), goal_grasp.as_ref());
@@ -99,6 +118,15 @@ pub fn plan_in_hand(
     }
 }
 
+/// The settings that a method really plans with: those of paper 000 have the paper's release rule (section 4.2.2).
+fn effective(settings: &InHandSettings) -> InHandSettings {
+    let mut effective = settings.clone();
+    if settings.method != Method::Gait {
+        effective.release_rule = ReleaseRule::EverywhereEveryFinger;
+    }
+    effective
+}
+
 /// One attempt: search, then shortcuts.
 fn solve(
     search: &mut Search,
@@ -106,7 +134,9 @@ fn solve(
     goal: Option<&state::GraspState>,
 ) -> Result<(state::GraspState, Vec<state::Step>), search::Stop> {
     let (start, mut steps) = match search.model().settings.method {
-        Method::Gait | Method::Visibility | Method::Classic => gait::grow(search, start, goal)?,
+        Method::Gait => gait::grow(search, start, goal)?,
+        Method::Visibility => visibility::build(search, start, goal)?,
+        Method::Classic => classic::build(search, start, goal)?,
     };
     shorten::shorten(search, &start, &mut steps, goal.is_none());
     Ok((start, steps))

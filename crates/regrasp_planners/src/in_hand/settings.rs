@@ -90,6 +90,10 @@ pub struct InHandSettings {
     pub wander_angle: f64,
     /// Share of extensions towards the goal, the others towards a pose nearby (real-hands-notes, 2: 0.75).
     pub goal_share: f64,
+    /// What a try at a pose costs when the next pose is chosen, as a share of the object's radius.
+    pub try_fee: f64,
+    /// Share of extensions whose relocations need not bring the object on: they turn the grasp over in dead ends.
+    pub aimless_share: f64,
     /// New contacts looked at per finger and extension. By measurement, see docs/benchmarks.md.
     pub candidates: usize,
     /// Of these, how many are kept for combining.
@@ -100,6 +104,9 @@ pub struct InHandSettings {
     pub shortcuts: usize,
     /// Schedule of alpha, for the methods of paper 000.
     pub alpha: Alpha,
+    /// Share of the poses that the methods of paper 000 draw around the way from start to goal. The others are turned
+    /// anyhow, as the paper has all (section 4.2.2): with 0 both methods take several times as long, `Classic` most.
+    pub guided_share: f64,
 }
 
 impl Default for InHandSettings {
@@ -119,11 +126,14 @@ impl Default for InHandSettings {
             wander_distance: 0.012,
             wander_angle: 0.4,
             goal_share: 0.7,
+            try_fee: 0.1,
+            aimless_share: 0.5,
             candidates: 6,
             candidates_kept: 3,
             restart_work: 40_000,
             shortcuts: 20,
             alpha: Alpha::Constant { value: 0.9 },
+            guided_share: 0.9,
         }
     }
 }
@@ -148,6 +158,7 @@ impl InHandSettings {
             ("contact_allowance", self.contact_allowance),
             ("limit_margin", self.limit_margin),
             ("goal_share", self.goal_share),
+            ("guided_share", self.guided_share),
         ] {
             if !(0.0..=1.0).contains(&value) {
                 return Err(format!("{name} is {value}; it must be between 0 and 1"));

@@ -16,6 +16,10 @@ pub enum Reason {
     OutOfReach,
     /// A transfer stopped at once: this pair of bodies was too near.
     TooNear(usize),
+    /// Between two grasps a contact would have to cross an edge of the object.
+    Crease,
+    /// A path in GS_n could not be cut into transfers and regrasps.
+    NotDecomposed,
 }
 
 /// Counts per reason.
@@ -50,6 +54,10 @@ impl Tally {
                     Reason::NotClosed => "no closed grasp of which a finger may let go".into(),
                     Reason::NoWayOver => "no free way for the fingers to the next grasp".into(),
                     Reason::OutOfReach => "a finger reaches no farther while the object moves".into(),
+                    Reason::Crease => "a contact would have to slide over an edge of the object".into(),
+                    Reason::NotDecomposed => {
+                        "a path with sliding contacts has no transfers and regrasps near it".into()
+                    }
                     Reason::TooNear(pair) => {
                         let pair = &model.pairs[pair];
                         format!("\"{}\" comes too near \"{}\"", model.bodies[pair.a].name, model.bodies[pair.b].name)
@@ -73,6 +81,8 @@ impl Tally {
                 Reason::NoWayOver => "no_way_over",
                 Reason::OutOfReach => "out_of_reach",
                 Reason::TooNear(_) => "too_near",
+                Reason::Crease => "crease",
+                Reason::NotDecomposed => "not_decomposed",
             };
             *counts.entry(key.to_owned()).or_default() += count;
         }

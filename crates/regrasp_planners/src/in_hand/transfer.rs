@@ -9,7 +9,7 @@ use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::{Coordinates, IkSettings, Preference};
 
 /// Share of the way to the preferred direction that one step of a redundant finger takes. By hand.
-const PREFERENCE_WEIGHT: f64 = 0.3;
+const PREFERENCE_WEIGHT: f64 = 1.0;
 
 /// What is asked of the inverse kinematics of a finger that touches with `normal_in_world`.
 pub fn ik_settings(model: &Model, finger: usize, normal_in_world: UnitVector) -> IkSettings {

@@ -40,6 +40,8 @@ pub enum TipMode {
 
 /// Largest number of times a step is halved before it counts as a collision.
 const MAX_HALVINGS: u32 = 4;
+/// Directions tried between two that each separate at one end of a step.
+const MAX_BETWEEN: usize = 5;
 /// Separation beyond which a search for a better direction stops, in metres.
 const ENOUGH: f64 = 0.004;
 
@@ -189,6 +191,27 @@ impl<'a> Workspace<'a> {
             place_finger(self.model, &mut self.next, finger, &joints[finger]);
         }
         self.try_step(None, mode, MAX_HALVINGS)
+    }
+
+    /// Goes to a configuration with other contacts; true when it is clear.
+    ///
+    /// What lies between is not tested: contacts that slide are no motion that is carried out (paths in GS_n, paper 000,
+    /// section 4.1). How far bodies move only spares tests of what is far apart.
+    pub fn slide(&mut self, world_from_object: &Pose, joints: &HandJoints, contacts: &Contacts) -> bool {
+        self.work += 1;
+        self.contacts.clone_from(contacts);
+        place_object(self.model, &mut self.next, world_from_object);
+        for finger in 0..self.model.n_fingers() {
+            place_finger(self.model, &mut self.next, finger, &joints[finger]);
+        }
+        self.bound_motion(None);
+        for (slack, pair) in self.slack.iter_mut().zip(&self.model.pairs) {
+            *slack -= self.motion[pair.a] + self.motion[pair.b];
+        }
+        self.now.clone_from(&self.next);
+        self.motion.fill(0.0);
+        self.deviation.fill(0.0);
+        (0..self.model.pairs.len()).all(|pair| self.pair_is_clear(pair, TipMode::AllHold))
     }
 
     /// Moves one finger if the step is clear; stays otherwise.
@@ -347,8 +370,37 @@ impl<'a> Workspace<'a> {
                 self.slack[index] = gap;
                 return true;
             }
+            if self.apart_between(index, best_now, required_at_ends) {
+                return true;
+            }
         }
         self.trees_apart(index, required)
+    }
+
+    /// Looks for a direction that separates at both ends, between `best_now`, which does at `now`, and the stored one,
+    /// which does at `next`: long links that turn have both no room for the other's.
+    fn apart_between(&mut self, index: usize, best_now: Vector, required_at_ends: f64) -> bool {
+        let pair = self.model.pairs[index];
+        let (a, b) = (&self.model.bodies[pair.a].shape, &self.model.bodies[pair.b].shape);
+        let (mut good_now, mut good_next) = (best_now, self.directions[index]);
+        let hints = &mut self.hints[index];
+        for _ in 0..MAX_BETWEEN {
+            let Some(middle) = (good_now + good_next).try_normalize(1e-6) else { return false };
+            let (now, next) = (&self.now.placements, &self.next.placements);
+            let gap_now = gap_along(&middle, a, &now[pair.a], b, &now[pair.b], hints);
+            let gap_next = gap_along(&middle, a, &next[pair.a], b, &next[pair.b], hints);
+            match (gap_now >= required_at_ends, gap_next >= required_at_ends) {
+                (true, true) => {
+                    self.directions[index] = middle;
+                    self.slack[index] = gap_next;
+                    return true;
+                }
+                (true, false) => good_now = middle,
+                (false, true) => good_next = middle,
+                (false, false) => return false,
+            }
+        }
+        false
     }
 
     /// The last word where a hull is larger than its mesh: exact triangles, with the relative motion of the step.

@@ -1,0 +1,25 @@
+//! The baseline of paper 000, section 5.1, "classic method": a visibility PRM whose local method is one transfer-regrasp
+//! or regrasp-transfer.
+
+use super::explore::{explore, roadmap_of};
+use super::link::LocalMethod;
+use super::search::{Search, Stop};
+use super::state::{GraspState, Step};
+use super::visibility::{ends, note_nearest, solution};
+
+/// Looks for motions from `start` to the goal pose and `goal_grasp`; what is not given is drawn.
+pub fn build(
+    search: &mut Search,
+    start: Option<GraspState>,
+    goal_grasp: Option<&GraspState>,
+) -> Result<(GraspState, Vec<Step>), Stop> {
+    let (start, goal) = ends(search, start, goal_grasp)?;
+    let mut roadmap = roadmap_of(search, &start, &goal, LocalMethod::TransferRegrasp)?;
+    loop {
+        if let Some(steps) = solution(search, &mut roadmap)? {
+            return Ok((start, steps));
+        }
+        explore(search, &mut roadmap, LocalMethod::TransferRegrasp)?;
+        note_nearest(search, &roadmap);
+    }
+}

@@ -1,0 +1,57 @@
+//! transform_path(): cuts a path in GS_n into transfers and regrasps by halving it (paper 000, section 4.3, algorithm 2).
+
+use super::grasp_path::GraspPath;
+use super::link::single_sequence;
+use super::search::{Search, Stop};
+use super::state::{GraspState, Step};
+
+/// Halvings after which a piece counts as one that cannot be decomposed. The paper stops where the object's poses are
+/// close; a path may also have equal poses at both ends (in-hand-notes, 4.5).
+const MAX_HALVINGS: u32 = 11;
+
+/// A piece of a path: its ends, with their parameters.
+struct Piece<'p> {
+    path: &'p GraspPath,
+    from: f64,
+    to: f64,
+    end: &'p GraspState,
+}
+
+/// Motions from `start` to `end`, the ends of `path`; None when a piece cannot be decomposed.
+pub fn decompose(
+    search: &mut Search,
+    path: &GraspPath,
+    start: &GraspState,
+    end: &GraspState,
+) -> Result<Option<Vec<Step>>, Stop> {
+    let mut steps = Vec::new();
+    let is_whole = transform_path(search, start, &Piece { path, from: 0.0, to: 1.0, end }, MAX_HALVINGS, &mut steps)?;
+    Ok(is_whole.then_some(steps))
+}
+
+/// Appends the motions of one piece; false when they were not found.
+fn transform_path(
+    search: &mut Search,
+    start: &GraspState,
+    piece: &Piece,
+    halvings: u32,
+    steps: &mut Vec<Step>,
+) -> Result<bool, Stop> {
+    search.check()?;
+    if let Some(sequence) = single_sequence(search, start, piece.end) {
+        steps.extend(sequence);
+        return Ok(true);
+    }
+    if halvings == 0 {
+        return Ok(false);
+    }
+    let half = 0.5 * (piece.from + piece.to);
+    let Some(middle) = piece.path.at(search.model(), half) else { return Ok(false) };
+    let first = Piece { to: half, end: &middle, ..*piece };
+    if !transform_path(search, start, &first, halvings - 1, steps)? {
+        return Ok(false);
+    }
+    // Where no finger had to move, the joints are the transfer's own.
+    let reached = steps.last().map_or(start, |step| &step.end).clone();
+    transform_path(search, &reached, &Piece { from: half, ..*piece }, halvings - 1, steps)
+}

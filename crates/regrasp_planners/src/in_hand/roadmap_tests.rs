@@ -1,0 +1,164 @@
+//! Tests of what the methods of paper 000 are made of, from inside.
+
+use super::decompose::decompose;
+use super::explore::draw_state;
+use super::grasp_path::GraspPath;
+use super::link::reversed;
+use super::model::Model;
+use super::search::Search;
+use super::settings::{InHandSettings, Method};
+use super::state::{GraspState, Motion, Step};
+use super::workspace::HandJoints;
+use regrasp_base::Budget;
+use regrasp_geometry::collision::Placement;
+use regrasp_geometry::{Point, Pose};
+use regrasp_grasp::Contact;
+use regrasp_plan::check::closure::{Body, margin};
+use regrasp_robot::import::LoadOptions;
+use regrasp_scene::{LoadedScene, load_scene};
+use std::path::Path;
+use std::sync::atomic::AtomicUsize;
+
+fn scene(name: &str) -> LoadedScene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes").join(name);
+    load_scene(&path, &LoadOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"))
+}
+
+/// Runs `test` on a search of the bundled scene `name`.
+fn with_search(name: &str, test: impl FnOnce(&mut Search)) {
+    let loaded = scene(name);
+    let settings = InHandSettings { method: Method::Visibility, ..InHandSettings::default() };
+    let model = Model::new(&loaded.scene, &super::effective(&settings));
+    let query = loaded.task.query(0);
+    let poses = (query.world_from_object_start, query.world_from_object_goal);
+    let (budget, winner) = (Budget::unlimited(), AtomicUsize::new(usize::MAX));
+    test(&mut Search::new(&model, poses, (0, 0), (&budget, u64::MAX), &winner, &|_| {}));
+}
+
+/// Pairs of random grasps with a path between them.
+fn linked_pairs(search: &mut Search, n_wanted: usize) -> Vec<(GraspState, GraspState, GraspPath)> {
+    let mut found = Vec::new();
+    for _ in 0..200 * n_wanted {
+        let (Some(a), Some(b)) = (draw_state(search), draw_state(search)) else { continue };
+        if let Some(path) = GraspPath::between(search, &a, &b) {
+            found.push((a, b, path));
+            if found.len() == n_wanted {
+                return found;
+            }
+        }
+    }
+    panic!("only {} of {n_wanted} pairs see each other", found.len());
+}
+
+fn tips_in_object(model: &Model, pose: &Pose, joints: &HandJoints) -> Vec<Point> {
+    let tip = |f: usize| Placement::from(pose).point_to_child(&model.fingers[f].ik.tip(&joints[f]));
+    (0..model.n_fingers()).map(tip).collect()
+}
+
+fn tip_over(model: &Model, finger: usize, contact: &Contact) -> Point {
+    contact.point_in_object + contact.normal_in_object.into_inner() * model.fingers[finger].tip_radius
+}
+
+#[test]
+fn paths_on_the_sphere_follow_great_circles_and_stay_closed_without_any_finger() {
+    with_search("sphere_90x.toml", |search| {
+        let model = search.model();
+        let body = Body {
+            center_of_mass: model.scene.object.center_of_mass,
+            torque_scale: model.frame.torque_scale,
+            friction: model.frame.friction,
+        };
+        for (a, b, path) in linked_pairs(search, 12) {
+            for k in 1..8 {
+                let t = f64::from(k) / 8.0;
+                let state = path.at(model, t).expect("a state of a valid path");
+                let tips = tips_in_object(model, &state.world_from_object, &state.joints);
+                for f in 0..model.n_fingers() {
+                    let (from, to) = (a.contacts[f].point_in_object.coords, b.contacts[f].point_in_object.coords);
+                    let angle = from.angle(&to);
+                    let on_arc = (from * ((1.0 - t) * angle).sin() + to * (t * angle).sin()) / angle.sin();
+                    assert!((state.contacts[f].point_in_object.coords - on_arc).norm() < 1e-9);
+                    assert!((tips[f] - tip_over(model, f, &state.contacts[f])).norm() < 1e-8);
+                    let others: Vec<Contact> =
+                        (0..model.n_fingers()).filter(|&g| g != f).map(|g| state.contacts[g]).collect();
+                    assert!(margin(&others, &body) > 0.0, "without finger {f} at {t}");
+                }
+            }
+        }
+    });
+}
+
+#[test]
+fn paths_on_the_box_cross_no_edge() {
+    with_search("box_90x.toml", |search| {
+        let model = search.model();
+        let object = &model.scene.object;
+        for (a, b, path) in linked_pairs(search, 3) {
+            for k in 1..8 {
+                let t = f64::from(k) / 8.0;
+                let state = path.at(model, t).expect("a state of a valid path");
+                for f in 0..model.n_fingers() {
+                    let (from, to) = (a.contacts[f], b.contacts[f]);
+                    assert!(from.normal_in_object.dot(&to.normal_in_object) > 1.0 - 1e-9, "one face");
+                    // On one face of a box the shortest way is straight.
+                    let straight = from.point_in_object + (to.point_in_object - from.point_in_object) * t;
+                    let point = state.contacts[f].point_in_object;
+                    assert!((point - straight).norm() < 1e-9);
+                    assert!(object.surface.crease_distance(&object.surface.project(&point)) >= object.edge_distance);
+                }
+            }
+        }
+    });
+}
+
+/// Every motion of `steps` does what its kind may do: transfers hold all contacts, regrasps move one finger and nothing
+/// else, and each begins where the one before ended.
+fn assert_feasible(model: &Model, start: &GraspState, steps: &[Step]) {
+    let mut state = start;
+    for step in steps {
+        match &step.motion {
+            Motion::Transfer(moments) => {
+                assert!(step.end.contacts == state.contacts);
+                for moment in moments {
+                    let tips = tips_in_object(model, &moment.world_from_object, &moment.joints);
+                    for (f, tip) in tips.iter().enumerate() {
+                        assert!((tip - tip_over(model, f, &state.contacts[f])).norm() < 1e-6);
+                    }
+                }
+                let last = moments.last().expect("a transfer has an end");
+                assert!(last.world_from_object == step.end.world_from_object && last.joints == step.end.joints);
+            }
+            Motion::Regrasp { finger, path } => {
+                assert!(step.end.world_from_object == state.world_from_object);
+                assert!(path.last() == Some(&step.end.joints[*finger]));
+                for f in (0..model.n_fingers()).filter(|f| f != finger) {
+                    assert!(step.end.contacts[f] == state.contacts[f] && step.end.joints[f] == state.joints[f]);
+                }
+            }
+        }
+        state = &step.end;
+    }
+}
+
+#[test]
+fn decomposed_paths_are_feasible_motions_between_their_ends_forwards_and_backwards() {
+    with_search("tight_sphere_180z.toml", |search| {
+        let model = search.model();
+        let (mut n_decomposed, mut n_divided) = (0, 0);
+        for (a, b, path) in linked_pairs(search, 12) {
+            let Some(steps) = decompose(search, &path, &a, &b).expect("no limits") else { continue };
+            n_decomposed += 1;
+            n_divided += usize::from(steps.iter().filter(|s| matches!(s.motion, Motion::Transfer(_))).count() > 1);
+            assert_feasible(model, &a, &steps);
+            let end = &steps.last().expect("different grasps").end;
+            assert!(end.contacts == b.contacts);
+            assert!((end.world_from_object.translation.vector - b.world_from_object.translation.vector).norm() < 1e-9);
+            let back = reversed(&a, &steps);
+            assert_feasible(model, end, &back);
+            let there_again = reversed(end, &back);
+            assert!(format!("{there_again:?}") == format!("{steps:?}"), "backwards twice is forwards");
+        }
+        assert!(n_decomposed >= 10, "the reduction property: {n_decomposed} of 12");
+        assert!(n_divided >= 1, "no path had to be divided: the test asks too little");
+    });
+}

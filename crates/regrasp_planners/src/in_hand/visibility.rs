@@ -1,0 +1,122 @@
+//! The method of paper 000: a visibility PRM in GS_n, components joined through GS_(n-1), paths in GS_n decomposed
+//! (algorithm 1; sections 4.2.1 and 5.2).
+
+use super::connect::{TriedPairs, connect_components};
+use super::decompose::decompose;
+use super::explore::{draw_state_at, explore, roadmap_of};
+use super::link::{Link, LocalMethod, Roadmap, reversed};
+use super::search::{Search, Stop};
+use super::settings::Alpha;
+use super::state::{GraspState, Step};
+use super::tally::Reason;
+use regrasp_geometry::Pose;
+use std::rc::Rc;
+
+/// Nodes of the ends of the query.
+const START: usize = 0;
+const GOAL: usize = 1;
+
+/// Looks for motions from `start` to the goal pose and `goal_grasp`; what is not given is drawn.
+pub fn build(
+    search: &mut Search,
+    start: Option<GraspState>,
+    goal_grasp: Option<&GraspState>,
+) -> Result<(GraspState, Vec<Step>), Stop> {
+    let (start, goal) = ends(search, start, goal_grasp)?;
+    let mut roadmap = roadmap_of(search, &start, &goal, LocalMethod::GraspPath)?;
+    let mut tried = TriedPairs::new();
+    let mut n_merges = 0;
+    loop {
+        while !roadmap.components().same(START, GOAL) {
+            if search.rng.unit() < alpha(&search.model().settings.alpha, n_merges, roadmap.nodes().len()) {
+                explore(search, &mut roadmap, LocalMethod::GraspPath)?;
+            } else {
+                n_merges += 1;
+                connect_components(search, &mut roadmap, &mut tried)?;
+            }
+            note_nearest(search, &roadmap);
+        }
+        if let Some(steps) = solution(search, &mut roadmap)? {
+            return Ok((start, steps));
+        }
+    }
+}
+
+/// Grasps at start and goal: as given, else drawn with every n-1 fingers closed.
+pub fn ends(
+    search: &mut Search,
+    start: Option<GraspState>,
+    goal_grasp: Option<&GraspState>,
+) -> Result<(GraspState, GraspState), Stop> {
+    let (start_pose, goal_pose) = (search.start, search.goal);
+    let start = match start {
+        Some(state) => state,
+        None => draw_end(search, &start_pose)?,
+    };
+    search.note(&start);
+    let goal = match goal_grasp {
+        Some(state) => state.clone(),
+        None => draw_end(search, &goal_pose)?,
+    };
+    Ok((start, goal))
+}
+
+fn draw_end(search: &mut Search, pose: &Pose) -> Result<GraspState, Stop> {
+    loop {
+        search.check()?;
+        if let Some(state) = draw_state_at(search, pose) {
+            return Ok(state);
+        }
+    }
+}
+
+/// The share of exploration (paper 000, section 5.2), after `n_merges` attempts to merge components and with `n_nodes`.
+fn alpha(schedule: &Alpha, n_merges: u32, n_nodes: usize) -> f64 {
+    match *schedule {
+        Alpha::Constant { value } => value,
+        Alpha::Decreasing { start, step, end } => (start - step * f64::from(n_merges)).max(end),
+        Alpha::Adaptive { start, end, scale } => (start / (1.0 + n_nodes as f64 / scale)).max(end),
+    }
+}
+
+/// Notes the newest node if it is joined to the start.
+pub fn note_nearest(search: &mut Search, roadmap: &Roadmap) {
+    let newest = roadmap.nodes().len() - 1;
+    if newest > GOAL && roadmap.components().same(START, newest) {
+        search.note(&roadmap.nodes()[newest].point);
+    }
+}
+
+/// The motions along the cheapest path from start to goal, its paths in GS_n decomposed.
+///
+/// None when one could not be: that edge is then deleted, and the ends may be apart again (in-hand-notes, 4.4).
+pub fn solution(search: &mut Search, roadmap: &mut Roadmap) -> Result<Option<Vec<Step>>, Stop> {
+    let Some(path) = roadmap.path(START, GOAL) else { return Ok(None) };
+    let mut steps = Vec::new();
+    for pair in path.nodes.windows(2) {
+        let (edge, is_forward) = roadmap.edge_between(pair[0], pair[1]).expect("a path goes along edges");
+        let (from, to) = (edge.from, edge.to);
+        let link = edge.motion.clone();
+        let start = roadmap.nodes()[from].point.clone();
+        let motions = match link {
+            Link::Steps(motions) => motions,
+            Link::Grasp(path) => {
+                let found = decompose(search, &path, &start, &roadmap.nodes()[to].point)?;
+                let removed = roadmap.remove_edge_between(from, to).expect("the edge just decomposed");
+                let Some(motions) = found else {
+                    search.tally.add(Reason::NotDecomposed);
+                    return Ok(None);
+                };
+                let motions = Rc::new(motions);
+                roadmap.add_edge(from, to, Link::Steps(motions.clone()), removed.cost);
+                motions
+            }
+        };
+        if is_forward {
+            steps.extend(motions.iter().cloned());
+        } else {
+            steps.extend(reversed(&start, &motions));
+        }
+    }
+    Ok(Some(steps))
+}

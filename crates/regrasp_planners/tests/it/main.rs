@@ -1,0 +1,3 @@
+//! Tests of the planners through their public functions, on the bundled scenes.
+
+mod in_hand_methods;
