@@ -17,7 +17,7 @@ mod decompose;
 mod endpoints;
 /// Sampling GS_n.
 mod explore;
-/// The gait tree.
+/// Two gait trees that grow until they meet.
 mod gait;
 /// Linear paths in GS_n.
 mod grasp_path;
@@ -49,6 +49,8 @@ mod state;
 mod tally;
 /// Transfer paths.
 mod transfer;
+/// A tree of grasps that grows by gaits.
+mod tree;
 /// Validating a plan once at the planner's resolution: the floor of planning time.
 mod validate;
 /// The method of paper 000.

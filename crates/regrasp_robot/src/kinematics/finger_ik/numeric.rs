@@ -18,7 +18,9 @@ use regrasp_geometry::{Point, Vector};
 /// Seeds in the table.
 const N_SEEDS: usize = 96;
 /// Seeds tried for one solution before giving up.
-const N_TRIES: usize = 6;
+const N_TRIES: usize = 4;
+/// Seeds tried after that without the preference.
+const N_LAST_TRIES: usize = 2;
 /// Newton steps from one seed.
 const MAX_STEPS: usize = 16;
 /// Newton steps of a warm start.
@@ -133,7 +135,7 @@ impl NumericIk {
             return found;
         }
         // The preference chose seeds too far from the target: reaching it comes first.
-        let nearest = self.nearest_seeds::<N_TRIES>(target, None, N_TRIES);
+        let nearest = self.nearest_seeds::<N_LAST_TRIES>(target, None, N_LAST_TRIES);
         nearest.into_iter().find_map(|seed| self.solve_from_seed(target, seed, None, settings))
     }
 

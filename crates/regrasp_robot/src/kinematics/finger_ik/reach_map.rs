@@ -4,9 +4,9 @@ use crate::kinematics::chain::Chain;
 use regrasp_geometry::{Point, Vector};
 
 /// Configurations sampled for the map.
-const N_SAMPLES: usize = 20_000;
+const N_SAMPLES: usize = 60_000;
 /// Cells along the longest side of the reached box.
-const N_CELLS: f64 = 40.0;
+const N_CELLS: f64 = 64.0;
 
 /// Cells that some sampled configuration reaches, grown by one cell all round.
 #[derive(Debug, Clone)]

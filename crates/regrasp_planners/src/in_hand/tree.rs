@@ -1,0 +1,306 @@
+//! A tree of grasps that grows from one end of the query by gaits: relocate fingers with look-ahead, then transfer as far
+//! as the hand can follow. In-hand-notes, section 3, method E; real-hands-notes, section 2, rule F2.
+
+use super::candidates::{Candidate, Way, draw_candidates, follow_share};
+use super::combine::{ClosureTable, rank, releasable};
+use super::grasps::choose_grasp;
+use super::pool::Pool;
+use super::regrasp::{Tried, regrasp};
+use super::relocate::{Foothold, can_lift, lift_is_within_reach};
+use super::search::Search;
+use super::state::{GraspState, Moment, Motion, Step};
+use super::tally::Reason;
+use super::transfer::transfer;
+use regrasp_base::Rng;
+use regrasp_geometry::Pose;
+use regrasp_geometry::collision::Placement;
+
+/// Combinations whose relocations are tried in one extension.
+const COMBINATIONS: usize = 16;
+/// Share of the way that relocations must gain otherwise.
+const LEAST_GAIN: f64 = 0.01;
+/// Least share of a transfer that is worth a node.
+const LEAST_SHARE: f64 = 0.05;
+
+/// A grasp that can be reached from the tree's end of the query.
+pub struct Node {
+    /// The grasp.
+    pub state: GraspState,
+    /// None for a grasp at the tree's end of the query.
+    pub parent: Option<usize>,
+    /// Motions from the parent's state to this one.
+    pub steps: Vec<Step>,
+    /// Extensions tried from here.
+    pub n_tries: u32,
+    /// Index of its pose in [`Tree::places`].
+    pub place: usize,
+}
+
+/// A pose of the object that nodes stand at.
+pub struct Place {
+    /// Candidates gathered there.
+    pub pool: Pool,
+    /// Nodes that stand there.
+    pub nodes: Vec<usize>,
+    /// Extensions tried from its nodes.
+    pub n_tries: u32,
+}
+
+/// All that was reached from one end of the query.
+pub struct Tree {
+    /// Nodes.
+    pub nodes: Vec<Node>,
+    /// Poses; the first is that of the tree's end of the query.
+    pub places: Vec<Place>,
+    /// The pose at the other end.
+    pub aim: Pose,
+    /// Grasps tried at its own end.
+    n_sown: u32,
+    /// True when the planner chooses the grasp at its own end.
+    pub root_is_free: bool,
+}
+
+impl Tree {
+    /// The tree that grows from `home` towards `aim`, with the grasp `given` at home if one is.
+    pub fn new(search: &mut Search, home: &Pose, aim: &Pose, given: Option<&GraspState>) -> Self {
+        let mut tree =
+            Tree { nodes: Vec::new(), places: Vec::new(), aim: *aim, n_sown: 0, root_is_free: given.is_none() };
+        tree.add_place(search, home);
+        if let Some(state) = given {
+            tree.add_root(state.clone());
+        }
+        tree
+    }
+
+    fn add_place(&mut self, search: &Search, world_from_object: &Pose) -> usize {
+        let pool = Pool::new(world_from_object, &self.aim, search.model().n_fingers());
+        self.places.push(Place { pool, nodes: Vec::new(), n_tries: 0 });
+        self.places.len() - 1
+    }
+
+    fn add_node(&mut self, node: Node) -> usize {
+        self.places[node.place].nodes.push(self.nodes.len());
+        self.nodes.push(node);
+        self.nodes.len() - 1
+    }
+
+    fn add_root(&mut self, state: GraspState) -> usize {
+        self.add_node(Node { state, parent: None, steps: Vec::new(), n_tries: 0, place: 0 })
+    }
+
+    /// The state at the tree's end of the query and all steps from there to `node`.
+    pub fn trace(&self, mut node: usize) -> (GraspState, Vec<Step>) {
+        let mut pieces = Vec::new();
+        while let Some(parent) = self.nodes[node].parent {
+            pieces.push(self.nodes[node].steps.clone());
+            node = parent;
+        }
+        pieces.reverse();
+        (self.nodes[node].state.clone(), pieces.into_iter().flatten().collect())
+    }
+
+    /// One step of growth towards `target`: the new node, if there is one.
+    pub fn grow(&mut self, search: &mut Search, target: &Pose) -> Option<usize> {
+        match pick(search, self, target) {
+            Some(node) => {
+                self.nodes[node].n_tries += 1;
+                let place = self.nodes[node].place;
+                self.places[place].n_tries += 1;
+                if self.nodes[node].n_tries == 1 && self.nodes[node].parent.is_none() && !self.root_is_free {
+                    // A given grasp is first taken as far as it goes by itself.
+                    return advance(search, self, node, target, Vec::new());
+                }
+                extend(search, self, node, target)
+            }
+            None => sow(search, self),
+        }
+    }
+}
+
+/// The node to extend; None for a new grasp at the tree's end of the query.
+///
+/// Poses are weighed, not nodes: a pose collects grasps quickly, and what stands there often fails alike. Often it is the
+/// nearest pose to the target, with a fee for each try, else any; of its nodes one of those tried least.
+fn pick(search: &mut Search, tree: &Tree, target: &Pose) -> Option<usize> {
+    let places = &tree.places;
+    let mut chosen = None;
+    if search.rng.chance(ANYWHERE_SHARE) {
+        chosen = Some(search.rng.below(places.len()));
+    } else {
+        let fee = search.model().settings.try_fee * search.model().turn_length();
+        let mut least = f64::INFINITY;
+        if tree.root_is_free {
+            least = search.distance(places[0].pool.world_from_object(), target) + fee * f64::from(tree.n_sown);
+        }
+        for (index, place) in places.iter().enumerate() {
+            let distance = search.distance(place.pool.world_from_object(), target) + fee * f64::from(place.n_tries);
+            if distance < least && !place.nodes.is_empty() {
+                (least, chosen) = (distance, Some(index));
+            }
+        }
+    }
+    let nodes = &places[chosen?].nodes;
+    let draw = |search: &mut Search| (!nodes.is_empty()).then(|| nodes[search.rng.below(nodes.len())]);
+    let (one, other) = (draw(search)?, draw(search)?);
+    Some(if tree.nodes[other].n_tries < tree.nodes[one].n_tries { other } else { one })
+}
+
+/// Share of extensions from a pose taken at random.
+const ANYWHERE_SHARE: f64 = 0.25;
+
+/// One extension: candidates for every finger, the best combinations, their relocations, the transfer.
+fn extend(search: &mut Search, tree: &mut Tree, node: usize, target: &Pose) -> Option<usize> {
+    let model = search.model();
+    let state = tree.nodes[node].state.clone();
+    let to_aim = *target == tree.aim;
+    let elsewhere = (!to_aim).then(|| Way::new(&state.world_from_object, target));
+    let place = tree.nodes[node].place;
+    let mut options = Vec::with_capacity(model.n_fingers());
+    for finger in 0..model.n_fingers() {
+        options.push(options_of(search, &mut tree.places[place].pool, elsewhere.as_ref(), &state, finger));
+    }
+    let mut table = ClosureTable::new(model, &options);
+    let present = options.iter().map(|of_finger| of_finger[0].follow).fold(1.0, f64::min);
+    let least = if search.rng.chance(model.settings.aimless_share) { 0.0 } else { present + LEAST_GAIN };
+    let ranked = rank(&mut search.workspace, &options, &mut table, Some(least), COMBINATIONS);
+    if ranked.is_empty() {
+        search.tally.add(Reason::NotClosed);
+        return None;
+    }
+    let mut tried = Tried::default();
+    let mut rng = Rng::child(&search.rng, "relocation", 0);
+    search.rng.bits();
+    for combination in &ranked {
+        let steps =
+            regrasp(&mut search.workspace, &state, &options, &combination.choice, &mut table, &mut tried, &mut rng);
+        match steps {
+            Some(steps) => return advance(search, tree, node, target, steps),
+            None => search.tally.add(Reason::NoWayOver),
+        }
+    }
+    None
+}
+
+/// The present contact of a finger and the best new ones: from the pool on the way to the goal, drawn anew elsewhere.
+fn options_of(
+    search: &mut Search,
+    pool: &mut Pool,
+    elsewhere: Option<&Way>,
+    state: &GraspState,
+    finger: usize,
+) -> Vec<Candidate> {
+    let settings = &search.model().settings;
+    let workspace = &mut search.workspace;
+    let (contact, joints) = (state.contacts[finger], state.joints[finger].clone());
+    let follow = follow_share(workspace, finger, &contact, &joints, elsewhere.unwrap_or(pool.way()));
+    let pose = &state.world_from_object;
+    let foothold = Foothold { contact: &contact, joints: &joints };
+    let is_stuck = !lift_is_within_reach(workspace.model, &Placement::from(pose), finger, &foothold);
+    let mut options = vec![Candidate { contact, joints, follow }];
+    if is_stuck {
+        return options;
+    }
+    workspace.place_object(pose);
+    let n_kept = settings.candidates_kept;
+    match elsewhere {
+        None => {
+            pool.grow(search, finger);
+            options.extend(pool.choose(finger, n_kept, &mut search.rng));
+        }
+        Some(way) => {
+            let new = draw_candidates(workspace, finger, pose, way, settings.candidates, n_kept, &mut search.rng);
+            search.n_samples += new.len() as u64;
+            options.extend(new);
+        }
+    }
+    if options.len() == 1 {
+        search.tally.add(Reason::NoContact(finger));
+    }
+    options
+}
+
+/// Transfers from the end of `steps` towards `target` and adds a node where that ends.
+fn advance(search: &mut Search, tree: &mut Tree, parent: usize, target: &Pose, mut steps: Vec<Step>) -> Option<usize> {
+    let from = steps.last().map_or(&tree.nodes[parent].state, |step| &step.end).clone();
+    let mut place = tree.nodes[parent].place;
+    let mut moments = Vec::new();
+    let share = transfer(&mut search.workspace, &from, target, &mut moments);
+    if share < 1.0 {
+        back_off(search, &from, &mut moments);
+    }
+    if let (Some(last), true) = (moments.last(), share > LEAST_SHARE) {
+        let end = GraspState {
+            world_from_object: last.world_from_object,
+            contacts: from.contacts.clone(),
+            joints: last.joints.clone(),
+        };
+        place = tree.add_place(search, &last.world_from_object);
+        steps.push(Step { motion: Motion::Transfer(moments), end });
+    } else {
+        match search.workspace.blocking_pair.take() {
+            Some(pair) => search.tally.add(Reason::TooNear(pair)),
+            None => search.tally.add(Reason::OutOfReach),
+        }
+    }
+    let state = steps.last()?.end.clone();
+    Some(tree.add_node(Node { state, parent: Some(parent), steps, n_tries: 0, place }))
+}
+
+/// Shortens a transfer that stopped at a limit or against something to where most fingers that may let go can be lifted.
+fn back_off(search: &mut Search, from: &GraspState, moments: &mut Vec<Moment>) {
+    let n_fingers = search.model().n_fingers();
+    let releasable = releasable(search.model(), &from.contacts);
+    let n_releasable = releasable.count_ones();
+    let mut best: Option<(usize, u32)> = None;
+    for back in BACK_OFFS {
+        if back >= moments.len() {
+            break;
+        }
+        let moment = &moments[moments.len() - 1 - back];
+        let mut n_liftable = 0;
+        for finger in (0..n_fingers).filter(|finger| releasable & (1 << finger) != 0) {
+            search.workspace.set(&moment.world_from_object, &moment.joints, &from.contacts);
+            let foothold = Foothold { contact: &from.contacts[finger], joints: &moment.joints[finger] };
+            let can = can_lift(&mut search.workspace, &moment.world_from_object, finger, &foothold);
+            n_liftable += u32::from(can);
+        }
+        if best.is_none_or(|(_, most)| n_liftable > most) {
+            best = Some((back, n_liftable));
+        }
+        if n_liftable == n_releasable {
+            break;
+        }
+    }
+    let back = best.map_or(moments.len(), |(back, _)| back);
+    moments.truncate(moments.len() - back);
+}
+
+/// Steps back from the end of a stopped transfer that are looked at.
+const BACK_OFFS: [usize; 5] = [0, 1, 2, 4, 7];
+
+/// Chooses a new grasp at the tree's end of the query, where no finger has to move for it, and takes it towards the aim.
+fn sow(search: &mut Search, tree: &mut Tree) -> Option<usize> {
+    let model = search.model();
+    let pose = *tree.places[0].pool.world_from_object();
+    tree.n_sown += 1;
+    search.workspace.place_object(&pose);
+    let mut options = Vec::with_capacity(model.n_fingers());
+    for finger in 0..model.n_fingers() {
+        if !tree.places[0].pool.grow(search, finger) {
+            search.tally.add(Reason::NoContact(finger));
+            return None;
+        }
+        options.push(tree.places[0].pool.choose(finger, model.settings.candidates_kept + 1, &mut search.rng));
+    }
+    match choose_grasp(search, &pose, &options) {
+        Some(state) => {
+            let node = tree.add_root(state);
+            let aim = tree.aim;
+            advance(search, tree, node, &aim, Vec::new()).or(Some(node))
+        }
+        None => {
+            search.tally.add(Reason::NotClosed);
+            None
+        }
+    }
+}
