@@ -65,7 +65,7 @@ pub struct Demo {
     #[arg(short, long, value_name = "DIR", default_value = "regrasp-demo")]
     pub output: PathBuf,
     /// Seed
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = whole_number, allow_negative_numbers = true)]
     pub seed: u64,
 }
 
@@ -78,10 +78,10 @@ pub struct Inspect {
     #[arg(short, long, value_name = "hand.toml")]
     pub output: Option<PathBuf>,
     /// Postures sampled for the pairs of links that always or never touch
-    #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000), allow_negative_numbers = true)]
     pub samples: u32,
     /// Seed of the sampled postures
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = whole_number, allow_negative_numbers = true)]
     pub seed: u64,
 }
 
@@ -95,13 +95,13 @@ pub struct Search {
     #[arg(long, value_name = "FILE.json")]
     pub settings: Option<PathBuf>,
     /// Closure margin asked of every holding set, in [0, 1)
-    #[arg(long, value_parser = margin)]
+    #[arg(long, value_parser = margin, allow_negative_numbers = true)]
     pub margin: Option<f64>,
     /// Wall-clock limit in seconds (per seed, in bench); it may only cut
-    #[arg(long, value_name = "S", value_parser = seconds)]
+    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
     pub time_limit: Option<Duration>,
     /// Work limit, in configurations looked at: the same on every machine
-    #[arg(long, value_name = "N", default_value_t = 20_000_000)]
+    #[arg(long, value_name = "N", default_value_t = 20_000_000, value_parser = whole_number, allow_negative_numbers = true)]
     pub max_work: u64,
 }
 
@@ -114,10 +114,10 @@ pub struct Plan {
     #[arg(short, long, value_name = "plan.json")]
     pub output: Option<PathBuf>,
     /// Seed
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = whole_number, allow_negative_numbers = true)]
     pub seed: u64,
     /// Threads [default: all cores]; the plan does not depend on it
-    #[arg(long, value_parser = threads)]
+    #[arg(long, value_parser = threads, allow_negative_numbers = true)]
     pub threads: Option<usize>,
     /// How to search.
     #[command(flatten)]
@@ -141,13 +141,13 @@ pub struct Bench {
     #[arg(required = true, value_name = "SCENE")]
     pub scenes: Vec<PathBuf>,
     /// Seeds per scene: 0, 1, ...
-    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, default_value_t = 20, value_parser = count, allow_negative_numbers = true)]
     pub seeds: u64,
     /// First seed
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = whole_number, allow_negative_numbers = true)]
     pub first_seed: u64,
     /// Threads of one search
-    #[arg(long, default_value = "1", value_parser = threads)]
+    #[arg(long, default_value = "1", value_parser = threads, allow_negative_numbers = true)]
     pub threads: usize,
     /// How to search.
     #[command(flatten)]
@@ -180,10 +180,10 @@ pub enum CampaignKind {
         #[arg(required = true)]
         scenes: Vec<PathBuf>,
         /// Queries in all, spread over the scenes
-        #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..))]
+        #[arg(long, default_value_t = 100, value_parser = count, allow_negative_numbers = true)]
         queries: u64,
         /// Numbers of threads to compare
-        #[arg(long, value_delimiter = ',', default_value = "1,2,8", value_parser = threads)]
+        #[arg(long, value_delimiter = ',', default_value = "1,2,8", value_parser = threads, allow_negative_numbers = true)]
         threads: Vec<usize>,
         /// How to search.
         #[command(flatten)]
@@ -195,10 +195,10 @@ pub enum CampaignKind {
         #[arg(required = true)]
         scenes: Vec<PathBuf>,
         /// Broken plans per kind
-        #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..))]
+        #[arg(long, default_value_t = 100, value_parser = count, allow_negative_numbers = true)]
         mutants: u64,
         /// Good plans
-        #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..))]
+        #[arg(long, default_value_t = 1000, value_parser = count, allow_negative_numbers = true)]
         good: u64,
         /// How to search.
         #[command(flatten)]
@@ -211,6 +211,14 @@ fn package(text: &str) -> Result<(String, PathBuf), String> {
         Some((name, folder)) if !name.is_empty() && !folder.is_empty() => Ok((name.to_owned(), PathBuf::from(folder))),
         _ => Err("expected NAME=DIR, such as allegro=/models/allegro".into()),
     }
+}
+
+fn whole_number(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| format!("expected a whole number from 0 to {}", u64::MAX))
+}
+
+fn count(text: &str) -> Result<u64, String> {
+    text.parse().ok().filter(|n| *n > 0).ok_or_else(|| "expected a whole number above 0".to_owned())
 }
 
 fn seconds(text: &str) -> Result<Duration, String> {
@@ -254,6 +262,14 @@ mod tests {
     }
 
     #[test]
+    fn negative_numbers_are_values_that_are_refused_with_their_reason() {
+        for flag in ["--seed", "--threads", "--margin", "--time-limit", "--max-work"] {
+            let error = Arguments::try_parse_from(["regrasp", "plan", "scene.toml", flag, "-3"]).unwrap_err();
+            assert!(error.to_string().contains("expected a"), "{error}");
+        }
+    }
+
+    #[test]
     fn nonsense_is_refused() {
         for text in ["0", "-1", "inf", "NaN", "1,5", ""] {
             assert!(seconds(text).is_err(), "{text}");
@@ -261,6 +277,10 @@ mod tests {
         for text in ["0", "-3", "10000", "two"] {
             assert!(threads(text).is_err(), "{text}");
         }
+        for text in ["-1", "1.5", "18446744073709551616", "0x10", ""] {
+            assert!(whole_number(text).is_err() && count(text).is_err(), "{text}");
+        }
+        assert!(count("0").is_err());
         assert_eq!(package("a=b=c"), Ok(("a".into(), "b=c".into())));
         assert!(package("=b").is_err() && package("a").is_err());
     }

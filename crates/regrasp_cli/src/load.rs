@@ -60,8 +60,12 @@ pub fn settings(search: &Search, n_threads: usize) -> Result<InHandSettings, Sto
 }
 
 fn settings_error(path: &Path, error: &serde_json::Error) -> Stop {
-    let place = Place { file: path.to_owned(), line: Some(error.line() as u32), column: Some(error.column() as u32) };
-    let diagnostic = Diagnostic::new("A504", place, error.to_string());
+    let (line, column) = (error.line() as u32, error.column().max(1) as u32);
+    let place = Place { file: path.to_owned(), line: Some(line), column: Some(column) };
+    let message = error.to_string();
+    // serde_json repeats the place at the end of its message.
+    let problem = message.rsplit_once(" at line ").map_or(message.as_str(), |(problem, _)| problem);
+    let diagnostic = Diagnostic::new("A504", place, problem);
     Stop::BadInput(diagnostic.expected("a JSON object like \"settings\" in a plan file").into())
 }
 

@@ -2,7 +2,7 @@
 //!
 //! parry's GJK proposes, a separating plane decides: a pair is called separated only by the width of the slab between
 //! two parallel planes that the support functions of both shapes confirm (Boyd, Vandenberghe 2004, 8.2). GJK stopping
-//! early, a wrong witness or a NaN therefore end as [`Answer::Unresolved`], never as a clearance. Balls and capsules are
+//! early, a wrong witness or a NaN therefore end as `Answer::Unresolved`, never as a clearance. Balls and capsules are
 //! a point and a segment with a margin, so that shallow contact of round fingertips needs no EPA.
 
 use crate::frame::{Point, Pose};

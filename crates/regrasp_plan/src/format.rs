@@ -98,7 +98,8 @@ pub fn schema() -> String {
 }
 
 fn syntax_error(path: &Path, error: &serde_json::Error) -> Diagnostic {
-    let place = Place { file: path.to_owned(), line: Some(error.line() as u32), column: Some(error.column() as u32) };
+    let place =
+        Place { file: path.to_owned(), line: Some(error.line() as u32), column: Some(error.column().max(1) as u32) };
     let message = error.to_string();
     // serde_json repeats the place at the end of its message.
     let problem = message.rsplit_once(" at line ").map_or(message.as_str(), |(problem, _)| problem);

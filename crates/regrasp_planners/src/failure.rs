@@ -68,7 +68,7 @@ pub struct Failure {
     /// Causes, commonest first.
     pub causes: Vec<Cause>,
     /// The nearest that the search came to the goal, if it got anywhere.
-    pub nearest_miss: Option<NearestMiss>,
+    pub nearest_miss: Option<Box<NearestMiss>>,
     /// Counts of the search.
     pub statistics: Statistics,
 }

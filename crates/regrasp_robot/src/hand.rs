@@ -94,13 +94,15 @@ pub struct PalmShape {
     pub placed: PlacedShape,
 }
 
-/// A palm and serial fingers. All poses are in the frame of [`Hand::base`].
+/// A palm and serial fingers. All poses are in the frame in which [`Hand::world_from_base`] places the base.
 #[derive(Debug, Clone)]
 pub struct Hand {
     /// The robot it was made from.
     pub robot: Arc<Robot>,
     /// The link whose frame is the hand frame.
     pub base: LinkId,
+    /// Where the base stands: the identity until [`Hand::placed_at`] says otherwise.
+    pub world_from_base: Pose,
     /// Fingers, in the order of the hand file.
     pub fingers: Vec<Finger>,
     /// The palm.
@@ -133,6 +135,7 @@ impl Hand {
     /// The same hand with its base placed at `world_from_hand`: every pose it gives is then in the world.
     #[must_use]
     pub fn placed_at(mut self, world_from_hand: &Pose) -> Self {
+        self.world_from_base = world_from_hand * self.world_from_base;
         for finger in &mut self.fingers {
             finger.chain.place_at(world_from_hand);
             finger.ik = FingerIk::new(&finger.chain, &finger.tip.center_in_body);

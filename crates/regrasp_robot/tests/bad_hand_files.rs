@@ -17,7 +17,7 @@ const URDF: &str = r#"<robot name="pincer">
 <joint name="jb2" type="revolute"><parent link="b1"/><child link="b2"/><origin xyz="0 0 0.05"/><axis xyz="0 1 0"/><limit lower="-1" upper="1"/><mimic joint="jb1" multiplier="-2" offset="0.5"/></joint>
 </robot>"#;
 
-const HEAD: &str = "format = \"regrasp hand\"\nversion = 1\nurdf = \"hand.urdf\"\n";
+const HEAD: &str = "format = \"regrasp-hand\"\nformat_version = 1\nurdf = \"hand.urdf\"\n";
 const POINT: &str = "tip = { shape = \"point\" }";
 
 fn write_files(folder: &Path, hand: &str) -> std::path::PathBuf {
@@ -62,8 +62,8 @@ refused!(
     an_empty_file,
     "",
     [
-        r#"U202 hand.toml:1:1 key "format": is missing; expected format = "regrasp hand""#,
-        r#"U202 hand.toml:1:1 key "version": is missing; expected version = 1"#,
+        r#"U202 hand.toml:1:1 key "format": is missing; expected format = "regrasp-hand""#,
+        r#"U202 hand.toml:1:1 key "format_version": is missing; expected format_version = 1"#,
         r#"U202 hand.toml:1:1 key "urdf": is missing; expected urdf = "...""#
     ]
 );
@@ -71,15 +71,15 @@ refused!(
     a_key_that_is_misspelt,
     format!("basse_link = \"palm\"\n{}", with_finger(&format!("tip_link = \"a_tip\"\n{POINT}\ncolour = 1"))),
     [
-        r#"U201 hand.toml:1:1 key "basse_link": is not a key of this table; expected one of format, version, urdf, srdf, base_link, allow, fingers
+        r#"U201 hand.toml:1:1 key "basse_link": is not a key of this table; expected one of format, format_version, urdf, srdf, base_link, allow, fingers
   fix: did you mean base_link?"#,
         r#"U201 hand.toml:10:1 key "colour": is not a key of this table; expected one of name, tip_link, first_joint, tip, rest"#
     ]
 );
 refused!(
     another_version,
-    with_finger(&format!("tip_link = \"a_tip\"\n{POINT}")).replace("version = 1", "version = 2"),
-    [r#"U204 hand.toml:2:11 key "version": is 2, which this program does not know; expected 1"#]
+    with_finger(&format!("tip_link = \"a_tip\"\n{POINT}")).replace("format_version = 1", "format_version = 2"),
+    [r#"U204 hand.toml:2:18 key "format_version": is 2, which this program does not know; expected 1"#]
 );
 refused!(
     a_urdf_that_is_not_there,

@@ -19,6 +19,8 @@ pub struct Object {
     pub friction: f64,
     /// Contacts keep this distance from creases of the surface, in metres.
     pub edge_distance: f64,
+    /// Edges of a mesh that fold by more than this are creases, in radians.
+    pub crease_angle: f64,
 }
 
 impl Object {

@@ -41,7 +41,9 @@ fn find_scene(plan_path: &Path, plan: &Plan) -> Result<PathBuf, Stop> {
     };
     let start = std::path::absolute(plan_path).unwrap_or_else(|_| plan_path.to_owned());
     let mut folders: Vec<PathBuf> = start.ancestors().skip(1).take(4).map(Path::to_owned).collect();
-    if let Ok(current) = std::env::current_dir() {
+    if let Ok(current) = std::env::current_dir()
+        && !folders.contains(&current)
+    {
         folders.push(current);
     }
     let mut candidates: Vec<PathBuf> = Vec::new();

@@ -223,12 +223,12 @@ mod tests {
                 Cause { reason: "finger \"thumb\" cannot reach a new contact".into(), count: 3000, share: 0.75 },
                 Cause { reason: "closure lost".into(), count: 1000, share: 0.25 },
             ],
-            nearest_miss: Some(NearestMiss {
+            nearest_miss: Some(Box::new(NearestMiss {
                 world_from_object: PoseData { position: [0.0; 3], quat_xyzw: [0.0, 0.0, 0.0, 1.0] },
                 angle_left: 61f64.to_radians(),
                 distance_left: 0.0012,
                 joints: vec![],
-            }),
+            })),
             statistics: Default::default(),
         };
         let text = failure_text(&failure);

@@ -1,5 +1,6 @@
 //! A folder with a good hand, object and scene, files of which a test may break; and the program run in it.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
@@ -105,15 +106,14 @@ pub fn repository() -> &'static Path {
 }
 
 /// The shared models, if they are here: `REGRASP_MODELS`, else `../shared/models` beside the repository or above it.
-// A test that skips says so where the test runner shows it.
-#[allow(clippy::print_stdout)]
 pub fn models() -> Option<PathBuf> {
     let named = std::env::var_os("REGRASP_MODELS").map(PathBuf::from);
     let root = repository().canonicalize().expect("the repository is there");
     let near = root.ancestors().map(|folder| folder.join("../shared/models"));
     let found = named.into_iter().chain(near).find(|folder| folder.is_dir());
     if found.is_none() {
-        println!("SKIPPED: no shared models");
+        // Past the capture of test output, so that the log says it.
+        let _ = writeln!(std::io::stderr(), "SKIPPED: no shared models");
     }
     found.and_then(|folder| folder.canonicalize().ok())
 }

@@ -26,7 +26,7 @@ const NEARLY_EXACT: f64 = 0.98;
 /// Looks for a direction along which the placed convex shapes are apart by at least `required`.
 ///
 /// `direction` is where to start (from `a` to `b`, any length) and receives the best unit direction found. The search
-/// goes on past `required` until the bound is `enough` or within a fifth of the true distance.
+/// goes on past `required` until the bound is `enough` or within a fiftieth of the true distance.
 pub fn separation(
     a: &Shape,
     parent_from_a: &Placement,
@@ -299,7 +299,8 @@ mod tests {
         let mut radius = 0.3;
         while radius > 1e-8 {
             let mut improved = false;
-            for _ in 0..24 {
+            // Gaps have ridges, along which few random steps lead up.
+            for _ in 0..100 {
                 let u = (best + Vector::from(rng.direction()) * radius).normalize();
                 let value = gap(&u);
                 if value > best_gap {
@@ -307,7 +308,7 @@ mod tests {
                 }
             }
             if !improved {
-                radius *= 0.6;
+                radius *= 0.75;
             }
         }
         best_gap

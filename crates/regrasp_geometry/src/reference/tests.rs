@@ -20,6 +20,9 @@ fn hull(rng: &mut Rng, n: usize, size: f64) -> Arc<ConvexHull> {
 
 const N_KINDS: usize = 6;
 
+/// A clearance may be understated by this much, in m, and a tenth of itself.
+const LARGEST_UNDERSTATEMENT: f64 = 1e-5;
+
 fn random_shape(rng: &mut Rng, kind: usize) -> Shape {
     let mut length = || rng.uniform(0.005, 0.05);
     match kind {
@@ -61,10 +64,34 @@ fn placed_at(a: &Shape, b: &Shape, gap: f64, rng: &mut Rng) -> (Pose, Pose, Poin
     (world_from_a, world_from_b, on_a + axis * gap)
 }
 
-/// Runs `n` pairs of each two kinds; returns how many were unresolved although apart by 1e-9 m or more, and for how many
-/// the lower bound was off by more than 2e-8 m or a gap of 1e-6 m was not seen.
-fn cross_check(n: usize) -> (usize, usize) {
-    let (mut n_unresolved, mut n_loose) = (0, 0);
+/// What a campaign of pairs with known gaps saw. That a clearance is never overstated is asserted pair by pair.
+#[derive(Debug, Default)]
+struct Seen {
+    /// Pairs.
+    n: usize,
+    /// Not decided although apart by 1e-9 m or more.
+    n_unresolved: usize,
+    /// Clearance understated by more than 2e-8 m and 1e-6 of the gap, or a gap taken for contact.
+    n_loose: usize,
+    /// Largest such understatement, in m, beyond a tenth of the gap, and the pair.
+    worst: (f64, &'static str, &'static str, f64),
+    /// Apart by `max` or more, but less than `max` was claimed.
+    n_short: usize,
+}
+
+impl Seen {
+    fn understated(&mut self, gap: f64, claimed: f64, kinds: (&'static str, &'static str)) {
+        self.n_loose += usize::from(claimed < gap * (1.0 - 1e-6) - 2e-8);
+        let beyond = 0.9 * gap - claimed;
+        if beyond > self.worst.0 {
+            self.worst = (beyond, kinds.0, kinds.1, gap);
+        }
+    }
+}
+
+/// Runs `n` pairs of each two kinds whose distance is known by construction.
+fn cross_check(n: usize) -> Seen {
+    let mut seen = Seen::default();
     for kind_a in 0..N_KINDS {
         for kind_b in kind_a..N_KINDS {
             let mut rng = Rng::keyed(1, "pairs", (kind_a * N_KINDS + kind_b) as u64);
@@ -88,28 +115,28 @@ fn cross_check(n: usize) -> (usize, usize) {
                 let answer = distance(&pair[0], &world_from_a, &pair[1], &world_from_b, max);
                 let back = distance(&pair[1], &world_from_b, &pair[0], &world_from_a, max);
                 let names = (a.kind(), b.kind(), gap);
+                seen.n += 1;
                 match answer {
                     Answer::SeparatedBy(lower) => {
                         assert!(lower > 0.0 && lower <= gap + 1e-12, "{names:?} {lower}");
                         if gap < max {
-                            assert!(lower >= 0.9 * gap - 1e-6, "{names:?} {lower}");
-                            n_loose += usize::from(lower < gap * (1.0 - 1e-6) - 2e-8);
+                            seen.understated(gap, lower, (a.kind(), b.kind()));
                         } else {
-                            assert!(lower >= max, "{names:?} {lower}");
+                            seen.n_short += usize::from(lower < max);
                         }
                     }
                     Answer::Penetrating(depth) => {
-                        // What is apart by a micrometre or less may, rarely, count as touching.
-                        assert!(gap <= 1e-12 || (gap < 2e-6 && depth < SHALLOW), "{names:?} {depth}");
-                        n_loose += usize::from(gap > 2e-9);
                         let on_b = world_from_a.inverse_transform_point(&nearest_of_b);
                         let inside = -Surface::of(&a).unwrap().signed_distance(&on_b);
                         assert!(
-                            depth >= 0.0 && (gap > 0.0 || depth <= -gap * (1.0 + 1e-6) + SHALLOW),
+                            depth >= 0.0 && depth <= (-gap).max(0.0) * (1.0 + 1e-6) + SHALLOW,
                             "{names:?} {depth} {inside}"
                         );
+                        if gap > 2e-9 {
+                            seen.understated(gap, 0.0, (a.kind(), b.kind()));
+                        }
                     }
-                    Answer::Unresolved => n_unresolved += usize::from(gap >= 1e-9),
+                    Answer::Unresolved => seen.n_unresolved += usize::from(gap >= 1e-9),
                 }
                 if gap.abs() > 2e-6 && answer != Answer::Unresolved && back != Answer::Unresolved {
                     let is_apart = |answer: Answer| matches!(answer, Answer::SeparatedBy(_));
@@ -118,20 +145,26 @@ fn cross_check(n: usize) -> (usize, usize) {
             }
         }
     }
-    (n_unresolved, n_loose)
+    seen
+}
+
+/// parry's GJK may stop early where gaps are below about 10 um; the slab then proves less than the gap, or nothing.
+fn assert_useful(seen: &Seen) {
+    assert!(seen.n_unresolved * 2_000 <= seen.n, "{seen:?}");
+    assert!(seen.n_loose * 100 <= seen.n, "{seen:?}");
+    assert!(seen.worst.0 <= LARGEST_UNDERSTATEMENT, "{seen:?}");
+    assert!(seen.n_short * 2_000 <= seen.n, "{seen:?}");
 }
 
 #[test]
 fn distances_known_by_construction_are_found() {
-    let (n_unresolved, n_loose) = cross_check(2_000);
-    assert!(n_unresolved <= 20 && n_loose <= 400, "{n_unresolved} of 42000 undecided, {n_loose} loose");
+    assert_useful(&cross_check(2_000));
 }
 
 #[test]
 #[ignore = "long: 2.1 million pairs"]
 fn distances_known_by_construction_are_found_in_many_pairs() {
-    let (n_unresolved, n_loose) = cross_check(100_000);
-    assert!(n_unresolved <= 1_000 && n_loose <= 20_000, "{n_unresolved} of 2100000 undecided, {n_loose} loose");
+    assert_useful(&cross_check(100_000));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Surfaces one can sample by area, walk by geodesics, and ask for normals, curvature and creases.
 //!
-//! Each kind of surface is a file with the same functions in the same order ([`SurfaceKind`]). Points and normals are
+//! Each kind of surface is a file with the same functions in the same order (`SurfaceKind`). Points and normals are
 //! in the shape's own frame, called the object frame here.
 
 mod bvh;

@@ -1,6 +1,7 @@
 //! Fingertips on their contacts, at waypoints and between them, and contacts on the object.
 
 use crate::check::continuity::{contact_of, moving_finger, pose_between, pose_difference};
+use crate::check::edges::Edges;
 use crate::check::model::{FingerModel, Model};
 use crate::check::surface;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
@@ -99,6 +100,8 @@ fn error_between(finger: &FingerModel, from: &Waypoint, to: &Waypoint, f: usize,
 /// Every contact of the plan lies on the object's surface, with the surface's normal, away from its edges.
 pub fn check_contacts(object: &Object, model: &Model, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
     let mut seen = BTreeSet::new();
+    let edges = Edges::of(&object.shape, object.crease_angle);
+    let least = object.edge_distance - settings.surface_tolerance;
     for (s, segment) in plan.segments.iter().enumerate() {
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
             for (f, state) in waypoint.contacts.iter().enumerate() {
@@ -122,8 +125,8 @@ pub fn check_contacts(object: &Object, model: &Model, plan: &Plan, settings: &Ch
                     let message = format!("the normal of finger \"{name}\" is {angle:.3e} rad off the surface's");
                     log.push(tell(Kind::ContactNormalWrong, message, angle, settings.normal_tolerance));
                 }
-                let edge = surface::edge_distance(&object.shape, &Point::from(point));
-                if edge < object.edge_distance - settings.surface_tolerance {
+                let edge = edges.distance(&Point::from(point), least);
+                if edge < least {
                     let message = format!(
                         "the contact of finger \"{name}\" is {edge:.3e} m from an edge, the scene asks for {:.3e}",
                         object.edge_distance

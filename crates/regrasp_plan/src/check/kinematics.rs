@@ -1,7 +1,6 @@
 //! The checker's own forward kinematics, straight from the robot's joints, and bounds of how far things move.
 //!
-//! Matrices are 4 x 4 and rotations are Rodrigues' formula; nothing here asks `regrasp_robot::Chain` for more than
-//! where the hand stands.
+//! Matrices are 4 x 4 and rotations are Rodrigues' formula; nothing here asks `regrasp_robot::Chain`.
 
 use nalgebra::{Matrix3, Matrix4, Rotation3, Translation3, UnitQuaternion};
 use regrasp_geometry::{Point, Pose, Vector};
@@ -158,39 +157,8 @@ pub fn pose_of(matrix: &Matrix4<f64>) -> Pose {
     Pose::from_parts(Translation3::from(translation), UnitQuaternion::from_rotation_matrix(&rotation))
 }
 
-/// Where the hand's root stands, found from where its first finger begins and confirmed by the other ones.
-///
-/// The hand stores its place only in its chains. Err when the chains contradict each other.
+/// Where the hand's root stands, from where its base stands; joints above the base rest.
 pub fn world_from_root(hand: &Hand) -> Result<Pose, String> {
-    let robot = &hand.robot;
-    let mut found: Option<Pose> = None;
-    for finger in &hand.fingers {
-        let mut root_from_joint = Pose::identity();
-        let mut below_base = hand.base == robot.root;
-        let mut first_moving = None;
-        for id in robot.joints_to(finger.tip.link) {
-            let joint = &robot.joints[id.0];
-            root_from_joint *= joint.parent_from_joint;
-            if joint.kind != JointKind::Fixed && below_base {
-                first_moving = Some(id);
-                break;
-            }
-            below_base |= joint.child == hand.base;
-        }
-        let (Some(_), Some(first)) = (first_moving, finger.chain.joints.first()) else {
-            return Err(format!("finger \"{}\" has no moving joint below the hand's base", finger.name));
-        };
-        let world_from_root = first.parent_from_joint * root_from_joint.inverse();
-        if let Some(other) = &found {
-            let difference = (other.to_homogeneous() - world_from_root.to_homogeneous()).norm();
-            if difference > 1e-9 {
-                return Err(format!(
-                    "finger \"{}\" stands elsewhere than its robot says, by {difference:.3e}",
-                    finger.name
-                ));
-            }
-        }
-        found.get_or_insert(world_from_root);
-    }
-    found.ok_or_else(|| "the hand has no finger".to_owned())
+    let root_from_base = Path::new(&hand.robot, hand.base, &Pose::identity(), &[])?.world_from_link(&[]);
+    Ok(hand.world_from_base * pose_of(&root_from_base).inverse())
 }

@@ -13,6 +13,8 @@ pub mod collision;
 pub mod contact;
 /// What can be judged from the waypoints alone.
 pub mod continuity;
+/// Distance of contacts from sharp edges.
+pub mod edges;
 /// `regrasp check`: everything is read afresh from files.
 pub mod files;
 /// The checker's own forward kinematics and motion bounds.

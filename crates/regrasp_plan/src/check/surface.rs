@@ -140,28 +140,11 @@ pub fn distance_to_triangle(point: &Point, corners: &[Point; 3]) -> f64 {
     [(a, b), (b, c), (c, a)].iter().map(|(from, to)| distance_to_edge(point, from, to)).fold(f64::INFINITY, f64::min)
 }
 
-fn distance_to_edge(point: &Point, from: &Point, to: &Point) -> f64 {
+/// Distance from a point to the segment between two others.
+pub fn distance_to_edge(point: &Point, from: &Point, to: &Point) -> f64 {
     let along = to - from;
     let t = ((point - from).dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
     (point - (from + along * t)).norm()
-}
-
-/// Distance of a surface point from the nearest sharp edge of the shape; infinite for shapes without one and for
-/// meshes, whose creases are a matter of the scene's threshold.
-pub fn edge_distance(shape: &Shape, point: &Point) -> f64 {
-    match shape {
-        Shape::Cuboid { half_extents } => {
-            // On a face, the nearest edge is as far as the second-nearest face.
-            let mut inside: Vec<f64> = (half_extents - point.coords.abs()).iter().copied().collect();
-            inside.sort_by(f64::total_cmp);
-            inside[1]
-        }
-        Shape::Cylinder { half_length, radius } => {
-            let across = point.coords.xy().norm();
-            (across - radius).hypot(point.z.abs() - half_length)
-        }
-        _ => f64::INFINITY,
-    }
 }
 
 #[cfg(test)]

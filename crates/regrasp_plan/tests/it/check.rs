@@ -1,13 +1,14 @@
 //! The checker accepts a plan that is good by construction, and says what it cannot judge.
 
 use crate::sample;
-use regrasp_geometry::Shape;
+use regrasp_geometry::{Point, Shape, TriangleMesh};
 use regrasp_plan::check::Moment;
 use regrasp_plan::check::{CheckSettings, ViolationKind, check, check_files};
 use regrasp_plan::format::to_json;
 use regrasp_robot::import::LoadOptions;
 use regrasp_scene::{GraspRequest, InHandQuery};
 use std::path::Path;
+use std::sync::Arc;
 
 #[test]
 fn a_good_plan_is_accepted() {
@@ -64,11 +65,27 @@ fn a_plan_is_held_to_the_query() {
     assert_eq!(judge(&other_contacts), [ViolationKind::GoalMismatch]);
 }
 
+/// A cube of half side `half` as twelve triangles.
+fn cube_mesh(half: f64) -> Shape {
+    let corner = |i: u32| {
+        let side = |bit: u32| if i >> bit & 1 == 1 { half } else { -half };
+        Point::new(side(0), side(1), side(2))
+    };
+    let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles = faces.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
+    Shape::Mesh(Arc::new(TriangleMesh::new((0..8).map(corner).collect(), triangles).unwrap()))
+}
+
 #[test]
 fn a_contact_near_an_edge_is_reported() {
-    let mut scene = sample::scene();
     let half_extents = nalgebra::Vector3::repeat(sample::OBJECT_RADIUS);
-    scene.object.shape = Shape::Cuboid { half_extents };
+    a_contact_near_an_edge_of(Shape::Cuboid { half_extents });
+    a_contact_near_an_edge_of(cube_mesh(sample::OBJECT_RADIUS));
+}
+
+fn a_contact_near_an_edge_of(shape: Shape) {
+    let mut scene = sample::scene();
+    scene.object.shape = shape;
     scene.object.edge_distance = 0.004;
     let mut plan = sample::plan(&scene);
     let r = sample::OBJECT_RADIUS;

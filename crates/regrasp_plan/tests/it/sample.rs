@@ -144,7 +144,7 @@ fn hand() -> Hand {
         }
     }
     let palm = robot.links[0].collision.iter().map(|p| PalmShape { link: LinkId(0), placed: p.clone() }).collect();
-    Hand { robot: Arc::new(robot), base: LinkId(0), fingers, palm, allowed_pairs }
+    Hand { robot: Arc::new(robot), base: LinkId(0), world_from_base: Pose::identity(), fingers, palm, allowed_pairs }
 }
 
 /// The object: a sphere whose centre of mass is its centre.
@@ -158,6 +158,7 @@ fn object() -> Object {
         center_of_mass: Point::origin(),
         friction: 0.8,
         edge_distance: 0.0,
+        crease_angle: regrasp_geometry::surface::DEFAULT_CREASE_ANGLE,
     }
 }
 

@@ -68,6 +68,7 @@ impl Left {
             distance_left: (state.world_from_object.translation.vector - goal.translation.vector).norm(),
             joints: state.joints.iter().flatten().copied().collect(),
         });
+        let nearest_miss = nearest_miss.map(Box::new);
         let reached = nearest_miss.as_ref().map_or("no grasp was found at the start pose".to_owned(), |miss| {
             format!(
                 "the object came within {:.1} degrees and {:.1} mm of the goal",
@@ -119,6 +120,7 @@ pub fn work_of_attempt(base: u64, index: usize) -> u64 {
 ///
 /// `run(index, work_limit, winner)` is one attempt. The result is that of the lowest index that succeeded, with what
 /// all attempts up to it left behind; so it is the same on any number of threads.
+#[expect(clippy::result_large_err, reason = "success carries what the attempts left behind too, so is no smaller")]
 pub fn run_attempts<T: Send>(
     n_threads: usize,
     base_work: u64,

@@ -43,7 +43,7 @@ pub enum Carrier {
         /// Index of the moving body in the finger's chain.
         link: usize,
         /// Bounds of its motion.
-        bound: MotionBound,
+        bound: Box<MotionBound>,
     },
     /// The object.
     Object,
@@ -114,7 +114,7 @@ impl<'a> Model<'a> {
             let first = bodies.len();
             let mut add = |shape: &Shape, body_from_shape: &Pose, link: usize, id, name: &str, is_tip: bool| {
                 let (center, radius) = shape.bounding_sphere();
-                let bound = MotionBound::new(&finger.chain, link, &(body_from_shape * center), radius);
+                let bound = Box::new(MotionBound::new(&finger.chain, link, &(body_from_shape * center), radius));
                 bodies.push(Body {
                     shape: shape.clone(),
                     tree: None,

@@ -67,7 +67,7 @@ impl Tally {
                 share: count as f64 / total as f64,
             })
             .collect();
-        causes.sort_by(|a, b| b.count.cmp(&a.count));
+        causes.sort_by_key(|cause| std::cmp::Reverse(cause.count));
         causes
     }
 

@@ -19,8 +19,8 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// The value of `format` in a hand file.
-pub const FORMAT: &str = "regrasp hand";
-/// The value of `version` in a hand file.
+pub const FORMAT: &str = "regrasp-hand";
+/// The value of `format_version` in a hand file.
 pub const VERSION: i64 = 1;
 
 /// How hands and robots are read.
@@ -101,7 +101,7 @@ fn load_hand_file(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
     })?;
     let table = Table { entries: document.get_ref(), offset: 0 };
     let mut reader = TomlReader { file: path, text: &text, found: Diagnostics::default() };
-    reader.refuse_unknown(table, &["format", "version", "urdf", "srdf", "base_link", "allow", "fingers"]);
+    reader.refuse_unknown(table, &["format", "format_version", "urdf", "srdf", "base_link", "allow", "fingers"]);
     refuse_other_format(&mut reader, table);
 
     let mut inputs = vec![own];
@@ -198,17 +198,17 @@ fn refuse_other_format(reader: &mut TomlReader, table: Table) {
     if table.get("format").is_none() {
         reader.missing(table, "format", &format!("format = \"{FORMAT}\""));
     }
-    let Some(version) = table.get("version") else {
-        reader.missing(table, "version", &format!("version = {VERSION}"));
+    let Some(version) = table.get("format_version") else {
+        reader.missing(table, "format_version", &format!("format_version = {VERSION}"));
         return;
     };
-    if let Some(seen) = reader.finite(version, "version")
+    if let Some(seen) = reader.finite(version, "format_version")
         && seen != VERSION as f64
     {
         let place = reader.place(version.span().start);
         reader.found.push(
             Diagnostic::new("U204", place, format!("is {seen}, which this program does not know"))
-                .element("key", "version")
+                .element("key", "format_version")
                 .expected(format!("{VERSION}")),
         );
     }

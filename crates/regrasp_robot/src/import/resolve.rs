@@ -156,7 +156,13 @@ fn package_roots(
     if given.is_empty() {
         tried.push(format!("--package {package}: not given"));
     }
-    roots.extend(given.iter().map(|(_, root)| (Source::Given, root.clone())));
+    for (_, root) in given {
+        if root.is_dir() {
+            roots.push((Source::Given, root.clone()));
+        } else {
+            tried.push(format!("--package {package}: {} (no such folder)", root.display()));
+        }
+    }
     if options.search_paths.is_empty() {
         tried.push("ROS_PACKAGE_PATH, AMENT_PREFIX_PATH: not set".into());
     }

@@ -88,10 +88,7 @@ pub(crate) fn parse_srdf(
     let document = parse(path, text)?;
     let root = document.root_element();
     let mut reader = Reader::new(path, lenient);
-    if !root.has_tag_name("robot") {
-        let problem = format!("the outermost element is <{}>", root.tag_name().name());
-        return Err(Diagnostic::new("U106", reader.place(root), problem).expected("<robot name=\"...\">").into());
-    }
+    reader.refuse_other_root(root)?;
     let mut srdf = Srdf::default();
     for node in children(root, "group") {
         // Groups without a name are references inside other groups in old files.

@@ -107,6 +107,15 @@ impl<'a> Reader<'a> {
         Reader { file, found: Diagnostics::default(), notes: Vec::new(), lenient }
     }
 
+    /// Err when the outermost element is not `<robot>` (`U106`).
+    pub fn refuse_other_root(&self, root: Node) -> Result<(), InputError> {
+        if root.has_tag_name("robot") {
+            return Ok(());
+        }
+        let problem = format!("the outermost element is <{}>", root.tag_name().name());
+        Err(Diagnostic::new("U106", self.place(root), problem).expected("<robot name=\"...\">").into())
+    }
+
     /// Where `node` begins.
     pub fn place(&self, node: Node) -> Place {
         let at = node.document().text_pos_at(node.range().start);

@@ -21,7 +21,7 @@ pub fn hand_file_text(hand: &Hand, urdf: &str, allow: &BTreeSet<(LinkId, LinkId)
         "# Hand \"{}\": written by `regrasp inspect`; edit freely. Metres and radians.",
         comment(&robot.name)
     );
-    let _ = writeln!(text, "format = {}\nversion = {VERSION}\nurdf = {}", quoted(FORMAT), quoted(urdf));
+    let _ = writeln!(text, "format = {}\nformat_version = {VERSION}\nurdf = {}", quoted(FORMAT), quoted(urdf));
     let _ = writeln!(text, "base_link = {}", name(hand.base));
     if !allow.is_empty() {
         let _ = writeln!(

@@ -53,20 +53,20 @@ pub(super) fn object(root: &mut Table, files: &mut Files, found: &mut Found) -> 
     table.finish(found);
 
     let (shape, mass, center_of_mass) = placed?;
-    let edge_distance = edge_distance?;
+    let (edge_distance, crease_angle) = (edge_distance?, crease_angle?);
     if let Some(center) = &center {
         center_is_inside(&shape, &center_of_mass, center, found)?;
     }
-    let surface = match Surface::with_crease_angle(&shape, crease_angle?) {
+    let surface = match Surface::with_crease_angle(&shape, crease_angle) {
         Ok(surface) => surface,
         Err(error) => {
-            let diagnostic = regrasp_base::Diagnostic::new("M204", found.place(&root.span), error.to_string())
+            let diagnostic = regrasp_base::Diagnostic::new("M207", found.place(&root.span), error.to_string())
                 .element("table", "object");
             found.diagnostics.push(diagnostic);
             return None;
         }
     };
-    Some(Object { name, shape, surface, mass, center_of_mass, friction: friction?, edge_distance })
+    Some(Object { name, shape, surface, mass, center_of_mass, friction: friction?, edge_distance, crease_angle })
 }
 
 fn friction(entry: &Entry, found: &mut Found) -> Option<f64> {
@@ -163,7 +163,7 @@ fn placed(
     let shape = match shape::shifted(&read.shape, shift) {
         Ok(shape) => shape,
         Err(reason) => {
-            let diagnostic = table.error("M202", found, format!("cannot be moved to its origin: {reason}"));
+            let diagnostic = table.error("M205", found, format!("cannot be moved to its origin: {reason}"));
             found.diagnostics.push(diagnostic);
             return None;
         }

@@ -147,7 +147,7 @@ fn mesh(kind: &Entry, files: &mut Files, found: &mut Found) -> Option<ReadShape>
     let scaled = match mesh.scaled(scale) {
         Ok(scaled) => oriented(scaled, kind, found),
         Err(error) => {
-            let diagnostic = kind.error("M202", found, format!("cannot be scaled by {scale:?}: {error}"));
+            let diagnostic = kind.error("M205", found, format!("cannot be scaled by {scale:?}: {error}"));
             found.diagnostics.push(diagnostic);
             return None;
         }
@@ -158,7 +158,7 @@ fn mesh(kind: &Entry, files: &mut Files, found: &mut Found) -> Option<ReadShape>
         Solid::Hull => match ConvexHull::new(scaled.vertices()) {
             Ok(hull) => Shape::Convex(Arc::new(hull)),
             Err(error) => {
-                let diagnostic = kind.error("M203", found, error.to_string()).fix("give a mesh that has an inside");
+                let diagnostic = kind.error("M206", found, error.to_string()).fix("give a mesh that has an inside");
                 found.diagnostics.push(diagnostic);
                 return None;
             }

@@ -353,7 +353,7 @@ fn packages_that_are_not_given() {
 #[test]
 fn faults_of_the_hand_file_keep_their_own_place() {
     let folder = Folder::new();
-    folder.write("hand.toml", "format = \"regrasp hand\"\nversion = 1\n");
+    folder.write("hand.toml", "format = \"regrasp-hand\"\nformat_version = 1\n");
     let messages = folder.messages(GOOD);
     assert!(messages.contains("hand.toml") && messages.contains("urdf"), "{messages}");
 }

@@ -3,6 +3,7 @@
 use regrasp_base::InputError;
 use regrasp_robot::import::{LoadOptions, ResolveOptions};
 use regrasp_scene::{LoadedScene, load_scene};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// The root of the repository.
@@ -11,14 +12,14 @@ pub fn repository() -> PathBuf {
 }
 
 /// The shared models; says SKIPPED when they are absent.
-#[allow(clippy::print_stdout, reason = "a skipped test has to say so")]
 pub fn shared_models() -> Option<PathBuf> {
     if let Some(given) = std::env::var_os("REGRASP_MODELS") {
         return Some(PathBuf::from(given));
     }
     let found = repository().ancestors().map(|folder| folder.join("shared/models")).find(|folder| folder.is_dir());
     if found.is_none() {
-        println!("SKIPPED: no shared models");
+        // Past the capture of test output, so that the log says it.
+        let _ = writeln!(std::io::stderr(), "SKIPPED: no shared models");
     }
     found
 }

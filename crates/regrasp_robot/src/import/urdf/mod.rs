@@ -54,10 +54,7 @@ pub(crate) fn parse_robot(
     let document = parse(path, text)?;
     let root = document.root_element();
     let mut reader = Reader::new(path, lenient);
-    if !root.has_tag_name("robot") {
-        let problem = format!("the outermost element is <{}>", root.tag_name().name());
-        return Err(Diagnostic::new("U106", reader.place(root), problem).expected("<robot name=\"...\">").into());
-    }
+    reader.refuse_other_root(root)?;
     reader.note_misspelt_children(root, &["link", "joint", "material", "transmission", "gazebo"], ("robot", ""));
     let name = root.attribute("name").unwrap_or_default().to_owned();
 

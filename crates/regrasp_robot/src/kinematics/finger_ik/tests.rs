@@ -5,6 +5,7 @@ use super::*;
 use crate::kinematics::samples::*;
 use nalgebra::{DVector, Matrix3};
 use regrasp_geometry::Vector;
+use std::io::Write;
 
 /// Every solution strictly inside the limits that Newton steps find from a grid of `n` values per coordinate.
 fn brute_force(chain: &Chain, center: &Point, target: &Point, n: usize) -> Vec<DVector<f64>> {
@@ -115,7 +116,8 @@ fn closed_form_misses_no_branch_of_special_geometries() {
 #[test]
 fn closed_form_misses_no_branch_of_real_hands() {
     let Some(models) = shared_models() else {
-        println!("SKIPPED: no shared models");
+        // Past the capture of test output, so that the log says it.
+        let _ = writeln!(std::io::stderr(), "SKIPPED: no shared models");
         return;
     };
     let mut rng = Rng::keyed(3, "real_3r", 0);
@@ -211,7 +213,8 @@ fn success(ik: &FingerIk, n_targets: usize, preference: bool, rng: &mut Rng) -> 
 #[test]
 fn numeric_solves_nearly_all_reachable_targets_of_allegro() {
     let Some(models) = shared_models() else {
-        println!("SKIPPED: no shared models");
+        // Past the capture of test output, so that the log says it.
+        let _ = writeln!(std::io::stderr(), "SKIPPED: no shared models");
         return;
     };
     let mut rng = Rng::keyed(6, "allegro", 0);
