@@ -131,7 +131,7 @@ impl Default for InHandSettings {
             candidates: 6,
             candidates_kept: 3,
             restart_work: 80_000,
-            shortcuts: 20,
+            shortcuts: 8,
             alpha: Alpha::Constant { value: 0.9 },
             guided_share: 0.9,
         }

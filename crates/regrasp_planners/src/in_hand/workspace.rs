@@ -53,6 +53,14 @@ struct Configuration {
     placements: Vec<Placement>,
 }
 
+/// Where `next` may differ from `now`, besides what the coming step changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stale {
+    Nothing,
+    Finger(usize),
+    Everything,
+}
+
 /// Scratch memory of one search thread.
 #[derive(Debug)]
 pub struct Workspace<'a> {
@@ -60,6 +68,7 @@ pub struct Workspace<'a> {
     pub model: &'a Model<'a>,
     now: Configuration,
     next: Configuration,
+    stale: Stale,
     /// Direction that last separated each pair, from `a` to `b`, in the world.
     directions: Vec<Vector>,
     hints: Vec<[u32; 2]>,
@@ -84,6 +93,7 @@ impl<'a> Workspace<'a> {
         let now = Configuration { joints, world_from_object: Pose::identity(), placements };
         Workspace {
             next: now.clone(),
+            stale: Stale::Nothing,
             now,
             directions: vec![Vector::zeros(); model.pairs.len()],
             hints: vec![[0; 2]; model.pairs.len()],
@@ -111,10 +121,31 @@ impl<'a> Workspace<'a> {
             place_finger(self.model, &mut self.now, finger, &joints[finger]);
         }
         self.slack.fill(f64::NEG_INFINITY);
+        self.stale = Stale::Everything;
+    }
+
+    /// Makes `next` the same as `now`, but for a finger that is placed afresh anyway.
+    fn align(&mut self, except: Option<usize>) {
+        match self.stale {
+            Stale::Nothing => {}
+            Stale::Finger(finger) if Some(finger) == except => {}
+            Stale::Finger(finger) => {
+                self.next.joints[finger].clone_from(&self.now.joints[finger]);
+                let bodies = self.model.fingers[finger].bodies.clone();
+                self.next.placements[bodies.clone()].copy_from_slice(&self.now.placements[bodies]);
+            }
+            Stale::Everything => self.next.clone_from(&self.now),
+        }
+        self.stale = Stale::Nothing;
     }
 
     /// Puts one finger somewhere, without any test.
     pub fn set_finger(&mut self, finger: usize, joints: &Coordinates) {
+        self.stale = match self.stale {
+            Stale::Nothing => Stale::Finger(finger),
+            Stale::Finger(other) if other == finger => self.stale,
+            _ => Stale::Everything,
+        };
         place_finger(self.model, &mut self.now, finger, joints);
         for &pair in &self.model.fingers[finger].pairs {
             self.slack[pair] = f64::NEG_INFINITY;
@@ -124,19 +155,20 @@ impl<'a> Workspace<'a> {
     /// Puts the object somewhere, without any test; what pairs knew of each other is forgotten.
     pub fn place_object(&mut self, world_from_object: &Pose) {
         place_object(self.model, &mut self.now, world_from_object);
+        place_object(self.model, &mut self.next, world_from_object);
         self.slack.fill(f64::NEG_INFINITY);
     }
 
     /// Puts the object and one finger somewhere, without any test.
     pub fn place_object_and_finger(&mut self, world_from_object: &Pose, finger: usize, joints: &Coordinates) {
-        place_object(self.model, &mut self.now, world_from_object);
+        self.place_object(world_from_object);
         self.set_finger(finger, joints);
     }
 
     /// True when no pair is too near now.
     pub fn is_clear(&mut self, mode: TipMode) -> bool {
         self.work += 1;
-        self.next.clone_from(&self.now);
+        self.align(None);
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
         (0..self.model.pairs.len()).all(|pair| self.pair_is_clear(pair, mode))
@@ -145,7 +177,7 @@ impl<'a> Workspace<'a> {
     /// True when no pair of one finger is too near now.
     pub fn finger_is_clear(&mut self, finger: usize, mode: TipMode) -> bool {
         self.work += 1;
-        self.next.clone_from(&self.now);
+        self.align(None);
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
         let model = self.model;
@@ -155,7 +187,7 @@ impl<'a> Workspace<'a> {
     /// True when one finger is clear of the object, the palm and obstacles now, whatever the other fingers do.
     pub fn finger_alone_is_clear(&mut self, finger: usize, mode: TipMode) -> bool {
         self.work += 1;
-        self.next.clone_from(&self.now);
+        self.align(None);
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
         let model = self.model;
@@ -167,9 +199,9 @@ impl<'a> Workspace<'a> {
         self.work += 1;
         let model = self.model;
         let (f, g) = (first.0.min(second.0), first.0.max(second.0));
-        place_finger(model, &mut self.now, first.0, first.1);
-        place_finger(model, &mut self.now, second.0, second.1);
-        self.next.clone_from(&self.now);
+        self.set_finger(first.0, first.1);
+        self.set_finger(second.0, second.1);
+        self.align(None);
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
         self.slack.fill(f64::NEG_INFINITY);
@@ -190,6 +222,7 @@ impl<'a> Workspace<'a> {
         for finger in 0..self.model.n_fingers() {
             place_finger(self.model, &mut self.next, finger, &joints[finger]);
         }
+        self.stale = Stale::Everything;
         self.try_step(None, mode, MAX_HALVINGS)
     }
 
@@ -209,6 +242,7 @@ impl<'a> Workspace<'a> {
             *slack -= self.motion[pair.a] + self.motion[pair.b];
         }
         self.now.clone_from(&self.next);
+        self.stale = Stale::Nothing;
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
         (0..self.model.pairs.len()).all(|pair| self.pair_is_clear(pair, TipMode::AllHold))
@@ -216,7 +250,8 @@ impl<'a> Workspace<'a> {
 
     /// Moves one finger if the step is clear; stays otherwise.
     pub fn step_finger(&mut self, finger: usize, joints: &Coordinates, mode: TipMode) -> bool {
-        self.next.clone_from(&self.now);
+        self.align(Some(finger));
+        self.stale = Stale::Finger(finger);
         place_finger(self.model, &mut self.next, finger, joints);
         self.try_step(Some(finger), mode, MAX_HALVINGS)
     }
@@ -240,6 +275,7 @@ impl<'a> Workspace<'a> {
         if halvings == 0 || !blocking.is_none_or(|pair| self.end_is_clear(pair, mode)) {
             return false;
         }
+        self.stale = Stale::Everything;
         let (start, goal) = (self.now.clone(), self.next.clone());
         self.next = midway(model, &start, &goal);
         if self.try_step(moving, mode, halvings - 1) {
