@@ -23,6 +23,8 @@ pub struct FingerModel<'a> {
     pub ik: &'a FingerIk,
     /// Radius of the ball tip; zero for a sharp one.
     pub tip_radius: f64,
+    /// Bounds of the motion of the tip's centre.
+    pub tip_bound: MotionBound,
     /// Indices of its bodies in [`Model::bodies`].
     pub bodies: std::ops::Range<usize>,
     /// Pairs that a motion of this finger alone can bring together.
@@ -146,6 +148,12 @@ impl<'a> Model<'a> {
             let ik = &finger.ik;
             fingers.push(FingerModel {
                 tip_radius: finger.tip.radius(),
+                tip_bound: MotionBound::new(
+                    &finger.chain,
+                    finger.chain.joints.len() - 1,
+                    &finger.tip.center_in_body,
+                    0.0,
+                ),
                 tip_at_rest: ik.tip(&finger.rest),
                 ik,
                 bodies: first..bodies.len(),

@@ -12,7 +12,7 @@ use regrasp_plan::plan::{
 use regrasp_scene::InHandQuery;
 
 /// Largest distance of a holding fingertip from its contact that plans promise, in metres (issue: at most 0.5 mm).
-const CONTACT_TOLERANCE: f64 = 0.0005;
+pub const CONTACT_TOLERANCE: f64 = 0.0005;
 
 /// Makes the plan of `steps` from `start`.
 pub fn record(

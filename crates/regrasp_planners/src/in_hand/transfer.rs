@@ -1,8 +1,9 @@
 //! Transfer paths: the object moves, the contacts stay on it, the fingers follow (paper 000, section 4.2.3).
 
 use super::model::Model;
+use super::record::CONTACT_TOLERANCE;
 use super::state::{GraspState, Moment};
-use super::workspace::{HandJoints, TipMode, Workspace, tip_target};
+use super::workspace::{Contacts, HandJoints, TipMode, Workspace, tip_target};
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Pose, UnitVector, frame, interpolate_pose};
 use regrasp_grasp::Contact;
@@ -47,21 +48,58 @@ pub fn transfer(workspace: &mut Workspace, start: &GraspState, goal: &Pose, mome
     let model = workspace.model;
     workspace.set(&start.world_from_object, &start.joints, &start.contacts);
     let steps = n_steps(model, &start.world_from_object, goal, model.settings.step);
-    let mut joints: HandJoints = start.joints.clone();
-    for k in 1..=steps {
-        let t = k as f64 / steps as f64;
-        let pose = if k == steps { *goal } else { interpolate_pose(&start.world_from_object, goal, t) };
+    let shortest = 1.0 / (steps << MAX_HALVINGS) as f64;
+    let mut pending: Vec<f64> = (1..=steps).rev().map(|k| k as f64 / steps as f64).collect();
+    let mut made = 0.0;
+    let mut here = Moment { world_from_object: start.world_from_object, joints: start.joints.clone() };
+    while let Some(t) = pending.pop() {
+        let pose = if t == 1.0 { *goal } else { interpolate_pose(&start.world_from_object, goal, t) };
         let world_from_object = Placement::from(&pose);
+        let mut joints = HandJoints::new();
         for finger in 0..model.n_fingers() {
-            match follow_contact(model, finger, &start.contacts[finger], &world_from_object, &joints[finger]) {
-                Some(solution) => joints[finger] = solution,
-                None => return (k - 1) as f64 / steps as f64,
+            match follow_contact(model, finger, &start.contacts[finger], &world_from_object, &here.joints[finger]) {
+                Some(solution) => joints.push(solution),
+                None => return made,
             }
         }
-        if !workspace.step(&pose, &joints, TipMode::AllHold) {
-            return (k - 1) as f64 / steps as f64;
+        let there = Moment { world_from_object: pose, joints };
+        if !tips_stay(model, &start.contacts, &here, &there) {
+            if t - made <= shortest {
+                return made;
+            }
+            pending.extend([t, 0.5 * (made + t)]);
+            continue;
         }
-        moments.push(Moment { world_from_object: pose, joints: joints.clone() });
+        if !workspace.step(&there.world_from_object, &there.joints, TipMode::AllHold) {
+            return made;
+        }
+        moments.push(there.clone());
+        (made, here) = (t, there);
     }
     1.0
+}
+
+/// Most often that a step is halved because fingertips stray from their contacts on the way.
+const MAX_HALVINGS: usize = 4;
+/// Share of the contact tolerance that a tip may stray half-way; the rest is for what lies between.
+const HALFWAY_SHARE: f64 = 0.7;
+
+/// True when every tip stays on its contact while the joints move linearly: half-way, where they stray most.
+fn tips_stay(model: &Model, contacts: &Contacts, from: &Moment, to: &Moment) -> bool {
+    let allowed = HALFWAY_SHARE * CONTACT_TOLERANCE;
+    let mut half: Option<Placement> = None;
+    (0..model.n_fingers()).all(|f| {
+        let finger = &model.fingers[f];
+        let change: Coordinates = from.joints[f].iter().zip(&to.joints[f]).map(|(a, b)| b - a).collect();
+        // What the joints' bound proves needs no look; the object strays as little as the shortest step of a finger.
+        if finger.tip_bound.chord_deviation(&change) < 0.5 * allowed {
+            return true;
+        }
+        let world_from_object = half.get_or_insert_with(|| {
+            Placement::from(&interpolate_pose(&from.world_from_object, &to.world_from_object, 0.5))
+        });
+        let joints: Coordinates = from.joints[f].iter().zip(&change).map(|(q, dq)| q + 0.5 * dq).collect();
+        let target = tip_target(world_from_object, &contacts[f], finger.tip_radius);
+        (finger.ik.tip(&joints) - target).norm() <= allowed
+    })
 }
