@@ -239,7 +239,7 @@ fn around(
     let margin = FREE_LIMIT_MARGIN;
     let lower: Vec<f64> = chain.lower.iter().zip(start).map(|(l, q)| (l + margin).max(q - 3.2)).collect();
     let upper: Vec<f64> = chain.upper.iter().zip(start).map(|(u, q)| (u - margin).min(q + 3.2)).collect();
-    let settings = RrtSettings { max_iterations: model.settings.rrt_iterations, ..RrtSettings::default() };
+    let settings = RrtSettings { max_iterations: workspace.rrt_iterations, ..RrtSettings::default() };
     let as_joints = |q: &[f64]| -> Coordinates { q.iter().copied().collect() };
     let corners = RrtConnect::new().plan(start, goal, &lower, &upper, &settings, rng, |from, to| {
         workspace.set_finger(finger, &as_joints(from));

@@ -15,6 +15,9 @@ use regrasp_geometry::collision::Placement;
 /// Joints nearer than this count as the same posture, in radians or metres.
 const SAME_POSTURE: f64 = 1e-6;
 
+/// Fraction of the usual iterations of RRT-Connect for relocations that others can stand in for.
+const CASUAL: usize = 8;
+
 /// What a sequence costs: relocations first, then transfers.
 fn cost(steps: &[Step]) -> (usize, usize) {
     let n_transfers = steps.iter().filter(|step| matches!(step.motion, Motion::Transfer(_))).count();
@@ -179,5 +182,9 @@ pub fn change_grasp(
     if !table.is_closed(&goal, (1 << model.n_fingers()) - 1) {
         return None;
     }
-    regrasp(&mut search.workspace, state, &options, &goal, &mut table, &mut Tried::default(), rng)
+    // One of many ways to the same end: not worth a long search for a finger's way.
+    search.workspace.rrt_iterations = model.settings.rrt_iterations / CASUAL;
+    let steps = regrasp(&mut search.workspace, state, &options, &goal, &mut table, &mut Tried::default(), rng);
+    search.workspace.rrt_iterations = model.settings.rrt_iterations;
+    steps
 }

@@ -79,6 +79,8 @@ pub struct Workspace<'a> {
     /// How far its points stray at most from straight lines in the current step.
     deviation: Vec<f64>,
     contacts: Contacts,
+    /// Iterations of RRT-Connect that a relocation is worth just now.
+    pub rrt_iterations: usize,
     /// Configurations looked at.
     pub work: u64,
     /// The pair that stopped the last failed step.
@@ -101,6 +103,7 @@ impl<'a> Workspace<'a> {
             motion: vec![0.0; model.bodies.len()],
             deviation: vec![0.0; model.bodies.len()],
             contacts: Contacts::new(),
+            rrt_iterations: model.settings.rrt_iterations,
             work: 0,
             blocking_pair: None,
             model,
