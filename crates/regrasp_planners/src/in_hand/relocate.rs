@@ -97,13 +97,17 @@ fn lift(
     let normal = world_from_object.vector(&foothold.contact.normal_in_object);
     let base = world_from_object.point(&foothold.contact.point_in_object) + normal * model.fingers[finger].tip_radius;
     let mode = TipMode::Near { finger, normal_in_world: normal };
-    let settings = free_ik_settings(model, finger, UnitVector::new_unchecked(normal));
+    // No turning of the finger here: it would move the tip sideways between waypoints, over the surface.
+    let settings =
+        IkSettings { preference: None, ..free_ik_settings(model, finger, UnitVector::new_unchecked(normal)) };
     workspace.set_finger(finger, foothold.joints);
-    let n_steps = (height / model.settings.step).ceil().max(1.0) as usize;
+    // Short steps near the contact: between waypoints joints move linearly and the tip strays sideways with the square of
+    // the step, which must not be a slide over the surface.
+    let n_steps = 2 * (height / model.settings.step).ceil().max(1.0) as usize;
     let mut path = Vec::with_capacity(n_steps);
     let mut joints = foothold.joints.clone();
     for k in 1..=n_steps {
-        let target = base + normal * (height * k as f64 / n_steps as f64);
+        let target = base + normal * (height * (k as f64 / n_steps as f64).powi(2));
         joints = model.fingers[finger].ik.solve_near(&target, &joints, &settings)?;
         if !workspace.step_finger(finger, &joints, mode) {
             return None;
