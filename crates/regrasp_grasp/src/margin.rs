@@ -47,14 +47,8 @@ pub fn response_norms<const N: usize>(contacts: &[Contact; N], frame: &GraspFram
     }))
 }
 
-/// The margin that internal forces `forces` prove, by substitution; zero when they prove nothing.
-#[inline]
-pub fn proved_margin<const N: usize>(contacts: &[Contact; N], forces: &[Vector; N], frame: &GraspFrame) -> f64 {
-    let Some(norms) = response_norms(contacts, frame) else { return 0.0 };
-    margin_of_forces(contacts, forces, &norms, frame)
-}
-
-/// As [`proved_margin`], with the response norms given.
+/// The margin that internal forces `forces` prove, by substitution; zero when they prove nothing. `norms` are those of
+/// [`response_norms`].
 #[inline]
 pub fn margin_of_forces<const N: usize>(
     contacts: &[Contact; N],

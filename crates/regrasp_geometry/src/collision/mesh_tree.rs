@@ -5,7 +5,7 @@
 
 use super::gjk::{Answer, separation};
 use super::placement::Placement;
-use crate::frame::{Point, Vector};
+use crate::frame::Point;
 use crate::mesh::TriangleMesh;
 use crate::shape::Shape;
 use nalgebra::Matrix3;
@@ -21,10 +21,11 @@ pub struct MeshTree {
 struct Node {
     low: Point,
     high: Point,
-    /// Leaf: first triangle; inner node: index of the left child (the right one follows it... see `right`).
+    /// Leaf: first triangle; inner node: index of the left child.
     first: u32,
     /// Number of triangles of a leaf; 0 for inner nodes.
     n_triangles: u32,
+    /// Inner node: index of the right child.
     right: u32,
 }
 
@@ -129,9 +130,4 @@ fn build(corners: &mut [[Point; 3]], first: usize, nodes: &mut Vec<Node>) -> u32
         nodes[index] = Node { low, high, first: left, n_triangles: 0, right };
     }
     index as u32
-}
-
-/// Vector from a triangle, kept for callers that excuse triangles by their normal.
-pub fn triangle_normal(corners: &[Point; 3]) -> Vector {
-    (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).normalize()
 }

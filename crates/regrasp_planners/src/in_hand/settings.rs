@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Gait tree: relocate with look-ahead, transfer as far as possible, restart. The default, by measurement.
+    /// Gait trees from start and goal that meet: relocate with look-ahead, transfer as far as possible. The default, by
+    /// measurement.
     Gait,
     /// Paper 000: visibility PRM in GS_n, components joined by transfer-regrasp paths, dichotomic decomposition.
     Visibility,
