@@ -125,33 +125,27 @@ pub fn follow_share(
     f64::from(n_followed) / LOOK_AHEAD as f64
 }
 
-/// New candidates of `finger`, the ones that follow farthest first; at most `n_kept` of `n_drawn`.
+/// Draws contacts of `finger` that it can take, with its joints there: up to `n_wanted`, each given to `found`.
 ///
-/// The workspace has the object at `world_from_object`; it is left with the object and the finger anywhere.
-pub fn draw_candidates(
+/// The workspace has the object at `world_from_object` and keeps it there; the finger is left anywhere.
+pub fn draw_footholds(
     workspace: &mut Workspace,
     finger: usize,
-    world_from_object: &Pose,
-    way: &Way,
-    n_drawn: usize,
-    n_kept: usize,
+    world_from_object: &Placement,
+    n_wanted: usize,
     rng: &mut Rng,
-) -> Vec<Candidate> {
-    let placement = Placement::from(world_from_object);
-    let mut found: Vec<Candidate> = Vec::with_capacity(n_drawn);
-    let mut n_tries = 0;
-    while found.len() < n_drawn && n_tries < 8 * n_drawn {
-        n_tries += 1;
-        let Some(contact) = draw_contact(workspace.model, finger, &placement, rng) else { continue };
-        workspace.place_object(world_from_object);
-        let Some(joints) = reach(workspace, finger, &contact, &placement, rng) else { continue };
-        let follow = follow_share(workspace, finger, &contact, &joints, way);
-        found.push(Candidate { contact, joints, follow });
+    mut found: impl FnMut(Contact, Coordinates),
+) {
+    let mut n_found = 0;
+    for _ in 0..8 * n_wanted {
+        if n_found == n_wanted {
+            return;
+        }
+        let Some(contact) = draw_contact(workspace.model, finger, world_from_object, rng) else { continue };
+        let Some(joints) = reach(workspace, finger, &contact, world_from_object, rng) else { continue };
+        found(contact, joints);
+        n_found += 1;
     }
-    // Stable: equal shares stay in the order drawn.
-    found.sort_by(|a, b| b.follow.total_cmp(&a.follow));
-    found.truncate(n_kept);
-    found
 }
 
 /// A random pose near the way from `start` to `goal` (in-hand-notes, 3: biased poses).

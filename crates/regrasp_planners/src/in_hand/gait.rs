@@ -15,6 +15,9 @@ use regrasp_geometry::Pose;
 /// Nodes at a common pose whose grasps are tried to be joined.
 const JOINS: usize = 4;
 
+/// Nodes before which no extension wanders: easy queries are solved by then.
+const EAGER_NODES: usize = 10;
+
 /// Where an extension aims.
 enum Target {
     /// The other end of the query.
@@ -68,7 +71,8 @@ pub fn grow(
 
 fn draw_target(search: &mut Search, trees: &[Tree; 2], growing: usize) -> Target {
     let other = &trees[1 - growing];
-    if !search.rng.chance(search.model().settings.goal_share) {
+    let is_young = trees[0].nodes.len() + trees[1].nodes.len() < EAGER_NODES;
+    if !is_young && !search.rng.chance(search.model().settings.goal_share) {
         return Target::Anywhere(draw_pose(search.model(), &search.start, &search.goal, &mut search.rng));
     }
     if other.places.len() > 1 && search.rng.chance(OTHER_SHARE) {

@@ -50,8 +50,9 @@ pub struct Foothold<'a> {
 
 /// Moves `finger` from one foothold to another, with everything else where `workspace` has it.
 ///
-/// Returns the joints after the start, the last ones being exactly those of the goal. The workspace is left with the
-/// finger anywhere.
+/// RRT-Connect is tried at the first height only that both ends can be lifted to: it seldom finds lower what it did not
+/// find there. Returns the joints after the start, the last ones being exactly those of the goal. The workspace is left
+/// with the finger anywhere.
 pub fn relocate(
     workspace: &mut Workspace,
     world_from_object: &Pose,
@@ -62,14 +63,17 @@ pub fn relocate(
 ) -> Option<Vec<Coordinates>> {
     let model = workspace.model;
     let placement = Placement::from(world_from_object);
+    let mut may_go_around = true;
     for &height in &model.settings.lift_heights {
         let Some(up) = lift(workspace, &placement, finger, &from, height) else { continue };
         let Some(mut down) = lift(workspace, &placement, finger, &to, height) else { continue };
         let mode = TipMode::Away { finger, clearance: tip_clearance(model, height) };
         let (Some(above_start), Some(above_goal)) = (up.last().cloned(), down.pop()) else { continue };
-        let Some(over) = pass_over(workspace, &placement, finger, &above_start, &above_goal, height, mode, rng) else {
-            continue;
-        };
+        let mut over = pass_over(workspace, &placement, finger, &above_start, &above_goal, height, mode);
+        if over.is_none() && std::mem::take(&mut may_go_around) {
+            over = around(workspace, finger, &above_start, &above_goal, mode, rng);
+        }
+        let Some(over) = over else { continue };
         let mut path = up;
         path.extend(over);
         down.reverse();
@@ -118,7 +122,7 @@ fn lift(
     workspace.finger_is_clear(finger, clear).then_some(path)
 }
 
-/// From above one contact to above the other: along the surface, else straight in the joints, else by RRT-Connect.
+/// From above one contact to above the other: along the surface, else straight in the joints.
 fn pass_over(
     workspace: &mut Workspace,
     world_from_object: &Placement,
@@ -127,15 +131,12 @@ fn pass_over(
     goal: &Coordinates,
     height: f64,
     mode: TipMode,
-    rng: &mut Rng,
 ) -> Option<Vec<Coordinates>> {
-    slide(workspace, world_from_object, finger, start, goal, height, mode)
-        .or_else(|| {
-            let mut path = Vec::new();
-            workspace.set_finger(finger, start);
-            joint_line(workspace, finger, start, goal, mode, &mut path).then_some(path)
-        })
-        .or_else(|| around(workspace, finger, start, goal, mode, rng))
+    slide(workspace, world_from_object, finger, start, goal, height, mode).or_else(|| {
+        let mut path = Vec::new();
+        workspace.set_finger(finger, start);
+        joint_line(workspace, finger, start, goal, mode, &mut path).then_some(path)
+    })
 }
 
 /// Follows the surface at `height`: the tip turns about the object's centre of mass and is pushed out where it comes

@@ -1,7 +1,7 @@
 //! A tree of grasps that grows from one end of the query by gaits: relocate fingers with look-ahead, then transfer as far
 //! as the hand can follow. In-hand-notes, section 3, method E; real-hands-notes, section 2, rule F2.
 
-use super::candidates::{Candidate, Way, draw_candidates, follow_share};
+use super::candidates::{Candidate, Way, follow_share};
 use super::combine::{ClosureTable, rank, releasable};
 use super::grasps::choose_grasp;
 use super::pool::Pool;
@@ -181,7 +181,7 @@ fn extend(search: &mut Search, tree: &mut Tree, node: usize, target: &Pose) -> O
     None
 }
 
-/// The present contact of a finger and the best new ones: from the pool on the way to the goal, drawn anew elsewhere.
+/// The present contact of a finger and the best others of the pool for its way.
 fn options_of(
     search: &mut Search,
     pool: &mut Pool,
@@ -189,7 +189,6 @@ fn options_of(
     state: &GraspState,
     finger: usize,
 ) -> Vec<Candidate> {
-    let settings = &search.model().settings;
     let workspace = &mut search.workspace;
     let (contact, joints) = (state.contacts[finger], state.joints[finger].clone());
     let follow = follow_share(workspace, finger, &contact, &joints, elsewhere.unwrap_or(pool.way()));
@@ -200,19 +199,11 @@ fn options_of(
     if is_stuck {
         return options;
     }
-    workspace.place_object(pose);
-    let n_kept = settings.candidates_kept;
-    match elsewhere {
-        None => {
-            pool.grow(search, finger);
-            options.extend(pool.choose(finger, n_kept, &mut search.rng));
-        }
-        Some(way) => {
-            let new = draw_candidates(workspace, finger, pose, way, settings.candidates, n_kept, &mut search.rng);
-            search.n_samples += new.len() as u64;
-            options.extend(new);
-        }
-    }
+    let n_kept = search.model().settings.candidates_kept;
+    options.extend(match elsewhere {
+        None => pool.towards_aim(search, finger, n_kept),
+        Some(way) => pool.along(search, finger, way, n_kept),
+    });
     if options.len() == 1 {
         search.tally.add(Reason::NoContact(finger));
     }
@@ -286,11 +277,12 @@ fn sow(search: &mut Search, tree: &mut Tree) -> Option<usize> {
     search.workspace.place_object(&pose);
     let mut options = Vec::with_capacity(model.n_fingers());
     for finger in 0..model.n_fingers() {
-        if !tree.places[0].pool.grow(search, finger) {
+        let candidates = tree.places[0].pool.towards_aim(search, finger, model.settings.candidates_kept + 1);
+        if candidates.is_empty() {
             search.tally.add(Reason::NoContact(finger));
             return None;
         }
-        options.push(tree.places[0].pool.choose(finger, model.settings.candidates_kept + 1, &mut search.rng));
+        options.push(candidates);
     }
     match choose_grasp(search, &pose, &options) {
         Some(state) => {

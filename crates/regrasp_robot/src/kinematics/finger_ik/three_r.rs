@@ -40,6 +40,11 @@ impl Wave {
     fn at(&self, c: f64, s: f64) -> f64 {
         self.constant + self.cosine * c + self.sine * s
     }
+
+    /// Derivative by the angle.
+    fn slope(&self, c: f64, s: f64) -> f64 {
+        self.sine * c - self.cosine * s
+    }
 }
 
 /// The angles that a joint can have, as an arc: angles outside are seen by two products, without an arc tangent.
@@ -283,16 +288,11 @@ impl ThreeR {
         if n_near != 1 {
             return None;
         }
-        let (tip, mut jacobian) = self.tip_and_jacobian(chain, &near);
-        let error = target.coords - tip;
-        if error.norm_squared() >= POLISHED * POLISHED {
-            if !self.polish(chain, target, error, &mut near) {
-                return None;
-            }
-            jacobian = self.tip_and_jacobian(chain, &near).1;
+        let error = self.tip_error(chain, target, &near);
+        if error.norm_squared() >= POLISHED * POLISHED && !self.polish(chain, target, error, &mut near) {
+            return None;
         }
-        let before = self.tip_and_jacobian(chain, seed).1.determinant();
-        let same_side = before * jacobian.determinant() > 0.0;
+        let same_side = self.side(seed) * self.side(&near) > 0.0;
         (same_side && bring_inside(chain, settings.limit_margin, &mut near)).then(|| near.into_iter().collect())
     }
 
@@ -368,7 +368,7 @@ impl ThreeR {
             if error.norm_squared() < POLISHED * POLISHED {
                 return true;
             }
-            let (_, jacobian) = self.tip_and_jacobian(chain, coordinates);
+            let jacobian = self.jacobian(chain, coordinates);
             let Some(step) = jacobian.try_inverse().map(|inverse| inverse * error) else {
                 break;
             };
@@ -385,20 +385,38 @@ impl ThreeR {
         error.norm_squared() < POSITION_TOLERANCE * POSITION_TOLERANCE
     }
 
+    /// The determinant of the tip's Jacobian but for a constant factor. Joint 1 changes neither the tip's distance from the
+    /// axis's origin nor its height along the axis: what counts is how joints 2 and 3 change the two.
+    fn side(&self, coordinates: &[f64]) -> f64 {
+        let turn = |joint: usize| {
+            let (k, multiplier, offset) = self.drives[joint];
+            (multiplier * coordinates[k] + offset).sin_cos()
+        };
+        let ((s2, c2), (s3, c3)) = (turn(1), turn(2));
+        let (x, y) = (self.x.at(c3, s3), self.y.at(c3, s3));
+        let (dx, dy) = (self.x.slope(c3, s3), self.y.slope(c3, s3));
+        let by_2 = (-self.offset * (s2 * x + c2 * y), self.twist_sine * (c2 * x - s2 * y));
+        let by_3 = (
+            self.half_square.slope(c3, s3) + self.offset * (c2 * dx - s2 * dy),
+            self.twist_height.slope(c3, s3) + self.twist_sine * (s2 * dx + c2 * dy),
+        );
+        by_2.0 * by_3.1 - by_3.0 * by_2.1
+    }
+
     /// From the tip to the target.
     fn tip_error(&self, chain: &Chain, target: &Point, coordinates: &[f64; 3]) -> Vector {
         target - chain.last_frame(coordinates).point(&self.center_in_body)
     }
 
-    /// The tip, and its Jacobian with one column per coordinate.
-    fn tip_and_jacobian(&self, chain: &Chain, coordinates: &[f64]) -> (Vector, Matrix3<f64>) {
+    /// The tip's Jacobian, one column per coordinate.
+    fn jacobian(&self, chain: &Chain, coordinates: &[f64]) -> Matrix3<f64> {
         let mut lines: ArrayVec<JointLine, 3> = ArrayVec::new();
         let tip = chain.joint_lines(coordinates, &mut lines).point(&self.center_in_body).coords;
         let mut jacobian = Matrix3::zeros();
         for (drive, line) in self.drives.iter().zip(&lines) {
             jacobian.set_column(drive.0, &(line.axis.cross(&(tip - line.origin)) * drive.1));
         }
-        (tip, jacobian)
+        jacobian
     }
 }
 
@@ -492,4 +510,34 @@ fn in_limits(angle: f64, multiplier: f64, offset: f64, lower: f64, upper: f64) -
         }
     }
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kinematics::samples::{random_coordinates, random_turning};
+    use regrasp_base::Rng;
+
+    #[test]
+    fn side_is_the_determinant_but_for_a_constant() {
+        let mut n_compared = 0;
+        for case in 0..60 {
+            let mut rng = Rng::keyed(11, "side", case);
+            let (chain, center) = random_turning(3, 3.0, &mut rng);
+            let Some(ik) = ThreeR::new(&chain, &center) else { continue };
+            let mut ratio = None;
+            for _ in 0..20 {
+                let q = random_coordinates(&chain, &mut rng);
+                let determinant = ik.jacobian(&chain, q.as_slice()).determinant();
+                if determinant.abs() < 1e-6 {
+                    continue;
+                }
+                let now = ik.side(q.as_slice()) / determinant;
+                let first = *ratio.get_or_insert(now);
+                assert!((now - first).abs() < 1e-6 * first.abs(), "case {case}: {now} against {first}");
+                n_compared += 1;
+            }
+        }
+        assert!(n_compared > 500);
+    }
 }
