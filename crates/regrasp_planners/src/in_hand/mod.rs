@@ -39,6 +39,8 @@ mod relocate;
 mod roadmap_tests;
 /// What all methods share.
 mod search;
+#[cfg(test)]
+mod sequence_tests;
 /// Settings.
 pub mod settings;
 /// Random shortcuts.
@@ -59,7 +61,7 @@ mod visibility;
 mod workspace;
 
 pub use settings::{Alpha, InHandSettings, Method, ReleaseRule};
-pub use validate::validate_once;
+pub use validate::{NotProven, validate_once};
 
 use crate::failure::Failure;
 use attempts::{Left, run_attempts};
