@@ -50,6 +50,13 @@ impl Budget {
         if work_done >= self.max_work {
             return Err(Interrupt::WorkSpent);
         }
+        self.check_caller()
+    }
+
+    /// Err when the deadline has passed or the caller cancelled, whatever work was done.
+    ///
+    /// Reads the clock, as [`Budget::check`] does.
+    pub fn check_caller(&self) -> Result<(), Interrupt> {
         if self.cancelled.load(Ordering::Relaxed) {
             return Err(Interrupt::Cancelled);
         }
@@ -72,5 +79,7 @@ mod tests {
         let budget = Budget::unlimited();
         budget.cancelled.store(true, Ordering::Relaxed);
         assert_eq!(budget.check(0), Err(Interrupt::Cancelled));
+        assert_eq!(budget.check_caller(), Err(Interrupt::Cancelled));
+        assert_eq!(Budget::work(0).check_caller(), Ok(()), "work is not asked about");
     }
 }

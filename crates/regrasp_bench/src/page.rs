@@ -49,7 +49,7 @@ fn table(summaries: &[Summary], out: &mut String) {
             summary.solved,
             summary.runs,
             summary.accepted.map_or_else(dash, |n| format!("{n}/{}", summary.solved)),
-            summary.floor_multiple.map_or_else(dash, |x| format!("{x:.1}")),
+            summary.floors(),
             summary.check_s.map_or_else(dash, |s| ms(s.mean)),
             summary.nodes.map_or_else(dash, |s| format!("{:.0}", s.mean)),
             summary.transfers.map_or_else(dash, |s| format!("{:.1}", s.mean)),

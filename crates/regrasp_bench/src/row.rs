@@ -4,7 +4,7 @@ use cpu_time::ProcessTime;
 use regrasp_base::Budget;
 use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, check};
-use regrasp_planners::in_hand::validate_once;
+use regrasp_planners::in_hand::{NotProven, validate_once};
 use regrasp_planners::{Failure, InHandSettings, Progress, plan_in_hand};
 use regrasp_scene::{InHandQuery, Scene};
 use serde::{Deserialize, Serialize};
@@ -62,7 +62,8 @@ pub struct Row {
     pub plan_s: f64,
     /// Processor time of the process during planning, all threads together.
     pub plan_cpu_s: f64,
-    /// Processor time to validate the final plan once at the planner's resolution.
+    /// Processor time to validate the final plan once at the planner's resolution; none for a solved seed whose plan does
+    /// not pass, which is a defect: `cause` says what.
     pub floor_s: Option<f64>,
     /// Wall-clock time of the checker.
     pub check_s: Option<f64>,
@@ -86,7 +87,7 @@ pub struct Row {
     pub min_clearance: Option<f64>,
     /// Angle left at the nearest miss, in degrees.
     pub angle_left_deg: Option<f64>,
-    /// Commonest cause of a failure, or first violation of a rejected plan.
+    /// Commonest cause of a failure, first violation of a rejected plan, or what has no floor.
     pub cause: String,
 }
 
@@ -131,7 +132,10 @@ pub fn run(problem: Problem, settings: &RunSettings) -> Row {
             row.status = "solved".into();
             row.transfers = plan.statistics.transfers;
             row.relocations = plan.statistics.relocations;
-            row.floor_s = floor(problem.scene, &plan, &settings.planner);
+            match floor(problem.scene, &plan, &settings.planner) {
+                Ok(seconds) => row.floor_s = Some(seconds),
+                Err(not_proven) => row.cause = not_proven.to_string(),
+            }
             if settings.judge == Judge::Checker {
                 judge(problem, &plan, &mut row);
             }
@@ -157,14 +161,13 @@ fn judge(problem: Problem, plan: &Plan, row: &mut Row) {
     }
 }
 
-/// Processor time to validate `plan` once at the planner's resolution, the least of three; none if it does not pass.
-fn floor(scene: &Scene, plan: &Plan, settings: &InHandSettings) -> Option<f64> {
-    let mut least: Option<f64> = None;
+/// Processor time to validate `plan` once at the planner's resolution, the least of three.
+fn floor(scene: &Scene, plan: &Plan, settings: &InHandSettings) -> Result<f64, NotProven> {
+    let mut least = f64::INFINITY;
     for _ in 0..3 {
         let started = ProcessTime::now();
-        validate_once(scene, plan, settings).ok()?;
-        let seconds = started.elapsed().as_secs_f64();
-        least = Some(least.map_or(seconds, |least| least.min(seconds)));
+        validate_once(scene, plan, settings)?;
+        least = least.min(started.elapsed().as_secs_f64());
     }
-    least
+    Ok(least)
 }

@@ -47,6 +47,8 @@ pub struct Summary {
     pub plan_cpu_s: Option<Spread>,
     /// Mean processor time of planning over mean floor, over the solved seeds.
     pub floor_multiple: Option<f64>,
+    /// Solved seeds whose plan was not proven again at the planner's resolution, so that they have no floor: defects.
+    pub without_floor: usize,
     /// Wall-clock time of the checker.
     pub check_s: Option<Spread>,
     /// Nodes over the solved seeds.
@@ -59,6 +61,14 @@ pub struct Summary {
     pub min_margin: Option<f64>,
     /// Smallest clearance of any accepted plan, in metres.
     pub min_clearance: Option<f64>,
+}
+
+impl Summary {
+    /// Planning time in floors, and how many plans have none if any do.
+    pub fn floors(&self) -> String {
+        let multiple = self.floor_multiple.map_or("-".into(), |x| format!("{x:.1}"));
+        if self.without_floor == 0 { multiple } else { format!("{multiple} ({} without)", self.without_floor) }
+    }
 }
 
 /// One summary per scene and method, in the order in which they first appear.
@@ -92,6 +102,7 @@ fn summary_of(&(scene, method): &(&str, &str), rows: &[Row]) -> Summary {
         plan_s: over(|row| row.plan_s),
         plan_cpu_s: over(|row| row.plan_cpu_s),
         floor_multiple: (floor > 0.0).then(|| planned / floor),
+        without_floor: solved.len() - floored.len(),
         check_s: Spread::of(solved.iter().filter_map(|row| row.check_s)),
         nodes: over(|row| row.nodes as f64),
         transfers: over(|row| row.transfers as f64),
@@ -126,7 +137,7 @@ pub fn table(summaries: &[Summary]) -> String {
             summary.method,
             format!("{}/{}", summary.solved, summary.runs),
             summary.accepted.map_or("-".into(), |n| format!("{n}/{}", summary.solved)),
-            summary.floor_multiple.map_or("-".into(), |x| format!("{x:.1}")),
+            summary.floors(),
             summary.check_s.map_or("-".into(), |spread| ms(spread.mean)),
             summary.min_margin.map_or("-".into(), |x| format!("{x:.4}")),
             summary.min_clearance.map_or("-".into(), |x| format!("{:.3}", 1e3 * x)),

@@ -61,7 +61,7 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
     if talk.is_json() { Ok(()) } else { talk.data(&summary::table(&summaries)) }
 }
 
-/// One line per miss or rejection; solved seeds stay silent but for `--json`.
+/// One line per miss, rejection or plan without floor; other solved seeds stay silent but for `--json`.
 fn say_row(row: &Row, talk: &Talk) {
     talk.event("row", json!(row));
     if row.status != "solved" {
@@ -69,6 +69,8 @@ fn say_row(row: &Row, talk: &Talk) {
         talk.say(format!("miss   {} seed {}: {}{left}; {}", row.scene, row.seed, row.status, row.cause));
     } else if row.accepted == Some(false) {
         talk.say(format!("REJECTED   {} seed {}: {}", row.scene, row.seed, row.cause));
+    } else if row.floor_s.is_none() {
+        talk.say(format!("NO FLOOR   {} seed {}: {}", row.scene, row.seed, row.cause));
     }
 }
 

@@ -186,7 +186,7 @@ pub fn failure_text(failure: &Failure) -> String {
     }
     if !failure.causes.is_empty() {
         let tried: u64 = failure.causes.iter().map(|cause| cause.count).sum();
-        let _ = writeln!(out, "  {} attempts failed:", grouped(tried));
+        let _ = writeln!(out, "  {} tries of the search failed:", grouped(tried));
         for cause in failure.causes.iter().take(8) {
             let _ = writeln!(out, "    {:>5.1} %  {}", 100.0 * cause.share, cause.reason);
         }
@@ -233,7 +233,7 @@ mod tests {
         };
         let text = failure_text(&failure);
         for part in
-            ["not a proof", "within 61 deg and 1.2 mm", "4 000 attempts", "75.0 %  finger \"thumb\"", "try: more time"]
+            ["not a proof", "within 61 deg and 1.2 mm", "4 000 tries", "75.0 %  finger \"thumb\"", "try: more time"]
         {
             assert!(text.contains(part), "{part} is missing in\n{text}");
         }

@@ -54,7 +54,7 @@ pub struct CheckSettings {
     /// Start and goal may be missed by this much, in metres and radians.
     pub pose_tolerance: f64,
     /// What must be the same (end and begin of segments, a grasp, a resting object) may differ by this much, in metres
-    /// and radians: solvers that stop, not motion.
+    /// and radians: rounding, not motion.
     pub meeting_tolerance: f64,
     /// Joints may be this far beyond their limits: rounding.
     pub limit_tolerance: f64,
@@ -80,7 +80,7 @@ impl Default for CheckSettings {
             largest_contact_tolerance: 0.5e-3,
             smallest_margin: 0.0,
             pose_tolerance: 1e-6,
-            meeting_tolerance: 1e-7,
+            meeting_tolerance: 1e-9,
             limit_tolerance: 1e-9,
             largest_turn: 0.5,
             largest_slide: 0.05,

@@ -57,9 +57,9 @@ impl Left {
     /// The failure that all attempts together are.
     pub fn failure(self, model: &Model, query: &InHandQuery, interrupt: Interrupt, n_attempts: usize) -> Failure {
         let limit = match interrupt {
-            Interrupt::WorkSpent => "work budget",
-            Interrupt::Deadline => "time limit",
-            Interrupt::Cancelled => "interruption",
+            Interrupt::WorkSpent => "within the work allowed",
+            Interrupt::Deadline => "within the time limit",
+            Interrupt::Cancelled => "until interrupted",
         };
         let goal = &query.world_from_object_goal;
         let nearest_miss = self.nearest.as_ref().map(|(_, state)| NearestMiss {
@@ -86,7 +86,7 @@ impl Left {
         };
         Failure {
             kind: interrupt.into(),
-            message: format!("no plan within the {limit} (not a proof), {n_attempts} attempts: {reached}"),
+            message: format!("no plan {limit} (not a proof), searching from scratch {}: {reached}", times(n_attempts)),
             advice,
             causes,
             nearest_miss,
@@ -111,6 +111,14 @@ impl Left {
     }
 }
 
+fn times(n: usize) -> String {
+    match n {
+        0 => "not even once".into(),
+        1 => "once".into(),
+        n => format!("{n} times"),
+    }
+}
+
 /// Work that attempt `index` may do: `base`, growing so that hard queries get long attempts too.
 pub fn work_of_attempt(base: u64, index: usize) -> u64 {
     base.saturating_mul(1 + index as u64 / 4)
@@ -119,7 +127,8 @@ pub fn work_of_attempt(base: u64, index: usize) -> u64 {
 /// Runs attempts until one succeeds or the budget ends.
 ///
 /// `run(index, work_limit, winner)` is one attempt. The result is that of the lowest index that succeeded, with what
-/// all attempts up to it left behind; so it is the same on any number of threads.
+/// all attempts up to it left behind and that index; so it is the same on any number of threads. Err: what ended it, what
+/// the attempts left behind, and how many were begun.
 #[expect(clippy::result_large_err, reason = "success carries what the attempts left behind too, so is no smaller")]
 pub fn run_attempts<T: Send>(
     n_threads: usize,
@@ -153,11 +162,11 @@ pub fn run_attempts<T: Send>(
         } else {
             round.par_iter().with_max_len(1).map(|&(index, limit)| one(index, limit)).collect()
         };
-        for (&(index, _), (result, from_attempt)) in round.iter().zip(outcomes) {
+        for (&(attempt, _), (result, from_attempt)) in round.iter().zip(outcomes) {
             left.add(from_attempt);
             match result {
-                Ok(value) => return Ok((value, left, index)),
-                Err(Stop::Budget(interrupt)) => return Err((interrupt, left, index)),
+                Ok(value) => return Ok((value, left, attempt)),
+                Err(Stop::Budget(interrupt)) => return Err((interrupt, left, attempt + 1)),
                 Err(Stop::Restart | Stop::Overtaken) => {}
             }
         }

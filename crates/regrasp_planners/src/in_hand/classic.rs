@@ -4,7 +4,7 @@
 use super::explore::{explore, roadmap_of};
 use super::link::LocalMethod;
 use super::search::{Search, Stop};
-use super::state::{GraspState, Step};
+use super::state::{GraspState, Sequence};
 use super::visibility::{ends, note_nearest, solution};
 
 /// Looks for motions from `start` to the goal pose and `goal_grasp`; what is not given is drawn.
@@ -12,12 +12,12 @@ pub fn build(
     search: &mut Search,
     start: Option<GraspState>,
     goal_grasp: Option<&GraspState>,
-) -> Result<(GraspState, Vec<Step>), Stop> {
+) -> Result<Sequence, Stop> {
     let (start, goal) = ends(search, start, goal_grasp)?;
     let mut roadmap = roadmap_of(search, &start, &goal, LocalMethod::TransferRegrasp)?;
     loop {
-        if let Some(steps) = solution(search, &mut roadmap)? {
-            return Ok((start, steps));
+        if let Some(way) = solution(search, &mut roadmap)? {
+            return Ok(way);
         }
         explore(search, &mut roadmap, LocalMethod::TransferRegrasp)?;
         note_nearest(search, &roadmap);

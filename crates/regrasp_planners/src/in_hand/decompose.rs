@@ -3,7 +3,7 @@
 use super::grasp_path::GraspPath;
 use super::link::single_sequence;
 use super::search::{Search, Stop};
-use super::state::{GraspState, Step};
+use super::state::{GraspState, Sequence};
 
 /// Halvings after which a piece counts as one that cannot be decomposed. The paper stops where the object's poses are
 /// close; a path may also have equal poses at both ends (in-hand-notes, 4.5).
@@ -23,35 +23,28 @@ pub fn decompose(
     path: &GraspPath,
     start: &GraspState,
     end: &GraspState,
-) -> Result<Option<Vec<Step>>, Stop> {
-    let mut steps = Vec::new();
-    let is_whole = transform_path(search, start, &Piece { path, from: 0.0, to: 1.0, end }, MAX_HALVINGS, &mut steps)?;
-    Ok(is_whole.then_some(steps))
+) -> Result<Option<Sequence>, Stop> {
+    transform_path(search, start, &Piece { path, from: 0.0, to: 1.0, end }, MAX_HALVINGS)
 }
 
-/// Appends the motions of one piece; false when they were not found.
+/// The motions of one piece, from exactly `start` to exactly its end.
 fn transform_path(
     search: &mut Search,
     start: &GraspState,
     piece: &Piece,
     halvings: u32,
-    steps: &mut Vec<Step>,
-) -> Result<bool, Stop> {
+) -> Result<Option<Sequence>, Stop> {
     search.check()?;
     if let Some(sequence) = single_sequence(search, start, piece.end) {
-        steps.extend(sequence);
-        return Ok(true);
+        return Ok(Some(sequence));
     }
     if halvings == 0 {
-        return Ok(false);
+        return Ok(None);
     }
     let half = 0.5 * (piece.from + piece.to);
-    let Some(middle) = piece.path.at(search.model(), half) else { return Ok(false) };
+    let Some(middle) = piece.path.at(search.model(), half) else { return Ok(None) };
     let first = Piece { to: half, end: &middle, ..*piece };
-    if !transform_path(search, start, &first, halvings - 1, steps)? {
-        return Ok(false);
-    }
-    // Where no finger had to move, the joints are the transfer's own.
-    let reached = steps.last().map_or(start, |step| &step.end).clone();
-    transform_path(search, &reached, &Piece { from: half, ..*piece }, halvings - 1, steps)
+    let Some(to_middle) = transform_path(search, start, &first, halvings - 1)? else { return Ok(None) };
+    let from_middle = transform_path(search, &middle, &Piece { from: half, ..*piece }, halvings - 1)?;
+    Ok(from_middle.and_then(|rest| to_middle.then(rest)))
 }

@@ -4,10 +4,9 @@
 //! gone backwards, so what leads from the goal leads to it.
 
 use super::candidates::draw_pose;
-use super::link::reversed;
 use super::search::{Search, Stop};
-use super::shorten::{change_grasp, whole_transfer};
-use super::state::{GraspState, Step};
+use super::shorten::{Arrival, change_grasp, whole_transfer};
+use super::state::{GraspState, Sequence};
 use super::tree::Tree;
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;
@@ -30,11 +29,7 @@ enum Target {
 
 /// Looks for a sequence of motions from `start` (or from a grasp of its own choice) to the goal pose, and there to the
 /// grasp `goal_grasp` if one is asked for.
-pub fn grow(
-    search: &mut Search,
-    start: Option<GraspState>,
-    goal_grasp: Option<&GraspState>,
-) -> Result<(GraspState, Vec<Step>), Stop> {
+pub fn grow(search: &mut Search, start: Option<GraspState>, goal_grasp: Option<&GraspState>) -> Result<Sequence, Stop> {
     let (start_pose, goal_pose) = (search.start, search.goal);
     let mut trees = [
         Tree::new(search, &start_pose, &goal_pose, start.as_ref()),
@@ -52,8 +47,7 @@ pub fn grow(
         };
         if let Some(node) = trees[growing].grow(search, &pose) {
             if growing == 0 {
-                let state = trees[0].nodes[node].state.clone();
-                search.note(&state);
+                search.note(trees[0].nodes[node].state());
             }
             if let Some(solution) =
                 meet(search, &trees, growing, node, &target).or_else(|| bridge(search, &trees, growing, node))
@@ -103,15 +97,9 @@ const OTHERS_LOOKED_AT: usize = 3;
 const OTHER_SHARE: f64 = 0.4;
 
 /// The whole way, if `node` of the growing tree completes it.
-fn meet(
-    search: &mut Search,
-    trees: &[Tree; 2],
-    growing: usize,
-    node: usize,
-    target: &Target,
-) -> Option<(GraspState, Vec<Step>)> {
+fn meet(search: &mut Search, trees: &[Tree; 2], growing: usize, node: usize, target: &Target) -> Option<Sequence> {
     let (tree, other) = (&trees[growing], &trees[1 - growing]);
-    let state = &tree.nodes[node].state;
+    let state = tree.nodes[node].state();
     let place = match target {
         Target::Aim => 0,
         Target::Other(place) => *place,
@@ -121,16 +109,17 @@ fn meet(
         return None;
     }
     if place == 0 && other.root_is_free {
-        return Some(in_order(growing, tree.trace(node), Vec::new(), None));
+        return Some(from_the_start(growing, tree.trace(node)));
     }
-    let (there, join) = join(search, state, other, place)?;
-    Some(in_order(growing, tree.trace(node), join, Some(other.trace(there))))
+    let (there, join) = join(search, &Sequence::at(state.clone()), other, place)?;
+    let way = tree.trace(node).then(join)?.then(other.trace(there).reversed())?;
+    Some(from_the_start(growing, way))
 }
 
 /// From a new node straight to the nearest pose of the other tree, and there into one of its grasps.
-fn bridge(search: &mut Search, trees: &[Tree; 2], growing: usize, node: usize) -> Option<(GraspState, Vec<Step>)> {
+fn bridge(search: &mut Search, trees: &[Tree; 2], growing: usize, node: usize) -> Option<Sequence> {
     let (tree, other) = (&trees[growing], &trees[1 - growing]);
-    let state = &tree.nodes[node].state;
+    let state = tree.nodes[node].state();
     let mut nearest = (f64::INFINITY, None);
     for (index, place) in other.places.iter().enumerate() {
         let distance = search.distance(&state.world_from_object, place.pool.world_from_object());
@@ -139,40 +128,25 @@ fn bridge(search: &mut Search, trees: &[Tree; 2], growing: usize, node: usize) -
         }
     }
     let place = nearest.1?;
-    let step = whole_transfer(search, state, other.places[place].pool.world_from_object())?;
-    let (there, join) = join(search, &step.end, other, place)?;
-    let (root, mut steps) = tree.trace(node);
-    steps.push(step);
-    Some(in_order(growing, (root, steps), join, Some(other.trace(there))))
+    let across = whole_transfer(search, state, other.places[place].pool.world_from_object())?;
+    let (there, join) = join(search, &across, other, place)?;
+    let way = tree.trace(node).then(join)?.then(other.trace(there).reversed())?;
+    Some(from_the_start(growing, way))
 }
 
-/// Relocations from `state` into the grasp of one of the nodes at `place` of `other`, which has the same object pose.
-fn join(search: &mut Search, state: &GraspState, other: &Tree, place: usize) -> Option<(usize, Vec<Step>)> {
+/// `way` and then relocations into exactly one of the nodes at `place` of `other`, which has the object pose that `way`
+/// ends at.
+fn join(search: &mut Search, way: &Sequence, other: &Tree, place: usize) -> Option<(usize, Sequence)> {
     let nodes = &other.places[place].nodes;
     (0..JOINS.min(nodes.len())).find_map(|_| {
         let there = nodes[search.rng.below(nodes.len())];
         let mut rng = Rng::child(&search.rng, "join", 0);
         search.rng.bits();
-        Some((there, change_grasp(search, state, &other.nodes[there].state, false, &mut rng)?))
+        Some((there, change_grasp(search, way, other.nodes[there].state(), Arrival::Exact, &mut rng)?))
     })
 }
 
-/// From the start to the goal, whichever tree was growing: the way in the growing tree, the join, the way back in the
-/// other one.
-fn in_order(
-    growing: usize,
-    (root, mut steps): (GraspState, Vec<Step>),
-    join: Vec<Step>,
-    other: Option<(GraspState, Vec<Step>)>,
-) -> (GraspState, Vec<Step>) {
-    steps.extend(join);
-    if let Some((other_root, other_steps)) = other {
-        steps.extend(reversed(&other_root, &other_steps));
-    }
-    if growing == 0 {
-        return (root, steps);
-    }
-    let start = steps.last().map_or_else(|| root.clone(), |step| step.end.clone());
-    let back = reversed(&root, &steps);
-    (start, back)
+/// `way` as it goes from the start to the goal, found from the end whose tree was growing.
+fn from_the_start(growing: usize, way: Sequence) -> Sequence {
+    if growing == 0 { way } else { way.reversed() }
 }

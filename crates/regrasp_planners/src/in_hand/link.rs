@@ -2,8 +2,8 @@
 
 use super::grasp_path::GraspPath;
 use super::search::{Search, Stop};
-use super::shorten::{regrasp_transfer, transfer_regrasp};
-use super::state::{GraspState, Moment, Motion, Step};
+use super::shorten::{Arrival, regrasp_transfer, transfer_regrasp};
+use super::state::{GraspState, Sequence};
 use regrasp_base::Rng;
 use regrasp_roadmap::space::Space;
 use regrasp_roadmap::visibility_prm::VisibilityPrm;
@@ -18,7 +18,7 @@ pub enum Link {
     /// A path in GS_n, to be decomposed.
     Grasp(Rc<GraspPath>),
     /// Feasible motions.
-    Steps(Rc<Vec<Step>>),
+    Steps(Rc<Sequence>),
 }
 
 /// How two grasps are linked.
@@ -71,33 +71,10 @@ pub fn distance(search: &Search, a: &GraspState, b: &GraspState) -> f64 {
     search.distance(&a.world_from_object, &b.world_from_object) + apart / a.contacts.len() as f64
 }
 
-/// One transfer and one regrasp, in either order (paper 000, section 4.3).
-pub fn single_sequence(search: &mut Search, from: &GraspState, to: &GraspState) -> Option<Vec<Step>> {
+/// One transfer and one regrasp, in either order (paper 000, section 4.3): from exactly `from` to exactly `to`.
+pub fn single_sequence(search: &mut Search, from: &GraspState, to: &GraspState) -> Option<Sequence> {
     let mut rng = Rng::child(&search.rng, "single_sequence", 0);
     search.rng.bits();
-    transfer_regrasp(search, from, to, false, &mut rng).or_else(|| regrasp_transfer(search, from, to, false, &mut rng))
-}
-
-/// The motions of `steps` from `start`, gone backwards from where they end.
-pub fn reversed(start: &GraspState, steps: &[Step]) -> Vec<Step> {
-    let state_before = |index: usize| if index == 0 { start } else { &steps[index - 1].end };
-    (0..steps.len())
-        .rev()
-        .map(|index| {
-            let before = state_before(index);
-            let motion = match &steps[index].motion {
-                Motion::Transfer(moments) => {
-                    let mut back: Vec<Moment> = moments[..moments.len() - 1].iter().rev().cloned().collect();
-                    back.push(Moment { world_from_object: before.world_from_object, joints: before.joints.clone() });
-                    Motion::Transfer(back)
-                }
-                Motion::Regrasp { finger, path } => {
-                    let mut back: Vec<_> = path[..path.len() - 1].iter().rev().cloned().collect();
-                    back.push(before.joints[*finger].clone());
-                    Motion::Regrasp { finger: *finger, path: back }
-                }
-            };
-            Step { motion, end: before.clone() }
-        })
-        .collect()
+    transfer_regrasp(search, from, to, Arrival::Exact, &mut rng)
+        .or_else(|| regrasp_transfer(search, from, to, Arrival::Exact, &mut rng))
 }

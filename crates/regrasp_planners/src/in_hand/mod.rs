@@ -39,6 +39,8 @@ mod relocate;
 mod roadmap_tests;
 /// What all methods share.
 mod search;
+#[cfg(test)]
+mod sequence_tests;
 /// Settings.
 pub mod settings;
 /// Random shortcuts.
@@ -59,7 +61,7 @@ mod visibility;
 mod workspace;
 
 pub use settings::{Alpha, InHandSettings, Method, ReleaseRule};
-pub use validate::validate_once;
+pub use validate::{NotProven, validate_once};
 
 use crate::failure::Failure;
 use attempts::{Left, run_attempts};
@@ -113,9 +115,7 @@ pub fn plan_in_hand(
         (solution, Left::of(&search))
     });
     match found {
-        Ok(((start, steps), left, n_restarts)) => {
-            Ok(record::record(&model, query, seed, &start, &steps, left.statistics(n_restarts)))
-        }
+        Ok((way, left, n_restarts)) => Ok(record::record(&model, query, seed, &way, left.statistics(n_restarts))),
         Err((interrupt, left, n_attempts)) => Err(left.failure(&model, query, interrupt, n_attempts)),
     }
 }
@@ -134,12 +134,12 @@ fn solve(
     search: &mut Search,
     start: Option<state::GraspState>,
     goal: Option<&state::GraspState>,
-) -> Result<(state::GraspState, Vec<state::Step>), search::Stop> {
-    let (start, mut steps) = match search.model().settings.method {
+) -> Result<state::Sequence, search::Stop> {
+    let mut way = match search.model().settings.method {
         Method::Gait => gait::grow(search, start, goal)?,
         Method::Visibility => visibility::build(search, start, goal)?,
         Method::Classic => classic::build(search, start, goal)?,
     };
-    shorten::shorten(search, &start, &mut steps, goal.is_none());
-    Ok((start, steps))
+    shorten::shorten(search, &mut way, goal.is_none());
+    Ok(way)
 }

@@ -1,7 +1,7 @@
 //! The plan as it is written to a file.
 
 use super::model::Model;
-use super::state::{GraspState, Motion, Step};
+use super::state::{Motion, Sequence};
 use super::workspace::{Contacts, HandJoints};
 use regrasp_geometry::Pose;
 use regrasp_grasp::{Contact, closure};
@@ -14,21 +14,15 @@ use regrasp_scene::InHandQuery;
 /// Largest distance of a holding fingertip from its contact that plans promise, in metres (issue: at most 0.5 mm).
 pub const CONTACT_TOLERANCE: f64 = 0.0005;
 
-/// Makes the plan of `steps` from `start`.
-pub fn record(
-    model: &Model,
-    query: &InHandQuery,
-    seed: u64,
-    start: &GraspState,
-    steps: &[Step],
-    mut statistics: Statistics,
-) -> Plan {
+/// Makes the plan of the motions `way`.
+pub fn record(model: &Model, query: &InHandQuery, seed: u64, way: &Sequence, mut statistics: Statistics) -> Plan {
     let scene = model.scene;
-    let mut segments = Vec::with_capacity(steps.len());
+    let start = way.start();
+    let mut segments = Vec::with_capacity(way.steps().len());
     let mut kept_margin = closure::closure_margin(&start.contacts, &model.frame);
     let mut state = start;
-    for step in steps {
-        match &step.motion {
+    for step in way.steps() {
+        match step.motion() {
             Motion::Transfer(moments) => {
                 statistics.transfers += 1;
                 kept_margin = kept_margin.min(closure::closure_margin(&state.contacts, &model.frame));
@@ -48,14 +42,14 @@ pub fn record(
                     joints[*finger].clone_from(at);
                     let is_last = k + 1 == path.len();
                     let (contacts, free) =
-                        if is_last { (&step.end.contacts, None) } else { (&state.contacts, Some(*finger)) };
+                        if is_last { (&step.end().contacts, None) } else { (&state.contacts, Some(*finger)) };
                     waypoints.push(waypoint(&state.world_from_object, &joints, contacts, free));
                 }
                 let name = scene.hand.fingers[*finger].name.clone();
                 segments.push(Segment { kind: SegmentKind::Regrasp, moving_finger: Some(name), waypoints });
             }
         }
-        state = &step.end;
+        state = step.end();
     }
     kept_margin = kept_margin.min(closure::closure_margin(&state.contacts, &model.frame));
     if segments.is_empty() {

@@ -3,12 +3,12 @@
 use super::candidates::Candidate;
 use super::combine::{Choice, ClosureTable};
 use super::relocate::{Foothold, relocate};
-use super::state::{GraspState, Motion, Step};
+use super::state::{GraspState, Sequence};
 use super::workspace::Workspace;
 use regrasp_base::Rng;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 
-/// Relocations already tried from one state: what moved before decides what is in the way.
+/// Relocations already tried from one state between one set of options: what moved before decides what is in the way.
 #[derive(Debug, Default)]
 pub struct Tried {
     /// (options of all fingers before, finger, option after) and the path, if there is one.
@@ -26,22 +26,18 @@ pub fn regrasp(
     table: &mut ClosureTable,
     tried: &mut Tried,
     rng: &mut Rng,
-) -> Option<Vec<Step>> {
+) -> Option<Sequence> {
     let mut current: Choice = goal.iter().map(|_| 0).collect();
     let mut dead: Vec<Choice> = Vec::new();
     let mut order: Vec<(usize, usize)> = Vec::new();
     if !search(workspace, start, options, goal, table, tried, rng, &mut current, &mut dead, &mut order) {
         return None;
     }
-    let mut steps = Vec::with_capacity(order.len());
-    let mut state = start.clone();
+    let mut way = Sequence::at(start.clone());
     for (finger, which) in order {
-        let option = &options[finger][goal[finger]];
-        let path = tried.known[which].3.clone()?;
-        state = state.with_finger(finger, option.contact, option.joints.clone());
-        steps.push(Step { motion: Motion::Regrasp { finger, path }, end: state.clone() });
+        way.push_regrasp(finger, options[finger][goal[finger]].contact, tried.known[which].3.clone()?);
     }
-    Some(steps)
+    Some(way)
 }
 
 fn search(

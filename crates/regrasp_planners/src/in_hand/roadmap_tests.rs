@@ -3,11 +3,10 @@
 use super::decompose::decompose;
 use super::explore::draw_state;
 use super::grasp_path::GraspPath;
-use super::link::reversed;
 use super::model::Model;
 use super::search::Search;
 use super::settings::{InHandSettings, Method};
-use super::state::{GraspState, Motion, Step};
+use super::state::{GraspState, Motion, Sequence};
 use super::workspace::HandJoints;
 use regrasp_base::Budget;
 use regrasp_geometry::collision::Placement;
@@ -25,7 +24,7 @@ fn scene(name: &str) -> LoadedScene {
 }
 
 /// Runs `test` on a search of the bundled scene `name`.
-fn with_search(name: &str, test: impl FnOnce(&mut Search)) {
+pub(super) fn with_search(name: &str, test: impl FnOnce(&mut Search)) {
     let loaded = scene(name);
     let settings = InHandSettings { method: Method::Visibility, ..InHandSettings::default() };
     let model = Model::new(&loaded.scene, &super::effective(&settings));
@@ -111,14 +110,14 @@ fn paths_on_the_box_cross_no_edge() {
     });
 }
 
-/// Every motion of `steps` does what its kind may do: transfers hold all contacts, regrasps move one finger and nothing
+/// Every motion of `way` does what its kind may do: transfers hold all contacts, regrasps move one finger and nothing
 /// else, and each begins where the one before ended.
-fn assert_feasible(model: &Model, start: &GraspState, steps: &[Step]) {
-    let mut state = start;
-    for step in steps {
-        match &step.motion {
+fn assert_feasible(model: &Model, way: &Sequence) {
+    let mut state = way.start();
+    for step in way.steps() {
+        match step.motion() {
             Motion::Transfer(moments) => {
-                assert!(step.end.contacts == state.contacts);
+                assert!(step.end().contacts == state.contacts);
                 for moment in moments {
                     let tips = tips_in_object(model, &moment.world_from_object, &moment.joints);
                     for (f, tip) in tips.iter().enumerate() {
@@ -126,17 +125,17 @@ fn assert_feasible(model: &Model, start: &GraspState, steps: &[Step]) {
                     }
                 }
                 let last = moments.last().expect("a transfer has an end");
-                assert!(last.world_from_object == step.end.world_from_object && last.joints == step.end.joints);
+                assert!(last.world_from_object == step.end().world_from_object && last.joints == step.end().joints);
             }
             Motion::Regrasp { finger, path } => {
-                assert!(step.end.world_from_object == state.world_from_object);
-                assert!(path.last() == Some(&step.end.joints[*finger]));
+                assert!(step.end().world_from_object == state.world_from_object);
+                assert!(path.last() == Some(&step.end().joints[*finger]));
                 for f in (0..model.n_fingers()).filter(|f| f != finger) {
-                    assert!(step.end.contacts[f] == state.contacts[f] && step.end.joints[f] == state.joints[f]);
+                    assert!(step.end().contacts[f] == state.contacts[f] && step.end().joints[f] == state.joints[f]);
                 }
             }
         }
-        state = &step.end;
+        state = step.end();
     }
 }
 
@@ -146,17 +145,16 @@ fn decomposed_paths_are_feasible_motions_between_their_ends_forwards_and_backwar
         let model = search.model();
         let (mut n_decomposed, mut n_divided) = (0, 0);
         for (a, b, path) in linked_pairs(search, 12) {
-            let Some(steps) = decompose(search, &path, &a, &b).expect("no limits") else { continue };
+            let Some(way) = decompose(search, &path, &a, &b).expect("no limits") else { continue };
             n_decomposed += 1;
-            n_divided += usize::from(steps.iter().filter(|s| matches!(s.motion, Motion::Transfer(_))).count() > 1);
-            assert_feasible(model, &a, &steps);
-            let end = &steps.last().expect("different grasps").end;
-            assert!(end.contacts == b.contacts);
-            assert!((end.world_from_object.translation.vector - b.world_from_object.translation.vector).norm() < 1e-9);
-            let back = reversed(&a, &steps);
-            assert_feasible(model, end, &back);
-            let there_again = reversed(end, &back);
-            assert!(format!("{there_again:?}") == format!("{steps:?}"), "backwards twice is forwards");
+            let transfers = way.steps().iter().filter(|step| matches!(step.motion(), Motion::Transfer(_)));
+            n_divided += usize::from(transfers.count() > 1);
+            assert_feasible(model, &way);
+            assert!(*way.start() == a && *way.end() == b, "from exactly one grasp to exactly the other");
+            let back = way.reversed();
+            assert_feasible(model, &back);
+            assert!(*back.start() == b && *back.end() == a);
+            assert!(back.reversed() == way, "backwards twice is forwards");
         }
         assert!(n_decomposed >= 10, "the reduction property: {n_decomposed} of 12");
         assert!(n_divided >= 1, "no path had to be divided: the test asks too little");

@@ -98,11 +98,9 @@ impl<'a> Search<'a> {
         if self.winner.load(Ordering::Relaxed) < self.attempt {
             return Err(Stop::Overtaken);
         }
-        match self.budget.check(work.min(self.budget.max_work - 1)) {
-            Err(interrupt) => Err(Stop::Budget(interrupt)),
-            Ok(()) if work >= self.work_limit => Err(Stop::Restart),
-            Ok(()) => Ok(()),
-        }
+        // The caller's work limit is shared out among the attempts, this one's share being `work_limit`.
+        self.budget.check_caller().map_err(Stop::Budget)?;
+        if work >= self.work_limit { Err(Stop::Restart) } else { Ok(()) }
     }
 
     /// Distance between poses, with angles weighed by the object's radius.

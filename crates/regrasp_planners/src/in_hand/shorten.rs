@@ -5,85 +5,99 @@ use super::candidates::Candidate;
 use super::combine::{Choice, ClosureTable};
 use super::regrasp::{Tried, regrasp};
 use super::search::{Search, Stop};
-use super::state::{GraspState, Motion, Step};
+use super::state::{GraspState, Moment, Motion, Sequence, Step};
 use super::transfer::{follow_contact, transfer};
-use super::workspace::HandJoints;
+use super::workspace::{HandJoints, TipMode, Workspace};
 use regrasp_base::{Interrupt, Rng};
 use regrasp_geometry::Pose;
 use regrasp_geometry::collision::Placement;
 
-/// Joints nearer than this count as the same posture, in radians or metres.
+/// Joints nearer than this differ by what solvers leave: they are set on each other, in radians or metres.
 const SAME_POSTURE: f64 = 1e-6;
 
 /// Fraction of the usual iterations of RRT-Connect for relocations that others can stand in for.
 const CASUAL: usize = 8;
 
-/// What a sequence costs: relocations first, then transfers.
+/// What is asked of the end of a sequence.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Arrival {
+    /// Exactly the state: pose, contacts and joints.
+    Exact,
+    /// The object's pose and closed fingers, whatever their postures.
+    AnyPosture,
+}
+
+/// What motions cost: relocations first, then transfers.
 fn cost(steps: &[Step]) -> (usize, usize) {
-    let n_transfers = steps.iter().filter(|step| matches!(step.motion, Motion::Transfer(_))).count();
+    let n_transfers = steps.iter().filter(|step| matches!(step.motion(), Motion::Transfer(_))).count();
     (steps.len() - n_transfers, n_transfers)
 }
 
-/// Tries `settings.shortcuts` random shortcuts on `steps` from `start`. `end_is_free` when any grasp will do at the end.
+/// Tries `settings.shortcuts` random shortcuts on `way`. `end_is_free` when any grasp will do at the end.
 ///
 /// A plan that is already there is never given up: the caller's limits only end the shortening.
-pub fn shorten(search: &mut Search, start: &GraspState, steps: &mut Vec<Step>, end_is_free: bool) {
+pub fn shorten(search: &mut Search, way: &mut Sequence, end_is_free: bool) {
     for _ in 0..search.model().settings.shortcuts {
-        if steps.len() < 2 {
+        let n_steps = way.steps().len();
+        if n_steps < 2 {
             return;
         }
         if let Err(Stop::Budget(interrupt)) = search.check() {
             search.cut_by_time |= interrupt != Interrupt::WorkSpent;
             return;
         }
-        let first = search.rng.below(steps.len() - 1);
+        let first = search.rng.below(n_steps - 1);
         let last = if end_is_free && search.rng.chance(0.3) {
-            steps.len() - 1
+            n_steps - 1
         } else {
-            first + 1 + search.rng.below(steps.len() - first - 1)
+            first + 1 + search.rng.below(n_steps - first - 1)
         };
-        let from = if first == 0 { start.clone() } else { steps[first - 1].end.clone() };
-        let free = end_is_free && last + 1 == steps.len();
-        let old = cost(&steps[first..=last]);
-        if let Some(detour) = direct(search, &from, &steps[last].end.clone(), free, old) {
-            steps.splice(first..=last, detour);
+        let arrival = if end_is_free && last + 1 == n_steps { Arrival::AnyPosture } else { Arrival::Exact };
+        let old = cost(&way.steps()[first..=last]);
+        let (from, to) = (way.state_before(first), way.steps()[last].end());
+        if let Some(detour) = direct(search, from, to, arrival, old)
+            && cost(detour.steps()) < old
+        {
+            let fits = way.replace(first..=last, detour);
+            debug_assert!(fits, "a direct way from and to the same states");
         }
     }
 }
 
-/// A cheaper way from `from` to `to` (to its pose only, when `free`), if one of the direct ones is feasible.
+/// A way from `from` to `to` that is cheaper than `old`, if one of the direct ones is feasible.
 fn direct(
     search: &mut Search,
     from: &GraspState,
     to: &GraspState,
-    free: bool,
+    arrival: Arrival,
     old: (usize, usize),
-) -> Option<Vec<Step>> {
+) -> Option<Sequence> {
     let n_changed = from.contacts.iter().zip(&to.contacts).filter(|(a, b)| a != b).count();
-    let moves = search.distance(&from.world_from_object, &to.world_from_object) > 0.0;
-    if free
+    let moves = from.world_from_object != to.world_from_object;
+    if arrival == Arrival::AnyPosture
         && old > (0, usize::from(moves))
-        && let Some(step) = whole_transfer(search, from, &to.world_from_object)
+        && let Some(way) = whole_transfer(search, from, &to.world_from_object)
     {
-        return Some(vec![step]);
+        return Some(way);
     }
     if (n_changed, usize::from(moves)) >= old {
         return None;
     }
     let mut rng = Rng::child(&search.rng, "shortcut", 0);
     search.rng.bits();
-    transfer_regrasp(search, from, to, free, &mut rng).or_else(|| regrasp_transfer(search, from, to, free, &mut rng))
+    transfer_regrasp(search, from, to, arrival, &mut rng)
+        .or_else(|| regrasp_transfer(search, from, to, arrival, &mut rng))
 }
 
 /// A transfer that arrives, or nothing.
-pub fn whole_transfer(search: &mut Search, from: &GraspState, goal: &Pose) -> Option<Step> {
+pub fn whole_transfer(search: &mut Search, from: &GraspState, goal: &Pose) -> Option<Sequence> {
     let mut moments = Vec::new();
     if transfer(&mut search.workspace, from, goal, &mut moments) < 1.0 {
         return None;
     }
-    let joints = moments.last()?.joints.clone();
-    let end = GraspState { world_from_object: *goal, contacts: from.contacts.clone(), joints };
-    Some(Step { motion: Motion::Transfer(moments), end })
+    let mut way = Sequence::at(from.clone());
+    way.push_transfer(moments);
+    Some(way)
 }
 
 /// Transfer with the first grasp, then change to the second (paper 000, algorithm 2).
@@ -91,29 +105,29 @@ pub fn transfer_regrasp(
     search: &mut Search,
     from: &GraspState,
     to: &GraspState,
-    free: bool,
+    arrival: Arrival,
     rng: &mut Rng,
-) -> Option<Vec<Step>> {
-    let mut steps = Vec::new();
-    let mut state = from.clone();
-    if search.distance(&from.world_from_object, &to.world_from_object) > 0.0 {
-        let mut step = whole_transfer(search, from, &to.world_from_object)?;
-        settle_postures(&mut step, to);
-        state = step.end.clone();
-        steps.push(step);
-    }
-    steps.extend(change_grasp(search, &state, to, free, rng)?);
-    Some(steps)
+) -> Option<Sequence> {
+    let way = if from.world_from_object == to.world_from_object {
+        Sequence::at(from.clone())
+    } else {
+        whole_transfer(search, from, &to.world_from_object)?
+    };
+    change_grasp(search, &way, to, arrival, rng)
 }
 
-/// Change to the second grasp, then transfer (paper 000, section 4.3).
+/// Change to the second grasp, then transfer (paper 000, section 4.3). None where the object has nowhere to go: that is
+/// [`transfer_regrasp`].
 pub fn regrasp_transfer(
     search: &mut Search,
     from: &GraspState,
     to: &GraspState,
-    free: bool,
+    arrival: Arrival,
     rng: &mut Rng,
-) -> Option<Vec<Step>> {
+) -> Option<Sequence> {
+    if from.world_from_object == to.world_from_object {
+        return None;
+    }
     let model = search.model();
     let before = Placement::from(&from.world_from_object);
     let mut joints = HandJoints::new();
@@ -125,53 +139,66 @@ pub fn regrasp_transfer(
         });
     }
     let middle = GraspState { world_from_object: from.world_from_object, contacts: to.contacts.clone(), joints };
-    let mut steps = change_grasp(search, from, &middle, false, rng)?;
-    let last = steps.last().map_or(from, |step| &step.end).clone();
-    if search.distance(&from.world_from_object, &to.world_from_object) > 0.0 {
-        let mut step = whole_transfer(search, &last, &to.world_from_object)?;
-        if !free && !settle_postures(&mut step, to) {
-            return None;
-        }
-        steps.push(step);
+    let change = change_grasp(search, &Sequence::at(from.clone()), &middle, Arrival::Exact, rng)?;
+    let mut way = change.then(whole_transfer(search, &middle, &to.world_from_object)?)?;
+    if arrival == Arrival::Exact {
+        way = settle(&mut search.workspace, way, to)?;
     }
-    Some(steps)
+    (arrival == Arrival::AnyPosture || way.end() == to).then_some(way)
 }
 
-/// Ends a transfer in exactly the postures of `to` where it is there already but for rounding; true if everywhere.
-fn settle_postures(step: &mut Step, to: &GraspState) -> bool {
-    let mut all = true;
-    for (joints, wanted) in step.end.joints.iter_mut().zip(&to.joints) {
-        let is_there = joints.iter().zip(wanted).all(|(a, b)| (a - b).abs() < SAME_POSTURE);
-        if is_there {
-            joints.clone_from(wanted);
+/// The joints at `state`, those of `wanted` where a finger has the same contact and is there but for rounding.
+fn settled_joints(state: &GraspState, wanted: &GraspState) -> HandJoints {
+    let mut joints = state.joints.clone();
+    for (finger, own) in joints.iter_mut().enumerate() {
+        let there = &wanted.joints[finger];
+        let is_there = own.iter().zip(there).all(|(a, b)| (a - b).abs() < SAME_POSTURE);
+        if is_there && state.contacts[finger] == wanted.contacts[finger] {
+            own.clone_from(there);
         }
-        all &= is_there;
     }
-    if let Motion::Transfer(moments) = &mut step.motion
-        && let Some(last) = moments.last_mut()
-    {
-        last.joints.clone_from(&step.end.joints);
-    }
-    all
+    joints
 }
 
-/// Relocations that turn the grasp of `state` into that of `to`, the object standing still.
+/// Ends `way` in exactly the postures of `wanted`, which has the same object pose, wherever a finger is there but for
+/// rounding. Its last transfer then ends there, in a step that is tested again; without one the fingers make that step by
+/// themselves.
+fn settle(workspace: &mut Workspace, mut way: Sequence, wanted: &GraspState) -> Option<Sequence> {
+    let joints = settled_joints(way.end(), wanted);
+    if joints == way.end().joints {
+        return Some(way);
+    }
+    let world_from_object = way.end().world_from_object;
+    let mut moments = way.pop_transfer().unwrap_or_default();
+    moments.pop();
+    let (pose, before) =
+        moments.last().map_or((&way.end().world_from_object, &way.end().joints), |m| (&m.world_from_object, &m.joints));
+    workspace.set(pose, before, &way.end().contacts);
+    if !workspace.step(&world_from_object, &joints, TipMode::AllHold) {
+        return None;
+    }
+    moments.push(Moment { world_from_object, joints });
+    way.push_transfer(moments);
+    Some(way)
+}
+
+/// `way`, then relocations that turn the grasp in which it ends into that of `to`, the object standing still.
 pub fn change_grasp(
     search: &mut Search,
-    state: &GraspState,
+    way: &Sequence,
     to: &GraspState,
-    free: bool,
+    arrival: Arrival,
     rng: &mut Rng,
-) -> Option<Vec<Step>> {
+) -> Option<Sequence> {
     let model = search.model();
+    let is_exact = arrival == Arrival::Exact;
+    let joints = if is_exact { settled_joints(way.end(), to) } else { way.end().joints.clone() };
     let mut options = Vec::with_capacity(model.n_fingers());
     let mut goal = Choice::new();
-    for finger in 0..model.n_fingers() {
-        let mut of_finger =
-            vec![Candidate { contact: state.contacts[finger], joints: state.joints[finger].clone(), follow: 1.0 }];
-        let same_posture =
-            state.joints[finger].iter().zip(&to.joints[finger]).all(|(a, b)| (a - b).abs() < SAME_POSTURE);
-        let moves = state.contacts[finger] != to.contacts[finger] || (!free && !same_posture);
+    for (finger, own) in joints.into_iter().enumerate() {
+        let contact = way.end().contacts[finger];
+        let moves = contact != to.contacts[finger] || (is_exact && own != to.joints[finger]);
+        let mut of_finger = vec![Candidate { contact, joints: own, follow: 1.0 }];
         if moves {
             of_finger.push(Candidate { contact: to.contacts[finger], joints: to.joints[finger].clone(), follow: 1.0 });
         }
@@ -182,9 +209,12 @@ pub fn change_grasp(
     if !table.is_closed(&goal, (1 << model.n_fingers()) - 1) {
         return None;
     }
+    let way = if is_exact { settle(&mut search.workspace, way.clone(), to)? } else { way.clone() };
     // One of many ways to the same end: not worth a long search for a finger's way.
     search.workspace.rrt_iterations = model.settings.rrt_iterations / CASUAL;
-    let steps = regrasp(&mut search.workspace, state, &options, &goal, &mut table, &mut Tried::default(), rng);
+    let tried = &mut Tried::default();
+    let change = regrasp(&mut search.workspace, way.end(), &options, &goal, &mut table, tried, rng);
     search.workspace.rrt_iterations = model.settings.rrt_iterations;
-    steps
+    let way = way.then(change?)?;
+    (!is_exact || way.end() == to).then_some(way)
 }

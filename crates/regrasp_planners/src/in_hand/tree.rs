@@ -8,7 +8,7 @@ use super::pool::Pool;
 use super::regrasp::{Tried, regrasp};
 use super::relocate::{Foothold, can_lift, lift_is_within_reach};
 use super::search::Search;
-use super::state::{GraspState, Moment, Motion, Step};
+use super::state::{GraspState, Moment, Sequence};
 use super::tally::Reason;
 use super::transfer::transfer;
 use regrasp_base::Rng;
@@ -24,16 +24,21 @@ const LEAST_SHARE: f64 = 0.05;
 
 /// A grasp that can be reached from the tree's end of the query.
 pub struct Node {
-    /// The grasp.
-    pub state: GraspState,
     /// None for a grasp at the tree's end of the query.
-    pub parent: Option<usize>,
+    parent: Option<usize>,
     /// Motions from the parent's state to this one.
-    pub steps: Vec<Step>,
+    way: Sequence,
     /// Extensions tried from here.
     pub n_tries: u32,
     /// Index of its pose in [`Tree::places`].
     pub place: usize,
+}
+
+impl Node {
+    /// The grasp.
+    pub fn state(&self) -> &GraspState {
+        self.way.end()
+    }
 }
 
 /// A pose of the object that nodes stand at.
@@ -85,18 +90,20 @@ impl Tree {
     }
 
     fn add_root(&mut self, state: GraspState) -> usize {
-        self.add_node(Node { state, parent: None, steps: Vec::new(), n_tries: 0, place: 0 })
+        self.add_node(Node { parent: None, way: Sequence::at(state), n_tries: 0, place: 0 })
     }
 
-    /// The state at the tree's end of the query and all steps from there to `node`.
-    pub fn trace(&self, mut node: usize) -> (GraspState, Vec<Step>) {
-        let mut pieces = Vec::new();
+    /// All motions from the tree's end of the query to `node`.
+    pub fn trace(&self, mut node: usize) -> Sequence {
+        let mut nodes = vec![node];
         while let Some(parent) = self.nodes[node].parent {
-            pieces.push(self.nodes[node].steps.clone());
+            nodes.push(parent);
             node = parent;
         }
-        pieces.reverse();
-        (self.nodes[node].state.clone(), pieces.into_iter().flatten().collect())
+        let start = Sequence::at(self.nodes[node].state().clone());
+        nodes.iter().rev().fold(start, |way, &node| {
+            way.then(self.nodes[node].way.clone()).expect("a node's motions begin in exactly its parent's state")
+        })
     }
 
     /// One step of growth towards `target`: the new node, if there is one.
@@ -108,7 +115,8 @@ impl Tree {
                 self.places[place].n_tries += 1;
                 if self.nodes[node].n_tries == 1 && self.nodes[node].parent.is_none() && !self.root_is_free {
                     // A given grasp is first taken as far as it goes by itself.
-                    return advance(search, self, node, target, Vec::new());
+                    let here = Sequence::at(self.nodes[node].state().clone());
+                    return advance(search, self, node, target, here);
                 }
                 extend(search, self, node, target)
             }
@@ -151,7 +159,7 @@ const ANYWHERE_SHARE: f64 = 0.25;
 /// One extension: candidates for every finger, the best combinations, their relocations, the transfer.
 fn extend(search: &mut Search, tree: &mut Tree, node: usize, target: &Pose) -> Option<usize> {
     let model = search.model();
-    let state = tree.nodes[node].state.clone();
+    let state = tree.nodes[node].state().clone();
     let to_aim = *target == tree.aim;
     let elsewhere = (!to_aim).then(|| Way::new(&state.world_from_object, target));
     let place = tree.nodes[node].place;
@@ -171,10 +179,10 @@ fn extend(search: &mut Search, tree: &mut Tree, node: usize, target: &Pose) -> O
     let mut rng = Rng::child(&search.rng, "relocation", 0);
     search.rng.bits();
     for combination in &ranked {
-        let steps =
+        let way =
             regrasp(&mut search.workspace, &state, &options, &combination.choice, &mut table, &mut tried, &mut rng);
-        match steps {
-            Some(steps) => return advance(search, tree, node, target, steps),
+        match way {
+            Some(way) => return advance(search, tree, node, target, way),
             None => search.tally.add(Reason::NoWayOver),
         }
     }
@@ -210,9 +218,9 @@ fn options_of(
     options
 }
 
-/// Transfers from the end of `steps` towards `target` and adds a node where that ends.
-fn advance(search: &mut Search, tree: &mut Tree, parent: usize, target: &Pose, mut steps: Vec<Step>) -> Option<usize> {
-    let from = steps.last().map_or(&tree.nodes[parent].state, |step| &step.end).clone();
+/// Transfers from the end of `way`, which begins at `parent`, towards `target` and adds a node where that ends.
+fn advance(search: &mut Search, tree: &mut Tree, parent: usize, target: &Pose, mut way: Sequence) -> Option<usize> {
+    let from = way.end().clone();
     let mut place = tree.nodes[parent].place;
     let mut moments = Vec::new();
     let share = transfer(&mut search.workspace, &from, target, &mut moments);
@@ -220,21 +228,16 @@ fn advance(search: &mut Search, tree: &mut Tree, parent: usize, target: &Pose, m
         back_off(search, &from, &mut moments);
     }
     if let (Some(last), true) = (moments.last(), share > LEAST_SHARE) {
-        let end = GraspState {
-            world_from_object: last.world_from_object,
-            contacts: from.contacts.clone(),
-            joints: last.joints.clone(),
-        };
         place = tree.add_place(search, &last.world_from_object);
-        steps.push(Step { motion: Motion::Transfer(moments), end });
+        way.push_transfer(moments);
     } else {
         match search.workspace.blocking_pair.take() {
             Some(pair) => search.tally.add(Reason::TooNear(pair)),
             None => search.tally.add(Reason::OutOfReach),
         }
     }
-    let state = steps.last()?.end.clone();
-    Some(tree.add_node(Node { state, parent: Some(parent), steps, n_tries: 0, place }))
+    let has_moved = !way.steps().is_empty();
+    has_moved.then(|| tree.add_node(Node { parent: Some(parent), way, n_tries: 0, place }))
 }
 
 /// Shortens a transfer that stopped at a limit or against something to where most fingers that may let go can be lifted.
@@ -286,9 +289,10 @@ fn sow(search: &mut Search, tree: &mut Tree) -> Option<usize> {
     }
     match choose_grasp(search, &pose, &options) {
         Some(state) => {
+            let here = Sequence::at(state.clone());
             let node = tree.add_root(state);
             let aim = tree.aim;
-            advance(search, tree, node, &aim, Vec::new()).or(Some(node))
+            advance(search, tree, node, &aim, here).or(Some(node))
         }
         None => {
             search.tally.add(Reason::NotClosed);

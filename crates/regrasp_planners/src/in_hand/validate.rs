@@ -9,60 +9,108 @@ use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 use regrasp_grasp::{Contact, closure};
 use regrasp_plan::plan::{Plan, Segment, SegmentKind, Waypoint};
+use regrasp_robot::kinematics::finger_ik::Coordinates;
 use regrasp_scene::Scene;
+
+/// What could not be proven of a plan at the planner's resolution.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NotProven {
+    /// Index of the segment.
+    pub segment: usize,
+    /// Index of the waypoint at which the step ends that was not proven.
+    pub waypoint: usize,
+    /// What is in the way, in words.
+    pub cause: String,
+}
+
+impl std::fmt::Display for NotProven {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "not proven at the planner's resolution: segment {}, waypoint {}: ", self.segment, self.waypoint)?;
+        f.write_str(&self.cause)
+    }
+}
+
+impl std::error::Error for NotProven {}
 
 /// Steps through every waypoint of `plan` once, as the planner does: kinematics, collision and closure.
 ///
-/// Returns the index of the first segment that fails, if one does.
-pub fn validate_once(scene: &Scene, plan: &Plan, settings: &InHandSettings) -> Result<(), usize> {
+/// Errors: the first step that is not proven.
+pub fn validate_once(scene: &Scene, plan: &Plan, settings: &InHandSettings) -> Result<(), NotProven> {
     let model = Model::new(scene, settings);
     let mut workspace = Workspace::new(&model);
     for (index, segment) in plan.segments.iter().enumerate() {
-        if !segment_is_valid(&model, &mut workspace, segment) {
-            return Err(index);
-        }
+        validate_segment(&model, &mut workspace, segment).map_err(|(waypoint, cause)| NotProven {
+            segment: index,
+            waypoint,
+            cause,
+        })?;
     }
     Ok(())
 }
 
-fn segment_is_valid(model: &Model, workspace: &mut Workspace, segment: &Segment) -> bool {
-    let (Some(first), Some(last)) = (segment.waypoints.first(), segment.waypoints.last()) else { return false };
-    let Some(contacts) = contacts_of(first) else { return false };
+/// Errors: index of the waypoint and what is wrong with the step to it.
+fn validate_segment(model: &Model, workspace: &mut Workspace, segment: &Segment) -> Result<(), (usize, String)> {
+    let waypoints = segment.waypoints.as_slice();
+    let ends = waypoints.first().zip(waypoints.last());
+    let Some((contacts, landing)) = ends.and_then(|(first, last)| contacts_of(first).zip(contacts_of(last))) else {
+        return Err((0, "the segment does not begin and end with all fingers in contact".into()));
+    };
     let moving = segment.moving_finger.as_ref().and_then(|name| model.scene.hand.finger_named(name)).map(|id| id.0);
     let holding: Vec<Contact> = (0..contacts.len()).filter(|&f| Some(f) != moving).map(|f| contacts[f]).collect();
-    if closure::closure_margin(&holding, &model.frame) < model.settings.closure_margin {
-        return false;
+    let margin = closure::closure_margin(&holding, &model.frame);
+    if margin < model.settings.closure_margin {
+        return Err((0, format!("closure margin {margin:.4} of {}", model.settings.closure_margin)));
     }
-    let pose = Pose::from(&first.world_from_object);
-    workspace.set(&pose, &joints_of(model, first), &contacts);
+    let pose = Pose::from(&waypoints[0].world_from_object);
+    workspace.set(&pose, &joints_of(model, &waypoints[0]), &contacts);
     match (segment.kind, moving) {
-        (SegmentKind::Transfer, _) => segment.waypoints[1..].iter().all(|waypoint| {
-            workspace.step(&Pose::from(&waypoint.world_from_object), &joints_of(model, waypoint), TipMode::AllHold)
-        }),
-        (SegmentKind::Regrasp, Some(finger)) => {
-            let Some(landing) = contacts_of(last) else { return false };
-            let ends = [contacts[finger], landing[finger]].map(|contact| End::new(model, finger, &pose, &contact));
-            segment.waypoints[1..].iter().all(|waypoint| {
-                let joints = &joints_of(model, waypoint)[finger];
-                let before = model.fingers[finger].ik.tip(&workspace.joints()[finger]);
-                let after = model.fingers[finger].ik.tip(joints);
-                let over =
-                    ends.iter().find(|end| end.height_over(&before).is_some() && end.height_over(&after).is_some());
-                let mode = match over {
-                    Some(end) => TipMode::Near { finger, normal_in_world: end.normal.into_inner() },
-                    None => TipMode::Away { finger, clearance: 0.0 },
-                };
-                workspace.step_finger(finger, joints, mode)
-            })
+        (SegmentKind::Transfer, _) => {
+            for (k, waypoint) in waypoints.iter().enumerate().skip(1) {
+                let pose = Pose::from(&waypoint.world_from_object);
+                if !workspace.step(&pose, &joints_of(model, waypoint), TipMode::AllHold) {
+                    return Err((k, in_the_way(workspace)));
+                }
+            }
         }
-        (SegmentKind::Regrasp, None) => false,
+        (SegmentKind::Regrasp, Some(finger)) => {
+            let path: Vec<Coordinates> =
+                waypoints.iter().map(|waypoint| joints_of(model, waypoint).remove(finger)).collect();
+            let ends = [contacts[finger], landing[finger]].map(|contact| End::new(model, finger, &pose, &contact));
+            let is_over = |end: &End, joints: &Coordinates| end.is_under(&model.fingers[finger].ik.tip(joints));
+            let n_up = path.iter().take_while(|joints| is_over(&ends[0], joints)).count();
+            let n_down = path.iter().rev().take_while(|joints| is_over(&ends[1], joints)).count();
+            for k in 1..path.len() {
+                let near = |end: &End| TipMode::Near { finger, normal_in_world: end.normal };
+                let mode = if k < n_up {
+                    near(&ends[0])
+                } else if k > path.len() - n_down {
+                    near(&ends[1])
+                } else {
+                    TipMode::Away { finger, clearance: 0.0 }
+                };
+                if !workspace.step_finger(finger, &path[k], mode) {
+                    return Err((k, in_the_way(workspace)));
+                }
+            }
+        }
+        (SegmentKind::Regrasp, None) => return Err((0, "a regrasp without a moving finger".into())),
     }
+    Ok(())
+}
+
+/// The bodies that stopped the last step.
+fn in_the_way(workspace: &Workspace) -> String {
+    workspace.blocking_pair.map_or("a step that is not clear".into(), |pair| {
+        let (pair, bodies) = (&workspace.model.pairs[pair], &workspace.model.bodies);
+        format!("\"{}\" comes too near \"{}\"", bodies[pair.a].name, bodies[pair.b].name)
+    })
 }
 
 /// A contact with the line that the tip's centre leaves it along.
 struct End {
+    /// Where the tip's centre is in contact.
     foot: Point,
-    normal: UnitVector,
+    normal: Vector,
 }
 
 impl End {
@@ -70,16 +118,19 @@ impl End {
         let placement = Placement::from(pose);
         let normal: Vector = placement.vector(&contact.normal_in_object);
         let foot = placement.point(&contact.point_in_object) + normal * model.fingers[finger].tip_radius;
-        End { foot, normal: UnitVector::new_unchecked(normal) }
+        End { foot, normal }
     }
 
-    /// Height of a tip's centre that is straight over the contact.
-    fn height_over(&self, tip: &Point) -> Option<f64> {
+    /// True when the centre of a tip is straight over the contact.
+    fn is_under(&self, tip: &Point) -> bool {
         let arm = tip - self.foot;
         let height = arm.dot(&self.normal);
-        ((arm - self.normal.into_inner() * height).norm() < 1e-5 && height > -1e-5).then_some(height)
+        (arm - self.normal * height).norm() < STRAIGHT && height > -STRAIGHT
     }
 }
+
+/// Distance from the normal that still counts as on it, in metres: far above what solvers leave.
+const STRAIGHT: f64 = 1e-5;
 
 fn contacts_of(waypoint: &Waypoint) -> Option<Contacts> {
     waypoint

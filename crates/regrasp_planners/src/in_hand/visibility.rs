@@ -4,10 +4,10 @@
 use super::connect::{TriedPairs, connect_components};
 use super::decompose::decompose;
 use super::explore::{draw_state_at, explore, roadmap_of};
-use super::link::{Link, LocalMethod, Roadmap, reversed};
+use super::link::{Link, LocalMethod, Roadmap};
 use super::search::{Search, Stop};
 use super::settings::Alpha;
-use super::state::{GraspState, Step};
+use super::state::{GraspState, Sequence};
 use super::tally::Reason;
 use regrasp_geometry::Pose;
 use std::rc::Rc;
@@ -21,7 +21,7 @@ pub fn build(
     search: &mut Search,
     start: Option<GraspState>,
     goal_grasp: Option<&GraspState>,
-) -> Result<(GraspState, Vec<Step>), Stop> {
+) -> Result<Sequence, Stop> {
     let (start, goal) = ends(search, start, goal_grasp)?;
     let mut roadmap = roadmap_of(search, &start, &goal, LocalMethod::GraspPath)?;
     let mut tried = TriedPairs::new();
@@ -36,8 +36,8 @@ pub fn build(
             }
             note_nearest(search, &roadmap);
         }
-        if let Some(steps) = solution(search, &mut roadmap)? {
-            return Ok((start, steps));
+        if let Some(way) = solution(search, &mut roadmap)? {
+            return Ok(way);
         }
     }
 }
@@ -90,18 +90,17 @@ pub fn note_nearest(search: &mut Search, roadmap: &Roadmap) {
 /// The motions along the cheapest path from start to goal, its paths in GS_n decomposed.
 ///
 /// None when one could not be: that edge is then deleted, and the ends may be apart again (in-hand-notes, 4.4).
-pub fn solution(search: &mut Search, roadmap: &mut Roadmap) -> Result<Option<Vec<Step>>, Stop> {
+pub fn solution(search: &mut Search, roadmap: &mut Roadmap) -> Result<Option<Sequence>, Stop> {
     let Some(path) = roadmap.path(START, GOAL) else { return Ok(None) };
-    let mut steps = Vec::new();
+    let mut way = Sequence::at(roadmap.nodes()[START].point.clone());
     for pair in path.nodes.windows(2) {
         let (edge, is_forward) = roadmap.edge_between(pair[0], pair[1]).expect("a path goes along edges");
         let (from, to) = (edge.from, edge.to);
         let link = edge.motion.clone();
-        let start = roadmap.nodes()[from].point.clone();
         let motions = match link {
             Link::Steps(motions) => motions,
             Link::Grasp(path) => {
-                let found = decompose(search, &path, &start, &roadmap.nodes()[to].point)?;
+                let found = decompose(search, &path, &roadmap.nodes()[from].point, &roadmap.nodes()[to].point)?;
                 let removed = roadmap.remove_edge_between(from, to).expect("the edge just decomposed");
                 let Some(motions) = found else {
                     search.tally.add(Reason::NotDecomposed);
@@ -112,11 +111,8 @@ pub fn solution(search: &mut Search, roadmap: &mut Roadmap) -> Result<Option<Vec
                 motions
             }
         };
-        if is_forward {
-            steps.extend(motions.iter().cloned());
-        } else {
-            steps.extend(reversed(&start, &motions));
-        }
+        let along = if is_forward { Sequence::clone(&motions) } else { motions.reversed() };
+        way = way.then(along).expect("the motions of an edge go from exactly one of its nodes to exactly the other");
     }
-    Ok(Some(steps))
+    Ok(Some(way))
 }

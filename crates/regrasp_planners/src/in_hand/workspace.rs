@@ -110,11 +110,6 @@ impl<'a> Workspace<'a> {
         }
     }
 
-    /// Joint positions now.
-    pub fn joints(&self) -> &HandJoints {
-        &self.now.joints
-    }
-
     /// Goes to a configuration, without any test. `contacts` are where the fingers hold.
     pub fn set(&mut self, world_from_object: &Pose, joints: &HandJoints, contacts: &Contacts) {
         self.contacts.clone_from(contacts);

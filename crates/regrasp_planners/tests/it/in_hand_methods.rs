@@ -12,7 +12,7 @@ use std::path::Path;
 const METHODS: [Method; 3] = [Method::Gait, Method::Visibility, Method::Classic];
 const SEEDS: std::ops::Range<u64> = 0..3;
 
-fn scene(name: &str) -> LoadedScene {
+pub fn scene(name: &str) -> LoadedScene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes").join(name);
     load_scene(&path, &LoadOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"))
 }

@@ -1,0 +1,110 @@
+//! Sequences of motions meet exactly, and what arrives somewhere arrives exactly there.
+
+use super::explore::draw_state;
+use super::roadmap_tests::with_search;
+use super::shorten::{Arrival, regrasp_transfer, shorten, transfer_regrasp};
+use super::state::{GraspState, Moment, Sequence};
+use regrasp_base::Rng;
+
+/// `state` with one finger in another posture at the same contact: a little off, as redundant fingers come back to a pose.
+fn other_postures(state: &GraspState) -> Vec<GraspState> {
+    let mut found = Vec::new();
+    for finger in 0..state.joints.len() {
+        for (joint, shift) in [(0, 0.01), (1, -0.01), (2, 0.01), (2, -0.01)] {
+            let mut other = state.clone();
+            other.joints[finger][joint] += shift;
+            found.push(other);
+        }
+    }
+    found
+}
+
+fn wait_at(state: &GraspState) -> Moment {
+    Moment { world_from_object: state.world_from_object, joints: state.joints.clone() }
+}
+
+#[test]
+fn a_change_between_postures_at_the_same_contacts_arrives_exactly_or_not_at_all() {
+    with_search("sphere_90x.toml", |search| {
+        let mut rng = Rng::keyed(3, "postures", 0);
+        let (mut n_pairs, mut n_arrived) = (0, 0);
+        for _ in 0..40 {
+            let Some(from) = draw_state(search) else { continue };
+            for to in other_postures(&from) {
+                n_pairs += 1;
+                for local_method in [transfer_regrasp, regrasp_transfer] {
+                    let Some(way) = local_method(search, &from, &to, Arrival::Exact, &mut rng) else { continue };
+                    n_arrived += 1;
+                    assert!(*way.start() == from && *way.end() == to, "from exactly one posture to exactly the other");
+                }
+            }
+        }
+        assert!(n_pairs >= 20 && n_arrived >= 5, "too little was tried: {n_arrived} of {n_pairs}");
+    });
+}
+
+#[test]
+fn rounding_at_an_arrival_is_taken_out_and_more_than_rounding_is_moved() {
+    with_search("sphere_90x.toml", |search| {
+        let mut rng = Rng::keyed(4, "rounding", 0);
+        let mut n_settled = 0;
+        for _ in 0..100 {
+            let Some(from) = draw_state(search) else { continue };
+            let mut to = from.clone();
+            to.joints.iter_mut().flatten().for_each(|joint| *joint += 1e-8 * (rng.unit() - 0.5));
+            let Some(way) = transfer_regrasp(search, &from, &to, Arrival::Exact, &mut rng) else { continue };
+            n_settled += 1;
+            assert!(*way.end() == to && way.steps().len() == 1, "{:?}", way.steps().len());
+        }
+        assert!(n_settled >= 10, "too little was tried: {n_settled}");
+    });
+}
+
+#[test]
+fn shortcuts_between_two_visits_of_a_pose_leave_no_gap() {
+    with_search("sphere_90x.toml", |search| {
+        let mut n_tried = 0;
+        for _ in 0..40 {
+            let Some(first) = draw_state(search) else { continue };
+            for second in other_postures(&first) {
+                // Motions that need not be feasible: only where they begin and end matters here. The pose is visited twice,
+                // with the same contacts and another posture, and the motion after it begins in that one.
+                let mut way = Sequence::at(first.clone());
+                way.push_transfer(vec![wait_at(&first)]);
+                way.push_transfer(vec![wait_at(&second)]);
+                way.push_transfer(vec![wait_at(&second)]);
+                let end = way.end().clone();
+                shorten(search, &mut way, false);
+                n_tried += 1;
+                assert!(*way.start() == first && *way.end() == end);
+                assert!(way.reversed().reversed() == way, "each motion begins where the one before ends");
+            }
+        }
+        assert!(n_tried >= 20, "too little was tried: {n_tried}");
+    });
+}
+
+#[test]
+fn what_does_not_meet_is_not_joined() {
+    with_search("sphere_90x.toml", |search| {
+        let states: Vec<GraspState> = (0..200).filter_map(|_| draw_state(search)).take(3).collect();
+        let [a, b, c] = states.try_into().expect("three grasps");
+        let mut a_to_b = Sequence::at(a.clone());
+        a_to_b.push_transfer(vec![wait_at(&b)]);
+        // A transfer keeps its contacts: it ends in b's joints and pose, and a's contacts.
+        assert!(a_to_b.end().contacts == a.contacts && a_to_b.end().joints == b.joints);
+        let mut nearly = a_to_b.end().clone();
+        nearly.joints[0][0] += 1e-15_f64.max(nearly.joints[0][0].abs() * f64::EPSILON);
+        assert!(a_to_b.clone().then(Sequence::at(nearly.clone())).is_none(), "one bit apart is apart");
+        assert!(a_to_b.clone().then(Sequence::at(a_to_b.end().clone())).is_some());
+
+        let mut way = a_to_b.clone();
+        way.push_transfer(vec![wait_at(&c)]);
+        let mut detour = Sequence::at(a);
+        detour.push_transfer(vec![Moment { world_from_object: nearly.world_from_object, joints: nearly.joints }]);
+        let before = way.clone();
+        assert!(!way.replace(0..=0, detour.clone()) && way == before, "a detour to another end is refused");
+        assert!(!way.replace(1..=1, detour.clone()) && way == before, "a detour from another start is refused");
+        assert!(way.replace(0..=1, detour.clone()) && way == detour, "the end of all may change");
+    });
+}
