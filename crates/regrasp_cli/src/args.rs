@@ -161,6 +161,9 @@ pub struct Bench {
     /// Make a Markdown page of CSV files that were written before; plans nothing
     #[arg(long, value_name = "FILE")]
     pub page: Option<PathBuf>,
+    /// For --page: seconds by scene, within which it should be solved
+    #[arg(long, value_name = "FILE.json", requires = "page")]
+    pub limits: Option<PathBuf>,
 }
 
 /// `regrasp campaign`

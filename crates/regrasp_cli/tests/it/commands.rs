@@ -182,11 +182,13 @@ fn bench_writes_rows_and_the_page_is_made_of_them() {
     ] {
         assert!(rows.lines().next().unwrap().split(',').any(|name| name == column), "{column} is missing");
     }
+    folder.write("limits.json", "{ \"scene\": 3600 }");
     for page in ["one.md", "two.md"] {
-        assert_eq!(folder.run(&["bench", "--page", page, "out/rows.csv"]).code, Some(0));
+        let run = folder.run(&["bench", "--page", page, "--limits", "limits.json", "out/rows.csv"]);
+        assert_eq!(run.code, Some(0), "{run:?}");
     }
     let page = std::fs::read_to_string(folder.path("one.md")).unwrap();
-    assert!(page.contains("| scene | gait | 3/3 | 3/3 |"), "{page}");
+    assert!(page.contains("| scene | gait | 3/3 | 3/3 (3600 s) | 3/3 |"), "{page}");
     assert_eq!(page, std::fs::read_to_string(folder.path("two.md")).unwrap());
 }
 
