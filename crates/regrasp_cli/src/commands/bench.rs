@@ -1,6 +1,6 @@
 //! `regrasp bench`: plan scenes with many seeds and tabulate; or make the page of CSV files.
 
-use super::plan::refuse_unwritable;
+use super::plan::{refuse_input, refuse_unwritable};
 use crate::args::{self, Common};
 use crate::interrupt;
 use crate::load;
@@ -24,6 +24,7 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
         Some(path) => {
             make_folder_of(path)?;
             refuse_unwritable(path)?;
+            refuse_input(path, arguments.scenes.iter().map(PathBuf::as_path))?;
             Some(csv::Writer::create(path).map_err(|error| Stop::unwritable(path, &error))?)
         }
         None => None,
@@ -75,6 +76,7 @@ fn say_row(row: &Row, talk: &Talk) {
 fn write_page(path: &Path, csv_files: &[PathBuf], limits: Option<&Path>, talk: &Talk) -> Result<(), Stop> {
     make_folder_of(path)?;
     refuse_unwritable(path)?;
+    refuse_input(path, csv_files.iter().map(PathBuf::as_path).chain(limits))?;
     let limits = limits.map_or_else(|| Ok(Limits::new()), limits::read)?;
     let mut parts = Vec::new();
     for file in csv_files {

@@ -1,6 +1,7 @@
 //! What the commands do when all is well, and how they end when they are stopped.
 
-use crate::folder::{Folder, Run, models, repository};
+use crate::folder::{Folder, Run};
+use crate::places::{repository, shared_models};
 use serde_json::Value;
 use std::process::Command;
 use std::time::{Duration, Instant};
@@ -208,7 +209,7 @@ fn inspect_writes_a_hand_file_that_plans() {
 /// Hands that nobody here made: Allegro plans; three-finger hands are refused with the reason, at once.
 #[test]
 fn real_hands() {
-    let Some(models) = models() else { return };
+    let Some(models) = shared_models() else { return };
     let package = format!("models={}", models.display());
     let folder = Folder::new();
     let scene = |name: &str| repository().join(format!("scenes/{name}.toml")).to_str().unwrap().to_owned();
