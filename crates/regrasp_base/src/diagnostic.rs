@@ -185,6 +185,11 @@ pub fn printable(text: &str) -> String {
         .collect()
 }
 
+/// `x` with all its digits, as people write it: very large and very small numbers with an exponent.
+pub fn number(x: f64) -> String {
+    if x == 0.0 || (1e-4..1e10).contains(&x.abs()) { x.to_string() } else { format!("{x:e}") }
+}
+
 /// The candidate nearest to `word` by edit distance, when it is near enough to be a slip of the keyboard.
 pub fn did_you_mean<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let limit = (word.chars().count() / 3).max(1) + 1;
@@ -233,6 +238,12 @@ mod tests {
     #[test]
     fn names_cannot_drive_a_terminal() {
         assert_eq!(printable("a\u{1b}[2Jb\u{202e}c"), "a\u{fffd}[2Jb\u{fffd}c");
+    }
+
+    #[test]
+    fn numbers_are_short() {
+        let shown = [0.0, -0.8, 0.078, 1e300, -2.5e-7, f64::INFINITY].map(number);
+        assert_eq!(shown, ["0", "-0.8", "0.078", "1e300", "-2.5e-7", "inf"]);
     }
 
     #[test]

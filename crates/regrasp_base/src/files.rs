@@ -39,13 +39,17 @@ pub fn read_text(path: &Path) -> Result<String, InputError> {
 pub fn text_of(path: &Path, bytes: Vec<u8>) -> Result<String, InputError> {
     let text = String::from_utf8(bytes).map_err(|error| {
         let offset = error.utf8_error().valid_up_to();
-        let encoding = match error.as_bytes() {
-            [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => "it looks like UTF-16",
-            _ => "it may be Latin-1",
+        let bytes = error.as_bytes();
+        let (guess, encoding) = match bytes {
+            [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => ("looks like", "UTF-16"),
+            _ => ("may be", "Latin-1"),
         };
-        Diagnostic::new("F002", Place::file(path), format!("is not UTF-8 at byte {offset}; {encoding}"))
+        // Of UTF-16 not even the line feeds can be counted.
+        let line = bytes[..offset].iter().filter(|&&byte| byte == b'\n').count() as u32 + 1;
+        let place = if encoding == "UTF-16" { Place::file(path) } else { Place::line(path, line) };
+        Diagnostic::new("F002", place, format!("is not UTF-8 at byte {offset}; it {guess} {encoding}"))
             .expected("UTF-8 text")
-            .fix("save it again as UTF-8, e.g. iconv -f UTF-16 -t UTF-8")
+            .fix(format!("save it again as UTF-8, e.g. iconv -f {encoding} -t UTF-8"))
     })?;
     Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }
@@ -55,8 +59,23 @@ pub fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
+/// Refuses a `path` where something stands that is no file, such as a folder, a pipe or a device: writing by renaming would
+/// put a file in its place.
+pub fn refuse_other_than_file(path: &Path) -> io::Result<()> {
+    match fs::metadata(path) {
+        Ok(metadata) if metadata.is_dir() => Err(io::Error::from(io::ErrorKind::IsADirectory)),
+        Ok(metadata) if !metadata.is_file() => {
+            Err(io::Error::new(io::ErrorKind::InvalidInput, "it is there and is not a regular file"))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Writes `bytes` to `path` through a temporary file beside it, synced and renamed: the file is whole or unchanged.
+///
+/// Errors: what the system says, and what stands at `path` is not a regular file.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    refuse_other_than_file(path)?;
     let name = path.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "path has no file name"))?;
     let mut temporary_name = name.to_owned();
     temporary_name.push(format!(".{}.tmp", std::process::id()));
@@ -81,6 +100,20 @@ mod tests {
     #[test]
     fn sha256_of_the_standard_example() {
         assert_eq!(sha256(b"abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+    }
+
+    #[test]
+    fn the_line_that_is_not_utf_8_is_named() {
+        let of = |bytes: &[u8]| text_of(Path::new("a"), bytes.to_vec()).unwrap_err().to_string();
+        assert!(of(b"x\n\xe9").starts_with("F002 a:2: is not UTF-8 at byte 2; it may be Latin-1"));
+        assert!(of(b"\xff\xfex\0").starts_with("F002 a: is not UTF-8 at byte 0; it looks like UTF-16"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_device_is_not_replaced() {
+        assert!(write_atomic(Path::new("/dev/null"), b"x").is_err());
+        assert!(!fs::metadata("/dev/null").unwrap().is_file());
     }
 
     #[test]

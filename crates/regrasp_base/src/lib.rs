@@ -1,6 +1,7 @@
 //! What every floor of the tower may use and none may know more than.
 //!
-//! Keyed random numbers, work budgets, diagnostics about input files, files that are written whole or not at all.
+//! Keyed random numbers, work budgets, diagnostics about input files, strict TOML, files that are written whole or not
+//! at all.
 
 /// Work budgets, deadlines and interruption.
 pub mod budget;
@@ -10,6 +11,8 @@ pub mod diagnostic;
 pub mod files;
 /// Random numbers keyed by (seed, purpose, index).
 pub mod random;
+/// TOML tables read strictly, with the place of every key and value.
+pub mod toml_table;
 
 pub use budget::{Budget, Interrupt};
 pub use diagnostic::{Diagnostic, InputError, Place};

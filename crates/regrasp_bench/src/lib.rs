@@ -6,6 +6,8 @@
 pub mod csv;
 /// The same bytes on any number of threads.
 pub mod determinism;
+/// Times within which scenes should be solved.
+pub mod limits;
 /// The checker against good and broken plans.
 pub mod mutations;
 /// `docs/benchmarks.md` from CSV files.
@@ -15,5 +17,6 @@ pub mod row;
 /// Smallest, median, mean and largest per scene and method.
 pub mod summary;
 
+pub use limits::Limits;
 pub use row::{Problem, Row, RunSettings, run};
 pub use summary::{Spread, Summary, summarise};

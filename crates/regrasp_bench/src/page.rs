@@ -1,5 +1,6 @@
 //! `docs/benchmarks.md` from CSV files. The same files give the same bytes.
 
+use crate::limits::Limits;
 use crate::row::Row;
 use crate::summary::{Summary, ms, summarise};
 use std::fmt::Write;
@@ -7,21 +8,28 @@ use std::fmt::Write;
 /// Most misses that are listed per CSV file.
 const MAX_MISSES: usize = 60;
 
-/// The page. Each part is the name of a CSV file and its rows.
-pub fn markdown(parts: &[(String, Vec<Row>)]) -> String {
+/// The page. Each part is the name of a CSV file and its rows; parts stand in the order given, the comparison of the
+/// paper's methods after the last part that has a row of either.
+pub fn markdown(parts: &[(String, Vec<Row>)], limits: &Limits) -> String {
     let mut out = String::from(
         "# Benchmarks\n\n\
          Written by `make bench`; never edited by hand. Planning times are processor times of the planner call over the solved\n\
          seeds, in milliseconds; *floor* is the time to validate the final plan once at the planner's resolution, and *floors* is\n\
-         mean planning time over mean floor. *accepted* is the verdict of the independent checker; *margin* and *gap* are the\n\
+         mean planning time over mean floor. *within limit* is the share of seeds with an accepted plan in at most the processor\n\
+         time in brackets, where one is set. *accepted* is the verdict of the independent checker; *margin* and *gap* are the\n\
          smallest closure margin and the smallest clearance that it found in any plan of the row.\n",
     );
-    for (name, rows) in parts {
+    let is_of_the_paper =
+        |(_, rows): &(String, Vec<Row>)| rows.iter().any(|row| matches!(row.method.as_str(), "classic" | "visibility"));
+    let last_of_the_paper = parts.iter().rposition(is_of_the_paper);
+    for (i, (name, rows)) in parts.iter().enumerate() {
         let _ = writeln!(out, "\n## {}\n\nFrom `{}`.\n", heading(name), escaped(name));
-        table(&summarise(rows), &mut out);
+        table(rows, limits, &mut out);
         misses(rows, &mut out);
+        if last_of_the_paper == Some(i) {
+            ratios(parts, &mut out);
+        }
     }
-    ratios(parts, &mut out);
     out
 }
 
@@ -30,12 +38,12 @@ fn heading(name: &str) -> String {
     escaped(file.strip_suffix(".csv").unwrap_or(file))
 }
 
-fn table(summaries: &[Summary], out: &mut String) {
+fn table(rows: &[Row], limits: &Limits, out: &mut String) {
     out.push_str(
-        "| scene | method | solved | accepted | min | median | mean | max | floors | check ms | nodes | transfers | relocations | margin | gap mm |\n\
-         |---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+        "| scene | method | solved | within limit | accepted | min | median | mean | max | floors | check ms | nodes | transfers | relocations | margin | gap mm |\n\
+         |---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
-    for summary in summaries {
+    for summary in &summarise(rows) {
         let [min, median, mean, max] =
             summary.plan_cpu_s.map_or(["-".to_owned(), "-".into(), "-".into(), "-".into()], |s| {
                 [ms(s.min), ms(s.median), ms(s.mean), ms(s.max)]
@@ -43,11 +51,12 @@ fn table(summaries: &[Summary], out: &mut String) {
         let dash = || "-".to_owned();
         let _ = writeln!(
             out,
-            "| {} | {} | {}/{} | {} | {min} | {median} | {mean} | {max} | {} | {} | {} | {} | {} | {} | {} |",
+            "| {} | {} | {}/{} | {} | {} | {min} | {median} | {mean} | {max} | {} | {} | {} | {} | {} | {} | {} |",
             escaped(&summary.scene),
             escaped(&summary.method),
             summary.solved,
             summary.runs,
+            within_limit(summary, rows, limits).unwrap_or_else(dash),
             summary.accepted.map_or_else(dash, |n| format!("{n}/{}", summary.solved)),
             summary.floors(),
             summary.check_s.map_or_else(dash, |s| ms(s.mean)),
@@ -58,6 +67,18 @@ fn table(summaries: &[Summary], out: &mut String) {
             summary.min_clearance.map_or_else(dash, |x| format!("{:.3}", 1e3 * x)),
         );
     }
+}
+
+/// `19/20 (10 s)`: seeds with a plan, not rejected, in at most the scene's limit of processor time; none without a limit.
+fn within_limit(summary: &Summary, rows: &[Row], limits: &Limits) -> Option<String> {
+    let limit = *limits.get(&summary.scene)?;
+    let is_within = |row: &&Row| {
+        (&row.scene, &row.method) == (&summary.scene, &summary.method)
+            && row.status == "solved"
+            && row.accepted != Some(false)
+            && row.plan_cpu_s <= limit
+    };
+    Some(format!("{}/{} ({limit} s)", rows.iter().filter(is_within).count(), summary.runs))
 }
 
 /// Seeds without an accepted plan, with the cause.
@@ -140,15 +161,42 @@ mod tests {
             cause: "closure <lost>".into(),
             ..Row::default()
         };
-        let page = markdown(&[
+        let parts = [
             (
                 "docs/benchmarks/classic.csv".into(),
                 vec![row("classic", "solved", 0.3), row("classic", "time_limit", 9.0)],
             ),
             ("v.csv".into(), vec![row("visibility", "solved", 0.003)]),
-        ]);
+            ("w.csv".into(), vec![row("gait", "solved", 0.001)]),
+        ];
+        let page = markdown(&parts, &Limits::new());
         assert!(page.contains("| tight\\|sphere | 300 (1/2) | 3.00 (1/1) | 100 |"), "{page}");
         assert!(page.contains("- tight\\|sphere (classic) seed 0: time_limit; closure &lt;lost>"), "{page}");
         assert!(page.contains("## classic\n"));
+        let at = |text: &str| page.find(text).unwrap();
+        assert!(at("## v\n") < at("## Classic method over") && at("## Classic method over") < at("## w\n"), "{page}");
+    }
+
+    #[test]
+    fn a_plan_is_within_the_limit_when_it_is_in_time_and_not_rejected() {
+        let row = |scene: &str, status: &str, plan_cpu_s, accepted| Row {
+            scene: scene.into(),
+            method: "gait".into(),
+            status: status.into(),
+            plan_cpu_s,
+            accepted,
+            ..Row::default()
+        };
+        let rows = vec![
+            row("cube", "solved", 2.0, Some(true)),
+            row("cube", "solved", 2.1, Some(true)),
+            row("cube", "solved", 0.1, Some(false)),
+            row("cube", "time_limit", 1.0, None),
+            row("cube", "solved", 0.2, None),
+            row("ball", "solved", 0.2, Some(true)),
+        ];
+        let page = markdown(&[("a.csv".into(), rows)], &Limits::from([("cube".into(), 2.0), ("cone".into(), 1.0)]));
+        assert!(page.contains("| cube | gait | 4/5 | 2/5 (2 s) |"), "{page}");
+        assert!(page.contains("| ball | gait | 1/1 | - |"), "{page}");
     }
 }

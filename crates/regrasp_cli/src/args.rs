@@ -2,7 +2,7 @@
 
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Methods of the in-hand planner, as `regrasp_planners::Method` spells them.
@@ -12,6 +12,9 @@ pub const METHODS: [&str; 3] = ["gait", "visibility", "classic"];
 const MAX_THREADS: i64 = 1024;
 
 /// Plans how a multi-fingered hand turns an object, and judges plans independently.
+///
+/// First steps: `regrasp demo`; for a hand of your own `regrasp inspect hand.urdf -o hand.toml`, then a scene file
+/// (docs/scene-format.md), `regrasp plan scene.toml -o plan.json`, `regrasp check plan.json`.
 #[derive(Debug, Parser)]
 #[command(name = "regrasp", version, max_term_width = 110, arg_required_else_help = true)]
 pub struct Arguments {
@@ -88,10 +91,10 @@ pub struct Inspect {
 /// How to search.
 #[derive(Debug, Args)]
 pub struct Search {
-    /// Algorithm [default: the best by measurement]
+    /// Algorithm [default: gait, the best by measurement]
     #[arg(long, value_parser = PossibleValuesParser::new(METHODS))]
     pub method: Option<String>,
-    /// All settings of the planner, as a plan file has them; other flags go before it
+    /// All settings of the planner, as a plan file has them; what other flags say wins over it
     #[arg(long, value_name = "FILE.json")]
     pub settings: Option<PathBuf>,
     /// Closure margin asked of every holding set, in [0, 1)
@@ -161,6 +164,9 @@ pub struct Bench {
     /// Make a Markdown page of CSV files that were written before; plans nothing
     #[arg(long, value_name = "FILE")]
     pub page: Option<PathBuf>,
+    /// For --page: seconds by scene, within which it should be solved
+    #[arg(long, value_name = "FILE.json", requires = "page")]
+    pub limits: Option<PathBuf>,
 }
 
 /// `regrasp campaign`
@@ -208,7 +214,10 @@ pub enum CampaignKind {
 
 fn package(text: &str) -> Result<(String, PathBuf), String> {
     match text.split_once('=') {
-        Some((name, folder)) if !name.is_empty() && !folder.is_empty() => Ok((name.to_owned(), PathBuf::from(folder))),
+        Some((name, folder)) if !name.is_empty() && !folder.is_empty() => match Path::new(folder).is_dir() {
+            true => Ok((name.to_owned(), PathBuf::from(folder))),
+            false => Err(format!("{folder} is not a folder")),
+        },
         _ => Err("expected NAME=DIR, such as allegro=/models/allegro".into()),
     }
 }
@@ -281,7 +290,8 @@ mod tests {
             assert!(whole_number(text).is_err() && count(text).is_err(), "{text}");
         }
         assert!(count("0").is_err());
-        assert_eq!(package("a=b=c"), Ok(("a".into(), "b=c".into())));
+        assert_eq!(package("a=."), Ok(("a".into(), ".".into())));
         assert!(package("=b").is_err() && package("a").is_err());
+        assert_eq!(package("a=b=c"), Err("b=c is not a folder".into()));
     }
 }

@@ -41,7 +41,16 @@ pub fn settings(search: &Search, n_threads: usize) -> Result<InHandSettings, Sto
     let mut settings = match &search.settings {
         Some(path) => {
             let text = regrasp::base::files::read_text(path)?;
-            serde_json::from_str(&text).map_err(|error| settings_error(path, &error))?
+            // serde would take a list for the fields in their order, and an empty one for the defaults.
+            if text.trim_start().starts_with('[') {
+                return Err(settings_error(path, 1, 1, "is a list"));
+            }
+            serde_json::from_str(&text).map_err(|error| {
+                let message = error.to_string();
+                // serde_json repeats the place at the end of its message.
+                let problem = message.rsplit_once(" at line ").map_or(message.as_str(), |(problem, _)| problem);
+                settings_error(path, error.line(), error.column().max(1), problem)
+            })?
         }
         None => InHandSettings::default(),
     };
@@ -55,16 +64,15 @@ pub fn settings(search: &Search, n_threads: usize) -> Result<InHandSettings, Sto
     }
     match settings.validate() {
         Ok(()) => Ok(settings),
-        Err(problem) => Err(Stop::argument("A503", "--settings", problem, "settings as in a plan file")),
+        Err(problem) => match &search.settings {
+            Some(path) => Err(Stop::BadInput(Diagnostic::new("A503", Place::file(path), problem).into())),
+            None => Err(Stop::argument("A503", "--margin", problem, "a number in [0, 1)")),
+        },
     }
 }
 
-fn settings_error(path: &Path, error: &serde_json::Error) -> Stop {
-    let (line, column) = (error.line() as u32, error.column().max(1) as u32);
-    let place = Place { file: path.to_owned(), line: Some(line), column: Some(column) };
-    let message = error.to_string();
-    // serde_json repeats the place at the end of its message.
-    let problem = message.rsplit_once(" at line ").map_or(message.as_str(), |(problem, _)| problem);
+fn settings_error(path: &Path, line: usize, column: usize, problem: &str) -> Stop {
+    let place = Place { file: path.to_owned(), line: Some(line as u32), column: Some(column as u32) };
     let diagnostic = Diagnostic::new("A504", place, problem);
     Stop::BadInput(diagnostic.expected("a JSON object like \"settings\" in a plan file").into())
 }

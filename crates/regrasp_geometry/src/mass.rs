@@ -27,7 +27,7 @@ pub enum SolidError {
     /// The mesh does not bound a solid.
     #[error(
         "the mesh is not a closed solid ({open_edges} open, {non_manifold_edges} non-manifold, {flipped_edges} flipped \
-         edges), so its volume and centre of mass are not known; give `com`, or take its hull with `solid = \"hull\"`"
+         edges), so its volume and centre of mass are not known"
     )]
     NotWatertight {
         /// Edges with one triangle.
@@ -38,7 +38,7 @@ pub enum SolidError {
         flipped_edges: usize,
     },
     /// The volume is zero.
-    #[error("the solid has no volume; give `com`")]
+    #[error("the solid has no volume")]
     NoVolume,
 }
 

@@ -1,7 +1,7 @@
 //! Reading and writing `plan.json`, and its JSON Schema. `docs/plan-format.md` describes the file.
 
 use crate::plan::{ContactMode, FORMAT, FORMAT_VERSION, Plan, PoseData};
-use regrasp_base::diagnostic::Diagnostics;
+use regrasp_base::diagnostic::{Diagnostics, number};
 use regrasp_base::{Diagnostic, InputError, Place};
 use serde::Deserialize;
 use std::fmt::Write as _;
@@ -259,7 +259,7 @@ impl Reader<'_> {
         }
         if let Some(value) = waypoint.joints.iter().find(|value| value.abs() > caps::POSITION) {
             let expected = format!("at most {} in size", caps::POSITION);
-            self.fail("C409", &inside("joints"), format!("holds {value}"), expected);
+            self.fail("C409", &inside("joints"), format!("holds {}", number(*value)), expected);
         }
         self.pose(&inside("world_from_object"), &waypoint.world_from_object);
         if waypoint.contacts.len() != plan.fingers.len() {

@@ -56,30 +56,38 @@ macro_rules! refused {
 refused!(
     text_that_is_not_toml,
     "format = \n",
-    ["U200 hand.toml:1:10: is not valid TOML: string values must be quoted, expected literal string"]
+    ["U200 hand.toml:1:10: string values must be quoted, expected literal string"]
+);
+refused!(an_empty_file, "", ["U200 hand.toml: is empty; expected a TOML file"]);
+refused!(a_urdf_called_toml, URDF, ["U200 hand.toml: looks like XML; expected a TOML file"]);
+refused!(
+    a_scene_file,
+    "format = \"regrasp-scene\"\nformat_version = 1\ntask = \"in_hand\"\n",
+    [r#"U204 hand.toml:1:10 key "format": is "regrasp-scene"; expected "regrasp-hand""#]
 );
 refused!(
-    an_empty_file,
-    "",
+    a_file_of_comments,
+    "# nothing",
     [
-        r#"U202 hand.toml:1:1 key "format": is missing; expected format = "regrasp-hand""#,
-        r#"U202 hand.toml:1:1 key "format_version": is missing; expected format_version = 1"#,
-        r#"U202 hand.toml:1:1 key "urdf": is missing; expected urdf = "...""#
+        "U202 hand.toml:1:1: has no `format`\n  fix: add format = \"regrasp-hand\" as the first line",
+        "U202 hand.toml:1:1: has no `format_version`\n  fix: add format_version = 1",
+        "U202 hand.toml:1:1: has no `urdf`\n  fix: add urdf = \"hand.urdf\"",
+        "U202 hand.toml:1:1: has no `fingers`\n  fix: add at least one [[fingers]] table"
     ]
 );
 refused!(
     a_key_that_is_misspelt,
     format!("basse_link = \"palm\"\n{}", with_finger(&format!("tip_link = \"a_tip\"\n{POINT}\ncolour = 1"))),
     [
-        r#"U201 hand.toml:1:1 key "basse_link": is not a key of this table; expected one of format, format_version, urdf, srdf, base_link, allow, fingers
+        r#"U201 hand.toml:1:1 key "basse_link": is not a key that exists here; expected format, format_version, urdf, srdf, base_link, allow or fingers
   fix: did you mean base_link?"#,
-        r#"U201 hand.toml:10:1 key "colour": is not a key of this table; expected one of name, tip_link, first_joint, tip, rest"#
+        r#"U201 hand.toml:10:1 key "fingers[0].colour": is not a key that exists here; expected name, tip_link, first_joint, tip or rest"#
     ]
 );
 refused!(
     another_version,
     with_finger(&format!("tip_link = \"a_tip\"\n{POINT}")).replace("format_version = 1", "format_version = 2"),
-    [r#"U204 hand.toml:2:18 key "format_version": is 2, which this program does not know; expected 1"#]
+    [r#"U204 hand.toml:2:18 key "format_version": is 2; expected 1, the version that this program reads"#]
 );
 refused!(
     a_urdf_that_is_not_there,
@@ -91,47 +99,63 @@ refused!(
 refused!(
     a_link_that_is_misspelt,
     with_finger(&format!("tip_link = \"a_tpi\"\n{POINT}")),
-    [r#"U205 hand.toml:7:12 key "tip_link": the robot has no link "a_tpi"; expected the name of a link of the URDF
-  fix: did you mean "a_tip"?"#]
+    [
+        r#"U205 hand.toml:7:12 key "fingers[0].tip_link": the robot has no link "a_tpi"; expected the name of a link of the URDF
+  fix: did you mean "a_tip"?"#
+    ]
+);
+refused!(no_fingers, HEAD, ["U202 hand.toml:1:1: has no `fingers`\n  fix: add at least one [[fingers]] table"]);
+refused!(
+    an_empty_list_of_fingers,
+    format!("{HEAD}fingers = []\n"),
+    [r#"U202 hand.toml:4:11 key "fingers": is empty; expected at least one [[fingers]] table"#]
 );
 refused!(
-    no_fingers,
-    HEAD,
-    [r#"U202 hand.toml:1:1 key "fingers": is missing; expected at least one [[fingers]] table"#]
+    fingers_that_are_numbers,
+    format!("{HEAD}fingers = [1]\n"),
+    [r#"U203 hand.toml:4:12 key "fingers[0]": is 1, an integer; expected a table"#]
+);
+refused!(
+    a_tip_larger_than_the_hand,
+    with_finger("tip_link = \"a_tip\"\ntip = { shape = \"sphere\", radius = 5 }"),
+    [
+        r#"U217 hand.toml finger "a": its tip has a radius of 5 m, more than the 0.1082 m of the hand; expected a radius in metres"#
+    ]
 );
 refused!(
     no_tip,
     with_finger("tip_link = \"a_tip\""),
-    [
-        r#"U202 hand.toml:5:1 key "tip": is missing; expected tip = { shape = "sphere", radius = 0.012, center = [0, 0, 0] }"#
-    ]
+    [r#"U202 hand.toml:5:1 table "fingers[0]": has no `tip`
+  fix: add tip = { shape = "sphere", radius = 0.012, center = [0, 0, 0] }"#]
 );
 refused!(
     a_tip_shape_that_is_misspelt,
     with_finger("tip_link = \"a_tip\"\ntip = { shape = \"spere\", radius = 0.01 }"),
-    [r#"U213 hand.toml:8:17 key "shape": is "spere"; expected "sphere", "point" or "mesh"
-  fix: did you mean "sphere"?"#]
+    [
+        r#"U213 hand.toml:8:17 key "fingers[0].tip.shape": is "spere" (did you mean "sphere"?); expected sphere, point or mesh"#
+    ]
 );
 refused!(
     a_negative_tip_radius,
     with_finger("tip_link = \"a_tip\"\ntip = { shape = \"sphere\", radius = -0.01 }"),
-    [r#"U213 hand.toml:8:36 key "radius": is -0.01; expected a length above 0, in metres
-  fix: shape = "point" for a sharp tip"#]
+    [
+        r#"U213 hand.toml:8:36 key "fingers[0].tip.radius": is -0.01; expected a length above 0, in metres, or shape = "point" for a sharp tip"#
+    ]
 );
 refused!(
     a_tip_radius_of_nan,
     with_finger("tip_link = \"a_tip\"\ntip = { shape = \"sphere\", radius = nan }"),
-    [r#"V001 hand.toml:8:36 key "radius": is NaN; expected a finite number"#]
+    [r#"V001 hand.toml:8:36 key "fingers[0].tip.radius": is nan; expected a finite number"#]
 );
 refused!(
     a_tip_radius_in_words,
     with_finger("tip_link = \"a_tip\"\ntip = { shape = \"sphere\", radius = \"big\" }"),
-    [r#"U203 hand.toml:8:36 key "radius": is a string; expected a number"#]
+    [r#"U203 hand.toml:8:36 key "fingers[0].tip.radius": is "big", a string; expected a number"#]
 );
 refused!(
     a_center_of_two_numbers,
     with_finger("tip_link = \"a_tip\"\ntip = { shape = \"sphere\", radius = 0.01, center = [0, 1] }"),
-    [r#"U203 hand.toml:8:51 key "center": is a list of 2; expected three numbers: [x, y, z]"#]
+    [r#"U203 hand.toml:8:51 key "fingers[0].tip.center": has 2 values; expected an array of 3 numbers"#]
 );
 refused!(
     a_hull_of_nothing,
@@ -145,15 +169,15 @@ refused!(
     a_rest_position_outside_the_limits,
     with_finger(&format!("tip_link = \"a_tip\"\n{POINT}\nrest = {{ ja1 = 2.0, ja3 = 0 }}")),
     [
-        r#"U212 hand.toml:9:10 joint "ja1": rest position 2 is outside the limits; expected -1..1"#,
-        r#"U205 hand.toml:9:21 key "rest": finger "a" has no independent joint "ja3"; expected one of ja1, ja2
+        r#"U212 hand.toml:9:16 joint "ja1": rest position 2 is outside the limits; expected -1..1"#,
+        r#"U205 hand.toml:9:27 key "rest": finger "a" has no independent joint "ja3"; expected one of ja1, ja2
   fix: did you mean ja1?"#
     ]
 );
 refused!(
     a_rest_position_of_a_follower,
     with_finger(&format!("tip_link = \"a_tip\"\n{POINT}")).replace("\"b2\"\n", "\"b2\"\nrest = { jb2 = 0.0 }\n"),
-    [r#"U205 hand.toml:12:10 key "rest": finger "b" has no independent joint "jb2"; expected one of jb1
+    [r#"U205 hand.toml:12:16 key "rest": finger "b" has no independent joint "jb2"; expected one of jb1
   fix: did you mean jb1?"#]
 );
 refused!(
@@ -164,8 +188,8 @@ refused!(
             .replace("base_link", "allow = [[\"a1\"], [\"a1\", \"b3\"]]\nbase_link")
     ),
     [
-        r#"U203 hand.toml:4:10 key "allow": is a list of 1; expected pairs of link names: [["link_a", "link_b"], ...]"#,
-        r#"U205 hand.toml:4:25 key "allow": the robot has no link "b3"; expected the name of a link of the URDF
+        r#"U203 hand.toml:4:10 key "allow[0]": has 1 values; expected pairs of link names: [["link_a", "link_b"], ...]"#,
+        r#"U205 hand.toml:4:25 key "allow[1][1]": the robot has no link "b3"; expected the name of a link of the URDF
   fix: did you mean "b1"?"#
     ]
 );

@@ -1,30 +1,19 @@
 //! Bundled and shared hands against published dimensions.
 
+#[path = "../../../tests/support/places.rs"]
+mod places;
+
+use places::{repository, shared_models};
 use regrasp_base::Rng;
 use regrasp_geometry::Point;
 use regrasp_robot::inspect::{InspectSettings, hand_file_text, inspect};
 use regrasp_robot::{Hand, LoadOptions, TipShape, load_hand, load_robot};
 use std::fs;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// A bundled hand.
 fn bundled(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/hands").join(name).join("hand.toml")
-}
-
-/// The folder of shared models: `REGRASP_MODELS`, else `shared/models` beside a folder above this crate.
-fn shared_models() -> Option<PathBuf> {
-    if let Some(given) = std::env::var_os("REGRASP_MODELS") {
-        return Some(PathBuf::from(given));
-    }
-    let crate_root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let found = crate_root.ancestors().map(|dir| dir.join("shared/models")).find(|dir| dir.is_dir());
-    if found.is_none() {
-        // Past the capture of test output, so that the log says it.
-        let _ = writeln!(std::io::stderr(), "SKIPPED: no shared models");
-    }
-    found
+    repository().join("assets/hands").join(name).join("hand.toml")
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! `regrasp bench`: plan scenes with many seeds and tabulate; or make the page of CSV files.
 
-use super::plan::refuse_unwritable;
+use super::plan::{refuse_input, refuse_unwritable};
 use crate::args::{self, Common};
 use crate::interrupt;
 use crate::load;
@@ -8,22 +8,23 @@ use crate::stop::Stop;
 use crate::talk::Talk;
 use regrasp::base::files;
 use regrasp_bench::row::Judge;
-use regrasp_bench::{Problem, Row, RunSettings, csv, page, run as run_one, summarise, summary};
+use regrasp_bench::{Limits, Problem, Row, RunSettings, csv, limits, page, run as run_one, summarise, summary};
 use serde_json::json;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 /// Runs every seed of every scene, or writes the page.
 pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), Stop> {
     if let Some(path) = &arguments.page {
-        return write_page(path, &arguments.scenes, talk);
+        return write_page(path, &arguments.scenes, arguments.limits.as_deref(), talk);
     }
     let cancelled = interrupt::flag()?;
     let mut writer = match &arguments.csv {
         Some(path) => {
             make_folder_of(path)?;
             refuse_unwritable(path)?;
+            refuse_input(path, arguments.scenes.iter().map(PathBuf::as_path))?;
             Some(csv::Writer::create(path).map_err(|error| Stop::unwritable(path, &error))?)
         }
         None => None,
@@ -74,14 +75,16 @@ fn say_row(row: &Row, talk: &Talk) {
     }
 }
 
-fn write_page(path: &Path, csv_files: &[std::path::PathBuf], talk: &Talk) -> Result<(), Stop> {
+fn write_page(path: &Path, csv_files: &[PathBuf], limits: Option<&Path>, talk: &Talk) -> Result<(), Stop> {
     make_folder_of(path)?;
     refuse_unwritable(path)?;
+    refuse_input(path, csv_files.iter().map(PathBuf::as_path).chain(limits))?;
+    let limits = limits.map_or_else(|| Ok(Limits::new()), limits::read)?;
     let mut parts = Vec::new();
     for file in csv_files {
         parts.push((file.to_string_lossy().into_owned(), csv::read(file)?));
     }
-    let text = page::markdown(&parts);
+    let text = page::markdown(&parts, &limits);
     files::write_atomic(path, text.as_bytes()).map_err(|error| Stop::unwritable(path, &error))?;
     talk.say(format!("wrote  {}", path.display()));
     Ok(())

@@ -1,6 +1,6 @@
 //! `regrasp inspect`: what a hand is like, and a hand file for it.
 
-use super::plan::refuse_unwritable;
+use super::plan::{refuse_input, refuse_unwritable};
 use crate::args::{self, Common};
 use crate::interrupt;
 use crate::load;
@@ -26,6 +26,9 @@ pub fn run(arguments: &args::Inspect, common: &Common, talk: &Talk) -> Result<()
     let settings = InspectSettings { n_postures: arguments.samples as usize };
     let mut rng = Rng::keyed(arguments.seed, "inspect", 0);
     let found = inspect(&arguments.urdf, &load::options(common), &settings, &mut rng)?;
+    if let Some(path) = &arguments.output {
+        refuse_input(path, found.inputs.iter().map(|input| input.path.as_path()))?;
+    }
     for note in &found.notes {
         talk.note(note);
     }

@@ -26,6 +26,10 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
     }
     let cancelled = interrupt::flag()?;
     let loaded = load::scene(&arguments.scene, common, talk)?;
+    if let Some(path) = &arguments.output {
+        let read = loaded.scene.inputs.iter().map(|input| input.path.as_path());
+        refuse_input(path, read.chain(arguments.search.settings.as_deref()))?;
+    }
     let query = loaded.task.query(arguments.seed);
     let n_threads = arguments.threads.unwrap_or_else(available_threads);
     let settings = load::settings(&arguments.search, n_threads)?;
@@ -74,8 +78,8 @@ pub fn available_threads() -> usize {
 /// Refuses a path that cannot be written, before any work is done (`F003`).
 pub fn refuse_unwritable(path: &Path) -> Result<(), Stop> {
     let fail = |error: io::Error| Err(Stop::unwritable(path, &error));
-    if path.is_dir() {
-        return fail(io::Error::from(io::ErrorKind::IsADirectory));
+    if let Err(error) = files::refuse_other_than_file(path) {
+        return fail(error);
     }
     let Some(name) = path.file_name() else {
         return fail(io::Error::new(io::ErrorKind::InvalidInput, "the path has no file name"));
@@ -86,6 +90,15 @@ pub fn refuse_unwritable(path: &Path) -> Result<(), Stop> {
     match std::fs::File::create_new(&probe).and_then(|_| std::fs::remove_file(&probe)) {
         Ok(()) => Ok(()),
         Err(error) => fail(error),
+    }
+}
+
+/// Refuses to write over a file that this command reads (`F003`).
+pub fn refuse_input<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a Path>) -> Result<(), Stop> {
+    let Ok(real) = path.canonicalize() else { return Ok(()) };
+    match inputs.into_iter().find(|input| input.canonicalize().is_ok_and(|input| input == real)) {
+        None => Ok(()),
+        Some(_) => Err(Stop::unwritable(path, &io::Error::other("it is an input of this command"))),
     }
 }
 
@@ -245,6 +258,8 @@ mod tests {
         assert!(refuse_unwritable(&folder.path().join("missing").join("plan.json")).is_err());
         assert!(refuse_unwritable(folder.path()).is_err());
         assert!(refuse_unwritable(&folder.path().join("plan.json")).is_ok());
+        assert!(refuse_input(&folder.path().join("plan.json"), [folder.path()]).is_ok());
+        assert!(refuse_input(&folder.path().join("."), [folder.path()]).is_err());
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 }

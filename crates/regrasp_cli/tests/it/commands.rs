@@ -1,6 +1,7 @@
 //! What the commands do when all is well, and how they end when they are stopped.
 
-use crate::folder::{Folder, Run, models, repository};
+use crate::folder::{Folder, Run};
+use crate::places::{repository, shared_models};
 use serde_json::Value;
 use std::process::Command;
 use std::time::{Duration, Instant};
@@ -182,11 +183,13 @@ fn bench_writes_rows_and_the_page_is_made_of_them() {
     ] {
         assert!(rows.lines().next().unwrap().split(',').any(|name| name == column), "{column} is missing");
     }
+    folder.write("limits.json", "{ \"scene\": 3600 }");
     for page in ["one.md", "two.md"] {
-        assert_eq!(folder.run(&["bench", "--page", page, "out/rows.csv"]).code, Some(0));
+        let run = folder.run(&["bench", "--page", page, "--limits", "limits.json", "out/rows.csv"]);
+        assert_eq!(run.code, Some(0), "{run:?}");
     }
     let page = std::fs::read_to_string(folder.path("one.md")).unwrap();
-    assert!(page.contains("| scene | gait | 3/3 | 3/3 |"), "{page}");
+    assert!(page.contains("| scene | gait | 3/3 | 3/3 (3600 s) | 3/3 |"), "{page}");
     assert_eq!(page, std::fs::read_to_string(folder.path("two.md")).unwrap());
 }
 
@@ -206,7 +209,7 @@ fn inspect_writes_a_hand_file_that_plans() {
 /// Hands that nobody here made: Allegro plans; three-finger hands are refused with the reason, at once.
 #[test]
 fn real_hands() {
-    let Some(models) = models() else { return };
+    let Some(models) = shared_models() else { return };
     let package = format!("models={}", models.display());
     let folder = Folder::new();
     let scene = |name: &str| repository().join(format!("scenes/{name}.toml")).to_str().unwrap().to_owned();

@@ -1,29 +1,9 @@
 //! A folder with a good hand, object and scene, files of which a test may break; and the program run in it.
 
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use crate::places::repository;
+use crate::wide_scene::{SCENE, copy_hand};
+use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
-
-/// The scene of [`Folder::new`].
-pub const SCENE: &str = r#"format = "regrasp-scene"
-format_version = 1
-task = "in_hand"
-
-[hand]
-file = "hand.toml"
-
-[object]
-name = "ball"
-sphere = { radius = 0.032 }
-mass = 0.1
-friction = 0.8
-
-[start]
-position = [0.0, 0.0, 0.078]
-
-[goal]
-turn = { axis = "z", angle_deg = 180 }
-"#;
 
 /// A folder that is removed at the end of the test.
 pub struct Folder(tempfile::TempDir);
@@ -32,10 +12,7 @@ impl Folder {
     /// The wide four-finger hand with a ball.
     pub fn new() -> Self {
         let folder = Folder(tempfile::tempdir().expect("a temporary folder"));
-        let hand = repository().join("assets/hands/wide_four_finger");
-        for name in ["hand.toml", "hand.urdf"] {
-            std::fs::copy(hand.join(name), folder.path(name)).expect("the bundled hand is there");
-        }
+        copy_hand(&repository(), folder.0.path());
         folder.write("scene.toml", SCENE);
         folder
     }
@@ -98,22 +75,4 @@ impl Run {
             err: String::from_utf8(output.stderr).expect("stderr is UTF-8"),
         }
     }
-}
-
-/// The root of the repository.
-pub fn repository() -> &'static Path {
-    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
-}
-
-/// The shared models, if they are here: `REGRASP_MODELS`, else `../shared/models` beside the repository or above it.
-pub fn models() -> Option<PathBuf> {
-    let named = std::env::var_os("REGRASP_MODELS").map(PathBuf::from);
-    let root = repository().canonicalize().expect("the repository is there");
-    let near = root.ancestors().map(|folder| folder.join("../shared/models"));
-    let found = named.into_iter().chain(near).find(|folder| folder.is_dir());
-    if found.is_none() {
-        // Past the capture of test output, so that the log says it.
-        let _ = writeln!(std::io::stderr(), "SKIPPED: no shared models");
-    }
-    found.and_then(|folder| folder.canonicalize().ok())
 }

@@ -3,3 +3,7 @@
 mod bad_input;
 mod commands;
 mod folder;
+#[path = "../../../../tests/support/places.rs"]
+mod places;
+#[path = "../../../../tests/support/wide_scene.rs"]
+mod wide_scene;

@@ -34,6 +34,9 @@ pub fn read_mesh(path: &Path, bytes: &[u8]) -> Result<TriangleMesh, InputError> 
     match extension.as_str() {
         "stl" => read_stl(path, bytes),
         "obj" => read_obj(path, bytes),
+        "" => Err(Diagnostic::new("M200", Place::file(path), "has no extension that says its format")
+            .expected("an .stl or .obj file")
+            .into()),
         _ => {
             Err(Diagnostic::new("M200", Place::file(path), format!("\".{extension}\" is not a mesh format read here"))
                 .expected("an .stl or .obj file")

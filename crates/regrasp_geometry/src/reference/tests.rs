@@ -1,6 +1,7 @@
 //! parry against distances known by construction, closed forms and surfaces.
 
 use super::*;
+use crate::collision::{self, Placement, separation};
 use crate::{ConvexHull, Surface, Vector};
 use regrasp_base::Rng;
 use std::sync::Arc;
@@ -20,8 +21,10 @@ fn hull(rng: &mut Rng, n: usize, size: f64) -> Arc<ConvexHull> {
 
 const N_KINDS: usize = 6;
 
-/// A clearance may be understated by this much, in m, and a tenth of itself.
+/// A clearance may be understated by this much, in m; 9.6e-6 m was the most in 2.1 million pairs.
 const LARGEST_UNDERSTATEMENT: f64 = 1e-5;
+/// Gaps of this much and more, in m, are found to 1e-6 of themselves and 2e-8 m but for one pair in a thousand.
+const WIDE: f64 = 1e-3;
 
 fn random_shape(rng: &mut Rng, kind: usize) -> Shape {
     let mut length = || rng.uniform(0.005, 0.05);
@@ -73,7 +76,9 @@ struct Seen {
     n_unresolved: usize,
     /// Clearance understated by more than 2e-8 m and 1e-6 of the gap, or a gap taken for contact.
     n_loose: usize,
-    /// Largest such understatement, in m, beyond a tenth of the gap, and the pair.
+    /// Those of them with a gap of [`WIDE`] or more.
+    n_loose_and_wide: usize,
+    /// Largest understatement in m, and the pair.
     worst: (f64, &'static str, &'static str, f64),
     /// Apart by `max` or more, but less than `max` was claimed.
     n_short: usize,
@@ -81,11 +86,25 @@ struct Seen {
 
 impl Seen {
     fn understated(&mut self, gap: f64, claimed: f64, kinds: (&'static str, &'static str)) {
-        self.n_loose += usize::from(claimed < gap * (1.0 - 1e-6) - 2e-8);
-        let beyond = 0.9 * gap - claimed;
-        if beyond > self.worst.0 {
-            self.worst = (beyond, kinds.0, kinds.1, gap);
+        let is_loose = claimed < gap * (1.0 - 1e-6) - 2e-8;
+        self.n_loose += usize::from(is_loose);
+        self.n_loose_and_wide += usize::from(is_loose && gap >= WIDE);
+        if is_loose && gap - claimed > self.worst.0 {
+            self.worst = (gap - claimed, kinds.0, kinds.1, gap);
         }
+    }
+}
+
+/// The planner's own search finds every gap of 1e-6 m or more up to the fiftieth at which it stops, and claims no more.
+fn own_code_finds(a: &Shape, world_from_a: &Pose, b: &Shape, world_from_b: &Pose, gap: f64) {
+    let (at_a, at_b) = (Placement::from(world_from_a), Placement::from(world_from_b));
+    let mut direction = Vector::zeros();
+    match separation(a, &at_a, b, &at_b, 1e-9, f64::INFINITY, &mut direction, &mut [0; 2]) {
+        collision::Answer::SeparatedBy(lower) => {
+            assert!(lower <= gap + 1e-12, "{} {} {gap} {lower}", a.kind(), b.kind());
+            assert!(lower >= 0.98 * gap - 1e-9, "{} {} {gap} {lower}", a.kind(), b.kind());
+        }
+        answer => assert!(gap < 1e-6, "{} {} {gap} {answer:?}", a.kind(), b.kind()),
     }
 }
 
@@ -100,13 +119,16 @@ fn cross_check(n: usize) -> Seen {
                 if i % 20 == 0 {
                     (a, b) = (random_shape(&mut rng, kind_a), random_shape(&mut rng, kind_b));
                 }
-                let gap = match i % 8 {
+                let gap = match i % 11 {
                     0 => 0.0,
                     1 => 1e-9,
                     2 => -1e-9,
                     3 => 1e-6,
                     4 => -1e-6,
                     5 => rng.uniform(-0.004, 0.0),
+                    6 => 1e-5,
+                    7 => 1e-4,
+                    8 => 1e-3,
                     _ => rng.uniform(0.0, 0.1),
                 };
                 let (world_from_a, world_from_b, nearest_of_b) = placed_at(&a, &b, gap, &mut rng);
@@ -116,6 +138,7 @@ fn cross_check(n: usize) -> Seen {
                 let back = distance(&pair[1], &world_from_b, &pair[0], &world_from_a, max);
                 let names = (a.kind(), b.kind(), gap);
                 seen.n += 1;
+                own_code_finds(&a, &world_from_a, &b, &world_from_b, gap);
                 match answer {
                     Answer::SeparatedBy(lower) => {
                         assert!(lower > 0.0 && lower <= gap + 1e-12, "{names:?} {lower}");
@@ -148,12 +171,13 @@ fn cross_check(n: usize) -> Seen {
     seen
 }
 
-/// parry's GJK may stop early where gaps are below about 10 um; the slab then proves less than the gap, or nothing.
+/// parry's GJK stops early where the rim of a cylinder is near a face, and the slab it leaves proves less than the gap: 30,632
+/// of 2.1 million pairs, two thirds of them 1e-5 m apart or less. The planner's own search has none of this.
 fn assert_useful(seen: &Seen) {
     assert!(seen.n_unresolved * 2_000 <= seen.n, "{seen:?}");
-    assert!(seen.n_loose * 100 <= seen.n, "{seen:?}");
+    assert!(seen.n_loose * 60 <= seen.n && seen.n_loose_and_wide * 1_000 <= seen.n, "{seen:?}");
     assert!(seen.worst.0 <= LARGEST_UNDERSTATEMENT, "{seen:?}");
-    assert!(seen.n_short * 2_000 <= seen.n, "{seen:?}");
+    assert_eq!(seen.n_short, 0, "{seen:?}");
 }
 
 #[test]

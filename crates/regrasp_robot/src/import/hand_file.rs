@@ -4,24 +4,32 @@
 
 use super::assemble::{FingerSpec, HandSpec, TipSpec, assemble};
 use super::resolve::{ResolveOptions, resolve_own};
-use super::srdf::load_srdf;
-use super::toml_table::{Need, Table, TomlReader};
+use super::srdf::{LoadedSrdf, load_srdf};
 use super::urdf::{LoadedRobot, load_robot};
 use crate::hand::Hand;
-use crate::robot::{LinkId, Robot};
-use regrasp_base::diagnostic::{Diagnostics, did_you_mean};
+use crate::robot::{JointId, LinkId, Robot};
+use regrasp_base::diagnostic::did_you_mean;
+use regrasp_base::toml_table::{Codes, Entry, Found, Table};
 use regrasp_base::{Diagnostic, InputError, Place, files};
 use regrasp_geometry::Point;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use toml::Spanned;
-use toml::de::{DeTable, DeValue};
 
 /// The value of `format` in a hand file.
 pub const FORMAT: &str = "regrasp-hand";
 /// The value of `format_version` in a hand file.
-pub const VERSION: i64 = 1;
+pub const VERSION: f64 = 1.0;
+
+const CODES: Codes = Codes {
+    syntax: "U200",
+    unknown_key: "U201",
+    missing_key: "U202",
+    wrong_type: "U203",
+    unknown_word: "U213",
+    other_format: "U204",
+    out_of_range: "U213",
+};
 
 /// How hands and robots are read.
 #[derive(Debug, Clone, Default)]
@@ -91,62 +99,14 @@ fn load_hand_file(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let own = LoadedInput { role: "hand".into(), name, path: path.to_owned(), sha256: files::sha256(&bytes) };
     let text = files::text_of(path, bytes)?;
-    let document = DeTable::parse(&text).map_err(|error| {
-        let place = match error.span() {
-            Some(span) => Place::at_offset(path, &text, span.start),
-            None => Place::file(path),
-        };
-        let message = error.message().lines().collect::<Vec<_>>().join(" ");
-        InputError::from(Diagnostic::new("U200", place, format!("is not valid TOML: {message}")))
-    })?;
-    let table = Table { entries: document.get_ref(), offset: 0 };
-    let mut reader = TomlReader { file: path, text: &text, found: Diagnostics::default() };
-    reader.refuse_unknown(table, &["format", "format_version", "urdf", "srdf", "base_link", "allow", "fingers"]);
-    refuse_other_format(&mut reader, table);
-
+    let mut found = Found::new(path, &text, CODES);
+    let document = found.parse();
+    let parts = document.as_ref().and_then(|document| read(Table::root(document), path, options, &mut found));
+    let (mut notes, diagnostics) = (found.notes, found.diagnostics);
+    let parts = diagnostics.into_result(parts)?;
+    let Parts { robot, spec, inputs: read } = parts.expect("what could not be read has left a diagnostic");
     let mut inputs = vec![own];
-    let mut notes = Vec::new();
-    let urdf = reader.text(table, "urdf", Need::Required);
-    let robot = urdf.and_then(|(urdf, offset)| {
-        let loaded = resolve_own(urdf, path, reader.place(offset), &options.resolve)
-            .map_err(|error| InputError::from(error.element("key", "urdf")))
-            .and_then(|resolved| {
-                notes.extend(resolved.notes);
-                load_robot(&resolved.path, options)
-            });
-        match loaded {
-            Ok(mut loaded) => {
-                if let Some(first) = loaded.inputs.first_mut() {
-                    urdf.clone_into(&mut first.name);
-                }
-                inputs.extend(loaded.inputs);
-                notes.extend(loaded.notes);
-                Some(Arc::new(loaded.robot))
-            }
-            Err(error) => {
-                reader.found.extend(error);
-                None
-            }
-        }
-    });
-    // Without a robot no name in the rest of the file can be looked up.
-    let Some(robot) = robot else { return Err(only_error(reader.found, path)) };
-    let mut spec = read_spec(&mut reader, table, &robot);
-    if let Some((srdf, offset)) = reader.text(table, "srdf", Need::Optional) {
-        let loaded = resolve_own(srdf, path, reader.place(offset), &options.resolve)
-            .map_err(|error| InputError::from(error.element("key", "srdf")))
-            .and_then(|resolved| load_srdf(&resolved.path, &robot, options.lenient));
-        match loaded {
-            Ok(mut loaded) => {
-                srdf.clone_into(&mut loaded.input.name);
-                inputs.push(loaded.input);
-                notes.extend(loaded.notes);
-                spec.allow.extend(loaded.srdf.disabled_pairs.iter().map(|pair| pair.links));
-            }
-            Err(error) => reader.found.extend(error),
-        }
-    }
-    reader.found.into_result(())?;
+    inputs.extend(read);
     let (hand, more) = assemble(&robot, &spec, path)?;
     notes.extend(more);
     refuse_wrong_unit(&hand, path)?;
@@ -156,10 +116,18 @@ fn load_hand_file(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
 /// Refuses hands whose joints and tips are spread over less than a centimetre or more than five metres.
 ///
 /// Arms with hands are a metre or two; a hand written in millimetres is a hundred metres or more.
+///
+/// Errors: such a span (`U216`), a fingertip larger than the hand (`U217`).
 fn refuse_wrong_unit(hand: &Hand, path: &Path) -> Result<(), InputError> {
     let span = crate::inspect::span(hand);
     if (0.01..=5.0).contains(&span) {
-        return Ok(());
+        let Some(finger) = hand.fingers.iter().find(|finger| finger.tip.radius() > span) else { return Ok(()) };
+        let problem =
+            format!("its tip has a radius of {} m, more than the {span:.4} m of the hand", finger.tip.radius());
+        return Err(Diagnostic::new("U217", Place::file(path), problem)
+            .element("finger", &finger.name)
+            .expected("a radius in metres")
+            .into());
     }
     let (guess, factor) = if span > 5.0 {
         ("is probably in millimetres", "0.001")
@@ -176,230 +144,200 @@ fn refuse_wrong_unit(hand: &Hand, path: &Path) -> Result<(), InputError> {
     .into())
 }
 
-/// The gathered problems as an error; there is at least one.
-fn only_error(found: Diagnostics, path: &Path) -> InputError {
-    match found.into_result(()) {
-        Err(error) => error,
-        Ok(()) => Diagnostic::new("U200", Place::file(path), "cannot be used").into(),
-    }
+/// What a hand file says.
+struct Parts {
+    robot: Arc<Robot>,
+    spec: HandSpec,
+    inputs: Vec<LoadedInput>,
 }
 
-fn refuse_other_format(reader: &mut TomlReader, table: Table) {
-    if let Some((format, offset)) = reader.text(table, "format", Need::Optional)
-        && format != FORMAT
-    {
-        let place = reader.place(offset);
-        reader.found.push(
-            Diagnostic::new("U204", place, format!("is \"{format}\""))
-                .element("key", "format")
-                .expected(format!("\"{FORMAT}\"")),
-        );
-    }
-    if table.get("format").is_none() {
-        reader.missing(table, "format", &format!("format = \"{FORMAT}\""));
-    }
-    let Some(version) = table.get("format_version") else {
-        reader.missing(table, "format_version", &format!("format_version = {VERSION}"));
-        return;
-    };
-    if let Some(seen) = reader.finite(version, "format_version")
-        && seen != VERSION as f64
-    {
-        let place = reader.place(version.span().start);
-        reader.found.push(
-            Diagnostic::new("U204", place, format!("is {seen}, which this program does not know"))
-                .element("key", "format_version")
-                .expected(format!("{VERSION}")),
-        );
-    }
-}
-
-fn read_spec(reader: &mut TomlReader, table: Table, robot: &Robot) -> HandSpec {
-    let base = match reader.text(table, "base_link", Need::Optional) {
-        Some((name, offset)) => known_link(reader, robot, "base_link", name, offset).unwrap_or(robot.root),
-        None => robot.root,
-    };
-    let allow = table.get("allow").map_or_else(BTreeSet::new, |value| read_pairs(reader, robot, value));
-    let mut fingers = Vec::new();
-    match table.get("fingers") {
-        None => reader.missing(table, "fingers", "at least one [[fingers]] table"),
-        Some(value) => match value.get_ref().as_array() {
-            Some(items) if !items.is_empty() => {
-                for item in items {
-                    match item.get_ref().as_table() {
-                        Some(entries) => {
-                            let finger = Table { entries, offset: item.span().start };
-                            fingers.extend(read_finger(reader, finger, robot));
-                        }
-                        None => reader.wrong_type(item, "fingers", "a [[fingers]] table"),
-                    }
-                }
-            }
-            _ => reader.wrong_type(value, "fingers", "at least one [[fingers]] table"),
-        },
-    }
-    HandSpec { base, fingers, allow }
-}
-
-fn read_finger(reader: &mut TomlReader, table: Table, robot: &Robot) -> Option<FingerSpec> {
-    reader.refuse_unknown(table, &["name", "tip_link", "first_joint", "tip", "rest"]);
-    let name = reader.text(table, "name", Need::Required);
-    let tip_link = reader
-        .text(table, "tip_link", Need::Required)
-        .and_then(|(link, offset)| known_link(reader, robot, "tip_link", link, offset));
-    let first_joint = match reader.text(table, "first_joint", Need::Optional) {
-        Some((joint, offset)) => Some(known_joint(reader, robot, "first_joint", joint, offset)?),
-        None => None,
-    };
-    let tip = read_tip(reader, table);
-    let mut rest = Vec::new();
-    if let Some(value) = table.get("rest") {
-        match value.get_ref().as_table() {
-            None => reader.wrong_type(value, "rest", "a table: { joint_name = value, ... }"),
-            Some(entries) => {
-                for (key, value) in entries {
-                    let number = reader.finite(value, key.get_ref());
-                    let place = reader.place(key.span().start);
-                    rest.extend(number.map(|number| (key.get_ref().to_string(), number, place)));
-                }
-            }
-        }
-    }
-    Some(FingerSpec {
-        name: name?.0.to_owned(),
-        tip_link: tip_link?,
-        first_joint,
-        tip: tip?,
-        rest,
-        place: reader.place(table.offset),
-    })
-}
-
-fn read_tip(reader: &mut TomlReader, finger: Table) -> Option<TipSpec> {
-    let expected = "tip = { shape = \"sphere\", radius = 0.012, center = [0, 0, 0] }";
-    let Some(value) = finger.get("tip") else {
-        reader.missing(finger, "tip", expected);
+/// Reads the whole file; none if anything is missing, with the reason in `found`.
+fn read(mut root: Table, path: &Path, options: &LoadOptions, found: &mut Found) -> Option<Parts> {
+    if !root.is_of_format(found, FORMAT, VERSION) {
         return None;
-    };
-    let Some(entries) = value.get_ref().as_table() else {
-        reader.wrong_type(value, "tip", expected);
-        return None;
-    };
-    let tip = Table { entries, offset: value.span().start };
-    let (shape, offset) = reader.text(tip, "shape", Need::Required)?;
-    match shape {
-        "sphere" => {
-            reader.refuse_unknown(tip, &["shape", "radius", "center"]);
-            let center = read_center(reader, tip, "center");
-            let Some(value) = tip.get("radius") else {
-                reader.missing(tip, "radius", "radius = 0.012");
-                return None;
-            };
-            let radius = reader.finite(value, "radius")?;
-            if radius <= 0.0 {
-                let place = reader.place(value.span().start);
-                reader.found.push(
-                    Diagnostic::new("U213", place, format!("is {radius}"))
-                        .element("key", "radius")
-                        .expected("a length above 0, in metres")
-                        .fix("shape = \"point\" for a sharp tip"),
-                );
-                return None;
-            }
-            Some(TipSpec::Sphere { radius, center: center? })
+    }
+    let urdf = root.required(found, "urdf", "add urdf = \"hand.urdf\"");
+    let srdf = root.optional("srdf");
+    let base = root.optional("base_link");
+    let allow = root.optional("allow");
+    let fingers = root.required(found, "fingers", "add at least one [[fingers]] table");
+    root.finish(found);
+    // Without a robot no name in the rest of the file can be looked up.
+    let (robot, mut inputs) = urdf.and_then(|entry| read_robot(&entry, path, options, found))?;
+    let base = base.and_then(|entry| known_link(&entry, &robot, found)).unwrap_or(robot.root);
+    let mut allow = allow.map_or_else(BTreeSet::new, |entry| read_pairs(&entry, &robot, found));
+    let fingers = fingers.map_or_else(Vec::new, |entry| read_fingers(&entry, &robot, found));
+    if let Some(entry) = srdf
+        && let Some(loaded) = read_srdf(&entry, path, &robot, options, found)
+    {
+        allow.extend(loaded.srdf.disabled_pairs.iter().map(|pair| pair.links));
+        inputs.push(loaded.input);
+    }
+    Some(Parts { robot, spec: HandSpec { base, fingers, allow }, inputs })
+}
+
+/// The file that `entry` names.
+fn locate(entry: &Entry, path: &Path, options: &LoadOptions, found: &mut Found) -> Option<PathBuf> {
+    let name = entry.text(found)?;
+    match resolve_own(name, path, found.place(&entry.span), &options.resolve) {
+        Ok(resolved) => {
+            found.notes.extend(resolved.notes);
+            Some(resolved.path)
         }
-        "point" => {
-            reader.refuse_unknown(tip, &["shape", "position"]);
-            Some(TipSpec::Point { position: read_center(reader, tip, "position")? })
-        }
-        "mesh" => {
-            reader.refuse_unknown(tip, &["shape", "center"]);
-            Some(TipSpec::Hull { center: read_center(reader, tip, "center")? })
-        }
-        other => {
-            let meant = did_you_mean(other, ["sphere", "point", "mesh"]);
-            let place = reader.place(offset);
-            reader.found.push(
-                Diagnostic::new("U213", place, format!("is \"{other}\""))
-                    .element("key", "shape")
-                    .expected("\"sphere\", \"point\" or \"mesh\"")
-                    .fix(meant.map_or(String::new(), |meant| format!("did you mean \"{meant}\"?"))),
-            );
+        Err(diagnostic) => {
+            found.diagnostics.push(diagnostic.element("key", &entry.name));
             None
         }
     }
 }
 
-/// The point in `key`, the origin of the tip link where it is missing; none where it is bad.
-fn read_center(reader: &mut TomlReader, tip: Table, key: &str) -> Option<Point> {
-    if tip.get(key).is_none() {
-        return Some(Point::origin());
+fn read_robot(
+    entry: &Entry,
+    path: &Path,
+    options: &LoadOptions,
+    found: &mut Found,
+) -> Option<(Arc<Robot>, Vec<LoadedInput>)> {
+    let urdf = locate(entry, path, options, found)?;
+    match load_robot(&urdf, options) {
+        Ok(mut loaded) => {
+            if let (Some(first), Some(name)) = (loaded.inputs.first_mut(), entry.as_text()) {
+                name.clone_into(&mut first.name);
+            }
+            found.notes.extend(loaded.notes);
+            Some((Arc::new(loaded.robot), loaded.inputs))
+        }
+        Err(error) => {
+            found.diagnostics.extend(error);
+            None
+        }
     }
-    reader.vector(tip, key).map(Point::from)
 }
 
-fn read_pairs(reader: &mut TomlReader, robot: &Robot, value: &Spanned<DeValue>) -> BTreeSet<(LinkId, LinkId)> {
+fn read_srdf(
+    entry: &Entry,
+    path: &Path,
+    robot: &Robot,
+    options: &LoadOptions,
+    found: &mut Found,
+) -> Option<LoadedSrdf> {
+    let srdf = locate(entry, path, options, found)?;
+    match load_srdf(&srdf, robot, options.lenient) {
+        Ok(mut loaded) => {
+            entry.as_text()?.clone_into(&mut loaded.input.name);
+            found.notes.append(&mut loaded.notes);
+            Some(loaded)
+        }
+        Err(error) => {
+            found.diagnostics.extend(error);
+            None
+        }
+    }
+}
+
+fn read_fingers(entry: &Entry, robot: &Robot, found: &mut Found) -> Vec<FingerSpec> {
+    let items = entry.entries(found, "at least one [[fingers]] table").unwrap_or_default();
+    if entry.is_empty_list() {
+        let diagnostic = entry.error("U202", found, "is empty").expected("at least one [[fingers]] table");
+        found.diagnostics.push(diagnostic);
+    }
+    items.iter().filter_map(|item| read_finger(item.table(found)?, robot, found)).collect()
+}
+
+fn read_finger(mut table: Table, robot: &Robot, found: &mut Found) -> Option<FingerSpec> {
+    let name = table.required(found, "name", "add name = \"thumb\"").and_then(|entry| entry.text(found));
+    let tip_link = table
+        .required(found, "tip_link", "add tip_link = \"...\", the link that touches")
+        .and_then(|entry| known_link(&entry, robot, found));
+    let first_joint = table.optional("first_joint").map(|entry| known_joint(&entry, robot, found));
+    let tip = table
+        .required(found, "tip", "add tip = { shape = \"sphere\", radius = 0.012, center = [0, 0, 0] }")
+        .and_then(|entry| read_tip(entry.table(found)?, found));
+    let rest = table.optional("rest").and_then(|entry| entry.table(found));
+    let mut positions = Vec::new();
+    for (joint, entry) in rest.iter().flat_map(Table::all) {
+        let number = entry.number(found);
+        positions.extend(number.map(|number| (joint.to_owned(), number, found.place(&entry.span))));
+    }
+    let place = found.place(&table.span);
+    table.finish(found);
+    let first_joint = match first_joint {
+        Some(joint) => Some(joint?),
+        None => None,
+    };
+    Some(FingerSpec { name: name?.to_owned(), tip_link: tip_link?, first_joint, tip: tip?, rest: positions, place })
+}
+
+fn read_tip(mut table: Table, found: &mut Found) -> Option<TipSpec> {
+    let shape = table
+        .required(found, "shape", "add shape = \"sphere\", \"point\" or \"mesh\"")?
+        .choice(found, &["sphere", "point", "mesh"])?;
+    let tip = match shape {
+        "sphere" => {
+            let center = point(&mut table, "center", found);
+            let radius = table
+                .required(found, "radius", "add radius = 0.012, in metres; shape = \"point\" for a sharp tip")
+                .and_then(|entry| {
+                    entry.number_that(found, "a length above 0, in metres, or shape = \"point\" for a sharp tip", |x| {
+                        x > 0.0
+                    })
+                });
+            radius.zip(center).map(|(radius, center)| TipSpec::Sphere { radius, center })
+        }
+        "point" => point(&mut table, "position", found).map(|position| TipSpec::Point { position }),
+        _ => point(&mut table, "center", found).map(|center| TipSpec::Hull { center }),
+    };
+    table.finish(found);
+    tip
+}
+
+/// The point in `key`, the origin of the tip link where it is missing; none where it is bad.
+fn point(table: &mut Table, key: &'static str, found: &mut Found) -> Option<Point> {
+    match table.optional(key) {
+        Some(entry) => entry.numbers::<3>(found).map(Point::from),
+        None => Some(Point::origin()),
+    }
+}
+
+fn read_pairs(entry: &Entry, robot: &Robot, found: &mut Found) -> BTreeSet<(LinkId, LinkId)> {
     let expected = "pairs of link names: [[\"link_a\", \"link_b\"], ...]";
     let mut pairs = BTreeSet::new();
-    let Some(items) = value.get_ref().as_array() else {
-        reader.wrong_type(value, "allow", expected);
-        return pairs;
-    };
-    for item in items {
-        let names: Vec<(&str, usize)> = item.get_ref().as_array().map_or_else(Vec::new, |pair| {
-            pair.iter().filter_map(|name| name.get_ref().as_str().map(|text| (text, name.span().start))).collect()
-        });
-        let &[(a, a_offset), (b, b_offset)] = names.as_slice() else {
-            reader.wrong_type(item, "allow", expected);
+    for pair in entry.entries(found, expected).unwrap_or_default() {
+        let Some(names) = pair.entries(found, expected) else { continue };
+        let [a, b] = names.as_slice() else {
+            let diagnostic = pair.error("U203", found, format!("has {} values", names.len())).expected(expected);
+            found.diagnostics.push(diagnostic);
             continue;
         };
-        let a = known_link(reader, robot, "allow", a, a_offset);
-        let b = known_link(reader, robot, "allow", b, b_offset);
-        if let (Some(a), Some(b)) = (a, b) {
+        if let (Some(a), Some(b)) = (known_link(a, robot, found), known_link(b, robot, found)) {
             pairs.insert((a.min(b), a.max(b)));
         }
     }
     pairs
 }
 
-fn known_link(reader: &mut TomlReader, robot: &Robot, key: &str, name: &str, offset: usize) -> Option<LinkId> {
+fn known_link(entry: &Entry, robot: &Robot, found: &mut Found) -> Option<LinkId> {
+    let name = entry.text(found)?;
     let link = robot.link_named(name);
     if link.is_none() {
-        let names = robot.links.iter().map(|link| link.name.as_str());
-        refuse_name(reader, key, "link", name, names, offset);
+        refuse_name(entry, "link", name, robot.links.iter().map(|link| link.name.as_str()), found);
     }
     link
 }
 
-fn known_joint(
-    reader: &mut TomlReader,
-    robot: &Robot,
-    key: &str,
-    name: &str,
-    offset: usize,
-) -> Option<crate::robot::JointId> {
+fn known_joint(entry: &Entry, robot: &Robot, found: &mut Found) -> Option<JointId> {
+    let name = entry.text(found)?;
     let joint = robot.joint_named(name);
     if joint.is_none() {
-        let names = robot.joints.iter().map(|joint| joint.name.as_str());
-        refuse_name(reader, key, "joint", name, names, offset);
+        refuse_name(entry, "joint", name, robot.joints.iter().map(|joint| joint.name.as_str()), found);
     }
     joint
 }
 
-fn refuse_name<'n>(
-    reader: &mut TomlReader,
-    key: &str,
-    kind: &str,
-    name: &str,
-    names: impl Iterator<Item = &'n str>,
-    offset: usize,
-) {
+fn refuse_name<'n>(entry: &Entry, kind: &str, name: &str, names: impl Iterator<Item = &'n str>, found: &mut Found) {
     let meant = did_you_mean(name, names);
-    let place = reader.place(offset);
-    reader.found.push(
-        Diagnostic::new("U205", place, format!("the robot has no {kind} \"{name}\""))
-            .element("key", key)
-            .expected(format!("the name of a {kind} of the URDF"))
-            .fix(meant.map_or(String::new(), |meant| format!("did you mean \"{meant}\"?"))),
-    );
+    let diagnostic = entry
+        .error("U205", found, format!("the robot has no {kind} \"{name}\""))
+        .expected(format!("the name of a {kind} of the URDF"))
+        .fix(meant.map_or(String::new(), |meant| format!("did you mean \"{meant}\"?")));
+    found.diagnostics.push(diagnostic);
 }

@@ -17,8 +17,6 @@ pub mod resolve;
 /// SRDF: groups, end effectors, pairs of links that are not tested.
 pub mod srdf;
 mod tip_split;
-/// TOML tables with the places of their keys and values.
-mod toml_table;
 /// URDF.
 pub mod urdf;
 /// XML elements and attributes with their places.

@@ -227,7 +227,8 @@ fn within(
     let Some((path, notes)) = existing(path) else {
         let hint = same_name_near(folder, Path::new(name))
             .map_or(String::new(), |found| format!("a file of that name is at {}", found.display()));
-        return Err(Diagnostic::new("U101", place, format!("\"{name}\" not found; looked in: {}", path.display()))
+        let problem = if path.is_dir() { "is a folder" } else { "not found" };
+        return Err(Diagnostic::new("U101", place, format!("\"{name}\" {problem}; looked in: {}", path.display()))
             .expected("a path relative to this file, or package://NAME/PATH")
             .fix(hint));
     };

@@ -3,7 +3,6 @@
 use super::chain::{Chain, ChainJoint, Motion};
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
-use std::path::PathBuf;
 
 /// A chain of turning joints: origin in the parent, rotation vector, axis, limits.
 pub fn turning(joints: &[(Vector, Vector, Vector, f64, f64)]) -> Chain {
@@ -57,16 +56,6 @@ pub fn random_turning(n: usize, reach: f64, rng: &mut Rng) -> (Chain, Point) {
 /// A random configuration within the limits.
 pub fn random_coordinates(chain: &Chain, rng: &mut Rng) -> Vec<f64> {
     (0..chain.n_coordinates()).map(|k| rng.uniform(chain.lower[k], chain.upper[k])).collect()
-}
-
-/// The folder of real hands, or none (the test says so and returns).
-pub fn shared_models() -> Option<PathBuf> {
-    let named = std::env::var_os("REGRASP_MODELS").map(PathBuf::from);
-    let above = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-        .ancestors()
-        .flat_map(|folder| [folder.join("models"), folder.join("shared/models")])
-        .find(|folder| folder.join("FACTS.md").is_file());
-    named.or(above)
 }
 
 /// The chain from the root of a URDF to `tip_link`, which must be carried by fixed joints from the last moving one;

@@ -1,9 +1,9 @@
 //! The files that a scene file names: found, read once, hashed.
 
-use super::table::{Entry, Found};
 use crate::scene::InputFile;
 use regrasp_base::Diagnostic;
 use regrasp_base::files;
+use regrasp_base::toml_table::{Entry, Found};
 use regrasp_geometry::TriangleMesh;
 use regrasp_robot::import::{LoadOptions, resolve};
 use std::path::{Path, PathBuf};

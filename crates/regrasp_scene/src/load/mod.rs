@@ -2,14 +2,13 @@
 //!
 //! Codes: S100 not TOML, S101 unknown key, S102 missing key, S103 wrong type, S104 unknown word, S105 another format,
 //! S106 exactly one of several, S107 number out of range, S110 file not found, S112 name used twice, S120 unknown joint
-//! or finger, S121 joint or finger missing; M201 units, M205 to M207 unusable mesh, M210 no volume; P302 out of reach,
+//! or finger, S121 joint or finger missing; M201 units, M204 mesh far from its own origin, M205 to M207 unusable mesh, M210 no volume; P302 out of reach,
 //! P303 joint limit, P304 contact off the surface; V001 not finite, V002 quaternion not of length one, V003 zero quaternion.
 
 mod files;
 mod object;
 mod pose;
 mod shape;
-mod table;
 mod task;
 mod units;
 
@@ -18,16 +17,26 @@ pub use task::{Goal, InHandTask, StartOrientation};
 use crate::scene::{InputFile, Scene};
 use files::Files;
 use regrasp_base::InputError;
+use regrasp_base::toml_table::{Codes, Found, Table};
 use regrasp_geometry::Pose;
 use regrasp_robot::Hand;
 use regrasp_robot::import::{LoadOptions, load_hand};
 use std::path::Path;
-use table::{Found, Table};
 
 /// Value of `format` in a scene file.
 pub const FORMAT: &str = "regrasp-scene";
 /// Value of `format_version` that this version reads.
 pub const FORMAT_VERSION: f64 = 1.0;
+
+const CODES: Codes = Codes {
+    syntax: "S100",
+    unknown_key: "S101",
+    missing_key: "S102",
+    wrong_type: "S103",
+    unknown_word: "S104",
+    other_format: "S105",
+    out_of_range: "S107",
+};
 
 /// A scene file, read.
 #[derive(Debug, Clone)]
@@ -47,7 +56,7 @@ pub fn load_scene(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Inp
     let bytes = regrasp_base::files::read(path)?;
     let mut files = Files::new(path, &bytes, options);
     let text = regrasp_base::files::text_of(path, bytes)?;
-    let mut found = Found::new(path, &text);
+    let mut found = Found::new(path, &text, CODES);
     let document = found.parse();
     let parts = document.as_ref().and_then(|document| read(Table::root(document), &mut files, &mut found));
     let (notes, diagnostics) = (found.notes, found.diagnostics);
@@ -67,7 +76,10 @@ struct Parts {
 
 /// Reads the whole file; none if anything is missing, with the reason in `found`.
 fn read(mut root: Table, files: &mut Files, found: &mut Found) -> Option<Parts> {
-    header(&mut root, found);
+    if !root.is_of_format(found, FORMAT, FORMAT_VERSION) {
+        return None;
+    }
+    task_name(&mut root, found);
     let hand = hand(&mut root, files, found);
     let object = object::object(&mut root, files, found);
     let obstacles = object::obstacles(&mut root, files, found);
@@ -84,32 +96,15 @@ fn read(mut root: Table, files: &mut Files, found: &mut Found) -> Option<Parts> 
     Some(Parts { hand: hand?, object: object?, obstacles, task: task? })
 }
 
-/// `format`, `format_version`, `task`. Errors: missing (`S102`), another format, version or task (`S105`).
-fn header(root: &mut Table, found: &mut Found) {
-    let format = root.required(found, "format", "add format = \"regrasp-scene\" as the first line");
-    let version = root.required(found, "format_version", "add format_version = 1");
-    let task = root.required(found, "task", "add task = \"in_hand\"");
-    let mut wrong = Vec::new();
-    if let Some(entry) = format
-        && let Some(text) = entry.text(found)
-        && text != FORMAT
-    {
-        wrong.push((entry, format!("is \"{text}\""), format!("\"{FORMAT}\"")));
-    }
-    if let Some(entry) = version
-        && let Some(number) = entry.number(found)
-        && number != FORMAT_VERSION
-    {
-        wrong.push((entry, format!("is {number}"), format!("{FORMAT_VERSION}, the version that this program reads")));
-    }
-    if let Some(entry) = task
+/// `task`. Errors: missing (`S102`), another task (`S105`).
+fn task_name(root: &mut Table, found: &mut Found) {
+    if let Some(entry) = root.required(found, "task", "add task = \"in_hand\"")
         && let Some(text) = entry.text(found)
         && text != "in_hand"
     {
-        wrong.push((entry, format!("is \"{text}\""), "\"in_hand\", the only task that this version plans".to_owned()));
-    }
-    for (entry, problem, expected) in wrong {
-        let diagnostic = entry.error("S105", found, problem).expected(expected);
+        let diagnostic = entry
+            .error("S105", found, format!("is \"{text}\""))
+            .expected("\"in_hand\", the only task that this version plans");
         found.diagnostics.push(diagnostic);
     }
 }

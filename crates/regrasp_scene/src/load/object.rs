@@ -3,9 +3,10 @@
 use super::files::Files;
 use super::pose;
 use super::shape::{self, Origin, ReadShape};
-use super::table::{Entry, Found, Table};
 use crate::object::Object;
 use crate::scene::Obstacle;
+use regrasp_base::diagnostic::number;
+use regrasp_base::toml_table::{Entry, Found, Table};
 use regrasp_geometry::mass::{Solid, solid_properties};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::surface::DEFAULT_CREASE_ANGLE;
@@ -74,7 +75,7 @@ fn friction(entry: &Entry, found: &mut Found) -> Option<f64> {
     if friction == 0.0 {
         found.note(&entry.span, "friction 0: fingertips can only push along the normal");
     } else if friction > UNLIKELY_FRICTION {
-        found.note(&entry.span, format!("friction {friction} is more than any known pair of materials has"));
+        found.note(&entry.span, format!("friction {} is more than any known pair of materials has", number(friction)));
     }
     Some(friction)
 }
@@ -109,7 +110,8 @@ fn mass(table: &mut Table, found: &mut Found) -> Option<GivenMass> {
             if mass == 0.0 {
                 found.note(&entry.span, "mass 0: the object has no weight");
             } else if mass > UNLIKELY_MASS {
-                found.note(&entry.span, format!("mass {mass} kg is much for a hand; masses are in kilograms"));
+                found
+                    .note(&entry.span, format!("mass {} kg is much for a hand; masses are in kilograms", number(mass)));
             }
             Some(GivenMass::Mass(mass))
         }

@@ -1,7 +1,7 @@
 //! Positions, orientations and turns in scene files.
 
-use super::table::{Entry, Found, Table};
 use nalgebra::UnitQuaternion;
+use regrasp_base::toml_table::{Entry, Found, Table};
 use regrasp_geometry::{Pose, UnitVector, Vector, pose_from};
 
 /// A quaternion whose length differs from 1 by more is an error, not a rounding.

@@ -2,7 +2,8 @@
 //! `ellipsoid`, `mesh`.
 
 use super::files::Files;
-use super::table::{Entry, Found, Table, one_of};
+use regrasp_base::diagnostic::number;
+use regrasp_base::toml_table::{Entry, Found, Table, one_of};
 use regrasp_geometry::{ConvexHull, Shape, TriangleMesh, Vector};
 use std::sync::Arc;
 
@@ -115,8 +116,10 @@ fn has_likely_size(shape: &Shape, entry: &Entry, found: &mut Found) -> bool {
     } else {
         format!("lengths are in metres: multiply them by {scale}")
     };
+    // Four decimals where they say something.
+    let shown = |x: f64| if (0.01..1e6).contains(&extent) { format!("{x:.4}") } else { format!("{x:.1e}") };
     let diagnostic = entry
-        .error("M201", found, format!("is {:.4} x {:.4} x {:.4} m", size.x, size.y, size.z))
+        .error("M201", found, format!("is {} x {} x {} m", shown(size.x), shown(size.y), shown(size.z)))
         .expected(format!("a largest extent between {MIN_EXTENT} m and {MAX_EXTENT} m"))
         .fix(fix);
     found.diagnostics.push(diagnostic);
@@ -164,7 +167,25 @@ fn mesh(kind: &Entry, files: &mut Files, found: &mut Found) -> Option<ReadShape>
             }
         },
     };
-    has_likely_size(&shape, kind, found).then_some(ReadShape { shape, origin })
+    let is_good = has_likely_size(&shape, kind, found) && has_likely_place(&shape, origin, kind, found);
+    is_good.then_some(ReadShape { shape, origin })
+}
+
+/// Reports a mesh that is farther from its own frame than any object is large (`M204`): the object would turn about a
+/// point in the next room. An origin that is given answers for it.
+fn has_likely_place(shape: &Shape, origin: Origin, entry: &Entry, found: &mut Found) -> bool {
+    let (low, high) = shape.bounds();
+    // Of the box, the point nearest to the origin.
+    let nearest = low.coords.sup(&-high.coords).sup(&Vector::zeros()).norm();
+    if origin != Origin::File || nearest <= MAX_EXTENT {
+        return true;
+    }
+    let diagnostic = entry
+        .error("M204", found, format!("lies {} m from the origin of its own file", number(nearest.round())))
+        .expected(format!("at most {MAX_EXTENT} m: the object frame is the frame of the file"))
+        .fix("mesh = { file = ..., origin = \"center\" }");
+    found.diagnostics.push(diagnostic);
+    false
 }
 
 /// One factor, or one per axis; negative mirrors. Errors: zero (`S107`).

@@ -1,10 +1,10 @@
 //! `[start]` and `[goal]`: what is asked, and how a seed resolves what the file leaves open.
 
 use super::pose;
-use super::table::{Entry, Found, Table, suggestion};
 use crate::query::{GraspRequest, InHandQuery};
 use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_base::Rng;
+use regrasp_base::toml_table::{Entry, Found, Table, suggestion};
 use regrasp_geometry::frame::rotation_between;
 use regrasp_geometry::{Point, Pose, Vector, pose_from};
 use regrasp_robot::Hand;

@@ -1,9 +1,10 @@
 //! Mistakes that show only when hand, object and task are seen together: units (reliability R15), reach, contacts.
 
-use super::table::{Found, Table};
 use super::task::{Goal, InHandTask, StartOrientation};
 use crate::object::Object;
 use crate::query::GraspRequest;
+use regrasp_base::diagnostic::number;
+use regrasp_base::toml_table::{Found, Table};
 use regrasp_geometry::{Point, Pose};
 use regrasp_robot::Hand;
 
@@ -27,7 +28,7 @@ pub(super) fn check_sizes(hand: &Hand, object: &Object, root: &mut Table, found:
         .error(
             "M201",
             found,
-            format!("is {object_size:.4} m large, the hand {hand_size:.4} m: one of them is in another unit"),
+            format!("is {object_size:.4} m large, the hand {} m: one of them is in another unit", shown(hand_size, 4)),
         )
         .expected(format!("sizes that differ by a factor of at most {MAX_SIZE_RATIO}"))
         .fix(format!("lengths are in metres; a mesh in another unit takes scale = {scale}"));
@@ -49,15 +50,11 @@ pub(super) fn check_reach(hand: &Hand, object: &Object, task: &InHandTask, root:
         let Some(entry) = root.optional(key) else { continue };
         let p = pose.translation.vector;
         let mut diagnostic = entry
-            .error("P302", found, format!("position [{}, {}, {}] is {distance:.3} m from the hand", p.x, p.y, p.z))
+            .error("P302", found, format!("position {} is {} m from the hand", list(p), shown(distance, 3)))
             .expected(format!("at most {reach:.3} m, the reach of its fingers and the size of the object"));
         if distance / 1000.0 < reach {
-            diagnostic = diagnostic.fix(format!(
-                "positions are in metres: [{}, {}, {}] if these were millimetres",
-                p.x / 1000.0,
-                p.y / 1000.0,
-                p.z / 1000.0
-            ));
+            diagnostic =
+                diagnostic.fix(format!("positions are in metres: {} if these were millimetres", list(p / 1000.0)));
         }
         found.diagnostics.push(diagnostic);
         // One cause: the goal follows the start.
@@ -89,6 +86,16 @@ pub(super) fn check_contacts(hand: &Hand, object: &Object, task: &InHandTask, ro
             found.diagnostics.push(diagnostic);
         }
     }
+}
+
+/// A vector as a list of a scene file.
+fn list(v: regrasp_geometry::Vector) -> String {
+    format!("[{}, {}, {}]", number(v.x), number(v.y), number(v.z))
+}
+
+/// Metres with so many decimals; far too many metres by their power of ten.
+fn shown(metres: f64, decimals: usize) -> String {
+    if metres < 1e6 { format!("{metres:.decimals$}") } else { format!("{metres:.1e}") }
 }
 
 /// Distance of the object from the nearest finger base, and the reach, when no finger can touch the object there.

@@ -1,6 +1,6 @@
 //! Bad scene files (reliability B4): one clear message each, with file, line, element, value and what would be right.
 
-use crate::support::{Folder, GOOD, cube};
+use crate::support::{Folder, GOOD, cube, repository};
 
 /// The good scene with `from` replaced, which must be there.
 fn with(from: &str, to: &str) -> String {
@@ -399,6 +399,49 @@ fn obstacles_of_one_name() {
         &format!("{GOOD}{obstacle}{obstacle}"),
         &["S112 scene.toml:25:1", "has the name \"wall\", as another obstacle"],
     );
+}
+
+#[test]
+fn a_mesh_far_from_its_own_origin() {
+    let folder = Folder::new();
+    let far: String = cube(0.02, 12).replace("v 0 ", "v 1000 ").replace("v 0.04 ", "v 1000.04 ");
+    folder.write("far.obj", &far);
+    let mesh = |more: &str| with("sphere = { radius = 0.032 }", &format!("mesh = {{ file = \"far.obj\"{more} }}"));
+    assert_eq!(
+        folder.messages(&mesh("")),
+        "M204 scene.toml:10:8 key \"object.mesh\": lies 1000 m from the origin of its own file; expected at most 3 m: the \
+         object frame is the frame of the file\n  fix: mesh = { file = ..., origin = \"center\" }"
+    );
+    let object = folder.load(&mesh(", origin = \"center\"")).unwrap().scene.object;
+    assert!(object.center_of_mass.coords.norm() < 1e-9);
+}
+
+#[test]
+fn files_of_another_kind_are_one_complaint() {
+    refused("", "S100 scene.toml: is empty; expected a TOML file");
+    refused("\n<robot name=\"r\"/>\n", "S100 scene.toml: looks like XML; expected a TOML file");
+    let hand = std::fs::read_to_string(repository().join("assets/hands/wide_four_finger/hand.toml")).unwrap();
+    let messages = Folder::new().messages(&hand);
+    assert!(messages.starts_with("S105") && messages.contains("is \"regrasp-hand\""), "{messages}");
+    assert_eq!(messages.lines().count(), 1, "{messages}");
+}
+
+#[test]
+fn faults_of_syntax_are_few() {
+    let messages = Folder::new().messages(&"a b\n".repeat(100));
+    let lines: Vec<&str> = messages.lines().collect();
+    assert_eq!(lines.len(), 6, "{messages}");
+    assert!(lines[5].contains("more faults of syntax"), "{messages}");
+    assert!(Folder::new().messages(&format!("a = {}", "[".repeat(10_000))).lines().count() <= 6);
+}
+
+#[test]
+fn enormous_numbers_are_shown_short() {
+    for (from, to) in [("0.078]", "1e300]"), ("0.078]", "-1e154]"), ("friction = 0.8", "friction = -1e300")] {
+        let messages = Folder::new().messages(&with(from, to));
+        assert!(messages.contains("1e") && messages.len() < 250, "{messages}");
+    }
+    noted(&with("mass = 0.1", "mass = 1e300"), "mass 1e300 kg");
 }
 
 #[test]

@@ -1,28 +1,12 @@
-//! Where the repository and the shared models are, and scenes written for one test.
+//! Scenes written for one test.
 
+pub use crate::places::{repository, shared_models};
+pub use crate::wide_scene::SCENE as GOOD;
+use crate::wide_scene::copy_hand;
 use regrasp_base::InputError;
 use regrasp_robot::import::{LoadOptions, ResolveOptions};
 use regrasp_scene::{LoadedScene, load_scene};
-use std::io::Write;
-use std::path::{Path, PathBuf};
-
-/// The root of the repository.
-pub fn repository() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
-}
-
-/// The shared models; says SKIPPED when they are absent.
-pub fn shared_models() -> Option<PathBuf> {
-    if let Some(given) = std::env::var_os("REGRASP_MODELS") {
-        return Some(PathBuf::from(given));
-    }
-    let found = repository().ancestors().map(|folder| folder.join("shared/models")).find(|folder| folder.is_dir());
-    if found.is_none() {
-        // Past the capture of test output, so that the log says it.
-        let _ = writeln!(std::io::stderr(), "SKIPPED: no shared models");
-    }
-    found
-}
+use std::path::Path;
 
 /// Options with `models` as the package of that name.
 pub fn with_models(models: &Path) -> LoadOptions {
@@ -37,34 +21,10 @@ pub struct Folder {
     folder: tempfile::TempDir,
 }
 
-/// Object, start and goal of a good scene.
-pub const GOOD: &str = r#"format = "regrasp-scene"
-format_version = 1
-task = "in_hand"
-
-[hand]
-file = "hand.toml"
-
-[object]
-name = "ball"
-sphere = { radius = 0.032 }
-mass = 0.1
-friction = 0.8
-
-[start]
-position = [0.0, 0.0, 0.078]
-
-[goal]
-turn = { axis = "x", angle_deg = 90 }
-"#;
-
 impl Folder {
     pub fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let hand = repository().join("assets/hands/wide_four_finger");
-        for name in ["hand.toml", "hand.urdf"] {
-            std::fs::copy(hand.join(name), folder.path().join(name)).unwrap();
-        }
+        copy_hand(&repository(), folder.path());
         let new = Folder { folder };
         new.write("cube.obj", &cube(0.02, 12));
         new.write("open.obj", &cube(0.02, 10));

@@ -3,6 +3,7 @@
 use super::Meshes;
 use crate::import::xml::{Named, Reader, child, children};
 use nalgebra::{Translation3, UnitQuaternion};
+use regrasp_base::diagnostic::number;
 use regrasp_base::{Diagnostic, InputError};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Pose, Shape, TriangleMesh, Vector};
@@ -11,6 +12,8 @@ use std::sync::Arc;
 
 /// Tags of geometry that are read.
 const SHAPES: [&str; 5] = ["box", "cylinder", "sphere", "capsule", "mesh"];
+/// Greater lengths are nonsense in any unit, in metres; they would turn sums into infinity.
+const MAX_LENGTH: f64 = 1e6;
 
 /// The pose in the `<origin>` of `node`; the identity where there is none.
 ///
@@ -20,6 +23,10 @@ pub(super) fn read_origin(reader: &mut Reader, node: Node, element: Named) -> Op
     let xyz = reader.numbers(origin, "xyz", Some([0.0; 3]), element);
     let rpy = reader.numbers(origin, "rpy", Some([0.0; 3]), element);
     let ([x, y, z], [roll, pitch, yaw]) = (xyz?, rpy?);
+    if let Some(far) = [x, y, z].into_iter().find(|length| length.abs() > MAX_LENGTH) {
+        refuse_length(reader, origin, "xyz", far, element);
+        return None;
+    }
     Some(Pose::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_euler_angles(roll, pitch, yaw)))
 }
 
@@ -66,7 +73,7 @@ fn read_shape(reader: &mut Reader, geometry: Node, element: Named, meshes: &mut 
         "box" => {
             let size = reader.numbers::<3>(node, "size", None, element)?;
             for length in size {
-                refuse_non_positive(reader, node, "size", length, element)?;
+                checked_length(reader, node, "size", length, element)?;
             }
             Some(Shape::Cuboid { half_extents: Vector::from(size) / 2.0 })
         }
@@ -86,20 +93,26 @@ fn read_shape(reader: &mut Reader, geometry: Node, element: Named, meshes: &mut 
 
 fn positive(reader: &mut Reader, node: Node, name: &str, element: Named) -> Option<f64> {
     let [value] = reader.numbers::<1>(node, name, None, element)?;
-    refuse_non_positive(reader, node, name, value, element)
+    checked_length(reader, node, name, value, element)
 }
 
-fn refuse_non_positive(reader: &mut Reader, node: Node, name: &str, value: f64, element: Named) -> Option<f64> {
-    if value > 0.0 {
+fn checked_length(reader: &mut Reader, node: Node, name: &str, value: f64, element: Named) -> Option<f64> {
+    if value > 0.0 && value <= MAX_LENGTH {
         return Some(value);
     }
+    refuse_length(reader, node, name, value, element);
+    None
+}
+
+fn refuse_length(reader: &mut Reader, node: Node, name: &str, value: f64, element: Named) {
+    let expected =
+        if value.abs() > MAX_LENGTH { "metres, and not millions of them" } else { "a length above 0, in metres" };
     let (tag, place) = (node.tag_name().name(), reader.attribute_place(node, name));
     reader.found.push(
-        Diagnostic::new("U151", place, format!("{name} of <{tag}> is {value}"))
+        Diagnostic::new("U151", place, format!("{name} of <{tag}> is {}", number(value)))
             .element(element.0, element.1)
-            .expected("a length above 0, in metres"),
+            .expected(expected),
     );
-    None
 }
 
 fn read_mesh(reader: &mut Reader, node: Node, element: Named, meshes: &mut Meshes) -> Option<Shape> {

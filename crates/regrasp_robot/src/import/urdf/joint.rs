@@ -5,7 +5,7 @@ use crate::import::xml::{Reader, child, children};
 use crate::robot::{Joint, JointKind, Limits};
 use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_base::Diagnostic;
-use regrasp_base::diagnostic::did_you_mean;
+use regrasp_base::diagnostic::{did_you_mean, number};
 use regrasp_geometry::{Pose, UnitVector, Vector};
 use roxmltree::Node;
 
@@ -181,7 +181,11 @@ fn read_limits(reader: &mut Reader, node: Node, name: &str, kind: Option<JointKi
         return None;
     }
     if word == "revolute" && (lower.abs() > 20.0 || upper.abs() > 20.0) {
-        reader.note(limit, element, format!("limits {lower}..{upper} look like degrees; they are read as radians"));
+        reader.note(
+            limit,
+            element,
+            format!("limits {}..{} look like degrees; they are read as radians", number(lower), number(upper)),
+        );
     }
     Some(Limits { lower, upper, velocity, effort })
 }

@@ -64,8 +64,7 @@ pub(crate) fn parse_robot(
         let Some(link_name) = reader.required(node, "name", ("link", "")) else { continue };
         if links.len() == MAX_LINKS {
             let place = reader.place(node);
-            reader.found.push(Diagnostic::new("U105", place, format!("has more than {MAX_LINKS} links")));
-            break;
+            return Err(Diagnostic::new("U105", place, format!("has more than {MAX_LINKS} links")).into());
         }
         reader.note_misspelt_children(node, &["inertial", "visual", "collision"], ("link", link_name));
         let collision = geometry::read_collisions(&mut reader, node, link_name, meshes);

@@ -1,11 +1,10 @@
 //! Inverse kinematics against brute force: a dense grid of seeds, each polished by plain Newton steps.
-#![allow(clippy::print_stdout)] // measured rates
 
 use super::*;
 use crate::kinematics::samples::*;
+use crate::places::shared_models;
 use nalgebra::{DVector, Matrix3};
 use regrasp_geometry::Vector;
-use std::io::Write;
 
 /// Every solution strictly inside the limits that Newton steps find from a grid of `n` values per coordinate.
 fn brute_force(chain: &Chain, center: &Point, target: &Point, n: usize) -> Vec<DVector<f64>> {
@@ -115,11 +114,7 @@ fn closed_form_misses_no_branch_of_special_geometries() {
 
 #[test]
 fn closed_form_misses_no_branch_of_real_hands() {
-    let Some(models) = shared_models() else {
-        // Past the capture of test output, so that the log says it.
-        let _ = writeln!(std::io::stderr(), "SKIPPED: no shared models");
-        return;
-    };
+    let Some(models) = shared_models() else { return };
     let mut rng = Rng::keyed(3, "real_3r", 0);
     for (file, tip) in [
         ("dclaw/dclaw.urdf", "link_f1_head"),
@@ -129,8 +124,7 @@ fn closed_form_misses_no_branch_of_real_hands() {
         ("trifingeredu/trifingeredu.urdf", "finger_tip_link_0"),
     ] {
         let (chain, center) = urdf_chain(&models.join("hands").join(file), tip, Point::origin());
-        let most = compare(&chain, &center, 10, &mut rng);
-        println!("{file} {tip}: at most {most} branches");
+        compare(&chain, &center, 10, &mut rng);
     }
 }
 
@@ -191,8 +185,7 @@ fn tracking_stays_on_the_branch_or_refuses() {
         }
         n_reached += path.len();
     }
-    println!("{n_reached} of 2400 waypoints before a singularity");
-    assert!(n_reached > 1200);
+    assert!(n_reached > 1200, "{n_reached} of 2400 waypoints before a singularity");
 }
 
 /// Share of random reachable targets that are solved, with `preference` or not.
@@ -212,11 +205,7 @@ fn success(ik: &FingerIk, n_targets: usize, preference: bool, rng: &mut Rng) -> 
 
 #[test]
 fn numeric_solves_nearly_all_reachable_targets_of_allegro() {
-    let Some(models) = shared_models() else {
-        // Past the capture of test output, so that the log says it.
-        let _ = writeln!(std::io::stderr(), "SKIPPED: no shared models");
-        return;
-    };
+    let Some(models) = shared_models() else { return };
     let mut rng = Rng::keyed(6, "allegro", 0);
     for tip in ["link_3.0_tip", "link_7.0_tip", "link_11.0_tip", "link_15.0_tip"] {
         let path = models.join("hands/allegro/allegro_right.urdf");
@@ -224,7 +213,6 @@ fn numeric_solves_nearly_all_reachable_targets_of_allegro() {
         let ik = FingerIk::new(&chain, &center);
         assert!(!ik.is_closed_form() && ik.is_redundant());
         let (plain, turned) = (success(&ik, 2000, false, &mut rng), success(&ik, 2000, true, &mut rng));
-        println!("{tip}: {:.1} % solved, {:.1} % with a random preference", 100.0 * plain, 100.0 * turned);
         assert!(plain >= 0.97 && turned >= 0.99, "{tip}: {plain} {turned}");
     }
 }
@@ -236,7 +224,6 @@ fn numeric_solves_nearly_all_reachable_targets_of_random_chains() {
     for n in [4, 4, 4, 5, 7] {
         let (chain, center) = random_turning(n, 1.0, &mut rng);
         let share = success(&FingerIk::new(&chain, &center), 400, false, &mut rng);
-        println!("{n} joints: {:.1} % solved", 100.0 * share);
         worst = worst.min(share);
     }
     assert!(worst > 0.9, "{worst}");
@@ -267,8 +254,7 @@ fn numeric_finds_the_branches_of_the_closed_form() {
             n_found += found.len();
         }
     }
-    println!("numeric found {n_found} of {n_known} branches");
-    assert!(n_found as f64 > 0.97 * n_known as f64);
+    assert!(n_found as f64 > 0.97 * n_known as f64, "numeric found {n_found} of {n_known} branches");
 }
 
 #[test]
@@ -295,8 +281,9 @@ fn the_null_space_turns_the_tip_to_the_preference() {
     }
     let n = f64::from(n_compared);
     let (plain, turned, best) = (plain_sum / n, turned_sum / n, best_sum / n);
-    println!("mean cosine to the preference: {plain:.3} without, {turned:.3} with, {best:.3} best of all seeds");
-    assert!(turned > plain + 0.5 * (best - plain));
+    let told =
+        format!("mean cosine to the preference: {plain:.3} without, {turned:.3} with, {best:.3} best of all seeds");
+    assert!(turned > plain + 0.5 * (best - plain), "{told}");
 }
 
 #[test]
@@ -316,8 +303,7 @@ fn solve_many_gives_different_solutions() {
         }
         n_solutions += solutions.len();
     }
-    println!("{n_solutions} solutions of 250 asked");
-    assert!(n_solutions >= 150);
+    assert!(n_solutions >= 150, "{n_solutions} solutions of 250 asked");
 }
 
 #[test]
@@ -341,6 +327,6 @@ fn redundant_tracking_moves_little_and_stays_on_target() {
         n_reached += path.len();
         n_wanted += targets.len();
     }
-    println!("{n_reached} of {n_wanted} waypoints, largest step {largest:.3} rad");
-    assert!(largest <= 0.4 && n_reached * 10 >= n_wanted * 8);
+    let told = format!("{n_reached} of {n_wanted} waypoints, largest step {largest:.3} rad");
+    assert!(largest <= 0.4 && n_reached * 10 >= n_wanted * 8, "{told}");
 }

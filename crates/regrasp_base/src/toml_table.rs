@@ -1,8 +1,9 @@
 //! A strict reader of TOML tables: every key is asked for by name, every other key is an error, every error has its
 //! line and column, and reading goes on after an error so that all causes are found in one run.
+//!
+//! Hand files and scene files are read by it; each has codes of its own ([`Codes`]). V001: a number is not finite.
 
-use regrasp_base::diagnostic::{Diagnostics, did_you_mean, printable};
-use regrasp_base::{Diagnostic, Place};
+use crate::diagnostic::{Diagnostic, Diagnostics, Place, did_you_mean, number, printable};
 use std::ops::Range;
 use std::path::Path;
 use toml::Spanned;
@@ -10,11 +11,34 @@ use toml::de::{DeTable, DeValue};
 
 /// Longest value that a message quotes, in characters.
 const QUOTE_LIMIT: usize = 60;
+/// Faults of the syntax that are told one by one: one fault mostly draws others after it.
+const MAX_SYNTAX_FAULTS: usize = 5;
+
+/// The codes that a kind of file has for the faults found here.
+#[derive(Debug, Clone, Copy)]
+pub struct Codes {
+    /// Not TOML, or empty.
+    pub syntax: &'static str,
+    /// A key that nobody asks for.
+    pub unknown_key: &'static str,
+    /// A key that must be there and is not.
+    pub missing_key: &'static str,
+    /// A value of another type.
+    pub wrong_type: &'static str,
+    /// A text that is none of the words allowed.
+    pub unknown_word: &'static str,
+    /// A file of another kind or version.
+    pub other_format: &'static str,
+    /// A number that makes no sense here.
+    pub out_of_range: &'static str,
+}
 
 /// What was found out about a file while reading it.
-pub(super) struct Found<'a> {
+#[derive(Debug)]
+pub struct Found<'a> {
     path: &'a Path,
     text: &'a str,
+    codes: Codes,
     /// Errors.
     pub diagnostics: Diagnostics,
     /// Things that are worth knowing and no error.
@@ -23,8 +47,8 @@ pub(super) struct Found<'a> {
 
 impl<'a> Found<'a> {
     /// Nothing found yet in `text`, the content of `path`.
-    pub fn new(path: &'a Path, text: &'a str) -> Self {
-        Found { path, text, diagnostics: Diagnostics::default(), notes: Vec::new() }
+    pub fn new(path: &'a Path, text: &'a str, codes: Codes) -> Self {
+        Found { path, text, codes, diagnostics: Diagnostics::default(), notes: Vec::new() }
     }
 
     /// The place of `span`.
@@ -38,19 +62,32 @@ impl<'a> Found<'a> {
         self.notes.push(printable(&note));
     }
 
-    /// Parses the text. Errors: not TOML (`S100`), one per fault of the syntax.
+    /// Parses the text. Errors (`syntax`): empty, XML, or not TOML; then up to five faults and a count of the others.
     pub fn parse(&mut self) -> Option<Spanned<DeTable<'a>>> {
+        let start = self.text.trim_start();
+        if start.is_empty() || start.starts_with('<') {
+            let problem = if start.is_empty() { "is empty" } else { "looks like XML" };
+            let diagnostic =
+                Diagnostic::new(self.codes.syntax, Place::file(self.path), problem).expected("a TOML file");
+            self.diagnostics.push(diagnostic);
+            return None;
+        }
         let (table, errors) = DeTable::parse_recoverable(self.text);
-        let is_good = errors.is_empty();
-        for error in errors {
+        let n_errors = errors.len();
+        for error in errors.into_iter().take(MAX_SYNTAX_FAULTS) {
             let span = error.span().unwrap_or(0..0);
-            let mut diagnostic = Diagnostic::new("S100", self.place(&span), error.message().trim().replace('\n', "; "));
+            let problem = error.message().trim().replace('\n', "; ");
+            let mut diagnostic = Diagnostic::new(self.codes.syntax, self.place(&span), problem);
             if let Some(number) = self.decimal_comma(&span) {
                 diagnostic = diagnostic.fix(format!("write {number} with a point, not a comma"));
             }
             self.diagnostics.push(diagnostic);
         }
-        is_good.then_some(table)
+        if n_errors > MAX_SYNTAX_FAULTS {
+            let problem = format!("has {} more faults of syntax", n_errors - MAX_SYNTAX_FAULTS);
+            self.diagnostics.push(Diagnostic::new(self.codes.syntax, Place::file(self.path), problem));
+        }
+        (n_errors == 0).then_some(table)
     }
 
     /// The number with a point for its comma, when the line of `span` is `key = 1,5`.
@@ -66,8 +103,8 @@ impl<'a> Found<'a> {
 }
 
 /// A value and the dotted name of its key.
-#[derive(Clone)]
-pub(super) struct Entry<'a> {
+#[derive(Debug, Clone)]
+pub struct Entry<'a> {
     /// Such as `object.friction`.
     pub name: String,
     /// Where the value stands.
@@ -92,12 +129,14 @@ impl<'a> Entry<'a> {
     }
 
     fn wrong_type(&self, found: &mut Found, expected: &str) {
-        let problem = format!("is {}, a {}", self.quote(found), self.value.type_str());
-        let diagnostic = self.error("S103", found, problem).expected(expected);
+        let kind = self.value.type_str();
+        let article = if kind.starts_with(['a', 'i']) { "an" } else { "a" };
+        let problem = format!("is {}, {article} {kind}", self.quote(found));
+        let diagnostic = self.error(found.codes.wrong_type, found, problem).expected(expected);
         found.diagnostics.push(diagnostic);
     }
 
-    /// A finite number. Errors: another type (`S103`), NaN, infinite or too large (`V001`).
+    /// A finite number. Errors: another type (`wrong_type`), NaN, infinite or too large (`V001`).
     pub fn number(&self, found: &mut Found) -> Option<f64> {
         let number = match self.value {
             DeValue::Integer(integer) => i64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|i| i as f64),
@@ -118,13 +157,14 @@ impl<'a> Entry<'a> {
         }
     }
 
-    /// A number that `accepts` takes; `expected` says which those are. Errors: as [`Entry::number`], and `S107`.
+    /// A number that `accepts` takes; `expected` says which those are. Errors: as [`Entry::number`], and `out_of_range`.
     pub fn number_that(&self, found: &mut Found, expected: &str, accepts: impl Fn(f64) -> bool) -> Option<f64> {
-        let number = self.number(found)?;
-        if accepts(number) {
-            return Some(number);
+        let value = self.number(found)?;
+        if accepts(value) {
+            return Some(value);
         }
-        let diagnostic = self.error("S107", found, format!("is {number}")).expected(expected);
+        let diagnostic =
+            self.error(found.codes.out_of_range, found, format!("is {}", number(value))).expected(expected);
         found.diagnostics.push(diagnostic);
         None
     }
@@ -134,12 +174,12 @@ impl<'a> Entry<'a> {
         self.number_that(found, "a length above 0, in metres", |x| x > 0.0)
     }
 
-    /// `N` finite numbers. Errors: another type or count (`S103`), and as [`Entry::number`] for each.
+    /// `N` finite numbers. Errors: another type or count (`wrong_type`), and as [`Entry::number`] for each.
     pub fn numbers<const N: usize>(&self, found: &mut Found) -> Option<[f64; N]> {
         let entries = self.entries(found, &format!("an array of {N} numbers"))?;
         if entries.len() != N {
             let diagnostic = self
-                .error("S103", found, format!("has {} values", entries.len()))
+                .error(found.codes.wrong_type, found, format!("has {} values", entries.len()))
                 .expected(format!("an array of {N} numbers"));
             found.diagnostics.push(diagnostic);
             return None;
@@ -188,19 +228,28 @@ impl<'a> Entry<'a> {
         }
     }
 
+    /// True if the value is a list of nothing.
+    pub fn is_empty_list(&self) -> bool {
+        matches!(self.value, DeValue::Array(items) if items.is_empty())
+    }
+
     /// True if the value is a number.
     pub fn is_number(&self) -> bool {
         matches!(self.value, DeValue::Integer(_) | DeValue::Float(_))
     }
 
-    /// One of the `choices`. Errors: another type (`S103`) or text (`S104`).
+    /// One of the `choices`. Errors: another type (`wrong_type`) or text (`unknown_word`).
     pub fn choice(&self, found: &mut Found, choices: &[&'static str]) -> Option<&'static str> {
         let text = self.text(found)?;
         if let Some(choice) = choices.iter().find(|choice| **choice == text) {
             return Some(choice);
         }
         let diagnostic = self
-            .error("S104", found, format!("is {}{}", self.quote(found), suggestion(text, choices.iter().copied())))
+            .error(
+                found.codes.unknown_word,
+                found,
+                format!("is {}{}", self.quote(found), suggestion(text, choices.iter().copied())),
+            )
             .expected(one_of(choices));
         found.diagnostics.push(diagnostic);
         None
@@ -232,7 +281,8 @@ impl<'a> Entry<'a> {
 }
 
 /// A table whose keys are asked for one by one.
-pub(super) struct Table<'a> {
+#[derive(Debug)]
+pub struct Table<'a> {
     /// Dotted name; empty for the whole file.
     pub name: String,
     /// Where it stands.
@@ -267,11 +317,11 @@ impl<'a> Table<'a> {
         Some(Entry { name: self.name_of(key), span: value.span(), value: value.get_ref() })
     }
 
-    /// The value of `key`. Errors: missing (`S102`), with `fix`.
+    /// The value of `key`. Errors: missing (`missing_key`), with `fix`.
     pub fn required(&mut self, found: &mut Found, key: &'static str, fix: &str) -> Option<Entry<'a>> {
         let entry = self.optional(key);
         if entry.is_none() {
-            let diagnostic = self.error("S102", found, format!("has no `{key}`")).fix(fix);
+            let diagnostic = self.error(found.codes.missing_key, found, format!("has no `{key}`")).fix(fix);
             found.diagnostics.push(diagnostic);
         }
         entry
@@ -280,6 +330,36 @@ impl<'a> Table<'a> {
     /// Those of `keys` that are there.
     pub fn present(&mut self, keys: &[&'static str]) -> Vec<Entry<'a>> {
         keys.iter().filter_map(|key| self.optional(key)).collect()
+    }
+
+    /// True if `format` and `format_version`, which every file of ours begins with, say that it is of this kind; the rest
+    /// of another file would only be noise. Errors: missing (`missing_key`), another format or version (`other_format`).
+    pub fn is_of_format(&mut self, found: &mut Found, format: &str, version: f64) -> bool {
+        let fix = format!("add format = \"{format}\" as the first line");
+        let format_entry = self.required(found, "format", &fix);
+        let version_entry = self.required(found, "format_version", &format!("add format_version = {version}"));
+        let mut is_ours = true;
+        if let Some(entry) = &format_entry
+            && let Some(text) = entry.text(found)
+            && text != format
+        {
+            let diagnostic = entry
+                .error(found.codes.other_format, found, format!("is \"{text}\""))
+                .expected(format!("\"{format}\""));
+            found.diagnostics.push(diagnostic);
+            return false;
+        }
+        if let Some(entry) = &version_entry
+            && let Some(seen) = entry.number(found)
+            && seen != version
+        {
+            let diagnostic = entry
+                .error(found.codes.other_format, found, format!("is {}", number(seen)))
+                .expected(format!("{version}, the version that this program reads"));
+            found.diagnostics.push(diagnostic);
+            is_ours = false;
+        }
+        is_ours
     }
 
     /// Every key with its value, for tables whose keys are names that the user chose.
@@ -293,7 +373,7 @@ impl<'a> Table<'a> {
         entries
     }
 
-    /// Reports every key that was never asked for (`S101`).
+    /// Reports every key that was never asked for (`unknown_key`).
     pub fn finish(self, found: &mut Found) {
         let mut unknown: Vec<_> = self
             .table
@@ -303,9 +383,10 @@ impl<'a> Table<'a> {
             .collect();
         unknown.sort_by_key(|(_, span)| span.start);
         for (key, span) in unknown {
-            let mut diagnostic = Diagnostic::new("S101", found.place(&span), "is not a key that exists here")
-                .element("key", &self.name_of(key))
-                .expected(one_of(&self.known));
+            let mut diagnostic =
+                Diagnostic::new(found.codes.unknown_key, found.place(&span), "is not a key that exists here")
+                    .element("key", &self.name_of(key))
+                    .expected(one_of(&self.known));
             if key == "quat" || key == "quaternion" || key == "orientation" {
                 diagnostic = diagnostic.fix("write quat_xyzw = [x, y, z, w] or quat_wxyz = [w, x, y, z]");
             } else if let Some(near) = did_you_mean(key, self.known.iter().copied()) {
@@ -317,12 +398,12 @@ impl<'a> Table<'a> {
 }
 
 /// ` (did you mean "x"?)`, or nothing.
-pub(super) fn suggestion<'n>(word: &str, candidates: impl IntoIterator<Item = &'n str>) -> String {
+pub fn suggestion<'n>(word: &str, candidates: impl IntoIterator<Item = &'n str>) -> String {
     did_you_mean(word, candidates).map(|near| format!(" (did you mean \"{near}\"?)")).unwrap_or_default()
 }
 
 /// `a, b or c`.
-pub(super) fn one_of(names: &[impl AsRef<str>]) -> String {
+pub fn one_of(names: &[impl AsRef<str>]) -> String {
     let names: Vec<&str> = names.iter().map(AsRef::as_ref).collect();
     match names.split_last() {
         Some((last, [])) => (*last).to_owned(),
