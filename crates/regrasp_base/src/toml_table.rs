@@ -1,7 +1,7 @@
 //! A strict reader of TOML tables: every key is asked for by name, every other key is an error, every error has its
 //! line and column, and reading goes on after an error so that all causes are found in one run.
 //!
-//! Hand files and scene files are read by it; each has codes of its own ([`Codes`]). V001: a number is not finite.
+//! Hand files and scene files are read by it; each has codes of its own (`toml_table::Codes`). V001: a number is not finite.
 
 use crate::diagnostic::{Diagnostic, Diagnostics, Place, did_you_mean, number, printable};
 use std::ops::Range;
