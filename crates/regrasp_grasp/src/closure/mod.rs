@@ -63,17 +63,45 @@ impl Verdict {
     }
 }
 
-/// The margin of [`prove`]; zero when closure is not proved.
-pub fn closure_margin(grips: &[Grip], frame: &GraspFrame, enough: f64) -> f64 {
-    prove(grips, frame, enough).margin()
+/// False for contacts that cannot be closed wherever they are: they have fewer than seven force coordinates, so that
+/// forces that balance would span less than the six dimensions of wrenches. True says nothing.
+pub fn may_close(models: &[ContactModel], friction: f64) -> bool {
+    let width = |model: &ContactModel| match model {
+        ContactModel::Point if friction > 0.0 => 3,
+        ContactModel::SoftFinger { .. } if friction > 0.0 => 4,
+        _ => 1,
+    };
+    models.iter().map(width).sum::<usize>() >= 7
 }
 
-/// The proof with the largest margin of pairs with a soft finger and of triples as hard points; where that is below
-/// `enough`, of all contacts together as well. Below `enough` no margin is followed further up.
+/// The margin of [`prove`]; zero when closure is not proved. Of three points with friction it is that of [`three`].
+pub fn closure_margin(grips: &[Grip], frame: &GraspFrame, enough: f64) -> f64 {
+    match grips {
+        [a, b, c] if grips.iter().all(|grip| grip.model == ContactModel::Point) => {
+            three::prove(&[a.contact, b.contact, c.contact], frame).map_or(0.0, |(margin, _)| margin)
+        }
+        _ => prove(grips, frame, enough).margin(),
+    }
+}
+
+/// The proof with the largest margin of pairs with a soft finger and of triples as points; where that is below `enough`,
+/// of all contacts together as well. Above `enough` no margin is followed further up.
 ///
 /// More contacts only enlarge the hull of wrenches, and so does torsion: a margin of some is one of all (paper 000,
 /// section 3.1: GS_{k+1} lies in GS_k).
 pub fn prove(grips: &[Grip], frame: &GraspFrame, enough: f64) -> Verdict {
+    match prove_by_few(grips, frame, enough) {
+        Some(few) if few.margin >= enough => Verdict::Closed(few),
+        Some(few) => match general::prove(grips, frame, enough) {
+            Verdict::Closed(all) if all.margin > few.margin => Verdict::Closed(all),
+            _ => Verdict::Closed(few),
+        },
+        None => general::prove(grips, frame, enough),
+    }
+}
+
+/// The proof with the largest margin of two or three contacts out of more.
+fn prove_by_few(grips: &[Grip], frame: &GraspFrame, enough: f64) -> Option<Closure> {
     let mut best: Option<Closure> = None;
     let mut offer = |margin: f64, contacts: &[usize], forces: &[ContactForce]| {
         if best.as_ref().is_none_or(|known| margin > known.margin) {
@@ -103,12 +131,5 @@ pub fn prove(grips: &[Grip], frame: &GraspFrame, enough: f64) -> Verdict {
             }
         }
     }
-    match best {
-        Some(closure) if closure.margin >= enough => Verdict::Closed(closure),
-        Some(few) => match general::prove(grips, frame, enough) {
-            Verdict::Closed(all) if all.margin > few.margin => Verdict::Closed(all),
-            _ => Verdict::Closed(few),
-        },
-        None => general::prove(grips, frame, enough),
-    }
+    best
 }
