@@ -18,10 +18,10 @@ pub(super) fn apply(entry: &Entry, hand: &mut Hand, found: &mut Found) -> Option
             continue;
         };
         let contact = value.table(found).and_then(|mut table| {
-            let given = table.required(found, "model", "add model = \"soft_finger\"").is_some();
-            let contact = contact_model::read(&mut table, "model", ContactModel::default(), "S106", found);
+            let contact = contact_model::read(&mut table, "model", ContactModel::default(), "S106", found)?;
+            table.required(found, "model", "add model = \"soft_finger\"")?;
             table.finish(found);
-            contact.filter(|_| given)
+            Some(contact)
         });
         match contact {
             Some(contact) => hand.fingers[finger.0].tip.contact = contact,
