@@ -77,7 +77,7 @@ fn couplings_of_file_and_urdf_are_merged_into_chains() {
     assert_eq!(
         error,
         [
-            r#"U218 hand.toml:5:9 key "joint": joint "b_end" follows another joint already; expected one coupling per joint, of the hand file or the URDF"#
+            r#"U219 hand.toml:5:9 key "couplings[0].joint": joint "b_end" follows another joint already; expected one coupling per joint, of the hand file or the URDF"#
         ]
     );
 }
@@ -87,20 +87,29 @@ fn bad_couplings_are_refused() {
     let refusal = |more: String| load(&hand_file(&more, ""), &LoadOptions::default()).unwrap_err().join("\n");
     let cycle = coupling("a_end", "a_mid", "") + &coupling("a_mid", "a_end", "");
     for (more, expected) in [
-        (coupling("a_ned", "a_mid", ""), r#"U205 hand.toml:5:9 key "joint": the robot has no joint "a_ned""#),
-        (coupling("a_end", "a_end", ""), r#"U141 hand.toml:5:9 key "joint": joint "a_end" follows itself"#),
-        (cycle, r#"U141 hand.toml:5:9 key "joint": joint "a_end" follows itself"#),
-        (coupling("a_end", "a_mid", "multiplier = 0"), r#"U142 hand.toml:7:14 key "multiplier": is 0"#),
+        (
+            coupling("a_ned", "a_mid", ""),
+            r#"U205 hand.toml:5:9 key "couplings[0].joint": the robot has no joint "a_ned""#,
+        ),
+        (
+            coupling("a_end", "a_end", ""),
+            r#"U141 hand.toml:5:9 key "couplings[0].joint": joint "a_end" follows itself"#,
+        ),
+        (cycle, r#"U141 hand.toml:5:9 key "couplings[0].joint": joint "a_end" follows itself"#),
+        (coupling("a_end", "a_mid", "multiplier = 0"), r#"U213 hand.toml:7:14 key "couplings[0].multiplier": is 0"#),
         (
             coupling("a_end", "a_mid", "offset = 3"),
-            r#"U143 hand.toml:5:9 key "joint": joint "a_end" follows joint "a_mid" to 3..4.6"#,
+            r#"U143 hand.toml:5:9 key "couplings[0].joint": joint "a_end" follows joint "a_mid" to 3..4.6"#,
         ),
-        (coupling("a_end", "a_mid", "ratio = 1"), r#"U201 hand.toml:7:1 key "ratio": is not a key of this table"#),
+        (
+            coupling("a_end", "a_mid", "ratio = 1"),
+            r#"U201 hand.toml:7:1 key "couplings[0].ratio": is not a key that exists here"#,
+        ),
         (
             coupling("a_end", "b_low", ""),
             "U209 hand.toml:9:1 finger \"a\": joint \"a_end\" follows joint \"b_low\", which is on another finger",
         ),
-        ("couplings = 3".to_owned(), r#"U203 hand.toml:4:13 key "couplings": is an integer"#),
+        ("couplings = 3".to_owned(), r#"U203 hand.toml:4:13 key "couplings": is 3, an integer"#),
     ] {
         let seen = refusal(more);
         assert!(seen.starts_with(expected), "{seen}\nexpected {expected}");
@@ -137,23 +146,29 @@ fn contact_models_come_from_the_finger_or_the_default() {
     for (contact, expected) in [
         (
             "contact = \"soft\"",
-            "U217 hand.toml:9:11 key \"contact\": is \"soft\"; expected \"frictionless\", \"point\" or \"soft_finger\"",
+            "U213 hand.toml:9:11 key \"fingers[0].contact\": is \"soft\"; expected frictionless, point or soft_finger",
         ),
-        ("contact = \"soft_finger\"", "U202 hand.toml:5:1 key \"torsion_radius\": is missing"),
-        ("torsion_radius = 0.004", "U217 hand.toml:9:18 key \"torsion_radius\": stands without a contact model"),
+        (
+            "contact = \"soft_finger\"",
+            "U218 hand.toml:9:11 key \"fingers[0].contact\": has no `torsion_radius` beside it",
+        ),
+        (
+            "torsion_radius = 0.004",
+            "U218 hand.toml:9:18 key \"fingers[0].torsion_radius\": stands without a contact model",
+        ),
         (
             "contact = \"point\"\ntorsion_radius = 0.004",
-            "U217 hand.toml:10:18 key \"torsion_radius\": stands beside contact = \"point\"",
+            "U218 hand.toml:10:18 key \"fingers[0].torsion_radius\": stands beside \"point\"",
         ),
         (
             "contact = \"soft_finger\"\ntorsion_radius = 5",
-            "U217 hand.toml:10:18 key \"torsion_radius\": is 5; expected a length above 0 and at most 0.05",
+            "U213 hand.toml:10:18 key \"fingers[0].torsion_radius\": is 5; expected a length above 0 and at most 0.05",
         ),
         (
             "contact = \"soft_finger\"\ntorsion_radius = 0",
-            "U217 hand.toml:10:18 key \"torsion_radius\": is 0; expected",
+            "U213 hand.toml:10:18 key \"fingers[0].torsion_radius\": is 0; expected",
         ),
-        ("contact = 3", "U203 hand.toml:9:11 key \"contact\": is an integer"),
+        ("contact = 3", "U203 hand.toml:9:11 key \"fingers[0].contact\": is 3, an integer"),
     ] {
         let seen = load(&hand_file("", contact), &LoadOptions::default()).unwrap_err().join("\n");
         assert!(seen.starts_with(expected), "{seen}\nexpected {expected}");

@@ -20,8 +20,8 @@ use files::Files;
 use regrasp_base::InputError;
 use regrasp_base::toml_table::{Codes, Found, Table};
 use regrasp_geometry::Pose;
-use regrasp_robot::contact_model::{self, ContactModel};
 use regrasp_robot::Hand;
+use regrasp_robot::contact_model::{self, ContactModel};
 use regrasp_robot::import::{LoadOptions, load_hand};
 use std::path::Path;
 
