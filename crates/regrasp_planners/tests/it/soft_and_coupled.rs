@@ -1,6 +1,7 @@
 //! Soft fingertips, of which two hold, and fingers with coupled joints, on real hands: plans against the checker, and
 //! the checker against the same plans in hands without torsion or with other couplings.
 
+use crate::places::shared_models;
 use regrasp_base::{Budget, Rng};
 use regrasp_plan::Plan;
 use regrasp_plan::check::mutation::mutants;
@@ -9,20 +10,7 @@ use regrasp_planners::in_hand::{InHandSettings, plan_in_hand, validate_once};
 use regrasp_robot::import::{LoadOptions, ResolveOptions};
 use regrasp_scene::{LoadedScene, Scene, load_scene};
 use std::collections::BTreeSet;
-use std::io::Write;
-use std::path::{Path, PathBuf};
-
-/// The shared models, if they are there.
-fn shared_models() -> Option<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let folder = std::env::var_os("REGRASP_MODELS").map_or_else(|| root.join("../shared/models"), PathBuf::from);
-    if !folder.is_dir() {
-        // Past the capture of test output, so that the log says it.
-        let _ = writeln!(std::io::stderr(), "SKIPPED: no models at {}", folder.display());
-        return None;
-    }
-    Some(folder)
-}
+use std::path::Path;
 
 fn scene(name: &str, models: &Path) -> LoadedScene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes").join(name);
