@@ -67,7 +67,8 @@ impl Campaign {
             if count.made >= per_kind {
                 continue;
             }
-            let report = check(problem.scene, Some(problem.query), &mutant.plan, &settings);
+            let scene = mutant.scene.as_ref().unwrap_or(problem.scene);
+            let report = check(scene, Some(problem.query), &mutant.plan, &settings);
             count.made += 1;
             count.rejected += u64::from(!report.accepted());
             let fits = report.violations.iter().any(|violation| mutant.expected.contains(&violation.kind));

@@ -21,7 +21,11 @@ pub fn options(common: &Common) -> LoadOptions {
     let mut search_paths = entries(std::env::var_os("ROS_PACKAGE_PATH"));
     search_paths.extend(entries(std::env::var_os("AMENT_PREFIX_PATH")));
     search_paths.retain(|path| !path.as_os_str().is_empty());
-    LoadOptions { resolve: ResolveOptions { packages: common.packages.clone(), search_paths }, lenient: common.lenient }
+    LoadOptions {
+        resolve: ResolveOptions { packages: common.packages.clone(), search_paths },
+        lenient: common.lenient,
+        ..LoadOptions::default()
+    }
 }
 
 /// Reads a scene and says what was read.

@@ -1,7 +1,6 @@
 //! Contacts, friction cones, force closure with margin and certificate. Knows no planner.
 //!
-//! A contact model is a file in `contact/`: the point contact with friction is the first; frictionless and soft-finger
-//! contacts join as files of their own.
+//! A contact model is a file in `contact/`; what is asked of contacts of any models is in `closure/`.
 
 /// Force closure with margin and certificate.
 pub mod closure;
@@ -10,5 +9,5 @@ pub mod contact;
 /// The margin: a certified lower bound of the Ferrari-Canny radius.
 pub mod margin;
 
-pub use closure::{Closure, GraspFrame, closure_margin};
-pub use contact::Contact;
+pub use closure::{Closure, GraspFrame, Separation, Verdict, closure_margin};
+pub use contact::{Contact, ContactForce, ContactModel, Grip};

@@ -8,9 +8,12 @@
 //! back to one, the ball of radius `t / (1 + t sum s_i)` lies in the convex hull of the contact wrenches: its radius is
 //! a lower bound of the one of Ferrari and Canny (ICRA 1992, with forces limited in sum). A grasp is force closed if
 //! and only if some `t > 0` exists.
+//!
+//! The forces of a contact are vectors of its cone's space: one number without friction, three with it, and for a soft
+//! finger a fourth, its moment over its torsion radius.
 
 use crate::closure::GraspFrame;
-use crate::contact::{Contact, friction_cone};
+use crate::contact::{Contact, ContactForce, Grip, friction_cone};
 use nalgebra::Matrix3;
 use regrasp_geometry::Vector;
 
@@ -74,6 +77,25 @@ pub fn margin_of_forces<const N: usize>(
         t = t.min(depth / norms[i]);
     }
     // The forces balance but for rounding; what they miss is taken off the ball.
-    t -= residual;
-    if t > 0.0 { t / (1.0 + t * norms.iter().sum::<f64>()) } else { 0.0 }
+    ball_of_depth(t - residual, norms.iter().sum())
+}
+
+/// Radius of the ball that forces at depth `t s_i` prove, `norm_sum` being the sum of the `s_i`; zero when there is none.
+#[inline]
+pub fn ball_of_depth(t: f64, norm_sum: f64) -> f64 {
+    if t > 0.0 { t / (1.0 + t * norm_sum) } else { 0.0 }
+}
+
+/// Length of the wrench that is left of `forces`, and the sum of their normal components.
+pub fn imbalance(grips: &[Grip], forces: &[ContactForce], frame: &GraspFrame) -> (f64, f64) {
+    let (mut force_sum, mut torque_sum, mut total) = (Vector::zeros(), Vector::zeros(), 0.0);
+    for (grip, force) in grips.iter().zip(forces) {
+        let components = grip.components(force, frame.friction);
+        let exerted = grip.force(&components);
+        let arm = grip.contact.point_in_object - frame.center_of_mass;
+        total += components.normal;
+        force_sum += exerted.force;
+        torque_sum += arm.cross(&exerted.force) + grip.contact.normal_in_object.into_inner() * exerted.torsion;
+    }
+    ((force_sum.norm_squared() + (torque_sum / frame.torque_scale).norm_squared()).sqrt(), total)
 }

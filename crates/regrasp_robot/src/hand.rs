@@ -1,5 +1,6 @@
 //! A hand: a palm and serial fingers, with everything the planners ask for prepared once.
 
+use crate::contact_model::ContactModel;
 use crate::kinematics::chain::Chain;
 use crate::kinematics::finger_ik::FingerIk;
 use crate::robot::{LinkId, Robot};
@@ -35,6 +36,8 @@ pub struct Tip {
     pub shape: TipShape,
     /// The point of the tip (its centre, for a sphere), in the frame of the chain's last moving body.
     pub center_in_body: Point,
+    /// What it can transmit where it touches.
+    pub contact: ContactModel,
 }
 
 impl Tip {

@@ -1,7 +1,9 @@
-//! Robots as read, hands as planned with, and their kinematics. Knows no object and no contact.
+//! Robots as read, hands as planned with, and their kinematics. Knows no object and no force.
 //!
 //! Models never change after loading; poses and joint values live with the caller.
 
+/// What a fingertip can transmit where it touches.
+pub mod contact_model;
 /// A hand: a palm and serial fingers.
 pub mod hand;
 /// Readers: URDF, SRDF, `package://` paths, hand files.
@@ -13,6 +15,7 @@ pub mod kinematics;
 /// Links and joints of a robot, as read.
 pub mod robot;
 
+pub use contact_model::ContactModel;
 pub use hand::{Finger, FingerId, FingerShape, Hand, Tip, TipShape};
 pub use import::{LoadOptions, LoadedHand, LoadedInput, LoadedRobot, ResolveOptions, load_hand, load_robot};
 pub use kinematics::chain::{Chain, ChainJoint, Motion};

@@ -139,7 +139,7 @@ fn files_outside_the_models_folders_are_refused() {
     // A package given by name is allowed wherever it is.
     let urdf = write(root, "model/hand.urdf", with_mesh("../secret.obj"));
     let resolve = ResolveOptions { packages: vec![("all".into(), root.to_owned())], ..Default::default() };
-    assert!(load_with(&urdf, &LoadOptions { resolve, lenient: false }).is_ok());
+    assert!(load_with(&urdf, &LoadOptions { resolve, ..Default::default() }).is_ok());
 }
 
 #[cfg(unix)]

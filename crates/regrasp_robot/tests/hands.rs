@@ -112,7 +112,7 @@ fn every_shared_robot_is_read_or_refused_for_a_missing_package() {
                 let package = ("motion_bench_maker".to_owned(), models.join("benchmarks/mbm_configs"));
                 let resolve = regrasp_robot::ResolveOptions { packages: vec![package], ..Default::default() };
                 // Only the folder names inside the package differ from the original's.
-                let error = load_robot(&path, &LoadOptions { resolve, lenient: false }).unwrap_err();
+                let error = load_robot(&path, &LoadOptions { resolve, ..Default::default() }).unwrap_err();
                 assert!(error.to_string().contains("--package: "), "{error}");
             }
         }

@@ -1,8 +1,10 @@
 //! Force closure with margin, by exact second-order cones and a certificate that is substituted back.
 //!
-//! Contact `i` with normal `n_i` can push with a force in the round cone about `-n_i` of slope `mu`. `G` maps stacked
-//! contact forces to the wrench (force; torque about the centre of mass divided by the torque scale). `P` is a right
-//! inverse of `G`, `sigma_i` the Frobenius norm of the three rows of `P` that belong to contact `i`. The cone program
+//! Contact `i` with normal `n_i` exerts `f_i` in a round cone about `-n_i` of slope `mu`: a ray without friction, a cone in
+//! three dimensions with it, and in four for a soft finger, whose moment about the normal is measured over its torsion
+//! radius. `G` maps stacked contact forces to the wrench (force; torque about the centre of mass divided by the torque
+//! scale). `P` is a right inverse of `G`, `sigma_i` the Frobenius norm of the rows of `P` that belong to contact `i`. The
+//! cone program
 //!
 //!   rho = max t   with   G f = 0,   sum_i normal(f_i) = 1,   distance of f_i to its cone's boundary >= t sigma_i
 //!
@@ -19,9 +21,10 @@ use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SupportedConeT}
 use nalgebra::{DMatrix, DVector, Matrix6};
 use regrasp_geometry::frame::tangents;
 use regrasp_geometry::{Point, Vector};
-use regrasp_grasp::Contact;
+use regrasp_grasp::{ContactModel, Grip};
+use std::ops::Range;
 
-/// Grasp maps with a smaller singular value than this count as not closed: two contacts, or contacts on one line.
+/// Grasp maps with a smaller singular value than this count as not closed: two points, or contacts on one line.
 const SMALLEST_SINGULAR_VALUE: f64 = 1e-6;
 
 /// What the contacts act on.
@@ -35,45 +38,73 @@ pub struct Body {
     pub friction: f64,
 }
 
-/// Margin of the best subset of at least three of `contacts`: zero when no closure could be proved.
+/// Margin of the best subset of `grips`, soft fingers taken as such or as points: zero when no closure could be proved.
 ///
-/// Closure can only grow with contacts, so the margin of a subset is one of the whole set.
-pub fn margin(contacts: &[Contact], body: &Body) -> f64 {
-    let n_contacts = contacts.len();
+/// Closure can only grow with contacts and with torsion, so the margin of a subset is one of the whole set.
+pub fn margin(grips: &[Grip], body: &Body) -> f64 {
+    let n_contacts = grips.len();
     assert!(n_contacts <= 16, "the subsets of {n_contacts} contacts are too many");
     let mut best: f64 = 0.0;
     for subset in 0u32..1 << n_contacts {
-        if subset.count_ones() >= 3 {
-            let chosen: Vec<Contact> = (0..n_contacts).filter(|i| subset >> i & 1 == 1).map(|i| contacts[i]).collect();
+        let chosen: Vec<Grip> = (0..n_contacts).filter(|i| subset >> i & 1 == 1).map(|i| grips[i]).collect();
+        let n_soft = chosen.iter().filter(|grip| torsion_radius(grip).is_some()).count();
+        if chosen.len() >= 3 || (chosen.len() == 2 && n_soft > 0) {
             best = best.max(margin_of_all(&chosen, body));
+        }
+        if chosen.len() >= 3 && n_soft > 0 {
+            best = best.max(margin_of_all(&hardened(&chosen), body));
         }
     }
     best
 }
 
-/// Margin in which every one of `contacts` takes part; zero when no closure could be proved.
-pub fn margin_of_all(contacts: &[Contact], body: &Body) -> f64 {
-    let grasp_map = grasp_map(contacts, body);
-    let Some(right_inverse) = right_inverse(&grasp_map) else { return 0.0 };
-    let shares: Vec<f64> = (0..contacts.len()).map(|i| right_inverse.view((3 * i, 0), (3, 6)).norm()).collect();
-    let Some(forces) = internal_forces(&grasp_map, &shares, body.friction) else { return 0.0 };
-    substituted_margin(&grasp_map, &right_inverse, &shares, forces, body.friction)
+/// The same contacts without torsion.
+fn hardened(grips: &[Grip]) -> Vec<Grip> {
+    let hard = |grip: &Grip| match grip.model {
+        ContactModel::SoftFinger { .. } => Grip { model: ContactModel::Point, ..*grip },
+        ContactModel::Point | ContactModel::Frictionless => *grip,
+    };
+    grips.iter().map(hard).collect()
 }
 
-/// The 6 x 3k grasp map; the columns of a contact are its pushing direction `-n` and two tangents.
-fn grasp_map(contacts: &[Contact], body: &Body) -> DMatrix<f64> {
-    let mut map = DMatrix::zeros(6, 3 * contacts.len());
-    for (i, contact) in contacts.iter().enumerate() {
-        let (x, y) = tangents(&contact.normal_in_object);
-        let arm = (contact.point_in_object - body.center_of_mass) / body.torque_scale;
-        for (j, direction) in
-            [-contact.normal_in_object.into_inner(), x.into_inner(), y.into_inner()].iter().enumerate()
-        {
-            map.view_mut((0, 3 * i + j), (3, 1)).copy_from(direction);
-            map.view_mut((3, 3 * i + j), (3, 1)).copy_from(&arm.cross(direction));
-        }
+fn torsion_radius(grip: &Grip) -> Option<f64> {
+    match grip.model {
+        ContactModel::SoftFinger { torsion_radius } => Some(torsion_radius),
+        ContactModel::Point | ContactModel::Frictionless => None,
     }
-    map
+}
+
+/// Margin in which every one of `grips` takes part; zero when no closure could be proved.
+pub fn margin_of_all(grips: &[Grip], body: &Body) -> f64 {
+    let (grasp_map, cones) = grasp_map(grips, body);
+    let Some(right_inverse) = right_inverse(&grasp_map) else { return 0.0 };
+    let shares: Vec<f64> = cones.iter().map(|cone| right_inverse.rows(cone.start, cone.len()).norm()).collect();
+    let Some(forces) = internal_forces(&grasp_map, &cones, &shares, body.friction) else { return 0.0 };
+    substituted_margin(&grasp_map, &right_inverse, &cones, &shares, forces, body.friction)
+}
+
+/// The grasp map and the columns of each contact in it: its pushing direction `-n`; with friction two tangents; for a
+/// soft finger the moment of its torsion radius about the normal.
+fn grasp_map(grips: &[Grip], body: &Body) -> (DMatrix<f64>, Vec<Range<usize>>) {
+    let mut columns: Vec<[Vector; 2]> = Vec::new();
+    let mut cones = Vec::new();
+    for grip in grips {
+        let first = columns.len();
+        let normal = grip.contact.normal_in_object;
+        let (x, y) = tangents(&normal);
+        let arm = (grip.contact.point_in_object - body.center_of_mass) / body.torque_scale;
+        let mut add = |force: Vector| columns.push([force, arm.cross(&force)]);
+        add(-normal.into_inner());
+        if body.friction > 0.0 && grip.model != ContactModel::Frictionless {
+            add(x.into_inner());
+            add(y.into_inner());
+            if let Some(radius) = torsion_radius(grip) {
+                columns.push([Vector::zeros(), normal.into_inner() * (radius / body.torque_scale)]);
+            }
+        }
+        cones.push(first..columns.len());
+    }
+    (DMatrix::from_fn(6, columns.len(), |row, column| columns[column][row / 3][row % 3]), cones)
 }
 
 /// The pseudo-inverse of a grasp map of full rank.
@@ -90,27 +121,40 @@ fn right_inverse(grasp_map: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(grasp_map.transpose() * DMatrix::from_column_slice(6, 6, inverse.as_slice()))
 }
 
+/// Slope of a cone of `width` dimensions, and the factor between the slack of its inequality and the distance.
+fn slope_and_scale(width: usize, friction: f64) -> (f64, f64) {
+    if width == 1 { (1.0, 1.0) } else { (friction, (1.0 + friction * friction).sqrt()) }
+}
+
 /// Forces that solve the cone program of the module's header, as the solver says, unverified.
-fn internal_forces(grasp_map: &DMatrix<f64>, shares: &[f64], friction: f64) -> Option<DVector<f64>> {
-    let n_contacts = shares.len();
-    let n_forces = 3 * n_contacts;
+fn internal_forces(
+    grasp_map: &DMatrix<f64>,
+    cones: &[Range<usize>],
+    shares: &[f64],
+    friction: f64,
+) -> Option<DVector<f64>> {
+    let n_forces = grasp_map.ncols();
     let mut constraints = DMatrix::zeros(7 + n_forces, n_forces + 1);
     constraints.view_mut((0, 0), (6, n_forces)).copy_from(grasp_map);
-    for i in 0..n_contacts {
-        let row = 7 + 3 * i;
-        constraints[(6, 3 * i)] = 1.0;
-        constraints[(row, 3 * i)] = -friction;
-        constraints[(row, n_forces)] = shares[i] * (1.0 + friction * friction).sqrt();
-        constraints[(row + 1, 3 * i + 1)] = -1.0;
-        constraints[(row + 2, 3 * i + 2)] = -1.0;
+    let mut kinds = vec![SupportedConeT::ZeroConeT(7)];
+    for (cone, share) in cones.iter().zip(shares) {
+        let (slope, scale) = slope_and_scale(cone.len(), friction);
+        constraints[(6, cone.start)] = 1.0;
+        constraints[(7 + cone.start, cone.start)] = -slope;
+        constraints[(7 + cone.start, n_forces)] = share * scale;
+        for k in cone.clone().skip(1) {
+            constraints[(7 + k, k)] = -1.0;
+        }
+        kinds.push(match cone.len() {
+            1 => SupportedConeT::NonnegativeConeT(1),
+            width => SupportedConeT::SecondOrderConeT(width),
+        });
     }
     let mut right_side = vec![0.0; 7 + n_forces];
     right_side[6] = 1.0;
     let mut cost = vec![0.0; n_forces + 1];
     cost[n_forces] = -1.0;
-    let mut cones = vec![SupportedConeT::ZeroConeT(7)];
-    cones.extend((0..n_contacts).map(|_| SupportedConeT::SecondOrderConeT(3)));
-    let solution = solve(&cost, &constraints, &right_side, &cones)?;
+    let solution = solve(&cost, &constraints, &right_side, &kinds)?;
     Some(DVector::from_column_slice(&solution[..n_forces]))
 }
 
@@ -153,19 +197,22 @@ fn sparse(dense: &DMatrix<f64>) -> CscMatrix<f64> {
 fn substituted_margin(
     grasp_map: &DMatrix<f64>,
     right_inverse: &DMatrix<f64>,
+    cones: &[Range<usize>],
     shares: &[f64],
     forces: DVector<f64>,
     friction: f64,
 ) -> f64 {
     let mut forces = &forces - right_inverse * (grasp_map * &forces);
-    let total: f64 = (0..shares.len()).map(|i| forces[3 * i]).sum();
+    let total: f64 = cones.iter().map(|cone| forces[cone.start]).sum();
     if total.is_nan() || total <= 1e-3 {
         return 0.0;
     }
     forces /= total;
-    let cone_scale = (1.0 + friction * friction).sqrt();
-    let slack = |i: usize| (friction * forces[3 * i] - forces[3 * i + 1].hypot(forces[3 * i + 2])) / cone_scale;
-    let rho = (0..shares.len()).map(|i| slack(i) / shares[i]).fold(f64::INFINITY, f64::min);
+    let slack = |cone: &Range<usize>| {
+        let (slope, scale) = slope_and_scale(cone.len(), friction);
+        (slope * forces[cone.start] - forces.rows(cone.start + 1, cone.len() - 1).norm()) / scale
+    };
+    let rho = cones.iter().zip(shares).map(|(cone, share)| slack(cone) / share).fold(f64::INFINITY, f64::min);
     let imbalance = (grasp_map * &forces).norm();
     let inverse_error = (grasp_map * right_inverse - DMatrix::identity(6, 6)).norm();
     let rho = rho * (1.0 - inverse_error) - 2.0 * imbalance;
@@ -174,21 +221,25 @@ fn substituted_margin(
 
 /// Upper bound of the Ferrari-Canny radius: the smallest support value of the contact wrenches over directions, drawn
 /// at random and then improved by pattern search. Shares nothing with [`margin`]. For tests and reports.
-pub fn ferrari_canny_upper(contacts: &[Contact], body: &Body, n_directions: usize, rng: &mut regrasp_base::Rng) -> f64 {
+pub fn ferrari_canny_upper(grips: &[Grip], body: &Body, n_directions: usize, rng: &mut regrasp_base::Rng) -> f64 {
     let arms: Vec<Vector> =
-        contacts.iter().map(|c| (c.point_in_object - body.center_of_mass) / body.torque_scale).collect();
+        grips.iter().map(|grip| (grip.contact.point_in_object - body.center_of_mass) / body.torque_scale).collect();
     // Largest work of a force of unit normal component along the wrench direction (force part, torque part).
     let support = |direction: &[f64; 6]| {
         let norm = direction.iter().map(|x| x * x).sum::<f64>().sqrt();
         let linear = Vector::new(direction[0], direction[1], direction[2]) / norm;
         let angular = Vector::new(direction[3], direction[4], direction[5]) / norm;
-        contacts
+        grips
             .iter()
             .zip(&arms)
-            .map(|(contact, arm)| {
+            .map(|(grip, arm)| {
+                let normal = grip.contact.normal_in_object;
                 let pull = linear + angular.cross(arm);
-                let along = -pull.dot(&contact.normal_in_object);
-                along + body.friction * (pull + along * contact.normal_in_object.into_inner()).norm()
+                let along = -pull.dot(&normal);
+                let across = (pull + along * normal.into_inner()).norm();
+                let twist = torsion_radius(grip).unwrap_or(0.0) / body.torque_scale * angular.dot(&normal);
+                let slope = if grip.model == ContactModel::Frictionless { 0.0 } else { body.friction };
+                along + slope * across.hypot(twist)
             })
             .fold(0.0, f64::max)
     };
@@ -221,123 +272,4 @@ pub fn ferrari_canny_upper(contacts: &[Contact], body: &Body, n_directions: usiz
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use regrasp_base::Rng;
-    use regrasp_geometry::UnitVector;
-
-    fn sphere_contact(direction: [f64; 3], radius: f64) -> Contact {
-        let normal = UnitVector::new_normalize(Vector::from(direction));
-        Contact { point_in_object: Point::from(normal.into_inner() * radius), normal_in_object: normal }
-    }
-
-    fn body(friction: f64) -> Body {
-        Body { center_of_mass: Point::origin(), torque_scale: 0.03, friction }
-    }
-
-    fn random_contacts(n_contacts: usize, rng: &mut Rng) -> Vec<Contact> {
-        (0..n_contacts).map(|_| sphere_contact(rng.direction(), 0.03)).collect()
-    }
-
-    /// Smallest sum of normal forces with which `contacts` resist `wrench`, by another cone program.
-    fn effort_against(contacts: &[Contact], body: &Body, wrench: &[f64; 6]) -> Option<f64> {
-        let map = grasp_map(contacts, body);
-        let n_forces = 3 * contacts.len();
-        let mut constraints = DMatrix::zeros(6 + n_forces, n_forces);
-        constraints.view_mut((0, 0), (6, n_forces)).copy_from(&map);
-        let mut cost = vec![0.0; n_forces];
-        let mut cones = vec![SupportedConeT::ZeroConeT(6)];
-        for i in 0..contacts.len() {
-            cost[3 * i] = 1.0;
-            constraints[(6 + 3 * i, 3 * i)] = -body.friction;
-            constraints[(7 + 3 * i, 3 * i + 1)] = -1.0;
-            constraints[(8 + 3 * i, 3 * i + 2)] = -1.0;
-            cones.push(SupportedConeT::SecondOrderConeT(3));
-        }
-        let mut right_side = vec![0.0; 6 + n_forces];
-        right_side[..6].copy_from_slice(wrench);
-        let forces = DVector::from_vec(solve(&cost, &constraints, &right_side, &cones)?);
-        let error = (&map * &forces - DVector::from_column_slice(wrench)).norm();
-        (error < 1e-6).then(|| (0..contacts.len()).map(|i| forces[3 * i]).sum())
-    }
-
-    #[test]
-    fn every_wrench_within_the_margin_is_resisted_with_unit_effort() {
-        let mut rng = Rng::keyed(1, "closure", 0);
-        let mut closed = 0;
-        for trial in 0..60 {
-            let contacts = random_contacts(3 + trial % 3, &mut rng);
-            let margin = margin(&contacts, &body(0.8));
-            if margin == 0.0 {
-                continue;
-            }
-            closed += 1;
-            for _ in 0..40 {
-                let direction: [f64; 6] = std::array::from_fn(|_| rng.normal());
-                let norm = direction.iter().map(|x| x * x).sum::<f64>().sqrt();
-                let effort = effort_against(&contacts, &body(0.8), &direction.map(|x| x * margin / norm)).unwrap();
-                assert!(effort <= 1.0 + 1e-6, "effort {effort} at margin {margin}");
-            }
-        }
-        assert!(closed > 15, "{closed}");
-    }
-
-    #[test]
-    fn the_margin_is_below_the_upper_bound_and_both_vanish_together() {
-        let mut rng = Rng::keyed(2, "closure", 0);
-        let (mut closed, mut open) = (0, 0);
-        let mut smallest_ratio = f64::INFINITY;
-        for trial in 0..300 {
-            let contacts = random_contacts(3 + trial % 2, &mut rng);
-            let lower = margin(&contacts, &body(0.5));
-            let upper = ferrari_canny_upper(&contacts, &body(0.5), 2000, &mut rng);
-            assert!(lower <= upper + 1e-9, "{lower} > {upper}");
-            if lower > 0.0 {
-                closed += 1;
-                smallest_ratio = smallest_ratio.min(lower / upper);
-            } else {
-                open += 1;
-                // Not proved closed, so a direction that (almost) no contact can push along must exist.
-                assert!(upper < 1e-3, "trial {trial}: not closed, but every direction has support {upper}");
-            }
-        }
-        assert!(closed > 40 && open > 40, "{closed} closed, {open} open");
-        assert!(smallest_ratio > 0.05, "{smallest_ratio}");
-    }
-
-    #[test]
-    fn three_contacts_on_an_equator_close_and_two_or_a_half_sphere_do_not() {
-        let third = std::f64::consts::TAU / 3.0;
-        let equator: Vec<Contact> =
-            (0..3).map(|i| sphere_contact([(third * i as f64).cos(), (third * i as f64).sin(), 0.0], 0.03)).collect();
-        assert!(margin(&equator, &body(0.8)) > 0.05);
-        assert_eq!(margin(&equator[..2], &body(0.8)), 0.0);
-        assert_eq!(margin(&equator, &body(0.0)), 0.0);
-        let half: Vec<Contact> =
-            [[1.0, 0.0, 0.5], [-1.0, 0.3, 0.6], [0.0, 1.0, 0.7]].map(|d| sphere_contact(d, 0.03)).to_vec();
-        assert_eq!(margin(&half, &body(0.2)), 0.0);
-    }
-
-    #[test]
-    fn the_margin_does_not_depend_on_the_frame_or_the_unit_of_length() {
-        let mut rng = Rng::keyed(3, "closure", 0);
-        let mut compared = 0;
-        for _ in 0..60 {
-            let contacts = random_contacts(4, &mut rng);
-            let before = margin(&contacts, &body(0.7));
-            let motion = regrasp_geometry::pose_from([0.0; 3], rng.quat_xyzw());
-            let moved: Vec<Contact> = contacts
-                .iter()
-                .map(|c| Contact {
-                    point_in_object: Point::from((motion * c.point_in_object).coords * 10.0),
-                    normal_in_object: UnitVector::new_normalize(motion * c.normal_in_object.into_inner()),
-                })
-                .collect();
-            let scaled = Body { torque_scale: 0.3, ..body(0.7) };
-            let after = margin(&moved, &scaled);
-            assert!((before - after).abs() < 1e-7, "{before} {after}");
-            compared += usize::from(before > 0.0);
-        }
-        assert!(compared > 20, "{compared}");
-    }
-}
+mod tests;

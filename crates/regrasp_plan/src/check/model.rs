@@ -3,7 +3,7 @@
 use crate::check::kinematics::{Path, world_from_root};
 use nalgebra::Matrix4;
 use regrasp_geometry::{Point, Pose};
-use regrasp_robot::{JointKind, LinkId, TipShape};
+use regrasp_robot::{ContactModel, JointKind, LinkId, TipShape};
 use regrasp_scene::Scene;
 
 /// A fingertip that touches with a ball; a sharp tip is a ball of radius zero.
@@ -17,6 +17,8 @@ pub struct FingerModel {
     pub center: Point,
     /// Radius of the ball.
     pub radius: f64,
+    /// What it transmits where it touches.
+    pub contact: ContactModel,
     /// The link that may touch the object.
     pub tip_link: LinkId,
     /// First and one past the last index of this finger's coordinates in a joint vector.
@@ -94,6 +96,7 @@ impl Model {
                 path,
                 center: finger.tip.center_in_body,
                 radius,
+                contact: finger.tip.contact,
                 tip_link: finger.tip.link,
                 coordinates,
             });

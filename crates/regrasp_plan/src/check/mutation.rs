@@ -1,6 +1,10 @@
-//! Plans broken in exactly one known way each, to test the checker (reliability R1). Every mutant must be rejected.
+//! Plans broken in exactly one known way each, to test the checker (reliability R1). Every mutant must be rejected. Some
+//! are good plans in a hand that is another than the one they were made for: what the plan does not say, the hand does.
 //!
 //! Amounts are small: a mutant that any check would catch proves nothing.
+
+/// Good plans in hands of other contacts and couplings.
+mod hand;
 
 use crate::check::continuity::{contact_of, moving_finger, pose_difference};
 use crate::check::model::Model;
@@ -9,6 +13,7 @@ use crate::plan::{ContactMode, ContactState, Plan, PoseData, SegmentKind};
 use nalgebra::{DMatrix, DVector};
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, Shape, UnitVector, Vector};
+use regrasp_robot::Hand;
 use regrasp_scene::Scene;
 
 /// A broken plan.
@@ -18,6 +23,8 @@ pub struct Mutant {
     pub name: &'static str,
     /// The broken plan.
     pub plan: Plan,
+    /// The scene to judge it in, where that is what was changed.
+    pub scene: Option<Scene>,
     /// At least one of these must be reported; others may follow from them.
     pub expected: Vec<ViolationKind>,
 }
@@ -36,6 +43,8 @@ pub fn mutants(plan: &Plan, scene: &Scene, rng: &mut Rng) -> Vec<Mutant> {
     breeder.break_contacts();
     breeder.break_roles();
     breeder.break_relocations();
+    breeder.break_contact_models();
+    breeder.break_couplings();
     breeder.found
 }
 
@@ -57,7 +66,21 @@ impl Breeder<'_> {
     ) {
         let mut plan = self.plan.clone();
         if damage(&mut plan, self.rng).is_some() {
-            self.found.push(Mutant { name, plan, expected: expected.to_vec() });
+            self.found.push(Mutant { name, plan, scene: None, expected: expected.to_vec() });
+        }
+    }
+
+    /// Adds the plan as it is, in a scene with another hand, if `damage` finds a place for it.
+    fn add_hand(
+        &mut self,
+        name: &'static str,
+        expected: &[ViolationKind],
+        damage: impl FnOnce(&mut Hand, &mut Rng) -> Option<()>,
+    ) {
+        let mut scene = self.scene.clone();
+        if damage(&mut scene.hand, self.rng).is_some() {
+            let plan = self.plan.clone();
+            self.found.push(Mutant { name, plan, scene: Some(scene), expected: expected.to_vec() });
         }
     }
 

@@ -6,6 +6,7 @@ use crate::check::model::Model;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, Plan, SegmentKind};
+use regrasp_grasp::Grip;
 use regrasp_scene::{InputFile, Object};
 use std::collections::BTreeMap;
 
@@ -54,7 +55,7 @@ pub fn check_closure(
         friction: plan.promises.friction.min(object.friction),
     };
     let required = plan.promises.required_margin.max(settings.smallest_margin);
-    let mut known: BTreeMap<Vec<[u64; 6]>, f64> = BTreeMap::new();
+    let mut known: BTreeMap<Vec<(usize, [u64; 6])>, f64> = BTreeMap::new();
     let mut smallest: Option<f64> = None;
     for (s, segment) in plan.segments.iter().enumerate() {
         let moving = moving_finger(model, segment);
@@ -64,16 +65,23 @@ pub fn check_closure(
                 .filter(|&f| segment.kind == SegmentKind::Transfer || Some(f) != moving)
                 .filter(|&f| waypoint.contacts[f].mode != ContactMode::Free)
                 .collect();
-            let contacts: Vec<_> = holding.iter().filter_map(|&f| contact_of(&waypoint.contacts[f])).collect();
-            let key: Vec<[u64; 6]> = contacts
+            let grips: Vec<(usize, Grip)> = holding
                 .iter()
-                .map(|c| {
-                    let (p, n) = (c.point_in_object, c.normal_in_object);
-                    [p.x, p.y, p.z, n.x, n.y, n.z].map(f64::to_bits)
+                .filter_map(|&f| {
+                    let contact = contact_of(&waypoint.contacts[f])?;
+                    Some((f, Grip { contact, model: model.fingers[f].contact }))
                 })
                 .collect();
+            let key: Vec<(usize, [u64; 6])> = grips
+                .iter()
+                .map(|(f, grip)| {
+                    let (p, n) = (grip.contact.point_in_object, grip.contact.normal_in_object);
+                    (*f, [p.x, p.y, p.z, n.x, n.y, n.z].map(f64::to_bits))
+                })
+                .collect();
+            let grips: Vec<Grip> = grips.into_iter().map(|(_, grip)| grip).collect();
             let is_new = !known.contains_key(&key);
-            let found = *known.entry(key).or_insert_with(|| margin(&contacts, &body));
+            let found = *known.entry(key).or_insert_with(|| margin(&grips, &body));
             smallest = Some(smallest.map_or(found, |least: f64| least.min(found)));
             if is_new && !(found > 0.0 && found >= required - MARGIN_TOLERANCE) {
                 let names: Vec<&str> = holding.iter().map(|&f| model.fingers[f].name.as_str()).collect();

@@ -5,7 +5,8 @@ use super::model::{MAX_FINGERS, Model};
 use super::settings::ReleaseRule;
 use super::workspace::Workspace;
 use arrayvec::ArrayVec;
-use regrasp_grasp::{Contact, closure};
+use regrasp_grasp::{Contact, ContactModel, Grip, closure};
+use std::collections::BTreeMap;
 
 /// Which candidate each finger takes.
 pub type Choice = ArrayVec<usize, MAX_FINGERS>;
@@ -16,8 +17,24 @@ pub struct ClosureTable<'a> {
     model: &'a Model<'a>,
     options: &'a [Vec<Candidate>],
     n_options: usize,
+    /// Which sets of fingers are looked at.
+    sets: Sets,
     /// Margin of a triple of (finger, option), NaN where not asked for yet.
-    margins: Vec<f64>,
+    triples: Vec<f64>,
+    /// Margin of a pair of (finger, option), NaN where not asked for yet; none without soft fingers.
+    pairs: Vec<f64>,
+    /// Margin of all fingers of a set together, where pairs and triples are not enough.
+    larger: BTreeMap<(u32, Choice), f64>,
+}
+
+/// Which sets of fingers may be closed where no smaller one of them is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Sets {
+    /// Triples of points. Four points of which no three are closed hold, but let nobody go: with four fingers they are of
+    /// no use.
+    Triples,
+    /// Any.
+    All,
 }
 
 impl<'a> ClosureTable<'a> {
@@ -25,39 +42,102 @@ impl<'a> ClosureTable<'a> {
     pub fn new(model: &'a Model<'a>, options: &'a [Vec<Candidate>]) -> Self {
         let n_options = options.iter().map(Vec::len).max().unwrap_or(0);
         let n = options.len();
-        let n_triples = n * n * n;
-        ClosureTable { model, options, n_options, margins: vec![f64::NAN; n_triples * n_options.pow(3)] }
+        let are_points = model.fingers.iter().all(|finger| finger.contact == ContactModel::Point);
+        let has_soft = model.fingers.iter().any(|finger| matches!(finger.contact, ContactModel::SoftFinger { .. }));
+        ClosureTable {
+            model,
+            options,
+            n_options,
+            sets: if are_points && n <= 4 { Sets::Triples } else { Sets::All },
+            triples: vec![f64::NAN; (n * n_options).pow(3)],
+            pairs: vec![f64::NAN; if has_soft { (n * n_options).pow(2) } else { 0 }],
+            larger: BTreeMap::new(),
+        }
     }
 
-    /// Margin of three fingers with their options.
+    /// Margin of three fingers with their options, as points.
     fn triple(&mut self, fingers: [usize; 3], choice: &Choice) -> f64 {
         let n = self.options.len();
         let [i, j, k] = fingers;
         let m = self.n_options;
         let index = (((i * n + j) * n + k) * m + choice[i]) * m * m + choice[j] * m + choice[k];
-        if self.margins[index].is_nan() {
+        if self.triples[index].is_nan() {
             let contacts = fingers.map(|f| self.options[f][choice[f]].contact);
-            self.margins[index] = closure::three::prove(&contacts, &self.model.frame).map_or(0.0, |(margin, _)| margin);
+            let is_smooth = |&f: &usize| self.model.fingers[f].contact == ContactModel::Frictionless;
+            self.triples[index] = match fingers.iter().any(is_smooth) {
+                true => 0.0,
+                false => closure::three::prove(&contacts, &self.model.frame).map_or(0.0, |(margin, _)| margin),
+            };
         }
-        self.margins[index]
+        self.triples[index]
     }
 
-    /// Largest margin of three of the fingers whose bit is set in `holding`.
+    /// Margin of two fingers with their options.
+    fn pair(&mut self, fingers: [usize; 2], choice: &Choice) -> f64 {
+        let [i, j] = fingers;
+        let (n, m) = (self.options.len(), self.n_options);
+        let index = ((i * n + j) * m + choice[i]) * m + choice[j];
+        if self.pairs[index].is_nan() {
+            self.pairs[index] = self.together(&fingers, choice);
+        }
+        self.pairs[index]
+    }
+
+    /// Margin in which all of `fingers` take part with their options, up to the one asked for.
+    fn together(&self, fingers: &[usize], choice: &Choice) -> f64 {
+        let grips: ArrayVec<Grip, MAX_FINGERS> =
+            fingers.iter().map(|&f| self.model.grip(f, &self.options[f][choice[f]].contact)).collect();
+        let models: ArrayVec<ContactModel, MAX_FINGERS> = grips.iter().map(|grip| grip.model).collect();
+        match closure::may_close(&models, self.model.frame.friction) {
+            true => closure::general::prove(&grips, &self.model.frame, self.model.settings.closure_margin).margin(),
+            false => 0.0,
+        }
+    }
+
+    /// Margin of the fingers whose bit is set in `holding`: the first found that is enough, or the largest.
     pub fn margin(&mut self, choice: &Choice, holding: u32) -> f64 {
-        let n = self.options.len();
-        let holds = |f: usize| holding & (1 << f) != 0;
+        let enough = self.model.settings.closure_margin;
+        let fingers: ArrayVec<usize, MAX_FINGERS> =
+            (0..self.options.len()).filter(|&f| holding & (1 << f) != 0).collect();
+        let n = fingers.len();
         let mut best = 0.0f64;
-        for i in (0..n).filter(|&f| holds(f)) {
-            for j in (i + 1..n).filter(|&f| holds(f)) {
-                for k in (j + 1..n).filter(|&f| holds(f)) {
-                    best = best.max(self.triple([i, j, k], choice));
-                    if best >= self.model.settings.closure_margin {
+        for i in 0..n {
+            for j in i + 1..n {
+                for k in j + 1..n {
+                    best = best.max(self.triple([fingers[i], fingers[j], fingers[k]], choice));
+                    if best >= enough {
                         return best;
                     }
                 }
             }
         }
-        best
+        if self.sets == Sets::Triples {
+            return best;
+        }
+        if !self.pairs.is_empty() {
+            for i in 0..n {
+                for j in i + 1..n {
+                    best = best.max(self.pair([fingers[i], fingers[j]], choice));
+                    if best >= enough {
+                        return best;
+                    }
+                }
+            }
+        }
+        if n < 3 {
+            return best;
+        }
+        // Who does not hold does not matter.
+        let key = (holding, (0..choice.len()).map(|f| if fingers.contains(&f) { choice[f] } else { 0 }).collect());
+        let together = match self.larger.get(&key) {
+            Some(&known) => known,
+            None => {
+                let found = self.together(&fingers, choice);
+                self.larger.insert(key, found);
+                found
+            }
+        };
+        best.max(together)
     }
 
     /// True when the fingers of `holding` keep the required margin.
@@ -78,9 +158,7 @@ pub fn releasable(model: &Model, contacts: &[Contact]) -> u32 {
     let n = contacts.len();
     let mut bits = 0;
     for finger in 0..n {
-        let others: ArrayVec<Contact, MAX_FINGERS> =
-            (0..n).filter(|&other| other != finger).map(|other| contacts[other]).collect();
-        if closure::closure_margin(&others, &model.frame) >= model.settings.closure_margin {
+        if model.closure_margin(contacts, model.all_fingers() & !(1 << finger)) >= model.settings.closure_margin {
             bits |= 1 << finger;
         }
     }

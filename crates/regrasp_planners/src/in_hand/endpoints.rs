@@ -9,14 +9,13 @@ use crate::failure::{Failure, FailureKind};
 use regrasp_base::Rng;
 use regrasp_geometry::collision::{Answer, Placement, separation};
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
-use regrasp_grasp::{Contact, closure};
+use regrasp_grasp::closure::may_close;
+use regrasp_grasp::{Contact, ContactModel};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use regrasp_scene::GraspRequest;
 
 /// Distance of a given fingertip from the surface, and of a given contact point, that still counts as touching.
 const TOUCHING: f64 = 1e-4;
-/// Fingers that hard point contacts need: three hold while one is away (paper 004, section III).
-const LEAST_FINGERS: usize = 4;
 
 /// Which end of the query.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,21 +54,26 @@ fn refusal(kind: FailureKind, message: String, advice: &str) -> Failure {
     }
 }
 
-/// Refuses hands that can never do it with hard point contacts.
+/// Refuses hands of which the others can never hold while one finger is away.
 pub fn refuse_impossible(model: &Model) -> Result<(), Failure> {
     let n = model.n_fingers();
-    if n >= LEAST_FINGERS {
+    let others_may_hold = |away: usize| {
+        let others: Vec<ContactModel> = (0..n).filter(|&f| f != away).map(|f| model.fingers[f].contact).collect();
+        may_close(&others, model.frame.friction)
+    };
+    if (0..n).any(others_may_hold) {
         return Ok(());
     }
-    let hold = if n == 0 { "none".to_owned() } else { (n - 1).to_string() };
+    let models: Vec<&str> = model.fingers.iter().map(|finger| finger.contact.name()).collect();
     Err(refusal(
         FailureKind::Impossible,
         format!(
-            "the hand has {n} fingers with hard point contacts: while one is away only {hold} hold, and fewer than three \
-             hard points cannot hold an object (it can turn about the line through two of them). {n} hard fingers can \
-             never change their grasp"
+            "the hand has {n} fingers with contacts {models:?} and friction {}: while one of them is away the others \
+             cannot hold an object (fewer than three points cannot: it turns about the line through two of them). Such a \
+             hand can never change its grasp",
+            model.frame.friction
         ),
-        "use a hand with at least 4 fingers; soft fingertips, of which two can hold, are not supported yet",
+        "use a hand with at least 4 fingers, or declare soft fingertips, of which two can hold (contact = \"soft_finger\")",
     ))
 }
 
@@ -141,7 +145,7 @@ pub fn given_grasp(
         GraspRequest::Joints(values) => from_joints(model, end, world_from_object, values)?,
         GraspRequest::Contacts(points) => from_contacts(model, end, world_from_object, points, rng)?,
     };
-    let margin = closure::closure_margin(&state.contacts, &model.frame);
+    let margin = model.closure_margin(&state.contacts, model.all_fingers());
     if margin < model.settings.closure_margin {
         return Err(end.failure(
             format!(

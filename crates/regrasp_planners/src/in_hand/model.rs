@@ -2,9 +2,10 @@
 //!
 //! Built once per query, shared by all threads, never changed.
 
+use arrayvec::ArrayVec;
 use regrasp_geometry::collision::{MeshTree, Placement};
 use regrasp_geometry::{ConvexHull, Point, Pose, Shape, Vector};
-use regrasp_grasp::GraspFrame;
+use regrasp_grasp::{Contact, ContactModel, GraspFrame, Grip, closure};
 use regrasp_robot::TipShape;
 use regrasp_robot::kinematics::finger_ik::FingerIk;
 use regrasp_robot::kinematics::motion_bound::MotionBound;
@@ -23,6 +24,8 @@ pub struct FingerModel<'a> {
     pub ik: &'a FingerIk,
     /// Radius of the ball tip; zero for a sharp one.
     pub tip_radius: f64,
+    /// What the tip transmits where it touches.
+    pub contact: ContactModel,
     /// Bounds of the motion of the tip's centre.
     pub tip_bound: MotionBound,
     /// Indices of its bodies in [`Model::bodies`].
@@ -148,6 +151,7 @@ impl<'a> Model<'a> {
             let ik = &finger.ik;
             fingers.push(FingerModel {
                 tip_radius: finger.tip.radius(),
+                contact: finger.tip.contact,
                 tip_bound: MotionBound::new(
                     &finger.chain,
                     finger.chain.joints.len() - 1,
@@ -218,6 +222,27 @@ impl<'a> Model<'a> {
     /// Number of fingers.
     pub fn n_fingers(&self) -> usize {
         self.fingers.len()
+    }
+
+    /// Contact of `finger` with what its tip transmits.
+    #[inline]
+    pub fn grip(&self, finger: usize, contact: &Contact) -> Grip {
+        Grip { contact: *contact, model: self.fingers[finger].contact }
+    }
+
+    /// Closure margin of the fingers whose bit is set in `holding`, each at its contact; the first found that is enough.
+    pub fn closure_margin(&self, contacts: &[Contact], holding: u32) -> f64 {
+        let grips: ArrayVec<Grip, MAX_FINGERS> = (0..contacts.len())
+            .filter(|&finger| holding & (1 << finger) != 0)
+            .map(|finger| self.grip(finger, &contacts[finger]))
+            .collect();
+        closure::closure_margin(&grips, &self.frame, self.settings.closure_margin)
+    }
+
+    /// All fingers, as bits.
+    #[inline]
+    pub fn all_fingers(&self) -> u32 {
+        (1 << self.fingers.len()) - 1
     }
 
     /// Length by which angles of object poses are weighed against distances: the object's radius.

@@ -4,7 +4,6 @@ use super::model::Model;
 use super::state::{Motion, Sequence};
 use super::workspace::{Contacts, HandJoints};
 use regrasp_geometry::Pose;
-use regrasp_grasp::{Contact, closure};
 use regrasp_plan::plan::{
     ContactMode, ContactState, FORMAT, FORMAT_VERSION, Plan, PlanInput, PoseData, Promises, Segment, SegmentKind,
     Statistics, Waypoint,
@@ -19,13 +18,13 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, way: &Sequence, mut
     let scene = model.scene;
     let start = way.start();
     let mut segments = Vec::with_capacity(way.steps().len());
-    let mut kept_margin = closure::closure_margin(&start.contacts, &model.frame);
+    let mut kept_margin = model.closure_margin(&start.contacts, model.all_fingers());
     let mut state = start;
     for step in way.steps() {
         match step.motion() {
             Motion::Transfer(moments) => {
                 statistics.transfers += 1;
-                kept_margin = kept_margin.min(closure::closure_margin(&state.contacts, &model.frame));
+                kept_margin = kept_margin.min(model.closure_margin(&state.contacts, model.all_fingers()));
                 let mut waypoints = vec![waypoint(&state.world_from_object, &state.joints, &state.contacts, None)];
                 waypoints
                     .extend(moments.iter().map(|m| waypoint(&m.world_from_object, &m.joints, &state.contacts, None)));
@@ -33,9 +32,8 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, way: &Sequence, mut
             }
             Motion::Regrasp { finger, path } => {
                 statistics.relocations += 1;
-                let holding: Vec<Contact> =
-                    (0..state.contacts.len()).filter(|f| f != finger).map(|f| state.contacts[f]).collect();
-                kept_margin = kept_margin.min(closure::closure_margin(&holding, &model.frame));
+                let holding = model.all_fingers() & !(1 << finger);
+                kept_margin = kept_margin.min(model.closure_margin(&state.contacts, holding));
                 let mut waypoints = vec![waypoint(&state.world_from_object, &state.joints, &state.contacts, None)];
                 let mut joints = state.joints.clone();
                 for (k, at) in path.iter().enumerate() {
@@ -51,7 +49,7 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, way: &Sequence, mut
         }
         state = step.end();
     }
-    kept_margin = kept_margin.min(closure::closure_margin(&state.contacts, &model.frame));
+    kept_margin = kept_margin.min(model.closure_margin(&state.contacts, model.all_fingers()));
     if segments.is_empty() {
         // Start and goal are the same and any grasp will do: hold still.
         let here = waypoint(&start.world_from_object, &start.joints, &start.contacts, None);

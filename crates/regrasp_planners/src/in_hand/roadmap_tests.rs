@@ -11,7 +11,7 @@ use super::workspace::HandJoints;
 use regrasp_base::Budget;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Point, Pose};
-use regrasp_grasp::Contact;
+use regrasp_grasp::{Contact, Grip};
 use regrasp_plan::check::closure::{Body, margin};
 use regrasp_robot::import::LoadOptions;
 use regrasp_scene::{LoadedScene, load_scene};
@@ -78,8 +78,8 @@ fn paths_on_the_sphere_follow_great_circles_and_stay_closed_without_any_finger()
                     let on_arc = (from * ((1.0 - t) * angle).sin() + to * (t * angle).sin()) / angle.sin();
                     assert!((state.contacts[f].point_in_object.coords - on_arc).norm() < 1e-9);
                     assert!((tips[f] - tip_over(model, f, &state.contacts[f])).norm() < 1e-8);
-                    let others: Vec<Contact> =
-                        (0..model.n_fingers()).filter(|&g| g != f).map(|g| state.contacts[g]).collect();
+                    let others: Vec<Grip> =
+                        (0..model.n_fingers()).filter(|&g| g != f).map(|g| model.grip(g, &state.contacts[g])).collect();
                     assert!(margin(&others, &body) > 0.0, "without finger {f} at {t}");
                 }
             }

@@ -7,7 +7,7 @@ use super::settings::InHandSettings;
 use super::workspace::{Contacts, HandJoints, TipMode, Workspace};
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
-use regrasp_grasp::{Contact, closure};
+use regrasp_grasp::Contact;
 use regrasp_plan::plan::{Plan, Segment, SegmentKind, Waypoint};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use regrasp_scene::Scene;
@@ -56,8 +56,8 @@ fn validate_segment(model: &Model, workspace: &mut Workspace, segment: &Segment)
         return Err((0, "the segment does not begin and end with all fingers in contact".into()));
     };
     let moving = segment.moving_finger.as_ref().and_then(|name| model.scene.hand.finger_named(name)).map(|id| id.0);
-    let holding: Vec<Contact> = (0..contacts.len()).filter(|&f| Some(f) != moving).map(|f| contacts[f]).collect();
-    let margin = closure::closure_margin(&holding, &model.frame);
+    let holding = model.all_fingers() & !moving.map_or(0, |finger| 1 << finger);
+    let margin = model.closure_margin(&contacts, holding);
     if margin < model.settings.closure_margin {
         return Err((0, format!("closure margin {margin:.4} of {}", model.settings.closure_margin)));
     }

@@ -1,4 +1,7 @@
 //! Tests of the planners through their public functions, on the bundled scenes.
 
 mod in_hand_methods;
+#[path = "../../../../tests/support/places.rs"]
+mod places;
 mod segments;
+mod soft_and_coupled;

@@ -1,14 +1,14 @@
 //! Segments of plans meet to the last bit, and each plan is proven again from its waypoints alone, forwards and backwards.
 
 use crate::in_hand_methods::scene;
+use crate::places::shared_models;
 use regrasp_base::Budget;
 use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, check};
 use regrasp_planners::in_hand::{InHandSettings, Method, plan_in_hand, validate_once};
 use regrasp_robot::import::{LoadOptions, ResolveOptions};
 use regrasp_scene::{LoadedScene, load_scene};
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 fn assert_meets(plan: &Plan, which: &str) {
     for (s, pair) in plan.segments.windows(2).enumerate() {
@@ -62,23 +62,11 @@ fn segments_of_the_papers_methods_meet_exactly() {
     assert!(judge(&scene("sphere_180x.toml"), &much_cut(Method::Classic), 0..10, 100_000) >= 5);
 }
 
-/// `REGRASP_MODELS`, else `shared/models` beside a folder above; says SKIPPED when there are none.
-fn models() -> Option<PathBuf> {
-    let named = std::env::var_os("REGRASP_MODELS").map(PathBuf::from);
-    let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
-    let found = named.or_else(|| above.map(|folder| folder.join("shared/models")).find(|folder| folder.is_dir()));
-    if found.is_none() {
-        // Past the capture of test output, so that the log says it.
-        let _ = writeln!(std::io::stderr(), "SKIPPED: no shared models");
-    }
-    found
-}
-
 #[test]
 fn segments_of_a_hand_with_redundant_fingers_meet_exactly() {
-    let Some(models) = models() else { return };
+    let Some(models) = shared_models() else { return };
     let packages = vec![("models".into(), models)];
-    let options = LoadOptions { resolve: ResolveOptions { packages, search_paths: vec![] }, lenient: false };
+    let options = LoadOptions { resolve: ResolveOptions { packages, search_paths: vec![] }, ..LoadOptions::default() };
     let mut n_plans = 0;
     for (name, seeds) in [("cylinder20_x", 6..8), ("cylinder20_z", 0..4), ("sphere32_x", 0..8), ("cube57_z", 0..3)] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../scenes/allegro/{name}.toml"));

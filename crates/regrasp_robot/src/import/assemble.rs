@@ -5,6 +5,7 @@
 
 use super::finger_chain::{make_chain, rest_posture};
 use super::tip_split;
+use crate::contact_model::ContactModel;
 use crate::hand::{Finger, FingerShape, Hand, PalmShape, Tip, TipShape, convex_of};
 use crate::robot::{Joint, JointId, JointKind, LinkId, Robot};
 use nalgebra::{Translation3, UnitQuaternion};
@@ -35,6 +36,7 @@ pub(crate) struct FingerSpec {
     /// First joint of the chain; moving joints before it are held. The first after the base where none is given.
     pub first_joint: Option<JointId>,
     pub tip: TipSpec,
+    pub contact: ContactModel,
     /// Rest posture by joint name, with the place of each name; the rest in the middle of the limits.
     pub rest: Vec<(String, f64, Place)>,
     /// Where it stands, for messages.
@@ -299,7 +301,7 @@ fn make_finger(
         }
     };
     let rest = rest_posture(spec, &chain, found);
-    let tip = Tip { link: spec.tip_link, shape, center_in_body: tip_at.body_from_link * center };
+    let tip = Tip { link: spec.tip_link, shape, center_in_body: tip_at.body_from_link * center, contact: spec.contact };
     Some(Finger::new(spec.name.clone(), chain, tip, shapes, rest))
 }
 

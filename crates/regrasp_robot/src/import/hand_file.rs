@@ -3,9 +3,11 @@
 //! A bare URDF is accepted too; its fingers and tips are then guessed as `inspect` does.
 
 use super::assemble::{FingerSpec, HandSpec, TipSpec, assemble};
+use super::couplings;
 use super::resolve::{ResolveOptions, resolve_own};
 use super::srdf::{LoadedSrdf, load_srdf};
 use super::urdf::{LoadedRobot, load_robot};
+use crate::contact_model::{self, ContactModel};
 use crate::hand::Hand;
 use crate::robot::{JointId, LinkId, Robot};
 use regrasp_base::diagnostic::did_you_mean;
@@ -39,6 +41,8 @@ pub struct LoadOptions {
     /// Drop, with a note, what is not supported or not found: joints of unsupported types are held fixed, collision
     /// geometry that cannot be read is left out, unknown links in an SRDF are skipped.
     pub lenient: bool,
+    /// Contact model of fingertips of which the hand file says nothing.
+    pub contact: ContactModel,
 }
 
 /// A file that was read.
@@ -82,7 +86,7 @@ pub fn load_hand(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Input
 fn load_bare_urdf(path: &Path, options: &LoadOptions) -> Result<LoadedHand, InputError> {
     let LoadedRobot { robot, inputs, mut notes } = load_robot(path, options)?;
     let robot = Arc::new(robot);
-    let spec = crate::inspect::guess::guess_hand(&robot, path)?;
+    let spec = crate::inspect::guess::guess_hand(&robot, options.contact, path)?;
     notes.push(format!(
         "{}: fingers and tips were guessed; `regrasp inspect -o hand.toml` writes them down",
         path.display()
@@ -160,13 +164,18 @@ fn read(mut root: Table, path: &Path, options: &LoadOptions, found: &mut Found) 
     let srdf = root.optional("srdf");
     let base = root.optional("base_link");
     let allow = root.optional("allow");
+    let couplings = root.optional("couplings");
     let fingers = root.required(found, "fingers", "add at least one [[fingers]] table");
     root.finish(found);
     // Without a robot no name in the rest of the file can be looked up.
-    let (robot, mut inputs) = urdf.and_then(|entry| read_robot(&entry, path, options, found))?;
+    let (mut robot, mut inputs) = urdf.and_then(|entry| read_robot(&entry, path, options, found))?;
+    if let Some(entry) = couplings {
+        couplings::read(&entry, &mut robot, found);
+    }
+    let robot = Arc::new(robot);
     let base = base.and_then(|entry| known_link(&entry, &robot, found)).unwrap_or(robot.root);
     let mut allow = allow.map_or_else(BTreeSet::new, |entry| read_pairs(&entry, &robot, found));
-    let fingers = fingers.map_or_else(Vec::new, |entry| read_fingers(&entry, &robot, found));
+    let fingers = fingers.map_or_else(Vec::new, |entry| read_fingers(&entry, &robot, options.contact, found));
     if let Some(entry) = srdf
         && let Some(loaded) = read_srdf(&entry, path, &robot, options, found)
     {
@@ -196,7 +205,7 @@ fn read_robot(
     path: &Path,
     options: &LoadOptions,
     found: &mut Found,
-) -> Option<(Arc<Robot>, Vec<LoadedInput>)> {
+) -> Option<(Robot, Vec<LoadedInput>)> {
     let urdf = locate(entry, path, options, found)?;
     match load_robot(&urdf, options) {
         Ok(mut loaded) => {
@@ -204,7 +213,7 @@ fn read_robot(
                 name.clone_into(&mut first.name);
             }
             found.notes.extend(loaded.notes);
-            Some((Arc::new(loaded.robot), loaded.inputs))
+            Some((loaded.robot, loaded.inputs))
         }
         Err(error) => {
             found.diagnostics.extend(error);
@@ -234,16 +243,21 @@ fn read_srdf(
     }
 }
 
-fn read_fingers(entry: &Entry, robot: &Robot, found: &mut Found) -> Vec<FingerSpec> {
+fn read_fingers(entry: &Entry, robot: &Robot, contact: ContactModel, found: &mut Found) -> Vec<FingerSpec> {
     let items = entry.entries(found, "at least one [[fingers]] table").unwrap_or_default();
     if entry.is_empty_list() {
         let diagnostic = entry.error("U202", found, "is empty").expected("at least one [[fingers]] table");
         found.diagnostics.push(diagnostic);
     }
-    items.iter().filter_map(|item| read_finger(item.table(found)?, robot, found)).collect()
+    items.iter().filter_map(|item| read_finger(item.table(found)?, robot, contact, found)).collect()
 }
 
-fn read_finger(mut table: Table, robot: &Robot, found: &mut Found) -> Option<FingerSpec> {
+fn read_finger(
+    mut table: Table,
+    robot: &Robot,
+    default_contact: ContactModel,
+    found: &mut Found,
+) -> Option<FingerSpec> {
     let name = table.required(found, "name", "add name = \"thumb\"").and_then(|entry| entry.text(found));
     let tip_link = table
         .required(found, "tip_link", "add tip_link = \"...\", the link that touches")
@@ -252,6 +266,7 @@ fn read_finger(mut table: Table, robot: &Robot, found: &mut Found) -> Option<Fin
     let tip = table
         .required(found, "tip", "add tip = { shape = \"sphere\", radius = 0.012, center = [0, 0, 0] }")
         .and_then(|entry| read_tip(entry.table(found)?, found));
+    let contact = contact_model::read(&mut table, "contact", default_contact, "U218", found);
     let rest = table.optional("rest").and_then(|entry| entry.table(found));
     let mut positions = Vec::new();
     for (joint, entry) in rest.iter().flat_map(Table::all) {
@@ -264,7 +279,15 @@ fn read_finger(mut table: Table, robot: &Robot, found: &mut Found) -> Option<Fin
         Some(joint) => Some(joint?),
         None => None,
     };
-    Some(FingerSpec { name: name?.to_owned(), tip_link: tip_link?, first_joint, tip: tip?, rest: positions, place })
+    Some(FingerSpec {
+        name: name?.to_owned(),
+        tip_link: tip_link?,
+        first_joint,
+        tip: tip?,
+        contact: contact?,
+        rest: positions,
+        place,
+    })
 }
 
 fn read_tip(mut table: Table, found: &mut Found) -> Option<TipSpec> {
@@ -324,7 +347,7 @@ fn known_link(entry: &Entry, robot: &Robot, found: &mut Found) -> Option<LinkId>
     link
 }
 
-fn known_joint(entry: &Entry, robot: &Robot, found: &mut Found) -> Option<JointId> {
+pub(super) fn known_joint(entry: &Entry, robot: &Robot, found: &mut Found) -> Option<JointId> {
     let name = entry.text(found)?;
     let joint = robot.joint_named(name);
     if joint.is_none() {

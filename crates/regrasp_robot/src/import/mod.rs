@@ -9,6 +9,7 @@
 
 /// A hand from a robot and the choice of its fingers.
 pub(crate) mod assemble;
+mod couplings;
 mod finger_chain;
 /// `hand.toml`, and hands guessed from a bare URDF.
 pub mod hand_file;

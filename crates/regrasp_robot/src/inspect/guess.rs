@@ -4,6 +4,7 @@
 //! farthest from that joint.
 
 use super::tip_sphere::fit_tip;
+use crate::contact_model::ContactModel;
 use crate::import::assemble::{FingerSpec, HandSpec, TipSpec};
 use crate::robot::{JointId, JointKind, LinkId, Robot};
 use nalgebra::{Translation3, UnitQuaternion};
@@ -12,8 +13,8 @@ use regrasp_geometry::{Point, Pose};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// The hand that `robot` seems to be. Errors: nothing in it moves (`U214`).
-pub(crate) fn guess_hand(robot: &Robot, file: &Path) -> Result<HandSpec, InputError> {
+/// The hand that `robot` seems to be, with fingertips of one `contact` model. Errors: nothing in it moves (`U214`).
+pub(crate) fn guess_hand(robot: &Robot, contact: ContactModel, file: &Path) -> Result<HandSpec, InputError> {
     let last_joints = last_moving_joints(robot);
     if last_joints.is_empty() {
         return Err(Diagnostic::new("U214", Place::file(file), "has no joint that moves, so no finger")
@@ -30,7 +31,15 @@ pub(crate) fn guess_hand(robot: &Robot, file: &Path) -> Result<HandSpec, InputEr
         if fingers.iter().any(|other| other.name == name) {
             name.clone_from(link_name);
         }
-        fingers.push(FingerSpec { name, tip_link, first_joint: None, tip, rest: Vec::new(), place: Place::file(file) });
+        fingers.push(FingerSpec {
+            name,
+            tip_link,
+            first_joint: None,
+            tip,
+            contact,
+            rest: Vec::new(),
+            place: Place::file(file),
+        });
     }
     Ok(HandSpec { base, fingers, allow: BTreeSet::new() })
 }

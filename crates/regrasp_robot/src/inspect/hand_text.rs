@@ -1,5 +1,6 @@
 //! A hand as the text of a `hand.toml`.
 
+use crate::contact_model::ContactModel;
 use crate::hand::{Finger, Hand, TipShape};
 use crate::import::hand_file::{FORMAT, VERSION};
 use crate::robot::LinkId;
@@ -33,12 +34,29 @@ pub fn hand_file_text(hand: &Hand, urdf: &str, allow: &BTreeSet<(LinkId, LinkId)
         }
         let _ = writeln!(text, "]");
     }
+    for joint in &robot.joints {
+        let Some(mimic) = joint.mimic else { continue };
+        let _ = writeln!(
+            text,
+            "\n[[couplings]]\njoint = {}\nleader = {}\nmultiplier = {}\noffset = {}",
+            quoted(&joint.name),
+            quoted(&robot.joints[mimic.joint.0].name),
+            number(mimic.multiplier),
+            number(mimic.offset)
+        );
+    }
     for finger in &hand.fingers {
         let _ = writeln!(text, "\n[[fingers]]\nname = {}\ntip_link = {}", quoted(&finger.name), name(finger.tip.link));
         if let Some(first) = first_joint_if_needed(hand, finger) {
             let _ = writeln!(text, "first_joint = {}", quoted(&first));
         }
         let _ = writeln!(text, "# In the frame of the tip link.\ntip = {}", tip_text(hand, finger));
+        if finger.tip.contact != ContactModel::default() {
+            let _ = writeln!(text, "contact = {}", quoted(finger.tip.contact.name()));
+        }
+        if let ContactModel::SoftFinger { torsion_radius } = finger.tip.contact {
+            let _ = writeln!(text, "torsion_radius = {}", number(torsion_radius));
+        }
         let rest: Vec<String> = (0..finger.rest.len())
             .map(|k| {
                 let rounded = (finger.rest[k] * 1e4).round() / 1e4 + 0.0;

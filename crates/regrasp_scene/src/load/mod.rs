@@ -5,6 +5,7 @@
 //! or finger, S121 joint or finger missing; M201 units, M204 mesh far from its own origin, M205 to M207 unusable mesh, M210 no volume; P302 out of reach,
 //! P303 joint limit, P304 contact off the surface; V001 not finite, V002 quaternion not of length one, V003 zero quaternion.
 
+mod contact;
 mod files;
 mod object;
 mod pose;
@@ -20,6 +21,7 @@ use regrasp_base::InputError;
 use regrasp_base::toml_table::{Codes, Found, Table};
 use regrasp_geometry::Pose;
 use regrasp_robot::Hand;
+use regrasp_robot::contact_model::{self, ContactModel};
 use regrasp_robot::import::{LoadOptions, load_hand};
 use std::path::Path;
 
@@ -109,7 +111,7 @@ fn task_name(root: &mut Table, found: &mut Found) {
     }
 }
 
-/// `[hand]`: the hand of the file named, placed in the world, with its rest posture.
+/// `[hand]`: the hand of the file named, placed in the world, with its rest posture and contact models.
 fn hand(root: &mut Table, files: &mut Files, found: &mut Found) -> Option<Hand> {
     let mut table = root.required(found, "hand", "add [hand] with file = \"hand.toml\"")?.table(found)?;
     let file = table.required(found, "file", "add file = \"hand.toml\" or a .urdf");
@@ -122,10 +124,13 @@ fn hand(root: &mut Table, files: &mut Files, found: &mut Found) -> Option<Hand> 
         None => Some(Pose::identity()),
     };
     let rest = table.optional("rest");
+    let default_contact = contact_model::read(&mut table, "contact", ContactModel::default(), "S106", found);
+    let contacts = table.optional("contacts");
     table.finish(found);
     let file = file?;
     let path = files.locate(&file, found)?;
-    let loaded = match load_hand(&path, files.options) {
+    let options = LoadOptions { contact: default_contact?, ..files.options.clone() };
+    let loaded = match load_hand(&path, &options) {
         Ok(loaded) => loaded,
         Err(error) => {
             found.diagnostics.extend(error);
@@ -139,6 +144,9 @@ fn hand(root: &mut Table, files: &mut Files, found: &mut Found) -> Option<Hand> 
         files.inputs.push(InputFile { role: input.role, name, path: input.path, sha256: input.sha256 });
     }
     let mut hand = loaded.hand;
+    if let Some(entry) = contacts {
+        contact::apply(&entry, &mut hand, found)?;
+    }
     if let Some(entry) = rest {
         let mut values = task::joint_values(&entry.table(found)?, &hand, false, found)?.into_iter();
         for finger in &mut hand.fingers {

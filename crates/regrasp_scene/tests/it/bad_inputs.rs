@@ -479,3 +479,52 @@ fn every_cause_is_found_in_one_run() {
         assert!(messages.contains(part), "`{part}` is not in:\n{messages}");
     }
 }
+
+#[test]
+fn contact_models_that_contradict_themselves() {
+    let hand = |more: &str| {
+        let start = GOOD.find("[object]").unwrap();
+        format!("{}{more}\n\n{}", GOOD[..start].trim_end().to_owned() + "\n", &GOOD[start..])
+    };
+    refused_with(
+        &hand("contact = \"soft\""),
+        &["S104 scene.toml:", "key \"hand.contact\": is \"soft\"", "expected frictionless, point or soft_finger"],
+    );
+    refused_with(&hand("contact = \"soft_finger\""), &["S106 scene.toml:", "has no `torsion_radius` beside it"]);
+    refused_with(&hand("torsion_radius = 0.005"), &["S106 scene.toml:", "stands without a contact model"]);
+    refused_with(
+        &hand("contact = \"point\"\ntorsion_radius = 0.005"),
+        &["S106 scene.toml:", "stands beside \"point\", which has no torsion"],
+    );
+    refused_with(
+        &hand("contact = \"soft_finger\"\ntorsion_radius = 5"),
+        &[
+            "S107 scene.toml:",
+            "key \"hand.torsion_radius\": is 5",
+            "expected a length above 0 and at most 0.05, in metres",
+        ],
+    );
+    refused_with(
+        &hand("contacts = { finger_9 = { model = \"point\" } }"),
+        &["S120 scene.toml:", "key \"hand.contacts.finger_9\": is not a finger of the hand"],
+    );
+    refused_with(&hand("contacts = { east = {} }"), &["S102 scene.toml:", "has no `model`"]);
+    refused_with(
+        &hand("contacts = { east = { torsion_radius = 0.01 } }"),
+        &["S106 scene.toml:", "key \"hand.contacts.east.torsion_radius\": stands without a contact model"],
+    );
+}
+
+#[test]
+fn contact_models_of_the_scene_reach_the_fingers() {
+    use regrasp_robot::ContactModel;
+    let start = GOOD.find("[object]").unwrap();
+    let more = "contact = \"soft_finger\"\ntorsion_radius = 0.005\ncontacts = { north = { model = \"frictionless\" } }";
+    let text = format!("{}\n{more}\n\n{}", GOOD[..start].trim_end(), &GOOD[start..]);
+    let fingers = Folder::new().load(&text).unwrap().scene.hand.fingers;
+    let soft = ContactModel::SoftFinger { torsion_radius: 0.005 };
+    let expected = [soft, ContactModel::Frictionless, soft, soft];
+    assert_eq!(fingers.iter().map(|finger| finger.tip.contact).collect::<Vec<_>>(), expected);
+    let plain = Folder::new().load(GOOD).unwrap().scene.hand.fingers;
+    assert!(plain.iter().all(|finger| finger.tip.contact == ContactModel::Point));
+}

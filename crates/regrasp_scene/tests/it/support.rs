@@ -12,7 +12,7 @@ use std::path::Path;
 pub fn with_models(models: &Path) -> LoadOptions {
     LoadOptions {
         resolve: ResolveOptions { packages: vec![("models".into(), models.to_owned())], search_paths: vec![] },
-        lenient: false,
+        ..LoadOptions::default()
     }
 }
 

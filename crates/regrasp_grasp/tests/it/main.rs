@@ -1,0 +1,6 @@
+//! Closure against second ways of knowing.
+
+mod closed_forms;
+mod closure;
+mod polyhedral;
+mod sample;

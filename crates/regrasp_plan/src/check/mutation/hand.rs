@@ -1,0 +1,85 @@
+//! Good plans in hands of other contacts and couplings than they were made for, and coupled joints gone wrong.
+
+use super::{Breeder, pick};
+use crate::check::violation::ViolationKind::{ClosureLost, ContactOffTip, JointLimit, WrongScene};
+use crate::plan::{ContactMode, SegmentKind, Waypoint};
+use regrasp_robot::ContactModel;
+use std::sync::Arc;
+
+impl Breeder<'_> {
+    pub(super) fn break_contact_models(&mut self) {
+        // Sets of fingers that hold somewhere, and the torsion that they count on.
+        let holding: Vec<Vec<usize>> = self.plan.segments.iter().flat_map(|s| &s.waypoints).map(holders).collect();
+        let fingers = &self.scene.hand.fingers;
+        let is_soft = |f: usize| matches!(fingers[f].tip.contact, ContactModel::SoftFinger { .. });
+        let pair = holding.iter().find(|set| set.len() == 2 && set.iter().any(|&f| is_soft(f))).cloned();
+        let promises = &self.plan.promises;
+        let (required, friction, scale) = (promises.required_margin, promises.friction, promises.torque_scale);
+        self.add_hand("torsion that two fingers hold by is absent", &[ClosureLost], |hand, _| {
+            pair.as_ref()?.iter().for_each(|&f| hand.fingers[f].tip.contact = ContactModel::Point);
+            Some(())
+        });
+        self.add_hand("torsion that two fingers hold by is a thousandth", &[ClosureLost], |hand, _| {
+            // A twist about the line of the two is resisted by their torsion alone: no margin is larger than this.
+            let mut most = 0.0;
+            for &f in pair.as_ref()? {
+                if let ContactModel::SoftFinger { torsion_radius } = &mut hand.fingers[f].tip.contact {
+                    *torsion_radius *= 1e-3;
+                    most += friction * *torsion_radius / scale;
+                }
+            }
+            if most >= required {
+                return None;
+            }
+            Some(())
+        });
+        self.add_hand("fingertips without friction", &[ClosureLost], |hand, _| {
+            // Fewer than seven contacts without friction hold nothing.
+            hand.fingers.iter_mut().for_each(|finger| finger.tip.contact = ContactModel::Frictionless);
+            (hand.fingers.len() < 7).then_some(())
+        });
+    }
+
+    pub(super) fn break_couplings(&mut self) {
+        let moving = &self.plan.segments;
+        let coupled: Vec<usize> = (0..self.scene.hand.robot.joints.len())
+            .filter(|&joint| self.scene.hand.robot.joints[joint].mimic.is_some())
+            .filter(|&joint| self.model.fingers.iter().any(|finger| finger.moving_joints.contains(&joint)))
+            .collect();
+        let is_held = moving.iter().any(|segment| segment.kind == SegmentKind::Transfer);
+        self.add_hand("coupling broken by three degrees", &[ContactOffTip], |hand, rng| {
+            let joint = *coupled.get(rng.below(coupled.len().max(1)))?;
+            let mimic = Arc::make_mut(&mut hand.robot).joints[joint].mimic.as_mut()?;
+            mimic.offset += 3f64.to_radians();
+            is_held.then_some(())
+        });
+        self.add_hand("coupling left out", &[ContactOffTip], |hand, rng| {
+            let joint = *coupled.get(rng.below(coupled.len().max(1)))?;
+            let joint = &mut Arc::make_mut(&mut hand.robot).joints[joint];
+            // What follows nothing and is driven by nothing rests.
+            joint.mimic = None;
+            is_held.then_some(())
+        });
+        let (model, robot) = (self.model, &self.scene.hand.robot);
+        self.add("coupled joint beyond its limit", &[JointLimit], |plan, rng| {
+            let is_follower = |name: &str| robot.joint_named(name).is_some_and(|id| robot.joints[id.0].mimic.is_some());
+            let rows: Vec<_> = model.limits.iter().filter(|row| is_follower(&row.name)).collect();
+            let row = rows.get(rng.below(rows.len().max(1)))?;
+            let position = row.upper + rng.uniform(0.5f64, 1.0).to_radians();
+            pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?.joints[row.coordinate] =
+                (position - row.offset) / row.multiplier;
+            Some(())
+        });
+        self.add("coupled joint named as if it were free", &[WrongScene], |plan, rng| {
+            let joint = *coupled.get(rng.below(coupled.len().max(1)))?;
+            plan.joint_names.push(robot.joints[joint].name.clone());
+            plan.segments.iter_mut().flat_map(|segment| &mut segment.waypoints).for_each(|w| w.joints.push(0.1));
+            Some(())
+        });
+    }
+}
+
+/// Fingers that hold at a waypoint.
+fn holders(waypoint: &Waypoint) -> Vec<usize> {
+    (0..waypoint.contacts.len()).filter(|&f| waypoint.contacts[f].mode != ContactMode::Free).collect()
+}
