@@ -2,3 +2,4 @@
 
 mod in_hand_methods;
 mod segments;
+mod way_poses;
