@@ -40,12 +40,14 @@ pictures: demo
 test:
 	cargo test --locked --workspace
 
-# Writes docs/benchmarks.md and docs/benchmarks/*.csv. One thread, so that times compare. The two methods of paper 000 draw
-# poses uniformly, as the paper does.
+# Writes docs/benchmarks.md and docs/benchmarks/. One thread, so that times compare. The two methods of paper 000 draw poses
+# uniformly, as the paper does. The suites of the papers take hours; cut off and run again, they go on where they were.
 bench: release
 	$(REGRASP) bench $(WIDE) $(TIGHT) --seeds $(SEEDS) --threads 1 --time-limit 20 --csv docs/benchmarks/wide.csv
 	$(REGRASP) bench scenes/tight_sphere_180z.toml --method visibility --settings docs/benchmarks/uniform_poses.json --seeds $(CLASSIC_SEEDS) --threads 1 --time-limit 60 --csv docs/benchmarks/visibility.csv
 	$(REGRASP) bench scenes/tight_sphere_180z.toml --method classic --settings docs/benchmarks/uniform_poses.json --seeds $(CLASSIC_SEEDS) --threads 1 --time-limit 60 --csv docs/benchmarks/classic.csv
+	$(REGRASP) bench suites/paper000.toml
+	$(REGRASP) bench suites/paper004.toml
 ifneq ($(PACKAGES),)
 	$(REGRASP) bench $(ALLEGRO_REQUIRED) $(ALLEGRO_BENCH) --csv docs/benchmarks/allegro_required.csv
 	$(REGRASP) bench $(ALLEGRO_STRETCH) $(ALLEGRO_BENCH) --csv docs/benchmarks/allegro_stretch.csv
@@ -53,14 +55,14 @@ ifneq ($(PACKAGES),)
 endif
 	$(MAKE) benchmark-page
 
-# docs/benchmarks.md again, from the CSV files that are there.
+# docs/benchmarks.md again, from what was measured.
 benchmark-page: release
-	$(REGRASP) bench --page docs/benchmarks.md --limits docs/benchmarks/limits.json $(wildcard $(BENCHMARKS:%=docs/benchmarks/%.csv))
+	$(REGRASP) bench --page docs/benchmarks.md --limits docs/benchmarks/limits.json $(wildcard $(BENCHMARKS:%=docs/benchmarks/%.csv)) suites/*.toml
 
 # Slow: same bytes on 1, 2 and 8 threads (100 queries), and the checker against broken and good plans.
 campaign: release
-	$(REGRASP) campaign determinism $(WIDE) --queries 100 --threads 1,2,8
-	$(REGRASP) campaign mutations $(WIDE) --mutants 100 --good 1000
+	$(REGRASP) campaign determinism $(WIDE) scenes/cubic.toml --queries 100 --threads 1,2,8
+	$(REGRASP) campaign mutations $(WIDE) scenes/cubic.toml --mutants 100 --good 1000
 
 FUZZ_TARGETS := urdf srdf hand_toml scene_toml stl obj plan_json
 FUZZ_RUNS ?= 1000000

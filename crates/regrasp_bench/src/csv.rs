@@ -60,7 +60,7 @@ pub fn line(row: &Row) -> String {
     fields.join(",") + "\n"
 }
 
-fn quoted(text: &str) -> String {
+pub(crate) fn quoted(text: &str) -> String {
     let needs_quotes = text.contains([',', '"', '\n', '\r']);
     if needs_quotes { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
 }
@@ -77,45 +77,73 @@ pub struct Writer {
 impl Writer {
     /// Creates `PATH.partial` with the header.
     pub fn create(path: &Path) -> io::Result<Self> {
-        let mut name = path.file_name().ok_or_else(|| io::Error::from(io::ErrorKind::InvalidInput))?.to_owned();
-        name.push(".partial");
-        let partial_path = path.with_file_name(name);
-        let mut partial = File::create(&partial_path)?;
-        let text = header();
-        partial.write_all(text.as_bytes())?;
+        Writer::with_text(path, header())
+    }
+
+    /// Creates `PATH.partial` with `text`: a header, and lines that are there already.
+    pub fn with_text(path: &Path, text: String) -> io::Result<Self> {
+        let partial_path = partial_path(path);
+        // Whole or not at all: rows taken over from an earlier run are not lost when this one is cut off here.
+        regrasp_base::files::write_atomic(&partial_path, text.as_bytes())?;
+        let partial = File::options().append(true).open(&partial_path)?;
         Ok(Writer { path: path.to_owned(), partial_path, partial, text })
     }
 
     /// Appends a row.
     pub fn push(&mut self, row: &Row) -> io::Result<()> {
-        let line = line(row);
+        self.push_line(&line(row))
+    }
+
+    /// Appends a line, which ends with a line feed.
+    pub fn push_line(&mut self, line: &str) -> io::Result<()> {
         self.partial.write_all(line.as_bytes())?;
         self.partial.flush()?;
-        self.text.push_str(&line);
+        self.text.push_str(line);
         Ok(())
     }
 
     /// Writes the file whole and removes the partial one.
-    pub fn finish(self) -> io::Result<()> {
-        regrasp_base::files::write_atomic(&self.path, self.text.as_bytes())?;
+    pub fn finish(mut self) -> io::Result<()> {
+        let text = std::mem::take(&mut self.text);
+        self.finish_as(&text)
+    }
+
+    /// The same with the lines in another order: `text` is all of them with the header.
+    pub fn finish_as(self, text: &str) -> io::Result<()> {
+        regrasp_base::files::write_atomic(&self.path, text.as_bytes())?;
         std::fs::remove_file(&self.partial_path)
     }
+}
+
+/// Where the rows of `path` are kept until all are there: `PATH.partial`.
+pub fn partial_path(path: &Path) -> PathBuf {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(".partial");
+    path.with_file_name(name)
 }
 
 /// Reads what [`Writer`] wrote. Errors: a header of other columns (`V020`), a line that is not a row (`V021`).
 pub fn read(path: &Path) -> Result<Vec<Row>, InputError> {
     let text = regrasp_base::files::read_text(path)?;
-    let mut records = records(&text).into_iter();
+    Ok(read_leading(path, &text, &[])?.into_iter().map(|(_, row)| row).collect())
+}
+
+/// Rows of `text`, which came from `path`, with columns of other names before ours. Errors: as [`read`].
+pub fn read_leading(path: &Path, text: &str, leading: &[&str]) -> Result<Vec<(Vec<String>, Row)>, InputError> {
+    let mut records = records(text).into_iter();
     let names = records.next().map(|(_, fields)| fields).unwrap_or_default();
-    if names != COLUMNS {
+    let expected: Vec<&str> = leading.iter().copied().chain(COLUMNS).collect();
+    if names != expected {
         return Err(Diagnostic::new("V020", Place::line(path, 1), format!("has the columns {}", names.join(",")))
-            .expected(COLUMNS.join(","))
+            .expected(expected.join(","))
             .fix("give a CSV file that `regrasp bench --csv` of this version wrote")
             .into());
     }
     records
-        .map(|(line, fields)| {
-            row_of(&fields)
+        .map(|(line, mut fields)| {
+            let own = fields.split_off(leading.len().min(fields.len()));
+            row_of(&own)
+                .map(|row| (fields, row))
                 .ok_or_else(|| Diagnostic::new("V021", Place::line(path, line), "is not a row of a benchmark").into())
         })
         .collect()

@@ -14,6 +14,8 @@ pub mod mutations;
 pub mod page;
 /// One seed of one scene: plan, judge, measure.
 pub mod row;
+/// The tables and figures of a paper, measured again.
+pub mod suite;
 /// Smallest, median, mean and largest per scene and method.
 pub mod summary;
 

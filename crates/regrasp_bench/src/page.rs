@@ -9,8 +9,8 @@ use std::fmt::Write;
 const MAX_MISSES: usize = 60;
 
 /// The page. Each part is the name of a CSV file and its rows; parts stand in the order given, the comparison of the
-/// paper's methods after the last part that has a row of either.
-pub fn markdown(parts: &[(String, Vec<Row>)], limits: &Limits) -> String {
+/// paper's methods after the last part that has a row of either, sections of suites at the end.
+pub fn markdown(parts: &[(String, Vec<Row>)], suites: &[String], limits: &Limits) -> String {
     let mut out = String::from(
         "# Benchmarks\n\n\
          Written by `make bench`; never edited by hand. Planning times are processor times of the planner call over the solved\n\
@@ -29,6 +29,10 @@ pub fn markdown(parts: &[(String, Vec<Row>)], limits: &Limits) -> String {
         if last_of_the_paper == Some(i) {
             ratios(parts, &mut out);
         }
+    }
+    for section in suites {
+        out.push('\n');
+        out.push_str(section);
     }
     out
 }
@@ -82,7 +86,7 @@ fn within_limit(summary: &Summary, rows: &[Row], limits: &Limits) -> Option<Stri
 }
 
 /// Seeds without an accepted plan, with the cause.
-fn misses(rows: &[Row], out: &mut String) {
+pub(crate) fn misses(rows: &[Row], out: &mut String) {
     let missed: Vec<&Row> = rows.iter().filter(|row| row.status != "solved" || row.accepted == Some(false)).collect();
     if missed.is_empty() {
         return;
@@ -143,7 +147,7 @@ fn ratios(parts: &[(String, Vec<Row>)], out: &mut String) {
     }
 }
 
-fn escaped(text: &str) -> String {
+pub(crate) fn escaped(text: &str) -> String {
     regrasp_base::diagnostic::printable(text).replace('|', "\\|").replace('<', "&lt;").replace('\n', " ")
 }
 
@@ -169,7 +173,8 @@ mod tests {
             ("v.csv".into(), vec![row("visibility", "solved", 0.003)]),
             ("w.csv".into(), vec![row("gait", "solved", 0.001)]),
         ];
-        let page = markdown(&parts, &Limits::new());
+        let page = markdown(&parts, &["## A suite\n".into()], &Limits::new());
+        assert!(page.ends_with("\n## A suite\n"), "{page}");
         assert!(page.contains("| tight\\|sphere | 300 (1/2) | 3.00 (1/1) | 100 |"), "{page}");
         assert!(page.contains("- tight\\|sphere (classic) seed 0: time_limit; closure &lt;lost>"), "{page}");
         assert!(page.contains("## classic\n"));
@@ -195,7 +200,8 @@ mod tests {
             row("cube", "solved", 0.2, None),
             row("ball", "solved", 0.2, Some(true)),
         ];
-        let page = markdown(&[("a.csv".into(), rows)], &Limits::from([("cube".into(), 2.0), ("cone".into(), 1.0)]));
+        let page =
+            markdown(&[("a.csv".into(), rows)], &[], &Limits::from([("cube".into(), 2.0), ("cone".into(), 1.0)]));
         assert!(page.contains("| cube | gait | 4/5 | 2/5 (2 s) |"), "{page}");
         assert!(page.contains("| ball | gait | 1/1 | - |"), "{page}");
     }

@@ -53,6 +53,8 @@ pub struct Summary {
     pub check_s: Option<Spread>,
     /// Nodes over the solved seeds.
     pub nodes: Option<Spread>,
+    /// Grasps and contacts sampled over the solved seeds.
+    pub samples: Option<Spread>,
     /// Transfers per plan.
     pub transfers: Option<Spread>,
     /// Relocations per plan.
@@ -79,11 +81,15 @@ pub fn summarise(rows: &[Row]) -> Vec<Summary> {
             keys.push((&row.scene, &row.method));
         }
     }
-    keys.iter().map(|key| summary_of(key, rows)).collect()
+    let of = |(scene, method)| -> Vec<&Row> {
+        rows.iter().filter(|row| row.scene == scene && row.method == method).collect()
+    };
+    keys.into_iter().map(|key| summary_of_rows(&of(key))).collect()
 }
 
-fn summary_of(&(scene, method): &(&str, &str), rows: &[Row]) -> Summary {
-    let runs: Vec<&Row> = rows.iter().filter(|row| row.scene == scene && row.method == method).collect();
+/// One summary of all `runs`, named after the first.
+pub fn summary_of_rows(runs: &[&Row]) -> Summary {
+    let (scene, method) = runs.first().map_or(("", ""), |row| (&row.scene, &row.method));
     let solved: Vec<&Row> = runs.iter().copied().filter(|row| row.status == "solved").collect();
     let over = |value: fn(&Row) -> f64| Spread::of(solved.iter().map(|row| value(row)));
     let smallest = |value: fn(&Row) -> Option<f64>| solved.iter().filter_map(|row| value(row)).reduce(f64::min);
@@ -105,6 +111,7 @@ fn summary_of(&(scene, method): &(&str, &str), rows: &[Row]) -> Summary {
         without_floor: solved.len() - floored.len(),
         check_s: Spread::of(solved.iter().filter_map(|row| row.check_s)),
         nodes: over(|row| row.nodes as f64),
+        samples: over(|row| row.samples as f64),
         transfers: over(|row| row.transfers as f64),
         relocations: over(|row| row.relocations as f64),
         min_margin: smallest(|row| row.min_margin),

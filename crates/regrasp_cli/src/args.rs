@@ -140,12 +140,12 @@ pub struct Check {
 /// `regrasp bench`
 #[derive(Debug, Args)]
 pub struct Bench {
-    /// Scene files, or folders of them; CSV files with --page
+    /// Scene files, or folders of them; or one suite file; CSV and suite files with --page
     #[arg(required = true, value_name = "SCENE")]
     pub scenes: Vec<PathBuf>,
-    /// Seeds per scene: 0, 1, ...
-    #[arg(long, default_value_t = 20, value_parser = count, allow_negative_numbers = true)]
-    pub seeds: u64,
+    /// Seeds per scene: 0, 1, ... [default: 20]; of a suite, the most trials per row
+    #[arg(long, value_parser = count, allow_negative_numbers = true)]
+    pub seeds: Option<u64>,
     /// First seed
     #[arg(long, default_value_t = 0, value_parser = whole_number, allow_negative_numbers = true)]
     pub first_seed: u64,
@@ -158,6 +158,9 @@ pub struct Bench {
     /// Write one row per scene and seed
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
+    /// Folder for the results of a suite [default: the one that the suite names]
+    #[arg(long, value_name = "DIR")]
+    pub results: Option<PathBuf>,
     /// Do not judge the plans
     #[arg(long)]
     pub no_check: bool,

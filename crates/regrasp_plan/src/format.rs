@@ -15,6 +15,7 @@ mod caps {
     pub const INPUTS: usize = 10_000;
     pub const SEGMENTS: usize = 100_000;
     pub const WAYPOINTS: usize = 2_000_000;
+    pub const WAY_POSES: usize = 10_000;
     /// Largest position, in metres or radians.
     pub const POSITION: f64 = 1e6;
     /// Diagnostics per file; a broken writer breaks every waypoint in the same way.
@@ -50,6 +51,10 @@ pub fn to_json(plan: &Plan) -> String {
     field("joint_names", compact(&plan.joint_names));
     field("fingers", compact(&plan.fingers));
     field("start", compact(&plan.start));
+    if !plan.way_poses.is_empty() {
+        let way_poses: Vec<String> = plan.way_poses.iter().map(|pose| format!("    {}", compact(pose))).collect();
+        field("way_poses", format!("[\n{}\n  ]", way_poses.join(",\n")));
+    }
     field("goal", compact(&plan.goal));
     field("statistics", compact(&plan.statistics));
     out.push_str("  \"segments\": [");
@@ -176,6 +181,7 @@ impl Reader<'_> {
             ("joint_names", plan.joint_names.len(), caps::JOINTS),
             ("fingers", plan.fingers.len(), caps::FINGERS),
             ("inputs", plan.inputs.len(), caps::INPUTS),
+            ("way_poses", plan.way_poses.len(), caps::WAY_POSES),
             ("segments", plan.segments.len(), caps::SEGMENTS),
             ("segments", n_waypoints, caps::WAYPOINTS),
         ] {
@@ -217,6 +223,15 @@ impl Reader<'_> {
         }
         self.pose(&[Key("start")], &plan.start);
         self.pose(&[Key("goal")], &plan.goal);
+        for (i, way_pose) in plan.way_poses.iter().enumerate() {
+            let at = [Key("way_poses"), Index(i)];
+            self.pose(&[at[0], at[1], Key("world_from_object")], &way_pose.world_from_object);
+            let n_waypoints = plan.segments.get(way_pose.segment).map_or(0, |segment| segment.waypoints.len());
+            if way_pose.waypoint >= n_waypoints {
+                let problem = format!("is passed at segment {}, waypoint {}", way_pose.segment, way_pose.waypoint);
+                self.fail("C409", &at, problem, "a waypoint that the plan has".into());
+            }
+        }
         if plan.segments.is_empty() {
             self.fail("C406", &[Key("segments")], "is empty".into(), "at least one segment".into());
         }
@@ -307,13 +322,16 @@ fn all_numbers(plan: &Plan) -> impl Iterator<Item = f64> + '_ {
     let p = &plan.promises;
     let promises = [p.contact_tolerance, p.friction, p.required_margin, p.kept_margin, p.torque_scale];
     let waypoints = plan.segments.iter().flat_map(|segment| &segment.waypoints);
-    promises.into_iter().chain(pose(&plan.start)).chain(pose(&plan.goal)).chain(waypoints.flat_map(move |waypoint| {
-        let contacts = waypoint
-            .contacts
-            .iter()
-            .flat_map(|contact| contact.point_in_object.into_iter().chain(contact.normal_in_object).flatten());
-        waypoint.joints.iter().copied().chain(pose(&waypoint.world_from_object)).chain(contacts)
-    }))
+    let way = plan.way_poses.iter().flat_map(move |way_pose| pose(&way_pose.world_from_object));
+    promises.into_iter().chain(pose(&plan.start)).chain(way).chain(pose(&plan.goal)).chain(waypoints.flat_map(
+        move |waypoint| {
+            let contacts = waypoint
+                .contacts
+                .iter()
+                .flat_map(|contact| contact.point_in_object.into_iter().chain(contact.normal_in_object).flatten());
+            waypoint.joints.iter().copied().chain(pose(&waypoint.world_from_object)).chain(contacts)
+        },
+    ))
 }
 
 /// Byte offset of the value that `steps` lead to. `text` is valid JSON, or nothing is found.

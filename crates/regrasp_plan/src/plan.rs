@@ -107,6 +107,18 @@ pub struct Segment {
     pub waypoints: Vec<Waypoint>,
 }
 
+/// A pose that the object has to pass between start and goal, and when it does.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WayPose {
+    /// The pose asked for.
+    pub world_from_object: PoseData,
+    /// Index of the segment in which it is passed, from 0.
+    pub segment: usize,
+    /// Index of the waypoint of that segment at which it is passed, from 0.
+    pub waypoint: usize,
+}
+
 /// What the plan promises; the checker holds it to these numbers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -173,6 +185,9 @@ pub struct Plan {
     pub fingers: Vec<String>,
     /// Object pose asked for at the start.
     pub start: PoseData,
+    /// Poses asked for between start and goal, in order; absent where none were.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub way_poses: Vec<WayPose>,
     /// Object pose asked for at the goal.
     pub goal: PoseData,
     /// The motion, in order; never empty.

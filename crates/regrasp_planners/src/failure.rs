@@ -12,6 +12,8 @@ pub enum FailureKind {
     StartInvalid,
     /// The goal is not valid as asked. Decided before any search.
     GoalInvalid,
+    /// A way pose is not valid as asked. Decided before any search.
+    WayInvalid,
     /// This hand can never do it with these contacts, for a reason that needs no search.
     Impossible,
     /// The work budget is used up: not a proof.
@@ -43,14 +45,14 @@ pub struct Cause {
     pub share: f64,
 }
 
-/// The pose nearest to the goal that was reached.
+/// The pose nearest to the goal, or to the end of the leg that failed, that was reached.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NearestMiss {
     /// The object's pose there.
     pub world_from_object: PoseData,
-    /// Angle left to the goal, in radians.
+    /// Angle left to the goal or the end of the leg, in radians.
     pub angle_left: f64,
-    /// Distance left to the goal, in metres.
+    /// Distance left to it, in metres.
     pub distance_left: f64,
     /// Joint positions there, in the order of `Hand::joint_names`.
     pub joints: Vec<f64>,
@@ -67,7 +69,9 @@ pub struct Failure {
     pub advice: String,
     /// Causes, commonest first.
     pub causes: Vec<Cause>,
-    /// The nearest that the search came to the goal, if it got anywhere.
+    /// Number of the leg that failed, from 1; none for a query without way poses, or before any search.
+    pub leg: Option<usize>,
+    /// The nearest that the search came to the goal (or to the end of that leg), if it got anywhere.
     pub nearest_miss: Option<Box<NearestMiss>>,
     /// Counts of the search.
     pub statistics: Statistics,

@@ -1,6 +1,7 @@
-//! `regrasp bench`: plan scenes with many seeds and tabulate; or make the page of CSV files.
+//! `regrasp bench`: plan scenes with many seeds and tabulate; or make the page of CSV files; suites are in `suite`.
 
 use super::plan::{refuse_input, refuse_unwritable};
+use super::suite;
 use crate::args::{self, Common};
 use crate::interrupt;
 use crate::load;
@@ -8,6 +9,7 @@ use crate::stop::Stop;
 use crate::talk::Talk;
 use regrasp::base::files;
 use regrasp_bench::row::Judge;
+use regrasp_bench::suite::is_suite;
 use regrasp_bench::{Limits, Problem, Row, RunSettings, csv, limits, page, run as run_one, summarise, summary};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -18,6 +20,13 @@ use std::sync::atomic::Ordering;
 pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), Stop> {
     if let Some(path) = &arguments.page {
         return write_page(path, &arguments.scenes, arguments.limits.as_deref(), talk);
+    }
+    if arguments.scenes.iter().any(|path| is_suite(path)) {
+        let [path] = arguments.scenes.as_slice() else {
+            let seen = format!("are {} files", arguments.scenes.len());
+            return Err(Stop::argument("A505", "SCENE", seen, "one suite, alone, or scenes"));
+        };
+        return suite::run(path, arguments, common, talk);
     }
     let cancelled = interrupt::flag()?;
     let mut writer = match &arguments.csv {
@@ -39,7 +48,8 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
     let mut rows = Vec::new();
     for path in load::scene_files(&arguments.scenes)? {
         let loaded = load::scene(&path, common, talk)?;
-        for seed in arguments.first_seed..arguments.first_seed.saturating_add(arguments.seeds) {
+        for seed in arguments.first_seed..arguments.first_seed.saturating_add(arguments.seeds.unwrap_or(DEFAULT_SEEDS))
+        {
             let query = loaded.task.query(seed);
             let row = run_one(Problem { scene: &loaded.scene, query: &query, seed }, &settings);
             if cancelled.load(Ordering::Relaxed) {
@@ -62,8 +72,11 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
     if talk.is_json() { Ok(()) } else { talk.data(&summary::table(&summaries)) }
 }
 
+/// Seeds per scene where none are given.
+const DEFAULT_SEEDS: u64 = 20;
+
 /// One line per miss, rejection or plan without floor; other solved seeds stay silent but for `--json`.
-fn say_row(row: &Row, talk: &Talk) {
+pub fn say_row(row: &Row, talk: &Talk) {
     talk.event("row", json!(row));
     if row.status != "solved" {
         let left = row.angle_left_deg.map_or(String::new(), |angle| format!(", {angle:.0} deg left"));
@@ -75,23 +88,28 @@ fn say_row(row: &Row, talk: &Talk) {
     }
 }
 
-fn write_page(path: &Path, csv_files: &[PathBuf], limits: Option<&Path>, talk: &Talk) -> Result<(), Stop> {
+/// The page of CSV files and, after them, of suites with what was measured of them.
+fn write_page(path: &Path, inputs: &[PathBuf], limits: Option<&Path>, talk: &Talk) -> Result<(), Stop> {
     make_folder_of(path)?;
     refuse_unwritable(path)?;
-    refuse_input(path, csv_files.iter().map(PathBuf::as_path).chain(limits))?;
+    refuse_input(path, inputs.iter().map(PathBuf::as_path).chain(limits))?;
     let limits = limits.map_or_else(|| Ok(Limits::new()), limits::read)?;
-    let mut parts = Vec::new();
-    for file in csv_files {
-        parts.push((file.to_string_lossy().into_owned(), csv::read(file)?));
+    let (mut parts, mut sections) = (Vec::new(), Vec::new());
+    for file in inputs {
+        if is_suite(file) {
+            sections.push(suite::section(file, path)?);
+        } else {
+            parts.push((file.to_string_lossy().into_owned(), csv::read(file)?));
+        }
     }
-    let text = page::markdown(&parts, &limits);
+    let text = page::markdown(&parts, &sections, &limits);
     files::write_atomic(path, text.as_bytes()).map_err(|error| Stop::unwritable(path, &error))?;
     talk.say(format!("wrote  {}", path.display()));
     Ok(())
 }
 
 /// Makes the folder of a file that this command is about to write.
-fn make_folder_of(path: &Path) -> Result<(), Stop> {
+pub fn make_folder_of(path: &Path) -> Result<(), Stop> {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => {
             std::fs::create_dir_all(folder).map_err(|error| Stop::unwritable(folder, &error))

@@ -6,6 +6,7 @@ mod check;
 mod demo;
 mod inspect;
 pub mod plan;
+mod suite;
 
 use crate::args::{Arguments, Command};
 use crate::stop::Stop;

@@ -107,13 +107,18 @@ pub fn say_query(query: &InHandQuery, seed: u64, n_threads: usize, talk: &Talk) 
     let (start, goal) = (&query.world_from_object_start, &query.world_from_object_goal);
     let angle = start.rotation.angle_to(&goal.rotation);
     let distance = (goal.translation.vector - start.translation.vector).norm();
+    let n_way = query.world_from_object_way.len();
+    let way = if n_way == 0 { String::new() } else { format!(", {}", counted(n_way, "way pose")) };
     talk.say(format!(
-        "query  rotation {:.0} deg, translation {:.1} mm, seed {seed}, {}",
+        "query  rotation {:.0} deg, translation {:.1} mm{way}, seed {seed}, {}",
         angle.to_degrees(),
         1e3 * distance,
         counted(n_threads, "thread")
     ));
-    talk.event("query", json!({ "angle": angle, "distance": distance, "seed": seed, "threads": n_threads }));
+    talk.event(
+        "query",
+        json!({ "angle": angle, "distance": distance, "way_poses": n_way, "seed": seed, "threads": n_threads }),
+    );
 }
 
 /// Searches, with progress, and says what was found.
@@ -183,6 +188,7 @@ pub fn failure_text(failure: &Failure) -> String {
     let heading = match failure.kind {
         FailureKind::StartInvalid => "NO PLAN: the start is not valid",
         FailureKind::GoalInvalid => "NO PLAN: the goal is not valid",
+        FailureKind::WayInvalid => "NO PLAN: a way pose is not valid",
         FailureKind::Impossible => "NO PLAN: impossible with this hand and these contacts",
         FailureKind::WorkSpent => "NO PLAN within the work allowed (not a proof)",
         FailureKind::TimeLimit => "NO PLAN within the time limit (not a proof)",
@@ -192,9 +198,10 @@ pub fn failure_text(failure: &Failure) -> String {
     if let Some(miss) = &failure.nearest_miss {
         let _ = writeln!(
             out,
-            "  nearest: the object came within {:.0} deg and {:.1} mm of the goal",
+            "  nearest: the object came within {:.0} deg and {:.1} mm of {}",
             miss.angle_left.to_degrees(),
-            1e3 * miss.distance_left
+            1e3 * miss.distance_left,
+            failure.leg.map_or("the goal".to_owned(), |leg| format!("the end of leg {leg}"))
         );
     }
     if !failure.causes.is_empty() {
@@ -236,6 +243,7 @@ mod tests {
                 Cause { reason: "finger \"thumb\" cannot reach a new contact".into(), count: 3000, share: 0.75 },
                 Cause { reason: "closure lost".into(), count: 1000, share: 0.25 },
             ],
+            leg: Some(2),
             nearest_miss: Some(Box::new(NearestMiss {
                 world_from_object: PoseData { position: [0.0; 3], quat_xyzw: [0.0, 0.0, 0.0, 1.0] },
                 angle_left: 61f64.to_radians(),
@@ -245,9 +253,13 @@ mod tests {
             statistics: Default::default(),
         };
         let text = failure_text(&failure);
-        for part in
-            ["not a proof", "within 61 deg and 1.2 mm", "4 000 tries", "75.0 %  finger \"thumb\"", "try: more time"]
-        {
+        for part in [
+            "not a proof",
+            "within 61 deg and 1.2 mm of the end of leg 2",
+            "4 000 tries",
+            "75.0 %  finger \"thumb\"",
+            "try: more time",
+        ] {
             assert!(text.contains(part), "{part} is missing in\n{text}");
         }
     }

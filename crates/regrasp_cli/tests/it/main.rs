@@ -5,5 +5,6 @@ mod commands;
 mod folder;
 #[path = "../../../../tests/support/places.rs"]
 mod places;
+mod suite;
 #[path = "../../../../tests/support/wide_scene.rs"]
 mod wide_scene;

@@ -34,6 +34,9 @@ pub fn check_form(model: &Model, plan: &Plan, log: &mut Log) {
             log.push(Violation::new(Kind::NotANumber, format!("the {name} pose is not a pose")).subjects([name]));
         }
     }
+    for (i, _) in plan.way_poses.iter().enumerate().filter(|(_, pose)| !is_pose(&pose.world_from_object)) {
+        log.push(Violation::new(Kind::NotANumber, format!("way pose {i} is not a pose")));
+    }
     let p = &plan.promises;
     let promises = [p.contact_tolerance, p.friction, p.required_margin, p.kept_margin, p.torque_scale];
     if !promises.iter().all(|x| x.is_finite()) {

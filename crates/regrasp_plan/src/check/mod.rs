@@ -33,6 +33,8 @@ pub mod promises;
 pub mod surface;
 /// What can be wrong with a plan.
 pub mod violation;
+/// Poses to be passed between start and goal.
+pub mod way;
 
 pub use files::{CheckedFiles, check_files};
 pub use violation::{Moment, Violation, ViolationKind};
@@ -51,7 +53,7 @@ pub struct CheckSettings {
     pub largest_contact_tolerance: f64,
     /// Closure margin asked of every holding set even if the plan promises less; dimensionless.
     pub smallest_margin: f64,
-    /// Start and goal may be missed by this much, in metres and radians.
+    /// Start, way poses and goal may be missed by this much, in metres and radians.
     pub pose_tolerance: f64,
     /// What must be the same (end and begin of segments, a grasp, a resting object) may differ by this much, in metres
     /// and radians: rounding, not motion.
@@ -185,6 +187,7 @@ fn judge(
 ) {
     report.n_waypoints = plan.segments.iter().map(|segment| segment.waypoints.len()).sum();
     continuity::check_ends(query, plan, settings, log);
+    way::check_way(query, plan, settings, log);
     continuity::check_meeting(plan, settings, log);
     continuity::check_joints(model, plan, settings, log);
     continuity::check_roles(model, plan, settings, log);

@@ -43,6 +43,8 @@ pub enum ViolationKind {
     StartMismatch,
     /// The plan does not end where it was asked to.
     GoalMismatch,
+    /// A pose that was to be passed on the way is not, or not in the order asked for.
+    WayPoseMissed,
     /// A segment does not begin where the one before ends.
     SegmentsDoNotMeet,
     /// No segment, or a segment with fewer than two waypoints.

@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 #[test]
 fn every_mutant_is_rejected_for_a_fitting_reason() {
     let scene = sample::scene();
-    let plan = sample::plan(&scene);
+    let plan = sample::plan_with_way(&scene);
     let query = sample::query(&plan);
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     let mut kinds = BTreeSet::new();
@@ -39,6 +39,7 @@ fn every_mutant_is_rejected_for_a_fitting_reason() {
         NotANumber,
         StartMismatch,
         GoalMismatch,
+        WayPoseMissed,
         SegmentsDoNotMeet,
         EmptySegment,
         JointLimit,

@@ -4,7 +4,7 @@
 use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Point, Pose, Shape, Vector};
-use regrasp_plan::plan::{FORMAT, FORMAT_VERSION, PlanInput, PoseData, Promises, Statistics};
+use regrasp_plan::plan::{FORMAT, FORMAT_VERSION, PlanInput, PoseData, Promises, Statistics, WayPose};
 use regrasp_plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
 use regrasp_robot::hand::PalmShape;
 use regrasp_robot::{
@@ -284,6 +284,7 @@ pub fn plan(scene: &Scene) -> Plan {
         joint_names,
         fingers: (0..N_FINGERS).map(|f| format!("f{f}")).collect(),
         start: PoseData::from(&(world_from_hand() * start)),
+        way_poses: Vec::new(),
         goal: PoseData::from(&(world_from_hand() * goal)),
         segments,
         statistics: Statistics::default(),
@@ -293,10 +294,23 @@ pub fn plan(scene: &Scene) -> Plan {
     plan
 }
 
+/// The same plan with poses to be passed: within the first transfer, at its end, and within the last one.
+pub fn plan_with_way(scene: &Scene) -> Plan {
+    let mut plan = plan(scene);
+    plan.way_poses = [(0, 5), (0, 10), (3, 4)]
+        .map(|(segment, waypoint)| {
+            let world_from_object = plan.segments[segment].waypoints[waypoint].world_from_object;
+            WayPose { world_from_object, segment, waypoint }
+        })
+        .to_vec();
+    plan
+}
+
 /// The query that [`plan`] answers.
 pub fn query(plan: &Plan) -> InHandQuery {
     InHandQuery {
         world_from_object_start: Pose::from(&plan.start),
+        world_from_object_way: plan.way_poses.iter().map(|pose| Pose::from(&pose.world_from_object)).collect(),
         world_from_object_goal: Pose::from(&plan.goal),
         start_grasp: GraspRequest::Automatic,
         goal_grasp: GraspRequest::Automatic,

@@ -6,9 +6,8 @@ use super::tally::Tally;
 use crate::failure::{Failure, NearestMiss};
 use rayon::prelude::*;
 use regrasp_base::Interrupt;
-use regrasp_geometry::frame;
+use regrasp_geometry::{Pose, frame};
 use regrasp_plan::plan::{PoseData, Statistics};
-use regrasp_scene::InHandQuery;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What an attempt left behind, whether it succeeded or not.
@@ -22,7 +21,9 @@ pub struct Left {
     pub n_nodes: u64,
     /// Samples.
     pub n_samples: u64,
-    /// The state nearest to the goal, with its distance.
+    /// Index of the farthest leg begun.
+    pub leg: usize,
+    /// The state nearest to the goal of that leg, with its distance.
     pub nearest: Option<(f64, super::state::GraspState)>,
     /// True when a wall-clock limit cut something that a plan was found without.
     pub cut_by_time: bool,
@@ -36,6 +37,7 @@ impl Left {
             work: search.workspace.work,
             n_nodes: search.n_nodes,
             n_samples: search.n_samples,
+            leg: search.leg,
             nearest: search.nearest.clone(),
             cut_by_time: search.cut_by_time,
         }
@@ -54,14 +56,15 @@ impl Left {
         }
     }
 
-    /// The failure that all attempts together are.
-    pub fn failure(self, model: &Model, query: &InHandQuery, interrupt: Interrupt, n_attempts: usize) -> Failure {
+    /// The failure that all attempts together are; `poses` are those of the query, from start to goal.
+    pub fn failure(self, model: &Model, poses: &[Pose], interrupt: Interrupt, n_attempts: usize) -> Failure {
         let limit = match interrupt {
             Interrupt::WorkSpent => "within the work allowed",
             Interrupt::Deadline => "within the time limit",
             Interrupt::Cancelled => "until interrupted",
         };
-        let goal = &query.world_from_object_goal;
+        let n_legs = poses.len() - 1;
+        let goal = &poses[self.leg + 1];
         let nearest_miss = self.nearest.as_ref().map(|(_, state)| NearestMiss {
             world_from_object: PoseData::from(&state.world_from_object),
             angle_left: frame::rotation_between(&state.world_from_object, goal).norm(),
@@ -69,13 +72,16 @@ impl Left {
             joints: state.joints.iter().flatten().copied().collect(),
         });
         let nearest_miss = nearest_miss.map(Box::new);
+        let end = if self.leg + 1 == n_legs { "the goal".to_owned() } else { format!("way pose {}", self.leg + 1) };
         let reached = nearest_miss.as_ref().map_or("no grasp was found at the start pose".to_owned(), |miss| {
             format!(
-                "the object came within {:.1} degrees and {:.1} mm of the goal",
+                "the object came within {:.1} degrees and {:.1} mm of {end}",
                 miss.angle_left.to_degrees(),
                 miss.distance_left * 1e3
             )
         });
+        let leg = (n_legs > 1).then_some(self.leg + 1);
+        let where_stuck = leg.map_or(String::new(), |leg| format!("leg {leg} of {n_legs} failed: "));
         let causes = self.tally.causes(model);
         let advice = match causes.first() {
             Some(cause) if nearest_miss.is_none() => {
@@ -86,9 +92,13 @@ impl Left {
         };
         Failure {
             kind: interrupt.into(),
-            message: format!("no plan {limit} (not a proof), searching from scratch {}: {reached}", times(n_attempts)),
+            message: format!(
+                "no plan {limit} (not a proof), searching from scratch {}: {where_stuck}{reached}",
+                times(n_attempts)
+            ),
             advice,
             causes,
+            leg,
             nearest_miss,
             statistics: Statistics {
                 cut_by_time: interrupt != Interrupt::WorkSpent,
@@ -103,7 +113,10 @@ impl Left {
         self.n_nodes += other.n_nodes;
         self.n_samples += other.n_samples;
         self.cut_by_time |= other.cut_by_time;
-        if let Some((distance, _)) = &other.nearest
+        if other.leg > self.leg {
+            (self.leg, self.nearest) = (other.leg, other.nearest);
+        } else if let Some((distance, _)) = &other.nearest
+            && other.leg == self.leg
             && self.nearest.as_ref().is_none_or(|(least, _)| distance < least)
         {
             self.nearest = other.nearest;

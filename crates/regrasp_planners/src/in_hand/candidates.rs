@@ -150,9 +150,13 @@ pub fn draw_footholds(
 
 /// A random pose near the way from `start` to `goal` (in-hand-notes, 3: biased poses).
 pub fn draw_pose(model: &Model, start: &Pose, goal: &Pose, rng: &mut Rng) -> Pose {
+    let settings = &model.settings;
+    let is_far = rng.chance(settings.far_share);
+    let (distance, angle) = (settings.wander_distance, settings.wander_angle);
+    let distance = if is_far { distance.max(model.scene.object.radius()) } else { distance };
     let along = interpolate_pose(start, goal, rng.unit());
-    let shift = Vector::from(rng.direction()) * (model.settings.wander_distance * rng.unit().cbrt());
-    let turn = Vector::new(rng.normal(), rng.normal(), rng.normal()) * model.settings.wander_angle;
+    let shift = Vector::from(rng.direction()) * (distance * rng.unit().cbrt());
+    let turn = Vector::new(rng.normal(), rng.normal(), rng.normal()) * angle;
     let center = along * model.scene.object.center_of_mass;
     let rotation = nalgebra::UnitQuaternion::from_scaled_axis(turn) * along.rotation;
     // Turn about the centre of mass, then shift.

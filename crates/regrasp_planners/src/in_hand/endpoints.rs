@@ -17,26 +17,30 @@ use regrasp_scene::GraspRequest;
 /// Distance of a given fingertip from the surface, and of a given contact point, that still counts as touching.
 const TOUCHING: f64 = 1e-4;
 
-/// Which end of the query.
+/// Which pose of the query.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum End {
     /// The start.
     Start,
+    /// A pose on the way, by its number from 1.
+    Way(usize),
     /// The goal.
     Goal,
 }
 
 impl End {
-    fn name(self) -> &'static str {
+    fn name(self) -> String {
         match self {
-            End::Start => "start",
-            End::Goal => "goal",
+            End::Start => "start".into(),
+            End::Way(number) => format!("way pose {number}"),
+            End::Goal => "goal".into(),
         }
     }
 
     fn failure(self, message: String, advice: &str) -> Failure {
         let kind = match self {
             End::Start => FailureKind::StartInvalid,
+            End::Way(_) => FailureKind::WayInvalid,
             End::Goal => FailureKind::GoalInvalid,
         };
         refusal(kind, message, advice)
@@ -49,6 +53,7 @@ fn refusal(kind: FailureKind, message: String, advice: &str) -> Failure {
         message,
         advice: advice.into(),
         causes: Vec::new(),
+        leg: None,
         nearest_miss: None,
         statistics: Default::default(),
     }
@@ -79,19 +84,34 @@ pub fn refuse_impossible(model: &Model) -> Result<(), Failure> {
 
 /// Refuses an object pose at which the object itself is in collision with palm or obstacles.
 pub fn refuse_buried_object(model: &Model, end: End, world_from_object: &Pose) -> Result<(), Failure> {
+    let Some(other) = blocking_body(model, world_from_object) else { return Ok(()) };
+    Err(end.failure(
+        format!(
+            "at the {} the object \"{}\" is in collision with \"{}\", or nearer than {} m; nothing was moved",
+            end.name(),
+            model.bodies[model.object].name,
+            model.bodies[other].name,
+            model.settings.clearance
+        ),
+        "move the object away from it, or make the clearance smaller",
+    ))
+}
+
+/// The first body of palm or obstacles that the object by itself comes too near to, if one is.
+pub fn blocking_body(model: &Model, world_from_object: &Pose) -> Option<usize> {
     let object = &model.bodies[model.object];
     let at_object = Placement::from(world_from_object).then(&object.carrier_from_body);
-    for pair in &model.pairs {
+    model.pairs.iter().find_map(|pair| {
         let other = if pair.a == model.object {
             pair.b
         } else if pair.b == model.object {
             pair.a
         } else {
-            continue;
+            return None;
         };
         let body = &model.bodies[other];
         if !matches!(body.carrier, Carrier::World) {
-            continue;
+            return None;
         }
         let mut direction = Vector::zeros();
         let clearance = model.settings.clearance;
@@ -116,20 +136,8 @@ pub fn refuse_buried_object(model: &Model, end: End, world_from_object: &Pose) -
                     .as_ref()
                     .is_some_and(|tree| tree_apart(tree, &body.carrier_from_body, &object.shape, &at_object))
         };
-        if !matches!(answer, Answer::SeparatedBy(_)) && !exactly_apart() {
-            return Err(end.failure(
-                format!(
-                    "at the {} the object \"{}\" is in collision with \"{}\", or nearer than {} m; nothing was moved",
-                    end.name(),
-                    object.name,
-                    body.name,
-                    clearance
-                ),
-                "move the object away from it, or make the clearance smaller",
-            ));
-        }
-    }
-    Ok(())
+        (!matches!(answer, Answer::SeparatedBy(_)) && !exactly_apart()).then_some(other)
+    })
 }
 
 /// The grasp that the query gives at one end; None where the planner chooses.

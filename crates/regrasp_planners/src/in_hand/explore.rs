@@ -1,7 +1,7 @@
 //! explore(): samples GS_n by the random loop generator and links the samples inside it (paper 000, section 4.2.2; paper
 //! 004, algorithm 2).
 
-use super::candidates::{Candidate, draw_contact, draw_pose, reach};
+use super::candidates::{Candidate, draw_contact, reach};
 use super::combine::{Choice, ClosureTable};
 use super::link::{GraspSpace, LocalMethod, Roadmap};
 use super::search::{Search, Stop};
@@ -57,7 +57,7 @@ pub fn draw_state(search: &mut Search) -> Option<GraspState> {
     let model = search.model();
     let (start, goal) = (search.start, search.goal);
     let pose = if search.rng.chance(model.settings.guided_share) {
-        draw_pose(model, &start, &goal, &mut search.rng)
+        search.draw_pose()
     } else {
         draw_turned_pose(search, &start, &goal)
     };

@@ -3,7 +3,6 @@
 //! In place of sampling GS_n and linking (paper 000, section 4.2) the trees only ever hold what is feasible. Motions can be
 //! gone backwards, so what leads from the goal leads to it.
 
-use super::candidates::draw_pose;
 use super::search::{Search, Stop};
 use super::shorten::{Arrival, change_grasp, whole_transfer};
 use super::state::{GraspState, Sequence};
@@ -67,7 +66,7 @@ fn draw_target(search: &mut Search, trees: &[Tree; 2], growing: usize) -> Target
     let other = &trees[1 - growing];
     let is_young = trees[0].nodes.len() + trees[1].nodes.len() < EAGER_NODES;
     if !is_young && !search.rng.chance(search.model().settings.goal_share) {
-        return Target::Anywhere(draw_pose(search.model(), &search.start, &search.goal, &mut search.rng));
+        return Target::Anywhere(search.draw_pose());
     }
     if other.places.len() > 1 && search.rng.chance(OTHER_SHARE) {
         return Target::Other(nearest_of_some(search, &trees[growing], other));

@@ -23,10 +23,14 @@ mod gait;
 mod grasp_path;
 /// Grasps at a given object pose.
 mod grasps;
+/// Legs of a query, from way pose to way pose.
+mod legs;
 /// Links between grasps.
 mod link;
 /// The scene prepared for planning.
 mod model;
+/// Narrow passages at the ends of a leg.
+mod passage;
 /// Candidates gathered at one pose.
 mod pool;
 /// The plan as it is written to a file.
@@ -66,6 +70,7 @@ pub use validate::{NotProven, validate_once};
 use crate::failure::Failure;
 use attempts::{Left, run_attempts};
 use endpoints::{End, given_grasp, refuse_buried_object, refuse_impossible};
+use legs::{Legs, plan_legs};
 use model::Model;
 use regrasp_base::{Budget, Rng};
 use regrasp_plan::Plan;
@@ -99,24 +104,34 @@ pub fn plan_in_hand(
 ) -> Result<Plan, Failure> {
     settings.validate().expect("settings are validated where they are read");
     let model = Model::new(scene, &effective(settings));
+    let poses = query.poses();
     let (start_pose, goal_pose) = (query.world_from_object_start, query.world_from_object_goal);
     refuse_impossible(&model)?;
     refuse_buried_object(&model, End::Start, &start_pose)?;
+    for (index, pose) in query.world_from_object_way.iter().enumerate() {
+        refuse_buried_object(&model, End::Way(index + 1), pose)?;
+    }
     refuse_buried_object(&model, End::Goal, &goal_pose)?;
     let mut rng = Rng::keyed(seed, "given_grasps", 0);
     let start_grasp = given_grasp(&model, End::Start, &start_pose, &query.start_grasp, &mut rng)?;
     let goal_grasp = given_grasp(&model, End::Goal, &goal_pose, &query.goal_grasp, &mut rng)?;
 
-    let base_work = if settings.method == Method::Gait { settings.restart_work } else { budget.max_work };
+    let legs = Legs { poses: &poses, start_grasp: start_grasp.as_ref(), goal_grasp: goal_grasp.as_ref() };
+    let base_work = if settings.method == Method::Gait {
+        settings.restart_work.saturating_mul(legs.n_legs() as u64)
+    } else {
+        budget.max_work
+    };
     let found = run_attempts(settings.n_threads, base_work, budget.max_work, |index, work, winner| {
-        let poses = (start_pose, goal_pose);
-        let mut search = Search::new(&model, poses, (seed, index), (budget, work), winner, progress);
-        let solution = solve(&mut search, start_grasp.clone(), goal_grasp.as_ref());
+        let mut search = Search::new(&model, (start_pose, goal_pose), (seed, index), (budget, work), winner, progress);
+        let solution = plan_legs(&mut search, &legs);
         (solution, Left::of(&search))
     });
     match found {
-        Ok((way, left, n_restarts)) => Ok(record::record(&model, query, seed, &way, left.statistics(n_restarts))),
-        Err((interrupt, left, n_attempts)) => Err(left.failure(&model, query, interrupt, n_attempts)),
+        Ok((solution, left, n_restarts)) => {
+            Ok(record::record(&model, query, seed, &solution, left.statistics(n_restarts)))
+        }
+        Err((interrupt, left, n_attempts)) => Err(left.failure(&model, &poses, interrupt, n_attempts)),
     }
 }
 
@@ -127,19 +142,4 @@ fn effective(settings: &InHandSettings) -> InHandSettings {
         effective.release_rule = ReleaseRule::EverywhereEveryFinger;
     }
     effective
-}
-
-/// One attempt: search, then shortcuts.
-fn solve(
-    search: &mut Search,
-    start: Option<state::GraspState>,
-    goal: Option<&state::GraspState>,
-) -> Result<state::Sequence, search::Stop> {
-    let mut way = match search.model().settings.method {
-        Method::Gait => gait::grow(search, start, goal)?,
-        Method::Visibility => visibility::build(search, start, goal)?,
-        Method::Classic => classic::build(search, start, goal)?,
-    };
-    shorten::shorten(search, &mut way, goal.is_none());
-    Ok(way)
 }

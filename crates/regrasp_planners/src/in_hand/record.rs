@@ -1,21 +1,23 @@
 //! The plan as it is written to a file.
 
+use super::legs::Solution;
 use super::model::Model;
-use super::state::{Motion, Sequence};
+use super::state::Motion;
 use super::workspace::{Contacts, HandJoints};
 use regrasp_geometry::Pose;
 use regrasp_plan::plan::{
     ContactMode, ContactState, FORMAT, FORMAT_VERSION, Plan, PlanInput, PoseData, Promises, Segment, SegmentKind,
-    Statistics, Waypoint,
+    Statistics, WayPose, Waypoint,
 };
 use regrasp_scene::InHandQuery;
 
 /// Largest distance of a holding fingertip from its contact that plans promise, in metres (issue: at most 0.5 mm).
 pub const CONTACT_TOLERANCE: f64 = 0.0005;
 
-/// Makes the plan of the motions `way`.
-pub fn record(model: &Model, query: &InHandQuery, seed: u64, way: &Sequence, mut statistics: Statistics) -> Plan {
+/// Makes the plan of `solution`.
+pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution, mut statistics: Statistics) -> Plan {
     let scene = model.scene;
+    let Solution { way, steps_to_way } = solution;
     let start = way.start();
     let mut segments = Vec::with_capacity(way.steps().len());
     let mut kept_margin = model.closure_margin(&start.contacts, model.all_fingers());
@@ -82,10 +84,23 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, way: &Sequence, mut
         joint_names: scene.hand.joint_names(),
         fingers: scene.hand.fingers.iter().map(|finger| finger.name.clone()).collect(),
         start: PoseData::from(&query.world_from_object_start),
+        way_poses: way_poses(query, &segments, steps_to_way),
         goal: PoseData::from(&query.world_from_object_goal),
         segments,
         statistics,
     }
+}
+
+/// Each way pose with the last waypoint of the leg that leads to it; every step is a segment.
+fn way_poses(query: &InHandQuery, segments: &[Segment], steps_to_way: &[usize]) -> Vec<WayPose> {
+    let passed = |&n_steps: &usize| match n_steps.checked_sub(1) {
+        Some(segment) => (segment, segments[segment].waypoints.len() - 1),
+        None => (0, 0),
+    };
+    let poses = query.world_from_object_way.iter().zip(steps_to_way.iter().map(passed));
+    poses
+        .map(|(pose, (segment, waypoint))| WayPose { world_from_object: PoseData::from(pose), segment, waypoint })
+        .collect()
 }
 
 fn waypoint(pose: &Pose, joints: &HandJoints, contacts: &Contacts, free: Option<usize>) -> Waypoint {

@@ -1,7 +1,9 @@
 //! What all methods of the in-hand planner share: scratch memory, random numbers, budget, tally.
 
 use super::Progress;
+use super::candidates::draw_pose;
 use super::model::Model;
+use super::passage::Passages;
 use super::state::GraspState;
 use super::tally::Tally;
 use super::workspace::Workspace;
@@ -17,16 +19,19 @@ pub struct Search<'a> {
     pub rng: Rng,
     /// Why attempts failed.
     pub tally: Tally,
-    /// The state nearest to the goal pose so far, with its distance.
+    /// Index of the leg that is being planned.
+    pub leg: usize,
+    /// The state nearest to the leg's goal pose so far, with its distance.
     pub nearest: Option<(f64, GraspState)>,
     /// Nodes made.
     pub n_nodes: u64,
     /// Grasps and contacts sampled.
     pub n_samples: u64,
-    /// Start pose of the query.
+    /// Start pose of the leg.
     pub start: Pose,
-    /// Goal pose of the query.
+    /// Goal pose of the leg.
     pub goal: Pose,
+    passages: Passages,
     /// Index of the attempt.
     pub attempt: usize,
     /// True when a wall-clock limit cut something that a plan was found without.
@@ -67,11 +72,13 @@ impl<'a> Search<'a> {
             workspace: Workspace::new(model),
             rng: Rng::keyed(seed, "attempt", attempt as u64),
             tally: Tally::default(),
+            leg: 0,
             nearest: None,
             n_nodes: 0,
             n_samples: 0,
             start,
             goal,
+            passages: Passages::default(),
             attempt,
             cut_by_time: false,
             budget,
@@ -80,6 +87,13 @@ impl<'a> Search<'a> {
             progress,
             next_report: REPORT_EVERY,
         }
+    }
+
+    /// Turns to another leg; what was learnt about failures stays.
+    pub fn begin_leg(&mut self, leg: usize, start: Pose, goal: Pose) {
+        (self.leg, self.start, self.goal) = (leg, start, goal);
+        (self.nearest, self.n_nodes) = (None, 0);
+        self.passages = Passages::of(self.model(), [&start, &goal]);
     }
 
     /// The scene, prepared.
@@ -101,6 +115,13 @@ impl<'a> Search<'a> {
         // The caller's work limit is shared out among the attempts, this one's share being `work_limit`.
         self.budget.check_caller().map_err(Stop::Budget)?;
         if work >= self.work_limit { Err(Stop::Restart) } else { Ok(()) }
+    }
+
+    /// A random pose near the way, or out of a passage at one of its ends.
+    pub fn draw_pose(&mut self) -> Pose {
+        let model = self.model();
+        let way_out = self.passages.draw(model.settings.passage_share, &mut self.rng);
+        way_out.unwrap_or_else(|| draw_pose(model, &self.start, &self.goal, &mut self.rng))
     }
 
     /// Distance between poses, with angles weighed by the object's radius.

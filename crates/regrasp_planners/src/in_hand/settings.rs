@@ -43,6 +43,45 @@ pub enum Alpha {
         /// Number of nodes at which the value is halved.
         scale: f64,
     },
+    /// Biased by growth (paper 004, section IV-A, which gives no formula): merging has the probability `first` in the empty
+    /// graph and comes nearer to `last` as the graph grows, half of the way at `scale` nodes.
+    Growing {
+        /// Probability of a merge in the empty graph.
+        first: f64,
+        /// Probability that it tends to.
+        last: f64,
+        /// Number of nodes at which half of the way is gone.
+        scale: f64,
+    },
+}
+
+impl Alpha {
+    /// The share of exploration after `n_merges` attempts to merge components, with `n_nodes` in the graph.
+    pub fn value(&self, n_merges: u32, n_nodes: usize) -> f64 {
+        match *self {
+            Alpha::Constant { value } => value,
+            Alpha::Decreasing { start, step, end } => (start - step * f64::from(n_merges)).max(end),
+            Alpha::Adaptive { start, end, scale } => (start / (1.0 + n_nodes as f64 / scale)).max(end),
+            Alpha::Growing { first, last, scale } => {
+                let grown = n_nodes as f64 / (n_nodes as f64 + scale);
+                1.0 - (first + (last - first) * grown)
+            }
+        }
+    }
+
+    /// What is wrong with it, if anything.
+    fn validate(&self) -> Result<(), String> {
+        let (shares, above_zero) = match *self {
+            Alpha::Constant { value } => ([value, value], 1.0),
+            Alpha::Decreasing { start, step, end } => ([start, end], if step >= 0.0 { 1.0 } else { step }),
+            Alpha::Adaptive { start, end, scale } => ([start, end], scale),
+            Alpha::Growing { first, last, scale } => ([first, last], scale),
+        };
+        if shares.iter().all(|share| (0.0..=1.0).contains(share)) && above_zero > 0.0 && above_zero.is_finite() {
+            return Ok(());
+        }
+        Err(format!("alpha is {self:?}; shares must be between 0 and 1, a step at least 0, a scale above 0"))
+    }
 }
 
 /// When a finger may let go.
@@ -90,6 +129,11 @@ pub struct InHandSettings {
     pub wander_distance: f64,
     /// How far it may turn away from it, standard deviation (in-hand-notes, 3: 0.4 rad).
     pub wander_angle: f64,
+    /// Share of poses drawn as far off the straight way as the object is large: long objects must travel to turn (paper 000,
+    /// section 5.1, example 3).
+    pub far_share: f64,
+    /// Share of poses drawn straight out of a passage, where an end of the way lies in one (paper 000, example 4).
+    pub passage_share: f64,
     /// Share of extensions towards the goal, the others towards a pose nearby (real-hands-notes, 2: 0.75).
     pub goal_share: f64,
     /// What a try at a pose costs when the next pose is chosen, as a share of the object's radius.
@@ -128,6 +172,8 @@ impl Default for InHandSettings {
             rrt_iterations: 100,
             wander_distance: 0.02,
             wander_angle: 0.4,
+            far_share: 0.1,
+            passage_share: 0.5,
             goal_share: 0.7,
             try_fee: 0.6,
             aimless_share: 0.6,
@@ -160,6 +206,8 @@ impl InHandSettings {
             ("closure_margin", self.closure_margin),
             ("contact_allowance", self.contact_allowance),
             ("limit_margin", self.limit_margin),
+            ("far_share", self.far_share),
+            ("passage_share", self.passage_share),
             ("goal_share", self.goal_share),
             ("guided_share", self.guided_share),
         ] {
@@ -173,6 +221,32 @@ impl InHandSettings {
         if self.lift_heights.is_empty() || self.lift_heights.iter().any(|h| !(*h > 0.0 && *h < 0.2)) {
             return Err("lift_heights must be a list of heights between 0 and 0.2 m".into());
         }
-        Ok(())
+        self.alpha.validate()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn alpha_follows_its_schedule() {
+        let decreasing = Alpha::Decreasing { start: 0.5, step: 0.005, end: 0.3 };
+        assert_eq!([0, 20, 40, 1000].map(|merges| decreasing.value(merges, 7)), [0.5, 0.4, 0.3, 0.3]);
+        let adaptive = Alpha::Adaptive { start: 0.9, end: 0.1, scale: 50.0 };
+        assert_eq!([0, 50, 1_000_000].map(|nodes| adaptive.value(3, nodes)), [0.9, 0.45, 0.1]);
+        // Explores first, merges more and more.
+        let growing = Alpha::Growing { first: 0.1, last: 0.7, scale: 100.0 };
+        assert_eq!([0, 100].map(|nodes| growing.value(3, nodes)), [0.9, 0.6]);
+        assert!((growing.value(0, usize::MAX) - 0.3).abs() < 1e-9);
+        for alpha in [decreasing, adaptive, growing, Alpha::Constant { value: 1.0 }] {
+            assert_eq!(alpha.validate(), Ok(()));
+            let text = serde_json::to_string(&alpha).unwrap();
+            assert_eq!(serde_json::from_str::<Alpha>(&text).unwrap(), alpha, "{text}");
+        }
+        assert!(Alpha::Constant { value: 1.5 }.validate().is_err());
+        assert!(Alpha::Decreasing { start: 0.5, step: -0.1, end: 0.3 }.validate().is_err());
+        assert!(Alpha::Growing { first: 0.1, last: f64::NAN, scale: 1.0 }.validate().is_err());
+        assert!(Alpha::Adaptive { start: 0.9, end: 0.1, scale: 0.0 }.validate().is_err());
     }
 }

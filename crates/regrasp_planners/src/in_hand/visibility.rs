@@ -6,7 +6,6 @@ use super::decompose::decompose;
 use super::explore::{draw_state_at, explore, roadmap_of};
 use super::link::{Link, LocalMethod, Roadmap};
 use super::search::{Search, Stop};
-use super::settings::Alpha;
 use super::state::{GraspState, Sequence};
 use super::tally::Reason;
 use regrasp_geometry::Pose;
@@ -28,7 +27,7 @@ pub fn build(
     let mut n_merges = 0;
     loop {
         while !roadmap.components().same(START, GOAL) {
-            if search.rng.unit() < alpha(&search.model().settings.alpha, n_merges, roadmap.nodes().len()) {
+            if search.rng.unit() < search.model().settings.alpha.value(n_merges, roadmap.nodes().len()) {
                 explore(search, &mut roadmap, LocalMethod::GraspPath)?;
             } else {
                 n_merges += 1;
@@ -67,15 +66,6 @@ fn draw_end(search: &mut Search, pose: &Pose) -> Result<GraspState, Stop> {
         if let Some(state) = draw_state_at(search, pose) {
             return Ok(state);
         }
-    }
-}
-
-/// The share of exploration (paper 000, section 5.2), after `n_merges` attempts to merge components and with `n_nodes`.
-fn alpha(schedule: &Alpha, n_merges: u32, n_nodes: usize) -> f64 {
-    match *schedule {
-        Alpha::Constant { value } => value,
-        Alpha::Decreasing { start, step, end } => (start - step * f64::from(n_merges)).max(end),
-        Alpha::Adaptive { start, end, scale } => (start / (1.0 + n_nodes as f64 / scale)).max(end),
     }
 }
 

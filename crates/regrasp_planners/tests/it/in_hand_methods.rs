@@ -17,7 +17,7 @@ pub fn scene(name: &str) -> LoadedScene {
     load_scene(&path, &LoadOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"))
 }
 
-fn settings(method: Method, n_threads: usize) -> InHandSettings {
+pub fn settings(method: Method, n_threads: usize) -> InHandSettings {
     // Alpha as in paper 000's box example.
     let alpha = Alpha::Decreasing { start: 0.5, step: 0.005, end: 0.3 };
     InHandSettings { method, n_threads, alpha, ..InHandSettings::default() }

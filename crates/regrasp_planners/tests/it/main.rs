@@ -5,3 +5,4 @@ mod in_hand_methods;
 mod places;
 mod segments;
 mod soft_and_coupled;
+mod way_poses;

@@ -1,6 +1,5 @@
 //! Positions, orientations and turns in scene files.
 
-use nalgebra::UnitQuaternion;
 use regrasp_base::toml_table::{Entry, Found, Table};
 use regrasp_geometry::{Pose, UnitVector, Vector, pose_from};
 
@@ -60,17 +59,17 @@ pub(super) fn pose(table: &mut Table, found: &mut Found) -> Option<Pose> {
     Some(pose_from(position?.into(), quaternion?))
 }
 
-/// `{ axis, angle_deg }`: a turn about an axis of the world.
-pub(super) fn turn(entry: &Entry, found: &mut Found) -> Option<UnitQuaternion<f64>> {
+/// `{ axis, angle_deg }`: a turn about an axis of the world; the angle in radians.
+pub(super) fn turn(entry: &Entry, found: &mut Found) -> Option<(UnitVector, f64)> {
     let mut table = entry.table(found)?;
     let axis = table
         .required(found, "axis", "add axis = \"x\", \"y\", \"z\" or [x, y, z]")
         .and_then(|entry| axis(&entry, found));
     let angle = table
         .required(found, "angle_deg", "add angle_deg = 90")
-        .and_then(|entry| entry.number_that(found, "degrees between -360 and 360", |angle| angle.abs() <= 360.0));
+        .and_then(|entry| entry.number_that(found, "degrees between -3600 and 3600", |angle| angle.abs() <= 3600.0));
     table.finish(found);
-    Some(UnitQuaternion::from_axis_angle(&axis?, angle?.to_radians()))
+    Some((axis?, angle?.to_radians()))
 }
 
 fn axis(entry: &Entry, found: &mut Found) -> Option<UnitVector> {

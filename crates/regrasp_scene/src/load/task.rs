@@ -1,4 +1,4 @@
-//! `[start]` and `[goal]`: what is asked, and how a seed resolves what the file leaves open.
+//! `[start]`, `[[way]]` and `[goal]`: what is asked, and how a seed resolves what the file leaves open.
 
 use super::pose;
 use crate::query::{GraspRequest, InHandQuery};
@@ -6,8 +6,9 @@ use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_base::Rng;
 use regrasp_base::toml_table::{Entry, Found, Table, suggestion};
 use regrasp_geometry::frame::rotation_between;
-use regrasp_geometry::{Point, Pose, Vector, pose_from};
+use regrasp_geometry::{Point, Pose, UnitVector, Vector, pose_from};
 use regrasp_robot::Hand;
+use std::f64::consts::PI;
 
 /// A start position may be drawn from a ball of at most this radius, in metres.
 const MAX_POSITION_WITHIN: f64 = 1.0;
@@ -15,6 +16,8 @@ const MAX_POSITION_WITHIN: f64 = 1.0;
 const SAME_POSITION: f64 = 1e-9;
 /// Start and goal nearer than this are the same, in radians.
 const SAME_ANGLE: f64 = 1e-9;
+/// Most way poses that a file may give.
+const MAX_WAY: usize = 1000;
 
 /// Orientation at the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,18 +28,49 @@ pub enum StartOrientation {
     Random,
 }
 
-/// Where the object has to go.
+/// Where the object has to go: the goal, or a pose on the way.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Goal {
     /// To a pose of the world.
     Pose(Pose),
-    /// Turned about its own origin, by world axes, and moved.
+    /// Turned about its own origin, by world axes, and moved: both as seen from the start.
     Turn {
-        /// Rotation, in the world frame, applied after the start orientation.
-        rotation: UnitQuaternion<f64>,
+        /// Axis, in the world frame; the turn is applied after the start orientation.
+        axis: UnitVector,
+        /// Angle, in radians; may exceed half a turn.
+        angle: f64,
         /// Displacement of the object's origin, in the world frame.
         shift: Vector,
     },
+}
+
+impl Goal {
+    /// The pose, seen from the start as drawn.
+    fn pose(&self, start: &Pose) -> Pose {
+        self.pose_at(start, 1.0)
+    }
+
+    /// The pose at a share of the turn and the displacement; that of a goal in the world does not depend on it.
+    fn pose_at(&self, start: &Pose, share: f64) -> Pose {
+        match self {
+            Goal::Pose(pose) => *pose,
+            Goal::Turn { axis, angle, shift } => {
+                let position = start.translation.vector + shift * share;
+                let rotation = UnitQuaternion::from_axis_angle(axis, angle * share);
+                Pose::from_parts(Translation3::from(position), rotation * start.rotation)
+            }
+        }
+    }
+
+    /// Legs that a turn is broken into, so that each is below half a turn; half a turn itself is one leg.
+    fn n_legs(&self) -> usize {
+        match self {
+            Goal::Turn { angle, .. } if angle.abs() > PI + SAME_ANGLE => {
+                (angle.abs() / PI + SAME_ANGLE).floor() as usize + 1
+            }
+            _ => 1,
+        }
+    }
 }
 
 /// The in-hand task of a scene file, before a seed resolves its randomness.
@@ -50,6 +84,8 @@ pub struct InHandTask {
     pub start_orientation: StartOrientation,
     /// Grasp at the start.
     pub start_grasp: GraspRequest,
+    /// Poses that the object has to pass, in order; without those that break up a goal beyond half a turn.
+    pub way: Vec<Goal>,
     /// Where the object has to go.
     pub goal: Goal,
     /// Grasp at the goal.
@@ -70,15 +106,13 @@ impl InHandTask {
             let drawn = Rng::keyed(seed, "start_orientation", 0).quat_xyzw();
             start.rotation = pose_from([0.0; 3], drawn).rotation * start.rotation;
         }
-        let goal = match &self.goal {
-            Goal::Pose(pose) => *pose,
-            Goal::Turn { rotation, shift } => {
-                Pose::from_parts(Translation3::from(start.translation.vector + shift), rotation * start.rotation)
-            }
-        };
+        let mut way: Vec<Pose> = self.way.iter().map(|pose| pose.pose(&start)).collect();
+        let n_legs = self.goal.n_legs();
+        way.extend((1..n_legs).map(|leg| self.goal.pose_at(&start, leg as f64 / n_legs as f64)));
         InHandQuery {
             world_from_object_start: start,
-            world_from_object_goal: goal,
+            world_from_object_way: way,
+            world_from_object_goal: self.goal.pose(&start),
             start_grasp: self.start_grasp.clone(),
             goal_grasp: self.goal_grasp.clone(),
         }
@@ -112,18 +146,37 @@ pub(super) fn start(root: &mut Table, hand: Option<&Hand>, found: &mut Found) ->
     })
 }
 
-/// Reads `[goal]` and joins it with the start.
-pub(super) fn task(
-    root: &mut Table,
-    start: Option<Start>,
-    hand: Option<&Hand>,
-    found: &mut Found,
-) -> Option<InHandTask> {
-    let fix = "add [goal] with turn = { axis = \"x\", angle_deg = 90 } or position and quat_xyzw";
-    let mut table = root.required(found, "goal", fix)?.table(found)?;
+/// Reads `[[way]]`. Errors: as for a goal, but a turn beyond half a turn (`S107`), and too many (`S107`).
+fn way(root: &mut Table, found: &mut Found) -> Option<Vec<Goal>> {
+    let Some(entry) = root.optional("way") else { return Some(Vec::new()) };
+    let entries = entry.entries(found, "tables [[way]]")?;
+    if entries.len() > MAX_WAY {
+        let diagnostic = entry.error("S107", found, format!("has {} poses", entries.len()));
+        found.diagnostics.push(diagnostic.expected(format!("at most {MAX_WAY}")));
+        return None;
+    }
+    let mut poses = Vec::with_capacity(entries.len());
+    for entry in &entries {
+        let mut table = entry.table(found)?;
+        let pose = pose_or_turn(&mut table, found);
+        table.finish(found);
+        if let Some(pose) = &pose
+            && pose.n_legs() > 1
+        {
+            let diagnostic = entry.error("S107", found, "turns by more than 180 degrees, which is no single pose");
+            found.diagnostics.push(diagnostic.expected("a turn of at most 180 degrees as seen from the start"));
+            return None;
+        }
+        poses.push(pose);
+    }
+    poses.into_iter().collect()
+}
+
+/// A pose of the world, or a turn and displacement seen from the start. Errors: both (`S106`), neither (`S102`).
+fn pose_or_turn(table: &mut Table, found: &mut Found) -> Option<Goal> {
     let absolute = table.present(&["position", "quat_xyzw", "quat_wxyz"]);
     let relative = table.present(&["turn", "move"]);
-    let goal = match (absolute.first(), relative.first()) {
+    match (absolute.first(), relative.first()) {
         (Some(absolute), Some(relative)) => {
             let diagnostic = relative
                 .error("S106", found, format!("cannot stand beside {}", absolute.name))
@@ -132,22 +185,48 @@ pub(super) fn task(
             None
         }
         (None, None) => {
-            let diagnostic = table.error("S102", found, "says neither a pose nor a turn").fix(fix);
+            let diagnostic = table.error("S102", found, "says neither a pose nor a turn").fix(POSE_FIX);
             found.diagnostics.push(diagnostic);
             None
         }
-        (Some(_), None) => pose::pose(&mut table, found).map(Goal::Pose),
-        (None, Some(_)) => relative_goal(&mut table, found),
-    };
+        (Some(_), None) => pose::pose(table, found).map(Goal::Pose),
+        (None, Some(_)) => relative_goal(table, found),
+    }
+}
+
+/// How to say a pose.
+const POSE_FIX: &str = "add turn = { axis = \"x\", angle_deg = 90 } or position and quat_xyzw";
+
+/// Reads `[[way]]` and `[goal]` and joins them with the start.
+pub(super) fn task(
+    root: &mut Table,
+    start: Option<Start>,
+    hand: Option<&Hand>,
+    found: &mut Found,
+) -> Option<InHandTask> {
+    let way = way(root, found);
+    let fix = "add [goal] with turn = { axis = \"x\", angle_deg = 90 } or position and quat_xyzw";
+    let mut table = root.required(found, "goal", fix)?.table(found)?;
+    let goal = pose_or_turn(&mut table, found);
+    if let (Some(way), Some(goal)) = (&way, &goal)
+        && !way.is_empty()
+        && goal.n_legs() > 1
+    {
+        let diagnostic = table.error("S106", found, "turns by more than 180 degrees beside [[way]]");
+        found
+            .diagnostics
+            .push(diagnostic.fix("give the last pose by a turn of at most 180 degrees, and the others in [[way]]"));
+    }
     let goal_grasp = grasp(&mut table, hand, found);
     let span = table.span.clone();
     table.finish(found);
-    let (start, goal) = (start?, goal?);
+    let (start, way, goal) = (start?, way?, goal?);
     let task = InHandTask {
         world_from_object_start: start.pose?,
         position_within: start.position_within,
         start_orientation: start.orientation,
         start_grasp: start.grasp,
+        way,
         goal,
         goal_grasp,
     };
@@ -158,15 +237,16 @@ pub(super) fn task(
 }
 
 fn relative_goal(table: &mut Table, found: &mut Found) -> Option<Goal> {
-    let rotation = match table.optional("turn") {
+    let turn = match table.optional("turn") {
         Some(entry) => pose::turn(&entry, found),
-        None => Some(UnitQuaternion::identity()),
+        None => Some((Vector::z_axis(), 0.0)),
     };
     let shift = match table.optional("move") {
         Some(entry) => entry.numbers::<3>(found).map(Vector::from),
         None => Some(Vector::zeros()),
     };
-    Some(Goal::Turn { rotation: rotation?, shift: shift? })
+    let (axis, angle) = turn?;
+    Some(Goal::Turn { axis, angle, shift: shift? })
 }
 
 fn is_goal_start(task: &InHandTask) -> bool {
@@ -175,6 +255,9 @@ fn is_goal_start(task: &InHandTask) -> bool {
         return false;
     }
     let query = task.query(0);
+    if !query.world_from_object_way.is_empty() {
+        return false;
+    }
     let (start, goal) = (&query.world_from_object_start, &query.world_from_object_goal);
     (start.translation.vector - goal.translation.vector).norm() < SAME_POSITION
         && rotation_between(start, goal).norm() < SAME_ANGLE

@@ -35,15 +35,17 @@ pub(super) fn check_sizes(hand: &Hand, object: &Object, root: &mut Table, found:
     found.diagnostics.push(diagnostic);
 }
 
-/// Reports start and goal positions that no finger can reach whatever its joints do (`P302`).
+/// Reports positions of start, way and goal that no finger can reach whatever its joints do (`P302`).
 pub(super) fn check_reach(hand: &Hand, object: &Object, task: &InHandTask, root: &mut Table, found: &mut Found) {
     let query = task.query(0);
     let object_reach = object.shape.reach_from(&Point::origin());
     let slack = task.position_within * 2.0;
     let is_goal_fixed = matches!(task.goal, Goal::Pose(_)) || task.start_orientation == StartOrientation::Given;
-    let ends = [("start", query.world_from_object_start), ("goal", query.world_from_object_goal)];
-    for (key, pose) in ends {
-        if key == "goal" && !is_goal_fixed {
+    let mut poses = vec![("start", query.world_from_object_start)];
+    poses.extend(query.world_from_object_way.iter().take(task.way.len()).map(|pose| ("way", *pose)));
+    poses.push(("goal", query.world_from_object_goal));
+    for (key, pose) in poses {
+        if key != "start" && !is_goal_fixed {
             continue;
         }
         let Some((distance, reach)) = beyond_reach(hand, &pose, object_reach + slack) else { continue };

@@ -198,6 +198,22 @@ fn goal_said_twice() {
 }
 
 #[test]
+fn way_poses_that_cannot_be() {
+    let way = |text: &str| with("[goal]", &format!("{text}\n[goal]"));
+    refused_with(&way("[[way]]\n"), &["S102", "table \"way[0]\"", "says neither a pose nor a turn"]);
+    refused_with(
+        &way("[[way]]\nmove = [0, 0, 0]\n[[way]]\nmove = [0, 0, 0]\nposition = [0, 0, 0.08]"),
+        &["S106", "key \"way[1].move\": cannot stand beside way[1].position"],
+    );
+    refused_with(&way("[[way]]\nturn = { axis = \"z\", angle_deg = 200 }"), &["S107", "no single pose"]);
+    refused_with(&way("[way]\nmove = [0, 0, 0]"), &["S103", "expected tables [[way]]"]);
+    refused_with(&way("[[way]]\nmove = [0, 0, 0]\ngrasp = \"automatic\""), &["S101", "way[0].grasp"]);
+    refused_with(&way("[[way]]\nposition = [0, 0, 7.8]"), &["P302", "position [0, 0, 7.8]"]);
+    let both = way("[[way]]\nmove = [0, 0, 0]").replace("angle_deg = 90", "angle_deg = 360");
+    refused_with(&both, &["S106", "turns by more than 180 degrees beside [[way]]"]);
+}
+
+#[test]
 fn bad_axis() {
     refused_with(
         &with("axis = \"x\"", "axis = \"X\""),
@@ -206,7 +222,7 @@ fn bad_axis() {
     refused_with(&with("axis = \"x\"", "axis = [0, 0, 0]"), &["S107", "is the zero vector"]);
     refused_with(
         &with("angle_deg = 90", "angle_deg = 5156"),
-        &["S107", "is 5156; expected degrees between -360 and 360"],
+        &["S107", "is 5156; expected degrees between -3600 and 3600"],
     );
 }
 

@@ -23,9 +23,16 @@ fn center_in_world(loaded: &LoadedScene, world_from_object: &Pose) -> Point {
     world_from_object * loaded.scene.object.center_of_mass
 }
 
+/// Scenes of the papers that are more than a turn in place.
+const PAPER_SCENES: [&str; 5] = ["bulb", "cubic", "ellipsoid_free", "ellipsoid_obstacle", "pencil"];
+
 #[test]
 fn scenes_of_the_bundled_hands_load_without_models() {
-    let paths = scenes_in("");
+    let mut paths = scenes_in("");
+    let is_of_paper =
+        |path: &PathBuf| PAPER_SCENES.iter().any(|name| path.file_stem().is_some_and(|stem| stem == *name));
+    assert_eq!(paths.iter().filter(|path| is_of_paper(path)).count(), PAPER_SCENES.len());
+    paths.retain(|path| !is_of_paper(path));
     assert_eq!(paths.len(), 8);
     for path in paths {
         let loaded = load(&path, &LoadOptions::default());
@@ -41,6 +48,52 @@ fn scenes_of_the_bundled_hands_load_without_models() {
             assert_eq!(input.sha256, regrasp_base::files::sha256(&std::fs::read(&input.path).unwrap()));
             assert!(!Path::new(&input.name).is_absolute(), "{}", input.name);
         }
+    }
+}
+
+#[test]
+fn the_bulb_is_what_its_generator_writes() {
+    let written = std::fs::read_to_string(repository().join("assets/objects/bulb.obj")).unwrap();
+    assert_eq!(
+        written,
+        crate::bulb_mesh::obj(),
+        "cargo run -p regrasp_scene --example bulb_mesh > assets/objects/bulb.obj"
+    );
+}
+
+#[test]
+fn the_bulb_is_round_closed_and_as_large_as_its_scene_says() {
+    let loaded = load(&repository().join("scenes/bulb.toml"), &LoadOptions::default());
+    assert_eq!(loaded.notes, Vec::<String>::new(), "closed and wound outwards");
+    let regrasp_geometry::Shape::Mesh(mesh) = &loaded.scene.object.shape else { panic!("the bulb is a mesh") };
+    let radius_at = |low: f64, high: f64| {
+        let there = mesh.vertices().iter().filter(|v| v.z >= low && v.z <= high);
+        there.map(|v| v.x.hypot(v.y)).fold(0.0, f64::max)
+    };
+    assert!((radius_at(-0.024, 0.024) - 0.024).abs() < 2e-4);
+    assert!((radius_at(0.030, 0.050) - 0.009).abs() < 1e-6);
+    let center = loaded.scene.object.center_of_mass;
+    assert!(center.x.hypot(center.y) < 1e-9 && center.z > 0.0 && center.z < 0.012, "{center}");
+    // 2 mm of play: the socket's faces are 11 mm off the vertical axis.
+    for obstacle in loaded.scene.obstacles.iter().filter(|obstacle| obstacle.name != "socket_roof") {
+        let regrasp_geometry::Shape::Cuboid { half_extents } = &obstacle.placed.shape else { panic!("boxes") };
+        let at = obstacle.placed.parent_from_shape.translation.vector;
+        assert!((at.x.hypot(at.y) - half_extents.x - 0.011).abs() < 1e-6, "{}", obstacle.name);
+    }
+}
+
+#[test]
+fn the_cube_turns_all_the_way_in_three_legs() {
+    let loaded = load(&repository().join("scenes/cubic.toml"), &LoadOptions::default());
+    let poses = loaded.task.query(3).poses();
+    assert_eq!(poses.len(), 4);
+    let step = nalgebra::UnitQuaternion::from_axis_angle(&nalgebra::Vector3::x_axis(), 120f64.to_radians());
+    for pair in poses.windows(2) {
+        assert!(
+            (pair[1].rotation * pair[0].rotation.inverse()).angle_to(&step) < 1e-9,
+            "all legs go the same way round"
+        );
+        assert_eq!(pair[0].translation, pair[1].translation);
     }
 }
 

@@ -1,6 +1,9 @@
 //! Tests of the scene crate over real scene files.
 
 mod bad_inputs;
+#[expect(dead_code, reason = "its `main` writes to stdout; here the text is compared")]
+#[path = "../../examples/bulb_mesh.rs"]
+mod bulb_mesh;
 mod bundled;
 mod pairs;
 #[path = "../../../../tests/support/places.rs"]

@@ -56,6 +56,36 @@ fn goals_are_absolute_or_relative() {
 }
 
 #[test]
+fn way_poses_are_absolute_or_seen_from_the_start_as_drawn() {
+    let way = "[[way]]\nmove = [0.0, 0.01, 0.0]\n[[way]]\nposition = [0.0, 0.0, 0.07]\n\n[goal]";
+    let text = GOOD.replace("[goal]", way).replace("0.078]", "0.078]\nposition_within = 0.01");
+    let query = task(&text).query(5);
+    let [first, second] = query.world_from_object_way.as_slice() else { panic!("two poses") };
+    let start = query.world_from_object_start;
+    assert!((first.translation.vector - start.translation.vector - Vector::new(0.0, 0.01, 0.0)).norm() < 1e-15);
+    assert_eq!(first.rotation, start.rotation);
+    assert_eq!(second.translation.vector, Vector::new(0.0, 0.0, 0.07));
+    assert_eq!(query.poses().len(), 4);
+    assert_eq!(task(GOOD).query(5).world_from_object_way, []);
+}
+
+#[test]
+fn turns_beyond_half_a_turn_are_broken_into_legs_below_it() {
+    for (angle, n_legs) in [(180.0, 1), (-180.0, 1), (181.0, 2), (-270.0, 2), (360.0, 3), (539.0, 3), (720.0, 5)] {
+        let text = GOOD.replace("angle_deg = 90 }", &format!("angle_deg = {angle} }}\nmove = [0.0, 0.0, 0.006]"));
+        let poses = task(&text).query(0).poses();
+        assert_eq!(poses.len() - 1, n_legs, "{angle}");
+        // Added up leg by leg, the angle is the one asked for.
+        let sum: f64 = poses.windows(2).map(|p| (p[1].rotation * p[0].rotation.inverse()).scaled_axis().x).sum();
+        if n_legs > 1 {
+            assert!((sum.to_degrees() - angle).abs() < 1e-9, "{angle}: {}", sum.to_degrees());
+        }
+        let rise = poses[1].translation.z - poses[0].translation.z;
+        assert!((rise - 0.006 / n_legs as f64).abs() < 1e-15);
+    }
+}
+
+#[test]
 fn grasps_are_read_by_name() {
     let contacts =
         "{ contacts = { south = [0, -0.032, 0], east = [0.032, 0, 0], west = [-0.032, 0, 0], north = [0, 0.032, 0] } }";

@@ -1,0 +1,380 @@
+//! Suites: the tables and figures of a paper, measured again. `docs/suite-format.md` says what a suite file may contain.
+//!
+//! Codes: B600 not TOML or not the shape of a suite, B601 another format or version, B602 a value that makes no sense.
+
+/// Points of a figure as SVG.
+pub mod chart;
+/// The results of a suite as Markdown.
+pub mod results;
+/// Rows of a suite as CSV; those of an earlier run are taken over.
+pub mod rows;
+
+use regrasp_base::{Diagnostic, InputError, Place};
+use regrasp_planners::InHandSettings;
+use regrasp_planners::in_hand::Alpha;
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// Value of `format` in a suite file.
+pub const FORMAT: &str = "regrasp-suite";
+/// Value of `format_version` that this version reads.
+pub const FORMAT_VERSION: u32 = 1;
+
+/// A suite file, read.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Suite {
+    /// Always `regrasp-suite`.
+    pub format: String,
+    /// Version of the format.
+    pub format_version: u32,
+    /// Heading of the results.
+    pub title: String,
+    /// Said under the heading.
+    #[serde(default)]
+    pub note: String,
+    /// Folder for the results, relative to the suite file.
+    pub results: PathBuf,
+    /// Work allowed per trial, in configurations looked at.
+    #[serde(default = "default_max_work")]
+    pub max_work: u64,
+    /// Tables.
+    #[serde(default)]
+    pub tables: Vec<Table>,
+    /// Figures.
+    #[serde(default)]
+    pub figures: Vec<Figure>,
+}
+
+fn default_max_work() -> u64 {
+    20_000_000
+}
+
+/// A table of the paper.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Table {
+    /// Heading.
+    pub title: String,
+    /// Said under the heading.
+    #[serde(default)]
+    pub note: String,
+    /// What the paper reports.
+    #[serde(default)]
+    pub published: Vec<Published>,
+    /// What is measured.
+    pub rows: Vec<Entry>,
+}
+
+/// A row of the paper's own table: a mean, or smallest, mean and largest.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Published {
+    /// Name of the row.
+    pub name: String,
+    /// Seconds.
+    pub time_s: Vec<f64>,
+    /// Nodes of the graph.
+    #[serde(default)]
+    pub nodes: Vec<f64>,
+    /// Nodes generated, where the paper tells them from those of the graph.
+    #[serde(default)]
+    pub generated: Vec<f64>,
+}
+
+/// A scene, planned with many seeds.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Entry {
+    /// Name of the row, unique in its table.
+    pub name: String,
+    /// Scene file, relative to the suite file.
+    pub scene: PathBuf,
+    /// Trials: seeds 0, 1, ...
+    pub trials: u64,
+    /// Wall-clock time allowed per trial, in seconds.
+    #[serde(default)]
+    pub time_limit_s: Option<f64>,
+    /// Work allowed per trial, where it is not the suite's.
+    #[serde(default)]
+    pub max_work: Option<u64>,
+    /// Largest mean processor time asked for, in seconds: the results say whether it was met.
+    #[serde(default)]
+    pub mean_at_most_s: Option<f64>,
+    /// Settings of the planner that are not the default.
+    #[serde(default)]
+    pub settings: InHandSettings,
+}
+
+/// A figure of the paper: mean time against a constant alpha, a panel per curve.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Figure {
+    /// Name of its SVG file, without extension.
+    pub name: String,
+    /// Heading.
+    pub title: String,
+    /// Said under the heading.
+    #[serde(default)]
+    pub note: String,
+    /// Values of alpha, within `[0, 1]`.
+    pub alpha: Vec<f64>,
+    /// Curves; `settings.alpha` is replaced by the value of each point.
+    pub curves: Vec<Entry>,
+}
+
+/// A row of a table or a point of a figure, to be measured.
+#[derive(Debug, Clone)]
+pub struct Job {
+    /// Where it stands, such as `Table 1/gait, 90 x` or `figure_10/sphere/0.3`; unique in the suite.
+    pub name: String,
+    /// Scene file.
+    pub scene: PathBuf,
+    /// Trials.
+    pub trials: u64,
+    /// Wall-clock limit per trial, in seconds.
+    pub time_limit_s: Option<f64>,
+    /// Work limit per trial.
+    pub max_work: u64,
+    /// Settings of the planner.
+    pub settings: InHandSettings,
+}
+
+impl Suite {
+    /// Everything that is to be measured, in order. Scenes are found from the folder of `suite_path`.
+    pub fn jobs(&self, suite_path: &Path) -> Vec<Job> {
+        let folder = suite_path.parent().unwrap_or(Path::new(""));
+        let job = |name: String, entry: &Entry, settings: InHandSettings| Job {
+            name,
+            scene: folder.join(&entry.scene),
+            trials: entry.trials,
+            time_limit_s: entry.time_limit_s,
+            max_work: entry.max_work.unwrap_or(self.max_work),
+            settings,
+        };
+        let mut jobs = Vec::new();
+        for table in &self.tables {
+            jobs.extend(table.rows.iter().map(|row| job(table.job_name(row), row, row.settings.clone())));
+        }
+        for figure in &self.figures {
+            for curve in &figure.curves {
+                for &value in &figure.alpha {
+                    let settings = InHandSettings { alpha: Alpha::Constant { value }, ..curve.settings.clone() };
+                    jobs.push(job(figure.job_name(curve, value), curve, settings));
+                }
+            }
+        }
+        jobs
+    }
+
+    /// Folder for the results.
+    pub fn results_folder(&self, suite_path: &Path) -> PathBuf {
+        suite_path.parent().unwrap_or(Path::new("")).join(&self.results)
+    }
+
+    /// What makes no sense, one sentence each.
+    fn faults(&self) -> Vec<String> {
+        let mut faults = Vec::new();
+        let entries = self.tables.iter().flat_map(|table| &table.rows);
+        for entry in entries.chain(self.figures.iter().flat_map(|figure| &figure.curves)) {
+            if let Err(problem) = entry.settings.validate() {
+                faults.push(format!("row \"{}\": settings: {problem}", entry.name));
+            }
+            if entry.trials == 0 || entry.max_work == Some(0) {
+                faults.push(format!("row \"{}\": trials and max_work must be at least 1", entry.name));
+            }
+            if [entry.time_limit_s, entry.mean_at_most_s].iter().flatten().any(|s| !(*s > 0.0 && *s <= 1e7)) {
+                faults.push(format!("row \"{}\": times must be above 0 and at most 1e7 s", entry.name));
+            }
+        }
+        for figure in &self.figures {
+            if figure.alpha.is_empty() || !figure.alpha.iter().all(|value| (0.0..=1.0).contains(value)) {
+                faults.push(format!("figure \"{}\": alpha must be a list of values between 0 and 1", figure.name));
+            }
+            if figure.name.is_empty() || !figure.name.bytes().all(|b| b.is_ascii_alphanumeric() || b"_-".contains(&b)) {
+                faults.push(format!("figure \"{}\": a name is made of letters, digits, _ and -", figure.name));
+            }
+        }
+        for published in self.tables.iter().flat_map(|table| &table.published) {
+            let lists = [&published.time_s, &published.nodes, &published.generated];
+            if lists.iter().any(|list| !matches!(list.len(), 0 | 1 | 3)) {
+                faults.push(format!("published \"{}\": give a mean, or smallest, mean and largest", published.name));
+            }
+        }
+        let mut names: Vec<String> = self.jobs(Path::new("")).into_iter().map(|job| job.name).collect();
+        names.sort();
+        faults.extend(names.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| format!("\"{}\" twice", pair[0])));
+        faults
+    }
+}
+
+impl Table {
+    /// Name of the job of `row`.
+    pub fn job_name(&self, row: &Entry) -> String {
+        format!("{}/{}", self.title, row.name)
+    }
+}
+
+impl Figure {
+    /// Name of the job of a point of `curve`.
+    pub fn job_name(&self, curve: &Entry, alpha: f64) -> String {
+        format!("{}/{}/{alpha}", self.name, curve.name)
+    }
+}
+
+/// True when the file at `path` says that it is a suite.
+pub fn is_suite(path: &Path) -> bool {
+    let says_so =
+        |text: String| text.parse::<toml::Table>().ok()?.get("format").map(|format| format.as_str() == Some(FORMAT));
+    path.extension().is_some_and(|extension| extension == "toml")
+        && regrasp_base::files::read_text(path).ok().and_then(says_so) == Some(true)
+}
+
+/// Reads the suite file at `path`.
+///
+/// Errors: not TOML, an unknown or missing key or a wrong type (`B600`); another format or version (`B601`); values that
+/// make no sense (`B602`), all of them.
+pub fn read(path: &Path) -> Result<Suite, InputError> {
+    let text = regrasp_base::files::read_text(path)?;
+    let suite: Suite = toml::from_str(&text).map_err(|error| {
+        let place = Place::at_offset(path, &text, error.span().map_or(0, |span| span.start));
+        Diagnostic::new("B600", place, error.message().trim().replace('\n', "; "))
+            .expected("a suite file as in docs/suite-format.md")
+    })?;
+    if suite.format != FORMAT || suite.format_version != FORMAT_VERSION {
+        let seen = format!("is \"{}\" version {}", suite.format, suite.format_version);
+        return Err(Diagnostic::new("B601", Place::line(path, 1), seen)
+            .expected(format!("\"{FORMAT}\" version {FORMAT_VERSION}"))
+            .into());
+    }
+    let mut found = regrasp_base::diagnostic::Diagnostics::default();
+    for fault in suite.faults() {
+        found.push(Diagnostic::new("B602", Place::file(path), fault));
+    }
+    found.into_result(suite)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rows::SuiteRow;
+    use super::*;
+    use crate::row::Row;
+
+    fn repository() -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+    }
+
+    fn read_text(text: &str) -> Result<Suite, String> {
+        let path = std::env::temp_dir().join(format!("regrasp_suite_{}_{}.toml", std::process::id(), text.len()));
+        std::fs::write(&path, text).unwrap();
+        let suite = read(&path).map_err(|error| error.to_string());
+        std::fs::remove_file(&path).unwrap();
+        suite
+    }
+
+    const GOOD: &str = r#"format = "regrasp-suite"
+format_version = 1
+title = "A | suite"
+results = "out"
+[[tables]]
+title = "T"
+[[tables.published]]
+name = "published"
+time_s = [1, 5, 9]
+nodes = [7]
+[[tables.rows]]
+name = "fast"
+scene = "s.toml"
+trials = 2
+mean_at_most_s = 0.002
+[[figures]]
+name = "f"
+title = "F"
+alpha = [0.25, 0.5]
+[[figures.curves]]
+name = "c"
+scene = "s.toml"
+trials = 1
+time_limit_s = 3
+settings = { method = "visibility", guided_share = 0.0 }
+"#;
+
+    #[test]
+    fn the_suites_of_the_repository_name_scenes_that_are_there() {
+        for name in ["paper000", "paper004"] {
+            let path = repository().join("suites").join(name).with_extension("toml");
+            assert!(is_suite(&path));
+            let suite = read(&path).unwrap_or_else(|error| panic!("{error}"));
+            for job in suite.jobs(&path) {
+                assert!(job.scene.is_file() && !is_suite(&job.scene), "{}", job.scene.display());
+            }
+        }
+    }
+
+    #[test]
+    fn jobs_are_rows_and_points() {
+        let suite = read_text(GOOD).unwrap();
+        let jobs = suite.jobs(Path::new("suites/a.toml"));
+        let names: Vec<&str> = jobs.iter().map(|job| job.name.as_str()).collect();
+        assert_eq!(names, ["T/fast", "f/c/0.25", "f/c/0.5"]);
+        assert_eq!(jobs[0].scene, Path::new("suites/s.toml"));
+        assert_eq!((jobs[0].settings.n_threads, jobs[0].max_work), (1, 20_000_000));
+        assert_eq!(jobs[1].settings.alpha, Alpha::Constant { value: 0.25 });
+        assert_eq!((jobs[1].settings.guided_share, jobs[1].time_limit_s), (0.0, Some(3.0)));
+    }
+
+    #[test]
+    fn what_makes_no_sense_is_refused_with_its_reason() {
+        for (from, to, reason) in [
+            ("title = \"T\"", "titel = \"T\"", "B600"),
+            ("regrasp-suite", "regrasp-scene", "B601"),
+            ("format_version = 1", "format_version = 2", "B601"),
+            ("trials = 2", "trials = 0", "trials and max_work must be at least 1"),
+            ("[0.25, 0.5]", "[0.25, 1.5]", "alpha must be"),
+            ("[0.25, 0.5]", "[0.5, 0.5]", "\"f/c/0.5\" twice"),
+            ("time_limit_s = 3", "time_limit_s = -3", "times must be"),
+            ("guided_share = 0.0", "guided_share = 2.0", "guided_share is 2"),
+            ("guided_share = 0.0", "gided_share = 2.0", "B600"),
+            ("name = \"f\"", "name = \"../f\"", "letters, digits"),
+            ("[1, 5, 9]", "[1, 5]", "smallest, mean and largest"),
+        ] {
+            assert!(GOOD.contains(from), "{from}");
+            let error = read_text(&GOOD.replacen(from, to, 1)).unwrap_err();
+            assert!(error.contains(reason), "{to}: {error}");
+        }
+    }
+
+    #[test]
+    fn results_hold_published_and_measured_numbers_and_say_what_was_met() {
+        let suite = read_text(GOOD).unwrap();
+        let row = |job: &str, seed, seconds: f64| SuiteRow {
+            job: job.into(),
+            inputs: String::new(),
+            row: Row {
+                status: "solved".into(),
+                seed,
+                plan_cpu_s: seconds,
+                accepted: Some(true),
+                nodes: 4 + 2 * seed,
+                relocations: 1 + seed,
+                ..Row::default()
+            },
+        };
+        let mut rows = vec![row("T/fast", 0, 0.001), row("T/fast", 1, 0.003), row("f/c/0.5", 0, 2.5)];
+        let page = results::markdown(&suite, &rows, "there/");
+        assert!(page.contains("## A \\| suite"), "{page}");
+        assert!(page.contains("| *published* | - | - | 1.00 s | 5.00 s | 9.00 s | - | 7 | - | - |"), "{page}");
+        assert!(
+            page.contains("| fast | 2/2 | 2/2 | 1.00 ms | 2.00 ms | 3.00 ms | 4 | 5 | 6 | 0 | 1.0 | 1.5 | - |"),
+            "{page}"
+        );
+        assert!(page.contains("mean at most 2.00 ms: met"), "{page}");
+        assert!(page.contains("![F](there/f.svg)") && page.contains("| 0.5 | 1/1 | 2.50 s | 2.50 s |"), "{page}");
+        assert!(page.contains("| 0.25 | 0/0 | - | - |"), "not measured yet: {page}");
+        let pictures = results::pictures(&suite, &rows);
+        assert_eq!(pictures.len(), 1);
+        assert!(pictures[0].0 == "f.svg" && pictures[0].1.matches("<circle").count() == 1);
+        rows[1].row.status = "time_limit".into();
+        assert!(results::markdown(&suite, &rows, "").contains("MISSED"), "a miss is no mean");
+    }
+}
