@@ -64,5 +64,5 @@ fn plan_leg(search: &mut Search, start: Option<GraspState>, goal: Option<&GraspS
         Method::Classic => classic::build(search, start, goal)?,
     };
     shorten::shorten(search, &mut way, goal.is_none());
-    Ok(way)
+    Ok(way.with_transfers_joined())
 }

@@ -108,3 +108,22 @@ fn what_does_not_meet_is_not_joined() {
         assert!(way.replace(0..=1, detour.clone()) && way == detour, "the end of all may change");
     });
 }
+
+#[test]
+fn transfers_in_a_row_are_joined_and_nothing_else_changes() {
+    with_search("sphere_90x.toml", |search| {
+        let mut rng = Rng::keyed(5, "row", 0);
+        let state = std::iter::repeat_with(|| draw_state(search)).take(40).flatten().next().expect("a grasp");
+        let way =
+            regrasp_transfer(search, &state, &state, Arrival::Exact, &mut rng).unwrap_or(Sequence::at(state.clone()));
+        let mut long = way.clone();
+        long.push_transfer(vec![wait_at(&state), wait_at(&state)]);
+        long.push_transfer(vec![wait_at(&state)]);
+        long.push_regrasp(0, state.contacts[0], vec![state.joints[0].clone()]);
+        long.push_transfer(vec![wait_at(&state)]);
+        let joined = long.clone().with_transfers_joined();
+        assert_eq!(joined.steps().len() + 1, long.steps().len());
+        assert!(joined.start() == long.start() && joined.end() == long.end());
+        assert!(joined.clone().with_transfers_joined() == joined);
+    });
+}

@@ -146,6 +146,21 @@ impl Sequence {
         fits
     }
 
+    /// One transfer in place of each run of transfers: the same motion in fewer segments.
+    pub fn with_transfers_joined(self) -> Sequence {
+        let mut joined = Sequence::at(self.start);
+        for step in self.steps {
+            match (step.motion, joined.steps.last_mut()) {
+                (Motion::Transfer(moments), Some(Step { motion: Motion::Transfer(before), end })) => {
+                    before.extend(moments);
+                    *end = step.end;
+                }
+                (motion, _) => joined.steps.push(Step { motion, end: step.end }),
+            }
+        }
+        joined
+    }
+
     /// The same motions gone backwards, from the end to the start.
     pub fn reversed(&self) -> Sequence {
         let backwards = |index: usize| {
