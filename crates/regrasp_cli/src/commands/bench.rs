@@ -63,7 +63,7 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
 }
 
 /// One line per miss, rejection or plan without floor; other solved seeds stay silent but for `--json`.
-fn say_row(row: &Row, talk: &Talk) {
+pub fn say_row(row: &Row, talk: &Talk) {
     talk.event("row", json!(row));
     if row.status != "solved" {
         let left = row.angle_left_deg.map_or(String::new(), |angle| format!(", {angle:.0} deg left"));
@@ -91,7 +91,7 @@ fn write_page(path: &Path, csv_files: &[PathBuf], limits: Option<&Path>, talk: &
 }
 
 /// Makes the folder of a file that this command is about to write.
-fn make_folder_of(path: &Path) -> Result<(), Stop> {
+pub fn make_folder_of(path: &Path) -> Result<(), Stop> {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => {
             std::fs::create_dir_all(folder).map_err(|error| Stop::unwritable(folder, &error))

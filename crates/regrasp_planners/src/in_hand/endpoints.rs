@@ -1,7 +1,7 @@
 //! Start and goal as the query gives them: what is wrong with them is said before any search.
 
 use super::combine::releasable;
-use super::model::{Carrier, Model};
+use super::model::{Body, Carrier, Model};
 use super::state::GraspState;
 use super::transfer::ik_settings;
 use super::workspace::{Contacts, HandJoints, TipMode, Workspace, tip_target};
@@ -75,22 +75,37 @@ pub fn refuse_impossible(model: &Model) -> Result<(), Failure> {
 
 /// Refuses an object pose at which the object itself is in collision with palm or obstacles.
 pub fn refuse_buried_object(model: &Model, end: End, world_from_object: &Pose) -> Result<(), Failure> {
+    let Some(body) = object_blocked_by(model, world_from_object) else { return Ok(()) };
+    Err(end.failure(
+        format!(
+            "at the {} the object \"{}\" is in collision with \"{}\", or nearer than {} m; nothing was moved",
+            end.name(),
+            model.bodies[model.object].name,
+            body.name,
+            model.settings.clearance
+        ),
+        "move the object away from it, or make the clearance smaller",
+    ))
+}
+
+/// The body of palm or obstacles that the object is too near to at a pose, if there is one.
+pub fn object_blocked_by<'m>(model: &'m Model, world_from_object: &Pose) -> Option<&'m Body> {
     let object = &model.bodies[model.object];
     let at_object = Placement::from(world_from_object).then(&object.carrier_from_body);
-    for pair in &model.pairs {
+    let clearance = model.settings.clearance;
+    model.pairs.iter().find_map(|pair| {
         let other = if pair.a == model.object {
             pair.b
         } else if pair.b == model.object {
             pair.a
         } else {
-            continue;
+            return None;
         };
         let body = &model.bodies[other];
         if !matches!(body.carrier, Carrier::World) {
-            continue;
+            return None;
         }
         let mut direction = Vector::zeros();
-        let clearance = model.settings.clearance;
         let answer = separation(
             &object.shape,
             &at_object,
@@ -112,20 +127,8 @@ pub fn refuse_buried_object(model: &Model, end: End, world_from_object: &Pose) -
                     .as_ref()
                     .is_some_and(|tree| tree_apart(tree, &body.carrier_from_body, &object.shape, &at_object))
         };
-        if !matches!(answer, Answer::SeparatedBy(_)) && !exactly_apart() {
-            return Err(end.failure(
-                format!(
-                    "at the {} the object \"{}\" is in collision with \"{}\", or nearer than {} m; nothing was moved",
-                    end.name(),
-                    object.name,
-                    body.name,
-                    clearance
-                ),
-                "move the object away from it, or make the clearance smaller",
-            ));
-        }
-    }
-    Ok(())
+        (!matches!(answer, Answer::SeparatedBy(_)) && !exactly_apart()).then_some(body)
+    })
 }
 
 /// The grasp that the query gives at one end; None where the planner chooses.
