@@ -1,98 +1,81 @@
 //! Linking an object pose to the graph: grasps of nodes at places nearby, taken there by one transfer.
 
-use super::super::candidates::{Way, follow_share};
 use super::super::model::MAX_FINGERS;
 use super::super::search::{Search, Stop};
 use super::super::shorten::{change_grasp, whole_transfer};
 use super::super::state::{GraspState, Step};
+use super::super::transfer::ik_settings;
+use super::super::workspace::{TipMode, tip_target};
 use super::GraspRoadmap;
+use super::graph::contact_ids;
 use super::landmarks::Bounds;
-use super::region::nearest_places;
 use regrasp_base::Rng;
-use regrasp_geometry::Pose;
+use regrasp_geometry::collision::Placement;
+use regrasp_geometry::{Pose, UnitVector, interpolate_pose};
+use regrasp_robot::kinematics::finger_ik::IkSettings;
 
-/// One end of a query, with the nodes that are linked to it.
+/// One end of a query, with the nodes that may be linked to it.
 pub struct QueryEnd {
     /// Pose of the object.
     pub pose: Pose,
     /// The grasp given there.
     pub given: Option<GraspState>,
-    /// Links found.
-    pub links: Vec<Link>,
+    /// Nodes that every finger alone can follow from.
+    pub anchors: Vec<Anchor>,
+    /// Nodes not looked at yet, the most promising last.
+    candidates: Vec<Candidate>,
+    near: Vec<Place>,
+}
+
+/// A node that may be linked to an end.
+#[derive(Debug, Clone, Copy)]
+pub struct Anchor {
+    /// The node.
+    pub node: usize,
+    /// What the link costs.
+    pub cost: f64,
 }
 
 /// Proven motions between an end of a query and a node.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Link {
     /// The node.
     pub node: usize,
-    /// What they cost.
-    pub cost: f64,
+    /// Nodes of the path that it skips, because they have the same grasp.
+    pub n_skipped: usize,
     /// From the node to the end's pose.
     pub transfer: Step,
-    /// From the grasp given at the end to that of the transfer.
+    /// The grasp at the end: the one given, else that of the transfer.
+    pub grasp: GraspState,
+    /// From that grasp to that of the transfer.
     pub changes: Vec<Step>,
 }
 
-/// A node that may be linked, and the least that a path through it costs.
+/// A node, and the least that a path through it costs.
 struct Candidate {
-    node: usize,
+    anchor: Anchor,
     place: usize,
-    cost: f64,
     estimate: f64,
 }
 
 /// What is known of the footholds of one place: whether a finger alone could follow with it to the end's pose.
 struct Place {
-    way: Way,
+    /// Some poses of the way from the place to the end.
+    way: [Pose; LOOKS.len()],
     follows: [Vec<(u32, bool)>; MAX_FINGERS],
 }
 
 impl QueryEnd {
-    /// An end without links.
+    /// An end without anchors.
     pub fn new(pose: Pose, given: Option<GraspState>) -> Self {
-        QueryEnd { pose, given, links: Vec::new() }
+        QueryEnd { pose, given, anchors: Vec::new(), candidates: Vec::new(), near: Vec::new() }
     }
 
-    /// Adds up to `n_wanted` links to nodes at the places that are `places` in the order of their distance, the most
-    /// promising first by what `bounds` says of the way from there on.
-    pub fn look_around(
-        &mut self,
-        search: &mut Search,
-        roadmap: &GraspRoadmap,
-        places: std::ops::Range<usize>,
-        bounds: &Bounds,
-        n_wanted: usize,
-    ) -> Result<(), Stop> {
-        let (mut near, mut candidates) = self.candidates(roadmap, places, bounds);
-        let n_wanted = self.links.len() + n_wanted;
-        // Stable: equal estimates stay in the order of places and nodes.
-        candidates.sort_by(|a, b| a.estimate.total_cmp(&b.estimate));
-        for candidate in &candidates {
-            search.check()?;
-            if self.links.len() >= n_wanted {
-                break;
-            }
-            if may_follow(search, roadmap, candidate.node, &mut near[candidate.place])
-                && let Some(link) = self.link(search, roadmap, candidate.node, candidate.cost)
-            {
-                self.links.push(link);
-            }
-        }
-        Ok(())
-    }
-
-    fn candidates(
-        &self,
-        roadmap: &GraspRoadmap,
-        places: std::ops::Range<usize>,
-        bounds: &Bounds,
-    ) -> (Vec<Place>, Vec<Candidate>) {
+    /// Takes the nodes at some places, given with their distances, for candidates; `bounds` tell what the way from there on
+    /// costs.
+    pub fn look_around(&mut self, roadmap: &GraspRoadmap, places: &[(f64, usize)], bounds: &Bounds) {
         let (graph, costs) = (&roadmap.graph, roadmap.about.costs);
-        let has_nodes = |place: usize| !roadmap.index.nodes_at(place).is_empty();
-        let nearest = nearest_places(&graph.places, &self.pose, costs.turn_length, places.end, has_nodes);
-        let (mut near, mut candidates) = (Vec::new(), Vec::new());
-        for &(distance, place) in nearest.iter().skip(places.start) {
+        for &(distance, place) in places {
             for &node in roadmap.index.nodes_at(place) {
                 let node = node as usize;
                 let mut cost = distance;
@@ -101,25 +84,59 @@ impl QueryEnd {
                     cost += costs.relocation * (0..graph.n_fingers()).filter(moves).count() as f64;
                 }
                 let estimate = cost + roadmap.landmarks.bound(node, bounds);
-                candidates.push(Candidate { node, place: near.len(), cost, estimate });
+                self.candidates.push(Candidate { anchor: Anchor { node, cost }, place: self.near.len(), estimate });
             }
-            near.push(Place { way: Way::new(&graph.places[place], &self.pose), follows: Default::default() });
+            let way = LOOKS.map(|share| interpolate_pose(&graph.places[place], &self.pose, share));
+            self.near.push(Place { way, follows: Default::default() });
         }
-        (near, candidates)
+        let order =
+            |a: &Candidate, b: &Candidate| b.estimate.total_cmp(&a.estimate).then(b.anchor.node.cmp(&a.anchor.node));
+        self.candidates.sort_unstable_by(order);
     }
 
-    /// The motions between the end and a node, if they are feasible.
-    pub fn link(&self, search: &mut Search, roadmap: &GraspRoadmap, node: usize, cost: f64) -> Option<Link> {
-        let transfer = whole_transfer(search, &roadmap.graph.state(node), &self.pose)?;
-        let changes = match &self.given {
-            None => Vec::new(),
-            Some(given) => {
-                let mut rng = Rng::child(&search.rng, "given_grasp", 0);
-                search.rng.bits();
-                change_grasp(search, given, &transfer.end, false, &mut rng)?
+    /// Turns the most promising candidates into anchors until there are `n_wanted`, as far as there are.
+    pub fn fill(&mut self, search: &mut Search, roadmap: &GraspRoadmap, n_wanted: usize) -> Result<(), Stop> {
+        while self.anchors.len() < n_wanted {
+            search.check()?;
+            let Some(candidate) = self.candidates.pop() else { break };
+            if may_follow(search, roadmap, candidate.anchor.node, &mut self.near[candidate.place]) {
+                self.anchors.push(candidate.anchor);
             }
+        }
+        Ok(())
+    }
+
+    /// The motions between the end and `path`, which begins at one of the anchors: from the last of its first nodes that
+    /// have one grasp, else from the anchor. None when neither is feasible; then the anchor is none any more.
+    pub fn prove(
+        &mut self,
+        search: &mut Search,
+        roadmap: &GraspRoadmap,
+        path: impl Iterator<Item = usize> + Clone,
+    ) -> Option<Link> {
+        let anchor = path.clone().next()?;
+        let grasp = contact_ids(&roadmap.graph, anchor);
+        let alike = path.take_while(|&node| contact_ids(&roadmap.graph, node) == grasp);
+        let (n_skipped, last) = alike.enumerate().last()?;
+        let mut link = self.link(search, roadmap, last, n_skipped);
+        if link.is_none() && n_skipped > 0 {
+            link = self.link(search, roadmap, anchor, 0);
+        }
+        if link.is_none() {
+            self.anchors.retain(|other| other.node != anchor);
+        }
+        link
+    }
+
+    fn link(&self, search: &mut Search, roadmap: &GraspRoadmap, node: usize, n_skipped: usize) -> Option<Link> {
+        let transfer = whole_transfer(search, &roadmap.graph.state(node), &self.pose)?;
+        let Some(given) = &self.given else {
+            return Some(Link { node, n_skipped, grasp: transfer.end.clone(), transfer, changes: Vec::new() });
         };
-        Some(Link { node, cost, transfer, changes })
+        let mut rng = Rng::child(&search.rng, "given_grasp", 0);
+        search.rng.bits();
+        let changes = change_grasp(search, given, &transfer.end, false, &mut rng)?;
+        Some(Link { node, n_skipped, grasp: given.clone(), transfer, changes })
     }
 }
 
@@ -131,9 +148,32 @@ fn may_follow(search: &mut Search, roadmap: &GraspRoadmap, node: usize, place: &
         if let Some(&(_, follows)) = place.follows[finger].iter().find(|(other, _)| *other == foothold) {
             return follows;
         }
-        let (contact, joints) = (graph.contact(node, finger), graph.joints(node, finger));
-        let follows = follow_share(&mut search.workspace, finger, contact, &joints, &place.way) >= 1.0;
+        let follows = follows(search, roadmap, node, finger, &place.way);
         place.follows[finger].push((foothold, follows));
         follows
     })
 }
+
+/// True when a finger alone reaches its contact of a node, clear of object, palm and obstacles, at some moments of a way.
+fn follows(search: &mut Search, roadmap: &GraspRoadmap, node: usize, finger: usize, way: &[Pose]) -> bool {
+    let model = search.model();
+    let contact = roadmap.graph.contact(node, finger);
+    let mut seed = roadmap.graph.joints(node, finger);
+    way.iter().all(|pose| {
+        let world_from_object = Placement::from(pose);
+        let normal = world_from_object.vector(&contact.normal_in_object);
+        let target = tip_target(&world_from_object, contact, model.fingers[finger].tip_radius);
+        // Moments are far apart; reach is asked about, not continuity.
+        let settings = ik_settings(model, finger, UnitVector::new_unchecked(normal));
+        let settings = IkSettings { max_step: FARTHEST, ..settings };
+        let Some(joints) = model.fingers[finger].ik.solve_near(&target, &seed, &settings) else { return false };
+        search.workspace.place_object_and_finger(pose, finger, &joints);
+        seed = joints;
+        search.workspace.finger_alone_is_clear(finger, TipMode::Near { finger, normal_in_world: normal })
+    })
+}
+
+/// Shares of a way at which single fingers are looked at: the end first, where most of those fail that fail.
+const LOOKS: [f64; 2] = [1.0, 0.5];
+/// Largest change of a joint between them.
+const FARTHEST: f64 = 1.5;

@@ -8,7 +8,7 @@ use super::bytes::{Reader, Writer, checksum};
 use super::graph::{Edge, Footholds, Graph, Node, Passage};
 use super::identity::{Digest, Identity};
 use super::index::{Costs, Index};
-use super::landmarks::Landmarks;
+use super::landmarks::{Landmarks, MOST_SLACK};
 use super::{About, BuildSettings, GraspRoadmap, Region};
 use crate::in_hand::InHandSettings;
 use regrasp_base::{Diagnostic, InputError, Place, files};
@@ -130,7 +130,9 @@ impl GraspRoadmap {
         }
         out.f32s(&graph.ways);
         out.pad();
-        out.f32s(&self.landmarks.distances);
+        out.f64s([self.landmarks.step]);
+        out.u64(u64::from(self.landmarks.slack));
+        out.u16s(&self.landmarks.distances);
         out.pad();
         seal(&mut out.bytes);
         out.bytes
@@ -174,8 +176,11 @@ impl GraspRoadmap {
         if about.identity.fingers.len() != graph.n_fingers() {
             return Err(contradiction("names other fingers than it has".into()));
         }
-        if landmarks.distances.iter().any(|distance| !(*distance >= 0.0)) {
-            return Err(contradiction("has a distance that is negative or no number".into()));
+        if !(landmarks.step > 0.0 && landmarks.step.is_finite()) {
+            return Err(contradiction(format!("has landmarks that measure in steps of {}", landmarks.step)));
+        }
+        if landmarks.slack > MOST_SLACK {
+            return Err(contradiction(format!("has landmarks that are {} steps off", landmarks.slack)));
         }
         let index = Index::new(&graph, about.costs);
         Ok(GraspRoadmap { about, graph, landmarks, index })
@@ -241,7 +246,8 @@ impl Sizes {
             padded(self.nodes, 4 * (1 + self.fingers.len()))?,
             padded(self.edges, 16)?,
             padded(self.ways, 4)?,
-            padded(self.nodes.checked_mul(self.landmarks)?, 4)?,
+            16,
+            padded(self.nodes.checked_mul(self.landmarks)?, 2)?,
         ];
         for &(n_coordinates, n_footholds) in &self.fingers {
             sections.push(padded(n_footholds, 4)?);
@@ -279,8 +285,10 @@ fn tables(reader: &mut Reader, sizes: &Sizes) -> Option<(Graph, Landmarks)> {
     let edges = reader.take(sizes.edges.checked_mul(16)?)?;
     graph.edges = edges.as_chunks::<16>().0.iter().map(edge_of).collect();
     graph.ways = reader.f32s(sizes.ways)?;
-    let distances = reader.f32s(sizes.nodes.checked_mul(sizes.landmarks)?)?;
-    Some((graph, Landmarks { n_landmarks: sizes.landmarks, distances }))
+    let step = *reader.f64s(1)?.first()?;
+    let slack = u32::try_from(reader.u64()?).unwrap_or(u32::MAX);
+    let distances = reader.u16s(sizes.nodes.checked_mul(sizes.landmarks)?)?;
+    Some((graph, Landmarks { n_landmarks: sizes.landmarks, step, slack, distances }))
 }
 
 fn numbers<const N: usize>(bytes: &[u8]) -> [f64; N] {

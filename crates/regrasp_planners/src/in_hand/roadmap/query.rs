@@ -12,6 +12,7 @@ use super::super::state::{GraspState, Motion, Step};
 use super::GraspRoadmap;
 use super::anchor::{Link, QueryEnd};
 use super::build::legs_of;
+use super::index::Index;
 use super::landmarks::Bounds;
 use super::region::nearest_places;
 use super::registry::Registry;
@@ -27,9 +28,11 @@ use std::path::Path;
 use std::sync::atomic::AtomicUsize;
 
 /// Places nearest to each end whose grasps are tried: few at first, more where these lead nowhere.
-const PLACES: [usize; 4] = [0, 3, 8, 24];
-/// Links that are looked for at each end, from which A* chooses.
-const LINKS: usize = 2;
+const RINGS: [usize; 4] = [0, 3, 8, 24];
+/// Anchors at each end from which A* chooses.
+const ANCHORS: usize = 2;
+/// A path costs at most so many times the cheapest one between the anchors (weighted A*, Pohl 1970).
+const GREED: f64 = 1.5;
 
 /// A roadmap opened for a scene.
 #[derive(Debug)]
@@ -49,8 +52,8 @@ pub struct QueryMemory {
 pub struct Answer {
     /// The plan.
     pub plan: Plan,
-    /// Links that were found at start and goal.
-    links: [Vec<Link>; 2],
+    /// Links of start and goal to the graph.
+    links: [Link; 2],
 }
 
 impl<'a> RoadmapPlanner<'a> {
@@ -117,88 +120,96 @@ impl<'a> RoadmapPlanner<'a> {
         (start_grasp, goal_grasp): (Option<GraspState>, Option<GraspState>),
         memory: &mut QueryMemory,
     ) -> Result<Result<Answer, Failure>, Stop> {
+        let (roadmap, landmarks) = (self.roadmap, &self.roadmap.landmarks);
         let mut start = QueryEnd::new(search.start, start_grasp);
         let mut goal = QueryEnd::new(search.goal, goal_grasp);
-        let mut n_expanded = 0;
-        for places in PLACES.windows(2) {
-            let places = places[0]..places[1];
+        let (mut n_expanded, mut seen) = (0, (false, false));
+        for ring in RINGS.windows(2) {
+            let around_start = self.places_around(&start.pose, ring[0]..ring[1]);
+            let around_goal = self.places_around(&goal.pose, ring[0]..ring[1]);
             // Where the goal will be linked is not known yet: at one of the nodes around.
-            let around = self.nodes_around(&goal.pose, places.clone());
-            let bounds = self.roadmap.landmarks.bounds(around.into_iter());
-            start.look_around(search, self.roadmap, places.clone(), &bounds, LINKS)?;
-            let bounds = self.bounds_to(&start);
-            goal.look_around(search, self.roadmap, places, &bounds, LINKS)?;
-            if start.links.is_empty() || goal.links.is_empty() {
-                continue;
+            let ends = around_goal.iter().flat_map(|&(distance, place)| {
+                roadmap.index.nodes_at(place).iter().map(move |&node| (node as usize, distance))
+            });
+            start.look_around(roadmap, &around_start, &landmarks.bounds(ends));
+            start.fill(search, roadmap, ANCHORS)?;
+            goal.look_around(roadmap, &around_goal, &self.bounds_to(&start));
+            loop {
+                start.fill(search, roadmap, ANCHORS)?;
+                goal.fill(search, roadmap, ANCHORS)?;
+                seen = (seen.0 || !start.anchors.is_empty(), seen.1 || !goal.anchors.is_empty());
+                if start.anchors.is_empty() || goal.anchors.is_empty() {
+                    break;
+                }
+                let path = self.route(&start, &goal, &mut memory.a_star);
+                n_expanded += memory.a_star.n_expanded();
+                let Some(path) = path else { break };
+                let Some(first) = start.prove(search, roadmap, path.iter().copied()) else { continue };
+                let Some(last) = goal.prove(search, roadmap, path[first.n_skipped..].iter().rev().copied()) else {
+                    continue;
+                };
+                let between = &path[first.n_skipped..path.len() - last.n_skipped];
+                let Some((begin, steps)) = self.motions(search, [&first, &last], between) else {
+                    let message = "a stored transfer does not come out as it was proven: the roadmap is of another \
+                                   version of the program, or was made by hand";
+                    return Ok(Err(self.failure(message.into(), search)));
+                };
+                let statistics =
+                    Statistics { nodes: n_expanded as u64, work: search.workspace.work, ..Statistics::default() };
+                let mut plan = record::record(&self.model, query, seed, &begin, &steps, statistics);
+                plan.method = "roadmap".into();
+                return Ok(Ok(Answer { plan, links: [first, last] }));
             }
-            let path = self.route(&start, &goal, &mut memory.a_star);
-            n_expanded += memory.a_star.n_expanded();
-            let Some(path) = path else { continue };
-            let Some((begin, mut steps)) = self.motions(&start, &goal, &path) else {
-                let message = "a stored transfer does not come out as it was proven: the roadmap is of another version \
-                               of the program, or was made by hand";
-                return Ok(Err(self.failure(message.into(), search)));
-            };
-            straighten(search, &begin, &mut steps);
-            let statistics =
-                Statistics { nodes: n_expanded as u64, work: search.workspace.work, ..Statistics::default() };
-            let mut plan = record::record(&self.model, query, seed, &begin, &steps, statistics);
-            plan.method = "roadmap".into();
-            return Ok(Ok(Answer { plan, links: [start.links, goal.links] }));
         }
-        Ok(Err(if start.links.is_empty() {
-            self.not_linked(End::Start, search)
-        } else if goal.links.is_empty() {
-            self.not_linked(End::Goal, search)
-        } else {
-            self.failure("the roadmap does not lead from start to goal".into(), search)
+        Ok(Err(match seen {
+            (false, _) => self.not_linked(End::Start, search),
+            (_, false) => self.not_linked(End::Goal, search),
+            _ => self.failure("the roadmap does not lead from start to goal".into(), search),
         }))
     }
 
-    /// Nodes at the places that are `places` in the order of their distance from a pose, with that distance.
-    fn nodes_around(&self, pose: &Pose, places: std::ops::Range<usize>) -> Vec<(usize, f64)> {
+    /// The places with nodes that are `ring` in the order of their distance from a pose, with that distance.
+    fn places_around(&self, pose: &Pose, ring: std::ops::Range<usize>) -> Vec<(f64, usize)> {
         let (graph, index) = (&self.roadmap.graph, &self.roadmap.index);
         let has_nodes = |place: usize| !index.nodes_at(place).is_empty();
-        let nearest = nearest_places(&graph.places, pose, self.model.turn_length(), places.end, has_nodes);
-        let at = |&(distance, place): &(f64, usize)| {
-            index.nodes_at(place).iter().map(move |&node| (node as usize, distance)).collect::<Vec<_>>()
-        };
-        nearest.iter().skip(places.start).flat_map(at).collect()
+        let mut nearest = nearest_places(&graph.places, pose, self.model.turn_length(), ring.end, has_nodes);
+        nearest.drain(..ring.start.min(nearest.len()));
+        nearest
     }
 
-    /// Lower bounds of the cost of reaching one of the links of an end, and the end by it.
+    /// Lower bounds of the cost of reaching one of the anchors of an end, and the end from there.
     fn bounds_to(&self, end: &QueryEnd) -> Bounds {
-        self.roadmap.landmarks.bounds(end.links.iter().map(|link| (link.node, link.cost)))
+        self.roadmap.landmarks.bounds(end.anchors.iter().map(|anchor| (anchor.node, anchor.cost)))
     }
 
-    /// The cheapest way from a link of the start to one of the goal, as nodes.
+    /// A cheap way from an anchor of the start to one of the goal, as nodes.
     fn route(&self, start: &QueryEnd, goal: &QueryEnd, a_star: &mut AStar) -> Option<Vec<usize>> {
         let roadmap = self.roadmap;
         let (from, to) = (roadmap.graph.nodes.len(), roadmap.graph.nodes.len() + 1);
         let neighbours = |node: usize, out: &mut Vec<(usize, f64)>| {
             if node == from {
-                out.extend(start.links.iter().map(|link| (link.node, link.cost)));
+                out.extend(start.anchors.iter().map(|anchor| (anchor.node, anchor.cost)));
                 return;
             }
             roadmap.index.neighbours(node, out);
-            out.extend(goal.links.iter().filter(|link| link.node == node).map(|link| (to, link.cost)));
+            out.extend(goal.anchors.iter().filter(|anchor| anchor.node == node).map(|anchor| (to, anchor.cost)));
         };
         let bounds = self.bounds_to(goal);
-        let bound = |node: usize| if node < from { roadmap.landmarks.bound(node, &bounds) } else { 0.0 };
+        let bound = |node: usize| if node < from { GREED * roadmap.landmarks.bound(node, &bounds) } else { 0.0 };
         let path = a_star.cheapest_path(from, |node| node == to, neighbours, bound)?.nodes;
         Some(path[1..path.len() - 1].to_vec())
     }
 
-    /// All motions from the start to the goal along a path, with the grasp to begin with.
-    fn motions(&self, start: &QueryEnd, goal: &QueryEnd, path: &[usize]) -> Option<(GraspState, Vec<Step>)> {
+    /// All motions from the start to the goal along a path, with the grasp to begin with. None when what is stored does
+    /// not fit together.
+    fn motions(
+        &self,
+        search: &mut Search,
+        [first, last]: [&Link; 2],
+        path: &[usize],
+    ) -> Option<(GraspState, Vec<Step>)> {
         let graph = &self.roadmap.graph;
-        let cheapest = |end: &'_ QueryEnd, node: usize| {
-            let at_node = (0..end.links.len()).filter(|&which| end.links[which].node == node);
-            at_node.min_by(|&a, &b| end.links[a].cost.total_cmp(&end.links[b].cost))
-        };
-        let first = &start.links[cheapest(start, *path.first()?)?];
-        let last = &goal.links[cheapest(goal, *path.last()?)?];
-        let begin = start.given.clone().unwrap_or_else(|| first.transfer.end.clone());
+        let begin = first.grasp.clone();
         let mut steps = first.changes.clone();
         steps.extend(reversed(&graph.state(first.node), std::slice::from_ref(&first.transfer)));
         for pair in path.windows(2) {
@@ -206,9 +217,8 @@ impl<'a> RoadmapPlanner<'a> {
             steps.push(motion_along(&self.model, self.roadmap, edge, pair[0])?);
         }
         steps.push(last.transfer.clone());
-        if let Some(given) = &goal.given {
-            steps.extend(reversed(given, &last.changes));
-        }
+        steps.extend(reversed(&last.grasp, &last.changes));
+        straighten(search, &begin, &mut steps);
         Some((begin, steps))
     }
 
@@ -264,19 +274,21 @@ fn straighten(search: &mut Search, start: &GraspState, steps: &mut Vec<Step>) {
 }
 
 impl GraspRoadmap {
-    /// The roadmap with the ends of an answered query as new places.
+    /// The roadmap with the ends of an answered query as new places, each linked by the motions found.
     #[must_use]
     pub fn grown_by(self, answer: &Answer) -> Self {
-        let mut about = self.about;
-        let mut registry = Registry::new(self.graph);
-        for links in &answer.links {
-            let Some(first) = links.first() else { continue };
-            let place = registry.add_place(first.transfer.end.world_from_object);
-            for link in links {
-                registry.add_legs(link.node as u32, &legs_of(std::slice::from_ref(&link.transfer), Some(place)));
-            }
+        let GraspRoadmap { mut about, graph, mut landmarks, .. } = self;
+        let mut registry = Registry::new(graph);
+        for link in &answer.links {
+            let place = registry.add_place(link.transfer.end.world_from_object);
+            let mut legs = legs_of(std::slice::from_ref(&link.transfer), Some(place));
+            legs.extend(legs_of(&reversed(&link.grasp, &link.changes), None));
+            registry.add_legs(link.node as u32, &legs);
         }
         about.n_grown += 1;
-        GraspRoadmap::new(about, registry.into_graph())
+        let graph = registry.into_graph();
+        let index = Index::new(&graph, about.costs);
+        landmarks.extend(&graph, &index);
+        GraspRoadmap { about, graph, landmarks, index }
     }
 }
