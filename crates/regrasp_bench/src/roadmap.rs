@@ -1,6 +1,6 @@
 //! One random query on a roadmap: answer, judge, measure.
 
-use crate::row::{Judge, Problem, Row, RunSettings, floor, judge, status_of};
+use crate::row::{Problem, Row, RunSettings, measure, status_of};
 use cpu_time::ProcessTime;
 use regrasp_base::Budget;
 use regrasp_planners::in_hand::roadmap::{QueryMemory, RoadmapPlanner};
@@ -27,12 +27,7 @@ pub fn run(planner: &RoadmapPlanner, problem: Problem, settings: &RunSettings, m
             row.nodes = plan.statistics.nodes;
             row.samples = plan.statistics.samples;
             row.work = plan.statistics.work;
-            row.transfers = plan.statistics.transfers;
-            row.relocations = plan.statistics.relocations;
-            row.floor_s = floor(problem.scene, plan, planner.settings());
-            if settings.judge == Judge::Checker {
-                judge(problem, plan, &mut row);
-            }
+            measure(problem, plan, planner.settings(), settings.judge, &mut row);
         }
         Err(failure) => {
             row.status = status_of(&failure);

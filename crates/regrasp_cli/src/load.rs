@@ -59,7 +59,7 @@ pub fn planner_settings(
     }
     match settings.validate() {
         Ok(()) => Ok(settings),
-        Err(problem) => match &search.settings {
+        Err(problem) => match file {
             Some(path) => Err(Stop::BadInput(Diagnostic::new("A503", Place::file(path), problem).into())),
             None => Err(Stop::argument("A503", "--margin", problem, "a number in [0, 1)")),
         },

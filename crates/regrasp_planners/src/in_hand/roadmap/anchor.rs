@@ -2,8 +2,8 @@
 
 use super::super::model::MAX_FINGERS;
 use super::super::search::{Search, Stop};
-use super::super::shorten::{change_grasp, whole_transfer};
-use super::super::state::{GraspState, Step};
+use super::super::shorten::{Arrival, change_grasp, whole_transfer};
+use super::super::state::{GraspState, Sequence};
 use super::super::transfer::ik_settings;
 use super::super::workspace::{TipMode, tip_target};
 use super::GraspRoadmap;
@@ -44,11 +44,9 @@ pub struct Link {
     /// Nodes of the path that it skips, because they have the same grasp.
     pub n_skipped: usize,
     /// From the node to the end's pose.
-    pub transfer: Step,
-    /// The grasp at the end: the one given, else that of the transfer.
-    pub grasp: GraspState,
-    /// From that grasp to that of the transfer.
-    pub changes: Vec<Step>,
+    pub transfer: Sequence,
+    /// At the end's pose, from the grasp given there to that of the transfer; no motion where any grasp will do.
+    pub changes: Sequence,
 }
 
 /// A node, and the least that a path through it costs.
@@ -130,13 +128,15 @@ impl QueryEnd {
 
     fn link(&self, search: &mut Search, roadmap: &GraspRoadmap, node: usize, n_skipped: usize) -> Option<Link> {
         let transfer = whole_transfer(search, &roadmap.graph.state(node), &self.pose)?;
-        let Some(given) = &self.given else {
-            return Some(Link { node, n_skipped, grasp: transfer.end.clone(), transfer, changes: Vec::new() });
+        let changes = match &self.given {
+            None => Sequence::at(transfer.end().clone()),
+            Some(given) => {
+                let mut rng = Rng::child(&search.rng, "given_grasp", 0);
+                search.rng.bits();
+                change_grasp(search, &Sequence::at(given.clone()), transfer.end(), Arrival::Exact, &mut rng)?
+            }
         };
-        let mut rng = Rng::child(&search.rng, "given_grasp", 0);
-        search.rng.bits();
-        let changes = change_grasp(search, given, &transfer.end, false, &mut rng)?;
-        Some(Link { node, n_skipped, grasp: given.clone(), transfer, changes })
+        Some(Link { node, n_skipped, transfer, changes })
     }
 }
 

@@ -10,9 +10,9 @@ use super::super::model::Model;
 use super::super::relocate::{Foothold, relocate};
 use super::super::search::{Search, Stop};
 use super::super::settings::{InHandSettings, Method};
-use super::super::shorten::whole_transfer;
-use super::super::state::{GraspState, Motion, Step};
-use super::super::validate::relocation_is_clear;
+use super::super::shorten::{Arrival, transfer_regrasp};
+use super::super::state::{GraspState, Motion, Sequence, Step};
+use super::super::validate::follow_relocation;
 use super::graph::{FootholdIds, Graph, Leg, Lists, contact_ids};
 use super::grasps::{Reached, spread_contacts};
 use super::identity::Identity;
@@ -28,7 +28,7 @@ use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use regrasp_scene::Scene;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::atomic::AtomicUsize;
 
 /// How a roadmap is built.
@@ -315,17 +315,19 @@ impl<'b> Builder<'b> {
             if is_mutual && (other as usize) < at.place {
                 continue;
             }
-            let there: BTreeSet<_> =
-                at.nodes_at.of(other as usize).iter().map(|&node| contact_ids(at.graph, node as usize)).collect();
-            let mut shared: Vec<u32> = at.nodes().to_vec();
-            shared.retain(|&node| there.contains(&contact_ids(at.graph, node as usize)));
+            let there: BTreeMap<_, u32> =
+                at.nodes_at.of(other as usize).iter().map(|&to| (contact_ids(at.graph, to as usize), to)).collect();
+            let pair_of = |&from: &u32| there.get(&contact_ids(at.graph, from as usize)).map(|&to| (from, to));
+            let mut shared: Vec<(u32, u32)> = at.nodes().iter().filter_map(pair_of).collect();
             search.rng.shuffle(&mut shared);
             let mut n_taken = 0;
-            for node in shared {
+            for (from, to) in shared {
                 search.check()?;
-                let state = at.graph.state(node as usize);
-                if let Some(step) = whole_transfer(search, &state, &at.graph.places[other as usize]) {
-                    found.push(Found { origin: Origin::Node(node), legs: legs_of(&[step], Some(other)) });
+                let (state, wanted) = (at.graph.state(from as usize), at.graph.state(to as usize));
+                let mut rng = Rng::child(&search.rng, "transfer", u64::from(from));
+                // Where a hand reaches the contacts in several ways, fingers may have to change their postures there.
+                if let Some(way) = transfer_regrasp(search, &state, &wanted, Arrival::Exact, &mut rng) {
+                    found.push(Found { origin: Origin::Node(from), legs: legs_of(&way, other) });
                     n_taken += 1;
                     if n_taken == self.build.transfers {
                         break;
@@ -393,8 +395,8 @@ impl Ways {
         let contacts = [&start.contacts[finger], &end.contacts[finger]];
         for path in known.iter() {
             search.workspace.set(&at.pose, &start.joints, &start.contacts);
-            if relocation_is_clear(&mut search.workspace, &at.pose, finger, contacts, path) {
-                return Some(path.clone());
+            if follow_relocation(&mut search.workspace, &at.pose, finger, contacts, path).is_ok() {
+                return Some(path[1..].to_vec());
             }
         }
         if known.len() >= WAYS {
@@ -408,7 +410,7 @@ impl Ways {
         let (leave, arrive) =
             (Foothold { contact: &a, joints: &joints_a }, Foothold { contact: &b, joints: &joints_b });
         let path = relocate(&mut search.workspace, &at.pose, finger, leave, arrive, &mut rng)?;
-        known.push(path.clone());
+        known.push(std::iter::once(joints_a).chain(path.iter().cloned()).collect());
         Some(path)
     }
 }
@@ -435,16 +437,13 @@ fn stopped(stop: &Stop) -> Failure {
     failed(kind, "the roadmap was not finished".into(), "allow more work or time, or ask for fewer places")
 }
 
-/// Steps as the graph keeps them; a transfer among them leads to `place`.
-pub(super) fn legs_of(steps: &[Step], place: Option<u32>) -> Vec<Leg> {
-    steps
-        .iter()
-        .map(|step| match (&step.motion, place) {
-            (Motion::Transfer(_), Some(place)) => Leg::Transfer { place, joints: step.end.joints.clone() },
-            (Motion::Transfer(_), None) => unreachable!("a transfer leads to a place"),
-            (Motion::Regrasp { finger, path }, _) => {
-                Leg::Relocation { finger: *finger, path: path.clone(), contact: step.end.contacts[*finger] }
-            }
-        })
-        .collect()
+/// A sequence as the graph keeps it; a transfer in it leads to `place`.
+pub(super) fn legs_of(way: &Sequence, place: u32) -> Vec<Leg> {
+    let leg_of = |step: &Step| match step.motion() {
+        Motion::Transfer(_) => Leg::Transfer { place, joints: step.end().joints.clone() },
+        Motion::Regrasp { finger, path } => {
+            Leg::Relocation { finger: *finger, path: path.clone(), contact: step.end().contacts[*finger] }
+        }
+    };
+    way.steps().iter().map(leg_of).collect()
 }

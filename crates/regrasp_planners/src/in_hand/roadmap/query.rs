@@ -2,13 +2,12 @@
 //! smoothed.
 
 use super::super::endpoints::{End, given_grasp, object_blocked_by, refuse_buried_object};
-use super::super::link::reversed;
 use super::super::model::Model;
 use super::super::record;
 use super::super::search::{Search, Stop};
 use super::super::settings::InHandSettings;
-use super::super::shorten::transfer_regrasp;
-use super::super::state::{GraspState, Motion, Step};
+use super::super::shorten::{Arrival, transfer_regrasp};
+use super::super::state::{GraspState, Motion, Sequence};
 use super::GraspRoadmap;
 use super::anchor::{Link, QueryEnd};
 use super::build::legs_of;
@@ -149,14 +148,14 @@ impl<'a> RoadmapPlanner<'a> {
                     continue;
                 };
                 let between = &path[first.n_skipped..path.len() - last.n_skipped];
-                let Some((begin, steps)) = self.motions(search, [&first, &last], between) else {
+                let Some(way) = self.motions(search, [&first, &last], between) else {
                     let message = "a stored transfer does not come out as it was proven: the roadmap is of another \
                                    version of the program, or was made by hand";
                     return Ok(Err(self.failure(message.into(), search)));
                 };
                 let statistics =
                     Statistics { nodes: n_expanded as u64, work: search.workspace.work, ..Statistics::default() };
-                let mut plan = record::record(&self.model, query, seed, &begin, &steps, statistics);
+                let mut plan = record::record(&self.model, query, seed, &way, statistics);
                 plan.method = "roadmap".into();
                 return Ok(Ok(Answer { plan, links: [first, last] }));
             }
@@ -200,26 +199,16 @@ impl<'a> RoadmapPlanner<'a> {
         Some(path[1..path.len() - 1].to_vec())
     }
 
-    /// All motions from the start to the goal along a path, with the grasp to begin with. None when what is stored does
-    /// not fit together.
-    fn motions(
-        &self,
-        search: &mut Search,
-        [first, last]: [&Link; 2],
-        path: &[usize],
-    ) -> Option<(GraspState, Vec<Step>)> {
-        let graph = &self.roadmap.graph;
-        let begin = first.grasp.clone();
-        let mut steps = first.changes.clone();
-        steps.extend(reversed(&graph.state(first.node), std::slice::from_ref(&first.transfer)));
+    /// All motions from the start to the goal along a path. None when what is stored does not fit together.
+    fn motions(&self, search: &mut Search, [first, last]: [&Link; 2], path: &[usize]) -> Option<Sequence> {
+        let mut way = first.changes.clone().then(first.transfer.reversed())?;
         for pair in path.windows(2) {
             let edge = self.roadmap.index.edge_between(pair[0], pair[1])?;
-            steps.push(motion_along(&self.model, self.roadmap, edge, pair[0])?);
+            way = way.then(motion_along(&self.model, self.roadmap, edge, pair[0])?)?;
         }
-        steps.push(last.transfer.clone());
-        steps.extend(reversed(&last.grasp, &last.changes));
-        straighten(search, &begin, &mut steps);
-        Some((begin, steps))
+        way = way.then(last.transfer.clone())?.then(last.changes.reversed())?;
+        straighten(search, &mut way);
+        Some(way)
     }
 
     fn not_linked(&self, end: End, search: &Search) -> Failure {
@@ -254,22 +243,21 @@ impl<'a> RoadmapPlanner<'a> {
 }
 
 /// Transfers that follow each other with one grasp become one, where that is free.
-fn straighten(search: &mut Search, start: &GraspState, steps: &mut Vec<Step>) {
-    let is_transfer = |step: &Step| matches!(step.motion, Motion::Transfer(_));
+fn straighten(search: &mut Search, way: &mut Sequence) {
     let mut first = 0;
-    while first < steps.len() {
-        let n = steps[first..].iter().take_while(|step| is_transfer(step)).count();
-        if n >= 2 {
-            let from = if first == 0 { start.clone() } else { steps[first - 1].end.clone() };
-            let to = steps[first + n - 1].end.clone();
+    while first < way.steps().len() {
+        let transfers = way.steps()[first..].iter().take_while(|step| matches!(step.motion(), Motion::Transfer(_)));
+        let last = first + transfers.count().max(1) - 1;
+        if last > first {
+            let (from, to) = (way.state_before(first).clone(), way.steps()[last].end().clone());
             let mut rng = Rng::child(&search.rng, "straighten", first as u64);
-            if let Some(straight) = transfer_regrasp(search, &from, &to, false, &mut rng)
-                && straight.len() == 1
-            {
-                steps.splice(first..first + n, straight);
+            let straight = transfer_regrasp(search, &from, &to, Arrival::Exact, &mut rng);
+            if let Some(straight) = straight.filter(|straight| straight.steps().len() <= 1) {
+                let fits = way.replace(first..=last, straight);
+                debug_assert!(fits, "the same ends");
             }
         }
-        first += n.max(1);
+        first = last + 1;
     }
 }
 
@@ -280,9 +268,9 @@ impl GraspRoadmap {
         let GraspRoadmap { mut about, graph, mut landmarks, .. } = self;
         let mut registry = Registry::new(graph);
         for link in &answer.links {
-            let place = registry.add_place(link.transfer.end.world_from_object);
-            let mut legs = legs_of(std::slice::from_ref(&link.transfer), Some(place));
-            legs.extend(legs_of(&reversed(&link.grasp, &link.changes), None));
+            let place = registry.add_place(link.transfer.end().world_from_object);
+            let mut legs = legs_of(&link.transfer, place);
+            legs.extend(legs_of(&link.changes.reversed(), place));
             registry.add_legs(link.node as u32, &legs);
         }
         about.n_grown += 1;

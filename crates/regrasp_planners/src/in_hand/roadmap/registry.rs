@@ -8,9 +8,6 @@ use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Joints nearer than this are the same foothold, in radians or metres: they came to it by different ways.
-const SAME_POSTURE: f64 = 1e-6;
-
 /// A graph with what finds its parts again.
 #[derive(Debug, Default)]
 pub struct Registry {
@@ -129,8 +126,7 @@ impl Registry {
     fn foothold_id(&mut self, place: u32, finger: usize, contact: u32, joints: &[f64]) -> u32 {
         let table = &mut self.graph.footholds[finger];
         let known = self.footholds.entry((place, finger as u32, contact)).or_default();
-        let same = |&id: &u32| table.joints_of(id).iter().zip(joints).all(|(a, b)| (a - b).abs() < SAME_POSTURE);
-        if let Some(id) = known.iter().copied().find(same) {
+        if let Some(id) = known.iter().copied().find(|&id| table.joints_of(id) == joints) {
             return id;
         }
         let id = table.contacts.len() as u32;
