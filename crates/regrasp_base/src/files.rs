@@ -13,19 +13,24 @@ pub const MAX_FILE_BYTES: u64 = 256 << 20;
 ///
 /// Errors: not found, a directory, a pipe or device, too large, not readable (`F001`).
 pub fn read(path: &Path) -> Result<Vec<u8>, InputError> {
+    read_at_most(path, MAX_FILE_BYTES)
+}
+
+/// As [`read`], for files of at most `max_bytes`.
+pub fn read_at_most(path: &Path, max_bytes: u64) -> Result<Vec<u8>, InputError> {
     let fail = |problem: String| InputError::from(Diagnostic::new("F001", Place::file(path), problem));
     let metadata = fs::metadata(path).map_err(|error| fail(format!("cannot be read: {error}")))?;
     if !metadata.is_file() {
         return Err(fail("is not a regular file".into()));
     }
-    if metadata.len() > MAX_FILE_BYTES {
-        return Err(fail(format!("has {} bytes, more than the limit of {MAX_FILE_BYTES}", metadata.len())));
+    if metadata.len() > max_bytes {
+        return Err(fail(format!("has {} bytes, more than the limit of {max_bytes}", metadata.len())));
     }
     let file = fs::File::open(path).map_err(|error| fail(format!("cannot be opened: {error}")))?;
     let mut bytes = Vec::new();
-    file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(|error| fail(format!("cannot be read: {error}")))?;
-    if bytes.len() as u64 > MAX_FILE_BYTES {
-        return Err(fail(format!("grew past the limit of {MAX_FILE_BYTES} bytes while it was read")));
+    file.take(max_bytes + 1).read_to_end(&mut bytes).map_err(|error| fail(format!("cannot be read: {error}")))?;
+    if bytes.len() as u64 > max_bytes {
+        return Err(fail(format!("grew past the limit of {max_bytes} bytes while it was read")));
     }
     Ok(bytes)
 }
@@ -56,7 +61,17 @@ pub fn text_of(path: &Path, bytes: Vec<u8>) -> Result<String, InputError> {
 
 /// SHA-256 of `bytes`, as 64 lower-case hexadecimal digits.
 pub fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+    hex(&sha256_bytes(bytes))
+}
+
+/// SHA-256 of `bytes`.
+pub fn sha256_bytes(bytes: &[u8]) -> [u8; 32] {
+    Sha256::digest(bytes).into()
+}
+
+/// `bytes` as lower-case hexadecimal digits.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Refuses a `path` where something stands that is no file, such as a folder, a pipe or a device: writing by renaming would

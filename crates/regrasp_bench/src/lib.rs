@@ -12,6 +12,8 @@ pub mod limits;
 pub mod mutations;
 /// `docs/benchmarks.md` from CSV files.
 pub mod page;
+/// Random queries on a roadmap.
+pub mod roadmap;
 /// One seed of one scene: plan, judge, measure.
 pub mod row;
 /// The tables and figures of a paper, measured again.

@@ -130,15 +130,7 @@ pub fn run(problem: Problem, settings: &RunSettings) -> Row {
     match outcome {
         Ok(plan) => {
             row.status = "solved".into();
-            row.transfers = plan.statistics.transfers;
-            row.relocations = plan.statistics.relocations;
-            match floor(problem.scene, &plan, &settings.planner) {
-                Ok(seconds) => row.floor_s = Some(seconds),
-                Err(not_proven) => row.cause = not_proven.to_string(),
-            }
-            if settings.judge == Judge::Checker {
-                judge(problem, &plan, &mut row);
-            }
+            measure(problem, &plan, &settings.planner, settings.judge, &mut row);
         }
         Err(failure) => {
             row.status = status_of(&failure);
@@ -149,6 +141,20 @@ pub fn run(problem: Problem, settings: &RunSettings) -> Row {
     row
 }
 
+/// Enters what a plan is like: its motions, its floor and, if asked, the checker's verdict.
+pub(crate) fn measure(problem: Problem, plan: &Plan, settings: &InHandSettings, asked: Judge, row: &mut Row) {
+    row.transfers = plan.statistics.transfers;
+    row.relocations = plan.statistics.relocations;
+    match floor(problem.scene, plan, settings) {
+        Ok(seconds) => row.floor_s = Some(seconds),
+        Err(not_proven) => row.cause = not_proven.to_string(),
+    }
+    if asked == Judge::Checker {
+        judge(problem, plan, row);
+    }
+}
+
+/// Judges a plan and enters what came of it.
 fn judge(problem: Problem, plan: &Plan, row: &mut Row) {
     let started = Instant::now();
     let report = check(problem.scene, Some(problem.query), plan, &CheckSettings::default());

@@ -56,6 +56,8 @@ pub enum Command {
     Check(Check),
     /// Plan scenes with many seeds and tabulate
     Bench(Bench),
+    /// Many queries on one saved graph of a hand and an object
+    Roadmap(Roadmap),
     /// Long tests of the tool itself: determinism, and the checker against broken plans
     #[command(hide = true)]
     Campaign(Campaign),
@@ -172,6 +174,109 @@ pub struct Bench {
     pub limits: Option<PathBuf>,
 }
 
+/// `regrasp roadmap`
+#[derive(Debug, Args)]
+pub struct Roadmap {
+    /// What to do with it.
+    #[command(subcommand)]
+    pub action: RoadmapAction,
+}
+
+/// What can be done with a roadmap.
+#[derive(Debug, Subcommand)]
+pub enum RoadmapAction {
+    /// Build the graph of a scene's hand and object
+    Build(RoadmapBuild),
+    /// Plan the turn of a scene on a graph, check the plan, then write it
+    Query(RoadmapQuery),
+    /// Show what a graph is of and how large
+    Info {
+        /// Roadmap file
+        roadmap: PathBuf,
+    },
+    /// Answer random queries on a graph and tabulate
+    Bench(RoadmapBench),
+}
+
+/// `regrasp roadmap build`
+#[derive(Debug, Args)]
+pub struct RoadmapBuild {
+    /// Scene file
+    pub scene: PathBuf,
+    /// Roadmap file
+    #[arg(short, long, value_name = "FILE.roadmap")]
+    pub output: PathBuf,
+    /// Object poses that the graph is built over [default: 600]
+    #[arg(long, value_parser = count, allow_negative_numbers = true)]
+    pub places: Option<u64>,
+    /// How far the object may be from start and goal position, along each axis, in metres
+    #[arg(long, value_name = "M", default_value_t = 0.01, value_parser = metres, allow_negative_numbers = true)]
+    pub within: f64,
+    /// Largest angle from the start orientation, in degrees; 180 is every orientation
+    #[arg(long, value_name = "DEG", default_value_t = 180.0, value_parser = degrees, allow_negative_numbers = true)]
+    pub angle: f64,
+    /// All settings of the build, as `roadmap info --json` shows them; other flags go before it
+    #[arg(long, value_name = "FILE.json")]
+    pub build_settings: Option<PathBuf>,
+    /// All settings of the planner, as a plan file has them
+    #[arg(long, value_name = "FILE.json")]
+    pub settings: Option<PathBuf>,
+    /// Closure margin asked of every holding set, in [0, 1)
+    #[arg(long, value_parser = margin, allow_negative_numbers = true)]
+    pub margin: Option<f64>,
+    /// Seed
+    #[arg(long, default_value_t = 0, value_parser = whole_number, allow_negative_numbers = true)]
+    pub seed: u64,
+    /// Threads [default: all cores]; the graph does not depend on it
+    #[arg(long, value_parser = threads, allow_negative_numbers = true)]
+    pub threads: Option<usize>,
+}
+
+/// `regrasp roadmap query`
+#[derive(Debug, Args)]
+pub struct RoadmapQuery {
+    /// Roadmap file
+    pub roadmap: PathBuf,
+    /// Scene file, of the same hand and object
+    pub scene: PathBuf,
+    /// Plan file [default: stdout]
+    #[arg(short, long, value_name = "plan.json")]
+    pub output: Option<PathBuf>,
+    /// Seed
+    #[arg(long, default_value_t = 0, value_parser = whole_number, allow_negative_numbers = true)]
+    pub seed: u64,
+    /// Add start and goal to the graph and save it
+    #[arg(long)]
+    pub grow: bool,
+    /// Work limit, in configurations looked at: the same on every machine
+    #[arg(long, value_name = "N", default_value_t = 1_000_000, value_parser = whole_number, allow_negative_numbers = true)]
+    pub max_work: u64,
+}
+
+/// `regrasp roadmap bench`
+#[derive(Debug, Args)]
+pub struct RoadmapBench {
+    /// Roadmap file
+    pub roadmap: PathBuf,
+    /// Scene file, of the same hand and object
+    pub scene: PathBuf,
+    /// Queries: start and goal drawn uniformly from the graph's region, by seeds 0, 1, ...
+    #[arg(long, default_value_t = 1000, value_parser = count, allow_negative_numbers = true)]
+    pub queries: u64,
+    /// Of these, how many are planned without the graph too
+    #[arg(long, default_value_t = 0, value_parser = whole_number, allow_negative_numbers = true)]
+    pub single: u64,
+    /// First seed
+    #[arg(long, default_value_t = 0, value_parser = whole_number, allow_negative_numbers = true)]
+    pub first_seed: u64,
+    /// Write one row per query and method
+    #[arg(long, value_name = "FILE")]
+    pub csv: Option<PathBuf>,
+    /// Do not judge the plans
+    #[arg(long)]
+    pub no_check: bool,
+}
+
 /// `regrasp campaign`
 #[derive(Debug, Args)]
 pub struct Campaign {
@@ -245,6 +350,20 @@ fn margin(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(value) if (0.0..1.0).contains(&value) => Ok(value),
         _ => Err("expected a number in [0, 1)".into()),
+    }
+}
+
+fn metres(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
+        _ => Err("expected a number of metres from 0 to 1".into()),
+    }
+}
+
+fn degrees(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(value) if value > 0.0 && value <= 180.0 => Ok(value),
+        _ => Err("expected a number of degrees above 0 and at most 180".into()),
     }
 }
 

@@ -42,37 +42,47 @@ pub fn scene(path: &Path, common: &Common, talk: &Talk) -> Result<LoadedScene, S
 
 /// Settings of the planner: defaults, then the settings file, then the flags.
 pub fn settings(search: &Search, n_threads: usize) -> Result<InHandSettings, Stop> {
-    let mut settings = match &search.settings {
-        Some(path) => {
-            let text = regrasp::base::files::read_text(path)?;
-            // serde would take a list for the fields in their order, and an empty one for the defaults.
-            if text.trim_start().starts_with('[') {
-                return Err(settings_error(path, 1, 1, "is a list"));
-            }
-            serde_json::from_str(&text).map_err(|error| {
-                let message = error.to_string();
-                // serde_json repeats the place at the end of its message.
-                let problem = message.rsplit_once(" at line ").map_or(message.as_str(), |(problem, _)| problem);
-                settings_error(path, error.line(), error.column().max(1), problem)
-            })?
-        }
-        None => InHandSettings::default(),
-    };
+    planner_settings(search.settings.as_deref(), search.method.as_deref(), search.margin, n_threads)
+}
+
+/// Settings of the planner: defaults, then the file, then the rest.
+pub fn planner_settings(
+    file: Option<&Path>,
+    method: Option<&str>,
+    margin: Option<f64>,
+    n_threads: usize,
+) -> Result<InHandSettings, Stop> {
+    let mut settings: InHandSettings = file.map_or_else(|| Ok(InHandSettings::default()), settings_file)?;
     settings.n_threads = n_threads;
     // The argument parser lets only the planner's own spellings through; a test holds the two lists together.
-    if let Some(method) = search.method.as_deref().and_then(|name| serde_json::from_value(name.into()).ok()) {
+    if let Some(method) = method.and_then(|name| serde_json::from_value(name.into()).ok()) {
         settings.method = method;
     }
-    if let Some(margin) = search.margin {
+    if let Some(margin) = margin {
         settings.closure_margin = margin;
     }
     match settings.validate() {
         Ok(()) => Ok(settings),
-        Err(problem) => match &search.settings {
+        Err(problem) => match file {
             Some(path) => Err(Stop::BadInput(Diagnostic::new("A503", Place::file(path), problem).into())),
             None => Err(Stop::argument("A503", "--margin", problem, "a number in [0, 1)")),
         },
     }
+}
+
+/// A JSON file of settings. Errors: as [`regrasp::base::files::read_text`], and not such settings (`A504`).
+pub fn settings_file<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, Stop> {
+    let text = regrasp::base::files::read_text(path)?;
+    // serde would take a list for the fields in their order, and an empty one for the defaults.
+    if text.trim_start().starts_with('[') {
+        return Err(settings_error(path, 1, 1, "is a list"));
+    }
+    serde_json::from_str(&text).map_err(|error| {
+        let message = error.to_string();
+        // serde_json repeats the place at the end of its message.
+        let problem = message.rsplit_once(" at line ").map_or(message.as_str(), |(problem, _)| problem);
+        settings_error(path, error.line(), error.column().max(1), problem)
+    })
 }
 
 fn settings_error(path: &Path, line: usize, column: usize, problem: &str) -> Stop {

@@ -16,6 +16,8 @@ pub enum FailureKind {
     WayInvalid,
     /// This hand can never do it with these contacts, for a reason that needs no search.
     Impossible,
+    /// A roadmap does not lead from start to goal: not a proof.
+    NotConnected,
     /// The work budget is used up: not a proof.
     WorkSpent,
     /// The time limit has passed: not a proof.

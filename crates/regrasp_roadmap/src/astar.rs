@@ -34,59 +34,118 @@ impl PartialOrd for Open {
     }
 }
 
-/// The cheapest path from `start` to the first node for which `is_goal` holds; none when there is none.
-///
-/// `neighbours` appends `(node, cost of the edge)` with costs of zero or more; an infinite cost is no edge. `heuristic`
-/// must never exceed the cost of the rest of the way; zero makes it Dijkstra's algorithm. Nodes may be any indices;
-/// memory grows with the largest one seen. Equal costs are decided by the smaller index.
+/// The cheapest path from `start` to the first node for which `is_goal` holds; none when there is none. One search with
+/// fresh memory: see [`AStar::cheapest_path`].
 pub fn cheapest_path(
     start: usize,
-    mut is_goal: impl FnMut(usize) -> bool,
-    mut neighbours: impl FnMut(usize, &mut Vec<(usize, f64)>),
-    mut heuristic: impl FnMut(usize) -> f64,
+    is_goal: impl FnMut(usize) -> bool,
+    neighbours: impl FnMut(usize, &mut Vec<(usize, f64)>),
+    heuristic: impl FnMut(usize) -> f64,
 ) -> Option<CheapestPath> {
-    let mut costs: Vec<f64> = Vec::new();
-    let mut parents: Vec<usize> = Vec::new();
-    let reach = |costs: &mut Vec<f64>, parents: &mut Vec<usize>, node: usize| {
-        if node >= costs.len() {
-            costs.resize(node + 1, f64::INFINITY);
-            parents.resize(node + 1, usize::MAX);
-        }
-    };
-    reach(&mut costs, &mut parents, start);
-    costs[start] = 0.0;
-    let mut queue = BinaryHeap::new();
-    queue.push(Open { estimate: heuristic(start), cost: 0.0, node: start });
-    let mut edges = Vec::new();
-    while let Some(open) = queue.pop() {
-        // A cheaper way was found after this entry was queued.
-        if open.cost > costs[open.node] {
-            continue;
-        }
-        if is_goal(open.node) {
-            let mut nodes = vec![open.node];
-            let mut node = open.node;
-            while node != start {
-                node = parents[node];
-                nodes.push(node);
+    AStar::new().cheapest_path(start, is_goal, neighbours, heuristic)
+}
+
+/// What is known of a node in the search whose number it carries.
+#[derive(Debug, Clone, Copy)]
+struct Mark {
+    search: u32,
+    parent: usize,
+    cost: f64,
+}
+
+/// Memory of searches, one after the other: a search of a large graph costs what it looks at, not the graph's size.
+#[derive(Debug, Default)]
+pub struct AStar {
+    marks: Vec<Mark>,
+    search: u32,
+    queue: BinaryHeap<Open>,
+    edges: Vec<(usize, f64)>,
+    n_expanded: usize,
+}
+
+impl AStar {
+    /// Empty memory.
+    pub fn new() -> Self {
+        AStar::default()
+    }
+
+    /// Nodes that the last search expanded.
+    pub fn n_expanded(&self) -> usize {
+        self.n_expanded
+    }
+
+    /// The cheapest path from `start` to the first node for which `is_goal` holds; none when there is none.
+    ///
+    /// `neighbours` appends `(node, cost of the edge)` with costs of zero or more; an infinite cost is no edge.
+    /// `heuristic` must never exceed the cost of the rest of the way; zero makes it Dijkstra's algorithm. Nodes may be any
+    /// indices; memory grows with the largest one seen. Equal costs are decided by the smaller index.
+    pub fn cheapest_path(
+        &mut self,
+        start: usize,
+        mut is_goal: impl FnMut(usize) -> bool,
+        mut neighbours: impl FnMut(usize, &mut Vec<(usize, f64)>),
+        mut heuristic: impl FnMut(usize) -> f64,
+    ) -> Option<CheapestPath> {
+        self.begin();
+        self.reach(start, start, 0.0);
+        self.queue.push(Open { estimate: heuristic(start), cost: 0.0, node: start });
+        while let Some(open) = self.queue.pop() {
+            // A cheaper way was found after this entry was queued.
+            if open.cost > self.marks[open.node].cost {
+                continue;
             }
-            nodes.reverse();
-            return Some(CheapestPath { nodes, cost: open.cost });
-        }
-        edges.clear();
-        neighbours(open.node, &mut edges);
-        for &(next, edge_cost) in &edges {
-            assert!(edge_cost >= 0.0, "edge {} - {next} costs {edge_cost}", open.node);
-            reach(&mut costs, &mut parents, next);
-            let cost = open.cost + edge_cost;
-            if cost < costs[next] {
-                costs[next] = cost;
-                parents[next] = open.node;
-                queue.push(Open { estimate: cost + heuristic(next), cost, node: next });
+            if is_goal(open.node) {
+                return Some(CheapestPath { nodes: self.way_to(open.node, start), cost: open.cost });
             }
+            self.n_expanded += 1;
+            let mut edges = std::mem::take(&mut self.edges);
+            edges.clear();
+            neighbours(open.node, &mut edges);
+            for &(next, edge_cost) in &edges {
+                assert!(edge_cost >= 0.0, "edge {} - {next} costs {edge_cost}", open.node);
+                let cost = open.cost + edge_cost;
+                if self.reach(next, open.node, cost) {
+                    self.queue.push(Open { estimate: cost + heuristic(next), cost, node: next });
+                }
+            }
+            self.edges = edges;
+        }
+        None
+    }
+
+    /// Forgets the last search.
+    fn begin(&mut self) {
+        self.queue.clear();
+        self.n_expanded = 0;
+        self.search = self.search.wrapping_add(1);
+        if self.search == 0 {
+            self.marks.clear();
+            self.search = 1;
         }
     }
-    None
+
+    /// True when `cost` is less than what was known of `node`; it is known from now on.
+    fn reach(&mut self, node: usize, parent: usize, cost: f64) -> bool {
+        if node >= self.marks.len() {
+            self.marks.resize(node + 1, Mark { search: 0, parent: usize::MAX, cost: f64::INFINITY });
+        }
+        let mark = &mut self.marks[node];
+        let known = if mark.search == self.search { mark.cost } else { f64::INFINITY };
+        if cost < known {
+            *mark = Mark { search: self.search, parent, cost };
+        }
+        cost < known
+    }
+
+    fn way_to(&self, mut node: usize, start: usize) -> Vec<usize> {
+        let mut nodes = vec![node];
+        while node != start {
+            node = self.marks[node].parent;
+            nodes.push(node);
+        }
+        nodes.reverse();
+        nodes
+    }
 }
 
 #[cfg(test)]
@@ -110,6 +169,7 @@ mod tests {
     #[test]
     fn agrees_with_bellman_ford_and_dijkstra() {
         let mut rng = Rng::keyed(1, "astar", 0);
+        let mut memory = AStar::new();
         let (mut n_reached, mut n_cut) = (0, 0);
         for _ in 0..200 {
             let n = 30;
@@ -134,6 +194,9 @@ mod tests {
             for goal in 0..n {
                 let guided = cheapest_path(0, |node| node == goal, neighbours, |node| distance(node, goal));
                 let blind = cheapest_path(0, |node| node == goal, neighbours, |_| 0.0);
+                // Memory that other searches, of other graphs, have used.
+                let again = memory.cheapest_path(0, |node| node == goal, neighbours, |node| distance(node, goal));
+                assert_eq!(again, guided);
                 match (&guided, &blind) {
                     (Some(a), Some(b)) => {
                         assert!((a.cost - known[goal]).abs() < 1e-12 && (b.cost - known[goal]).abs() < 1e-12);

@@ -6,6 +6,7 @@ mod check;
 mod demo;
 mod inspect;
 pub mod plan;
+mod roadmap;
 mod suite;
 
 use crate::args::{Arguments, Command};
@@ -21,6 +22,7 @@ pub fn run(arguments: &Arguments, talk: &Talk) -> Result<(), Stop> {
         Command::Plan(plan) => plan::run(plan, common, talk),
         Command::Check(check) => check::run(check, common, talk),
         Command::Bench(bench) => bench::run(bench, common, talk),
+        Command::Roadmap(roadmap) => roadmap::run(roadmap, common, talk),
         Command::Campaign(campaign) => campaign::run(campaign, common, talk),
     }
 }

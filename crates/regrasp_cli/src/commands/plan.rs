@@ -37,14 +37,25 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
 
     let limits = Limits { max_work: arguments.search.max_work, time_limit: arguments.search.time_limit, cancelled };
     let plan = search(&loaded.scene, &query, &settings, arguments.seed, &limits, talk)?;
-    let bytes = format::to_json(&plan);
+    judge_and_write(&plan, arguments.output.as_deref(), &arguments.scene, common, talk)
+}
+
+/// Judges a plan; writes it to `output`, or to stdout, if it is accepted.
+pub fn judge_and_write(
+    plan: &Plan,
+    output: Option<&Path>,
+    scene: &Path,
+    common: &Common,
+    talk: &Talk,
+) -> Result<(), Stop> {
+    let bytes = format::to_json(plan);
     // Judged is what will be written, in a scene read afresh: the checker starts from files.
-    let plan_path = arguments.output.as_deref().unwrap_or(Path::new("plan.json"));
-    let report = judge::judge_bytes(plan_path, bytes.as_bytes(), &arguments.scene, &load::options(common), talk)?;
+    let plan_path = output.unwrap_or(Path::new("plan.json"));
+    let report = judge::judge_bytes(plan_path, bytes.as_bytes(), scene, &load::options(common), talk)?;
     if !report.accepted() {
-        return Err(rejected(arguments.output.as_deref(), &bytes, talk));
+        return Err(rejected(output, &bytes, talk));
     }
-    let Some(path) = &arguments.output else {
+    let Some(path) = output else {
         return if talk.is_json() {
             talk.event("written", json!({ "sha256": files::sha256(bytes.as_bytes()), "plan": plan }));
             Ok(())
@@ -143,7 +154,12 @@ pub fn search(
         Err(failure) if failure.kind == FailureKind::Interrupted => return Err(Stop::Interrupted),
         Err(failure) => return Err(Stop::NoPlan(Box::new(failure))),
     };
-    let seconds = started.elapsed().as_secs_f64();
+    say_plan(&plan, started.elapsed().as_secs_f64(), talk);
+    Ok(plan)
+}
+
+/// Says what was found, in how many seconds.
+pub fn say_plan(plan: &Plan, seconds: f64, talk: &Talk) {
     let waypoints: usize = plan.segments.iter().map(|segment| segment.waypoints.len()).sum();
     talk.say(format!(
         "plan   {}, {}, {} waypoints, closure margin {:.4}{}   {}",
@@ -158,7 +174,6 @@ pub fn search(
         "plan",
         json!({ "seconds": seconds, "statistics": plan.statistics, "kept_margin": plan.promises.kept_margin }),
     );
-    Ok(plan)
 }
 
 /// Keeps a rejected plan for a bug report, beside where the plan would have gone: never under its name.
@@ -190,6 +205,7 @@ pub fn failure_text(failure: &Failure) -> String {
         FailureKind::GoalInvalid => "NO PLAN: the goal is not valid",
         FailureKind::WayInvalid => "NO PLAN: a way pose is not valid",
         FailureKind::Impossible => "NO PLAN: impossible with this hand and these contacts",
+        FailureKind::NotConnected => "NO PLAN on this roadmap (not a proof)",
         FailureKind::WorkSpent => "NO PLAN within the work allowed (not a proof)",
         FailureKind::TimeLimit => "NO PLAN within the time limit (not a proof)",
         FailureKind::Interrupted => "interrupted",

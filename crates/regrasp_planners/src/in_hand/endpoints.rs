@@ -1,7 +1,7 @@
 //! Start and goal as the query gives them: what is wrong with them is said before any search.
 
 use super::combine::releasable;
-use super::model::{Carrier, Model};
+use super::model::{Body, Carrier, Model};
 use super::state::GraspState;
 use super::transfer::ik_settings;
 use super::workspace::{Contacts, HandJoints, TipMode, Workspace, tip_target};
@@ -84,23 +84,24 @@ pub fn refuse_impossible(model: &Model) -> Result<(), Failure> {
 
 /// Refuses an object pose at which the object itself is in collision with palm or obstacles.
 pub fn refuse_buried_object(model: &Model, end: End, world_from_object: &Pose) -> Result<(), Failure> {
-    let Some(other) = blocking_body(model, world_from_object) else { return Ok(()) };
+    let Some(body) = object_blocked_by(model, world_from_object) else { return Ok(()) };
     Err(end.failure(
         format!(
             "at the {} the object \"{}\" is in collision with \"{}\", or nearer than {} m; nothing was moved",
             end.name(),
             model.bodies[model.object].name,
-            model.bodies[other].name,
+            body.name,
             model.settings.clearance
         ),
         "move the object away from it, or make the clearance smaller",
     ))
 }
 
-/// The first body of palm or obstacles that the object by itself comes too near to, if one is.
-pub fn blocking_body(model: &Model, world_from_object: &Pose) -> Option<usize> {
+/// The body of palm or obstacles that the object is too near to at a pose, if there is one.
+pub fn object_blocked_by<'m>(model: &'m Model, world_from_object: &Pose) -> Option<&'m Body> {
     let object = &model.bodies[model.object];
     let at_object = Placement::from(world_from_object).then(&object.carrier_from_body);
+    let clearance = model.settings.clearance;
     model.pairs.iter().find_map(|pair| {
         let other = if pair.a == model.object {
             pair.b
@@ -114,7 +115,6 @@ pub fn blocking_body(model: &Model, world_from_object: &Pose) -> Option<usize> {
             return None;
         }
         let mut direction = Vector::zeros();
-        let clearance = model.settings.clearance;
         let answer = separation(
             &object.shape,
             &at_object,
@@ -136,7 +136,7 @@ pub fn blocking_body(model: &Model, world_from_object: &Pose) -> Option<usize> {
                     .as_ref()
                     .is_some_and(|tree| tree_apart(tree, &body.carrier_from_body, &object.shape, &at_object))
         };
-        (!matches!(answer, Answer::SeparatedBy(_)) && !exactly_apart()).then_some(other)
+        (!matches!(answer, Answer::SeparatedBy(_)) && !exactly_apart()).then_some(body)
     })
 }
 

@@ -39,6 +39,8 @@ mod record;
 mod regrasp;
 /// The relocation of one finger.
 mod relocate;
+/// Many queries on one roadmap.
+pub mod roadmap;
 #[cfg(test)]
 mod roadmap_tests;
 /// What all methods share.

@@ -1,7 +1,7 @@
 //! Passages: ends of a leg that the object by itself can leave only straight out, such as a hole. Uniform draws seldom find
 //! the way out (paper 000, section 5.1, example 4), so some poses are drawn along it.
 
-use super::endpoints::blocking_body;
+use super::endpoints::object_blocked_by;
 use super::model::Model;
 use regrasp_base::Rng;
 use regrasp_geometry::{Pose, Vector};
@@ -67,7 +67,7 @@ fn is_free(model: &Model, end: &Pose, direction: &Vector) -> bool {
     (1..=n_steps).all(|k| {
         let shift = direction * (model.settings.wander_distance * k as f64 / n_steps as f64);
         let pose = Pose::from_parts((end.translation.vector + shift).into(), end.rotation);
-        blocking_body(model, &pose).is_none()
+        object_blocked_by(model, &pose).is_none()
     })
 }
 

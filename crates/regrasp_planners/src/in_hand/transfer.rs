@@ -45,8 +45,21 @@ pub fn n_steps(model: &Model, from: &Pose, to: &Pose, step: f64) -> usize {
 ///
 /// Appends the moments after the start to `moments`; returns the share of the way that was made, 1 being all of it.
 pub fn transfer(workspace: &mut Workspace, start: &GraspState, goal: &Pose, moments: &mut Vec<Moment>) -> f64 {
-    let model = workspace.model;
     workspace.set(&start.world_from_object, &start.joints, &start.contacts);
+    follow(workspace.model, start, goal, moments, |there| {
+        workspace.step(&there.world_from_object, &there.joints, TipMode::AllHold)
+    })
+}
+
+/// As [`transfer`], with collisions left to `is_clear`, which is asked about each step to the moment it is given. Without
+/// it the same moments come out: that is how a transfer that was proven once is carried out again.
+pub fn follow(
+    model: &Model,
+    start: &GraspState,
+    goal: &Pose,
+    moments: &mut Vec<Moment>,
+    mut is_clear: impl FnMut(&Moment) -> bool,
+) -> f64 {
     let steps = n_steps(model, &start.world_from_object, goal, model.settings.step);
     let shortest = 1.0 / (steps << MAX_HALVINGS) as f64;
     let mut pending: Vec<f64> = (1..=steps).rev().map(|k| k as f64 / steps as f64).collect();
@@ -70,7 +83,7 @@ pub fn transfer(workspace: &mut Workspace, start: &GraspState, goal: &Pose, mome
             pending.extend([t, 0.5 * (made + t)]);
             continue;
         }
-        if !workspace.step(&there.world_from_object, &there.joints, TipMode::AllHold) {
+        if !is_clear(&there) {
             return made;
         }
         moments.push(there.clone());

@@ -75,23 +75,8 @@ fn validate_segment(model: &Model, workspace: &mut Workspace, segment: &Segment)
         (SegmentKind::Regrasp, Some(finger)) => {
             let path: Vec<Coordinates> =
                 waypoints.iter().map(|waypoint| joints_of(model, waypoint).remove(finger)).collect();
-            let ends = [contacts[finger], landing[finger]].map(|contact| End::new(model, finger, &pose, &contact));
-            let is_over = |end: &End, joints: &Coordinates| end.is_under(&model.fingers[finger].ik.tip(joints));
-            let n_up = path.iter().take_while(|joints| is_over(&ends[0], joints)).count();
-            let n_down = path.iter().rev().take_while(|joints| is_over(&ends[1], joints)).count();
-            for k in 1..path.len() {
-                let near = |end: &End| TipMode::Near { finger, normal_in_world: end.normal };
-                let mode = if k < n_up {
-                    near(&ends[0])
-                } else if k > path.len() - n_down {
-                    near(&ends[1])
-                } else {
-                    TipMode::Away { finger, clearance: 0.0 }
-                };
-                if !workspace.step_finger(finger, &path[k], mode) {
-                    return Err((k, in_the_way(workspace)));
-                }
-            }
+            let contacts = [&contacts[finger], &landing[finger]];
+            follow_relocation(workspace, &pose, finger, contacts, &path).map_err(|k| (k, in_the_way(workspace)))?;
         }
         (SegmentKind::Regrasp, None) => return Err((0, "a regrasp without a moving finger".into())),
     }
@@ -104,6 +89,36 @@ fn in_the_way(workspace: &Workspace) -> String {
         let (pair, bodies) = (&workspace.model.pairs[pair], &workspace.model.bodies);
         format!("\"{}\" comes too near \"{}\"", bodies[pair.a].name, bodies[pair.b].name)
     })
+}
+
+/// Moves `finger` along `path`, which begins where it is, from one contact to another, everything else being where
+/// `workspace` has it. Errors: index of the joints that are not reached.
+pub fn follow_relocation(
+    workspace: &mut Workspace,
+    pose: &Pose,
+    finger: usize,
+    contacts: [&Contact; 2],
+    path: &[Coordinates],
+) -> Result<(), usize> {
+    let model = workspace.model;
+    let ends = contacts.map(|contact| End::new(model, finger, pose, contact));
+    let is_over = |end: &End, joints: &Coordinates| end.is_under(&model.fingers[finger].ik.tip(joints));
+    let n_up = path.iter().take_while(|joints| is_over(&ends[0], joints)).count();
+    let n_down = path.iter().rev().take_while(|joints| is_over(&ends[1], joints)).count();
+    for k in 1..path.len() {
+        let near = |end: &End| TipMode::Near { finger, normal_in_world: end.normal };
+        let mode = if k < n_up {
+            near(&ends[0])
+        } else if k > path.len() - n_down {
+            near(&ends[1])
+        } else {
+            TipMode::Away { finger, clearance: 0.0 }
+        };
+        if !workspace.step_finger(finger, &path[k], mode) {
+            return Err(k);
+        }
+    }
+    Ok(())
 }
 
 /// A contact with the line that the tip's centre leaves it along.

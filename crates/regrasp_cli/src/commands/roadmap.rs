@@ -1,0 +1,256 @@
+//! `regrasp roadmap`: many queries on one saved graph of a hand and an object.
+
+use super::bench::{make_folder_of, say_row};
+use super::plan::{available_threads, judge_and_write, refuse_unwritable, say_plan, say_query};
+use crate::args::{self, Common, RoadmapAction};
+use crate::interrupt;
+use crate::load;
+use crate::stop::Stop;
+use crate::talk::{Talk, counted, duration, grouped};
+use regrasp::Budget;
+use regrasp::base::files;
+use regrasp::planners::FailureKind;
+use regrasp::planners::in_hand::roadmap::{
+    About, BuildSettings, BuildStage, Census, GraspRoadmap, QueryMemory, Region, RoadmapPlanner, build_roadmap,
+};
+use regrasp_bench::row::Judge;
+use regrasp_bench::{Problem, RunSettings, csv, roadmap as bench, run as run_one, summarise, summary};
+use serde_json::json;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+/// Does what is asked of a roadmap.
+pub fn run(arguments: &args::Roadmap, common: &Common, talk: &Talk) -> Result<(), Stop> {
+    match &arguments.action {
+        RoadmapAction::Build(build) => run_build(build, common, talk),
+        RoadmapAction::Query(query) => run_query(query, common, talk),
+        RoadmapAction::Info { roadmap } => run_info(roadmap, talk),
+        RoadmapAction::Bench(bench) => run_bench(bench, common, talk),
+    }
+}
+
+/// Builds and saves.
+fn run_build(arguments: &args::RoadmapBuild, common: &Common, talk: &Talk) -> Result<(), Stop> {
+    refuse_unwritable(&arguments.output)?;
+    let cancelled = interrupt::flag()?;
+    let loaded = load::scene(&arguments.scene, common, talk)?;
+    let n_threads = arguments.threads.unwrap_or_else(available_threads);
+    let settings = load::planner_settings(arguments.settings.as_deref(), None, arguments.margin, n_threads)?;
+    let mut build: BuildSettings =
+        arguments.build_settings.as_deref().map_or_else(|| Ok(BuildSettings::default()), load::settings_file)?;
+    if let Some(places) = arguments.places {
+        build.places = usize::try_from(places).unwrap_or(usize::MAX);
+    }
+    build.validate().map_err(|problem| Stop::argument("A505", "--build-settings", problem, "settings of a build"))?;
+    let query = loaded.task.query(arguments.seed);
+    let poses = [query.world_from_object_start, query.world_from_object_goal];
+    let center_of_mass = loaded.scene.object.center_of_mass;
+    let region = Region::around(&poses, &center_of_mass, arguments.within, arguments.angle.to_radians());
+
+    let started = Instant::now();
+    let budget = Budget { cancelled, ..Budget::unlimited() };
+    let progress = |stage: BuildStage| {
+        let seconds = started.elapsed().as_secs_f64();
+        talk.say(format!(
+            "build  {:<7} {} grasps, {} motions, {} configurations   {}",
+            stage.name,
+            grouped(stage.nodes as u64),
+            grouped(stage.edges as u64),
+            grouped(stage.work),
+            duration(seconds)
+        ));
+        talk.event(
+            "stage",
+            json!({
+                "name": stage.name, "nodes": stage.nodes, "edges": stage.edges, "work": stage.work, "seconds": seconds,
+            }),
+        );
+    };
+    let built = build_roadmap(&loaded.scene, &region, &build, &settings, arguments.seed, &budget, &progress);
+    let roadmap = match built {
+        Ok(roadmap) => roadmap,
+        Err(failure) if failure.kind == FailureKind::Interrupted => return Err(Stop::Interrupted),
+        Err(failure) => return Err(Stop::NoPlan(Box::new(failure))),
+    };
+    save(&roadmap, &arguments.output, talk)
+}
+
+/// Writes a roadmap whole or not at all and says what it is.
+fn save(roadmap: &GraspRoadmap, path: &Path, talk: &Talk) -> Result<(), Stop> {
+    let bytes = roadmap.to_bytes();
+    files::write_atomic(path, &bytes).map_err(|error| Stop::unwritable(path, &error))?;
+    let sha256 = files::sha256(&bytes);
+    say_census(&roadmap.census(), talk);
+    talk.say(format!("wrote  {}   {} bytes   sha256 {sha256}", path.display(), grouped(bytes.len() as u64)));
+    talk.event("written", json!({ "path": path, "bytes": bytes.len(), "sha256": sha256 }));
+    Ok(())
+}
+
+/// Reads a roadmap and says how long it took.
+fn open(path: &Path, talk: &Talk) -> Result<GraspRoadmap, Stop> {
+    let started = Instant::now();
+    let roadmap = GraspRoadmap::read(path)?;
+    let seconds = started.elapsed().as_secs_f64();
+    talk.say(format!("graph  {}   loaded in {}", path.display(), duration(seconds)));
+    talk.event("roadmap", json!({ "path": path, "seconds": seconds }));
+    Ok(roadmap)
+}
+
+/// Answers the query of a scene, checks the plan, writes it, and lets the roadmap grow if asked.
+fn run_query(arguments: &args::RoadmapQuery, common: &Common, talk: &Talk) -> Result<(), Stop> {
+    if let Some(path) = &arguments.output {
+        refuse_unwritable(path)?;
+    }
+    if arguments.grow {
+        refuse_unwritable(&arguments.roadmap)?;
+    }
+    let cancelled = interrupt::flag()?;
+    let roadmap = open(&arguments.roadmap, talk)?;
+    let loaded = load::scene(&arguments.scene, common, talk)?;
+    let query = loaded.task.query(arguments.seed);
+    say_query(&query, arguments.seed, 1, talk);
+    let planner = RoadmapPlanner::new(&arguments.roadmap, &roadmap, &loaded.scene)?;
+    let budget = Budget { cancelled, ..Budget::work(arguments.max_work) };
+    let started = Instant::now();
+    let answer = match planner.plan(&query, arguments.seed, &budget, &mut QueryMemory::default()) {
+        Ok(answer) => answer,
+        Err(failure) if failure.kind == FailureKind::Interrupted => return Err(Stop::Interrupted),
+        Err(failure) => return Err(Stop::NoPlan(Box::new(failure))),
+    };
+    say_plan(&answer.plan, started.elapsed().as_secs_f64(), talk);
+    judge_and_write(&answer.plan, arguments.output.as_deref(), &arguments.scene, common, talk)?;
+    if arguments.grow {
+        drop(planner);
+        save(&roadmap.grown_by(&answer), &arguments.roadmap, talk)?;
+    }
+    Ok(())
+}
+
+/// Shows what a roadmap is of and how large.
+fn run_info(path: &Path, talk: &Talk) -> Result<(), Stop> {
+    let started = Instant::now();
+    let bytes = std::fs::metadata(path).map_or(0, |metadata| metadata.len());
+    let roadmap = GraspRoadmap::read(path)?;
+    let seconds = started.elapsed().as_secs_f64();
+    let (about, census) = (roadmap.about(), roadmap.census());
+    if talk.is_json() {
+        talk.event(
+            "roadmap",
+            json!({ "path": path, "bytes": bytes, "seconds": seconds, "census": census,
+            "about": about.summary() }),
+        );
+        return Ok(());
+    }
+    talk.data(&info_text(path, bytes, seconds, about, &census))
+}
+
+fn info_text(path: &Path, bytes: u64, seconds: f64, about: &About, census: &Census) -> String {
+    let identity = &about.identity;
+    let digits = files::hex;
+    let mm = |metres: f64| format!("{:.1}", 1e3 * metres);
+    let region = &about.region;
+    let (center, half) = (region.center.map(mm), region.half_extents.map(mm));
+    let angle = region.max_angle.to_degrees();
+    let turned =
+        if angle >= 180.0 { "any orientation".to_owned() } else { format!("turned by at most {angle:.0} deg") };
+    let components: Vec<String> = census.components.iter().take(6).map(|&size| grouped(size as u64)).collect();
+    let lines = [
+        format!("file        {}   {} bytes, loaded in {}", path.display(), grouped(bytes), duration(seconds)),
+        format!(
+            "hand        {}   {}   sha256 {}",
+            identity.hand_name,
+            identity.fingers.join(", "),
+            digits(&identity.hand)
+        ),
+        format!("object      {}   sha256 {}", identity.object_name, digits(&identity.object)),
+        format!("friction    {}", identity.friction),
+        format!("obstacles   sha256 {}", digits(&identity.obstacles)),
+        format!("region      centre of mass {} mm, +- {} mm; {turned}", center.join(" "), half.join(" ")),
+        format!("covered     {} of {}", grouped(census.places_covered as u64), counted(census.places, "place")),
+        format!(
+            "nodes       {} grasps; {} contacts, {} footholds",
+            grouped(census.nodes as u64),
+            grouped(census.contacts as u64),
+            grouped(census.footholds as u64)
+        ),
+        format!(
+            "edges       {}: {}, {}",
+            grouped((census.transfers + census.relocations) as u64),
+            counted(census.transfers, "transfer"),
+            counted(census.relocations, "relocation")
+        ),
+        format!("components  {}: {}", census.components.len(), components.join(", ")),
+        format!("margin      {} asked of every holding set", about.settings.closure_margin),
+        format!(
+            "built       seed {}, grown by {}",
+            about.seed,
+            if about.n_grown == 1 { "1 query".into() } else { format!("{} queries", about.n_grown) }
+        ),
+    ];
+    lines.join("\n") + "\n"
+}
+
+fn say_census(census: &Census, talk: &Talk) {
+    talk.say(format!(
+        "graph  {}, {}, {}, {}",
+        counted(census.nodes, "grasp"),
+        counted(census.transfers, "transfer"),
+        counted(census.relocations, "relocation"),
+        counted(census.components.len(), "component")
+    ));
+    talk.event("census", json!(census));
+}
+
+/// Random queries with the roadmap, and without it for comparison.
+fn run_bench(arguments: &args::RoadmapBench, common: &Common, talk: &Talk) -> Result<(), Stop> {
+    let cancelled = interrupt::flag()?;
+    let roadmap = open(&arguments.roadmap, talk)?;
+    let loaded = load::scene(&arguments.scene, common, talk)?;
+    let planner = RoadmapPlanner::new(&arguments.roadmap, &roadmap, &loaded.scene)?;
+    let mut writer = match &arguments.csv {
+        Some(path) => {
+            make_folder_of(path)?;
+            refuse_unwritable(path)?;
+            Some(csv::Writer::create(path).map_err(|error| Stop::unwritable(path, &error))?)
+        }
+        None => None,
+    };
+    let settings = RunSettings {
+        planner: planner.settings().clone(),
+        max_work: 20_000_000,
+        time_limit: None,
+        judge: if arguments.no_check { Judge::Skip } else { Judge::Checker },
+        cancelled: Arc::clone(&cancelled),
+    };
+    let mut memory = QueryMemory::default();
+    let mut rows = Vec::new();
+    for number in 0..arguments.queries {
+        let seed = arguments.first_seed.saturating_add(number);
+        let query = planner.random_query(seed);
+        let problem = Problem { scene: &loaded.scene, query: &query, seed };
+        let mut found = vec![bench::run(&planner, problem, &settings, &mut memory)];
+        if number < arguments.single {
+            found.push(run_one(problem, &settings));
+        }
+        if cancelled.load(Ordering::Relaxed) {
+            return Err(Stop::Interrupted);
+        }
+        for row in found {
+            say_row(&row, talk);
+            if let (Some(writer), Some(path)) = (&mut writer, &arguments.csv) {
+                writer.push(&row).map_err(|error| Stop::unwritable(path, &error))?;
+            }
+            rows.push(row);
+        }
+    }
+    if let (Some(writer), Some(path)) = (writer, &arguments.csv) {
+        writer.finish().map_err(|error| Stop::unwritable(path, &error))?;
+    }
+    let summaries = summarise(&rows);
+    for summary in &summaries {
+        talk.event("summary", json!(summary));
+    }
+    if talk.is_json() { Ok(()) } else { talk.data(&summary::table(&summaries)) }
+}

@@ -1,0 +1,330 @@
+//! The graph of grasps and proven motions, as numbers in flat tables.
+//!
+//! A node is a grasp: a place (object pose) and a foothold (contact and joints) of every finger. An edge is a transfer
+//! (same contacts, other place) or the relocation of one finger (same place); both can be gone both ways. A transfer is
+//! stored as its two ends only, because the way between them follows from the first; a relocation stores its joints.
+
+use super::super::model::MAX_FINGERS;
+use super::super::state::GraspState;
+use super::super::workspace::{Contacts, HandJoints};
+use arrayvec::ArrayVec;
+use regrasp_geometry::Pose;
+use regrasp_grasp::Contact;
+use regrasp_robot::kinematics::finger_ik::Coordinates;
+
+/// Footholds of all fingers, as indices into the tables of each; unused ones are zero.
+pub type FootholdIds = [u32; MAX_FINGERS];
+
+/// A grasp.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Node {
+    /// Index of its place.
+    pub place: u32,
+    /// Foothold of every finger.
+    pub footholds: FootholdIds,
+}
+
+/// How an edge is gone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Passage {
+    /// All fingers hold, the object moves from the first node's place to the second's.
+    Transfer,
+    /// One finger moves.
+    Relocation {
+        /// The finger.
+        finger: u8,
+        /// Index of the first number of its way in [`Graph::ways`].
+        first: u32,
+        /// Joint vectors of its way, those at both ends left out.
+        n_between: u16,
+    },
+}
+
+/// A proven motion between two nodes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Edge {
+    /// Node that it was proven from.
+    pub from: u32,
+    /// Node that it leads to.
+    pub to: u32,
+    /// How.
+    pub passage: Passage,
+}
+
+/// Footholds of one finger: contacts that it takes at some place, with its joints there.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Footholds {
+    /// Number of joints of the finger.
+    pub n_coordinates: usize,
+    /// Indices into [`Graph::contacts`].
+    pub contacts: Vec<u32>,
+    /// Joints, `n_coordinates` per foothold.
+    pub joints: Vec<f64>,
+}
+
+impl Footholds {
+    /// Joints of foothold `id`.
+    pub fn joints_of(&self, id: u32) -> &[f64] {
+        let first = id as usize * self.n_coordinates;
+        &self.joints[first..first + self.n_coordinates]
+    }
+}
+
+/// The tables.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Graph {
+    /// Object poses.
+    pub places: Vec<Pose>,
+    /// Contacts, in the object frame, that footholds share.
+    pub contacts: Vec<Contact>,
+    /// Footholds, finger by finger.
+    pub footholds: Vec<Footholds>,
+    /// Grasps.
+    pub nodes: Vec<Node>,
+    /// Motions.
+    pub edges: Vec<Edge>,
+    /// Joints of relocations between their ends, in single precision: the rounding moves a fingertip by some ten
+    /// nanometres, far below every clearance.
+    pub ways: Vec<f32>,
+}
+
+impl Graph {
+    /// An empty graph for fingers with these numbers of joints.
+    pub fn new(n_coordinates: impl IntoIterator<Item = usize>) -> Self {
+        let footholds =
+            n_coordinates.into_iter().map(|n| Footholds { n_coordinates: n, ..Footholds::default() }).collect();
+        Graph { footholds, ..Graph::default() }
+    }
+
+    /// Number of fingers.
+    pub fn n_fingers(&self) -> usize {
+        self.footholds.len()
+    }
+
+    /// The pose of a node's place.
+    pub fn pose(&self, node: usize) -> &Pose {
+        &self.places[self.nodes[node].place as usize]
+    }
+
+    /// Joints of one finger at a node.
+    pub fn joints(&self, node: usize, finger: usize) -> Coordinates {
+        self.footholds[finger].joints_of(self.nodes[node].footholds[finger]).iter().copied().collect()
+    }
+
+    /// Contact of one finger at a node.
+    pub fn contact(&self, node: usize, finger: usize) -> &Contact {
+        &self.contacts[self.contact_id(node, finger) as usize]
+    }
+
+    /// Index of the contact of one finger at a node.
+    pub fn contact_id(&self, node: usize, finger: usize) -> u32 {
+        self.footholds[finger].contacts[self.nodes[node].footholds[finger] as usize]
+    }
+
+    /// The grasp that a node stands for.
+    pub fn state(&self, node: usize) -> GraspState {
+        let contacts: Contacts = (0..self.n_fingers()).map(|finger| *self.contact(node, finger)).collect();
+        let joints: HandJoints = (0..self.n_fingers()).map(|finger| self.joints(node, finger)).collect();
+        GraspState { world_from_object: *self.pose(node), contacts, joints }
+    }
+
+    /// Joints of a relocation between its ends, in the order it was proven.
+    pub fn way(&self, finger: usize, first: u32, n_between: u16) -> impl DoubleEndedIterator<Item = Coordinates> {
+        let stride = self.footholds[finger].n_coordinates;
+        let first = first as usize;
+        self.ways[first..first + usize::from(n_between) * stride]
+            .chunks_exact(stride.max(1))
+            .map(|joints| joints.iter().map(|&q| f64::from(q)).collect())
+    }
+
+    /// The nodes at which `keep` holds with what they stand on, renumbered in the same order; edges between them stay.
+    #[must_use]
+    pub fn only(&self, keep: impl Fn(usize) -> bool) -> Graph {
+        let n_coordinates = self.footholds.iter().map(|footholds| footholds.n_coordinates);
+        let mut kept = Graph { places: self.places.clone(), ..Graph::new(n_coordinates) };
+        let mut new_nodes = vec![u32::MAX; self.nodes.len()];
+        let mut new_contacts = vec![u32::MAX; self.contacts.len()];
+        let mut new_footholds: Vec<Vec<u32>> =
+            self.footholds.iter().map(|footholds| vec![u32::MAX; footholds.contacts.len()]).collect();
+        for (index, node) in self.nodes.iter().enumerate().filter(|&(index, _)| keep(index)) {
+            let mut renamed = Node { place: node.place, footholds: [0; MAX_FINGERS] };
+            for finger in 0..self.n_fingers() {
+                let old = node.footholds[finger];
+                let new = &mut new_footholds[finger][old as usize];
+                if *new == u32::MAX {
+                    let old_contact = self.footholds[finger].contacts[old as usize] as usize;
+                    if new_contacts[old_contact] == u32::MAX {
+                        new_contacts[old_contact] = kept.contacts.len() as u32;
+                        kept.contacts.push(self.contacts[old_contact]);
+                    }
+                    *new = kept.footholds[finger].contacts.len() as u32;
+                    kept.footholds[finger].contacts.push(new_contacts[old_contact]);
+                    kept.footholds[finger].joints.extend_from_slice(self.footholds[finger].joints_of(old));
+                }
+                renamed.footholds[finger] = *new;
+            }
+            new_nodes[index] = kept.nodes.len() as u32;
+            kept.nodes.push(renamed);
+        }
+        for edge in &self.edges {
+            let (from, to) = (new_nodes[edge.from as usize], new_nodes[edge.to as usize]);
+            if from == u32::MAX || to == u32::MAX {
+                continue;
+            }
+            let passage = match edge.passage {
+                Passage::Transfer => Passage::Transfer,
+                Passage::Relocation { finger, first, n_between } => {
+                    let start = kept.ways.len() as u32;
+                    let n = usize::from(n_between) * self.footholds[usize::from(finger)].n_coordinates;
+                    kept.ways.extend_from_slice(&self.ways[first as usize..first as usize + n]);
+                    Passage::Relocation { finger, first: start, n_between }
+                }
+            };
+            kept.edges.push(Edge { from, to, passage });
+        }
+        kept
+    }
+
+    /// What contradicts itself, if anything: indices out of range, motions whose ends do not fit, numbers that are not
+    /// finite, poses and normals that are not of length one.
+    pub fn validate(&self) -> Result<(), String> {
+        self.validate_points()?;
+        self.validate_nodes()?;
+        for (index, edge) in self.edges.iter().enumerate() {
+            self.validate_edge(edge).map_err(|problem| format!("edge {index} {problem}"))?;
+        }
+        match self.ways.iter().position(|q| !q.is_finite()) {
+            Some(index) => Err(format!("number {index} of the relocations is not finite")),
+            None => Ok(()),
+        }
+    }
+
+    fn validate_points(&self) -> Result<(), String> {
+        let is_unit = |length: f64| (length - 1.0).abs() < 1e-9;
+        for (index, place) in self.places.iter().enumerate() {
+            let is_finite = place.translation.vector.iter().all(|x| x.is_finite());
+            if !is_finite || !is_unit(place.rotation.coords.norm()) {
+                return Err(format!("place {index} is no pose"));
+            }
+        }
+        for (index, contact) in self.contacts.iter().enumerate() {
+            let is_finite = contact.point_in_object.iter().all(|x| x.is_finite());
+            if !is_finite || !is_unit(contact.normal_in_object.norm()) {
+                return Err(format!("contact {index} is no point with a normal"));
+            }
+        }
+        for (finger, footholds) in self.footholds.iter().enumerate() {
+            if footholds.joints.len() != footholds.contacts.len() * footholds.n_coordinates {
+                return Err(format!("finger {finger} has joints that do not fit its footholds"));
+            }
+            if let Some(id) = footholds.contacts.iter().position(|&contact| contact as usize >= self.contacts.len()) {
+                return Err(format!("foothold {id} of finger {finger} is at a contact that does not exist"));
+            }
+            if footholds.joints.iter().any(|q| !q.is_finite()) {
+                return Err(format!("finger {finger} has a joint that is not finite"));
+            }
+        }
+        Ok(())
+    }
+
+    fn validate_nodes(&self) -> Result<(), String> {
+        for (index, node) in self.nodes.iter().enumerate() {
+            let stands = (0..self.n_fingers())
+                .all(|finger| (node.footholds[finger] as usize) < self.footholds[finger].contacts.len());
+            if node.place as usize >= self.places.len() || !stands {
+                return Err(format!("node {index} is at a place or foothold that does not exist"));
+            }
+        }
+        Ok(())
+    }
+
+    fn validate_edge(&self, edge: &Edge) -> Result<(), String> {
+        let (from, to) = (edge.from as usize, edge.to as usize);
+        if from >= self.nodes.len() || to >= self.nodes.len() || from == to {
+            return Err("joins nodes that do not exist, or a node to itself".into());
+        }
+        let (start, end) = (&self.nodes[from], &self.nodes[to]);
+        match edge.passage {
+            Passage::Transfer => {
+                let same_grasp = (0..self.n_fingers()).all(|f| self.contact_id(from, f) == self.contact_id(to, f));
+                if !same_grasp || start.place == end.place {
+                    return Err("is a transfer that changes the grasp or does not move the object".into());
+                }
+            }
+            Passage::Relocation { finger, first, n_between } => {
+                let moving = usize::from(finger);
+                if moving >= self.n_fingers() || start.place != end.place {
+                    return Err("is a relocation of no finger, or moves the object".into());
+                }
+                let one_moves =
+                    (0..self.n_fingers()).all(|f| (start.footholds[f] != end.footholds[f]) == (f == moving));
+                if !one_moves {
+                    return Err("is a relocation of other fingers than its own".into());
+                }
+                let n = usize::from(n_between) * self.footholds[moving].n_coordinates;
+                if first as usize + n > self.ways.len() {
+                    return Err("is a relocation with a way that does not exist".into());
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A list of numbers per key, all in one table.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Lists {
+    firsts: Vec<u32>,
+    items: Vec<u32>,
+}
+
+impl Lists {
+    /// The items of `pairs` (key, item) by key, in the order given. Fewer than 2^32 of them.
+    pub fn new(n_keys: usize, pairs: impl Iterator<Item = (u32, u32)> + Clone) -> Self {
+        let mut firsts = vec![0u32; n_keys + 1];
+        for (key, _) in pairs.clone() {
+            firsts[key as usize + 1] += 1;
+        }
+        for key in 0..n_keys {
+            firsts[key + 1] += firsts[key];
+        }
+        let mut next = firsts.clone();
+        let mut items = vec![0; firsts[n_keys] as usize];
+        for (key, item) in pairs {
+            items[next[key as usize] as usize] = item;
+            next[key as usize] += 1;
+        }
+        Lists { firsts, items }
+    }
+
+    /// The items of `key`.
+    pub fn of(&self, key: usize) -> &[u32] {
+        &self.items[self.firsts[key] as usize..self.firsts[key + 1] as usize]
+    }
+}
+
+/// Grasps and motions gathered before they are numbered: see [`super::registry`].
+#[derive(Debug, Clone)]
+pub enum Leg {
+    /// To a place, with the same contacts.
+    Transfer {
+        /// Index of the place.
+        place: u32,
+        /// Joints there.
+        joints: HandJoints,
+    },
+    /// To another foothold of one finger.
+    Relocation {
+        /// The finger.
+        finger: usize,
+        /// Its joints after the start, the last ones being at the contact.
+        path: Vec<Coordinates>,
+        /// Its contact at the end.
+        contact: Contact,
+    },
+}
+
+/// Contacts of a node as indices.
+pub fn contact_ids(graph: &Graph, node: usize) -> ArrayVec<u32, MAX_FINGERS> {
+    (0..graph.n_fingers()).map(|finger| graph.contact_id(node, finger)).collect()
+}

@@ -1,0 +1,193 @@
+//! The grasps of a roadmap: each finger has a list of contacts spread over the object, the same at every place, so that
+//! grasps of one place share footholds and grasps of different places share contacts.
+
+use super::super::candidates::{Candidate, reach};
+use super::super::combine::{Choice, ClosureTable};
+use super::super::model::Model;
+use super::super::search::Search;
+use super::super::settings::ReleaseRule;
+use super::super::state::GraspState;
+use regrasp_base::Rng;
+use regrasp_geometry::Pose;
+use regrasp_geometry::collision::Placement;
+use regrasp_grasp::Contact;
+
+/// Contacts drawn for one, of which the one farthest from those before is taken.
+const CANDIDATES: usize = 12;
+/// Draws for one contact before the surface counts as used up.
+const TRIES: usize = 200;
+/// Postures tried for a contact at a place.
+const POSTURES: usize = 2;
+
+/// Up to `n` contacts of each finger, spread over the object so that the first few are spread as well.
+pub fn spread_contacts(model: &Model, n: usize, seed: u64) -> Vec<Vec<Contact>> {
+    (0..model.n_fingers())
+        .map(|finger| {
+            let mut rng = Rng::keyed(seed, "roadmap_contacts", finger as u64);
+            let mut contacts: Vec<Contact> = Vec::with_capacity(n);
+            for _ in 0..n {
+                let mut best: Option<(f64, Contact)> = None;
+                let mut n_drawn = 0;
+                for _ in 0..TRIES {
+                    let Some(contact) = draw(model, finger, &mut rng) else { continue };
+                    let nearest =
+                        contacts.iter().map(|other| apart(model, &contact, other)).fold(f64::INFINITY, f64::min);
+                    if best.as_ref().is_none_or(|(farthest, _)| nearest > *farthest) {
+                        best = Some((nearest, contact));
+                    }
+                    n_drawn += 1;
+                    if n_drawn == CANDIDATES {
+                        break;
+                    }
+                }
+                contacts.extend(best.map(|(_, contact)| contact));
+            }
+            contacts
+        })
+        .collect()
+}
+
+/// A contact drawn by area, as the fingertip really touches, off the creases.
+fn draw(model: &Model, finger: usize, rng: &mut Rng) -> Option<Contact> {
+    let object = &model.scene.object;
+    let drawn = object.surface.sample(rng);
+    let settled = object.surface.settle(&drawn, model.fingers[finger].tip_radius)?;
+    (object.surface.crease_distance(&settled) >= object.edge_distance)
+        .then_some(Contact { point_in_object: settled.point_in_object, normal_in_object: settled.normal_in_object })
+}
+
+/// How different two contacts are: in place, and in direction so that the two sides of a thin object are far apart.
+fn apart(model: &Model, a: &Contact, b: &Contact) -> f64 {
+    let turned = (a.normal_in_object.into_inner() - b.normal_in_object.into_inner()).norm();
+    (a.point_in_object - b.point_in_object).norm() + 0.3 * model.turn_length() * turned
+}
+
+/// Contacts that each finger reaches with the object at a pose, with joints.
+#[derive(Debug, Clone, Default)]
+pub struct Reached {
+    /// Candidates of every finger, in the order of the contacts.
+    pub options: Vec<Vec<Candidate>>,
+    /// Position of each in its finger's list of contacts.
+    pub which: Vec<Vec<usize>>,
+}
+
+impl Reached {
+    /// At a pose, of the contacts given for every finger.
+    pub fn at(search: &mut Search, pose: &Pose, contacts: &[Vec<Contact>]) -> Self {
+        let placement = Placement::from(pose);
+        let mut reached = Reached::default();
+        for (finger, of_finger) in contacts.iter().enumerate() {
+            search.workspace.place_object(pose);
+            let (mut options, mut which) = (Vec::new(), Vec::new());
+            for (index, contact) in of_finger.iter().enumerate() {
+                search.n_samples += 1;
+                let joints = (0..POSTURES)
+                    .find_map(|_| reach(&mut search.workspace, finger, contact, &placement, &mut search.rng));
+                if let Some(joints) = joints {
+                    options.push(Candidate { contact: *contact, joints, follow: 1.0 });
+                    which.push(index);
+                }
+            }
+            reached.options.push(options);
+            reached.which.push(which);
+        }
+        reached
+    }
+
+    /// The same with only the first `n` contacts of every finger.
+    #[must_use]
+    pub fn of_first(&self, n: usize) -> Self {
+        let mut fewer = self.clone();
+        for (options, which) in fewer.options.iter_mut().zip(&mut fewer.which) {
+            let n_kept = which.partition_point(|&index| index < n);
+            options.truncate(n_kept);
+            which.truncate(n_kept);
+        }
+        fewer
+    }
+
+    /// All grasps that the candidates make, closed and clear, with a finger that may let go; at most `limit`.
+    pub fn grasps(&self, search: &mut Search, pose: &Pose, limit: usize) -> Vec<GraspState> {
+        let mut found = Vec::new();
+        if self.options.iter().any(Vec::is_empty) {
+            return found;
+        }
+        let mut clashes = Clashes::new(search, pose, &self.options);
+        let mut table = ClosureTable::new(search.model(), &self.options);
+        let mut choice = Choice::new();
+        self.complete(search, pose, limit, &mut clashes, &mut table, &mut choice, &mut found);
+        found
+    }
+
+    /// Completes a choice for the first fingers in all ways.
+    fn complete(
+        &self,
+        search: &Search,
+        pose: &Pose,
+        limit: usize,
+        clashes: &mut Clashes,
+        table: &mut ClosureTable,
+        choice: &mut Choice,
+        found: &mut Vec<GraspState>,
+    ) {
+        let n = self.options.len();
+        let finger = choice.len();
+        if finger == n {
+            let n_releasable = table.n_releasable(choice);
+            let rule = search.model().settings.release_rule;
+            let enough = if rule == ReleaseRule::EverywhereEveryFinger { n } else { 1 };
+            if n_releasable >= enough && found.len() < limit {
+                let chosen = |f: usize| &self.options[f][choice[f]];
+                found.push(GraspState {
+                    world_from_object: *pose,
+                    contacts: (0..n).map(|f| chosen(f).contact).collect(),
+                    joints: (0..n).map(|f| chosen(f).joints.clone()).collect(),
+                });
+            }
+            return;
+        }
+        for option in 0..self.options[finger].len() {
+            if (0..finger).all(|other| clashes.is_clear(other, choice[other], finger, option)) {
+                choice.push(option);
+                self.complete(search, pose, limit, clashes, table, choice, found);
+                choice.pop();
+            }
+        }
+    }
+}
+
+/// Which candidates of two fingers are in each other's way.
+struct Clashes {
+    n_fingers: usize,
+    n_options: usize,
+    is_clear: Vec<bool>,
+}
+
+impl Clashes {
+    fn new(search: &mut Search, pose: &Pose, options: &[Vec<Candidate>]) -> Self {
+        let n_options = options.iter().map(Vec::len).max().unwrap_or(0);
+        let n_fingers = options.len();
+        let mut clashes = Clashes { n_fingers, n_options, is_clear: vec![true; (n_fingers * n_options).pow(2)] };
+        search.workspace.place_object(pose);
+        for f in 0..n_fingers {
+            for g in f + 1..n_fingers {
+                for (a, one) in options[f].iter().enumerate() {
+                    for (b, other) in options[g].iter().enumerate() {
+                        let index = clashes.index(f, a, g, b);
+                        clashes.is_clear[index] =
+                            search.workspace.fingers_are_clear((f, &one.joints), (g, &other.joints));
+                    }
+                }
+            }
+        }
+        clashes
+    }
+
+    fn index(&self, f: usize, a: usize, g: usize, b: usize) -> usize {
+        ((f * self.n_fingers + g) * self.n_options + a) * self.n_options + b
+    }
+
+    fn is_clear(&self, f: usize, a: usize, g: usize, b: usize) -> bool {
+        self.is_clear[self.index(f, a, g, b)]
+    }
+}

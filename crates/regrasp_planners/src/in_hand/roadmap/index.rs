@@ -1,0 +1,101 @@
+//! What a graph is searched with: links by node with their costs, nodes by place, components.
+
+use super::graph::{Graph, Lists, Passage};
+use super::region::near_distance;
+use regrasp_roadmap::Components;
+
+/// What motions cost, in metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Costs {
+    /// Length by which angles of the object are weighed: a transfer costs its distance.
+    pub turn_length: f64,
+    /// A relocation costs this.
+    pub relocation: f64,
+}
+
+/// The edges of a graph from both ends, and its nodes by place.
+#[derive(Debug, Clone, Default)]
+pub struct Index {
+    /// First entry of every node in `links`, and the number of links at the end.
+    firsts: Vec<u32>,
+    links: Vec<Link>,
+    /// Nodes of every place.
+    nodes_at: Lists,
+}
+
+/// One end of an edge, as the node at the other end sees it.
+#[derive(Debug, Clone, Copy)]
+struct Link {
+    node: u32,
+    edge: u32,
+    cost: f64,
+}
+
+impl Index {
+    /// Of a graph that is valid.
+    pub fn new(graph: &Graph, costs: Costs) -> Self {
+        let ends = graph.edges.iter().enumerate();
+        let ends = ends.flat_map(|(index, edge)| [(edge.from, index as u32), (edge.to, index as u32)]);
+        let edges_of = Lists::new(graph.nodes.len(), ends);
+        let mut links = Vec::with_capacity(2 * graph.edges.len());
+        let mut firsts = vec![0];
+        for node in 0..graph.nodes.len() {
+            for &index in edges_of.of(node) {
+                let edge = &graph.edges[index as usize];
+                let other = if edge.from as usize == node { edge.to } else { edge.from };
+                let cost = match edge.passage {
+                    Passage::Transfer => near_distance(graph.pose(node), graph.pose(other as usize), costs.turn_length),
+                    Passage::Relocation { .. } => costs.relocation,
+                };
+                links.push(Link { node: other, edge: index, cost });
+            }
+            firsts.push(links.len() as u32);
+        }
+        let places = graph.nodes.iter().enumerate().map(|(index, node)| (node.place, index as u32));
+        Index { firsts, links, nodes_at: Lists::new(graph.places.len(), places) }
+    }
+
+    fn links_of(&self, node: usize) -> &[Link] {
+        &self.links[self.firsts[node] as usize..self.firsts[node + 1] as usize]
+    }
+
+    /// Nodes at a place.
+    pub fn nodes_at(&self, place: usize) -> &[u32] {
+        self.nodes_at.of(place)
+    }
+
+    /// Appends the neighbours of `node` with what it costs to go there.
+    pub fn neighbours(&self, node: usize, out: &mut Vec<(usize, f64)>) {
+        out.extend(self.links_of(node).iter().map(|link| (link.node as usize, link.cost)));
+    }
+
+    /// The cheapest edge between two nodes.
+    pub fn edge_between(&self, a: usize, b: usize) -> Option<u32> {
+        let links = self.links_of(a).iter().filter(|link| link.node as usize == b);
+        links.min_by(|x, y| x.cost.total_cmp(&y.cost).then(x.edge.cmp(&y.edge))).map(|link| link.edge)
+    }
+}
+
+/// Connected components of a graph.
+pub fn components(graph: &Graph) -> Components {
+    let mut components = Components::new();
+    for _ in &graph.nodes {
+        components.push();
+    }
+    for edge in &graph.edges {
+        components.join(edge.from as usize, edge.to as usize);
+    }
+    components
+}
+
+/// Sizes of the components, largest first.
+pub fn component_sizes(graph: &Graph) -> Vec<usize> {
+    let components = components(graph);
+    let mut sizes = std::collections::BTreeMap::new();
+    for node in 0..graph.nodes.len() {
+        *sizes.entry(components.representative(node)).or_insert(0usize) += 1;
+    }
+    let mut sizes: Vec<usize> = sizes.into_values().collect();
+    sizes.sort_unstable_by(|a, b| b.cmp(a));
+    sizes
+}

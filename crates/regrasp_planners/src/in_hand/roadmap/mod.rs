@@ -1,0 +1,181 @@
+//! Many queries on one roadmap (paper 004, section IV-D): built once for a hand and an object, saved, asked often.
+//!
+//! The manipulation graph of paper 004 keeps paths in GS_n, which every query would have to decompose. This one keeps
+//! grasps, transfers and relocations, proven when it is built, so that a path in it is a plan.
+
+/// Linking an object pose to the graph.
+mod anchor;
+/// Building.
+mod build;
+/// Bytes of a file, with nothing believed.
+mod bytes;
+/// The file format.
+mod file;
+/// The tables.
+mod graph;
+/// The grasps that it is made of.
+mod grasps;
+/// What a roadmap was built for.
+mod identity;
+/// What the tables are searched with.
+mod index;
+/// Lower bounds for A*.
+mod landmarks;
+/// Answering queries.
+mod query;
+/// The poses covered.
+mod region;
+/// A graph that grows.
+mod registry;
+/// Motions along a path in the graph.
+mod route;
+
+pub use build::{BuildSettings, BuildStage, build_roadmap};
+pub use file::seal;
+pub use identity::{Digest, Identity};
+pub use query::{Answer, QueryMemory, RoadmapPlanner};
+pub use region::Region;
+
+use super::settings::InHandSettings;
+use graph::Graph;
+use index::{Costs, Index};
+use landmarks::Landmarks;
+use regrasp_base::{Diagnostic, InputError, Place};
+use regrasp_scene::Scene;
+use std::path::Path;
+
+/// What a roadmap says about itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct About {
+    /// What it was built for.
+    pub identity: Identity,
+    /// The poses that it covers.
+    pub region: Region,
+    /// Settings of the planner that its motions were proven with.
+    pub settings: InHandSettings,
+    /// Settings that it was built with.
+    pub build: BuildSettings,
+    /// Seed that it was built with.
+    pub seed: u64,
+    /// Queries that it has grown by.
+    pub n_grown: u64,
+    /// What motions cost.
+    costs: Costs,
+}
+
+impl About {
+    /// All of it as JSON, as the file has it.
+    pub fn summary(&self) -> serde_json::Value {
+        file::about_json(self)
+    }
+}
+
+/// A graph of grasps and proven motions of one hand and one object.
+#[derive(Debug, Clone)]
+pub struct GraspRoadmap {
+    about: About,
+    graph: Graph,
+    landmarks: Landmarks,
+    index: Index,
+}
+
+/// Numbers about a roadmap.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Census {
+    /// Object poses.
+    pub places: usize,
+    /// Grasps.
+    pub nodes: usize,
+    /// Transfers.
+    pub transfers: usize,
+    /// Relocations.
+    pub relocations: usize,
+    /// Contacts on the object.
+    pub contacts: usize,
+    /// Footholds of all fingers.
+    pub footholds: usize,
+    /// Sizes of the connected components, largest first.
+    pub components: Vec<usize>,
+    /// Places with a grasp of the largest component.
+    pub places_covered: usize,
+}
+
+impl GraspRoadmap {
+    fn new(about: About, graph: Graph) -> Self {
+        let index = Index::new(&graph, about.costs);
+        let landmarks = Landmarks::choose(&graph, &index);
+        GraspRoadmap { about, graph, landmarks, index }
+    }
+
+    /// What it was built for, and how.
+    pub fn about(&self) -> &About {
+        &self.about
+    }
+
+    /// Counts it.
+    pub fn census(&self) -> Census {
+        let n_transfers = self.graph.edges.iter().filter(|edge| edge.passage == graph::Passage::Transfer).count();
+        let components = index::components(&self.graph);
+        let mut counts = std::collections::BTreeMap::new();
+        for node in 0..self.graph.nodes.len() {
+            *counts.entry(components.representative(node)).or_insert(0usize) += 1;
+        }
+        let largest = counts.iter().max_by_key(|&(&node, &count)| (count, std::cmp::Reverse(node))).map(|(&n, _)| n);
+        let is_covered = |place: usize| {
+            let mut nodes = self.index.nodes_at(place).iter();
+            nodes.any(|&node| Some(components.representative(node as usize)) == largest)
+        };
+        Census {
+            places: self.graph.places.len(),
+            nodes: self.graph.nodes.len(),
+            transfers: n_transfers,
+            relocations: self.graph.edges.len() - n_transfers,
+            contacts: self.graph.contacts.len(),
+            footholds: self.graph.footholds.iter().map(|footholds| footholds.contacts.len()).sum(),
+            components: index::component_sizes(&self.graph),
+            places_covered: (0..self.graph.places.len()).filter(|&place| is_covered(place)).count(),
+        }
+    }
+
+    /// Refuses a scene that the roadmap was not built for; `path` is where the roadmap came from.
+    ///
+    /// Errors: another hand (`R610`), object (`R611`), friction (`R612`) or obstacles (`R613`); all that differ.
+    pub fn refuse_other_scene(&self, path: &Path, scene: &Scene) -> Result<(), InputError> {
+        let (built, asked) = (&self.about.identity, Identity::of(scene));
+        let rebuild = "build a roadmap for this scene: regrasp roadmap build SCENE -o FILE";
+        let mut diagnostics = Vec::new();
+        let mut differs = |code, what: &str, was: String, is: String| {
+            let problem = format!("was built for another {what}: {was}; the scene has {is}");
+            diagnostics.push(Diagnostic::new(code, Place::file(path), problem).fix(rebuild));
+        };
+        let named =
+            |name: &str, digest: &Digest| format!("\"{name}\", {}", &regrasp_base::files::hex(digest)[..SHOWN_DIGITS]);
+        if built.hand != asked.hand {
+            differs(
+                "R610",
+                "hand, or the same one placed otherwise",
+                named(&built.hand_name, &built.hand),
+                named(&asked.hand_name, &asked.hand),
+            );
+        }
+        if built.object != asked.object {
+            differs(
+                "R611",
+                "object",
+                named(&built.object_name, &built.object),
+                named(&asked.object_name, &asked.object),
+            );
+        }
+        if built.friction != asked.friction {
+            differs("R612", "friction", built.friction.to_string(), asked.friction.to_string());
+        }
+        if built.obstacles != asked.obstacles {
+            let digits = |digest: &Digest| regrasp_base::files::hex(digest)[..SHOWN_DIGITS].to_owned();
+            differs("R613", "set of obstacles", digits(&built.obstacles), digits(&asked.obstacles));
+        }
+        if diagnostics.is_empty() { Ok(()) } else { Err(InputError { diagnostics }) }
+    }
+}
+
+/// Hexadecimal digits of a digest that messages show.
+const SHOWN_DIGITS: usize = 12;

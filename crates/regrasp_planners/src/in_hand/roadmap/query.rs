@@ -1,0 +1,282 @@
+//! Answering queries (paper 004, section IV-D): start and goal are linked to the graph, the graph is searched, the path is
+//! smoothed.
+
+use super::super::endpoints::{End, given_grasp, object_blocked_by, refuse_buried_object};
+use super::super::model::Model;
+use super::super::record;
+use super::super::search::{Search, Stop};
+use super::super::settings::InHandSettings;
+use super::super::shorten::{Arrival, transfer_regrasp};
+use super::super::state::{GraspState, Motion, Sequence};
+use super::GraspRoadmap;
+use super::anchor::{Link, QueryEnd};
+use super::build::legs_of;
+use super::index::Index;
+use super::landmarks::Bounds;
+use super::region::nearest_places;
+use super::registry::Registry;
+use super::route::motion_along;
+use crate::failure::{Failure, FailureKind};
+use regrasp_base::{Budget, InputError, Rng};
+use regrasp_geometry::Pose;
+use regrasp_plan::Plan;
+use regrasp_plan::plan::Statistics;
+use regrasp_roadmap::AStar;
+use regrasp_scene::{GraspRequest, InHandQuery, Scene};
+use std::path::Path;
+use std::sync::atomic::AtomicUsize;
+
+/// Places nearest to each end whose grasps are tried: few at first, more where these lead nowhere.
+const RINGS: [usize; 4] = [0, 3, 8, 24];
+/// Anchors at each end from which A* chooses.
+const ANCHORS: usize = 2;
+/// A path costs at most so many times the cheapest one between the anchors (weighted A*, Pohl 1970).
+const GREED: f64 = 1.5;
+
+/// A roadmap opened for a scene.
+#[derive(Debug)]
+pub struct RoadmapPlanner<'a> {
+    model: Model<'a>,
+    roadmap: &'a GraspRoadmap,
+}
+
+/// Memory of queries, one after the other: saves time, changes nothing.
+#[derive(Debug, Default)]
+pub struct QueryMemory {
+    a_star: AStar,
+}
+
+/// A plan, and what the roadmap can learn from it.
+#[derive(Debug)]
+pub struct Answer {
+    /// The plan.
+    pub plan: Plan,
+    /// Links of start and goal to the graph.
+    links: [Link; 2],
+}
+
+impl<'a> RoadmapPlanner<'a> {
+    /// Opens a roadmap, which came from `path`, for a scene.
+    ///
+    /// Errors: it was built for another one (`R610` to `R613`).
+    pub fn new(path: &Path, roadmap: &'a GraspRoadmap, scene: &'a Scene) -> Result<Self, InputError> {
+        roadmap.refuse_other_scene(path, scene)?;
+        Ok(RoadmapPlanner { model: Model::new(scene, &roadmap.about.settings), roadmap })
+    }
+
+    /// Settings of the planner that the roadmap's motions were proven with.
+    pub fn settings(&self) -> &InHandSettings {
+        &self.model.settings
+    }
+
+    /// A query from one pose of the roadmap's region to another, drawn uniformly by seed among those at which the object
+    /// is clear of palm and obstacles; the planner chooses the grasps.
+    pub fn random_query(&self, seed: u64) -> InHandQuery {
+        let draw = |purpose: &str| {
+            let mut rng = Rng::keyed(seed, purpose, 0);
+            loop {
+                let pose = self.roadmap.about.region.draw(&self.model.scene.object.center_of_mass, &mut rng);
+                if object_blocked_by(&self.model, &pose).is_none() {
+                    return pose;
+                }
+            }
+        };
+        InHandQuery {
+            world_from_object_start: draw("random_start"),
+            world_from_object_goal: draw("random_goal"),
+            start_grasp: GraspRequest::Automatic,
+            goal_grasp: GraspRequest::Automatic,
+        }
+    }
+
+    /// Answers a query. The same query, seed and roadmap give the same plan.
+    pub fn plan(
+        &self,
+        query: &InHandQuery,
+        seed: u64,
+        budget: &Budget,
+        memory: &mut QueryMemory,
+    ) -> Result<Answer, Failure> {
+        let model = &self.model;
+        let poses = (query.world_from_object_start, query.world_from_object_goal);
+        refuse_buried_object(model, End::Start, &poses.0)?;
+        refuse_buried_object(model, End::Goal, &poses.1)?;
+        let mut rng = Rng::keyed(seed, "given_grasps", 0);
+        let start_grasp = given_grasp(model, End::Start, &poses.0, &query.start_grasp, &mut rng)?;
+        let goal_grasp = given_grasp(model, End::Goal, &poses.1, &query.goal_grasp, &mut rng)?;
+        let winner = AtomicUsize::new(usize::MAX);
+        let mut search = Search::new(model, poses, (seed, 0), (budget, budget.max_work), &winner, &|_| {});
+        search.rng = Rng::keyed(seed, "roadmap_query", 0);
+        let answer = self.answer(&mut search, query, seed, (start_grasp, goal_grasp), memory);
+        answer.unwrap_or_else(|stop| Err(self.stopped(&stop, &search)))
+    }
+
+    fn answer(
+        &self,
+        search: &mut Search,
+        query: &InHandQuery,
+        seed: u64,
+        (start_grasp, goal_grasp): (Option<GraspState>, Option<GraspState>),
+        memory: &mut QueryMemory,
+    ) -> Result<Result<Answer, Failure>, Stop> {
+        let (roadmap, landmarks) = (self.roadmap, &self.roadmap.landmarks);
+        let mut start = QueryEnd::new(search.start, start_grasp);
+        let mut goal = QueryEnd::new(search.goal, goal_grasp);
+        let (mut n_expanded, mut seen) = (0, (false, false));
+        for ring in RINGS.windows(2) {
+            let around_start = self.places_around(&start.pose, ring[0]..ring[1]);
+            let around_goal = self.places_around(&goal.pose, ring[0]..ring[1]);
+            // Where the goal will be linked is not known yet: at one of the nodes around.
+            let ends = around_goal.iter().flat_map(|&(distance, place)| {
+                roadmap.index.nodes_at(place).iter().map(move |&node| (node as usize, distance))
+            });
+            start.look_around(roadmap, &around_start, &landmarks.bounds(ends));
+            start.fill(search, roadmap, ANCHORS)?;
+            goal.look_around(roadmap, &around_goal, &self.bounds_to(&start));
+            loop {
+                start.fill(search, roadmap, ANCHORS)?;
+                goal.fill(search, roadmap, ANCHORS)?;
+                seen = (seen.0 || !start.anchors.is_empty(), seen.1 || !goal.anchors.is_empty());
+                if start.anchors.is_empty() || goal.anchors.is_empty() {
+                    break;
+                }
+                let path = self.route(&start, &goal, &mut memory.a_star);
+                n_expanded += memory.a_star.n_expanded();
+                let Some(path) = path else { break };
+                let Some(first) = start.prove(search, roadmap, path.iter().copied()) else { continue };
+                let Some(last) = goal.prove(search, roadmap, path[first.n_skipped..].iter().rev().copied()) else {
+                    continue;
+                };
+                let between = &path[first.n_skipped..path.len() - last.n_skipped];
+                let Some(way) = self.motions(search, [&first, &last], between) else {
+                    let message = "a stored transfer does not come out as it was proven: the roadmap is of another \
+                                   version of the program, or was made by hand";
+                    return Ok(Err(self.failure(message.into(), search)));
+                };
+                let statistics =
+                    Statistics { nodes: n_expanded as u64, work: search.workspace.work, ..Statistics::default() };
+                let mut plan = record::record(&self.model, query, seed, &way, statistics);
+                plan.method = "roadmap".into();
+                return Ok(Ok(Answer { plan, links: [first, last] }));
+            }
+        }
+        Ok(Err(match seen {
+            (false, _) => self.not_linked(End::Start, search),
+            (_, false) => self.not_linked(End::Goal, search),
+            _ => self.failure("the roadmap does not lead from start to goal".into(), search),
+        }))
+    }
+
+    /// The places with nodes that are `ring` in the order of their distance from a pose, with that distance.
+    fn places_around(&self, pose: &Pose, ring: std::ops::Range<usize>) -> Vec<(f64, usize)> {
+        let (graph, index) = (&self.roadmap.graph, &self.roadmap.index);
+        let has_nodes = |place: usize| !index.nodes_at(place).is_empty();
+        let mut nearest = nearest_places(&graph.places, pose, self.model.turn_length(), ring.end, has_nodes);
+        nearest.drain(..ring.start.min(nearest.len()));
+        nearest
+    }
+
+    /// Lower bounds of the cost of reaching one of the anchors of an end, and the end from there.
+    fn bounds_to(&self, end: &QueryEnd) -> Bounds {
+        self.roadmap.landmarks.bounds(end.anchors.iter().map(|anchor| (anchor.node, anchor.cost)))
+    }
+
+    /// A cheap way from an anchor of the start to one of the goal, as nodes.
+    fn route(&self, start: &QueryEnd, goal: &QueryEnd, a_star: &mut AStar) -> Option<Vec<usize>> {
+        let roadmap = self.roadmap;
+        let (from, to) = (roadmap.graph.nodes.len(), roadmap.graph.nodes.len() + 1);
+        let neighbours = |node: usize, out: &mut Vec<(usize, f64)>| {
+            if node == from {
+                out.extend(start.anchors.iter().map(|anchor| (anchor.node, anchor.cost)));
+                return;
+            }
+            roadmap.index.neighbours(node, out);
+            out.extend(goal.anchors.iter().filter(|anchor| anchor.node == node).map(|anchor| (to, anchor.cost)));
+        };
+        let bounds = self.bounds_to(goal);
+        let bound = |node: usize| if node < from { GREED * roadmap.landmarks.bound(node, &bounds) } else { 0.0 };
+        let path = a_star.cheapest_path(from, |node| node == to, neighbours, bound)?.nodes;
+        Some(path[1..path.len() - 1].to_vec())
+    }
+
+    /// All motions from the start to the goal along a path. None when what is stored does not fit together.
+    fn motions(&self, search: &mut Search, [first, last]: [&Link; 2], path: &[usize]) -> Option<Sequence> {
+        let mut way = first.changes.clone().then(first.transfer.reversed())?;
+        for pair in path.windows(2) {
+            let edge = self.roadmap.index.edge_between(pair[0], pair[1])?;
+            way = way.then(motion_along(&self.model, self.roadmap, edge, pair[0])?)?;
+        }
+        way = way.then(last.transfer.clone())?.then(last.changes.reversed())?;
+        straighten(search, &mut way);
+        Some(way)
+    }
+
+    fn not_linked(&self, end: End, search: &Search) -> Failure {
+        let (name, pose) = match end {
+            End::Start => ("start", &search.start),
+            End::Goal => ("goal", &search.goal),
+        };
+        let center_of_mass = self.model.scene.object.center_of_mass;
+        let inside = self.roadmap.about.region.contains(pose, &center_of_mass, 1e-9);
+        let place = if inside { "which is in its region" } else { "which is outside its region" };
+        self.failure(format!("no grasp of the roadmap can be taken to the {name}, {place}"), search)
+    }
+
+    fn failure(&self, message: String, search: &Search) -> Failure {
+        Failure {
+            kind: FailureKind::NotConnected,
+            message,
+            advice: "build the roadmap with more places, or over a region that holds start and goal".into(),
+            causes: search.tally.causes(&self.model),
+            nearest_miss: None,
+            statistics: Statistics { work: search.workspace.work, ..Statistics::default() },
+        }
+    }
+
+    fn stopped(&self, stop: &Stop, search: &Search) -> Failure {
+        let kind = match stop {
+            Stop::Budget(interrupt) => (*interrupt).into(),
+            Stop::Restart | Stop::Overtaken => FailureKind::WorkSpent,
+        };
+        Failure { kind, ..self.failure("the query was cut".into(), search) }
+    }
+}
+
+/// Transfers that follow each other with one grasp become one, where that is free.
+fn straighten(search: &mut Search, way: &mut Sequence) {
+    let mut first = 0;
+    while first < way.steps().len() {
+        let transfers = way.steps()[first..].iter().take_while(|step| matches!(step.motion(), Motion::Transfer(_)));
+        let last = first + transfers.count().max(1) - 1;
+        if last > first {
+            let (from, to) = (way.state_before(first).clone(), way.steps()[last].end().clone());
+            let mut rng = Rng::child(&search.rng, "straighten", first as u64);
+            let straight = transfer_regrasp(search, &from, &to, Arrival::Exact, &mut rng);
+            if let Some(straight) = straight.filter(|straight| straight.steps().len() <= 1) {
+                let fits = way.replace(first..=last, straight);
+                debug_assert!(fits, "the same ends");
+            }
+        }
+        first = last + 1;
+    }
+}
+
+impl GraspRoadmap {
+    /// The roadmap with the ends of an answered query as new places, each linked by the motions found.
+    #[must_use]
+    pub fn grown_by(self, answer: &Answer) -> Self {
+        let GraspRoadmap { mut about, graph, mut landmarks, .. } = self;
+        let mut registry = Registry::new(graph);
+        for link in &answer.links {
+            let place = registry.add_place(link.transfer.end().world_from_object);
+            let mut legs = legs_of(&link.transfer, place);
+            legs.extend(legs_of(&link.changes.reversed(), place));
+            registry.add_legs(link.node as u32, &legs);
+        }
+        about.n_grown += 1;
+        let graph = registry.into_graph();
+        let index = Index::new(&graph, about.costs);
+        landmarks.extend(&graph, &index);
+        GraspRoadmap { about, graph, landmarks, index }
+    }
+}
