@@ -127,6 +127,7 @@ fn failed(kind: FailureKind, message: String, advice: &str) -> Failure {
         message,
         advice: advice.into(),
         causes: Vec::new(),
+        leg: None,
         nearest_miss: None,
         statistics: Default::default(),
     }

@@ -2,6 +2,7 @@
 //! smoothed.
 
 use super::super::endpoints::{End, given_grasp, object_blocked_by, refuse_buried_object};
+use super::super::legs::Solution;
 use super::super::model::Model;
 use super::super::record;
 use super::super::search::{Search, Stop};
@@ -83,13 +84,14 @@ impl<'a> RoadmapPlanner<'a> {
         };
         InHandQuery {
             world_from_object_start: draw("random_start"),
+            world_from_object_way: Vec::new(),
             world_from_object_goal: draw("random_goal"),
             start_grasp: GraspRequest::Automatic,
             goal_grasp: GraspRequest::Automatic,
         }
     }
 
-    /// Answers a query. The same query, seed and roadmap give the same plan.
+    /// Answers a query without way poses. The same query, seed and roadmap give the same plan.
     pub fn plan(
         &self,
         query: &InHandQuery,
@@ -99,6 +101,7 @@ impl<'a> RoadmapPlanner<'a> {
     ) -> Result<Answer, Failure> {
         let model = &self.model;
         let poses = (query.world_from_object_start, query.world_from_object_goal);
+        refuse_way_poses(query)?;
         refuse_buried_object(model, End::Start, &poses.0)?;
         refuse_buried_object(model, End::Goal, &poses.1)?;
         let mut rng = Rng::keyed(seed, "given_grasps", 0);
@@ -155,7 +158,8 @@ impl<'a> RoadmapPlanner<'a> {
                 };
                 let statistics =
                     Statistics { nodes: n_expanded as u64, work: search.workspace.work, ..Statistics::default() };
-                let mut plan = record::record(&self.model, query, seed, &way, statistics);
+                let mut plan =
+                    record::record(&self.model, query, seed, &Solution { way, steps_to_way: Vec::new() }, statistics);
                 plan.method = "roadmap".into();
                 return Ok(Ok(Answer { plan, links: [first, last] }));
             }
@@ -214,7 +218,7 @@ impl<'a> RoadmapPlanner<'a> {
     fn not_linked(&self, end: End, search: &Search) -> Failure {
         let (name, pose) = match end {
             End::Start => ("start", &search.start),
-            End::Goal => ("goal", &search.goal),
+            End::Way(_) | End::Goal => ("goal", &search.goal),
         };
         let center_of_mass = self.model.scene.object.center_of_mass;
         let inside = self.roadmap.about.region.contains(pose, &center_of_mass, 1e-9);
@@ -228,6 +232,7 @@ impl<'a> RoadmapPlanner<'a> {
             message,
             advice: "build the roadmap with more places, or over a region that holds start and goal".into(),
             causes: search.tally.causes(&self.model),
+            leg: None,
             nearest_miss: None,
             statistics: Statistics { work: search.workspace.work, ..Statistics::default() },
         }
@@ -279,4 +284,21 @@ impl GraspRoadmap {
         landmarks.extend(&graph, &index);
         GraspRoadmap { about, graph, landmarks, index }
     }
+}
+
+/// A roadmap is asked leg by leg.
+fn refuse_way_poses(query: &InHandQuery) -> Result<(), Failure> {
+    let n_way_poses = query.world_from_object_way.len();
+    if n_way_poses == 0 {
+        return Ok(());
+    }
+    Err(Failure {
+        kind: FailureKind::WayInvalid,
+        message: format!("the query has {n_way_poses} way poses; a roadmap answers queries from one pose to another"),
+        advice: "ask leg by leg, each from the grasp in which the one before ends, or use regrasp plan".into(),
+        causes: Vec::new(),
+        leg: None,
+        nearest_miss: None,
+        statistics: Statistics::default(),
+    })
 }
