@@ -221,7 +221,7 @@ impl Breeder<'_> {
         self.add("object cuts a way pose short", &[WayPoseMissed], |plan, rng| {
             // The waypoint itself is left out; the moments named after it move up.
             let n_poses = plan.way_poses.len();
-            let chosen = plan.way_poses.get(rng.below(n_poses.max(1)))?.clone();
+            let chosen = *plan.way_poses.get(rng.below(n_poses.max(1)))?;
             let waypoints = &mut plan.segments.get_mut(chosen.segment)?.waypoints;
             if waypoints.len() < 3 {
                 return None;

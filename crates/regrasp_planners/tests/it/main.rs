@@ -3,6 +3,7 @@
 mod in_hand_methods;
 #[path = "../../../../tests/support/places.rs"]
 mod places;
+mod roadmaps;
 mod segments;
 mod soft_and_coupled;
 mod way_poses;

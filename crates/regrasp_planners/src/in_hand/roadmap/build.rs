@@ -145,6 +145,7 @@ fn largest_component(graph: &Graph) -> Graph {
 }
 
 /// Where a sequence begins.
+#[expect(clippy::large_enum_variant, reason = "a few at a time, short-lived")]
 enum Origin {
     /// At a node.
     Node(u32),

@@ -305,6 +305,7 @@ impl Lists {
 
 /// Grasps and motions gathered before they are numbered: see [`super::registry`].
 #[derive(Debug, Clone)]
+#[expect(clippy::large_enum_variant, reason = "a few at a time, short-lived")]
 pub enum Leg {
     /// To a place, with the same contacts.
     Transfer {
