@@ -5,6 +5,7 @@
 
 /// Good plans in hands of other contacts and couplings.
 mod hand;
+/// Way poses gone wrong.
 mod way;
 
 use crate::check::continuity::{contact_of, moving_finger, pose_difference};
