@@ -259,13 +259,17 @@ mod tests {
     use super::rows::SuiteRow;
     use super::*;
     use crate::row::Row;
+    use std::sync::atomic::{AtomicUsize, Ordering};
 
     fn repository() -> PathBuf {
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
     }
 
     fn read_text(text: &str) -> Result<Suite, String> {
-        let path = std::env::temp_dir().join(format!("regrasp_suite_{}_{}.toml", std::process::id(), text.len()));
+        // Tests run side by side: each text has a file of its own.
+        static COUNT: AtomicUsize = AtomicUsize::new(0);
+        let number = COUNT.fetch_add(1, Ordering::Relaxed);
+        let path = std::env::temp_dir().join(format!("regrasp_suite_{}_{number}.toml", std::process::id()));
         std::fs::write(&path, text).unwrap();
         let suite = read(&path).map_err(|error| error.to_string());
         std::fs::remove_file(&path).unwrap();
