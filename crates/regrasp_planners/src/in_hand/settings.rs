@@ -130,7 +130,7 @@ pub struct InHandSettings {
     /// How far it may turn away from it, standard deviation (in-hand-notes, 3: 0.4 rad).
     pub wander_angle: f64,
     /// Share of poses drawn as far off the straight way as the object is large: long objects must travel to turn (paper 000,
-    /// section 5.1, example 3).
+    /// section 5.1, example 3). By measurement: with 0.2 the pencil takes a fifth of the work of 0, boxes within 5 % of it.
     pub far_share: f64,
     /// Share of poses drawn straight out of a passage, where an end of the way lies in one (paper 000, example 4).
     pub passage_share: f64,
@@ -172,7 +172,7 @@ impl Default for InHandSettings {
             rrt_iterations: 100,
             wander_distance: 0.02,
             wander_angle: 0.4,
-            far_share: 0.1,
+            far_share: 0.2,
             passage_share: 0.5,
             goal_share: 0.7,
             try_fee: 0.6,
