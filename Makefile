@@ -15,6 +15,7 @@ ALLEGRO_REQUIRED := $(addprefix scenes/allegro/,$(addsuffix .toml,sphere32_x sph
   cube57_z cube57_180z cylinder20_x cylinder20_y box_y))
 ALLEGRO_STRETCH := $(addprefix scenes/allegro/,$(addsuffix .toml,box_x box_z cube45_x cylinder20_z))
 ALLEGRO_MESHES := $(addprefix scenes/allegro/,$(addsuffix .toml,rubiks_x rubiks_z apple_x apple_z can_y))
+SOFT_AND_COUPLED := scenes/dclaw/soft_sphere32_x.toml scenes/trifinger/soft_cylinder20_z.toml scenes/shadow/sphere32_z.toml
 # Sections of docs/benchmarks.md, in this order; those without a CSV file are left out.
 BENCHMARKS := wide visibility classic allegro_required allegro_stretch allegro_meshes
 SEEDS ?= 200
@@ -59,10 +60,14 @@ endif
 benchmark-page: release
 	$(REGRASP) bench --page docs/benchmarks.md --limits docs/benchmarks/limits.json $(wildcard $(BENCHMARKS:%=docs/benchmarks/%.csv)) suites/*.toml
 
-# Slow: same bytes on 1, 2 and 8 threads (100 queries), and the checker against broken and good plans.
+# Slow: same bytes on 1, 2 and 8 threads (100 queries), and the checker against broken and good plans; torsion and couplings
+# are broken in plans for real hands.
 campaign: release
 	$(REGRASP) campaign determinism $(WIDE) scenes/cubic.toml --queries 100 --threads 1,2,8
 	$(REGRASP) campaign mutations $(WIDE) scenes/cubic.toml --mutants 100 --good 1000
+ifneq ($(PACKAGES),)
+	$(REGRASP) campaign mutations $(SOFT_AND_COUPLED) $(PACKAGES) --mutants 100 --good 300
+endif
 
 FUZZ_TARGETS := urdf srdf hand_toml scene_toml stl obj plan_json
 FUZZ_RUNS ?= 1000000

@@ -1,7 +1,9 @@
 //! Scenes times seeds to tables, and campaigns that try the tool itself. Prints nothing; `regrasp_cli` does.
 //!
-//! Times are taken around calls, in wall-clock and in processor time of the process; planners never see a clock.
+//! Times are taken around calls, in wall-clock and in processor time; planners never see a clock.
 
+/// Trials side by side.
+pub mod at_once;
 /// Rows as CSV, written whole or appended one by one, and read back.
 pub mod csv;
 /// The same bytes on any number of threads.

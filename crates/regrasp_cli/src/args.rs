@@ -154,6 +154,9 @@ pub struct Bench {
     /// Threads of one search
     #[arg(long, default_value = "1", value_parser = threads, allow_negative_numbers = true)]
     pub threads: usize,
+    /// Seeds planned at the same time: as many as there are cores to spare, or times do not compare
+    #[arg(long, default_value = "1", value_name = "N", value_parser = threads, allow_negative_numbers = true)]
+    pub at_once: usize,
     /// How to search.
     #[command(flatten)]
     pub search: Search,

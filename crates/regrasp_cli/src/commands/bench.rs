@@ -8,6 +8,7 @@ use crate::load;
 use crate::stop::Stop;
 use crate::talk::Talk;
 use regrasp::base::files;
+use regrasp_bench::at_once::in_order;
 use regrasp_bench::row::Judge;
 use regrasp_bench::suite::is_suite;
 use regrasp_bench::{Limits, Problem, Row, RunSettings, csv, limits, page, run as run_one, summarise, summary};
@@ -48,10 +49,13 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
     let mut rows = Vec::new();
     for path in load::scene_files(&arguments.scenes)? {
         let loaded = load::scene(&path, common, talk)?;
-        for seed in arguments.first_seed..arguments.first_seed.saturating_add(arguments.seeds.unwrap_or(DEFAULT_SEEDS))
-        {
+        let n_seeds = arguments.seeds.unwrap_or(DEFAULT_SEEDS).min(u64::MAX - arguments.first_seed);
+        let job = |index: usize| {
+            let seed = arguments.first_seed + index as u64;
             let query = loaded.task.query(seed);
-            let row = run_one(Problem { scene: &loaded.scene, query: &query, seed }, &settings);
+            run_one(Problem { scene: &loaded.scene, query: &query, seed }, &settings)
+        };
+        in_order(n_seeds as usize, arguments.at_once, job, |_, row| {
             if cancelled.load(Ordering::Relaxed) {
                 return Err(Stop::Interrupted);
             }
@@ -60,7 +64,8 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
                 writer.push(&row).map_err(|error| Stop::unwritable(path, &error))?;
             }
             rows.push(row);
-        }
+            Ok(())
+        })?;
     }
     if let (Some(writer), Some(path)) = (writer, &arguments.csv) {
         writer.finish().map_err(|error| Stop::unwritable(path, &error))?;

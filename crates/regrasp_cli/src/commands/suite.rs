@@ -9,6 +9,7 @@ use crate::stop::Stop;
 use crate::talk::Talk;
 use regrasp::base::files;
 use regrasp::scene::LoadedScene;
+use regrasp_bench::at_once::in_order;
 use regrasp_bench::csv::Writer;
 use regrasp_bench::row::Judge;
 use regrasp_bench::suite::rows::{SuiteRow, earlier, header, inputs_hash, kept, line};
@@ -47,7 +48,7 @@ pub fn run(path: &Path, arguments: &args::Bench, common: &Common, talk: &Talk) -
     talk.say(format!("suite  {}: {n_trials} trials, {n_kept} of them measured before", suite.title));
     let mut progress = Progress { n_done: n_kept as u64, n_trials, last: Instant::now() };
     for part in &mut plan {
-        measure(part, &cancelled, &mut progress, talk, |row| {
+        measure(part, arguments.at_once, &cancelled, &mut progress, talk, |row| {
             writer.push_line(&line(row)).map_err(|error| Stop::unwritable(&csv_path, &error))
         })?;
     }
@@ -116,6 +117,7 @@ impl Progress {
 
 fn measure(
     part: &mut Part,
+    n_at_once: usize,
     cancelled: &Arc<AtomicBool>,
     progress: &mut Progress,
     talk: &Talk,
@@ -129,20 +131,23 @@ fn measure(
         judge: Judge::Checker,
         cancelled: Arc::clone(cancelled),
     };
-    for (seed, done) in part.done.iter_mut().enumerate().filter(|(_, done)| done.is_none()) {
-        let seed = seed as u64;
+    let missing: Vec<usize> = (0..part.done.len()).filter(|&seed| part.done[seed].is_none()).collect();
+    let run_seed = |index: usize| {
+        let seed = missing[index] as u64;
         let query = part.loaded.task.query(seed);
-        let row = run_one(Problem { scene: &part.loaded.scene, query: &query, seed }, &settings);
+        run_one(Problem { scene: &part.loaded.scene, query: &query, seed }, &settings)
+    };
+    in_order(missing.len(), n_at_once, run_seed, |index, row| {
         if cancelled.load(Ordering::Relaxed) {
             return Err(Stop::Interrupted);
         }
         say_row(&row, talk);
         let row = SuiteRow { job: job.name.clone(), inputs: part.inputs.clone(), row };
         push(&row)?;
-        *done = Some(row);
+        part.done[missing[index]] = Some(row);
         progress.count(&job.name, talk);
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 fn write_results(suite: &Suite, rows: &[SuiteRow], folder: &Path, talk: &Talk) -> Result<(), Stop> {
