@@ -11,13 +11,16 @@ use std::sync::Arc;
 
 /// A shape that reaches at most this many radii from the centre belongs to the tip as a whole.
 const WHOLE_WITHIN: f64 = 2.0;
-/// A phalanx is cut this many radii behind the centre. A neck as wide as the ball then stands out of it by 0.12 radii,
-/// which nothing covers; cutting at the centre would forbid contacts on the side of the ball.
+/// A phalanx is cut this many radii behind the centre: cutting at the centre would forbid contacts on the side of the ball.
+/// Between the cut and the ball a capsule as wide as the ball stands out by 0.03 radii, which nothing covers.
 const CUT_BEHIND: f64 = 0.5;
+/// What lies ahead of the cut and stands out of the ball by no more than this is left to the ball, in metres.
+const NEGLIGIBLE: f64 = 1e-4;
 
 /// The shapes of a tip link with a ball of `radius` at `center`, all in the frame of `body`, whose joint is the origin.
 ///
-/// A phalanx is replaced by its part behind the ball, which is not tip, and by the ball, which is.
+/// A phalanx is replaced by its part behind the ball, which is not tip, by the part ahead where that stands out of the ball,
+/// which is tip, and by the ball.
 pub(crate) fn split(
     placed: Vec<PlacedShape>,
     link: LinkId,
@@ -29,7 +32,7 @@ pub(crate) fn split(
     let Some(axis) = UnitVector::try_new(center.coords, 1e-6) else {
         return placed.into_iter().map(|placed| whole(placed, true)).collect();
     };
-    let mut shapes = Vec::new();
+    let (mut shapes, mut fronts) = (Vec::new(), Vec::new());
     for placed in placed {
         let center_in_shape = placed.parent_from_shape.inverse() * center;
         if placed.shape.reach_from(&center_in_shape) <= WHOLE_WITHIN * radius {
@@ -38,7 +41,13 @@ pub(crate) fn split(
         }
         match behind(&placed, center, &axis, radius) {
             Behind::All => shapes.push(whole(placed, false)),
-            Behind::Part(part) => shapes.push(whole(part, false)),
+            Behind::Part(part, ahead) => {
+                shapes.push(whole(part, false));
+                let stands_out = |ahead: &PlacedShape| {
+                    ahead.shape.reach_from(&(ahead.parent_from_shape.inverse() * center)) > radius + NEGLIGIBLE
+                };
+                fronts.extend(ahead.filter(stands_out).map(|ahead| whole(ahead, true)));
+            }
             Behind::Unknown => shapes.push(whole(placed, true)),
         }
     }
@@ -46,13 +55,15 @@ pub(crate) fn split(
         let parent_from_shape = Pose::from_parts(Translation3::from(center.coords), UnitQuaternion::identity());
         shapes.push(whole(PlacedShape { parent_from_shape, shape: Shape::Sphere { radius } }, true));
     }
+    shapes.extend(fronts);
     shapes
 }
 
 /// What of a shape lies behind the cut.
 enum Behind {
     All,
-    Part(PlacedShape),
+    /// It, and what lies ahead.
+    Part(PlacedShape, Option<PlacedShape>),
     /// The shape cannot be cut.
     Unknown,
 }
@@ -99,33 +110,33 @@ fn shorten_capsule(ends: [Point; 2], cut: &Point, axis: &UnitVector, radius: f64
         .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&nalgebra::Vector3::x_axis(), std::f64::consts::PI));
     let middle = nalgebra::center(&end, &ends[near]);
     let shape = Shape::Capsule { half_length: 0.5 * along.norm(), radius };
-    Behind::Part(PlacedShape {
-        parent_from_shape: Pose::from_parts(Translation3::from(middle.coords), rotation),
-        shape,
-    })
+    let part = PlacedShape { parent_from_shape: Pose::from_parts(Translation3::from(middle.coords), rotation), shape };
+    Behind::Part(part, None)
 }
 
-/// The hull of the points behind the cut and of the edges' crossings with it.
+/// The hulls of the points on either side of the cut, each with the edges' crossings.
 fn cut_polyhedron(points: &[Point], triangles: &[[u32; 3]], cut: &Point, axis: &UnitVector) -> Behind {
     let ahead: Vec<f64> = points.iter().map(|p| axis.dot(&(p - cut))).collect();
     if ahead.iter().all(|&a| a <= 0.0) {
         return Behind::All;
     }
-    let mut kept: Vec<Point> = points.iter().zip(&ahead).filter(|(_, a)| **a <= 0.0).map(|(p, _)| *p).collect();
+    let mut crossings = Vec::new();
     for corners in triangles {
         for k in 0..3 {
             let (i, j) = (corners[k] as usize, corners[(k + 1) % 3] as usize);
             if ahead[i] < 0.0 && ahead[j] > 0.0 {
-                kept.push(points[i] + (points[j] - points[i]) * (ahead[i] / (ahead[i] - ahead[j])));
+                crossings.push(points[i] + (points[j] - points[i]) * (ahead[i] / (ahead[i] - ahead[j])));
             }
         }
     }
-    match ConvexHull::new(&kept) {
-        Ok(hull) => {
-            let shape = Shape::Convex(Arc::new(hull));
-            Behind::Part(PlacedShape { parent_from_shape: Pose::identity(), shape })
-        }
-        Err(_) => Behind::Unknown,
+    let hull_of = |is_kept: &dyn Fn(f64) -> bool| {
+        let kept = points.iter().zip(&ahead).filter(|(_, a)| is_kept(**a)).map(|(p, _)| *p);
+        let hull = ConvexHull::new(&kept.chain(crossings.iter().copied()).collect::<Vec<_>>()).ok()?;
+        Some(PlacedShape { parent_from_shape: Pose::identity(), shape: Shape::Convex(Arc::new(hull)) })
+    };
+    match hull_of(&|a| a <= 0.0) {
+        Some(part) => Behind::Part(part, hull_of(&|a| a >= 0.0)),
+        None => Behind::Unknown,
     }
 }
 
@@ -158,24 +169,37 @@ mod tests {
         let whole = Arc::new(ConvexHull::new(&points).unwrap());
         let placed = PlacedShape { parent_from_shape: Pose::identity(), shape: Shape::Convex(whole.clone()) };
         let shapes = split(vec![placed], LinkId(3), 1, &center, RADIUS);
-        assert_eq!(shapes.iter().map(|s| s.is_tip).collect::<Vec<_>>(), [false, true]);
+        assert_eq!(shapes.iter().map(|s| s.is_tip).collect::<Vec<_>>(), [false, true, true]);
         let Shape::Convex(rest) = &shapes[0].placed.shape else { panic!("{:?}", shapes[0]) };
-        assert!(rest.vertices().iter().all(|p| p.x <= 0.07 - CUT_BEHIND * RADIUS + 1e-12));
+        assert_eq!(shapes[1].placed.shape, Shape::Sphere { radius: RADIUS });
+        let Shape::Convex(front) = &shapes[2].placed.shape else { panic!("{:?}", shapes[2]) };
+        let cut_at = 0.07 - CUT_BEHIND * RADIUS;
+        assert!(rest.vertices().iter().all(|p| p.x <= cut_at + 1e-12));
+        assert!(front.vertices().iter().all(|p| p.x >= cut_at - 1e-12));
         let mut rng = regrasp_base::Rng::keyed(1, "split", 0);
-        let mut hints = [0, 0];
-        // By support in random directions the part lies in the whole, and reaches the cut.
+        let mut hints = [0, 0, 0];
+        // By support in random directions both parts lie in the whole, and one of them reaches as far.
         for _ in 0..500 {
             let direction = Vector3::new(rng.normal(), rng.normal(), rng.normal()).normalize();
-            let part = direction.dot(&rest.support(&direction, &mut hints[0]).coords);
-            assert!(part <= direction.dot(&whole.support(&direction, &mut hints[1]).coords) + 1e-12);
+            let [in_rest, in_front, in_whole] = [(rest, 0), (front, 1), (&whole, 2)]
+                .map(|(hull, k)| direction.dot(&hull.support(&direction, &mut hints[k]).coords));
+            assert!((in_rest.max(in_front) - in_whole).abs() < 1e-12, "{in_rest} {in_front} {in_whole}");
         }
-        // What neither part nor ball covers stands out of the ball by no more than its own width at the cut allows.
-        let uncovered = points
+    }
+
+    #[test]
+    fn what_lies_within_the_ball_is_left_to_it() {
+        let center = Point::new(0.07, 0.0, 0.0);
+        // A phalanx that narrows to a point inside the ball.
+        let points: Vec<Point> = [(0.0, 0.0), (0.01, 0.0), (-0.005, 0.008), (-0.005, -0.008)]
             .iter()
-            .filter(|p| p.x > 0.07 - CUT_BEHIND * RADIUS)
-            .map(|p| (p - center).norm() - RADIUS)
-            .fold(0.0, f64::max);
-        assert!(uncovered <= 0.12 * RADIUS, "{uncovered}");
+            .map(|&(y, z)| Point::new(0.02, y, z))
+            .chain([Point::new(0.075, 0.0, 0.0)])
+            .collect();
+        let hull = Arc::new(ConvexHull::new(&points).unwrap());
+        let placed = PlacedShape { parent_from_shape: Pose::identity(), shape: Shape::Convex(hull) };
+        let shapes = split(vec![placed], LinkId(3), 1, &center, RADIUS);
+        assert_eq!(shapes.iter().map(|s| s.is_tip).collect::<Vec<_>>(), [false, true]);
     }
 
     #[test]
