@@ -195,6 +195,28 @@ fn bench_writes_rows_and_the_page_is_made_of_them() {
 }
 
 #[test]
+fn seeds_planned_at_the_same_time_give_the_same_rows_in_the_same_order() {
+    let folder = Folder::new();
+    let rows = |n_at_once: &str| -> Vec<String> {
+        let run = folder.run(&["bench", "scene.toml", "--seeds", "5", "--at-once", n_at_once, "--csv", "rows.csv"]);
+        assert_eq!(run.code, Some(0), "{run:?}");
+        let text = std::fs::read_to_string(folder.path("rows.csv")).unwrap();
+        let names: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+        let is_time: Vec<bool> = names.iter().map(|name| name.ends_with("_s")).collect();
+        let without_times = |line: &str| {
+            let fields = line.split(',').zip(&is_time).filter(|(_, is_time)| !**is_time).map(|(field, _)| field);
+            fields.collect::<Vec<_>>().join(",")
+        };
+        text.lines().map(without_times).collect()
+    };
+    let one = rows("1");
+    assert_eq!(one.len(), 6, "{one:?}");
+    assert_eq!(one, rows("3"));
+    let refused = folder.run(&["bench", "scene.toml", "--at-once", "0"]);
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+}
+
+#[test]
 fn inspect_writes_a_hand_file_that_plans() {
     let folder = Folder::new();
     let run = folder.run(&["inspect", "hand.urdf", "-o", "guessed.toml", "--samples", "200"]);
