@@ -165,7 +165,8 @@ impl Breeder<'_> {
             (!missed.is_empty()).then(|| drop(plan.segments.remove(missed[rng.below(missed.len())])))
         });
         self.add("segment reversed in time", &[SegmentsDoNotMeet, StartMismatch, GoalMismatch], |plan, rng| {
-            pick(&mut plan.segments, rng)?.waypoints.reverse();
+            let mut moving: Vec<_> = plan.segments.iter_mut().filter(|segment| goes_somewhere(segment)).collect();
+            pick(&mut moving, rng)?.waypoints.reverse();
             Some(())
         });
         self.add("plan reversed in time", &[StartMismatch, GoalMismatch], |plan, _| {
