@@ -112,7 +112,7 @@ fn what_a_transfer_alone_cannot_do_is_refused_after_a_search() {
     query.world_from_object_goal.translation.z += 0.08;
     let settings = InHandSettings::default();
     let found = plan_in_hand(&loaded.scene, &query, &settings, 0, &Budget::work(3_000_000), &|_| {});
-    let failure = found.err().expect("no transfer leads there");
+    let failure = found.expect_err("no transfer leads there");
     assert_eq!(failure.kind, FailureKind::Impossible);
     for words in ["can never change its grasp", "no transfer alone was found", "degrees"] {
         assert!(failure.message.contains(words), "{words} is missing: {}", failure.message);
@@ -121,7 +121,7 @@ fn what_a_transfer_alone_cannot_do_is_refused_after_a_search() {
     // Two hard fingertips hold nothing at all: no search.
     let hard = regrasp_robot::ContactModel::Point;
     loaded.scene.hand.fingers.iter_mut().for_each(|finger| finger.tip.contact = hard);
-    let failure = try_plan(&loaded, &settings, 0).err().expect("nothing holds");
+    let failure = try_plan(&loaded, &settings, 0).expect_err("nothing holds");
     assert_eq!((failure.kind, failure.statistics.work), (FailureKind::Impossible, 0));
     assert!(failure.message.contains("all of them together cannot hold"), "{}", failure.message);
 }
@@ -136,7 +136,7 @@ fn a_failure_names_the_fingers_that_could_never_be_released() {
     let settings = InHandSettings { closure_margin: 0.02, ..InHandSettings::default() };
     let query = loaded.task.query(0);
     let found = plan_in_hand(&loaded.scene, &query, &settings, 0, &Budget::work(60_000), &|_| {});
-    let failure = found.err().expect("no finger can be released");
+    let failure = found.expect_err("no finger can be released");
     assert_eq!(failure.kind, FailureKind::WorkSpent);
     for words in ["never to be released", "\"east\"", "closed in none of", "nearest: margin", "of 0.02", "degrees"] {
         assert!(failure.message.contains(words), "{words} is missing: {}", failure.message);
