@@ -88,9 +88,11 @@ pub struct Waypoint {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SegmentKind {
-    /// All fingers hold, the grasp stays, the object moves (paper 000, section 3.2).
+    /// The object moves; every finger holds one contact all along, or is free all along (paper 000, section 3.2: in GS_k
+    /// k fingers hold and the others are independent).
     Transfer,
-    /// The object stays, one finger moves to another contact, the others hold.
+    /// The object stays and one finger moves: to another contact, away from one to stay free, from free to a contact, or
+    /// from one free posture to another. The others rest, those that hold and those that are free.
     Regrasp,
 }
 
@@ -149,7 +151,9 @@ pub struct Statistics {
     pub restarts: u64,
     /// Transfers in the plan.
     pub transfers: u64,
-    /// Single-finger relocations in the plan.
+    /// Transfers in the plan during which some finger is free.
+    pub transfers_with_free_fingers: u64,
+    /// Relocations in the plan: how often a finger lands on a contact.
     pub relocations: u64,
     /// True when a wall-clock limit cut something, so that another machine may find another plan.
     pub cut_by_time: bool,

@@ -20,21 +20,26 @@ fn bundled(name: &str) -> PathBuf {
 fn bundled_hands_follow_the_closed_form_of_their_fingers() {
     // tip = x inward + h (cos t1 z - sin t1 y), x = l1 sin t2 + l2 sin(t2 + t3), h = l1 cos t2 + l2 cos(t2 + t3), in the
     // finger frame whose x points inward.
-    for name in ["wide_four_finger", "tight_four_finger"] {
+    for (name, n_fingers, base_radius) in [
+        ("wide_four_finger", 4, 0.045),
+        ("tight_four_finger", 4, 0.045),
+        ("soft_pair", 2, 0.045),
+        ("six_finger", 6, 0.055),
+    ] {
         let loaded = load_hand(&bundled(name), &LoadOptions::default()).unwrap();
         assert_eq!(loaded.notes, Vec::<String>::new());
         let hand = loaded.hand;
-        assert_eq!(hand.fingers.len(), 4);
-        assert_eq!(hand.n_joints(), 12);
+        assert_eq!(hand.fingers.len(), n_fingers);
+        assert_eq!(hand.n_joints(), 3 * n_fingers);
         for (k, finger) in hand.fingers.iter().enumerate() {
             assert!(finger.chain.within_limits(&finger.rest, 0.0));
-            let azimuth = k as f64 * std::f64::consts::FRAC_PI_2;
+            let azimuth = k as f64 * std::f64::consts::TAU / n_fingers as f64;
             let outward = nalgebra::Vector3::new(azimuth.cos(), azimuth.sin(), 0.0);
             let (inward, up) = (-outward, nalgebra::Vector3::z());
             let sideways = up.cross(&inward);
             for [t1, t2, t3] in [[0.0f64, 0.0, 0.0], [0.2, -0.5, 1.1], [-0.3, 0.9, 0.4]] {
                 let (x, h) = (0.058 * t2.sin() + 0.05 * (t2 + t3).sin(), 0.058 * t2.cos() + 0.05 * (t2 + t3).cos());
-                let expected = 0.045 * outward + x * inward + h * (t1.cos() * up - t1.sin() * sideways);
+                let expected = base_radius * outward + x * inward + h * (t1.cos() * up - t1.sin() * sideways);
                 let tip = finger.chain.tip(&[t1, t2, t3], &finger.tip.center_in_body);
                 assert!((tip.coords - expected).norm() < 1e-12, "{name} {} {tip} {expected}", finger.name);
             }

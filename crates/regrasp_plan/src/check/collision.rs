@@ -1,7 +1,7 @@
 //! No collision at any moment: distances by parry, motion bounds between the moments where they are measured.
 
 use crate::check::bodies::{Bodies, Owner, Pair};
-use crate::check::continuity::moving_finger;
+use crate::check::continuity::{is_free_throughout, moving_finger};
 use crate::check::lift::{FreePart, free_part};
 use crate::check::model::Model;
 use crate::check::motion::{Breach, Step, certify};
@@ -36,21 +36,24 @@ pub fn check_collision(
         let moving = moving_finger(model, segment).filter(|_| segment.kind == SegmentKind::Regrasp);
         let free =
             moving.and_then(|f| free_part(bodies, &model.fingers[f], f, segment, s, settings, log, &mut n_distances));
+        let is_free: Vec<bool> = (0..model.fingers.len()).map(|f| is_free_throughout(segment, f)).collect();
         for (w, ends) in segment.waypoints.windows(2).enumerate() {
             let mut step = Step::new(bodies, &ends[0], &ends[1]);
             for (pair, track) in bodies.pairs.iter().zip(&mut tracks) {
                 if track.reported_in == Some(s) {
                     continue;
                 }
-                let may_touch = pair.tip_of.is_some();
+                let may_touch = pair.tip_of.is_some_and(|f| !is_free[f]);
+                // The tip of a free finger touches nothing, and rounding is no distance.
+                let apart = if pair.tip_of.is_some() { settings.free_clearance } else { 0.0 };
                 if !may_touch && track.bound < clearance.as_ref().map_or(f64::INFINITY, |c| c.distance) {
                     note_clearance(&mut step, bodies, pair, track, Moment::at(s, w), &mut clearance);
                 }
-                if step.rests(pair) && track.bound > 0.0 {
+                if step.rests(pair) && track.bound > apart {
                     continue;
                 }
                 let is_moving_tip = may_touch && pair.tip_of == moving;
-                for (t0, t1, floor) in pieces(w, if is_moving_tip { free } else { None }, may_touch, tolerance) {
+                for (t0, t1, floor) in pieces(w, if is_moving_tip { free } else { None }, may_touch, tolerance, apart) {
                     match certify(&mut step, pair, (t0, t1), track.bound, floor, settings.resolution) {
                         Ok(bound) => track.bound = bound,
                         Err(breach) => {
@@ -68,9 +71,9 @@ pub fn check_collision(
 }
 
 /// The step cut where the moving tip becomes clear and where it lands; each piece with the distance it must keep.
-fn pieces(w: usize, free: Option<FreePart>, may_touch: bool, tolerance: f64) -> Vec<(f64, f64, f64)> {
+fn pieces(w: usize, free: Option<FreePart>, may_touch: bool, tolerance: f64, apart: f64) -> Vec<(f64, f64, f64)> {
     if !may_touch {
-        return vec![(0.0, 1.0, 0.0)];
+        return vec![(0.0, 1.0, apart)];
     }
     let Some(((first, from), (last, to))) = free else { return vec![(0.0, 1.0, -tolerance)] };
     let from = if w < first {

@@ -247,7 +247,8 @@ pub fn check_joints(model: &Model, plan: &Plan, settings: &CheckSettings, log: &
     }
 }
 
-/// Who may change what: the grasp stays in a transfer; in a regrasp only the moving finger changes.
+/// Who may change what: in a transfer every finger keeps its contact or stays free; in a regrasp only the moving finger
+/// changes.
 pub fn check_roles(model: &Model, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
     for (s, segment) in plan.segments.iter().enumerate() {
         match segment.kind {
@@ -257,7 +258,7 @@ pub fn check_roles(model: &Model, plan: &Plan, settings: &CheckSettings, log: &m
                     log.push(Violation::new(Kind::WrongMovingFinger, message).when(Moment::at(s, 0)));
                 }
                 for finger in 0..model.fingers.len() {
-                    check_holding(model, segment, s, finger, settings, log);
+                    check_constant(model, segment, s, finger, settings, log);
                 }
             }
             SegmentKind::Regrasp => check_regrasp_roles(model, segment, s, settings, log),
@@ -283,7 +284,7 @@ fn check_regrasp_roles(model: &Model, segment: &Segment, s: usize, settings: &Ch
     }
     for (f, finger) in model.fingers.iter().enumerate() {
         if Some(f) != moving {
-            check_holding(model, segment, s, f, settings, log);
+            check_constant(model, segment, s, f, settings, log);
             for (w, waypoint) in segment.waypoints.iter().enumerate() {
                 let moved = finger.coordinates.clone().map(|k| (waypoint.joints[k] - first.joints[k]).abs());
                 let moved = moved.fold(0.0, f64::max);
@@ -298,12 +299,10 @@ fn check_regrasp_roles(model: &Model, segment: &Segment, s: usize, settings: &Ch
             continue;
         }
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
-            let expected = if w == 0 || w == last_index { ContactMode::Fixed } else { ContactMode::Free };
-            if waypoint.contacts[f].mode != expected {
-                let message = format!(
-                    "moving finger \"{}\" is {:?}, but must be {expected:?} here",
-                    finger.name, waypoint.contacts[f].mode
-                );
+            // At its ends it holds or is free, as what comes before and after says.
+            let is_end = w == 0 || w == last_index;
+            if !is_end && !is_free(&waypoint.contacts[f]) {
+                let message = format!("moving finger \"{}\" holds on its way, but must be free", finger.name);
                 let violation = Violation::new(Kind::WrongContactMode, message).when(Moment::at(s, w));
                 log.push(violation.subjects([finger.name.as_str()]));
             }
@@ -311,20 +310,30 @@ fn check_regrasp_roles(model: &Model, segment: &Segment, s: usize, settings: &Ch
     }
 }
 
-/// Finger `f` holds the same contact all through the segment.
-fn check_holding(model: &Model, segment: &Segment, s: usize, f: usize, settings: &CheckSettings, log: &mut Log) {
+/// Finger `f` holds the same contact all through the segment, or is free all through it.
+fn check_constant(model: &Model, segment: &Segment, s: usize, f: usize, settings: &CheckSettings, log: &mut Log) {
     let name = model.fingers[f].name.as_str();
     let first = &segment.waypoints[0].contacts[f];
     for (w, waypoint) in segment.waypoints.iter().enumerate() {
         let contact = &waypoint.contacts[f];
-        if contact.mode == ContactMode::Free {
-            let message = format!("finger \"{name}\" is free, but must hold");
+        if is_free(contact) != is_free(first) {
+            let (was, is) = if is_free(first) { ("is free", "holds") } else { ("holds", "is free") };
+            let message = format!("finger \"{name}\" {was} when the segment begins, but {is} here");
             log.push(Violation::new(Kind::WrongContactMode, message).when(Moment::at(s, w)).subjects([name]));
-        } else if first.mode != ContactMode::Free && !contacts_agree(first, contact, settings.meeting_tolerance) {
+        } else if !contacts_agree(first, contact, settings.meeting_tolerance) {
             let message = format!("the contact of finger \"{name}\" is not the one with which the segment began");
             log.push(Violation::new(Kind::GraspChanges, message).when(Moment::at(s, w)).subjects([name]));
         }
     }
+}
+
+fn is_free(contact: &ContactState) -> bool {
+    contact.mode == ContactMode::Free
+}
+
+/// True when finger `f` is free at every waypoint of the segment.
+pub fn is_free_throughout(segment: &Segment, f: usize) -> bool {
+    segment.waypoints.iter().all(|waypoint| is_free(&waypoint.contacts[f]))
 }
 
 /// Index of the finger that moves in a segment.

@@ -1,5 +1,5 @@
 //! Lifting and landing: a moving fingertip leaves its contact on the normal's side before it goes anywhere, and reaches
-//! the next one from there.
+//! the next one from there. One that is free at an end of its motion has nothing to leave or reach there.
 
 use crate::check::bodies::{Bodies, Owner, Pair};
 use crate::check::continuity::contact_of;
@@ -7,7 +7,7 @@ use crate::check::model::FingerModel;
 use crate::check::motion::Step;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
-use crate::plan::{Segment, Waypoint};
+use crate::plan::{ContactMode, Segment, Waypoint};
 use regrasp_geometry::{Pose, Vector};
 
 /// Tangent of the angle between the way of the tip's centre and the normal, at most: 60 degrees.
@@ -37,9 +37,16 @@ pub fn free_part(
 ) -> Option<FreePart> {
     let n_steps = segment.waypoints.len() - 1;
     let mut search = Search { bodies, finger, f, segment, s, settings, log, n_distances };
-    let lifted = search.run(&segment.waypoints[0], (0..n_steps).map(|w| (w, Direction::Forward)).collect());
-    let landing =
-        search.run(&segment.waypoints[n_steps], (0..n_steps).rev().map(|w| (w, Direction::Backward)).collect());
+    let (first, last) = (&segment.waypoints[0], &segment.waypoints[n_steps]);
+    let is_free = |waypoint: &Waypoint| waypoint.contacts[f].mode == ContactMode::Free;
+    let lifted = match is_free(first) {
+        true => Some((0, 0.0)),
+        false => search.run(first, (0..n_steps).map(|w| (w, Direction::Forward)).collect()),
+    };
+    let landing = match is_free(last) {
+        true => Some((n_steps - 1, 1.0)),
+        false => search.run(last, (0..n_steps).rev().map(|w| (w, Direction::Backward)).collect()),
+    };
     let (Some(lifted), Some(landing)) = (lifted, landing) else {
         search.report(Moment::at(s, 0), "never gets clear of the object".into(), 0.0, settings.lift_clearance);
         return None;

@@ -72,6 +72,8 @@ pub struct CheckSettings {
     pub resolution: f64,
     /// A lifted fingertip must get this far from the object before it may go anywhere, in metres.
     pub lift_clearance: f64,
+    /// The tip of a finger that is free all through a segment keeps this far from the object, in metres.
+    pub free_clearance: f64,
     /// Most violations of a kind that are reported one by one.
     pub most_per_kind: usize,
 }
@@ -90,6 +92,7 @@ impl Default for CheckSettings {
             normal_tolerance: 1e-3,
             resolution: 0.05e-3,
             lift_clearance: 0.1e-3,
+            free_clearance: 0.05e-3,
             most_per_kind: 20,
         }
     }

@@ -3,6 +3,8 @@
 //!
 //! Amounts are small: a mutant that any check would catch proves nothing.
 
+/// Fingers that are free, and fingers that are said to be.
+mod free;
 /// Good plans in hands of other contacts and couplings.
 mod hand;
 /// Way poses gone wrong.
@@ -48,6 +50,7 @@ pub fn mutants(plan: &Plan, scene: &Scene, rng: &mut Rng) -> Vec<Mutant> {
     breeder.break_relocations();
     breeder.break_contact_models();
     breeder.break_couplings();
+    breeder.break_free_fingers();
     breeder.found
 }
 
@@ -162,7 +165,8 @@ impl Breeder<'_> {
             (!missed.is_empty()).then(|| drop(plan.segments.remove(missed[rng.below(missed.len())])))
         });
         self.add("segment reversed in time", &[SegmentsDoNotMeet, StartMismatch, GoalMismatch], |plan, rng| {
-            pick(&mut plan.segments, rng)?.waypoints.reverse();
+            let mut moving: Vec<_> = plan.segments.iter_mut().filter(|segment| goes_somewhere(segment)).collect();
+            pick(&mut moving, rng)?.waypoints.reverse();
             Some(())
         });
         self.add("plan reversed in time", &[StartMismatch, GoalMismatch], |plan, _| {
@@ -331,7 +335,9 @@ impl Breeder<'_> {
         });
         self.add("finger lets go in a transfer", &[WrongContactMode], |plan, rng| {
             let (s, w) = pick_waypoint(plan, rng, SegmentKind::Transfer)?;
-            *pick(&mut plan.segments[s].waypoints[w].contacts, rng)? = free();
+            let mut held: Vec<_> = plan.segments[s].waypoints[w].contacts.iter_mut().collect();
+            held.retain(|contact| contact.mode == ContactMode::Fixed);
+            **pick(&mut held, rng)? = free();
             Some(())
         });
         self.add("contact rolls", &[ModeNotSupported], |plan, rng| {
@@ -364,6 +370,9 @@ impl Breeder<'_> {
             let segment = pick(&mut regrasps, rng)?;
             let f = moving_finger(model, segment)?;
             let last = segment.waypoints.len().checked_sub(1).filter(|&last| last >= 2)?;
+            if segment.waypoints[last].contacts[f].mode == ContactMode::Free {
+                return None;
+            }
             segment.waypoints[last - 1].contacts[f] = segment.waypoints[last].contacts[f].clone();
             Some(())
         });

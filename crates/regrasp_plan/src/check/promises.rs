@@ -41,7 +41,7 @@ pub fn check_inputs(plan: &Plan, inputs: &[InputFile], log: &mut Log) {
     }
 }
 
-/// Closure of the holding fingers in every segment; the smallest margin. Contacts are constant in a segment.
+/// Closure of exactly the fingers that hold, in every segment; the smallest margin. Contacts are constant in a segment.
 pub fn check_closure(
     object: &Object,
     model: &Model,

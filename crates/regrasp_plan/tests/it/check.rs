@@ -21,6 +21,33 @@ fn a_good_plan_is_accepted() {
 }
 
 #[test]
+fn a_good_plan_with_a_free_finger_is_accepted() {
+    let scene = sample::scene();
+    let plan = sample::plan_with_free_finger(&scene);
+    let report = check(&scene, Some(&sample::query(&plan)), &plan, &CheckSettings::default());
+    assert!(report.accepted(), "{report:#?}");
+    assert!(report.min_margin.unwrap() > 0.005);
+}
+
+#[test]
+fn a_free_finger_keeps_clear_of_the_object() {
+    let scene = sample::scene();
+    let plan = sample::plan_with_free_finger(&scene);
+    let lifted = plan.segments.iter().position(|segment| segment.kind == regrasp_plan::SegmentKind::Transfer).unwrap();
+    // Declared free from the start on, though it still touches: nothing else is wrong with that.
+    let mut touching = plan.clone();
+    let free = touching.segments[lifted].waypoints[0].contacts[1].clone();
+    touching.segments[0].waypoints[0].contacts[1] = free;
+    let kinds = |plan: &regrasp_plan::Plan| {
+        let report = check(&scene, Some(&sample::query(plan)), plan, &CheckSettings::default());
+        report.violations.iter().map(|violation| violation.kind).collect::<Vec<_>>()
+    };
+    let found = kinds(&touching);
+    assert!(!found.is_empty() && found.iter().all(|kind| *kind == ViolationKind::Collision), "{found:?}");
+    assert!(kinds(&plan).is_empty());
+}
+
+#[test]
 fn a_plan_of_another_scene_is_rejected_and_a_missing_scene_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("plan.json");

@@ -9,13 +9,14 @@ use std::collections::{BTreeMap, BTreeSet};
 #[test]
 fn every_mutant_is_rejected_for_a_fitting_reason() {
     let scene = sample::scene();
-    let plan = sample::plan_with_way(&scene);
-    let query = sample::query(&plan);
+    let plans = [sample::plan_with_way(&scene), sample::plan_with_free_finger(&scene)];
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     let mut kinds = BTreeSet::new();
     let mut wrong = Vec::new();
-    for round in 0..30 {
-        for mutant in mutants(&plan, &scene, &mut Rng::keyed(1, "mutation", round)) {
+    for round in 0..60 {
+        let plan = &plans[round as usize % 2];
+        let query = sample::query(plan);
+        for mutant in mutants(plan, &scene, &mut Rng::keyed(1, "mutation", round)) {
             // Header mutants also change what was asked for, so the query is only given for the others.
             let judged_in = mutant.scene.as_ref().unwrap_or(&scene);
             let report = check(judged_in, Some(&query), &mutant.plan, &CheckSettings::default());
@@ -29,8 +30,17 @@ fn every_mutant_is_rejected_for_a_fitting_reason() {
     }
     assert!(wrong.is_empty(), "{} mutants wrongly judged:\n{}", wrong.len(), wrong.join("\n"));
     assert!(counts.len() >= 40, "{counts:?}");
-    for (name, count) in counts {
-        assert!(count >= 5, "{name} was only made {count} times");
+    for (name, count) in &counts {
+        assert!(*count >= 5, "{name} was only made {count} times");
+    }
+    for name in [
+        "finger declared free whom the others need",
+        "finger declared free that touches the object",
+        "free finger touches the object",
+        "finger declared holding that is away",
+        "free finger holds for a moment",
+    ] {
+        assert!(counts.contains_key(name), "{name} was never made");
     }
     use ViolationKind::*;
     for kind in [

@@ -219,11 +219,23 @@ fn waypoint(hand_from_object: &Pose, grasp: &Grasp, lifted: Option<(usize, Vecto
 }
 
 fn transfer(from: &Pose, turn: &Vector, shift: &Vector, grasp: &Grasp, n_steps: usize) -> (Segment, Pose) {
+    transfer_with(from, turn, shift, grasp, None, n_steps)
+}
+
+/// A transfer in which the tip of one finger may be free, at a place beside the object that moves with it.
+fn transfer_with(
+    from: &Pose,
+    turn: &Vector,
+    shift: &Vector,
+    grasp: &Grasp,
+    lifted: Option<(usize, Vector)>,
+    n_steps: usize,
+) -> (Segment, Pose) {
     let pose_at = |t: f64| {
         let rotation = UnitQuaternion::from_scaled_axis(turn * t) * from.rotation;
         Pose::from_parts(Translation3::from(from.translation.vector + shift * t), rotation)
     };
-    let waypoints = (0..=n_steps).map(|k| waypoint(&pose_at(k as f64 / n_steps as f64), grasp, None)).collect();
+    let waypoints = (0..=n_steps).map(|k| waypoint(&pose_at(k as f64 / n_steps as f64), grasp, lifted)).collect();
     (Segment { kind: SegmentKind::Transfer, moving_finger: None, waypoints }, pose_at(1.0))
 }
 
@@ -259,7 +271,10 @@ pub fn plan(scene: &Scene) -> Plan {
     let (second, grasp) = regrasp(&pose, &grasp, 1, around(65.0, 2.0), 0.004);
     let (third, grasp) = regrasp(&pose, &grasp, 3, around(255.0, -6.0), 0.002);
     let (fourth, goal) = transfer(&pose, &Vector::new(-0.05, 0.0, 0.15), &Vector::new(0.0, 0.002, -0.002), &grasp, 8);
-    let segments = vec![first, second, third, fourth];
+    plan_of(scene, &start, &goal, vec![first, second, third, fourth])
+}
+
+fn plan_of(scene: &Scene, start: &Pose, goal: &Pose, segments: Vec<Segment>) -> Plan {
     let joint_names = scene.hand.joint_names();
     let mut plan = Plan {
         format: FORMAT.into(),
@@ -294,7 +309,31 @@ pub fn plan(scene: &Scene) -> Plan {
     plan
 }
 
-/// The same plan with poses to be passed: within the first transfer, at its end, and within the last one.
+/// A finger lifts off and stays free while the others turn the object, goes to another free posture, and lands.
+pub fn plan_with_free_finger(scene: &Scene) -> Plan {
+    let start = Pose::translation(0.0, 0.0, 0.078);
+    let grasp = [around(5.0, -5.0), around(80.0, 6.0), around(178.0, -4.0), around(272.0, 3.0)];
+    let finger = 1;
+    let (away, touch) = (0.008, OBJECT_RADIUS + TIP_RADIUS);
+    let (whole, _) = regrasp(&start, &grasp, finger, around(70.0, 2.0), away);
+    // A relocation lifts in six steps.
+    let highest = 6;
+    let part = |waypoints: &[Waypoint]| Segment { waypoints: waypoints.to_vec(), ..whole.clone() };
+    let lift = part(&whole.waypoints[..=highest]);
+    let hover = grasp[finger].normalize() * (touch + away);
+    let (turn, shift) = (Vector::new(0.02, 0.03, 0.15), Vector::new(0.001, -0.001, 0.002));
+    let (held, pose) = transfer_with(&start, &turn, &shift, &grasp, Some((finger, hover)), 10);
+    let free_at = |t: f64| waypoint(&pose, &grasp, Some((finger, hover * (1.0 + 0.05 * t))));
+    let higher = Segment { waypoints: (0..=4).map(|k| free_at(f64::from(k) / 4.0)).collect(), ..whole.clone() };
+    let (back, landed) = regrasp(&pose, &grasp, finger, around(70.0, 2.0), away);
+    let mut waypoints = vec![free_at(1.0)];
+    waypoints.extend_from_slice(&back.waypoints[highest..]);
+    let land = Segment { waypoints, ..back };
+    let (last, goal) = transfer(&pose, &Vector::new(-0.05, 0.0, 0.1), &Vector::new(0.0, 0.002, -0.002), &landed, 8);
+    plan_of(scene, &start, &goal, vec![lift, held, higher, land, last])
+}
+
+/// As [`plan`], with poses to be passed: within the first transfer, at its end, and within the last one.
 pub fn plan_with_way(scene: &Scene) -> Plan {
     let mut plan = plan(scene);
     plan.way_poses = [(0, 5), (0, 10), (3, 4)]

@@ -80,6 +80,7 @@ impl Left {
                 miss.distance_left * 1e3
             )
         });
+        let bound = self.tally.bound_fingers(model).map_or(String::new(), |bound| format!("; {bound}"));
         let leg = (n_legs > 1).then_some(self.leg + 1);
         let where_stuck = leg.map_or(String::new(), |leg| format!("leg {leg} of {n_legs} failed: "));
         let causes = self.tally.causes(model);
@@ -93,7 +94,7 @@ impl Left {
         Failure {
             kind: interrupt.into(),
             message: format!(
-                "no plan {limit} (not a proof), searching from scratch {}: {where_stuck}{reached}",
+                "no plan {limit} (not a proof), searching from scratch {}: {where_stuck}{reached}{bound}",
                 times(n_attempts)
             ),
             advice,

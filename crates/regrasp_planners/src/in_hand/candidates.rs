@@ -17,14 +17,14 @@ const LOOK_AHEAD_STEP: f64 = 1.0;
 /// How strongly rays are drawn towards the finger. By hand: half of the rays fall within 55 degrees.
 const PULL: f64 = 0.9;
 
-/// A contact that a finger can take, with everything else ignored but object, palm and obstacles.
+/// A contact that a finger can take, or a free posture, with everything else ignored but object, palm and obstacles.
 #[derive(Debug, Clone)]
 pub struct Candidate {
-    /// The contact.
-    pub contact: Contact,
+    /// The contact; None for a free posture.
+    pub contact: Option<Contact>,
     /// Joints there.
     pub joints: Coordinates,
-    /// Share of the way to the target that the finger can follow with it.
+    /// Share of the way to the target that the finger can follow with it, or that it is not in the way of.
     pub follow: f64,
 }
 
@@ -89,7 +89,7 @@ pub fn reach(
     let normal = UnitVector::new_unchecked(world_from_object.vector(&contact.normal_in_object));
     let target = tip_target(world_from_object, contact, model.fingers[finger].tip_radius);
     let joints = model.fingers[finger].ik.solve_random(&target, &ik_settings(model, finger, normal), rng)?;
-    if !lift_is_within_reach(model, world_from_object, finger, &Foothold { contact, joints: &joints }) {
+    if !lift_is_within_reach(model, world_from_object, finger, &Foothold { contact: Some(contact), joints: &joints }) {
         return None;
     }
     workspace.set_finger(finger, &joints);
@@ -123,6 +123,27 @@ pub fn follow_share(
         n_followed += 1;
     }
     f64::from(n_followed) / LOOK_AHEAD as f64
+}
+
+/// Share of the way along which `finger`, free with these joints, is clear of the object, palm and obstacles, looked at now
+/// and then; None when it is not at the beginning, with the object at `world_from_object`.
+pub fn clear_share(
+    workspace: &mut Workspace,
+    finger: usize,
+    joints: &Coordinates,
+    world_from_object: &Pose,
+    way: &Way,
+) -> Option<f64> {
+    let mode = TipMode::Away { finger, clearance: workspace.model.free_clearance() };
+    let mut is_clear = |pose: &Pose| {
+        workspace.place_object_and_finger(pose, finger, joints);
+        workspace.finger_alone_is_clear(finger, mode)
+    };
+    if !is_clear(world_from_object) {
+        return None;
+    }
+    let n_clear = way.moments.iter().take_while(|(pose, _)| is_clear(pose)).count();
+    Some(n_clear as f64 / LOOK_AHEAD as f64)
 }
 
 /// Draws contacts of `finger` that it can take, with its joints there: up to `n_wanted`, each given to `found`.

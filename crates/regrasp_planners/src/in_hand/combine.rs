@@ -1,6 +1,7 @@
 //! Combinations of candidates: which grasps are closed, which of their fingers can be released, how far they follow.
 
 use super::candidates::Candidate;
+use super::free::most_free;
 use super::model::{MAX_FINGERS, Model};
 use super::settings::ReleaseRule;
 use super::workspace::Workspace;
@@ -25,6 +26,28 @@ pub struct ClosureTable<'a> {
     pairs: Vec<f64>,
     /// Margin of all fingers of a set together, where pairs and triples are not enough.
     larger: BTreeMap<(u32, Choice), f64>,
+    /// What letting each finger go was seen to come to.
+    releases: [Held; MAX_FINGERS],
+}
+
+/// How the others hold without a finger, over the closed grasps in which it holds.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Held {
+    /// Closed grasps looked at.
+    pub n_grasps: u64,
+    /// Of these, grasps that the others hold with the margin asked for.
+    pub n_held: u64,
+    /// Largest margin of the others, up to the one asked for.
+    pub best: f64,
+}
+
+impl Held {
+    /// Adds what was seen elsewhere.
+    pub fn add(&mut self, other: &Held) {
+        self.n_grasps += other.n_grasps;
+        self.n_held += other.n_held;
+        self.best = self.best.max(other.best);
+    }
 }
 
 /// Which sets of fingers may be closed where no smaller one of them is.
@@ -52,7 +75,19 @@ impl<'a> ClosureTable<'a> {
             triples: vec![f64::NAN; (n * n_options).pow(3)],
             pairs: vec![f64::NAN; if has_soft { (n * n_options).pow(2) } else { 0 }],
             larger: BTreeMap::new(),
+            releases: Default::default(),
         }
+    }
+
+    /// Contact of a finger with its option, which is none of a free posture.
+    fn contact(&self, finger: usize, choice: &Choice) -> Contact {
+        self.options[finger][choice[finger]].contact.expect("only fingers that hold are asked about")
+    }
+
+    /// Fingers whose options are contacts, as bits.
+    pub fn holding(&self, choice: &Choice) -> u32 {
+        let holds = |&f: &usize| self.options[f][choice[f]].contact.is_some();
+        (0..choice.len()).filter(holds).fold(0, |bits, f| bits | 1 << f)
     }
 
     /// Margin of three fingers with their options, as points.
@@ -62,7 +97,7 @@ impl<'a> ClosureTable<'a> {
         let m = self.n_options;
         let index = (((i * n + j) * n + k) * m + choice[i]) * m * m + choice[j] * m + choice[k];
         if self.triples[index].is_nan() {
-            let contacts = fingers.map(|f| self.options[f][choice[f]].contact);
+            let contacts = fingers.map(|f| self.contact(f, choice));
             let is_smooth = |&f: &usize| self.model.fingers[f].contact == ContactModel::Frictionless;
             self.triples[index] = match fingers.iter().any(is_smooth) {
                 true => 0.0,
@@ -86,7 +121,7 @@ impl<'a> ClosureTable<'a> {
     /// Margin in which all of `fingers` take part with their options, up to the one asked for.
     fn together(&self, fingers: &[usize], choice: &Choice) -> f64 {
         let grips: ArrayVec<Grip, MAX_FINGERS> =
-            fingers.iter().map(|&f| self.model.grip(f, &self.options[f][choice[f]].contact)).collect();
+            fingers.iter().map(|&f| self.model.grip(f, &self.contact(f, choice))).collect();
         let models: ArrayVec<ContactModel, MAX_FINGERS> = grips.iter().map(|grip| grip.model).collect();
         match closure::may_close(&models, self.model.frame.friction) {
             true => closure::general::prove(&grips, &self.model.frame, self.model.settings.closure_margin).margin(),
@@ -94,8 +129,10 @@ impl<'a> ClosureTable<'a> {
         }
     }
 
-    /// Margin of the fingers whose bit is set in `holding`: the first found that is enough, or the largest.
-    pub fn margin(&mut self, choice: &Choice, holding: u32) -> f64 {
+    /// Margin of the fingers whose bit is set in `among` and whose options are contacts: the first found that is enough,
+    /// or the largest.
+    pub fn margin(&mut self, choice: &Choice, among: u32) -> f64 {
+        let holding = among & self.holding(choice);
         let enough = self.model.settings.closure_margin;
         let fingers: ArrayVec<usize, MAX_FINGERS> =
             (0..self.options.len()).filter(|&f| holding & (1 << f) != 0).collect();
@@ -140,25 +177,40 @@ impl<'a> ClosureTable<'a> {
         best.max(together)
     }
 
-    /// True when the fingers of `holding` keep the required margin.
-    pub fn is_closed(&mut self, choice: &Choice, holding: u32) -> bool {
-        self.margin(choice, holding) >= self.model.settings.closure_margin
+    /// True when those of the fingers of `among` whose options are contacts keep the required margin.
+    pub fn is_closed(&mut self, choice: &Choice, among: u32) -> bool {
+        self.margin(choice, among) >= self.model.settings.closure_margin
     }
 
-    /// Number of fingers that the others would let go.
+    /// Number of fingers that the others would let go, or that are free, in a choice that is closed.
     pub fn n_releasable(&mut self, choice: &Choice) -> usize {
         let n = self.options.len();
-        let all = (1u32 << n) - 1;
-        (0..n).filter(|&finger| self.is_closed(choice, all & !(1 << finger))).count()
+        let (holding, enough) = (self.holding(choice), self.model.settings.closure_margin);
+        let mut n_releasable = 0;
+        for finger in 0..n {
+            if holding & (1 << finger) == 0 {
+                n_releasable += 1;
+                continue;
+            }
+            let best = self.margin(choice, holding & !(1 << finger));
+            let is_held = best >= enough;
+            self.releases[finger].add(&Held { n_grasps: 1, n_held: u64::from(is_held), best });
+            n_releasable += usize::from(is_held);
+        }
+        n_releasable
+    }
+
+    /// What was seen so far of letting each finger go.
+    pub fn releases(&self) -> &[Held] {
+        &self.releases
     }
 }
 
-/// Fingers that the others would let go with these contacts, as bits.
-pub fn releasable(model: &Model, contacts: &[Contact]) -> u32 {
-    let n = contacts.len();
+/// Fingers of `holding` that the others of them would let go with these contacts, as bits.
+pub fn releasable(model: &Model, contacts: &[Contact], holding: u32) -> u32 {
     let mut bits = 0;
-    for finger in 0..n {
-        if model.closure_margin(contacts, model.all_fingers() & !(1 << finger)) >= model.settings.closure_margin {
+    for finger in (0..contacts.len()).filter(|finger| holding & (1 << finger) != 0) {
+        if model.closure_margin(contacts, holding & !(1 << finger)) >= model.settings.closure_margin {
             bits |= 1 << finger;
         }
     }
@@ -208,7 +260,8 @@ impl ClashTable {
     }
 }
 
-/// The best closed combinations of `options` that fit together, best first. With `least_follow`, option 0 of a finger is
+/// The best closed combinations of `options` that fit together, with no more free fingers than the settings allow, best
+/// first. With `least_follow`, option 0 of a finger is
 /// where it is, others cost a relocation, and all must follow at least that share of the way.
 pub fn rank(
     workspace: &mut Workspace,
@@ -223,6 +276,7 @@ pub fn rank(
     let mut clashes = ClashTable::new(options);
     let n = options.len();
     let all = (1u32 << n) - 1;
+    let most_free = most_free(model);
     let n_choices: usize = options.iter().map(Vec::len).product();
     let mut rough: Vec<Ranked> = Vec::with_capacity(n_choices);
     for code in 0..n_choices {
@@ -231,6 +285,10 @@ pub fn rank(
         for finger_options in options {
             choice.push(rest % finger_options.len());
             rest /= finger_options.len();
+        }
+        let n_free = (0..n).filter(|&f| options[f][choice[f]].contact.is_none()).count();
+        if n_free > most_free {
+            continue;
         }
         let n_moved = if keeps_first { choice.iter().filter(|&&option| option != 0).count() } else { 0 };
         if keeps_first && n_moved == 0 {
@@ -254,13 +312,14 @@ pub fn rank(
         }
         let n_releasable = table.n_releasable(&candidate.choice);
         let rule = model.settings.release_rule;
-        if n_releasable == 0 || (rule == ReleaseRule::EverywhereEveryFinger && n_releasable < n) {
+        if (n_releasable == 0 && model.may_release) || (rule == ReleaseRule::EverywhereEveryFinger && n_releasable < n)
+        {
             continue;
         }
         if !clashes.is_clear(workspace, options, &candidate.choice) {
             continue;
         }
-        candidate.worth += RELEASE_BONUS * (n_releasable - 1) as f64 / (n - 1) as f64;
+        candidate.worth += RELEASE_BONUS * n_releasable.saturating_sub(1) as f64 / (n - 1) as f64;
         let place = ranked.partition_point(|other| other.worth >= candidate.worth);
         ranked.insert(place, candidate);
         ranked.truncate(n_wanted);

@@ -61,25 +61,52 @@ fn refusal(kind: FailureKind, message: String, advice: &str) -> Failure {
 
 /// Refuses hands of which the others can never hold while one finger is away.
 pub fn refuse_impossible(model: &Model) -> Result<(), Failure> {
-    let n = model.n_fingers();
-    let others_may_hold = |away: usize| {
-        let others: Vec<ContactModel> = (0..n).filter(|&f| f != away).map(|f| model.fingers[f].contact).collect();
-        may_close(&others, model.frame.friction)
-    };
-    if (0..n).any(others_may_hold) {
+    if model.may_release {
         return Ok(());
     }
+    Err(refusal(FailureKind::Impossible, never_released(model), MORE_FINGERS))
+}
+
+/// Refuses hands that cannot hold an object even with all fingers.
+pub fn refuse_holding_nothing(model: &Model) -> Result<(), Failure> {
+    let all: Vec<ContactModel> = model.fingers.iter().map(|finger| finger.contact).collect();
+    if may_close(&all, model.frame.friction) {
+        return Ok(());
+    }
+    let message = format!(
+        "the hand has {} and friction {}: all of them together cannot hold an object",
+        fingers_in_words(model),
+        model.frame.friction
+    );
+    Err(refusal(FailureKind::Impossible, message, MORE_FINGERS))
+}
+
+const MORE_FINGERS: &str =
+    "use a hand with at least 4 fingers, or declare soft fingertips, of which two can hold (contact = \"soft_finger\")";
+
+fn fingers_in_words(model: &Model) -> String {
     let models: Vec<&str> = model.fingers.iter().map(|finger| finger.contact.name()).collect();
-    Err(refusal(
-        FailureKind::Impossible,
-        format!(
-            "the hand has {n} fingers with contacts {models:?} and friction {}: while one of them is away the others \
-             cannot hold an object (fewer than three points cannot: it turns about the line through two of them). Such a \
-             hand can never change its grasp",
-            model.frame.friction
-        ),
-        "use a hand with at least 4 fingers, or declare soft fingertips, of which two can hold (contact = \"soft_finger\")",
-    ))
+    format!("{} fingers with contacts {models:?}", model.n_fingers())
+}
+
+fn never_released(model: &Model) -> String {
+    format!(
+        "the hand has {} and friction {}: while one of them is away the others cannot hold an object (fewer than three points \
+         cannot: it turns about the line through two of them). Such a hand can never change its grasp",
+        fingers_in_words(model),
+        model.frame.friction
+    )
+}
+
+/// What a search with such a hand that found no transfer comes to: `failure` with the reason for which transfers are all that
+/// it has.
+pub fn refuse_after_transfers(model: &Model, failure: Failure) -> Failure {
+    Failure {
+        kind: FailureKind::Impossible,
+        message: format!("{}, and no transfer alone was found: {}", never_released(model), failure.message),
+        advice: MORE_FINGERS.into(),
+        ..failure
+    }
 }
 
 /// Refuses an object pose at which the object itself is in collision with palm or obstacles.
@@ -165,7 +192,7 @@ pub fn given_grasp(
             "move the contacts apart, or ask for a smaller margin",
         ));
     }
-    if end == End::Start && releasable(model, &state.contacts) == 0 {
+    if end == End::Start && model.may_release && releasable(model, &state.contacts, state.holding) == 0 {
         return Err(end.failure(
             "in the start grasp no finger may let go: no n-1 of the fingers are force closed".into(),
             "choose other contacts, or let the planner choose (grasp = \"automatic\")",
@@ -226,7 +253,7 @@ fn from_joints(model: &Model, end: End, world_from_object: &Pose, values: &[f64]
         contacts.push(Contact { point_in_object, normal_in_object });
         joints.push(own);
     }
-    Ok(GraspState { world_from_object: *world_from_object, contacts, joints })
+    Ok(GraspState::held_by_all(*world_from_object, contacts, joints))
 }
 
 fn from_contacts(
@@ -268,7 +295,7 @@ fn from_contacts(
         contacts.push(contact);
         joints.push(own);
     }
-    Ok(GraspState { world_from_object: *world_from_object, contacts, joints })
+    Ok(GraspState::held_by_all(*world_from_object, contacts, joints))
 }
 
 /// Postures tried for a given contact.

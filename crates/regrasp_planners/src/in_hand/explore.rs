@@ -105,11 +105,11 @@ pub fn draw_state_at(search: &mut Search, world_from_object: &Pose) -> Option<Gr
             continue;
         }
         let chosen = |f: usize| &options[f][choice[f]];
-        let contacts: Contacts = (0..n).map(|f| chosen(f).contact).collect();
+        let Some(contacts) = (0..n).map(|f| chosen(f).contact).collect::<Option<Contacts>>() else { continue };
         let joints: HandJoints = (0..n).map(|f| chosen(f).joints.clone()).collect();
         search.workspace.set(world_from_object, &joints, &contacts);
         if search.workspace.is_clear(TipMode::AllHold) {
-            return Some(GraspState { world_from_object: *world_from_object, contacts, joints });
+            return Some(GraspState::held_by_all(*world_from_object, contacts, joints));
         }
         reason = search.workspace.blocking_pair.map_or(reason, Reason::TooNear);
     }
@@ -130,7 +130,7 @@ fn draw_footholds(
     for _ in 0..4 * CONTACTS {
         let Some(contact) = draw_contact(model, finger, placement, &mut search.rng) else { continue };
         if let Some(joints) = reach(&mut search.workspace, finger, &contact, placement, &mut search.rng) {
-            found.push(Candidate { contact, joints, follow: 1.0 });
+            found.push(Candidate { contact: Some(contact), joints, follow: 1.0 });
             if found.len() == CONTACTS {
                 break;
             }

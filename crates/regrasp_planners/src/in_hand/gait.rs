@@ -6,7 +6,7 @@
 use super::search::{Search, Stop};
 use super::shorten::{Arrival, change_grasp, whole_transfer};
 use super::state::{GraspState, Sequence};
-use super::tree::Tree;
+use super::tree::{Tree, land};
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;
 
@@ -49,7 +49,7 @@ pub fn grow(search: &mut Search, start: Option<GraspState>, goal_grasp: Option<&
                 search.note(trees[0].nodes[node].state());
             }
             if let Some(solution) =
-                meet(search, &trees, growing, node, &target).or_else(|| bridge(search, &trees, growing, node))
+                meet(search, &mut trees, growing, node, &target).or_else(|| bridge(search, &trees, growing, node))
             {
                 return Ok(solution);
             }
@@ -96,8 +96,9 @@ const OTHERS_LOOKED_AT: usize = 3;
 const OTHER_SHARE: f64 = 0.4;
 
 /// The whole way, if `node` of the growing tree completes it.
-fn meet(search: &mut Search, trees: &[Tree; 2], growing: usize, node: usize, target: &Target) -> Option<Sequence> {
-    let (tree, other) = (&trees[growing], &trees[1 - growing]);
+fn meet(search: &mut Search, trees: &mut [Tree; 2], growing: usize, node: usize, target: &Target) -> Option<Sequence> {
+    let [first, second] = trees;
+    let (tree, other) = if growing == 0 { (&*first, second) } else { (&*second, first) };
     let state = tree.nodes[node].state();
     let place = match target {
         Target::Aim => 0,
@@ -108,7 +109,8 @@ fn meet(search: &mut Search, trees: &[Tree; 2], growing: usize, node: usize, tar
         return None;
     }
     if place == 0 && other.root_is_free {
-        return Some(from_the_start(growing, tree.trace(node)));
+        let way = land(search, other, tree.trace(node))?;
+        return Some(from_the_start(growing, way));
     }
     let (there, join) = join(search, &Sequence::at(state.clone()), other, place)?;
     let way = tree.trace(node).then(join)?.then(other.trace(there).reversed())?;

@@ -73,7 +73,7 @@ impl GraspPath {
         let joints = (0..model.n_fingers())
             .map(|f| follow_contact(model, f, &contacts[f], &placement, &seed[f]))
             .collect::<Option<HandJoints>>()?;
-        Some(GraspState { world_from_object, contacts, joints })
+        Some(GraspState::held_by_all(world_from_object, contacts, joints))
     }
 }
 
@@ -82,7 +82,7 @@ fn trace(search: &mut Search, model: &Model, from: &GraspState, to: &GraspState)
     let every_finger = (1u32 << model.n_fingers()) - 1;
     for t in FIRST_LOOKS {
         let contacts = way.contacts_at(model, t).ok_or(Reason::Crease)?;
-        if releasable(model, &contacts) != every_finger {
+        if releasable(model, &contacts, every_finger) != every_finger {
             return Err(Reason::NotClosed);
         }
         let placement = Placement::from(&interpolate_pose(&way.from, &way.to, t));
@@ -104,7 +104,7 @@ fn trace(search: &mut Search, model: &Model, from: &GraspState, to: &GraspState)
             current[finger] = follow_contact(model, finger, &contacts[finger], &placement, &current[finger])
                 .ok_or(Reason::OutOfReach)?;
         }
-        if releasable(model, &contacts) != every_finger {
+        if releasable(model, &contacts, every_finger) != every_finger {
             return Err(Reason::NotClosed);
         }
         if !search.workspace.slide(&pose, &current, &contacts) {

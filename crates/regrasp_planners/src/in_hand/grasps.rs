@@ -5,7 +5,7 @@ use super::combine::{ClosureTable, rank};
 use super::search::Search;
 use super::state::GraspState;
 use super::tally::Reason;
-use super::workspace::{Contacts, HandJoints, TipMode};
+use super::workspace::TipMode;
 use regrasp_geometry::Pose;
 
 /// The best grasp that `options` make, closed and clear.
@@ -13,13 +13,14 @@ pub fn choose_grasp(search: &mut Search, world_from_object: &Pose, options: &[Ve
     let model = search.model();
     let mut table = ClosureTable::new(model, options);
     let ranked = rank(&mut search.workspace, options, &mut table, None, GRASPS_TRIED);
+    search.tally.note_releases(&table, world_from_object);
     for combination in ranked {
         let chosen = |f: usize| &options[f][combination.choice[f]];
-        let contacts: Contacts = (0..options.len()).map(|f| chosen(f).contact).collect();
-        let joints: HandJoints = (0..options.len()).map(|f| chosen(f).joints.clone()).collect();
-        search.workspace.set(world_from_object, &joints, &contacts);
+        let fingers = (0..options.len()).map(|f| (chosen(f).contact, chosen(f).joints.clone()));
+        let state = GraspState::of(*world_from_object, fingers);
+        search.workspace.set_state(&state);
         if search.workspace.is_clear(TipMode::AllHold) {
-            return Some(GraspState { world_from_object: *world_from_object, contacts, joints });
+            return Some(state);
         }
         if let Some(pair) = search.workspace.blocking_pair {
             search.tally.add(Reason::TooNear(pair));

@@ -17,6 +17,8 @@ mod decompose;
 mod endpoints;
 /// Sampling GS_n.
 mod explore;
+/// Postures of free fingers.
+mod free;
 /// Two gait trees that grow until they meet.
 mod gait;
 /// Linear paths in GS_n.
@@ -71,10 +73,12 @@ pub use validate::{NotProven, validate_once};
 
 use crate::failure::Failure;
 use attempts::{Left, run_attempts};
-use endpoints::{End, given_grasp, refuse_buried_object, refuse_impossible};
+use endpoints::{
+    End, given_grasp, refuse_after_transfers, refuse_buried_object, refuse_holding_nothing, refuse_impossible,
+};
 use legs::{Legs, plan_legs};
 use model::Model;
-use regrasp_base::{Budget, Rng};
+use regrasp_base::{Budget, Interrupt, Rng};
 use regrasp_plan::Plan;
 use regrasp_scene::{InHandQuery, Scene};
 use search::Search;
@@ -108,7 +112,10 @@ pub fn plan_in_hand(
     let model = Model::new(scene, &effective(settings));
     let poses = query.poses();
     let (start_pose, goal_pose) = (query.world_from_object_start, query.world_from_object_goal);
-    refuse_impossible(&model)?;
+    refuse_holding_nothing(&model)?;
+    if settings.method != Method::Gait {
+        refuse_impossible(&model)?;
+    }
     refuse_buried_object(&model, End::Start, &start_pose)?;
     for (index, pose) in query.world_from_object_way.iter().enumerate() {
         refuse_buried_object(&model, End::Way(index + 1), pose)?;
@@ -124,7 +131,9 @@ pub fn plan_in_hand(
     } else {
         budget.max_work
     };
-    let found = run_attempts(settings.n_threads, base_work, budget.max_work, |index, work, winner| {
+    // A hand that cannot change its grasp has transfers only: what there is to find is found soon.
+    let max_work = if model.may_release { budget.max_work } else { budget.max_work.min(TRANSFERS_WORK) };
+    let found = run_attempts(settings.n_threads, base_work, max_work, |index, work, winner| {
         let mut search = Search::new(&model, (start_pose, goal_pose), (seed, index), (budget, work), winner, progress);
         let solution = plan_legs(&mut search, &legs);
         (solution, Left::of(&search))
@@ -133,9 +142,16 @@ pub fn plan_in_hand(
         Ok((solution, left, n_restarts)) => {
             Ok(record::record(&model, query, seed, &solution, left.statistics(n_restarts)))
         }
-        Err((interrupt, left, n_attempts)) => Err(left.failure(&model, &poses, interrupt, n_attempts)),
+        Err((interrupt, left, n_attempts)) => {
+            let failure = left.failure(&model, &poses, interrupt, n_attempts);
+            let is_searched = !model.may_release && interrupt == Interrupt::WorkSpent && max_work == TRANSFERS_WORK;
+            Err(if is_searched { refuse_after_transfers(&model, failure) } else { failure })
+        }
     }
 }
+
+/// Work after which a hand that cannot change its grasp is refused: some thousand grasps and transfers. By hand.
+const TRANSFERS_WORK: u64 = 40_000;
 
 /// The settings that a method really plans with: those of paper 000 have the paper's release rule (section 4.2.2).
 fn effective(settings: &InHandSettings) -> InHandSettings {

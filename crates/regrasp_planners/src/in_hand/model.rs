@@ -103,6 +103,8 @@ pub struct Model<'a> {
     pub frame: GraspFrame,
     /// Largest distance of a point of the object from its frame's origin: bounds its motion when it turns.
     pub object_reach: f64,
+    /// False for hands of which the others can never hold while one finger is away: they never change their grasp.
+    pub may_release: bool,
     /// Settings.
     pub settings: InHandSettings,
 }
@@ -203,8 +205,15 @@ impl<'a> Model<'a> {
                 .collect();
             finger.pairs = (0..pairs.len()).filter(|&p| moves(pairs[p].a) || moves(pairs[p].b)).collect();
         }
+        let others_may_hold = |away: usize| {
+            let others: Vec<ContactModel> =
+                (0..fingers.len()).filter(|&f| f != away).map(|f| fingers[f].contact).collect();
+            closure::may_close(&others, scene.object.friction)
+        };
+        let may_release = (0..fingers.len()).any(others_may_hold);
         Model {
             scene,
+            may_release,
             fingers,
             object,
             pairs,
@@ -237,6 +246,12 @@ impl<'a> Model<'a> {
             .map(|finger| self.grip(finger, &contacts[finger]))
             .collect();
         closure::closure_margin(&grips, &self.frame, self.settings.closure_margin)
+    }
+
+    /// Distance that the tip of a free finger keeps from the object: at least twice what the checker asks.
+    #[inline]
+    pub fn free_clearance(&self) -> f64 {
+        self.settings.clearance.max(1e-4)
     }
 
     /// All fingers, as bits.

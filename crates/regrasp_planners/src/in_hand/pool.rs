@@ -35,7 +35,7 @@ struct Foothold {
 
 impl Foothold {
     fn candidate(&self, follow: f64) -> Candidate {
-        Candidate { contact: self.contact, joints: self.joints.clone(), follow }
+        Candidate { contact: Some(self.contact), joints: self.joints.clone(), follow }
     }
 
     /// As [`Foothold::follow`], with those not looked at last.

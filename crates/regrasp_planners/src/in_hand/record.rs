@@ -20,30 +20,32 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution
     let Solution { way, steps_to_way } = solution;
     let start = way.start();
     let mut segments = Vec::with_capacity(way.steps().len());
-    let mut kept_margin = model.closure_margin(&start.contacts, model.all_fingers());
+    let mut kept_margin = model.closure_margin(&start.contacts, start.holding);
     let mut state = start;
     for step in way.steps() {
         match step.motion() {
             Motion::Transfer(moments) => {
                 statistics.transfers += 1;
-                kept_margin = kept_margin.min(model.closure_margin(&state.contacts, model.all_fingers()));
-                let mut waypoints = vec![waypoint(&state.world_from_object, &state.joints, &state.contacts, None)];
-                waypoints
-                    .extend(moments.iter().map(|m| waypoint(&m.world_from_object, &m.joints, &state.contacts, None)));
+                statistics.transfers_with_free_fingers += u64::from(!state.is_held_by_all());
+                kept_margin = kept_margin.min(model.closure_margin(&state.contacts, state.holding));
+                let held = |pose: &Pose, joints: &HandJoints| waypoint(pose, joints, &state.contacts, state.holding);
+                let mut waypoints = vec![held(&state.world_from_object, &state.joints)];
+                waypoints.extend(moments.iter().map(|m| held(&m.world_from_object, &m.joints)));
                 segments.push(Segment { kind: SegmentKind::Transfer, moving_finger: None, waypoints });
             }
             Motion::Regrasp { finger, path } => {
-                statistics.relocations += 1;
-                let holding = model.all_fingers() & !(1 << finger);
+                let end = step.end();
+                statistics.relocations += u64::from(end.holds(*finger));
+                let holding = state.holding & !(1 << finger);
                 kept_margin = kept_margin.min(model.closure_margin(&state.contacts, holding));
-                let mut waypoints = vec![waypoint(&state.world_from_object, &state.joints, &state.contacts, None)];
+                let pose = &state.world_from_object;
+                let mut waypoints = vec![waypoint(pose, &state.joints, &state.contacts, state.holding)];
                 let mut joints = state.joints.clone();
                 for (k, at) in path.iter().enumerate() {
                     joints[*finger].clone_from(at);
                     let is_last = k + 1 == path.len();
-                    let (contacts, free) =
-                        if is_last { (&step.end().contacts, None) } else { (&state.contacts, Some(*finger)) };
-                    waypoints.push(waypoint(&state.world_from_object, &joints, contacts, free));
+                    let holding = if is_last { end.holding } else { holding };
+                    waypoints.push(waypoint(pose, &joints, &end.contacts, holding));
                 }
                 let name = scene.hand.fingers[*finger].name.clone();
                 segments.push(Segment { kind: SegmentKind::Regrasp, moving_finger: Some(name), waypoints });
@@ -51,10 +53,10 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution
         }
         state = step.end();
     }
-    kept_margin = kept_margin.min(model.closure_margin(&state.contacts, model.all_fingers()));
+    kept_margin = kept_margin.min(model.closure_margin(&state.contacts, state.holding));
     if segments.is_empty() {
         // Start and goal are the same and any grasp will do: hold still.
-        let here = waypoint(&start.world_from_object, &start.joints, &start.contacts, None);
+        let here = waypoint(&start.world_from_object, &start.joints, &start.contacts, start.holding);
         let waypoints = vec![here.clone(), here];
         segments.push(Segment { kind: SegmentKind::Transfer, moving_finger: None, waypoints });
     }
@@ -103,7 +105,7 @@ fn way_poses(query: &InHandQuery, segments: &[Segment], steps_to_way: &[usize]) 
         .collect()
 }
 
-fn waypoint(pose: &Pose, joints: &HandJoints, contacts: &Contacts, free: Option<usize>) -> Waypoint {
+fn waypoint(pose: &Pose, joints: &HandJoints, contacts: &Contacts, holding: u32) -> Waypoint {
     Waypoint {
         joints: joints.iter().flatten().copied().collect(),
         world_from_object: PoseData::from(pose),
@@ -111,7 +113,7 @@ fn waypoint(pose: &Pose, joints: &HandJoints, contacts: &Contacts, free: Option<
             .iter()
             .enumerate()
             .map(|(finger, contact)| {
-                if free == Some(finger) {
+                if holding & (1 << finger) == 0 {
                     ContactState { mode: ContactMode::Free, point_in_object: None, normal_in_object: None }
                 } else {
                     ContactState {

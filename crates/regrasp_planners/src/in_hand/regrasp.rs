@@ -15,7 +15,7 @@ pub struct Tried {
     known: Vec<(Choice, usize, usize, Option<Vec<Coordinates>>)>,
 }
 
-/// Relocates fingers one at a time from option 0 of each to `goal`; each leaves only where the others are closed.
+/// Moves fingers one at a time from option 0 of each to `goal`; each leaves only where the others that hold are closed.
 ///
 /// Depth first over the orders; what failed once is not tried again. `start` holds the options 0.
 pub fn regrasp(
@@ -97,18 +97,18 @@ fn try_relocation(
     let mut state = start.clone();
     for (f, &taken) in current.iter().enumerate() {
         if taken != 0 {
-            state.contacts[f] = options[f][taken].contact;
+            state.set_contact(f, options[f][taken].contact);
             state.joints[f].clone_from(&options[f][taken].joints);
         }
     }
-    workspace.set(&state.world_from_object, &state.joints, &state.contacts);
+    workspace.set_state(&state);
     let to = &options[finger][option];
     let path = relocate(
         workspace,
         &state.world_from_object,
         finger,
-        Foothold { contact: &state.contacts[finger], joints: &state.joints[finger] },
-        Foothold { contact: &to.contact, joints: &to.joints },
+        Foothold { contact: state.contact(finger).as_ref(), joints: &state.joints[finger] },
+        Foothold { contact: to.contact.as_ref(), joints: &to.joints },
         rng,
     );
     tried.known.push((current.clone(), finger, option, path));

@@ -30,10 +30,23 @@ pub fn can_lift(workspace: &mut Workspace, world_from_object: &Pose, finger: usi
 
 /// True when the finger's joints let it leave a foothold at all, whatever is in the way.
 pub fn lift_is_within_reach(model: &Model, world_from_object: &Placement, finger: usize, from: &Foothold) -> bool {
-    let normal = world_from_object.vector(&from.contact.normal_in_object);
-    let tip = tip_target(world_from_object, from.contact, model.fingers[finger].tip_radius);
+    let Some(contact) = from.contact else { return true };
+    hover(model, world_from_object, finger, contact, from.joints, LEAST_LIFT).is_some()
+}
+
+/// Joints of `finger` at `height` over `contact`, near those that it has there.
+pub fn hover(
+    model: &Model,
+    world_from_object: &Placement,
+    finger: usize,
+    contact: &Contact,
+    joints: &Coordinates,
+    height: f64,
+) -> Option<Coordinates> {
+    let normal = world_from_object.vector(&contact.normal_in_object);
+    let tip = tip_target(world_from_object, contact, model.fingers[finger].tip_radius);
     let settings = free_ik_settings(model, finger, UnitVector::new_unchecked(normal));
-    model.fingers[finger].ik.solve_near(&(tip + normal * LEAST_LIFT), from.joints, &settings).is_some()
+    model.fingers[finger].ik.solve_near(&(tip + normal * height), joints, &settings)
 }
 
 /// Height that counts as having left, in metres.
@@ -42,8 +55,8 @@ const LEAST_LIFT: f64 = 0.001;
 /// One end of a relocation.
 #[derive(Debug, Clone)]
 pub struct Foothold<'a> {
-    /// The contact.
-    pub contact: &'a Contact,
+    /// The contact; None where the finger is free.
+    pub contact: Option<&'a Contact>,
     /// Joints of the finger there.
     pub joints: &'a Coordinates,
 }
@@ -68,7 +81,12 @@ pub fn relocate(
         let Some(up) = lift(workspace, &placement, finger, &from, height) else { continue };
         let Some(mut down) = lift(workspace, &placement, finger, &to, height) else { continue };
         let mode = TipMode::Away { finger, clearance: tip_clearance(model, height) };
-        let (Some(above_start), Some(above_goal)) = (up.last().cloned(), down.pop()) else { continue };
+        // A free finger is above already; a contact is the last to be reached.
+        let above_start = up.last().unwrap_or(from.joints).clone();
+        let (above_goal, landing) = match down.pop() {
+            Some(above) => (above, Some(to.joints.clone())),
+            None => (to.joints.clone(), None),
+        };
         let mut over = pass_over(workspace, &placement, finger, &above_start, &above_goal, height, mode);
         if over.is_none() && std::mem::take(&mut may_go_around) {
             over = around(workspace, finger, &above_start, &above_goal, mode, rng);
@@ -78,7 +96,7 @@ pub fn relocate(
         path.extend(over);
         down.reverse();
         path.extend(down);
-        path.push(to.joints.clone());
+        path.extend(landing);
         return Some(path);
     }
     None
@@ -89,7 +107,8 @@ fn tip_clearance(model: &Model, height: f64) -> f64 {
     model.settings.clearance.min(0.5 * height)
 }
 
-/// Joints after the contact, from it straight up along the normal; the last ones are at `height` and clear.
+/// Joints after the contact, from it straight up along the normal; the last ones are at `height` and clear. None at all from
+/// a free posture, which must be clear.
 fn lift(
     workspace: &mut Workspace,
     world_from_object: &Placement,
@@ -98,8 +117,13 @@ fn lift(
     height: f64,
 ) -> Option<Vec<Coordinates>> {
     let model = workspace.model;
-    let normal = world_from_object.vector(&foothold.contact.normal_in_object);
-    let base = world_from_object.point(&foothold.contact.point_in_object) + normal * model.fingers[finger].tip_radius;
+    let clear = TipMode::Away { finger, clearance: tip_clearance(model, height) };
+    let Some(contact) = foothold.contact else {
+        workspace.set_finger(finger, foothold.joints);
+        return workspace.finger_is_clear(finger, clear).then(Vec::new);
+    };
+    let normal = world_from_object.vector(&contact.normal_in_object);
+    let base = world_from_object.point(&contact.point_in_object) + normal * model.fingers[finger].tip_radius;
     let mode = TipMode::Near { finger, normal_in_world: normal };
     // No turning of the finger here: it would move the tip sideways between waypoints, over the surface.
     let settings =
@@ -118,7 +142,6 @@ fn lift(
         }
         path.push(joints.clone());
     }
-    let clear = TipMode::Away { finger, clearance: tip_clearance(model, height) };
     workspace.finger_is_clear(finger, clear).then_some(path)
 }
 

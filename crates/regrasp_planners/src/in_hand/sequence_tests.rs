@@ -119,7 +119,7 @@ fn transfers_in_a_row_are_joined_and_nothing_else_changes() {
         let mut long = way.clone();
         long.push_transfer(vec![wait_at(&state), wait_at(&state)]);
         long.push_transfer(vec![wait_at(&state)]);
-        long.push_regrasp(0, state.contacts[0], vec![state.joints[0].clone()]);
+        long.push_regrasp(0, Some(state.contacts[0]), vec![state.joints[0].clone()]);
         long.push_transfer(vec![wait_at(&state)]);
         let joined = long.clone().with_transfers_joined();
         assert_eq!(joined.steps().len() + 1, long.steps().len());

@@ -144,6 +144,13 @@ pub struct InHandSettings {
     pub candidates: usize,
     /// Of these, how many are kept for combining.
     pub candidates_kept: usize,
+    /// Least number of fingers that hold while the object moves, where they are closed; the others may be free meanwhile (paths
+    /// through GS_k, paper 000, section 3.2). With the number of fingers, or more, all hold.
+    pub least_holding: usize,
+    /// Extensions tried at a pose before one of them may leave fingers free that hold.
+    pub free_after: u32,
+    /// Share of the extensions after that which may.
+    pub free_share: f64,
     /// Work after which a search starts again from nothing; grows by as much with every fourth restart. Trees take new start
     /// grasps by themselves, so that restarts are rare.
     pub restart_work: u64,
@@ -179,6 +186,9 @@ impl Default for InHandSettings {
             aimless_share: 0.6,
             candidates: 6,
             candidates_kept: 3,
+            least_holding: 2,
+            free_after: 3,
+            free_share: 0.5,
             restart_work: 300_000,
             shortcuts: 8,
             alpha: Alpha::Constant { value: 0.9 },
@@ -210,6 +220,7 @@ impl InHandSettings {
             ("passage_share", self.passage_share),
             ("goal_share", self.goal_share),
             ("guided_share", self.guided_share),
+            ("free_share", self.free_share),
         ] {
             if !(0.0..=1.0).contains(&value) {
                 return Err(format!("{name} is {value}; it must be between 0 and 1"));

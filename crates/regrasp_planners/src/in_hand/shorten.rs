@@ -72,9 +72,10 @@ fn direct(
     arrival: Arrival,
     old: (usize, usize),
 ) -> Option<Sequence> {
-    let n_changed = from.contacts.iter().zip(&to.contacts).filter(|(a, b)| a != b).count();
+    let n_changed = (0..from.contacts.len()).filter(|&finger| from.contact(finger) != to.contact(finger)).count();
     let moves = from.world_from_object != to.world_from_object;
     if arrival == Arrival::AnyPosture
+        && from.holding & to.holding == to.holding
         && old > (0, usize::from(moves))
         && let Some(way) = whole_transfer(search, from, &to.world_from_object)
     {
@@ -132,13 +133,14 @@ pub fn regrasp_transfer(
     let before = Placement::from(&from.world_from_object);
     let mut joints = HandJoints::new();
     for finger in 0..model.n_fingers() {
-        joints.push(if from.contacts[finger] == to.contacts[finger] {
-            from.joints[finger].clone()
-        } else {
-            follow_contact(model, finger, &to.contacts[finger], &before, &to.joints[finger])?
+        joints.push(match to.contact(finger) {
+            // What is free stays where it is while the object moves.
+            None => to.joints[finger].clone(),
+            contact if contact == from.contact(finger) => from.joints[finger].clone(),
+            Some(contact) => follow_contact(model, finger, &contact, &before, &to.joints[finger])?,
         });
     }
-    let middle = GraspState { world_from_object: from.world_from_object, contacts: to.contacts.clone(), joints };
+    let middle = GraspState { world_from_object: from.world_from_object, joints, ..to.clone() };
     let change = change_grasp(search, &Sequence::at(from.clone()), &middle, Arrival::Exact, rng)?;
     let mut way = change.then(whole_transfer(search, &middle, &to.world_from_object)?)?;
     if arrival == Arrival::Exact {
@@ -153,7 +155,7 @@ fn settled_joints(state: &GraspState, wanted: &GraspState) -> HandJoints {
     for (finger, own) in joints.iter_mut().enumerate() {
         let there = &wanted.joints[finger];
         let is_there = own.iter().zip(there).all(|(a, b)| (a - b).abs() < SAME_POSTURE);
-        if is_there && state.contacts[finger] == wanted.contacts[finger] {
+        if is_there && state.contact(finger) == wanted.contact(finger) {
             own.clone_from(there);
         }
     }
@@ -173,7 +175,7 @@ fn settle(workspace: &mut Workspace, mut way: Sequence, wanted: &GraspState) -> 
     moments.pop();
     let (pose, before) =
         moments.last().map_or((&way.end().world_from_object, &way.end().joints), |m| (&m.world_from_object, &m.joints));
-    workspace.set(pose, before, &way.end().contacts);
+    workspace.set_held(pose, before, &way.end().contacts, way.end().holding);
     if !workspace.step(&world_from_object, &joints, TipMode::AllHold) {
         return None;
     }
@@ -196,11 +198,11 @@ pub fn change_grasp(
     let mut options = Vec::with_capacity(model.n_fingers());
     let mut goal = Choice::new();
     for (finger, own) in joints.into_iter().enumerate() {
-        let contact = way.end().contacts[finger];
-        let moves = contact != to.contacts[finger] || (is_exact && own != to.joints[finger]);
+        let contact = way.end().contact(finger);
+        let moves = contact != to.contact(finger) || (is_exact && own != to.joints[finger]);
         let mut of_finger = vec![Candidate { contact, joints: own, follow: 1.0 }];
         if moves {
-            of_finger.push(Candidate { contact: to.contacts[finger], joints: to.joints[finger].clone(), follow: 1.0 });
+            of_finger.push(Candidate { contact: to.contact(finger), joints: to.joints[finger].clone(), follow: 1.0 });
         }
         goal.push(usize::from(moves));
         options.push(of_finger);

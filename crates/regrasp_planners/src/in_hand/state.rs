@@ -1,20 +1,72 @@
-//! Points of GS_n: an object pose and n contacts, with the joints that reach them; and the motions between them.
+//! Points of GS_n and GS_k: an object pose, the contacts of the fingers that hold, the joints of all; and the motions
+//! between them.
 
 use super::workspace::{Contacts, HandJoints};
-use regrasp_geometry::Pose;
+use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use std::ops::RangeInclusive;
 
-/// All fingers hold the object (a configuration in GS_n; paper 000, section 4.1).
+/// Some fingers hold the object, the others are free, each with a posture of its own: a configuration in GS_k with its
+/// independent fingers; in GS_n where all hold (paper 000, sections 3.2 and 4.1).
 #[derive(Debug, Clone, PartialEq)]
 pub struct GraspState {
     /// Object pose.
     pub world_from_object: Pose,
-    /// Contacts, in the object frame.
+    /// Fingers that hold, as bits.
+    pub holding: u32,
+    /// Contacts, in the object frame; [`no_contact`] for a finger that is free.
     pub contacts: Contacts,
-    /// Joints that reach the contacts.
+    /// Joints: those that reach the contact, or the posture of a free finger.
     pub joints: HandJoints,
+}
+
+/// What stands in place of the contact of a free finger: always the same, so that states can be compared.
+pub fn no_contact() -> Contact {
+    Contact { point_in_object: Point::origin(), normal_in_object: Vector::z_axis() }
+}
+
+impl GraspState {
+    /// The state in which all fingers hold.
+    pub fn held_by_all(world_from_object: Pose, contacts: Contacts, joints: HandJoints) -> Self {
+        GraspState { world_from_object, holding: (1 << contacts.len()) - 1, contacts, joints }
+    }
+
+    /// The state in which the fingers with a contact hold.
+    pub fn of(world_from_object: Pose, fingers: impl Iterator<Item = (Option<Contact>, Coordinates)>) -> Self {
+        let (contacts, joints) = (Contacts::new(), HandJoints::new());
+        let mut state = GraspState { world_from_object, holding: 0, contacts, joints };
+        for (finger, (contact, own)) in fingers.enumerate() {
+            state.contacts.push(no_contact());
+            state.joints.push(own);
+            state.set_contact(finger, contact);
+        }
+        state
+    }
+
+    /// True when `finger` holds.
+    pub fn holds(&self, finger: usize) -> bool {
+        self.holding & (1 << finger) != 0
+    }
+
+    /// Contact of `finger`; None when it is free.
+    pub fn contact(&self, finger: usize) -> Option<Contact> {
+        self.holds(finger).then(|| self.contacts[finger])
+    }
+
+    /// Puts `finger` on a contact, or sets it free.
+    pub fn set_contact(&mut self, finger: usize, contact: Option<Contact>) {
+        match contact {
+            Some(_) => self.holding |= 1 << finger,
+            None => self.holding &= !(1 << finger),
+        }
+        self.contacts[finger] = contact.unwrap_or_else(no_contact);
+    }
+
+    /// True when all fingers hold.
+    pub fn is_held_by_all(&self) -> bool {
+        self.holding.count_ones() as usize == self.contacts.len()
+    }
 }
 
 /// A moment of a transfer.
@@ -29,9 +81,10 @@ pub struct Moment {
 /// A feasible elementary motion (paper 000, section 3.2).
 #[derive(Debug, Clone, PartialEq)]
 pub enum Motion {
-    /// The object moves, the grasp stays. Moments after the start, the last one being the end.
+    /// The object moves, the grasp stays; fingers that are free may move. Moments after the start, the last one being the
+    /// end.
     Transfer(Vec<Moment>),
-    /// One finger moves to another contact. Its joints after the start, the last ones being at the contact.
+    /// One finger moves to another contact or posture. Its joints after the start, the last ones being there.
     Regrasp {
         /// Which finger.
         finger: usize,
@@ -100,17 +153,18 @@ impl Sequence {
         let Some(last) = moments.last() else { return };
         let end = GraspState {
             world_from_object: last.world_from_object,
+            holding: self.end().holding,
             contacts: self.end().contacts.clone(),
             joints: last.joints.clone(),
         };
         self.steps.push(Step { motion: Motion::Transfer(moments), end });
     }
 
-    /// Appends the relocation of `finger` along `path` to `contact`, if the path has any joints.
-    pub fn push_regrasp(&mut self, finger: usize, contact: Contact, path: Vec<Coordinates>) {
+    /// Appends the motion of `finger` along `path` to `contact`, or to be free, if the path has any joints.
+    pub fn push_regrasp(&mut self, finger: usize, contact: Option<Contact>, path: Vec<Coordinates>) {
         let Some(last) = path.last() else { return };
         let mut end = self.end().clone();
-        end.contacts[finger] = contact;
+        end.set_contact(finger, contact);
         end.joints[finger].clone_from(last);
         self.steps.push(Step { motion: Motion::Regrasp { finger, path }, end });
     }

@@ -1,7 +1,9 @@
 //! Why attempts failed: counted on the way, told when no plan is found.
 
-use super::model::Model;
+use super::combine::{ClosureTable, Held};
+use super::model::{MAX_FINGERS, Model};
 use crate::failure::Cause;
+use regrasp_geometry::Pose;
 
 /// A reason for which an attempt of the search failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -12,6 +14,8 @@ pub enum Reason {
     NotClosed,
     /// A closed grasp was found, but the fingers find no free way to it in any order.
     NoWayOver,
+    /// A closed grasp was found that this finger has to leave its contact for, but the others do not hold without it.
+    Bound(usize),
     /// A transfer stopped at once: a finger reaches no farther.
     OutOfReach,
     /// A transfer stopped at once: this pair of bodies was too near.
@@ -22,10 +26,28 @@ pub enum Reason {
     NotDecomposed,
 }
 
+/// Grasps looked at in which a finger holds, and what the others would do without it.
+#[derive(Debug, Clone, Default)]
+struct Release {
+    seen: Held,
+    /// Pose of the object where the margin of the others was largest.
+    best_at: Option<Pose>,
+}
+
+impl Release {
+    fn add(&mut self, seen: &Held, at: Option<Pose>) {
+        if seen.n_grasps > 0 && (self.best_at.is_none() || seen.best > self.seen.best) {
+            self.best_at = at;
+        }
+        self.seen.add(seen);
+    }
+}
+
 /// Counts per reason.
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
     counts: std::collections::BTreeMap<Reason, u64>,
+    releases: [Release; MAX_FINGERS],
 }
 
 impl Tally {
@@ -39,6 +61,39 @@ impl Tally {
         for (&reason, count) in &other.counts {
             *self.counts.entry(reason).or_default() += count;
         }
+        for (release, more) in self.releases.iter_mut().zip(&other.releases) {
+            release.add(&more.seen, more.best_at);
+        }
+    }
+
+    /// Takes note of the grasps that were looked at with the object at `world_from_object`.
+    pub fn note_releases(&mut self, table: &ClosureTable, world_from_object: &Pose) {
+        for (release, seen) in self.releases.iter_mut().zip(table.releases()) {
+            release.add(seen, Some(*world_from_object));
+        }
+    }
+
+    /// The fingers that could let go nowhere, in words; None where every finger could somewhere, or none was asked about.
+    pub fn bound_fingers(&self, model: &Model) -> Option<String> {
+        let required = model.settings.closure_margin;
+        let bound: Vec<String> = (0..model.n_fingers())
+            .filter_map(|finger| {
+                let Release { seen, best_at } = &self.releases[finger];
+                let at = best_at.as_ref().filter(|_| seen.n_held == 0)?;
+                let (name, p) = (&model.scene.hand.fingers[finger].name, at.translation.vector);
+                Some(format!(
+                    "\"{name}\" (the others are closed in none of {} closed grasps; nearest: margin {:.4} of {required}, with \
+                     the object at [{:.4}, {:.4}, {:.4}] m, turned by {:.1} degrees)",
+                    seen.n_grasps,
+                    seen.best,
+                    p.x,
+                    p.y,
+                    p.z,
+                    at.rotation.angle().to_degrees()
+                ))
+            })
+            .collect();
+        (!bound.is_empty()).then(|| format!("never to be released: {}", bound.join(", ")))
     }
 
     /// The causes in words, commonest first.
@@ -53,6 +108,9 @@ impl Tally {
                     Reason::NoContact(f) => format!("finger \"{}\" finds no contact it reaches", finger_name(f)),
                     Reason::NotClosed => "no closed grasp of which a finger may let go".into(),
                     Reason::NoWayOver => "no free way for the fingers to the next grasp".into(),
+                    Reason::Bound(f) => {
+                        format!("finger \"{}\" cannot be released: the others are not closed", finger_name(f))
+                    }
                     Reason::OutOfReach => "a finger reaches no farther while the object moves".into(),
                     Reason::Crease => "a contact would have to slide over an edge of the object".into(),
                     Reason::NotDecomposed => {
@@ -79,6 +137,7 @@ impl Tally {
                 Reason::NoContact(_) => "no_contact",
                 Reason::NotClosed => "not_closed",
                 Reason::NoWayOver => "no_way_over",
+                Reason::Bound(_) => "not_released",
                 Reason::OutOfReach => "out_of_reach",
                 Reason::TooNear(_) => "too_near",
                 Reason::Crease => "crease",

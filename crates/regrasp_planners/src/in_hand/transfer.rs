@@ -3,7 +3,7 @@
 use super::model::Model;
 use super::record::CONTACT_TOLERANCE;
 use super::state::{GraspState, Moment};
-use super::workspace::{Contacts, HandJoints, TipMode, Workspace, tip_target};
+use super::workspace::{HandJoints, TipMode, Workspace, tip_target};
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Pose, UnitVector, frame, interpolate_pose};
 use regrasp_grasp::Contact;
@@ -45,7 +45,7 @@ pub fn n_steps(model: &Model, from: &Pose, to: &Pose, step: f64) -> usize {
 ///
 /// Appends the moments after the start to `moments`; returns the share of the way that was made, 1 being all of it.
 pub fn transfer(workspace: &mut Workspace, start: &GraspState, goal: &Pose, moments: &mut Vec<Moment>) -> f64 {
-    workspace.set(&start.world_from_object, &start.joints, &start.contacts);
+    workspace.set_state(start);
     follow(workspace.model, start, goal, moments, |there| {
         workspace.step(&there.world_from_object, &there.joints, TipMode::AllHold)
     })
@@ -70,13 +70,18 @@ pub fn follow(
         let world_from_object = Placement::from(&pose);
         let mut joints = HandJoints::new();
         for finger in 0..model.n_fingers() {
+            if !start.holds(finger) {
+                // What is free stays where it is.
+                joints.push(here.joints[finger].clone());
+                continue;
+            }
             match follow_contact(model, finger, &start.contacts[finger], &world_from_object, &here.joints[finger]) {
                 Some(solution) => joints.push(solution),
                 None => return made,
             }
         }
         let there = Moment { world_from_object: pose, joints };
-        if !tips_stay(model, &start.contacts, &here, &there) {
+        if !tips_stay(model, start, &here, &there) {
             if t - made <= shortest {
                 return made;
             }
@@ -97,11 +102,11 @@ const MAX_HALVINGS: usize = 4;
 /// Share of the contact tolerance that a tip may stray half-way; the rest is for what lies between.
 const HALFWAY_SHARE: f64 = 0.7;
 
-/// True when every tip stays on its contact while the joints move linearly: half-way, where they stray most.
-fn tips_stay(model: &Model, contacts: &Contacts, from: &Moment, to: &Moment) -> bool {
+/// True when every tip that holds stays on its contact while the joints move linearly: half-way, where they stray most.
+fn tips_stay(model: &Model, state: &GraspState, from: &Moment, to: &Moment) -> bool {
     let allowed = HALFWAY_SHARE * CONTACT_TOLERANCE;
     let mut half: Option<Placement> = None;
-    (0..model.n_fingers()).all(|f| {
+    (0..model.n_fingers()).filter(|&f| state.holds(f)).all(|f| {
         let finger = &model.fingers[f];
         let change: Coordinates = from.joints[f].iter().zip(&to.joints[f]).map(|(a, b)| b - a).collect();
         // What the joints' bound proves needs no look; the object strays as little as the shortest step of a finger.
@@ -112,7 +117,7 @@ fn tips_stay(model: &Model, contacts: &Contacts, from: &Moment, to: &Moment) -> 
             Placement::from(&interpolate_pose(&from.world_from_object, &to.world_from_object, 0.5))
         });
         let joints: Coordinates = from.joints[f].iter().zip(&change).map(|(q, dq)| q + 0.5 * dq).collect();
-        let target = tip_target(world_from_object, &contacts[f], finger.tip_radius);
+        let target = tip_target(world_from_object, &state.contacts[f], finger.tip_radius);
         (finger.ik.tip(&joints) - target).norm() <= allowed
     })
 }

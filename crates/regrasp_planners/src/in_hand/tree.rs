@@ -1,8 +1,9 @@
 //! A tree of grasps that grows from one end of the query by gaits: relocate fingers with look-ahead, then transfer as far
 //! as the hand can follow. In-hand-notes, section 3, method E; real-hands-notes, section 2, rule F2.
 
-use super::candidates::{Candidate, Way, follow_share};
-use super::combine::{ClosureTable, rank, releasable};
+use super::candidates::{Candidate, Way, clear_share, follow_share};
+use super::combine::{Choice, ClosureTable, rank, releasable};
+use super::free::{draw_leavable, free_posture, free_posture_at, most_free};
 use super::grasps::choose_grasp;
 use super::pool::Pool;
 use super::regrasp::{Tried, regrasp};
@@ -118,6 +119,10 @@ impl Tree {
                     let here = Sequence::at(self.nodes[node].state().clone());
                     return advance(search, self, node, target, here);
                 }
+                if !search.model().may_release {
+                    let here = Sequence::at(self.nodes[node].state().clone());
+                    return advance(search, self, node, target, here);
+                }
                 extend(search, self, node, target)
             }
             None => sow(search, self),
@@ -163,14 +168,22 @@ fn extend(search: &mut Search, tree: &mut Tree, node: usize, target: &Pose) -> O
     let to_aim = *target == tree.aim;
     let elsewhere = (!to_aim).then(|| Way::new(&state.world_from_object, target));
     let place = tree.nodes[node].place;
+    let leavable = draw_leavable(search, &state, tree.places[place].n_tries);
     let mut options = Vec::with_capacity(model.n_fingers());
     for finger in 0..model.n_fingers() {
-        options.push(options_of(search, &mut tree.places[place].pool, elsewhere.as_ref(), &state, finger));
+        let pool = &mut tree.places[place].pool;
+        let mut of_finger = options_of(search, pool, elsewhere.as_ref(), &state, finger);
+        if leavable & (1 << finger) != 0 {
+            let way = elsewhere.as_ref().unwrap_or(tree.places[place].pool.way());
+            of_finger.extend(free_posture(search, finger, &state, way));
+        }
+        options.push(of_finger);
     }
     let mut table = ClosureTable::new(model, &options);
     let present = options.iter().map(|of_finger| of_finger[0].follow).fold(1.0, f64::min);
     let least = if search.rng.chance(model.settings.aimless_share) { 0.0 } else { present + LEAST_GAIN };
     let ranked = rank(&mut search.workspace, &options, &mut table, Some(least), COMBINATIONS);
+    search.tally.note_releases(&table, &state.world_from_object);
     if ranked.is_empty() {
         search.tally.add(Reason::NotClosed);
         return None;
@@ -183,13 +196,26 @@ fn extend(search: &mut Search, tree: &mut Tree, node: usize, target: &Pose) -> O
             regrasp(&mut search.workspace, &state, &options, &combination.choice, &mut table, &mut tried, &mut rng);
         match way {
             Some(way) => return advance(search, tree, node, target, way),
-            None => search.tally.add(Reason::NoWayOver),
+            None => note_stuck(search, &mut table, &combination.choice),
         }
     }
     None
 }
 
-/// The present contact of a finger and the best others of the pool for its way.
+/// Takes note of a combination that could not be reached: for want of release if no finger that has to move may be the
+/// first.
+fn note_stuck(search: &mut Search, table: &mut ClosureTable, goal: &Choice) {
+    let present: Choice = goal.iter().map(|_| 0).collect();
+    let holding = table.holding(&present);
+    let moving = || (0..goal.len()).filter(|&finger| goal[finger] != 0);
+    if moving().any(|finger| table.is_closed(&present, holding & !(1 << finger))) {
+        search.tally.add(Reason::NoWayOver);
+        return;
+    }
+    moving().for_each(|finger| search.tally.add(Reason::Bound(finger)));
+}
+
+/// The present contact or free posture of a finger, and the best contacts of the pool for its way.
 fn options_of(
     search: &mut Search,
     pool: &mut Pool,
@@ -198,10 +224,13 @@ fn options_of(
     finger: usize,
 ) -> Vec<Candidate> {
     let workspace = &mut search.workspace;
-    let (contact, joints) = (state.contacts[finger], state.joints[finger].clone());
-    let follow = follow_share(workspace, finger, &contact, &joints, elsewhere.unwrap_or(pool.way()));
-    let pose = &state.world_from_object;
-    let foothold = Foothold { contact: &contact, joints: &joints };
+    let (contact, joints) = (state.contact(finger), state.joints[finger].clone());
+    let (pose, way) = (&state.world_from_object, elsewhere.unwrap_or(pool.way()));
+    let follow = match &contact {
+        Some(contact) => follow_share(workspace, finger, contact, &joints, way),
+        None => clear_share(workspace, finger, &joints, pose, way).unwrap_or(0.0),
+    };
+    let foothold = Foothold { contact: contact.as_ref(), joints: &joints };
     let is_stuck = !lift_is_within_reach(workspace.model, &Placement::from(pose), finger, &foothold);
     let mut options = vec![Candidate { contact, joints, follow }];
     if is_stuck {
@@ -243,7 +272,7 @@ fn advance(search: &mut Search, tree: &mut Tree, parent: usize, target: &Pose, m
 /// Shortens a transfer that stopped at a limit or against something to where most fingers that may let go can be lifted.
 fn back_off(search: &mut Search, from: &GraspState, moments: &mut Vec<Moment>) {
     let n_fingers = search.model().n_fingers();
-    let releasable = releasable(search.model(), &from.contacts);
+    let releasable = releasable(search.model(), &from.contacts, from.holding);
     let n_releasable = releasable.count_ones();
     let mut best: Option<(usize, u32)> = None;
     for back in BACK_OFFS {
@@ -253,8 +282,9 @@ fn back_off(search: &mut Search, from: &GraspState, moments: &mut Vec<Moment>) {
         let moment = &moments[moments.len() - 1 - back];
         let mut n_liftable = 0;
         for finger in (0..n_fingers).filter(|finger| releasable & (1 << finger) != 0) {
-            search.workspace.set(&moment.world_from_object, &moment.joints, &from.contacts);
-            let foothold = Foothold { contact: &from.contacts[finger], joints: &moment.joints[finger] };
+            search.workspace.set_held(&moment.world_from_object, &moment.joints, &from.contacts, from.holding);
+            let contact = &from.contacts[finger];
+            let foothold = Foothold { contact: Some(contact), joints: &moment.joints[finger] };
             let can = can_lift(&mut search.workspace, &moment.world_from_object, finger, &foothold);
             n_liftable += u32::from(can);
         }
@@ -272,6 +302,45 @@ fn back_off(search: &mut Search, from: &GraspState, moments: &mut Vec<Moment>) {
 /// Steps back from the end of a stopped transfer that are looked at.
 const BACK_OFFS: [usize; 5] = [0, 1, 2, 4, 7];
 
+/// Grasps of all fingers that are looked for before one with fewer will do.
+const SOWN_IN_VAIN: u32 = 10;
+
+/// `way`, which ends at the tree's own pose, with the fingers that are free there put on contacts as far as they reach any.
+/// None where they do, but find no way to a closed grasp.
+pub fn land(search: &mut Search, tree: &mut Tree, way: Sequence) -> Option<Sequence> {
+    let model = search.model();
+    let state = way.end().clone();
+    if state.is_held_by_all() {
+        return Some(way);
+    }
+    let mut options = Vec::with_capacity(model.n_fingers());
+    for finger in 0..model.n_fingers() {
+        let (contact, joints) = (state.contact(finger), state.joints[finger].clone());
+        let mut of_finger = vec![Candidate { contact, joints, follow: 1.0 }];
+        if contact.is_none() {
+            of_finger.extend(tree.places[0].pool.towards_aim(search, finger, model.settings.candidates_kept));
+        }
+        options.push(of_finger);
+    }
+    if options.iter().all(|of_finger| of_finger.len() == 1) {
+        return Some(way);
+    }
+    let mut table = ClosureTable::new(model, &options);
+    let ranked = rank(&mut search.workspace, &options, &mut table, Some(0.0), LANDINGS);
+    let lands = |choice: &Choice| (0..options.len()).all(|f| options[f].len() == 1 || choice[f] != 0);
+    let mut tried = Tried::default();
+    let mut rng = Rng::child(&search.rng, "landing", 0);
+    search.rng.bits();
+    ranked.iter().filter(|combination| lands(&combination.choice)).find_map(|combination| {
+        let goal = &combination.choice;
+        let down = regrasp(&mut search.workspace, &state, &options, goal, &mut table, &mut tried, &mut rng)?;
+        way.clone().then(down)
+    })
+}
+
+/// Grasps that fingers which are free at an end may land in.
+const LANDINGS: usize = 64;
+
 /// Chooses a new grasp at the tree's end of the query, where no finger has to move for it, and takes it towards the aim.
 fn sow(search: &mut Search, tree: &mut Tree) -> Option<usize> {
     let model = search.model();
@@ -280,10 +349,17 @@ fn sow(search: &mut Search, tree: &mut Tree) -> Option<usize> {
     search.workspace.place_object(&pose);
     let mut options = Vec::with_capacity(model.n_fingers());
     for finger in 0..model.n_fingers() {
-        let candidates = tree.places[0].pool.towards_aim(search, finger, model.settings.candidates_kept + 1);
+        let mut candidates = tree.places[0].pool.towards_aim(search, finger, model.settings.candidates_kept + 1);
         if candidates.is_empty() {
             search.tally.add(Reason::NoContact(finger));
-            return None;
+            // A finger that reaches nothing is left free, once grasps of all fingers were looked for in vain.
+            if tree.n_sown <= SOWN_IN_VAIN || !tree.nodes.is_empty() || most_free(model) == 0 {
+                return None;
+            }
+            candidates.extend(free_posture_at(search, finger, &pose, tree.places[0].pool.way()));
+            if candidates.is_empty() {
+                return None;
+            }
         }
         options.push(candidates);
     }

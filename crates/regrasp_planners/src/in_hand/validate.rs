@@ -4,11 +4,12 @@
 
 use super::model::Model;
 use super::settings::InHandSettings;
-use super::workspace::{Contacts, HandJoints, TipMode, Workspace};
+use super::state::GraspState;
+use super::workspace::{HandJoints, TipMode, Workspace};
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 use regrasp_grasp::Contact;
-use regrasp_plan::plan::{Plan, Segment, SegmentKind, Waypoint};
+use regrasp_plan::plan::{ContactState, Plan, Segment, SegmentKind, Waypoint};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use regrasp_scene::Scene;
 
@@ -52,17 +53,21 @@ pub fn validate_once(scene: &Scene, plan: &Plan, settings: &InHandSettings) -> R
 fn validate_segment(model: &Model, workspace: &mut Workspace, segment: &Segment) -> Result<(), (usize, String)> {
     let waypoints = segment.waypoints.as_slice();
     let ends = waypoints.first().zip(waypoints.last());
-    let Some((contacts, landing)) = ends.and_then(|(first, last)| contacts_of(first).zip(contacts_of(last))) else {
-        return Err((0, "the segment does not begin and end with all fingers in contact".into()));
+    let state_at = |waypoint: &Waypoint| {
+        let pose = Pose::from(&waypoint.world_from_object);
+        GraspState::of(pose, waypoint.contacts.iter().map(contact_of).zip(joints_of(model, waypoint)))
+    };
+    let Some((start, end)) = ends.map(|(first, last)| (state_at(first), state_at(last))) else {
+        return Err((0, "the segment has no waypoints".into()));
     };
     let moving = segment.moving_finger.as_ref().and_then(|name| model.scene.hand.finger_named(name)).map(|id| id.0);
-    let holding = model.all_fingers() & !moving.map_or(0, |finger| 1 << finger);
-    let margin = model.closure_margin(&contacts, holding);
+    let holding = start.holding & !moving.map_or(0, |finger| 1 << finger);
+    let margin = model.closure_margin(&start.contacts, holding);
     if margin < model.settings.closure_margin {
         return Err((0, format!("closure margin {margin:.4} of {}", model.settings.closure_margin)));
     }
-    let pose = Pose::from(&waypoints[0].world_from_object);
-    workspace.set(&pose, &joints_of(model, &waypoints[0]), &contacts);
+    let pose = start.world_from_object;
+    workspace.set_state(&start);
     match (segment.kind, moving) {
         (SegmentKind::Transfer, _) => {
             for (k, waypoint) in waypoints.iter().enumerate().skip(1) {
@@ -75,8 +80,9 @@ fn validate_segment(model: &Model, workspace: &mut Workspace, segment: &Segment)
         (SegmentKind::Regrasp, Some(finger)) => {
             let path: Vec<Coordinates> =
                 waypoints.iter().map(|waypoint| joints_of(model, waypoint).remove(finger)).collect();
-            let contacts = [&contacts[finger], &landing[finger]];
-            follow_relocation(workspace, &pose, finger, contacts, &path).map_err(|k| (k, in_the_way(workspace)))?;
+            let contacts = [start.contact(finger), end.contact(finger)];
+            follow_relocation(workspace, &pose, finger, contacts.each_ref().map(Option::as_ref), &path)
+                .map_err(|k| (k, in_the_way(workspace)))?;
         }
         (SegmentKind::Regrasp, None) => return Err((0, "a regrasp without a moving finger".into())),
     }
@@ -91,28 +97,28 @@ fn in_the_way(workspace: &Workspace) -> String {
     })
 }
 
-/// Moves `finger` along `path`, which begins where it is, from one contact to another, everything else being where
-/// `workspace` has it. Errors: index of the joints that are not reached.
+/// Moves `finger` along `path`, which begins where it is, from one contact to another (None: it is free there), everything
+/// else being where `workspace` has it. Errors: index of the joints that are not reached.
 pub fn follow_relocation(
     workspace: &mut Workspace,
     pose: &Pose,
     finger: usize,
-    contacts: [&Contact; 2],
+    contacts: [Option<&Contact>; 2],
     path: &[Coordinates],
 ) -> Result<(), usize> {
     let model = workspace.model;
-    let ends = contacts.map(|contact| End::new(model, finger, pose, contact));
-    let is_over = |end: &End, joints: &Coordinates| end.is_under(&model.fingers[finger].ik.tip(joints));
+    let ends = contacts.map(|contact| contact.map(|contact| End::new(model, finger, pose, contact)));
+    let is_over = |end: &Option<End>, joints: &Coordinates| {
+        end.as_ref().is_some_and(|end| end.is_under(&model.fingers[finger].ik.tip(joints)))
+    };
     let n_up = path.iter().take_while(|joints| is_over(&ends[0], joints)).count();
     let n_down = path.iter().rev().take_while(|joints| is_over(&ends[1], joints)).count();
     for k in 1..path.len() {
         let near = |end: &End| TipMode::Near { finger, normal_in_world: end.normal };
-        let mode = if k < n_up {
-            near(&ends[0])
-        } else if k > path.len() - n_down {
-            near(&ends[1])
-        } else {
-            TipMode::Away { finger, clearance: 0.0 }
+        let mode = match &ends {
+            [Some(end), _] if k < n_up => near(end),
+            [_, Some(end)] if k > path.len() - n_down => near(end),
+            _ => TipMode::Away { finger, clearance: 0.0 },
         };
         if !workspace.step_finger(finger, &path[k], mode) {
             return Err(k);
@@ -147,16 +153,11 @@ impl End {
 /// Distance from the normal that still counts as on it, in metres: far above what solvers leave.
 const STRAIGHT: f64 = 1e-5;
 
-fn contacts_of(waypoint: &Waypoint) -> Option<Contacts> {
-    waypoint
-        .contacts
-        .iter()
-        .map(|contact| {
-            let point_in_object = Point::from(Vector::from(contact.point_in_object?));
-            let normal_in_object = UnitVector::new_normalize(Vector::from(contact.normal_in_object?));
-            Some(Contact { point_in_object, normal_in_object })
-        })
-        .collect()
+/// None for a finger that is free.
+fn contact_of(contact: &ContactState) -> Option<Contact> {
+    let point_in_object = Point::from(Vector::from(contact.point_in_object?));
+    let normal_in_object = UnitVector::new_normalize(Vector::from(contact.normal_in_object?));
+    Some(Contact { point_in_object, normal_in_object })
 }
 
 fn joints_of(model: &Model, waypoint: &Waypoint) -> HandJoints {

@@ -6,6 +6,7 @@
 //! are far apart the distance known from before, less what both have moved since, proves it for nothing.
 
 use super::model::{Carrier, MAX_FINGERS, Model};
+use super::state::GraspState;
 use arrayvec::ArrayVec;
 use regrasp_geometry::collision::{Answer, Placement, gap_along, separation};
 use regrasp_geometry::{Point, Pose, Vector, frame, interpolate_pose};
@@ -20,7 +21,8 @@ pub type Contacts = ArrayVec<Contact, MAX_FINGERS>;
 /// What the fingertips do during a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TipMode {
-    /// All tips hold; each may press into the object by the contact allowance, along its normal.
+    /// The tips of fingers that hold may press into the object by the contact allowance, along their normals; those of
+    /// free ones keep clear of it.
     AllHold,
     /// One finger is leaving or reaching the contact with this outward normal, in the world.
     Near {
@@ -79,6 +81,8 @@ pub struct Workspace<'a> {
     /// How far its points stray at most from straight lines in the current step.
     deviation: Vec<f64>,
     contacts: Contacts,
+    /// Fingers that are free, as bits.
+    free: u32,
     /// Iterations of RRT-Connect that a relocation is worth just now.
     pub rrt_iterations: usize,
     /// Configurations looked at.
@@ -103,6 +107,7 @@ impl<'a> Workspace<'a> {
             motion: vec![0.0; model.bodies.len()],
             deviation: vec![0.0; model.bodies.len()],
             contacts: Contacts::new(),
+            free: 0,
             rrt_iterations: model.settings.rrt_iterations,
             work: 0,
             blocking_pair: None,
@@ -110,9 +115,20 @@ impl<'a> Workspace<'a> {
         }
     }
 
-    /// Goes to a configuration, without any test. `contacts` are where the fingers hold.
+    /// Goes to a state, without any test.
+    pub fn set_state(&mut self, state: &GraspState) {
+        self.set_held(&state.world_from_object, &state.joints, &state.contacts, state.holding);
+    }
+
+    /// Goes to a configuration in which all fingers hold, without any test. `contacts` are where.
     pub fn set(&mut self, world_from_object: &Pose, joints: &HandJoints, contacts: &Contacts) {
+        self.set_held(world_from_object, joints, contacts, self.model.all_fingers());
+    }
+
+    /// Goes to a configuration, without any test. `contacts` are where the fingers of `holding` hold.
+    pub fn set_held(&mut self, world_from_object: &Pose, joints: &HandJoints, contacts: &Contacts, holding: u32) {
         self.contacts.clone_from(contacts);
+        self.free = self.model.all_fingers() & !holding;
         self.blocking_pair = None;
         place_object(self.model, &mut self.now, world_from_object);
         for finger in 0..self.model.n_fingers() {
@@ -341,7 +357,8 @@ impl<'a> Workspace<'a> {
     fn pair_is_clear(&mut self, index: usize, mode: TipMode) -> bool {
         let pair = self.model.pairs[index];
         let motion = self.motion[pair.a] + self.motion[pair.b];
-        let required = self.model.settings.clearance;
+        let is_free_tip = pair.tip_of.is_some_and(|finger| self.free & (1 << finger) != 0);
+        let required = if is_free_tip { self.model.free_clearance() } else { self.model.settings.clearance };
         self.slack[index] -= motion;
         if self.slack[index] > required {
             return true;
@@ -351,8 +368,8 @@ impl<'a> Workspace<'a> {
                 self.tip_is_clear(index, finger, Some(normal_in_world))
             }
             (Some(finger), TipMode::Away { finger: away, clearance }) if finger == away => self.apart(index, clearance),
-            (Some(finger), _) => self.tip_is_clear(index, finger, None),
-            (None, _) => self.apart(index, required),
+            (Some(finger), _) if !is_free_tip => self.tip_is_clear(index, finger, None),
+            _ => self.apart(index, required),
         };
         if !is_clear {
             self.blocking_pair = Some(index);

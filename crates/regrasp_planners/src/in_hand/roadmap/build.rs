@@ -354,7 +354,7 @@ impl<'b> Builder<'b> {
             for nodes in alike.values().filter(|nodes| nodes.len() > 1) {
                 search.check()?;
                 let contacts = at.graph.state(nodes[0] as usize).contacts;
-                if releasable(self.model, &contacts) & (1 << finger) == 0 {
+                if releasable(self.model, &contacts, self.model.all_fingers()) & (1 << finger) == 0 {
                     continue;
                 }
                 for (k, &from) in nodes.iter().enumerate() {
@@ -394,7 +394,7 @@ impl Ways {
         let (start, end) = (at.graph.state(from as usize), at.graph.state(to as usize));
         let foothold = |node: u32| at.graph.nodes[node as usize].footholds[finger];
         let known = self.known.entry((finger, foothold(from), foothold(to))).or_default();
-        let contacts = [&start.contacts[finger], &end.contacts[finger]];
+        let contacts = [Some(&start.contacts[finger]), Some(&end.contacts[finger])];
         for path in known.iter() {
             search.workspace.set(&at.pose, &start.joints, &start.contacts);
             if follow_relocation(&mut search.workspace, &at.pose, finger, contacts, path).is_ok() {
@@ -410,7 +410,7 @@ impl Ways {
         let mut rng = Rng::child(&search.rng, "way", 0);
         search.rng.bits();
         let (leave, arrive) =
-            (Foothold { contact: &a, joints: &joints_a }, Foothold { contact: &b, joints: &joints_b });
+            (Foothold { contact: Some(&a), joints: &joints_a }, Foothold { contact: Some(&b), joints: &joints_b });
         let path = relocate(&mut search.workspace, &at.pose, finger, leave, arrive, &mut rng)?;
         known.push(std::iter::once(joints_a).chain(path.iter().cloned()).collect());
         Some(path)

@@ -125,7 +125,7 @@ impl Graph {
     pub fn state(&self, node: usize) -> GraspState {
         let contacts: Contacts = (0..self.n_fingers()).map(|finger| *self.contact(node, finger)).collect();
         let joints: HandJoints = (0..self.n_fingers()).map(|finger| self.joints(node, finger)).collect();
-        GraspState { world_from_object: *self.pose(node), contacts, joints }
+        GraspState::held_by_all(*self.pose(node), contacts, joints)
     }
 
     /// Joints of a relocation between its ends, in the order it was proven.

@@ -84,7 +84,7 @@ impl Reached {
                 let joints = (0..POSTURES)
                     .find_map(|_| reach(&mut search.workspace, finger, contact, &placement, &mut search.rng));
                 if let Some(joints) = joints {
-                    options.push(Candidate { contact: *contact, joints, follow: 1.0 });
+                    options.push(Candidate { contact: Some(*contact), joints, follow: 1.0 });
                     which.push(index);
                 }
             }
@@ -138,11 +138,8 @@ impl Reached {
             let enough = if rule == ReleaseRule::EverywhereEveryFinger { n } else { 1 };
             if n_releasable >= enough && found.len() < limit {
                 let chosen = |f: usize| &self.options[f][choice[f]];
-                found.push(GraspState {
-                    world_from_object: *pose,
-                    contacts: (0..n).map(|f| chosen(f).contact).collect(),
-                    joints: (0..n).map(|f| chosen(f).joints.clone()).collect(),
-                });
+                let fingers = (0..n).map(|f| (chosen(f).contact, chosen(f).joints.clone()));
+                found.push(GraspState::of(*pose, fingers));
             }
             return;
         }

@@ -26,7 +26,7 @@ pub fn motion_along(model: &Model, roadmap: &GraspRoadmap, edge: u32, from: usiz
             let finger = usize::from(finger);
             let mut path: Vec<_> = graph.way(finger, first, n_between).collect();
             path.push(graph.joints(to, finger));
-            way.push_regrasp(finger, *graph.contact(to, finger), path);
+            way.push_regrasp(finger, Some(*graph.contact(to, finger)), path);
         }
     }
     Some(if stored.from as usize == from { way } else { way.reversed() })

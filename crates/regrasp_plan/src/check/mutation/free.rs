@@ -1,0 +1,124 @@
+//! Fingers that are free, and fingers that are said to be.
+
+use super::{Breeder, free, move_tip, pick, pick_waypoint};
+use crate::check::closure::{Body, margin};
+use crate::check::continuity::{contact_of, is_free_throughout};
+use crate::check::model::Model;
+use crate::check::surface;
+use crate::check::violation::ViolationKind::{
+    ClosureLost, Collision, ContactOffTip, WrongContactMode, WrongMovingFinger,
+};
+use crate::plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
+use regrasp_base::Rng;
+use regrasp_geometry::{Point, Pose, Vector};
+use regrasp_grasp::Grip;
+
+impl Breeder<'_> {
+    pub(super) fn break_free_fingers(&mut self) {
+        let (model, scene) = (self.model, self.scene);
+        let object = &scene.object;
+        let body = Body {
+            center_of_mass: object.center_of_mass,
+            torque_scale: object.radius(),
+            friction: self.plan.promises.friction,
+        };
+        let required = self.plan.promises.required_margin;
+        let holds_without = |waypoint: &Waypoint, left_out: usize| {
+            let grips: Vec<Grip> = (0..model.fingers.len())
+                .filter(|&f| f != left_out)
+                .filter_map(|f| {
+                    Some(Grip { contact: contact_of(&waypoint.contacts[f])?, model: model.fingers[f].contact })
+                })
+                .collect();
+            margin(&grips, &body) >= required
+        };
+        // All through the plan, so that it is the same finger at every meeting of segments.
+        self.add("finger declared free whom the others need", &[ClosureLost], |plan, rng| {
+            let needed = |f: &usize| plan.segments.iter().any(|segment| !holds_without(&segment.waypoints[0], *f));
+            let mut fingers: Vec<usize> = (0..model.fingers.len()).filter(needed).collect();
+            let f = *pick(&mut fingers, rng)?;
+            declare_free(plan, f)
+        });
+        self.add("finger declared free that touches the object", &[Collision], |plan, rng| {
+            let touches = |segment: &Segment, f: usize| {
+                segment.kind == SegmentKind::Transfer && segment.waypoints[0].contacts[f].mode != ContactMode::Free
+            };
+            let mut places: Vec<(usize, usize)> = (0..plan.segments.len())
+                .flat_map(|s| (0..model.fingers.len()).map(move |f| (s, f)))
+                .filter(|&(s, f)| touches(&plan.segments[s], f) && holds_without(&plan.segments[s].waypoints[0], f))
+                .collect();
+            let (_, f) = *pick(&mut places, rng)?;
+            declare_free(plan, f)
+        });
+        self.add("free finger touches the object", &[Collision], |plan, rng| {
+            let (s, f) = pick_free(plan, model, rng)?;
+            let n_waypoints = plan.segments[s].waypoints.len();
+            let w = rng.below(n_waypoints);
+            let depth = rng.uniform(0.0, 0.2e-3);
+            let waypoint = &mut plan.segments[s].waypoints[w];
+            let (foot, normal) = beneath(model, scene, waypoint, f)?;
+            let center = foot + normal * (model.fingers[f].radius - depth);
+            let target = Pose::from(&waypoint.world_from_object) * center;
+            move_tip(model, f, &mut waypoint.joints, &target)
+        });
+        self.add("finger declared holding that is away", &[ContactOffTip], |plan, rng| {
+            let (s, f) = pick_free(plan, model, rng)?;
+            let (foot, normal) = beneath(model, scene, &plan.segments[s].waypoints[0], f)?;
+            let contact = ContactState {
+                mode: ContactMode::Fixed,
+                point_in_object: Some(foot.into()),
+                normal_in_object: Some(normal.into()),
+            };
+            plan.segments[s].waypoints.iter_mut().for_each(|waypoint| waypoint.contacts[f] = contact.clone());
+            Some(())
+        });
+        self.add("free finger holds for a moment", &[WrongContactMode], |plan, rng| {
+            let (s, f) = pick_free(plan, model, rng)?;
+            let w = 1 + rng.below(plan.segments[s].waypoints.len() - 1);
+            let (foot, normal) = beneath(model, scene, &plan.segments[s].waypoints[w], f)?;
+            plan.segments[s].waypoints[w].contacts[f] = ContactState {
+                mode: ContactMode::Fixed,
+                point_in_object: Some(foot.into()),
+                normal_in_object: Some(normal.into()),
+            };
+            Some(())
+        });
+        self.add("free finger moves while another one relocates", &[WrongMovingFinger], |plan, rng| {
+            let (s, w) = pick_waypoint(plan, rng, SegmentKind::Regrasp)?;
+            let segment = &mut plan.segments[s];
+            let moving = segment.moving_finger.clone();
+            let is_resting =
+                |f: &usize| is_free_throughout(segment, *f) && Some(&model.fingers[*f].name) != moving.as_ref();
+            let mut resting: Vec<usize> = (0..model.fingers.len()).filter(is_resting).collect();
+            let f = *pick(&mut resting, rng)?;
+            segment.waypoints[w].joints[model.fingers[f].coordinates.start] += rng.uniform(1e-5, 1e-3);
+            Some(())
+        });
+    }
+}
+
+/// Says at every waypoint that finger `f` is free.
+fn declare_free(plan: &mut Plan, f: usize) -> Option<()> {
+    plan.segments.iter_mut().flat_map(|segment| &mut segment.waypoints).for_each(|w| w.contacts[f] = free());
+    Some(())
+}
+
+/// A transfer, and a finger that is free in it.
+fn pick_free(plan: &Plan, model: &Model, rng: &mut Rng) -> Option<(usize, usize)> {
+    let mut places: Vec<(usize, usize)> = (0..plan.segments.len())
+        .filter(|&s| plan.segments[s].kind == SegmentKind::Transfer)
+        .flat_map(|s| (0..model.fingers.len()).map(move |f| (s, f)))
+        .filter(|&(s, f)| is_free_throughout(&plan.segments[s], f))
+        .collect();
+    pick(&mut places, rng).copied()
+}
+
+/// The point of the object's surface nearest to the tip of finger `f` and the outward normal there, in the object frame.
+fn beneath(model: &Model, scene: &regrasp_scene::Scene, waypoint: &Waypoint, f: usize) -> Option<(Point, Vector)> {
+    let object = &scene.object;
+    let pose = Pose::from(&waypoint.world_from_object);
+    let tip = pose.inverse() * model.fingers[f].center_in_world(&waypoint.joints);
+    let foot = object.surface.project(&tip);
+    let nearest = surface::nearest(&object.shape, &foot.point_in_object);
+    (nearest.distance < 1e-6).then(|| (foot.point_in_object, foot.normal_in_object.into_inner()))
+}
