@@ -11,6 +11,8 @@ mod classic;
 mod combine;
 /// Joining components of a roadmap.
 mod connect;
+/// What plans cost.
+mod cost;
 /// Paths in GS_n cut into transfers and regrasps.
 mod decompose;
 /// Start and goal as the query gives them.
@@ -23,6 +25,8 @@ mod gait;
 mod grasp_path;
 /// Grasps at a given object pose.
 mod grasps;
+/// Better plans after the first.
+mod improve;
 /// Legs of a query, from way pose to way pose.
 mod legs;
 /// Links between grasps.
@@ -66,18 +70,20 @@ mod visibility;
 /// Configurations and continuous collision tests.
 mod workspace;
 
-pub use settings::{Alpha, InHandSettings, Method, ReleaseRule};
+pub use settings::{Alpha, CostWeights, InHandSettings, Method, ReleaseRule};
 pub use validate::{NotProven, validate_once};
 
 use crate::failure::Failure;
 use attempts::{Left, run_attempts};
 use endpoints::{End, given_grasp, refuse_buried_object, refuse_impossible};
-use legs::{Legs, plan_legs};
+use legs::{Legs, Solution, plan_legs};
 use model::Model;
 use regrasp_base::{Budget, Rng};
 use regrasp_plan::Plan;
+use regrasp_plan::plan::Statistics;
 use regrasp_scene::{InHandQuery, Scene};
 use search::Search;
+use std::sync::atomic::AtomicUsize;
 
 /// What a running search tells its caller.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -131,10 +137,38 @@ pub fn plan_in_hand(
     });
     match found {
         Ok((solution, left, n_restarts)) => {
-            Ok(record::record(&model, query, seed, &solution, left.statistics(n_restarts)))
+            let statistics = left.statistics(n_restarts);
+            let (solution, statistics) = improved(&model, &legs, seed, budget, (solution, statistics), progress);
+            Ok(record::record(&model, query, seed, &solution, statistics))
         }
         Err((interrupt, left, n_attempts)) => Err(left.failure(&model, &poses, interrupt, n_attempts)),
     }
+}
+
+/// A solution after the improvement that the settings ask for, and the statistics with it.
+fn improved(
+    model: &Model,
+    legs: &Legs,
+    seed: u64,
+    budget: &Budget,
+    (solution, mut statistics): (Solution, Statistics),
+    progress: &(dyn Fn(Progress) + Sync),
+) -> (Solution, Statistics) {
+    let work = model.settings.improve_work.min(budget.max_work.saturating_sub(statistics.work));
+    if model.settings.improve_work == 0 {
+        return (solution, statistics);
+    }
+    let budget = budget.of_improvement();
+    let ends = (legs.poses[0], legs.poses[legs.n_legs()]);
+    let winner = AtomicUsize::new(usize::MAX);
+    let mut search = Search::new(model, ends, (seed, 0), (&budget, work), &winner, progress);
+    search.rng = Rng::keyed(seed, "improvement", 0);
+    let (solution, improvement) = improve::improve(&mut search, legs, solution);
+    statistics.work += improvement.work;
+    statistics.samples += search.n_samples;
+    statistics.cut_by_time |= search.cut_by_time;
+    statistics.improvement = Some(Box::new(improvement));
+    (solution, statistics)
 }
 
 /// The settings that a method really plans with: those of paper 000 have the paper's release rule (section 4.2.2).

@@ -2,7 +2,7 @@
 
 use super::legs::Solution;
 use super::model::Model;
-use super::state::Motion;
+use super::state::{Motion, Sequence};
 use super::workspace::{Contacts, HandJoints};
 use regrasp_geometry::Pose;
 use regrasp_plan::plan::{
@@ -20,13 +20,11 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution
     let Solution { way, steps_to_way } = solution;
     let start = way.start();
     let mut segments = Vec::with_capacity(way.steps().len());
-    let mut kept_margin = model.closure_margin(&start.contacts, model.all_fingers());
     let mut state = start;
     for step in way.steps() {
         match step.motion() {
             Motion::Transfer(moments) => {
                 statistics.transfers += 1;
-                kept_margin = kept_margin.min(model.closure_margin(&state.contacts, model.all_fingers()));
                 let mut waypoints = vec![waypoint(&state.world_from_object, &state.joints, &state.contacts, None)];
                 waypoints
                     .extend(moments.iter().map(|m| waypoint(&m.world_from_object, &m.joints, &state.contacts, None)));
@@ -34,8 +32,6 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution
             }
             Motion::Regrasp { finger, path } => {
                 statistics.relocations += 1;
-                let holding = model.all_fingers() & !(1 << finger);
-                kept_margin = kept_margin.min(model.closure_margin(&state.contacts, holding));
                 let mut waypoints = vec![waypoint(&state.world_from_object, &state.joints, &state.contacts, None)];
                 let mut joints = state.joints.clone();
                 for (k, at) in path.iter().enumerate() {
@@ -51,7 +47,6 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution
         }
         state = step.end();
     }
-    kept_margin = kept_margin.min(model.closure_margin(&state.contacts, model.all_fingers()));
     if segments.is_empty() {
         // Start and goal are the same and any grasp will do: hold still.
         let here = waypoint(&start.world_from_object, &start.joints, &start.contacts, None);
@@ -78,7 +73,7 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution
             contact_tolerance: CONTACT_TOLERANCE,
             friction: model.frame.friction,
             required_margin: model.settings.closure_margin,
-            kept_margin,
+            kept_margin: kept_margin(model, way),
             torque_scale: model.frame.torque_scale,
         },
         joint_names: scene.hand.joint_names(),
@@ -89,6 +84,20 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution
         segments,
         statistics,
     }
+}
+
+/// The smallest closure margin of the fingers that hold, at any moment: that is what a plan promises.
+pub fn kept_margin(model: &Model, way: &Sequence) -> f64 {
+    let all = model.all_fingers();
+    let mut kept = model.closure_margin(&way.end().contacts, all);
+    for (index, step) in way.steps().iter().enumerate() {
+        let holding = match step.motion() {
+            Motion::Transfer(_) => all,
+            Motion::Regrasp { finger, .. } => all & !(1 << finger),
+        };
+        kept = kept.min(model.closure_margin(&way.state_before(index).contacts, holding));
+    }
+    kept
 }
 
 /// Each way pose with the last waypoint of the leg that leads to it; every step is a segment.

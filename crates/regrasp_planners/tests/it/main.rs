@@ -1,5 +1,6 @@
 //! Tests of the planners through their public functions, on the bundled scenes.
 
+mod improvement;
 mod in_hand_methods;
 #[path = "../../../../tests/support/places.rs"]
 mod places;
