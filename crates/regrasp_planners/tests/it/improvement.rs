@@ -153,7 +153,7 @@ fn the_weights_decide_what_is_better() {
     let loaded = scene("box_180x.toml");
     let query = loaded.task.query(5);
     let margins = CostWeights { margin: 20.0, ..CostWeights::default() };
-    let tight = plan(&loaded, &query, &settings(150_000), 5);
+    let tight = plan(&loaded, &query, &settings(300_000), 5);
     let wide = plan(&loaded, &query, &InHandSettings { cost: margins, ..settings(300_000) }, 5);
     assert!(improvement(&wide).improved.kept_margin > improvement(&wide).first.kept_margin, "{:?}", improvement(&wide));
     assert!(improvement(&tight).improved.relocations < improvement(&tight).first.relocations);
