@@ -195,6 +195,44 @@ fn bench_writes_rows_and_the_page_is_made_of_them() {
 }
 
 #[test]
+fn a_plan_is_improved_by_work_or_by_time_and_says_which() {
+    let folder = Folder::new();
+    let plan = |arguments: &[&str]| {
+        let run = folder.run(&[&["plan", "scene.toml", "-o", "plan.json"], arguments].concat());
+        assert_eq!(run.code, Some(0), "{run:?}");
+        let text = std::fs::read_to_string(folder.path("plan.json")).unwrap();
+        (run, serde_json::from_str::<serde_json::Value>(&text).unwrap())
+    };
+    let (run, by_work) = plan(&["--improve-work", "30000", "--threads", "1"]);
+    assert!(run.err.contains("better ") && run.err.contains(" instead of "), "{}", run.err);
+    assert_eq!(by_work, plan(&["--improve-work", "30000", "--threads", "3"]).1);
+    assert_eq!(by_work["settings"]["improve_work"], 30_000);
+    assert_eq!(by_work["statistics"]["cut_by_time"], false);
+    let (run, by_time) = plan(&["--improve", "0.2"]);
+    assert_eq!(by_time["statistics"]["cut_by_time"], true, "{}", run.err);
+    let cost = |plan: &serde_json::Value, which: &str| {
+        plan["statistics"]["improvement"][which]["cost"].as_f64().expect("a cost")
+    };
+    for plan in [&by_work, &by_time] {
+        assert!(cost(plan, "improved") <= cost(plan, "first"));
+    }
+    let (run, plain) = plan(&[]);
+    assert!(plain["statistics"].get("improvement").is_none() && !run.err.contains("better "));
+}
+
+#[test]
+fn bench_compares_first_and_improved_plans() {
+    let folder = Folder::new();
+    let run = folder.run(&["bench", "scene.toml", "--seeds", "2", "--csv", "rows.csv", "--improve-work", "20000"]);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    assert!(run.out.contains("relocations") && run.out.contains("2/2"), "{}", run.out);
+    let run = folder.run(&["bench", "--page", "page.md", "rows.csv"]);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    let page = std::fs::read_to_string(folder.path("page.md")).unwrap();
+    assert!(page.contains("## Improvement\n") && page.contains("| scene | 2/2 | 2/2 |"), "{page}");
+}
+
+#[test]
 fn inspect_writes_a_hand_file_that_plans() {
     let folder = Folder::new();
     let run = folder.run(&["inspect", "hand.urdf", "-o", "guessed.toml", "--samples", "200"]);

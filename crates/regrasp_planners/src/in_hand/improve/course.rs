@@ -7,7 +7,7 @@ use super::super::transfer::n_steps;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Pose, interpolate_pose};
 
-/// Steps between stations. By measurement, see docs/benchmarks.md.
+/// Steps between stations. By hand: 12 degrees of a turn of the box.
 const STATION_STEPS: usize = 3;
 
 /// A way of the object from start to goal, in steps no longer than the planner's.

@@ -29,7 +29,7 @@ use regrasp_plan::plan::{Improvement, PlanFigures};
 use regrasp_roadmap::Limits;
 use track::{Track, covers, draw_tracks};
 
-/// Tracks drawn per finger and course.
+/// Tracks drawn per finger and course. By hand, with a look at how often a finger is left without a way.
 const DRAWN: usize = 150;
 /// Tracks kept per course, all fingers together.
 const KEPT: usize = 96;
@@ -54,7 +54,8 @@ enum Lay {
     Own,
 }
 
-/// Courses in turn. By measurement, see docs/benchmarks.md.
+/// Courses in turn. By measurement, 12 seeds of box_90x, box_180z and box_180x and 300,000 units of work: these leave 1.1, 3.8
+/// and 2.5 relocations, straight ones alone 1.0, 5.5 and 4.0, bent ones alone 1.3, 3.7 and 2.7.
 const LAYS: [Lay; 6] = [Lay::Straight, Lay::Bent, Lay::Bent, Lay::Own, Lay::Bent, Lay::Bent];
 
 /// A solution that costs no more than `first`, and what became of it. Whatever ends the search only ends the improvement.
