@@ -11,14 +11,16 @@ OUT ?= out
 
 WIDE := $(addprefix scenes/,$(addsuffix .toml,sphere_90x sphere_180z sphere_180x box_90x box_180z box_180x))
 TIGHT := $(addprefix scenes/,$(addsuffix .toml,tight_sphere_180z tight_box_90x))
+BOXES := $(addprefix scenes/,$(addsuffix .toml,box_90x box_180z box_180x))
 ALLEGRO_REQUIRED := $(addprefix scenes/allegro/,$(addsuffix .toml,sphere32_x sphere32_z sphere32_180x cube57_x cube57_y \
   cube57_z cube57_180z cylinder20_x cylinder20_y box_y))
 ALLEGRO_STRETCH := $(addprefix scenes/allegro/,$(addsuffix .toml,box_x box_z cube45_x cylinder20_z))
 ALLEGRO_MESHES := $(addprefix scenes/allegro/,$(addsuffix .toml,rubiks_x rubiks_z apple_x apple_z can_y))
 SOFT_AND_COUPLED := scenes/dclaw/soft_sphere32_x.toml scenes/trifinger/soft_cylinder20_z.toml scenes/shadow/sphere32_z.toml
 # Sections of docs/benchmarks.md, in this order; those without a CSV file are left out.
-BENCHMARKS := wide visibility classic allegro_required allegro_stretch allegro_meshes
+BENCHMARKS := wide visibility classic improvement allegro_required allegro_stretch allegro_meshes
 SEEDS ?= 200
+IMPROVEMENT_SEEDS ?= 100
 ALLEGRO_SEEDS ?= 20
 CLASSIC_SEEDS ?= 20
 ALLEGRO_BENCH = $(PACKAGES) --time-limit 20 --threads 1 --seeds $(ALLEGRO_SEEDS)
@@ -47,6 +49,7 @@ bench: release
 	$(REGRASP) bench $(WIDE) $(TIGHT) --seeds $(SEEDS) --threads 1 --time-limit 20 --csv docs/benchmarks/wide.csv
 	$(REGRASP) bench scenes/tight_sphere_180z.toml --method visibility --settings docs/benchmarks/uniform_poses.json --seeds $(CLASSIC_SEEDS) --threads 1 --time-limit 60 --csv docs/benchmarks/visibility.csv
 	$(REGRASP) bench scenes/tight_sphere_180z.toml --method classic --settings docs/benchmarks/uniform_poses.json --seeds $(CLASSIC_SEEDS) --threads 1 --time-limit 60 --csv docs/benchmarks/classic.csv
+	$(REGRASP) bench $(BOXES) --improve 1 --seeds $(IMPROVEMENT_SEEDS) --threads 1 --csv docs/benchmarks/improvement.csv
 	$(REGRASP) bench suites/paper000.toml
 	$(REGRASP) bench suites/paper004.toml
 ifneq ($(PACKAGES),)

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Why a search stopped before it was done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,6 +22,8 @@ pub struct Budget {
     pub max_work: u64,
     /// Wall-clock instant after which the search is cut.
     pub deadline: Option<Instant>,
+    /// Wall-clock time after the first solution, at the end of which looking for a better one is cut.
+    pub improve_for: Option<Duration>,
     /// Set by the caller, from any thread, to stop the search.
     pub cancelled: Arc<AtomicBool>,
 }
@@ -29,7 +31,7 @@ pub struct Budget {
 impl Budget {
     /// Only work is limited: fully reproducible.
     pub fn work(max_work: u64) -> Self {
-        Budget { max_work, deadline: None, cancelled: Arc::new(AtomicBool::new(false)) }
+        Budget { max_work, deadline: None, improve_for: None, cancelled: Arc::new(AtomicBool::new(false)) }
     }
 
     /// No limit but cancellation.
@@ -41,6 +43,14 @@ impl Budget {
     pub fn with_deadline(mut self, deadline: Instant) -> Self {
         self.deadline = Some(deadline);
         self
+    }
+
+    /// What is left for improving a solution that has just been found: the deadline is at most `improve_for` from now.
+    pub fn of_improvement(&self) -> Self {
+        // A time beyond what clocks count cuts nothing.
+        let end = self.improve_for.and_then(|time| Instant::now().checked_add(time));
+        let deadline = [self.deadline, end].into_iter().flatten().min();
+        Budget { deadline, ..self.clone() }
     }
 
     /// Err when `work_done` units are too many, the deadline has passed or the caller cancelled.
@@ -80,6 +90,11 @@ mod tests {
         budget.cancelled.store(true, Ordering::Relaxed);
         assert_eq!(budget.check(0), Err(Interrupt::Cancelled));
         assert_eq!(budget.check_caller(), Err(Interrupt::Cancelled));
+        let hasty = Budget { improve_for: Some(Duration::ZERO), ..Budget::unlimited() };
+        assert_eq!(hasty.check(0), Ok(()), "the first solution is waited for");
+        assert_eq!(hasty.of_improvement().check(0), Err(Interrupt::Deadline));
+        let endless = Budget { improve_for: Some(Duration::MAX), ..Budget::unlimited() };
+        assert_eq!(endless.of_improvement().check(0), Ok(()));
         assert_eq!(Budget::work(0).check_caller(), Ok(()), "work is not asked about");
     }
 }

@@ -195,6 +195,7 @@ fn row_of(fields: &[String]) -> Option<Row> {
         min_clearance: optional(min_clearance)?,
         angle_left_deg: optional(angle_left_deg)?,
         cause: cause.clone(),
+        ..Row::default()
     })
 }
 

@@ -8,6 +8,8 @@ pub mod at_once;
 pub mod csv;
 /// The same bytes on any number of threads.
 pub mod determinism;
+/// First and improved plans side by side.
+pub mod improvement;
 /// Times within which scenes should be solved.
 pub mod limits;
 /// The checker against good and broken plans.

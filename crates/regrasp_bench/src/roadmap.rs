@@ -15,6 +15,7 @@ pub fn run(planner: &RoadmapPlanner, problem: Problem, settings: &RunSettings, m
     let budget = Budget {
         max_work: settings.max_work,
         deadline: settings.time_limit.map(|limit| started.0 + limit),
+        improve_for: None,
         cancelled: Arc::clone(&settings.cancelled),
     };
     let outcome = planner.plan(problem.query, problem.seed, &budget, memory);

@@ -4,6 +4,7 @@ use cpu_time::{ProcessTime, ThreadTime};
 use regrasp_base::Budget;
 use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, check};
+use regrasp_plan::plan::Improvement;
 use regrasp_planners::in_hand::{NotProven, validate_once};
 use regrasp_planners::{Failure, InHandSettings, Progress, plan_in_hand};
 use regrasp_scene::{InHandQuery, Scene};
@@ -34,6 +35,8 @@ pub struct RunSettings {
     pub time_limit: Option<Duration>,
     /// Whether plans are judged.
     pub judge: Judge,
+    /// Wall-clock time allowed per seed for a better plan after the first.
+    pub improve_for: Option<Duration>,
     /// Set from outside to stop.
     pub cancelled: Arc<AtomicBool>,
 }
@@ -87,6 +90,12 @@ pub struct Row {
     pub min_clearance: Option<f64>,
     /// Angle left at the nearest miss, in degrees.
     pub angle_left_deg: Option<f64>,
+    /// What became of the first plan, where a better one was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub improvement: Option<Improvement>,
+    /// True when a wall-clock limit cut the search or the improvement; not in CSV files without improvement.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub cut_by_time: bool,
     /// Commonest cause of a failure, first violation of a rejected plan, or what has no floor.
     pub cause: String,
 }
@@ -113,6 +122,7 @@ pub fn run(problem: Problem, settings: &RunSettings) -> Row {
     let budget = Budget {
         max_work: settings.max_work,
         deadline: settings.time_limit.map(|limit| started.0 + limit),
+        improve_for: settings.improve_for,
         cancelled: Arc::clone(&settings.cancelled),
     };
     let silent = |_: Progress| {};
@@ -129,6 +139,8 @@ pub fn run(problem: Problem, settings: &RunSettings) -> Row {
     row.samples = statistics.samples;
     row.work = statistics.work;
     row.restarts = statistics.restarts;
+    row.cut_by_time = statistics.cut_by_time;
+    row.improvement = statistics.improvement.as_deref().cloned();
     match outcome {
         Ok(plan) => {
             row.status = "solved".into();

@@ -108,6 +108,12 @@ pub struct Search {
     /// Work limit, in configurations looked at: the same on every machine
     #[arg(long, value_name = "N", default_value_t = 20_000_000, value_parser = whole_number, allow_negative_numbers = true)]
     pub max_work: u64,
+    /// Look for a better plan after the first, for so many seconds; the plan says if that cut the search
+    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
+    pub improve: Option<Duration>,
+    /// The same by work, in configurations looked at: the same plan on every machine
+    #[arg(long, value_name = "N", value_parser = whole_number, allow_negative_numbers = true)]
+    pub improve_work: Option<u64>,
 }
 
 /// `regrasp plan`
@@ -397,7 +403,7 @@ mod tests {
 
     #[test]
     fn negative_numbers_are_values_that_are_refused_with_their_reason() {
-        for flag in ["--seed", "--threads", "--margin", "--time-limit", "--max-work"] {
+        for flag in ["--seed", "--threads", "--margin", "--time-limit", "--max-work", "--improve", "--improve-work"] {
             let error = Arguments::try_parse_from(["regrasp", "plan", "scene.toml", flag, "-3"]).unwrap_err();
             assert!(error.to_string().contains("expected a"), "{error}");
         }

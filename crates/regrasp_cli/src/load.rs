@@ -42,7 +42,15 @@ pub fn scene(path: &Path, common: &Common, talk: &Talk) -> Result<LoadedScene, S
 
 /// Settings of the planner: defaults, then the settings file, then the flags.
 pub fn settings(search: &Search, n_threads: usize) -> Result<InHandSettings, Stop> {
-    planner_settings(search.settings.as_deref(), search.method.as_deref(), search.margin, n_threads)
+    let file = search.settings.as_deref();
+    let mut settings = planner_settings(file, search.method.as_deref(), search.margin, n_threads)?;
+    match search.improve_work {
+        Some(work) => settings.improve_work = work,
+        // Time alone is to end it.
+        None if search.improve.is_some() && settings.improve_work == 0 => settings.improve_work = u64::MAX,
+        None => {}
+    }
+    Ok(settings)
 }
 
 /// Settings of the planner: defaults, then the file, then the rest.

@@ -159,6 +159,43 @@ pub struct Statistics {
     pub cut_by_time: bool,
     /// Attempts that failed, by cause.
     pub failures: std::collections::BTreeMap<String, u64>,
+    /// What became of the first plan; absent where none was asked to be improved.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub improvement: Option<Box<Improvement>>,
+}
+
+/// Looking for a better plan after the first.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Improvement {
+    /// The first plan.
+    pub first: PlanFigures,
+    /// The plan in this file.
+    pub improved: PlanFigures,
+    /// What no plan for the query costs less than.
+    pub lower_bound: f64,
+    /// Searches begun.
+    pub rounds: u64,
+    /// Configurations looked at, part of the statistics' `work`.
+    pub work: u64,
+}
+
+/// What a plan costs, and why.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PlanFigures {
+    /// Single-finger relocations.
+    pub relocations: u64,
+    /// Transfers.
+    pub transfers: u64,
+    /// How far the object goes, in metres; angles count with the object's radius about its centre of mass.
+    pub object_path: f64,
+    /// How far the joints go, all together, in radians or metres.
+    pub joint_path: f64,
+    /// Closure margin kept, as promised.
+    pub kept_margin: f64,
+    /// Cost by the weights in the settings.
+    pub cost: f64,
 }
 
 /// A plan: how to take the object from start to goal.

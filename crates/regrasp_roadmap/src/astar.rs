@@ -12,7 +12,8 @@ pub struct CheapestPath {
     pub cost: f64,
 }
 
-/// An entry of the queue; the greatest is the one with the smallest estimate, then the smallest node.
+/// An entry of the queue; the greatest is the one with the smallest estimate, then the one that has come farthest, then the
+/// smallest node.
 #[derive(Debug, PartialEq)]
 struct Open {
     estimate: f64,
@@ -24,7 +25,8 @@ impl Eq for Open {}
 
 impl Ord for Open {
     fn cmp(&self, other: &Self) -> Ordering {
-        other.estimate.total_cmp(&self.estimate).then(other.node.cmp(&self.node))
+        let farther = self.cost.total_cmp(&other.cost);
+        other.estimate.total_cmp(&self.estimate).then(farther).then(other.node.cmp(&self.node))
     }
 }
 
@@ -53,6 +55,20 @@ struct Mark {
     cost: f64,
 }
 
+/// Where a search ends without a path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Paths that cost as much or more are not wanted.
+    pub cost: f64,
+    /// Most nodes expanded.
+    pub n_expanded: usize,
+}
+
+impl Limits {
+    /// None.
+    pub const NONE: Limits = Limits { cost: f64::INFINITY, n_expanded: usize::MAX };
+}
+
 /// Memory of searches, one after the other: a search of a large graph costs what it looks at, not the graph's size.
 #[derive(Debug, Default)]
 pub struct AStar {
@@ -74,13 +90,26 @@ impl AStar {
         self.n_expanded
     }
 
-    /// The cheapest path from `start` to the first node for which `is_goal` holds; none when there is none.
+    /// [`AStar::cheapest_path_within`] no limits.
+    pub fn cheapest_path(
+        &mut self,
+        start: usize,
+        is_goal: impl FnMut(usize) -> bool,
+        neighbours: impl FnMut(usize, &mut Vec<(usize, f64)>),
+        heuristic: impl FnMut(usize) -> f64,
+    ) -> Option<CheapestPath> {
+        self.cheapest_path_within(Limits::NONE, start, is_goal, neighbours, heuristic)
+    }
+
+    /// The cheapest path from `start` to the first node for which `is_goal` holds; none when there is none, or none within
+    /// the limits.
     ///
     /// `neighbours` appends `(node, cost of the edge)` with costs of zero or more; an infinite cost is no edge.
     /// `heuristic` must never exceed the cost of the rest of the way; zero makes it Dijkstra's algorithm. Nodes may be any
     /// indices; memory grows with the largest one seen. Equal costs are decided by the smaller index.
-    pub fn cheapest_path(
+    pub fn cheapest_path_within(
         &mut self,
+        limits: Limits,
         start: usize,
         mut is_goal: impl FnMut(usize) -> bool,
         mut neighbours: impl FnMut(usize, &mut Vec<(usize, f64)>),
@@ -94,8 +123,14 @@ impl AStar {
             if open.cost > self.marks[open.node].cost {
                 continue;
             }
+            if open.estimate >= limits.cost {
+                return None;
+            }
             if is_goal(open.node) {
                 return Some(CheapestPath { nodes: self.way_to(open.node, start), cost: open.cost });
+            }
+            if self.n_expanded >= limits.n_expanded {
+                return None;
             }
             self.n_expanded += 1;
             let mut edges = std::mem::take(&mut self.edges);

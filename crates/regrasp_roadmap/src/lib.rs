@@ -18,7 +18,7 @@ pub mod space;
 /// A roadmap that keeps only samples that see nothing known or join what was apart.
 pub mod visibility_prm;
 
-pub use astar::{AStar, CheapestPath, cheapest_path};
+pub use astar::{AStar, CheapestPath, Limits, cheapest_path};
 pub use components::Components;
 pub use rrt_connect::{RrtConnect, RrtSettings};
 pub use smoothing::{shorten_path, shorten_polyline};

@@ -11,7 +11,9 @@ use regrasp::base::files;
 use regrasp_bench::at_once::in_order;
 use regrasp_bench::row::Judge;
 use regrasp_bench::suite::is_suite;
-use regrasp_bench::{Limits, Problem, Row, RunSettings, csv, limits, page, run as run_one, summarise, summary};
+use regrasp_bench::{
+    Limits, Problem, Row, RunSettings, csv, improvement, limits, page, run as run_one, summarise, summary,
+};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -29,20 +31,24 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
         };
         return suite::run(path, arguments, common, talk);
     }
+    let planner = load::settings(&arguments.search, arguments.threads)?;
+    let improves = planner.improve_work > 0;
     let cancelled = interrupt::flag()?;
     let mut writer = match &arguments.csv {
         Some(path) => {
             make_folder_of(path)?;
             refuse_unwritable(path)?;
             refuse_input(path, arguments.scenes.iter().map(PathBuf::as_path))?;
-            Some(csv::Writer::create(path).map_err(|error| Stop::unwritable(path, &error))?)
+            let header = if improves { improvement::header() } else { csv::header() };
+            Some(csv::Writer::with_text(path, header).map_err(|error| Stop::unwritable(path, &error))?)
         }
         None => None,
     };
     let settings = RunSettings {
-        planner: load::settings(&arguments.search, arguments.threads)?,
+        planner,
         max_work: arguments.search.max_work,
         time_limit: arguments.search.time_limit,
+        improve_for: arguments.search.improve,
         judge: if arguments.no_check { Judge::Skip } else { Judge::Checker },
         cancelled: Arc::clone(&cancelled),
     };
@@ -61,7 +67,8 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
             }
             say_row(&row, talk);
             if let (Some(writer), Some(path)) = (&mut writer, &arguments.csv) {
-                writer.push(&row).map_err(|error| Stop::unwritable(path, &error))?;
+                let line = if improves { improvement::line(&row) } else { csv::line(&row) };
+                writer.push_line(&line).map_err(|error| Stop::unwritable(path, &error))?;
             }
             rows.push(row);
             Ok(())
@@ -74,7 +81,11 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
     for summary in &summaries {
         talk.event("summary", json!(summary));
     }
-    if talk.is_json() { Ok(()) } else { talk.data(&summary::table(&summaries)) }
+    if talk.is_json() {
+        return Ok(());
+    }
+    talk.data(&summary::table(&summaries))?;
+    if improves { talk.data(&improvement::table(&rows)) } else { Ok(()) }
 }
 
 /// Seeds per scene where none are given.
@@ -103,6 +114,8 @@ fn write_page(path: &Path, inputs: &[PathBuf], limits: Option<&Path>, talk: &Tal
     for file in inputs {
         if is_suite(file) {
             sections.push(suite::section(file, path)?);
+        } else if improvement::is_improvement(file)? {
+            sections.push(improvement::section(&file.to_string_lossy(), &improvement::read(file)?));
         } else {
             parts.push((file.to_string_lossy().into_owned(), csv::read(file)?));
         }

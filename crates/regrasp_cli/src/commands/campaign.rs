@@ -45,7 +45,12 @@ fn determinism(
     talk: &Talk,
 ) -> Result<(), Stop> {
     let settings = load::settings(search, 1)?;
-    let budget = Budget { max_work: search.max_work, deadline: None, cancelled: Arc::clone(cancelled) };
+    let budget = Budget {
+        max_work: search.max_work,
+        deadline: None,
+        improve_for: search.improve,
+        cancelled: Arc::clone(cancelled),
+    };
     let (mut n_same, mut n_solved) = (0, 0);
     for i in 0..queries {
         let LoadedScene { scene, task, .. } = &scenes[(i % scenes.len() as u64) as usize];
@@ -92,7 +97,12 @@ fn mutations(
         let seed = i / scenes.len() as u64;
         let query = task.query(seed);
         let deadline = search.time_limit.map(|limit| Instant::now() + limit);
-        let budget = Budget { max_work: search.max_work, deadline, cancelled: Arc::clone(cancelled) };
+        let budget = Budget {
+            max_work: search.max_work,
+            deadline,
+            improve_for: search.improve,
+            cancelled: Arc::clone(cancelled),
+        };
         match plan_in_hand(scene, &query, &settings, seed, &budget, &|_| {}) {
             Ok(plan) => campaign.add(Problem { scene, query: &query, seed }, &plan, mutants),
             Err(_) => unsolved += 1,

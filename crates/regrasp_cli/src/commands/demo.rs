@@ -38,7 +38,7 @@ pub fn run(arguments: &args::Demo, common: &Common, talk: &Talk) -> Result<(), S
     let query = loaded.task.query(arguments.seed);
     let settings = InHandSettings { n_threads: available_threads(), ..InHandSettings::default() };
     say_query(&query, arguments.seed, settings.n_threads, talk);
-    let limits = Limits { max_work: MAX_WORK, time_limit: None, cancelled };
+    let limits = Limits { max_work: MAX_WORK, time_limit: None, improve_for: None, cancelled };
     let plan = search(&loaded.scene, &query, &settings, arguments.seed, &limits, talk)?;
     let bytes = format::to_json(&plan);
     let (plan_path, chart_path) = (folder.join("plan.json"), folder.join("gait.svg"));

@@ -35,7 +35,12 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
     let settings = load::settings(&arguments.search, n_threads)?;
     say_query(&query, arguments.seed, n_threads, talk);
 
-    let limits = Limits { max_work: arguments.search.max_work, time_limit: arguments.search.time_limit, cancelled };
+    let limits = Limits {
+        max_work: arguments.search.max_work,
+        time_limit: arguments.search.time_limit,
+        improve_for: arguments.search.improve,
+        cancelled,
+    };
     let plan = search(&loaded.scene, &query, &settings, arguments.seed, &limits, talk)?;
     judge_and_write(&plan, arguments.output.as_deref(), &arguments.scene, common, talk)
 }
@@ -77,6 +82,8 @@ pub struct Limits {
     pub max_work: u64,
     /// Wall-clock time.
     pub time_limit: Option<Duration>,
+    /// Wall-clock time for a better plan after the first.
+    pub improve_for: Option<Duration>,
     /// Set by Ctrl-C.
     pub cancelled: Arc<AtomicBool>,
 }
@@ -146,6 +153,7 @@ pub fn search(
     let budget = Budget {
         max_work: limits.max_work,
         deadline: limits.time_limit.map(|limit| started + limit),
+        improve_for: limits.improve_for,
         cancelled: Arc::clone(&limits.cancelled),
     };
     let report = |progress| lines.report(progress);
@@ -170,6 +178,22 @@ pub fn say_plan(plan: &Plan, seconds: f64, talk: &Talk) {
         if plan.statistics.cut_by_time { ", cut by the time limit" } else { "" },
         duration(seconds),
     ));
+    if let Some(improvement) = &plan.statistics.improvement {
+        let (first, improved) = (&improvement.first, &improvement.improved);
+        talk.say(format!(
+            "better {} instead of {}, object path {:.0} mm instead of {:.0}, joint path {:.1} rad instead of {:.1}, cost \
+             {:.2} instead of {:.2} in {}",
+            counted(improved.relocations as usize, "relocation"),
+            first.relocations,
+            1e3 * improved.object_path,
+            1e3 * first.object_path,
+            improved.joint_path,
+            first.joint_path,
+            improved.cost,
+            first.cost,
+            counted(improvement.rounds as usize, "round"),
+        ));
+    }
     talk.event(
         "plan",
         json!({ "seconds": seconds, "statistics": plan.statistics, "kept_margin": plan.promises.kept_margin }),

@@ -222,6 +222,7 @@ fn run_bench(arguments: &args::RoadmapBench, common: &Common, talk: &Talk) -> Re
         max_work: 20_000_000,
         time_limit: None,
         judge: if arguments.no_check { Judge::Skip } else { Judge::Checker },
+        improve_for: None,
         cancelled: Arc::clone(&cancelled),
     };
     let mut memory = QueryMemory::default();

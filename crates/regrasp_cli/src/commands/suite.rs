@@ -129,6 +129,7 @@ fn measure(
         max_work: job.max_work,
         time_limit: job.time_limit_s.map(Duration::from_secs_f64),
         judge: Judge::Checker,
+        improve_for: None,
         cancelled: Arc::clone(cancelled),
     };
     let missing: Vec<usize> = (0..part.done.len()).filter(|&seed| part.done[seed].is_none()).collect();

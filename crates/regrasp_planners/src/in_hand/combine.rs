@@ -18,6 +18,8 @@ pub struct ClosureTable<'a> {
     model: &'a Model<'a>,
     options: &'a [Vec<Candidate>],
     n_options: usize,
+    /// Margin from which on a set is closed.
+    enough: f64,
     /// Which sets of fingers are looked at.
     sets: Sets,
     /// Margin of a triple of (finger, option), NaN where not asked for yet.
@@ -61,8 +63,13 @@ enum Sets {
 }
 
 impl<'a> ClosureTable<'a> {
-    /// An empty table over `options[finger]`.
+    /// An empty table over `options[finger]`, for the margin of the settings.
     pub fn new(model: &'a Model<'a>, options: &'a [Vec<Candidate>]) -> Self {
+        ClosureTable::with_margin(model, options, model.settings.closure_margin)
+    }
+
+    /// An empty table over `options[finger]`; closed is what has the margin `enough`.
+    pub fn with_margin(model: &'a Model<'a>, options: &'a [Vec<Candidate>], enough: f64) -> Self {
         let n_options = options.iter().map(Vec::len).max().unwrap_or(0);
         let n = options.len();
         let are_points = model.fingers.iter().all(|finger| finger.contact == ContactModel::Point);
@@ -71,6 +78,7 @@ impl<'a> ClosureTable<'a> {
             model,
             options,
             n_options,
+            enough,
             sets: if are_points && n <= 4 { Sets::Triples } else { Sets::All },
             triples: vec![f64::NAN; (n * n_options).pow(3)],
             pairs: vec![f64::NAN; if has_soft { (n * n_options).pow(2) } else { 0 }],
@@ -124,7 +132,7 @@ impl<'a> ClosureTable<'a> {
             fingers.iter().map(|&f| self.model.grip(f, &self.contact(f, choice))).collect();
         let models: ArrayVec<ContactModel, MAX_FINGERS> = grips.iter().map(|grip| grip.model).collect();
         match closure::may_close(&models, self.model.frame.friction) {
-            true => closure::general::prove(&grips, &self.model.frame, self.model.settings.closure_margin).margin(),
+            true => closure::general::prove(&grips, &self.model.frame, self.enough).margin(),
             false => 0.0,
         }
     }
@@ -133,7 +141,7 @@ impl<'a> ClosureTable<'a> {
     /// or the largest.
     pub fn margin(&mut self, choice: &Choice, among: u32) -> f64 {
         let holding = among & self.holding(choice);
-        let enough = self.model.settings.closure_margin;
+        let enough = self.enough;
         let fingers: ArrayVec<usize, MAX_FINGERS> =
             (0..self.options.len()).filter(|&f| holding & (1 << f) != 0).collect();
         let n = fingers.len();
@@ -179,13 +187,13 @@ impl<'a> ClosureTable<'a> {
 
     /// True when those of the fingers of `among` whose options are contacts keep the required margin.
     pub fn is_closed(&mut self, choice: &Choice, among: u32) -> bool {
-        self.margin(choice, among) >= self.model.settings.closure_margin
+        self.margin(choice, among) >= self.enough
     }
 
     /// Number of fingers that the others would let go, or that are free, in a choice that is closed.
     pub fn n_releasable(&mut self, choice: &Choice) -> usize {
         let n = self.options.len();
-        let (holding, enough) = (self.holding(choice), self.model.settings.closure_margin);
+        let (holding, enough) = (self.holding(choice), self.enough);
         let mut n_releasable = 0;
         for finger in 0..n {
             if holding & (1 << finger) == 0 {

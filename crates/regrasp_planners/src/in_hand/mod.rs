@@ -11,6 +11,8 @@ mod classic;
 mod combine;
 /// Joining components of a roadmap.
 mod connect;
+/// What plans cost.
+mod cost;
 /// Paths in GS_n cut into transfers and regrasps.
 mod decompose;
 /// Start and goal as the query gives them.
@@ -25,6 +27,8 @@ mod gait;
 mod grasp_path;
 /// Grasps at a given object pose.
 mod grasps;
+/// Better plans after the first.
+mod improve;
 /// Legs of a query, from way pose to way pose.
 mod legs;
 /// Links between grasps.
@@ -68,7 +72,7 @@ mod visibility;
 /// Configurations and continuous collision tests.
 mod workspace;
 
-pub use settings::{Alpha, InHandSettings, Method, ReleaseRule};
+pub use settings::{Alpha, CostWeights, InHandSettings, Method, ReleaseRule};
 pub use validate::{NotProven, validate_once};
 
 use crate::failure::Failure;
@@ -76,12 +80,14 @@ use attempts::{Left, run_attempts};
 use endpoints::{
     End, given_grasp, refuse_after_transfers, refuse_buried_object, refuse_holding_nothing, refuse_impossible,
 };
-use legs::{Legs, plan_legs};
+use legs::{Legs, Solution, plan_legs};
 use model::Model;
 use regrasp_base::{Budget, Interrupt, Rng};
 use regrasp_plan::Plan;
+use regrasp_plan::plan::Statistics;
 use regrasp_scene::{InHandQuery, Scene};
 use search::Search;
+use std::sync::atomic::AtomicUsize;
 
 /// What a running search tells its caller.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -113,7 +119,8 @@ pub fn plan_in_hand(
     let poses = query.poses();
     let (start_pose, goal_pose) = (query.world_from_object_start, query.world_from_object_goal);
     refuse_holding_nothing(&model)?;
-    if settings.method != Method::Gait {
+    let may_try_transfers = model.n_fingers() == 2 || settings.transfers_alone;
+    if settings.method != Method::Gait || !may_try_transfers {
         refuse_impossible(&model)?;
     }
     refuse_buried_object(&model, End::Start, &start_pose)?;
@@ -140,7 +147,9 @@ pub fn plan_in_hand(
     });
     match found {
         Ok((solution, left, n_restarts)) => {
-            Ok(record::record(&model, query, seed, &solution, left.statistics(n_restarts)))
+            let statistics = left.statistics(n_restarts);
+            let (solution, statistics) = improved(&model, &legs, seed, budget, (solution, statistics), progress);
+            Ok(record::record(&model, query, seed, &solution, statistics))
         }
         Err((interrupt, left, n_attempts)) => {
             let failure = left.failure(&model, &poses, interrupt, n_attempts);
@@ -152,6 +161,32 @@ pub fn plan_in_hand(
 
 /// Work after which a hand that cannot change its grasp is refused: some thousand grasps and transfers. By hand.
 const TRANSFERS_WORK: u64 = 40_000;
+
+/// A solution after the improvement that the settings ask for, and the statistics with it.
+fn improved(
+    model: &Model,
+    legs: &Legs,
+    seed: u64,
+    budget: &Budget,
+    (solution, mut statistics): (Solution, Statistics),
+    progress: &(dyn Fn(Progress) + Sync),
+) -> (Solution, Statistics) {
+    let work = model.settings.improve_work.min(budget.max_work.saturating_sub(statistics.work));
+    if model.settings.improve_work == 0 {
+        return (solution, statistics);
+    }
+    let budget = budget.of_improvement();
+    let ends = (legs.poses[0], legs.poses[legs.n_legs()]);
+    let winner = AtomicUsize::new(usize::MAX);
+    let mut search = Search::new(model, ends, (seed, 0), (&budget, work), &winner, progress);
+    search.rng = Rng::keyed(seed, "improvement", 0);
+    let (solution, improvement) = improve::improve(&mut search, legs, solution);
+    statistics.work += improvement.work;
+    statistics.samples += search.n_samples;
+    statistics.cut_by_time |= search.cut_by_time;
+    statistics.improvement = Some(Box::new(improvement));
+    (solution, statistics)
+}
 
 /// The settings that a method really plans with: those of paper 000 have the paper's release rule (section 4.2.2).
 fn effective(settings: &InHandSettings) -> InHandSettings {

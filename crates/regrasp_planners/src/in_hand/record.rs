@@ -2,7 +2,7 @@
 
 use super::legs::Solution;
 use super::model::Model;
-use super::state::Motion;
+use super::state::{Motion, Sequence};
 use super::workspace::{Contacts, HandJoints};
 use regrasp_geometry::Pose;
 use regrasp_plan::plan::{
@@ -20,14 +20,12 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution
     let Solution { way, steps_to_way } = solution;
     let start = way.start();
     let mut segments = Vec::with_capacity(way.steps().len());
-    let mut kept_margin = model.closure_margin(&start.contacts, start.holding);
     let mut state = start;
     for step in way.steps() {
         match step.motion() {
             Motion::Transfer(moments) => {
                 statistics.transfers += 1;
                 statistics.transfers_with_free_fingers += u64::from(!state.is_held_by_all());
-                kept_margin = kept_margin.min(model.closure_margin(&state.contacts, state.holding));
                 let held = |pose: &Pose, joints: &HandJoints| waypoint(pose, joints, &state.contacts, state.holding);
                 let mut waypoints = vec![held(&state.world_from_object, &state.joints)];
                 waypoints.extend(moments.iter().map(|m| held(&m.world_from_object, &m.joints)));
@@ -37,7 +35,6 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution
                 let end = step.end();
                 statistics.relocations += u64::from(end.holds(*finger));
                 let holding = state.holding & !(1 << finger);
-                kept_margin = kept_margin.min(model.closure_margin(&state.contacts, holding));
                 let pose = &state.world_from_object;
                 let mut waypoints = vec![waypoint(pose, &state.joints, &state.contacts, state.holding)];
                 let mut joints = state.joints.clone();
@@ -53,7 +50,6 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution
         }
         state = step.end();
     }
-    kept_margin = kept_margin.min(model.closure_margin(&state.contacts, state.holding));
     if segments.is_empty() {
         // Start and goal are the same and any grasp will do: hold still.
         let here = waypoint(&start.world_from_object, &start.joints, &start.contacts, start.holding);
@@ -80,7 +76,7 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution
             contact_tolerance: CONTACT_TOLERANCE,
             friction: model.frame.friction,
             required_margin: model.settings.closure_margin,
-            kept_margin,
+            kept_margin: kept_margin(model, way),
             torque_scale: model.frame.torque_scale,
         },
         joint_names: scene.hand.joint_names(),
@@ -91,6 +87,20 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution
         segments,
         statistics,
     }
+}
+
+/// The smallest closure margin of the fingers that hold, at any moment: that is what a plan promises.
+pub fn kept_margin(model: &Model, way: &Sequence) -> f64 {
+    let mut kept = model.closure_margin(&way.end().contacts, way.end().holding);
+    for (index, step) in way.steps().iter().enumerate() {
+        let before = way.state_before(index);
+        let holding = match step.motion() {
+            Motion::Transfer(_) => before.holding,
+            Motion::Regrasp { finger, .. } => before.holding & !(1 << finger),
+        };
+        kept = kept.min(model.closure_margin(&before.contacts, holding));
+    }
+    kept
 }
 
 /// Each way pose with the last waypoint of the leg that leads to it; every step is a segment.

@@ -25,9 +25,13 @@ fn scene(name: &str) -> LoadedScene {
 
 /// Runs `test` on a search of the bundled scene `name`.
 pub(super) fn with_search(name: &str, test: impl FnOnce(&mut Search)) {
+    with_settings(name, &InHandSettings { method: Method::Visibility, ..InHandSettings::default() }, test);
+}
+
+/// The same with other settings.
+pub(super) fn with_settings(name: &str, settings: &InHandSettings, test: impl FnOnce(&mut Search)) {
     let loaded = scene(name);
-    let settings = InHandSettings { method: Method::Visibility, ..InHandSettings::default() };
-    let model = Model::new(&loaded.scene, &super::effective(&settings));
+    let model = Model::new(&loaded.scene, &super::effective(settings));
     let query = loaded.task.query(0);
     let poses = (query.world_from_object_start, query.world_from_object_goal);
     let (budget, winner) = (Budget::unlimited(), AtomicUsize::new(usize::MAX));

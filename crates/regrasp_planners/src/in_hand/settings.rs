@@ -95,6 +95,43 @@ pub enum ReleaseRule {
     EverywhereEveryFinger,
 }
 
+/// What a plan costs: a weighted sum, of which improvement looks for less. Weights are at least 0.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CostWeights {
+    /// Of one relocation.
+    pub relocation: f64,
+    /// Of a metre that the object goes; angles count with the object's radius.
+    pub object_path: f64,
+    /// Of a radian, or metre, that a joint goes, all joints together.
+    pub joint_path: f64,
+    /// Of a closure margin as small as the one asked for; one of twice that costs half.
+    pub margin: f64,
+}
+
+impl Default for CostWeights {
+    /// Relocations first: by hand, so that in the plans of the bundled scenes all the rest together costs about as much as
+    /// one of them.
+    fn default() -> Self {
+        CostWeights { relocation: 1.0, object_path: 1.0, joint_path: 0.01, margin: 0.2 }
+    }
+}
+
+impl CostWeights {
+    fn validate(&self) -> Result<(), String> {
+        let CostWeights { relocation, object_path, joint_path, margin } = *self;
+        let weights =
+            [("relocation", relocation), ("object_path", object_path), ("joint_path", joint_path), ("margin", margin)];
+        match weights.iter().find(|(_, weight)| !(*weight >= 0.0 && *weight <= MAX_WEIGHT)) {
+            Some((name, weight)) => Err(format!("cost.{name} is {weight}; it must be between 0 and {MAX_WEIGHT}")),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Largest weight of a cost: sums stay exact enough.
+const MAX_WEIGHT: f64 = 1e6;
+
 /// Settings of [`super::plan_in_hand`]. Lengths in metres, angles in radians.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -147,6 +184,9 @@ pub struct InHandSettings {
     /// Least number of fingers that hold while the object moves, where they are closed; the others may be free meanwhile (paths
     /// through GS_k, paper 000, section 3.2). With the number of fingers, or more, all hold.
     pub least_holding: usize,
+    /// True when a hand of three or more fingers that can never change its grasp, such as three hard fingers, is to try with
+    /// transfers alone; it is refused at once otherwise. Two fingers always try.
+    pub transfers_alone: bool,
     /// Extensions tried at a pose before one of them may leave fingers free that hold.
     pub free_after: u32,
     /// Share of the extensions after that which may.
@@ -156,6 +196,10 @@ pub struct InHandSettings {
     pub restart_work: u64,
     /// Random shortcuts tried on the plan found (in-hand-notes, 3).
     pub shortcuts: usize,
+    /// Work spent on a better plan after the first one: units of the work budget; 0 for none.
+    pub improve_work: u64,
+    /// What makes a plan better.
+    pub cost: CostWeights,
     /// Schedule of alpha, for the methods of paper 000.
     pub alpha: Alpha,
     /// Share of the poses that the methods of paper 000 draw around the way from start to goal. The others are turned
@@ -187,10 +231,13 @@ impl Default for InHandSettings {
             candidates: 6,
             candidates_kept: 3,
             least_holding: 2,
+            transfers_alone: false,
             free_after: 3,
             free_share: 0.5,
             restart_work: 300_000,
             shortcuts: 8,
+            improve_work: 0,
+            cost: CostWeights::default(),
             alpha: Alpha::Constant { value: 0.9 },
             guided_share: 0.9,
         }
@@ -232,6 +279,7 @@ impl InHandSettings {
         if self.lift_heights.is_empty() || self.lift_heights.iter().any(|h| !(*h > 0.0 && *h < 0.2)) {
             return Err("lift_heights must be a list of heights between 0 and 0.2 m".into());
         }
+        self.cost.validate()?;
         self.alpha.validate()
     }
 }

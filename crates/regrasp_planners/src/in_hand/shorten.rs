@@ -13,10 +13,10 @@ use regrasp_geometry::Pose;
 use regrasp_geometry::collision::Placement;
 
 /// Joints nearer than this differ by what solvers leave: they are set on each other, in radians or metres.
-const SAME_POSTURE: f64 = 1e-6;
+pub const SAME_POSTURE: f64 = 1e-6;
 
 /// Fraction of the usual iterations of RRT-Connect for relocations that others can stand in for.
-const CASUAL: usize = 8;
+pub const CASUAL: usize = 8;
 
 /// What is asked of the end of a sequence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -102,22 +102,37 @@ const MAX_HALVINGS: usize = 4;
 /// Share of the contact tolerance that a tip may stray half-way; the rest is for what lies between.
 const HALFWAY_SHARE: f64 = 0.7;
 
-/// True when every tip that holds stays on its contact while the joints move linearly: half-way, where they stray most.
+/// True when every tip that holds stays on its contact while the joints move linearly.
 fn tips_stay(model: &Model, state: &GraspState, from: &Moment, to: &Moment) -> bool {
-    let allowed = HALFWAY_SHARE * CONTACT_TOLERANCE;
     let mut half: Option<Placement> = None;
-    (0..model.n_fingers()).filter(|&f| state.holds(f)).all(|f| {
-        let finger = &model.fingers[f];
-        let change: Coordinates = from.joints[f].iter().zip(&to.joints[f]).map(|(a, b)| b - a).collect();
-        // What the joints' bound proves needs no look; the object strays as little as the shortest step of a finger.
-        if finger.tip_bound.chord_deviation(&change) < 0.5 * allowed {
-            return true;
-        }
-        let world_from_object = half.get_or_insert_with(|| {
+    let mut halfway = || {
+        *half.get_or_insert_with(|| {
             Placement::from(&interpolate_pose(&from.world_from_object, &to.world_from_object, 0.5))
-        });
-        let joints: Coordinates = from.joints[f].iter().zip(&change).map(|(q, dq)| q + 0.5 * dq).collect();
-        let target = tip_target(world_from_object, &state.contacts[f], finger.tip_radius);
-        (finger.ik.tip(&joints) - target).norm() <= allowed
-    })
+        })
+    };
+    (0..model.n_fingers())
+        .filter(|&f| state.holds(f))
+        .all(|f| tip_stays(model, f, &state.contacts[f], &from.joints[f], &to.joints[f], &mut halfway))
+}
+
+/// True when the tip of `finger` stays on its contact while its joints move linearly: half-way, where it strays most.
+/// `halfway` places the object there.
+pub fn tip_stays(
+    model: &Model,
+    finger: usize,
+    contact: &Contact,
+    from: &Coordinates,
+    to: &Coordinates,
+    mut halfway: impl FnMut() -> Placement,
+) -> bool {
+    let allowed = HALFWAY_SHARE * CONTACT_TOLERANCE;
+    let finger = &model.fingers[finger];
+    let change: Coordinates = from.iter().zip(to).map(|(a, b)| b - a).collect();
+    // What the joints' bound proves needs no look; the object strays as little as the shortest step of a finger.
+    if finger.tip_bound.chord_deviation(&change) < 0.5 * allowed {
+        return true;
+    }
+    let joints: Coordinates = from.iter().zip(&change).map(|(q, dq)| q + 0.5 * dq).collect();
+    let target = tip_target(&halfway(), contact, finger.tip_radius);
+    (finger.ik.tip(&joints) - target).norm() <= allowed
 }

@@ -1,6 +1,7 @@
 //! Tests of the planners through their public functions, on the bundled scenes.
 
 mod free_fingers;
+mod improvement;
 mod in_hand_methods;
 #[path = "../../../../tests/support/places.rs"]
 mod places;

@@ -20,6 +20,11 @@ fn arguments_that_make_no_sense() {
         (["--time-limit", "0"], "seconds"),
         (["--time-limit", "-3"], "seconds"),
         (["--time-limit", "inf"], "seconds"),
+        (["--improve", "0"], "seconds"),
+        (["--improve", "-1"], "seconds"),
+        (["--improve", "NaN"], "seconds"),
+        (["--improve-work", "1.5"], "whole number"),
+        (["--improve-work", "-1"], "whole number"),
         (["--margin", "1.5"], "[0, 1)"),
         (["--method", "clasic"], "classic"),
         (["--package", "allegro"], "NAME=DIR"),
@@ -29,6 +34,22 @@ fn arguments_that_make_no_sense() {
         let run = folder.run(&["plan", "scene.toml", &joined]);
         assert_eq!(run.code, Some(2), "{run:?}");
         assert!(run.err.contains(says) && run.err.contains(arguments[1]), "{}", run.err);
+    }
+}
+
+#[test]
+fn weights_of_a_cost_that_make_no_sense() {
+    let folder = Folder::new();
+    for (settings, says) in [
+        ("{ \"cost\": { \"relocation\": -1.0 } }", "cost.relocation is -1"),
+        ("{ \"cost\": { \"margin\": 1e300 } }", "cost.margin is"),
+        ("{ \"cost\": { \"relocations\": 1.0 } }", "relocations"),
+        ("{ \"improve_work\": -1 }", "-1"),
+    ] {
+        folder.write("settings.json", settings);
+        let run = folder.run(&["plan", "scene.toml", "--settings", "settings.json"]);
+        assert_eq!(run.code, Some(2), "{run:?}");
+        assert!(run.err.contains(says) && run.err.contains("settings.json"), "{}", run.err);
     }
 }
 
