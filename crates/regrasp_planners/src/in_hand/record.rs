@@ -1,7 +1,7 @@
 //! The plan as it is written to a file.
 
 use super::legs::Solution;
-use super::model::Model;
+use super::model::{MAX_FINGERS, Model};
 use super::state::Motion;
 use super::workspace::{Contacts, HandJoints};
 use regrasp_geometry::Pose;
@@ -27,7 +27,8 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution
             Motion::Transfer(moments) => {
                 statistics.transfers += 1;
                 kept_margin = kept_margin.min(model.closure_margin(&state.contacts, model.all_fingers()));
-                let mut waypoints = vec![waypoint(&state.world_from_object, &state.joints, &state.contacts, None)];
+                let mut waypoints = Vec::with_capacity(1 + moments.len());
+                waypoints.push(waypoint(&state.world_from_object, &state.joints, &state.contacts, None));
                 waypoints
                     .extend(moments.iter().map(|m| waypoint(&m.world_from_object, &m.joints, &state.contacts, None)));
                 segments.push(Segment { kind: SegmentKind::Transfer, moving_finger: None, waypoints });
@@ -36,7 +37,8 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution
                 statistics.relocations += 1;
                 let holding = model.all_fingers() & !(1 << finger);
                 kept_margin = kept_margin.min(model.closure_margin(&state.contacts, holding));
-                let mut waypoints = vec![waypoint(&state.world_from_object, &state.joints, &state.contacts, None)];
+                let mut waypoints = Vec::with_capacity(1 + path.len());
+                waypoints.push(waypoint(&state.world_from_object, &state.joints, &state.contacts, None));
                 let mut joints = state.joints.clone();
                 for (k, at) in path.iter().enumerate() {
                     joints[*finger].clone_from(at);
@@ -105,7 +107,7 @@ fn way_poses(query: &InHandQuery, segments: &[Segment], steps_to_way: &[usize]) 
 
 fn waypoint(pose: &Pose, joints: &HandJoints, contacts: &Contacts, free: Option<usize>) -> Waypoint {
     Waypoint {
-        joints: joints.iter().flatten().copied().collect(),
+        joints: joints.iter().map(|own| &own[..]).collect::<arrayvec::ArrayVec<_, MAX_FINGERS>>().concat(),
         world_from_object: PoseData::from(pose),
         contacts: contacts
             .iter()
