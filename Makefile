@@ -16,10 +16,10 @@ ALLEGRO_REQUIRED := $(addprefix scenes/allegro/,$(addsuffix .toml,sphere32_x sph
 ALLEGRO_STRETCH := $(addprefix scenes/allegro/,$(addsuffix .toml,box_x box_z cube45_x cylinder20_z))
 ALLEGRO_MESHES := $(addprefix scenes/allegro/,$(addsuffix .toml,rubiks_x rubiks_z apple_x apple_z can_y))
 SOFT_AND_COUPLED := scenes/dclaw/soft_sphere32_x.toml scenes/trifinger/soft_cylinder20_z.toml scenes/shadow/sphere32_z.toml
-# Sections of docs/benchmarks.md, in this order; those without a CSV file are left out.
-BENCHMARKS := wide visibility classic allegro_required allegro_stretch allegro_meshes $(ROADMAPS)
 # Roadmaps that are built and asked: sphere, box, and the box with more than a million motions.
 ROADMAPS := roadmap_sphere roadmap_box roadmap_million
+# Sections of docs/benchmarks.md, in this order; those without a CSV file are left out.
+BENCHMARKS := wide visibility classic allegro_required allegro_stretch allegro_meshes $(ROADMAPS)
 QUERIES ?= 1000
 ROADMAP_BENCH = --queries $(QUERIES) --csv docs/benchmarks/$@.csv --graph docs/benchmarks/$@.json
 SEEDS ?= 200

@@ -3,7 +3,7 @@
 use crate::page::escaped;
 use crate::row::{Problem, Row, RunSettings, measure, status_of};
 use crate::summary::{Spread, ms};
-use cpu_time::ProcessTime;
+use cpu_time::{ProcessTime, ThreadTime};
 use regrasp_base::{Budget, Diagnostic, InputError, Place, files};
 use regrasp_planners::in_hand::roadmap::{GraspRoadmap, QueryMemory, RoadmapPlanner};
 use serde::{Deserialize, Serialize};
@@ -16,7 +16,7 @@ use std::time::Instant;
 pub fn run(planner: &RoadmapPlanner, problem: Problem, settings: &RunSettings, memory: &mut QueryMemory) -> Row {
     let mut row =
         Row { scene: problem.scene.name.clone(), method: "roadmap".into(), seed: problem.seed, ..Row::default() };
-    let started = (Instant::now(), ProcessTime::now());
+    let started = (Instant::now(), ThreadTime::now());
     let budget = Budget {
         max_work: settings.max_work,
         deadline: settings.time_limit.map(|limit| started.0 + limit),

@@ -32,8 +32,9 @@ fn ask(folder: &Folder, more: &[&str]) -> (Run, u64) {
     let run = folder.run(&arguments);
     assert_eq!(run.code, Some(0), "{run:?}");
     let events = run.out.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
-    let work = events.filter(|event| event["event"] == "plan").map(|plan| plan["statistics"]["work"].as_u64().unwrap());
-    let work = work.last().expect("a plan");
+    let mut work =
+        events.filter(|event| event["event"] == "plan").map(|plan| plan["statistics"]["work"].as_u64().unwrap());
+    let work = work.next_back().expect("a plan");
     (run, work)
 }
 
