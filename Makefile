@@ -17,15 +17,19 @@ ALLEGRO_REQUIRED := $(addprefix scenes/allegro/,$(addsuffix .toml,sphere32_x sph
 ALLEGRO_STRETCH := $(addprefix scenes/allegro/,$(addsuffix .toml,box_x box_z cube45_x cylinder20_z))
 ALLEGRO_MESHES := $(addprefix scenes/allegro/,$(addsuffix .toml,rubiks_x rubiks_z apple_x apple_z can_y))
 SOFT_AND_COUPLED := scenes/dclaw/soft_sphere32_x.toml scenes/trifinger/soft_cylinder20_z.toml scenes/shadow/sphere32_z.toml
+# Roadmaps that are built and asked: sphere, box, and the box with more than a million motions.
+ROADMAPS := roadmap_sphere roadmap_box roadmap_million
 # Sections of docs/benchmarks.md, in this order; those without a CSV file are left out.
-BENCHMARKS := wide visibility classic improvement allegro_required allegro_stretch allegro_meshes
+BENCHMARKS := wide visibility classic improvement allegro_required allegro_stretch allegro_meshes $(ROADMAPS)
+QUERIES ?= 1000
+ROADMAP_BENCH = --queries $(QUERIES) --csv docs/benchmarks/$@.csv --graph docs/benchmarks/$@.json
 SEEDS ?= 200
 IMPROVEMENT_SEEDS ?= 100
 ALLEGRO_SEEDS ?= 20
 CLASSIC_SEEDS ?= 20
 ALLEGRO_BENCH = $(PACKAGES) --time-limit 20 --threads 1 --seeds $(ALLEGRO_SEEDS)
 
-.PHONY: all demo pictures test bench benchmark-page campaign fuzz docs release
+.PHONY: all demo pictures test bench benchmark-page campaign fuzz docs release $(ROADMAPS)
 
 all: release
 
@@ -52,6 +56,7 @@ bench: release
 	$(REGRASP) bench $(BOXES) --improve 1 --seeds $(IMPROVEMENT_SEEDS) --threads 1 --csv docs/benchmarks/improvement.csv
 	$(REGRASP) bench suites/paper000.toml
 	$(REGRASP) bench suites/paper004.toml
+	$(MAKE) $(ROADMAPS)
 ifneq ($(PACKAGES),)
 	$(REGRASP) bench $(ALLEGRO_REQUIRED) $(ALLEGRO_BENCH) --csv docs/benchmarks/allegro_required.csv
 	$(REGRASP) bench $(ALLEGRO_STRETCH) $(ALLEGRO_BENCH) --csv docs/benchmarks/allegro_stretch.csv
@@ -59,9 +64,20 @@ ifneq ($(PACKAGES),)
 endif
 	$(MAKE) benchmark-page
 
+# Random queries on saved graphs, and the same ones without them; $(OUT) keeps the graphs.
+roadmap_sphere roadmap_box: roadmap_%: release
+	mkdir -p $(OUT)
+	$(REGRASP) roadmap build scenes/$*_90x.toml -o $(OUT)/$@.roadmap
+	$(REGRASP) roadmap bench $(OUT)/$@.roadmap scenes/$*_90x.toml --single $(QUERIES) $(ROADMAP_BENCH)
+
+roadmap_million: release
+	mkdir -p $(OUT)
+	$(REGRASP) roadmap build scenes/box_90x.toml -o $(OUT)/$@.roadmap --places 1700
+	$(REGRASP) roadmap bench $(OUT)/$@.roadmap scenes/box_90x.toml $(ROADMAP_BENCH)
+
 # docs/benchmarks.md again, from what was measured.
 benchmark-page: release
-	$(REGRASP) bench --page docs/benchmarks.md --limits docs/benchmarks/limits.json $(wildcard $(BENCHMARKS:%=docs/benchmarks/%.csv)) suites/*.toml
+	$(REGRASP) bench --page docs/benchmarks.md --limits docs/benchmarks/limits.json $(wildcard $(BENCHMARKS:%=docs/benchmarks/%.csv) $(ROADMAPS:%=docs/benchmarks/%.json)) suites/*.toml
 
 # Slow: same bytes on 1, 2 and 8 threads (100 queries), and the checker against broken and good plans; torsion and couplings
 # are broken in plans for real hands.
@@ -72,7 +88,7 @@ ifneq ($(PACKAGES),)
 	$(REGRASP) campaign mutations $(SOFT_AND_COUPLED) $(PACKAGES) --mutants 100 --good 300
 endif
 
-FUZZ_TARGETS := urdf srdf hand_toml scene_toml stl obj plan_json
+FUZZ_TARGETS := urdf srdf hand_toml scene_toml stl obj plan_json roadmap
 FUZZ_RUNS ?= 1000000
 
 # Needs a nightly toolchain and cargo-fuzz (cargo install cargo-fuzz).

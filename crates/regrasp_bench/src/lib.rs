@@ -16,7 +16,7 @@ pub mod limits;
 pub mod mutations;
 /// `docs/benchmarks.md` from CSV files.
 pub mod page;
-/// Random queries on a roadmap.
+/// Random queries on a roadmap, and what a graph is like.
 pub mod roadmap;
 /// One seed of one scene: plan, judge, measure.
 pub mod row;

@@ -1,6 +1,7 @@
 //! `docs/benchmarks.md` from CSV files. The same files give the same bytes.
 
 use crate::limits::Limits;
+use crate::roadmap::{self, GraphFacts};
 use crate::row::Row;
 use crate::summary::{Summary, ms, summarise};
 use std::fmt::Write;
@@ -9,8 +10,8 @@ use std::fmt::Write;
 const MAX_MISSES: usize = 60;
 
 /// The page. Each part is the name of a CSV file and its rows; parts stand in the order given, the comparison of the
-/// paper's methods after the last part that has a row of either, sections of suites at the end.
-pub fn markdown(parts: &[(String, Vec<Row>)], suites: &[String], limits: &Limits) -> String {
+/// paper's methods after the last part that has a row of either, queries on roadmaps and then sections of suites at the end.
+pub fn markdown(parts: &[(String, Vec<Row>)], graphs: &[GraphFacts], suites: &[String], limits: &Limits) -> String {
     let mut out = String::from(
         "# Benchmarks\n\n\
          Written by `make bench`; never edited by hand. Planning times are processor times of the planner call over the solved\n\
@@ -30,6 +31,7 @@ pub fn markdown(parts: &[(String, Vec<Row>)], suites: &[String], limits: &Limits
             ratios(parts, &mut out);
         }
     }
+    roadmap::section(parts, graphs, &mut out);
     for section in suites {
         out.push('\n');
         out.push_str(section);
@@ -173,7 +175,7 @@ mod tests {
             ("v.csv".into(), vec![row("visibility", "solved", 0.003)]),
             ("w.csv".into(), vec![row("gait", "solved", 0.001)]),
         ];
-        let page = markdown(&parts, &["## A suite\n".into()], &Limits::new());
+        let page = markdown(&parts, &[], &["## A suite\n".into()], &Limits::new());
         assert!(page.ends_with("\n## A suite\n"), "{page}");
         assert!(page.contains("| tight\\|sphere | 300 (1/2) | 3.00 (1/1) | 100 |"), "{page}");
         assert!(page.contains("- tight\\|sphere (classic) seed 0: time_limit; closure &lt;lost>"), "{page}");
@@ -201,7 +203,7 @@ mod tests {
             row("ball", "solved", 0.2, Some(true)),
         ];
         let page =
-            markdown(&[("a.csv".into(), rows)], &[], &Limits::from([("cube".into(), 2.0), ("cone".into(), 1.0)]));
+            markdown(&[("a.csv".into(), rows)], &[], &[], &Limits::from([("cube".into(), 2.0), ("cone".into(), 1.0)]));
         assert!(page.contains("| cube | gait | 4/5 | 2/5 (2 s) |"), "{page}");
         assert!(page.contains("| ball | gait | 1/1 | - |"), "{page}");
     }

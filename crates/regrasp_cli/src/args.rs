@@ -148,7 +148,7 @@ pub struct Check {
 /// `regrasp bench`
 #[derive(Debug, Args)]
 pub struct Bench {
-    /// Scene files, or folders of them; or one suite file; CSV and suite files with --page
+    /// Scene files, or folders of them; or one suite file; with --page CSV files, facts about graphs, and suite files
     #[arg(required = true, value_name = "SCENE")]
     pub scenes: Vec<PathBuf>,
     /// Seeds per scene: 0, 1, ... [default: 20]; of a suite, the most trials per row
@@ -215,7 +215,7 @@ pub struct RoadmapBuild {
     /// Roadmap file
     #[arg(short, long, value_name = "FILE.roadmap")]
     pub output: PathBuf,
-    /// Object poses that the graph is built over [default: 600]
+    /// Object poses that the graph is built over [default: 400]
     #[arg(long, value_parser = count, allow_negative_numbers = true)]
     pub places: Option<u64>,
     /// How far the object may be from start and goal position, along each axis, in metres
@@ -257,6 +257,15 @@ pub struct RoadmapQuery {
     /// Add start and goal to the graph and save it
     #[arg(long)]
     pub grow: bool,
+    /// Make one transfer of those in a row, where that is free: shorter motions, slower answers
+    #[arg(long)]
+    pub smooth: bool,
+    /// Settings of the planner that the plan has to keep; refused where the graph was proven with others
+    #[arg(long, value_name = "FILE.json")]
+    pub settings: Option<PathBuf>,
+    /// Closure margin that the plan has to keep; refused where the graph was proven with another
+    #[arg(long, value_parser = margin, allow_negative_numbers = true)]
+    pub margin: Option<f64>,
     /// Work limit, in configurations looked at: the same on every machine
     #[arg(long, value_name = "N", default_value_t = 1_000_000, value_parser = whole_number, allow_negative_numbers = true)]
     pub max_work: u64,
@@ -278,9 +287,15 @@ pub struct RoadmapBench {
     /// First seed
     #[arg(long, default_value_t = 0, value_parser = whole_number, allow_negative_numbers = true)]
     pub first_seed: u64,
+    /// Make one transfer of those in a row, where that is free: shorter motions, slower answers
+    #[arg(long)]
+    pub smooth: bool,
     /// Write one row per query and method
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
+    /// Write what the graph is like and how long it takes to load
+    #[arg(long, value_name = "FILE.json")]
+    pub graph: Option<PathBuf>,
     /// Do not judge the plans
     #[arg(long)]
     pub no_check: bool,

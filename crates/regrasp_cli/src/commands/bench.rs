@@ -9,6 +9,7 @@ use crate::stop::Stop;
 use crate::talk::Talk;
 use regrasp::base::files;
 use regrasp_bench::at_once::in_order;
+use regrasp_bench::roadmap::GraphFacts;
 use regrasp_bench::row::Judge;
 use regrasp_bench::suite::is_suite;
 use regrasp_bench::{
@@ -104,23 +105,25 @@ pub fn say_row(row: &Row, talk: &Talk) {
     }
 }
 
-/// The page of CSV files and, after them, of suites with what was measured of them.
+/// The page of CSV files, of facts about graphs and, after them, of suites with what was measured of them.
 fn write_page(path: &Path, inputs: &[PathBuf], limits: Option<&Path>, talk: &Talk) -> Result<(), Stop> {
     make_folder_of(path)?;
     refuse_unwritable(path)?;
     refuse_input(path, inputs.iter().map(PathBuf::as_path).chain(limits))?;
     let limits = limits.map_or_else(|| Ok(Limits::new()), limits::read)?;
-    let (mut parts, mut sections) = (Vec::new(), Vec::new());
+    let (mut parts, mut graphs, mut sections) = (Vec::new(), Vec::new(), Vec::new());
     for file in inputs {
         if is_suite(file) {
             sections.push(suite::section(file, path)?);
+        } else if file.extension().is_some_and(|extension| extension == "json") {
+            graphs.push(GraphFacts::read(file)?);
         } else if improvement::is_improvement(file)? {
             sections.push(improvement::section(&file.to_string_lossy(), &improvement::read(file)?));
         } else {
             parts.push((file.to_string_lossy().into_owned(), csv::read(file)?));
         }
     }
-    let text = page::markdown(&parts, &sections, &limits);
+    let text = page::markdown(&parts, &graphs, &sections, &limits);
     files::write_atomic(path, text.as_bytes()).map_err(|error| Stop::unwritable(path, &error))?;
     talk.say(format!("wrote  {}", path.display()));
     Ok(())

@@ -108,10 +108,14 @@ fn run_query(arguments: &args::RoadmapQuery, common: &Common, talk: &Talk) -> Re
     }
     let cancelled = interrupt::flag()?;
     let roadmap = open(&arguments.roadmap, talk)?;
+    refuse_other_settings(&roadmap, arguments)?;
     let loaded = load::scene(&arguments.scene, common, talk)?;
     let query = loaded.task.query(arguments.seed);
     say_query(&query, arguments.seed, 1, talk);
-    let planner = RoadmapPlanner::new(&arguments.roadmap, &roadmap, &loaded.scene)?;
+    let mut planner = RoadmapPlanner::new(&arguments.roadmap, &roadmap, &loaded.scene)?;
+    if arguments.smooth {
+        planner = planner.smoothing();
+    }
     let budget = Budget { cancelled, ..Budget::work(arguments.max_work) };
     let started = Instant::now();
     let answer = match planner.plan(&query, arguments.seed, &budget, &mut QueryMemory::default()) {
@@ -126,6 +130,21 @@ fn run_query(arguments: &args::RoadmapQuery, common: &Common, talk: &Talk) -> Re
         save(&roadmap.grown_by(&answer), &arguments.roadmap, talk)?;
     }
     Ok(())
+}
+
+/// Refuses settings asked for that the roadmap was not built with; what is not asked for is as the roadmap has it.
+fn refuse_other_settings(roadmap: &GraspRoadmap, arguments: &args::RoadmapQuery) -> Result<(), Stop> {
+    if arguments.settings.is_none() && arguments.margin.is_none() {
+        return Ok(());
+    }
+    let mut asked = match arguments.settings.as_deref() {
+        Some(file) => load::planner_settings(Some(file), None, None, 1)?,
+        None => roadmap.about().settings.clone(),
+    };
+    if let Some(margin) = arguments.margin {
+        asked.closure_margin = margin;
+    }
+    Ok(roadmap.refuse_other_settings(&arguments.roadmap, &asked)?)
 }
 
 /// Shows what a roadmap is of and how large.
@@ -156,6 +175,7 @@ fn info_text(path: &Path, bytes: u64, seconds: f64, about: &About, census: &Cens
     let turned =
         if angle >= 180.0 { "any orientation".to_owned() } else { format!("turned by at most {angle:.0} deg") };
     let components: Vec<String> = census.components.iter().take(6).map(|&size| grouped(size as u64)).collect();
+    let contacts: Vec<&str> = identity.contacts.iter().map(|contact| contact.name()).collect();
     let lines = [
         format!("file        {}   {} bytes, loaded in {}", path.display(), grouped(bytes), duration(seconds)),
         format!(
@@ -165,6 +185,7 @@ fn info_text(path: &Path, bytes: u64, seconds: f64, about: &About, census: &Cens
             digits(&identity.hand)
         ),
         format!("object      {}   sha256 {}", identity.object_name, digits(&identity.object)),
+        format!("contacts    {}", contacts.join(", ")),
         format!("friction    {}", identity.friction),
         format!("obstacles   sha256 {}", digits(&identity.obstacles)),
         format!("region      centre of mass {} mm, +- {} mm; {turned}", center.join(" "), half.join(" ")),
@@ -208,7 +229,10 @@ fn run_bench(arguments: &args::RoadmapBench, common: &Common, talk: &Talk) -> Re
     let cancelled = interrupt::flag()?;
     let roadmap = open(&arguments.roadmap, talk)?;
     let loaded = load::scene(&arguments.scene, common, talk)?;
-    let planner = RoadmapPlanner::new(&arguments.roadmap, &roadmap, &loaded.scene)?;
+    let mut planner = RoadmapPlanner::new(&arguments.roadmap, &roadmap, &loaded.scene)?;
+    if arguments.smooth {
+        planner = planner.smoothing();
+    }
     let mut writer = match &arguments.csv {
         Some(path) => {
             make_folder_of(path)?;
@@ -217,6 +241,10 @@ fn run_bench(arguments: &args::RoadmapBench, common: &Common, talk: &Talk) -> Re
         }
         None => None,
     };
+    if let Some(path) = &arguments.graph {
+        make_folder_of(path)?;
+        refuse_unwritable(path)?;
+    }
     let settings = RunSettings {
         planner: planner.settings().clone(),
         max_work: 20_000_000,
@@ -248,6 +276,12 @@ fn run_bench(arguments: &args::RoadmapBench, common: &Common, talk: &Talk) -> Re
     }
     if let (Some(writer), Some(path)) = (writer, &arguments.csv) {
         writer.finish().map_err(|error| Stop::unwritable(path, &error))?;
+    }
+    if let Some(path) = &arguments.graph {
+        let facts = bench::GraphFacts::of(&arguments.roadmap, &loaded.scene.name)?;
+        let text = serde_json::to_string_pretty(&facts).expect("plain data becomes JSON") + "\n";
+        files::write_atomic(path, text.as_bytes()).map_err(|error| Stop::unwritable(path, &error))?;
+        talk.say(format!("wrote  {}   loaded in {}", path.display(), duration(facts.load_s)));
     }
     let summaries = summarise(&rows);
     for summary in &summaries {

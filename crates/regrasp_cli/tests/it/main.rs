@@ -5,6 +5,8 @@ mod commands;
 mod folder;
 #[path = "../../../../tests/support/places.rs"]
 mod places;
+mod roadmap;
+mod roadmap_file;
 mod suite;
 #[path = "../../../../tests/support/wide_scene.rs"]
 mod wide_scene;

@@ -1,7 +1,7 @@
 //! The plan as it is written to a file.
 
 use super::legs::Solution;
-use super::model::Model;
+use super::model::{MAX_FINGERS, Model};
 use super::state::{Motion, Sequence};
 use super::workspace::{Contacts, HandJoints};
 use regrasp_geometry::Pose;
@@ -27,7 +27,8 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution
                 statistics.transfers += 1;
                 statistics.transfers_with_free_fingers += u64::from(!state.is_held_by_all());
                 let held = |pose: &Pose, joints: &HandJoints| waypoint(pose, joints, &state.contacts, state.holding);
-                let mut waypoints = vec![held(&state.world_from_object, &state.joints)];
+                let mut waypoints = Vec::with_capacity(1 + moments.len());
+                waypoints.push(held(&state.world_from_object, &state.joints));
                 waypoints.extend(moments.iter().map(|m| held(&m.world_from_object, &m.joints)));
                 segments.push(Segment { kind: SegmentKind::Transfer, moving_finger: None, waypoints });
             }
@@ -36,7 +37,8 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution
                 statistics.relocations += u64::from(end.holds(*finger));
                 let holding = state.holding & !(1 << finger);
                 let pose = &state.world_from_object;
-                let mut waypoints = vec![waypoint(pose, &state.joints, &state.contacts, state.holding)];
+                let mut waypoints = Vec::with_capacity(1 + path.len());
+                waypoints.push(waypoint(pose, &state.joints, &state.contacts, state.holding));
                 let mut joints = state.joints.clone();
                 for (k, at) in path.iter().enumerate() {
                     joints[*finger].clone_from(at);
@@ -117,7 +119,7 @@ fn way_poses(query: &InHandQuery, segments: &[Segment], steps_to_way: &[usize]) 
 
 fn waypoint(pose: &Pose, joints: &HandJoints, contacts: &Contacts, holding: u32) -> Waypoint {
     Waypoint {
-        joints: joints.iter().flatten().copied().collect(),
+        joints: joints.iter().map(|own| &own[..]).collect::<arrayvec::ArrayVec<_, MAX_FINGERS>>().concat(),
         world_from_object: PoseData::from(pose),
         contacts: contacts
             .iter()

@@ -89,6 +89,24 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// Work that is left of this search's share.
+    pub fn work_left(&self) -> u64 {
+        self.work_limit.saturating_sub(self.workspace.work)
+    }
+
+    /// Another search for a part of what this one looks for, with a share of its limits and random numbers of its own.
+    pub fn for_detour(&self, (seed, attempt): (u64, usize), work_limit: u64) -> Self {
+        let search = Search::new(
+            self.model(),
+            (self.start, self.goal),
+            (seed, 0),
+            (self.budget, work_limit),
+            self.winner,
+            self.progress,
+        );
+        Search { rng: Rng::keyed(seed, "detour", attempt as u64), ..search }
+    }
+
     /// Turns to another leg; what was learnt about failures stays.
     pub fn begin_leg(&mut self, leg: usize, start: Pose, goal: Pose) {
         (self.leg, self.start, self.goal) = (leg, start, goal);

@@ -64,10 +64,13 @@ pub fn follow(
     let shortest = 1.0 / (steps << MAX_HALVINGS) as f64;
     let mut pending: Vec<f64> = (1..=steps).rev().map(|k| k as f64 / steps as f64).collect();
     let mut made = 0.0;
-    let mut here = Moment { world_from_object: start.world_from_object, joints: start.joints.clone() };
+    let first = Moment { world_from_object: start.world_from_object, joints: start.joints.clone() };
+    moments.reserve(steps);
+    let n_before = moments.len();
     while let Some(t) = pending.pop() {
         let pose = if t == 1.0 { *goal } else { interpolate_pose(&start.world_from_object, goal, t) };
         let world_from_object = Placement::from(&pose);
+        let here = moments[n_before..].last().unwrap_or(&first);
         let mut joints = HandJoints::new();
         for finger in 0..model.n_fingers() {
             if !start.holds(finger) {
@@ -81,7 +84,7 @@ pub fn follow(
             }
         }
         let there = Moment { world_from_object: pose, joints };
-        if !tips_stay(model, start, &here, &there) {
+        if !tips_stay(model, start, here, &there) {
             if t - made <= shortest {
                 return made;
             }
@@ -91,8 +94,8 @@ pub fn follow(
         if !is_clear(&there) {
             return made;
         }
-        moments.push(there.clone());
-        (made, here) = (t, there);
+        moments.push(there);
+        made = t;
     }
     1.0
 }

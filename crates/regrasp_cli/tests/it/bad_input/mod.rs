@@ -4,6 +4,7 @@
 mod arguments;
 mod meshes;
 mod plans;
+mod roadmaps;
 mod robots;
 mod scenes;
 

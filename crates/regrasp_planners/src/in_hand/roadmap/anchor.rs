@@ -1,14 +1,17 @@
-//! Linking an object pose to the graph: grasps of nodes at places nearby, taken there by one transfer.
+//! Linking an object pose to the graph: grasps of nodes at places nearby, taken there by one transfer; where none follows,
+//! by a detour of transfers and relocations.
 
+use super::super::gait;
 use super::super::model::MAX_FINGERS;
 use super::super::search::{Search, Stop};
-use super::super::shorten::{Arrival, change_grasp, whole_transfer};
-use super::super::state::{GraspState, Sequence};
+use super::super::shorten::{Arrival, change_grasp, shorten, whole_transfer};
+use super::super::state::{GraspState, Motion, Sequence};
 use super::super::transfer::ik_settings;
 use super::super::workspace::{TipMode, tip_target};
 use super::GraspRoadmap;
 use super::graph::contact_ids;
 use super::landmarks::Bounds;
+use super::route::same_posture;
 use regrasp_base::Rng;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Pose, UnitVector, interpolate_pose};
@@ -25,6 +28,8 @@ pub struct QueryEnd {
     /// Nodes not looked at yet, the most promising last.
     candidates: Vec<Candidate>,
     near: Vec<Place>,
+    /// A proven link that is no single transfer.
+    detour: Option<Link>,
 }
 
 /// A node that may be linked to an end.
@@ -43,10 +48,10 @@ pub struct Link {
     pub node: usize,
     /// Nodes of the path that it skips, because they have the same grasp.
     pub n_skipped: usize,
-    /// From the node to the end's pose.
-    pub transfer: Sequence,
-    /// At the end's pose, from the grasp given there to that of the transfer; no motion where any grasp will do.
-    pub changes: Sequence,
+    /// From the node to the end's pose, and there into the grasp given, if one is.
+    pub way: Sequence,
+    /// True when every transfer of the way comes out again from its two ends, so that a graph can keep it.
+    pub can_be_kept: bool,
 }
 
 /// A node, and the least that a path through it costs.
@@ -66,7 +71,7 @@ struct Place {
 impl QueryEnd {
     /// An end without anchors.
     pub fn new(pose: Pose, given: Option<GraspState>) -> Self {
-        QueryEnd { pose, given, anchors: Vec::new(), candidates: Vec::new(), near: Vec::new() }
+        QueryEnd { pose, given, anchors: Vec::new(), candidates: Vec::new(), near: Vec::new(), detour: None }
     }
 
     /// Takes the nodes at some places, given with their distances, for candidates; `bounds` tell what the way from there on
@@ -104,10 +109,30 @@ impl QueryEnd {
         Ok(())
     }
 
-    /// The motions between the end and `path`, which begins at one of the anchors: from the last of its first nodes that
-    /// have one grasp, else from the anchor. None when neither is feasible; then the anchor is none any more.
+    /// The motions between the end and `path`, which begins at one of the anchors. None when they are not feasible; then the
+    /// anchor is none any more. With `smooth` from the last of the first nodes that have one grasp, if that is feasible.
     pub fn prove(
         &mut self,
+        search: &mut Search,
+        roadmap: &GraspRoadmap,
+        path: impl Iterator<Item = usize> + Clone,
+        smooth: bool,
+    ) -> Option<Link> {
+        let anchor = path.clone().next()?;
+        if let Some(detour) = self.detour.as_ref().filter(|detour| detour.node == anchor) {
+            return Some(detour.clone());
+        }
+        let link = if smooth { self.longest_link(search, roadmap, path) } else { None };
+        let link = link.or_else(|| self.link(search, roadmap, anchor, 0));
+        if link.is_none() {
+            self.anchors.retain(|other| other.node != anchor);
+        }
+        link
+    }
+
+    /// From the last of the first nodes of `path` that have one grasp, where that is not the first.
+    fn longest_link(
+        &self,
         search: &mut Search,
         roadmap: &GraspRoadmap,
         path: impl Iterator<Item = usize> + Clone,
@@ -116,27 +141,39 @@ impl QueryEnd {
         let grasp = contact_ids(&roadmap.graph, anchor);
         let alike = path.take_while(|&node| contact_ids(&roadmap.graph, node) == grasp);
         let (n_skipped, last) = alike.enumerate().last()?;
-        let mut link = self.link(search, roadmap, last, n_skipped);
-        if link.is_none() && n_skipped > 0 {
-            link = self.link(search, roadmap, anchor, 0);
-        }
-        if link.is_none() {
-            self.anchors.retain(|other| other.node != anchor);
-        }
-        link
+        if n_skipped > 0 { self.link(search, roadmap, last, n_skipped) } else { None }
+    }
+
+    /// Looks for a way to a node as one looks for a plan; the node becomes an anchor. False when there is none within the
+    /// search's share of work.
+    pub fn detour(&mut self, search: &mut Search, roadmap: &GraspRoadmap, node: usize) -> Result<bool, Stop> {
+        let there = roadmap.graph.state(node);
+        search.begin_leg(0, self.pose, there.world_from_object);
+        let mut way = match gait::grow(search, self.given.clone(), Some(&there)) {
+            Err(Stop::Restart) => return Ok(false),
+            found => found?,
+        };
+        shorten(search, &mut way, false);
+        let way = way.reversed();
+        let can_be_kept = comes_out_again(search, &way);
+        self.anchors.push(Anchor { node, cost: 0.0 });
+        self.detour = Some(Link { node, n_skipped: 0, way, can_be_kept });
+        Ok(true)
     }
 
     fn link(&self, search: &mut Search, roadmap: &GraspRoadmap, node: usize, n_skipped: usize) -> Option<Link> {
         let transfer = whole_transfer(search, &roadmap.graph.state(node), &self.pose)?;
-        let changes = match &self.given {
-            None => Sequence::at(transfer.end().clone()),
+        let way = match &self.given {
+            None => transfer,
             Some(given) => {
                 let mut rng = Rng::child(&search.rng, "given_grasp", 0);
                 search.rng.bits();
-                change_grasp(search, &Sequence::at(given.clone()), transfer.end(), Arrival::Exact, &mut rng)?
+                let given = Sequence::at(given.clone());
+                let changes = change_grasp(search, &given, transfer.end(), Arrival::Exact, &mut rng)?;
+                transfer.then(changes.reversed())?
             }
         };
-        Some(Link { node, n_skipped, transfer, changes })
+        Some(Link { node, n_skipped, way, can_be_kept: true })
     }
 }
 
@@ -173,7 +210,19 @@ fn follows(search: &mut Search, roadmap: &GraspRoadmap, node: usize, finger: usi
     })
 }
 
-/// Shares of a way at which single fingers are looked at: the end first, where most of those fail that fail.
-const LOOKS: [f64; 2] = [1.0, 0.5];
+/// True when each transfer of `way` is a straight one, proven again from its two ends.
+fn comes_out_again(search: &mut Search, way: &Sequence) -> bool {
+    (0..way.steps().len()).all(|index| {
+        let step = &way.steps()[index];
+        if !matches!(step.motion(), Motion::Transfer(_)) {
+            return true;
+        }
+        let again = whole_transfer(search, way.state_before(index), &step.end().world_from_object);
+        again.is_some_and(|again| same_posture(&again.end().joints, &step.end().joints))
+    })
+}
+
+/// Shares of a way at which single fingers are looked at: at the end most of those fail that fail.
+const LOOKS: [f64; 1] = [1.0];
 /// Largest change of a joint between them.
 const FARTHEST: f64 = 1.5;

@@ -19,6 +19,7 @@ use super::identity::Identity;
 use super::index::{Costs, components};
 use super::region::{Region, nearest_places, spread_places};
 use super::registry::Registry;
+use super::route::evenly;
 use super::{About, GraspRoadmap};
 use crate::failure::{Failure, FailureKind};
 use rayon::prelude::*;
@@ -329,7 +330,7 @@ impl<'b> Builder<'b> {
                 let mut rng = Rng::child(&search.rng, "transfer", u64::from(from));
                 // Where a hand reaches the contacts in several ways, fingers may have to change their postures there.
                 if let Some(way) = transfer_regrasp(search, &state, &wanted, Arrival::Exact, &mut rng) {
-                    found.push(Found { origin: Origin::Node(from), legs: legs_of(&way, other) });
+                    found.push(Found { origin: Origin::Node(from), legs: legs_of(&way, |_| other) });
                     n_taken += 1;
                     if n_taken == self.build.transfers {
                         break;
@@ -439,13 +440,17 @@ fn stopped(stop: &Stop) -> Failure {
     failed(kind, "the roadmap was not finished".into(), "allow more work or time, or ask for fewer places")
 }
 
-/// A sequence as the graph keeps it; a transfer in it leads to `place`.
-pub(super) fn legs_of(way: &Sequence, place: u32) -> Vec<Leg> {
-    let leg_of = |step: &Step| match step.motion() {
-        Motion::Transfer(_) => Leg::Transfer { place, joints: step.end().joints.clone() },
+/// A sequence as the graph keeps it; `place_of` says which place a transfer leads to.
+pub(super) fn legs_of(way: &Sequence, mut place_of: impl FnMut(&Pose) -> u32) -> Vec<Leg> {
+    let leg_of = |(index, step): (usize, &Step)| match step.motion() {
+        Motion::Transfer(moments) => Leg::Transfer {
+            place: place_of(&step.end().world_from_object),
+            joints: step.end().joints.clone(),
+            between: evenly(&way.state_before(index).world_from_object, moments),
+        },
         Motion::Regrasp { finger, path } => {
             Leg::Relocation { finger: *finger, path: path.clone(), contact: step.end().contacts[*finger] }
         }
     };
-    way.steps().iter().map(leg_of).collect()
+    way.steps().iter().enumerate().map(leg_of).collect()
 }

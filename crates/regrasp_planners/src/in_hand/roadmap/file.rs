@@ -14,19 +14,21 @@ use crate::in_hand::InHandSettings;
 use regrasp_base::{Diagnostic, InputError, Place, files};
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 use regrasp_grasp::Contact;
+use regrasp_robot::ContactModel;
+use regrasp_robot::kinematics::finger_ik;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// First bytes of every roadmap file.
 const MAGIC: [u8; 8] = *b"regrasp\x1a";
 /// Version that this program reads and writes.
-const FORMAT_VERSION: u32 = 1;
+const FORMAT_VERSION: u32 = 2;
 /// Largest file that is read: more nodes than indices can tell apart need more.
 const MAX_FILE_BYTES: u64 = 8 << 30;
 /// Where the bytes begin that the checksum is of: after magic, version, number of fingers, length and checksum.
 const CHECKED_FROM: usize = 32;
 /// Most moving joints of a finger.
-const MAX_COORDINATES: u64 = 16;
+const MAX_COORDINATES: usize = finger_ik::MAX_COORDINATES;
 /// Finger of an edge that is a transfer.
 const NO_FINGER: u8 = 255;
 
@@ -38,6 +40,7 @@ struct AboutData {
     fingers: Vec<String>,
     hand_name: String,
     hand_sha256: String,
+    contacts: Vec<ContactData>,
     object_name: String,
     object_sha256: String,
     obstacles_sha256: String,
@@ -49,6 +52,15 @@ struct AboutData {
     n_grown: u64,
     turn_length: f64,
     relocation_cost: f64,
+}
+
+/// [`ContactModel`] on disk, with the words of hand files.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(tag = "model", rename_all = "snake_case", deny_unknown_fields)]
+enum ContactData {
+    Frictionless,
+    Point,
+    SoftFinger { torsion_radius: f64 },
 }
 
 /// Sizes of all tables, as the file says them.
@@ -80,7 +92,7 @@ impl GraspRoadmap {
     /// The bytes of the file.
     pub fn to_bytes(&self) -> Vec<u8> {
         let graph = &self.graph;
-        let about = serde_json::to_string_pretty(&data_of(&self.about)).expect("plain data becomes JSON");
+        let about = serde_json::to_string(&data_of(&self.about)).expect("plain data becomes JSON");
         let mut out = Writer::default();
         out.bytes.extend(MAGIC);
         out.u32(FORMAT_VERSION);
@@ -121,7 +133,7 @@ impl GraspRoadmap {
         out.pad();
         for edge in &graph.edges {
             let (first, n_between, finger) = match edge.passage {
-                Passage::Transfer => (0, 0, NO_FINGER),
+                Passage::Transfer { first, n_between } => (first, n_between, NO_FINGER),
                 Passage::Relocation { finger, first, n_between } => (first, n_between, finger),
             };
             out.u32s([edge.from, edge.to, first]);
@@ -142,16 +154,20 @@ impl GraspRoadmap {
     ///
     /// No size is believed before it fits the number of bytes. Errors: `R601` to `R606`.
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, InputError> {
-        let fail = |code, problem: String| Diagnostic::new(code, Place::file(path), problem);
-        let cut = || fail("R603", "ends too early".into()).fix("build it again, or take it from a backup");
+        let fail = |code, problem: String| {
+            Diagnostic::new(code, Place::file(path), problem).fix("build it again, or take it from a backup")
+        };
+        let cut = || fail("R603", format!("has {} bytes and ends too early", bytes.len()));
         let mut reader = Reader::new(bytes);
         if reader.take(MAGIC.len()) != Some(&MAGIC) {
-            let diagnostic = fail("R601", "is not a roadmap file".into());
-            return Err(diagnostic.expected("a file that regrasp roadmap build wrote").into());
+            let start: String = bytes.iter().take(MAGIC.len()).map(|byte| format!("{byte:02x}")).collect();
+            let diagnostic = Diagnostic::new("R601", Place::file(path), format!("begins with the bytes \"{start}\""));
+            let diagnostic = diagnostic.expected("a file that regrasp roadmap build wrote");
+            return Err(diagnostic.fix("regrasp roadmap build SCENE -o FILE.roadmap").into());
         }
         let version = reader.u32().ok_or_else(cut)?;
         if version != FORMAT_VERSION {
-            let diagnostic = fail("R602", format!("has format version {version}"));
+            let diagnostic = Diagnostic::new("R602", Place::file(path), format!("has format version {version}"));
             return Err(diagnostic.expected(FORMAT_VERSION.to_string()).fix("build it again with this program").into());
         }
         let n_fingers = reader.u32().ok_or_else(cut)?;
@@ -159,11 +175,12 @@ impl GraspRoadmap {
         let sum = reader.u64().ok_or_else(cut)?;
         if length != bytes.len() as u64 {
             let problem = format!("has {} bytes and says it has {length}", bytes.len());
-            return Err(fail("R603", problem).fix("build it again, or take it from a backup").into());
+            return Err(fail("R603", problem).into());
         }
-        if checksum(&bytes[CHECKED_FROM..]) != sum {
-            let problem = "is damaged: its checksum is another".to_owned();
-            return Err(fail("R604", problem).fix("build it again, or take it from a backup").into());
+        let own_sum = checksum(&bytes[CHECKED_FROM..]);
+        if own_sum != sum {
+            let problem = format!("is damaged: its bytes have the checksum {own_sum:016x}");
+            return Err(fail("R604", problem).expected(format!("{sum:016x}, as it says at byte 24")).into());
         }
         let sizes = sizes(&mut reader, n_fingers, bytes.len()).map_err(|problem| fail("R606", problem))?;
         let about = about(&mut reader, &sizes).map_err(|problem| fail("R605", problem))?;
@@ -173,7 +190,8 @@ impl GraspRoadmap {
         }
         let contradiction = |problem| InputError::from(fail("R606", problem));
         graph.validate().map_err(contradiction)?;
-        if about.identity.fingers.len() != graph.n_fingers() {
+        let identity = &about.identity;
+        if [identity.fingers.len(), identity.contacts.len()] != [graph.n_fingers(); 2] {
             return Err(contradiction("names other fingers than it has".into()));
         }
         if !(landmarks.step > 0.0 && landmarks.step.is_finite()) {
@@ -199,38 +217,43 @@ pub fn seal(bytes: &mut [u8]) {
 
 /// Reads the sizes and holds them against the number of bytes.
 fn sizes(reader: &mut Reader, n_fingers: u32, n_bytes: usize) -> Result<Sizes, String> {
-    const CUT: &str = "ends within its table of sizes";
     if n_fingers == 0 || n_fingers as usize > MAX_FINGERS {
         return Err(format!("has {n_fingers} fingers; 1 to {MAX_FINGERS} are possible"));
     }
-    let mut count = || -> Result<usize, String> {
-        let value = reader.u64().ok_or(CUT)?;
+    let mut at = CHECKED_FROM;
+    let mut count = |what: &str| -> Result<usize, String> {
+        let value = reader.u64().ok_or("ends within its table of sizes")?;
         // Each thing counted takes at least one byte of the file.
         if value > n_bytes as u64 {
-            return Err(format!("says it has {value} of something in {n_bytes} bytes"));
+            return Err(format!("says at byte {at} that it has {value} {what}, in {n_bytes} bytes"));
         }
+        at += 8;
         Ok(value as usize)
     };
     let mut sizes = Sizes {
-        about: count()?,
-        places: count()?,
-        contacts: count()?,
-        nodes: count()?,
-        edges: count()?,
-        ways: count()?,
-        landmarks: count()?,
+        about: count("bytes about itself")?,
+        places: count("places")?,
+        contacts: count("contacts")?,
+        nodes: count("nodes")?,
+        edges: count("edges")?,
+        ways: count("joint values of motions")?,
+        landmarks: count("landmarks")?,
         fingers: Vec::new(),
     };
-    for _ in 0..n_fingers {
-        let finger = (count()?, count()?);
-        if finger.0 as u64 > MAX_COORDINATES || finger.0 == 0 {
-            return Err(format!("has a finger of {} joints", finger.0));
+    for index in 0..n_fingers {
+        let finger = (count("joints of a finger")?, count("footholds of a finger")?);
+        if finger.0 > MAX_COORDINATES || finger.0 == 0 {
+            return Err(format!(
+                "says that finger {index} has {} joints; 1 to {MAX_COORDINATES} are possible",
+                finger.0
+            ));
         }
         sizes.fingers.push(finger);
     }
     match sizes.total() {
         Some(total) if total == n_bytes => Ok(sizes),
-        _ => Err(format!("has tables that do not fit its {n_bytes} bytes")),
+        Some(total) => Err(format!("has tables of {total} bytes by its own sizes, in {n_bytes} bytes")),
+        None => Err("says sizes beyond all files".into()),
     }
 }
 
@@ -311,9 +334,10 @@ fn edge_of(record: &[u8; 16]) -> Edge {
     let words = record.as_chunks::<4>().0;
     let word = |k: usize| u32::from_le_bytes(words[k]);
     let [low, high, finger, _] = words[3];
+    let (first, n_between) = (word(2), u16::from_le_bytes([low, high]));
     let passage = match finger {
-        NO_FINGER => Passage::Transfer,
-        finger => Passage::Relocation { finger, first: word(2), n_between: u16::from_le_bytes([low, high]) },
+        NO_FINGER => Passage::Transfer { first, n_between },
+        finger => Passage::Relocation { finger, first, n_between },
     };
     Edge { from: word(0), to: word(1), passage }
 }
@@ -329,6 +353,7 @@ fn data_of(about: &About) -> AboutData {
         fingers: about.identity.fingers.clone(),
         hand_name: about.identity.hand_name.clone(),
         hand_sha256: files::hex(&about.identity.hand),
+        contacts: about.identity.contacts.iter().map(ContactData::from).collect(),
         object_name: about.identity.object_name.clone(),
         object_sha256: files::hex(&about.identity.object),
         obstacles_sha256: files::hex(&about.identity.obstacles),
@@ -359,6 +384,7 @@ fn about(reader: &mut Reader, sizes: &Sizes) -> Result<About, String> {
             fingers: data.fingers,
             hand_name: data.hand_name,
             hand: digest_of(&data.hand_sha256)?,
+            contacts: data.contacts.iter().map(ContactModel::from).collect(),
             object_name: data.object_name,
             object: digest_of(&data.object_sha256)?,
             obstacles: digest_of(&data.obstacles_sha256)?,
@@ -371,6 +397,26 @@ fn about(reader: &mut Reader, sizes: &Sizes) -> Result<About, String> {
         n_grown: data.n_grown,
         costs: Costs { turn_length: data.turn_length, relocation: data.relocation_cost },
     })
+}
+
+impl From<&ContactModel> for ContactData {
+    fn from(model: &ContactModel) -> Self {
+        match *model {
+            ContactModel::Frictionless => ContactData::Frictionless,
+            ContactModel::Point => ContactData::Point,
+            ContactModel::SoftFinger { torsion_radius } => ContactData::SoftFinger { torsion_radius },
+        }
+    }
+}
+
+impl From<&ContactData> for ContactModel {
+    fn from(data: &ContactData) -> Self {
+        match *data {
+            ContactData::Frictionless => ContactModel::Frictionless,
+            ContactData::Point => ContactModel::Point,
+            ContactData::SoftFinger { torsion_radius } => ContactModel::SoftFinger { torsion_radius },
+        }
+    }
 }
 
 fn digest_of(text: &str) -> Result<Digest, String> {

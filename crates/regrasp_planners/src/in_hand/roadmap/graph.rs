@@ -1,8 +1,8 @@
 //! The graph of grasps and proven motions, as numbers in flat tables.
 //!
 //! A node is a grasp: a place (object pose) and a foothold (contact and joints) of every finger. An edge is a transfer
-//! (same contacts, other place) or the relocation of one finger (same place); both can be gone both ways. A transfer is
-//! stored as its two ends only, because the way between them follows from the first; a relocation stores its joints.
+//! (same contacts, other place) or the relocation of one finger (same place); both can be gone both ways. Both store their
+//! joints between the ends; the object's poses follow from the ends.
 
 use super::super::model::MAX_FINGERS;
 use super::super::state::GraspState;
@@ -28,7 +28,12 @@ pub struct Node {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Passage {
     /// All fingers hold, the object moves from the first node's place to the second's.
-    Transfer,
+    Transfer {
+        /// Index of the first number of its way in [`Graph::ways`].
+        first: u32,
+        /// Moments between its ends, at equal shares of the way; [`NOT_STORED`] where they are to be stepped again.
+        n_between: u16,
+    },
     /// One finger moves.
     Relocation {
         /// The finger.
@@ -39,6 +44,9 @@ pub enum Passage {
         n_between: u16,
     },
 }
+
+/// In place of a number of moments: they are not at equal shares of the way, and not stored.
+pub const NOT_STORED: u16 = u16::MAX;
 
 /// A proven motion between two nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -83,7 +91,7 @@ pub struct Graph {
     pub nodes: Vec<Node>,
     /// Motions.
     pub edges: Vec<Edge>,
-    /// Joints of relocations between their ends, in single precision: the rounding moves a fingertip by some ten
+    /// Joints of motions between their ends, of one finger for relocations, of all for transfers; in single precision: the rounding moves a fingertip by some ten
     /// nanometres, far below every clearance.
     pub ways: Vec<f32>,
 }
@@ -137,6 +145,39 @@ impl Graph {
             .map(|joints| joints.iter().map(|&q| f64::from(q)).collect())
     }
 
+    /// Joints of a transfer between its ends, in the order it was proven.
+    pub fn moments(&self, first: u32, n_between: u16) -> impl Iterator<Item = HandJoints> {
+        let stride = self.n_joints();
+        let first = first as usize;
+        self.ways[first..first + usize::from(n_between) * stride].chunks_exact(stride.max(1)).map(|joints| {
+            let mut rest = joints;
+            let of_finger = |footholds: &Footholds| {
+                let (own, others) = rest.split_at(footholds.n_coordinates);
+                rest = others;
+                own.iter().map(|&q| f64::from(q)).collect()
+            };
+            self.footholds.iter().map(of_finger).collect()
+        })
+    }
+
+    /// Number of joints of all fingers.
+    fn n_joints(&self) -> usize {
+        self.footholds.iter().map(|footholds| footholds.n_coordinates).sum()
+    }
+
+    /// The numbers that an edge has in [`Graph::ways`].
+    fn way_of(&self, passage: &Passage) -> std::ops::Range<usize> {
+        let (first, n) = match *passage {
+            Passage::Transfer { n_between: NOT_STORED, .. } => (0, 0),
+            Passage::Transfer { first, n_between } => (first as usize, usize::from(n_between) * self.n_joints()),
+            Passage::Relocation { finger, first, n_between } => {
+                let stride = self.footholds[usize::from(finger)].n_coordinates;
+                (first as usize, usize::from(n_between) * stride)
+            }
+        };
+        first..first + n
+    }
+
     /// The nodes at which `keep` holds with what they stand on, renumbered in the same order; edges between them stay.
     #[must_use]
     pub fn only(&self, keep: impl Fn(usize) -> bool) -> Graph {
@@ -171,14 +212,11 @@ impl Graph {
             if from == u32::MAX || to == u32::MAX {
                 continue;
             }
+            let first = kept.ways.len() as u32;
+            kept.ways.extend_from_slice(&self.ways[self.way_of(&edge.passage)]);
             let passage = match edge.passage {
-                Passage::Transfer => Passage::Transfer,
-                Passage::Relocation { finger, first, n_between } => {
-                    let start = kept.ways.len() as u32;
-                    let n = usize::from(n_between) * self.footholds[usize::from(finger)].n_coordinates;
-                    kept.ways.extend_from_slice(&self.ways[first as usize..first as usize + n]);
-                    Passage::Relocation { finger, first: start, n_between }
-                }
+                Passage::Transfer { n_between, .. } => Passage::Transfer { first, n_between },
+                Passage::Relocation { finger, n_between, .. } => Passage::Relocation { finger, first, n_between },
             };
             kept.edges.push(Edge { from, to, passage });
         }
@@ -194,7 +232,7 @@ impl Graph {
             self.validate_edge(edge).map_err(|problem| format!("edge {index} {problem}"))?;
         }
         match self.ways.iter().position(|q| !q.is_finite()) {
-            Some(index) => Err(format!("number {index} of the relocations is not finite")),
+            Some(index) => Err(format!("joint value {index} of its motions is not finite")),
             None => Ok(()),
         }
     }
@@ -245,13 +283,13 @@ impl Graph {
         }
         let (start, end) = (&self.nodes[from], &self.nodes[to]);
         match edge.passage {
-            Passage::Transfer => {
+            Passage::Transfer { .. } => {
                 let same_grasp = (0..self.n_fingers()).all(|f| self.contact_id(from, f) == self.contact_id(to, f));
                 if !same_grasp || start.place == end.place {
                     return Err("is a transfer that changes the grasp or does not move the object".into());
                 }
             }
-            Passage::Relocation { finger, first, n_between } => {
+            Passage::Relocation { finger, .. } => {
                 let moving = usize::from(finger);
                 if moving >= self.n_fingers() || start.place != end.place {
                     return Err("is a relocation of no finger, or moves the object".into());
@@ -261,11 +299,10 @@ impl Graph {
                 if !one_moves {
                     return Err("is a relocation of other fingers than its own".into());
                 }
-                let n = usize::from(n_between) * self.footholds[moving].n_coordinates;
-                if first as usize + n > self.ways.len() {
-                    return Err("is a relocation with a way that does not exist".into());
-                }
             }
+        }
+        if self.way_of(&edge.passage).end > self.ways.len() {
+            return Err("has a way that does not exist".into());
         }
         Ok(())
     }
@@ -313,6 +350,8 @@ pub enum Leg {
         place: u32,
         /// Joints there.
         joints: HandJoints,
+        /// Joints on the way, at equal shares of it; none where they are to be stepped again.
+        between: Option<Vec<HandJoints>>,
     },
     /// To another foothold of one finger.
     Relocation {

@@ -7,7 +7,7 @@ use regrasp_base::files::sha256_bytes;
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Point, Pose, Shape};
 use regrasp_robot::kinematics::chain::Motion;
-use regrasp_robot::{Hand, TipShape};
+use regrasp_robot::{ContactModel, Hand, TipShape};
 use regrasp_scene::{Object, Scene};
 
 /// A SHA-256.
@@ -20,8 +20,11 @@ pub struct Identity {
     pub fingers: Vec<String>,
     /// Name of the robot that the hand is of.
     pub hand_name: String,
-    /// The hand as it stands in the world: chains, limits, tips, shapes, pairs that may touch.
+    /// The hand as it stands in the world: chains, limits, couplings, tips, shapes, pairs that may touch. What its tips
+    /// transmit is apart.
     pub hand: Digest,
+    /// Contact model of every fingertip.
+    pub contacts: Vec<ContactModel>,
     /// Name of the object.
     pub object_name: String,
     /// The object: shape, centre of mass, where contacts may be. Its friction is apart.
@@ -44,6 +47,7 @@ impl Identity {
             fingers: scene.hand.fingers.iter().map(|finger| finger.name.clone()).collect(),
             hand_name: scene.hand.robot.name.clone(),
             hand: hand(&scene.hand),
+            contacts: scene.hand.fingers.iter().map(|finger| finger.tip.contact).collect(),
             object_name: scene.object.name.clone(),
             object: object(&scene.object),
             obstacles: obstacles.digest(),

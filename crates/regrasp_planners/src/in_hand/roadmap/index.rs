@@ -44,7 +44,9 @@ impl Index {
                 let edge = &graph.edges[index as usize];
                 let other = if edge.from as usize == node { edge.to } else { edge.from };
                 let cost = match edge.passage {
-                    Passage::Transfer => near_distance(graph.pose(node), graph.pose(other as usize), costs.turn_length),
+                    Passage::Transfer { .. } => {
+                        near_distance(graph.pose(node), graph.pose(other as usize), costs.turn_length)
+                    }
                     Passage::Relocation { .. } => costs.relocation,
                 };
                 links.push(Link { node: other, edge: index, cost });

@@ -100,41 +100,63 @@ impl Landmarks {
 
     /// Lower bounds of the cost to the nearest of some goals, each a node and what remains to be paid there.
     pub fn bounds(&self, goals: impl Iterator<Item = (usize, f64)>) -> Bounds {
-        let mut bounds = vec![(FAR, FAR); self.n_landmarks];
-        let slack = self.slack as i32;
+        let (mut beyond, mut behind) = (vec![FAR; self.n_landmarks], vec![FAR; self.n_landmarks]);
         for (node, rest) in goals {
-            let rest = i32::from(self.steps(rest));
-            for (bound, &distance) in bounds.iter_mut().zip(self.of(node)) {
+            let rest = f32::from(self.steps(rest)) - self.slack as f32;
+            for ((beyond, behind), &distance) in beyond.iter_mut().zip(&mut behind).zip(self.of(node)) {
                 // By the triangle inequality, with the landmark beyond the goal and with it behind the node. The distance
                 // that is taken away may be too short.
-                let distance = i32::from(distance);
-                bound.0 = bound.0.min(rest - distance - slack);
-                bound.1 = bound.1.min(rest + distance - slack);
+                let distance = f32::from(distance);
+                *beyond = smaller(*beyond, rest - distance);
+                *behind = smaller(*behind, rest + distance);
             }
         }
-        Bounds { bounds }
+        Bounds { beyond, behind }
     }
 
     /// The bound for a node.
     pub fn bound(&self, node: usize, bounds: &Bounds) -> f64 {
-        let mut best = 0;
-        for (&distance, &(beyond, behind)) in self.of(node).iter().zip(&bounds.bounds) {
-            let distance = i32::from(distance);
-            best = best.max((distance + beyond).max(behind - distance));
+        let (distances, beyond, behind) = (self.of(node), &bounds.beyond[..], &bounds.behind[..]);
+        let mut best = [0.0; LANES];
+        let chunks = (distances.as_chunks::<LANES>(), beyond.as_chunks::<LANES>(), behind.as_chunks::<LANES>());
+        for ((distances, beyond), behind) in chunks.0.0.iter().zip(chunks.1.0).zip(chunks.2.0) {
+            for lane in 0..LANES {
+                let distance = f32::from(distances[lane]);
+                let either = larger(distance + beyond[lane], behind[lane] - distance);
+                best[lane] = larger(best[lane], either);
+            }
         }
-        self.step * f64::from(best)
+        for ((&distance, &beyond), &behind) in chunks.0.1.iter().zip(chunks.1.1).zip(chunks.2.1) {
+            let distance = f32::from(distance);
+            best[0] = larger(best[0], larger(distance + beyond, behind - distance));
+        }
+        self.step * f64::from(best.into_iter().fold(0.0, larger))
     }
 }
 
+/// Landmarks that are looked at together: what one instruction takes.
+const LANES: usize = 8;
+
+/// Of two numbers, in one instruction: `f32::max` takes more to step over what is not a number.
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// Of two numbers, in one instruction.
+fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
 /// More steps than any distance.
-const FAR: i32 = 1 << 20;
+const FAR: f32 = 1048576.0;
 /// Slack at which landmarks are chosen anew.
 pub const MOST_SLACK: u32 = 1000;
 
-/// What [`Landmarks::bound`] needs to know of the goals.
+/// What [`Landmarks::bound`] needs to know of the goals, in steps. Whole numbers below 2^24, which `f32` holds exactly.
 #[derive(Debug, Clone)]
 pub struct Bounds {
-    bounds: Vec<(i32, i32)>,
+    beyond: Vec<f32>,
+    behind: Vec<f32>,
 }
 
 /// The node of the greatest finite cost.

@@ -41,6 +41,7 @@ use graph::Graph;
 use index::{Costs, Index};
 use landmarks::Landmarks;
 use regrasp_base::{Diagnostic, InputError, Place};
+use regrasp_robot::ContactModel;
 use regrasp_scene::Scene;
 use std::path::Path;
 
@@ -114,7 +115,8 @@ impl GraspRoadmap {
 
     /// Counts it.
     pub fn census(&self) -> Census {
-        let n_transfers = self.graph.edges.iter().filter(|edge| edge.passage == graph::Passage::Transfer).count();
+        let n_transfers =
+            self.graph.edges.iter().filter(|edge| matches!(edge.passage, graph::Passage::Transfer { .. })).count();
         let components = index::components(&self.graph);
         let mut counts = std::collections::BTreeMap::new();
         for node in 0..self.graph.nodes.len() {
@@ -139,7 +141,8 @@ impl GraspRoadmap {
 
     /// Refuses a scene that the roadmap was not built for; `path` is where the roadmap came from.
     ///
-    /// Errors: another hand (`R610`), object (`R611`), friction (`R612`) or obstacles (`R613`); all that differ.
+    /// Errors: another hand (`R610`), object (`R611`), friction (`R612`), set of obstacles (`R613`) or contact model of a
+    /// fingertip (`R614`), all that differ; tables that are not of the hand it names (`R606`).
     pub fn refuse_other_scene(&self, path: &Path, scene: &Scene) -> Result<(), InputError> {
         let (built, asked) = (&self.about.identity, Identity::of(scene));
         let rebuild = "build a roadmap for this scene: regrasp roadmap build SCENE -o FILE";
@@ -173,7 +176,65 @@ impl GraspRoadmap {
             let digits = |digest: &Digest| regrasp_base::files::hex(digest)[..SHOWN_DIGITS].to_owned();
             differs("R613", "set of obstacles", digits(&built.obstacles), digits(&asked.obstacles));
         }
+        if built.hand == asked.hand {
+            let fingers = built.fingers.iter().zip(built.contacts.iter().zip(&asked.contacts));
+            for (name, (was, is)) in fingers.filter(|(_, (was, is))| was != is) {
+                let what = format!("contact model of finger \"{name}\"");
+                differs("R614", &what, contact_text(was), contact_text(is));
+            }
+        }
+        if diagnostics.is_empty() && !self.has_joints_of(scene) {
+            let problem = "has tables of other fingers than the hand that it names";
+            diagnostics.push(Diagnostic::new("R606", Place::file(path), problem).fix(rebuild));
+        }
         if diagnostics.is_empty() { Ok(()) } else { Err(InputError { diagnostics }) }
+    }
+
+    /// Refuses settings that other motions are feasible with than those of the roadmap: the closure margin, the release rule,
+    /// steps and distances. What only steers a search may differ. `path` is where the roadmap came from.
+    ///
+    /// Errors: `R615`, one for each setting that differs.
+    pub fn refuse_other_settings(&self, path: &Path, asked: &InHandSettings) -> Result<(), InputError> {
+        let (built, asked) = (feasibility(&self.about.settings), feasibility(asked));
+        let differing = built.iter().zip(&asked).filter(|((_, was), (_, is))| was != is);
+        let diagnostics: Vec<Diagnostic> = differing
+            .map(|((name, was), (_, is))| {
+                let problem = format!("was built with another {name}: {was}; asked for is {is}");
+                Diagnostic::new("R615", Place::file(path), problem)
+                    .fix("build a roadmap with these settings: regrasp roadmap build --settings FILE.json, or --margin")
+            })
+            .collect();
+        if diagnostics.is_empty() { Ok(()) } else { Err(InputError { diagnostics }) }
+    }
+
+    fn has_joints_of(&self, scene: &Scene) -> bool {
+        let fingers = &scene.hand.fingers;
+        let footholds = &self.graph.footholds;
+        fingers.len() == footholds.len()
+            && fingers.iter().zip(footholds).all(|(finger, table)| finger.chain.n_coordinates() == table.n_coordinates)
+    }
+}
+
+/// The settings that decide what is feasible, by name.
+fn feasibility(settings: &InHandSettings) -> [(&'static str, serde_json::Value); 7] {
+    use serde_json::json;
+    [
+        ("closure_margin", json!(settings.closure_margin)),
+        ("release_rule", json!(settings.release_rule)),
+        ("step", json!(settings.step)),
+        ("clearance", json!(settings.clearance)),
+        ("contact_allowance", json!(settings.contact_allowance)),
+        ("limit_margin", json!(settings.limit_margin)),
+        ("joint_step", json!(settings.joint_step)),
+    ]
+}
+
+fn contact_text(model: &ContactModel) -> String {
+    match model {
+        ContactModel::SoftFinger { torsion_radius } => {
+            format!("\"{}\" with torsion_radius {torsion_radius}", model.name())
+        }
+        ContactModel::Frictionless | ContactModel::Point => format!("\"{}\"", model.name()),
     }
 }
 

@@ -13,7 +13,7 @@ use super::GraspRoadmap;
 use super::anchor::{Link, QueryEnd};
 use super::build::legs_of;
 use super::index::Index;
-use super::landmarks::Bounds;
+use super::landmarks::{Bounds, Landmarks};
 use super::region::nearest_places;
 use super::registry::Registry;
 use super::route::motion_along;
@@ -28,17 +28,22 @@ use std::path::Path;
 use std::sync::atomic::AtomicUsize;
 
 /// Places nearest to each end whose grasps are tried: few at first, more where these lead nowhere.
-const RINGS: [usize; 4] = [0, 3, 8, 24];
+const RINGS: [usize; 4] = [0, 1, 4, 24];
+/// Places nearest to an end that a detour may lead to, where nothing else links it.
+const DETOURS: usize = 3;
+/// Configurations that a detour may cost: as many as hard single queries take.
+const DETOUR_WORK: u64 = 50_000;
 /// Anchors at each end from which A* chooses.
-const ANCHORS: usize = 2;
+const ANCHORS: usize = 1;
 /// A path costs at most so many times the cheapest one between the anchors (weighted A*, Pohl 1970).
-const GREED: f64 = 1.5;
+const GREED: f64 = 2.5;
 
 /// A roadmap opened for a scene.
 #[derive(Debug)]
 pub struct RoadmapPlanner<'a> {
     model: Model<'a>,
     roadmap: &'a GraspRoadmap,
+    smooth: bool,
 }
 
 /// Memory of queries, one after the other: saves time, changes nothing.
@@ -62,7 +67,13 @@ impl<'a> RoadmapPlanner<'a> {
     /// Errors: it was built for another one (`R610` to `R613`).
     pub fn new(path: &Path, roadmap: &'a GraspRoadmap, scene: &'a Scene) -> Result<Self, InputError> {
         roadmap.refuse_other_scene(path, scene)?;
-        Ok(RoadmapPlanner { model: Model::new(scene, &roadmap.about.settings), roadmap })
+        Ok(RoadmapPlanner { model: Model::new(scene, &roadmap.about.settings), roadmap, smooth: false })
+    }
+
+    /// With transfers that follow each other with one grasp made one, where that is free: shorter motions, slower answers.
+    #[must_use]
+    pub fn smoothing(self) -> Self {
+        RoadmapPlanner { smooth: true, ..self }
     }
 
     /// Settings of the planner that the roadmap's motions were proven with.
@@ -126,16 +137,24 @@ impl<'a> RoadmapPlanner<'a> {
         let mut start = QueryEnd::new(search.start, start_grasp);
         let mut goal = QueryEnd::new(search.goal, goal_grasp);
         let (mut n_expanded, mut seen) = (0, (false, false));
-        for ring in RINGS.windows(2) {
-            let around_start = self.places_around(&start.pose, ring[0]..ring[1]);
-            let around_goal = self.places_around(&goal.pose, ring[0]..ring[1]);
-            // Where the goal will be linked is not known yet: at one of the nodes around.
-            let ends = around_goal.iter().flat_map(|&(distance, place)| {
-                roadmap.index.nodes_at(place).iter().map(move |&node| (node as usize, distance))
-            });
-            start.look_around(roadmap, &around_start, &landmarks.bounds(ends));
-            start.fill(search, roadmap, ANCHORS)?;
-            goal.look_around(roadmap, &around_goal, &self.bounds_to(&start));
+        for round in 0..RINGS.len() {
+            if let Some(ring) = RINGS.windows(2).nth(round) {
+                let around_start = self.places_around(&start.pose, ring[0]..ring[1]);
+                let around_goal = self.places_around(&goal.pose, ring[0]..ring[1]);
+                // Where the goal will be linked is not known yet: at one of the nodes around.
+                let ends = around_goal.iter().flat_map(|&(distance, place)| {
+                    roadmap.index.nodes_at(place).iter().map(move |&node| (node as usize, distance))
+                });
+                start.look_around(roadmap, &around_start, &landmarks.bounds(ends));
+                start.fill(search, roadmap, ANCHORS)?;
+                goal.look_around(roadmap, &around_goal, &self.bounds_to(&start));
+            } else {
+                for (end, which) in [(&mut start, 0), (&mut goal, 1)] {
+                    if end.anchors.is_empty() {
+                        self.detour(search, end, (seed, which))?;
+                    }
+                }
+            }
             loop {
                 start.fill(search, roadmap, ANCHORS)?;
                 goal.fill(search, roadmap, ANCHORS)?;
@@ -146,8 +165,11 @@ impl<'a> RoadmapPlanner<'a> {
                 let path = self.route(&start, &goal, &mut memory.a_star);
                 n_expanded += memory.a_star.n_expanded();
                 let Some(path) = path else { break };
-                let Some(first) = start.prove(search, roadmap, path.iter().copied()) else { continue };
-                let Some(last) = goal.prove(search, roadmap, path[first.n_skipped..].iter().rev().copied()) else {
+                let Some(first) = start.prove(search, roadmap, path.iter().copied(), self.smooth) else {
+                    continue;
+                };
+                let rest = path[first.n_skipped..].iter().rev().copied();
+                let Some(last) = goal.prove(search, roadmap, rest, self.smooth) else {
                     continue;
                 };
                 let between = &path[first.n_skipped..path.len() - last.n_skipped];
@@ -169,6 +191,20 @@ impl<'a> RoadmapPlanner<'a> {
             (_, false) => self.not_linked(End::Goal, search),
             _ => self.failure("the roadmap does not lead from start to goal".into(), search),
         }))
+    }
+
+    /// Links an end by a search of its own.
+    fn detour(&self, search: &mut Search, end: &mut QueryEnd, (seed, which): (u64, usize)) -> Result<(), Stop> {
+        for (index, (_, place)) in self.places_around(&end.pose, 0..DETOURS).into_iter().enumerate() {
+            let Some(&node) = self.roadmap.index.nodes_at(place).first() else { continue };
+            let mut own = search.for_detour((seed, which * DETOURS + index), DETOUR_WORK.min(search.work_left()));
+            let found = end.detour(&mut own, self.roadmap, node as usize);
+            search.workspace.work += own.workspace.work;
+            if found? {
+                break;
+            }
+        }
+        Ok(())
     }
 
     /// The places with nodes that are `ring` in the order of their distance from a pose, with that distance.
@@ -205,14 +241,16 @@ impl<'a> RoadmapPlanner<'a> {
 
     /// All motions from the start to the goal along a path. None when what is stored does not fit together.
     fn motions(&self, search: &mut Search, [first, last]: [&Link; 2], path: &[usize]) -> Option<Sequence> {
-        let mut way = first.changes.clone().then(first.transfer.reversed())?;
+        let mut way = first.way.reversed();
         for pair in path.windows(2) {
             let edge = self.roadmap.index.edge_between(pair[0], pair[1])?;
             way = way.then(motion_along(&self.model, self.roadmap, edge, pair[0])?)?;
         }
-        way = way.then(last.transfer.clone())?.then(last.changes.reversed())?;
-        straighten(search, &mut way);
-        Some(way)
+        way = way.then(last.way.clone())?;
+        if self.smooth {
+            straighten(search, &mut way);
+        }
+        Some(way.with_transfers_joined())
     }
 
     fn not_linked(&self, end: End, search: &Search) -> Failure {
@@ -272,16 +310,20 @@ impl GraspRoadmap {
     pub fn grown_by(self, answer: &Answer) -> Self {
         let GraspRoadmap { mut about, graph, mut landmarks, .. } = self;
         let mut registry = Registry::new(graph);
-        for link in &answer.links {
-            let place = registry.add_place(link.transfer.end().world_from_object);
-            let mut legs = legs_of(&link.transfer, place);
-            legs.extend(legs_of(&link.changes.reversed(), place));
+        let before = (registry.graph().nodes.len(), registry.graph().edges.len());
+        for link in answer.links.iter().filter(|link| link.can_be_kept) {
+            let legs = legs_of(&link.way, |pose| registry.add_place(*pose));
             registry.add_legs(link.node as u32, &legs);
         }
         about.n_grown += 1;
         let graph = registry.into_graph();
         let index = Index::new(&graph, about.costs);
-        landmarks.extend(&graph, &index);
+        if graph.edges.len() - before.1 == graph.nodes.len() - before.0 {
+            landmarks.extend(&graph, &index);
+        } else {
+            // What was added closes a ring: ways between old nodes may have become shorter.
+            landmarks = Landmarks::choose(&graph, &index);
+        }
         GraspRoadmap { about, graph, landmarks, index }
     }
 }

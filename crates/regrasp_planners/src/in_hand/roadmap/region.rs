@@ -48,8 +48,8 @@ impl Region {
         if !((length - 1.0).abs() < 1e-6) {
             return Err("the reference quaternion is not of length one".into());
         }
-        if !(self.max_angle > 0.0 && self.max_angle <= std::f64::consts::PI) {
-            return Err(format!("max_angle is {}; it must be above 0 and at most pi", self.max_angle));
+        if !(LEAST_ANGLE..=std::f64::consts::PI).contains(&self.max_angle) {
+            return Err(format!("max_angle is {}; it must be from {LEAST_ANGLE} to pi", self.max_angle));
         }
         Ok(())
     }
@@ -72,10 +72,11 @@ impl Region {
 
     /// An angle with density proportional to `1 - cos`, which is that of uniform rotations.
     fn draw_angle(&self, rng: &mut Rng) -> f64 {
-        let most = 1.0 - self.max_angle.cos();
+        // 1 - cos a is 2 sin^2 (a/2), which small angles keep their digits in.
+        let most = (0.5 * self.max_angle).sin().powi(2);
         loop {
             let angle = self.max_angle * rng.unit();
-            if rng.unit() * most < 1.0 - angle.cos() {
+            if rng.unit() * most < (0.5 * angle).sin().powi(2) {
                 return angle;
             }
         }
@@ -90,6 +91,8 @@ impl Region {
     }
 }
 
+/// Smallest `max_angle`, in radians.
+const LEAST_ANGLE: f64 = 1e-6;
 /// Poses drawn for one place, of which the one farthest from the places before is taken (Mitchell 1991, "best
 /// candidate"): they lie more evenly than if drawn alone.
 const CANDIDATES: u64 = 6;
@@ -127,6 +130,13 @@ pub fn near_distance(a: &Pose, b: &Pose, turn_length: f64) -> f64 {
     (a.translation.vector - b.translation.vector).norm() + turn_length * 2.0 * cosine.acos()
 }
 
+/// A lower bound of [`near_distance`], with room for rounding.
+fn at_least(a: &Pose, b: &Pose, turn_length: f64) -> f64 {
+    let cosine = a.rotation.coords.dot(&b.rotation.coords).abs().min(1.0);
+    let chord = (2.0 - 2.0 * cosine).max(0.0).sqrt();
+    (1.0 - 1e-9) * ((a.translation.vector - b.translation.vector).norm() + turn_length * 2.0 * chord) - 1e-9
+}
+
 /// The `n` places nearest to `pose` for which `admit` holds, nearest first.
 pub fn nearest_places(
     places: &[Pose],
@@ -138,6 +148,11 @@ pub fn nearest_places(
     let mut best: Vec<(f64, usize)> = Vec::with_capacity(n + 1);
     for (index, place) in places.iter().enumerate() {
         if !admit(index) {
+            continue;
+        }
+        // No angle is less than its chord, which is cheaper.
+        let farthest = if best.len() < n { f64::INFINITY } else { best.last().map_or(0.0, |last| last.0) };
+        if at_least(place, pose, turn_length) > farthest {
             continue;
         }
         let distance = near_distance(place, pose, turn_length);

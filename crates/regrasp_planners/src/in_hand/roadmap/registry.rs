@@ -2,7 +2,8 @@
 
 use super::super::model::MAX_FINGERS;
 use super::super::state::GraspState;
-use super::graph::{Edge, FootholdIds, Graph, Leg, Node, Passage};
+use super::super::workspace::HandJoints;
+use super::graph::{Edge, FootholdIds, Graph, Leg, NOT_STORED, Node, Passage};
 use regrasp_geometry::Pose;
 use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
@@ -73,22 +74,36 @@ impl Registry {
         let mut here = from;
         for leg in legs {
             here = match leg {
-                Leg::Transfer { place, joints } => self.add_transfer(here, *place, joints),
+                Leg::Transfer { place, joints, between } => {
+                    self.add_transfer(here, *place, joints, between.as_deref())?
+                }
                 Leg::Relocation { finger, path, contact } => self.add_relocation(here, *finger, path, contact)?,
             };
         }
         Some(here)
     }
 
-    fn add_transfer(&mut self, from: u32, place: u32, joints: &[Coordinates]) -> u32 {
+    fn add_transfer(
+        &mut self,
+        from: u32,
+        place: u32,
+        joints: &[Coordinates],
+        between: Option<&[HandJoints]>,
+    ) -> Option<u32> {
+        let first = u32::try_from(self.graph.ways.len()).ok()?;
         let mut footholds = [0; MAX_FINGERS];
         for finger in 0..self.graph.n_fingers() {
             let contact = self.graph.contact_id(from as usize, finger);
             footholds[finger] = self.foothold_id(place, finger, contact, &joints[finger]);
         }
         let to = self.node_id(place, footholds);
-        self.add_edge(Edge { from, to, passage: Passage::Transfer });
-        to
+        let stored = between.and_then(|moments| Some((moments, u16::try_from(moments.len()).ok()?)));
+        let stored = stored.filter(|&(_, n)| n != NOT_STORED);
+        let (moments, n_between) = stored.unwrap_or((&[], NOT_STORED));
+        if self.add_edge(Edge { from, to, passage: Passage::Transfer { first, n_between } }) {
+            self.graph.ways.extend(moments.iter().flatten().flatten().map(|&q| q as f32));
+        }
+        Some(to)
     }
 
     fn add_relocation(&mut self, from: u32, finger: usize, path: &[Coordinates], contact: &Contact) -> Option<u32> {
