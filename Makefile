@@ -90,12 +90,14 @@ endif
 
 FUZZ_TARGETS := urdf srdf hand_toml scene_toml stl obj plan_json roadmap
 FUZZ_RUNS ?= 1000000
+# Inputs go through files: in memory where the system has such a folder.
+FUZZ_TMP ?= $(or $(wildcard /dev/shm),/tmp)
 
 # Needs a nightly toolchain and cargo-fuzz (cargo install cargo-fuzz).
 fuzz:
 	for target in $(FUZZ_TARGETS); do \
 	  mkdir -p fuzz/corpus/$$target && cp -n fuzz/seeds/$$target/* fuzz/corpus/$$target/ ; \
-	  cargo +nightly fuzz run --sanitizer none $$target -- -runs=$(FUZZ_RUNS) -max_len=4096 -timeout=5 -rss_limit_mb=1024 || exit 1 ; \
+	  TMPDIR=$(FUZZ_TMP) cargo +nightly fuzz run --sanitizer none $$target -- -runs=$(FUZZ_RUNS) -max_len=4096 -timeout=30 -rss_limit_mb=1024 || exit 1 ; \
 	done
 
 docs:
