@@ -4,9 +4,9 @@
 //! gone backwards, so what leads from the goal leads to it.
 
 use super::search::{Search, Stop};
-use super::shorten::{Arrival, change_grasp, whole_transfer};
+use super::shorten::{change_grasp_over, whole_transfer};
 use super::state::{GraspState, Sequence};
-use super::tree::{Tree, land};
+use super::tree::{Place, Tree, land};
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;
 
@@ -49,7 +49,7 @@ pub fn grow(search: &mut Search, start: Option<GraspState>, goal_grasp: Option<&
                 search.note(trees[0].nodes[node].state());
             }
             if let Some(solution) =
-                meet(search, &mut trees, growing, node, &target).or_else(|| bridge(search, &trees, growing, node))
+                meet(search, &mut trees, growing, node, &target).or_else(|| bridge(search, &mut trees, growing, node))
             {
                 return Ok(solution);
             }
@@ -118,8 +118,9 @@ fn meet(search: &mut Search, trees: &mut [Tree; 2], growing: usize, node: usize,
 }
 
 /// From a new node straight to the nearest pose of the other tree, and there into one of its grasps.
-fn bridge(search: &mut Search, trees: &[Tree; 2], growing: usize, node: usize) -> Option<Sequence> {
-    let (tree, other) = (&trees[growing], &trees[1 - growing]);
+fn bridge(search: &mut Search, trees: &mut [Tree; 2], growing: usize, node: usize) -> Option<Sequence> {
+    let [first, second] = trees;
+    let (tree, other) = if growing == 0 { (&*first, second) } else { (&*second, first) };
     let state = tree.nodes[node].state();
     let mut nearest = (f64::INFINITY, None);
     for (index, place) in other.places.iter().enumerate() {
@@ -137,13 +138,14 @@ fn bridge(search: &mut Search, trees: &[Tree; 2], growing: usize, node: usize) -
 
 /// `way` and then relocations into exactly one of the nodes at `place` of `other`, which has the object pose that `way`
 /// ends at.
-fn join(search: &mut Search, way: &Sequence, other: &Tree, place: usize) -> Option<(usize, Sequence)> {
-    let nodes = &other.places[place].nodes;
+fn join(search: &mut Search, way: &Sequence, other: &mut Tree, place: usize) -> Option<(usize, Sequence)> {
+    let Tree { nodes: all, places, .. } = other;
+    let Place { nodes, pool, .. } = &mut places[place];
     (0..JOINS.min(nodes.len())).find_map(|_| {
         let there = nodes[search.rng.below(nodes.len())];
         let mut rng = Rng::child(&search.rng, "join", 0);
         search.rng.bits();
-        Some((there, change_grasp(search, way, other.nodes[there].state(), Arrival::Exact, &mut rng)?))
+        Some((there, change_grasp_over(search, way, all[there].state(), pool, &mut rng)?))
     })
 }
 

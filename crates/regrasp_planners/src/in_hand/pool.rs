@@ -76,6 +76,20 @@ impl Pool {
         search.n_samples += (footholds.len() - n_before) as u64;
     }
 
+    /// Up to `n_wanted` candidates of `finger`, any; new ones are drawn only where there are too few.
+    ///
+    /// The search's workspace is left anywhere.
+    pub fn any(&mut self, search: &mut Search, finger: usize, n_wanted: usize) -> Vec<Candidate> {
+        if self.of_finger[finger].len() < n_wanted {
+            self.grow(search, finger);
+        }
+        let footholds = &self.of_finger[finger];
+        let mut order: Vec<usize> = (0..footholds.len()).collect();
+        search.rng.shuffle(&mut order);
+        order.truncate(n_wanted);
+        order.into_iter().map(|which| footholds[which].candidate(footholds[which].rank())).collect()
+    }
+
     /// Up to `n_wanted` candidates of `finger` for the way to the aim: those that follow farthest, and one of the others
     /// for variety. Empty when none was ever found.
     ///

@@ -6,6 +6,7 @@ use super::relocate::{Foothold, relocate};
 use super::state::{GraspState, Sequence};
 use super::workspace::Workspace;
 use regrasp_base::Rng;
+use regrasp_roadmap::astar::{AStar, Limits};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 
 /// Relocations already tried from one state between one set of options: what moved before decides what is in the way.
@@ -13,6 +14,13 @@ use regrasp_robot::kinematics::finger_ik::Coordinates;
 pub struct Tried {
     /// (options of all fingers before, finger, option after) and the path, if there is one.
     known: Vec<(Choice, usize, usize, Option<Vec<Coordinates>>)>,
+}
+
+impl Tried {
+    /// True when this relocation was tried and has no path.
+    fn failed(&self, before: &Choice, finger: usize, option: usize) -> bool {
+        self.known.iter().any(|(c, f, o, path)| path.is_none() && *f == finger && *o == option && c == before)
+    }
 }
 
 /// Moves fingers one at a time from option 0 of each to `goal`; each leaves only where the others that hold are closed.
@@ -39,6 +47,78 @@ pub fn regrasp(
     }
     Some(way)
 }
+
+/// Moves fingers one at a time from option 0 of each to `goal` by the fewest relocations, over other options where need be:
+/// where two grasps have too few fingers in common to hold by, a third one leads from one to the other.
+///
+/// The order is sought in closure alone; a relocation that is then found impossible is left out and the order sought again,
+/// with `n_tries` relocations tried in all. `start` holds the options 0.
+pub fn regrasp_over(
+    workspace: &mut Workspace,
+    start: &GraspState,
+    options: &[Vec<Candidate>],
+    goal: &Choice,
+    table: &mut ClosureTable,
+    n_tries: usize,
+    rng: &mut Rng,
+) -> Option<Sequence> {
+    let n = options.len();
+    let all = (1u32 << n) - 1;
+    let base = options.iter().map(Vec::len).max().unwrap_or(1);
+    let as_node = |choice: &Choice| choice.iter().rev().fold(0, |node, &option| node * base + option);
+    let as_choice = |mut node: usize| -> Choice {
+        let digit = |_| {
+            let option = node % base;
+            node /= base;
+            option
+        };
+        (0..n).map(digit).collect()
+    };
+    let first: Choice = (0..n).map(|_| 0).collect();
+    let (mut tried, mut search) = (Tried::default(), AStar::new());
+    loop {
+        let limits = Limits { n_expanded: MOST_GRASPS, ..Limits::NONE };
+        let neighbours = |node: usize, edges: &mut Vec<(usize, f64)>| {
+            let choice = as_choice(node);
+            for finger in 0..n {
+                if !table.is_closed(&choice, all & !(1 << finger)) {
+                    continue;
+                }
+                for option in (0..options[finger].len()).filter(|&option| option != choice[finger]) {
+                    let mut next = choice.clone();
+                    next[finger] = option;
+                    if table.is_closed(&next, all) && !tried.failed(&choice, finger, option) {
+                        edges.push((as_node(&next), 1.0));
+                    }
+                }
+            }
+        };
+        // A finger that is not at its goal has to move once at least.
+        let n_away = |node: usize| as_choice(node).iter().zip(goal).filter(|(a, b)| a != b).count() as f64;
+        let goal_node = as_node(goal);
+        let path =
+            search.cheapest_path_within(limits, as_node(&first), |node| node == goal_node, neighbours, n_away)?;
+        let mut way = Sequence::at(start.clone());
+        let is_whole = path.nodes.windows(2).all(|pair| {
+            let (before, after) = (as_choice(pair[0]), as_choice(pair[1]));
+            let Some(finger) = (0..n).find(|&finger| before[finger] != after[finger]) else { return false };
+            let option = after[finger];
+            let which = try_relocation(workspace, start, options, &before, finger, option, &mut tried, rng);
+            let Some(path) = &tried.known[which].3 else { return false };
+            way.push_regrasp(finger, options[finger][option].contact, path.clone());
+            true
+        });
+        if is_whole {
+            return Some(way);
+        }
+        if tried.known.len() >= n_tries {
+            return None;
+        }
+    }
+}
+
+/// Most grasps looked at for an order.
+const MOST_GRASPS: usize = 400;
 
 fn search(
     workspace: &mut Workspace,

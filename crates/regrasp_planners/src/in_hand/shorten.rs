@@ -3,7 +3,8 @@
 
 use super::candidates::Candidate;
 use super::combine::{Choice, ClosureTable};
-use super::regrasp::{Tried, regrasp};
+use super::pool::Pool;
+use super::regrasp::{Tried, regrasp, regrasp_over};
 use super::search::{Search, Stop};
 use super::state::{GraspState, Moment, Motion, Sequence, Step};
 use super::transfer::{follow_contact, transfer};
@@ -14,6 +15,12 @@ use regrasp_geometry::collision::Placement;
 
 /// Joints nearer than this differ by what solvers leave: they are set on each other, in radians or metres.
 pub const SAME_POSTURE: f64 = 1e-6;
+
+/// Other contacts per finger over which one grasp is changed into another.
+const OTHERS: usize = 3;
+
+/// Relocations tried for such a change.
+const RELOCATIONS: usize = 24;
 
 /// Fraction of the usual iterations of RRT-Connect for relocations that others can stand in for.
 pub const CASUAL: usize = 8;
@@ -192,6 +199,29 @@ pub fn change_grasp(
     arrival: Arrival,
     rng: &mut Rng,
 ) -> Option<Sequence> {
+    change(search, way, to, arrival, rng, None)
+}
+
+/// As [`change_grasp`] with exact arrival; where two postures of each finger are not enough, over others of `pool`, which is
+/// at the pose that `way` ends at.
+pub fn change_grasp_over(
+    search: &mut Search,
+    way: &Sequence,
+    to: &GraspState,
+    pool: &mut Pool,
+    rng: &mut Rng,
+) -> Option<Sequence> {
+    change(search, way, to, Arrival::Exact, rng, Some(pool))
+}
+
+fn change(
+    search: &mut Search,
+    way: &Sequence,
+    to: &GraspState,
+    arrival: Arrival,
+    rng: &mut Rng,
+    pool: Option<&mut Pool>,
+) -> Option<Sequence> {
     let model = search.model();
     let is_exact = arrival == Arrival::Exact;
     let joints = if is_exact { settled_joints(way.end(), to) } else { way.end().joints.clone() };
@@ -215,7 +245,14 @@ pub fn change_grasp(
     // One of many ways to the same end: not worth a long search for a finger's way.
     search.workspace.rrt_iterations = model.settings.rrt_iterations / CASUAL;
     let tried = &mut Tried::default();
-    let change = regrasp(&mut search.workspace, way.end(), &options, &goal, &mut table, tried, rng);
+    let mut change = regrasp(&mut search.workspace, way.end(), &options, &goal, &mut table, tried, rng);
+    if let (None, Some(pool)) = (&change, pool) {
+        for (finger, of_finger) in options.iter_mut().enumerate() {
+            of_finger.extend(pool.any(search, finger, OTHERS));
+        }
+        let mut table = ClosureTable::new(model, &options);
+        change = regrasp_over(&mut search.workspace, way.end(), &options, &goal, &mut table, RELOCATIONS, rng);
+    }
     search.workspace.rrt_iterations = model.settings.rrt_iterations;
     let way = way.then(change?)?;
     (!is_exact || way.end() == to).then_some(way)
