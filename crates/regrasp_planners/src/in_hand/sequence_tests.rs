@@ -1,9 +1,10 @@
 //! Sequences of motions meet exactly, and what arrives somewhere arrives exactly there.
 
-use super::explore::draw_state;
+use super::explore::{draw_state, draw_state_at};
+use super::pool::Pool;
 use super::roadmap_tests::with_search;
-use super::shorten::{Arrival, regrasp_transfer, shorten, transfer_regrasp};
-use super::state::{GraspState, Moment, Sequence};
+use super::shorten::{Arrival, change_grasp, change_grasp_over, regrasp_transfer, shorten, transfer_regrasp};
+use super::state::{GraspState, Moment, Motion, Sequence};
 use regrasp_base::Rng;
 
 /// `state` with one finger in another posture at the same contact: a little off, as redundant fingers come back to a pose.
@@ -125,5 +126,36 @@ fn transfers_in_a_row_are_joined_and_nothing_else_changes() {
         assert_eq!(joined.steps().len() + 1, long.steps().len());
         assert!(joined.start() == long.start() && joined.end() == long.end());
         assert!(joined.clone().with_transfers_joined() == joined);
+    });
+}
+
+#[test]
+fn a_third_grasp_leads_from_one_to_another_where_none_does_directly() {
+    with_search("box_90x.toml", |search| {
+        let mut rng = Rng::keyed(5, "third grasp", 0);
+        let (mut n_direct, mut n_over) = (0, 0);
+        for _ in 0..400 {
+            let Some(from) = draw_state(search) else { continue };
+            let Some(to) = draw_state_at(search, &from.world_from_object) else { continue };
+            let here = Sequence::at(from.clone());
+            let direct = change_grasp(search, &here, &to, Arrival::Exact, &mut rng);
+            let mut pool = Pool::new(&from.world_from_object, &search.goal, search.model().n_fingers());
+            let Some(way) = change_grasp_over(search, &here, &to, &mut pool, &mut rng) else {
+                assert!(direct.is_none(), "what goes directly goes");
+                continue;
+            };
+            n_direct += u32::from(direct.is_some());
+            n_over += u32::from(direct.is_none());
+            assert!(*way.start() == from && *way.end() == to, "from exactly one grasp to exactly the other");
+            for (index, step) in way.steps().iter().enumerate() {
+                let Motion::Regrasp { finger, .. } = step.motion() else { panic!("the object moves") };
+                let (before, model) = (way.state_before(index), search.model());
+                let others = before.holding & !(1 << finger);
+                let asked = model.settings.closure_margin;
+                assert!(model.closure_margin(&before.contacts, others) >= asked, "the others hold meanwhile");
+                assert!(model.closure_margin(&step.end().contacts, step.end().holding) >= asked, "all hold afterwards");
+            }
+        }
+        assert!(n_direct >= 5 && n_over >= 5, "too little was tried: {n_direct} directly, {n_over} over others");
     });
 }
