@@ -2,6 +2,7 @@
 
 use super::combine::releasable;
 use super::model::{Body, Carrier, Model};
+use super::settings::Method;
 use super::state::GraspState;
 use super::transfer::ik_settings;
 use super::workspace::{Contacts, HandJoints, TipMode, Workspace, tip_target};
@@ -12,7 +13,7 @@ use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 use regrasp_grasp::closure::may_close;
 use regrasp_grasp::{Contact, ContactModel};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
-use regrasp_scene::GraspRequest;
+use regrasp_scene::{GraspRequest, InHandQuery};
 
 /// Distance of a given fingertip from the surface, and of a given contact point, that still counts as touching.
 const TOUCHING: f64 = 1e-4;
@@ -59,6 +60,20 @@ fn refusal(kind: FailureKind, message: String, advice: &str) -> Failure {
     }
 }
 
+/// Refuses what no search can find: hands that cannot hold or never change their grasp, poses at which the object is buried.
+pub fn refuse_hopeless(model: &Model, query: &InHandQuery) -> Result<(), Failure> {
+    refuse_holding_nothing(model)?;
+    let may_try_transfers = model.n_fingers() == 2 || model.settings.transfers_alone;
+    if model.settings.method != Method::Gait || !may_try_transfers {
+        refuse_impossible(model)?;
+    }
+    refuse_buried_object(model, End::Start, &query.world_from_object_start)?;
+    for (index, pose) in query.world_from_object_way.iter().enumerate() {
+        refuse_buried_object(model, End::Way(index + 1), pose)?;
+    }
+    refuse_buried_object(model, End::Goal, &query.world_from_object_goal)
+}
+
 /// Refuses hands of which the others can never hold while one finger is away.
 pub fn refuse_impossible(model: &Model) -> Result<(), Failure> {
     if model.may_release {
@@ -68,7 +83,7 @@ pub fn refuse_impossible(model: &Model) -> Result<(), Failure> {
 }
 
 /// Refuses hands that cannot hold an object even with all fingers.
-pub fn refuse_holding_nothing(model: &Model) -> Result<(), Failure> {
+fn refuse_holding_nothing(model: &Model) -> Result<(), Failure> {
     let all: Vec<ContactModel> = model.fingers.iter().map(|finger| finger.contact).collect();
     if may_close(&all, model.frame.friction) {
         return Ok(());

@@ -77,9 +77,7 @@ pub use validate::{NotProven, validate_once};
 
 use crate::failure::Failure;
 use attempts::{Left, run_attempts};
-use endpoints::{
-    End, given_grasp, refuse_after_transfers, refuse_buried_object, refuse_holding_nothing, refuse_impossible,
-};
+use endpoints::{End, given_grasp, refuse_after_transfers, refuse_hopeless};
 use legs::{Legs, Solution, plan_legs};
 use model::Model;
 use regrasp_base::{Budget, Interrupt, Rng};
@@ -116,30 +114,15 @@ pub fn plan_in_hand(
 ) -> Result<Plan, Failure> {
     settings.validate().expect("settings are validated where they are read");
     let model = Model::new(scene, &effective(settings));
+    refuse_hopeless(&model, query)?;
     let poses = query.poses();
     let (start_pose, goal_pose) = (query.world_from_object_start, query.world_from_object_goal);
-    refuse_holding_nothing(&model)?;
-    let may_try_transfers = model.n_fingers() == 2 || settings.transfers_alone;
-    if settings.method != Method::Gait || !may_try_transfers {
-        refuse_impossible(&model)?;
-    }
-    refuse_buried_object(&model, End::Start, &start_pose)?;
-    for (index, pose) in query.world_from_object_way.iter().enumerate() {
-        refuse_buried_object(&model, End::Way(index + 1), pose)?;
-    }
-    refuse_buried_object(&model, End::Goal, &goal_pose)?;
     let mut rng = Rng::keyed(seed, "given_grasps", 0);
     let start_grasp = given_grasp(&model, End::Start, &start_pose, &query.start_grasp, &mut rng)?;
     let goal_grasp = given_grasp(&model, End::Goal, &goal_pose, &query.goal_grasp, &mut rng)?;
 
     let legs = Legs { poses: &poses, start_grasp: start_grasp.as_ref(), goal_grasp: goal_grasp.as_ref() };
-    let base_work = if settings.method == Method::Gait {
-        settings.restart_work.saturating_mul(legs.n_legs() as u64)
-    } else {
-        budget.max_work
-    };
-    // A hand that cannot change its grasp has transfers only: what there is to find is found soon.
-    let max_work = if model.may_release { budget.max_work } else { budget.max_work.min(TRANSFERS_WORK) };
+    let (base_work, max_work) = work_limits(&model, &legs, budget);
     let found = run_attempts(settings.n_threads, base_work, max_work, |index, work, winner| {
         let mut search = Search::new(&model, (start_pose, goal_pose), (seed, index), (budget, work), winner, progress);
         let solution = plan_legs(&mut search, &legs);
@@ -153,10 +136,20 @@ pub fn plan_in_hand(
         }
         Err((interrupt, left, n_attempts)) => {
             let failure = left.failure(&model, &poses, interrupt, n_attempts);
-            let is_searched = !model.may_release && interrupt == Interrupt::WorkSpent && max_work == TRANSFERS_WORK;
-            Err(if is_searched { refuse_after_transfers(&model, failure) } else { failure })
+            let has_tried_all = interrupt == Interrupt::WorkSpent && max_work < budget.max_work;
+            Err(if has_tried_all { refuse_after_transfers(&model, failure) } else { failure })
         }
     }
+}
+
+/// Work of the first attempt, and of all together.
+fn work_limits(model: &Model, legs: &Legs, budget: &Budget) -> (u64, u64) {
+    let base_work = match model.settings.method {
+        Method::Gait => model.settings.restart_work.saturating_mul(legs.n_legs() as u64),
+        Method::Visibility | Method::Classic => budget.max_work,
+    };
+    // A hand that cannot change its grasp has transfers only: what there is to find is found soon.
+    (base_work, if model.may_release { budget.max_work } else { budget.max_work.min(TRANSFERS_WORK) })
 }
 
 /// Work after which a hand that cannot change its grasp is refused: some thousand grasps and transfers. By hand.
