@@ -1,5 +1,6 @@
 //! The object that is manipulated.
 
+use regrasp_geometry::collision::MeshBody;
 use regrasp_geometry::{Point, Shape, Surface};
 
 /// A rigid object. Its frame is the frame of its shape.
@@ -9,6 +10,8 @@ pub struct Object {
     pub name: String,
     /// Its shape.
     pub shape: Shape,
+    /// For a mesh, what collision tests ask of it.
+    pub mesh_body: Option<MeshBody>,
     /// The surface that fingertips touch.
     pub surface: Surface,
     /// Mass, in kilograms.

@@ -154,6 +154,7 @@ fn object() -> Object {
     Object {
         name: "ball".into(),
         surface: surface_of(&shape),
+        mesh_body: None,
         shape,
         mass: 0.1,
         center_of_mass: Point::origin(),
