@@ -354,11 +354,12 @@ mod tests {
                 }
             }
             let sides = edge_sides(&triangles);
-            let found: Vec<([u32; 2], Vec<(usize, usize)>)> = sides
-                .chunk_by(EdgeSide::same_edge)
-                .map(|run| (run[0].ends, run.iter().map(|side| (side.triangle(), side.corner())).collect()))
+            let runs = sides.chunk_by(EdgeSide::same_edge);
+            let found: BTreeMap<_, _> = runs
+                .map(|run| (run[0].ends, run.iter().map(|side| (side.triangle(), side.corner())).collect::<Vec<_>>()))
                 .collect();
-            assert_eq!(found, walks.into_iter().collect::<Vec<_>>());
+            assert_eq!(found, walks);
+            assert!(sides.is_sorted());
         }
     }
 }

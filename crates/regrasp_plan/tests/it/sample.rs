@@ -154,6 +154,7 @@ fn object() -> Object {
     Object {
         name: "ball".into(),
         surface: surface_of(&shape),
+        radius: OBJECT_RADIUS,
         mesh_body: None,
         shape,
         mass: 0.1,

@@ -217,7 +217,7 @@ impl<'a> Model<'a> {
             pairs,
             frame: GraspFrame {
                 center_of_mass: scene.object.center_of_mass,
-                torque_scale: scene.object.radius(),
+                torque_scale: scene.object.radius,
                 friction: scene.object.friction,
             },
             object_reach: bodies[object].center.coords.norm() + bodies[object].radius,

@@ -74,9 +74,11 @@ pub(super) fn object(root: &mut Table, files: &mut Files, found: &mut Found) -> 
             return None;
         }
     };
+    let radius = shape.reach_from(&center_of_mass);
     Some(Object {
         name,
         shape,
+        radius,
         mesh_body,
         surface,
         mass,
