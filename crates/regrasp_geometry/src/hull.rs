@@ -32,18 +32,54 @@ pub enum HullError {
 /// Below this many vertices the support is found by looking at all of them.
 const BRUTE_FORCE_LIMIT: usize = 24;
 
+/// Directions in which [`ConvexHull::around`] looks for extreme points.
+const N_DIRECTIONS: usize = 400;
+
 impl ConvexHull {
     /// The hull of `points`, verified by substitution.
     pub fn new(points: &[Point]) -> Result<Self, HullError> {
         let (vertices, triangles) = crate::reference::convex_hull(points)?;
-        ConvexHull::from_polyhedron(vertices, triangles, points)
+        ConvexHull::from_polyhedron(vertices, triangles, &PointTree::new(points))
+    }
+
+    /// A polyhedron of a few hundred corners that contains all `points` and is hardly larger than their hull: the hull
+    /// of the points that are extreme in [`N_DIRECTIONS`] directions, grown about its middle until it holds the rest.
+    ///
+    /// In `n` points this takes O(n log n), and support queries do not depend on `n`. Round shapes of many points are
+    /// exceeded by at most about half a percent of their size, polyhedra of few corners by a rounding error.
+    pub fn around(points: &[Point]) -> Result<Self, HullError> {
+        let tree = PointTree::new(points);
+        let extent = tree.nodes[0].high - tree.nodes[0].low;
+        if extent.min() < 1e-9 {
+            return Err(HullError::Flat { thickness: extent.min() });
+        }
+        let middle = Point::from((tree.nodes[0].low.coords + tree.nodes[0].high.coords) / 2.0);
+        let farthest = |direction: Vector| tree.farthest(&direction, &middle, f64::NEG_INFINITY).1;
+        let mut extreme: Vec<usize> =
+            (0..N_DIRECTIONS).map(|i| farthest(spiral_direction(i, N_DIRECTIONS).component_div(&extent))).collect();
+        extreme.sort_unstable();
+        extreme.dedup();
+        let extreme: Vec<Point> = extreme.into_iter().map(|i| tree.points[i]).collect();
+        let (mut vertices, triangles) = crate::reference::convex_hull(&extreme)?;
+        let center = Point::from(vertices.iter().map(|v| v.coords).sum::<Vector>() / vertices.len() as f64);
+        let mut scale: f64 = 1.0;
+        for corners in &triangles {
+            let Some((a, normal)) = face(&vertices, corners, extent.norm()) else { continue };
+            let offset = normal.dot(&(a - center));
+            if offset.is_nan() || offset <= 0.0 {
+                return Err(HullError::Failed { reason: "its middle lies outside a face".into() });
+            }
+            scale = scale.max(tree.farthest(&normal, &center, offset).0 / offset);
+        }
+        vertices.iter_mut().for_each(|v| *v = center + (*v - center) * (scale * (1.0 + 1e-9)));
+        ConvexHull::from_polyhedron(vertices, triangles, &tree)
     }
 
     /// Takes a polyhedron with outward triangles as hull of `points`, after verifying that it is one.
     pub(crate) fn from_polyhedron(
         vertices: Vec<Point>,
         triangles: Vec<[u32; 3]>,
-        points: &[Point],
+        points: &PointTree,
     ) -> Result<Self, HullError> {
         let n = vertices.len();
         let size = vertices.iter().map(|v| (v - vertices[0]).norm()).fold(0.0, f64::max);
@@ -54,13 +90,8 @@ impl ConvexHull {
                 adjacency[a as usize].push(b);
                 adjacency[b as usize].push(a);
             }
-            let [a, b, c] = corners.map(|i| vertices[i as usize]);
-            let normal = (b - a).cross(&(c - a));
-            if normal.norm() < 1e-12 * size * size {
-                continue;
-            }
-            let normal = normal.normalize();
-            let outside = points.iter().map(|p| normal.dot(&(p - a))).fold(0.0, f64::max);
+            let Some((a, normal)) = face(&vertices, corners, size) else { continue };
+            let (outside, _) = points.farthest(&normal, &a, 0.0);
             if outside > 1e-7 * size {
                 return Err(HullError::Failed { reason: format!("a point lies {outside:.3e} m outside a face") });
             }
@@ -114,5 +145,158 @@ impl ConvexHull {
             }
             current = next;
         }
+    }
+}
+
+/// A corner and the unit normal of a triangle; None when it has no area beside `size` squared.
+fn face(vertices: &[Point], corners: &[u32; 3], size: f64) -> Option<(Point, Vector)> {
+    let [a, b, c] = corners.map(|i| vertices[i as usize]);
+    let normal = (b - a).cross(&(c - a));
+    (normal.norm() >= 1e-12 * size * size).then(|| (a, normal.normalize()))
+}
+
+/// Direction `i` of `n` spread evenly (Fibonacci lattice; Gonzalez 2010).
+fn spiral_direction(i: usize, n: usize) -> Vector {
+    let z = 1.0 - (2 * i + 1) as f64 / n as f64;
+    let angle = i as f64 * std::f64::consts::PI * (3.0 - 5f64.sqrt());
+    let flat = (1.0 - z * z).sqrt();
+    Vector::new(flat * angle.cos(), flat * angle.sin(), z)
+}
+
+/// Points in a tree of boxes, to find the farthest along a direction without looking at all.
+#[derive(Debug)]
+pub(crate) struct PointTree {
+    nodes: Vec<PointNode>,
+    points: Vec<Point>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct PointNode {
+    low: Point,
+    high: Point,
+    first: usize,
+    count: usize,
+    /// The right child, the left one being the next node; 0 for leaves.
+    right: usize,
+}
+
+impl PointTree {
+    /// Points per leaf at most.
+    const LEAF: usize = 16;
+
+    pub fn new(points: &[Point]) -> Self {
+        let mut tree = PointTree { nodes: Vec::new(), points: Vec::new() };
+        let mut points = points.to_vec();
+        tree.add(&mut points, 0);
+        tree.points = points;
+        tree
+    }
+
+    fn add(&mut self, points: &mut [Point], first: usize) {
+        let start = points.first().copied().unwrap_or_else(Point::origin);
+        let (low, high) = points.iter().fold((start, start), |(low, high), p| (low.inf(p), high.sup(p)));
+        let node = self.nodes.len();
+        self.nodes.push(PointNode { low, high, first, count: points.len(), right: 0 });
+        if points.len() > PointTree::LEAF {
+            let axis = (high - low).imax();
+            let middle = points.len() / 2;
+            points.select_nth_unstable_by(middle, |p, q| p[axis].total_cmp(&q[axis]));
+            let (left, right) = points.split_at_mut(middle);
+            self.add(left, first);
+            self.nodes[node].right = self.nodes.len();
+            self.add(right, first + middle);
+        }
+    }
+
+    /// Largest `direction . (p - from)` over the points, and the place of that point, where it is above `least`;
+    /// else `least` and place 0.
+    ///
+    /// Bounds of boxes are computed as values of points are, so rounding never hides a point.
+    pub fn farthest(&self, direction: &Vector, from: &Point, least: f64) -> (f64, usize) {
+        let bound = |node: &PointNode| {
+            let corner =
+                Point::from(Vector::from_fn(|k, _| if direction[k] >= 0.0 { node.high[k] } else { node.low[k] }));
+            direction.dot(&(corner - from))
+        };
+        let mut best = (least, 0);
+        let mut stack = vec![0];
+        while let Some(index) = stack.pop() {
+            let node = &self.nodes[index];
+            if bound(node) <= best.0 {
+                continue;
+            }
+            if node.right == 0 {
+                for (i, p) in self.points.iter().enumerate().skip(node.first).take(node.count) {
+                    let value = direction.dot(&(p - from));
+                    if value > best.0 {
+                        best = (value, i);
+                    }
+                }
+                continue;
+            }
+            let (left, right) = (index + 1, node.right);
+            let left_first = bound(&self.nodes[left]) >= bound(&self.nodes[right]);
+            stack.extend(if left_first { [right, left] } else { [left, right] });
+        }
+        best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use regrasp_base::Rng;
+
+    fn cloud(n: usize, index: u64) -> Vec<Point> {
+        let mut rng = Rng::keyed(7, "hull", index);
+        let radii = Vector::new(0.05, 0.03, 0.01);
+        (0..n).map(|_| Point::from(Vector::from(rng.direction()).component_mul(&radii) * rng.unit().sqrt())).collect()
+    }
+
+    #[test]
+    fn the_farthest_point_is_that_of_looking_at_all() {
+        let mut rng = Rng::keyed(1, "hull", 0);
+        for (index, n) in [1, 2, 16, 17, 40, 500, 3000].into_iter().enumerate() {
+            let points = cloud(n, index as u64);
+            let tree = PointTree::new(&points);
+            for _ in 0..200 {
+                let (direction, from) = (Vector::from(rng.direction()), points[rng.below(n)]);
+                let (value, place) = tree.farthest(&direction, &from, f64::NEG_INFINITY);
+                let all = points.iter().map(|p| direction.dot(&(p - from))).fold(f64::NEG_INFINITY, f64::max);
+                assert_eq!(value, all);
+                assert_eq!(direction.dot(&(tree.points[place] - from)), all);
+                assert_eq!(tree.farthest(&direction, &from, 1.0), (1.0, 0));
+            }
+        }
+    }
+
+    #[test]
+    fn a_hull_around_contains_all_points_and_is_hardly_larger() {
+        let mut rng = Rng::keyed(2, "hull", 0);
+        for (index, n) in [10, 300, 20_000].into_iter().enumerate() {
+            let points = cloud(n, 10 + index as u64);
+            let (exact, around) = (ConvexHull::new(&points).unwrap(), ConvexHull::around(&points).unwrap());
+            for _ in 0..500 {
+                let direction = Vector::from(rng.direction());
+                let (mut hint, mut other) = (0, 0);
+                let inner = direction.dot(&exact.support(&direction, &mut hint).coords);
+                let outer = direction.dot(&around.support(&direction, &mut other).coords);
+                assert!(outer >= inner - 1e-12, "{n} points: {outer} {inner}");
+                assert!(outer <= inner + 0.03 * inner.abs(), "{n} points: {outer} {inner}");
+            }
+        }
+        let flat: Vec<Point> = cloud(100, 20).into_iter().map(|p| Point::new(p.x, p.y, 0.0)).collect();
+        assert!(matches!(ConvexHull::around(&flat), Err(HullError::Flat { .. })));
+    }
+
+    #[test]
+    fn a_polyhedron_that_leaves_a_point_out_is_no_hull() {
+        let points = cloud(400, 30);
+        let hull = ConvexHull::new(&points).unwrap();
+        let mut more = points.clone();
+        more.push(Point::new(0.0, 0.0, 0.02));
+        let tree = PointTree::new(&more);
+        let refused = ConvexHull::from_polyhedron(hull.vertices().to_vec(), hull.triangles().to_vec(), &tree);
+        assert!(matches!(refused, Err(HullError::Failed { .. })));
     }
 }

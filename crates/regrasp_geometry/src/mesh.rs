@@ -1,7 +1,6 @@
 //! Triangle meshes as read, validated, with their statistics.
 
 use crate::frame::{Point, Vector};
-use std::collections::BTreeMap;
 
 /// A triangle mesh with finite vertices, indices in range and no triangle of zero area.
 #[derive(Debug, Clone, PartialEq)]
@@ -150,6 +149,9 @@ impl TriangleMesh {
 
     /// The same mesh under `p -> scale * p` (component-wise); a mirroring scale flips the winding back.
     pub fn scaled(&self, scale: Vector) -> Result<Self, MeshError> {
+        if scale == Vector::repeat(1.0) {
+            return Ok(self.clone());
+        }
         let vertices = self.vertices.iter().map(|v| Point::from(v.coords.component_mul(&scale))).collect();
         let mesh = TriangleMesh::new(vertices, self.triangles.clone())?;
         let mirrored = scale.x * scale.y * scale.z < 0.0;
@@ -157,20 +159,27 @@ impl TriangleMesh {
     }
 }
 
-/// Vertices without duplicates, and for each old vertex the index of the one that stands for it.
+/// Vertices without duplicates, and for each old vertex the index of the one that stands for it: the first.
 fn merge_equal(vertices: Vec<Point>, n_merged: &mut usize) -> (Vec<Point>, Vec<u32>) {
-    let mut order: Vec<u32> = (0..vertices.len() as u32).collect();
     let key = |i: u32| {
         let v = &vertices[i as usize];
         // +0.0 turns -0.0 into 0.0, so that the two compare equal.
         [(v.x + 0.0).to_bits(), (v.y + 0.0).to_bits(), (v.z + 0.0).to_bits()]
     };
-    order.sort_unstable_by_key(|&i| (key(i), i));
-    let mut stands_for = vec![0u32; vertices.len()];
-    for pair in 0..order.len() {
-        let i = order[pair];
-        let same = pair > 0 && key(order[pair - 1]) == key(i);
-        stands_for[i as usize] = if same { stands_for[order[pair - 1] as usize] } else { i };
+    // Equal vertices share a bucket; few others do.
+    let n_bits = vertices.len().next_power_of_two().trailing_zeros().max(1);
+    let bucket = |i: usize| (scattered(key(i as u32)) >> (64 - n_bits)) as u32;
+    let (mut order, starts) = by_bucket(vertices.len(), 1 << n_bits, bucket);
+    let mut stands_for: Vec<u32> = (0..vertices.len() as u32).collect();
+    for range in starts.windows(2) {
+        let members = &mut order[range[0] as usize..range[1] as usize];
+        if members.len() < 2 {
+            continue;
+        }
+        members.sort_unstable_by_key(|&i| (key(i), i));
+        for same in members.chunk_by(|&i, &j| key(i) == key(j)) {
+            same.iter().for_each(|&i| stands_for[i as usize] = same[0]);
+        }
     }
     let mut new_index = vec![u32::MAX; vertices.len()];
     let mut kept = Vec::new();
@@ -186,19 +195,81 @@ fn merge_equal(vertices: Vec<Point>, n_merged: &mut usize) -> (Vec<Point>, Vec<u
     (kept, merged_from)
 }
 
-fn count_edges(triangles: &[[u32; 3]], statistics: &mut MeshStatistics) {
-    // Per undirected edge: how often it is walked upwards and downwards.
-    let mut walks: BTreeMap<(u32, u32), [usize; 2]> = BTreeMap::new();
-    for corners in triangles {
-        for k in 0..3 {
-            let (a, b) = (corners[k], corners[(k + 1) % 3]);
-            walks.entry((a.min(b), a.max(b))).or_default()[usize::from(a > b)] += 1;
-        }
+/// A number that differs in its leading bits for keys that differ anywhere (the finaliser of MurmurHash3).
+fn scattered(key: [u64; 3]) -> u64 {
+    key.iter().fold(0, |mixed: u64, &word| {
+        let x = (mixed ^ word).wrapping_mul(0xff51_afd7_ed55_8ccd);
+        let x = (x ^ (x >> 33)).wrapping_mul(0xc4ce_b9fe_1a85_ec53);
+        x ^ (x >> 33)
+    })
+}
+
+/// The numbers `0..n` by bucket, in order within each, and where each bucket starts (counting sort).
+fn by_bucket(n: usize, n_buckets: usize, bucket: impl Fn(usize) -> u32) -> (Vec<u32>, Vec<u32>) {
+    let mut starts = vec![0u32; n_buckets + 1];
+    for i in 0..n {
+        starts[bucket(i) as usize + 1] += 1;
     }
-    for [up, down] in walks.values() {
-        match up + down {
+    for k in 0..n_buckets {
+        starts[k + 1] += starts[k];
+    }
+    let mut next = starts.clone();
+    let mut order = vec![0u32; n];
+    for i in 0..n {
+        let place = &mut next[bucket(i) as usize];
+        order[*place as usize] = i as u32;
+        *place += 1;
+    }
+    (order, starts)
+}
+
+/// One side of an undirected edge: the triangle that has it, and which of its edges it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct EdgeSide {
+    ends: [u32; 2],
+    /// Three times the triangle, plus the corner that the edge starts at.
+    side: u32,
+}
+
+impl EdgeSide {
+    pub(crate) fn triangle(&self) -> usize {
+        self.side as usize / 3
+    }
+
+    /// The edge goes from this corner of the triangle to the next.
+    pub(crate) fn corner(&self) -> usize {
+        self.side as usize % 3
+    }
+
+    pub(crate) fn same_edge(&self, other: &EdgeSide) -> bool {
+        self.ends == other.ends
+    }
+}
+
+/// Sides of all edges by their ends (the lower vertex first), then by triangle and corner.
+pub(crate) fn edge_sides(triangles: &[[u32; 3]]) -> Vec<EdgeSide> {
+    let n_vertices = triangles.iter().flatten().max().map_or(0, |&last| last as usize + 1);
+    let ends_of = |side: usize| {
+        let (corners, k) = (triangles[side / 3], side % 3);
+        let (a, b) = (corners[k], corners[(k + 1) % 3]);
+        [a.min(b), a.max(b)]
+    };
+    let (order, starts) = by_bucket(3 * triangles.len(), n_vertices, |side| ends_of(side)[0]);
+    let mut sides: Vec<EdgeSide> =
+        order.into_iter().map(|side| EdgeSide { ends: ends_of(side as usize), side }).collect();
+    for range in starts.windows(2) {
+        sides[range[0] as usize..range[1] as usize].sort_unstable();
+    }
+    sides
+}
+
+fn count_edges(triangles: &[[u32; 3]], statistics: &mut MeshStatistics) {
+    for sides in edge_sides(triangles).chunk_by(EdgeSide::same_edge) {
+        // How often the edge is walked from its lower to its higher vertex.
+        let n_up = sides.iter().filter(|side| triangles[side.triangle()][side.corner()] == side.ends[0]).count();
+        match sides.len() {
             1 => statistics.open_edges += 1,
-            2 if *up != 1 => statistics.flipped_edges += 1,
+            2 if n_up != 1 => statistics.flipped_edges += 1,
             2 => {}
             _ => statistics.non_manifold_edges += 1,
         }
@@ -248,5 +319,47 @@ mod tests {
         ));
         vertices[2].y = f64::NAN;
         assert!(matches!(TriangleMesh::new(vertices, triangles), Err(MeshError::NotFinite { first: 2, count: 1 })));
+    }
+
+    #[test]
+    fn sides_and_merged_vertices_are_those_of_maps() {
+        use regrasp_base::Rng;
+        use std::collections::BTreeMap;
+        let mut rng = Rng::keyed(1, "mesh", 0);
+        for n in [4, 30, 700] {
+            // On a coarse grid about zero many vertices fall together, some as 0.0 and -0.0.
+            let coordinate =
+                |rng: &mut Rng| (rng.uniform(-3.0, 3.0) as i32 as f64) * 0.5 * if rng.chance(0.5) { 1.0 } else { -1.0 };
+            let points: Vec<Point> =
+                (0..n).map(|_| Point::new(coordinate(&mut rng), coordinate(&mut rng), coordinate(&mut rng))).collect();
+            let mut n_merged = 0;
+            let (kept, merged_from) = merge_equal(points.clone(), &mut n_merged);
+            let mut expected: Vec<Point> = Vec::new();
+            for (i, p) in points.iter().enumerate() {
+                let place = expected.iter().position(|q| q == p).unwrap_or_else(|| {
+                    expected.push(*p);
+                    expected.len() - 1
+                });
+                assert_eq!(merged_from[i] as usize, place);
+            }
+            assert_eq!((&kept, n_merged), (&expected, n - expected.len()));
+
+            let mut corner = || rng.below(n) as u32;
+            let triangles: Vec<[u32; 3]> = (0..4 * n).map(|_| [corner(), corner(), corner()]).collect();
+            let mut walks: BTreeMap<[u32; 2], Vec<(usize, usize)>> = BTreeMap::new();
+            for (i, corners) in triangles.iter().enumerate() {
+                for k in 0..3 {
+                    let (a, b) = (corners[k], corners[(k + 1) % 3]);
+                    walks.entry([a.min(b), a.max(b)]).or_default().push((i, k));
+                }
+            }
+            let sides = edge_sides(&triangles);
+            let runs = sides.chunk_by(EdgeSide::same_edge);
+            let found: BTreeMap<_, _> = runs
+                .map(|run| (run[0].ends, run.iter().map(|side| (side.triangle(), side.corner())).collect::<Vec<_>>()))
+                .collect();
+            assert_eq!(found, walks);
+            assert!(sides.is_sorted());
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! The object that is manipulated.
 
+use regrasp_geometry::collision::MeshBody;
 use regrasp_geometry::{Point, Shape, Surface};
 
 /// A rigid object. Its frame is the frame of its shape.
@@ -9,6 +10,10 @@ pub struct Object {
     pub name: String,
     /// Its shape.
     pub shape: Shape,
+    /// Largest distance of a point of the object from its centre of mass, in metres: the torque scale of grasp quality.
+    pub radius: f64,
+    /// For a mesh, what collision tests ask of it.
+    pub mesh_body: Option<MeshBody>,
     /// The surface that fingertips touch.
     pub surface: Surface,
     /// Mass, in kilograms.
@@ -21,11 +26,4 @@ pub struct Object {
     pub edge_distance: f64,
     /// Edges of a mesh that fold by more than this are creases, in radians.
     pub crease_angle: f64,
-}
-
-impl Object {
-    /// Largest distance of a point of the object from its centre of mass: the torque scale of grasp quality.
-    pub fn radius(&self) -> f64 {
-        self.shape.reach_from(&self.center_of_mass)
-    }
 }

@@ -1,6 +1,7 @@
 //! The scene: hand, object, obstacles.
 
 use crate::object::Object;
+use regrasp_geometry::collision::MeshBody;
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_robot::Hand;
 use std::path::PathBuf;
@@ -12,6 +13,8 @@ pub struct Obstacle {
     pub name: String,
     /// Its shape, placed in the world.
     pub placed: PlacedShape,
+    /// For a mesh, what collision tests ask of it.
+    pub mesh_body: Option<MeshBody>,
 }
 
 /// A file that the scene was made from.

@@ -5,10 +5,12 @@
 
 use super::gjk::{Answer, separation};
 use super::placement::Placement;
-use crate::frame::Point;
+use crate::frame::{Point, Pose, Vector};
+use crate::hull::ConvexHull;
 use crate::mesh::TriangleMesh;
-use crate::shape::Shape;
+use crate::shape::{PlacedShape, Shape};
 use nalgebra::Matrix3;
+use std::sync::Arc;
 
 /// A tree of axis-aligned boxes over the triangles of a mesh.
 #[derive(Debug, Clone)]
@@ -31,6 +33,56 @@ struct Node {
 
 const LEAF_SIZE: usize = 4;
 
+impl Node {
+    fn corners(&self) -> [Point; 8] {
+        std::array::from_fn(|i| {
+            Point::from(Vector::from_fn(|k, _| if i >> k & 1 == 1 { self.high[k] } else { self.low[k] }))
+        })
+    }
+}
+
+/// A mesh made ready for collision tests, once and for all of them.
+#[derive(Debug, Clone)]
+pub struct MeshBody {
+    /// A convex shape, placed in the mesh frame, that contains the mesh: a first test.
+    pub bound: PlacedShape,
+    /// The triangles, which decide.
+    pub tree: Arc<MeshTree>,
+}
+
+/// Up to this many vertices the bound of a mesh is its convex hull.
+const EXACT_HULL_UP_TO: usize = 20_000;
+
+impl MeshBody {
+    /// Bounds `mesh` by its hull; by a little more when it has many vertices, by a box when it is flat.
+    pub fn new(mesh: &TriangleMesh) -> Self {
+        let vertices = mesh.vertices();
+        let hull =
+            if vertices.len() <= EXACT_HULL_UP_TO { ConvexHull::new(vertices) } else { ConvexHull::around(vertices) };
+        let bound = match hull {
+            Ok(hull) => PlacedShape { parent_from_shape: Pose::identity(), shape: Shape::Convex(Arc::new(hull)) },
+            Err(_) => {
+                let (low, high) = mesh.bounds();
+                let half_extents = ((high - low) / 2.0).map(|h: f64| h.max(1e-9));
+                let middle = nalgebra::center(&low, &high);
+                PlacedShape {
+                    parent_from_shape: Pose::translation(middle.x, middle.y, middle.z),
+                    shape: Shape::Cuboid { half_extents },
+                }
+            }
+        };
+        MeshBody { bound, tree: Arc::new(MeshTree::new(mesh)) }
+    }
+
+    /// As [`MeshBody::new`]; None for shapes that are convex themselves.
+    pub fn of(shape: &Shape) -> Option<Self> {
+        match shape {
+            Shape::Mesh(mesh) => Some(MeshBody::new(mesh)),
+            _ => None,
+        }
+    }
+}
+
 impl MeshTree {
     /// The tree over `mesh`, split at the median of the longest side.
     pub fn new(mesh: &TriangleMesh) -> Self {
@@ -46,14 +98,15 @@ impl MeshTree {
         self.all_near(shape, mesh_from_shape, required, smallest, &mut |_| false)
     }
 
-    /// As [`MeshTree::is_apart`], but a triangle that is too near passes when `excuse` says so of its corners.
+    /// As [`MeshTree::is_apart`], but what is too near passes when `excuse` says so of its corners: a triangle, or a box
+    /// of triangles. What excuses points must excuse all that lies between them.
     pub fn all_near(
         &self,
         shape: &Shape,
         mesh_from_shape: &Placement,
         required: f64,
         smallest: &mut f64,
-        excuse: &mut dyn FnMut(&[Point; 3]) -> bool,
+        excuse: &mut dyn FnMut(&[Point]) -> bool,
     ) -> bool {
         let (center, radius) = shape.bounding_sphere();
         let center = mesh_from_shape.point(&center);
@@ -82,6 +135,9 @@ impl MeshTree {
                 continue;
             }
             if node.n_triangles == 0 {
+                if excuse(&node.corners()) {
+                    continue;
+                }
                 stack[n_stack] = node.first;
                 stack[n_stack + 1] = node.right;
                 n_stack += 2;
@@ -130,4 +186,77 @@ fn build(corners: &mut [[Point; 3]], first: usize, nodes: &mut Vec<Node>) -> u32
         nodes[index] = Node { low, high, first: left, n_triangles: 0, right };
     }
     index as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use regrasp_base::Rng;
+    use std::f64::consts::PI;
+
+    /// A closed ball of radius 1 with a bumpy surface, of about `2 * n * n` triangles.
+    fn ball(n: u32) -> TriangleMesh {
+        let point = |i: u32, j: u32| {
+            let (polar, around) = (f64::from(i) / f64::from(n) * PI, f64::from(j % n) / f64::from(n) * 2.0 * PI);
+            let radius = 1.0 - 0.05 * (5.0 * polar).sin() * (3.0 * around).sin();
+            Point::new(polar.sin() * around.cos(), polar.sin() * around.sin(), polar.cos()) * radius
+        };
+        let vertices = (0..=n).flat_map(|i| (0..n).map(move |j| point(i, j))).collect();
+        let at = |i: u32, j: u32| i * n + j % n;
+        let quads = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+        let split = quads.flat_map(|(i, j)| {
+            [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]
+        });
+        TriangleMesh::new(vertices, split.collect()).unwrap()
+    }
+
+    #[test]
+    fn excuses_of_boxes_are_those_of_their_triangles() {
+        let mesh = ball(24);
+        let tree = MeshTree::new(&mesh);
+        let shape = Shape::Sphere { radius: 0.4 };
+        let mut rng = Rng::keyed(1, "mesh_tree", 0);
+        let mut n_of = [0, 0];
+        for _ in 0..2000 {
+            let normal = Vector::from(rng.direction());
+            let at = Placement { translation: normal * rng.uniform(1.2, 1.45), ..Placement::IDENTITY };
+            let lowest = normal.dot(&at.translation) - 0.4;
+            let allowed = rng.uniform(0.0, 0.1);
+            let mut passes = |corners: &[Point]| {
+                let highest = corners.iter().map(|p| normal.dot(&p.coords)).fold(f64::NEG_INFINITY, f64::max);
+                lowest - highest >= -allowed
+            };
+            let expected = tree.corners.iter().all(|corners| {
+                matches!(triangle_separation(&shape, &at, corners, 0.0), Answer::SeparatedBy(_)) || passes(corners)
+            });
+            let found = tree.all_near(&shape, &at, 0.0, &mut 0.0, &mut passes);
+            assert_eq!(found, expected);
+            n_of[usize::from(found)] += 1;
+        }
+        assert!(n_of.iter().all(|&n| n > 100), "{n_of:?}");
+    }
+
+    #[test]
+    fn bounds_of_few_and_of_many_vertices_contain_the_mesh() {
+        for n in [8, 150] {
+            let mesh = ball(n);
+            let body = MeshBody::new(&mesh);
+            assert_eq!(mesh.vertices().len() > EXACT_HULL_UP_TO, n == 150);
+            let mut rng = Rng::keyed(2, "mesh_tree", u64::from(n));
+            for _ in 0..200 {
+                let direction = Vector::from(rng.direction());
+                let reach = |p: &Point| direction.dot(&p.coords);
+                let mesh_reach = mesh.vertices().iter().map(reach).fold(f64::NEG_INFINITY, f64::max);
+                let bound = crate::collision::support::support_value(&body.bound.shape, &direction, &mut 0);
+                assert!(bound >= mesh_reach - 1e-7 && bound <= 1.02 * mesh_reach, "{n}: {bound} {mesh_reach}");
+            }
+        }
+        let flat = TriangleMesh::new(
+            vec![Point::new(0.0, 0.0, 1.0), Point::new(2.0, 0.0, 1.0), Point::new(0.0, 2.0, 1.0)],
+            vec![[0, 1, 2]],
+        );
+        let bound = MeshBody::new(&flat.unwrap()).bound;
+        assert_eq!(bound.shape.kind(), "box");
+        assert_eq!(bound.parent_from_shape.translation.vector, Vector::new(1.0, 1.0, 1.0));
+    }
 }

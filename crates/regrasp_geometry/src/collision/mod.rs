@@ -14,6 +14,6 @@ pub mod placement;
 pub mod support;
 
 pub use gjk::{Answer, separation};
-pub use mesh_tree::MeshTree;
+pub use mesh_tree::{MeshBody, MeshTree};
 pub use placement::Placement;
 pub use support::gap_along;

@@ -20,11 +20,15 @@ impl Aabb {
     }
 
     pub fn of(points: &[Point]) -> Self {
-        points.iter().fold(Aabb::empty(), |b, p| Aabb { low: b.low.inf(&p.coords), high: b.high.sup(&p.coords) })
+        points.iter().fold(Aabb::empty(), |b, p| b.union(&Aabb { low: p.coords, high: p.coords }))
     }
 
+    #[inline]
     pub fn union(&self, other: &Aabb) -> Self {
-        Aabb { low: self.low.inf(&other.low), high: self.high.sup(&other.high) }
+        // Nothing here is NaN: plain comparisons, one instruction each, instead of `f64::min`.
+        let lower = |a: f64, b: f64| if a < b { a } else { b };
+        let higher = |a: f64, b: f64| if a > b { a } else { b };
+        Aabb { low: self.low.zip_map(&other.low, lower), high: self.high.zip_map(&other.high, higher) }
     }
 
     pub fn overlaps(&self, other: &Aabb) -> bool {
@@ -82,11 +86,11 @@ impl Bvh {
         let whole = boxes.iter().fold(Aabb::empty(), |all, b| all.union(b));
         let padding = Vector::repeat(1e-13 * whole.low.abs().sup(&whole.high.abs()).max());
         let pad = |b: &Aabb| Aabb { low: b.low - padding, high: b.high + padding };
-        let boxes: Vec<Aabb> = boxes.iter().map(pad).collect();
-        let boxes = &boxes[..];
-        let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
+        let mut items: Vec<Item> =
+            boxes.iter().zip(0..).map(|(bounds, index)| Item { bounds: pad(bounds), index }).collect();
         let mut nodes = Vec::with_capacity(boxes.len() / 2 + 1);
-        let root = build(boxes, &mut order, 0, &mut nodes, 0);
+        let root = build(&mut items, &mut Vec::new(), 0, &mut nodes, 0);
+        let order = items.iter().map(|item| item.index).collect();
         Bvh { root, nodes, order }
     }
 
@@ -201,55 +205,81 @@ impl Bvh {
     }
 }
 
-fn build(boxes: &[Aabb], order: &mut [u32], start: usize, nodes: &mut Vec<[Child; 2]>, depth: usize) -> Child {
-    let bounds = order.iter().fold(Aabb::empty(), |all, &i| all.union(&boxes[i as usize]));
-    if order.len() <= LEAF {
-        return Child { bounds, start: start as u32, count: order.len() as u32 };
+/// An item on its way into the tree.
+#[derive(Debug, Clone, Copy)]
+struct Item {
+    bounds: Aabb,
+    index: u32,
+}
+
+impl Item {
+    /// Twice the centre.
+    #[inline]
+    fn middle(&self) -> Vector {
+        self.bounds.low + self.bounds.high
     }
-    let middle_of = |i: u32| boxes[i as usize].low + boxes[i as usize].high;
-    let centers = order.iter().fold(Aabb::empty(), |all, &i| {
-        let c = middle_of(i);
+}
+
+fn build(
+    items: &mut [Item],
+    right_side: &mut Vec<Item>,
+    start: usize,
+    nodes: &mut Vec<[Child; 2]>,
+    depth: usize,
+) -> Child {
+    let bounds = items.iter().fold(Aabb::empty(), |all, item| all.union(&item.bounds));
+    if items.len() <= LEAF {
+        return Child { bounds, start: start as u32, count: items.len() as u32 };
+    }
+    let centers = items.iter().fold(Aabb::empty(), |all, item| {
+        let c = item.middle();
         all.union(&Aabb { low: c, high: c })
     });
     // Below half the stack's depth the heuristic decides, after that halves: the stacks cannot overflow.
-    let split = if depth < 48 { best_split(boxes, order, &centers, middle_of) } else { None };
+    let split = if depth < 48 { best_split(items, right_side, &centers) } else { None };
     let middle = split.unwrap_or_else(|| {
-        let extent = centers.high - centers.low;
-        let axis = extent.imax();
-        let middle = order.len() / 2;
-        order
-            .select_nth_unstable_by(middle, |&i, &j| middle_of(i)[axis].total_cmp(&middle_of(j)[axis]).then(i.cmp(&j)));
+        let axis = (centers.high - centers.low).imax();
+        let middle = items.len() / 2;
+        let before = |a: &Item, b: &Item| a.middle()[axis].total_cmp(&b.middle()[axis]).then(a.index.cmp(&b.index));
+        items.select_nth_unstable_by(middle, before);
         middle
     });
     let node = nodes.len();
     let placeholder = Child { bounds, start: 0, count: 0 };
     nodes.push([placeholder; 2]);
-    let (left, right) = order.split_at_mut(middle);
-    let a = build(boxes, left, start, nodes, depth + 1);
-    let b = build(boxes, right, start + middle, nodes, depth + 1);
+    let (left, right) = items.split_at_mut(middle);
+    let a = build(left, right_side, start, nodes, depth + 1);
+    let b = build(right, right_side, start + middle, nodes, depth + 1);
     nodes[node] = [a, b];
     Child { bounds, start: node as u32, count: 0 }
 }
 
-/// Partitions `order` where the surface area heuristic is least; None when all centres fall into one bin.
-fn best_split(boxes: &[Aabb], order: &mut [u32], centers: &Aabb, middle_of: impl Fn(u32) -> Vector) -> Option<usize> {
+/// Partitions `items` where the surface area heuristic is least, keeping their order on either side; None when all
+/// centres fall into one bin. `right_side` is room to work in.
+fn best_split(items: &mut [Item], right_side: &mut Vec<Item>, centers: &Aabb) -> Option<usize> {
+    let extent = centers.high - centers.low;
+    let mut bins = [[(Aabb::empty(), 0usize); BINS]; 3];
+    for item in items.iter() {
+        let middle = item.middle();
+        for axis in (0..3).filter(|&axis| extent[axis] > 0.0) {
+            let entry = &mut bins[axis][bin(middle[axis], centers.low[axis], extent[axis])];
+            *entry = (entry.0.union(&item.bounds), entry.1 + 1);
+        }
+    }
     let mut best = (f64::INFINITY, 0, 0);
-    for axis in 0..3 {
-        let extent = centers.high[axis] - centers.low[axis];
-        if extent <= 0.0 {
-            continue;
+    for (axis, bins) in bins.iter().enumerate() {
+        // Half area and number of items from each bin on.
+        let mut from = [(0.0, 0); BINS];
+        let (mut bounds, mut n) = (Aabb::empty(), 0);
+        for k in (0..BINS).rev() {
+            (bounds, n) = (bounds.union(&bins[k].0), n + bins[k].1);
+            from[k] = (bounds.half_area(), n);
         }
-        let bin_of = |i: u32| bin(middle_of(i)[axis], centers.low[axis], extent);
-        let mut bins = [(Aabb::empty(), 0usize); BINS];
-        for &i in order.iter() {
-            let entry = &mut bins[bin_of(i)];
-            *entry = (entry.0.union(&boxes[i as usize]), entry.1 + 1);
-        }
+        let (mut bounds, mut n_left) = (Aabb::empty(), 0);
         for cut in 1..BINS {
-            let gather =
-                |part: &[(Aabb, usize)]| part.iter().fold((Aabb::empty(), 0), |(all, n), (b, m)| (all.union(b), n + m));
-            let ((left, n_left), (right, n_right)) = (gather(&bins[..cut]), gather(&bins[cut..]));
-            let cost = left.half_area() * n_left as f64 + right.half_area() * n_right as f64;
+            (bounds, n_left) = (bounds.union(&bins[cut - 1].0), n_left + bins[cut - 1].1);
+            let (right, n_right) = from[cut];
+            let cost = bounds.half_area() * n_left as f64 + right * n_right as f64;
             if n_left > 0 && n_right > 0 && cost < best.0 {
                 best = (cost, axis, cut);
             }
@@ -259,10 +289,19 @@ fn best_split(boxes: &[Aabb], order: &mut [u32], centers: &Aabb, middle_of: impl
     if !cost.is_finite() {
         return None;
     }
-    let extent = centers.high[axis] - centers.low[axis];
-    let is_left = |i: u32| bin(middle_of(i)[axis], centers.low[axis], extent) < cut;
-    order.sort_by_key(|&i| !is_left(i));
-    Some(order.iter().filter(|&&i| is_left(i)).count())
+    right_side.clear();
+    let mut n_left = 0;
+    for i in 0..items.len() {
+        let item = items[i];
+        if bin(item.middle()[axis], centers.low[axis], extent[axis]) < cut {
+            items[n_left] = item;
+            n_left += 1;
+        } else {
+            right_side.push(item);
+        }
+    }
+    items[n_left..].copy_from_slice(right_side);
+    Some(n_left)
 }
 
 fn bin(value: f64, low: f64, extent: f64) -> usize {

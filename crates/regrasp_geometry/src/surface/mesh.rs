@@ -64,12 +64,12 @@ impl MeshSurface {
         let face_normals = face_normals(&vertices, &topology.triangles);
         let is_crease = creases(&topology, &face_normals, crease_angle);
         let patch_of = patches(&topology, &is_crease);
-        let corner_normals = corner_normals(&vertices, &topology, &face_normals, &is_crease);
+        let angles = corner_angles(&vertices, &topology.triangles);
+        let corner_normals = corner_normals(&topology, &face_normals, &angles, &is_crease);
         let mut vertex_pseudonormals = vec![Vector::zeros(); vertices.len()];
         for (i, corners) in topology.triangles.iter().enumerate() {
             for k in 0..3 {
-                let [a, b, c] = [k, (k + 1) % 3, (k + 2) % 3].map(|m| vertices[corners[m] as usize]);
-                vertex_pseudonormals[corners[k] as usize] += face_normals[i] * angle_at(&a, &b, &c);
+                vertex_pseudonormals[corners[k] as usize] += face_normals[i] * angles[i][k];
             }
         }
         let inside_test = InsideTest::new(&vertices, &topology, &face_normals);
@@ -268,12 +268,21 @@ fn turn_parts_outward(vertices: &[Point], topology: &mut Topology, repairs: &mut
     }
 }
 
+/// Interior angle of each triangle at each corner.
+fn corner_angles(vertices: &[Point], triangles: &[[u32; 3]]) -> Vec<[f64; 3]> {
+    let of = |corners: &[u32; 3]| {
+        let [a, b, c] = corners.map(|i| vertices[i as usize]);
+        [angle_at(&a, &b, &c), angle_at(&b, &c, &a), angle_at(&c, &a, &b)]
+    };
+    triangles.iter().map(of).collect()
+}
+
 /// Per triangle and corner: normals of the fan up to the next creases, weighted by their angles (Thuermer, Wuethrich
 /// 1998), which unlike areas do not depend on how faces are cut into triangles.
 fn corner_normals(
-    vertices: &[Point],
     topology: &Topology,
     face_normals: &[Vector],
+    angles: &[[f64; 3]],
     is_crease: &[[bool; 3]],
 ) -> Vec<[Vector; 3]> {
     let mut normals = vec![[Vector::zeros(); 3]; face_normals.len()];
@@ -289,8 +298,7 @@ fn corner_normals(
             let mut sum = Vector::zeros();
             let at_vertex = |&j: &u32| topology.corner_at(j as usize, vertex).map(|m| (j as usize, m));
             for (j, m) in fan.iter().filter_map(at_vertex) {
-                let [a, b, c] = [m, (m + 1) % 3, (m + 2) % 3].map(|n| vertices[topology.triangles[j][n] as usize]);
-                sum += face_normals[j] * angle_at(&a, &b, &c);
+                sum += face_normals[j] * angles[j][m];
             }
             let normal = sum.try_normalize(1e-12).unwrap_or(face_normals[i]);
             for (j, m) in fan.iter().filter_map(at_vertex) {

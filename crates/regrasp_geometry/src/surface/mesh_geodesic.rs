@@ -10,6 +10,7 @@ use super::SurfacePoint;
 use super::geodesic::{Bend, Geodesic, Leg};
 use super::mesh::{MeshSurface, barycentric};
 use super::mesh_topology::{NONE, angle_at};
+use super::sparse::Sparse;
 use crate::frame::Point;
 use nalgebra::Vector2;
 use std::cmp::Reverse;
@@ -62,17 +63,15 @@ fn straightened(mesh: &MeshSurface, mut strip: Vec<u32>, a: &SurfacePoint, b: &S
 /// The strip along the shortest way over edges, from a corner of the triangle of `a` to one of that of `b`: A* over
 /// vertices. None where a fan is interrupted by an open edge.
 fn strip_over_vertices(mesh: &MeshSurface, a: &SurfacePoint, b: &SurfacePoint) -> Option<Vec<u32>> {
-    let n = mesh.vertices.len();
-    let mut cost = vec![f64::INFINITY; n];
-    // The vertex before, and a triangle at the vertex.
-    let mut from = vec![(NONE, NONE); n];
+    // Cost, the vertex before, and a triangle at the vertex.
+    let mut reached = Sparse::new((f64::INFINITY, NONE, NONE));
     let mut heap = BinaryHeap::new();
     let to_goal = |v: u32| (mesh.vertices[v as usize] - b.point_in_object).norm();
     let key = |total: f64, v: u32| Reverse((total.to_bits(), v));
     for v in mesh.topology.triangles[a.facet as usize] {
-        cost[v as usize] = (mesh.vertices[v as usize] - a.point_in_object).norm();
-        from[v as usize] = (NONE, a.facet);
-        heap.push(key(cost[v as usize] + to_goal(v), v));
+        let cost = (mesh.vertices[v as usize] - a.point_in_object).norm();
+        reached.set(v, (cost, NONE, a.facet));
+        heap.push(key(cost + to_goal(v), v));
     }
     let mut fan = Vec::new();
     let goals = mesh.topology.triangles[b.facet as usize];
@@ -81,25 +80,28 @@ fn strip_over_vertices(mesh: &MeshSurface, a: &SurfacePoint, b: &SurfacePoint) -
         if goals.contains(&v) {
             break v;
         }
-        if f64::from_bits(total) > cost[v as usize] + to_goal(v) {
+        let (cost, _, triangle) = reached.get(v);
+        if f64::from_bits(total) > cost + to_goal(v) {
             continue;
         }
-        let triangle = from[v as usize].1 as usize;
-        mesh.topology.fan(triangle, mesh.topology.corner_at(triangle, v)?, |_, _| false, &mut fan);
+        mesh.topology.fan(triangle as usize, mesh.topology.corner_at(triangle as usize, v)?, |_, _| false, &mut fan);
         for &i in &fan {
             for w in mesh.topology.triangles[i as usize] {
-                let next = cost[v as usize] + (mesh.vertices[w as usize] - mesh.vertices[v as usize]).norm();
-                if next < cost[w as usize] {
-                    cost[w as usize] = next;
-                    from[w as usize] = (v, i);
+                let next = cost + (mesh.vertices[w as usize] - mesh.vertices[v as usize]).norm();
+                if next < reached.get(w).0 {
+                    reached.set(w, (next, v, i));
                     heap.push(key(next + to_goal(w), w));
                 }
             }
         }
     };
     let mut way = vec![last];
-    while from[way[way.len() - 1] as usize].0 != NONE {
-        way.push(from[way[way.len() - 1] as usize].0);
+    loop {
+        let (_, before, _) = reached.get(way[way.len() - 1]);
+        if before == NONE {
+            break;
+        }
+        way.push(before);
     }
     way.reverse();
     let mut strip = vec![a.facet];
@@ -162,45 +164,39 @@ fn without_loops(strip: &[u32]) -> Vec<u32> {
 /// Triangles from that of `a` to that of `b`: A* over triangles, each standing at the middle of the edge by which it is
 /// entered.
 fn strip_over_triangles(mesh: &MeshSurface, a: &SurfacePoint, b: &SurfacePoint) -> Option<Vec<u32>> {
-    let n = mesh.n_triangles();
     let (start, goal) = (a.facet, b.facet);
-    let mut cost = vec![f64::INFINITY; n];
-    let mut stands_at = vec![Point::origin(); n];
-    let mut from = vec![NONE; n];
+    // Cost, where one stands, and the triangle before.
+    let mut reached = Sparse::new((f64::INFINITY, Point::origin(), NONE));
     let mut heap = BinaryHeap::new();
     let goal_point = b.point_in_object;
     let key = |total: f64, i: u32| Reverse((total.to_bits(), i));
-    cost[start as usize] = 0.0;
-    stands_at[start as usize] = a.point_in_object;
+    reached.set(start, (0.0, a.point_in_object, NONE));
     heap.push(key((goal_point - a.point_in_object).norm(), start));
     while let Some(Reverse((total, i))) = heap.pop() {
         if i == goal {
             let mut strip = vec![goal];
             let mut at = goal;
             while at != start {
-                at = from[at as usize];
+                at = reached.get(at).2;
                 strip.push(at);
             }
             strip.reverse();
             return Some(strip);
         }
-        let here = i as usize;
-        let at = stands_at[here];
-        if f64::from_bits(total) > cost[here] + (goal_point - at).norm() {
+        let (cost, at, _) = reached.get(i);
+        if f64::from_bits(total) > cost + (goal_point - at).norm() {
             continue;
         }
         let corners = mesh.corners(i);
         for k in 0..3 {
-            let j = mesh.topology.neighbours[here][k];
+            let j = mesh.topology.neighbours[i as usize][k];
             if j == NONE {
                 continue;
             }
             let middle = toward(&corners[k], &corners[(k + 1) % 3], &at, &goal_point);
-            let next_cost = cost[here] + (middle - at).norm();
-            if next_cost < cost[j as usize] {
-                cost[j as usize] = next_cost;
-                stands_at[j as usize] = middle;
-                from[j as usize] = i;
+            let next_cost = cost + (middle - at).norm();
+            if next_cost < reached.get(j).0 {
+                reached.set(j, (next_cost, middle, i));
                 heap.push(key(next_cost + (goal_point - middle).norm(), j));
             }
         }

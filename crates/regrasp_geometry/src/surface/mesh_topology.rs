@@ -2,6 +2,7 @@
 
 use super::SurfaceError;
 use crate::frame::{Point, Vector};
+use crate::mesh::{EdgeSide, edge_sides};
 use std::f64::consts::PI;
 
 /// No neighbour: an open edge, or one with more than two triangles.
@@ -132,21 +133,13 @@ fn walks(triangle: &[u32; 3], a: u32, b: u32) -> bool {
 }
 
 fn neighbours_of(triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
-    let mut edges = Vec::with_capacity(3 * triangles.len());
-    for (i, corners) in triangles.iter().enumerate() {
-        for k in 0..3 {
-            let (a, b) = (corners[k], corners[(k + 1) % 3]);
-            edges.push((a.min(b), a.max(b), i as u32, k as u8));
-        }
-    }
-    edges.sort_unstable();
     let mut neighbours = vec![[NONE; 3]; triangles.len()];
-    for run in edges.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
-        if let [(_, _, i, j), (_, _, k, l)] = run
-            && i != k
+    for run in edge_sides(triangles).chunk_by(EdgeSide::same_edge) {
+        if let [one, other] = run
+            && one.triangle() != other.triangle()
         {
-            neighbours[*i as usize][*j as usize] = *k;
-            neighbours[*k as usize][*l as usize] = *i;
+            neighbours[one.triangle()][one.corner()] = other.triangle() as u32;
+            neighbours[other.triangle()][other.corner()] = one.triangle() as u32;
         }
     }
     neighbours

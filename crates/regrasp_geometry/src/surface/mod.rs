@@ -15,6 +15,7 @@ mod mesh_geodesic;
 mod mesh_topology;
 mod settle;
 mod smooth_geodesic;
+mod sparse;
 mod sphere;
 
 #[cfg(test)]

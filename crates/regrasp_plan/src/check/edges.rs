@@ -2,7 +2,6 @@
 
 use crate::check::surface::distance_to_edge;
 use regrasp_geometry::{Point, Shape, Vector};
-use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 /// How far beside an edge one looks whether it is hidden in the solid, in metres.
@@ -77,21 +76,20 @@ impl<'a> Edges<'a> {
 }
 
 fn of_triangles<'a>(vertices: &'a [Point], triangles: &'a [[u32; 3]], crease_angle: f64) -> Edges<'a> {
-    // The corners opposite to each edge.
-    let mut opposite: BTreeMap<[u32; 2], Vec<u32>> = BTreeMap::new();
-    for &[a, b, c] in triangles {
-        for (from, to, apex) in [(a, b, c), (b, c, a), (c, a, b)] {
-            opposite.entry([from.min(to), from.max(to)]).or_default().push(apex);
-        }
-    }
+    // Ends of each edge and the corner opposite to it, of every triangle.
+    let sides = triangles.iter().flat_map(|&[a, b, c]| {
+        [(a, b, c), (b, c, a), (c, a, b)].map(|(from, to, apex)| ([from.min(to), from.max(to)], apex))
+    });
+    let mut sides: Vec<([u32; 2], u32)> = sides.collect();
+    sides.sort_by_key(|(ends, _)| *ends);
     let mut sharp = Vec::new();
-    for (ends, apexes) in opposite {
-        let [from, to] = ends.map(|i| vertices[i as usize]);
+    for edge in sides.chunk_by(|(ends, _), (others, _)| ends == others) {
+        let [from, to] = edge[0].0.map(|i| vertices[i as usize]);
         // Directions into the triangles, square to the edge; opposite ones are a flat surface, however it is wound.
         let along = (to - from).normalize();
-        let inward: Vec<Vector> = apexes
+        let inward: Vec<Vector> = edge
             .iter()
-            .filter_map(|&apex| {
+            .filter_map(|&(_, apex)| {
                 let arm = vertices[apex as usize] - from;
                 (arm - along * arm.dot(&along)).try_normalize(0.0)
             })

@@ -51,7 +51,7 @@ pub fn check_closure(
 ) -> Option<f64> {
     let body = Body {
         center_of_mass: object.center_of_mass,
-        torque_scale: object.radius(),
+        torque_scale: object.radius,
         friction: plan.promises.friction.min(object.friction),
     };
     let required = plan.promises.required_margin.max(settings.smallest_margin);
@@ -124,7 +124,7 @@ pub fn check_promises(object: &Object, plan: &Plan, settings: &CheckSettings, mi
         let message = format!("the plan says it keeps margin {}, found is {found}", promises.kept_margin);
         broken("kept_margin", promises.kept_margin, found, message);
     }
-    let scale = object.radius();
+    let scale = object.radius;
     if (promises.torque_scale - scale).abs() > 1e-9 * scale {
         let message = format!("torque scale {}, the object's radius is {scale}", promises.torque_scale);
         broken("torque_scale", promises.torque_scale, scale, message);

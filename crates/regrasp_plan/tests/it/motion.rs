@@ -87,6 +87,7 @@ fn what_is_certified_is_clear_and_what_is_clear_is_certified() {
     // A needle that the fingers pass: 0.2 mm thick.
     scene.obstacles.push(Obstacle {
         name: "needle".into(),
+        mesh_body: None,
         placed: PlacedShape {
             parent_from_shape: sample::world_from_hand() * Pose::translation(0.055, 0.01, 0.07),
             shape: Shape::Capsule { half_length: 0.02, radius: 0.1e-3 },

@@ -154,6 +154,8 @@ fn object() -> Object {
     Object {
         name: "ball".into(),
         surface: surface_of(&shape),
+        radius: OBJECT_RADIUS,
+        mesh_body: None,
         shape,
         mass: 0.1,
         center_of_mass: Point::origin(),

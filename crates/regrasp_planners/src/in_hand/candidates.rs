@@ -174,7 +174,7 @@ pub fn draw_pose(model: &Model, start: &Pose, goal: &Pose, rng: &mut Rng) -> Pos
     let settings = &model.settings;
     let is_far = rng.chance(settings.far_share);
     let (distance, angle) = (settings.wander_distance, settings.wander_angle);
-    let distance = if is_far { distance.max(model.scene.object.radius()) } else { distance };
+    let distance = if is_far { distance.max(model.turn_length()) } else { distance };
     let along = interpolate_pose(start, goal, rng.unit());
     let shift = Vector::from(rng.direction()) * (distance * rng.unit().cbrt());
     let turn = Vector::new(rng.normal(), rng.normal(), rng.normal()) * angle;

@@ -3,8 +3,8 @@
 //! Built once per query, shared by all threads, never changed.
 
 use arrayvec::ArrayVec;
-use regrasp_geometry::collision::{MeshTree, Placement};
-use regrasp_geometry::{ConvexHull, Point, Pose, Shape, Vector};
+use regrasp_geometry::collision::{MeshBody, MeshTree, Placement};
+use regrasp_geometry::{Point, Pose, Shape};
 use regrasp_grasp::{Contact, ContactModel, GraspFrame, Grip, closure};
 use regrasp_robot::TipShape;
 use regrasp_robot::kinematics::finger_ik::FingerIk;
@@ -62,7 +62,7 @@ pub struct Body {
     /// Convex shape; for a mesh, its hull.
     pub shape: Shape,
     /// The exact triangles, where the hull is not the mesh.
-    pub tree: Option<MeshTree>,
+    pub tree: Option<Arc<MeshTree>>,
     /// Pose in its carrier's frame.
     pub carrier_from_body: Placement,
     /// Centre of the bounding ball, in the body frame.
@@ -169,20 +169,18 @@ impl<'a> Model<'a> {
         }
         let n_finger_bodies = bodies.len();
         for part in &hand.palm {
-            bodies.push(fixed_body(
-                &part.placed.shape,
-                &part.placed.parent_from_shape,
-                &hand.robot.links[part.link.0].name,
-            ));
+            let (shape, place) = (&part.placed.shape, &part.placed.parent_from_shape);
+            bodies.push(fixed_body(shape, None, place, &hand.robot.links[part.link.0].name));
             links.push((part.link, false));
         }
         let object = bodies.len();
         bodies.push(Body {
             carrier: Carrier::Object,
-            ..fixed_body(&scene.object.shape, &Pose::identity(), &scene.object.name)
+            ..fixed_body(&scene.object.shape, scene.object.mesh_body.as_ref(), &Pose::identity(), &scene.object.name)
         });
         for obstacle in &scene.obstacles {
-            bodies.push(fixed_body(&obstacle.placed.shape, &obstacle.placed.parent_from_shape, &obstacle.name));
+            let (shape, place) = (&obstacle.placed.shape, &obstacle.placed.parent_from_shape);
+            bodies.push(fixed_body(shape, obstacle.mesh_body.as_ref(), place, &obstacle.name));
         }
         let mut pairs = Vec::new();
         for a in 0..bodies.len() {
@@ -219,7 +217,7 @@ impl<'a> Model<'a> {
             pairs,
             frame: GraspFrame {
                 center_of_mass: scene.object.center_of_mass,
-                torque_scale: scene.object.radius(),
+                torque_scale: scene.object.radius,
                 friction: scene.object.friction,
             },
             object_reach: bodies[object].center.coords.norm() + bodies[object].radius,
@@ -266,35 +264,24 @@ impl<'a> Model<'a> {
     }
 }
 
-/// A body that nothing moves.
-fn fixed_body(shape: &Shape, world_from_shape: &Pose, name: &str) -> Body {
-    let (convex, tree) = match shape {
-        Shape::Mesh(mesh) => match ConvexHull::new(mesh.vertices()) {
-            // The hull is only a first test; the triangles decide.
-            Ok(hull) => (Shape::Convex(Arc::new(hull)), Some(MeshTree::new(mesh))),
-            // A flat mesh has no hull: a box around it is the first test.
-            Err(_) => {
-                let (low, high) = mesh.bounds();
-                let half = ((high - low) / 2.0).map(|h: f64| h.max(1e-9));
-                let shift = Vector::from(nalgebra::center(&low, &high).coords);
-                let placed = Pose::from_parts(shift.into(), nalgebra::UnitQuaternion::identity());
-                return Body {
-                    tree: Some(MeshTree::new(mesh)),
-                    ..fixed_body(&Shape::Cuboid { half_extents: half }, &(world_from_shape * placed), name)
-                };
-            }
-        },
-        convex => (convex.clone(), None),
+/// A body that nothing moves; `mesh_body` is that of a mesh, where it is known.
+fn fixed_body(shape: &Shape, mesh_body: Option<&MeshBody>, world_from_shape: &Pose, name: &str) -> Body {
+    let body = |shape: &Shape, tree, place: &Pose| {
+        let (center, radius) = shape.bounding_sphere();
+        Body {
+            shape: shape.clone(),
+            tree,
+            carrier_from_body: Placement::from(place),
+            center,
+            radius,
+            carrier: Carrier::World,
+            name: name.to_owned(),
+        }
     };
-    let (center, radius) = convex.bounding_sphere();
-    Body {
-        shape: convex,
-        tree,
-        carrier_from_body: Placement::from(world_from_shape),
-        center,
-        radius,
-        carrier: Carrier::World,
-        name: name.to_owned(),
+    match mesh_body.cloned().or_else(|| MeshBody::of(shape)) {
+        // The bound is only a first test; the triangles decide.
+        Some(MeshBody { bound, tree }) => body(&bound.shape, Some(tree), &(world_from_shape * bound.parent_from_shape)),
+        None => body(shape, None, world_from_shape),
     }
 }
 

@@ -30,7 +30,7 @@ impl Passages {
         if model.scene.obstacles.is_empty() {
             return Passages { ways_out };
         }
-        let length = model.scene.object.radius();
+        let length = model.turn_length();
         for end in ends {
             let directions = (0..6).map(|k| {
                 let sign = if k % 2 == 0 { 1.0 } else { -1.0 };

@@ -31,7 +31,7 @@ fn improvement(plan: &Plan) -> &Improvement {
 
 /// The cost of a plan from what is in its file.
 fn cost_of_file(loaded: &LoadedScene, plan: &Plan, weights: &CostWeights) -> f64 {
-    let turn_length = loaded.scene.object.radius();
+    let turn_length = loaded.scene.object.radius;
     let (mut relocations, mut object_path, mut joint_path) = (0.0, 0.0, 0.0);
     for segment in &plan.segments {
         relocations += f64::from(u8::from(segment.kind == SegmentKind::Regrasp));
@@ -180,7 +180,7 @@ fn the_methods_of_the_paper_are_improved_under_their_release_rule() {
             .collect();
         let frame = regrasp_grasp::GraspFrame {
             center_of_mass: model.object.center_of_mass,
-            torque_scale: model.object.radius(),
+            torque_scale: model.object.radius,
             friction: model.object.friction,
         };
         for away in 0..contacts.len() {

@@ -123,7 +123,7 @@ fn plate() -> Obstacle {
         parent_from_shape: Pose::translation(0.3, 0.0, 0.0),
         shape: Shape::Cuboid { half_extents: Vector::repeat(0.01) },
     };
-    Obstacle { name: "plate".into(), placed }
+    Obstacle { name: "plate".into(), placed, mesh_body: None }
 }
 
 #[test]

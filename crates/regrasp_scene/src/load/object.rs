@@ -7,6 +7,7 @@ use crate::object::Object;
 use crate::scene::Obstacle;
 use regrasp_base::diagnostic::number;
 use regrasp_base::toml_table::{Entry, Found, Table};
+use regrasp_geometry::collision::MeshBody;
 use regrasp_geometry::mass::{Solid, solid_properties};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::surface::DEFAULT_CREASE_ANGLE;
@@ -58,7 +59,13 @@ pub(super) fn object(root: &mut Table, files: &mut Files, found: &mut Found) -> 
     if let Some(center) = &center {
         center_is_inside(&shape, &center_of_mass, center, found)?;
     }
-    let surface = match Surface::with_crease_angle(&shape, crease_angle) {
+    // Both take long for meshes of a million triangles.
+    let (surface, mesh_body) = std::thread::scope(|scope| {
+        let mesh_body = scope.spawn(|| MeshBody::of(&shape));
+        let surface = Surface::with_crease_angle(&shape, crease_angle);
+        (surface, mesh_body.join().expect("preparing a mesh does not panic"))
+    });
+    let surface = match surface {
         Ok(surface) => surface,
         Err(error) => {
             let diagnostic = regrasp_base::Diagnostic::new("M207", found.place(&root.span), error.to_string())
@@ -67,7 +74,19 @@ pub(super) fn object(root: &mut Table, files: &mut Files, found: &mut Found) -> 
             return None;
         }
     };
-    Some(Object { name, shape, surface, mass, center_of_mass, friction: friction?, edge_distance, crease_angle })
+    let radius = shape.reach_from(&center_of_mass);
+    Some(Object {
+        name,
+        shape,
+        radius,
+        mesh_body,
+        surface,
+        mass,
+        center_of_mass,
+        friction: friction?,
+        edge_distance,
+        crease_angle,
+    })
 }
 
 fn friction(entry: &Entry, found: &mut Found) -> Option<f64> {
@@ -229,5 +248,7 @@ fn obstacle(entry: &Entry, files: &mut Files, found: &mut Found) -> Option<Obsta
         found.diagnostics.push(diagnostic);
         return None;
     }
-    Some(Obstacle { name: name.to_owned(), placed: PlacedShape { parent_from_shape: pose, shape: read.shape } })
+    let mesh_body = MeshBody::of(&read.shape);
+    let placed = PlacedShape { parent_from_shape: pose, shape: read.shape };
+    Some(Obstacle { name: name.to_owned(), placed, mesh_body })
 }

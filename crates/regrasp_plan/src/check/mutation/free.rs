@@ -19,7 +19,7 @@ impl Breeder<'_> {
         let object = &scene.object;
         let body = Body {
             center_of_mass: object.center_of_mass,
-            torque_scale: object.radius(),
+            torque_scale: object.radius,
             friction: self.plan.promises.friction,
         };
         let required = self.plan.promises.required_margin;
