@@ -16,6 +16,8 @@ ALLEGRO_REQUIRED := $(addprefix scenes/allegro/,$(addsuffix .toml,sphere32_x sph
   cube57_z cube57_180z cylinder20_x cylinder20_y box_y))
 ALLEGRO_STRETCH := $(addprefix scenes/allegro/,$(addsuffix .toml,box_x box_z cube45_x cylinder20_z))
 ALLEGRO_MESHES := $(addprefix scenes/allegro/,$(addsuffix .toml,rubiks_x rubiks_z apple_x apple_z can_y))
+# Way poses, soft fingers, and fingers that are free while the object moves.
+CAMPAIGN := $(WIDE) $(addprefix scenes/,$(addsuffix .toml,cubic soft_pair_roll six_finger_box_90x))
 SOFT_AND_COUPLED := scenes/dclaw/soft_sphere32_x.toml scenes/trifinger/soft_cylinder20_z.toml scenes/shadow/sphere32_z.toml
 # Roadmaps that are built and asked: sphere, box, and the box with more than a million motions.
 ROADMAPS := roadmap_sphere roadmap_box roadmap_million
@@ -82,8 +84,8 @@ benchmark-page: release
 # Slow: same bytes on 1, 2 and 8 threads (100 queries), and the checker against broken and good plans; torsion and couplings
 # are broken in plans for real hands.
 campaign: release
-	$(REGRASP) campaign determinism $(WIDE) scenes/cubic.toml --queries 100 --threads 1,2,8
-	$(REGRASP) campaign mutations $(WIDE) scenes/cubic.toml --mutants 100 --good 1000
+	$(REGRASP) campaign determinism $(CAMPAIGN) --queries 100 --threads 1,2,8
+	$(REGRASP) campaign mutations $(CAMPAIGN) --mutants 100 --good 1000
 ifneq ($(PACKAGES),)
 	$(REGRASP) campaign mutations $(SOFT_AND_COUPLED) $(PACKAGES) --mutants 100 --good 300
 endif
