@@ -86,6 +86,7 @@ benchmark-page: release
 campaign: release
 	$(REGRASP) campaign determinism $(CAMPAIGN) --queries 100 --threads 1,2,8
 	$(REGRASP) campaign mutations $(CAMPAIGN) --mutants 100 --good 1000
+	$(REGRASP) campaign mutations scenes/six_finger_box_90x.toml scenes/box_180x.toml --settings docs/benchmarks/free_fingers.json --mutants 100 --good 200
 ifneq ($(PACKAGES),)
 	$(REGRASP) campaign mutations $(SOFT_AND_COUPLED) $(PACKAGES) --mutants 100 --good 300
 endif

@@ -43,7 +43,7 @@ impl ConvexHull {
     }
 
     /// A polyhedron of a few hundred corners that contains all `points` and is hardly larger than their hull: the hull
-    /// of the points that are extreme in [`N_DIRECTIONS`] directions, grown about its middle until it holds the rest.
+    /// of the points that are extreme in `N_DIRECTIONS` directions, grown about its middle until it holds the rest.
     ///
     /// In `n` points this takes O(n log n), and support queries do not depend on `n`. Round shapes of many points are
     /// exceeded by at most about half a percent of their size, polyhedra of few corners by a rounding error.
