@@ -91,7 +91,8 @@ pub struct Graph {
     pub nodes: Vec<Node>,
     /// Motions.
     pub edges: Vec<Edge>,
-    /// Joints of motions between their ends, of one finger for relocations, of all for transfers; in single precision: the rounding moves a fingertip by some ten
+    /// Joints of motions between their ends, of one finger for relocations, of all for transfers; in single precision: the
+    /// rounding moves a fingertip by some ten
     /// nanometres, far below every clearance.
     pub ways: Vec<f32>,
 }
