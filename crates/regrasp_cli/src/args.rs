@@ -2,6 +2,7 @@
 
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
+use regrasp_bench::growth::Curve;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -56,6 +57,8 @@ pub enum Command {
     Check(Check),
     /// Plan scenes with many seeds and tabulate
     Bench(Bench),
+    /// Measure how loading and planning grow with fingers, triangles, obstacles and threads
+    Growth(Growth),
     /// Many queries on one saved graph of a hand and an object
     Roadmap(Roadmap),
     /// Long tests of the tool itself: determinism, and the checker against broken plans
@@ -181,6 +184,32 @@ pub struct Bench {
     /// For --page: seconds by scene, within which it should be solved
     #[arg(long, value_name = "FILE.json", requires = "page")]
     pub limits: Option<PathBuf>,
+}
+
+/// `regrasp growth`
+#[derive(Debug, Args)]
+pub struct Growth {
+    /// Curves [default: all]
+    #[arg(value_name = "CURVE", value_parser = PossibleValuesParser::new(Curve::ALL.map(Curve::name)))]
+    pub curves: Vec<String>,
+    /// Folder for the scenes, which are kept; the largest mesh has 50 MB
+    #[arg(short, long, value_name = "DIR", default_value = "regrasp-growth")]
+    pub output: PathBuf,
+    /// Folder for CSV file and picture of each curve [default: that of the scenes]
+    #[arg(long, value_name = "DIR")]
+    pub results: Option<PathBuf>,
+    /// Seeds per scene: 0, 1, ...; a batch over threads has ten times as many queries
+    #[arg(long, default_value_t = 20, value_parser = count, allow_negative_numbers = true)]
+    pub trials: u64,
+    /// Only sizes up to this one
+    #[arg(long, value_name = "SIZE", value_parser = whole_number, allow_negative_numbers = true)]
+    pub up_to: Option<u64>,
+    /// Wall-clock limit per trial, in seconds; it may only cut
+    #[arg(long, value_name = "S", default_value = "10", value_parser = seconds, allow_negative_numbers = true)]
+    pub time_limit: Duration,
+    /// Work limit per trial, in configurations looked at
+    #[arg(long, value_name = "N", default_value_t = 20_000_000, value_parser = whole_number, allow_negative_numbers = true)]
+    pub max_work: u64,
 }
 
 /// `regrasp roadmap`
