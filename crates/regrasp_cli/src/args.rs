@@ -199,7 +199,7 @@ pub struct Growth {
     #[arg(long, value_name = "DIR")]
     pub results: Option<PathBuf>,
     /// Seeds per scene: 0, 1, ...; a batch over threads has ten times as many queries
-    #[arg(long, default_value_t = 20, value_parser = count, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=100_000), allow_negative_numbers = true)]
     pub trials: u64,
     /// Only sizes up to this one
     #[arg(long, value_name = "SIZE", value_parser = whole_number, allow_negative_numbers = true)]

@@ -58,3 +58,42 @@ pub fn batch(loaded: &LoadedScene, n: usize, n_at_once: usize, settings: &RunSet
     });
     (rows.collect(), wall_s)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::growth::{Curve, Point, write_scene};
+    use crate::row::Judge;
+    use regrasp_planners::InHandSettings;
+
+    #[test]
+    fn a_batch_is_judged_and_does_not_depend_on_the_threads() {
+        let folder = std::env::temp_dir().join(format!("regrasp_growth_batch_{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let path = write_scene(&Point { curve: Curve::Threads, object: "box", size: 1 }, &folder).unwrap();
+        let (loaded, load) = timed_load(&path).unwrap();
+        assert!(load.wall_s > 0.0 && load.wall_s.is_finite() && load.cpu_s.is_finite());
+        let settings = RunSettings {
+            planner: InHandSettings { n_threads: 1, ..InHandSettings::default() },
+            max_work: 1_000_000,
+            time_limit: None,
+            judge: Judge::Checker,
+            improve_for: None,
+            cancelled: Default::default(),
+        };
+        let told = [1, 3].map(|n_at_once| {
+            let (rows, wall_s) = batch(&loaded, 6, n_at_once, &settings);
+            assert!(wall_s > 0.0);
+            rows.into_iter()
+                .map(|row| {
+                    assert_eq!((row.status.as_str(), row.accepted), ("solved", Some(true)), "{}", row.cause);
+                    (row.seed, row.work, row.nodes, row.relocations)
+                })
+                .collect::<Vec<_>>()
+        });
+        assert_eq!(told[0], told[1]);
+        let works: std::collections::BTreeSet<u64> = told[0].iter().map(|row| row.1).collect();
+        assert!(works.len() > 1, "the queries of a batch differ");
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+}

@@ -5,8 +5,9 @@ use std::fmt::Write;
 
 /// Middle of the shell, in the world, in metres: the start of the object.
 const MIDDLE: [f64; 3] = [0.0, 0.0, 0.078];
-/// Distance of an obstacle's centre from the middle, in metres: from beside the outer knuckles to far away.
-const DISTANCE: [f64; 2] = [0.105, 0.200];
+/// Distance of an obstacle's centre from the middle, in metres: from where the knuckles move to far away. Fingertips and
+/// object stay within the shell.
+const DISTANCE: [f64; 2] = [0.085, 0.200];
 /// Half size of an obstacle, in metres.
 const HALF_SIZE: [f64; 2] = [0.002, 0.004];
 /// No obstacle reaches below this height, in metres: the palm lies there.

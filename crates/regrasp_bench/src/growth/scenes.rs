@@ -54,6 +54,11 @@ fn scene_toml(point: &Point, hand_file: &str, mesh_file: &str) -> String {
         Curve::Threads => "position_within = 0.003\n",
         _ => "",
     };
+    let turn = match point.curve {
+        // Three soft fingers need no relocation for 90 degrees about x.
+        Curve::Fingers | Curve::Threads => "{ axis = \"z\", angle_deg = 180 }",
+        Curve::Triangles | Curve::Obstacles => "{ axis = \"x\", angle_deg = 90 }",
+    };
     let obstacles = match point.curve {
         Curve::Obstacles => obstacles::obstacles_toml(point.size as usize, OBSTACLE_SEED),
         _ => String::new(),
@@ -64,10 +69,80 @@ fn scene_toml(point: &Point, hand_file: &str, mesh_file: &str) -> String {
          [hand]\nfile = \"{hand_file}\"\n{contact}\n\
          [object]\nname = \"{}\"\n{shape}\nmass = 0.1\nfriction = 0.8\n{obstacles}\n\
          [start]\nposition = [0.0, 0.0, 0.078]\n{start}\n\
-         [goal]\nturn = {{ axis = \"x\", angle_deg = 90 }}\n",
+         [goal]\nturn = {turn}\n",
         point.object,
         point.size,
         point.curve.name(),
         point.object
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use regrasp_geometry::Shape;
+    use regrasp_robot::hand::Finger;
+    use regrasp_scene::load_scene;
+    use std::f64::consts::{PI, TAU};
+
+    fn loaded(point: Point) -> regrasp_scene::LoadedScene {
+        let folder = std::env::temp_dir().join(format!("regrasp_growth_{}_{}", scene_name(&point), std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let path = write_scene(&point, &folder).unwrap();
+        let loaded = load_scene(&path, &Default::default()).unwrap_or_else(|error| panic!("{point:?}: {error}"));
+        std::fs::remove_dir_all(&folder).unwrap();
+        assert!(loaded.notes.is_empty(), "{point:?}: {:?}", loaded.notes);
+        loaded
+    }
+
+    #[test]
+    fn hands_have_as_many_soft_tips_as_asked_evenly_placed() {
+        for size in Curve::Fingers.sizes().iter().copied() {
+            let hand = loaded(Point { curve: Curve::Fingers, object: "sphere", size }).scene.hand;
+            assert_eq!(hand.fingers.len(), size as usize);
+            let tip = |finger: &Finger| {
+                let mut poses = Vec::new();
+                finger.chain.forward(&finger.rest, &mut poses);
+                poses.last().unwrap() * finger.tip.center_in_body
+            };
+            let first = tip(&hand.fingers[0]);
+            for (index, finger) in hand.fingers.iter().enumerate() {
+                // The first, turned about z by its share of a full turn.
+                let (sin, cos) = (TAU * index as f64 / size as f64).sin_cos();
+                let turned = [cos * first.x - sin * first.y, sin * first.x + cos * first.y, first.z];
+                let tip = tip(finger);
+                assert!((0..3).all(|k| (tip[k] - turned[k]).abs() < 1e-9), "{size}, {index}: {tip} {turned:?}");
+                assert_eq!(finger.tip.contact.name(), "soft_finger");
+            }
+        }
+    }
+
+    #[test]
+    fn every_point_but_the_large_ones_is_a_scene_that_loads() {
+        for point in Curve::ALL.into_iter().flat_map(|curve| curve.points(10_000)) {
+            let scene = loaded(point).scene;
+            let n_obstacles = if point.curve == Curve::Obstacles { point.size as usize } else { 0 };
+            assert_eq!(scene.obstacles.len(), n_obstacles);
+            if let Shape::Mesh(mesh) = &scene.object.shape {
+                assert!(point.curve == Curve::Triangles && mesh.statistics().is_watertight());
+                assert_eq!(mesh.triangles().len(), point.size as usize);
+                let exact = 4.0 / 3.0 * PI * RADII.iter().product::<f64>();
+                let missing = 1.0 - mesh.signed_volume() / exact;
+                assert!(missing > 0.0 && missing < 15.0 / point.size as f64, "{point:?}: {missing}");
+            }
+        }
+    }
+
+    #[test]
+    fn fewer_obstacles_are_the_first_of_more_and_none_is_in_the_palm() {
+        let [few, many] = [10, 100].map(|size| loaded(Point { curve: Curve::Obstacles, object: "box", size }).scene);
+        for (a, b) in few.obstacles.iter().zip(&many.obstacles) {
+            assert_eq!((&a.name, &a.placed), (&b.name, &b.placed));
+        }
+        for obstacle in &many.obstacles {
+            let (center, radius) = obstacle.placed.shape.bounding_sphere();
+            let center = obstacle.placed.parent_from_shape * center;
+            assert!(center.z - radius > 0.0, "{} at {center}", obstacle.name);
+        }
+    }
 }

@@ -113,10 +113,10 @@ pub fn table(curve: Curve, rows: &[GrowthRow]) -> String {
 /// ending in `/`), and rows.
 pub fn section(files: &[(String, String, Vec<GrowthRow>)]) -> String {
     let mut out = String::from(
-        "## Growth\n\nWritten by `make growth`. Hands of equal fingers, evenly placed; 90 degrees about x. Times of planning are\n\
-         processor times on one thread in ms, over the trials solved; *times* is the mean over that of the size named in the text.\n\
-         *load* is the least of three, in ms of wall-clock time; *configurations* is the mean work of a trial, *us each* the time per\n\
-         configuration. What is not solved is in the tables and listed below them.\n",
+        "## Growth\n\nWritten by `make growth`. Hands of equal fingers, evenly placed. Times of planning are processor times on one\n\
+         thread in ms, over the trials solved; *times* is the mean over that of the size named in the text. *load* is the least of\n\
+         three, in ms of wall-clock time; *configurations* is the mean work of a trial, *us each* the time per configuration. What is\n\
+         not solved is in the tables and listed below them.\n",
     );
     for (name, folder, rows) in files {
         for curve in Curve::ALL {
@@ -163,25 +163,25 @@ fn heading(curve: Curve) -> &'static str {
 fn text(curve: Curve, points: &[Measured]) -> String {
     match curve {
         Curve::Fingers => {
-            "Soft fingertips in every hand: three hard fingers cannot hold while one of them is away. *times* is against four \
-             fingers."
+            "Turns by 180 degrees about z. Soft fingertips in every hand: three hard fingers cannot hold while one of them is \
+             away. *times* is against four fingers."
                 .to_owned()
         }
         Curve::Triangles => {
-            "One ellipsoid of half axes 30, 28 and 34 mm, in more and more triangles, between four hard fingers; all corners lie \
-             on it. *times* is against 10000 triangles."
+            "One ellipsoid of half axes 30, 28 and 34 mm, in more and more triangles with all corners on it, turned by 90 degrees \
+             about x by four hard fingers. *times* is against 10000 triangles."
                 .to_owned()
         }
         Curve::Obstacles => {
-            "Boxes and balls of 4 to 8 mm in a shell around a box and four hard fingers, 105 to 200 mm from the middle; fewer are \
-             the first of more. *times* is against one obstacle."
+            "Boxes and balls of 4 to 8 mm in a shell around a box that four hard fingers turn by 90 degrees about x, 85 to 200 mm \
+             from its middle; fewer are the first of more. *times* is against one obstacle."
                 .to_owned()
         }
         Curve::Threads => {
             let [n, cores] = points.first().map_or([0, 0], |point| [point.summary.runs, point.cores]);
             format!(
-                "{n} queries, whose starts differ by up to 3 mm, planned at the same time on so many threads of a machine with \
-                 {cores} cores, one thread each. *batch* and *plans per s* are wall-clock times of planning alone; *times* is \
+                "{n} turns of a box by 180 degrees about z, with starts up to 3 mm from the middle, planned by four hard fingers at \
+                 the same time on so many threads of a machine with {cores} cores, one thread each. *batch* and *plans per s* are wall-clock times of planning alone; *times* is \
                  against one thread."
             )
         }
