@@ -12,6 +12,9 @@ pub const METHODS: [&str; 3] = ["gait", "visibility", "classic"];
 /// Most threads that may be asked for.
 const MAX_THREADS: i64 = 1024;
 
+/// Most trials that may be asked of a point of a growth curve; plans of a batch are kept until all are there.
+const MAX_TRIALS: u64 = 100_000;
+
 /// Plans how a multi-fingered hand turns an object, and judges plans independently.
 ///
 /// First steps: `regrasp demo`; for a hand of your own `regrasp inspect hand.urdf -o hand.toml`, then a scene file
@@ -199,7 +202,7 @@ pub struct Growth {
     #[arg(long, value_name = "DIR")]
     pub results: Option<PathBuf>,
     /// Seeds per scene: 0, 1, ...; a batch over threads has ten times as many queries
-    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=100_000), allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 20, value_parser = trials, allow_negative_numbers = true)]
     pub trials: u64,
     /// Only sizes up to this one
     #[arg(long, value_name = "SIZE", value_parser = whole_number, allow_negative_numbers = true)]
@@ -389,6 +392,13 @@ fn whole_number(text: &str) -> Result<u64, String> {
 
 fn count(text: &str) -> Result<u64, String> {
     text.parse().ok().filter(|n| *n > 0).ok_or_else(|| "expected a whole number above 0".to_owned())
+}
+
+fn trials(text: &str) -> Result<u64, String> {
+    match text.parse() {
+        Ok(n) if (1..=MAX_TRIALS).contains(&n) => Ok(n),
+        _ => Err(format!("expected a number of trials between 1 and {MAX_TRIALS}")),
+    }
 }
 
 fn seconds(text: &str) -> Result<Duration, String> {

@@ -75,8 +75,9 @@ fn arguments_that_make_no_sense() {
     complains(&run, "F003", "taken", &["cannot be written"]);
     for (arguments, says) in [
         (["growth", "legs", "--quiet"], "fingers, triangles, obstacles, threads"),
-        (["growth", "--trials", "0"], "1..="),
-        (["growth", "--trials", "-1"], "1..="),
+        (["growth", "--trials", "0"], "between 1 and"),
+        (["growth", "--trials", "-1"], "between 1 and"),
+        (["growth", "--trials", "18446744073709551615"], "between 1 and"),
         (["growth", "--up-to", "-3"], "whole number"),
         (["growth", "--time-limit", "0"], "seconds"),
     ] {
