@@ -177,10 +177,10 @@ fn tick_step(largest: f64) -> f64 {
     [1.0, 2.0, 5.0, 10.0].map(|factor| factor * power).into_iter().find(|step| largest / step <= 6.0).unwrap_or(power)
 }
 
-/// Up to four significant digits, without rounding noise.
+/// Up to four significant digits, without rounding noise; short enough for its place.
 fn number(value: f64) -> String {
     let rounded: f64 = format!("{value:.3e}").parse().unwrap_or(value);
-    rounded.to_string()
+    if rounded >= 1e5 { format!("{rounded:e}") } else { rounded.to_string() }
 }
 
 fn escaped(text: &str) -> String {
@@ -196,7 +196,7 @@ mod tests {
         for (largest, step) in [(0.0, 1.0), (6.0, 1.0), (6.1, 2.0), (0.45, 0.1), (1234.0, 500.0), (0.0031, 0.001)] {
             assert!((tick_step(largest) - step).abs() < 1e-12, "{largest}: {}", tick_step(largest));
         }
-        assert_eq!(number(0.1 + 0.2), "0.3");
+        assert_eq!([0.1 + 0.2, 1e4, 1e6].map(number), ["0.3", "10000", "1e6"]);
     }
 
     #[test]

@@ -293,10 +293,12 @@ mod tests {
         slow[3].load.wall_s = 2.5;
         let page = section(&[("t.csv".to_owned(), String::new(), slow.clone())]);
         assert!(page.contains("2.50 s, MISSED;") && page.contains("2.50 times, MISSED"), "{page}");
+        slow[0].row.accepted = Some(false);
         // A miss is no time.
         slow[3].row.status = "time_limit".into();
         let page = section(&[("t.csv".to_owned(), String::new(), slow)]);
         assert!(page.contains("no time, MISSED") && page.contains("| ellipsoid | 1000000 | 0/1 | - |"), "{page}");
+        assert!(page.contains("| ellipsoid | 100 | 1/2 | 0/1 |") && page.contains("rejected by the checker"), "{page}");
     }
 
     #[test]
