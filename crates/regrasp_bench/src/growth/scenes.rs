@@ -55,7 +55,7 @@ fn scene_toml(point: &Point, hand_file: &str, mesh_file: &str) -> String {
         _ => "",
     };
     let turn = match point.curve {
-        // Three soft fingers need no relocation for 90 degrees about x.
+        // 90 degrees about x are one transfer for three soft fingers, and a batch of them is over too soon to be timed.
         Curve::Fingers | Curve::Threads => "{ axis = \"z\", angle_deg = 180 }",
         Curve::Triangles | Curve::Obstacles => "{ axis = \"x\", angle_deg = 90 }",
     };
@@ -63,17 +63,18 @@ fn scene_toml(point: &Point, hand_file: &str, mesh_file: &str) -> String {
         Curve::Obstacles => obstacles::obstacles_toml(point.size as usize, OBSTACLE_SEED),
         _ => String::new(),
     };
+    let size = match point.curve {
+        Curve::Threads => "a batch over threads".to_owned(),
+        _ => format!("{} {}", point.size, point.curve.name()),
+    };
     format!(
-        "# {}: {} of {}; written by `regrasp growth`.\n\
+        "# {}, {size}; written by `regrasp growth`.\n\
          format = \"regrasp-scene\"\nformat_version = 1\ntask = \"in_hand\"\n\n\
          [hand]\nfile = \"{hand_file}\"\n{contact}\n\
          [object]\nname = \"{}\"\n{shape}\nmass = 0.1\nfriction = 0.8\n{obstacles}\n\
          [start]\nposition = [0.0, 0.0, 0.078]\n{start}\n\
          [goal]\nturn = {turn}\n",
-        point.object,
-        point.size,
-        point.curve.name(),
-        point.object
+        point.object, point.object
     )
 }
 

@@ -198,10 +198,11 @@ fn asked(points: &[Measured]) -> String {
     let all_solved = [largest, reference].iter().all(|point| point.summary.solved == point.summary.runs);
     let ratio = largest.mean_s().zip(reference.mean_s()).map(|(a, b)| a / b);
     format!(
-        "\nAsked of {} triangles: loaded in at most {LOAD_AT_MOST_S} s: {:.2} s, {}; planned with at most {PLAN_AT_MOST} times as \
+        "\nAsked of {} triangles: loaded in at most {LOAD_AT_MOST_S} s: {:.2} s ({:.2} s of processor time), {}; planned with at most {PLAN_AT_MOST} times as \
          slowly as {}: {}, {}.\n",
         largest.size,
         largest.load.wall_s,
+        largest.load.cpu_s,
         verdict(largest.load.wall_s <= LOAD_AT_MOST_S),
         reference.size,
         ratio.map_or("no time".into(), |ratio| format!("{ratio:.2} times")),
@@ -280,7 +281,7 @@ mod tests {
         for part in [
             "| ellipsoid | 100 | 1/2 | 1/1 | 0.10 | 0.10 | 1.00 | 1.00 | 1.00 | 0.50 | 1000 | 1.0 | 3.0 | - |",
             "| ellipsoid | 1000000 | 1/1 | 1/1 | 1000 |",
-            "1.00 s, met; planned with at most 2 times as slowly as 10000: 1.50 times, met.",
+            "1.00 s (1.00 s of processor time), met; planned with at most 2 times as slowly as 10000: 1.50 times, met.",
             "![Growth with triangles](growth/triangles.svg)",
             "- triangles_100 () seed 0: work_spent; closure lost",
             "machine with 2 cores",
@@ -292,7 +293,10 @@ mod tests {
         slow[3].row.plan_cpu_s = 0.005;
         slow[3].load.wall_s = 2.5;
         let page = section(&[("t.csv".to_owned(), String::new(), slow.clone())]);
-        assert!(page.contains("2.50 s, MISSED;") && page.contains("2.50 times, MISSED"), "{page}");
+        assert!(
+            page.contains("2.50 s (1.00 s of processor time), MISSED;") && page.contains("2.50 times, MISSED"),
+            "{page}"
+        );
         slow[0].row.accepted = Some(false);
         // A miss is no time.
         slow[3].row.status = "time_limit".into();

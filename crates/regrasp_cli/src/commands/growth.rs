@@ -8,6 +8,7 @@ use crate::stop::Stop;
 use crate::talk::{Talk, duration, grouped};
 use regrasp::InHandSettings;
 use regrasp::base::files;
+use regrasp::scene::LoadedScene;
 use regrasp_bench::growth::{Curve, GrowthRow, Point, batch, header, line, pictures, table, timed_load, write_scene};
 use regrasp_bench::row::Judge;
 use regrasp_bench::{Problem, Row, RunSettings, run as run_one};
@@ -69,24 +70,8 @@ fn measure(
     let folder = &arguments.output;
     let path = write_scene(point, folder).map_err(|error| Stop::unwritable(folder, &error))?;
     let (loaded, load) = timed_load(&path)?;
-    let (trials, batch_s) = match point.curve {
-        Curve::Threads => {
-            let n = usize::try_from(arguments.trials.saturating_mul(BATCH_PER_TRIAL)).unwrap_or(usize::MAX);
-            let (trials, seconds) = batch(&loaded, n, point.size as usize, settings);
-            (trials, Some(seconds))
-        }
-        _ => {
-            let mut trials = Vec::new();
-            for seed in 0..arguments.trials {
-                let query = loaded.task.query(seed);
-                trials.push(run_one(Problem { scene: &loaded.scene, query: &query, seed }, settings));
-                if settings.cancelled.load(Ordering::Relaxed) {
-                    break;
-                }
-            }
-            (trials, None)
-        }
-    };
+    talk.say(format!("scene  {}   loaded in {}", path.display(), duration(load.wall_s)));
+    let (trials, batch_s) = plan(point.curve, point.size, &loaded, arguments.trials, settings);
     if settings.cancelled.load(Ordering::Relaxed) {
         return Err(Stop::Interrupted);
     }
@@ -105,16 +90,35 @@ fn measure(
     Ok(trials.into_iter().map(row).collect())
 }
 
+/// Trials one after the other; or, over threads, a batch of them at the same time, with its wall-clock time in seconds.
+fn plan(
+    curve: Curve,
+    size: u64,
+    loaded: &LoadedScene,
+    n_trials: u64,
+    settings: &RunSettings,
+) -> (Vec<Row>, Option<f64>) {
+    if curve == Curve::Threads {
+        let (rows, seconds) = batch(loaded, (n_trials * BATCH_PER_TRIAL) as usize, size as usize, settings);
+        return (rows, Some(seconds));
+    }
+    let of_seed = |seed: u64| {
+        let query = loaded.task.query(seed);
+        run_one(Problem { scene: &loaded.scene, query: &query, seed }, settings)
+    };
+    let goes_on = |_: &u64| !settings.cancelled.load(Ordering::Relaxed);
+    ((0..n_trials).take_while(goes_on).map(of_seed).collect(), None)
+}
+
 /// Says how a point went.
 fn say_point(point: &Point, load_s: f64, trials: &[Row], batch_s: Option<f64>, talk: &Talk) {
     let solved: Vec<&Row> = trials.iter().filter(|row| row.status == "solved").collect();
     let mean_s = solved.iter().map(|row| row.plan_cpu_s).sum::<f64>() / solved.len() as f64;
     talk.say(format!(
-        "point  {:<9} {:>9}  {:<9}  loaded in {}, solved {} of {}{}{}",
+        "point  {:<9} {:>9}  {:<9}  solved {} of {}{}{}",
         point.curve.name(),
         grouped(point.size),
         point.object,
-        duration(load_s),
         solved.len(),
         trials.len(),
         if solved.is_empty() { String::new() } else { format!(", mean {}", duration(mean_s)) },
