@@ -22,7 +22,7 @@ pub struct ClosureTable<'a> {
     enough: f64,
     /// Which sets of fingers are looked at.
     sets: Sets,
-    /// Margin of a triple of (finger, option), NaN where not asked for yet.
+    /// Margin of three fingers with their options, NaN where not asked for yet; triples i < j < k are numbered by k, j, i.
     triples: Vec<f64>,
     /// Margin of a pair of (finger, option), NaN where not asked for yet; none without soft fingers.
     pairs: Vec<f64>,
@@ -72,6 +72,7 @@ impl<'a> ClosureTable<'a> {
     pub fn with_margin(model: &'a Model<'a>, options: &'a [Vec<Candidate>], enough: f64) -> Self {
         let n_options = options.iter().map(Vec::len).max().unwrap_or(0);
         let n = options.len();
+        let n_triples = n * n.saturating_sub(1) * n.saturating_sub(2) / 6;
         let are_points = model.fingers.iter().all(|finger| finger.contact == ContactModel::Point);
         let has_soft = model.fingers.iter().any(|finger| matches!(finger.contact, ContactModel::SoftFinger { .. }));
         ClosureTable {
@@ -80,7 +81,7 @@ impl<'a> ClosureTable<'a> {
             n_options,
             enough,
             sets: if are_points && n <= 4 { Sets::Triples } else { Sets::All },
-            triples: vec![f64::NAN; (n * n_options).pow(3)],
+            triples: vec![f64::NAN; n_triples * n_options.pow(3)],
             pairs: vec![f64::NAN; if has_soft { (n * n_options).pow(2) } else { 0 }],
             larger: BTreeMap::new(),
             releases: Default::default(),
@@ -98,12 +99,12 @@ impl<'a> ClosureTable<'a> {
         (0..choice.len()).filter(holds).fold(0, |bits, f| bits | 1 << f)
     }
 
-    /// Margin of three fingers with their options, as points.
+    /// Margin of three fingers, in rising order, with their options, as points.
     fn triple(&mut self, fingers: [usize; 3], choice: &Choice) -> f64 {
-        let n = self.options.len();
         let [i, j, k] = fingers;
         let m = self.n_options;
-        let index = (((i * n + j) * n + k) * m + choice[i]) * m * m + choice[j] * m + choice[k];
+        let which = k * (k - 1) * (k - 2) / 6 + j * (j - 1) / 2 + i;
+        let index = ((which * m + choice[i]) * m + choice[j]) * m + choice[k];
         if self.triples[index].is_nan() {
             let contacts = fingers.map(|f| self.contact(f, choice));
             let is_smooth = |&f: &usize| self.model.fingers[f].contact == ContactModel::Frictionless;

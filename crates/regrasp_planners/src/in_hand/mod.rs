@@ -65,6 +65,8 @@ mod tally;
 mod transfer;
 /// A tree of grasps that grows by gaits.
 mod tree;
+/// Moving fingers that are seldom free to move.
+mod unlock;
 /// Validating a plan once at the planner's resolution: the floor of planning time.
 mod validate;
 /// The method of paper 000.

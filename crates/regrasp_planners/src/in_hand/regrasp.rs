@@ -48,8 +48,9 @@ pub fn regrasp(
     Some(way)
 }
 
-/// Moves fingers one at a time from option 0 of each to `goal` by the fewest relocations, over other options where need be:
-/// where two grasps have too few fingers in common to hold by, a third one leads from one to the other.
+/// Moves fingers one at a time from option 0 of each by the fewest relocations to a choice that is a goal, over other
+/// options where need be: where two grasps have too few fingers in common to hold by, a third one leads from one to the
+/// other. `n_away` is at most the number of relocations that a choice is away from a goal.
 ///
 /// The order is sought in closure alone; a relocation that is then found impossible is left out and the order sought again,
 /// with `n_tries` relocations tried in all. `start` holds the options 0.
@@ -57,7 +58,8 @@ pub fn regrasp_over(
     workspace: &mut Workspace,
     start: &GraspState,
     options: &[Vec<Candidate>],
-    goal: &Choice,
+    is_goal: impl Fn(&Choice) -> bool,
+    n_away: impl Fn(&Choice) -> f64,
     table: &mut ClosureTable,
     n_tries: usize,
     rng: &mut Rng,
@@ -85,19 +87,18 @@ pub fn regrasp_over(
                     continue;
                 }
                 for option in (0..options[finger].len()).filter(|&option| option != choice[finger]) {
-                    let mut next = choice.clone();
-                    next[finger] = option;
-                    if table.is_closed(&next, all) && !tried.failed(&choice, finger, option) {
+                    // The others hold wherever the finger lands.
+                    if !tried.failed(&choice, finger, option) {
+                        let mut next = choice.clone();
+                        next[finger] = option;
                         edges.push((as_node(&next), 1.0));
                     }
                 }
             }
         };
-        // A finger that is not at its goal has to move once at least.
-        let n_away = |node: usize| as_choice(node).iter().zip(goal).filter(|(a, b)| a != b).count() as f64;
-        let goal_node = as_node(goal);
-        let path =
-            search.cheapest_path_within(limits, as_node(&first), |node| node == goal_node, neighbours, n_away)?;
+        let is_there = |node: usize| is_goal(&as_choice(node));
+        let n_left = |node: usize| n_away(&as_choice(node));
+        let path = search.cheapest_path_within(limits, as_node(&first), is_there, neighbours, n_left)?;
         let mut way = Sequence::at(start.clone());
         let is_whole = path.nodes.windows(2).all(|pair| {
             let (before, after) = (as_choice(pair[0]), as_choice(pair[1]));

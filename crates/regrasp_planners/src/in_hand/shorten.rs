@@ -251,7 +251,11 @@ fn change(
             of_finger.extend(pool.any(search, finger, OTHERS));
         }
         let mut table = ClosureTable::new(model, &options);
-        change = regrasp_over(&mut search.workspace, way.end(), &options, &goal, &mut table, RELOCATIONS, rng);
+        let is_goal = |choice: &Choice| *choice == goal;
+        // A finger that is not at its goal has to move once at least.
+        let n_away = |choice: &Choice| choice.iter().zip(&goal).filter(|(a, b)| a != b).count() as f64;
+        let workspace = &mut search.workspace;
+        change = regrasp_over(workspace, way.end(), &options, is_goal, n_away, &mut table, RELOCATIONS, rng);
     }
     search.workspace.rrt_iterations = model.settings.rrt_iterations;
     let way = way.then(change?)?;

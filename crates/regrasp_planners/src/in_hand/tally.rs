@@ -56,6 +56,11 @@ impl Tally {
         *self.counts.entry(reason).or_default() += 1;
     }
 
+    /// What was seen of letting `finger` go.
+    pub fn release(&self, finger: usize) -> &Held {
+        &self.releases[finger].seen
+    }
+
     /// Adds another tally.
     pub fn merge(&mut self, other: &Tally) {
         for (&reason, count) in &other.counts {

@@ -12,6 +12,7 @@ use super::search::Search;
 use super::state::{GraspState, Moment, Sequence};
 use super::tally::Reason;
 use super::transfer::transfer;
+use super::unlock::{draw_bound_finger, unlock};
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;
 use regrasp_geometry::collision::Placement;
@@ -119,6 +120,11 @@ impl Tree {
                 if (is_given && self.nodes[node].n_tries == 1) || !search.model().may_release {
                     let here = Sequence::at(self.nodes[node].state().clone());
                     return advance(search, self, node, target, here);
+                }
+                if let Some(finger) = draw_bound_finger(search) {
+                    let state = self.nodes[node].state().clone();
+                    let way = unlock(search, &state, finger, &mut self.places[place].pool)?;
+                    return advance(search, self, node, target, way);
                 }
                 extend(search, self, node, target)
             }
