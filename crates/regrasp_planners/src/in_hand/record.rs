@@ -1,10 +1,11 @@
 //! The plan as it is written to a file.
 
 use super::legs::Solution;
-use super::model::{MAX_FINGERS, Model};
+use super::model::Model;
 use super::state::{Motion, Sequence};
 use super::workspace::{Contacts, HandJoints};
 use regrasp_geometry::Pose;
+use regrasp_grasp::Contact;
 use regrasp_plan::plan::{
     ContactMode, ContactState, FORMAT, FORMAT_VERSION, Plan, PlanInput, PoseData, Promises, Segment, SegmentKind,
     Statistics, WayPose, Waypoint,
@@ -26,7 +27,8 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution
             Motion::Transfer(moments) => {
                 statistics.transfers += 1;
                 statistics.transfers_with_free_fingers += u64::from(!state.is_held_by_all());
-                let held = |pose: &Pose, joints: &HandJoints| waypoint(pose, joints, &state.contacts, state.holding);
+                let contacts = contact_states(&state.contacts, state.holding);
+                let held = |pose: &Pose, joints: &HandJoints| waypoint(pose, joints, &contacts);
                 let mut waypoints = Vec::with_capacity(1 + moments.len());
                 waypoints.push(held(&state.world_from_object, &state.joints));
                 waypoints.extend(moments.iter().map(|m| held(&m.world_from_object, &m.joints)));
@@ -35,16 +37,17 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution
             Motion::Regrasp { finger, path } => {
                 let end = step.end();
                 statistics.relocations += u64::from(end.holds(*finger));
-                let holding = state.holding & !(1 << finger);
                 let pose = &state.world_from_object;
+                let contacts = contact_states(&end.contacts, state.holding & !(1 << finger));
                 let mut waypoints = Vec::with_capacity(1 + path.len());
-                waypoints.push(waypoint(pose, &state.joints, &state.contacts, state.holding));
+                waypoints.push(waypoint(pose, &state.joints, &contact_states(&state.contacts, state.holding)));
                 let mut joints = state.joints.clone();
-                for (k, at) in path.iter().enumerate() {
+                for at in path {
                     joints[*finger].clone_from(at);
-                    let is_last = k + 1 == path.len();
-                    let holding = if is_last { end.holding } else { holding };
-                    waypoints.push(waypoint(pose, &joints, &end.contacts, holding));
+                    waypoints.push(waypoint(pose, &joints, &contacts));
+                }
+                if let Some(last) = waypoints.last_mut() {
+                    last.contacts = contact_states(&end.contacts, end.holding);
                 }
                 let name = scene.hand.fingers[*finger].name.clone();
                 segments.push(Segment { kind: SegmentKind::Regrasp, moving_finger: Some(name), waypoints });
@@ -54,7 +57,7 @@ pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution
     }
     if segments.is_empty() {
         // Start and goal are the same and any grasp will do: hold still.
-        let here = waypoint(&start.world_from_object, &start.joints, &start.contacts, start.holding);
+        let here = waypoint(&start.world_from_object, &start.joints, &contact_states(&start.contacts, start.holding));
         let waypoints = vec![here.clone(), here];
         segments.push(Segment { kind: SegmentKind::Transfer, moving_finger: None, waypoints });
     }
@@ -117,24 +120,23 @@ fn way_poses(query: &InHandQuery, segments: &[Segment], steps_to_way: &[usize]) 
         .collect()
 }
 
-fn waypoint(pose: &Pose, joints: &HandJoints, contacts: &Contacts, holding: u32) -> Waypoint {
-    Waypoint {
-        joints: joints.iter().map(|own| &own[..]).collect::<arrayvec::ArrayVec<_, MAX_FINGERS>>().concat(),
-        world_from_object: PoseData::from(pose),
-        contacts: contacts
-            .iter()
-            .enumerate()
-            .map(|(finger, contact)| {
-                if holding & (1 << finger) == 0 {
-                    ContactState { mode: ContactMode::Free, point_in_object: None, normal_in_object: None }
-                } else {
-                    ContactState {
-                        mode: ContactMode::Fixed,
-                        point_in_object: Some(contact.point_in_object.coords.into()),
-                        normal_in_object: Some(contact.normal_in_object.into_inner().into()),
-                    }
-                }
-            })
-            .collect(),
-    }
+fn waypoint(pose: &Pose, joints: &HandJoints, contacts: &[ContactState]) -> Waypoint {
+    let mut all = Vec::with_capacity(joints.iter().map(|own| own.len()).sum());
+    joints.iter().for_each(|own| all.extend_from_slice(own));
+    Waypoint { joints: all, world_from_object: PoseData::from(pose), contacts: contacts.to_vec() }
+}
+
+fn contact_states(contacts: &Contacts, holding: u32) -> Vec<ContactState> {
+    let state = |(finger, contact): (usize, &Contact)| {
+        if holding & (1 << finger) == 0 {
+            ContactState { mode: ContactMode::Free, point_in_object: None, normal_in_object: None }
+        } else {
+            ContactState {
+                mode: ContactMode::Fixed,
+                point_in_object: Some(contact.point_in_object.coords.into()),
+                normal_in_object: Some(contact.normal_in_object.into_inner().into()),
+            }
+        }
+    };
+    contacts.iter().enumerate().map(state).collect()
 }

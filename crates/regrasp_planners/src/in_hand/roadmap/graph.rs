@@ -132,8 +132,12 @@ impl Graph {
     /// The grasp that a node stands for.
     pub fn state(&self, node: usize) -> GraspState {
         let contacts: Contacts = (0..self.n_fingers()).map(|finger| *self.contact(node, finger)).collect();
-        let joints: HandJoints = (0..self.n_fingers()).map(|finger| self.joints(node, finger)).collect();
-        GraspState::held_by_all(*self.pose(node), contacts, joints)
+        GraspState::held_by_all(*self.pose(node), contacts, self.hand_joints(node))
+    }
+
+    /// Joints of all fingers at a node.
+    pub fn hand_joints(&self, node: usize) -> HandJoints {
+        (0..self.n_fingers()).map(|finger| self.joints(node, finger)).collect()
     }
 
     /// Joints of a relocation between its ends, in the order it was proven.
@@ -146,7 +150,11 @@ impl Graph {
     }
 
     /// Joints of a transfer between its ends, in the order it was proven.
-    pub fn moments(&self, first: u32, n_between: u16) -> impl Iterator<Item = HandJoints> {
+    pub fn moments(
+        &self,
+        first: u32,
+        n_between: u16,
+    ) -> impl DoubleEndedIterator<Item = HandJoints> + ExactSizeIterator {
         let stride = self.n_joints();
         let first = first as usize;
         self.ways[first..first + usize::from(n_between) * stride].chunks_exact(stride.max(1)).map(|joints| {

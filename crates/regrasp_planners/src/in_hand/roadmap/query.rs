@@ -16,7 +16,7 @@ use super::index::Index;
 use super::landmarks::{Bounds, Landmarks};
 use super::region::nearest_places;
 use super::registry::Registry;
-use super::route::motion_along;
+use super::route::push_motion_along;
 use crate::failure::{Failure, FailureKind};
 use regrasp_base::{Budget, InputError, Rng};
 use regrasp_geometry::Pose;
@@ -242,9 +242,13 @@ impl<'a> RoadmapPlanner<'a> {
     /// All motions from the start to the goal along a path. None when what is stored does not fit together.
     fn motions(&self, search: &mut Search, [first, last]: [&Link; 2], path: &[usize]) -> Option<Sequence> {
         let mut way = first.way.reversed();
+        if *way.end() != self.roadmap.graph.state(path[0]) {
+            return None;
+        }
         for pair in path.windows(2) {
             let edge = self.roadmap.index.edge_between(pair[0], pair[1])?;
-            way = way.then(motion_along(&self.model, self.roadmap, edge, pair[0])?)?;
+            // What is straightened is looked at motion by motion.
+            push_motion_along(&self.model, self.roadmap, (edge, pair[0]), !self.smooth, &mut way)?;
         }
         way = way.then(last.way.clone())?;
         if self.smooth {

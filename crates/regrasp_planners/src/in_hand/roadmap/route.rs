@@ -6,43 +6,65 @@ use super::super::transfer::follow;
 use super::super::workspace::HandJoints;
 use super::GraspRoadmap;
 use super::graph::{NOT_STORED, Passage};
-use regrasp_geometry::{Pose, interpolate_pose};
+use regrasp_geometry::Pose;
+use regrasp_geometry::frame::PoseLine;
 
 /// Largest difference between the joints that a transfer ends in and those stored, in radians or metres.
 const SAME_POSTURE: f64 = 2e-6;
 
-/// The motion along edge `edge` from node `from`, which is one of its ends.
+/// Appends the motion along edge `edge` from node `from`, which is one of its ends and the state that `way` ends in. With
+/// `joins` a transfer at the end of `way` goes on where the edge is one.
 ///
 /// None when the stored ends of a transfer do not fit each other: it was proven by another version of the kinematics.
-pub fn motion_along(model: &Model, roadmap: &GraspRoadmap, edge: u32, from: usize) -> Option<Sequence> {
+pub fn push_motion_along(
+    model: &Model,
+    roadmap: &GraspRoadmap,
+    (edge, from): (u32, usize),
+    joins: bool,
+    way: &mut Sequence,
+) -> Option<()> {
     let graph = &roadmap.graph;
     let stored = &graph.edges[edge as usize];
-    let to = stored.to as usize;
-    let mut way = Sequence::at(graph.state(stored.from as usize));
+    let (proven_from, proven_to) = (stored.from as usize, stored.to as usize);
+    let is_forwards = proven_from == from;
+    let to = if is_forwards { proven_to } else { proven_from };
     match stored.passage {
         Passage::Transfer { n_between: NOT_STORED, .. } => {
-            let moments = transfer_again(model, way.start(), &graph.state(to))?;
-            way.push_transfer(moments);
+            let moments = transfer_again(model, &graph.state(proven_from), &graph.state(proven_to))?;
+            let mut again = Sequence::at(graph.state(proven_from));
+            again.push_transfer(moments);
+            let mut again = if is_forwards { again } else { again.reversed() };
+            push(way, again.pop_transfer()?, joins);
         }
         Passage::Transfer { first, n_between } => {
-            let (start, end) = (way.start(), graph.state(to));
-            let (from, to) = (start.world_from_object, end.world_from_object);
-            let mut moments = Vec::with_capacity(usize::from(n_between) + 1);
-            for (k, joints) in graph.moments(first, n_between).enumerate() {
-                let share = share_of(k, usize::from(n_between) + 1);
-                moments.push(Moment { world_from_object: interpolate_pose(&from, &to, share), joints });
+            let line = PoseLine::between(graph.pose(proven_from), graph.pose(proven_to));
+            let n = usize::from(n_between) + 1;
+            let moment = |(k, joints)| Moment { world_from_object: line.at(share_of(k, n)), joints };
+            let end = Moment { world_from_object: *graph.pose(to), joints: graph.hand_joints(to) };
+            let between = graph.moments(first, n_between).enumerate().map(moment);
+            if is_forwards {
+                push(way, between.chain([end]), joins);
+            } else {
+                push(way, between.rev().chain([end]), joins);
             }
-            moments.push(Moment { world_from_object: to, joints: end.joints });
-            way.push_transfer(moments);
         }
         Passage::Relocation { finger, first, n_between } => {
             let finger = usize::from(finger);
-            let mut path: Vec<_> = graph.way(finger, first, n_between).collect();
-            path.push(graph.joints(to, finger));
+            let between = graph.way(finger, first, n_between);
+            let end = [graph.joints(to, finger)];
+            let path = if is_forwards { between.chain(end).collect() } else { between.rev().chain(end).collect() };
             way.push_regrasp(finger, Some(*graph.contact(to, finger)), path);
         }
     }
-    Some(if stored.from as usize == from { way } else { way.reversed() })
+    Some(())
+}
+
+fn push(way: &mut Sequence, moments: impl IntoIterator<Item = Moment>, joins: bool) {
+    if joins {
+        way.go_on(moments);
+    } else {
+        way.push_transfer(moments.into_iter().collect());
+    }
 }
 
 /// Share of a transfer's way that is made at moment `k` of `n`, of which the last is its end; as steps are shared out.
@@ -54,10 +76,8 @@ fn share_of(k: usize, n: usize) -> f64 {
 /// not stored.
 pub fn evenly(start: &Pose, moments: &[Moment]) -> Option<Vec<HandJoints>> {
     let (end, between) = moments.split_last()?;
-    let is_at = |(k, moment): (usize, &Moment)| {
-        let pose = interpolate_pose(start, &end.world_from_object, share_of(k, moments.len()));
-        pose == moment.world_from_object
-    };
+    let line = PoseLine::between(start, &end.world_from_object);
+    let is_at = |(k, moment): (usize, &Moment)| line.at(share_of(k, moments.len())) == moment.world_from_object;
     let is_even = between.iter().enumerate().all(is_at);
     is_even.then(|| between.iter().map(|moment| moment.joints.clone()).collect())
 }
