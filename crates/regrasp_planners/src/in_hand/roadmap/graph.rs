@@ -119,7 +119,12 @@ impl Graph {
 
     /// Joints of one finger at a node.
     pub fn joints(&self, node: usize, finger: usize) -> Coordinates {
-        self.footholds[finger].joints_of(self.nodes[node].footholds[finger]).iter().copied().collect()
+        self.joints_of(node, finger).iter().copied().collect()
+    }
+
+    /// Joints of one finger at a node, in place.
+    pub fn joints_of(&self, node: usize, finger: usize) -> &[f64] {
+        self.footholds[finger].joints_of(self.nodes[node].footholds[finger])
     }
 
     /// Contact of one finger at a node.
@@ -143,35 +148,14 @@ impl Graph {
         (0..self.n_fingers()).map(|finger| self.joints(node, finger)).collect()
     }
 
-    /// Joints of a relocation between its ends, in the order it was proven.
-    pub fn way(&self, finger: usize, first: u32, n_between: u16) -> impl DoubleEndedIterator<Item = Coordinates> {
-        let stride = self.footholds[finger].n_coordinates;
-        let first = first as usize;
-        self.ways[first..first + usize::from(n_between) * stride]
-            .chunks_exact(stride.max(1))
-            .map(|joints| joints.iter().map(|&q| f64::from(q)).collect())
+    /// Joints of all fingers in a transfer between its ends, in the order it was proven.
+    pub fn strands_of(&self, first: u32, n_between: u16) -> ArrayVec<&[f32], MAX_FINGERS> {
+        let firsts = &self.strands[first as usize..first as usize + self.n_fingers()];
+        firsts.iter().enumerate().map(|(finger, &first)| self.numbers_of(finger, first, n_between)).collect()
     }
 
-    /// Joints of a transfer between its ends, in the order it was proven.
-    pub fn moments(
-        &self,
-        first: u32,
-        n_between: u16,
-    ) -> impl DoubleEndedIterator<Item = HandJoints> + ExactSizeIterator {
-        let strands: ArrayVec<&[f32], MAX_FINGERS> = (0..self.n_fingers())
-            .map(|finger| self.numbers_of(finger, self.strands[first as usize + finger], n_between))
-            .collect();
-        (0..usize::from(n_between)).map(move |k| {
-            let of_finger = |(strand, footholds): (&&[f32], &Footholds)| {
-                let n = footholds.n_coordinates;
-                strand[k * n..(k + 1) * n].iter().map(|&q| f64::from(q)).collect()
-            };
-            strands.iter().zip(&self.footholds).map(of_finger).collect()
-        })
-    }
-
-    /// The numbers of a finger's way.
-    fn numbers_of(&self, finger: usize, first: u32, n_between: u16) -> &[f32] {
+    /// Joints of one finger in a motion between its ends, in the order it was proven.
+    pub fn numbers_of(&self, finger: usize, first: u32, n_between: u16) -> &[f32] {
         let n = usize::from(n_between) * self.footholds[finger].n_coordinates;
         &self.ways[first as usize..first as usize + n]
     }
