@@ -353,6 +353,11 @@ impl Lists {
         Lists { firsts, items }
     }
 
+    /// First item of every key, with the number of items at the end; and the items.
+    pub fn into_tables(self) -> (Vec<u32>, Vec<u32>) {
+        (self.firsts, self.items)
+    }
+
     /// The items of `key`.
     pub fn of(&self, key: usize) -> &[u32] {
         &self.items[self.firsts[key] as usize..self.firsts[key + 1] as usize]

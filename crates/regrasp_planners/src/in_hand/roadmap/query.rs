@@ -232,6 +232,7 @@ impl<'a> RoadmapPlanner<'a> {
             out.extend(goal.anchors.iter().filter(|anchor| anchor.node == node).map(|anchor| (to, anchor.cost)));
         };
         let bounds = self.bounds_to(goal);
+
         let bound = |node: usize| if node < from { GREED * roadmap.landmarks.bound(node, &bounds) } else { 0.0 };
         let path = a_star.cheapest_path(from, |node| node == to, neighbours, bound)?.nodes;
         Some(path[1..path.len() - 1].to_vec())
