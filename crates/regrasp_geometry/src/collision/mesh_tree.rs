@@ -134,8 +134,16 @@ impl MeshTree {
             let mut direction = at_box.translation - mesh_from_shape.translation;
             // Of a ball the distance is known already.
             if !matches!(shape, Shape::Sphere { .. })
-                && let Answer::SeparatedBy(d) =
-                    separation(shape, mesh_from_shape, &cuboid, &at_box, required, required, &mut direction, &mut [0; 2])
+                && let Answer::SeparatedBy(d) = separation(
+                    shape,
+                    mesh_from_shape,
+                    &cuboid,
+                    &at_box,
+                    required,
+                    required,
+                    &mut direction,
+                    &mut [0; 2],
+                )
             {
                 *smallest = smallest.min(d);
                 continue;

@@ -70,9 +70,10 @@ fn roadmap_with_a_wrong_checksum() {
 
 #[test]
 fn roadmap_with_huge_counts() {
-    for (index, what) in ["bytes about itself", "places", "contacts", "nodes", "edges", "ways of fingers", "joint values"]
-        .into_iter()
-        .enumerate()
+    for (index, what) in
+        ["bytes about itself", "places", "contacts", "nodes", "edges", "ways of fingers", "joint values"]
+            .into_iter()
+            .enumerate()
     {
         let at = 32 + 8 * index;
         let place = format!("byte {at}");
