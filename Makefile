@@ -23,6 +23,9 @@ SOFT_AND_COUPLED := scenes/dclaw/soft_sphere32_x.toml scenes/trifinger/soft_cyli
 ROADMAPS := roadmap_sphere roadmap_box roadmap_million
 # Sections of docs/benchmarks.md, in this order; those without a CSV file are left out.
 BENCHMARKS := wide visibility classic improvement allegro_required allegro_stretch allegro_meshes $(ROADMAPS)
+# Curves of `make growth`, in this order.
+GROWTH := fingers triangles obstacles threads
+GROWTH_TRIALS ?= 20
 QUERIES ?= 1000
 ROADMAP_BENCH = --queries $(QUERIES) --csv docs/benchmarks/$@.csv --graph docs/benchmarks/$@.json
 SEEDS ?= 200
@@ -31,7 +34,7 @@ ALLEGRO_SEEDS ?= 20
 CLASSIC_SEEDS ?= 20
 ALLEGRO_BENCH = $(PACKAGES) --time-limit 20 --threads 1 --seeds $(ALLEGRO_SEEDS)
 
-.PHONY: all demo pictures test bench benchmark-page campaign fuzz docs release $(ROADMAPS)
+.PHONY: all demo pictures test bench growth benchmark-page campaign fuzz docs release $(ROADMAPS)
 
 all: release
 
@@ -59,6 +62,7 @@ bench: release
 	$(REGRASP) bench suites/paper000.toml
 	$(REGRASP) bench suites/paper004.toml
 	$(MAKE) $(ROADMAPS)
+	$(MAKE) growth
 ifneq ($(PACKAGES),)
 	$(REGRASP) bench $(ALLEGRO_REQUIRED) $(ALLEGRO_BENCH) --csv docs/benchmarks/allegro_required.csv
 	$(REGRASP) bench $(ALLEGRO_STRETCH) $(ALLEGRO_BENCH) --csv docs/benchmarks/allegro_stretch.csv
@@ -77,9 +81,14 @@ roadmap_million: release
 	$(REGRASP) roadmap build scenes/box_90x.toml -o $(OUT)/$@.roadmap --places 1700
 	$(REGRASP) roadmap bench $(OUT)/$@.roadmap scenes/box_90x.toml $(ROADMAP_BENCH)
 
+# How loading and planning grow with fingers, triangles, obstacles and threads; minutes. $(OUT) keeps the scenes.
+growth: release
+	$(REGRASP) growth $(GROWTH) --trials $(GROWTH_TRIALS) -o $(OUT)/growth --results docs/benchmarks/growth
+	$(MAKE) benchmark-page
+
 # docs/benchmarks.md again, from what was measured.
 benchmark-page: release
-	$(REGRASP) bench --page docs/benchmarks.md --limits docs/benchmarks/limits.json $(wildcard $(BENCHMARKS:%=docs/benchmarks/%.csv) $(ROADMAPS:%=docs/benchmarks/%.json)) suites/*.toml
+	$(REGRASP) bench --page docs/benchmarks.md --limits docs/benchmarks/limits.json $(wildcard $(BENCHMARKS:%=docs/benchmarks/%.csv) $(ROADMAPS:%=docs/benchmarks/%.json) $(GROWTH:%=docs/benchmarks/growth/%.csv)) suites/*.toml
 
 # Slow: same bytes on 1, 2 and 8 threads (100 queries), and the checker against broken and good plans; torsion and couplings
 # are broken in plans for real hands.

@@ -4,10 +4,14 @@
 
 /// Trials side by side.
 pub mod at_once;
+/// Curves as SVG.
+mod chart;
 /// Rows as CSV, written whole or appended one by one, and read back.
 pub mod csv;
 /// The same bytes on any number of threads.
 pub mod determinism;
+/// How loading and planning grow with fingers, triangles, obstacles and threads.
+pub mod growth;
 /// First and improved plans side by side.
 pub mod improvement;
 /// Times within which scenes should be solved.

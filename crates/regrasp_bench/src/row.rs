@@ -112,6 +112,15 @@ pub fn method_name(settings: &InHandSettings) -> String {
 
 /// Plans one seed, judges the plan, and measures both.
 pub fn run(problem: Problem, settings: &RunSettings) -> Row {
+    let (mut row, plan) = plan_only(problem, settings);
+    if let Some(plan) = &plan {
+        measure(problem, plan, &settings.planner, settings.judge, &mut row);
+    }
+    row
+}
+
+/// Plans one seed: the plan, if there is one, is neither measured nor judged yet.
+pub(crate) fn plan_only(problem: Problem, settings: &RunSettings) -> (Row, Option<Plan>) {
     let mut row = Row {
         scene: problem.scene.name.clone(),
         method: method_name(&settings.planner),
@@ -144,15 +153,15 @@ pub fn run(problem: Problem, settings: &RunSettings) -> Row {
     match outcome {
         Ok(plan) => {
             row.status = "solved".into();
-            measure(problem, &plan, &settings.planner, settings.judge, &mut row);
+            (row, Some(plan))
         }
         Err(failure) => {
             row.status = status_of(&failure);
             row.angle_left_deg = failure.nearest_miss.as_ref().map(|miss| miss.angle_left.to_degrees());
             row.cause = failure.causes.first().map_or(failure.message.clone(), |cause| cause.reason.clone());
+            (row, None)
         }
     }
-    row
 }
 
 /// Enters what a plan is like: its motions, its floor and, if asked, the checker's verdict.

@@ -55,6 +55,8 @@ pub struct Summary {
     pub nodes: Option<Spread>,
     /// Grasps and contacts sampled over the solved seeds.
     pub samples: Option<Spread>,
+    /// Configurations looked at over the solved seeds.
+    pub work: Option<Spread>,
     /// Transfers per plan.
     pub transfers: Option<Spread>,
     /// Relocations per plan.
@@ -112,6 +114,7 @@ pub fn summary_of_rows(runs: &[&Row]) -> Summary {
         check_s: Spread::of(solved.iter().filter_map(|row| row.check_s)),
         nodes: over(|row| row.nodes as f64),
         samples: over(|row| row.samples as f64),
+        work: over(|row| row.work as f64),
         transfers: over(|row| row.transfers as f64),
         relocations: over(|row| row.relocations as f64),
         min_margin: smallest(|row| row.min_margin),

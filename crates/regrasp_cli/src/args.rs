@@ -2,6 +2,7 @@
 
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
+use regrasp_bench::growth::Curve;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -10,6 +11,9 @@ pub const METHODS: [&str; 3] = ["gait", "visibility", "classic"];
 
 /// Most threads that may be asked for.
 const MAX_THREADS: i64 = 1024;
+
+/// Most trials that may be asked of a point of a growth curve; plans of a batch are kept until all are there.
+const MAX_TRIALS: u64 = 100_000;
 
 /// Plans how a multi-fingered hand turns an object, and judges plans independently.
 ///
@@ -56,6 +60,8 @@ pub enum Command {
     Check(Check),
     /// Plan scenes with many seeds and tabulate
     Bench(Bench),
+    /// Measure how loading and planning grow with fingers, triangles, obstacles and threads
+    Growth(Growth),
     /// Many queries on one saved graph of a hand and an object
     Roadmap(Roadmap),
     /// Long tests of the tool itself: determinism, and the checker against broken plans
@@ -181,6 +187,32 @@ pub struct Bench {
     /// For --page: seconds by scene, within which it should be solved
     #[arg(long, value_name = "FILE.json", requires = "page")]
     pub limits: Option<PathBuf>,
+}
+
+/// `regrasp growth`
+#[derive(Debug, Args)]
+pub struct Growth {
+    /// Curves [default: all]
+    #[arg(value_name = "CURVE", value_parser = PossibleValuesParser::new(Curve::ALL.map(Curve::name)))]
+    pub curves: Vec<String>,
+    /// Folder for the scenes, which are kept; the largest mesh has 50 MB
+    #[arg(short, long, value_name = "DIR", default_value = "regrasp-growth")]
+    pub output: PathBuf,
+    /// Folder for CSV file and picture of each curve [default: that of the scenes]
+    #[arg(long, value_name = "DIR")]
+    pub results: Option<PathBuf>,
+    /// Seeds per scene: 0, 1, ...; a batch over threads has ten times as many queries
+    #[arg(long, default_value_t = 20, value_parser = trials, allow_negative_numbers = true)]
+    pub trials: u64,
+    /// Only sizes up to this one
+    #[arg(long, value_name = "SIZE", value_parser = whole_number, allow_negative_numbers = true)]
+    pub up_to: Option<u64>,
+    /// Wall-clock limit per trial, in seconds; it may only cut
+    #[arg(long, value_name = "S", default_value = "10", value_parser = seconds, allow_negative_numbers = true)]
+    pub time_limit: Duration,
+    /// Work limit per trial, in configurations looked at
+    #[arg(long, value_name = "N", default_value_t = 20_000_000, value_parser = whole_number, allow_negative_numbers = true)]
+    pub max_work: u64,
 }
 
 /// `regrasp roadmap`
@@ -360,6 +392,13 @@ fn whole_number(text: &str) -> Result<u64, String> {
 
 fn count(text: &str) -> Result<u64, String> {
     text.parse().ok().filter(|n| *n > 0).ok_or_else(|| "expected a whole number above 0".to_owned())
+}
+
+fn trials(text: &str) -> Result<u64, String> {
+    match text.parse() {
+        Ok(n) if (1..=MAX_TRIALS).contains(&n) => Ok(n),
+        _ => Err(format!("expected a number of trials between 1 and {MAX_TRIALS}")),
+    }
 }
 
 fn seconds(text: &str) -> Result<Duration, String> {

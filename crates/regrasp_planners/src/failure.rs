@@ -79,6 +79,21 @@ pub struct Failure {
     pub statistics: Statistics,
 }
 
+impl Failure {
+    /// Of this kind, for a reason known without a search.
+    pub(crate) fn unsearched(kind: FailureKind, message: String, advice: &str) -> Self {
+        Failure {
+            kind,
+            message,
+            advice: advice.into(),
+            causes: Vec::new(),
+            leg: None,
+            nearest_miss: None,
+            statistics: Statistics::default(),
+        }
+    }
+}
+
 impl std::fmt::Display for Failure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(&self.message)

@@ -90,7 +90,7 @@ impl AStar {
         self.n_expanded
     }
 
-    /// [`AStar::cheapest_path_within`] no limits.
+    /// [`AStar::cheapest_path_within`] with no limits.
     pub fn cheapest_path(
         &mut self,
         start: usize,
@@ -105,8 +105,9 @@ impl AStar {
     /// the limits.
     ///
     /// `neighbours` appends `(node, cost of the edge)` with costs of zero or more; an infinite cost is no edge.
-    /// `heuristic` must never exceed the cost of the rest of the way; zero makes it Dijkstra's algorithm. Nodes may be any
-    /// indices below 2^32; memory grows with the largest one seen. Equal costs are decided by the smaller index.
+    /// `heuristic` must never exceed the cost of the rest of the way; zero makes it Dijkstra's algorithm. With one that
+    /// does, a path is found where there is one, but perhaps not the cheapest. Nodes may be any indices
+    /// below 2^32; memory grows with the largest one seen. Equal estimates are decided by the one that has come farthest, then by the smaller index.
     pub fn cheapest_path_within(
         &mut self,
         limits: Limits,

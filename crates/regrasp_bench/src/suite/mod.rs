@@ -2,8 +2,6 @@
 //!
 //! Codes: B600 not TOML or not the shape of a suite, B601 another format or version, B602 a value that makes no sense.
 
-/// Points of a figure as SVG.
-pub mod chart;
 /// The results of a suite as Markdown.
 pub mod results;
 /// Rows of a suite as CSV; those of an earlier run are taken over.

@@ -1,8 +1,8 @@
 //! The results of a suite as Markdown: the paper's numbers beside ours. The same rows give the same bytes.
 
-use super::chart::{Panel, svg};
 use super::rows::SuiteRow;
 use super::{Entry, Figure, Published, Suite, Table};
+use crate::chart::{Axis, Panel, Scale, svg};
 use crate::page::{escaped, misses};
 use crate::row::Row;
 use crate::summary::{Spread, Summary, summary_of_rows};
@@ -31,11 +31,14 @@ const METHOD_OF_MEASURING: &str = "Ours: processor time of the planner call on o
      checker; *floors* is mean planning time over the mean time to validate the final plan once. Published times are of the \
      authors' machine and hand; a dash is what they do not give.";
 
+const ALPHA: Axis = Axis { label: "alpha", scale: Scale::Unit };
+const TIME: Axis = Axis { label: "mean time, ms", scale: Scale::FromZero };
+
 /// The figures as (file name, SVG).
 pub fn pictures(suite: &Suite, rows: &[SuiteRow]) -> Vec<(String, String)> {
     let picture = |figure: &Figure| {
         let panels: Vec<Panel> = figure.curves.iter().map(|curve| panel(figure, curve, rows)).collect();
-        (format!("{}.svg", figure.name), svg(&panels, "alpha", "mean time, ms"))
+        (format!("{}.svg", figure.name), svg(&panels, &ALPHA, &TIME))
     };
     suite.figures.iter().map(picture).collect()
 }

@@ -9,6 +9,7 @@ use crate::stop::Stop;
 use crate::talk::Talk;
 use regrasp::base::files;
 use regrasp_bench::at_once::in_order;
+use regrasp_bench::growth;
 use regrasp_bench::roadmap::GraphFacts;
 use regrasp_bench::row::Judge;
 use regrasp_bench::suite::is_suite;
@@ -111,7 +112,7 @@ fn write_page(path: &Path, inputs: &[PathBuf], limits: Option<&Path>, talk: &Tal
     refuse_unwritable(path)?;
     refuse_input(path, inputs.iter().map(PathBuf::as_path).chain(limits))?;
     let limits = limits.map_or_else(|| Ok(Limits::new()), limits::read)?;
-    let (mut parts, mut graphs, mut sections) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut parts, mut graphs, mut sections, mut curves) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for file in inputs {
         if is_suite(file) {
             sections.push(suite::section(file, path)?);
@@ -119,9 +120,15 @@ fn write_page(path: &Path, inputs: &[PathBuf], limits: Option<&Path>, talk: &Tal
             graphs.push(GraphFacts::read(file)?);
         } else if improvement::is_improvement(file)? {
             sections.push(improvement::section(&file.to_string_lossy(), &improvement::read(file)?));
+        } else if growth::is_growth(file)? {
+            let folder = suite::link(file.parent().unwrap_or(Path::new("")), path);
+            curves.push((file.to_string_lossy().into_owned(), folder, growth::read(file)?));
         } else {
             parts.push((file.to_string_lossy().into_owned(), csv::read(file)?));
         }
+    }
+    if !curves.is_empty() {
+        sections.push(growth::section(&curves));
     }
     let text = page::markdown(&parts, &graphs, &sections, &limits);
     files::write_atomic(path, text.as_bytes()).map_err(|error| Stop::unwritable(path, &error))?;

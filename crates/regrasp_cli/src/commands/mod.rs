@@ -4,6 +4,7 @@ mod bench;
 mod campaign;
 mod check;
 mod demo;
+mod growth;
 mod inspect;
 pub mod plan;
 mod roadmap;
@@ -22,6 +23,7 @@ pub fn run(arguments: &Arguments, talk: &Talk) -> Result<(), Stop> {
         Command::Plan(plan) => plan::run(plan, common, talk),
         Command::Check(check) => check::run(check, common, talk),
         Command::Bench(bench) => bench::run(bench, common, talk),
+        Command::Growth(growth) => growth::run(growth, talk),
         Command::Roadmap(roadmap) => roadmap::run(roadmap, common, talk),
         Command::Campaign(campaign) => campaign::run(campaign, common, talk),
     }

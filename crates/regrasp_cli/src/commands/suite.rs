@@ -175,11 +175,16 @@ pub fn section(path: &Path, page: &Path) -> Result<String, Stop> {
     Ok(results::markdown(&suite, &rows, &link(&folder, page)))
 }
 
-/// `folder` as seen from the page, ending in `/`: relative if it lies below the page's folder.
-fn link(folder: &Path, page: &Path) -> String {
-    let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let from = real(page.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new(".")));
+/// `folder` as seen from the page, ending in `/`, or empty for the page's own: relative if it lies below the page's folder.
+pub fn link(folder: &Path, page: &Path) -> String {
+    let real = |path: &Path| {
+        let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
+        path.canonicalize().unwrap_or_else(|_| path.to_owned())
+    };
+    let from = real(page.parent().unwrap_or(Path::new("")));
     let folder = real(folder);
-    let below = folder.strip_prefix(&from).unwrap_or(&folder);
-    format!("{}/", below.to_string_lossy())
+    match folder.strip_prefix(&from).unwrap_or(&folder) {
+        same if same.as_os_str().is_empty() => String::new(),
+        below => format!("{}/", below.to_string_lossy()),
+    }
 }

@@ -3,6 +3,7 @@
 mod bad_input;
 mod commands;
 mod folder;
+mod growth;
 #[path = "../../../../tests/support/places.rs"]
 mod places;
 mod roadmap;

@@ -7,6 +7,7 @@ use regrasp_plan::check::{CheckSettings, ViolationKind, check, check_files};
 use regrasp_plan::format::to_json;
 use regrasp_robot::import::LoadOptions;
 use regrasp_scene::{GraspRequest, InHandQuery};
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -27,6 +28,20 @@ fn a_good_plan_with_a_free_finger_is_accepted() {
     let report = check(&scene, Some(&sample::query(&plan)), &plan, &CheckSettings::default());
     assert!(report.accepted(), "{report:#?}");
     assert!(report.min_margin.unwrap() > 0.005);
+}
+
+#[test]
+fn two_soft_fingers_hold_while_one_is_away_and_another_relocates() {
+    let scene = sample::soft_scene();
+    let plan = sample::plan_with_two_away(&scene);
+    let report = check(&scene, Some(&sample::query(&plan)), &plan, &CheckSettings::default());
+    assert!(report.accepted(), "{report:#?}");
+    // Hard ones do not.
+    let report = check(&sample::scene(), Some(&sample::query(&plan)), &plan, &CheckSettings::default());
+    let kinds: BTreeSet<_> = report.violations.iter().map(|violation| violation.kind).collect();
+    assert!(kinds.contains(&ViolationKind::ClosureLost), "{kinds:?}");
+    let fits = |kind: &ViolationKind| matches!(kind, ViolationKind::ClosureLost | ViolationKind::PromiseBroken);
+    assert!(kinds.iter().all(fits), "{kinds:?}");
 }
 
 #[test]

@@ -9,16 +9,21 @@ use std::collections::{BTreeMap, BTreeSet};
 #[test]
 fn every_mutant_is_rejected_for_a_fitting_reason() {
     let scene = sample::scene();
-    let plans = [sample::plan_with_way(&scene), sample::plan_with_free_finger(&scene)];
+    let soft = sample::soft_scene();
+    let plans = [
+        (&scene, sample::plan_with_way(&scene)),
+        (&scene, sample::plan_with_free_finger(&scene)),
+        (&soft, sample::plan_with_two_away(&soft)),
+    ];
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     let mut kinds = BTreeSet::new();
     let mut wrong = Vec::new();
-    for round in 0..60 {
-        let plan = &plans[round as usize % 2];
+    for round in 0..90 {
+        let (scene, plan) = &plans[round as usize % plans.len()];
         let query = sample::query(plan);
-        for mutant in mutants(plan, &scene, &mut Rng::keyed(1, "mutation", round)) {
+        for mutant in mutants(plan, scene, &mut Rng::keyed(1, "mutation", round)) {
             // Header mutants also change what was asked for, so the query is only given for the others.
-            let judged_in = mutant.scene.as_ref().unwrap_or(&scene);
+            let judged_in = mutant.scene.as_ref().unwrap_or(scene);
             let report = check(judged_in, Some(&query), &mutant.plan, &CheckSettings::default());
             let found: BTreeSet<ViolationKind> = report.violations.iter().map(|v| v.kind).collect();
             *counts.entry(mutant.name).or_default() += 1;
@@ -39,6 +44,7 @@ fn every_mutant_is_rejected_for_a_fitting_reason() {
         "free finger touches the object",
         "finger declared holding that is away",
         "free finger holds for a moment",
+        "free finger moves while another one relocates",
     ] {
         assert!(counts.contains_key(name), "{name} was never made");
     }

@@ -335,6 +335,36 @@ pub fn plan_with_free_finger(scene: &Scene) -> Plan {
     plan_of(scene, &start, &goal, vec![lift, held, higher, land, last])
 }
 
+/// With soft fingertips, of which two hold the sphere.
+pub fn soft_scene() -> Scene {
+    let mut scene = scene();
+    for finger in &mut scene.hand.fingers {
+        finger.tip.contact = regrasp_robot::ContactModel::SoftFinger { torsion_radius: 0.005 };
+    }
+    scene
+}
+
+/// A finger lifts off, another one relocates while it is away, it lands, the object turns. For [`soft_scene`].
+pub fn plan_with_two_away(scene: &Scene) -> Plan {
+    let start = Pose::translation(0.0, 0.0, 0.078);
+    let grasp = [around(5.0, -5.0), around(80.0, 6.0), around(178.0, -4.0), around(272.0, 3.0)];
+    let (resting, away) = (1, 0.008);
+    let (mut lift, _) = regrasp(&start, &grasp, resting, around(70.0, 2.0), away);
+    let highest = 6;
+    lift.waypoints.truncate(highest + 1);
+    let hover = lift.waypoints[highest].clone();
+    let (mut other, grasp) = regrasp(&start, &grasp, 3, around(255.0, -6.0), 0.002);
+    for waypoint in &mut other.waypoints {
+        let joints = 3 * resting..3 * (resting + 1);
+        waypoint.joints[joints.clone()].copy_from_slice(&hover.joints[joints]);
+        waypoint.contacts[resting] = hover.contacts[resting].clone();
+    }
+    let (mut land, grasp) = regrasp(&start, &grasp, resting, around(70.0, 2.0), away);
+    land.waypoints.drain(..highest);
+    let (last, goal) = transfer(&start, &Vector::new(-0.05, 0.0, 0.1), &Vector::new(0.0, 0.002, -0.002), &grasp, 8);
+    plan_of(scene, &start, &goal, vec![lift, other, land, last])
+}
+
 /// As [`plan`], with poses to be passed: within the first transfer, at its end, and within the last one.
 pub fn plan_with_way(scene: &Scene) -> Plan {
     let mut plan = plan(scene);

@@ -169,7 +169,8 @@ impl<'a> ClosureTable<'a> {
                 }
             }
         }
-        if n < 3 {
+        let is_point = |&f: &usize| self.model.fingers[f].contact == ContactModel::Point;
+        if n < 3 || (n == 3 && fingers.iter().all(is_point)) {
             return best;
         }
         // Who does not hold does not matter.
@@ -236,14 +237,15 @@ pub struct Ranked {
 
 /// Which options of two fingers are in each other's way, found out when first asked for.
 #[derive(Debug)]
-struct ClashTable {
+pub struct ClashTable {
     n_fingers: usize,
     n_options: usize,
     known: Vec<Option<bool>>,
 }
 
 impl ClashTable {
-    fn new(options: &[Vec<Candidate>]) -> Self {
+    /// An empty table over `options[finger]`.
+    pub fn new(options: &[Vec<Candidate>]) -> Self {
         let n_options = options.iter().map(Vec::len).max().unwrap_or(0);
         let n_fingers = options.len();
         ClashTable { n_fingers, n_options, known: vec![None; (n_fingers * n_options).pow(2)] }
@@ -253,7 +255,8 @@ impl ClashTable {
         (0..choice.len()).all(|f| (f + 1..choice.len()).all(|g| self.pair(workspace, options, f, g, choice)))
     }
 
-    fn pair(
+    /// True when fingers `f` < `g` keep clear of each other with the options chosen.
+    pub fn pair(
         &mut self,
         workspace: &mut Workspace,
         options: &[Vec<Candidate>],
@@ -339,3 +342,49 @@ pub fn rank(
 const RELOCATION_FEE: f64 = 0.08;
 /// Share of the way that a grasp with every finger releasable is worth over one with a single one. By hand.
 const RELEASE_BONUS: f64 = 0.3;
+
+#[cfg(test)]
+mod tests {
+    use super::super::explore::draw_state;
+    use super::super::roadmap_tests::with_search;
+    use super::super::state::GraspState;
+    use super::*;
+
+    /// Every set of fingers counts as closed where the margin that plans promise is enough, and nowhere else.
+    #[test]
+    fn the_table_agrees_with_the_margin_of_the_model() {
+        for (scene, n_fingers) in [("six_finger_box_90x.toml", 6), ("box_90x.toml", 4)] {
+            with_search(scene, |search| {
+                let states: Vec<_> = (0..200).filter_map(|_| draw_state(search)).take(12).collect();
+                let model = search.model();
+                let of_finger = |finger: usize| {
+                    let candidate = |state: &GraspState| Candidate {
+                        contact: state.contact(finger),
+                        joints: state.joints[finger].clone(),
+                        follow: 1.0,
+                    };
+                    states.iter().map(candidate).collect()
+                };
+                let options: Vec<Vec<Candidate>> = (0..n_fingers).map(of_finger).collect();
+                let mut table = ClosureTable::new(model, &options);
+                let mut seen = [[0; 2]; MAX_FINGERS + 1];
+                for _ in 0..4000 {
+                    let choice: Choice = (0..n_fingers).map(|_| search.rng.below(states.len())).collect();
+                    let among = search.rng.below(1 << n_fingers) as u32;
+                    let contacts: Vec<Contact> = (0..n_fingers).map(|f| table.contact(f, &choice)).collect();
+                    let margin = model.closure_margin(&contacts, among);
+                    let is_closed = margin >= model.settings.closure_margin;
+                    let n_holding = among.count_ones() as usize;
+                    // Of four fingers all together are of no use: they let nobody go.
+                    if n_fingers == 4 && n_holding == 4 {
+                        assert!(is_closed || !table.is_closed(&choice, among), "{choice:?}: {margin}");
+                        continue;
+                    }
+                    assert_eq!(table.is_closed(&choice, among), is_closed, "{scene} {choice:?} {among:b}: {margin}");
+                    seen[n_holding][usize::from(is_closed)] += 1;
+                }
+                assert!((3..n_fingers).all(|n| seen[n].iter().all(|&count| count >= 5)), "{seen:?}");
+            });
+        }
+    }
+}

@@ -44,19 +44,7 @@ impl End {
             End::Way(_) => FailureKind::WayInvalid,
             End::Goal => FailureKind::GoalInvalid,
         };
-        refusal(kind, message, advice)
-    }
-}
-
-fn refusal(kind: FailureKind, message: String, advice: &str) -> Failure {
-    Failure {
-        kind,
-        message,
-        advice: advice.into(),
-        causes: Vec::new(),
-        leg: None,
-        nearest_miss: None,
-        statistics: Default::default(),
+        Failure::unsearched(kind, message, advice)
     }
 }
 
@@ -79,7 +67,7 @@ pub fn refuse_impossible(model: &Model) -> Result<(), Failure> {
     if model.may_release {
         return Ok(());
     }
-    Err(refusal(FailureKind::Impossible, never_released(model), MORE_FINGERS))
+    Err(Failure::unsearched(FailureKind::Impossible, never_released(model), MORE_FINGERS))
 }
 
 /// Refuses hands that cannot hold an object even with all fingers.
@@ -93,7 +81,7 @@ fn refuse_holding_nothing(model: &Model) -> Result<(), Failure> {
         fingers_in_words(model),
         model.frame.friction
     );
-    Err(refusal(FailureKind::Impossible, message, MORE_FINGERS))
+    Err(Failure::unsearched(FailureKind::Impossible, message, MORE_FINGERS))
 }
 
 const MORE_FINGERS: &str =

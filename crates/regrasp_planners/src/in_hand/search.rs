@@ -7,6 +7,7 @@ use super::passage::Passages;
 use super::state::GraspState;
 use super::tally::Tally;
 use super::workspace::Workspace;
+use crate::failure::FailureKind;
 use regrasp_base::{Budget, Interrupt, Rng};
 use regrasp_geometry::{Pose, frame};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -53,6 +54,16 @@ pub enum Stop {
     Overtaken,
     /// The caller's limits.
     Budget(Interrupt),
+}
+
+impl Stop {
+    /// What it is for a search that has no further attempt.
+    pub fn kind(&self) -> FailureKind {
+        match self {
+            Stop::Budget(interrupt) => (*interrupt).into(),
+            Stop::Restart | Stop::Overtaken => FailureKind::WorkSpent,
+        }
+    }
 }
 
 /// Work between two reports of progress.

@@ -114,12 +114,9 @@ impl Tree {
                 self.nodes[node].n_tries += 1;
                 let place = self.nodes[node].place;
                 self.places[place].n_tries += 1;
-                if self.nodes[node].n_tries == 1 && self.nodes[node].parent.is_none() && !self.root_is_free {
-                    // A given grasp is first taken as far as it goes by itself.
-                    let here = Sequence::at(self.nodes[node].state().clone());
-                    return advance(search, self, node, target, here);
-                }
-                if !search.model().may_release {
+                let is_given = self.nodes[node].parent.is_none() && !self.root_is_free;
+                // A given grasp is first taken as far as it goes by itself.
+                if (is_given && self.nodes[node].n_tries == 1) || !search.model().may_release {
                     let here = Sequence::at(self.nodes[node].state().clone());
                     return advance(search, self, node, target, here);
                 }

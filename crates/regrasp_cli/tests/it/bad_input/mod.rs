@@ -19,7 +19,7 @@ fn refused(folder: &Folder, code: &str, place: &str, says: &[&str]) {
 }
 
 #[track_caller]
-fn complains(run: &Run, code: &str, place: &str, says: &[&str]) {
+pub fn complains(run: &Run, code: &str, place: &str, says: &[&str]) {
     assert_eq!(run.code, Some(2), "{run:?}");
     assert!(run.out.is_empty(), "{run:?}");
     assert!(!run.err.contains("panicked"), "{}", run.err);

@@ -16,7 +16,7 @@ use super::super::validate::follow_relocation;
 use super::graph::{FootholdIds, Graph, Leg, Lists, contact_ids};
 use super::grasps::{Reached, spread_contacts};
 use super::identity::Identity;
-use super::index::{Costs, components};
+use super::index::{Costs, component_sizes, components};
 use super::region::{Region, nearest_places, spread_places};
 use super::registry::Registry;
 use super::route::evenly;
@@ -117,31 +117,15 @@ pub fn build_roadmap(
     let graph = largest_component(&builder.registry.into_graph());
     if graph.edges.is_empty() {
         let message = "no grasp that could be changed was found at any pose of the region".to_owned();
-        return Err(failed(FailureKind::WorkSpent, message, "choose a region within the fingers' reach"));
+        return Err(Failure::unsearched(FailureKind::WorkSpent, message, "choose a region within the fingers' reach"));
     }
     Ok(GraspRoadmap::new(about, graph))
-}
-
-fn failed(kind: FailureKind, message: String, advice: &str) -> Failure {
-    Failure {
-        kind,
-        message,
-        advice: advice.into(),
-        causes: Vec::new(),
-        leg: None,
-        nearest_miss: None,
-        statistics: Default::default(),
-    }
 }
 
 /// The largest component, the first one of equals.
 fn largest_component(graph: &Graph) -> Graph {
     let components = components(graph);
-    let mut counts = BTreeMap::new();
-    for node in 0..graph.nodes.len() {
-        *counts.entry(components.representative(node)).or_insert(0usize) += 1;
-    }
-    let largest = counts.iter().max_by_key(|&(&node, &count)| (count, std::cmp::Reverse(node))).map(|(&node, _)| node);
+    let largest = component_sizes(&components).first().map(|&(node, _)| node);
     graph.only(|node| Some(components.representative(node)) == largest)
 }
 
@@ -193,7 +177,11 @@ impl<'b> Builder<'b> {
     ) -> Result<Self, Failure> {
         let threads =
             rayon::ThreadPoolBuilder::new().num_threads(model.settings.n_threads).build().map_err(|error| {
-                failed(FailureKind::Impossible, format!("no threads to work with: {error}"), "ask for fewer threads")
+                Failure::unsearched(
+                    FailureKind::Impossible,
+                    format!("no threads to work with: {error}"),
+                    "ask for fewer threads",
+                )
             })?;
         let mut registry = Registry::new(Graph::new(model.fingers.iter().map(|f| f.ik.chain().n_coordinates())));
         let places = spread_places(model, region, build.places, seed);
@@ -433,11 +421,8 @@ impl AtPlace<'_> {
 }
 
 fn stopped(stop: &Stop) -> Failure {
-    let kind = match stop {
-        Stop::Budget(interrupt) => (*interrupt).into(),
-        Stop::Restart | Stop::Overtaken => FailureKind::WorkSpent,
-    };
-    failed(kind, "the roadmap was not finished".into(), "allow more work or time, or ask for fewer places")
+    let advice = "allow more work or time, or ask for fewer places";
+    Failure::unsearched(stop.kind(), "the roadmap was not finished".into(), advice)
 }
 
 /// A sequence as the graph keeps it; `place_of` says which place a transfer leads to.

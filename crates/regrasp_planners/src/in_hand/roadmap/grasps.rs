@@ -2,7 +2,7 @@
 //! grasps of one place share footholds and grasps of different places share contacts.
 
 use super::super::candidates::{Candidate, reach};
-use super::super::combine::{Choice, ClosureTable};
+use super::super::combine::{Choice, ClashTable, ClosureTable};
 use super::super::model::Model;
 use super::super::search::Search;
 use super::super::settings::ReleaseRule;
@@ -112,7 +112,8 @@ impl Reached {
         if self.options.iter().any(Vec::is_empty) {
             return found;
         }
-        let mut clashes = Clashes::new(search, pose, &self.options);
+        search.workspace.place_object(pose);
+        let mut clashes = ClashTable::new(&self.options);
         let mut table = ClosureTable::new(search.model(), &self.options);
         let mut choice = Choice::new();
         self.complete(search, pose, limit, &mut clashes, &mut table, &mut choice, &mut found);
@@ -122,10 +123,10 @@ impl Reached {
     /// Completes a choice for the first fingers in all ways.
     fn complete(
         &self,
-        search: &Search,
+        search: &mut Search,
         pose: &Pose,
         limit: usize,
-        clashes: &mut Clashes,
+        clashes: &mut ClashTable,
         table: &mut ClosureTable,
         choice: &mut Choice,
         found: &mut Vec<GraspState>,
@@ -144,47 +145,11 @@ impl Reached {
             return;
         }
         for option in 0..self.options[finger].len() {
-            if (0..finger).all(|other| clashes.is_clear(other, choice[other], finger, option)) {
-                choice.push(option);
+            choice.push(option);
+            if (0..finger).all(|other| clashes.pair(&mut search.workspace, &self.options, other, finger, choice)) {
                 self.complete(search, pose, limit, clashes, table, choice, found);
-                choice.pop();
             }
+            choice.pop();
         }
-    }
-}
-
-/// Which candidates of two fingers are in each other's way.
-struct Clashes {
-    n_fingers: usize,
-    n_options: usize,
-    is_clear: Vec<bool>,
-}
-
-impl Clashes {
-    fn new(search: &mut Search, pose: &Pose, options: &[Vec<Candidate>]) -> Self {
-        let n_options = options.iter().map(Vec::len).max().unwrap_or(0);
-        let n_fingers = options.len();
-        let mut clashes = Clashes { n_fingers, n_options, is_clear: vec![true; (n_fingers * n_options).pow(2)] };
-        search.workspace.place_object(pose);
-        for f in 0..n_fingers {
-            for g in f + 1..n_fingers {
-                for (a, one) in options[f].iter().enumerate() {
-                    for (b, other) in options[g].iter().enumerate() {
-                        let index = clashes.index(f, a, g, b);
-                        clashes.is_clear[index] =
-                            search.workspace.fingers_are_clear((f, &one.joints), (g, &other.joints));
-                    }
-                }
-            }
-        }
-        clashes
-    }
-
-    fn index(&self, f: usize, a: usize, g: usize, b: usize) -> usize {
-        ((f * self.n_fingers + g) * self.n_options + a) * self.n_options + b
-    }
-
-    fn is_clear(&self, f: usize, a: usize, g: usize, b: usize) -> bool {
-        self.is_clear[self.index(f, a, g, b)]
     }
 }

@@ -3,6 +3,7 @@
 use super::graph::{Graph, Lists, Passage};
 use super::region::near_distance;
 use regrasp_roadmap::Components;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// What motions cost, in metres.
@@ -94,14 +95,13 @@ pub fn components(graph: &Graph) -> Components {
     components
 }
 
-/// Sizes of the components, largest first.
-pub fn component_sizes(graph: &Graph) -> Vec<usize> {
-    let components = components(graph);
-    let mut sizes = std::collections::BTreeMap::new();
-    for node in 0..graph.nodes.len() {
-        *sizes.entry(components.representative(node)).or_insert(0usize) += 1;
+/// The smallest node of each component and the component's size, largest first, of equals the one with the smaller node.
+pub fn component_sizes(components: &Components) -> Vec<(usize, usize)> {
+    let mut counts = BTreeMap::new();
+    for node in 0..components.len() {
+        *counts.entry(components.representative(node)).or_insert(0usize) += 1;
     }
-    let mut sizes: Vec<usize> = sizes.into_values().collect();
-    sizes.sort_unstable_by(|a, b| b.cmp(a));
+    let mut sizes: Vec<(usize, usize)> = counts.into_iter().collect();
+    sizes.sort_by_key(|&(_, size)| std::cmp::Reverse(size));
     sizes
 }

@@ -118,11 +118,8 @@ impl GraspRoadmap {
         let n_transfers =
             self.graph.edges.iter().filter(|edge| matches!(edge.passage, graph::Passage::Transfer { .. })).count();
         let components = index::components(&self.graph);
-        let mut counts = std::collections::BTreeMap::new();
-        for node in 0..self.graph.nodes.len() {
-            *counts.entry(components.representative(node)).or_insert(0usize) += 1;
-        }
-        let largest = counts.iter().max_by_key(|&(&node, &count)| (count, std::cmp::Reverse(node))).map(|(&n, _)| n);
+        let sizes = index::component_sizes(&components);
+        let largest = sizes.first().map(|&(node, _)| node);
         let is_covered = |place: usize| {
             let mut nodes = self.index.nodes_at(place).iter();
             nodes.any(|&node| Some(components.representative(node as usize)) == largest)
@@ -134,7 +131,7 @@ impl GraspRoadmap {
             relocations: self.graph.edges.len() - n_transfers,
             contacts: self.graph.contacts.len(),
             footholds: self.graph.footholds.iter().map(|footholds| footholds.contacts.len()).sum(),
-            components: index::component_sizes(&self.graph),
+            components: sizes.iter().map(|&(_, size)| size).collect(),
             places_covered: (0..self.graph.places.len()).filter(|&place| is_covered(place)).count(),
         }
     }

@@ -63,7 +63,7 @@ pub struct Answer {
 impl<'a> RoadmapPlanner<'a> {
     /// Opens a roadmap, which came from `path`, for a scene.
     ///
-    /// Errors: it was built for another one (`R610` to `R613`).
+    /// Errors: it was built for another one (`R610` to `R614`), or its tables are not of the hand it names (`R606`).
     pub fn new(path: &Path, roadmap: &'a GraspRoadmap, scene: &'a Scene) -> Result<Self, InputError> {
         roadmap.refuse_other_scene(path, scene)?;
         Ok(RoadmapPlanner { model: Model::new(scene, &roadmap.about.settings), roadmap, smooth: false })
@@ -292,11 +292,7 @@ impl<'a> RoadmapPlanner<'a> {
     }
 
     fn stopped(&self, stop: &Stop, search: &Search) -> Failure {
-        let kind = match stop {
-            Stop::Budget(interrupt) => (*interrupt).into(),
-            Stop::Restart | Stop::Overtaken => FailureKind::WorkSpent,
-        };
-        Failure { kind, ..self.failure("the query was cut".into(), search) }
+        Failure { kind: stop.kind(), ..self.failure("the query was cut".into(), search) }
     }
 }
 
@@ -349,13 +345,7 @@ fn refuse_way_poses(query: &InHandQuery) -> Result<(), Failure> {
     if n_way_poses == 0 {
         return Ok(());
     }
-    Err(Failure {
-        kind: FailureKind::WayInvalid,
-        message: format!("the query has {n_way_poses} way poses; a roadmap answers queries from one pose to another"),
-        advice: "ask leg by leg, each from the grasp in which the one before ends, or use regrasp plan".into(),
-        causes: Vec::new(),
-        leg: None,
-        nearest_miss: None,
-        statistics: Statistics::default(),
-    })
+    let message = format!("the query has {n_way_poses} way poses; a roadmap answers queries from one pose to another");
+    let advice = "ask leg by leg, each from the grasp in which the one before ends, or use regrasp plan";
+    Err(Failure::unsearched(FailureKind::WayInvalid, message, advice))
 }
