@@ -29,12 +29,31 @@ pub fn parts_of(pose: &Pose) -> ([f64; 3], [f64; 4]) {
 ///
 /// At a turn of exactly pi the two shortest ways are equally long; the one that the quaternions' signs give is taken.
 pub fn interpolate_pose(from: &Pose, to: &Pose, t: f64) -> Pose {
-    let translation = from.translation.vector.lerp(&to.translation.vector, t);
-    let rotation_vector = rotation_between(from, to);
-    Pose::from_parts(
-        Translation3::from(translation),
-        UnitQuaternion::from_scaled_axis(rotation_vector * t) * from.rotation,
-    )
+    PoseLine::between(from, to).at(t)
+}
+
+/// All poses of [`interpolate_pose`] from one pose to another: the same values, for asking more than once.
+#[derive(Debug, Clone)]
+pub struct PoseLine {
+    from: Pose,
+    to: Vector,
+    rotation_vector: Vector,
+}
+
+impl PoseLine {
+    /// The motion from one pose to another.
+    pub fn between(from: &Pose, to: &Pose) -> Self {
+        PoseLine { from: *from, to: to.translation.vector, rotation_vector: rotation_between(from, to) }
+    }
+
+    /// The pose at `t` in `[0, 1]`.
+    pub fn at(&self, t: f64) -> Pose {
+        let translation = self.from.translation.vector.lerp(&self.to, t);
+        Pose::from_parts(
+            Translation3::from(translation),
+            UnitQuaternion::from_scaled_axis(self.rotation_vector * t) * self.from.rotation,
+        )
+    }
 }
 
 /// Rotation vector, in the parent frame, that turns `from` into `to`; its length is at most pi.

@@ -33,7 +33,7 @@ pub enum HullError {
 const BRUTE_FORCE_LIMIT: usize = 24;
 
 /// Directions in which [`ConvexHull::around`] looks for extreme points.
-const N_DIRECTIONS: usize = 400;
+const N_DIRECTIONS: usize = 1500;
 
 impl ConvexHull {
     /// The hull of `points`, verified by substitution.
@@ -42,11 +42,11 @@ impl ConvexHull {
         ConvexHull::from_polyhedron(vertices, triangles, &PointTree::new(points))
     }
 
-    /// A polyhedron of a few hundred corners that contains all `points` and is hardly larger than their hull: the hull
+    /// A polyhedron of a few thousand corners that contains all `points` and is hardly larger than their hull: the hull
     /// of the points that are extreme in `N_DIRECTIONS` directions, grown about its middle until it holds the rest.
     ///
     /// In `n` points this takes O(n log n), and support queries do not depend on `n`. Round shapes of many points are
-    /// exceeded by at most about half a percent of their size, polyhedra of few corners by a rounding error.
+    /// exceeded by at most about a seventh of a percent of their size, polyhedra of few corners by a rounding error.
     pub fn around(points: &[Point]) -> Result<Self, HullError> {
         let tree = PointTree::new(points);
         let extent = tree.nodes[0].high - tree.nodes[0].low;

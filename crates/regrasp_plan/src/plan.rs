@@ -59,7 +59,7 @@ pub enum ContactMode {
 }
 
 /// Contact of one finger at one waypoint.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ContactState {
     /// What the finger does.

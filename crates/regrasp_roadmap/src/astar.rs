@@ -51,7 +51,7 @@ pub fn cheapest_path(
 #[derive(Debug, Clone, Copy)]
 struct Mark {
     search: u32,
-    parent: usize,
+    parent: u32,
     cost: f64,
 }
 
@@ -106,8 +106,8 @@ impl AStar {
     ///
     /// `neighbours` appends `(node, cost of the edge)` with costs of zero or more; an infinite cost is no edge.
     /// `heuristic` must never exceed the cost of the rest of the way; zero makes it Dijkstra's algorithm. With one that
-    /// does, a path is found where there is one, but perhaps not the cheapest. Nodes may be any indices; memory grows with
-    /// the largest one seen. Equal estimates are decided by the one that has come farthest, then by the smaller index.
+    /// does, a path is found where there is one, but perhaps not the cheapest. Nodes may be any indices
+    /// below 2^32; memory grows with the largest one seen. Equal estimates are decided by the one that has come farthest, then by the smaller index.
     pub fn cheapest_path_within(
         &mut self,
         limits: Limits,
@@ -163,12 +163,13 @@ impl AStar {
     /// True when `cost` is less than what was known of `node`; it is known from now on.
     fn reach(&mut self, node: usize, parent: usize, cost: f64) -> bool {
         if node >= self.marks.len() {
-            self.marks.resize(node + 1, Mark { search: 0, parent: usize::MAX, cost: f64::INFINITY });
+            assert!(u32::try_from(node).is_ok(), "node {node} of at most 2^32");
+            self.marks.resize(node + 1, Mark { search: 0, parent: u32::MAX, cost: f64::INFINITY });
         }
         let mark = &mut self.marks[node];
         let known = if mark.search == self.search { mark.cost } else { f64::INFINITY };
         if cost < known {
-            *mark = Mark { search: self.search, parent, cost };
+            *mark = Mark { search: self.search, parent: parent as u32, cost };
         }
         cost < known
     }
@@ -176,7 +177,7 @@ impl AStar {
     fn way_to(&self, mut node: usize, start: usize) -> Vec<usize> {
         let mut nodes = vec![node];
         while node != start {
-            node = self.marks[node].parent;
+            node = self.marks[node].parent as usize;
             nodes.push(node);
         }
         nodes.reverse();

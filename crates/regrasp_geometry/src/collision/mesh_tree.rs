@@ -98,8 +98,8 @@ impl MeshTree {
         self.all_near(shape, mesh_from_shape, required, smallest, &mut |_| false)
     }
 
-    /// As [`MeshTree::is_apart`], but what is too near passes when `excuse` says so of its corners: a triangle, or a box
-    /// of triangles. What excuses points must excuse all that lies between them.
+    /// As [`MeshTree::is_apart`], but what `excuse` says so of by its corners passes however near it is, and does not count
+    /// for `smallest`: a triangle, or a box of triangles. What excuses points must excuse all that lies between them.
     pub fn all_near(
         &self,
         shape: &Shape,
@@ -121,6 +121,10 @@ impl MeshTree {
                 *smallest = smallest.min(outside);
                 continue;
             }
+            // Asked first, as it is cheaper than a search.
+            if excuse(&node.corners()) {
+                continue;
+            }
             let half = (node.high - node.low) / 2.0;
             let at_box = Placement {
                 rotation: Matrix3::identity(),
@@ -128,16 +132,23 @@ impl MeshTree {
             };
             let cuboid = Shape::Cuboid { half_extents: half };
             let mut direction = at_box.translation - mesh_from_shape.translation;
-            let answer =
-                separation(shape, mesh_from_shape, &cuboid, &at_box, required, required, &mut direction, &mut [0; 2]);
-            if let Answer::SeparatedBy(d) = answer {
+            // Of a ball the distance is known already.
+            if !matches!(shape, Shape::Sphere { .. })
+                && let Answer::SeparatedBy(d) = separation(
+                    shape,
+                    mesh_from_shape,
+                    &cuboid,
+                    &at_box,
+                    required,
+                    required,
+                    &mut direction,
+                    &mut [0; 2],
+                )
+            {
                 *smallest = smallest.min(d);
                 continue;
             }
             if node.n_triangles == 0 {
-                if excuse(&node.corners()) {
-                    continue;
-                }
                 stack[n_stack] = node.first;
                 stack[n_stack + 1] = node.right;
                 n_stack += 2;
@@ -145,9 +156,11 @@ impl MeshTree {
             }
             let first = node.first as usize;
             for corners in &self.corners[first..first + node.n_triangles as usize] {
+                if excuse(corners) {
+                    continue;
+                }
                 match triangle_separation(shape, mesh_from_shape, corners, required) {
                     Answer::SeparatedBy(d) => *smallest = smallest.min(d),
-                    _ if excuse(corners) => {}
                     _ => return false,
                 }
             }

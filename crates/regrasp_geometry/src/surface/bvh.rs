@@ -1,6 +1,6 @@
 //! Bounding volume hierarchy over boxes, for nearest items and rays.
 //!
-//! Binned surface area heuristic (Wald 2007); each node holds the boxes of both its children.
+//! Binned surface area heuristic (Wald 2007); each node holds the boxes of both its children, in single precision.
 
 use crate::frame::{Point, Vector};
 
@@ -39,12 +39,32 @@ impl Aabb {
         let d = self.high - self.low;
         if d.x < 0.0 { 0.0 } else { d.x * d.y + d.y * d.z + d.z * d.x }
     }
+}
 
+/// A box in single precision, rounded outwards: half the memory, which is what queries in large trees wait for.
+#[derive(Debug, Clone, Copy)]
+struct Bounds {
+    low: [f32; 3],
+    high: [f32; 3],
+}
+
+impl From<&Aabb> for Bounds {
+    fn from(aabb: &Aabb) -> Self {
+        let below = |x: f64| if f64::from(x as f32) > x { (x as f32).next_down() } else { x as f32 };
+        let above = |x: f64| if f64::from(x as f32) < x { (x as f32).next_up() } else { x as f32 };
+        Bounds {
+            low: [below(aabb.low.x), below(aabb.low.y), below(aabb.low.z)],
+            high: [above(aabb.high.x), above(aabb.high.y), above(aabb.high.z)],
+        }
+    }
+}
+
+impl Bounds {
     #[inline]
     fn distance_squared(&self, p: &Vector) -> f64 {
         let mut sum = 0.0;
         for k in 0..3 {
-            let excess = (self.low[k] - p[k]).max(p[k] - self.high[k]).max(0.0);
+            let excess = (f64::from(self.low[k]) - p[k]).max(p[k] - f64::from(self.high[k])).max(0.0);
             sum += excess * excess;
         }
         sum
@@ -55,7 +75,8 @@ impl Aabb {
     fn entry(&self, origin: &Vector, inverse: &Vector, t_max: f64) -> Option<f64> {
         let (mut enter, mut leave): (f64, f64) = (0.0, t_max);
         for k in 0..3 {
-            let (a, b) = ((self.low[k] - origin[k]) * inverse[k], (self.high[k] - origin[k]) * inverse[k]);
+            let (a, b) =
+                ((f64::from(self.low[k]) - origin[k]) * inverse[k], (f64::from(self.high[k]) - origin[k]) * inverse[k]);
             enter = enter.max(a.min(b));
             leave = leave.min(a.max(b));
         }
@@ -67,15 +88,20 @@ impl Aabb {
 /// A child: an inner node (`count == 0`) or `count` items from `start`.
 #[derive(Debug, Clone, Copy)]
 struct Child {
-    bounds: Aabb,
+    bounds: Bounds,
     start: u32,
     count: u32,
 }
 
+/// Both children of a node: one line of a processor's cache.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+struct Node([Child; 2]);
+
 #[derive(Debug, Clone)]
 pub(super) struct Bvh {
     root: Child,
-    nodes: Vec<[Child; 2]>,
+    nodes: Vec<Node>,
     /// Items in the order of the leaves.
     order: Vec<u32>,
 }
@@ -132,7 +158,7 @@ impl Bvh {
             if bound >= best.1 {
                 continue;
             }
-            let [a, b] = &self.nodes[node as usize];
+            let Node([a, b]) = &self.nodes[node as usize];
             let (da, db) = (a.bounds.distance_squared(p), b.bounds.distance_squared(p));
             let (near, dn, far, df) = if da <= db { (a, da, b, db) } else { (b, db, a, da) };
             // Far leaves are looked at after the near subtree only when they are inner nodes; leaves are cheap.
@@ -184,7 +210,7 @@ impl Bvh {
             if bound > limit {
                 continue;
             }
-            let [a, b] = &self.nodes[node as usize];
+            let Node([a, b]) = &self.nodes[node as usize];
             let mut hits = [(a, a.bounds.entry(o, &inverse, limit)), (b, b.bounds.entry(o, &inverse, limit))];
             if let (Some(ta), Some(tb)) = (hits[0].1, hits[1].1)
                 && ta < tb
@@ -220,14 +246,9 @@ impl Item {
     }
 }
 
-fn build(
-    items: &mut [Item],
-    right_side: &mut Vec<Item>,
-    start: usize,
-    nodes: &mut Vec<[Child; 2]>,
-    depth: usize,
-) -> Child {
+fn build(items: &mut [Item], right_side: &mut Vec<Item>, start: usize, nodes: &mut Vec<Node>, depth: usize) -> Child {
     let bounds = items.iter().fold(Aabb::empty(), |all, item| all.union(&item.bounds));
+    let bounds = Bounds::from(&bounds);
     if items.len() <= LEAF {
         return Child { bounds, start: start as u32, count: items.len() as u32 };
     }
@@ -246,11 +267,11 @@ fn build(
     });
     let node = nodes.len();
     let placeholder = Child { bounds, start: 0, count: 0 };
-    nodes.push([placeholder; 2]);
+    nodes.push(Node([placeholder; 2]));
     let (left, right) = items.split_at_mut(middle);
     let a = build(left, right_side, start, nodes, depth + 1);
     let b = build(right, right_side, start + middle, nodes, depth + 1);
-    nodes[node] = [a, b];
+    nodes[node] = Node([a, b]);
     Child { bounds, start: node as u32, count: 0 }
 }
 

@@ -292,9 +292,9 @@ impl Breeder<'_> {
             let segment = pick(&mut plan.segments, rng)?;
             let holding = |c: &&ContactState| c.mode == ContactMode::Fixed;
             for waypoint in &mut segment.waypoints {
-                let first = waypoint.contacts.iter().find(holding)?.clone();
+                let first = *waypoint.contacts.iter().find(holding)?;
                 let others = waypoint.contacts.iter_mut().filter(|c| c.mode == ContactMode::Fixed);
-                others.for_each(|contact| *contact = first.clone());
+                others.for_each(|contact| *contact = first);
             }
             Some(())
         });
@@ -373,7 +373,7 @@ impl Breeder<'_> {
             if segment.waypoints[last].contacts[f].mode == ContactMode::Free {
                 return None;
             }
-            segment.waypoints[last - 1].contacts[f] = segment.waypoints[last].contacts[f].clone();
+            segment.waypoints[last - 1].contacts[f] = segment.waypoints[last].contacts[f];
             Some(())
         });
         self.add("holding finger moves in a regrasp", &[WrongMovingFinger], |plan, rng| {
@@ -540,7 +540,7 @@ fn replace_contact(
     change: impl Fn(Point, UnitVector, &mut Rng) -> (Point, UnitVector),
 ) -> Option<()> {
     let f = rng.below(model.fingers.len());
-    let first = pick(&mut plan.segments, rng)?.waypoints.first()?.contacts[f].clone();
+    let first = pick(&mut plan.segments, rng)?.waypoints.first()?.contacts[f];
     let contact = contact_of(&first)?;
     let (point, normal) = change(contact.point_in_object, contact.normal_in_object, rng);
     for waypoint in plan.segments.iter_mut().flat_map(|segment| &mut segment.waypoints) {

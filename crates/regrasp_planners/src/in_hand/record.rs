@@ -1,10 +1,11 @@
 //! The plan as it is written to a file.
 
 use super::legs::Solution;
-use super::model::{MAX_FINGERS, Model};
-use super::state::{Motion, Sequence};
-use super::workspace::{Contacts, HandJoints};
+use super::model::Model;
+use super::state::{GraspState, Motion, Sequence, no_contact};
+use super::workspace::Contacts;
 use regrasp_geometry::Pose;
+use regrasp_grasp::Contact;
 use regrasp_plan::plan::{
     ContactMode, ContactState, FORMAT, FORMAT_VERSION, Plan, PlanInput, PoseData, Promises, Segment, SegmentKind,
     Statistics, WayPose, Waypoint,
@@ -15,79 +16,184 @@ use regrasp_scene::InHandQuery;
 pub const CONTACT_TOLERANCE: f64 = 0.0005;
 
 /// Makes the plan of `solution`.
-pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution, mut statistics: Statistics) -> Plan {
-    let scene = model.scene;
+pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution, statistics: Statistics) -> Plan {
     let Solution { way, steps_to_way } = solution;
-    let start = way.start();
-    let mut segments = Vec::with_capacity(way.steps().len());
-    let mut state = start;
-    for step in way.steps() {
-        match step.motion() {
-            Motion::Transfer(moments) => {
-                statistics.transfers += 1;
-                statistics.transfers_with_free_fingers += u64::from(!state.is_held_by_all());
-                let held = |pose: &Pose, joints: &HandJoints| waypoint(pose, joints, &state.contacts, state.holding);
-                let mut waypoints = Vec::with_capacity(1 + moments.len());
-                waypoints.push(held(&state.world_from_object, &state.joints));
-                waypoints.extend(moments.iter().map(|m| held(&m.world_from_object, &m.joints)));
-                segments.push(Segment { kind: SegmentKind::Transfer, moving_finger: None, waypoints });
-            }
-            Motion::Regrasp { finger, path } => {
-                let end = step.end();
-                statistics.relocations += u64::from(end.holds(*finger));
-                let holding = state.holding & !(1 << finger);
-                let pose = &state.world_from_object;
-                let mut waypoints = Vec::with_capacity(1 + path.len());
-                waypoints.push(waypoint(pose, &state.joints, &state.contacts, state.holding));
-                let mut joints = state.joints.clone();
-                for (k, at) in path.iter().enumerate() {
-                    joints[*finger].clone_from(at);
-                    let is_last = k + 1 == path.len();
-                    let holding = if is_last { end.holding } else { holding };
-                    waypoints.push(waypoint(pose, &joints, &end.contacts, holding));
+    let mut recorder = Recorder::at(model, way.start(), false);
+    recorder.sequence(way);
+    recorder.finish(query, seed, steps_to_way, statistics)
+}
+
+/// A plan in the making: motions are written down one after the other, each from where the one before ended.
+pub struct Recorder<'m, 'a> {
+    model: &'m Model<'a>,
+    /// Transfers in a row are one.
+    joins: bool,
+    segments: Vec<Segment>,
+    /// Where the last motion ended.
+    here: Waypoint,
+    contacts: Contacts,
+    holding: u32,
+    /// The smallest closure margin so far.
+    kept_margin: f64,
+    transfers: u64,
+    transfers_with_free_fingers: u64,
+    relocations: u64,
+}
+
+impl<'m, 'a> Recorder<'m, 'a> {
+    /// Begins at a state; with `joins` transfers in a row become one.
+    pub fn at(model: &'m Model<'a>, start: &GraspState, joins: bool) -> Self {
+        let here = Waypoint {
+            joints: start.joints.iter().flatten().copied().collect(),
+            world_from_object: PoseData::from(&start.world_from_object),
+            contacts: contact_states(&start.contacts, start.holding),
+        };
+        Recorder {
+            model,
+            joins,
+            segments: Vec::new(),
+            here,
+            contacts: start.contacts.clone(),
+            holding: start.holding,
+            kept_margin: f64::INFINITY,
+            transfers: 0,
+            transfers_with_free_fingers: 0,
+            relocations: 0,
+        }
+    }
+
+    /// Writes down the motions of a sequence.
+    pub fn sequence(&mut self, way: &Sequence) {
+        for step in way.steps() {
+            match step.motion() {
+                Motion::Transfer(moments) => {
+                    self.begin_transfer(moments.len());
+                    for moment in moments {
+                        self.moment(&moment.world_from_object, moment.joints.iter().flatten().copied());
+                    }
                 }
-                let name = scene.hand.fingers[*finger].name.clone();
-                segments.push(Segment { kind: SegmentKind::Regrasp, moving_finger: Some(name), waypoints });
+                Motion::Regrasp { finger, path } => {
+                    self.begin_regrasp(*finger, step.end().contact(*finger).as_ref(), path.len());
+                    path.iter().for_each(|joints| self.finger_at(*finger, joints.iter().copied()));
+                    self.end_regrasp();
+                }
             }
         }
-        state = step.end();
     }
-    if segments.is_empty() {
-        // Start and goal are the same and any grasp will do: hold still.
-        let here = waypoint(&start.world_from_object, &start.joints, &start.contacts, start.holding);
-        let waypoints = vec![here.clone(), here];
-        segments.push(Segment { kind: SegmentKind::Transfer, moving_finger: None, waypoints });
+
+    /// Begins a transfer of `n` moments, or goes on with the one before.
+    pub fn begin_transfer(&mut self, n: usize) {
+        let goes_on = self.segments.last().is_some_and(|segment| segment.kind == SegmentKind::Transfer);
+        if self.joins && goes_on {
+            self.waypoints().reserve(n);
+            return;
+        }
+        self.keep(self.holding);
+        self.transfers += 1;
+        self.transfers_with_free_fingers += u64::from(self.holding != self.model.all_fingers());
+        self.begin(SegmentKind::Transfer, None, n);
     }
-    Plan {
-        format: FORMAT.into(),
-        format_version: FORMAT_VERSION,
-        tool: concat!("regrasp ", env!("CARGO_PKG_VERSION")).into(),
-        task: "in_hand".into(),
-        method: serde_json::to_value(model.settings.method)
-            .ok()
-            .and_then(|value| value.as_str().map(str::to_owned))
-            .unwrap_or_default(),
-        seed,
-        settings: serde_json::to_value(&model.settings).unwrap_or_default(),
-        inputs: scene
-            .inputs
-            .iter()
-            .map(|i| PlanInput { role: i.role.clone(), name: i.name.clone(), sha256: i.sha256.clone() })
-            .collect(),
-        promises: Promises {
-            contact_tolerance: CONTACT_TOLERANCE,
-            friction: model.frame.friction,
-            required_margin: model.settings.closure_margin,
-            kept_margin: kept_margin(model, way),
-            torque_scale: model.frame.torque_scale,
-        },
-        joint_names: scene.hand.joint_names(),
-        fingers: scene.hand.fingers.iter().map(|finger| finger.name.clone()).collect(),
-        start: PoseData::from(&query.world_from_object_start),
-        way_poses: way_poses(query, &segments, steps_to_way),
-        goal: PoseData::from(&query.world_from_object_goal),
-        segments,
-        statistics,
+
+    /// A moment of the transfer, with the joints of all fingers.
+    pub fn moment(&mut self, world_from_object: &Pose, joints: impl Iterator<Item = f64>) {
+        self.here.joints.clear();
+        self.here.joints.extend(joints);
+        self.here.world_from_object = PoseData::from(world_from_object);
+        self.push_here();
+    }
+
+    /// Begins the motion of a finger of `n` joint vectors to a contact, or to be free.
+    pub fn begin_regrasp(&mut self, finger: usize, contact: Option<&Contact>, n: usize) {
+        let others = self.holding & !(1 << finger);
+        self.keep(others);
+        self.relocations += u64::from(contact.is_some());
+        let name = self.model.scene.hand.fingers[finger].name.clone();
+        self.begin(SegmentKind::Regrasp, Some(name), n);
+        self.contacts[finger] = contact.copied().unwrap_or_else(no_contact);
+        self.holding = others | contact.map_or(0, |_| 1 << finger);
+        self.here.contacts = contact_states(&self.contacts, others);
+    }
+
+    /// Joints of the finger that moves, the last ones being at its contact.
+    pub fn finger_at(&mut self, finger: usize, joints: impl Iterator<Item = f64>) {
+        let first: usize = self.model.fingers[..finger].iter().map(|finger| finger.ik.chain().n_coordinates()).sum();
+        self.here.joints[first..].iter_mut().zip(joints).for_each(|(own, joint)| *own = joint);
+        self.push_here();
+    }
+
+    /// The finger has arrived.
+    pub fn end_regrasp(&mut self) {
+        self.here.contacts = contact_states(&self.contacts, self.holding);
+        let contacts = self.here.contacts.clone();
+        if let Some(last) = self.waypoints().last_mut() {
+            last.contacts = contacts;
+        }
+    }
+
+    fn begin(&mut self, kind: SegmentKind, moving_finger: Option<String>, n: usize) {
+        self.segments.push(Segment { kind, moving_finger, waypoints: Vec::with_capacity(1 + n) });
+        self.push_here();
+    }
+
+    fn push_here(&mut self) {
+        let here = self.here.clone();
+        self.waypoints().push(here);
+    }
+
+    fn waypoints(&mut self) -> &mut Vec<Waypoint> {
+        &mut self.segments.last_mut().expect("a motion has begun").waypoints
+    }
+
+    fn keep(&mut self, holding: u32) {
+        self.kept_margin = self.kept_margin.min(self.model.closure_margin(&self.contacts, holding));
+    }
+
+    /// The plan.
+    pub fn finish(mut self, query: &InHandQuery, seed: u64, steps_to_way: &[usize], statistics: Statistics) -> Plan {
+        self.keep(self.holding);
+        if self.segments.is_empty() {
+            // Start and goal are the same and any grasp will do: hold still.
+            let waypoints = vec![self.here.clone(), self.here];
+            self.segments.push(Segment { kind: SegmentKind::Transfer, moving_finger: None, waypoints });
+        }
+        let statistics = Statistics {
+            transfers: self.transfers,
+            transfers_with_free_fingers: self.transfers_with_free_fingers,
+            relocations: self.relocations,
+            ..statistics
+        };
+        let (model, scene) = (self.model, self.model.scene);
+        Plan {
+            format: FORMAT.into(),
+            format_version: FORMAT_VERSION,
+            tool: concat!("regrasp ", env!("CARGO_PKG_VERSION")).into(),
+            task: "in_hand".into(),
+            method: serde_json::to_value(model.settings.method)
+                .ok()
+                .and_then(|value| value.as_str().map(str::to_owned))
+                .unwrap_or_default(),
+            seed,
+            settings: serde_json::to_value(&model.settings).unwrap_or_default(),
+            inputs: scene
+                .inputs
+                .iter()
+                .map(|i| PlanInput { role: i.role.clone(), name: i.name.clone(), sha256: i.sha256.clone() })
+                .collect(),
+            promises: Promises {
+                contact_tolerance: CONTACT_TOLERANCE,
+                friction: model.frame.friction,
+                required_margin: model.settings.closure_margin,
+                kept_margin: self.kept_margin,
+                torque_scale: model.frame.torque_scale,
+            },
+            joint_names: scene.hand.joint_names(),
+            fingers: scene.hand.fingers.iter().map(|finger| finger.name.clone()).collect(),
+            start: PoseData::from(&query.world_from_object_start),
+            way_poses: way_poses(query, &self.segments, steps_to_way),
+            goal: PoseData::from(&query.world_from_object_goal),
+            segments: self.segments,
+            statistics,
+        }
     }
 }
 
@@ -117,24 +223,17 @@ fn way_poses(query: &InHandQuery, segments: &[Segment], steps_to_way: &[usize]) 
         .collect()
 }
 
-fn waypoint(pose: &Pose, joints: &HandJoints, contacts: &Contacts, holding: u32) -> Waypoint {
-    Waypoint {
-        joints: joints.iter().map(|own| &own[..]).collect::<arrayvec::ArrayVec<_, MAX_FINGERS>>().concat(),
-        world_from_object: PoseData::from(pose),
-        contacts: contacts
-            .iter()
-            .enumerate()
-            .map(|(finger, contact)| {
-                if holding & (1 << finger) == 0 {
-                    ContactState { mode: ContactMode::Free, point_in_object: None, normal_in_object: None }
-                } else {
-                    ContactState {
-                        mode: ContactMode::Fixed,
-                        point_in_object: Some(contact.point_in_object.coords.into()),
-                        normal_in_object: Some(contact.normal_in_object.into_inner().into()),
-                    }
-                }
-            })
-            .collect(),
-    }
+fn contact_states(contacts: &Contacts, holding: u32) -> Vec<ContactState> {
+    let state = |(finger, contact): (usize, &Contact)| {
+        if holding & (1 << finger) == 0 {
+            ContactState { mode: ContactMode::Free, point_in_object: None, normal_in_object: None }
+        } else {
+            ContactState {
+                mode: ContactMode::Fixed,
+                point_in_object: Some(contact.point_in_object.coords.into()),
+                normal_in_object: Some(contact.normal_in_object.into_inner().into()),
+            }
+        }
+    };
+    contacts.iter().enumerate().map(state).collect()
 }

@@ -160,6 +160,18 @@ impl Sequence {
         self.steps.push(Step { motion: Motion::Transfer(moments), end });
     }
 
+    /// As [`Sequence::push_transfer`], but a transfer that is the last motion goes on.
+    pub fn go_on(&mut self, moments: impl IntoIterator<Item = Moment>) {
+        let Some(Step { motion: Motion::Transfer(before), end }) = self.steps.last_mut() else {
+            return self.push_transfer(moments.into_iter().collect());
+        };
+        before.extend(moments);
+        if let Some(last) = before.last() {
+            end.world_from_object = last.world_from_object;
+            end.joints.clone_from(&last.joints);
+        }
+    }
+
     /// Appends the motion of `finger` along `path` to `contact`, or to be free, if the path has any joints.
     pub fn push_regrasp(&mut self, finger: usize, contact: Option<Contact>, path: Vec<Coordinates>) {
         let Some(last) = path.last() else { return };
@@ -204,12 +216,9 @@ impl Sequence {
     pub fn with_transfers_joined(self) -> Sequence {
         let mut joined = Sequence::at(self.start);
         for step in self.steps {
-            match (step.motion, joined.steps.last_mut()) {
-                (Motion::Transfer(moments), Some(Step { motion: Motion::Transfer(before), end })) => {
-                    before.extend(moments);
-                    *end = step.end;
-                }
-                (motion, _) => joined.steps.push(Step { motion, end: step.end }),
+            match step.motion {
+                Motion::Transfer(moments) => joined.go_on(moments),
+                motion @ Motion::Regrasp { .. } => joined.steps.push(Step { motion, end: step.end }),
             }
         }
         joined

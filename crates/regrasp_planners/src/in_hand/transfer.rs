@@ -5,7 +5,8 @@ use super::record::CONTACT_TOLERANCE;
 use super::state::{GraspState, Moment};
 use super::workspace::{HandJoints, TipMode, Workspace, tip_target};
 use regrasp_geometry::collision::Placement;
-use regrasp_geometry::{Pose, UnitVector, frame, interpolate_pose};
+use regrasp_geometry::frame::{self, PoseLine};
+use regrasp_geometry::{Pose, UnitVector, interpolate_pose};
 use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::{Coordinates, IkSettings, Preference};
 
@@ -61,6 +62,7 @@ pub fn follow(
     mut is_clear: impl FnMut(&Moment) -> bool,
 ) -> f64 {
     let steps = n_steps(model, &start.world_from_object, goal, model.settings.step);
+    let line = PoseLine::between(&start.world_from_object, goal);
     let shortest = 1.0 / (steps << MAX_HALVINGS) as f64;
     let mut pending: Vec<f64> = (1..=steps).rev().map(|k| k as f64 / steps as f64).collect();
     let mut made = 0.0;
@@ -68,7 +70,7 @@ pub fn follow(
     moments.reserve(steps);
     let n_before = moments.len();
     while let Some(t) = pending.pop() {
-        let pose = if t == 1.0 { *goal } else { interpolate_pose(&start.world_from_object, goal, t) };
+        let pose = if t == 1.0 { *goal } else { line.at(t) };
         let world_from_object = Placement::from(&pose);
         let here = moments[n_before..].last().unwrap_or(&first);
         let mut joints = HandJoints::new();

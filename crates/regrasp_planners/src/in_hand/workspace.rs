@@ -71,7 +71,8 @@ pub struct Workspace<'a> {
     now: Configuration,
     next: Configuration,
     stale: Stale,
-    /// Direction that last separated each pair, from `a` to `b`, in the world.
+    /// Direction that last separated each pair, from `a` to `b`: in the frame of the object where it is one of them, else in
+    /// the world. Near the object it is a normal of its surface, which turns with it.
     directions: Vec<Vector>,
     hints: Vec<[u32; 2]>,
     /// Lower bound of each pair's distance now.
@@ -389,13 +390,13 @@ impl<'a> Workspace<'a> {
             return true;
         }
         let required_at_ends = required + self.deviation[pair.a] + self.deviation[pair.b];
+        let direction = self.last_direction(index);
+        let mut separating = direction;
         let hints = &mut self.hints[index];
-        let direction = self.directions[index];
         let mut at_next = gap_along(&direction, &a.shape, at_a, &b.shape, at_b, hints);
         if !(at_next >= required_at_ends && direction != Vector::zeros()) {
-            let mut better = direction;
-            let answer = separation(&a.shape, at_a, &b.shape, at_b, required_at_ends, ENOUGH, &mut better, hints);
-            self.directions[index] = better;
+            let answer = separation(&a.shape, at_a, &b.shape, at_b, required_at_ends, ENOUGH, &mut separating, hints);
+            self.directions[index] = self.to_keep(index, &separating);
             match answer {
                 Answer::SeparatedBy(d) => at_next = d,
                 Answer::TooNear | Answer::Unresolved => return self.trees_apart(index, required),
@@ -404,36 +405,64 @@ impl<'a> Workspace<'a> {
         let (from_a, from_b) = (&self.now.placements[pair.a], &self.now.placements[pair.b]);
         // What is known at `next` less all motion may be enough; else the same direction must separate at `now`.
         if at_next - motion >= required
-            || gap_along(&self.directions[index], &a.shape, from_a, &b.shape, from_b, &mut self.hints[index])
-                >= required_at_ends
+            || gap_along(&separating, &a.shape, from_a, &b.shape, from_b, &mut self.hints[index]) >= required_at_ends
         {
             self.slack[index] = at_next;
             return true;
         }
         // The best direction at `now` may separate at `next` as well.
-        let mut best_now = self.directions[index];
+        let mut best_now = separating;
         let hints = &mut self.hints[index];
         let answer = separation(&a.shape, from_a, &b.shape, from_b, required_at_ends, ENOUGH, &mut best_now, hints);
         if matches!(answer, Answer::SeparatedBy(_)) {
             let gap = gap_along(&best_now, &a.shape, at_a, &b.shape, at_b, hints);
             if gap >= required_at_ends {
-                self.directions[index] = best_now;
+                self.directions[index] = self.to_keep(index, &best_now);
                 self.slack[index] = gap;
                 return true;
             }
-            if self.apart_between(index, best_now, required_at_ends) {
+            if self.apart_between(index, [best_now, separating], required_at_ends) {
                 return true;
             }
         }
         self.trees_apart(index, required)
     }
 
-    /// Looks for a direction that separates at both ends, between `best_now`, which does at `now`, and the stored one,
-    /// which does at `next`: long links that turn have both no room for the other's.
-    fn apart_between(&mut self, index: usize, best_now: Vector, required_at_ends: f64) -> bool {
+    /// The direction that last separated the pair, in the world; in the middle of the step where it turns with the object.
+    #[inline]
+    fn last_direction(&self, index: usize) -> Vector {
+        let direction = self.directions[index];
+        match self.turns_with(index) {
+            Some(body) if direction != Vector::zeros() => {
+                let [now, next] = [&self.now, &self.next].map(|end| end.placements[body].vector(&direction));
+                (now + next).try_normalize(1e-6).unwrap_or(next)
+            }
+            _ => direction,
+        }
+    }
+
+    /// What is stored of a direction in the world that separates the pair at `next`.
+    #[inline]
+    fn to_keep(&self, index: usize, direction: &Vector) -> Vector {
+        match self.turns_with(index) {
+            Some(body) => self.next.placements[body].vector_to_child(direction),
+            None => *direction,
+        }
+    }
+
+    /// The object, where it is one of the pair.
+    #[inline]
+    fn turns_with(&self, index: usize) -> Option<usize> {
+        let (pair, object) = (self.model.pairs[index], self.model.object);
+        (pair.a == object || pair.b == object).then_some(object)
+    }
+
+    /// Looks for a direction that separates at both ends, between one that does at `now` and one that does at `next`: long
+    /// links that turn have both no room for the other's.
+    fn apart_between(&mut self, index: usize, [good_now, good_next]: [Vector; 2], required_at_ends: f64) -> bool {
         let pair = self.model.pairs[index];
         let (a, b) = (&self.model.bodies[pair.a].shape, &self.model.bodies[pair.b].shape);
-        let (mut good_now, mut good_next) = (best_now, self.directions[index]);
+        let (mut good_now, mut good_next) = (good_now, good_next);
         let hints = &mut self.hints[index];
         for _ in 0..MAX_BETWEEN {
             let Some(middle) = (good_now + good_next).try_normalize(1e-6) else { return false };
@@ -442,7 +471,7 @@ impl<'a> Workspace<'a> {
             let gap_next = gap_along(&middle, a, &next[pair.a], b, &next[pair.b], hints);
             match (gap_now >= required_at_ends, gap_next >= required_at_ends) {
                 (true, true) => {
-                    self.directions[index] = middle;
+                    self.directions[index] = self.to_keep(index, &middle);
                     self.slack[index] = gap_next;
                     return true;
                 }

@@ -50,7 +50,7 @@ fn roadmap_that_is_cut_off() {
 fn roadmap_of_another_version() {
     let mut bytes = ROADMAP.to_vec();
     bytes[8] = 99;
-    roadmap_is_refused(&bytes, "R602", &["99", "expected 2", "fix: "]);
+    roadmap_is_refused(&bytes, "R602", &["99", "expected 3", "fix: "]);
 }
 
 #[test]
@@ -70,9 +70,10 @@ fn roadmap_with_a_wrong_checksum() {
 
 #[test]
 fn roadmap_with_huge_counts() {
-    for (index, what) in ["bytes about itself", "places", "contacts", "nodes", "edges", "joint values", "landmarks"]
-        .into_iter()
-        .enumerate()
+    for (index, what) in
+        ["bytes about itself", "places", "contacts", "nodes", "edges", "ways of fingers", "joint values"]
+            .into_iter()
+            .enumerate()
     {
         let at = 32 + 8 * index;
         let place = format!("byte {at}");

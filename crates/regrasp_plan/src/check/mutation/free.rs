@@ -69,7 +69,7 @@ impl Breeder<'_> {
                 point_in_object: Some(foot.into()),
                 normal_in_object: Some(normal.into()),
             };
-            plan.segments[s].waypoints.iter_mut().for_each(|waypoint| waypoint.contacts[f] = contact.clone());
+            plan.segments[s].waypoints.iter_mut().for_each(|waypoint| waypoint.contacts[f] = contact);
             Some(())
         });
         self.add("free finger holds for a moment", &[WrongContactMode], |plan, rng| {

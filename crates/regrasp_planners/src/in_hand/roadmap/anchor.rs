@@ -16,6 +16,8 @@ use regrasp_base::Rng;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Pose, UnitVector, interpolate_pose};
 use regrasp_robot::kinematics::finger_ik::IkSettings;
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
 
 /// One end of a query, with the nodes that may be linked to it.
 pub struct QueryEnd {
@@ -25,8 +27,8 @@ pub struct QueryEnd {
     pub given: Option<GraspState>,
     /// Nodes that every finger alone can follow from.
     pub anchors: Vec<Anchor>,
-    /// Nodes not looked at yet, the most promising last.
-    candidates: Vec<Candidate>,
+    /// Nodes not looked at yet, the most promising first.
+    candidates: BinaryHeap<Candidate>,
     near: Vec<Place>,
     /// A proven link that is no single transfer.
     detour: Option<Link>,
@@ -54,12 +56,32 @@ pub struct Link {
     pub can_be_kept: bool,
 }
 
-/// A node, and the least that a path through it costs.
+/// A node, and the least that a path through it costs; the greatest is the one that costs least, then the smallest node.
 struct Candidate {
     anchor: Anchor,
     place: usize,
     estimate: f64,
 }
+
+impl Ord for Candidate {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.estimate.total_cmp(&self.estimate).then(other.anchor.node.cmp(&self.anchor.node))
+    }
+}
+
+impl PartialOrd for Candidate {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Candidate {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Candidate {}
 
 /// What is known of the footholds of one place: whether a finger alone could follow with it to the end's pose.
 struct Place {
@@ -71,13 +93,14 @@ struct Place {
 impl QueryEnd {
     /// An end without anchors.
     pub fn new(pose: Pose, given: Option<GraspState>) -> Self {
-        QueryEnd { pose, given, anchors: Vec::new(), candidates: Vec::new(), near: Vec::new(), detour: None }
+        QueryEnd { pose, given, anchors: Vec::new(), candidates: BinaryHeap::new(), near: Vec::new(), detour: None }
     }
 
     /// Takes the nodes at some places, given with their distances, for candidates; `bounds` tell what the way from there on
     /// costs.
     pub fn look_around(&mut self, roadmap: &GraspRoadmap, places: &[(f64, usize)], bounds: &Bounds) {
         let (graph, costs) = (&roadmap.graph, roadmap.about.costs);
+        let mut candidates = std::mem::take(&mut self.candidates).into_vec();
         for &(distance, place) in places {
             for &node in roadmap.index.nodes_at(place) {
                 let node = node as usize;
@@ -87,14 +110,12 @@ impl QueryEnd {
                     cost += costs.relocation * (0..graph.n_fingers()).filter(moves).count() as f64;
                 }
                 let estimate = cost + roadmap.landmarks.bound(node, bounds);
-                self.candidates.push(Candidate { anchor: Anchor { node, cost }, place: self.near.len(), estimate });
+                candidates.push(Candidate { anchor: Anchor { node, cost }, place: self.near.len(), estimate });
             }
             let way = LOOKS.map(|share| interpolate_pose(&graph.places[place], &self.pose, share));
             self.near.push(Place { way, follows: Default::default() });
         }
-        let order =
-            |a: &Candidate, b: &Candidate| b.estimate.total_cmp(&a.estimate).then(b.anchor.node.cmp(&a.anchor.node));
-        self.candidates.sort_unstable_by(order);
+        self.candidates = candidates.into();
     }
 
     /// Turns the most promising candidates into anchors until there are `n_wanted`, as far as there are.

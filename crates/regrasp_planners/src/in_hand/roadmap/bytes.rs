@@ -33,11 +33,6 @@ impl Writer {
         values.into_iter().for_each(|value| self.u32(value));
     }
 
-    /// Numbers.
-    pub fn u16s(&mut self, values: &[u16]) {
-        values.iter().for_each(|value| self.bytes.extend(value.to_le_bytes()));
-    }
-
     /// Zeros to the end of the section.
     pub fn pad(&mut self) {
         self.bytes.resize(self.bytes.len().next_multiple_of(8), 0);
@@ -96,12 +91,6 @@ impl<'b> Reader<'b> {
     pub fn u32s(&mut self, n: usize) -> Option<Vec<u32>> {
         let bytes = self.take_padded(n.checked_mul(4)?)?;
         Some(bytes.as_chunks::<4>().0.iter().map(|chunk| u32::from_le_bytes(*chunk)).collect())
-    }
-
-    /// `n` numbers, padded.
-    pub fn u16s(&mut self, n: usize) -> Option<Vec<u16>> {
-        let bytes = self.take_padded(n.checked_mul(2)?)?;
-        Some(bytes.as_chunks::<2>().0.iter().map(|chunk| u16::from_le_bytes(*chunk)).collect())
     }
 
     /// True when all was read.

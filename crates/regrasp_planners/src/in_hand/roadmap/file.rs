@@ -8,7 +8,7 @@ use super::bytes::{Reader, Writer, checksum};
 use super::graph::{Edge, Footholds, Graph, Node, Passage};
 use super::identity::{Digest, Identity};
 use super::index::{Costs, Index};
-use super::landmarks::{Landmarks, MOST_SLACK};
+use super::landmarks::{Landmarks, ROW_BYTES, Row};
 use super::{About, BuildSettings, GraspRoadmap, Region};
 use crate::in_hand::InHandSettings;
 use regrasp_base::{Diagnostic, InputError, Place, files};
@@ -22,7 +22,7 @@ use std::path::Path;
 /// First bytes of every roadmap file.
 const MAGIC: [u8; 8] = *b"regrasp\x1a";
 /// Version that this program reads and writes.
-const FORMAT_VERSION: u32 = 2;
+const FORMAT_VERSION: u32 = 3;
 /// Largest file that is read: more nodes than indices can tell apart need more.
 const MAX_FILE_BYTES: u64 = 8 << 30;
 /// Where the bytes begin that the checksum is of: after magic, version, number of fingers, length and checksum.
@@ -70,8 +70,8 @@ struct Sizes {
     contacts: usize,
     nodes: usize,
     edges: usize,
+    strands: usize,
     ways: usize,
-    landmarks: usize,
     /// Joints and footholds of every finger.
     fingers: Vec<(usize, usize)>,
 }
@@ -105,8 +105,8 @@ impl GraspRoadmap {
             graph.contacts.len(),
             graph.nodes.len(),
             graph.edges.len(),
+            graph.strands.len(),
             graph.ways.len(),
-            self.landmarks.n_landmarks,
         ];
         counts.iter().for_each(|&count| out.u64(count as u64));
         for footholds in &graph.footholds {
@@ -140,12 +140,12 @@ impl GraspRoadmap {
             out.bytes.extend(n_between.to_le_bytes());
             out.bytes.extend([finger, 0]);
         }
+        out.u32s(graph.strands.iter().copied());
+        out.pad();
         out.f32s(&graph.ways);
         out.pad();
         out.f64s([self.landmarks.step]);
-        out.u64(u64::from(self.landmarks.slack));
-        out.u16s(&self.landmarks.distances);
-        out.pad();
+        self.landmarks.rows.iter().for_each(|row| out.bytes.extend(row.0));
         seal(&mut out.bytes);
         out.bytes
     }
@@ -197,9 +197,6 @@ impl GraspRoadmap {
         if !(landmarks.step > 0.0 && landmarks.step.is_finite()) {
             return Err(contradiction(format!("has landmarks that measure in steps of {}", landmarks.step)));
         }
-        if landmarks.slack > MOST_SLACK {
-            return Err(contradiction(format!("has landmarks that are {} steps off", landmarks.slack)));
-        }
         let index = Index::new(&graph, about.costs);
         Ok(GraspRoadmap { about, graph, landmarks, index })
     }
@@ -236,8 +233,8 @@ fn sizes(reader: &mut Reader, n_fingers: u32, n_bytes: usize) -> Result<Sizes, S
         contacts: count("contacts")?,
         nodes: count("nodes")?,
         edges: count("edges")?,
+        strands: count("ways of fingers")?,
         ways: count("joint values of motions")?,
-        landmarks: count("landmarks")?,
         fingers: Vec::new(),
     };
     for index in 0..n_fingers {
@@ -268,9 +265,10 @@ impl Sizes {
             padded(self.contacts, 6 * 8)?,
             padded(self.nodes, 4 * (1 + self.fingers.len()))?,
             padded(self.edges, 16)?,
+            padded(self.strands, 4)?,
             padded(self.ways, 4)?,
-            16,
-            padded(self.nodes.checked_mul(self.landmarks)?, 2)?,
+            8,
+            padded(self.nodes, ROW_BYTES)?,
         ];
         for &(n_coordinates, n_footholds) in &self.fingers {
             sections.push(padded(n_footholds, 4)?);
@@ -307,11 +305,12 @@ fn tables(reader: &mut Reader, sizes: &Sizes) -> Option<(Graph, Landmarks)> {
         .collect();
     let edges = reader.take(sizes.edges.checked_mul(16)?)?;
     graph.edges = edges.as_chunks::<16>().0.iter().map(edge_of).collect();
+    graph.strands = reader.u32s(sizes.strands)?;
     graph.ways = reader.f32s(sizes.ways)?;
     let step = *reader.f64s(1)?.first()?;
-    let slack = u32::try_from(reader.u64()?).unwrap_or(u32::MAX);
-    let distances = reader.u16s(sizes.nodes.checked_mul(sizes.landmarks)?)?;
-    Some((graph, Landmarks { n_landmarks: sizes.landmarks, step, slack, distances }))
+    let rows = reader.take(sizes.nodes.checked_mul(ROW_BYTES)?)?;
+    let rows = rows.as_chunks::<ROW_BYTES>().0.iter().map(|row| Row(*row)).collect();
+    Some((graph, Landmarks { step, rows }))
 }
 
 fn numbers<const N: usize>(bytes: &[u8]) -> [f64; N] {

@@ -11,6 +11,7 @@ use arrayvec::ArrayVec;
 use regrasp_geometry::Pose;
 use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
+use std::collections::BTreeMap;
 
 /// Footholds of all fingers, as indices into the tables of each; unused ones are zero.
 pub type FootholdIds = [u32; MAX_FINGERS];
@@ -29,7 +30,7 @@ pub struct Node {
 pub enum Passage {
     /// All fingers hold, the object moves from the first node's place to the second's.
     Transfer {
-        /// Index of the first number of its way in [`Graph::ways`].
+        /// Index of the first of its numbers, one per finger, in [`Graph::strands`].
         first: u32,
         /// Moments between its ends, at equal shares of the way; [`NOT_STORED`] where they are to be stepped again.
         n_between: u16,
@@ -91,9 +92,10 @@ pub struct Graph {
     pub nodes: Vec<Node>,
     /// Motions.
     pub edges: Vec<Edge>,
-    /// Joints of motions between their ends, of one finger for relocations, of all for transfers; in single precision: the
-    /// rounding moves a fingertip by some ten
-    /// nanometres, far below every clearance.
+    /// For each transfer the index of the first number of every finger's way in [`Graph::ways`].
+    pub strands: Vec<u32>,
+    /// Joints of single fingers between the ends of motions, in single precision: the rounding moves a fingertip by some
+    /// ten nanometres, far below every clearance. Motions in which a finger does the same share its way.
     pub ways: Vec<f32>,
 }
 
@@ -117,7 +119,12 @@ impl Graph {
 
     /// Joints of one finger at a node.
     pub fn joints(&self, node: usize, finger: usize) -> Coordinates {
-        self.footholds[finger].joints_of(self.nodes[node].footholds[finger]).iter().copied().collect()
+        self.joints_of(node, finger).iter().copied().collect()
+    }
+
+    /// Joints of one finger at a node, in place.
+    pub fn joints_of(&self, node: usize, finger: usize) -> &[f64] {
+        self.footholds[finger].joints_of(self.nodes[node].footholds[finger])
     }
 
     /// Contact of one finger at a node.
@@ -133,50 +140,39 @@ impl Graph {
     /// The grasp that a node stands for.
     pub fn state(&self, node: usize) -> GraspState {
         let contacts: Contacts = (0..self.n_fingers()).map(|finger| *self.contact(node, finger)).collect();
-        let joints: HandJoints = (0..self.n_fingers()).map(|finger| self.joints(node, finger)).collect();
-        GraspState::held_by_all(*self.pose(node), contacts, joints)
+        GraspState::held_by_all(*self.pose(node), contacts, self.hand_joints(node))
     }
 
-    /// Joints of a relocation between its ends, in the order it was proven.
-    pub fn way(&self, finger: usize, first: u32, n_between: u16) -> impl DoubleEndedIterator<Item = Coordinates> {
-        let stride = self.footholds[finger].n_coordinates;
-        let first = first as usize;
-        self.ways[first..first + usize::from(n_between) * stride]
-            .chunks_exact(stride.max(1))
-            .map(|joints| joints.iter().map(|&q| f64::from(q)).collect())
+    /// Joints of all fingers at a node.
+    pub fn hand_joints(&self, node: usize) -> HandJoints {
+        (0..self.n_fingers()).map(|finger| self.joints(node, finger)).collect()
     }
 
-    /// Joints of a transfer between its ends, in the order it was proven.
-    pub fn moments(&self, first: u32, n_between: u16) -> impl Iterator<Item = HandJoints> {
-        let stride = self.n_joints();
-        let first = first as usize;
-        self.ways[first..first + usize::from(n_between) * stride].chunks_exact(stride.max(1)).map(|joints| {
-            let mut rest = joints;
-            let of_finger = |footholds: &Footholds| {
-                let (own, others) = rest.split_at(footholds.n_coordinates);
-                rest = others;
-                own.iter().map(|&q| f64::from(q)).collect()
-            };
-            self.footholds.iter().map(of_finger).collect()
-        })
+    /// Joints of all fingers in a transfer between its ends, in the order it was proven.
+    pub fn strands_of(&self, first: u32, n_between: u16) -> ArrayVec<&[f32], MAX_FINGERS> {
+        let firsts = &self.strands[first as usize..first as usize + self.n_fingers()];
+        firsts.iter().enumerate().map(|(finger, &first)| self.numbers_of(finger, first, n_between)).collect()
     }
 
-    /// Number of joints of all fingers.
-    fn n_joints(&self) -> usize {
-        self.footholds.iter().map(|footholds| footholds.n_coordinates).sum()
+    /// Joints of one finger in a motion between its ends, in the order it was proven.
+    pub fn numbers_of(&self, finger: usize, first: u32, n_between: u16) -> &[f32] {
+        let n = usize::from(n_between) * self.footholds[finger].n_coordinates;
+        &self.ways[first as usize..first as usize + n]
     }
 
-    /// The numbers that an edge has in [`Graph::ways`].
-    fn way_of(&self, passage: &Passage) -> std::ops::Range<usize> {
-        let (first, n) = match *passage {
-            Passage::Transfer { n_between: NOT_STORED, .. } => (0, 0),
-            Passage::Transfer { first, n_between } => (first as usize, usize::from(n_between) * self.n_joints()),
-            Passage::Relocation { finger, first, n_between } => {
-                let stride = self.footholds[usize::from(finger)].n_coordinates;
-                (first as usize, usize::from(n_between) * stride)
+    /// The ways that an edge has in [`Graph::ways`]: finger and first number of each, all of so many joint vectors. What
+    /// lies outside of the tables is left out.
+    fn ways_of(&self, passage: &Passage) -> (ArrayVec<(usize, u32), MAX_FINGERS>, u16) {
+        match *passage {
+            Passage::Transfer { n_between: NOT_STORED, .. } => (ArrayVec::new(), 0),
+            Passage::Transfer { first, n_between } => {
+                let strands = self.strands.get(first as usize..).unwrap_or_default();
+                (strands.iter().copied().enumerate().take(self.n_fingers()).collect(), n_between)
             }
-        };
-        first..first + n
+            Passage::Relocation { finger, first, n_between } => {
+                ([(usize::from(finger), first)].into_iter().collect(), n_between)
+            }
+        }
     }
 
     /// The nodes at which `keep` holds with what they stand on, renumbered in the same order; edges between them stay.
@@ -208,16 +204,29 @@ impl Graph {
             new_nodes[index] = kept.nodes.len() as u32;
             kept.nodes.push(renamed);
         }
+        let mut new_ways = BTreeMap::new();
         for edge in &self.edges {
             let (from, to) = (new_nodes[edge.from as usize], new_nodes[edge.to as usize]);
             if from == u32::MAX || to == u32::MAX {
                 continue;
             }
-            let first = kept.ways.len() as u32;
-            kept.ways.extend_from_slice(&self.ways[self.way_of(&edge.passage)]);
+            let (ways, n_between) = self.ways_of(&edge.passage);
+            let firsts = ways.into_iter().map(|(finger, first)| {
+                *new_ways.entry((finger, first, n_between)).or_insert_with(|| {
+                    kept.ways.extend_from_slice(self.numbers_of(finger, first, n_between));
+                    (kept.ways.len() - usize::from(n_between) * self.footholds[finger].n_coordinates) as u32
+                })
+            });
+            let firsts: ArrayVec<u32, MAX_FINGERS> = firsts.collect();
             let passage = match edge.passage {
-                Passage::Transfer { n_between, .. } => Passage::Transfer { first, n_between },
-                Passage::Relocation { finger, n_between, .. } => Passage::Relocation { finger, first, n_between },
+                Passage::Transfer { n_between, .. } => {
+                    let first = kept.strands.len() as u32;
+                    kept.strands.extend(firsts);
+                    Passage::Transfer { first, n_between }
+                }
+                Passage::Relocation { finger, n_between, .. } => {
+                    Passage::Relocation { finger, first: firsts[0], n_between }
+                }
             };
             kept.edges.push(Edge { from, to, passage });
         }
@@ -302,7 +311,16 @@ impl Graph {
                 }
             }
         }
-        if self.way_of(&edge.passage).end > self.ways.len() {
+        let (ways, n_between) = self.ways_of(&edge.passage);
+        let n_ways = match edge.passage {
+            Passage::Transfer { n_between: NOT_STORED, .. } => 0,
+            Passage::Transfer { .. } => self.n_fingers(),
+            Passage::Relocation { .. } => 1,
+        };
+        let is_there = |&(finger, first): &(usize, u32)| {
+            first as usize + usize::from(n_between) * self.footholds[finger].n_coordinates <= self.ways.len()
+        };
+        if ways.len() != n_ways || !ways.iter().all(is_there) {
             return Err("has a way that does not exist".into());
         }
         Ok(())
@@ -333,6 +351,11 @@ impl Lists {
             next[key as usize] += 1;
         }
         Lists { firsts, items }
+    }
+
+    /// First item of every key, with the number of items at the end; and the items.
+    pub fn into_tables(self) -> (Vec<u32>, Vec<u32>) {
+        (self.firsts, self.items)
     }
 
     /// The items of `key`.

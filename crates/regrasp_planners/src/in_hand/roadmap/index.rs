@@ -4,6 +4,7 @@ use super::graph::{Graph, Lists, Passage};
 use super::region::near_distance;
 use regrasp_roadmap::Components;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// What motions cost, in metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,16 +21,17 @@ pub struct Index {
     /// First entry of every node in `links`, and the number of links at the end.
     firsts: Vec<u32>,
     links: Vec<Link>,
+    /// The edge of each link.
+    edges: Vec<u32>,
     /// Nodes of every place.
     nodes_at: Lists,
 }
 
-/// One end of an edge, as the node at the other end sees it.
+/// One end of an edge, as the node at the other end sees it: no more than a search looks at, as memory is what it waits for.
 #[derive(Debug, Clone, Copy)]
 struct Link {
     node: u32,
-    edge: u32,
-    cost: f64,
+    cost: f32,
 }
 
 impl Index {
@@ -39,7 +41,6 @@ impl Index {
         let ends = ends.flat_map(|(index, edge)| [(edge.from, index as u32), (edge.to, index as u32)]);
         let edges_of = Lists::new(graph.nodes.len(), ends);
         let mut links = Vec::with_capacity(2 * graph.edges.len());
-        let mut firsts = vec![0];
         for node in 0..graph.nodes.len() {
             for &index in edges_of.of(node) {
                 let edge = &graph.edges[index as usize];
@@ -50,16 +51,16 @@ impl Index {
                     }
                     Passage::Relocation { .. } => costs.relocation,
                 };
-                links.push(Link { node: other, edge: index, cost });
+                links.push(Link { node: other, cost: cost as f32 });
             }
-            firsts.push(links.len() as u32);
         }
+        let (firsts, edges) = edges_of.into_tables();
         let places = graph.nodes.iter().enumerate().map(|(index, node)| (node.place, index as u32));
-        Index { firsts, links, nodes_at: Lists::new(graph.places.len(), places) }
+        Index { firsts, links, edges, nodes_at: Lists::new(graph.places.len(), places) }
     }
 
-    fn links_of(&self, node: usize) -> &[Link] {
-        &self.links[self.firsts[node] as usize..self.firsts[node + 1] as usize]
+    fn range_of(&self, node: usize) -> Range<usize> {
+        self.firsts[node] as usize..self.firsts[node + 1] as usize
     }
 
     /// Nodes at a place.
@@ -69,13 +70,16 @@ impl Index {
 
     /// Appends the neighbours of `node` with what it costs to go there.
     pub fn neighbours(&self, node: usize, out: &mut Vec<(usize, f64)>) {
-        out.extend(self.links_of(node).iter().map(|link| (link.node as usize, link.cost)));
+        let links = &self.links[self.range_of(node)];
+        out.extend(links.iter().map(|link| (link.node as usize, f64::from(link.cost))));
     }
 
     /// The cheapest edge between two nodes.
     pub fn edge_between(&self, a: usize, b: usize) -> Option<u32> {
-        let links = self.links_of(a).iter().filter(|link| link.node as usize == b);
-        links.min_by(|x, y| x.cost.total_cmp(&y.cost).then(x.edge.cmp(&y.edge))).map(|link| link.edge)
+        let (links, edges) = (&self.links[self.range_of(a)], &self.edges[self.range_of(a)]);
+        let between = links.iter().zip(edges).filter(|(link, _)| link.node as usize == b);
+        let cheapest = between.min_by(|x, y| x.0.cost.total_cmp(&y.0.cost).then(x.1.cmp(y.1)));
+        cheapest.map(|(_, &edge)| edge)
     }
 }
 

@@ -9,21 +9,39 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 /// Landmarks of a graph. By measurement on the box: A* expands 600, 206, 100 and 53 nodes with 8, 16, 32 and 64 of them.
-const N_LANDMARKS: usize = 64;
-/// Largest distance in steps; the one above is no way.
-const MOST_STEPS: f64 = 65_534.0;
+const N_LANDMARKS: usize = 63;
+/// Largest distance in steps.
+const MOST_STEPS: f64 = 254.0;
 
-/// Distances of every node from the landmarks, in steps, rounded down.
+/// Distances of every node from the landmarks, in steps.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Landmarks {
-    /// Number of landmarks.
-    pub n_landmarks: usize,
     /// Cost of one step.
     pub step: f64,
-    /// Steps by which a distance may be too short: one, and one more for each time that nodes were added.
-    pub slack: u32,
-    /// Cost from each landmark to a node, `n_landmarks` per node.
-    pub distances: Vec<u16>,
+    /// What is known of each node.
+    pub rows: Vec<Row>,
+}
+
+/// Distances of one node from up to [`N_LANDMARKS`] landmarks in steps, rounded down, zero where there is no landmark; then
+/// its slack, the steps by which they may be too short. One line of a processor's cache: looking it up costs most.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(align(64))]
+pub struct Row(pub [u8; ROW_BYTES]);
+
+/// Bytes of a [`Row`].
+pub const ROW_BYTES: usize = N_LANDMARKS + 1;
+
+impl Row {
+    /// What is known of a node of which nothing is known.
+    const NOTHING: Row = {
+        let mut row = [0; ROW_BYTES];
+        row[N_LANDMARKS] = u8::MAX;
+        Row(row)
+    };
+
+    fn slack(&self) -> u8 {
+        self.0[N_LANDMARKS]
+    }
 }
 
 /// A cost and a node, as Dijkstra's queue wants them.
@@ -48,16 +66,17 @@ impl Landmarks {
     /// Chooses landmarks of a connected graph, each the node farthest from those before, and measures.
     pub fn choose(graph: &Graph, index: &Index) -> Self {
         let n_nodes = graph.nodes.len();
-        let n_landmarks = N_LANDMARKS.min(n_nodes);
         // No two nodes are farther apart than twice the farthest from node 0.
         let from_first = costs_from(graph, index, 0);
         let mut landmark = farthest(&from_first);
         let step = (2.0 * from_first[landmark] / MOST_STEPS).max(f64::MIN_POSITIVE);
-        let mut landmarks = Landmarks { n_landmarks, step, slack: 1, distances: vec![0; n_nodes * n_landmarks] };
+        let mut row = Row([0; ROW_BYTES]);
+        row.0[N_LANDMARKS] = 1;
+        let mut landmarks = Landmarks { step, rows: vec![row; n_nodes] };
         let mut nearest = vec![f64::INFINITY; n_nodes];
-        for which in 0..n_landmarks {
+        for which in 0..N_LANDMARKS.min(n_nodes) {
             for (node, cost) in costs_from(graph, index, landmark).into_iter().enumerate() {
-                landmarks.distances[node * n_landmarks + which] = landmarks.steps(cost);
+                landmarks.rows[node].0[which] = landmarks.steps(cost);
                 nearest[node] = nearest[node].min(cost);
             }
             landmark = farthest(&nearest);
@@ -65,98 +84,73 @@ impl Landmarks {
         landmarks
     }
 
-    fn steps(&self, cost: f64) -> u16 {
+    fn steps(&self, cost: f64) -> u8 {
         // Saturates: not a number is zero.
-        (cost / self.step).min(MOST_STEPS) as u16
+        (cost / self.step).min(MOST_STEPS) as u8
     }
 
     /// Goes on for nodes that were added to `graph`, each of which the edges after it link to one node before it: no way
     /// between other nodes has become shorter.
     pub fn extend(&mut self, graph: &Graph, index: &Index) {
-        if self.slack >= MOST_SLACK {
-            *self = Landmarks::choose(graph, index);
-            return;
-        }
         let mut neighbours = Vec::new();
-        self.slack += 1;
-        for node in self.distances.len() / self.n_landmarks.max(1)..graph.nodes.len() {
+        for node in self.rows.len()..graph.nodes.len() {
             neighbours.clear();
             index.neighbours(node, &mut neighbours);
             let parent = neighbours.iter().find(|(other, _)| *other < node);
-            for which in 0..self.n_landmarks {
-                let steps = parent.map_or(0, |&(other, cost)| {
-                    let distance = self.step * f64::from(self.distances[other * self.n_landmarks + which]);
-                    self.steps(distance + cost)
-                });
-                self.distances.push(steps);
-            }
+            self.rows.push(parent.map_or(Row::NOTHING, |&(other, cost)| self.beside(&self.rows[other], cost)));
         }
     }
 
-    /// The distances of a node.
-    fn of(&self, node: usize) -> &[u16] {
-        &self.distances[node * self.n_landmarks..(node + 1) * self.n_landmarks]
+    /// Of a node whose only edge, of cost `cost`, leads to a node with `row`.
+    fn beside(&self, row: &Row, cost: f64) -> Row {
+        let farther = row.0.map(|distance| self.step * f64::from(distance) + cost);
+        let is_too_far = farther[..N_LANDMARKS].iter().any(|&cost| cost >= self.step * MOST_STEPS);
+        if is_too_far || row.slack() >= MOST_SLACK {
+            return Row::NOTHING;
+        }
+        let mut beside = Row(farther.map(|cost| self.steps(cost)));
+        beside.0[N_LANDMARKS] = row.slack() + 1;
+        beside
     }
 
     /// Lower bounds of the cost to the nearest of some goals, each a node and what remains to be paid there.
     pub fn bounds(&self, goals: impl Iterator<Item = (usize, f64)>) -> Bounds {
-        let (mut beyond, mut behind) = (vec![FAR; self.n_landmarks], vec![FAR; self.n_landmarks]);
+        let mut bounds = Bounds { near: Row([0; ROW_BYTES]), far: Row([u8::MAX; ROW_BYTES]) };
         for (node, rest) in goals {
-            let rest = f32::from(self.steps(rest)) - self.slack as f32;
-            for ((beyond, behind), &distance) in beyond.iter_mut().zip(&mut behind).zip(self.of(node)) {
-                // By the triangle inequality, with the landmark beyond the goal and with it behind the node. The distance
-                // that is taken away may be too short.
-                let distance = f32::from(distance);
-                *beyond = smaller(*beyond, rest - distance);
-                *behind = smaller(*behind, rest + distance);
+            let (row, rest) = (&self.rows[node], self.steps(rest));
+            let ends = bounds.near.0.iter_mut().zip(&mut bounds.far.0);
+            for ((near, far), &distance) in ends.zip(&row.0) {
+                // The distance that is taken away may be too short.
+                *near = (*near).max(distance.saturating_add(row.slack()).saturating_sub(rest));
+                *far = (*far).min(distance.saturating_add(rest));
             }
         }
-        Bounds { beyond, behind }
+        // No landmark: says nothing.
+        (bounds.near.0[N_LANDMARKS], bounds.far.0[N_LANDMARKS]) = (u8::MAX, 0);
+        bounds
     }
 
     /// The bound for a node.
     pub fn bound(&self, node: usize, bounds: &Bounds) -> f64 {
-        let (distances, beyond, behind) = (self.of(node), &bounds.beyond[..], &bounds.behind[..]);
-        let mut best = [0.0; LANES];
-        let chunks = (distances.as_chunks::<LANES>(), beyond.as_chunks::<LANES>(), behind.as_chunks::<LANES>());
-        for ((distances, beyond), behind) in chunks.0.0.iter().zip(chunks.1.0).zip(chunks.2.0) {
-            for lane in 0..LANES {
-                let distance = f32::from(distances[lane]);
-                let either = larger(distance + beyond[lane], behind[lane] - distance);
-                best[lane] = larger(best[lane], either);
-            }
+        let row = &self.rows[node];
+        let (mut beyond, mut behind) = (0, 0);
+        for ((&distance, &near), &far) in row.0.iter().zip(&bounds.near.0).zip(&bounds.far.0) {
+            beyond = distance.saturating_sub(near).max(beyond);
+            behind = far.saturating_sub(distance).max(behind);
         }
-        for ((&distance, &beyond), &behind) in chunks.0.1.iter().zip(chunks.1.1).zip(chunks.2.1) {
-            let distance = f32::from(distance);
-            best[0] = larger(best[0], larger(distance + beyond, behind - distance));
-        }
-        self.step * f64::from(best.into_iter().fold(0.0, larger))
+        self.step * f64::from(beyond.max(behind.saturating_sub(row.slack())))
     }
 }
 
-/// Landmarks that are looked at together: what one instruction takes.
-const LANES: usize = 8;
+/// Slack of a node beside which nothing is told of a new one any more.
+const MOST_SLACK: u8 = 100;
 
-/// Of two numbers, in one instruction: `f32::max` takes more to step over what is not a number.
-fn larger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
-
-/// Of two numbers, in one instruction.
-fn smaller(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-/// More steps than any distance.
-const FAR: f32 = 1048576.0;
-/// Slack at which landmarks are chosen anew.
-pub const MOST_SLACK: u32 = 1000;
-
-/// What [`Landmarks::bound`] needs to know of the goals, in steps. Whole numbers below 2^24, which `f32` holds exactly.
+/// What [`Landmarks::bound`] needs to know of the goals, in steps: by the triangle inequality a node is as far from them as
+/// it is farther from some landmark than `near`, or nearer to it than `far`.
 #[derive(Debug, Clone)]
 pub struct Bounds {
-    beyond: Vec<f32>,
-    behind: Vec<f32>,
+    near: Row,
+    far: Row,
 }
 
 /// The node of the greatest finite cost.

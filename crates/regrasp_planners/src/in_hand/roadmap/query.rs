@@ -2,9 +2,8 @@
 //! smoothed.
 
 use super::super::endpoints::{End, given_grasp, object_blocked_by, refuse_buried_object};
-use super::super::legs::Solution;
 use super::super::model::Model;
-use super::super::record;
+use super::super::record::Recorder;
 use super::super::search::{Search, Stop};
 use super::super::settings::InHandSettings;
 use super::super::shorten::{Arrival, transfer_regrasp};
@@ -16,7 +15,7 @@ use super::index::Index;
 use super::landmarks::{Bounds, Landmarks};
 use super::region::nearest_places;
 use super::registry::Registry;
-use super::route::motion_along;
+use super::route::Passing;
 use crate::failure::{Failure, FailureKind};
 use regrasp_base::{Budget, InputError, Rng};
 use regrasp_geometry::Pose;
@@ -173,15 +172,14 @@ impl<'a> RoadmapPlanner<'a> {
                     continue;
                 };
                 let between = &path[first.n_skipped..path.len() - last.n_skipped];
-                let Some(way) = self.motions(search, [&first, &last], between) else {
+                let Some(recorder) = self.motions(search, [&first, &last], between) else {
                     let message = "a stored transfer does not come out as it was proven: the roadmap is of another \
                                    version of the program, or was made by hand";
                     return Ok(Err(self.failure(message.into(), search)));
                 };
                 let statistics =
                     Statistics { nodes: n_expanded as u64, work: search.workspace.work, ..Statistics::default() };
-                let mut plan =
-                    record::record(&self.model, query, seed, &Solution { way, steps_to_way: Vec::new() }, statistics);
+                let mut plan = recorder.finish(query, seed, &[], statistics);
                 plan.method = "roadmap".into();
                 return Ok(Ok(Answer { plan, links: [first, last] }));
             }
@@ -234,23 +232,40 @@ impl<'a> RoadmapPlanner<'a> {
             out.extend(goal.anchors.iter().filter(|anchor| anchor.node == node).map(|anchor| (to, anchor.cost)));
         };
         let bounds = self.bounds_to(goal);
+
         let bound = |node: usize| if node < from { GREED * roadmap.landmarks.bound(node, &bounds) } else { 0.0 };
         let path = a_star.cheapest_path(from, |node| node == to, neighbours, bound)?.nodes;
         Some(path[1..path.len() - 1].to_vec())
     }
 
     /// All motions from the start to the goal along a path. None when what is stored does not fit together.
-    fn motions(&self, search: &mut Search, [first, last]: [&Link; 2], path: &[usize]) -> Option<Sequence> {
-        let mut way = first.way.reversed();
-        for pair in path.windows(2) {
+    fn motions(&self, search: &mut Search, [first, last]: [&Link; 2], path: &[usize]) -> Option<Recorder<'_, 'a>> {
+        let graph = &self.roadmap.graph;
+        let to_first = first.way.reversed();
+        if *to_first.end() != graph.state(path[0]) || *last.way.start() != graph.state(path[path.len() - 1]) {
+            return None;
+        }
+        let edges = path.windows(2).map(|pair| {
             let edge = self.roadmap.index.edge_between(pair[0], pair[1])?;
-            way = way.then(motion_along(&self.model, self.roadmap, edge, pair[0])?)?;
-        }
-        way = way.then(last.way.clone())?;
+            Passing::along(&self.model, graph, edge, pair[0])
+        });
+        let mut recorder = Recorder::at(&self.model, to_first.start(), true);
         if self.smooth {
+            let mut way = to_first;
+            for edge in edges {
+                edge?.push_to(&mut way);
+            }
+            way = way.then(last.way.clone())?;
             straighten(search, &mut way);
+            recorder.sequence(&way);
+        } else {
+            recorder.sequence(&to_first);
+            for edge in edges {
+                edge?.record_to(&mut recorder);
+            }
+            recorder.sequence(&last.way);
         }
-        Some(way.with_transfers_joined())
+        Some(recorder)
     }
 
     fn not_linked(&self, end: End, search: &Search) -> Failure {

@@ -4,10 +4,12 @@ use super::super::model::MAX_FINGERS;
 use super::super::state::GraspState;
 use super::super::workspace::HandJoints;
 use super::graph::{Edge, FootholdIds, Graph, Leg, NOT_STORED, Node, Passage};
+use arrayvec::ArrayVec;
 use regrasp_geometry::Pose;
 use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 /// A graph with what finds its parts again.
 #[derive(Debug, Default)]
@@ -17,6 +19,8 @@ pub struct Registry {
     footholds: BTreeMap<(u32, u32, u32), Vec<u32>>,
     nodes: BTreeMap<(u32, FootholdIds), u32>,
     edges: BTreeSet<(u32, u32)>,
+    /// Ways added, as their range in [`Graph::ways`], by finger and the footholds that they join.
+    ways: BTreeMap<[u32; 3], Vec<Range<usize>>>,
 }
 
 impl Registry {
@@ -68,8 +72,7 @@ impl Registry {
         self.node_id(place, footholds)
     }
 
-    /// Follows `legs` from a node, adding nodes and edges; the node at the end. None, with nothing added, when the graph
-    /// is full.
+    /// Follows `legs` from a node, adding nodes and edges; the node at the end. None when the graph is full.
     pub fn add_legs(&mut self, from: u32, legs: &[Leg]) -> Option<u32> {
         let mut here = from;
         for leg in legs {
@@ -90,18 +93,27 @@ impl Registry {
         joints: &[Coordinates],
         between: Option<&[HandJoints]>,
     ) -> Option<u32> {
-        let first = u32::try_from(self.graph.ways.len()).ok()?;
+        let n_fingers = self.graph.n_fingers();
         let mut footholds = [0; MAX_FINGERS];
-        for finger in 0..self.graph.n_fingers() {
+        for finger in 0..n_fingers {
             let contact = self.graph.contact_id(from as usize, finger);
             footholds[finger] = self.foothold_id(place, finger, contact, &joints[finger]);
         }
         let to = self.node_id(place, footholds);
         let stored = between.and_then(|moments| Some((moments, u16::try_from(moments.len()).ok()?)));
         let stored = stored.filter(|&(_, n)| n != NOT_STORED);
-        let (moments, n_between) = stored.unwrap_or((&[], NOT_STORED));
-        if self.add_edge(Edge { from, to, passage: Passage::Transfer { first, n_between } }) {
-            self.graph.ways.extend(moments.iter().flatten().flatten().map(|&q| q as f32));
+        let first = u32::try_from(self.graph.strands.len()).ok()?;
+        let n_between = stored.map_or(NOT_STORED, |(_, n)| n);
+        if !self.is_joined(from, to) {
+            let mut strands = ArrayVec::<u32, MAX_FINGERS>::new();
+            for finger in (0..n_fingers).take_while(|_| stored.is_some()) {
+                let joins = [finger as u32, self.graph.nodes[from as usize].footholds[finger], footholds[finger]];
+                let moments = stored.map_or(&[][..], |(moments, _)| moments);
+                let numbers = moments.iter().flat_map(|joints| joints[finger].iter().map(|&q| q as f32));
+                strands.push(self.way_id(joins, numbers.collect())?);
+            }
+            self.graph.strands.extend(strands);
+            self.add_edge(Edge { from, to, passage: Passage::Transfer { first, n_between } });
         }
         Some(to)
     }
@@ -109,25 +121,44 @@ impl Registry {
     fn add_relocation(&mut self, from: u32, finger: usize, path: &[Coordinates], contact: &Contact) -> Option<u32> {
         let (last, between) = path.split_last()?;
         let n_between = u16::try_from(between.len()).ok()?;
-        let first = u32::try_from(self.graph.ways.len()).ok()?;
         let mut node = self.graph.nodes[from as usize];
+        let left = node.footholds[finger];
         let contact = self.contact_id(contact);
         node.footholds[finger] = self.foothold_id(node.place, finger, contact, last);
         let to = self.node_id(node.place, node.footholds);
-        let edge = Edge { from, to, passage: Passage::Relocation { finger: finger as u8, first, n_between } };
-        if self.add_edge(edge) {
-            self.graph.ways.extend(between.iter().flatten().map(|&q| q as f32));
+        let joins = [finger as u32, left, node.footholds[finger]];
+        if !self.is_joined(from, to) {
+            let first = self.way_id(joins, between.iter().flatten().map(|&q| q as f32).collect())?;
+            self.add_edge(Edge { from, to, passage: Passage::Relocation { finger: finger as u8, first, n_between } });
         }
         Some(to)
     }
 
-    /// True when the edge is new.
-    fn add_edge(&mut self, edge: Edge) -> bool {
-        let is_new = edge.from != edge.to && self.edges.insert(ordered(edge.from, edge.to));
-        if is_new {
-            self.graph.edges.push(edge);
-        }
-        is_new
+    /// Index of the first number of a way in the table, which the same way of a finger has only once. None when the table
+    /// is full.
+    fn way_id(&mut self, joins: [u32; 3], numbers: Vec<f32>) -> Option<u32> {
+        let table = &mut self.graph.ways;
+        let known = self.ways.entry(joins).or_default();
+        let at = match known.iter().find(|range| table[Range::clone(range)] == numbers[..]) {
+            Some(range) => range.start,
+            None => {
+                known.push(table.len()..table.len() + numbers.len());
+                table.extend_from_slice(&numbers);
+                table.len() - numbers.len()
+            }
+        };
+        u32::try_from(at).ok()
+    }
+
+    /// Adds an edge between nodes that are not joined.
+    fn add_edge(&mut self, edge: Edge) {
+        self.edges.insert(ordered(edge.from, edge.to));
+        self.graph.edges.push(edge);
+    }
+
+    /// True when no edge is wanted between two nodes: there is one, or they are one.
+    fn is_joined(&self, a: u32, b: u32) -> bool {
+        a == b || self.edges.contains(&ordered(a, b))
     }
 
     fn contact_id(&mut self, contact: &Contact) -> u32 {
