@@ -51,7 +51,7 @@ fn a_free_finger_keeps_clear_of_the_object() {
     let lifted = plan.segments.iter().position(|segment| segment.kind == regrasp_plan::SegmentKind::Transfer).unwrap();
     // Declared free from the start on, though it still touches: nothing else is wrong with that.
     let mut touching = plan.clone();
-    let free = touching.segments[lifted].waypoints[0].contacts[1].clone();
+    let free = touching.segments[lifted].waypoints[0].contacts[1];
     touching.segments[0].waypoints[0].contacts[1] = free;
     let kinds = |plan: &regrasp_plan::Plan| {
         let report = check(&scene, Some(&sample::query(plan)), plan, &CheckSettings::default());

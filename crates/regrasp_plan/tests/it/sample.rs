@@ -357,7 +357,7 @@ pub fn plan_with_two_away(scene: &Scene) -> Plan {
     for waypoint in &mut other.waypoints {
         let joints = 3 * resting..3 * (resting + 1);
         waypoint.joints[joints.clone()].copy_from_slice(&hover.joints[joints]);
-        waypoint.contacts[resting] = hover.contacts[resting].clone();
+        waypoint.contacts[resting] = hover.contacts[resting];
     }
     let (mut land, grasp) = regrasp(&start, &grasp, resting, around(70.0, 2.0), away);
     land.waypoints.drain(..highest);
