@@ -4,6 +4,8 @@
 //! counts as collision. A separation is always proved by a direction: the supports of both shapes along it are at
 //! least that far apart, whatever the search that found the direction did.
 
+/// Which of many balls are near a point.
+pub mod ball_tree;
 /// The search for a separating direction (GJK).
 pub mod gjk;
 /// Convex shapes against triangle meshes, through a tree of boxes.
@@ -13,6 +15,7 @@ pub mod placement;
 /// Support functions of convex shapes.
 pub mod support;
 
+pub use ball_tree::{Ball, BallTree};
 pub use gjk::{Answer, separation};
 pub use mesh_tree::{MeshBody, MeshTree};
 pub use placement::Placement;

@@ -1,4 +1,4 @@
-//! Bounding volume hierarchy over boxes, for nearest items and rays.
+//! Bounding volume hierarchy over boxes, for nearest items, all near ones, and rays.
 //!
 //! Binned surface area heuristic (Wald 2007); each node holds the boxes of both its children, in single precision.
 
@@ -9,7 +9,7 @@ const LEAF: usize = 4;
 const BINS: usize = 12;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Aabb {
+pub(crate) struct Aabb {
     pub low: Vector,
     pub high: Vector,
 }
@@ -99,7 +99,7 @@ struct Child {
 struct Node([Child; 2]);
 
 #[derive(Debug, Clone)]
-pub(super) struct Bvh {
+pub(crate) struct Bvh {
     root: Child,
     nodes: Vec<Node>,
     /// Items in the order of the leaves.
@@ -179,6 +179,37 @@ impl Bvh {
             }
         }
         (best.0 != usize::MAX).then_some(best)
+    }
+
+    /// Visits items (by rank in [`Bvh::order`]), at least all whose boxes are nearer to `point` than `limit_squared`. Returns
+    /// a lower bound of the squared distance of the boxes that were not visited.
+    #[inline]
+    pub fn within(&self, point: &Point, limit_squared: f64, mut visit: impl FnMut(usize)) -> f64 {
+        let p = &point.coords;
+        let mut others = f64::INFINITY;
+        let mut stack = [0u32; 96];
+        let mut height = 0;
+        let mut look_at = |child: &Child, stack: &mut [u32; 96], height: &mut usize| {
+            let d = child.bounds.distance_squared(p);
+            if d >= limit_squared {
+                others = others.min(d);
+            } else if child.count > 0 {
+                (child.start..child.start + child.count).for_each(|rank| visit(rank as usize));
+            } else {
+                stack[*height] = child.start;
+                *height += 1;
+            }
+        };
+        if self.root.count > 0 || !self.nodes.is_empty() {
+            look_at(&self.root, &mut stack, &mut height);
+        }
+        while height > 0 {
+            height -= 1;
+            for child in &self.nodes[stack[height] as usize].0 {
+                look_at(child, &mut stack, &mut height);
+            }
+        }
+        others
     }
 
     /// Visits items whose boxes the ray meets; `visit` takes a rank and the present limit and may lower the limit.

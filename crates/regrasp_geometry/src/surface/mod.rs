@@ -3,7 +3,7 @@
 //! Each kind of surface is a file with the same functions in the same order (`SurfaceKind`). Points and normals are
 //! in the shape's own frame, called the object frame here.
 
-mod bvh;
+pub(crate) mod bvh;
 mod capsule;
 mod cuboid;
 mod cylinder;

@@ -161,7 +161,8 @@ impl Bodies {
     }
 
     fn add_pairs(&mut self, scene: &Scene) {
-        for a in 0..self.items.len() {
+        let moves = |&a: &usize| self.items[a].owner != Owner::Obstacle;
+        for a in (0..self.items.len()).filter(moves) {
             for b in 0..self.items.len() {
                 let (first, second) = (&self.items[a], &self.items[b]);
                 let judged = match (first.owner, second.owner) {

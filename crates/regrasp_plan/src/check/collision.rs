@@ -2,6 +2,7 @@
 
 use crate::check::bodies::{Bodies, Owner, Pair};
 use crate::check::continuity::{is_free_throughout, moving_finger};
+use crate::check::far::Looked;
 use crate::check::lift::{FreePart, free_part};
 use crate::check::model::Model;
 use crate::check::motion::{Breach, Step, certify};
@@ -29,6 +30,7 @@ pub fn check_collision(
     let tolerance = plan.promises.contact_tolerance.min(settings.largest_contact_tolerance);
     let mut tracks = vec![Track { bound: f64::NEG_INFINITY, reported_in: None }; bodies.pairs.len()];
     let mut clearance: Option<Clearance> = None;
+    let mut looked = Looked::new(bodies);
     let mut n_distances = 0;
     for (s, segment) in plan.segments.iter().enumerate() {
         // Segments may fail to meet; what was known before says nothing then.
@@ -39,7 +41,10 @@ pub fn check_collision(
         let is_free: Vec<bool> = (0..model.fingers.len()).map(|f| is_free_throughout(segment, f)).collect();
         for (w, ends) in segment.waypoints.windows(2).enumerate() {
             let mut step = Step::new(bodies, &ends[0], &ends[1]);
-            for (pair, track) in bodies.pairs.iter().zip(&mut tracks) {
+            let known = clearance.as_ref().map_or(f64::INFINITY, |c| c.distance.max(0.0));
+            let forget = |index: usize| tracks[index].bound = f64::NEG_INFINITY;
+            for &index in looked.in_step(bodies, &mut step, known, forget) {
+                let (pair, track) = (&bodies.pairs[index], &mut tracks[index]);
                 if track.reported_in == Some(s) {
                     continue;
                 }

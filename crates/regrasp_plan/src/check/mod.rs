@@ -15,6 +15,8 @@ pub mod contact;
 pub mod continuity;
 /// Distance of contacts from sharp edges.
 pub mod edges;
+/// Obstacles that are too far away to matter in a step.
+pub mod far;
 /// `regrasp check`: everything is read afresh from files.
 pub mod files;
 /// The checker's own forward kinematics and motion bounds.

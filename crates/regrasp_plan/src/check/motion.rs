@@ -99,7 +99,8 @@ impl<'a> Step<'a> {
         pose
     }
 
-    fn center(&mut self, item: usize, t: f64) -> Point {
+    /// Centre of the item's ball in the world.
+    pub fn center(&mut self, item: usize, t: f64) -> Point {
         let item = &self.bodies.items[item];
         self.pose(item.carrier, t) * item.center
     }

@@ -6,6 +6,7 @@ use regrasp_geometry::reference::{Answer, distance};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Pose, Shape, Vector};
 use regrasp_plan::check::bodies::{Bodies, Owner};
+use regrasp_plan::check::far::Looked;
 use regrasp_plan::check::model::Model;
 use regrasp_plan::check::motion::{Step, certify};
 use regrasp_plan::plan::PoseData;
@@ -136,4 +137,98 @@ fn what_is_certified_is_clear_and_what_is_clear_is_certified() {
     }
     assert!(bodies.items.iter().any(|item| item.owner == Owner::Obstacle));
     assert!(certified > 500 && refused > 30 && in_between > 5, "{certified} {refused} {in_between}");
+}
+
+/// Specks, balls, boxes and a few walls around the hand.
+fn obstacles(n: usize, rng: &mut Rng) -> Vec<Obstacle> {
+    let obstacle = |index: usize| {
+        let size = [1e-5, 0.004, 0.01, 3.0][rng.below(4).min(rng.below(8))];
+        let shape = match rng.below(2) {
+            0 => Shape::Sphere { radius: size },
+            _ => Shape::Cuboid { half_extents: Vector::new(size, 0.5 * size, 0.3 * size) },
+        };
+        let away = rng.uniform(0.11, 0.4) + if size > 1.0 { shape.bounding_sphere().1 } else { 0.0 };
+        let middle = sample::world_from_hand() * Pose::translation(0.0, 0.0, 0.06);
+        let position = middle.translation.vector + Vector::from(rng.direction()) * away;
+        let parent_from_shape = regrasp_geometry::pose_from(position.into(), rng.quat_xyzw());
+        Obstacle {
+            name: format!("obstacle {index}"),
+            mesh_body: None,
+            placed: PlacedShape { parent_from_shape, shape },
+        }
+    };
+    (0..n).map(obstacle).collect()
+}
+
+#[test]
+fn pairs_that_are_left_out_stay_apart_all_the_time() {
+    let mut scene = sample::scene();
+    let mut rng = Rng::keyed(4, "motion", 0);
+    scene.obstacles = obstacles(150, &mut rng);
+    let model = Model::new(&scene).unwrap();
+    let bodies = Bodies::new(&scene, &model).unwrap();
+    let mut looked = Looked::new(&bodies);
+    let waypoints = samples(&sample::plan(&scene));
+    let mut was_out = vec![false; bodies.pairs.len()];
+    let (mut n_out, mut n_in, mut n_back) = (0, 0, 0);
+    for round in 0..60 {
+        // Small steps, leaps, and steps of nothing.
+        let (from, turn) = (&waypoints[round / 4 % waypoints.len()], [0.02, 0.3, 0.0][round % 3]);
+        let to = neighbour(from, turn, &mut rng);
+        let mut step = Step::new(&bodies, from, &to);
+        let keep = [0.0, 0.001, 0.02][rng.below(3)];
+        let mut told = Vec::new();
+        let near = looked.in_step(&bodies, &mut step, keep, |index| told.push(index)).to_vec();
+        assert!(near.is_sorted_by(|a, b| a < b));
+        for (index, pair) in bodies.pairs.iter().enumerate() {
+            let is_out = near.binary_search(&index).is_err();
+            assert_eq!(told.contains(&index), is_out && !was_out[index], "told once, when it is first left out");
+            n_back += usize::from(was_out[index] && !is_out);
+            was_out[index] = is_out;
+            if !is_out {
+                n_in += 1;
+                continue;
+            }
+            n_out += 1;
+            assert!(bodies.items[pair.b].owner == Owner::Obstacle);
+            for k in 0..=4 {
+                let distance = step.measure(pair, k as f64 / 4.0).unwrap();
+                assert!(distance > keep, "{distance} at least {keep}, round {round}");
+            }
+        }
+    }
+    assert!(n_out > 10_000 && n_in > 5_000 && n_back > 30, "{n_out} {n_in} {n_back}");
+}
+
+#[test]
+fn the_smallest_clearance_among_many_obstacles_is_that_of_all_pairs() {
+    let mut scene = sample::scene();
+    let mut rng = Rng::keyed(5, "motion", 0);
+    let plan = sample::plan(&scene);
+    scene.obstacles = obstacles(150, &mut rng);
+    // Half a millimetre over where the object, a ball, is highest: nearer than a lifted finger is to it.
+    let centers = plan.segments.iter().flat_map(|segment| &segment.waypoints).map(|w| Pose::from(&w.world_from_object));
+    let highest = centers.map(|pose| pose.translation.vector).max_by(|a, b| a.z.total_cmp(&b.z)).unwrap();
+    let over = highest + Vector::z() * (sample::OBJECT_RADIUS + 0.002 + 0.0005);
+    scene.obstacles[70].name = "obstacle over the object".into();
+    scene.obstacles[70].placed = PlacedShape {
+        parent_from_shape: Pose::translation(over.x, over.y, over.z),
+        shape: Shape::Sphere { radius: 0.002 },
+    };
+    let model = Model::new(&scene).unwrap();
+    let bodies = Bodies::new(&scene, &model).unwrap();
+    let is_obstacle = |item: usize| bodies.items[item].owner == Owner::Obstacle;
+    let mut smallest = f64::INFINITY;
+    for segment in &plan.segments {
+        for ends in segment.waypoints.windows(2) {
+            let mut step = Step::new(&bodies, &ends[0], &ends[1]);
+            for pair in bodies.pairs.iter().filter(|pair| is_obstacle(pair.b)) {
+                smallest = smallest.min(step.measure(pair, 0.0).unwrap());
+            }
+        }
+    }
+    let report = regrasp_plan::check::check(&scene, Some(&sample::query(&plan)), &plan, &Default::default());
+    let clearance = report.min_clearance.expect("something was measured");
+    assert_eq!(clearance.pair[1], "obstacle over the object");
+    assert!(clearance.distance == smallest && (smallest - 0.0005).abs() < 1e-9, "{clearance:?}, {smallest}");
 }

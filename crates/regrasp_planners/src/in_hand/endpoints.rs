@@ -132,18 +132,10 @@ pub fn object_blocked_by<'m>(model: &'m Model, world_from_object: &Pose) -> Opti
     let object = &model.bodies[model.object];
     let at_object = Placement::from(world_from_object).then(&object.carrier_from_body);
     let clearance = model.settings.clearance;
-    model.pairs.iter().find_map(|pair| {
-        let other = if pair.a == model.object {
-            pair.b
-        } else if pair.b == model.object {
-            pair.a
-        } else {
-            return None;
-        };
-        let body = &model.bodies[other];
-        if !matches!(body.carrier, Carrier::World) {
-            return None;
-        }
+    let palm = model.pairs.iter().filter(|pair| pair.b == model.object).map(|pair| pair.a);
+    let is_fixed = |&other: &usize| matches!(model.bodies[other].carrier, Carrier::World);
+    let obstacles = model.obstacles_near(&at_object.point(&object.center), (object.radius + clearance) * (1.0 + 1e-9));
+    palm.filter(is_fixed).chain(obstacles).map(|other| &model.bodies[other]).find(|body| {
         let mut direction = Vector::zeros();
         let answer = separation(
             &object.shape,
@@ -166,7 +158,7 @@ pub fn object_blocked_by<'m>(model: &'m Model, world_from_object: &Pose) -> Opti
                     .as_ref()
                     .is_some_and(|tree| tree_apart(tree, &body.carrier_from_body, &object.shape, &at_object))
         };
-        (!matches!(answer, Answer::SeparatedBy(_)) && !exactly_apart()).then_some(body)
+        !matches!(answer, Answer::SeparatedBy(_)) && !exactly_apart()
     })
 }
 
@@ -204,8 +196,9 @@ pub fn given_grasp(
     let mut workspace = Workspace::new(model);
     workspace.set(world_from_object, &state.joints, &state.contacts);
     if !workspace.is_clear(TipMode::AllHold) {
-        let pair = workspace.blocking_pair.map(|p| &model.pairs[p]);
-        let names = pair.map_or(("?", "?"), |p| (model.bodies[p.a].name.as_str(), model.bodies[p.b].name.as_str()));
+        let names = workspace
+            .blocking_pair
+            .map_or(("?", "?"), |p| (model.bodies[p.a].name.as_str(), model.bodies[p.b].name.as_str()));
         return Err(end.failure(
             format!("at the {} \"{}\" and \"{}\" collide; nothing was moved", end.name(), names.0, names.1),
             "choose other contacts or joints",

@@ -3,7 +3,7 @@
 //! Built once per query, shared by all threads, never changed.
 
 use arrayvec::ArrayVec;
-use regrasp_geometry::collision::{MeshBody, MeshTree, Placement};
+use regrasp_geometry::collision::{Ball, BallTree, MeshBody, MeshTree, Placement};
 use regrasp_geometry::{Point, Pose, Shape};
 use regrasp_grasp::{Contact, ContactModel, GraspFrame, Grip, closure};
 use regrasp_robot::TipShape;
@@ -30,8 +30,10 @@ pub struct FingerModel<'a> {
     pub tip_bound: MotionBound,
     /// Indices of its bodies in [`Model::bodies`].
     pub bodies: std::ops::Range<usize>,
-    /// Pairs that a motion of this finger alone can bring together.
+    /// Pairs that a motion of this finger alone can bring together, but for those with obstacles.
     pub pairs: Vec<usize>,
+    /// When the obstacles have their turn among these.
+    pub turns: Vec<Turn>,
     /// Of these, the pairs with each other finger.
     pub pairs_with: Vec<Vec<usize>>,
     /// Tip centre at rest, in the world: where the finger likes to work.
@@ -75,8 +77,8 @@ pub struct Body {
     pub name: String,
 }
 
-/// Two bodies that are kept apart.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Two bodies that are kept apart. In the order in which they are tested: by the first body, then by the second.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Pair {
     /// First body.
     pub a: usize,
@@ -84,6 +86,15 @@ pub struct Pair {
     pub b: usize,
     /// The finger whose tip touches the object, when the pair is a fingertip and the object.
     pub tip_of: Option<usize>,
+}
+
+/// The turn of the obstacles in a list of pairs: those of one body come after its other pairs, as in the order of [`Pair`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Turn {
+    /// Number of pairs of the list that come before.
+    pub n_before: usize,
+    /// The moving body whose pairs with all obstacles follow.
+    pub body: usize,
 }
 
 /// The scene, prepared.
@@ -97,8 +108,12 @@ pub struct Model<'a> {
     pub bodies: Vec<Body>,
     /// Index of the object's body.
     pub object: usize,
-    /// Pairs to keep apart.
+    /// Pairs to keep apart, in order, but for those with obstacles: every moving body is kept apart from each of these.
     pub pairs: Vec<Pair>,
+    /// When the obstacles have their turn among these.
+    pub turns: Vec<Turn>,
+    /// Bounding balls of the obstacles, in the world.
+    pub obstacles: BallTree,
     /// What closure is asked about; friction as planned with.
     pub frame: GraspFrame,
     /// Largest distance of a point of the object from its frame's origin: bounds its motion when it turns.
@@ -164,6 +179,7 @@ impl<'a> Model<'a> {
                 ik,
                 bodies: first..bodies.len(),
                 pairs: Vec::new(),
+                turns: Vec::new(),
                 pairs_with: Vec::new(),
             });
         }
@@ -183,11 +199,14 @@ impl<'a> Model<'a> {
             bodies.push(fixed_body(shape, obstacle.mesh_body.as_ref(), place, &obstacle.name));
         }
         let mut pairs = Vec::new();
-        for a in 0..bodies.len() {
-            for b in a + 1..bodies.len() {
-                if let Some(pair) = pair_of(scene, &bodies, &links, a, b, n_finger_bodies, object) {
-                    pairs.push(pair);
-                }
+        let mut turns = Vec::new();
+        let has_obstacles = !scene.obstacles.is_empty();
+        for a in 0..=object {
+            pairs.extend(
+                (a + 1..=object).filter_map(|b| pair_of(scene, &bodies, &links, [a, b], n_finger_bodies, object)),
+            );
+            if has_obstacles && !matches!(bodies[a].carrier, Carrier::World) {
+                turns.push(Turn { n_before: pairs.len(), body: a });
             }
         }
         for (f, finger) in fingers.iter_mut().enumerate() {
@@ -202,6 +221,11 @@ impl<'a> Model<'a> {
                 .map(|g| (0..pairs.len()).filter(|&p| between(&pairs[p], g)).collect())
                 .collect();
             finger.pairs = (0..pairs.len()).filter(|&p| moves(pairs[p].a) || moves(pairs[p].b)).collect();
+            let among_its_own = |turn: &Turn| {
+                let n_before = finger.pairs.partition_point(|&pair| pair < turn.n_before);
+                Turn { n_before, ..*turn }
+            };
+            finger.turns = turns.iter().filter(|turn| moves(turn.body)).map(among_its_own).collect();
         }
         let others_may_hold = |away: usize| {
             let others: Vec<ContactModel> =
@@ -215,6 +239,8 @@ impl<'a> Model<'a> {
             fingers,
             object,
             pairs,
+            turns,
+            obstacles: balls_of(&bodies[object + 1..]),
             frame: GraspFrame {
                 center_of_mass: scene.object.center_of_mass,
                 torque_scale: scene.object.radius,
@@ -224,6 +250,22 @@ impl<'a> Model<'a> {
             bodies,
             settings: settings.clone(),
         }
+    }
+
+    /// Index in [`Model::bodies`] of the first obstacle, and number of bodies before the obstacles.
+    #[inline]
+    pub fn first_obstacle(&self) -> usize {
+        self.object + 1
+    }
+
+    /// Obstacles of which the bounding ball may be nearer than `reach` to `point` in the world, by their indices in
+    /// [`Model::bodies`], in order.
+    pub fn obstacles_near(&self, point: &Point, reach: f64) -> Vec<usize> {
+        let mut near: Vec<Ball> = Vec::new();
+        self.obstacles.near(point, reach, &mut near);
+        let mut near: Vec<usize> = near.iter().map(|ball| self.first_obstacle() + ball.index as usize).collect();
+        near.sort_unstable();
+        near
     }
 
     /// Number of fingers.
@@ -285,13 +327,18 @@ fn fixed_body(shape: &Shape, mesh_body: Option<&MeshBody>, world_from_shape: &Po
     }
 }
 
-/// The pair `(a, b)` if it is one to keep apart.
+/// The bounding balls of bodies that nothing moves, in the world.
+fn balls_of(bodies: &[Body]) -> BallTree {
+    let ball = |body: &Body| (body.carrier_from_body.point(&body.center), body.radius);
+    BallTree::new(&bodies.iter().map(ball).collect::<Vec<_>>())
+}
+
+/// The pair `(a, b)` of hand and object if it is one to keep apart.
 fn pair_of(
     scene: &Scene,
     bodies: &[Body],
     links: &[(regrasp_robot::LinkId, bool)],
-    a: usize,
-    b: usize,
+    [a, b]: [usize; 2],
     n_finger_bodies: usize,
     object: usize,
 ) -> Option<Pair> {

@@ -1,7 +1,7 @@
 //! Why attempts failed: counted on the way, told when no plan is found.
 
 use super::combine::{ClosureTable, Held};
-use super::model::{MAX_FINGERS, Model};
+use super::model::{MAX_FINGERS, Model, Pair};
 use crate::failure::Cause;
 use regrasp_geometry::Pose;
 
@@ -19,7 +19,7 @@ pub enum Reason {
     /// A transfer stopped at once: a finger reaches no farther.
     OutOfReach,
     /// A transfer stopped at once: this pair of bodies was too near.
-    TooNear(usize),
+    TooNear(Pair),
     /// Between two grasps a contact would have to cross an edge of the object.
     Crease,
     /// A path in GS_n could not be cut into transfers and regrasps.
@@ -122,7 +122,6 @@ impl Tally {
                         "a path with sliding contacts has no transfers and regrasps near it".into()
                     }
                     Reason::TooNear(pair) => {
-                        let pair = &model.pairs[pair];
                         format!("\"{}\" comes too near \"{}\"", model.bodies[pair.a].name, model.bodies[pair.b].name)
                     }
                 },

@@ -92,7 +92,7 @@ fn validate_segment(model: &Model, workspace: &mut Workspace, segment: &Segment)
 /// The bodies that stopped the last step.
 fn in_the_way(workspace: &Workspace) -> String {
     workspace.blocking_pair.map_or("a step that is not clear".into(), |pair| {
-        let (pair, bodies) = (&workspace.model.pairs[pair], &workspace.model.bodies);
+        let bodies = &workspace.model.bodies;
         format!("\"{}\" comes too near \"{}\"", bodies[pair.a].name, bodies[pair.b].name)
     })
 }

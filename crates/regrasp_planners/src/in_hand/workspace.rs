@@ -5,11 +5,18 @@
 //! ends by more than their deviations, it separates them all along: two support evaluations prove a step. Where bodies
 //! are far apart the distance known from before, less what both have moved since, proves it for nothing.
 
-use super::model::{Carrier, MAX_FINGERS, Model};
+/// Where everything is at one moment.
+mod configuration;
+/// Obstacles near the bodies that move.
+mod nearby;
+
+use super::model::{Carrier, MAX_FINGERS, Model, Pair};
 use super::state::GraspState;
 use arrayvec::ArrayVec;
+use configuration::{Configuration, midway, place_finger, place_object};
+use nearby::Nearby;
 use regrasp_geometry::collision::{Answer, Placement, gap_along, separation};
-use regrasp_geometry::{Point, Pose, Vector, frame, interpolate_pose};
+use regrasp_geometry::{Point, Pose, Vector, frame};
 use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 
@@ -47,14 +54,6 @@ const MAX_BETWEEN: usize = 5;
 /// Separation beyond which a search for a better direction stops, in metres.
 const ENOUGH: f64 = 0.004;
 
-/// A configuration: placements of all bodies and the numbers they came from.
-#[derive(Debug, Clone)]
-struct Configuration {
-    joints: HandJoints,
-    world_from_object: Pose,
-    placements: Vec<Placement>,
-}
-
 /// Where `next` may differ from `now`, besides what the coming step changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stale {
@@ -71,13 +70,19 @@ pub struct Workspace<'a> {
     now: Configuration,
     next: Configuration,
     stale: Stale,
+    /// Pairs that something is known of: those of the model, then those with obstacles that were ever near.
+    pairs: Vec<Pair>,
+    /// Which obstacles are near.
+    nearby: Nearby,
+    /// Obstacles to be tested just now.
+    hits: Vec<u32>,
     /// Direction that last separated each pair, from `a` to `b`: in the frame of the object where it is one of them, else in
     /// the world. Near the object it is a normal of its surface, which turns with it.
     directions: Vec<Vector>,
     hints: Vec<[u32; 2]>,
     /// Lower bound of each pair's distance now.
     slack: Vec<f64>,
-    /// How far each body moves at most in the current step.
+    /// How far each body but obstacles moves at most in the current step.
     motion: Vec<f64>,
     /// How far its points stray at most from straight lines in the current step.
     deviation: Vec<f64>,
@@ -89,29 +94,36 @@ pub struct Workspace<'a> {
     /// Configurations looked at.
     pub work: u64,
     /// The pair that stopped the last failed step.
-    pub blocking_pair: Option<usize>,
+    pub blocking_pair: Option<Pair>,
+    /// Its index in `pairs`.
+    blocking_index: usize,
 }
 
 impl<'a> Workspace<'a> {
     /// Fresh scratch memory for `model`.
     pub fn new(model: &'a Model<'a>) -> Self {
-        let placements: Vec<Placement> = model.bodies.iter().map(|body| body.carrier_from_body).collect();
+        let bodies = &model.bodies[..model.first_obstacle()];
+        let placements: Vec<Placement> = bodies.iter().map(|body| body.carrier_from_body).collect();
         let joints = model.scene.hand.fingers.iter().map(|finger| finger.rest.iter().copied().collect()).collect();
         let now = Configuration { joints, world_from_object: Pose::identity(), placements };
         Workspace {
             next: now.clone(),
             stale: Stale::Nothing,
             now,
+            pairs: model.pairs.clone(),
+            nearby: Nearby::new(model),
+            hits: Vec::new(),
             directions: vec![Vector::zeros(); model.pairs.len()],
             hints: vec![[0; 2]; model.pairs.len()],
             slack: vec![f64::NEG_INFINITY; model.pairs.len()],
-            motion: vec![0.0; model.bodies.len()],
-            deviation: vec![0.0; model.bodies.len()],
+            motion: vec![0.0; bodies.len()],
+            deviation: vec![0.0; bodies.len()],
             contacts: Contacts::new(),
             free: 0,
             rrt_iterations: model.settings.rrt_iterations,
             work: 0,
             blocking_pair: None,
+            blocking_index: 0,
             model,
         }
     }
@@ -135,7 +147,7 @@ impl<'a> Workspace<'a> {
         for finger in 0..self.model.n_fingers() {
             place_finger(self.model, &mut self.now, finger, &joints[finger]);
         }
-        self.slack.fill(f64::NEG_INFINITY);
+        self.forget_slack();
         self.stale = Stale::Everything;
     }
 
@@ -165,13 +177,14 @@ impl<'a> Workspace<'a> {
         for &pair in &self.model.fingers[finger].pairs {
             self.slack[pair] = f64::NEG_INFINITY;
         }
+        self.nearby.forget(self.model.fingers[finger].bodies.clone());
     }
 
     /// Puts the object somewhere, without any test; what pairs knew of each other is forgotten.
     pub fn place_object(&mut self, world_from_object: &Pose) {
         place_object(self.model, &mut self.now, world_from_object);
         place_object(self.model, &mut self.next, world_from_object);
-        self.slack.fill(f64::NEG_INFINITY);
+        self.forget_slack();
     }
 
     /// Puts the object and one finger somewhere, without any test.
@@ -186,7 +199,7 @@ impl<'a> Workspace<'a> {
         self.align(None);
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
-        (0..self.model.pairs.len()).all(|pair| self.pair_is_clear(pair, mode))
+        self.all_are_clear(None, mode)
     }
 
     /// True when no pair of one finger is too near now.
@@ -195,8 +208,7 @@ impl<'a> Workspace<'a> {
         self.align(None);
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
-        let model = self.model;
-        model.fingers[finger].pairs.iter().all(|&pair| self.pair_is_clear(pair, mode))
+        self.all_are_clear(Some(finger), mode)
     }
 
     /// True when one finger is clear of the object, the palm and obstacles now, whatever the other fingers do.
@@ -205,8 +217,11 @@ impl<'a> Workspace<'a> {
         self.align(None);
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
-        let model = self.model;
-        model.fingers[finger].pairs.iter().all(|&pair| self.is_between_fingers(pair) || self.pair_is_clear(pair, mode))
+        let moving = &self.model.fingers[finger];
+        self.in_turn(moving.pairs.len(), &moving.turns, mode, |this, k| {
+            let pair = moving.pairs[k];
+            this.is_between_fingers(pair) || this.pair_is_clear(pair, mode)
+        })
     }
 
     /// True when two fingers with these joints are clear of each other.
@@ -219,7 +234,7 @@ impl<'a> Workspace<'a> {
         self.align(None);
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
-        self.slack.fill(f64::NEG_INFINITY);
+        self.forget_slack();
         model.fingers[f].pairs_with[g].iter().all(|&pair| self.pair_is_clear(pair, TipMode::AllHold))
     }
 
@@ -256,11 +271,12 @@ impl<'a> Workspace<'a> {
         for (slack, pair) in self.slack.iter_mut().zip(&self.model.pairs) {
             *slack -= self.motion[pair.a] + self.motion[pair.b];
         }
+        self.nearby.drift(&self.motion);
         self.now.clone_from(&self.next);
         self.stale = Stale::Nothing;
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
-        (0..self.model.pairs.len()).all(|pair| self.pair_is_clear(pair, TipMode::AllHold))
+        self.all_are_clear(None, TipMode::AllHold)
     }
 
     /// Moves one finger if the step is clear; stays otherwise.
@@ -276,18 +292,13 @@ impl<'a> Workspace<'a> {
         self.work += 1;
         self.bound_motion(moving);
         let model = self.model;
-        let is_clear = match moving {
-            Some(finger) => model.fingers[finger].pairs.iter().all(|&pair| self.pair_is_clear(pair, mode)),
-            None => (0..model.pairs.len()).all(|pair| self.pair_is_clear(pair, mode)),
-        };
-        if is_clear {
+        if self.all_are_clear(moving, mode) {
             std::mem::swap(&mut self.now, &mut self.next);
             return true;
         }
         // Pairs tested before the one that failed have their slack at `next`; it is not known at `now` any more.
-        self.slack.fill(f64::NEG_INFINITY);
-        let blocking = self.blocking_pair;
-        if halvings == 0 || !blocking.is_none_or(|pair| self.end_is_clear(pair, mode)) {
+        self.forget_slack();
+        if halvings == 0 || !self.end_is_clear(self.blocking_index, mode) {
             return false;
         }
         self.stale = Stale::Everything;
@@ -300,7 +311,7 @@ impl<'a> Workspace<'a> {
             }
         }
         self.now = start;
-        self.slack.fill(f64::NEG_INFINITY);
+        self.forget_slack();
         false
     }
 
@@ -308,6 +319,7 @@ impl<'a> Workspace<'a> {
     fn end_is_clear(&mut self, pair: usize, mode: TipMode) -> bool {
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
+        self.slack[pair] = f64::NEG_INFINITY;
         let is_clear = self.pair_is_clear(pair, mode);
         self.slack[pair] = f64::NEG_INFINITY;
         is_clear
@@ -353,11 +365,33 @@ impl<'a> Workspace<'a> {
         }
     }
 
+    /// True when all pairs that a motion of `moving`, or of everything, can bring together stay apart during the step, in the
+    /// order of [`Pair`]; ends at the first that does not.
+    #[inline]
+    fn all_are_clear(&mut self, moving: Option<usize>, mode: TipMode) -> bool {
+        let model = self.model;
+        match moving {
+            Some(finger) => {
+                let moving = &model.fingers[finger];
+                let test = |this: &mut Self, k: usize| this.pair_is_clear(moving.pairs[k], mode);
+                self.in_turn(moving.pairs.len(), &moving.turns, mode, test)
+            }
+            None => self.in_turn(model.pairs.len(), &model.turns, mode, |this, k| this.pair_is_clear(k, mode)),
+        }
+    }
+
+    /// How far points of a body stray at most from straight lines in the current step.
+    #[inline]
+    fn deviation_of(&self, body: usize) -> f64 {
+        self.deviation.get(body).copied().unwrap_or(0.0)
+    }
+
     /// True when the pair stays apart during the step from `now` to `next`; its slack is then the one at `next`.
     #[inline]
     fn pair_is_clear(&mut self, index: usize, mode: TipMode) -> bool {
-        let pair = self.model.pairs[index];
-        let motion = self.motion[pair.a] + self.motion[pair.b];
+        let pair = self.pairs[index];
+        // Obstacles do not move, and are never first.
+        let motion = self.motion[pair.a] + self.motion.get(pair.b).copied().unwrap_or(0.0);
         let is_free_tip = pair.tip_of.is_some_and(|finger| self.free & (1 << finger) != 0);
         let required = if is_free_tip { self.model.free_clearance() } else { self.model.settings.clearance };
         self.slack[index] -= motion;
@@ -368,28 +402,31 @@ impl<'a> Workspace<'a> {
             (Some(finger), TipMode::Near { finger: near, normal_in_world }) if finger == near => {
                 self.tip_is_clear(index, finger, Some(normal_in_world))
             }
-            (Some(finger), TipMode::Away { finger: away, clearance }) if finger == away => self.apart(index, clearance),
+            (Some(finger), TipMode::Away { finger: away, clearance }) if finger == away => {
+                self.apart(index, clearance, motion)
+            }
             (Some(finger), _) if !is_free_tip => self.tip_is_clear(index, finger, None),
-            _ => self.apart(index, required),
+            _ => self.apart(index, required, motion),
         };
         if !is_clear {
-            self.blocking_pair = Some(index);
+            self.blocking_pair = Some(pair);
+            self.blocking_index = index;
         }
         is_clear
     }
 
-    /// Proves that the pair keeps `required` all along the step.
-    fn apart(&mut self, index: usize, required: f64) -> bool {
-        let pair = self.model.pairs[index];
-        let (a, b) = (&self.model.bodies[pair.a], &self.model.bodies[pair.b]);
-        let motion = self.motion[pair.a] + self.motion[pair.b];
-        let (at_a, at_b) = (&self.next.placements[pair.a], &self.next.placements[pair.b]);
+    /// Proves that the pair, which moves by at most `motion`, keeps `required` all along the step.
+    fn apart(&mut self, index: usize, required: f64, motion: f64) -> bool {
+        let pair = self.pairs[index];
+        let model = self.model;
+        let (a, b) = (&model.bodies[pair.a], &model.bodies[pair.b]);
+        let (at_a, at_b) = (&self.next.placements[pair.a], self.next.at(model, pair.b));
         let between = (at_a.point(&a.center) - at_b.point(&b.center)).norm() - a.radius - b.radius;
         if between > required + motion {
             self.slack[index] = between;
             return true;
         }
-        let required_at_ends = required + self.deviation[pair.a] + self.deviation[pair.b];
+        let required_at_ends = required + self.deviation[pair.a] + self.deviation_of(pair.b);
         let direction = self.last_direction(index);
         let mut separating = direction;
         let hints = &mut self.hints[index];
@@ -402,7 +439,7 @@ impl<'a> Workspace<'a> {
                 Answer::TooNear | Answer::Unresolved => return self.trees_apart(index, required),
             }
         }
-        let (from_a, from_b) = (&self.now.placements[pair.a], &self.now.placements[pair.b]);
+        let (from_a, from_b) = (&self.now.placements[pair.a], self.now.at(model, pair.b));
         // What is known at `next` less all motion may be enough; else the same direction must separate at `now`.
         if at_next - motion >= required
             || gap_along(&separating, &a.shape, from_a, &b.shape, from_b, &mut self.hints[index]) >= required_at_ends
@@ -453,22 +490,22 @@ impl<'a> Workspace<'a> {
     /// The object, where it is one of the pair.
     #[inline]
     fn turns_with(&self, index: usize) -> Option<usize> {
-        let (pair, object) = (self.model.pairs[index], self.model.object);
+        let (pair, object) = (self.pairs[index], self.model.object);
         (pair.a == object || pair.b == object).then_some(object)
     }
 
     /// Looks for a direction that separates at both ends, between one that does at `now` and one that does at `next`: long
     /// links that turn have both no room for the other's.
     fn apart_between(&mut self, index: usize, [good_now, good_next]: [Vector; 2], required_at_ends: f64) -> bool {
-        let pair = self.model.pairs[index];
-        let (a, b) = (&self.model.bodies[pair.a].shape, &self.model.bodies[pair.b].shape);
+        let (pair, model) = (self.pairs[index], self.model);
+        let (a, b) = (&model.bodies[pair.a].shape, &model.bodies[pair.b].shape);
         let (mut good_now, mut good_next) = (good_now, good_next);
         let hints = &mut self.hints[index];
         for _ in 0..MAX_BETWEEN {
             let Some(middle) = (good_now + good_next).try_normalize(1e-6) else { return false };
-            let (now, next) = (&self.now.placements, &self.next.placements);
-            let gap_now = gap_along(&middle, a, &now[pair.a], b, &now[pair.b], hints);
-            let gap_next = gap_along(&middle, a, &next[pair.a], b, &next[pair.b], hints);
+            let (now, next) = (&self.now, &self.next);
+            let gap_now = gap_along(&middle, a, &now.placements[pair.a], b, now.at(model, pair.b), hints);
+            let gap_next = gap_along(&middle, a, &next.placements[pair.a], b, next.at(model, pair.b), hints);
             match (gap_now >= required_at_ends, gap_next >= required_at_ends) {
                 (true, true) => {
                     self.directions[index] = self.to_keep(index, &middle);
@@ -485,18 +522,19 @@ impl<'a> Workspace<'a> {
 
     /// The last word where a hull is larger than its mesh: exact triangles, with the relative motion of the step.
     fn trees_apart(&mut self, index: usize, required: f64) -> bool {
-        let pair = self.model.pairs[index];
-        let (mesh, other) = match (&self.model.bodies[pair.a].tree, &self.model.bodies[pair.b].tree) {
+        let pair = self.pairs[index];
+        let model = self.model;
+        let (mesh, other) = match (&model.bodies[pair.a].tree, &model.bodies[pair.b].tree) {
             (_, Some(_)) => (pair.b, pair.a),
             (Some(_), None) => (pair.a, pair.b),
             (None, None) => return false,
         };
-        let Some(tree) = &self.model.bodies[mesh].tree else { return false };
-        let body = &self.model.bodies[other];
-        let now = self.now.placements[mesh].inverse_then(&self.now.placements[other]);
-        let next = self.next.placements[mesh].inverse_then(&self.next.placements[other]);
+        let Some(tree) = &model.bodies[mesh].tree else { return false };
+        let body = &model.bodies[other];
+        let now = self.now.at(model, mesh).inverse_then(self.now.at(model, other));
+        let next = self.next.at(model, mesh).inverse_then(self.next.at(model, other));
         let relative_motion =
-            now.displacement(&next, &body.center, body.radius) + self.deviation[mesh] + self.deviation[other];
+            now.displacement(&next, &body.center, body.radius) + self.deviation_of(mesh) + self.deviation_of(other);
         // Whatever the moment, one of the two ends is at most half of the motion away.
         let needed = required + 0.5 * relative_motion;
         let mut smallest = 0.0;
@@ -511,7 +549,7 @@ impl<'a> Workspace<'a> {
 
     /// Proves that a tip in contact presses into the object by no more than the allowance, along the contact normal.
     fn tip_is_clear(&mut self, index: usize, finger: usize, normal_in_world: Option<Vector>) -> bool {
-        let pair = self.model.pairs[index];
+        let pair = self.pairs[index];
         let (tip, object) = (&self.model.bodies[pair.a], &self.model.bodies[pair.b]);
         self.slack[index] = f64::NEG_INFINITY;
         let allowed = self.model.settings.contact_allowance - self.deviation[pair.a] - self.deviation[pair.b];
@@ -541,39 +579,6 @@ impl<'a> Workspace<'a> {
         }
         true
     }
-}
-
-fn place_object(model: &Model, configuration: &mut Configuration, world_from_object: &Pose) {
-    configuration.world_from_object = *world_from_object;
-    configuration.placements[model.object] =
-        Placement::from(world_from_object).then(&model.bodies[model.object].carrier_from_body);
-}
-
-fn place_finger(model: &Model, configuration: &mut Configuration, finger: usize, joints: &Coordinates) {
-    configuration.joints[finger].clone_from(joints);
-    let chain = model.fingers[finger].ik.chain();
-    let mut frames = [Placement::IDENTITY; MAX_BODIES];
-    let n_bodies = chain.joints.len();
-    chain.forward_frames(joints, &mut frames[..n_bodies]);
-    for index in model.fingers[finger].bodies.clone() {
-        let body = &model.bodies[index];
-        let Carrier::Finger { link, .. } = body.carrier else { unreachable!("bodies of a finger") };
-        configuration.placements[index] = frames[link].then(&body.carrier_from_body);
-    }
-}
-
-/// Most moving joints of a finger.
-const MAX_BODIES: usize = 16;
-
-fn midway(model: &Model, from: &Configuration, to: &Configuration) -> Configuration {
-    let mut middle = from.clone();
-    place_object(model, &mut middle, &interpolate_pose(&from.world_from_object, &to.world_from_object, 0.5));
-    for finger in 0..model.n_fingers() {
-        let joints: Coordinates =
-            from.joints[finger].iter().zip(&to.joints[finger]).map(|(a, b)| 0.5 * (a + b)).collect();
-        place_finger(model, &mut middle, finger, &joints);
-    }
-    middle
 }
 
 /// The tip centre that touches `contact` with the object at `world_from_object`, in the world.

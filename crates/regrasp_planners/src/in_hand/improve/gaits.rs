@@ -319,10 +319,7 @@ impl<'g, 'a> Gaits<'g, 'a> {
             _ => None,
         };
         let (station, choice) = (node.station, &node.choice);
-        let fingers = self.search.workspace.blocking_pair.map(|pair| {
-            let pair = &model.pairs[pair];
-            [finger_of(pair.a), finger_of(pair.b)]
-        });
+        let fingers = self.search.workspace.blocking_pair.map(|pair| [finger_of(pair.a), finger_of(pair.b)]);
         match fingers {
             Some([Some(f), Some(g)]) if f != g => {
                 let (f, g) = (f.min(g), f.max(g));
