@@ -106,6 +106,8 @@ pub struct Model<'a> {
     pub fingers: Vec<FingerModel<'a>>,
     /// Bodies: fingers first, then palm, object, obstacles.
     pub bodies: Vec<Body>,
+    /// Radii of the bodies' bounding balls, side by side.
+    pub radii: Vec<f64>,
     /// Index of the object's body.
     pub object: usize,
     /// Pairs to keep apart, in order, but for those with obstacles: every moving body is kept apart from each of these.
@@ -247,6 +249,7 @@ impl<'a> Model<'a> {
                 friction: scene.object.friction,
             },
             object_reach: bodies[object].center.coords.norm() + bodies[object].radius,
+            radii: bodies.iter().map(|body| body.radius).collect(),
             bodies,
             settings: settings.clone(),
         }

@@ -105,7 +105,8 @@ impl<'a> Workspace<'a> {
         let bodies = &model.bodies[..model.first_obstacle()];
         let placements: Vec<Placement> = bodies.iter().map(|body| body.carrier_from_body).collect();
         let joints = model.scene.hand.fingers.iter().map(|finger| finger.rest.iter().copied().collect()).collect();
-        let now = Configuration { joints, world_from_object: Pose::identity(), placements };
+        let centers = bodies.iter().map(|body| body.carrier_from_body.point(&body.center)).collect();
+        let now = Configuration { joints, world_from_object: Pose::identity(), placements, centers };
         Workspace {
             next: now.clone(),
             stale: Stale::Nothing,
@@ -159,7 +160,8 @@ impl<'a> Workspace<'a> {
             Stale::Finger(finger) => {
                 self.next.joints[finger].clone_from(&self.now.joints[finger]);
                 let bodies = self.model.fingers[finger].bodies.clone();
-                self.next.placements[bodies.clone()].copy_from_slice(&self.now.placements[bodies]);
+                self.next.placements[bodies.clone()].copy_from_slice(&self.now.placements[bodies.clone()]);
+                self.next.centers[bodies.clone()].copy_from_slice(&self.now.centers[bodies]);
             }
             Stale::Everything => self.next.clone_from(&self.now),
         }
@@ -419,13 +421,14 @@ impl<'a> Workspace<'a> {
     fn apart(&mut self, index: usize, required: f64, motion: f64) -> bool {
         let pair = self.pairs[index];
         let model = self.model;
-        let (a, b) = (&model.bodies[pair.a], &model.bodies[pair.b]);
-        let (at_a, at_b) = (&self.next.placements[pair.a], self.next.at(model, pair.b));
-        let between = (at_a.point(&a.center) - at_b.point(&b.center)).norm() - a.radius - b.radius;
+        let centers = self.next.center(model, pair.a) - self.next.center(model, pair.b);
+        let between = centers.norm() - model.radii[pair.a] - model.radii[pair.b];
         if between > required + motion {
             self.slack[index] = between;
             return true;
         }
+        let (a, b) = (&model.bodies[pair.a], &model.bodies[pair.b]);
+        let (at_a, at_b) = (&self.next.placements[pair.a], self.next.at(model, pair.b));
         let required_at_ends = required + self.deviation[pair.a] + self.deviation_of(pair.b);
         let direction = self.last_direction(index);
         let mut separating = direction;

@@ -3,7 +3,7 @@
 use super::HandJoints;
 use crate::in_hand::model::{Carrier, Model};
 use regrasp_geometry::collision::Placement;
-use regrasp_geometry::{Pose, interpolate_pose};
+use regrasp_geometry::{Point, Pose, interpolate_pose};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 
 /// A configuration: placements of all bodies but obstacles and the numbers they came from.
@@ -12,6 +12,8 @@ pub struct Configuration {
     pub joints: HandJoints,
     pub world_from_object: Pose,
     pub placements: Vec<Placement>,
+    /// Centres of the bodies' bounding balls, in the world.
+    pub centers: Vec<Point>,
 }
 
 impl Configuration {
@@ -20,13 +22,28 @@ impl Configuration {
     pub fn at<'s>(&'s self, model: &'s Model, body: usize) -> &'s Placement {
         self.placements.get(body).unwrap_or_else(|| &model.bodies[body].carrier_from_body)
     }
+
+    /// Centre of a body's bounding ball, in the world.
+    #[inline]
+    pub fn center(&self, model: &Model, body: usize) -> Point {
+        match self.centers.get(body) {
+            Some(center) => *center,
+            None => model.bodies[body].carrier_from_body.point(&model.bodies[body].center),
+        }
+    }
+
+    #[inline]
+    fn place(&mut self, model: &Model, body: usize, world_from_carrier: &Placement) {
+        let placement = world_from_carrier.then(&model.bodies[body].carrier_from_body);
+        self.centers[body] = placement.point(&model.bodies[body].center);
+        self.placements[body] = placement;
+    }
 }
 
 /// Puts the object at a pose.
 pub fn place_object(model: &Model, configuration: &mut Configuration, world_from_object: &Pose) {
     configuration.world_from_object = *world_from_object;
-    configuration.placements[model.object] =
-        Placement::from(world_from_object).then(&model.bodies[model.object].carrier_from_body);
+    configuration.place(model, model.object, &Placement::from(world_from_object));
 }
 
 /// Puts the bodies of a finger where its joints say.
@@ -37,9 +54,8 @@ pub fn place_finger(model: &Model, configuration: &mut Configuration, finger: us
     let n_bodies = chain.joints.len();
     chain.forward_frames(joints, &mut frames[..n_bodies]);
     for index in model.fingers[finger].bodies.clone() {
-        let body = &model.bodies[index];
-        let Carrier::Finger { link, .. } = body.carrier else { unreachable!("bodies of a finger") };
-        configuration.placements[index] = frames[link].then(&body.carrier_from_body);
+        let Carrier::Finger { link, .. } = model.bodies[index].carrier else { unreachable!("bodies of a finger") };
+        configuration.place(model, index, &frames[link]);
     }
 }
 

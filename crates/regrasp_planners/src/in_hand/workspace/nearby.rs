@@ -192,7 +192,7 @@ impl Workspace<'_> {
 
     /// True when a body stays apart from all obstacles during the step.
     pub(super) fn is_clear_of_obstacles(&mut self, body: usize, mode: TipMode) -> bool {
-        let center = self.next.placements[body].point(&self.model.bodies[body].center);
+        let center = self.next.centers[body];
         let mut hits = std::mem::take(&mut self.hits);
         hits.clear();
         self.nearby.look(self.model, body, center, self.motion[body], &mut hits);
