@@ -106,8 +106,9 @@ impl AStar {
     ///
     /// `neighbours` appends `(node, cost of the edge)` with costs of zero or more; an infinite cost is no edge.
     /// `heuristic` must never exceed the cost of the rest of the way; zero makes it Dijkstra's algorithm. With one that
-    /// does, a path is found where there is one, but perhaps not the cheapest. Nodes may be any indices
-    /// below 2^32; memory grows with the largest one seen. Equal estimates are decided by the one that has come farthest, then by the smaller index.
+    /// does, a path is found where there is one, but perhaps not the cheapest. Nodes may be any indices below 2^32; memory
+    /// grows with the largest one seen. Equal estimates are decided by the one that has come farthest, then by the smaller
+    /// index.
     pub fn cheapest_path_within(
         &mut self,
         limits: Limits,

@@ -160,11 +160,20 @@ impl MeshSurface {
         SurfacePoint::new(point, normal, facet)
     }
 
-    fn nearest(&self, point: &Point) -> (u32, Point, Feature) {
+    /// The nearest point of the surface, its triangle and what of that it lies on; quick when `reach` is hardly larger than its
+    /// distance, right whatever it is.
+    fn nearest(&self, point: &Point, reach: f64) -> (u32, Point, Feature) {
         let visit = |rank: usize| (nearest_on_triangle(&self.corners[rank], point).0 - point).norm_squared();
-        let rank = self.bvh.nearest(point, f64::INFINITY, visit).map_or(0, |(rank, _)| rank);
+        let near = self.bvh.nearest(point, reach * reach * (1.0 + 1e-9), visit);
+        let near = near.or_else(|| self.bvh.nearest(point, f64::INFINITY, visit));
+        let rank = near.map_or(0, |(rank, _)| rank);
         let (on_triangle, feature) = nearest_on_triangle(&self.corners[rank], point);
         (self.outer[rank], on_triangle, feature)
+    }
+
+    /// Length of `away`, which leads from the nearest point of the surface; negative inside.
+    fn signed(&self, away: Vector, facet: u32, feature: Feature) -> f64 {
+        away.norm().copysign(away.dot(&self.pseudonormal(facet, feature)))
     }
 
     /// Direction that tells outside from inside next to a feature of triangle `facet`.
@@ -220,14 +229,18 @@ impl SurfaceKind for MeshSurface {
     }
 
     fn project(&self, point: &Point) -> SurfacePoint {
-        let (facet, on_surface, _) = self.nearest(point);
+        let (facet, on_surface, _) = self.nearest(point, f64::INFINITY);
         self.surface_point(facet, on_surface)
     }
 
     fn signed_distance(&self, point: &Point) -> f64 {
-        let (facet, on_surface, feature) = self.nearest(point);
-        let away = point - on_surface;
-        away.norm().copysign(away.dot(&self.pseudonormal(facet, feature)))
+        let (facet, on_surface, feature) = self.nearest(point, f64::INFINITY);
+        self.signed(point - on_surface, facet, feature)
+    }
+
+    fn project_signed(&self, point: &Point, reach: f64) -> (SurfacePoint, f64) {
+        let (facet, on_surface, feature) = self.nearest(point, reach);
+        (self.surface_point(facet, on_surface), self.signed(point - on_surface, facet, feature))
     }
 
     fn crease_distance(&self, at: &SurfacePoint) -> f64 {

@@ -83,6 +83,10 @@ trait SurfaceKind: std::fmt::Debug + Send + Sync {
     fn cast_ray(&self, origin: &Point, direction: &UnitVector) -> Option<SurfacePoint>;
     fn project(&self, point: &Point) -> SurfacePoint;
     fn signed_distance(&self, point: &Point) -> f64;
+    /// Both, of a point that is no farther from the surface than `reach`.
+    fn project_signed(&self, point: &Point, _reach: f64) -> (SurfacePoint, f64) {
+        (self.project(point), self.signed_distance(point))
+    }
     fn crease_distance(&self, at: &SurfacePoint) -> f64;
     fn same_face(&self, a: &SurfacePoint, b: &SurfacePoint) -> bool;
     fn curvature(&self, at: &SurfacePoint) -> [f64; 2];
@@ -165,6 +169,12 @@ impl Surface {
     /// Distance of `point` from the surface, negative inside. An open mesh has its inside behind its triangles.
     pub fn signed_distance(&self, point: &Point) -> f64 {
         self.kind.signed_distance(point)
+    }
+
+    /// The point of the surface nearest to `point` and the distance of [`Surface::signed_distance`]; cheaper than one after
+    /// the other.
+    pub fn project_signed(&self, point: &Point) -> (SurfacePoint, f64) {
+        self.kind.project_signed(point, f64::INFINITY)
     }
 
     /// The contact of a ball of radius `tip_radius` that touches the surface near `near` and penetrates nowhere; its

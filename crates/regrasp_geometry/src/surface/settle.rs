@@ -18,17 +18,18 @@ pub(super) fn settle(surface: &Surface, near: &SurfacePoint, tip_radius: f64) ->
     }
     let mut center = near.point_in_object + near.normal_in_object.as_ref() * tip_radius;
     for push in 0..MAX_PUSHES {
-        let nearest = surface.project(&center);
+        // The ball touches the point that it comes from.
+        let (nearest, signed) = surface.kind.project_signed(&center, tip_radius);
         let away = center - nearest.point_in_object;
         let distance = away.norm();
-        if distance < TOLERANCE || (push == 0 && surface.signed_distance(&center) < 0.0) {
+        if distance < TOLERANCE || (push == 0 && signed < 0.0) {
             return None;
         }
         // The start is one radius from `near`, so the ball can only be too close, never too far, but for rounding.
         if (distance - tip_radius).abs() <= TOLERANCE {
             let settled = nearest.point_in_object;
             let slid = (settled - near.point_in_object).norm();
-            let is_outside = push == 0 || surface.signed_distance(&center) > 0.0;
+            let is_outside = push == 0 || signed > 0.0;
             let normal = UnitVector::new_unchecked(away / distance);
             return (slid <= 2.0 * tip_radius && is_outside).then(|| SurfacePoint::new(settled, normal, nearest.facet));
         }

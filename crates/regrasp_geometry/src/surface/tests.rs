@@ -216,6 +216,12 @@ fn nearest_points_are_on_the_surface_and_nothing_is_nearer() {
             let distance = (q.point_in_object - p).norm();
             assert!(surface.signed_distance(&q.point_in_object).abs() < 1e-12, "{} {p}", shape.kind());
             assert!((surface.signed_distance(&p).abs() - distance).abs() < 1e-12);
+            // However far the surface is thought to be at most.
+            for reach in [f64::INFINITY, 2.0 * distance, distance, 0.5 * distance] {
+                let (foot, signed) = surface.kind.project_signed(&p, reach);
+                let apart = (foot.point_in_object - p).norm() - distance;
+                assert!(apart.abs() < 1e-12 && signed == surface.signed_distance(&p), "{} {p} {reach}", shape.kind());
+            }
             let nearest = samples.iter().map(|s| (s - p).norm()).fold(f64::INFINITY, f64::min);
             assert!(nearest > distance - 1e-12, "{} {p}: {nearest} {distance}", shape.kind());
             assert!(nearest < distance + 2e-3, "{} {p}: {nearest} {distance}", shape.kind());

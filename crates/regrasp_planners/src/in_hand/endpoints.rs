@@ -227,7 +227,8 @@ fn from_joints(model: &Model, end: End, world_from_object: &Pose, values: &[f64]
         }
         let tip = placement.point_to_child(&finger.ik.tip(&own));
         let surface = &model.scene.object.surface;
-        let distance = surface.signed_distance(&tip) - finger.tip_radius;
+        let (foot, distance) = surface.project_signed(&tip);
+        let distance = distance - finger.tip_radius;
         if distance.abs() > TOUCHING {
             return Err(end.failure(
                 format!(
@@ -238,7 +239,6 @@ fn from_joints(model: &Model, end: End, world_from_object: &Pose, values: &[f64]
                 "correct the joints or give contacts",
             ));
         }
-        let foot = surface.project(&tip);
         let away = tip - foot.point_in_object;
         let normal_in_object = match UnitVector::try_new(away, 1e-6) {
             Some(normal) if finger.tip_radius > 0.0 => normal,

@@ -216,8 +216,7 @@ fn turned(from: &Vector, to: &Vector, angle: f64, t: f64) -> Vector {
 fn push_out(model: &Model, tip: &mut Point, away: f64) -> Option<Vector> {
     let surface = &model.scene.object.surface;
     for _ in 0..4 {
-        let distance = surface.signed_distance(tip);
-        let foot = surface.project(tip);
+        let (foot, distance) = surface.project_signed(tip);
         let outward =
             if distance > 1e-6 { (*tip - foot.point_in_object) / distance } else { foot.normal_in_object.into_inner() };
         if distance >= away - 1e-6 {
