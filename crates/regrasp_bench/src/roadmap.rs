@@ -1,10 +1,12 @@
 //! Random queries on a roadmap: answer, judge, measure; and what a graph is like, for the page.
 
 use crate::page::escaped;
-use crate::row::{Problem, Row, RunSettings, measure, status_of};
+use crate::row::{Problem, Row, RunSettings, measure, plan_only, status_of};
 use crate::summary::{Spread, ms};
 use cpu_time::{ProcessTime, ThreadTime};
 use regrasp_base::{Budget, Diagnostic, InputError, Place, files};
+use regrasp_plan::Plan;
+use regrasp_planners::in_hand::InHandSettings;
 use regrasp_planners::in_hand::roadmap::{GraspRoadmap, QueryMemory, RoadmapPlanner};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
@@ -12,8 +14,42 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Answers one query, judges the plan, and measures both. Times are of the query alone: the roadmap is open.
-pub fn run(planner: &RoadmapPlanner, problem: Problem, settings: &RunSettings, memory: &mut QueryMemory) -> Row {
+/// Queries that are answered one right after the other before any of their plans is judged.
+pub const BLOCK: usize = 100;
+
+/// Answers queries, one right after the other as a user of a graph asks them; plans the first `n_single` of them without the
+/// graph; then judges the plans and measures both. Times are of the query alone: the roadmap is open.
+pub fn run(
+    planner: &RoadmapPlanner,
+    problems: &[Problem],
+    n_single: usize,
+    settings: &RunSettings,
+    memory: &mut QueryMemory,
+) -> Vec<Row> {
+    let answers: Vec<_> = problems.iter().map(|&problem| answer(planner, problem, settings, memory)).collect();
+    let singles: Vec<_> = problems.iter().take(n_single).map(|&problem| plan_only(problem, settings)).collect();
+    let judged = |problem: Problem, (mut row, plan): (Row, Option<Plan>), planned_with: &InHandSettings| {
+        if let Some(plan) = &plan {
+            measure(problem, plan, planned_with, settings.judge, &mut row);
+        }
+        row
+    };
+    let mut singles = singles.into_iter();
+    let mut rows = Vec::with_capacity(2 * problems.len());
+    for (&problem, answer) in problems.iter().zip(answers) {
+        rows.push(judged(problem, answer, planner.settings()));
+        rows.extend(singles.next().map(|single| judged(problem, single, &settings.planner)));
+    }
+    rows
+}
+
+/// Answers one query: the plan, if there is one, is neither measured nor judged yet.
+fn answer(
+    planner: &RoadmapPlanner,
+    problem: Problem,
+    settings: &RunSettings,
+    memory: &mut QueryMemory,
+) -> (Row, Option<Plan>) {
     let mut row =
         Row { scene: problem.scene.name.clone(), method: "roadmap".into(), seed: problem.seed, ..Row::default() };
     let started = (Instant::now(), ThreadTime::now());
@@ -28,20 +64,18 @@ pub fn run(planner: &RoadmapPlanner, problem: Problem, settings: &RunSettings, m
     row.plan_cpu_s = started.1.elapsed().as_secs_f64();
     match outcome {
         Ok(answer) => {
-            let plan = &answer.plan;
+            let statistics = &answer.plan.statistics;
             row.status = "solved".into();
-            row.nodes = plan.statistics.nodes;
-            row.samples = plan.statistics.samples;
-            row.work = plan.statistics.work;
-            measure(problem, plan, planner.settings(), settings.judge, &mut row);
+            (row.nodes, row.samples, row.work) = (statistics.nodes, statistics.samples, statistics.work);
+            (row, Some(answer.plan))
         }
         Err(failure) => {
             row.status = status_of(&failure);
             row.work = failure.statistics.work;
             row.cause = failure.message;
+            (row, None)
         }
     }
-    row
 }
 
 /// What a saved graph is like. Times in seconds.

@@ -14,7 +14,7 @@ use regrasp::planners::in_hand::roadmap::{
     About, BuildSettings, BuildStage, Census, GraspRoadmap, QueryMemory, Region, RoadmapPlanner, build_roadmap,
 };
 use regrasp_bench::row::Judge;
-use regrasp_bench::{Problem, RunSettings, csv, roadmap as bench, run as run_one, summarise, summary};
+use regrasp_bench::{Problem, RunSettings, csv, roadmap as bench, summarise, summary};
 use serde_json::json;
 use std::path::Path;
 use std::sync::Arc;
@@ -255,14 +255,14 @@ fn run_bench(arguments: &args::RoadmapBench, common: &Common, talk: &Talk) -> Re
     };
     let mut memory = QueryMemory::default();
     let mut rows = Vec::new();
-    for number in 0..arguments.queries {
-        let seed = arguments.first_seed.saturating_add(number);
-        let query = planner.random_query(seed);
-        let problem = Problem { scene: &loaded.scene, query: &query, seed };
-        let mut found = vec![bench::run(&planner, problem, &settings, &mut memory)];
-        if number < arguments.single {
-            found.push(run_one(problem, &settings));
-        }
+    let seeds: Vec<u64> = (0..arguments.queries).map(|number| arguments.first_seed.saturating_add(number)).collect();
+    let mut n_single = usize::try_from(arguments.single).unwrap_or(usize::MAX);
+    for block in seeds.chunks(bench::BLOCK) {
+        let queries: Vec<_> = block.iter().map(|&seed| planner.random_query(seed)).collect();
+        let problem = |(query, &seed)| Problem { scene: &loaded.scene, query, seed };
+        let problems: Vec<Problem> = queries.iter().zip(block).map(problem).collect();
+        let found = bench::run(&planner, &problems, n_single, &settings, &mut memory);
+        n_single = n_single.saturating_sub(block.len());
         if cancelled.load(Ordering::Relaxed) {
             return Err(Stop::Interrupted);
         }
