@@ -22,7 +22,7 @@ SOFT_AND_COUPLED := scenes/dclaw/soft_sphere32_x.toml scenes/trifinger/soft_cyli
 # Roadmaps that are built and asked: sphere, box, and the box with more than a million motions.
 ROADMAPS := roadmap_sphere roadmap_box roadmap_million
 # Sections of docs/benchmarks.md, in this order; those without a CSV file are left out.
-BENCHMARKS := wide visibility classic improvement allegro_required allegro_stretch allegro_meshes $(ROADMAPS)
+BENCHMARKS := wide visibility classic improvement allegro_required allegro_stretch allegro_meshes dclaw trifinger shadow $(ROADMAPS)
 # Curves of `make growth`, in this order.
 GROWTH := fingers triangles obstacles threads
 GROWTH_TRIALS ?= 20
@@ -33,6 +33,7 @@ IMPROVEMENT_SEEDS ?= 100
 ALLEGRO_SEEDS ?= 20
 CLASSIC_SEEDS ?= 20
 ALLEGRO_BENCH = $(PACKAGES) --time-limit 20 --threads 1 --seeds $(ALLEGRO_SEEDS)
+SOFT_BENCH = $(PACKAGES) --time-limit 6 --threads 1 --seeds $(ALLEGRO_SEEDS)
 
 .PHONY: all demo pictures test bench growth benchmark-page campaign fuzz docs release $(ROADMAPS)
 
@@ -67,6 +68,9 @@ ifneq ($(PACKAGES),)
 	$(REGRASP) bench $(ALLEGRO_REQUIRED) $(ALLEGRO_BENCH) --csv docs/benchmarks/allegro_required.csv
 	$(REGRASP) bench $(ALLEGRO_STRETCH) $(ALLEGRO_BENCH) --csv docs/benchmarks/allegro_stretch.csv
 	$(REGRASP) bench $(ALLEGRO_MESHES) $(ALLEGRO_BENCH) --csv docs/benchmarks/allegro_meshes.csv
+	$(REGRASP) bench $(wildcard scenes/dclaw/soft_*.toml) $(SOFT_BENCH) --csv docs/benchmarks/dclaw.csv
+	$(REGRASP) bench $(wildcard scenes/trifinger/soft_*.toml) $(SOFT_BENCH) --csv docs/benchmarks/trifinger.csv
+	$(REGRASP) bench $(wildcard scenes/shadow/*.toml) $(ALLEGRO_BENCH) --csv docs/benchmarks/shadow.csv
 endif
 	$(MAKE) benchmark-page
 

@@ -2,7 +2,7 @@
 //!
 //! Binned surface area heuristic (Wald 2007); each node holds the boxes of both its children, in single precision.
 
-use crate::frame::{Point, Vector};
+use crate::frame::{Point, UnitVector, Vector, tangents};
 
 /// Items per leaf at most.
 const LEAF: usize = 4;
@@ -85,12 +85,22 @@ impl Bounds {
     }
 }
 
-/// A child: an inner node (`count == 0`) or `count` items from `start`.
+/// A child: an inner node (`count == 0`, or from `FIRST_SHEET` on), or `count` items from `start`.
 #[derive(Debug, Clone, Copy)]
 struct Child {
     bounds: Bounds,
     start: u32,
     count: u32,
+}
+
+/// Where `count` of an inner node is as much or more, the difference is the index of its sheet.
+const FIRST_SHEET: u32 = 1 << 31;
+
+impl Child {
+    #[inline]
+    fn is_leaf(&self) -> bool {
+        self.count != 0 && self.count < FIRST_SHEET
+    }
 }
 
 /// Both children of a node: one line of a processor's cache.
@@ -104,6 +114,8 @@ pub(crate) struct Bvh {
     nodes: Vec<Node>,
     /// Items in the order of the leaves.
     order: Vec<u32>,
+    /// Boxes along the surface, of some inner nodes.
+    sheets: Vec<Sheet>,
 }
 
 impl Bvh {
@@ -117,7 +129,49 @@ impl Bvh {
         let mut nodes = Vec::with_capacity(boxes.len() / 2 + 1);
         let root = build(&mut items, &mut Vec::new(), 0, &mut nodes, 0);
         let order = items.iter().map(|item| item.index).collect();
-        Bvh { root, nodes, order }
+        Bvh { root, nodes, order, sheets: Vec::new() }
+    }
+
+    /// Bounds nodes of some tens of triangles along the surface too, where [`Bvh::nearest`] then turns back; the results are
+    /// the same. `corners` are the triangles in the order of the queries.
+    pub fn add_sheets(&mut self, corners: &[[Point; 3]]) {
+        if !self.root.is_leaf() && !self.nodes.is_empty() {
+            self.add_sheets_below(self.root.start, corners);
+        }
+    }
+
+    /// The ranks of the items below a node.
+    fn add_sheets_below(&mut self, node: u32, corners: &[[Point; 3]]) -> std::ops::Range<usize> {
+        let ranges = [0, 1].map(|side| {
+            let child = self.nodes[node as usize].0[side];
+            match child.is_leaf() {
+                true => child.start as usize..(child.start + child.count) as usize,
+                false => self.add_sheets_below(child.start, corners),
+            }
+        });
+        let [a, b] = &ranges;
+        let all = a.start.min(b.start)..a.end.max(b.end);
+        if all.len() > SHEET {
+            for (side, range) in ranges.into_iter().enumerate() {
+                let child = &mut self.nodes[node as usize].0[side];
+                if let (false, 0..=SHEET) = (child.is_leaf(), range.len())
+                    && let Some(sheet) = Sheet::around(&corners[range])
+                {
+                    child.count = FIRST_SHEET + self.sheets.len() as u32;
+                    self.sheets.push(sheet);
+                }
+            }
+        }
+        all
+    }
+
+    /// Lower bound of the squared distance of the items of an inner child, of which that of its box is `of_box`.
+    #[inline]
+    fn bound_of(&self, child: &Child, of_box: f64, p: &Vector) -> f64 {
+        match child.count.checked_sub(FIRST_SHEET) {
+            Some(index) => of_box.max(self.sheets[index as usize].distance_squared(p)),
+            None => of_box,
+        }
     }
 
     /// Items in the order in which the queries count them.
@@ -146,7 +200,7 @@ impl Bvh {
                 }
             }
         };
-        if self.root.count > 0 {
+        if self.root.is_leaf() {
             scan(&self.root, &mut best);
         } else if !self.nodes.is_empty() {
             stack[0] = (self.root.start, 0.0);
@@ -162,19 +216,19 @@ impl Bvh {
             let (da, db) = (a.bounds.distance_squared(p), b.bounds.distance_squared(p));
             let (near, dn, far, df) = if da <= db { (a, da, b, db) } else { (b, db, a, da) };
             // Far leaves are looked at after the near subtree only when they are inner nodes; leaves are cheap.
-            if dn < best.1 && near.count > 0 {
+            if dn < best.1 && near.is_leaf() {
                 scan(near, &mut best);
             }
             if df < best.1 {
-                if far.count > 0 {
+                if far.is_leaf() {
                     scan(far, &mut best);
                 } else {
-                    stack[height] = (far.start, df);
+                    stack[height] = (far.start, self.bound_of(far, df, p));
                     height += 1;
                 }
             }
-            if dn < best.1 && near.count == 0 {
-                stack[height] = (near.start, dn);
+            if dn < best.1 && !near.is_leaf() {
+                stack[height] = (near.start, self.bound_of(near, dn, p));
                 height += 1;
             }
         }
@@ -193,14 +247,14 @@ impl Bvh {
             let d = child.bounds.distance_squared(p);
             if d >= limit_squared {
                 others = others.min(d);
-            } else if child.count > 0 {
+            } else if child.is_leaf() {
                 (child.start..child.start + child.count).for_each(|rank| visit(rank as usize));
             } else {
                 stack[*height] = child.start;
                 *height += 1;
             }
         };
-        if self.root.count > 0 || !self.nodes.is_empty() {
+        if self.root.is_leaf() || !self.nodes.is_empty() {
             look_at(&self.root, &mut stack, &mut height);
         }
         while height > 0 {
@@ -229,7 +283,7 @@ impl Bvh {
                 *limit = visit(rank, *limit);
             }
         };
-        if self.root.count > 0 {
+        if self.root.is_leaf() {
             scan(&self.root, &mut limit);
         } else if !self.nodes.is_empty() {
             stack[0] = (self.root.start, 0.0);
@@ -251,7 +305,7 @@ impl Bvh {
             // The farther one is pushed first.
             for (child, t) in hits {
                 let Some(t) = t else { continue };
-                if child.count > 0 {
+                if child.is_leaf() {
                     scan(child, &mut limit);
                 } else {
                     stack[height] = (child.start, t);
@@ -259,6 +313,49 @@ impl Bvh {
                 }
             }
         }
+    }
+}
+
+/// Most triangles of a sheet. By hand: few enough to be nearly flat, so many that all sheets of a million fit into a cache.
+const SHEET: usize = 64;
+
+/// A box along a piece of surface, which is thin where boxes along the axes stand out: a point near a surface of many
+/// triangles is nearer to the boxes of hundreds of them than to any triangle. In single precision.
+#[derive(Debug, Clone, Copy)]
+struct Sheet {
+    center: [f32; 3],
+    axes: [[f32; 3]; 3],
+    half: [f32; 3],
+}
+
+impl Sheet {
+    /// None where the triangles face no common side.
+    fn around(corners: &[[Point; 3]]) -> Option<Self> {
+        let normal = corners.iter().fold(Vector::zeros(), |sum, [a, b, c]| sum + (b - a).cross(&(c - a)));
+        let normal = UnitVector::try_new(normal, 1e-300)?;
+        let (u, v) = tangents(&normal);
+        let points = || corners.iter().flatten();
+        let whole = points().fold(Aabb::empty(), |all, p| all.union(&Aabb { low: p.coords, high: p.coords }));
+        let center = ((whole.low + whole.high) / 2.0).map(|x| x as f32);
+        let axes = [u, v, normal].map(|axis| axis.map(|x| x as f32).into());
+        let mut sheet = Sheet { center: center.into(), axes, half: [0.0; 3] };
+        let along = |k: usize| points().map(|p| sheet.along(k, &p.coords).abs()).fold(0.0, f64::max);
+        sheet.half = [0, 1, 2].map(|k| (along(k) as f32).next_up());
+        Some(sheet)
+    }
+
+    /// Coordinate of a point along an axis, from the centre.
+    #[inline]
+    fn along(&self, k: usize, p: &Vector) -> f64 {
+        (0..3).map(|i| f64::from(self.axes[k][i]) * (p[i] - f64::from(self.center[i]))).sum()
+    }
+
+    /// A lower bound of the squared distance.
+    #[inline]
+    fn distance_squared(&self, p: &Vector) -> f64 {
+        let excess = |k: usize| (self.along(k, p).abs() - f64::from(self.half[k])).max(0.0);
+        // The axes are orthonormal but for the rounding to single precision.
+        (0..3).map(|k| excess(k) * excess(k)).sum::<f64>() * (1.0 - 1e-6)
     }
 }
 
@@ -358,4 +455,62 @@ fn best_split(items: &mut [Item], right_side: &mut Vec<Item>, centers: &Aabb) ->
 
 fn bin(value: f64, low: f64, extent: f64) -> usize {
     (((value - low) / extent * BINS as f64) as usize).min(BINS - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::mesh::nearest_on_triangle;
+    use super::*;
+    use regrasp_base::Rng;
+
+    /// A bumpy sheet of triangles, folded over at one side, and loose triangles in front of it.
+    fn triangles(rng: &mut Rng) -> Vec<[Point; 3]> {
+        let n = 40;
+        let height: Vec<f64> = (0..=n).flat_map(|_| (0..=n).map(|_| 0.01 * rng.unit()).collect::<Vec<_>>()).collect();
+        let at = |i: usize, j: usize| {
+            let fold = if i > 30 { 0.3 - 0.01 * i as f64 } else { 0.0 };
+            Point::new(0.01 * i as f64 + 2.0 * fold, 0.01 * j as f64, height[i * (n + 1) + j] - fold)
+        };
+        let mut found = Vec::new();
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            found.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            found.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+        for _ in 0..200 {
+            let corner = |rng: &mut Rng| Point::from(Vector::from(rng.direction()) * rng.unit() * 0.3);
+            found.push([corner(rng), corner(rng), corner(rng)]);
+        }
+        found
+    }
+
+    #[test]
+    fn sheets_change_nothing_and_the_nearest_is_that_of_all() {
+        let mut rng = Rng::keyed(5, "sheets", 0);
+        let corners = triangles(&mut rng);
+        let boxes: Vec<Aabb> = corners.iter().map(|corners| Aabb::of(corners)).collect();
+        let without = Bvh::new(&boxes);
+        let corners: Vec<[Point; 3]> = without.order().iter().map(|&index| corners[index as usize]).collect();
+        let mut with = without.clone();
+        with.add_sheets(&corners);
+        assert!(with.sheets.len() > 40 && without.sheets.is_empty(), "{}", with.sheets.len());
+        let mut n_spared = 0;
+        for _ in 0..2000 {
+            let point = Point::from(Vector::from(rng.direction()) * 0.5 * rng.unit());
+            let mut n_seen = [0; 2];
+            let [plain, sheeted] = [&without, &with].map(|tree| {
+                let seen = &mut n_seen[usize::from(!tree.sheets.is_empty())];
+                let visit = |rank: usize| {
+                    *seen += 1;
+                    (nearest_on_triangle(&corners[rank], &point).0 - point).norm_squared()
+                };
+                tree.nearest(&point, f64::INFINITY, visit)
+            });
+            assert_eq!(plain, sheeted);
+            let distance = |corners: &[Point; 3]| (nearest_on_triangle(corners, &point).0 - point).norm_squared();
+            let least = corners.iter().map(distance).fold(f64::INFINITY, f64::min);
+            assert_eq!(sheeted.unwrap().1, least);
+            n_spared += n_seen[0] - n_seen[1];
+        }
+        assert!(n_spared > 1000, "{n_spared}");
+    }
 }

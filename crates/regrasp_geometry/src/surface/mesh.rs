@@ -49,7 +49,7 @@ pub struct MeshSurface {
 
 /// Where on a triangle a point lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Feature {
+pub(super) enum Feature {
     Inside,
     Edge(usize),
     Corner(usize),
@@ -81,9 +81,10 @@ impl MeshSurface {
 
         let corners_of = |i: u32| topology.triangles[i as usize].map(|v| vertices[v as usize]);
         let boxes: Vec<Aabb> = outer.iter().map(|&i| Aabb::of(&corners_of(i))).collect();
-        let bvh = Bvh::new(&boxes);
+        let mut bvh = Bvh::new(&boxes);
         let outer: Vec<u32> = bvh.order().iter().map(|&rank| outer[rank as usize]).collect();
         let corners: Vec<[Point; 3]> = outer.iter().map(|&i| corners_of(i)).collect();
+        bvh.add_sheets(&corners);
         let mut area = 0.0;
         let area_up_to = corners
             .iter()
@@ -431,7 +432,7 @@ fn meet([a, b, c]: &[Point; 3], origin: &Point, direction: &Vector) -> Option<f6
 }
 
 /// Nearest point of a triangle (Ericson 2005, 5.1.5).
-fn nearest_on_triangle([a, b, c]: &[Point; 3], p: &Point) -> (Point, Feature) {
+pub(super) fn nearest_on_triangle([a, b, c]: &[Point; 3], p: &Point) -> (Point, Feature) {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
     if d1 <= 0.0 && d2 <= 0.0 {
