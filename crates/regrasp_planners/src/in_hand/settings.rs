@@ -193,7 +193,8 @@ pub struct InHandSettings {
     /// Share of the extensions after that which may.
     pub free_share: f64,
     /// Work after which a search starts again from nothing; grows by as much with every fourth restart. Trees take new start
-    /// grasps by themselves, so that restarts are rare.
+    /// grasps by themselves, so that restarts are rare. By measurement, 20 seeds: against 300,000 a million saves 30 % on
+    /// allegro/box_x and a tenth on cube45_x and cube57_x.
     pub restart_work: u64,
     /// Random shortcuts tried on the plan found (in-hand-notes, 3).
     pub shortcuts: usize,
@@ -235,7 +236,7 @@ impl Default for InHandSettings {
             transfers_alone: false,
             free_after: 3,
             free_share: 0.5,
-            restart_work: 300_000,
+            restart_work: 1_000_000,
             shortcuts: 8,
             improve_work: 0,
             cost: CostWeights::default(),
