@@ -54,7 +54,7 @@ test:
 	cargo test --locked --workspace
 
 # Writes docs/benchmarks.md and docs/benchmarks/. One thread, so that times compare. The two methods of paper 000 draw poses
-# uniformly, as the paper does. The suites of the papers take hours; cut off and run again, they go on where they were.
+# uniformly, as the paper does. The suite of paper 000 takes half an hour; cut off and run again, it goes on where it was.
 bench: release
 	$(REGRASP) bench $(WIDE) $(TIGHT) --seeds $(SEEDS) --threads 1 --time-limit 20 --csv docs/benchmarks/wide.csv
 	$(REGRASP) bench scenes/tight_sphere_180z.toml --method visibility --settings docs/benchmarks/uniform_poses.json --seeds $(CLASSIC_SEEDS) --threads 1 --time-limit 60 --csv docs/benchmarks/visibility.csv

@@ -211,6 +211,7 @@ mod tests {
         assert!(text.contains("d=\"M62.0 268.0M317.0 40.0L402.0 154.0\""));
         assert!(text.contains("a&lt;b") && !text.contains("NaN"));
     }
+
     #[test]
     fn a_scale_encloses_its_values_and_has_ticks_where_they_stand() {
         let ruler = |scale, values: &[f64]| Ruler::new(scale, values.iter().copied());

@@ -112,9 +112,18 @@ pub fn method_name(settings: &InHandSettings) -> String {
 
 /// Plans one seed, judges the plan, and measures both.
 pub fn run(problem: Problem, settings: &RunSettings) -> Row {
-    let (mut row, plan) = plan_only(problem, settings);
+    measured(problem, plan_only(problem, settings), &settings.planner, settings.judge)
+}
+
+/// The row of what was planned, with the plan measured and judged, if there is one.
+pub(crate) fn measured(
+    problem: Problem,
+    (mut row, plan): (Row, Option<Plan>),
+    planned_with: &InHandSettings,
+    judge: Judge,
+) -> Row {
     if let Some(plan) = &plan {
-        measure(problem, plan, &settings.planner, settings.judge, &mut row);
+        measure(problem, plan, planned_with, judge, &mut row);
     }
     row
 }

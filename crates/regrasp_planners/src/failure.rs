@@ -80,8 +80,8 @@ pub struct Failure {
 }
 
 impl Failure {
-    /// Of this kind, for a reason known without a search.
-    pub(crate) fn unsearched(kind: FailureKind, message: String, advice: &str) -> Self {
+    /// Kind, message and advice alone: no causes, no nearest miss, nothing counted.
+    pub(crate) fn bare(kind: FailureKind, message: String, advice: &str) -> Self {
         Failure {
             kind,
             message,

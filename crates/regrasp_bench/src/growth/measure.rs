@@ -1,7 +1,7 @@
 //! Loading and batches, measured.
 
 use crate::at_once::in_order;
-use crate::row::{Problem, Row, RunSettings, measure, plan_only};
+use crate::row::{Problem, Row, RunSettings, measured, plan_only};
 use cpu_time::ProcessTime;
 use regrasp_base::InputError;
 use regrasp_scene::{LoadedScene, load_scene};
@@ -50,12 +50,10 @@ pub fn batch(loaded: &LoadedScene, n: usize, n_at_once: usize, settings: &RunSet
     });
     let wall_s = started.elapsed().as_secs_f64();
     debug_assert!(told.is_ok(), "telling does not fail");
-    let rows = planned.into_iter().enumerate().map(|(index, (mut row, plan))| {
-        if let Some(plan) = plan {
-            measure(problem(index), &plan, &settings.planner, settings.judge, &mut row);
-        }
-        row
-    });
+    let rows = planned
+        .into_iter()
+        .enumerate()
+        .map(|(index, planned)| measured(problem(index), planned, &settings.planner, settings.judge));
     (rows.collect(), wall_s)
 }
 

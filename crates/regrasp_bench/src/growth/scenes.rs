@@ -119,6 +119,24 @@ mod tests {
     }
 
     #[test]
+    fn the_finger_is_that_of_the_bundled_hand() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/six_finger_sphere_90x.toml");
+        let bundled = load_scene(&path, &Default::default()).unwrap().scene.hand;
+        let written = loaded(Point { curve: Curve::Fingers, object: "sphere", size: 6 }).scene.hand;
+        assert_eq!(bundled.fingers.len(), written.fingers.len());
+        for (a, b) in bundled.fingers.iter().zip(&written.fingers) {
+            assert_eq!((&a.chain.lower, &a.chain.upper, &a.rest), (&b.chain.lower, &b.chain.upper, &b.rest));
+            assert_eq!((&a.tip.shape, a.tip.center_in_body), (&b.tip.shape, b.tip.center_in_body));
+            let parts = |finger: &Finger| -> Vec<_> {
+                finger.shapes.iter().map(|shape| (shape.body, shape.placed.clone(), shape.is_tip)).collect()
+            };
+            assert_eq!(parts(a), parts(b));
+            let tip = |finger: &Finger| finger.ik.tip(&finger.rest);
+            assert!((tip(a) - tip(b)).norm() < 1e-9, "{} {}", a.name, b.name);
+        }
+    }
+
+    #[test]
     fn every_point_but_the_large_ones_is_a_scene_that_loads() {
         for point in Curve::ALL.into_iter().flat_map(|curve| curve.points(10_000)) {
             let scene = loaded(point).scene;

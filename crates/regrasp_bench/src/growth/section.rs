@@ -181,8 +181,8 @@ fn text(curve: Curve, points: &[Measured]) -> String {
             let [n, cores] = points.first().map_or([0, 0], |point| [point.summary.runs, point.cores]);
             format!(
                 "{n} turns of a box by 180 degrees about z, with starts up to 3 mm from the middle, planned by four hard fingers at \
-                 the same time on so many threads of a machine with {cores} cores, one thread each. *batch* and *plans per s* are wall-clock times of planning alone; *times* is \
-                 against one thread."
+                 the same time on so many threads of a machine with {cores} cores, one thread each. *batch* and *plans per s* are \
+                 wall-clock times of planning alone; *times* is against one thread."
             )
         }
     }
@@ -198,8 +198,8 @@ fn asked(points: &[Measured]) -> String {
     let all_solved = [largest, reference].iter().all(|point| point.summary.solved == point.summary.runs);
     let ratio = largest.mean_s().zip(reference.mean_s()).map(|(a, b)| a / b);
     format!(
-        "\nAsked of {} triangles: loaded in at most {LOAD_AT_MOST_S} s: {:.2} s ({:.2} s of processor time), {}; planned with at most {PLAN_AT_MOST} times as \
-         slowly as {}: {}, {}.\n",
+        "\nAsked of {} triangles: loaded in at most {LOAD_AT_MOST_S} s: {:.2} s ({:.2} s of processor time), {}; planned with \
+         at most {PLAN_AT_MOST} times as slowly as {}: {}, {}.\n",
         largest.size,
         largest.load.wall_s,
         largest.load.cpu_s,

@@ -1,6 +1,7 @@
 //! Bounding volume hierarchy over boxes, for nearest items, all near ones, and rays.
 //!
 //! Binned surface area heuristic (Wald 2007); each node holds the boxes of both its children, in single precision.
+//! Over triangles, nodes of some tens of them have a box along the surface besides (`Sheet`).
 
 use crate::frame::{Point, UnitVector, Vector, tangents};
 

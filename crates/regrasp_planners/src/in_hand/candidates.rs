@@ -2,6 +2,7 @@
 
 use super::model::Model;
 use super::relocate::{Foothold, lift_is_within_reach};
+use super::state::GraspState;
 use super::transfer::ik_settings;
 use super::workspace::{TipMode, Workspace, tip_target};
 use regrasp_base::Rng;
@@ -26,6 +27,13 @@ pub struct Candidate {
     pub joints: Coordinates,
     /// Share of the way to the target that the finger can follow with it, or that it is not in the way of.
     pub follow: f64,
+}
+
+impl Candidate {
+    /// Where `finger` is in `state`: it may stay.
+    pub fn present(state: &GraspState, finger: usize) -> Self {
+        Candidate { contact: state.contact(finger), joints: state.joints[finger].clone(), follow: 1.0 }
+    }
 }
 
 /// The way of the object that is looked ahead along.

@@ -348,7 +348,6 @@ const RELEASE_BONUS: f64 = 0.3;
 mod tests {
     use super::super::explore::draw_state;
     use super::super::roadmap_tests::with_search;
-    use super::super::state::GraspState;
     use super::*;
 
     /// Every set of fingers counts as closed where the margin that plans promise is enough, and nowhere else.
@@ -358,14 +357,7 @@ mod tests {
             with_search(scene, |search| {
                 let states: Vec<_> = (0..200).filter_map(|_| draw_state(search)).take(12).collect();
                 let model = search.model();
-                let of_finger = |finger: usize| {
-                    let candidate = |state: &GraspState| Candidate {
-                        contact: state.contact(finger),
-                        joints: state.joints[finger].clone(),
-                        follow: 1.0,
-                    };
-                    states.iter().map(candidate).collect()
-                };
+                let of_finger = |finger: usize| states.iter().map(|state| Candidate::present(state, finger)).collect();
                 let options: Vec<Vec<Candidate>> = (0..n_fingers).map(of_finger).collect();
                 let mut table = ClosureTable::new(model, &options);
                 let mut seen = [[0; 2]; MAX_FINGERS + 1];

@@ -44,7 +44,7 @@ impl End {
             End::Way(_) => FailureKind::WayInvalid,
             End::Goal => FailureKind::GoalInvalid,
         };
-        Failure::unsearched(kind, message, advice)
+        Failure::bare(kind, message, advice)
     }
 }
 
@@ -67,7 +67,7 @@ pub fn refuse_impossible(model: &Model) -> Result<(), Failure> {
     if model.may_release {
         return Ok(());
     }
-    Err(Failure::unsearched(FailureKind::Impossible, never_released(model), MORE_FINGERS))
+    Err(Failure::bare(FailureKind::Impossible, never_released(model), MORE_FINGERS))
 }
 
 /// Refuses hands that cannot hold an object even with all fingers.
@@ -81,7 +81,7 @@ fn refuse_holding_nothing(model: &Model) -> Result<(), Failure> {
         fingers_in_words(model),
         model.frame.friction
     );
-    Err(Failure::unsearched(FailureKind::Impossible, message, MORE_FINGERS))
+    Err(Failure::bare(FailureKind::Impossible, message, MORE_FINGERS))
 }
 
 const MORE_FINGERS: &str =

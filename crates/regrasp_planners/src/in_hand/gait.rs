@@ -13,7 +13,7 @@ use regrasp_base::Rng;
 use regrasp_geometry::Pose;
 
 /// Nodes at a common pose whose grasps are tried to be joined: any at first, in hard queries those most like the grasp that
-/// is to be joined. By measurement, 20 seeds: that takes a tenth to a third off allegro/box_x, cube45_x and cylinder20_x.
+/// is to be joined. By measurement, 20 seeds: that takes a fifth off the work of allegro/cube45_x, a twentieth off box_x.
 const JOINS: usize = 4;
 
 /// Nodes before which no extension wanders: easy queries are solved by then.

@@ -2,7 +2,7 @@
 
 use super::legs::Solution;
 use super::model::Model;
-use super::state::{GraspState, Motion, Sequence, no_contact};
+use super::state::{GraspState, Moment, Motion, Sequence, no_contact};
 use super::workspace::Contacts;
 use regrasp_geometry::Pose;
 use regrasp_grasp::Contact;
@@ -66,18 +66,21 @@ impl<'m, 'a> Recorder<'m, 'a> {
     pub fn sequence(&mut self, way: &Sequence) {
         for step in way.steps() {
             match step.motion() {
-                Motion::Transfer(moments) => {
-                    self.begin_transfer(moments.len());
-                    for moment in moments {
-                        self.moment(&moment.world_from_object, moment.joints.iter().flatten().copied());
-                    }
-                }
+                Motion::Transfer(moments) => self.transfer(moments),
                 Motion::Regrasp { finger, path } => {
                     self.begin_regrasp(*finger, step.end().contact(*finger).as_ref(), path.len());
                     path.iter().for_each(|joints| self.finger_at(*finger, joints.iter().copied()));
                     self.end_regrasp();
                 }
             }
+        }
+    }
+
+    /// Writes down a transfer.
+    pub fn transfer(&mut self, moments: &[Moment]) {
+        self.begin_transfer(moments.len());
+        for moment in moments {
+            self.moment(&moment.world_from_object, moment.joints.iter().flatten().copied());
         }
     }
 

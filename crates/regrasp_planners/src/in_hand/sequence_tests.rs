@@ -1,10 +1,17 @@
 //! Sequences of motions meet exactly, and what arrives somewhere arrives exactly there.
 
+use super::candidates::Candidate;
+use super::combine::{ClosureTable, releasable};
 use super::explore::{draw_state, draw_state_at};
+use super::grasps::choose_grasp;
 use super::pool::Pool;
-use super::roadmap_tests::with_search;
+use super::roadmap_tests::{with_search, with_settings};
+use super::search::Search;
+use super::settings::InHandSettings;
 use super::shorten::{Arrival, change_grasp, change_grasp_over, regrasp_transfer, shorten, transfer_regrasp};
 use super::state::{GraspState, Moment, Motion, Sequence};
+use super::tally::Tally;
+use super::unlock::{draw_bound_finger, unlock};
 use regrasp_base::Rng;
 
 /// `state` with one finger in another posture at the same contact: a little off, as redundant fingers come back to a pose.
@@ -157,5 +164,68 @@ fn a_third_grasp_leads_from_one_to_another_where_none_does_directly() {
             }
         }
         assert!(n_direct >= 5 && n_over >= 5, "too little was tried: {n_direct} directly, {n_over} over others");
+    });
+}
+
+/// A grasp at the start that lets some fingers go, but not all, and which.
+fn draw_partly_bound(search: &mut Search) -> Option<(GraspState, u32)> {
+    let pose = search.start;
+    let mut pool = Pool::new(&pose, &search.goal, search.model().n_fingers());
+    let options: Vec<Vec<Candidate>> =
+        (0..search.model().n_fingers()).map(|finger| pool.any(search, finger, 1)).collect();
+    if options.iter().any(Vec::is_empty) {
+        return None;
+    }
+    let state = choose_grasp(search, &pose, &options)?;
+    let released = releasable(search.model(), &state.contacts, state.holding);
+    (released != state.holding).then_some((state, released))
+}
+
+#[test]
+fn a_bound_finger_is_moved_last_and_only_where_the_others_hold() {
+    with_settings("box_90x.toml", &InHandSettings::default(), |search| {
+        let (mut n_alone, mut n_prepared) = (0, 0);
+        for round in 0..400 {
+            let Some((from, _)) = draw_partly_bound(search) else { continue };
+            let finger = round % search.model().n_fingers();
+            let mut pool = Pool::new(&from.world_from_object, &search.goal, search.model().n_fingers());
+            let Some(way) = unlock(search, &from, finger, &mut pool) else { continue };
+            assert!(*way.start() == from);
+            for (index, step) in way.steps().iter().enumerate() {
+                let Motion::Regrasp { finger: moved, .. } = step.motion() else { panic!("the object moves") };
+                assert_eq!(*moved == finger, index + 1 == way.steps().len(), "it moves once, at the end");
+                let (before, model) = (way.state_before(index), search.model());
+                let others = before.holding & !(1 << moved);
+                assert!(model.closure_margin(&before.contacts, others) >= model.settings.closure_margin);
+            }
+            assert!(way.end().contact(finger) != from.contact(finger));
+            n_alone += u32::from(way.steps().len() == 1);
+            n_prepared += u32::from(way.steps().len() > 1);
+        }
+        assert!(n_alone >= 5 && n_prepared >= 5, "too little was tried: {n_alone} at once, {n_prepared} after others");
+    });
+}
+
+#[test]
+fn a_finger_is_bound_only_once_enough_grasps_were_seen_that_do_not_let_it_go() {
+    with_settings("box_90x.toml", &InHandSettings::default(), |search| {
+        let model = search.model();
+        let drawn = (0..500).find_map(|_| draw_partly_bound(search));
+        let (state, released) = drawn.expect("a grasp that lets only some fingers go");
+        let options: Vec<Vec<Candidate>> =
+            (0..model.n_fingers()).map(|finger| vec![Candidate::present(&state, finger)]).collect();
+        let mut table = ClosureTable::new(model, &options);
+        table.n_releasable(&options.iter().map(|_| 0).collect());
+        // Drawing takes note as well.
+        search.tally = Tally::default();
+        for _ in 0..99 {
+            search.tally.note_releases(&table, &state.world_from_object);
+        }
+        assert!((0..200).all(|_| draw_bound_finger(search).is_none()), "too few were seen");
+        search.tally.note_releases(&table, &state.world_from_object);
+        let drawn: Vec<Option<usize>> = (0..200).map(|_| draw_bound_finger(search)).collect();
+        let fingers = drawn.iter().flatten().fold(0, |bits, finger| bits | 1 << finger);
+        assert_eq!(fingers, state.holding & !released, "those that are bound, and no other");
+        assert!(drawn.iter().any(Option::is_none), "other extensions go on");
     });
 }

@@ -232,7 +232,7 @@ fn change(
         let moves = contact != to.contact(finger) || (is_exact && own != to.joints[finger]);
         let mut of_finger = vec![Candidate { contact, joints: own, follow: 1.0 }];
         if moves {
-            of_finger.push(Candidate { contact: to.contact(finger), joints: to.joints[finger].clone(), follow: 1.0 });
+            of_finger.push(Candidate::present(to, finger));
         }
         goal.push(usize::from(moves));
         options.push(of_finger);

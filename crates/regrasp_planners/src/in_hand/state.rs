@@ -161,7 +161,7 @@ impl Sequence {
     }
 
     /// As [`Sequence::push_transfer`], but a transfer that is the last motion goes on.
-    pub fn go_on(&mut self, moments: impl IntoIterator<Item = Moment>) {
+    fn go_on(&mut self, moments: impl IntoIterator<Item = Moment>) {
         let Some(Step { motion: Motion::Transfer(before), end }) = self.steps.last_mut() else {
             return self.push_transfer(moments.into_iter().collect());
         };

@@ -318,9 +318,8 @@ pub fn land(search: &mut Search, tree: &mut Tree, way: Sequence) -> Option<Seque
     }
     let mut options = Vec::with_capacity(model.n_fingers());
     for finger in 0..model.n_fingers() {
-        let (contact, joints) = (state.contact(finger), state.joints[finger].clone());
-        let mut of_finger = vec![Candidate { contact, joints, follow: 1.0 }];
-        if contact.is_none() {
+        let mut of_finger = vec![Candidate::present(&state, finger)];
+        if !state.holds(finger) {
             of_finger.extend(tree.places[0].pool.towards_aim(search, finger, model.settings.candidates_kept));
         }
         options.push(of_finger);

@@ -117,7 +117,7 @@ pub fn build_roadmap(
     let graph = largest_component(&builder.registry.into_graph());
     if graph.edges.is_empty() {
         let message = "no grasp that could be changed was found at any pose of the region".to_owned();
-        return Err(Failure::unsearched(FailureKind::WorkSpent, message, "choose a region within the fingers' reach"));
+        return Err(Failure::bare(FailureKind::WorkSpent, message, "choose a region within the fingers' reach"));
     }
     Ok(GraspRoadmap::new(about, graph))
 }
@@ -177,7 +177,7 @@ impl<'b> Builder<'b> {
     ) -> Result<Self, Failure> {
         let threads =
             rayon::ThreadPoolBuilder::new().num_threads(model.settings.n_threads).build().map_err(|error| {
-                Failure::unsearched(
+                Failure::bare(
                     FailureKind::Impossible,
                     format!("no threads to work with: {error}"),
                     "ask for fewer threads",
@@ -422,7 +422,7 @@ impl AtPlace<'_> {
 
 fn stopped(stop: &Stop) -> Failure {
     let advice = "allow more work or time, or ask for fewer places";
-    Failure::unsearched(stop.kind(), "the roadmap was not finished".into(), advice)
+    Failure::bare(stop.kind(), "the roadmap was not finished".into(), advice)
 }
 
 /// A sequence as the graph keeps it; `place_of` says which place a transfer leads to.

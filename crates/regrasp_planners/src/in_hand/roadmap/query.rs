@@ -232,7 +232,6 @@ impl<'a> RoadmapPlanner<'a> {
             out.extend(goal.anchors.iter().filter(|anchor| anchor.node == node).map(|anchor| (to, anchor.cost)));
         };
         let bounds = self.bounds_to(goal);
-
         let bound = |node: usize| if node < from { GREED * roadmap.landmarks.bound(node, &bounds) } else { 0.0 };
         let path = a_star.cheapest_path(from, |node| node == to, neighbours, bound)?.nodes;
         Some(path[1..path.len() - 1].to_vec())
@@ -347,5 +346,5 @@ fn refuse_way_poses(query: &InHandQuery) -> Result<(), Failure> {
     }
     let message = format!("the query has {n_way_poses} way poses; a roadmap answers queries from one pose to another");
     let advice = "ask leg by leg, each from the grasp in which the one before ends, or use regrasp plan";
-    Err(Failure::unsearched(FailureKind::WayInvalid, message, advice))
+    Err(Failure::bare(FailureKind::WayInvalid, message, advice))
 }

@@ -101,12 +101,7 @@ impl<'g> Passing<'g> {
                 let at_end = (0..graph.n_fingers()).flat_map(|finger| graph.joints_of(to, finger).iter().copied());
                 recorder.moment(graph.pose(to), at_end);
             }
-            Stored::Again(moments) => {
-                recorder.begin_transfer(moments.len());
-                for moment in moments {
-                    recorder.moment(&moment.world_from_object, moment.joints.iter().flatten().copied());
-                }
-            }
+            Stored::Again(moments) => recorder.transfer(moments),
             Stored::Relocation(finger, strand) => {
                 let stride = graph.footholds[*finger].n_coordinates;
                 let n = strand.len() / stride;
