@@ -1,7 +1,8 @@
 //! The plan and its parts. `docs/plan-format.md` and `schema/plan.schema.json` say the same.
 //!
 //! Between two waypoints every joint moves linearly and the object's pose as `interpolate_pose` says, both with the
-//! same parameter.
+//! same parameter, which is linear in time; contact forces change linearly too, in the object frame. Between two segments
+//! everything rests while forces change.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// Value of [`Plan::format`].
 pub const FORMAT: &str = "regrasp-plan";
 /// Value of [`Plan::format_version`] that this version writes.
-pub const FORMAT_VERSION: u32 = 1;
+pub const FORMAT_VERSION: u32 = 2;
 
 /// A pose on disk.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -70,14 +71,54 @@ pub struct ContactState {
     /// Outward normal of the object there, in the object frame; absent when the finger is free.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normal_in_object: Option<[f64; 3]>,
+    /// Force of the finger on the object, in newtons, in the object frame; absent when the finger is free, and in plans
+    /// without forces.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force_in_object: Option<[f64; 3]>,
+    /// Moment of the finger on the object about the outward normal, in newton metres; absent for point contacts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub torsion: Option<f64>,
+}
+
+impl ContactState {
+    /// The contact of a finger that does not touch the object.
+    pub const FREE: ContactState = ContactState {
+        mode: ContactMode::Free,
+        point_in_object: None,
+        normal_in_object: None,
+        force_in_object: None,
+        torsion: None,
+    };
+
+    /// A contact at a point with this outward normal, both in the object frame, without a force.
+    pub fn at(mode: ContactMode, point_in_object: [f64; 3], normal_in_object: [f64; 3]) -> Self {
+        ContactState {
+            mode,
+            point_in_object: Some(point_in_object),
+            normal_in_object: Some(normal_in_object),
+            ..ContactState::FREE
+        }
+    }
+
+    /// True when the finger holds the object, at a fixed contact or rolling.
+    pub fn holds(&self) -> bool {
+        self.mode != ContactMode::Free
+    }
 }
 
 /// The state of hand and object at one moment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Waypoint {
+    /// When, in seconds from the start.
+    pub time: f64,
     /// Positions of all joints, in the order of [`Plan::joint_names`], in radians or metres.
     pub joints: Vec<f64>,
+    /// Velocities of all joints, in radians or metres per second; zero at both ends of every segment.
+    pub joint_velocities: Vec<f64>,
+    /// Torques, or forces of sliding joints, with which the joints make the contact forces; empty in plans without forces.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub joint_torques: Vec<f64>,
     /// Pose of the object in the world.
     pub world_from_object: PoseData,
     /// One entry per finger, in the order of [`Plan::fingers`].
@@ -88,8 +129,8 @@ pub struct Waypoint {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SegmentKind {
-    /// The object moves; every finger holds one contact all along, or is free all along (paper 000, section 3.2: in GS_k
-    /// k fingers hold and the others are independent).
+    /// The object moves; every finger holds all along, at one contact or rolling, or is free all along (paper 000, section
+    /// 3.2: in GS_k k fingers hold and the others are independent; paper 004, section IV-C: rolling).
     Transfer,
     /// The object stays and one finger moves: to another contact, away from one to stay free, from free to a contact, or
     /// from one free posture to another. The others rest, those that hold and those that are free.
@@ -105,7 +146,8 @@ pub struct Segment {
     /// The finger that moves, in a regrasp.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moving_finger: Option<String>,
-    /// At least two; the first is the last of the segment before.
+    /// At least two; the first is the last of the segment before, but for time and forces: the finger that is about to lift
+    /// has none left, one that has landed none yet.
     pub waypoints: Vec<Waypoint>,
 }
 
@@ -127,14 +169,55 @@ pub struct WayPose {
 pub struct Promises {
     /// Largest distance of a holding fingertip from its contact at and between waypoints, in metres.
     pub contact_tolerance: f64,
-    /// Friction coefficient used for closure.
+    /// Friction coefficient that closure and forces count on: the scene's over `friction_margin`.
     pub friction: f64,
+    /// What the scene's friction coefficient was divided by; at least 1.
+    pub friction_margin: f64,
     /// Closure margin that every holding set keeps (see `regrasp_grasp::margin`); dimensionless.
     pub required_margin: f64,
     /// Smallest margin that the planner found along the plan: a lower bound of the Ferrari-Canny radius.
     pub kept_margin: f64,
     /// Length by which torques are divided in the margin, in metres.
     pub torque_scale: f64,
+    /// How far a rolling fingertip slips at most over the object in one segment, in metres.
+    pub slip_tolerance: f64,
+    /// Limits of the motion in time.
+    pub motion: MotionLimits,
+    /// What the contact forces balance, and their limits; absent in plans without forces.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub forces: Option<ForcePromises>,
+}
+
+/// Limits of the motion in time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MotionLimits {
+    /// Largest speed of a fingertip's centre, or of a point of the object no farther from its centre of mass than
+    /// `torque_scale`, between two waypoints on average, in metres per second: slow enough to be quasi-static.
+    pub largest_speed: f64,
+    /// Largest velocity of each joint, in radians or metres per second: the robot's, or what the settings say where it has
+    /// none.
+    pub joint_velocities: Vec<f64>,
+    /// Largest acceleration of each joint, as differences of velocities between waypoints, in radians or metres per second
+    /// squared.
+    pub joint_accelerations: Vec<f64>,
+}
+
+/// What the contact forces balance, and their limits.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ForcePromises {
+    /// Mass of the object, in kilograms.
+    pub mass: f64,
+    /// Gravity in the world, in metres per second squared; absent when the grasp holds whatever its direction: forces then
+    /// balance no weight, and leave room for that of every direction (`docs/plan-format.md`, forces).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gravity_in_world: Option<[f64; 3]>,
+    /// Least and largest normal force of a finger that holds, in newtons.
+    pub normal_force: [f64; 2],
+    /// Largest torque of each joint, in newton metres or newtons: the share of the robot's effort limit that the settings
+    /// allow; absent for joints without a limit.
+    pub joint_torques: Vec<Option<f64>>,
 }
 
 /// Counts of the search.

@@ -337,7 +337,7 @@ impl Breeder<'_> {
             let (s, w) = pick_waypoint(plan, rng, SegmentKind::Transfer)?;
             let mut held: Vec<_> = plan.segments[s].waypoints[w].contacts.iter_mut().collect();
             held.retain(|contact| contact.mode == ContactMode::Fixed);
-            **pick(&mut held, rng)? = free();
+            **pick(&mut held, rng)? = ContactState::FREE;
             Some(())
         });
         self.add("contact rolls", &[ModeNotSupported], |plan, rng| {
@@ -362,7 +362,7 @@ impl Breeder<'_> {
             let (s, w) = pick_waypoint(plan, rng, SegmentKind::Regrasp)?;
             let mut held = plan.segments[s].waypoints[w].contacts.iter_mut().collect::<Vec<_>>();
             held.retain(|contact| contact.mode == ContactMode::Fixed);
-            **pick(&mut held, rng)? = free();
+            **pick(&mut held, rng)? = ContactState::FREE;
             Some(())
         });
         self.add("moving finger lands early", &[WrongContactMode], |plan, rng| {
@@ -407,7 +407,7 @@ impl Breeder<'_> {
             let mut waypoints = vec![first.clone()];
             for k in 1..n_steps {
                 let mut waypoint = waypoints.last()?.clone();
-                waypoint.contacts[f] = free();
+                waypoint.contacts[f] = ContactState::FREE;
                 move_tip(model, f, &mut waypoint.joints, &(a + (b - a) * (k as f64 / n_steps as f64)))?;
                 waypoints.push(waypoint);
             }
@@ -438,10 +438,6 @@ impl Breeder<'_> {
             move_tip(model, f, &mut waypoint.joints, &(target + (here - target).normalize() * reach))
         });
     }
-}
-
-fn free() -> ContactState {
-    ContactState { mode: ContactMode::Free, point_in_object: None, normal_in_object: None }
 }
 
 fn pick<'a, T>(items: &'a mut [T], rng: &mut Rng) -> Option<&'a mut T> {
@@ -581,7 +577,7 @@ fn push_free_tip(plan: &mut Plan, model: &Model, rng: &mut Rng, target: impl Fn(
         side: object * side.into_inner(),
     };
     let mut waypoint = end.clone();
-    waypoint.contacts[f] = free();
+    waypoint.contacts[f] = ContactState::FREE;
     move_tip(model, f, &mut waypoint.joints, &target(&ours))?;
     let place = if at_end { segment.waypoints.len() - 1 } else { 1 };
     segment.waypoints.insert(place, waypoint);

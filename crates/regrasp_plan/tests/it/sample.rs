@@ -4,7 +4,7 @@
 use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Point, Pose, Shape, Vector};
-use regrasp_plan::plan::{FORMAT, FORMAT_VERSION, PlanInput, PoseData, Promises, Statistics, WayPose};
+use regrasp_plan::plan::{FORMAT, FORMAT_VERSION, MotionLimits, PlanInput, PoseData, Promises, Statistics, WayPose};
 use regrasp_plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
 use regrasp_robot::hand::PalmShape;
 use regrasp_robot::{
@@ -209,15 +209,18 @@ fn waypoint(hand_from_object: &Pose, grasp: &Grasp, lifted: Option<(usize, Vecto
         let center = free.map_or(direction * (OBJECT_RADIUS + TIP_RADIUS), |(_, center)| center);
         joints.extend(finger_joints(f, &(hand_from_object * Point::from(center))));
         contacts.push(match free {
-            Some(_) => ContactState { mode: ContactMode::Free, point_in_object: None, normal_in_object: None },
-            None => ContactState {
-                mode: ContactMode::Fixed,
-                point_in_object: Some((direction * OBJECT_RADIUS).into()),
-                normal_in_object: Some(direction.into()),
-            },
+            Some(_) => ContactState::FREE,
+            None => ContactState::at(ContactMode::Fixed, (direction * OBJECT_RADIUS).into(), direction.into()),
         });
     }
-    Waypoint { joints, world_from_object: PoseData::from(&(world_from_hand() * hand_from_object)), contacts }
+    Waypoint {
+        time: 0.0,
+        joint_velocities: vec![0.0; joints.len()],
+        joint_torques: Vec::new(),
+        joints,
+        world_from_object: PoseData::from(&(world_from_hand() * hand_from_object)),
+        contacts,
+    }
 }
 
 fn transfer(from: &Pose, turn: &Vector, shift: &Vector, grasp: &Grasp, n_steps: usize) -> (Segment, Pose) {
@@ -297,6 +300,14 @@ fn plan_of(scene: &Scene, start: &Pose, goal: &Pose, segments: Vec<Segment>) -> 
             required_margin: 0.005,
             kept_margin: 0.005,
             torque_scale: OBJECT_RADIUS,
+            friction_margin: 1.0,
+            slip_tolerance: 1e-4,
+            motion: MotionLimits {
+                largest_speed: 0.04,
+                joint_velocities: vec![2.0; joint_names.len()],
+                joint_accelerations: vec![20.0; joint_names.len()],
+            },
+            forces: None,
         },
         joint_names,
         fingers: (0..N_FINGERS).map(|f| format!("f{f}")).collect(),
@@ -306,6 +317,11 @@ fn plan_of(scene: &Scene, start: &Pose, goal: &Pose, segments: Vec<Segment>) -> 
         segments,
         statistics: Statistics::default(),
     };
+    let mut now = 0.0;
+    for waypoint in plan.segments.iter_mut().flat_map(|segment| &mut segment.waypoints) {
+        waypoint.time = now;
+        now += 0.2;
+    }
     plan.statistics.transfers = 2;
     plan.statistics.relocations = 2;
     plan

@@ -61,6 +61,8 @@ mod shorten;
 mod state;
 /// Why attempts failed.
 mod tally;
+/// Times of waypoints.
+mod timing;
 /// Transfer paths.
 mod transfer;
 /// A tree of grasps that grows by gaits.

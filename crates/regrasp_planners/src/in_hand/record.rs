@@ -3,6 +3,7 @@
 use super::legs::Solution;
 use super::model::Model;
 use super::state::{GraspState, Moment, Motion, Sequence, no_contact};
+use super::timing;
 use super::workspace::Contacts;
 use regrasp_geometry::Pose;
 use regrasp_grasp::Contact;
@@ -14,6 +15,8 @@ use regrasp_scene::InHandQuery;
 
 /// Largest distance of a holding fingertip from its contact that plans promise, in metres (issue: at most 0.5 mm).
 pub const CONTACT_TOLERANCE: f64 = 0.0005;
+/// Largest slip of a rolling fingertip in a segment that plans promise, in metres (issue: 0.1 mm).
+pub const SLIP_TOLERANCE: f64 = 0.0001;
 
 /// Makes the plan of `solution`.
 pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution, statistics: Statistics) -> Plan {
@@ -44,6 +47,9 @@ impl<'m, 'a> Recorder<'m, 'a> {
     /// Begins at a state; with `joins` transfers in a row become one.
     pub fn at(model: &'m Model<'a>, start: &GraspState, joins: bool) -> Self {
         let here = Waypoint {
+            time: 0.0,
+            joint_velocities: vec![0.0; model.scene.hand.n_joints()],
+            joint_torques: Vec::new(),
             joints: start.joints.iter().flatten().copied().collect(),
             world_from_object: PoseData::from(&start.world_from_object),
             contacts: contact_states(&start.contacts, start.holding),
@@ -166,6 +172,7 @@ impl<'m, 'a> Recorder<'m, 'a> {
             ..statistics
         };
         let (model, scene) = (self.model, self.model.scene);
+        timing::assign_times(&mut self.segments);
         Plan {
             format: FORMAT.into(),
             format_version: FORMAT_VERSION,
@@ -188,6 +195,10 @@ impl<'m, 'a> Recorder<'m, 'a> {
                 required_margin: model.settings.closure_margin,
                 kept_margin: self.kept_margin,
                 torque_scale: model.frame.torque_scale,
+                friction_margin: 1.0,
+                slip_tolerance: SLIP_TOLERANCE,
+                motion: timing::limits(model),
+                forces: None,
             },
             joint_names: scene.hand.joint_names(),
             fingers: scene.hand.fingers.iter().map(|finger| finger.name.clone()).collect(),
@@ -229,13 +240,13 @@ fn way_poses(query: &InHandQuery, segments: &[Segment], steps_to_way: &[usize]) 
 fn contact_states(contacts: &Contacts, holding: u32) -> Vec<ContactState> {
     let state = |(finger, contact): (usize, &Contact)| {
         if holding & (1 << finger) == 0 {
-            ContactState { mode: ContactMode::Free, point_in_object: None, normal_in_object: None }
+            ContactState::FREE
         } else {
-            ContactState {
-                mode: ContactMode::Fixed,
-                point_in_object: Some(contact.point_in_object.coords.into()),
-                normal_in_object: Some(contact.normal_in_object.into_inner().into()),
-            }
+            ContactState::at(
+                ContactMode::Fixed,
+                contact.point_in_object.coords.into(),
+                contact.normal_in_object.into_inner().into(),
+            )
         }
     };
     contacts.iter().enumerate().map(state).collect()

@@ -1,6 +1,6 @@
 //! Fingers that are free, and fingers that are said to be.
 
-use super::{Breeder, free, move_tip, pick, pick_waypoint};
+use super::{Breeder, move_tip, pick, pick_waypoint};
 use crate::check::closure::{Body, margin};
 use crate::check::continuity::{contact_of, is_free_throughout};
 use crate::check::model::Model;
@@ -64,11 +64,7 @@ impl Breeder<'_> {
         self.add("finger declared holding that is away", &[ContactOffTip], |plan, rng| {
             let (s, f) = pick_free(plan, model, rng)?;
             let (foot, normal) = beneath(model, scene, &plan.segments[s].waypoints[0], f)?;
-            let contact = ContactState {
-                mode: ContactMode::Fixed,
-                point_in_object: Some(foot.into()),
-                normal_in_object: Some(normal.into()),
-            };
+            let contact = ContactState::at(ContactMode::Fixed, foot.into(), normal.into());
             plan.segments[s].waypoints.iter_mut().for_each(|waypoint| waypoint.contacts[f] = contact);
             Some(())
         });
@@ -76,11 +72,8 @@ impl Breeder<'_> {
             let (s, f) = pick_free(plan, model, rng)?;
             let w = 1 + rng.below(plan.segments[s].waypoints.len() - 1);
             let (foot, normal) = beneath(model, scene, &plan.segments[s].waypoints[w], f)?;
-            plan.segments[s].waypoints[w].contacts[f] = ContactState {
-                mode: ContactMode::Fixed,
-                point_in_object: Some(foot.into()),
-                normal_in_object: Some(normal.into()),
-            };
+            plan.segments[s].waypoints[w].contacts[f] =
+                ContactState::at(ContactMode::Fixed, foot.into(), normal.into());
             Some(())
         });
         self.add("free finger moves while another one relocates", &[WrongMovingFinger], |plan, rng| {
@@ -99,7 +92,10 @@ impl Breeder<'_> {
 
 /// Says at every waypoint that finger `f` is free.
 fn declare_free(plan: &mut Plan, f: usize) -> Option<()> {
-    plan.segments.iter_mut().flat_map(|segment| &mut segment.waypoints).for_each(|w| w.contacts[f] = free());
+    plan.segments
+        .iter_mut()
+        .flat_map(|segment| &mut segment.waypoints)
+        .for_each(|w| w.contacts[f] = ContactState::FREE);
     Some(())
 }
 
