@@ -6,6 +6,8 @@
 pub mod friction_cone;
 /// Frictionless point.
 pub mod frictionless;
+/// Balls that roll on surfaces.
+pub mod rolling;
 /// Soft finger with elliptic torsion.
 pub mod soft_finger;
 

@@ -2,6 +2,7 @@
 
 use super::model::Model;
 use super::relocate::{Foothold, lift_is_within_reach};
+use super::roll::RollStep;
 use super::state::GraspState;
 use super::transfer::ik_settings;
 use super::workspace::{TipMode, Workspace, tip_target};
@@ -39,6 +40,7 @@ impl Candidate {
 /// The way of the object that is looked ahead along.
 #[derive(Debug, Clone)]
 pub struct Way {
+    from: Placement,
     moments: Vec<(Pose, Placement)>,
 }
 
@@ -51,7 +53,7 @@ impl Way {
                 (pose, Placement::from(&pose))
             })
             .collect();
-        Way { moments }
+        Way { from: Placement::from(from), moments }
     }
 }
 
@@ -105,7 +107,7 @@ pub fn reach(
     workspace.finger_alone_is_clear(finger, mode).then_some(joints)
 }
 
-/// Share of the way along which `finger` can keep `contact`, looked at alone and only now and then.
+/// Share of the way, from its beginning, along which `finger` can keep `contact` or roll from it, looked at alone and only now and then.
 pub fn follow_share(
     workspace: &mut Workspace,
     finger: usize,
@@ -114,15 +116,27 @@ pub fn follow_share(
     way: &Way,
 ) -> f64 {
     let model = workspace.model;
-    let mut current = joints.clone();
+    let (mut current, mut contact, mut from) = (joints.clone(), *contact, &way.from);
     let mut n_followed = 0;
     for (pose, world_from_object) in &way.moments {
-        let normal = world_from_object.vector(&contact.normal_in_object);
         // Moments are far apart; what matters here is reach, not continuity, so the step may be larger.
-        let settings =
-            IkSettings { max_step: LOOK_AHEAD_STEP, ..ik_settings(model, finger, UnitVector::new_unchecked(normal)) };
-        let target = tip_target(world_from_object, contact, model.fingers[finger].tip_radius);
-        let Some(next) = model.fingers[finger].ik.solve_near(&target, &current, &settings) else { break };
+        let next = if model.rolls(finger) {
+            let step = RollStep::new(model, finger, &contact, &current, from, world_from_object);
+            let Some(rolled) = step.coarse(LOOK_AHEAD_STEP) else { break };
+            if !rolled.keeps_off_edges(model) {
+                break;
+            }
+            contact = rolled.contact;
+            rolled.joints
+        } else {
+            let normal = UnitVector::new_unchecked(world_from_object.vector(&contact.normal_in_object));
+            let settings = IkSettings { max_step: LOOK_AHEAD_STEP, ..ik_settings(model, finger, normal) };
+            let target = tip_target(world_from_object, &contact, model.fingers[finger].tip_radius);
+            let Some(next) = model.fingers[finger].ik.solve_near(&target, &current, &settings) else { break };
+            next
+        };
+        from = world_from_object;
+        let normal = world_from_object.vector(&contact.normal_in_object);
         workspace.place_object_and_finger(pose, finger, &next);
         if !workspace.finger_alone_is_clear(finger, TipMode::Near { finger, normal_in_world: normal }) {
             break;

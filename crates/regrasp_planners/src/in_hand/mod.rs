@@ -49,6 +49,8 @@ mod relocate;
 pub mod roadmap;
 #[cfg(test)]
 mod roadmap_tests;
+/// Fingertips that roll.
+mod roll;
 /// What all methods share.
 mod search;
 #[cfg(test)]
@@ -76,7 +78,7 @@ mod visibility;
 /// Configurations and continuous collision tests.
 mod workspace;
 
-pub use settings::{Alpha, CostWeights, InHandSettings, Method, ReleaseRule};
+pub use settings::{Alpha, CostWeights, InHandSettings, Method, ReleaseRule, TransferMode};
 pub use validate::{NotProven, validate_once};
 
 use crate::failure::Failure;

@@ -12,7 +12,7 @@ use regrasp_robot::kinematics::motion_bound::MotionBound;
 use regrasp_scene::Scene;
 use std::sync::Arc;
 
-use super::settings::InHandSettings;
+use super::settings::{InHandSettings, TransferMode};
 
 /// Most fingers a hand may have.
 pub const MAX_FINGERS: usize = 6;
@@ -232,7 +232,7 @@ impl<'a> Model<'a> {
         let others_may_hold = |away: usize| {
             let others: Vec<ContactModel> =
                 (0..fingers.len()).filter(|&f| f != away).map(|f| fingers[f].contact).collect();
-            closure::may_close(&others, scene.object.friction)
+            closure::may_close(&others, scene.object.friction / settings.friction_margin)
         };
         let may_release = (0..fingers.len()).any(others_may_hold);
         Model {
@@ -246,7 +246,7 @@ impl<'a> Model<'a> {
             frame: GraspFrame {
                 center_of_mass: scene.object.center_of_mass,
                 torque_scale: scene.object.radius,
-                friction: scene.object.friction,
+                friction: scene.object.friction / settings.friction_margin,
             },
             object_reach: bodies[object].center.coords.norm() + bodies[object].radius,
             radii: bodies.iter().map(|body| body.radius).collect(),
@@ -274,6 +274,18 @@ impl<'a> Model<'a> {
     /// Number of fingers.
     pub fn n_fingers(&self) -> usize {
         self.fingers.len()
+    }
+
+    /// True when `finger` rolls over the object while it moves; a sharp tip has nothing to roll on.
+    #[inline]
+    pub fn rolls(&self, finger: usize) -> bool {
+        self.settings.transfer == TransferMode::Rolling && self.fingers[finger].tip_radius > 0.0
+    }
+
+    /// True when some finger rolls: contacts then travel while the object moves.
+    #[inline]
+    pub fn any_rolls(&self) -> bool {
+        (0..self.n_fingers()).any(|finger| self.rolls(finger))
     }
 
     /// Contact of `finger` with what its tip transmits.

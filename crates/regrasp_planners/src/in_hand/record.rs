@@ -52,7 +52,7 @@ impl<'m, 'a> Recorder<'m, 'a> {
             joint_torques: Vec::new(),
             joints: start.joints.iter().flatten().copied().collect(),
             world_from_object: PoseData::from(&start.world_from_object),
-            contacts: contact_states(&start.contacts, start.holding),
+            contacts: resting(&start.contacts, start.holding),
         };
         Recorder {
             model,
@@ -86,6 +86,11 @@ impl<'m, 'a> Recorder<'m, 'a> {
     pub fn transfer(&mut self, moments: &[Moment]) {
         self.begin_transfer(moments.len());
         for moment in moments {
+            if self.model.any_rolls() {
+                self.contacts.clone_from(&moment.contacts);
+                self.keep(self.holding);
+                self.here.contacts = moving(self.model, &self.contacts, self.holding);
+            }
             self.moment(&moment.world_from_object, moment.joints.iter().flatten().copied());
         }
     }
@@ -100,6 +105,7 @@ impl<'m, 'a> Recorder<'m, 'a> {
         self.keep(self.holding);
         self.transfers += 1;
         self.transfers_with_free_fingers += u64::from(self.holding != self.model.all_fingers());
+        self.here.contacts = moving(self.model, &self.contacts, self.holding);
         self.begin(SegmentKind::Transfer, None, n);
     }
 
@@ -117,10 +123,11 @@ impl<'m, 'a> Recorder<'m, 'a> {
         self.keep(others);
         self.relocations += u64::from(contact.is_some());
         let name = self.model.scene.hand.fingers[finger].name.clone();
+        self.here.contacts = resting(&self.contacts, self.holding);
         self.begin(SegmentKind::Regrasp, Some(name), n);
         self.contacts[finger] = contact.copied().unwrap_or_else(no_contact);
         self.holding = others | contact.map_or(0, |_| 1 << finger);
-        self.here.contacts = contact_states(&self.contacts, others);
+        self.here.contacts = resting(&self.contacts, others);
     }
 
     /// Joints of the finger that moves, the last ones being at its contact.
@@ -132,7 +139,7 @@ impl<'m, 'a> Recorder<'m, 'a> {
 
     /// The finger has arrived.
     pub fn end_regrasp(&mut self) {
-        self.here.contacts = contact_states(&self.contacts, self.holding);
+        self.here.contacts = resting(&self.contacts, self.holding);
         let contacts = self.here.contacts.clone();
         if let Some(last) = self.waypoints().last_mut() {
             last.contacts = contacts;
@@ -195,7 +202,7 @@ impl<'m, 'a> Recorder<'m, 'a> {
                 required_margin: model.settings.closure_margin,
                 kept_margin: self.kept_margin,
                 torque_scale: model.frame.torque_scale,
-                friction_margin: 1.0,
+                friction_margin: model.settings.friction_margin,
                 slip_tolerance: SLIP_TOLERANCE,
                 motion: timing::limits(model),
                 forces: None,
@@ -217,7 +224,13 @@ pub fn kept_margin(model: &Model, way: &Sequence) -> f64 {
     for (index, step) in way.steps().iter().enumerate() {
         let before = way.state_before(index);
         let holding = match step.motion() {
-            Motion::Transfer(_) => before.holding,
+            Motion::Transfer(moments) => {
+                if model.any_rolls() {
+                    let margins = moments.iter().map(|moment| model.closure_margin(&moment.contacts, before.holding));
+                    kept = margins.fold(kept, f64::min);
+                }
+                before.holding
+            }
             Motion::Regrasp { finger, .. } => before.holding & !(1 << finger),
         };
         kept = kept.min(model.closure_margin(&before.contacts, holding));
@@ -237,17 +250,26 @@ fn way_poses(query: &InHandQuery, segments: &[Segment], steps_to_way: &[usize]) 
         .collect()
 }
 
-fn contact_states(contacts: &Contacts, holding: u32) -> Vec<ContactState> {
+/// Contacts while the object stands still.
+fn resting(contacts: &Contacts, holding: u32) -> Vec<ContactState> {
+    contact_states(contacts, holding, |_| ContactMode::Fixed)
+}
+
+/// Contacts while the object moves.
+fn moving(model: &Model, contacts: &Contacts, holding: u32) -> Vec<ContactState> {
+    contact_states(contacts, holding, |finger| match model.rolls(finger) {
+        true => ContactMode::Rolling,
+        false => ContactMode::Fixed,
+    })
+}
+
+fn contact_states(contacts: &Contacts, holding: u32, mode: impl Fn(usize) -> ContactMode) -> Vec<ContactState> {
     let state = |(finger, contact): (usize, &Contact)| {
         if holding & (1 << finger) == 0 {
-            ContactState::FREE
-        } else {
-            ContactState::at(
-                ContactMode::Fixed,
-                contact.point_in_object.coords.into(),
-                contact.normal_in_object.into_inner().into(),
-            )
+            return ContactState::FREE;
         }
+        let (point, normal) = (contact.point_in_object.coords, contact.normal_in_object.into_inner());
+        ContactState::at(mode(finger), point.into(), normal.into())
     };
     contacts.iter().enumerate().map(state).collect()
 }

@@ -28,7 +28,7 @@ fn other_postures(state: &GraspState) -> Vec<GraspState> {
 }
 
 fn wait_at(state: &GraspState) -> Moment {
-    Moment { world_from_object: state.world_from_object, joints: state.joints.clone() }
+    state.moment()
 }
 
 #[test]
@@ -109,7 +109,7 @@ fn what_does_not_meet_is_not_joined() {
         let mut way = a_to_b.clone();
         way.push_transfer(vec![wait_at(&c)]);
         let mut detour = Sequence::at(a);
-        detour.push_transfer(vec![Moment { world_from_object: nearly.world_from_object, joints: nearly.joints }]);
+        detour.push_transfer(vec![nearly.moment()]);
         let before = way.clone();
         assert!(!way.replace(0..=0, detour.clone()) && way == before, "a detour to another end is refused");
         assert!(!way.replace(1..=1, detour.clone()) && way == before, "a detour from another start is refused");

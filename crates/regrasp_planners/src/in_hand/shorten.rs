@@ -137,6 +137,12 @@ pub fn regrasp_transfer(
         return None;
     }
     let model = search.model();
+    if model.any_rolls() {
+        // Where the contacts have to be before the object moves, only the way back says.
+        let back = whole_transfer(search, to, &from.world_from_object)?;
+        let change = change_grasp(search, &Sequence::at(from.clone()), back.end(), Arrival::Exact, rng)?;
+        return change.then(back.reversed());
+    }
     let before = Placement::from(&from.world_from_object);
     let mut joints = HandJoints::new();
     for finger in 0..model.n_fingers() {
@@ -186,7 +192,7 @@ fn settle(workspace: &mut Workspace, mut way: Sequence, wanted: &GraspState) -> 
     if !workspace.step(&world_from_object, &joints, TipMode::AllHold) {
         return None;
     }
-    moments.push(Moment { world_from_object, joints });
+    moments.push(Moment { world_from_object, joints, contacts: way.end().contacts.clone() });
     way.push_transfer(moments);
     Some(way)
 }

@@ -76,12 +76,25 @@ pub struct Moment {
     pub world_from_object: Pose,
     /// Joints.
     pub joints: HandJoints,
+    /// Contacts, which travel where fingertips roll.
+    pub contacts: Contacts,
+}
+
+impl GraspState {
+    /// This state as a moment of a transfer.
+    pub fn moment(&self) -> Moment {
+        Moment {
+            world_from_object: self.world_from_object,
+            joints: self.joints.clone(),
+            contacts: self.contacts.clone(),
+        }
+    }
 }
 
 /// A feasible elementary motion (paper 000, section 3.2).
 #[derive(Debug, Clone, PartialEq)]
 pub enum Motion {
-    /// The object moves, the grasp stays; fingers that are free may move. Moments after the start, the last one being the
+    /// The object moves, every finger keeps its contact or rolls; fingers that are free may move. Moments after the start, the last one being the
     /// end.
     Transfer(Vec<Moment>),
     /// One finger moves to another contact or posture. Its joints after the start, the last ones being there.
@@ -154,7 +167,7 @@ impl Sequence {
         let end = GraspState {
             world_from_object: last.world_from_object,
             holding: self.end().holding,
-            contacts: self.end().contacts.clone(),
+            contacts: last.contacts.clone(),
             joints: last.joints.clone(),
         };
         self.steps.push(Step { motion: Motion::Transfer(moments), end });
@@ -169,6 +182,7 @@ impl Sequence {
         if let Some(last) = before.last() {
             end.world_from_object = last.world_from_object;
             end.joints.clone_from(&last.joints);
+            end.contacts.clone_from(&last.contacts);
         }
     }
 
@@ -231,7 +245,7 @@ impl Sequence {
             let motion = match &self.steps[index].motion {
                 Motion::Transfer(moments) => {
                     let mut back: Vec<Moment> = moments[..moments.len() - 1].iter().rev().cloned().collect();
-                    back.push(Moment { world_from_object: before.world_from_object, joints: before.joints.clone() });
+                    back.push(before.moment());
                     Motion::Transfer(back)
                 }
                 Motion::Regrasp { finger, path } => {

@@ -1,7 +1,9 @@
-//! Transfer paths: the object moves, the contacts stay on it, the fingers follow (paper 000, section 4.2.3).
+//! Transfer paths: the object moves, the fingers follow, with contacts that stay on it (paper 000, section 4.2.3) or roll
+//! over it (paper 004, section IV-C).
 
 use super::model::Model;
 use super::record::CONTACT_TOLERANCE;
+use super::roll::{NoStep, RollStep};
 use super::state::{GraspState, Moment};
 use super::workspace::{HandJoints, TipMode, Workspace, tip_target};
 use regrasp_geometry::collision::Placement;
@@ -48,6 +50,7 @@ pub fn n_steps(model: &Model, from: &Pose, to: &Pose, step: f64) -> usize {
 pub fn transfer(workspace: &mut Workspace, start: &GraspState, goal: &Pose, moments: &mut Vec<Moment>) -> f64 {
     workspace.set_state(start);
     follow(workspace.model, start, goal, moments, |there| {
+        workspace.roll_to(&there.contacts);
         workspace.step(&there.world_from_object, &there.joints, TipMode::AllHold)
     })
 }
@@ -66,33 +69,20 @@ pub fn follow(
     let shortest = 1.0 / (steps << MAX_HALVINGS) as f64;
     let mut pending: Vec<f64> = (1..=steps).rev().map(|k| k as f64 / steps as f64).collect();
     let mut made = 0.0;
-    let first = Moment { world_from_object: start.world_from_object, joints: start.joints.clone() };
+    let first = start.moment();
     moments.reserve(steps);
     let n_before = moments.len();
     while let Some(t) = pending.pop() {
         let pose = if t == 1.0 { *goal } else { line.at(t) };
-        let world_from_object = Placement::from(&pose);
         let here = moments[n_before..].last().unwrap_or(&first);
-        let mut joints = HandJoints::new();
-        for finger in 0..model.n_fingers() {
-            if !start.holds(finger) {
-                // What is free stays where it is.
-                joints.push(here.joints[finger].clone());
+        let there = match step(model, start, here, &pose) {
+            Ok(there) => there,
+            Err(NoStep::TooLong) if t - made > shortest => {
+                pending.extend([t, 0.5 * (made + t)]);
                 continue;
             }
-            match follow_contact(model, finger, &start.contacts[finger], &world_from_object, &here.joints[finger]) {
-                Some(solution) => joints.push(solution),
-                None => return made,
-            }
-        }
-        let there = Moment { world_from_object: pose, joints };
-        if !tips_stay(model, start, here, &there) {
-            if t - made <= shortest {
-                return made;
-            }
-            pending.extend([t, 0.5 * (made + t)]);
-            continue;
-        }
+            Err(_) => return made,
+        };
         if !is_clear(&there) {
             return made;
         }
@@ -102,23 +92,45 @@ pub fn follow(
     1.0
 }
 
+/// One step of the object to `pose`, with fingers that follow; the ones that hold are closed there.
+fn step(model: &Model, start: &GraspState, here: &Moment, pose: &Pose) -> Result<Moment, NoStep> {
+    let (from, to) = (Placement::from(&here.world_from_object), Placement::from(pose));
+    let mut half: Option<Placement> = None;
+    let mut halfway =
+        || *half.get_or_insert_with(|| Placement::from(&interpolate_pose(&here.world_from_object, pose, 0.5)));
+    let mut joints = HandJoints::new();
+    let mut contacts = here.contacts.clone();
+    for finger in 0..model.n_fingers() {
+        let own = &here.joints[finger];
+        joints.push(if !start.holds(finger) {
+            // What is free stays where it is.
+            own.clone()
+        } else if model.rolls(finger) {
+            let rolled =
+                RollStep::new(model, finger, &contacts[finger], own, &from, &to).fine(&halfway(), HALFWAY_ALLOWED)?;
+            if !rolled.keeps_off_edges(model) {
+                return Err(NoStep::OutOfReach);
+            }
+            contacts[finger] = rolled.contact;
+            rolled.joints
+        } else {
+            let there = follow_contact(model, finger, &contacts[finger], &to, own).ok_or(NoStep::OutOfReach)?;
+            if !tip_stays(model, finger, &contacts[finger], own, &there, &mut halfway) {
+                return Err(NoStep::TooLong);
+            }
+            there
+        });
+    }
+    if model.any_rolls() && model.closure_margin(&contacts, start.holding) < model.settings.closure_margin {
+        return Err(NoStep::OutOfReach);
+    }
+    Ok(Moment { world_from_object: *pose, joints, contacts })
+}
+
 /// Most often that a step is halved because fingertips stray from their contacts on the way.
 const MAX_HALVINGS: usize = 4;
-/// Share of the contact tolerance that a tip may stray half-way; the rest is for what lies between.
-const HALFWAY_SHARE: f64 = 0.7;
-
-/// True when every tip that holds stays on its contact while the joints move linearly.
-fn tips_stay(model: &Model, state: &GraspState, from: &Moment, to: &Moment) -> bool {
-    let mut half: Option<Placement> = None;
-    let mut halfway = || {
-        *half.get_or_insert_with(|| {
-            Placement::from(&interpolate_pose(&from.world_from_object, &to.world_from_object, 0.5))
-        })
-    };
-    (0..model.n_fingers())
-        .filter(|&f| state.holds(f))
-        .all(|f| tip_stays(model, f, &state.contacts[f], &from.joints[f], &to.joints[f], &mut halfway))
-}
+/// How far a tip may stray from its contact half-way, in metres: a share of the tolerance; the rest is for what lies between.
+const HALFWAY_ALLOWED: f64 = 0.7 * CONTACT_TOLERANCE;
 
 /// True when the tip of `finger` stays on its contact while its joints move linearly: half-way, where it strays most.
 /// `halfway` places the object there.
@@ -130,14 +142,13 @@ pub fn tip_stays(
     to: &Coordinates,
     mut halfway: impl FnMut() -> Placement,
 ) -> bool {
-    let allowed = HALFWAY_SHARE * CONTACT_TOLERANCE;
     let finger = &model.fingers[finger];
     let change: Coordinates = from.iter().zip(to).map(|(a, b)| b - a).collect();
     // What the joints' bound proves needs no look; the object strays as little as the shortest step of a finger.
-    if finger.tip_bound.chord_deviation(&change) < 0.5 * allowed {
+    if finger.tip_bound.chord_deviation(&change) < 0.5 * HALFWAY_ALLOWED {
         return true;
     }
     let joints: Coordinates = from.iter().zip(&change).map(|(q, dq)| q + 0.5 * dq).collect();
     let target = tip_target(&halfway(), contact, finger.tip_radius);
-    (finger.ik.tip(&joints) - target).norm() <= allowed
+    (finger.ik.tip(&joints) - target).norm() <= HALFWAY_ALLOWED
 }

@@ -275,18 +275,17 @@ fn advance(search: &mut Search, tree: &mut Tree, parent: usize, target: &Pose, m
 /// Shortens a transfer that stopped at a limit or against something to where most fingers that may let go can be lifted.
 fn back_off(search: &mut Search, from: &GraspState, moments: &mut Vec<Moment>) {
     let n_fingers = search.model().n_fingers();
-    let releasable = releasable(search.model(), &from.contacts, from.holding);
-    let n_releasable = releasable.count_ones();
     let mut best: Option<(usize, u32)> = None;
     for back in BACK_OFFS {
         if back >= moments.len() {
             break;
         }
         let moment = &moments[moments.len() - 1 - back];
+        let releasable = releasable(search.model(), &moment.contacts, from.holding);
         let mut n_liftable = 0;
         for finger in (0..n_fingers).filter(|finger| releasable & (1 << finger) != 0) {
-            search.workspace.set_held(&moment.world_from_object, &moment.joints, &from.contacts, from.holding);
-            let contact = &from.contacts[finger];
+            search.workspace.set_held(&moment.world_from_object, &moment.joints, &moment.contacts, from.holding);
+            let contact = &moment.contacts[finger];
             let foothold = Foothold { contact: Some(contact), joints: &moment.joints[finger] };
             let can = can_lift(&mut search.workspace, &moment.world_from_object, finger, &foothold);
             n_liftable += u32::from(can);
@@ -294,7 +293,7 @@ fn back_off(search: &mut Search, from: &GraspState, moments: &mut Vec<Moment>) {
         if best.is_none_or(|(_, most)| n_liftable > most) {
             best = Some((back, n_liftable));
         }
-        if n_liftable == n_releasable {
+        if n_liftable == releasable.count_ones() {
             break;
         }
     }

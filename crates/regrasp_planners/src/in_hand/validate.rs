@@ -64,7 +64,7 @@ fn validate_segment(model: &Model, workspace: &mut Workspace, segment: &Segment)
     let holding = start.holding & !moving.map_or(0, |finger| 1 << finger);
     let margin = model.closure_margin(&start.contacts, holding);
     if margin < model.settings.closure_margin {
-        return Err((0, format!("closure margin {margin:.4} of {}", model.settings.closure_margin)));
+        return Err((0, not_closed(model, margin)));
     }
     let pose = start.world_from_object;
     workspace.set_state(&start);
@@ -72,6 +72,14 @@ fn validate_segment(model: &Model, workspace: &mut Workspace, segment: &Segment)
         (SegmentKind::Transfer, _) => {
             for (k, waypoint) in waypoints.iter().enumerate().skip(1) {
                 let pose = Pose::from(&waypoint.world_from_object);
+                if waypoint.contacts != waypoints[k - 1].contacts {
+                    let here = state_at(waypoint);
+                    let margin = model.closure_margin(&here.contacts, here.holding);
+                    if margin < model.settings.closure_margin {
+                        return Err((k, not_closed(model, margin)));
+                    }
+                    workspace.roll_to(&here.contacts);
+                }
                 if !workspace.step(&pose, &joints_of(model, waypoint), TipMode::AllHold) {
                     return Err((k, in_the_way(workspace)));
                 }
@@ -87,6 +95,10 @@ fn validate_segment(model: &Model, workspace: &mut Workspace, segment: &Segment)
         (SegmentKind::Regrasp, None) => return Err((0, "a regrasp without a moving finger".into())),
     }
     Ok(())
+}
+
+fn not_closed(model: &Model, margin: f64) -> String {
+    format!("closure margin {margin:.4} of {}", model.settings.closure_margin)
 }
 
 /// The bodies that stopped the last step.

@@ -152,6 +152,11 @@ impl<'a> Workspace<'a> {
         self.stale = Stale::Everything;
     }
 
+    /// The coming step ends with these contacts: fingertips roll.
+    pub fn roll_to(&mut self, contacts: &Contacts) {
+        self.contacts.clone_from(contacts);
+    }
+
     /// Makes `next` the same as `now`, but for a finger that is placed afresh anyway.
     fn align(&mut self, except: Option<usize>) {
         match self.stale {

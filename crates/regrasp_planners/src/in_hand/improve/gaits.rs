@@ -288,6 +288,7 @@ impl<'g, 'a> Gaits<'g, 'a> {
         let range = self.course.stations[node.station] + 1..=self.course.stations[node.station + 1];
         range
             .map(|moment| Moment {
+                contacts: self.state(node).contacts,
                 world_from_object: self.course.poses[moment],
                 joints: node.choice.iter().enumerate().map(|(f, &t)| self.tracks[f][t].at(moment).clone()).collect(),
             })

@@ -73,8 +73,17 @@ impl<'g> Passing<'g> {
                     let tables = strands.iter().zip(&graph.footholds);
                     tables.map(|(strand, table)| numbers_at(strand, table.n_coordinates, k).collect()).collect()
                 };
-                let moment = |k| Moment { world_from_object: line.at(share_of(k, n + 1)), joints: joints(k) };
-                let end = Moment { world_from_object: *graph.pose(to), joints: graph.hand_joints(to) };
+                let contacts = way.end().contacts.clone();
+                let moment = |k| Moment {
+                    world_from_object: line.at(share_of(k, n + 1)),
+                    joints: joints(k),
+                    contacts: contacts.clone(),
+                };
+                let end = Moment {
+                    world_from_object: *graph.pose(to),
+                    joints: graph.hand_joints(to),
+                    contacts: contacts.clone(),
+                };
                 way.push_transfer(self.order(*n).map(moment).chain([end]).collect());
             }
             Stored::Again(moments) => way.push_transfer(moments.clone()),

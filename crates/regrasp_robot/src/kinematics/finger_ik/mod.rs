@@ -12,11 +12,12 @@ mod reach_map;
 /// Closed form for chains of three turning joints.
 mod three_r;
 
+use super::body_frame::BodyFrame;
 use super::chain::Chain;
 use arrayvec::ArrayVec;
 use numeric::NumericIk;
 use regrasp_base::Rng;
-use regrasp_geometry::{Point, UnitVector};
+use regrasp_geometry::{Point, UnitVector, Vector};
 use three_r::ThreeR;
 
 /// Most coordinates that a finger may have.
@@ -54,6 +55,15 @@ impl Default for IkSettings {
     fn default() -> Self {
         IkSettings { limit_margin: 0.0, preference: None, max_step: 0.4 }
     }
+}
+
+/// What [`FingerIk::follow`] is asked for, in the base frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Asked {
+    /// How far a point of the last body has still to go, in metres.
+    pub error: Vector,
+    /// That point as seen from the tip's centre, in metres.
+    pub arm: Vector,
 }
 
 /// Inverse kinematics of one finger, prepared.
@@ -162,6 +172,25 @@ impl FingerIk {
             Method::ClosedForm(ik) => ik.solve_near(&self.chain, target_in_base, seed, settings),
             Method::Numeric(ik) => ik.solve_near(target_in_base, seed, settings),
         }
+    }
+
+    /// The coordinates near `start` at which nothing is asked any more: Newton steps of a point of the last body that
+    /// changes from one to the next. `asked` is given the frame of the last body in the base frame. This is what a
+    /// fingertip needs that rolls: the point that touches depends on where the finger is.
+    ///
+    /// None where the limits, `settings.max_step` or a singularity are in the way, or `asked` says None.
+    pub fn follow(
+        &self,
+        start: &[f64],
+        settings: &IkSettings,
+        asked: impl FnMut(&BodyFrame) -> Option<Asked>,
+    ) -> Option<Coordinates> {
+        numeric::follow(&self.chain, &self.center_in_body, start, settings, asked)
+    }
+
+    /// The tip's centre, in the frame of the last body.
+    pub fn center_in_body(&self) -> &Point {
+        &self.center_in_body
     }
 
     /// Follows `targets` from `start` with [`FingerIk::solve_near`], appending one solution per target.

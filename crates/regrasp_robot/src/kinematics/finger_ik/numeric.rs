@@ -8,7 +8,8 @@
 //! larger one, with coordinates that move nothing.
 
 use super::reach_map::ReachMap;
-use super::{Coordinates, IkSettings, MAX_COORDINATES, POSITION_TOLERANCE, Preference};
+use super::{Asked, Coordinates, IkSettings, MAX_COORDINATES, POSITION_TOLERANCE, Preference};
+use crate::kinematics::body_frame::BodyFrame;
 use crate::kinematics::chain::{Chain, JointLine, Motion};
 use arrayvec::ArrayVec;
 use nalgebra::Matrix3;
@@ -75,7 +76,7 @@ struct Effort {
 impl NumericIk {
     /// Prepares the seed table.
     pub fn new(chain: &Chain, center_in_body: &Point) -> Self {
-        let tip_axis_in_body = center_in_body.coords.try_normalize(0.0).unwrap_or_else(Vector::z);
+        let tip_axis_in_body = tip_axis(center_in_body);
         let length = center_in_body.coords.norm();
         let links = chain.joints.iter().skip(1).map(|joint| joint.parent_from_joint.translation.vector.norm());
         let slides = chain.joints.iter().any(|joint| joint.motion == Motion::Slide);
@@ -230,22 +231,7 @@ impl NumericIk {
     }
 
     fn state<const N: usize>(&self, coordinates: &[f64]) -> State<N> {
-        let mut lines: ArrayVec<JointLine, { 2 * MAX_COORDINATES }> = ArrayVec::new();
-        let last = self.chain.joint_lines(coordinates, &mut lines);
-        let tip = last.point(&self.center_in_body).coords;
-        let tip_axis = last.vector(&self.tip_axis_in_body);
-        let mut state = State { tip, tip_axis, slides: [Vector::zeros(); N], spins: [Vector::zeros(); N] };
-        for (joint, line) in self.chain.joints.iter().zip(&lines) {
-            let axis = line.axis * joint.multiplier;
-            match joint.motion {
-                Motion::Turn => {
-                    state.slides[joint.coordinate] += axis.cross(&(tip - line.origin));
-                    state.spins[joint.coordinate] += axis;
-                }
-                Motion::Slide => state.slides[joint.coordinate] += axis,
-            }
-        }
-        state
+        state_of(&self.chain, &self.center_in_body, &self.tip_axis_in_body, coordinates).0
     }
 
     /// Newton steps from `start` until the tip is on the target.
@@ -312,6 +298,109 @@ impl NumericIk {
         (error.norm() < POSITION_TOLERANCE).then(|| coordinates[..n].iter().copied().collect())
     }
 }
+
+/// Direction of the last body: from its joint to the tip's centre, in its frame.
+fn tip_axis(center_in_body: &Point) -> Vector {
+    center_in_body.coords.try_normalize(0.0).unwrap_or_else(Vector::z)
+}
+
+/// The tip and how it moves with each coordinate; the frame of the last body.
+fn state_of<const N: usize>(
+    chain: &Chain,
+    center_in_body: &Point,
+    tip_axis_in_body: &Vector,
+    coordinates: &[f64],
+) -> (State<N>, BodyFrame) {
+    let mut lines: ArrayVec<JointLine, { 2 * MAX_COORDINATES }> = ArrayVec::new();
+    let last = chain.joint_lines(coordinates, &mut lines);
+    let tip = last.point(center_in_body).coords;
+    let tip_axis = last.vector(tip_axis_in_body);
+    let mut state = State { tip, tip_axis, slides: [Vector::zeros(); N], spins: [Vector::zeros(); N] };
+    for (joint, line) in chain.joints.iter().zip(&lines) {
+        let axis = line.axis * joint.multiplier;
+        match joint.motion {
+            Motion::Turn => {
+                state.slides[joint.coordinate] += axis.cross(&(tip - line.origin));
+                state.spins[joint.coordinate] += axis;
+            }
+            Motion::Slide => state.slides[joint.coordinate] += axis,
+        }
+    }
+    (state, last)
+}
+
+/// Newton steps of [`follow`].
+const MAX_FOLLOW_STEPS: usize = 8;
+
+/// See `FingerIk::follow`.
+pub(super) fn follow(
+    chain: &Chain,
+    center_in_body: &Point,
+    start: &[f64],
+    settings: &IkSettings,
+    asked: impl FnMut(&BodyFrame) -> Option<Asked>,
+) -> Option<Coordinates> {
+    match chain.n_coordinates() {
+        ..=3 => follow_in::<3>(chain, center_in_body, start, settings, asked),
+        4 => follow_in::<4>(chain, center_in_body, start, settings, asked),
+        5 => follow_in::<5>(chain, center_in_body, start, settings, asked),
+        _ => follow_in::<MAX_COORDINATES>(chain, center_in_body, start, settings, asked),
+    }
+}
+
+fn follow_in<const N: usize>(
+    chain: &Chain,
+    center_in_body: &Point,
+    start: &[f64],
+    settings: &IkSettings,
+    mut asked: impl FnMut(&BodyFrame) -> Option<Asked>,
+) -> Option<Coordinates> {
+    let n = chain.n_coordinates();
+    let (mut limits, mut coordinates) = ([(0.0, 0.0); N], [0.0; N]);
+    for k in 0..n {
+        // Where it stands is allowed, even inside the margin.
+        limits[k] = (
+            (chain.lower[k] + settings.limit_margin).min(start[k]),
+            (chain.upper[k] - settings.limit_margin).max(start[k]),
+        );
+        coordinates[k] = start[k];
+    }
+    let axis = tip_axis(center_in_body);
+    let mut first_determinant = 0.0;
+    let mut error_before = f64::INFINITY;
+    for i in 0..MAX_FOLLOW_STEPS {
+        let (mut state, frame) = state_of::<N>(chain, center_in_body, &axis, &coordinates);
+        let Asked { error, arm } = asked(&frame)?;
+        for k in 0..n {
+            let spin = state.spins[k];
+            state.slides[k] += spin.cross(&arm);
+        }
+        let determinant = if n == 3 { state.slides[0].cross(&state.slides[1]).dot(&state.slides[2]) } else { 1.0 };
+        if i == 0 {
+            first_determinant = determinant;
+        }
+        let wish = settings.preference.as_ref().filter(|_| n > 3 && i == 0);
+        let error_now = error.norm();
+        if wish.is_none() && error_now < FOLLOW_TOLERANCE {
+            let is_near = (0..n).all(|k| (coordinates[k] - start[k]).abs() <= settings.max_step);
+            // Without redundancy the branches are separated by the sign of the Jacobian's determinant.
+            return (is_near && determinant * first_determinant > 0.0)
+                .then(|| coordinates[..n].iter().copied().collect());
+        }
+        if i > CRAWL_STEPS && error_now > 0.5 * error_before {
+            return None;
+        }
+        error_before = error_now;
+        let step = bounded_step(&state, &error, wish, &coordinates, &limits)?;
+        for k in 0..n {
+            coordinates[k] = (coordinates[k] + step[k]).clamp(limits[k].0, limits[k].1);
+        }
+    }
+    None
+}
+
+/// Error at which [`follow`] ends, in metres.
+const FOLLOW_TOLERANCE: f64 = 1e-9;
 
 /// The step to the target, with coordinates that would leave their limits set on them.
 #[inline]
