@@ -99,8 +99,7 @@ fn what_does_not_meet_is_not_joined() {
         let [a, b, c] = states.try_into().expect("three grasps");
         let mut a_to_b = Sequence::at(a.clone());
         a_to_b.push_transfer(vec![wait_at(&b)]);
-        // A transfer keeps its contacts: it ends in b's joints and pose, and a's contacts.
-        assert!(a_to_b.end().contacts == a.contacts && a_to_b.end().joints == b.joints);
+        assert!(*a_to_b.end() == b, "a transfer ends where its last moment is, contacts included");
         let mut nearly = a_to_b.end().clone();
         nearly.joints[0][0] += 1e-15_f64.max(nearly.joints[0][0].abs() * f64::EPSILON);
         assert!(a_to_b.clone().then(Sequence::at(nearly.clone())).is_none(), "one bit apart is apart");
