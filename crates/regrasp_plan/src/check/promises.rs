@@ -114,6 +114,11 @@ pub fn check_promises(object: &Object, plan: &Plan, settings: &CheckSettings, mi
         let message = format!("contact tolerance {:e} m, at most {limit:e} is accepted", promises.contact_tolerance);
         broken("contact_tolerance", promises.contact_tolerance, limit, message);
     }
+    if !(promises.slip_tolerance >= 0.0 && promises.slip_tolerance <= settings.largest_slip_tolerance) {
+        let limit = settings.largest_slip_tolerance;
+        let message = format!("slip tolerance {:e} m, at most {limit:e} is accepted", promises.slip_tolerance);
+        broken("slip_tolerance", promises.slip_tolerance, limit, message);
+    }
     if !(promises.required_margin >= 0.0 && promises.kept_margin >= promises.required_margin) {
         let message = format!("keeps margin {}, requires {}", promises.kept_margin, promises.required_margin);
         broken("kept_margin", promises.kept_margin, promises.required_margin, message);
