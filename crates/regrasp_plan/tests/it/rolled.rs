@@ -4,6 +4,9 @@
 use crate::sample::{self, Grasp, OBJECT_RADIUS, TIP_RADIUS};
 use nalgebra::{Matrix3, Translation3, UnitQuaternion};
 use regrasp_geometry::{Point, Pose, Vector};
+use regrasp_grasp::Grip;
+use regrasp_plan::check::closure::{Body, margin};
+use regrasp_plan::check::continuity::contact_of;
 use regrasp_plan::check::{CheckSettings, Report, ViolationKind, check};
 use regrasp_plan::{ContactMode, ContactState, Plan, Segment, SegmentKind};
 use regrasp_scene::Scene;
@@ -167,4 +170,32 @@ fn sharp_tips_and_resting_objects_do_not_roll() {
         finger.tip.shape = regrasp_robot::TipShape::Point;
     }
     assert!(kinds(&judge(&sharp, &plan)).contains(&ViolationKind::WrongContactMode));
+}
+
+#[test]
+fn the_smallest_margin_of_contacts_that_roll_is_that_of_every_waypoint_by_itself() {
+    for scene in [sample::scene(), sample::soft_scene()] {
+        let plan = plan(&scene, 40);
+        let body =
+            Body { center_of_mass: Point::origin(), torque_scale: OBJECT_RADIUS, friction: plan.promises.friction };
+        let margin_at = |contacts: &Vec<ContactState>| {
+            let holding = contacts.iter().enumerate().filter(|(_, contact)| contact.holds());
+            let grip = |(f, state): (usize, &ContactState)| Grip {
+                contact: contact_of(state).unwrap(),
+                model: scene.hand.fingers[f].tip.contact,
+            };
+            margin(&holding.map(grip).collect::<Vec<_>>(), &body)
+        };
+        let smallest = plan.segments.iter().flat_map(|segment| {
+            let moving = segment.moving_finger.as_ref().map(|name| name[1..].parse::<usize>().unwrap());
+            segment.waypoints.iter().map(move |waypoint| {
+                let mut contacts = waypoint.contacts.clone();
+                moving.iter().for_each(|&f| contacts[f] = ContactState::FREE);
+                contacts
+            })
+        });
+        let smallest = smallest.map(|contacts| margin_at(&contacts)).fold(f64::INFINITY, f64::min);
+        let found = judge(&scene, &plan).min_margin.unwrap();
+        assert!((found - smallest).abs() < 1e-12, "{found} {smallest}");
+    }
 }
