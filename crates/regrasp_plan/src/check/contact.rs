@@ -1,8 +1,10 @@
-//! Fingertips on their contacts, at waypoints and between them, and contacts on the object.
+//! Fingertips on their contacts, at waypoints and between them, and contacts on the object. Tips that roll between two
+//! waypoints are judged in `rolling`.
 
-use crate::check::continuity::{contact_of, moving_finger, pose_between, pose_difference};
+use crate::check::continuity::{contact_of, moving_finger, pose_between};
 use crate::check::edges::Edges;
 use crate::check::model::{FingerModel, Model};
+use crate::check::rolling::bounds_in_object;
 use crate::check::surface;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
@@ -14,7 +16,7 @@ use std::collections::BTreeSet;
 /// Most samples of one step; a step that needs more is one that no planner makes.
 const MOST_SAMPLES: usize = 4096;
 
-/// Largest distance of a holding fingertip from its contact, over the plan; violations go to the log.
+/// Largest distance of a fingertip from the fixed contact that it holds, over the plan; violations go to the log.
 ///
 /// Between samples the bound is exact: the tip's centre in the object frame deviates from the chord between two
 /// samples by at most (largest acceleration) (interval)^2 / 8.
@@ -55,7 +57,7 @@ pub fn check_tips(model: &Model, plan: &Plan, log: &mut Log) -> f64 {
 }
 
 fn holds(waypoint: &Waypoint, finger: usize) -> bool {
-    waypoint.contacts[finger].mode != ContactMode::Free
+    waypoint.contacts[finger].mode == ContactMode::Fixed
 }
 
 /// Where the tip's centre belongs, in the object frame.
@@ -64,7 +66,8 @@ fn center_in_object(finger: &FingerModel, waypoint: &Waypoint, f: usize) -> Opti
     Some(contact.point_in_object + contact.normal_in_object.into_inner() * finger.radius)
 }
 
-fn error_at(finger: &FingerModel, waypoint: &Waypoint, f: usize) -> f64 {
+/// Distance of the tip's centre from where it belongs, at a waypoint; infinite when the finger has no contact there.
+pub fn error_at(finger: &FingerModel, waypoint: &Waypoint, f: usize) -> f64 {
     let Some(target) = center_in_object(finger, waypoint, f) else { return f64::INFINITY };
     let pose = Pose::from(&waypoint.world_from_object);
     (finger.center_in_world(&waypoint.joints) - pose * target).norm()
@@ -74,10 +77,7 @@ fn error_at(finger: &FingerModel, waypoint: &Waypoint, f: usize) -> f64 {
 fn error_between(finger: &FingerModel, from: &Waypoint, to: &Waypoint, f: usize, tolerance: f64) -> (f64, f64) {
     let Some(target) = center_in_object(finger, from, f) else { return (f64::INFINITY, 0.0) };
     let (start, end) = (Pose::from(&from.world_from_object), Pose::from(&to.world_from_object));
-    let (shift, turn) = pose_difference(&from.world_from_object, &to.world_from_object);
-    let rates = finger.path.rates(&finger.center, 0.0, &from.joints, &to.joints);
-    let arm = (finger.center_in_world(&from.joints) - start * Point::origin()).norm() + rates.speed + shift;
-    let acceleration = rates.acceleration + 2.0 * turn * (rates.speed + shift) + turn * turn * arm;
+    let (_, acceleration) = bounds_in_object(finger, from, to);
     // Between samples no more than a twentieth of the tolerance may be unknown.
     let allowed = (0.05 * tolerance).max(1e-9);
     let n_samples = ((acceleration / (8.0 * allowed)).sqrt().ceil() as usize).clamp(1, MOST_SAMPLES);

@@ -81,10 +81,6 @@ fn check_waypoint_form(plan: &Plan, waypoint: &Waypoint, at: Moment, log: &mut L
             let message = format!("the contact of finger \"{finger}\" is not one: {contact:?}");
             log.push(Violation::new(Kind::NotANumber, message).when(at).subjects([finger.as_str()]));
         }
-        if contact.mode == ContactMode::Rolling {
-            let message = format!("finger \"{finger}\" rolls; this version judges fixed contacts only");
-            log.push(Violation::new(Kind::ModeNotSupported, message).when(at).subjects([finger.as_str()]));
-        }
     }
 }
 
@@ -198,14 +194,14 @@ pub fn check_meeting(plan: &Plan, settings: &CheckSettings, log: &mut Log) {
     }
 }
 
-/// True when both hold at the same place with the same normal, or both are free.
+/// True when both hold at the same place with the same normal, at a fixed contact or rolling, or both are free.
 pub fn contacts_agree(a: &ContactState, b: &ContactState, tolerance: f64) -> bool {
     let near = |p: Option<[f64; 3]>, q: Option<[f64; 3]>| match (p, q) {
         (Some(p), Some(q)) => (Vector::from(p) - Vector::from(q)).norm() <= tolerance,
         (None, None) => true,
         _ => false,
     };
-    a.mode == b.mode && near(a.point_in_object, b.point_in_object) && near(a.normal_in_object, b.normal_in_object)
+    a.holds() == b.holds() && near(a.point_in_object, b.point_in_object) && near(a.normal_in_object, b.normal_in_object)
 }
 
 /// Limits at every waypoint (motion between is linear, so they hold there too), and steps that are jumps.
@@ -247,8 +243,8 @@ pub fn check_joints(model: &Model, plan: &Plan, settings: &CheckSettings, log: &
     }
 }
 
-/// Who may change what: in a transfer every finger keeps its contact or stays free; in a regrasp only the moving finger
-/// changes.
+/// Who may change what: in a transfer every finger keeps its contact, or rolls all along, or stays free; in a regrasp only
+/// the moving finger changes, and none rolls.
 pub fn check_roles(model: &Model, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
     for (s, segment) in plan.segments.iter().enumerate() {
         match segment.kind {
@@ -259,6 +255,7 @@ pub fn check_roles(model: &Model, plan: &Plan, settings: &CheckSettings, log: &m
                 }
                 for finger in 0..model.fingers.len() {
                     check_constant(model, segment, s, finger, settings, log);
+                    check_may_roll(model, segment, s, finger, log);
                 }
             }
             SegmentKind::Regrasp => check_regrasp_roles(model, segment, s, settings, log),
@@ -283,6 +280,7 @@ fn check_regrasp_roles(model: &Model, segment: &Segment, s: usize, settings: &Ch
         }
     }
     for (f, finger) in model.fingers.iter().enumerate() {
+        check_may_roll(model, segment, s, f, log);
         if Some(f) != moving {
             check_constant(model, segment, s, f, settings, log);
             for (w, waypoint) in segment.waypoints.iter().enumerate() {
@@ -310,20 +308,45 @@ fn check_regrasp_roles(model: &Model, segment: &Segment, s: usize, settings: &Ch
     }
 }
 
-/// Finger `f` holds the same contact all through the segment, or is free all through it.
+/// Only balls roll, and only while the object moves.
+fn check_may_roll(model: &Model, segment: &Segment, s: usize, f: usize, log: &mut Log) {
+    let finger = &model.fingers[f];
+    let rolls = |waypoint: &Waypoint| waypoint.contacts[f].mode == ContactMode::Rolling;
+    let Some(w) = segment.waypoints.iter().position(rolls) else { return };
+    let why = match segment.kind {
+        SegmentKind::Transfer if finger.radius > 0.0 => return,
+        SegmentKind::Transfer => "its tip is sharp",
+        SegmentKind::Regrasp => "the object rests",
+    };
+    let message = format!("finger \"{}\" rolls, but {why}", finger.name);
+    let violation = Violation::new(Kind::WrongContactMode, message).when(Moment::at(s, w));
+    log.push(violation.subjects([finger.name.as_str()]));
+}
+
+/// Finger `f` holds the same contact all through the segment, or rolls all through it, or is free all through it.
 fn check_constant(model: &Model, segment: &Segment, s: usize, f: usize, settings: &CheckSettings, log: &mut Log) {
     let name = model.fingers[f].name.as_str();
     let first = &segment.waypoints[0].contacts[f];
     for (w, waypoint) in segment.waypoints.iter().enumerate() {
         let contact = &waypoint.contacts[f];
-        if is_free(contact) != is_free(first) {
-            let (was, is) = if is_free(first) { ("is free", "holds") } else { ("holds", "is free") };
+        if contact.mode != first.mode {
+            let (was, is) = (mode_in_words(first.mode), mode_in_words(contact.mode));
             let message = format!("finger \"{name}\" {was} when the segment begins, but {is} here");
             log.push(Violation::new(Kind::WrongContactMode, message).when(Moment::at(s, w)).subjects([name]));
+        } else if first.mode == ContactMode::Rolling {
+            // Where it rolls to is judged by how.
         } else if !contacts_agree(first, contact, settings.meeting_tolerance) {
             let message = format!("the contact of finger \"{name}\" is not the one with which the segment began");
             log.push(Violation::new(Kind::GraspChanges, message).when(Moment::at(s, w)).subjects([name]));
         }
+    }
+}
+
+fn mode_in_words(mode: ContactMode) -> &'static str {
+    match mode {
+        ContactMode::Fixed => "holds",
+        ContactMode::Rolling => "rolls",
+        ContactMode::Free => "is free",
     }
 }
 

@@ -29,8 +29,12 @@ pub mod model;
 pub mod motion;
 /// Plans broken in one known way each.
 pub mod mutation;
+/// A piece of the object's surface near a fingertip.
+pub mod patch;
 /// What the plan promises, and whether the promises may be made and are kept.
 pub mod promises;
+/// Fingertips that roll.
+pub mod rolling;
 /// Distance from the object's surface and the normals there.
 pub mod surface;
 /// What can be wrong with a plan.
@@ -53,6 +57,8 @@ use serde::{Deserialize, Serialize};
 pub struct CheckSettings {
     /// Largest contact tolerance that a plan may promise, in metres. Issue 2: 0.5 mm.
     pub largest_contact_tolerance: f64,
+    /// Largest slip of a rolling fingertip in a segment that a plan may promise, in metres. Issue 4: 0.1 mm.
+    pub largest_slip_tolerance: f64,
     /// Closure margin asked of every holding set even if the plan promises less; dimensionless.
     pub smallest_margin: f64,
     /// Start, way poses and goal may be missed by this much, in metres and radians.
@@ -84,6 +90,7 @@ impl Default for CheckSettings {
     fn default() -> Self {
         CheckSettings {
             largest_contact_tolerance: 0.5e-3,
+            largest_slip_tolerance: 0.1e-3,
             smallest_margin: 0.0,
             pose_tolerance: 1e-6,
             meeting_tolerance: 1e-9,
@@ -122,8 +129,11 @@ pub struct Report {
     pub min_margin: Option<f64>,
     /// Smallest distance at a waypoint of a pair that must not touch; between waypoints it is certified to be positive.
     pub min_clearance: Option<Clearance>,
-    /// Largest distance of a holding fingertip from its contact, in metres, certified between waypoints.
+    /// Largest distance of a holding fingertip from its contact, in metres, certified between waypoints; for tips that roll
+    /// the largest that was measured, while between waypoints it is certified to be within the tolerance.
     pub max_contact_error: f64,
+    /// Largest slip of a finger that rolls, in a segment, in metres; none when no finger rolls.
+    pub max_slip: Option<f64>,
     /// Waypoints judged.
     pub n_waypoints: usize,
     /// Distances measured.
@@ -196,7 +206,9 @@ fn judge(
     continuity::check_meeting(plan, settings, log);
     continuity::check_joints(model, plan, settings, log);
     continuity::check_roles(model, plan, settings, log);
-    report.max_contact_error = contact::check_tips(model, plan, log);
+    let rolled = rolling::check_rolling(&scene.object.shape, model, plan, settings, log);
+    report.max_contact_error = contact::check_tips(model, plan, log).max(rolled.max_contact_error);
+    report.max_slip = rolled.max_slip;
     contact::check_contacts(&scene.object, model, plan, settings, log);
     report.min_margin = promises::check_closure(&scene.object, model, plan, settings, log);
     promises::check_promises(&scene.object, plan, settings, report.min_margin, log);

@@ -7,6 +7,8 @@
 mod free;
 /// Good plans in hands of other contacts and couplings.
 mod hand;
+/// Fingertips that roll, and fingertips that are said to.
+mod rolling;
 /// Way poses gone wrong.
 mod way;
 
@@ -51,6 +53,7 @@ pub fn mutants(plan: &Plan, scene: &Scene, rng: &mut Rng) -> Vec<Mutant> {
     breeder.break_contact_models();
     breeder.break_couplings();
     breeder.break_free_fingers();
+    breeder.break_rolling();
     breeder.found
 }
 
@@ -290,10 +293,10 @@ impl Breeder<'_> {
         }
         self.add("all contacts in one place", &[ClosureLost], |plan, rng| {
             let segment = pick(&mut plan.segments, rng)?;
-            let holding = |c: &&ContactState| c.mode == ContactMode::Fixed;
+            let holding = |c: &&ContactState| c.holds();
             for waypoint in &mut segment.waypoints {
                 let first = *waypoint.contacts.iter().find(holding)?;
-                let others = waypoint.contacts.iter_mut().filter(|c| c.mode == ContactMode::Fixed);
+                let others = waypoint.contacts.iter_mut().filter(|c| c.holds());
                 others.for_each(|contact| *contact = first);
             }
             Some(())
@@ -319,7 +322,7 @@ impl Breeder<'_> {
         });
         self.add("contact without a normal", &[NotANumber], |plan, rng| {
             let waypoint = pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?;
-            let mut held: Vec<_> = waypoint.contacts.iter_mut().filter(|c| c.mode == ContactMode::Fixed).collect();
+            let mut held: Vec<_> = waypoint.contacts.iter_mut().filter(|c| c.holds()).collect();
             pick(&mut held, rng)?.normal_in_object = None;
             Some(())
         });
@@ -328,21 +331,17 @@ impl Breeder<'_> {
     fn break_roles(&mut self) {
         self.add("contact changes in a transfer", &[GraspChanges], |plan, rng| {
             let (s, w) = pick_waypoint(plan, rng, SegmentKind::Transfer)?;
-            let contacts = &mut plan.segments[s].waypoints[w].contacts;
-            let point = pick(contacts, rng)?.point_in_object.as_mut()?;
+            let mut contacts: Vec<_> = plan.segments[s].waypoints[w].contacts.iter_mut().collect();
+            contacts.retain(|contact| contact.mode == ContactMode::Fixed);
+            let point = pick(&mut contacts, rng)?.point_in_object.as_mut()?;
             point[rng.below(3)] += rng.uniform(1e-6, 1e-5);
             Some(())
         });
         self.add("finger lets go in a transfer", &[WrongContactMode], |plan, rng| {
             let (s, w) = pick_waypoint(plan, rng, SegmentKind::Transfer)?;
             let mut held: Vec<_> = plan.segments[s].waypoints[w].contacts.iter_mut().collect();
-            held.retain(|contact| contact.mode == ContactMode::Fixed);
+            held.retain(|contact| contact.holds());
             **pick(&mut held, rng)? = ContactState::FREE;
-            Some(())
-        });
-        self.add("contact rolls", &[ModeNotSupported], |plan, rng| {
-            let (s, w) = pick_waypoint(plan, rng, SegmentKind::Transfer)?;
-            pick(&mut plan.segments[s].waypoints[w].contacts, rng)?.mode = ContactMode::Rolling;
             Some(())
         });
         let model = self.model;
@@ -361,7 +360,7 @@ impl Breeder<'_> {
         self.add("holding finger lets go in a regrasp", &[WrongContactMode, ClosureLost], |plan, rng| {
             let (s, w) = pick_waypoint(plan, rng, SegmentKind::Regrasp)?;
             let mut held = plan.segments[s].waypoints[w].contacts.iter_mut().collect::<Vec<_>>();
-            held.retain(|contact| contact.mode == ContactMode::Fixed);
+            held.retain(|contact| contact.holds());
             **pick(&mut held, rng)? = ContactState::FREE;
             Some(())
         });

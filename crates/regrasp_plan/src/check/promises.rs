@@ -1,14 +1,14 @@
 //! What the plan promises: input files, friction, tolerance, closure margin.
 
-use crate::check::closure::{Body, margin};
+use crate::check::closure::{Body, Certificate, certified_margin, margin_by};
 use crate::check::continuity::{contact_of, moving_finger};
 use crate::check::model::Model;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
-use crate::plan::{ContactMode, Plan, SegmentKind};
-use regrasp_grasp::Grip;
+use crate::plan::{Plan, SegmentKind};
+use regrasp_grasp::{Contact, Grip};
 use regrasp_scene::{InputFile, Object};
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
 /// How much smaller than promised a margin may come out: two solvers, one number.
 const MARGIN_TOLERANCE: f64 = 1e-9;
@@ -41,7 +41,20 @@ pub fn check_inputs(plan: &Plan, inputs: &[InputFile], log: &mut Log) {
     }
 }
 
-/// Closure of exactly the fingers that hold, in every segment; the smallest margin. Contacts are constant in a segment.
+/// Of so many different sets of contacts one is solved for before the others are looked at.
+const SOLVED_FIRST: usize = 16;
+
+/// Contacts that hold at some waypoints, and the first of these.
+struct Holding {
+    at: Moment,
+    fingers: Vec<usize>,
+    grips: Vec<Grip>,
+}
+
+/// Closure of exactly the fingers that hold, at every waypoint; the smallest margin.
+///
+/// Contacts that roll are others at every waypoint. Forces found for the waypoint before are tried first: what they prove is
+/// enough where it is no less than what is required and than the smallest margin found so far.
 pub fn check_closure(
     object: &Object,
     model: &Model,
@@ -55,47 +68,72 @@ pub fn check_closure(
         friction: plan.promises.friction.min(object.friction),
     };
     let required = plan.promises.required_margin.max(settings.smallest_margin);
-    let mut known: BTreeMap<Vec<(usize, [u64; 6])>, f64> = BTreeMap::new();
+    let sets = holding_sets(model, plan);
     let mut smallest: Option<f64> = None;
-    for (s, segment) in plan.segments.iter().enumerate() {
-        let moving = moving_finger(model, segment);
-        // A waypoint may break the roles; closure is judged for what really holds there.
-        for (w, waypoint) in segment.waypoints.iter().enumerate() {
-            let holding: Vec<usize> = (0..model.fingers.len())
-                .filter(|&f| segment.kind == SegmentKind::Transfer || Some(f) != moving)
-                .filter(|&f| waypoint.contacts[f].mode != ContactMode::Free)
-                .collect();
-            let grips: Vec<(usize, Grip)> = holding
-                .iter()
-                .filter_map(|&f| {
-                    let contact = contact_of(&waypoint.contacts[f])?;
-                    Some((f, Grip { contact, model: model.fingers[f].contact }))
-                })
-                .collect();
-            let key: Vec<(usize, [u64; 6])> = grips
-                .iter()
-                .map(|(f, grip)| {
-                    let (p, n) = (grip.contact.point_in_object, grip.contact.normal_in_object);
-                    (*f, [p.x, p.y, p.z, n.x, n.y, n.z].map(f64::to_bits))
-                })
-                .collect();
-            let grips: Vec<Grip> = grips.into_iter().map(|(_, grip)| grip).collect();
-            let is_new = !known.contains_key(&key);
-            let found = *known.entry(key).or_insert_with(|| margin(&grips, &body));
-            smallest = Some(smallest.map_or(found, |least: f64| least.min(found)));
-            if is_new && !(found > 0.0 && found >= required - MARGIN_TOLERANCE) {
-                let names: Vec<&str> = holding.iter().map(|&f| model.fingers[f].name.as_str()).collect();
-                let message = if found > 0.0 {
-                    format!("fingers {names:?} hold with margin {found:.6}, {required:.6} is required")
-                } else {
-                    format!("fingers {names:?} are not proved to be force closed")
-                };
-                let violation = Violation::new(Kind::ClosureLost, message).when(Moment::at(s, w));
-                log.push(violation.subjects(names).amount(found, required));
-            }
+    let mut solved: Vec<Option<(f64, Option<Certificate>)>> = vec![None; sets.len()];
+    let solve = |set: &Holding, smallest: &mut Option<f64>| {
+        let certified = certified_margin(&set.grips, &body);
+        let (margin, certificate) = certified.map_or((0.0, None), |(margin, proof)| (margin, Some(proof)));
+        *smallest = Some(smallest.map_or(margin, |least: f64| least.min(margin)));
+        (margin, certificate)
+    };
+    for (set, solved) in sets.iter().zip(&mut solved).step_by(SOLVED_FIRST) {
+        *solved = Some(solve(set, &mut smallest));
+    }
+    let mut before: Option<(&[usize], Certificate)> = None;
+    for (set, solved) in sets.iter().zip(solved) {
+        let enough = smallest.map_or(required, |least| least.max(required));
+        let tried = before.as_ref().filter(|(fingers, _)| *fingers == set.fingers && solved.is_none());
+        if enough > 0.0 && tried.is_some_and(|(_, proof)| margin_by(proof, &set.grips, &body) >= enough) {
+            continue;
+        }
+        let (found, certificate) = solved.unwrap_or_else(|| solve(set, &mut smallest));
+        before = certificate.map(|proof| (set.fingers.as_slice(), proof));
+        if !(found > 0.0 && found >= required - MARGIN_TOLERANCE) {
+            log.push(closure_lost(model, set, found, required));
         }
     }
     smallest
+}
+
+/// The different sets of contacts that hold in the plan, in order.
+fn holding_sets(model: &Model, plan: &Plan) -> Vec<Holding> {
+    let mut seen = BTreeSet::new();
+    let mut sets = Vec::new();
+    for (s, segment) in plan.segments.iter().enumerate() {
+        let moving = moving_finger(model, segment).filter(|_| segment.kind == SegmentKind::Regrasp);
+        // A waypoint may break the roles; closure is judged for what really holds there.
+        for (w, waypoint) in segment.waypoints.iter().enumerate() {
+            let holding: Vec<(usize, Contact)> = (0..model.fingers.len())
+                .filter(|&f| Some(f) != moving && waypoint.contacts[f].holds())
+                .filter_map(|f| Some((f, contact_of(&waypoint.contacts[f])?)))
+                .collect();
+            let key: Vec<(usize, [u64; 6])> = holding
+                .iter()
+                .map(|(f, contact)| {
+                    let (p, n) = (contact.point_in_object, contact.normal_in_object);
+                    (*f, [p.x, p.y, p.z, n.x, n.y, n.z].map(f64::to_bits))
+                })
+                .collect();
+            if seen.insert(key) {
+                let grip =
+                    |(f, contact): &(usize, Contact)| Grip { contact: *contact, model: model.fingers[*f].contact };
+                let fingers = holding.iter().map(|(f, _)| *f).collect();
+                sets.push(Holding { at: Moment::at(s, w), fingers, grips: holding.iter().map(grip).collect() });
+            }
+        }
+    }
+    sets
+}
+
+fn closure_lost(model: &Model, set: &Holding, found: f64, required: f64) -> Violation {
+    let names: Vec<&str> = set.fingers.iter().map(|&f| model.fingers[f].name.as_str()).collect();
+    let message = if found > 0.0 {
+        format!("fingers {names:?} hold with margin {found:.6}, {required:.6} is required")
+    } else {
+        format!("fingers {names:?} are not proved to be force closed")
+    };
+    Violation::new(Kind::ClosureLost, message).when(set.at).subjects(names).amount(found, required)
 }
 
 /// Promises that no plan may make, and promises that this plan does not keep.
@@ -113,6 +151,11 @@ pub fn check_promises(object: &Object, plan: &Plan, settings: &CheckSettings, mi
         let limit = settings.largest_contact_tolerance;
         let message = format!("contact tolerance {:e} m, at most {limit:e} is accepted", promises.contact_tolerance);
         broken("contact_tolerance", promises.contact_tolerance, limit, message);
+    }
+    if !(promises.slip_tolerance >= 0.0 && promises.slip_tolerance <= settings.largest_slip_tolerance) {
+        let limit = settings.largest_slip_tolerance;
+        let message = format!("slip tolerance {:e} m, at most {limit:e} is accepted", promises.slip_tolerance);
+        broken("slip_tolerance", promises.slip_tolerance, limit, message);
     }
     if !(promises.required_margin >= 0.0 && promises.kept_margin >= promises.required_margin) {
         let message = format!("keeps margin {}, requires {}", promises.kept_margin, promises.required_margin);

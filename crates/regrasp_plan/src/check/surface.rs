@@ -142,9 +142,14 @@ pub fn distance_to_triangle(point: &Point, corners: &[Point; 3]) -> f64 {
 
 /// Distance from a point to the segment between two others.
 pub fn distance_to_edge(point: &Point, from: &Point, to: &Point) -> f64 {
+    (point - nearest_on_edge(point, from, to)).norm()
+}
+
+/// The point of the segment between two others that is nearest to a point.
+pub fn nearest_on_edge(point: &Point, from: &Point, to: &Point) -> Point {
     let along = to - from;
     let t = ((point - from).dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
-    (point - (from + along * t)).norm()
+    from + along * t
 }
 
 #[cfg(test)]

@@ -61,10 +61,10 @@ pub enum ViolationKind {
     WrongContactMode,
     /// In a regrasp, a finger moves that should not, or the moving finger has no name.
     WrongMovingFinger,
-    /// A mode of contact that this version cannot judge.
-    ModeNotSupported,
     /// A holding fingertip is not on its contact.
     ContactOffTip,
+    /// A fingertip that should roll slides over the object.
+    Slip,
     /// A contact is not on the object's surface.
     ContactOffSurface,
     /// A contact's normal is not the surface's.

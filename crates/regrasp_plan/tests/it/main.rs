@@ -4,4 +4,5 @@ mod check;
 mod format;
 mod motion;
 mod mutation;
+mod rolled;
 mod sample;

@@ -14,11 +14,12 @@ fn every_mutant_is_rejected_for_a_fitting_reason() {
         (&scene, sample::plan_with_way(&scene)),
         (&scene, sample::plan_with_free_finger(&scene)),
         (&soft, sample::plan_with_two_away(&soft)),
+        (&scene, crate::rolled::plan(&scene, 10)),
     ];
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     let mut kinds = BTreeSet::new();
     let mut wrong = Vec::new();
-    for round in 0..90 {
+    for round in 0..80 {
         let (scene, plan) = &plans[round as usize % plans.len()];
         let query = sample::query(plan);
         for mutant in mutants(plan, scene, &mut Rng::keyed(1, "mutation", round)) {
@@ -45,6 +46,15 @@ fn every_mutant_is_rejected_for_a_fitting_reason() {
         "finger declared holding that is away",
         "free finger holds for a moment",
         "free finger moves while another one relocates",
+        "slip tolerance below the slip",
+        "rolling contacts shifted on the object only",
+        "rolling tip slides there and back",
+        "rolling tip creeps",
+        "pivoting tip passed off as rolling",
+        "fixed contact declared as rolling",
+        "rolling contact declared as fixed",
+        "finger stops rolling on its way",
+        "finger rolls while the object rests",
     ] {
         assert!(counts.contains_key(name), "{name} was never made");
     }
@@ -64,8 +74,8 @@ fn every_mutant_is_rejected_for_a_fitting_reason() {
         GraspChanges,
         WrongContactMode,
         WrongMovingFinger,
-        ModeNotSupported,
         ContactOffTip,
+        Slip,
         ContactOffSurface,
         ContactNormalWrong,
         ClosureLost,

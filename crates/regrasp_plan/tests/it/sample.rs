@@ -197,10 +197,27 @@ fn finger_joints(f: usize, center_in_hand: &Point) -> [f64; 3] {
     [(-p.y).atan2(p.z), lean, bend]
 }
 
-/// Contacts by direction from the centre of the sphere, in the object frame.
-type Grasp = [Vector; N_FINGERS];
+/// Where the tip of finger `f` stands.
+pub fn hand_from_tip(f: usize, joints: &[f64; 3]) -> Pose {
+    let turned = |axis: Vector, angle: f64| Pose::rotation(axis * angle);
+    let first = hand_from_finger(f) * turned(Vector::x(), joints[0]) * turned(Vector::y(), joints[1]);
+    first * up(PROXIMAL) * turned(Vector::y(), joints[2]) * up(DISTAL)
+}
 
-fn waypoint(hand_from_object: &Pose, grasp: &Grasp, lifted: Option<(usize, Vector)>) -> Waypoint {
+/// Origin and direction of the joints' axes of finger `f`, and its tip's centre, in the hand frame.
+pub fn finger_axes(f: usize, joints: &[f64; 3]) -> ([(Point, Vector); 3], Point) {
+    let base = hand_from_finger(f);
+    let lean = base * Pose::rotation(Vector::x() * joints[0]);
+    let bend = lean * Pose::rotation(Vector::y() * joints[1]) * up(PROXIMAL);
+    let axis = |frame: &Pose, axis: Vector| (frame * Point::origin(), frame * axis);
+    let axes = [axis(&base, Vector::x()), axis(&lean, Vector::y()), axis(&bend, Vector::y())];
+    (axes, hand_from_tip(f, joints) * Point::origin())
+}
+
+/// Contacts by direction from the centre of the sphere, in the object frame.
+pub type Grasp = [Vector; N_FINGERS];
+
+pub fn waypoint(hand_from_object: &Pose, grasp: &Grasp, lifted: Option<(usize, Vector)>) -> Waypoint {
     let mut joints = Vec::new();
     let mut contacts = Vec::new();
     for f in 0..N_FINGERS {
@@ -244,7 +261,7 @@ fn transfer_with(
     (Segment { kind: SegmentKind::Transfer, moving_finger: None, waypoints }, pose_at(1.0))
 }
 
-fn regrasp(pose: &Pose, grasp: &Grasp, finger: usize, to: Vector, lift: f64) -> (Segment, Grasp) {
+pub fn regrasp(pose: &Pose, grasp: &Grasp, finger: usize, to: Vector, lift: f64) -> (Segment, Grasp) {
     let (from, to) = (grasp[finger].normalize(), to.normalize());
     let mut after = *grasp;
     after[finger] = to;
@@ -263,15 +280,18 @@ fn regrasp(pose: &Pose, grasp: &Grasp, finger: usize, to: Vector, lift: f64) -> 
     (Segment { kind: SegmentKind::Regrasp, moving_finger: Some(format!("f{finger}")), waypoints }, after)
 }
 
-fn around(azimuth_deg: f64, elevation_deg: f64) -> Vector {
+pub fn around(azimuth_deg: f64, elevation_deg: f64) -> Vector {
     let (a, e) = (azimuth_deg.to_radians(), elevation_deg.to_radians());
     Vector::new(a.cos() * e.cos(), a.sin() * e.cos(), e.sin())
 }
 
+/// Azimuths and elevations of the contacts at the start, in degrees.
+pub const START_GRASP: [(f64, f64); N_FINGERS] = [(5.0, -5.0), (80.0, 6.0), (178.0, -4.0), (272.0, 3.0)];
+
 /// Transfer, relocation of two fingers, transfer.
 pub fn plan(scene: &Scene) -> Plan {
     let start = Pose::translation(0.0, 0.0, 0.078);
-    let grasp = [around(5.0, -5.0), around(80.0, 6.0), around(178.0, -4.0), around(272.0, 3.0)];
+    let grasp = START_GRASP.map(|(a, e)| around(a, e));
     let (first, pose) = transfer(&start, &Vector::new(0.02, 0.03, 0.2), &Vector::new(0.001, -0.001, 0.002), &grasp, 10);
     let (second, grasp) = regrasp(&pose, &grasp, 1, around(65.0, 2.0), 0.004);
     let (third, grasp) = regrasp(&pose, &grasp, 3, around(255.0, -6.0), 0.002);
@@ -279,7 +299,7 @@ pub fn plan(scene: &Scene) -> Plan {
     plan_of(scene, &start, &goal, vec![first, second, third, fourth])
 }
 
-fn plan_of(scene: &Scene, start: &Pose, goal: &Pose, segments: Vec<Segment>) -> Plan {
+pub fn plan_of(scene: &Scene, start: &Pose, goal: &Pose, segments: Vec<Segment>) -> Plan {
     let joint_names = scene.hand.joint_names();
     let mut plan = Plan {
         format: FORMAT.into(),
@@ -330,7 +350,7 @@ fn plan_of(scene: &Scene, start: &Pose, goal: &Pose, segments: Vec<Segment>) -> 
 /// A finger lifts off and stays free while the others turn the object, goes to another free posture, and lands.
 pub fn plan_with_free_finger(scene: &Scene) -> Plan {
     let start = Pose::translation(0.0, 0.0, 0.078);
-    let grasp = [around(5.0, -5.0), around(80.0, 6.0), around(178.0, -4.0), around(272.0, 3.0)];
+    let grasp = START_GRASP.map(|(a, e)| around(a, e));
     let finger = 1;
     let (away, touch) = (0.008, OBJECT_RADIUS + TIP_RADIUS);
     let (whole, _) = regrasp(&start, &grasp, finger, around(70.0, 2.0), away);
@@ -363,7 +383,7 @@ pub fn soft_scene() -> Scene {
 /// A finger lifts off, another one relocates while it is away, it lands, the object turns. For [`soft_scene`].
 pub fn plan_with_two_away(scene: &Scene) -> Plan {
     let start = Pose::translation(0.0, 0.0, 0.078);
-    let grasp = [around(5.0, -5.0), around(80.0, 6.0), around(178.0, -4.0), around(272.0, 3.0)];
+    let grasp = START_GRASP.map(|(a, e)| around(a, e));
     let (resting, away) = (1, 0.008);
     let (mut lift, _) = regrasp(&start, &grasp, resting, around(70.0, 2.0), away);
     let highest = 6;

@@ -1,0 +1,317 @@
+//! Fingertips that roll: the ball stays on the object's surface, and what touches does not slide.
+//!
+//! A tip is a ball fixed to its link. In the object frame its centre goes along `c(t)` and the link turns; the point of
+//! the surface nearest to `c` is the contact and `n` the direction from there. The material point of the link that touches
+//! is at `c - r n`. Rolling without slipping means that its velocity seen from the object has no part across `n` (paper
+//! 004, section IV-C; paper 003, section 6.2.2). Turning about `n` is no slip: soft fingertips twist, and resist it with
+//! the torsion of their contact model, but do not slide.
+
+use crate::check::contact::error_at;
+use crate::check::continuity::{pose_between, pose_difference};
+use crate::check::model::{FingerModel, Model};
+use crate::check::patch::Patch;
+use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
+use crate::check::{CheckSettings, Log};
+use crate::plan::{ContactMode, Plan, Waypoint};
+use nalgebra::Matrix4;
+use regrasp_geometry::{Point, Pose, Shape, Vector};
+
+/// Pieces after which no finer sum is made; what is then unknown counts as slip.
+const MOST_PIECES: usize = 128;
+/// Share of the slip allowed that may stay unknown in a step.
+const UNKNOWN_SHARE: f64 = 0.002;
+/// Motion that is too small to be divided further when it cannot be told whether the tip is on the surface, as a share
+/// of the contact tolerance.
+const SMALLEST_PIECE: f64 = 1e-3;
+
+/// What rolling amounts to in a plan.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Rolled {
+    /// Largest slip of a finger in a segment, in metres; none when no finger rolls.
+    pub max_slip: Option<f64>,
+    /// Largest distance of a rolling tip from its contact at waypoints, and from the surface where that was measured
+    /// between them, in metres.
+    pub max_contact_error: f64,
+}
+
+/// Judges every step in which a finger rolls.
+pub fn check_rolling(shape: &Shape, model: &Model, plan: &Plan, settings: &CheckSettings, log: &mut Log) -> Rolled {
+    let tolerance = plan.promises.contact_tolerance.min(settings.largest_contact_tolerance);
+    let slip_tolerance = plan.promises.slip_tolerance.min(settings.largest_slip_tolerance);
+    let mut rolled = Rolled::default();
+    for (s, segment) in plan.segments.iter().enumerate() {
+        for (f, finger) in model.fingers.iter().enumerate() {
+            let rolls = |waypoint: &Waypoint| waypoint.contacts[f].mode == ContactMode::Rolling;
+            let mut sum = 0.0;
+            let mut worst = (0.0, 0);
+            let mut is_off = false;
+            for (w, waypoint) in segment.waypoints.iter().enumerate().filter(|(_, waypoint)| rolls(waypoint)) {
+                let next = segment.waypoints.get(w + 1).filter(|next| rolls(next));
+                let (mut error, mut fraction) = (error_at(finger, waypoint, f), 0.0);
+                if let Some(next) = next {
+                    let roll = Roll::new(finger, waypoint, next, shape, tolerance);
+                    let (between, at) = roll.off_surface(tolerance);
+                    if between > error {
+                        (error, fraction) = (between, at);
+                    }
+                    let slip = roll.slip(UNKNOWN_SHARE * slip_tolerance);
+                    sum += slip;
+                    if slip > worst.0 {
+                        worst = (slip, w);
+                    }
+                }
+                rolled.max_contact_error = rolled.max_contact_error.max(error);
+                if error > tolerance && !is_off {
+                    is_off = true;
+                    let at = Moment { segment: s, waypoint: w, fraction };
+                    log.push(off_contact(finger, error, tolerance).when(at));
+                }
+            }
+            if segment.waypoints.iter().any(rolls) {
+                rolled.max_slip = Some(rolled.max_slip.map_or(sum, |most| most.max(sum)));
+            }
+            if sum > slip_tolerance {
+                let message = format!(
+                    "the tip of finger \"{}\" slides {sum:.3e} m over the object in this segment, most of it here",
+                    finger.name
+                );
+                let violation = Violation::new(Kind::Slip, message).when(Moment::at(s, worst.1));
+                log.push(violation.subjects([finger.name.as_str()]).amount(sum, slip_tolerance));
+            }
+        }
+    }
+    rolled
+}
+
+fn off_contact(finger: &FingerModel, error: f64, tolerance: f64) -> Violation {
+    let message = format!("the rolling tip of finger \"{}\" is {error:.3e} m off its contact", finger.name);
+    Violation::new(Kind::ContactOffTip, message).subjects([finger.name.as_str()]).amount(error, tolerance)
+}
+
+/// A rolling fingertip between two waypoints; the parameter runs from 0 to 1.
+pub struct Roll<'a> {
+    finger: &'a FingerModel,
+    from: &'a Waypoint,
+    to: &'a Waypoint,
+    world_from_object: [Pose; 2],
+    patch: Patch<'a>,
+    /// Bound of the second derivative of the centre in the object frame.
+    acceleration: f64,
+}
+
+impl<'a> Roll<'a> {
+    /// The step of `finger` over an object of this shape. The surface is looked at as far from the tip as it can come in
+    /// this step, and `tolerance` farther.
+    pub fn new(
+        finger: &'a FingerModel,
+        from: &'a Waypoint,
+        to: &'a Waypoint,
+        shape: &'a Shape,
+        tolerance: f64,
+    ) -> Self {
+        let world_from_object = [from, to].map(|waypoint| Pose::from(&waypoint.world_from_object));
+        let (speed, acceleration) = bounds_in_object(finger, from, to);
+        let start = world_from_object[0].inverse() * finger.center_in_world(&from.joints);
+        let patch = Patch::near(shape, &start, finger.radius + 2.0 * tolerance + speed);
+        Roll { finger, from, to, world_from_object, patch, acceleration }
+    }
+
+    fn object_from_link(&self, t: f64) -> Matrix4<f64> {
+        let joints: Vec<f64> = self.from.joints.iter().zip(&self.to.joints).map(|(a, b)| a + t * (b - a)).collect();
+        let [start, end] = &self.world_from_object;
+        pose_between(start, end, t).inverse().to_homogeneous() * self.finger.path.world_from_link(&joints)
+    }
+
+    fn center(&self, t: f64) -> Point {
+        self.object_from_link(t).transform_point(&self.finger.center)
+    }
+
+    /// Distance of the ball from the surface, negative when it presses in; infinite when no surface is near.
+    fn gap(&self, center: &Point) -> f64 {
+        let distance = self.patch.foot(center).map(|foot| (center - foot).norm());
+        distance.filter(|distance| distance.is_finite()).map_or(f64::INFINITY, |distance| distance - self.finger.radius)
+    }
+
+    /// The largest distance of the ball from the surface, either side, and when. When it is below `tolerance`, it is so
+    /// at every moment: a distance changes no faster than the centre moves, and that strays from the chord of an interval
+    /// `h` by at most acceleration `h^2 / 8`. Where this cannot be shown, the answer is above the tolerance.
+    pub fn off_surface(&self, tolerance: f64) -> (f64, f64) {
+        let mut worst = (0.0, 0.0);
+        let mut known = |t: f64| {
+            let center = self.center(t);
+            let gap = self.gap(&center);
+            if gap.abs() > worst.0 {
+                worst = (gap.abs(), t);
+            }
+            (t, center, gap)
+        };
+        let mut pending = vec![(known(0.0), known(1.0))];
+        while let Some((from, to)) = pending.pop() {
+            let span = to.0 - from.0;
+            let stray = self.acceleration * span * span / 8.0;
+            let way = (to.1 - from.1).norm();
+            let most = 0.5 * ((from.2 + to.2).abs() + way) + stray;
+            if most <= tolerance || from.2.abs().max(to.2.abs()) > tolerance {
+                continue;
+            }
+            if way + 2.0 * stray < SMALLEST_PIECE * tolerance {
+                return (most, from.0);
+            }
+            let middle = known(0.5 * (from.0 + to.0));
+            pending.push((middle, to));
+            pending.push((from, middle));
+        }
+        worst
+    }
+
+    /// How far the fingertip slides over the object, in metres: the length of the integral, over the step, of the velocity
+    /// of the touching point of the link, seen from the object and across the normal. Sums of ever finer pieces are
+    /// compared until what they extrapolate to differs by less than `unknown`, which is added.
+    pub fn slip(&self, unknown: f64) -> f64 {
+        let normal = |center: &Point| {
+            let away = center - self.patch.foot(center)?;
+            away.try_normalize(1e-9)
+        };
+        slip(&|t| self.object_from_link(t), &self.finger.center, self.finger.radius, &normal, unknown)
+    }
+}
+
+/// Speed and acceleration bounds of the tip's centre seen from the object, per step and per step squared.
+///
+/// The second derivative of `R^T (p - o)` with constant angular velocity `w` and velocity `o'` is
+/// `p'' - 2 w x (p' - o') + w x (w x (p - o))`, turned.
+pub fn bounds_in_object(finger: &FingerModel, from: &Waypoint, to: &Waypoint) -> (f64, f64) {
+    let (shift, turn) = pose_difference(&from.world_from_object, &to.world_from_object);
+    let rates = finger.path.rates(&finger.center, 0.0, &from.joints, &to.joints);
+    let origin = Pose::from(&from.world_from_object) * Point::origin();
+    let relative = rates.speed + shift;
+    let arm = (finger.center_in_world(&from.joints) - origin).norm() + relative;
+    (relative + turn * arm, rates.acceleration + 2.0 * turn * relative + turn * turn * arm)
+}
+
+/// Slip of a ball of `radius` about `center`, which `object_from_link` carries from 0 to 1, over a surface whose normal
+/// towards a centre beside it is given; infinite where there is none.
+fn slip(
+    object_from_link: &dyn Fn(f64) -> Matrix4<f64>,
+    center: &Point,
+    radius: f64,
+    normal: &dyn Fn(&Point) -> Option<Vector>,
+    unknown: f64,
+) -> f64 {
+    let slide_in = |n_pieces| slide(object_from_link, center, radius, normal, n_pieces);
+    // The error of the midpoint rule is a series in the square of the pieces' length: its first term cancels.
+    let extrapolated = |coarse: &Vector, fine: &Vector| fine + (fine - coarse) / 3.0;
+    let mut n_pieces = 2;
+    let (Some(first), Some(mut fine)) = (slide_in(1), slide_in(2)) else { return f64::INFINITY };
+    let mut best = extrapolated(&first, &fine);
+    loop {
+        n_pieces *= 2;
+        let Some(finer) = slide_in(n_pieces) else { return f64::INFINITY };
+        let better = extrapolated(&fine, &finer);
+        let difference = (better - best).norm();
+        if difference <= unknown || n_pieces >= MOST_PIECES {
+            let slip = better.norm() + difference;
+            return if slip.is_nan() { f64::INFINITY } else { slip };
+        }
+        (fine, best) = (finer, better);
+    }
+}
+
+/// The integral of the sliding velocity in `n_pieces` pieces. In each the point that touches half-way is carried from the
+/// beginning of the piece to its end: the midpoint rule, whose error falls with the square of the number of pieces.
+fn slide(
+    object_from_link: &dyn Fn(f64) -> Matrix4<f64>,
+    center: &Point,
+    radius: f64,
+    normal: &dyn Fn(&Point) -> Option<Vector>,
+    n_pieces: usize,
+) -> Option<Vector> {
+    let mut sum = Vector::zeros();
+    let mut before = object_from_link(0.0);
+    for k in 0..n_pieces {
+        let at = |halves: usize| (2 * k + halves) as f64 / (2 * n_pieces) as f64;
+        let (middle, after) = (object_from_link(at(1)), object_from_link(at(2)));
+        let normal = normal(&middle.transform_point(center))?;
+        let touching = center - middle.fixed_view::<3, 3>(0, 0).transpose() * normal * radius;
+        let way = after.transform_point(&touching) - before.transform_point(&touching);
+        sum += way - normal * normal.dot(&way);
+        before = after;
+    }
+    Some(sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Rotation3, Translation3};
+
+    const RADIUS: f64 = 0.006;
+    const UNKNOWN: f64 = 1e-9;
+
+    fn carried(center: Vector, turn: Vector) -> Matrix4<f64> {
+        Translation3::from(center).to_homogeneous() * Rotation3::new(turn).to_homogeneous()
+    }
+
+    fn slip_of(motion: &dyn Fn(f64) -> Matrix4<f64>, normal: &dyn Fn(&Point) -> Option<Vector>) -> f64 {
+        slip(motion, &Point::origin(), RADIUS, normal, UNKNOWN)
+    }
+
+    fn up(_: &Point) -> Option<Vector> {
+        Some(Vector::z())
+    }
+
+    #[test]
+    fn a_ball_that_rolls_on_a_plane_slips_by_what_it_goes_too_far() {
+        for (turn, too_far) in [(1.5, 0.0), (-0.4, 0.0), (0.7, 0.2e-3), (0.3, -1e-3), (0.0, 0.5e-3)] {
+            let way = RADIUS * turn + too_far;
+            let motion = |t: f64| carried(Vector::new(way * t, 0.0, RADIUS), Vector::y() * turn * t);
+            assert!((slip_of(&motion, &up) - f64::abs(too_far)).abs() < 1e-8, "{turn} {too_far}");
+        }
+    }
+
+    #[test]
+    fn spinning_about_the_normal_is_no_slip_and_pivoting_is() {
+        let spin = |t: f64| carried(Vector::z() * RADIUS, Vector::z() * 0.8 * t);
+        assert!(slip_of(&spin, &up) < 1e-8);
+        // Rolling with spin: a constant angular velocity, the centre goes with its horizontal part.
+        let turn = Vector::new(0.5, -0.7, 0.9);
+        let rolling = |t: f64| carried(Vector::z() * RADIUS + turn.cross(&Vector::z()) * RADIUS * t, turn * t);
+        assert!(slip_of(&rolling, &up) < 1e-8);
+        // The centre stands still while the ball turns: the contact slides by the arc.
+        let pivot = |t: f64| carried(Vector::z() * RADIUS, Vector::y() * 0.1 * t);
+        assert!((slip_of(&pivot, &up) - 0.1 * RADIUS).abs() < 1e-8);
+    }
+
+    /// On a sphere of radius `R` the ball turns `(R + r) / r` times as fast as it goes round, in one `-(R - r) / r` times.
+    #[test]
+    fn balls_roll_on_and_in_spheres() {
+        for (sphere, side) in [(0.03, 1.0), (0.012, 1.0), (0.03, -1.0), (0.011, -1.0)] {
+            let track = sphere + side * RADIUS;
+            let round = 0.4;
+            let away = |center: &Point| (center.coords * side).try_normalize(1e-9);
+            for wrong in [0.0, 0.05, -0.2] {
+                let turn = side * track / RADIUS * round + wrong;
+                let motion = |t: f64| {
+                    let (sine, cosine) = (round * t).sin_cos();
+                    carried(Vector::new(cosine, sine, 0.0) * track, Vector::z() * turn * t)
+                };
+                // The slip per radian is the ball's radius; it turns with the contact frame, so its sum is a chord.
+                let expected = RADIUS * f64::abs(wrong) * (0.5 * round).sin() / (0.5 * round);
+                let found = slip_of(&motion, &away);
+                assert!((found - expected).abs() < 2e-8, "{sphere} {side} {wrong}: {found} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_error_falls_with_the_square_of_the_pieces() {
+        // A ball that rolls unevenly on a plane: nothing slides.
+        let turn = |t: f64| 2.0 * t + 0.8 * (3.0 * t).sin();
+        let motion = |t: f64| carried(Vector::new(RADIUS * turn(t), 0.0, RADIUS), Vector::y() * turn(t));
+        let error = |n_pieces| slide(&motion, &Point::origin(), RADIUS, &up, n_pieces).unwrap().norm();
+        for n_pieces in [8, 16, 32, 64] {
+            let order = (error(n_pieces) / error(2 * n_pieces)).log2();
+            assert!((order - 2.0).abs() < 0.15, "{n_pieces}: {order}");
+        }
+    }
+}
