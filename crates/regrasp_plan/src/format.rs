@@ -318,20 +318,9 @@ impl Reader<'_> {
 
 /// Every floating-point number of the plan.
 fn all_numbers(plan: &Plan) -> impl Iterator<Item = f64> + '_ {
-    let pose = |pose: &PoseData| pose.position.into_iter().chain(pose.quat_xyzw);
-    let p = &plan.promises;
-    let promises = [p.contact_tolerance, p.friction, p.required_margin, p.kept_margin, p.torque_scale];
-    let waypoints = plan.segments.iter().flat_map(|segment| &segment.waypoints);
-    let way = plan.way_poses.iter().flat_map(move |way_pose| pose(&way_pose.world_from_object));
-    promises.into_iter().chain(pose(&plan.start)).chain(way).chain(pose(&plan.goal)).chain(waypoints.flat_map(
-        move |waypoint| {
-            let contacts = waypoint
-                .contacts
-                .iter()
-                .flat_map(|contact| contact.point_in_object.into_iter().chain(contact.normal_in_object).flatten());
-            waypoint.joints.iter().copied().chain(pose(&waypoint.world_from_object)).chain(contacts)
-        },
-    ))
+    let way = plan.way_poses.iter().flat_map(|way_pose| way_pose.world_from_object.numbers());
+    let waypoints = plan.segments.iter().flat_map(|segment| &segment.waypoints).flat_map(crate::Waypoint::numbers);
+    plan.promises.numbers().chain(plan.start.numbers()).chain(way).chain(plan.goal.numbers()).chain(waypoints)
 }
 
 /// Byte offset of the value that `steps` lead to. `text` is valid JSON, or nothing is found.

@@ -22,6 +22,13 @@ pub struct PoseData {
     pub quat_xyzw: [f64; 4],
 }
 
+impl PoseData {
+    /// Every number of the pose.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
+        self.position.into_iter().chain(self.quat_xyzw)
+    }
+}
+
 impl From<&regrasp_geometry::Pose> for PoseData {
     fn from(pose: &regrasp_geometry::Pose) -> Self {
         let (position, quat_xyzw) = regrasp_geometry::frame::parts_of(pose);
@@ -125,6 +132,19 @@ pub struct Waypoint {
     pub contacts: Vec<ContactState>,
 }
 
+impl Waypoint {
+    /// Every number of the waypoint.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
+        let joints = self.joints.iter().chain(&self.joint_velocities).chain(&self.joint_torques).copied();
+        let of_contact = |contact: &ContactState| {
+            let vectors = [contact.point_in_object, contact.normal_in_object, contact.force_in_object];
+            vectors.into_iter().flatten().flatten().chain(contact.torsion)
+        };
+        let contacts = self.contacts.iter().flat_map(of_contact);
+        std::iter::once(self.time).chain(joints).chain(self.world_from_object.numbers()).chain(contacts)
+    }
+}
+
 /// Kind of a segment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -186,6 +206,29 @@ pub struct Promises {
     /// What the contact forces balance, and their limits; absent in plans without forces.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub forces: Option<ForcePromises>,
+}
+
+impl Promises {
+    /// Every number of the promises.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
+        let scalars = [
+            self.contact_tolerance,
+            self.friction,
+            self.friction_margin,
+            self.required_margin,
+            self.kept_margin,
+            self.torque_scale,
+            self.slip_tolerance,
+            self.motion.largest_speed,
+        ];
+        let motion = self.motion.joint_velocities.iter().chain(&self.motion.joint_accelerations).copied();
+        let of_forces = |forces: &'_ ForcePromises| {
+            let scalars = [forces.mass, forces.normal_force[0], forces.normal_force[1]].into_iter();
+            let limits = forces.joint_torques.iter().flatten().copied();
+            scalars.chain(forces.gravity_in_world.into_iter().flatten()).chain(limits).collect::<Vec<f64>>()
+        };
+        scalars.into_iter().chain(motion).chain(self.forces.iter().flat_map(of_forces))
+    }
 }
 
 /// Limits of the motion in time.

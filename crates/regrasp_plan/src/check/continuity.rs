@@ -37,10 +37,14 @@ pub fn check_form(model: &Model, plan: &Plan, log: &mut Log) {
     for (i, _) in plan.way_poses.iter().enumerate().filter(|(_, pose)| !is_pose(&pose.world_from_object)) {
         log.push(Violation::new(Kind::NotANumber, format!("way pose {i} is not a pose")));
     }
-    let p = &plan.promises;
-    let promises = [p.contact_tolerance, p.friction, p.required_margin, p.kept_margin, p.torque_scale];
-    if !promises.iter().all(|x| x.is_finite()) {
+    if !plan.promises.numbers().all(f64::is_finite) {
         log.push(Violation::new(Kind::NotANumber, "a promise is not a number"));
+    }
+    let n_joints = plan.joint_names.len();
+    let motion = &plan.promises.motion;
+    let n_torques = plan.promises.forces.as_ref().map_or(n_joints, |forces| forces.joint_torques.len());
+    if [motion.joint_velocities.len(), motion.joint_accelerations.len(), n_torques] != [n_joints; 3] {
+        log.push(Violation::new(Kind::WrongScene, format!("promises for other than {n_joints} joints")));
     }
     for (s, segment) in plan.segments.iter().enumerate() {
         if segment.waypoints.len() < 2 {
@@ -64,16 +68,25 @@ fn check_waypoint_form(plan: &Plan, waypoint: &Waypoint, at: Moment, log: &mut L
         );
         log.push(Violation::new(Kind::WrongScene, message).when(at));
     }
-    if !waypoint.joints.iter().all(|x| x.is_finite()) || !is_pose(&waypoint.world_from_object) {
-        log.push(Violation::new(Kind::NotANumber, "joints or object pose are not numbers, or no rotation").when(at));
+    let n_torques = waypoint.joint_torques.len();
+    if waypoint.joint_velocities.len() != plan.joint_names.len()
+        || (n_torques != 0 && n_torques != plan.joint_names.len())
+    {
+        let message = format!(
+            "{} velocities and {n_torques} torques, but {} joint names",
+            waypoint.joint_velocities.len(),
+            plan.joint_names.len()
+        );
+        log.push(Violation::new(Kind::WrongScene, message).when(at));
+    }
+    if !waypoint.numbers().all(f64::is_finite) || !is_pose(&waypoint.world_from_object) {
+        log.push(Violation::new(Kind::NotANumber, "what is not a number, or an object pose that is none").when(at));
     }
     for (finger, contact) in plan.fingers.iter().zip(&waypoint.contacts) {
         let complete = match contact.mode {
-            ContactMode::Free => contact.point_in_object.is_none() && contact.normal_in_object.is_none(),
+            ContactMode::Free => *contact == ContactState::FREE,
             ContactMode::Fixed | ContactMode::Rolling => match (contact.point_in_object, contact.normal_in_object) {
-                (Some(point), Some(normal)) => {
-                    point.iter().all(|x| x.is_finite()) && (Vector::from(normal).norm() - 1.0).abs() < 1e-9
-                }
+                (Some(_), Some(normal)) => (Vector::from(normal).norm() - 1.0).abs() < 1e-9,
                 _ => false,
             },
         };

@@ -48,6 +48,32 @@ pub struct Path {
     pub last_from_link: Matrix4<f64>,
 }
 
+/// A joint's axis where the joints before it have put it, in the world.
+#[derive(Debug, Clone, Copy)]
+pub struct DrivenAxis {
+    /// Index, in the joint vector, of the coordinate that drives it.
+    pub coordinate: usize,
+    /// The joint moves this much as fast as its coordinate.
+    pub multiplier: f64,
+    /// True for a sliding joint.
+    pub slides: bool,
+    /// Unit vector along the axis.
+    pub direction: Vector,
+    /// A point of the axis.
+    pub origin: Point,
+}
+
+impl DrivenAxis {
+    /// Work of a force at `point` and a couple, per unit of the coordinate: their share of its torque.
+    pub fn work(&self, force: &Vector, point: &Point, couple: &Vector) -> f64 {
+        let per_joint = match self.slides {
+            true => self.direction.dot(force),
+            false => self.direction.dot(&((point - self.origin).cross(force) + couple)),
+        };
+        self.multiplier * per_joint
+    }
+}
+
 /// Bounds over one step between two waypoints, whose parameter runs from 0 to 1.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Rates {
@@ -101,6 +127,22 @@ impl Path {
             frame = frame * joint.parent_from_joint * motion(joint, joint.position(joints));
         }
         frame * self.last_from_link
+    }
+
+    /// The axes of the path's joints that some coordinate drives, in the world.
+    pub fn axes(&self, joints: &[f64]) -> Vec<DrivenAxis> {
+        let mut frame = Matrix4::<f64>::identity();
+        let mut axes = Vec::new();
+        for joint in &self.joints {
+            frame *= joint.parent_from_joint;
+            if let Some(coordinate) = joint.coordinate {
+                let direction = frame.transform_vector(&joint.axis);
+                let origin = frame.transform_point(&Point::origin());
+                axes.push(DrivenAxis { coordinate, multiplier: joint.multiplier, slides: joint.slides, direction, origin });
+            }
+            frame *= motion(joint, joint.position(joints));
+        }
+        axes
     }
 
     /// True when some joint of the path moves between two joint vectors.

@@ -19,6 +19,8 @@ pub mod edges;
 pub mod far;
 /// `regrasp check`: everything is read afresh from files.
 pub mod files;
+/// Contact forces and joint torques.
+pub mod forces;
 /// The checker's own forward kinematics and motion bounds.
 pub mod kinematics;
 /// Lifting and landing of moving fingertips.
@@ -37,6 +39,8 @@ pub mod promises;
 pub mod rolling;
 /// Distance from the object's surface and the normals there.
 pub mod surface;
+/// When waypoints are passed, and how fast.
+pub mod times;
 /// What can be wrong with a plan.
 pub mod violation;
 /// Poses to be passed between start and goal.
@@ -76,6 +80,18 @@ pub struct CheckSettings {
     pub surface_tolerance: f64,
     /// Contact normals may be this far off the surface's, in radians.
     pub normal_tolerance: f64,
+    /// Contact forces and the object's weight may fail to balance by this much, and any force may be this far beyond a
+    /// limit, in newtons. Issue 4: 1e-6 N.
+    pub force_tolerance: f64,
+    /// Their moments about the centre of mass may fail to balance by this much, in newton metres. Issue 4: 1e-7 N m.
+    pub moment_tolerance: f64,
+    /// Joint torques may be off by this share of (force times largest lever arm).
+    pub torque_tolerance: f64,
+    /// Half-way between two waypoints the imbalance (torques over the torque scale) may be this share of the sum of all
+    /// normal forces.
+    pub half_way_imbalance: f64,
+    /// Joint velocities that should be zero, or below another, may miss that by this much, in rad/s or m/s.
+    pub velocity_tolerance: f64,
     /// Motion that is too small to be divided further when distances stay unresolved, in metres.
     pub resolution: f64,
     /// A lifted fingertip must get this far from the object before it may go anywhere, in metres.
@@ -99,6 +115,11 @@ impl Default for CheckSettings {
             largest_slide: 0.05,
             surface_tolerance: 1e-5,
             normal_tolerance: 1e-3,
+            force_tolerance: 1e-6,
+            moment_tolerance: 1e-7,
+            torque_tolerance: 1e-6,
+            half_way_imbalance: 0.05,
+            velocity_tolerance: 1e-6,
             resolution: 0.05e-3,
             lift_clearance: 0.1e-3,
             free_clearance: 0.05e-3,
@@ -134,6 +155,15 @@ pub struct Report {
     pub max_contact_error: f64,
     /// Largest slip of a finger that rolls, in a segment, in metres; none when no finger rolls.
     pub max_slip: Option<f64>,
+    /// Largest imbalance of forces and weight at a waypoint, in newtons; none in plans without forces.
+    pub max_force_residual: Option<f64>,
+    /// Largest imbalance of moments at a waypoint, in newton metres; none in plans without forces.
+    pub max_moment_residual: Option<f64>,
+    /// Largest imbalance half-way between waypoints, torques over the torque scale, as a share of the sum of all normal
+    /// forces; none in plans without forces.
+    pub max_half_way_imbalance: Option<f64>,
+    /// Time that the plan takes, in seconds.
+    pub duration: f64,
     /// Waypoints judged.
     pub n_waypoints: usize,
     /// Distances measured.
@@ -212,6 +242,13 @@ fn judge(
     contact::check_contacts(&scene.object, model, plan, settings, log);
     report.min_margin = promises::check_closure(&scene.object, model, plan, settings, log);
     promises::check_promises(&scene.object, plan, settings, report.min_margin, log);
+    times::check_times(&scene.object, model, plan, settings, log);
+    report.duration = times::duration(plan);
+    if let Some(balance) = forces::check_forces(&scene.object, model, plan, settings, log) {
+        report.max_force_residual = Some(balance.force);
+        report.max_moment_residual = Some(balance.moment);
+        report.max_half_way_imbalance = Some(balance.half_way);
+    }
     match bodies::Bodies::new(scene, model) {
         Err(message) => log.push(Violation::new(ViolationKind::WrongScene, message)),
         Ok(bodies) => {

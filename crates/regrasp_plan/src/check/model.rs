@@ -51,6 +51,23 @@ pub struct LimitRow {
     pub upper: f64,
 }
 
+/// How fast a joint may go and what its drive can do.
+#[derive(Debug, Clone)]
+pub struct DriveRow {
+    /// Name of the joint.
+    pub name: String,
+    /// Index in the joint vector of the coordinate that drives it.
+    pub coordinate: usize,
+    /// The joint moves this much as fast as its coordinate; 1 for the driven joint itself.
+    pub multiplier: f64,
+    /// True for a joint that follows another: it has no drive of its own.
+    pub follows: bool,
+    /// Highest speed, in rad/s or m/s, where the robot says one.
+    pub velocity: Option<f64>,
+    /// Highest torque or force, in N m or N, where the robot says one.
+    pub effort: Option<f64>,
+}
+
 /// Everything about the hand that is not a shape.
 #[derive(Debug, Clone)]
 pub struct Model {
@@ -62,6 +79,8 @@ pub struct Model {
     pub fingers: Vec<FingerModel>,
     /// Limits of all joints that have some.
     pub limits: Vec<LimitRow>,
+    /// What the joints that move with the joint vector can do.
+    pub drives: Vec<DriveRow>,
     /// Where the robot's root stands.
     pub world_from_root: Pose,
 }
@@ -106,13 +125,14 @@ impl Model {
             let id = robot.joint_named(name).ok_or_else(|| format!("the robot has no joint \"{name}\""))?;
             slides.push(robot.joints[id.0].kind == JointKind::Prismatic);
         }
-        Ok(Model { slides, limits: limit_rows(scene, &joint_names)?, joint_names, fingers, world_from_root })
+        let (limits, drives) = joint_rows(scene, &joint_names)?;
+        Ok(Model { slides, limits, drives, joint_names, fingers, world_from_root })
     }
 }
 
-fn limit_rows(scene: &Scene, joint_names: &[String]) -> Result<Vec<LimitRow>, String> {
+fn joint_rows(scene: &Scene, joint_names: &[String]) -> Result<(Vec<LimitRow>, Vec<DriveRow>), String> {
     let robot = &scene.hand.robot;
-    let mut rows = Vec::new();
+    let (mut rows, mut drives) = (Vec::new(), Vec::new());
     for (i, joint) in robot.joints.iter().enumerate() {
         let (driver, multiplier, offset) = match &joint.mimic {
             Some(mimic) => (mimic.joint.0, mimic.multiplier, mimic.offset),
@@ -120,6 +140,14 @@ fn limit_rows(scene: &Scene, joint_names: &[String]) -> Result<Vec<LimitRow>, St
         };
         let driver_name = &robot.joints.get(driver).ok_or("a coupled joint follows one that does not exist")?.name;
         let Some(coordinate) = joint_names.iter().position(|name| name == driver_name) else { continue };
+        drives.push(DriveRow {
+            name: joint.name.clone(),
+            coordinate,
+            multiplier,
+            follows: joint.mimic.is_some(),
+            velocity: joint.limits.and_then(|limits| limits.velocity),
+            effort: joint.limits.and_then(|limits| limits.effort),
+        });
         let bounded = matches!(joint.kind, JointKind::Revolute | JointKind::Prismatic);
         if let (true, Some(limits)) = (bounded, &joint.limits) {
             rows.push(LimitRow {
@@ -132,5 +160,5 @@ fn limit_rows(scene: &Scene, joint_names: &[String]) -> Result<Vec<LimitRow>, St
             });
         }
     }
-    Ok(rows)
+    Ok((rows, drives))
 }

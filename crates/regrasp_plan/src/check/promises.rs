@@ -15,6 +15,9 @@ const MARGIN_TOLERANCE: f64 = 1e-9;
 /// How far the kept margin may be above the one found here before it is a broken promise.
 const KEPT_MARGIN_TOLERANCE: f64 = 1e-6;
 
+/// Friction times its margin may be this much above the scene's: rounding.
+const FRICTION_TOLERANCE: f64 = 1e-9;
+
 /// The files of the plan against those of the scene as loaded now.
 pub fn check_inputs(plan: &Plan, inputs: &[InputFile], log: &mut Log) {
     for input in &plan.inputs {
@@ -144,6 +147,15 @@ pub fn check_promises(object: &Object, plan: &Plan, settings: &CheckSettings, mi
         let violation = Violation::new(Kind::FrictionAboveScene, message);
         log.push(violation.amount(promises.friction, object.friction));
     }
+    // The margin between the two frictions.
+    let divided = promises.friction * promises.friction_margin;
+    if promises.friction <= object.friction && divided > object.friction + FRICTION_TOLERANCE {
+        let message = format!(
+            "friction {} with a margin of {} needs {divided}, the scene has {}",
+            promises.friction, promises.friction_margin, object.friction
+        );
+        log.push(Violation::new(Kind::FrictionAboveScene, message).amount(divided, object.friction));
+    }
     let mut broken = |name: &str, amount: f64, limit: f64, message: String| {
         log.push(Violation::new(Kind::PromiseBroken, message).subjects([name]).amount(amount, limit));
     };
@@ -171,6 +183,10 @@ pub fn check_promises(object: &Object, plan: &Plan, settings: &CheckSettings, mi
     if (promises.torque_scale - scale).abs() > 1e-9 * scale {
         let message = format!("torque scale {}, the object's radius is {scale}", promises.torque_scale);
         broken("torque_scale", promises.torque_scale, scale, message);
+    }
+    if promises.friction_margin < 1.0 {
+        let message = format!("friction margin {} is below one", promises.friction_margin);
+        broken("friction_margin", promises.friction_margin, 1.0, message);
     }
     if promises.friction < 0.0 {
         let message = format!("friction {} is negative", promises.friction);

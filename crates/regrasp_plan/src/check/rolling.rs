@@ -126,6 +126,13 @@ impl<'a> Roll<'a> {
         self.object_from_link(t).transform_point(&self.finger.center)
     }
 
+    /// Where the tip touches, and the normal there, in the object frame.
+    pub fn contact(&self, t: f64) -> Option<(Point, Vector)> {
+        let center = self.center(t);
+        let foot = self.patch.foot(&center)?;
+        Some((foot, (center - foot).try_normalize(1e-9)?))
+    }
+
     /// Distance of the ball from the surface, negative when it presses in; infinite when no surface is near.
     fn gap(&self, center: &Point) -> f64 {
         let distance = self.patch.foot(center).map(|foot| (center - foot).norm());

@@ -81,6 +81,30 @@ pub enum ViolationKind {
     LandingOrLiftingNotFree,
     /// A promise is not one that a plan may make, or is not kept.
     PromiseBroken,
+    /// A force or torque is missing in a plan that promises forces, or there is one in a plan that promises none.
+    ForceMissing,
+    /// The contact forces do not balance the object's weight.
+    ForceUnbalanced,
+    /// A contact force that the fingertip cannot transmit: outside its cone.
+    ForceOutsideCone,
+    /// A holding finger presses less or more than promised.
+    NormalForceOutOfRange,
+    /// A finger still presses when it lifts off, or already when it lands.
+    MovingFingerPresses,
+    /// The joint torques are not those that make the contact forces.
+    TorqueWrong,
+    /// A joint needs more torque than promised.
+    TorqueLimit,
+    /// Time stands still, runs backward, or leaves none for forces to change.
+    TimeOrder,
+    /// A joint goes faster than promised.
+    JointTooFast,
+    /// A fingertip or the object goes faster than promised.
+    TooFast,
+    /// A joint's velocity changes faster than promised.
+    JointAcceleration,
+    /// Joint velocities that do not belong to the motion.
+    VelocityInconsistent,
 }
 
 /// One thing that is wrong.

@@ -1,0 +1,324 @@
+//! Contact forces and joint torques, by substitution: they balance the object's weight, stay in the exact cones and in the
+//! promised range, and the joints make them.
+//!
+//! Forces are those of the fingers on the object, in the object frame; moments are about its centre of mass. Between two
+//! segments pose and contacts stay and forces change linearly: what balances at both ends balances in between, and cones
+//! and limits are convex, so that the ends are all that has to be looked at.
+
+use crate::check::continuity::{contact_of, moving_finger, pose_between};
+use crate::check::model::Model;
+use crate::check::rolling::Roll;
+use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
+use crate::check::{CheckSettings, Log};
+use crate::plan::{ContactState, ForcePromises, Plan, Segment, SegmentKind, Waypoint};
+use regrasp_geometry::{Point, Pose, Vector};
+use regrasp_grasp::ContactModel;
+use regrasp_scene::Object;
+
+/// Standard gravity, in metres per second squared (CGPM 1901).
+const GRAVITY: f64 = 9.80665;
+/// Masses, gravities and limits may be off by this much, relatively: rounding.
+const ROUNDING: f64 = 1e-9;
+/// Torques may be this far off whatever the forces, in newton metres: rounding.
+const TORQUE_ROUNDING: f64 = 1e-9;
+
+/// How well forces balance: the largest residuals of the plan.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Balance {
+    /// Of forces at waypoints, in newtons.
+    pub force: f64,
+    /// Of moments at waypoints, in newton metres.
+    pub moment: f64,
+    /// Half-way between waypoints, torques over the torque scale, as a share of the sum of all normal forces.
+    pub half_way: f64,
+}
+
+/// What one finger exerts at one waypoint.
+#[derive(Debug, Clone, Copy)]
+struct Exerted {
+    finger: usize,
+    point: Point,
+    normal: Vector,
+    force: Vector,
+    torsion: f64,
+}
+
+impl Exerted {
+    fn pressing(&self) -> f64 {
+        -self.force.dot(&self.normal)
+    }
+
+    fn tangential(&self) -> f64 {
+        (self.force + self.normal * self.pressing()).norm()
+    }
+}
+
+/// Judges forces and torques of the whole plan; none when it promises no forces, and has none.
+pub fn check_forces(
+    object: &Object,
+    model: &Model,
+    plan: &Plan,
+    settings: &CheckSettings,
+    log: &mut Log,
+) -> Option<Balance> {
+    let Some(promises) = &plan.promises.forces else {
+        check_absent(plan, log);
+        return None;
+    };
+    check_promises(object, model, promises, log);
+    let judge = Judge { object, model, plan, promises, settings };
+    let mut balance = Balance::default();
+    for (s, segment) in plan.segments.iter().enumerate() {
+        let moving = moving_finger(model, segment).filter(|_| segment.kind == SegmentKind::Regrasp);
+        for (w, waypoint) in segment.waypoints.iter().enumerate() {
+            let at = Moment::at(s, w);
+            let Some(exerted) = judge.exerted(waypoint, at, log) else { continue };
+            let (force, moment) = judge.check_balance(waypoint, &exerted, at, log);
+            (balance.force, balance.moment) = (balance.force.max(force), balance.moment.max(moment));
+            for one in &exerted {
+                judge.check_contact(one, moving, at, log);
+            }
+            judge.check_torques(waypoint, &exerted, at, log);
+        }
+        for w in 1..segment.waypoints.len() {
+            let half_way = judge.check_half_way(segment, Moment::at(s, w - 1), log);
+            balance.half_way = balance.half_way.max(half_way);
+        }
+    }
+    Some(balance)
+}
+
+/// No forces are promised, so there are none.
+fn check_absent(plan: &Plan, log: &mut Log) {
+    for (s, segment) in plan.segments.iter().enumerate() {
+        for (w, waypoint) in segment.waypoints.iter().enumerate() {
+            let loaded = |contact: &ContactState| contact.force_in_object.is_some() || contact.torsion.is_some();
+            if !waypoint.joint_torques.is_empty() || waypoint.contacts.iter().any(loaded) {
+                let message = "forces or torques in a plan that promises none";
+                log.push(Violation::new(Kind::ForceMissing, message).when(Moment::at(s, w)));
+            }
+        }
+    }
+}
+
+/// Mass, gravity and limits against scene and robot.
+fn check_promises(object: &Object, model: &Model, promises: &ForcePromises, log: &mut Log) {
+    let mut broken = |name: &str, amount: f64, limit: f64, message: String| {
+        log.push(Violation::new(Kind::PromiseBroken, message).subjects([name]).amount(amount, limit));
+    };
+    if (promises.mass - object.mass).abs() > ROUNDING * object.mass {
+        let message = format!("mass {} kg, the scene's object has {} kg", promises.mass, object.mass);
+        broken("mass", promises.mass, object.mass, message);
+    }
+    // The direction is the scene's where it states one; scenes have none yet.
+    if let Some(gravity) = promises.gravity_in_world.map(|gravity| Vector::from(gravity).norm())
+        && (gravity - GRAVITY).abs() > 1e-6
+    {
+        broken("gravity_in_world", gravity, GRAVITY, format!("gravity of {gravity} m/s^2 instead of {GRAVITY}"));
+    }
+    let [least, largest] = promises.normal_force;
+    if !(least >= 0.0 && least <= largest) {
+        broken("normal_force", least, largest, format!("normal forces from {least} N to {largest} N"));
+    }
+    for drive in model.drives.iter().filter(|drive| !drive.follows) {
+        let Some(effort) = drive.effort else { continue };
+        let promised = promises.joint_torques[drive.coordinate].unwrap_or(f64::INFINITY);
+        if promised > effort * (1.0 + ROUNDING) {
+            let message = format!("torque {promised} of joint \"{}\", the robot allows {effort}", drive.name);
+            broken("joint_torques", promised, effort, message);
+        }
+    }
+    for limit in promises.joint_torques.iter().flatten().filter(|limit| **limit < 0.0) {
+        broken("joint_torques", *limit, 0.0, format!("a torque limit of {limit}"));
+    }
+    if promises.gravity_in_world.is_none() {
+        check_room_for_any_gravity(log);
+    }
+}
+
+/// Forces of plans that hold whatever the direction of gravity balance no weight and leave room for that of every
+/// direction. How much room, the format does not say yet; until it does, such plans are not accepted.
+fn check_room_for_any_gravity(log: &mut Log) {
+    let message = "forces for gravity of any direction cannot be judged by this version";
+    log.push(Violation::new(Kind::ForceUnbalanced, message).subjects(["gravity_in_world"]));
+}
+
+struct Judge<'a> {
+    object: &'a Object,
+    model: &'a Model,
+    plan: &'a Plan,
+    promises: &'a ForcePromises,
+    settings: &'a CheckSettings,
+}
+
+impl Judge<'_> {
+    /// What every holding finger exerts; none, and a violation, when a force or torque is missing.
+    fn exerted(&self, waypoint: &Waypoint, at: Moment, log: &mut Log) -> Option<Vec<Exerted>> {
+        let mut missing = |what: String| {
+            log.push(Violation::new(Kind::ForceMissing, what).when(at));
+            None
+        };
+        if waypoint.joint_torques.len() != self.plan.joint_names.len() {
+            return missing(format!("{} joint torques", waypoint.joint_torques.len()));
+        }
+        let mut exerted = Vec::new();
+        for (finger, state) in waypoint.contacts.iter().enumerate() {
+            let Some(contact) = contact_of(state) else { continue };
+            let Some(force) = state.force_in_object else {
+                return missing(format!("finger \"{}\" holds without a force", self.model.fingers[finger].name));
+            };
+            exerted.push(Exerted {
+                finger,
+                point: contact.point_in_object,
+                normal: contact.normal_in_object.into_inner(),
+                force: Vector::from(force),
+                torsion: state.torsion.unwrap_or(0.0),
+            });
+        }
+        Some(exerted)
+    }
+
+    /// The object's weight, in the object frame.
+    fn weight(&self, world_from_object: &Pose) -> Vector {
+        let gravity = self.promises.gravity_in_world.map_or(Vector::zeros(), Vector::from);
+        world_from_object.rotation.inverse() * gravity * self.promises.mass
+    }
+
+    /// Force, and moment about the centre of mass, that are left when everything is added up.
+    fn residual(&self, world_from_object: &Pose, exerted: &[Exerted]) -> (Vector, Vector) {
+        let mut sum = (self.weight(world_from_object), Vector::zeros());
+        for one in exerted {
+            sum.0 += one.force;
+            sum.1 += (one.point - self.object.center_of_mass).cross(&one.force) + one.normal * one.torsion;
+        }
+        sum
+    }
+
+    fn check_balance(&self, waypoint: &Waypoint, exerted: &[Exerted], at: Moment, log: &mut Log) -> (f64, f64) {
+        let (force, moment) = self.residual(&Pose::from(&waypoint.world_from_object), exerted);
+        let (force, moment) = (force.norm(), moment.norm());
+        let CheckSettings { force_tolerance, moment_tolerance, .. } = *self.settings;
+        if force > force_tolerance || moment > moment_tolerance {
+            let message = format!("forces and weight leave {force:.3e} N and {moment:.3e} N m");
+            let violation = Violation::new(Kind::ForceUnbalanced, message).when(at).subjects(["object"]);
+            log.push(match force > force_tolerance {
+                true => violation.amount(force, force_tolerance),
+                false => violation.amount(moment, moment_tolerance),
+            });
+        }
+        (force, moment)
+    }
+
+    /// The cone of the finger's contact model, and the range of its normal force.
+    fn check_contact(&self, one: &Exerted, moving: Option<usize>, at: Moment, log: &mut Log) {
+        let finger = &self.model.fingers[one.finger];
+        let tolerance = self.settings.force_tolerance;
+        let mut report = |kind: Kind, message: String, amount: f64, limit: f64| {
+            let violation = Violation::new(kind, message).when(at).subjects([finger.name.as_str()]);
+            log.push(violation.amount(amount, limit));
+        };
+        if moving == Some(one.finger) {
+            let size = one.force.norm();
+            if size > tolerance || one.torsion.abs() > self.settings.moment_tolerance {
+                let message = format!("moving finger \"{}\" presses with {size:.3e} N", finger.name);
+                report(Kind::MovingFingerPresses, message, size, tolerance);
+            }
+            return;
+        }
+        let friction = self.plan.promises.friction.min(self.object.friction);
+        let pressing = one.pressing();
+        let (across, room) = match finger.contact {
+            ContactModel::Frictionless => (one.tangential().max(one.torsion.abs() / self.object.radius), 0.0),
+            // With no friction every contact is frictionless.
+            ContactModel::SoftFinger { torsion_radius } if friction > 0.0 => {
+                (one.tangential().hypot(one.torsion / torsion_radius), friction * pressing)
+            }
+            // No torsion at all: any counts as if it were sliding by itself.
+            _ if one.torsion != 0.0 => (f64::INFINITY, friction * pressing),
+            _ => (one.tangential(), friction * pressing),
+        };
+        if across > room + tolerance {
+            let message = format!(
+                "finger \"{}\" exerts {across:.4e} N across the normal (torsion over its radius counted), {room:.4e} N are left by friction",
+                finger.name
+            );
+            report(Kind::ForceOutsideCone, message, across, room);
+        }
+        let [least, largest] = self.promises.normal_force;
+        if pressing < least - tolerance || pressing > largest + tolerance {
+            let message = format!("finger \"{}\" presses with {pressing:.6} N, not {least} to {largest} N", finger.name);
+            report(Kind::NormalForceOutOfRange, message, pressing, if pressing < least { least } else { largest });
+        }
+    }
+
+    /// Torques by virtual work: a coordinate's is the work of force and torsion per unit of it, over all joints that it
+    /// drives. Joints of free fingers make none.
+    fn check_torques(&self, waypoint: &Waypoint, exerted: &[Exerted], at: Moment, log: &mut Log) {
+        let world_from_object = Pose::from(&waypoint.world_from_object);
+        let mut expected = vec![0.0; waypoint.joint_torques.len()];
+        let mut tolerance = vec![TORQUE_ROUNDING; expected.len()];
+        for one in exerted {
+            let finger = &self.model.fingers[one.finger];
+            let (force, couple) = (world_from_object * one.force, world_from_object * one.normal * one.torsion);
+            let point = world_from_object * one.point;
+            let axes = finger.path.axes(&waypoint.joints);
+            let arm = axes.iter().map(|axis| (point - axis.origin).norm()).fold(0.0, f64::max);
+            for axis in axes {
+                expected[axis.coordinate] += axis.work(&force, &point, &couple);
+                let size = if axis.slides { force.norm() } else { force.norm() * arm + couple.norm() };
+                tolerance[axis.coordinate] += self.settings.torque_tolerance * size * axis.multiplier.abs();
+            }
+        }
+        for (k, name) in self.plan.joint_names.iter().enumerate() {
+            let torque = waypoint.joint_torques[k];
+            let error = (torque - expected[k]).abs();
+            if error > tolerance[k] {
+                let message = format!("joint \"{name}\" has torque {torque:.6e}, its forces need {:.6e}", expected[k]);
+                let violation = Violation::new(Kind::TorqueWrong, message).when(at);
+                log.push(violation.subjects([name.as_str()]).amount(error, tolerance[k]));
+            }
+            let limit = self.promises.joint_torques[k].unwrap_or(f64::INFINITY);
+            if torque.abs() > limit * (1.0 + ROUNDING) + TORQUE_ROUNDING {
+                let message = format!("joint \"{name}\" needs torque {torque:.4}, {limit:.4} is allowed");
+                let violation = Violation::new(Kind::TorqueLimit, message).when(at);
+                log.push(violation.subjects([name.as_str()]).amount(torque.abs(), limit));
+            }
+        }
+    }
+
+    /// What is left half-way from a waypoint to the next, as a share of the sum of all normal forces.
+    fn check_half_way(&self, segment: &Segment, at: Moment, log: &mut Log) -> f64 {
+        let (from, to) = (&segment.waypoints[at.waypoint], &segment.waypoints[at.waypoint + 1]);
+        let mut exerted = Vec::new();
+        for (f, (before, after)) in from.contacts.iter().zip(&to.contacts).enumerate() {
+            let (Some(first), Some(second)) = (contact_of(before), contact_of(after)) else { continue };
+            let mean = |a: Option<[f64; 3]>, b: Option<[f64; 3]>| Some((Vector::from(a?) + Vector::from(b?)) * 0.5);
+            let Some(force) = mean(before.force_in_object, after.force_in_object) else { continue };
+            let torsion = 0.5 * (before.torsion.unwrap_or(0.0) + after.torsion.unwrap_or(0.0));
+            let (point, normal) = if first == second {
+                (first.point_in_object, first.normal_in_object.into_inner())
+            } else {
+                let tolerance = self.plan.promises.contact_tolerance;
+                let roll = Roll::new(&self.model.fingers[f], from, to, &self.object.shape, tolerance);
+                let Some(contact) = roll.contact(0.5) else { continue };
+                contact
+            };
+            exerted.push(Exerted { finger: f, point, normal, force, torsion });
+        }
+        let pressing: f64 = exerted.iter().map(Exerted::pressing).sum();
+        let ends = [from, to].map(|waypoint| Pose::from(&waypoint.world_from_object));
+        let (force, moment) = self.residual(&pose_between(&ends[0], &ends[1], 0.5), &exerted);
+        let share = force.norm().hypot(moment.norm() / self.object.radius) / pressing.max(1e-9);
+        let limit = self.settings.half_way_imbalance;
+        if share > limit {
+            let message = format!(
+                "half-way to the next waypoint forces and weight leave {:.3e} N and {:.3e} N m",
+                force.norm(),
+                moment.norm()
+            );
+            let violation = Violation::new(Kind::ForceUnbalanced, message).when(Moment { fraction: 0.5, ..at });
+            log.push(violation.subjects(["object"]).amount(share, limit));
+        }
+        share
+    }
+}
