@@ -1,6 +1,6 @@
 //! Reading and writing `plan.json`, and its JSON Schema. `docs/plan-format.md` describes the file.
 
-use crate::plan::{ContactMode, FORMAT, FORMAT_VERSION, Plan, PoseData};
+use crate::plan::{ContactMode, ContactState, FORMAT, FORMAT_VERSION, ForcePromises, Plan, PoseData};
 use regrasp_base::diagnostic::{Diagnostics, number};
 use regrasp_base::{Diagnostic, InputError, Place};
 use serde::Deserialize;
@@ -18,6 +18,8 @@ mod caps {
     pub const WAY_POSES: usize = 10_000;
     /// Largest position, in metres or radians.
     pub const POSITION: f64 = 1e6;
+    /// Largest time, velocity, acceleration, force, torque or mass.
+    pub const SIZE: f64 = 1e9;
     /// Diagnostics per file; a broken writer breaks every waypoint in the same way.
     pub const DIAGNOSTICS: usize = 20;
 }
@@ -79,7 +81,7 @@ pub fn to_json(plan: &Plan) -> String {
 ///
 /// Errors, with line and column: not JSON or not the shape of a plan (`C401`), another format (`C402`), another version
 /// (`C403`), vectors of the wrong length (`C404`), a quaternion or normal that is not of length one (`C405`), no
-/// motion (`C406`), a contact without point or with one too many (`C407`), a name used twice or unknown (`C408`), a
+/// motion (`C406`), a contact that lacks something or has too much (`C407`), a name used twice or unknown (`C408`), a
 /// number that makes no sense (`C409`), too much of something (`C410`).
 pub fn from_json(path: &Path, bytes: &[u8]) -> Result<Plan, InputError> {
     if bytes.len() as u64 > caps::BYTES {
@@ -215,11 +217,14 @@ impl Reader<'_> {
             ("required_margin", promises.required_margin, 0.0, 1.0),
             ("kept_margin", promises.kept_margin, 0.0, 1.0),
             ("torque_scale", promises.torque_scale, 1e-9, 1e3),
+            ("friction_margin", promises.friction_margin, 1.0, 1e3),
+            ("slip_tolerance", promises.slip_tolerance, 0.0, 1.0),
         ] {
-            if !(low..=high).contains(&value) {
-                let expected = format!("a number from {low} to {high}");
-                self.fail("C409", &[Key("promises"), Key(key)], format!("is {value}"), expected);
-            }
+            self.within(&[Key("promises"), Key(key)], value, low, high);
+        }
+        self.motion_limits(plan);
+        if let Some(forces) = &promises.forces {
+            self.force_promises(plan, forces);
         }
         self.pose(&[Key("start")], &plan.start);
         self.pose(&[Key("goal")], &plan.goal);
@@ -264,6 +269,61 @@ impl Reader<'_> {
         }
     }
 
+    fn within(&mut self, steps: &[Step], value: f64, low: f64, high: f64) {
+        if !(low..=high).contains(&value) {
+            let expected = format!("a number from {} to {}", number(low), number(high));
+            self.fail("C409", steps, format!("is {}", number(value)), expected);
+        }
+    }
+
+    /// A vector of one value for each joint, none larger than any that makes sense.
+    fn per_joint(&mut self, plan: &Plan, steps: &[Step], values: &[f64], n_expected: usize) {
+        if values.len() != n_expected {
+            let expected = match n_expected {
+                0 => "none: \"promises\" has no \"forces\"".into(),
+                _ => format!("{}, one for each of \"joint_names\"", plan.joint_names.len()),
+            };
+            self.fail("C404", steps, format!("has {} values", values.len()), expected);
+        }
+        if let Some(value) = values.iter().find(|value| value.abs() > caps::SIZE) {
+            let expected = format!("at most {} in size", number(caps::SIZE));
+            self.fail("C409", steps, format!("holds {}", number(*value)), expected);
+        }
+    }
+
+    fn motion_limits(&mut self, plan: &Plan) {
+        use Step::Key;
+        let motion = &plan.promises.motion;
+        let inside = |key| [Key("promises"), Key("motion"), Key(key)];
+        self.within(&inside("largest_speed"), motion.largest_speed, 1e-9, caps::SIZE);
+        let limits =
+            [("joint_velocities", &motion.joint_velocities), ("joint_accelerations", &motion.joint_accelerations)];
+        for (key, values) in limits {
+            self.per_joint(plan, &inside(key), values, plan.joint_names.len());
+            if let Some(value) = values.iter().find(|value| **value <= 0.0) {
+                self.fail("C409", &inside(key), format!("holds {}", number(*value)), "limits above 0".into());
+            }
+        }
+    }
+
+    fn force_promises(&mut self, plan: &Plan, forces: &ForcePromises) {
+        use Step::Key;
+        let inside = |key| [Key("promises"), Key("forces"), Key(key)];
+        self.within(&inside("mass"), forces.mass, 1e-9, caps::SIZE);
+        for component in forces.gravity_in_world.into_iter().flatten() {
+            self.within(&inside("gravity_in_world"), component, -1e3, 1e3);
+        }
+        let [least, largest] = forces.normal_force;
+        self.within(&inside("normal_force"), least, 0.0, caps::SIZE);
+        self.within(&inside("normal_force"), largest, least, caps::SIZE);
+        let limits: Vec<f64> = forces.joint_torques.iter().map(|limit| limit.unwrap_or(0.0)).collect();
+        self.per_joint(plan, &inside("joint_torques"), &limits, plan.joint_names.len());
+        if let Some(limit) = limits.iter().find(|limit| **limit < 0.0) {
+            let steps = inside("joint_torques");
+            self.fail("C409", &steps, format!("holds {}", number(*limit)), "limits of 0 or more, or null".into());
+        }
+    }
+
     fn waypoint(&mut self, plan: &Plan, at: &[Step; 4], waypoint: &crate::Waypoint) {
         use Step::{Index, Key};
         let inside = |key| [at[0], at[1], at[2], at[3], Key(key)];
@@ -276,6 +336,11 @@ impl Reader<'_> {
             let expected = format!("at most {} in size", caps::POSITION);
             self.fail("C409", &inside("joints"), format!("holds {}", number(*value)), expected);
         }
+        self.within(&inside("time"), waypoint.time, 0.0, caps::SIZE);
+        let n_joints = plan.joint_names.len();
+        self.per_joint(plan, &inside("joint_velocities"), &waypoint.joint_velocities, n_joints);
+        let n_torques = if plan.promises.forces.is_some() { n_joints } else { 0 };
+        self.per_joint(plan, &inside("joint_torques"), &waypoint.joint_torques, n_torques);
         self.pose(&inside("world_from_object"), &waypoint.world_from_object);
         if waypoint.contacts.len() != plan.fingers.len() {
             let problem = format!("has {} entries", waypoint.contacts.len());
@@ -300,6 +365,27 @@ impl Reader<'_> {
                 }
                 _ => self.fail("C407", &steps, "holds but lacks its point or normal".into(), "both".into()),
             }
+            self.contact_force(plan, &steps, contact);
+        }
+    }
+
+    fn contact_force(&mut self, plan: &Plan, steps: &[Step], contact: &ContactState) {
+        let is_loaded = contact.force_in_object.is_some() || contact.torsion.is_some();
+        if contact.mode == ContactMode::Free {
+            if is_loaded {
+                self.fail("C407", steps, "is free but has a force or torsion".into(), "neither".into());
+            }
+        } else if plan.promises.forces.is_none() {
+            if is_loaded {
+                let problem = "has a force or torsion, but \"promises\" has no \"forces\"";
+                self.fail("C407", steps, problem.into(), "neither".into());
+            }
+        } else if contact.force_in_object.is_none() {
+            self.fail("C407", steps, "holds but lacks its force, which \"promises\" has".into(), "a force".into());
+        }
+        let numbers = contact.force_in_object.into_iter().flatten().chain(contact.torsion);
+        if let Some(value) = numbers.into_iter().find(|value| value.abs() > caps::SIZE) {
+            self.fail("C409", steps, format!("has a force of {}", number(value)), "newtons".into());
         }
     }
 

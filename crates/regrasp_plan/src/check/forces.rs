@@ -246,7 +246,8 @@ impl Judge<'_> {
         }
         let [least, largest] = self.promises.normal_force;
         if pressing < least - tolerance || pressing > largest + tolerance {
-            let message = format!("finger \"{}\" presses with {pressing:.6} N, not {least} to {largest} N", finger.name);
+            let message =
+                format!("finger \"{}\" presses with {pressing:.6} N, not {least} to {largest} N", finger.name);
             report(Kind::NormalForceOutOfRange, message, pressing, if pressing < least { least } else { largest });
         }
     }
@@ -293,7 +294,7 @@ impl Judge<'_> {
         for (f, (before, after)) in from.contacts.iter().zip(&to.contacts).enumerate() {
             let (Some(first), Some(second)) = (contact_of(before), contact_of(after)) else { continue };
             let mean = |a: Option<[f64; 3]>, b: Option<[f64; 3]>| Some((Vector::from(a?) + Vector::from(b?)) * 0.5);
-            let Some(force) = mean(before.force_in_object, after.force_in_object) else { continue };
+            let Some(force) = mean(before.force_in_object, after.force_in_object) else { return 0.0 };
             let torsion = 0.5 * (before.torsion.unwrap_or(0.0) + after.torsion.unwrap_or(0.0));
             let (point, normal) = if first == second {
                 (first.point_in_object, first.normal_in_object.into_inner())

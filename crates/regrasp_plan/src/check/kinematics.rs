@@ -138,7 +138,13 @@ impl Path {
             if let Some(coordinate) = joint.coordinate {
                 let direction = frame.transform_vector(&joint.axis);
                 let origin = frame.transform_point(&Point::origin());
-                axes.push(DrivenAxis { coordinate, multiplier: joint.multiplier, slides: joint.slides, direction, origin });
+                axes.push(DrivenAxis {
+                    coordinate,
+                    multiplier: joint.multiplier,
+                    slides: joint.slides,
+                    direction,
+                    origin,
+                });
             }
             frame *= motion(joint, joint.position(joints));
         }

@@ -92,6 +92,8 @@ pub struct CheckSettings {
     pub half_way_imbalance: f64,
     /// Joint velocities that should be zero, or below another, may miss that by this much, in rad/s or m/s.
     pub velocity_tolerance: f64,
+    /// Where forces change between two segments, at least this much time lies between, in seconds.
+    pub shortest_pause: f64,
     /// Motion that is too small to be divided further when distances stay unresolved, in metres.
     pub resolution: f64,
     /// A lifted fingertip must get this far from the object before it may go anywhere, in metres.
@@ -120,6 +122,7 @@ impl Default for CheckSettings {
             torque_tolerance: 1e-6,
             half_way_imbalance: 0.05,
             velocity_tolerance: 1e-6,
+            shortest_pause: 1e-3,
             resolution: 0.05e-3,
             lift_clearance: 0.1e-3,
             free_clearance: 0.05e-3,

@@ -52,7 +52,8 @@ fn check_limits(model: &Model, plan: &Plan, log: &mut Log) {
     for drive in model.drives.iter().filter(|drive| !drive.follows) {
         let promised = motion.joint_velocities[drive.coordinate];
         if let Some(limit) = drive.velocity.filter(|limit| promised > limit * (1.0 + ROUNDING)) {
-            let message = format!("joint \"{}\" is promised {promised} per second, the robot allows {limit}", drive.name);
+            let message =
+                format!("joint \"{}\" is promised {promised} per second, the robot allows {limit}", drive.name);
             let violation = Violation::new(Kind::PromiseBroken, message);
             log.push(violation.subjects(["joint_velocities", drive.name.as_str()]).amount(promised, limit));
         }
@@ -105,7 +106,15 @@ fn check_accelerations(
 }
 
 /// Mean speeds of fingertips and object in a step.
-fn check_speeds(object: &Object, model: &Model, plan: &Plan, from: &Waypoint, to: &Waypoint, at: Moment, log: &mut Log) {
+fn check_speeds(
+    object: &Object,
+    model: &Model,
+    plan: &Plan,
+    from: &Waypoint,
+    to: &Waypoint,
+    at: Moment,
+    log: &mut Log,
+) {
     let span = to.time - from.time;
     let limit = plan.promises.motion.largest_speed;
     let mut report = |name: &str, way: f64| {
@@ -162,20 +171,16 @@ fn allowed(before: f64, after: f64) -> (f64, f64) {
 fn check_pause(end: &Waypoint, begin: &Waypoint, s: usize, settings: &CheckSettings, log: &mut Log) {
     let span = begin.time - end.time;
     let force = |contact: &ContactState| contact.force_in_object.map_or(Vector::zeros(), Vector::from);
-    let changes = end
-        .contacts
-        .iter()
-        .zip(&begin.contacts)
-        .map(|(a, b)| (force(a) - force(b)).norm())
-        .fold(0.0, f64::max);
+    let changes =
+        end.contacts.iter().zip(&begin.contacts).map(|(a, b)| (force(a) - force(b)).norm()).fold(0.0, f64::max);
     let what = if span < 0.0 {
         format!("begins {:.3e} s before the segment before has ended", -span)
-    } else if span == 0.0 && changes > settings.force_tolerance {
-        format!("leaves no time in which forces change by {changes:.3e} N")
+    } else if span < settings.shortest_pause && changes > settings.force_tolerance {
+        format!("leaves {span:.3e} s in which forces change by {changes:.3e} N")
     } else {
         return;
     };
-    log.push(Violation::new(Kind::TimeOrder, what).when(Moment::at(s, 0)).amount(span, 0.0));
+    log.push(Violation::new(Kind::TimeOrder, what).when(Moment::at(s, 0)).amount(span, settings.shortest_pause));
 }
 
 #[cfg(test)]

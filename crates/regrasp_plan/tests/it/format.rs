@@ -78,11 +78,49 @@ fn every_kind_of_damage_is_named_with_its_place() {
         ("C409", cut(&|p| p.promises.friction = -0.1), "promises.friction".into()),
         ("C409", cut(&|p| p.inputs[0].sha256 = "abc".into()), "abc".into()),
         ("C409", cut(&|p| p.segments[0].waypoints[2].joints[0] = 1e9), format!("plan.json:{third_line}:")),
+        ("C404", cut(&|p| p.segments[0].waypoints[2].joint_velocities.truncate(3)), format!("plan.json:{third_line}:")),
+        ("C404", cut(&|p| p.segments[0].waypoints[2].joint_torques = vec![0.0; 12]), "\"forces\"".into()),
+        ("C404", cut(&|p| p.promises.motion.joint_velocities.truncate(3)), "motion.joint_velocities".into()),
+        ("C409", cut(&|p| p.promises.motion.joint_accelerations[2] = 0.0), "above 0".into()),
+        ("C409", cut(&|p| p.promises.motion.largest_speed = -1.0), "largest_speed".into()),
+        ("C409", cut(&|p| p.promises.friction_margin = 0.9), "friction_margin".into()),
+        ("C409", cut(&|p| p.promises.slip_tolerance = -1e-9), "slip_tolerance".into()),
+        ("C409", cut(&|p| p.segments[0].waypoints[2].time = -1.0), format!("plan.json:{third_line}:")),
+        (
+            "C407",
+            cut(&|p| p.segments[0].waypoints[2].contacts[1].force_in_object = Some([0.0; 3])),
+            "has no \"forces\"".into(),
+        ),
+        ("C407", cut(&|p| p.segments[1].waypoints[2].contacts[1].torsion = Some(0.0)), "free but has a force".into()),
         ("C410", cut(&|p| p.fingers = (0..65).map(|i| i.to_string()).collect()), "65".into()),
     ];
     for (code, text, part) in cases {
         let message = read(&text).unwrap_err();
         assert!(message.contains(code) && message.contains(&part), "wanted {code} and {part:?} in:\n{message}");
+    }
+}
+
+#[test]
+fn damaged_forces_are_named_with_their_place() {
+    let scene = sample::scene();
+    let good = crate::loaded::plan(&scene);
+    assert_eq!(read(&to_json(&good)).as_ref(), Ok(&good));
+    type Damage<'a> = &'a dyn Fn(&mut Plan);
+    let cases: [(&str, Damage, &str); 8] = [
+        ("C404", &|p| p.segments[0].waypoints[2].joint_torques.clear(), "waypoints[2].joint_torques"),
+        ("C404", &|p| _ = p.promises.forces.as_mut().unwrap().joint_torques.pop(), "forces.joint_torques"),
+        ("C407", &|p| p.segments[0].waypoints[2].contacts[0].force_in_object = None, "lacks its force"),
+        ("C409", &|p| p.promises.forces.as_mut().unwrap().mass = 0.0, "forces.mass"),
+        ("C409", &|p| p.promises.forces.as_mut().unwrap().normal_force = [3.0, 2.0], "forces.normal_force"),
+        ("C409", &|p| p.promises.forces.as_mut().unwrap().joint_torques[1] = Some(-1.0), "forces.joint_torques"),
+        ("C409", &|p| p.promises.forces.as_mut().unwrap().gravity_in_world = Some([0.0, 0.0, 1e6]), "gravity_in_world"),
+        ("C409", &|p| p.segments[0].waypoints[2].contacts[0].force_in_object = Some([1e12; 3]), "has a force of"),
+    ];
+    for (code, damage, part) in cases {
+        let mut plan = good.clone();
+        damage(&mut plan);
+        let message = read(&to_json(&plan)).unwrap_err();
+        assert!(message.contains(code) && message.contains(part), "wanted {code} and {part:?} in:\n{message}");
     }
 }
 

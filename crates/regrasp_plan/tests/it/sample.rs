@@ -72,8 +72,8 @@ fn robot() -> Robot {
             let limits = LIMITS.get(j).map(|(low, high)| Limits {
                 lower: low.to_radians(),
                 upper: high.to_radians(),
-                velocity: None,
-                effort: None,
+                velocity: Some(3.0),
+                effort: Some(1.0),
             });
             let joint = JointId(robot.joints.len());
             robot.links.push(Link { name: format!("f{f}_l{j}"), collision, parent_joint: Some(joint) });
