@@ -3,12 +3,16 @@
 //!
 //! Amounts are small: a mutant that any check would catch proves nothing.
 
+/// Forces, torques, and what is promised of them.
+mod forces;
 /// Fingers that are free, and fingers that are said to be.
 mod free;
 /// Good plans in hands of other contacts and couplings.
 mod hand;
 /// Fingertips that roll, and fingertips that are said to.
 mod rolling;
+/// Times and velocities.
+mod times;
 /// Way poses gone wrong.
 mod way;
 
@@ -54,6 +58,8 @@ pub fn mutants(plan: &Plan, scene: &Scene, rng: &mut Rng) -> Vec<Mutant> {
     breeder.break_couplings();
     breeder.break_free_fingers();
     breeder.break_rolling();
+    breeder.break_forces();
+    breeder.break_times();
     breeder.found
 }
 

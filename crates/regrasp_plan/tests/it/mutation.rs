@@ -10,16 +10,19 @@ use std::collections::{BTreeMap, BTreeSet};
 fn every_mutant_is_rejected_for_a_fitting_reason() {
     let scene = sample::scene();
     let soft = sample::soft_scene();
+    let loaded = [crate::loaded::load(sample::plan_with_way(&scene), &scene), crate::loaded::plan(&soft)];
     let plans = [
         (&scene, sample::plan_with_way(&scene)),
         (&scene, sample::plan_with_free_finger(&scene)),
         (&soft, sample::plan_with_two_away(&soft)),
         (&scene, crate::rolled::plan(&scene, 10)),
+        (&scene, loaded[0].clone()),
+        (&soft, loaded[1].clone()),
     ];
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     let mut kinds = BTreeSet::new();
     let mut wrong = Vec::new();
-    for round in 0..80 {
+    for round in 0..54 {
         let (scene, plan) = &plans[round as usize % plans.len()];
         let query = sample::query(plan);
         for mutant in mutants(plan, scene, &mut Rng::keyed(1, "mutation", round)) {
@@ -55,6 +58,16 @@ fn every_mutant_is_rejected_for_a_fitting_reason() {
         "rolling contact declared as fixed",
         "finger stops rolling on its way",
         "finger rolls while the object rests",
+        "two fingers squeezed beyond their cones",
+        "moments out of balance, forces in balance",
+        "moving finger presses when it lifts or lands",
+        "soft fingertip twists harder than it can",
+        "hard fingertip exerts torsion",
+        "torque limit promised above the robot's",
+        "a step too fast",
+        "no time for forces to change",
+        "joint acceleration promised below the motion's",
+        "velocity with which the motion turns back",
     ] {
         assert!(counts.contains_key(name), "{name} was never made");
     }
@@ -83,6 +96,18 @@ fn every_mutant_is_rejected_for_a_fitting_reason() {
         Collision,
         LandingOrLiftingNotFree,
         PromiseBroken,
+        ForceMissing,
+        ForceUnbalanced,
+        ForceOutsideCone,
+        NormalForceOutOfRange,
+        MovingFingerPresses,
+        TorqueWrong,
+        TorqueLimit,
+        TimeOrder,
+        JointTooFast,
+        TooFast,
+        JointAcceleration,
+        VelocityInconsistent,
     ] {
         assert!(kinds.contains(&kind), "{kind:?} was never the reason");
     }
