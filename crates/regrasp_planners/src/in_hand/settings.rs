@@ -279,10 +279,15 @@ impl Default for InHandSettings {
 }
 
 impl InHandSettings {
-    /// The settings of geometry alone, as in paper 000: contacts stay where they are while the object moves, and all of the
-    /// friction is counted on.
+    /// The settings of geometry alone, as in paper 000: contacts stay where they are while the object moves, all of the
+    /// friction is counted on, and nobody asks about forces.
     pub fn plain() -> Self {
-        InHandSettings { transfer: TransferMode::Fixed, friction_margin: 1.0, ..InHandSettings::default() }
+        InHandSettings {
+            transfer: TransferMode::Fixed,
+            friction_margin: 1.0,
+            forces: None,
+            ..InHandSettings::default()
+        }
     }
 
     /// What is wrong with the settings, if anything: one sentence per field.

@@ -176,7 +176,6 @@ const MAX_SPEED: f64 = 1e6;
 #[cfg(test)]
 mod tests {
     use super::super::InHandSettings;
-    use super::*;
 
     #[test]
     fn bad_settings_are_told() {
