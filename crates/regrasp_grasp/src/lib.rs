@@ -8,6 +8,9 @@ pub mod closure;
 pub mod contact;
 /// The margin: a certified lower bound of the Ferrari-Canny radius.
 pub mod margin;
+/// Wrenches, and contact forces that balance them.
+pub mod wrench;
 
 pub use closure::{Closure, GraspFrame, Separation, Verdict, closure_margin};
 pub use contact::{Contact, ContactForce, ContactModel, Grip};
+pub use wrench::{ForceLimits, ForceProblem, NoForces, Wrench};

@@ -2,6 +2,8 @@
 
 /// Who may not touch whom.
 pub mod collision_pairs;
+/// Which way things fall.
+pub mod gravity;
 /// The scene file.
 pub mod load;
 /// The object that is manipulated.
@@ -12,6 +14,7 @@ pub mod query;
 pub mod scene;
 
 pub use collision_pairs::{CollisionPairs, FingerShapeId, collision_pairs};
+pub use gravity::{Gravity, STANDARD_GRAVITY};
 pub use load::{Goal, InHandTask, LoadedScene, StartOrientation, load_scene};
 pub use object::Object;
 pub use query::{GraspRequest, InHandQuery};

@@ -1,5 +1,6 @@
 //! The scene: hand, object, obstacles.
 
+use crate::gravity::Gravity;
 use crate::object::Object;
 use regrasp_geometry::collision::MeshBody;
 use regrasp_geometry::shape::PlacedShape;
@@ -41,6 +42,8 @@ pub struct Scene {
     pub object: Object,
     /// Obstacles.
     pub obstacles: Vec<Obstacle>,
+    /// Gravity, where the file states it; along the world's -Z otherwise, unless a planner is told another direction.
+    pub gravity: Option<Gravity>,
     /// The files it was read from, the scene file first.
     pub inputs: Vec<InputFile>,
 }

@@ -1,6 +1,7 @@
-//! Closure against second ways of knowing.
+//! Closure and forces against second ways of knowing.
 
 mod closed_forms;
 mod closure;
+mod forces;
 mod polyhedral;
 mod sample;

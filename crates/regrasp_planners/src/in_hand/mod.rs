@@ -19,6 +19,10 @@ mod decompose;
 mod endpoints;
 /// Sampling GS_n.
 mod explore;
+/// Contact forces of the fingers.
+mod forces;
+/// Forces and torques along a plan.
+mod forces_along;
 /// Postures of free fingers.
 mod free;
 /// Two gait trees that grow until they meet.
@@ -78,10 +82,12 @@ mod visibility;
 /// Configurations and continuous collision tests.
 mod workspace;
 
-pub use settings::{Alpha, CostWeights, InHandSettings, Method, ReleaseRule, TransferMode};
+pub use settings::{
+    Alpha, CostWeights, ForceSettings, GravityInHand, InHandSettings, Method, ReleaseRule, SpeedSettings, TransferMode,
+};
 pub use validate::{NotProven, validate_once};
 
-use crate::failure::Failure;
+use crate::failure::{Failure, FailureKind};
 use attempts::{Left, run_attempts};
 use endpoints::{End, given_grasp, refuse_after_transfers, refuse_hopeless};
 use legs::{Legs, Solution, plan_legs};
@@ -90,8 +96,9 @@ use regrasp_base::{Budget, Interrupt, Rng};
 use regrasp_plan::Plan;
 use regrasp_plan::plan::Statistics;
 use regrasp_scene::{InHandQuery, Scene};
-use search::Search;
+use search::{Search, Stop};
 use std::sync::atomic::AtomicUsize;
+use tally::Reason;
 
 /// What a running search tells its caller.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -119,6 +126,7 @@ pub fn plan_in_hand(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Plan, Failure> {
     settings.validate().expect("settings are validated where they are read");
+    refuse_two_gravities(scene, settings)?;
     let model = Model::new(scene, &effective(settings));
     refuse_hopeless(&model, query)?;
     let poses = query.poses();
@@ -131,20 +139,35 @@ pub fn plan_in_hand(
     let (base_work, max_work) = work_limits(&model, &legs, budget);
     let found = run_attempts(settings.n_threads, base_work, max_work, |index, work, winner| {
         let mut search = Search::new(&model, (start_pose, goal_pose), (seed, index), (budget, work), winner, progress);
-        let solution = plan_legs(&mut search, &legs);
-        (solution, Left::of(&search))
+        let planned = plan_legs(&mut search, &legs).and_then(|solution| {
+            let plan = record::record(&model, query, seed, &solution, Statistics::default()).map_err(|unbalanced| {
+                search.tally.add(Reason::NoForces(unbalanced));
+                Stop::Restart
+            })?;
+            Ok((solution, plan))
+        });
+        (planned, Left::of(&search))
     });
     match found {
-        Ok((solution, left, n_restarts)) => {
+        Ok(((solution, plan), left, n_restarts)) => {
             let statistics = left.statistics(n_restarts);
-            let (solution, statistics) = improved(&model, &legs, seed, budget, (solution, statistics), progress);
-            Ok(record::record(&model, query, seed, &solution, statistics))
+            let first = (solution, with_counts(plan, statistics));
+            Ok(improved(&model, &legs, query, seed, budget, first, progress))
         }
         Err((interrupt, left, n_attempts)) => {
             let failure = left.failure(&model, &poses, interrupt, n_attempts);
             let has_tried_all = interrupt == Interrupt::WorkSpent && max_work < budget.max_work;
             Err(if has_tried_all { refuse_after_transfers(&model, failure) } else { failure })
         }
+    }
+}
+
+/// The scene's gravity and that of the settings are one, where both are stated.
+fn refuse_two_gravities(scene: &Scene, settings: &InHandSettings) -> Result<(), Failure> {
+    let advice = "state gravity in the scene or in the settings, not in both";
+    match settings::gravity_of(scene, settings.gravity.as_ref()) {
+        Ok(_) => Ok(()),
+        Err(message) => Err(Failure::bare(FailureKind::Impossible, message, advice)),
     }
 }
 
@@ -161,30 +184,49 @@ fn work_limits(model: &Model, legs: &Legs, budget: &Budget) -> (u64, u64) {
 /// Work after which a hand that cannot change its grasp is refused: some thousand grasps and transfers. By hand.
 const TRANSFERS_WORK: u64 = 40_000;
 
-/// A solution after the improvement that the settings ask for, and the statistics with it.
+/// The plan of a solution after the improvement that the settings ask for; the same plan where what is better geometry
+/// leaves no forces.
 fn improved(
     model: &Model,
     legs: &Legs,
+    query: &InHandQuery,
     seed: u64,
     budget: &Budget,
-    (solution, mut statistics): (Solution, Statistics),
+    (solution, mut plan): (Solution, Plan),
     progress: &(dyn Fn(Progress) + Sync),
-) -> (Solution, Statistics) {
-    let work = model.settings.improve_work.min(budget.max_work.saturating_sub(statistics.work));
+) -> Plan {
+    let work = model.settings.improve_work.min(budget.max_work.saturating_sub(plan.statistics.work));
     if model.settings.improve_work == 0 {
-        return (solution, statistics);
+        return plan;
     }
     let budget = budget.of_improvement();
     let ends = (legs.poses[0], legs.poses[legs.n_legs()]);
     let winner = AtomicUsize::new(usize::MAX);
     let mut search = Search::new(model, ends, (seed, 0), (&budget, work), &winner, progress);
     search.rng = Rng::keyed(seed, "improvement", 0);
-    let (solution, improvement) = improve::improve(&mut search, legs, solution);
-    statistics.work += improvement.work;
-    statistics.samples += search.n_samples;
-    statistics.cut_by_time |= search.cut_by_time;
-    statistics.improvement = Some(Box::new(improvement));
-    (solution, statistics)
+    let (solution, mut improvement) = improve::improve(&mut search, legs, solution);
+    let mut counts = plan.statistics.clone();
+    match record::record(model, query, seed, &solution, Statistics::default()) {
+        Ok(better) => plan = better,
+        Err(_) => improvement.improved = improvement.first,
+    }
+    counts.work += improvement.work;
+    counts.samples += search.n_samples;
+    counts.cut_by_time |= search.cut_by_time;
+    counts.improvement = Some(Box::new(improvement));
+    with_counts(plan, counts)
+}
+
+/// The plan with the counts of a search beside those of its own motions.
+fn with_counts(mut plan: Plan, counts: Statistics) -> Plan {
+    let own = plan.statistics;
+    plan.statistics = Statistics {
+        transfers: own.transfers,
+        transfers_with_free_fingers: own.transfers_with_free_fingers,
+        relocations: own.relocations,
+        ..counts
+    };
+    plan
 }
 
 /// The settings that a method really plans with: those of paper 000 have the paper's release rule (section 4.2.2).

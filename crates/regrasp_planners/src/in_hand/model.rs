@@ -12,6 +12,7 @@ use regrasp_robot::kinematics::motion_bound::MotionBound;
 use regrasp_scene::Scene;
 use std::sync::Arc;
 
+use super::forces::ForceModel;
 use super::settings::{InHandSettings, TransferMode};
 
 /// Most fingers a hand may have.
@@ -118,6 +119,8 @@ pub struct Model<'a> {
     pub obstacles: BallTree,
     /// What closure is asked about; friction as planned with.
     pub frame: GraspFrame,
+    /// What contact forces balance, and their limits; None for plans without forces.
+    pub forces: Option<ForceModel>,
     /// Largest distance of a point of the object from its frame's origin: bounds its motion when it turns.
     pub object_reach: f64,
     /// False for hands of which the others can never hold while one finger is away: they never change their grasp.
@@ -248,6 +251,7 @@ impl<'a> Model<'a> {
                 torque_scale: scene.object.radius,
                 friction: scene.object.friction / settings.friction_margin,
             },
+            forces: ForceModel::new(scene, settings),
             object_reach: bodies[object].center.coords.norm() + bodies[object].radius,
             radii: bodies.iter().map(|body| body.radius).collect(),
             bodies,

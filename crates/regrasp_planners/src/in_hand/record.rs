@@ -1,5 +1,7 @@
 //! The plan as it is written to a file.
 
+use super::forces::Unbalanced;
+use super::forces_along::add_forces;
 use super::legs::Solution;
 use super::model::Model;
 use super::state::{GraspState, Moment, Motion, Sequence, no_contact};
@@ -19,7 +21,15 @@ pub const CONTACT_TOLERANCE: f64 = 0.0005;
 pub const SLIP_TOLERANCE: f64 = 0.0001;
 
 /// Makes the plan of `solution`.
-pub fn record(model: &Model, query: &InHandQuery, seed: u64, solution: &Solution, statistics: Statistics) -> Plan {
+///
+/// Errors: a moment at which no contact forces balance the weight: a plan without them is none.
+pub fn record(
+    model: &Model,
+    query: &InHandQuery,
+    seed: u64,
+    solution: &Solution,
+    statistics: Statistics,
+) -> Result<Plan, Unbalanced> {
     let Solution { way, steps_to_way } = solution;
     let mut recorder = Recorder::at(model, way.start(), false);
     recorder.sequence(way);
@@ -165,7 +175,15 @@ impl<'m, 'a> Recorder<'m, 'a> {
     }
 
     /// The plan.
-    pub fn finish(mut self, query: &InHandQuery, seed: u64, steps_to_way: &[usize], statistics: Statistics) -> Plan {
+    ///
+    /// Errors: as [`record`].
+    pub fn finish(
+        mut self,
+        query: &InHandQuery,
+        seed: u64,
+        steps_to_way: &[usize],
+        statistics: Statistics,
+    ) -> Result<Plan, Unbalanced> {
         self.keep(self.holding);
         if self.segments.is_empty() {
             // Start and goal are the same and any grasp will do: hold still.
@@ -179,8 +197,10 @@ impl<'m, 'a> Recorder<'m, 'a> {
             ..statistics
         };
         let (model, scene) = (self.model, self.model.scene);
-        timing::assign_times(&mut self.segments);
-        Plan {
+        let forces = add_forces(model, &mut self.segments)?;
+        let motion = timing::limits(model);
+        timing::assign_times(model, &motion, &mut self.segments);
+        Ok(Plan {
             format: FORMAT.into(),
             format_version: FORMAT_VERSION,
             tool: concat!("regrasp ", env!("CARGO_PKG_VERSION")).into(),
@@ -204,8 +224,8 @@ impl<'m, 'a> Recorder<'m, 'a> {
                 torque_scale: model.frame.torque_scale,
                 friction_margin: model.settings.friction_margin,
                 slip_tolerance: SLIP_TOLERANCE,
-                motion: timing::limits(model),
-                forces: None,
+                motion,
+                forces,
             },
             joint_names: scene.hand.joint_names(),
             fingers: scene.hand.fingers.iter().map(|finger| finger.name.clone()).collect(),
@@ -214,7 +234,7 @@ impl<'m, 'a> Recorder<'m, 'a> {
             goal: PoseData::from(&query.world_from_object_goal),
             segments: self.segments,
             statistics,
-        }
+        })
     }
 }
 

@@ -1,5 +1,9 @@
 //! Settings of the in-hand planner. Every default says where it comes from.
 
+mod physics;
+
+pub use physics::{AnyDirection, ForceSettings, GravityInHand, SpeedSettings, gravity_of};
+
 use serde::{Deserialize, Serialize};
 
 /// Which algorithm plans.
@@ -219,6 +223,12 @@ pub struct InHandSettings {
     pub improve_work: u64,
     /// What makes a plan better.
     pub cost: CostWeights,
+    /// Contact forces; none for plans that say nothing about them.
+    pub forces: Option<ForceSettings>,
+    /// Gravity, where the scene leaves it open.
+    pub gravity: Option<GravityInHand>,
+    /// How fast plans are carried out.
+    pub speed: SpeedSettings,
     /// Schedule of alpha, for the methods of paper 000.
     pub alpha: Alpha,
     /// Share of the poses that the methods of paper 000 draw around the way from start to goal. The others are turned
@@ -259,6 +269,9 @@ impl Default for InHandSettings {
             shortcuts: 8,
             improve_work: 0,
             cost: CostWeights::default(),
+            forces: Some(ForceSettings::default()),
+            gravity: None,
+            speed: SpeedSettings::default(),
             alpha: Alpha::Constant { value: 0.9 },
             guided_share: 0.9,
         }
@@ -266,10 +279,15 @@ impl Default for InHandSettings {
 }
 
 impl InHandSettings {
-    /// The settings of geometry alone, as in paper 000: contacts stay where they are while the object moves, and all of the
-    /// friction is counted on.
+    /// The settings of geometry alone, as in paper 000: contacts stay where they are while the object moves, all of the
+    /// friction is counted on, and nobody asks about forces.
     pub fn plain() -> Self {
-        InHandSettings { transfer: TransferMode::Fixed, friction_margin: 1.0, ..InHandSettings::default() }
+        InHandSettings {
+            transfer: TransferMode::Fixed,
+            friction_margin: 1.0,
+            forces: None,
+            ..InHandSettings::default()
+        }
     }
 
     /// What is wrong with the settings, if anything: one sentence per field.
@@ -315,6 +333,11 @@ impl InHandSettings {
             return Err("lift_heights must be a list of heights between 0 and 0.2 m".into());
         }
         self.cost.validate()?;
+        if let Some(forces) = &self.forces {
+            forces.validate()?;
+        }
+        self.gravity.as_ref().map_or(Ok(()), GravityInHand::validate)?;
+        self.speed.validate()?;
         self.alpha.validate()
     }
 }

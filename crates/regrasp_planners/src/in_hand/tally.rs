@@ -1,6 +1,7 @@
 //! Why attempts failed: counted on the way, told when no plan is found.
 
 use super::combine::{ClosureTable, Held};
+use super::forces::Unbalanced;
 use super::model::{MAX_FINGERS, Model, Pair};
 use crate::failure::Cause;
 use regrasp_geometry::Pose;
@@ -22,6 +23,8 @@ pub enum Reason {
     TooNear(Pair),
     /// Between two grasps a contact would have to cross an edge of the object.
     Crease,
+    /// There are no contact forces that balance the weight.
+    NoForces(Unbalanced),
     /// A path in GS_n could not be cut into transfers and regrasps.
     NotDecomposed,
 }
@@ -118,6 +121,7 @@ impl Tally {
                     }
                     Reason::OutOfReach => "a finger reaches no farther while the object moves".into(),
                     Reason::Crease => "a contact would have to slide over an edge of the object".into(),
+                    Reason::NoForces(unbalanced) => unbalanced.in_words(model),
                     Reason::NotDecomposed => {
                         "a path with sliding contacts has no transfers and regrasps near it".into()
                     }
@@ -145,6 +149,7 @@ impl Tally {
                 Reason::OutOfReach => "out_of_reach",
                 Reason::TooNear(_) => "too_near",
                 Reason::Crease => "crease",
+                Reason::NoForces(_) => "no_forces",
                 Reason::NotDecomposed => "not_decomposed",
             };
             *counts.entry(key.to_owned()).or_default() += count;

@@ -7,6 +7,7 @@
 
 mod contact;
 mod files;
+mod gravity;
 mod object;
 mod pose;
 mod shape;
@@ -15,6 +16,7 @@ mod units;
 
 pub use task::{Goal, InHandTask, StartOrientation};
 
+use crate::gravity::Gravity;
 use crate::scene::{InputFile, Scene};
 use files::Files;
 use regrasp_base::InputError;
@@ -63,9 +65,9 @@ pub fn load_scene(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Inp
     let parts = document.as_ref().and_then(|document| read(Table::root(document), &mut files, &mut found));
     let (notes, diagnostics) = (found.notes, found.diagnostics);
     let parts = diagnostics.into_result(parts)?;
-    let Parts { hand, object, obstacles, task } = parts.expect("what could not be read has left a diagnostic");
+    let Parts { hand, object, obstacles, gravity, task } = parts.expect("what could not be read has left a diagnostic");
     let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-    let scene = Scene { name, hand, object, obstacles, inputs: files.inputs };
+    let scene = Scene { name, hand, object, obstacles, gravity, inputs: files.inputs };
     Ok(LoadedScene { scene, task, notes })
 }
 
@@ -73,6 +75,7 @@ struct Parts {
     hand: Hand,
     object: crate::object::Object,
     obstacles: Vec<crate::scene::Obstacle>,
+    gravity: Option<Gravity>,
     task: InHandTask,
 }
 
@@ -83,6 +86,7 @@ fn read(mut root: Table, files: &mut Files, found: &mut Found) -> Option<Parts> 
     }
     task_name(&mut root, found);
     let hand = hand(&mut root, files, found);
+    let gravity = gravity::gravity(&mut root, hand.as_ref(), found);
     let object = object::object(&mut root, files, found);
     let obstacles = object::obstacles(&mut root, files, found);
     let start = task::start(&mut root, hand.as_ref(), found);
@@ -95,7 +99,7 @@ fn read(mut root: Table, files: &mut Files, found: &mut Found) -> Option<Parts> 
         }
     }
     root.finish(found);
-    Some(Parts { hand: hand?, object: object?, obstacles, task: task? })
+    Some(Parts { hand: hand?, object: object?, obstacles, gravity, task: task? })
 }
 
 /// `task`. Errors: missing (`S102`), another task (`S105`).

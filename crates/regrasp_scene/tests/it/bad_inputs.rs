@@ -109,6 +109,21 @@ fn another_format_version_or_task() {
 }
 
 #[test]
+fn gravity_that_is_no_direction() {
+    let stated = |gravity: &str| with("task = \"in_hand\"\n", &format!("task = \"in_hand\"\ngravity = {gravity}\n"));
+    refused(
+        &stated("[0, 0.0, 0]"),
+        "S107 scene.toml:4:11 key \"gravity\": is the zero vector, which is no direction; expected a direction in the hand's \
+         frame, of any length, or \"any\"",
+    );
+    refused_with(&stated("\"down\""), &["S104 scene.toml:4:11 key \"gravity\": is \"down\"", "\"any\""]);
+    refused_with(&stated("9.81"), &["S103 scene.toml:4:11 key \"gravity\": is 9.81"]);
+    refused_with(&stated("[0, 0]"), &["S103 scene.toml:4:11 key \"gravity\": has 2 values"]);
+    refused_with(&stated("[0, 0, nan]"), &["V001 scene.toml:4:18 key \"gravity[2]\""]);
+    refused_with(&with("friction = 0.8", "friction = 0.8\ngravity = \"any\""), &["S101", "object.gravity"]);
+}
+
+#[test]
 fn no_shape_or_two() {
     refused_with(
         &with("sphere = { radius = 0.032 }\n", ""),

@@ -2,7 +2,7 @@
 
 use crate::support::{Folder, GOOD};
 use regrasp_geometry::{Point, Vector};
-use regrasp_scene::{GraspRequest, InHandTask};
+use regrasp_scene::{GraspRequest, Gravity, InHandTask};
 
 fn task(text: &str) -> InHandTask {
     Folder::new().load(text).unwrap_or_else(|error| panic!("{error}")).task
@@ -120,4 +120,23 @@ fn hand_pose_and_rest_posture_take_effect() {
         |hand: &regrasp_robot::Hand| hand.fingers[0].chain.tip(&[0.1, 0.2, 0.3], &hand.fingers[0].tip.center_in_body);
     let (before, after) = (tip(&plain), tip(&moved));
     assert!((after - Point::new(0.1 - before.x, -before.y, before.z)).norm() < 1e-12);
+}
+
+#[test]
+fn gravity_is_a_direction_of_the_hand() {
+    let load = |gravity: &str| {
+        let text = GOOD.replace("task = \"in_hand\"\n", &format!("task = \"in_hand\"\n{gravity}\n")).replace(
+            "file = \"hand.toml\"\n",
+            "file = \"hand.toml\"\nworld_from_hand = { position = [0, 0, 0], quat_xyzw = [1, 0, 0, 0] }\n",
+        );
+        Folder::new().load(&text).unwrap_or_else(|error| panic!("{error}")).scene.gravity
+    };
+    // The hand is turned upside down about x: its y and z are the world's -y and -z.
+    let Some(Gravity::Direction(down)) = load("gravity = [0, 0, 20]") else { panic!("a direction was stated") };
+    assert!((down.into_inner() - Vector::new(0.0, 0.0, -1.0)).norm() < 1e-12);
+    let Some(Gravity::Direction(down)) = load("gravity = [3, 4, 0]") else { panic!("a direction was stated") };
+    assert!((down.into_inner() - Vector::new(0.6, -0.8, 0.0)).norm() < 1e-12);
+    assert_eq!(load("gravity = \"any\""), Some(Gravity::Any));
+    assert_eq!(load(""), None);
+    assert_eq!(Gravity::default().in_world(), Some(Vector::new(0.0, 0.0, -9.80665)));
 }

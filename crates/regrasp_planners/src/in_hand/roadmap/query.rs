@@ -8,6 +8,7 @@ use super::super::search::{Search, Stop};
 use super::super::settings::InHandSettings;
 use super::super::shorten::{Arrival, transfer_regrasp};
 use super::super::state::{GraspState, Motion, Sequence};
+use super::super::tally::Reason;
 use super::GraspRoadmap;
 use super::anchor::{Link, QueryEnd};
 use super::build::legs_of;
@@ -179,7 +180,13 @@ impl<'a> RoadmapPlanner<'a> {
                 };
                 let statistics =
                     Statistics { nodes: n_expanded as u64, work: search.workspace.work, ..Statistics::default() };
-                let mut plan = recorder.finish(query, seed, &[], statistics);
+                let mut plan = match recorder.finish(query, seed, &[], statistics) {
+                    Ok(plan) => plan,
+                    Err(unbalanced) => {
+                        search.tally.add(Reason::NoForces(unbalanced));
+                        return Ok(Err(self.failure(unbalanced.in_words(&self.model), search)));
+                    }
+                };
                 plan.method = "roadmap".into();
                 return Ok(Ok(Answer { plan, links: [first, last] }));
             }

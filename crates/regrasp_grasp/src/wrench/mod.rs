@@ -1,0 +1,12 @@
+//! Wrenches on the object, and the contact forces that balance them.
+
+/// The minimum of a quadratic, with a logarithmic barrier before every limit.
+mod barrier;
+/// Contact forces that balance a load.
+pub mod force_distribution;
+/// Newton steps, contact by contact.
+mod newton_step;
+
+pub use force_distribution::{
+    BalancedForces, ForceLimits, ForceProblem, JointRow, JointRows, NoForces, Reserve, Wrench, can_balance, distribute,
+};

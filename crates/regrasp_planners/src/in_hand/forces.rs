@@ -1,0 +1,216 @@
+//! Contact forces of the hand's fingers: what balances the object's weight within all limits.
+
+use super::model::{MAX_FINGERS, Model};
+use super::settings::gravity_of;
+use super::settings::{ForceSettings, InHandSettings};
+use super::workspace::Contacts;
+use arrayvec::ArrayVec;
+use regrasp_geometry::Vector;
+use regrasp_geometry::collision::Placement;
+use regrasp_grasp::wrench::force_distribution::MAX_ROWS;
+use regrasp_grasp::wrench::{
+    BalancedForces, ForceLimits, ForceProblem, JointRow, JointRows, NoForces, Wrench, can_balance, distribute,
+};
+use regrasp_grasp::{Contact, ContactForce, Grip};
+use regrasp_plan::plan::ForcePromises;
+use regrasp_robot::kinematics::body_frame::BodyFrame;
+use regrasp_robot::kinematics::chain::Motion;
+use regrasp_robot::kinematics::finger_ik::Coordinates;
+use regrasp_scene::{Gravity, Scene};
+
+/// What contact forces balance, and their limits.
+#[derive(Debug)]
+pub struct ForceModel {
+    /// Limits and wishes.
+    limits: ForceLimits,
+    /// Mass of the object.
+    mass: f64,
+    /// Direction.
+    gravity: Gravity,
+    /// Largest torque of every joint, finger by finger; infinite where there is no limit.
+    torques: ArrayVec<ArrayVec<f64, MAX_ROWS>, MAX_FINGERS>,
+}
+
+/// Which limit leaves no forces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Unbalanced {
+    /// Friction: no forces do, however large.
+    AtAnyForce,
+    /// This finger would have to press with less than the least normal force.
+    TooLight(usize),
+    /// This finger would have to press with more than the largest normal force.
+    TooHard(usize),
+    /// This joint of this finger would need more than its limit.
+    TooWeak(usize, usize),
+}
+
+impl ForceModel {
+    /// Of a scene; None for plans without forces.
+    pub fn new(scene: &Scene, settings: &InHandSettings) -> Option<Self> {
+        let ForceSettings { squeeze, squeeze_weight, normal_force: [least, largest], torque_share } = settings.forces?;
+        let effort = |name: &String| {
+            let joint = scene.hand.robot.joint_named(name)?;
+            scene.hand.robot.joints[joint.0].limits?.effort
+        };
+        let torque = |name: &String| effort(name).map_or(f64::INFINITY, |effort| effort * torque_share);
+        Some(ForceModel {
+            limits: ForceLimits { least, largest, squeeze, squeeze_weight },
+            mass: scene.object.mass,
+            gravity: gravity_of(scene, settings.gravity.as_ref()).unwrap_or_default(),
+            torques: scene.hand.fingers.iter().map(|f| f.chain.names.iter().map(torque).collect()).collect(),
+        })
+    }
+
+    /// What a plan promises about its forces.
+    pub fn promises(&self) -> ForcePromises {
+        ForcePromises {
+            mass: self.mass,
+            gravity_in_world: self.gravity.in_world().map(Into::into),
+            normal_force: [self.limits.least, self.limits.largest],
+            joint_torques: self.torques.iter().flatten().map(|&limit| Some(limit).filter(|l| l.is_finite())).collect(),
+        }
+    }
+
+    /// Weight of the object, in its frame.
+    fn load(&self, world_from_object: &Placement) -> Wrench {
+        let gravity = self.gravity.in_world().unwrap_or_else(Vector::zeros);
+        Wrench::at_center_of_mass(world_from_object.vector_to_child(&gravity) * self.mass)
+    }
+}
+
+impl Unbalanced {
+    /// In words.
+    pub fn in_words(&self, model: &Model) -> String {
+        let finger_name = |f: usize| model.scene.hand.fingers[f].name.as_str();
+        let limits = model.forces.as_ref().map_or([0.0; 2], |forces| [forces.limits.least, forces.limits.largest]);
+        let cause = match *self {
+            Unbalanced::AtAnyForce => format!("friction {:.3} does not hold it at any force", model.frame.friction),
+            Unbalanced::TooLight(f) => {
+                format!("finger \"{}\" would have to press with less than {} N", finger_name(f), limits[0])
+            }
+            Unbalanced::TooHard(f) => {
+                format!("finger \"{}\" would have to press with more than {} N", finger_name(f), limits[1])
+            }
+            Unbalanced::TooWeak(f, j) => {
+                let chain = &model.scene.hand.fingers[f].chain;
+                let slides = chain.joints.iter().any(|joint| joint.coordinate == j && joint.motion == Motion::Slide);
+                let limit = model.forces.as_ref().map_or(0.0, |forces| forces.torques[f][j]);
+                let unit = if slides { "N" } else { "N m" };
+                format!("joint \"{}\" would need more than {limit} {unit}", chain.names[j])
+            }
+        };
+        let what = match model.forces.as_ref().map(|forces| forces.gravity) {
+            Some(Gravity::Any) => "the weight in every direction",
+            _ => "the weight",
+        };
+        format!("no contact forces balance {what}: {cause}")
+    }
+}
+
+/// A grasp at a pose, ready to be asked about forces.
+pub struct Held {
+    /// Fingers that hold, in order.
+    pub fingers: ArrayVec<usize, MAX_FINGERS>,
+    grips: ArrayVec<Grip, MAX_FINGERS>,
+    joints: ArrayVec<JointRows, MAX_FINGERS>,
+    load: Wrench,
+}
+
+impl Held {
+    /// The fingers of `holding` at their contacts; `joints` gives those of each.
+    pub fn new<'j>(
+        model: &Model,
+        forces: &ForceModel,
+        world_from_object: &Placement,
+        contacts: &Contacts,
+        holding: u32,
+        joints: impl Fn(usize) -> &'j [f64],
+    ) -> Self {
+        let fingers: ArrayVec<usize, MAX_FINGERS> =
+            (0..model.n_fingers()).filter(|finger| holding & (1 << finger) != 0).collect();
+        let rows = |&finger: &usize| {
+            joint_rows(model, finger, &forces.torques[finger], joints(finger), world_from_object, &contacts[finger])
+        };
+        Held {
+            grips: fingers.iter().map(|&finger| model.grip(finger, &contacts[finger])).collect(),
+            joints: fingers.iter().map(rows).collect(),
+            load: forces.load(world_from_object),
+            fingers,
+        }
+    }
+
+    fn problem<'p>(&'p self, model: &'p Model, forces: &ForceModel) -> ForceProblem<'p> {
+        ForceProblem {
+            grips: &self.grips,
+            joints: &self.joints,
+            reserves: &[],
+            frame: &model.frame,
+            load: self.load,
+            limits: forces.limits,
+        }
+    }
+
+    /// The forces of the fingers; `warm` are those of the moment before.
+    pub fn forces(
+        &self,
+        model: &Model,
+        forces: &ForceModel,
+        warm: Option<&BalancedForces>,
+    ) -> Result<BalancedForces, Unbalanced> {
+        distribute(&self.problem(model, forces), warm.map(|warm| warm.as_slice())).map_err(|cause| match cause {
+            NoForces::NotBalanced => Unbalanced::AtAnyForce,
+            NoForces::LeastNormalForce { grip } => Unbalanced::TooLight(self.fingers[grip]),
+            NoForces::LargestNormalForce { grip } => Unbalanced::TooHard(self.fingers[grip]),
+            NoForces::JointTorque { grip, joint } => Unbalanced::TooWeak(self.fingers[grip], joint),
+        })
+    }
+
+    /// True when there are forces.
+    pub fn is_balanced(&self, model: &Model, forces: &ForceModel) -> bool {
+        can_balance(&self.problem(model, forces))
+    }
+
+    /// Torques of all joints of the holding finger `index` for what it exerts.
+    pub fn torques(&self, index: usize, exerted: &ContactForce) -> Coordinates {
+        self.joints[index].iter().map(|row| row.torque(exerted)).collect()
+    }
+}
+
+/// Rows of the transposed Jacobian of the point of the tip that touches, at the tip's centre less its radius along the
+/// normal, in the object frame; coupled joints by virtual work.
+fn joint_rows(
+    model: &Model,
+    finger: usize,
+    limits: &[f64],
+    joints: &[f64],
+    world_from_object: &Placement,
+    contact: &Contact,
+) -> JointRows {
+    let of_hand = &model.scene.hand.fingers[finger];
+    let chain = &of_hand.chain;
+    let mut frames: ArrayVec<BodyFrame, MAX_BODIES> = (0..chain.joints.len()).map(|_| BodyFrame::IDENTITY).collect();
+    chain.forward_frames(joints, &mut frames);
+    let normal = world_from_object.vector(&contact.normal_in_object);
+    let last = frames.last().unwrap_or(&BodyFrame::IDENTITY);
+    let touching = last.point(&of_hand.tip.center_in_body).coords - normal * model.fingers[finger].tip_radius;
+    let mut rows: JointRows =
+        limits.iter().map(|&limit| JointRow { per_force: Vector::zeros(), per_torsion: 0.0, limit }).collect();
+    for (joint, frame) in chain.joints.iter().zip(&frames) {
+        let axis = frame.vector(&joint.axis);
+        let row = &mut rows[joint.coordinate];
+        match joint.motion {
+            Motion::Turn => {
+                row.per_force += axis.cross(&(touching - frame.translation)) * joint.multiplier;
+                row.per_torsion += axis.dot(&normal) * joint.multiplier;
+            }
+            Motion::Slide => row.per_force += axis * joint.multiplier,
+        }
+    }
+    for row in &mut rows {
+        row.per_force = world_from_object.vector_to_child(&row.per_force);
+    }
+    rows
+}
+
+/// Most moving bodies of a finger.
+const MAX_BODIES: usize = 2 * MAX_ROWS;

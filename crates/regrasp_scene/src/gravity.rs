@@ -1,0 +1,39 @@
+//! Which way things fall.
+
+use regrasp_geometry::{UnitVector, Vector};
+use regrasp_robot::Hand;
+
+/// Standard gravity, in metres per second squared (ISO 80000-3).
+pub const STANDARD_GRAVITY: f64 = 9.80665;
+
+/// Direction of gravity.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Gravity {
+    /// Downwards, in the world frame.
+    Direction(UnitVector),
+    /// Whichever: the hand may be carried about.
+    Any,
+}
+
+impl Gravity {
+    /// Along `down_in_hand`, as seen from the hand's base, where it stands. None for the zero vector.
+    pub fn in_hand(hand: &Hand, down_in_hand: &Vector) -> Option<Self> {
+        let down = UnitVector::try_new(*down_in_hand, 1e-9)?;
+        Some(Gravity::Direction(hand.world_from_base.rotation * down))
+    }
+
+    /// Acceleration in the world; None where the direction is not known.
+    pub fn in_world(&self) -> Option<Vector> {
+        match self {
+            Gravity::Direction(down) => Some(down.into_inner() * STANDARD_GRAVITY),
+            Gravity::Any => None,
+        }
+    }
+}
+
+impl Default for Gravity {
+    /// Along the world's -Z.
+    fn default() -> Self {
+        Gravity::Direction(-Vector::z_axis())
+    }
+}
