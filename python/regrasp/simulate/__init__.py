@@ -1,7 +1,8 @@
 """Replays of plans in MuJoCo: what a plan is worth where things slip, give and fall.
 
-    from regrasp.simulate import simulate
-    report = simulate("plan.json", gravity="down")
+    from regrasp.simulate import load, simulate
+    plan, xml = load("plan.json")
+    report = simulate(plan, xml).report
     print(report.kept, report.final_position_error)
 
 ``python -m regrasp.simulate plan.json`` does the same; ``docs/simulate.md`` says what is simulated and how. Needs the extra
@@ -10,11 +11,16 @@
 
 from __future__ import annotations
 
-from .measure import Dropped, LostContact, Report, UnplannedContact, report
-from .model import Settings
-from .reference import PlanError
-from .run import Replay, simulate
-from .replay import Drift, Track
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .load import load
+    from .measure import Dropped, LostContact, Report, UnplannedContact
+    from .model import Settings
+    from .reference import PlanError
+    from .replay import Drift, Track
+    from .run import Replay, simulate
 
 __all__ = [
     "Drift",
@@ -26,6 +32,27 @@ __all__ = [
     "Settings",
     "Track",
     "UnplannedContact",
-    "report",
+    "load",
     "simulate",
 ]
+
+_HOMES = {
+    "Drift": "replay",
+    "Dropped": "measure",
+    "LostContact": "measure",
+    "PlanError": "reference",
+    "Replay": "run",
+    "Report": "measure",
+    "Settings": "model",
+    "Track": "replay",
+    "UnplannedContact": "measure",
+    "load": "load",
+    "simulate": "run",
+}
+
+
+def __getattr__(name: str) -> Any:
+    # MuJoCo chooses how to draw when it is imported: the command line has a say before that.
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f".{_HOMES[name]}", __name__), name)
