@@ -47,7 +47,7 @@ def _camera(rig: Rig, track: Track) -> mujoco.MjvCamera:
     camera = mujoco.MjvCamera()
     camera.type = mujoco.mjtCamera.mjCAMERA_FREE
     camera.lookat[:] = track.object_position[0]
-    camera.distance = 3.0 * max(rig.radius, max(finger.reach for finger in rig.fingers))
+    camera.distance = 2.2 * max(rig.radius, max(finger.reach for finger in rig.fingers))
     view = -(0.9 * rig.palm_axis + 0.8 * rig.side_axis + 0.3 * np.cross(rig.palm_axis, rig.side_axis))
     view /= np.linalg.norm(view)
     camera.azimuth = float(np.degrees(np.arctan2(view[1], view[0])))

@@ -20,7 +20,7 @@ const POINT_RADIUS: f64 = 0.0005;
 const CONVEX_WITHIN: f64 = 0.01;
 const PALM_COLOR: &str = "0.55 0.56 0.6 1";
 const OBSTACLE_COLOR: &str = "0.5 0.45 0.4 1";
-const OBJECT_COLOR: &str = "0.9 0.75 0.3 0.7";
+const OBJECT_MATERIAL: &str = "object";
 /// Fingers in turn.
 const FINGER_COLORS: [&str; 6] =
     ["0.3 0.5 0.8 1", "0.8 0.35 0.3 1", "0.35 0.7 0.4 1", "0.65 0.4 0.75 1", "0.3 0.7 0.75 1", "0.85 0.55 0.25 1"];
@@ -42,9 +42,17 @@ pub(super) struct GeomNames {
 /// A geom to be written.
 struct Geom<'a> {
     name: &'a str,
-    color: &'a str,
+    look: Look<'a>,
     body_from_shape: Pose,
     shape: &'a Shape,
+}
+
+/// How a geom looks.
+enum Look<'a> {
+    /// In one colour.
+    Color(&'a str),
+    /// As the object.
+    Checkers,
 }
 
 /// The ball of a round or sharp tip.
@@ -67,7 +75,10 @@ pub(super) fn write(scene: &Scene, plan: &Plan) -> Mjcf {
     xml.leaf("light", &[("pos", "0.3 -0.3 1".into()), ("dir", "-0.3 0.3 -1".into()), ("directional", "true".into())]);
     for (obstacle, name) in scene.obstacles.iter().zip(&names.obstacles) {
         let body_from_shape = obstacle.placed.parent_from_shape;
-        write_geom(&mut xml, &Geom { name, color: OBSTACLE_COLOR, body_from_shape, shape: &obstacle.placed.shape });
+        write_geom(
+            &mut xml,
+            &Geom { name, look: Look::Color(OBSTACLE_COLOR), body_from_shape, shape: &obstacle.placed.shape },
+        );
     }
     write_hand(&mut xml, hand, &moving, &names);
     write_object(&mut xml, scene, plan, &names, &object);
@@ -218,6 +229,17 @@ fn write_meshes(xml: &mut Xml, scene: &Scene, names: &GeomNames) {
     let obstacles = scene.obstacles.iter().map(|obstacle| &obstacle.placed.shape).zip(&names.obstacles);
     let object = std::iter::once((&scene.object.shape, &names.object));
     xml.open("asset", &[]);
+    let texture = |kind: &str, pattern: &str, colors: [&str; 2]| {
+        let side = if kind == "cube" { "64" } else { "16" };
+        let texture = [("type", kind.to_owned()), ("builtin", pattern.to_owned()), ("width", side.to_owned())];
+        let colors = [("height", side.to_owned()), ("rgb1", colors[0].to_owned()), ("rgb2", colors[1].to_owned())];
+        [&texture[..], &colors[..]].concat()
+    };
+    xml.leaf("texture", &texture("skybox", "flat", ["1 1 1", "1 1 1"]));
+    // Turning shows on a pattern only.
+    let checkers = texture("cube", "checker", ["0.95 0.8 0.35", "0.75 0.45 0.15"]);
+    xml.leaf("texture", &[&[("name", OBJECT_MATERIAL.to_owned())], &checkers[..]].concat());
+    xml.leaf("material", &[("name", OBJECT_MATERIAL.into()), ("texture", OBJECT_MATERIAL.into())]);
     for (shape, name) in palm.chain(fingers).chain(obstacles).chain(object) {
         let vertices: Vec<Point> = match shape {
             Shape::Convex(hull) => hull.vertices().to_vec(),
@@ -240,7 +262,7 @@ fn write_hand(xml: &mut Xml, hand: &Hand, moving: &[Vec<JointId>], names: &GeomN
     open_body(xml, link_name(hand.base), &hand.world_from_base, false);
     for (palm, name) in hand.palm.iter().zip(&names.palm) {
         let body_from_shape = base_from_world * palm.placed.parent_from_shape;
-        write_geom(xml, &Geom { name, color: PALM_COLOR, body_from_shape, shape: &palm.placed.shape });
+        write_geom(xml, &Geom { name, look: Look::Color(PALM_COLOR), body_from_shape, shape: &palm.placed.shape });
     }
     for (index, finger) in hand.fingers.iter().enumerate() {
         let color = FINGER_COLORS[index % FINGER_COLORS.len()];
@@ -254,7 +276,7 @@ fn write_hand(xml: &mut Xml, hand: &Hand, moving: &[Vec<JointId>], names: &GeomN
             write_inertial(xml, &inertia::of_link(on_body().map(|(shape, _)| &shape.placed)));
             for (shape, name) in on_body() {
                 let body_from_shape = shape.placed.parent_from_shape;
-                write_geom(xml, &Geom { name, color, body_from_shape, shape: &shape.placed.shape });
+                write_geom(xml, &Geom { name, look: Look::Color(color), body_from_shape, shape: &shape.placed.shape });
             }
         }
         write_tip(xml, finger, &names.fingers[index], color);
@@ -348,7 +370,7 @@ fn write_object(xml: &mut Xml, scene: &Scene, plan: &Plan, names: &GeomNames, na
     write_inertial(xml, &inertia::of_object(&scene.object));
     let geom = Geom {
         name: &names.object,
-        color: OBJECT_COLOR,
+        look: Look::Checkers,
         body_from_shape: Pose::identity(),
         shape: &scene.object.shape,
     };
@@ -368,7 +390,10 @@ fn write_geom(xml: &mut Xml, geom: &Geom) {
     let [pos, quat] = place(&geom.body_from_shape);
     let mut attributes = vec![("name", geom.name.to_owned()), ("type", kind.to_owned()), pos, quat];
     attributes.push(if kind == "mesh" { ("mesh", geom.name.to_owned()) } else { ("size", numbers(size)) });
-    attributes.push(("rgba", geom.color.to_owned()));
+    attributes.push(match geom.look {
+        Look::Color(color) => ("rgba", color.to_owned()),
+        Look::Checkers => ("material", OBJECT_MATERIAL.to_owned()),
+    });
     xml.leaf("geom", &attributes);
 }
 
