@@ -41,7 +41,7 @@ class Controller:
 class Feedback:
     """C2: the error of the object's pose, integrated slowly as an offset of every fingertip.
 
-    A holding finger's offset grows by gain * (displacement that its contact lacks). A free finger takes up the
+    A pressing finger's offset grows by gain * (displacement that its contact lacks). A free finger takes up the
     displacement of the real object from the planned one, so that it lands where it should on the real object; offsets are
     continuous over landing and lifting.
     """
@@ -71,7 +71,7 @@ class Feedback:
         lacking[:, 1] = y + c * arms[:, 0] - a * arms[:, 2]
         lacking[:, 2] = z + a * arms[:, 1] - b * arms[:, 0]
         offsets = self._offsets
-        held = ref.holds[k][:, None]
+        held = ref.presses[k][:, None]
         offsets += np.where(held, self._grow * lacking, self._follow * (-lacking - offsets))
         np.clip(offsets, -LARGEST_OFFSET, LARGEST_OFFSET, out=offsets)
         return self._commands[k] + self._inverse[ref.waypoint[k]] @ offsets.ravel()

@@ -45,6 +45,8 @@ class Reference:
     """Shape (n, 4)."""
     holds: NDArray[np.bool_]
     """Fingers that should press on the object. Shape (n, n_fingers)."""
+    presses: NDArray[np.bool_]
+    """Fingers that hold, or whose force goes up or down in a pause. Shape (n, n_fingers)."""
     may_touch: NDArray[np.bool_]
     """Fingers that hold, lift or land. Shape (n, n_fingers)."""
 
@@ -115,7 +117,7 @@ def reference(plan: Plan, *, tick: float = 0.004, speed: float = 1.0, lift_time:
     rate = (a + u * (2.0 * (3.0 - 2.0 * a - b) + u * 3.0 * (a + b - 2.0))) / duration[index]
 
     position, quat = _object_poses(points, index, s)
-    holds, may_touch = _contacts(plan, times, index, at, lift_time)
+    holds, presses, may_touch = _contacts(plan, times, index, at, lift_time)
     return Reference(
         tick=tick,
         segment=segment_of[index],
@@ -126,6 +128,7 @@ def reference(plan: Plan, *, tick: float = 0.004, speed: float = 1.0, lift_time:
         object_position=position,
         object_quat_wxyz=quat,
         holds=holds,
+        presses=presses,
         may_touch=may_touch,
     )
 
@@ -145,8 +148,8 @@ def _contacts(
     index: NDArray[np.int64],
     at: Array,
     lift_time: float,
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Who holds and who may touch, at every tick."""
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Who holds, who presses and who may touch, at every tick."""
     held = held_at_waypoints(plan)
     # In a pause only those hold that hold before and after: the others' forces go up from zero or down to it.
     holds = held[index] & held[index + 1]
@@ -154,7 +157,7 @@ def _contacts(
     for f in range(held.shape[1]):
         for k in np.flatnonzero(np.diff(held[:, f].astype(np.int8))):
             may_touch[(at >= times[k] - lift_time) & (at <= times[k + 1] + lift_time), f] = True
-    return holds, may_touch
+    return holds, held[index] | held[index + 1], may_touch
 
 
 def quat_product(a: Array, b: Array) -> Array:
