@@ -8,7 +8,7 @@ use super::state::{GraspState, Moment};
 use super::workspace::{HandJoints, TipMode, Workspace, tip_target};
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::frame::{self, PoseLine};
-use regrasp_geometry::{Pose, UnitVector, interpolate_pose};
+use regrasp_geometry::{Pose, UnitVector};
 use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::{Coordinates, IkSettings, Preference};
 
@@ -95,9 +95,8 @@ pub fn follow(
 /// One step of the object to `pose`, with fingers that follow; the ones that hold are closed there.
 fn step(model: &Model, start: &GraspState, here: &Moment, pose: &Pose) -> Result<Moment, NoStep> {
     let (from, to) = (Placement::from(&here.world_from_object), Placement::from(pose));
-    let mut half: Option<Placement> = None;
-    let mut halfway =
-        || *half.get_or_insert_with(|| Placement::from(&interpolate_pose(&here.world_from_object, pose, 0.5)));
+    let line = PoseLine::between(&here.world_from_object, pose);
+    let between = |t: f64| Placement::from(&line.at(t));
     let mut joints = HandJoints::new();
     let mut contacts = here.contacts.clone();
     for finger in 0..model.n_fingers() {
@@ -107,7 +106,7 @@ fn step(model: &Model, start: &GraspState, here: &Moment, pose: &Pose) -> Result
             own.clone()
         } else if model.rolls(finger) {
             let rolled =
-                RollStep::new(model, finger, &contacts[finger], own, &from, &to).fine(&halfway(), HALFWAY_ALLOWED)?;
+                RollStep::new(model, finger, &contacts[finger], own, &from, &to).fine(between, HALFWAY_ALLOWED)?;
             if !rolled.keeps_off_edges(model) {
                 return Err(NoStep::OutOfReach);
             }
@@ -115,7 +114,7 @@ fn step(model: &Model, start: &GraspState, here: &Moment, pose: &Pose) -> Result
             rolled.joints
         } else {
             let there = follow_contact(model, finger, &contacts[finger], &to, own).ok_or(NoStep::OutOfReach)?;
-            if !tip_stays(model, finger, &contacts[finger], own, &there, &mut halfway) {
+            if !tip_stays(model, finger, &contacts[finger], own, &there, || between(0.5)) {
                 return Err(NoStep::TooLong);
             }
             there

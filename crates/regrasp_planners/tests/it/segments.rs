@@ -3,8 +3,8 @@
 use crate::in_hand_methods::scene;
 use crate::places::shared_models;
 use regrasp_base::Budget;
-use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, check};
+use regrasp_plan::{Plan, Waypoint};
 use regrasp_planners::in_hand::{InHandSettings, Method, plan_in_hand, validate_once};
 use regrasp_robot::import::{LoadOptions, ResolveOptions};
 use regrasp_scene::{LoadedScene, load_scene};
@@ -12,7 +12,13 @@ use std::path::Path;
 
 fn assert_meets(plan: &Plan, which: &str) {
     for (s, pair) in plan.segments.windows(2).enumerate() {
-        assert_eq!(pair[0].waypoints.last(), pair[1].waypoints.first(), "{which}: between segments {s} and {}", s + 1);
+        let (end, begin) = (pair[0].waypoints.last().unwrap(), pair[1].waypoints.first().unwrap());
+        let place = |w: &Waypoint| {
+            let contacts: Vec<_> = w.contacts.iter().map(|c| (c.point_in_object, c.normal_in_object)).collect();
+            (w.joints.clone(), w.world_from_object, contacts)
+        };
+        assert_eq!(place(end), place(begin), "{which}: between segments {s} and {}", s + 1);
+        assert!(end.time <= begin.time, "{which}: between segments {s} and {}", s + 1);
     }
 }
 
