@@ -3,14 +3,14 @@
 use crate::in_hand_methods::scene;
 use crate::places::shared_models;
 use crate::soft_and_coupled;
-use nalgebra::UnitQuaternion;
-use regrasp_base::Budget;
+use nalgebra::{DMatrix, UnitQuaternion};
+use regrasp_base::{Budget, Rng};
 use regrasp_geometry::{Point, Pose, UnitVector, Vector, frame};
 use regrasp_grasp::{Contact, ContactForce, ContactModel, Grip};
 use regrasp_plan::Plan;
-use regrasp_plan::check::{CheckSettings, check};
+use regrasp_plan::check::{CheckSettings, Violation, check};
 use regrasp_plan::plan::{SegmentKind, Waypoint};
-use regrasp_planners::in_hand::{ForceSettings, GravityInHand, InHandSettings, plan_in_hand};
+use regrasp_planners::in_hand::{AnyDirection, ForceSettings, GravityInHand, InHandSettings, plan_in_hand};
 use regrasp_planners::{Failure, FailureKind};
 use regrasp_scene::{Gravity, LoadedScene, Scene};
 
@@ -197,6 +197,7 @@ fn plans_rest_between_segments_and_keep_to_their_limits() {
                 }
                 let mean = object_way(&loaded.scene, from, to) / span;
                 assert!(mean <= limits.largest_speed * (1.0 + 1e-9), "{name}: {mean} m/s");
+                fastest = fastest.max(mean);
                 for j in 0..plan.joint_names.len() {
                     let (a, b) = (from.joints[j], to.joints[j]);
                     let (start, end) = (from.joint_velocities[j], to.joint_velocities[j]);
@@ -217,6 +218,62 @@ fn plans_rest_between_segments_and_keep_to_their_limits() {
         // Slow by intention, not for want of anything.
         assert!(fastest > 0.5 * limits.largest_speed, "{name}: {fastest} m/s at most");
     });
+}
+
+/// Forces of plans for any direction balance nothing; with what the least-norm inverse of the grasp map adds they balance
+/// the weight in each of many directions, inside all limits: the inverse is that of a singular value decomposition.
+#[test]
+fn plans_for_any_direction_hold_in_each() {
+    let mut rng = Rng::keyed(1, "directions", 0);
+    for name in ["sphere_90x.toml", "box_90x.toml"] {
+        let loaded = scene(name);
+        let any = InHandSettings { gravity: Some(GravityInHand::Any(AnyDirection::Any)), ..settings() };
+        let (query, budget) = (loaded.task.query(0), Budget::work(3_000_000));
+        let plan =
+            plan_in_hand(&loaded.scene, &query, &any, 0, &budget, &|_| {}).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+        let unknown_room = |violation: &Violation| violation.subjects == ["gravity_in_world"];
+        assert!(report.violations.iter().all(unknown_room), "{name}: {report:#?}");
+        assert_eq!(plan.promises.forces.as_ref().expect("forces were asked for").gravity_in_world, None);
+        let object = &loaded.scene.object;
+        for (s, segment) in plan.segments.iter().enumerate() {
+            for waypoint in segment.waypoints.iter().step_by(4) {
+                let holding: Vec<usize> = (0..plan.fingers.len()).filter(|&f| holds(&plan, s, waypoint, f)).collect();
+                let at = |finger: usize| {
+                    let state = &waypoint.contacts[finger];
+                    let normal = Vector::from(state.normal_in_object.unwrap());
+                    (Point::from(state.point_in_object.unwrap()) - object.center_of_mass, normal)
+                };
+                let mut map = DMatrix::zeros(6, 3 * holding.len());
+                let mut sum = Vector::zeros();
+                for (index, &finger) in holding.iter().enumerate() {
+                    let arm = at(finger).0;
+                    sum += exerted(waypoint, finger).force;
+                    for axis in 0..3 {
+                        let force = Vector::ith(axis, 1.0);
+                        let column = 3 * index + axis;
+                        map.fixed_view_mut::<3, 1>(0, column).copy_from(&force);
+                        map.fixed_view_mut::<3, 1>(3, column).copy_from(&(arm.cross(&force) / object.radius));
+                    }
+                }
+                assert!(sum.norm() < 1e-10, "{name}: {sum}");
+                let inverse = map.pseudo_inverse(1e-9).expect("the grasp is closed");
+                for _ in 0..20 {
+                    let load = Vector::from(rng.direction()) * (object.mass * 9.80665);
+                    let more = inverse.columns(0, 3) * -load;
+                    for (index, &finger) in holding.iter().enumerate() {
+                        let force = exerted(waypoint, finger).force
+                            + Vector::new(more[3 * index], more[3 * index + 1], more[3 * index + 2]);
+                        let normal = at(finger).1;
+                        let pressing = -force.dot(&normal);
+                        let across = (force + normal * pressing).norm();
+                        assert!(pressing > 2.0 && pressing < 15.0, "{name}: {pressing}");
+                        assert!(across < plan.promises.friction * pressing, "{name}: {across} {pressing}");
+                    }
+                }
+            }
+        }
+    }
 }
 
 fn changed(name: &str, change: impl FnOnce(&mut Scene)) -> LoadedScene {
