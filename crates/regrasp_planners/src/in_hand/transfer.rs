@@ -1,6 +1,7 @@
 //! Transfer paths: the object moves, the fingers follow, with contacts that stay on it (paper 000, section 4.2.3) or roll
 //! over it (paper 004, section IV-C).
 
+use super::forces::balances;
 use super::model::Model;
 use super::record::CONTACT_TOLERANCE;
 use super::roll::{NoStep, RollStep};
@@ -48,11 +49,19 @@ pub fn n_steps(model: &Model, from: &Pose, to: &Pose, step: f64) -> usize {
 ///
 /// Appends the moments after the start to `moments`; returns the share of the way that was made, 1 being all of it.
 pub fn transfer(workspace: &mut Workspace, start: &GraspState, goal: &Pose, moments: &mut Vec<Moment>) -> f64 {
+    if !holds_weight(workspace, &start.moment(), start.holding) {
+        return 0.0;
+    }
     workspace.set_state(start);
     follow(workspace.model, start, goal, moments, |there| {
         workspace.roll_to(&there.contacts);
         workspace.step(&there.world_from_object, &there.joints, TipMode::AllHold)
+            && holds_weight(workspace, there, start.holding)
     })
+}
+
+fn holds_weight(workspace: &mut Workspace, there: &Moment, holding: u32) -> bool {
+    balances(workspace, &there.world_from_object, &there.joints, &there.contacts, holding)
 }
 
 /// As [`transfer`], with collisions left to `is_clear`, which is asked about each step to the moment it is given. Without
