@@ -34,6 +34,6 @@ impl Gravity {
 impl Default for Gravity {
     /// Along the world's -Z.
     fn default() -> Self {
-        Gravity::Direction(-Vector::z_axis())
+        Gravity::Direction(UnitVector::new_unchecked(Vector::new(0.0, 0.0, -1.0)))
     }
 }

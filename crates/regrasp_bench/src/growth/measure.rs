@@ -72,7 +72,7 @@ mod tests {
         let (loaded, load) = timed_load(&path).unwrap();
         assert!(load.wall_s > 0.0 && load.wall_s.is_finite() && load.cpu_s.is_finite());
         let settings = RunSettings {
-            planner: InHandSettings { n_threads: 1, ..InHandSettings::default() },
+            planner: InHandSettings { n_threads: 1, ..InHandSettings::plain() },
             max_work: 1_000_000,
             time_limit: None,
             judge: Judge::Checker,

@@ -11,6 +11,7 @@ use regrasp_base::{Diagnostic, InputError, Place};
 use regrasp_planners::InHandSettings;
 use regrasp_planners::in_hand::Alpha;
 use serde::Deserialize;
+use serde::de::Error as _;
 use std::path::{Path, PathBuf};
 
 /// Value of `format` in a suite file.
@@ -99,8 +100,8 @@ pub struct Entry {
     /// Largest mean processor time asked for, in seconds: the results say whether it was met.
     #[serde(default)]
     pub mean_at_most_s: Option<f64>,
-    /// Settings of the planner that are not the default.
-    #[serde(default)]
+    /// Settings of the planner that are not those of geometry alone, which the papers plan with.
+    #[serde(default = "InHandSettings::plain", deserialize_with = "changed_from_plain")]
     pub settings: InHandSettings,
 }
 
@@ -136,6 +137,16 @@ pub struct Job {
     pub max_work: u64,
     /// Settings of the planner.
     pub settings: InHandSettings,
+}
+
+/// The settings of geometry alone, but for those that are given.
+fn changed_from_plain<'de, D: serde::Deserializer<'de>>(given: D) -> Result<InHandSettings, D::Error> {
+    let given = serde_json::Map::deserialize(given)?;
+    let mut all = serde_json::to_value(InHandSettings::plain()).map_err(D::Error::custom)?;
+    if let Some(all) = all.as_object_mut() {
+        all.extend(given);
+    }
+    serde_json::from_value(all).map_err(D::Error::custom)
 }
 
 impl Suite {

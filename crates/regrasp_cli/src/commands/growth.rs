@@ -36,7 +36,7 @@ pub fn run(arguments: &args::Growth, talk: &Talk) -> Result<(), Stop> {
         refuse_unwritable(&file)?;
     }
     let settings = RunSettings {
-        planner: InHandSettings { n_threads: 1, ..InHandSettings::default() },
+        planner: InHandSettings { n_threads: 1, ..InHandSettings::plain() },
         max_work: arguments.max_work,
         time_limit: Some(arguments.time_limit),
         judge: Judge::Checker,

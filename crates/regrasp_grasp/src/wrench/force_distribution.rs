@@ -224,7 +224,7 @@ fn program<const D: usize>(problem: &ForceProblem, relaxed: Relaxed) -> Option<P
             limits: ArrayVec::new(),
         };
         let arm = (grip.contact.point_in_object - frame.center_of_mass) / frame.torque_scale;
-        let axes = axes::<D>(problem, grip);
+        let axes = axes::<D>(problem.frame.friction, grip);
         for (column, axis) in block.map.iter_mut().zip(&axes) {
             let torque = arm.cross(&axis.force)
                 + grip.contact.normal_in_object.into_inner() * (axis.torsion / frame.torque_scale);
@@ -247,9 +247,9 @@ fn program<const D: usize>(problem: &ForceProblem, relaxed: Relaxed) -> Option<P
 }
 
 /// What a unit of each coordinate exerts; nothing for those that the contact does not transmit.
-fn axes<const D: usize>(problem: &ForceProblem, grip: &Grip) -> [ContactForce; D] {
+pub(super) fn axes<const D: usize>(friction: f64, grip: &Grip) -> [ContactForce; D] {
     let normal = grip.contact.normal_in_object.into_inner();
-    let model = grip.model_at(problem.frame.friction);
+    let model = grip.model_at(friction);
     let nothing = ContactForce { force: Vector::zeros(), torsion: 0.0 };
     let mut axes = [nothing; D];
     axes[0].force = -normal;
@@ -265,7 +265,7 @@ fn axes<const D: usize>(problem: &ForceProblem, grip: &Grip) -> [ContactForce; D
 }
 
 fn coordinates<const D: usize>(problem: &ForceProblem, grip: &Grip, exerted: &ContactForce) -> [f64; D] {
-    axes::<D>(problem, grip).map(|axis| {
+    axes::<D>(problem.frame.friction, grip).map(|axis| {
         let along_torsion = if axis.torsion > 0.0 { exerted.torsion / axis.torsion } else { 0.0 };
         axis.force.dot(&exerted.force) + along_torsion
     })
@@ -273,7 +273,7 @@ fn coordinates<const D: usize>(problem: &ForceProblem, grip: &Grip, exerted: &Co
 
 fn exerted<const D: usize>(problem: &ForceProblem, grip: &Grip, coordinates: &[f64; D]) -> ContactForce {
     let mut sum = ContactForce { force: Vector::zeros(), torsion: 0.0 };
-    for (axis, x) in axes::<D>(problem, grip).iter().zip(coordinates) {
+    for (axis, x) in axes::<D>(problem.frame.friction, grip).iter().zip(coordinates) {
         sum.force += axis.force * *x;
         sum.torsion += axis.torsion * x;
     }

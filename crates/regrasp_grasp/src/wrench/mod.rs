@@ -1,5 +1,7 @@
 //! Wrenches on the object, and the contact forces that balance them.
 
+/// Room for a weight whose direction is not known.
+pub mod any_direction;
 /// The minimum of a quadratic, with a logarithmic barrier before every limit.
 mod barrier;
 /// Contact forces that balance a load.

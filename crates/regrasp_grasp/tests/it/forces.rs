@@ -5,6 +5,7 @@ use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, UnitVector, Vector};
+use regrasp_grasp::wrench::any_direction::{answer, reserves};
 use regrasp_grasp::wrench::{BalancedForces, JointRow, JointRows, Reserve, can_balance, distribute};
 use regrasp_grasp::{
     Contact, ContactForce, ContactModel, ForceLimits, ForceProblem, GraspFrame, Grip, NoForces, Wrench,
@@ -363,4 +364,42 @@ fn reserves_are_kept_free() {
         }
     }
     assert!(n_found > 20, "{n_found}");
+}
+
+#[test]
+fn room_for_any_direction_is_enough_for_every_one() {
+    let mut rng = Rng::keyed(4, "forces", 0);
+    let (mut n_found, mut n_none, mut nearest) = (0, 0, f64::INFINITY);
+    for _ in 0..150 {
+        let n = 3 + rng.below(3);
+        let models = models(n, &mut rng);
+        let grips = grips(&models, &mut rng);
+        let joints = joints(n, 0.7, &mut rng);
+        let weight = rng.uniform(0.1, 1.5);
+        let Some(reserves) = reserves(&grips, &joints, &FRAME, weight) else {
+            n_none += 1;
+            continue;
+        };
+        let held = ForceProblem { reserves: &reserves, ..problem(&grips, &joints, Wrench::ZERO) };
+        let Ok(forces) = distribute(&held, None) else { continue };
+        n_found += 1;
+        for _ in 0..300 {
+            let load = Vector::from(rng.direction()) * weight;
+            let more = answer(&grips, &FRAME, &load).expect("there was a reserve");
+            let sum: BalancedForces = forces
+                .iter()
+                .zip(&more)
+                .map(|(a, b)| ContactForce { force: a.force + b.force, torsion: a.torsion + b.torsion })
+                .collect();
+            assert_good(&problem(&grips, &joints, Wrench::at_center_of_mass(load)), &sum);
+            for (grip, force) in grips.iter().zip(&sum) {
+                nearest = nearest.min(grip.components(force, FRAME.friction).normal - LIMITS.least);
+            }
+        }
+    }
+    // Not by far more than enough, either.
+    assert!(n_found > 40 && n_none > 0 && nearest < 0.05, "{n_found} {n_none} {nearest}");
+    // Two points cannot be turned anyhow.
+    let pair = [grip([0.03, 0.0, 0.0], ContactModel::Point), grip([-0.03, 0.0, 0.0], ContactModel::Point)];
+    assert!(reserves(&pair, &[], &CENTERED, 1.0).is_none());
 }

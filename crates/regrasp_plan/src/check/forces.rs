@@ -13,7 +13,7 @@ use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactState, ForcePromises, Plan, Segment, SegmentKind, Waypoint};
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp::ContactModel;
-use regrasp_scene::Object;
+use regrasp_scene::{Gravity, Object, Scene};
 
 /// Standard gravity, in metres per second squared (CGPM 1901).
 const GRAVITY: f64 = 9.80665;
@@ -55,17 +55,18 @@ impl Exerted {
 
 /// Judges forces and torques of the whole plan; none when it promises no forces, and has none.
 pub fn check_forces(
-    object: &Object,
+    scene: &Scene,
     model: &Model,
     plan: &Plan,
     settings: &CheckSettings,
     log: &mut Log,
 ) -> Option<Balance> {
+    let object = &scene.object;
     let Some(promises) = &plan.promises.forces else {
         check_absent(plan, log);
         return None;
     };
-    check_promises(object, model, promises, log);
+    check_promises(scene, model, promises, log);
     let judge = Judge { object, model, plan, promises, settings };
     let mut balance = Balance::default();
     for (s, segment) in plan.segments.iter().enumerate() {
@@ -102,7 +103,8 @@ fn check_absent(plan: &Plan, log: &mut Log) {
 }
 
 /// Mass, gravity and limits against scene and robot.
-fn check_promises(object: &Object, model: &Model, promises: &ForcePromises, log: &mut Log) {
+fn check_promises(scene: &Scene, model: &Model, promises: &ForcePromises, log: &mut Log) {
+    let object = &scene.object;
     let mut broken = |name: &str, amount: f64, limit: f64, message: String| {
         log.push(Violation::new(Kind::PromiseBroken, message).subjects([name]).amount(amount, limit));
     };
@@ -110,7 +112,19 @@ fn check_promises(object: &Object, model: &Model, promises: &ForcePromises, log:
         let message = format!("mass {} kg, the scene's object has {} kg", promises.mass, object.mass);
         broken("mass", promises.mass, object.mass, message);
     }
-    // The direction is the scene's where it states one; scenes have none yet.
+    let promised = promises.gravity_in_world.map(Vector::from);
+    let differs = match scene.gravity {
+        Some(Gravity::Direction(down)) => {
+            promised.is_none_or(|promised| (promised - down.into_inner() * GRAVITY).norm() > 1e-6)
+        }
+        Some(Gravity::Any) => promised.is_some(),
+        // The scene leaves the direction to the plan.
+        None => false,
+    };
+    if differs {
+        let message = format!("gravity {promised:?}, the scene states {:?}", scene.gravity);
+        broken("gravity_in_world", f64::NAN, f64::NAN, message);
+    }
     if let Some(gravity) = promises.gravity_in_world.map(|gravity| Vector::from(gravity).norm())
         && (gravity - GRAVITY).abs() > 1e-6
     {
@@ -261,7 +275,9 @@ impl Judge<'_> {
         for one in exerted {
             let finger = &self.model.fingers[one.finger];
             let (force, couple) = (world_from_object * one.force, world_from_object * one.normal * one.torsion);
-            let point = world_from_object * one.point;
+            // The point of the tip that touches: it is the contact within the contact tolerance.
+            let touching = world_from_object * one.normal * finger.radius;
+            let point = finger.center_in_world(&waypoint.joints) - touching;
             let axes = finger.path.axes(&waypoint.joints);
             let arm = axes.iter().map(|axis| (point - axis.origin).norm()).fold(0.0, f64::max);
             for axis in axes {

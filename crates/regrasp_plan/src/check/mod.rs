@@ -250,7 +250,7 @@ fn judge(
     promises::check_promises(&scene.object, plan, settings, report.min_margin, log);
     times::check_times(&scene.object, model, plan, settings, log);
     report.duration = times::duration(plan);
-    if let Some(balance) = forces::check_forces(&scene.object, model, plan, settings, log) {
+    if let Some(balance) = forces::check_forces(scene, model, plan, settings, log) {
         report.max_force_residual = Some(balance.force);
         report.max_moment_residual = Some(balance.moment);
         report.max_half_way_imbalance = Some(balance.half_way);

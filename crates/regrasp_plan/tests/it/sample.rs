@@ -171,6 +171,7 @@ fn surface_of(shape: &Shape) -> regrasp_geometry::Surface {
 
 pub fn scene() -> Scene {
     Scene {
+        gravity: None,
         name: "sample".into(),
         hand: hand().placed_at(&world_from_hand()),
         object: object(),

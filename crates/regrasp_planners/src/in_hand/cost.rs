@@ -77,6 +77,10 @@ pub fn lower_bound(model: &Model, poses: &[Pose], start: Option<&GraspState>, go
     let straight: f64 =
         poses.windows(2).map(|pair| frame::pose_distance(&pair[0], &pair[1], model.turn_length())).sum();
     let must_move = |finger: usize| {
+        // A contact that rolls may come to where it is asked for.
+        if model.rolls(finger) {
+            return false;
+        }
         let contacts = [start, goal].map(|state| state.and_then(|state| state.contact(finger)));
         let is_out_of_reach = |pose: &Pose| {
             let mut given = contacts.iter().flatten();

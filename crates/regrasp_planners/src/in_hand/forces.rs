@@ -3,20 +3,22 @@
 use super::model::{MAX_FINGERS, Model};
 use super::settings::gravity_of;
 use super::settings::{ForceSettings, InHandSettings};
-use super::workspace::Contacts;
+use super::workspace::{Contacts, HandJoints, Workspace};
 use arrayvec::ArrayVec;
-use regrasp_geometry::Vector;
 use regrasp_geometry::collision::Placement;
+use regrasp_geometry::{Pose, Vector};
+use regrasp_grasp::wrench::any_direction::reserves;
 use regrasp_grasp::wrench::force_distribution::MAX_ROWS;
 use regrasp_grasp::wrench::{
-    BalancedForces, ForceLimits, ForceProblem, JointRow, JointRows, NoForces, Wrench, can_balance, distribute,
+    BalancedForces, ForceLimits, ForceProblem, JointRow, JointRows, NoForces, Reserve, Wrench, can_balance, distribute,
 };
 use regrasp_grasp::{Contact, ContactForce, Grip};
 use regrasp_plan::plan::ForcePromises;
 use regrasp_robot::kinematics::body_frame::BodyFrame;
 use regrasp_robot::kinematics::chain::Motion;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
-use regrasp_scene::{Gravity, Scene};
+use regrasp_scene::{Gravity, STANDARD_GRAVITY, Scene};
+use std::collections::BTreeMap;
 
 /// What contact forces balance, and their limits.
 #[derive(Debug)]
@@ -114,6 +116,8 @@ pub struct Held {
     grips: ArrayVec<Grip, MAX_FINGERS>,
     joints: ArrayVec<JointRows, MAX_FINGERS>,
     load: Wrench,
+    /// Room for a weight of any direction; None where the fingers cannot answer every one.
+    reserves: Option<ArrayVec<Reserve, MAX_FINGERS>>,
 }
 
 impl Held {
@@ -131,23 +135,27 @@ impl Held {
         let rows = |&finger: &usize| {
             joint_rows(model, finger, &forces.torques[finger], joints(finger), world_from_object, &contacts[finger])
         };
-        Held {
-            grips: fingers.iter().map(|&finger| model.grip(finger, &contacts[finger])).collect(),
-            joints: fingers.iter().map(rows).collect(),
-            load: forces.load(world_from_object),
-            fingers,
-        }
+        let grips: ArrayVec<Grip, MAX_FINGERS> =
+            fingers.iter().map(|&finger| model.grip(finger, &contacts[finger])).collect();
+        let joints: ArrayVec<JointRows, MAX_FINGERS> = fingers.iter().map(rows).collect();
+        let reserves = match forces.gravity {
+            Gravity::Direction(_) => Some(ArrayVec::new()),
+            Gravity::Any => reserves(&grips, &joints, &model.frame, forces.mass * STANDARD_GRAVITY),
+        };
+        Held { fingers, grips, joints, load: forces.load(world_from_object), reserves }
     }
 
-    fn problem<'p>(&'p self, model: &'p Model, forces: &ForceModel) -> ForceProblem<'p> {
-        ForceProblem {
+    /// None where no forces whatever will do.
+    fn problem<'p>(&'p self, model: &'p Model, forces: &ForceModel) -> Option<ForceProblem<'p>> {
+        let reserves = self.reserves.as_ref().filter(|_| !self.grips.is_empty())?;
+        Some(ForceProblem {
             grips: &self.grips,
             joints: &self.joints,
-            reserves: &[],
+            reserves,
             frame: &model.frame,
             load: self.load,
             limits: forces.limits,
-        }
+        })
     }
 
     /// The forces of the fingers; `warm` are those of the moment before.
@@ -157,7 +165,8 @@ impl Held {
         forces: &ForceModel,
         warm: Option<&BalancedForces>,
     ) -> Result<BalancedForces, Unbalanced> {
-        distribute(&self.problem(model, forces), warm.map(|warm| warm.as_slice())).map_err(|cause| match cause {
+        let problem = self.problem(model, forces).ok_or(Unbalanced::AtAnyForce)?;
+        distribute(&problem, warm.map(|warm| warm.as_slice())).map_err(|cause| match cause {
             NoForces::NotBalanced => Unbalanced::AtAnyForce,
             NoForces::LeastNormalForce { grip } => Unbalanced::TooLight(self.fingers[grip]),
             NoForces::LargestNormalForce { grip } => Unbalanced::TooHard(self.fingers[grip]),
@@ -167,13 +176,57 @@ impl Held {
 
     /// True when there are forces.
     pub fn is_balanced(&self, model: &Model, forces: &ForceModel) -> bool {
-        can_balance(&self.problem(model, forces))
+        self.problem(model, forces).is_some_and(|problem| can_balance(&problem))
     }
 
     /// Torques of all joints of the holding finger `index` for what it exerts.
     pub fn torques(&self, index: usize, exerted: &ContactForce) -> Coordinates {
         self.joints[index].iter().map(|row| row.torque(exerted)).collect()
     }
+}
+
+/// Grasps that a search refused as nothing balances them, by cause.
+#[derive(Debug, Clone, Default)]
+pub struct Refusals {
+    n_seen: u64,
+    counts: BTreeMap<Unbalanced, u64>,
+}
+
+/// Refusals of which one is asked for its cause, which takes several times as long as the refusal.
+const CAUSE_EVERY: u64 = 16;
+
+impl Refusals {
+    /// Causes and how often each was seen.
+    pub fn counts(&self) -> impl Iterator<Item = (Unbalanced, u64)> + '_ {
+        self.counts.iter().map(|(&cause, &count)| (cause, count))
+    }
+}
+
+/// True when the fingers of `holding` can balance the weight, or nobody asks for forces; a refusal is counted,
+/// and as work.
+pub fn balances(
+    workspace: &mut Workspace,
+    world_from_object: &Pose,
+    joints: &HandJoints,
+    contacts: &Contacts,
+    holding: u32,
+) -> bool {
+    let model = workspace.model;
+    let Some(forces) = &model.forces else { return true };
+    let pose = Placement::from(world_from_object);
+    let held = Held::new(model, forces, &pose, contacts, holding, |finger| &joints[finger]);
+    if held.is_balanced(model, forces) {
+        return true;
+    }
+    let refusals = &mut workspace.refusals;
+    if refusals.n_seen % CAUSE_EVERY == 0
+        && let Err(cause) = held.forces(model, forces, None)
+    {
+        *refusals.counts.entry(cause).or_default() += CAUSE_EVERY;
+    }
+    refusals.n_seen += 1;
+    workspace.work += 1;
+    false
 }
 
 /// Rows of the transposed Jacobian of the point of the tip that touches, at the tip's centre less its radius along the

@@ -83,7 +83,8 @@ mod visibility;
 mod workspace;
 
 pub use settings::{
-    Alpha, CostWeights, ForceSettings, GravityInHand, InHandSettings, Method, ReleaseRule, SpeedSettings, TransferMode,
+    Alpha, AnyDirection, CostWeights, ForceSettings, GravityInHand, InHandSettings, Method, ReleaseRule, SpeedSettings,
+    TransferMode,
 };
 pub use validate::{NotProven, validate_once};
 

@@ -2,6 +2,7 @@
 
 use super::candidates::Candidate;
 use super::combine::{Choice, ClosureTable};
+use super::forces::balances;
 use super::relocate::{Foothold, relocate};
 use super::state::{GraspState, Sequence};
 use super::workspace::Workspace;
@@ -181,6 +182,11 @@ fn try_relocation(
             state.set_contact(f, options[f][taken].contact);
             state.joints[f].clone_from(&options[f][taken].joints);
         }
+    }
+    let others = state.holding & !(1 << finger);
+    if !balances(workspace, &state.world_from_object, &state.joints, &state.contacts, others) {
+        tried.known.push((current.clone(), finger, option, None));
+        return tried.known.len() - 1;
     }
     workspace.set_state(&state);
     let to = &options[finger][option];

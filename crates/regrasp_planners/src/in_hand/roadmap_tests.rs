@@ -25,7 +25,7 @@ fn scene(name: &str) -> LoadedScene {
 
 /// Runs `test` on a search of the bundled scene `name`.
 pub(super) fn with_search(name: &str, test: impl FnOnce(&mut Search)) {
-    with_settings(name, &InHandSettings { method: Method::Visibility, ..InHandSettings::default() }, test);
+    with_settings(name, &InHandSettings { method: Method::Visibility, ..InHandSettings::plain() }, test);
 }
 
 /// The same with other settings.

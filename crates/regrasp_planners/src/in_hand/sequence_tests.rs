@@ -182,7 +182,7 @@ fn draw_partly_bound(search: &mut Search) -> Option<(GraspState, u32)> {
 
 #[test]
 fn a_bound_finger_is_moved_last_and_only_where_the_others_hold() {
-    with_settings("box_90x.toml", &InHandSettings::default(), |search| {
+    with_settings("box_90x.toml", &InHandSettings::plain(), |search| {
         let (mut n_alone, mut n_prepared) = (0, 0);
         for round in 0..400 {
             let Some((from, _)) = draw_partly_bound(search) else { continue };
@@ -207,7 +207,7 @@ fn a_bound_finger_is_moved_last_and_only_where_the_others_hold() {
 
 #[test]
 fn a_finger_is_bound_only_once_enough_grasps_were_seen_that_do_not_let_it_go() {
-    with_settings("box_90x.toml", &InHandSettings::default(), |search| {
+    with_settings("box_90x.toml", &InHandSettings::plain(), |search| {
         let model = search.model();
         let drawn = (0..500).find_map(|_| draw_partly_bound(search));
         let (state, released) = drawn.expect("a grasp that lets only some fingers go");

@@ -242,8 +242,8 @@ impl Default for InHandSettings {
             method: Method::Gait,
             n_threads: 1,
             release_rule: ReleaseRule::WhereOthersHold,
-            transfer: TransferMode::Fixed,
-            friction_margin: 1.0,
+            transfer: TransferMode::Rolling,
+            friction_margin: 1.5,
             closure_margin: 0.005,
             step: 0.003,
             clearance: 0.0002,
@@ -320,11 +320,6 @@ impl InHandSettings {
         }
         if !(self.friction_margin >= 1.0 && self.friction_margin <= 100.0) {
             return Err(format!("friction_margin is {}; it must be between 1 and 100", self.friction_margin));
-        }
-        if self.improve_work > 0 && self.transfer == TransferMode::Rolling {
-            return Err(
-                "improve_work needs transfer = \"fixed\": plans with rolling fingertips are not improved yet".into()
-            );
         }
         if self.n_threads == 0 || self.candidates == 0 || self.candidates_kept == 0 || self.restart_work == 0 {
             return Err("n_threads, candidates, candidates_kept and restart_work must be at least 1".into());

@@ -59,6 +59,11 @@ impl Tally {
         *self.counts.entry(reason).or_default() += 1;
     }
 
+    /// So many more failures for `reason`.
+    pub fn add_many(&mut self, reason: Reason, count: u64) {
+        *self.counts.entry(reason).or_default() += count;
+    }
+
     /// What was seen of letting `finger` go.
     pub fn release(&self, finger: usize) -> &Held {
         &self.releases[finger].seen

@@ -1,6 +1,7 @@
 //! Transfer paths: the object moves, the fingers follow, with contacts that stay on it (paper 000, section 4.2.3) or roll
 //! over it (paper 004, section IV-C).
 
+use super::forces::balances;
 use super::model::Model;
 use super::record::CONTACT_TOLERANCE;
 use super::roll::{NoStep, RollStep};
@@ -8,7 +9,7 @@ use super::state::{GraspState, Moment};
 use super::workspace::{HandJoints, TipMode, Workspace, tip_target};
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::frame::{self, PoseLine};
-use regrasp_geometry::{Pose, UnitVector, interpolate_pose};
+use regrasp_geometry::{Pose, UnitVector};
 use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::{Coordinates, IkSettings, Preference};
 
@@ -48,11 +49,19 @@ pub fn n_steps(model: &Model, from: &Pose, to: &Pose, step: f64) -> usize {
 ///
 /// Appends the moments after the start to `moments`; returns the share of the way that was made, 1 being all of it.
 pub fn transfer(workspace: &mut Workspace, start: &GraspState, goal: &Pose, moments: &mut Vec<Moment>) -> f64 {
+    if !holds_weight(workspace, &start.moment(), start.holding) {
+        return 0.0;
+    }
     workspace.set_state(start);
     follow(workspace.model, start, goal, moments, |there| {
         workspace.roll_to(&there.contacts);
         workspace.step(&there.world_from_object, &there.joints, TipMode::AllHold)
+            && holds_weight(workspace, there, start.holding)
     })
+}
+
+fn holds_weight(workspace: &mut Workspace, there: &Moment, holding: u32) -> bool {
+    balances(workspace, &there.world_from_object, &there.joints, &there.contacts, holding)
 }
 
 /// As [`transfer`], with collisions left to `is_clear`, which is asked about each step to the moment it is given. Without
@@ -95,9 +104,8 @@ pub fn follow(
 /// One step of the object to `pose`, with fingers that follow; the ones that hold are closed there.
 fn step(model: &Model, start: &GraspState, here: &Moment, pose: &Pose) -> Result<Moment, NoStep> {
     let (from, to) = (Placement::from(&here.world_from_object), Placement::from(pose));
-    let mut half: Option<Placement> = None;
-    let mut halfway =
-        || *half.get_or_insert_with(|| Placement::from(&interpolate_pose(&here.world_from_object, pose, 0.5)));
+    let line = PoseLine::between(&here.world_from_object, pose);
+    let between = |t: f64| Placement::from(&line.at(t));
     let mut joints = HandJoints::new();
     let mut contacts = here.contacts.clone();
     for finger in 0..model.n_fingers() {
@@ -107,7 +115,7 @@ fn step(model: &Model, start: &GraspState, here: &Moment, pose: &Pose) -> Result
             own.clone()
         } else if model.rolls(finger) {
             let rolled =
-                RollStep::new(model, finger, &contacts[finger], own, &from, &to).fine(&halfway(), HALFWAY_ALLOWED)?;
+                RollStep::new(model, finger, &contacts[finger], own, &from, &to).fine(between, HALFWAY_ALLOWED)?;
             if !rolled.keeps_off_edges(model) {
                 return Err(NoStep::OutOfReach);
             }
@@ -115,7 +123,7 @@ fn step(model: &Model, start: &GraspState, here: &Moment, pose: &Pose) -> Result
             rolled.joints
         } else {
             let there = follow_contact(model, finger, &contacts[finger], &to, own).ok_or(NoStep::OutOfReach)?;
-            if !tip_stays(model, finger, &contacts[finger], own, &there, &mut halfway) {
+            if !tip_stays(model, finger, &contacts[finger], own, &there, || between(0.5)) {
                 return Err(NoStep::TooLong);
             }
             there

@@ -10,6 +10,7 @@ mod configuration;
 /// Obstacles near the bodies that move.
 mod nearby;
 
+use super::forces::Refusals;
 use super::model::{Carrier, MAX_FINGERS, Model, Pair};
 use super::state::GraspState;
 use arrayvec::ArrayVec;
@@ -93,6 +94,8 @@ pub struct Workspace<'a> {
     pub rrt_iterations: usize,
     /// Configurations looked at.
     pub work: u64,
+    /// Grasps refused for want of forces.
+    pub refusals: Refusals,
     /// The pair that stopped the last failed step.
     pub blocking_pair: Option<Pair>,
     /// Its index in `pairs`.
@@ -123,6 +126,7 @@ impl<'a> Workspace<'a> {
             free: 0,
             rrt_iterations: model.settings.rrt_iterations,
             work: 0,
+            refusals: Refusals::default(),
             blocking_pair: None,
             blocking_index: 0,
             model,

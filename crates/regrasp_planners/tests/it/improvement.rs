@@ -11,7 +11,7 @@ use regrasp_scene::{GraspRequest, InHandQuery, LoadedScene};
 use std::time::Duration;
 
 fn settings(improve_work: u64) -> InHandSettings {
-    InHandSettings { improve_work, ..InHandSettings::default() }
+    InHandSettings { improve_work, ..InHandSettings::plain() }
 }
 
 /// Plans, and has the plan judged.

@@ -3,6 +3,7 @@
 mod free_fingers;
 mod improvement;
 mod in_hand_methods;
+mod physics;
 #[path = "../../../../tests/support/places.rs"]
 mod places;
 mod roadmaps;

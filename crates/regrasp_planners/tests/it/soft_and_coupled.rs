@@ -12,7 +12,7 @@ use regrasp_scene::{LoadedScene, Scene, load_scene};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-fn scene(name: &str, models: &Path) -> LoadedScene {
+pub fn scene(name: &str, models: &Path) -> LoadedScene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes").join(name);
     let resolve = ResolveOptions { packages: vec![("models".into(), models.to_owned())], search_paths: vec![] };
     load_scene(&path, &LoadOptions { resolve, ..LoadOptions::default() }).unwrap_or_else(|e| panic!("{name}: {e}"))

@@ -9,8 +9,9 @@ use crate::check::violation::ViolationKind::{
 };
 use crate::plan::{ContactState, ForcePromises, Plan, SegmentKind, Waypoint};
 use regrasp_base::Rng;
-use regrasp_geometry::{Pose, Vector};
+use regrasp_geometry::{Pose, UnitVector, Vector};
 use regrasp_grasp::ContactModel;
+use regrasp_scene::Gravity;
 
 impl Breeder<'_> {
     pub(super) fn break_forces(&mut self) {
@@ -52,7 +53,17 @@ impl Breeder<'_> {
             gravity.iter_mut().for_each(|x| *x *= factor);
             Some(())
         });
-        self.add("gravity promised from elsewhere", &[ForceUnbalanced], |plan, rng| {
+        if let Some(gravity) = self.plan.promises.forces.as_ref().and_then(|forces| forces.gravity_in_world) {
+            let tilt = nalgebra::Rotation3::new(Vector::from(self.rng.direction()) * self.rng.uniform(1e-3, 0.1));
+            let mut scene = self.scene.clone();
+            scene.gravity = Some(Gravity::Direction(UnitVector::new_normalize(tilt * Vector::from(gravity))));
+            let turned = (Vector::from(gravity) - tilt * Vector::from(gravity)).norm() > 1e-3;
+            if turned {
+                let (plan, expected) = (self.plan.clone(), vec![PromiseBroken]);
+                self.found.push(Mutant { name: "gravity from elsewhere", plan, scene: Some(scene), expected });
+            }
+        }
+        self.add("gravity promised from elsewhere", &[ForceUnbalanced, PromiseBroken], |plan, rng| {
             let gravity = promises(plan)?.gravity_in_world.as_mut()?;
             let turn = nalgebra::Rotation3::new(Vector::from(rng.direction()) * rng.uniform(1e-3, 0.1));
             let before = Vector::from(*gravity);
@@ -336,7 +347,9 @@ fn make_torques(model: &Model, waypoint: &mut Waypoint) {
     for (finger, state) in model.fingers.iter().zip(&waypoint.contacts) {
         let (Some(contact), Some(force)) = (contact_of(state), state.force_in_object) else { continue };
         let couple = world_from_object * contact.normal_in_object.into_inner() * state.torsion.unwrap_or(0.0);
-        let (force, point) = (world_from_object * Vector::from(force), world_from_object * contact.point_in_object);
+        let force = world_from_object * Vector::from(force);
+        let touching = world_from_object * contact.normal_in_object.into_inner() * finger.radius;
+        let point = finger.center_in_world(&waypoint.joints) - touching;
         for axis in finger.path.axes(&waypoint.joints) {
             waypoint.joint_torques[axis.coordinate] += axis.work(&force, &point, &couple);
         }

@@ -8,6 +8,7 @@
 use super::super::candidates::Candidate;
 use super::super::combine::{Choice, ClosureTable};
 use super::super::cost::joint_path;
+use super::super::forces::balances;
 use super::super::legs::Solution;
 use super::super::model::{Carrier, Model};
 use super::super::relocate::{Foothold, relocate};
@@ -301,6 +302,10 @@ impl<'g, 'a> Gaits<'g, 'a> {
             return true;
         }
         let state = self.state(node);
+        if !self.is_balanced(&state.moment(), state.holding) {
+            self.no_goods.insert(NoGood::Grasp(node.station, node.choice.clone()));
+            return false;
+        }
         self.search.workspace.set(&state.world_from_object, &state.joints, &state.contacts);
         for moment in self.moments(node) {
             if !self.search.workspace.step(&moment.world_from_object, &moment.joints, TipMode::AllHold) {
@@ -308,8 +313,16 @@ impl<'g, 'a> Gaits<'g, 'a> {
                 self.no_goods.insert(no_good);
                 return false;
             }
+            if !self.is_balanced(&moment, state.holding) {
+                self.no_goods.insert(NoGood::Grasp(node.station, node.choice.clone()));
+                return false;
+            }
         }
         self.proven_transfers.insert(node.clone())
+    }
+
+    fn is_balanced(&mut self, at: &Moment, holding: u32) -> bool {
+        balances(&mut self.search.workspace, &at.world_from_object, &at.joints, &at.contacts, holding)
     }
 
     /// What stopped a transfer, in the smallest terms.
@@ -338,6 +351,10 @@ impl<'g, 'a> Gaits<'g, 'a> {
             return true;
         }
         let state = self.state(node);
+        if !self.is_balanced(&state.moment(), state.holding & !(1 << finger)) {
+            self.no_goods.insert(NoGood::Relocation(node.station, finger, node.choice[finger], track));
+            return false;
+        }
         self.search.workspace.set(&state.world_from_object, &state.joints, &state.contacts);
         let to = &self.tracks[finger][track];
         let moment = self.course.stations[node.station];

@@ -3,6 +3,9 @@
 //! Each round lays a course, a way of the object through all poses of the query; gathers tracks, contacts that fingers
 //! keep along parts of it; and takes the cheapest gait on them that can be proven. The courses are the straight way, that
 //! of the best plan so far, whose own contacts are then among the tracks, and ways bent at random.
+//!
+//! Where fingertips roll, contacts depend on the way that led to them and no two gaits share tracks: a round is then a new
+//! search from nothing.
 
 /// Ways of the object.
 mod course;
@@ -16,7 +19,7 @@ mod track;
 use super::candidates::{Candidate, draw_pose};
 use super::combine::Choice;
 use super::cost::{figures, lower_bound, margin_cost};
-use super::legs::{Legs, Solution};
+use super::legs::{Legs, Solution, plan_legs};
 use super::model::Model;
 use super::search::{Search, Stop};
 use super::shorten::CASUAL;
@@ -71,7 +74,10 @@ pub fn improve(search: &mut Search, legs: &Legs, first: Solution) -> (Solution, 
     search.workspace.rrt_iterations = model.settings.rrt_iterations / CASUAL;
     while improvement.improved.cost > lower_bound {
         let mut rng = Rng::child(&search.rng, "round", improvement.rounds);
-        let better = search.check().and_then(|()| round(search, legs, &best, &improvement, &mut rng));
+        let better = search.check().and_then(|()| match model.any_rolls() {
+            true => search_again(search, legs, &improvement, &rng),
+            false => round(search, legs, &best, &improvement, &mut rng),
+        });
         match better {
             Ok(Some((better, figures))) => (best, improvement.improved) = (better, figures),
             Ok(None) => {}
@@ -84,6 +90,19 @@ pub fn improve(search: &mut Search, legs: &Legs, first: Solution) -> (Solution, 
     }
     improvement.work = search.workspace.work - work_before;
     (best, improvement)
+}
+
+/// A new search, if what it finds is better than the best so far. Err when the search is to stop.
+fn search_again(
+    search: &mut Search,
+    legs: &Legs,
+    improvement: &Improvement,
+    rng: &Rng,
+) -> Result<Option<(Solution, PlanFigures)>, Stop> {
+    search.rng = rng.clone();
+    let solution = plan_legs(search, legs)?;
+    let figures = figures(search.model(), &solution.way);
+    Ok((figures.cost < improvement.improved.cost).then_some((solution, figures)))
 }
 
 /// A course and the cheapest gait found along it, if that is better than the best so far. Err when the search is to stop

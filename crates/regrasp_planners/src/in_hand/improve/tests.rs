@@ -16,7 +16,7 @@ const NO_LIMITS: Limits = Limits { cost: 1e9, n_expanded: 1_000_000 };
 
 /// Gaits on a few tracks along the straight course of `name`.
 fn with_gaits(name: &str, n_tracks: usize, test: impl FnOnce(&mut Gaits)) {
-    with_settings(name, &InHandSettings::default(), |search: &mut Search| {
+    with_settings(name, &InHandSettings::plain(), |search: &mut Search| {
         let poses = [search.start, search.goal];
         let legs = Legs { poses: &poses, start_grasp: None, goal_grasp: None };
         let mut rng = Rng::keyed(1, "gaits", 0);
@@ -73,7 +73,7 @@ fn what_a_proven_gait_costs_is_no_less_than_the_search_said() {
 
 #[test]
 fn what_a_finger_reaches_is_never_out_of_its_reach() {
-    with_settings("box_180z.toml", &InHandSettings::default(), |search| {
+    with_settings("box_180z.toml", &InHandSettings::plain(), |search| {
         let model = search.model();
         let mut rng = Rng::keyed(3, "reach", 0);
         let placement = Placement::from(&search.goal);
@@ -98,7 +98,7 @@ fn what_a_finger_reaches_is_never_out_of_its_reach() {
 
 #[test]
 fn a_bound_with_grasps_at_both_ends_counts_the_fingers_that_must_move() {
-    with_settings("box_90x.toml", &InHandSettings::default(), |search| {
+    with_settings("box_90x.toml", &InHandSettings::plain(), |search| {
         let poses = [search.start, search.goal];
         search.begin_leg(0, poses[0], poses[1]);
         let way = super::super::gait::grow(search, None, None).expect("an easy query");

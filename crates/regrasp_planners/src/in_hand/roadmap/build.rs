@@ -9,7 +9,7 @@ use super::super::endpoints::refuse_impossible;
 use super::super::model::Model;
 use super::super::relocate::{Foothold, relocate};
 use super::super::search::{Search, Stop};
-use super::super::settings::{InHandSettings, Method};
+use super::super::settings::{InHandSettings, Method, TransferMode};
 use super::super::shorten::{Arrival, transfer_regrasp};
 use super::super::state::{GraspState, Motion, Sequence, Step};
 use super::super::validate::follow_relocation;
@@ -88,6 +88,9 @@ pub struct BuildStage {
 
 /// Builds a roadmap of `scene` over `region`, with `settings.n_threads` threads.
 ///
+/// Contacts stay where they are while the object moves, whatever the settings say: where a fingertip rolls to depends on the
+/// way that it came, and a graph has many ways to each of its grasps.
+///
 /// Failures: a hand that can never do it, a spent budget, an interruption, or no grasp anywhere. Panics if settings or
 /// region are not valid.
 pub fn build_roadmap(
@@ -100,7 +103,7 @@ pub fn build_roadmap(
     progress: &(dyn Fn(BuildStage) + Sync),
 ) -> Result<GraspRoadmap, Failure> {
     settings.validate().and_then(|()| build.validate()).and_then(|()| region.validate()).expect("validated by callers");
-    let settings = InHandSettings { method: Method::Gait, ..settings.clone() };
+    let settings = InHandSettings { method: Method::Gait, transfer: TransferMode::Fixed, ..settings.clone() };
     let model = Model::new(scene, &settings);
     refuse_impossible(&model)?;
     let mut builder = Builder::new(&model, region, build, seed, budget, progress)?;

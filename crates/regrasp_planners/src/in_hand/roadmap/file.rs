@@ -22,7 +22,7 @@ use std::path::Path;
 /// First bytes of every roadmap file.
 const MAGIC: [u8; 8] = *b"regrasp\x1a";
 /// Version that this program reads and writes.
-const FORMAT_VERSION: u32 = 3;
+const FORMAT_VERSION: u32 = 4;
 /// Largest file that is read: more nodes than indices can tell apart need more.
 const MAX_FILE_BYTES: u64 = 8 << 30;
 /// Where the bytes begin that the checksum is of: after magic, version, number of fingers, length and checksum.

@@ -213,10 +213,11 @@ impl GraspRoadmap {
 }
 
 /// The settings that decide what is feasible, by name.
-fn feasibility(settings: &InHandSettings) -> [(&'static str, serde_json::Value); 7] {
+fn feasibility(settings: &InHandSettings) -> [(&'static str, serde_json::Value); 8] {
     use serde_json::json;
     [
         ("closure_margin", json!(settings.closure_margin)),
+        ("friction_margin", json!(settings.friction_margin)),
         ("release_rule", json!(settings.release_rule)),
         ("step", json!(settings.step)),
         ("clearance", json!(settings.clearance)),

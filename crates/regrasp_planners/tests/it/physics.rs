@@ -1,0 +1,332 @@
+//! Forces, torques, times and velocities of plans, substituted into what they have to satisfy.
+
+use crate::in_hand_methods::scene;
+use crate::places::shared_models;
+use crate::soft_and_coupled;
+use nalgebra::{DMatrix, UnitQuaternion};
+use regrasp_base::{Budget, Rng};
+use regrasp_geometry::{Point, Pose, UnitVector, Vector, frame};
+use regrasp_grasp::{Contact, ContactForce, ContactModel, Grip};
+use regrasp_plan::Plan;
+use regrasp_plan::check::{CheckSettings, Violation, check};
+use regrasp_plan::plan::{SegmentKind, Waypoint};
+use regrasp_planners::in_hand::{AnyDirection, ForceSettings, GravityInHand, InHandSettings, plan_in_hand};
+use regrasp_planners::{Failure, FailureKind};
+use regrasp_scene::{Gravity, LoadedScene, Scene};
+
+const SCENES: [&str; 4] = ["sphere_90x.toml", "box_90x.toml", "soft_pair_roll.toml", "shadow/sphere32_z.toml"];
+
+fn settings() -> InHandSettings {
+    InHandSettings { friction_margin: 1.5, forces: Some(ForceSettings::default()), ..InHandSettings::default() }
+}
+
+fn plan_with(loaded: &LoadedScene, settings: &InHandSettings, seed: u64) -> Result<Plan, Failure> {
+    let (query, budget) = (loaded.task.query(seed), Budget::work(3_000_000));
+    let plan = plan_in_hand(&loaded.scene, &query, settings, seed, &budget, &|_| {})?;
+    let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+    assert!(report.accepted(), "seed {seed}: {report:#?}");
+    Ok(plan)
+}
+
+/// Calls `ask` with plans of the bundled scenes.
+fn for_plans(mut ask: impl FnMut(&str, &LoadedScene, &Plan)) {
+    let models = shared_models();
+    for name in SCENES {
+        let loaded = match &models {
+            Some(models) => soft_and_coupled::scene(name, models),
+            None if name.contains('/') => continue,
+            None => scene(name),
+        };
+        for seed in 0..3 {
+            let plan = plan_with(&loaded, &settings(), seed).unwrap_or_else(|failure| panic!("{name}: {failure}"));
+            ask(name, &loaded, &plan);
+        }
+    }
+}
+
+fn holds(plan: &Plan, segment: usize, waypoint: &Waypoint, finger: usize) -> bool {
+    let moves = plan.segments[segment].moving_finger.as_ref() == Some(&plan.fingers[finger]);
+    waypoint.contacts[finger].holds() && !moves
+}
+
+fn exerted(waypoint: &Waypoint, finger: usize) -> ContactForce {
+    let state = &waypoint.contacts[finger];
+    let force = Vector::from(state.force_in_object.expect("a finger that holds has a force"));
+    ContactForce { force, torsion: state.torsion.unwrap_or(0.0) }
+}
+
+#[test]
+fn forces_balance_the_weight_inside_all_limits() {
+    for_plans(|name, loaded, plan| {
+        let promised = plan.promises.forces.as_ref().expect("forces were asked for");
+        let object = &loaded.scene.object;
+        assert_eq!((promised.mass, promised.gravity_in_world), (object.mass, Some([0.0, 0.0, -9.80665])), "{name}");
+        for (s, segment) in plan.segments.iter().enumerate() {
+            for waypoint in &segment.waypoints {
+                let world_from_object = Pose::from(&waypoint.world_from_object);
+                let down = Vector::new(0.0, 0.0, -9.80665) * object.mass;
+                let (mut force, mut torque) = (world_from_object.rotation.inverse() * down, Vector::zeros());
+                for finger in 0..plan.fingers.len() {
+                    let state = &waypoint.contacts[finger];
+                    let model = loaded.scene.hand.fingers[finger].tip.contact;
+                    assert_eq!(state.holds(), state.force_in_object.is_some());
+                    let is_soft = matches!(model, ContactModel::SoftFinger { .. });
+                    assert_eq!(state.torsion.is_some(), state.holds() && is_soft, "{name}");
+                    if !state.holds() {
+                        continue;
+                    }
+                    let given = exerted(waypoint, finger);
+                    if !holds(plan, s, waypoint, finger) {
+                        assert_eq!((given.force, given.torsion), (Vector::zeros(), 0.0), "{name}: lifts or lands");
+                        continue;
+                    }
+                    let normal = Vector::from(state.normal_in_object.unwrap());
+                    let point = Point::from(state.point_in_object.unwrap());
+                    force += given.force;
+                    torque += (point - object.center_of_mass).cross(&given.force) + normal * given.torsion;
+                    let contact =
+                        Contact { point_in_object: point, normal_in_object: UnitVector::new_normalize(normal) };
+                    let grip = Grip { contact, model };
+                    let parts = grip.components(&given, plan.promises.friction);
+                    assert!(grip.depth(&parts, plan.promises.friction) > 0.0, "{name}: {parts:?}");
+                    assert!(parts.normal > 2.0 && parts.normal < 15.0, "{name}: {parts:?}");
+                }
+                assert!(force.norm() < 1e-10 && torque.norm() < 1e-11, "{name}: {force} {torque}");
+                for (torque, limit) in waypoint.joint_torques.iter().zip(&promised.joint_torques) {
+                    assert!(limit.is_none_or(|limit| torque.abs() < limit), "{name}: {torque}");
+                }
+            }
+        }
+    });
+}
+
+/// The work of a joint's torque is that of its finger's force, at whatever the joint moves: finite differences of the
+/// point and the direction of the tip that touch.
+#[test]
+fn joint_torques_do_the_work_of_the_forces() {
+    for_plans(|name, loaded, plan| {
+        for (s, segment) in plan.segments.iter().enumerate() {
+            for waypoint in segment.waypoints.iter().step_by(5) {
+                let world_from_object = Pose::from(&waypoint.world_from_object);
+                let mut first = 0;
+                for (index, finger) in loaded.scene.hand.fingers.iter().enumerate() {
+                    let n_joints = finger.chain.n_coordinates();
+                    let joints = &waypoint.joints[first..first + n_joints];
+                    let torques = &waypoint.joint_torques[first..first + n_joints];
+                    first += n_joints;
+                    if !holds(plan, s, waypoint, index) {
+                        assert!(torques.iter().all(|&torque| torque == 0.0));
+                        continue;
+                    }
+                    let given = exerted(waypoint, index);
+                    let force = world_from_object.rotation * given.force;
+                    let normal =
+                        world_from_object.rotation * Vector::from(waypoint.contacts[index].normal_in_object.unwrap());
+                    let tip_at = |joints: &[f64]| {
+                        let mut bodies = Vec::new();
+                        finger.chain.forward(joints, &mut bodies);
+                        *bodies.last().expect("a finger has joints")
+                    };
+                    let here = tip_at(joints);
+                    let touching = here * finger.tip.center_in_body - normal * finger.tip.radius();
+                    let touching_in_body = here.inverse_transform_point(&touching);
+                    for (j, torque) in torques.iter().enumerate() {
+                        let step = 1e-6;
+                        let at = |sign: f64| {
+                            let mut moved = joints.to_vec();
+                            moved[j] += sign * step;
+                            tip_at(&moved)
+                        };
+                        let (low, high) = (at(-1.0), at(1.0));
+                        let way = high * touching_in_body - low * touching_in_body;
+                        let turn = UnitQuaternion::scaled_axis(&(high.rotation * low.rotation.inverse()));
+                        let work = (force.dot(&way) + given.torsion * normal.dot(&turn)) / (2.0 * step);
+                        assert!((work - torque).abs() < 1e-6, "{name}, joint {j} of {}: {work} {torque}", finger.name);
+                    }
+                }
+            }
+        }
+    });
+}
+
+/// Largest distance that a point of the ball about the centre of mass goes, by sampling it.
+fn object_way(scene: &Scene, from: &Waypoint, to: &Waypoint) -> f64 {
+    let (from, to) = (Pose::from(&from.world_from_object), Pose::from(&to.world_from_object));
+    let turn = frame::rotation_between(&from, &to);
+    let across = if turn.norm() > 0.0 { turn.cross(&Vector::new(0.3, 0.5, 0.7)).normalize() } else { Vector::x() };
+    [across, turn.cross(&across).normalize(), -across]
+        .iter()
+        .filter(|direction| direction.norm() > 0.5)
+        .map(|direction| {
+            let point = scene.object.center_of_mass + from.rotation.inverse() * direction * scene.object.radius;
+            (to * point - from * point).norm()
+        })
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn plans_rest_between_segments_and_keep_to_their_limits() {
+    for_plans(|name, loaded, plan| {
+        let limits = &plan.promises.motion;
+        let speed = settings().speed;
+        assert_eq!(plan.segments[0].waypoints[0].time, 0.0);
+        let mut fastest: f64 = 0.0;
+        for (s, segment) in plan.segments.iter().enumerate() {
+            let (first, last) = (&segment.waypoints[0], segment.waypoints.last().unwrap());
+            for end in [first, last] {
+                assert!(end.joint_velocities.iter().all(|&velocity| velocity == 0.0), "{name}: not at rest");
+            }
+            if let Some(before) = s.checked_sub(1).map(|before| &plan.segments[before]) {
+                let ended = before.waypoints.last().unwrap();
+                let are_transfers = [before.kind, segment.kind].iter().all(|kind| *kind == SegmentKind::Transfer);
+                let ramp = if are_transfers { 0.0 } else { speed.ramp };
+                assert!((first.time - ended.time - ramp).abs() < 1e-9, "{name}");
+            }
+            for pair in segment.waypoints.windows(2) {
+                let (from, to) = (&pair[0], &pair[1]);
+                let span = to.time - from.time;
+                assert!(span >= 0.999e-3, "{name}: {span}");
+                let mut first_joint = 0;
+                for finger in &loaded.scene.hand.fingers {
+                    let range = first_joint..first_joint + finger.chain.n_coordinates();
+                    first_joint = range.end;
+                    let tips = [from, to].map(|waypoint| finger.ik.tip(&waypoint.joints[range.clone()]));
+                    let mean = (tips[1] - tips[0]).norm() / span;
+                    assert!(mean <= limits.largest_speed * (1.0 + 1e-9), "{name}: {mean} m/s");
+                    fastest = fastest.max(mean);
+                }
+                let mean = object_way(&loaded.scene, from, to) / span;
+                assert!(mean <= limits.largest_speed * (1.0 + 1e-9), "{name}: {mean} m/s");
+                fastest = fastest.max(mean);
+                for j in 0..plan.joint_names.len() {
+                    let (a, b) = (from.joints[j], to.joints[j]);
+                    let (start, end) = (from.joint_velocities[j], to.joint_velocities[j]);
+                    let most = limits.joint_velocities[j] * (1.0 + 1e-9);
+                    assert!(((end - start) / span).abs() <= limits.joint_accelerations[j] * (1.0 + 1e-6), "{name}");
+                    // The cubic goes from one position to the other without turning back, nowhere too fast.
+                    let mean = (b - a) / span;
+                    let velocity = |t: f64| {
+                        6.0 * t * (1.0 - t) * mean + (1.0 - t) * (1.0 - 3.0 * t) * start + t * (3.0 * t - 2.0) * end
+                    };
+                    for k in 0..=16 {
+                        let v = velocity(f64::from(k) / 16.0);
+                        assert!(v.abs() <= most && v * mean >= -1e-12, "{name}: {v}, {mean} on average");
+                    }
+                }
+            }
+        }
+        // Slow by intention, not for want of anything.
+        assert!(fastest > 0.5 * limits.largest_speed, "{name}: {fastest} m/s at most");
+    });
+}
+
+/// Forces of plans for any direction balance nothing; with what the least-norm inverse of the grasp map adds they balance
+/// the weight in each of many directions, inside all limits: the inverse is that of a singular value decomposition.
+#[test]
+fn plans_for_any_direction_hold_in_each() {
+    let mut rng = Rng::keyed(1, "directions", 0);
+    for name in ["sphere_90x.toml", "box_90x.toml"] {
+        let loaded = scene(name);
+        let any = InHandSettings { gravity: Some(GravityInHand::Any(AnyDirection::Any)), ..settings() };
+        let (query, budget) = (loaded.task.query(0), Budget::work(3_000_000));
+        let plan =
+            plan_in_hand(&loaded.scene, &query, &any, 0, &budget, &|_| {}).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+        let unknown_room = |violation: &Violation| violation.subjects == ["gravity_in_world"];
+        assert!(report.violations.iter().all(unknown_room), "{name}: {report:#?}");
+        assert_eq!(plan.promises.forces.as_ref().expect("forces were asked for").gravity_in_world, None);
+        let object = &loaded.scene.object;
+        for (s, segment) in plan.segments.iter().enumerate() {
+            for waypoint in segment.waypoints.iter().step_by(4) {
+                let holding: Vec<usize> = (0..plan.fingers.len()).filter(|&f| holds(&plan, s, waypoint, f)).collect();
+                let at = |finger: usize| {
+                    let state = &waypoint.contacts[finger];
+                    let normal = Vector::from(state.normal_in_object.unwrap());
+                    (Point::from(state.point_in_object.unwrap()) - object.center_of_mass, normal)
+                };
+                let mut map = DMatrix::zeros(6, 3 * holding.len());
+                let mut sum = Vector::zeros();
+                for (index, &finger) in holding.iter().enumerate() {
+                    let arm = at(finger).0;
+                    sum += exerted(waypoint, finger).force;
+                    for axis in 0..3 {
+                        let force = Vector::ith(axis, 1.0);
+                        let column = 3 * index + axis;
+                        map.fixed_view_mut::<3, 1>(0, column).copy_from(&force);
+                        map.fixed_view_mut::<3, 1>(3, column).copy_from(&(arm.cross(&force) / object.radius));
+                    }
+                }
+                assert!(sum.norm() < 1e-10, "{name}: {sum}");
+                let inverse = map.pseudo_inverse(1e-9).expect("the grasp is closed");
+                for _ in 0..20 {
+                    let load = Vector::from(rng.direction()) * (object.mass * 9.80665);
+                    let more = inverse.columns(0, 3) * -load;
+                    for (index, &finger) in holding.iter().enumerate() {
+                        let force = exerted(waypoint, finger).force
+                            + Vector::new(more[3 * index], more[3 * index + 1], more[3 * index + 2]);
+                        let normal = at(finger).1;
+                        let pressing = -force.dot(&normal);
+                        let across = (force + normal * pressing).norm();
+                        assert!(pressing > 2.0 && pressing < 15.0, "{name}: {pressing}");
+                        assert!(across < plan.promises.friction * pressing, "{name}: {across} {pressing}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn changed(name: &str, change: impl FnOnce(&mut Scene)) -> LoadedScene {
+    let mut loaded = scene(name);
+    change(&mut loaded.scene);
+    loaded
+}
+
+#[test]
+fn without_forces_there_is_no_plan_and_the_cause_is_named() {
+    let budget = Budget::work(60_000);
+    let fails = |loaded: &LoadedScene, settings: &InHandSettings| {
+        let failure = plan_in_hand(&loaded.scene, &loaded.task.query(0), settings, 0, &budget, &|_| {});
+        let failure = failure.expect_err("nothing balances it");
+        let causes: Vec<&str> = failure.causes.iter().map(|cause| cause.reason.as_str()).collect();
+        (causes.join("\n"), failure.advice)
+    };
+    let (causes, _) = fails(&changed("sphere_90x.toml", |scene| scene.object.mass = 20.0), &settings());
+    assert!(causes.contains("no contact forces balance the weight: "), "{causes}");
+    let strong = ForceSettings { normal_force: [2.0, 500.0], ..ForceSettings::default() };
+    let (causes, _) = fails(
+        &changed("sphere_90x.toml", |scene| scene.object.mass = 20.0),
+        &InHandSettings { forces: Some(strong), ..settings() },
+    );
+    assert!(causes.contains(" would need more than 1 N m"), "{causes}");
+    let weak = ForceSettings { torque_share: 0.1, ..ForceSettings::default() };
+    let (causes, advice) = fails(&scene("sphere_90x.toml"), &InHandSettings { forces: Some(weak), ..settings() });
+    assert!(causes.contains("balance the weight: joint \"") && causes.contains(" would need more than 0.1 N m"));
+    assert!(advice.contains("no contact forces"), "{advice}");
+    // The same without asking about forces.
+    let heavy = changed("sphere_90x.toml", |scene| scene.object.mass = 20.0);
+    let plain = InHandSettings { forces: None, ..settings() };
+    let plan = plan_with(&heavy, &plain, 0).expect("geometry knows no weight");
+    assert!(plan.promises.forces.is_none());
+    let waypoints = || plan.segments.iter().flat_map(|segment| &segment.waypoints);
+    assert!(waypoints().all(|w| w.joint_torques.is_empty() && w.contacts.iter().all(|c| c.force_in_object.is_none())));
+}
+
+#[test]
+fn gravity_may_be_stated_once() {
+    let along_x = GravityInHand::Direction([3.0, 0.0, 0.0]);
+    let asked = InHandSettings { gravity: Some(along_x), ..settings() };
+    let loaded = scene("sphere_90x.toml");
+    let plan = plan_with(&loaded, &asked, 0).expect("a sphere held from the side");
+    let gravity = plan.promises.forces.and_then(|forces| forces.gravity_in_world).expect("a direction");
+    assert!((Vector::from(gravity) - Vector::new(9.80665, 0.0, 0.0)).norm() < 1e-12);
+    let stated = |gravity| changed("sphere_90x.toml", |scene| scene.gravity = Some(gravity));
+    assert!(plan_with(&stated(Gravity::Direction(Vector::x_axis())), &asked, 0).is_ok());
+    let failure = plan_with(&stated(Gravity::default()), &asked, 0).expect_err("two directions");
+    assert_eq!(failure.kind, FailureKind::Impossible);
+    assert_eq!(
+        failure.message,
+        "the scene states gravity along [0.000, 0.000, -1.000] of the world, the settings along [1.000, 0.000, 0.000] of \
+         the world: leave one of them out"
+    );
+}
