@@ -17,7 +17,7 @@ def main(arguments: list[str] | None = None) -> int:
         # Read by MuJoCo when it is imported.
         os.environ["MUJOCO_GL"] = "egl"
     try:
-        import mujoco  # noqa: F401  # pyright: ignore[reportUnusedImport]
+        from . import _mujoco  # noqa: F401  # pyright: ignore[reportUnusedImport]
     except ImportError as error:
         return _bad_input(f"MuJoCo is not there ({error}); pip install 'regrasp[sim]'")
     from .load import load
@@ -31,6 +31,7 @@ def main(arguments: list[str] | None = None) -> int:
             gravity=options.gravity,
             friction_scale=options.friction_scale,
             mass_scale=options.mass_scale,
+            torsion=options.torsion,
             speed=options.speed,
             noslip=not options.no_noslip,
             hold_time=options.hold_time,
@@ -125,6 +126,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--friction-scale", type=_positive, default=1.0, help="friction of the simulation over the scene's")
     parser.add_argument("--mass-scale", type=_positive, default=1.0, help="mass of the object over the planned one")
+    parser.add_argument("--torsion", type=float, metavar="M", help="torsional friction of all fingertips, in metres")
     parser.add_argument("--speed", type=_positive, default=1.0, help="times faster than planned")
     parser.add_argument("--squeeze", type=_positive, default=0.003, metavar="M", help="of controller A, in metres")
     parser.add_argument("--no-noslip", action="store_true", help="without MuJoCo's solver against creep")

@@ -234,7 +234,7 @@ def _pair(rows: list[dict[str, Any]], of: Any, mm: str, deg: str) -> str:
 def main(arguments: list[str] | None = None) -> int:
     """Runs the command; returns the exit code."""
     options = _parser().parse_args(arguments)
-    settings = json.loads(options.settings.read_text()) if options.settings else {}
+    settings: dict[str, Any] = json.loads(options.settings.read_text()) if options.settings else {}
     jobs = [
         Job(
             scene=str(scene),

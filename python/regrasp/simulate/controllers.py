@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .model import Rig, Settings, contact_jacobians, gravity_of, inverses, normals_in_world
@@ -54,8 +56,9 @@ class Feedback:
         self._inverse = (rig.stiffness[:, None] * inverse.reshape(len(inverse), n_joints, -1)).copy()
         self._arms = contacts - ref.object_position[:, None, :]
         self._ref = ref
-        self._grow = settings.feedback_gain * settings.tick
-        self._follow = settings.tick / FREE_FOLLOW_TIME
+        pressing = ref.presses[:, :, None].astype(np.float64)
+        self._leak = (1.0 - pressing) * (settings.tick / FREE_FOLLOW_TIME)
+        self._gain = pressing * (settings.feedback_gain * settings.tick) - self._leak
         self._offsets = np.zeros((len(rig.fingers), 3))
         self._position = slice(rig.object_qpos, rig.object_qpos + 3)
         self._quat = slice(rig.object_qpos + 3, rig.object_qpos + 7)
@@ -71,9 +74,8 @@ class Feedback:
         lacking[:, 1] = y + c * arms[:, 0] - a * arms[:, 2]
         lacking[:, 2] = z + a * arms[:, 1] - b * arms[:, 0]
         offsets = self._offsets
-        held = ref.presses[k][:, None]
-        offsets += np.where(held, self._grow * lacking, self._follow * (-lacking - offsets))
-        np.clip(offsets, -LARGEST_OFFSET, LARGEST_OFFSET, out=offsets)
+        change = self._gain[k] * lacking - self._leak[k] * offsets
+        np.maximum(-LARGEST_OFFSET, np.minimum(LARGEST_OFFSET, offsets + change), out=offsets)
         return self._commands[k] + self._inverse[ref.waypoint[k]] @ offsets.ravel()
 
 
@@ -99,7 +101,7 @@ def _torques(rig: Rig, jacobians: Array, contacts: Array, settings: Settings) ->
     if settings.controller == "A":
         return np.zeros((len(points), len(rig.plan["joint_names"])))
     torques = np.array([point["joint_torques"] for point in points], dtype=np.float64)
-    promised = rig.plan["promises"].get("forces") or {}
+    promised: dict[str, Any] = rig.plan["promises"].get("forces") or {}
     if "gravity_in_world" in promised:
         return torques
     lift = -float(promised["mass"]) * gravity_of(rig, settings.gravity) if "mass" in promised else np.zeros(3)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from .reference import Plan, PlanError
 
@@ -21,10 +22,10 @@ def load(
     Raises ``PlanError`` or ``OSError``.
     """
     try:
-        plan: Plan = json.loads(path.read_text(encoding="utf-8"))
+        plan: Any = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:
         raise PlanError(f"{path}: not JSON ({error})") from None
-    if not isinstance(plan, dict) or plan.get("format") != "regrasp-plan" or plan.get("format_version") != 2:
+    if not _is_plan(plan):
         raise PlanError(f"{path}: not a plan of format version 2")
     if mjcf is not None:
         return plan, mjcf.read_text(encoding="utf-8")
@@ -34,3 +35,7 @@ def load(
         return plan, regrasp.export_mjcf(path, scene=scene, packages=packages)
     except regrasp.RegraspError as error:
         raise PlanError(str(error)) from None
+
+
+def _is_plan(content: Any) -> bool:
+    return isinstance(content, dict) and (content.get("format"), content.get("format_version")) == ("regrasp-plan", 2)  # pyright: ignore[reportUnknownMemberType]

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ._mujoco import MjModel
 from .model import Rig, Settings
 from .reference import Array, Reference, rotation_matrices, waypoints_of
 from .replay import DROPPED, Drift, Track, pose_errors
@@ -215,5 +215,5 @@ def _unplanned(
     return sorted(found, key=lambda contact: contact.time)
 
 
-def _geom_name(model: mujoco.MjModel, geom: int) -> str:
+def _geom_name(model: MjModel, geom: int) -> str:
     return str(model.geom(geom).name)

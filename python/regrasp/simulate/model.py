@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ._mujoco import MjModel, mujoco
 from .reference import Array, Plan, PlanError, rotation_matrices, waypoints_of
 
 #: Stiffness of the joints of a finger of REFERENCE_REACH, in N m/rad, and damping, in N m s/rad (physics notes, section 6).
@@ -32,6 +33,8 @@ class Settings:
     """Friction of the simulation over the scene's."""
     mass_scale: float = 1.0
     """Mass of the simulated object over the one that the plan counts on."""
+    torsion: float | None = None
+    """Torsional friction of all fingertips, in metres, before it is scaled; without it the model's."""
     speed: float = 1.0
     """Times faster than planned."""
     noslip: bool = True
@@ -71,7 +74,7 @@ class FingerModel:
 class Rig:
     """A MuJoCo model with what the controllers and measurements ask of it."""
 
-    model: mujoco.MjModel
+    model: MjModel
     plan: Plan
     fingers: list[FingerModel]
     object_body: int
@@ -179,8 +182,10 @@ def contact_jacobians(rig: Rig) -> tuple[Array, Array]:
 
 def inverses(jacobians: Array) -> Array:
     """Damped inverses: shape (n_waypoints, n_joints, n_fingers, 3)."""
-    square = np.einsum("kfij,kflj->kfil", jacobians, jacobians) + INVERSE_DAMPING**2 * np.eye(3)
-    return np.einsum("kfij,kfil->kjfl", jacobians, np.linalg.inv(square))
+    square: Any = np.einsum("kfij,kflj->kfil", jacobians, jacobians) + INVERSE_DAMPING**2 * np.eye(3)
+    # numpy's own types of inv are not known to checkers for arrays of any shape.
+    invert: Any = np.linalg.inv
+    return np.einsum("kfij,kfil->kjfl", jacobians, invert(square))
 
 
 def normals_in_world(plan: Plan) -> Array:
@@ -199,13 +204,18 @@ def _apply(rig: Rig, settings: Settings) -> None:
     model.opt.gravity = gravity_of(rig, settings.gravity)
     if not settings.noslip:
         model.opt.noslip_iterations = 0
+    if settings.torsion is not None:
+        resists = model.pair_dim == 4
+        model.pair_friction[resists, 2] = settings.torsion
+        if settings.torsion == 0.0:
+            model.pair_dim[resists] = 3
     model.pair_friction[:] *= settings.friction_scale
     model.body_mass[rig.object_body] *= settings.mass_scale
     model.body_inertia[rig.object_body] *= settings.mass_scale
     mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
-def _make_servos(model: mujoco.MjModel, names: list[str], stiffness: Array, damping: Array) -> None:
+def _make_servos(model: MjModel, names: list[str], stiffness: Array, damping: Array) -> None:
     """Turns motors into joint servos: torque = control + stiffness * (0 - q) - damping * velocity.
 
     With control = stiffness * target + damping * velocity + torque it is a PD controller with both fed forward, that runs at the
@@ -227,7 +237,7 @@ def _gains(fingers: list[FingerModel], n_joints: int, scale: float) -> tuple[Arr
     return scale * REFERENCE_STIFFNESS * factor, scale * REFERENCE_DAMPING * factor
 
 
-def _drives(model: mujoco.MjModel, names: list[str]) -> Array:
+def _drives(model: MjModel, names: list[str]) -> Array:
     drives = np.zeros((model.nv, len(names)))
     for j, name in enumerate(names):
         drives[model.jnt_dofadr[model.joint(name).id], j] = 1.0
@@ -238,7 +248,7 @@ def _drives(model: mujoco.MjModel, names: list[str]) -> Array:
     return drives
 
 
-def _finger(model: mujoco.MjModel, name: str, joint_names: list[str]) -> FingerModel:
+def _finger(model: MjModel, name: str, joint_names: list[str]) -> FingerModel:
     site = model.site(f"{name}:tip")
     body = int(model.site_bodyid[site.id])
     object_geom = model.geom("object").id
@@ -263,7 +273,7 @@ def _finger(model: mujoco.MjModel, name: str, joint_names: list[str]) -> FingerM
     return FingerModel(name, int(site.id), body, np.array(sorted(joints)), reach, frozenset(touching))
 
 
-def _palm_axes(model: mujoco.MjModel, fingers: list[FingerModel], object_body: int) -> tuple[Array, Array]:
+def _palm_axes(model: MjModel, fingers: list[FingerModel], object_body: int) -> tuple[Array, Array]:
     """The axis of the hand frame nearest to the way from the roots of the fingers to the object where it starts, and the
     positive axis after it in the order x y z, both in the world."""
     data = mujoco.MjData(model)
@@ -280,14 +290,14 @@ def _palm_axes(model: mujoco.MjModel, fingers: list[FingerModel], object_body: i
     return np.sign(way[k]) * world_from_hand[:, k], world_from_hand[:, (k + 1) % 3].copy()
 
 
-def _free_joint(model: mujoco.MjModel) -> int:
+def _free_joint(model: MjModel) -> int:
     free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
     if len(free) != 1:
         raise PlanError(f"the model has {len(free)} free bodies; expected the object alone")
     return int(free[0])
 
 
-def _sensor(model: mujoco.MjModel, name: str) -> slice:
+def _sensor(model: MjModel, name: str) -> slice:
     sensor = model.sensor(name).id
     first = int(model.sensor_adr[sensor])
     return slice(first, first + int(model.sensor_dim[sensor]))

@@ -99,7 +99,8 @@ def reference(plan: Plan, *, tick: float = 0.004, speed: float = 1.0, lift_time:
     n = int(np.ceil((times[-1] - times[0]) / tick)) + 1
     at = times[0] + tick * np.arange(n)
     # Of waypoints at the same time the last has passed.
-    index = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
+    search: Any = np.searchsorted
+    index: NDArray[np.int64] = np.asarray(search(times, at, side="right") - 1).clip(0, len(times) - 2)
     duration = np.maximum(steps, 1e-12)
     u = np.clip((at - times[index]) / duration[index], 0.0, 1.0)
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import copy
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ._mujoco import MjData, mujoco
 from .controllers import Controller
 from .model import Rig, Settings
 from .reference import Array, Reference, rotation_matrices
@@ -60,7 +60,7 @@ class Drift:
     """Angle from there, in radians."""
 
 
-def grip(rig: Rig, controller: Controller, settings: Settings) -> mujoco.MjData:
+def grip(rig: Rig, controller: Controller, settings: Settings) -> MjData:
     """The start grasp, closed about the pinned object with forces ramped up; then the pin is off."""
     model = rig.model
     data = mujoco.MjData(model)
@@ -78,7 +78,7 @@ def grip(rig: Rig, controller: Controller, settings: Settings) -> mujoco.MjData:
     return data
 
 
-def hold(rig: Rig, ref: Reference, controller: Controller, gripped: mujoco.MjData, settings: Settings) -> Drift:
+def hold(rig: Rig, ref: Reference, controller: Controller, gripped: MjData, settings: Settings) -> Drift:
     """Holds the start grasp and measures how far the object creeps. ``gripped`` stays as it is."""
     data = copy.copy(gripped)
     data.ctrl[:] = controller.commands[0]
@@ -102,7 +102,7 @@ def hold(rig: Rig, ref: Reference, controller: Controller, gripped: mujoco.MjDat
     )
 
 
-def replay(rig: Rig, ref: Reference, controller: Controller, gripped: mujoco.MjData, settings: Settings) -> Track:
+def replay(rig: Rig, ref: Reference, controller: Controller, gripped: MjData, settings: Settings) -> Track:
     """Replays the plan, then rests. ``gripped`` is where it starts, and is changed. Ends early when the object is dropped."""
     model, data = rig.model, gripped
     rest = round(settings.rest_time / settings.tick)

@@ -6,10 +6,10 @@ import struct
 import zlib
 from pathlib import Path
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ._mujoco import MjvCamera, mujoco
 from .model import Rig
 from .replay import Track
 
@@ -42,7 +42,7 @@ def strip(rig: Rig, track: Track, *, pictures: int = 6, width: int = 360, height
     return np.concatenate(panels, axis=1)
 
 
-def _camera(rig: Rig, track: Track) -> mujoco.MjvCamera:
+def _camera(rig: Rig, track: Track) -> MjvCamera:
     """Looks at where the object starts, from the side and from above the palm."""
     camera = mujoco.MjvCamera()
     camera.type = mujoco.mjtCamera.mjCAMERA_FREE
