@@ -290,7 +290,7 @@ impl<'a> RoadmapPlanner<'a> {
             kind: FailureKind::NotConnected,
             message,
             advice: "build the roadmap with more places, or over a region that holds start and goal".into(),
-            causes: search.tally.causes(&self.model),
+            causes: search.whole_tally().causes(&self.model),
             leg: None,
             nearest_miss: None,
             statistics: Statistics { work: search.workspace.work, ..Statistics::default() },
