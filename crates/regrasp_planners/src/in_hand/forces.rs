@@ -196,6 +196,11 @@ pub struct Refusals {
 const CAUSE_EVERY: u64 = 16;
 
 impl Refusals {
+    /// How many there were.
+    pub fn n_seen(&self) -> u64 {
+        self.n_seen
+    }
+
     /// Causes and how often each was seen.
     pub fn counts(&self) -> impl Iterator<Item = (Unbalanced, u64)> + '_ {
         self.counts.iter().map(|(&cause, &count)| (cause, count))
