@@ -224,7 +224,7 @@ pub fn balances(
         return true;
     }
     let refusals = &mut workspace.refusals;
-    if refusals.n_seen % CAUSE_EVERY == 0
+    if refusals.n_seen.is_multiple_of(CAUSE_EVERY)
         && let Err(cause) = held.forces(model, forces, None)
     {
         *refusals.counts.entry(cause).or_default() += CAUSE_EVERY;
