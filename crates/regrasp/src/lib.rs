@@ -5,6 +5,7 @@
 //! `CONVENTIONS.md`; the tower of crates is in `ARCHITECTURE.md`.
 
 pub use regrasp_base as base;
+pub use regrasp_export as export;
 pub use regrasp_geometry as geometry;
 pub use regrasp_grasp as grasp;
 pub use regrasp_plan as plan;

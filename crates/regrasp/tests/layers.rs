@@ -27,6 +27,18 @@ const TOWER: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "regrasp_export",
+        &[
+            "regrasp_base",
+            "regrasp_geometry",
+            "regrasp_robot",
+            "regrasp_scene",
+            "regrasp_plan",
+            // Its tests plan.
+            "regrasp_planners",
+        ],
+    ),
+    (
         "regrasp",
         &[
             "regrasp_base",
@@ -37,6 +49,7 @@ const TOWER: &[(&str, &[&str])] = &[
             "regrasp_grasp",
             "regrasp_plan",
             "regrasp_planners",
+            "regrasp_export",
         ],
     ),
     (
@@ -60,6 +73,7 @@ const PRIVATE: &[(&str, &[&str])] = &[
     ("roxmltree", &["regrasp_robot"]),
     ("clap", &["regrasp_cli"]),
     ("ctrlc", &["regrasp_cli"]),
+    ("zip", &["regrasp_export"]),
     ("clarabel", &["regrasp_grasp", "regrasp_plan"]),
 ];
 

@@ -1,0 +1,14 @@
+//! Plans in the formats of other tools. Knows no planner; `docs/export-formats.md` describes what is written.
+//!
+//! Everything written is a function of the plan alone: the same plan gives the same bytes.
+
+/// A plan as arrays over all waypoints.
+pub mod arrays;
+/// Arrays for numpy: `.npz` without pickle.
+pub mod npz;
+/// ROS 2 `trajectory_msgs/JointTrajectory` as YAML.
+pub mod ros2;
+
+pub use arrays::PlanArrays;
+pub use npz::to_npz;
+pub use ros2::to_ros2;

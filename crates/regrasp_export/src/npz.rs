@@ -1,0 +1,105 @@
+//! Arrays for numpy: a ZIP archive of `.npy` files (NEP 1), stored, with one fixed date. No array holds objects, so that
+//! `numpy.load` reads it with `allow_pickle=False`.
+
+use crate::arrays::{CONTACT_MODES, PlanArrays, kind_name};
+use regrasp_plan::Plan;
+use std::io::{Cursor, Write};
+use zip::write::{SimpleFileOptions, ZipWriter};
+use zip::{CompressionMethod, DateTime};
+
+/// The bytes of an `.npz` file with the arrays of `plan`, names as in [`PlanArrays`].
+pub fn to_npz(plan: &Plan) -> Vec<u8> {
+    let arrays = PlanArrays::new(plan);
+    let (n, j, f) = (arrays.n_waypoints, arrays.joint_names.len(), arrays.fingers.len());
+    let mut file = Npz::new();
+    file.add("format", &texts(&[], &["regrasp-arrays"]));
+    file.add("format_version", &integers(&[], &[1]));
+    file.add("tool", &texts(&[], &[&plan.tool]));
+    file.add("method", &texts(&[], &[&plan.method]));
+    file.add("seed", &npy("<u8", &[], plan.seed.to_le_bytes().into()));
+    file.add("joint_names", &names(&arrays.joint_names));
+    file.add("fingers", &names(&arrays.fingers));
+    file.add("contact_mode_names", &texts(&[CONTACT_MODES.len()], &CONTACT_MODES));
+    file.add("times", &floats(&[n], &arrays.times));
+    file.add("joints", &floats(&[n, j], &arrays.joints));
+    file.add("joint_velocities", &floats(&[n, j], &arrays.joint_velocities));
+    if let Some(torques) = &arrays.joint_torques {
+        file.add("joint_torques", &floats(&[n, j], torques));
+    }
+    file.add("object_positions", &floats(&[n, 3], &arrays.object_positions));
+    file.add("object_quat_xyzw", &floats(&[n, 4], &arrays.object_quat_xyzw));
+    file.add("contact_modes", &npy("|u1", &[n, f], arrays.contact_modes));
+    file.add("contact_points_in_object", &floats(&[n, f, 3], &arrays.contact_points_in_object));
+    file.add("contact_normals_in_object", &floats(&[n, f, 3], &arrays.contact_normals_in_object));
+    file.add("contact_forces_in_object", &floats(&[n, f, 3], &arrays.contact_forces_in_object));
+    file.add("contact_torsions", &floats(&[n, f], &arrays.contact_torsions));
+    file.add("segment_of_waypoint", &integers(&[n], &arrays.segment_of_waypoint));
+    let kinds: Vec<&str> = arrays.segment_kinds.iter().map(|&kind| kind_name(kind)).collect();
+    file.add("segment_kinds", &texts(&[kinds.len()], &kinds));
+    file.add("segment_moving_fingers", &integers(&[kinds.len()], &arrays.segment_moving_fingers));
+    file.add("segment_starts", &integers(&[kinds.len() + 1], &arrays.segment_starts));
+    file.finish()
+}
+
+/// An archive being written to memory.
+struct Npz(ZipWriter<Cursor<Vec<u8>>>);
+
+/// What memory cannot refuse.
+const IN_MEMORY: &str = "writing an archive to memory does not fail";
+
+impl Npz {
+    fn new() -> Self {
+        Npz(ZipWriter::new(Cursor::new(Vec::new())))
+    }
+
+    fn add(&mut self, name: &str, npy: &[u8]) {
+        // The date is that of the ZIP epoch: bytes must not depend on the clock.
+        let options = SimpleFileOptions::default()
+            .compression_method(CompressionMethod::Stored)
+            .last_modified_time(DateTime::default())
+            .unix_permissions(0o644);
+        self.0.start_file(format!("{name}.npy"), options).expect(IN_MEMORY);
+        self.0.write_all(npy).expect(IN_MEMORY);
+    }
+
+    fn finish(self) -> Vec<u8> {
+        self.0.finish().expect(IN_MEMORY).into_inner()
+    }
+}
+
+fn names(names: &[String]) -> Vec<u8> {
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    texts(&[names.len()], &names)
+}
+
+fn floats(shape: &[usize], values: &[f64]) -> Vec<u8> {
+    npy("<f8", shape, values.iter().flat_map(|value| value.to_le_bytes()).collect())
+}
+
+fn integers(shape: &[usize], values: &[i64]) -> Vec<u8> {
+    npy("<i8", shape, values.iter().flat_map(|value| value.to_le_bytes()).collect())
+}
+
+/// Text of one width, in UTF-32, filled up with zeros.
+fn texts(shape: &[usize], values: &[&str]) -> Vec<u8> {
+    let width = values.iter().map(|text| text.chars().count()).max().unwrap_or(0).max(1);
+    let padded = |text: &&str| -> Vec<char> { text.chars().chain(std::iter::repeat('\0')).take(width).collect() };
+    let data = values.iter().flat_map(padded).flat_map(|c| u32::from(c).to_le_bytes()).collect();
+    npy(&format!("<U{width}"), shape, data)
+}
+
+/// A file of version 1.0 of the NPY format: magic word, header padded to a multiple of 64 bytes, data in C order.
+fn npy(descr: &str, shape: &[usize], data: Vec<u8>) -> Vec<u8> {
+    const BEFORE_HEADER: usize = 10;
+    let lengths: String = shape.iter().map(|length| format!("{length},")).collect();
+    let mut header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({lengths}), }}");
+    let end = (BEFORE_HEADER + header.len() + 1).next_multiple_of(64);
+    header.push_str(&" ".repeat(end - BEFORE_HEADER - header.len() - 1));
+    header.push('\n');
+    let length = u16::try_from(header.len()).expect("a header of a few dimensions is short");
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend(length.to_le_bytes());
+    bytes.extend(header.as_bytes());
+    bytes.extend(data);
+    bytes
+}

@@ -1,0 +1,5 @@
+//! Exports, read back by other means than they were written with.
+
+mod npz;
+mod ros2;
+mod sample;

@@ -1,0 +1,23 @@
+//! A plan with a free finger in it, planned and accepted.
+
+use regrasp_base::Budget;
+use regrasp_plan::Plan;
+use regrasp_plan::check::{CheckSettings, check};
+use regrasp_planners::{InHandSettings, plan_in_hand};
+use regrasp_robot::import::LoadOptions;
+use regrasp_scene::load_scene;
+use std::path::Path;
+use std::sync::LazyLock;
+
+/// The sphere of the bundled wide hand, turned about x.
+pub static PLAN: LazyLock<Plan> = LazyLock::new(|| {
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/sphere_90x.toml");
+    let loaded = load_scene(&scene, &LoadOptions::default()).expect("a scene");
+    let query = loaded.task.query(3);
+    let budget = Budget::work(1_000_000);
+    let plan =
+        plan_in_hand(&loaded.scene, &query, &InHandSettings::default(), 3, &budget, &|_| {}).expect("an easy query");
+    let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+    assert!(report.accepted(), "{:?}", report.violations);
+    plan
+});
