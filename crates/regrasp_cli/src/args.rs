@@ -1,7 +1,7 @@
 //! Arguments. The spellings are a promise to scripts.
 
 use clap::builder::PossibleValuesParser;
-use clap::{Args, Parser, Subcommand};
+use clap::{ArgGroup, Args, Parser, Subcommand};
 use regrasp_bench::growth::Curve;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -58,6 +58,8 @@ pub enum Command {
     Plan(Plan),
     /// Judge a plan from the files alone; exit code 0 accepted, 1 rejected
     Check(Check),
+    /// Write a plan in the formats of other tools
+    Export(Export),
     /// Plan scenes with many seeds and tabulate
     Bench(Bench),
     /// Measure how loading and planning grow with fingers, triangles, obstacles and threads
@@ -149,6 +151,26 @@ pub struct Check {
     /// Scene file [default: the one that the plan names, beside the plan or in the current folder]
     #[arg(long, value_name = "FILE")]
     pub scene: Option<PathBuf>,
+}
+
+/// `regrasp export`
+#[derive(Debug, Args)]
+#[command(group(ArgGroup::new("formats").required(true).multiple(true)))]
+pub struct Export {
+    /// Plan file
+    pub plan: PathBuf,
+    /// Arrays for numpy, without pickle
+    #[arg(long, value_name = "FILE.npz", group = "formats")]
+    pub npz: Option<PathBuf>,
+    /// ROS 2 trajectory_msgs/JointTrajectory
+    #[arg(long, value_name = "FILE.yaml", group = "formats")]
+    pub ros2: Option<PathBuf>,
+    /// Scene file [default: the one that the plan names, beside the plan or in the current folder]
+    #[arg(long, value_name = "FILE")]
+    pub scene: Option<PathBuf>,
+    /// Write what the checker rejects too
+    #[arg(long)]
+    pub no_check: bool,
 }
 
 /// `regrasp bench`

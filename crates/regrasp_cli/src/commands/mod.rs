@@ -2,8 +2,9 @@
 
 mod bench;
 mod campaign;
-mod check;
+pub mod check;
 mod demo;
+mod export;
 mod growth;
 mod inspect;
 pub mod plan;
@@ -22,6 +23,7 @@ pub fn run(arguments: &Arguments, talk: &Talk) -> Result<(), Stop> {
         Command::Inspect(inspect) => inspect::run(inspect, common, talk),
         Command::Plan(plan) => plan::run(plan, common, talk),
         Command::Check(check) => check::run(check, common, talk),
+        Command::Export(export) => export::run(export, common, talk),
         Command::Bench(bench) => bench::run(bench, common, talk),
         Command::Growth(growth) => growth::run(growth, talk),
         Command::Roadmap(roadmap) => roadmap::run(roadmap, common, talk),

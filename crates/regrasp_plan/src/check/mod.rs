@@ -19,6 +19,8 @@ pub mod edges;
 pub mod far;
 /// `regrasp check`: everything is read afresh from files.
 pub mod files;
+/// The scene file of a plan, where nobody says which it is.
+pub mod find_scene;
 /// Contact forces and joint torques.
 pub mod forces;
 /// The checker's own forward kinematics and motion bounds.
@@ -47,6 +49,7 @@ pub mod violation;
 pub mod way;
 
 pub use files::{CheckedFiles, check_files};
+pub use find_scene::find_scene;
 pub use violation::{Moment, Violation, ViolationKind};
 
 use crate::plan::Plan;

@@ -1,0 +1,60 @@
+//! `regrasp export`: a plan in the formats of other tools.
+//!
+//! What is exported may be sent to a robot: a plan that the checker rejects is refused, unless `--no-check` is given.
+
+use crate::args::{self, Common};
+use crate::commands::check::scene_of;
+use crate::commands::plan::{refuse_input, refuse_unwritable};
+use crate::interrupt;
+use crate::judge;
+use crate::load;
+use crate::stop::Stop;
+use crate::talk::Talk;
+use regrasp::Plan;
+use regrasp::base::files;
+use regrasp::export;
+use regrasp::plan::format;
+use serde_json::json;
+use std::path::Path;
+
+/// How a plan becomes the bytes of a file.
+type Write = fn(&Plan) -> Vec<u8>;
+
+/// Reads, judges, writes.
+pub fn run(arguments: &args::Export, common: &Common, talk: &Talk) -> Result<(), Stop> {
+    // The flag is not asked here: the process ends by itself shortly after Ctrl-C.
+    interrupt::flag()?;
+    let formats: [(&str, Option<&Path>, Write); 2] = [
+        ("npz", arguments.npz.as_deref(), export::to_npz),
+        ("ros2", arguments.ros2.as_deref(), |plan| export::to_ros2(plan).into_bytes()),
+    ];
+    let wanted: Vec<(&str, &Path, Write)> =
+        formats.into_iter().filter_map(|(name, path, write)| Some((name, path?, write))).collect();
+    for (k, &(name, path, _)) in wanted.iter().enumerate() {
+        refuse_unwritable(path)?;
+        refuse_input(path, [arguments.plan.as_path()].into_iter().chain(arguments.scene.as_deref()))?;
+        if wanted[..k].iter().any(|&(_, other, _)| other == path) {
+            let problem = format!("is {}, which another format is written to", path.display());
+            return Err(Stop::argument("A505", &format!("--{name}"), problem, "one file for each format"));
+        }
+    }
+    let plan = format::from_json(&arguments.plan, &files::read(&arguments.plan)?)?;
+    if !arguments.no_check {
+        let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref())?;
+        let loaded = load::scene(&scene_path, common, talk)?;
+        for &(_, path, _) in &wanted {
+            refuse_input(path, loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
+        }
+        if !judge::judge(&loaded, &plan, talk)?.accepted() {
+            return Err(Stop::Rejected);
+        }
+    }
+    for (name, path, write) in wanted {
+        let bytes = write(&plan);
+        files::write_atomic(path, &bytes).map_err(|error| Stop::unwritable(path, &error))?;
+        let sha256 = files::sha256(&bytes);
+        talk.event("written", json!({ "format": name, "path": path, "sha256": sha256 }));
+        talk.say(format!("wrote  {}   sha256 {sha256}", path.display()));
+    }
+    Ok(())
+}

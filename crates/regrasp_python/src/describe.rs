@@ -1,0 +1,140 @@
+//! Scenes and hands as JSON. Numbers that are not finite (limits of continuous joints) become null.
+
+use regrasp::geometry::{Pose, Shape};
+use regrasp::plan::plan::PoseData;
+use regrasp::robot::hand::{Finger, TipShape};
+use regrasp::robot::robot::{Joint, JointKind, Limits};
+use regrasp::robot::{ContactModel, Hand};
+use regrasp::scene::{InHandQuery, InputFile, LoadedScene, Object, Obstacle};
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// A scene, its hand included.
+pub fn scene(loaded: &LoadedScene, path: &Path) -> Value {
+    let scene = &loaded.scene;
+    json!({
+        "name": scene.name,
+        "path": path,
+        "hand": hand(&scene.hand),
+        "object": object(&scene.object),
+        "obstacles": scene.obstacles.iter().map(obstacle).collect::<Vec<_>>(),
+        "inputs": scene.inputs.iter().map(input).collect::<Vec<_>>(),
+        "notes": loaded.notes,
+    })
+}
+
+/// The poses of a query.
+pub fn query(query: &InHandQuery) -> Value {
+    json!({
+        "start": pose(&query.world_from_object_start),
+        "way": query.world_from_object_way.iter().map(pose).collect::<Vec<_>>(),
+        "goal": pose(&query.world_from_object_goal),
+    })
+}
+
+/// A hand.
+pub fn hand(hand: &Hand) -> Value {
+    let mut joints = Vec::new();
+    for finger in &hand.fingers {
+        let chain = &finger.chain;
+        for (k, name) in chain.names.iter().enumerate() {
+            let of_robot = hand.robot.joint_named(name).map(|id| &hand.robot.joints[id.0]);
+            let limits = of_robot.and_then(|joint| joint.limits);
+            joints.push(json!({
+                "name": name,
+                "finger": finger.name,
+                "kind": of_robot.map_or("revolute", kind),
+                "lower": chain.lower[k],
+                "upper": chain.upper[k],
+                "velocity": limits.and_then(|limits: Limits| limits.velocity),
+                "effort": limits.and_then(|limits: Limits| limits.effort),
+            }));
+        }
+    }
+    let coupled = hand.robot.joints.iter().filter_map(|joint| {
+        let mimic = joint.mimic?;
+        Some(json!({
+            "name": joint.name,
+            "follows": hand.robot.joints[mimic.joint.0].name,
+            "multiplier": mimic.multiplier,
+            "offset": mimic.offset,
+        }))
+    });
+    json!({
+        "name": hand.robot.name,
+        "base_link": hand.robot.links[hand.base.0].name,
+        "world_from_base": pose(&hand.world_from_base),
+        "joints": joints,
+        "coupled_joints": coupled.collect::<Vec<_>>(),
+        "fingers": hand.fingers.iter().map(|finger| self::finger(hand, finger)).collect::<Vec<_>>(),
+    })
+}
+
+fn finger(hand: &Hand, finger: &Finger) -> Value {
+    let torsion_radius = match finger.tip.contact {
+        ContactModel::SoftFinger { torsion_radius } => Some(torsion_radius),
+        ContactModel::Frictionless | ContactModel::Point => None,
+    };
+    let shape = match finger.tip.shape {
+        TipShape::Point => "point",
+        TipShape::Sphere { .. } => "sphere",
+        TipShape::Hull(_) => "hull",
+    };
+    json!({
+        "name": finger.name,
+        "joint_names": finger.chain.names,
+        "rest": finger.rest,
+        "tip": {
+            "link": hand.robot.links[finger.tip.link.0].name,
+            "shape": shape,
+            "radius": finger.tip.radius(),
+            "contact": finger.tip.contact.name(),
+            "torsion_radius": torsion_radius,
+        },
+    })
+}
+
+fn kind(joint: &Joint) -> &'static str {
+    match joint.kind {
+        JointKind::Fixed => "fixed",
+        JointKind::Revolute => "revolute",
+        JointKind::Continuous => "continuous",
+        JointKind::Prismatic => "prismatic",
+    }
+}
+
+fn object(object: &Object) -> Value {
+    json!({
+        "name": object.name,
+        "shape": shape(&object.shape),
+        "mass": object.mass,
+        "center_of_mass": <[f64; 3]>::from(object.center_of_mass.coords),
+        "friction": object.friction,
+        "radius": object.radius,
+    })
+}
+
+fn obstacle(obstacle: &Obstacle) -> Value {
+    json!({
+        "name": obstacle.name,
+        "shape": shape(&obstacle.placed.shape),
+        "world_from_obstacle": pose(&obstacle.placed.parent_from_shape),
+    })
+}
+
+fn shape(shape: &Shape) -> Value {
+    let (low, high) = shape.bounds();
+    json!({
+        "kind": shape.kind(),
+        "low": <[f64; 3]>::from(low.coords),
+        "high": <[f64; 3]>::from(high.coords),
+    })
+}
+
+fn input(input: &InputFile) -> Value {
+    json!({ "role": input.role, "name": input.name, "path": input.path, "sha256": input.sha256 })
+}
+
+fn pose(pose: &Pose) -> Value {
+    json!(PoseData::from(pose))
+}

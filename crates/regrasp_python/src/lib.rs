@@ -1,0 +1,39 @@
+//! The native module `regrasp._regrasp`. The package in `python/regrasp` wraps it; users see that one only.
+//!
+//! Plain data crosses the border: JSON for records, little-endian bytes for arrays. Every function that Python can call runs
+//! in `guard::guarded`, so that no panic gets past it.
+
+/// Scenes and hands as JSON.
+mod describe;
+/// Rust errors as Python exceptions.
+mod error;
+/// No panic crosses the border.
+mod guard;
+/// Hands and scenes, read.
+mod model;
+/// Plans.
+mod plan;
+/// Searching and judging.
+mod search;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+mod _regrasp {
+    #[pymodule_export]
+    use super::guard::panic_for_tests;
+    #[pymodule_export]
+    use super::model::{Hand, Scene};
+    #[pymodule_export]
+    use super::plan::Plan;
+    #[pymodule_export]
+    use super::search::{check, find_scene, plan};
+
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        super::guard::catch_messages();
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

@@ -1,0 +1,117 @@
+//! Hands and scenes, read. They never change, so that any number of threads may share one.
+
+use crate::describe;
+use crate::error;
+use crate::guard::guarded;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use regrasp::robot::import::{LoadOptions, ResolveOptions, load_hand};
+use regrasp::scene::{LoadedScene, load_scene};
+use std::path::{Path, PathBuf};
+
+/// How files are read, as the package passes it: packages by name and folder, folders to search, lenient.
+type Options = (Vec<(String, PathBuf)>, Vec<PathBuf>, bool);
+
+fn load_options((packages, search_paths, lenient): Options) -> LoadOptions {
+    LoadOptions { resolve: ResolveOptions { packages, search_paths }, lenient, ..LoadOptions::default() }
+}
+
+/// A scene file and all it names.
+#[pyclass(frozen, module = "regrasp._regrasp")]
+pub struct Scene {
+    /// What was read.
+    pub loaded: LoadedScene,
+    path: PathBuf,
+    options: LoadOptions,
+}
+
+impl Scene {
+    /// The same scene, read afresh: the checker starts from files.
+    pub fn read_again(&self) -> Result<LoadedScene, regrasp::InputError> {
+        load_scene(&self.path, &self.options)
+    }
+
+    /// The scene file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+#[pymethods]
+impl Scene {
+    /// Reads the scene file at `path`.
+    #[staticmethod]
+    fn load(py: Python<'_>, path: PathBuf, options: Options) -> PyResult<Self> {
+        guarded(py, || {
+            let options = load_options(options);
+            let loaded = py.detach(|| load_scene(&path, &options)).map_err(|error| error::input(py, &error))?;
+            Ok(Scene { loaded, path, options })
+        })
+    }
+
+    /// What the scene is made of, as JSON.
+    fn describe(&self, py: Python<'_>) -> PyResult<String> {
+        guarded(py, || Ok(describe::scene(&self.loaded, &self.path).to_string()))
+    }
+
+    /// The poses that the query of `seed` asks for, from start to goal, as JSON.
+    fn query(&self, py: Python<'_>, seed: u64) -> PyResult<String> {
+        guarded(py, || Ok(describe::query(&self.loaded.task.query(seed)).to_string()))
+    }
+
+    /// Tip centres in the world, as [`Hand::tips`] gives them.
+    fn tips<'py>(&self, py: Python<'py>, joints: &[u8]) -> PyResult<Bound<'py, PyBytes>> {
+        guarded(py, || tips(py, &self.loaded.scene.hand, joints))
+    }
+}
+
+/// A hand file, or a URDF whose fingers were guessed.
+#[pyclass(frozen, module = "regrasp._regrasp")]
+pub struct Hand {
+    hand: regrasp::robot::Hand,
+    description: String,
+}
+
+#[pymethods]
+impl Hand {
+    /// Reads the hand at `path`.
+    #[staticmethod]
+    fn load(py: Python<'_>, path: PathBuf, options: Options) -> PyResult<Self> {
+        guarded(py, || {
+            let options = load_options(options);
+            let loaded = py.detach(|| load_hand(&path, &options)).map_err(|error| error::input(py, &error))?;
+            let mut description = describe::hand(&loaded.hand);
+            description["notes"] = loaded.notes.into();
+            Ok(Hand { hand: loaded.hand, description: description.to_string() })
+        })
+    }
+
+    /// What the hand is like, as JSON.
+    fn describe(&self) -> &str {
+        &self.description
+    }
+
+    /// Tip centres for rows of joint positions: doubles in, doubles out, three per finger and row.
+    fn tips<'py>(&self, py: Python<'py>, joints: &[u8]) -> PyResult<Bound<'py, PyBytes>> {
+        guarded(py, || tips(py, &self.hand, joints))
+    }
+}
+
+fn tips<'py>(py: Python<'py>, hand: &regrasp::robot::Hand, joints: &[u8]) -> PyResult<Bound<'py, PyBytes>> {
+    let (values, rest) = joints.as_chunks::<8>();
+    let values: Vec<f64> = values.iter().map(|&bytes| f64::from_le_bytes(bytes)).collect();
+    if !rest.is_empty() || values.len() % hand.n_joints().max(1) != 0 {
+        let problem = format!("has {} values", values.len());
+        return Err(error::argument(py, "tips", "joints", problem, &format!("rows of {}", hand.n_joints())));
+    }
+    let mut out = Vec::new();
+    for row in values.chunks(hand.n_joints().max(1)) {
+        let mut left = row;
+        for finger in &hand.fingers {
+            let own = left.split_off(..finger.chain.n_coordinates()).unwrap_or_default();
+            let tip = finger.chain.tip(own, &finger.tip.center_in_body);
+            out.extend(tip.iter().flat_map(|value| value.to_le_bytes()));
+        }
+    }
+    Ok(PyBytes::new(py, &out))
+}

@@ -1,0 +1,114 @@
+//! Plans: files, arrays, exports.
+
+use crate::error;
+use crate::guard::guarded;
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+use regrasp::base::{Diagnostic, Place, files};
+use regrasp::export::{PlanArrays, to_npz, to_ros2};
+use regrasp::plan::format;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// A plan.
+#[pyclass(frozen, module = "regrasp._regrasp")]
+pub struct Plan {
+    /// The plan.
+    pub plan: regrasp::Plan,
+}
+
+#[pymethods]
+impl Plan {
+    /// Reads the plan file at `path`.
+    #[staticmethod]
+    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        guarded(py, || {
+            let read = || format::from_json(&path, &files::read(&path)?);
+            Ok(Plan { plan: py.detach(read).map_err(|error| error::input(py, &error))? })
+        })
+    }
+
+    /// Reads a plan from the content of a plan file; errors call it `name`.
+    #[staticmethod]
+    fn parse(py: Python<'_>, content: &[u8], name: PathBuf) -> PyResult<Self> {
+        guarded(py, || {
+            let read = || format::from_json(&name, content);
+            Ok(Plan { plan: py.detach(read).map_err(|error| error::input(py, &error))? })
+        })
+    }
+
+    /// The bytes of its plan file.
+    fn to_json<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        guarded(py, || Ok(PyBytes::new(py, py.detach(|| format::to_json(&self.plan)).as_bytes())))
+    }
+
+    /// The bytes of an archive of arrays for numpy.
+    fn to_npz<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        guarded(py, || Ok(PyBytes::new(py, &py.detach(|| to_npz(&self.plan)))))
+    }
+
+    /// A ROS 2 trajectory, as YAML.
+    fn to_ros2(&self, py: Python<'_>) -> PyResult<String> {
+        guarded(py, || Ok(py.detach(|| to_ros2(&self.plan))))
+    }
+
+    /// Everything but the waypoints, as JSON: the keys of a plan file, and of each segment kind, moving finger and number of
+    /// waypoints.
+    fn header(&self, py: Python<'_>) -> PyResult<String> {
+        guarded(py, || {
+            let bare = regrasp::Plan { segments: Vec::new(), ..self.plan.clone() };
+            let mut header = json!(bare);
+            let segments = self.plan.segments.iter().map(|segment| {
+                json!({
+                    "kind": segment.kind,
+                    "moving_finger": segment.moving_finger,
+                    "n_waypoints": segment.waypoints.len(),
+                })
+            });
+            header["segments"] = Value::Array(segments.collect());
+            Ok(header.to_string())
+        })
+    }
+
+    /// Arrays over all waypoints by name: numpy type, shape, bytes.
+    fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        guarded(py, || {
+            let arrays = py.detach(|| PlanArrays::new(&self.plan));
+            let (n, j, f) = (arrays.n_waypoints, arrays.joint_names.len(), arrays.fingers.len());
+            let out = PyDict::new(py);
+            let add = |name: &str, dtype: &str, shape: &[usize], bytes: Vec<u8>| {
+                out.set_item(name, (dtype, shape.to_vec(), PyBytes::new(py, &bytes)))
+            };
+            let floats = |values: &[f64]| -> Vec<u8> { values.iter().flat_map(|value| value.to_le_bytes()).collect() };
+            add("times", "<f8", &[n], floats(&arrays.times))?;
+            add("joints", "<f8", &[n, j], floats(&arrays.joints))?;
+            add("joint_velocities", "<f8", &[n, j], floats(&arrays.joint_velocities))?;
+            if let Some(torques) = &arrays.joint_torques {
+                add("joint_torques", "<f8", &[n, j], floats(torques))?;
+            }
+            add("object_positions", "<f8", &[n, 3], floats(&arrays.object_positions))?;
+            add("object_quat_xyzw", "<f8", &[n, 4], floats(&arrays.object_quat_xyzw))?;
+            add("contact_modes", "|u1", &[n, f], arrays.contact_modes)?;
+            add("contact_points_in_object", "<f8", &[n, f, 3], floats(&arrays.contact_points_in_object))?;
+            add("contact_normals_in_object", "<f8", &[n, f, 3], floats(&arrays.contact_normals_in_object))?;
+            add("contact_forces_in_object", "<f8", &[n, f, 3], floats(&arrays.contact_forces_in_object))?;
+            add("contact_torsions", "<f8", &[n, f], floats(&arrays.contact_torsions))?;
+            let segments = arrays.segment_of_waypoint.iter().flat_map(|index| index.to_le_bytes()).collect();
+            add("segment_of_waypoint", "<i8", &[n], segments)?;
+            Ok(out)
+        })
+    }
+
+    /// Writes `content` to `path`, whole or not at all.
+    #[staticmethod]
+    fn write(py: Python<'_>, path: PathBuf, content: &[u8]) -> PyResult<()> {
+        guarded(py, || py.detach(|| files::write_atomic(&path, content)).map_err(|error| unwritable(py, &path, &error)))
+    }
+}
+
+/// A file that cannot be written (`F003`).
+fn unwritable(py: Python<'_>, path: &Path, error: &std::io::Error) -> PyErr {
+    let diagnostic = Diagnostic::new("F003", Place::file(path), format!("cannot be written: {error}"))
+        .fix("name a file in a folder that exists and may be written to");
+    error::input(py, &diagnostic.into())
+}

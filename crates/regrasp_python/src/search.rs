@@ -1,0 +1,208 @@
+//! Searching and judging, without the interpreter's lock; the thread that called keeps an ear for Ctrl-C and for progress.
+
+use crate::error;
+use crate::guard::guarded;
+use crate::model::Scene;
+use crate::plan::Plan;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use regrasp::base::{Diagnostic, Place};
+use regrasp::plan::check::{CheckSettings, Report};
+use regrasp::plan::format;
+use regrasp::planners::Progress;
+use regrasp::{Budget, Failure, InHandSettings};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, mpsc};
+use std::time::{Duration, Instant};
+
+/// How often a waiting caller looks for signals and progress.
+const LISTEN_EVERY: Duration = Duration::from_millis(20);
+
+/// What is asked of a search, beside scene and settings; see `regrasp.plan`.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Request {
+    seed: u64,
+    threads: usize,
+    max_work: u64,
+    time_limit: Option<f64>,
+    improve: Option<f64>,
+    method: Option<String>,
+    margin: Option<f64>,
+    improve_work: Option<u64>,
+    settings: Option<String>,
+    progress: Option<Py<PyAny>>,
+}
+
+/// Plans `scene` and judges the plan: `(plan, report)` when the checker accepts it, else `(None, failure)`, both as JSON.
+#[pyfunction]
+pub fn plan(py: Python<'_>, scene: &Scene, request: Request) -> PyResult<(Option<Plan>, String)> {
+    guarded(py, || {
+        let settings = settings(&request).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
+        let query = scene.loaded.task.query(request.seed);
+        let started = Instant::now();
+        let seconds = |value: Option<f64>| value.map(Duration::from_secs_f64);
+        let (deadline, improve_for) =
+            (seconds(request.time_limit).map(|limit| started + limit), seconds(request.improve));
+        let found = watched(py, request.progress.as_ref(), |cancelled, report| {
+            let budget = Budget { max_work: request.max_work, deadline, improve_for, cancelled };
+            regrasp::plan_in_hand(&scene.loaded.scene, &query, &settings, request.seed, &budget, report)
+        })?;
+        let plan = match found {
+            Ok(plan) => plan,
+            Err(failure) => return Ok((None, failed(&failure))),
+        };
+        let (plan, report) = py.detach(|| judged_as_written(&plan, scene)).map_err(|error| error::input(py, &error))?;
+        if report.accepted() {
+            return Ok((Some(Plan { plan }), self::report(&report)));
+        }
+        Ok((None, rejected(&plan, &report)))
+    })
+}
+
+/// Judges `plan` in `scene` as it was read, against the query of the plan's seed, and returns the report as JSON.
+#[pyfunction]
+pub fn check(py: Python<'_>, plan: &Plan, scene: &Scene) -> PyResult<String> {
+    guarded(py, || {
+        let judged = py.detach(|| {
+            let query = scene.loaded.task.query(plan.plan.seed);
+            regrasp::plan::check::check(&scene.loaded.scene, Some(&query), &plan.plan, &CheckSettings::default())
+        });
+        Ok(report(&judged))
+    })
+}
+
+/// The scene file that `plan`, at `path`, names, looked for as `regrasp check` does; `current` is the current folder.
+#[pyfunction]
+pub fn find_scene(py: Python<'_>, plan: &Plan, path: PathBuf, current: PathBuf) -> PyResult<PathBuf> {
+    guarded(py, || {
+        regrasp::plan::check::find_scene(&path, &plan.plan, Some(&current)).map_err(|error| error::input(py, &error))
+    })
+}
+
+/// Judges the bytes that a file of `plan` would have, in a scene that is read afresh: the checker starts from files.
+fn judged_as_written(plan: &regrasp::Plan, scene: &Scene) -> Result<(regrasp::Plan, Report), regrasp::InputError> {
+    let plan = format::from_json(Path::new("plan.json"), format::to_json(plan).as_bytes())
+        .expect("a plan just made is a plan file");
+    let again = scene.read_again()?;
+    let query = again.task.query(plan.seed);
+    let report = regrasp::plan::check::check(&again.scene, Some(&query), &plan, &CheckSettings::default());
+    Ok((plan, report))
+}
+
+/// Settings of the planner: defaults, then the JSON, then what has an argument of its own.
+fn settings(request: &Request) -> Result<InHandSettings, Diagnostic> {
+    let bad = |code, problem: String| Diagnostic::new(code, Place::file("regrasp.plan"), problem);
+    let mut settings = InHandSettings::default();
+    if let Some(text) = &request.settings {
+        settings = serde_json::from_str(text).map_err(|error| {
+            let message = error.to_string();
+            let problem = message.rsplit_once(" at line ").map_or(message.as_str(), |(problem, _)| problem);
+            bad("A504", problem.to_owned())
+                .element("argument", "settings")
+                .expected("keys and values like \"settings\" in a plan file")
+        })?;
+    }
+    settings.n_threads = request.threads;
+    if let Some(method) = &request.method {
+        settings.method = serde_json::from_value(method.as_str().into())
+            .map_err(|error| bad("A510", error.to_string()).element("argument", "method"))?;
+    }
+    if let Some(margin) = request.margin {
+        settings.closure_margin = margin;
+    }
+    match request.improve_work {
+        Some(work) => settings.improve_work = work,
+        // Time alone is to end it.
+        None if request.improve.is_some() && settings.improve_work == 0 => settings.improve_work = u64::MAX,
+        None => {}
+    }
+    settings.validate().map_err(|problem| bad("A503", problem).element("argument", "settings"))?;
+    Ok(settings)
+}
+
+fn failed(failure: &Failure) -> String {
+    json!(failure).to_string()
+}
+
+/// A plan that the checker rejects is a failure, with what a report of the bug needs.
+fn rejected(plan: &regrasp::Plan, report: &Report) -> String {
+    json!({
+        "kind": "rejected",
+        "message": format!("the checker rejects the plan that was found: {}", report.violations.first().map_or_else(String::new, ToString::to_string)),
+        "advice": "another seed may do; please report this, with the rejected plan",
+        "causes": [],
+        "leg": null,
+        "nearest_miss": null,
+        "statistics": plan.statistics,
+        "report": serde_json::from_str::<serde_json::Value>(&self::report(report)).unwrap_or_default(),
+        "rejected_plan": format::to_json(plan),
+    })
+    .to_string()
+}
+
+fn report(report: &Report) -> String {
+    let mut value = json!(report);
+    for (entry, violation) in value["violations"].as_array_mut().into_iter().flatten().zip(&report.violations) {
+        entry["text"] = violation.to_string().into();
+    }
+    value.to_string()
+}
+
+/// Runs `work` on a thread of its own, without the interpreter's lock, while this one tells `listener` of progress and hears
+/// signals. What the listener or a signal handler raises stops the search, and is raised.
+pub fn watched<T: Send>(
+    py: Python<'_>,
+    listener: Option<&Py<PyAny>>,
+    work: impl FnOnce(Arc<AtomicBool>, &(dyn Fn(Progress) + Sync)) -> T + Send,
+) -> PyResult<T> {
+    let cancelled = Arc::new(AtomicBool::new(false));
+    let latest = Mutex::new(None);
+    let result = py.detach(|| {
+        std::thread::scope(|scope| {
+            let (ended, end) = mpsc::channel::<()>();
+            let flag = Arc::clone(&cancelled);
+            let worker = scope.spawn(|| {
+                // Dropped at the end, also when `work` panics.
+                let _ended = ended;
+                work(flag, &|progress| {
+                    if let Ok(mut latest) = latest.lock() {
+                        *latest = Some(progress);
+                    }
+                })
+            });
+            let mut raised = None;
+            loop {
+                let is_over = end.recv_timeout(LISTEN_EVERY) != Err(mpsc::RecvTimeoutError::Timeout);
+                if raised.is_none()
+                    && let Err(error) = Python::attach(|py| listen(py, listener, &latest))
+                {
+                    cancelled.store(true, Ordering::Relaxed);
+                    raised = Some(error);
+                }
+                if is_over {
+                    break;
+                }
+            }
+            let result = worker.join().unwrap_or_else(|payload| std::panic::resume_unwind(payload));
+            raised.map_or(Ok(result), Err)
+        })
+    });
+    result
+}
+
+/// Runs signal handlers (on the main thread), and tells the listener of the latest progress, if it has not heard of it.
+fn listen(py: Python<'_>, listener: Option<&Py<PyAny>>, latest: &Mutex<Option<Progress>>) -> PyResult<()> {
+    py.check_signals()?;
+    let news = latest.lock().ok().and_then(|mut latest| latest.take());
+    let (Some(listener), Some(progress)) = (listener, news) else { return Ok(()) };
+    let fields = PyDict::new(py);
+    fields.set_item("nodes", progress.nodes)?;
+    fields.set_item("work", progress.work)?;
+    fields.set_item("restarts", progress.restarts)?;
+    fields.set_item("angle_left", progress.angle_left)?;
+    listener.call1(py, (fields,))?;
+    Ok(())
+}

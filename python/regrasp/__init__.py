@@ -1,0 +1,69 @@
+"""Plans what a multi-fingered hand has to do to turn an object, and judges plans independently.
+
+    scene = regrasp.load_scene("scene.toml")
+    result = regrasp.plan(scene, seed=7)
+    if result:
+        result.save("plan.json")
+        assert regrasp.check(result)
+    else:
+        print(result)
+
+SI units and radians; rotations are `quat_xyzw`; joint vectors are in the order of `joint_names`.
+"""
+
+from ._errors import Diagnostic, InputError, InternalError, RegraspError
+from ._model import (
+    CoupledJoint,
+    Finger,
+    Hand,
+    InputFile,
+    Joint,
+    Object,
+    Obstacle,
+    Pose,
+    Query,
+    Scene,
+    Shape,
+    Tip,
+    load_hand,
+    load_scene,
+)
+from ._plan import CONTACT_MODES, Plan, Segment
+from ._planning import check, plan
+from ._regrasp import __version__
+from ._result import Cause, Clearance, Failure, Moment, NearestMiss, Progress, Report, Violation
+
+__all__ = [
+    "CONTACT_MODES",
+    "Cause",
+    "Clearance",
+    "CoupledJoint",
+    "Diagnostic",
+    "Failure",
+    "Finger",
+    "Hand",
+    "InputError",
+    "InputFile",
+    "InternalError",
+    "Joint",
+    "Moment",
+    "NearestMiss",
+    "Object",
+    "Obstacle",
+    "Plan",
+    "Pose",
+    "Progress",
+    "Query",
+    "RegraspError",
+    "Report",
+    "Scene",
+    "Segment",
+    "Shape",
+    "Tip",
+    "Violation",
+    "__version__",
+    "check",
+    "load_hand",
+    "load_scene",
+    "plan",
+]

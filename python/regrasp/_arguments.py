@@ -1,0 +1,61 @@
+"""Arguments, looked at before anything is done with them."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from typing import Any
+
+from ._errors import argument_error
+
+StrPath = str | os.PathLike[str]
+"""A path."""
+
+Options = tuple[list[tuple[str, str]], list[str], bool]
+"""Packages by name and folder, folders to search, lenient."""
+
+
+def load_options(function: str, packages: Mapping[str, StrPath] | None, lenient: bool) -> Options:
+    """How files are read: the packages given, then `ROS_PACKAGE_PATH`, then `AMENT_PREFIX_PATH`, as the command line does."""
+    named = [(name, os.fspath(folder)) for name, folder in (packages or {}).items()]
+    for name, folder in named:
+        if not name or not os.path.isdir(folder):
+            raise argument_error(function, "packages", f"{name!r}: {folder!r} is not a folder", "names with folders")
+    variables = (os.environ.get(name, "") for name in ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"))
+    search = [path for value in variables for path in value.split(os.pathsep) if path]
+    return named, search, lenient
+
+
+def whole(function: str, name: str, value: Any, low: int, high: int) -> int:
+    """A whole number from `low` to `high`; numpy's integers count."""
+    try:
+        number = value.__index__()
+    except AttributeError:
+        raise argument_error(function, name, f"is {value!r}", "a whole number") from None
+    if isinstance(value, bool) or not low <= number <= high:
+        raise argument_error(function, name, f"is {value!r}", f"a whole number from {low} to {high}")
+    return int(number)
+
+
+def seed_of(function: str, value: Any) -> int:
+    """A seed."""
+    return whole(function, "seed", value, 0, 2**64 - 1)
+
+
+def seconds(function: str, name: str, value: Any) -> float | None:
+    """A number of seconds above 0, or none."""
+    if value is None:
+        return None
+    return real(function, name, value, lambda number: 0 < number <= 1e7, "a number of seconds above 0 and at most 1e7")
+
+
+def real(function: str, name: str, value: Any, is_right: Any, expected: str) -> float:
+    """A number for which `is_right` holds."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise argument_error(function, name, f"is {value!r}", expected) from None
+    if isinstance(value, (str, bytes)) or not math.isfinite(number) or not is_right(number):
+        raise argument_error(function, name, f"is {value!r}", expected)
+    return number

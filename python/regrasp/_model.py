@@ -1,0 +1,324 @@
+"""Hands and scenes, read. They never change, and any number of threads may share one.
+
+SI units, radians. `world_from_x` takes points of frame x to the world.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _regrasp
+from ._arguments import StrPath, load_options, seed_of
+from ._errors import argument_error
+
+FloatArray = npt.NDArray[np.float64]
+"""Doubles, C-contiguous. Those that belong to a scene, hand or plan are read-only."""
+
+
+def _constant(values: Sequence[float]) -> FloatArray:
+    array = np.array(values, dtype=np.float64)
+    array.flags.writeable = False
+    return array
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """Where a frame stands in another."""
+
+    position: FloatArray
+    """(3,), metres."""
+    quat_xyzw: FloatArray
+    """(4,), unit quaternion, w >= 0."""
+
+    @property
+    def matrix(self) -> FloatArray:
+        """(4, 4): parent_from_child, so that `point_in_parent = matrix @ [*point_in_child, 1]`."""
+        x, y, z, w = (float(value) for value in self.quat_xyzw)
+        matrix = np.eye(4)
+        matrix[:3, :3] = [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+        matrix[:3, 3] = self.position
+        return matrix
+
+    def __repr__(self) -> str:
+        return f"Pose(position={self.position.tolist()}, quat_xyzw={self.quat_xyzw.tolist()})"
+
+
+def pose_of(fields: Mapping[str, Any]) -> Pose:
+    """A pose as files spell it."""
+    return Pose(_constant(fields["position"]), _constant(fields["quat_xyzw"]))
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """What a shape is, and its extent in its own frame."""
+
+    kind: str
+    """"sphere", "capsule", "box", "cylinder", "ellipsoid", "convex" or "mesh"."""
+    low: FloatArray
+    """(3,): lowest coordinates."""
+    high: FloatArray
+    """(3,): highest coordinates."""
+
+
+def _shape(fields: Mapping[str, Any]) -> Shape:
+    return Shape(fields["kind"], _constant(fields["low"]), _constant(fields["high"]))
+
+
+@dataclass(frozen=True)
+class Joint:
+    """An independent joint."""
+
+    name: str
+    finger: str
+    """The finger that it moves."""
+    kind: str
+    """"revolute", "continuous" or "prismatic"."""
+    lower: float
+    """Lowest position, those of joints that follow it taken into account; -inf without a limit."""
+    upper: float
+    """Highest position; inf without a limit."""
+    velocity: float | None
+    """Highest speed, where the robot file says."""
+    effort: float | None
+    """Highest torque (or force), where the robot file says."""
+
+
+@dataclass(frozen=True)
+class CoupledJoint:
+    """A joint that follows another: `position = multiplier * position(follows) + offset`."""
+
+    name: str
+    follows: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True)
+class Tip:
+    """A fingertip."""
+
+    link: str
+    shape: str
+    """"point", "sphere" or "hull"."""
+    radius: float
+    """Of a sphere; 0 for others."""
+    contact: str
+    """Contact model: "frictionless", "point" or "soft_finger"."""
+    torsion_radius: float | None
+    """Of a soft finger."""
+
+
+@dataclass(frozen=True)
+class Finger:
+    """A finger."""
+
+    name: str
+    joint_names: tuple[str, ...]
+    tip: Tip
+    rest: tuple[float, ...]
+    """Posture when nothing else is asked of it, in the order of `joint_names`."""
+
+
+class Hand:
+    """A palm and fingers. Made by `load_hand`, or part of a scene, where it is placed in the world."""
+
+    def __init__(self, native: _regrasp.Hand | _regrasp.Scene, fields: Mapping[str, Any]) -> None:
+        self._native = native
+        self.name: str = fields["name"]
+        self.base_link: str = fields["base_link"]
+        """The link whose frame is the hand frame."""
+        self.world_from_base: Pose = pose_of(fields["world_from_base"])
+        self.joints: tuple[Joint, ...] = tuple(_joint(entry) for entry in fields["joints"])
+        """Independent joints, finger by finger: the order of every joint vector."""
+        self.coupled_joints: tuple[CoupledJoint, ...] = tuple(CoupledJoint(**entry) for entry in fields["coupled_joints"])
+        self.fingers: tuple[Finger, ...] = tuple(_finger(entry) for entry in fields["fingers"])
+        """Fingers, in the order of every contact list."""
+        self.notes: tuple[str, ...] = tuple(fields.get("notes", ()))
+        """Remarks of the reader."""
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the independent joints, in the order of every joint vector."""
+        return tuple(joint.name for joint in self.joints)
+
+    @cached_property
+    def limits(self) -> FloatArray:
+        """(j, 2): lowest and highest position of every joint."""
+        limits = np.array([(joint.lower, joint.upper) for joint in self.joints], dtype=np.float64).reshape(-1, 2)
+        limits.flags.writeable = False
+        return limits
+
+    def joint_vector(self, positions: Mapping[str, float]) -> FloatArray:
+        """(j,): positions given by name, in the order of `joint_names`. Raises `InputError` for names unknown or missing."""
+        names = self.joint_names
+        unknown = sorted(set(positions) - set(names))
+        missing = [name for name in names if name not in positions]
+        if unknown or missing:
+            problem = f"names unknown joints {unknown}" if unknown else f"lacks joints {missing}"
+            raise argument_error("Hand.joint_vector", "positions", problem, f"a value for each of {list(names)}")
+        return np.array([positions[name] for name in names], dtype=np.float64)
+
+    def tips(self, joints: npt.ArrayLike) -> FloatArray:
+        """Centres of the fingertips in the world (in the base frame, for a hand without a scene), by forward kinematics.
+
+        `joints` is (j,) or (n, j), in the order of `joint_names`; the answer is (f, 3) or (n, f, 3).
+        """
+        values = np.ascontiguousarray(joints, dtype="<f8")
+        if values.ndim not in (1, 2) or values.shape[-1] != len(self.joints):
+            expected = f"shape ({len(self.joints)},) or (n, {len(self.joints)})"
+            raise argument_error("Hand.tips", "joints", f"has shape {values.shape}", expected)
+        flat = np.frombuffer(self._native.tips(values.tobytes()), dtype="<f8")
+        return flat.reshape(*values.shape[:-1], len(self.fingers), 3)
+
+    def __repr__(self) -> str:
+        fingers = ", ".join(finger.name for finger in self.fingers)
+        return f"<Hand {self.name!r}: {len(self.joints)} joints, fingers {fingers}>"
+
+
+def _joint(fields: Mapping[str, Any]) -> Joint:
+    lower, upper = fields["lower"], fields["upper"]
+    return Joint(
+        name=fields["name"],
+        finger=fields["finger"],
+        kind=fields["kind"],
+        lower=-float("inf") if lower is None else lower,
+        upper=float("inf") if upper is None else upper,
+        velocity=fields["velocity"],
+        effort=fields["effort"],
+    )
+
+
+def _finger(fields: Mapping[str, Any]) -> Finger:
+    return Finger(fields["name"], tuple(fields["joint_names"]), Tip(**fields["tip"]), tuple(fields["rest"]))
+
+
+@dataclass(frozen=True, eq=False)
+class Object:
+    """The object that is manipulated. Its frame is that of its shape."""
+
+    name: str
+    shape: Shape
+    mass: float
+    center_of_mass: FloatArray
+    """(3,), in the object frame."""
+    friction: float
+    """Coulomb coefficient between fingertips and object."""
+    radius: float
+    """Largest distance of its surface from its centre of mass."""
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacle:
+    """Something fixed in the world that nothing may touch."""
+
+    name: str
+    shape: Shape
+    world_from_obstacle: Pose
+
+
+@dataclass(frozen=True)
+class InputFile:
+    """A file that a scene was read from."""
+
+    role: str
+    """"scene", "hand", "urdf", "srdf" or "mesh"."""
+    name: str
+    """How the scene spells it."""
+    path: str
+    """Where it was found."""
+    sha256: str
+
+
+@dataclass(frozen=True, eq=False)
+class Query:
+    """What is asked, with the randomness of the scene file resolved by a seed."""
+
+    start: Pose
+    """World from object at the start."""
+    way: tuple[Pose, ...]
+    """Poses to be passed, in order."""
+    goal: Pose
+    """World from object at the goal."""
+
+
+class Scene:
+    """Hand, object, obstacles and task. Made by `load_scene`."""
+
+    def __init__(self, native: _regrasp.Scene, source: tuple[str, dict[str, str], bool]) -> None:
+        fields: dict[str, Any] = json.loads(native.describe())
+        self._native = native
+        self._source = source
+        self.name: str = fields["name"]
+        self.path: str = fields["path"]
+        """The scene file, as it was named."""
+        self.hand: Hand = Hand(native, fields["hand"])
+        shape = fields["object"].pop("shape")
+        center = _constant(fields["object"].pop("center_of_mass"))
+        self.object: Object = Object(shape=_shape(shape), center_of_mass=center, **fields["object"])
+        self.obstacles: tuple[Obstacle, ...] = tuple(
+            Obstacle(entry["name"], _shape(entry["shape"]), pose_of(entry["world_from_obstacle"]))
+            for entry in fields["obstacles"]
+        )
+        self.inputs: tuple[InputFile, ...] = tuple(InputFile(**entry) for entry in fields["inputs"])
+        """Every file that was read, the scene file first."""
+        self.notes: tuple[str, ...] = tuple(fields["notes"])
+        """Remarks of the reader."""
+
+    @property
+    def start(self) -> Pose:
+        """World from object at the start, as seed 0 draws it where the scene leaves it open."""
+        return self.query().start
+
+    @property
+    def goal(self) -> Pose:
+        """World from object at the goal, of seed 0."""
+        return self.query().goal
+
+    def query(self, *, seed: int = 0) -> Query:
+        """What is asked with `seed`."""
+        fields = json.loads(self._native.query(seed_of("Scene.query", seed)))
+        way = tuple(pose_of(entry) for entry in fields["way"])
+        return Query(pose_of(fields["start"]), way, pose_of(fields["goal"]))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Read again from its files: what a scene is stands there.
+        return (_load_scene, self._source)
+
+    def __repr__(self) -> str:
+        obstacles = f", {len(self.obstacles)} obstacles" if self.obstacles else ""
+        return f"<Scene {self.name!r}: {self.hand.name}, {self.object.shape.kind} {self.object.name!r}{obstacles}>"
+
+
+def load_scene(path: StrPath, *, packages: Mapping[str, StrPath] | None = None, lenient: bool = False) -> Scene:
+    """Reads a scene file and every file it names.
+
+    `packages` says where `package://NAME/` is; `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH` are looked at after it. With
+    `lenient`, what cannot be understood in robot files is dropped and listed in `notes`, instead of refused.
+
+    Raises `InputError`, with every cause found.
+    """
+    named = {name: os.fspath(folder) for name, folder in (packages or {}).items()}
+    return _load_scene(os.fspath(path), named, lenient)
+
+
+def _load_scene(path: str, packages: dict[str, str], lenient: bool) -> Scene:
+    native = _regrasp.Scene.load(path, load_options("load_scene", packages, lenient))
+    return Scene(native, (path, packages, lenient))
+
+
+def load_hand(path: StrPath, *, packages: Mapping[str, StrPath] | None = None, lenient: bool = False) -> Hand:
+    """Reads a hand file, or a URDF whose fingers are then guessed. Arguments and errors as `load_scene`."""
+    native = _regrasp.Hand.load(os.fspath(path), load_options("load_hand", packages, lenient))
+    return Hand(native, json.loads(native.describe()))

@@ -1,0 +1,111 @@
+"""Planning and checking."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping
+from typing import Any, Literal
+
+from . import _regrasp
+from ._arguments import StrPath, real, seconds, seed_of, whole
+from ._errors import argument_error
+from ._model import Scene, load_scene
+from ._plan import Plan
+from ._result import Failure, Progress, Report, failure_of, report_of
+
+METHODS = ("gait", "visibility", "classic")
+MAX_THREADS = 1024
+
+
+def plan(
+    scene: Scene | StrPath,
+    *,
+    seed: int = 0,
+    threads: int = 1,
+    time_limit: float | None = None,
+    max_work: int = 20_000_000,
+    method: Literal["gait", "visibility", "classic"] | None = None,
+    margin: float | None = None,
+    improve: float | None = None,
+    improve_work: int | None = None,
+    settings: Mapping[str, Any] | None = None,
+    progress: Callable[[Progress], object] | None = None,
+) -> Plan | Failure:
+    """Plans how the hand takes the object from start to goal, and has the plan judged by the independent checker.
+
+    Not to find a plan is a result, no exception: the answer is a `Plan`, which is true, or a `Failure`, which is false. A plan
+    that the checker rejects is a failure of kind "rejected".
+
+    scene: what `load_scene` gave, or a scene file.
+    seed: the same scene, settings and seed give the same plan, byte by byte, on any number of threads.
+    threads: threads that search at once.
+    time_limit: seconds after which the search is cut; the plan then says so (`statistics["cut_by_time"]`).
+    max_work: limit in configurations looked at, the same on every machine.
+    method: algorithm; "gait" where nothing else is said.
+    margin: closure margin asked of every holding set, in [0, 1).
+    improve: seconds spent on a better plan after the first; `improve_work`: the same by work.
+    settings: settings of the planner, with the keys of "settings" in a plan file; the other arguments win over it.
+    progress: called now and then, by this thread, with a `Progress`; what it raises stops the search and is raised.
+
+    The interpreter's lock is released while the search runs, and Ctrl-C stops it. Raises `InputError`, and `InternalError`
+    where regrasp has a bug.
+    """
+    if not isinstance(scene, Scene):
+        scene = load_scene(scene)
+    if method is not None and method not in METHODS:
+        raise argument_error("plan", "method", f"is {method!r}", f"one of {', '.join(METHODS)}")
+    if margin is not None:
+        margin = real("plan", "margin", margin, lambda value: 0 <= value < 1, "a number in [0, 1)")
+    if improve_work is not None:
+        improve_work = whole("plan", "improve_work", improve_work, 0, 2**64 - 1)
+    request: dict[str, Any] = {
+        "seed": seed_of("plan", seed),
+        "threads": whole("plan", "threads", threads, 1, MAX_THREADS),
+        "max_work": whole("plan", "max_work", max_work, 0, 2**64 - 1),
+        "time_limit": seconds("plan", "time_limit", time_limit),
+        "improve": seconds("plan", "improve", improve),
+        "method": method,
+        "margin": margin,
+        "improve_work": improve_work,
+        "settings": None if settings is None else _settings_text(settings),
+        "progress": None if progress is None else lambda fields: progress(Progress(**fields)),
+    }
+    found, outcome = _regrasp.plan(scene._native, request)  # pyright: ignore[reportPrivateUsage]
+    if found is None:
+        return failure_of(outcome)
+    made = Plan(found, report=report_of(json.loads(outcome)))
+    made.scene_path = scene.path
+    return made
+
+
+def _settings_text(settings: Mapping[str, Any]) -> str:
+    try:
+        return json.dumps(dict(settings), allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise argument_error("plan", "settings", str(error), "what JSON can express") from None
+
+
+def check(
+    plan: Plan | StrPath,
+    scene: Scene | StrPath | None = None,
+    *,
+    packages: Mapping[str, StrPath] | None = None,
+    lenient: bool = False,
+) -> Report:
+    """Judges a plan in its scene, by the checker that knows no planner.
+
+    plan: a plan, or a plan file.
+    scene: a scene, taken as it was read, or a scene file, which is read now; without it, the file that the plan was planned
+    for or names: beside the plan file, in one of the folders above it, or in the current folder.
+    packages, lenient: as in `load_scene`, for scene files.
+
+    Raises `InputError` for files that cannot be used. What is wrong with the plan is no exception but in the report.
+    """
+    if not isinstance(plan, Plan):
+        plan = Plan.from_file(plan)
+    if scene is None:
+        scene = plan.scene_path or _regrasp.find_scene(plan._native, plan.path or "plan.json", os.getcwd())  # pyright: ignore[reportPrivateUsage]
+    if not isinstance(scene, Scene):
+        scene = load_scene(scene, packages=packages, lenient=lenient)
+    return report_of(json.loads(_regrasp.check(plan._native, scene._native)))  # pyright: ignore[reportPrivateUsage]
