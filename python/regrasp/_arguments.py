@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from ._errors import argument_error
@@ -50,7 +50,7 @@ def seconds(function: str, name: str, value: Any) -> float | None:
     return real(function, name, value, lambda number: 0 < number <= 1e7, "a number of seconds above 0 and at most 1e7")
 
 
-def real(function: str, name: str, value: Any, is_right: Any, expected: str) -> float:
+def real(function: str, name: str, value: Any, is_right: Callable[[float], bool], expected: str) -> float:
     """A number for which `is_right` holds."""
     try:
         number = float(value)

@@ -1,5 +1,7 @@
 """What is raised. Failing to find a plan is no error: see `Failure`."""
 
+# pyright: reportUnusedFunction=false
+
 from __future__ import annotations
 
 import json
@@ -82,7 +84,7 @@ class InternalError(RegraspError):
     """A broken invariant: a bug in regrasp. The text says what a report of it needs."""
 
 
-def _input_error(message: str, diagnostics: str) -> InputError:  # pyright: ignore[reportUnusedFunction]
+def _input_error(message: str, diagnostics: str) -> InputError:
     """Called by the native module, with the diagnostics as JSON."""
     return InputError(
         message,

@@ -3,6 +3,9 @@
 SI units, radians. `world_from_x` takes points of frame x to the world.
 """
 
+# One package, in parts: what is private to it is not private to a part.
+# pyright: reportPrivateUsage=false, reportUnusedFunction=false
+
 from __future__ import annotations
 
 import json
@@ -156,7 +159,9 @@ class Hand:
     @cached_property
     def limits(self) -> FloatArray:
         """(j, 2): lowest and highest position of every joint."""
-        limits = np.array([(joint.lower, joint.upper) for joint in self.joints], dtype=np.float64).reshape(-1, 2)
+        limits = np.empty((len(self.joints), 2))
+        limits[:, 0] = [joint.lower for joint in self.joints]
+        limits[:, 1] = [joint.upper for joint in self.joints]
         limits.flags.writeable = False
         return limits
 
@@ -175,12 +180,12 @@ class Hand:
 
         `joints` is (j,) or (n, j), in the order of `joint_names`; the answer is (f, 3) or (n, f, 3).
         """
-        values = np.ascontiguousarray(joints, dtype="<f8")
+        values = np.ascontiguousarray(joints, dtype=np.float64)
         if values.ndim not in (1, 2) or values.shape[-1] != len(self.joints):
             expected = f"shape ({len(self.joints)},) or (n, {len(self.joints)})"
             raise argument_error("Hand.tips", "joints", f"has shape {values.shape}", expected)
-        flat = np.frombuffer(self._native.tips(values.tobytes()), dtype="<f8")
-        return flat.reshape(*values.shape[:-1], len(self.fingers), 3)
+        shape = (*values.shape[:-1], len(self.fingers), 3)
+        return np.ndarray(shape, np.float64, self._native.tips(values.tobytes()))
 
     def __repr__(self) -> str:
         fingers = ", ".join(finger.name for finger in self.fingers)

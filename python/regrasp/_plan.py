@@ -1,5 +1,8 @@
 """Plans: what a hand does, over time."""
 
+# One package, in parts: what is private to it is not private to a part.
+# pyright: reportPrivateUsage=false, reportUnusedFunction=false
+
 from __future__ import annotations
 
 import json
@@ -115,7 +118,12 @@ class Plan:
     @cached_property
     def _arrays(self) -> dict[str, npt.NDArray[Any]]:
         raw = self._native.arrays()
-        return {name: np.frombuffer(data, dtype).reshape(shape) for name, (dtype, shape, data) in raw.items()}
+        return {name: np.ndarray(shape, np.dtype(dtype), data) for name, (dtype, shape, data) in raw.items()}
+
+    @property
+    def n_waypoints(self) -> int:
+        """n: of all segments together."""
+        return self.segments[-1].stop
 
     @property
     def times(self) -> FloatArray:
@@ -183,10 +191,6 @@ class Plan:
         """(n,): index in `segments`."""
         return self._arrays["segment_of_waypoint"]
 
-    def __len__(self) -> int:
-        """Number of waypoints."""
-        return self.segments[-1].stop
-
     def __bool__(self) -> Literal[True]:
         return True
 
@@ -204,7 +208,7 @@ class Plan:
     def __repr__(self) -> str:
         transfers, relocations = self.statistics["transfers"], self.statistics["relocations"]
         return (
-            f"<Plan: {transfers} transfers, {relocations} relocations, {len(self)} waypoints, {self.duration:.1f} s, "
+            f"<Plan: {transfers} transfers, {relocations} relocations, {self.n_waypoints} waypoints, {self.duration:.1f} s, "
             f"closure margin {self.promises['kept_margin']:.4f}>"
         )
 

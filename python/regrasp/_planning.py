@@ -1,5 +1,8 @@
 """Planning and checking."""
 
+# One package, in parts: what is private to it is not private to a part.
+# pyright: reportPrivateUsage=false, reportUnusedFunction=false
+
 from __future__ import annotations
 
 import json
@@ -69,14 +72,21 @@ def plan(
         "margin": margin,
         "improve_work": improve_work,
         "settings": None if settings is None else _settings_text(settings),
-        "progress": None if progress is None else lambda fields: progress(Progress(**fields)),
+        "progress": None if progress is None else _listener(progress),
     }
-    found, outcome = _regrasp.plan(scene._native, request)  # pyright: ignore[reportPrivateUsage]
+    found, outcome = _regrasp.plan(scene._native, request)
     if found is None:
         return failure_of(outcome)
     made = Plan(found, report=report_of(json.loads(outcome)))
     made.scene_path = scene.path
     return made
+
+
+def _listener(progress: Callable[[Progress], object]) -> Callable[[dict[str, Any]], None]:
+    def listen(fields: dict[str, Any]) -> None:
+        progress(Progress(**fields))
+
+    return listen
 
 
 def _settings_text(settings: Mapping[str, Any]) -> str:
@@ -105,7 +115,7 @@ def check(
     if not isinstance(plan, Plan):
         plan = Plan.from_file(plan)
     if scene is None:
-        scene = plan.scene_path or _regrasp.find_scene(plan._native, plan.path or "plan.json", os.getcwd())  # pyright: ignore[reportPrivateUsage]
+        scene = plan.scene_path or _regrasp.find_scene(plan._native, plan.path or "plan.json", os.getcwd())
     if not isinstance(scene, Scene):
         scene = load_scene(scene, packages=packages, lenient=lenient)
-    return report_of(json.loads(_regrasp.check(plan._native, scene._native)))  # pyright: ignore[reportPrivateUsage]
+    return report_of(json.loads(_regrasp.check(plan._native, scene._native)))

@@ -1,6 +1,6 @@
 """Plans a bundled scene, saves the plan, has it judged again by the independent checker, and says which finger let go when.
 
-    python examples/python/01_plan_and_check.py my_scene.toml
+    python examples/python/02_plan_and_check.py my_scene.toml
 """
 
 import sys

@@ -17,7 +17,7 @@ if not plan:
 travel = np.abs(np.diff(plan.joints, axis=0)).sum(axis=0)
 low, high = scene.hand.limits.T
 nearest = np.minimum(plan.joints - low, high - plan.joints).min(axis=0)
-print(f"{len(plan)} waypoints, {plan.duration:.1f} s")
+print(f"{plan.n_waypoints} waypoints, {plan.duration:.1f} s")
 for name, way, margin in zip(plan.joint_names, travel, nearest):
     print(f"  {name:24} goes {np.degrees(way):6.1f} deg, stays {np.degrees(margin):5.1f} deg off its limits")
 
