@@ -19,6 +19,7 @@ print(f"{hand.name}: {len(hand.fingers)} fingers, {len(hand.joints)} joints")
 
 rest = [angle for finger in hand.fingers for angle in finger.rest]
 for finger, tip_in_base in zip(hand.fingers, hand.tips(rest)):
-    print(f"  {finger.name}: tip rests at {np.round(1e3 * tip_in_base, 1).tolist()} mm, a {finger.tip.shape}")
+    x, y, z = 1e3 * tip_in_base
+    print(f"  {finger.name}: tip, a {finger.tip.shape}, rests at [{x:.1f} {y:.1f} {z:.1f}] mm")
     for name, angle in zip(finger.joint_names, finger.rest):
         print(f"    {name:24} {np.degrees(angle):7.1f} deg")

@@ -2,6 +2,8 @@
 
 from typing import Any, final
 
+__all__ = ["Hand", "Plan", "Scene", "__version__", "_panic_for_tests", "check", "find_scene", "plan"]
+
 __version__: str
 
 _Options = tuple[list[tuple[str, str]], list[str], bool]

@@ -32,7 +32,7 @@ def test_an_error_has_code_place_and_fix(tmp_path: Path) -> None:
     assert len(error.diagnostics) >= 2, "all causes in one run"
     by_code = {entry.code: entry for entry in error.diagnostics}
     unknown = by_code["S101"]
-    assert unknown.file == str(path) and unknown.element == 'key "fricton"'
+    assert unknown.file == str(path) and unknown.element == 'key "object.fricton"'
     lines = path.read_text().splitlines()
     assert unknown.line is not None and "fricton" in lines[unknown.line - 1]
     assert "friction" in unknown.expected + unknown.fix + unknown.problem
