@@ -35,7 +35,7 @@ CLASSIC_SEEDS ?= 20
 ALLEGRO_BENCH = $(PACKAGES) --time-limit 20 --threads 1 --seeds $(ALLEGRO_SEEDS)
 SOFT_BENCH = $(PACKAGES) --time-limit 6 --threads 1 --seeds $(ALLEGRO_SEEDS)
 
-.PHONY: all demo pictures test bench growth benchmark-page campaign fuzz docs release $(ROADMAPS)
+.PHONY: all demo pictures test test-rust test-python python bench growth benchmark-page campaign fuzz docs release $(ROADMAPS)
 
 all: release
 
@@ -50,8 +50,29 @@ demo: release
 pictures: demo
 	mkdir -p docs/pictures && cp $(OUT)/demo/gait.svg docs/pictures/demo-gait.svg
 
-test:
+test: test-rust test-python
+
+test-rust:
 	cargo test --locked --workspace
+
+# A fresh virtual environment with the package, installed by pip as users do. The build finds the crates compiled that
+# `make release` compiled. Says SKIPPED, and leaves no environment, where there is no Python of 3.10 or later, or where pip finds
+# nothing to install; a package that does not build is an error.
+PYTHON ?= python3
+VENV := target/python
+python:
+	rm -rf $(VENV)
+	if ! $(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null; then \
+	  echo "SKIPPED: no Python of 3.10 or later ($(PYTHON))"; \
+	elif ! { $(PYTHON) -m venv $(VENV) && $(VENV)/bin/pip install -q -r python/requirements-ci.txt; }; then \
+	  echo "SKIPPED: pip cannot install python/requirements-ci.txt"; rm -rf $(VENV); \
+	else \
+	  PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(VENV)/bin/pip install -q --no-build-isolation --no-deps . ; \
+	fi
+
+test-python: release python
+	if [ ! -d $(VENV) ]; then echo "SKIPPED: tests of the Python package"; \
+	else REGRASP_CLI=$(CURDIR)/$(REGRASP) $(VENV)/bin/python -m pytest -q; fi
 
 # Writes docs/benchmarks.md and docs/benchmarks/. One thread, so that times compare. The two methods of paper 000 draw poses
 # uniformly, as the paper does. The suite of paper 000 takes half an hour; cut off and run again, it goes on where it was.

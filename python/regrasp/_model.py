@@ -13,7 +13,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -276,6 +276,12 @@ class Scene:
             Obstacle(entry["name"], _shape(entry["shape"]), pose_of(entry["world_from_obstacle"]))
             for entry in fields["obstacles"]
         )
+        gravity = fields["gravity"]
+        self.gravity: FloatArray | Literal["any"] | None = (
+            _constant(cast("list[float]", gravity)) if isinstance(gravity, list) else gravity
+        )
+        """(3,): acceleration in the world, in m/s^2; "any" where the grasp has to hold whatever its direction; none where the
+        scene leaves it open, and it is along the world's -Z."""
         self.inputs: tuple[InputFile, ...] = tuple(InputFile(**entry) for entry in fields["inputs"])
         """Every file that was read, the scene file first."""
         self.notes: tuple[str, ...] = tuple(fields["notes"])

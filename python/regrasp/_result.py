@@ -105,6 +105,14 @@ class Report:
     min_clearance: Clearance | None
     max_contact_error: float
     """Largest distance of a holding fingertip from its contact, in metres, certified between waypoints."""
+    max_slip: float | None
+    """Largest slip of a finger that rolls, in a segment, in metres; none when no finger rolls."""
+    max_force_residual: float | None
+    """Largest imbalance of forces and weight at a waypoint, in newtons; none in plans without forces."""
+    max_moment_residual: float | None
+    """Largest imbalance of moments, in newton metres; none in plans without forces."""
+    duration: float
+    """Time that the plan takes, in seconds."""
     n_waypoints: int
     """Waypoints judged."""
     n_distances: int
@@ -140,6 +148,10 @@ def report_of(fields: Mapping[str, Any]) -> Report:
             moment=Moment(**clearance["at"]),
         ),
         max_contact_error=fields["max_contact_error"],
+        max_slip=fields["max_slip"],
+        max_force_residual=fields["max_force_residual"],
+        max_moment_residual=fields["max_moment_residual"],
+        duration=fields["duration"],
         n_waypoints=fields["n_waypoints"],
         n_distances=fields["n_distances"],
         data=fields,

@@ -29,9 +29,25 @@ def test_a_scene_has_what_its_file_says(scene: regrasp.Scene) -> None:
     assert scene.object.mass == 0.1 and scene.object.friction == 0.8
     assert scene.object.shape.high.tolist() == [scene.object.radius] * 3
     assert [entry.role for entry in scene.inputs][0] == "scene"
-    assert scene.obstacles == ()
+    assert scene.obstacles == () and scene.gravity is None
     turn = scene.goal.matrix[:3, :3] @ scene.start.matrix[:3, :3].T
     np.testing.assert_allclose(turn, [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-12)
+
+
+def test_gravity_is_given_in_the_frame_of_the_hand(tmp_path: Path) -> None:
+    text = (REPOSITORY / "scenes/sphere_90x.toml").read_text()
+    folder = REPOSITORY / "assets/hands/wide_four_finger"
+    for name in ("hand.toml", "hand.urdf"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    text = text.replace("../assets/hands/wide_four_finger/", "")
+    for value, expected in [("[0.0, 2.0, 0.0]", [0, 9.80665, 0]), ('"any"', "any")]:
+        (tmp_path / "scene.toml").write_text(text.replace('task = "in_hand"', f'task = "in_hand"\ngravity = {value}'))
+        scene = regrasp.load_scene(tmp_path / "scene.toml")
+        if isinstance(scene.gravity, str):
+            assert scene.gravity == expected
+        else:
+            # The hand of this scene stands upright in the world.
+            np.testing.assert_allclose(scene.gravity, expected)
 
 
 def test_the_seed_draws_what_the_scene_leaves_open() -> None:

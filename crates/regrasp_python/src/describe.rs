@@ -5,7 +5,7 @@ use regrasp::plan::plan::PoseData;
 use regrasp::robot::hand::{Finger, TipShape};
 use regrasp::robot::robot::{Joint, JointKind, Limits};
 use regrasp::robot::{ContactModel, Hand};
-use regrasp::scene::{InHandQuery, InputFile, LoadedScene, Object, Obstacle};
+use regrasp::scene::{Gravity, InHandQuery, InputFile, LoadedScene, Object, Obstacle};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -17,6 +17,7 @@ pub fn scene(loaded: &LoadedScene, path: &Path) -> Value {
         "path": path,
         "hand": hand(&scene.hand),
         "object": object(&scene.object),
+        "gravity": scene.gravity.as_ref().map(gravity),
         "obstacles": scene.obstacles.iter().map(obstacle).collect::<Vec<_>>(),
         "inputs": scene.inputs.iter().map(input).collect::<Vec<_>>(),
         "notes": loaded.notes,
@@ -112,6 +113,10 @@ fn object(object: &Object) -> Value {
         "friction": object.friction,
         "radius": object.radius,
     })
+}
+
+fn gravity(gravity: &Gravity) -> Value {
+    gravity.in_world().map_or_else(|| json!("any"), |in_world| json!(<[f64; 3]>::from(in_world)))
 }
 
 fn obstacle(obstacle: &Obstacle) -> Value {

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod commands;
+mod export;
 mod folder;
 mod growth;
 #[path = "../../../../tests/support/places.rs"]
