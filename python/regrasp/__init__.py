@@ -29,7 +29,7 @@ from ._model import (
     load_scene,
 )
 from ._plan import CONTACT_MODES, Plan, Segment
-from ._planning import check, plan
+from ._planning import check, export_mjcf, plan
 from ._regrasp import __version__
 from ._result import Cause, Clearance, Failure, Moment, NearestMiss, Progress, Report, Violation
 
@@ -63,6 +63,7 @@ __all__ = [
     "Violation",
     "__version__",
     "check",
+    "export_mjcf",
     "load_hand",
     "load_scene",
     "plan",

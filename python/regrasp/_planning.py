@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from collections.abc import Callable, Mapping
 from typing import Any, Literal
 
@@ -112,6 +113,34 @@ def check(
 
     Raises `InputError` for files that cannot be used. What is wrong with the plan is no exception but in the report.
     """
+    plan, scene = _with_scene(plan, scene, packages, lenient)
+    return report_of(json.loads(_regrasp.check(plan._native, scene._native)))
+
+
+def export_mjcf(
+    plan: Plan | StrPath,
+    scene: Scene | StrPath | None = None,
+    *,
+    packages: Mapping[str, StrPath] | None = None,
+    lenient: bool = False,
+) -> str:
+    """The MuJoCo model of a plan's scene: hand, obstacles, object, and a keyframe for every waypoint.
+
+    plan, scene, packages, lenient: as in `check`.
+
+    Warns where the model differs from the scene: MuJoCo collides with convex hulls. Raises `InputError`.
+    """
+    plan, scene = _with_scene(plan, scene, packages, lenient)
+    xml, notes = plan._native.to_mjcf(scene._native)
+    for note in notes:
+        warnings.warn(note, stacklevel=2)
+    return xml
+
+
+def _with_scene(
+    plan: Plan | StrPath, scene: Scene | StrPath | None, packages: Mapping[str, StrPath] | None, lenient: bool
+) -> tuple[Plan, Scene]:
+    """A plan and its scene, read where files are named."""
     if not isinstance(plan, Plan):
         plan = Plan.from_file(plan)
     if scene is None:
@@ -121,4 +150,4 @@ def check(
             scene = _regrasp.find_scene(plan._native, plan.path or "plan.json", os.getcwd())
     if not isinstance(scene, Scene):
         scene = load_scene(scene, packages=packages, lenient=lenient)
-    return report_of(json.loads(_regrasp.check(plan._native, scene._native)))
+    return plan, scene

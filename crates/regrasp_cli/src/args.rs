@@ -60,6 +60,8 @@ pub enum Command {
     Check(Check),
     /// Write a plan in the formats of other tools
     Export(Export),
+    /// Say how to replay a plan in MuJoCo, which the Python package does
+    Simulate(Simulate),
     /// Plan scenes with many seeds and tabulate
     Bench(Bench),
     /// Measure how loading and planning grow with fingers, triangles, obstacles and threads
@@ -165,12 +167,22 @@ pub struct Export {
     /// ROS 2 trajectory_msgs/JointTrajectory
     #[arg(long, value_name = "FILE.yaml", group = "formats")]
     pub ros2: Option<PathBuf>,
+    /// MuJoCo model of the scene, with a keyframe for every waypoint
+    #[arg(long, value_name = "FILE.xml", group = "formats")]
+    pub mjcf: Option<PathBuf>,
     /// Scene file [default: the one that the plan names, beside the plan or in the current folder]
     #[arg(long, value_name = "FILE")]
     pub scene: Option<PathBuf>,
     /// Write what the checker rejects too
     #[arg(long)]
     pub no_check: bool,
+}
+
+/// `regrasp simulate`
+#[derive(Debug, Args)]
+pub struct Simulate {
+    /// Plan file
+    pub plan: PathBuf,
 }
 
 /// `regrasp bench`

@@ -4,11 +4,14 @@
 
 /// A plan as arrays over all waypoints.
 pub mod arrays;
+/// MuJoCo models of a plan's scene.
+pub mod mjcf;
 /// Arrays for numpy: `.npz` without pickle.
 pub mod npz;
 /// ROS 2 `trajectory_msgs/JointTrajectory` as YAML.
 pub mod ros2;
 
 pub use arrays::PlanArrays;
+pub use mjcf::{Mjcf, MjcfError, to_mjcf};
 pub use npz::to_npz;
 pub use ros2::to_ros2;

@@ -2,10 +2,11 @@
 
 use crate::error;
 use crate::guard::guarded;
+use crate::model::Scene;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use regrasp::base::{Diagnostic, Place, files};
-use regrasp::export::{PlanArrays, to_npz, to_ros2};
+use regrasp::export::{PlanArrays, to_mjcf, to_npz, to_ros2};
 use regrasp::plan::format;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -50,6 +51,16 @@ impl Plan {
     /// A ROS 2 trajectory, as YAML.
     fn to_ros2(&self, py: Python<'_>) -> PyResult<String> {
         guarded(py, || Ok(py.detach(|| to_ros2(&self.plan))))
+    }
+
+    /// The MuJoCo model of `scene` with a keyframe per waypoint, and where it differs from the scene.
+    fn to_mjcf(&self, py: Python<'_>, scene: &Scene) -> PyResult<(String, Vec<String>)> {
+        guarded(py, || {
+            let model = py.detach(|| to_mjcf(&scene.loaded.scene, &self.plan));
+            let model = model
+                .map_err(|wrong| error::argument(py, "export_mjcf", "scene", wrong.to_string(), "the plan's scene"))?;
+            Ok((model.xml, model.notes))
+        })
     }
 
     /// Everything but the waypoints, as JSON: the keys of a plan file, and of each segment kind, moving finger and number of

@@ -1,0 +1,57 @@
+//! A MuJoCo model of a plan's scene: hand, obstacles, object, and a keyframe for every waypoint.
+//!
+//! What may touch in the model is what the checker keeps apart (`regrasp_scene::collision_pairs`), pair by pair; pairs that
+//! the hand allows never touch. A round fingertip touches the object with its ball, as the plan means it, and everything else
+//! with the shapes of its link. MuJoCo collides with convex hulls of meshes: an object that is not convex is written as
+//! its hull, and a note says so. `docs/simulate.md` has the settings and where they come from.
+
+mod inertia;
+mod model;
+mod pairs;
+mod xml;
+
+use regrasp_plan::Plan;
+use regrasp_scene::Scene;
+
+/// A model, ready to be written to a file or loaded from memory.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Mjcf {
+    /// The MJCF document; it names no other file.
+    pub xml: String,
+    /// Where the model differs from the scene.
+    pub notes: Vec<String>,
+}
+
+/// Why there is no model.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum MjcfError {
+    /// Joints or fingers of plan and scene differ.
+    #[error("the plan is for another hand: its {what} are {plan}, those of the scene's hand {scene}")]
+    AnotherHand {
+        /// `joints` or `fingers`.
+        what: &'static str,
+        /// Names in the plan.
+        plan: String,
+        /// Names in the scene.
+        scene: String,
+    },
+}
+
+/// The MuJoCo model of `scene`, with the waypoints of `plan` as keyframes `segment_waypoint`, both from 0.
+///
+/// Names: bodies and joints as links and joints of the robot; the object is the body `object` (with underscores where a link
+/// has that name) with the free joint of the same name; of each finger the site `FINGER:tip` at the tip's centre and, for
+/// a round tip, the geom `FINGER:tip`; other geoms are `LINK:k`, `obstacle:NAME` and `object`.
+///
+/// Errors: the plan is not for this scene's hand.
+pub fn to_mjcf(scene: &Scene, plan: &Plan) -> Result<Mjcf, MjcfError> {
+    let fingers: Vec<String> = scene.hand.fingers.iter().map(|finger| finger.name.clone()).collect();
+    for (what, in_plan, in_scene) in
+        [("joints", &plan.joint_names, &scene.hand.joint_names()), ("fingers", &plan.fingers, &fingers)]
+    {
+        if in_plan != in_scene {
+            return Err(MjcfError::AnotherHand { what, plan: in_plan.join(", "), scene: in_scene.join(", ") });
+        }
+    }
+    Ok(model::write(scene, plan))
+}

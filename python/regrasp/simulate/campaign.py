@@ -1,0 +1,326 @@
+"""Many replays: scenes times seeds times directions of gravity times controllers, to a CSV file and a Markdown table.
+
+    python -m regrasp.simulate.campaign scenes/sphere_90x.toml scenes/box_90x.toml --seeds 50 -o campaign
+
+Plans are made for the direction of gravity that they are replayed in. Every plan and every result is kept in the output
+folder, one file each, and what is there is not done again: a campaign that was cut off goes on where it was. The same
+arguments give the same tables on any number of processes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import math
+import multiprocessing
+import sys
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+#: Settings of the planner for each kind of plan; all but the first are negative controls.
+VARIANTS: dict[str, dict[str, Any]] = {
+    "default": {},
+    "no-rolling": {"transfer": "fixed"},
+    "no-margin": {"friction_margin": 1.0},
+}
+GRAVITIES = ("up", "down", "side")
+CONTROLLERS = ("A", "B", "C2")
+
+
+@dataclass(frozen=True)
+class Job:
+    """One plan and its replays."""
+
+    scene: str
+    seed: int
+    gravity: str
+    variant: str
+    controllers: tuple[str, ...]
+    friction_scale: float
+    mass_scale: float
+    speed: float
+    noslip: bool
+    packages: tuple[tuple[str, str], ...]
+    settings: str
+    """Settings of the planner as JSON; those of the variant win over them."""
+    time_limit: float
+    folder: str
+
+    @property
+    def plan_path(self) -> Path:
+        """Where the plan is kept."""
+        return Path(self.folder) / "plans" / self.variant / Path(self.scene).stem / f"{self.gravity}-{self.seed}.json"
+
+    def result_path(self, controller: str) -> Path:
+        """Where the result of a replay is kept."""
+        conditions = f"f{self.friction_scale:g}-m{self.mass_scale:g}-v{self.speed:g}{'' if self.noslip else '-creep'}"
+        place = Path(self.folder) / "results" / self.variant / Path(self.scene).stem / f"{controller}-{conditions}"
+        return place / f"{self.gravity}-{self.seed}.json"
+
+
+def run(job: Job) -> list[dict[str, Any]]:
+    """Plans, unless the plan is there, and replays what has no result yet; returns a row per controller."""
+    missing = [controller for controller in job.controllers if not job.result_path(controller).exists()]
+    if missing:
+        _replay(job, missing)
+    return [json.loads(job.result_path(controller).read_text()) for controller in job.controllers]
+
+
+def _replay(job: Job, controllers: Sequence[str]) -> None:
+    import regrasp
+
+    from .model import Settings
+    from .run import simulate
+
+    scene = regrasp.load_scene(job.scene, packages=dict(job.packages))
+    plan, cause = _plan(job, scene)
+    drift = None
+    for controller in controllers:
+        row: dict[str, Any] = {
+            "scene": Path(job.scene).stem,
+            "variant": job.variant,
+            "gravity": job.gravity,
+            "controller": controller,
+            "seed": job.seed,
+            "friction_scale": job.friction_scale,
+            "mass_scale": job.mass_scale,
+            "speed": job.speed,
+            "noslip": job.noslip,
+            "planned": plan is not None,
+            "cause": cause,
+        }
+        if plan is not None:
+            settings = Settings(
+                controller=controller,
+                gravity=job.gravity,
+                friction_scale=job.friction_scale,
+                mass_scale=job.mass_scale,
+                speed=job.speed,
+                noslip=job.noslip,
+            )
+            xml = regrasp.export_mjcf(plan, scene)
+            report = simulate(json.loads(plan.to_json()), xml, settings, drift=drift).report
+            # Controller A holds in another way; the others start alike.
+            drift = report.drift if controller != "A" else None
+            assert report.drift is not None
+            lost, touched, dropped = report.lost_contacts, report.unplanned_contacts, report.dropped
+            row |= {
+                "kept": report.kept,
+                "final_mm": round(1e3 * report.final_position_error, 4),
+                "final_deg": round(math.degrees(report.final_angle_error), 4),
+                "largest_mm": round(1e3 * report.largest_position_error, 4),
+                "largest_deg": round(math.degrees(report.largest_angle_error), 4),
+                "slip_mm": round(1e3 * report.largest_slip, 4),
+                "drift_mm": round(1e3 * report.drift.position, 4),
+                "drift_deg": round(math.degrees(report.drift.angle), 4),
+                "contacts_lost": len(lost),
+                "unplanned": " ".join("+".join(touch.geoms) for touch in touched),
+                "duration": round(report.duration, 3),
+                "largest_force": round(report.largest_normal_force, 3),
+                "dropped_segment": dropped.segment if dropped else "",
+                "dropped_kind": dropped.kind if dropped else "",
+                "dropped_finger": (dropped.finger or "") if dropped else "",
+                "dropped_time": round(dropped.time, 3) if dropped else "",
+            }
+        path = job.result_path(controller)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _write(path, json.dumps(row))
+
+
+def _plan(job: Job, scene: Any) -> tuple[Any, str]:
+    """The plan, or why there is none."""
+    import regrasp
+
+    if job.plan_path.exists():
+        return regrasp.Plan.from_file(job.plan_path), ""
+    failed = job.plan_path.with_suffix(".failed")
+    if failed.exists():
+        return None, failed.read_text()
+    settings = {**json.loads(job.settings), **VARIANTS[job.variant], "gravity": _down(job, scene)}
+    found = regrasp.plan(scene, seed=job.seed, settings=settings, time_limit=job.time_limit)
+    job.plan_path.parent.mkdir(parents=True, exist_ok=True)
+    if isinstance(found, regrasp.Plan):
+        _write(job.plan_path, found.to_json().decode())
+        return found, ""
+    cause = str(found).splitlines()[0]
+    _write(failed, cause)
+    return None, cause
+
+
+def _down(job: Job, scene: Any) -> list[float]:
+    """The direction of gravity, in the hand's frame."""
+    import numpy as np
+    import regrasp
+
+    from .model import Settings, gravity_of, make_rig
+
+    # Which way the palm faces shows in any plan.
+    for seed in range(100):
+        plan = regrasp.plan(scene, seed=seed, settings={"forces": None, "friction_margin": 1.0})
+        if isinstance(plan, regrasp.Plan):
+            rig = make_rig(regrasp.export_mjcf(plan, scene), json.loads(plan.to_json()), Settings(controller="A"))
+            world_from_hand = scene.hand.world_from_base.matrix[:3, :3]
+            down = world_from_hand.T @ gravity_of(rig, job.gravity)
+            return [round(float(x), 12) for x in down / np.linalg.norm(down)]
+    raise RuntimeError(f"{job.scene}: no seed below 100 has a plan")
+
+
+def _write(path: Path, text: str) -> None:
+    """Whole or not at all."""
+    part = path.with_name(path.name + ".part")
+    part.write_text(text)
+    part.replace(path)
+
+
+def table(rows: Iterable[dict[str, Any]]) -> str:
+    """A Markdown table: one line per scene, kind of plan, gravity, controller and conditions."""
+    keys = ("scene", "variant", "gravity", "controller", "friction_scale", "mass_scale", "speed", "noslip")
+    groups: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
+    for row in rows:
+        groups.setdefault(tuple(row[key] for key in keys), []).append(row)
+    lines = [
+        "| scene | plans | gravity | controller | conditions | planned | kept | within 5 mm, 5 deg | within 2 mm, 2 deg | "
+        "final median | final worst | slip median, worst | contacts lost | unplanned contacts | hold drift worst |",
+        "|" + "---|" * 15,
+    ]
+    for group, members in sorted(groups.items()):
+        scene, variant, gravity, controller, friction, mass, speed, noslip = group
+        seen = [row for row in members if row["planned"]]
+        kept = [row for row in seen if row["kept"]]
+        conditions = [
+            text
+            for text, usual in (
+                (f"friction x {friction:g}", friction == 1.0),
+                (f"mass x {mass:g}", mass == 1.0),
+                (f"speed x {speed:g}", speed == 1.0),
+                ("noslip off", noslip),
+            )
+            if not usual
+        ]
+        within = [sum(row["final_mm"] < limit and row["final_deg"] < limit for row in kept) for limit in (5, 2)]
+        cells = [
+            scene,
+            variant,
+            gravity,
+            controller,
+            ", ".join(conditions) or "nominal",
+            f"{len(seen)} of {len(members)}",
+            f"{len(kept)} of {len(seen)}",
+            *(f"{n} of {len(seen)}" for n in within),
+            _pair(kept, median, "final_mm", "final_deg"),
+            _pair(kept, max, "final_mm", "final_deg"),
+            f"{_one(kept, median, 'slip_mm')}, {_one(kept, max, 'slip_mm')} mm",
+            str(sum(row["contacts_lost"] for row in kept)),
+            f"in {sum(bool(row['unplanned']) for row in kept)}",
+            _pair(seen, max, "drift_mm", "drift_deg"),
+        ]
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _one(rows: list[dict[str, Any]], of: Any, key: str) -> str:
+    return f"{of([row[key] for row in rows]):.2f}" if rows else "-"
+
+
+def _pair(rows: list[dict[str, Any]], of: Any, mm: str, deg: str) -> str:
+    return f"{_one(rows, of, mm)} mm {_one(rows, of, deg)} deg"
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Runs the command; returns the exit code."""
+    options = _parser().parse_args(arguments)
+    settings: dict[str, Any] = json.loads(options.settings.read_text()) if options.settings else {}
+    jobs = [
+        Job(
+            scene=str(scene),
+            seed=seed,
+            gravity=gravity,
+            variant=variant,
+            controllers=tuple(options.controllers),
+            friction_scale=friction,
+            mass_scale=mass,
+            speed=speed,
+            noslip=not options.no_noslip,
+            packages=tuple((name, str(folder)) for name, folder in options.package),
+            settings=json.dumps(settings),
+            time_limit=options.time_limit,
+            folder=str(options.output),
+        )
+        for scene in options.scenes
+        for variant in options.variants
+        for gravity in options.gravity
+        for friction in options.friction_scale
+        for mass in options.mass_scale
+        for speed in options.speed
+        for seed in range(options.first_seed, options.first_seed + options.seeds)
+    ]
+    done: dict[int, list[dict[str, Any]]] = {}
+    with ProcessPoolExecutor(options.processes, mp_context=multiprocessing.get_context("spawn")) as pool:
+        futures = {pool.submit(run, job): k for k, job in enumerate(jobs)}
+        for n, future in enumerate(as_completed(futures), 1):
+            done[futures[future]] = future.result()
+            if n % 20 == 0 or n == len(jobs):
+                print(f"{n} of {len(jobs)} plans", file=sys.stderr)
+    rows = [row for k in range(len(jobs)) for row in done[k]]
+    fields = list(dict.fromkeys(key for row in rows for key in row))
+    with (options.output / f"{options.name}.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, fields, restval="", lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    text = table(rows)
+    (options.output / f"{options.name}.md").write_text(text)
+    print(text, end="")
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    def words(known: Sequence[str]) -> Any:
+        def read(text: str) -> list[str]:
+            wanted = text.split(",")
+            if unknown := [word for word in wanted if word not in known]:
+                raise argparse.ArgumentTypeError(f"{unknown[0]!r} is none of {', '.join(known)}")
+            return wanted
+
+        return read
+
+    def scales(text: str) -> list[float]:
+        values = [float(word) for word in text.split(",")]
+        if not all(0.0 < value < math.inf for value in values):
+            raise argparse.ArgumentTypeError("expected numbers above zero")
+        return values
+
+    def package(text: str) -> tuple[str, Path]:
+        name, equals, folder = text.partition("=")
+        if not (name and equals and folder):
+            raise argparse.ArgumentTypeError("expected NAME=DIR")
+        return name, Path(folder)
+
+    parser = argparse.ArgumentParser(
+        prog="python -m regrasp.simulate.campaign", description="Replays many plans in MuJoCo and tabulates."
+    )
+    parser.add_argument("scenes", type=Path, nargs="+", help="scene files")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder for plans, results and tables")
+    parser.add_argument("--name", default="campaign", help="name of the tables [default: campaign]")
+    parser.add_argument("--seeds", type=int, default=10, help="plans per scene and direction [default: 10]")
+    parser.add_argument("--first-seed", type=int, default=0)
+    parser.add_argument("--gravity", type=words(GRAVITIES), default=list(GRAVITIES), help="[default: up,down,side]")
+    parser.add_argument("--controllers", type=words(CONTROLLERS), default=["B", "C2"], help="[default: B,C2]")
+    parser.add_argument("--variants", type=words(tuple(VARIANTS)), default=["default"], help=f"of {', '.join(VARIANTS)}")
+    parser.add_argument("--friction-scale", type=scales, default=[1.0])
+    parser.add_argument("--mass-scale", type=scales, default=[1.0])
+    parser.add_argument("--speed", type=scales, default=[1.0])
+    parser.add_argument("--no-noslip", action="store_true", help="without MuJoCo's solver against creep")
+    parser.add_argument("--settings", type=Path, metavar="FILE.json", help="settings of the planner")
+    parser.add_argument("--time-limit", type=float, default=60.0, metavar="S", help="for one plan [default: 60]")
+    parser.add_argument("--package", type=package, action="append", default=[], metavar="NAME=DIR")
+    parser.add_argument("--processes", type=int, default=2)
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,134 @@
+"""What the joints are told: physics notes, section 1 (controllers) and section 6."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .model import Rig, Settings, contact_jacobians, gravity_of, inverses, normals_in_world
+from .reference import Array, Reference, held_at_waypoints, quat_inverse, quat_product, waypoints_of
+
+#: Largest offset of a fingertip by feedback, in metres.
+LARGEST_OFFSET = 0.01
+#: Time in which a free finger takes up the error of the object, in seconds.
+FREE_FOLLOW_TIME = 0.05
+
+
+class Controller:
+    """Commands of a replay: computed in advance for A and B, corrected at every tick for C2."""
+
+    def __init__(self, rig: Rig, ref: Reference, settings: Settings) -> None:
+        jacobians, contacts = contact_jacobians(rig)
+        self._inverses = inverses(jacobians)
+        self._contacts = contacts
+        self.torques = ref.blend(_torques(rig, jacobians, contacts, settings))
+        """Fed forward, at every tick."""
+        targets = ref.joints
+        if settings.controller == "A":
+            held = held_at_waypoints(rig.plan)
+            inward = -settings.squeeze * normals_in_world(rig.plan) * held[:, :, None]
+            targets = targets + ref.blend(np.einsum("kjfl,kfl->kj", self._inverses, inward))
+        self.servo = rig.stiffness * targets + rig.damping * ref.joint_velocities
+        """Commands without torques, at every tick."""
+        self.commands = self.servo + self.torques
+        """Commands at every tick."""
+        self.has_feedback = settings.controller == "C2"
+
+    def feedback(self, rig: Rig, ref: Reference, settings: Settings) -> Feedback:
+        """A fresh feedback loop over these commands."""
+        return Feedback(rig, ref, settings, self.commands, self._inverses, ref.blend(self._contacts))
+
+
+class Feedback:
+    """C2: the error of the object's pose, integrated slowly as an offset of every fingertip.
+
+    A pressing finger's offset grows by gain * (displacement that its contact lacks). A free finger takes up the
+    displacement of the real object from the planned one, so that it lands where it should on the real object; offsets are
+    continuous over landing and lifting.
+    """
+
+    def __init__(
+        self, rig: Rig, ref: Reference, settings: Settings, commands: Array, inverse: Array, contacts: Array
+    ) -> None:
+        self._commands = commands
+        n_joints = commands.shape[1]
+        self._inverse = (rig.stiffness[:, None] * inverse.reshape(len(inverse), n_joints, -1)).copy()
+        self._arms = contacts - ref.object_position[:, None, :]
+        self._ref = ref
+        pressing = ref.presses[:, :, None].astype(np.float64)
+        self._leak = (1.0 - pressing) * (settings.tick / FREE_FOLLOW_TIME)
+        self._gain = pressing * (settings.feedback_gain * settings.tick) - self._leak
+        self._offsets = np.zeros((len(rig.fingers), 3))
+        self._position = slice(rig.object_qpos, rig.object_qpos + 3)
+        self._quat = slice(rig.object_qpos + 3, rig.object_qpos + 7)
+
+    def command(self, k: int, qpos: Array) -> Array:
+        """The command at tick ``k``, with the object where ``qpos`` has it."""
+        ref = self._ref
+        x, y, z = ref.object_position[k] - qpos[self._position]
+        a, b, c = _turn(ref.object_quat_wxyz[k], qpos[self._quat])
+        arms = self._arms[k]
+        lacking = np.empty_like(arms)
+        lacking[:, 0] = x + b * arms[:, 2] - c * arms[:, 1]
+        lacking[:, 1] = y + c * arms[:, 0] - a * arms[:, 2]
+        lacking[:, 2] = z + a * arms[:, 1] - b * arms[:, 0]
+        offsets = self._offsets
+        change = self._gain[k] * lacking - self._leak[k] * offsets
+        np.maximum(-LARGEST_OFFSET, np.minimum(LARGEST_OFFSET, offsets + change), out=offsets)
+        return self._commands[k] + self._inverse[ref.waypoint[k]] @ offsets.ravel()
+
+
+def _turn(to: Array, from_: Array) -> tuple[float, float, float]:
+    """Rotation vector that turns the orientation ``from_`` into ``to``, for small angles; numpy is slow on three numbers."""
+    aw, ax, ay, az = to.tolist()
+    bw, bx, by, bz = from_.tolist()
+    w = aw * bw + ax * bx + ay * by + az * bz
+    s = 2.0 if w >= 0.0 else -2.0
+    return (
+        s * (-aw * bx + ax * bw - ay * bz + az * by),
+        s * (-aw * by + ax * bz + ay * bw - az * bx),
+        s * (-aw * bz - ax * by + ay * bx + az * bw),
+    )
+
+
+def _torques(rig: Rig, jacobians: Array, contacts: Array, settings: Settings) -> Array:
+    """Torques that make the plan's contact forces, at every waypoint: none for a squeeze by position.
+
+    A plan for gravity of any direction balances no weight: the least forces that balance the weight are added.
+    """
+    points = waypoints_of(rig.plan)
+    if settings.controller == "A":
+        return np.zeros((len(points), len(rig.plan["joint_names"])))
+    torques = np.array([point["joint_torques"] for point in points], dtype=np.float64)
+    promised: dict[str, Any] = rig.plan["promises"].get("forces") or {}
+    if "gravity_in_world" in promised:
+        return torques
+    lift = -float(promised["mass"]) * gravity_of(rig, settings.gravity) if "mass" in promised else np.zeros(3)
+    held = held_at_waypoints(rig.plan)
+    center = np.array(rig.model.body_ipos[rig.object_body])
+    for k, point in enumerate(points):
+        pose = point["world_from_object"]
+        forces = _least_forces(contacts[k][held[k]] - _place(pose, center), lift)
+        torques[k] += np.einsum("fij,fi->j", jacobians[k][held[k]], forces)
+    return torques
+
+
+def _least_forces(arms: Array, force: Array) -> Array:
+    """Least forces at ``arms`` from the centre of mass that sum up to ``force`` and turn nothing."""
+    grasp = np.zeros((6, 3 * len(arms)))
+    for f, (x, y, z) in enumerate(arms):
+        grasp[:3, 3 * f : 3 * f + 3] = np.eye(3)
+        grasp[3:, 3 * f : 3 * f + 3] = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
+    wrench = np.concatenate((force, np.zeros(3)))
+    # Torques in units of a finger's width, so that both halves count alike.
+    scale = np.repeat((1.0, 30.0), 3)
+    return (np.linalg.pinv(grasp * scale[:, None]) @ (wrench * scale)).reshape(-1, 3)
+
+
+def _place(pose: dict[str, list[float]], point: Array) -> Array:
+    quat = np.array(pose["quat_xyzw"])[[3, 0, 1, 2]]
+    turned = quat_product(quat_product(quat, np.concatenate(([0.0], point))), quat_inverse(quat))[1:]
+    return np.array(pose["position"]) + turned
+
+

@@ -1,0 +1,219 @@
+"""What a replay says about a plan: kept or dropped, errors, slip, contacts lost and contacts made that were not planned."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._mujoco import MjModel
+from .model import Rig, Settings
+from .reference import Array, Reference, rotation_matrices, waypoints_of
+from .replay import DROPPED, Drift, Track, pose_errors
+
+#: A contact that should hold counts as lost when it is away for longer, in seconds.
+LOST_AFTER = 0.024
+
+
+@dataclass(frozen=True)
+class LostContact:
+    """A contact that should hold and did not touch."""
+
+    segment: int
+    finger: str
+    time: float
+    """When it was lost, in seconds from the start of the plan."""
+    duration: float
+    """For how long, in seconds."""
+
+
+@dataclass(frozen=True)
+class UnplannedContact:
+    """Two geoms that touched though the plan does not let them."""
+
+    geoms: tuple[str, str]
+    segment: int
+    """Segment under way when they first touched."""
+    time: float
+    """When, in seconds from the start of the plan."""
+    duration: float
+    """Sum of the times that they touched, in seconds."""
+
+
+@dataclass(frozen=True)
+class Dropped:
+    """Where the object was lost."""
+
+    segment: int
+    kind: str
+    """``transfer`` or ``regrasp``."""
+    time: float
+    """When it was more than 30 mm away, in seconds from the start of the plan."""
+    finger: str | None
+    """Of the fingers that should hold, the one that lost its contact first in the second before."""
+    moving_finger: str | None
+    """The finger that the segment moves."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """The result of a replay, in metres, radians, seconds and newtons; ``docs/simulate.md`` describes the keys."""
+
+    kept: bool
+    dropped: Dropped | None
+    largest_position_error: float
+    largest_angle_error: float
+    final_position_error: float
+    final_angle_error: float
+    largest_slip: float
+    """Largest slip of a finger in one segment."""
+    slip: list[list[float | None]]
+    """For each segment and finger how far it slid over the object; nothing where it never held."""
+    lost_contacts: list[LostContact]
+    unplanned_contacts: list[UnplannedContact]
+    largest_normal_force: float
+    largest_torque: float
+    """Largest torque fed forward to a joint, in N m."""
+    drift: Drift | None
+    """Of the static hold before."""
+    duration: float
+    """Length of the motion replayed, in seconds."""
+    settings: Settings
+    gravity_in_world: tuple[float, float, float]
+    scene: str
+    seed: int
+    method: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``."""
+        return {"format": "regrasp-replay", "format_version": 1, **asdict(self)}
+
+
+def report(rig: Rig, ref: Reference, track: Track, torques: Array, drift: Drift | None, settings: Settings) -> Report:
+    """Measures ``track`` against ``ref``."""
+    ticks = np.minimum(np.arange(track.n_ticks), ref.n_ticks - 1)
+    seen = np.concatenate((track.object_position, track.object_quat_wxyz), axis=1)
+    wanted = np.concatenate((ref.object_position, ref.object_quat_wxyz), axis=1)[ticks]
+    position, angle = pose_errors(rig, seen, wanted)
+    away = np.flatnonzero(~(position <= DROPPED))
+    kept = len(away) == 0
+    # What is flung about afterwards says nothing.
+    end = track.n_ticks if kept else int(away[0]) + 1
+    forces = track.sensors[:end, rig.normal_force]
+    lost = _lost_contacts(rig, ref, ticks[:end], forces)
+    slip = _slip(rig, ref, track, ticks[:end], forces)
+    plan = rig.plan
+    gx, gy, gz = (float(g) for g in rig.model.opt.gravity)
+    return Report(
+        kept=kept,
+        dropped=None if kept else _dropped(rig, ref, ticks, int(away[0]), forces),
+        largest_position_error=float(position[:end].max()),
+        largest_angle_error=float(angle[:end].max()),
+        final_position_error=float(position[-1]),
+        final_angle_error=float(angle[-1]),
+        largest_slip=max((s for row in slip for s in row if s is not None), default=0.0),
+        slip=slip,
+        lost_contacts=lost,
+        unplanned_contacts=_unplanned(rig, ref, track, ticks, end),
+        largest_normal_force=float(forces.max()),
+        largest_torque=float(np.abs(torques).max()),
+        drift=drift,
+        duration=ref.tick * ref.n_ticks,
+        settings=settings,
+        gravity_in_world=(gx, gy, gz),
+        scene=str(plan["inputs"][0]["name"]),
+        seed=int(plan["seed"]),
+        method=str(plan["method"]),
+    )
+
+
+def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First index and end of each run of true."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2])]
+
+
+def _lost_contacts(rig: Rig, ref: Reference, ticks: NDArray[np.int64], forces: Array) -> list[LostContact]:
+    lost: list[LostContact] = []
+    for f, finger in enumerate(rig.fingers):
+        for first, end in _runs(ref.holds[ticks, f] & (forces[:, f] <= 0.0)):
+            if (end - first) * ref.tick > LOST_AFTER:
+                segment = int(ref.segment[ticks[first]])
+                lost.append(LostContact(segment, finger.name, first * ref.tick, (end - first) * ref.tick))
+    return sorted(lost, key=lambda contact: contact.time)
+
+
+def _dropped(rig: Rig, ref: Reference, ticks: NDArray[np.int64], at: int, forces: Array) -> Dropped:
+    segment = int(ref.segment[ticks[at]])
+    described = rig.plan["segments"][segment]
+    begin = max(0, at - round(1.0 / ref.tick))
+    without = ref.holds[ticks[begin : at + 1]] & (forces[begin : at + 1] <= 0.0)
+    first = [int(np.argmax(column)) if column.any() else at + 1 for column in without.T]
+    finger = int(np.argmin(first))
+    return Dropped(
+        segment=segment,
+        kind=described["kind"],
+        time=at * ref.tick,
+        finger=rig.fingers[finger].name if first[finger] <= at else None,
+        moving_finger=described.get("moving_finger"),
+    )
+
+
+def _slip(
+    rig: Rig, ref: Reference, track: Track, ticks: NDArray[np.int64], forces: Array
+) -> list[list[float | None]]:
+    """Sliding of tips over the object: the relative velocity at the contact, across the normal, integrated in the object
+    frame; the farthest from where the segment began. Rolling without slipping gives zero."""
+    n = len(ticks)
+    turn = rotation_matrices(track.object_quat_wxyz[:n])
+    origin = track.object_position[:n]
+    object_linear = track.sensors[:n, rig.linear_velocity[-1]]
+    object_angular = track.sensors[:n, rig.angular_velocity[-1]]
+    contacts = [[point["contacts"][f] for point in waypoints_of(rig.plan)] for f in range(len(rig.fingers))]
+    segments = ref.segment[ticks]
+    out: list[list[float | None]] = [[None] * len(rig.fingers) for _ in rig.plan["segments"]]
+    for f in range(len(rig.fingers)):
+        zero = (0.0, 0.0, 0.0)
+        point = ref.blend(np.array([contact.get("point_in_object") or zero for contact in contacts[f]]))[ticks]
+        normal = ref.blend(np.array([contact.get("normal_in_object") or zero for contact in contacts[f]]))[ticks]
+        touches = ref.holds[ticks, f] & (forces[:, f] > 0.0)
+        where = origin + np.einsum("kij,kj->ki", turn, point)
+        tip_velocity = track.sensors[:n, rig.linear_velocity[f]] + np.cross(
+            track.sensors[:n, rig.angular_velocity[f]], where - track.tips[:n, f]
+        )
+        object_velocity = object_linear + np.cross(object_angular, where - origin)
+        relative = np.einsum("kji,kj->ki", turn, tip_velocity - object_velocity)
+        length = np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
+        normal = normal / length
+        across = relative - np.einsum("ki,ki->k", relative, normal)[:, None] * normal
+        across[~touches] = 0.0
+        for s in np.unique(segments[touches]):
+            during = segments == s
+            path = np.cumsum(across[during], axis=0) * ref.tick
+            out[int(s)][f] = float(np.linalg.norm(path, axis=1).max())
+    return out
+
+
+def _unplanned(
+    rig: Rig, ref: Reference, track: Track, ticks: NDArray[np.int64], end: int
+) -> list[UnplannedContact]:
+    before = track.contact_ticks < end
+    at, geoms = track.contact_ticks[before], np.sort(track.contact_geoms[before], axis=1)
+    planned = np.zeros(len(at), dtype=bool)
+    for f, finger in enumerate(rig.fingers):
+        tip = np.isin(geoms, list(finger.touching)).any(axis=1) & (geoms == rig.object_geom).any(axis=1)
+        planned |= tip & ref.may_touch[ticks[at], f]
+    found: list[UnplannedContact] = []
+    at, geoms = at[~planned], geoms[~planned]
+    for a, b in np.unique(geoms, axis=0).tolist():
+        when = np.unique(at[(geoms == (a, b)).all(axis=1)])
+        names = (_geom_name(rig.model, a), _geom_name(rig.model, b))
+        segment = int(ref.segment[ticks[when[0]]])
+        found.append(UnplannedContact(names, segment, float(when[0] * ref.tick), float(len(when) * ref.tick)))
+    return sorted(found, key=lambda contact: contact.time)
+
+
+def _geom_name(model: MjModel, geom: int) -> str:
+    return str(model.geom(geom).name)

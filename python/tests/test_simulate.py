@@ -1,0 +1,220 @@
+"""Replays in MuJoCo: the exported model, the reference in time, verdicts."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import regrasp
+from conftest import SCENES
+
+mujoco = pytest.importorskip("mujoco")
+
+from regrasp.simulate import PlanError, Settings, simulate  # noqa: E402
+from regrasp.simulate.__main__ import main  # noqa: E402
+from regrasp.simulate.model import contact_jacobians, make_rig, normals_in_world  # noqa: E402
+from regrasp.simulate.reference import (  # noqa: E402
+    quat_exp,
+    quat_product,
+    reference,
+    rotation_matrices,
+    rotation_vector,
+    waypoints_of,
+)
+
+MODELS = Path(os.environ.get("REGRASP_MODELS", SCENES.parents[1] / "shared/models"))
+
+
+def planned(name: str, seed: int = 1, **settings: Any) -> tuple[regrasp.Plan, str]:
+    """A plan and its model."""
+    if "/" in name and not MODELS.is_dir():
+        pytest.skip("SKIPPED: the shared models are not here")
+    packages = {"models": MODELS} if MODELS.is_dir() else {}
+    scene = regrasp.load_scene(SCENES / f"{name}.toml", packages=packages)
+    plan = regrasp.plan(scene, seed=seed, settings=settings)
+    assert isinstance(plan, regrasp.Plan), plan
+    return plan, regrasp.export_mjcf(plan, scene)
+
+
+def as_data(plan: regrasp.Plan) -> dict[str, Any]:
+    return json.loads(plan.to_json())
+
+
+@pytest.fixture(scope="module")
+def short() -> Iterator[tuple[dict[str, Any], str]]:
+    """A plan of a few seconds."""
+    plan, xml = planned("sphere_90x", seed=2)
+    yield as_data(plan), xml
+
+
+@pytest.mark.parametrize("name", ["sphere_90x", "box_90x", "allegro/cube57_z", "shadow/sphere32_z"])
+def test_fingertips_of_every_frame_lie_on_their_contacts(name: str) -> None:
+    plan, xml = planned(name)
+    arrays = np.load(io.BytesIO(plan.to_npz()), allow_pickle=False)
+    model = mujoco.MjModel.from_xml_string(xml)
+    data = mujoco.MjData(model)
+    assert model.nkey == len(arrays["times"])
+    qpos_of = [model.joint(str(joint)).qposadr[0] for joint in arrays["joint_names"]]
+    names = [str(arrays["contact_mode_names"][k]) for k in range(3)]
+    held = 0
+    for k in range(model.nkey):
+        mujoco.mj_resetDataKeyframe(model, data, k)
+        assert data.time == arrays["times"][k]
+        np.testing.assert_array_equal(data.qpos[qpos_of], arrays["joints"][k])
+        mujoco.mj_kinematics(model, data)
+        turn, origin = data.body("object").xmat.reshape(3, 3), data.body("object").xpos
+        np.testing.assert_allclose(origin, arrays["object_positions"][k], atol=1e-12)
+        for f, finger in enumerate(arrays["fingers"]):
+            if names[arrays["contact_modes"][k, f]] == "free":
+                continue
+            held += 1
+            radius = model.geom(f"{finger}:tip").size[0]
+            outward = turn @ arrays["contact_normals_in_object"][k, f]
+            contact = origin + turn @ arrays["contact_points_in_object"][k, f]
+            assert np.linalg.norm(data.site(f"{finger}:tip").xpos - radius * outward - contact) < 0.5e-3
+    assert held > 3 * model.nkey
+
+
+@pytest.mark.parametrize("name", ["sphere_90x", "allegro/cube57_z", "shadow/sphere32_z"])
+def test_what_may_touch_does_not_at_any_waypoint_but_for_tips(name: str) -> None:
+    # The checker said so; MuJoCo's collision is another way to know, but it has margins of its own.
+    plan, xml = planned(name)
+    model = mujoco.MjModel.from_xml_string(xml)
+    data = mujoco.MjData(model)
+    for k in range(model.nkey):
+        mujoco.mj_resetDataKeyframe(model, data, k)
+        mujoco.mj_forward(model, data)
+        for contact in data.contact[: data.ncon]:
+            depth = 0.5e-3 if model.geom("object").id in contact.geom else 1e-5
+            assert contact.dist > -depth, [model.geom(g).name for g in contact.geom]
+
+
+def test_coupled_joints_of_the_model_follow() -> None:
+    plan, xml = planned("shadow/sphere32_z")
+    model = mujoco.MjModel.from_xml_string(xml)
+    data = mujoco.MjData(model)
+    couplings = [e for e in range(model.neq) if model.eq_type[e] == mujoco.mjtEq.mjEQ_JOINT]
+    assert len(couplings) == 4
+    mujoco.mj_resetDataKeyframe(model, data, model.nkey - 1)
+    for e in couplings:
+        follower, leader = (data.qpos[model.jnt_qposadr[j]] for j in (model.eq_obj1id[e], model.eq_obj2id[e]))
+        assert follower == pytest.approx(model.eq_data[e, 0] + model.eq_data[e, 1] * leader, abs=1e-12)
+
+
+def test_rotations_agree_with_mujoco() -> None:
+    rng = np.random.default_rng(1)
+    vectors = rng.normal(size=(50, 3))
+    quats = quat_exp(vectors)
+    out, turn = np.empty(4), np.empty(9)
+    for vector, quat, other in zip(vectors, quats, quats[::-1]):
+        mujoco.mju_axisAngle2Quat(out, vector / np.linalg.norm(vector), float(np.linalg.norm(vector)))
+        np.testing.assert_allclose(quat, out, atol=1e-12)
+        mujoco.mju_quat2Mat(turn, quat)
+        np.testing.assert_allclose(rotation_matrices(quat), turn.reshape(3, 3), atol=1e-12)
+        mujoco.mju_mulQuat(out, quat, other)
+        np.testing.assert_allclose(quat_product(quat, other), out, atol=1e-12)
+        if np.linalg.norm(vector) < math.pi:
+            np.testing.assert_allclose(rotation_vector(quat), vector, atol=1e-9)
+
+
+@pytest.mark.parametrize("speed", [1.0, 2.0])
+def test_the_reference_goes_through_the_waypoints_on_straight_lines(short: tuple[dict[str, Any], str], speed: float) -> None:
+    plan, _ = short
+    ref = reference(plan, speed=speed)
+    points = waypoints_of(plan)
+    joints = np.array([point["joints"] for point in points])
+    assert ref.n_ticks * ref.tick == pytest.approx(points[-1]["time"] / speed, abs=3 * ref.tick)
+    on_line = (1 - ref.fraction[:, None]) * joints[ref.waypoint] + ref.fraction[:, None] * joints[ref.waypoint + 1]
+    np.testing.assert_allclose(ref.joints, on_line, atol=1e-12)
+    assert np.all((ref.fraction >= 0) & (ref.fraction <= 1))
+    # Velocities are what the positions do, by differences.
+    differences = np.gradient(ref.joints, ref.tick, axis=0)
+    assert np.abs(differences - ref.joint_velocities).max() < 0.2 * max(1.0, np.abs(ref.joint_velocities).max())
+    quats = np.array([point["world_from_object"]["quat_xyzw"] for point in points])[:, [3, 0, 1, 2]]
+    np.testing.assert_allclose(np.abs(ref.object_quat_wxyz[-1] @ quats[-1]), 1.0, atol=1e-12)
+
+
+def test_torques_of_the_plan_are_those_of_its_forces_in_the_model(short: tuple[dict[str, Any], str]) -> None:
+    plan, xml = short
+    rig = make_rig(xml, plan, Settings())
+    jacobians, _ = contact_jacobians(rig)
+    points = waypoints_of(plan)
+    for k, point in enumerate(points):
+        x, y, z, w = point["world_from_object"]["quat_xyzw"]
+        turn = rotation_matrices(np.array([w, x, y, z]))
+        torques = np.zeros(len(plan["joint_names"]))
+        for f, contact in enumerate(point["contacts"]):
+            if contact.get("force_in_object"):
+                torques += jacobians[k, f].T @ (turn @ np.array(contact["force_in_object"]))
+        np.testing.assert_allclose(point["joint_torques"], torques, atol=1e-9)
+    pushes = [c["force_in_object"] for c in points[0]["contacts"]]
+    outward = normals_in_world(plan)[0]
+    first = points[0]["world_from_object"]["quat_xyzw"]
+    turn = rotation_matrices(np.array(first)[[3, 0, 1, 2]])
+    assert all((turn @ np.array(push)) @ normal < 0 for push, normal in zip(pushes, outward))
+
+
+def test_a_static_hold_does_not_creep_and_a_short_plan_is_kept(short: tuple[dict[str, Any], str]) -> None:
+    plan, xml = short
+    result = simulate(plan, xml, Settings(controller="B"))
+    report = result.report
+    assert report.drift is not None
+    assert report.drift.position < 0.2e-3 and report.drift.angle < math.radians(0.5)
+    assert report.kept and report.dropped is None
+    assert report.final_position_error < 5e-3 and report.final_angle_error < math.radians(5)
+    assert all(0.0 <= slip < 5e-3 for row in report.slip for slip in row if slip is not None)
+    again = simulate(plan, xml, Settings(controller="B")).report
+    assert json.dumps(again.to_json()) == json.dumps(report.to_json())
+    closed = simulate(plan, xml, Settings(controller="C2"), drift=report.drift).report
+    assert closed.kept
+    assert closed.final_position_error < 2e-3 and closed.final_angle_error < math.radians(2)
+    assert closed.final_angle_error < report.final_angle_error
+
+
+def test_a_load_that_nobody_told_of_is_dropped_and_the_report_says_where(short: tuple[dict[str, Any], str]) -> None:
+    plan, xml = short
+    report = simulate(plan, xml, Settings(gravity="down", mass_scale=30.0, hold_time=0.0)).report
+    assert not report.kept
+    assert report.dropped is not None and 0 <= report.dropped.segment < len(plan["segments"])
+    assert report.largest_position_error > 0.03
+    assert report.lost_contacts
+
+
+def test_without_noslip_every_hold_creeps(short: tuple[dict[str, Any], str]) -> None:
+    plan, xml = short
+    still = simulate(plan, xml, Settings(gravity="down", speed=50.0)).report.drift
+    creeps = simulate(plan, xml, Settings(gravity="down", speed=50.0, noslip=False)).report.drift
+    assert still is not None and creeps is not None
+    assert creeps.position > 3 * still.position
+
+
+def test_a_plan_without_forces_is_for_controller_a_only() -> None:
+    plan, xml = planned("sphere_90x", forces=None)
+    data = as_data(plan)
+    with pytest.raises(PlanError, match="no forces"):
+        simulate(data, xml, Settings(controller="B"))
+    assert simulate(data, xml, Settings(controller="A", hold_time=0.0)).report.largest_torque == 0.0
+
+
+def test_the_command_line_says_kept_dropped_or_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plan, xml = planned("sphere_90x", seed=2)
+    plan.save(tmp_path / "plan.json")
+    (tmp_path / "model.xml").write_text(xml)
+    usual = [str(tmp_path / "plan.json"), "--mjcf", str(tmp_path / "model.xml"), "--hold-time", "0"]
+    assert main([*usual, "-o", str(tmp_path / "report.json")]) == 0
+    assert "KEPT" in capsys.readouterr().out
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert report["format"] == "regrasp-replay" and report["kept"] is True
+    assert main([*usual, "--mass-scale", "30", "--gravity", "down"]) == 1
+    assert "DROPPED" in capsys.readouterr().out
+    (tmp_path / "broken.json").write_text("{")
+    assert main([str(tmp_path / "broken.json")]) == 2
+    assert "not JSON" in capsys.readouterr().err
