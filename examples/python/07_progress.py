@@ -19,7 +19,7 @@ def watch(progress: regrasp.Progress) -> None:
 
 scene = regrasp.load_scene(SCENES / "six_finger_box_90x.toml")
 try:
-    # Improving for an hour, were it not for the callback; plans with rolling fingertips are not improved yet.
-    regrasp.plan(scene, improve=3600, settings={"transfer": "fixed"}, progress=watch)
+    # Improving for an hour, were it not for the callback.
+    regrasp.plan(scene, improve=3600, progress=watch)
 except Enough:
     print("stopped by the callback")

@@ -86,22 +86,7 @@ class InternalError(RegraspError):
 
 def _input_error(message: str, diagnostics: str) -> InputError:
     """Called by the native module, with the diagnostics as JSON."""
-    return InputError(
-        message,
-        tuple(
-            Diagnostic(
-                code=entry["code"],
-                file=entry["place"]["file"],
-                line=entry["place"]["line"],
-                column=entry["place"]["column"],
-                element=entry["element"],
-                problem=entry["problem"],
-                expected=entry["expected"],
-                fix=entry["fix"],
-            )
-            for entry in json.loads(diagnostics)
-        ),
-    )
+    return InputError(message, tuple(Diagnostic(**entry) for entry in json.loads(diagnostics)))
 
 
 def argument_error(function: str, name: str, problem: str, expected: str) -> InputError:

@@ -57,8 +57,8 @@ class Plan:
         self._native = native
         self.path: str | None = path
         """The file it was read from, or last saved to."""
-        self.scene_path: str | None = None
-        """The scene file it was planned for, when `plan` made it."""
+        # The scene it was planned for, when `plan` made it: path, packages, lenient.
+        self._source: tuple[str, dict[str, str], bool] | None = None
         self.report: Report | None = report
         """What the checker said when `plan` made it."""
         self.joint_names: tuple[str, ...] = tuple(fields["joint_names"])

@@ -14,7 +14,7 @@ from typing import Any, Literal
 from . import _regrasp
 from ._arguments import StrPath, real, seconds, seed_of, whole
 from ._errors import argument_error
-from ._model import Scene, load_scene
+from ._model import Scene, _load_scene, load_scene
 from ._plan import Plan
 from ._result import Failure, Progress, Report, failure_of, report_of
 
@@ -79,7 +79,7 @@ def plan(
     if found is None:
         return failure_of(outcome)
     made = Plan(found, report=report_of(json.loads(outcome)))
-    made.scene_path = scene.path
+    made._source = scene._source
     return made
 
 
@@ -107,8 +107,8 @@ def check(
     """Judges a plan in its scene, by the checker that knows no planner.
 
     plan: a plan, or a plan file.
-    scene: a scene, taken as it was read, or a scene file, which is read now; without it, the file that the plan was planned
-    for or names: beside the plan file, in one of the folders above it, or in the current folder.
+    scene: a scene, taken as it was read, or a scene file, which is read now; without it, the scene that `plan` planned for,
+    read afresh, or the file that the plan names: beside the plan file, in one of the folders above it, or in the current one.
     packages, lenient: as in `load_scene`, for scene files.
 
     Raises `InputError` for files that cannot be used. What is wrong with the plan is no exception but in the report.
@@ -144,7 +144,10 @@ def _with_scene(
     if not isinstance(plan, Plan):
         plan = Plan.from_file(plan)
     if scene is None:
-        scene = plan.scene_path or _regrasp.find_scene(plan._native, plan.path or "plan.json", os.getcwd())
+        if plan._source is not None:
+            scene = _load_scene(*plan._source)
+        else:
+            scene = _regrasp.find_scene(plan._native, plan.path or "plan.json", os.getcwd())
     if not isinstance(scene, Scene):
         scene = load_scene(scene, packages=packages, lenient=lenient)
     return plan, scene

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 from pathlib import Path
 
@@ -81,6 +82,23 @@ def test_arguments_that_make_no_sense(scene: regrasp.Scene, arguments, says: str
     assert caught.value.code in ("A503", "A504", "A510")
     (name,) = arguments
     assert name in caught.value.element or caught.value.element == 'argument "settings"'
+
+
+@pytest.mark.skipif(os.name != "posix", reason="names of files are text here")
+def test_names_that_are_not_utf_8(tmp_path: Path) -> None:
+    folder = tmp_path / os.fsdecode(b"caf\xe9")
+    try:
+        folder.mkdir()
+    except OSError:
+        pytest.skip("this file system wants UTF-8")
+    path = bad_scene(folder)
+    with pytest.raises(regrasp.InputError) as caught:
+        regrasp.load_scene(path)
+    assert caught.value.file.endswith("scene.toml") and caught.value.line
+    path.write_text((path.read_text()).replace("fricton", "friction").replace("mass = -1.0", "mass = 0.1"))
+    scene = regrasp.load_scene(path)
+    plan = regrasp.plan(scene)
+    assert plan and regrasp.check(plan).ok
 
 
 def test_numbers_of_numpy_are_numbers(scene: regrasp.Scene) -> None:

@@ -11,7 +11,7 @@ import pytest
 import regrasp
 
 # An hour of improving, were it not stopped.
-LONG = {"improve": 3600.0, "max_work": 10**15, "settings": {"transfer": "fixed"}}
+LONG = {"improve": 3600.0, "max_work": 10**15}
 
 
 def test_ctrl_c_stops_a_search(box: regrasp.Scene) -> None:
@@ -51,7 +51,7 @@ def test_what_a_callback_raises_stops_the_search(box: regrasp.Scene) -> None:
 
 def test_progress_is_told_by_the_thread_that_asked(box: regrasp.Scene) -> None:
     threads: set[int] = set()
-    found = regrasp.plan(box, improve_work=100_000, settings={"transfer": "fixed"}, threads=2, progress=lambda _: threads.add(threading.get_ident()))
+    found = regrasp.plan(box, improve_work=100_000, threads=2, progress=lambda _: threads.add(threading.get_ident()))
     assert found and threads == {threading.get_ident()}
 
 
@@ -69,7 +69,7 @@ def test_other_threads_run_meanwhile(box: regrasp.Scene) -> None:
     thread = threading.Thread(target=count)
     thread.start()
     started = time.monotonic()
-    regrasp.plan(box, improve_work=200_000, settings={"transfer": "fixed"})
+    regrasp.plan(box, improve_work=200_000)
     seconds = time.monotonic() - started
     over.set()
     thread.join()

@@ -111,7 +111,7 @@ def test_settings_of_a_plan_make_it_again(box: regrasp.Scene) -> None:
 
 
 def test_improvement_by_work_is_in_the_plan(box: regrasp.Scene) -> None:
-    better = regrasp.plan(box, seed=4, improve_work=30_000, settings={"transfer": "fixed"})
+    better = regrasp.plan(box, seed=4, improve_work=30_000)
     assert better and better.statistics["improvement"]["improved"]["cost"] <= better.statistics["improvement"]["first"]["cost"]
 
 

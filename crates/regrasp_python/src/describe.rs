@@ -14,7 +14,7 @@ pub fn scene(loaded: &LoadedScene, path: &Path) -> Value {
     let scene = &loaded.scene;
     json!({
         "name": scene.name,
-        "path": path,
+        "path": path.to_string_lossy(),
         "hand": hand(&scene.hand),
         "object": object(&scene.object),
         "gravity": scene.gravity.as_ref().map(gravity),
@@ -137,7 +137,7 @@ fn shape(shape: &Shape) -> Value {
 }
 
 fn input(input: &InputFile) -> Value {
-    json!({ "role": input.role, "name": input.name, "path": input.path, "sha256": input.sha256 })
+    json!({ "role": input.role, "name": input.name, "path": input.path.to_string_lossy(), "sha256": input.sha256 })
 }
 
 fn pose(pose: &Pose) -> Value {

@@ -3,11 +3,26 @@
 use pyo3::prelude::*;
 use regrasp::InputError;
 use regrasp::base::{Diagnostic, Place};
+use serde_json::{Value, json};
 
 /// `regrasp.InputError` with all its diagnostics.
 pub fn input(py: Python<'_>, error: &InputError) -> PyErr {
-    let diagnostics = serde_json::to_string(&error.diagnostics).unwrap_or_else(|_| "[]".into());
-    raised(py, "_input_error", (error.to_string(), diagnostics))
+    let diagnostics: Vec<Value> = error.diagnostics.iter().map(diagnostic).collect();
+    raised(py, "_input_error", (error.to_string(), Value::Array(diagnostics).to_string()))
+}
+
+fn diagnostic(diagnostic: &Diagnostic) -> Value {
+    json!({
+        "code": diagnostic.code,
+        // A name that is not UTF-8 is no reason to lose the rest.
+        "file": diagnostic.place.file.to_string_lossy(),
+        "line": diagnostic.place.line,
+        "column": diagnostic.place.column,
+        "element": diagnostic.element,
+        "problem": diagnostic.problem,
+        "expected": diagnostic.expected,
+        "fix": diagnostic.fix,
+    })
 }
 
 /// `regrasp.InputError` for an argument of a Python function that makes no sense.

@@ -86,8 +86,6 @@ const CENTERED: f64 = 1e-12;
 const NEARLY_CENTERED: f64 = 0.1;
 /// Square of the Newton decrement of a start that is far from the minimum.
 const FAR: f64 = 30.0;
-/// What the objective counts first from there, of what it counts in the end.
-const FIRST: f64 = 0.01;
 /// Forces that keep less from some limit count as none, in shares of the squeeze.
 const BAND: f64 = 1e-4;
 /// Relative length below which a row of the grasp map counts as combined of the others.
@@ -175,7 +173,7 @@ impl<const D: usize> Program<D> {
             point.at(self, &forces, 0.0, wish);
             let (mut step, mut decrement) = point.step.solve(&point.descent, &self.rest(&forces));
             if count == 0 && decrement > FAR {
-                wish = FIRST * last_wish;
+                wish = last_wish * FAR / decrement;
                 point.at(self, &forces, 0.0, wish);
                 (step, decrement) = point.step.solve(&point.descent, &self.rest(&forces));
             }

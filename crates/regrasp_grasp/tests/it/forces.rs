@@ -403,3 +403,32 @@ fn room_for_any_direction_is_enough_for_every_one() {
     let pair = [grip([0.03, 0.0, 0.0], ContactModel::Point), grip([-0.03, 0.0, 0.0], ContactModel::Point)];
     assert!(reserves(&pair, &[], &CENTERED, 1.0).is_none());
 }
+
+#[test]
+fn any_scale_of_forces_will_do() {
+    let mut rng = Rng::keyed(5, "forces", 0);
+    for (least, largest, squeeze, heaviest) in [
+        (0.0, 1e4, 4.0, 3.0),
+        (0.0, 15.0, 0.01, 0.1),
+        (2.0, 2.5, 2.2, 0.3),
+        (1e-3, 1e-2, 4e-3, 1e-3),
+        (100.0, 1000.0, 300.0, 200.0),
+    ] {
+        let limits = ForceLimits { least, largest, squeeze, squeeze_weight: 0.2 };
+        let mut n_found = 0;
+        for _ in 0..200 {
+            let models = models(4, &mut rng);
+            let grips = grips(&models, &mut rng);
+            let joints = joints(4, 0.08 * largest, &mut rng);
+            let load = Wrench::at_center_of_mass(Vector::from(rng.direction()) * rng.uniform(0.0, heaviest));
+            let problem = ForceProblem { limits, ..problem(&grips, &joints, load) };
+            let forces = distribute(&problem, None);
+            assert_eq!(forces.is_ok(), can_balance(&problem), "{limits:?}");
+            if let Ok(forces) = forces {
+                assert_good(&problem, &forces);
+                n_found += 1;
+            }
+        }
+        assert!(n_found > 10, "{limits:?}: {n_found}");
+    }
+}

@@ -150,7 +150,7 @@ fn shares_of(right_inverse: &DMatrix<f64>, cones: &[Range<usize>]) -> Vec<f64> {
 
 /// The grasp map and the columns of each contact in it: its pushing direction `-n`; with friction two tangents; for a
 /// soft finger the moment of its torsion radius about the normal.
-fn grasp_map(grips: &[Grip], body: &Body) -> (DMatrix<f64>, Vec<Range<usize>>) {
+pub fn grasp_map(grips: &[Grip], body: &Body) -> (DMatrix<f64>, Vec<Range<usize>>) {
     let mut columns: Vec<[Vector; 2]> = Vec::new();
     let mut cones = Vec::new();
     for grip in grips {
@@ -172,8 +172,8 @@ fn grasp_map(grips: &[Grip], body: &Body) -> (DMatrix<f64>, Vec<Range<usize>>) {
     (DMatrix::from_fn(6, columns.len(), |row, column| columns[column][row / 3][row % 3]), cones)
 }
 
-/// The pseudo-inverse of a grasp map of full rank.
-fn right_inverse(grasp_map: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+/// The pseudo-inverse of a grasp map of full rank: the right inverse of least norm.
+pub fn right_inverse(grasp_map: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let gram = Matrix6::from_iterator((grasp_map * grasp_map.transpose()).iter().copied());
     let eigen = gram.symmetric_eigen();
     let floor = SMALLEST_SINGULAR_VALUE * SMALLEST_SINGULAR_VALUE;

@@ -6,6 +6,7 @@
 //! and limits are convex, so that the ends are all that has to be looked at.
 
 use crate::check::continuity::{contact_of, moving_finger, pose_between};
+use crate::check::kinematics::DrivenAxis;
 use crate::check::model::Model;
 use crate::check::rolling::Roll;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
@@ -35,16 +36,16 @@ pub struct Balance {
 
 /// What one finger exerts at one waypoint.
 #[derive(Debug, Clone, Copy)]
-struct Exerted {
-    finger: usize,
-    point: Point,
-    normal: Vector,
-    force: Vector,
-    torsion: f64,
+pub(super) struct Exerted {
+    pub(super) finger: usize,
+    pub(super) point: Point,
+    pub(super) normal: Vector,
+    pub(super) force: Vector,
+    pub(super) torsion: f64,
 }
 
 impl Exerted {
-    fn pressing(&self) -> f64 {
+    pub(super) fn pressing(&self) -> f64 {
         -self.force.dot(&self.normal)
     }
 
@@ -80,6 +81,10 @@ pub fn check_forces(
                 judge.check_contact(one, moving, at, log);
             }
             judge.check_torques(waypoint, &exerted, at, log);
+            if promises.gravity_in_world.is_none() {
+                let held: Vec<Exerted> = exerted.into_iter().filter(|one| moving != Some(one.finger)).collect();
+                judge.check_room(waypoint, &held, promises.mass * GRAVITY, at, log);
+            }
         }
         for w in 1..segment.waypoints.len() {
             let half_way = judge.check_half_way(segment, Moment::at(s, w - 1), log);
@@ -145,24 +150,15 @@ fn check_promises(scene: &Scene, model: &Model, promises: &ForcePromises, log: &
     for limit in promises.joint_torques.iter().flatten().filter(|limit| **limit < 0.0) {
         broken("joint_torques", *limit, 0.0, format!("a torque limit of {limit}"));
     }
-    if promises.gravity_in_world.is_none() {
-        check_room_for_any_gravity(log);
-    }
 }
 
-/// Forces of plans that hold whatever the direction of gravity balance no weight and leave room for that of every
-/// direction. How much room, the format does not say yet; until it does, such plans are not accepted.
-fn check_room_for_any_gravity(log: &mut Log) {
-    let message = "forces for gravity of any direction cannot be judged by this version";
-    log.push(Violation::new(Kind::ForceUnbalanced, message).subjects(["gravity_in_world"]));
-}
-
-struct Judge<'a> {
-    object: &'a Object,
-    model: &'a Model,
-    plan: &'a Plan,
-    promises: &'a ForcePromises,
-    settings: &'a CheckSettings,
+/// What everything is judged by.
+pub(super) struct Judge<'a> {
+    pub(super) object: &'a Object,
+    pub(super) model: &'a Model,
+    pub(super) plan: &'a Plan,
+    pub(super) promises: &'a ForcePromises,
+    pub(super) settings: &'a CheckSettings,
 }
 
 impl Judge<'_> {
@@ -239,18 +235,9 @@ impl Judge<'_> {
             }
             return;
         }
-        let friction = self.plan.promises.friction.min(self.object.friction);
         let pressing = one.pressing();
-        let (across, room) = match finger.contact {
-            ContactModel::Frictionless => (one.tangential().max(one.torsion.abs() / self.object.radius), 0.0),
-            // With no friction every contact is frictionless.
-            ContactModel::SoftFinger { torsion_radius } if friction > 0.0 => {
-                (one.tangential().hypot(one.torsion / torsion_radius), friction * pressing)
-            }
-            // No torsion at all: any counts as if it were sliding by itself.
-            _ if one.torsion != 0.0 => (f64::INFINITY, friction * pressing),
-            _ => (one.tangential(), friction * pressing),
-        };
+        let across = self.across(one);
+        let room = if finger.contact == ContactModel::Frictionless { 0.0 } else { self.friction() * pressing };
         if across > room + tolerance {
             let message = format!(
                 "finger \"{}\" exerts {across:.4e} N across the normal (torsion over its radius counted), {room:.4e} N are left by friction",
@@ -266,6 +253,51 @@ impl Judge<'_> {
         }
     }
 
+    /// Friction counted on.
+    pub(super) fn friction(&self) -> f64 {
+        self.plan.promises.friction.min(self.object.friction)
+    }
+
+    /// The torsion radius of a soft finger; zero where no torsion is transmitted.
+    pub(super) fn torsion_radius(&self, one: &Exerted) -> f64 {
+        match self.model.fingers[one.finger].contact {
+            ContactModel::SoftFinger { torsion_radius } if self.friction() > 0.0 => torsion_radius,
+            _ => 0.0,
+        }
+    }
+
+    /// Length of tangential force and torsion over torsion radius; infinite for torsion that is not transmitted.
+    pub(super) fn across(&self, one: &Exerted) -> f64 {
+        match self.torsion_radius(one) {
+            _ if one.torsion == 0.0 => one.tangential(),
+            0.0 => f64::INFINITY,
+            radius => one.tangential().hypot(one.torsion / radius),
+        }
+    }
+
+    /// Work of a force and a couple of one finger, in the object frame, per unit of each coordinate: coordinate, torque,
+    /// and force times the largest lever arm. The force acts where the tip touches, which is the contact within the contact
+    /// tolerance.
+    pub(super) fn torques(
+        &self,
+        world_from_object: &Pose,
+        waypoint: &Waypoint,
+        one: &Exerted,
+        force: &Vector,
+        couple: &Vector,
+    ) -> Vec<(usize, f64, f64)> {
+        let finger = &self.model.fingers[one.finger];
+        let point = finger.center_in_world(&waypoint.joints) - world_from_object * one.normal * finger.radius;
+        let (force, couple) = (world_from_object * force, world_from_object * couple);
+        let axes = finger.path.axes(&waypoint.joints);
+        let arm = axes.iter().map(|axis| (point - axis.origin).norm()).fold(0.0, f64::max);
+        let torque = |axis: &DrivenAxis| {
+            let size = if axis.slides { force.norm() } else { force.norm() * arm + couple.norm() };
+            (axis.coordinate, axis.work(&force, &point, &couple), size * axis.multiplier.abs())
+        };
+        axes.iter().map(torque).collect()
+    }
+
     /// Torques by virtual work: a coordinate's is the work of force and torsion per unit of it, over all joints that it
     /// drives. Joints of free fingers make none.
     fn check_torques(&self, waypoint: &Waypoint, exerted: &[Exerted], at: Moment, log: &mut Log) {
@@ -273,17 +305,10 @@ impl Judge<'_> {
         let mut expected = vec![0.0; waypoint.joint_torques.len()];
         let mut tolerance = vec![TORQUE_ROUNDING; expected.len()];
         for one in exerted {
-            let finger = &self.model.fingers[one.finger];
-            let (force, couple) = (world_from_object * one.force, world_from_object * one.normal * one.torsion);
-            // The point of the tip that touches: it is the contact within the contact tolerance.
-            let touching = world_from_object * one.normal * finger.radius;
-            let point = finger.center_in_world(&waypoint.joints) - touching;
-            let axes = finger.path.axes(&waypoint.joints);
-            let arm = axes.iter().map(|axis| (point - axis.origin).norm()).fold(0.0, f64::max);
-            for axis in axes {
-                expected[axis.coordinate] += axis.work(&force, &point, &couple);
-                let size = if axis.slides { force.norm() } else { force.norm() * arm + couple.norm() };
-                tolerance[axis.coordinate] += self.settings.torque_tolerance * size * axis.multiplier.abs();
+            let couple = one.normal * one.torsion;
+            for (coordinate, torque, size) in self.torques(&world_from_object, waypoint, one, &one.force, &couple) {
+                expected[coordinate] += torque;
+                tolerance[coordinate] += self.settings.torque_tolerance * size;
             }
         }
         for (k, name) in self.plan.joint_names.iter().enumerate() {

@@ -3,6 +3,8 @@
 //! It shares no decision with the planner: own forward kinematics from the robot's joints, own closed forms of
 //! surfaces, force closure by exact cones with a certificate, distances by parry, and motion bounds between waypoints.
 
+/// Room for the weight in every direction.
+mod any_gravity;
 /// Everything that can collide, and which pairs must not.
 pub mod bodies;
 /// Force closure with margin, by exact second-order cones.

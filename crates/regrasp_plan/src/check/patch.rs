@@ -15,7 +15,14 @@ pub enum Patch<'a> {
     /// All of a primitive.
     Primitive(&'a Shape),
     /// Triangles of a polyhedron; possibly none.
-    Triangles(Vec<[Point; 3]>),
+    Triangles(Vec<Facet>),
+}
+
+/// A triangle, and how far from its first corner it reaches.
+#[derive(Debug, Clone, Copy)]
+pub struct Facet {
+    corners: [Point; 3],
+    reach: f64,
 }
 
 impl<'a> Patch<'a> {
@@ -26,12 +33,12 @@ impl<'a> Patch<'a> {
             Shape::Mesh(mesh) => (mesh.vertices(), mesh.triangles()),
             primitive => return Patch::Primitive(primitive),
         };
-        let comes_near = |[a, b, c]: &[Point; 3]| {
-            let length = (b - a).norm_squared().max((c - a).norm_squared()).sqrt();
-            (a - center).norm() <= reach + length
-        };
-        let corners = triangles.iter().map(|triangle| triangle.map(|i| vertices[i as usize]));
-        Patch::Triangles(corners.filter(comes_near).collect())
+        let facets = triangles.iter().map(|triangle| {
+            let corners = triangle.map(|i| vertices[i as usize]);
+            let [a, b, c] = &corners;
+            Facet { reach: (b - a).norm_squared().max((c - a).norm_squared()).sqrt(), corners }
+        });
+        Patch::Triangles(facets.filter(|facet| (facet.corners[0] - center).norm() <= reach + facet.reach).collect())
     }
 
     /// The point of the patch that is nearest to `point`; none when the patch is empty.
@@ -40,10 +47,22 @@ impl<'a> Patch<'a> {
     pub fn foot(&self, point: &Point) -> Option<Point> {
         match self {
             Patch::Primitive(shape) => Some(foot_on(shape, point)),
-            Patch::Triangles(triangles) => triangles
-                .iter()
-                .map(|corners| nearest_on_triangle(point, corners))
-                .min_by(|a, b| (a - point).norm_squared().total_cmp(&(b - point).norm_squared())),
+            Patch::Triangles(facets) => {
+                let mut nearest: Option<(f64, Point)> = None;
+                for Facet { corners, reach } in facets {
+                    let best = nearest.map_or(f64::INFINITY, |(distance, _)| distance);
+                    // No point of the triangle is nearer than this.
+                    if (corners[0] - point).norm() - reach > best {
+                        continue;
+                    }
+                    let foot = nearest_on_triangle(point, corners);
+                    let distance = (foot - point).norm();
+                    if distance < best {
+                        nearest = Some((distance, foot));
+                    }
+                }
+                nearest.map(|(_, foot)| foot)
+            }
         }
     }
 }

@@ -73,35 +73,50 @@ fn tip_center(f: usize, waypoint: &Waypoint) -> Point {
 }
 
 fn add_forces(waypoint: &mut Waypoint, moving: Option<usize>, scene: &Scene) {
+    for contact in waypoint.contacts.iter_mut().filter(|contact| contact.holds()) {
+        contact.force_in_object = Some([0.0; 3]);
+    }
+    let held = |&f: &usize| Some(f) != moving && waypoint.contacts[f].holds();
+    let holding: Vec<usize> = (0..sample::N_FINGERS).filter(held).collect();
+    let points: Vec<Vector> =
+        holding.iter().map(|&f| Vector::from(waypoint.contacts[f].point_in_object.unwrap())).collect();
+    let centroid = points.iter().sum::<Vector>() / points.len() as f64;
+    for (f, point) in holding.into_iter().zip(points) {
+        waypoint.contacts[f].force_in_object = Some(((centroid - point) * SQUEEZE).into());
+    }
+    carry(waypoint, moving, scene, &(Vector::from(GRAVITY_IN_WORLD) * scene.object.mass));
+}
+
+/// Adds the shortest forces and torsions that balance `weight`, which is in the world.
+fn carry(waypoint: &mut Waypoint, moving: Option<usize>, scene: &Scene, weight: &Vector) {
     let pose = Pose::from(&waypoint.world_from_object);
-    let weight = pose.rotation.inverse() * Vector::from(GRAVITY_IN_WORLD) * scene.object.mass;
+    let weight = pose.rotation.inverse() * weight;
     let holding: Vec<usize> =
         (0..sample::N_FINGERS).filter(|&f| Some(f) != moving && waypoint.contacts[f].holds()).collect();
     let contacts: Vec<_> = holding.iter().map(|&f| contact_of(&waypoint.contacts[f]).unwrap()).collect();
-    let centroid = contacts.iter().map(|c| c.point_in_object.coords).sum::<Vector>() / contacts.len() as f64;
-    // Columns: three of force for each contact, and one of torsion.
+    let torsion_radius = |f: usize| match scene.hand.fingers[f].tip.contact {
+        ContactModel::SoftFinger { torsion_radius } => torsion_radius,
+        _ => 0.0,
+    };
+    // Columns: three of force for each contact, and one of torsion over torsion radius.
     let mut map = DMatrix::<f64>::zeros(6, 4 * contacts.len());
-    for (i, contact) in contacts.iter().enumerate() {
+    for (i, (&f, contact)) in holding.iter().zip(&contacts).enumerate() {
         let arm = contact.point_in_object - scene.object.center_of_mass;
         map.view_mut((0, 4 * i), (3, 3)).fill_with_identity();
         map.view_mut((3, 4 * i), (3, 3)).copy_from(&arm.cross_matrix());
-        if matches!(scene.hand.fingers[holding[i]].tip.contact, ContactModel::SoftFinger { .. }) {
-            map.view_mut((3, 4 * i + 3), (3, 1)).copy_from(&contact.normal_in_object.into_inner());
-        }
+        map.view_mut((3, 4 * i + 3), (3, 1)).copy_from(&(contact.normal_in_object.into_inner() * torsion_radius(f)));
     }
     let mut load = DVector::zeros(6);
     load.rows_mut(0, 3).copy_from(&-weight);
     // The centre of mass is the origin, and the weight has no moment about it.
     let carrying = map.svd(true, true).solve(&load, 1e-12).unwrap();
-    for (i, (&f, contact)) in holding.iter().zip(&contacts).enumerate() {
-        let inward = (centroid - contact.point_in_object.coords) * SQUEEZE;
-        waypoint.contacts[f].force_in_object = Some((inward + carrying.fixed_rows::<3>(4 * i)).into());
-        if matches!(scene.hand.fingers[f].tip.contact, ContactModel::SoftFinger { .. }) {
-            waypoint.contacts[f].torsion = Some(carrying[4 * i + 3]);
+    for (i, &f) in holding.iter().enumerate() {
+        let state = &mut waypoint.contacts[f];
+        let force = Vector::from(state.force_in_object.unwrap()) + carrying.fixed_rows::<3>(4 * i);
+        state.force_in_object = Some(force.into());
+        if torsion_radius(f) > 0.0 {
+            state.torsion = Some(carrying[4 * i + 3] * torsion_radius(f));
         }
-    }
-    if let Some(f) = moving.filter(|&f| waypoint.contacts[f].holds()) {
-        waypoint.contacts[f].force_in_object = Some([0.0; 3]);
     }
 }
 
@@ -172,12 +187,46 @@ fn what_is_balanced_at_waypoints_far_apart_is_not_in_between() {
     assert!(((half_way(&far) / half_way(&near)).log2() - 2.0).abs() < 0.2);
 }
 
+/// Forces that balance nothing, for gravity of any direction.
+pub fn any_gravity_plan(scene: &Scene) -> Plan {
+    let mut weightless = scene.clone();
+    weightless.object.mass = 0.0;
+    let mut plan = load(crate::rolled::plan(scene, 10), &weightless);
+    let forces = plan.promises.forces.as_mut().unwrap();
+    (forces.mass, forces.gravity_in_world) = (scene.object.mass, None);
+    forces.normal_force = [0.5, 8.0];
+    plan
+}
+
 #[test]
-fn gravity_of_any_direction_is_not_accepted_yet() {
-    let scene = sample::scene();
-    let mut plan = plan(&scene);
-    plan.promises.forces.as_mut().unwrap().gravity_in_world = None;
-    assert_eq!(kinds(&scene, &plan), [ViolationKind::ForceUnbalanced]);
+fn room_for_every_direction_is_room_for_each() {
+    let mut rng = regrasp_base::Rng::keyed(1, "directions", 0);
+    for scene in [sample::scene(), sample::soft_scene()] {
+        let mut plan = any_gravity_plan(&scene);
+        assert!(judge(&scene, &plan).accepted(), "{:#?}", judge(&scene, &plan));
+        // The shortest forces that carry a weight, on top.
+        let down = Vector::from(rng.direction()) * 9.80665;
+        let squeezed = plan.clone();
+        for segment in &mut plan.segments {
+            let moving = segment.moving_finger.as_ref().map(|name| name[1..].parse::<usize>().unwrap());
+            for waypoint in &mut segment.waypoints {
+                carry(waypoint, moving, &scene, &(down * scene.object.mass));
+                add_torques(waypoint);
+            }
+        }
+        plan.promises.forces.as_mut().unwrap().gravity_in_world = Some(down.into());
+        assert!(judge(&scene, &plan).accepted(), "{:#?}", judge(&scene, &plan));
+        // A heavier object leaves too little room, for one limit or the other.
+        let mut plan = squeezed;
+        let mut heavy = scene.clone();
+        heavy.object.mass *= 20.0;
+        plan.promises.forces.as_mut().unwrap().mass *= 20.0;
+        let found = kinds(&heavy, &plan);
+        assert!(found.contains(&ViolationKind::ForceOutsideCone), "{found:?}");
+        assert!(found.contains(&ViolationKind::NormalForceOutOfRange), "{found:?}");
+        plan.promises.forces.as_mut().unwrap().joint_torques.fill(Some(0.4));
+        assert!(kinds(&heavy, &plan).contains(&ViolationKind::TorqueLimit));
+    }
 }
 
 #[test]

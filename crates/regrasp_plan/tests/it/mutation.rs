@@ -18,11 +18,12 @@ fn every_mutant_is_rejected_for_a_fitting_reason() {
         (&scene, crate::rolled::plan(&scene, 10)),
         (&scene, loaded[0].clone()),
         (&soft, loaded[1].clone()),
+        (&scene, crate::loaded::any_gravity_plan(&scene)),
     ];
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     let mut kinds = BTreeSet::new();
     let mut wrong = Vec::new();
-    for round in 0..54 {
+    for round in 0..56 {
         let (scene, plan) = &plans[round as usize % plans.len()];
         let query = sample::query(plan);
         for mutant in mutants(plan, scene, &mut Rng::keyed(1, "mutation", round)) {
@@ -65,6 +66,8 @@ fn every_mutant_is_rejected_for_a_fitting_reason() {
         "hard fingertip exerts torsion",
         "torque limit promised above the robot's",
         "a step too fast",
+        "no torque left for the weight of some direction",
+        "squeezed too little for the weight of some direction",
         "no time for forces to change",
         "joint acceleration promised below the motion's",
         "velocity with which the motion turns back",

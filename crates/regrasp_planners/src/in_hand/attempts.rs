@@ -2,7 +2,7 @@
 
 use super::model::Model;
 use super::search::{Search, Stop};
-use super::tally::{Reason, Tally};
+use super::tally::Tally;
 use crate::failure::{Failure, NearestMiss};
 use rayon::prelude::*;
 use regrasp_base::Interrupt;
@@ -32,12 +32,8 @@ pub struct Left {
 impl Left {
     /// What `search` leaves.
     pub fn of(search: &Search) -> Self {
-        let mut tally = search.tally.clone();
-        for (cause, count) in search.workspace.refusals.counts() {
-            tally.add_many(Reason::NoForces(cause), count);
-        }
         Left {
-            tally,
+            tally: search.whole_tally(),
             work: search.workspace.work,
             n_nodes: search.n_nodes,
             n_samples: search.n_samples,

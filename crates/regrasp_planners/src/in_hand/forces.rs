@@ -196,6 +196,11 @@ pub struct Refusals {
 const CAUSE_EVERY: u64 = 16;
 
 impl Refusals {
+    /// How many there were.
+    pub fn n_seen(&self) -> u64 {
+        self.n_seen
+    }
+
     /// Causes and how often each was seen.
     pub fn counts(&self) -> impl Iterator<Item = (Unbalanced, u64)> + '_ {
         self.counts.iter().map(|(&cause, &count)| (cause, count))
@@ -219,7 +224,7 @@ pub fn balances(
         return true;
     }
     let refusals = &mut workspace.refusals;
-    if refusals.n_seen % CAUSE_EVERY == 0
+    if refusals.n_seen.is_multiple_of(CAUSE_EVERY)
         && let Err(cause) = held.forces(model, forces, None)
     {
         *refusals.counts.entry(cause).or_default() += CAUSE_EVERY;

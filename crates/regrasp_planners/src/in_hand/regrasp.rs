@@ -15,6 +15,8 @@ use regrasp_robot::kinematics::finger_ik::Coordinates;
 pub struct Tried {
     /// (options of all fingers before, finger, option after) and the path, if there is one.
     known: Vec<(Choice, usize, usize, Option<Vec<Coordinates>>)>,
+    /// True when one was refused as the others cannot balance the weight: that is counted by itself.
+    pub lacks_forces: bool,
 }
 
 impl Tried {
@@ -185,6 +187,7 @@ fn try_relocation(
     }
     let others = state.holding & !(1 << finger);
     if !balances(workspace, &state.world_from_object, &state.joints, &state.contacts, others) {
+        tried.lacks_forces = true;
         tried.known.push((current.clone(), finger, option, None));
         return tried.known.len() - 1;
     }

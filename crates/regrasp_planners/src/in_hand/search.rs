@@ -5,7 +5,7 @@ use super::candidates::draw_pose;
 use super::model::Model;
 use super::passage::Passages;
 use super::state::GraspState;
-use super::tally::Tally;
+use super::tally::{Reason, Tally};
 use super::workspace::Workspace;
 use crate::failure::FailureKind;
 use regrasp_base::{Budget, Interrupt, Rng};
@@ -123,6 +123,15 @@ impl<'a> Search<'a> {
         (self.leg, self.start, self.goal) = (leg, start, goal);
         (self.nearest, self.n_nodes) = (None, 0);
         self.passages = Passages::of(self.model(), [&start, &goal]);
+    }
+
+    /// Why attempts failed, with the grasps that were refused for want of forces.
+    pub fn whole_tally(&self) -> Tally {
+        let mut tally = self.tally.clone();
+        for (cause, count) in self.workspace.refusals.counts() {
+            tally.add_many(Reason::NoForces(cause), count);
+        }
+        tally
     }
 
     /// The scene, prepared.

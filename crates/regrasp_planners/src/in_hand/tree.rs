@@ -199,6 +199,7 @@ fn extend(search: &mut Search, tree: &mut Tree, node: usize, target: &Pose) -> O
             regrasp(&mut search.workspace, &state, &options, &combination.choice, &mut table, &mut tried, &mut rng);
         match way {
             Some(way) => return advance(search, tree, node, target, way),
+            None if tried.lacks_forces => {}
             None => note_stuck(search, &mut table, &combination.choice),
         }
     }
@@ -255,14 +256,17 @@ fn advance(search: &mut Search, tree: &mut Tree, parent: usize, target: &Pose, m
     let from = way.end().clone();
     let mut place = tree.nodes[parent].place;
     let mut moments = Vec::new();
+    let n_refused = search.workspace.refusals.n_seen();
     let share = transfer(&mut search.workspace, &from, target, &mut moments);
+    // What no forces balance is counted by itself.
+    let lacks_forces = search.workspace.refusals.n_seen() > n_refused;
     if share < 1.0 {
         back_off(search, &from, &mut moments);
     }
     if let (Some(last), true) = (moments.last(), share > LEAST_SHARE) {
         place = tree.add_place(search, &last.world_from_object);
         way.push_transfer(moments);
-    } else {
+    } else if !lacks_forces {
         match search.workspace.blocking_pair.take() {
             Some(pair) => search.tally.add(Reason::TooNear(pair)),
             None => search.tally.add(Reason::OutOfReach),

@@ -100,6 +100,30 @@ impl Breeder<'_> {
             range[0] = least * rng.uniform(1.0001, 1.01);
             (range[0] < range[1] && least > 0.1).then_some(())
         });
+        self.add("no torque left for the weight of some direction", &[TorqueLimit], |plan, rng| {
+            let k = rng.below(model.joint_names.len());
+            let largest = waypoints(plan).filter_map(|w| w.joint_torques.get(k)).fold(0.0, |a: f64, b| a.max(b.abs()));
+            let forces = promises(plan).filter(|forces| forces.gravity_in_world.is_none())?;
+            forces.joint_torques[k] = Some(largest * rng.uniform(1.0001, 1.001));
+            (largest > 0.05).then_some(())
+        });
+        self.add(
+            "squeezed too little for the weight of some direction",
+            &[NormalForceOutOfRange, ForceOutsideCone],
+            |plan, rng| {
+                // Nothing is lifted, so forces stay in balance when all are smaller.
+                promises(plan).filter(|forces| forces.gravity_in_world.is_none())?.normal_force[0] = 0.0;
+                let factor = rng.uniform(0.001, 0.01);
+                for waypoint in plan.segments.iter_mut().flat_map(|segment| &mut segment.waypoints) {
+                    for contact in &mut waypoint.contacts {
+                        contact.force_in_object.iter_mut().flatten().for_each(|x| *x *= factor);
+                        contact.torsion.iter_mut().for_each(|x| *x *= factor);
+                    }
+                    make_torques(model, waypoint);
+                }
+                Some(())
+            },
+        );
         self.add("limits for one joint too few", &[WrongScene], |plan, _| {
             promises(plan)?.joint_torques.pop().map(|_| ())
         });

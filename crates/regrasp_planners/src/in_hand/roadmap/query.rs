@@ -4,6 +4,7 @@
 use super::super::endpoints::{End, given_grasp, object_blocked_by, refuse_buried_object};
 use super::super::model::Model;
 use super::super::record::Recorder;
+use super::super::refuse_two_gravities;
 use super::super::search::{Search, Stop};
 use super::super::settings::InHandSettings;
 use super::super::shorten::{Arrival, transfer_regrasp};
@@ -113,6 +114,7 @@ impl<'a> RoadmapPlanner<'a> {
         let model = &self.model;
         let poses = (query.world_from_object_start, query.world_from_object_goal);
         refuse_way_poses(query)?;
+        refuse_two_gravities(model.scene, &model.settings)?;
         refuse_buried_object(model, End::Start, &poses.0)?;
         refuse_buried_object(model, End::Goal, &poses.1)?;
         let mut rng = Rng::keyed(seed, "given_grasps", 0);
@@ -290,7 +292,7 @@ impl<'a> RoadmapPlanner<'a> {
             kind: FailureKind::NotConnected,
             message,
             advice: "build the roadmap with more places, or over a region that holds start and goal".into(),
-            causes: search.tally.causes(&self.model),
+            causes: search.whole_tally().causes(&self.model),
             leg: None,
             nearest_miss: None,
             statistics: Statistics { work: search.workspace.work, ..Statistics::default() },
