@@ -44,6 +44,7 @@ class Job:
     friction_scale: float
     mass_scale: float
     speed: float
+    torsion: float | None
     noslip: bool
     packages: tuple[tuple[str, str], ...]
     settings: str
@@ -58,7 +59,9 @@ class Job:
 
     def result_path(self, controller: str) -> Path:
         """Where the result of a replay is kept."""
-        conditions = f"f{self.friction_scale:g}-m{self.mass_scale:g}-v{self.speed:g}{'' if self.noslip else '-creep'}"
+        conditions = f"f{self.friction_scale:g}-m{self.mass_scale:g}-v{self.speed:g}"
+        conditions += "" if self.torsion is None else f"-t{self.torsion:g}"
+        conditions += "" if self.noslip else "-creep"
         place = Path(self.folder) / "results" / self.variant / Path(self.scene).stem / f"{controller}-{conditions}"
         return place / f"{self.gravity}-{self.seed}.json"
 
@@ -90,6 +93,7 @@ def _replay(job: Job, controllers: Sequence[str]) -> None:
             "friction_scale": job.friction_scale,
             "mass_scale": job.mass_scale,
             "speed": job.speed,
+            "torsion": job.torsion,
             "noslip": job.noslip,
             "planned": plan is not None,
             "cause": cause,
@@ -101,6 +105,7 @@ def _replay(job: Job, controllers: Sequence[str]) -> None:
                 friction_scale=job.friction_scale,
                 mass_scale=job.mass_scale,
                 speed=job.speed,
+                torsion=job.torsion,
                 noslip=job.noslip,
             )
             xml = regrasp.export_mjcf(plan, scene)
@@ -179,7 +184,7 @@ def _write(path: Path, text: str) -> None:
 
 def table(rows: Iterable[dict[str, Any]]) -> str:
     """A Markdown table: one line per scene, kind of plan, gravity, controller and conditions."""
-    keys = ("scene", "variant", "gravity", "controller", "friction_scale", "mass_scale", "speed", "noslip")
+    keys = ("scene", "variant", "gravity", "controller", "friction_scale", "mass_scale", "speed", "torsion", "noslip")
     groups: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
     for row in rows:
         groups.setdefault(tuple(row[key] for key in keys), []).append(row)
@@ -188,8 +193,8 @@ def table(rows: Iterable[dict[str, Any]]) -> str:
         "final median | final worst | slip median, worst | contacts lost | unplanned contacts | hold drift worst |",
         "|" + "---|" * 15,
     ]
-    for group, members in sorted(groups.items()):
-        scene, variant, gravity, controller, friction, mass, speed, noslip = group
+    for group, members in sorted(groups.items(), key=lambda item: [str(value) for value in item[0]]):
+        scene, variant, gravity, controller, friction, mass, speed, torsion, noslip = group
         seen = [row for row in members if row["planned"]]
         kept = [row for row in seen if row["kept"]]
         conditions = [
@@ -198,6 +203,7 @@ def table(rows: Iterable[dict[str, Any]]) -> str:
                 (f"friction x {friction:g}", friction == 1.0),
                 (f"mass x {mass:g}", mass == 1.0),
                 (f"speed x {speed:g}", speed == 1.0),
+                (f"torsion {1e3 * (torsion or 0.0):g} mm", torsion is None),
                 ("noslip off", noslip),
             )
             if not usual
@@ -235,6 +241,12 @@ def main(arguments: list[str] | None = None) -> int:
     """Runs the command; returns the exit code."""
     options = _parser().parse_args(arguments)
     settings: dict[str, Any] = json.loads(options.settings.read_text()) if options.settings else {}
+    options.output.mkdir(parents=True, exist_ok=True)
+    made_with = options.output / "settings.json"
+    if made_with.exists() and json.loads(made_with.read_text()) != settings:
+        print(f"error: the plans in {options.output} were made with other settings ({made_with})", file=sys.stderr)
+        return 2
+    _write(made_with, json.dumps(settings))
     jobs = [
         Job(
             scene=str(scene),
@@ -245,6 +257,7 @@ def main(arguments: list[str] | None = None) -> int:
             friction_scale=friction,
             mass_scale=mass,
             speed=speed,
+            torsion=options.torsion,
             noslip=not options.no_noslip,
             packages=tuple((name, str(folder)) for name, folder in options.package),
             settings=json.dumps(settings),
@@ -314,6 +327,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--friction-scale", type=scales, default=[1.0])
     parser.add_argument("--mass-scale", type=scales, default=[1.0])
     parser.add_argument("--speed", type=scales, default=[1.0])
+    parser.add_argument("--torsion", type=float, metavar="M", help="torsional friction of all fingertips, in metres")
     parser.add_argument("--no-noslip", action="store_true", help="without MuJoCo's solver against creep")
     parser.add_argument("--settings", type=Path, metavar="FILE.json", help="settings of the planner")
     parser.add_argument("--time-limit", type=float, default=60.0, metavar="S", help="for one plan [default: 60]")
