@@ -11,6 +11,11 @@ from .reference import Array, Reference, held_at_waypoints, quat_inverse, quat_p
 
 #: Largest offset of a fingertip by feedback, in metres.
 LARGEST_OFFSET = 0.01
+#: Share of its planned normal force that feedback may take from a finger. A pose error that only a pull could mend, because
+#: friction holds the object where it is, would else end with the contact lost.
+LARGEST_RELIEF = 0.5
+#: Speed at which a tip that retreated too far comes back, in metres per second.
+RETURN_SPEED = 0.005
 #: Time in which a free finger takes up the error of the object, in seconds.
 FREE_FOLLOW_TIME = 0.05
 
@@ -22,6 +27,7 @@ class Controller:
         jacobians, contacts = contact_jacobians(rig)
         self._inverses = inverses(jacobians)
         self._contacts = contacts
+        self._jacobians = jacobians
         self.torques = ref.blend(_torques(rig, jacobians, contacts, settings))
         """Fed forward, at every tick."""
         targets = ref.joints
@@ -37,7 +43,8 @@ class Controller:
 
     def feedback(self, rig: Rig, ref: Reference, settings: Settings) -> Feedback:
         """A fresh feedback loop over these commands."""
-        return Feedback(rig, ref, settings, self.commands, self._inverses, ref.blend(self._contacts))
+        retreats = _largest_retreats(rig, self._jacobians)
+        return Feedback(rig, ref, settings, self.commands, self._inverses, self._contacts, retreats)
 
 
 class Feedback:
@@ -45,20 +52,30 @@ class Feedback:
 
     A pressing finger's offset grows by gain * (displacement that its contact lacks). A free finger takes up the
     displacement of the real object from the planned one, so that it lands where it should on the real object; offsets are
-    continuous over landing and lifting.
+    continuous over landing and lifting. A pressing finger retreats from the object no farther than `LARGEST_RELIEF` allows.
     """
 
     def __init__(
-        self, rig: Rig, ref: Reference, settings: Settings, commands: Array, inverse: Array, contacts: Array
+        self,
+        rig: Rig,
+        ref: Reference,
+        settings: Settings,
+        commands: Array,
+        inverse: Array,
+        contacts: Array,
+        retreats: Array,
     ) -> None:
         self._commands = commands
         n_joints = commands.shape[1]
         self._inverse = (rig.stiffness[:, None] * inverse.reshape(len(inverse), n_joints, -1)).copy()
-        self._arms = contacts - ref.object_position[:, None, :]
+        self._arms = ref.blend(contacts) - ref.object_position[:, None, :]
+        self._normals = ref.blend(normals_in_world(rig.plan))
+        self._retreats = np.where(ref.presses, ref.blend(retreats), np.inf)
         self._ref = ref
         pressing = ref.presses[:, :, None].astype(np.float64)
         self._leak = (1.0 - pressing) * (settings.tick / FREE_FOLLOW_TIME)
         self._gain = pressing * (settings.feedback_gain * settings.tick) - self._leak
+        self._return = RETURN_SPEED * settings.tick
         self._offsets = np.zeros((len(rig.fingers), 3))
         self._position = slice(rig.object_qpos, rig.object_qpos + 3)
         self._quat = slice(rig.object_qpos + 3, rig.object_qpos + 7)
@@ -75,8 +92,27 @@ class Feedback:
         lacking[:, 2] = z + a * arms[:, 1] - b * arms[:, 0]
         offsets = self._offsets
         change = self._gain[k] * lacking - self._leak[k] * offsets
+        normals = self._normals[k]
+        # Where it is beyond the limit, because forces went down or the finger landed so, it comes back without a jump.
+        limits = np.maximum(self._retreats[k], (offsets * normals).sum(axis=1) - self._return)
         np.maximum(-LARGEST_OFFSET, np.minimum(LARGEST_OFFSET, offsets + change), out=offsets)
+        too_far = (offsets * normals).sum(axis=1) - limits
+        offsets -= np.maximum(too_far, 0.0)[:, None] * normals
         return self._commands[k] + self._inverse[ref.waypoint[k]] @ offsets.ravel()
+
+
+def _largest_retreats(rig: Rig, jacobians: Array) -> Array:
+    """How far each tip's target may go outwards, at every waypoint: what takes `LARGEST_RELIEF` of the planned normal force
+    from a tip whose joints are springs. Shape (n_waypoints, n_fingers)."""
+    normals = normals_in_world(rig.plan)
+    across = np.einsum("kfi,kfij->kfj", normals, jacobians)
+    compliance = (across**2 / rig.stiffness).sum(axis=2)
+    pushes = np.zeros(compliance.shape)
+    for k, point in enumerate(waypoints_of(rig.plan)):
+        for f, contact in enumerate(point["contacts"]):
+            if contact.get("force_in_object"):
+                pushes[k, f] = -np.dot(contact["force_in_object"], contact["normal_in_object"])
+    return LARGEST_RELIEF * pushes * compliance
 
 
 def _turn(to: Array, from_: Array) -> tuple[float, float, float]:
