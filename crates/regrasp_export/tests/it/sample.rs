@@ -5,14 +5,21 @@ use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, check};
 use regrasp_planners::{InHandSettings, plan_in_hand};
 use regrasp_robot::import::LoadOptions;
-use regrasp_scene::load_scene;
+use regrasp_scene::{LoadedScene, Scene, load_scene};
 use std::path::Path;
 use std::sync::LazyLock;
 
+fn load() -> LoadedScene {
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/sphere_90x.toml");
+    load_scene(&scene, &LoadOptions::default()).expect("a scene")
+}
+
+/// The scene that [`PLAN`] is for.
+pub static SCENE: LazyLock<Scene> = LazyLock::new(|| load().scene);
+
 /// The sphere of the bundled wide hand, turned about x.
 pub static PLAN: LazyLock<Plan> = LazyLock::new(|| {
-    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/sphere_90x.toml");
-    let loaded = load_scene(&scene, &LoadOptions::default()).expect("a scene");
+    let loaded = load();
     let query = loaded.task.query(3);
     let budget = Budget::work(1_000_000);
     let plan =

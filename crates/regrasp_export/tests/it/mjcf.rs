@@ -1,0 +1,60 @@
+//! What stands in a MuJoCo model; the Python tests load it into MuJoCo.
+
+use crate::sample::{PLAN, SCENE};
+use regrasp_export::{MjcfError, to_mjcf};
+use regrasp_scene::collision_pairs;
+use std::collections::BTreeSet;
+
+/// Values of `key` in the elements called `name`, in order.
+fn values<'x>(xml: &'x str, name: &str, key: &str) -> Vec<&'x str> {
+    let (start, key) = (format!("<{name} "), format!(" {key}=\""));
+    let elements = xml.lines().filter(|line| line.trim_start().starts_with(&start));
+    elements.filter_map(|line| line.split_once(&key)?.1.split_once('"')).map(|(value, _)| value).collect()
+}
+
+#[test]
+fn exactly_what_the_checker_keeps_apart_may_touch_and_the_tips() {
+    let xml = to_mjcf(&SCENE, &PLAN).expect("the plan's scene").xml;
+    let pairs = collision_pairs(&SCENE);
+    let unplanned = pairs.link_object.len()
+        + pairs.finger_finger.len()
+        + pairs.within_finger.len()
+        + pairs.finger_palm.len()
+        + pairs.finger_obstacle.len()
+        + pairs.palm_object.len()
+        + pairs.object_obstacle.len();
+    assert_eq!(values(&xml, "pair", "class").len(), unplanned);
+    let (a, b) = (values(&xml, "pair", "geom1"), values(&xml, "pair", "geom2"));
+    assert_eq!(a.len(), unplanned + SCENE.hand.fingers.len());
+    let all: BTreeSet<(&str, &str)> = a.iter().zip(&b).map(|(&a, &b)| (a.min(b), a.max(b))).collect();
+    assert_eq!(all.len(), a.len(), "a pair stands there twice");
+    let geoms: BTreeSet<&str> = values(&xml, "geom", "name").into_iter().collect();
+    assert!(a.iter().chain(&b).all(|name| geoms.contains(name)));
+    assert_eq!(geoms.len(), values(&xml, "geom", "name").len(), "a name stands there twice");
+}
+
+#[test]
+fn every_waypoint_is_a_keyframe_and_every_joint_has_a_motor() {
+    let xml = to_mjcf(&SCENE, &PLAN).expect("the plan's scene").xml;
+    let n_waypoints: usize = PLAN.segments.iter().map(|segment| segment.waypoints.len()).sum();
+    assert_eq!(values(&xml, "key", "name").len(), n_waypoints);
+    assert_eq!(values(&xml, "motor", "joint"), PLAN.joint_names);
+    let last = &PLAN.segments.last().expect("a segment").waypoints.last().expect("a waypoint");
+    let numbers: Vec<f64> = values(&xml, "key", "qpos")[n_waypoints - 1]
+        .split(' ')
+        .map(|number| number.parse().expect("a number"))
+        .collect();
+    let [x, y, z, w] = last.world_from_object.quat_xyzw;
+    let object = [&last.world_from_object.position[..], &[w, x, y, z]].concat();
+    assert_eq!(numbers, [last.joints.clone(), object].concat());
+}
+
+#[test]
+fn a_plan_for_another_hand_is_refused() {
+    let mut plan = PLAN.clone();
+    plan.joint_names[0] = "elbow".into();
+    assert!(matches!(to_mjcf(&SCENE, &plan), Err(MjcfError::AnotherHand { what: "joints", .. })));
+    let mut plan = PLAN.clone();
+    plan.fingers.swap(0, 1);
+    assert!(matches!(to_mjcf(&SCENE, &plan), Err(MjcfError::AnotherHand { what: "fingers", .. })));
+}
