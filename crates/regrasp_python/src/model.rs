@@ -100,7 +100,7 @@ impl Hand {
 fn tips<'py>(py: Python<'py>, hand: &regrasp::robot::Hand, joints: &[u8]) -> PyResult<Bound<'py, PyBytes>> {
     let (values, rest) = joints.as_chunks::<8>();
     let values: Vec<f64> = values.iter().map(|&bytes| f64::from_le_bytes(bytes)).collect();
-    if !rest.is_empty() || values.len() % hand.n_joints().max(1) != 0 {
+    if !rest.is_empty() || !values.len().is_multiple_of(hand.n_joints().max(1)) {
         let problem = format!("has {} values", values.len());
         return Err(error::argument(py, "tips", "joints", problem, &format!("rows of {}", hand.n_joints())));
     }

@@ -160,7 +160,7 @@ pub fn watched<T: Send>(
 ) -> PyResult<T> {
     let cancelled = Arc::new(AtomicBool::new(false));
     let latest = Mutex::new(None);
-    let result = py.detach(|| {
+    py.detach(|| {
         std::thread::scope(|scope| {
             let (ended, end) = mpsc::channel::<()>();
             let flag = Arc::clone(&cancelled);
@@ -189,8 +189,7 @@ pub fn watched<T: Send>(
             let result = worker.join().unwrap_or_else(|payload| std::panic::resume_unwind(payload));
             raised.map_or(Ok(result), Err)
         })
-    });
-    result
+    })
 }
 
 /// Runs signal handlers (on the main thread), and tells the listener of the latest progress, if it has not heard of it.

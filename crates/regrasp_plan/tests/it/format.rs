@@ -125,6 +125,15 @@ fn damaged_forces_are_named_with_their_place() {
 }
 
 #[test]
+fn the_seed_of_the_fuzz_target_is_a_plan_of_this_version() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/seeds/plan_json/plan.json");
+    let plan = from_json(&path, &std::fs::read(&path).unwrap()).unwrap_or_else(|error| panic!("{error}"));
+    let rolls = |contact: &regrasp_plan::ContactState| contact.mode == ContactMode::Rolling;
+    assert!(plan.promises.forces.is_some());
+    assert!(plan.segments.iter().flat_map(|s| &s.waypoints).flat_map(|w| &w.contacts).any(rolls));
+}
+
+#[test]
 fn a_file_full_of_damage_gives_a_short_answer() {
     let mut plan = GOOD.0.clone();
     plan.segments.iter_mut().flat_map(|s| &mut s.waypoints).for_each(|w| w.joints.clear());

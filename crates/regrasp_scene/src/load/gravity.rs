@@ -10,14 +10,22 @@ use regrasp_robot::Hand;
 /// Errors: neither a direction nor `"any"` (`S103`, `S104`), the zero vector (`S107`).
 pub(super) fn gravity(root: &mut Table, hand: Option<&Hand>, found: &mut Found) -> Option<Gravity> {
     let entry = root.optional("gravity")?;
-    if entry.as_text().is_some() {
-        return entry.choice(found, &["any"]).map(|_| Gravity::Any);
+    if let Some(word) = entry.as_text() {
+        if word == "any" {
+            return Some(Gravity::Any);
+        }
+        let diagnostic = entry.error("S104", found, format!("is \"{word}\"")).expected(EXPECTED);
+        found.diagnostics.push(diagnostic);
+        return None;
     }
     let down_in_hand = Vector::from(entry.numbers::<3>(found)?);
     if down_in_hand.norm() <= 1e-9 {
         let diagnostic = entry.error("S107", found, "is the zero vector, which is no direction");
-        found.diagnostics.push(diagnostic.expected("a direction in the hand's frame, of any length, or \"any\""));
+        found.diagnostics.push(diagnostic.expected(EXPECTED));
         return None;
     }
     Gravity::in_hand(hand?, &down_in_hand)
 }
+
+/// What may stand there.
+const EXPECTED: &str = "a direction in the hand's frame, of any length, or \"any\"";
