@@ -8,13 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._mujoco import MjModel
+from ._mujoco import MjModel, mujoco
 from .model import Rig, Settings
 from .reference import Array, Reference, rotation_matrices, waypoints_of
 from .replay import DROPPED, Drift, Track, pose_errors
 
 #: A contact that should hold counts as lost when it is away for longer, in seconds.
 LOST_AFTER = 0.024
+
+
+#: A free fingertip that the plan has nearer to the object may touch it: it lifts or lands, and no hand follows exactly. Metres.
+NEAR = 0.001
 
 
 @dataclass(frozen=True)
@@ -201,10 +205,11 @@ def _unplanned(
 ) -> list[UnplannedContact]:
     before = track.contact_ticks < end
     at, geoms = track.contact_ticks[before], np.sort(track.contact_geoms[before], axis=1)
+    may_touch = ref.presses | (ref.blend(_tip_gaps(rig)) < NEAR)
     planned = np.zeros(len(at), dtype=bool)
     for f, finger in enumerate(rig.fingers):
         tip = np.isin(geoms, list(finger.touching)).any(axis=1) & (geoms == rig.object_geom).any(axis=1)
-        planned |= tip & ref.may_touch[ticks[at], f]
+        planned |= tip & may_touch[ticks[at], f]
     found: list[UnplannedContact] = []
     at, geoms = at[~planned], geoms[~planned]
     for a, b in np.unique(geoms, axis=0).tolist():
@@ -213,6 +218,20 @@ def _unplanned(
         segment = int(ref.segment[ticks[when[0]]])
         found.append(UnplannedContact(names, segment, float(when[0] * ref.tick), float(len(when) * ref.tick)))
     return sorted(found, key=lambda contact: contact.time)
+
+
+def _tip_gaps(rig: Rig) -> Array:
+    """Planned distance of each fingertip from the object at every waypoint, up to 10 mm. Shape (n_waypoints, n_fingers)."""
+    data = mujoco.MjData(rig.model)
+    ends = np.empty(6)
+    gaps = np.empty((rig.model.nkey, len(rig.fingers)))
+    for k in range(rig.model.nkey):
+        mujoco.mj_resetDataKeyframe(rig.model, data, k)
+        mujoco.mj_kinematics(rig.model, data)
+        for f, finger in enumerate(rig.fingers):
+            distances = [mujoco.mj_geomDistance(rig.model, data, geom, rig.object_geom, 0.01, ends) for geom in finger.touching]
+            gaps[k, f] = min(distances)
+    return gaps
 
 
 def _geom_name(model: MjModel, geom: int) -> str:

@@ -47,8 +47,6 @@ class Reference:
     """Fingers that should press on the object. Shape (n, n_fingers)."""
     presses: NDArray[np.bool_]
     """Fingers that hold, or whose force goes up or down in a pause. Shape (n, n_fingers)."""
-    may_touch: NDArray[np.bool_]
-    """Fingers that hold, lift or land. Shape (n, n_fingers)."""
 
     @property
     def n_ticks(self) -> int:
@@ -83,11 +81,10 @@ def held_at_waypoints(plan: Plan) -> NDArray[np.bool_]:
     return np.array(rows)
 
 
-def reference(plan: Plan, *, tick: float = 0.004, speed: float = 1.0, lift_time: float = 0.06) -> Reference:
+def reference(plan: Plan, *, tick: float = 0.004, speed: float = 1.0) -> Reference:
     """The plan at control ticks.
 
-    ``speed`` divides all times. A finger that lifts or lands may touch the object for ``lift_time`` seconds after or before
-    the moment that the plan says. Raises ``PlanError`` where times do not increase.
+    ``speed`` divides all times. Raises ``PlanError`` where times do not increase.
     """
     points = waypoints_of(plan)
     times = np.array([point["time"] for point in points]) / speed
@@ -118,7 +115,7 @@ def reference(plan: Plan, *, tick: float = 0.004, speed: float = 1.0, lift_time:
     rate = (a + u * (2.0 * (3.0 - 2.0 * a - b) + u * 3.0 * (a + b - 2.0))) / duration[index]
 
     position, quat = _object_poses(points, index, s)
-    holds, presses, may_touch = _contacts(plan, times, index, at, lift_time)
+    held = held_at_waypoints(plan)
     return Reference(
         tick=tick,
         segment=segment_of[index],
@@ -128,9 +125,9 @@ def reference(plan: Plan, *, tick: float = 0.004, speed: float = 1.0, lift_time:
         joint_velocities=rate[:, None] * line[index],
         object_position=position,
         object_quat_wxyz=quat,
-        holds=holds,
-        presses=presses,
-        may_touch=may_touch,
+        # In a pause only those hold that hold before and after: the others' forces go up from zero or down to it.
+        holds=held[index] & held[index + 1],
+        presses=held[index] | held[index + 1],
     )
 
 
@@ -141,24 +138,6 @@ def _object_poses(points: list[dict[str, Any]], index: NDArray[np.int64], s: Arr
     turn = rotation_vector(quat_product(quat[1:], quat_inverse(quat[:-1])))
     moved = position[index] + s[:, None] * np.diff(position, axis=0)[index]
     return moved, quat_product(quat_exp(s[:, None] * turn[index]), quat[index])
-
-
-def _contacts(
-    plan: Plan,
-    times: Array,
-    index: NDArray[np.int64],
-    at: Array,
-    lift_time: float,
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
-    """Who holds, who presses and who may touch, at every tick."""
-    held = held_at_waypoints(plan)
-    # In a pause only those hold that hold before and after: the others' forces go up from zero or down to it.
-    holds = held[index] & held[index + 1]
-    may_touch = holds.copy()
-    for f in range(held.shape[1]):
-        for k in np.flatnonzero(np.diff(held[:, f].astype(np.int8))):
-            may_touch[(at >= times[k] - lift_time) & (at <= times[k + 1] + lift_time), f] = True
-    return holds, held[index] | held[index + 1], may_touch
 
 
 def quat_product(a: Array, b: Array) -> Array:
