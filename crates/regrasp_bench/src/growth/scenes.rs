@@ -85,9 +85,12 @@ mod tests {
     use regrasp_robot::hand::Finger;
     use regrasp_scene::load_scene;
     use std::f64::consts::{PI, TAU};
+    use std::sync::atomic::{AtomicUsize, Ordering};
 
     fn loaded(point: Point) -> regrasp_scene::LoadedScene {
-        let folder = std::env::temp_dir().join(format!("regrasp_growth_{}_{}", scene_name(&point), std::process::id()));
+        static N_FOLDERS: AtomicUsize = AtomicUsize::new(0);
+        let unique = (std::process::id(), N_FOLDERS.fetch_add(1, Ordering::Relaxed));
+        let folder = std::env::temp_dir().join(format!("regrasp_growth_{}_{unique:?}", scene_name(&point)));
         std::fs::create_dir_all(&folder).unwrap();
         let path = write_scene(&point, &folder).unwrap();
         let loaded = load_scene(&path, &Default::default()).unwrap_or_else(|error| panic!("{point:?}: {error}"));

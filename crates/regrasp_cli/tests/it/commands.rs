@@ -109,7 +109,7 @@ fn json_is_one_object_per_line_and_the_last_is_the_exit_code() {
 #[test]
 fn no_plan_is_exit_code_1_with_causes_and_nothing_written() {
     let folder = Folder::new();
-    let run = folder.run(&["plan", "scene.toml", "-o", "plan.json", "--max-work", "20"]);
+    let run = folder.run(&["plan", "scene.toml", "-o", "plan.json", "--max-work", "2000", "--margin", "0.9"]);
     assert_eq!(run.code, Some(1), "{run:?}");
     assert!(run.err.contains("NO PLAN within the work allowed (not a proof)"), "{}", run.err);
     assert!(!folder.path("plan.json").exists());

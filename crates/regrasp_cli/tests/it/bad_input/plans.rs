@@ -36,7 +36,7 @@ fn plan_of_another_version() {
 #[test]
 fn plan_with_too_few_joints() {
     plan_is_refused(
-        PLAN.replacen("0.1,\n", "", 1),
+        PLAN.replacen("\n0.1,\n", "\n", 1),
         "C404",
         "plan.json:",
         &["segments[0].waypoints[0].joints", "3", "4"],
@@ -86,8 +86,8 @@ fn plan_with_a_key_twice() {
 
 #[test]
 fn plan_with_a_joint_beyond_all_numbers() {
-    plan_is_refused(PLAN.replacen("0.1,\n", "1e999,\n", 1), "C401", "plan.json:", &["out of range"]);
-    plan_is_refused(PLAN.replacen("0.1,\n", "1e300,\n", 1), "C409", "plan.json:", &["1e300", "joints"]);
+    plan_is_refused(PLAN.replacen("\n0.1,\n", "\n1e999,\n", 1), "C401", "plan.json:", &["out of range"]);
+    plan_is_refused(PLAN.replacen("\n0.1,\n", "\n1e300,\n", 1), "C409", "plan.json:", &["1e300", "joints"]);
 }
 
 #[test]

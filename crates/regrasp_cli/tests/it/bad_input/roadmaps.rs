@@ -50,7 +50,7 @@ fn roadmap_that_is_cut_off() {
 fn roadmap_of_another_version() {
     let mut bytes = ROADMAP.to_vec();
     bytes[8] = 99;
-    roadmap_is_refused(&bytes, "R602", &["99", "expected 3", "fix: "]);
+    roadmap_is_refused(&bytes, "R602", &["99", "expected 4", "fix: "]);
 }
 
 #[test]
