@@ -22,7 +22,7 @@ SOFT_AND_COUPLED := scenes/dclaw/soft_sphere32_x.toml scenes/trifinger/soft_cyli
 # Roadmaps that are built and asked: sphere, box, and the box with more than a million motions.
 ROADMAPS := roadmap_sphere roadmap_box roadmap_million
 # Sections of docs/benchmarks.md, in this order; those without a CSV file are left out.
-BENCHMARKS := wide visibility classic improvement allegro_required allegro_stretch allegro_meshes dclaw trifinger shadow $(ROADMAPS)
+BENCHMARKS := rolling_wide rolling_allegro wide visibility classic improvement allegro_required allegro_stretch allegro_meshes dclaw trifinger shadow $(ROADMAPS)
 # Curves of `make growth`, in this order.
 GROWTH := fingers triangles obstacles threads
 GROWTH_TRIALS ?= 20
@@ -32,10 +32,12 @@ SEEDS ?= 200
 IMPROVEMENT_SEEDS ?= 100
 ALLEGRO_SEEDS ?= 20
 CLASSIC_SEEDS ?= 20
+# Geometry alone, as in the papers: contacts stay where they are while the object moves, no friction is held back, no forces.
+PLAIN := --settings docs/benchmarks/plain.json
 ALLEGRO_BENCH = $(PACKAGES) --time-limit 20 --threads 1 --seeds $(ALLEGRO_SEEDS)
 SOFT_BENCH = $(PACKAGES) --time-limit 6 --threads 1 --seeds $(ALLEGRO_SEEDS)
 
-.PHONY: all demo pictures test test-rust test-python python bench growth benchmark-page campaign fuzz docs release $(ROADMAPS)
+.PHONY: all demo pictures test replay test-rust test-python python bench growth benchmark-page campaign fuzz docs release $(ROADMAPS)
 
 all: release
 
@@ -77,33 +79,35 @@ test-python: release python
 # Writes docs/benchmarks.md and docs/benchmarks/. One thread, so that times compare. The two methods of paper 000 draw poses
 # uniformly, as the paper does. The suite of paper 000 takes half an hour; cut off and run again, it goes on where it was.
 bench: release
-	$(REGRASP) bench $(WIDE) $(TIGHT) --seeds $(SEEDS) --threads 1 --time-limit 20 --csv docs/benchmarks/wide.csv
+	$(REGRASP) bench $(WIDE) --seeds $(SEEDS) --threads 1 --time-limit 20 --csv docs/benchmarks/rolling_wide.csv
+	$(REGRASP) bench $(WIDE) $(TIGHT) $(PLAIN) --seeds $(SEEDS) --threads 1 --time-limit 20 --csv docs/benchmarks/wide.csv
 	$(REGRASP) bench scenes/tight_sphere_180z.toml --method visibility --settings docs/benchmarks/uniform_poses.json --seeds $(CLASSIC_SEEDS) --threads 1 --time-limit 60 --csv docs/benchmarks/visibility.csv
 	$(REGRASP) bench scenes/tight_sphere_180z.toml --method classic --settings docs/benchmarks/uniform_poses.json --seeds $(CLASSIC_SEEDS) --threads 1 --time-limit 60 --csv docs/benchmarks/classic.csv
-	$(REGRASP) bench $(BOXES) --improve 1 --seeds $(IMPROVEMENT_SEEDS) --threads 1 --csv docs/benchmarks/improvement.csv
+	$(REGRASP) bench $(BOXES) $(PLAIN) --improve 1 --seeds $(IMPROVEMENT_SEEDS) --threads 1 --csv docs/benchmarks/improvement.csv
 	$(REGRASP) bench suites/paper000.toml
 	$(REGRASP) bench suites/paper004.toml
 	$(MAKE) $(ROADMAPS)
 	$(MAKE) growth
 ifneq ($(PACKAGES),)
-	$(REGRASP) bench $(ALLEGRO_REQUIRED) $(ALLEGRO_BENCH) --csv docs/benchmarks/allegro_required.csv
-	$(REGRASP) bench $(ALLEGRO_STRETCH) $(ALLEGRO_BENCH) --csv docs/benchmarks/allegro_stretch.csv
-	$(REGRASP) bench $(ALLEGRO_MESHES) $(ALLEGRO_BENCH) --csv docs/benchmarks/allegro_meshes.csv
-	$(REGRASP) bench $(wildcard scenes/dclaw/soft_*.toml) $(SOFT_BENCH) --csv docs/benchmarks/dclaw.csv
-	$(REGRASP) bench $(wildcard scenes/trifinger/soft_*.toml) $(SOFT_BENCH) --csv docs/benchmarks/trifinger.csv
-	$(REGRASP) bench $(wildcard scenes/shadow/*.toml) $(ALLEGRO_BENCH) --csv docs/benchmarks/shadow.csv
+	$(REGRASP) bench $(ALLEGRO_REQUIRED) $(ALLEGRO_MESHES) $(ALLEGRO_BENCH) --csv docs/benchmarks/rolling_allegro.csv
+	$(REGRASP) bench $(ALLEGRO_REQUIRED) $(PLAIN) $(ALLEGRO_BENCH) --csv docs/benchmarks/allegro_required.csv
+	$(REGRASP) bench $(ALLEGRO_STRETCH) $(PLAIN) $(ALLEGRO_BENCH) --csv docs/benchmarks/allegro_stretch.csv
+	$(REGRASP) bench $(ALLEGRO_MESHES) $(PLAIN) $(ALLEGRO_BENCH) --csv docs/benchmarks/allegro_meshes.csv
+	$(REGRASP) bench $(wildcard scenes/dclaw/soft_*.toml) $(PLAIN) $(SOFT_BENCH) --csv docs/benchmarks/dclaw.csv
+	$(REGRASP) bench $(wildcard scenes/trifinger/soft_*.toml) $(PLAIN) $(SOFT_BENCH) --csv docs/benchmarks/trifinger.csv
+	$(REGRASP) bench $(wildcard scenes/shadow/*.toml) $(PLAIN) $(ALLEGRO_BENCH) --csv docs/benchmarks/shadow.csv
 endif
 	$(MAKE) benchmark-page
 
 # Random queries on saved graphs, and the same ones without them; $(OUT) keeps the graphs.
 roadmap_sphere roadmap_box: roadmap_%: release
 	mkdir -p $(OUT)
-	$(REGRASP) roadmap build scenes/$*_90x.toml -o $(OUT)/$@.roadmap
+	$(REGRASP) roadmap build scenes/$*_90x.toml $(PLAIN) -o $(OUT)/$@.roadmap
 	$(REGRASP) roadmap bench $(OUT)/$@.roadmap scenes/$*_90x.toml --single $(QUERIES) $(ROADMAP_BENCH)
 
 roadmap_million: release
 	mkdir -p $(OUT)
-	$(REGRASP) roadmap build scenes/box_90x.toml -o $(OUT)/$@.roadmap --places 1700
+	$(REGRASP) roadmap build scenes/box_90x.toml $(PLAIN) -o $(OUT)/$@.roadmap --places 1700
 	$(REGRASP) roadmap bench $(OUT)/$@.roadmap scenes/box_90x.toml $(ROADMAP_BENCH)
 
 # How loading and planning grow with fingers, triangles, obstacles and threads; minutes. $(OUT) keeps the scenes.
@@ -114,6 +118,22 @@ growth: release
 # docs/benchmarks.md again, from what was measured.
 benchmark-page: release
 	$(REGRASP) bench --page docs/benchmarks.md --limits docs/benchmarks/limits.json $(wildcard $(BENCHMARKS:%=docs/benchmarks/%.csv) $(ROADMAPS:%=docs/benchmarks/%.json) $(GROWTH:%=docs/benchmarks/growth/%.csv)) suites/*.toml
+
+# Replays in MuJoCo: 50 plans per scene and direction of gravity, with and without feedback of the object's pose; the negative
+# controls; friction, mass and speed other than planned. Some 20 minutes. Writes docs/benchmarks/replay.
+REPLAY := $(addprefix scenes/,$(addsuffix .toml,sphere_90x sphere_180z box_90x))
+REPLAY_ALLEGRO := $(addprefix scenes/allegro/,$(addsuffix .toml,sphere32_x cube57_y cube57_z))
+REPLAY_SEEDS ?= 50
+CONTROL_SEEDS ?= 20
+SIMULATE = $(VENV)/bin/python -m regrasp.simulate.campaign
+replay: python
+	mkdir -p $(OUT)/replay docs/benchmarks/replay
+	$(SIMULATE) $(REPLAY) $(if $(PACKAGES),$(REPLAY_ALLEGRO)) $(PACKAGES) --seeds $(REPLAY_SEEDS) --processes 2 -o $(OUT)/replay --name campaign
+	$(SIMULATE) $(REPLAY) --gravity down --controllers B,A --variants default,no-rolling,no-margin --seeds $(CONTROL_SEEDS) --processes 2 -o $(OUT)/replay --name controls
+	$(SIMULATE) $(REPLAY) --gravity down --friction-scale 0.8,1,1.2 --seeds $(CONTROL_SEEDS) --processes 2 -o $(OUT)/replay --name friction
+	$(SIMULATE) $(REPLAY) --gravity down --mass-scale 0.5,1,1.5 --seeds $(CONTROL_SEEDS) --processes 2 -o $(OUT)/replay --name mass
+	$(SIMULATE) $(REPLAY) --gravity down --speed 1,2 --seeds $(CONTROL_SEEDS) --processes 2 -o $(OUT)/replay --name speed
+	cp $(OUT)/replay/*.csv $(OUT)/replay/*.md docs/benchmarks/replay/
 
 # Slow: same bytes on 1, 2 and 8 threads (100 queries), and the checker against broken and good plans; torsion and couplings
 # are broken in plans for real hands.
