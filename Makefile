@@ -89,7 +89,7 @@ bench: release
 	$(MAKE) $(ROADMAPS)
 	$(MAKE) growth
 ifneq ($(PACKAGES),)
-	$(REGRASP) bench $(ALLEGRO_REQUIRED) $(ALLEGRO_MESHES) $(ALLEGRO_BENCH) --csv docs/benchmarks/rolling_allegro.csv
+	$(REGRASP) bench $(ALLEGRO_REQUIRED) $(ALLEGRO_BENCH) --csv docs/benchmarks/rolling_allegro.csv
 	$(REGRASP) bench $(ALLEGRO_REQUIRED) $(PLAIN) $(ALLEGRO_BENCH) --csv docs/benchmarks/allegro_required.csv
 	$(REGRASP) bench $(ALLEGRO_STRETCH) $(PLAIN) $(ALLEGRO_BENCH) --csv docs/benchmarks/allegro_stretch.csv
 	$(REGRASP) bench $(ALLEGRO_MESHES) $(PLAIN) $(ALLEGRO_BENCH) --csv docs/benchmarks/allegro_meshes.csv
@@ -124,7 +124,7 @@ benchmark-page: release
 REPLAY := $(addprefix scenes/,$(addsuffix .toml,sphere_90x sphere_180z box_90x))
 REPLAY_ALLEGRO := $(addprefix scenes/allegro/,$(addsuffix .toml,sphere32_x cube57_y cube57_z))
 REPLAY_SEEDS ?= 50
-CONTROL_SEEDS ?= 20
+CONTROL_SEEDS ?= 10
 SIMULATE = $(VENV)/bin/python -m regrasp.simulate.campaign
 replay: python
 	mkdir -p $(OUT)/replay docs/benchmarks/replay
