@@ -107,7 +107,8 @@ pub fn reach(
     workspace.finger_alone_is_clear(finger, mode).then_some(joints)
 }
 
-/// Share of the way, from its beginning, along which `finger` can keep `contact` or roll from it, looked at alone and only now and then.
+/// Share of the way, from its beginning, along which `finger` can keep `contact` or roll from it, looked at alone and only now
+/// and then.
 pub fn follow_share(
     workspace: &mut Workspace,
     finger: usize,

@@ -5,14 +5,15 @@
 //! balance, at one pose, and all limits are convex.
 
 use super::forces::{ForceModel, Held, Unbalanced};
-use super::model::{MAX_FINGERS, Model};
+use super::model::Model;
+use super::record::{contact_of, joints_of};
 use super::state::no_contact;
 use super::workspace::Contacts;
+use regrasp_geometry::Pose;
 use regrasp_geometry::collision::Placement;
-use regrasp_geometry::{Point, Pose, UnitVector, Vector};
+use regrasp_grasp::ContactModel;
 use regrasp_grasp::wrench::BalancedForces;
-use regrasp_grasp::{Contact, ContactModel};
-use regrasp_plan::plan::{ContactState, ForcePromises, Segment, SegmentKind, Waypoint};
+use regrasp_plan::plan::{ForcePromises, Segment, SegmentKind, Waypoint};
 
 /// Writes forces and torques into all waypoints; what they promise. None where the settings want none.
 ///
@@ -75,21 +76,9 @@ fn held(model: &Model, forces: &ForceModel, waypoint: &Waypoint, moving: Option<
         holding |= u32::from(contact.is_some()) << finger;
         contacts.push(contact.unwrap_or_else(no_contact));
     }
-    let mut starts = [0; MAX_FINGERS + 1];
-    for (finger, of_model) in model.fingers.iter().enumerate() {
-        starts[finger + 1] = starts[finger] + of_model.ik.chain().n_coordinates();
-    }
     let world_from_object = Placement::from(&Pose::from(&waypoint.world_from_object));
-    let joints = |finger: usize| &waypoint.joints[starts[finger]..starts[finger + 1]];
-    Held::new(model, forces, &world_from_object, &contacts, holding, joints)
-}
-
-fn contact_of(state: &ContactState) -> Option<Contact> {
-    let (point, normal) = (state.point_in_object?, state.normal_in_object?);
-    Some(Contact {
-        point_in_object: Point::from(point),
-        normal_in_object: UnitVector::new_unchecked(Vector::from(normal)),
-    })
+    let joints = joints_of(model, waypoint);
+    Held::new(model, forces, &world_from_object, &contacts, holding, |finger| &joints[finger])
 }
 
 /// Forces of the fingers that hold; none of one that has just landed or is about to lift.

@@ -232,10 +232,11 @@ impl<'a> Model<'a> {
             };
             finger.turns = turns.iter().filter(|turn| moves(turn.body)).map(among_its_own).collect();
         }
+        let friction = scene.object.friction / settings.friction_margin;
         let others_may_hold = |away: usize| {
             let others: Vec<ContactModel> =
                 (0..fingers.len()).filter(|&f| f != away).map(|f| fingers[f].contact).collect();
-            closure::may_close(&others, scene.object.friction / settings.friction_margin)
+            closure::may_close(&others, friction)
         };
         let may_release = (0..fingers.len()).any(others_may_hold);
         Model {
@@ -249,7 +250,7 @@ impl<'a> Model<'a> {
             frame: GraspFrame {
                 center_of_mass: scene.object.center_of_mass,
                 torque_scale: scene.object.radius,
-                friction: scene.object.friction / settings.friction_margin,
+                friction,
             },
             forces: ForceModel::new(scene, settings),
             object_reach: bodies[object].center.coords.norm() + bodies[object].radius,

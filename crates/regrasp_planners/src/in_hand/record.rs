@@ -1,4 +1,4 @@
-//! The plan as it is written to a file.
+//! The plan as it is written to a file, and what a waypoint says when it is read back.
 
 use super::forces::Unbalanced;
 use super::forces_along::add_forces;
@@ -6,8 +6,8 @@ use super::legs::Solution;
 use super::model::Model;
 use super::state::{GraspState, Moment, Motion, Sequence, no_contact};
 use super::timing;
-use super::workspace::Contacts;
-use regrasp_geometry::Pose;
+use super::workspace::{Contacts, HandJoints};
+use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 use regrasp_grasp::Contact;
 use regrasp_plan::plan::{
     ContactMode, ContactState, FORMAT, FORMAT_VERSION, Plan, PlanInput, PoseData, Promises, Segment, SegmentKind,
@@ -292,4 +292,25 @@ fn contact_states(contacts: &Contacts, holding: u32, mode: impl Fn(usize) -> Con
         ContactState::at(mode(finger), point.into(), normal.into())
     };
     contacts.iter().enumerate().map(state).collect()
+}
+
+/// The contact that is written down; None for a finger that is free.
+pub fn contact_of(state: &ContactState) -> Option<Contact> {
+    let (point, normal) = (state.point_in_object?, state.normal_in_object?);
+    let normal_in_object = UnitVector::new_unchecked(Vector::from(normal));
+    Some(Contact { point_in_object: Point::from(point), normal_in_object })
+}
+
+/// Joints of all fingers at a waypoint.
+pub fn joints_of(model: &Model, waypoint: &Waypoint) -> HandJoints {
+    let mut rest = waypoint.joints.as_slice();
+    model
+        .fingers
+        .iter()
+        .map(|finger| {
+            let (own, others) = rest.split_at(finger.ik.chain().n_coordinates().min(rest.len()));
+            rest = others;
+            own.iter().copied().collect()
+        })
+        .collect()
 }

@@ -124,7 +124,8 @@ pub fn transfer_regrasp(
     change_grasp(search, &way, to, arrival, rng)
 }
 
-/// Change to the second grasp, then transfer (paper 000, section 4.3). None where the object has nowhere to go: that is
+/// Change to the second grasp, then transfer (paper 000, section 4.3); where fingertips roll, to the contacts from which they
+/// roll into those of the second grasp. None where the object has nowhere to go: that is
 /// [`transfer_regrasp`].
 pub fn regrasp_transfer(
     search: &mut Search,

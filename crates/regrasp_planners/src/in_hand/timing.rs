@@ -9,6 +9,7 @@
 use super::model::Model;
 use regrasp_geometry::{Point, Pose, frame};
 use regrasp_plan::plan::{MotionLimits, Segment, SegmentKind, Waypoint};
+use regrasp_robot::kinematics::finger_ik::Coordinates;
 
 /// Time in which the pace of a segment rises and falls, in seconds: a fraction of what a transfer takes.
 const EASE: f64 = 0.1;
@@ -138,8 +139,7 @@ impl<'m, 'a> Timing<'m, 'a> {
     /// How far a fingertip's centre goes, by way of the middle of the step.
     fn tip_way(&self, finger: usize, from: &[f64], to: &[f64]) -> f64 {
         let ik = self.model.fingers[finger].ik;
-        let middle: regrasp_robot::kinematics::finger_ik::Coordinates =
-            from.iter().zip(to).map(|(a, b)| 0.5 * (a + b)).collect();
+        let middle: Coordinates = from.iter().zip(to).map(|(a, b)| 0.5 * (a + b)).collect();
         let [from, middle, to] = [from, &middle, to].map(|joints| ik.tip(joints));
         (middle - from).norm() + (to - middle).norm()
     }

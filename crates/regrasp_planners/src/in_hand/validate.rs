@@ -3,13 +3,14 @@
 //! This is a measure, not a judge: it shares everything with the planner. The judge is `regrasp_plan::check`.
 
 use super::model::Model;
+use super::record::{contact_of, joints_of};
 use super::settings::InHandSettings;
 use super::state::GraspState;
-use super::workspace::{HandJoints, TipMode, Workspace};
+use super::workspace::{TipMode, Workspace};
 use regrasp_geometry::collision::Placement;
-use regrasp_geometry::{Point, Pose, UnitVector, Vector};
+use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp::Contact;
-use regrasp_plan::plan::{ContactState, Plan, Segment, SegmentKind, Waypoint};
+use regrasp_plan::plan::{Plan, Segment, SegmentKind, Waypoint};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use regrasp_scene::Scene;
 
@@ -164,23 +165,3 @@ impl End {
 
 /// Distance from the normal that still counts as on it, in metres: far above what solvers leave.
 const STRAIGHT: f64 = 1e-5;
-
-/// None for a finger that is free.
-fn contact_of(contact: &ContactState) -> Option<Contact> {
-    let point_in_object = Point::from(Vector::from(contact.point_in_object?));
-    let normal_in_object = UnitVector::new_normalize(Vector::from(contact.normal_in_object?));
-    Some(Contact { point_in_object, normal_in_object })
-}
-
-fn joints_of(model: &Model, waypoint: &Waypoint) -> HandJoints {
-    let mut rest = waypoint.joints.as_slice();
-    model
-        .fingers
-        .iter()
-        .map(|finger| {
-            let (own, others) = rest.split_at(finger.ik.chain().n_coordinates().min(rest.len()));
-            rest = others;
-            own.iter().copied().collect()
-        })
-        .collect()
-}

@@ -287,9 +287,10 @@ impl<'g, 'a> Gaits<'g, 'a> {
     /// The moments of a transfer from a node's station to the next.
     fn moments(&self, node: &Node) -> Vec<Moment> {
         let range = self.course.stations[node.station] + 1..=self.course.stations[node.station + 1];
+        let contacts = self.state(node).contacts;
         range
             .map(|moment| Moment {
-                contacts: self.state(node).contacts,
+                contacts: contacts.clone(),
                 world_from_object: self.course.poses[moment],
                 joints: node.choice.iter().enumerate().map(|(f, &t)| self.tracks[f][t].at(moment).clone()).collect(),
             })
