@@ -13,6 +13,7 @@ pub use regrasp_planners as planners;
 pub use regrasp_roadmap as roadmap;
 pub use regrasp_robot as robot;
 pub use regrasp_scene as scene;
+pub use regrasp_viewer as viewer;
 
 pub use regrasp_base::{Budget, InputError};
 pub use regrasp_plan::Plan;

@@ -39,6 +39,19 @@ const TOWER: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "regrasp_viewer",
+        &[
+            "regrasp_base",
+            "regrasp_geometry",
+            "regrasp_robot",
+            "regrasp_scene",
+            "regrasp_grasp",
+            "regrasp_plan",
+            // Its tests plan.
+            "regrasp_planners",
+        ],
+    ),
+    (
         "regrasp",
         &[
             "regrasp_base",
@@ -50,6 +63,7 @@ const TOWER: &[(&str, &[&str])] = &[
             "regrasp_plan",
             "regrasp_planners",
             "regrasp_export",
+            "regrasp_viewer",
         ],
     ),
     (
