@@ -25,7 +25,7 @@ pub fn run(arguments: &Arguments, talk: &Talk) -> Result<(), Stop> {
         Command::Plan(plan) => plan::run(plan, common, talk),
         Command::Check(check) => check::run(check, common, talk),
         Command::Export(export) => export::run(export, common, talk),
-        Command::Simulate(simulate) => simulate::run(simulate, talk),
+        Command::Simulate(simulate) => simulate::run(simulate),
         Command::Bench(bench) => bench::run(bench, common, talk),
         Command::Growth(growth) => growth::run(growth, talk),
         Command::Roadmap(roadmap) => roadmap::run(roadmap, common, talk),
