@@ -11,7 +11,7 @@ use crate::check::model::Model;
 use crate::check::rolling::Roll;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
-use crate::plan::{ContactState, ForcePromises, Plan, Segment, SegmentKind, Waypoint};
+use crate::plan::{ContactState, ForcePromises, Plan, Segment, Waypoint};
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp::ContactModel;
 use regrasp_scene::{Gravity, Object, Scene};
@@ -71,7 +71,7 @@ pub fn check_forces(
     let judge = Judge { object, model, plan, promises, settings };
     let mut balance = Balance::default();
     for (s, segment) in plan.segments.iter().enumerate() {
-        let moving = moving_finger(model, segment).filter(|_| segment.kind == SegmentKind::Regrasp);
+        let moving = moving_finger(model, segment);
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
             let at = Moment::at(s, w);
             let Some(exerted) = judge.exerted(waypoint, at, log) else { continue };

@@ -5,7 +5,7 @@ use crate::check::continuity::{contact_of, moving_finger};
 use crate::check::model::Model;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
-use crate::plan::{Plan, SegmentKind};
+use crate::plan::Plan;
 use regrasp_grasp::{Contact, Grip};
 use regrasp_scene::{InputFile, Object};
 use std::collections::BTreeSet;
@@ -104,7 +104,7 @@ fn holding_sets(model: &Model, plan: &Plan) -> Vec<Holding> {
     let mut seen = BTreeSet::new();
     let mut sets = Vec::new();
     for (s, segment) in plan.segments.iter().enumerate() {
-        let moving = moving_finger(model, segment).filter(|_| segment.kind == SegmentKind::Regrasp);
+        let moving = moving_finger(model, segment);
         // A waypoint may break the roles; closure is judged for what really holds there.
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
             let holding: Vec<(usize, Contact)> = (0..model.fingers.len())

@@ -2,8 +2,8 @@
 
 use crate::sample::{self, judge, kinds};
 use regrasp_geometry::{Point, Shape, TriangleMesh};
-use regrasp_plan::check::Moment;
-use regrasp_plan::check::{CheckSettings, ViolationKind, check, check_files};
+use regrasp_plan::Plan;
+use regrasp_plan::check::{CheckSettings, Moment, ViolationKind, check, check_files};
 use regrasp_plan::format::to_json;
 use regrasp_robot::import::LoadOptions;
 use regrasp_scene::{GraspRequest, InHandQuery};
@@ -53,6 +53,24 @@ fn a_free_finger_keeps_clear_of_the_object() {
     touching.segments[0].waypoints[0].contacts[1] = free;
     assert_eq!(kinds(&judge(&scene, &touching)), [ViolationKind::Collision]);
     assert!(judge(&scene, &plan).accepted());
+}
+
+#[test]
+fn a_finger_that_a_transfer_names_as_moving_is_judged_as_one_that_holds() {
+    // So few waypoints that tips leave their contacts in between.
+    let scene = sample::scene();
+    let mut plan = sample::plan(&scene);
+    let waypoints = &mut plan.segments[0].waypoints;
+    waypoints.drain(1..waypoints.len() - 1);
+    let off_tip = |plan: &Plan| {
+        let violations = judge(&scene, plan).violations.into_iter();
+        violations.filter(|violation| violation.kind == ViolationKind::ContactOffTip).collect::<Vec<_>>()
+    };
+    let found = off_tip(&plan);
+    assert!(found.iter().any(|violation| violation.subjects == ["f0"]), "{found:?}");
+    plan.segments[0].moving_finger = Some("f0".into());
+    assert_eq!(off_tip(&plan), found);
+    assert!(kinds(&judge(&scene, &plan)).contains(&ViolationKind::WrongMovingFinger));
 }
 
 #[test]
