@@ -65,11 +65,7 @@ pub fn check_closure(
     settings: &CheckSettings,
     log: &mut Log,
 ) -> Option<f64> {
-    let body = Body {
-        center_of_mass: object.center_of_mass,
-        torque_scale: object.radius,
-        friction: plan.promises.friction.min(object.friction),
-    };
+    let body = Body::of(object, plan);
     let required = plan.promises.required_margin.max(settings.smallest_margin);
     let sets = holding_sets(model, plan);
     let mut smallest: Option<f64> = None;
