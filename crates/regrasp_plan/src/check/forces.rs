@@ -1,9 +1,23 @@
-//! Contact forces and joint torques, by substitution: they balance the object's weight, stay in the exact cones and in the
-//! promised range, and the joints make them.
+//! Contact forces and joint torques, by substitution, as `docs/plan-format.md` (forces) asks.
 //!
-//! Forces are those of the fingers on the object, in the object frame; moments are about its centre of mass. Between two
-//! segments pose and contacts stay and forces change linearly: what balances at both ends balances in between, and cones
-//! and limits are convex, so that the ends are all that has to be looked at.
+//! Forces are those of the fingers on the object, in the object frame; moments are about its centre of mass. Tolerances are
+//! fields of `CheckSettings`. At every waypoint
+//!
+//! - forces and weight add up to zero within `force_tolerance`, their moments and torsions within `moment_tolerance`;
+//! - the force of a holding finger is in the exact cone of its contact model (`CONVENTIONS.md`) with the friction of
+//!   `closure::Body::of`, and its normal part in the promised range, both within `force_tolerance`; the moving finger of a
+//!   regrasp exerts nothing, within the first two tolerances;
+//! - every joint's torque is the work of force and torsion per unit of its coordinate, within the share `torque_tolerance` of
+//!   the largest that this work could be, and at most the promised one;
+//! - without a direction of gravity there is room for the weight in each (`any_gravity`).
+//!
+//! Half-way to the next waypoint, at the pose between and with contacts where tips then touch, what is left (torques over
+//! the object's radius) is at most the share `half_way_imbalance` of the sum of all normal forces.
+//!
+//! Between two segments pose and contacts stay and forces change linearly: what balances at both ends balances in between,
+//! and cones, largest normal forces and torque limits are convex, so that the ends are all that has to be looked at.
+//!
+//! Mass, gravity and torque limits of the plan are held against scene and robot.
 
 use crate::check::closure::Body;
 use crate::check::continuity::{contact_of, moving_finger, pose_between};

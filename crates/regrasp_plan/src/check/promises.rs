@@ -1,4 +1,13 @@
-//! What the plan promises: input files, friction, tolerance, closure margin.
+//! What the plan promises of its inputs and contacts; promises of time are judged in `times`, of forces in `forces`.
+//!
+//! - Input files: the same roles, names and SHA-256 as the scene's, none more and none less.
+//! - Friction: not negative, at most the scene's, and at most that over `friction_margin`, which is at least 1.
+//! - Contact and slip tolerance: at most what the settings accept. That they are kept is judged in `contact` and `rolling`.
+//! - Closure: at every waypoint, of exactly the fingers that hold, with the margin promised or asked for by the settings; the
+//!   margin is that of `closure`, dimensionless, with torques divided by the object's radius, which `torque_scale` has to
+//!   be. The margin said to be kept is no more than the smallest one found.
+//!
+//! Tolerances, for rounding and two solvers, are the constants below.
 
 use crate::check::closure::{Body, Certificate, certified_margin, margin_by};
 use crate::check::continuity::{contact_of, moving_finger};
@@ -10,11 +19,12 @@ use regrasp_grasp::{Contact, Grip};
 use regrasp_scene::{InputFile, Object};
 use std::collections::BTreeSet;
 
-/// How much smaller than promised a margin may come out: two solvers, one number.
+/// How much smaller than required a margin may come out: two solvers, one number.
 const MARGIN_TOLERANCE: f64 = 1e-9;
 /// How far the kept margin may be above the one found here before it is a broken promise.
 const KEPT_MARGIN_TOLERANCE: f64 = 1e-6;
-
+/// The torque scale may differ from the object's radius by this share of it: rounding.
+const SCALE_TOLERANCE: f64 = 1e-9;
 /// Friction times its margin may be this much above the scene's: rounding.
 const FRICTION_TOLERANCE: f64 = 1e-9;
 
@@ -176,7 +186,7 @@ pub fn check_promises(object: &Object, plan: &Plan, settings: &CheckSettings, mi
         broken("kept_margin", promises.kept_margin, found, message);
     }
     let scale = object.radius;
-    if (promises.torque_scale - scale).abs() > 1e-9 * scale {
+    if (promises.torque_scale - scale).abs() > SCALE_TOLERANCE * scale {
         let message = format!("torque scale {}, the object's radius is {scale}", promises.torque_scale);
         broken("torque_scale", promises.torque_scale, scale, message);
     }

@@ -179,7 +179,7 @@ impl<'a> Roll<'a> {
 
     /// How far the fingertip slides over the object, in metres: the length of the integral, over the step, of the velocity
     /// of the touching point of the link, seen from the object and across the normal. What stays unknown is added: at
-    /// most `unknown`, unless [`MOST_PIECES`] are too few for that. Infinite where no surface is near.
+    /// most `unknown`, unless 128 pieces are too few for that. Infinite where no surface is near.
     pub fn slip(&self, unknown: f64) -> f64 {
         let object_from_link = |t: f64| self.object_from_link(t);
         let normal = |center: &Point| self.touching(center).map(|(_, normal)| normal);
