@@ -69,6 +69,8 @@ mod state;
 mod tally;
 /// Times of waypoints.
 mod timing;
+/// Where fingertips touch, and joints with which they do.
+mod tip;
 /// Transfer paths.
 mod transfer;
 /// A tree of grasps that grows by gaits.
