@@ -1,0 +1,354 @@
+// The 3-D view. It draws when something changed, never on its own.
+
+import {
+  AmbientLight, Box3, Color, DirectionalLight, EdgesGeometry, Group, HemisphereLight, LineBasicMaterial, LineSegments, MathUtils, Mesh,
+  MeshLambertMaterial, NoToneMapping, PerspectiveCamera, Quaternion, Scene, Sphere, Vector3, WebGLRenderer, type BufferGeometry, type Material,
+} from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { largestForce } from "../charts/lines";
+import { linkPoses } from "../kinematics";
+import type { CameraPlace } from "../link";
+import { norm, poseFrom, rotationBetween, sub, type Pose } from "../math";
+import type { Motion } from "../motion";
+import type { PieceStory, PoseData, Story } from "../story";
+import { fingerColour, type Theme } from "../theme";
+import { Contacts } from "./contacts";
+import { patterned, type PatternColours } from "./materials";
+import { geometryOf, type Triangles } from "./mesh";
+
+export type Layer = "visual" | "ghosts" | "contacts" | "cones" | "forces" | "trace" | "obstacles";
+
+interface Ghost { group: Group; pose: Pose }
+
+export class Stage {
+  readonly canvas: HTMLCanvasElement;
+  readonly layers: Record<Layer, boolean> = { visual: true, ghosts: true, contacts: true, cones: true, forces: true, trace: true, obstacles: true };
+  readonly nTriangles: number;
+  private readonly renderer: WebGLRenderer;
+  private readonly scene = new Scene();
+  private readonly camera: PerspectiveCamera;
+  private readonly controls: OrbitControls;
+  private readonly links: Group[];
+  private readonly object = new Group();
+  private readonly obstacles = new Group();
+  private readonly contacts: Contacts;
+  private readonly ghosts: Ghost[] = [];
+  private readonly shapes: { mesh: Mesh; role: PieceStory["role"]; alone: boolean }[] = [];
+  private readonly repaint: (() => void)[] = [];
+  private readonly pattern: PatternColours = { light: new Color(), dark: new Color(), mark: new Color() };
+  private readonly insets: { scene: Scene; canvas: HTMLCanvasElement }[] = [];
+  private readonly insetCamera = new PerspectiveCamera(24, 1, 0.01, 10);
+  private readonly focus: Sphere;
+  private readonly software: boolean;
+  /** True once somebody placed the camera; until then it frames the hand at every size. */
+  private placed = false;
+  private dirty = true;
+  private insetsDirty = true;
+
+  /** Throws where there is no WebGL. */
+  constructor(private readonly story: Story, private readonly motion: Motion, private readonly theme: Theme, onCamera: () => void) {
+    this.software = drawnBySoftware();
+    this.renderer = new WebGLRenderer({ antialias: !this.software, powerPreference: "high-performance" });
+    this.renderer.toneMapping = NoToneMapping;
+    this.canvas = this.renderer.domElement;
+    this.camera = new PerspectiveCamera(32, 1, 0.005, 20);
+    const gravity = story.scene.gravity_in_world;
+    if (gravity && norm(gravity) > 1e-9) this.camera.up.set(...gravity).normalize().negate();
+    else this.camera.up.set(0, 0, 1);
+    this.controls = new OrbitControls(this.camera, this.canvas);
+    this.controls.enableDamping = false;
+    this.controls.addEventListener("start", () => { this.placed = true; });
+    this.controls.addEventListener("change", () => {
+      this.dirty = this.insetsDirty = true;
+      onCamera();
+    });
+
+    const decoded = new Map<number, Triangles>();
+    this.links = story.scene.links.map(() => new Group());
+    this.scene.add(...this.links, this.object, this.obstacles);
+    const body = this.addPieces(decoded);
+    this.nTriangles = this.shapes.reduce((sum, s) => sum + (s.mesh.geometry.index?.count ?? 0) / 3, 0);
+    const size = body ? Math.max(...body.half.toArray()) : 0.03;
+    this.contacts = new Contacts(story.scene, motion, size, largestForce(motion));
+    this.object.add(this.contacts.current, this.contacts.trace);
+    this.addLights(this.scene);
+    if (body) this.addGhosts(body.geometry, body.middle, body.half);
+    this.setTime(motion.start);
+    this.focus = this.findFocus();
+    this.setLayer("visual", true);
+    theme.onChange(() => this.paint());
+    this.paint();
+    this.frame();
+  }
+
+  // ---- making ----
+
+  private addPieces(decoded: Map<number, Triangles>): { geometry: BufferGeometry; middle: Vector3; half: Vector3 } | null {
+    const { scene } = this.story;
+    const groups = new Map<string, PieceStory[]>();
+    for (const piece of scene.pieces) {
+      const key = `${piece.on}/${piece.role}/${piece.is_tip}`;
+      groups.set(key, [...(groups.get(key) ?? []), piece]);
+    }
+    const hasRole = (on: PieceStory["on"], role: string) => scene.pieces.some((p) => p.on === on && p.role === role);
+    let body: { geometry: BufferGeometry; middle: Vector3; half: Vector3 } | null = null;
+    for (const pieces of groups.values()) {
+      const { on, role, is_tip } = pieces[0];
+      const geometry = geometryOf(pieces, scene.meshes, decoded);
+      let material: Material;
+      if (on === "object") {
+        geometry.computeBoundingBox();
+        const middle = geometry.boundingBox!.getCenter(new Vector3());
+        const half = geometry.boundingBox!.getSize(new Vector3()).multiplyScalar(0.5).max(new Vector3(1e-6, 1e-6, 1e-6));
+        material = patterned(middle, half, this.pattern);
+        if (!body || role === "visual") body = { geometry, middle, half };
+      } else material = on === "world" ? this.obstacleMaterial() : this.linkMaterial(scene.links[on]?.finger ?? -1, is_tip);
+      const mesh = new Mesh(geometry, material);
+      if (on === "world") mesh.renderOrder = 1;
+      const edges = on === "object" || on === "world" ? this.edges(geometry, on === "world" ? 0.5 : 0.35) : null;
+      if (edges) mesh.add(edges);
+      (on === "object" ? this.object : on === "world" ? this.obstacles : this.links[on] ?? this.scene).add(mesh);
+      this.shapes.push({ mesh, role, alone: !hasRole(on, role === "visual" ? "collision" : "visual") });
+    }
+    return body;
+  }
+
+  private linkMaterial(finger: number, isTip: boolean): MeshLambertMaterial {
+    const material = new MeshLambertMaterial();
+    const own = new Color(fingerColour(finger));
+    const share = finger < 0 ? 0 : isTip ? 0.9 : 0.4;
+    this.repaint.push(() => material.color.set(this.theme.colours.palm).lerp(own, share));
+    return material;
+  }
+
+  private obstacleMaterial(): MeshLambertMaterial {
+    const material = new MeshLambertMaterial({ transparent: true, opacity: 0.3, depthWrite: false });
+    this.repaint.push(() => material.color.set(this.theme.colours.muted));
+    return material;
+  }
+
+  private edges(geometry: BufferGeometry, opacity: number): LineSegments | null {
+    if ((geometry.index?.count ?? 0) / 3 > 40000) return null;
+    const edges = new EdgesGeometry(geometry, 35);
+    if (edges.getAttribute("position").count === 0) return null;
+    const material = new LineBasicMaterial({ transparent: true, opacity });
+    this.repaint.push(() => material.color.set(this.theme.colours.objectMark));
+    return new LineSegments(edges, material);
+  }
+
+  private addLights(scene: Scene): void {
+    scene.add(new AmbientLight(0xffffff, 0.9), new HemisphereLight(0xffffff, 0x8d8a86, 1.1));
+    const lamp = new DirectionalLight(0xffffff, 1.7);
+    lamp.position.copy(this.camera.up).multiplyScalar(2).add(new Vector3(0.8, -1.1, 0.4));
+    scene.add(lamp);
+  }
+
+  /** Start and goal in place, shells behind whatever covers them, and each once more in a small view of its own. */
+  private addGhosts(geometry: BufferGeometry, middle: Vector3, half: Vector3): void {
+    const { story } = this;
+    const [start, goal] = [story.plan?.start ?? story.asked[0], story.plan?.goal ?? story.asked[story.asked.length - 1]];
+    const put = (data: PoseData | undefined, opacity: number): void => {
+      if (!data) return;
+      const look = { transparent: true, opacity, depthWrite: false, polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 4 };
+      const shell = new Mesh(geometry, patterned(middle, half, this.pattern, look));
+      shell.renderOrder = 1;
+      const group = new Group().add(shell);
+      const edges = this.edges(geometry, 0.6);
+      if (edges) group.add(edges);
+      const pose = poseFrom(data);
+      group.position.set(...pose.position);
+      group.quaternion.set(...pose.quat);
+      this.scene.add(group);
+      this.ghosts.push({ group, pose });
+    };
+    put(start, 0.16);
+    put(goal, 0.3);
+    for (const way of story.asked.slice(1, -1)) put(way, 0.1);
+    for (const data of [start, goal]) {
+      if (!data) continue;
+      const scene = new Scene();
+      const mesh = new Mesh(geometry, patterned(middle, half, this.pattern));
+      const edges = this.edges(geometry, 0.45);
+      if (edges) mesh.add(edges);
+      mesh.position.copy(middle).negate();
+      const turned = new Group().add(mesh);
+      turned.quaternion.set(...data.quat_xyzw);
+      turned.scale.setScalar(1 / half.length());
+      scene.add(turned);
+      this.addLights(scene);
+      const canvas = document.createElement("canvas");
+      canvas.width = canvas.height = 168;
+      this.insets.push({ scene, canvas });
+    }
+  }
+
+  /** Canvases of the small views: start, goal. */
+  get insetCanvases(): HTMLCanvasElement[] {
+    return this.insets.map((inset) => inset.canvas);
+  }
+
+  /** Ball about fingers and object, all along the motion; the palm counts where it is not far larger. */
+  private findFocus(): Sphere {
+    const near = new Box3();
+    const all = new Box3();
+    for (let i = 0; i <= 4; i++) {
+      this.setTime(this.motion.start + ((this.motion.end - this.motion.start) * i) / 4);
+      this.scene.updateMatrixWorld(true);
+      this.links.forEach((link, k) => {
+        const box = new Box3().setFromObject(link);
+        all.union(box);
+        if (this.story.scene.links[k].finger >= 0) near.union(box);
+      });
+      const box = new Box3();
+      for (const child of this.object.children) if (child instanceof Mesh) box.expandByObject(child);
+      near.union(box);
+      all.union(box);
+    }
+    this.setTime(this.motion.start);
+    const [close, wide] = [near, all].map((box) => box.getBoundingSphere(new Sphere()));
+    if (all.isEmpty()) return new Sphere(new Vector3(), 0.1);
+    return near.isEmpty() || wide.radius < 1.35 * close.radius ? wide : close;
+  }
+
+  // ---- showing ----
+
+  private paint(): void {
+    const { colours } = this.theme;
+    this.scene.background = new Color(colours.stage);
+    for (const inset of this.insets) inset.scene.background = new Color(colours.panel);
+    this.pattern.light.set(colours.objectLight);
+    this.pattern.dark.set(colours.objectDark);
+    this.pattern.mark.set(colours.objectMark);
+    for (const paint of this.repaint) paint();
+    this.dirty = this.insetsDirty = true;
+  }
+
+  setTime(time: number): void {
+    linkPoses(this.story.scene, this.motion.joints(time)).forEach((pose, i) => place(this.links[i], pose));
+    const now = this.motion.object(time);
+    place(this.object, now);
+    this.contacts.show(time);
+    for (const { group, pose } of this.ghosts) {
+      const near = norm(sub(pose.position, now.position)) < 5e-4 && norm(rotationBetween(pose.quat, now.quat)) < 0.02;
+      group.visible = this.layers.ghosts && !near;
+    }
+    this.dirty = true;
+  }
+
+  setLayer(layer: Layer, shown: boolean): void {
+    this.layers[layer] = shown;
+    for (const { mesh, role, alone } of this.shapes) mesh.visible = alone || (role === "visual") === this.layers.visual;
+    this.contacts.current.visible = this.layers.contacts;
+    this.contacts.setCones(this.layers.cones);
+    this.contacts.setForces(this.layers.forces);
+    this.contacts.trace.visible = this.layers.trace;
+    this.obstacles.visible = this.layers.obstacles;
+    this.dirty = true;
+  }
+
+  /** Layers that this story has anything for. */
+  has(layer: Layer): boolean {
+    const { pieces } = this.story.scene;
+    if (layer === "visual") return pieces.some((p) => p.role === "visual") && this.shapes.some((s) => !s.alone);
+    if (layer === "obstacles") return pieces.some((p) => p.on === "world");
+    if (layer === "forces") return this.motion.hasForces;
+    if (layer === "contacts" || layer === "cones" || layer === "trace") return this.motion.holds.some((h) => h.length > 0);
+    return this.ghosts.length > 0;
+  }
+
+  /** Puts the camera where hand and object fill the view. */
+  frame(): void {
+    const half = Math.min(MathUtils.degToRad(this.camera.fov) / 2, Math.atan(Math.tan(MathUtils.degToRad(this.camera.fov) / 2) * this.camera.aspect));
+    const distance = (this.focus.radius / Math.sin(half)) * 0.98;
+    this.controls.minDistance = this.focus.radius * 0.15;
+    this.controls.maxDistance = this.focus.radius * 30;
+    this.look({ azimuth: -55, elevation: 26, distance, target: this.focus.center.toArray() });
+    this.placed = false;
+  }
+
+  place(camera: CameraPlace): void {
+    this.placed = true;
+    this.look(camera);
+  }
+
+  private look({ azimuth, elevation, distance, target }: CameraPlace): void {
+    const [a, e] = [MathUtils.degToRad(azimuth), MathUtils.degToRad(Math.min(Math.max(elevation, -89.9), 89.9))];
+    const standing = new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), this.camera.up);
+    const out = new Vector3(Math.cos(a) * Math.cos(e), Math.sin(a) * Math.cos(e), Math.sin(e)).applyQuaternion(standing);
+    this.controls.target.set(...target);
+    this.camera.position.copy(out.multiplyScalar(distance)).add(this.controls.target);
+    this.controls.update();
+    this.dirty = this.insetsDirty = true;
+  }
+
+  cameraPlace(): CameraPlace {
+    const out = this.camera.position.clone().sub(this.controls.target);
+    const distance = out.length();
+    const lying = new Quaternion().setFromUnitVectors(this.camera.up, new Vector3(0, 0, 1));
+    out.applyQuaternion(lying).normalize();
+    return {
+      azimuth: MathUtils.radToDeg(Math.atan2(out.y, out.x)),
+      elevation: MathUtils.radToDeg(Math.asin(MathUtils.clamp(out.z, -1, 1))),
+      distance,
+      target: this.controls.target.toArray(),
+    };
+  }
+
+  resize(width: number, height: number): void {
+    if (width < 1 || height < 1) return;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio || 1, this.software ? 1 : 2));
+    this.renderer.setSize(width, height);
+    this.camera.aspect = width / height;
+    this.camera.near = this.focus.radius * 0.02;
+    this.camera.far = this.focus.radius * 80;
+    this.camera.updateProjectionMatrix();
+    if (!this.placed) this.frame();
+    this.dirty = this.insetsDirty = true;
+  }
+
+  /** Draws if anything changed since the last time. */
+  draw(): boolean {
+    if (!this.dirty) return false;
+    if (this.insetsDirty) this.drawInsets();
+    this.renderer.render(this.scene, this.camera);
+    this.dirty = false;
+    return true;
+  }
+
+  /** Small views keep the camera's direction; they are copied out, so that playing need not draw them again. */
+  private drawInsets(): void {
+    this.insetsDirty = false;
+    const pixels = Math.min(168, this.canvas.width, this.canvas.height);
+    if (pixels < 8) return;
+    const out = this.camera.position.clone().sub(this.controls.target).normalize().multiplyScalar(5.2);
+    this.insetCamera.up.copy(this.camera.up);
+    this.insetCamera.position.copy(out);
+    this.insetCamera.lookAt(0, 0, 0);
+    const edge = pixels / this.renderer.getPixelRatio();
+    this.renderer.setScissorTest(true);
+    this.renderer.setScissor(0, 0, edge, edge);
+    this.renderer.setViewport(0, 0, edge, edge);
+    for (const { scene, canvas } of this.insets) {
+      this.renderer.render(scene, this.insetCamera);
+      canvas.getContext("2d")?.drawImage(this.canvas, 0, this.canvas.height - pixels, pixels, pixels, 0, 0, canvas.width, canvas.height);
+    }
+    this.renderer.setScissorTest(false);
+    const size = this.canvas;
+    this.renderer.setViewport(0, 0, size.width / this.renderer.getPixelRatio(), size.height / this.renderer.getPixelRatio());
+  }
+}
+
+function place(group: Group, pose: Pose): void {
+  group.position.set(...pose.position);
+  group.quaternion.set(...pose.quat);
+}
+
+/** True where WebGL runs on the processor: smoothing edges costs too much there. Throws where there is no WebGL. */
+function drawnBySoftware(): boolean {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  if (!gl) throw new Error("no WebGL 2");
+  const info = gl.getExtension("WEBGL_debug_renderer_info");
+  const name = String(info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : gl.getParameter(gl.RENDERER));
+  gl.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software|basic render/i.test(name);
+}
