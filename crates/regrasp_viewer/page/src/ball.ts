@@ -1,7 +1,7 @@
 // The object's orientation along the plan, in the ball of rotation vectors (radius pi) seen from the start: the centre is
 // the start's orientation, opposite points of the surface are one and the same. Nodes of the roadmap where there are some.
 
-import { el } from "./dom";
+import { el, setText } from "./dom";
 import { cross, fromRotationVector, multiply, norm, rotate, rotationBetween, scale, sub, unit, type Quat, type Vec3 } from "./math";
 import type { Motion } from "./motion";
 import type { Player } from "./player";
@@ -281,7 +281,7 @@ export class Ball {
     const made = this.prepare(this.over);
     const now = rotationBetween(this.origin, this.motion.object(this.player.time).quat);
     const text = `${((norm(now) * 180) / Math.PI).toFixed(1)}\u00b0 from the start, ${((this.left(now) * 180) / Math.PI).toFixed(1)}\u00b0 to go`;
-    if (this.readout.textContent !== text) this.readout.textContent = text;
+    setText(this.readout, text);
     if (!made) return;
     const { context, place } = made;
     const [x, y] = place(now);

@@ -27,6 +27,11 @@ export function button(content: Child, hint: string | null, onClick: () => void,
   return element;
 }
 
+/** Sets the text where it differs: texts follow the time many times a second. */
+export function setText(element: Element, text: string): void {
+  if (element.textContent !== text) element.textContent = text;
+}
+
 const ICONS: Record<string, string[]> = {
   play: ["M7 4.5v15l12-7.5z"],
   pause: ["M6.5 5h4v14h-4z", "M13.5 5h4v14h-4z"],
@@ -34,7 +39,6 @@ const ICONS: Record<string, string[]> = {
   previous: ["M19 5v14l-9-7z", "M5 5h3v14h-3z"],
   repeat: ["M4 11a7 7 0 0 1 12-4.6V4l5 4.2-5 4.2V9.5A4.6 4.6 0 0 0 6.6 11z", "M20 13a7 7 0 0 1-12 4.6V20l-5-4.2 5-4.2v2.9A4.6 4.6 0 0 0 17.4 13z"],
   sun: ["M12 7a5 5 0 1 0 0 10 5 5 0 0 0 0-10z", "M11 1h2v4h-2zM11 19h2v4h-2zM1 11h4v2H1zM19 11h4v2h-4zM4 5.4 5.4 4l2.8 2.8-1.4 1.4zM15.8 17.2l1.4-1.4L20 18.6 18.6 20zM4 18.6l2.8-2.8 1.4 1.4L5.4 20zM15.8 6.8 18.6 4 20 5.4l-2.8 2.8z"],
-  help: ["M9.2 9.2A3 3 0 0 1 15 10c0 2.2-2.9 2.5-2.9 4.6h-1.9c0-3.1 2.8-3.2 2.8-4.6a1 1 0 0 0-2-.1z", "M10.1 16.2h2.1v2.2h-2.1z"],
   download: ["M11 3h2v9l3.3-3.3 1.4 1.4L12 15.8l-5.7-5.7 1.4-1.4L11 12z", "M4 17h2v2h12v-2h2v4H4z"],
   layers: ["M12 3 2.5 8 12 13l9.5-5z", "m4.6 11-2.1 1.1L12 17l9.5-4.9-2.1-1.1L12 14.9z"],
   frame: ["M3 3h6v2H5v4H3zM15 3h6v6h-2V5h-4zM3 15h2v4h4v2H3zM19 15h2v6h-6v-2h4z", "M9 9h6v6H9z"],

@@ -52,7 +52,7 @@ function header(story: Story, theme: Theme, help: () => void): HTMLElement {
     el("span", { class: "gap" }),
     story.plan ? button(icon("download"), "Download plan.json", () => download(story), "button quiet") : null,
     scheme,
-    button(icon("help"), "Keys and help", help, "button quiet"),
+    button("?", "Keys and help", help, "button quiet question"),
   );
 }
 
@@ -131,7 +131,7 @@ function start(): void {
     // After a pause of the browser's own (another tab), the plan goes on where it was.
     player.advance(Math.min((now - before) / 1000, 0.25));
     before = now;
-    stage?.draw();
+    stage?.draw(now);
     requestAnimationFrame(tick);
   };
   requestAnimationFrame(tick);

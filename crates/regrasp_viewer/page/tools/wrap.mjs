@@ -16,7 +16,7 @@ export const escaped = (json) =>
 export function wrap(story) {
   const script = readFileSync(join(page, "dist/viewer.js"), "utf8");
   const style = readFileSync(join(page, "dist/viewer.css"), "utf8");
-  const policy = `default-src 'none'; script-src ${hash(script)}; style-src ${hash(style)}; base-uri 'none'; form-action 'none'`;
+  const policy = `default-src 'none'; script-src ${hash(script)}; style-src ${hash(style)}; img-src data: blob:; base-uri 'none'; form-action 'none'`;
   const json = typeof story === "string" ? story : JSON.stringify(story);
   return `<!doctype html>
 <html lang="en">

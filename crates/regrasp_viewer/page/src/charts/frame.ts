@@ -1,6 +1,6 @@
 // What all charts share: the time axis, a canvas in the right resolution, labels and lines.
 
-import { el } from "../dom";
+import { el, setText } from "../dom";
 import type { Colours, Theme } from "../theme";
 import type { Motion } from "../motion";
 
@@ -26,6 +26,8 @@ export interface ChartSpec {
   draw: (drawing: Drawing) => void;
   /** Text beside the title, of the time shown. */
   readout?: (time: number) => string;
+  /** Brings further texts to the time shown. */
+  show?: (time: number) => void;
   /** Further elements under the title and under the plot. */
   above?: HTMLElement;
   below?: HTMLElement;
@@ -52,7 +54,8 @@ export class Chart {
 
   show(time: number): void {
     const text = this.spec.readout?.(time) ?? "";
-    if (this.value.textContent !== text) this.value.textContent = text;
+    setText(this.value, text);
+    this.spec.show?.(time);
   }
 
   draw(left: number): void {

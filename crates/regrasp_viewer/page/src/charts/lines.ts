@@ -4,7 +4,7 @@ import { dot, norm } from "../math";
 import type { Motion } from "../motion";
 import type { Story } from "../story";
 import { fingerColour } from "../theme";
-import { el } from "../dom";
+import { el, setText } from "../dom";
 import { fitted, tickText, ticks, transferBands, type ChartSpec, type Drawing } from "./frame";
 
 const TOP = 10;
@@ -188,6 +188,7 @@ export function forceChart(story: Story, motion: Motion): ChartSpec {
   };
   const curves = fingers.map((_, finger) => motion.waypoints.map((__, i) => normalForce(finger, i)));
   const range = span(curves.flat(), [0]);
+  const items = fingers.map((finger, i) => keyItem(finger.name, fingerColour(i), i));
   return {
     id: "force",
     title: "Normal forces, N",
@@ -199,9 +200,9 @@ export function forceChart(story: Story, motion: Motion): ChartSpec {
         curve(drawing, motion, y, { values, colour: fingerColour(finger), dash: DASHES[finger % DASHES.length], width: 1.75 });
       });
     },
-    readout(time) {
-      const now = motion.contacts(time);
-      return now.map((c) => (c.force ? (-dot(c.force, c.normal)).toFixed(1) : "\u2013")).join("  ");
+    below: el("ul", { class: "key values" }, ...items.map((item) => item.element)),
+    show(time) {
+      motion.contacts(time).forEach((c, i) => setText(items[i].value, c.force ? `${(-dot(c.force, c.normal)).toFixed(1)} N` : "\u2013"));
     },
   };
 }
@@ -213,7 +214,8 @@ export function jointChart(story: Story, motion: Motion, redraw: () => void): Ch
   const groups = jointGroups(story);
   let shown = 0;
   const tabs = el("div", { class: "tabs", role: "group", "aria-label": "Finger whose joints are shown" });
-  const legend = el("ul", { class: "key joints" });
+  const legend = el("ul", { class: "key values" });
+  let items: KeyItem[] = [];
   const bounds = (joint: number): Range => {
     const { lower, upper } = story.scene.joints[joint];
     if (lower !== null && upper !== null && upper > lower) return { low: lower, high: upper };
@@ -223,10 +225,15 @@ export function jointChart(story: Story, motion: Motion, redraw: () => void): Ch
     const { low, high } = bounds(joint);
     return (q - low) / (high - low || 1);
   };
+  const limits = (joint: number): string => {
+    const { lower, upper } = story.scene.joints[joint];
+    return lower === null || upper === null ? "no limits" : `${jointText(story, joint, lower)} to ${jointText(story, joint, upper)}`;
+  };
   const choose = (group: number): void => {
     shown = group;
     [...tabs.children].forEach((tab, i) => tab.setAttribute("aria-pressed", String(i === shown)));
-    legend.replaceChildren(...groups[shown].joints.map((joint, k) => legendItem(story, joint, k, groups[shown].finger)));
+    items = groups[shown].joints.map((joint, k) => keyItem(story.scene.joints[joint].name, fingerColour(groups[shown].finger), k, limits(joint)));
+    legend.replaceChildren(...items.map((item) => item.element));
     redraw();
   };
   groups.forEach((group, i) => {
@@ -264,9 +271,9 @@ export function jointChart(story: Story, motion: Motion, redraw: () => void): Ch
         curve(drawing, motion, y, { values, colour: fingerColour(finger), dash: DASHES[k % DASHES.length], width: 1.75 });
       });
     },
-    readout(time) {
+    show(time) {
       const q = motion.joints(time);
-      return groups[shown].joints.map((joint) => jointText(story, joint, q[joint])).join("  ");
+      items.forEach((item, k) => setText(item.value, jointText(story, groups[shown].joints[k], q[groups[shown].joints[k]])));
     },
   };
 }
@@ -277,15 +284,18 @@ function slides(story: Story, joint: number): boolean {
 }
 
 function jointText(story: Story, joint: number, q: number): string {
-  return slides(story, joint) ? `${(q * 1000).toFixed(1)} mm` : `${((q * 180) / Math.PI).toFixed(0)}\u00b0`;
+  return slides(story, joint) ? `${(q * 1000).toFixed(1)} mm` : `${((q * 180) / Math.PI).toFixed(0).replace("-", "\u2212")}\u00b0`;
 }
 
-function legendItem(story: Story, joint: number, k: number, finger: number): HTMLElement {
+interface KeyItem { element: HTMLElement; value: HTMLElement }
+
+/** A line as the chart draws its k-th one, with its name and room for its value. */
+function keyItem(name: string, colour: string, k: number, hint: string | null = null): KeyItem {
   const sample = el("canvas", { width: 44, height: 12, "aria-hidden": "true" });
   const context = sample.getContext("2d");
   if (context) {
     context.scale(2, 2);
-    context.strokeStyle = fingerColour(finger);
+    context.strokeStyle = colour;
     context.lineWidth = 1.75;
     context.setLineDash(DASHES[k % DASHES.length]);
     context.beginPath();
@@ -293,9 +303,8 @@ function legendItem(story: Story, joint: number, k: number, finger: number): HTM
     context.lineTo(22, 3);
     context.stroke();
   }
-  const { name, lower, upper } = story.scene.joints[joint];
-  const limits = lower === null || upper === null ? "no limits" : `${jointText(story, joint, lower)} to ${jointText(story, joint, upper)}`;
-  return el("li", { title: limits }, sample, el("span", { class: "name" }, name));
+  const value = el("span", { class: "value" });
+  return { element: el("li", { title: hint ? `${name}: ${hint}` : name }, sample, el("span", { class: "name" }, name), value), value };
 }
 
 interface JointGroup { name: string; finger: number; joints: number[] }

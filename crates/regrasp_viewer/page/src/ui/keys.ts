@@ -20,7 +20,8 @@ const HELP: [string[], string][] = [
   [["<", ">"], "Slower, faster"],
   [["R"], "Repeat"],
   [["F"], "Frame the hand"],
-  [["C", "V", "G"], "Friction cones, visual shapes, ghosts"],
+  [["C", "G"], "Friction cones, start and goal in place"],
+  [["H", "V"], "See through the hand, visual or collision shapes"],
   [["T"], "Light, dark"],
   [["?"], "This help"],
 ];
@@ -62,6 +63,7 @@ export function listenToKeys(player: Player, motion: Motion, actions: Actions, h
     r: () => player.setRepeats(!player.repeats),
     f: () => actions.frame(),
     c: () => actions.toggle("cones"),
+    h: () => actions.toggle("seeThrough"),
     v: () => actions.toggle("visual"),
     g: () => actions.toggle("ghosts"),
     t: () => actions.theme(),

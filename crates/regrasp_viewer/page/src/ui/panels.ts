@@ -37,7 +37,7 @@ export function figures(story: Story, motion: Motion): HTMLElement | null {
   if (story.judged) {
     const { margin, clearance, required_margin, pair, pairs } = story.judged;
     const i = indexOfLeast(margin);
-    put("Closure margin", i < 0 ? "\u2013" : margin[i]!.toFixed(3), "", `required ${required_margin}`);
+    put("Closure margin", i < 0 ? "\u2013" : margin[i]!.toFixed(4), "", `required ${required_margin}`);
     const k = indexOfLeast(clearance);
     put("Clearance", k < 0 ? "\u2013" : (clearance[k]! * 1000).toFixed(2), k < 0 ? "" : "mm", k < 0 ? "" : pairs[pair[k]]?.join(" \u2013 ") ?? "");
   }
@@ -52,7 +52,7 @@ export function violations(story: Story): HTMLElement | null {
 
 export function facts(story: Story): HTMLElement | null {
   if (story.facts.length === 0) return null;
-  const rows = story.facts.map(([name, value]) => el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, value)));
+  const rows = story.facts.map(([name, value]) => el("tr", {}, el("th", { scope: "row" }, name), el("td", { class: /^sha256 [0-9a-f]{64}$/.test(value) ? "hash" : null }, value)));
   return el("section", { class: "card" }, el("h2", {}, story.plan ? "The plan" : "The query"), el("table", { class: "facts" }, el("tbody", {}, ...rows)));
 }
 
@@ -66,7 +66,7 @@ export function failure(story: Story): HTMLElement | null {
     card.append(el("p", { class: "miss" }, el("span", { class: "swatch-object" }), `Nearest miss, shown beside: ${degrees(miss.angle_left)}${distance} from the goal.`));
   }
   if (failed.causes.length > 0) card.append(causes(failed.causes));
-  if (failed.advice) card.append(el("p", { class: "advice" }, el("strong", {}, "What to try "), failed.advice));
+  if (failed.advice) card.append(el("div", { class: "advice" }, el("h3", {}, "What to try"), el("p", {}, failed.advice)));
   return card;
 }
 

@@ -1,6 +1,6 @@
 // The 3-D view with what lies over it: what happens now, who holds, layers, start and goal.
 
-import { button, el, icon } from "../dom";
+import { button, el, icon, setText } from "../dom";
 import type { Motion } from "../motion";
 import type { Player } from "../player";
 import type { Story } from "../story";
@@ -9,6 +9,7 @@ import type { Layer, Stage } from "../view/stage";
 
 const LAYERS: [Layer, string][] = [
   ["visual", "Visual shapes"],
+  ["seeThrough", "See through the hand"],
   ["contacts", "Contacts and normals"],
   ["cones", "Friction cones"],
   ["forces", "Forces"],
@@ -96,7 +97,7 @@ export class Viewport {
   private show(time: number): void {
     const { motion, story } = this;
     if (!story.plan) {
-      set(this.caption, story.failure?.nearest_miss ? "Nearest miss" : "Start");
+      setText(this.caption, story.failure?.nearest_miss ? "Nearest miss" : "Start");
       return;
     }
     const at = motion.stretchAt(time);
@@ -105,15 +106,11 @@ export class Viewport {
     const same = motion.stretches.filter((s) => s.kind === stretch.kind);
     const number = `${same.indexOf(stretch) + 1} of ${same.length}`;
     const name = story.scene.fingers[stretch.moving]?.name;
-    set(this.caption, stretch.kind === "regrasp" ? `Relocation ${number}${name ? `: ${name} moves` : ""}` : `Transfer ${number}`);
+    setText(this.caption, stretch.kind === "regrasp" ? `Relocation ${number}${name ? `: ${name} moves` : ""}` : `Transfer ${number}`);
     motion.contacts(time).forEach((contact, i) => {
       const moves = contact.mode === "free" && stretch.moving === i;
-      set(this.states[i], STATES[moves ? "moving" : contact.mode]);
+      setText(this.states[i], STATES[moves ? "moving" : contact.mode]);
       this.states[i].parentElement!.classList.toggle("away", contact.mode === "free");
     });
   }
-}
-
-function set(element: HTMLElement, text: string): void {
-  if (element.textContent !== text) element.textContent = text;
 }

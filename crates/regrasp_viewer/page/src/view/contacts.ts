@@ -1,106 +1,111 @@
 // What is drawn on the object: contacts of now with normal, friction cone and force, and the trace of all contacts.
 
 import {
-  BufferAttribute, BufferGeometry, CircleGeometry, Color, ConeGeometry, CylinderGeometry, DoubleSide, GreaterDepth, Group, InstancedMesh,
-  Matrix4, Mesh, MeshBasicMaterial, OctahedronGeometry, Quaternion, RingGeometry, Vector3,
+  BufferAttribute, BufferGeometry, CircleGeometry, Color, ConeGeometry, CylinderGeometry, DoubleSide, Float32BufferAttribute, GreaterDepth, Group,
+  InstancedMesh, Matrix4, Mesh, MeshBasicMaterial, Points, PointsMaterial, Quaternion, RingGeometry, Vector3, type MeshBasicMaterialParameters,
 } from "three";
+import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import { add, cross, norm, scale, sub, unit, type Vec3 } from "../math";
-import type { ContactNow, Hold, Motion } from "../motion";
+import type { Hold, Motion } from "../motion";
 import type { SceneStory } from "../story";
 import { fingerColour } from "../theme";
 
-const Z = new Vector3(0, 0, 1);
 const Y = new Vector3(0, 1, 0);
+const Z = new Vector3(0, 0, 1);
+const NOWHERE = new Matrix4().makeScale(0, 0, 0);
 
-/** A mesh, and the same faintly where something stands before it. */
-function seenThrough(geometry: BufferGeometry, colour: string): Group {
-  const front = new Mesh(geometry, new MeshBasicMaterial({ color: colour, side: DoubleSide }));
-  const behind = new Mesh(geometry, new MeshBasicMaterial({
-    color: colour, side: DoubleSide, transparent: true, opacity: 0.3, depthFunc: GreaterDepth, depthWrite: false,
-  }));
-  behind.renderOrder = 3;
-  return new Group().add(front, behind);
+/** One part of the marks, once per finger, drawn in one go. */
+class Part {
+  readonly mesh: InstancedMesh;
+
+  constructor(geometry: BufferGeometry, nFingers: number, look: MeshBasicMaterialParameters, renderOrder = 0) {
+    this.mesh = new InstancedMesh(geometry, new MeshBasicMaterial({ side: DoubleSide, ...look }), nFingers);
+    this.mesh.frustumCulled = false;
+    this.mesh.renderOrder = renderOrder;
+    for (let i = 0; i < nFingers; i++) this.mesh.setColorAt(i, new Color(fingerColour(i)));
+  }
+
+  put(finger: number, where: Matrix4 | null): void {
+    this.mesh.setMatrixAt(finger, where ?? NOWHERE);
+    this.mesh.instanceMatrix.needsUpdate = true;
+  }
 }
 
-class FingerContact {
-  readonly group = new Group();
-  readonly cone: Group;
-  readonly arrow: Group;
-  private readonly disc: Group;
-  private readonly ring: Group;
-  private readonly shaft: Group;
-  private readonly head: Group;
+/** Parts with the same geometry twice: as it is, and faintly where something stands before it. */
+function seenThrough(geometry: BufferGeometry, nFingers: number): Part[] {
+  const behind = { transparent: true, opacity: 0.3, depthFunc: GreaterDepth, depthWrite: false } as const;
+  return [new Part(geometry, nFingers, {}), new Part(geometry, nFingers, behind, 3)];
+}
 
-  constructor(colour: string, size: number, reach: number, friction: number) {
-    this.disc = seenThrough(new CircleGeometry(size, 20), colour);
-    this.ring = seenThrough(new RingGeometry(size * 0.55, size * 1.15, 24), colour);
-    const needle = new CylinderGeometry(size * 0.12, size * 0.12, reach, 6).rotateX(Math.PI / 2).translate(0, 0, reach / 2);
-    const normal = seenThrough(needle, colour);
-    this.disc.position.z = this.ring.position.z = size * 0.06;
-
-    const wall = new ConeGeometry(friction * reach, reach, 32, 1, true).rotateX(-Math.PI / 2).translate(0, 0, reach / 2);
-    const rim = new RingGeometry(friction * reach * 0.975, friction * reach, 40).translate(0, 0, reach);
-    const veil = new MeshBasicMaterial({ color: colour, side: DoubleSide, transparent: true, opacity: 0.2, depthWrite: false });
-    const cone = new Mesh(wall, veil);
-    cone.renderOrder = 2;
-    this.cone = new Group().add(cone, new Mesh(rim, new MeshBasicMaterial({ color: colour, side: DoubleSide })));
-
-    this.shaft = seenThrough(new CylinderGeometry(size * 0.24, size * 0.24, 1, 8).translate(0, -0.5, 0), colour);
-    this.head = seenThrough(new ConeGeometry(size * 0.7, size * 1.6, 12).translate(0, -size * 0.8, 0), colour);
-    this.arrow = new Group().add(this.shaft, this.head);
-    this.group.add(this.disc, this.ring, normal, this.cone);
+/** A cone with its point at the origin that opens along z, veiled, with a clear rim. */
+function coneGeometry(reach: number, friction: number): BufferGeometry {
+  const wall = new ConeGeometry(friction * reach, reach, 32, 1, true).rotateX(-Math.PI / 2).translate(0, 0, reach / 2);
+  const rim = new RingGeometry(friction * reach * 0.975, friction * reach, 40).translate(0, 0, reach);
+  for (const [geometry, opacity] of [[wall, 0.2], [rim, 0.95]] as [BufferGeometry, number][]) {
+    const n = geometry.getAttribute("position").count;
+    geometry.setAttribute("color", new Float32BufferAttribute(Array.from({ length: n }, () => [1, 1, 1, opacity]).flat(), 4));
   }
-
-  show(contact: ContactNow, forceLength: number): void {
-    this.group.visible = contact.mode !== "free";
-    this.arrow.visible = this.group.visible && contact.force !== null;
-    if (!this.group.visible) return;
-    this.group.position.set(...contact.point);
-    this.group.quaternion.setFromUnitVectors(Z, new Vector3(...contact.normal));
-    this.disc.visible = contact.mode === "fixed";
-    this.ring.visible = contact.mode === "rolling";
-    if (!contact.force) return;
-    const length = norm(contact.force) * forceLength;
-    this.arrow.visible = length > 1e-9;
-    this.arrow.position.set(...contact.point);
-    this.arrow.quaternion.setFromUnitVectors(Y, new Vector3(...unit(contact.force)));
-    this.shaft.scale.set(1, Math.max(length, 1e-6), 1);
-  }
+  return mergeGeometries([wall, rim])!;
 }
 
 export class Contacts {
   readonly current = new Group();
   readonly trace: Group;
-  private readonly fingers: FingerContact[];
+  private readonly discs: Part[];
+  private readonly rings: Part[];
+  private readonly normals: Part;
+  private readonly cones: Part[];
+  private readonly shafts: Part[];
+  private readonly heads: Part[];
+  private readonly forceReach: number;
   private forcesShown = true;
 
   /** `objectSize`: half the largest side of the object, metres; `largestForce`: newtons, 0 without forces. */
   constructor(scene: SceneStory, private readonly motion: Motion, objectSize: number, private readonly largestForce: number) {
-    this.fingers = scene.fingers.map((finger, i) => {
-      const reach = Math.max(2.1 * finger.tip_radius, 0.45 * objectSize);
-      const made = new FingerContact(fingerColour(i), 0.085 * objectSize, reach, Math.max(scene.friction, 1e-3));
-      this.current.add(made.group, made.arrow);
-      return made;
-    });
+    const n = scene.fingers.length;
+    const size = 0.085 * objectSize;
+    const reaches = scene.fingers.map((finger) => Math.max(2.1 * finger.tip_radius, 0.45 * objectSize));
+    const reach = Math.max(...reaches, 0.45 * objectSize);
     this.forceReach = 1.3 * objectSize;
+    this.discs = seenThrough(new CircleGeometry(size, 20).translate(0, 0, size * 0.06), n);
+    this.rings = seenThrough(new RingGeometry(size * 0.55, size * 1.15, 24).translate(0, 0, size * 0.06), n);
+    this.normals = new Part(new CylinderGeometry(size * 0.12, size * 0.12, reach, 6, 1, true).rotateX(Math.PI / 2).translate(0, 0, reach / 2), n, {});
+    const veil = { transparent: true, depthWrite: false, vertexColors: true };
+    this.cones = [new Part(coneGeometry(reach, Math.max(scene.friction, 1e-3)), n, veil, 2)];
+    this.shafts = seenThrough(new CylinderGeometry(size * 0.24, size * 0.24, 1, 8, 1, true).translate(0, -0.5, 0), n);
+    this.heads = seenThrough(new ConeGeometry(size * 0.7, size * 1.6, 12).translate(0, -size * 0.8, 0), n);
+    for (const part of [...this.discs, ...this.rings, this.normals, ...this.cones, ...this.shafts, ...this.heads]) this.current.add(part.mesh);
     this.trace = traceOf(motion, objectSize);
   }
 
-  private readonly forceReach: number;
-
   setCones(shown: boolean): void {
-    for (const finger of this.fingers) finger.cone.visible = shown;
+    for (const cone of this.cones) cone.mesh.visible = shown;
   }
 
   setForces(shown: boolean): void {
     this.forcesShown = shown;
+    for (const part of [...this.shafts, ...this.heads]) part.mesh.visible = shown && this.largestForce > 0;
   }
 
   show(time: number): void {
-    const forceLength = this.largestForce > 0 ? this.forceReach / this.largestForce : 0;
-    this.motion.contacts(time).forEach((contact, i) => {
-      this.fingers[i]?.show(this.forcesShown ? contact : { ...contact, force: null }, forceLength);
+    let [fixed, rolling] = [false, false];
+    this.motion.contacts(time).forEach(({ mode, point, normal, force }, i) => {
+      const at = new Vector3(...point);
+      const turned = new Quaternion().setFromUnitVectors(Z, new Vector3(...normal));
+      const here = mode === "free" ? null : new Matrix4().compose(at, turned, new Vector3(1, 1, 1));
+      fixed ||= mode === "fixed";
+      rolling ||= mode === "rolling";
+      for (const part of this.discs) part.put(i, mode === "fixed" ? here : null);
+      for (const part of this.rings) part.put(i, mode === "rolling" ? here : null);
+      this.normals.put(i, here);
+      for (const part of this.cones) part.put(i, here);
+      const length = force && this.largestForce > 0 ? (norm(force) / this.largestForce) * this.forceReach : 0;
+      const along = force && length > 1e-9 && this.forcesShown ? new Quaternion().setFromUnitVectors(Y, new Vector3(...unit(force))) : null;
+      for (const part of this.heads) part.put(i, along && new Matrix4().compose(at, along, new Vector3(1, 1, 1)));
+      for (const part of this.shafts) part.put(i, along && new Matrix4().compose(at, along, new Vector3(1, length, 1)));
     });
+    for (const part of this.discs) part.mesh.visible = fixed;
+    for (const part of this.rings) part.mesh.visible = rolling;
   }
 }
 
@@ -111,34 +116,32 @@ function traceOf(motion: Motion, size: number): Group {
   const trace = new Group();
   const width = 0.022 * size;
   motion.holds.forEach((holds, finger) => {
-    const colour = new Color(fingerColour(finger));
+    const colour = fingerColour(finger);
     const material = new MeshBasicMaterial({ color: colour, side: DoubleSide });
-    const places: { at: Vec3; normal: Vec3; radius: number }[] = [];
+    const surfaces: BufferGeometry[] = [];
+    const dots: Vec3[] = [];
     holds.forEach((hold, i) => {
       const [first, last] = [hold.path[0], hold.path[hold.path.length - 1]];
-      places.push({ at: first.point, normal: first.normal, radius: 2 * width });
-      if (last !== first) {
-        trace.add(new Mesh(ribbon(hold, width), material));
-        places.push({ at: last.point, normal: last.normal, radius: 1.4 * width });
-      }
+      surfaces.push(disc(first, 2 * width));
+      if (last !== first) surfaces.push(ribbon(hold, width), disc(last, 1.4 * width));
       const next = holds[i + 1];
-      if (next) for (const at of arc(last, next.path[0], size)) places.push({ at, normal: [0, 0, 0], radius: 0.55 * width });
+      if (next) dots.push(...arc(last, next.path[0], size));
     });
-    const discs = places.filter((p) => norm(p.normal) > 0);
-    const dots = places.filter((p) => norm(p.normal) === 0).slice(0, MOST_DOTS);
-    trace.add(copies(new CircleGeometry(1, 14), material, discs, 0.008 * size), copies(new OctahedronGeometry(1), material, dots, 0));
+    if (surfaces.length > 0) trace.add(new Mesh(mergeGeometries(surfaces)!, material));
+    if (dots.length > 0) {
+      const points = new BufferGeometry().setAttribute("position", new Float32BufferAttribute(dots.slice(0, MOST_DOTS).flat(), 3));
+      trace.add(new Points(points, new PointsMaterial({ color: colour, size: 1.2 * width })));
+    }
   });
   return trace;
 }
 
-function copies(geometry: BufferGeometry, material: MeshBasicMaterial, places: { at: Vec3; normal: Vec3; radius: number }[], lift: number): InstancedMesh {
-  const mesh = new InstancedMesh(geometry, material, places.length);
-  places.forEach(({ at, normal, radius }, i) => {
-    const turn = norm(normal) > 0 ? new Quaternion().setFromUnitVectors(Z, new Vector3(...normal)) : new Quaternion();
-    const place = new Vector3(...add(at, scale(normal, lift)));
-    mesh.setMatrixAt(i, new Matrix4().compose(place, turn, new Vector3(radius, radius, radius)));
-  });
-  return mesh;
+function disc({ point, normal }: { point: Vec3; normal: Vec3 }, radius: number): BufferGeometry {
+  const turned = new Quaternion().setFromUnitVectors(Z, new Vector3(...normal));
+  const flat = new CircleGeometry(radius, 12).applyQuaternion(turned).translate(...add(point, scale(normal, 0.12 * radius)));
+  flat.deleteAttribute("normal");
+  flat.deleteAttribute("uv");
+  return flat;
 }
 
 function ribbon(hold: Hold, width: number): BufferGeometry {

@@ -103,3 +103,38 @@ export function geometryOf(pieces: PieceStory[], meshes: MeshStory[], decoded: M
   geometry.setIndex(new BufferAttribute(positions.length / 3 > 65535 ? new Uint32Array(index) : new Uint16Array(index), 1));
   return geometry;
 }
+
+/** A coarser copy for ghosts: vertices that share a cell of a grid of `cells` per longest side become one. */
+export function coarse(geometry: BufferGeometry, cells: number): BufferGeometry {
+  geometry.computeBoundingBox();
+  const { min, max } = geometry.boundingBox!;
+  const cell = Math.max(max.x - min.x, max.y - min.y, max.z - min.z) / cells || 1;
+  const [from, normal, index] = [geometry.getAttribute("position"), geometry.getAttribute("normal"), geometry.index!];
+  const known = new Map<string, number>();
+  const sums: number[][] = [];
+  const merged: number[] = [];
+  for (let i = 0; i < from.count; i++) {
+    const point = [from.getX(i), from.getY(i), from.getZ(i)];
+    const key = point.map((x, k) => Math.round((x - [min.x, min.y, min.z][k]) / cell)).join("/");
+    let at = known.get(key);
+    if (at === undefined) {
+      known.set(key, (at = sums.length));
+      sums.push([0, 0, 0, 0, 0, 0, 0]);
+    }
+    [...point, normal.getX(i), normal.getY(i), normal.getZ(i), 1].forEach((x, k) => { sums[at!][k] += x; });
+    merged.push(at);
+  }
+  const corners: number[] = [];
+  for (let t = 0; t < index.count; t += 3) {
+    const [a, b, c] = [0, 1, 2].map((k) => merged[index.getX(t + k)]);
+    if (a !== b && b !== c && c !== a) corners.push(a, b, c);
+  }
+  const made = new BufferGeometry();
+  made.setAttribute("position", new BufferAttribute(new Float32Array(sums.flatMap(([x, y, z, , , , n]) => [x / n, y / n, z / n])), 3));
+  made.setAttribute("normal", new BufferAttribute(new Float32Array(sums.flatMap(([, , , x, y, z]) => {
+    const length = Math.hypot(x, y, z) || 1;
+    return [x / length, y / length, z / length];
+  })), 3));
+  made.setIndex(corners);
+  return made;
+}

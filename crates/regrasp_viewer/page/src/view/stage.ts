@@ -1,8 +1,9 @@
 // The 3-D view. It draws when something changed, never on its own.
 
 import {
-  AmbientLight, Box3, Color, DirectionalLight, EdgesGeometry, Group, HemisphereLight, LineBasicMaterial, LineSegments, MathUtils, Mesh,
-  MeshLambertMaterial, NoToneMapping, PerspectiveCamera, Quaternion, Scene, Sphere, Vector3, WebGLRenderer, type BufferGeometry, type Material,
+  Box3, Color, CustomBlending, DirectionalLight, EdgesGeometry, Group, HemisphereLight, LineBasicMaterial, LineSegments, MathUtils, Mesh,
+  MeshLambertMaterial, NoToneMapping, OneFactor, OneMinusSrcAlphaFactor, PerspectiveCamera, Quaternion, Scene, Sphere, SrcAlphaFactor, Vector3, WebGLRenderer, type BufferGeometry, type Material,
+  type MeshLambertMaterialParameters,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { largestForce } from "../charts/lines";
@@ -14,16 +15,17 @@ import type { PieceStory, PoseData, Story } from "../story";
 import { fingerColour, type Theme } from "../theme";
 import { Contacts } from "./contacts";
 import { patterned, type PatternColours } from "./materials";
-import { geometryOf, type Triangles } from "./mesh";
+import { coarse, geometryOf, type Triangles } from "./mesh";
 
-export type Layer = "visual" | "ghosts" | "contacts" | "cones" | "forces" | "trace" | "obstacles";
+export type Layer = "visual" | "seeThrough" | "ghosts" | "contacts" | "cones" | "forces" | "trace" | "obstacles";
 
 interface Ghost { group: Group; pose: Pose }
 
 export class Stage {
   readonly canvas: HTMLCanvasElement;
-  readonly layers: Record<Layer, boolean> = { visual: true, ghosts: true, contacts: true, cones: true, forces: true, trace: true, obstacles: true };
-  readonly nTriangles: number;
+  readonly layers: Record<Layer, boolean> = {
+    visual: true, seeThrough: false, ghosts: true, contacts: true, cones: true, forces: true, trace: true, obstacles: true,
+  };
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
   private readonly camera: PerspectiveCamera;
@@ -33,21 +35,32 @@ export class Stage {
   private readonly obstacles = new Group();
   private readonly contacts: Contacts;
   private readonly ghosts: Ghost[] = [];
-  private readonly shapes: { mesh: Mesh; role: PieceStory["role"]; alone: boolean }[] = [];
+  private readonly shapes: { mesh: Mesh; role: PieceStory["role"] }[] = [];
+  private readonly handMaterials: MeshLambertMaterial[] = [];
+  private readonly hasVisual: boolean;
   private readonly repaint: (() => void)[] = [];
   private readonly pattern: PatternColours = { light: new Color(), dark: new Color(), mark: new Color() };
   private readonly insets: { scene: Scene; canvas: HTMLCanvasElement }[] = [];
   private readonly insetCamera = new PerspectiveCamera(24, 1, 0.01, 10);
-  private readonly focus: Sphere;
+  private readonly focus: { points: Vector3[]; sphere: Sphere };
   private readonly software: boolean;
   /** True once somebody placed the camera; until then it frames the hand at every size. */
   private placed = false;
+  private ratio = 0;
+  private size: [number, number] = [1, 1];
+  private sized: [number, number] = [0, 0];
+  private movingRatio: number;
+  private interval = 16;
+  private drawn = -1e9;
+  private rough = false;
   private dirty = true;
   private insetsDirty = true;
 
   /** Throws where there is no WebGL. */
   constructor(private readonly story: Story, private readonly motion: Motion, private readonly theme: Theme, onCamera: () => void) {
     this.software = drawnBySoftware();
+    this.hasVisual = story.scene.pieces.some((piece) => piece.role === "visual");
+    this.movingRatio = this.software ? 1 : Math.min(devicePixelRatio || 1, 2);
     this.renderer = new WebGLRenderer({ antialias: !this.software, powerPreference: "high-performance" });
     this.renderer.toneMapping = NoToneMapping;
     this.canvas = this.renderer.domElement;
@@ -67,7 +80,6 @@ export class Stage {
     this.links = story.scene.links.map(() => new Group());
     this.scene.add(...this.links, this.object, this.obstacles);
     const body = this.addPieces(decoded);
-    this.nTriangles = this.shapes.reduce((sum, s) => sum + (s.mesh.geometry.index?.count ?? 0) / 3, 0);
     const size = body ? Math.max(...body.half.toArray()) : 0.03;
     this.contacts = new Contacts(story.scene, motion, size, largestForce(motion));
     this.object.add(this.contacts.current, this.contacts.trace);
@@ -90,7 +102,6 @@ export class Stage {
       const key = `${piece.on}/${piece.role}/${piece.is_tip}`;
       groups.set(key, [...(groups.get(key) ?? []), piece]);
     }
-    const hasRole = (on: PieceStory["on"], role: string) => scene.pieces.some((p) => p.on === on && p.role === role);
     let body: { geometry: BufferGeometry; middle: Vector3; half: Vector3 } | null = null;
     for (const pieces of groups.values()) {
       const { on, role, is_tip } = pieces[0];
@@ -108,13 +119,14 @@ export class Stage {
       const edges = on === "object" || on === "world" ? this.edges(geometry, on === "world" ? 0.5 : 0.35) : null;
       if (edges) mesh.add(edges);
       (on === "object" ? this.object : on === "world" ? this.obstacles : this.links[on] ?? this.scene).add(mesh);
-      this.shapes.push({ mesh, role, alone: !hasRole(on, role === "visual" ? "collision" : "visual") });
+      this.shapes.push({ mesh, role });
     }
     return body;
   }
 
   private linkMaterial(finger: number, isTip: boolean): MeshLambertMaterial {
     const material = new MeshLambertMaterial();
+    this.handMaterials.push(material);
     const own = new Color(fingerColour(finger));
     const share = finger < 0 ? 0 : isTip ? 0.9 : 0.4;
     this.repaint.push(() => material.color.set(this.theme.colours.palm).lerp(own, share));
@@ -137,24 +149,34 @@ export class Stage {
   }
 
   private addLights(scene: Scene): void {
-    scene.add(new AmbientLight(0xffffff, 0.9), new HemisphereLight(0xffffff, 0x8d8a86, 1.1));
+    scene.add(new HemisphereLight(0xffffff, 0xc8c6c4, 2));
     const lamp = new DirectionalLight(0xffffff, 1.7);
     lamp.position.copy(this.camera.up).multiplyScalar(2).add(new Vector3(0.8, -1.1, 0.4));
     scene.add(lamp);
   }
 
-  /** Start and goal in place, shells behind whatever covers them, and each once more in a small view of its own. */
+  /**
+   * Start and goal in place, and each once more in a small view of its own. In place they are painted before everything else
+   * (blended, yet in the pass of opaque things), so that they never shine through nor flicker with the object.
+   */
   private addGhosts(geometry: BufferGeometry, middle: Vector3, half: Vector3): void {
     const { story } = this;
     const [start, goal] = [story.plan?.start ?? story.asked[0], story.plan?.goal ?? story.asked[story.asked.length - 1]];
+    const simple = geometry.index!.count > 6000 ? coarse(geometry, 22) : geometry;
     const put = (data: PoseData | undefined, opacity: number): void => {
       if (!data) return;
-      const look = { transparent: true, opacity, depthWrite: false, polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 4 };
-      const shell = new Mesh(geometry, patterned(middle, half, this.pattern, look));
-      shell.renderOrder = 1;
+      const look: MeshLambertMaterialParameters = {
+        opacity, depthWrite: false, blending: CustomBlending, blendSrc: SrcAlphaFactor,
+        blendDst: OneMinusSrcAlphaFactor, blendSrcAlpha: OneFactor, blendDstAlpha: OneMinusSrcAlphaFactor,
+      };
+      const shell = new Mesh(simple, patterned(middle, half, this.pattern, look));
+      shell.renderOrder = -1;
       const group = new Group().add(shell);
-      const edges = this.edges(geometry, 0.6);
-      if (edges) group.add(edges);
+      const edges = this.edges(geometry, 0.45);
+      if (edges) {
+        edges.renderOrder = 1;
+        group.add(edges);
+      }
       const pose = poseFrom(data);
       group.position.set(...pose.position);
       group.quaternion.set(...pose.quat);
@@ -187,27 +209,27 @@ export class Stage {
     return this.insets.map((inset) => inset.canvas);
   }
 
-  /** Ball about fingers and object, all along the motion; the palm counts where it is not far larger. */
-  private findFocus(): Sphere {
-    const near = new Box3();
-    const all = new Box3();
+  /** Corners of the boxes of fingers and object, all along the motion; the palm counts where it is not far larger. */
+  private findFocus(): { points: Vector3[]; sphere: Sphere } {
+    const near: Box3[] = [];
+    const far: Box3[] = [];
     for (let i = 0; i <= 4; i++) {
       this.setTime(this.motion.start + ((this.motion.end - this.motion.start) * i) / 4);
       this.scene.updateMatrixWorld(true);
       this.links.forEach((link, k) => {
         const box = new Box3().setFromObject(link);
-        all.union(box);
-        if (this.story.scene.links[k].finger >= 0) near.union(box);
+        if (!box.isEmpty()) (this.story.scene.links[k].finger >= 0 ? near : far).push(box);
       });
-      const box = new Box3();
-      for (const child of this.object.children) if (child instanceof Mesh) box.expandByObject(child);
-      near.union(box);
-      all.union(box);
+      for (const child of this.object.children) if (child instanceof Mesh) near.push(new Box3().setFromObject(child));
     }
+    for (const ghost of this.ghosts) near.push(new Box3().setFromObject(ghost.group));
     this.setTime(this.motion.start);
-    const [close, wide] = [near, all].map((box) => box.getBoundingSphere(new Sphere()));
-    if (all.isEmpty()) return new Sphere(new Vector3(), 0.1);
-    return near.isEmpty() || wide.radius < 1.35 * close.radius ? wide : close;
+    const ball = (boxes: Box3[]) => boxes.reduce((all, box) => all.union(box), new Box3()).getBoundingSphere(new Sphere());
+    if (near.length + far.length === 0) return { points: [new Vector3()], sphere: new Sphere(new Vector3(), 0.1) };
+    const all = near.length === 0 || ball([...near, ...far]).radius < 1.5 * ball(near).radius ? [...near, ...far] : near;
+    const points = all.flatMap(({ min, max }) => [0, 1, 2, 3, 4, 5, 6, 7].map((i) =>
+      new Vector3(i & 1 ? max.x : min.x, i & 2 ? max.y : min.y, i & 4 ? max.z : min.z)));
+    return { points, sphere: ball(all) };
   }
 
   // ---- showing ----
@@ -237,7 +259,15 @@ export class Stage {
 
   setLayer(layer: Layer, shown: boolean): void {
     this.layers[layer] = shown;
-    for (const { mesh, role, alone } of this.shapes) mesh.visible = alone || (role === "visual") === this.layers.visual;
+    // Each role is complete where there is any piece of it.
+    const role = this.layers.visual && this.hasVisual ? "visual" : "collision";
+    for (const shape of this.shapes) shape.mesh.visible = shape.role === role;
+    for (const material of this.handMaterials) {
+      material.transparent = this.layers.seeThrough;
+      material.opacity = this.layers.seeThrough ? 0.35 : 1;
+      material.depthWrite = !this.layers.seeThrough;
+      material.needsUpdate = true;
+    }
     this.contacts.current.visible = this.layers.contacts;
     this.contacts.setCones(this.layers.cones);
     this.contacts.setForces(this.layers.forces);
@@ -249,7 +279,8 @@ export class Stage {
   /** Layers that this story has anything for. */
   has(layer: Layer): boolean {
     const { pieces } = this.story.scene;
-    if (layer === "visual") return pieces.some((p) => p.role === "visual") && this.shapes.some((s) => !s.alone);
+    if (layer === "visual") return this.hasVisual && pieces.some((p) => p.role === "collision");
+    if (layer === "seeThrough") return pieces.some((p) => typeof p.on === "number");
     if (layer === "obstacles") return pieces.some((p) => p.on === "world");
     if (layer === "forces") return this.motion.hasForces;
     if (layer === "contacts" || layer === "cones" || layer === "trace") return this.motion.holds.some((h) => h.length > 0);
@@ -258,11 +289,28 @@ export class Stage {
 
   /** Puts the camera where hand and object fill the view. */
   frame(): void {
-    const half = Math.min(MathUtils.degToRad(this.camera.fov) / 2, Math.atan(Math.tan(MathUtils.degToRad(this.camera.fov) / 2) * this.camera.aspect));
-    const distance = (this.focus.radius / Math.sin(half)) * 0.98;
-    this.controls.minDistance = this.focus.radius * 0.15;
-    this.controls.maxDistance = this.focus.radius * 30;
-    this.look({ azimuth: -55, elevation: 26, distance, target: this.focus.center.toArray() });
+    const { points, sphere } = this.focus;
+    this.controls.minDistance = sphere.radius * 0.15;
+    this.controls.maxDistance = sphere.radius * 30;
+    const up = Math.tan(MathUtils.degToRad(this.camera.fov) / 2) * 0.82;
+    const side = up * this.camera.aspect;
+    const target = sphere.center.clone();
+    let distance = sphere.radius * 4;
+    // The view's middle and distance such that the outermost points touch its edges; each round nears it.
+    for (let round = 0; round < 6; round++) {
+      this.look({ azimuth: -55, elevation: 26, distance, target: target.toArray() });
+      this.camera.updateMatrixWorld(true);
+      const seen = points.map((p) => p.clone().applyMatrix4(this.camera.matrixWorldInverse));
+      const bounds = new Box3().setFromPoints(seen.map(({ x, y, z }) => new Vector3(x / -z, y / -z, 0)));
+      const middle = bounds.getCenter(new Vector3()).multiplyScalar(distance);
+      target.add(new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 0).multiplyScalar(middle.x));
+      target.add(new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 1).multiplyScalar(middle.y));
+      const size = bounds.getSize(new Vector3());
+      distance *= Math.max(size.x / 2 / side, size.y / 2 / up);
+    }
+    // Somewhat above the middle: names and small views lie below.
+    target.add(new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 1).multiplyScalar(-0.07 * up * distance));
+    this.look({ azimuth: -55, elevation: 26, distance, target: target.toArray() });
     this.placed = false;
   }
 
@@ -296,23 +344,50 @@ export class Stage {
 
   resize(width: number, height: number): void {
     if (width < 1 || height < 1) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio || 1, this.software ? 1 : 2));
-    this.renderer.setSize(width, height);
+    this.size = [width, height];
+    this.setRatio(this.stillRatio());
     this.camera.aspect = width / height;
-    this.camera.near = this.focus.radius * 0.02;
-    this.camera.far = this.focus.radius * 80;
+    this.camera.near = this.focus.sphere.radius * 0.02;
+    this.camera.far = this.focus.sphere.radius * 80;
     this.camera.updateProjectionMatrix();
     if (!this.placed) this.frame();
     this.dirty = this.insetsDirty = true;
   }
 
-  /** Draws if anything changed since the last time. */
-  draw(): boolean {
-    if (!this.dirty) return false;
+  /** Pixels of the picture per CSS pixel while nothing moves: where the processor draws, twice as fine smooths edges. */
+  private stillRatio(): number {
+    return this.software ? 2 : Math.min(devicePixelRatio || 1, 2);
+  }
+
+  private setRatio(ratio: number): void {
+    if (ratio === this.ratio && this.size[0] === this.sized[0] && this.size[1] === this.sized[1]) return;
+    this.ratio = ratio;
+    this.sized = this.size;
+    this.renderer.setPixelRatio(ratio);
+    this.renderer.setSize(...this.size);
+  }
+
+  /** Draws if anything changed since the last time; once more and finer when it has been still for a moment. */
+  draw(now: number): boolean {
+    const settles = this.rough && now - this.drawn > 200;
+    if (!this.dirty && !settles) return false;
+    const moves = this.dirty && now - this.drawn < 200;
+    if (moves) this.pace(now - this.drawn);
+    this.rough = moves && this.movingRatio < this.stillRatio();
+    this.setRatio(moves ? Math.min(this.movingRatio, this.stillRatio()) : this.stillRatio());
     if (this.insetsDirty) this.drawInsets();
     this.renderer.render(this.scene, this.camera);
     this.dirty = false;
+    this.drawn = now;
     return true;
+  }
+
+  /** Coarser pictures while moving where drawing takes longer than 28 ms on average. */
+  private pace(interval: number): void {
+    this.interval += (interval - this.interval) * 0.08;
+    if (this.interval < 28 || this.movingRatio <= 0.5) return;
+    this.movingRatio = Math.max(0.5, this.movingRatio * 0.85);
+    this.interval = 16;
   }
 
   /** Small views keep the camera's direction; they are copied out, so that playing need not draw them again. */
@@ -320,7 +395,7 @@ export class Stage {
     this.insetsDirty = false;
     const pixels = Math.min(168, this.canvas.width, this.canvas.height);
     if (pixels < 8) return;
-    const out = this.camera.position.clone().sub(this.controls.target).normalize().multiplyScalar(5.2);
+    const out = this.camera.position.clone().sub(this.controls.target).normalize().multiplyScalar(6);
     this.insetCamera.up.copy(this.camera.up);
     this.insetCamera.position.copy(out);
     this.insetCamera.lookAt(0, 0, 0);
