@@ -109,7 +109,7 @@ export class Motion {
       const normalFrom = from.normal_in_object ?? [0, 0, 1];
       const forces = from.force_in_object && to.force_in_object;
       return {
-        mode: from.mode,
+        mode: from.mode === "rolling" && to.mode === "rolling" ? "rolling" : "fixed",
         point: lerp(pointFrom, to.point_in_object ?? pointFrom, u),
         normal: unit(lerp(normalFrom, to.normal_in_object ?? normalFrom, u)),
         force: forces ? lerp(from.force_in_object!, to.force_in_object!, u) : null,

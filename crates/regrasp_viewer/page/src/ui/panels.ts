@@ -63,7 +63,7 @@ export function failure(story: Story): HTMLElement | null {
   const miss = failed.nearest_miss;
   if (miss) {
     const distance = miss.distance_left > 1e-5 ? ` and ${(miss.distance_left * 1000).toFixed(1)} mm` : "";
-    card.append(el("p", { class: "miss" }, el("span", { class: "swatch-object" }), `Nearest miss, shown beside: ${degrees(miss.angle_left)}${distance} from the goal.`));
+    card.append(el("p", { class: "miss" }, el("span", { class: "swatch-object" }), `The nearest miss, shown in 3-D, is ${degrees(miss.angle_left)}${distance} from the goal.`));
   }
   if (failed.causes.length > 0) card.append(causes(failed.causes));
   if (failed.advice) card.append(el("div", { class: "advice" }, el("h3", {}, "What to try"), el("p", {}, failed.advice)));

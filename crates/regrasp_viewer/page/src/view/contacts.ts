@@ -130,7 +130,7 @@ function traceOf(motion: Motion, size: number): Group {
     if (surfaces.length > 0) trace.add(new Mesh(mergeGeometries(surfaces)!, material));
     if (dots.length > 0) {
       const points = new BufferGeometry().setAttribute("position", new Float32BufferAttribute(dots.slice(0, MOST_DOTS).flat(), 3));
-      trace.add(new Points(points, new PointsMaterial({ color: colour, size: 1.2 * width })));
+      trace.add(new Points(points, new PointsMaterial({ color: colour, size: 4 * width })));
     }
   });
   return trace;

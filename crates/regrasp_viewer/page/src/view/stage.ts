@@ -195,7 +195,8 @@ export class Stage {
       mesh.position.copy(middle).negate();
       const turned = new Group().add(mesh);
       turned.quaternion.set(...data.quat_xyzw);
-      turned.scale.setScalar(1 / half.length());
+      geometry.computeBoundingSphere();
+      turned.scale.setScalar(1 / (geometry.boundingSphere!.radius || 1));
       scene.add(turned);
       this.addLights(scene);
       const canvas = document.createElement("canvas");
