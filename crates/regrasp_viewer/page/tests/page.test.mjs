@@ -35,7 +35,7 @@ test("opens from disk with hand, object and charts", options, async () => {
   await page.waitForTimeout(400);
   const { different, commonest } = colours(await picture(page));
   assert.ok(different > 500 && commonest < 0.9, `${different} colours, ${commonest} of one`);
-  assert.equal(await page.locator(".verdict").innerText(), "Accepted by the checker");
+  assert.equal(await page.locator(".verdict").textContent(), "Accepted by the checker");
   const charts = page.locator(".chart canvas[role=img]");
   assert.equal(await charts.count(), 5);
   for (let i = 0; i < 5; i++) {
@@ -90,6 +90,7 @@ test("hovering a chart looks at a time, leaving goes back, clicking keeps it", o
     await page.mouse.move(2, 2);
     assert.equal(await shownTime(page), 1, id);
   }
+  await page.locator("#chart-margin .plot").scrollIntoViewIfNeeded();
   const box = await page.locator("#chart-margin .plot").boundingBox();
   await page.mouse.click(box.x + box.width * 0.8, box.y + box.height / 2);
   await page.mouse.move(2, 2);
@@ -187,7 +188,11 @@ test("the plan can be taken out of the page", options, async () => {
 });
 
 test("the content security policy stops other scripts", options, async () => {
-  const { page, requests, close } = await open(browser, ball);
+  const { page, close } = await open(browser, ball);
+  const failed = [];
+  const answered = [];
+  page.on("requestfailed", (request) => failed.push(request.failure().errorText));
+  page.on("response", (response) => answered.push(response.url()));
   await page.evaluate(() => {
     const script = document.createElement("script");
     script.textContent = "window.__ran = 1";
@@ -201,14 +206,16 @@ test("the content security policy stops other scripts", options, async () => {
   await page.waitForTimeout(500);
   assert.equal(await page.evaluate(() => window.__ran), undefined);
   assert.notEqual(await page.evaluate(() => getComputedStyle(document.getElementById("styled")).color), "rgb(1, 2, 3)");
-  assert.deepEqual(requests.filter((url) => url.startsWith("http")), []);
-  const blocked = await page.evaluate(() => {
+  assert.deepEqual(answered, []);
+  assert.ok(failed.length > 0 && failed.every((why) => why === "csp"), `${failed}`);
+  // Later, on the page's own account: what a debugger evaluates may make functions of text.
+  const blocked = await page.evaluate(() => new Promise((done) => setTimeout(() => {
     try {
-      return new Function("return 1")();
+      done(new Function("return 1")());
     } catch (error) {
-      return error.name;
+      done(error.name);
     }
-  });
+  }, 0)));
   assert.equal(blocked, "EvalError");
   await close();
   // The same page without its policy does run them: the test can see.
@@ -228,7 +235,7 @@ function hostile(count) {
     (n) => `<img src=x onerror="window.__ran=${n}">`, (n) => `</script><script>window.__ran=${n}</script>`, (n) => `<svg onload=window.__ran=${n}>`,
     (n) => `"><iframe srcdoc="<script>parent.__ran=${n}</script>">`, (n) => `javascript:window.__ran=${n}`, (n) => `</style><b>${n}`,
     (n) => `'"\`\${window.__ran=${n}}{{${n}}}`, (n) => `\u202e${n}\u2066<i>\u0000`, (n) => `<!--<script>${n}`, (n) => `&lt;b&gt;&amp;${n}`,
-    (n) => `${n}${"W".repeat(3000)}`, (n) => `${n}\u2028\u2029\n\r\t\\u003c`, (n) => `__proto__${n}`, (n) => `]]>${n}<![CDATA[`, (n) => `\ud83e\udd16\ud800${n}`,
+    (n) => `${n}${"W".repeat(3000)}`, (n) => `${n}\u2028\u2029\n\r\t\\u003c`, (n) => `__proto__${n}`, (n) => `]]>${n}<![CDATA[`, (n) => `\ud83e\udd16\ufffd\uffff${n}`,
   ];
   return kinds[count % kinds.length](count);
 }
@@ -258,9 +265,9 @@ test("300 names with markup run nothing and break nothing", options, async () =>
     // Names stand in the page as they are (a script that reads them back sees the same characters).
     assert.equal(await page.locator("h1").evaluate((e) => e.textContent), story.title);
     const cells = await page.locator(".facts td").evaluateAll((all) => all.map((e) => e.textContent));
-    assert.deepEqual(cells, story.facts.map(([, value]) => value.toWellFormed?.() ?? value.replace(/\ud800/g, "\ufffd")));
+    assert.deepEqual(cells, story.facts.map(([, value]) => value));
     if (!fails) {
-      assert.deepEqual(await page.locator(".wrong li").evaluateAll((all) => all.map((e) => e.textContent)), story.judged.violations.map((v) => v.replace(/\ud800/g, "\ufffd")));
+      assert.deepEqual(await page.locator(".wrong li").evaluateAll((all) => all.map((e) => e.textContent)), story.judged.violations);
       assert.equal(await page.locator(".legend li").count(), 8);
     }
     assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), "wider than the window");
@@ -303,7 +310,7 @@ test("a page without a plan says why", options, async () => {
   assert.equal(await page.locator(".causes li").count(), story.failure.causes.length);
   const widths = await page.locator(".causes .bar").evaluateAll((bars) => bars.map((b) => b.getBoundingClientRect().width));
   story.failure.causes.forEach((cause, i) => assert.ok(Math.abs(widths[i] / widths[0] - cause.share / story.failure.causes[0].share) < 0.02));
-  const text = await page.locator(".failure").innerText();
+  const text = await page.locator(".failure").textContent();
   for (const part of [story.failure.message, story.failure.advice, "60.7\u00b0", "52 %"]) assert.ok(text.includes(part), part);
   assert.equal(await page.locator(".transport, .chart").count(), 0);
   assert.ok(colours(await picture(page)).different > 500);
@@ -318,7 +325,7 @@ test("a page without a plan says why", options, async () => {
 test("a rejected plan says so first", options, async () => {
   const story = { ...ball, judged: { ...ball.judged, accepted: false, violations: ["finger \"index\" slips 0.4 mm at 3.1 s"], margin: ball.judged.margin.map(() => null) } };
   const opened = await open(browser, story);
-  assert.equal(await opened.page.locator(".verdict").innerText(), "Rejected by the checker");
+  assert.equal(await opened.page.locator(".verdict").textContent(), "Rejected by the checker");
   assert.match(await opened.page.locator(".wrong").innerText(), /slips 0\.4 mm/);
   await finish(opened);
 });
