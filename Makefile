@@ -84,10 +84,11 @@ page: $(PAGE)/node_modules
 $(PAGE)/node_modules: $(PAGE)/package-lock.json
 	cd $(PAGE) && npm ci --silent && touch node_modules
 
-# Says SKIPPED where there is no npm, or no Chromium (CHROMIUM names one that is not at /usr/bin/chromium).
+# Says SKIPPED where there is no npm, where it cannot install, or no Chromium (CHROMIUM names one that is not /usr/bin/chromium).
 test-page:
 	@if ! command -v npm >/dev/null; then echo "SKIPPED: no npm: tests of the page"; \
-	else $(MAKE) --no-print-directory $(PAGE)/node_modules && cd $(PAGE) && npm run --silent check && npm test --silent; fi
+	elif ! $(MAKE) --no-print-directory $(PAGE)/node_modules; then echo "SKIPPED: npm cannot install: tests of the page"; \
+	else cd $(PAGE) && npm run --silent check && npm test --silent; fi
 
 # Writes docs/benchmarks.md and docs/benchmarks/. One thread, so that times compare. The two methods of paper 000 draw poses
 # uniformly, as the paper does. The suite of paper 000 takes half an hour; cut off and run again, it goes on where it was.
