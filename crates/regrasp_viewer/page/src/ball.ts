@@ -70,14 +70,10 @@ export class Ball {
     };
     item("start", null, "start");
     item("goal", null, "goal");
-    const order = [...this.rank].slice(0, 4);
-    for (const [component, rank] of order) {
-      const size = sizes.get(component)!;
-      item(`component ${rank + 1}: ${size} node${size === 1 ? "" : "s"}`, COMPONENTS[rank] ?? "#9aa2a9", "");
-    }
-    const rest = [...this.rank].slice(4);
-    const alone = rest.filter(([component]) => sizes.get(component) === 1).length;
-    if (rest.length > alone) item(`${rest.length - alone} further components`, "#9aa2a9", "");
+    const groups = [...this.rank].filter(([component]) => sizes.get(component)! > 1);
+    for (const [component, rank] of groups.slice(0, 4)) item(`component ${rank + 1}: ${sizes.get(component)} nodes`, COMPONENTS[rank] ?? "#9aa2a9", "");
+    if (groups.length > 4) item(`${groups.length - 4} further components`, "#9aa2a9", "");
+    const alone = this.rank.size - groups.length;
     if (alone > 0) item(`${alone} isolated node${alone === 1 ? "" : "s"}`, null, "hollow");
     return el("div", {}, key, el("p", { class: "note" },
       "Distance from the centre is the angle turned since the start, direction its axis; the rim is 180\u00b0, where opposite points are the same."));

@@ -5,6 +5,6 @@ import { existsSync } from "node:fs";
 export const CHROMIUM = process.env.CHROMIUM || "/usr/bin/chromium";
 export const hasChromium = existsSync(CHROMIUM);
 export const FLAGS = [
-  "--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic",
+  "--headless", "--no-sandbox", "--disable-gpu", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic",
   "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync",
 ];

@@ -1,4 +1,4 @@
-// All charts on one time axis, with one cursor through them; hovering looks at a time, clicking keeps it.
+// All charts on one time axis, with a cursor through each; hovering looks at a time, clicking keeps it.
 
 import { el } from "../dom";
 import type { Motion } from "../motion";
@@ -12,7 +12,7 @@ import { clearanceChart, forceChart, jointChart, jointGroups, marginChart } from
 export class ChartStack {
   readonly element: HTMLElement;
   private readonly charts: Chart[];
-  private readonly cursor: HTMLElement;
+  private readonly cursors: HTMLElement[];
   private left = 64;
   private width = 0;
 
@@ -22,8 +22,8 @@ export class ChartStack {
     if (jointGroups(story).length > 0) specs.push(jointChart(story, motion, () => this.draw()));
     if (motion.hasForces) specs.push(forceChart(story, motion));
     this.charts = specs.map((spec) => new Chart(spec, motion, theme));
-    this.cursor = el("div", { class: "cursor", "aria-hidden": "true" });
-    this.element = el("div", { class: "charts" }, ...this.charts.map((c) => c.element), this.cursor);
+    this.element = el("div", { class: "charts" }, ...this.charts.map((c) => c.element));
+    this.cursors = [...this.element.querySelectorAll(".plot")].map((plot) => plot.appendChild(el("div", { class: "cursor", "aria-hidden": "true" })));
     if (!motion.hasForces) this.element.append(el("p", { class: "note" }, "This plan carries no contact forces."));
     this.listen();
     player.onTime((time) => this.show(time));
@@ -43,7 +43,8 @@ export class ChartStack {
   private show(time: number): void {
     const span = Math.max(this.motion.end - this.motion.start, 1e-9);
     const inner = Math.max(1, this.width - this.left - RIGHT);
-    this.cursor.style.transform = `translateX(${this.left + ((time - this.motion.start) / span) * inner}px)`;
+    const place = `translateX(${(this.left + ((time - this.motion.start) / span) * inner).toFixed(2)}px)`;
+    for (const cursor of this.cursors) cursor.style.transform = place;
     for (const chart of this.charts) chart.show(time);
   }
 

@@ -4,6 +4,7 @@ import { el, icon } from "../dom";
 import { indexOfLeast } from "../charts/lines";
 import type { Motion } from "../motion";
 import type { Story } from "../story";
+import { COMPONENTS } from "../theme";
 
 const degrees = (radians: number): string => `${((radians * 180) / Math.PI).toFixed(1)}\u00b0`;
 
@@ -94,18 +95,25 @@ export function components(story: Story): HTMLElement | null {
   const order = [...members.values()].sort((a, b) => b.length - a.length);
   if (order.length === 0) return null;
   const nodes = story.roadmap.nodes;
-  const rows = order.slice(0, 8).map((list, i) => {
-    const nearest = Math.min(...list.map((k) => nodes[k].angle_to_goal));
-    return el("tr", {}, el("td", {}, String(i + 1)), el("td", {}, String(list.length)), el("td", {}, degrees(nearest)));
-  });
+  const nearest = (list: number[]): string => degrees(Math.min(...list.map((k) => nodes[k].angle_to_goal)));
+  const row = (name: string, colour: string | null, size: number, list: number[]) => {
+    const dot = el("span", { class: colour ? "dot" : "dot hollow" });
+    if (colour) dot.style.background = colour;
+    return el("tr", {}, el("td", {}, el("span", { class: "named" }, dot, name)), el("td", {}, String(size)), el("td", {}, nearest(list)));
+  };
+  const groups = order.filter((list) => list.length > 1);
+  const alone = order.filter((list) => list.length === 1).flat();
+  const rows = groups.slice(0, 6).map((list, i) => row(`component ${i + 1}`, COMPONENTS[i], list.length, list));
+  const rest = groups.slice(6).flat();
+  if (rest.length > 0) rows.push(row(`${groups.length - 6} further`, "#9aa2a9", rest.length, rest));
+  if (alone.length > 0) rows.push(row("isolated nodes", null, alone.length, alone));
   return el(
     "section",
     { class: "card" },
-    el("h2", {}, order.length === 1 ? "One component" : `${order.length} components of the roadmap`),
-    el("p", { class: "note" }, "No motion was found from one component to another."),
+    el("h2", {}, order.length === 1 ? "One component of the roadmap" : `${order.length} components of the roadmap`),
+    order.length > 1 ? el("p", { class: "note" }, "No motion was found from one component to another.") : null,
     el("table", { class: "numbers" },
-      el("thead", {}, el("tr", {}, ...["Component", "Nodes", "Nearest to the goal"].map((t) => el("th", { scope: "col" }, t)))),
+      el("thead", {}, el("tr", {}, ...["", "Nodes", "Nearest to the goal"].map((t) => el("th", { scope: "col" }, t)))),
       el("tbody", {}, ...rows)),
-    order.length > 8 ? el("p", { class: "note" }, `${order.length - 8} more, of ${order.slice(8).reduce((n, l) => n + l.length, 0)} nodes.`) : null,
   );
 }

@@ -163,7 +163,7 @@ export class Stage {
     const { story } = this;
     const [start, goal] = [story.plan?.start ?? story.asked[0], story.plan?.goal ?? story.asked[story.asked.length - 1]];
     const simple = geometry.index!.count > 6000 ? coarse(geometry, 22) : geometry;
-    const put = (data: PoseData | undefined, opacity: number): void => {
+    const put = (data: PoseData | undefined, opacity: number, outline: number): void => {
       if (!data) return;
       const look: MeshLambertMaterialParameters = {
         opacity, depthWrite: false, blending: CustomBlending, blendSrc: SrcAlphaFactor,
@@ -172,7 +172,7 @@ export class Stage {
       const shell = new Mesh(simple, patterned(middle, half, this.pattern, look));
       shell.renderOrder = -1;
       const group = new Group().add(shell);
-      const edges = this.edges(geometry, 0.45);
+      const edges = this.edges(geometry, outline);
       if (edges) {
         edges.renderOrder = 1;
         group.add(edges);
@@ -183,9 +183,9 @@ export class Stage {
       this.scene.add(group);
       this.ghosts.push({ group, pose });
     };
-    put(start, 0.16);
-    put(goal, 0.3);
-    for (const way of story.asked.slice(1, -1)) put(way, 0.1);
+    put(start, 0.14, 0.15);
+    put(goal, 0.3, 0.45);
+    for (const way of story.asked.slice(1, -1)) put(way, 0.1, 0.15);
     for (const data of [start, goal]) {
       if (!data) continue;
       const scene = new Scene();
