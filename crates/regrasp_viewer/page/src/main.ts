@@ -90,7 +90,10 @@ function start(): void {
         { class: "right" },
         panels.violations(story),
         panels.failure(story),
-        panels.figures(story, motion),
+        panels.figures(story, motion, (time) => {
+          player.setPlaying(false);
+          player.seek(time);
+        }),
         charts ? el("section", { class: "card", "aria-label": "Charts over time" }, charts.element) : null,
         panels.components(story),
         ball.element,
@@ -122,6 +125,7 @@ function start(): void {
 
   listenToKeys(player, motion, {
     frame: () => stage?.frame(),
+    orbit: (azimuth, elevation, closer) => stage?.orbit(azimuth, elevation, closer),
     toggle: (layer) => viewport.toggle(layer),
     theme: () => theme.toggle(),
   }, help.open);

@@ -1,7 +1,7 @@
 // Colours. Those of the page are defined once, in page.css; drawings read them from there.
 
 /** Okabe and Ito's colours, then two more; finger i has colour i % 8 everywhere. */
-export const PALETTE = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#999933", "#7f3c8d"];
+export const PALETTE = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#999933", "#882255"];
 export const fingerColour = (finger: number): string => (finger < 0 ? "#8a9299" : PALETTE[finger % PALETTE.length]);
 
 /** Components of the roadmap (Tol's "bright"), the largest first; further ones are grey. */

@@ -153,9 +153,49 @@ test("the address keeps time and camera", options, async () => {
   await page.mouse.move(box.x + 300, box.y + 220, { steps: 4 });
   await page.mouse.up();
   await page.waitForFunction(() => !location.hash.includes("cam=20,40"));
+  const turned = await page.evaluate(() => location.hash);
+  await page.keyboard.press("l");
+  await page.keyboard.press("+");
+  await page.waitForFunction((before) => location.hash !== before, turned);
   await page.evaluate(() => { location.hash = "#t=1.5"; });
   await page.waitForFunction(() => document.querySelector(".clock").textContent.startsWith("1.50"));
   await finish(opened);
+});
+
+test("the worst moments are a click away, and parts have names", options, async () => {
+  const opened = await open(browser, ball);
+  const { page } = opened;
+  const times = ball.plan.segments.flatMap((segment) => segment.waypoints.map((w) => w.time));
+  for (const [i, values] of [[0, ball.judged.margin], [1, ball.judged.clearance]]) {
+    await page.locator(".figures .at").nth(i).click();
+    assert.equal(await shownTime(page), times[values.indexOf(Math.min(...values))]);
+  }
+  const box = await canvas(page).boundingBox();
+  const seen = new Set();
+  for (let k = 1; k < 12; k++) {
+    await page.mouse.move(box.x + (box.width * k) / 12, box.y + box.height * 0.35);
+    await page.waitForTimeout(60);
+    if (await page.locator(".hint").isVisible()) seen.add(await page.locator(".hint").textContent());
+  }
+  assert.ok(seen.has("ball") && seen.size > 1, [...seen].join());
+  await finish(opened);
+});
+
+test("stands in a sandboxed frame of another page", options, async () => {
+  const context = await browser.newContext();
+  const page = await context.newPage();
+  const complaints = [];
+  page.on("pageerror", (error) => complaints.push(String(error)));
+  page.on("console", (message) => message.type() === "error" && complaints.push(message.text()));
+  await page.setContent('<iframe sandbox="allow-scripts" width="1000" height="700"></iframe>');
+  await page.locator("iframe").evaluate((frame, html) => { frame.srcdoc = html; }, wrap(ball));
+  const frame = page.frameLocator("iframe");
+  await frame.locator(".play").click();
+  await frame.locator(".clock", { hasText: /^[1-9]/ }).waitFor();
+  await frame.locator(".play").click();
+  await page.waitForTimeout(700);
+  assert.deepEqual(complaints, []);
+  await context.close();
 });
 
 test("what is shown can be chosen", options, async () => {

@@ -7,6 +7,7 @@ import { step } from "./transport";
 
 export interface Actions {
   frame: () => void;
+  orbit: (azimuth: number, elevation: number, closer: number) => void;
   toggle: (layer: string) => void;
   theme: () => void;
 }
@@ -20,6 +21,8 @@ const HELP: [string[], string][] = [
   [["<", ">"], "Slower, faster"],
   [["R"], "Repeat"],
   [["F"], "Frame the hand"],
+  [["J", "L", "I", "K"], "Turn the view"],
+  [["+", "\u2212"], "Closer, farther"],
   [["C", "G"], "Friction cones, start and goal in place"],
   [["H", "V"], "See through the hand, visual or collision shapes"],
   [["T"], "Light, dark"],
@@ -62,6 +65,13 @@ export function listenToKeys(player: Player, motion: Motion, actions: Actions, h
     ">": () => faster(1),
     r: () => player.setRepeats(!player.repeats),
     f: () => actions.frame(),
+    j: () => actions.orbit(-6, 0, 1),
+    l: () => actions.orbit(6, 0, 1),
+    i: () => actions.orbit(0, 6, 1),
+    k: () => actions.orbit(0, -6, 1),
+    "+": () => actions.orbit(0, 0, 1.15),
+    "=": () => actions.orbit(0, 0, 1.15),
+    "-": () => actions.orbit(0, 0, 1 / 1.15),
     c: () => actions.toggle("cones"),
     h: () => actions.toggle("seeThrough"),
     v: () => actions.toggle("visual"),

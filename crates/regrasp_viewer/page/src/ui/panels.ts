@@ -25,22 +25,30 @@ export function verdict(story: Story): HTMLElement {
   );
 }
 
-/** The few numbers that one looks for first. */
-export function figures(story: Story, motion: Motion): HTMLElement | null {
+/** The few numbers that one looks for first; the worst moments can be gone to. */
+export function figures(story: Story, motion: Motion, seek: (time: number) => void): HTMLElement | null {
   if (!story.plan) return null;
-  const relocations = story.plan.segments.filter((s) => s.kind === "regrasp").length;
   const list = el("dl", { class: "figures" });
-  const put = (name: string, value: string, unit: string, more = "") =>
+  const put = (name: string, value: string, unit: string, ...more: (HTMLElement | string)[]) =>
     list.append(el("div", {}, el("dt", {}, name), el("dd", {}, value, unit ? el("span", { class: "unit" }, ` ${unit}`) : null),
-      el("dd", { class: "more" }, more)));
-  put("Relocations", String(relocations), "", `${story.plan.segments.length - relocations} transfers`);
+      el("dd", { class: "more" }, ...more)));
+  const go = (i: number) => {
+    const time = motion.times[i];
+    const link = el("button", { type: "button", class: "at", title: "Show this moment" }, `at ${time.toFixed(2)} s`);
+    link.addEventListener("click", () => seek(time));
+    return link;
+  };
+  const relocations = motion.stretches.filter((s) => s.kind === "regrasp").length;
+  put("Relocations", String(relocations), "", `${motion.stretches.length - relocations} transfers`);
   put("Duration", (motion.end - motion.start).toFixed(1), "s", `${motion.waypoints.length} waypoints`);
   if (story.judged) {
     const { margin, clearance, required_margin, pair, pairs } = story.judged;
     const i = indexOfLeast(margin);
-    put("Closure margin", i < 0 ? "\u2013" : margin[i]!.toFixed(4), "", `required ${required_margin}`);
+    if (i < 0) put("Closure margin", "\u2013", "", "not judged");
+    else put("Closure margin", margin[i]!.toFixed(4), "", go(i), `, required ${required_margin}`);
     const k = indexOfLeast(clearance);
-    put("Clearance", k < 0 ? "\u2013" : (clearance[k]! * 1000).toFixed(2), k < 0 ? "" : "mm", k < 0 ? "" : pairs[pair[k]]?.join(" \u2013 ") ?? "");
+    if (k < 0) put("Clearance", "\u2013", "", "not judged");
+    else put("Clearance", (clearance[k]! * 1000).toFixed(2), "mm", go(k), `, ${pairs[pair[k]]?.join(" \u2013 ") ?? ""}`);
   }
   return list;
 }

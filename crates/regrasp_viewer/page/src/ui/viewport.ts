@@ -37,7 +37,7 @@ export class Viewport {
     if (stage) {
       stage.canvas.setAttribute("role", "img");
       stage.canvas.setAttribute("aria-label", "Hand and object in 3-D; drag to turn");
-      this.element.append(stage.canvas, this.tools(stage), this.insets(stage));
+      this.element.append(stage.canvas, this.tools(stage), this.insets(stage), this.hint(stage));
     } else {
       this.element.append(el("p", { class: "no-webgl" },
         "The 3-D view needs WebGL 2, which this browser does not offer. Charts and facts are complete without it."));
@@ -83,6 +83,26 @@ export class Viewport {
     });
     stage.canvas.addEventListener("pointerdown", close);
     return tools;
+  }
+
+  /** The name of the part under the mouse. */
+  private hint(stage: Stage): HTMLElement {
+    const hint = el("p", { class: "hint", hidden: true });
+    let waiting = false;
+    stage.canvas.addEventListener("pointermove", (event) => {
+      if (event.pointerType === "touch" || event.buttons !== 0 || waiting) return;
+      waiting = true;
+      requestAnimationFrame(() => {
+        waiting = false;
+        const { clientWidth, clientHeight } = stage.canvas;
+        const name = stage.nameAt(event.offsetX / clientWidth, event.offsetY / clientHeight);
+        hint.hidden = name === null;
+        setText(hint, name ?? "");
+        hint.style.transform = `translate(${Math.min(event.offsetX + 14, clientWidth - 180)}px, ${event.offsetY + 16}px)`;
+      });
+    });
+    for (const leaving of ["pointerleave", "pointerdown"]) stage.canvas.addEventListener(leaving, () => { hint.hidden = true; });
+    return hint;
   }
 
   private insets(stage: Stage): HTMLElement {

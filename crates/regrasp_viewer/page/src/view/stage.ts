@@ -2,7 +2,7 @@
 
 import {
   Box3, Color, CustomBlending, DirectionalLight, EdgesGeometry, Group, HemisphereLight, LineBasicMaterial, LineSegments, MathUtils, Mesh,
-  MeshLambertMaterial, NoToneMapping, OneFactor, OneMinusSrcAlphaFactor, PerspectiveCamera, Quaternion, Scene, Sphere, SrcAlphaFactor, Vector3, WebGLRenderer, type BufferGeometry, type Material,
+  MeshLambertMaterial, NoToneMapping, OneFactor, OneMinusSrcAlphaFactor, PerspectiveCamera, Quaternion, Raycaster, Scene, Sphere, SrcAlphaFactor, Vector2, Vector3, WebGLRenderer, type BufferGeometry, type Material,
   type MeshLambertMaterialParameters,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
@@ -35,7 +35,7 @@ export class Stage {
   private readonly obstacles = new Group();
   private readonly contacts: Contacts;
   private readonly ghosts: Ghost[] = [];
-  private readonly shapes: { mesh: Mesh; role: PieceStory["role"] }[] = [];
+  private readonly shapes: { mesh: Mesh; role: PieceStory["role"]; name: string }[] = [];
   private readonly handMaterials: MeshLambertMaterial[] = [];
   private readonly hasVisual: boolean;
   private readonly repaint: (() => void)[] = [];
@@ -99,7 +99,7 @@ export class Stage {
     const { scene } = this.story;
     const groups = new Map<string, PieceStory[]>();
     for (const piece of scene.pieces) {
-      const key = `${piece.on}/${piece.role}/${piece.is_tip}`;
+      const key = `${piece.on}/${piece.role}/${piece.is_tip}/${piece.on === "world" ? piece.name : ""}`;
       groups.set(key, [...(groups.get(key) ?? []), piece]);
     }
     let body: { geometry: BufferGeometry; middle: Vector3; half: Vector3 } | null = null;
@@ -119,7 +119,7 @@ export class Stage {
       const edges = on === "object" || on === "world" ? this.edges(geometry, on === "world" ? 0.5 : 0.35) : null;
       if (edges) mesh.add(edges);
       (on === "object" ? this.object : on === "world" ? this.obstacles : this.links[on] ?? this.scene).add(mesh);
-      this.shapes.push({ mesh, role });
+      this.shapes.push({ mesh, role, name: pieces[0].name });
     }
     return body;
   }
@@ -315,6 +315,22 @@ export class Stage {
     this.placed = false;
   }
 
+  /** Turns the camera about its target, degrees, and brings it closer by a factor. */
+  orbit(azimuth: number, elevation: number, closer: number): void {
+    const now = this.cameraPlace();
+    const distance = MathUtils.clamp(now.distance / closer, this.controls.minDistance, this.controls.maxDistance);
+    this.place({ ...now, azimuth: now.azimuth + azimuth, elevation: now.elevation + elevation, distance });
+  }
+
+  /** Name of what is seen at a place of the canvas, given as shares of its width and height. */
+  nameAt(x: number, y: number): string | null {
+    const ray = new Raycaster();
+    ray.setFromCamera(new Vector2(2 * x - 1, 1 - 2 * y), this.camera);
+    const shown = this.shapes.filter(({ mesh }) => mesh.visible && (mesh.parent?.visible ?? true));
+    const hit = ray.intersectObjects(shown.map((shape) => shape.mesh), false)[0];
+    return shown.find((shape) => shape.mesh === hit?.object)?.name ?? null;
+  }
+
   place(camera: CameraPlace): void {
     this.placed = true;
     this.look(camera);
@@ -396,10 +412,11 @@ export class Stage {
     this.insetsDirty = false;
     const pixels = Math.min(168, this.canvas.width, this.canvas.height);
     if (pixels < 8) return;
-    const out = this.camera.position.clone().sub(this.controls.target).normalize().multiplyScalar(6);
+    const out = this.camera.position.clone().sub(this.controls.target).normalize().multiplyScalar(6.4);
     this.insetCamera.up.copy(this.camera.up);
     this.insetCamera.position.copy(out);
-    this.insetCamera.lookAt(0, 0, 0);
+    // A little low: the name of the view stands above.
+    this.insetCamera.lookAt(this.camera.up.clone().multiplyScalar(0.14));
     const edge = pixels / this.renderer.getPixelRatio();
     this.renderer.setScissorTest(true);
     this.renderer.setScissor(0, 0, edge, edge);
