@@ -29,9 +29,9 @@ export function verdict(story: Story): HTMLElement {
 export function figures(story: Story, motion: Motion, seek: (time: number) => void): HTMLElement | null {
   if (!story.plan) return null;
   const list = el("dl", { class: "figures" });
-  const put = (name: string, value: string, unit: string, ...more: (HTMLElement | string)[]) =>
+  const put = (name: string, value: string, unit: string, more: string, when: HTMLElement | null = null) =>
     list.append(el("div", {}, el("dt", {}, name), el("dd", {}, value, unit ? el("span", { class: "unit" }, ` ${unit}`) : null),
-      el("dd", { class: "more" }, ...more)));
+      el("dd", { class: "more", title: more }, more), when ? el("dd", { class: "more" }, when) : null));
   const go = (i: number) => {
     const time = motion.times[i];
     const link = el("button", { type: "button", class: "at", title: "Show this moment" }, `at ${time.toFixed(2)} s`);
@@ -45,10 +45,10 @@ export function figures(story: Story, motion: Motion, seek: (time: number) => vo
     const { margin, clearance, required_margin, pair, pairs } = story.judged;
     const i = indexOfLeast(margin);
     if (i < 0) put("Closure margin", "\u2013", "", "not judged");
-    else put("Closure margin", margin[i]!.toFixed(4), "", go(i), `, required ${required_margin}`);
+    else put("Closure margin", margin[i]!.toFixed(4), "", `required ${required_margin}`, go(i));
     const k = indexOfLeast(clearance);
     if (k < 0) put("Clearance", "\u2013", "", "not judged");
-    else put("Clearance", (clearance[k]! * 1000).toFixed(2), "mm", go(k), `, ${pairs[pair[k]]?.join(" \u2013 ") ?? ""}`);
+    else put("Clearance", (clearance[k]! * 1000).toFixed(2), "mm", pairs[pair[k]]?.join(" \u2013 ") ?? "", go(k));
   }
   return list;
 }

@@ -23,9 +23,9 @@ vec3 inBox = (vInObject - patternMiddle) / patternHalf;
 vec3 side = clamp(inBox / (fwidth(inBox) + 1e-5), -1.0, 1.0);
 vec3 painted = mix(patternDark, patternLight, 0.5 + 0.5 * side.x * side.y * side.z);
 vec3 outward = normalize(inBox);
-float blur = length(fwidth(outward)) + 1e-4;
-float dotOfX = 1.0 - smoothstep(-blur, blur, acos(clamp(outward.x, -1.0, 1.0)) - 0.2);
-float ringOfZ = 1.0 - smoothstep(-blur, blur, abs(acos(clamp(outward.z, -1.0, 1.0)) - 0.42) - 0.06);
+vec2 blur = fwidth(outward.xz) + 1e-4;
+float dotOfX = smoothstep(-blur.x, blur.x, outward.x - 0.980);
+float ringOfZ = smoothstep(-blur.y, blur.y, outward.z - 0.887) * (1.0 - smoothstep(-blur.y, blur.y, outward.z - 0.936));
 diffuseColor.rgb = mix(painted, patternMark, max(dotOfX, ringOfZ));
 `;
 

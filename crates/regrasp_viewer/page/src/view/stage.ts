@@ -61,7 +61,11 @@ export class Stage {
     this.software = drawnBySoftware();
     this.hasVisual = story.scene.pieces.some((piece) => piece.role === "visual");
     this.movingRatio = this.software ? 1 : Math.min(devicePixelRatio || 1, 2);
-    this.renderer = new WebGLRenderer({ antialias: !this.software, powerPreference: "high-performance" });
+    const canvas = document.createElement("canvas");
+    // Made here and not by three.js, whose own is see-through: an opaque one is cheaper to lay into the page.
+    const context = canvas.getContext("webgl2", { alpha: false, antialias: !this.software, powerPreference: "high-performance" });
+    if (!context) throw new Error("no WebGL 2");
+    this.renderer = new WebGLRenderer({ canvas, context });
     this.renderer.toneMapping = NoToneMapping;
     this.canvas = this.renderer.domElement;
     this.camera = new PerspectiveCamera(32, 1, 0.005, 20);
