@@ -6,8 +6,6 @@ export type Vec3 = [number, number, number];
 export type Quat = [number, number, number, number];
 export interface Pose { position: Vec3; quat: Quat }
 
-export const IDENTITY: Pose = { position: [0, 0, 0], quat: [0, 0, 0, 1] };
-
 export const add = (a: Vec3, b: Vec3): Vec3 => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
 export const sub = (a: Vec3, b: Vec3): Vec3 => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 export const scale = (a: Vec3, s: number): Vec3 => [a[0] * s, a[1] * s, a[2] * s];

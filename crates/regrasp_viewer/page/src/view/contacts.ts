@@ -109,31 +109,35 @@ export class Contacts {
   }
 }
 
-const MOST_DOTS = 600;
+const MOST_ARCS = 200;
 
 /** Placements as dots, rolling as ribbons, relocations as dotted arcs from contact to contact. */
 function traceOf(motion: Motion, size: number): Group {
   const trace = new Group();
   const width = 0.022 * size;
+  const surfaces: BufferGeometry[] = [];
+  const dots: BufferGeometry[] = [];
   motion.holds.forEach((holds, finger) => {
-    const colour = fingerColour(finger);
-    const material = new MeshBasicMaterial({ color: colour, side: DoubleSide });
-    const surfaces: BufferGeometry[] = [];
-    const dots: Vec3[] = [];
+    const colour = new Color(fingerColour(finger));
     holds.forEach((hold, i) => {
       const [first, last] = [hold.path[0], hold.path[hold.path.length - 1]];
-      surfaces.push(disc(first, 2 * width));
-      if (last !== first) surfaces.push(ribbon(hold, width), disc(last, 1.4 * width));
+      surfaces.push(painted(disc(first, 2 * width), colour));
+      if (last !== first) surfaces.push(painted(ribbon(hold, width), colour), painted(disc(last, 1.4 * width), colour));
       const next = holds[i + 1];
-      if (next) dots.push(...arc(last, next.path[0], size));
+      const way = next ? arc(last, next.path[0], size) : [];
+      if (way.length > 0 && dots.length < MOST_ARCS) {
+        dots.push(painted(new BufferGeometry().setAttribute("position", new Float32BufferAttribute(way.flat(), 3)), colour));
+      }
     });
-    if (surfaces.length > 0) trace.add(new Mesh(mergeGeometries(surfaces)!, material));
-    if (dots.length > 0) {
-      const points = new BufferGeometry().setAttribute("position", new Float32BufferAttribute(dots.slice(0, MOST_DOTS).flat(), 3));
-      trace.add(new Points(points, new PointsMaterial({ color: colour, size: 4 * width })));
-    }
   });
+  if (surfaces.length > 0) trace.add(new Mesh(mergeGeometries(surfaces)!, new MeshBasicMaterial({ vertexColors: true, side: DoubleSide })));
+  if (dots.length > 0) trace.add(new Points(mergeGeometries(dots)!, new PointsMaterial({ vertexColors: true, size: 4 * width })));
   return trace;
+}
+
+function painted(geometry: BufferGeometry, colour: Color): BufferGeometry {
+  const n = geometry.getAttribute("position").count;
+  return geometry.setAttribute("color", new Float32BufferAttribute(Array.from({ length: n }, () => colour.toArray()).flat(), 3));
 }
 
 function disc({ point, normal }: { point: Vec3; normal: Vec3 }, radius: number): BufferGeometry {

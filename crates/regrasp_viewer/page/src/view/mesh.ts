@@ -104,7 +104,10 @@ export function geometryOf(pieces: PieceStory[], meshes: MeshStory[], decoded: M
   return geometry;
 }
 
-/** A coarser copy for ghosts: vertices that share a cell of a grid of `cells` per longest side become one. */
+/**
+ * A coarser copy for ghosts: vertices that share a cell of a grid of `cells` per longest side become one, those of different
+ * sides of an edge apart.
+ */
 export function coarse(geometry: BufferGeometry, cells: number): BufferGeometry {
   geometry.computeBoundingBox();
   const { min, max } = geometry.boundingBox!;
@@ -115,13 +118,14 @@ export function coarse(geometry: BufferGeometry, cells: number): BufferGeometry 
   const merged: number[] = [];
   for (let i = 0; i < from.count; i++) {
     const point = [from.getX(i), from.getY(i), from.getZ(i)];
-    const key = point.map((x, k) => Math.round((x - [min.x, min.y, min.z][k]) / cell)).join("/");
+    const turned = [normal.getX(i), normal.getY(i), normal.getZ(i)];
+    const key = [...point.map((x, k) => Math.round((x - [min.x, min.y, min.z][k]) / cell)), ...turned.map((x) => Math.round(1.4 * x))].join("/");
     let at = known.get(key);
     if (at === undefined) {
       known.set(key, (at = sums.length));
       sums.push([0, 0, 0, 0, 0, 0, 0]);
     }
-    [...point, normal.getX(i), normal.getY(i), normal.getZ(i), 1].forEach((x, k) => { sums[at!][k] += x; });
+    [...point, ...turned, 1].forEach((x, k) => { sums[at!][k] += x; });
     merged.push(at);
   }
   const corners: number[] = [];
