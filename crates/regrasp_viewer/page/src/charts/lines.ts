@@ -225,14 +225,18 @@ export function jointChart(story: Story, motion: Motion, redraw: () => void): Ch
     const { low, high } = bounds(joint);
     return (q - low) / (high - low || 1);
   };
-  const limits = (joint: number): string => {
+  const limits = (joint: number): string | null => {
     const { lower, upper } = story.scene.joints[joint];
-    return lower === null || upper === null ? "no limits" : `${jointText(story, joint, lower)} to ${jointText(story, joint, upper)}`;
+    return lower === null || upper === null ? null : `${jointText(story, joint, lower)} to ${jointText(story, joint, upper)}`;
   };
   const choose = (group: number): void => {
     shown = group;
     [...tabs.children].forEach((tab, i) => tab.setAttribute("aria-pressed", String(i === shown)));
-    items = groups[shown].joints.map((joint, k) => keyItem(story.scene.joints[joint].name, fingerColour(groups[shown].finger), k, limits(joint)));
+    items = groups[shown].joints.map((joint, k) => {
+      const bounded = limits(joint);
+      const name = story.scene.joints[joint].name + (bounded ? "" : " (no limits: its own range)");
+      return keyItem(name, fingerColour(groups[shown].finger), k, bounded);
+    });
     legend.replaceChildren(...items.map((item) => item.element));
     redraw();
   };

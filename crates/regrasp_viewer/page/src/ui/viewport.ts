@@ -45,6 +45,8 @@ export class Viewport {
     this.element.append(this.caption);
     if (story.plan) this.element.append(legend);
     player.onTime((time) => this.show(time));
+    // Read out where one stops, not while it plays.
+    player.onState(() => this.caption.setAttribute("aria-live", player.playing ? "off" : "polite"));
     this.show(player.time);
   }
 

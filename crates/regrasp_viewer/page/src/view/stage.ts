@@ -214,7 +214,7 @@ export class Stage {
     return this.insets.map((inset) => inset.canvas);
   }
 
-  /** Corners of the boxes of fingers and object, all along the motion; the palm counts where it is not far larger. */
+  /** Corners of the boxes of fingers and object, all along the motion; palm and obstacles count where they are not far larger. */
   private findFocus(): { points: Vector3[]; sphere: Sphere } {
     const near: Box3[] = [];
     const far: Box3[] = [];
@@ -231,7 +231,9 @@ export class Stage {
     this.setTime(this.motion.start);
     const ball = (boxes: Box3[]) => boxes.reduce((all, box) => all.union(box), new Box3()).getBoundingSphere(new Sphere());
     if (near.length + far.length === 0) return { points: [new Vector3()], sphere: new Sphere(new Vector3(), 0.1) };
-    const all = near.length === 0 || ball([...near, ...far]).radius < 1.5 * ball(near).radius ? [...near, ...far] : near;
+    const hand = near.length === 0 || ball([...near, ...far]).radius < 1.5 * ball(near).radius ? [...near, ...far] : near;
+    const around = this.obstacles.children.map((child) => new Box3().setFromObject(child));
+    const all = ball([...hand, ...around]).radius < 1.6 * ball(hand).radius ? [...hand, ...around] : hand;
     const points = all.flatMap(({ min, max }) => [0, 1, 2, 3, 4, 5, 6, 7].map((i) =>
       new Vector3(i & 1 ? max.x : min.x, i & 2 ? max.y : min.y, i & 4 ? max.z : min.z)));
     return { points, sphere: ball(all) };
