@@ -418,11 +418,10 @@ export class Stage {
     this.insetsDirty = false;
     const pixels = Math.min(168, this.canvas.width, this.canvas.height);
     if (pixels < 8) return;
-    const out = this.camera.position.clone().sub(this.controls.target).normalize().multiplyScalar(6.4);
+    const out = this.camera.position.clone().sub(this.controls.target).normalize().multiplyScalar(5.6);
     this.insetCamera.up.copy(this.camera.up);
     this.insetCamera.position.copy(out);
-    // A little low: the name of the view stands above.
-    this.insetCamera.lookAt(this.camera.up.clone().multiplyScalar(0.14));
+    this.insetCamera.lookAt(0, 0, 0);
     const edge = pixels / this.renderer.getPixelRatio();
     this.renderer.setScissorTest(true);
     this.renderer.setScissor(0, 0, edge, edge);
