@@ -29,23 +29,29 @@ impl<'a> Page<'a> {
 
     /// Writes the page of a plan, whatever the checker said of it.
     pub fn write_plan(&self, plan: &Plan, report: &Report, talk: &Talk) -> Result<(), Stop> {
-        write(self.path, &self.story(Outcome::Planned { plan, report }, Vec::new())?, talk)
+        write(self.path, &self.story(Outcome::Planned { plan, report }, Vec::new(), None)?, talk)
     }
 
     /// Writes the page of a failure.
     pub fn write_failure(&self, failure: &Failure, talk: &Talk) -> Result<(), Stop> {
         let outcome = Outcome::Failed(told::failure_story(failure));
-        write(self.path, &self.story(outcome, told::failure_facts(failure))?, talk)
+        let reached = told::reached_story(failure, &self.query.world_from_object_goal);
+        write(self.path, &self.story(outcome, told::failure_facts(failure), reached)?, talk)
     }
 
-    fn story(&self, outcome: Outcome, facts: Vec<(String, String)>) -> Result<Story, Stop> {
+    fn story(
+        &self,
+        outcome: Outcome,
+        facts: Vec<(String, String)>,
+        roadmap: Option<RoadmapStory>,
+    ) -> Result<Story, Stop> {
         let telling = Telling {
             scene: self.scene,
             query: Some(self.query),
             outcome,
             title: None,
             facts,
-            roadmap: None::<RoadmapStory>,
+            roadmap,
             packages: self.packages,
         };
         story(&telling)

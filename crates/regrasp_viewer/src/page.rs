@@ -57,7 +57,12 @@ fn embedded(text: &str, tag: &str) -> String {
 
 /// `text` as text of an element or a quoted attribute; control characters replaced.
 pub fn escape_text(text: &str) -> String {
-    printable(text).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;").replace('\'', "&#39;")
+    printable(text)
+        .replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+        .replace('\'', "&#39;")
 }
 
 /// `json` with every character written as an escape that means something to an HTML parser or ends a line of JavaScript.

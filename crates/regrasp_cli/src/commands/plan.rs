@@ -308,6 +308,7 @@ mod tests {
                 distance_left: 0.0012,
                 joints: vec![],
             })),
+            reached: None,
             statistics: Default::default(),
         };
         let text = failure_text(&failure);

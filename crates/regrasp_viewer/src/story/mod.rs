@@ -12,10 +12,10 @@ pub mod pack;
 mod scene;
 /// Meshes of fewer triangles.
 mod simplify;
-/// Triangles of shapes.
-pub mod tessellate;
 /// A story from scene, query and plan.
 mod telling;
+/// Triangles of shapes.
+pub mod tessellate;
 
 pub use telling::{Outcome, Telling, tell};
 

@@ -3,7 +3,9 @@
 use super::pack::pack;
 use super::simplify::simplify;
 use super::tessellate::{Triangles, tessellate};
-use super::{Carrier, FingerStory, JointStory, LinkKind, LinkStory, OtherCarrier, PieceStory, PoseData, Role, SceneStory};
+use super::{
+    Carrier, FingerStory, JointStory, LinkKind, LinkStory, OtherCarrier, PieceStory, PoseData, Role, SceneStory,
+};
 use regrasp_geometry::{Pose, Shape, UnitVector, Vector};
 use regrasp_plan::check::kinematics::world_from_root;
 use regrasp_robot::hand::convex_of;
@@ -19,7 +21,10 @@ const SAME_BALL: f64 = 1e-6;
 /// The scene, with remarks on what could not be shown as it is. Visual meshes are looked for in `packages`.
 ///
 /// Err with a message when couplings of the robot lead nowhere.
-pub(super) fn scene_story(scene: &Scene, packages: &ResolveOptions) -> Result<(SceneStory, Vec<(String, String)>), String> {
+pub(super) fn scene_story(
+    scene: &Scene,
+    packages: &ResolveOptions,
+) -> Result<(SceneStory, Vec<(String, String)>), String> {
     let hand = &scene.hand;
     let tree = Tree::new(hand);
     let mut shapes = Shapes::default();

@@ -53,7 +53,13 @@ fn clustered(mesh: &Triangles, low: &Point, cell: f64) -> Triangles {
             continue;
         }
         // Rotated so that the smallest comes first: the same triangle is the same key, its other side is not.
-        let turned = if a < b && a < c { [a, b, c] } else if b < c { [b, c, a] } else { [c, a, b] };
+        let turned = if a < b && a < c {
+            [a, b, c]
+        } else if b < c {
+            [b, c, a]
+        } else {
+            [c, a, b]
+        };
         if seen.insert(turned) {
             triangles.push(turned);
         }

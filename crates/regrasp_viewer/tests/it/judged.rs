@@ -25,7 +25,8 @@ fn the_series_has_the_smallest_values_of_the_report() {
         assert!(least >= 0.98 * reported - 1e-9 && least <= 1.02 * reported, "{least} {reported}");
         // The report looks at the waypoints that steps begin with.
         let reported = sample.report.min_clearance.as_ref().unwrap();
-        let mut begin = sample.plan.segments.iter().flat_map(|s| (1..=s.waypoints.len()).map(|k| k < s.waypoints.len()));
+        let mut begin =
+            sample.plan.segments.iter().flat_map(|s| (1..=s.waypoints.len()).map(|k| k < s.waypoints.len()));
         let at_begin = found.clearance.iter().filter(|_| begin.next().unwrap());
         let least = at_begin.flatten().min_by(|a, b| a.distance.total_cmp(&b.distance)).unwrap();
         assert!((least.distance - reported.distance).abs() < 1e-12, "{least:?} {reported:?}");

@@ -1,5 +1,5 @@
-use crate::sample::{Sample, options_with_models};
 use crate::places::repository;
+use crate::sample::{Sample, options_with_models};
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;
 use regrasp_robot::Hand;
@@ -66,11 +66,14 @@ fn assert_same_kinematics(hand: &Hand, story: &SceneStory) {
 
 #[test]
 fn links_are_where_the_hand_has_them() {
-    let mut scenes = vec![("scenes/sphere_90x.toml", LoadOptions::default()), ("scenes/bulb.toml", LoadOptions::default())];
+    let mut scenes =
+        vec![("scenes/sphere_90x.toml", LoadOptions::default()), ("scenes/bulb.toml", LoadOptions::default())];
     if let Some(options) = options_with_models() {
         // The Shadow hand has coupled joints, the wrist of which belongs to no finger.
-        scenes.extend(["scenes/allegro/cube57_z.toml", "scenes/shadow/cube57_x.toml", "scenes/trifinger/sphere32_z.toml"]
-            .map(|scene| (scene, options.clone())));
+        scenes.extend(
+            ["scenes/allegro/cube57_z.toml", "scenes/shadow/cube57_x.toml", "scenes/trifinger/sphere32_z.toml"]
+                .map(|scene| (scene, options.clone())),
+        );
     }
     for (path, options) in scenes {
         let scene = load_scene(&repository().join(path), &options).unwrap().scene;
@@ -82,7 +85,8 @@ fn links_are_where_the_hand_has_them() {
             assert_eq!(link.joint >= 0, link.kind != LinkKind::Fixed);
         }
         assert_same_kinematics(&scene.hand, &story.scene);
-        let has_mimic = story.scene.links.iter().any(|link| link.joint >= 0 && link.multiplier != 1.0 || link.offset != 0.0);
+        let has_mimic =
+            story.scene.links.iter().any(|link| link.joint >= 0 && link.multiplier != 1.0 || link.offset != 0.0);
         let shares = |link: usize| story.scene.links.iter().filter(|l| l.joint == link as i32).count() > 1;
         let n_coupled = (0..story.scene.joints.len()).filter(|&k| shares(k)).count();
         assert_eq!(has_mimic || n_coupled > 0, path.contains("shadow"), "{path}");
@@ -103,8 +107,14 @@ fn every_shape_is_drawn_once_and_every_piece_has_its_mesh() {
     let n_link_shapes: usize = scene.hand.robot.links.iter().map(|link| link.collision.len()).sum();
     let on_links = story.pieces.iter().filter(|piece| matches!(piece.on, Carrier::Link(_)));
     assert!(on_links.clone().count() >= n_link_shapes);
-    assert_eq!(on_links.filter(|piece| piece.is_tip).map(|piece| &piece.name).collect::<std::collections::BTreeSet<_>>().len(), 4);
-    assert_eq!(story.pieces.iter().filter(|piece| matches!(piece.on, Carrier::Other(_))).count(), 1 + scene.obstacles.len());
+    assert_eq!(
+        on_links.filter(|piece| piece.is_tip).map(|piece| &piece.name).collect::<std::collections::BTreeSet<_>>().len(),
+        4
+    );
+    assert_eq!(
+        story.pieces.iter().filter(|piece| matches!(piece.on, Carrier::Other(_))).count(),
+        1 + scene.obstacles.len()
+    );
 }
 
 #[test]
@@ -117,9 +127,43 @@ fn looks_come_from_the_robot_file_and_do_not_matter_to_planning() {
     assert!(!story.facts.iter().any(|(label, _)| label.starts_with("Looks of")));
     // No visual mesh is among what the scene was read from.
     assert!(scene.inputs.iter().all(|input| !input.name.contains("visual")));
-    // Where they are not found, collision geometry stands in, and the facts say so.
-    let blind = story_of(&scene, &LoadOptions::default());
-    assert!(of_role(&blind, Role::Visual) == 0 || blind.facts.iter().any(|(label, _)| label.starts_with("Looks of")));
+}
+
+#[test]
+fn what_cannot_be_read_looks_as_it_collides_and_the_facts_name_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let hand = repository().join("assets/hands/wide_four_finger");
+    std::fs::copy(hand.join("hand.toml"), folder.path().join("hand.toml")).unwrap();
+    let urdf = std::fs::read_to_string(hand.join("hand.urdf")).unwrap();
+    let with = |geometry: &str| format!("<visual><geometry>{geometry}</geometry></visual>");
+    let in_link = |urdf: &str, name: &str, visual: &str| {
+        let open = format!("<link name=\"{name}\">");
+        assert!(urdf.contains(&open), "{name}");
+        urdf.replace(&open, &format!("{open}{visual}"))
+    };
+    let urdf = in_link(&urdf, "palm", &with("<mesh filename=\"palm.dae\"/>"));
+    let urdf = in_link(&urdf, "east_proximal", &with("<box size=\"0.01 0.02 nonsense\"/>"));
+    let urdf = in_link(&urdf, "north_proximal", &with("<box size=\"0.01 0.02 0.03\"/>"));
+    std::fs::write(folder.path().join("hand.urdf"), urdf).unwrap();
+    let scene = std::fs::read_to_string(repository().join("scenes/sphere_90x.toml")).unwrap();
+    let scene = scene.replace("../assets/hands/wide_four_finger/hand.toml", "hand.toml");
+    let path = folder.path().join("scene.toml");
+    std::fs::write(&path, scene).unwrap();
+
+    let options = LoadOptions::default();
+    let loaded = load_scene(&path, &options).unwrap();
+    let story = story_of(&loaded.scene, &options);
+    let looks_of = |name: &str| story.facts.iter().find(|(label, _)| *label == format!("Looks of {name}"));
+    assert!(looks_of("palm").unwrap().1.contains("palm.dae"), "{:?}", looks_of("palm"));
+    assert!(looks_of("east_proximal").is_some() && looks_of("north_proximal").is_none());
+    let meshes = |name: &str, role: Role| -> Vec<usize> {
+        story.scene.pieces.iter().filter(|p| p.name == name && p.role == role).map(|p| p.mesh).collect()
+    };
+    for name in ["palm", "east_proximal", "west_proximal"] {
+        assert_eq!(meshes(name, Role::Visual), meshes(name, Role::Collision), "{name}");
+    }
+    assert_ne!(meshes("north_proximal", Role::Visual), meshes("north_proximal", Role::Collision));
+    assert_eq!(meshes("sphere", Role::Visual), meshes("sphere", Role::Collision));
 }
 
 #[test]
