@@ -1,4 +1,5 @@
-# Everything a developer runs. Needs Rust (and cargo-fuzz with a nightly toolchain for `fuzz` only).
+# Everything a developer runs. Needs Rust; Python of 3.10 or later for the package and for `replay`; cargo-fuzz with a nightly
+# toolchain for `fuzz` only.
 
 MODELS ?= $(or $(REGRASP_MODELS),$(abspath ../shared/models))
 ifneq ($(wildcard $(MODELS)),)
@@ -127,12 +128,13 @@ REPLAY_SEEDS ?= 50
 CONTROL_SEEDS ?= 10
 SIMULATE = $(VENV)/bin/python -m regrasp.simulate.campaign
 replay: python
+	[ -d $(VENV) ] || { echo "error: replays need the Python package (see above)" >&2; exit 1; }
 	mkdir -p $(OUT)/replay docs/benchmarks/replay
-	$(SIMULATE) $(REPLAY) $(if $(PACKAGES),$(REPLAY_ALLEGRO)) $(PACKAGES) --seeds $(REPLAY_SEEDS) --processes 2 -o $(OUT)/replay --name campaign
-	$(SIMULATE) $(REPLAY) --gravity down --controllers B,A --variants default,no-rolling,no-margin --seeds $(CONTROL_SEEDS) --processes 2 -o $(OUT)/replay --name controls
-	$(SIMULATE) $(REPLAY) --gravity down --friction-scale 0.8,1,1.2 --seeds $(CONTROL_SEEDS) --processes 2 -o $(OUT)/replay --name friction
-	$(SIMULATE) $(REPLAY) --gravity down --mass-scale 0.5,1,1.5 --seeds $(CONTROL_SEEDS) --processes 2 -o $(OUT)/replay --name mass
-	$(SIMULATE) $(REPLAY) --gravity down --speed 1,2 --seeds $(CONTROL_SEEDS) --processes 2 -o $(OUT)/replay --name speed
+	$(SIMULATE) $(REPLAY) $(if $(PACKAGES),$(REPLAY_ALLEGRO)) $(PACKAGES) --seeds $(REPLAY_SEEDS) -o $(OUT)/replay --name campaign
+	$(SIMULATE) $(REPLAY) --gravity down --controllers B,A --variants default,no-rolling,no-margin --seeds $(CONTROL_SEEDS) -o $(OUT)/replay --name controls
+	$(SIMULATE) $(REPLAY) --gravity down --friction-scale 0.8,1,1.2 --seeds $(CONTROL_SEEDS) -o $(OUT)/replay --name friction
+	$(SIMULATE) $(REPLAY) --gravity down --mass-scale 0.5,1,1.5 --seeds $(CONTROL_SEEDS) -o $(OUT)/replay --name mass
+	$(SIMULATE) $(REPLAY) --gravity down --speed 1,2 --seeds $(CONTROL_SEEDS) -o $(OUT)/replay --name speed
 	cp $(OUT)/replay/*.csv $(OUT)/replay/*.md docs/benchmarks/replay/
 
 # Slow: same bytes on 1, 2 and 8 threads (100 queries), and the checker against broken and good plans; torsion and couplings

@@ -22,6 +22,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from .__main__ import package
+
 #: Settings of the planner for each kind of plan; all but the first are negative controls.
 VARIANTS: dict[str, dict[str, Any]] = {
     "default": {},
@@ -109,9 +111,10 @@ def _replay(job: Job, controllers: Sequence[str]) -> None:
                 noslip=job.noslip,
             )
             xml = regrasp.export_mjcf(plan, scene)
-            report = simulate(json.loads(plan.to_json()), xml, settings, drift=drift).report
-            # Controller A holds in another way; the others start alike.
-            drift = report.drift if controller != "A" else None
+            # Controller A holds in a way of its own; the others start alike.
+            known = None if controller == "A" else drift
+            report = simulate(json.loads(plan.to_json()), xml, settings, drift=known).report
+            drift = drift if controller == "A" else report.drift
             assert report.drift is not None
             lost, touched, dropped = report.lost_contacts, report.unplanned_contacts, report.dropped
             row |= {
@@ -306,12 +309,6 @@ def _parser() -> argparse.ArgumentParser:
         if not all(0.0 < value < math.inf for value in values):
             raise argparse.ArgumentTypeError("expected numbers above zero")
         return values
-
-    def package(text: str) -> tuple[str, Path]:
-        name, equals, folder = text.partition("=")
-        if not (name and equals and folder):
-            raise argparse.ArgumentTypeError("expected NAME=DIR")
-        return name, Path(folder)
 
     parser = argparse.ArgumentParser(
         prog="python -m regrasp.simulate.campaign", description="Replays many plans in MuJoCo and tabulates."

@@ -27,7 +27,7 @@ pub fn run(arguments: &Arguments, talk: &Talk) -> Result<(), Stop> {
         Command::Check(check) => check::run(check, common, talk),
         Command::View(view) => view::run(view, common, talk),
         Command::Export(export) => export::run(export, common, talk),
-        Command::Simulate(simulate) => simulate::run(simulate, talk),
+        Command::Simulate(simulate) => simulate::run(simulate),
         Command::Bench(bench) => bench::run(bench, common, talk),
         Command::Growth(growth) => growth::run(growth, talk),
         Command::Roadmap(roadmap) => roadmap::run(roadmap, common, talk),

@@ -5,9 +5,9 @@ use crate::check::closure::{Body, Certificate, certified_margin, margin_by};
 use crate::check::continuity::{is_free_throughout, moving_finger};
 use crate::check::model::Model;
 use crate::check::motion::Step;
-use crate::check::promises::{Holder, body_of, grips_of, holders};
+use crate::check::promises::{Holder, grips_of, holders};
 use crate::check::{CheckSettings, Log, form_is_sound};
-use crate::plan::{Plan, Segment, SegmentKind, Waypoint};
+use crate::plan::{Plan, Segment, Waypoint};
 use regrasp_scene::Scene;
 use std::collections::BTreeMap;
 
@@ -47,10 +47,10 @@ pub fn along(scene: &Scene, plan: &Plan) -> Result<Along, String> {
     }
     let bodies = Bodies::new(scene, &model)?;
     let mut along = Along::default();
-    let mut margins = Margins { body: body_of(&scene.object, plan), known: BTreeMap::new(), last: None };
+    let mut margins = Margins { body: Body::of(&scene.object, plan), known: BTreeMap::new(), last: None };
     let mut clearances = Clearances { bodies: &bodies, names: BTreeMap::new(), nearest: 0 };
     for segment in &plan.segments {
-        let moving = moving_finger(&model, segment).filter(|_| segment.kind == SegmentKind::Regrasp);
+        let moving = moving_finger(&model, segment);
         let judged = clearances.judged_in(segment);
         for waypoint in &segment.waypoints {
             along.margin.push(margins.of(&model, &holders(&model, moving, waypoint)));

@@ -93,7 +93,8 @@ pub struct CheckSettings {
     pub force_tolerance: f64,
     /// Their moments about the centre of mass may fail to balance by this much, in newton metres. Issue 4: 1e-7 N m.
     pub moment_tolerance: f64,
-    /// Joint torques may be off by this share of (force times largest lever arm).
+    /// Joint torques may be off by this share of (force times largest lever arm), and those that the weight of some direction
+    /// may need above their limit by this share of it.
     pub torque_tolerance: f64,
     /// Half-way between two waypoints the imbalance (torques over the torque scale) may be this share of the sum of all
     /// normal forces.

@@ -1,20 +1,30 @@
-//! What the plan promises: input files, friction, tolerance, closure margin.
+//! What the plan promises of its inputs and contacts; promises of time are judged in `times`, of forces in `forces`.
+//!
+//! - Input files: the same roles, names and SHA-256 as the scene's, none more and none less.
+//! - Friction: not negative, at most the scene's, and at most that over `friction_margin`, which is at least 1.
+//! - Contact and slip tolerance: at most what the settings accept. That they are kept is judged in `contact` and `rolling`.
+//! - Closure: at every waypoint, of exactly the fingers that hold, with the margin promised or asked for by the settings; the
+//!   margin is that of `closure`, dimensionless, with torques divided by the object's radius, which `torque_scale` has to
+//!   be. The margin said to be kept is no more than the smallest one found.
+//!
+//! Tolerances, for rounding and two solvers, are the constants below.
 
 use crate::check::closure::{Body, Certificate, certified_margin, margin_by};
 use crate::check::continuity::{contact_of, moving_finger};
 use crate::check::model::Model;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
-use crate::plan::{Plan, SegmentKind, Waypoint};
+use crate::plan::{Plan, Waypoint};
 use regrasp_grasp::{Contact, Grip};
 use regrasp_scene::{InputFile, Object};
 use std::collections::BTreeSet;
 
-/// How much smaller than promised a margin may come out: two solvers, one number.
+/// How much smaller than required a margin may come out: two solvers, one number.
 const MARGIN_TOLERANCE: f64 = 1e-9;
 /// How far the kept margin may be above the one found here before it is a broken promise.
 const KEPT_MARGIN_TOLERANCE: f64 = 1e-6;
-
+/// The torque scale may differ from the object's radius by this share of it: rounding.
+const SCALE_TOLERANCE: f64 = 1e-9;
 /// Friction times its margin may be this much above the scene's: rounding.
 const FRICTION_TOLERANCE: f64 = 1e-9;
 
@@ -83,15 +93,6 @@ pub fn grips_of(model: &Model, holders: &[Holder]) -> Vec<Grip> {
     holders.iter().map(grip).collect()
 }
 
-/// What the contacts of `plan` act on.
-pub fn body_of(object: &Object, plan: &Plan) -> Body {
-    Body {
-        center_of_mass: object.center_of_mass,
-        torque_scale: object.radius,
-        friction: plan.promises.friction.min(object.friction),
-    }
-}
-
 /// Closure of exactly the fingers that hold, at every waypoint; the smallest margin.
 ///
 /// Contacts that roll are others at every waypoint. Forces found for the waypoint before are tried first: what they prove is
@@ -103,7 +104,7 @@ pub fn check_closure(
     settings: &CheckSettings,
     log: &mut Log,
 ) -> Option<f64> {
-    let body = body_of(object, plan);
+    let body = Body::of(object, plan);
     let required = plan.promises.required_margin.max(settings.smallest_margin);
     let sets = holding_sets(model, plan);
     let mut smallest: Option<f64> = None;
@@ -138,7 +139,7 @@ fn holding_sets(model: &Model, plan: &Plan) -> Vec<Holding> {
     let mut seen = BTreeSet::new();
     let mut sets = Vec::new();
     for (s, segment) in plan.segments.iter().enumerate() {
-        let moving = moving_finger(model, segment).filter(|_| segment.kind == SegmentKind::Regrasp);
+        let moving = moving_finger(model, segment);
         // A waypoint may break the roles; closure is judged for what really holds there.
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
             let holding = holders(model, moving, waypoint);
@@ -202,7 +203,7 @@ pub fn check_promises(object: &Object, plan: &Plan, settings: &CheckSettings, mi
         broken("kept_margin", promises.kept_margin, found, message);
     }
     let scale = object.radius;
-    if (promises.torque_scale - scale).abs() > 1e-9 * scale {
+    if (promises.torque_scale - scale).abs() > SCALE_TOLERANCE * scale {
         let message = format!("torque scale {}, the object's radius is {scale}", promises.torque_scale);
         broken("torque_scale", promises.torque_scale, scale, message);
     }

@@ -18,7 +18,8 @@ use regrasp_geometry::{Point, Pose, Shape, Vector};
 
 /// Pieces after which no finer sum is made; what is then unknown counts as slip.
 const MOST_PIECES: usize = 128;
-/// Share of the slip allowed that may stay unknown in a step.
+/// Share of the slip allowed that may stay unknown in a step. What is unknown counts as slip: of the slip allowed to a
+/// segment of fifty steps it takes at most a tenth.
 const UNKNOWN_SHARE: f64 = 0.002;
 /// Motion that is too small to be divided further when it cannot be told whether the tip is on the surface, as a share
 /// of the contact tolerance.
@@ -128,8 +129,13 @@ impl<'a> Roll<'a> {
 
     /// Where the tip touches, and the normal there, in the object frame.
     pub fn contact(&self, t: f64) -> Option<(Point, Vector)> {
-        let center = self.center(t);
-        let foot = self.patch.foot(&center)?;
+        self.touching(&self.center(t))
+    }
+
+    /// Where a tip with its centre at `center` touches, and the normal there: the point of the surface nearest to it, and the
+    /// direction from there to it.
+    fn touching(&self, center: &Point) -> Option<(Point, Vector)> {
+        let foot = self.patch.foot(center)?;
         Some((foot, (center - foot).try_normalize(1e-9)?))
     }
 
@@ -172,14 +178,13 @@ impl<'a> Roll<'a> {
     }
 
     /// How far the fingertip slides over the object, in metres: the length of the integral, over the step, of the velocity
-    /// of the touching point of the link, seen from the object and across the normal. Sums of ever finer pieces are
-    /// compared until what they extrapolate to differs by less than `unknown`, which is added.
+    /// of the touching point of the link, seen from the object and across the normal. What stays unknown is added: at
+    /// most `unknown`, unless 128 pieces are too few for that. Infinite where no surface is near.
     pub fn slip(&self, unknown: f64) -> f64 {
-        let normal = |center: &Point| {
-            let away = center - self.patch.foot(center)?;
-            away.try_normalize(1e-9)
-        };
-        slip(&|t| self.object_from_link(t), &self.finger.center, self.finger.radius, &normal, unknown)
+        let object_from_link = |t: f64| self.object_from_link(t);
+        let normal = |center: &Point| self.touching(center).map(|(_, normal)| normal);
+        let FingerModel { center, radius, .. } = self.finger;
+        slip(|n_pieces| slide(&object_from_link, center, *radius, &normal, n_pieces), unknown)
     }
 }
 
@@ -196,16 +201,11 @@ pub fn bounds_in_object(finger: &FingerModel, from: &Waypoint, to: &Waypoint) ->
     (relative + turn * arm, rates.acceleration + 2.0 * turn * relative + turn * turn * arm)
 }
 
-/// Slip of a ball of `radius` about `center`, which `object_from_link` carries from 0 to 1, over a surface whose normal
-/// towards a centre beside it is given; infinite where there is none.
-fn slip(
-    object_from_link: &dyn Fn(f64) -> Matrix4<f64>,
-    center: &Point,
-    radius: f64,
-    normal: &dyn Fn(&Point) -> Option<Vector>,
-    unknown: f64,
-) -> f64 {
-    let slide_in = |n_pieces| slide(object_from_link, center, radius, normal, n_pieces);
+/// Length of the integral that `slide_in` approximates in so many pieces; infinite where it gives none.
+///
+/// Sums of ever finer pieces are compared until what they extrapolate to changes by at most `unknown`, or there are
+/// [`MOST_PIECES`]. The change is added.
+fn slip(slide_in: impl Fn(usize) -> Option<Vector>, unknown: f64) -> f64 {
     // The error of the midpoint rule is a series in the square of the pieces' length: its first term cancels.
     let extrapolated = |coarse: &Vector, fine: &Vector| fine + (fine - coarse) / 3.0;
     let mut n_pieces = 2;
@@ -224,8 +224,10 @@ fn slip(
     }
 }
 
-/// The integral of the sliding velocity in `n_pieces` pieces. In each the point that touches half-way is carried from the
-/// beginning of the piece to its end: the midpoint rule, whose error falls with the square of the number of pieces.
+/// The integral of the sliding velocity of a ball of `radius` about `center`, which `object_from_link` carries from 0 to 1,
+/// over a surface whose normal towards a centre beside it is given; none where there is no normal. In each of `n_pieces`
+/// pieces the point that touches half-way is carried from the beginning of the piece to its end: the midpoint rule, whose
+/// error falls with the square of the number of pieces.
 fn slide(
     object_from_link: &dyn Fn(f64) -> Matrix4<f64>,
     center: &Point,
@@ -260,7 +262,7 @@ mod tests {
     }
 
     fn slip_of(motion: &dyn Fn(f64) -> Matrix4<f64>, normal: &dyn Fn(&Point) -> Option<Vector>) -> f64 {
-        slip(motion, &Point::origin(), RADIUS, normal, UNKNOWN)
+        slip(|n_pieces| slide(motion, &Point::origin(), RADIUS, normal, n_pieces), UNKNOWN)
     }
 
     fn up(_: &Point) -> Option<Vector> {

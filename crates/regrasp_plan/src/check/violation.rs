@@ -57,7 +57,8 @@ pub enum ViolationKind {
     ObjectMovesInRegrasp,
     /// A contact that should stay changes.
     GraspChanges,
-    /// A finger holds where it should be free, or is free where it should hold.
+    /// A finger changes between holding, rolling and being free in a segment that it should spend in one of these; the moving
+    /// finger of a regrasp holds between its ends; or a finger rolls that cannot: its tip is sharp, or the object rests.
     WrongContactMode,
     /// In a regrasp, a finger moves that should not, or the moving finger has no name.
     WrongMovingFinger,

@@ -4,6 +4,7 @@
 use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Point, Pose, Shape, Vector};
+use regrasp_plan::check::{CheckSettings, Report, ViolationKind, check};
 use regrasp_plan::plan::{FORMAT, FORMAT_VERSION, MotionLimits, PlanInput, PoseData, Promises, Statistics, WayPose};
 use regrasp_plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
 use regrasp_robot::hand::PalmShape;
@@ -13,6 +14,7 @@ use regrasp_robot::{
 };
 use regrasp_scene::scene::InputFile;
 use regrasp_scene::{GraspRequest, InHandQuery, Object, Scene};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 pub const N_FINGERS: usize = 4;
@@ -424,4 +426,15 @@ pub fn query(plan: &Plan) -> InHandQuery {
         start_grasp: GraspRequest::Automatic,
         goal_grasp: GraspRequest::Automatic,
     }
+}
+
+/// What the checker says of `plan` as an answer to its own query.
+pub fn judge(scene: &Scene, plan: &Plan) -> Report {
+    check(scene, Some(&query(plan)), plan, &CheckSettings::default())
+}
+
+/// The kinds of violations, each once.
+pub fn kinds(report: &Report) -> Vec<ViolationKind> {
+    let kinds: BTreeSet<_> = report.violations.iter().map(|violation| violation.kind).collect();
+    kinds.into_iter().collect()
 }

@@ -87,7 +87,8 @@ fn draw_contact_once(model: &Model, finger: usize, world_from_object: &Placement
     Some(Contact { point_in_object: hit.point_in_object, normal_in_object: hit.normal_in_object })
 }
 
-/// Joints of `finger` at `contact` from which it can be lifted again, clear of everything but the other fingers; the workspace has the object in place.
+/// Joints of `finger` at `contact` from which it can be lifted again, clear of everything but the other fingers; the
+/// workspace has the object in place.
 pub fn reach(
     workspace: &mut Workspace,
     finger: usize,

@@ -215,12 +215,14 @@ impl<'a> Model<'a> {
             }
         }
         for (f, finger) in fingers.iter_mut().enumerate() {
-            let moves = |body: usize| matches!(bodies[body].carrier, Carrier::Finger { finger, .. } if finger == f);
+            let finger_of = |body: usize| match bodies[body].carrier {
+                Carrier::Finger { finger, .. } => Some(finger),
+                _ => None,
+            };
+            let moves = |body: usize| finger_of(body) == Some(f);
             let between = |pair: &Pair, g: usize| {
-                let carried_by = |body: usize, which: usize| matches!(bodies[body].carrier, Carrier::Finger { finger, .. } if finger == which);
-                g != f
-                    && ((carried_by(pair.a, f) && carried_by(pair.b, g))
-                        || (carried_by(pair.a, g) && carried_by(pair.b, f)))
+                let fingers = [finger_of(pair.a), finger_of(pair.b)];
+                g != f && (fingers == [Some(f), Some(g)] || fingers == [Some(g), Some(f)])
             };
             finger.pairs_with = (0..scene.hand.fingers.len())
                 .map(|g| (0..pairs.len()).filter(|&p| between(&pairs[p], g)).collect())

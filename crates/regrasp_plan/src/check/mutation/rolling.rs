@@ -1,6 +1,7 @@
 //! Fingertips that roll, and fingertips that are said to.
 
-use super::{Breeder, move_tip, pick};
+use super::choice::{pick, places};
+use super::{Breeder, move_tip};
 use crate::check::continuity::contact_of;
 use crate::check::model::Model;
 use crate::check::patch::Patch;
@@ -81,8 +82,7 @@ impl Breeder<'_> {
                     && segment.waypoints[0].contacts[f].mode == ContactMode::Fixed
                     && pivots(model, segment, f, plan.promises.slip_tolerance).is_some()
             };
-            let mut places: Vec<(usize, usize)> = places(plan, model, fixed);
-            let &mut (s, f) = pick(&mut places, rng)?;
+            let &mut (s, f) = pick(&mut places(plan, model, fixed), rng)?;
             declare(plan, s, f, ContactMode::Rolling);
             Some(())
         });
@@ -106,13 +106,6 @@ impl Breeder<'_> {
             Some(())
         });
     }
-}
-
-fn places(plan: &Plan, model: &Model, fits: impl Fn(&Segment, usize) -> bool) -> Vec<(usize, usize)> {
-    (0..plan.segments.len())
-        .flat_map(|s| (0..model.fingers.len()).map(move |f| (s, f)))
-        .filter(|&(s, f)| fits(&plan.segments[s], f))
-        .collect()
 }
 
 /// A segment, and a finger that rolls in it and gets somewhere.
