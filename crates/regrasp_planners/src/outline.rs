@@ -58,3 +58,38 @@ impl Outline {
         self.nodes.iter().map(|node| node.component + 1).max().unwrap_or(0)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use regrasp_base::Rng;
+
+    #[test]
+    fn components_are_those_of_spreading_numbers_and_the_largest_comes_first() {
+        let mut rng = Rng::keyed(4, "outline", 0);
+        for n in [0, 1, 7, 40] {
+            let edges: Vec<OutlineEdge> = (0..n / 2)
+                .map(|_| OutlineEdge { nodes: [rng.below(n), rng.below(n)], changes_grasp: rng.chance(0.5) })
+                .collect();
+            let outline = Outline::new(vec![Pose::identity(); n], edges.clone());
+            // The smallest node of each component, by spreading it until nothing changes.
+            let mut least: Vec<usize> = (0..n).collect();
+            for _ in 0..n {
+                for edge in &edges {
+                    let smaller = least[edge.nodes[0]].min(least[edge.nodes[1]]);
+                    edge.nodes.iter().for_each(|&node| least[node] = smaller);
+                }
+            }
+            for a in 0..n {
+                for b in 0..n {
+                    let same = outline.nodes[a].component == outline.nodes[b].component;
+                    assert_eq!(same, least[a] == least[b], "{a} {b}");
+                }
+            }
+            let size = |k: usize| outline.nodes.iter().filter(|node| node.component == k).count();
+            let sizes: Vec<usize> = (0..outline.n_components()).map(size).collect();
+            assert!(sizes.is_sorted_by(|a, b| a >= b) && !sizes.contains(&0), "{sizes:?}");
+            assert_eq!(sizes.iter().sum::<usize>(), n);
+        }
+    }
+}

@@ -67,3 +67,58 @@ fn clustered(mesh: &Triangles, low: &Point, cell: f64) -> Triangles {
     let vertices = sums.iter().map(|(sum, n)| Point::from(sum / *n)).collect();
     Triangles { vertices, triangles, smooth_below: mesh.smooth_below }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    /// Radii of a ring: of its middle line, and of its cross section.
+    const RING: (f64, f64) = (0.06, 0.02);
+
+    /// A ring of `2 n^2` triangles.
+    fn ring(n: usize) -> Triangles {
+        let angle = |k: usize| 2.0 * PI * k as f64 / n as f64;
+        let vertex = |i: usize, j: usize| {
+            let across = RING.0 + RING.1 * angle(j).cos();
+            Point::new(across * angle(i).cos(), across * angle(i).sin(), RING.1 * angle(j).sin())
+        };
+        let at = |i: usize, j: usize| (i % n * n + j % n) as u32;
+        let faces = |(i, j)| {
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            [[a, b, c], [a, c, d]]
+        };
+        let cells = || (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+        Triangles {
+            vertices: cells().map(|(i, j)| vertex(i, j)).collect(),
+            triangles: cells().flat_map(faces).collect(),
+            smooth_below: 0.5,
+        }
+    }
+
+    fn volume(mesh: &Triangles) -> f64 {
+        let corner = |i: u32| mesh.vertices[i as usize].coords;
+        mesh.triangles.iter().map(|&[a, b, c]| corner(a).dot(&corner(b).cross(&corner(c))) / 6.0).sum()
+    }
+
+    #[test]
+    fn fewer_triangles_stay_on_the_surface_and_turned_outwards() {
+        let exact = 2.0 * PI * PI * RING.0 * RING.1 * RING.1;
+        let mesh = ring(300);
+        assert!((volume(&mesh) / exact - 1.0).abs() < 1e-3);
+        for most in [1_000, 20_000, 100_000] {
+            let found = simplify(mesh.clone(), most);
+            let n = found.triangles.len();
+            assert!(n <= most && n > most / 3, "{n} of {most}");
+            // A surface of area a has about a / (2 cell^2) triangles and more.
+            let cell = (4.0 * PI * PI * RING.0 * RING.1 / n as f64 * 4.0).sqrt();
+            for v in &found.vertices {
+                let from_middle = (v.x.hypot(v.y) - RING.0).hypot(v.z);
+                assert!((from_middle - RING.1).abs() < cell, "{v} of {most}");
+            }
+            assert!((volume(&found) / exact - 1.0).abs() < 0.1, "{} of {exact}", volume(&found));
+            assert_eq!(simplify(mesh.clone(), most), found);
+        }
+        assert_eq!(simplify(mesh.clone(), mesh.triangles.len()), mesh);
+    }
+}
