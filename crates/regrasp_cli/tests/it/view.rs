@@ -156,3 +156,43 @@ fn files_that_cannot_be_read_or_written() {
     let run = folder.run(&["plan", "scene.toml", "-o", "a", "--report", "a"]);
     complains(&run, "A505", "--report", &["another file"]);
 }
+
+/// `text` with what means something in an attribute of XML escaped.
+fn xml(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[test]
+fn markup_in_files_and_their_names_stays_text() {
+    let (link, finger, object) =
+        ("</script><script>alert(1)</script>", "<img src=x onerror=alert(2)>", "<!--<script>]]>\u{202e}");
+    let folder = Folder::new();
+    let replaced = |name: &str, changes: &[(&str, String)]| {
+        let mut text = std::fs::read_to_string(folder.path(name)).unwrap();
+        for (old, new) in changes {
+            assert!(text.contains(old), "{name} has no {old}");
+            text = text.replace(old, new);
+        }
+        folder.write(name, text);
+    };
+    replaced("hand.urdf", &[("\"palm\"", format!("\"{}\"", xml(link)))]);
+    replaced("hand.toml", &[("\"palm\"", format!("'{link}'")), ("name = \"north\"", format!("name = '{finger}'"))]);
+    replaced("scene.toml", &[("\"ball\"", format!("'{object}'"))]);
+    std::fs::rename(folder.path("scene.toml"), folder.path("<b onload=x>&.toml")).unwrap();
+    let run = folder.run(&["plan", "<b onload=x>&.toml", "-o", "plan.json", "--report", "plan.html"]);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    let told = story(&folder, "plan.html");
+    assert_eq!(told["title"], "<b onload=x>&");
+    assert_eq!(told["scene"]["links"][0]["name"], link);
+    let names = |list: &str| -> Vec<String> {
+        told["scene"][list].as_array().unwrap().iter().map(|entry| entry["name"].as_str().unwrap().to_owned()).collect()
+    };
+    assert!(names("fingers").iter().any(|name| name == finger) && names("pieces").iter().any(|name| name == object));
+    let page = std::fs::read_to_string(folder.path("plan.html")).unwrap();
+    // The viewer apart, which is the same in every page.
+    let (own, _) = page.rsplit_once("<script>").unwrap();
+    for markup in ["<img", "<b ", "<!--", "]]><", "alert(1)</"] {
+        assert!(!own.contains(markup), "{markup} is in the page");
+    }
+    assert_eq!(own.matches("<script").count(), 1);
+}
