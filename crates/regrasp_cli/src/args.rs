@@ -58,6 +58,8 @@ pub enum Command {
     Plan(Plan),
     /// Judge a plan from the files alone; exit code 0 accepted, 1 rejected
     Check(Check),
+    /// Show a plan: one page for a browser, with nothing to install and no network
+    View(View),
     /// Write a plan in the formats of other tools
     Export(Export),
     /// Say how to replay a plan in MuJoCo, which the Python package does
@@ -137,6 +139,9 @@ pub struct Plan {
     /// Seed
     #[arg(long, default_value_t = 0, value_parser = whole_number, allow_negative_numbers = true)]
     pub seed: u64,
+    /// Write a page for a browser too: of the plan, or of why there is none
+    #[arg(long, value_name = "FILE.html")]
+    pub report: Option<PathBuf>,
     /// Threads [default: all cores]; the plan does not depend on it
     #[arg(long, value_parser = threads, allow_negative_numbers = true)]
     pub threads: Option<usize>,
@@ -153,6 +158,28 @@ pub struct Check {
     /// Scene file [default: the one that the plan names, beside the plan or in the current folder]
     #[arg(long, value_name = "FILE")]
     pub scene: Option<PathBuf>,
+}
+
+/// `regrasp view`
+#[derive(Debug, Args)]
+#[command(group(ArgGroup::new("pictures").required(true).multiple(true)))]
+pub struct View {
+    /// Plan file
+    pub plan: PathBuf,
+    /// Scene file [default: the one that the plan names, beside the plan or in the current folder]
+    pub scene: Option<PathBuf>,
+    /// Page: one HTML file that opens from disk
+    #[arg(short, long, value_name = "plan.html", group = "pictures")]
+    pub output: Option<PathBuf>,
+    /// What the page is told, as JSON
+    #[arg(long, value_name = "FILE.json", group = "pictures")]
+    pub story: Option<PathBuf>,
+    /// Title of the page [default: the scene's name]
+    #[arg(long)]
+    pub title: Option<String>,
+    /// Show the graph of this roadmap file too
+    #[arg(long, value_name = "FILE.roadmap")]
+    pub with_roadmap: Option<PathBuf>,
 }
 
 /// `regrasp export`

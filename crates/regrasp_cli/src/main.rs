@@ -14,6 +14,8 @@ mod interrupt;
 mod judge;
 /// Models from disk, with what the environment says about packages.
 mod load;
+/// Pages for a browser.
+mod pages;
 /// What is printed while a search runs.
 mod progress;
 /// How a command ends, other than well.

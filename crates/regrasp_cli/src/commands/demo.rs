@@ -6,6 +6,7 @@ use crate::gait_chart;
 use crate::interrupt;
 use crate::judge;
 use crate::load;
+use crate::pages::Page;
 use crate::stop::Stop;
 use crate::talk::Talk;
 use regrasp::InHandSettings;
@@ -25,7 +26,7 @@ const FILES: [(&str, &str); 3] = [
     ("assets/hands/wide_four_finger/hand.urdf", include_str!("../../../../assets/hands/wide_four_finger/hand.urdf")),
 ];
 
-/// Writes the bundled files, plans, checks, writes plan and picture.
+/// Writes the bundled files, plans, checks, writes plan, picture and page.
 pub fn run(arguments: &args::Demo, common: &Common, talk: &Talk) -> Result<(), Stop> {
     let cancelled = interrupt::flag()?;
     let folder = &arguments.output;
@@ -42,7 +43,9 @@ pub fn run(arguments: &args::Demo, common: &Common, talk: &Talk) -> Result<(), S
     let plan = search(&loaded.scene, &query, &settings, arguments.seed, &limits, talk)?;
     let bytes = format::to_json(&plan);
     let (plan_path, chart_path) = (folder.join("plan.json"), folder.join("gait.svg"));
-    if !judge::judge_bytes(&plan_path, bytes.as_bytes(), &scene_path, &load::options(common), talk)?.accepted() {
+    let options = load::options(common);
+    let report = judge::judge_bytes(&plan_path, bytes.as_bytes(), &scene_path, &options, talk)?;
+    if !report.accepted() {
         return Err(Stop::Rejected);
     }
     write(&plan_path, bytes.as_bytes())?;
@@ -52,7 +55,8 @@ pub fn run(arguments: &args::Demo, common: &Common, talk: &Talk) -> Result<(), S
     talk.say(format!("wrote  {}   sha256 {sha256}", plan_path.display()));
     talk.say(format!("chart  {}   which finger holds when; open it in a browser", chart_path.display()));
     talk.say(format!("next   regrasp check {}", plan_path.display()));
-    Ok(())
+    let page_path = folder.join("plan.html");
+    Page::new(&page_path, &loaded.scene, &query, &options.resolve).write_plan(&plan, &report, talk)
 }
 
 /// Writes a file and the folders above it.

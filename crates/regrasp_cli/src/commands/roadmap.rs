@@ -124,7 +124,7 @@ fn run_query(arguments: &args::RoadmapQuery, common: &Common, talk: &Talk) -> Re
         Err(failure) => return Err(Stop::NoPlan(Box::new(failure))),
     };
     say_plan(&answer.plan, started.elapsed().as_secs_f64(), talk);
-    judge_and_write(&answer.plan, arguments.output.as_deref(), &arguments.scene, common, talk)?;
+    judge_and_write(&answer.plan, arguments.output.as_deref(), &arguments.scene, None, common, talk)?;
     if arguments.grow {
         drop(planner);
         save(&roadmap.grown_by(&answer), &arguments.roadmap, talk)?;

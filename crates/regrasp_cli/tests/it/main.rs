@@ -10,5 +10,6 @@ mod places;
 mod roadmap;
 mod roadmap_file;
 mod suite;
+mod view;
 #[path = "../../../../tests/support/wide_scene.rs"]
 mod wide_scene;

@@ -3,6 +3,8 @@
 //! It shares no decision with the planner: own forward kinematics from the robot's joints, own closed forms of
 //! surfaces, force closure by exact cones with a certificate, distances by parry, and motion bounds between waypoints.
 
+/// Margin and clearance at every waypoint.
+pub mod along;
 /// Room for the weight in every direction.
 mod any_gravity;
 /// Everything that can collide, and which pairs must not.
@@ -52,6 +54,7 @@ pub mod violation;
 /// Poses to be passed between start and goal.
 pub mod way;
 
+pub use along::{Along, along};
 pub use files::{CheckedFiles, check_files};
 pub use find_scene::find_scene;
 pub use violation::{Moment, Violation, ViolationKind};
@@ -216,13 +219,7 @@ pub fn check(scene: &Scene, query: Option<&InHandQuery>, plan: &Plan, settings: 
     match Model::new(scene) {
         Err(message) => log.push(Violation::new(ViolationKind::WrongScene, message)),
         Ok(model) => {
-            continuity::check_form(&model, plan, &mut log);
-            let form_is_sound = !log.found.iter().any(|violation| {
-                use ViolationKind::{EmptySegment, NotANumber, WrongScene};
-                matches!(violation.kind, EmptySegment | NotANumber | WrongScene)
-            });
-            // Everything else indexes by joint, finger and waypoint.
-            if form_is_sound {
+            if form_is_sound(&model, plan, &mut log) {
                 judge(scene, query, plan, settings, &model, &mut log, &mut report);
             }
         }
@@ -230,6 +227,15 @@ pub fn check(scene: &Scene, query: Option<&InHandQuery>, plan: &Plan, settings: 
     report.n_violations = log.count;
     report.violations = log.found;
     report
+}
+
+/// Whether joints, fingers and waypoints of `plan` are those of the scene: everything else indexes by them.
+fn form_is_sound(model: &Model, plan: &Plan, log: &mut Log) -> bool {
+    continuity::check_form(model, plan, log);
+    !log.found.iter().any(|violation| {
+        use ViolationKind::{EmptySegment, NotANumber, WrongScene};
+        matches!(violation.kind, EmptySegment | NotANumber | WrongScene)
+    })
 }
 
 fn judge(

@@ -14,7 +14,7 @@ use crate::check::continuity::{contact_of, moving_finger};
 use crate::check::model::Model;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
-use crate::plan::Plan;
+use crate::plan::{Plan, Waypoint};
 use regrasp_grasp::{Contact, Grip};
 use regrasp_scene::{InputFile, Object};
 use std::collections::BTreeSet;
@@ -62,6 +62,35 @@ struct Holding {
     at: Moment,
     fingers: Vec<usize>,
     grips: Vec<Grip>,
+}
+
+/// A finger that holds, and its contact.
+pub struct Holder {
+    /// Index of the finger.
+    pub finger: usize,
+    contact: Contact,
+}
+
+impl Holder {
+    /// The same for the same finger at the same contact only.
+    pub fn key(&self) -> (usize, [u64; 6]) {
+        let (p, n) = (self.contact.point_in_object, self.contact.normal_in_object);
+        (self.finger, [p.x, p.y, p.z, n.x, n.y, n.z].map(f64::to_bits))
+    }
+}
+
+/// The fingers that hold at a waypoint; `moving` is the one that a regrasp moves.
+pub fn holders(model: &Model, moving: Option<usize>, waypoint: &Waypoint) -> Vec<Holder> {
+    (0..model.fingers.len())
+        .filter(|&f| Some(f) != moving && waypoint.contacts[f].holds())
+        .filter_map(|finger| Some(Holder { finger, contact: contact_of(&waypoint.contacts[finger])? }))
+        .collect()
+}
+
+/// Contacts of fingers with what their tips transmit.
+pub fn grips_of(model: &Model, holders: &[Holder]) -> Vec<Grip> {
+    let grip = |holder: &Holder| Grip { contact: holder.contact, model: model.fingers[holder.finger].contact };
+    holders.iter().map(grip).collect()
 }
 
 /// Closure of exactly the fingers that hold, at every waypoint; the smallest margin.
@@ -113,22 +142,10 @@ fn holding_sets(model: &Model, plan: &Plan) -> Vec<Holding> {
         let moving = moving_finger(model, segment);
         // A waypoint may break the roles; closure is judged for what really holds there.
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
-            let holding: Vec<(usize, Contact)> = (0..model.fingers.len())
-                .filter(|&f| Some(f) != moving && waypoint.contacts[f].holds())
-                .filter_map(|f| Some((f, contact_of(&waypoint.contacts[f])?)))
-                .collect();
-            let key: Vec<(usize, [u64; 6])> = holding
-                .iter()
-                .map(|(f, contact)| {
-                    let (p, n) = (contact.point_in_object, contact.normal_in_object);
-                    (*f, [p.x, p.y, p.z, n.x, n.y, n.z].map(f64::to_bits))
-                })
-                .collect();
-            if seen.insert(key) {
-                let grip =
-                    |(f, contact): &(usize, Contact)| Grip { contact: *contact, model: model.fingers[*f].contact };
-                let fingers = holding.iter().map(|(f, _)| *f).collect();
-                sets.push(Holding { at: Moment::at(s, w), fingers, grips: holding.iter().map(grip).collect() });
+            let holding = holders(model, moving, waypoint);
+            if seen.insert(holding.iter().map(Holder::key).collect::<Vec<_>>()) {
+                let fingers = holding.iter().map(|holder| holder.finger).collect();
+                sets.push(Holding { at: Moment::at(s, w), fingers, grips: grips_of(model, &holding) });
             }
         }
     }

@@ -48,7 +48,7 @@ fn robot() -> Robot {
     };
     let mut robot = Robot {
         name: "sample".into(),
-        links: vec![Link { name: "palm".into(), collision: vec![palm], parent_joint: None }],
+        links: vec![Link { name: "palm".into(), collision: vec![palm], visual: Vec::new(), parent_joint: None }],
         joints: Vec::new(),
         root: LinkId(0),
     };
@@ -78,7 +78,8 @@ fn robot() -> Robot {
                 effort: Some(1.0),
             });
             let joint = JointId(robot.joints.len());
-            robot.links.push(Link { name: format!("f{f}_l{j}"), collision, parent_joint: Some(joint) });
+            let name = format!("f{f}_l{j}");
+            robot.links.push(Link { name, collision, visual: Vec::new(), parent_joint: Some(joint) });
             robot.joints.push(Joint {
                 name: format!("f{f}_j{j}"),
                 kind,
