@@ -1,0 +1,128 @@
+//! From where everything is seen best.
+
+use super::key_frames::KeyFrame;
+use super::stage::Stage;
+use crate::render::raster::{NONE, Samples};
+use crate::render::{Camera, Model};
+use regrasp_geometry::{Point, Vector};
+use std::f64::consts::TAU;
+
+/// Directions tried around the vertical, and heights over the horizon in radians.
+const AROUND: usize = 16;
+const HEIGHTS: [f64; 3] = [0.30, 0.52, 0.75];
+/// Width of the pictures in which directions are compared, in pixels.
+const TRIAL_WIDTH: usize = 120;
+/// Share of the picture that stays free at each side.
+const BORDER: f64 = 0.04;
+/// Focal length over the picture's width: a lens of about 26 degrees.
+const FOCAL: f64 = 2.2;
+/// The object's diameter is at least this share of the picture's height, even if parts of the hand are cut.
+const LEAST_OBJECT: f64 = 0.27;
+
+/// A ball that holds all corners of all models.
+pub fn ball_around(postures: &[Vec<Model>]) -> (Point, f64) {
+    let corners: Vec<Point> = all_corners(postures).collect();
+    let (low, high) = corners.iter().fold((corners[0], corners[0]), |(low, high), p| (low.inf(p), high.sup(p)));
+    let center = nalgebra::center(&low, &high);
+    (center, corners.iter().map(|p| (p - center).norm()).fold(1e-6, f64::max))
+}
+
+fn all_corners(postures: &[Vec<Model>]) -> impl Iterator<Item = Point> + '_ {
+    postures.iter().flatten().flat_map(|model| model.world_corners().flatten().collect::<Vec<_>>())
+}
+
+/// The camera from which most of the object, and most contacts, are seen over all frames.
+pub fn best(stage: &Stage, frames: &[KeyFrame], postures: &[Vec<Model>], width: usize, height: usize) -> Camera {
+    let corners: Vec<Point> = thinned(all_corners(postures).collect());
+    let trial_height = (TRIAL_WIDTH * height).div_ceil(width.max(1)).max(1);
+    let mut found: Option<(f64, Vector)> = None;
+    for height_angle in HEIGHTS {
+        for k in 0..AROUND {
+            // Not straight at a finger or a face where hands are symmetric.
+            let angle = TAU * (k as f64 + 0.35) / AROUND as f64;
+            let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
+            let level = libm::cos(height_angle);
+            let toward = Vector::new(level * cosine, level * sine, -libm::sin(height_angle));
+            let camera = framed(stage, frames, &corners, &toward, TRIAL_WIDTH, trial_height);
+            let value = value_of(stage, frames, postures, &camera, trial_height);
+            if found.is_none_or(|(best, _)| value > best) {
+                found = Some((value, toward));
+            }
+        }
+    }
+    let toward = found.map_or_else(Vector::y, |(_, toward)| toward);
+    framed(stage, frames, &corners, &toward, width, height)
+}
+
+/// At most some thousands of points, enough to frame them.
+fn thinned(points: Vec<Point>) -> Vec<Point> {
+    let step = points.len().div_ceil(6000).max(1);
+    points.into_iter().step_by(step).collect()
+}
+
+/// How much of the object is seen, as share of the picture, with a bonus for contacts that nothing hides.
+fn value_of(stage: &Stage, frames: &[KeyFrame], postures: &[Vec<Model>], camera: &Camera, height: usize) -> f64 {
+    let mut value = 0.0;
+    for (frame, solid) in frames.iter().zip(postures) {
+        let n_object = solid[..stage.n_object_pieces()].iter().map(|m| m.surface.corners.len()).sum::<usize>() as u32;
+        let seen = Samples::of(solid, camera, TRIAL_WIDTH, height);
+        let of_object = seen.triangle.iter().filter(|&&t| t != NONE && t < n_object).count();
+        value += of_object as f64 / seen.triangle.len() as f64;
+        let object = regrasp_geometry::Pose::from(&frame.world_from_object);
+        let size = stage.object_radius;
+        for contact in frame.contacts.iter().filter(|contact| contact.holds()) {
+            let Some(point) = contact.point_in_object else { continue };
+            let at = camera.see(&(object * Point::from(point)));
+            let inside = at.x >= 0.0 && at.y >= 0.0 && at.x < TRIAL_WIDTH as f64 && at.y < height as f64;
+            if inside {
+                let nearest = 1.0 / seen.inverse_depth[at.y as usize * TRIAL_WIDTH + at.x as usize];
+                // The fingertip itself may be in front.
+                value += if at.depth - nearest < 0.45 * size { 0.012 } else { 0.0 };
+            }
+        }
+    }
+    value
+}
+
+/// A camera that looks along `toward` and shows all `corners`, or, where the object would be too small, the object in its
+/// middle.
+fn framed(
+    stage: &Stage,
+    frames: &[KeyFrame],
+    corners: &[Point],
+    toward: &Vector,
+    width: usize,
+    height: usize,
+) -> Camera {
+    let middle = frames.iter().map(|frame| stage.object_center_at(frame).coords).sum::<Vector>();
+    let middle = Point::from(middle / frames.len() as f64);
+    let size = stage.object_radius;
+    let focal = FOCAL * width as f64;
+    let half = [width as f64 / 2.0, height as f64 / 2.0];
+    let room = half.map(|h| h * (1.0 - 2.0 * BORDER));
+    let farthest = focal * 2.0 * size / (LEAST_OBJECT * height as f64);
+    // Distances, from near to far, until all is in the picture.
+    let mut distance = farthest * 0.35;
+    loop {
+        let mut camera = Camera::looking(toward, &middle, distance, focal, [0.0, 0.0]);
+        let seen = corners.iter().map(|p| camera.see(p));
+        let whole = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
+        let [left, top, right, bottom] = seen.fold(whole, |b, p| match p.depth > 0.0 {
+            true => [b[0].min(p.x), b[1].min(p.y), b[2].max(p.x), b[3].max(p.y)],
+            false => [-1e9, -1e9, 1e9, 1e9],
+        });
+        let fits = right - left <= 2.0 * room[0] && bottom - top <= 2.0 * room[1];
+        let last = distance >= farthest;
+        if fits || last {
+            // The hand in the middle, as far as the object keeps its place in the picture.
+            let object = 1.25 * focal * size / distance;
+            let shift = |low: f64, high: f64, half: f64| {
+                let most = (half - object).max(0.0);
+                (-(low + high) / 2.0).clamp(-most, most)
+            };
+            camera.center = [half[0] + shift(left, right, half[0]), half[1] + shift(top, bottom, half[1])];
+            return camera;
+        }
+        distance = (distance * 1.02).min(farthest);
+    }
+}
