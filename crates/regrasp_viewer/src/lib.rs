@@ -1,8 +1,10 @@
 //! Pictures of plans: one self-contained page, storyboards and charts. Reads scene and plan only.
 //!
 //! [`story`] gathers everything that a picture needs to know, [`page`] makes one HTML file of it, [`storyboard`] a PNG of key
-//! frames, `charts` and `roadmap_picture` make SVG pictures.
+//! frames, [`charts`] and `roadmap_picture` make SVG pictures.
 
+/// Charts of a plan.
+pub mod charts;
 /// One self-contained HTML file.
 pub mod page;
 /// One colour per finger, the same in every picture.

@@ -42,9 +42,19 @@ pub fn moving_finger(plan: &Plan, segment: &Segment) -> Option<usize> {
 
 /// Angle by which the object is turned at a waypoint, from where it started, in radians.
 pub fn turned(plan: &Plan, waypoint: &Waypoint) -> f64 {
-    let start = plan.segments.first().and_then(|segment| segment.waypoints.first()).unwrap_or(waypoint);
-    let [start, now] = [start, waypoint].map(|w| Pose::from(&w.world_from_object));
+    let [start, now] = start_and(plan, waypoint);
     start.rotation.angle_to(&now.rotation)
+}
+
+/// How far the object's origin is at a waypoint from where it started, in metres.
+pub fn moved(plan: &Plan, waypoint: &Waypoint) -> f64 {
+    let [start, now] = start_and(plan, waypoint);
+    (now.translation.vector - start.translation.vector).norm()
+}
+
+fn start_and(plan: &Plan, waypoint: &Waypoint) -> [Pose; 2] {
+    let start = plan.segments.first().and_then(|segment| segment.waypoints.first()).unwrap_or(waypoint);
+    [start, waypoint].map(|w| Pose::from(&w.world_from_object))
 }
 
 /// What a finger does for a while.

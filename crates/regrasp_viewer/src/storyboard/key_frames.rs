@@ -34,6 +34,8 @@ pub struct KeyFrame {
     pub time: f64,
     /// Angle by which the object has turned since the start, in radians.
     pub turned: f64,
+    /// How far its origin has moved since then, in metres.
+    pub moved: f64,
     /// Why.
     pub event: Event,
     /// The finger that moves.
@@ -58,7 +60,7 @@ impl KeyFrame {
             Event::LetsGo => format!("{finger} lets go"),
             Event::Lands => format!("{finger} lands"),
             Event::MovesFreely => format!("{finger} moves, free"),
-            Event::ObjectMoves => "object turns".into(),
+            Event::ObjectMoves => "object moves".into(),
             Event::Goal => "goal".into(),
         }
     }
@@ -151,6 +153,7 @@ fn key_frame(scene: &SceneStory, plan: &Plan, steps: &[Step], step: usize) -> Ke
         step,
         time: waypoint.time,
         turned: timeline::turned(plan, waypoint),
+        moved: timeline::moved(plan, waypoint),
         event,
         moving,
         path: if moving.is_some() { tip_path(scene, plan, segment) } else { Vec::new() },

@@ -175,7 +175,11 @@ fn caption(sheet: &mut Sheet, plan: &Plan, frame: &KeyFrame, layout: &Layout, k:
     let middle = x as f64 + layout.frame_width as f64 / 2.0;
     let width = layout.frame_width as f64;
     let first = y as f64 + layout.frame_height as f64 + 0.95 * layout.text;
-    let moment = format!("{:.1} s, turned {:.0}\u{b0}", frame.time, frame.turned.to_degrees());
+    let far = match plan_turns(plan) {
+        true => format!("turned {:.0}\u{b0}", frame.turned.to_degrees()),
+        false => format!("moved {:.0} mm", 1e3 * frame.moved),
+    };
+    let moment = format!("{:.1} s, {far}", frame.time);
     let moment = sheet.fitted(&moment, layout.text, width);
     sheet.write(&moment, middle, first, layout.text, "#222222", Anchor::Middle);
     let (dot, room) = (0.28 * layout.text, 1.0 * layout.text);
@@ -193,6 +197,11 @@ fn caption(sheet: &mut Sheet, plan: &Plan, frame: &KeyFrame, layout: &Layout, k:
             sheet.write(&text, middle, second, layout.text, "#222222", Anchor::Middle);
         }
     }
+}
+
+/// True unless the object only moves along, at no moment turned by a degree.
+fn plan_turns(plan: &Plan) -> bool {
+    timeline::steps(plan).iter().any(|step| timeline::turned(plan, step.waypoint) > 1f64.to_radians())
 }
 
 /// The object's axes in the lower left corner of a frame.
