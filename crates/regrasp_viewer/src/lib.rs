@@ -1,7 +1,7 @@
 //! Pictures of plans: one self-contained page, storyboards and charts. Reads scene and plan only.
 //!
 //! [`story`] gathers everything that a picture needs to know, [`page`] makes one HTML file of it, [`storyboard`] a PNG of key
-//! frames, [`charts`] and `roadmap_picture` make SVG pictures.
+//! frames, [`charts`] and [`roadmap_picture`] make SVG pictures.
 
 /// Charts of a plan.
 pub mod charts;
@@ -11,6 +11,8 @@ pub mod page;
 pub mod palette;
 /// Small software renderer.
 pub mod render;
+/// A manipulation graph in the plane.
+pub mod roadmap_picture;
 /// What a page is told.
 pub mod story;
 /// Key frames of a plan in one picture.

@@ -1,6 +1,7 @@
 //! `regrasp plan`: plan a scene, check the plan, then write it.
 
 use crate::args::{self, Common};
+use crate::commands::pictures;
 use crate::interrupt;
 use crate::judge;
 use crate::load;
@@ -11,6 +12,7 @@ use crate::talk::{Talk, counted, duration, grouped};
 use regrasp::base::files;
 use regrasp::plan::format;
 use regrasp::planners::FailureKind;
+use regrasp::told;
 use regrasp::{Budget, Failure, InHandQuery, InHandSettings, Plan, Scene};
 use serde_json::json;
 use std::fmt::Write;
@@ -22,7 +24,7 @@ use std::time::{Duration, Instant};
 
 /// Plans, checks, writes.
 pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), Stop> {
-    let written = [arguments.output.as_deref(), arguments.report.as_deref()];
+    let written = [arguments.output.as_deref(), arguments.report.as_deref(), arguments.causes.as_deref()];
     for path in written.iter().flatten() {
         refuse_unwritable(path)?;
     }
@@ -50,8 +52,13 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
     let packages = load::options(common).resolve;
     let page = arguments.report.as_deref().map(|path| Page::new(path, &loaded.scene, &query, &packages));
     let plan = match (search(&loaded.scene, &query, &settings, arguments.seed, &limits, talk), &page) {
-        (Err(Stop::NoPlan(failure)), Some(page)) => {
-            page.write_failure(&failure, talk)?;
+        (Err(Stop::NoPlan(failure)), page) => {
+            if let Some(page) = page {
+                page.write_failure(&failure, talk)?;
+            }
+            if let Some(path) = &arguments.causes {
+                pictures::write_causes(path, &told::failure_story(&failure), talk)?;
+            }
             return Err(Stop::NoPlan(failure));
         }
         (found, _) => found?,
