@@ -163,7 +163,8 @@ fn run_picture(arguments: &args::RoadmapPicture, common: &Common, talk: &Talk) -
     if !judge::judge(&loaded, &answer.plan, talk)?.accepted() {
         return Err(Stop::Rejected);
     }
-    let story = told::roadmap_story(&roadmap, &answer.plan);
+    // With start and goal of the query as nodes.
+    let story = told::roadmap_story(&roadmap.grown_by(&answer), &answer.plan);
     let title = format!("Graph {name}, goal of {}", loaded.scene.name);
     pictures::write_roadmap(&arguments.output, &story, &title, talk)
 }

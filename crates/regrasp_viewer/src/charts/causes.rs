@@ -4,8 +4,8 @@ use super::svg::{Anchor, INK, SOFT, Svg, cut};
 use crate::story::FailureStory;
 
 const WIDTH: f64 = 836.0;
-const LEFT: f64 = 360.0;
-const RIGHT: f64 = 690.0;
+const LEFT: f64 = 452.0;
+const RIGHT: f64 = 730.0;
 const ROW: f64 = 24.0;
 const TOP: f64 = 44.0;
 /// Most causes that are shown one by one.
@@ -22,13 +22,13 @@ pub fn causes(failure: &FailureStory) -> Option<String> {
     let height = TOP + ROW * shown.len() as f64 + if rest > 0 { 28.0 } else { 12.0 };
     let mut svg = Svg::new(WIDTH, height);
     svg.text("Why no plan was found", [16.0, 19.0], Anchor::Start, INK, "font-weight=\"bold\"");
-    svg.text(&cut(&failure.message, 125), [16.0, 35.0], Anchor::Start, SOFT, "font-size=\"11\"");
+    svg.text(&cut(&failure.message, 140), [16.0, 35.0], Anchor::Start, SOFT, "font-size=\"11\"");
     for (row, cause) in shown.iter().enumerate() {
         let y = TOP + ROW * row as f64;
         let width = (RIGHT - LEFT) * cause.share / largest;
-        svg.text(&cut(&cause.reason, 56), [LEFT - 8.0, y + 16.0], Anchor::End, INK, "");
+        svg.text(&cut(&cause.reason, 74), [LEFT - 8.0, y + 16.0], Anchor::End, INK, "");
         svg.rect([LEFT, y + 4.0], [width, ROW - 8.0], "#0072b2", "");
-        let label = format!("{} %   {}", super::margin::significant(100.0 * cause.share), cause.count);
+        let label = format!("{} % ({})", super::margin::significant(100.0 * cause.share), cause.count);
         svg.text(&label, [LEFT + width + 8.0, y + 16.0], Anchor::Start, SOFT, "font-size=\"11\"");
     }
     if rest > 0 {

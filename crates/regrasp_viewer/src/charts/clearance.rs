@@ -25,7 +25,10 @@ pub fn clearance(plan: &Plan, judged: &Judged) -> Option<String> {
     let bottom = TOP + HEIGHT;
     let values = Scale::new(worst.1.min(0.0), highest * 1.08, bottom, TOP).rounded(4);
     let mut svg = Svg::new(SHEET, bottom + time_axis::AXIS);
-    time_axis::heading(&mut svg, "Clearance", "of the nearest two things that must not touch; grey: the object moves");
+    let pair = judged.pair.get(worst.2).and_then(|pair| judged.pairs.get(*pair));
+    let names = pair.map_or_else(String::new, |(a, b)| format!(", {} and {}", cut(a, 24), cut(b, 24)));
+    let dot = format!("dot: smallest, {} mm at {:.2} s{names}; grey: the object moves", significant(worst.1), worst.0);
+    time_axis::heading(&mut svg, "Clearance", &dot);
     time_axis::shade_transfers(&mut svg, plan, &time, TOP, bottom);
     time_axis::draw_values(&mut svg, &values, 4, "distance [mm]");
     svg.line([LEFT, values.at(0.0)], [RIGHT, values.at(0.0)], LIMIT, 1.5, "stroke-dasharray=\"6 3\"");
@@ -37,10 +40,6 @@ pub fn clearance(plan: &Plan, judged: &Judged) -> Option<String> {
     svg.path(&points, "#009e73", 1.8, "class=\"clearance\"");
     let place = [time.at(worst.0), values.at(worst.1)];
     svg.disc(place, 4.0, "#009e73", "stroke=\"#ffffff\" stroke-width=\"1.5\"");
-    let pair = judged.pair.get(worst.2).and_then(|pair| judged.pairs.get(*pair));
-    let names = pair.map_or_else(String::new, |(a, b)| format!(": {} and {}", cut(a, 24), cut(b, 24)));
-    let label = format!("smallest {} mm at {:.2} s{names}", significant(worst.1), worst.0);
-    time_axis::callout(&mut svg, &label, place, TOP);
     time_axis::frame(&mut svg, TOP, bottom);
     time_axis::draw(&mut svg, &time, bottom);
     Some(svg.finish("Clearance over time"))

@@ -23,7 +23,8 @@ pub fn margin(plan: &Plan, judged: &Judged) -> Option<String> {
     let bottom = TOP + HEIGHT;
     let values = Scale::new(0.0, highest * 1.08, bottom, TOP).rounded(4);
     let mut svg = Svg::new(SHEET, bottom + time_axis::AXIS);
-    time_axis::heading(&mut svg, "Closure margin", "of the fingers that hold; grey: the object moves");
+    let dot = format!("dot: smallest, {} at {:.2} s; grey: the object moves", significant(worst.1), worst.0);
+    time_axis::heading(&mut svg, "Closure margin", &dot);
     time_axis::shade_transfers(&mut svg, plan, &time, TOP, bottom);
     time_axis::draw_values(&mut svg, &values, 4, "margin");
     let required = values.at(judged.required_margin);
@@ -39,7 +40,6 @@ pub fn margin(plan: &Plan, judged: &Judged) -> Option<String> {
     svg.text_on_lines(&label, place, Anchor::End, LIMIT, "font-size=\"11\"");
     let place = [time.at(worst.0), values.at(worst.1)];
     svg.disc(place, 4.0, "#0072b2", "stroke=\"#ffffff\" stroke-width=\"1.5\"");
-    time_axis::callout(&mut svg, &format!("smallest {} at {:.2} s", significant(worst.1), worst.0), place, TOP);
     time_axis::frame(&mut svg, TOP, bottom);
     time_axis::draw(&mut svg, &time, bottom);
     Some(svg.finish("Closure margin over time"))

@@ -52,6 +52,8 @@ pub fn short(value: f64) -> String {
 /// `text` with what means something in XML escaped, and control characters replaced.
 pub fn escaped(text: &str) -> String {
     regrasp_base::diagnostic::printable(text)
+        // No characters in XML 1.0.
+        .replace(['\u{fffe}', '\u{ffff}'], "\u{fffd}")
         .replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")

@@ -65,10 +65,3 @@ pub fn draw_values(svg: &mut Svg, values: &Scale, n_ticks: usize, name: &str) {
 pub fn frame(svg: &mut Svg, top: f64, bottom: f64) {
     svg.rect([LEFT, top], [RIGHT - LEFT, bottom - top], "none", "stroke=\"#9a9a9a\" stroke-width=\"1\"");
 }
-
-/// A label at a place, on the side of it where there is room.
-pub fn callout(svg: &mut Svg, text: &str, [x, y]: [f64; 2], top: f64) {
-    let (anchor, shift) = if x > (LEFT + RIGHT) / 2.0 { (Anchor::End, -8.0) } else { (Anchor::Start, 8.0) };
-    let up = if y - 18.0 < top { y + 16.0 } else { y - 8.0 };
-    svg.text_on_lines(text, [x + shift, up], anchor, INK, "font-size=\"11\"");
-}

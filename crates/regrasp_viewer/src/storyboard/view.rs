@@ -114,10 +114,10 @@ fn framed(
         let fits = right - left <= 2.0 * room[0] && bottom - top <= 2.0 * room[1];
         let last = distance >= farthest;
         if fits || last {
-            // The hand in the middle, as far as the object keeps its place in the picture.
+            // All in the middle; where that does not fit, as far as the object keeps its place in the picture.
             let object = 1.25 * focal * size / distance;
             let shift = |low: f64, high: f64, half: f64| {
-                let most = (half - object).max(0.0);
+                let most = if fits { f64::INFINITY } else { (half - object).max(0.0) };
                 (-(low + high) / 2.0).clamp(-most, most)
             };
             camera.center = [half[0] + shift(left, right, half[0]), half[1] + shift(top, bottom, half[1])];
