@@ -142,9 +142,9 @@ pub struct Plan {
     /// Write a page for a browser too: of the plan, or of why there is none
     #[arg(long, value_name = "FILE.html")]
     pub report: Option<PathBuf>,
-    /// Write the causes as a picture where no plan is found
-    #[arg(long, value_name = "FILE.svg")]
-    pub causes: Option<PathBuf>,
+    /// Where no plan is found, write pictures of why to this folder: the causes, and the graph that was reached
+    #[arg(long, value_name = "DIR")]
+    pub failure: Option<PathBuf>,
     /// Threads [default: all cores]; the plan does not depend on it
     #[arg(long, value_parser = threads, allow_negative_numbers = true)]
     pub threads: Option<usize>,

@@ -77,10 +77,14 @@ fn axes(svg: &mut Svg, growth: &Scale, angles: &Scale) {
     svg.text("angle to the goal", [x, y], Anchor::Middle, SOFT, &turn);
 }
 
-/// All edges of one kind and one component in one path each.
+/// Edges in one path; where paths lie over each other the picture grows darker, which one path does not do by itself.
+const PER_PATH: usize = 40;
+
+/// Edges by kind and component.
 fn draw_edges(svg: &mut Svg, roadmap: &RoadmapStory, place: &dyn Fn(&RoadmapNode) -> [f64; 2]) {
     let many = (roadmap.edges.len() as f64 / 300.0).max(1.0);
-    let opacity = (0.55 / many.sqrt()).clamp(0.07, 0.5);
+    let opacity = (0.6 / many.sqrt()).clamp(0.10, 0.5);
+    let width = (0.9 / many.powf(0.25)).max(0.45);
     for kind in [RoadmapEdgeKind::Transfer, RoadmapEdgeKind::TransferRegrasp] {
         for component in 0..=COLORED {
             let mut points = Vec::new();
@@ -94,7 +98,9 @@ fn draw_edges(svg: &mut Svg, roadmap: &RoadmapStory, place: &dyn Fn(&RoadmapNode
                 RoadmapEdgeKind::Transfer => "",
                 RoadmapEdgeKind::TransferRegrasp => " stroke-dasharray=\"5 3\"",
             };
-            svg.path(&points, color(component), 0.9, &format!("stroke-opacity=\"{opacity:.2}\"{dashes}"));
+            for some in points.chunks(3 * PER_PATH) {
+                svg.path(some, color(component), width, &format!("stroke-opacity=\"{opacity:.2}\"{dashes}"));
+            }
         }
     }
 }

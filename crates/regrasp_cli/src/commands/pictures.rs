@@ -6,9 +6,11 @@ use crate::args;
 use crate::stop::Stop;
 use crate::talk::{Talk, grouped};
 use regrasp::base::files;
-use regrasp::viewer::story::{FailureStory, RoadmapStory, Story};
+use regrasp::told;
+use regrasp::viewer::story::{RoadmapStory, Story};
 use regrasp::viewer::storyboard::{StoryboardError, StoryboardSettings, storyboard};
 use regrasp::viewer::{charts, roadmap_picture::roadmap_picture};
+use regrasp::{Failure, InHandQuery};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -52,15 +54,17 @@ pub fn write(arguments: &args::View, story: &Story, talk: &Talk) -> Result<(), S
     Ok(())
 }
 
-/// Writes the causes of a failure as bars; says so where there are none.
-pub fn write_causes(path: &Path, failure: &FailureStory, talk: &Talk) -> Result<(), Stop> {
-    match charts::causes(failure) {
-        Some(chart) => put(path, chart.as_bytes(), talk),
-        None => {
-            talk.say(format!("no causes were counted: {} is not written", path.display()));
-            Ok(())
-        }
+/// Writes what there is to be seen of a failure: the causes as bars, and the graph that the search had reached.
+pub fn write_failure(folder: &Path, failure: &Failure, query: &InHandQuery, talk: &Talk) -> Result<(), Stop> {
+    std::fs::create_dir_all(folder).map_err(|error| Stop::unwritable(folder, &error))?;
+    if let Some(chart) = charts::causes(&told::failure_story(failure)) {
+        put(&folder.join("causes.svg"), chart.as_bytes(), talk)?;
     }
+    if let Some(reached) = told::reached_story(failure, &query.world_from_object_goal) {
+        let picture = roadmap_picture(&reached, "Grasps that the search reached");
+        put(&folder.join("reached.svg"), picture.as_bytes(), talk)?;
+    }
+    Ok(())
 }
 
 /// Writes the picture of a graph.

@@ -12,7 +12,6 @@ use crate::talk::{Talk, counted, duration, grouped};
 use regrasp::base::files;
 use regrasp::plan::format;
 use regrasp::planners::FailureKind;
-use regrasp::told;
 use regrasp::{Budget, Failure, InHandQuery, InHandSettings, Plan, Scene};
 use serde_json::json;
 use std::fmt::Write;
@@ -24,7 +23,7 @@ use std::time::{Duration, Instant};
 
 /// Plans, checks, writes.
 pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), Stop> {
-    let written = [arguments.output.as_deref(), arguments.report.as_deref(), arguments.causes.as_deref()];
+    let written = [arguments.output.as_deref(), arguments.report.as_deref()];
     for path in written.iter().flatten() {
         refuse_unwritable(path)?;
     }
@@ -56,8 +55,8 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
             if let Some(page) = page {
                 page.write_failure(&failure, talk)?;
             }
-            if let Some(path) = &arguments.causes {
-                pictures::write_causes(path, &told::failure_story(&failure), talk)?;
+            if let Some(folder) = &arguments.failure {
+                pictures::write_failure(folder, &failure, &query, talk)?;
             }
             return Err(Stop::NoPlan(failure));
         }

@@ -39,7 +39,12 @@ fn path_of_class<'a>(document: &'a Document, class: &str) -> Node<'a, 'a> {
 }
 
 /// The scale of an axis, read from the first and last number written beside it.
-fn scale_of(document: &Document, along: &str, is_on_axis: &dyn Fn(&Node) -> bool, shift: f64) -> impl Fn(f64) -> f64 {
+fn scale_of(
+    document: &Document,
+    along: &str,
+    is_on_axis: &dyn Fn(&Node) -> bool,
+    shift: f64,
+) -> impl Fn(f64) -> f64 + use<> {
     let ticks: Vec<(f64, f64)> = document
         .descendants()
         .filter(|node| node.has_tag_name("text") && is_on_axis(node))
@@ -50,11 +55,11 @@ fn scale_of(document: &Document, along: &str, is_on_axis: &dyn Fn(&Node) -> bool
     move |place| first.1 + (place - first.0) / (last.0 - first.0) * (last.1 - first.1)
 }
 
-fn values_of(document: &Document) -> impl Fn(f64) -> f64 {
+fn values_of(document: &Document) -> impl Fn(f64) -> f64 + use<> {
     scale_of(document, "y", &|node| node.attribute("text-anchor") == Some("end") && number(node, "x") < 110.0, 4.0)
 }
 
-fn times_of(document: &Document) -> impl Fn(f64) -> f64 {
+fn times_of(document: &Document) -> impl Fn(f64) -> f64 + use<> {
     let lowest = document
         .descendants()
         .filter(|node| node.has_tag_name("text") && node.text() == Some("time [s]"))
