@@ -2,7 +2,7 @@
 
 /// Colours that people with any kind of colour vision tell apart, and that differ in lightness (Okabe and Ito 2008); the last
 /// two stand in for their yellow and black, which are lost on white and among lines.
-pub const FINGERS: [&str; 8] = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#999933", "#7f3c8d"];
+pub const FINGERS: [&str; 8] = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#999933", "#882255"];
 
 /// Colour of the finger or the component with this number, as `#rrggbb`.
 pub fn color(number: usize) -> &'static str {
