@@ -124,12 +124,25 @@ pub struct Marks {
 pub fn marks(plan: &Plan, finger: usize) -> Marks {
     let mut marks = Marks::default();
     let on = |stretch: &Stretch| matches!(stretch.doing, Doing::Holds | Doing::Rolls);
-    for pair in stretches(plan, finger).windows(2) {
+    let stretches = stretches(plan, finger);
+    // A finger may let go in the first moment, and land in the last.
+    let ends = [
+        plan.segments.first().and_then(|s| s.waypoints.first()),
+        plan.segments.last().and_then(|s| s.waypoints.last()),
+    ];
+    let [held_first, held_last] = ends.map(|w| w.and_then(|w| w.contacts.get(finger)).is_some_and(|c| c.holds()));
+    if let Some(first) = stretches.first().filter(|first| held_first && !on(first)) {
+        marks.lifts.push(first.from);
+    }
+    for pair in stretches.windows(2) {
         match (on(&pair[0]), on(&pair[1])) {
             (true, false) => marks.lifts.push(pair[1].from),
             (false, true) => marks.lands.push(pair[1].from),
             _ => {}
         }
+    }
+    if let Some(last) = stretches.last().filter(|last| held_last && !on(last)) {
+        marks.lands.push(last.until);
     }
     marks
 }

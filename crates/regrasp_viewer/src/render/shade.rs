@@ -28,6 +28,8 @@ pub struct Layer {
     pub in_front: f64,
     /// Opacity where it is hidden behind something solid.
     pub hidden: f64,
+    /// Whether the camera has to show all of it.
+    pub is_framed: bool,
 }
 
 /// A picture: red, green and blue of each pixel, row by row from the upper left.

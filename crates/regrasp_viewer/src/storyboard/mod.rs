@@ -75,7 +75,8 @@ pub fn storyboard_picture(story: &Story, settings: &StoryboardSettings) -> Resul
     let layout = Layout::new(settings.width, columns, frames.len());
     let stage = Stage::new(scene, plan, settings.collision).map_err(StoryboardError::Plan)?;
     let postures: Vec<_> = frames.iter().map(|frame| stage.solid(frame)).collect();
-    let camera = view::best(&stage, &frames, &postures, layout.frame_width, layout.frame_height);
+    let layers: Vec<_> = frames.iter().map(|frame| stage.layers(frame)).collect();
+    let camera = view::best(&stage, &frames, &postures, &layers, layout.frame_width, layout.frame_height);
     let radius = stage.object_radius;
     let look = Look {
         supersampling: settings.supersampling,
@@ -85,9 +86,8 @@ pub fn storyboard_picture(story: &Story, settings: &StoryboardSettings) -> Resul
     };
     let too_large = || StoryboardError::Settings("the picture would be too large".into());
     let mut sheet = Sheet::new(settings.width, layout.height).ok_or_else(too_large)?;
-    for (k, (frame, solid)) in frames.iter().zip(&postures).enumerate() {
-        let layers = stage.layers(frame);
-        let picture = render(solid, &layers, &camera, layout.frame_width, layout.frame_height, &look);
+    for (k, frame) in frames.iter().enumerate() {
+        let picture = render(&postures[k], &layers[k], &camera, layout.frame_width, layout.frame_height, &look);
         let (x, y) = layout.corner(k);
         sheet.lay(&picture, x, y);
         draw_axes(&mut sheet, frame, &camera, &layout, k);

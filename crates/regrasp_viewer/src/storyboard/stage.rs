@@ -25,6 +25,9 @@ const OBSTACLE_BODY: u32 = 1;
 const MARK_BODY: u32 = 100;
 const FIRST_LINK: u32 = 1000;
 
+/// Obstacles nearer than this, in radii of the object, are shown whole.
+const NEAR: f64 = 5.0;
+
 /// Unit vector along an axis.
 pub fn unit(axis: usize) -> Vector {
     Vector::ith(axis, 1.0)
@@ -66,6 +69,7 @@ pub struct Stage<'s> {
     object_center: Point,
     /// Largest distance of a point of the object from there, in metres.
     pub object_radius: f64,
+    object_at_start: Pose,
     /// Largest contact force in the plan, in newtons.
     largest_force: f64,
     friction: f64,
@@ -102,6 +106,7 @@ impl<'s> Stage<'s> {
             obstacles: Vec::new(),
             object_center,
             object_radius,
+            object_at_start: Pose::from(&plan.start),
             largest_force: forces.map(|force| force.norm()).fold(0.0, f64::max),
             friction: plan.promises.friction,
         };
@@ -144,6 +149,18 @@ impl<'s> Stage<'s> {
                 self.obstacles.push(prop.placed(&Pose::identity()));
             }
         }
+    }
+
+    /// Obstacles, placed in the world.
+    pub fn obstacles(&self) -> &[Model] {
+        &self.obstacles
+    }
+
+    /// True when no obstacle is so large, or so far away, that hand and object would be small beside it.
+    fn obstacles_are_near(&self) -> bool {
+        let center = self.object_at_start * self.object_center;
+        let mut corners = self.obstacles.iter().flat_map(|model| model.world_corners().flatten().collect::<Vec<_>>());
+        corners.all(|corner| (corner - center).norm() < NEAR * self.object_radius)
     }
 
     /// How many models of [`Stage::solid`] are the object's.
@@ -195,9 +212,9 @@ impl<'s> Stage<'s> {
             marks.extend(marks::rope(&frame.path, 0.03 * size, color, MARK_BODY + finger as u32));
         }
         vec![
-            Layer { models: self.obstacles.clone(), in_front: 0.40, hidden: 0.0 },
-            Layer { models: cones, in_front: 0.38, hidden: 0.10 },
-            Layer { models: marks, in_front: 1.0, hidden: 0.45 },
+            Layer { models: self.obstacles.clone(), in_front: 0.40, hidden: 0.0, is_framed: self.obstacles_are_near() },
+            Layer { models: cones, in_front: 0.38, hidden: 0.10, is_framed: true },
+            Layer { models: marks, in_front: 1.0, hidden: 0.45, is_framed: true },
         ]
     }
 }

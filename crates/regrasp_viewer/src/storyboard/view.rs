@@ -3,6 +3,7 @@
 use super::key_frames::KeyFrame;
 use super::stage::Stage;
 use crate::render::raster::{NONE, Samples};
+use crate::render::shade::Layer;
 use crate::render::{Camera, Model};
 use regrasp_geometry::{Point, Vector};
 use std::f64::consts::TAU;
@@ -12,6 +13,13 @@ const AROUND: usize = 16;
 const HEIGHTS: [f64; 3] = [0.30, 0.52, 0.75];
 /// Width of the pictures in which directions are compared, in pixels.
 const TRIAL_WIDTH: usize = 120;
+/// Directions, evenly spread, in which the farthest corners of a model are kept for framing.
+const N_EXTREMES: usize = 40;
+/// What it counts to see a contact, the whole path of a moving finger, and a tenth of the picture of obstacles, against the whole
+/// picture of nothing but the object.
+const CONTACT: f64 = 0.012;
+const PATH: f64 = 0.03;
+const OBSTACLE: f64 = 0.3;
 /// Share of the picture that stays free at each side.
 const BORDER: f64 = 0.04;
 /// Focal length over the picture's width: a lens of about 26 degrees.
@@ -31,9 +39,19 @@ fn all_corners(postures: &[Vec<Model>]) -> impl Iterator<Item = Point> + '_ {
     postures.iter().flatten().flat_map(|model| model.world_corners().flatten().collect::<Vec<_>>())
 }
 
-/// The camera from which most of the object, and most contacts, are seen over all frames.
-pub fn best(stage: &Stage, frames: &[KeyFrame], postures: &[Vec<Model>], width: usize, height: usize) -> Camera {
-    let corners: Vec<Point> = thinned(all_corners(postures).collect());
+/// The camera from which most of the object, and most contacts, are seen over all frames; `layers` are what is drawn over the
+/// models in every frame.
+pub fn best(
+    stage: &Stage,
+    frames: &[KeyFrame],
+    postures: &[Vec<Model>],
+    layers: &[Vec<Layer>],
+    width: usize,
+    height: usize,
+) -> Camera {
+    let shown =
+        postures.iter().flatten().chain(layers.iter().flatten().filter(|l| l.is_framed).flat_map(|l| &l.models));
+    let corners: Vec<Point> = shown.flat_map(extremes).collect();
     let trial_height = (TRIAL_WIDTH * height).div_ceil(width.max(1)).max(1);
     let mut found: Option<(f64, Vector)> = None;
     for height_angle in HEIGHTS {
@@ -54,13 +72,24 @@ pub fn best(stage: &Stage, frames: &[KeyFrame], postures: &[Vec<Model>], width: 
     framed(stage, frames, &corners, &toward, width, height)
 }
 
-/// At most some thousands of points, enough to frame them.
-fn thinned(points: Vec<Point>) -> Vec<Point> {
-    let step = points.len().div_ceil(6000).max(1);
-    points.into_iter().step_by(step).collect()
+/// The corners of a model that reach farthest in some directions: enough to frame it.
+fn extremes(model: &Model) -> Vec<Point> {
+    let corners: Vec<Point> = model.world_corners().flatten().collect();
+    if corners.len() <= N_EXTREMES {
+        return corners;
+    }
+    let farthest = |k: usize| {
+        let height = 1.0 - (2 * k + 1) as f64 / N_EXTREMES as f64;
+        let angle = k as f64 * TAU * 0.381_966;
+        let level = (1.0 - height * height).sqrt();
+        let direction = Vector::new(level * libm::cos(angle), level * libm::sin(angle), height);
+        let reach = |p: &&Point| direction.dot(&p.coords);
+        corners.iter().max_by(|a, b| reach(a).total_cmp(&reach(b))).copied()
+    };
+    (0..N_EXTREMES).filter_map(farthest).collect()
 }
 
-/// How much of the object is seen, as share of the picture, with a bonus for contacts that nothing hides.
+/// How much of the object is seen, as share of the picture, with a bonus for contacts, paths and obstacles that nothing hides.
 fn value_of(stage: &Stage, frames: &[KeyFrame], postures: &[Vec<Model>], camera: &Camera, height: usize) -> f64 {
     let mut value = 0.0;
     for (frame, solid) in frames.iter().zip(postures) {
@@ -70,16 +99,19 @@ fn value_of(stage: &Stage, frames: &[KeyFrame], postures: &[Vec<Model>], camera:
         value += of_object as f64 / seen.triangle.len() as f64;
         let object = regrasp_geometry::Pose::from(&frame.world_from_object);
         let size = stage.object_radius;
-        for contact in frame.contacts.iter().filter(|contact| contact.holds()) {
-            let Some(point) = contact.point_in_object else { continue };
-            let at = camera.see(&(object * Point::from(point)));
+        // True where nothing thicker than a fingertip is in front.
+        let is_seen = |point: &Point| {
+            let at = camera.see(point);
             let inside = at.x >= 0.0 && at.y >= 0.0 && at.x < TRIAL_WIDTH as f64 && at.y < height as f64;
-            if inside {
-                let nearest = 1.0 / seen.inverse_depth[at.y as usize * TRIAL_WIDTH + at.x as usize];
-                // The fingertip itself may be in front.
-                value += if at.depth - nearest < 0.45 * size { 0.012 } else { 0.0 };
-            }
-        }
+            inside && at.depth - 1.0 / seen.inverse_depth[at.y as usize * TRIAL_WIDTH + at.x as usize] < 0.45 * size
+        };
+        let contacts = frame.contacts.iter().filter(|contact| contact.holds()).filter_map(|c| c.point_in_object);
+        value += CONTACT * contacts.filter(|point| is_seen(&(object * Point::from(*point)))).count() as f64;
+        let on_path = frame.path.iter().filter(|point| is_seen(point)).count();
+        value += PATH * on_path as f64 / frame.path.len().max(1) as f64;
+        let obstacles = Samples::of(stage.obstacles(), camera, TRIAL_WIDTH, height);
+        let nearer = obstacles.inverse_depth.iter().zip(&seen.inverse_depth).filter(|(a, b)| a > b).count();
+        value += OBSTACLE * (nearer as f64 / seen.triangle.len() as f64).min(0.1);
     }
     value
 }

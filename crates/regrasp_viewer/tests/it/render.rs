@@ -155,7 +155,7 @@ fn still_life(supersampling: usize) -> Picture {
         [0.2, 0.4, 0.8],
         2,
     );
-    let layers = [Layer { models: vec![pane], in_front: 0.4, hidden: 0.0 }];
+    let layers = [Layer { models: vec![pane], in_front: 0.4, hidden: 0.0, is_framed: true }];
     let look =
         Look { supersampling, occlusion_radius: 0.04, shadows_within: Some((Point::origin(), 0.2)), outline: 1.0 };
     render(&solid, &layers, &camera(), SIZE, SIZE, &look)

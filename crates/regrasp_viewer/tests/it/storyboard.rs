@@ -44,6 +44,9 @@ fn a_storyboard_is_the_same_again_and_as_wide_as_asked() {
     assert!(bytes == storyboard(&story, &small(4)).expect("a storyboard"));
     let picture = storyboard_picture(&story, &small(4)).expect("a storyboard");
     assert_eq!(picture.width, 480);
+    // Nothing is cut: the picture is white around frames, whose inner borders stay free.
+    let row_is_white = |row: usize| picture.rgb[3 * 480 * row..3 * 480 * (row + 1)].iter().all(|&byte| byte == 255);
+    assert!((0..6).all(row_is_white), "something is cut at the top");
     // Each quarter shows something.
     for quarter in 0..4 {
         let columns = quarter * 120..(quarter + 1) * 120;
