@@ -5,14 +5,14 @@ use super::plan::{refuse_input, refuse_unwritable};
 use crate::args;
 use crate::stop::Stop;
 use crate::talk::{Talk, grouped};
-use regrasp::base::files;
+use regrasp::base::{Diagnostic, Place, files};
 use regrasp::told;
 use regrasp::viewer::story::{RoadmapStory, Story};
 use regrasp::viewer::storyboard::{StoryboardError, StoryboardSettings, storyboard};
 use regrasp::viewer::{charts, roadmap_picture::roadmap_picture};
 use regrasp::{Failure, InHandQuery};
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Refuses what cannot be written, before anything is made; `inputs` are the files that the command reads.
 pub fn refuse<'a>(arguments: &args::View, inputs: impl Iterator<Item = &'a Path> + Clone) -> Result<(), Stop> {
@@ -38,7 +38,9 @@ pub fn write(arguments: &args::View, story: &Story, talk: &Talk) -> Result<(), S
         };
         let bytes = storyboard(story, &settings).map_err(|error| match error {
             StoryboardError::Settings(problem) => Stop::argument("A505", "--png", problem, "a picture that fits"),
-            StoryboardError::Plan(problem) => Stop::Internal(problem),
+            StoryboardError::Plan(problem) => {
+                Stop::BadInput(Diagnostic::new("C408", Place::file(&arguments.plan), problem).into())
+            }
         })?;
         put(path, &bytes, talk)?;
     }
@@ -68,7 +70,7 @@ pub fn write_failure(folder: &Path, failure: &Failure, query: &InHandQuery, talk
 }
 
 /// Writes the picture of a graph.
-pub fn write_roadmap(path: &PathBuf, roadmap: &RoadmapStory, title: &str, talk: &Talk) -> Result<(), Stop> {
+pub fn write_roadmap(path: &Path, roadmap: &RoadmapStory, title: &str, talk: &Talk) -> Result<(), Stop> {
     make_folder_of(path)?;
     put(path, roadmap_picture(roadmap, title).as_bytes(), talk)
 }

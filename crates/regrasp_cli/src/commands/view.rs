@@ -37,7 +37,7 @@ pub fn run(arguments: &args::View, common: &Common, talk: &Talk) -> Result<(), S
     let plan = format::from_json(&arguments.plan, &files::read(&arguments.plan)?)?;
     let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref())?;
     let loaded = load::scene(&scene_path, common, talk)?;
-    for path in &wanted {
+    for path in wanted.into_iter().chain(arguments.png.as_deref()) {
         refuse_input(path, loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
     }
     let roadmap = match &arguments.with_roadmap {
