@@ -11,7 +11,7 @@
 //! as they need not come together.
 
 use super::barrier::MAX_GRIPS;
-use super::force_distribution::{JointRow, JointRows, Reserve, axes};
+use super::force_distribution::{JointRow, JointRows, Reserve, axes, exerted};
 use crate::closure::GraspFrame;
 use crate::contact::{ContactForce, Grip};
 use arrayvec::ArrayVec;
@@ -47,15 +47,11 @@ pub fn reserves(
 /// What has to be added to forces that balance nothing so that they balance `load`, a force at the centre of mass.
 pub fn answer(grips: &[Grip], frame: &GraspFrame, load: &Vector) -> Option<ArrayVec<ContactForce, MAX_GRIPS>> {
     let answers = answers(grips, frame)?;
-    let exerted = |(grip, answer): (&Grip, &Matrix4x3<f64>)| {
-        let coordinates = -(answer * load);
-        let nothing = ContactForce { force: Vector::zeros(), torsion: 0.0 };
-        axes::<4>(frame.friction, grip).iter().zip(coordinates.iter()).fold(nothing, |sum, (axis, x)| ContactForce {
-            force: sum.force + axis.force * *x,
-            torsion: sum.torsion + axis.torsion * x,
-        })
+    let added = |(grip, answer): (&Grip, &Matrix4x3<f64>)| {
+        let coordinates: [f64; 4] = (-(answer * load)).into();
+        exerted(frame.friction, grip, &coordinates)
     };
-    Some(grips.iter().zip(&answers).map(exerted).collect())
+    Some(grips.iter().zip(&answers).map(added).collect())
 }
 
 /// Force columns of the least-norm right inverse, contact by contact.

@@ -65,11 +65,9 @@ pub struct Program<const D: usize> {
     pub weight: f64,
 }
 
-/// No forces inside the limits: how far, and which limits of each kind stand most in the way, by the multipliers of phase I.
+/// No forces inside the limits: which limits of each kind stand most in the way, by the multipliers of phase I.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Infeasible {
-    /// How much every limit would have to give, in newtons.
-    pub shortfall: f64,
     /// Contact with the least normal force most in the way.
     pub least: usize,
     /// Contact with the largest normal force most in the way.
@@ -117,7 +115,7 @@ impl<const D: usize> Program<D> {
             return Ok(found);
         }
         let start = self.strictly_inside()?;
-        let undecided = self.infeasible(&start, 0.0);
+        let undecided = self.infeasible(&start);
         self.center(start).ok_or(undecided)
     }
 
@@ -234,7 +232,7 @@ impl<const D: usize> Program<D> {
                     weight *= 10.0;
                     continue;
                 }
-                return Err(self.infeasible(&forces, give));
+                return Err(self.infeasible(&forces));
             }
             let value = weight * give + self.value(&forces, give, 0.0).unwrap_or(f64::INFINITY);
             let mut length = 1.0;
@@ -249,18 +247,18 @@ impl<const D: usize> Program<D> {
                 }
                 length *= 0.5;
                 if length < 1e-9 {
-                    return Err(self.infeasible(&forces, give));
+                    return Err(self.infeasible(&forces));
                 }
             }
             if self.slack(&forces) > self.band() {
                 return Ok(forces);
             }
         }
-        Err(self.infeasible(&forces, give))
+        Err(self.infeasible(&forces))
     }
 
-    fn infeasible(&self, forces: &Forces<D>, give: f64) -> Infeasible {
-        let mut infeasible = Infeasible { shortfall: give, least: 0, largest: 0, joint: None };
+    fn infeasible(&self, forces: &Forces<D>) -> Infeasible {
+        let mut infeasible = Infeasible { least: 0, largest: 0, joint: None };
         // Multipliers are the reciprocals of the slacks: the least slack of a kind is the largest multiplier.
         let (mut least, mut largest, mut joint) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
         for (index, (block, f)) in self.blocks.iter().zip(forces).enumerate() {

@@ -165,7 +165,7 @@ fn distribute_in<const D: usize>(
     });
     let solved = program::<D>(problem, Relaxed::default()).ok_or(NoForces::NotBalanced)?.minimum(start);
     let forces = solved.map_err(|infeasible| cause::<D>(problem, &infeasible))?;
-    Ok(problem.grips.iter().zip(&forces).map(|(grip, f)| exerted(problem, grip, f)).collect())
+    Ok(problem.grips.iter().zip(&forces).map(|(grip, f)| exerted(problem.frame.friction, grip, f)).collect())
 }
 
 /// Which limit would have to give: the kind whose absence leaves forces, weakest first.
@@ -271,9 +271,10 @@ fn coordinates<const D: usize>(problem: &ForceProblem, grip: &Grip, exerted: &Co
     })
 }
 
-fn exerted<const D: usize>(problem: &ForceProblem, grip: &Grip, coordinates: &[f64; D]) -> ContactForce {
+/// What a contact exerts that has these coordinates over its axes.
+pub(super) fn exerted<const D: usize>(friction: f64, grip: &Grip, coordinates: &[f64; D]) -> ContactForce {
     let mut sum = ContactForce { force: Vector::zeros(), torsion: 0.0 };
-    for (axis, x) in axes::<D>(problem.frame.friction, grip).iter().zip(coordinates) {
+    for (axis, x) in axes::<D>(friction, grip).iter().zip(coordinates) {
         sum.force += axis.force * *x;
         sum.torsion += axis.torsion * x;
     }

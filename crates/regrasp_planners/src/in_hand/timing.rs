@@ -3,8 +3,8 @@
 //! Every segment goes from rest to rest. Between two waypoints it takes at least as long as the speed limits ask; the
 //! pace rises from nothing and falls to nothing evenly, within [`EASE`]. Velocities are those of the monotone cubic
 //! through the waypoints (Fritsch, Butland, *A method for constructing local monotone piecewise cubic interpolants*,
-//! 1984), so that cubic Hermite interpolation overshoots nowhere; where they change faster than the acceleration limits
-//! allow, time is stretched.
+//! 1984), so that cubic Hermite interpolation overshoots nowhere; where they change from one waypoint to the next faster, on
+//! average, than the acceleration limits allow, time is stretched. Peaks of the acceleration in between are not limited.
 
 use super::model::Model;
 use regrasp_geometry::{Point, Pose, frame};
@@ -43,15 +43,14 @@ pub fn limits(model: &Model) -> MotionLimits {
     }
 }
 
-/// Gives every waypoint its time and its velocities; `ramp` seconds pass between segments where forces change.
+/// Gives every waypoint its time and its velocities; `SpeedSettings::ramp` passes between segments where forces change.
 pub fn assign_times(model: &Model, limits: &MotionLimits, segments: &mut [Segment]) {
     let mut now = 0.0;
     let mut timing = Timing::new(model, limits);
     let mut before: Option<SegmentKind> = None;
     for segment in segments {
-        let has_forces = segment.waypoints.iter().any(|waypoint| !waypoint.joint_torques.is_empty());
         let goes_on = (before, segment.kind) == (Some(SegmentKind::Transfer), SegmentKind::Transfer);
-        if has_forces && before.is_some() && !goes_on {
+        if model.settings.forces.is_some() && before.is_some() && !goes_on {
             now += model.settings.speed.ramp;
         }
         before = Some(segment.kind);

@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 ///
 /// All are newtons per finger, whatever the object weighs. The least force is what a finger must press with to be in
 /// control of its contact, the largest what fingers and object stand: neither has to do with the object's mass. The
-/// squeeze is a wish; weight is balanced on top of it. The defaults are for objects of some 10 to 300 g: replays in
-/// MuJoCo kept what they were measured for at 50, 100 and 300 g (notes on physics, section 3, mass), where such forces
-/// existed at all. Heavier objects want a larger `normal_force[1]`; a plan that fails for want of it says so.
+/// squeeze is a wish; weight is balanced on top of it. The defaults are for objects of some 10 to 300 g: replays
+/// of a prototype kept 59 of 59 plans at 100 g, 16 of 16 at 50 g and 10 of 11 at 300 g where such forces existed at all (notes
+/// on physics, section 3). Heavier objects want a larger `normal_force[1]`; a plan that fails for want of it says so.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ForceSettings {
