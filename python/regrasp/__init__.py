@@ -29,7 +29,7 @@ from ._model import (
     load_scene,
 )
 from ._plan import CONTACT_MODES, Plan, Segment
-from ._planning import check, export_mjcf, plan
+from ._planning import check, export_mjcf, plan, view
 from ._regrasp import __version__
 from ._result import Cause, Clearance, Failure, Moment, NearestMiss, Progress, Report, Violation
 
@@ -67,4 +67,5 @@ __all__ = [
     "load_hand",
     "load_scene",
     "plan",
+    "view",
 ]

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from . import _regrasp
 from ._arguments import StrPath
+from ._errors import InputError
 from ._model import FloatArray, Pose, pose_of
 from ._result import Report
 
@@ -213,13 +214,35 @@ class Plan:
         )
 
     def _repr_html_(self) -> str:
+        """The page of the plan in a frame, where its scene is known and still there; else a table of its segments."""
+        heading = f"<b>{escape(repr(self)[1:-1])}</b>"
+        page = self._page()
+        if page is None:
+            return heading + self._table()
+        # The page runs scripts of its own, in an origin of its own.
+        return (
+            f'{heading}<iframe srcdoc="{escape(page, quote=True)}" sandbox="allow-scripts" title="plan" '
+            'width="100%" height="720" style="border: 0"></iframe>'
+        )
+
+    def _page(self) -> str | None:
+        from ._planning import view
+
+        if self._source is None and self.path is None:
+            return None
+        try:
+            return view(self)
+        except InputError:
+            return None
+
+    def _table(self) -> str:
         rows = "".join(
             f"<tr><td>{index}</td><td>{segment.kind}</td><td>{escape(segment.moving_finger or '')}</td>"
             f"<td>{self.times[segment.start]:.2f} s</td><td>{segment.stop - segment.start}</td></tr>"
             for index, segment in enumerate(self.segments)
         )
         head = "<tr><th></th><th>segment</th><th>moving finger</th><th>from</th><th>waypoints</th></tr>"
-        return f"<b>{escape(repr(self)[1:-1])}</b><table>{head}{rows}</table>"
+        return f"<table>{head}{rows}</table>"
 
 
 def _segments(entries: list[dict[str, Any]]) -> tuple[Segment, ...]:

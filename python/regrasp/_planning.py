@@ -137,6 +137,30 @@ def export_mjcf(
     return xml
 
 
+def view(
+    plan: Plan | StrPath,
+    path: StrPath | None = None,
+    scene: Scene | StrPath | None = None,
+    *,
+    title: str | None = None,
+    packages: Mapping[str, StrPath] | None = None,
+    lenient: bool = False,
+) -> str:
+    """The page of a plan: one HTML file with hand, object, margin and clearance, which opens from disk and fetches nothing.
+
+    plan, scene, packages, lenient: as in `check`.
+    path: where the page is written too, if given.
+    title: in place of the scene's name.
+
+    The checker's verdict is in the page, also where it rejects the plan. Raises `InputError`.
+    """
+    plan, scene = _with_scene(plan, scene, packages, lenient)
+    page = _regrasp.page(plan._native, scene._native, title)
+    if path is not None:
+        _regrasp.Plan.write(os.fspath(path), page.encode())
+    return page
+
+
 def _with_scene(
     plan: Plan | StrPath, scene: Scene | StrPath | None, packages: Mapping[str, StrPath] | None, lenient: bool
 ) -> tuple[Plan, Scene]:

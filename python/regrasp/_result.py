@@ -236,5 +236,3 @@ def failure_of(text: str) -> Failure:
         report=None if report is None else report_of(report),
         rejected_plan=fields.get("rejected_plan"),
     )
-
-

@@ -34,15 +34,19 @@ def test_a_scene_has_what_its_file_says(scene: regrasp.Scene) -> None:
     np.testing.assert_allclose(turn, [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-12)
 
 
+def written(folder: Path, text: str) -> regrasp.Scene:
+    """The scene that `text` describes, with the wide hand beside it."""
+    hand = REPOSITORY / "assets/hands/wide_four_finger"
+    for name in ("hand.toml", "hand.urdf"):
+        (folder / name).write_bytes((hand / name).read_bytes())
+    (folder / "scene.toml").write_text(text.replace("../assets/hands/wide_four_finger/", ""))
+    return regrasp.load_scene(folder / "scene.toml")
+
+
 def test_gravity_is_given_in_the_frame_of_the_hand(tmp_path: Path) -> None:
     text = (REPOSITORY / "scenes/sphere_90x.toml").read_text()
-    folder = REPOSITORY / "assets/hands/wide_four_finger"
-    for name in ("hand.toml", "hand.urdf"):
-        (tmp_path / name).write_bytes((folder / name).read_bytes())
-    text = text.replace("../assets/hands/wide_four_finger/", "")
     for value, expected in [("[0.0, 2.0, 0.0]", [0, 9.80665, 0]), ('"any"', "any")]:
-        (tmp_path / "scene.toml").write_text(text.replace('task = "in_hand"', f'task = "in_hand"\ngravity = {value}'))
-        scene = regrasp.load_scene(tmp_path / "scene.toml")
+        scene = written(tmp_path, text.replace('task = "in_hand"', f'task = "in_hand"\ngravity = {value}'))
         if isinstance(scene.gravity, str):
             assert scene.gravity == expected
         else:
@@ -50,19 +54,24 @@ def test_gravity_is_given_in_the_frame_of_the_hand(tmp_path: Path) -> None:
             np.testing.assert_allclose(scene.gravity, expected)
 
 
-def test_the_seed_draws_what_the_scene_leaves_open() -> None:
-    scene = regrasp.load_scene(REPOSITORY / "scenes/tight_box_90x.toml")
-    starts = [scene.query(seed=seed).start.matrix for seed in (0, 0, 1)]
-    np.testing.assert_array_equal(starts[0], starts[1])
-    same = np.array_equal(starts[0], starts[2])
-    text = Path(scene.path).read_text()
-    assert same != ("random" in text or "position_within" in text)
+def test_the_seed_draws_what_the_scene_leaves_open(tmp_path: Path) -> None:
+    given = (REPOSITORY / "scenes/sphere_90x.toml").read_text()
+    drawn = given.replace("[start]\n", "[start]\nrandom_orientation = true\n")
+    for text, same in ((given, True), (drawn, False)):
+        scene = written(tmp_path, text)
+        starts = [scene.query(seed=seed).start.matrix for seed in (0, 0, 1)]
+        np.testing.assert_array_equal(starts[0], starts[1])
+        assert np.array_equal(starts[0], starts[2]) is same
 
 
 def test_way_poses_are_asked_for_between_start_and_goal() -> None:
     scene = regrasp.load_scene(REPOSITORY / "scenes/cubic.toml")
     query = scene.query(seed=0)
-    assert isinstance(query.way, tuple)
+    assert len(query.way) == 2
+    turns = [pose.matrix[:3, :3] for pose in (query.start, *query.way, query.goal)]
+    for turn, following in zip(turns, turns[1:]):
+        # A full turn in three legs of 120 degrees.
+        assert np.trace(following @ turn.T) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_fingertips_stand_one_radius_off_their_contacts(box: regrasp.Scene, plan: regrasp.Plan) -> None:

@@ -18,7 +18,7 @@ from conftest import SCENES
 
 mujoco = pytest.importorskip("mujoco")
 
-from regrasp.simulate import PlanError, Settings, simulate  # noqa: E402
+from regrasp.simulate import PlanError, Settings, load, simulate  # noqa: E402
 from regrasp.simulate.__main__ import main  # noqa: E402
 from regrasp.simulate.model import contact_jacobians, make_rig, normals_in_world  # noqa: E402
 from regrasp.simulate.reference import (  # noqa: E402
@@ -135,9 +135,11 @@ def test_the_reference_goes_through_the_waypoints_on_straight_lines(short: tuple
     on_line = (1 - ref.fraction[:, None]) * joints[ref.waypoint] + ref.fraction[:, None] * joints[ref.waypoint + 1]
     np.testing.assert_allclose(ref.joints, on_line, atol=1e-12)
     assert np.all((ref.fraction >= 0) & (ref.fraction <= 1))
-    # Velocities are what the positions do, by differences.
+    # Velocities are what the positions do, by differences; across a waypoint, where lines bend, these are means.
     differences = np.gradient(ref.joints, ref.tick, axis=0)
-    assert np.abs(differences - ref.joint_velocities).max() < 0.2 * max(1.0, np.abs(ref.joint_velocities).max())
+    largest = np.abs(ref.joint_velocities).max()
+    assert largest > 0.05
+    assert np.abs(differences - ref.joint_velocities).max() < 0.1 * largest
     quats = np.array([point["world_from_object"]["quat_xyzw"] for point in points])[:, [3, 0, 1, 2]]
     np.testing.assert_allclose(np.abs(ref.object_quat_wxyz[-1] @ quats[-1]), 1.0, atol=1e-12)
 
@@ -196,6 +198,16 @@ def test_without_noslip_every_hold_creeps(short: tuple[dict[str, Any], str]) -> 
     assert creeps.position > 3 * still.position
 
 
+def test_a_model_of_another_plan_is_refused(short: tuple[dict[str, Any], str]) -> None:
+    plan, xml = short
+    with pytest.raises(PlanError, match="MuJoCo cannot read"):
+        make_rig("<mujoco", plan, Settings())
+    *before, last = plan["segments"]
+    shorter = {**plan, "segments": [*before, {**last, "waypoints": last["waypoints"][:-1]}]}
+    with pytest.raises(PlanError, match="keyframes"):
+        make_rig(xml, shorter, Settings())
+
+
 def test_a_plan_without_forces_is_for_controller_a_only() -> None:
     plan, xml = planned("sphere_90x", forces=None)
     data = as_data(plan)
@@ -208,6 +220,7 @@ def test_the_command_line_says_kept_dropped_or_bad_input(tmp_path: Path, capsys:
     plan, xml = planned("sphere_90x", seed=2)
     plan.save(tmp_path / "plan.json")
     (tmp_path / "model.xml").write_text(xml)
+    assert load(str(tmp_path / "plan.json"), mjcf=tmp_path / "model.xml") == (as_data(plan), xml)
     usual = [str(tmp_path / "plan.json"), "--mjcf", str(tmp_path / "model.xml"), "--hold-time", "0"]
     assert main([*usual, "-o", str(tmp_path / "report.json")]) == 0
     assert "KEPT" in capsys.readouterr().out

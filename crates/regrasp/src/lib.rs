@@ -4,6 +4,9 @@
 //! [`scene`] reads files, [`planners`] plans, [`plan`] holds the plan and its checker. Frames, units and the glossary are in
 //! `CONVENTIONS.md`; the tower of crates is in `ARCHITECTURE.md`.
 
+/// What pages are told of what only planners know.
+pub mod told;
+
 pub use regrasp_base as base;
 pub use regrasp_export as export;
 pub use regrasp_geometry as geometry;

@@ -58,6 +58,8 @@ pub enum Command {
     Plan(Plan),
     /// Judge a plan from the files alone; exit code 0 accepted, 1 rejected
     Check(Check),
+    /// Show a plan: one page for a browser, with nothing to install and no network
+    View(View),
     /// Write a plan in the formats of other tools
     Export(Export),
     /// Say how to replay a plan in MuJoCo, which the Python package does
@@ -137,6 +139,12 @@ pub struct Plan {
     /// Seed
     #[arg(long, default_value_t = 0, value_parser = whole_number, allow_negative_numbers = true)]
     pub seed: u64,
+    /// Write a page for a browser too: of the plan, or of why there is none
+    #[arg(long, value_name = "FILE.html")]
+    pub report: Option<PathBuf>,
+    /// Where no plan is found, write pictures of why to this folder: the causes, and the graph that was reached
+    #[arg(long, value_name = "DIR")]
+    pub failure: Option<PathBuf>,
     /// Threads [default: all cores]; the plan does not depend on it
     #[arg(long, value_parser = threads, allow_negative_numbers = true)]
     pub threads: Option<usize>,
@@ -153,6 +161,46 @@ pub struct Check {
     /// Scene file [default: the one that the plan names, beside the plan or in the current folder]
     #[arg(long, value_name = "FILE")]
     pub scene: Option<PathBuf>,
+}
+
+/// `regrasp view`
+#[derive(Debug, Args)]
+#[command(group(ArgGroup::new("pictures").required(true).multiple(true)))]
+pub struct View {
+    /// Plan file
+    pub plan: PathBuf,
+    /// Scene file [default: the one that the plan names, beside the plan or in the current folder]
+    pub scene: Option<PathBuf>,
+    /// Page: one HTML file that opens from disk
+    #[arg(short, long, value_name = "plan.html", group = "pictures")]
+    pub output: Option<PathBuf>,
+    /// What the page is told, as JSON
+    #[arg(long, value_name = "FILE.json", group = "pictures")]
+    pub story: Option<PathBuf>,
+    /// Storyboard: key frames in one picture
+    #[arg(long, value_name = "FILE.png", group = "pictures")]
+    pub png: Option<PathBuf>,
+    /// Charts: gait, margin, clearance, joints, forces, orientation, each as a file in this folder
+    #[arg(long, value_name = "DIR", group = "pictures")]
+    pub svg: Option<PathBuf>,
+    /// Key frames of the storyboard
+    #[arg(long, value_name = "N", default_value_t = 6, requires = "png")]
+    pub frames: usize,
+    /// Width of the storyboard, in pixels
+    #[arg(long, value_name = "PIXELS", default_value_t = 1500, requires = "png")]
+    pub width: usize,
+    /// Key frames in a row of the storyboard [default: by their number]
+    #[arg(long, value_name = "N", requires = "png")]
+    pub columns: Option<usize>,
+    /// Draw collision shapes in the storyboard even where it is known what things look like
+    #[arg(long, requires = "png")]
+    pub collision: bool,
+    /// Title of the page [default: the scene's name]
+    #[arg(long)]
+    pub title: Option<String>,
+    /// Show the graph of this roadmap file too
+    #[arg(long, value_name = "FILE.roadmap")]
+    pub with_roadmap: Option<PathBuf>,
 }
 
 /// `regrasp export`
@@ -269,6 +317,8 @@ pub enum RoadmapAction {
         /// Roadmap file
         roadmap: PathBuf,
     },
+    /// Draw a graph: how near to the goal its grasps are, its components, and a solution where a scene is given
+    Picture(RoadmapPicture),
     /// Answer random queries on a graph and tabulate
     Bench(RoadmapBench),
 }
@@ -305,6 +355,24 @@ pub struct RoadmapBuild {
     /// Threads [default: all cores]; the graph does not depend on it
     #[arg(long, value_parser = threads, allow_negative_numbers = true)]
     pub threads: Option<usize>,
+}
+
+/// `regrasp roadmap picture`
+#[derive(Debug, Args)]
+pub struct RoadmapPicture {
+    /// Roadmap file
+    pub roadmap: PathBuf,
+    /// Scene file, of the same hand and object, whose turn is planned on the graph
+    pub scene: Option<PathBuf>,
+    /// Picture
+    #[arg(short, long, value_name = "FILE.svg")]
+    pub output: PathBuf,
+    /// Seed of the query
+    #[arg(long, default_value_t = 0, value_parser = whole_number, allow_negative_numbers = true)]
+    pub seed: u64,
+    /// Work limit of the query, in configurations looked at
+    #[arg(long, value_name = "N", default_value_t = 1_000_000, value_parser = whole_number, allow_negative_numbers = true)]
+    pub max_work: u64,
 }
 
 /// `regrasp roadmap query`

@@ -6,14 +6,14 @@
 mod args;
 /// One file per command.
 mod commands;
-/// The finger gait of a plan as an SVG picture.
-mod gait_chart;
 /// Ctrl-C, SIGTERM, and the promise to stop within 100 ms.
 mod interrupt;
 /// What the checker said, in words and as an event.
 mod judge;
 /// Models from disk, with what the environment says about packages.
 mod load;
+/// Pages for a browser.
+mod pages;
 /// What is printed while a search runs.
 mod progress;
 /// How a command ends, other than well.

@@ -46,6 +46,48 @@ pub struct PlanArrays {
     pub segment_starts: Vec<i64>,
 }
 
+/// One numeric array: row-major, the waypoint first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NumericArray<'a> {
+    /// Its name: that of the field of [`PlanArrays`].
+    pub name: &'static str,
+    /// Its length along every axis.
+    pub shape: Vec<usize>,
+    /// Its numbers; as many as the product of the shape.
+    pub data: Numbers<'a>,
+}
+
+/// Numbers of one type.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Numbers<'a> {
+    /// Of 64 bits.
+    Floats(&'a [f64]),
+    /// Of 64 bits, with a sign.
+    Integers(&'a [i64]),
+    /// Of 8 bits, without a sign.
+    Bytes(&'a [u8]),
+}
+
+impl Numbers<'_> {
+    /// What numpy calls the type, in the byte order of [`Numbers::to_bytes`].
+    pub fn numpy_type(&self) -> &'static str {
+        match self {
+            Numbers::Floats(_) => "<f8",
+            Numbers::Integers(_) => "<i8",
+            Numbers::Bytes(_) => "|u1",
+        }
+    }
+
+    /// The numbers one after another, the least byte first.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        match self {
+            Numbers::Floats(values) => values.iter().flat_map(|value| value.to_le_bytes()).collect(),
+            Numbers::Integers(values) => values.iter().flat_map(|value| value.to_le_bytes()).collect(),
+            Numbers::Bytes(values) => values.to_vec(),
+        }
+    }
+}
+
 /// Names of contact modes, in the order of the numbers in [`PlanArrays::contact_modes`].
 pub const CONTACT_MODES: [&str; 3] = ["free", "fixed", "rolling"];
 
@@ -101,6 +143,30 @@ impl PlanArrays {
                 .collect(),
             segment_starts,
         }
+    }
+
+    /// All numeric arrays over the waypoints, in the order of the fields; those over segments are not among them.
+    /// `joint_torques` is left out in plans without forces.
+    pub fn numeric(&self) -> Vec<NumericArray<'_>> {
+        use Numbers::{Bytes, Floats, Integers};
+        let (n, j, f) = (self.n_waypoints, self.joint_names.len(), self.fingers.len());
+        let mut arrays = Vec::new();
+        let mut add = |name, shape: &[usize], data| arrays.push(NumericArray { name, shape: shape.to_vec(), data });
+        add("times", &[n], Floats(&self.times));
+        add("joints", &[n, j], Floats(&self.joints));
+        add("joint_velocities", &[n, j], Floats(&self.joint_velocities));
+        if let Some(torques) = &self.joint_torques {
+            add("joint_torques", &[n, j], Floats(torques));
+        }
+        add("object_positions", &[n, 3], Floats(&self.object_positions));
+        add("object_quat_xyzw", &[n, 4], Floats(&self.object_quat_xyzw));
+        add("contact_modes", &[n, f], Bytes(&self.contact_modes));
+        add("contact_points_in_object", &[n, f, 3], Floats(&self.contact_points_in_object));
+        add("contact_normals_in_object", &[n, f, 3], Floats(&self.contact_normals_in_object));
+        add("contact_forces_in_object", &[n, f, 3], Floats(&self.contact_forces_in_object));
+        add("contact_torsions", &[n, f], Floats(&self.contact_torsions));
+        add("segment_of_waypoint", &[n], Integers(&self.segment_of_waypoint));
+        arrays
     }
 }
 

@@ -1,7 +1,7 @@
 //! Arrays for numpy: a ZIP archive of `.npy` files (NEP 1), stored, with one fixed date. No array holds objects, so that
 //! `numpy.load` reads it with `allow_pickle=False`.
 
-use crate::arrays::{CONTACT_MODES, PlanArrays, kind_name};
+use crate::arrays::{CONTACT_MODES, Numbers, NumericArray, PlanArrays, kind_name};
 use regrasp_plan::Plan;
 use std::io::{Cursor, Write};
 use zip::write::{SimpleFileOptions, ZipWriter};
@@ -10,7 +10,6 @@ use zip::{CompressionMethod, DateTime};
 /// The bytes of an `.npz` file with the arrays of `plan`, names as in [`PlanArrays`].
 pub fn to_npz(plan: &Plan) -> Vec<u8> {
     let arrays = PlanArrays::new(plan);
-    let (n, j, f) = (arrays.n_waypoints, arrays.joint_names.len(), arrays.fingers.len());
     let mut file = Npz::new();
     file.add("format", &texts(&[], &["regrasp-arrays"]));
     file.add("format_version", &integers(&[], &[1]));
@@ -20,20 +19,9 @@ pub fn to_npz(plan: &Plan) -> Vec<u8> {
     file.add("joint_names", &names(&arrays.joint_names));
     file.add("fingers", &names(&arrays.fingers));
     file.add("contact_mode_names", &texts(&[CONTACT_MODES.len()], &CONTACT_MODES));
-    file.add("times", &floats(&[n], &arrays.times));
-    file.add("joints", &floats(&[n, j], &arrays.joints));
-    file.add("joint_velocities", &floats(&[n, j], &arrays.joint_velocities));
-    if let Some(torques) = &arrays.joint_torques {
-        file.add("joint_torques", &floats(&[n, j], torques));
+    for NumericArray { name, shape, data } in arrays.numeric() {
+        file.add(name, &npy(data.numpy_type(), &shape, data.to_bytes()));
     }
-    file.add("object_positions", &floats(&[n, 3], &arrays.object_positions));
-    file.add("object_quat_xyzw", &floats(&[n, 4], &arrays.object_quat_xyzw));
-    file.add("contact_modes", &npy("|u1", &[n, f], arrays.contact_modes));
-    file.add("contact_points_in_object", &floats(&[n, f, 3], &arrays.contact_points_in_object));
-    file.add("contact_normals_in_object", &floats(&[n, f, 3], &arrays.contact_normals_in_object));
-    file.add("contact_forces_in_object", &floats(&[n, f, 3], &arrays.contact_forces_in_object));
-    file.add("contact_torsions", &floats(&[n, f], &arrays.contact_torsions));
-    file.add("segment_of_waypoint", &integers(&[n], &arrays.segment_of_waypoint));
     let kinds: Vec<&str> = arrays.segment_kinds.iter().map(|&kind| kind_name(kind)).collect();
     file.add("segment_kinds", &texts(&[kinds.len()], &kinds));
     file.add("segment_moving_fingers", &integers(&[kinds.len()], &arrays.segment_moving_fingers));
@@ -72,12 +60,9 @@ fn names(names: &[String]) -> Vec<u8> {
     texts(&[names.len()], &names)
 }
 
-fn floats(shape: &[usize], values: &[f64]) -> Vec<u8> {
-    npy("<f8", shape, values.iter().flat_map(|value| value.to_le_bytes()).collect())
-}
-
 fn integers(shape: &[usize], values: &[i64]) -> Vec<u8> {
-    npy("<i8", shape, values.iter().flat_map(|value| value.to_le_bytes()).collect())
+    let values = Numbers::Integers(values);
+    npy(values.numpy_type(), shape, values.to_bytes())
 }
 
 /// Text of one width, in UTF-32, filled up with zeros.

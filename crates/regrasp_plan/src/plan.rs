@@ -82,7 +82,8 @@ pub struct ContactState {
     /// without forces.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_in_object: Option<[f64; 3]>,
-    /// Moment of the finger on the object about the outward normal, in newton metres; absent for point contacts.
+    /// Moment of the finger on the object about the outward normal, in newton metres; absent: zero. Only soft fingers exert
+    /// any; it is absent where the force is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub torsion: Option<f64>,
 }

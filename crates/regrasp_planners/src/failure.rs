@@ -1,5 +1,6 @@
 //! Why no plan was found: a result, with causes and the nearest miss, not an error.
 
+use crate::outline::Outline;
 use regrasp_base::Interrupt;
 use regrasp_plan::plan::{PoseData, Statistics};
 use serde::Serialize;
@@ -75,6 +76,9 @@ pub struct Failure {
     pub leg: Option<usize>,
     /// The nearest that the search came to the goal (or to the end of that leg), if it got anywhere.
     pub nearest_miss: Option<Box<NearestMiss>>,
+    /// What was reached when the search ended: of the attempt that reached most, where the method is `gait`. Not in events.
+    #[serde(skip)]
+    pub reached: Option<Box<Outline>>,
     /// Counts of the search.
     pub statistics: Statistics,
 }
@@ -89,6 +93,7 @@ impl Failure {
             causes: Vec::new(),
             leg: None,
             nearest_miss: None,
+            reached: None,
             statistics: Statistics::default(),
         }
     }

@@ -6,6 +6,9 @@
 pub mod failure;
 /// In-hand manipulation by grasp subspaces (papers 000 and 004).
 pub mod in_hand;
+/// What a graph of grasps looks like.
+pub mod outline;
 
 pub use failure::{Cause, Failure, FailureKind, NearestMiss};
 pub use in_hand::{InHandSettings, Method, Progress, plan_in_hand};
+pub use outline::{Outline, OutlineEdge, OutlineNode};

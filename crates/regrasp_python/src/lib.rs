@@ -15,6 +15,8 @@ mod model;
 mod plan;
 /// Searching and judging.
 mod search;
+/// Pages of plans.
+mod view;
 
 use pyo3::prelude::*;
 
@@ -28,6 +30,8 @@ mod _regrasp {
     use super::plan::Plan;
     #[pymodule_export]
     use super::search::{check, find_scene, plan};
+    #[pymodule_export]
+    use super::view::page;
 
     use pyo3::prelude::*;
 

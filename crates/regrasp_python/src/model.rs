@@ -31,6 +31,11 @@ impl Scene {
         load_scene(&self.path, &self.options)
     }
 
+    /// Where its packages are.
+    pub fn packages(&self) -> &ResolveOptions {
+        &self.options.resolve
+    }
+
     /// The scene file.
     pub fn path(&self) -> &Path {
         &self.path

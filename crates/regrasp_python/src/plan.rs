@@ -85,27 +85,11 @@ impl Plan {
     fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         guarded(py, || {
             let arrays = py.detach(|| PlanArrays::new(&self.plan));
-            let (n, j, f) = (arrays.n_waypoints, arrays.joint_names.len(), arrays.fingers.len());
             let out = PyDict::new(py);
-            let add = |name: &str, dtype: &str, shape: &[usize], bytes: Vec<u8>| {
-                out.set_item(name, (dtype, shape.to_vec(), PyBytes::new(py, &bytes)))
-            };
-            let floats = |values: &[f64]| -> Vec<u8> { values.iter().flat_map(|value| value.to_le_bytes()).collect() };
-            add("times", "<f8", &[n], floats(&arrays.times))?;
-            add("joints", "<f8", &[n, j], floats(&arrays.joints))?;
-            add("joint_velocities", "<f8", &[n, j], floats(&arrays.joint_velocities))?;
-            if let Some(torques) = &arrays.joint_torques {
-                add("joint_torques", "<f8", &[n, j], floats(torques))?;
+            for array in arrays.numeric() {
+                let bytes = PyBytes::new(py, &array.data.to_bytes());
+                out.set_item(array.name, (array.data.numpy_type(), array.shape, bytes))?;
             }
-            add("object_positions", "<f8", &[n, 3], floats(&arrays.object_positions))?;
-            add("object_quat_xyzw", "<f8", &[n, 4], floats(&arrays.object_quat_xyzw))?;
-            add("contact_modes", "|u1", &[n, f], arrays.contact_modes)?;
-            add("contact_points_in_object", "<f8", &[n, f, 3], floats(&arrays.contact_points_in_object))?;
-            add("contact_normals_in_object", "<f8", &[n, f, 3], floats(&arrays.contact_normals_in_object))?;
-            add("contact_forces_in_object", "<f8", &[n, f, 3], floats(&arrays.contact_forces_in_object))?;
-            add("contact_torsions", "<f8", &[n, f], floats(&arrays.contact_torsions))?;
-            let segments = arrays.segment_of_waypoint.iter().flat_map(|index| index.to_le_bytes()).collect();
-            add("segment_of_waypoint", "<i8", &[n], segments)?;
             Ok(out)
         })
     }

@@ -1,7 +1,8 @@
 //! Links and joints of a robot, as read.
 
 use regrasp_geometry::shape::PlacedShape;
-use regrasp_geometry::{Pose, UnitVector};
+use regrasp_geometry::{Pose, Shape, UnitVector, Vector};
+use std::path::PathBuf;
 
 /// Index of a link in [`Robot::links`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -18,8 +19,41 @@ pub struct Link {
     pub name: String,
     /// Collision geometry, placed in the link frame. Meshes are kept as read.
     pub collision: Vec<PlacedShape>,
+    /// What it looks like: for pictures only, never looked at in planning.
+    pub visual: Vec<Visual>,
     /// The joint that carries this link; none for the root.
     pub parent_joint: Option<JointId>,
+}
+
+/// A part of what a link looks like.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Visual {
+    /// Pose of the geometry's frame in the link frame.
+    pub parent_from_visual: Pose,
+    /// The geometry.
+    pub geometry: VisualGeometry,
+}
+
+/// Geometry of a [`Visual`].
+#[derive(Debug, Clone, PartialEq)]
+pub enum VisualGeometry {
+    /// A shape.
+    Shape(Shape),
+    /// A mesh file, which loading a robot does not open.
+    Mesh(VisualMesh),
+    /// What could not be understood, in words.
+    Unreadable(String),
+}
+
+/// A mesh file that a robot file names: [`VisualMesh::load`] reads it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VisualMesh {
+    /// As the robot file names it.
+    pub name: String,
+    /// The robot file.
+    pub model: PathBuf,
+    /// Scale along the axes.
+    pub scale: Vector,
 }
 
 /// How a joint moves.

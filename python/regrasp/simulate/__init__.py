@@ -15,7 +15,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .load import load
+    from .files import load
     from .measure import Dropped, LostContact, Report, UnplannedContact
     from .model import Settings
     from .reference import PlanError
@@ -46,7 +46,7 @@ _HOMES = {
     "Settings": "model",
     "Track": "replay",
     "UnplannedContact": "measure",
-    "load": "load",
+    "load": "files",
     "simulate": "run",
 }
 

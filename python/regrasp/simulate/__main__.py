@@ -8,19 +8,23 @@ import math
 import os
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .measure import Report
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Runs the command; returns the exit code."""
     options = _parser().parse_args(arguments)
-    if options.strip and "MUJOCO_GL" not in os.environ and "DISPLAY" not in os.environ:
+    if options.strip and sys.platform == "linux" and not {"MUJOCO_GL", "DISPLAY"} & os.environ.keys():
         # Read by MuJoCo when it is imported.
         os.environ["MUJOCO_GL"] = "egl"
     try:
         from . import _mujoco  # noqa: F401  # pyright: ignore[reportUnusedImport]
     except ImportError as error:
         return _bad_input(f"MuJoCo is not there ({error}); pip install 'regrasp[sim]'")
-    from .load import load
+    from .files import load
     from .model import Settings
     from .reference import PlanError
     from .run import simulate
@@ -59,11 +63,8 @@ def main(arguments: list[str] | None = None) -> int:
     return 0 if report.kept else 1
 
 
-def summary(report: object) -> str:
+def summary(report: Report) -> str:
     """A report in a few lines, in millimetres and degrees."""
-    from .measure import Report
-
-    assert isinstance(report, Report)
     gravity = ", ".join(f"{g:.2f}" for g in report.gravity_in_world)
     lines = [f"replay {report.scene}, seed {report.seed}, controller {report.settings.controller}, gravity ({gravity})"]
     if report.drift is not None:
@@ -108,7 +109,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("plan", type=Path, help="plan file")
     parser.add_argument("--scene", type=Path, help="scene file [default: the one that the plan names]")
-    parser.add_argument("--package", type=_package, action="append", default=[], metavar="NAME=DIR")
+    parser.add_argument("--package", type=package, action="append", default=[], metavar="NAME=DIR")
     parser.add_argument("--mjcf", type=Path, metavar="FILE", help="model to use, as written by regrasp export --mjcf")
     parser.add_argument(
         "--controller",
@@ -137,7 +138,8 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _package(text: str) -> tuple[str, Path]:
+def package(text: str) -> tuple[str, Path]:
+    """Reads ``NAME=DIR``."""
     name, equals, folder = text.partition("=")
     if not (name and equals and folder):
         raise argparse.ArgumentTypeError("expected NAME=DIR")

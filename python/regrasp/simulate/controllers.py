@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .model import Rig, Settings, contact_jacobians, gravity_of, inverses, normals_in_world
-from .reference import Array, Reference, held_at_waypoints, quat_inverse, quat_product, waypoints_of
+from .reference import Array, Reference, held_at_waypoints, rotation_matrices, waypoints_of
 
 #: Largest offset of a fingertip by feedback, in metres.
 LARGEST_OFFSET = 0.01
@@ -163,8 +163,5 @@ def _least_forces(arms: Array, force: Array) -> Array:
 
 
 def _place(pose: dict[str, list[float]], point: Array) -> Array:
-    quat = np.array(pose["quat_xyzw"])[[3, 0, 1, 2]]
-    turned = quat_product(quat_product(quat, np.concatenate(([0.0], point))), quat_inverse(quat))[1:]
-    return np.array(pose["position"]) + turned
-
-
+    quat_wxyz = np.array(pose["quat_xyzw"])[[3, 0, 1, 2]]
+    return np.array(pose["position"]) + rotation_matrices(quat_wxyz) @ point

@@ -109,7 +109,13 @@ def make_rig(xml: str, plan: Plan, settings: Settings) -> Rig:
         raise PlanError(f"no controller {settings.controller!r}; there are A, B and C2")
     if settings.controller != "A" and not waypoints_of(plan)[0].get("joint_torques"):
         raise PlanError("the plan has no forces; only controller A (a squeeze by position) can replay it")
-    model = mujoco.MjModel.from_xml_string(xml)
+    try:
+        model = mujoco.MjModel.from_xml_string(xml)
+    except ValueError as error:
+        raise PlanError(f"MuJoCo cannot read the model: {error}") from None
+    n_waypoints = len(waypoints_of(plan))
+    if model.nkey != n_waypoints:
+        raise PlanError(f"the model has {model.nkey} keyframes, the plan {n_waypoints} waypoints; make it from this plan")
     object_joint = _free_joint(model)
     object_body = int(model.jnt_bodyid[object_joint])
     names: list[str] = plan["joint_names"]

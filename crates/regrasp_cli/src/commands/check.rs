@@ -21,7 +21,10 @@ pub fn run(arguments: &args::Check, common: &Common, talk: &Talk) -> Result<(), 
     if judge::judge(&loaded, &plan, talk)?.accepted() { Ok(()) } else { Err(Stop::Rejected) }
 }
 
-/// The scene file of a plan at `plan_path`, where `--scene` does not name it.
+/// The scene file of `plan`, which was read from `plan_path`: `named`, what `--scene` says, whatever the plan says; without
+/// it the one that [`find_scene`] finds, with the current folder as the last to look in.
+///
+/// Errors: without `named`, the plan names no scene file, or none is found (`C420`).
 pub fn scene_of(plan_path: &Path, plan: &Plan, named: Option<&Path>) -> Result<PathBuf, Stop> {
     match named {
         Some(path) => Ok(path.to_owned()),

@@ -2,15 +2,16 @@
 
 use super::plan::{Limits, available_threads, say_query, search};
 use crate::args::{self, Common};
-use crate::gait_chart;
 use crate::interrupt;
 use crate::judge;
 use crate::load;
+use crate::pages::Page;
 use crate::stop::Stop;
 use crate::talk::Talk;
 use regrasp::InHandSettings;
 use regrasp::base::files;
 use regrasp::plan::format;
+use regrasp::viewer::charts;
 use serde_json::json;
 use std::path::Path;
 
@@ -25,7 +26,7 @@ const FILES: [(&str, &str); 3] = [
     ("assets/hands/wide_four_finger/hand.urdf", include_str!("../../../../assets/hands/wide_four_finger/hand.urdf")),
 ];
 
-/// Writes the bundled files, plans, checks, writes plan and picture.
+/// Writes the bundled files, plans, checks, writes plan, picture and page.
 pub fn run(arguments: &args::Demo, common: &Common, talk: &Talk) -> Result<(), Stop> {
     let cancelled = interrupt::flag()?;
     let folder = &arguments.output;
@@ -42,17 +43,20 @@ pub fn run(arguments: &args::Demo, common: &Common, talk: &Talk) -> Result<(), S
     let plan = search(&loaded.scene, &query, &settings, arguments.seed, &limits, talk)?;
     let bytes = format::to_json(&plan);
     let (plan_path, chart_path) = (folder.join("plan.json"), folder.join("gait.svg"));
-    if !judge::judge_bytes(&plan_path, bytes.as_bytes(), &scene_path, &load::options(common), talk)?.accepted() {
+    let options = load::options(common);
+    let report = judge::judge_bytes(&plan_path, bytes.as_bytes(), &scene_path, &options, talk)?;
+    if !report.accepted() {
         return Err(Stop::Rejected);
     }
     write(&plan_path, bytes.as_bytes())?;
-    write(&chart_path, gait_chart::svg(&plan).as_bytes())?;
+    write(&chart_path, charts::gait(&plan).as_bytes())?;
     let sha256 = files::sha256(bytes.as_bytes());
     talk.event("written", json!({ "path": plan_path, "sha256": sha256, "chart": chart_path }));
     talk.say(format!("wrote  {}   sha256 {sha256}", plan_path.display()));
     talk.say(format!("chart  {}   which finger holds when; open it in a browser", chart_path.display()));
     talk.say(format!("next   regrasp check {}", plan_path.display()));
-    Ok(())
+    let page_path = folder.join("plan.html");
+    Page::new(&page_path, &loaded.scene, &query, &options.resolve).write_plan(&plan, &report, talk)
 }
 
 /// Writes a file and the folders above it.

@@ -7,10 +7,12 @@ mod demo;
 mod export;
 mod growth;
 mod inspect;
+mod pictures;
 pub mod plan;
 mod roadmap;
 mod simulate;
 mod suite;
+mod view;
 
 use crate::args::{Arguments, Command};
 use crate::stop::Stop;
@@ -24,8 +26,9 @@ pub fn run(arguments: &Arguments, talk: &Talk) -> Result<(), Stop> {
         Command::Inspect(inspect) => inspect::run(inspect, common, talk),
         Command::Plan(plan) => plan::run(plan, common, talk),
         Command::Check(check) => check::run(check, common, talk),
+        Command::View(view) => view::run(view, common, talk),
         Command::Export(export) => export::run(export, common, talk),
-        Command::Simulate(simulate) => simulate::run(simulate, talk),
+        Command::Simulate(simulate) => simulate::run(simulate),
         Command::Bench(bench) => bench::run(bench, common, talk),
         Command::Growth(growth) => growth::run(growth, talk),
         Command::Roadmap(roadmap) => roadmap::run(roadmap, common, talk),

@@ -1,9 +1,11 @@
 //! `regrasp plan`: plan a scene, check the plan, then write it.
 
 use crate::args::{self, Common};
+use crate::commands::pictures;
 use crate::interrupt;
 use crate::judge;
 use crate::load;
+use crate::pages::Page;
 use crate::progress::ProgressLines;
 use crate::stop::Stop;
 use crate::talk::{Talk, counted, duration, grouped};
@@ -21,12 +23,17 @@ use std::time::{Duration, Instant};
 
 /// Plans, checks, writes.
 pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), Stop> {
-    if let Some(path) = &arguments.output {
+    let written = [arguments.output.as_deref(), arguments.report.as_deref()];
+    for path in written.iter().flatten() {
         refuse_unwritable(path)?;
+    }
+    if arguments.report.is_some() && arguments.report == arguments.output {
+        let problem = "is where the plan is written to";
+        return Err(Stop::argument("A505", "--report", problem, "another file"));
     }
     let cancelled = interrupt::flag()?;
     let loaded = load::scene(&arguments.scene, common, talk)?;
-    if let Some(path) = &arguments.output {
+    for path in written.into_iter().flatten() {
         let read = loaded.scene.inputs.iter().map(|input| input.path.as_path());
         refuse_input(path, read.chain(arguments.search.settings.as_deref()))?;
     }
@@ -41,15 +48,29 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
         improve_for: arguments.search.improve,
         cancelled,
     };
-    let plan = search(&loaded.scene, &query, &settings, arguments.seed, &limits, talk)?;
-    judge_and_write(&plan, arguments.output.as_deref(), &arguments.scene, common, talk)
+    let packages = load::options(common).resolve;
+    let page = arguments.report.as_deref().map(|path| Page::new(path, &loaded.scene, &query, &packages));
+    let plan = match (search(&loaded.scene, &query, &settings, arguments.seed, &limits, talk), &page) {
+        (Err(Stop::NoPlan(failure)), page) => {
+            if let Some(page) = page {
+                page.write_failure(&failure, talk)?;
+            }
+            if let Some(folder) = &arguments.failure {
+                pictures::write_failure(folder, &failure, &query, talk)?;
+            }
+            return Err(Stop::NoPlan(failure));
+        }
+        (found, _) => found?,
+    };
+    judge_and_write(&plan, arguments.output.as_deref(), &arguments.scene, page.as_ref(), common, talk)
 }
 
-/// Judges a plan; writes it to `output`, or to stdout, if it is accepted.
+/// Judges a plan; writes it to `output`, or to stdout, if it is accepted. A page is written of every plan.
 pub fn judge_and_write(
     plan: &Plan,
     output: Option<&Path>,
     scene: &Path,
+    page: Option<&Page>,
     common: &Common,
     talk: &Talk,
 ) -> Result<(), Stop> {
@@ -57,6 +78,9 @@ pub fn judge_and_write(
     // Judged is what will be written, in a scene read afresh: the checker starts from files.
     let plan_path = output.unwrap_or(Path::new("plan.json"));
     let report = judge::judge_bytes(plan_path, bytes.as_bytes(), scene, &load::options(common), talk)?;
+    if let Some(page) = page {
+        page.write_plan(plan, &report, talk)?;
+    }
     if !report.accepted() {
         return Err(rejected(output, &bytes, talk));
     }
@@ -290,6 +314,7 @@ mod tests {
                 distance_left: 0.0012,
                 joints: vec![],
             })),
+            reached: None,
             statistics: Default::default(),
         };
         let text = failure_text(&failure);

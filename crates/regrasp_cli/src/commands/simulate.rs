@@ -2,13 +2,12 @@
 
 use crate::args;
 use crate::stop::Stop;
-use crate::talk::Talk;
 use regrasp::base::files;
 use regrasp::base::{Diagnostic, Place};
 use regrasp::plan::format;
 
 /// Says how. Always bad input (`A506`): nothing was simulated, and no script should believe that it was.
-pub fn run(arguments: &args::Simulate, _: &Talk) -> Result<(), Stop> {
+pub fn run(arguments: &args::Simulate) -> Result<(), Stop> {
     let plan = &arguments.plan;
     format::from_json(plan, &files::read(plan)?)?;
     let problem = "MuJoCo replays come with the Python package, which this program does not start";

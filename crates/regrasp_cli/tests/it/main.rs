@@ -5,10 +5,12 @@ mod commands;
 mod export;
 mod folder;
 mod growth;
+mod pictures;
 #[path = "../../../../tests/support/places.rs"]
 mod places;
 mod roadmap;
 mod roadmap_file;
 mod suite;
+mod view;
 #[path = "../../../../tests/support/wide_scene.rs"]
 mod wide_scene;

@@ -6,25 +6,21 @@
 //! much is enough for every direction (`docs/plan-format.md`, forces).
 
 use crate::check::Log;
-use crate::check::closure::{Body, grasp_map, right_inverse};
-use crate::check::forces::{Exerted, Judge};
+use crate::check::closure::{grasp_map, right_inverse};
+use crate::check::forces::{Exerted, GRAVITY, Judge};
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::plan::Waypoint;
 use nalgebra::{DMatrix, RowVector3};
 use regrasp_geometry::frame::tangents;
-use regrasp_geometry::{Pose, UnitVector, Vector};
+use regrasp_geometry::{UnitVector, Vector};
 use regrasp_grasp::{Contact, Grip};
 
 impl Judge<'_> {
-    /// Judges the room that the forces of the holding fingers leave for a weight of `weight` newtons.
-    pub(super) fn check_room(&self, waypoint: &Waypoint, exerted: &[Exerted], weight: f64, at: Moment, log: &mut Log) {
-        let body = Body {
-            center_of_mass: self.object.center_of_mass,
-            torque_scale: self.object.radius,
-            friction: self.friction(),
-        };
+    /// Judges the room that the forces of the holding fingers leave for the object's weight, as great as promised.
+    pub(super) fn check_room(&self, waypoint: &Waypoint, exerted: &[Exerted], at: Moment, log: &mut Log) {
+        let weight = self.promises.mass * GRAVITY;
         let grips: Vec<Grip> = exerted.iter().map(|one| self.grip(one)).collect();
-        let (map, cones) = grasp_map(&grips, &body);
+        let (map, cones) = grasp_map(&grips, &self.body);
         let Some(inverse) = right_inverse(&map) else {
             let message = "the contacts do not balance a weight of every direction";
             log.push(Violation::new(Kind::ForceUnbalanced, message).when(at).subjects(["object"]));
@@ -65,7 +61,7 @@ impl Judge<'_> {
             n_rows => answer.rows(1, n_rows - 1).singular_values().max(),
         };
         let across = self.across(one) + across_room;
-        let room = self.friction() * (pressing - normal_room);
+        let room = self.body.friction * (pressing - normal_room);
         if answer.nrows() > 1 && across > room + tolerance {
             let message = format!(
                 "finger \"{name}\" may have to exert {across:.4e} N across the normal for the weight of some direction, {room:.4e} N are left by friction"
@@ -75,6 +71,8 @@ impl Judge<'_> {
         }
     }
 
+    /// `answer` as in [`Judge::check_contact_room`]; of the joints only this finger's change with it. A torque may be above
+    /// its limit by the share `torque_tolerance` of the limit.
     fn check_torque_room(&self, waypoint: &Waypoint, one: &Exerted, answer: &DMatrix<f64>, at: Moment, log: &mut Log) {
         let (x, y) = tangents(&UnitVector::new_unchecked(one.normal));
         let radius = self.torsion_radius(one);
@@ -84,11 +82,10 @@ impl Judge<'_> {
             (y.into_inner(), Vector::zeros()),
             (Vector::zeros(), one.normal * radius),
         ];
-        let world_from_object = Pose::from(&waypoint.world_from_object);
         let mut changes = vec![RowVector3::zeros(); waypoint.joint_torques.len()];
         for (j, (force, couple)) in units.iter().enumerate().take(answer.nrows()) {
-            for (coordinate, torque, _) in self.torques(&world_from_object, waypoint, one, force, couple) {
-                changes[coordinate] += answer.fixed_view::<1, 3>(j, 0) * torque;
+            for work in self.torques(waypoint, one, force, couple) {
+                changes[work.coordinate] += answer.fixed_view::<1, 3>(j, 0) * work.torque;
             }
         }
         for (k, change) in changes.iter().enumerate().filter(|(_, change)| change.norm() > 0.0) {

@@ -16,12 +16,14 @@
 //! The solver's status is never looked at. Its `f` is projected onto `G f = 0`, scaled to the sum of one, and the slacks
 //! are evaluated anew, with the residuals of `G f` and of `G P - I` taken off. What a useless answer gives is no margin.
 
+use crate::plan::Plan;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SupportedConeT};
 use nalgebra::{DMatrix, DVector, Matrix6};
 use regrasp_geometry::frame::tangents;
 use regrasp_geometry::{Point, Vector};
 use regrasp_grasp::{ContactModel, Grip};
+use regrasp_scene::Object;
 use std::ops::Range;
 
 /// Grasp maps with a smaller singular value than this count as not closed: two points, or contacts on one line.
@@ -36,6 +38,17 @@ pub struct Body {
     pub torque_scale: f64,
     /// Friction coefficient.
     pub friction: f64,
+}
+
+impl Body {
+    /// The object as the plan may count on it: the promised friction, but no more than the object has.
+    pub fn of(object: &Object, plan: &Plan) -> Self {
+        Body {
+            center_of_mass: object.center_of_mass,
+            torque_scale: object.radius,
+            friction: plan.promises.friction.min(object.friction),
+        }
+    }
 }
 
 /// Forces that prove a closure, to be tried on contacts nearby.

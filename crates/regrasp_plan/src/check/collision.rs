@@ -8,7 +8,7 @@ use crate::check::model::Model;
 use crate::check::motion::{Breach, Step, certify};
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Clearance, Log};
-use crate::plan::{Plan, SegmentKind};
+use crate::plan::Plan;
 
 /// What is known of a pair along the plan.
 #[derive(Debug, Clone, Copy)]
@@ -35,7 +35,7 @@ pub fn check_collision(
     for (s, segment) in plan.segments.iter().enumerate() {
         // Segments may fail to meet; what was known before says nothing then.
         tracks.iter_mut().for_each(|track| track.bound = f64::NEG_INFINITY);
-        let moving = moving_finger(model, segment).filter(|_| segment.kind == SegmentKind::Regrasp);
+        let moving = moving_finger(model, segment);
         let free =
             moving.and_then(|f| free_part(bodies, &model.fingers[f], f, segment, s, settings, log, &mut n_distances));
         let is_free: Vec<bool> = (0..model.fingers.len()).map(|f| is_free_throughout(segment, f)).collect();

@@ -372,9 +372,9 @@ pub fn is_free_throughout(segment: &Segment, f: usize) -> bool {
     segment.waypoints.iter().all(|waypoint| is_free(&waypoint.contacts[f]))
 }
 
-/// Index of the finger that moves in a segment.
+/// Index of the finger that moves in a regrasp, where it names one of the hand's; none in a transfer, whatever it names.
 pub fn moving_finger(model: &Model, segment: &Segment) -> Option<usize> {
-    let name = segment.moving_finger.as_deref()?;
+    let name = segment.moving_finger.as_deref().filter(|_| segment.kind == SegmentKind::Regrasp)?;
     model.fingers.iter().position(|finger| finger.name == name)
 }
 

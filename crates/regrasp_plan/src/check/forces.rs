@@ -1,23 +1,41 @@
-//! Contact forces and joint torques, by substitution: they balance the object's weight, stay in the exact cones and in the
-//! promised range, and the joints make them.
+//! Contact forces and joint torques, by substitution, as `docs/plan-format.md` (forces) asks.
 //!
-//! Forces are those of the fingers on the object, in the object frame; moments are about its centre of mass. Between two
-//! segments pose and contacts stay and forces change linearly: what balances at both ends balances in between, and cones
-//! and limits are convex, so that the ends are all that has to be looked at.
+//! Forces are those of the fingers on the object, in the object frame; moments are about its centre of mass. Tolerances are
+//! fields of `CheckSettings`. At every waypoint
+//!
+//! - forces and weight add up to zero within `force_tolerance`, their moments and torsions within `moment_tolerance`;
+//! - the force of a holding finger is in the exact cone of its contact model (`CONVENTIONS.md`) with the friction of
+//!   `closure::Body::of`, and its normal part in the promised range, both within `force_tolerance`; the moving finger of a
+//!   regrasp exerts nothing, within the first two tolerances;
+//! - every joint's torque is the work of force and torsion per unit of its coordinate, within the share `torque_tolerance` of
+//!   the largest that this work could be, and at most the promised one;
+//! - without a direction of gravity there is room for the weight in each (`any_gravity`).
+//!
+//! Half-way to the next waypoint, at the pose between and with contacts where tips then touch, what is left (torques over
+//! the object's radius) is at most the share `half_way_imbalance` of the sum of all normal forces.
+//!
+//! Between two segments pose and contacts stay and forces change linearly: what balances at both ends balances in between,
+//! and cones, largest normal forces and torque limits are convex, so that the ends are all that has to be looked at.
+//!
+//! Mass, gravity and torque limits of the plan are held against scene and robot.
 
+use crate::check::closure::Body;
 use crate::check::continuity::{contact_of, moving_finger, pose_between};
 use crate::check::kinematics::DrivenAxis;
-use crate::check::model::Model;
+use crate::check::model::{FingerModel, Model};
 use crate::check::rolling::Roll;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
-use crate::plan::{ContactState, ForcePromises, Plan, Segment, SegmentKind, Waypoint};
+use crate::plan::{ContactState, ForcePromises, Plan, Segment, Waypoint};
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp::ContactModel;
 use regrasp_scene::{Gravity, Object, Scene};
 
 /// Standard gravity, in metres per second squared (CGPM 1901).
-const GRAVITY: f64 = 9.80665;
+pub(super) const GRAVITY: f64 = 9.80665;
+/// The promised gravity may be this far from the scene's, and its length from [`GRAVITY`], in metres per second squared:
+/// rounding of a direction.
+const GRAVITY_TOLERANCE: f64 = 1e-6;
 /// Masses, gravities and limits may be off by this much, relatively: rounding.
 const ROUNDING: f64 = 1e-9;
 /// Torques may be this far off whatever the forces, in newton metres: rounding.
@@ -68,10 +86,10 @@ pub fn check_forces(
         return None;
     };
     check_promises(scene, model, promises, log);
-    let judge = Judge { object, model, plan, promises, settings };
+    let judge = Judge { object, body: Body::of(object, plan), model, plan, promises, settings };
     let mut balance = Balance::default();
     for (s, segment) in plan.segments.iter().enumerate() {
-        let moving = moving_finger(model, segment).filter(|_| segment.kind == SegmentKind::Regrasp);
+        let moving = moving_finger(model, segment);
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
             let at = Moment::at(s, w);
             let Some(exerted) = judge.exerted(waypoint, at, log) else { continue };
@@ -83,7 +101,7 @@ pub fn check_forces(
             judge.check_torques(waypoint, &exerted, at, log);
             if promises.gravity_in_world.is_none() {
                 let held: Vec<Exerted> = exerted.into_iter().filter(|one| moving != Some(one.finger)).collect();
-                judge.check_room(waypoint, &held, promises.mass * GRAVITY, at, log);
+                judge.check_room(waypoint, &held, at, log);
             }
         }
         for w in 1..segment.waypoints.len() {
@@ -120,7 +138,7 @@ fn check_promises(scene: &Scene, model: &Model, promises: &ForcePromises, log: &
     let promised = promises.gravity_in_world.map(Vector::from);
     let differs = match scene.gravity {
         Some(Gravity::Direction(down)) => {
-            promised.is_none_or(|promised| (promised - down.into_inner() * GRAVITY).norm() > 1e-6)
+            promised.is_none_or(|promised| (promised - down.into_inner() * GRAVITY).norm() > GRAVITY_TOLERANCE)
         }
         Some(Gravity::Any) => promised.is_some(),
         // The scene leaves the direction to the plan.
@@ -131,7 +149,7 @@ fn check_promises(scene: &Scene, model: &Model, promises: &ForcePromises, log: &
         broken("gravity_in_world", f64::NAN, f64::NAN, message);
     }
     if let Some(gravity) = promises.gravity_in_world.map(|gravity| Vector::from(gravity).norm())
-        && (gravity - GRAVITY).abs() > 1e-6
+        && (gravity - GRAVITY).abs() > GRAVITY_TOLERANCE
     {
         broken("gravity_in_world", gravity, GRAVITY, format!("gravity of {gravity} m/s^2 instead of {GRAVITY}"));
     }
@@ -155,6 +173,7 @@ fn check_promises(scene: &Scene, model: &Model, promises: &ForcePromises, log: &
 /// What everything is judged by.
 pub(super) struct Judge<'a> {
     pub(super) object: &'a Object,
+    pub(super) body: Body,
     pub(super) model: &'a Model,
     pub(super) plan: &'a Plan,
     pub(super) promises: &'a ForcePromises,
@@ -237,7 +256,7 @@ impl Judge<'_> {
         }
         let pressing = one.pressing();
         let across = self.across(one);
-        let room = if finger.contact == ContactModel::Frictionless { 0.0 } else { self.friction() * pressing };
+        let room = if finger.contact == ContactModel::Frictionless { 0.0 } else { self.body.friction * pressing };
         if across > room + tolerance {
             let message = format!(
                 "finger \"{}\" exerts {across:.4e} N across the normal (torsion over its radius counted), {room:.4e} N are left by friction",
@@ -253,15 +272,10 @@ impl Judge<'_> {
         }
     }
 
-    /// Friction counted on.
-    pub(super) fn friction(&self) -> f64 {
-        self.plan.promises.friction.min(self.object.friction)
-    }
-
     /// The torsion radius of a soft finger; zero where no torsion is transmitted.
     pub(super) fn torsion_radius(&self, one: &Exerted) -> f64 {
         match self.model.fingers[one.finger].contact {
-            ContactModel::SoftFinger { torsion_radius } if self.friction() > 0.0 => torsion_radius,
+            ContactModel::SoftFinger { torsion_radius } if self.body.friction > 0.0 => torsion_radius,
             _ => 0.0,
         }
     }
@@ -275,40 +289,27 @@ impl Judge<'_> {
         }
     }
 
-    /// Work of a force and a couple of one finger, in the object frame, per unit of each coordinate: coordinate, torque,
-    /// and force times the largest lever arm. The force acts where the tip touches, which is the contact within the contact
-    /// tolerance.
+    /// As [`torques_of`], for another force and couple at the contact of `one`.
     pub(super) fn torques(
         &self,
-        world_from_object: &Pose,
         waypoint: &Waypoint,
         one: &Exerted,
         force: &Vector,
         couple: &Vector,
-    ) -> Vec<(usize, f64, f64)> {
-        let finger = &self.model.fingers[one.finger];
-        let point = finger.center_in_world(&waypoint.joints) - world_from_object * one.normal * finger.radius;
-        let (force, couple) = (world_from_object * force, world_from_object * couple);
-        let axes = finger.path.axes(&waypoint.joints);
-        let arm = axes.iter().map(|axis| (point - axis.origin).norm()).fold(0.0, f64::max);
-        let torque = |axis: &DrivenAxis| {
-            let size = if axis.slides { force.norm() } else { force.norm() * arm + couple.norm() };
-            (axis.coordinate, axis.work(&force, &point, &couple), size * axis.multiplier.abs())
-        };
-        axes.iter().map(torque).collect()
+    ) -> Vec<JointWork> {
+        torques_of(&self.model.fingers[one.finger], waypoint, &one.normal, force, couple)
     }
 
     /// Torques by virtual work: a coordinate's is the work of force and torsion per unit of it, over all joints that it
     /// drives. Joints of free fingers make none.
     fn check_torques(&self, waypoint: &Waypoint, exerted: &[Exerted], at: Moment, log: &mut Log) {
-        let world_from_object = Pose::from(&waypoint.world_from_object);
         let mut expected = vec![0.0; waypoint.joint_torques.len()];
         let mut tolerance = vec![TORQUE_ROUNDING; expected.len()];
         for one in exerted {
             let couple = one.normal * one.torsion;
-            for (coordinate, torque, size) in self.torques(&world_from_object, waypoint, one, &one.force, &couple) {
-                expected[coordinate] += torque;
-                tolerance[coordinate] += self.settings.torque_tolerance * size;
+            for work in self.torques(waypoint, one, &one.force, &couple) {
+                expected[work.coordinate] += work.torque;
+                tolerance[work.coordinate] += self.settings.torque_tolerance * work.size;
             }
         }
         for (k, name) in self.plan.joint_names.iter().enumerate() {
@@ -350,6 +351,7 @@ impl Judge<'_> {
         let pressing: f64 = exerted.iter().map(Exerted::pressing).sum();
         let ends = [from, to].map(|waypoint| Pose::from(&waypoint.world_from_object));
         let (force, moment) = self.residual(&pose_between(&ends[0], &ends[1], 0.5), &exerted);
+        // Fingers that do not press leave room for no imbalance, and nothing is divided by zero.
         let share = force.norm().hypot(moment.norm() / self.object.radius) / pressing.max(1e-9);
         let limit = self.settings.half_way_imbalance;
         if share > limit {
@@ -363,4 +365,37 @@ impl Judge<'_> {
         }
         share
     }
+}
+
+/// Work of a joint against a force and a couple of its finger's tip, per unit of the coordinate that drives it.
+pub(super) struct JointWork {
+    /// Index of the coordinate in the joint vector.
+    pub(super) coordinate: usize,
+    /// The work, in newton metres, or newtons of a sliding joint.
+    pub(super) torque: f64,
+    /// The largest that the work of so great a force and couple could be: force times the largest lever arm, and the couple.
+    pub(super) size: f64,
+}
+
+/// The work of every joint of `finger` when its tip exerts `force` and `couple` where the object's outward normal is
+/// `normal`, all three in the object frame. The force acts where the tip touches, one radius from its centre: that is the
+/// contact within the contact tolerance.
+pub(super) fn torques_of(
+    finger: &FingerModel,
+    waypoint: &Waypoint,
+    normal: &Vector,
+    force: &Vector,
+    couple: &Vector,
+) -> Vec<JointWork> {
+    let world_from_object = Pose::from(&waypoint.world_from_object);
+    let point = finger.touching_in_world(&waypoint.joints, &(world_from_object * normal));
+    let (force, couple) = (world_from_object * force, world_from_object * couple);
+    let axes = finger.path.axes(&waypoint.joints);
+    let arm = axes.iter().map(|axis| (point - axis.origin).norm()).fold(0.0, f64::max);
+    let work = |axis: &DrivenAxis| {
+        let size = if axis.slides { force.norm() } else { force.norm() * arm + couple.norm() };
+        let torque = axis.work(&force, &point, &couple);
+        JointWork { coordinate: axis.coordinate, torque, size: size * axis.multiplier.abs() }
+    };
+    axes.iter().map(work).collect()
 }

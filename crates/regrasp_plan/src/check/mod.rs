@@ -3,6 +3,8 @@
 //! It shares no decision with the planner: own forward kinematics from the robot's joints, own closed forms of
 //! surfaces, force closure by exact cones with a certificate, distances by parry, and motion bounds between waypoints.
 
+/// Margin and clearance at every waypoint.
+pub mod along;
 /// Room for the weight in every direction.
 mod any_gravity;
 /// Everything that can collide, and which pairs must not.
@@ -45,11 +47,14 @@ pub mod rolling;
 pub mod surface;
 /// When waypoints are passed, and how fast.
 pub mod times;
+/// Fingertips: where they touch.
+pub mod tip;
 /// What can be wrong with a plan.
 pub mod violation;
 /// Poses to be passed between start and goal.
 pub mod way;
 
+pub use along::{Along, along};
 pub use files::{CheckedFiles, check_files};
 pub use find_scene::find_scene;
 pub use violation::{Moment, Violation, ViolationKind};
@@ -90,7 +95,8 @@ pub struct CheckSettings {
     pub force_tolerance: f64,
     /// Their moments about the centre of mass may fail to balance by this much, in newton metres. Issue 4: 1e-7 N m.
     pub moment_tolerance: f64,
-    /// Joint torques may be off by this share of (force times largest lever arm).
+    /// Joint torques may be off by this share of (force times largest lever arm), and those that the weight of some direction
+    /// may need above their limit by this share of it.
     pub torque_tolerance: f64,
     /// Half-way between two waypoints the imbalance (torques over the torque scale) may be this share of the sum of all
     /// normal forces.
@@ -213,13 +219,7 @@ pub fn check(scene: &Scene, query: Option<&InHandQuery>, plan: &Plan, settings: 
     match Model::new(scene) {
         Err(message) => log.push(Violation::new(ViolationKind::WrongScene, message)),
         Ok(model) => {
-            continuity::check_form(&model, plan, &mut log);
-            let form_is_sound = !log.found.iter().any(|violation| {
-                use ViolationKind::{EmptySegment, NotANumber, WrongScene};
-                matches!(violation.kind, EmptySegment | NotANumber | WrongScene)
-            });
-            // Everything else indexes by joint, finger and waypoint.
-            if form_is_sound {
+            if form_is_sound(&model, plan, &mut log) {
                 judge(scene, query, plan, settings, &model, &mut log, &mut report);
             }
         }
@@ -227,6 +227,15 @@ pub fn check(scene: &Scene, query: Option<&InHandQuery>, plan: &Plan, settings: 
     report.n_violations = log.count;
     report.violations = log.found;
     report
+}
+
+/// Whether joints, fingers and waypoints of `plan` are those of the scene: everything else indexes by them.
+fn form_is_sound(model: &Model, plan: &Plan, log: &mut Log) -> bool {
+    continuity::check_form(model, plan, log);
+    !log.found.iter().any(|violation| {
+        use ViolationKind::{EmptySegment, NotANumber, WrongScene};
+        matches!(violation.kind, EmptySegment | NotANumber | WrongScene)
+    })
 }
 
 fn judge(
@@ -247,6 +256,7 @@ fn judge(
     let rolled = rolling::check_rolling(&scene.object.shape, model, plan, settings, log);
     report.max_contact_error = contact::check_tips(model, plan, log).max(rolled.max_contact_error);
     report.max_slip = rolled.max_slip;
+    contact::check_pads(model, plan, log);
     contact::check_contacts(&scene.object, model, plan, settings, log);
     report.min_margin = promises::check_closure(&scene.object, model, plan, settings, log);
     promises::check_promises(&scene.object, plan, settings, report.min_margin, log);

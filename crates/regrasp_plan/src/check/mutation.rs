@@ -3,6 +3,8 @@
 //!
 //! Amounts are small: a mutant that any check would catch proves nothing.
 
+/// Random places for damage.
+mod choice;
 /// Forces, torques, and what is promised of them.
 mod forces;
 /// Fingers that are free, and fingers that are said to be.
@@ -19,7 +21,8 @@ mod way;
 use crate::check::continuity::{contact_of, moving_finger, pose_difference};
 use crate::check::model::Model;
 use crate::check::violation::ViolationKind::{self, *};
-use crate::plan::{ContactMode, ContactState, Plan, PoseData, SegmentKind};
+use crate::plan::{ContactMode, ContactState, Plan, PoseData, Segment, SegmentKind, Waypoint};
+use choice::{any_segment, any_waypoint, pick, pick_waypoint, swap_two, waypoints_mut};
 use nalgebra::{DMatrix, DVector};
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, Shape, UnitVector, Vector};
@@ -202,8 +205,7 @@ impl Breeder<'_> {
             let row = limits.get(rng.below(limits.len().max(1)))?;
             let beyond = rng.uniform(0.5f64, 1.0).to_radians();
             let position = if rng.chance(0.5) { row.lower - beyond } else { row.upper + beyond };
-            pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?.joints[row.coordinate] =
-                (position - row.offset) / row.multiplier;
+            any_waypoint(plan, rng)?.joints[row.coordinate] = (position - row.offset) / row.multiplier;
             Some(())
         });
         let model = self.model;
@@ -211,11 +213,11 @@ impl Breeder<'_> {
             let turning: Vec<usize> = (0..model.slides.len()).filter(|&k| !model.slides[k]).collect();
             let k = *turning.get(rng.below(turning.len().max(1)))?;
             // Both steps at the waypoint change by this much, so one of them is a jump.
-            pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?.joints[k] += rng.uniform(1.01, 1.2);
+            any_waypoint(plan, rng)?.joints[k] += rng.uniform(1.01, 1.2);
             Some(())
         });
         self.add("joint is not a number", &[NotANumber], |plan, rng| {
-            *pick(&mut pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?.joints, rng)? = f64::NAN;
+            *pick(&mut any_waypoint(plan, rng)?.joints, rng)? = f64::NAN;
             Some(())
         });
     }
@@ -225,25 +227,24 @@ impl Breeder<'_> {
             [ContactOffTip, ObjectMovesInRegrasp, SegmentsDoNotMeet, StartMismatch, GoalMismatch];
         self.add("object shifted at a waypoint", &MOVED, |plan, rng| {
             let tolerance = plan.promises.contact_tolerance;
-            let waypoint = pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?;
+            let waypoint = any_waypoint(plan, rng)?;
             shift(&mut waypoint.world_from_object, rng, 2.5 * tolerance, 4.0 * tolerance);
             Some(())
         });
         self.add("quaternion components swapped", &MOVED, |plan, rng| {
-            let waypoint = pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?;
+            let waypoint = any_waypoint(plan, rng)?;
             let before = waypoint.world_from_object;
             waypoint.world_from_object.quat_xyzw.swap(0, 1 + rng.below(2));
             let (_, angle) = pose_difference(&before, &waypoint.world_from_object);
             (angle > 0.1).then_some(())
         });
         self.add("quaternion not of length one", &[NotANumber], |plan, rng| {
-            let waypoint = pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?;
+            let waypoint = any_waypoint(plan, rng)?;
             waypoint.world_from_object.quat_xyzw.iter_mut().for_each(|x| *x *= 1.0 + 1e-6);
             Some(())
         });
         self.add("object creeps in a regrasp", &[ObjectMovesInRegrasp], |plan, rng| {
-            let mut regrasps: Vec<_> = plan.segments.iter_mut().filter(|s| s.kind == SegmentKind::Regrasp).collect();
-            let segment = pick(&mut regrasps, rng)?;
+            let segment = any_segment(plan, rng, SegmentKind::Regrasp)?;
             let n_waypoints = segment.waypoints.len();
             let waypoint = segment.waypoints.get_mut(1 + rng.below(n_waypoints - 1))?;
             shift(&mut waypoint.world_from_object, rng, 1e-6, 1e-5);
@@ -267,7 +268,8 @@ impl Breeder<'_> {
                 let way = if along == 0.0 { side } else { contact.normal_in_object };
                 let sign = if along == 0.0 { 1.0 } else { along };
                 let off = way.into_inner() * (sign * tolerance * rng.uniform(2.1, 4.0));
-                let center = contact.point_in_object + contact.normal_in_object.into_inner() * model.fingers[f].radius;
+                let normal = contact.normal_in_object.into_inner();
+                let center = contact.point_in_object + model.fingers[f].center_from_contact(waypoint, &normal);
                 move_tip(model, f, &mut waypoint.joints, &(object * (center + off)))
             });
         }
@@ -299,10 +301,9 @@ impl Breeder<'_> {
         }
         self.add("all contacts in one place", &[ClosureLost], |plan, rng| {
             let segment = pick(&mut plan.segments, rng)?;
-            let holding = |c: &&ContactState| c.holds();
             for waypoint in &mut segment.waypoints {
-                let first = *waypoint.contacts.iter().find(holding)?;
-                let others = waypoint.contacts.iter_mut().filter(|c| c.holds());
+                let first = *waypoint.contacts.iter().find(|contact| contact.holds())?;
+                let others = waypoint.contacts.iter_mut().filter(|contact| contact.holds());
                 others.for_each(|contact| *contact = first);
             }
             Some(())
@@ -327,7 +328,7 @@ impl Breeder<'_> {
             Some(())
         });
         self.add("contact without a normal", &[NotANumber], |plan, rng| {
-            let waypoint = pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?;
+            let waypoint = any_waypoint(plan, rng)?;
             let mut held: Vec<_> = waypoint.contacts.iter_mut().filter(|c| c.holds()).collect();
             pick(&mut held, rng)?.normal_in_object = None;
             Some(())
@@ -352,15 +353,13 @@ impl Breeder<'_> {
         });
         let model = self.model;
         self.add("another finger named as moving", &[WrongMovingFinger], |plan, rng| {
-            let mut regrasps: Vec<_> = plan.segments.iter_mut().filter(|s| s.kind == SegmentKind::Regrasp).collect();
-            let segment = pick(&mut regrasps, rng)?;
+            let segment = any_segment(plan, rng, SegmentKind::Regrasp)?;
             let f = moving_finger(model, segment)?;
-            segment.moving_finger = Some(plan.fingers[(f + 1) % plan.fingers.len()].clone());
+            segment.moving_finger = Some(model.fingers[(f + 1) % model.fingers.len()].name.clone());
             Some(())
         });
         self.add("moving finger not named", &[WrongMovingFinger], |plan, rng| {
-            let mut regrasps: Vec<_> = plan.segments.iter_mut().filter(|s| s.kind == SegmentKind::Regrasp).collect();
-            pick(&mut regrasps, rng)?.moving_finger = None;
+            any_segment(plan, rng, SegmentKind::Regrasp)?.moving_finger = None;
             Some(())
         });
         self.add("holding finger lets go in a regrasp", &[WrongContactMode, ClosureLost], |plan, rng| {
@@ -371,11 +370,10 @@ impl Breeder<'_> {
             Some(())
         });
         self.add("moving finger lands early", &[WrongContactMode], |plan, rng| {
-            let mut regrasps: Vec<_> = plan.segments.iter_mut().filter(|s| s.kind == SegmentKind::Regrasp).collect();
-            let segment = pick(&mut regrasps, rng)?;
+            let segment = any_segment(plan, rng, SegmentKind::Regrasp)?;
             let f = moving_finger(model, segment)?;
             let last = segment.waypoints.len().checked_sub(1).filter(|&last| last >= 2)?;
-            if segment.waypoints[last].contacts[f].mode == ContactMode::Free {
+            if !segment.waypoints[last].contacts[f].holds() {
                 return None;
             }
             segment.waypoints[last - 1].contacts[f] = segment.waypoints[last].contacts[f];
@@ -395,16 +393,16 @@ impl Breeder<'_> {
         let (model, scene) = (self.model, self.scene);
         self.add("relocation without lift", &[LandingOrLiftingNotFree, Collision], |plan, rng| {
             // The tip goes straight through the object or along its surface, in small steps.
-            let mut regrasps: Vec<_> = plan.segments.iter_mut().filter(|s| s.kind == SegmentKind::Regrasp).collect();
-            let segment = pick(&mut regrasps, rng)?;
+            let segment = any_segment(plan, rng, SegmentKind::Regrasp)?;
             let (first, last) = (segment.waypoints.first()?.clone(), segment.waypoints.last()?.clone());
             let f = moving_finger(model, segment)?;
             let (from, to) = (contact_of(&first.contacts[f])?, contact_of(&last.contacts[f])?);
             let object = Pose::from(&first.world_from_object);
-            let center = |c: &regrasp_grasp::Contact| {
-                object * (c.point_in_object + c.normal_in_object.into_inner() * model.fingers[f].radius)
+            let center = |c: &regrasp_grasp::Contact, waypoint: &Waypoint| {
+                let away = model.fingers[f].center_from_contact(waypoint, &c.normal_in_object);
+                object * (c.point_in_object + away)
             };
-            let (a, b) = (center(&from), center(&to));
+            let (a, b) = (center(&from, &first), center(&to, &last));
             if (a - b).norm() < 2e-3 {
                 return None;
             }
@@ -437,7 +435,7 @@ impl Breeder<'_> {
             let target = model.fingers[other].center_in_world(&waypoint.joints);
             let here = model.fingers[f].center_in_world(&waypoint.joints);
             let reach = (model.fingers[f].radius + model.fingers[other].radius - 1e-3).max(1e-3);
-            if hand_may_touch || waypoint.contacts[f].mode != ContactMode::Free {
+            if hand_may_touch || waypoint.contacts[f].holds() {
                 return None;
             }
             move_tip(model, f, &mut waypoint.joints, &(target + (here - target).normalize() * reach))
@@ -445,47 +443,12 @@ impl Breeder<'_> {
     }
 }
 
-fn pick<'a, T>(items: &'a mut [T], rng: &mut Rng) -> Option<&'a mut T> {
-    if items.is_empty() { None } else { Some(&mut items[rng.below(items.len())]) }
-}
-
-fn swap_two<T: PartialEq>(items: &mut [T], rng: &mut Rng) -> Option<()> {
-    let n_items = items.len();
-    (n_items >= 2).then(|| {
-        let first = rng.below(n_items);
-        items.swap(first, (first + 1 + rng.below(n_items - 1)) % n_items);
-    })
-}
-
-/// Swaps two items of which `differ` says that it matters.
-fn swap_two_that<T>(items: &mut [T], rng: &mut Rng, differ: impl Fn(&T, &T) -> bool) -> Option<()> {
-    let pairs: Vec<(usize, usize)> = (0..items.len())
-        .flat_map(|i| (i + 1..items.len()).map(move |k| (i, k)))
-        .filter(|&(i, k)| differ(&items[i], &items[k]))
-        .collect();
-    let &(i, k) = pairs.get(rng.below(pairs.len().max(1)))?;
-    items.swap(i, k);
-    Some(())
-}
-
-/// A random inner waypoint of a random segment of `kind`.
-fn pick_waypoint(plan: &Plan, rng: &mut Rng, kind: SegmentKind) -> Option<(usize, usize)> {
-    let places: Vec<(usize, usize)> = plan
-        .segments
-        .iter()
-        .enumerate()
-        .filter(|(_, segment)| segment.kind == kind)
-        .flat_map(|(s, segment)| (1..segment.waypoints.len() - 1).map(move |w| (s, w)))
-        .collect();
-    if places.is_empty() { None } else { Some(places[rng.below(places.len())]) }
-}
-
 fn shift(pose: &mut PoseData, rng: &mut Rng, low: f64, high: f64) {
     let way = Vector::from(rng.direction()) * rng.uniform(low, high);
     (0..3).for_each(|k| pose.position[k] += way[k]);
 }
 
-fn travel(segment: &crate::Segment) -> f64 {
+fn travel(segment: &Segment) -> f64 {
     match (segment.waypoints.first(), segment.waypoints.last()) {
         (Some(a), Some(b)) => {
             let (distance, angle) = pose_difference(&a.world_from_object, &b.world_from_object);
@@ -496,7 +459,7 @@ fn travel(segment: &crate::Segment) -> f64 {
 }
 
 /// True when the object or a joint ends more than a millionth of a metre or radian from where it began.
-fn goes_somewhere(segment: &crate::Segment) -> bool {
+fn goes_somewhere(segment: &Segment) -> bool {
     let (Some(first), Some(last)) = (segment.waypoints.first(), segment.waypoints.last()) else { return false };
     travel(segment) > 1e-6 || first.joints.iter().zip(&last.joints).any(|(a, b)| (a - b).abs() > 1e-6)
 }
@@ -544,12 +507,12 @@ fn replace_contact(
     let first = pick(&mut plan.segments, rng)?.waypoints.first()?.contacts[f];
     let contact = contact_of(&first)?;
     let (point, normal) = change(contact.point_in_object, contact.normal_in_object, rng);
-    for waypoint in plan.segments.iter_mut().flat_map(|segment| &mut segment.waypoints) {
+    for waypoint in waypoints_mut(plan) {
         if waypoint.contacts[f] == first {
             let state = &mut waypoint.contacts[f];
             state.point_in_object = Some(point.into());
             state.normal_in_object = Some(normal.into_inner().into());
-            let center = point + normal.into_inner() * model.fingers[f].radius;
+            let center = point + model.fingers[f].center_from_contact(waypoint, &normal);
             move_tip(model, f, &mut waypoint.joints, &(Pose::from(&waypoint.world_from_object) * center))?;
         }
     }
@@ -568,8 +531,7 @@ struct End {
 
 /// Puts an extra waypoint after the beginning or before the end of a relocation, with the tip at `target`.
 fn push_free_tip(plan: &mut Plan, model: &Model, rng: &mut Rng, target: impl Fn(&End) -> Point) -> Option<()> {
-    let mut regrasps: Vec<_> = plan.segments.iter_mut().filter(|s| s.kind == SegmentKind::Regrasp).collect();
-    let segment = pick(&mut regrasps, rng)?;
+    let segment = any_segment(plan, rng, SegmentKind::Regrasp)?;
     let f = moving_finger(model, segment)?;
     let at_end = rng.chance(0.5);
     let end = if at_end { segment.waypoints.last()? } else { segment.waypoints.first()? };

@@ -1,20 +1,30 @@
-//! What the plan promises: input files, friction, tolerance, closure margin.
+//! What the plan promises of its inputs and contacts; promises of time are judged in `times`, of forces in `forces`.
+//!
+//! - Input files: the same roles, names and SHA-256 as the scene's, none more and none less.
+//! - Friction: not negative, at most the scene's, and at most that over `friction_margin`, which is at least 1.
+//! - Contact and slip tolerance: at most what the settings accept. That they are kept is judged in `contact` and `rolling`.
+//! - Closure: at every waypoint, of exactly the fingers that hold, with the margin promised or asked for by the settings; the
+//!   margin is that of `closure`, dimensionless, with torques divided by the object's radius, which `torque_scale` has to
+//!   be. The margin said to be kept is no more than the smallest one found.
+//!
+//! Tolerances, for rounding and two solvers, are the constants below.
 
 use crate::check::closure::{Body, Certificate, certified_margin, margin_by};
 use crate::check::continuity::{contact_of, moving_finger};
 use crate::check::model::Model;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
-use crate::plan::{Plan, SegmentKind};
+use crate::plan::{Plan, Waypoint};
 use regrasp_grasp::{Contact, Grip};
 use regrasp_scene::{InputFile, Object};
 use std::collections::BTreeSet;
 
-/// How much smaller than promised a margin may come out: two solvers, one number.
+/// How much smaller than required a margin may come out: two solvers, one number.
 const MARGIN_TOLERANCE: f64 = 1e-9;
 /// How far the kept margin may be above the one found here before it is a broken promise.
 const KEPT_MARGIN_TOLERANCE: f64 = 1e-6;
-
+/// The torque scale may differ from the object's radius by this share of it: rounding.
+const SCALE_TOLERANCE: f64 = 1e-9;
 /// Friction times its margin may be this much above the scene's: rounding.
 const FRICTION_TOLERANCE: f64 = 1e-9;
 
@@ -54,6 +64,35 @@ struct Holding {
     grips: Vec<Grip>,
 }
 
+/// A finger that holds, and its contact.
+pub struct Holder {
+    /// Index of the finger.
+    pub finger: usize,
+    contact: Contact,
+}
+
+impl Holder {
+    /// The same for the same finger at the same contact only.
+    pub fn key(&self) -> (usize, [u64; 6]) {
+        let (p, n) = (self.contact.point_in_object, self.contact.normal_in_object);
+        (self.finger, [p.x, p.y, p.z, n.x, n.y, n.z].map(f64::to_bits))
+    }
+}
+
+/// The fingers that hold at a waypoint; `moving` is the one that a regrasp moves.
+pub fn holders(model: &Model, moving: Option<usize>, waypoint: &Waypoint) -> Vec<Holder> {
+    (0..model.fingers.len())
+        .filter(|&f| Some(f) != moving && waypoint.contacts[f].holds())
+        .filter_map(|finger| Some(Holder { finger, contact: contact_of(&waypoint.contacts[finger])? }))
+        .collect()
+}
+
+/// Contacts of fingers with what their tips transmit.
+pub fn grips_of(model: &Model, holders: &[Holder]) -> Vec<Grip> {
+    let grip = |holder: &Holder| Grip { contact: holder.contact, model: model.fingers[holder.finger].contact };
+    holders.iter().map(grip).collect()
+}
+
 /// Closure of exactly the fingers that hold, at every waypoint; the smallest margin.
 ///
 /// Contacts that roll are others at every waypoint. Forces found for the waypoint before are tried first: what they prove is
@@ -65,11 +104,7 @@ pub fn check_closure(
     settings: &CheckSettings,
     log: &mut Log,
 ) -> Option<f64> {
-    let body = Body {
-        center_of_mass: object.center_of_mass,
-        torque_scale: object.radius,
-        friction: plan.promises.friction.min(object.friction),
-    };
+    let body = Body::of(object, plan);
     let required = plan.promises.required_margin.max(settings.smallest_margin);
     let sets = holding_sets(model, plan);
     let mut smallest: Option<f64> = None;
@@ -104,25 +139,13 @@ fn holding_sets(model: &Model, plan: &Plan) -> Vec<Holding> {
     let mut seen = BTreeSet::new();
     let mut sets = Vec::new();
     for (s, segment) in plan.segments.iter().enumerate() {
-        let moving = moving_finger(model, segment).filter(|_| segment.kind == SegmentKind::Regrasp);
+        let moving = moving_finger(model, segment);
         // A waypoint may break the roles; closure is judged for what really holds there.
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
-            let holding: Vec<(usize, Contact)> = (0..model.fingers.len())
-                .filter(|&f| Some(f) != moving && waypoint.contacts[f].holds())
-                .filter_map(|f| Some((f, contact_of(&waypoint.contacts[f])?)))
-                .collect();
-            let key: Vec<(usize, [u64; 6])> = holding
-                .iter()
-                .map(|(f, contact)| {
-                    let (p, n) = (contact.point_in_object, contact.normal_in_object);
-                    (*f, [p.x, p.y, p.z, n.x, n.y, n.z].map(f64::to_bits))
-                })
-                .collect();
-            if seen.insert(key) {
-                let grip =
-                    |(f, contact): &(usize, Contact)| Grip { contact: *contact, model: model.fingers[*f].contact };
-                let fingers = holding.iter().map(|(f, _)| *f).collect();
-                sets.push(Holding { at: Moment::at(s, w), fingers, grips: holding.iter().map(grip).collect() });
+            let holding = holders(model, moving, waypoint);
+            if seen.insert(holding.iter().map(Holder::key).collect::<Vec<_>>()) {
+                let fingers = holding.iter().map(|holder| holder.finger).collect();
+                sets.push(Holding { at: Moment::at(s, w), fingers, grips: grips_of(model, &holding) });
             }
         }
     }
@@ -180,7 +203,7 @@ pub fn check_promises(object: &Object, plan: &Plan, settings: &CheckSettings, mi
         broken("kept_margin", promises.kept_margin, found, message);
     }
     let scale = object.radius;
-    if (promises.torque_scale - scale).abs() > 1e-9 * scale {
+    if (promises.torque_scale - scale).abs() > SCALE_TOLERANCE * scale {
         let message = format!("torque scale {}, the object's radius is {scale}", promises.torque_scale);
         broken("torque_scale", promises.torque_scale, scale, message);
     }

@@ -1,5 +1,17 @@
-//! When waypoints are passed, how fast joints, fingertips and object go, and whether the velocities in the plan belong to
-//! its motion.
+//! When waypoints are passed, and how fast joints, fingertips and object go, as `docs/plan-format.md` (time) asks.
+//!
+//! - Time rises in a segment. The next one begins no earlier than it ends, and `shortest_pause` later where a contact force
+//!   is by then another, beyond `force_tolerance`.
+//! - In a step the mean velocity of every joint, coupled ones too, and those in the plan at its ends are at most the promised
+//!   one and the robot's; the change of velocity is at most the promised acceleration times the time.
+//! - Mean speeds in the world, of every tip's centre and of the object (way of its centre of mass, and turn times radius),
+//!   are at most the promised one.
+//! - The velocities in the plan belong to its motion: zero at both ends of a segment, elsewhere such that the cubic through
+//!   positions and velocities never turns back within a step (Fritsch, Carlson 1980), within `velocity_tolerance`.
+//! - Promised limits are above zero, and velocities no more than the robot's.
+//!
+//! Limits may be exceeded by the share 1e-6 for rounding, changes of velocity by `velocity_tolerance` as well. Tolerances
+//! named here are fields of `CheckSettings`.
 
 use crate::check::continuity::pose_difference;
 use crate::check::model::Model;

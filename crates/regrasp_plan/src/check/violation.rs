@@ -57,7 +57,8 @@ pub enum ViolationKind {
     ObjectMovesInRegrasp,
     /// A contact that should stay changes.
     GraspChanges,
-    /// A finger holds where it should be free, or is free where it should hold.
+    /// A finger changes between holding, rolling and being free in a segment that it should spend in one of these; the moving
+    /// finger of a regrasp holds between its ends; or a finger rolls that cannot: its tip is sharp, or the object rests.
     WrongContactMode,
     /// In a regrasp, a finger moves that should not, or the moving finger has no name.
     WrongMovingFinger,
@@ -65,6 +66,8 @@ pub enum ViolationKind {
     ContactOffTip,
     /// A fingertip that should roll slides over the object.
     Slip,
+    /// A fingertip touches outside the pad that the hand file gives it.
+    ContactOffPad,
     /// A contact is not on the object's surface.
     ContactOffSurface,
     /// A contact's normal is not the surface's.

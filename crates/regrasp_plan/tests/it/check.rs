@@ -1,13 +1,12 @@
 //! The checker accepts a plan that is good by construction, and says what it cannot judge.
 
-use crate::sample;
+use crate::sample::{self, judge, kinds};
 use regrasp_geometry::{Point, Shape, TriangleMesh};
-use regrasp_plan::check::Moment;
-use regrasp_plan::check::{CheckSettings, ViolationKind, check, check_files};
+use regrasp_plan::Plan;
+use regrasp_plan::check::{CheckSettings, Moment, ViolationKind, check, check_files};
 use regrasp_plan::format::to_json;
 use regrasp_robot::import::LoadOptions;
 use regrasp_scene::{GraspRequest, InHandQuery};
-use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -15,7 +14,7 @@ use std::sync::Arc;
 fn a_good_plan_is_accepted() {
     let scene = sample::scene();
     let plan = sample::plan(&scene);
-    let report = check(&scene, Some(&sample::query(&plan)), &plan, &CheckSettings::default());
+    let report = judge(&scene, &plan);
     assert!(report.accepted(), "{report:#?}");
     assert!(report.min_margin.unwrap() > 0.005);
     assert!(report.max_contact_error < 0.1e-3);
@@ -25,7 +24,7 @@ fn a_good_plan_is_accepted() {
 fn a_good_plan_with_a_free_finger_is_accepted() {
     let scene = sample::scene();
     let plan = sample::plan_with_free_finger(&scene);
-    let report = check(&scene, Some(&sample::query(&plan)), &plan, &CheckSettings::default());
+    let report = judge(&scene, &plan);
     assert!(report.accepted(), "{report:#?}");
     assert!(report.min_margin.unwrap() > 0.005);
 }
@@ -34,11 +33,10 @@ fn a_good_plan_with_a_free_finger_is_accepted() {
 fn two_soft_fingers_hold_while_one_is_away_and_another_relocates() {
     let scene = sample::soft_scene();
     let plan = sample::plan_with_two_away(&scene);
-    let report = check(&scene, Some(&sample::query(&plan)), &plan, &CheckSettings::default());
+    let report = judge(&scene, &plan);
     assert!(report.accepted(), "{report:#?}");
     // Hard ones do not.
-    let report = check(&sample::scene(), Some(&sample::query(&plan)), &plan, &CheckSettings::default());
-    let kinds: BTreeSet<_> = report.violations.iter().map(|violation| violation.kind).collect();
+    let kinds = kinds(&judge(&sample::scene(), &plan));
     assert!(kinds.contains(&ViolationKind::ClosureLost), "{kinds:?}");
     let fits = |kind: &ViolationKind| matches!(kind, ViolationKind::ClosureLost | ViolationKind::PromiseBroken);
     assert!(kinds.iter().all(fits), "{kinds:?}");
@@ -53,13 +51,26 @@ fn a_free_finger_keeps_clear_of_the_object() {
     let mut touching = plan.clone();
     let free = touching.segments[lifted].waypoints[0].contacts[1];
     touching.segments[0].waypoints[0].contacts[1] = free;
-    let kinds = |plan: &regrasp_plan::Plan| {
-        let report = check(&scene, Some(&sample::query(plan)), plan, &CheckSettings::default());
-        report.violations.iter().map(|violation| violation.kind).collect::<Vec<_>>()
+    assert_eq!(kinds(&judge(&scene, &touching)), [ViolationKind::Collision]);
+    assert!(judge(&scene, &plan).accepted());
+}
+
+#[test]
+fn a_finger_that_a_transfer_names_as_moving_is_judged_as_one_that_holds() {
+    // So few waypoints that tips leave their contacts in between.
+    let scene = sample::scene();
+    let mut plan = sample::plan(&scene);
+    let waypoints = &mut plan.segments[0].waypoints;
+    waypoints.drain(1..waypoints.len() - 1);
+    let off_tip = |plan: &Plan| {
+        let violations = judge(&scene, plan).violations.into_iter();
+        violations.filter(|violation| violation.kind == ViolationKind::ContactOffTip).collect::<Vec<_>>()
     };
-    let found = kinds(&touching);
-    assert!(!found.is_empty() && found.iter().all(|kind| *kind == ViolationKind::Collision), "{found:?}");
-    assert!(kinds(&plan).is_empty());
+    let found = off_tip(&plan);
+    assert!(found.iter().any(|violation| violation.subjects == ["f0"]), "{found:?}");
+    plan.segments[0].moving_finger = Some("f0".into());
+    assert_eq!(off_tip(&plan), found);
+    assert!(kinds(&judge(&scene, &plan)).contains(&ViolationKind::WrongMovingFinger));
 }
 
 #[test]
@@ -73,7 +84,7 @@ fn a_plan_of_another_scene_is_rejected_and_a_missing_scene_is_an_error() {
     assert!(missing.contains("C420") && missing.contains("sample.scene") && missing.contains("--scene"), "{missing}");
     let other = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/sphere_90x.toml");
     let checked = check_files(&path, Some(&other), &options, &settings).unwrap();
-    let kinds: Vec<_> = checked.report.violations.iter().map(|violation| violation.kind).collect();
+    let kinds = kinds(&checked.report);
     assert!(kinds.contains(&ViolationKind::InputHashMismatch) && kinds.contains(&ViolationKind::WrongScene));
     let mut escaping = plan.clone();
     escaping.inputs[0].name = "../secret.toml".into();

@@ -2,11 +2,11 @@
 //! of the contacts, the shortest forces and torsions that carry the weight on top, and torques by finite differences of
 //! virtual work.
 
-use crate::sample::{self, TIP_RADIUS};
+use crate::sample::{self, TIP_RADIUS, judge, kinds};
 use nalgebra::{DMatrix, DVector};
 use regrasp_geometry::{Point, Pose, Vector};
+use regrasp_plan::check::ViolationKind;
 use regrasp_plan::check::continuity::contact_of;
-use regrasp_plan::check::{CheckSettings, Report, ViolationKind, check};
 use regrasp_plan::plan::{ForcePromises, SegmentKind};
 use regrasp_plan::{Plan, Segment, Waypoint};
 use regrasp_robot::ContactModel;
@@ -146,17 +146,6 @@ fn add_torques(waypoint: &mut Waypoint) {
     }
 }
 
-fn judge(scene: &Scene, plan: &Plan) -> Report {
-    check(scene, Some(&sample::query(plan)), plan, &CheckSettings::default())
-}
-
-fn kinds(scene: &Scene, plan: &Plan) -> Vec<ViolationKind> {
-    let mut kinds: Vec<_> = judge(scene, plan).violations.iter().map(|violation| violation.kind).collect();
-    kinds.sort();
-    kinds.dedup();
-    kinds
-}
-
 #[test]
 fn plans_with_forces_and_times_are_accepted() {
     let (scene, soft) = (sample::scene(), sample::soft_scene());
@@ -221,11 +210,11 @@ fn room_for_every_direction_is_room_for_each() {
         let mut heavy = scene.clone();
         heavy.object.mass *= 20.0;
         plan.promises.forces.as_mut().unwrap().mass *= 20.0;
-        let found = kinds(&heavy, &plan);
+        let found = kinds(&judge(&heavy, &plan));
         assert!(found.contains(&ViolationKind::ForceOutsideCone), "{found:?}");
         assert!(found.contains(&ViolationKind::NormalForceOutOfRange), "{found:?}");
         plan.promises.forces.as_mut().unwrap().joint_torques.fill(Some(0.4));
-        assert!(kinds(&heavy, &plan).contains(&ViolationKind::TorqueLimit));
+        assert!(kinds(&judge(&heavy, &plan)).contains(&ViolationKind::TorqueLimit));
     }
 }
 
@@ -260,7 +249,7 @@ fn every_rule_of_forces_is_broken_by_itself() {
         damage(&mut plan);
         let mut expected = expected.to_vec();
         expected.sort();
-        assert_eq!(kinds(scene, &plan), expected, "case {i}");
+        assert_eq!(kinds(&judge(scene, &plan)), expected, "case {i}");
     }
 }
 
@@ -287,7 +276,7 @@ fn every_rule_of_time_is_broken_by_itself() {
     for (i, (damage, expected)) in cases.iter().enumerate() {
         let mut plan = plan(&scene);
         damage(&mut plan);
-        assert_eq!(&kinds(&scene, &plan), expected, "case {i}");
+        assert_eq!(&kinds(&judge(&scene, &plan)), expected, "case {i}");
     }
     // Standing at every waypoint is slow, but no contradiction.
     let mut halting = plan(&scene);

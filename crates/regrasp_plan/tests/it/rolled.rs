@@ -1,13 +1,13 @@
 //! Transfers in which the tips of the sample hand roll over the ball, integrated here in tiny steps: the condition is that
 //! the touching points of link and object have one velocity, solved for the joint rates. The checker looks at poses only.
 
-use crate::sample::{self, Grasp, OBJECT_RADIUS, TIP_RADIUS};
+use crate::sample::{self, Grasp, OBJECT_RADIUS, TIP_RADIUS, judge, kinds};
 use nalgebra::{Matrix3, Translation3, UnitQuaternion};
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp::Grip;
+use regrasp_plan::check::ViolationKind;
 use regrasp_plan::check::closure::{Body, margin};
 use regrasp_plan::check::continuity::contact_of;
-use regrasp_plan::check::{CheckSettings, Report, ViolationKind, check};
 use regrasp_plan::{ContactMode, ContactState, Plan, Segment, SegmentKind};
 use regrasp_scene::Scene;
 
@@ -91,16 +91,6 @@ pub fn plan(scene: &Scene, n_steps: usize) -> Plan {
         Course { from: first.pose(1.0), turn: Vector::new(-0.05, 0.0, 0.15), shift: Vector::new(0.0, 0.002, -0.002) };
     let (rolled_again, _) = transfer(&last, &grasp, n_steps);
     sample::plan_of(scene, &from, &last.pose(1.0), vec![rolled, relocated, rolled_again])
-}
-
-fn judge(scene: &Scene, plan: &Plan) -> Report {
-    check(scene, Some(&sample::query(plan)), plan, &CheckSettings::default())
-}
-
-fn kinds(report: &Report) -> Vec<ViolationKind> {
-    let mut kinds: Vec<_> = report.violations.iter().map(|violation| violation.kind).collect();
-    kinds.dedup();
-    kinds
 }
 
 #[test]

@@ -4,6 +4,7 @@
 use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Point, Pose, Shape, Vector};
+use regrasp_plan::check::{CheckSettings, Report, ViolationKind, check};
 use regrasp_plan::plan::{FORMAT, FORMAT_VERSION, MotionLimits, PlanInput, PoseData, Promises, Statistics, WayPose};
 use regrasp_plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
 use regrasp_robot::hand::PalmShape;
@@ -13,6 +14,7 @@ use regrasp_robot::{
 };
 use regrasp_scene::scene::InputFile;
 use regrasp_scene::{GraspRequest, InHandQuery, Object, Scene};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 pub const N_FINGERS: usize = 4;
@@ -46,7 +48,7 @@ fn robot() -> Robot {
     };
     let mut robot = Robot {
         name: "sample".into(),
-        links: vec![Link { name: "palm".into(), collision: vec![palm], parent_joint: None }],
+        links: vec![Link { name: "palm".into(), collision: vec![palm], visual: Vec::new(), parent_joint: None }],
         joints: Vec::new(),
         root: LinkId(0),
     };
@@ -76,7 +78,8 @@ fn robot() -> Robot {
                 effort: Some(1.0),
             });
             let joint = JointId(robot.joints.len());
-            robot.links.push(Link { name: format!("f{f}_l{j}"), collision, parent_joint: Some(joint) });
+            let name = format!("f{f}_l{j}");
+            robot.links.push(Link { name, collision, visual: Vec::new(), parent_joint: Some(joint) });
             robot.joints.push(Joint {
                 name: format!("f{f}_j{j}"),
                 kind,
@@ -130,6 +133,7 @@ fn hand() -> Hand {
                 link: link(3),
                 shape: TipShape::Sphere { radius: TIP_RADIUS },
                 center_in_body: Point::new(0.0, 0.0, DISTAL),
+                pad: None,
                 contact: regrasp_robot::ContactModel::Point,
             };
             Finger::new(format!("f{f}"), chain, tip, shapes, vec![0.0, -0.3, 1.0])
@@ -423,4 +427,15 @@ pub fn query(plan: &Plan) -> InHandQuery {
         start_grasp: GraspRequest::Automatic,
         goal_grasp: GraspRequest::Automatic,
     }
+}
+
+/// What the checker says of `plan` as an answer to its own query.
+pub fn judge(scene: &Scene, plan: &Plan) -> Report {
+    check(scene, Some(&query(plan)), plan, &CheckSettings::default())
+}
+
+/// The kinds of violations, each once.
+pub fn kinds(report: &Report) -> Vec<ViolationKind> {
+    let kinds: BTreeSet<_> = report.violations.iter().map(|violation| violation.kind).collect();
+    kinds.into_iter().collect()
 }

@@ -4,6 +4,7 @@ use super::model::Model;
 use super::search::{Search, Stop};
 use super::tally::Tally;
 use crate::failure::{Failure, NearestMiss};
+use crate::outline::Outline;
 use rayon::prelude::*;
 use regrasp_base::Interrupt;
 use regrasp_geometry::{Pose, frame};
@@ -25,6 +26,8 @@ pub struct Left {
     pub leg: usize,
     /// The state nearest to the goal of that leg, with its distance.
     pub nearest: Option<(f64, super::state::GraspState)>,
+    /// What was reached on that leg.
+    pub reached: Option<Box<Outline>>,
     /// True when a wall-clock limit cut something that a plan was found without.
     pub cut_by_time: bool,
 }
@@ -39,6 +42,7 @@ impl Left {
             n_samples: search.n_samples,
             leg: search.leg,
             nearest: search.nearest.clone(),
+            reached: search.reached.clone(),
             cut_by_time: search.cut_by_time,
         }
     }
@@ -101,6 +105,7 @@ impl Left {
             causes,
             leg,
             nearest_miss,
+            reached: self.reached.clone(),
             statistics: Statistics {
                 cut_by_time: interrupt != Interrupt::WorkSpent,
                 ..self.statistics(n_attempts.saturating_sub(1))
@@ -114,6 +119,10 @@ impl Left {
         self.n_nodes += other.n_nodes;
         self.n_samples += other.n_samples;
         self.cut_by_time |= other.cut_by_time;
+        let n_reached = |left: &Left| left.reached.as_ref().map_or(0, |reached| reached.nodes.len());
+        if other.leg > self.leg || (other.leg == self.leg && n_reached(&other) > n_reached(self)) {
+            self.reached.clone_from(&other.reached);
+        }
         if other.leg > self.leg {
             (self.leg, self.nearest) = (other.leg, other.nearest);
         } else if let Some((distance, _)) = &other.nearest

@@ -8,6 +8,7 @@ use super::search::{Search, Stop};
 use super::shorten::{Arrival, change_grasp, change_grasp_over, whole_transfer};
 use super::state::{GraspState, Sequence};
 use super::tree::{Node, Place, Tree, land};
+use crate::outline::{Outline, OutlineEdge};
 use arrayvec::ArrayVec;
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;
@@ -43,7 +44,10 @@ pub fn grow(search: &mut Search, start: Option<GraspState>, goal_grasp: Option<&
     ];
     let mut growing = 0;
     loop {
-        search.check()?;
+        if let Err(stop) = search.check() {
+            search.reached = Some(Box::new(outline(&trees)));
+            return Err(stop);
+        }
         search.n_nodes = (trees[0].nodes.len() + trees[1].nodes.len()) as u64;
         let target = draw_target(search, &trees, growing);
         let pose = match &target {
@@ -67,6 +71,21 @@ pub fn grow(search: &mut Search, start: Option<GraspState>, goal_grasp: Option<&
             growing = 1 - growing;
         }
     }
+}
+
+/// Both trees, the nodes of the start's first.
+fn outline(trees: &[Tree; 2]) -> Outline {
+    let (mut poses, mut edges) = (Vec::new(), Vec::new());
+    for tree in trees {
+        let first = poses.len();
+        poses.extend(tree.nodes.iter().map(|node| node.state().world_from_object));
+        for (index, node) in tree.nodes.iter().enumerate() {
+            let edge =
+                |parent| OutlineEdge { nodes: [first + parent, first + index], changes_grasp: node.changes_grasp() };
+            edges.extend(node.parent().map(edge));
+        }
+    }
+    Outline::new(poses, edges)
 }
 
 fn draw_target(search: &mut Search, trees: &[Tree; 2], growing: usize) -> Target {

@@ -8,6 +8,7 @@ use super::state::GraspState;
 use super::tally::{Reason, Tally};
 use super::workspace::Workspace;
 use crate::failure::FailureKind;
+use crate::outline::Outline;
 use regrasp_base::{Budget, Interrupt, Rng};
 use regrasp_geometry::{Pose, frame};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -24,6 +25,8 @@ pub struct Search<'a> {
     pub leg: usize,
     /// The state nearest to the leg's goal pose so far, with its distance.
     pub nearest: Option<(f64, GraspState)>,
+    /// What was reached when the search was stopped.
+    pub reached: Option<Box<Outline>>,
     /// Nodes made.
     pub n_nodes: u64,
     /// Grasps and contacts sampled.
@@ -85,6 +88,7 @@ impl<'a> Search<'a> {
             tally: Tally::default(),
             leg: 0,
             nearest: None,
+            reached: None,
             n_nodes: 0,
             n_samples: 0,
             start,

@@ -94,8 +94,8 @@ impl GraspState {
 /// A feasible elementary motion (paper 000, section 3.2).
 #[derive(Debug, Clone, PartialEq)]
 pub enum Motion {
-    /// The object moves, every finger keeps its contact or rolls; fingers that are free may move. Moments after the start, the last one being the
-    /// end.
+    /// The object moves, every finger keeps its contact or rolls; fingers that are free may move. Moments after the start,
+    /// the last one being the end.
     Transfer(Vec<Moment>),
     /// One finger moves to another contact or posture. Its joints after the start, the last ones being there.
     Regrasp {

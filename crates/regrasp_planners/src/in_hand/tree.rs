@@ -9,7 +9,7 @@ use super::pool::Pool;
 use super::regrasp::{Tried, regrasp};
 use super::relocate::{Foothold, can_lift, lift_is_within_reach};
 use super::search::Search;
-use super::state::{GraspState, Moment, Sequence};
+use super::state::{GraspState, Moment, Motion, Sequence};
 use super::tally::Reason;
 use super::transfer::transfer;
 use super::unlock::{draw_bound_finger, unlock};
@@ -40,6 +40,16 @@ impl Node {
     /// The grasp.
     pub fn state(&self) -> &GraspState {
         self.way.end()
+    }
+
+    /// Index of the node that it grew from; none for a grasp at the tree's end of the query.
+    pub fn parent(&self) -> Option<usize> {
+        self.parent
+    }
+
+    /// True when a finger changes its contact on the way from the parent.
+    pub fn changes_grasp(&self) -> bool {
+        self.way.steps().iter().any(|step| matches!(step.motion(), Motion::Regrasp { .. }))
     }
 }
 

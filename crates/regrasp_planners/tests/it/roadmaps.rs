@@ -49,6 +49,21 @@ fn answers_are_accepted_and_the_graph_grows_by_them() {
 }
 
 #[test]
+fn an_outline_has_the_components_of_the_graph_and_its_transfers_between_places() {
+    let loaded = scene("sphere_90x.toml");
+    let roadmap = small_roadmap(&loaded, 1);
+    let (census, outline) = (roadmap.census(), roadmap.outline());
+    assert_eq!(outline.n_components(), census.components.len());
+    assert!(outline.nodes.len() >= census.places_covered && outline.nodes.len() <= census.nodes);
+    assert!(!outline.edges.is_empty() && outline.edges.len() <= census.transfers);
+    for edge in &outline.edges {
+        let [a, b] = edge.nodes.map(|node| &outline.nodes[node]);
+        assert!(a.component == b.component && a.world_from_object != b.world_from_object);
+    }
+    assert!(outline.edges.is_sorted_by(|a, b| a < b), "an edge twice");
+}
+
+#[test]
 fn bytes_come_back_and_do_not_depend_on_threads() {
     let loaded = scene("sphere_90x.toml");
     let bytes = small_roadmap(&loaded, 1).to_bytes();

@@ -1,7 +1,9 @@
 //! Contact forces, torques and what is promised of them, gone wrong.
 
-use super::{Breeder, Mutant, pick};
+use super::choice::{any_drive, any_segment, any_waypoint, pick, waypoints, waypoints_mut};
+use super::{Breeder, Mutant};
 use crate::check::continuity::{contact_of, moving_finger};
+use crate::check::forces::torques_of;
 use crate::check::model::Model;
 use crate::check::violation::ViolationKind::{
     ForceMissing, ForceOutsideCone, ForceUnbalanced, FrictionAboveScene, MovingFingerPresses, NormalForceOutOfRange,
@@ -71,20 +73,18 @@ impl Breeder<'_> {
             ((before - Vector::from(*gravity)).norm() > 1e-3).then_some(())
         });
         self.add("torque limit promised above the robot's", &[PromiseBroken], |plan, rng| {
-            let drives: Vec<_> = model.drives.iter().filter(|drive| !drive.follows && drive.effort.is_some()).collect();
-            let drive = drives.get(rng.below(drives.len().max(1)))?;
+            let drive = any_drive(model, rng, |drive| drive.effort.is_some())?;
             promises(plan)?.joint_torques[drive.coordinate] = Some(drive.effort? * rng.uniform(1.001, 1.1));
             Some(())
         });
         self.add("torque limit left out", &[PromiseBroken], |plan, rng| {
-            let drives: Vec<_> = model.drives.iter().filter(|drive| !drive.follows && drive.effort.is_some()).collect();
-            let drive = drives.get(rng.below(drives.len().max(1)))?;
+            let drive = any_drive(model, rng, |drive| drive.effort.is_some())?;
             promises(plan)?.joint_torques[drive.coordinate] = None;
             Some(())
         });
         self.add("torque limit below a torque", &[TorqueLimit], |plan, rng| {
             let k = rng.below(model.joint_names.len());
-            let largest = waypoints(plan).filter_map(|w| w.joint_torques.get(k)).fold(0.0, |a: f64, b| a.max(b.abs()));
+            let largest = largest_torque(plan, k);
             promises(plan)?.joint_torques[k] = Some(largest * rng.uniform(0.95, 0.999));
             (largest > 1e-3).then_some(())
         });
@@ -102,7 +102,7 @@ impl Breeder<'_> {
         });
         self.add("no torque left for the weight of some direction", &[TorqueLimit], |plan, rng| {
             let k = rng.below(model.joint_names.len());
-            let largest = waypoints(plan).filter_map(|w| w.joint_torques.get(k)).fold(0.0, |a: f64, b| a.max(b.abs()));
+            let largest = largest_torque(plan, k);
             let forces = promises(plan).filter(|forces| forces.gravity_in_world.is_none())?;
             forces.joint_torques[k] = Some(largest * rng.uniform(1.0001, 1.001));
             (largest > 0.05).then_some(())
@@ -114,7 +114,7 @@ impl Breeder<'_> {
                 // Nothing is lifted, so forces stay in balance when all are smaller.
                 promises(plan).filter(|forces| forces.gravity_in_world.is_none())?.normal_force[0] = 0.0;
                 let factor = rng.uniform(0.001, 0.01);
-                for waypoint in plan.segments.iter_mut().flat_map(|segment| &mut segment.waypoints) {
+                for waypoint in waypoints_mut(plan) {
                     for contact in &mut waypoint.contacts {
                         contact.force_in_object.iter_mut().flatten().for_each(|x| *x *= factor);
                         contact.torsion.iter_mut().for_each(|x| *x *= factor);
@@ -144,7 +144,7 @@ impl Breeder<'_> {
             Some(())
         });
         self.add("moments out of balance, forces in balance", &[ForceUnbalanced], |plan, rng| {
-            let waypoint = pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?;
+            let waypoint = any_waypoint(plan, rng)?;
             let (a, b) = two_loaded(waypoint, rng)?;
             let off = Vector::from(rng.direction()) * rng.uniform(2e-5, 1e-4);
             let arm = exert(waypoint, a, &off)? - exert(waypoint, b, &-off)?;
@@ -157,8 +157,7 @@ impl Breeder<'_> {
         });
         self.add("forces of another moment", &[ForceUnbalanced], |plan, rng| {
             let gravity = Vector::from(promises(plan)?.gravity_in_world?) * promises(plan)?.mass;
-            let mut transfers: Vec<_> = plan.segments.iter_mut().filter(|s| s.kind == SegmentKind::Transfer).collect();
-            let waypoints = &mut pick(&mut transfers, rng)?.waypoints;
+            let waypoints = &mut any_segment(plan, rng, SegmentKind::Transfer)?.waypoints;
             let (first, other) = (waypoints[0].clone(), rng.below(waypoints.len()));
             let weight = |waypoint: &Waypoint| Pose::from(&waypoint.world_from_object).rotation.inverse() * gravity;
             let differs = (weight(&first) - weight(&waypoints[other])).norm() > 1e-4;
@@ -177,7 +176,7 @@ impl Breeder<'_> {
         });
         self.add("forces promised and left out", &[ForceMissing], |plan, _| {
             promises(plan)?;
-            for waypoint in plan.segments.iter_mut().flat_map(|segment| &mut segment.waypoints) {
+            for waypoint in waypoints_mut(plan) {
                 waypoint.joint_torques.clear();
                 waypoint.contacts.iter_mut().for_each(|c| (c.force_in_object, c.torsion) = (None, None));
             }
@@ -189,15 +188,14 @@ impl Breeder<'_> {
         });
         self.add("force of a free finger", &[NotANumber], |plan, rng| {
             promises(plan)?;
-            let waypoint = pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?;
+            let waypoint = any_waypoint(plan, rng)?;
             let mut free: Vec<_> = waypoint.contacts.iter_mut().filter(|contact| !contact.holds()).collect();
             pick(&mut free, rng)?.force_in_object = Some([0.0; 3]);
             Some(())
         });
         self.add("moving finger presses when it lifts or lands", &[MovingFingerPresses], |plan, rng| {
             promises(plan)?;
-            let mut regrasps: Vec<_> = plan.segments.iter_mut().filter(|s| s.kind == SegmentKind::Regrasp).collect();
-            let segment = pick(&mut regrasps, rng)?;
+            let segment = any_segment(plan, rng, SegmentKind::Regrasp)?;
             let f = moving_finger(model, segment)?;
             let waypoint = if rng.chance(0.5) { segment.waypoints.first_mut() } else { segment.waypoints.last_mut() }?;
             // Two others take the opposite halves: forces stay in balance.
@@ -215,7 +213,7 @@ impl Breeder<'_> {
         let (model, friction) = (self.model, self.plan.promises.friction);
         self.add("two fingers squeezed beyond their cones", &[ForceOutsideCone, NormalForceOutOfRange], |plan, rng| {
             // Along the line between two contacts: everything stays in balance.
-            let waypoint = pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?;
+            let waypoint = any_waypoint(plan, rng)?;
             let (a, b) = two_loaded(waypoint, rng)?;
             let line = exert(waypoint, a, &Vector::zeros())? - exert(waypoint, b, &Vector::zeros())?;
             let step = line.normalize() * if rng.chance(0.5) { 0.05 } else { -0.05 };
@@ -249,14 +247,14 @@ impl Breeder<'_> {
             }
             promises(plan)?;
             let &mut (f, radius) = pick(&mut soft, rng)?;
-            let waypoint = pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?;
+            let waypoint = any_waypoint(plan, rng)?;
             let pressing = pressing_of(&waypoint.contacts[f])?;
             waypoint.contacts[f].torsion = Some(friction * pressing * radius * rng.uniform(1.001, 1.1));
             (pressing > 0.1).then_some(())
         });
         self.add("hard fingertip exerts torsion", &[ForceOutsideCone], |plan, rng| {
             promises(plan)?;
-            let waypoint = pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?;
+            let waypoint = any_waypoint(plan, rng)?;
             let is_hard = |f: &usize| model.fingers[*f].contact == ContactModel::Point;
             let mut hard: Vec<usize> = (0..model.fingers.len()).filter(is_hard).collect();
             let contact = &mut waypoint.contacts[*pick(&mut hard, rng)?];
@@ -268,18 +266,17 @@ impl Breeder<'_> {
     fn break_torques(&mut self) {
         let model = self.model;
         self.add("torque wrong by a little", &[TorqueWrong], |plan, rng| {
-            let waypoint = pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?;
+            let waypoint = any_waypoint(plan, rng)?;
             *pick(&mut waypoint.joint_torques, rng)? += rng.uniform(1e-5, 1e-4);
             Some(())
         });
         self.add("torques with the other sign", &[TorqueWrong], |plan, rng| {
-            let torques = &mut pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?.joint_torques;
+            let torques = &mut any_waypoint(plan, rng)?.joint_torques;
             torques.iter_mut().for_each(|torque| *torque = -*torque);
             torques.iter().any(|torque| torque.abs() > 1e-3).then_some(())
         });
         self.add("torques of the waypoint before", &[TorqueWrong], |plan, rng| {
-            let mut transfers: Vec<_> = plan.segments.iter_mut().filter(|s| s.kind == SegmentKind::Transfer).collect();
-            let waypoints = &mut pick(&mut transfers, rng)?.waypoints;
+            let waypoints = &mut any_segment(plan, rng, SegmentKind::Transfer)?.waypoints;
             let w = 1 + rng.below(waypoints.len() - 1);
             let before = waypoints[w - 1].joint_torques.clone();
             let differs = before.iter().zip(&waypoints[w].joint_torques).any(|(a, b)| (a - b).abs() > 1e-5);
@@ -288,12 +285,12 @@ impl Breeder<'_> {
         });
         self.add("torques missing", &[ForceMissing], |plan, rng| {
             promises(plan)?;
-            pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?.joint_torques.clear();
+            any_waypoint(plan, rng)?.joint_torques.clear();
             Some(())
         });
         self.add("all forces scaled beyond a torque limit", &[TorqueLimit, ForceUnbalanced], |plan, rng| {
             let limits = promises(plan)?.joint_torques.clone();
-            let waypoint = pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?;
+            let waypoint = any_waypoint(plan, rng)?;
             let share = |(torque, limit): (&f64, &Option<f64>)| limit.map_or(0.0, |limit| torque.abs() / limit);
             let most = waypoint.joint_torques.iter().zip(&limits).map(share).fold(0.0, f64::max);
             let factor = 1.01 / most;
@@ -310,8 +307,11 @@ fn promises(plan: &mut Plan) -> Option<&mut ForcePromises> {
     plan.promises.forces.as_mut()
 }
 
-fn waypoints(plan: &Plan) -> impl Iterator<Item = &Waypoint> {
-    plan.segments.iter().flat_map(|segment| &segment.waypoints)
+/// The largest torque, either way, of joint `k` in the plan.
+fn largest_torque(plan: &Plan, k: usize) -> f64 {
+    waypoints(plan)
+        .filter_map(|waypoint| waypoint.joint_torques.get(k))
+        .fold(0.0, |most, torque| torque.abs().max(most))
 }
 
 fn pressing_of(contact: &ContactState) -> Option<f64> {
@@ -333,7 +333,7 @@ fn is_loaded(contact: &ContactState) -> bool {
 
 /// Some contact with a force above a thousandth of a newton.
 fn pick_loaded<'a>(plan: &'a mut Plan, rng: &mut Rng) -> Option<&'a mut ContactState> {
-    let waypoint = pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?;
+    let waypoint = any_waypoint(plan, rng)?;
     let mut loaded: Vec<usize> = (0..waypoint.contacts.len()).filter(|&f| is_loaded(&waypoint.contacts[f])).collect();
     let f = *pick(&mut loaded, rng)?;
     Some(&mut waypoint.contacts[f])
@@ -366,16 +366,14 @@ fn in_cone(waypoint: &Waypoint, f: usize, friction: f64) -> bool {
 
 /// Gives the joints the torques that make the contact forces.
 fn make_torques(model: &Model, waypoint: &mut Waypoint) {
-    let world_from_object = Pose::from(&waypoint.world_from_object);
-    waypoint.joint_torques.fill(0.0);
+    let mut torques = vec![0.0; model.joint_names.len()];
     for (finger, state) in model.fingers.iter().zip(&waypoint.contacts) {
         let (Some(contact), Some(force)) = (contact_of(state), state.force_in_object) else { continue };
-        let couple = world_from_object * contact.normal_in_object.into_inner() * state.torsion.unwrap_or(0.0);
-        let force = world_from_object * Vector::from(force);
-        let touching = world_from_object * contact.normal_in_object.into_inner() * finger.radius;
-        let point = finger.center_in_world(&waypoint.joints) - touching;
-        for axis in finger.path.axes(&waypoint.joints) {
-            waypoint.joint_torques[axis.coordinate] += axis.work(&force, &point, &couple);
+        let normal = contact.normal_in_object.into_inner();
+        let couple = normal * state.torsion.unwrap_or(0.0);
+        for work in torques_of(finger, waypoint, &normal, &Vector::from(force), &couple) {
+            torques[work.coordinate] += work.torque;
         }
     }
+    waypoint.joint_torques = torques;
 }

@@ -1,6 +1,7 @@
 //! Fingers that are free, and fingers that are said to be.
 
-use super::{Breeder, move_tip, pick, pick_waypoint};
+use super::choice::{pick, pick_waypoint, places, waypoints_mut};
+use super::{Breeder, move_tip};
 use crate::check::closure::{Body, margin};
 use crate::check::continuity::{contact_of, is_free_throughout};
 use crate::check::model::Model;
@@ -16,12 +17,7 @@ use regrasp_grasp::Grip;
 impl Breeder<'_> {
     pub(super) fn break_free_fingers(&mut self) {
         let (model, scene) = (self.model, self.scene);
-        let object = &scene.object;
-        let body = Body {
-            center_of_mass: object.center_of_mass,
-            torque_scale: object.radius,
-            friction: self.plan.promises.friction,
-        };
+        let body = Body::of(&scene.object, self.plan);
         let required = self.plan.promises.required_margin;
         let holds_without = |waypoint: &Waypoint, left_out: usize| {
             let grips: Vec<Grip> = (0..model.fingers.len())
@@ -41,13 +37,10 @@ impl Breeder<'_> {
         });
         self.add("finger declared free that touches the object", &[Collision], |plan, rng| {
             let touches = |segment: &Segment, f: usize| {
-                segment.kind == SegmentKind::Transfer && segment.waypoints[0].contacts[f].mode != ContactMode::Free
+                let first = &segment.waypoints[0];
+                segment.kind == SegmentKind::Transfer && first.contacts[f].holds() && holds_without(first, f)
             };
-            let mut places: Vec<(usize, usize)> = (0..plan.segments.len())
-                .flat_map(|s| (0..model.fingers.len()).map(move |f| (s, f)))
-                .filter(|&(s, f)| touches(&plan.segments[s], f) && holds_without(&plan.segments[s].waypoints[0], f))
-                .collect();
-            let (_, f) = *pick(&mut places, rng)?;
+            let (_, f) = *pick(&mut places(plan, model, touches), rng)?;
             declare_free(plan, f)
         });
         self.add("free finger touches the object", &[Collision], |plan, rng| {
@@ -92,21 +85,14 @@ impl Breeder<'_> {
 
 /// Says at every waypoint that finger `f` is free.
 fn declare_free(plan: &mut Plan, f: usize) -> Option<()> {
-    plan.segments
-        .iter_mut()
-        .flat_map(|segment| &mut segment.waypoints)
-        .for_each(|w| w.contacts[f] = ContactState::FREE);
+    waypoints_mut(plan).for_each(|waypoint| waypoint.contacts[f] = ContactState::FREE);
     Some(())
 }
 
 /// A transfer, and a finger that is free in it.
 fn pick_free(plan: &Plan, model: &Model, rng: &mut Rng) -> Option<(usize, usize)> {
-    let mut places: Vec<(usize, usize)> = (0..plan.segments.len())
-        .filter(|&s| plan.segments[s].kind == SegmentKind::Transfer)
-        .flat_map(|s| (0..model.fingers.len()).map(move |f| (s, f)))
-        .filter(|&(s, f)| is_free_throughout(&plan.segments[s], f))
-        .collect();
-    pick(&mut places, rng).copied()
+    let is_free = |segment: &Segment, f| segment.kind == SegmentKind::Transfer && is_free_throughout(segment, f);
+    pick(&mut places(plan, model, is_free), rng).copied()
 }
 
 /// The point of the object's surface nearest to the tip of finger `f` and the outward normal there, in the object frame.

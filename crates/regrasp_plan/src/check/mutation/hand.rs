@@ -1,15 +1,19 @@
 //! Good plans in hands of other contacts and couplings than they were made for, and coupled joints gone wrong.
 
-use super::{Breeder, pick};
-use crate::check::violation::ViolationKind::{ClosureLost, ContactOffTip, JointLimit, WrongScene};
-use crate::plan::{ContactMode, SegmentKind, Waypoint};
+use super::Breeder;
+use super::choice::{any_waypoint, waypoints, waypoints_mut};
+use crate::check::continuity::contact_of;
+use crate::check::violation::ViolationKind::{ClosureLost, ContactOffPad, ContactOffTip, JointLimit, WrongScene};
+use crate::plan::{SegmentKind, Waypoint};
+use regrasp_geometry::{Pose, UnitVector, Vector};
 use regrasp_robot::ContactModel;
+use regrasp_robot::tip::Pad;
 use std::sync::Arc;
 
 impl Breeder<'_> {
     pub(super) fn break_contact_models(&mut self) {
         // Sets of fingers that hold somewhere, and the torsion that they count on.
-        let holding: Vec<Vec<usize>> = self.plan.segments.iter().flat_map(|s| &s.waypoints).map(holders).collect();
+        let holding: Vec<Vec<usize>> = waypoints(self.plan).map(holders).collect();
         let fingers = &self.scene.hand.fingers;
         let is_soft = |f: usize| matches!(fingers[f].tip.contact, ContactModel::SoftFinger { .. });
         let pair = holding.iter().find(|set| set.len() == 2 && set.iter().any(|&f| is_soft(f))).cloned();
@@ -31,6 +35,22 @@ impl Breeder<'_> {
             if most >= required {
                 return None;
             }
+            Some(())
+        });
+        let model = self.model;
+        let touching = self.plan.segments.iter().flat_map(|segment| &segment.waypoints).find_map(|waypoint| {
+            let f = *holders(waypoint).first()?;
+            let contact = contact_of(&waypoint.contacts[f])?;
+            let normal = Pose::from(&waypoint.world_from_object) * contact.normal_in_object.into_inner();
+            let link = model.fingers[f].path.world_from_link(&waypoint.joints);
+            Some((f, -link.fixed_view::<3, 3>(0, 0).tr_mul(&normal)))
+        });
+        self.add_hand("pad that ends beside the contact", &[ContactOffPad], |hand, rng| {
+            let (f, outward) = touching?;
+            let angle = rng.uniform(0.2f64, 1.0);
+            let aside = outward.cross(&Vector::from(rng.direction())).try_normalize(1e-3)?;
+            let axis = nalgebra::Rotation3::new(aside * (angle + 0.01)) * outward;
+            hand.fingers[f].tip.pad = Some(Pad { axis_in_body: UnitVector::new_normalize(axis), cosine: angle.cos() });
             Some(())
         });
         self.add_hand("fingertips without friction", &[ClosureLost], |hand, _| {
@@ -66,14 +86,13 @@ impl Breeder<'_> {
             let rows: Vec<_> = model.limits.iter().filter(|row| is_follower(&row.name)).collect();
             let row = rows.get(rng.below(rows.len().max(1)))?;
             let position = row.upper + rng.uniform(0.5f64, 1.0).to_radians();
-            pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?.joints[row.coordinate] =
-                (position - row.offset) / row.multiplier;
+            any_waypoint(plan, rng)?.joints[row.coordinate] = (position - row.offset) / row.multiplier;
             Some(())
         });
         self.add("coupled joint named as if it were free", &[WrongScene], |plan, rng| {
             let joint = *coupled.get(rng.below(coupled.len().max(1)))?;
             plan.joint_names.push(robot.joints[joint].name.clone());
-            plan.segments.iter_mut().flat_map(|segment| &mut segment.waypoints).for_each(|w| w.joints.push(0.1));
+            waypoints_mut(plan).for_each(|w| w.joints.push(0.1));
             Some(())
         });
     }
@@ -81,5 +100,5 @@ impl Breeder<'_> {
 
 /// Fingers that hold at a waypoint.
 fn holders(waypoint: &Waypoint) -> Vec<usize> {
-    (0..waypoint.contacts.len()).filter(|&f| waypoint.contacts[f].mode != ContactMode::Free).collect()
+    (0..waypoint.contacts.len()).filter(|&f| waypoint.contacts[f].holds()).collect()
 }

@@ -1,6 +1,7 @@
 //! Times and velocities gone wrong.
 
-use super::{Breeder, pick, pick_waypoint};
+use super::Breeder;
+use super::choice::{any_drive, any_waypoint, pick, pick_waypoint, waypoints_mut};
 use crate::check::model::Model;
 use crate::check::violation::ViolationKind::{
     JointAcceleration, JointTooFast, NotANumber, PromiseBroken, TimeOrder, TooFast, VelocityInconsistent, WrongScene,
@@ -53,7 +54,7 @@ impl Breeder<'_> {
             changes.then_some(())
         });
         self.add("time is not a number", &[NotANumber], |plan, rng| {
-            pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?.time = f64::NAN;
+            any_waypoint(plan, rng)?.time = f64::NAN;
             Some(())
         });
     }
@@ -76,9 +77,7 @@ impl Breeder<'_> {
             (fastest > 1e-6).then_some(())
         });
         self.add("joint velocity promised above the robot's", &[PromiseBroken], |plan, rng| {
-            let drives: Vec<_> =
-                model.drives.iter().filter(|drive| !drive.follows && drive.velocity.is_some()).collect();
-            let drive = drives.get(rng.below(drives.len().max(1)))?;
+            let drive = any_drive(model, rng, |drive| drive.velocity.is_some())?;
             plan.promises.motion.joint_velocities[drive.coordinate] = drive.velocity? * rng.uniform(1.001, 1.1);
             Some(())
         });
@@ -126,18 +125,14 @@ impl Breeder<'_> {
             change_velocity(plan, rng, |before, after, rng| (before * after <= 0.0).then(|| rng.uniform(1e-5, 1e-3)))
         });
         self.add("velocity is not a number", &[NotANumber], |plan, rng| {
-            let waypoint = pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?;
+            let waypoint = any_waypoint(plan, rng)?;
             *pick(&mut waypoint.joint_velocities, rng)? = f64::INFINITY;
             Some(())
         });
         self.add("velocities of one joint too few", &[WrongScene], |plan, rng| {
-            pick(&mut pick(&mut plan.segments, rng)?.waypoints, rng)?.joint_velocities.pop().map(|_| ())
+            any_waypoint(plan, rng)?.joint_velocities.pop().map(|_| ())
         });
     }
-}
-
-fn waypoints_mut(plan: &mut Plan) -> impl Iterator<Item = &mut Waypoint> {
-    plan.segments.iter_mut().flat_map(|segment| &mut segment.waypoints)
 }
 
 fn steps(plan: &Plan) -> impl Iterator<Item = (&Waypoint, &Waypoint)> {

@@ -1,6 +1,7 @@
 //! Way poses that are not passed, or not as the plan says.
 
-use super::{Breeder, pick, pick_waypoint, shift, swap_two_that};
+use super::choice::{pick, pick_waypoint, swap_two_that};
+use super::{Breeder, shift};
 use crate::check::continuity::pose_difference;
 use crate::check::violation::ViolationKind::WayPoseMissed;
 use crate::plan::SegmentKind;

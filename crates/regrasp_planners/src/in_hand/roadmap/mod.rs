@@ -37,12 +37,14 @@ pub use query::{Answer, QueryMemory, RoadmapPlanner};
 pub use region::Region;
 
 use super::settings::InHandSettings;
+use crate::outline::{Outline, OutlineEdge};
 use graph::Graph;
 use index::{Costs, Index};
 use landmarks::Landmarks;
 use regrasp_base::{Diagnostic, InputError, Place};
 use regrasp_robot::ContactModel;
 use regrasp_scene::Scene;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// What a roadmap says about itself.
@@ -134,6 +136,29 @@ impl GraspRoadmap {
             components: sizes.iter().map(|&(_, size)| size).collect(),
             places_covered: (0..self.graph.places.len()).filter(|&place| is_covered(place)).count(),
         }
+    }
+
+    /// What it looks like: one node for all grasps of a component at a place, which relocations join, and transfers between
+    /// places.
+    pub fn outline(&self) -> Outline {
+        let components = index::components(&self.graph);
+        let mut nodes: BTreeMap<(u32, usize), usize> = BTreeMap::new();
+        let mut poses = Vec::new();
+        let node_of: Vec<usize> = (0..self.graph.nodes.len())
+            .map(|node| {
+                let key = (self.graph.nodes[node].place, components.representative(node));
+                *nodes.entry(key).or_insert_with(|| {
+                    poses.push(*self.graph.pose(node));
+                    poses.len() - 1
+                })
+            })
+            .collect();
+        let ends = self.graph.edges.iter().map(|edge| [edge.from, edge.to].map(|node| node_of[node as usize]));
+        let edges: BTreeSet<OutlineEdge> = ends
+            .filter(|[a, b]| a != b)
+            .map(|[a, b]| OutlineEdge { nodes: [a.min(b), a.max(b)], changes_grasp: false })
+            .collect();
+        Outline::new(poses, edges.into_iter().collect())
     }
 
     /// Refuses a scene that the roadmap was not built for; `path` is where the roadmap came from.

@@ -295,6 +295,7 @@ impl<'a> RoadmapPlanner<'a> {
             causes: search.whole_tally().causes(&self.model),
             leg: None,
             nearest_miss: None,
+            reached: None,
             statistics: Statistics { work: search.workspace.work, ..Statistics::default() },
         }
     }

@@ -11,7 +11,7 @@ use roxmltree::Node;
 use std::sync::Arc;
 
 /// Tags of geometry that are read.
-const SHAPES: [&str; 5] = ["box", "cylinder", "sphere", "capsule", "mesh"];
+pub(super) const SHAPES: [&str; 5] = ["box", "cylinder", "sphere", "capsule", "mesh"];
 /// Greater lengths are nonsense in any unit, in metres; they would turn sums into infinity.
 const MAX_LENGTH: f64 = 1e6;
 
@@ -70,6 +70,14 @@ fn read_shape(reader: &mut Reader, geometry: Node, element: Named, meshes: &mut 
         return None;
     };
     match node.tag_name().name() {
+        "mesh" => read_mesh(reader, node, element, meshes),
+        _ => read_primitive(reader, node, element),
+    }
+}
+
+/// The shape of `node`, a box, ball, capsule or cylinder.
+pub(super) fn read_primitive(reader: &mut Reader, node: Node, element: Named) -> Option<Shape> {
+    match node.tag_name().name() {
         "box" => {
             let size = reader.numbers::<3>(node, "size", None, element)?;
             for length in size {
@@ -78,7 +86,6 @@ fn read_shape(reader: &mut Reader, geometry: Node, element: Named, meshes: &mut 
             Some(Shape::Cuboid { half_extents: Vector::from(size) / 2.0 })
         }
         "sphere" => Some(Shape::Sphere { radius: positive(reader, node, "radius", element)? }),
-        "mesh" => read_mesh(reader, node, element, meshes),
         round => {
             let radius = positive(reader, node, "radius", element);
             let half_length = positive(reader, node, "length", element).map(|length| length / 2.0);

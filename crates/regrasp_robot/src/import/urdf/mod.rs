@@ -1,12 +1,14 @@
 //! URDF. Form: <http://wiki.ros.org/urdf/XML>, with the `<capsule>` of URDF 1.2 (`length` is that of the cylinder).
 //!
-//! Read: links with collision geometry, joints, limits, couplings. Not read: inertia, visuals, transmissions, sensors.
+//! Read: links with collision geometry, joints, limits, couplings; of visuals which they are, and no file that they name.
+//! Not read: inertia, transmissions, sensors.
 //! Every problem of a file is reported in one run.
 
 mod geometry;
 mod joint;
 mod mimic;
 mod tree;
+mod visual;
 
 use super::hand_file::{LoadOptions, LoadedInput};
 use super::xml::{Reader, children, parse};
@@ -68,7 +70,8 @@ pub(crate) fn parse_robot(
         }
         reader.note_misspelt_children(node, &["inertial", "visual", "collision"], ("link", link_name));
         let collision = geometry::read_collisions(&mut reader, node, link_name, meshes);
-        links.push(Link { name: link_name.to_owned(), collision, parent_joint: None });
+        let visual = visual::read_visuals(path, node, link_name);
+        links.push(Link { name: link_name.to_owned(), collision, visual, parent_joint: None });
         link_nodes.push(node);
     }
     if links.is_empty() {

@@ -7,28 +7,29 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from .._arguments import StrPath
 from .reference import Plan, PlanError
 
 
 def load(
-    path: Path,
+    path: StrPath,
     *,
-    scene: Path | None = None,
-    packages: Mapping[str, Path] | None = None,
-    mjcf: Path | None = None,
+    scene: StrPath | None = None,
+    packages: Mapping[str, StrPath] | None = None,
+    mjcf: StrPath | None = None,
 ) -> tuple[Plan, str]:
     """The plan in ``path`` and its MuJoCo model: from ``mjcf``, else made from the scene that the plan names.
 
     Raises ``PlanError`` or ``OSError``.
     """
     try:
-        plan: Any = json.loads(path.read_text(encoding="utf-8"))
+        plan: Any = json.loads(Path(path).read_text(encoding="utf-8"))
     except ValueError as error:
         raise PlanError(f"{path}: not JSON ({error})") from None
     if not _is_plan(plan):
         raise PlanError(f"{path}: not a plan of format version 2")
     if mjcf is not None:
-        return plan, mjcf.read_text(encoding="utf-8")
+        return plan, Path(mjcf).read_text(encoding="utf-8")
     import regrasp
 
     try:

@@ -1,0 +1,72 @@
+//! `regrasp view`: a page of a plan, and pictures.
+//!
+//! A plan that the checker rejects gets its page too: it says so, and shows where.
+
+use crate::args::{self, Common};
+use crate::commands::check::scene_of;
+use crate::commands::pictures;
+use crate::commands::plan::{refuse_input, refuse_unwritable};
+use crate::interrupt;
+use crate::judge;
+use crate::load;
+use crate::pages;
+use crate::stop::Stop;
+use crate::talk::Talk;
+use regrasp::base::files;
+use regrasp::plan::format;
+use regrasp::planners::in_hand::roadmap::GraspRoadmap;
+use regrasp::told;
+use regrasp::viewer::story::{Outcome, Telling};
+use serde_json::json;
+use std::path::Path;
+
+/// Reads, judges, writes.
+pub fn run(arguments: &args::View, common: &Common, talk: &Talk) -> Result<(), Stop> {
+    // The flag is not asked here: the process ends by itself shortly after Ctrl-C.
+    interrupt::flag()?;
+    let wanted: Vec<&Path> = [&arguments.output, &arguments.story].into_iter().flatten().map(|p| p.as_path()).collect();
+    let own = [Some(arguments.plan.as_path()), arguments.scene.as_deref(), arguments.with_roadmap.as_deref()];
+    for path in &wanted {
+        refuse_unwritable(path)?;
+        refuse_input(path, own.into_iter().flatten())?;
+    }
+    if arguments.output.is_some() && arguments.output == arguments.story {
+        return Err(Stop::argument("A505", "--story", "is where the page is written to", "another file"));
+    }
+    pictures::refuse(arguments, own.into_iter().flatten())?;
+    let plan = format::from_json(&arguments.plan, &files::read(&arguments.plan)?)?;
+    let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref())?;
+    let loaded = load::scene(&scene_path, common, talk)?;
+    for path in wanted.into_iter().chain(arguments.png.as_deref()) {
+        refuse_input(path, loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
+    }
+    let roadmap = match &arguments.with_roadmap {
+        Some(path) => {
+            let roadmap = GraspRoadmap::read(path)?;
+            roadmap.refuse_other_scene(path, &loaded.scene)?;
+            Some(told::roadmap_story(&roadmap, &plan))
+        }
+        None => None,
+    };
+    let report = judge::judge(&loaded, &plan, talk)?;
+    let packages = load::options(common).resolve;
+    let story = pages::story(&Telling {
+        scene: &loaded.scene,
+        query: None,
+        outcome: Outcome::Planned { plan: &plan, report: &report },
+        title: arguments.title.as_deref(),
+        facts: Vec::new(),
+        roadmap,
+        packages: &packages,
+    })?;
+    pictures::write(arguments, &story, talk)?;
+    if let Some(path) = &arguments.story {
+        files::write_atomic(path, story.to_json().as_bytes()).map_err(|error| Stop::unwritable(path, &error))?;
+        talk.event("written", json!({ "story": path }));
+        talk.say(format!("wrote  {}", path.display()));
+    }
+    if let Some(path) = &arguments.output {
+        pages::write(path, &story, talk)?;
+    }
+    Ok(())
+}

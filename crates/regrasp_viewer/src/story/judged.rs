@@ -1,0 +1,33 @@
+//! Margin and clearance along a plan, from the checker's own functions.
+
+use super::Judged;
+use regrasp_plan::Plan;
+use regrasp_plan::check::{Along, Report, along};
+use regrasp_scene::Scene;
+
+/// Violations that are told one by one.
+const TOLD: usize = 20;
+
+/// The checker's report and its series. Nothing is measured along a plan that is not of this scene.
+pub(super) fn judged(scene: &Scene, plan: &Plan, report: &Report) -> Judged {
+    let n_waypoints = plan.segments.iter().map(|segment| segment.waypoints.len()).sum();
+    let nothing = |_| Along { margin: Vec::new(), clearance: vec![None; n_waypoints], pairs: Vec::new() };
+    let found = along(scene, plan).unwrap_or_else(nothing);
+    let mut violations: Vec<String> = report.violations.iter().take(TOLD).map(ToString::to_string).collect();
+    if report.n_violations > violations.len() {
+        violations.push(format!("and {} more", report.n_violations - violations.len()));
+    }
+    let margin = match found.margin.is_empty() {
+        true => vec![None; n_waypoints],
+        false => found.margin.into_iter().map(Some).collect(),
+    };
+    Judged {
+        accepted: report.accepted(),
+        violations,
+        margin,
+        required_margin: plan.promises.required_margin,
+        clearance: found.clearance.iter().map(|nearest| nearest.map(|nearest| nearest.distance)).collect(),
+        pair: found.clearance.iter().map(|nearest| nearest.map_or(0, |nearest| nearest.pair)).collect(),
+        pairs: found.pairs.into_iter().map(|[a, b]| (a, b)).collect(),
+    }
+}

@@ -1,0 +1,81 @@
+//! A story from scene, query and plan.
+
+use super::facts::plan_facts;
+use super::judged::judged;
+use super::scene::scene_story;
+use super::{FORMAT, FailureStory, PoseData, RoadmapStory, Story, VERSION};
+use regrasp_plan::Plan;
+use regrasp_plan::check::Report;
+use regrasp_robot::ResolveOptions;
+use regrasp_scene::{InHandQuery, Scene};
+
+/// What came of a query.
+#[derive(Debug, Clone)]
+pub enum Outcome<'a> {
+    /// A plan, and what the checker said of it in the same scene.
+    Planned {
+        /// The plan.
+        plan: &'a Plan,
+        /// What the checker said.
+        report: &'a Report,
+    },
+    /// No plan.
+    Failed(FailureStory),
+}
+
+/// What a story is made from.
+#[derive(Debug, Clone)]
+pub struct Telling<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// What was asked; else what the plan says was.
+    pub query: Option<&'a InHandQuery>,
+    /// What came of it.
+    pub outcome: Outcome<'a>,
+    /// Title; the scene's name where there is none.
+    pub title: Option<&'a str>,
+    /// Lines of facts that the caller knows, shown first.
+    pub facts: Vec<(String, String)>,
+    /// A manipulation graph.
+    pub roadmap: Option<RoadmapStory>,
+    /// Where visual meshes are looked for.
+    pub packages: &'a ResolveOptions,
+}
+
+/// The story. Err with a message when the robot contradicts itself.
+pub fn tell(telling: &Telling) -> Result<Story, String> {
+    let (mut scene, notes) = scene_story(telling.scene, telling.packages)?;
+    let mut facts = telling.facts.clone();
+    let mut asked: Vec<PoseData> =
+        telling.query.map_or_else(Vec::new, |query| query.poses().iter().map(PoseData::from).collect());
+    let (plan, measured, failure) = match &telling.outcome {
+        Outcome::Failed(failure) => (None, None, Some(failure.clone())),
+        Outcome::Planned { plan, report } => {
+            let measured = judged(telling.scene, plan, report);
+            facts.extend(plan_facts(plan, report, &measured));
+            if asked.is_empty() {
+                let way = plan.way_poses.iter().map(|way| way.world_from_object);
+                asked = std::iter::once(plan.start).chain(way).chain([plan.goal]).collect();
+            }
+            if let Some(forces) = &plan.promises.forces {
+                scene.gravity_in_world = forces.gravity_in_world;
+            }
+            (Some((*plan).clone()), Some(measured), None)
+        }
+    };
+    facts.extend(notes);
+    let inputs = telling.scene.inputs.iter();
+    facts.extend(inputs.map(|input| (format!("{} {}", input.role, input.name), format!("sha256 {}", input.sha256))));
+    Ok(Story {
+        format: FORMAT.into(),
+        version: VERSION,
+        title: telling.title.unwrap_or(&telling.scene.name).to_owned(),
+        facts,
+        scene,
+        asked,
+        plan,
+        judged: measured,
+        failure,
+        roadmap: telling.roadmap.clone(),
+    })
+}

@@ -1,0 +1,61 @@
+//! Scenes, plans and their stories.
+
+use crate::places::{repository, shared_models};
+use regrasp_base::Budget;
+use regrasp_plan::Plan;
+use regrasp_plan::check::{CheckSettings, Report, check};
+use regrasp_planners::{InHandSettings, plan_in_hand};
+use regrasp_robot::import::LoadOptions;
+use regrasp_scene::{InHandQuery, LoadedScene, load_scene};
+use regrasp_viewer::story::{Outcome, Story, Telling, tell};
+
+/// A scene with a plan that the checker accepts.
+pub struct Sample {
+    pub options: LoadOptions,
+    pub loaded: LoadedScene,
+    pub query: InHandQuery,
+    pub plan: Plan,
+    pub report: Report,
+}
+
+/// How models are found; none where the shared ones are absent.
+pub fn options_with_models() -> Option<LoadOptions> {
+    let mut options = LoadOptions::default();
+    options.resolve.packages.push(("models".into(), shared_models()?));
+    Some(options)
+}
+
+impl Sample {
+    pub fn new(scene: &str, options: LoadOptions) -> Self {
+        let loaded = load_scene(&repository().join(scene), &options).unwrap_or_else(|error| panic!("{error}"));
+        let query = loaded.task.query(0);
+        let budget = Budget::work(5_000_000);
+        let plan = plan_in_hand(&loaded.scene, &query, &InHandSettings::default(), 0, &budget, &|_| {})
+            .unwrap_or_else(|failure| panic!("{failure}"));
+        let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+        assert!(report.accepted(), "{:?}", report.violations);
+        Sample { options, loaded, query, plan, report }
+    }
+
+    /// The sphere in the wide hand.
+    pub fn sphere() -> Self {
+        Sample::new("scenes/sphere_90x.toml", LoadOptions::default())
+    }
+
+    pub fn story(&self) -> Story {
+        self.story_of(&self.plan, &self.report)
+    }
+
+    pub fn story_of(&self, plan: &Plan, report: &Report) -> Story {
+        let telling = Telling {
+            scene: &self.loaded.scene,
+            query: Some(&self.query),
+            outcome: Outcome::Planned { plan, report },
+            title: None,
+            facts: Vec::new(),
+            roadmap: None,
+            packages: &self.options.resolve,
+        };
+        tell(&telling).expect("a story")
+    }
+}
