@@ -74,6 +74,7 @@ export class Ball {
     for (const [component, rank] of groups.slice(0, 4)) item(`component ${rank + 1}: ${sizes.get(component)} nodes`, COMPONENTS[rank] ?? "#9aa2a9", "");
     if (groups.length > 4) item(`${groups.length - 4} further components`, "#9aa2a9", "");
     const alone = this.rank.size - groups.length;
+    if (this.story.roadmap?.solution.length) item("node of the plan", null, "ring");
     if (alone > 0) item(`${alone} isolated node${alone === 1 ? "" : "s"}`, null, "hollow");
     return el("div", {}, key, el("p", { class: "note" },
       "Distance from the centre is the angle turned since the start, direction its axis; the rim is 180\u00b0, where opposite points are the same."));
@@ -196,6 +197,8 @@ export class Ball {
     if (!roadmap) return;
     context.strokeStyle = this.theme.colours.faint;
     context.lineWidth = 0.75;
+    // Many motions make a veil, not a wall.
+    context.globalAlpha = Math.min(1, Math.max(0.12, 300 / roadmap.edges.length));
     for (const edge of roadmap.edges) {
       const [a, b] = edge.nodes.map((i) => this.nodes[i]);
       if (!a || !b || norm(sub(a.point, b.point)) > Math.PI) continue;
@@ -208,6 +211,7 @@ export class Ball {
       context.stroke();
     }
     context.setLineDash([]);
+    const solution = new Set(roadmap.solution.map((i) => this.nodes[i]));
     const order = this.nodes.map((node) => ({ node, at: place(node.point) })).sort((a, b) => a.at[2] - b.at[2]);
     for (const { node, at } of order) {
       context.globalAlpha = at[2] < 0 ? 0.55 : 1;
@@ -221,6 +225,12 @@ export class Ball {
         context.fillStyle = node.colour;
         context.fill();
       }
+      if (!solution.has(node)) continue;
+      context.strokeStyle = this.theme.colours.ink;
+      context.lineWidth = 1.75;
+      context.beginPath();
+      context.arc(at[0], at[1], 5, 0, 2 * Math.PI);
+      context.stroke();
     }
     context.globalAlpha = 1;
   }
