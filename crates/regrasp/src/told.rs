@@ -72,8 +72,8 @@ pub fn roadmap_story(roadmap: &GraspRoadmap, plan: &Plan) -> RoadmapStory {
     story
 }
 
-/// What a search had reached when it failed, the start's component being 0; none where the planner keeps no graph. `goal` is
-/// the pose asked for.
+/// What a search had reached when it failed; none where the planner keeps no graph. `goal` is the pose asked for.
+/// Component 0 is the start's.
 pub fn reached_story(failure: &Failure, goal: &Pose) -> Option<RoadmapStory> {
     let mut story = outline_story(failure.reached.as_ref()?, goal);
     // The nodes of the start come first, if there are any.
