@@ -38,7 +38,7 @@ PLAIN := --settings docs/benchmarks/plain.json
 ALLEGRO_BENCH = $(PACKAGES) --time-limit 20 --threads 1 --seeds $(ALLEGRO_SEEDS)
 SOFT_BENCH = $(PACKAGES) --time-limit 6 --threads 1 --seeds $(ALLEGRO_SEEDS)
 
-.PHONY: all demo pictures test replay test-rust test-python python bench growth benchmark-page campaign fuzz docs release $(ROADMAPS)
+.PHONY: all demo pictures test replay test-rust test-python test-page page python bench growth benchmark-page campaign fuzz docs release $(ROADMAPS)
 
 all: release
 
@@ -53,7 +53,7 @@ demo: release
 pictures: demo
 	mkdir -p docs/pictures && cp $(OUT)/demo/gait.svg docs/pictures/demo-gait.svg
 
-test: test-rust test-python
+test: test-rust test-python test-page
 
 test-rust:
 	cargo test --locked --workspace
@@ -76,6 +76,20 @@ python:
 test-python: release python
 	if [ ! -d $(VENV) ]; then echo "SKIPPED: tests of the Python package"; \
 	else REGRASP_CLI=$(CURDIR)/$(REGRASP) $(VENV)/bin/python -m pytest -q; fi
+
+# The page of `regrasp view`: its script and style are committed, so that cargo needs no npm.
+PAGE := crates/regrasp_viewer/page
+page: $(PAGE)/node_modules
+	cd $(PAGE) && npm run --silent build
+
+$(PAGE)/node_modules: $(PAGE)/package-lock.json
+	cd $(PAGE) && npm ci --silent && touch node_modules
+
+# Says SKIPPED where there is no npm, where it cannot install, or no Chromium (CHROMIUM names one that is not /usr/bin/chromium).
+test-page:
+	@if ! command -v npm >/dev/null; then echo "SKIPPED: no npm: tests of the page"; \
+	elif ! $(MAKE) --no-print-directory $(PAGE)/node_modules; then echo "SKIPPED: npm cannot install: tests of the page"; \
+	else cd $(PAGE) && npm run --silent check && npm test --silent; fi
 
 # Writes docs/benchmarks.md and docs/benchmarks/. One thread, so that times compare. The two methods of paper 000 draw poses
 # uniformly, as the paper does. The suite of paper 000 takes half an hour; cut off and run again, it goes on where it was.

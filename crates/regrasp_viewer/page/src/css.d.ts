@@ -1,0 +1,2 @@
+// The build writes it beside the script.
+declare module "*.css";

@@ -1,0 +1,25 @@
+// Forward kinematics from the link tree of the story.
+
+import type { SceneStory } from "./story";
+import { compose, fromRotationVector, poseFrom, scale, type Pose } from "./math";
+
+/** Pose of every link in the world, for one position per joint. */
+export function linkPoses(scene: SceneStory, joints: readonly number[]): Pose[] {
+  const poses: Pose[] = [];
+  for (const link of scene.links) {
+    const parent = link.parent < 0 ? poseFrom(scene.world_from_root) : poses[link.parent];
+    let pose = compose(parent, poseFrom(link.parent_from_joint));
+    if (link.kind !== "fixed") {
+      const at = link.joint < 0 ? link.offset : link.multiplier * (joints[link.joint] ?? 0) + link.offset;
+      const moved = scale(link.axis, at);
+      pose = compose(
+        pose,
+        link.kind === "revolute"
+          ? { position: [0, 0, 0], quat: fromRotationVector(moved) }
+          : { position: moved, quat: [0, 0, 0, 1] },
+      );
+    }
+    poses.push(pose);
+  }
+  return poses;
+}

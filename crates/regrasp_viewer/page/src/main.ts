@@ -1,0 +1,144 @@
+// The page: reads the story, builds everything, runs the clock.
+
+import "./page.css";
+import { Ball } from "./ball";
+import { ChartStack } from "./charts/stack";
+import { button, el, icon } from "./dom";
+import { keepLink, readLink } from "./link";
+import { Motion, still } from "./motion";
+import { Player } from "./player";
+import type { Story } from "./story";
+import { Theme } from "./theme";
+import { helpPanel, listenToKeys } from "./ui/keys";
+import * as panels from "./ui/panels";
+import { Transport } from "./ui/transport";
+import { Viewport } from "./ui/viewport";
+import { Stage } from "./view/stage";
+
+function readStory(): Story {
+  const text = document.getElementById("story")?.textContent;
+  if (!text) throw new Error("This page carries no plan.");
+  const story = JSON.parse(text) as Story;
+  if (story.format !== "regrasp-story") throw new Error("What this page carries is not a plan.");
+  if (story.version !== 1) {
+    throw new Error(`This page shows plans of version 1; it carries version ${String(story.version)}. Make it again with one version of regrasp.`);
+  }
+  return story;
+}
+
+function stageOf(story: Story, motion: Motion, theme: Theme, onCamera: () => void): Stage | null {
+  try {
+    return new Stage(story, motion, theme, onCamera);
+  } catch (error) {
+    if (story.scene.links.length > 0 && !(error instanceof Error && /webgl/i.test(error.message))) throw error;
+    return null;
+  }
+}
+
+function download(story: Story): void {
+  const address = URL.createObjectURL(new Blob([JSON.stringify(story.plan, null, 1)], { type: "application/json" }));
+  const link = el("a", { href: address, download: "plan.json" });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(address), 1000);
+}
+
+function header(story: Story, theme: Theme, help: () => void): HTMLElement {
+  const scheme = button(icon("sun"), "Light or dark", () => theme.toggle(), "button quiet");
+  return el(
+    "header",
+    { class: "top" },
+    el("h1", { title: story.title }, story.title || "Plan"),
+    panels.verdict(story),
+    el("span", { class: "gap" }),
+    story.plan ? button(icon("download"), "Download plan.json", () => download(story), "button quiet") : null,
+    scheme,
+    button("?", "Keys and help", help, "button quiet question"),
+  );
+}
+
+function start(): void {
+  const app = document.getElementById("app") ?? document.body.appendChild(el("div", { id: "app" }));
+  const theme = new Theme();
+  let story: Story;
+  try {
+    story = readStory();
+  } catch (error) {
+    app.replaceChildren(el("main", { class: "message", role: "alert" }, el("h1", {}, "Nothing to show"), el("p", {}, (error as Error).message)));
+    return;
+  }
+  document.title = story.title ? `${story.title} \u2013 regrasp` : "regrasp";
+  const motion = new Motion(story.plan ?? still(story));
+  const player = new Player(motion.start, motion.end);
+
+  let keep = () => {};
+  const stage = stageOf(story, motion, theme, () => keep());
+  const viewport = new Viewport(story, motion, player, stage);
+  const help = helpPanel();
+  const moves = story.plan !== null && motion.end > motion.start;
+  const transport = moves ? new Transport(motion, player, theme) : null;
+  const charts = moves ? new ChartStack(story, motion, player, theme) : null;
+  const ball = new Ball(story, motion, player, theme);
+
+  app.replaceChildren(
+    header(story, theme, help.open),
+    el(
+      "main",
+      {},
+      el("div", { class: "left" }, viewport.element, transport?.element),
+      el(
+        "div",
+        { class: "right" },
+        panels.violations(story),
+        panels.failure(story),
+        panels.figures(story, motion, (time) => {
+          player.setPlaying(false);
+          player.seek(time);
+        }),
+        charts ? el("section", { class: "card", "aria-label": "Charts over time" }, charts.element) : null,
+        panels.components(story),
+        ball.element,
+        panels.facts(story),
+      ),
+    ),
+    help.element,
+  );
+
+  if (stage) {
+    const fit = () => stage.resize(viewport.element.clientWidth, viewport.element.clientHeight);
+    fit();
+    new ResizeObserver(fit).observe(viewport.element);
+    player.onTime((time) => stage.setTime(time));
+  }
+  charts?.draw();
+  ball.draw();
+
+  const follow = () => {
+    const { time, camera } = readLink(location.hash);
+    if (camera) stage?.place(camera);
+    if (time !== null) player.seek(time);
+  };
+  follow();
+  addEventListener("hashchange", follow);
+  keep = keepLink(player, () => stage?.cameraPlace() ?? null);
+  player.onTime(() => keep());
+  player.onState(() => keep());
+
+  listenToKeys(player, motion, {
+    frame: () => stage?.frame(),
+    orbit: (azimuth, elevation, closer) => stage?.orbit(azimuth, elevation, closer),
+    toggle: (layer) => viewport.toggle(layer),
+    theme: () => theme.toggle(),
+  }, help.open);
+
+  let before = performance.now();
+  const tick = (now: number): void => {
+    // After a pause of the browser's own (another tab), the plan goes on where it was.
+    player.advance(Math.min((now - before) / 1000, 0.25));
+    before = now;
+    stage?.draw(now);
+    requestAnimationFrame(tick);
+  };
+  requestAnimationFrame(tick);
+}
+
+start();

@@ -1,0 +1,202 @@
+// The plan as functions of time. Everything here is computed from the plan's waypoints.
+
+import type { Contact, Plan, Segment, Story, Waypoint } from "./story";
+import { clamp, interpolatePose, lerp, norm, poseFrom, sub, unit, type Pose, type Vec3 } from "./math";
+
+export interface Stretch {
+  kind: Segment["kind"];
+  /** Index of the finger that moves, -1 in transfers. */
+  moving: number;
+  /** First and last waypoint, in the order of all waypoints. */
+  first: number;
+  last: number;
+  start: number;
+  end: number;
+}
+
+/** A finger on the object from landing to lifting off. */
+export interface Hold {
+  finger: number;
+  start: number;
+  end: number;
+  /** Parts of it, each fixed or rolling; they touch. */
+  spans: { start: number; end: number; mode: "fixed" | "rolling" }[];
+  /** Where the contact is on the object: one point while it stays, more while it rolls. */
+  path: { time: number; point: Vec3; normal: Vec3 }[];
+}
+
+export interface ContactNow {
+  mode: "fixed" | "rolling" | "free";
+  point: Vec3;
+  normal: Vec3;
+  force: Vec3 | null;
+}
+
+const FREE: ContactNow = { mode: "free", point: [0, 0, 0], normal: [0, 0, 1], force: null };
+
+const holds = (contact: Contact | undefined): boolean => contact !== undefined && contact.mode !== "free";
+
+export class Motion {
+  readonly waypoints: Waypoint[] = [];
+  readonly times: number[] = [];
+  readonly stretches: Stretch[] = [];
+  readonly nFingers: number;
+  readonly start: number;
+  readonly end: number;
+  readonly hasForces: boolean;
+  readonly holds: Hold[][];
+
+  constructor(plan: Plan) {
+    this.nFingers = plan.fingers.length;
+    for (const segment of plan.segments) {
+      const first = this.waypoints.length;
+      for (const waypoint of segment.waypoints) {
+        this.waypoints.push(waypoint);
+        this.times.push(waypoint.time);
+      }
+      const last = this.waypoints.length - 1;
+      this.stretches.push({
+        kind: segment.kind,
+        moving: segment.kind === "regrasp" ? plan.fingers.indexOf(segment.moving_finger ?? "") : -1,
+        first,
+        last,
+        start: this.times[first],
+        end: this.times[last],
+      });
+    }
+    this.start = this.times[0] ?? 0;
+    this.end = this.times[this.times.length - 1] ?? 0;
+    this.hasForces = this.waypoints.some((w) => w.contacts.some((c) => c.force_in_object));
+    this.holds = Array.from({ length: this.nFingers }, (_, finger) => this.holdsOf(finger));
+  }
+
+  /** The waypoint at or before `time`, and how far it is from there to the next one, in [0, 1). */
+  moment(time: number): { index: number; u: number } {
+    let low = 0;
+    let high = this.times.length - 1;
+    while (low < high) {
+      const middle = (low + high + 1) >> 1;
+      if (this.times[middle] <= time) low = middle;
+      else high = middle - 1;
+    }
+    const next = this.times[low + 1];
+    const span = next === undefined ? 0 : next - this.times[low];
+    return { index: low, u: span > 0 ? clamp((time - this.times[low]) / span, 0, 1) : 0 };
+  }
+
+  joints(time: number): number[] {
+    const { index, u } = this.moment(time);
+    const from = this.waypoints[index].joints;
+    const to = this.waypoints[index + 1]?.joints;
+    return to === undefined || u === 0 ? from : from.map((q, i) => q + (to[i] - q) * u);
+  }
+
+  object(time: number): Pose {
+    const { index, u } = this.moment(time);
+    const from = poseFrom(this.waypoints[index].world_from_object);
+    const next = this.waypoints[index + 1];
+    return next === undefined || u === 0 ? from : interpolatePose(from, poseFrom(next.world_from_object), u);
+  }
+
+  contacts(time: number): ContactNow[] {
+    const { index, u } = this.moment(time);
+    const now = this.waypoints[index].contacts;
+    const next = this.waypoints[index + 1]?.contacts;
+    return now.map((from, finger) => {
+      const to = u === 0 ? from : next?.[finger];
+      if (to === undefined || !holds(from) || !holds(to)) return FREE;
+      const pointFrom = from.point_in_object ?? [0, 0, 0];
+      const normalFrom = from.normal_in_object ?? [0, 0, 1];
+      const forces = from.force_in_object && to.force_in_object;
+      return {
+        mode: from.mode === "rolling" && to.mode === "rolling" ? "rolling" : "fixed",
+        point: lerp(pointFrom, to.point_in_object ?? pointFrom, u),
+        normal: unit(lerp(normalFrom, to.normal_in_object ?? normalFrom, u)),
+        force: forces ? lerp(from.force_in_object!, to.force_in_object!, u) : null,
+      };
+    });
+  }
+
+  /** Index of the stretch that `time` is in; between two, the earlier. */
+  stretchAt(time: number): number {
+    let found = 0;
+    this.stretches.forEach((stretch, i) => {
+      if (stretch.start <= time + 1e-9) found = i;
+    });
+    return found;
+  }
+
+  /** Start of the next or previous relocation seen from `time`; the start or end of the plan where there is none. */
+  relocationFrom(time: number, step: 1 | -1): number {
+    const starts = this.stretches.filter((s) => s.kind === "regrasp").map((s) => s.start);
+    if (step > 0) return starts.find((t) => t > time + 1e-6) ?? this.end;
+    return starts.reverse().find((t) => t < time - 1e-6) ?? this.start;
+  }
+
+  private holdsOf(finger: number): Hold[] {
+    const found: Hold[] = [];
+    let open: Hold | null = null;
+    const close = () => {
+      if (open && open.end > open.start) found.push(open);
+      open = null;
+    };
+    for (let i = 0; i + 1 < this.waypoints.length; i++) {
+      const from = this.waypoints[i].contacts[finger];
+      const to = this.waypoints[i + 1].contacts[finger];
+      if (!holds(from) || !holds(to)) {
+        close();
+        continue;
+      }
+      const [start, end] = [this.times[i], this.times[i + 1]];
+      const mode = from.mode === "rolling" && to.mode === "rolling" ? "rolling" : "fixed";
+      const put = (contact: Contact, time: number, hold: Hold) => {
+        const point = contact.point_in_object ?? [0, 0, 0];
+        const before = hold.path[hold.path.length - 1];
+        if (before && norm(sub(before.point, point)) < 1e-6) return;
+        hold.path.push({ time, point, normal: contact.normal_in_object ?? [0, 0, 1] });
+      };
+      open ??= { finger, start, end, spans: [], path: [] };
+      const hold: Hold = open;
+      put(from, start, hold);
+      put(to, end, hold);
+      hold.end = end;
+      const span = hold.spans[hold.spans.length - 1];
+      if (span && span.mode === mode) span.end = end;
+      else if (end > start) hold.spans.push({ start, end, mode });
+    }
+    close();
+    return found;
+  }
+}
+
+/** A plan of one moment: the nearest miss of a failure, or the start, for the 3-D view. */
+export function still(story: Story): Plan {
+  const miss = story.failure?.nearest_miss ?? null;
+  const object = miss?.world_from_object ?? story.asked[0] ?? { position: [0, 0, 0], quat_xyzw: [0, 0, 0, 1] };
+  const middle = (lower: number | null, upper: number | null) => clamp(0, lower ?? -Infinity, upper ?? Infinity);
+  const joints = miss?.joints ?? story.scene.joints.map((j) => middle(j.lower, j.upper));
+  const goal = story.asked[story.asked.length - 1] ?? object;
+  return {
+    format: "regrasp-plan",
+    task: "in_hand",
+    method: "",
+    seed: 0,
+    joint_names: story.scene.joints.map((j) => j.name),
+    fingers: story.scene.fingers.map((f) => f.name),
+    start: story.asked[0] ?? object,
+    goal,
+    segments: [{
+      kind: "transfer",
+      waypoints: [{
+        time: 0,
+        joints,
+        joint_velocities: joints.map(() => 0),
+        world_from_object: object,
+        contacts: story.scene.fingers.map(() => ({ mode: "free" as const })),
+      }],
+    }],
+    promises: { friction: story.scene.friction, friction_margin: 1, required_margin: 0, kept_margin: 0, torque_scale: 1 },
+    inputs: [],
+    statistics: { transfers: 0, relocations: 0 },
+  };
+}

@@ -1,0 +1,130 @@
+// Kinematics and motion of the page against other ways to know them: 4 x 4 matrices, and a plan that the planner made.
+
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { test } from "node:test";
+import { load } from "./support.mjs";
+import { matricesOf, matrix, poseMatrix, synthetic } from "./synthetic.mjs";
+
+const { linkPoses } = await load("kinematics");
+const { Motion } = await load("motion");
+const math = await load("math");
+const { readLink, writeLink } = await load("link");
+
+/** Numbers in [-1, 1) that are the same every time. */
+function numbers(seed) {
+  let state = seed;
+  return () => {
+    state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
+    return state / 2 ** 31 - 1;
+  };
+}
+const asMatrix = (pose) => poseMatrix({ position: pose.position, quat_xyzw: pose.quat });
+const near = (a, b, tolerance) => a.forEach((x, i) => assert.ok(Math.abs(x - b[i]) <= tolerance, `${x} is not ${b[i]}`));
+const sphere = JSON.parse(readFileSync(new URL("stories/sphere_180z.json", import.meta.url), "utf8"));
+
+test("poses of links are those that matrices give", () => {
+  const next = numbers(1);
+  for (const [shape, fingers] of [["ball", 4], ["box", 5]]) {
+    const { scene } = synthetic({ shape, fingers, duration: 2, triangles: 400 });
+    const unit = (v) => v.map((x) => x / Math.hypot(...v));
+    // A sliding joint, a coupled one, and a base that stands askew: what the hand itself lacks.
+    scene.world_from_root = { position: [0.1, -0.2, 0.3], quat_xyzw: unit([0.1, 0.7, -0.3, 0.6]) };
+    Object.assign(scene.links[2], { kind: "prismatic", axis: unit([1, 2, -1]) });
+    Object.assign(scene.links[3], { joint: 0, multiplier: -0.7, offset: 0.2 });
+    for (let round = 0; round < 50; round++) {
+      const q = scene.joints.map(() => 2 * next());
+      const expected = matricesOf(scene, q);
+      linkPoses(scene, q).forEach((pose, i) => near(asMatrix(pose), expected[i], 1e-12));
+    }
+  }
+});
+
+test("fingertips of a planned motion are on their contacts", () => {
+  const motion = new Motion(sphere.plan);
+  let seen = 0;
+  for (const w of motion.waypoints) {
+    const links = linkPoses(sphere.scene, w.joints);
+    w.contacts.forEach((contact, f) => {
+      if (contact.mode === "free") return;
+      const { tip_link, tip_center_in_link, tip_radius } = sphere.scene.fingers[f];
+      const centre = contact.point_in_object.map((x, k) => x + tip_radius * contact.normal_in_object[k]);
+      near(math.apply(links[tip_link], tip_center_in_link), math.apply(math.poseFrom(w.world_from_object), centre), 5e-4);
+      seen++;
+    });
+  }
+  assert.ok(seen > 30, `${seen} contacts`);
+});
+
+test("between waypoints the object turns at a constant rate about one axis", () => {
+  const next = numbers(2);
+  for (let round = 0; round < 200; round++) {
+    const quat = () => {
+      const q = [next(), next(), next(), next()];
+      return q.map((x) => x / Math.hypot(...q));
+    };
+    const [from, to] = [0, 1].map(() => ({ position: [next(), next(), next()], quat: quat() }));
+    const [a, b] = [asMatrix(from), asMatrix(to)];
+    // Rotation from one to the other, its axis and angle by trace and skew part.
+    const delta = [0, 1, 2].map((r) => [0, 1, 2].map((c) => [0, 1, 2].reduce((s, k) => s + b[4 * r + k] * a[4 * c + k], 0)));
+    const angle = Math.acos(Math.min(1, Math.max(-1, (delta[0][0] + delta[1][1] + delta[2][2] - 1) / 2)));
+    if (angle > 3.1 || angle < 0.05) continue;
+    const axis = [delta[2][1] - delta[1][2], delta[0][2] - delta[2][0], delta[1][0] - delta[0][1]].map((x) => x / (2 * Math.sin(angle)));
+    const t = 0.5 + 0.5 * next();
+    const expected = matrix.times(matrix.turn(axis, t * angle), [...a.slice(0, 3), 0, ...a.slice(4, 7), 0, ...a.slice(8, 11), 0, 0, 0, 0, 1]);
+    from.position.forEach((x, k) => { expected[4 * k + 3] = x + (to.position[k] - x) * t; });
+    near(asMatrix(math.interpolatePose(from, to, t)), expected, 1e-8);
+  }
+});
+
+test("a motion gives its waypoints, and half-way half of everything", () => {
+  const { plan } = synthetic({ duration: 6, triangles: 400 });
+  const motion = new Motion(plan);
+  motion.times.forEach((time, i) => {
+    if (motion.times[i + 1] === time) return;
+    near(motion.joints(time), motion.waypoints[i].joints, 1e-12);
+    const half = (time + (motion.times[i + 1] ?? time)) / 2;
+    near(motion.joints(half), motion.waypoints[i].joints.map((q, k) => (q + (motion.waypoints[i + 1] ?? motion.waypoints[i]).joints[k]) / 2), 1e-12);
+  });
+  assert.deepEqual(motion.joints(-5), motion.waypoints[0].joints);
+  assert.deepEqual(motion.joints(1e9), motion.waypoints.at(-1).joints);
+});
+
+test("holds cover exactly the time in which a finger is on the object", () => {
+  for (const { plan } of [synthetic({ duration: 12, triangles: 400 }), sphere]) {
+    const motion = new Motion(plan);
+    motion.holds.forEach((holds, f) => {
+      for (let i = 0; i + 1 < motion.times.length; i++) {
+        const middle = (motion.times[i] + motion.times[i + 1]) / 2;
+        if (motion.times[i + 1] - motion.times[i] < 1e-9) continue;
+        const on = motion.waypoints[i].contacts[f].mode !== "free" && motion.waypoints[i + 1].contacts[f].mode !== "free";
+        const hold = holds.find((h) => h.start <= middle && middle <= h.end);
+        assert.equal(hold !== undefined, on);
+        assert.equal(motion.contacts(middle)[f].mode !== "free", on);
+        if (!hold) continue;
+        const span = hold.spans.find((s) => s.start <= middle && middle <= s.end);
+        const rolls = [i, i + 1].every((k) => motion.waypoints[k].contacts[f].mode === "rolling");
+        assert.equal(span.mode, rolls ? "rolling" : "fixed");
+        assert.equal(motion.contacts(middle)[f].mode, span.mode);
+      }
+    });
+  }
+});
+
+test("relocations are found from anywhere", () => {
+  const motion = new Motion(sphere.plan);
+  const starts = motion.stretches.filter((s) => s.kind === "regrasp").map((s) => s.start);
+  const visited = [];
+  for (let t = motion.start; (t = motion.relocationFrom(t, 1)) < motion.end;) visited.push(t);
+  assert.deepEqual(visited, starts);
+  assert.equal(motion.relocationFrom(motion.end, -1), starts.at(-1));
+  assert.equal(motion.relocationFrom(starts[0], -1), motion.start);
+});
+
+test("links are read as they were written, and nonsense is not read", () => {
+  const camera = { azimuth: -31.5, elevation: 20.3, distance: 0.4567, target: [0.01, -0.02, 0.0789] };
+  assert.deepEqual(readLink(writeLink(3.25, camera)), { time: 3.25, camera });
+  for (const hash of ["", "#", "#t=", "#t=abc&cam=1,2,3", "#cam=1,2,0,0,0,0", "#cam=1,2,NaN,0,0,0", "#t=Infinity&cam=,,,,,", "#%%%=&t=1e999"]) {
+    assert.deepEqual(readLink(hash), { time: null, camera: null }, hash);
+  }
+});
