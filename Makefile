@@ -38,7 +38,7 @@ PLAIN := --settings docs/benchmarks/plain.json
 ALLEGRO_BENCH = $(PACKAGES) --time-limit 20 --threads 1 --seeds $(ALLEGRO_SEEDS)
 SOFT_BENCH = $(PACKAGES) --time-limit 6 --threads 1 --seeds $(ALLEGRO_SEEDS)
 
-.PHONY: all demo pictures test replay test-rust test-python test-page page python bench growth benchmark-page campaign fuzz docs release $(ROADMAPS)
+.PHONY: all demo gallery test replay test-rust test-python test-page page python bench growth benchmark-page campaign fuzz docs release $(ROADMAPS)
 
 all: release
 
@@ -49,9 +49,26 @@ release:
 demo: release
 	$(REGRASP) demo -o $(OUT)/demo
 
-# The pictures of the README.
-pictures: demo
-	mkdir -p docs/pictures && cp $(OUT)/demo/gait.svg docs/pictures/demo-gait.svg
+# The pictures of README and docs/gallery.md, which has the same commands; those of the Allegro hand want the models. The same
+# bytes every time.
+GALLERY ?= docs/pictures
+gallery: release
+	mkdir -p $(GALLERY) $(OUT)/gallery
+	$(REGRASP) plan scenes/box_90x.toml -o $(OUT)/gallery/box.json
+	$(REGRASP) view $(OUT)/gallery/box.json scenes/box_90x.toml --png $(GALLERY)/box.png --width 1200
+	$(REGRASP) plan scenes/ellipsoid_obstacle.toml -o $(OUT)/gallery/obstacle.json
+	$(REGRASP) view $(OUT)/gallery/obstacle.json scenes/ellipsoid_obstacle.toml --png $(GALLERY)/obstacle.png --width 1200
+	$(REGRASP) roadmap build scenes/box_90x.toml $(PLAIN) --places 120 --angle 100 -o $(OUT)/gallery/box.roadmap
+	$(REGRASP) roadmap picture $(OUT)/gallery/box.roadmap scenes/box_90x.toml -o $(GALLERY)/roadmap.svg
+	$(REGRASP) plan scenes/out_of_reach.toml -o $(OUT)/gallery/none.json --max-work 300000 --failure $(GALLERY)/out-of-reach; test $$? -eq 1
+ifneq ($(PACKAGES),)
+	$(REGRASP) plan scenes/allegro/cube57_z.toml $(PACKAGES) --seed 1 -o $(OUT)/gallery/cube.json
+	$(REGRASP) view $(OUT)/gallery/cube.json scenes/allegro/cube57_z.toml $(PACKAGES) --png $(GALLERY)/allegro-cube.png --frames 8 --width 1400 --svg $(GALLERY)/allegro-cube
+	$(REGRASP) plan scenes/allegro/apple_z.toml $(PACKAGES) -o $(OUT)/gallery/apple.json
+	$(REGRASP) view $(OUT)/gallery/apple.json scenes/allegro/apple_z.toml $(PACKAGES) --png $(GALLERY)/allegro-apple.png --frames 8 --width 1300
+else
+	@echo "SKIPPED: pictures of the Allegro hand (no models)"
+endif
 
 test: test-rust test-python test-page
 

@@ -72,6 +72,13 @@ pub fn roadmap_story(roadmap: &GraspRoadmap, plan: &Plan) -> RoadmapStory {
     story
 }
 
+/// The graph of a saved roadmap, with angles to the pose of its first node, without a solution.
+pub fn roadmap_from_first(roadmap: &GraspRoadmap) -> RoadmapStory {
+    let outline = roadmap.outline();
+    let first = outline.nodes.first().map_or_else(Pose::identity, |node| node.world_from_object);
+    outline_story(&outline, &first)
+}
+
 /// What a search had reached when it failed; none where the planner keeps no graph. `goal` is the pose asked for.
 /// Component 0 is the start's.
 pub fn reached_story(failure: &Failure, goal: &Pose) -> Option<RoadmapStory> {

@@ -142,6 +142,9 @@ pub struct Plan {
     /// Write a page for a browser too: of the plan, or of why there is none
     #[arg(long, value_name = "FILE.html")]
     pub report: Option<PathBuf>,
+    /// Where no plan is found, write pictures of why to this folder: the causes, and the graph that was reached
+    #[arg(long, value_name = "DIR")]
+    pub failure: Option<PathBuf>,
     /// Threads [default: all cores]; the plan does not depend on it
     #[arg(long, value_parser = threads, allow_negative_numbers = true)]
     pub threads: Option<usize>,
@@ -174,6 +177,24 @@ pub struct View {
     /// What the page is told, as JSON
     #[arg(long, value_name = "FILE.json", group = "pictures")]
     pub story: Option<PathBuf>,
+    /// Storyboard: key frames in one picture
+    #[arg(long, value_name = "FILE.png", group = "pictures")]
+    pub png: Option<PathBuf>,
+    /// Charts: gait, margin, clearance, joints, forces, orientation, each as a file in this folder
+    #[arg(long, value_name = "DIR", group = "pictures")]
+    pub svg: Option<PathBuf>,
+    /// Key frames of the storyboard
+    #[arg(long, value_name = "N", default_value_t = 6, requires = "png")]
+    pub frames: usize,
+    /// Width of the storyboard, in pixels
+    #[arg(long, value_name = "PIXELS", default_value_t = 1500, requires = "png")]
+    pub width: usize,
+    /// Key frames in a row of the storyboard [default: by their number]
+    #[arg(long, value_name = "N", requires = "png")]
+    pub columns: Option<usize>,
+    /// Draw collision shapes in the storyboard even where it is known what things look like
+    #[arg(long, requires = "png")]
+    pub collision: bool,
     /// Title of the page [default: the scene's name]
     #[arg(long)]
     pub title: Option<String>,
@@ -296,6 +317,8 @@ pub enum RoadmapAction {
         /// Roadmap file
         roadmap: PathBuf,
     },
+    /// Draw a graph: how near to the goal its grasps are, its components, and a solution where a scene is given
+    Picture(RoadmapPicture),
     /// Answer random queries on a graph and tabulate
     Bench(RoadmapBench),
 }
@@ -332,6 +355,24 @@ pub struct RoadmapBuild {
     /// Threads [default: all cores]; the graph does not depend on it
     #[arg(long, value_parser = threads, allow_negative_numbers = true)]
     pub threads: Option<usize>,
+}
+
+/// `regrasp roadmap picture`
+#[derive(Debug, Args)]
+pub struct RoadmapPicture {
+    /// Roadmap file
+    pub roadmap: PathBuf,
+    /// Scene file, of the same hand and object, whose turn is planned on the graph
+    pub scene: Option<PathBuf>,
+    /// Picture
+    #[arg(short, long, value_name = "FILE.svg")]
+    pub output: PathBuf,
+    /// Seed of the query
+    #[arg(long, default_value_t = 0, value_parser = whole_number, allow_negative_numbers = true)]
+    pub seed: u64,
+    /// Work limit of the query, in configurations looked at
+    #[arg(long, value_name = "N", default_value_t = 1_000_000, value_parser = whole_number, allow_negative_numbers = true)]
+    pub max_work: u64,
 }
 
 /// `regrasp roadmap query`

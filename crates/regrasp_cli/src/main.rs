@@ -6,8 +6,6 @@
 mod args;
 /// One file per command.
 mod commands;
-/// The finger gait of a plan as an SVG picture.
-mod gait_chart;
 /// Ctrl-C, SIGTERM, and the promise to stop within 100 ms.
 mod interrupt;
 /// What the checker said, in words and as an event.

@@ -2,8 +2,9 @@
 
 use regrasp::geometry::{Pose, Shape};
 use regrasp::plan::plan::PoseData;
-use regrasp::robot::hand::{Finger, TipShape};
+use regrasp::robot::hand::Finger;
 use regrasp::robot::robot::{Joint, JointKind, Limits};
+use regrasp::robot::tip::TipShape;
 use regrasp::robot::{ContactModel, Hand};
 use regrasp::scene::{Gravity, InHandQuery, InputFile, LoadedScene, Object, Obstacle};
 use serde_json::{Value, json};
@@ -79,7 +80,8 @@ fn finger(hand: &Hand, finger: &Finger) -> Value {
     let shape = match finger.tip.shape {
         TipShape::Point => "point",
         TipShape::Sphere { .. } => "sphere",
-        TipShape::Hull(_) => "hull",
+        TipShape::Ellipsoid(_) => "ellipsoid",
+        TipShape::Hull { .. } => "hull",
     };
     json!({
         "name": finger.name,

@@ -1,54 +1,17 @@
 //! A hand: a palm and serial fingers, with everything the planners ask for prepared once.
 
-use crate::contact_model::ContactModel;
 use crate::kinematics::chain::Chain;
 use crate::kinematics::finger_ik::FingerIk;
 use crate::robot::{LinkId, Robot};
+use crate::tip::Tip;
 use regrasp_geometry::shape::PlacedShape;
-use regrasp_geometry::{Point, Pose, Shape};
+use regrasp_geometry::{Pose, Shape};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Index of a finger in [`Hand::fingers`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct FingerId(pub usize);
-
-/// What the fingertip is, for contact.
-#[derive(Debug, Clone, PartialEq)]
-pub enum TipShape {
-    /// A sharp tip: contact at one point of the link (paper 000, section 3.1).
-    Point,
-    /// A ball: contact anywhere on it that the object's normal selects.
-    Sphere {
-        /// Radius.
-        radius: f64,
-    },
-    /// The convex hull of the tip link's own collision geometry, in the tip frame.
-    Hull(Arc<regrasp_geometry::ConvexHull>),
-}
-
-/// A fingertip.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Tip {
-    /// Link that carries the tip, as the user names it.
-    pub link: LinkId,
-    /// Its shape.
-    pub shape: TipShape,
-    /// The point of the tip (its centre, for a sphere), in the frame of the chain's last moving body.
-    pub center_in_body: Point,
-    /// What it can transmit where it touches.
-    pub contact: ContactModel,
-}
-
-impl Tip {
-    /// Distance from [`Tip::center_in_body`] to the contact, for tips where it is the same in all directions.
-    pub fn radius(&self) -> f64 {
-        match self.shape {
-            TipShape::Sphere { radius } => radius,
-            TipShape::Point | TipShape::Hull(_) => 0.0,
-        }
-    }
-}
 
 /// A collision shape of a finger.
 #[derive(Debug, Clone)]

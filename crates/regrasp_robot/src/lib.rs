@@ -14,12 +14,15 @@ pub mod inspect;
 pub mod kinematics;
 /// Links and joints of a robot, as read.
 pub mod robot;
+/// Fingertips: what of the last link touches.
+pub mod tip;
 
 pub use contact_model::ContactModel;
-pub use hand::{Finger, FingerId, FingerShape, Hand, Tip, TipShape};
+pub use hand::{Finger, FingerId, FingerShape, Hand};
 pub use import::{LoadOptions, LoadedHand, LoadedInput, LoadedRobot, ResolveOptions, load_hand, load_robot};
 pub use kinematics::chain::{Chain, ChainJoint, Motion};
 pub use robot::{Joint, JointId, JointKind, Limits, Link, LinkId, Mimic, Robot, Visual, VisualGeometry, VisualMesh};
+pub use tip::{Tip, TipShape};
 
 #[cfg(test)]
 #[path = "../../../tests/support/places.rs"]

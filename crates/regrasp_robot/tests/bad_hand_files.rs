@@ -81,7 +81,7 @@ refused!(
     [
         r#"U201 hand.toml:1:1 key "basse_link": is not a key that exists here; expected format, format_version, urdf, srdf, base_link, allow, couplings or fingers
   fix: did you mean base_link?"#,
-        r#"U201 hand.toml:10:1 key "fingers[0].colour": is not a key that exists here; expected name, tip_link, first_joint, tip, contact, torsion_radius or rest"#
+        r#"U201 hand.toml:10:1 key "fingers[0].colour": is not a key that exists here; expected name, tip_link, first_joint, tip, pad, contact, torsion_radius or rest"#
     ]
 );
 refused!(
@@ -132,7 +132,30 @@ refused!(
     a_tip_shape_that_is_misspelt,
     with_finger("tip_link = \"a_tip\"\ntip = { shape = \"spere\", radius = 0.01 }"),
     [
-        r#"U213 hand.toml:8:17 key "fingers[0].tip.shape": is "spere" (did you mean "sphere"?); expected sphere, point or mesh"#
+        r#"U213 hand.toml:8:17 key "fingers[0].tip.shape": is "spere" (did you mean "sphere"?); expected sphere, ellipsoid, point or mesh"#
+    ]
+);
+refused!(
+    an_ellipsoid_that_is_a_plate,
+    with_finger("tip_link = \"a_tip\"\ntip = { shape = \"ellipsoid\", radii = [0.01, 0.01, 0.001] }"),
+    [
+        r#"U213 hand.toml:8:38 key "fingers[0].tip.radii": is [0.01, 0.01, 0.001]; expected three lengths above 0, in metres, none less than a fifth of another"#
+    ]
+);
+refused!(
+    an_ellipsoid_without_radii_that_is_turned_by_no_rotation,
+    with_finger("tip_link = \"a_tip\"\ntip = { shape = \"ellipsoid\", quat_xyzw = [0, 0, 0, 0.5] }"),
+    [
+        "U202 hand.toml:8:7 table \"fingers[0].tip\": has no `radii`\n  fix: add radii = [0.009, 0.007, 0.007], the half axes in metres",
+        r#"U213 hand.toml:8:42 key "fingers[0].tip.quat_xyzw": has length 0.5; expected a unit quaternion, x y z w"#
+    ]
+);
+refused!(
+    a_pad_without_a_direction_and_with_a_wide_angle,
+    with_finger(&format!("tip_link = \"a_tip\"\n{POINT}\npad = {{ axis = [0, 0, 0], angle_deg = 200 }}")),
+    [
+        r#"U213 hand.toml:9:16 key "fingers[0].pad.axis": is the zero vector, which is no direction; expected a direction out of the pad, in the frame of the tip link"#,
+        r#"U213 hand.toml:9:39 key "fingers[0].pad.angle_deg": is 200; expected an angle above 0 and at most 180, in degrees"#
     ]
 );
 refused!(

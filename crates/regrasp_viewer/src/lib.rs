@@ -1,10 +1,23 @@
 //! Pictures of plans: one self-contained page, storyboards and charts. Reads scene and plan only.
 //!
-//! [`story`] gathers everything that a picture needs to know, [`page`] makes one HTML file of it.
+//! [`story`] gathers everything that a picture needs to know, [`page`] makes one HTML file of it, [`storyboard`] a PNG of key
+//! frames, [`charts`] and [`roadmap_picture`] make SVG pictures.
 
+/// Charts of a plan.
+pub mod charts;
 /// One self-contained HTML file.
 pub mod page;
+/// One colour per finger, the same in every picture.
+pub mod palette;
+/// Small software renderer.
+pub mod render;
+/// A manipulation graph in the plane.
+pub mod roadmap_picture;
 /// What a page is told.
 pub mod story;
+/// Key frames of a plan in one picture.
+pub mod storyboard;
+/// A plan read along time.
+pub mod timeline;
 
 pub use story::Story;

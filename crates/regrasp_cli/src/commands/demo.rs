@@ -2,7 +2,6 @@
 
 use super::plan::{Limits, available_threads, say_query, search};
 use crate::args::{self, Common};
-use crate::gait_chart;
 use crate::interrupt;
 use crate::judge;
 use crate::load;
@@ -12,6 +11,7 @@ use crate::talk::Talk;
 use regrasp::InHandSettings;
 use regrasp::base::files;
 use regrasp::plan::format;
+use regrasp::viewer::charts;
 use serde_json::json;
 use std::path::Path;
 
@@ -49,7 +49,7 @@ pub fn run(arguments: &args::Demo, common: &Common, talk: &Talk) -> Result<(), S
         return Err(Stop::Rejected);
     }
     write(&plan_path, bytes.as_bytes())?;
-    write(&chart_path, gait_chart::svg(&plan).as_bytes())?;
+    write(&chart_path, charts::gait(&plan).as_bytes())?;
     let sha256 = files::sha256(bytes.as_bytes());
     talk.event("written", json!({ "path": plan_path, "sha256": sha256, "chart": chart_path }));
     talk.say(format!("wrote  {}   sha256 {sha256}", plan_path.display()));

@@ -7,6 +7,7 @@ mod demo;
 mod export;
 mod growth;
 mod inspect;
+mod pictures;
 pub mod plan;
 mod roadmap;
 mod simulate;

@@ -1,6 +1,7 @@
 //! `regrasp plan`: plan a scene, check the plan, then write it.
 
 use crate::args::{self, Common};
+use crate::commands::pictures;
 use crate::interrupt;
 use crate::judge;
 use crate::load;
@@ -50,8 +51,13 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
     let packages = load::options(common).resolve;
     let page = arguments.report.as_deref().map(|path| Page::new(path, &loaded.scene, &query, &packages));
     let plan = match (search(&loaded.scene, &query, &settings, arguments.seed, &limits, talk), &page) {
-        (Err(Stop::NoPlan(failure)), Some(page)) => {
-            page.write_failure(&failure, talk)?;
+        (Err(Stop::NoPlan(failure)), page) => {
+            if let Some(page) = page {
+                page.write_failure(&failure, talk)?;
+            }
+            if let Some(folder) = &arguments.failure {
+                pictures::write_failure(folder, &failure, &query, talk)?;
+            }
             return Err(Stop::NoPlan(failure));
         }
         (found, _) => found?,

@@ -1,9 +1,11 @@
 //! `regrasp roadmap`: many queries on one saved graph of a hand and an object.
 
 use super::bench::{make_folder_of, say_row};
-use super::plan::{available_threads, judge_and_write, refuse_unwritable, say_plan, say_query};
+use super::pictures;
+use super::plan::{available_threads, judge_and_write, refuse_input, refuse_unwritable, say_plan, say_query};
 use crate::args::{self, Common, RoadmapAction};
 use crate::interrupt;
+use crate::judge;
 use crate::load;
 use crate::stop::Stop;
 use crate::talk::{Talk, counted, duration, grouped};
@@ -13,6 +15,7 @@ use regrasp::planners::FailureKind;
 use regrasp::planners::in_hand::roadmap::{
     About, BuildSettings, BuildStage, Census, GraspRoadmap, QueryMemory, Region, RoadmapPlanner, build_roadmap,
 };
+use regrasp::told;
 use regrasp_bench::row::Judge;
 use regrasp_bench::{Problem, RunSettings, csv, roadmap as bench, summarise, summary};
 use serde_json::json;
@@ -27,6 +30,7 @@ pub fn run(arguments: &args::Roadmap, common: &Common, talk: &Talk) -> Result<()
         RoadmapAction::Build(build) => run_build(build, common, talk),
         RoadmapAction::Query(query) => run_query(query, common, talk),
         RoadmapAction::Info { roadmap } => run_info(roadmap, talk),
+        RoadmapAction::Picture(picture) => run_picture(picture, common, talk),
         RoadmapAction::Bench(bench) => run_bench(bench, common, talk),
     }
 }
@@ -130,6 +134,39 @@ fn run_query(arguments: &args::RoadmapQuery, common: &Common, talk: &Talk) -> Re
         save(&roadmap.grown_by(&answer), &arguments.roadmap, talk)?;
     }
     Ok(())
+}
+
+/// Draws a graph; with a scene also the answer to its query, which is judged like any other.
+fn run_picture(arguments: &args::RoadmapPicture, common: &Common, talk: &Talk) -> Result<(), Stop> {
+    refuse_unwritable(&arguments.output)?;
+    refuse_input(&arguments.output, [arguments.roadmap.as_path()].into_iter().chain(arguments.scene.as_deref()))?;
+    let cancelled = interrupt::flag()?;
+    let roadmap = open(&arguments.roadmap, talk)?;
+    let name = arguments.roadmap.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    let Some(scene) = &arguments.scene else {
+        let story = told::roadmap_from_first(&roadmap);
+        let title = format!("Graph {name}, goal: its first pose");
+        return pictures::write_roadmap(&arguments.output, &story, &title, talk);
+    };
+    let loaded = load::scene(scene, common, talk)?;
+    let query = loaded.task.query(arguments.seed);
+    say_query(&query, arguments.seed, 1, talk);
+    let planner = RoadmapPlanner::new(&arguments.roadmap, &roadmap, &loaded.scene)?;
+    let budget = Budget { cancelled, ..Budget::work(arguments.max_work) };
+    let started = Instant::now();
+    let answer = match planner.plan(&query, arguments.seed, &budget, &mut QueryMemory::default()) {
+        Ok(answer) => answer,
+        Err(failure) if failure.kind == FailureKind::Interrupted => return Err(Stop::Interrupted),
+        Err(failure) => return Err(Stop::NoPlan(Box::new(failure))),
+    };
+    say_plan(&answer.plan, started.elapsed().as_secs_f64(), talk);
+    if !judge::judge(&loaded, &answer.plan, talk)?.accepted() {
+        return Err(Stop::Rejected);
+    }
+    // With start and goal of the query as nodes.
+    let story = told::roadmap_story(&roadmap.grown_by(&answer), &answer.plan);
+    let title = format!("Graph {name}, goal of {}", loaded.scene.name);
+    pictures::write_roadmap(&arguments.output, &story, &title, talk)
 }
 
 /// Refuses settings asked for that the roadmap was not built with; what is not asked for is as the roadmap has it.

@@ -1,9 +1,10 @@
-//! `regrasp view`: a page of a plan.
+//! `regrasp view`: a page of a plan, and pictures.
 //!
 //! A plan that the checker rejects gets its page too: it says so, and shows where.
 
 use crate::args::{self, Common};
 use crate::commands::check::scene_of;
+use crate::commands::pictures;
 use crate::commands::plan::{refuse_input, refuse_unwritable};
 use crate::interrupt;
 use crate::judge;
@@ -32,10 +33,11 @@ pub fn run(arguments: &args::View, common: &Common, talk: &Talk) -> Result<(), S
     if arguments.output.is_some() && arguments.output == arguments.story {
         return Err(Stop::argument("A505", "--story", "is where the page is written to", "another file"));
     }
+    pictures::refuse(arguments, own.into_iter().flatten())?;
     let plan = format::from_json(&arguments.plan, &files::read(&arguments.plan)?)?;
     let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref())?;
     let loaded = load::scene(&scene_path, common, talk)?;
-    for path in &wanted {
+    for path in wanted.into_iter().chain(arguments.png.as_deref()) {
         refuse_input(path, loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
     }
     let roadmap = match &arguments.with_roadmap {
@@ -57,6 +59,7 @@ pub fn run(arguments: &args::View, common: &Common, talk: &Talk) -> Result<(), S
         roadmap,
         packages: &packages,
     })?;
+    pictures::write(arguments, &story, talk)?;
     if let Some(path) = &arguments.story {
         files::write_atomic(path, story.to_json().as_bytes()).map_err(|error| Stop::unwritable(path, &error))?;
         talk.event("written", json!({ "story": path }));

@@ -5,6 +5,7 @@ mod commands;
 mod export;
 mod folder;
 mod growth;
+mod pictures;
 #[path = "../../../../tests/support/places.rs"]
 mod places;
 mod roadmap;

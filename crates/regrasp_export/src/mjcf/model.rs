@@ -3,6 +3,7 @@
 use super::inertia::{self, Inertial};
 use super::xml::{Xml, numbers};
 use super::{Mjcf, pairs};
+use nalgebra::UnitQuaternion;
 use regrasp_geometry::mass::solid_properties;
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{ConvexHull, Point, Pose, Shape, pose_from};
@@ -55,11 +56,10 @@ enum Look<'a> {
     Checkers,
 }
 
-/// The ball of a round or sharp tip.
-struct Ball {
+/// The ball or ellipsoid of a tip.
+struct OwnTip {
     name: String,
-    center: Point,
-    radius: f64,
+    placed: PlacedShape,
 }
 
 pub(super) fn write(scene: &Scene, plan: &Plan) -> Mjcf {
@@ -135,15 +135,15 @@ fn geom_names(scene: &Scene) -> GeomNames {
     let palm = hand.palm.iter().map(|shape| name_of(shape.link)).collect();
     let (mut fingers, mut touching) = (Vec::new(), Vec::new());
     for finger in &hand.fingers {
-        let ball = ball_of(finger);
-        let is_ball = |placed: &PlacedShape| ball.as_ref().is_some_and(|ball| ball.is(placed));
+        let own = own_tip(finger);
+        let is_own = |placed: &PlacedShape| own.as_ref().is_some_and(|own| own.is(placed));
         let of_finger: Vec<String> = finger
             .shapes
             .iter()
-            .map(|shape| if is_ball(&shape.placed) { tip_name(finger) } else { name_of(shape.link) })
+            .map(|shape| if is_own(&shape.placed) { tip_name(finger) } else { name_of(shape.link) })
             .collect();
-        touching.push(match ball {
-            Some(ball) => vec![ball.name],
+        touching.push(match own {
+            Some(own) => vec![own.name],
             None => {
                 let tips = finger.shapes.iter().zip(&of_finger).filter(|(shape, _)| shape.is_tip);
                 tips.map(|(_, name)| name.clone()).collect()
@@ -164,20 +164,27 @@ fn tip_name(finger: &Finger) -> String {
     format!("{}:tip", finger.name)
 }
 
-fn ball_of(finger: &Finger) -> Option<Ball> {
-    let radius = match finger.tip.shape {
-        TipShape::Sphere { radius } => radius,
-        TipShape::Point => POINT_RADIUS,
-        TipShape::Hull(_) => return None,
+/// A small ball for a sharp tip; None for hulls, which are the link's collision geometry.
+fn own_tip(finger: &Finger) -> Option<OwnTip> {
+    let placed = match finger.tip.shape {
+        TipShape::Point => PlacedShape {
+            parent_from_shape: Pose::from_parts(finger.tip.center_in_body.coords.into(), UnitQuaternion::identity()),
+            shape: Shape::Sphere { radius: POINT_RADIUS },
+        },
+        TipShape::Sphere { .. } | TipShape::Ellipsoid(_) | TipShape::Hull { .. } => finger.tip.own_shape()?,
     };
-    Some(Ball { name: tip_name(finger), center: finger.tip.center_in_body, radius })
+    Some(OwnTip { name: tip_name(finger), placed })
 }
 
-impl Ball {
-    /// True when `placed`, a shape of the tip's body, is this ball.
+impl OwnTip {
+    /// True when `placed`, a shape of the tip's body, is this one.
     fn is(&self, placed: &PlacedShape) -> bool {
-        let same_center = (placed.parent_from_shape.translation.vector - self.center.coords).norm() < 1e-9;
-        matches!(placed.shape, Shape::Sphere { radius } if (radius - self.radius).abs() < 1e-9) && same_center
+        let [a, b] = [placed, &self.placed].map(|placed| placed.parent_from_shape.translation.vector);
+        let same_shape = match (&placed.shape, &self.placed.shape) {
+            (Shape::Sphere { radius: a }, Shape::Sphere { radius: b }) => (a - b).abs() < 1e-9,
+            _ => *placed == self.placed,
+        };
+        same_shape && (a - b).norm() < 1e-9
     }
 }
 
@@ -330,22 +337,14 @@ fn write_inertial(xml: &mut Xml, inertial: &Inertial) {
 
 fn write_tip(xml: &mut Xml, finger: &Finger, names: &[String], color: &str) {
     let center = finger.tip.center_in_body;
-    let ball = ball_of(finger);
-    if let Some(ball) = ball.as_ref().filter(|ball| !names.contains(&ball.name)) {
-        xml.leaf(
-            "geom",
-            &[
-                ("name", ball.name.clone()),
-                ("type", "sphere".into()),
-                ("size", numbers([ball.radius])),
-                ("pos", numbers(center.iter().copied())),
-                ("rgba", color.into()),
-            ],
-        );
+    let own = own_tip(finger);
+    if let Some(OwnTip { name, placed }) = own.as_ref().filter(|own| !names.contains(&own.name)) {
+        let body_from_shape = placed.parent_from_shape;
+        write_geom(xml, &Geom { name, look: Look::Color(color), body_from_shape, shape: &placed.shape });
     }
     // Every contact of the tip lies in its site, so that the touch sensor sees it.
-    let reach = match ball {
-        Some(ball) => 1.5 * ball.radius + 0.001,
+    let reach = match own {
+        Some(own) => 1.5 * own.placed.shape.reach_from(&Point::origin()) + 0.001,
         None => {
             let tips = finger.shapes.iter().filter(|shape| shape.is_tip);
             tips.map(|shape| shape.placed.shape.reach_from(&(shape.placed.parent_from_shape.inverse() * center)))

@@ -8,6 +8,8 @@ pub mod friction_cone;
 pub mod frictionless;
 /// Balls that roll on surfaces.
 pub mod rolling;
+/// Ellipsoids that roll.
+pub mod rolling_ellipsoid;
 /// Soft finger with elliptic torsion.
 pub mod soft_finger;
 

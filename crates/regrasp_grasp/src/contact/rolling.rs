@@ -73,58 +73,6 @@ pub fn slip(radius: f64, from: &Ball, to: &Ball, turn: &Vector) -> Vector {
     left - middle * middle.dot(&left)
 }
 
-/// Fixed-point steps for one step of the midpoint rule; each gains at least the factor `turn / 2`.
-const MAX_ITERATIONS: usize = 60;
-/// Most often that a step is halved.
-const MAX_HALVINGS: u32 = 20;
-
-/// Rolls a ball of radius `radius` that touches at `from` by the rotation vector `turn` relative to the object, at constant
-/// angular velocity in the object frame. `touch` finds the nearest point of the surface.
-///
-/// Steps are halved until one and two halves of it agree within `tolerance` times their share of the turn. None when the
-/// ball leaves what `touch` knows, or the tolerance is not reached.
-pub fn roll(
-    touch: &impl Fn(&Point) -> Option<Touch>,
-    radius: f64,
-    from: &Touch,
-    turn: &Vector,
-    tolerance: f64,
-) -> Option<Touch> {
-    roll_within(touch, radius, from, turn, tolerance, MAX_HALVINGS)
-}
-
-fn roll_within(
-    touch: &impl Fn(&Point) -> Option<Touch>,
-    radius: f64,
-    from: &Touch,
-    turn: &Vector,
-    tolerance: f64,
-    halvings: u32,
-) -> Option<Touch> {
-    let half = turn * 0.5;
-    let (whole, middle) = (roll_step(touch, radius, from, turn)?, roll_step(touch, radius, from, &half)?);
-    let twice = roll_step(touch, radius, &middle, &half)?;
-    if (whole.ball.center - twice.ball.center).norm() <= tolerance {
-        return Some(twice);
-    }
-    let halvings = halvings.checked_sub(1)?;
-    let middle = roll_within(touch, radius, from, &half, 0.5 * tolerance, halvings)?;
-    roll_within(touch, radius, &middle, &half, 0.5 * tolerance, halvings)
-}
-
-/// One step of the midpoint rule.
-pub fn roll_step(touch: &impl Fn(&Point) -> Option<Touch>, radius: f64, from: &Touch, turn: &Vector) -> Option<Touch> {
-    let mut to = *from;
-    for _ in 0..MAX_ITERATIONS {
-        let off = slip(radius, &from.ball, &to.ball, turn) + to.ball.normal * (to.distance - radius);
-        if off.norm() < 1e-13 * radius.max(1e-3) {
-            break;
-        }
-        to = touch(&(to.ball.center - off))?;
-    }
-    Some(to)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -133,6 +81,48 @@ mod tests {
     use regrasp_geometry::Shape;
 
     const RADIUS: f64 = 0.006;
+
+    /// Fixed-point steps for one step of the midpoint rule; each gains at least the factor `turn / 2`.
+    const MAX_ITERATIONS: usize = 60;
+    /// Most often that a step is halved.
+    const MAX_HALVINGS: u32 = 20;
+
+    /// Rolls a ball that touches at `from` by the rotation vector `turn` relative to the object, at constant angular velocity
+    /// in the object frame. `touch` finds the nearest point of the surface. Steps are halved until one and two halves of it
+    /// agree within `tolerance` times their share of the turn.
+    fn roll(touch: &impl Fn(&Point) -> Option<Touch>, from: &Touch, turn: &Vector, tolerance: f64) -> Touch {
+        roll_within(touch, from, turn, tolerance, MAX_HALVINGS)
+    }
+
+    fn roll_within(
+        touch: &impl Fn(&Point) -> Option<Touch>,
+        from: &Touch,
+        turn: &Vector,
+        tolerance: f64,
+        halvings: u32,
+    ) -> Touch {
+        let half = turn * 0.5;
+        let twice = roll_step(touch, &roll_step(touch, from, &half), &half);
+        if (roll_step(touch, from, turn).ball.center - twice.ball.center).norm() <= tolerance {
+            return twice;
+        }
+        assert!(halvings > 0, "the tolerance is not reached");
+        let middle = roll_within(touch, from, &half, 0.5 * tolerance, halvings - 1);
+        roll_within(touch, &middle, &half, 0.5 * tolerance, halvings - 1)
+    }
+
+    /// One step of the midpoint rule.
+    fn roll_step(touch: &impl Fn(&Point) -> Option<Touch>, from: &Touch, turn: &Vector) -> Touch {
+        let mut to = *from;
+        for _ in 0..MAX_ITERATIONS {
+            let off = slip(RADIUS, &from.ball, &to.ball, turn) + to.ball.normal * (to.distance - RADIUS);
+            if off.norm() < 1e-13 * RADIUS {
+                return to;
+            }
+            to = touch(&(to.ball.center - off)).expect("the ball is near the surface");
+        }
+        panic!("the step does not converge");
+    }
 
     fn on(surface: &Surface) -> impl Fn(&Point) -> Option<Touch> + '_ {
         |center| Touch::of(surface, center)
@@ -168,7 +158,7 @@ mod tests {
         let start = touch(&Point::new(0.1, -0.05, 0.01 + RADIUS)).unwrap();
         // Also about the normal: that moves nothing.
         let turn = Vector::new(0.7, -1.1, 2.0);
-        let end = roll(&touch, RADIUS, &start, &turn, 1e-12).unwrap();
+        let end = roll(&touch, &start, &turn, 1e-12);
         let expected = start.ball.center + RADIUS * turn.cross(&Vector::z());
         assert!((end.ball.center - expected).norm() < 1e-12, "{} {expected}", end.ball.center);
         assert!((end.distance - RADIUS).abs() < 1e-12);
@@ -186,7 +176,7 @@ mod tests {
             let touch = |p: &Point| if path_radius > large { outside(p) } else { inside(p) };
             let start = touch(&Point::new(0.0, 0.0, path_radius)).unwrap();
             for turn in [0.3, 1.5, -2.5] {
-                let end = roll(&touch, RADIUS, &start, &(Vector::x() * turn), 1e-12).unwrap();
+                let end = roll(&touch, &start, &(Vector::x() * turn), 1e-12);
                 // w x n with w along x and n along +-z.
                 let angle = turn * RADIUS / path_radius * start.ball.normal.z;
                 let expected = Point::new(0.0, -path_radius * angle.sin(), path_radius * angle.cos());
@@ -208,7 +198,7 @@ mod tests {
         let touch = on(&surface);
         let start = touch(&Point::from(Vector::new(0.3, -0.5, 0.9).normalize() * (large + RADIUS))).unwrap();
         let turn = Vector::new(1.0, 0.4, -0.8);
-        let end = roll(&touch, RADIUS, &start, &turn, 1e-12).unwrap();
+        let end = roll(&touch, &start, &turn, 1e-12);
         let expected = Rotation3::new(turn * (RADIUS / (large + RADIUS))) * start.ball.center;
         assert!((end.ball.center - expected).norm() < 1e-11);
     }
@@ -223,7 +213,7 @@ mod tests {
         let expected = Rotation3::new(turn * (RADIUS / (large + RADIUS))) * start.ball.center;
         let error = |n_steps: u32| {
             let share = turn / f64::from(n_steps);
-            let end = (0..n_steps).try_fold(start, |at, _| roll_step(&touch, RADIUS, &at, &share)).unwrap();
+            let end = (0..n_steps).fold(start, |at, _| roll_step(&touch, &at, &share));
             (end.ball.center - expected).norm()
         };
         let errors: Vec<f64> = [4, 8, 16, 32, 64].map(error).to_vec();
@@ -242,15 +232,15 @@ mod tests {
             let start = touch(&Point::from(Vector::from(rng.direction()) * 0.1)).unwrap();
             let start = touch(&(start.foot.point_in_object + start.ball.normal * RADIUS)).unwrap();
             let turn = Vector::from(rng.direction()) * 0.2;
-            let there = roll_step(&touch, RADIUS, &start, &turn).unwrap();
+            let there = roll_step(&touch, &start, &turn);
             assert!((there.distance - RADIUS).abs() < 1e-12);
-            let back = roll_step(&touch, RADIUS, &there, &-turn).unwrap();
+            let back = roll_step(&touch, &there, &-turn);
             assert!((back.ball.center - start.ball.center).norm() < 1e-12);
         }
     }
 
-    /// Rolling without slipping: the traces on object and ball are equally long, and the velocities of the two material
-    /// points agree by finite differences.
+    /// Rolling without slipping: the material point of the ball that touches has no velocity over the object, by finite
+    /// differences.
     #[test]
     fn material_points_that_touch_move_alike() {
         let surface = Surface::of(&Shape::Ellipsoid { radii: Vector::new(0.03, 0.02, 0.04) }).unwrap();
@@ -259,7 +249,7 @@ mod tests {
         let start = touch(&(center.point_in_object + center.normal_in_object.into_inner() * RADIUS)).unwrap();
         let omega = Vector::new(0.3, -0.8, 0.5);
         let h = 1e-5;
-        let end = roll_step(&touch, RADIUS, &start, &(omega * h)).unwrap();
+        let end = roll_step(&touch, &start, &(omega * h));
         // The point of the ball that touches at the start, carried along by the ball.
         let arm = -start.ball.normal * RADIUS;
         let carried = end.ball.center + Rotation3::new(omega * h) * arm;

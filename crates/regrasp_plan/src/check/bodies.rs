@@ -2,6 +2,7 @@
 
 use crate::check::kinematics::Path;
 use crate::check::model::Model;
+use nalgebra::{Rotation3, UnitQuaternion};
 use regrasp_geometry::reference::ReferenceShape;
 use regrasp_geometry::{Point, Pose, Shape};
 use regrasp_robot::LinkId;
@@ -147,13 +148,13 @@ impl Bodies {
             }
         }
         for (f, finger) in model.fingers.iter().enumerate() {
-            if finger.radius > 0.0 {
+            if let Some((shape, turn)) = finger.own_shape() {
                 self.carriers.push(Carrier::Link(finger.path.clone()));
-                let at = Pose::translation(finger.center.x, finger.center.y, finger.center.z);
-                let ball = Shape::Sphere { radius: finger.radius };
+                let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));
+                let at = Pose::from_parts(finger.center.coords.into(), turn);
                 let carrier = self.carriers.len() - 1;
                 let name = format!("tip of {}", finger.name);
-                let item = self.add(&name, Owner::Finger(f), carrier, &at, &ball)?;
+                let item = self.add(&name, Owner::Finger(f), carrier, &at, &shape)?;
                 (item.link, item.body_depth, item.is_tip) = (Some(finger.tip_link), finger.path.joints.len(), true);
             }
         }

@@ -4,12 +4,14 @@
 use crate::check::continuity::{contact_of, moving_finger, pose_between};
 use crate::check::edges::Edges;
 use crate::check::model::{FingerModel, Model};
-use crate::check::rolling::bounds_in_object;
+use crate::check::rolling::{bounds_in_object, speed_in_object};
 use crate::check::surface;
+use crate::check::tip::TipSurface;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, Plan, Waypoint};
 use regrasp_geometry::{Point, Pose, Vector};
+use regrasp_grasp::Contact;
 use regrasp_scene::Object;
 use std::collections::BTreeSet;
 
@@ -18,8 +20,8 @@ const MOST_SAMPLES: usize = 4096;
 
 /// Largest distance of a fingertip from the fixed contact that it holds, over the plan; violations go to the log.
 ///
-/// Between samples the bound is exact: the tip's centre in the object frame deviates from the chord between two
-/// samples by at most (largest acceleration) (interval)^2 / 8.
+/// Between samples the bound is exact: the centre of a ball in the object frame deviates from the chord between two samples by
+/// at most (largest acceleration) (interval)^2 / 8; what touches of another tip moves by at most (largest speed) (interval) / 2.
 pub fn check_tips(model: &Model, plan: &Plan, log: &mut Log) -> f64 {
     let tolerance = plan.promises.contact_tolerance;
     let mut largest: f64 = 0.0;
@@ -60,28 +62,48 @@ fn holds(waypoint: &Waypoint, finger: usize) -> bool {
     waypoint.contacts[finger].mode == ContactMode::Fixed
 }
 
-/// Where the tip's centre belongs, in the object frame.
-fn center_in_object(finger: &FingerModel, waypoint: &Waypoint, f: usize) -> Option<Point> {
-    let contact = contact_of(&waypoint.contacts[f])?;
-    Some(contact.point_in_object + contact.normal_in_object.into_inner() * finger.radius)
+/// Distance of the tip from the contact when joints and object are given: for balls, of the centre from where it belongs; for
+/// others, of the point that faces the contact's normal from the contact, and what the hull is off the ellipsoid there.
+fn error(finger: &FingerModel, joints: &[f64], world_from_object: &Pose, contact: &Contact) -> f64 {
+    let normal = contact.normal_in_object.into_inner();
+    match finger.surface {
+        TipSurface::Ball => {
+            let target = contact.point_in_object + normal * finger.radius;
+            (finger.center_in_world(joints) - world_from_object * target).norm()
+        }
+        TipSurface::Ellipsoid { .. } => {
+            let normal = world_from_object * normal;
+            let touching = finger.touching_in_world(joints, &normal);
+            (touching - world_from_object * contact.point_in_object).norm() + finger.misfit(joints, &normal)
+        }
+    }
 }
 
-/// Distance of the tip's centre from where it belongs, at a waypoint; infinite when the finger has no contact there.
+/// Distance of the tip from its contact at a waypoint; infinite when the finger has no contact there.
 pub fn error_at(finger: &FingerModel, waypoint: &Waypoint, f: usize) -> f64 {
-    let Some(target) = center_in_object(finger, waypoint, f) else { return f64::INFINITY };
-    let pose = Pose::from(&waypoint.world_from_object);
-    (finger.center_in_world(&waypoint.joints) - pose * target).norm()
+    let Some(contact) = contact_of(&waypoint.contacts[f]) else { return f64::INFINITY };
+    error(finger, &waypoint.joints, &Pose::from(&waypoint.world_from_object), &contact)
 }
 
 /// Upper bound of the error over the closed step, and where it is largest.
 fn error_between(finger: &FingerModel, from: &Waypoint, to: &Waypoint, f: usize, tolerance: f64) -> (f64, f64) {
-    let Some(target) = center_in_object(finger, from, f) else { return (f64::INFINITY, 0.0) };
+    let Some(contact) = contact_of(&from.contacts[f]) else { return (f64::INFINITY, 0.0) };
     let (start, end) = (Pose::from(&from.world_from_object), Pose::from(&to.world_from_object));
-    let (_, acceleration) = bounds_in_object(finger, from, to);
     // Between samples no more than a twentieth of the tolerance may be unknown.
     let allowed = (0.05 * tolerance).max(1e-9);
-    let n_samples = ((acceleration / (8.0 * allowed)).sqrt().ceil() as usize).clamp(1, MOST_SAMPLES);
-    let remainder = acceleration / (8.0 * (n_samples * n_samples) as f64);
+    let (n_samples, remainder) = match finger.surface {
+        TipSurface::Ball => {
+            let (_, acceleration) = bounds_in_object(finger, from, to);
+            let n_samples = ((acceleration / (8.0 * allowed)).sqrt().ceil() as usize).clamp(1, MOST_SAMPLES);
+            (n_samples, acceleration / (8.0 * (n_samples * n_samples) as f64))
+        }
+        // The error changes no faster than the point that touches moves, and that wanders over the tip.
+        TipSurface::Ellipsoid { .. } => {
+            let speed = speed_in_object(finger, from, to);
+            let n_samples = ((speed / (2.0 * allowed)).ceil() as usize).clamp(1, MOST_SAMPLES);
+            (n_samples, speed / (2.0 * n_samples as f64))
+        }
+    };
     let mut worst = (0.0, 0.0);
     let mut joints = from.joints.clone();
     for sample in 0..=n_samples {
@@ -89,12 +111,33 @@ fn error_between(finger: &FingerModel, from: &Waypoint, to: &Waypoint, f: usize,
         for (k, joint) in joints.iter_mut().enumerate() {
             *joint = from.joints[k] + t * (to.joints[k] - from.joints[k]);
         }
-        let error = (finger.center_in_world(&joints) - pose_between(&start, &end, t) * target).norm();
+        let error = error(finger, &joints, &pose_between(&start, &end, t), &contact);
         if error > worst.0 {
             worst = (error, t);
         }
     }
     (worst.0 + remainder, worst.1)
+}
+
+/// Every fingertip that holds touches with its pad, at waypoints.
+pub fn check_pads(model: &Model, plan: &Plan, log: &mut Log) {
+    for (s, segment) in plan.segments.iter().enumerate() {
+        for (w, waypoint) in segment.waypoints.iter().enumerate() {
+            for (finger, state) in model.fingers.iter().zip(&waypoint.contacts) {
+                let Some(contact) = contact_of(state).filter(|_| state.holds()) else { continue };
+                let normal = Pose::from(&waypoint.world_from_object) * contact.normal_in_object.into_inner();
+                if let Some((angle, allowed)) = finger.off_pad(&waypoint.joints, &normal) {
+                    let degrees = [angle, allowed].map(f64::to_degrees);
+                    let message = format!(
+                        "finger \"{}\" touches {:.2} degrees from the axis of its pad, which ends at {:.2}",
+                        finger.name, degrees[0], degrees[1]
+                    );
+                    let violation = Violation::new(Kind::ContactOffPad, message).when(Moment::at(s, w));
+                    log.push(violation.subjects([finger.name.as_str()]).amount(angle, allowed));
+                }
+            }
+        }
+    }
 }
 
 /// Every contact of the plan lies on the object's surface, with the surface's normal, away from its edges.

@@ -388,7 +388,7 @@ pub(super) fn torques_of(
     couple: &Vector,
 ) -> Vec<JointWork> {
     let world_from_object = Pose::from(&waypoint.world_from_object);
-    let point = finger.center_in_world(&waypoint.joints) - world_from_object * normal * finger.radius;
+    let point = finger.touching_in_world(&waypoint.joints, &(world_from_object * normal));
     let (force, couple) = (world_from_object * force, world_from_object * couple);
     let axes = finger.path.axes(&waypoint.joints);
     let arm = axes.iter().map(|axis| (point - axis.origin).norm()).fold(0.0, f64::max);

@@ -47,6 +47,8 @@ pub mod rolling;
 pub mod surface;
 /// When waypoints are passed, and how fast.
 pub mod times;
+/// Fingertips: where they touch.
+pub mod tip;
 /// What can be wrong with a plan.
 pub mod violation;
 /// Poses to be passed between start and goal.
@@ -254,6 +256,7 @@ fn judge(
     let rolled = rolling::check_rolling(&scene.object.shape, model, plan, settings, log);
     report.max_contact_error = contact::check_tips(model, plan, log).max(rolled.max_contact_error);
     report.max_slip = rolled.max_slip;
+    contact::check_pads(model, plan, log);
     contact::check_contacts(&scene.object, model, plan, settings, log);
     report.min_margin = promises::check_closure(&scene.object, model, plan, settings, log);
     promises::check_promises(&scene.object, plan, settings, report.min_margin, log);

@@ -1,22 +1,28 @@
 //! The scene as the checker sees it: paths to links, joint limits and fingertips, straight from the robot.
 
 use crate::check::kinematics::{Path, world_from_root};
+use crate::check::tip::TipSurface;
 use nalgebra::Matrix4;
 use regrasp_geometry::{Point, Pose};
-use regrasp_robot::{ContactModel, JointKind, LinkId, TipShape};
+use regrasp_robot::tip::Pad;
+use regrasp_robot::{ContactModel, JointKind, LinkId};
 use regrasp_scene::Scene;
 
-/// A fingertip that touches with a ball; a sharp tip is a ball of radius zero.
+/// A finger with its tip; a sharp tip is a ball of radius zero.
 #[derive(Debug, Clone)]
 pub struct FingerModel {
     /// Name of the finger.
     pub name: String,
     /// Path to the last moving body, in whose frame [`FingerModel::center`] is.
     pub path: Path,
-    /// Centre of the ball.
+    /// Centre of the ball or ellipsoid that touches.
     pub center: Point,
-    /// Radius of the ball.
+    /// Radius of the ball, or largest half axis of the ellipsoid.
     pub radius: f64,
+    /// The surface that touches.
+    pub surface: TipSurface,
+    /// Where it may touch; anywhere without one.
+    pub pad: Option<Pad>,
     /// What it transmits where it touches.
     pub contact: ContactModel,
     /// The link that may touch the object.
@@ -28,7 +34,7 @@ pub struct FingerModel {
 }
 
 impl FingerModel {
-    /// Centre of the tip's ball in the world.
+    /// Centre of the tip in the world.
     pub fn center_in_world(&self, joints: &[f64]) -> Point {
         self.path.world_from_link(joints).transform_point(&self.center)
     }
@@ -86,7 +92,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// Reads the hand of `scene`. Err with a message when the hand contradicts itself or has tips that are no balls.
+    /// Reads the hand of `scene`. Err with a message when the hand contradicts itself.
     pub fn new(scene: &Scene) -> Result<Self, String> {
         let hand = &scene.hand;
         let robot = &hand.robot;
@@ -97,16 +103,6 @@ impl Model {
         for finger in &hand.fingers {
             let mut path = Path::new(robot, finger.tip.link, &world_from_root, &joint_names)?;
             path.last_from_link = Matrix4::identity();
-            let radius = match finger.tip.shape {
-                TipShape::Point => 0.0,
-                TipShape::Sphere { radius } => radius,
-                TipShape::Hull(_) => {
-                    return Err(format!(
-                        "the tip of finger \"{}\" is not a ball; this version judges balls",
-                        finger.name
-                    ));
-                }
-            };
             let coordinates = first..first + finger.chain.n_coordinates();
             first = coordinates.end;
             fingers.push(FingerModel {
@@ -114,7 +110,9 @@ impl Model {
                 moving_joints: path.joints.iter().map(|joint| joint.joint).collect(),
                 path,
                 center: finger.tip.center_in_body,
-                radius,
+                radius: finger.tip.radius(),
+                surface: TipSurface::of(&finger.tip),
+                pad: finger.tip.pad,
                 contact: finger.tip.contact,
                 tip_link: finger.tip.link,
                 coordinates,

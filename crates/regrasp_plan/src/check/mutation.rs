@@ -21,7 +21,7 @@ mod way;
 use crate::check::continuity::{contact_of, moving_finger, pose_difference};
 use crate::check::model::Model;
 use crate::check::violation::ViolationKind::{self, *};
-use crate::plan::{ContactMode, ContactState, Plan, PoseData, Segment, SegmentKind};
+use crate::plan::{ContactMode, ContactState, Plan, PoseData, Segment, SegmentKind, Waypoint};
 use choice::{any_segment, any_waypoint, pick, pick_waypoint, swap_two, waypoints_mut};
 use nalgebra::{DMatrix, DVector};
 use regrasp_base::Rng;
@@ -268,7 +268,8 @@ impl Breeder<'_> {
                 let way = if along == 0.0 { side } else { contact.normal_in_object };
                 let sign = if along == 0.0 { 1.0 } else { along };
                 let off = way.into_inner() * (sign * tolerance * rng.uniform(2.1, 4.0));
-                let center = contact.point_in_object + contact.normal_in_object.into_inner() * model.fingers[f].radius;
+                let normal = contact.normal_in_object.into_inner();
+                let center = contact.point_in_object + model.fingers[f].center_from_contact(waypoint, &normal);
                 move_tip(model, f, &mut waypoint.joints, &(object * (center + off)))
             });
         }
@@ -397,10 +398,11 @@ impl Breeder<'_> {
             let f = moving_finger(model, segment)?;
             let (from, to) = (contact_of(&first.contacts[f])?, contact_of(&last.contacts[f])?);
             let object = Pose::from(&first.world_from_object);
-            let center = |c: &regrasp_grasp::Contact| {
-                object * (c.point_in_object + c.normal_in_object.into_inner() * model.fingers[f].radius)
+            let center = |c: &regrasp_grasp::Contact, waypoint: &Waypoint| {
+                let away = model.fingers[f].center_from_contact(waypoint, &c.normal_in_object);
+                object * (c.point_in_object + away)
             };
-            let (a, b) = (center(&from), center(&to));
+            let (a, b) = (center(&from, &first), center(&to, &last));
             if (a - b).norm() < 2e-3 {
                 return None;
             }
@@ -510,7 +512,7 @@ fn replace_contact(
             let state = &mut waypoint.contacts[f];
             state.point_in_object = Some(point.into());
             state.normal_in_object = Some(normal.into_inner().into());
-            let center = point + normal.into_inner() * model.fingers[f].radius;
+            let center = point + model.fingers[f].center_from_contact(waypoint, &normal);
             move_tip(model, f, &mut waypoint.joints, &(Pose::from(&waypoint.world_from_object) * center))?;
         }
     }

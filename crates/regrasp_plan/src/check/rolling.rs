@@ -10,6 +10,7 @@ use crate::check::contact::error_at;
 use crate::check::continuity::{pose_between, pose_difference};
 use crate::check::model::{FingerModel, Model};
 use crate::check::patch::Patch;
+use crate::check::tip::TipSurface;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, Plan, Waypoint};
@@ -96,9 +97,25 @@ pub struct Roll<'a> {
     to: &'a Waypoint,
     world_from_object: [Pose; 2],
     patch: Patch<'a>,
+    /// Bound of the speed of whatever touches in the object frame.
+    speed: f64,
     /// Bound of the second derivative of the centre in the object frame.
     acceleration: f64,
 }
+
+/// A tip over the surface, in the object frame.
+#[derive(Debug, Clone, Copy)]
+struct Touch {
+    /// The point of the surface nearest to the tip.
+    foot: Point,
+    /// The direction from there to the tip.
+    normal: Vector,
+    /// Distance, negative when the tip presses in.
+    gap: f64,
+}
+
+/// Steps of the search for nearest points on an ellipsoid and a surface.
+const MOST_TOUCH_STEPS: usize = 100;
 
 impl<'a> Roll<'a> {
     /// The step of `finger` over an object of this shape. The surface is looked at as far from the tip as it can come in
@@ -113,8 +130,11 @@ impl<'a> Roll<'a> {
         let world_from_object = [from, to].map(|waypoint| Pose::from(&waypoint.world_from_object));
         let (speed, acceleration) = bounds_in_object(finger, from, to);
         let start = world_from_object[0].inverse() * finger.center_in_world(&from.joints);
-        let patch = Patch::near(shape, &start, finger.radius + 2.0 * tolerance + speed);
-        Roll { finger, from, to, world_from_object, patch, acceleration }
+        // Feet are sought from the centre, and from inside an ellipsoid.
+        let inside = finger.surface.curvature_radii().map_or(0.0, |[_, flattest]| 2.0 * flattest);
+        let patch = Patch::near(shape, &start, finger.radius + inside + 2.0 * tolerance + speed);
+        let speed = speed_in_object(finger, from, to);
+        Roll { finger, from, to, world_from_object, patch, speed, acceleration }
     }
 
     fn object_from_link(&self, t: f64) -> Matrix4<f64> {
@@ -123,36 +143,49 @@ impl<'a> Roll<'a> {
         pose_between(start, end, t).inverse().to_homogeneous() * self.finger.path.world_from_link(&joints)
     }
 
-    fn center(&self, t: f64) -> Point {
-        self.object_from_link(t).transform_point(&self.finger.center)
-    }
-
     /// Where the tip touches, and the normal there, in the object frame.
     pub fn contact(&self, t: f64) -> Option<(Point, Vector)> {
-        self.touching(&self.center(t))
+        self.touch(&self.object_from_link(t)).map(|touch| (touch.foot, touch.normal))
     }
 
-    /// Where a tip with its centre at `center` touches, and the normal there: the point of the surface nearest to it, and the
-    /// direction from there to it.
-    fn touching(&self, center: &Point) -> Option<(Point, Vector)> {
-        let foot = self.patch.foot(center)?;
-        Some((foot, (center - foot).try_normalize(1e-9)?))
+    /// The tip over the surface with its link at `object_from_link`.
+    ///
+    /// For a ball the foot is that of its centre. For an ellipsoid the foot is sought from a point inside it, below the point
+    /// of the tip that faces the normal, until the normal from that foot is the same.
+    fn touch(&self, object_from_link: &Matrix4<f64>) -> Option<Touch> {
+        let center = object_from_link.transform_point(&self.finger.center);
+        let foot = self.patch.foot(&center)?;
+        let mut touch = Touch { foot, normal: (center - foot).try_normalize(1e-9)?, gap: f64::INFINITY };
+        let Some([sharpest, flattest]) = self.finger.surface.curvature_radii() else {
+            touch.gap = (center - foot).norm() - self.finger.radius;
+            return touch.gap.is_finite().then_some(touch);
+        };
+        let inward = 0.5 * (sharpest + flattest);
+        let turn = object_from_link.fixed_view::<3, 3>(0, 0);
+        for _ in 0..MOST_TOUCH_STEPS {
+            let facing = object_from_link.transform_point(&self.finger.point_facing(&-turn.tr_mul(&touch.normal)));
+            let inside = facing + touch.normal * inward;
+            let foot = self.patch.foot(&inside)?;
+            let normal = (inside - foot).try_normalize(1e-9)?;
+            let settled = (normal - touch.normal).norm() < 1e-12;
+            touch = Touch { foot, normal, gap: (facing - foot).dot(&normal) };
+            if settled {
+                return touch.gap.is_finite().then_some(touch);
+            }
+        }
+        None
     }
 
-    /// Distance of the ball from the surface, negative when it presses in; infinite when no surface is near.
-    fn gap(&self, center: &Point) -> f64 {
-        let distance = self.patch.foot(center).map(|foot| (center - foot).norm());
-        distance.filter(|distance| distance.is_finite()).map_or(f64::INFINITY, |distance| distance - self.finger.radius)
-    }
-
-    /// The largest distance of the ball from the surface, either side, and when. When it is below `tolerance`, it is so
-    /// at every moment: a distance changes no faster than the centre moves, and that strays from the chord of an interval
-    /// `h` by at most acceleration `h^2 / 8`. Where this cannot be shown, the answer is above the tolerance.
+    /// The largest distance of the tip from the surface, either side, and when. When it is below `tolerance`, it is so at every
+    /// moment: a ball's distance changes no faster than its centre moves, and that strays from the chord of an interval `h` by
+    /// at most acceleration `h^2 / 8`; an ellipsoid's no faster than any of its points moves. Where this cannot be shown, the
+    /// answer is above the tolerance.
     pub fn off_surface(&self, tolerance: f64) -> (f64, f64) {
         let mut worst = (0.0, 0.0);
         let mut known = |t: f64| {
-            let center = self.center(t);
-            let gap = self.gap(&center);
+            let link = self.object_from_link(t);
+            let center = link.transform_point(&self.finger.center);
+            let gap = self.touch(&link).map_or(f64::INFINITY, |touch| touch.gap);
             if gap.abs() > worst.0 {
                 worst = (gap.abs(), t);
             }
@@ -161,8 +194,10 @@ impl<'a> Roll<'a> {
         let mut pending = vec![(known(0.0), known(1.0))];
         while let Some((from, to)) = pending.pop() {
             let span = to.0 - from.0;
-            let stray = self.acceleration * span * span / 8.0;
-            let way = (to.1 - from.1).norm();
+            let (way, stray) = match self.finger.surface {
+                TipSurface::Ball => ((to.1 - from.1).norm(), self.acceleration * span * span / 8.0),
+                TipSurface::Ellipsoid { .. } => (self.speed * span, 0.0),
+            };
             let most = 0.5 * ((from.2 + to.2).abs() + way) + stray;
             if most <= tolerance || from.2.abs().max(to.2.abs()) > tolerance {
                 continue;
@@ -182,9 +217,11 @@ impl<'a> Roll<'a> {
     /// most `unknown`, unless 128 pieces are too few for that. Infinite where no surface is near.
     pub fn slip(&self, unknown: f64) -> f64 {
         let object_from_link = |t: f64| self.object_from_link(t);
-        let normal = |center: &Point| self.touching(center).map(|(_, normal)| normal);
-        let FingerModel { center, radius, .. } = self.finger;
-        slip(|n_pieces| slide(&object_from_link, center, *radius, &normal, n_pieces), unknown)
+        let touching = |link: &Matrix4<f64>| {
+            let normal = self.touch(link)?.normal;
+            Some((self.finger.point_facing(&-link.fixed_view::<3, 3>(0, 0).tr_mul(&normal)), normal))
+        };
+        slip(|n_pieces| slide(&object_from_link, &touching, n_pieces), unknown)
     }
 }
 
@@ -199,6 +236,17 @@ pub fn bounds_in_object(finger: &FingerModel, from: &Waypoint, to: &Waypoint) ->
     let relative = rates.speed + shift;
     let arm = (finger.center_in_world(&from.joints) - origin).norm() + relative;
     (relative + turn * arm, rates.acceleration + 2.0 * turn * relative + turn * turn * arm)
+}
+
+/// Bound of the speed, per step, of whatever of a tip touches, seen from the object: of the points of the tip, and of the place
+/// on it that faces a direction, which wanders by no more than the largest radius of curvature per radian.
+pub fn speed_in_object(finger: &FingerModel, from: &Waypoint, to: &Waypoint) -> f64 {
+    let flattest = finger.surface.curvature_radii().map_or(0.0, |[_, flattest]| flattest);
+    let (shift, turn) = pose_difference(&from.world_from_object, &to.world_from_object);
+    let reach = finger.radius + flattest;
+    let relative = finger.path.rates(&finger.center, reach, &from.joints, &to.joints).speed + shift;
+    let origin = Pose::from(&from.world_from_object) * Point::origin();
+    relative + turn * ((finger.center_in_world(&from.joints) - origin).norm() + reach + relative)
 }
 
 /// Length of the integral that `slide_in` approximates in so many pieces; infinite where it gives none.
@@ -224,24 +272,19 @@ fn slip(slide_in: impl Fn(usize) -> Option<Vector>, unknown: f64) -> f64 {
     }
 }
 
-/// The integral of the sliding velocity of a ball of `radius` about `center`, which `object_from_link` carries from 0 to 1,
-/// over a surface whose normal towards a centre beside it is given; none where there is no normal. In each of `n_pieces`
-/// pieces the point that touches half-way is carried from the beginning of the piece to its end: the midpoint rule, whose
-/// error falls with the square of the number of pieces.
-fn slide(
-    object_from_link: &dyn Fn(f64) -> Matrix4<f64>,
-    center: &Point,
-    radius: f64,
-    normal: &dyn Fn(&Point) -> Option<Vector>,
-    n_pieces: usize,
-) -> Option<Vector> {
+/// Which point of a link touches, in its frame, and the normal there, in the object frame, with the link where it is given.
+type Touching<'a> = dyn Fn(&Matrix4<f64>) -> Option<(Point, Vector)> + 'a;
+
+/// The integral of the sliding velocity of a tip that `object_from_link` carries from 0 to 1; none where nothing touches. In each
+/// of `n_pieces` pieces the point that touches half-way is carried from the beginning of the piece to its end: the midpoint
+/// rule, whose error falls with the square of the number of pieces.
+fn slide(object_from_link: &dyn Fn(f64) -> Matrix4<f64>, touching: &Touching, n_pieces: usize) -> Option<Vector> {
     let mut sum = Vector::zeros();
     let mut before = object_from_link(0.0);
     for k in 0..n_pieces {
         let at = |halves: usize| (2 * k + halves) as f64 / (2 * n_pieces) as f64;
         let (middle, after) = (object_from_link(at(1)), object_from_link(at(2)));
-        let normal = normal(&middle.transform_point(center))?;
-        let touching = center - middle.fixed_view::<3, 3>(0, 0).transpose() * normal * radius;
+        let (touching, normal) = touching(&middle)?;
         let way = after.transform_point(&touching) - before.transform_point(&touching);
         sum += way - normal * normal.dot(&way);
         before = after;
@@ -261,8 +304,16 @@ mod tests {
         Translation3::from(center).to_homogeneous() * Rotation3::new(turn).to_homogeneous()
     }
 
+    /// What touches of a ball about the link's origin, over a surface with this normal below its centre.
+    fn ball_on(normal: &dyn Fn(&Point) -> Option<Vector>) -> impl Fn(&Matrix4<f64>) -> Option<(Point, Vector)> {
+        |link| {
+            let normal = normal(&link.transform_point(&Point::origin()))?;
+            Some((Point::from(-link.fixed_view::<3, 3>(0, 0).tr_mul(&normal) * RADIUS), normal))
+        }
+    }
+
     fn slip_of(motion: &dyn Fn(f64) -> Matrix4<f64>, normal: &dyn Fn(&Point) -> Option<Vector>) -> f64 {
-        slip(|n_pieces| slide(motion, &Point::origin(), RADIUS, normal, n_pieces), UNKNOWN)
+        slip(|n_pieces| slide(motion, &ball_on(normal), n_pieces), UNKNOWN)
     }
 
     fn up(_: &Point) -> Option<Vector> {
@@ -317,7 +368,7 @@ mod tests {
         // A ball that rolls unevenly on a plane: nothing slides.
         let turn = |t: f64| 2.0 * t + 0.8 * (3.0 * t).sin();
         let motion = |t: f64| carried(Vector::new(RADIUS * turn(t), 0.0, RADIUS), Vector::y() * turn(t));
-        let error = |n_pieces| slide(&motion, &Point::origin(), RADIUS, &up, n_pieces).unwrap().norm();
+        let error = |n_pieces| slide(&motion, &ball_on(&up), n_pieces).unwrap().norm();
         for n_pieces in [8, 16, 32, 64] {
             let order = (error(n_pieces) / error(2 * n_pieces)).log2();
             assert!((order - 2.0).abs() < 0.15, "{n_pieces}: {order}");

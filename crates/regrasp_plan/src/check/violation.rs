@@ -66,6 +66,8 @@ pub enum ViolationKind {
     ContactOffTip,
     /// A fingertip that should roll slides over the object.
     Slip,
+    /// A fingertip touches outside the pad that the hand file gives it.
+    ContactOffPad,
     /// A contact is not on the object's surface.
     ContactOffSurface,
     /// A contact's normal is not the surface's.

@@ -133,6 +133,7 @@ fn hand() -> Hand {
                 link: link(3),
                 shape: TipShape::Sphere { radius: TIP_RADIUS },
                 center_in_body: Point::new(0.0, 0.0, DISTAL),
+                pad: None,
                 contact: regrasp_robot::ContactModel::Point,
             };
             Finger::new(format!("f{f}"), chain, tip, shapes, vec![0.0, -0.3, 1.0])

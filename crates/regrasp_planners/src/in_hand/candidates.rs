@@ -5,7 +5,7 @@ use super::relocate::{Foothold, lift_is_within_reach};
 use super::roll::RollStep;
 use super::state::GraspState;
 use super::transfer::ik_settings;
-use super::workspace::{TipMode, Workspace, tip_target};
+use super::workspace::{TipMode, Workspace};
 use regrasp_base::Rng;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Point, Pose, UnitVector, Vector, interpolate_pose};
@@ -77,10 +77,10 @@ fn draw_contact_once(model: &Model, finger: usize, world_from_object: &Placement
     let hit = object.surface.cast_ray(&inner, &direction)?;
     let finger_model = &model.fingers[finger];
     let rough = Contact { point_in_object: hit.point_in_object, normal_in_object: hit.normal_in_object };
-    if !finger_model.ik.may_reach(&tip_target(world_from_object, &rough, finger_model.tip_radius)) {
+    if !finger_model.may_reach(world_from_object, &rough) {
         return None;
     }
-    let hit = object.surface.settle(&hit, finger_model.tip_radius)?;
+    let hit = object.surface.settle(&hit, finger_model.settle_radius)?;
     if object.surface.crease_distance(&hit) < object.edge_distance {
         return None;
     }
@@ -98,8 +98,8 @@ pub fn reach(
 ) -> Option<Coordinates> {
     let model = workspace.model;
     let normal = UnitVector::new_unchecked(world_from_object.vector(&contact.normal_in_object));
-    let target = tip_target(world_from_object, contact, model.fingers[finger].tip_radius);
-    let joints = model.fingers[finger].ik.solve_random(&target, &ik_settings(model, finger, normal), rng)?;
+    let settings = ik_settings(model, finger, normal);
+    let joints = model.fingers[finger].touch_random(world_from_object, contact, &settings, rng)?;
     if !lift_is_within_reach(model, world_from_object, finger, &Foothold { contact: Some(contact), joints: &joints }) {
         return None;
     }
@@ -133,8 +133,8 @@ pub fn follow_share(
         } else {
             let normal = UnitVector::new_unchecked(world_from_object.vector(&contact.normal_in_object));
             let settings = IkSettings { max_step: LOOK_AHEAD_STEP, ..ik_settings(model, finger, normal) };
-            let target = tip_target(world_from_object, &contact, model.fingers[finger].tip_radius);
-            let Some(next) = model.fingers[finger].ik.solve_near(&target, &current, &settings) else { break };
+            let next = model.fingers[finger].touch_near(world_from_object, &contact, &current, &settings);
+            let Some(next) = next else { break };
             next
         };
         from = world_from_object;

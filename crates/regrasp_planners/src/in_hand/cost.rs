@@ -4,7 +4,7 @@ use super::model::Model;
 use super::record::kept_margin;
 use super::settings::CostWeights;
 use super::state::{GraspState, Motion, Sequence};
-use super::workspace::{HandJoints, tip_target};
+use super::workspace::HandJoints;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Pose, frame};
 use regrasp_grasp::Contact;
@@ -94,11 +94,5 @@ pub fn lower_bound(model: &Model, poses: &[Pose], start: Option<&GraspState>, go
 
 /// True when no joints of `finger` within its limits reach `contact`. Only a closed form proves that.
 pub fn cannot_reach(model: &Model, finger: usize, contact: &Contact, world_from_object: &Placement) -> bool {
-    let finger = &model.fingers[finger];
-    let mut solutions = Vec::new();
-    if finger.ik.is_closed_form() {
-        let target = tip_target(world_from_object, contact, finger.tip_radius);
-        finger.ik.solve_all(&target, &IkSettings::default(), &mut solutions);
-    }
-    finger.ik.is_closed_form() && solutions.is_empty()
+    model.fingers[finger].cannot_touch(world_from_object, contact, &IkSettings::default())
 }

@@ -5,7 +5,7 @@ use super::model::{Body, Carrier, Model};
 use super::settings::Method;
 use super::state::GraspState;
 use super::transfer::ik_settings;
-use super::workspace::{Contacts, HandJoints, TipMode, Workspace, tip_target};
+use super::workspace::{Contacts, HandJoints, TipMode, Workspace};
 use crate::failure::{Failure, FailureKind};
 use regrasp_base::Rng;
 use regrasp_geometry::collision::{Answer, Placement, separation};
@@ -225,10 +225,14 @@ fn from_joints(model: &Model, end: End, world_from_object: &Pose, values: &[f64]
                 "give joint positions within the limits; regrasp inspect prints them",
             ));
         }
-        let tip = placement.point_to_child(&finger.ik.tip(&own));
+        // No finger moves by the rounding of the given joints: the contact is the one that the tip has as it stands.
         let surface = &model.scene.object.surface;
-        let (foot, distance) = surface.project_signed(&tip);
-        let distance = distance - finger.tip_radius;
+        let Some((contact, distance)) = finger.contact_at(surface, &own, &placement) else {
+            return Err(end.failure(
+                format!("at the {} the tip of finger \"{name}\" has no contact: it is deep in the object", end.name()),
+                "correct the joints or give contacts",
+            ));
+        };
         if distance.abs() > TOUCHING {
             return Err(end.failure(
                 format!(
@@ -239,14 +243,13 @@ fn from_joints(model: &Model, end: End, world_from_object: &Pose, values: &[f64]
                 "correct the joints or give contacts",
             ));
         }
-        let away = tip - foot.point_in_object;
-        let normal_in_object = match UnitVector::try_new(away, 1e-6) {
-            Some(normal) if finger.tip_radius > 0.0 => normal,
-            _ => foot.normal_in_object,
-        };
-        // The contact that the tip has as it stands: no finger moves by the rounding of the given joints.
-        let point_in_object = tip - normal_in_object.into_inner() * finger.tip_radius;
-        contacts.push(Contact { point_in_object, normal_in_object });
+        if !finger.pad_faces(&own, &placement.vector(&contact.normal_in_object)) {
+            return Err(end.failure(
+                format!("at the {} finger \"{name}\" touches outside its pad", end.name()),
+                "correct the joints or give contacts",
+            ));
+        }
+        contacts.push(contact);
         joints.push(own);
     }
     Ok(GraspState::held_by_all(*world_from_object, contacts, joints))
@@ -272,7 +275,7 @@ fn from_contacts(
                 "give a point on the surface, in the object frame",
             ));
         }
-        let foot = surface.settle(&foot, model.fingers[f].tip_radius).unwrap_or(foot);
+        let foot = surface.settle(&foot, model.fingers[f].settle_radius).unwrap_or(foot);
         let contact = Contact { point_in_object: foot.point_in_object, normal_in_object: foot.normal_in_object };
         let mut workspace = Workspace::new(model);
         workspace.place_object(world_from_object);
@@ -280,8 +283,8 @@ fn from_contacts(
             (0..REACH_TRIES).find_map(|_| super::candidates::reach(&mut workspace, f, &contact, &placement, rng));
         let Some(own) = reached else {
             let normal = UnitVector::new_unchecked(placement.vector(&contact.normal_in_object));
-            let target = tip_target(&placement, &contact, model.fingers[f].tip_radius);
-            let reachable = model.fingers[f].ik.solve_random(&target, &ik_settings(model, f, normal), rng).is_some();
+            let settings = ik_settings(model, f, normal);
+            let reachable = model.fingers[f].touch_random(&placement, &contact, &settings, rng).is_some();
             let why = if reachable { "only in collision" } else { "not at all within its joint limits" };
             return Err(end.failure(
                 format!("finger \"{name}\" reaches its {} contact {why}", end.name()),

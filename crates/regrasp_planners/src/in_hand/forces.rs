@@ -250,7 +250,7 @@ fn joint_rows(
     chain.forward_frames(joints, &mut frames);
     let normal = world_from_object.vector(&contact.normal_in_object);
     let last = frames.last().unwrap_or(&BodyFrame::IDENTITY);
-    let touching = last.point(&of_hand.tip.center_in_body).coords - normal * model.fingers[finger].tip_radius;
+    let touching = last.point(&of_hand.tip.center_in_body).coords + model.fingers[finger].arm(last, &normal);
     let mut rows: JointRows =
         limits.iter().map(|&limit| JointRow { per_force: Vector::zeros(), per_torsion: 0.0, limit }).collect();
     for (joint, frame) in chain.joints.iter().zip(&frames) {

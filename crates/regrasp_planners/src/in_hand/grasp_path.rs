@@ -9,7 +9,7 @@ use super::search::Search;
 use super::state::GraspState;
 use super::tally::Reason;
 use super::transfer::{follow_contact, ik_settings};
-use super::workspace::{Contacts, HandJoints, tip_target};
+use super::workspace::{Contacts, HandJoints};
 use arrayvec::ArrayVec;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::surface::Geodesic;
@@ -117,15 +117,8 @@ fn trace(search: &mut Search, model: &Model, from: &GraspState, to: &GraspState)
 
 /// True unless the finger has a closed form that says the contact is out of its reach.
 fn in_reach(model: &Model, finger: usize, contact: &Contact, world_from_object: &Placement) -> bool {
-    let ik = model.fingers[finger].ik;
-    if ik.is_redundant() {
-        return true;
-    }
     let normal = UnitVector::new_unchecked(world_from_object.vector(&contact.normal_in_object));
-    let target = tip_target(world_from_object, contact, model.fingers[finger].tip_radius);
-    let mut solutions = Vec::new();
-    ik.solve_all(&target, &ik_settings(model, finger, normal), &mut solutions);
-    !solutions.is_empty()
+    !model.fingers[finger].cannot_touch(world_from_object, contact, &ik_settings(model, finger, normal))
 }
 
 impl Way {
@@ -169,7 +162,7 @@ impl Way {
                 Some(_) if t <= 0.0 => Some(way.from),
                 Some(_) if t >= 1.0 => Some(way.to),
                 Some(path) => {
-                    let settled = object.surface.settle(&path.at(t), finger.tip_radius)?;
+                    let settled = object.surface.settle(&path.at(t), finger.settle_radius)?;
                     (object.surface.crease_distance(&settled) >= object.edge_distance).then_some(Contact {
                         point_in_object: settled.point_in_object,
                         normal_in_object: settled.normal_in_object,

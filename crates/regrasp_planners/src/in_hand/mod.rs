@@ -33,6 +33,8 @@ mod grasp_path;
 mod grasps;
 /// Better plans after the first.
 mod improve;
+/// A first try with more clearance.
+mod keep_away;
 /// Legs of a query, from way pose to way pose.
 mod legs;
 /// Links between grasps.
@@ -69,6 +71,8 @@ mod state;
 mod tally;
 /// Times of waypoints.
 mod timing;
+/// Where fingertips touch, and joints with which they do.
+mod tip;
 /// Transfer paths.
 mod transfer;
 /// A tree of grasps that grows by gaits.
@@ -83,8 +87,8 @@ mod visibility;
 mod workspace;
 
 pub use settings::{
-    Alpha, AnyDirection, CostWeights, ForceSettings, GravityInHand, InHandSettings, Method, ReleaseRule, SpeedSettings,
-    TransferMode,
+    Alpha, AnyDirection, CostWeights, ForceSettings, GravityInHand, InHandSettings, KeepAway, Method, ReleaseRule,
+    SpeedSettings, TransferMode,
 };
 pub use validate::{NotProven, validate_once};
 
@@ -128,6 +132,30 @@ pub fn plan_in_hand(
 ) -> Result<Plan, Failure> {
     settings.validate().expect("settings are validated where they are read");
     refuse_two_gravities(scene, settings)?;
+    let Some((first, tried)) = keep_away::first_try(scene, settings, budget) else {
+        return plan_with(scene, query, settings, seed, budget, progress);
+    };
+    let spent = match plan_with(scene, query, &first, seed, &tried, progress) {
+        Ok(plan) => return Ok(Plan { settings: record::settings_of(settings), ..plan }),
+        Err(failure) if failure.kind == FailureKind::Interrupted => return Err(failure),
+        Err(failure) => failure.statistics.work,
+    };
+    let left = Budget { max_work: budget.max_work.saturating_sub(spent), ..budget.clone() };
+    let mut found = plan_with(scene, query, settings, seed, &left, progress);
+    let (Ok(Plan { statistics, .. }) | Err(Failure { statistics, .. })) = &mut found;
+    statistics.work += spent;
+    found
+}
+
+/// As [`plan_in_hand`], with the clearance of the settings.
+fn plan_with(
+    scene: &Scene,
+    query: &InHandQuery,
+    settings: &InHandSettings,
+    seed: u64,
+    budget: &Budget,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Plan, Failure> {
     let model = Model::new(scene, &effective(settings));
     refuse_hopeless(&model, query)?;
     let poses = query.poses();

@@ -4,11 +4,13 @@
 
 use arrayvec::ArrayVec;
 use regrasp_geometry::collision::{Ball, BallTree, MeshBody, MeshTree, Placement};
+use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Point, Pose, Shape};
 use regrasp_grasp::{Contact, ContactModel, GraspFrame, Grip, closure};
-use regrasp_robot::TipShape;
+use regrasp_robot::kinematics::body_frame::BodyFrame;
 use regrasp_robot::kinematics::finger_ik::FingerIk;
 use regrasp_robot::kinematics::motion_bound::MotionBound;
+use regrasp_robot::tip::{Pad, TipEllipsoid};
 use regrasp_scene::Scene;
 use std::sync::Arc;
 
@@ -23,8 +25,16 @@ pub const MAX_FINGERS: usize = 6;
 pub struct FingerModel<'a> {
     /// Inverse kinematics of the tip's centre.
     pub ik: &'a FingerIk,
-    /// Radius of the ball tip; zero for a sharp one.
+    /// Largest distance of the tip's surface from its centre: the radius of a ball, zero for a sharp tip.
     pub tip_radius: f64,
+    /// The tip, where it is no ball and not sharp.
+    pub ellipsoid: Option<&'a TipEllipsoid>,
+    /// Radius of a ball that holds the tip when it touches where the tip does: for a ball its own.
+    pub settle_radius: f64,
+    /// Where the tip may touch; anywhere without one.
+    pub pad: Option<&'a Pad>,
+    /// Its last link at rest, in the world.
+    pub link_at_rest: BodyFrame,
     /// What the tip transmits where it touches.
     pub contact: ContactModel,
     /// Bounds of the motion of the tip's centre.
@@ -157,22 +167,27 @@ impl<'a> Model<'a> {
                 let name = &hand.robot.links[part.link.0].name;
                 add(&part.placed.shape, &part.placed.parent_from_shape, part.body, part.link, name, part.is_tip);
             }
-            if let TipShape::Sphere { radius } = finger.tip.shape {
-                let place =
-                    Pose::from_parts(finger.tip.center_in_body.coords.into(), nalgebra::UnitQuaternion::identity());
-                let is_there = finger.shapes.iter().any(|part| {
-                    part.is_tip
-                        && matches!(part.placed.shape, Shape::Sphere { radius: r } if (r - radius).abs() < 1e-9)
-                        && (part.placed.parent_from_shape.translation.vector - place.translation.vector).norm() < 1e-9
-                });
-                if !is_there {
+            if let Some(own) = finger.tip.own_shape() {
+                let is_own = |placed: &PlacedShape| {
+                    let shift = placed.parent_from_shape.translation.vector - own.parent_from_shape.translation.vector;
+                    let same_size = match (&placed.shape, &own.shape) {
+                        (Shape::Sphere { radius: a }, Shape::Sphere { radius: b }) => (a - b).abs() < 1e-9,
+                        _ => *placed == own,
+                    };
+                    same_size && shift.norm() < 1e-9
+                };
+                if !finger.shapes.iter().any(|part| part.is_tip && is_own(&part.placed)) {
                     let link = finger.chain.joints.len() - 1;
-                    add(&Shape::Sphere { radius }, &place, link, finger.tip.link, "tip ball", true);
+                    add(&own.shape, &own.parent_from_shape, link, finger.tip.link, "tip", true);
                 }
             }
             let ik = &finger.ik;
             fingers.push(FingerModel {
                 tip_radius: finger.tip.radius(),
+                ellipsoid: finger.tip.ellipsoid(),
+                settle_radius: finger.tip.ellipsoid().map_or(finger.tip.radius(), TipEllipsoid::flattest),
+                pad: finger.tip.pad.as_ref(),
+                link_at_rest: finger.chain.last_frame(&finger.rest),
                 contact: finger.tip.contact,
                 tip_bound: MotionBound::new(
                     &finger.chain,

@@ -4,6 +4,7 @@ use super::forces::Unbalanced;
 use super::forces_along::add_forces;
 use super::legs::Solution;
 use super::model::Model;
+use super::settings::InHandSettings;
 use super::state::{GraspState, Moment, Motion, Sequence, no_contact};
 use super::timing;
 use super::workspace::{Contacts, HandJoints};
@@ -19,6 +20,11 @@ use regrasp_scene::InHandQuery;
 pub const CONTACT_TOLERANCE: f64 = 0.0005;
 /// Largest slip of a rolling fingertip in a segment that plans promise, in metres (issue: 0.1 mm).
 pub const SLIP_TOLERANCE: f64 = 0.0001;
+
+/// Settings as plans have them.
+pub fn settings_of(settings: &InHandSettings) -> serde_json::Value {
+    serde_json::to_value(settings).unwrap_or_default()
+}
 
 /// Makes the plan of `solution`.
 ///
@@ -210,7 +216,7 @@ impl<'m, 'a> Recorder<'m, 'a> {
                 .and_then(|value| value.as_str().map(str::to_owned))
                 .unwrap_or_default(),
             seed,
-            settings: serde_json::to_value(&model.settings).unwrap_or_default(),
+            settings: settings_of(&model.settings),
             inputs: scene
                 .inputs
                 .iter()

@@ -3,7 +3,7 @@
 
 use super::model::Model;
 use super::transfer::ik_settings;
-use super::workspace::{TipMode, Workspace, tip_target};
+use super::workspace::{TipMode, Workspace};
 use regrasp_base::Rng;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
@@ -44,7 +44,7 @@ pub fn hover(
     height: f64,
 ) -> Option<Coordinates> {
     let normal = world_from_object.vector(&contact.normal_in_object);
-    let tip = tip_target(world_from_object, contact, model.fingers[finger].tip_radius);
+    let tip = model.fingers[finger].center_touching(world_from_object, contact, joints);
     let settings = free_ik_settings(model, finger, UnitVector::new_unchecked(normal));
     model.fingers[finger].ik.solve_near(&(tip + normal * height), joints, &settings)
 }
@@ -123,7 +123,8 @@ fn lift(
         return workspace.finger_is_clear(finger, clear).then(Vec::new);
     };
     let normal = world_from_object.vector(&contact.normal_in_object);
-    let base = world_from_object.point(&contact.point_in_object) + normal * model.fingers[finger].tip_radius;
+    let base =
+        world_from_object.point(&contact.point_in_object) - model.fingers[finger].arm_with(foothold.joints, &normal);
     let mode = TipMode::Near { finger, normal_in_world: normal };
     // No turning of the finger here: it would move the tip sideways between waypoints, over the surface.
     let settings =

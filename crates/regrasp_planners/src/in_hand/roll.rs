@@ -1,17 +1,18 @@
 //! Fingertips that roll on the object while it moves (paper 004, section IV-C).
 //!
-//! The tip is a ball that is part of the last link, so it turns as the link does, and the contact travels on both surfaces.
-//! Joints are sought that leave no slip over a step, by the rule of `regrasp_grasp::contact::rolling`.
+//! The tip is a ball or an ellipsoid that is part of the last link, so it turns as the link does, and the contact travels on
+//! both surfaces. Joints are sought that leave no slip over a step, by the rules of `regrasp_grasp::contact::rolling` and
+//! `rolling_ellipsoid`.
 
-use super::model::Model;
+use super::model::{FingerModel, Model};
 use super::record::SLIP_TOLERANCE;
 use super::transfer::ik_settings;
-use nalgebra::Matrix3;
 use regrasp_geometry::collision::Placement;
-use regrasp_geometry::surface::SurfacePoint;
+use regrasp_geometry::surface::{Surface, SurfacePoint};
 use regrasp_geometry::{UnitVector, Vector};
 use regrasp_grasp::Contact;
 use regrasp_grasp::contact::rolling::{Ball, Touch, slip, turn_between};
+use regrasp_grasp::contact::rolling_ellipsoid::{self, Stance};
 use regrasp_robot::kinematics::body_frame::BodyFrame;
 use regrasp_robot::kinematics::finger_ik::{Asked, Coordinates, IkSettings, Preference};
 
@@ -49,14 +50,28 @@ impl Rolled {
     }
 }
 
+/// A fingertip near the surface, seen from the object.
+#[derive(Debug, Clone, Copy)]
+struct Touching {
+    stance: Stance,
+    foot: SurfacePoint,
+    /// Distance of the tip from the surface, negative when it presses in.
+    gap: f64,
+}
+
+impl Touching {
+    fn contact(&self) -> Contact {
+        let normal_in_object = UnitVector::new_unchecked(self.stance.normal);
+        Contact { point_in_object: self.foot.point_in_object, normal_in_object }
+    }
+}
+
 /// The step that a rolling fingertip makes while the object moves from `from` to `to`, both world from object.
 #[derive(Debug, Clone, Copy)]
 pub struct RollStep<'a> {
     model: &'a Model<'a>,
     finger: usize,
-    start: Ball,
-    /// Rotation of the last link in the object frame at the start.
-    object_from_link: Matrix3<f64>,
+    start: Stance,
     joints: &'a Coordinates,
     to: &'a Placement,
 }
@@ -71,14 +86,15 @@ impl<'a> RollStep<'a> {
         from: &Placement,
         to: &'a Placement,
     ) -> Self {
+        let of_hand = &model.fingers[finger];
         let normal = contact.normal_in_object.into_inner();
-        let start = Ball { center: contact.point_in_object + normal * model.fingers[finger].tip_radius, normal };
-        let link = model.fingers[finger].ik.chain().last_frame(joints);
-        RollStep { model, finger, start, object_from_link: from.rotation.tr_mul(&link.rotation), joints, to }
-    }
-
-    fn radius(&self) -> f64 {
-        self.model.fingers[self.finger].tip_radius
+        let link = of_hand.ik.chain().last_frame(joints);
+        let object_from_link = from.rotation.tr_mul(&link.rotation);
+        let center = match of_hand.ellipsoid {
+            None => contact.point_in_object + normal * of_hand.tip_radius,
+            Some(_) => from.point_to_child(&link.point(of_hand.ik.center_in_body())),
+        };
+        RollStep { model, finger, start: Stance { center, object_from_link, normal }, joints, to }
     }
 
     /// What is asked of the joints; a redundant finger may also turn towards the inward normal.
@@ -89,28 +105,44 @@ impl<'a> RollStep<'a> {
         IkSettings { preference, max_step, ..settings }
     }
 
-    /// Where the ball is, and how far it has turned relative to the object, with the link at `link`.
-    fn touch(&self, link: &BodyFrame, object: &Placement) -> Option<(Touch, Matrix3<f64>)> {
-        let center = object.point_to_child(&link.point(self.model.fingers[self.finger].ik.center_in_body()));
-        let touch = Touch::of(&self.model.scene.object.surface, &center)?;
-        Some((touch, object.rotation.tr_mul(&link.rotation)))
+    /// Where the tip is, with the link at `link` and the object at `object`.
+    fn touch(&self, link: &BodyFrame, object: &Placement) -> Option<Touching> {
+        self.model.fingers[self.finger].touch(&self.model.scene.object.surface, link, object, &self.start.normal)
+    }
+
+    fn slip(&self, from: &Stance, to: &Stance) -> Vector {
+        let finger = &self.model.fingers[self.finger];
+        match finger.ellipsoid {
+            Some(ellipsoid) => rolling_ellipsoid::slip(ellipsoid, from, to),
+            None => {
+                let turn = turn_between(&from.object_from_link, &to.object_from_link);
+                let ball = |at: &Stance| Ball { center: at.center, normal: at.normal };
+                slip(finger.tip_radius, &ball(from), &ball(to), &turn)
+            }
+        }
     }
 
     /// Joints without slip at the end of the step, by the midpoint rule, less what is known of its error.
     fn solve(&self, near: &Coordinates, settings: &IkSettings, error: &Vector) -> Option<Rolled> {
-        let radius = self.radius();
+        let finger = &self.model.fingers[self.finger];
         let mut end = None;
         let asked = |link: &BodyFrame| {
-            let (touch, object_from_link) = self.touch(link, self.to)?;
-            let turn = turn_between(&self.object_from_link, &object_from_link);
-            let normal = touch.ball.normal;
-            let slipped = slip(radius, &self.start, &touch.ball, &turn) + error;
-            let off = slipped - normal * normal.dot(&slipped) + normal * (touch.distance - radius);
+            let touch = self.touch(link, self.to)?;
+            let normal = touch.stance.normal;
+            let slipped = self.slip(&self.start, &touch.stance) + error;
+            let off = slipped - normal * normal.dot(&slipped) + normal * touch.gap;
             end = Some(touch);
-            Some(Asked { error: -self.to.vector(&off), arm: -self.to.vector(&(normal * radius)) })
+            let arm = match finger.ellipsoid {
+                None => -self.to.vector(&(normal * finger.tip_radius)),
+                Some(_) => finger.arm(link, &self.to.vector(&normal)),
+            };
+            Some(Asked { error: -self.to.vector(&off), arm })
         };
-        let joints = self.model.fingers[self.finger].ik.follow(near, settings, asked)?;
-        end.map(|touch: Touch| Rolled { contact: touch.contact(), foot: touch.foot, joints })
+        let joints = finger.ik.follow(near, settings, asked)?;
+        let end = end.filter(|end: &Touching| {
+            finger.pad.is_none_or(|pad| pad.holds(&-end.stance.object_from_link.tr_mul(&end.stance.normal)))
+        })?;
+        Some(Rolled { contact: end.contact(), foot: end.foot, joints })
     }
 
     /// The end of a long step, for looking ahead: no look at what happens half-way.
@@ -142,25 +174,62 @@ impl<'a> RollStep<'a> {
     /// Slip over parts of the step, while the joints move linearly: what the rule over the whole of it leaves out. None where
     /// the tip is farther from the surface than `allowed`, or deeper, at the end of a part.
     fn slip_over_parts(&self, end: &Rolled, between: &impl Fn(f64) -> Placement, allowed: f64) -> Option<Vector> {
-        let radius = self.radius();
         let n_parts = if self.model.scene.object.surface.mesh().is_some() { PARTS_ON_MESH } else { PARTS };
-        let chain = self.model.fingers[self.finger].ik.chain();
-        let (mut ball, mut object_from_link) = (self.start, self.object_from_link);
+        let finger = &self.model.fingers[self.finger];
+        let chain = finger.ik.chain();
+        let mut before = self.start;
         let mut sum = Vector::zeros();
         for k in 1..n_parts {
             let t = k as f64 / n_parts as f64;
             let joints: Coordinates = self.joints.iter().zip(&end.joints).map(|(a, b)| a + t * (b - a)).collect();
-            let (touch, turned) = self.touch(&chain.last_frame(&joints), &between(t))?;
-            if (touch.distance - radius).abs() > allowed {
+            let touch = self.touch(&chain.last_frame(&joints), &between(t))?;
+            if touch.gap.abs() > allowed {
                 return None;
             }
-            sum += slip(radius, &ball, &touch.ball, &turn_between(&object_from_link, &turned));
-            (ball, object_from_link) = (touch.ball, turned);
+            sum += self.slip(&before, &touch.stance);
+            before = touch.stance;
         }
-        let normal = end.contact.normal_in_object.into_inner();
-        let last = Ball { center: end.contact.point_in_object + normal * radius, normal };
-        let turned = self.to.rotation.tr_mul(&chain.last_frame(&end.joints).rotation);
-        Some(sum + slip(radius, &ball, &last, &turn_between(&object_from_link, &turned)))
+        let last = RollStep::new(self.model, self.finger, &end.contact, &end.joints, self.to, self.to).start;
+        Some(sum + self.slip(&before, &last))
+    }
+}
+
+impl FingerModel<'_> {
+    /// Where the tip is over the object's surface, with the link at `link` and the object at `object`; the normal is sought
+    /// near `normal`, in the object frame.
+    #[inline]
+    fn touch(&self, surface: &Surface, link: &BodyFrame, object: &Placement, normal: &Vector) -> Option<Touching> {
+        let center = object.point_to_child(&link.point(self.ik.center_in_body()));
+        let object_from_link = object.rotation.tr_mul(&link.rotation);
+        match self.ellipsoid {
+            None => {
+                let touch = Touch::of(surface, &center)?;
+                let stance = Stance { center, object_from_link, normal: touch.ball.normal };
+                Some(Touching { stance, foot: touch.foot, gap: touch.distance - self.tip_radius })
+            }
+            Some(ellipsoid) => {
+                let stance = Stance { center, object_from_link, normal: *normal };
+                let touch = rolling_ellipsoid::Touch::of(surface, ellipsoid, &stance)?;
+                Some(Touching { stance: touch.stance, foot: touch.foot, gap: touch.gap })
+            }
+        }
+    }
+
+    /// The contact that the tip has as it stands, on its own surface, and its distance from the object's, negative inside.
+    pub fn contact_at(&self, surface: &Surface, joints: &[f64], object: &Placement) -> Option<(Contact, f64)> {
+        let link = self.ik.chain().last_frame(joints);
+        let center = object.point_to_child(&link.point(self.ik.center_in_body()));
+        let (foot, distance) = surface.project_signed(&center);
+        let away = UnitVector::try_new(center - foot.point_in_object, 1e-6).filter(|_| self.tip_radius > 0.0);
+        let normal_in_object = away.unwrap_or(foot.normal_in_object);
+        if self.ellipsoid.is_none() {
+            let point_in_object = center - normal_in_object.into_inner() * self.tip_radius;
+            return Some((Contact { point_in_object, normal_in_object }, distance - self.tip_radius));
+        }
+        let touching = self.touch(surface, &link, object, &normal_in_object)?;
+        let mut contact = touching.contact();
+        contact.point_in_object += touching.stance.normal * touching.gap;
+        Some((contact, touching.gap))
     }
 }
 

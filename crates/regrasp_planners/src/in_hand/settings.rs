@@ -2,7 +2,7 @@
 
 mod physics;
 
-pub use physics::{AnyDirection, ForceSettings, GravityInHand, SpeedSettings, gravity_of};
+pub use physics::{AnyDirection, ForceSettings, GravityInHand, KeepAway, SpeedSettings, gravity_of};
 
 use serde::{Deserialize, Serialize};
 
@@ -171,6 +171,8 @@ pub struct InHandSettings {
     pub step: f64,
     /// Distance that bodies keep which do not touch. By hand.
     pub clearance: f64,
+    /// A first try that keeps farther away; none goes without. Hands whose links cannot stand so far back go without too.
+    pub keep_away: Option<KeepAway>,
     /// How far the tip link of a holding finger may press into the object in the model. By hand: well below the
     /// contact tolerance of 0.5 mm.
     pub contact_allowance: f64,
@@ -247,6 +249,7 @@ impl Default for InHandSettings {
             closure_margin: 0.005,
             step: 0.003,
             clearance: 0.0002,
+            keep_away: Some(KeepAway::default()),
             contact_allowance: 0.0003,
             limit_margin: 0.01,
             joint_step: 0.4,
@@ -280,11 +283,12 @@ impl Default for InHandSettings {
 
 impl InHandSettings {
     /// The settings of geometry alone, as in paper 000: contacts stay where they are while the object moves, all of the
-    /// friction is counted on, and nobody asks about forces.
+    /// friction is counted on, links keep away no farther than they must, and nobody asks about forces.
     pub fn plain() -> Self {
         InHandSettings {
             transfer: TransferMode::Fixed,
             friction_margin: 1.0,
+            keep_away: None,
             forces: None,
             ..InHandSettings::default()
         }
@@ -303,6 +307,11 @@ impl InHandSettings {
             if !(value > 0.0 && value.is_finite()) {
                 return Err(format!("{name} is {value}; it must be positive and finite"));
             }
+        }
+        if let Some(KeepAway { clearance, .. }) = self.keep_away
+            && !(clearance > 0.0 && clearance < 0.1)
+        {
+            return Err(format!("keep_away.clearance is {clearance}; it must be above 0 and below 0.1 m"));
         }
         for (name, value) in [
             ("closure_margin", self.closure_margin),

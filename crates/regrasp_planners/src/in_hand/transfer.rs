@@ -6,7 +6,7 @@ use super::model::Model;
 use super::record::CONTACT_TOLERANCE;
 use super::roll::{NoStep, RollStep};
 use super::state::{GraspState, Moment};
-use super::workspace::{HandJoints, TipMode, Workspace, tip_target};
+use super::workspace::{HandJoints, TipMode, Workspace};
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::frame::{self, PoseLine};
 use regrasp_geometry::{Pose, UnitVector};
@@ -35,8 +35,7 @@ pub fn follow_contact(
     seed: &Coordinates,
 ) -> Option<Coordinates> {
     let normal = UnitVector::new_unchecked(world_from_object.vector(&contact.normal_in_object));
-    let target = tip_target(world_from_object, contact, model.fingers[finger].tip_radius);
-    model.fingers[finger].ik.solve_near(&target, seed, &ik_settings(model, finger, normal))
+    model.fingers[finger].touch_near(world_from_object, contact, seed, &ik_settings(model, finger, normal))
 }
 
 /// Number of steps from `from` to `to` of which none moves a point of the object by more than the step length.
@@ -153,10 +152,10 @@ pub fn tip_stays(
     let finger = &model.fingers[finger];
     let change: Coordinates = from.iter().zip(to).map(|(a, b)| b - a).collect();
     // What the joints' bound proves needs no look; the object strays as little as the shortest step of a finger.
-    if finger.tip_bound.chord_deviation(&change) < 0.5 * HALFWAY_ALLOWED {
+    if finger.ellipsoid.is_none() && finger.tip_bound.chord_deviation(&change) < 0.5 * HALFWAY_ALLOWED {
         return true;
     }
     let joints: Coordinates = from.iter().zip(&change).map(|(q, dq)| q + 0.5 * dq).collect();
-    let target = tip_target(&halfway(), contact, finger.tip_radius);
+    let target = finger.center_touching(&halfway(), contact, &joints);
     (finger.ik.tip(&joints) - target).norm() <= HALFWAY_ALLOWED
 }

@@ -120,7 +120,11 @@ pub fn follow_relocation(
     path: &[Coordinates],
 ) -> Result<(), usize> {
     let model = workspace.model;
-    let ends = contacts.map(|contact| contact.map(|contact| End::new(model, finger, pose, contact)));
+    let [first, last] = [path.first(), path.last()];
+    let end = |contact: Option<&Contact>, joints: Option<&Coordinates>| {
+        contact.zip(joints).map(|(contact, joints)| End::new(model, finger, pose, contact, joints))
+    };
+    let ends = [end(contacts[0], first), end(contacts[1], last)];
     let is_over = |end: &Option<End>, joints: &Coordinates| {
         end.as_ref().is_some_and(|end| end.is_under(&model.fingers[finger].ik.tip(joints)))
     };
@@ -148,10 +152,11 @@ struct End {
 }
 
 impl End {
-    fn new(model: &Model, finger: usize, pose: &Pose, contact: &Contact) -> Self {
+    /// `joints` are those of the contact.
+    fn new(model: &Model, finger: usize, pose: &Pose, contact: &Contact, joints: &Coordinates) -> Self {
         let placement = Placement::from(pose);
         let normal: Vector = placement.vector(&contact.normal_in_object);
-        let foot = placement.point(&contact.point_in_object) + normal * model.fingers[finger].tip_radius;
+        let foot = placement.point(&contact.point_in_object) - model.fingers[finger].arm_with(joints, &normal);
         End { foot, normal }
     }
 

@@ -17,7 +17,7 @@ use arrayvec::ArrayVec;
 use configuration::{Configuration, midway, place_finger, place_object};
 use nearby::Nearby;
 use regrasp_geometry::collision::{Answer, Placement, gap_along, separation};
-use regrasp_geometry::{Point, Pose, Vector, frame};
+use regrasp_geometry::{Pose, Vector, frame};
 use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 
@@ -591,10 +591,4 @@ impl<'a> Workspace<'a> {
         }
         true
     }
-}
-
-/// The tip centre that touches `contact` with the object at `world_from_object`, in the world.
-#[inline]
-pub fn tip_target(world_from_object: &Placement, contact: &Contact, tip_radius: f64) -> Point {
-    world_from_object.point(&(contact.point_in_object + contact.normal_in_object.into_inner() * tip_radius))
 }

@@ -9,4 +9,5 @@ mod places;
 mod roadmaps;
 mod segments;
 mod soft_and_coupled;
+mod tips;
 mod way_poses;

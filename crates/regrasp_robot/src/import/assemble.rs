@@ -6,13 +6,14 @@
 use super::finger_chain::{make_chain, rest_posture};
 use super::tip_split;
 use crate::contact_model::ContactModel;
-use crate::hand::{Finger, FingerShape, Hand, PalmShape, Tip, TipShape, convex_of};
+use crate::hand::{Finger, FingerShape, Hand, PalmShape, convex_of};
 use crate::robot::{Joint, JointId, JointKind, LinkId, Robot};
+use crate::tip::{Pad, Tip, TipEllipsoid, TipShape, fit};
 use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_base::diagnostic::Diagnostics;
 use regrasp_base::{Diagnostic, InputError, Place};
 use regrasp_geometry::shape::PlacedShape;
-use regrasp_geometry::{ConvexHull, Point, Pose, Shape, TriangleMesh};
+use regrasp_geometry::{ConvexHull, Point, Pose, Shape, TriangleMesh, UnitVector, Vector};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::Path;
 use std::sync::Arc;
@@ -36,6 +37,8 @@ pub(crate) struct FingerSpec {
     /// First joint of the chain; moving joints before it are held. The first after the base where none is given.
     pub first_joint: Option<JointId>,
     pub tip: TipSpec,
+    /// Where the tip may touch; anywhere without one.
+    pub pad: Option<PadSpec>,
     pub contact: ContactModel,
     /// Rest posture by joint name, with the place of each name; the rest in the middle of the limits.
     pub rest: Vec<(String, f64, Place)>,
@@ -47,8 +50,16 @@ pub(crate) struct FingerSpec {
 #[derive(Debug, Clone)]
 pub(crate) enum TipSpec {
     Sphere { radius: f64, center: Point },
+    Ellipsoid { radii: Vector, center: Point, link_from_ellipsoid: UnitQuaternion<f64> },
     Point { position: Point },
     Hull { center: Point },
+}
+
+/// The part of a tip that may touch; the axis is in the frame of the tip link.
+#[derive(Debug, Clone)]
+pub(crate) struct PadSpec {
+    pub axis: UnitVector,
+    pub angle: f64,
 }
 
 /// A rigid body of a hand.
@@ -256,7 +267,18 @@ fn make_finger(
     found: &mut Diagnostics,
 ) -> Option<Finger> {
     let chain = make_chain(robot, spec, joints, carried, found)?;
-    let tip_at = carried.get(&spec.tip_link)?;
+    let body_from_link = carried.get(&spec.tip_link)?.body_from_link;
+    let pad = spec.pad.as_ref().map(|pad| Pad { axis_in_body: body_from_link * pad.axis, cosine: pad.angle.cos() });
+    let tip = |shape, center_in_body| Tip { link: spec.tip_link, shape, center_in_body, pad, contact: spec.contact };
+    let round = match &spec.tip {
+        TipSpec::Sphere { radius, center } => Some(tip(TipShape::Sphere { radius: *radius }, body_from_link * center)),
+        TipSpec::Ellipsoid { radii, center, link_from_ellipsoid } => {
+            let ellipsoid = TipEllipsoid::new(*radii, body_from_link.rotation * link_from_ellipsoid);
+            Some(tip(TipShape::Ellipsoid(ellipsoid), body_from_link * center))
+        }
+        TipSpec::Point { .. } | TipSpec::Hull { .. } => None,
+    };
+    let own = round.as_ref().and_then(Tip::own_shape);
     let mut shapes = Vec::new();
     for (&link, at) in carried {
         let Body::Finger { finger, body } = at.body else { continue };
@@ -264,10 +286,8 @@ fn make_finger(
             continue;
         }
         let placed = hulls.of_link(link, &at.body_from_link, found);
-        match &spec.tip {
-            TipSpec::Sphere { radius, center } if link == spec.tip_link => {
-                shapes.extend(tip_split::split(placed, link, body, &(tip_at.body_from_link * center), *radius));
-            }
+        match &own {
+            Some(own) if link == spec.tip_link => shapes.extend(tip_split::split(placed, link, body, own)),
             _ => {
                 let is_tip = link == spec.tip_link;
                 shapes.extend(placed.into_iter().map(|placed| FingerShape { body, link, placed, is_tip }));
@@ -275,34 +295,46 @@ fn make_finger(
         }
     }
     shapes.sort_by_key(|shape| (shape.body, shape.link));
-    let (center, shape) = match &spec.tip {
-        TipSpec::Sphere { radius, center } => (center, TipShape::Sphere { radius: *radius }),
-        TipSpec::Point { position } => (position, TipShape::Point),
-        TipSpec::Hull { center } => {
-            let center_in_body = tip_at.body_from_link * center;
+    let tip = match (&spec.tip, round) {
+        (_, Some(tip)) => tip,
+        (TipSpec::Hull { center }, None) => {
             let points: Vec<Point> = shapes.iter().filter(|s| s.is_tip).flat_map(|s| corners(&s.placed)).collect();
-            let moved: Vec<Point> = points.iter().map(|p| Point::from(p - center_in_body)).collect();
-            match ConvexHull::new(&moved) {
-                Ok(hull) => (center, TipShape::Hull(Arc::new(hull))),
-                Err(error) => {
-                    let problem = match moved.as_slice() {
-                        [] => "tip link has no collision geometry with corners".to_owned(),
-                        _ => format!("tip link has no hull: {error}"),
-                    };
-                    found.push(
-                        Diagnostic::new("U210", spec.place.clone(), problem)
-                            .element("finger", &spec.name)
-                            .expected("box or mesh collision geometry on the tip link")
-                            .fix("shape = \"sphere\" for a round tip"),
-                    );
+            match hull_tip(&points, &(body_from_link * center), pad.as_ref()) {
+                Ok((center, shape)) => tip(shape, center),
+                Err((problem, expected, fix)) => {
+                    let diagnostic = Diagnostic::new("U210", spec.place.clone(), problem).element("finger", &spec.name);
+                    found.push(diagnostic.expected(expected).fix(fix));
                     return None;
                 }
             }
         }
+        (TipSpec::Point { position }, None) => tip(TipShape::Point, body_from_link * position),
+        (TipSpec::Sphere { .. } | TipSpec::Ellipsoid { .. }, None) => unreachable!("made above"),
     };
     let rest = rest_posture(spec, &chain, found);
-    let tip = Tip { link: spec.tip_link, shape, center_in_body: tip_at.body_from_link * center, contact: spec.contact };
     Some(Finger::new(spec.name.clone(), chain, tip, shapes, rest))
+}
+
+/// A tip that is the hull of `points` near `center`, all in the frame of its body: the centre of the ellipsoid that is like it,
+/// and the shape; or what is wrong, what was expected, and what helps.
+fn hull_tip(
+    points: &[Point],
+    center: &Point,
+    pad: Option<&Pad>,
+) -> Result<(Point, TipShape), (String, &'static str, &'static str)> {
+    let geometry = "box or mesh collision geometry on the tip link";
+    let near: Vec<Point> = points.iter().map(|p| Point::from(p - center)).collect();
+    let no_hull = |error| (format!("tip link has no hull: {error}"), geometry, "shape = \"sphere\" for a round tip");
+    if near.is_empty() {
+        let problem = "tip link has no collision geometry with corners".to_owned();
+        return Err((problem, geometry, "shape = \"sphere\" for a round tip"));
+    }
+    ConvexHull::new(&near).map_err(no_hull)?;
+    let fit = fit(&near, pad)
+        .ok_or_else(|| ("tip link is flat".to_owned(), geometry, "shape = \"sphere\" for a round tip"))?;
+    let about: Vec<Point> = near.iter().map(|p| Point::from(p - fit.center)).collect();
+    let hull = Arc::new(ConvexHull::new(&about).map_err(no_hull)?);
+    Ok((center + fit.center.coords, TipShape::Hull { hull, fitted: fit.ellipsoid, misfit: fit.misfit }))
 }
 
 /// Corner points of a polyhedral shape in the parent's frame; none for round shapes.

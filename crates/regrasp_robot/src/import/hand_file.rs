@@ -2,7 +2,7 @@
 //!
 //! A bare URDF is accepted too; its fingers and tips are then guessed as `inspect` does.
 
-use super::assemble::{FingerSpec, HandSpec, TipSpec, assemble};
+use super::assemble::{FingerSpec, HandSpec, PadSpec, TipSpec, assemble};
 use super::couplings;
 use super::resolve::{ResolveOptions, resolve_own};
 use super::srdf::{LoadedSrdf, load_srdf};
@@ -10,10 +10,11 @@ use super::urdf::{LoadedRobot, load_robot};
 use crate::contact_model::{self, ContactModel};
 use crate::hand::Hand;
 use crate::robot::{JointId, LinkId, Robot};
+use nalgebra::{Quaternion, UnitQuaternion};
 use regrasp_base::diagnostic::did_you_mean;
 use regrasp_base::toml_table::{Codes, Entry, Found, Table};
 use regrasp_base::{Diagnostic, InputError, Place, files};
-use regrasp_geometry::Point;
+use regrasp_geometry::{Point, UnitVector, Vector};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -266,6 +267,7 @@ fn read_finger(
     let tip = table
         .required(found, "tip", "add tip = { shape = \"sphere\", radius = 0.012, center = [0, 0, 0] }")
         .and_then(|entry| read_tip(entry.table(found)?, found));
+    let pad = table.optional("pad").map(|entry| read_pad(entry.table(found)?, found));
     let contact = contact_model::read(&mut table, "contact", default_contact, "U218", found);
     let rest = table.optional("rest").and_then(|entry| entry.table(found));
     let mut positions = Vec::new();
@@ -284,6 +286,10 @@ fn read_finger(
         tip_link: tip_link?,
         first_joint,
         tip: tip?,
+        pad: match pad {
+            Some(pad) => Some(pad?),
+            None => None,
+        },
         contact: contact?,
         rest: positions,
         place,
@@ -292,8 +298,8 @@ fn read_finger(
 
 fn read_tip(mut table: Table, found: &mut Found) -> Option<TipSpec> {
     let shape = table
-        .required(found, "shape", "add shape = \"sphere\", \"point\" or \"mesh\"")?
-        .choice(found, &["sphere", "point", "mesh"])?;
+        .required(found, "shape", "add shape = \"sphere\", \"ellipsoid\", \"point\" or \"mesh\"")?
+        .choice(found, &["sphere", "ellipsoid", "point", "mesh"])?;
     let tip = match shape {
         "sphere" => {
             let center = point(&mut table, "center", found);
@@ -306,11 +312,72 @@ fn read_tip(mut table: Table, found: &mut Found) -> Option<TipSpec> {
                 });
             radius.zip(center).map(|(radius, center)| TipSpec::Sphere { radius, center })
         }
+        "ellipsoid" => {
+            let center = point(&mut table, "center", found);
+            let radii = table
+                .required(found, "radii", "add radii = [0.009, 0.007, 0.007], the half axes in metres")
+                .and_then(|entry| lengths(&entry, found));
+            let turn = match table.optional("quat_xyzw") {
+                Some(entry) => unit_quaternion(&entry, found),
+                None => Some(UnitQuaternion::identity()),
+            };
+            radii.zip(center).zip(turn).map(|((radii, center), turn)| TipSpec::Ellipsoid {
+                radii,
+                center,
+                link_from_ellipsoid: turn,
+            })
+        }
         "point" => point(&mut table, "position", found).map(|position| TipSpec::Point { position }),
         _ => point(&mut table, "center", found).map(|center| TipSpec::Hull { center }),
     };
     table.finish(found);
     tip
+}
+
+/// Half axes of an ellipsoid, none less than a fifth of another: flatter ones are plates, not fingertips.
+fn lengths(entry: &Entry, found: &mut Found) -> Option<Vector> {
+    let radii = Vector::from(entry.numbers::<3>(found)?);
+    if radii.min() > 0.0 && radii.min() >= 0.2 * radii.max() {
+        return Some(radii);
+    }
+    let expected = "three lengths above 0, in metres, none less than a fifth of another";
+    let problem = format!("is [{}, {}, {}]", radii.x, radii.y, radii.z);
+    found.diagnostics.push(entry.error("U213", found, problem).expected(expected));
+    None
+}
+
+fn unit_quaternion(entry: &Entry, found: &mut Found) -> Option<UnitQuaternion<f64>> {
+    let [x, y, z, w] = entry.numbers::<4>(found)?;
+    let quaternion = Quaternion::new(w, x, y, z);
+    if (quaternion.norm() - 1.0).abs() <= 1e-6 {
+        return Some(UnitQuaternion::from_quaternion(quaternion));
+    }
+    let problem = format!("has length {}", quaternion.norm());
+    found.diagnostics.push(entry.error("U213", found, problem).expected("a unit quaternion, x y z w"));
+    None
+}
+
+fn read_pad(mut table: Table, found: &mut Found) -> Option<PadSpec> {
+    let axis = table
+        .required(found, "axis", "add axis = [0.0, 0.0, 1.0], out of the pad, in the frame of the tip link")
+        .and_then(|entry| {
+            let given = Vector::from(entry.numbers::<3>(found)?);
+            let axis = UnitVector::try_new(given, 1e-9);
+            if axis.is_none() {
+                let problem = "is the zero vector, which is no direction";
+                found.diagnostics.push(
+                    entry
+                        .error("U213", found, problem)
+                        .expected("a direction out of the pad, in the frame of the tip link"),
+                );
+            }
+            axis
+        });
+    let angle = table.required(found, "angle_deg", "add angle_deg = 60").and_then(|entry| {
+        entry.number_that(found, "an angle above 0 and at most 180, in degrees", |x| x > 0.0 && x <= 180.0)
+    });
+    table.finish(found);
+    axis.zip(angle).map(|(axis, angle)| PadSpec { axis, angle: angle.to_radians() })
 }
 
 /// The point in `key`, the origin of the tip link where it is missing; none where it is bad.

@@ -17,17 +17,13 @@ const CUT_BEHIND: f64 = 0.5;
 /// What lies ahead of the cut and stands out of the ball by no more than this is left to the ball, in metres.
 const NEGLIGIBLE: f64 = 1e-4;
 
-/// The shapes of a tip link with a ball of `radius` at `center`, all in the frame of `body`, whose joint is the origin.
+/// The shapes of a tip link whose tip is `own`, a ball or an ellipsoid, all in the frame of `body`, whose joint is the origin.
 ///
-/// A phalanx is replaced by its part behind the ball, which is not tip, by the part ahead where that stands out of the ball,
-/// which is tip, and by the ball.
-pub(crate) fn split(
-    placed: Vec<PlacedShape>,
-    link: LinkId,
-    body: usize,
-    center: &Point,
-    radius: f64,
-) -> Vec<FingerShape> {
+/// A phalanx is replaced by its part behind the tip's ball (the smallest that holds the ellipsoid), which is not tip, by the
+/// part ahead where that stands out of the ball, which is tip, and by `own`.
+pub(crate) fn split(placed: Vec<PlacedShape>, link: LinkId, body: usize, own: &PlacedShape) -> Vec<FingerShape> {
+    let center = Point::from(own.parent_from_shape.translation.vector);
+    let radius = own.shape.reach_from(&Point::origin());
     let whole = |placed: PlacedShape, is_tip: bool| FingerShape { body, link, placed, is_tip };
     let Some(axis) = UnitVector::try_new(center.coords, 1e-6) else {
         return placed.into_iter().map(|placed| whole(placed, true)).collect();
@@ -39,7 +35,7 @@ pub(crate) fn split(
             shapes.push(whole(placed, true));
             continue;
         }
-        match behind(&placed, center, &axis, radius) {
+        match behind(&placed, &center, &axis, radius) {
             Behind::All => shapes.push(whole(placed, false)),
             Behind::Part(part, ahead) => {
                 shapes.push(whole(part, false));
@@ -52,8 +48,7 @@ pub(crate) fn split(
         }
     }
     if shapes.iter().all(|shape| !shape.is_tip) {
-        let parent_from_shape = Pose::from_parts(Translation3::from(center.coords), UnitQuaternion::identity());
-        shapes.push(whole(PlacedShape { parent_from_shape, shape: Shape::Sphere { radius } }, true));
+        shapes.push(whole(own.clone(), true));
     }
     shapes.extend(fronts);
     shapes
@@ -147,6 +142,11 @@ mod tests {
 
     const RADIUS: f64 = 0.01;
 
+    fn ball(center: &Point) -> PlacedShape {
+        let parent_from_shape = Pose::from_parts(Translation3::from(center.coords), UnitQuaternion::identity());
+        PlacedShape { parent_from_shape, shape: Shape::Sphere { radius: RADIUS } }
+    }
+
     /// Points on a capsule along x from 0.02 to `CENTER` with a ball of `RADIUS` at its end: a phalanx.
     fn phalanx_points() -> Vec<Point> {
         let mut points = Vec::new();
@@ -168,7 +168,7 @@ mod tests {
         let points = phalanx_points();
         let whole = Arc::new(ConvexHull::new(&points).unwrap());
         let placed = PlacedShape { parent_from_shape: Pose::identity(), shape: Shape::Convex(whole.clone()) };
-        let shapes = split(vec![placed], LinkId(3), 1, &center, RADIUS);
+        let shapes = split(vec![placed], LinkId(3), 1, &ball(&center));
         assert_eq!(shapes.iter().map(|s| s.is_tip).collect::<Vec<_>>(), [false, true, true]);
         let Shape::Convex(rest) = &shapes[0].placed.shape else { panic!("{:?}", shapes[0]) };
         assert_eq!(shapes[1].placed.shape, Shape::Sphere { radius: RADIUS });
@@ -198,7 +198,7 @@ mod tests {
             .collect();
         let hull = Arc::new(ConvexHull::new(&points).unwrap());
         let placed = PlacedShape { parent_from_shape: Pose::identity(), shape: Shape::Convex(hull) };
-        let shapes = split(vec![placed], LinkId(3), 1, &center, RADIUS);
+        let shapes = split(vec![placed], LinkId(3), 1, &ball(&center));
         assert_eq!(shapes.iter().map(|s| s.is_tip).collect::<Vec<_>>(), [false, true]);
     }
 
@@ -208,10 +208,10 @@ mod tests {
         let at = |x: f64| Pose::from_parts(Translation3::new(x, 0.0, 0.0), turned);
         let capsule =
             PlacedShape { parent_from_shape: at(0.04), shape: Shape::Capsule { half_length: 0.03, radius: RADIUS } };
-        let ball = PlacedShape { parent_from_shape: at(0.07), shape: Shape::Sphere { radius: RADIUS } };
-        let shapes = split(vec![capsule, ball.clone()], LinkId(3), 1, &Point::new(0.07, 0.0, 0.0), RADIUS);
+        let small = PlacedShape { parent_from_shape: at(0.07), shape: Shape::Sphere { radius: RADIUS } };
+        let shapes = split(vec![capsule, small.clone()], LinkId(3), 1, &ball(&Point::new(0.07, 0.0, 0.0)));
         assert_eq!(shapes.len(), 2);
-        assert_eq!((shapes[1].is_tip, &shapes[1].placed), (true, &ball));
+        assert_eq!((shapes[1].is_tip, &shapes[1].placed), (true, &small));
         let Shape::Capsule { half_length, radius } = shapes[0].placed.shape else { panic!("{:?}", shapes[0]) };
         assert!(!shapes[0].is_tip && radius == RADIUS);
         let ends = [-half_length, half_length].map(|z| shapes[0].placed.parent_from_shape * Point::new(0.0, 0.0, z));

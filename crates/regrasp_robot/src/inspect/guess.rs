@@ -36,6 +36,7 @@ pub(crate) fn guess_hand(robot: &Robot, contact: ContactModel, file: &Path) -> R
             tip_link,
             first_joint: None,
             tip,
+            pad: None,
             contact,
             rest: Vec::new(),
             place: Place::file(file),

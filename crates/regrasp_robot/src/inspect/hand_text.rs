@@ -1,9 +1,10 @@
 //! A hand as the text of a `hand.toml`.
 
 use crate::contact_model::ContactModel;
-use crate::hand::{Finger, Hand, TipShape};
+use crate::hand::{Finger, Hand};
 use crate::import::hand_file::{FORMAT, VERSION};
 use crate::robot::LinkId;
+use crate::tip::TipShape;
 use regrasp_geometry::Point;
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -54,6 +55,15 @@ pub fn hand_file_text(hand: &Hand, urdf: &str, allow: &BTreeSet<(LinkId, LinkId)
         if finger.tip.contact != ContactModel::default() {
             let _ = writeln!(text, "contact = {}", quoted(finger.tip.contact.name()));
         }
+        if let Some(pad) = finger.tip.pad {
+            let axis = hand.robot.fixed_pose_in_body(finger.tip.link).rotation.inverse() * pad.axis_in_body;
+            let [x, y, z] = [axis.x, axis.y, axis.z].map(number);
+            let _ = writeln!(
+                text,
+                "pad = {{ axis = [{x}, {y}, {z}], angle_deg = {} }}",
+                number(pad.cosine.acos().to_degrees())
+            );
+        }
         if let ContactModel::SoftFinger { torsion_radius } = finger.tip.contact {
             let _ = writeln!(text, "torsion_radius = {}", number(torsion_radius));
         }
@@ -81,7 +91,13 @@ fn tip_text(hand: &Hand, finger: &Finger) -> String {
             format!("{{ shape = \"sphere\", radius = {}, center = {point} }}", number(*radius))
         }
         TipShape::Point => format!("{{ shape = \"point\", position = {point} }}"),
-        TipShape::Hull(_) => format!("{{ shape = \"mesh\", center = {point} }}"),
+        TipShape::Ellipsoid(ellipsoid) => {
+            let turn = body_from_link.rotation.inverse() * ellipsoid.body_from_ellipsoid;
+            let list = |values: &[f64]| values.iter().map(|&value| number(value)).collect::<Vec<_>>().join(", ");
+            let (radii, turn) = (list(ellipsoid.radii.as_slice()), list(turn.coords.as_slice()));
+            format!("{{ shape = \"ellipsoid\", radii = [{radii}], center = {point}, quat_xyzw = [{turn}] }}")
+        }
+        TipShape::Hull { .. } => format!("{{ shape = \"mesh\", center = {point} }}"),
     }
 }
 

@@ -13,9 +13,10 @@ mod tip_sphere;
 /// Which links touch.
 mod touch;
 
-use crate::hand::{Hand, TipShape};
+use crate::hand::Hand;
 use crate::import::{LoadOptions, LoadedInput, load_hand, load_robot};
 use crate::robot::LinkId;
+use crate::tip::TipShape;
 use regrasp_base::{InputError, Rng};
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -149,7 +150,8 @@ pub fn inspect_hand(hand: &Hand, settings: &InspectSettings, rng: &mut Rng) -> H
             tip_shape: match finger.tip.shape {
                 TipShape::Sphere { .. } => "sphere",
                 TipShape::Point => "point",
-                TipShape::Hull(_) => "mesh",
+                TipShape::Ellipsoid(_) => "ellipsoid",
+                TipShape::Hull { .. } => "mesh",
             },
             tip_radius: finger.tip.radius(),
             tip_center_in_body: finger.tip.center_in_body.coords.into(),

@@ -26,6 +26,7 @@ use regrasp_geometry::Pose;
 use regrasp_robot::Hand;
 use regrasp_robot::contact_model::{self, ContactModel};
 use regrasp_robot::import::{LoadOptions, load_hand};
+use regrasp_robot::tip::{LARGEST_MISFIT, TipShape};
 use std::path::Path;
 
 /// Value of `format` in a scene file.
@@ -149,6 +150,16 @@ fn hand(root: &mut Table, files: &mut Files, found: &mut Found) -> Option<Hand> 
         files.inputs.push(InputFile { role: input.role, name, path: input.path, sha256: input.sha256 });
     }
     let mut hand = loaded.hand;
+    for finger in &hand.fingers {
+        if let TipShape::Hull { misfit, .. } = finger.tip.shape
+            && misfit > LARGEST_MISFIT
+        {
+            let off = format!("finger \"{}\": the tip's hull is {:.2} mm off an ellipsoid", finger.name, 1e3 * misfit);
+            let diagnostic = file.error("S108", found, off).expected("a rounded tip, within 0.2 mm over its pad");
+            let fix = "in the hand file give the tip a pad around what touches, or shape = \"ellipsoid\" or \"sphere\"";
+            found.diagnostics.push(diagnostic.fix(fix));
+        }
+    }
     if let Some(entry) = contacts {
         contact::apply(&entry, &mut hand, found)?;
     }

@@ -1,9 +1,12 @@
 //! Stories and pages, compared with other ways of knowing the same.
 
+mod charts;
 mod judged;
 mod page;
 #[path = "../../../../tests/support/places.rs"]
 mod places;
+mod render;
 mod sample;
 mod scene;
+mod storyboard;
 mod tessellation;

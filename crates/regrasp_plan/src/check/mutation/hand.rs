@@ -2,9 +2,12 @@
 
 use super::Breeder;
 use super::choice::{any_waypoint, waypoints, waypoints_mut};
-use crate::check::violation::ViolationKind::{ClosureLost, ContactOffTip, JointLimit, WrongScene};
+use crate::check::continuity::contact_of;
+use crate::check::violation::ViolationKind::{ClosureLost, ContactOffPad, ContactOffTip, JointLimit, WrongScene};
 use crate::plan::{SegmentKind, Waypoint};
+use regrasp_geometry::{Pose, UnitVector, Vector};
 use regrasp_robot::ContactModel;
+use regrasp_robot::tip::Pad;
 use std::sync::Arc;
 
 impl Breeder<'_> {
@@ -32,6 +35,22 @@ impl Breeder<'_> {
             if most >= required {
                 return None;
             }
+            Some(())
+        });
+        let model = self.model;
+        let touching = self.plan.segments.iter().flat_map(|segment| &segment.waypoints).find_map(|waypoint| {
+            let f = *holders(waypoint).first()?;
+            let contact = contact_of(&waypoint.contacts[f])?;
+            let normal = Pose::from(&waypoint.world_from_object) * contact.normal_in_object.into_inner();
+            let link = model.fingers[f].path.world_from_link(&waypoint.joints);
+            Some((f, -link.fixed_view::<3, 3>(0, 0).tr_mul(&normal)))
+        });
+        self.add_hand("pad that ends beside the contact", &[ContactOffPad], |hand, rng| {
+            let (f, outward) = touching?;
+            let angle = rng.uniform(0.2f64, 1.0);
+            let aside = outward.cross(&Vector::from(rng.direction())).try_normalize(1e-3)?;
+            let axis = nalgebra::Rotation3::new(aside * (angle + 0.01)) * outward;
+            hand.fingers[f].tip.pad = Some(Pad { axis_in_body: UnitVector::new_normalize(axis), cosine: angle.cos() });
             Some(())
         });
         self.add_hand("fingertips without friction", &[ClosureLost], |hand, _| {

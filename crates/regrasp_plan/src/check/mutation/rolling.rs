@@ -5,6 +5,8 @@ use super::{Breeder, move_tip};
 use crate::check::continuity::contact_of;
 use crate::check::model::Model;
 use crate::check::patch::Patch;
+use crate::check::surface;
+use crate::check::tip::TipSurface;
 use crate::check::violation::ViolationKind::{
     ContactOffSurface, ContactOffTip, GraspChanges, PromiseBroken, Slip, WrongContactMode,
 };
@@ -69,8 +71,9 @@ impl Breeder<'_> {
             let (s, f) = pick_rolling(plan, model, rng)?;
             let first = plan.segments[s].waypoints.first()?.contacts[f];
             let contact = contact_of(&first)?;
-            let center = contact.point_in_object + contact.normal_in_object.into_inner() * model.fingers[f].radius;
             for waypoint in &mut plan.segments[s].waypoints {
+                let away = model.fingers[f].center_from_contact(waypoint, &contact.normal_in_object);
+                let center = contact.point_in_object + away;
                 waypoint.contacts[f] = first;
                 move_tip(model, f, &mut waypoint.joints, &(Pose::from(&waypoint.world_from_object) * center))?;
             }
@@ -131,12 +134,18 @@ fn slide(model: &Model, shape: &Shape, waypoint: &mut Waypoint, f: usize, angle:
     let contact = contact_of(&waypoint.contacts[f])?;
     let (x, y) = regrasp_geometry::frame::tangents(&contact.normal_in_object);
     let side = x.into_inner() * angle.cos() + y.into_inner() * angle.sin();
-    let center = contact.point_in_object + contact.normal_in_object.into_inner() * radius + side * way;
+    let away = model.fingers[f].center_from_contact(waypoint, &contact.normal_in_object);
+    let center = contact.point_in_object + away + side * way;
     let foot = Patch::near(shape, &center, radius + 1e-3).foot(&center)?;
-    let normal = UnitVector::new_normalize(center - foot).into_inner();
+    let normal = match model.fingers[f].surface {
+        TipSurface::Ball => UnitVector::new_normalize(center - foot).into_inner(),
+        // Its centre is not over its contact; the surface is smooth where fingers roll.
+        TipSurface::Ellipsoid { .. } => surface::nearest(shape, &foot).normals.first()?.normalize(),
+    };
+    let away = model.fingers[f].center_from_contact(waypoint, &normal);
     (waypoint.contacts[f].point_in_object, waypoint.contacts[f].normal_in_object) =
         (Some(foot.into()), Some(normal.into()));
-    let target = Pose::from(&waypoint.world_from_object) * (foot + normal * radius);
+    let target = Pose::from(&waypoint.world_from_object) * (foot + away);
     move_tip(model, f, &mut waypoint.joints, &target)
 }
 

@@ -7,7 +7,7 @@ use super::super::search::{Search, Stop};
 use super::super::shorten::{Arrival, change_grasp, shorten, whole_transfer};
 use super::super::state::{GraspState, Motion, Sequence};
 use super::super::transfer::ik_settings;
-use super::super::workspace::{TipMode, tip_target};
+use super::super::workspace::TipMode;
 use super::GraspRoadmap;
 use super::graph::contact_ids;
 use super::landmarks::Bounds;
@@ -220,11 +220,12 @@ fn follows(search: &mut Search, roadmap: &GraspRoadmap, node: usize, finger: usi
     way.iter().all(|pose| {
         let world_from_object = Placement::from(pose);
         let normal = world_from_object.vector(&contact.normal_in_object);
-        let target = tip_target(&world_from_object, contact, model.fingers[finger].tip_radius);
         // Moments are far apart; reach is asked about, not continuity.
         let settings = ik_settings(model, finger, UnitVector::new_unchecked(normal));
         let settings = IkSettings { max_step: FARTHEST, ..settings };
-        let Some(joints) = model.fingers[finger].ik.solve_near(&target, &seed, &settings) else { return false };
+        let Some(joints) = model.fingers[finger].touch_near(&world_from_object, contact, &seed, &settings) else {
+            return false;
+        };
         search.workspace.place_object_and_finger(pose, finger, &joints);
         seed = joints;
         search.workspace.finger_alone_is_clear(finger, TipMode::Near { finger, normal_in_world: normal })

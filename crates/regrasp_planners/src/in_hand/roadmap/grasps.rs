@@ -51,7 +51,7 @@ pub fn spread_contacts(model: &Model, n: usize, seed: u64) -> Vec<Vec<Contact>> 
 fn draw(model: &Model, finger: usize, rng: &mut Rng) -> Option<Contact> {
     let object = &model.scene.object;
     let drawn = object.surface.sample(rng);
-    let settled = object.surface.settle(&drawn, model.fingers[finger].tip_radius)?;
+    let settled = object.surface.settle(&drawn, model.fingers[finger].settle_radius)?;
     (object.surface.crease_distance(&settled) >= object.edge_distance)
         .then_some(Contact { point_in_object: settled.point_in_object, normal_in_object: settled.normal_in_object })
 }

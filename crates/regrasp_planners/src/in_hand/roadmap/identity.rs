@@ -86,10 +86,18 @@ fn hand(hand: &Hand) -> Digest {
                 feed.count(1);
                 feed.numbers([*radius]);
             }
-            TipShape::Hull(hull) => {
+            TipShape::Hull { hull, .. } => {
                 feed.count(2);
                 feed.points(hull.vertices());
             }
+            TipShape::Ellipsoid(ellipsoid) => {
+                feed.count(3);
+                feed.numbers(ellipsoid.radii.iter().copied());
+                feed.numbers(ellipsoid.body_from_ellipsoid.coords.iter().copied());
+            }
+        }
+        if let Some(pad) = &finger.tip.pad {
+            feed.numbers(pad.axis_in_body.iter().copied().chain([pad.cosine]));
         }
         feed.count(finger.shapes.len());
         for shape in &finger.shapes {

@@ -1,0 +1,70 @@
+//! A first try with links that keep farther from everything than they must: in a hand that gives, links stray by more than
+//! plans keep them away, and what they touch then throws the object.
+
+use super::settings::{InHandSettings, Method};
+use regrasp_base::Budget;
+use regrasp_geometry::collision::support::support_value;
+use regrasp_geometry::{Vector, frame};
+use regrasp_robot::Finger;
+use regrasp_scene::Scene;
+
+/// Directions across a link in which its width is measured.
+const DIRECTIONS: usize = 32;
+
+/// Settings and budget of the first try; None where there is none to make.
+pub fn first_try(scene: &Scene, settings: &InHandSettings, budget: &Budget) -> Option<(InHandSettings, Budget)> {
+    let wanted = settings.keep_away.filter(|_| settings.method == Method::Gait)?;
+    let can_keep = |finger: &Finger| stand_back(finger).is_none_or(|back| back >= 2.0 * wanted.clearance);
+    if wanted.clearance <= settings.clearance || !scene.hand.fingers.iter().all(can_keep) {
+        return None;
+    }
+    let settings = InHandSettings { clearance: wanted.clearance, keep_away: None, ..settings.clone() };
+    Some((settings, Budget { max_work: wanted.work.min(budget.max_work / 2), ..budget.clone() }))
+}
+
+/// How far the link behind a round tip stands back behind it where it is thinnest, in metres: no finger keeps its last link
+/// farther from a plane that its tip touches, whichever way it turns. None for tips without such a link, and for sharp ones.
+fn stand_back(finger: &Finger) -> Option<f64> {
+    let last = finger.chain.joints.len() - 1;
+    let (x, y) = frame::tangents(&nalgebra::Unit::try_new(finger.tip.center_in_body.coords, 1e-6)?);
+    let behind = || finger.shapes.iter().filter(|shape| shape.body == last && !shape.is_tip);
+    if behind().next().is_none() || finger.tip.radius() == 0.0 {
+        return None;
+    }
+    let width = |across: &Vector| {
+        let reach = behind().map(|shape| {
+            let body_from_shape = &shape.placed.parent_from_shape;
+            let own = support_value(&shape.placed.shape, &(body_from_shape.rotation.inverse() * across), &mut 0);
+            body_from_shape.translation.vector.dot(across) + own
+        });
+        reach.fold(0.0, f64::max)
+    };
+    let thinnest = (0..DIRECTIONS).map(|k| {
+        let (sine, cosine) = (std::f64::consts::TAU * k as f64 / DIRECTIONS as f64).sin_cos();
+        width(&(x.into_inner() * cosine + y.into_inner() * sine))
+    });
+    Some(finger.tip.radius() - thinnest.fold(f64::INFINITY, f64::min))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use regrasp_robot::LoadOptions;
+
+    #[test]
+    fn the_wide_hand_stands_back_by_what_its_urdf_says() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/sphere_90x.toml");
+        let scene = regrasp_scene::load_scene(&path, &LoadOptions::default()).unwrap().scene;
+        // Tips of 5 mm on capsules of 4 mm.
+        for finger in &scene.hand.fingers {
+            assert!((stand_back(finger).unwrap() - 0.001).abs() < 1e-9);
+        }
+        let settings = InHandSettings::default();
+        assert!(first_try(&scene, &settings, &Budget::work(1000)).is_none());
+        let keep_away =
+            settings.keep_away.map(|wanted| super::super::settings::KeepAway { clearance: 0.0005, ..wanted });
+        let (first, budget) =
+            first_try(&scene, &InHandSettings { keep_away, ..settings }, &Budget::work(1000)).unwrap();
+        assert_eq!((first.clearance, first.keep_away, budget.max_work), (0.0005, None, 500));
+    }
+}

@@ -1,0 +1,68 @@
+//! Charts of a plan, as SVG: the same plan gives the same bytes.
+//!
+//! All charts with a time axis have it at the same place, so that they can be laid one under the other.
+
+/// Why no plan was found.
+mod causes;
+/// Distance of what must not touch.
+mod clearance;
+/// Normal forces.
+mod forces;
+/// Which finger holds when.
+mod gait;
+/// Joint angles within their limits.
+mod joints;
+/// Closure margin.
+mod margin;
+/// The way of the object's orientation.
+mod orientation;
+/// SVG text: elements, escaping, numbers, axes.
+pub mod svg;
+/// The time axis, and a panel over it.
+mod time_axis;
+
+pub use causes::causes;
+pub use clearance::clearance;
+pub use forces::forces;
+pub use gait::gait;
+pub use joints::joints;
+pub use margin::margin;
+pub use orientation::orientation;
+
+use crate::story::Story;
+
+/// A chart, and the name of its file without extension.
+pub type Chart = (&'static str, String);
+
+/// Every chart that the story has data for.
+pub fn all(story: &Story) -> Vec<Chart> {
+    let mut charts = Vec::new();
+    let mut add = |name: &'static str, chart: Option<String>| charts.extend(chart.map(|chart| (name, chart)));
+    if let Some(plan) = &story.plan {
+        add("gait", Some(gait(plan)));
+        if let Some(judged) = &story.judged {
+            add("margin", margin(plan, judged));
+            add("clearance", clearance(plan, judged));
+        }
+        add("joints", joints(plan, &story.scene));
+        add("forces", forces(plan));
+        add("orientation", orientation(plan, story.roadmap.as_ref()));
+    }
+    if let Some(failure) = &story.failure {
+        add("causes", causes(failure));
+    }
+    charts
+}
+
+/// What the chart is of, in a few words.
+fn title(plan: &regrasp_plan::Plan) -> String {
+    use regrasp_geometry::Pose;
+    let [start, goal] = [&plan.start, &plan.goal].map(|pose| Pose::from(pose).rotation);
+    let angle = start.angle_to(&goal).to_degrees();
+    let counted = |n: u64, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
+    format!(
+        "{angle:.0}\u{b0} in {} and {}",
+        counted(plan.statistics.transfers, "transfer"),
+        counted(plan.statistics.relocations, "relocation")
+    )
+}
