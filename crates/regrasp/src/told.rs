@@ -80,8 +80,19 @@ pub fn roadmap_from_first(roadmap: &GraspRoadmap) -> RoadmapStory {
 }
 
 /// What a search had reached when it failed; none where the planner keeps no graph. `goal` is the pose asked for.
+/// Component 0 is the start's.
 pub fn reached_story(failure: &Failure, goal: &Pose) -> Option<RoadmapStory> {
-    failure.reached.as_ref().map(|reached| outline_story(reached, goal))
+    let mut story = outline_story(failure.reached.as_ref()?, goal);
+    // The nodes of the start come first, if there are any.
+    let of_start = story.nodes.first().filter(|_| failure.nearest_miss.is_some()).map_or(0, |node| node.component);
+    for node in &mut story.nodes {
+        node.component = match node.component {
+            component if component == of_start => 0,
+            0 => of_start,
+            other => other,
+        };
+    }
+    Some(story)
 }
 
 fn outline_story(outline: &Outline, goal: &Pose) -> RoadmapStory {

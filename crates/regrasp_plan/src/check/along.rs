@@ -11,7 +11,9 @@ use crate::plan::{Plan, Segment, Waypoint};
 use regrasp_scene::Scene;
 use std::collections::BTreeMap;
 
-/// Margins of different contacts that a certificate may prove one after the other before the cone program is solved again.
+/// With more fingers than this, whose subsets are many, the cone programs are not solved at every waypoint.
+const SOLVED_UP_TO: usize = 6;
+/// Margins of different contacts that a certificate then may prove one after the other before they are solved again.
 const SOLVED_EVERY: usize = 8;
 /// What a certificate proves is taken where it is at least this share of the last margin solved for.
 const SHARE_TAKEN: f64 = 0.98;
@@ -29,7 +31,8 @@ pub struct Nearest {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Along {
     /// Closure margin of the fingers that hold, in a regrasp without the one that moves: a proven lower bound as in the
-    /// report, at contacts that roll up to 2 % below it; zero where no closure was proved.
+    /// report, and zero where no closure was proved. Of more than six fingers that roll, what forces found at one of the
+    /// waypoints before prove: maybe less than could be proved, at least 98 % of the margin there.
     pub margin: Vec<f64>,
     /// The nearest pair; none where a distance is not resolved, or nothing must be kept apart.
     pub clearance: Vec<Option<Nearest>>,
@@ -87,7 +90,8 @@ impl Margins {
         }
         let grips = grips_of(model, holders);
         let fingers: Vec<usize> = holders.iter().map(|holder| holder.finger).collect();
-        if let Some(last) = self.last.as_mut().filter(|last| last.fingers == fingers && last.used < SOLVED_EVERY) {
+        let is_near = |last: &&mut Solved| last.fingers == fingers && last.used < SOLVED_EVERY;
+        if let Some(last) = self.last.as_mut().filter(|last| fingers.len() > SOLVED_UP_TO && is_near(last)) {
             let proven = margin_by(&last.certificate, &grips, &self.body);
             if proven >= SHARE_TAKEN * last.margin {
                 last.used += 1;
