@@ -222,7 +222,7 @@ fn draw_axes(sheet: &mut Sheet, frame: &KeyFrame, camera: &Camera, layout: &Layo
         sheet.line(&[origin, end], 0.13 * layout.text, color);
         let letter = ["x", "y", "z"][axis];
         let seen = (end[0] - origin[0]).hypot(end[1] - origin[1]);
-        if seen < 0.3 * length {
+        if seen < 0.45 * length {
             continue; // It points at the reader; its letter would lie over others.
         }
         let place = [0, 1].map(|c| end[c] + (end[c] - origin[c]) / seen * 0.42 * layout.text);
