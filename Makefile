@@ -49,7 +49,7 @@ release:
 demo: release
 	$(REGRASP) demo -o $(OUT)/demo
 
-# The pictures of README and docs/gallery.md, which has the same commands; those of the Allegro hand want the models. The same
+# The pictures of README and docs/gallery.md, which has the same commands; those of the Allegro and Shadow hands want the models. The same
 # bytes every time.
 GALLERY ?= docs/pictures
 gallery: release
@@ -66,8 +66,10 @@ ifneq ($(PACKAGES),)
 	$(REGRASP) view $(OUT)/gallery/cube.json scenes/allegro/cube57_z.toml $(PACKAGES) --png $(GALLERY)/allegro-cube.png --frames 8 --width 1400 --svg $(GALLERY)/allegro-cube
 	$(REGRASP) plan scenes/allegro/apple_z.toml $(PACKAGES) -o $(OUT)/gallery/apple.json
 	$(REGRASP) view $(OUT)/gallery/apple.json scenes/allegro/apple_z.toml $(PACKAGES) --png $(GALLERY)/allegro-apple.png --frames 8 --width 1300
+	$(REGRASP) plan scenes/shadow/sphere32_z.toml $(PACKAGES) -o $(OUT)/gallery/shadow.json
+	$(REGRASP) view $(OUT)/gallery/shadow.json scenes/shadow/sphere32_z.toml $(PACKAGES) --png $(GALLERY)/shadow-sphere.png --frames 4 --width 1400
 else
-	@echo "SKIPPED: pictures of the Allegro hand (no models)"
+	@echo "SKIPPED: pictures of the Allegro and Shadow hands (no models)"
 endif
 
 test: test-rust test-python test-page

@@ -221,10 +221,11 @@ fn draw_axes(sheet: &mut Sheet, frame: &KeyFrame, camera: &Camera, layout: &Layo
         let color = stage::AXIS_COLORS[axis];
         sheet.line(&[origin, end], 0.13 * layout.text, color);
         let letter = ["x", "y", "z"][axis];
-        let out = [0, 1].map(|c| origin[c] + (end[c] - origin[c]) * 1.0);
-        let away = ((out[0] - origin[0]).powi(2) + (out[1] - origin[1]).powi(2)).sqrt().max(1e-9);
-        let shift = 0.42 * layout.text;
-        let place = [0, 1].map(|c| out[c] + (out[c] - origin[c]) / away * shift);
+        let seen = (end[0] - origin[0]).hypot(end[1] - origin[1]);
+        if seen < 0.45 * length {
+            continue; // It points at the reader; its letter would lie over others.
+        }
+        let place = [0, 1].map(|c| end[c] + (end[c] - origin[c]) / seen * 0.42 * layout.text);
         sheet.write(letter, place[0], place[1] + 0.24 * layout.text, 0.8 * layout.text, color, Anchor::Middle);
     }
 }

@@ -63,6 +63,8 @@ impl Prop {
 pub struct Stage<'s> {
     scene: &'s SceneStory,
     links: Vec<(usize, Prop)>,
+    /// For every piece of `links`, whether it belongs to a finger.
+    is_finger: Vec<bool>,
     object: Vec<Prop>,
     obstacles: Vec<Model>,
     /// Middle of the object's bounds, in its frame.
@@ -102,6 +104,7 @@ impl<'s> Stage<'s> {
         let mut stage = Stage {
             scene,
             links: Vec::new(),
+            is_finger: Vec::new(),
             object: Vec::new(),
             obstacles: Vec::new(),
             object_center,
@@ -130,6 +133,7 @@ impl<'s> Stage<'s> {
                     Some(_) => LINK,
                     None => PALM,
                 };
+                self.is_finger.push(finger.is_some());
                 let body = FIRST_LINK + 2 * link as u32 + u32::from(is_tip);
                 self.links.push((link, Prop { from_mesh, surface, paint: Paint::Plain(linear(color)), body }));
             }
@@ -166,6 +170,11 @@ impl<'s> Stage<'s> {
     /// How many models of [`Stage::solid`] are the object's.
     pub fn n_object_pieces(&self) -> usize {
         self.object.len()
+    }
+
+    /// For every model of [`Stage::solid`], whether it is of the object or a finger, not of the palm or an arm.
+    pub fn matters(&self) -> impl Iterator<Item = bool> + '_ {
+        std::iter::repeat_n(true, self.object.len()).chain(self.is_finger.iter().copied())
     }
 
     /// Where the middle of the object is, in the world.

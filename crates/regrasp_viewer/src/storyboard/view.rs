@@ -49,9 +49,12 @@ pub fn best(
     width: usize,
     height: usize,
 ) -> Camera {
-    let shown =
-        postures.iter().flatten().chain(layers.iter().flatten().filter(|l| l.is_framed).flat_map(|l| &l.models));
-    let corners: Vec<Point> = shown.flat_map(extremes).collect();
+    let marks = layers.iter().flatten().filter(|layer| layer.is_framed).flat_map(|layer| &layer.models);
+    let (mut corners, mut rest) = (marks.flat_map(extremes).collect::<Vec<Point>>(), Vec::new());
+    for (model, matters) in postures.iter().flat_map(|solid| solid.iter().zip(stage.matters())) {
+        if matters { &mut corners } else { &mut rest }.extend(extremes(model));
+    }
+    let corners = Corners { n_that_matter: corners.len(), all: [corners, rest].concat() };
     let trial_height = (TRIAL_WIDTH * height).div_ceil(width.max(1)).max(1);
     let mut found: Option<(f64, Vector)> = None;
     for height_angle in HEIGHTS {
@@ -116,12 +119,18 @@ fn value_of(stage: &Stage, frames: &[KeyFrame], postures: &[Vec<Model>], camera:
     value
 }
 
-/// A camera that looks along `toward` and shows all `corners`, or, where the object would be too small, the object in its
-/// middle.
+/// What is to be in the picture, first what matters most.
+struct Corners {
+    all: Vec<Point>,
+    n_that_matter: usize,
+}
+
+/// A camera that looks along `toward` and shows all corners; where the object would be too small, those that matter, and
+/// where it still would be, the object in the middle.
 fn framed(
     stage: &Stage,
     frames: &[KeyFrame],
-    corners: &[Point],
+    corners: &Corners,
     toward: &Vector,
     width: usize,
     height: usize,
@@ -131,30 +140,34 @@ fn framed(
     let size = stage.object_radius;
     let focal = FOCAL * width as f64;
     let half = [width as f64 / 2.0, height as f64 / 2.0];
-    let room = half.map(|h| h * (1.0 - 2.0 * BORDER));
+    let room = half.map(|h| 2.0 * h * (1.0 - 2.0 * BORDER));
     let farthest = focal * 2.0 * size / (LEAST_OBJECT * height as f64);
-    // Distances, from near to far, until all is in the picture.
-    let mut distance = farthest * 0.35;
-    loop {
-        let mut camera = Camera::looking(toward, &middle, distance, focal, [0.0, 0.0]);
-        let seen = corners.iter().map(|p| camera.see(p));
-        let whole = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
-        let [left, top, right, bottom] = seen.fold(whole, |b, p| match p.depth > 0.0 {
-            true => [b[0].min(p.x), b[1].min(p.y), b[2].max(p.x), b[3].max(p.y)],
-            false => [-1e9, -1e9, 1e9, 1e9],
-        });
-        let fits = right - left <= 2.0 * room[0] && bottom - top <= 2.0 * room[1];
-        let last = distance >= farthest;
-        if fits || last {
-            // All in the middle; where that does not fit, as far as the object keeps its place in the picture.
-            let object = 1.25 * focal * size / distance;
-            let shift = |low: f64, high: f64, half: f64| {
-                let most = if fits { f64::INFINITY } else { (half - object).max(0.0) };
-                (-(low + high) / 2.0).clamp(-most, most)
-            };
-            camera.center = [half[0] + shift(left, right, half[0]), half[1] + shift(top, bottom, half[1])];
-            return camera;
+    let looking = |distance: f64| Camera::looking(toward, &middle, distance, focal, [0.0, 0.0]);
+    for shown in [&corners.all[..], &corners.all[..corners.n_that_matter]] {
+        // Distances, from near to far, until all is in the picture.
+        let mut distance = farthest * 0.35;
+        while distance < farthest {
+            let camera = looking(distance);
+            let [left, top, right, bottom] = bounds(&camera, shown);
+            if right - left <= room[0] && bottom - top <= room[1] {
+                return Camera { center: [half[0] - (left + right) / 2.0, half[1] - (top + bottom) / 2.0], ..camera };
+            }
+            distance *= 1.02;
         }
-        distance = (distance * 1.02).min(farthest);
     }
+    // Something has to be cut.
+    let camera = looking(farthest);
+    let around = bounds(&camera, &corners.all[..corners.n_that_matter]);
+    let most = half.map(|h| (h - 1.25 * focal * size / farthest).max(0.0));
+    let shift = [0, 1].map(|k| (-(around[k] + around[k + 2]) / 2.0).clamp(-most[k], most[k]));
+    Camera { center: [half[0] + shift[0], half[1] + shift[1]], ..camera }
+}
+
+/// Left, top, right and bottom of what is seen of points; without bounds where one is behind the camera.
+fn bounds(camera: &Camera, points: &[Point]) -> [f64; 4] {
+    let nothing = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
+    points.iter().map(|p| camera.see(p)).fold(nothing, |b, p| match p.depth > 0.0 {
+        true => [b[0].min(p.x), b[1].min(p.y), b[2].max(p.x), b[3].max(p.y)],
+        false => [-1e9, -1e9, 1e9, 1e9],
+    })
 }
