@@ -33,7 +33,7 @@ fn scenes_of_the_bundled_hands_load_without_models() {
         |path: &PathBuf| PAPER_SCENES.iter().any(|name| path.file_stem().is_some_and(|stem| stem == *name));
     assert_eq!(paths.iter().filter(|path| is_of_paper(path)).count(), PAPER_SCENES.len());
     paths.retain(|path| !is_of_paper(path));
-    assert_eq!(paths.len(), 14);
+    assert_eq!(paths.len(), 15);
     for path in paths {
         let loaded = load(&path, &LoadOptions::default());
         assert_eq!(loaded.notes, Vec::<String>::new(), "{}", path.display());

@@ -2,7 +2,7 @@
 
 use super::shade::Picture;
 
-/// Bytes of a PNG file with 8 bits per channel: with a palette where the picture has at most 256 colours.
+/// Bytes of a PNG file with 8 bits per channel.
 ///
 /// Panics if the picture has not three bytes per pixel.
 pub fn encode(picture: &Picture) -> Vec<u8> {
