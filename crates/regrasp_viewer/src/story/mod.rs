@@ -126,7 +126,7 @@ pub struct LinkStory {
     pub parent_from_joint: PoseData,
     /// Axis in that frame.
     pub axis: [f64; 3],
-    /// Index in `joints` of what drives it, -1 for fixed ones. Position = multiplier * joints[joint] + offset.
+    /// Index in `joints` of what drives it, -1 for fixed ones. Position = `multiplier * joints[joint] + offset`.
     pub joint: i32,
     /// See `joint`.
     pub multiplier: f64,

@@ -1,7 +1,7 @@
 //! Triangles of shapes: closed, counter-clockwise seen from outside.
 //!
 //! Round shapes are inscribed: vertices lie on the surface, and no point of a triangle is farther from it than
-//! [`DEVIATION`] times the largest radius.
+//! `DEVIATION` times the largest radius.
 
 use regrasp_geometry::{Point, Shape, Vector};
 use std::f64::consts::PI;
