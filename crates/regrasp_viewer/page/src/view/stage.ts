@@ -60,7 +60,7 @@ export class Stage {
   constructor(private readonly story: Story, private readonly motion: Motion, private readonly theme: Theme, onCamera: () => void) {
     this.software = drawnBySoftware();
     this.hasVisual = story.scene.pieces.some((piece) => piece.role === "visual");
-    this.movingRatio = this.software ? 1 : Math.min(devicePixelRatio || 1, 2);
+    this.movingRatio = this.software ? 0.75 : Math.min(devicePixelRatio || 1, 2);
     const canvas = document.createElement("canvas");
     // Made here and not by three.js, whose own is see-through: an opaque one is cheaper to lay into the page.
     const context = canvas.getContext("webgl2", { alpha: false, antialias: !this.software, powerPreference: "high-performance" });
@@ -405,10 +405,10 @@ export class Stage {
     return true;
   }
 
-  /** Coarser pictures while moving where drawing takes longer than 28 ms on average. */
+  /** Coarser pictures while moving where drawing takes longer than 24 ms on average. */
   private pace(interval: number): void {
     this.interval += (interval - this.interval) * 0.08;
-    if (this.interval < 28 || this.movingRatio <= 0.5) return;
+    if (this.interval < 24 || this.movingRatio <= 0.5) return;
     this.movingRatio = Math.max(0.5, this.movingRatio * 0.85);
     this.interval = 16;
   }
