@@ -140,6 +140,22 @@ impl Tip {
     }
 }
 
+/// Lengths and angles below which two surfaces are the same, in metres and radians.
+const SAME: f64 = 1e-9;
+
+/// True when two balls or ellipsoids in one frame are the same; balls may be turned. False for all other shapes.
+pub fn is_same_surface(a: &PlacedShape, b: &PlacedShape) -> bool {
+    let [at, from] = [a, b].map(|placed| placed.parent_from_shape);
+    let is_alike = match (&a.shape, &b.shape) {
+        (Shape::Sphere { radius: a }, Shape::Sphere { radius: b }) => (a - b).abs() < SAME,
+        (Shape::Ellipsoid { radii: a }, Shape::Ellipsoid { radii: b }) => {
+            (a - b).norm() < SAME && at.rotation.angle_to(&from.rotation) < SAME
+        }
+        _ => false,
+    };
+    is_alike && (at.translation.vector - from.translation.vector).norm() < SAME
+}
+
 /// An ellipsoid that was fitted to points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
@@ -296,6 +312,23 @@ mod tests {
             given.as_mut_slice().sort_by(f64::total_cmp);
             assert!((found - given).norm() < 5e-5, "{found}");
         }
+    }
+
+    #[test]
+    fn surfaces_are_the_same_to_rounding_and_balls_however_they_are_turned() {
+        let placed = |shape: Shape, x: f64, angle: f64| PlacedShape {
+            parent_from_shape: Pose::new(Vector::new(x, 0.0, 0.0), Vector::new(0.0, 0.0, angle)),
+            shape,
+        };
+        let ball = || Shape::Sphere { radius: 0.005 };
+        let egg = || Shape::Ellipsoid { radii: Vector::new(0.009, 0.007, 0.006) };
+        assert!(is_same_surface(&placed(ball(), 0.01, 0.0), &placed(ball(), 0.01 + 1e-12, 1.0)));
+        assert!(!is_same_surface(&placed(ball(), 0.01, 0.0), &placed(ball(), 0.01001, 0.0)));
+        assert!(is_same_surface(&placed(egg(), 0.01, 0.3), &placed(egg(), 0.01, 0.3 + 1e-12)));
+        assert!(!is_same_surface(&placed(egg(), 0.01, 0.3), &placed(egg(), 0.01, 0.4)));
+        assert!(!is_same_surface(&placed(egg(), 0.01, 0.3), &placed(ball(), 0.01, 0.3)));
+        let cube = || Shape::Cuboid { half_extents: Vector::repeat(0.005) };
+        assert!(!is_same_surface(&placed(cube(), 0.0, 0.0), &placed(cube(), 0.0, 0.0)));
     }
 
     #[test]

@@ -8,6 +8,7 @@ use regrasp_geometry::mass::solid_properties;
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{ConvexHull, Point, Pose, Shape, pose_from};
 use regrasp_plan::Plan;
+use regrasp_robot::tip::is_same_surface;
 use regrasp_robot::{Finger, Hand, JointId, JointKind, LinkId, Motion, TipShape};
 use regrasp_scene::Scene;
 use std::sync::Arc;
@@ -136,7 +137,7 @@ fn geom_names(scene: &Scene) -> GeomNames {
     let (mut fingers, mut touching) = (Vec::new(), Vec::new());
     for finger in &hand.fingers {
         let own = own_tip(finger);
-        let is_own = |placed: &PlacedShape| own.as_ref().is_some_and(|own| own.is(placed));
+        let is_own = |placed: &PlacedShape| own.as_ref().is_some_and(|own| is_same_surface(placed, &own.placed));
         let of_finger: Vec<String> = finger
             .shapes
             .iter()
@@ -174,18 +175,6 @@ fn own_tip(finger: &Finger) -> Option<OwnTip> {
         TipShape::Sphere { .. } | TipShape::Ellipsoid(_) | TipShape::Hull { .. } => finger.tip.own_shape()?,
     };
     Some(OwnTip { name: tip_name(finger), placed })
-}
-
-impl OwnTip {
-    /// True when `placed`, a shape of the tip's body, is this one.
-    fn is(&self, placed: &PlacedShape) -> bool {
-        let [a, b] = [placed, &self.placed].map(|placed| placed.parent_from_shape.translation.vector);
-        let same_shape = match (&placed.shape, &self.placed.shape) {
-            (Shape::Sphere { radius: a }, Shape::Sphere { radius: b }) => (a - b).abs() < 1e-9,
-            _ => *placed == self.placed,
-        };
-        same_shape && (a - b).norm() < 1e-9
-    }
 }
 
 /// Solver, contacts and joints: physics notes, sections 1 and 2.

@@ -4,13 +4,12 @@
 
 use arrayvec::ArrayVec;
 use regrasp_geometry::collision::{Ball, BallTree, MeshBody, MeshTree, Placement};
-use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Point, Pose, Shape};
 use regrasp_grasp::{Contact, ContactModel, GraspFrame, Grip, closure};
 use regrasp_robot::kinematics::body_frame::BodyFrame;
 use regrasp_robot::kinematics::finger_ik::FingerIk;
 use regrasp_robot::kinematics::motion_bound::MotionBound;
-use regrasp_robot::tip::{Pad, TipEllipsoid};
+use regrasp_robot::tip::{Pad, TipEllipsoid, is_same_surface};
 use regrasp_scene::Scene;
 use std::sync::Arc;
 
@@ -167,19 +166,11 @@ impl<'a> Model<'a> {
                 let name = &hand.robot.links[part.link.0].name;
                 add(&part.placed.shape, &part.placed.parent_from_shape, part.body, part.link, name, part.is_tip);
             }
-            if let Some(own) = finger.tip.own_shape() {
-                let is_own = |placed: &PlacedShape| {
-                    let shift = placed.parent_from_shape.translation.vector - own.parent_from_shape.translation.vector;
-                    let same_size = match (&placed.shape, &own.shape) {
-                        (Shape::Sphere { radius: a }, Shape::Sphere { radius: b }) => (a - b).abs() < 1e-9,
-                        _ => *placed == own,
-                    };
-                    same_size && shift.norm() < 1e-9
-                };
-                if !finger.shapes.iter().any(|part| part.is_tip && is_own(&part.placed)) {
-                    let link = finger.chain.joints.len() - 1;
-                    add(&own.shape, &own.parent_from_shape, link, finger.tip.link, "tip", true);
-                }
+            if let Some(own) = finger.tip.own_shape()
+                && !finger.shapes.iter().any(|part| part.is_tip && is_same_surface(&part.placed, &own))
+            {
+                let link = finger.chain.joints.len() - 1;
+                add(&own.shape, &own.parent_from_shape, link, finger.tip.link, "tip", true);
             }
             let ik = &finger.ik;
             fingers.push(FingerModel {

@@ -6,17 +6,17 @@ use super::tessellate::{Triangles, tessellate};
 use super::{
     Carrier, FingerStory, JointStory, LinkKind, LinkStory, OtherCarrier, PieceStory, PoseData, Role, SceneStory,
 };
+use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Pose, Shape, UnitVector, Vector};
 use regrasp_plan::check::kinematics::world_from_root;
 use regrasp_robot::hand::convex_of;
-use regrasp_robot::{Hand, Joint, JointKind, LinkId, ResolveOptions, Robot, TipShape, VisualGeometry};
+use regrasp_robot::tip::is_same_surface;
+use regrasp_robot::{Hand, Joint, JointKind, LinkId, ResolveOptions, Robot, VisualGeometry};
 use regrasp_scene::Scene;
 use std::sync::Arc;
 
 /// Most triangles in a page, each mesh counted once: less than 3 MB of text.
 const MOST_TRIANGLES: usize = 120_000;
-/// Centres and radii that differ by less, in metres, are one ball.
-const SAME_BALL: f64 = 1e-6;
 
 /// The scene, with remarks on what could not be shown as it is. Visual meshes are looked for in `packages`.
 ///
@@ -194,16 +194,11 @@ fn collision_pieces(scene: &Scene, tree: &Tree, shapes: &mut Shapes) -> Vec<Piec
             let mesh = shapes.hull_of(&placed.shape);
             add(&placed.parent_from_shape, mesh);
         }
-        if let Some(finger) = tip
-            && let TipShape::Sphere { radius } = finger.tip.shape
-        {
-            let center = hand.robot.fixed_pose_in_body(*id).inverse() * finger.tip.center_in_body;
-            let is_drawn = link.collision.iter().any(|placed| {
-                let apart = (placed.parent_from_shape.translation.vector - center.coords).norm();
-                matches!(placed.shape, Shape::Sphere { radius: r } if (r - radius).abs() < SAME_BALL && apart < SAME_BALL)
-            });
-            if !is_drawn {
-                add(&Pose::translation(center.x, center.y, center.z), shapes.index_of(&Shape::Sphere { radius }));
+        if let Some(own) = tip.and_then(|finger| finger.tip.own_shape()) {
+            let link_from_body = hand.robot.fixed_pose_in_body(*id).inverse();
+            let own = PlacedShape { parent_from_shape: link_from_body * own.parent_from_shape, shape: own.shape };
+            if !link.collision.iter().any(|placed| is_same_surface(placed, &own)) {
+                add(&own.parent_from_shape, shapes.index_of(&own.shape));
             }
         }
     }

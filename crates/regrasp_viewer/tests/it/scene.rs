@@ -175,3 +175,19 @@ fn a_story_is_the_same_after_json_and_every_time() {
     assert_eq!(sample.story().to_json(), json);
     assert_eq!(story.asked.len(), 2);
 }
+
+#[test]
+fn fingertips_are_drawn_as_they_touch_whatever_else_their_link_is() {
+    let path = repository().join("scenes/oval_sphere_90x.toml");
+    let scene = load_scene(&path, &LoadOptions::default()).unwrap().scene;
+    let story = story_of(&scene, &LoadOptions::default());
+    for finger in &story.scene.fingers {
+        let on_tip = |carrier: &Carrier| *carrier == Carrier::Link(finger.tip_link);
+        let tips = story.scene.pieces.iter().filter(|piece| on_tip(&piece.on) && piece.is_tip);
+        let is_ellipsoid = |mesh: usize| {
+            let (mesh, sizes) = (&story.scene.meshes[mesh], [0.011, 0.012, 0.015]);
+            (0..3).all(|k| (mesh.upper[k] - mesh.lower[k] - sizes[k]).abs() < 2e-4)
+        };
+        assert_eq!(tips.filter(|piece| is_ellipsoid(piece.mesh)).count(), 1, "{}", finger.name);
+    }
+}
