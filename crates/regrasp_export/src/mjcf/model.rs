@@ -191,7 +191,7 @@ fn write_settings(xml: &mut Xml, plan: &Plan) {
             ("integrator", "implicitfast".into()),
             ("cone", "elliptic".into()),
             ("impratio", "10".into()),
-            ("noslip_iterations", "5".into()),
+            ("noslip_iterations", "60".into()),
             ("gravity", numbers(gravity.unwrap_or(GRAVITY))),
         ],
     );

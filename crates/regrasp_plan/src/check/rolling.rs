@@ -239,11 +239,10 @@ pub fn bounds_in_object(finger: &FingerModel, from: &Waypoint, to: &Waypoint) ->
 }
 
 /// Bound of the speed, per step, of whatever of a tip touches, seen from the object: of the points of the tip, and of the place
-/// on it that faces a direction, which wanders by no more than the largest radius of curvature per radian.
+/// on it that faces a direction ([`TipSurface::wander`](crate::check::tip::TipSurface::wander)).
 pub fn speed_in_object(finger: &FingerModel, from: &Waypoint, to: &Waypoint) -> f64 {
-    let flattest = finger.surface.curvature_radii().map_or(0.0, |[_, flattest]| flattest);
     let (shift, turn) = pose_difference(&from.world_from_object, &to.world_from_object);
-    let reach = finger.radius + flattest;
+    let reach = finger.radius + finger.surface.wander();
     let relative = finger.path.rates(&finger.center, reach, &from.joints, &to.joints).speed + shift;
     let origin = Pose::from(&from.world_from_object) * Point::origin();
     relative + turn * ((finger.center_in_world(&from.joints) - origin).norm() + reach + relative)

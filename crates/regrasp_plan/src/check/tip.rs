@@ -50,6 +50,18 @@ impl TipSurface {
             }
         }
     }
+
+    /// Bound, in metres per radian of the link's turn over the object, of how far the place that faces a direction wanders
+    /// over the tip; for a hull also of how fast what it is off its ellipsoid there changes.
+    pub fn wander(&self) -> f64 {
+        let TipSurface::Ellipsoid { radii, hull, .. } = self else { return 0.0 };
+        let flattest = self.curvature_radii().map_or(0.0, |[_, flattest]| flattest);
+        let apart = |hull: &Arc<ConvexHull>| {
+            // A support function changes by its point times the turn.
+            radii.max() + hull.vertices().iter().map(|p| p.coords.norm()).fold(0.0, f64::max)
+        };
+        flattest + hull.as_ref().map_or(0.0, apart)
+    }
 }
 
 impl FingerModel {
