@@ -96,6 +96,7 @@ pub fn kind_name(kind: SegmentKind) -> &'static str {
     match kind {
         SegmentKind::Transfer => "transfer",
         SegmentKind::Regrasp => "regrasp",
+        SegmentKind::Tracking => "tracking",
     }
 }
 
@@ -175,6 +176,10 @@ fn mode_number(mode: ContactMode) -> u8 {
         ContactMode::Free => 0,
         ContactMode::Fixed => 1,
         ContactMode::Rolling => 2,
+        ContactMode::PureRolling => 3,
+        ContactMode::Twisting => 4,
+        ContactMode::PureSliding => 5,
+        ContactMode::Sliding => 6,
     }
 }
 

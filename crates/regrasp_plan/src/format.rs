@@ -1,6 +1,8 @@
 //! Reading and writing `plan.json`, and its JSON Schema. `docs/plan-format.md` describes the file.
 
-use crate::plan::{ContactMode, ContactState, FORMAT, FORMAT_VERSION, ForcePromises, Plan, PoseData};
+use crate::plan::{
+    ContactMode, ContactState, FORMAT, FORMAT_VERSION, ForcePromises, Plan, PoseData, Segment, SegmentKind,
+};
 use regrasp_base::diagnostic::{Diagnostics, number};
 use regrasp_base::{Diagnostic, InputError, Place};
 use serde::Deserialize;
@@ -65,6 +67,9 @@ pub fn to_json(plan: &Plan) -> String {
         let _ = write!(out, "    {{\"kind\": {}, ", compact(&segment.kind));
         if let Some(finger) = &segment.moving_finger {
             let _ = write!(out, "\"moving_finger\": {}, ", compact(finger));
+        }
+        if let Some(finger) = &segment.rolling_finger {
+            let _ = write!(out, "\"rolling_finger\": {}, ", compact(finger));
         }
         out.push_str("\"waypoints\": [");
         for (j, waypoint) in segment.waypoints.iter().enumerate() {
@@ -226,6 +231,11 @@ impl Reader<'_> {
         if let Some(forces) = &promises.forces {
             self.force_promises(plan, forces);
         }
+        if let Some(tracking) = &promises.tracking {
+            let inside = |key| [Key("promises"), Key("tracking"), Key(key)];
+            self.within(&inside("goal_tolerance"), tracking.goal_tolerance, 0.0, std::f64::consts::PI);
+            self.within(&inside("sliding_friction"), tracking.sliding_friction, 0.0, 1e3);
+        }
         self.pose(&[Key("start")], &plan.start);
         self.pose(&[Key("goal")], &plan.goal);
         for (i, way_pose) in plan.way_poses.iter().enumerate() {
@@ -247,25 +257,33 @@ impl Reader<'_> {
                 let problem = format!("has {} waypoints", segment.waypoints.len());
                 self.fail("C406", &steps, problem, "at least 2".into());
             }
-            let regrasps = segment.kind == crate::SegmentKind::Regrasp;
-            match &segment.moving_finger {
-                Some(finger) if regrasps && !plan.fingers.contains(finger) => {
-                    let expected = format!("one of {}", plan.fingers.join(", "));
-                    let steps = [at[0], at[1], Key("moving_finger")];
-                    self.fail("C408", &steps, format!("\"{finger}\" is not in \"fingers\""), expected);
-                }
-                Some(_) if !regrasps => {
-                    let steps = [at[0], at[1], Key("moving_finger")];
-                    self.fail("C408", &steps, "stands in a transfer".into(), "no moving finger".into());
-                }
-                None if regrasps => {
-                    self.fail("C408", &at, "is a regrasp without \"moving_finger\"".into(), "its name".into());
-                }
-                _ => {}
-            }
+            self.finger_of(plan, &at, segment, "moving_finger", &segment.moving_finger);
+            self.finger_of(plan, &at, segment, "rolling_finger", &segment.rolling_finger);
             for (j, waypoint) in segment.waypoints.iter().enumerate() {
                 self.waypoint(plan, &[at[0], at[1], Key("waypoints"), Index(j)], waypoint);
             }
+        }
+    }
+
+    /// The finger that a segment names, where its kind has one.
+    fn finger_of(&mut self, plan: &Plan, at: &[Step; 2], segment: &Segment, key: &'static str, name: &Option<String>) {
+        let (kind, is_asked) = match segment.kind {
+            SegmentKind::Transfer => ("transfer", false),
+            SegmentKind::Regrasp => ("regrasp", key == "moving_finger"),
+            SegmentKind::Tracking => ("tracking segment", true),
+        };
+        let steps = [at[0], at[1], Step::Key(key)];
+        match name {
+            Some(finger) if is_asked && !plan.fingers.contains(finger) => {
+                let expected = format!("one of {}", plan.fingers.join(", "));
+                self.fail("C408", &steps, format!("\"{finger}\" is not in \"fingers\""), expected);
+            }
+            Some(_) if !is_asked => {
+                let expected = format!("no {}", key.replace('_', " "));
+                self.fail("C408", &steps, format!("stands in a {kind}"), expected);
+            }
+            None if is_asked => self.fail("C408", at, format!("is a {kind} without \"{key}\""), "its name".into()),
+            _ => {}
         }
     }
 
@@ -366,6 +384,16 @@ impl Reader<'_> {
                 _ => self.fail("C407", &steps, "holds but lacks its point or normal".into(), "both".into()),
             }
             self.contact_force(plan, &steps, contact);
+            let (point, velocity) = (contact.point_in_tip, contact.relative_velocity_in_object);
+            let is_tracked = point.is_some() || velocity.is_some() || contact.relative_turn_in_object.is_some();
+            if contact.mode == ContactMode::Free && is_tracked {
+                let problem = "is free but has a point on the tip or a relative velocity";
+                self.fail("C407", &steps, problem.into(), "neither".into());
+            }
+            let numbers = [point, velocity, contact.relative_turn_in_object].into_iter().flatten().flatten();
+            if let Some(value) = numbers.into_iter().find(|value| value.abs() > caps::POSITION) {
+                self.fail("C409", &steps, format!("holds {}", number(value)), "metres, m/s or rad/s".into());
+            }
         }
     }
 

@@ -60,10 +60,27 @@ pub struct PlanInput {
 pub enum ContactMode {
     /// Holds the object; the contact is fixed on the object.
     Fixed,
-    /// Holds the object; the contact travels because the fingertip rolls without slipping.
+    /// Holds the object; the contact travels because the fingertip rolls without slipping. It may twist about the normal
+    /// (paper 003, table 1: rolling without sliding).
     Rolling,
+    /// As rolling, without twisting about the normal (paper 003, table 1: pure rolling). In tracking only.
+    PureRolling,
+    /// Holds the object at a contact that stays on both, and twists about the normal there (paper 003, table 1: pure
+    /// twisting). In tracking only.
+    Twisting,
+    /// Slides over the object and does not turn relative to it (paper 003, table 1: pure sliding). In tracking only.
+    PureSliding,
+    /// Slides over the object, and may roll and twist (paper 003, table 1: sliding). In tracking only.
+    Sliding,
     /// Does not touch the object.
     Free,
+}
+
+impl ContactMode {
+    /// True where the fingertip slides: friction then has its full size and opposes the sliding.
+    pub fn slides(self) -> bool {
+        matches!(self, ContactMode::PureSliding | ContactMode::Sliding)
+    }
 }
 
 /// Contact of one finger at one waypoint.
@@ -86,6 +103,17 @@ pub struct ContactState {
     /// any; it is absent where the force is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub torsion: Option<f64>,
+    /// Contact point in the frame of the fingertip's link, in metres. In tracking, where it is part of what is planned.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub point_in_tip: Option<[f64; 3]>,
+    /// Velocity of the fingertip's point that touches, seen from the object, in the object frame, in metres per second: that
+    /// of the way from this waypoint to the next, at the last one that to it. In tracking.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relative_velocity_in_object: Option<[f64; 3]>,
+    /// Angular velocity of the fingertip seen from the object, in the object frame, in radians per second; of the same way. In
+    /// tracking.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relative_turn_in_object: Option<[f64; 3]>,
 }
 
 impl ContactState {
@@ -96,6 +124,9 @@ impl ContactState {
         normal_in_object: None,
         force_in_object: None,
         torsion: None,
+        point_in_tip: None,
+        relative_velocity_in_object: None,
+        relative_turn_in_object: None,
     };
 
     /// A contact at a point with this outward normal, both in the object frame, without a force.
@@ -138,7 +169,14 @@ impl Waypoint {
     pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
         let joints = self.joints.iter().chain(&self.joint_velocities).chain(&self.joint_torques).copied();
         let of_contact = |contact: &ContactState| {
-            let vectors = [contact.point_in_object, contact.normal_in_object, contact.force_in_object];
+            let vectors = [
+                contact.point_in_object,
+                contact.normal_in_object,
+                contact.force_in_object,
+                contact.point_in_tip,
+                contact.relative_velocity_in_object,
+                contact.relative_turn_in_object,
+            ];
             vectors.into_iter().flatten().flatten().chain(contact.torsion)
         };
         let contacts = self.contacts.iter().flat_map(of_contact);
@@ -156,6 +194,9 @@ pub enum SegmentKind {
     /// The object stays and one finger moves: to another contact, away from one to stay free, from free to a contact, or
     /// from one free posture to another. The others rest, those that hold and those that are free.
     Regrasp,
+    /// The object moves or rests, every finger touches it all along, and one finger moves (paper 003, section 3.1: finger
+    /// tracking). Of the others, which rest, one rolls without sliding, and all may roll, slide and twist as the object moves.
+    Tracking,
 }
 
 /// A piece of motion.
@@ -164,9 +205,12 @@ pub enum SegmentKind {
 pub struct Segment {
     /// Its kind.
     pub kind: SegmentKind,
-    /// The finger that moves, in a regrasp.
+    /// The finger that moves, in a regrasp and in tracking.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moving_finger: Option<String>,
+    /// In tracking, the resting finger that the object rolls on without sliding (paper 003, section 6.1.2: `F_t`).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rolling_finger: Option<String>,
     /// At least two; the first is the last of the segment before, but for time and forces: the finger that is about to lift
     /// has none left, one that has landed none yet.
     pub waypoints: Vec<Waypoint>,
@@ -202,6 +246,9 @@ pub struct Promises {
     pub torque_scale: f64,
     /// How far a rolling fingertip slips at most over the object in one segment, in metres.
     pub slip_tolerance: f64,
+    /// What tracking promises beside; absent in plans of in-hand tasks.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tracking: Option<TrackingPromises>,
     /// Limits of the motion in time.
     pub motion: MotionLimits,
     /// What the contact forces balance, and their limits; absent in plans without forces.
@@ -228,8 +275,20 @@ impl Promises {
             let limits = forces.joint_torques.iter().flatten().copied();
             scalars.chain(forces.gravity_in_world.into_iter().flatten()).chain(limits).collect::<Vec<f64>>()
         };
-        scalars.into_iter().chain(motion).chain(self.forces.iter().flat_map(of_forces))
+        let of_tracking = |tracking: &TrackingPromises| [tracking.goal_tolerance, tracking.sliding_friction];
+        let tracking = self.tracking.iter().flat_map(of_tracking);
+        scalars.into_iter().chain(motion).chain(tracking).chain(self.forces.iter().flat_map(of_forces))
     }
+}
+
+/// What a tracking plan promises beside. The goal of such a task is an orientation; where the object then is, is not asked.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TrackingPromises {
+    /// Largest angle between the object's last orientation and the goal's, in radians (paper 003, section 5: within a cell).
+    pub goal_tolerance: f64,
+    /// Friction coefficient of fingertips that slide: the scene's, as friction then has its full size.
+    pub sliding_friction: f64,
 }
 
 /// Limits of the motion in time.
@@ -335,7 +394,7 @@ pub struct Plan {
     pub format_version: u32,
     /// Tool and version that wrote it.
     pub tool: String,
-    /// Kind of task: `in_hand`.
+    /// Kind of task: `in_hand` or `tracking`.
     pub task: String,
     /// Method that planned it.
     pub method: String,

@@ -13,14 +13,35 @@ pub enum GraspRequest {
     Contacts(Vec<Point>),
 }
 
+/// Kind of task.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TaskKind {
+    /// A goal pose, reached by relocating fingers (papers 000 and 004).
+    InHand,
+    /// A goal orientation, wherever the object then is, reached with every finger on the object (paper 003, section 3.3).
+    Tracking,
+}
+
+impl TaskKind {
+    /// As scene and plan files spell it.
+    pub fn name(self) -> &'static str {
+        match self {
+            TaskKind::InHand => "in_hand",
+            TaskKind::Tracking => "tracking",
+        }
+    }
+}
+
 /// An in-hand query, with all randomness of the scene file resolved.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InHandQuery {
+    /// What is asked of the goal: its pose, or its orientation alone.
+    pub task: TaskKind,
     /// Object pose at the start.
     pub world_from_object_start: Pose,
     /// Object poses to be passed between start and goal, in order.
     pub world_from_object_way: Vec<Pose>,
-    /// Object pose at the goal.
+    /// Object pose at the goal. In tracking its position is that of the start, and not asked for.
     pub world_from_object_goal: Pose,
     /// Grasp at the start.
     pub start_grasp: GraspRequest,

@@ -38,6 +38,9 @@ pub struct Scene {
     pub name: String,
     /// The hand, already placed in the world: every pose it gives is in the world frame.
     pub hand: Hand,
+    /// Radius, in metres, of the balls that the centres of the fingertips may not leave: each is about where the tip is in the
+    /// rest posture (paper 003, section 7: 0.1 m). None where the joints alone say what a finger reaches.
+    pub reach: Option<f64>,
     /// The object.
     pub object: Object,
     /// Obstacles.

@@ -98,7 +98,7 @@ pub fn stretches(plan: &Plan, finger: usize) -> Vec<Stretch> {
                 let holds = mode != ContactMode::Free && before != ContactMode::Free;
                 // Between two segments everything rests.
                 let doing = match (holds, k > 0) {
-                    (true, true) if mode == ContactMode::Rolling && before == ContactMode::Rolling => Doing::Rolls,
+                    (true, true) if mode != ContactMode::Fixed && before == mode => Doing::Rolls,
                     (true, _) => Doing::Holds,
                     (false, true) if moves => Doing::Moves,
                     (false, _) => Doing::Waits,

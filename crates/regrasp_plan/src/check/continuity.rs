@@ -6,16 +6,29 @@ use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, ContactState, FORMAT, FORMAT_VERSION, Plan, PoseData, Segment, SegmentKind, Waypoint};
 use regrasp_geometry::{Pose, UnitVector, Vector};
-use regrasp_scene::{GraspRequest, InHandQuery};
+use regrasp_scene::{GraspRequest, InHandQuery, TaskKind};
+
+/// Tasks that there are.
+const TASKS: [&str; 2] = ["in_hand", "tracking"];
 
 /// Names, vector lengths and numbers. When this finds something, nothing else can be judged.
 pub fn check_form(model: &Model, plan: &Plan, log: &mut Log) {
-    if plan.format != FORMAT || plan.format_version != FORMAT_VERSION || plan.task != "in_hand" {
+    if plan.format != FORMAT || plan.format_version != FORMAT_VERSION || !TASKS.contains(&plan.task.as_str()) {
         let message = format!(
-            "format \"{}\" version {} task \"{}\" is not \"{FORMAT}\" {FORMAT_VERSION} \"in_hand\"",
+            "format \"{}\" version {} task \"{}\" is not \"{FORMAT}\" {FORMAT_VERSION} {TASKS:?}",
             plan.format, plan.format_version, plan.task
         );
         log.push(Violation::new(Kind::WrongScene, message));
+    }
+    let is_tracking = plan.promises.tracking.is_some();
+    if is_tracking != (plan.task == TaskKind::Tracking.name()) {
+        let message =
+            format!("promises {} tracking in a task \"{}\"", if is_tracking { "of" } else { "without" }, plan.task);
+        log.push(Violation::new(Kind::WrongScene, message));
+    }
+    if let Some(s) = plan.segments.iter().position(|segment| segment.kind == SegmentKind::Tracking && !is_tracking) {
+        let message = format!("tracking in a task \"{}\"", plan.task);
+        log.push(Violation::new(Kind::WrongScene, message).when(Moment::at(s, 0)));
     }
     let fingers: Vec<&str> = model.fingers.iter().map(|finger| finger.name.as_str()).collect();
     if plan.joint_names != model.joint_names {
@@ -85,7 +98,7 @@ fn check_waypoint_form(plan: &Plan, waypoint: &Waypoint, at: Moment, log: &mut L
     for (finger, contact) in plan.fingers.iter().zip(&waypoint.contacts) {
         let complete = match contact.mode {
             ContactMode::Free => *contact == ContactState::FREE,
-            ContactMode::Fixed | ContactMode::Rolling => match (contact.point_in_object, contact.normal_in_object) {
+            _ => match (contact.point_in_object, contact.normal_in_object) {
                 (Some(_), Some(normal)) => (Vector::from(normal).norm() - 1.0).abs() < 1e-9,
                 _ => false,
             },
@@ -134,6 +147,12 @@ pub fn pose_between(from: &Pose, to: &Pose, t: f64) -> Pose {
 /// Start and goal: the plan against the query, and the first and last waypoint against the plan's own header.
 pub fn check_ends(query: Option<&InHandQuery>, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
     let Some((first, last)) = ends(plan) else { return };
+    if let Some(query) = query
+        && plan.task != query.task.name()
+    {
+        let message = format!("the plan's task is \"{}\", the scene's \"{}\"", plan.task, query.task.name());
+        log.push(Violation::new(Kind::WrongScene, message));
+    }
     let last_moment = Moment::at(plan.segments.len() - 1, plan.segments.last().map_or(0, |s| s.waypoints.len() - 1));
     let sides = [
         (Kind::StartMismatch, "start", &plan.start, first, Moment::at(0, 0)),
@@ -272,6 +291,7 @@ pub fn check_roles(model: &Model, plan: &Plan, settings: &CheckSettings, log: &m
                 }
             }
             SegmentKind::Regrasp => check_regrasp_roles(model, segment, s, settings, log),
+            SegmentKind::Tracking => {}
         }
     }
 }
@@ -327,8 +347,8 @@ fn check_may_roll(model: &Model, segment: &Segment, s: usize, f: usize, log: &mu
     let rolls = |waypoint: &Waypoint| waypoint.contacts[f].mode == ContactMode::Rolling;
     let Some(w) = segment.waypoints.iter().position(rolls) else { return };
     let why = match segment.kind {
-        SegmentKind::Transfer if finger.radius > 0.0 => return,
-        SegmentKind::Transfer => "its tip is sharp",
+        SegmentKind::Transfer | SegmentKind::Tracking if finger.radius > 0.0 => return,
+        SegmentKind::Transfer | SegmentKind::Tracking => "its tip is sharp",
         SegmentKind::Regrasp => "the object rests",
     };
     let message = format!("finger \"{}\" rolls, but {why}", finger.name);
@@ -358,7 +378,9 @@ fn check_constant(model: &Model, segment: &Segment, s: usize, f: usize, settings
 fn mode_in_words(mode: ContactMode) -> &'static str {
     match mode {
         ContactMode::Fixed => "holds",
-        ContactMode::Rolling => "rolls",
+        ContactMode::Rolling | ContactMode::PureRolling => "rolls",
+        ContactMode::Twisting => "twists",
+        ContactMode::PureSliding | ContactMode::Sliding => "slides",
         ContactMode::Free => "is free",
     }
 }

@@ -175,6 +175,7 @@ fn surface_of(shape: &Shape) -> regrasp_geometry::Surface {
 
 pub fn scene() -> Scene {
     Scene {
+        reach: None,
         gravity: None,
         name: "sample".into(),
         hand: hand().placed_at(&world_from_hand()),
@@ -263,7 +264,7 @@ fn transfer_with(
         Pose::from_parts(Translation3::from(from.translation.vector + shift * t), rotation)
     };
     let waypoints = (0..=n_steps).map(|k| waypoint(&pose_at(k as f64 / n_steps as f64), grasp, lifted)).collect();
-    (Segment { kind: SegmentKind::Transfer, moving_finger: None, waypoints }, pose_at(1.0))
+    (Segment { kind: SegmentKind::Transfer, moving_finger: None, rolling_finger: None, waypoints }, pose_at(1.0))
 }
 
 pub fn regrasp(pose: &Pose, grasp: &Grasp, finger: usize, to: Vector, lift: f64) -> (Segment, Grasp) {
@@ -282,7 +283,8 @@ pub fn regrasp(pose: &Pose, grasp: &Grasp, finger: usize, to: Vector, lift: f64)
     }
     (1..n_steps).for_each(|k| free(to * (touch + lift * (1.0 - k as f64 / n_steps as f64))));
     waypoints.push(waypoint(pose, &after, None));
-    (Segment { kind: SegmentKind::Regrasp, moving_finger: Some(format!("f{finger}")), waypoints }, after)
+    let moving_finger = Some(format!("f{finger}"));
+    (Segment { kind: SegmentKind::Regrasp, moving_finger, rolling_finger: None, waypoints }, after)
 }
 
 pub fn around(azimuth_deg: f64, elevation_deg: f64) -> Vector {
@@ -327,6 +329,7 @@ pub fn plan_of(scene: &Scene, start: &Pose, goal: &Pose, segments: Vec<Segment>)
             torque_scale: OBJECT_RADIUS,
             friction_margin: 1.0,
             slip_tolerance: 1e-4,
+            tracking: None,
             motion: MotionLimits {
                 largest_speed: 0.04,
                 joint_velocities: vec![2.0; joint_names.len()],
@@ -421,6 +424,7 @@ pub fn plan_with_way(scene: &Scene) -> Plan {
 /// The query that [`plan`] answers.
 pub fn query(plan: &Plan) -> InHandQuery {
     InHandQuery {
+        task: regrasp_scene::TaskKind::InHand,
         world_from_object_start: Pose::from(&plan.start),
         world_from_object_way: plan.way_poses.iter().map(|pose| Pose::from(&pose.world_from_object)).collect(),
         world_from_object_goal: Pose::from(&plan.goal),

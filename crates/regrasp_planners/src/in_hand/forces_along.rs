@@ -29,6 +29,8 @@ pub fn add_forces(model: &Model, segments: &mut [Segment]) -> Result<Option<Forc
                 in_transfer(model, forces, segment, goes_on.and_then(|before| before.waypoints.last()))?;
             }
             SegmentKind::Regrasp => in_regrasp(model, forces, segment)?,
+            // The tracking planner finds its own, step by step.
+            SegmentKind::Tracking => {}
         }
     }
     Ok(Some(forces.promises()))

@@ -19,6 +19,8 @@ mod decompose;
 mod endpoints;
 /// Sampling GS_n.
 mod explore;
+/// A first try with more room.
+mod first_try;
 /// Contact forces of the fingers.
 mod forces;
 /// Forces and torques along a plan.
@@ -33,8 +35,6 @@ mod grasp_path;
 mod grasps;
 /// Better plans after the first.
 mod improve;
-/// A first try with more clearance.
-mod keep_away;
 /// Legs of a query, from way pose to way pose.
 mod legs;
 /// Links between grasps.
@@ -87,7 +87,7 @@ mod visibility;
 mod workspace;
 
 pub use settings::{
-    Alpha, AnyDirection, CostWeights, ForceSettings, GravityInHand, InHandSettings, KeepAway, Method, ReleaseRule,
+    Alpha, AnyDirection, CostWeights, FirstTry, ForceSettings, GravityInHand, InHandSettings, Method, ReleaseRule,
     SpeedSettings, TransferMode,
 };
 pub use validate::{NotProven, validate_once};
@@ -132,7 +132,7 @@ pub fn plan_in_hand(
 ) -> Result<Plan, Failure> {
     settings.validate().expect("settings are validated where they are read");
     refuse_two_gravities(scene, settings)?;
-    let Some((first, tried)) = keep_away::first_try(scene, settings, budget) else {
+    let Some((first, tried)) = first_try::first_try(scene, settings, budget) else {
         return plan_with(scene, query, settings, seed, budget, progress);
     };
     let spent = match plan_with(scene, query, &first, seed, &tried, progress) {

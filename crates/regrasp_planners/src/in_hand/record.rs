@@ -163,7 +163,8 @@ impl<'m, 'a> Recorder<'m, 'a> {
     }
 
     fn begin(&mut self, kind: SegmentKind, moving_finger: Option<String>, n: usize) {
-        self.segments.push(Segment { kind, moving_finger, waypoints: Vec::with_capacity(1 + n) });
+        let waypoints = Vec::with_capacity(1 + n);
+        self.segments.push(Segment { kind, moving_finger, rolling_finger: None, waypoints });
         self.push_here();
     }
 
@@ -194,7 +195,8 @@ impl<'m, 'a> Recorder<'m, 'a> {
         if self.segments.is_empty() {
             // Start and goal are the same and any grasp will do: hold still.
             let waypoints = vec![self.here.clone(), self.here];
-            self.segments.push(Segment { kind: SegmentKind::Transfer, moving_finger: None, waypoints });
+            let (moving_finger, rolling_finger) = (None, None);
+            self.segments.push(Segment { kind: SegmentKind::Transfer, moving_finger, rolling_finger, waypoints });
         }
         let statistics = Statistics {
             transfers: self.transfers,
@@ -230,6 +232,7 @@ impl<'m, 'a> Recorder<'m, 'a> {
                 torque_scale: model.frame.torque_scale,
                 friction_margin: model.settings.friction_margin,
                 slip_tolerance: SLIP_TOLERANCE,
+                tracking: None,
                 motion,
                 forces,
             },

@@ -2,7 +2,7 @@
 
 mod physics;
 
-pub use physics::{AnyDirection, ForceSettings, GravityInHand, KeepAway, SpeedSettings, gravity_of};
+pub use physics::{AnyDirection, FirstTry, ForceSettings, GravityInHand, SpeedSettings, gravity_of};
 
 use serde::{Deserialize, Serialize};
 
@@ -171,8 +171,8 @@ pub struct InHandSettings {
     pub step: f64,
     /// Distance that bodies keep which do not touch. By hand.
     pub clearance: f64,
-    /// A first try that keeps farther away; none goes without. Hands whose links cannot stand so far back go without too.
-    pub keep_away: Option<KeepAway>,
+    /// A first try with more room; none goes without.
+    pub first_try: Option<FirstTry>,
     /// How far the tip link of a holding finger may press into the object in the model. By hand: well below the
     /// contact tolerance of 0.5 mm.
     pub contact_allowance: f64,
@@ -249,7 +249,7 @@ impl Default for InHandSettings {
             closure_margin: 0.005,
             step: 0.003,
             clearance: 0.0002,
-            keep_away: Some(KeepAway::default()),
+            first_try: Some(FirstTry::default()),
             contact_allowance: 0.0003,
             limit_margin: 0.01,
             joint_step: 0.4,
@@ -288,7 +288,7 @@ impl InHandSettings {
         InHandSettings {
             transfer: TransferMode::Fixed,
             friction_margin: 1.0,
-            keep_away: None,
+            first_try: None,
             forces: None,
             ..InHandSettings::default()
         }
@@ -308,13 +308,14 @@ impl InHandSettings {
                 return Err(format!("{name} is {value}; it must be positive and finite"));
             }
         }
-        if let Some(KeepAway { clearance, .. }) = self.keep_away
+        if let Some(FirstTry { clearance, .. }) = self.first_try
             && !(clearance > 0.0 && clearance < 0.1)
         {
-            return Err(format!("keep_away.clearance is {clearance}; it must be above 0 and below 0.1 m"));
+            return Err(format!("first_try.clearance is {clearance}; it must be above 0 and below 0.1 m"));
         }
         for (name, value) in [
             ("closure_margin", self.closure_margin),
+            ("first_try.closure_margin", self.first_try.map_or(0.0, |first| first.closure_margin)),
             ("contact_allowance", self.contact_allowance),
             ("limit_margin", self.limit_margin),
             ("far_share", self.far_share),

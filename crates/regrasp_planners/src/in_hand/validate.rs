@@ -94,6 +94,7 @@ fn validate_segment(model: &Model, workspace: &mut Workspace, segment: &Segment)
                 .map_err(|k| (k, in_the_way(workspace)))?;
         }
         (SegmentKind::Regrasp, None) => return Err((0, "a regrasp without a moving finger".into())),
+        (SegmentKind::Tracking, _) => return Err((0, "tracking, which this planner does not do".into())),
     }
     Ok(())
 }

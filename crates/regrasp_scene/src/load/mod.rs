@@ -18,6 +18,7 @@ mod units;
 pub use task::{Goal, InHandTask, StartOrientation};
 
 use crate::gravity::Gravity;
+use crate::query::TaskKind;
 use crate::scene::{InputFile, Scene};
 use files::Files;
 use regrasp_base::InputError;
@@ -67,14 +68,16 @@ pub fn load_scene(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Inp
     let parts = document.as_ref().and_then(|document| read(Table::root(document), &mut files, &mut found));
     let (notes, diagnostics) = (found.notes, found.diagnostics);
     let parts = diagnostics.into_result(parts)?;
-    let Parts { hand, object, obstacles, gravity, task } = parts.expect("what could not be read has left a diagnostic");
+    let Parts { hand, reach, object, obstacles, gravity, task } =
+        parts.expect("what could not be read has left a diagnostic");
     let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-    let scene = Scene { name, hand, object, obstacles, gravity, inputs: files.inputs };
+    let scene = Scene { name, hand, reach, object, obstacles, gravity, inputs: files.inputs };
     Ok(LoadedScene { scene, task, notes })
 }
 
 struct Parts {
     hand: Hand,
+    reach: Option<f64>,
     object: crate::object::Object,
     obstacles: Vec<crate::scene::Obstacle>,
     gravity: Option<Gravity>,
@@ -86,13 +89,14 @@ fn read(mut root: Table, files: &mut Files, found: &mut Found) -> Option<Parts> 
     if !root.is_of_format(found, FORMAT, FORMAT_VERSION) {
         return None;
     }
-    task_name(&mut root, found);
+    let kind = task_name(&mut root, found);
     let hand = hand(&mut root, files, found);
+    let (hand, reach) = hand.map_or((None, None), |(hand, reach)| (Some(hand), reach));
     let gravity = gravity::gravity(&mut root, hand.as_ref(), found);
     let object = object::object(&mut root, files, found);
     let obstacles = object::obstacles(&mut root, files, found);
     let start = task::start(&mut root, hand.as_ref(), found);
-    let task = task::task(&mut root, start, hand.as_ref(), found);
+    let task = kind.and_then(|kind| task::task(&mut root, kind, start, hand.as_ref(), found));
     if let (Some(hand), Some(object)) = (&hand, &object) {
         units::check_sizes(hand, object, &mut root, found);
         if let Some(task) = &task {
@@ -101,24 +105,27 @@ fn read(mut root: Table, files: &mut Files, found: &mut Found) -> Option<Parts> 
         }
     }
     root.finish(found);
-    Some(Parts { hand: hand?, object: object?, obstacles, gravity, task: task? })
+    Some(Parts { hand: hand?, reach, object: object?, obstacles, gravity, task: task? })
 }
 
 /// `task`. Errors: missing (`S102`), another task (`S105`).
-fn task_name(root: &mut Table, found: &mut Found) {
-    if let Some(entry) = root.required(found, "task", "add task = \"in_hand\"")
-        && let Some(text) = entry.text(found)
-        && text != "in_hand"
-    {
-        let diagnostic = entry
-            .error("S105", found, format!("is \"{text}\""))
-            .expected("\"in_hand\", the only task that this version plans");
+fn task_name(root: &mut Table, found: &mut Found) -> Option<TaskKind> {
+    let entry = root.required(found, "task", "add task = \"in_hand\"")?;
+    let text = entry.text(found)?;
+    let known = [TaskKind::InHand, TaskKind::Tracking].into_iter().find(|kind| kind.name() == text);
+    if known.is_none() {
+        let expected = "\"in_hand\" or \"tracking\", the tasks that this version plans";
+        let diagnostic = entry.error("S105", found, format!("is \"{text}\"")).expected(expected);
         found.diagnostics.push(diagnostic);
     }
+    known
 }
 
-/// `[hand]`: the hand of the file named, placed in the world, with its rest posture and contact models.
-fn hand(root: &mut Table, files: &mut Files, found: &mut Found) -> Option<Hand> {
+/// Largest reach that makes sense, in metres.
+const MAX_REACH: f64 = 10.0;
+
+/// `[hand]`: the hand of the file named, placed in the world, with its rest posture and contact models; and the reach.
+fn hand(root: &mut Table, files: &mut Files, found: &mut Found) -> Option<(Hand, Option<f64>)> {
     let mut table = root.required(found, "hand", "add [hand] with file = \"hand.toml\"")?.table(found)?;
     let file = table.required(found, "file", "add file = \"hand.toml\" or a .urdf");
     let pose = match table.optional("world_from_hand") {
@@ -132,6 +139,10 @@ fn hand(root: &mut Table, files: &mut Files, found: &mut Found) -> Option<Hand> 
     let rest = table.optional("rest");
     let default_contact = contact_model::read(&mut table, "contact", ContactModel::default(), "S106", found);
     let contacts = table.optional("contacts");
+    let reach = table.optional("reach").and_then(|entry| {
+        let expected = format!("a radius from 0 to {MAX_REACH} metres");
+        entry.number_that(found, &expected, |x| (0.0..=MAX_REACH).contains(&x))
+    });
     table.finish(found);
     let file = file?;
     let path = files.locate(&file, found)?;
@@ -169,5 +180,5 @@ fn hand(root: &mut Table, files: &mut Files, found: &mut Found) -> Option<Hand> 
             finger.rest = values.by_ref().take(finger.rest.len()).collect();
         }
     }
-    Some(hand.placed_at(&pose?))
+    Some((hand.placed_at(&pose?), reach))
 }

@@ -1,7 +1,9 @@
 //! Positions, orientations and turns in scene files.
 
+use nalgebra::UnitQuaternion;
 use regrasp_base::toml_table::{Entry, Found, Table};
 use regrasp_geometry::{Pose, UnitVector, Vector, pose_from};
+use std::f64::consts::TAU;
 
 /// A quaternion whose length differs from 1 by more is an error, not a rounding.
 const QUATERNION_TOLERANCE: f64 = 1e-2;
@@ -14,11 +16,21 @@ pub(super) fn position(table: &mut Table, found: &mut Found) -> Option<Vector> {
     entry.numbers(found).map(Vector::from)
 }
 
-/// `quat_xyzw` or `quat_wxyz`, as x y z w of length one; no turn when neither is given.
+/// Keys of an orientation.
+pub(super) const ORIENTATIONS: [&str; 3] = ["quat_xyzw", "quat_wxyz", "rotation_vector"];
+
+/// Orientation of [`ORIENTATIONS`].
+pub(super) fn orientation(table: &mut Table, found: &mut Found) -> Option<UnitQuaternion<f64>> {
+    Some(pose_from([0.0; 3], quaternion(table, found)?).rotation)
+}
+
+/// `quat_xyzw`, `quat_wxyz` or `rotation_vector` (axis times angle, in radians), as x y z w of length one; no turn when none
+/// is given.
 ///
-/// Errors: both given (`S106`), zero (`V003`), length off by more than 1e-2 (`V002`).
+/// Errors: several given (`S106`), a zero quaternion (`V003`), its length off by more than 1e-2 (`V002`), a rotation vector that
+/// is longer than a turn (`S107`).
 pub(super) fn quaternion(table: &mut Table, found: &mut Found) -> Option<[f64; 4]> {
-    let entries = table.present(&["quat_xyzw", "quat_wxyz"]);
+    let entries = table.present(&ORIENTATIONS);
     let [entry] = entries.as_slice() else {
         if let [first, second, ..] = entries.as_slice() {
             let diagnostic =
@@ -28,6 +40,15 @@ pub(super) fn quaternion(table: &mut Table, found: &mut Found) -> Option<[f64; 4
         }
         return Some([0.0, 0.0, 0.0, 1.0]);
     };
+    if entry.name.ends_with("rotation_vector") {
+        let vector = Vector::from(entry.numbers::<3>(found)?);
+        if vector.norm() > TAU {
+            let diagnostic = entry.error("S107", found, format!("turns by {:.3} rad", vector.norm()));
+            found.diagnostics.push(diagnostic.expected("an axis times an angle of at most 2 pi radians"));
+            return None;
+        }
+        return Some(UnitQuaternion::from_scaled_axis(vector).coords.into());
+    }
     let [a, b, c, d] = entry.numbers::<4>(found)?;
     let [x, y, z, w] = if entry.name.ends_with("quat_wxyz") { [b, c, d, a] } else { [a, b, c, d] };
     let norm = x.hypot(y).hypot(z.hypot(w));

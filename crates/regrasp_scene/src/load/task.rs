@@ -1,7 +1,7 @@
 //! `[start]`, `[[way]]` and `[goal]`: what is asked, and how a seed resolves what the file leaves open.
 
 use super::pose;
-use crate::query::{GraspRequest, InHandQuery};
+use crate::query::{GraspRequest, InHandQuery, TaskKind};
 use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_base::Rng;
 use regrasp_base::toml_table::{Entry, Found, Table, suggestion};
@@ -31,6 +31,8 @@ pub enum StartOrientation {
 /// Where the object has to go: the goal, or a pose on the way.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Goal {
+    /// To an orientation in the world, where the start is.
+    Orientation(UnitQuaternion<f64>),
     /// To a pose of the world.
     Pose(Pose),
     /// Turned about its own origin, by world axes, and moved: both as seen from the start.
@@ -54,6 +56,7 @@ impl Goal {
     fn pose_at(&self, start: &Pose, share: f64) -> Pose {
         match self {
             Goal::Pose(pose) => *pose,
+            Goal::Orientation(rotation) => Pose::from_parts(start.translation, *rotation),
             Goal::Turn { axis, angle, shift } => {
                 let position = start.translation.vector + shift * share;
                 let rotation = UnitQuaternion::from_axis_angle(axis, angle * share);
@@ -76,6 +79,8 @@ impl Goal {
 /// The in-hand task of a scene file, before a seed resolves its randomness.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InHandTask {
+    /// Its kind.
+    pub kind: TaskKind,
     /// Object pose at the start, before the draw.
     pub world_from_object_start: Pose,
     /// The start position is drawn uniformly from the ball of this radius, in metres; 0 for none.
@@ -110,6 +115,7 @@ impl InHandTask {
         let n_legs = self.goal.n_legs();
         way.extend((1..n_legs).map(|leg| self.goal.pose_at(&start, leg as f64 / n_legs as f64)));
         InHandQuery {
+            task: self.kind,
             world_from_object_start: start,
             world_from_object_way: way,
             world_from_object_goal: self.goal.pose(&start),
@@ -174,7 +180,7 @@ fn way(root: &mut Table, found: &mut Found) -> Option<Vec<Goal>> {
 
 /// A pose of the world, or a turn and displacement seen from the start. Errors: both (`S106`), neither (`S102`).
 fn pose_or_turn(table: &mut Table, found: &mut Found) -> Option<Goal> {
-    let absolute = table.present(&["position", "quat_xyzw", "quat_wxyz"]);
+    let absolute = table.present(&["position", "quat_xyzw", "quat_wxyz", "rotation_vector"]);
     let relative = table.present(&["turn", "move"]);
     match (absolute.first(), relative.first()) {
         (Some(absolute), Some(relative)) => {
@@ -194,20 +200,48 @@ fn pose_or_turn(table: &mut Table, found: &mut Found) -> Option<Goal> {
     }
 }
 
+/// An orientation of the world, or a turn seen from the start. Errors: both (`S106`), neither (`S102`).
+fn orientation_or_turn(table: &mut Table, found: &mut Found) -> Option<Goal> {
+    let absolute = table.present(&pose::ORIENTATIONS);
+    let relative = table.present(&["turn"]);
+    match (absolute.first(), relative.first()) {
+        (Some(absolute), Some(relative)) => {
+            let diagnostic = relative
+                .error("S106", found, format!("cannot stand beside {}", absolute.name))
+                .expected("either rotation_vector or quat_xyzw, or turn");
+            found.diagnostics.push(diagnostic);
+            None
+        }
+        (None, None) => {
+            let diagnostic = table.error("S102", found, "says neither an orientation nor a turn");
+            let fix = "add turn = { axis = \"x\", angle_deg = 90 } or rotation_vector";
+            found.diagnostics.push(diagnostic.fix(fix));
+            None
+        }
+        (Some(_), None) => pose::orientation(table, found).map(Goal::Orientation),
+        (None, Some(_)) => relative_goal(table, found),
+    }
+}
+
 /// How to say a pose.
 const POSE_FIX: &str = "add turn = { axis = \"x\", angle_deg = 90 } or position and quat_xyzw";
 
 /// Reads `[[way]]` and `[goal]` and joins them with the start.
 pub(super) fn task(
     root: &mut Table,
+    kind: TaskKind,
     start: Option<Start>,
     hand: Option<&Hand>,
     found: &mut Found,
 ) -> Option<InHandTask> {
-    let way = way(root, found);
+    // Tracking knows no poses on the way: [[way]] is then a key that is not known.
+    let way = if kind == TaskKind::InHand { way(root, found) } else { Some(Vec::new()) };
     let fix = "add [goal] with turn = { axis = \"x\", angle_deg = 90 } or position and quat_xyzw";
     let mut table = root.required(found, "goal", fix)?.table(found)?;
-    let goal = pose_or_turn(&mut table, found);
+    let goal = match kind {
+        TaskKind::InHand => pose_or_turn(&mut table, found),
+        TaskKind::Tracking => orientation_or_turn(&mut table, found),
+    };
     if let (Some(way), Some(goal)) = (&way, &goal)
         && !way.is_empty()
         && goal.n_legs() > 1
@@ -222,6 +256,7 @@ pub(super) fn task(
     table.finish(found);
     let (start, way, goal) = (start?, way?, goal?);
     let task = InHandTask {
+        kind,
         world_from_object_start: start.pose?,
         position_within: start.position_within,
         start_orientation: start.orientation,
@@ -251,7 +286,7 @@ fn relative_goal(table: &mut Table, found: &mut Found) -> Option<Goal> {
 
 fn is_goal_start(task: &InHandTask) -> bool {
     let is_fixed = task.position_within == 0.0 && task.start_orientation == StartOrientation::Given;
-    if !is_fixed && matches!(task.goal, Goal::Pose(_)) {
+    if !is_fixed && matches!(task.goal, Goal::Pose(_) | Goal::Orientation(_)) {
         return false;
     }
     let query = task.query(0);

@@ -104,7 +104,7 @@ fn another_format_version_or_task() {
     );
     refused_with(
         &with("\"in_hand\"", "\"dual_arm\""),
-        &["S105 scene.toml:3:8 key \"task\": is \"dual_arm\"; expected \"in_hand\""],
+        &["S105 scene.toml:3:8 key \"task\": is \"dual_arm\"; expected \"in_hand\" or \"tracking\""],
     );
 }
 

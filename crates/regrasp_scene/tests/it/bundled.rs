@@ -24,7 +24,8 @@ fn center_in_world(loaded: &LoadedScene, world_from_object: &Pose) -> Point {
 }
 
 /// Scenes of the papers that are more than a turn in place.
-const PAPER_SCENES: [&str; 5] = ["bulb", "cubic", "ellipsoid_free", "ellipsoid_obstacle", "pencil"];
+const PAPER_SCENES: [&str; 7] =
+    ["bulb", "cubic", "diamond", "ellipsoid_free", "ellipsoid_obstacle", "football", "pencil"];
 
 #[test]
 fn scenes_of_the_bundled_hands_load_without_models() {
@@ -188,5 +189,33 @@ fn the_allegro_grasp_of_the_notes_touches_the_sphere() {
         let tip = finger.chain.tip(&degrees.map(f64::to_radians), &finger.tip.center_in_body);
         // The notes give whole degrees: half a degree over 150 mm is 1.3 mm.
         assert!(((tip - center).norm() - 0.044).abs() < 0.003, "{} {}", finger.name, (tip - center).norm());
+    }
+}
+
+/// Paper 003, section 7: masses, friction, orientations, radii and reach.
+#[test]
+fn scenes_of_finger_tracking_are_those_of_the_paper() {
+    let ends = [("diamond", [0.5, 0.4, 0.4], [-0.5, -0.5, 0.7]), ("football", [0.5, 0.7, 0.4], [-0.6, -0.5, 0.8])];
+    for (name, start, goal) in ends {
+        let loaded = load(&repository().join("scenes").join(format!("{name}.toml")), &LoadOptions::default());
+        let (scene, query) = (&loaded.scene, loaded.task.query(3));
+        assert_eq!((query.task, scene.reach), (regrasp_scene::TaskKind::Tracking, Some(0.1)));
+        assert_eq!((scene.object.mass, scene.object.friction), (1.0, 0.7));
+        for (pose, vector) in [(query.world_from_object_start, start), (query.world_from_object_goal, goal)] {
+            assert!((pose.rotation.scaled_axis() - regrasp_geometry::Vector::from(vector)).norm() < 1e-12);
+            assert_eq!(pose.translation.vector, regrasp_geometry::Vector::zeros());
+        }
+        for finger in &scene.hand.fingers {
+            assert!((0.02..=0.04).contains(&finger.tip.radius()));
+            assert_eq!(finger.tip.pad.is_some(), name == "football");
+        }
+        let regrasp_scene::GraspRequest::Contacts(contacts) = &query.start_grasp else { panic!("contacts are given") };
+        for (finger, contact) in scene.hand.fingers.iter().zip(contacts) {
+            let foot = scene.object.surface.project(contact);
+            assert!((foot.point_in_object - contact).norm() < 1e-8);
+            let center = query.world_from_object_start
+                * (foot.point_in_object + foot.normal_in_object.into_inner() * finger.tip.radius());
+            assert!((finger.ik.tip(&finger.rest) - center).norm() < 2e-6, "the tip rests where it touches first");
+        }
     }
 }

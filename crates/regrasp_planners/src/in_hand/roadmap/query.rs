@@ -95,6 +95,7 @@ impl<'a> RoadmapPlanner<'a> {
             }
         };
         InHandQuery {
+            task: regrasp_scene::TaskKind::InHand,
             world_from_object_start: draw("random_start"),
             world_from_object_way: Vec::new(),
             world_from_object_goal: draw("random_goal"),

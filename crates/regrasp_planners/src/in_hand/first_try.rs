@@ -1,5 +1,5 @@
-//! A first try with links that keep farther from everything than they must: in a hand that gives, links stray by more than
-//! plans keep them away, and what they touch then throws the object.
+//! A first try with links that keep farther from everything than they must, and grasps that hold better: in a hand that
+//! gives, links stray by more than plans keep them away, and what they touch then throws the object.
 
 use super::settings::{InHandSettings, Method};
 use regrasp_base::Budget;
@@ -13,12 +13,15 @@ const DIRECTIONS: usize = 32;
 
 /// Settings and budget of the first try; None where there is none to make.
 pub fn first_try(scene: &Scene, settings: &InHandSettings, budget: &Budget) -> Option<(InHandSettings, Budget)> {
-    let wanted = settings.keep_away.filter(|_| settings.method == Method::Gait)?;
+    let wanted = settings.first_try.filter(|_| settings.method == Method::Gait)?;
     let can_keep = |finger: &Finger| stand_back(finger).is_none_or(|back| back >= 2.0 * wanted.clearance);
-    if wanted.clearance <= settings.clearance || !scene.hand.fingers.iter().all(can_keep) {
+    let can_keep = scene.hand.fingers.iter().all(can_keep);
+    let clearance = if can_keep { wanted.clearance.max(settings.clearance) } else { settings.clearance };
+    let closure_margin = wanted.closure_margin.max(settings.closure_margin);
+    if (clearance, closure_margin) == (settings.clearance, settings.closure_margin) {
         return None;
     }
-    let settings = InHandSettings { clearance: wanted.clearance, keep_away: None, ..settings.clone() };
+    let settings = InHandSettings { clearance, closure_margin, first_try: None, ..settings.clone() };
     Some((settings, Budget { max_work: wanted.work.min(budget.max_work / 2), ..budget.clone() }))
 }
 
@@ -48,6 +51,7 @@ fn stand_back(finger: &Finger) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::settings::FirstTry;
     use super::*;
     use regrasp_robot::LoadOptions;
 
@@ -59,12 +63,16 @@ mod tests {
         for finger in &scene.hand.fingers {
             assert!((stand_back(finger).unwrap() - 0.001).abs() < 1e-9);
         }
-        let settings = InHandSettings::default();
-        assert!(first_try(&scene, &settings, &Budget::work(1000)).is_none());
-        let keep_away =
-            settings.keep_away.map(|wanted| super::super::settings::KeepAway { clearance: 0.0005, ..wanted });
-        let (first, budget) =
-            first_try(&scene, &InHandSettings { keep_away, ..settings }, &Budget::work(1000)).unwrap();
-        assert_eq!((first.clearance, first.keep_away, budget.max_work), (0.0005, None, 500));
+        let with = |wanted: FirstTry| {
+            let settings = InHandSettings { first_try: Some(wanted), ..InHandSettings::default() };
+            first_try(&scene, &settings, &Budget::work(1000))
+        };
+        let (usual, wanted) = (InHandSettings::default(), FirstTry::default());
+        assert!(with(FirstTry { closure_margin: 0.0, ..wanted }).is_none());
+        let (first, budget) = with(wanted).unwrap();
+        assert_eq!((first.clearance, first.closure_margin), (usual.clearance, wanted.closure_margin));
+        assert_eq!((first.first_try, budget.max_work), (None, 500));
+        let (first, _) = with(FirstTry { clearance: 0.0005, ..wanted }).unwrap();
+        assert_eq!((first.clearance, first.closure_margin), (0.0005, wanted.closure_margin));
     }
 }
