@@ -96,7 +96,7 @@ fn read(mut root: Table, files: &mut Files, found: &mut Found) -> Option<Parts> 
     let object = object::object(&mut root, files, found);
     let obstacles = object::obstacles(&mut root, files, found);
     let start = task::start(&mut root, hand.as_ref(), found);
-    let task = kind.and_then(|kind| task::task(&mut root, kind, start, hand.as_ref(), found));
+    let task = task::task(&mut root, kind.unwrap_or(TaskKind::InHand), start, hand.as_ref(), found);
     if let (Some(hand), Some(object)) = (&hand, &object) {
         units::check_sizes(hand, object, &mut root, found);
         if let Some(task) = &task {
