@@ -2,8 +2,9 @@
 
 use super::geodesic::Geodesic;
 use super::smooth_geodesic::straightened;
-use super::{SurfaceKind, SurfacePoint, quadratic_roots, unit_or};
+use super::{SurfaceKind, SurfacePoint, across, bar_operator, quadratic_roots, unit_or};
 use crate::frame::{Point, UnitVector, Vector};
+use nalgebra::Matrix3;
 use regrasp_base::Rng;
 use std::f64::consts::{PI, TAU};
 
@@ -91,6 +92,14 @@ impl SurfaceKind for CapsuleSurface {
     fn curvature(&self, at: &SurfacePoint) -> [f64; 2] {
         let k = 1.0 / self.radius;
         if at.point_in_object.z.abs() > self.half_length { [k, k] } else { [k, 0.0] }
+    }
+
+    fn shape_operator(&self, at: &SurfacePoint) -> Matrix3<f64> {
+        if at.point_in_object.z.abs() > self.half_length {
+            across(&at.normal_in_object) / self.radius
+        } else {
+            bar_operator(&at.normal_in_object, self.radius)
+        }
     }
 
     fn geodesic(&self, a: &SurfacePoint, b: &SurfacePoint) -> Option<Geodesic> {

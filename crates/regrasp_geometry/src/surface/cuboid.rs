@@ -3,7 +3,7 @@
 use super::geodesic::{Geodesic, Leg};
 use super::{SurfaceKind, SurfacePoint};
 use crate::frame::{Point, UnitVector, Vector};
-use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion};
 use regrasp_base::Rng;
 use std::f64::consts::FRAC_PI_2;
 
@@ -185,6 +185,10 @@ impl SurfaceKind for CuboidSurface {
 
     fn curvature(&self, _at: &SurfacePoint) -> [f64; 2] {
         [0.0; 2]
+    }
+
+    fn shape_operator(&self, _at: &SurfacePoint) -> Matrix3<f64> {
+        Matrix3::zeros()
     }
 
     /// The shortest straight line over all ways of unrolling the box.

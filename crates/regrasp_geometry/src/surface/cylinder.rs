@@ -1,8 +1,9 @@
 //! The surface of a cylinder about z. Faces: 0 side, 1 top, 2 bottom.
 
 use super::geodesic::{Bend, Geodesic, Leg};
-use super::{SurfaceKind, SurfacePoint, quadratic_roots};
+use super::{SurfaceKind, SurfacePoint, bar_operator, quadratic_roots};
 use crate::frame::{Point, UnitVector, Vector};
+use nalgebra::Matrix3;
 use regrasp_base::Rng;
 use std::f64::consts::{PI, TAU};
 
@@ -134,6 +135,10 @@ impl SurfaceKind for CylinderSurface {
 
     fn curvature(&self, at: &SurfacePoint) -> [f64; 2] {
         if at.facet == 0 { [1.0 / self.radius, 0.0] } else { [0.0; 2] }
+    }
+
+    fn shape_operator(&self, at: &SurfacePoint) -> Matrix3<f64> {
+        if at.facet == 0 { bar_operator(&at.normal_in_object, self.radius) } else { Matrix3::zeros() }
     }
 
     /// The shortest of the ways over side and caps, each a straight line when unrolled; where rims are crossed is found

@@ -6,8 +6,9 @@
 
 use super::geodesic::Geodesic;
 use super::smooth_geodesic::straightened;
-use super::{SurfaceKind, SurfacePoint, quadratic_roots};
+use super::{SurfaceKind, SurfacePoint, across, quadratic_roots};
 use crate::frame::{Point, UnitVector, Vector};
+use nalgebra::Matrix3;
 use regrasp_base::Rng;
 use std::f64::consts::PI;
 
@@ -117,6 +118,13 @@ impl SurfaceKind for EllipsoidSurface {
         let mean = (squares.sum() - point.norm_squared()) / (2.0 * product * h.powi(3));
         let spread = (mean * mean - gauss).max(0.0).sqrt();
         [mean + spread, gauss / (mean + spread)]
+    }
+
+    fn shape_operator(&self, at: &SurfacePoint) -> Matrix3<f64> {
+        let inverse_squares = self.radii.map(|radius| 1.0 / (radius * radius));
+        let steepness = at.point_in_object.coords.component_mul(&inverse_squares).norm();
+        let across = across(&at.normal_in_object);
+        across * Matrix3::from_diagonal(&inverse_squares) * across / steepness
     }
 
     fn geodesic(&self, a: &SurfacePoint, b: &SurfacePoint) -> Option<Geodesic> {

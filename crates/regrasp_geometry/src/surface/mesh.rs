@@ -10,6 +10,7 @@ use super::mesh_topology::{NONE, Topology, angle_at, creases, face_normals, patc
 use super::{SurfaceError, SurfaceKind, SurfacePoint, mesh_curvature, mesh_geodesic, unit_or};
 use crate::frame::{Point, UnitVector, Vector};
 use crate::mesh::TriangleMesh;
+use nalgebra::Matrix3;
 use regrasp_base::Rng;
 
 /// What was put right when a surface was made of a mesh.
@@ -256,6 +257,10 @@ impl SurfaceKind for MeshSurface {
 
     fn curvature(&self, at: &SurfacePoint) -> [f64; 2] {
         mesh_curvature::curvature(self, at)
+    }
+
+    fn shape_operator(&self, at: &SurfacePoint) -> Matrix3<f64> {
+        mesh_curvature::shape_operator(self, at)
     }
 
     fn geodesic(&self, a: &SurfacePoint, b: &SurfacePoint) -> Option<Geodesic> {

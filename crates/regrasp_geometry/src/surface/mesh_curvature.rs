@@ -4,13 +4,29 @@
 //! triangle from the differences of its corner normals, averaged over the fans of the triangle's corners. Fans end at
 //! creases, so a flat face stays flat up to its edges.
 
-use super::SurfacePoint;
 use super::mesh::{MeshSurface, barycentric};
+use super::{SurfacePoint, across};
 use crate::frame::{UnitVector, Vector, tangents};
 use nalgebra::{Matrix2, Matrix3};
 
 /// Principal curvatures at `at`, larger first, convex positive.
 pub(super) fn curvature(mesh: &MeshSurface, at: &SurfacePoint) -> [f64; 2] {
+    let tensor = fan_tensor(mesh, at);
+    let (u, v) = tangents(&at.normal_in_object);
+    let entry = |a: &UnitVector, b: &UnitVector| a.dot(&(tensor * b.as_ref()));
+    let (p, q, r) = (entry(&u, &u), entry(&u, &v), entry(&v, &v));
+    let (mean, spread) = (0.5 * (p + r), (0.25 * (p - r).powi(2) + q * q).sqrt());
+    [mean + spread, mean - spread]
+}
+
+/// The same with directions.
+pub(super) fn shape_operator(mesh: &MeshSurface, at: &SurfacePoint) -> Matrix3<f64> {
+    let across = across(&at.normal_in_object);
+    across * fan_tensor(mesh, at) * across
+}
+
+/// The second fundamental form about `at`, from the fans of the corners of its triangle.
+fn fan_tensor(mesh: &MeshSurface, at: &SurfacePoint) -> Matrix3<f64> {
     let facet = at.facet as usize;
     let weights = barycentric(&mesh.corners(at.facet), &at.point_in_object);
     let mut tensor = Matrix3::zeros();
@@ -26,11 +42,7 @@ pub(super) fn curvature(mesh: &MeshSurface, at: &SurfacePoint) -> [f64; 2] {
         }
         tensor += sum * (weights[k] / total);
     }
-    let (u, v) = tangents(&at.normal_in_object);
-    let entry = |a: &UnitVector, b: &UnitVector| a.dot(&(tensor * b.as_ref()));
-    let (p, q, r) = (entry(&u, &u), entry(&u, &v), entry(&v, &v));
-    let (mean, spread) = (0.5 * (p + r), (0.25 * (p - r).powi(2) + q * q).sqrt());
-    [mean + spread, mean - spread]
+    tensor
 }
 
 /// The second fundamental form of triangle `i` as a symmetric tensor in the object frame.

@@ -24,6 +24,7 @@ mod tests;
 use crate::frame::{Point, UnitVector, Vector};
 use crate::mesh::TriangleMesh;
 use crate::shape::Shape;
+use nalgebra::Matrix3;
 use regrasp_base::Rng;
 use std::sync::Arc;
 
@@ -90,6 +91,7 @@ trait SurfaceKind: std::fmt::Debug + Send + Sync {
     fn crease_distance(&self, at: &SurfacePoint) -> f64;
     fn same_face(&self, a: &SurfacePoint, b: &SurfacePoint) -> bool;
     fn curvature(&self, at: &SurfacePoint) -> [f64; 2];
+    fn shape_operator(&self, at: &SurfacePoint) -> Matrix3<f64>;
     fn geodesic(&self, a: &SurfacePoint, b: &SurfacePoint) -> Option<Geodesic>;
 }
 
@@ -200,6 +202,12 @@ impl Surface {
         self.kind.curvature(at)
     }
 
+    /// How the outward normal turns along the surface, in the object frame and in 1/m: moving by `d` across the normal turns the
+    /// normal by this times `d`. Symmetric, zero along the normal; its other eigenvalues are those of [`Surface::curvature`].
+    pub fn shape_operator(&self, at: &SurfacePoint) -> Matrix3<f64> {
+        self.kind.shape_operator(at)
+    }
+
     /// A shortest path on the surface. None when none exists (parts not connected) or its direction is undefined
     /// (antipodal points of a sphere).
     pub fn geodesic(&self, a: &SurfacePoint, b: &SurfacePoint) -> Option<Geodesic> {
@@ -221,6 +229,17 @@ fn checked_lengths(kind: &'static str, values: Vector) -> Result<Vector, Surface
 /// `v / |v|`, or `otherwise` when `v` is zero.
 fn unit_or(v: Vector, otherwise: UnitVector) -> UnitVector {
     UnitVector::try_new(v, 1e-300).unwrap_or(otherwise)
+}
+
+/// Takes off what is along the unit vector `normal`.
+fn across(normal: &UnitVector) -> Matrix3<f64> {
+    Matrix3::identity() - normal.as_ref() * normal.transpose()
+}
+
+/// The shape operator of the side of a round bar along z.
+fn bar_operator(normal: &UnitVector, radius: f64) -> Matrix3<f64> {
+    let around = Vector::z().cross(normal);
+    around * around.transpose() / radius
 }
 
 /// The roots, in order, of `a t^2 + 2 b t + c`, without cancellation; None when there is none.

@@ -1,8 +1,9 @@
 //! The surface of a ball about the origin. One face, number 0.
 
 use super::geodesic::Geodesic;
-use super::{SurfaceKind, SurfacePoint, quadratic_roots, unit_or};
+use super::{SurfaceKind, SurfacePoint, across, quadratic_roots, unit_or};
 use crate::frame::{Point, UnitVector, Vector};
+use nalgebra::Matrix3;
 use regrasp_base::Rng;
 use std::f64::consts::PI;
 
@@ -51,6 +52,10 @@ impl SurfaceKind for SphereSurface {
 
     fn curvature(&self, _at: &SurfacePoint) -> [f64; 2] {
         [1.0 / self.radius; 2]
+    }
+
+    fn shape_operator(&self, at: &SurfacePoint) -> Matrix3<f64> {
+        across(&at.normal_in_object) / self.radius
     }
 
     fn geodesic(&self, a: &SurfacePoint, b: &SurfacePoint) -> Option<Geodesic> {

@@ -335,6 +335,14 @@ fn curvature_is_the_turn_of_the_normal() {
             assert!(k1 >= k2);
             assert!((k1 + k2 - trace).abs() < 1e-3 * (1.0 + trace.abs()), "{} {k1} {k2} {trace}", shape.kind());
             assert!((k1 * k2 - determinant).abs() < 1e-3 * (1.0 + trace * trace), "{}", shape.kind());
+            let operator = surface.shape_operator(&p);
+            for (along, turned) in [(&u, du), (&v, dv)] {
+                assert!((operator * along.as_ref() - turned).norm() < 1e-3 * (1.0 + k1.abs()), "{}", shape.kind());
+            }
+            assert!(
+                (operator * p.normal_in_object.as_ref()).norm() < 1e-9
+                    && (operator - operator.transpose()).norm() < 1e-9
+            );
         }
     }
 }
@@ -346,6 +354,21 @@ fn mesh_curvature_approaches_that_of_the_smooth_shape() {
     for _ in 0..300 {
         let [k1, k2] = surface.curvature(&surface.sample(&mut rng));
         assert!((k1 * 0.03 - 1.0).abs() < 0.1 && (k2 * 0.03 - 1.0).abs() < 0.1, "{k1} {k2}");
+    }
+    let radii = Vector::new(0.03, 0.02, 0.04);
+    let smooth = Surface::of(&Shape::Ellipsoid { radii }).unwrap();
+    let mut faceted = icosphere(1.0, 4);
+    if let Shape::Mesh(mesh) = &faceted {
+        faceted = Shape::Mesh(std::sync::Arc::new(mesh.scaled(radii).unwrap()));
+    }
+    let mesh = Surface::of(&faceted).unwrap();
+    for _ in 0..300 {
+        let p = mesh.sample(&mut rng);
+        let (operator, expected) =
+            (mesh.shape_operator(&p), smooth.shape_operator(&smooth.project(&p.point_in_object)));
+        assert!((operator - expected).norm() < 0.12 * expected.norm(), "{operator} {expected}");
+        let [k1, k2] = mesh.curvature(&p);
+        assert!((operator.trace() - k1 - k2).abs() < 1e-9 * k1);
     }
 }
 
