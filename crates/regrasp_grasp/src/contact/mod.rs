@@ -6,6 +6,8 @@
 pub mod friction_cone;
 /// Frictionless point.
 pub mod frictionless;
+/// Contacts that roll, slide and twist: modes, Montana's equations, polyhedra.
+pub mod kinematics;
 /// Balls that roll on surfaces.
 pub mod rolling;
 /// Ellipsoids that roll.
