@@ -199,15 +199,12 @@ impl Mode {
 
     /// True when `velocity` obeys this mode. Rest obeys the modes that do not slide.
     pub fn permits(self, velocity: &RelativeVelocity, tolerances: &ModeTolerances) -> bool {
-        let [across, along] = [[0, 1], [3, 4]].map(|pair| pair.map(|k| self.zero_components()[k]));
-        let is_small = |length: f64, bound: f64| length <= bound;
-        let slides = !is_small(velocity.sliding_speed(), tolerances.linear);
-        let rolls = !is_small(velocity.angular.xy().norm(), tolerances.angular);
-        let twists = !is_small(velocity.angular.z.abs(), tolerances.angular);
-        is_small(velocity.linear.z.abs(), tolerances.linear)
-            && slides != across[0]
-            && !(rolls && along[0])
-            && !(twists && self.zero_components()[5])
+        let [still, _, _, no_roll, _, no_twist] = self.zero_components();
+        // Negated, so that what is not a number is not small.
+        let slides = !(velocity.sliding_speed() <= tolerances.linear);
+        let rolls = !(velocity.angular.xy().norm() <= tolerances.angular);
+        let twists = !(velocity.angular.z.abs() <= tolerances.angular);
+        velocity.linear.z.abs() <= tolerances.linear && slides != still && !(rolls && no_roll) && !(twists && no_twist)
     }
 }
 

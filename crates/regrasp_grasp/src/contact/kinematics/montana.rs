@@ -12,6 +12,12 @@ use nalgebra::{Matrix2, Matrix3, Rotation3, SVector, UnitQuaternion, Vector2};
 use regrasp_geometry::{Point, Pose, Vector};
 use std::cell::Cell;
 
+/// Newton steps for the nearest points, and the longest of them in coordinates: radians on round surfaces.
+const MAX_NEWTON_STEPS: usize = 60;
+const LONGEST_NEWTON_STEP: f64 = 0.4;
+/// A step this short ends the search; the next would be its square.
+const SETTLED: f64 = 1e-11;
+
 /// The two surfaces of a contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactPair {
@@ -110,6 +116,42 @@ impl ContactPair {
         }
         let x = contact_from_object_chart.inverse() * (contact_from_tip_chart * Vector::x());
         Ok(ContactState { psi: (-x.y).atan2(x.x), ..state })
+    }
+
+    /// Where a fingertip at `object_from_tip` is nearest to the object, found from a state near it: the state, and the distance of
+    /// the two points along the normal, negative where the bodies overlap. None when Newton's method finds no such points.
+    pub fn nearest_points(&self, object_from_tip: &Pose, near: &ContactState) -> Option<(ContactState, f64)> {
+        let mut state = *near;
+        for _ in 0..MAX_NEWTON_STEPS {
+            (state, _) = self.in_good_charts(&state, 0.0);
+            let (object, tip) = (self.object.forms(&state.object), self.tip.forms(&state.tip));
+            let object_from_chart = object.body_from_contact;
+            let tip_chart = object_from_chart.inverse() * object_from_tip * tip.body_from_contact;
+            let x = tip_chart * Vector::x();
+            state.psi = (-x.y).atan2(x.x);
+            let (apart, lean) = (tip_chart.translation.vector, -(tip_chart * Vector::z()).xy());
+            let tip_curvature = reflection(state.psi) * tip.curvature * reflection(state.psi);
+            // Moving by a over the object and by b over the tip: lean = K_o a + K_f b, apart + b = a + gap K_o a.
+            let (gap, across) = (apart.z, apart.xy());
+            let relative = object.curvature + tip_curvature + tip_curvature * object.curvature * gap;
+            let on_object = relative.try_inverse()? * (lean + tip_curvature * across);
+            let on_tip = on_object + object.curvature * on_object * gap - across;
+            let steps =
+                [solve_upper(&object.metric, &on_object), solve_upper(&tip.metric, &(reflection(state.psi) * on_tip))];
+            let size = steps[0].norm().max(steps[1].norm());
+            if !size.is_finite() {
+                return None;
+            }
+            if size < SETTLED && (tip_chart * Vector::z()).z < 0.0 {
+                return Some((state, gap));
+            }
+            let share = (LONGEST_NEWTON_STEP / size).min(1.0);
+            for (at, step) in [(&mut state.object, steps[0]), (&mut state.tip, steps[1])] {
+                at.u += step.x * share;
+                at.v += step.y * share;
+            }
+        }
+        None
     }
 
     /// Moves a contact under constant components in a transported frame for `duration` seconds.

@@ -8,7 +8,7 @@ use super::{any_coordinates, any_pose, any_state, any_velocity, apart, differenc
 use crate::contact::{rolling, rolling_ellipsoid};
 use nalgebra::UnitQuaternion;
 use regrasp_base::Rng;
-use regrasp_geometry::{Point, Pose, Vector};
+use regrasp_geometry::{Point, Pose, Shape, Surface, Vector};
 use regrasp_robot::tip::TipEllipsoid;
 
 /// Pairs of all kinds that touch in points.
@@ -164,6 +164,68 @@ fn states_are_found_again_from_poses() {
                 "{refused:?}"
             );
         }
+    }
+}
+
+/// From the pose alone, also where the bodies stand a little apart or overlap.
+#[test]
+fn nearest_points_are_found_again_from_the_pose_alone() {
+    let mut rng = Rng::keyed(7, "integration", 0);
+    let mut n_found = 0;
+    for pair in pairs(&mut rng) {
+        for _ in 0..20 {
+            let state = any_state(&pair, &mut rng);
+            let gap = rng.uniform(-0.001, 0.003);
+            let contact = pair.contact_pose(&state);
+            let object_from_tip =
+                contact.object_from_contact * Pose::translation(0.0, 0.0, gap) * contact.tip_from_contact.inverse();
+            if pair
+                .rates(&state, &RelativeVelocity::rolling(1.0, 1.0))
+                .is_ok_and(|r| r.object.norm().max(r.tip.norm()) > 3.0)
+            {
+                // Nearly flat on flat: many points are nearly nearest.
+                continue;
+            }
+            let mut near = state;
+            for at in [&mut near.object, &mut near.tip] {
+                at.u += rng.uniform(-0.05, 0.05);
+                at.v += rng.uniform(-0.05, 0.05);
+            }
+            let (found, measured) = pair.nearest_points(&object_from_tip, &near).unwrap();
+            assert!((measured - gap).abs() < 1e-12, "{measured} {gap}");
+            let again = pair.contact_pose(&found);
+            let off = again.object_from_contact.translation.vector - contact.object_from_contact.translation.vector;
+            assert!(off.norm() < 1e-9, "{off}");
+            let back = again.object_from_contact * Pose::translation(0.0, 0.0, gap) * again.tip_from_contact.inverse();
+            assert!(apart(&back, &object_from_tip, 0.1) < 1e-9);
+            n_found += 1;
+        }
+    }
+    assert!(n_found > 300, "{n_found}");
+}
+
+/// A ball is nearest where its centre is.
+#[test]
+fn nearest_points_of_balls_are_those_of_surfaces() {
+    let mut rng = Rng::keyed(8, "integration", 0);
+    let radii = Vector::new(0.09, 0.07, 0.12);
+    let surface = Surface::of(&Shape::Ellipsoid { radii }).unwrap();
+    let pair = ContactPair {
+        object: ChartedSurface::ellipsoid(radii, Pose::identity()).unwrap(),
+        tip: ChartedSurface::sphere(0.02, Pose::identity()).unwrap(),
+    };
+    for _ in 0..200 {
+        let center = Point::from(Vector::from(rng.direction()) * rng.uniform(0.13, 0.2));
+        let object_from_tip = Pose::translation(center.x, center.y, center.z) * any_pose(&mut rng).rotation;
+        let near = ContactState {
+            object: pair.object.coordinates(&center),
+            tip: pair.tip.coordinates(&object_from_tip.inverse_transform_point(&Point::origin())),
+            psi: 0.0,
+        };
+        let (found, gap) = pair.nearest_points(&object_from_tip, &near).unwrap();
+        let (foot, distance) = surface.project_signed(&center);
+        assert!((gap - distance + 0.02).abs() < 1e-10);
+        assert!((pair.object.point(&found.object) - foot.point_in_object).norm() < 1e-9);
     }
 }
 
