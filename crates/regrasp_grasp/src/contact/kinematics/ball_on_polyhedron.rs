@@ -3,15 +3,15 @@
 //! The centre of a ball that touches keeps one radius from the polyhedron: it moves on a surface of planes, parts of cylinders
 //! about the edges and parts of spheres about the vertices, smooth but for its curvature. In a contact frame that is carried
 //! along without turning about the normal, constant relative velocities move it along straight lines, helices and great
-//! circles, in closed form; the tip turns about two fixed axes, one after the other. [`BallWay::of`] joins such stretches.
+//! circles, in closed form; the tip turns about two fixed axes, one after the other. `BallWay::of` joins such stretches.
 //!
-//! The paper puts the fingertip onto the next face at once (equations 14 to 16): [`relocate`], [`advance_with_jumps`].
+//! The paper puts the fingertip onto the next face at once (equations 14 to 16): [`relocate`], `advance_with_jumps`.
 
 use super::mode::RelativeVelocity;
 use super::polyhedron::{Feature, Polyhedron};
 use super::{ContactPose, NoStep, checked_request};
 use nalgebra::{Translation3, UnitQuaternion};
-use regrasp_geometry::{Point, Pose, Vector};
+use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 
 /// A round fingertip.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,7 +81,7 @@ impl Ball {
         &self,
         feature: Feature,
         point: &Point,
-        normal: &regrasp_geometry::UnitVector,
+        normal: &UnitVector,
         object_from_tip: &UnitQuaternion<f64>,
     ) -> BallContact {
         let (x, _) = regrasp_geometry::frame::tangents(normal);
@@ -90,6 +90,15 @@ impl Ball {
         let object_from_contact = Pose::from_parts(Translation3::from(point.coords), rotation);
         let tip_from_contact = self.tip_from_contact(object_from_tip.inverse() * rotation);
         BallContact { feature, pose: ContactPose { object_from_contact, tip_from_contact } }
+    }
+
+    /// The contact of a ball at `object_from_tip` with what it is nearest to, and its distance from that along the normal,
+    /// negative where they overlap; x of the contact frame is any. None with the centre inside.
+    pub fn nearest(&self, polyhedron: &Polyhedron, object_from_tip: &Pose) -> Option<(BallContact, f64)> {
+        let center = object_from_tip * self.center_in_tip;
+        let (feature, point, distance) = polyhedron.nearest(&center)?;
+        let normal = UnitVector::try_new(center - point, 1e-12)?;
+        Some((self.touching(feature, &point, &normal, &object_from_tip.rotation), distance - self.radius))
     }
 
     fn tip_from_contact(&self, rotation: UnitQuaternion<f64>) -> Pose {
@@ -348,8 +357,9 @@ pub enum Transition {
 
 /// Equations 14 to 16: a contact beyond an edge of face `from`, in its plane, is folded about the edge onto the other face.
 ///
-/// What is carried over is the contact frame, so the angle of contact follows from the frames of the two faces (equation 15 with
-/// the sign of its angle).
+/// What is carried over is the contact frame, so the angle of contact follows from the frames of the two faces. As printed,
+/// equation 14 lacks the distance from the edge, equation 15 the sign of its angle; and 15 holds for sliding only in the frame
+/// carried over, not with a chart of the fingertip, which is touched elsewhere.
 pub fn relocate(
     polyhedron: &Polyhedron,
     ball: &Ball,

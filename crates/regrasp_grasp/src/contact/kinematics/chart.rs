@@ -42,11 +42,9 @@ pub struct Coordinates {
     pub v: f64,
 }
 
-/// A point with its contact frame and forms.
+/// The forms at a point: M, K and T.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Forms {
-    /// The point, z along the outward normal, x along the line of growing `u`; in the frame of the body.
-    pub body_from_contact: Pose,
     /// M: velocity of the point in x and y over rates of `u` and `v`, upper triangular.
     pub metric: Matrix2<f64>,
     /// K: velocity of the outward normal in x and y over that of the point; symmetric, in 1/m, positive where convex.
@@ -158,18 +156,22 @@ impl ChartedSurface {
     /// The forms at a point.
     pub fn forms(&self, at: &Coordinates) -> Forms {
         let jet = self.jet(at);
-        let (length, normal) = (jet.u.norm(), jet.u.cross(&jet.v).normalize());
-        let x = jet.u / length;
-        let y = normal.cross(&x);
-        let metric = Matrix2::new(length, jet.v.dot(&x), 0.0, jet.v.dot(&y));
-        let inverse =
-            Matrix2::new(1.0 / length, -metric[(0, 1)] / (length * metric[(1, 1)]), 0.0, 1.0 / metric[(1, 1)]);
+        let [x, y, normal] = jet.axes();
+        let metric = Matrix2::new(jet.u.dot(&x), jet.v.dot(&x), 0.0, jet.v.dot(&y));
+        let (across, along) = (1.0 / metric[(1, 1)], 1.0 / metric[(0, 0)]);
+        let inverse = Matrix2::new(along, -metric[(0, 1)] * along * across, 0.0, across);
         let second = -Matrix2::new(jet.uu.dot(&normal), jet.uv.dot(&normal), jet.uv.dot(&normal), jet.vv.dot(&normal));
         let curvature = inverse.transpose() * second * inverse;
-        let torsion = RowVector2::new(jet.uu.dot(&y), jet.uv.dot(&y)) / length * inverse;
-        let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, y, normal]));
+        let torsion = RowVector2::new(jet.uu.dot(&y), jet.uv.dot(&y)) * along * inverse;
+        Forms { metric, curvature, torsion }
+    }
+
+    /// The frame of a point, in the frame of the body: x along the line of growing `u`, z along the outward normal.
+    pub fn body_from_contact(&self, at: &Coordinates) -> Pose {
+        let jet = self.jet(at);
+        let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&jet.axes()));
         let surface_from_contact = Pose::from_parts(jet.point.into(), UnitQuaternion::from_rotation_matrix(&rotation));
-        Forms { body_from_contact: self.body_from_surface * surface_from_contact, metric, curvature, torsion }
+        self.body_from_surface * surface_from_contact
     }
 
     fn jet(&self, at: &Coordinates) -> Jet {
@@ -210,6 +212,12 @@ struct Jet {
 }
 
 impl Jet {
+    /// x along the first coordinate line, y across it, the outward normal.
+    fn axes(&self) -> [Vector; 3] {
+        let (x, normal) = (self.u.normalize(), self.u.cross(&self.v).normalize());
+        [x, normal.cross(&x), normal]
+    }
+
     fn map(&self, f: impl Fn(&Vector) -> Vector) -> Jet {
         Jet { point: f(&self.point), u: f(&self.u), v: f(&self.v), uu: f(&self.uu), uv: f(&self.uv), vv: f(&self.vv) }
     }

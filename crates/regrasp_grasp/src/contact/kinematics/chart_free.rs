@@ -1,8 +1,8 @@
 //! Montana's equations without charts: the contact frame moves over both bodies as a rigid frame, by the shape operators of
-//! the two surfaces ([`Surface::shape_operator`]). For any surface; on meshes curvature is estimated, and the path is as exact
+//! the two surfaces (`Surface::shape_operator`). For any surface; on meshes curvature is estimated, and the path is as exact
 //! as the mesh.
 //!
-//! The frame does not turn about the normal relative to the object, as [`super::RelativeControl::Transported`].
+//! The frame does not turn about the normal relative to the object, as `super::RelativeControl::Transported`.
 
 use super::dormand_prince;
 use super::mode::RelativeVelocity;

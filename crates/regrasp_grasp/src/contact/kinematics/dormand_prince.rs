@@ -22,15 +22,18 @@ const ERRORS: [f64; 7] =
 /// Shortest step, over the whole duration.
 const SHORTEST: f64 = 1e-10;
 
-/// One step of `length` from `state` at `time`: the state of order 5, and its difference from that of order 4.
+/// One step of `length` from `state` at `time`, where the rate is `slope`: the state of order 5, and its difference from that of
+/// order 4.
 pub(super) fn step<const N: usize>(
     rate: &mut impl FnMut(f64, &SVector<f64, N>) -> Result<SVector<f64, N>, NoStep>,
     time: f64,
     state: &SVector<f64, N>,
+    slope: &SVector<f64, N>,
     length: f64,
 ) -> Result<(SVector<f64, N>, SVector<f64, N>), NoStep> {
     let mut slopes = [SVector::<f64, N>::zeros(); 7];
-    for k in 0..6 {
+    slopes[0] = *slope;
+    for k in 1..6 {
         let at = (0..k).fold(*state, |at, j| at + slopes[j] * (length * STAGES[k][j]));
         slopes[k] = rate(time + NODES[k] * length, &at)?;
     }
@@ -53,13 +56,12 @@ pub(super) fn integrate<const N: usize>(
     tolerance: f64,
 ) -> Result<(SVector<f64, N>, usize), NoStep> {
     let (mut time, mut state, mut length, mut n_steps) = (0.0, start, duration, 0);
-    // What refuses the start refuses the whole.
-    rate(0.0, &state)?;
+    let mut slope = rate(0.0, &state)?;
     while time < duration {
         n_steps += 1;
         let is_last = time + length >= duration;
         let length_now = if is_last { duration - time } else { length };
-        let tried = step(&mut rate, time, &state, length_now);
+        let tried = step(&mut rate, time, &state, &slope, length_now);
         let error = match &tried {
             Ok((end, error)) => size(end, error) / length_now,
             Err(_) => f64::INFINITY,
@@ -70,6 +72,9 @@ pub(super) fn integrate<const N: usize>(
         {
             state = settled(*end);
             time = if is_last { duration } else { time + length_now };
+            if !is_last {
+                slope = rate(time, &state)?;
+            }
         } else if length_now < SHORTEST * duration {
             return Err(tried.err().unwrap_or(NoStep::Tolerance { reached: time, error }));
         }
@@ -95,7 +100,8 @@ mod tests {
             let length = 2.0 / f64::from(n);
             let start = (Vector2::x(), 0.0);
             let (end, estimated) = (0..n).fold(start, |(at, sum), _| {
-                let (to, error) = step(&mut circle, 0.0, &at, length).unwrap();
+                let slope = circle(0.0, &at).unwrap();
+                let (to, error) = step(&mut circle, 0.0, &at, &slope, length).unwrap();
                 (to, sum + error.norm())
             });
             ((end - Vector2::new(2f64.cos(), 2f64.sin())).norm(), estimated)

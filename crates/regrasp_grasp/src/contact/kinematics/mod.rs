@@ -1,8 +1,8 @@
 //! How a contact of a fingertip with the object moves (paper 003, sections 6.1.2 and 6.2.2, appendix A).
 //!
-//! A relative velocity in ([`mode::RelativeVelocity`]), a contact moved on both surfaces out, in three forms with the same
+//! A relative velocity in (`mode::RelativeVelocity`), a contact moved on both surfaces out, in three forms with the same
 //! result: `montana` in charts, `chart_free` on any surface, meshes too, and `ball_on_polyhedron` over faces, edges and
-//! vertices. The contact stays by construction: a [`ContactPose`] is one frame seen from both bodies.
+//! vertices. The contact stays by construction: a `ContactPose` is one frame seen from both bodies.
 
 /// Balls on convex polyhedra, over edges and vertices.
 pub mod ball_on_polyhedron;
@@ -160,8 +160,8 @@ fn checked_request(duration: f64, tolerance: f64, velocity: &RelativeVelocity) -
     if !(tolerance.is_finite() && tolerance > 0.0) {
         return Err(NoStep::Request { what: "the tolerance", value: tolerance, expected: "finite and above 0" });
     }
-    let worst = velocity.linear.iter().chain(velocity.angular.iter()).find(|x| !x.is_finite());
-    match worst {
+    let broken = velocity.linear.iter().chain(velocity.angular.iter()).find(|x| !x.is_finite());
+    match broken {
         Some(&value) => Err(NoStep::Request { what: "a relative velocity", value, expected: "finite" }),
         None => Ok(()),
     }

@@ -113,6 +113,11 @@ impl RelativeVelocity {
         RelativeVelocity { linear: self.linear * by, angular: self.angular * by }
     }
 
+    /// False where a component is infinite or not a number.
+    pub fn is_finite(&self) -> bool {
+        self.linear.iter().chain(self.angular.iter()).all(|x| x.is_finite())
+    }
+
     /// Speed of sliding, in m/s.
     pub fn sliding_speed(&self) -> f64 {
         self.linear.xy().norm()
@@ -200,29 +205,33 @@ impl Mode {
     /// True when `velocity` obeys this mode. Rest obeys the modes that do not slide.
     pub fn permits(self, velocity: &RelativeVelocity, tolerances: &ModeTolerances) -> bool {
         let [still, _, _, no_roll, _, no_twist] = self.zero_components();
-        // Negated, so that what is not a number is not small.
-        let slides = !(velocity.sliding_speed() <= tolerances.linear);
-        let rolls = !(velocity.angular.xy().norm() <= tolerances.angular);
-        let twists = !(velocity.angular.z.abs() <= tolerances.angular);
-        velocity.linear.z.abs() <= tolerances.linear && slides != still && !(rolls && no_roll) && !(twists && no_twist)
+        let slides = velocity.sliding_speed() > tolerances.linear;
+        let rolls = velocity.angular.xy().norm() > tolerances.angular;
+        let twists = velocity.angular.z.abs() > tolerances.angular;
+        velocity.is_finite()
+            && velocity.linear.z.abs() <= tolerances.linear
+            && slides != still
+            && !(rolls && no_roll)
+            && !(twists && no_twist)
     }
 }
 
 /// The most special mode that permits `velocity`, or why there is none. Speeds across the normal and the rates about axes
-/// across it are measured by their length, so the answer does not depend on the frame's x and y.
+/// across it are measured by their length, so the answer does not depend on the frame's x and y. What is not a number opens.
 pub fn motion_of(velocity: &RelativeVelocity, tolerances: &ModeTolerances) -> Motion {
-    if velocity.linear.z.abs() > tolerances.linear {
-        return if velocity.linear.z < 0.0 { Motion::Opens } else { Motion::Presses };
+    if velocity.linear.z > tolerances.linear {
+        return Motion::Presses;
     }
-    let slides = velocity.sliding_speed() > tolerances.linear;
-    if !slides && velocity.angular.xy().norm() <= tolerances.angular && velocity.angular.z.abs() <= tolerances.angular {
+    let turns = [velocity.angular.xy().norm(), velocity.angular.z.abs()];
+    if velocity.is_finite()
+        && velocity.linear.z.abs() <= tolerances.linear
+        && velocity.sliding_speed() <= tolerances.linear
+        && turns.iter().all(|rate| *rate <= tolerances.angular)
+    {
         return Motion::AtRest;
     }
-    match Mode::ALL.into_iter().find(|mode| mode.permits(velocity, tolerances)) {
-        Some(mode) => Motion::InMode(mode),
-        // Only where a component is not a number.
-        None => Motion::Opens,
-    }
+    let mode = Mode::ALL.into_iter().find(|mode| mode.permits(velocity, tolerances));
+    mode.map_or(Motion::Opens, Motion::InMode)
 }
 
 /// The force on the object at a contact that slides at `velocity`, in the contact frame, in newtons (equation 4, with its sign
@@ -241,7 +250,7 @@ impl ForceLaw {
         if force.norm() == 0.0 {
             return 0.0;
         }
-        if !(pressing > 0.0) {
+        if !(pressing > 0.0 && force.iter().all(|x| x.is_finite())) {
             return f64::INFINITY;
         }
         match self {
@@ -310,7 +319,8 @@ mod tests {
             assert_eq!(motion_of(&velocity, &EXACT), expected);
         }
         let broken = RelativeVelocity { linear: Vector::new(f64::NAN, 0.0, 0.0), angular: Vector::zeros() };
-        assert!(Mode::ALL.iter().all(|mode| mode.force_law() == ForceLaw::Sliding || !mode.permits(&broken, &EXACT)));
+        assert!(Mode::ALL.iter().all(|mode| !mode.permits(&broken, &EXACT)));
+        assert_eq!(motion_of(&broken, &EXACT), Motion::Opens);
     }
 
     /// The material points that touch, followed in the world by differences.
@@ -387,6 +397,10 @@ mod tests {
             assert!(!ForceLaw::Rolling.obeys(&-force, &velocity, friction, 1e9));
             assert!(!ForceLaw::Sliding.obeys(&force, &RelativeVelocity::rolling(1.0, 0.0), friction, 1e9));
             assert!(ForceLaw::Sliding.obeys(&Vector::zeros(), &velocity, friction, 0.0));
+            let broken = Vector::new(f64::NAN, 0.0, -1.0);
+            assert!(
+                [ForceLaw::Rolling, ForceLaw::Sliding].iter().all(|law| !law.obeys(&broken, &velocity, friction, 1e9))
+            );
         }
     }
 }

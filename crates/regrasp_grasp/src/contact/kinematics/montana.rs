@@ -84,7 +84,13 @@ impl ContactPair {
 
     /// The contact frame of the object's chart, seen from both bodies.
     pub fn contact_pose(&self, state: &ContactState) -> ContactPose {
-        contact_pose(&self.object.forms(&state.object), &self.tip.forms(&state.tip), state.psi)
+        let r = reflection(state.psi);
+        let turn = Matrix3::new(r[(0, 0)], r[(0, 1)], 0.0, r[(1, 0)], r[(1, 1)], 0.0, 0.0, 0.0, -1.0);
+        let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));
+        ContactPose {
+            object_from_contact: self.object.body_from_contact(&state.object),
+            tip_from_contact: self.tip.body_from_contact(&state.tip) * turn,
+        }
     }
 
     /// Pose of the fingertip relative to the object.
@@ -101,9 +107,9 @@ impl ContactPair {
             tip: self.tip.coordinates(&here(&contact.tip_from_contact)),
             psi: 0.0,
         };
-        let (object, tip) = (self.object.forms(&state.object), self.tip.forms(&state.tip));
-        let contact_from_object_chart = contact.object_from_contact.inverse() * object.body_from_contact;
-        let contact_from_tip_chart = contact.tip_from_contact.inverse() * tip.body_from_contact;
+        let contact_from_object_chart =
+            contact.object_from_contact.inverse() * self.object.body_from_contact(&state.object);
+        let contact_from_tip_chart = contact.tip_from_contact.inverse() * self.tip.body_from_contact(&state.tip);
         let away = [&contact_from_object_chart, &contact_from_tip_chart].map(|p| p.translation.vector.norm());
         let off = |normal: Vector, wanted: Vector| normal.cross(&wanted).norm().atan2(normal.dot(&wanted));
         let angles = [
@@ -125,8 +131,8 @@ impl ContactPair {
         for _ in 0..MAX_NEWTON_STEPS {
             (state, _) = self.in_good_charts(&state, 0.0);
             let (object, tip) = (self.object.forms(&state.object), self.tip.forms(&state.tip));
-            let object_from_chart = object.body_from_contact;
-            let tip_chart = object_from_chart.inverse() * object_from_tip * tip.body_from_contact;
+            let object_from_chart = self.object.body_from_contact(&state.object);
+            let tip_chart = object_from_chart.inverse() * object_from_tip * self.tip.body_from_contact(&state.tip);
             let x = tip_chart * Vector::x();
             state.psi = (-x.y).atan2(x.x);
             let (apart, lean) = (tip_chart.translation.vector, -(tip_chart * Vector::z()).xy());
@@ -212,7 +218,7 @@ impl ContactPair {
             RelativeControl::InChart(velocity) | RelativeControl::Transported(velocity) => {
                 velocity.in_frame_turned_by(-turned)
             }
-            RelativeControl::Varying(velocity) => velocity(time, &contact_pose(&object, &tip, state.psi)),
+            RelativeControl::Varying(velocity) => velocity(time, &self.contact_pose(&state)),
         };
         let rates = rates(&object, &tip, state.psi, &velocity)?;
         let turn = if matches!(control, RelativeControl::Transported(_)) { -rates.chart_turn } else { 0.0 };
@@ -235,12 +241,13 @@ impl ContactPair {
         let mut moved = ContactState { object, tip, psi: state.psi };
         let mut turned = turned;
         if object.axis != state.object.axis {
-            let angle = angle_between(&self.object.forms(&state.object), &self.object.forms(&object));
+            let angle =
+                angle_between(&self.object.body_from_contact(&state.object), &self.object.body_from_contact(&object));
             moved.psi += angle;
             turned -= angle;
         }
         if tip.axis != state.tip.axis {
-            moved.psi += angle_between(&self.tip.forms(&state.tip), &self.tip.forms(&tip));
+            moved.psi += angle_between(&self.tip.body_from_contact(&state.tip), &self.tip.body_from_contact(&tip));
         }
         (moved, turned)
     }
@@ -286,15 +293,8 @@ fn solve_upper(m: &Matrix2<f64>, right: &Vector2<f64>) -> Vector2<f64> {
     Vector2::new((right.x - m[(0, 1)] * second) / m[(0, 0)], second)
 }
 
-fn contact_pose(object: &Forms, tip: &Forms, psi: f64) -> ContactPose {
-    let r = reflection(psi);
-    let turn = Matrix3::new(r[(0, 0)], r[(0, 1)], 0.0, r[(1, 0)], r[(1, 1)], 0.0, 0.0, 0.0, -1.0);
-    let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));
-    ContactPose { object_from_contact: object.body_from_contact, tip_from_contact: tip.body_from_contact * turn }
-}
-
 /// Angle about the common outward normal from the x of one frame to that of another.
-fn angle_between(from: &Forms, to: &Forms) -> f64 {
-    let x = from.body_from_contact.inverse() * (to.body_from_contact * Vector::x());
+fn angle_between(from: &Pose, to: &Pose) -> f64 {
+    let x = from.inverse() * (to * Vector::x());
     x.y.atan2(x.x)
 }

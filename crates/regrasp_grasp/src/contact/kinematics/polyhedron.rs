@@ -1,5 +1,6 @@
 //! Convex polyhedra with their faces, edges and vertices (paper 003, section 3.2 and appendix A).
 
+use super::chart::ChartedSurface;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use regrasp_geometry::hull::HullError;
 use regrasp_geometry::{ConvexHull, Point, Pose, Shape, UnitVector, Vector};
@@ -148,6 +149,34 @@ impl Polyhedron {
     /// The vertices, those that no edge ends at too.
     pub fn vertices(&self) -> &[Point] {
         &self.vertices
+    }
+
+    /// The plane of a face with the coordinates of its frame, for [`super::ContactPair`].
+    pub fn chart(&self, face: usize) -> ChartedSurface {
+        ChartedSurface::plane(self.faces[face].object_from_face)
+    }
+
+    /// The feature nearest to a point outside, the nearest point of it and the distance. None inside.
+    pub fn nearest(&self, point: &Point) -> Option<(Feature, Point, f64)> {
+        let height = |face: &Face| face.normal.dot(&(point - self.vertices[face.corners[0]]));
+        if self.faces.iter().all(|face| height(face) <= 0.0) {
+            return None;
+        }
+        let faces = self.faces.iter().enumerate().filter(|(_, face)| height(face) > 0.0).filter_map(|(f, face)| {
+            let foot = point - face.normal.into_inner() * height(face);
+            self.depths(f, &foot).all(|depth| depth >= 0.0).then_some((Feature::Face(f), foot))
+        });
+        let edges = self.edges.iter().enumerate().filter_map(|(e, edge)| {
+            let s = (point - self.vertices[edge.ends[0]]).dot(&edge.direction);
+            let foot = self.vertices[edge.ends[0]] + edge.direction.into_inner() * s;
+            (s >= 0.0 && s <= edge.length).then_some((Feature::Edge(e), foot))
+        });
+        let vertices = self.vertices.iter().enumerate().map(|(v, vertex)| (Feature::Vertex(v), *vertex));
+        faces
+            .chain(edges)
+            .chain(vertices)
+            .map(|(feature, foot)| (feature, foot, (point - foot).norm()))
+            .min_by(|a, b| a.2.total_cmp(&b.2))
     }
 
     /// Unit vectors from a vertex along its edges.

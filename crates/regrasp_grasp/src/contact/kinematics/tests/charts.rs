@@ -18,12 +18,12 @@ fn forms_are_differences_of_the_parametrisation() {
             }
             let forms = surface.forms(&at);
             let step = 1e-5;
-            let along = |du: f64, dv: f64| surface.forms(&Coordinates { u: at.u + du, v: at.v + dv, ..at });
-            let [x, y, z] = [Vector::x(), Vector::y(), Vector::z()].map(|axis| forms.body_from_contact.rotation * axis);
+            let frame = surface.body_from_contact(&at);
+            let along = |du: f64, dv: f64| surface.body_from_contact(&Coordinates { u: at.u + du, v: at.v + dv, ..at });
+            let [x, y, z] = [Vector::x(), Vector::y(), Vector::z()].map(|axis| frame.rotation * axis);
             for (column, (before, after)) in
                 [(0, (along(-step, 0.0), along(step, 0.0))), (1, (along(0.0, -step), along(0.0, step)))]
             {
-                let (before, after) = (before.body_from_contact, after.body_from_contact);
                 let way = (after.translation.vector - before.translation.vector) / (2.0 * step);
                 let moved = Vector2::new(way.dot(&x), way.dot(&y));
                 let metric: Vector2<f64> = forms.metric.column(column).into();
@@ -37,7 +37,7 @@ fn forms_are_differences_of_the_parametrisation() {
                 assert!((spin - (forms.torsion * metric).x).abs() < 1e-6, "{surface:?} {at:?}");
             }
             assert!((forms.curvature - forms.curvature.transpose()).norm() < 1e-9 * (1.0 + forms.curvature.norm()));
-            assert!((forms.body_from_contact.translation.vector - surface.point(&at).coords).norm() == 0.0);
+            assert!((frame.translation.vector - surface.point(&at).coords).norm() == 0.0);
         }
     }
 }
@@ -71,7 +71,7 @@ fn curvature_and_normals_are_those_of_surfaces() {
             let foot = surface.project(&place.inverse_transform_point(&charted.point(&at)));
             assert!((place * foot.point_in_object - charted.point(&at)).norm() < 1e-14);
             let normal = place * foot.normal_in_object.into_inner();
-            assert!((forms.body_from_contact.rotation * Vector::z() - normal).norm() < 1e-12);
+            assert!((charted.body_from_contact(&at).rotation * Vector::z() - normal).norm() < 1e-12);
             let eigen = forms.curvature.symmetric_eigenvalues();
             let [k1, k2] = surface.curvature(&foot);
             assert!((eigen.max() - k1).abs() < 1e-9 && (eigen.min() - k2).abs() < 1e-9);
@@ -100,8 +100,9 @@ fn superellipsoids_obey_their_equation_and_include_ellipsoids() {
     let surface = ChartedSurface::superellipsoid(radii, 4.0, 2.5, Pose::identity()).unwrap();
     for k in 0..3 {
         let point = Point::from(Vector::ith(k, radii[k]));
-        let forms = surface.forms(&surface.coordinates(&point));
-        assert!((forms.body_from_contact.translation.vector - point.coords).norm() < 1e-15);
+        let at = surface.coordinates(&point);
+        let forms = surface.forms(&at);
+        assert!((surface.point(&at) - point).norm() < 1e-15);
         assert!(forms.curvature.iter().all(|x| x.is_finite()));
     }
     for (p, q) in [(1.5, 3.0), (3.0, 1.5), (3.0, 2.0), (f64::NAN, 3.0), (3.0, f64::INFINITY)] {

@@ -1,6 +1,8 @@
 //! Balls over edges and vertices, and equations 14 to 16.
 
 use super::super::ball_on_polyhedron::{Ball, BallContact, BallWay, Transition, advance_with_jumps, relocate};
+use super::super::chart::ChartedSurface;
+use super::super::montana::ContactPair;
 use super::super::polyhedron::{Feature, NotPolyhedron, Polyhedron};
 use super::super::{ContactPose, NoStep, RelativeVelocity};
 use super::{apart, differenced};
@@ -251,7 +253,7 @@ fn approaching(
 #[test]
 fn folding_over_an_edge_is_the_papers_with_its_errors_put_right() {
     let mut rng = Rng::keyed(5, "polyhedra", 0);
-    let mut n_wrong_signs = 0;
+    let (mut n_wrong_signs, mut n_sliding_off) = (0, 0);
     for shape in [cube(), diamond()] {
         let polyhedron = Polyhedron::of(&shape).unwrap();
         for edge in polyhedron.edges() {
@@ -319,9 +321,25 @@ fn folding_over_an_edge_is_the_papers_with_its_errors_put_right() {
                 assert!(((center - found).norm() - ball.radius).abs() < 1e-12);
             }
             assert_eq!(rolled.pose.tip_from_contact, beyond.tip_from_contact, "equation 16");
+
+            // With the charts of a sphere equation 15 holds for rolling alone: a tip that slides is touched elsewhere, where x
+            // of its chart points elsewhere.
+            let tip = ChartedSurface::sphere(
+                ball.radius,
+                Pose::from_parts(ball.center_in_tip.coords.into(), UnitQuaternion::identity()),
+            )
+            .unwrap();
+            let [before, rolled, slid] = [(p, &beyond), (q, &rolled.pose), (q, &slid.pose)].map(|(face, contact)| {
+                ContactPair { object: ChartedSurface::plane(face.object_from_face), tip }
+                    .state_at(contact, 1e-9, 1e-6)
+                    .unwrap()
+            });
+            assert!(gap(rolled.psi - before.psi - signed).abs() < 1e-9);
+            n_sliding_off +=
+                usize::from(gap(slid.psi - before.psi - signed).abs() > 1e-3 && slid.tip.axis == before.tip.axis);
         }
     }
-    assert!(n_wrong_signs > 3, "{n_wrong_signs}");
+    assert!(n_wrong_signs > 3 && n_sliding_off > 3, "{n_wrong_signs} {n_sliding_off}");
 }
 
 /// Straight over an edge both motions go the same way; the ball that goes round takes longer, by the angle over its rate.
@@ -404,4 +422,88 @@ fn starts_off_the_polyhedron_are_refused() {
     let nearly = start.pose.object_from_contact * Pose::translation(0.0, 0.0, 1e-8);
     let nearly = BallContact { pose: ContactPose { object_from_contact: nearly, ..start.pose }, ..start };
     assert!(BallWay::of(&polyhedron, &ball, &nearly, &velocity, 1.0).is_ok());
+}
+
+#[test]
+fn the_nearest_feature_is_that_of_the_surface() {
+    let mut rng = Rng::keyed(9, "polyhedra", 0);
+    let mut kinds = [0; 3];
+    for shape in [cube(), diamond(), any_hull(&mut rng)] {
+        let (polyhedron, surface) = (Polyhedron::of(&shape).unwrap(), Surface::of(&shape).unwrap());
+        for _ in 0..300 {
+            let ball = any_ball(&mut rng);
+            let place = Vector::from(rng.direction()) * rng.uniform(0.0, 0.3);
+            let object_from_tip = Pose::new(place, Vector::from(rng.direction()) * 2.0);
+            let center = object_from_tip * ball.center_in_tip;
+            let (foot, distance) = surface.project_signed(&center);
+            let Some((contact, gap)) = ball.nearest(&polyhedron, &object_from_tip) else {
+                assert!(distance <= 0.0);
+                continue;
+            };
+            kinds[match contact.feature {
+                Feature::Face(_) => 0,
+                Feature::Edge(_) => 1,
+                Feature::Vertex(_) => 2,
+            }] += 1;
+            assert!((gap + ball.radius - distance).abs() < 1e-12);
+            let at = contact.pose.object_from_contact.translation.vector;
+            assert!((at - foot.point_in_object.coords).norm() < 1e-12);
+            let lifted = contact.pose.object_from_contact * Pose::translation(0.0, 0.0, gap);
+            assert!(apart(&(lifted * contact.pose.tip_from_contact.inverse()), &object_from_tip, 0.1) < 1e-8);
+            let settled = BallWay::of(&polyhedron, &ball, &contact, &RelativeVelocity::rolling(0.1, 0.2), 0.1);
+            assert!(settled.is_ok(), "{settled:?}");
+        }
+    }
+    assert!(kinds.iter().all(|&n| n > 50), "{kinds:?}");
+}
+
+/// On a face as equation 12 has it for a plane; on an edge as for a thin bar, the more so the thinner.
+#[test]
+fn faces_are_planes_and_edges_are_thin_bars() {
+    let mut rng = Rng::keyed(10, "polyhedra", 0);
+    let polyhedron = Polyhedron::of(&cube()).unwrap();
+    for _ in 0..20 {
+        let ball = any_ball(&mut rng);
+        let place = Pose::from_parts(ball.center_in_tip.coords.into(), UnitQuaternion::identity());
+        let tip = ChartedSurface::sphere(ball.radius, place).unwrap();
+        let start = any_start(&polyhedron, &ball, &mut rng);
+        let Feature::Face(f) = start.feature else { panic!("it starts on a face") };
+        for velocity in velocities(&mut rng) {
+            let end = BallWay::of(&polyhedron, &ball, &start, &velocity, 0.1).unwrap().end();
+            let pair = ContactPair { object: polyhedron.chart(f), tip };
+            let state = pair.state_at(&start.pose, 1e-12, 1e-7).unwrap();
+            let x = start.pose.object_from_contact.inverse()
+                * (pair.contact_pose(&state).object_from_contact * Vector::x());
+            let by_chart = pair.advance(&state, &velocity.in_frame_turned_by(x.y.atan2(x.x)), 0.1, 1e-12).unwrap();
+            if end.feature == start.feature {
+                assert!(apart(&pair.object_from_tip(&by_chart), &end.pose.object_from_tip(), 0.1) < 1e-9);
+            }
+        }
+
+        let e = rng.below(polyhedron.edges().len());
+        let edge = &polyhedron.edges()[e];
+        let middle = polyhedron.vertices()[edge.ends[0]] + edge.direction.into_inner() * (edge.length * 0.5);
+        let normals = edge.faces.map(|f| polyhedron.faces()[f].normal.into_inner());
+        let normal = regrasp_geometry::UnitVector::new_normalize(normals[0] + normals[1]);
+        let start = ball.touching(Feature::Edge(e), &middle, &normal, &UnitQuaternion::identity());
+        for velocity in velocities(&mut rng) {
+            let end = BallWay::of(&polyhedron, &ball, &start, &velocity, 0.15).unwrap().end();
+            if end.feature != start.feature {
+                continue;
+            }
+            let off = [1e-4, 1e-5].map(|thickness| {
+                let axis = UnitQuaternion::rotation_between(&Vector::z(), &edge.direction)
+                    .unwrap_or(UnitQuaternion::from_scaled_axis(Vector::x() * std::f64::consts::PI));
+                let place = Pose::from_parts((middle - normal.into_inner() * thickness).coords.into(), axis);
+                let pair = ContactPair { object: ChartedSurface::cylinder(thickness, place).unwrap(), tip };
+                let state = pair.state_at(&start.pose, 1e-9, 1e-7).unwrap();
+                let x = start.pose.object_from_contact.inverse()
+                    * (pair.contact_pose(&state).object_from_contact * Vector::x());
+                let velocity = velocity.in_frame_turned_by(x.y.atan2(x.x));
+                let by_chart = pair.advance(&state, &velocity, 0.15, 1e-11).unwrap();
+                apart(&pair.object_from_tip(&by_chart), &end.pose.object_from_tip(), 0.1)
+            });
+            assert!(off[1] < 1e-5 && off[1] < 0.12 * off[0] + 1e-9, "{off:?}");
+        }
+    }
 }
