@@ -5,7 +5,7 @@
 //! along without turning about the normal, constant relative velocities move it along straight lines, helices and great
 //! circles, in closed form; the tip turns about two fixed axes, one after the other. `BallWay::of` joins such stretches.
 //!
-//! The paper puts the fingertip onto the next face at once (equations 14 to 16): [`relocate`], `advance_with_jumps`.
+//! The paper puts the fingertip onto the next face at once (equations 14 to 16): `relocate`, `advance_with_jumps`.
 
 use super::mode::RelativeVelocity;
 use super::polyhedron::{Feature, Polyhedron};

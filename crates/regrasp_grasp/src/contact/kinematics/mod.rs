@@ -21,11 +21,12 @@ pub mod polyhedron;
 #[cfg(test)]
 mod tests;
 
-pub use ball_on_polyhedron::{Ball, BallContact, BallWay, Transition, advance_with_jumps, relocate};
+pub use ball_on_polyhedron::{Ball, BallContact, BallWay, Stretch, Transition, advance_with_jumps, relocate};
 pub use chart::{ChartedSurface, Coordinates, Forms};
+pub use chart_free::SurfacePair;
 pub use mode::{BodyVelocity, ForceLaw, Mode, ModeTolerances, Motion, RelativeVelocity, motion_of};
 pub use montana::{Advanced, ContactPair, ContactState, RelativeControl};
-pub use polyhedron::{Feature, Polyhedron};
+pub use polyhedron::{Edge, Face, Feature, NotPolyhedron, Polyhedron};
 
 use nalgebra::{Matrix2, UnitQuaternion, Vector2};
 use regrasp_geometry::{Pose, Vector};
