@@ -144,6 +144,8 @@ impl Stretch {
 impl BallWay {
     /// Moves a ball under constant components of the relative velocity in the contact frame, which is carried along, for
     /// `duration` seconds. Time passes on edges and vertices too: there the ball goes round them.
+    ///
+    /// Panics where the feature is none of the polyhedron.
     pub fn of(
         polyhedron: &Polyhedron,
         ball: &Ball,
@@ -152,6 +154,10 @@ impl BallWay {
         duration: f64,
     ) -> Result<Self, NoStep> {
         checked_request(duration, 1.0, velocity)?;
+        if !(ball.radius.is_finite() && ball.radius > 0.0) {
+            let (what, expected) = ("the radius of the ball", "finite and above 0 m");
+            return Err(NoStep::Request { what, value: ball.radius, expected });
+        }
         if !(velocity.linear.z.abs() <= super::KEPT * velocity.sliding_speed().max(1.0)) {
             return Err(NoStep::NotKept { speed: velocity.linear.z });
         }

@@ -80,7 +80,7 @@ pub enum NoStep {
         /// Along the outward normal, object relative to fingertip, in m/s.
         speed: f64,
     },
-    /// A duration, tolerance or velocity that is not a number or has the wrong sign.
+    /// A duration, tolerance, velocity or radius that is not a number or has the wrong sign.
     #[error("{what} is {value}; it has to be {expected}")]
     Request {
         /// Which.
@@ -106,7 +106,7 @@ pub enum NoStep {
         /// Between the contact normal and the worse of the two surfaces' normals, in radians.
         angle: f64,
     },
-    /// The ball crosses edges without end, or stands where no feature takes it further.
+    /// The ball crosses edges without end, or stands on an edge or vertex with a normal that is none of theirs.
     #[error("the ball on the polyhedron finds no way on after {crossings} crossings")]
     Stuck {
         /// Edges and vertices crossed until then.

@@ -418,6 +418,13 @@ fn starts_off_the_polyhedron_are_refused() {
     let opening = RelativeVelocity { linear: Vector::new(0.0, 0.0, -0.1), ..velocity };
     assert_eq!(BallWay::of(&polyhedron, &ball, &start, &opening, 1.0), Err(NoStep::NotKept { speed: -0.1 }));
     assert!(matches!(BallWay::of(&polyhedron, &ball, &start, &velocity, -1.0), Err(NoStep::Request { .. })));
+    let point = Ball { radius: 0.0, ..ball };
+    assert!(matches!(BallWay::of(&polyhedron, &point, &start, &velocity, 1.0), Err(NoStep::Request { .. })));
+    let edge = &polyhedron.edges()[0];
+    let middle = nalgebra::center(&polyhedron.vertices()[edge.ends[0]], &polyhedron.vertices()[edge.ends[1]]);
+    let inside = -polyhedron.faces()[edge.faces[0]].normal;
+    let odd = ball.touching(Feature::Edge(0), &middle, &inside, &UnitQuaternion::identity());
+    assert_eq!(BallWay::of(&polyhedron, &ball, &odd, &velocity, 1.0), Err(NoStep::Stuck { crossings: 0 }));
     // Off by rounding is put right.
     let nearly = start.pose.object_from_contact * Pose::translation(0.0, 0.0, 1e-8);
     let nearly = BallContact { pose: ContactPose { object_from_contact: nearly, ..start.pose }, ..start };
