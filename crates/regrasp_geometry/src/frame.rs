@@ -1,6 +1,6 @@
 //! Poses, and motion between two poses.
 
-use nalgebra::{Isometry3, Point3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
 
 /// A rigid transform, named `parent_from_child` where it is used.
 pub type Pose = Isometry3<f64>;
@@ -67,6 +67,22 @@ pub fn rotation_between(from: &Pose, to: &Pose) -> Vector {
         return 2.0 * delta.imag();
     }
     delta.imag() * (2.0 * half_sine.atan2(delta.w) / half_sine)
+}
+
+/// Rotation vector that turns one rotation matrix into the other, by less than pi: `to = exp(vector) from`.
+#[inline]
+pub fn turn_between(from: &Matrix3<f64>, to: &Matrix3<f64>) -> Vector {
+    // The entries of to * from^T that are not needed are not made.
+    let row = |m: &Matrix3<f64>, i: usize| Vector::new(m[(i, 0)], m[(i, 1)], m[(i, 2)]);
+    let (to, from) = ([row(to, 0), row(to, 1), row(to, 2)], [row(from, 0), row(from, 1), row(from, 2)]);
+    let twice = Vector::new(
+        to[2].dot(&from[1]) - to[1].dot(&from[2]),
+        to[0].dot(&from[2]) - to[2].dot(&from[0]),
+        to[1].dot(&from[0]) - to[0].dot(&from[1]),
+    );
+    let sine = 0.5 * twice.norm();
+    let cosine = 0.5 * (to[0].dot(&from[0]) + to[1].dot(&from[1]) + to[2].dot(&from[2]) - 1.0);
+    if sine < 1e-12 { twice * 0.5 } else { twice * (0.5 * sine.atan2(cosine) / sine) }
 }
 
 /// Distance between poses: translation plus `length` times the angle between them.

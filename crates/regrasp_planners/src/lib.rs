@@ -8,7 +8,10 @@ pub mod failure;
 pub mod in_hand;
 /// What a graph of grasps looks like.
 pub mod outline;
+/// Finger tracking (paper 003).
+pub mod tracking;
 
 pub use failure::{Cause, Failure, FailureKind, NearestMiss};
 pub use in_hand::{InHandSettings, Method, Progress, plan_in_hand};
 pub use outline::{Outline, OutlineEdge, OutlineNode};
+pub use tracking::{TrackingSettings, plan_tracking};

@@ -7,7 +7,7 @@
 //! Turning about the normal moves nothing.
 
 use super::Contact;
-use nalgebra::Matrix3;
+pub use regrasp_geometry::frame::turn_between;
 use regrasp_geometry::surface::{Surface, SurfacePoint};
 use regrasp_geometry::{Point, UnitVector, Vector};
 
@@ -45,22 +45,6 @@ impl Touch {
         let normal_in_object = UnitVector::new_unchecked(self.ball.normal);
         Contact { point_in_object: self.foot.point_in_object, normal_in_object }
     }
-}
-
-/// Rotation vector that turns `from` into `to`, both of turns of less than pi: `to = exp(vector) from`.
-#[inline]
-pub fn turn_between(from: &Matrix3<f64>, to: &Matrix3<f64>) -> Vector {
-    // The entries of to * from^T that are not needed are not made.
-    let row = |m: &Matrix3<f64>, i: usize| Vector::new(m[(i, 0)], m[(i, 1)], m[(i, 2)]);
-    let (to, from) = ([row(to, 0), row(to, 1), row(to, 2)], [row(from, 0), row(from, 1), row(from, 2)]);
-    let twice = Vector::new(
-        to[2].dot(&from[1]) - to[1].dot(&from[2]),
-        to[0].dot(&from[2]) - to[2].dot(&from[0]),
-        to[1].dot(&from[0]) - to[0].dot(&from[1]),
-    );
-    let sine = 0.5 * twice.norm();
-    let cosine = 0.5 * (to[0].dot(&from[0]) + to[1].dot(&from[1]) + to[2].dot(&from[2]) - 1.0);
-    if sine < 1e-12 { twice * 0.5 } else { twice * (0.5 * sine.atan2(cosine) / sine) }
 }
 
 /// What is left of a step's motion when rolling is taken off: the slip of the ball over the object, in the object frame,

@@ -6,6 +6,8 @@ pub mod any_direction;
 mod barrier;
 /// Contact forces that balance a load.
 pub mod force_distribution;
+/// Small dense linear programs.
+pub mod linear_program;
 /// Newton steps, contact by contact.
 mod newton_step;
 

@@ -12,7 +12,8 @@ use regrasp_geometry::collision::{Answer, Placement, separation};
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 use regrasp_grasp::closure::may_close;
 use regrasp_grasp::{Contact, ContactModel};
-use regrasp_robot::kinematics::finger_ik::Coordinates;
+use regrasp_robot::kinematics::finger_ik::{Coordinates, IkSettings};
+use regrasp_robot::kinematics::whole_pose::{has_all_directions, joints_of_pose};
 use regrasp_scene::{GraspRequest, InHandQuery};
 
 /// Distance of a given fingertip from the surface, and of a given contact point, that still counts as touching.
@@ -170,11 +171,7 @@ pub fn given_grasp(
     request: &GraspRequest,
     rng: &mut Rng,
 ) -> Result<Option<GraspState>, Failure> {
-    let state = match request {
-        GraspRequest::Automatic => return Ok(None),
-        GraspRequest::Joints(values) => from_joints(model, end, world_from_object, values)?,
-        GraspRequest::Contacts(points) => from_contacts(model, end, world_from_object, points, rng)?,
-    };
+    let Some(state) = given_grasp_at(model, end, world_from_object, request, Near::Any(rng))? else { return Ok(None) };
     let margin = model.closure_margin(&state.contacts, model.all_fingers());
     if margin < model.settings.closure_margin {
         return Err(end.failure(
@@ -193,6 +190,33 @@ pub fn given_grasp(
             "choose other contacts, or let the planner choose (grasp = \"automatic\")",
         ));
     }
+    Ok(Some(state))
+}
+
+/// Which joints are taken for a contact.
+pub enum Near<'r> {
+    /// Any that are clear.
+    Any(&'r mut Rng),
+    /// Those nearest to the rest posture.
+    Rest,
+}
+
+/// Turns of a joint, in radians, from the rest posture to the start.
+const FROM_REST: f64 = 3.0;
+
+/// The grasp that the query gives at one end, clear of everything; whether it is closed is not asked.
+pub fn given_grasp_at(
+    model: &Model,
+    end: End,
+    world_from_object: &Pose,
+    request: &GraspRequest,
+    near: Near,
+) -> Result<Option<GraspState>, Failure> {
+    let state = match request {
+        GraspRequest::Automatic => return Ok(None),
+        GraspRequest::Joints(values) => from_joints(model, end, world_from_object, values)?,
+        GraspRequest::Contacts(points) => from_contacts(model, end, world_from_object, points, near)?,
+    };
     let mut workspace = Workspace::new(model);
     workspace.set(world_from_object, &state.joints, &state.contacts);
     if !workspace.is_clear(TipMode::AllHold) {
@@ -260,7 +284,7 @@ fn from_contacts(
     end: End,
     world_from_object: &Pose,
     points: &[Point],
-    rng: &mut Rng,
+    mut near: Near,
 ) -> Result<GraspState, Failure> {
     let placement = Placement::from(world_from_object);
     let (mut joints, mut contacts) = (HandJoints::new(), Contacts::new());
@@ -279,12 +303,31 @@ fn from_contacts(
         let contact = Contact { point_in_object: foot.point_in_object, normal_in_object: foot.normal_in_object };
         let mut workspace = Workspace::new(model);
         workspace.place_object(world_from_object);
-        let reached =
-            (0..REACH_TRIES).find_map(|_| super::candidates::reach(&mut workspace, f, &contact, &placement, rng));
+        let reached = match &mut near {
+            Near::Any(rng) => {
+                (0..REACH_TRIES).find_map(|_| super::candidates::reach(&mut workspace, f, &contact, &placement, rng))
+            }
+            Near::Rest => {
+                let settings = IkSettings { limit_margin: 0.0, preference: None, max_step: FROM_REST };
+                let (finger, rest) = (&model.fingers[f], &model.scene.hand.fingers[f].rest);
+                let chain = finger.ik.chain();
+                if has_all_directions(chain) {
+                    let rotation = chain.last_frame(rest).rotation;
+                    let center = finger.center_over(&placement, &contact);
+                    let translation = center.coords - rotation * finger.ik.center_in_body().coords;
+                    joints_of_pose(chain, rest, &Placement { rotation, translation })
+                } else {
+                    finger.touch_near(&placement, &contact, rest, &settings)
+                }
+            }
+        };
         let Some(own) = reached else {
             let normal = UnitVector::new_unchecked(placement.vector(&contact.normal_in_object));
             let settings = ik_settings(model, f, normal);
-            let reachable = model.fingers[f].touch_random(&placement, &contact, &settings, rng).is_some();
+            let reachable = match &mut near {
+                Near::Any(rng) => model.fingers[f].touch_random(&placement, &contact, &settings, rng).is_some(),
+                Near::Rest => false,
+            };
             let why = if reachable { "only in collision" } else { "not at all within its joint limits" };
             return Err(end.failure(
                 format!("finger \"{name}\" reaches its {} contact {why}", end.name()),

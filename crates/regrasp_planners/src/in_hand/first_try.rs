@@ -11,18 +11,27 @@ use regrasp_scene::Scene;
 /// Directions across a link in which its width is measured.
 const DIRECTIONS: usize = 32;
 
-/// Settings and budget of the first try; None where there is none to make.
-pub fn first_try(scene: &Scene, settings: &InHandSettings, budget: &Budget) -> Option<(InHandSettings, Budget)> {
-    let wanted = settings.first_try.filter(|_| settings.method == Method::Gait)?;
+/// Share of the work for the try that asks for both; by hand.
+const SHARE_FOR_BOTH: f64 = 1.0 / 3.0;
+
+/// Settings and work of what is tried first, in order; none where there is nothing to try: more clearance and more closure, and
+/// more clearance alone.
+pub fn first_tries(scene: &Scene, settings: &InHandSettings, budget: &Budget) -> Vec<(InHandSettings, u64)> {
+    let Some(wanted) = settings.first_try.filter(|_| settings.method == Method::Gait) else { return Vec::new() };
     let can_keep = |finger: &Finger| stand_back(finger).is_none_or(|back| back >= 2.0 * wanted.clearance);
-    let can_keep = scene.hand.fingers.iter().all(can_keep);
-    let clearance = if can_keep { wanted.clearance.max(settings.clearance) } else { settings.clearance };
-    let closure_margin = wanted.closure_margin.max(settings.closure_margin);
-    if (clearance, closure_margin) == (settings.clearance, settings.closure_margin) {
-        return None;
+    let keeps_away = wanted.clearance > settings.clearance && scene.hand.fingers.iter().all(can_keep);
+    let closes_more = wanted.closure_margin > settings.closure_margin;
+    let with = |keeps_away: bool, closes_more: bool, share: f64| {
+        let clearance = if keeps_away { wanted.clearance } else { settings.clearance };
+        let closure_margin = if closes_more { wanted.closure_margin } else { settings.closure_margin };
+        let work = ((wanted.work as f64 * share) as u64).min(budget.max_work / 4);
+        (InHandSettings { clearance, closure_margin, first_try: None, ..settings.clone() }, work)
+    };
+    match (keeps_away, closes_more) {
+        (true, true) => vec![with(true, true, SHARE_FOR_BOTH), with(true, false, 1.0)],
+        (false, false) => Vec::new(),
+        (keeps_away, closes_more) => vec![with(keeps_away, closes_more, 1.0)],
     }
-    let settings = InHandSettings { clearance, closure_margin, first_try: None, ..settings.clone() };
-    Some((settings, Budget { max_work: wanted.work.min(budget.max_work / 2), ..budget.clone() }))
 }
 
 /// How far the link behind a round tip stands back behind it where it is thinnest, in metres: no finger keeps its last link
@@ -65,14 +74,17 @@ mod tests {
         }
         let with = |wanted: FirstTry| {
             let settings = InHandSettings { first_try: Some(wanted), ..InHandSettings::default() };
-            first_try(&scene, &settings, &Budget::work(1000))
+            first_tries(&scene, &settings, &Budget::work(1000))
         };
         let (usual, wanted) = (InHandSettings::default(), FirstTry::default());
-        assert!(with(FirstTry { closure_margin: 0.0, ..wanted }).is_none());
-        let (first, budget) = with(wanted).unwrap();
-        assert_eq!((first.clearance, first.closure_margin), (usual.clearance, wanted.closure_margin));
-        assert_eq!((first.first_try, budget.max_work), (None, 500));
-        let (first, _) = with(FirstTry { clearance: 0.0005, ..wanted }).unwrap();
-        assert_eq!((first.clearance, first.closure_margin), (0.0005, wanted.closure_margin));
+        assert!(with(FirstTry { closure_margin: 0.0, ..wanted }).is_empty());
+        let asked = |tries: &[(InHandSettings, u64)]| -> Vec<(f64, f64, u64)> {
+            assert!(tries.iter().all(|(settings, _)| settings.first_try.is_none()));
+            tries.iter().map(|(settings, work)| (settings.clearance, settings.closure_margin, *work)).collect()
+        };
+        assert_eq!(asked(&with(wanted)), [(usual.clearance, wanted.closure_margin, 250)]);
+        let nearer = FirstTry { clearance: 0.0005, work: 90, ..wanted };
+        let both = [(0.0005, wanted.closure_margin, 30), (0.0005, usual.closure_margin, 90)];
+        assert_eq!(asked(&with(nearer)), both);
     }
 }

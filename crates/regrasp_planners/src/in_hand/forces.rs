@@ -73,6 +73,16 @@ impl ForceModel {
         }
     }
 
+    /// Weight of the object, in the world; zero where its direction is not known.
+    pub fn weight_in_world(&self) -> Vector {
+        self.gravity.in_world().unwrap_or_else(Vector::zeros) * self.mass
+    }
+
+    /// True when the joints of a finger can make these torques.
+    pub fn allows(&self, finger: usize, torques: &[f64]) -> bool {
+        self.torques[finger].iter().zip(torques).all(|(limit, torque)| torque.abs() <= *limit)
+    }
+
     /// Weight of the object, in its frame.
     fn load(&self, world_from_object: &Placement) -> Wrench {
         let gravity = self.gravity.in_world().unwrap_or_else(Vector::zeros);

@@ -16,13 +16,13 @@ mod cost;
 /// Paths in GS_n cut into transfers and regrasps.
 mod decompose;
 /// Start and goal as the query gives them.
-mod endpoints;
+pub(crate) mod endpoints;
 /// Sampling GS_n.
 mod explore;
 /// A first try with more room.
 mod first_try;
 /// Contact forces of the fingers.
-mod forces;
+pub(crate) mod forces;
 /// Forces and torques along a plan.
 mod forces_along;
 /// Postures of free fingers.
@@ -40,13 +40,13 @@ mod legs;
 /// Links between grasps.
 mod link;
 /// The scene prepared for planning.
-mod model;
+pub(crate) mod model;
 /// Narrow passages at the ends of a leg.
 mod passage;
 /// Candidates gathered at one pose.
 mod pool;
 /// The plan as it is written to a file.
-mod record;
+pub(crate) mod record;
 /// Sequences of relocations from one grasp to another.
 mod regrasp;
 /// The relocation of one finger.
@@ -56,7 +56,7 @@ pub mod roadmap;
 #[cfg(test)]
 mod roadmap_tests;
 /// Fingertips that roll.
-mod roll;
+pub(crate) mod roll;
 /// What all methods share.
 mod search;
 #[cfg(test)]
@@ -66,11 +66,11 @@ pub mod settings;
 /// Random shortcuts.
 mod shorten;
 /// Points of GS_n and the motions between them.
-mod state;
+pub(crate) mod state;
 /// Why attempts failed.
 mod tally;
 /// Times of waypoints.
-mod timing;
+pub(crate) mod timing;
 /// Where fingertips touch, and joints with which they do.
 mod tip;
 /// Transfer paths.
@@ -84,7 +84,7 @@ mod validate;
 /// The method of paper 000.
 mod visibility;
 /// Configurations and continuous collision tests.
-mod workspace;
+pub(crate) mod workspace;
 
 pub use settings::{
     Alpha, AnyDirection, CostWeights, FirstTry, ForceSettings, GravityInHand, InHandSettings, Method, ReleaseRule,
@@ -132,14 +132,18 @@ pub fn plan_in_hand(
 ) -> Result<Plan, Failure> {
     settings.validate().expect("settings are validated where they are read");
     refuse_two_gravities(scene, settings)?;
-    let Some((first, tried)) = first_try::first_try(scene, settings, budget) else {
-        return plan_with(scene, query, settings, seed, budget, progress);
-    };
-    let spent = match plan_with(scene, query, &first, seed, &tried, progress) {
-        Ok(plan) => return Ok(Plan { settings: record::settings_of(settings), ..plan }),
-        Err(failure) if failure.kind == FailureKind::Interrupted => return Err(failure),
-        Err(failure) => failure.statistics.work,
-    };
+    let mut spent = 0;
+    for (first, work) in first_try::first_tries(scene, settings, budget) {
+        let tried = Budget { max_work: work, ..budget.clone() };
+        match plan_with(scene, query, &first, seed, &tried, progress) {
+            Ok(mut plan) => {
+                plan.statistics.work += spent;
+                return Ok(Plan { settings: record::settings_of(settings), ..plan });
+            }
+            Err(failure) if failure.kind == FailureKind::Interrupted => return Err(failure),
+            Err(failure) => spent += failure.statistics.work,
+        }
+    }
     let left = Budget { max_work: budget.max_work.saturating_sub(spent), ..budget.clone() };
     let mut found = plan_with(scene, query, settings, seed, &left, progress);
     let (Ok(Plan { statistics, .. }) | Err(Failure { statistics, .. })) = &mut found;

@@ -207,7 +207,7 @@ impl<'m, 'a> Recorder<'m, 'a> {
         let (model, scene) = (self.model, self.model.scene);
         let forces = add_forces(model, &mut self.segments)?;
         let motion = timing::limits(model);
-        timing::assign_times(model, &motion, &mut self.segments);
+        timing::assign_times(model, &motion, &mut self.segments, timing::LEAST_SPAN);
         Ok(Plan {
             format: FORMAT.into(),
             format_version: FORMAT_VERSION,

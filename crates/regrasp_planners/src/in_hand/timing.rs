@@ -14,7 +14,7 @@ use regrasp_robot::kinematics::finger_ik::Coordinates;
 /// Time in which the pace of a segment rises and falls, in seconds: a fraction of what a transfer takes.
 const EASE: f64 = 0.1;
 /// Least time from one waypoint to the next, in seconds.
-const LEAST_SPAN: f64 = 1e-3;
+pub const LEAST_SPAN: f64 = 1e-3;
 /// Peak of the velocity of a cubic from rest to rest over its mean.
 const PEAK: f64 = 1.5;
 /// Rounds in which single spans are stretched before whole segments are.
@@ -43,10 +43,10 @@ pub fn limits(model: &Model) -> MotionLimits {
     }
 }
 
-/// Gives every waypoint its time and its velocities; `SpeedSettings::ramp` passes between segments where forces change.
-pub fn assign_times(model: &Model, limits: &MotionLimits, segments: &mut [Segment]) {
+/// Gives every waypoint its time and its velocities, `least_span` seconds or more apart; `SpeedSettings::ramp` passes between segments where forces change.
+pub fn assign_times(model: &Model, limits: &MotionLimits, segments: &mut [Segment], least_span: f64) {
     let mut now = 0.0;
-    let mut timing = Timing::new(model, limits);
+    let mut timing = Timing::new(model, limits, least_span);
     let mut before: Option<SegmentKind> = None;
     for segment in segments {
         let goes_on = (before, segment.kind) == (Some(SegmentKind::Transfer), SegmentKind::Transfer);
@@ -63,6 +63,7 @@ pub fn assign_times(model: &Model, limits: &MotionLimits, segments: &mut [Segmen
 struct Timing<'m, 'a> {
     model: &'m Model<'a>,
     limits: &'m MotionLimits,
+    least_span: f64,
     /// Least time from each waypoint to the next.
     spans: Vec<f64>,
     /// Time of each waypoint after the first.
@@ -72,8 +73,8 @@ struct Timing<'m, 'a> {
 }
 
 impl<'m, 'a> Timing<'m, 'a> {
-    fn new(model: &'m Model<'a>, limits: &'m MotionLimits) -> Self {
-        Timing { model, limits, spans: Vec::new(), times: Vec::new(), velocities: Vec::new() }
+    fn new(model: &'m Model<'a>, limits: &'m MotionLimits, least_span: f64) -> Self {
+        Timing { model, limits, least_span, spans: Vec::new(), times: Vec::new(), velocities: Vec::new() }
     }
 
     fn assign(&mut self, waypoints: &mut [Waypoint], start: f64) {
@@ -107,7 +108,7 @@ impl<'m, 'a> Timing<'m, 'a> {
     /// Time that the limits of speed and of joint velocities ask for between two waypoints.
     fn least_span(&self, from: &Waypoint, to: &Waypoint) -> f64 {
         let mut way = self.object_way(from, to);
-        let mut span = LEAST_SPAN;
+        let mut span = self.least_span;
         let mut first = 0;
         for (finger, of_model) in self.model.fingers.iter().enumerate() {
             let range = first..first + of_model.ik.chain().n_coordinates();

@@ -13,3 +13,5 @@ pub mod motion_bound;
 mod samples;
 /// Sine and cosine together, the same bits on every machine.
 mod trig;
+/// The last body of a chain as a whole: twists, joints for a pose, torques for a force.
+pub mod whole_pose;

@@ -1,0 +1,311 @@
+//! The local planner (paper 003, section 6.2.4, `LocalReOrientation`): from a grasp towards a sub-goal, step by step.
+
+use super::grasp::{PerFinger, TrackingGrasp, turn_to};
+use super::object_motion::ObjectMotion;
+use super::settings::RollingFinger;
+use super::step::{Asked, NoStep, Roles, Step, Stepper};
+use crate::in_hand::model::MAX_FINGERS;
+use arrayvec::ArrayVec;
+use nalgebra::UnitQuaternion;
+use regrasp_base::Rng;
+use regrasp_geometry::{UnitVector, Vector, frame};
+
+/// Time of a local plan in units of that to the sub-goal (paper 003: `bound_1`, twice).
+const MOST_TIME: f64 = 5.0;
+/// Cosine of the angle between the wanted turn and the one that the contacts allow, below which roles are not taken. By hand.
+const LEAST_ALIGNED: f64 = 0.3;
+/// Cosine below which roles are looked for that follow better.
+const WELL_ALIGNED: f64 = 0.5;
+/// How much chance counts against alignment when roles are chosen.
+const CHANCE: f64 = 0.4;
+/// Share of failures after which the object rests while the moving finger rolls (the paper draws from rest and motion).
+const REST_SHARE: f64 = 0.5;
+
+/// Time that a moving finger is looked ahead, in seconds. By hand.
+const AHEAD: f64 = 2.0;
+/// What a finger at the end of its reach counts against alignment. By hand.
+const REACH_WEIGHT: f64 = 1.0;
+/// What roles that go on count for.
+const KEPT: f64 = 0.1;
+
+/// Share of its reach that a finger may be away before it is rolled back, and to which it is.
+const FAR: f64 = 0.12;
+/// See [`FAR`].
+const NEAR: f64 = 0.03;
+/// Steps in one while the object rests.
+const REST_STEP: f64 = 5.0;
+
+/// What roles promise.
+struct Prospect {
+    /// Of the angle between the wanted turn and the one that they allow.
+    cosine: f64,
+    /// Turn of the object in a step, in the world.
+    turn: Vector,
+    /// Way of the moving tip in a step, rolling aside, in the world.
+    tip_way: Vector,
+}
+
+/// What has been tried for one step.
+#[derive(Default)]
+struct Tried {
+    n: usize,
+    /// The finger that has to move.
+    guilty: Option<usize>,
+    /// Roles that fail whatever the moving finger does.
+    useless: ArrayVec<Roles, 30>,
+}
+
+/// How often steps failed, by the paper's numbers; 0 for what it does not list.
+pub type Failures = [u64; 8];
+
+/// Roles and the moving finger's control, kept from step to step while they do.
+#[derive(Debug, Clone, Copy)]
+struct Choice {
+    roles: Roles,
+    control: [f64; 2],
+    object_rests: bool,
+}
+
+/// What a local plan has come to.
+pub struct LocalPlan {
+    /// Its steps.
+    pub steps: Vec<Step>,
+    /// True when it ends within the tolerance of the sub-goal.
+    pub arrived: bool,
+}
+
+/// Plans towards a sub-goal.
+pub struct Local<'s, 'm, 'a> {
+    /// Makes the steps.
+    pub stepper: &'s mut Stepper<'m, 'a>,
+    /// Random numbers.
+    pub rng: &'s mut Rng,
+    /// The finger that the object rolls on, where it is chosen once.
+    pub rolling: Option<usize>,
+    /// Counts.
+    pub failures: &'s mut Failures,
+}
+
+impl Local<'_, '_, '_> {
+    /// From `start` to within `tolerance` of the orientation `goal`, beginning with the roles `before`.
+    pub fn plan(
+        &mut self,
+        start: &TrackingGrasp,
+        goal: &UnitQuaternion<f64>,
+        tolerance: f64,
+        before: Option<Roles>,
+    ) -> LocalPlan {
+        let settings = self.stepper.settings;
+        let most_steps = (MOST_TIME * settings.sub_goal_time / settings.time_step).round() as usize;
+        let mut steps: Vec<Step> = Vec::new();
+        let mut here = start.clone();
+        self.stepper.workspace.set(&here.world_from_object.to_pose(), &here.joints, &here.contacts());
+        self.restore(&mut here, &mut steps);
+        let n_restored = steps.len();
+        let mut choice = before.map(|roles| Choice { roles, control: [0.0; 2], object_rests: false });
+        if let Some(choice) = &mut choice {
+            choice.control = self.control_towards_rest(&here, choice.roles.moving, &Vector::zeros());
+        }
+        while steps.len() - n_restored < most_steps {
+            let left = turn_to(&here.orientation(), goal);
+            if left.norm() <= tolerance {
+                return LocalPlan { steps, arrived: true };
+            }
+            let mut tried = Tried::default();
+            let mut made = None;
+            while tried.n < settings.trials {
+                let kept = choice.filter(|choice| tried.n == 0 && self.is_aligned(&here, choice, &left));
+                let next = kept.or_else(|| self.choose(&here, &left, &tried, choice));
+                tried.n += 1;
+                tried.guilty = None;
+                let Some(next) = next else {
+                    self.failures[NoStep::Degenerate.number()] += 1;
+                    continue;
+                };
+                choice = Some(next);
+                let turn = match next.object_rests {
+                    true => None,
+                    false => self.prospect(&here, next.roles, &left).map(|prospect| prospect.turn),
+                };
+                match self.stepper.step(&here, &Asked { roles: next.roles, turn, rolled: next.control }) {
+                    Ok(step) => {
+                        made = Some(step);
+                        break;
+                    }
+                    Err(failure) => {
+                        self.failures[failure.number()] += 1;
+                        self.learn(&mut tried, &next, failure);
+                    }
+                }
+            }
+            let Some(step) = made else { break };
+            here = step.end.clone();
+            if let Some(choice) = &mut choice {
+                choice.object_rests = false;
+            }
+            steps.push(step);
+        }
+        let arrived = turn_to(&here.orientation(), goal).norm() <= tolerance;
+        LocalPlan { steps, arrived }
+    }
+
+    /// While the object rests, rolls fingers back that have gone far from where they rest: the paper's object at rest (section
+    /// 6.2.4, `w_O` of zero), with a purpose.
+    fn restore(&mut self, here: &mut TrackingGrasp, steps: &mut Vec<Step>) {
+        let model = self.stepper.model;
+        let Some(reach) = model.scene.reach else { return };
+        for moving in 0..model.n_fingers() {
+            let away = |here: &TrackingGrasp| {
+                (here.tip_in_world(model, moving) - model.fingers[moving].tip_at_rest).norm() / reach
+            };
+            if away(here) < FAR {
+                continue;
+            }
+            let rolling = self.rolling.filter(|once| *once != moving).unwrap_or((moving + 1) % model.n_fingers());
+            let mut before = away(here);
+            loop {
+                let control = self.control_towards_rest(here, moving, &Vector::zeros()).map(|turn| turn * REST_STEP);
+                let asked = Asked { roles: Roles { moving, rolling }, turn: None, rolled: control };
+                let Ok(step) = self.stepper.step(here, &asked) else { break };
+                let now = away(&step.end);
+                if now > before - 1e-4 {
+                    // The step is made all the same: the workspace is there.
+                    *here = step.end.clone();
+                    steps.push(step);
+                    break;
+                }
+                before = now;
+                *here = step.end.clone();
+                steps.push(step);
+                if now < NEAR {
+                    break;
+                }
+            }
+        }
+    }
+
+    /// What a failure says about what to try next (paper 003, section 6.2.4): 1 and 3 keep the moving finger and change its
+    /// control, 4 moves the guilty one, 5 to 7 change the roles.
+    fn learn(&self, tried: &mut Tried, choice: &Choice, failure: NoStep) {
+        tried.guilty = match failure {
+            NoStep::BrokenContact(finger) => Some(finger),
+            NoStep::Collision | NoStep::MovingPad => Some(choice.roles.moving),
+            _ => None,
+        };
+        let whatever_it_does =
+            matches!(failure, NoStep::BrokenContact(_) | NoStep::RestingPad | NoStep::Degenerate | NoStep::Unbalanced);
+        if whatever_it_does && !choice.object_rests && !tried.useless.contains(&choice.roles) {
+            tried.useless.push(choice.roles);
+        }
+    }
+
+    /// True where the roles still lead towards the goal.
+    fn is_aligned(&self, here: &TrackingGrasp, choice: &Choice, left: &Vector) -> bool {
+        self.prospect(here, choice.roles, left).is_some_and(|prospect| prospect.cosine >= WELL_ALIGNED)
+    }
+
+    /// What these roles promise where `left` is the turn left to the sub-goal.
+    ///
+    /// The contacts leave one turn, which the paper takes at the extreme velocity of the largest component wanted. Here it goes no
+    /// farther than to where it is nearest to the sub-goal.
+    fn prospect(&self, here: &TrackingGrasp, roles: Roles, left: &Vector) -> Option<Prospect> {
+        let model = self.stepper.model;
+        let resting: PerFinger<usize> = (0..model.n_fingers()).filter(|&finger| finger != roles.moving).collect();
+        let motion = ObjectMotion::new(model, here, &resting, roles.rolling, left)?;
+        let (shift, allowed) = motion.twist(left);
+        let cosine = allowed.dot(left) / (allowed.norm() * left.norm());
+        let settings = self.stepper.settings;
+        let most = settings.object_velocity * settings.time_step / allowed.amax();
+        let share = (allowed.dot(left) / allowed.norm_squared()).min(most);
+        let (shift, allowed) = (shift * share, allowed * share);
+        let tip = here.tip_in_world(model, roles.moving);
+        let tip_way = shift + allowed.cross(&(tip.coords - here.world_from_object.translation));
+        Some(Prospect { cosine, turn: allowed, tip_way })
+    }
+
+    /// How far along its reach a tip is that goes on like this for [`AHEAD`]: 1 at the end; 0 where reach has no end.
+    fn reach_share(&self, here: &TrackingGrasp, finger: usize, tip_way: &Vector) -> f64 {
+        let model = self.stepper.model;
+        let Some(reach) = model.scene.reach else { return 0.0 };
+        let tip = here.tip_in_world(model, finger) + tip_way * (AHEAD / self.stepper.settings.time_step);
+        (tip - model.fingers[finger].tip_at_rest).norm() / reach
+    }
+
+    /// Other roles: those that lead best towards the goal and whose moving finger has reach left, with some chance.
+    fn choose(&mut self, here: &TrackingGrasp, left: &Vector, tried: &Tried, before: Option<Choice>) -> Option<Choice> {
+        let n = self.stepper.model.n_fingers();
+        let has_failed = tried.n > 0;
+        let chance = if has_failed { 1.0 } else { CHANCE };
+        let mut best: Option<(f64, Roles, Vector)> = None;
+        for moving in (0..n).filter(|&finger| tried.guilty.is_none_or(|guilty| guilty == finger)) {
+            for rolling in (0..n).filter(|&finger| finger != moving) {
+                let roles = Roles { moving, rolling };
+                if self.rolling.is_some_and(|once| once != rolling) || tried.useless.contains(&roles) {
+                    continue;
+                }
+                let noise = self.rng.uniform(0.0, chance);
+                let Some(prospect) = self.prospect(here, roles, left).filter(|p| p.cosine >= LEAST_ALIGNED) else {
+                    continue;
+                };
+                let share = self.reach_share(here, moving, &prospect.tip_way);
+                if share > 1.0 {
+                    continue;
+                }
+                // Changing roles costs a pause.
+                let kept = if before.is_some_and(|before| before.roles == roles) && !has_failed { KEPT } else { 0.0 };
+                let worth = prospect.cosine + noise + kept - REACH_WEIGHT * share * share;
+                if best.is_none_or(|(most, _, _)| worth > most) {
+                    best = Some((worth, roles, prospect.tip_way));
+                }
+            }
+        }
+        let object_rests = has_failed && self.rng.chance(REST_SHARE);
+        let (roles, tip_way) = match best {
+            Some((_, roles, tip_way)) => (roles, if object_rests { Vector::zeros() } else { tip_way }),
+            // Nothing leads there: a finger that rolls on while the object rests may change that.
+            None if object_rests => {
+                let moving = tried.guilty.unwrap_or_else(|| self.rng.below(n));
+                let others: ArrayVec<usize, MAX_FINGERS> = (0..n).filter(|&finger| finger != moving).collect();
+                let rolling = self.rolling.unwrap_or_else(|| others[self.rng.below(others.len())]);
+                if rolling == moving {
+                    return None;
+                }
+                (Roles { moving, rolling }, Vector::zeros())
+            }
+            None => return None,
+        };
+        let control =
+            if has_failed { self.drawn_control() } else { self.control_towards_rest(here, roles.moving, &tip_way) };
+        Some(Choice { roles, control, object_rests })
+    }
+
+    /// The control of the moving finger, of the extremes (paper 003, eq. 10), that keeps it nearest to where it rests.
+    fn control_towards_rest(&self, here: &TrackingGrasp, moving: usize, tip_way: &Vector) -> [f64; 2] {
+        let model = self.stepper.model;
+        let ball = &here.touches[moving].ball;
+        let (x, y) = frame::tangents(&UnitVector::new_unchecked(ball.normal));
+        let arm = here.world_from_object.vector(&ball.normal) * model.fingers[moving].tip_radius;
+        let tip = here.tip_in_world(model, moving);
+        let steps = AHEAD / self.stepper.settings.time_step;
+        let left = |control: &[f64; 2]| {
+            let turn = here.world_from_object.vector(&(x.into_inner() * control[0] + y.into_inner() * control[1]));
+            let way = (tip_way + turn.cross(&arm)) * steps;
+            (tip + way - model.fingers[moving].tip_at_rest).norm()
+        };
+        let most = self.stepper.settings.rolling_velocity * self.stepper.settings.time_step;
+        let controls = (0..9).map(|k| [f64::from(k % 3 - 1) * most, f64::from(k / 3 - 1) * most]);
+        controls.min_by(|a, b| left(a).total_cmp(&left(b))).unwrap_or([0.0; 2])
+    }
+
+    /// A control of the moving finger, drawn from the extremes (paper 003, eq. 10).
+    fn drawn_control(&mut self) -> [f64; 2] {
+        let settings = self.stepper.settings;
+        let most = settings.rolling_velocity * settings.time_step;
+        std::array::from_fn(|_| most * (self.rng.below(3) as f64 - 1.0))
+    }
+}
+
+/// The finger that the object rolls on, where the settings want one for all of the task.
+pub fn once(settings: RollingFinger, n_fingers: usize, rng: &mut Rng) -> Option<usize> {
+    (settings == RollingFinger::Once).then(|| rng.below(n_fingers))
+}

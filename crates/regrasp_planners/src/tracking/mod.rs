@@ -1,0 +1,142 @@
+//! Finger tracking: re-orienting an object by fingertips that roll and slide and never leave it. Paper 003: Cherif, Gupta,
+//! *Global Planning for Dexterous Re-orientation of Rigid Objects: Finger Tracking with Rolling and Sliding*, INRIA RR-3770,
+//! 1999.
+//!
+//! At every instant one fingertip moves and the others rest. On one of these the object rolls without sliding; over the
+//! others it rolls and slides.
+
+/// Contact forces at one moment.
+mod forces;
+/// Where object and fingertips are.
+mod grasp;
+/// From a grasp towards a sub-goal.
+mod local;
+/// How the object moves on fingertips that rest.
+mod object_motion;
+/// The plan as it is written to a file.
+mod record;
+/// A* over orientations.
+mod search;
+/// Settings.
+pub mod settings;
+/// One step of time.
+mod step;
+
+pub use settings::{Cones, RollingFinger, TrackingMethod, TrackingSettings};
+
+use crate::failure::{Cause, Failure, FailureKind, NearestMiss};
+use crate::in_hand::endpoints::{End, Near, given_grasp_at};
+use crate::in_hand::model::Model;
+use crate::in_hand::workspace::Workspace;
+use grasp::TrackingGrasp;
+use regrasp_base::{Budget, Rng};
+use regrasp_plan::Plan;
+use regrasp_plan::plan::{PoseData, Statistics};
+use regrasp_scene::{InHandQuery, Scene};
+use search::{Counts, Ended, search};
+use step::{Step, Stepper};
+
+/// Searches that are begun before none is begun any more. By hand.
+const MOST_RESTARTS: u64 = 20;
+
+/// Plans how the fingertips turn the object to the goal's orientation.
+///
+/// The plan is the same for the same scene, query, settings and seed. Panics if `settings.validate()` fails.
+///
+/// Errors: the start is none, or the search ends without a plan.
+pub fn plan_tracking(
+    scene: &Scene,
+    query: &InHandQuery,
+    settings: &TrackingSettings,
+    seed: u64,
+    budget: &Budget,
+) -> Result<Plan, Failure> {
+    settings.validate().expect("settings are validated where they are read");
+    let model = Model::new(scene, &settings.in_hand);
+    let forces =
+        model.forces.as_ref().ok_or_else(|| impossible("tracking needs forces", "leave in_hand.forces as it is"))?;
+    let start = &query.world_from_object_start;
+    let given = given_grasp_at(&model, End::Start, start, &query.start_grasp, Near::Rest)?;
+    let state = given.ok_or_else(|| impossible("tracking needs a start grasp", "give [start] grasp"))?;
+    let inside = || impossible("a fingertip is inside the object", "move it out");
+    let first = TrackingGrasp::of(&model, &state).ok_or_else(inside)?;
+    let mut stepper = Stepper { model: &model, settings, forces, workspace: Workspace::new(&model) };
+    let goal = query.world_from_object_goal.rotation;
+    let mut counts = Counts::default();
+    loop {
+        let mut rng = Rng::keyed(seed, "tracking", counts.restarts);
+        let found = search(&mut stepper, &first, &goal, &mut rng, budget, &mut counts);
+        match found.last {
+            Ok(last) => {
+                let path = found.path_to(last);
+                counts.on_path = path.len() as u64 - 1;
+                let steps: Vec<&Step> = path.iter().flat_map(|&node| &found.nodes[node].steps).collect();
+                return Ok(record::record(&stepper, forces, query, seed, &first, &steps, statistics(&counts)));
+            }
+            Err(Ended::Exhausted) if counts.restarts < MOST_RESTARTS => counts.restarts += 1,
+            Err(ref ended) => return Err(failure(ended, &counts, &found)),
+        }
+    }
+}
+
+fn impossible(message: &str, advice: &str) -> Failure {
+    Failure::bare(FailureKind::Impossible, message.into(), advice)
+}
+
+/// Counts for the plan file.
+fn statistics(counts: &Counts) -> Statistics {
+    let names = FAILURES.iter().zip(counts.failures).filter(|(_, count)| *count > 0);
+    Statistics {
+        nodes: counts.nodes,
+        samples: counts.explored,
+        work: counts.work,
+        restarts: counts.restarts,
+        transfers: counts.on_path,
+        failures: names.map(|(name, count)| ((*name).to_owned(), count)).collect(),
+        ..Statistics::default()
+    }
+}
+
+/// Failures 1 to 7 of paper 003, section 6.2.4, after what it does not list.
+const FAILURES: [&str; 8] = [
+    "moving finger may not change its face",
+    "1: moving finger collides",
+    "2: moving finger out of reach",
+    "3: moving fingertip touches outside its pad",
+    "4: contact of a resting finger broken at an edge",
+    "5: resting fingertip touches outside its pad",
+    "6: weight not balanced",
+    "7: resting fingers tell no motion towards the goal",
+];
+
+fn failure(ended: &Ended, counts: &Counts, found: &search::Found) -> Failure {
+    let (kind, why) = match ended {
+        Ended::Exhausted => (FailureKind::WorkSpent, "no orientation is left to be tried".to_owned()),
+        Ended::Interrupted(interrupt) => (FailureKind::from(*interrupt), "the budget is used up".to_owned()),
+    };
+    let (nearest, angle_left) = found.nearest;
+    let grasp = &found.nodes[nearest].grasp;
+    let total: u64 = counts.failures.iter().sum();
+    let mut causes: Vec<Cause> = FAILURES
+        .iter()
+        .zip(counts.failures)
+        .filter(|(_, count)| *count > 0)
+        .map(|(name, count)| Cause { reason: (*name).into(), count, share: count as f64 / total as f64 })
+        .collect();
+    causes.sort_by(|a, b| b.count.cmp(&a.count).then_with(|| a.reason.cmp(&b.reason)));
+    Failure {
+        kind,
+        message: format!("{why}; {:.1} degrees are left to the goal", angle_left.to_degrees()),
+        advice: "try another seed, or method = \"tracking+gaiting\"".into(),
+        causes,
+        leg: None,
+        nearest_miss: Some(Box::new(NearestMiss {
+            world_from_object: PoseData::from(&grasp.world_from_object.to_pose()),
+            angle_left,
+            distance_left: 0.0,
+            joints: grasp.joints.iter().flatten().copied().collect(),
+        })),
+        reached: None,
+        statistics: statistics(counts),
+    }
+}

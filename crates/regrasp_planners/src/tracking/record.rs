@@ -1,0 +1,189 @@
+//! The plan as it is written to a file.
+
+use super::grasp::{PerFinger, TrackingGrasp};
+use super::settings::TrackingSettings;
+use super::step::{Relative, Step, Stepper};
+use crate::in_hand::forces::ForceModel;
+use crate::in_hand::model::Model;
+use crate::in_hand::record::{CONTACT_TOLERANCE, SLIP_TOLERANCE};
+use crate::in_hand::timing;
+use regrasp_geometry::Vector;
+use regrasp_plan::plan::{
+    ContactMode, ContactState, FORMAT, FORMAT_VERSION, Plan, PlanInput, PoseData, Promises, Segment, SegmentKind,
+    Statistics, TrackingPromises, Waypoint,
+};
+use regrasp_scene::{InHandQuery, TaskKind};
+
+/// Settings as plans have them.
+pub fn settings_of(settings: &TrackingSettings) -> serde_json::Value {
+    serde_json::to_value(settings).unwrap_or_default()
+}
+
+/// Steps in a row with the same roles and modes, as one segment from `start`.
+struct Stretch<'s> {
+    start: &'s TrackingGrasp,
+    steps: Vec<&'s Step>,
+}
+
+/// Makes the plan of `steps`, which begin at `start`.
+pub fn record(
+    stepper: &Stepper,
+    forces: &ForceModel,
+    query: &InHandQuery,
+    seed: u64,
+    start: &TrackingGrasp,
+    steps: &[&Step],
+    statistics: Statistics,
+) -> Plan {
+    let (model, settings) = (stepper.model, stepper.settings);
+    let stretches = stretches(start, steps);
+    let mut segments: Vec<Segment> = stretches.iter().map(|stretch| segment(stepper, stretch)).collect();
+    if segments.is_empty() {
+        segments.push(at_rest(stepper, start));
+    }
+    let motion = timing::limits(model);
+    timing::assign_times(model, &motion, &mut segments, settings.time_step);
+    for (segment, stretch) in segments.iter_mut().zip(&stretches) {
+        add_velocities(segment, stretch);
+    }
+    let scene = model.scene;
+    Plan {
+        format: FORMAT.into(),
+        format_version: FORMAT_VERSION,
+        tool: concat!("regrasp ", env!("CARGO_PKG_VERSION")).into(),
+        task: TaskKind::Tracking.name().into(),
+        method: serde_json::to_value(settings.method)
+            .ok()
+            .and_then(|value| value.as_str().map(str::to_owned))
+            .unwrap_or_default(),
+        seed,
+        settings: settings_of(settings),
+        inputs: scene
+            .inputs
+            .iter()
+            .map(|i| PlanInput { role: i.role.clone(), name: i.name.clone(), sha256: i.sha256.clone() })
+            .collect(),
+        promises: Promises {
+            contact_tolerance: CONTACT_TOLERANCE,
+            friction: model.frame.friction,
+            required_margin: 0.0,
+            kept_margin: 0.0,
+            torque_scale: model.frame.torque_scale,
+            friction_margin: model.settings.friction_margin,
+            slip_tolerance: SLIP_TOLERANCE,
+            tracking: Some(TrackingPromises {
+                goal_tolerance: settings.goal_tolerance,
+                sliding_friction: scene.object.friction,
+            }),
+            motion,
+            forces: Some(forces.promises()),
+        },
+        joint_names: scene.hand.joint_names(),
+        fingers: scene.hand.fingers.iter().map(|finger| finger.name.clone()).collect(),
+        start: PoseData::from(&query.world_from_object_start),
+        way_poses: Vec::new(),
+        goal: PoseData::from(&query.world_from_object_goal),
+        segments,
+        statistics,
+    }
+}
+
+fn stretches<'s>(start: &'s TrackingGrasp, steps: &[&'s Step]) -> Vec<Stretch<'s>> {
+    let mut stretches: Vec<Stretch> = Vec::new();
+    let mut here = start;
+    for step in steps {
+        let goes_on = stretches.last().and_then(|stretch| stretch.steps.last()).is_some_and(|last| {
+            last.roles == step.roles && last.relative.iter().zip(&step.relative).all(|(a, b)| a.mode == b.mode)
+        });
+        if !goes_on {
+            stretches.push(Stretch { start: here, steps: Vec::new() });
+        }
+        if let Some(stretch) = stretches.last_mut() {
+            stretch.steps.push(step);
+        }
+        here = &step.end;
+    }
+    stretches
+}
+
+fn segment(stepper: &Stepper, stretch: &Stretch) -> Segment {
+    let model = stepper.model;
+    let roles = stretch.steps[0].roles;
+    let name = |finger: usize| Some(model.scene.hand.fingers[finger].name.clone());
+    let mut here = stretch.start;
+    let mut waypoints = Vec::with_capacity(1 + stretch.steps.len());
+    for step in &stretch.steps {
+        waypoints.push(waypoint(stepper, here, &step.relative, &step.forces[0]));
+        here = &step.end;
+    }
+    let last = stretch.steps[stretch.steps.len() - 1];
+    waypoints.push(waypoint(stepper, here, &last.relative, &last.forces[1]));
+    Segment {
+        kind: SegmentKind::Tracking,
+        moving_finger: name(roles.moving),
+        rolling_finger: name(roles.rolling),
+        waypoints,
+    }
+}
+
+/// The start holds still: it is the goal.
+fn at_rest(stepper: &Stepper, start: &TrackingGrasp) -> Segment {
+    let still = Relative { mode: ContactMode::Fixed, slid: Vector::zeros(), turned: Vector::zeros() };
+    let relative: PerFinger<Relative> = start.touches.iter().map(|_| still).collect();
+    let forces = stepper.balanced_at(start, start, start, &relative).unwrap_or_default();
+    let waypoint = waypoint(stepper, start, &relative, &forces);
+    let name = |finger: usize| Some(stepper.model.scene.hand.fingers[finger].name.clone());
+    Segment {
+        kind: SegmentKind::Tracking,
+        moving_finger: name(0),
+        rolling_finger: name(1),
+        waypoints: vec![waypoint.clone(), waypoint],
+    }
+}
+
+fn waypoint(stepper: &Stepper, grasp: &TrackingGrasp, relative: &PerFinger<Relative>, forces: &[Vector]) -> Waypoint {
+    let model: &Model = stepper.model;
+    let object = &grasp.world_from_object;
+    let mut joint_torques = Vec::new();
+    let mut contacts = Vec::new();
+    for (finger, force) in forces.iter().enumerate() {
+        let contact = grasp.touches[finger].contact();
+        let point_in_world = object.point(&contact.point_in_object);
+        joint_torques.extend(stepper.torques(grasp, finger, &point_in_world, &object.vector(force)));
+        let normal: [f64; 3] = contact.normal_in_object.into_inner().into();
+        let mut state = ContactState::at(relative[finger].mode, contact.point_in_object.coords.into(), normal);
+        state.force_in_object = Some((*force).into());
+        let point_in_tip = grasp.world_from_link[finger].point_to_child(&point_in_world);
+        state.point_in_tip = Some(point_in_tip.coords.into());
+        contacts.push(state);
+    }
+    Waypoint {
+        time: 0.0,
+        joints: grasp.joints.iter().flatten().copied().collect(),
+        joint_velocities: vec![0.0; model.scene.hand.n_joints()],
+        joint_torques,
+        world_from_object: PoseData::from(&object.to_pose()),
+        contacts,
+    }
+}
+
+/// Relative velocities, now that the times are known: those of the way to the next waypoint, at the last of that to it.
+fn add_velocities(segment: &mut Segment, stretch: &Stretch) {
+    let times: Vec<f64> = segment.waypoints.iter().map(|waypoint| waypoint.time).collect();
+    for (k, waypoint) in segment.waypoints.iter_mut().enumerate() {
+        let step = k.min(stretch.steps.len() - 1);
+        let seconds = times[step + 1] - times[step];
+        for (state, relative) in waypoint.contacts.iter_mut().zip(&stretch.steps[step].relative) {
+            let is_still = state.mode == ContactMode::Fixed;
+            let (slid, turned) =
+                if is_still { (Vector::zeros(), Vector::zeros()) } else { (relative.slid, relative.turned) };
+            // What touches slides across the normal of its own moment: so the law of friction can be exact.
+            let across = match state.normal_in_object.map(Vector::from).filter(|_| state.mode.slides()) {
+                Some(normal) => slid - normal * normal.dot(&slid),
+                None => Vector::zeros(),
+            };
+            state.relative_velocity_in_object = Some((across / seconds).into());
+            state.relative_turn_in_object = Some((turned / seconds).into());
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! Settings of finger tracking. Lengths in metres, angles in radians, velocities per second.
+
+use crate::in_hand::{ForceSettings, InHandSettings};
+use serde::{Deserialize, Serialize};
+
+/// Algorithm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum TrackingMethod {
+    /// No finger leaves the object (paper 003).
+    #[default]
+    #[serde(rename = "tracking")]
+    Tracking,
+    /// Where tracking ends, a finger is relocated through the air while the others hold, and tracking goes on.
+    #[serde(rename = "tracking+gaiting")]
+    TrackingAndGaiting,
+}
+
+/// Which resting finger the object rolls on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RollingFinger {
+    /// Any, chosen at each moment (paper 003, scenarios D-1, D-2 and F-1).
+    #[default]
+    Any,
+    /// One, chosen once in the beginning (scenarios D-3, D-4 and F-2).
+    Once,
+}
+
+/// Friction cones of fingertips that do not slide.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Cones {
+    /// Pyramids of four sides inscribed in the cones (paper 003, eq. 13).
+    #[default]
+    Pyramid,
+    /// Pyramids first, and exact cones where those hold nothing.
+    Exact,
+}
+
+/// Settings of [`super::plan_tracking`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TrackingSettings {
+    /// Algorithm.
+    pub method: TrackingMethod,
+    /// Time of a step (paper 003, table 2: 0.1 s).
+    pub time_step: f64,
+    /// Time from a node to its sub-goals (table 2: 2 s).
+    pub sub_goal_time: f64,
+    /// Edge of the cells of the orientation space (table 2: 2.406 degrees).
+    pub cell: f64,
+    /// Largest angle left to the goal's orientation; half a cell.
+    pub goal_tolerance: f64,
+    /// Extreme angular velocity of the object about each axis (table 3: 1.43 degrees per second).
+    pub object_velocity: f64,
+    /// Extreme sliding velocity of the moving finger along each tangent (table 3: 5 mm/s).
+    pub sliding_velocity: f64,
+    /// Extreme rolling velocity of the moving finger about each tangent (table 3: 2.86 degrees per second).
+    pub rolling_velocity: f64,
+    /// True where the moving finger may go from face to face of the object (scenarios D-1 and D-3).
+    pub face_changes: bool,
+    /// Which finger the object rolls on.
+    pub rolling_finger: RollingFinger,
+    /// Cones of fingertips that do not slide.
+    pub cones: Cones,
+    /// Choices tried in a row before a sub-goal is given up (paper 003, section 6.2.4, `bound_2`: 50).
+    pub trials: usize,
+    /// What the distance left to the goal counts in the order in which sub-goals are tried, beside the way to them: 1 is the
+    /// paper's A*. By measurement: with 1 the football is not solved within 20,000 steps, with 2 in 1,000, with 5 in 2,000.
+    pub goal_weight: f64,
+    /// Nodes of the search over orientations; then it begins anew with other random numbers. By hand.
+    pub nodes: usize,
+    /// What in-hand planning is asked: clearance, speed, forces, friction margin. As the paper: friction is that of the scene, and
+    /// a finger may touch without pressing.
+    pub in_hand: InHandSettings,
+}
+
+impl Default for TrackingSettings {
+    fn default() -> Self {
+        TrackingSettings {
+            method: TrackingMethod::Tracking,
+            time_step: 0.1,
+            sub_goal_time: 2.0,
+            cell: 2.406f64.to_radians(),
+            goal_tolerance: 1.203f64.to_radians(),
+            object_velocity: 1.43f64.to_radians(),
+            sliding_velocity: 0.005,
+            rolling_velocity: 2.86f64.to_radians(),
+            face_changes: true,
+            rolling_finger: RollingFinger::Any,
+            cones: Cones::Pyramid,
+            trials: 50,
+            goal_weight: 2.0,
+            nodes: 2000,
+            in_hand: InHandSettings {
+                friction_margin: 1.0,
+                forces: Some(ForceSettings { normal_force: [0.0, 80.0], ..ForceSettings::default() }),
+                ..InHandSettings::default()
+            },
+        }
+    }
+}
+
+impl TrackingSettings {
+    /// Errors: the first value that makes no sense.
+    pub fn validate(&self) -> Result<(), String> {
+        let positive = [
+            ("time_step", self.time_step),
+            ("sub_goal_time", self.sub_goal_time),
+            ("cell", self.cell),
+            ("goal_tolerance", self.goal_tolerance),
+            ("object_velocity", self.object_velocity),
+            ("sliding_velocity", self.sliding_velocity),
+            ("rolling_velocity", self.rolling_velocity),
+            ("goal_weight", self.goal_weight),
+        ];
+        for (name, value) in positive {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(format!("{name} is {value}; it must be positive and finite"));
+            }
+        }
+        if self.sub_goal_time < self.time_step {
+            return Err(format!("sub_goal_time is {}, less than time_step {}", self.sub_goal_time, self.time_step));
+        }
+        if self.goal_tolerance > self.cell {
+            return Err(format!("goal_tolerance is {}, more than a cell of {}", self.goal_tolerance, self.cell));
+        }
+        if self.trials == 0 || self.nodes == 0 {
+            return Err("trials and nodes are at least 1".into());
+        }
+        self.in_hand.validate().map_err(|message| format!("in_hand: {message}"))
+    }
+}

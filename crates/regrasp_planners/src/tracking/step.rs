@@ -1,0 +1,324 @@
+//! One step of time: the object moves on the fingertips that rest, one fingertip moves, and forces hold all of it (paper 003,
+//! sections 6.2.1 to 6.2.3).
+
+use super::forces::{Forces, Load, Pressing, balance};
+use super::grasp::{PerFinger, TrackingGrasp};
+use super::object_motion::ObjectMotion;
+use super::settings::TrackingSettings;
+use crate::in_hand::forces::ForceModel;
+use crate::in_hand::model::Model;
+use crate::in_hand::roll::RollStep;
+use crate::in_hand::workspace::{TipMode, Workspace};
+use nalgebra::Rotation3;
+use regrasp_geometry::collision::Placement;
+use regrasp_geometry::{Point, UnitVector, Vector, frame, interpolate_pose};
+use regrasp_grasp::contact::rolling::{Touch, slip, turn_between};
+use regrasp_plan::plan::ContactMode;
+use regrasp_robot::kinematics::finger_ik::Coordinates;
+use regrasp_robot::kinematics::whole_pose::{has_all_directions, joints_of_pose, torques};
+
+/// A tip's normal may differ from the face's by this much on a face: rounding. Balls touch edges with normals in between.
+const ON_FACE: f64 = 1e-9;
+/// Steps of the fixed-point method for a rolling ball; each gains two digits.
+const MOST_STEPS: usize = 20;
+/// Distance from the surface, and slip, that a rolling ball's step may leave, in metres.
+const REACHED: f64 = 1e-13;
+/// A fingertip that slides slower than this, in metres per second, neither slides nor rolls for sure: friction has no direction.
+const SLOWEST: f64 = 1e-4;
+
+/// Who does what.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Roles {
+    /// The finger that moves.
+    pub moving: usize,
+    /// The resting finger on which the object rolls.
+    pub rolling: usize,
+}
+
+/// What is asked of a step.
+#[derive(Debug, Clone, Copy)]
+pub struct Asked {
+    /// Who does what.
+    pub roles: Roles,
+    /// Turn of the object, in the world, of which as many components are kept as the contacts leave free; none: it rests.
+    pub turn: Option<Vector>,
+    /// Turn of the moving fingertip relative to the object, about the tangents of its contact (paper 003, eq. 10). Fingers that
+    /// cannot choose follow the object without sliding.
+    pub rolled: [f64; 2],
+}
+
+/// Why a step cannot be made (paper 003, section 6.2.4, failures 1 to 7).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum NoStep {
+    /// 1: the moving finger collides with another, or with anything but the object.
+    Collision,
+    /// 2: the moving finger cannot reach.
+    OutOfReach,
+    /// 3: the moving fingertip would touch outside its pad: with the planar part of a hemisphere.
+    MovingPad,
+    /// 4: the contact of this resting finger comes to an edge or vertex.
+    BrokenContact(usize),
+    /// 5: a resting fingertip would touch outside its pad.
+    RestingPad,
+    /// 6: no forces balance the weight.
+    Unbalanced,
+    /// 7: the resting fingers do not tell the object's motion, or it does not lead to the goal.
+    Degenerate,
+    /// The moving finger may not change its face, and would.
+    FaceChange,
+}
+
+impl NoStep {
+    /// Number in the paper's list; 0 for what it does not list.
+    pub fn number(self) -> usize {
+        match self {
+            NoStep::FaceChange => 0,
+            NoStep::Collision => 1,
+            NoStep::OutOfReach => 2,
+            NoStep::MovingPad => 3,
+            NoStep::BrokenContact(_) => 4,
+            NoStep::RestingPad => 5,
+            NoStep::Unbalanced => 6,
+            NoStep::Degenerate => 7,
+        }
+    }
+}
+
+/// Fingertip against object over a step, in the object frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Relative {
+    /// What it does.
+    pub mode: ContactMode,
+    /// How far its touching point slides.
+    pub slid: Vector,
+    /// How it turns, as a rotation vector.
+    pub turned: Vector,
+}
+
+/// A step made.
+#[derive(Debug, Clone)]
+pub struct Step {
+    /// Who did what.
+    pub roles: Roles,
+    /// Every fingertip against the object.
+    pub relative: PerFinger<Relative>,
+    /// Contact forces at its beginning and at its end.
+    pub forces: [Forces; 2],
+    /// The grasp at its end.
+    pub end: TrackingGrasp,
+}
+
+/// Makes steps.
+pub struct Stepper<'m, 'a> {
+    /// The scene, prepared.
+    pub model: &'m Model<'a>,
+    /// Settings.
+    pub settings: &'m TrackingSettings,
+    /// What forces balance; none where none are asked for.
+    pub forces: &'m ForceModel,
+    /// Where tips rest: about these their reach is.
+    pub workspace: Workspace<'m>,
+}
+
+impl<'m, 'a> Stepper<'m, 'a> {
+    /// Takes the step from `grasp`, where the workspace is; the workspace is then at its end, else where it was.
+    pub fn step(&mut self, grasp: &TrackingGrasp, asked: &Asked) -> Result<Step, NoStep> {
+        let model = self.model;
+        let Roles { moving, rolling } = asked.roles;
+        let resting: PerFinger<usize> = (0..model.n_fingers()).filter(|&finger| finger != moving).collect();
+        let (object, rest_touches) = match &asked.turn {
+            None => (grasp.world_from_object, resting.iter().map(|&finger| grasp.touches[finger]).collect()),
+            Some(turn) => {
+                let motion = ObjectMotion::new(model, grasp, &resting, rolling, turn).ok_or(NoStep::Degenerate)?;
+                motion.step(turn).ok_or(NoStep::Degenerate)?
+            }
+        };
+        let mut end = grasp.clone();
+        end.world_from_object = object;
+        for (&finger, touch) in resting.iter().zip(&rest_touches) {
+            end.touches[finger] = *touch;
+            if !self.stays_on_its_face(&grasp.touches[finger], touch) {
+                return Err(NoStep::BrokenContact(finger));
+            }
+            if !model.fingers[finger].pad_faces(&grasp.joints[finger], &end.normal_in_world(finger)) {
+                return Err(NoStep::RestingPad);
+            }
+        }
+        self.move_finger(grasp, moving, &asked.rolled, &mut end)?;
+        let relative = self.relative(grasp, &end, asked)?;
+        let forces = self.balanced(grasp, &end, &relative)?;
+        self.workspace.roll_to(&end.contacts());
+        if !self.workspace.step(&object.to_pose(), &end.joints, TipMode::AllHold) {
+            return Err(NoStep::Collision);
+        }
+        Ok(Step { roles: asked.roles, relative, forces, end })
+    }
+
+    /// True where a ball keeps its face: on smooth surfaces always.
+    fn stays_on_its_face(&self, from: &Touch, to: &Touch) -> bool {
+        let surface = &self.model.scene.object.surface;
+        let has_creases = surface.crease_distance(&to.foot).is_finite();
+        !has_creases
+            || ((to.ball.normal - to.foot.normal_in_object.into_inner()).norm() < ON_FACE
+                && surface.same_face(&from.foot, &to.foot))
+    }
+
+    /// The moving finger at the end of the step.
+    fn move_finger(
+        &self,
+        grasp: &TrackingGrasp,
+        moving: usize,
+        rolled: &[f64; 2],
+        end: &mut TrackingGrasp,
+    ) -> Result<(), NoStep> {
+        let model = self.model;
+        let finger = &model.fingers[moving];
+        let chain = finger.ik.chain();
+        let start = &grasp.touches[moving];
+        let touch = if has_all_directions(chain) {
+            let (x, y) = frame::tangents(&UnitVector::new_unchecked(start.ball.normal));
+            let turn = x.into_inner() * rolled[0] + y.into_inner() * rolled[1];
+            let touch = self.roll(moving, start, &turn).ok_or(NoStep::OutOfReach)?;
+            let object_from_link = Rotation3::new(turn).into_inner() * grasp.object_from_link(moving);
+            let rotation = end.world_from_object.rotation * object_from_link;
+            let center = end.world_from_object.point(&touch.ball.center);
+            let translation = center.coords - rotation * finger.ik.center_in_body().coords;
+            let link = Placement { rotation, translation };
+            let joints = joints_of_pose(chain, &grasp.joints[moving], &link).ok_or(NoStep::OutOfReach)?;
+            end.world_from_link[moving] = chain.last_frame(&joints);
+            end.joints[moving] = joints;
+            touch
+        } else {
+            let (from, to) = (grasp.world_from_object, end.world_from_object);
+            let (from_pose, to_pose) = (from.to_pose(), to.to_pose());
+            let between = |t: f64| Placement::from(&interpolate_pose(&from_pose, &to_pose, t));
+            let step = RollStep::new(model, moving, &start.contact(), &grasp.joints[moving], &from, &to);
+            let allowed = 0.2 * crate::in_hand::record::CONTACT_TOLERANCE;
+            let rolled = step.fine(between, allowed).map_err(|_| NoStep::OutOfReach)?;
+            end.world_from_link[moving] = chain.last_frame(&rolled.joints);
+            end.joints[moving] = rolled.joints;
+            let center = to.point_to_child(&end.world_from_link[moving].point(finger.ik.center_in_body()));
+            Touch::of(&model.scene.object.surface, &center).ok_or(NoStep::OutOfReach)?
+        };
+        if !self.settings.face_changes && !self.stays_on_its_face(start, &touch) {
+            return Err(NoStep::FaceChange);
+        }
+        end.touches[moving] = touch;
+        let tip = end.world_from_link[moving].point(finger.ik.center_in_body());
+        if model.scene.reach.is_some_and(|reach| (tip - finger.tip_at_rest).norm() > reach) {
+            return Err(NoStep::OutOfReach);
+        }
+        if !finger.pad_faces(&end.joints[moving], &end.normal_in_world(moving)) {
+            return Err(NoStep::MovingPad);
+        }
+        Ok(())
+    }
+
+    /// Where the ball of `finger` touches after it has rolled by the rotation vector `turn`, in the object frame.
+    fn roll(&self, finger: usize, from: &Touch, turn: &Vector) -> Option<Touch> {
+        let radius = self.model.fingers[finger].tip_radius;
+        let surface = &self.model.scene.object.surface;
+        let mut to = *from;
+        for _ in 0..MOST_STEPS {
+            let off = slip(radius, &from.ball, &to.ball, turn) + to.ball.normal * (to.distance - radius);
+            if off.norm() < REACHED {
+                return Some(to);
+            }
+            to = Touch::of(surface, &(to.ball.center - off))?;
+        }
+        let off = slip(radius, &from.ball, &to.ball, turn) + to.ball.normal * (to.distance - radius);
+        (off.norm() < 100.0 * REACHED).then_some(to)
+    }
+
+    /// Fingertips against the object, as paper 003, table 1 has it.
+    fn relative(
+        &self,
+        grasp: &TrackingGrasp,
+        end: &TrackingGrasp,
+        asked: &Asked,
+    ) -> Result<PerFinger<Relative>, NoStep> {
+        let model = self.model;
+        let of = |finger: usize| {
+            let turned = turn_between(&grasp.object_from_link(finger), &end.object_from_link(finger));
+            let radius = model.fingers[finger].tip_radius;
+            let slid = slip(radius, &grasp.touches[finger].ball, &end.touches[finger].ball, &turned);
+            let mode = if finger == asked.roles.moving {
+                match has_all_directions(model.fingers[finger].ik.chain()) {
+                    true => ContactMode::PureRolling,
+                    false => ContactMode::Rolling,
+                }
+            } else if asked.turn.is_none() {
+                ContactMode::Fixed
+            } else if finger == asked.roles.rolling {
+                ContactMode::Rolling
+            } else if slid.norm() < SLOWEST * self.settings.time_step {
+                return Err(NoStep::Degenerate);
+            } else {
+                ContactMode::Sliding
+            };
+            Ok(Relative { mode, slid, turned })
+        };
+        (0..model.n_fingers()).map(of).collect()
+    }
+
+    /// Forces at both ends of a step, with the sliding of the step.
+    fn balanced(
+        &self,
+        grasp: &TrackingGrasp,
+        end: &TrackingGrasp,
+        relative: &PerFinger<Relative>,
+    ) -> Result<[Forces; 2], NoStep> {
+        let at_end = self.balanced_at(end, grasp, end, relative)?;
+        Ok([self.balanced_at(grasp, grasp, end, relative)?, at_end])
+    }
+
+    pub fn balanced_at(
+        &self,
+        here: &TrackingGrasp,
+        from: &TrackingGrasp,
+        to: &TrackingGrasp,
+        relative: &PerFinger<Relative>,
+    ) -> Result<Forces, NoStep> {
+        let (model, object) = (self.model, &here.world_from_object);
+        let load = self.load(object);
+        let seconds = self.settings.time_step;
+        let pressing = |finger: usize| {
+            let Relative { mode, slid, .. } = &relative[finger];
+            let (point, normal) = (here.touches[finger].foot.point_in_object, here.touches[finger].ball.normal);
+            let across = slid - normal * normal.dot(slid);
+            let moved = to.world_from_object.point(&point) - from.world_from_object.point(&point);
+            Pressing {
+                point,
+                normal,
+                slides_along: mode.slides().then(|| across.normalize()),
+                object_velocity: object.vector_to_child(&moved) / seconds,
+            }
+        };
+        let contacts: PerFinger<Pressing> = (0..model.n_fingers()).map(pressing).collect();
+        let forces = balance(&contacts, &load).map_err(|_| NoStep::Unbalanced)?;
+        let is_strong = |finger: usize| {
+            let contact = object.point(&contacts[finger].point);
+            let torques = self.torques(here, finger, &contact, &object.vector(&forces[finger]));
+            self.forces.allows(finger, &torques)
+        };
+        if (0..model.n_fingers()).all(is_strong) { Ok(forces) } else { Err(NoStep::Unbalanced) }
+    }
+
+    /// What forces have to do with the object at `object`.
+    fn load(&self, object: &Placement) -> Load {
+        let frame = &self.model.frame;
+        Load {
+            weight: object.vector_to_child(&self.forces.weight_in_world()),
+            center_of_mass: frame.center_of_mass,
+            torque_scale: frame.torque_scale,
+            friction: frame.friction,
+            sliding_friction: self.model.scene.object.friction,
+            normal_force: self.settings.in_hand.forces.map_or([0.0, f64::MAX], |forces| forces.normal_force),
+        }
+    }
+
+    /// Torques of a finger that exerts `force` at `contact`, both in the world.
+    pub fn torques(&self, grasp: &TrackingGrasp, finger: usize, contact: &Point, force: &Vector) -> Coordinates {
+        torques(self.model.fingers[finger].ik.chain(), &grasp.joints[finger], contact, force)
+    }
+}

@@ -1,0 +1,78 @@
+//! Links of fingers as bodies that move: Jacobians of all six directions, joints for a pose, torques for a force.
+
+use super::body_frame::BodyFrame;
+use super::chain::{Chain, Motion};
+use super::finger_ik::{Coordinates, MAX_COORDINATES};
+use arrayvec::ArrayVec;
+use nalgebra::{Matrix6, Vector6};
+use regrasp_geometry::frame::turn_between;
+use regrasp_geometry::{Point, Vector};
+
+/// Steps of Newton's method for the joints of a pose.
+const MOST_STEPS: usize = 8;
+/// Distance and angle from the pose, in metres and radians, at which it is reached.
+const REACHED: f64 = 1e-12;
+/// Distance and angle below which the pose counts as reached where rounding ends the method.
+const CLOSE_ENOUGH: f64 = 1e-9;
+/// Joints of a chain, at most: inverse kinematics allows no more.
+const MAX_JOINTS: usize = 2 * MAX_COORDINATES;
+
+/// Velocity of the last body for unit velocity of each coordinate: of `point` in the base frame, and angular.
+pub fn twists(chain: &Chain, coordinates: &[f64], point: &Point) -> ArrayVec<[Vector; 2], MAX_COORDINATES> {
+    let mut frames = [BodyFrame::IDENTITY; MAX_JOINTS];
+    let frames = &mut frames[..chain.joints.len()];
+    chain.forward_frames(coordinates, frames);
+    let mut twists: ArrayVec<[Vector; 2], MAX_COORDINATES> =
+        coordinates.iter().map(|_| [Vector::zeros(), Vector::zeros()]).collect();
+    for (joint, frame) in chain.joints.iter().zip(frames.iter()) {
+        // A joint's axis is the same in the frame before and after its motion.
+        let axis = frame.vector(&joint.axis) * joint.multiplier;
+        let [linear, angular] = &mut twists[joint.coordinate];
+        match joint.motion {
+            Motion::Slide => *linear += axis,
+            Motion::Turn => {
+                *linear += axis.cross(&(point.coords - frame.translation));
+                *angular += axis;
+            }
+        }
+    }
+    twists
+}
+
+/// True where the chain can take its last body to any pose near by: three slides or turns for the place, three for the turn.
+pub fn has_all_directions(chain: &Chain) -> bool {
+    chain.n_coordinates() == 6
+}
+
+/// Coordinates near `near` with which the last body has the pose `wanted` in the base frame, for chains of six coordinates. None
+/// where Newton's method does not find them within the limits.
+pub fn joints_of_pose(chain: &Chain, near: &[f64], wanted: &BodyFrame) -> Option<Coordinates> {
+    let mut joints: Coordinates = near.iter().copied().collect();
+    let mut before = f64::INFINITY;
+    for _ in 0..MOST_STEPS {
+        let frame = chain.last_frame(&joints);
+        let way = wanted.translation - frame.translation;
+        let turn = turn_between(&frame.rotation, &wanted.rotation);
+        let left = way.norm().max(turn.norm());
+        if left < REACHED || (left < CLOSE_ENOUGH && left > 0.5 * before) {
+            return chain.within_limits(&joints, 0.0).then_some(joints);
+        }
+        before = left;
+        let twists = twists(chain, &joints, &Point::from(frame.translation));
+        let jacobian = Matrix6::from_fn(|row, column| {
+            let [linear, angular] = &twists[column];
+            if row < 3 { linear[row] } else { angular[row - 3] }
+        });
+        let step = jacobian.lu().solve(&Vector6::new(way.x, way.y, way.z, turn.x, turn.y, turn.z))?;
+        if !step.iter().all(|change| change.abs() < 1.0) {
+            return None;
+        }
+        joints.iter_mut().zip(step.iter()).for_each(|(joint, change)| *joint += change);
+    }
+    None
+}
+
+/// Torques, or forces of sliding joints, with which the last body exerts `force` at `point`, both in the base frame.
+pub fn torques(chain: &Chain, coordinates: &[f64], point: &Point, force: &Vector) -> Coordinates {
+    twists(chain, coordinates, point).iter().map(|[linear, _]| linear.dot(force)).collect()
+}
