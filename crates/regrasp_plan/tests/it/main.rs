@@ -7,3 +7,4 @@ mod motion;
 mod mutation;
 mod rolled;
 mod sample;
+mod tracked;
