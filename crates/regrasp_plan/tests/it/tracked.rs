@@ -3,16 +3,16 @@
 //! slides is put in as its law says, and the other forces are the nearest to a squeeze that balance. The checker looks at poses
 //! only.
 
-use crate::sample;
+use crate::sample::{self, judge};
 use nalgebra::{DMatrix, DVector, Rotation3, Translation3, UnitQuaternion};
 use regrasp_geometry::surface::DEFAULT_CREASE_ANGLE;
 use regrasp_geometry::{Point, Pose, Shape, Surface, TriangleMesh, Vector};
-use regrasp_plan::check::{CheckSettings, Report, check};
+use regrasp_plan::check::Report;
 use regrasp_plan::plan::{ForcePromises, MotionLimits, PoseData, TrackingPromises};
 use regrasp_plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
 use regrasp_robot::ContactModel;
 use regrasp_robot::import::{LoadOptions, load_hand};
-use regrasp_scene::{InHandQuery, Object, Scene, TaskKind};
+use regrasp_scene::{Object, Scene};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -180,7 +180,7 @@ fn span(step: usize, n_steps: usize) -> f64 {
 fn segment(scene: &Scene, motion: &Motion, squeeze: &[f64; 4]) -> Segment {
     let mut waypoints: Vec<Waypoint> = (0..=motion.n_steps).map(|w| waypoint(scene, motion, w)).collect();
     for waypoint in &mut waypoints {
-        add_forces(scene, waypoint, squeeze);
+        add_forces(scene, waypoint, squeeze, None);
     }
     let name = |f: usize| Some(NAMES[f].to_owned());
     let (moving_finger, rolling_finger) = (name(motion.moving), name(motion.rolling));
@@ -188,13 +188,15 @@ fn segment(scene: &Scene, motion: &Motion, squeeze: &[f64; 4]) -> Segment {
 }
 
 /// The forces nearest to the squeeze that balance, friction of what slides given; and torques by virtual work.
-fn add_forces(scene: &Scene, waypoint: &mut Waypoint, squeeze: &[f64; 4]) {
+/// Finger `idle` touches, if at all, without a force.
+fn add_forces(scene: &Scene, waypoint: &mut Waypoint, squeeze: &[f64; 4], idle: Option<usize>) {
     let hand_from_object = sample::world_from_hand().inverse() * Pose::from(&waypoint.world_from_object);
     let down = Pose::from(&waypoint.world_from_object).rotation.inverse() * Vector::from(GRAVITY_IN_WORLD);
     // Force of a unit, and moment about its contact.
     let mut columns: Vec<(usize, Vector, Vector)> = Vec::new();
     let mut wished: Vec<f64> = Vec::new();
-    for (f, contact) in waypoint.contacts.iter().enumerate().filter(|(_, contact)| contact.holds()) {
+    let held = |(f, contact): &(usize, &ContactState)| contact.holds() && idle != Some(*f);
+    for (f, contact) in waypoint.contacts.iter().enumerate().filter(held) {
         let normal = Vector::from(contact.normal_in_object.unwrap());
         if contact.mode.slides() {
             let velocity = Vector::from(contact.relative_velocity_in_object.unwrap());
@@ -306,15 +308,6 @@ fn plan_of(scene: &mut Scene, segments: Vec<Segment>) -> Plan {
     plan
 }
 
-/// As the query of the plan's own start and goal.
-pub fn query(plan: &Plan) -> InHandQuery {
-    InHandQuery { task: TaskKind::Tracking, ..sample::query(plan) }
-}
-
-pub fn judge(scene: &Scene, plan: &Plan) -> Report {
-    check(scene, Some(&query(plan)), plan, &CheckSettings::default())
-}
-
 /// How a moving fingertip goes over the ball, seen from the ball: its centre about one axis, its link about another.
 #[derive(Clone, Copy)]
 struct Round {
@@ -376,7 +369,7 @@ pub fn ball_plan(scene: &mut Scene) -> Plan {
     plan_of(scene, segments)
 }
 
-fn spinning<'a>(start: &Pose, spin: Vector, turn: f64, tips: &[Pose; 4], round: &Round) -> Motion<'a> {
+fn spinning(start: &Pose, spin: Vector, turn: f64, tips: &[Pose; 4], round: &Round) -> Motion<'static> {
     let (start, spin, round) = (*start, spin, *round);
     let object = move |t: f64| turned(spin * (turn * t)) * start;
     let seen = start.inverse() * tips[0];
@@ -395,6 +388,90 @@ fn spinning<'a>(start: &Pose, spin: Vector, turn: f64, tips: &[Pose; 4], round: 
         tips: [Box::new(carried), resting(b), resting(c), resting(d)],
         n_steps: 10,
     }
+}
+
+/// The ball spins, one of those that slid goes elsewhere through the air, all four carry the ball on, and it spins again.
+pub fn gaiting_plan(scene: &mut Scene) -> Plan {
+    let mut tips: [Pose; 4] =
+        std::array::from_fn(|f| pose(ball_grasp()[f] * (SIZE + RADII[f]), UnitQuaternion::identity()));
+    let (mut object, spin) = (Pose::identity(), ball_grasp()[1]);
+    let mut segments = Vec::new();
+    let carried = Round { mode: ContactMode::Fixed, center: Vector::zeros(), link: Vector::zeros() };
+    let first = spinning(&object, spin, 0.1, &tips, &carried);
+    segments.push(segment(scene, &first, &SQUEEZE));
+    let (end, tip) = ((first.object)(1.0), (first.tips[0])(1.0));
+    drop(first);
+    (object, tips[0]) = (end, tip);
+    // Off by 5 mm, aside by a fifth of a radian, and back.
+    let (relocated, there) = (2, tips[2]);
+    let around = move |t: f64| {
+        let lift = 0.005 * (4.0 * t).min(4.0 * (1.0 - t)).min(1.0);
+        let direction =
+            turned(Vector::z() * (0.2 * (2.0 * t - 0.5).clamp(0.0, 1.0))) * there.translation.vector.normalize();
+        pose(direction * (SIZE + RADII[2] + lift), there.rotation)
+    };
+    let [a, b, _, d] = tips;
+    let relocation = Motion {
+        moving: relocated,
+        rolling: 1,
+        modes: [ContactMode::Fixed; 4],
+        object: resting(object),
+        tips: [resting(a), resting(b), Box::new(around), resting(d)],
+        n_steps: 24,
+    };
+    segments.push(untracked(scene, segment(scene, &relocation, &SQUEEZE), SegmentKind::Regrasp));
+    tips[2] = (relocation.tips[2])(1.0);
+    drop(relocation);
+    let seen = [a, b, tips[2], d].map(|tip| object.inverse() * tip);
+    let start = object;
+    let course =
+        move |t: f64| pose(Vector::new(0.002, -0.003, 0.001) * t, turned(Vector::new(0.02, -0.05, 0.03) * t)) * start;
+    let together = |f: usize| -> Course { Box::new(move |t: f64| course(t) * seen[f]) };
+    let transfer = Motion {
+        moving: 0,
+        rolling: 1,
+        modes: [ContactMode::Fixed; 4],
+        object: Box::new(course),
+        tips: [together(0), together(1), together(2), together(3)],
+        n_steps: 10,
+    };
+    segments.push(untracked(scene, segment(scene, &transfer, &SQUEEZE), SegmentKind::Transfer));
+    let again = course(1.0);
+    let tips = seen.map(|tip| again * tip);
+    // The ball's centre is elsewhere now, and it spins about the contact with the same finger.
+    let center = again.translation.vector;
+    let shifted = tips.map(|tip| pose(tip.translation.vector - center, tip.rotation));
+    let start = pose(Vector::zeros(), again.rotation);
+    let axis = shifted[1].translation.vector.normalize();
+    let mut last = spinning(&start, axis, 0.08, &shifted, &carried);
+    let moved = |course: Course<'static>| -> Course<'static> {
+        Box::new(move |t: f64| Pose::from_parts(Translation3::from(center), UnitQuaternion::identity()) * course(t))
+    };
+    last.object = moved(last.object);
+    last.tips = last.tips.map(moved);
+    segments.push(segment(scene, &last, &SQUEEZE));
+    let mut plan = plan_of(scene, segments);
+    (plan.promises.required_margin, plan.promises.kept_margin) = (0.005, 0.005);
+    plan
+}
+
+/// A segment of another kind: the finger that relocates is free on its way and exerts nothing at its ends.
+fn untracked(scene: &Scene, mut segment: Segment, kind: SegmentKind) -> Segment {
+    let moving = segment.moving_finger.take().filter(|_| kind == SegmentKind::Regrasp);
+    let idle = moving.as_ref().and_then(|name| NAMES.iter().position(|other| other == name));
+    (segment.kind, segment.moving_finger, segment.rolling_finger) = (kind, moving, None);
+    let last = segment.waypoints.len() - 1;
+    for (w, waypoint) in segment.waypoints.iter_mut().enumerate() {
+        for (f, contact) in waypoint.contacts.iter_mut().enumerate() {
+            contact.point_in_tip = None;
+            (contact.relative_velocity_in_object, contact.relative_turn_in_object) = (None, None);
+            if idle == Some(f) && w > 0 && w < last {
+                *contact = ContactState::FREE;
+            }
+        }
+        add_forces(scene, waypoint, &SQUEEZE, idle);
+    }
+    segment
 }
 
 /// A box that rolls over a resting ball beneath it; two rest beside it, and it slides between them. The one on top is carried, and then
@@ -477,7 +554,7 @@ pub fn edge_plan(scene: &mut Scene) -> Plan {
             modes: [mode, Fixed, Fixed, Fixed],
             object: resting(Pose::identity()),
             tips: [course, resting(others[1]), resting(others[2]), resting(others[3])],
-            n_steps: 60,
+            n_steps: 36,
         };
         segment(scene, &motion, &SQUEEZE_BESIDE)
     });
@@ -495,7 +572,8 @@ fn complaints(report: &Report) -> String {
 #[test]
 fn plans_of_closed_forms_are_accepted() {
     type Make = fn(&mut Scene) -> Plan;
-    let plans: [(&str, Scene, Make); 4] = [
+    let plans: [(&str, Scene, Make); 5] = [
+        ("gaiting", ball_scene(), gaiting_plan),
         ("ball", ball_scene(), ball_plan),
         ("box", box_scene(), box_plan),
         ("edge", box_scene(), edge_plan),
@@ -505,10 +583,10 @@ fn plans_of_closed_forms_are_accepted() {
         let plan = make(&mut scene);
         let report = judge(&scene, &plan);
         assert!(report.accepted(), "{name}: {}", complaints(&report));
-        assert!(report.max_slip.unwrap() < 2e-5, "{name}: {:?}", report.max_slip);
+        assert!(report.max_slip.unwrap() < 3e-5, "{name}: {:?}", report.max_slip);
         assert!(report.max_sliding_force_error.unwrap() < 1e-12, "{name}: {:?}", report.max_sliding_force_error);
         assert!(report.max_contact_error < 5e-5, "{name}: {}", report.max_contact_error);
-        assert!(report.min_margin.is_none());
+        assert_eq!(report.min_margin.is_some(), name == "gaiting", "{name}: {:?}", report.min_margin);
         assert_eq!(
             regrasp_plan::format::from_json(Path::new("plan.json"), regrasp_plan::format::to_json(&plan).as_bytes())
                 .as_ref(),
