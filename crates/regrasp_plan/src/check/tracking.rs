@@ -93,8 +93,11 @@ fn wrong_mode(finger: &FingerModel, segment: &Segment, f: usize) -> Option<(usiz
         if w == last && here != segment.waypoints[last - 1].contacts[f].mode {
             return Some((w, "ends in another mode than that of the way there".into()));
         }
-        if here != ContactMode::Fixed && *mode.get_or_insert(here) != here {
-            return Some((w, format!("is {here:?}, but {mode:?} before")));
+        let before = *mode.get_or_insert(here);
+        if before == ContactMode::Fixed {
+            mode = Some(here);
+        } else if here != ContactMode::Fixed && here != before {
+            return Some((w, format!("is said to be {here:?}, but {before:?} before")));
         }
     }
     None

@@ -3,11 +3,11 @@
 //! slides is put in as its law says, and the other forces are the nearest to a squeeze that balance. The checker looks at poses
 //! only.
 
-use crate::sample::{self, judge};
+use crate::sample::{self, judge, kinds};
 use nalgebra::{DMatrix, DVector, Rotation3, Translation3, UnitQuaternion};
 use regrasp_geometry::surface::DEFAULT_CREASE_ANGLE;
 use regrasp_geometry::{Point, Pose, Shape, Surface, TriangleMesh, Vector};
-use regrasp_plan::check::Report;
+use regrasp_plan::check::{Report, ViolationKind};
 use regrasp_plan::plan::{ForcePromises, MotionLimits, PoseData, TrackingPromises};
 use regrasp_plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
 use regrasp_robot::ContactModel;
@@ -200,7 +200,7 @@ fn add_forces(scene: &Scene, waypoint: &mut Waypoint, squeeze: &[f64; 4], idle: 
         let normal = Vector::from(contact.normal_in_object.unwrap());
         if contact.mode.slides() {
             let velocity = Vector::from(contact.relative_velocity_in_object.unwrap());
-            let along = (velocity - normal * normal.dot(&velocity)).normalize();
+            let along = (velocity - normal * normal.dot(&velocity)).try_normalize(1e-12).unwrap_or_default();
             columns.push((f, along * FRICTION - normal, Vector::zeros()));
             wished.push(DRAG);
         } else {
@@ -593,4 +593,104 @@ fn plans_of_closed_forms_are_accepted() {
             Ok(&plan)
         );
     }
+}
+
+#[test]
+fn every_rule_of_tracking_is_broken_by_itself() {
+    use ViolationKind::*;
+    type Damage<'a> = &'a dyn Fn(&mut Plan);
+    fn states(plan: &mut Plan, s: usize, f: usize) -> impl Iterator<Item = &mut ContactState> {
+        plan.segments[s].waypoints.iter_mut().map(move |waypoint| &mut waypoint.contacts[f])
+    }
+    fn tracking(plan: &mut Plan) -> &mut TrackingPromises {
+        plan.promises.tracking.as_mut().unwrap()
+    }
+    let mut scene = ball_scene();
+    let good = ball_plan(&mut scene);
+    // Segments: 0 carried, 1 pure rolling, 2 rolling, 3 pure sliding, 4 sliding, 5 twisting; finger 1 twists in 0, 2 and 5, where 2
+    // and 3 slide.
+    let cases: [(Damage, &[ViolationKind]); 22] = [
+        (&|p| states(p, 0, 1).for_each(|c| c.mode = ContactMode::Rolling), &[]),
+        (&|p| states(p, 1, 0).for_each(|c| c.mode = ContactMode::Rolling), &[]),
+        (&|p| states(p, 2, 0).for_each(|c| c.mode = ContactMode::PureRolling), &[ContactModeWrong]),
+        (&|p| states(p, 2, 0).for_each(|c| c.mode = ContactMode::Twisting), &[ContactModeWrong]),
+        (&|p| states(p, 0, 1).for_each(|c| c.mode = ContactMode::Fixed), &[ContactModeWrong]),
+        (&|p| states(p, 0, 1).for_each(|c| c.mode = ContactMode::PureRolling), &[ContactModeWrong]),
+        (&|p| states(p, 3, 0).for_each(|c| c.mode = ContactMode::Sliding), &[]),
+        (
+            &|p| p.segments[4].waypoints[3].contacts[0].relative_turn_in_object = Some([0.1; 3]),
+            &[RelativeVelocityWrong],
+        ),
+        (
+            &|p| p.segments[0].waypoints[3].contacts[0].relative_turn_in_object = Some([1e-3; 3]),
+            &[RelativeVelocityWrong],
+        ),
+        (
+            &|p| p.segments[0].waypoints[3].contacts[1].relative_velocity_in_object = Some([1e-3; 3]),
+            &[RelativeVelocityWrong],
+        ),
+        (&|p| p.segments[0].waypoints[3].contacts[1].point_in_tip.as_mut().unwrap()[0] += 2e-4, &[ContactOffTip]),
+        (&|p| p.segments[0].waypoints[3].contacts[1].point_in_tip = None, &[RelativeMotionMissing]),
+        (&|p| p.segments[0].waypoints[10].contacts[0].mode = ContactMode::Rolling, &[WrongContactMode]),
+        (&|p| p.segments[1].waypoints[5].contacts[0].mode = ContactMode::Rolling, &[WrongContactMode]),
+        (&|p| p.segments[0].rolling_finger = Some("a".into()), &[WrongRollingFinger]),
+        (&|p| p.segments[0].rolling_finger = Some("c".into()), &[WrongRollingFinger]),
+        (&|p| p.segments[0].rolling_finger = Some("thumb".into()), &[WrongRollingFinger]),
+        (&|p| p.segments[1].moving_finger = Some("c".into()), &[WrongMovingFinger]),
+        (&|p| tracking(p).goal_tolerance = 0.0421, &[PromiseBroken]),
+        (&|p| tracking(p).goal_tolerance = 0.0099, &[GoalMismatch]),
+        (&|p| tracking(p).sliding_friction = FRICTION * 0.999, &[PromiseBroken]),
+        (&|p| (p.promises.required_margin, p.promises.kept_margin) = (0.0, 1e-6), &[PromiseBroken]),
+    ];
+    for (i, (damage, expected)) in cases.iter().enumerate() {
+        let mut plan = good.clone();
+        damage(&mut plan);
+        let report = judge(&scene, &plan);
+        assert_eq!(&kinds(&report), expected, "case {i}: {}", complaints(&report));
+    }
+    // Where the goal is, is not asked.
+    let mut elsewhere = good.clone();
+    elsewhere.goal.position = [0.3, 0.0, 0.0];
+    assert!(judge(&scene, &elsewhere).accepted());
+    scene.reach = Some(0.004);
+    assert_eq!(kinds(&judge(&scene, &good)), [OutOfReach]);
+}
+
+#[test]
+fn fixed_fingers_may_begin_to_slide_on_their_way() {
+    // The last steps of a ball that spins, after steps in which everything rests.
+    let mut scene = ball_scene();
+    let start = Pose::identity();
+    let tips: [Pose; 4] =
+        std::array::from_fn(|f| pose(ball_grasp()[f] * (SIZE + RADII[f]), UnitQuaternion::identity()));
+    let carried = Round { mode: ContactMode::Fixed, center: Vector::zeros(), link: Vector::zeros() };
+    let later = |t: f64| (2.0 * t - 1.0).max(0.0);
+    let whole = spinning(&start, ball_grasp()[1], 0.06, &tips, &carried);
+    let (object, tip) = (whole.object, whole.tips);
+    let [a, b, c, d] = tip;
+    let halting = |course: Course<'static>| -> Course<'static> { Box::new(move |t: f64| course(later(t))) };
+    let motion = Motion {
+        moving: 0,
+        rolling: 1,
+        modes: whole.modes,
+        object: halting(object),
+        tips: [halting(a), halting(b), halting(c), halting(d)],
+        n_steps: 10,
+    };
+    let mut segment = segment(&scene, &motion, &SQUEEZE);
+    for waypoint in &mut segment.waypoints[..5] {
+        waypoint.contacts.iter_mut().for_each(|contact| contact.mode = ContactMode::Fixed);
+        add_forces(&scene, waypoint, &SQUEEZE, None);
+    }
+    let plan = plan_of(&mut scene, vec![segment]);
+    let report = judge(&scene, &plan);
+    assert!(report.accepted(), "{}", complaints(&report));
+    // What does not slide has no full friction.
+    let mut plan = plan;
+    plan.segments[0].waypoints[2].contacts[2].mode = ContactMode::Sliding;
+    let found = kinds(&judge(&scene, &plan));
+    assert!(
+        found.contains(&ViolationKind::ContactModeWrong) && found.contains(&ViolationKind::SlidingForceWrong),
+        "{found:?}"
+    );
 }
