@@ -425,4 +425,15 @@ mod tests {
             assert!((order - 2.0).abs() < 0.15, "{n_pieces}: {order}");
         }
     }
+
+    #[test]
+    fn turns_are_those_of_their_axes() {
+        let turn = Vector::new(0.3, -0.2, 0.5);
+        let [start, end] = [0.0, 1.0].map(|t| carried(Vector::z(), turn * t));
+        assert!((turn_between(&start, &end) - turn).norm() < 1e-12);
+        // The rotation vector is that of the way from one to the other, in the fixed frame.
+        let before = carried(Vector::x(), Vector::new(0.1, 0.7, -0.4));
+        let after = carried(Vector::zeros(), turn) * before;
+        assert!((turn_between(&before, &after) - turn).norm() < 1e-12);
+    }
 }

@@ -8,3 +8,4 @@ mod mutation;
 mod rolled;
 mod sample;
 mod tracked;
+mod tracking;

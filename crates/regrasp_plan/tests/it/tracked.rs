@@ -3,11 +3,10 @@
 //! slides is put in as its law says, and the other forces are the nearest to a squeeze that balance. The checker looks at poses
 //! only.
 
-use crate::sample::{self, judge, kinds};
+use crate::sample;
 use nalgebra::{DMatrix, DVector, Rotation3, Translation3, UnitQuaternion};
 use regrasp_geometry::surface::DEFAULT_CREASE_ANGLE;
 use regrasp_geometry::{Point, Pose, Shape, Surface, TriangleMesh, Vector};
-use regrasp_plan::check::{Report, ViolationKind};
 use regrasp_plan::plan::{ForcePromises, MotionLimits, PoseData, TrackingPromises};
 use regrasp_plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
 use regrasp_robot::ContactModel;
@@ -17,12 +16,12 @@ use std::path::Path;
 use std::sync::Arc;
 
 const NAMES: [&str; 4] = ["a", "b", "c", "d"];
-const RADII: [f64; 4] = [0.04, 0.035, 0.03, 0.02];
+pub const RADII: [f64; 4] = [0.04, 0.035, 0.03, 0.02];
 /// Where the sliding joints of the hand are all zero, in the hand.
 const BASES: [[f64; 3]; 4] = [[0.1, 0.1, 0.0], [-0.1, 0.1, 0.0], [-0.1, -0.1, 0.0], [0.1, -0.1, 0.0]];
 /// Radius of the ball, and half the side of the box.
-const SIZE: f64 = 0.06;
-const FRICTION: f64 = 0.7;
+pub const SIZE: f64 = 0.06;
+pub const FRICTION: f64 = 0.7;
 /// Of soft fingertips.
 const TORSION_RADIUS: f64 = 0.02;
 const GRAVITY_IN_WORLD: [f64; 3] = [0.0, 0.0, -9.80665];
@@ -30,7 +29,7 @@ const GRAVITY_IN_WORLD: [f64; 3] = [0.0, 0.0, -9.80665];
 const STEP: f64 = 0.1;
 /// Normal forces wished for: of fingers that hold a ball or a box that moves and of those that hold a box at whose edge another one is,
 /// and of those that slide.
-const SQUEEZE: [f64; 4] = [8.0; 4];
+pub const SQUEEZE: [f64; 4] = [8.0; 4];
 const SQUEEZE_BESIDE: [f64; 4] = [1.5, 4.0, 12.0, 12.0];
 const DRAG: f64 = 0.7;
 /// How far a finger that slides goes from that, where one that holds goes by one; one that presses less goes less far.
@@ -84,23 +83,23 @@ pub fn mesh_scene() -> Scene {
 }
 
 /// A pose for every share of the way.
-type Course<'a> = Box<dyn Fn(f64) -> Pose + 'a>;
+pub type Course<'a> = Box<dyn Fn(f64) -> Pose + 'a>;
 
 /// What happens in a segment, in the hand's frame.
-struct Motion<'a> {
-    moving: usize,
-    rolling: usize,
-    modes: [ContactMode; 4],
-    object: Course<'a>,
-    tips: [Course<'a>; 4],
-    n_steps: usize,
+pub struct Motion<'a> {
+    pub moving: usize,
+    pub rolling: usize,
+    pub modes: [ContactMode; 4],
+    pub object: Course<'a>,
+    pub tips: [Course<'a>; 4],
+    pub n_steps: usize,
 }
 
 fn turned(vector: Vector) -> UnitQuaternion<f64> {
     UnitQuaternion::from_scaled_axis(vector)
 }
 
-fn pose(position: Vector, rotation: UnitQuaternion<f64>) -> Pose {
+pub fn pose(position: Vector, rotation: UnitQuaternion<f64>) -> Pose {
     Pose::from_parts(Translation3::from(position), rotation)
 }
 
@@ -177,7 +176,7 @@ fn span(step: usize, n_steps: usize) -> f64 {
     if step == 0 || step + 1 == n_steps { 2.0 * STEP } else { STEP }
 }
 
-fn segment(scene: &Scene, motion: &Motion, squeeze: &[f64; 4]) -> Segment {
+pub fn segment(scene: &Scene, motion: &Motion, squeeze: &[f64; 4]) -> Segment {
     let mut waypoints: Vec<Waypoint> = (0..=motion.n_steps).map(|w| waypoint(scene, motion, w)).collect();
     for waypoint in &mut waypoints {
         add_forces(scene, waypoint, squeeze, None);
@@ -189,7 +188,7 @@ fn segment(scene: &Scene, motion: &Motion, squeeze: &[f64; 4]) -> Segment {
 
 /// The forces nearest to the squeeze that balance, friction of what slides given; and torques by virtual work.
 /// Finger `idle` touches, if at all, without a force.
-fn add_forces(scene: &Scene, waypoint: &mut Waypoint, squeeze: &[f64; 4], idle: Option<usize>) {
+pub fn add_forces(scene: &Scene, waypoint: &mut Waypoint, squeeze: &[f64; 4], idle: Option<usize>) {
     let hand_from_object = sample::world_from_hand().inverse() * Pose::from(&waypoint.world_from_object);
     let down = Pose::from(&waypoint.world_from_object).rotation.inverse() * Vector::from(GRAVITY_IN_WORLD);
     // Force of a unit, and moment about its contact.
@@ -255,7 +254,7 @@ fn add_forces(scene: &Scene, waypoint: &mut Waypoint, squeeze: &[f64; 4], idle: 
 }
 
 /// Times and velocities of all segments, and what the plan promises.
-fn plan_of(scene: &mut Scene, segments: Vec<Segment>) -> Plan {
+pub fn plan_of(scene: &mut Scene, segments: Vec<Segment>) -> Plan {
     for (f, finger) in scene.hand.fingers.iter_mut().enumerate() {
         finger.rest = segments[0].waypoints[0].joints[6 * f..6 * f + 6].to_vec();
     }
@@ -310,14 +309,14 @@ fn plan_of(scene: &mut Scene, segments: Vec<Segment>) -> Plan {
 
 /// How a moving fingertip goes over the ball, seen from the ball: its centre about one axis, its link about another.
 #[derive(Clone, Copy)]
-struct Round {
-    mode: ContactMode,
-    center: Vector,
-    link: Vector,
+pub struct Round {
+    pub mode: ContactMode,
+    pub center: Vector,
+    pub link: Vector,
 }
 
 /// Directions of the contacts on the ball at the start. The ball spins about that of `b`.
-fn ball_grasp() -> [Vector; 4] {
+pub fn ball_grasp() -> [Vector; 4] {
     [
         sample::around(0.0, 62.0),
         Vector::new(0.1, -0.05, -1.0).normalize(),
@@ -369,7 +368,7 @@ pub fn ball_plan(scene: &mut Scene) -> Plan {
     plan_of(scene, segments)
 }
 
-fn spinning(start: &Pose, spin: Vector, turn: f64, tips: &[Pose; 4], round: &Round) -> Motion<'static> {
+pub fn spinning(start: &Pose, spin: Vector, turn: f64, tips: &[Pose; 4], round: &Round) -> Motion<'static> {
     let (start, spin, round) = (*start, spin, *round);
     let object = move |t: f64| turned(spin * (turn * t)) * start;
     let seen = start.inverse() * tips[0];
@@ -442,13 +441,12 @@ pub fn gaiting_plan(scene: &mut Scene) -> Plan {
     let center = again.translation.vector;
     let shifted = tips.map(|tip| pose(tip.translation.vector - center, tip.rotation));
     let start = pose(Vector::zeros(), again.rotation);
+    let place = pose(center, UnitQuaternion::identity());
     let axis = shifted[1].translation.vector.normalize();
-    let mut last = spinning(&start, axis, 0.08, &shifted, &carried);
-    let moved = |course: Course<'static>| -> Course<'static> {
-        Box::new(move |t: f64| Pose::from_parts(Translation3::from(center), UnitQuaternion::identity()) * course(t))
-    };
-    last.object = moved(last.object);
-    last.tips = last.tips.map(moved);
+    let last = spinning(&start, axis, 0.08, &shifted, &carried);
+    let spin = last;
+    let moved = move |course: Course<'static>| -> Course<'static> { Box::new(move |t: f64| place * course(t)) };
+    let last = Motion { object: moved(spin.object), tips: spin.tips.map(moved), ..spin };
     segments.push(segment(scene, &last, &SQUEEZE));
     let mut plan = plan_of(scene, segments);
     (plan.promises.required_margin, plan.promises.kept_margin) = (0.005, 0.005);
@@ -560,137 +558,4 @@ pub fn edge_plan(scene: &mut Scene) -> Plan {
     });
     let segments = segments.collect();
     plan_of(scene, segments)
-}
-
-/// The first violations, in short.
-fn complaints(report: &Report) -> String {
-    let lines: Vec<String> =
-        report.violations.iter().take(12).map(|v| v.to_string().chars().take(170).collect()).collect();
-    format!("{} violations:\n{}", report.n_violations, lines.join("\n"))
-}
-
-#[test]
-fn plans_of_closed_forms_are_accepted() {
-    type Make = fn(&mut Scene) -> Plan;
-    let plans: [(&str, Scene, Make); 5] = [
-        ("gaiting", ball_scene(), gaiting_plan),
-        ("ball", ball_scene(), ball_plan),
-        ("box", box_scene(), box_plan),
-        ("edge", box_scene(), edge_plan),
-        ("edge of a mesh", mesh_scene(), edge_plan),
-    ];
-    for (name, mut scene, make) in plans {
-        let plan = make(&mut scene);
-        let report = judge(&scene, &plan);
-        assert!(report.accepted(), "{name}: {}", complaints(&report));
-        assert!(report.max_slip.unwrap() < 3e-5, "{name}: {:?}", report.max_slip);
-        assert!(report.max_sliding_force_error.unwrap() < 1e-12, "{name}: {:?}", report.max_sliding_force_error);
-        assert!(report.max_contact_error < 5e-5, "{name}: {}", report.max_contact_error);
-        assert_eq!(report.min_margin.is_some(), name == "gaiting", "{name}: {:?}", report.min_margin);
-        assert_eq!(
-            regrasp_plan::format::from_json(Path::new("plan.json"), regrasp_plan::format::to_json(&plan).as_bytes())
-                .as_ref(),
-            Ok(&plan)
-        );
-    }
-}
-
-#[test]
-fn every_rule_of_tracking_is_broken_by_itself() {
-    use ViolationKind::*;
-    type Damage<'a> = &'a dyn Fn(&mut Plan);
-    fn states(plan: &mut Plan, s: usize, f: usize) -> impl Iterator<Item = &mut ContactState> {
-        plan.segments[s].waypoints.iter_mut().map(move |waypoint| &mut waypoint.contacts[f])
-    }
-    fn tracking(plan: &mut Plan) -> &mut TrackingPromises {
-        plan.promises.tracking.as_mut().unwrap()
-    }
-    let mut scene = ball_scene();
-    let good = ball_plan(&mut scene);
-    // Segments: 0 carried, 1 pure rolling, 2 rolling, 3 pure sliding, 4 sliding, 5 twisting; finger 1 twists in 0, 2 and 5, where 2
-    // and 3 slide.
-    let cases: [(Damage, &[ViolationKind]); 22] = [
-        (&|p| states(p, 0, 1).for_each(|c| c.mode = ContactMode::Rolling), &[]),
-        (&|p| states(p, 1, 0).for_each(|c| c.mode = ContactMode::Rolling), &[]),
-        (&|p| states(p, 2, 0).for_each(|c| c.mode = ContactMode::PureRolling), &[ContactModeWrong]),
-        (&|p| states(p, 2, 0).for_each(|c| c.mode = ContactMode::Twisting), &[ContactModeWrong]),
-        (&|p| states(p, 0, 1).for_each(|c| c.mode = ContactMode::Fixed), &[ContactModeWrong]),
-        (&|p| states(p, 0, 1).for_each(|c| c.mode = ContactMode::PureRolling), &[ContactModeWrong]),
-        (&|p| states(p, 3, 0).for_each(|c| c.mode = ContactMode::Sliding), &[]),
-        (
-            &|p| p.segments[4].waypoints[3].contacts[0].relative_turn_in_object = Some([0.1; 3]),
-            &[RelativeVelocityWrong],
-        ),
-        (
-            &|p| p.segments[0].waypoints[3].contacts[0].relative_turn_in_object = Some([1e-3; 3]),
-            &[RelativeVelocityWrong],
-        ),
-        (
-            &|p| p.segments[0].waypoints[3].contacts[1].relative_velocity_in_object = Some([1e-3; 3]),
-            &[RelativeVelocityWrong],
-        ),
-        (&|p| p.segments[0].waypoints[3].contacts[1].point_in_tip.as_mut().unwrap()[0] += 2e-4, &[ContactOffTip]),
-        (&|p| p.segments[0].waypoints[3].contacts[1].point_in_tip = None, &[RelativeMotionMissing]),
-        (&|p| p.segments[0].waypoints[10].contacts[0].mode = ContactMode::Rolling, &[WrongContactMode]),
-        (&|p| p.segments[1].waypoints[5].contacts[0].mode = ContactMode::Rolling, &[WrongContactMode]),
-        (&|p| p.segments[0].rolling_finger = Some("a".into()), &[WrongRollingFinger]),
-        (&|p| p.segments[0].rolling_finger = Some("c".into()), &[WrongRollingFinger]),
-        (&|p| p.segments[0].rolling_finger = Some("thumb".into()), &[WrongRollingFinger]),
-        (&|p| p.segments[1].moving_finger = Some("c".into()), &[WrongMovingFinger]),
-        (&|p| tracking(p).goal_tolerance = 0.0421, &[PromiseBroken]),
-        (&|p| tracking(p).goal_tolerance = 0.0099, &[GoalMismatch]),
-        (&|p| tracking(p).sliding_friction = FRICTION * 0.999, &[PromiseBroken]),
-        (&|p| (p.promises.required_margin, p.promises.kept_margin) = (0.0, 1e-6), &[PromiseBroken]),
-    ];
-    for (i, (damage, expected)) in cases.iter().enumerate() {
-        let mut plan = good.clone();
-        damage(&mut plan);
-        let report = judge(&scene, &plan);
-        assert_eq!(&kinds(&report), expected, "case {i}: {}", complaints(&report));
-    }
-    // Where the goal is, is not asked.
-    let mut elsewhere = good.clone();
-    elsewhere.goal.position = [0.3, 0.0, 0.0];
-    assert!(judge(&scene, &elsewhere).accepted());
-    scene.reach = Some(0.004);
-    assert_eq!(kinds(&judge(&scene, &good)), [OutOfReach]);
-}
-
-#[test]
-fn fixed_fingers_may_begin_to_slide_on_their_way() {
-    // The last steps of a ball that spins, after steps in which everything rests.
-    let mut scene = ball_scene();
-    let start = Pose::identity();
-    let tips: [Pose; 4] =
-        std::array::from_fn(|f| pose(ball_grasp()[f] * (SIZE + RADII[f]), UnitQuaternion::identity()));
-    let carried = Round { mode: ContactMode::Fixed, center: Vector::zeros(), link: Vector::zeros() };
-    let later = |t: f64| (2.0 * t - 1.0).max(0.0);
-    let whole = spinning(&start, ball_grasp()[1], 0.06, &tips, &carried);
-    let (object, tip) = (whole.object, whole.tips);
-    let [a, b, c, d] = tip;
-    let halting = |course: Course<'static>| -> Course<'static> { Box::new(move |t: f64| course(later(t))) };
-    let motion = Motion {
-        moving: 0,
-        rolling: 1,
-        modes: whole.modes,
-        object: halting(object),
-        tips: [halting(a), halting(b), halting(c), halting(d)],
-        n_steps: 10,
-    };
-    let mut segment = segment(&scene, &motion, &SQUEEZE);
-    for waypoint in &mut segment.waypoints[..5] {
-        waypoint.contacts.iter_mut().for_each(|contact| contact.mode = ContactMode::Fixed);
-        add_forces(&scene, waypoint, &SQUEEZE, None);
-    }
-    let plan = plan_of(&mut scene, vec![segment]);
-    let report = judge(&scene, &plan);
-    assert!(report.accepted(), "{}", complaints(&report));
-    // What does not slide has no full friction.
-    let mut plan = plan;
-    plan.segments[0].waypoints[2].contacts[2].mode = ContactMode::Sliding;
-    let found = kinds(&judge(&scene, &plan));
-    assert!(
-        found.contains(&ViolationKind::ContactModeWrong) && found.contains(&ViolationKind::SlidingForceWrong),
-        "{found:?}"
-    );
 }
