@@ -120,6 +120,9 @@ pub struct CheckSettings {
     pub turn_tolerance: f64,
     /// A fingertip that slides in tracking is faster than this in every step, in metres per second: sliding has a direction then.
     pub smallest_sliding_speed: f64,
+    /// A fingertip that does not slide in tracking slips no faster than this on the mean of a segment, in metres per second: short
+    /// segments would let it slide otherwise. A fiftieth of the velocity at which fingertips slide in paper 003 (table 3).
+    pub largest_slip_speed: f64,
     /// Relative velocities and turns of a tracking plan may be off by this share of their size: those at a moment differ from the
     /// means of a step, and nothing but the direction of friction counts on them.
     pub relative_velocity_share: f64,
@@ -157,6 +160,7 @@ impl Default for CheckSettings {
             largest_goal_tolerance: 0.042,
             turn_tolerance: 2e-3,
             smallest_sliding_speed: 1e-5,
+            largest_slip_speed: 1e-4,
             relative_velocity_share: 0.05,
             relative_velocity_angle: 0.02,
             sliding_force_tolerance: 1e-9,

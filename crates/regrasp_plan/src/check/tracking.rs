@@ -20,7 +20,7 @@
 //! | pure sliding | in every step | none | none |
 //! | sliding | in every step | any | any |
 //!
-//! None is `slip_tolerance` of the plan for slides and `turn_tolerance` for turns, each summed over the steps of a segment so that
+//! None is `slip_tolerance` of the plan for slides, but no faster than `largest_slip_speed` on the mean, and `turn_tolerance` for turns, each summed over the steps of a segment so that
 //! nothing cancels. In every step is faster than `smallest_sliding_speed`. Relative velocities are means: slide and turn over the
 //! time of the step.
 
@@ -130,8 +130,18 @@ pub fn check_tracking(shape: &Shape, model: &Model, plan: &Plan, settings: &Chec
     let slip_tolerance = plan.promises.slip_tolerance.min(settings.largest_slip_tolerance);
     for (s, segment) in plan.segments.iter().enumerate().filter(|(_, one)| one.kind == SegmentKind::Tracking) {
         for (f, finger) in model.fingers.iter().enumerate() {
-            let mut track =
-                Track { finger, f, segment, s, settings, tolerance, slip_tolerance, sums: Default::default(), log };
+            let mut track = Track {
+                finger,
+                f,
+                segment,
+                s,
+                settings,
+                tolerance,
+                slip_tolerance,
+                sums: Default::default(),
+                still: 0.0,
+                log,
+            };
             let error = track.check_touch(shape);
             rolled.max_contact_error = rolled.max_contact_error.max(error);
             track.check_modes(shape);
@@ -177,6 +187,8 @@ struct Track<'a> {
     tolerance: f64,
     slip_tolerance: f64,
     sums: [Sum; 4],
+    /// Time of the steps in modes that do not slide, in seconds.
+    still: f64,
     log: &'a mut Log,
 }
 
@@ -253,6 +265,7 @@ impl Track<'_> {
             if span <= 0.0 {
                 continue;
             }
+            self.still += if mode.slides() { 0.0 } else { span };
             if mode.slides() && slide.norm() - unknown < self.settings.smallest_sliding_speed * span {
                 let (speed, least) = (slide.norm() / span, self.settings.smallest_sliding_speed);
                 let message = format!(
@@ -285,11 +298,12 @@ impl Track<'_> {
     fn check_sums(&mut self) {
         let name = self.finger.name.as_str();
         let Sum { total, worst } = self.sums[SLIP];
-        if total > self.slip_tolerance {
+        let limit = self.slip_tolerance.min(self.settings.largest_slip_speed * self.still);
+        if total > limit {
             let message = format!(
                 "the tip of finger \"{name}\" slides {total:.3e} m over the object in this segment, most of it here"
             );
-            self.report(Kind::Slip, Moment::at(self.s, worst.1), message, total, self.slip_tolerance);
+            self.report(Kind::Slip, Moment::at(self.s, worst.1), message, total, limit);
         }
         for (which, how) in [(TURN, "turns"), (TWIST, "turns about the normal"), (ROLL, "turns across the normal")] {
             let Sum { total, worst } = self.sums[which];

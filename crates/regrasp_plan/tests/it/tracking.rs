@@ -200,3 +200,31 @@ fn points_on_the_tip_are_in_the_frame_of_its_link() {
         assert!((found - (sample::world_from_hand() * tip).to_homogeneous()).norm() < 1e-12);
     }
 }
+
+/// In each of many short segments a finger slides by less than the slip tolerance.
+#[test]
+fn short_segments_are_no_way_to_slide_and_hold() {
+    let mut scene = ball_scene();
+    let spin = ball_grasp()[1];
+    let carried = Round { mode: ContactMode::Fixed, center: Vector::zeros(), link: Vector::zeros() };
+    let slow = |mode: ContactMode, scene: &mut Scene| {
+        let mut tips: [Pose; 4] =
+            std::array::from_fn(|f| pose(ball_grasp()[f] * (SIZE + RADII[f]), UnitQuaternion::identity()));
+        let mut object = Pose::identity();
+        let mut segments = Vec::new();
+        for _ in 0..6 {
+            let mut motion = spinning(&object, spin, 0.001, &tips, &carried);
+            (motion.n_steps, motion.modes[2], motion.modes[3]) = (1, mode, mode);
+            segments.push(segment(scene, &motion, &SQUEEZE));
+            (object, tips[0]) = ((motion.object)(1.0), (motion.tips[0])(1.0));
+        }
+        plan_of(scene, segments)
+    };
+    let sliding = slow(ContactMode::Sliding, &mut scene);
+    let report = judge(&scene, &sliding);
+    assert!(report.accepted(), "{}", complaints(&report));
+    let rolling = slow(ContactMode::Rolling, &mut scene);
+    let report = judge(&scene, &rolling);
+    assert_eq!(kinds(&report), [ViolationKind::Slip], "{}", complaints(&report));
+    assert!(report.max_slip.unwrap() < 0.8e-4, "{:?}", report.max_slip);
+}
