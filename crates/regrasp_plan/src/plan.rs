@@ -107,9 +107,9 @@ pub struct ContactState {
     /// planned.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub point_in_tip: Option<[f64; 3]>,
-    /// Velocity of the fingertip's material point that touches, seen from the object, without its part along the normal, in the
-    /// object frame, in metres per second: its mean over the way from this waypoint to the next, at the last one over that to it;
-    /// zero where the mode does not slide. In tracking.
+    /// Velocity of the fingertip's material point that touches, seen from the object, without its part along the normal, in
+    /// the object frame, in metres per second: its mean over the way from this waypoint to the next, at the last one over
+    /// that to it; zero where the mode does not slide. In tracking.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub relative_velocity_in_object: Option<[f64; 3]>,
     /// Angular velocity of the fingertip's link seen from the object, in the object frame, in radians per second: the rotation

@@ -31,8 +31,9 @@ pub struct Nearest {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Along {
     /// Closure margin of the fingers that hold, in a regrasp without the one that moves: a proven lower bound as in the
-    /// report, and zero where no closure was proved, and in tracking, where none is judged. Of more than six fingers that roll, what forces found at one of the
-    /// waypoints before prove: maybe less than could be proved, at least 98 % of the margin there.
+    /// report, and zero where no closure was proved, and in tracking, where none is judged. Of more than six fingers that
+    /// roll, what forces found at one of the waypoints before prove: maybe less than could be proved, at least 98 % of the
+    /// margin there.
     pub margin: Vec<f64>,
     /// The nearest pair; none where a distance is not resolved, or nothing must be kept apart.
     pub clearance: Vec<Option<Nearest>>,

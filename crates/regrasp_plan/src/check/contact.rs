@@ -20,8 +20,9 @@ const MOST_SAMPLES: usize = 4096;
 
 /// Largest distance of a fingertip from the fixed contact that it holds, over the plan; violations go to the log.
 ///
-/// Between samples the bound is exact: the centre of a ball in the object frame deviates from the chord between two samples by
-/// at most (largest acceleration) (interval)^2 / 8; what touches of another tip moves by at most (largest speed) (interval) / 2.
+/// Between samples the bound is exact: the centre of a ball in the object frame deviates from the chord between two samples
+/// by at most (largest acceleration) (interval)^2 / 8; what touches of another tip moves by at most (largest speed)
+/// (interval) / 2.
 pub fn check_tips(model: &Model, plan: &Plan, log: &mut Log) -> f64 {
     let tolerance = plan.promises.contact_tolerance;
     let mut largest: f64 = 0.0;
@@ -141,8 +142,8 @@ pub fn check_pads(model: &Model, plan: &Plan, log: &mut Log) {
     }
 }
 
-/// Every contact of the plan lies on the object's surface, with the surface's normal, away from its edges: on an edge any normal
-/// between those of its faces is one. Tracking crosses edges, so contacts there may be near.
+/// Every contact of the plan lies on the object's surface, with the surface's normal, away from its edges: on an edge any
+/// normal between those of its faces is one. Tracking crosses edges, so contacts there may be near.
 pub fn check_contacts(object: &Object, model: &Model, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
     let mut seen = BTreeSet::new();
     let edges = Edges::of(&object.shape, object.crease_angle);

@@ -7,8 +7,9 @@
 //! - the force of a holding finger is in the exact cone of its contact model (`CONVENTIONS.md`) with the friction of
 //!   `closure::Body::of`, and its normal part in the promised range, both within `force_tolerance`; the moving finger of a
 //!   regrasp exerts nothing, within the first two tolerances;
-//! - in tracking, a fingertip that slides has friction of the scene's coefficient times the normal force along its relative velocity
-//!   in the plan (which `tracking` holds against the poses), within the share `sliding_force_tolerance`, and no torsion;
+//! - in tracking, a fingertip that slides has friction of the scene's coefficient times the normal force along its relative
+//!   velocity in the plan (which `tracking` holds against the poses), within the share `sliding_force_tolerance`, and no
+//!   torsion;
 //! - every joint's torque is the work of force and torsion per unit of its coordinate, within the share `torque_tolerance` of
 //!   the largest that this work could be, and at most the promised one;
 //! - without a direction of gravity there is room for the weight in each (`any_gravity`).
@@ -307,8 +308,8 @@ impl Judge<'_> {
         if finger.contact == ContactModel::Frictionless { 0.0 } else { self.object.friction }
     }
 
-    /// Length of what a force across the normal has beside friction of the size `full` along `direction`; a torsion, of which none
-    /// is left where friction has its full size, counts too.
+    /// Length of what a force across the normal has beside friction of the size `full` along `direction`; a torsion, of
+    /// which none is left where friction has its full size, counts too.
     fn sliding_error(&self, one: &Exerted, direction: &Vector, full: f64) -> f64 {
         let tangential = one.force + one.normal * one.pressing();
         let torsion = match self.torsion_radius(one) {
@@ -414,8 +415,8 @@ impl Judge<'_> {
     }
 }
 
-/// Where a fingertip slides by its relative velocity, across `normal`: a unit vector, or zero without one; none in modes that do not
-/// slide.
+/// Where a fingertip slides by its relative velocity, across `normal`: a unit vector, or zero without one; none in modes
+/// that do not slide.
 fn sliding_direction(state: &ContactState, normal: &Vector) -> Option<Vector> {
     let velocity = state.relative_velocity_in_object.map_or(Vector::zeros(), Vector::from);
     let across = velocity - normal * normal.dot(&velocity);

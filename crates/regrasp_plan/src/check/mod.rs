@@ -115,21 +115,23 @@ pub struct CheckSettings {
     pub free_clearance: f64,
     /// Largest goal tolerance that a tracking plan may promise, in radians. Paper 003, table 2: a cell of 2.406 degrees.
     pub largest_goal_tolerance: f64,
-    /// In tracking, a fingertip that does not turn, or not about the normal, or not across it, may do so by this much in a segment,
-    /// in radians: what the largest slip tolerance is at 50 mm from the axis.
+    /// In tracking, a fingertip that does not turn, or not about the normal, or not across it, may do so by this much in a
+    /// segment, in radians: what the largest slip tolerance is at 50 mm from the axis.
     pub turn_tolerance: f64,
-    /// A fingertip that slides in tracking is faster than this in every step, in metres per second: sliding has a direction then.
+    /// A fingertip that slides in tracking is faster than this in every step, in metres per second: sliding has a direction
+    /// then.
     pub smallest_sliding_speed: f64,
-    /// A fingertip that does not slide in tracking slips no faster than this on the mean of a segment, in metres per second: short
-    /// segments would let it slide otherwise. A fiftieth of the velocity at which fingertips slide in paper 003 (table 3).
+    /// A fingertip that does not slide in tracking slips no faster than this on the mean of a segment, in metres per
+    /// second: short segments would let it slide otherwise. A fiftieth of the velocity at which fingertips slide in paper
+    /// 003 (table 3).
     pub largest_slip_speed: f64,
-    /// Relative velocities and turns of a tracking plan may be off by this share of their size: those at a moment differ from the
-    /// means of a step, and nothing but the direction of friction counts on them.
+    /// Relative velocities and turns of a tracking plan may be off by this share of their size: those at a moment differ
+    /// from the means of a step, and nothing but the direction of friction counts on them.
     pub relative_velocity_share: f64,
     /// Directions of sliding may be off by this much, in radians.
     pub relative_velocity_angle: f64,
-    /// Friction of a sliding fingertip may differ from the scene's coefficient times the normal force, against the sliding, by this
-    /// share of it. Issue 6: 1e-9.
+    /// Friction of a sliding fingertip may differ from the scene's coefficient times the normal force, along the sliding,
+    /// by this share of it. Issue 6: 1e-9.
     pub sliding_force_tolerance: f64,
     /// Most violations of a kind that are reported one by one.
     pub most_per_kind: usize,
@@ -194,7 +196,8 @@ pub struct Report {
     /// Largest distance of a holding fingertip from its contact, in metres, certified between waypoints; for tips that roll
     /// the largest that was measured, while between waypoints it is certified to be within the tolerance.
     pub max_contact_error: f64,
-    /// Largest slip in a segment of a finger that rolls, or that does not slide in tracking, in metres; none when there is none.
+    /// Largest slip in a segment of a finger that rolls, or that does not slide in tracking, in metres; none when there is
+    /// none.
     pub max_slip: Option<f64>,
     /// Largest imbalance of forces and weight at a waypoint, in newtons; none in plans without forces.
     pub max_force_residual: Option<f64>,
@@ -203,8 +206,8 @@ pub struct Report {
     /// Largest imbalance half-way between waypoints, torques over the torque scale, as a share of the sum of all normal
     /// forces; none in plans without forces.
     pub max_half_way_imbalance: Option<f64>,
-    /// Largest distance of the friction of a sliding fingertip from Coulomb's law, as a share of friction times normal force; none
-    /// when no finger slides.
+    /// Largest distance of the friction of a sliding fingertip from Coulomb's law, as a share of friction times normal
+    /// force; none when no finger slides.
     pub max_sliding_force_error: Option<f64>,
     /// Time that the plan takes, in seconds.
     pub duration: f64,

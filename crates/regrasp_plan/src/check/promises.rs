@@ -4,9 +4,10 @@
 //! - Friction: not negative, at most the scene's, and at most that over `friction_margin`, which is at least 1.
 //! - Contact and slip tolerance: at most what the settings accept. That they are kept is judged in `contact` and `rolling`.
 //! - Tracking: the goal's tolerance is at most what the settings accept, friction of what slides is the scene's.
-//! - Closure: at every waypoint but those of tracking, of exactly the fingers that hold, with the margin promised or asked for by the settings; the
-//!   margin is that of `closure`, dimensionless, with torques divided by the object's radius, which `torque_scale` has to
-//!   be. The margin said to be kept is no more than the smallest one found; where none is judged, no margin is promised.
+//! - Closure: at every waypoint but those of tracking, of exactly the fingers that hold, with the margin promised or asked
+//!   for by the settings; the margin is that of `closure`, dimensionless, with torques divided by the object's radius,
+//!   which `torque_scale` has to be. The margin said to be kept is no more than the smallest one found; where none is
+//!   judged, no margin is promised.
 //!
 //! Tolerances, for rounding and two solvers, are the constants below.
 

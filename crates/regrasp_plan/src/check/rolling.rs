@@ -326,9 +326,9 @@ fn integral(slide_in: impl Fn(usize) -> Option<Vector>, allowed: impl Fn(&Vector
 /// Which point of a link touches, in its frame, and the normal there, in the object frame, with the link where it is given.
 type Touching<'a> = dyn Fn(&Matrix4<f64>) -> Option<(Point, Vector)> + 'a;
 
-/// The integral of the sliding velocity of a tip that `object_from_link` carries from 0 to 1; none where nothing touches. In each
-/// of `n_pieces` pieces the point that touches half-way is carried from the beginning of the piece to its end: the midpoint
-/// rule, whose error falls with the square of the number of pieces.
+/// The integral of the sliding velocity of a tip that `object_from_link` carries from 0 to 1; none where nothing touches.
+/// In each of `n_pieces` pieces the point that touches half-way is carried from the beginning of the piece to its end: the
+/// midpoint rule, whose error falls with the square of the number of pieces.
 fn slide(object_from_link: &dyn Fn(f64) -> Matrix4<f64>, touching: &Touching, n_pieces: usize) -> Option<Vector> {
     let mut sum = Vector::zeros();
     let mut before = object_from_link(0.0);

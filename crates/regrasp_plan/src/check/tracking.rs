@@ -1,5 +1,5 @@
-//! Tracking: every fingertip stays on the object, one finger moves, and every contact is in the mode that the plan says with the
-//! relative velocity that it says, by poses alone (paper 003, sections 6.1.2 and 6.2.2, table 1).
+//! Tracking: every fingertip stays on the object, one finger moves, and every contact is in the mode that the plan says
+//! with the relative velocity that it says, by poses alone (paper 003, sections 6.1.2 and 6.2.2, table 1).
 //!
 //! What a fingertip does from a waypoint to the next belongs to the first of the two, and at the last waypoint to that as well.
 //! Seen from the object, a step has
@@ -20,9 +20,9 @@
 //! | pure sliding | in every step | none | none |
 //! | sliding | in every step | any | any |
 //!
-//! None is `slip_tolerance` of the plan for slides, but no faster than `largest_slip_speed` on the mean, and `turn_tolerance` for turns, each summed over the steps of a segment so that
-//! nothing cancels. In every step is faster than `smallest_sliding_speed`. Relative velocities are means: slide and turn over the
-//! time of the step.
+//! None is `slip_tolerance` of the plan for slides, but no faster than `largest_slip_speed` on the mean, and
+//! `turn_tolerance` for turns, each summed over the steps of a segment so that nothing cancels. In every step is faster
+//! than `smallest_sliding_speed`. Relative velocities are means: slide and turn over the time of the step.
 
 use crate::check::contact::error_at;
 use crate::check::continuity::contact_of;
@@ -33,8 +33,8 @@ use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
 use regrasp_geometry::{Pose, Shape, Vector};
 
-/// Share of a slide that may stay unknown where it is compared with the plan's relative velocity, and what may anyway, in metres:
-/// a tenth of the way in a tenth of a second at the smallest sliding speed counts as sliding.
+/// Share of a slide that may stay unknown where it is compared with the plan's relative velocity, and what may anyway, in
+/// metres: a tenth of the way in a tenth of a second at the smallest sliding speed counts as sliding.
 const UNKNOWN_SLIDE: (f64, f64) = (1e-3, 1e-9);
 
 /// Indices of the fingers that a tracking segment names: the moving and the rolling one.
@@ -170,8 +170,8 @@ impl Sum {
     }
 }
 
-/// Indices of [`Track::sums`]: slides of modes that do not slide, and turns, turns about the normal and turns across it of modes that
-/// do not turn so.
+/// Indices of [`Track::sums`]: slides of modes that do not slide, and turns, turns about the normal and turns across it of
+/// modes that do not turn so.
 const SLIP: usize = 0;
 const TURN: usize = 1;
 const TWIST: usize = 2;
@@ -365,8 +365,8 @@ struct Found {
 
 /// Every tip's centre stays within `reach` of where it is at rest, at and between waypoints.
 ///
-/// Between two moments `h` apart the centre strays from its chord by at most acceleration `h^2 / 8`, and on the chord it is farthest
-/// at an end. Steps are halved until that decides; what it does not decide counts as too far.
+/// Between two moments `h` apart the centre strays from its chord by at most acceleration `h^2 / 8`, and on the chord it is
+/// farthest at an end. Steps are halved until that decides; what it does not decide counts as too far.
 pub fn check_reach(reach: f64, model: &Model, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
     let limit = reach + settings.limit_tolerance;
     for (s, segment) in plan.segments.iter().enumerate() {

@@ -57,12 +57,13 @@ pub enum ViolationKind {
     ObjectMovesInRegrasp,
     /// A contact that should stay changes.
     GraspChanges,
-    /// A finger changes between holding, rolling and being free in a segment that it should spend in one of these; the moving
-    /// finger of a regrasp holds between its ends; or a finger rolls that cannot: its tip is sharp, or the object rests. In tracking,
-    /// a finger does not touch, or changes between two modes other than being fixed; elsewhere, it has a mode of tracking.
+    /// A finger changes between holding, rolling and being free in a segment that it should spend in one of these; the
+    /// moving finger of a regrasp holds between its ends; or a finger rolls that cannot: its tip is sharp, or the object
+    /// rests. In tracking, a finger does not touch, or changes between two modes other than being fixed; elsewhere, it has
+    /// a mode of tracking.
     WrongContactMode,
-    /// In tracking, a contact is not in the mode that the plan says: by the poses it turns, twists or rolls though it should not, or
-    /// does not slide though it should.
+    /// In tracking, a contact is not in the mode that the plan says: by the poses it turns, twists or rolls though it
+    /// should not, or does not slide though it should.
     ContactModeWrong,
     /// In tracking, a contact lacks its point on the tip, or its relative velocity or turn; elsewhere, it has one of these.
     RelativeMotionMissing,
@@ -70,7 +71,8 @@ pub enum ViolationKind {
     RelativeVelocityWrong,
     /// In a regrasp or in tracking, a finger moves that should not, or the moving finger has no name.
     WrongMovingFinger,
-    /// In tracking, the rolling finger has no name, is the moving one, or is said to slide; or a segment of another kind names one.
+    /// In tracking, the rolling finger has no name, is the moving one, or is said to slide; or a segment of another kind
+    /// names one.
     WrongRollingFinger,
     /// A holding fingertip is not on its contact.
     ContactOffTip,

@@ -8,8 +8,8 @@ use regrasp_plan::check::{CheckSettings, ViolationKind, check};
 use regrasp_scene::Scene;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What came of the mutants of some plans, each looked at `rounds` times with other random places: how often each was made, and the
-/// kinds for which they were rejected.
+/// What came of the mutants of some plans, each looked at `rounds` times with other random places: how often each was made,
+/// and the kinds for which they were rejected.
 fn judge_mutants(plans: &[(&Scene, Plan)], rounds: usize) -> (BTreeMap<&'static str, usize>, BTreeSet<ViolationKind>) {
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     let mut kinds = BTreeSet::new();
@@ -48,8 +48,8 @@ fn every_mutant_is_rejected_for_a_fitting_reason() {
         (&scene, crate::loaded::any_gravity_plan(&scene)),
     ];
     let (counts, kinds) = judge_mutants(&plans, 8);
-    // All but one that needs an edge of a box, one that needs a finger of more than three joints, four of coupled joints, and those
-    // that tracking alone has.
+    // All but one that needs an edge of a box, one that needs a finger of more than three joints, four of coupled joints,
+    // and those that tracking alone has.
     assert_eq!(counts.len(), 129, "{counts:?}");
     for (name, count) in &counts {
         assert!(*count >= 5, "{name} was only made {count} times");

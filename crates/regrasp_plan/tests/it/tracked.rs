@@ -1,7 +1,7 @@
-//! Tracking plans made by closed forms, in the hand of four free fingertips: a ball that spins on one of them, a box that rolls
-//! on one, and a fingertip that goes over the edge of a box. Relative velocities are derivatives of the closed forms; friction of what
-//! slides is put in as its law says, and the other forces are the nearest to a squeeze that balance. The checker looks at poses
-//! only.
+//! Tracking plans made by closed forms, in the hand of four free fingertips: a ball that spins on one of them, a box that
+//! rolls on one, and a fingertip that goes over the edge of a box. Relative velocities are derivatives of the closed forms;
+//! friction of what slides is put in as its law says, and the other forces are the nearest to a squeeze that balance. The
+//! checker looks at poses only.
 
 use crate::sample;
 use nalgebra::{DMatrix, DVector, Rotation3, Translation3, UnitQuaternion};
@@ -27,8 +27,8 @@ const TORSION_RADIUS: f64 = 0.02;
 const GRAVITY_IN_WORLD: [f64; 3] = [0.0, 0.0, -9.80665];
 /// Time of a step; the first and the last of a segment take twice as long.
 const STEP: f64 = 0.1;
-/// Normal forces wished for: of fingers that hold a ball or a box that moves and of those that hold a box at whose edge another one is,
-/// and of those that slide.
+/// Normal forces wished for: of fingers that hold a ball or a box that moves and of those that hold a box at whose edge
+/// another one is, and of those that slide.
 pub const SQUEEZE: [f64; 4] = [8.0; 4];
 const SQUEEZE_BESIDE: [f64; 4] = [1.5, 4.0, 12.0, 12.0];
 const DRAG: f64 = 0.7;
@@ -472,8 +472,8 @@ fn untracked(scene: &Scene, mut segment: Segment, kind: SegmentKind) -> Segment 
     segment
 }
 
-/// A box that rolls over a resting ball beneath it; two rest beside it, and it slides between them. The one on top is carried, and then
-/// rolls on it.
+/// A box that rolls over a resting ball beneath it; two rest beside it, and it slides between them. The one on top is
+/// carried, and then rolls on it.
 pub fn box_plan(scene: &mut Scene) -> Plan {
     let normals = [Vector::z(), -Vector::z(), Vector::x(), -Vector::x()];
     let feet = [[0.005, -0.004], [0.0, 0.0], [0.01, 0.012], [-0.012, 0.01]];
@@ -521,8 +521,8 @@ pub fn box_plan(scene: &mut Scene) -> Plan {
     plan_of(scene, segments)
 }
 
-/// Where a tip's centre is that has gone `way` from the middle of the top of the box over the edge at +y, and how far its normal has
-/// turned.
+/// Where a tip's centre is that has gone `way` from the middle of the top of the box over the edge at +y, and how far its
+/// normal has turned.
 fn over_the_edge(way: f64, radius: f64) -> (Vector, f64) {
     let round = radius * std::f64::consts::FRAC_PI_2;
     let top = way.min(SIZE);

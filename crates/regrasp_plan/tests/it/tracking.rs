@@ -60,8 +60,8 @@ fn every_rule_of_tracking_is_broken_by_itself() {
     }
     let mut scene = ball_scene();
     let good = ball_plan(&mut scene);
-    // Segments: 0 carried, 1 pure rolling, 2 rolling, 3 pure sliding, 4 sliding, 5 twisting; finger 1 twists in 0, 2 and 5, where 2
-    // and 3 slide.
+    // Segments: 0 carried, 1 pure rolling, 2 rolling, 3 pure sliding, 4 sliding, 5 twisting; finger 1 twists in 0, 2 and 5,
+    // where 2 and 3 slide.
     let cases: [(Damage, &[ViolationKind]); 22] = [
         (&|p| states(p, 0, 1).for_each(|c| c.mode = ContactMode::Rolling), &[]),
         (&|p| states(p, 1, 0).for_each(|c| c.mode = ContactMode::Rolling), &[]),

@@ -416,8 +416,8 @@ fn is_all(segment: &Segment, f: usize, mode: ContactMode) -> bool {
     segment.kind == SegmentKind::Tracking && segment.waypoints.iter().all(|w| w.contacts[f].mode == mode)
 }
 
-/// True when finger `f` clearly does it in the segment: by its stated velocity, which a good plan has right, and by its turns from
-/// waypoint to waypoint.
+/// True when finger `f` clearly does it in the segment: by its stated velocity, which a good plan has right, and by its
+/// turns from waypoint to waypoint.
 fn does_it(model: &Model, segment: &Segment, f: usize, does: Does, slip_tolerance: f64) -> bool {
     let seen = |waypoint: &Waypoint| {
         let link = crate::check::kinematics::pose_of(&model.fingers[f].path.world_from_link(&waypoint.joints));
