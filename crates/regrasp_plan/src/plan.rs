@@ -103,15 +103,17 @@ pub struct ContactState {
     /// any; it is absent where the force is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub torsion: Option<f64>,
-    /// Contact point in the frame of the fingertip's link, in metres. In tracking, where it is part of what is planned.
+    /// Contact point at this waypoint in the frame of the fingertip's link, in metres. In tracking, where it is part of what is
+    /// planned.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub point_in_tip: Option<[f64; 3]>,
-    /// Velocity of the fingertip's point that touches, seen from the object, in the object frame, in metres per second: that
-    /// of the way from this waypoint to the next, at the last one that to it. In tracking.
+    /// Velocity of the fingertip's material point that touches, seen from the object, without its part along the normal, in
+    /// the object frame, in metres per second: its mean over the way from this waypoint to the next, at the last one over
+    /// that to it; zero where the mode does not slide. In tracking.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub relative_velocity_in_object: Option<[f64; 3]>,
-    /// Angular velocity of the fingertip seen from the object, in the object frame, in radians per second; of the same way. In
-    /// tracking.
+    /// Angular velocity of the fingertip's link seen from the object, in the object frame, in radians per second: the rotation
+    /// vector of the same way over its time; zero where the mode does not turn. In tracking.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub relative_turn_in_object: Option<[f64; 3]>,
 }

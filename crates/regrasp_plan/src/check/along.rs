@@ -7,7 +7,7 @@ use crate::check::model::Model;
 use crate::check::motion::Step;
 use crate::check::promises::{Holder, grips_of, holders};
 use crate::check::{CheckSettings, Log, form_is_sound};
-use crate::plan::{Plan, Segment, Waypoint};
+use crate::plan::{Plan, Segment, SegmentKind, Waypoint};
 use regrasp_scene::Scene;
 use std::collections::BTreeMap;
 
@@ -31,8 +31,9 @@ pub struct Nearest {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Along {
     /// Closure margin of the fingers that hold, in a regrasp without the one that moves: a proven lower bound as in the
-    /// report, and zero where no closure was proved. Of more than six fingers that roll, what forces found at one of the
-    /// waypoints before prove: maybe less than could be proved, at least 98 % of the margin there.
+    /// report, and zero where no closure was proved, and in tracking, where none is judged. Of more than six fingers that
+    /// roll, what forces found at one of the waypoints before prove: maybe less than could be proved, at least 98 % of the
+    /// margin there.
     pub margin: Vec<f64>,
     /// The nearest pair; none where a distance is not resolved, or nothing must be kept apart.
     pub clearance: Vec<Option<Nearest>>,
@@ -56,7 +57,10 @@ pub fn along(scene: &Scene, plan: &Plan) -> Result<Along, String> {
         let moving = moving_finger(&model, segment);
         let judged = clearances.judged_in(segment);
         for waypoint in &segment.waypoints {
-            along.margin.push(margins.of(&model, &holders(&model, moving, waypoint)));
+            along.margin.push(match segment.kind {
+                SegmentKind::Tracking => 0.0,
+                _ => margins.of(&model, &holders(&model, moving, waypoint)),
+            });
             let nearest = clearances.at(waypoint, &judged);
             along.clearance.push(nearest.map(|(distance, pair)| Nearest { distance, pair }));
         }

@@ -9,7 +9,7 @@ use crate::check::surface;
 use crate::check::tip::TipSurface;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
-use crate::plan::{ContactMode, Plan, Waypoint};
+use crate::plan::{ContactMode, Plan, SegmentKind, Waypoint};
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp::Contact;
 use regrasp_scene::Object;
@@ -20,12 +20,14 @@ const MOST_SAMPLES: usize = 4096;
 
 /// Largest distance of a fingertip from the fixed contact that it holds, over the plan; violations go to the log.
 ///
-/// Between samples the bound is exact: the centre of a ball in the object frame deviates from the chord between two samples by
-/// at most (largest acceleration) (interval)^2 / 8; what touches of another tip moves by at most (largest speed) (interval) / 2.
+/// Between samples the bound is exact: the centre of a ball in the object frame deviates from the chord between two samples
+/// by at most (largest acceleration) (interval)^2 / 8; what touches of another tip moves by at most (largest speed)
+/// (interval) / 2.
 pub fn check_tips(model: &Model, plan: &Plan, log: &mut Log) -> f64 {
     let tolerance = plan.promises.contact_tolerance;
     let mut largest: f64 = 0.0;
-    for (s, segment) in plan.segments.iter().enumerate() {
+    // Tips in tracking are judged in `tracking`.
+    for (s, segment) in plan.segments.iter().enumerate().filter(|(_, one)| one.kind != SegmentKind::Tracking) {
         let moving = moving_finger(model, segment);
         for (f, finger) in model.fingers.iter().enumerate() {
             let mut report = |error: f64, at: Moment| {
@@ -140,7 +142,8 @@ pub fn check_pads(model: &Model, plan: &Plan, log: &mut Log) {
     }
 }
 
-/// Every contact of the plan lies on the object's surface, with the surface's normal, away from its edges.
+/// Every contact of the plan lies on the object's surface, with the surface's normal, away from its edges: on an edge any
+/// normal between those of its faces is one. Tracking crosses edges, so contacts there may be near.
 pub fn check_contacts(object: &Object, model: &Model, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
     let mut seen = BTreeSet::new();
     let edges = Edges::of(&object.shape, object.crease_angle);
@@ -149,7 +152,8 @@ pub fn check_contacts(object: &Object, model: &Model, plan: &Plan, settings: &Ch
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
             for (f, state) in waypoint.contacts.iter().enumerate() {
                 let (Some(point), Some(normal)) = (state.point_in_object, state.normal_in_object) else { continue };
-                if !seen.insert((point.map(f64::to_bits), normal.map(f64::to_bits))) {
+                let may_cross = segment.kind == SegmentKind::Tracking;
+                if !seen.insert((may_cross, point.map(f64::to_bits), normal.map(f64::to_bits))) {
                     continue;
                 }
                 let name = model.fingers[f].name.as_str();
@@ -167,6 +171,9 @@ pub fn check_contacts(object: &Object, model: &Model, plan: &Plan, settings: &Ch
                 if angle > settings.normal_tolerance {
                     let message = format!("the normal of finger \"{name}\" is {angle:.3e} rad off the surface's");
                     log.push(tell(Kind::ContactNormalWrong, message, angle, settings.normal_tolerance));
+                }
+                if may_cross {
+                    continue;
                 }
                 let edge = edges.distance(&Point::from(point), least);
                 if edge < least {

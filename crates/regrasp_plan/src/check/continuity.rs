@@ -2,6 +2,7 @@
 //! which finger may change what.
 
 use crate::check::model::Model;
+use crate::check::tracking;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, ContactState, FORMAT, FORMAT_VERSION, Plan, PoseData, Segment, SegmentKind, Waypoint};
@@ -154,13 +155,22 @@ pub fn check_ends(query: Option<&InHandQuery>, plan: &Plan, settings: &CheckSett
         log.push(Violation::new(Kind::WrongScene, message));
     }
     let last_moment = Moment::at(plan.segments.len() - 1, plan.segments.last().map_or(0, |s| s.waypoints.len() - 1));
+    let goal_tolerance = plan.promises.tracking.as_ref().map(|tracking| tracking.goal_tolerance);
     let sides = [
         (Kind::StartMismatch, "start", &plan.start, first, Moment::at(0, 0)),
         (Kind::GoalMismatch, "goal", &plan.goal, last, last_moment),
     ];
     for (kind, name, asked, waypoint, at) in sides {
+        // The goal of tracking is an orientation.
+        let within = goal_tolerance.filter(|_| kind == Kind::GoalMismatch);
         let (distance, angle) = pose_difference(asked, &waypoint.world_from_object);
-        if distance > settings.pose_tolerance || angle > settings.pose_tolerance {
+        if let Some(limit) = within {
+            if angle > limit.min(settings.largest_goal_tolerance) {
+                let message = format!("the object is {angle:.4} rad from the {name} asked for");
+                let violation = Violation::new(kind, message).when(at).subjects(["object"]);
+                log.push(violation.amount(angle, limit));
+            }
+        } else if distance > settings.pose_tolerance || angle > settings.pose_tolerance {
             let message = format!("the object is {distance:.3e} m and {angle:.3e} rad from the {name} asked for");
             let violation = Violation::new(kind, message).when(at).subjects(["object"]);
             log.push(violation.amount(distance.max(angle), settings.pose_tolerance));
@@ -171,6 +181,7 @@ pub fn check_ends(query: Option<&InHandQuery>, plan: &Plan, settings: &CheckSett
             _ => (&query.world_from_object_goal, &query.goal_grasp),
         };
         let (distance, angle) = pose_difference(&PoseData::from(pose), asked);
+        let distance = if within.is_some() { 0.0 } else { distance };
         if distance > settings.pose_tolerance || angle > settings.pose_tolerance {
             let message = format!("the plan's {name} is {distance:.3e} m and {angle:.3e} rad from the scene's");
             let violation = Violation::new(kind, message).subjects(["object"]);
@@ -281,6 +292,7 @@ pub fn check_roles(model: &Model, plan: &Plan, settings: &CheckSettings, log: &m
     for (s, segment) in plan.segments.iter().enumerate() {
         match segment.kind {
             SegmentKind::Transfer => {
+                check_rolling_finger_absent(segment, s, log);
                 if segment.moving_finger.is_some() {
                     let message = "a transfer names a moving finger";
                     log.push(Violation::new(Kind::WrongMovingFinger, message).when(Moment::at(s, 0)));
@@ -290,8 +302,41 @@ pub fn check_roles(model: &Model, plan: &Plan, settings: &CheckSettings, log: &m
                     check_may_roll(model, segment, s, finger, log);
                 }
             }
-            SegmentKind::Regrasp => check_regrasp_roles(model, segment, s, settings, log),
-            SegmentKind::Tracking => {}
+            SegmentKind::Regrasp => {
+                check_rolling_finger_absent(segment, s, log);
+                check_regrasp_roles(model, segment, s, settings, log);
+            }
+            SegmentKind::Tracking => {
+                tracking::check_tracking_roles(model, segment, s, settings, log);
+                let [moving, _] = tracking::named_fingers(model, segment);
+                let others = (0..model.fingers.len()).filter(|f| Some(*f) != moving);
+                others.for_each(|f| check_rests(model, segment, s, f, settings, log));
+            }
+        }
+        tracking::check_present(model, segment, s, log);
+    }
+}
+
+fn check_rolling_finger_absent(segment: &Segment, s: usize, log: &mut Log) {
+    if segment.rolling_finger.is_some() {
+        let message = "a rolling finger is named outside tracking";
+        log.push(Violation::new(Kind::WrongRollingFinger, message).when(Moment::at(s, 0)));
+    }
+}
+
+/// The joints of finger `f` stay where they are all through the segment.
+fn check_rests(model: &Model, segment: &Segment, s: usize, f: usize, settings: &CheckSettings, log: &mut Log) {
+    let (finger, first) = (&model.fingers[f], &segment.waypoints[0]);
+    for (w, waypoint) in segment.waypoints.iter().enumerate() {
+        let moved = finger.coordinates.clone().map(|k| (waypoint.joints[k] - first.joints[k]).abs());
+        let moved = moved.fold(0.0, f64::max);
+        if moved > settings.meeting_tolerance {
+            let message =
+                format!("finger \"{}\" moves {moved:.3e} while another one is the moving finger", finger.name);
+            let violation = Violation::new(Kind::WrongMovingFinger, message).when(Moment::at(s, w));
+            let violation = violation.subjects([finger.name.as_str()]);
+            log.push(violation.amount(moved, settings.meeting_tolerance));
+            break;
         }
     }
 }
@@ -316,17 +361,7 @@ fn check_regrasp_roles(model: &Model, segment: &Segment, s: usize, settings: &Ch
         check_may_roll(model, segment, s, f, log);
         if Some(f) != moving {
             check_constant(model, segment, s, f, settings, log);
-            for (w, waypoint) in segment.waypoints.iter().enumerate() {
-                let moved = finger.coordinates.clone().map(|k| (waypoint.joints[k] - first.joints[k]).abs());
-                let moved = moved.fold(0.0, f64::max);
-                if moved > settings.meeting_tolerance {
-                    let message = format!("finger \"{}\" moves {moved:.3e} while another one relocates", finger.name);
-                    let violation = Violation::new(Kind::WrongMovingFinger, message).when(Moment::at(s, w));
-                    let violation = violation.subjects([finger.name.as_str()]);
-                    log.push(violation.amount(moved, settings.meeting_tolerance));
-                    break;
-                }
-            }
+            check_rests(model, segment, s, f, settings, log);
             continue;
         }
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
@@ -347,9 +382,9 @@ fn check_may_roll(model: &Model, segment: &Segment, s: usize, f: usize, log: &mu
     let rolls = |waypoint: &Waypoint| waypoint.contacts[f].mode == ContactMode::Rolling;
     let Some(w) = segment.waypoints.iter().position(rolls) else { return };
     let why = match segment.kind {
-        SegmentKind::Transfer | SegmentKind::Tracking if finger.radius > 0.0 => return,
-        SegmentKind::Transfer | SegmentKind::Tracking => "its tip is sharp",
         SegmentKind::Regrasp => "the object rests",
+        _ if finger.radius > 0.0 => return,
+        _ => "its tip is sharp",
     };
     let message = format!("finger \"{}\" rolls, but {why}", finger.name);
     let violation = Violation::new(Kind::WrongContactMode, message).when(Moment::at(s, w));
@@ -362,7 +397,10 @@ fn check_constant(model: &Model, segment: &Segment, s: usize, f: usize, settings
     let first = &segment.waypoints[0].contacts[f];
     for (w, waypoint) in segment.waypoints.iter().enumerate() {
         let contact = &waypoint.contacts[f];
-        if contact.mode != first.mode {
+        if !matches!(contact.mode, ContactMode::Fixed | ContactMode::Rolling | ContactMode::Free) {
+            let message = format!("finger \"{name}\" is {:?}, which is for tracking only", contact.mode);
+            log.push(Violation::new(Kind::WrongContactMode, message).when(Moment::at(s, w)).subjects([name]));
+        } else if contact.mode != first.mode {
             let (was, is) = (mode_in_words(first.mode), mode_in_words(contact.mode));
             let message = format!("finger \"{name}\" {was} when the segment begins, but {is} here");
             log.push(Violation::new(Kind::WrongContactMode, message).when(Moment::at(s, w)).subjects([name]));

@@ -7,6 +7,9 @@
 //! - the force of a holding finger is in the exact cone of its contact model (`CONVENTIONS.md`) with the friction of
 //!   `closure::Body::of`, and its normal part in the promised range, both within `force_tolerance`; the moving finger of a
 //!   regrasp exerts nothing, within the first two tolerances;
+//! - in tracking, a fingertip that slides has friction of the scene's coefficient times the normal force along its relative
+//!   velocity in the plan (which `tracking` holds against the poses), within the share `sliding_force_tolerance`, and no
+//!   torsion;
 //! - every joint's torque is the work of force and torsion per unit of its coordinate, within the share `torque_tolerance` of
 //!   the largest that this work could be, and at most the promised one;
 //! - without a direction of gravity there is room for the weight in each (`any_gravity`).
@@ -40,6 +43,8 @@ const GRAVITY_TOLERANCE: f64 = 1e-6;
 const ROUNDING: f64 = 1e-9;
 /// Torques may be this far off whatever the forces, in newton metres: rounding.
 const TORQUE_ROUNDING: f64 = 1e-9;
+/// Friction of what slides may be this far off whatever its size, in newtons: rounding.
+const SLIDING_ROUNDING: f64 = 1e-12;
 
 /// How well forces balance: the largest residuals of the plan.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -50,6 +55,8 @@ pub struct Balance {
     pub moment: f64,
     /// Half-way between waypoints, torques over the torque scale, as a share of the sum of all normal forces.
     pub half_way: f64,
+    /// Of the friction of sliding fingertips, as a share of friction times normal force; none when no finger slides.
+    pub sliding: Option<f64>,
 }
 
 /// What one finger exerts at one waypoint.
@@ -60,6 +67,8 @@ pub(super) struct Exerted {
     pub(super) normal: Vector,
     pub(super) force: Vector,
     pub(super) torsion: f64,
+    /// Where a fingertip slides, seen from the object and across the normal, a unit vector or zero.
+    pub(super) slides: Option<Vector>,
 }
 
 impl Exerted {
@@ -86,6 +95,10 @@ pub fn check_forces(
         return None;
     };
     check_promises(scene, model, promises, log);
+    if plan.promises.tracking.is_some() && promises.gravity_in_world.is_none() {
+        let message = "gravity of any direction in tracking: friction of what slides has but one";
+        log.push(Violation::new(Kind::PromiseBroken, message).subjects(["gravity_in_world"]));
+    }
     let judge = Judge { object, body: Body::of(object, plan), model, plan, promises, settings };
     let mut balance = Balance::default();
     for (s, segment) in plan.segments.iter().enumerate() {
@@ -97,6 +110,11 @@ pub fn check_forces(
             (balance.force, balance.moment) = (balance.force.max(force), balance.moment.max(moment));
             for one in &exerted {
                 judge.check_contact(one, moving, at, log);
+                if let Some(direction) = one.slides {
+                    let full = judge.sliding_friction(&model.fingers[one.finger]) * one.pressing();
+                    let share = judge.sliding_error(one, &direction, full) / full.abs().max(SLIDING_ROUNDING);
+                    balance.sliding = Some(balance.sliding.map_or(share, |most| most.max(share)));
+                }
             }
             judge.check_torques(waypoint, &exerted, at, log);
             if promises.gravity_in_world.is_none() {
@@ -202,6 +220,7 @@ impl Judge<'_> {
                 normal: contact.normal_in_object.into_inner(),
                 force: Vector::from(force),
                 torsion: state.torsion.unwrap_or(0.0),
+                slides: sliding_direction(state, &contact.normal_in_object),
             });
         }
         Some(exerted)
@@ -256,8 +275,20 @@ impl Judge<'_> {
         }
         let pressing = one.pressing();
         let across = self.across(one);
+        if let Some(direction) = one.slides {
+            let full = self.sliding_friction(finger) * pressing;
+            let error = self.sliding_error(one, &direction, full);
+            let limit = self.settings.sliding_force_tolerance * full.abs() + SLIDING_ROUNDING;
+            if error > limit {
+                let message = format!(
+                    "finger \"{}\" slides with a force {error:.4e} N off friction of {full:.4e} N along its way",
+                    finger.name
+                );
+                report(Kind::SlidingForceWrong, message, error, limit);
+            }
+        }
         let room = if finger.contact == ContactModel::Frictionless { 0.0 } else { self.body.friction * pressing };
-        if across > room + tolerance {
+        if one.slides.is_none() && across > room + tolerance {
             let message = format!(
                 "finger \"{}\" exerts {across:.4e} N across the normal (torsion over its radius counted), {room:.4e} N are left by friction",
                 finger.name
@@ -270,6 +301,23 @@ impl Judge<'_> {
                 format!("finger \"{}\" presses with {pressing:.6} N, not {least} to {largest} N", finger.name);
             report(Kind::NormalForceOutOfRange, message, pressing, if pressing < least { least } else { largest });
         }
+    }
+
+    /// The friction coefficient of a fingertip that slides: the scene's, as friction then has its full size.
+    fn sliding_friction(&self, finger: &FingerModel) -> f64 {
+        if finger.contact == ContactModel::Frictionless { 0.0 } else { self.object.friction }
+    }
+
+    /// Length of what a force across the normal has beside friction of the size `full` along `direction`; a torsion, of
+    /// which none is left where friction has its full size, counts too.
+    fn sliding_error(&self, one: &Exerted, direction: &Vector, full: f64) -> f64 {
+        let tangential = one.force + one.normal * one.pressing();
+        let torsion = match self.torsion_radius(one) {
+            _ if one.torsion == 0.0 => 0.0,
+            0.0 => f64::INFINITY,
+            radius => one.torsion / radius,
+        };
+        (tangential - direction * full).norm().hypot(torsion)
     }
 
     /// The torsion radius of a soft finger; zero where no torsion is transmitted.
@@ -346,7 +394,7 @@ impl Judge<'_> {
                 let Some(contact) = roll.contact(0.5) else { continue };
                 contact
             };
-            exerted.push(Exerted { finger: f, point, normal, force, torsion });
+            exerted.push(Exerted { finger: f, point, normal, force, torsion, slides: None });
         }
         let pressing: f64 = exerted.iter().map(Exerted::pressing).sum();
         let ends = [from, to].map(|waypoint| Pose::from(&waypoint.world_from_object));
@@ -365,6 +413,14 @@ impl Judge<'_> {
         }
         share
     }
+}
+
+/// Where a fingertip slides by its relative velocity, across `normal`: a unit vector, or zero without one; none in modes
+/// that do not slide.
+fn sliding_direction(state: &ContactState, normal: &Vector) -> Option<Vector> {
+    let velocity = state.relative_velocity_in_object.map_or(Vector::zeros(), Vector::from);
+    let across = velocity - normal * normal.dot(&velocity);
+    state.mode.slides().then(|| across.try_normalize(0.0).unwrap_or_else(Vector::zeros))
 }
 
 /// Work of a joint against a force and a couple of its finger's tip, per unit of the coordinate that drives it.

@@ -49,6 +49,8 @@ pub mod surface;
 pub mod times;
 /// Fingertips: where they touch.
 pub mod tip;
+/// Fingertips that stay on the object in tracking, and how far they may go.
+pub mod tracking;
 /// What can be wrong with a plan.
 pub mod violation;
 /// Poses to be passed between start and goal.
@@ -111,6 +113,26 @@ pub struct CheckSettings {
     pub lift_clearance: f64,
     /// The tip of a finger that is free all through a segment keeps this far from the object, in metres.
     pub free_clearance: f64,
+    /// Largest goal tolerance that a tracking plan may promise, in radians. Paper 003, table 2: a cell of 2.406 degrees.
+    pub largest_goal_tolerance: f64,
+    /// In tracking, a fingertip that does not turn, or not about the normal, or not across it, may do so by this much in a
+    /// segment, in radians: what the largest slip tolerance is at 50 mm from the axis.
+    pub turn_tolerance: f64,
+    /// A fingertip that slides in tracking is faster than this in every step, in metres per second: sliding has a direction
+    /// then.
+    pub smallest_sliding_speed: f64,
+    /// A fingertip that does not slide in tracking slips no faster than this on the mean of a segment, in metres per
+    /// second: short segments would let it slide otherwise. A fiftieth of the velocity at which fingertips slide in paper
+    /// 003 (table 3).
+    pub largest_slip_speed: f64,
+    /// Relative velocities and turns of a tracking plan may be off by this share of their size: those at a moment differ
+    /// from the means of a step, and nothing but the direction of friction counts on them.
+    pub relative_velocity_share: f64,
+    /// Directions of sliding may be off by this much, in radians.
+    pub relative_velocity_angle: f64,
+    /// Friction of a sliding fingertip may differ from the scene's coefficient times the normal force, along the sliding,
+    /// by this share of it. Issue 6: 1e-9.
+    pub sliding_force_tolerance: f64,
     /// Most violations of a kind that are reported one by one.
     pub most_per_kind: usize,
 }
@@ -137,6 +159,13 @@ impl Default for CheckSettings {
             resolution: 0.05e-3,
             lift_clearance: 0.1e-3,
             free_clearance: 0.05e-3,
+            largest_goal_tolerance: 0.042,
+            turn_tolerance: 2e-3,
+            smallest_sliding_speed: 1e-5,
+            largest_slip_speed: 1e-4,
+            relative_velocity_share: 0.05,
+            relative_velocity_angle: 0.02,
+            sliding_force_tolerance: 1e-9,
             most_per_kind: 20,
         }
     }
@@ -167,7 +196,8 @@ pub struct Report {
     /// Largest distance of a holding fingertip from its contact, in metres, certified between waypoints; for tips that roll
     /// the largest that was measured, while between waypoints it is certified to be within the tolerance.
     pub max_contact_error: f64,
-    /// Largest slip of a finger that rolls, in a segment, in metres; none when no finger rolls.
+    /// Largest slip in a segment of a finger that rolls, or that does not slide in tracking, in metres; none when there is
+    /// none.
     pub max_slip: Option<f64>,
     /// Largest imbalance of forces and weight at a waypoint, in newtons; none in plans without forces.
     pub max_force_residual: Option<f64>,
@@ -176,6 +206,9 @@ pub struct Report {
     /// Largest imbalance half-way between waypoints, torques over the torque scale, as a share of the sum of all normal
     /// forces; none in plans without forces.
     pub max_half_way_imbalance: Option<f64>,
+    /// Largest distance of the friction of a sliding fingertip from Coulomb's law, as a share of friction times normal
+    /// force; none when no finger slides.
+    pub max_sliding_force_error: Option<f64>,
     /// Time that the plan takes, in seconds.
     pub duration: f64,
     /// Waypoints judged.
@@ -254,8 +287,13 @@ fn judge(
     continuity::check_joints(model, plan, settings, log);
     continuity::check_roles(model, plan, settings, log);
     let rolled = rolling::check_rolling(&scene.object.shape, model, plan, settings, log);
-    report.max_contact_error = contact::check_tips(model, plan, log).max(rolled.max_contact_error);
-    report.max_slip = rolled.max_slip;
+    let tracked = tracking::check_tracking(&scene.object.shape, model, plan, settings, log);
+    let held = contact::check_tips(model, plan, log);
+    report.max_contact_error = held.max(rolled.max_contact_error).max(tracked.max_contact_error);
+    report.max_slip = [rolled.max_slip, tracked.max_slip].into_iter().flatten().reduce(f64::max);
+    if let Some(reach) = scene.reach {
+        tracking::check_reach(reach, model, plan, settings, log);
+    }
     contact::check_pads(model, plan, log);
     contact::check_contacts(&scene.object, model, plan, settings, log);
     report.min_margin = promises::check_closure(&scene.object, model, plan, settings, log);
@@ -266,6 +304,7 @@ fn judge(
         report.max_force_residual = Some(balance.force);
         report.max_moment_residual = Some(balance.moment);
         report.max_half_way_imbalance = Some(balance.half_way);
+        report.max_sliding_force_error = balance.sliding;
     }
     match bodies::Bodies::new(scene, model) {
         Err(message) => log.push(Violation::new(ViolationKind::WrongScene, message)),

@@ -27,6 +27,10 @@ pub struct FingerModel {
     pub contact: ContactModel,
     /// The link that may touch the object.
     pub tip_link: LinkId,
+    /// Pose of that link in the frame of the last moving body.
+    pub body_from_tip_link: Matrix4<f64>,
+    /// Centre of the tip in the world when the hand is in its rest posture.
+    pub center_at_rest: Point,
     /// First and one past the last index of this finger's coordinates in a joint vector.
     pub coordinates: std::ops::Range<usize>,
     /// Indices in `Robot::joints` of all moving joints on the path.
@@ -100,16 +104,20 @@ impl Model {
         let world_from_root = world_from_root(hand)?;
         let mut fingers = Vec::new();
         let mut first = 0;
+        let at_rest: Vec<f64> = hand.fingers.iter().flat_map(|finger| finger.rest.iter().copied()).collect();
         for finger in &hand.fingers {
             let mut path = Path::new(robot, finger.tip.link, &world_from_root, &joint_names)?;
-            path.last_from_link = Matrix4::identity();
+            let body_from_tip_link = std::mem::replace(&mut path.last_from_link, Matrix4::identity());
+            let center = finger.tip.center_in_body;
             let coordinates = first..first + finger.chain.n_coordinates();
             first = coordinates.end;
             fingers.push(FingerModel {
                 name: finger.name.clone(),
                 moving_joints: path.joints.iter().map(|joint| joint.joint).collect(),
+                center_at_rest: path.world_from_link(&at_rest).transform_point(&center),
                 path,
-                center: finger.tip.center_in_body,
+                body_from_tip_link,
+                center,
                 radius: finger.tip.radius(),
                 surface: TipSurface::of(&finger.tip),
                 pad: finger.tip.pad,

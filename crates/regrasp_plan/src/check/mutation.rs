@@ -15,6 +15,8 @@ mod hand;
 mod rolling;
 /// Times and velocities.
 mod times;
+/// Tracking: modes, relative velocities, friction of what slides.
+mod tracking;
 /// Way poses gone wrong.
 mod way;
 
@@ -22,7 +24,7 @@ use crate::check::continuity::{contact_of, moving_finger, pose_difference};
 use crate::check::model::Model;
 use crate::check::violation::ViolationKind::{self, *};
 use crate::plan::{ContactMode, ContactState, Plan, PoseData, Segment, SegmentKind, Waypoint};
-use choice::{any_segment, any_waypoint, pick, pick_waypoint, swap_two, waypoints_mut};
+use choice::{any_closed, any_segment, any_waypoint, pick, pick_waypoint, swap_two, waypoints_mut};
 use nalgebra::{DMatrix, DVector};
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, Shape, UnitVector, Vector};
@@ -63,6 +65,7 @@ pub fn mutants(plan: &Plan, scene: &Scene, rng: &mut Rng) -> Vec<Mutant> {
     breeder.break_rolling();
     breeder.break_forces();
     breeder.break_times();
+    breeder.break_tracking();
     breeder.found
 }
 
@@ -110,7 +113,7 @@ impl Breeder<'_> {
         });
         self.add("friction promise lowered below closure", &[ClosureLost, PromiseBroken], |plan, rng| {
             plan.promises.friction *= rng.uniform(0.001, 0.02);
-            Some(())
+            any_closed(plan, rng).map(|_| ())
         });
         self.add("contact tolerance raised", &[PromiseBroken], |plan, rng| {
             plan.promises.contact_tolerance = rng.uniform(0.51e-3, 0.7e-3);
@@ -124,7 +127,7 @@ impl Breeder<'_> {
             // No grasp has a Ferrari-Canny radius above one.
             plan.promises.kept_margin = rng.uniform(1.0, 1.1);
             plan.promises.required_margin = plan.promises.kept_margin;
-            Some(())
+            any_closed(plan, rng).map(|_| ())
         });
         self.add("kept margin invented", &[PromiseBroken], |plan, rng| {
             plan.promises.kept_margin = rng.uniform(0.9, 1.0);
@@ -150,12 +153,12 @@ impl Breeder<'_> {
         });
         self.add("goal asked for elsewhere", &[GoalMismatch], |plan, rng| {
             shift(&mut plan.goal, rng, 1e-5, 1e-4);
-            Some(())
+            plan.promises.tracking.is_none().then_some(())
         });
         self.add("two joint names swapped", &[WrongScene], |plan, rng| swap_two(&mut plan.joint_names, rng));
         self.add("two finger names swapped", &[WrongScene], |plan, rng| swap_two(&mut plan.fingers, rng));
         self.add("task renamed", &[WrongScene], |plan, _| {
-            plan.task = "tracking".into();
+            plan.task = if plan.task == "tracking" { "in_hand" } else { "tracking" }.into();
             Some(())
         });
     }
@@ -185,7 +188,7 @@ impl Breeder<'_> {
             plan.segments.reverse();
             plan.segments.iter_mut().for_each(|segment| segment.waypoints.reverse());
             let (distance, angle) = pose_difference(&plan.start, &plan.goal);
-            (distance.max(angle) > 1e-4).then_some(())
+            (distance.max(angle) > 1e-4 && plan.promises.tracking.is_none()).then_some(())
         });
         self.add("beginning cut off", &[StartMismatch], |plan, _| {
             let moved = plan.segments.iter().position(|s| s.kind == SegmentKind::Transfer && travel(s) > 1e-4)?;
@@ -290,7 +293,11 @@ impl Breeder<'_> {
             && scene.object.edge_distance > 1e-4
         {
             let distance = scene.object.edge_distance;
+            let may_cross = self.plan.promises.tracking.is_some();
             self.add("contact at an edge", &[ContactTooNearEdge], |plan, rng| {
+                if may_cross {
+                    return None;
+                }
                 let inset = distance * rng.uniform(0.3, 0.9);
                 replace_contact(plan, model, rng, |mut point, normal, _| {
                     let k = if normal.x.abs() < 0.5 { 0 } else { 1 };
@@ -300,7 +307,7 @@ impl Breeder<'_> {
             });
         }
         self.add("all contacts in one place", &[ClosureLost], |plan, rng| {
-            let segment = pick(&mut plan.segments, rng)?;
+            let segment = any_closed(plan, rng)?;
             for waypoint in &mut segment.waypoints {
                 let first = *waypoint.contacts.iter().find(|contact| contact.holds())?;
                 let others = waypoint.contacts.iter_mut().filter(|contact| contact.holds());
@@ -309,7 +316,7 @@ impl Breeder<'_> {
             Some(())
         });
         self.add("all contacts on one side", &[ClosureLost], |plan, rng| {
-            let segment = pick(&mut plan.segments, rng)?;
+            let segment = any_closed(plan, rng)?;
             let center = scene.object.center_of_mass;
             let pole = Vector::from(rng.direction());
             for waypoint in &mut segment.waypoints {

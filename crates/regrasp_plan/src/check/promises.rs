@@ -3,9 +3,11 @@
 //! - Input files: the same roles, names and SHA-256 as the scene's, none more and none less.
 //! - Friction: not negative, at most the scene's, and at most that over `friction_margin`, which is at least 1.
 //! - Contact and slip tolerance: at most what the settings accept. That they are kept is judged in `contact` and `rolling`.
-//! - Closure: at every waypoint, of exactly the fingers that hold, with the margin promised or asked for by the settings; the
-//!   margin is that of `closure`, dimensionless, with torques divided by the object's radius, which `torque_scale` has to
-//!   be. The margin said to be kept is no more than the smallest one found.
+//! - Tracking: the goal's tolerance is at most what the settings accept, friction of what slides is the scene's.
+//! - Closure: at every waypoint but those of tracking, of exactly the fingers that hold, with the margin promised or asked
+//!   for by the settings; the margin is that of `closure`, dimensionless, with torques divided by the object's radius,
+//!   which `torque_scale` has to be. The margin said to be kept is no more than the smallest one found; where none is
+//!   judged, no margin is promised.
 //!
 //! Tolerances, for rounding and two solvers, are the constants below.
 
@@ -14,7 +16,7 @@ use crate::check::continuity::{contact_of, moving_finger};
 use crate::check::model::Model;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
-use crate::plan::{Plan, Waypoint};
+use crate::plan::{Plan, SegmentKind, Waypoint};
 use regrasp_grasp::{Contact, Grip};
 use regrasp_scene::{InputFile, Object};
 use std::collections::BTreeSet;
@@ -139,6 +141,10 @@ fn holding_sets(model: &Model, plan: &Plan) -> Vec<Holding> {
     let mut seen = BTreeSet::new();
     let mut sets = Vec::new();
     for (s, segment) in plan.segments.iter().enumerate() {
+        // Fingers that slide close nothing: forces alone hold the object in tracking.
+        if segment.kind == SegmentKind::Tracking {
+            continue;
+        }
         let moving = moving_finger(model, segment);
         // A waypoint may break the roles; closure is judged for what really holds there.
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
@@ -201,6 +207,22 @@ pub fn check_promises(object: &Object, plan: &Plan, settings: &CheckSettings, mi
     {
         let message = format!("the plan says it keeps margin {}, found is {found}", promises.kept_margin);
         broken("kept_margin", promises.kept_margin, found, message);
+    }
+    let promised = promises.required_margin.max(promises.kept_margin);
+    if min_margin.is_none() && promised != 0.0 {
+        let message = format!("a margin of {promised} where no closure is asked for");
+        broken("kept_margin", promised, 0.0, message);
+    }
+    if let Some(tracking) = &promises.tracking {
+        let (asked, limit) = (tracking.goal_tolerance, settings.largest_goal_tolerance);
+        if !(asked >= 0.0 && asked <= limit) {
+            broken("goal_tolerance", asked, limit, format!("goal tolerance {asked} rad, at most {limit} is accepted"));
+        }
+        let (friction, limit) = (tracking.sliding_friction, object.friction);
+        if (friction - limit).abs() > FRICTION_TOLERANCE {
+            let message = format!("sliding friction {friction}, the scene's is {limit}");
+            broken("sliding_friction", friction, limit, message);
+        }
     }
     let scale = object.radius;
     if (promises.torque_scale - scale).abs() > SCALE_TOLERANCE * scale {

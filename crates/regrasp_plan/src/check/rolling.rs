@@ -13,15 +13,17 @@ use crate::check::patch::Patch;
 use crate::check::tip::TipSurface;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
-use crate::plan::{ContactMode, Plan, Waypoint};
-use nalgebra::Matrix4;
+use crate::plan::{ContactMode, Plan, SegmentKind, Waypoint};
+use nalgebra::{Matrix4, Rotation3, UnitQuaternion};
 use regrasp_geometry::{Point, Pose, Shape, Vector};
 
 /// Pieces after which no finer sum is made; what is then unknown counts as slip.
 const MOST_PIECES: usize = 128;
 /// Share of the slip allowed that may stay unknown in a step. What is unknown counts as slip: of the slip allowed to a
 /// segment of fifty steps it takes at most a tenth.
-const UNKNOWN_SHARE: f64 = 0.002;
+pub(super) const UNKNOWN_SHARE: f64 = 0.002;
+/// Pieces of a step in which turns are measured: the error falls with their square.
+const TURN_PIECES: usize = 8;
 /// Motion that is too small to be divided further when it cannot be told whether the tip is on the surface, as a share
 /// of the contact tolerance.
 const SMALLEST_PIECE: f64 = 1e-3;
@@ -41,7 +43,9 @@ pub fn check_rolling(shape: &Shape, model: &Model, plan: &Plan, settings: &Check
     let tolerance = plan.promises.contact_tolerance.min(settings.largest_contact_tolerance);
     let slip_tolerance = plan.promises.slip_tolerance.min(settings.largest_slip_tolerance);
     let mut rolled = Rolled::default();
-    for (s, segment) in plan.segments.iter().enumerate() {
+    // What rolls in tracking is judged in `tracking`.
+    let judged = plan.segments.iter().enumerate().filter(|(_, segment)| segment.kind != SegmentKind::Tracking);
+    for (s, segment) in judged {
         for (f, finger) in model.fingers.iter().enumerate() {
             let rolls = |waypoint: &Waypoint| waypoint.contacts[f].mode == ContactMode::Rolling;
             let mut sum = 0.0;
@@ -85,8 +89,8 @@ pub fn check_rolling(shape: &Shape, model: &Model, plan: &Plan, settings: &Check
     rolled
 }
 
-fn off_contact(finger: &FingerModel, error: f64, tolerance: f64) -> Violation {
-    let message = format!("the rolling tip of finger \"{}\" is {error:.3e} m off its contact", finger.name);
+pub(super) fn off_contact(finger: &FingerModel, error: f64, tolerance: f64) -> Violation {
+    let message = format!("the tip of finger \"{}\" is {error:.3e} m off its contact", finger.name);
     Violation::new(Kind::ContactOffTip, message).subjects([finger.name.as_str()]).amount(error, tolerance)
 }
 
@@ -216,13 +220,57 @@ impl<'a> Roll<'a> {
     /// of the touching point of the link, seen from the object and across the normal. What stays unknown is added: at
     /// most `unknown`, unless 128 pieces are too few for that. Infinite where no surface is near.
     pub fn slip(&self, unknown: f64) -> f64 {
+        slip(self.sliding(|_| unknown))
+    }
+
+    /// The integral of which [`Roll::slip`] is the length, in the object frame, and how much may be unknown of it: no more than
+    /// `allowed` says, unless 128 pieces are too few for that. None where no surface is near.
+    pub fn sliding(&self, allowed: impl Fn(&Vector) -> f64) -> Option<(Vector, f64)> {
         let object_from_link = |t: f64| self.object_from_link(t);
         let touching = |link: &Matrix4<f64>| {
             let normal = self.touch(link)?.normal;
             Some((self.finger.point_facing(&-link.fixed_view::<3, 3>(0, 0).tr_mul(&normal)), normal))
         };
-        slip(|n_pieces| slide(&object_from_link, &touching, n_pieces), unknown)
+        integral(|n_pieces| slide(&object_from_link, &touching, n_pieces), allowed)
     }
+
+    /// How the link turns over the object; none where no surface is near.
+    pub fn turning(&self) -> Option<Turning> {
+        let mut turning = Turning::default();
+        let first = self.object_from_link(0.0);
+        let mut before = first;
+        for k in 0..TURN_PIECES {
+            let at = |halves: usize| (2 * k + halves) as f64 / (2 * TURN_PIECES) as f64;
+            let normal = self.touch(&self.object_from_link(at(1)))?.normal;
+            let after = self.object_from_link(at(2));
+            let turn = turn_between(&before, &after);
+            let about = turn.dot(&normal);
+            turning.all += turn.norm();
+            turning.twist += about.abs();
+            turning.roll += (turn - normal * about).norm();
+            before = after;
+        }
+        turning.whole = turn_between(&first, &before);
+        Some(turning)
+    }
+}
+
+/// How the link of a fingertip turns in a step, seen from the object, in radians.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Turning {
+    /// Rotation vector from the beginning to the end, in the object frame.
+    pub whole: Vector,
+    /// Integral of the angular speed: nothing cancels.
+    pub all: f64,
+    /// Integral of the angular speed about the contact's normal.
+    pub twist: f64,
+    /// Integral of the angular speed across it.
+    pub roll: f64,
+}
+
+fn turn_between(before: &Matrix4<f64>, after: &Matrix4<f64>) -> Vector {
+    let turn = after.fixed_view::<3, 3>(0, 0) * before.fixed_view::<3, 3>(0, 0).transpose();
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn)).scaled_axis()
 }
 
 /// Speed and acceleration bounds of the tip's centre seen from the object, per step and per step squared.
@@ -248,24 +296,28 @@ pub fn speed_in_object(finger: &FingerModel, from: &Waypoint, to: &Waypoint) -> 
     relative + turn * ((finger.center_in_world(&from.joints) - origin).norm() + reach + relative)
 }
 
-/// Length of the integral that `slide_in` approximates in so many pieces; infinite where it gives none.
+/// Length of an integral with what is unknown of it; infinite without one.
+fn slip(integral: Option<(Vector, f64)>) -> f64 {
+    integral.map_or(f64::INFINITY, |(way, unknown)| way.norm() + unknown)
+}
+
+/// The integral that `slide_in` approximates in so many pieces, and what may be unknown of it; none where it gives none.
 ///
-/// Sums of ever finer pieces are compared until what they extrapolate to changes by at most `unknown`, or there are
-/// [`MOST_PIECES`]. The change is added.
-fn slip(slide_in: impl Fn(usize) -> Option<Vector>, unknown: f64) -> f64 {
+/// Sums of ever finer pieces are compared until what they extrapolate to changes by at most what is allowed, or there are
+/// [`MOST_PIECES`]. The change is what is unknown.
+fn integral(slide_in: impl Fn(usize) -> Option<Vector>, allowed: impl Fn(&Vector) -> f64) -> Option<(Vector, f64)> {
     // The error of the midpoint rule is a series in the square of the pieces' length: its first term cancels.
     let extrapolated = |coarse: &Vector, fine: &Vector| fine + (fine - coarse) / 3.0;
     let mut n_pieces = 2;
-    let (Some(first), Some(mut fine)) = (slide_in(1), slide_in(2)) else { return f64::INFINITY };
+    let (first, mut fine) = (slide_in(1)?, slide_in(2)?);
     let mut best = extrapolated(&first, &fine);
     loop {
         n_pieces *= 2;
-        let Some(finer) = slide_in(n_pieces) else { return f64::INFINITY };
+        let finer = slide_in(n_pieces)?;
         let better = extrapolated(&fine, &finer);
         let difference = (better - best).norm();
-        if difference <= unknown || n_pieces >= MOST_PIECES {
-            let slip = better.norm() + difference;
-            return if slip.is_nan() { f64::INFINITY } else { slip };
+        if difference <= allowed(&better) || n_pieces >= MOST_PIECES {
+            return difference.is_finite().then_some((better, difference));
         }
         (fine, best) = (finer, better);
     }
@@ -274,9 +326,9 @@ fn slip(slide_in: impl Fn(usize) -> Option<Vector>, unknown: f64) -> f64 {
 /// Which point of a link touches, in its frame, and the normal there, in the object frame, with the link where it is given.
 type Touching<'a> = dyn Fn(&Matrix4<f64>) -> Option<(Point, Vector)> + 'a;
 
-/// The integral of the sliding velocity of a tip that `object_from_link` carries from 0 to 1; none where nothing touches. In each
-/// of `n_pieces` pieces the point that touches half-way is carried from the beginning of the piece to its end: the midpoint
-/// rule, whose error falls with the square of the number of pieces.
+/// The integral of the sliding velocity of a tip that `object_from_link` carries from 0 to 1; none where nothing touches.
+/// In each of `n_pieces` pieces the point that touches half-way is carried from the beginning of the piece to its end: the
+/// midpoint rule, whose error falls with the square of the number of pieces.
 fn slide(object_from_link: &dyn Fn(f64) -> Matrix4<f64>, touching: &Touching, n_pieces: usize) -> Option<Vector> {
     let mut sum = Vector::zeros();
     let mut before = object_from_link(0.0);
@@ -294,7 +346,7 @@ fn slide(object_from_link: &dyn Fn(f64) -> Matrix4<f64>, touching: &Touching, n_
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Rotation3, Translation3};
+    use nalgebra::Translation3;
 
     const RADIUS: f64 = 0.006;
     const UNKNOWN: f64 = 1e-9;
@@ -312,7 +364,7 @@ mod tests {
     }
 
     fn slip_of(motion: &dyn Fn(f64) -> Matrix4<f64>, normal: &dyn Fn(&Point) -> Option<Vector>) -> f64 {
-        slip(|n_pieces| slide(motion, &ball_on(normal), n_pieces), UNKNOWN)
+        slip(integral(|n_pieces| slide(motion, &ball_on(normal), n_pieces), |_| UNKNOWN))
     }
 
     fn up(_: &Point) -> Option<Vector> {
@@ -372,5 +424,16 @@ mod tests {
             let order = (error(n_pieces) / error(2 * n_pieces)).log2();
             assert!((order - 2.0).abs() < 0.15, "{n_pieces}: {order}");
         }
+    }
+
+    #[test]
+    fn turns_are_those_of_their_axes() {
+        let turn = Vector::new(0.3, -0.2, 0.5);
+        let [start, end] = [0.0, 1.0].map(|t| carried(Vector::z(), turn * t));
+        assert!((turn_between(&start, &end) - turn).norm() < 1e-12);
+        // The rotation vector is that of the way from one to the other, in the fixed frame.
+        let before = carried(Vector::x(), Vector::new(0.1, 0.7, -0.4));
+        let after = carried(Vector::zeros(), turn) * before;
+        assert!((turn_between(&before, &after) - turn).norm() < 1e-12);
     }
 }

@@ -57,15 +57,29 @@ pub enum ViolationKind {
     ObjectMovesInRegrasp,
     /// A contact that should stay changes.
     GraspChanges,
-    /// A finger changes between holding, rolling and being free in a segment that it should spend in one of these; the moving
-    /// finger of a regrasp holds between its ends; or a finger rolls that cannot: its tip is sharp, or the object rests.
+    /// A finger changes between holding, rolling and being free in a segment that it should spend in one of these; the
+    /// moving finger of a regrasp holds between its ends; or a finger rolls that cannot: its tip is sharp, or the object
+    /// rests. In tracking, a finger does not touch, or changes between two modes other than being fixed; elsewhere, it has
+    /// a mode of tracking.
     WrongContactMode,
-    /// In a regrasp, a finger moves that should not, or the moving finger has no name.
+    /// In tracking, a contact is not in the mode that the plan says: by the poses it turns, twists or rolls though it
+    /// should not, or does not slide though it should.
+    ContactModeWrong,
+    /// In tracking, a contact lacks its point on the tip, or its relative velocity or turn; elsewhere, it has one of these.
+    RelativeMotionMissing,
+    /// The relative velocity or turn of a contact is not the one that the poses have.
+    RelativeVelocityWrong,
+    /// In a regrasp or in tracking, a finger moves that should not, or the moving finger has no name.
     WrongMovingFinger,
+    /// In tracking, the rolling finger has no name, is the moving one, or is said to slide; or a segment of another kind
+    /// names one.
+    WrongRollingFinger,
     /// A holding fingertip is not on its contact.
     ContactOffTip,
-    /// A fingertip that should roll slides over the object.
+    /// A fingertip that should roll, twist or stay slides over the object.
     Slip,
+    /// A fingertip's centre leaves the ball that the scene allows it.
+    OutOfReach,
     /// A fingertip touches outside the pad that the hand file gives it.
     ContactOffPad,
     /// A contact is not on the object's surface.
@@ -90,6 +104,8 @@ pub enum ViolationKind {
     ForceUnbalanced,
     /// A contact force that the fingertip cannot transmit: outside its cone.
     ForceOutsideCone,
+    /// The friction force of a fingertip that slides has not its full size, or does not point where the fingertip slides.
+    SlidingForceWrong,
     /// A holding finger presses less or more than promised.
     NormalForceOutOfRange,
     /// A finger still presses when it lifts off, or already when it lands.

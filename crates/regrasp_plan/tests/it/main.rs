@@ -7,3 +7,5 @@ mod motion;
 mod mutation;
 mod rolled;
 mod sample;
+mod tracked;
+mod tracking;

@@ -13,7 +13,7 @@ use regrasp_robot::{
     TipShape,
 };
 use regrasp_scene::scene::InputFile;
-use regrasp_scene::{GraspRequest, InHandQuery, Object, Scene};
+use regrasp_scene::{GraspRequest, InHandQuery, Object, Scene, TaskKind};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -424,7 +424,7 @@ pub fn plan_with_way(scene: &Scene) -> Plan {
 /// The query that [`plan`] answers.
 pub fn query(plan: &Plan) -> InHandQuery {
     InHandQuery {
-        task: regrasp_scene::TaskKind::InHand,
+        task: if plan.task == "tracking" { TaskKind::Tracking } else { TaskKind::InHand },
         world_from_object_start: Pose::from(&plan.start),
         world_from_object_way: plan.way_poses.iter().map(|pose| Pose::from(&pose.world_from_object)).collect(),
         world_from_object_goal: Pose::from(&plan.goal),

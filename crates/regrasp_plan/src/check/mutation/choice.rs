@@ -30,6 +30,13 @@ pub(super) fn any_segment<'a>(plan: &'a mut Plan, rng: &mut Rng, kind: SegmentKi
     (!segments.is_empty()).then(|| segments.swap_remove(rng.below(segments.len())))
 }
 
+/// A random segment in which closure is judged.
+pub(super) fn any_closed<'a>(plan: &'a mut Plan, rng: &mut Rng) -> Option<&'a mut Segment> {
+    let mut segments: Vec<_> =
+        plan.segments.iter_mut().filter(|segment| segment.kind != SegmentKind::Tracking).collect();
+    (!segments.is_empty()).then(|| segments.swap_remove(rng.below(segments.len())))
+}
+
 /// A random joint that has a drive of its own, of those that fit.
 pub(super) fn any_drive<'a>(model: &'a Model, rng: &mut Rng, fits: impl Fn(&DriveRow) -> bool) -> Option<&'a DriveRow> {
     let drives: Vec<_> = model.drives.iter().filter(|drive| !drive.follows && fits(drive)).collect();

@@ -215,6 +215,9 @@ impl Breeder<'_> {
             // Along the line between two contacts: everything stays in balance.
             let waypoint = any_waypoint(plan, rng)?;
             let (a, b) = two_loaded(waypoint, rng)?;
+            if [a, b].iter().any(|&f| waypoint.contacts[f].mode.slides()) {
+                return None;
+            }
             let line = exert(waypoint, a, &Vector::zeros())? - exert(waypoint, b, &Vector::zeros())?;
             let step = line.normalize() * if rng.chance(0.5) { 0.05 } else { -0.05 };
             let inside = |waypoint: &Waypoint| [a, b].into_iter().all(|f| in_cone(waypoint, f, friction));
@@ -236,7 +239,7 @@ impl Breeder<'_> {
             let slope = friction * rng.uniform(1.01, 1.1);
             let turned = (side.into_inner() * slope - normal.into_inner()).normalize() * size;
             contact.force_in_object = Some(turned.into());
-            (size > 0.1 && friction > 0.0).then_some(())
+            (size > 0.1 && friction > 0.0 && !contact.mode.slides()).then_some(())
         });
         self.add("soft fingertip twists harder than it can", &[ForceOutsideCone], |plan, rng| {
             let mut soft: Vec<(usize, f64)> = Vec::new();
@@ -250,7 +253,7 @@ impl Breeder<'_> {
             let waypoint = any_waypoint(plan, rng)?;
             let pressing = pressing_of(&waypoint.contacts[f])?;
             waypoint.contacts[f].torsion = Some(friction * pressing * radius * rng.uniform(1.001, 1.1));
-            (pressing > 0.1).then_some(())
+            (pressing > 0.1 && !waypoint.contacts[f].mode.slides()).then_some(())
         });
         self.add("hard fingertip exerts torsion", &[ForceOutsideCone], |plan, rng| {
             promises(plan)?;
@@ -259,7 +262,7 @@ impl Breeder<'_> {
             let mut hard: Vec<usize> = (0..model.fingers.len()).filter(is_hard).collect();
             let contact = &mut waypoint.contacts[*pick(&mut hard, rng)?];
             contact.torsion = Some(rng.uniform(1e-8, 1e-3));
-            (pressing_of(contact)? > 0.1).then_some(())
+            (pressing_of(contact)? > 0.1 && !contact.mode.slides()).then_some(())
         });
     }
 

@@ -53,10 +53,11 @@ impl Breeder<'_> {
             hand.fingers[f].tip.pad = Some(Pad { axis_in_body: UnitVector::new_normalize(axis), cosine: angle.cos() });
             Some(())
         });
+        let is_closed = self.plan.segments.iter().any(|segment| segment.kind != SegmentKind::Tracking);
         self.add_hand("fingertips without friction", &[ClosureLost], |hand, _| {
             // Fewer than seven contacts without friction hold nothing.
             hand.fingers.iter_mut().for_each(|finger| finger.tip.contact = ContactModel::Frictionless);
-            (hand.fingers.len() < 7).then_some(())
+            (is_closed && hand.fingers.len() < 7).then_some(())
         });
     }
 

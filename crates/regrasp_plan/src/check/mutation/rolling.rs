@@ -98,7 +98,7 @@ impl Breeder<'_> {
             let (s, f) = pick_rolling(plan, model, rng)?;
             let n_waypoints = plan.segments[s].waypoints.len();
             plan.segments[s].waypoints[1 + rng.below(n_waypoints - 1)].contacts[f].mode = ContactMode::Fixed;
-            Some(())
+            (plan.segments[s].kind == SegmentKind::Transfer).then_some(())
         });
         self.add("finger rolls while the object rests", &[WrongContactMode], |plan, rng| {
             let holds = |segment: &Segment, f: usize| {
@@ -124,12 +124,19 @@ fn pick_rolling(plan: &Plan, model: &Model, rng: &mut Rng) -> Option<(usize, usi
     pick(&mut places(plan, model, rolls), rng).copied()
 }
 
-fn declare(plan: &mut Plan, s: usize, f: usize, mode: ContactMode) {
+pub(super) fn declare(plan: &mut Plan, s: usize, f: usize, mode: ContactMode) {
     plan.segments[s].waypoints.iter_mut().for_each(|waypoint| waypoint.contacts[f].mode = mode);
 }
 
 /// Moves contact, tip and joints of finger `f` by `way` along the surface, `angle` from the first tangent.
-fn slide(model: &Model, shape: &Shape, waypoint: &mut Waypoint, f: usize, angle: f64, way: f64) -> Option<()> {
+pub(super) fn slide(
+    model: &Model,
+    shape: &Shape,
+    waypoint: &mut Waypoint,
+    f: usize,
+    angle: f64,
+    way: f64,
+) -> Option<()> {
     let radius = model.fingers[f].radius;
     let contact = contact_of(&waypoint.contacts[f])?;
     let (x, y) = regrasp_geometry::frame::tangents(&contact.normal_in_object);
