@@ -20,5 +20,7 @@ pub use regrasp_viewer as viewer;
 
 pub use regrasp_base::{Budget, InputError};
 pub use regrasp_plan::Plan;
-pub use regrasp_planners::{Failure, InHandSettings, Method, plan_in_hand};
+pub use regrasp_planners::{
+    Failure, InHandSettings, Method, PlannerSettings, TrackingSettings, plan_in_hand, plan_tracking,
+};
 pub use regrasp_scene::{InHandQuery, Scene};

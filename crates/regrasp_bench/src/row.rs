@@ -6,8 +6,8 @@ use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, check};
 use regrasp_plan::plan::Improvement;
 use regrasp_planners::in_hand::{NotProven, validate_once};
-use regrasp_planners::{Failure, InHandSettings, Progress, plan_in_hand};
-use regrasp_scene::{InHandQuery, Scene};
+use regrasp_planners::{Failure, InHandSettings, PlannerSettings, Progress, TrackingSettings, plan};
+use regrasp_scene::{InHandQuery, Scene, TaskKind};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -27,8 +27,10 @@ pub struct Problem<'a> {
 /// How to run.
 #[derive(Debug, Clone)]
 pub struct RunSettings {
-    /// Settings of the planner, with its number of threads.
+    /// Settings of the in-hand planner, with its number of threads.
     pub planner: InHandSettings,
+    /// Settings for tracking tasks.
+    pub tracking: TrackingSettings,
     /// Work allowed per seed.
     pub max_work: u64,
     /// Wall-clock time allowed per seed.
@@ -107,7 +109,12 @@ pub fn status_of(failure: &Failure) -> String {
 
 /// The word for a method, as settings spell it.
 pub fn method_name(settings: &InHandSettings) -> String {
-    serde_json::to_value(settings.method).ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
+    name_of(&settings.method)
+}
+
+/// As settings spell it.
+fn name_of(method: &impl Serialize) -> String {
+    serde_json::to_value(method).ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
 }
 
 /// Plans one seed, judges the plan, and measures both.
@@ -132,7 +139,10 @@ pub(crate) fn measured(
 pub(crate) fn plan_only(problem: Problem, settings: &RunSettings) -> (Row, Option<Plan>) {
     let mut row = Row {
         scene: problem.scene.name.clone(),
-        method: method_name(&settings.planner),
+        method: match problem.query.task {
+            TaskKind::InHand => method_name(&settings.planner),
+            TaskKind::Tracking => name_of(&settings.tracking.method),
+        },
         seed: problem.seed,
         ..Row::default()
     };
@@ -144,7 +154,8 @@ pub(crate) fn plan_only(problem: Problem, settings: &RunSettings) -> (Row, Optio
         cancelled: Arc::clone(&settings.cancelled),
     };
     let silent = |_: Progress| {};
-    let outcome = plan_in_hand(problem.scene, problem.query, &settings.planner, problem.seed, &budget, &silent);
+    let planner = PlannerSettings { in_hand: settings.planner.clone(), tracking: settings.tracking.clone() };
+    let outcome = plan(problem.scene, problem.query, &planner, problem.seed, &budget, &silent);
     row.plan_s = started.0.elapsed().as_secs_f64();
     // Other trials may run beside this one: only several threads of one search need the time of all.
     let cpu = if settings.planner.n_threads == 1 { started.2.elapsed() } else { started.1.elapsed() };
@@ -177,9 +188,11 @@ pub(crate) fn plan_only(problem: Problem, settings: &RunSettings) -> (Row, Optio
 pub(crate) fn measure(problem: Problem, plan: &Plan, settings: &InHandSettings, asked: Judge, row: &mut Row) {
     row.transfers = plan.statistics.transfers;
     row.relocations = plan.statistics.relocations;
-    match floor(problem.scene, plan, settings) {
-        Ok(seconds) => row.floor_s = Some(seconds),
-        Err(not_proven) => row.cause = not_proven.to_string(),
+    if problem.query.task == TaskKind::InHand {
+        match floor(problem.scene, plan, settings) {
+            Ok(seconds) => row.floor_s = Some(seconds),
+            Err(not_proven) => row.cause = not_proven.to_string(),
+        }
     }
     if asked == Judge::Checker {
         judge(problem, plan, row);

@@ -6,8 +6,8 @@ use crate::talk::{Talk, counted, duration, grouped};
 use regrasp::base::{Diagnostic, Place};
 use regrasp::geometry::Shape;
 use regrasp::robot::import::{LoadOptions, ResolveOptions};
-use regrasp::scene::{LoadedScene, load_scene};
-use regrasp::{InHandSettings, Scene};
+use regrasp::scene::{LoadedScene, TaskKind, load_scene};
+use regrasp::{InHandSettings, PlannerSettings, Scene, TrackingSettings};
 use serde_json::json;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -51,6 +51,19 @@ pub fn settings(search: &Search, n_threads: usize) -> Result<InHandSettings, Sto
         None => {}
     }
     Ok(settings)
+}
+
+/// Settings for a task of this kind: those of a tracking task are the file's alone.
+pub fn for_task(task: TaskKind, search: &Search, n_threads: usize) -> Result<PlannerSettings, Stop> {
+    if task == TaskKind::InHand {
+        return Ok(PlannerSettings { in_hand: settings(search, n_threads)?, ..PlannerSettings::default() });
+    }
+    let file = search.settings.as_deref();
+    let tracking: TrackingSettings = file.map_or_else(|| Ok(TrackingSettings::default()), settings_file)?;
+    if let (Err(problem), Some(path)) = (tracking.validate(), file) {
+        return Err(Stop::BadInput(Diagnostic::new("A503", Place::file(path), problem).into()));
+    }
+    Ok(PlannerSettings { tracking, ..PlannerSettings::default() })
 }
 
 /// Settings of the planner: defaults, then the file, then the rest.

@@ -15,3 +15,33 @@ pub use failure::{Cause, Failure, FailureKind, NearestMiss};
 pub use in_hand::{InHandSettings, Method, Progress, plan_in_hand};
 pub use outline::{Outline, OutlineEdge, OutlineNode};
 pub use tracking::{TrackingSettings, plan_tracking};
+
+use regrasp_base::Budget;
+use regrasp_plan::Plan;
+use regrasp_scene::{InHandQuery, Scene, TaskKind};
+
+/// Settings for every kind of task.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PlannerSettings {
+    /// For in-hand tasks.
+    pub in_hand: InHandSettings,
+    /// For tracking tasks.
+    pub tracking: TrackingSettings,
+}
+
+/// Plans `query` with the planner of its task: [`plan_in_hand`] or [`plan_tracking`].
+///
+/// Panics if the settings of that planner do not validate. Errors: as that planner.
+pub fn plan(
+    scene: &Scene,
+    query: &InHandQuery,
+    settings: &PlannerSettings,
+    seed: u64,
+    budget: &Budget,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Plan, Failure> {
+    match query.task {
+        TaskKind::InHand => plan_in_hand(scene, query, &settings.in_hand, seed, budget, progress),
+        TaskKind::Tracking => plan_tracking(scene, query, &settings.tracking, seed, budget, progress),
+    }
+}

@@ -10,7 +10,8 @@ use regrasp::base::{Diagnostic, Place};
 use regrasp::plan::check::{CheckSettings, Report};
 use regrasp::plan::format;
 use regrasp::planners::Progress;
-use regrasp::{Budget, Failure, InHandSettings};
+use regrasp::scene::TaskKind;
+use regrasp::{Budget, Failure, InHandSettings, PlannerSettings, TrackingSettings};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -40,7 +41,8 @@ pub struct Request {
 #[pyfunction]
 pub fn plan(py: Python<'_>, scene: &Scene, request: Request) -> PyResult<(Option<Plan>, String)> {
     guarded(py, || {
-        let settings = settings(&request).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
+        let task = scene.loaded.task.kind;
+        let settings = settings(task, &request).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
         let query = scene.loaded.task.query(request.seed);
         let started = Instant::now();
         let seconds = |value: Option<f64>| value.map(Duration::from_secs_f64);
@@ -48,7 +50,7 @@ pub fn plan(py: Python<'_>, scene: &Scene, request: Request) -> PyResult<(Option
             (seconds(request.time_limit).map(|limit| started + limit), seconds(request.improve));
         let found = watched(py, request.progress.as_ref(), |cancelled, report| {
             let budget = Budget { max_work: request.max_work, deadline, improve_for, cancelled };
-            regrasp::plan_in_hand(&scene.loaded.scene, &query, &settings, request.seed, &budget, report)
+            regrasp::planners::plan(&scene.loaded.scene, &query, &settings, request.seed, &budget, report)
         })?;
         let plan = match found {
             Ok(plan) => plan,
@@ -93,18 +95,36 @@ fn judged_as_written(plan: &regrasp::Plan, scene: &Scene) -> Result<(regrasp::Pl
 }
 
 /// Settings of the planner: defaults, then the JSON, then what has an argument of its own.
-fn settings(request: &Request) -> Result<InHandSettings, Diagnostic> {
-    let bad = |code, problem: String| Diagnostic::new(code, Place::file("regrasp.plan"), problem);
-    let mut settings = InHandSettings::default();
-    if let Some(text) = &request.settings {
-        settings = serde_json::from_str(text).map_err(|error| {
-            let message = error.to_string();
-            let problem = message.rsplit_once(" at line ").map_or(message.as_str(), |(problem, _)| problem);
-            bad("A504", problem.to_owned())
-                .element("argument", "settings")
-                .expected("keys and values like \"settings\" in a plan file")
-        })?;
+fn bad(code: &'static str, problem: String) -> Diagnostic {
+    Diagnostic::new(code, Place::file("regrasp.plan"), problem)
+}
+
+/// Settings as given, else the defaults.
+fn given<T: Default + serde::de::DeserializeOwned>(request: &Request) -> Result<T, Diagnostic> {
+    let Some(text) = &request.settings else { return Ok(T::default()) };
+    serde_json::from_str(text).map_err(|error| {
+        let message = error.to_string();
+        let problem = message.rsplit_once(" at line ").map_or(message.as_str(), |(problem, _)| problem);
+        bad("A504", problem.to_owned())
+            .element("argument", "settings")
+            .expected("keys and values like \"settings\" in a plan file")
+    })
+}
+
+/// Settings for a task of this kind: those of a tracking task are the given ones alone.
+fn settings(task: TaskKind, request: &Request) -> Result<PlannerSettings, Diagnostic> {
+    match task {
+        TaskKind::InHand => Ok(PlannerSettings { in_hand: in_hand(request)?, ..PlannerSettings::default() }),
+        TaskKind::Tracking => {
+            let tracking: TrackingSettings = given(request)?;
+            tracking.validate().map_err(|problem| bad("A503", problem).element("argument", "settings"))?;
+            Ok(PlannerSettings { tracking, ..PlannerSettings::default() })
+        }
     }
+}
+
+fn in_hand(request: &Request) -> Result<InHandSettings, Diagnostic> {
+    let mut settings: InHandSettings = given(request)?;
     settings.n_threads = request.threads;
     if let Some(method) = &request.method {
         settings.method = serde_json::from_value(method.as_str().into())

@@ -73,6 +73,7 @@ mod tests {
         assert!(load.wall_s > 0.0 && load.wall_s.is_finite() && load.cpu_s.is_finite());
         let settings = RunSettings {
             planner: InHandSettings { n_threads: 1, ..InHandSettings::plain() },
+            tracking: Default::default(),
             max_work: 1_000_000,
             time_limit: None,
             judge: Judge::Checker,

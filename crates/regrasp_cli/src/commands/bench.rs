@@ -8,6 +8,8 @@ use crate::load;
 use crate::stop::Stop;
 use crate::talk::Talk;
 use regrasp::base::files;
+use regrasp::scene::{LoadedScene, TaskKind};
+use regrasp::{InHandSettings, TrackingSettings};
 use regrasp_bench::at_once::in_order;
 use regrasp_bench::growth;
 use regrasp_bench::roadmap::GraphFacts;
@@ -33,7 +35,9 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
         };
         return suite::run(path, arguments, common, talk);
     }
-    let planner = load::settings(&arguments.search, arguments.threads)?;
+    let files = load::scene_files(&arguments.scenes)?;
+    let mut scenes = files.iter().map(|path| load::scene(path, common, talk)).collect::<Result<Vec<_>, _>>()?;
+    let (planner, tracking) = bench_settings(&scenes, arguments)?;
     let improves = planner.improve_work > 0;
     let cancelled = interrupt::flag()?;
     let mut writer = match &arguments.csv {
@@ -48,6 +52,7 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
     };
     let settings = RunSettings {
         planner,
+        tracking,
         max_work: arguments.search.max_work,
         time_limit: arguments.search.time_limit,
         improve_for: arguments.search.improve,
@@ -55,8 +60,7 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
         cancelled: Arc::clone(&cancelled),
     };
     let mut rows = Vec::new();
-    for path in load::scene_files(&arguments.scenes)? {
-        let loaded = load::scene(&path, common, talk)?;
+    for loaded in scenes.drain(..) {
         let n_seeds = arguments.seeds.unwrap_or(DEFAULT_SEEDS).min(u64::MAX - arguments.first_seed);
         let job = |index: usize| {
             let seed = arguments.first_seed + index as u64;
@@ -88,6 +92,21 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
     }
     talk.data(&summary::table(&summaries))?;
     if improves { talk.data(&improvement::table(&rows)) } else { Ok(()) }
+}
+
+/// Settings of both planners. A file of settings is that of the task that all scenes have (`A505` where they differ).
+fn bench_settings(scenes: &[LoadedScene], arguments: &args::Bench) -> Result<(InHandSettings, TrackingSettings), Stop> {
+    let is_tracking = |loaded: &LoadedScene| loaded.task.kind == TaskKind::Tracking;
+    if scenes.iter().any(is_tracking) {
+        if arguments.search.settings.is_some() && !scenes.iter().all(is_tracking) {
+            let problem = "is for scenes of two kinds of tasks";
+            return Err(Stop::argument("A505", "--settings", problem, "scenes of one kind"));
+        }
+        let tracking = load::for_task(TaskKind::Tracking, &arguments.search, arguments.threads)?.tracking;
+        let in_hand = InHandSettings { n_threads: arguments.threads, ..InHandSettings::default() };
+        return Ok((in_hand, tracking));
+    }
+    Ok((load::settings(&arguments.search, arguments.threads)?, TrackingSettings::default()))
 }
 
 /// Seeds per scene where none are given.

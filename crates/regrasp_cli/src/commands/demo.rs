@@ -8,10 +8,10 @@ use crate::load;
 use crate::pages::Page;
 use crate::stop::Stop;
 use crate::talk::Talk;
-use regrasp::InHandSettings;
 use regrasp::base::files;
 use regrasp::plan::format;
 use regrasp::viewer::charts;
+use regrasp::{InHandSettings, PlannerSettings};
 use serde_json::json;
 use std::path::Path;
 
@@ -37,8 +37,10 @@ pub fn run(arguments: &args::Demo, common: &Common, talk: &Talk) -> Result<(), S
     let scene_path = folder.join(SCENE);
     let loaded = load::scene(&scene_path, common, talk)?;
     let query = loaded.task.query(arguments.seed);
-    let settings = InHandSettings { n_threads: available_threads(), ..InHandSettings::default() };
-    say_query(&query, arguments.seed, settings.n_threads, talk);
+    let n_threads = available_threads();
+    let in_hand = InHandSettings { n_threads, ..InHandSettings::default() };
+    let settings = PlannerSettings { in_hand, ..PlannerSettings::default() };
+    say_query(&query, arguments.seed, n_threads, talk);
     let limits = Limits { max_work: MAX_WORK, time_limit: None, improve_for: None, cancelled };
     let plan = search(&loaded.scene, &query, &settings, arguments.seed, &limits, talk)?;
     let bytes = format::to_json(&plan);

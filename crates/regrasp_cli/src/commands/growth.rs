@@ -37,6 +37,7 @@ pub fn run(arguments: &args::Growth, talk: &Talk) -> Result<(), Stop> {
     }
     let settings = RunSettings {
         planner: InHandSettings { n_threads: 1, ..InHandSettings::plain() },
+        tracking: Default::default(),
         max_work: arguments.max_work,
         time_limit: Some(arguments.time_limit),
         judge: Judge::Checker,

@@ -11,8 +11,9 @@ use crate::stop::Stop;
 use crate::talk::{Talk, counted, duration, grouped};
 use regrasp::base::files;
 use regrasp::plan::format;
+use regrasp::plan::plan::Statistics;
 use regrasp::planners::FailureKind;
-use regrasp::{Budget, Failure, InHandQuery, InHandSettings, Plan, Scene};
+use regrasp::{Budget, Failure, InHandQuery, Plan, PlannerSettings, Scene};
 use serde_json::json;
 use std::fmt::Write;
 use std::io;
@@ -39,7 +40,7 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
     }
     let query = loaded.task.query(arguments.seed);
     let n_threads = arguments.threads.unwrap_or_else(available_threads);
-    let settings = load::settings(&arguments.search, n_threads)?;
+    let settings = load::for_task(query.task, &arguments.search, n_threads)?;
     say_query(&query, arguments.seed, n_threads, talk);
 
     let limits = Limits {
@@ -167,7 +168,7 @@ pub fn say_query(query: &InHandQuery, seed: u64, n_threads: usize, talk: &Talk) 
 pub fn search(
     scene: &Scene,
     query: &InHandQuery,
-    settings: &InHandSettings,
+    settings: &PlannerSettings,
     seed: u64,
     limits: &Limits,
     talk: &Talk,
@@ -181,7 +182,7 @@ pub fn search(
         cancelled: Arc::clone(&limits.cancelled),
     };
     let report = |progress| lines.report(progress);
-    let plan = match regrasp::plan_in_hand(scene, query, settings, seed, &budget, &report) {
+    let plan = match regrasp::planners::plan(scene, query, settings, seed, &budget, &report) {
         Ok(plan) => plan,
         Err(failure) if failure.kind == FailureKind::Interrupted => return Err(Stop::Interrupted),
         Err(failure) => return Err(Stop::NoPlan(Box::new(failure))),
@@ -193,6 +194,20 @@ pub fn search(
 /// Says what was found, in how many seconds.
 pub fn say_plan(plan: &Plan, seconds: f64, talk: &Talk) {
     let waypoints: usize = plan.segments.iter().map(|segment| segment.waypoints.len()).sum();
+    if plan.promises.tracking.is_some() {
+        let Statistics { nodes, samples, transfers, .. } = plan.statistics;
+        talk.say(format!(
+            "plan   {}, {} sub-goals on the path of {} tried and {} made, {} waypoints   {}",
+            counted(plan.segments.len(), "segment"),
+            grouped(transfers),
+            grouped(samples),
+            grouped(nodes),
+            grouped(waypoints as u64),
+            duration(seconds),
+        ));
+        talk.event("plan", json!({ "seconds": seconds, "statistics": plan.statistics }));
+        return;
+    }
     talk.say(format!(
         "plan   {}, {}, {} waypoints, closure margin {:.4}{}   {}",
         counted(plan.statistics.transfers as usize, "transfer"),

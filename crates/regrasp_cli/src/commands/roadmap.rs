@@ -284,6 +284,7 @@ fn run_bench(arguments: &args::RoadmapBench, common: &Common, talk: &Talk) -> Re
     }
     let settings = RunSettings {
         planner: planner.settings().clone(),
+        tracking: Default::default(),
         max_work: 20_000_000,
         time_limit: None,
         judge: if arguments.no_check { Judge::Skip } else { Judge::Checker },

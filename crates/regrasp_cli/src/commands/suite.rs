@@ -126,6 +126,7 @@ fn measure(
     let job = &part.job;
     let settings = RunSettings {
         planner: job.settings.clone(),
+        tracking: Default::default(),
         max_work: job.max_work,
         time_limit: job.time_limit_s.map(Duration::from_secs_f64),
         judge: Judge::Checker,

@@ -100,7 +100,7 @@ use model::Model;
 use regrasp_base::{Budget, Interrupt, Rng};
 use regrasp_plan::Plan;
 use regrasp_plan::plan::Statistics;
-use regrasp_scene::{InHandQuery, Scene};
+use regrasp_scene::{InHandQuery, Scene, TaskKind};
 use search::{Search, Stop};
 use std::sync::atomic::AtomicUsize;
 use tally::Reason;
@@ -132,6 +132,10 @@ pub fn plan_in_hand(
 ) -> Result<Plan, Failure> {
     settings.validate().expect("settings are validated where they are read");
     refuse_two_gravities(scene, settings)?;
+    if query.task != TaskKind::InHand {
+        let message = format!("a task of kind \"{}\" is none of the in-hand planner's", query.task.name());
+        return Err(Failure::bare(FailureKind::Impossible, message, "plan it with plan_tracking, or regrasp plan"));
+    }
     let mut spent = 0;
     for (first, work) in first_try::first_tries(scene, settings, budget) {
         let tried = Budget { max_work: work, ..budget.clone() };

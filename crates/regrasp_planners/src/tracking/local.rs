@@ -33,7 +33,7 @@ const FAR: f64 = 0.12;
 /// See [`FAR`].
 const NEAR: f64 = 0.03;
 /// Steps in one while the object rests.
-const REST_STEP: f64 = 5.0;
+const REST_STEP: f64 = 2.0;
 
 /// What roles promise.
 struct Prospect {

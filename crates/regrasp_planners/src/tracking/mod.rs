@@ -25,6 +25,7 @@ mod step;
 pub use settings::{Cones, RollingFinger, TrackingMethod, TrackingSettings};
 
 use crate::failure::{Cause, Failure, FailureKind, NearestMiss};
+use crate::in_hand::Progress;
 use crate::in_hand::endpoints::{End, Near, given_grasp_at};
 use crate::in_hand::model::Model;
 use crate::in_hand::workspace::Workspace;
@@ -41,7 +42,7 @@ const MOST_RESTARTS: u64 = 20;
 
 /// Plans how the fingertips turn the object to the goal's orientation.
 ///
-/// The plan is the same for the same scene, query, settings and seed. Panics if `settings.validate()` fails.
+/// The plan is the same for the same scene, query, settings and seed. `progress` is called after every sub-goal. Panics if `settings.validate()` fails.
 ///
 /// Errors: the start is none, or the search ends without a plan.
 pub fn plan_tracking(
@@ -50,6 +51,7 @@ pub fn plan_tracking(
     settings: &TrackingSettings,
     seed: u64,
     budget: &Budget,
+    progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Plan, Failure> {
     settings.validate().expect("settings are validated where they are read");
     let model = Model::new(scene, &settings.in_hand);
@@ -65,7 +67,7 @@ pub fn plan_tracking(
     let mut counts = Counts::default();
     loop {
         let mut rng = Rng::keyed(seed, "tracking", counts.restarts);
-        let found = search(&mut stepper, &first, &goal, &mut rng, budget, &mut counts);
+        let found = search(&mut stepper, &first, &goal, &mut rng, budget, &mut counts, progress);
         match found.last {
             Ok(last) => {
                 let path = found.path_to(last);

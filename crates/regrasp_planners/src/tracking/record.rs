@@ -153,8 +153,10 @@ fn waypoint(stepper: &Stepper, grasp: &TrackingGrasp, relative: &PerFinger<Relat
         let normal: [f64; 3] = contact.normal_in_object.into_inner().into();
         let mut state = ContactState::at(relative[finger].mode, contact.point_in_object.coords.into(), normal);
         state.force_in_object = Some((*force).into());
-        let point_in_tip = grasp.world_from_link[finger].point_to_child(&point_in_world);
-        state.point_in_tip = Some(point_in_tip.coords.into());
+        let hand = &model.scene.hand;
+        let body_from_tip = hand.robot.fixed_pose_in_body(hand.fingers[finger].tip.link);
+        let point_in_body = grasp.world_from_link[finger].point_to_child(&point_in_world);
+        state.point_in_tip = Some(body_from_tip.inverse_transform_point(&point_in_body).coords.into());
         contacts.push(state);
     }
     Waypoint {

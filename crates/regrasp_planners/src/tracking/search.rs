@@ -4,6 +4,7 @@
 use super::grasp::{TrackingGrasp, turn_to};
 use super::local::{Failures, Local, once};
 use super::step::{Roles, Step, Stepper};
+use crate::in_hand::Progress;
 use nalgebra::UnitQuaternion;
 use regrasp_base::{Budget, Interrupt, Rng};
 use regrasp_geometry::Vector;
@@ -106,6 +107,7 @@ pub fn search(
     rng: &mut Rng,
     budget: &Budget,
     counts: &mut Counts,
+    progress: &dyn Fn(Progress),
 ) -> Found {
     let settings = stepper.settings;
     let rolling = once(settings.rolling_finger, stepper.model.n_fingers(), rng);
@@ -154,6 +156,8 @@ pub fn search(
         if left < nearest.1 {
             nearest = (node, left);
         }
+        let Counts { work, restarts, .. } = *counts;
+        progress(Progress { nodes: nodes.len() as u64, work, restarts, angle_left: nearest.1 });
         if left <= settings.goal_tolerance {
             return Found { nodes, last: Ok(node), nearest };
         }

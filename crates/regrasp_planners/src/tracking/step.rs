@@ -23,6 +23,8 @@ const ON_FACE: f64 = 1e-9;
 const MOST_STEPS: usize = 20;
 /// Distance from the surface, and slip, that a rolling ball's step may leave, in metres.
 const REACHED: f64 = 1e-13;
+/// Corrections of a rolling step that would twist; each gains two digits.
+const UNTWISTINGS: usize = 3;
 /// A fingertip that slides slower than this, in metres per second, neither slides nor rolls for sure: friction has no direction.
 const SLOWEST: f64 = 1e-4;
 
@@ -177,8 +179,8 @@ impl<'m, 'a> Stepper<'m, 'a> {
         let start = &grasp.touches[moving];
         let touch = if has_all_directions(chain) {
             let (x, y) = frame::tangents(&UnitVector::new_unchecked(start.ball.normal));
-            let turn = x.into_inner() * rolled[0] + y.into_inner() * rolled[1];
-            let touch = self.roll(moving, start, &turn).ok_or(NoStep::OutOfReach)?;
+            let asked = x.into_inner() * rolled[0] + y.into_inner() * rolled[1];
+            let (turn, touch) = self.roll_purely(moving, start, &asked).ok_or(NoStep::OutOfReach)?;
             let object_from_link = Rotation3::new(turn).into_inner() * grasp.object_from_link(moving);
             let rotation = end.world_from_object.rotation * object_from_link;
             let center = end.world_from_object.point(&touch.ball.center);
@@ -212,6 +214,19 @@ impl<'m, 'a> Stepper<'m, 'a> {
             return Err(NoStep::MovingPad);
         }
         Ok(())
+    }
+
+    /// Rolls the ball of `finger` by the rotation vector `asked`, in the object frame, less what would twist it about the normal
+    /// half-way; the rotation vector and where the ball then touches.
+    fn roll_purely(&self, finger: usize, from: &Touch, asked: &Vector) -> Option<(Vector, Touch)> {
+        let mut turn = *asked;
+        let mut to = self.roll(finger, from, &turn)?;
+        for _ in 0..UNTWISTINGS {
+            let middle = (from.ball.normal + to.ball.normal).normalize();
+            turn = asked - middle * middle.dot(asked);
+            to = self.roll(finger, from, &turn)?;
+        }
+        Some((turn, to))
     }
 
     /// Where the ball of `finger` touches after it has rolled by the rotation vector `turn`, in the object frame.
