@@ -60,7 +60,7 @@ pub fn slip(radius: f64, from: &Ball, to: &Ball, turn: &Vector) -> Vector {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Rotation3;
+    use nalgebra::{Matrix3, Rotation3};
     use regrasp_base::Rng;
     use regrasp_geometry::Shape;
 

@@ -5,6 +5,8 @@
 //! At every instant one fingertip moves and the others rest. On one of these the object rolls without sliding; over the
 //! others it rolls and slides.
 
+/// Start and hand as the query gives them.
+mod endpoints;
 /// Contact forces at one moment.
 mod forces;
 /// Where object and fingertips are.
@@ -26,10 +28,9 @@ pub use settings::{Cones, RollingFinger, TrackingMethod, TrackingSettings};
 
 use crate::failure::{Cause, Failure, FailureKind, NearestMiss};
 use crate::in_hand::Progress;
-use crate::in_hand::endpoints::{End, Near, given_grasp_at};
 use crate::in_hand::model::Model;
+use crate::in_hand::settings::gravity_of;
 use crate::in_hand::workspace::Workspace;
-use grasp::TrackingGrasp;
 use regrasp_base::{Budget, Rng};
 use regrasp_plan::Plan;
 use regrasp_plan::plan::{PoseData, Statistics};
@@ -54,15 +55,13 @@ pub fn plan_tracking(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Plan, Failure> {
     settings.validate().expect("settings are validated where they are read");
+    let gravity = gravity_of(scene, settings.in_hand.gravity.as_ref())
+        .map_err(|message| Failure::bare(FailureKind::Impossible, message, "state gravity in one of both"))?;
     let model = Model::new(scene, &settings.in_hand);
-    let forces =
-        model.forces.as_ref().ok_or_else(|| impossible("tracking needs forces", "leave in_hand.forces as it is"))?;
-    let start = &query.world_from_object_start;
-    let given = given_grasp_at(&model, End::Start, start, &query.start_grasp, Near::Rest)?;
-    let state = given.ok_or_else(|| impossible("tracking needs a start grasp", "give [start] grasp"))?;
-    let inside = || impossible("a fingertip is inside the object", "move it out");
-    let first = TrackingGrasp::of(&model, &state).ok_or_else(inside)?;
+    endpoints::refuse(&model, &gravity)?;
+    let forces = model.forces.as_ref().expect("settings without forces do not validate");
     let mut stepper = Stepper { model: &model, settings, forces, workspace: Workspace::new(&model) };
+    let first = endpoints::start(&stepper, query)?;
     let goal = query.world_from_object_goal.rotation;
     let mut counts = Counts::default();
     loop {
@@ -79,10 +78,6 @@ pub fn plan_tracking(
             Err(ref ended) => return Err(failure(ended, &counts, &found)),
         }
     }
-}
-
-fn impossible(message: &str, advice: &str) -> Failure {
-    Failure::bare(FailureKind::Impossible, message.into(), advice)
 }
 
 /// Counts for the plan file.

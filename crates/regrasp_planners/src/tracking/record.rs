@@ -155,6 +155,8 @@ fn waypoint(stepper: &Stepper, grasp: &TrackingGrasp, relative: &PerFinger<Relat
         state.force_in_object = Some((*force).into());
         let hand = &model.scene.hand;
         let body_from_tip = hand.robot.fixed_pose_in_body(hand.fingers[finger].tip.link);
+        state.relative_velocity_in_object = Some([0.0; 3]);
+        state.relative_turn_in_object = Some([0.0; 3]);
         let point_in_body = grasp.world_from_link[finger].point_to_child(&point_in_world);
         state.point_in_tip = Some(body_from_tip.inverse_transform_point(&point_in_body).coords.into());
         contacts.push(state);

@@ -125,6 +125,9 @@ impl TrackingSettings {
         if self.goal_tolerance > self.cell {
             return Err(format!("goal_tolerance is {}, more than a cell of {}", self.goal_tolerance, self.cell));
         }
+        if self.in_hand.forces.is_none() {
+            return Err("in_hand.forces is none; tracking needs forces".into());
+        }
         if self.trials == 0 || self.nodes == 0 {
             return Err("trials and nodes are at least 1".into());
         }

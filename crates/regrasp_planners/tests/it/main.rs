@@ -10,4 +10,5 @@ mod roadmaps;
 mod segments;
 mod soft_and_coupled;
 mod tips;
+mod tracking;
 mod way_poses;

@@ -1,0 +1,112 @@
+//! What is wrong with a tracking query is said before any search.
+
+use super::grasp::{PerFinger, TrackingGrasp};
+use super::step::{Relative, Stepper};
+use crate::failure::{Failure, FailureKind};
+use crate::in_hand::endpoints::{End, Near, given_grasp_at};
+use crate::in_hand::model::Model;
+use regrasp_geometry::{Shape, TriangleMesh, Vector};
+use regrasp_plan::plan::ContactMode;
+use regrasp_scene::{Gravity, InHandQuery};
+
+/// Vertices of a mesh may be this far in front of one of its triangles, as a share of the object's radius: rounding.
+const FLAT: f64 = 1e-6;
+
+fn impossible(message: String, advice: &str) -> Failure {
+    Failure::bare(FailureKind::Impossible, message, advice)
+}
+
+/// Refuses hands, objects and gravity that tracking is not made for (paper 003, section 3.1: convex objects, fingertips that
+/// are balls; at least two of them rest).
+pub fn refuse(model: &Model, gravity: &Gravity) -> Result<(), Failure> {
+    let object = &model.scene.object;
+    let n = model.n_fingers();
+    if !(3..=4).contains(&n) {
+        let message = format!("the hand has {n} fingers: tracking moves one and rests two or three");
+        return Err(impossible(message, "use a hand of three or four fingers"));
+    }
+    let names = model.scene.hand.fingers.iter().map(|finger| finger.name.as_str());
+    if let Some((name, _)) = names.zip(&model.fingers).find(|(_, f)| f.tip_radius == 0.0 || f.ellipsoid.is_some()) {
+        let message = format!("the tip of finger \"{name}\" is no ball: tracking rolls balls");
+        return Err(impossible(message, "give the tip shape = \"sphere\" in the hand file"));
+    }
+    if let Shape::Mesh(mesh) = &object.shape
+        && let Some(depth) = dent(mesh, FLAT * object.radius)
+    {
+        let message = format!("the object \"{}\" is not convex: it has a dent of {:.2} mm", object.name, 1e3 * depth);
+        return Err(impossible(message, "give solid = \"hull\" for its convex hull, or turn it with an in_hand task"));
+    }
+    if matches!(gravity, Gravity::Any) {
+        let message =
+            "tracking needs the direction of gravity: forces of fingertips that slide depend on it".to_owned();
+        return Err(impossible(message, "give gravity a direction"));
+    }
+    Ok(())
+}
+
+/// How far a vertex is in front of the plane of a triangle at most, where that is more than `allowed`.
+fn dent(mesh: &TriangleMesh, allowed: f64) -> Option<f64> {
+    let mut deepest = allowed;
+    for triangle in mesh.triangles() {
+        let [a, b, c] = triangle.map(|index| mesh.vertices()[index as usize]);
+        let Some(normal) = (b - a).cross(&(c - a)).try_normalize(1e-300) else { continue };
+        for vertex in mesh.vertices() {
+            deepest = deepest.max(normal.dot(&(vertex - a)));
+        }
+    }
+    (deepest > allowed).then_some(deepest)
+}
+
+/// The grasp at the start.
+///
+/// Errors: none is given, or it collides, is out of reach, or holds nothing.
+pub fn start(stepper: &Stepper, query: &InHandQuery) -> Result<TrackingGrasp, Failure> {
+    let model = stepper.model;
+    let pose = &query.world_from_object_start;
+    let state = given_grasp_at(model, End::Start, pose, &query.start_grasp, Near::Rest)?.ok_or_else(|| {
+        let message = "tracking begins with a given grasp, and the start has none".to_owned();
+        impossible(message, "give [start] grasp = { contacts = { finger = [x, y, z] } }")
+    })?;
+    let invalid = |message: String, advice: &str| Failure::bare(FailureKind::StartInvalid, message, advice);
+    let grasp = TrackingGrasp::of(model, &state)
+        .ok_or_else(|| invalid("a fingertip's centre is inside the object at the start".into(), "move it out"))?;
+    for (finger, of_model) in model.fingers.iter().enumerate() {
+        let away = (grasp.tip_in_world(model, finger) - of_model.tip_at_rest).norm();
+        if let Some(reach) = model.scene.reach.filter(|reach| away > *reach) {
+            let name = &model.scene.hand.fingers[finger].name;
+            let message =
+                format!("at the start finger \"{name}\" is {away:.3} m from where it rests, its reach is {reach} m");
+            return Err(invalid(message, "choose another contact or rest posture, or a larger reach"));
+        }
+    }
+    let still = Relative { mode: ContactMode::Fixed, slid: Vector::zeros(), turned: Vector::zeros() };
+    let relative: PerFinger<Relative> = grasp.touches.iter().map(|_| still).collect();
+    if stepper.balanced_at(&grasp, &grasp, &grasp, &relative).is_err() {
+        let [least, largest] = stepper.settings.in_hand.forces.map_or([0.0, f64::MAX], |forces| forces.normal_force);
+        let message = format!(
+            "at the start no contact forces balance the weight: friction {:.3}, normal forces from {least} N to {largest} N",
+            model.frame.friction
+        );
+        return Err(invalid(message, "choose other contacts, or allow larger forces"));
+    }
+    Ok(grasp)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use regrasp_geometry::Point;
+
+    #[test]
+    fn dents_are_told_from_flat_faces() {
+        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.3, 0.3, 0.3]];
+        let vertices: Vec<Point> = corners.iter().map(|corner| Point::from(*corner)).collect();
+        let whole =
+            TriangleMesh::new(vertices[..4].to_vec(), vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]).unwrap();
+        assert_eq!(dent(&whole, 1e-9), None);
+        // The last corner lies below the large face, which it replaces by three.
+        let faces = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 4], [2, 3, 4], [3, 1, 4]];
+        let dented = TriangleMesh::new(vertices, faces).unwrap();
+        assert!(dent(&dented, 1e-9).unwrap() > 0.05);
+    }
+}

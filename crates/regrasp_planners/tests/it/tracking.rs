@@ -1,0 +1,113 @@
+//! Finger tracking against the checker, which shares nothing with the planner, against itself, and on bad input.
+
+use crate::in_hand_methods::scene;
+use nalgebra::UnitQuaternion;
+use regrasp_base::Budget;
+use regrasp_geometry::{Point, Vector};
+use regrasp_plan::Plan;
+use regrasp_plan::check::{CheckSettings, check};
+use regrasp_plan::plan::{ContactMode, SegmentKind};
+use regrasp_planners::in_hand::InHandSettings;
+use regrasp_planners::{Failure, FailureKind, TrackingSettings, plan_in_hand, plan_tracking};
+use regrasp_scene::{GraspRequest, Gravity, InHandQuery, LoadedScene};
+
+fn plan_with(loaded: &LoadedScene, query: &InHandQuery, seed: u64) -> Result<Plan, Failure> {
+    let settings = TrackingSettings::default();
+    plan_tracking(&loaded.scene, query, &settings, seed, &Budget::work(100_000), &|_| {})
+}
+
+/// Paper 003, scenario F-1.
+#[test]
+fn the_football_is_turned_and_every_plan_is_accepted() {
+    let loaded = scene("football.toml");
+    for seed in 0..4 {
+        let query = loaded.task.query(seed);
+        let plan = plan_with(&loaded, &query, seed).unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
+        let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+        assert!(report.accepted(), "seed {seed}: {:?}", report.violations.first());
+        assert!(report.max_force_residual.unwrap() < 1e-6 && report.max_moment_residual.unwrap() < 1e-7);
+        assert!(report.max_sliding_force_error.unwrap() < 1e-9);
+        assert!(plan.segments.iter().all(|segment| segment.kind == SegmentKind::Tracking));
+        let slides = |plan: &Plan| {
+            let waypoints = plan.segments.iter().flat_map(|segment| &segment.waypoints);
+            waypoints.flat_map(|waypoint| &waypoint.contacts).any(|contact| contact.mode == ContactMode::Sliding)
+        };
+        assert!(slides(&plan), "a turn by 94 degrees without sliding");
+        let again = plan_with(&loaded, &query, seed).unwrap();
+        assert_eq!(regrasp_plan::format::to_json(&plan), regrasp_plan::format::to_json(&again), "seed {seed}");
+    }
+}
+
+#[test]
+fn a_goal_that_is_the_start_is_a_plan_that_holds_still() {
+    let loaded = scene("football.toml");
+    let mut query = loaded.task.query(0);
+    query.world_from_object_goal = query.world_from_object_start;
+    let plan = plan_with(&loaded, &query, 0).unwrap();
+    assert_eq!((plan.segments.len(), plan.segments[0].waypoints.len()), (1, 2));
+    let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+    assert!(report.accepted(), "{:?}", report.violations.first());
+}
+
+fn refused(loaded: &LoadedScene, query: &InHandQuery, kind: FailureKind, words: &str) {
+    let failure = plan_with(loaded, query, 0).unwrap_err();
+    assert_eq!(failure.kind, kind, "{failure}");
+    assert!(failure.message.contains(words), "{failure}");
+    assert_eq!(failure.statistics.work, 0, "nothing is searched");
+}
+
+#[test]
+fn what_tracking_is_not_made_for_is_refused_by_name() {
+    let mut loaded = scene("football.toml");
+    let query = loaded.task.query(0);
+    loaded.scene.gravity = Some(Gravity::Any);
+    refused(&loaded, &query, FailureKind::Impossible, "direction of gravity");
+
+    let mut loaded = scene("football.toml");
+    let automatic = InHandQuery { start_grasp: GraspRequest::Automatic, ..query.clone() };
+    refused(&loaded, &automatic, FailureKind::Impossible, "the start has none");
+
+    // All four fingertips stand below one half of the football, which then falls off.
+    loaded.scene.object.friction = 0.01;
+    refused(&loaded, &query, FailureKind::StartInvalid, "no contact forces balance the weight");
+
+    let loaded = scene("football.toml");
+    let GraspRequest::Contacts(mut points) = query.start_grasp.clone() else { panic!("contacts are given") };
+    points[1] = points[0];
+    let overlapping = InHandQuery { start_grasp: GraspRequest::Contacts(points.clone()), ..query.clone() };
+    refused(&loaded, &overlapping, FailureKind::StartInvalid, "collide");
+    points[1] = Point::new(0.0, 0.0, 0.2);
+    let off = InHandQuery { start_grasp: GraspRequest::Contacts(points), ..query.clone() };
+    refused(&loaded, &off, FailureKind::StartInvalid, "off the surface");
+
+    let in_hand = plan_in_hand(&loaded.scene, &query, &InHandSettings::default(), 0, &Budget::work(10), &|_| {});
+    assert!(in_hand.unwrap_err().message.contains("tracking"));
+}
+
+#[test]
+fn a_goal_out_of_reach_is_a_failure_with_its_causes_and_the_nearest_miss() {
+    let mut loaded = scene("football.toml");
+    // Fingertips that may not move at all.
+    loaded.scene.reach = Some(1e-4);
+    let query = loaded.task.query(0);
+    let settings = TrackingSettings { trials: 5, ..TrackingSettings::default() };
+    let failure = plan_tracking(&loaded.scene, &query, &settings, 0, &Budget::work(500), &|_| {}).unwrap_err();
+    assert_eq!(failure.kind, FailureKind::WorkSpent);
+    assert!(!failure.causes.is_empty(), "{failure}");
+    let miss = failure.nearest_miss.expect("the start is the nearest");
+    let whole = query.world_from_object_start.rotation.angle_to(&query.world_from_object_goal.rotation);
+    assert!(miss.angle_left <= whole + 1e-9 && miss.angle_left > 0.5 * whole);
+}
+
+#[test]
+fn small_turns_about_any_axis_end_within_the_tolerance() {
+    let loaded = scene("football.toml");
+    for (seed, axis) in [Vector::x(), -Vector::y(), Vector::z()].into_iter().enumerate() {
+        let mut query = loaded.task.query(0);
+        let turn = UnitQuaternion::from_scaled_axis(axis * 0.12);
+        query.world_from_object_goal.rotation = turn * query.world_from_object_start.rotation;
+        let plan = plan_with(&loaded, &query, seed as u64).unwrap_or_else(|failure| panic!("{axis:?}: {failure}"));
+        let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+        assert!(report.accepted(), "{axis:?}: {:?}", report.violations.first());
+    }
+}
