@@ -6,7 +6,7 @@ use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, check};
 use regrasp_plan::plan::Improvement;
 use regrasp_planners::in_hand::{NotProven, validate_once};
-use regrasp_planners::{Failure, InHandSettings, PlannerSettings, Progress, TrackingSettings, plan};
+use regrasp_planners::{Failure, InHandSettings, PlannerSettings, Progress, TrackingSettings, plan, tracking};
 use regrasp_scene::{InHandQuery, Scene, TaskKind};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -109,12 +109,7 @@ pub fn status_of(failure: &Failure) -> String {
 
 /// The word for a method, as settings spell it.
 pub fn method_name(settings: &InHandSettings) -> String {
-    name_of(&settings.method)
-}
-
-/// As settings spell it.
-fn name_of(method: &impl Serialize) -> String {
-    serde_json::to_value(method).ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
+    serde_json::to_value(settings.method).ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
 }
 
 /// Plans one seed, judges the plan, and measures both.
@@ -141,7 +136,7 @@ pub(crate) fn plan_only(problem: Problem, settings: &RunSettings) -> (Row, Optio
         scene: problem.scene.name.clone(),
         method: match problem.query.task {
             TaskKind::InHand => method_name(&settings.planner),
-            TaskKind::Tracking => name_of(&settings.tracking.method),
+            TaskKind::Tracking => tracking::METHOD.into(),
         },
         seed: problem.seed,
         ..Row::default()

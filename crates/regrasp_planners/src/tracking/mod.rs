@@ -24,7 +24,7 @@ pub mod settings;
 /// One step of time.
 mod step;
 
-pub use settings::{Cones, RollingFinger, TrackingMethod, TrackingSettings};
+pub use settings::{METHOD, RollingFinger, TrackingSettings};
 
 use crate::failure::{Cause, Failure, FailureKind, NearestMiss};
 use crate::in_hand::Progress;
@@ -124,7 +124,7 @@ fn failure(ended: &Ended, counts: &Counts, found: &search::Found) -> Failure {
     Failure {
         kind,
         message: format!("{why}; {:.1} degrees are left to the goal", angle_left.to_degrees()),
-        advice: "try another seed, or method = \"tracking+gaiting\"".into(),
+        advice: "try another seed, another start grasp, or an in_hand task".into(),
         causes,
         leg: None,
         nearest_miss: Some(Box::new(NearestMiss {

@@ -1,7 +1,7 @@
 //! The plan as it is written to a file.
 
 use super::grasp::{PerFinger, TrackingGrasp};
-use super::settings::TrackingSettings;
+use super::settings::{METHOD, TrackingSettings};
 use super::step::{Relative, Step, Stepper};
 use crate::in_hand::forces::ForceModel;
 use crate::in_hand::model::Model;
@@ -52,10 +52,7 @@ pub fn record(
         format_version: FORMAT_VERSION,
         tool: concat!("regrasp ", env!("CARGO_PKG_VERSION")).into(),
         task: TaskKind::Tracking.name().into(),
-        method: serde_json::to_value(settings.method)
-            .ok()
-            .and_then(|value| value.as_str().map(str::to_owned))
-            .unwrap_or_default(),
+        method: METHOD.into(),
         seed,
         settings: settings_of(settings),
         inputs: scene

@@ -3,17 +3,8 @@
 use crate::in_hand::{ForceSettings, InHandSettings};
 use serde::{Deserialize, Serialize};
 
-/// Algorithm.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub enum TrackingMethod {
-    /// No finger leaves the object (paper 003).
-    #[default]
-    #[serde(rename = "tracking")]
-    Tracking,
-    /// Where tracking ends, a finger is relocated through the air while the others hold, and tracking goes on.
-    #[serde(rename = "tracking+gaiting")]
-    TrackingAndGaiting,
-}
+/// Name of the method in plans.
+pub const METHOD: &str = "tracking";
 
 /// Which resting finger the object rolls on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -26,23 +17,10 @@ pub enum RollingFinger {
     Once,
 }
 
-/// Friction cones of fingertips that do not slide.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Cones {
-    /// Pyramids of four sides inscribed in the cones (paper 003, eq. 13).
-    #[default]
-    Pyramid,
-    /// Pyramids first, and exact cones where those hold nothing.
-    Exact,
-}
-
 /// Settings of [`super::plan_tracking`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrackingSettings {
-    /// Algorithm.
-    pub method: TrackingMethod,
     /// Time of a step (paper 003, table 2: 0.1 s).
     pub time_step: f64,
     /// Time from a node to its sub-goals (table 2: 2 s).
@@ -53,16 +31,12 @@ pub struct TrackingSettings {
     pub goal_tolerance: f64,
     /// Extreme angular velocity of the object about each axis (table 3: 1.43 degrees per second).
     pub object_velocity: f64,
-    /// Extreme sliding velocity of the moving finger along each tangent (table 3: 5 mm/s).
-    pub sliding_velocity: f64,
     /// Extreme rolling velocity of the moving finger about each tangent (table 3: 2.86 degrees per second).
     pub rolling_velocity: f64,
     /// True where the moving finger may go from face to face of the object (scenarios D-1 and D-3).
     pub face_changes: bool,
     /// Which finger the object rolls on.
     pub rolling_finger: RollingFinger,
-    /// Cones of fingertips that do not slide.
-    pub cones: Cones,
     /// Choices tried in a row before a sub-goal is given up (paper 003, section 6.2.4, `bound_2`: 50).
     pub trials: usize,
     /// What the distance left to the goal counts in the order in which sub-goals are tried, beside the way to them: 1 is the
@@ -78,17 +52,14 @@ pub struct TrackingSettings {
 impl Default for TrackingSettings {
     fn default() -> Self {
         TrackingSettings {
-            method: TrackingMethod::Tracking,
             time_step: 0.1,
             sub_goal_time: 2.0,
             cell: 2.406f64.to_radians(),
             goal_tolerance: 1.203f64.to_radians(),
             object_velocity: 1.43f64.to_radians(),
-            sliding_velocity: 0.005,
             rolling_velocity: 2.86f64.to_radians(),
             face_changes: true,
             rolling_finger: RollingFinger::Any,
-            cones: Cones::Pyramid,
             trials: 50,
             goal_weight: 2.0,
             nodes: 2000,
@@ -110,7 +81,6 @@ impl TrackingSettings {
             ("cell", self.cell),
             ("goal_tolerance", self.goal_tolerance),
             ("object_velocity", self.object_velocity),
-            ("sliding_velocity", self.sliding_velocity),
             ("rolling_velocity", self.rolling_velocity),
             ("goal_weight", self.goal_weight),
         ];
