@@ -76,3 +76,65 @@ pub fn joints_of_pose(chain: &Chain, near: &[f64], wanted: &BodyFrame) -> Option
 pub fn torques(chain: &Chain, coordinates: &[f64], point: &Point, force: &Vector) -> Coordinates {
     twists(chain, coordinates, point).iter().map(|[linear, _]| linear.dot(force)).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kinematics::chain::ChainJoint;
+    use regrasp_base::Rng;
+    use regrasp_geometry::{Pose, UnitVector};
+
+    /// Three slides and three turns about skew axes, displaced from each other.
+    fn chain(rng: &mut Rng) -> Chain {
+        let joint = |coordinate: usize| ChainJoint {
+            parent_from_joint: Pose::new(Vector::from(rng.direction()) * 0.02, Vector::from(rng.direction()) * 0.2),
+            axis: UnitVector::new_normalize(Vector::ith(coordinate % 3, 1.0) + Vector::from(rng.direction()) * 0.1),
+            motion: if coordinate < 3 { Motion::Slide } else { Motion::Turn },
+            coordinate,
+            multiplier: 1.0,
+            offset: 0.0,
+        };
+        let joints = (0..6).map(joint).collect();
+        let names = (0..6).map(|k| format!("j{k}")).collect();
+        Chain::new(joints, names, vec![-2.0; 6], vec![2.0; 6])
+    }
+
+    #[test]
+    fn twists_are_those_of_finite_differences_and_torques_do_their_work() {
+        let mut rng = Rng::keyed(1, "twists", 0);
+        for _ in 0..50 {
+            let chain = chain(&mut rng);
+            let joints: Vec<f64> = (0..6).map(|_| rng.uniform(-0.6, 0.6)).collect();
+            let in_body = Point::from(Vector::from(rng.direction()) * 0.05);
+            let point = chain.last_frame(&joints).point(&in_body);
+            let force = Vector::from(rng.direction()) * 3.0;
+            let (twists, torques) = (twists(&chain, &joints, &point), torques(&chain, &joints, &point, &force));
+            for k in 0..6 {
+                let h = 1e-6;
+                let [before, after] = [-h, h].map(|h| {
+                    let mut moved = joints.clone();
+                    moved[k] += h;
+                    chain.last_frame(&moved)
+                });
+                let linear = (after.point(&in_body) - before.point(&in_body)) / (2.0 * h);
+                let angular = turn_between(&before.rotation, &after.rotation) / (2.0 * h);
+                assert!((linear - twists[k][0]).norm() < 1e-8 && (angular - twists[k][1]).norm() < 1e-8);
+                assert!((torques[k] - linear.dot(&force)).abs() < 1e-7);
+            }
+        }
+    }
+
+    #[test]
+    fn joints_of_a_pose_near_by_are_found_and_limits_are_kept() {
+        let mut rng = Rng::keyed(1, "joints_of_pose", 0);
+        for _ in 0..100 {
+            let chain = chain(&mut rng);
+            let joints: Vec<f64> = (0..6).map(|_| rng.uniform(-0.6, 0.6)).collect();
+            let near: Vec<f64> = joints.iter().map(|joint| joint + rng.uniform(-0.1, 0.1)).collect();
+            let found = joints_of_pose(&chain, &near, &chain.last_frame(&joints)).expect("it is near");
+            assert!(found.iter().zip(&joints).all(|(a, b)| (a - b).abs() < 1e-8));
+            let narrow = Chain::new(chain.joints.clone(), chain.names.clone(), vec![-1e-3; 6], vec![1e-3; 6]);
+            assert_eq!(joints_of_pose(&narrow, &near, &chain.last_frame(&joints)), None);
+        }
+    }
+}
