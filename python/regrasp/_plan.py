@@ -22,7 +22,7 @@ from ._errors import InputError
 from ._model import FloatArray, Pose, pose_of
 from ._result import Report
 
-CONTACT_MODES = ("free", "fixed", "rolling")
+CONTACT_MODES = ("free", "fixed", "rolling", "pure_rolling", "twisting", "pure_sliding", "sliding")
 """What the numbers in `Plan.contact_modes` mean."""
 
 
@@ -163,7 +163,7 @@ class Plan:
 
     @property
     def contact_modes(self) -> npt.NDArray[np.uint8]:
-        """(n, f): index in `regrasp.CONTACT_MODES`: 0 free, 1 fixed, 2 rolling."""
+        """(n, f): index in `regrasp.CONTACT_MODES`: 0 free, 1 fixed, 2 rolling; others in tracking."""
         return self._arrays["contact_modes"]
 
     @property

@@ -119,3 +119,14 @@ def test_a_scene_file_plans_too() -> None:
     plan = regrasp.plan(SCENES / "sphere_90x.toml")
     assert plan and plan.report is not None and plan.report.ok
     assert regrasp.check(plan).ok
+
+
+def test_tracking_tasks_are_planned_and_judged() -> None:
+    scene = regrasp.load_scene(SCENES / "football.toml")
+    plan = regrasp.plan(scene, seed=1)
+    assert plan, str(plan)
+    assert regrasp.check(plan, scene)
+    used = {regrasp.CONTACT_MODES[mode] for mode in np.unique(plan.contact_modes)}
+    assert {"rolling", "pure_rolling", "sliding"} <= used
+    with pytest.raises(regrasp.InputError, match="goal_weight"):
+        regrasp.plan(scene, settings={"goal_weight": -1})

@@ -89,7 +89,8 @@ impl Numbers<'_> {
 }
 
 /// Names of contact modes, in the order of the numbers in [`PlanArrays::contact_modes`].
-pub const CONTACT_MODES: [&str; 3] = ["free", "fixed", "rolling"];
+pub const CONTACT_MODES: [&str; 7] =
+    ["free", "fixed", "rolling", "pure_rolling", "twisting", "pure_sliding", "sliding"];
 
 /// Name of a kind of segment, as plan files spell it.
 pub fn kind_name(kind: SegmentKind) -> &'static str {

@@ -12,7 +12,8 @@ use std::collections::BTreeSet;
 
 /// Settings with which fingers are left free as often as can be.
 fn eager(least_holding: usize) -> InHandSettings {
-    InHandSettings { least_holding, free_after: 0, free_share: 1.0, shortcuts: 0, ..InHandSettings::default() }
+    let usual = InHandSettings { first_try: None, ..InHandSettings::default() };
+    InHandSettings { least_holding, free_after: 0, free_share: 1.0, shortcuts: 0, ..usual }
 }
 
 fn try_plan(loaded: &LoadedScene, settings: &InHandSettings, seed: u64) -> Result<Plan, Failure> {
