@@ -138,8 +138,8 @@ pub fn plan_in_hand(
     }
     let mut spent = 0;
     for (first, work) in first_try::first_tries(scene, settings, budget) {
-        let tried = Budget { max_work: work, ..budget.clone() };
-        match plan_with(scene, query, &first, seed, &tried, progress) {
+        let left = Budget { max_work: budget.max_work.saturating_sub(spent), ..budget.clone() };
+        match plan_with(scene, query, &first, seed, (&left, work), progress) {
             Ok(mut plan) => {
                 plan.statistics.work += spent;
                 return Ok(Plan { settings: record::settings_of(settings), ..plan });
@@ -149,21 +149,23 @@ pub fn plan_in_hand(
         }
     }
     let left = Budget { max_work: budget.max_work.saturating_sub(spent), ..budget.clone() };
-    let mut found = plan_with(scene, query, settings, seed, &left, progress);
+    let mut found = plan_with(scene, query, settings, seed, (&left, left.max_work), progress);
     let (Ok(Plan { statistics, .. }) | Err(Failure { statistics, .. })) = &mut found;
     statistics.work += spent;
     found
 }
 
-/// As [`plan_in_hand`], with the clearance of the settings.
+/// As [`plan_in_hand`], with the clearance and closure margin of the settings. The number beside the budget is the work of the
+/// first plan; what improves it has the whole budget.
 fn plan_with(
     scene: &Scene,
     query: &InHandQuery,
     settings: &InHandSettings,
     seed: u64,
-    budget: &Budget,
+    (whole, first_work): (&Budget, u64),
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Plan, Failure> {
+    let budget = &Budget { max_work: first_work.min(whole.max_work), ..whole.clone() };
     let model = Model::new(scene, &effective(settings));
     refuse_hopeless(&model, query)?;
     let poses = query.poses();
@@ -189,7 +191,7 @@ fn plan_with(
         Ok(((solution, plan), left, n_restarts)) => {
             let statistics = left.statistics(n_restarts);
             let first = (solution, with_counts(plan, statistics));
-            Ok(improved(&model, &legs, query, seed, budget, first, progress))
+            Ok(improved(&model, &legs, query, seed, whole, first, progress))
         }
         Err((interrupt, left, n_attempts)) => {
             let failure = left.failure(&model, &poses, interrupt, n_attempts);
