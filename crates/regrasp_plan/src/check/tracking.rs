@@ -5,8 +5,8 @@
 //! Seen from the object, a step has
 //!
 //! - the slide: the integral of the velocity of the touching point of the link, without its part along the normal
-//!   ([`Roll::sliding`]);
-//! - the turn of the link, and the parts of its angular speed about the normal and across it ([`Roll::turning`]).
+//!   ([`sliding`](crate::check::rolling::Roll::sliding));
+//! - the turn of the link, and the parts of its angular speed about the normal and across it ([`turning`](crate::check::rolling::Roll::turning)).
 //!
 //! A contact on an edge or a corner has the normal along which the tip's centre lies; the tip rolls, slides and pivots there
 //! as it does on faces.

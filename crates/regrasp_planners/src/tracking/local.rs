@@ -32,8 +32,6 @@ const KEPT: f64 = 0.1;
 const FAR: f64 = 0.12;
 /// See [`FAR`].
 const NEAR: f64 = 0.03;
-/// Steps in one while the object rests.
-const REST_STEP: f64 = 2.0;
 
 /// What roles promise.
 struct Prospect {
@@ -164,7 +162,7 @@ impl Local<'_, '_, '_> {
             let rolling = self.rolling.filter(|once| *once != moving).unwrap_or((moving + 1) % model.n_fingers());
             let mut before = away(here);
             loop {
-                let control = self.control_towards_rest(here, moving, &Vector::zeros()).map(|turn| turn * REST_STEP);
+                let control = self.control_towards_rest(here, moving, &Vector::zeros());
                 let asked = Asked { roles: Roles { moving, rolling }, turn: None, rolled: control };
                 let Ok(step) = self.stepper.step(here, &asked) else { break };
                 let now = away(&step.end);
