@@ -57,6 +57,31 @@ pub fn slip(radius: f64, from: &Ball, to: &Ball, turn: &Vector) -> Vector {
     left - middle * middle.dot(&left)
 }
 
+/// Fixed-point steps of [`roll_step`]; each gains at least the factor `turn / 2`.
+const MOST_ITERATIONS: usize = 60;
+/// Distance from the surface, and slip, that a step leaves, in metres; where rounding stops it sooner, a hundred times as much.
+const REACHED: f64 = 1e-13;
+
+/// Where a ball of `radius` that touches at `from` touches after one step of the midpoint rule that turns it by the rotation
+/// vector `turn`, in the object frame. `touch` finds the nearest point of the surface.
+///
+/// None where it finds none, or the step does not converge.
+#[inline]
+pub fn roll_step(touch: impl Fn(&Point) -> Option<Touch>, radius: f64, from: &Touch, turn: &Vector) -> Option<Touch> {
+    let mut to = *from;
+    let mut before = f64::INFINITY;
+    for _ in 0..MOST_ITERATIONS {
+        let off = slip(radius, &from.ball, &to.ball, turn) + to.ball.normal * (to.distance - radius);
+        let left = off.norm();
+        if left < REACHED || (left < 100.0 * REACHED && left >= before) {
+            return Some(to);
+        }
+        before = left;
+        to = touch(&(to.ball.center - off))?;
+    }
+    None
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -66,8 +91,6 @@ mod tests {
 
     const RADIUS: f64 = 0.006;
 
-    /// Fixed-point steps for one step of the midpoint rule; each gains at least the factor `turn / 2`.
-    const MAX_ITERATIONS: usize = 60;
     /// Most often that a step is halved.
     const MAX_HALVINGS: u32 = 20;
 
@@ -86,8 +109,8 @@ mod tests {
         halvings: u32,
     ) -> Touch {
         let half = turn * 0.5;
-        let twice = roll_step(touch, &roll_step(touch, from, &half), &half);
-        if (roll_step(touch, from, turn).ball.center - twice.ball.center).norm() <= tolerance {
+        let twice = step(touch, &step(touch, from, &half), &half);
+        if (step(touch, from, turn).ball.center - twice.ball.center).norm() <= tolerance {
             return twice;
         }
         assert!(halvings > 0, "the tolerance is not reached");
@@ -95,17 +118,8 @@ mod tests {
         roll_within(touch, &middle, &half, 0.5 * tolerance, halvings - 1)
     }
 
-    /// One step of the midpoint rule.
-    fn roll_step(touch: &impl Fn(&Point) -> Option<Touch>, from: &Touch, turn: &Vector) -> Touch {
-        let mut to = *from;
-        for _ in 0..MAX_ITERATIONS {
-            let off = slip(RADIUS, &from.ball, &to.ball, turn) + to.ball.normal * (to.distance - RADIUS);
-            if off.norm() < 1e-13 * RADIUS {
-                return to;
-            }
-            to = touch(&(to.ball.center - off)).expect("the ball is near the surface");
-        }
-        panic!("the step does not converge");
+    fn step(touch: &impl Fn(&Point) -> Option<Touch>, from: &Touch, turn: &Vector) -> Touch {
+        roll_step(touch, RADIUS, from, turn).expect("the ball is near the surface")
     }
 
     fn on(surface: &Surface) -> impl Fn(&Point) -> Option<Touch> + '_ {
@@ -197,7 +211,7 @@ mod tests {
         let expected = Rotation3::new(turn * (RADIUS / (large + RADIUS))) * start.ball.center;
         let error = |n_steps: u32| {
             let share = turn / f64::from(n_steps);
-            let end = (0..n_steps).fold(start, |at, _| roll_step(&touch, &at, &share));
+            let end = (0..n_steps).fold(start, |at, _| step(&touch, &at, &share));
             (end.ball.center - expected).norm()
         };
         let errors: Vec<f64> = [4, 8, 16, 32, 64].map(error).to_vec();
@@ -216,9 +230,9 @@ mod tests {
             let start = touch(&Point::from(Vector::from(rng.direction()) * 0.1)).unwrap();
             let start = touch(&(start.foot.point_in_object + start.ball.normal * RADIUS)).unwrap();
             let turn = Vector::from(rng.direction()) * 0.2;
-            let there = roll_step(&touch, &start, &turn);
+            let there = step(&touch, &start, &turn);
             assert!((there.distance - RADIUS).abs() < 1e-12);
-            let back = roll_step(&touch, &there, &-turn);
+            let back = step(&touch, &there, &-turn);
             assert!((back.ball.center - start.ball.center).norm() < 1e-12);
         }
     }
@@ -233,7 +247,7 @@ mod tests {
         let start = touch(&(center.point_in_object + center.normal_in_object.into_inner() * RADIUS)).unwrap();
         let omega = Vector::new(0.3, -0.8, 0.5);
         let h = 1e-5;
-        let end = roll_step(&touch, &start, &(omega * h));
+        let end = step(&touch, &start, &(omega * h));
         // The point of the ball that touches at the start, carried along by the ball.
         let arm = -start.ball.normal * RADIUS;
         let carried = end.ball.center + Rotation3::new(omega * h) * arm;

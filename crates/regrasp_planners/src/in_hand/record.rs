@@ -14,7 +14,7 @@ use regrasp_plan::plan::{
     ContactMode, ContactState, FORMAT, FORMAT_VERSION, Plan, PlanInput, PoseData, Promises, Segment, SegmentKind,
     Statistics, WayPose, Waypoint,
 };
-use regrasp_scene::InHandQuery;
+use regrasp_scene::{InHandQuery, Scene};
 
 /// Largest distance of a holding fingertip from its contact that plans promise, in metres (issue: at most 0.5 mm).
 pub const CONTACT_TOLERANCE: f64 = 0.0005;
@@ -204,46 +204,59 @@ impl<'m, 'a> Recorder<'m, 'a> {
             relocations: self.relocations,
             ..statistics
         };
-        let (model, scene) = (self.model, self.model.scene);
+        let model = self.model;
         let forces = add_forces(model, &mut self.segments)?;
         let motion = timing::limits(model);
         timing::assign_times(model, &motion, &mut self.segments, timing::LEAST_SPAN);
+        let promises = Promises {
+            contact_tolerance: CONTACT_TOLERANCE,
+            friction: model.frame.friction,
+            required_margin: model.settings.closure_margin,
+            kept_margin: self.kept_margin,
+            torque_scale: model.frame.torque_scale,
+            friction_margin: model.settings.friction_margin,
+            slip_tolerance: SLIP_TOLERANCE,
+            tracking: None,
+            motion,
+            forces,
+        };
         Ok(Plan {
-            format: FORMAT.into(),
-            format_version: FORMAT_VERSION,
-            tool: concat!("regrasp ", env!("CARGO_PKG_VERSION")).into(),
-            task: "in_hand".into(),
             method: serde_json::to_value(model.settings.method)
                 .ok()
                 .and_then(|value| value.as_str().map(str::to_owned))
                 .unwrap_or_default(),
             seed,
             settings: settings_of(&model.settings),
-            inputs: scene
-                .inputs
-                .iter()
-                .map(|i| PlanInput { role: i.role.clone(), name: i.name.clone(), sha256: i.sha256.clone() })
-                .collect(),
-            promises: Promises {
-                contact_tolerance: CONTACT_TOLERANCE,
-                friction: model.frame.friction,
-                required_margin: model.settings.closure_margin,
-                kept_margin: self.kept_margin,
-                torque_scale: model.frame.torque_scale,
-                friction_margin: model.settings.friction_margin,
-                slip_tolerance: SLIP_TOLERANCE,
-                tracking: None,
-                motion,
-                forces,
-            },
-            joint_names: scene.hand.joint_names(),
-            fingers: scene.hand.fingers.iter().map(|finger| finger.name.clone()).collect(),
-            start: PoseData::from(&query.world_from_object_start),
             way_poses: way_poses(query, &self.segments, steps_to_way),
-            goal: PoseData::from(&query.world_from_object_goal),
-            segments: self.segments,
             statistics,
+            ..plan_of(model.scene, query, promises, self.segments)
         })
+    }
+}
+
+/// A plan of `segments` for a query; method, seed, settings, way poses and statistics are left to be said.
+pub fn plan_of(scene: &Scene, query: &InHandQuery, promises: Promises, segments: Vec<Segment>) -> Plan {
+    Plan {
+        format: FORMAT.into(),
+        format_version: FORMAT_VERSION,
+        tool: concat!("regrasp ", env!("CARGO_PKG_VERSION")).into(),
+        task: query.task.name().into(),
+        method: String::new(),
+        seed: 0,
+        settings: serde_json::Value::Null,
+        inputs: scene
+            .inputs
+            .iter()
+            .map(|i| PlanInput { role: i.role.clone(), name: i.name.clone(), sha256: i.sha256.clone() })
+            .collect(),
+        promises,
+        joint_names: scene.hand.joint_names(),
+        fingers: scene.hand.fingers.iter().map(|finger| finger.name.clone()).collect(),
+        start: PoseData::from(&query.world_from_object_start),
+        way_poses: Vec::new(),
+        goal: PoseData::from(&query.world_from_object_goal),
+        segments,
+        statistics: Statistics::default(),
     }
 }
 

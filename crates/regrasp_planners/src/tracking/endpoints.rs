@@ -1,12 +1,12 @@
 //! What is wrong with a tracking query is said before any search.
 
-use super::grasp::{PerFinger, TrackingGrasp};
-use super::step::{Relative, Stepper};
+use super::forces::Forces;
+use super::grasp::TrackingGrasp;
+use super::step::Stepper;
 use crate::failure::{Failure, FailureKind};
 use crate::in_hand::endpoints::{End, Near, given_grasp_at};
 use crate::in_hand::model::Model;
-use regrasp_geometry::{Shape, TriangleMesh, Vector};
-use regrasp_plan::plan::ContactMode;
+use regrasp_geometry::{Shape, TriangleMesh};
 use regrasp_scene::{Gravity, InHandQuery};
 
 /// Vertices of a mesh may be this far in front of one of its triangles, as a share of the object's radius: rounding.
@@ -57,10 +57,10 @@ fn dent(mesh: &TriangleMesh, allowed: f64) -> Option<f64> {
     (deepest > allowed).then_some(deepest)
 }
 
-/// The grasp at the start.
+/// The grasp at the start, and forces that hold it.
 ///
 /// Errors: none is given, or it collides, is out of reach, or holds nothing.
-pub fn start(stepper: &Stepper, query: &InHandQuery) -> Result<TrackingGrasp, Failure> {
+pub fn start(stepper: &Stepper, query: &InHandQuery) -> Result<(TrackingGrasp, Forces), Failure> {
     let model = stepper.model;
     let pose = &query.world_from_object_start;
     let state = given_grasp_at(model, End::Start, pose, &query.start_grasp, Near::Rest)?.ok_or_else(|| {
@@ -79,17 +79,15 @@ pub fn start(stepper: &Stepper, query: &InHandQuery) -> Result<TrackingGrasp, Fa
             return Err(invalid(message, "choose another contact or rest posture, or a larger reach"));
         }
     }
-    let still = Relative { mode: ContactMode::Fixed, slid: Vector::zeros(), turned: Vector::zeros() };
-    let relative: PerFinger<Relative> = grasp.touches.iter().map(|_| still).collect();
-    if stepper.balanced_at(&grasp, &grasp, &grasp, &relative).is_err() {
+    let Ok(forces) = stepper.balanced_at_rest(&grasp) else {
         let [least, largest] = stepper.settings.in_hand.forces.map_or([0.0, f64::MAX], |forces| forces.normal_force);
         let message = format!(
             "at the start no contact forces balance the weight: friction {:.3}, normal forces from {least} N to {largest} N",
             model.frame.friction
         );
         return Err(invalid(message, "choose other contacts, or allow larger forces"));
-    }
-    Ok(grasp)
+    };
+    Ok((grasp, forces))
 }
 
 #[cfg(test)]

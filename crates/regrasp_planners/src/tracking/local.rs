@@ -3,7 +3,7 @@
 use super::grasp::{PerFinger, TrackingGrasp, turn_to};
 use super::object_motion::ObjectMotion;
 use super::settings::RollingFinger;
-use super::step::{Asked, NoStep, Roles, Step, Stepper};
+use super::step::{Asked, NoStep, Roles, STEP_WORK, Step, Stepper};
 use crate::in_hand::model::MAX_FINGERS;
 use arrayvec::ArrayVec;
 use nalgebra::UnitQuaternion;
@@ -32,6 +32,8 @@ const KEPT: f64 = 0.1;
 const FAR: f64 = 0.12;
 /// See [`FAR`].
 const NEAR: f64 = 0.03;
+/// Share of its reach that a step must bring a finger nearer to where it rests, to be followed by another. By hand.
+const LEAST_GAIN: f64 = 1e-4;
 
 /// What roles promise.
 struct Prospect {
@@ -61,7 +63,8 @@ pub type Failures = [u64; 8];
 struct Choice {
     roles: Roles,
     control: [f64; 2],
-    object_rests: bool,
+    /// Turn of the object in a step, in the world; none where it rests.
+    turn: Option<Vector>,
 }
 
 /// What a local plan has come to.
@@ -100,10 +103,10 @@ impl Local<'_, '_, '_> {
         self.stepper.workspace.set(&here.world_from_object.to_pose(), &here.joints, &here.contacts());
         self.restore(&mut here, &mut steps);
         let n_restored = steps.len();
-        let mut choice = before.map(|roles| Choice { roles, control: [0.0; 2], object_rests: false });
-        if let Some(choice) = &mut choice {
-            choice.control = self.control_towards_rest(&here, choice.roles.moving, &Vector::zeros());
-        }
+        let mut choice = before.map(|roles| {
+            let control = self.control_towards_rest(&here, roles.moving, &Vector::zeros());
+            Choice { roles, control, turn: None }
+        });
         while steps.len() - n_restored < most_steps {
             let left = turn_to(&here.orientation(), goal);
             if left.norm() <= tolerance {
@@ -112,7 +115,7 @@ impl Local<'_, '_, '_> {
             let mut tried = Tried::default();
             let mut made = None;
             while tried.n < settings.trials {
-                let kept = choice.filter(|choice| tried.n == 0 && self.is_aligned(&here, choice, &left));
+                let kept = choice.filter(|_| tried.n == 0).and_then(|choice| self.keep(&here, &choice, &left));
                 let next = kept.or_else(|| self.choose(&here, &left, &tried, choice));
                 tried.n += 1;
                 tried.guilty = None;
@@ -121,11 +124,7 @@ impl Local<'_, '_, '_> {
                     continue;
                 };
                 choice = Some(next);
-                let turn = match next.object_rests {
-                    true => None,
-                    false => self.prospect(&here, next.roles, &left).map(|prospect| prospect.turn),
-                };
-                match self.stepper.step(&here, &Asked { roles: next.roles, turn, rolled: next.control }) {
+                match self.stepper.step(&here, &Asked { roles: next.roles, turn: next.turn, rolled: next.control }) {
                     Ok(step) => {
                         made = Some(step);
                         break;
@@ -138,9 +137,6 @@ impl Local<'_, '_, '_> {
             }
             let Some(step) = made else { break };
             here = step.end.clone();
-            if let Some(choice) = &mut choice {
-                choice.object_rests = false;
-            }
             steps.push(step);
         }
         let arrived = turn_to(&here.orientation(), goal).norm() <= tolerance;
@@ -165,19 +161,14 @@ impl Local<'_, '_, '_> {
                 let control = self.control_towards_rest(here, moving, &Vector::zeros());
                 let asked = Asked { roles: Roles { moving, rolling }, turn: None, rolled: control };
                 let Ok(step) = self.stepper.step(here, &asked) else { break };
-                let now = away(&step.end);
-                if now > before - 1e-4 {
-                    // The step is made all the same: the workspace is there.
-                    *here = step.end.clone();
-                    steps.push(step);
+                // Also a step that leads no nearer has been made: the workspace is there.
+                *here = step.end.clone();
+                steps.push(step);
+                let now = away(here);
+                if now < NEAR || now > before - LEAST_GAIN {
                     break;
                 }
                 before = now;
-                *here = step.end.clone();
-                steps.push(step);
-                if now < NEAR {
-                    break;
-                }
             }
         }
     }
@@ -192,14 +183,15 @@ impl Local<'_, '_, '_> {
         };
         let whatever_it_does =
             matches!(failure, NoStep::BrokenContact(_) | NoStep::RestingPad | NoStep::Degenerate | NoStep::Unbalanced);
-        if whatever_it_does && !choice.object_rests && !tried.useless.contains(&choice.roles) {
+        if whatever_it_does && choice.turn.is_some() && !tried.useless.contains(&choice.roles) {
             tried.useless.push(choice.roles);
         }
     }
 
-    /// True where the roles still lead towards the goal.
-    fn is_aligned(&self, here: &TrackingGrasp, choice: &Choice, left: &Vector) -> bool {
-        self.prospect(here, choice.roles, left).is_some_and(|prospect| prospect.cosine >= WELL_ALIGNED)
+    /// The choice of the step before, where its roles still lead towards the goal.
+    fn keep(&self, here: &TrackingGrasp, choice: &Choice, left: &Vector) -> Option<Choice> {
+        let prospect = self.prospect(here, choice.roles, left).filter(|prospect| prospect.cosine >= WELL_ALIGNED)?;
+        Some(Choice { turn: Some(prospect.turn), ..*choice })
     }
 
     /// What these roles promise where `left` is the turn left to the sub-goal.
@@ -231,10 +223,11 @@ impl Local<'_, '_, '_> {
 
     /// Other roles: those that lead best towards the goal and whose moving finger has reach left, with some chance.
     fn choose(&mut self, here: &TrackingGrasp, left: &Vector, tried: &Tried, before: Option<Choice>) -> Option<Choice> {
+        self.stepper.work += STEP_WORK;
         let n = self.stepper.model.n_fingers();
         let has_failed = tried.n > 0;
         let chance = if has_failed { 1.0 } else { CHANCE };
-        let mut best: Option<(f64, Roles, Vector)> = None;
+        let mut best: Option<(f64, Roles, Prospect)> = None;
         for moving in (0..n).filter(|&finger| tried.guilty.is_none_or(|guilty| guilty == finger)) {
             for rolling in (0..n).filter(|&finger| finger != moving) {
                 let roles = Roles { moving, rolling };
@@ -252,14 +245,14 @@ impl Local<'_, '_, '_> {
                 // Changing roles costs a pause.
                 let kept = if before.is_some_and(|before| before.roles == roles) && !has_failed { KEPT } else { 0.0 };
                 let worth = prospect.cosine + noise + kept - REACH_WEIGHT * share * share;
-                if best.is_none_or(|(most, _, _)| worth > most) {
-                    best = Some((worth, roles, prospect.tip_way));
+                if best.as_ref().is_none_or(|(most, _, _)| worth > *most) {
+                    best = Some((worth, roles, prospect));
                 }
             }
         }
         let object_rests = has_failed && self.rng.chance(REST_SHARE);
-        let (roles, tip_way) = match best {
-            Some((_, roles, tip_way)) => (roles, if object_rests { Vector::zeros() } else { tip_way }),
+        let (roles, moves) = match best {
+            Some((_, roles, prospect)) => (roles, Some(prospect).filter(|_| !object_rests)),
             // Nothing leads there: a finger that rolls on while the object rests may change that.
             None if object_rests => {
                 let moving = tried.guilty.unwrap_or_else(|| self.rng.below(n));
@@ -268,13 +261,14 @@ impl Local<'_, '_, '_> {
                 if rolling == moving {
                     return None;
                 }
-                (Roles { moving, rolling }, Vector::zeros())
+                (Roles { moving, rolling }, None)
             }
             None => return None,
         };
+        let tip_way = moves.as_ref().map_or(Vector::zeros(), |prospect| prospect.tip_way);
         let control =
             if has_failed { self.drawn_control() } else { self.control_towards_rest(here, roles.moving, &tip_way) };
-        Some(Choice { roles, control, object_rests })
+        Some(Choice { roles, control, turn: moves.map(|prospect| prospect.turn) })
     }
 
     /// The control of the moving finger, of the extremes (paper 003, eq. 10), that keeps it nearest to where it rests.

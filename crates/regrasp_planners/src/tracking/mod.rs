@@ -43,7 +43,8 @@ const MOST_RESTARTS: u64 = 20;
 
 /// Plans how the fingertips turn the object to the goal's orientation.
 ///
-/// The plan is the same for the same scene, query, settings and seed. `progress` is called after every sub-goal. Panics if `settings.validate()` fails.
+/// The plan is the same for the same scene, query, settings and seed. `progress` is called after every sub-goal. Panics if
+/// `settings.validate()` fails.
 ///
 /// Errors: the start is none, or the search ends without a plan.
 pub fn plan_tracking(
@@ -60,19 +61,19 @@ pub fn plan_tracking(
     let model = Model::new(scene, &settings.in_hand);
     endpoints::refuse(&model, &gravity)?;
     let forces = model.forces.as_ref().expect("settings without forces do not validate");
-    let mut stepper = Stepper { model: &model, settings, forces, workspace: Workspace::new(&model) };
+    let mut stepper = Stepper { model: &model, settings, forces, workspace: Workspace::new(&model), work: 0 };
     let first = endpoints::start(&stepper, query)?;
     let goal = query.world_from_object_goal.rotation;
     let mut counts = Counts::default();
     loop {
         let mut rng = Rng::keyed(seed, "tracking", counts.restarts);
-        let found = search(&mut stepper, &first, &goal, &mut rng, budget, &mut counts, progress);
+        let found = search(&mut stepper, &first.0, &goal, &mut rng, budget, &mut counts, progress);
         match found.last {
             Ok(last) => {
                 let path = found.path_to(last);
                 counts.on_path = path.len() as u64 - 1;
                 let steps: Vec<&Step> = path.iter().flat_map(|&node| &found.nodes[node].steps).collect();
-                return Ok(record::record(&stepper, forces, query, seed, &first, &steps, statistics(&counts)));
+                return Ok(record::record(&stepper, query, seed, &first, &steps, statistics(&counts)));
             }
             Err(Ended::Exhausted) if counts.restarts < MOST_RESTARTS => counts.restarts += 1,
             Err(ref ended) => return Err(failure(ended, &counts, &found)),

@@ -1,18 +1,17 @@
 //! The plan as it is written to a file.
 
+use super::forces::Forces;
 use super::grasp::{PerFinger, TrackingGrasp};
 use super::settings::{METHOD, TrackingSettings};
 use super::step::{Relative, Step, Stepper};
-use crate::in_hand::forces::ForceModel;
 use crate::in_hand::model::Model;
-use crate::in_hand::record::{CONTACT_TOLERANCE, SLIP_TOLERANCE};
+use crate::in_hand::record::{CONTACT_TOLERANCE, SLIP_TOLERANCE, plan_of};
 use crate::in_hand::timing;
 use regrasp_geometry::Vector;
 use regrasp_plan::plan::{
-    ContactMode, ContactState, FORMAT, FORMAT_VERSION, Plan, PlanInput, PoseData, Promises, Segment, SegmentKind,
-    Statistics, TrackingPromises, Waypoint,
+    ContactMode, ContactState, Plan, PoseData, Promises, Segment, SegmentKind, Statistics, TrackingPromises, Waypoint,
 };
-use regrasp_scene::{InHandQuery, TaskKind};
+use regrasp_scene::InHandQuery;
 
 /// Settings as plans have them.
 pub fn settings_of(settings: &TrackingSettings) -> serde_json::Value {
@@ -28,10 +27,9 @@ struct Stretch<'s> {
 /// Makes the plan of `steps`, which begin at `start`.
 pub fn record(
     stepper: &Stepper,
-    forces: &ForceModel,
     query: &InHandQuery,
     seed: u64,
-    start: &TrackingGrasp,
+    (start, forces_at_rest): &(TrackingGrasp, Forces),
     steps: &[&Step],
     statistics: Statistics,
 ) -> Plan {
@@ -39,49 +37,34 @@ pub fn record(
     let stretches = stretches(start, steps);
     let mut segments: Vec<Segment> = stretches.iter().map(|stretch| segment(stepper, stretch)).collect();
     if segments.is_empty() {
-        segments.push(at_rest(stepper, start));
+        segments.push(at_rest(stepper, start, forces_at_rest));
     }
     let motion = timing::limits(model);
     timing::assign_times(model, &motion, &mut segments, settings.time_step);
     for (segment, stretch) in segments.iter_mut().zip(&stretches) {
         add_velocities(segment, stretch);
     }
-    let scene = model.scene;
+    let promises = Promises {
+        contact_tolerance: CONTACT_TOLERANCE,
+        friction: model.frame.friction,
+        required_margin: 0.0,
+        kept_margin: 0.0,
+        torque_scale: model.frame.torque_scale,
+        friction_margin: model.settings.friction_margin,
+        slip_tolerance: SLIP_TOLERANCE,
+        tracking: Some(TrackingPromises {
+            goal_tolerance: settings.goal_tolerance,
+            sliding_friction: model.scene.object.friction,
+        }),
+        motion,
+        forces: Some(stepper.forces.promises()),
+    };
     Plan {
-        format: FORMAT.into(),
-        format_version: FORMAT_VERSION,
-        tool: concat!("regrasp ", env!("CARGO_PKG_VERSION")).into(),
-        task: TaskKind::Tracking.name().into(),
         method: METHOD.into(),
         seed,
         settings: settings_of(settings),
-        inputs: scene
-            .inputs
-            .iter()
-            .map(|i| PlanInput { role: i.role.clone(), name: i.name.clone(), sha256: i.sha256.clone() })
-            .collect(),
-        promises: Promises {
-            contact_tolerance: CONTACT_TOLERANCE,
-            friction: model.frame.friction,
-            required_margin: 0.0,
-            kept_margin: 0.0,
-            torque_scale: model.frame.torque_scale,
-            friction_margin: model.settings.friction_margin,
-            slip_tolerance: SLIP_TOLERANCE,
-            tracking: Some(TrackingPromises {
-                goal_tolerance: settings.goal_tolerance,
-                sliding_friction: scene.object.friction,
-            }),
-            motion,
-            forces: Some(forces.promises()),
-        },
-        joint_names: scene.hand.joint_names(),
-        fingers: scene.hand.fingers.iter().map(|finger| finger.name.clone()).collect(),
-        start: PoseData::from(&query.world_from_object_start),
-        way_poses: Vec::new(),
-        goal: PoseData::from(&query.world_from_object_goal),
-        segments,
         statistics,
+        ..plan_of(model.scene, query, promises, segments)
     }
 }
 
@@ -124,11 +107,9 @@ fn segment(stepper: &Stepper, stretch: &Stretch) -> Segment {
 }
 
 /// The start holds still: it is the goal.
-fn at_rest(stepper: &Stepper, start: &TrackingGrasp) -> Segment {
-    let still = Relative { mode: ContactMode::Fixed, slid: Vector::zeros(), turned: Vector::zeros() };
-    let relative: PerFinger<Relative> = start.touches.iter().map(|_| still).collect();
-    let forces = stepper.balanced_at(start, start, start, &relative).unwrap_or_default();
-    let waypoint = waypoint(stepper, start, &relative, &forces);
+fn at_rest(stepper: &Stepper, start: &TrackingGrasp, forces: &Forces) -> Segment {
+    let relative: PerFinger<Relative> = start.touches.iter().map(|_| Relative::STILL).collect();
+    let waypoint = waypoint(stepper, start, &relative, forces);
     let name = |finger: usize| Some(stepper.model.scene.hand.fingers[finger].name.clone());
     Segment {
         kind: SegmentKind::Tracking,

@@ -3,6 +3,7 @@
 
 use super::grasp::{TrackingGrasp, turn_to};
 use super::local::{Failures, Local, once};
+use super::settings::TrackingSettings;
 use super::step::{Roles, Step, Stepper};
 use crate::in_hand::Progress;
 use nalgebra::UnitQuaternion;
@@ -58,7 +59,7 @@ impl Ord for Open {
 /// Counts of a search, as in paper 003, tables 4 and 5.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Sub-goals made: the nodes of the paper's graph.
+    /// Cells that sub-goals are in: the nodes of the paper's graph.
     pub nodes: u64,
     /// Sub-goals that the local planner was asked for.
     pub explored: u64,
@@ -68,7 +69,7 @@ pub struct Counts {
     pub failures: Failures,
     /// Searches begun anew.
     pub restarts: u64,
-    /// Steps tried.
+    /// Steps and choices of roles that were tried, [`super::step::STEP_WORK`] each.
     pub work: u64,
 }
 
@@ -78,6 +79,36 @@ pub enum Ended {
     Exhausted,
     /// The budget.
     Interrupted(Interrupt),
+}
+
+/// Cells of the orientation space: orientation vectors about the middle of the way, from where half a turn is far off.
+struct Cells {
+    middle: UnitQuaternion<f64>,
+    edge: f64,
+}
+
+impl Cells {
+    fn of(&self, orientation: &UnitQuaternion<f64>) -> [i32; 3] {
+        let vector = turn_to(&self.middle, orientation);
+        [0, 1, 2].map(|axis| (vector[axis] / self.edge).round() as i32)
+    }
+}
+
+/// The graph of the paper, as far as it has been made.
+struct Graph<'g> {
+    settings: &'g TrackingSettings,
+    goal: UnitQuaternion<f64>,
+    cells: Cells,
+    nodes: Vec<Node>,
+    /// Cells that a grasp is in.
+    taken: BTreeSet<[i32; 3]>,
+    /// Cells that a grasp is in or may come into: the nodes of the paper's graph.
+    seen: BTreeSet<[i32; 3]>,
+    open: BinaryHeap<Open>,
+    /// Sub-goals made.
+    n_made: usize,
+    /// The node nearest to the goal, and the angle left.
+    nearest: (usize, f64),
 }
 
 /// What was found: the nodes, and the last of the path, or why there is none and which came nearest.
@@ -99,6 +130,80 @@ impl Found {
     }
 }
 
+impl<'g> Graph<'g> {
+    fn new(settings: &'g TrackingSettings, start: &TrackingGrasp, goal: &UnitQuaternion<f64>) -> Self {
+        let orientation = start.orientation();
+        let middle = UnitQuaternion::from_scaled_axis(0.5 * turn_to(&orientation, goal)) * orientation;
+        let mut graph = Graph {
+            settings,
+            goal: *goal,
+            cells: Cells { middle, edge: settings.cell },
+            nodes: Vec::new(),
+            taken: BTreeSet::new(),
+            seen: BTreeSet::new(),
+            open: BinaryHeap::new(),
+            n_made: 0,
+            nearest: (0, f64::INFINITY),
+        };
+        let target = graph.cells.of(&orientation);
+        graph.add(Node { grasp: start.clone(), parent: None, steps: Vec::new(), length: 0.0 }, target);
+        graph
+    }
+
+    /// Adds a node that was reached by planning to a sub-goal in `target`, and its sub-goals; true at the goal.
+    fn add(&mut self, node: Node, target: [i32; 3]) -> bool {
+        let left = turn_to(&node.grasp.orientation(), &self.goal).norm();
+        let index = self.nodes.len();
+        if left < self.nearest.1 {
+            self.nearest = (index, left);
+        }
+        self.taken.insert(target);
+        self.seen.insert(target);
+        self.nodes.push(node);
+        let is_goal = left <= self.settings.goal_tolerance;
+        if !is_goal {
+            self.expand(index);
+        }
+        is_goal
+    }
+
+    /// Adds the sub-goals of a node: turns at extreme velocities about the axes of the world, and the goal where it is as near.
+    fn expand(&mut self, node: usize) {
+        let turn = self.settings.object_velocity * self.settings.sub_goal_time;
+        let from = self.nodes[node].grasp.orientation();
+        if turn_to(&from, &self.goal).amax() <= turn {
+            self.open(node, &from, self.goal, true);
+        }
+        for x in -1..=1 {
+            for y in -1..=1 {
+                for z in -1..=1 {
+                    let velocity = Vector::new(f64::from(x), f64::from(y), f64::from(z));
+                    if velocity != Vector::zeros() {
+                        self.open(node, &from, UnitQuaternion::from_scaled_axis(velocity * turn) * from, false);
+                    }
+                }
+            }
+        }
+    }
+
+    fn open(&mut self, node: usize, from: &UnitQuaternion<f64>, orientation: UnitQuaternion<f64>, is_goal: bool) {
+        let cell = self.cells.of(&orientation);
+        if !is_goal && self.taken.contains(&cell) {
+            return;
+        }
+        self.seen.insert(cell);
+        let way = turn_to(from, &orientation).norm();
+        let left = turn_to(&orientation, &self.goal).norm();
+        let estimate = self.nodes[node].length + way + self.settings.goal_weight * left;
+        self.open.push(Open { estimate, number: self.n_made, node, orientation, is_goal });
+        self.n_made += 1;
+    }
+
+    fn ended(self, last: Result<usize, Ended>) -> Found {
+        Found { nodes: self.nodes, last, nearest: self.nearest }
+    }
+}
+
 /// Searches from `start` to the orientation `goal`.
 pub fn search(
     stepper: &mut Stepper,
@@ -111,98 +216,44 @@ pub fn search(
 ) -> Found {
     let settings = stepper.settings;
     let rolling = once(settings.rolling_finger, stepper.model.n_fingers(), rng);
-    // Orientation vectors are about the middle of the way: half a turn is then far off.
-    let start_orientation = start.orientation();
-    let middle = UnitQuaternion::from_scaled_axis(0.5 * turn_to(&start_orientation, goal)) * start_orientation;
-    let cell = |orientation: &UnitQuaternion<f64>| {
-        let vector = turn_to(&middle, orientation);
-        [0, 1, 2].map(|axis| (vector[axis] / settings.cell).round() as i32)
-    };
-    let mut nodes = vec![Node { grasp: start.clone(), parent: None, steps: Vec::new(), length: 0.0 }];
-    let mut taken: BTreeSet<[i32; 3]> = BTreeSet::from([cell(&start_orientation)]);
-    let mut open: BinaryHeap<Open> = BinaryHeap::new();
-    let mut nearest = (0, turn_to(&start_orientation, goal).norm());
-    if nearest.1 <= settings.goal_tolerance {
-        return Found { nodes, last: Ok(0), nearest };
+    let mut graph = Graph::new(settings, start, goal);
+    let nodes_before = counts.nodes;
+    if graph.nearest.1 <= settings.goal_tolerance {
+        return graph.ended(Ok(0));
     }
-    expand(stepper, &nodes, 0, goal, &mut open, counts, &taken, &cell);
-    while let Some(best) = open.pop() {
+    while let Some(best) = graph.open.pop() {
         if let Err(interrupt) = budget.check(counts.work) {
-            return Found { nodes, last: Err(Ended::Interrupted(interrupt)), nearest };
+            return graph.ended(Err(Ended::Interrupted(interrupt)));
         }
-        if nodes.len() > settings.nodes {
+        if graph.nodes.len() > settings.nodes {
             break;
         }
-        let target = cell(&best.orientation);
-        if !best.is_goal && taken.contains(&target) {
+        let target = graph.cells.of(&best.orientation);
+        if !best.is_goal && graph.taken.contains(&target) {
             continue;
         }
         counts.explored += 1;
-        let from = &nodes[best.node];
+        let from = &graph.nodes[best.node];
         let before: Option<Roles> = from.steps.last().map(|step| step.roles);
-        let work_before = stepper.workspace.work;
+        let work_before = stepper.work;
         let mut local = Local { stepper, rng, rolling, failures: &mut counts.failures };
         let planned = local.plan(&from.grasp, &best.orientation, settings.goal_tolerance, before);
-        counts.work += (stepper.workspace.work - work_before).max(1);
+        counts.work += stepper.work - work_before;
         let Some(last) = planned.steps.last().filter(|_| planned.arrived) else { continue };
         let grasp = last.end.clone();
-        let orientation = grasp.orientation();
-        let way = turn_to(&from.grasp.orientation(), &orientation).norm();
-        let length = from.length + way;
-        let node = nodes.len();
-        nodes.push(Node { grasp, parent: Some(best.node), steps: planned.steps, length });
-        taken.insert(target);
-        let left = turn_to(&orientation, goal).norm();
-        if left < nearest.1 {
-            nearest = (node, left);
-        }
-        let Counts { work, restarts, .. } = *counts;
-        progress(Progress { nodes: nodes.len() as u64, work, restarts, angle_left: nearest.1 });
-        if left <= settings.goal_tolerance {
-            return Found { nodes, last: Ok(node), nearest };
-        }
-        expand(stepper, &nodes, node, goal, &mut open, counts, &taken, &cell);
-    }
-    Found { nodes, last: Err(Ended::Exhausted), nearest }
-}
-
-/// Adds the sub-goals of a node: turns at extreme velocities about the axes of the world, and the goal where it is as near.
-#[expect(clippy::too_many_arguments, reason = "the state of one search")]
-fn expand(
-    stepper: &Stepper,
-    nodes: &[Node],
-    node: usize,
-    goal: &UnitQuaternion<f64>,
-    open: &mut BinaryHeap<Open>,
-    counts: &mut Counts,
-    taken: &BTreeSet<[i32; 3]>,
-    cell: &impl Fn(&UnitQuaternion<f64>) -> [i32; 3],
-) {
-    let settings = stepper.settings;
-    let turn = settings.object_velocity * settings.sub_goal_time;
-    let from = nodes[node].grasp.orientation();
-    let left = turn_to(&from, goal);
-    let mut add = |orientation: UnitQuaternion<f64>, is_goal: bool| {
-        if !is_goal && taken.contains(&cell(&orientation)) {
-            return;
-        }
-        let estimate = nodes[node].length
-            + turn_to(&from, &orientation).norm()
-            + settings.goal_weight * turn_to(&orientation, goal).norm();
-        open.push(Open { estimate, number: counts.nodes as usize, node, orientation, is_goal });
-        counts.nodes += 1;
-    };
-    if left.amax() <= turn {
-        add(*goal, true);
-    }
-    for x in -1..=1 {
-        for y in -1..=1 {
-            for z in -1..=1 {
-                let velocity = Vector::new(f64::from(x), f64::from(y), f64::from(z));
-                if velocity != Vector::zeros() {
-                    add(UnitQuaternion::from_scaled_axis(velocity * turn) * from, false);
-                }
-            }
+        let length = from.length + turn_to(&from.grasp.orientation(), &grasp.orientation()).norm();
+        let is_goal = graph.add(Node { grasp, parent: Some(best.node), steps: planned.steps, length }, target);
+        counts.nodes = nodes_before + graph.seen.len() as u64;
+        progress(Progress {
+            nodes: graph.nodes.len() as u64,
+            work: counts.work,
+            restarts: counts.restarts,
+            angle_left: graph.nearest.1,
+        });
+        if is_goal {
+            let last = graph.nodes.len() - 1;
+            return graph.ended(Ok(last));
         }
     }
+    graph.ended(Err(Ended::Exhausted))
 }
