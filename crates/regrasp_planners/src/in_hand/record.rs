@@ -207,7 +207,7 @@ impl<'m, 'a> Recorder<'m, 'a> {
         let model = self.model;
         let forces = add_forces(model, &mut self.segments)?;
         let motion = timing::limits(model);
-        timing::assign_times(model, &motion, &mut self.segments, timing::LEAST_SPAN);
+        timing::assign_times(model, &motion, &mut self.segments, |_| timing::LEAST_SPAN);
         let promises = Promises {
             contact_tolerance: CONTACT_TOLERANCE,
             friction: model.frame.friction,

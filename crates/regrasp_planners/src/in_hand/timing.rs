@@ -44,16 +44,17 @@ pub fn limits(model: &Model) -> MotionLimits {
 }
 
 /// Gives every waypoint its time and its velocities, `least_span` seconds or more apart; `SpeedSettings::ramp` passes between segments where forces change.
-pub fn assign_times(model: &Model, limits: &MotionLimits, segments: &mut [Segment], least_span: f64) {
+pub fn assign_times(model: &Model, limits: &MotionLimits, segments: &mut [Segment], least_span: impl Fn(usize) -> f64) {
     let mut now = 0.0;
-    let mut timing = Timing::new(model, limits, least_span);
+    let mut timing = Timing::new(model, limits);
     let mut before: Option<SegmentKind> = None;
-    for segment in segments {
+    for (index, segment) in segments.iter_mut().enumerate() {
         let goes_on = (before, segment.kind) == (Some(SegmentKind::Transfer), SegmentKind::Transfer);
         if model.settings.forces.is_some() && before.is_some() && !goes_on {
             now += model.settings.speed.ramp;
         }
         before = Some(segment.kind);
+        timing.least_span = least_span(index);
         timing.assign(&mut segment.waypoints, now);
         now = segment.waypoints.last().map_or(now, |last| last.time);
     }
@@ -73,8 +74,8 @@ struct Timing<'m, 'a> {
 }
 
 impl<'m, 'a> Timing<'m, 'a> {
-    fn new(model: &'m Model<'a>, limits: &'m MotionLimits, least_span: f64) -> Self {
-        Timing { model, limits, least_span, spans: Vec::new(), times: Vec::new(), velocities: Vec::new() }
+    fn new(model: &'m Model<'a>, limits: &'m MotionLimits) -> Self {
+        Timing { model, limits, least_span: LEAST_SPAN, spans: Vec::new(), times: Vec::new(), velocities: Vec::new() }
     }
 
     fn assign(&mut self, waypoints: &mut [Waypoint], start: f64) {

@@ -2,18 +2,17 @@
 
 use super::grasp::{PerFinger, TrackingGrasp, turn_to};
 use super::object_motion::ObjectMotion;
-use super::settings::RollingFinger;
 use super::step::{Asked, NoStep, Roles, STEP_WORK, Step, Stepper};
-use crate::in_hand::model::MAX_FINGERS;
+use crate::in_hand::model::{MAX_FINGERS, Model};
 use arrayvec::ArrayVec;
 use nalgebra::UnitQuaternion;
 use regrasp_base::Rng;
-use regrasp_geometry::{UnitVector, Vector, frame};
+use regrasp_geometry::{Point, UnitVector, Vector, frame};
 
 /// Time of a local plan in units of that to the sub-goal (paper 003: `bound_1`, twice).
 const MOST_TIME: f64 = 5.0;
 /// Cosine of the angle between the wanted turn and the one that the contacts allow, below which roles are not taken. By hand.
-const LEAST_ALIGNED: f64 = 0.3;
+const LEAST_ALIGNED: f64 = 0.2;
 /// Cosine below which roles are looked for that follow better.
 const WELL_ALIGNED: f64 = 0.5;
 /// How much chance counts against alignment when roles are chosen.
@@ -26,14 +25,16 @@ const AHEAD: f64 = 2.0;
 /// What a finger at the end of its reach counts against alignment. By hand.
 const REACH_WEIGHT: f64 = 1.0;
 /// What roles that go on count for.
-const KEPT: f64 = 0.1;
+const KEPT: f64 = 0.05;
 
-/// Share of its reach that a finger may be away before it is rolled back, and to which it is.
-const FAR: f64 = 0.12;
+/// Distance from home, in units of the object's size, from which a finger is rolled back, and to which it is. By hand.
+const FAR: f64 = 0.06;
 /// See [`FAR`].
-const NEAR: f64 = 0.03;
-/// Share of its reach that a step must bring a finger nearer to where it rests, to be followed by another. By hand.
+const NEAR: f64 = 0.04;
+/// What a step must bring a finger nearer home, to be followed by another, in the same unit. By hand.
 const LEAST_GAIN: f64 = 1e-4;
+/// What distance from home, in the same unit, counts against alignment. By hand.
+const LAG_WEIGHT: f64 = 0.3;
 
 /// What roles promise.
 struct Prospect {
@@ -43,6 +44,25 @@ struct Prospect {
     turn: Vector,
     /// Way of the moving tip in a step, rolling aside, in the world.
     tip_way: Vector,
+}
+
+/// Where fingertips have their homes: their centres.
+pub enum Homes {
+    /// In the object frame.
+    OnObject(PerFinger<Point>),
+    /// In the world.
+    InWorld(PerFinger<Point>),
+}
+
+impl Homes {
+    /// Of a start grasp: on a polyhedron the fingertips belong to the faces that they are on, elsewhere to places in the world.
+    pub fn of(model: &Model, start: &TrackingGrasp) -> Self {
+        let surface = &model.scene.object.surface;
+        match surface.crease_distance(&start.touches[0].foot).is_finite() {
+            true => Homes::OnObject(start.touches.iter().map(|touch| touch.ball.center).collect()),
+            false => Homes::InWorld(model.fingers.iter().map(|finger| finger.tip_at_rest).collect()),
+        }
+    }
 }
 
 /// What has been tried for one step.
@@ -83,6 +103,8 @@ pub struct Local<'s, 'm, 'a> {
     pub rng: &'s mut Rng,
     /// The finger that the object rolls on, where it is chosen once.
     pub rolling: Option<usize>,
+    /// Where the fingertips have their homes.
+    pub homes: &'s Homes,
     /// Counts.
     pub failures: &'s mut Failures,
 }
@@ -104,7 +126,7 @@ impl Local<'_, '_, '_> {
         self.restore(&mut here, &mut steps);
         let n_restored = steps.len();
         let mut choice = before.map(|roles| {
-            let control = self.control_towards_rest(&here, roles.moving, &Vector::zeros());
+            let control = self.control_home(&here, roles.moving, Some(&Vector::zeros()), settings.time_step);
             Choice { roles, control, turn: None }
         });
         while steps.len() - n_restored < most_steps {
@@ -124,7 +146,8 @@ impl Local<'_, '_, '_> {
                     continue;
                 };
                 choice = Some(next);
-                match self.stepper.step(&here, &Asked { roles: next.roles, turn: next.turn, rolled: next.control }) {
+                let Choice { roles, control: rolled, turn } = next;
+                match self.stepper.step(&here, &Asked { roles, turn, rolled, seconds: settings.time_step }) {
                     Ok(step) => {
                         made = Some(step);
                         break;
@@ -143,34 +166,52 @@ impl Local<'_, '_, '_> {
         LocalPlan { steps, arrived }
     }
 
-    /// While the object rests, rolls fingers back that have gone far from where they rest: the paper's object at rest (section
-    /// 6.2.4, `w_O` of zero), with a purpose.
+    /// While the object rests, rolls fingers back that have come far from home: the paper's object at rest (section 6.2.4,
+    /// `w_O` of zero), with a purpose.
     fn restore(&mut self, here: &mut TrackingGrasp, steps: &mut Vec<Step>) {
         let model = self.stepper.model;
-        let Some(reach) = model.scene.reach else { return };
+        let size = model.frame.torque_scale;
         for moving in 0..model.n_fingers() {
-            let away = |here: &TrackingGrasp| {
-                (here.tip_in_world(model, moving) - model.fingers[moving].tip_at_rest).norm() / reach
-            };
-            if away(here) < FAR {
+            let mut before = self.lag(here, moving);
+            if before < FAR * size {
                 continue;
             }
             let rolling = self.rolling.filter(|once| *once != moving).unwrap_or((moving + 1) % model.n_fingers());
-            let mut before = away(here);
+            let settings = self.stepper.settings;
+            let mut seconds = settings.rest_step.max(settings.time_step);
             loop {
-                let control = self.control_towards_rest(here, moving, &Vector::zeros());
-                let asked = Asked { roles: Roles { moving, rolling }, turn: None, rolled: control };
-                let Ok(step) = self.stepper.step(here, &asked) else { break };
+                let rolled = self.control_home(here, moving, None, seconds);
+                let asked = Asked { roles: Roles { moving, rolling }, turn: None, rolled, seconds };
+                let step = match self.stepper.step(here, &asked) {
+                    Ok(step) => step,
+                    Err(NoStep::TooLong) => {
+                        seconds = (0.5 * seconds).max(settings.time_step);
+                        continue;
+                    }
+                    Err(_) => break,
+                };
                 // Also a step that leads no nearer has been made: the workspace is there.
                 *here = step.end.clone();
                 steps.push(step);
-                let now = away(here);
-                if now < NEAR || now > before - LEAST_GAIN {
+                let now = self.lag(here, moving);
+                if now < NEAR * size || now > before - LEAST_GAIN * size {
                     break;
                 }
                 before = now;
             }
         }
+    }
+
+    fn home_in_object(&self, here: &TrackingGrasp, finger: usize) -> Point {
+        match self.homes {
+            Homes::OnObject(centers) => centers[finger],
+            Homes::InWorld(centers) => here.world_from_object.point_to_child(&centers[finger]),
+        }
+    }
+
+    /// How far a fingertip is from its home on the object, in metres.
+    fn lag(&self, here: &TrackingGrasp, finger: usize) -> f64 {
+        (here.touches[finger].ball.center - self.home_in_object(here, finger)).norm()
     }
 
     /// What a failure says about what to try next (paper 003, section 6.2.4): 1 and 3 keep the moving finger and change its
@@ -191,7 +232,8 @@ impl Local<'_, '_, '_> {
     /// The choice of the step before, where its roles still lead towards the goal.
     fn keep(&self, here: &TrackingGrasp, choice: &Choice, left: &Vector) -> Option<Choice> {
         let prospect = self.prospect(here, choice.roles, left).filter(|prospect| prospect.cosine >= WELL_ALIGNED)?;
-        Some(Choice { turn: Some(prospect.turn), ..*choice })
+        let control = self.control_home(here, choice.roles.moving, Some(&prospect.tip_way), self.time_step());
+        Some(Choice { turn: Some(prospect.turn), control, ..*choice })
     }
 
     /// What these roles promise where `left` is the turn left to the sub-goal.
@@ -244,7 +286,8 @@ impl Local<'_, '_, '_> {
                 }
                 // Changing roles costs a pause.
                 let kept = if before.is_some_and(|before| before.roles == roles) && !has_failed { KEPT } else { 0.0 };
-                let worth = prospect.cosine + noise + kept - REACH_WEIGHT * share * share;
+                let lag = self.lag(here, moving) / self.stepper.model.frame.torque_scale;
+                let worth = prospect.cosine + noise + kept - REACH_WEIGHT * share * share + LAG_WEIGHT * lag;
                 if best.as_ref().is_none_or(|(most, _, _)| worth > *most) {
                     best = Some((worth, roles, prospect));
                 }
@@ -265,39 +308,42 @@ impl Local<'_, '_, '_> {
             }
             None => return None,
         };
-        let tip_way = moves.as_ref().map_or(Vector::zeros(), |prospect| prospect.tip_way);
-        let control =
-            if has_failed { self.drawn_control() } else { self.control_towards_rest(here, roles.moving, &tip_way) };
+        let tip_way = moves.as_ref().map(|prospect| prospect.tip_way);
+        let control = match has_failed {
+            true => self.drawn_control(),
+            false => self.control_home(here, roles.moving, tip_way.as_ref(), self.time_step()),
+        };
         Some(Choice { roles, control, turn: moves.map(|prospect| prospect.turn) })
     }
 
-    /// The control of the moving finger, of the extremes (paper 003, eq. 10), that keeps it nearest to where it rests.
-    fn control_towards_rest(&self, here: &TrackingGrasp, moving: usize, tip_way: &Vector) -> [f64; 2] {
-        let model = self.stepper.model;
+    fn time_step(&self) -> f64 {
+        self.stepper.settings.time_step
+    }
+
+    /// The control of the moving finger for a step of `seconds`, of the extremes (paper 003, eq. 10), that leads it nearest to its
+    /// home; `tip_way` is the way of its tip in the world with the object, none where this rests.
+    fn control_home(&self, here: &TrackingGrasp, moving: usize, tip_way: Option<&Vector>, seconds: f64) -> [f64; 2] {
+        let settings = self.stepper.settings;
         let ball = &here.touches[moving].ball;
         let (x, y) = frame::tangents(&UnitVector::new_unchecked(ball.normal));
-        let arm = here.world_from_object.vector(&ball.normal) * model.fingers[moving].tip_radius;
-        let tip = here.tip_in_world(model, moving);
-        let steps = AHEAD / self.stepper.settings.time_step;
+        let arm = ball.normal * self.stepper.model.fingers[moving].tip_radius;
+        let most = settings.rolling_velocity * seconds;
+        let ahead = if tip_way.is_none() { 1.0 } else { AHEAD / settings.time_step };
+        let mut home = self.home_in_object(here, moving);
+        if let (Homes::InWorld(_), Some(tip_way)) = (self.homes, tip_way) {
+            home -= here.world_from_object.vector_to_child(tip_way) * ahead;
+        }
         let left = |control: &[f64; 2]| {
-            let turn = here.world_from_object.vector(&(x.into_inner() * control[0] + y.into_inner() * control[1]));
-            let way = (tip_way + turn.cross(&arm)) * steps;
-            (tip + way - model.fingers[moving].tip_at_rest).norm()
+            let turn = x.into_inner() * control[0] + y.into_inner() * control[1];
+            (ball.center + turn.cross(&arm) * ahead - home).norm()
         };
-        let most = self.stepper.settings.rolling_velocity * self.stepper.settings.time_step;
         let controls = (0..9).map(|k| [f64::from(k % 3 - 1) * most, f64::from(k / 3 - 1) * most]);
         controls.min_by(|a, b| left(a).total_cmp(&left(b))).unwrap_or([0.0; 2])
     }
 
     /// A control of the moving finger, drawn from the extremes (paper 003, eq. 10).
     fn drawn_control(&mut self) -> [f64; 2] {
-        let settings = self.stepper.settings;
-        let most = settings.rolling_velocity * settings.time_step;
+        let most = self.stepper.settings.rolling_velocity * self.time_step();
         std::array::from_fn(|_| most * (self.rng.below(3) as f64 - 1.0))
     }
-}
-
-/// The finger that the object rolls on, where the settings want one for all of the task.
-pub fn once(settings: RollingFinger, n_fingers: usize, rng: &mut Rng) -> Option<usize> {
-    (settings == RollingFinger::Once).then(|| rng.below(n_fingers))
 }

@@ -31,6 +31,7 @@ use crate::in_hand::Progress;
 use crate::in_hand::model::Model;
 use crate::in_hand::settings::gravity_of;
 use crate::in_hand::workspace::Workspace;
+use grasp::TrackingGrasp;
 use regrasp_base::{Budget, Rng};
 use regrasp_plan::Plan;
 use regrasp_plan::plan::{PoseData, Statistics};
@@ -65,9 +66,15 @@ pub fn plan_tracking(
     let first = endpoints::start(&stepper, query)?;
     let goal = query.world_from_object_goal.rotation;
     let mut counts = Counts::default();
+    let mut nearest: Option<(f64, TrackingGrasp)> = None;
     loop {
         let mut rng = Rng::keyed(seed, "tracking", counts.restarts);
         let found = search(&mut stepper, &first.0, &goal, &mut rng, budget, &mut counts, progress);
+        let (index, angle_left) = found.nearest;
+        let before = nearest.as_ref().map_or(f64::INFINITY, |(angle_left, _)| *angle_left);
+        if angle_left < before {
+            nearest = Some((angle_left, found.nodes[index].grasp.clone()));
+        }
         match found.last {
             Ok(last) => {
                 let path = found.path_to(last);
@@ -76,7 +83,7 @@ pub fn plan_tracking(
                 return Ok(record::record(&stepper, query, seed, &first, &steps, statistics(&counts)));
             }
             Err(Ended::Exhausted) if counts.restarts < MOST_RESTARTS => counts.restarts += 1,
-            Err(ref ended) => return Err(failure(ended, &counts, &found)),
+            Err(ended) => return Err(failure(&ended, &counts, nearest)),
         }
     }
 }
@@ -107,13 +114,15 @@ const FAILURES: [&str; 8] = [
     "7: resting fingers tell no motion towards the goal",
 ];
 
-fn failure(ended: &Ended, counts: &Counts, found: &search::Found) -> Failure {
+fn failure(ended: &Ended, counts: &Counts, nearest: Option<(f64, TrackingGrasp)>) -> Failure {
     let (kind, why) = match ended {
         Ended::Exhausted => (FailureKind::WorkSpent, "no orientation is left to be tried".to_owned()),
         Ended::Interrupted(interrupt) => (FailureKind::from(*interrupt), "the budget is used up".to_owned()),
     };
-    let (nearest, angle_left) = found.nearest;
-    let grasp = &found.nodes[nearest].grasp;
+    let nearest = nearest.filter(|(angle_left, _)| angle_left.is_finite());
+    let left = nearest.as_ref().map_or(String::new(), |(angle_left, _)| {
+        format!("; {:.1} degrees are left to the goal", angle_left.to_degrees())
+    });
     let total: u64 = counts.failures.iter().sum();
     let mut causes: Vec<Cause> = FAILURES
         .iter()
@@ -124,16 +133,18 @@ fn failure(ended: &Ended, counts: &Counts, found: &search::Found) -> Failure {
     causes.sort_by(|a, b| b.count.cmp(&a.count).then_with(|| a.reason.cmp(&b.reason)));
     Failure {
         kind,
-        message: format!("{why}; {:.1} degrees are left to the goal", angle_left.to_degrees()),
+        message: format!("{why}{left}"),
         advice: "try another seed, another start grasp, or an in_hand task".into(),
         causes,
         leg: None,
-        nearest_miss: Some(Box::new(NearestMiss {
-            world_from_object: PoseData::from(&grasp.world_from_object.to_pose()),
-            angle_left,
-            distance_left: 0.0,
-            joints: grasp.joints.iter().flatten().copied().collect(),
-        })),
+        nearest_miss: nearest.map(|(angle_left, grasp)| {
+            Box::new(NearestMiss {
+                world_from_object: PoseData::from(&grasp.world_from_object.to_pose()),
+                angle_left,
+                distance_left: 0.0,
+                joints: grasp.joints.iter().flatten().copied().collect(),
+            })
+        }),
         reached: None,
         statistics: statistics(counts),
     }

@@ -40,7 +40,9 @@ pub fn record(
         segments.push(at_rest(stepper, start, forces_at_rest));
     }
     let motion = timing::limits(model);
-    timing::assign_times(model, &motion, &mut segments, settings.time_step);
+    timing::assign_times(model, &motion, &mut segments, |index| {
+        stretches.get(index).map_or(settings.time_step, |stretch| stretch.steps[0].seconds)
+    });
     for (segment, stretch) in segments.iter_mut().zip(&stretches) {
         add_velocities(segment, stretch);
     }

@@ -2,9 +2,9 @@
 //! extreme velocities lead to sub-goals in cells that no grasp is in yet; the local planner finds out whether they do.
 
 use super::grasp::{TrackingGrasp, turn_to};
-use super::local::{Failures, Local, once};
-use super::settings::TrackingSettings;
-use super::step::{Roles, Step, Stepper};
+use super::local::{Failures, Homes, Local};
+use super::settings::{RollingFinger, TrackingSettings};
+use super::step::{Asked, Roles, Step, Stepper};
 use crate::in_hand::Progress;
 use nalgebra::UnitQuaternion;
 use regrasp_base::{Budget, Interrupt, Rng};
@@ -174,6 +174,8 @@ impl<'g> Graph<'g> {
         if turn_to(&from, &self.goal).amax() <= turn {
             self.open(node, &from, self.goal, true);
         }
+        let left = turn_to(&from, &self.goal);
+        self.open(node, &from, UnitQuaternion::from_scaled_axis(left * (turn / left.amax()).min(1.0)) * from, false);
         for x in -1..=1 {
             for y in -1..=1 {
                 for z in -1..=1 {
@@ -204,6 +206,38 @@ impl<'g> Graph<'g> {
     }
 }
 
+/// The finger that the object rolls on all the time: the one on which most other fingers can move while it begins to turn as
+/// `turn` has it; or, where it is drawn, those more often.
+fn rolling_finger(stepper: &mut Stepper, start: &TrackingGrasp, turn: &Vector, rng: &mut Rng, is_drawn: bool) -> usize {
+    let n = stepper.model.n_fingers();
+    let settings = stepper.settings;
+    let step = turn * (settings.object_velocity * settings.time_step / turn.amax());
+    let mut worth = |rolling: usize| {
+        let mut along = 0.0;
+        for moving in (0..n).filter(|&finger| finger != rolling) {
+            stepper.workspace.set(&start.world_from_object.to_pose(), &start.joints, &start.contacts());
+            let asked = Asked {
+                roles: Roles { moving, rolling },
+                turn: Some(step),
+                rolled: [0.0; 2],
+                seconds: settings.time_step,
+            };
+            if let Ok(made) = stepper.step(start, &asked) {
+                let turned = turn_to(&start.orientation(), &made.end.orientation());
+                along += turned.dot(turn) / (turned.norm() * turn.norm());
+            }
+        }
+        along
+    };
+    let worths: Vec<f64> = (0..n).map(|finger| worth(finger).max(1e-3)).collect();
+    let mut left = if is_drawn { rng.uniform(0.0, worths.iter().sum()) } else { f64::INFINITY };
+    let drawn = worths.iter().position(|worth| {
+        left -= worth;
+        left < 0.0
+    });
+    drawn.unwrap_or_else(|| (0..n).max_by(|&a, &b| worths[a].total_cmp(&worths[b])).unwrap_or(0))
+}
+
 /// Searches from `start` to the orientation `goal`.
 pub fn search(
     stepper: &mut Stepper,
@@ -215,17 +249,24 @@ pub fn search(
     progress: &dyn Fn(Progress),
 ) -> Found {
     let settings = stepper.settings;
-    let rolling = once(settings.rolling_finger, stepper.model.n_fingers(), rng);
+    let rolling = match settings.rolling_finger {
+        RollingFinger::Any => None,
+        RollingFinger::Once => {
+            Some(rolling_finger(stepper, start, &turn_to(&start.orientation(), goal), rng, counts.restarts > 0))
+        }
+    };
     let mut graph = Graph::new(settings, start, goal);
     let nodes_before = counts.nodes;
+    let homes = Homes::of(stepper.model, start);
     if graph.nearest.1 <= settings.goal_tolerance {
         return graph.ended(Ok(0));
     }
+    let mut without_gain = 0;
     while let Some(best) = graph.open.pop() {
         if let Err(interrupt) = budget.check(counts.work) {
             return graph.ended(Err(Ended::Interrupted(interrupt)));
         }
-        if graph.nodes.len() > settings.nodes {
+        if graph.nodes.len() > settings.nodes || without_gain > settings.patience {
             break;
         }
         let target = graph.cells.of(&best.orientation);
@@ -233,16 +274,27 @@ pub fn search(
             continue;
         }
         counts.explored += 1;
+        without_gain += 1;
+        let nearest_before = graph.nearest.0;
         let from = &graph.nodes[best.node];
         let before: Option<Roles> = from.steps.last().map(|step| step.roles);
         let work_before = stepper.work;
-        let mut local = Local { stepper, rng, rolling, failures: &mut counts.failures };
+        let mut local = Local { stepper, rng, rolling, homes: &homes, failures: &mut counts.failures };
         let planned = local.plan(&from.grasp, &best.orientation, settings.goal_tolerance, before);
         counts.work += stepper.work - work_before;
-        let Some(last) = planned.steps.last().filter(|_| planned.arrived) else { continue };
+        let Some(last) = planned.steps.last() else { continue };
         let grasp = last.end.clone();
+        let here = grasp.orientation();
+        // What ends elsewhere is a node too, where no other is.
+        let target = if planned.arrived { target } else { graph.cells.of(&here) };
+        if !planned.arrived && graph.taken.contains(&target) {
+            continue;
+        }
         let length = from.length + turn_to(&from.grasp.orientation(), &grasp.orientation()).norm();
         let is_goal = graph.add(Node { grasp, parent: Some(best.node), steps: planned.steps, length }, target);
+        if graph.nearest.0 != nearest_before {
+            without_gain = 0;
+        }
         counts.nodes = nodes_before + graph.seen.len() as u64;
         progress(Progress {
             nodes: graph.nodes.len() as u64,

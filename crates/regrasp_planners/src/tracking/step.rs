@@ -24,6 +24,10 @@ const UNTWISTINGS: usize = 3;
 /// A fingertip that slides slower than this, in metres per second, neither slides nor rolls for sure: friction has no direction.
 const SLOWEST: f64 = 1e-4;
 
+/// Joints go straight from step to step: half-way the tip of a long step may be turned aside by this angle. A hundred such steps twist
+/// by less than checkers allow in a segment (2e-3).
+const MOST_BENT: f64 = 1e-5;
+
 /// Work of a step, in the unit of in-hand planning: a configuration looked at. By measurement, some 50 against 2 microseconds.
 pub const STEP_WORK: u64 = 25;
 
@@ -46,6 +50,8 @@ pub struct Asked {
     /// Turn of the moving fingertip relative to the object, about the tangents of its contact (paper 003, eq. 10). Fingers that
     /// cannot choose follow the object without sliding.
     pub rolled: [f64; 2],
+    /// How long the step takes. More than the settings' step only where the moving fingertip keeps its face.
+    pub seconds: f64,
 }
 
 /// Why a step cannot be made (paper 003, section 6.2.4, failures 1 to 7).
@@ -67,13 +73,15 @@ pub enum NoStep {
     Degenerate,
     /// The moving finger may not change its face, and would.
     FaceChange,
+    /// In a step this long the moving finger would leave its face, or its joints would lead it aside.
+    TooLong,
 }
 
 impl NoStep {
     /// Number in the paper's list; 0 for what it does not list.
     pub fn number(self) -> usize {
         match self {
-            NoStep::FaceChange => 0,
+            NoStep::FaceChange | NoStep::TooLong => 0,
             NoStep::Collision => 1,
             NoStep::OutOfReach => 2,
             NoStep::MovingPad => 3,
@@ -107,6 +115,8 @@ impl Relative {
 pub struct Step {
     /// Who did what.
     pub roles: Roles,
+    /// How long it takes.
+    pub seconds: f64,
     /// Every fingertip against the object.
     pub relative: PerFinger<Relative>,
     /// Contact forces at its beginning and at its end.
@@ -154,14 +164,14 @@ impl<'m, 'a> Stepper<'m, 'a> {
                 return Err(NoStep::RestingPad);
             }
         }
-        self.move_finger(grasp, moving, &asked.rolled, &mut end)?;
+        self.move_finger(grasp, asked, &mut end)?;
         let relative = self.relative(grasp, &end, asked)?;
         let forces = self.balanced(grasp, &end, &relative)?;
         self.workspace.roll_to(&end.contacts());
         if !self.workspace.step(&object.to_pose(), &end.joints, TipMode::AllHold) {
             return Err(NoStep::Collision);
         }
-        Ok(Step { roles: asked.roles, relative, forces, end })
+        Ok(Step { roles: asked.roles, seconds: asked.seconds, relative, forces, end })
     }
 
     /// True where a ball keeps its face: on smooth surfaces always.
@@ -174,27 +184,32 @@ impl<'m, 'a> Stepper<'m, 'a> {
     }
 
     /// The moving finger at the end of the step.
-    fn move_finger(
-        &self,
-        grasp: &TrackingGrasp,
-        moving: usize,
-        rolled: &[f64; 2],
-        end: &mut TrackingGrasp,
-    ) -> Result<(), NoStep> {
-        let model = self.model;
+    fn move_finger(&self, grasp: &TrackingGrasp, asked: &Asked, end: &mut TrackingGrasp) -> Result<(), NoStep> {
+        let (model, moving) = (self.model, asked.roles.moving);
         let finger = &model.fingers[moving];
         let chain = finger.ik.chain();
         let start = &grasp.touches[moving];
+        let is_long = asked.seconds > self.settings.time_step;
         let touch = if has_all_directions(chain) {
             let (x, y) = frame::tangents(&UnitVector::new_unchecked(start.ball.normal));
-            let asked = x.into_inner() * rolled[0] + y.into_inner() * rolled[1];
-            let (turn, touch) = self.roll_purely(moving, start, &asked).ok_or(NoStep::OutOfReach)?;
+            let turn = x.into_inner() * asked.rolled[0] + y.into_inner() * asked.rolled[1];
+            let (turn, touch) = self.roll_purely(moving, start, &turn).ok_or(NoStep::OutOfReach)?;
             let object_from_link = Rotation3::new(turn).into_inner() * grasp.object_from_link(moving);
             let rotation = end.world_from_object.rotation * object_from_link;
             let center = end.world_from_object.point(&touch.ball.center);
             let translation = center.coords - rotation * finger.ik.center_in_body().coords;
             let link = Placement { rotation, translation };
             let joints = joints_of_pose(chain, &grasp.joints[moving], &link).ok_or(NoStep::OutOfReach)?;
+            if is_long {
+                let middle: Coordinates =
+                    grasp.joints[moving].iter().zip(&joints).map(|(a, b)| 0.5 * (a + b)).collect();
+                let from = &grasp.world_from_link[moving].rotation;
+                let whole = turn_between(from, &link.rotation);
+                let half = turn_between(from, &chain.last_frame(&middle).rotation);
+                if (half - 0.5 * whole).norm() > MOST_BENT {
+                    return Err(NoStep::TooLong);
+                }
+            }
             end.world_from_link[moving] = chain.last_frame(&joints);
             end.joints[moving] = joints;
             touch
@@ -210,8 +225,13 @@ impl<'m, 'a> Stepper<'m, 'a> {
             let center = to.point_to_child(&end.world_from_link[moving].point(finger.ik.center_in_body()));
             Touch::of(&model.scene.object.surface, &center).ok_or(NoStep::OutOfReach)?
         };
-        if !self.settings.face_changes && !self.stays_on_its_face(start, &touch) {
-            return Err(NoStep::FaceChange);
+        if !self.stays_on_its_face(start, &touch) {
+            if is_long {
+                return Err(NoStep::TooLong);
+            }
+            if !self.settings.face_changes {
+                return Err(NoStep::FaceChange);
+            }
         }
         end.touches[moving] = touch;
         let tip = end.world_from_link[moving].point(finger.ik.center_in_body());

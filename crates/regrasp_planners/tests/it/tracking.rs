@@ -6,10 +6,12 @@ use regrasp_base::Budget;
 use regrasp_geometry::{Point, Vector};
 use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, check};
-use regrasp_plan::plan::{ContactMode, SegmentKind};
+use regrasp_plan::plan::{ContactMode, ContactState, Segment, SegmentKind};
 use regrasp_planners::in_hand::InHandSettings;
+use regrasp_planners::tracking::RollingFinger;
 use regrasp_planners::{Failure, FailureKind, TrackingSettings, plan_in_hand, plan_tracking};
 use regrasp_scene::{GraspRequest, Gravity, InHandQuery, LoadedScene};
+use std::collections::BTreeSet;
 
 fn plan_with(loaded: &LoadedScene, query: &InHandQuery, seed: u64) -> Result<Plan, Failure> {
     let settings = TrackingSettings::default();
@@ -35,6 +37,51 @@ fn the_football_is_turned_and_every_plan_is_accepted() {
         assert!(slides(&plan), "a turn by 94 degrees without sliding");
         let again = plan_with(&loaded, &query, seed).unwrap();
         assert_eq!(regrasp_plan::format::to_json(&plan), regrasp_plan::format::to_json(&again), "seed {seed}");
+    }
+}
+
+fn settings(face_changes: bool, rolling_finger: RollingFinger) -> TrackingSettings {
+    TrackingSettings { face_changes, rolling_finger, ..TrackingSettings::default() }
+}
+
+/// Paper 003, scenarios D-1 to D-4 and F-2.
+#[test]
+fn every_scenario_is_solved_as_its_settings_say() {
+    let (any, once) = (RollingFinger::Any, RollingFinger::Once);
+    let scenarios = [
+        ("diamond.toml", settings(true, any)),
+        ("diamond.toml", settings(false, any)),
+        ("diamond.toml", settings(true, once)),
+        ("diamond.toml", settings(false, once)),
+        ("football_pivot.toml", settings(true, once)),
+    ];
+    for (name, settings) in scenarios {
+        let loaded = scene(name);
+        for seed in 0..2 {
+            let query = loaded.task.query(seed);
+            let what = format!("{name}, {:?}, seed {seed}", settings.rolling_finger);
+            let plan = plan_tracking(&loaded.scene, &query, &settings, seed, &Budget::work(20_000_000), &|_| {})
+                .unwrap_or_else(|failure| panic!("{what}: {failure}"));
+            let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+            assert!(report.accepted(), "{what}: {:?}", report.violations.first());
+            if settings.rolling_finger == RollingFinger::Once {
+                // Where the object rests, any finger may be named: it rolls on none.
+                let is_turned = |segment: &&Segment| {
+                    segment.waypoints[0].contacts.iter().any(|contact| contact.mode == ContactMode::Sliding)
+                };
+                let rolling: BTreeSet<_> =
+                    plan.segments.iter().filter(is_turned).map(|segment| segment.rolling_finger.clone()).collect();
+                assert_eq!(rolling.len(), 1, "{what}: {rolling:?}");
+            }
+            if !settings.face_changes {
+                let face = |contact: &ContactState| contact.normal_in_object.unwrap().map(|x| (1e3 * x).round() as i64);
+                let waypoints = || plan.segments.iter().flat_map(|segment| &segment.waypoints);
+                for finger in 0..loaded.scene.hand.fingers.len() {
+                    let faces: BTreeSet<_> = waypoints().map(|waypoint| face(&waypoint.contacts[finger])).collect();
+                    assert_eq!(faces.len(), 1, "{what}: finger {finger} on {faces:?}");
+                }
+            }
+        }
     }
 }
 
