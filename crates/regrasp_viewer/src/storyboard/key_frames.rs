@@ -19,6 +19,8 @@ pub enum Event {
     Lands,
     /// A free finger moves, and stays free.
     MovesFreely,
+    /// A finger moves on the object, which rolls on another.
+    Tracks,
     /// The object moves.
     ObjectMoves,
     /// The plan ends.
@@ -40,6 +42,8 @@ pub struct KeyFrame {
     pub event: Event,
     /// The finger that moves.
     pub moving: Option<usize>,
+    /// The finger that the object rolls on, in tracking.
+    pub rolling: Option<usize>,
     /// Centres of the moving finger's tip all along its segment, in the world.
     pub path: Vec<Point>,
     /// Joint positions.
@@ -52,9 +56,13 @@ pub struct KeyFrame {
 
 impl KeyFrame {
     /// What happens, in words.
-    pub fn text(&self, finger: Option<&str>) -> String {
+    pub fn text(&self, finger: Option<&str>, rolling: Option<&str>) -> String {
         let finger = finger.unwrap_or("a finger");
         match self.event {
+            Event::Tracks => match rolling {
+                Some(rolling) => format!("{finger} moves, {rolling} rolls"),
+                None => format!("{finger} moves"),
+            },
             Event::Start => "start".into(),
             Event::Relocates => format!("{finger} relocates"),
             Event::LetsGo => format!("{finger} lets go"),
@@ -141,6 +149,7 @@ fn key_frame(scene: &SceneStory, plan: &Plan, steps: &[Step], step: usize) -> Ke
     let event = match (step, moving) {
         (0, _) => Event::Start,
         (_, _) if is_end => Event::Goal,
+        (_, Some(_)) if data.kind == SegmentKind::Tracking => Event::Tracks,
         (_, Some(finger)) => match (holds(0, finger), holds(data.waypoints.len() - 1, finger)) {
             (true, true) => Event::Relocates,
             (true, false) => Event::LetsGo,
@@ -156,6 +165,7 @@ fn key_frame(scene: &SceneStory, plan: &Plan, steps: &[Step], step: usize) -> Ke
         moved: timeline::moved(plan, waypoint),
         event,
         moving,
+        rolling: timeline::rolling_finger(plan, data).filter(|_| !is_end),
         path: if moving.is_some() { tip_path(scene, plan, segment) } else { Vec::new() },
         joints: waypoint.joints.clone(),
         world_from_object: waypoint.world_from_object,
