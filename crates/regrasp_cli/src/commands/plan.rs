@@ -284,9 +284,10 @@ pub fn failure_text(failure: &Failure) -> String {
     if let Some(miss) = &failure.nearest_miss {
         let _ = writeln!(
             out,
-            "  nearest: the object came within {:.0} deg and {:.1} mm of {}",
+            "  nearest: the object came within {:.0} deg{} of {}",
             miss.angle_left.to_degrees(),
-            1e3 * miss.distance_left,
+            // A goal of tracking says no position.
+            if miss.distance_left > 1e-5 { format!(" and {:.1} mm", 1e3 * miss.distance_left) } else { String::new() },
             failure.leg.map_or("the goal".to_owned(), |leg| format!("the end of leg {leg}"))
         );
     }

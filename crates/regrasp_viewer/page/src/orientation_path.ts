@@ -131,8 +131,11 @@ export class OrientationPath {
     context.textBaseline = "middle";
     context.lineJoin = "round";
     const middle = scale(add(this.low, this.high), 0.5);
-    // The box fits however it is turned.
-    const zoom = (Math.min(width, HEIGHT) - 56) / norm(sub(this.high, this.low));
+    // The box fits, whatever its azimuth.
+    const [wide, deep, high] = sub(this.high, this.low);
+    const across = Math.hypot(wide, deep);
+    const up = Math.cos(this.elevation) * high + Math.sin(this.elevation) * across;
+    const zoom = Math.min((width - 80) / across, (HEIGHT - 56) / up);
     const turn = multiply(fromRotationVector([this.elevation - Math.PI / 2, 0, 0]), fromRotationVector([0, 0, -this.azimuth - Math.PI / 2]));
     const place = (v: Vec3): [number, number] => {
       const [x, y] = rotate(turn, sub(v, middle));
@@ -191,8 +194,9 @@ export class OrientationPath {
         if (k < 2) stroke([at(value), opposite(value)], colours.line, 1);
         write(tickText(value, step), at(value), opposite(value), 12);
       }
-      write("xyz"[k], at(middle[k]), opposite(middle[k]), 26);
+      if (k < 2) write("xyz"[k], at(middle[k]), opposite(middle[k]), 26);
     };
+    write("z", [low[0], high[1], high[2]], [low[0], high[1], low[2] - 1], 12);
     axis(0, (x) => [x, low[1], 0], (x) => [x, high[1], 0]);
     axis(1, (y) => [high[0], y, 0], (y) => [low[0], y, 0]);
     axis(2, (z) => [low[0], high[1], z], (z) => [middle[0], middle[1], z]);

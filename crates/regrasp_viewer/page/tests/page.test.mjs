@@ -69,6 +69,7 @@ test("tracking is told with its own words, marks and path", options, async () =>
   assert.deepEqual(states, ["rolls, moving finger", "rolls, object on it", "slides", "slides"]);
   assert.match(await page.locator("#chart-gait").innerText(), /slides[^]*moving finger[^]*object rolls on it/);
   assert.doesNotMatch(await page.locator("body").innerText(), /transfer|relocat/i);
+  assert.equal(await page.locator("#chart-margin").count(), 0, "no margin was judged");
   // The fingertips' rims change with who moves.
   const before = await picture(page);
   await page.getByRole("button", { name: "Next change of the moving finger" }).click();

@@ -46,6 +46,8 @@ pub struct KeyFrame {
     pub rolling: Option<usize>,
     /// Centres of the moving finger's tip all along its segment, in the world.
     pub path: Vec<Point>,
+    /// In tracking, where each finger touched the object until then, in its frame; else empty.
+    pub traces: Vec<Vec<Point>>,
     /// Joint positions.
     pub joints: Vec<f64>,
     /// Pose of the object in the world.
@@ -167,8 +169,17 @@ fn key_frame(scene: &SceneStory, plan: &Plan, steps: &[Step], step: usize) -> Ke
         moving,
         rolling: timeline::rolling_finger(plan, data).filter(|_| !is_end),
         path: if moving.is_some() { tip_path(scene, plan, segment) } else { Vec::new() },
+        traces: match data.kind {
+            SegmentKind::Tracking => (0..plan.fingers.len()).map(|finger| trace_until(plan, finger, step)).collect(),
+            SegmentKind::Transfer | SegmentKind::Regrasp => Vec::new(),
+        },
         joints: waypoint.joints.clone(),
         world_from_object: waypoint.world_from_object,
         contacts: waypoint.contacts.clone(),
     }
+}
+
+/// Contacts of a finger up to a step, in the object frame.
+fn trace_until(plan: &Plan, finger: usize, step: usize) -> Vec<Point> {
+    timeline::trace(plan, finger).into_iter().take(step + 1).flatten().map(|(point, _)| point).collect()
 }

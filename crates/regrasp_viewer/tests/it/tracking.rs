@@ -262,6 +262,13 @@ fn charts_facts_and_frames_say_nothing_of_transfers_and_relocations() {
     assert!(charts::gait(&football().plan).contains("sub-goals"));
     let frames = key_frames(&story.scene, &football().plan, 6);
     assert_eq!(frames.len(), 6);
+    for frame in &frames {
+        assert_eq!(frame.traces.len(), 4);
+        for (trace, contact) in frame.traces.iter().zip(&frame.contacts) {
+            assert_eq!(trace.len(), frame.step + 1, "from the beginning until then");
+            assert_eq!(trace.last().map(|p| [p.x, p.y, p.z]), contact.point_in_object);
+        }
+    }
     for frame in &frames[1..5] {
         let segment = &football().plan.segments[timeline::steps(&football().plan)[frame.step].segment];
         assert_eq!(frame.event, Event::Tracks);
