@@ -38,7 +38,7 @@ PLAIN := --settings docs/benchmarks/plain.json
 ALLEGRO_BENCH = $(PACKAGES) --time-limit 20 --threads 1 --seeds $(ALLEGRO_SEEDS)
 SOFT_BENCH = $(PACKAGES) --time-limit 6 --threads 1 --seeds $(ALLEGRO_SEEDS)
 
-.PHONY: all demo gallery test replay test-rust test-python test-page page python bench growth benchmark-page campaign fuzz docs release $(ROADMAPS)
+.PHONY: all demo gallery test replay test-rust test-python test-page page python bench paper003 growth benchmark-page campaign fuzz docs release $(ROADMAPS)
 
 all: release
 
@@ -120,6 +120,7 @@ bench: release
 	$(REGRASP) bench $(BOXES) $(PLAIN) --improve 1 --seeds $(IMPROVEMENT_SEEDS) --threads 1 --csv docs/benchmarks/improvement.csv
 	$(REGRASP) bench suites/paper000.toml
 	$(REGRASP) bench suites/paper004.toml
+	$(MAKE) paper003
 	$(MAKE) $(ROADMAPS)
 	$(MAKE) growth
 ifneq ($(PACKAGES),)
@@ -148,6 +149,12 @@ roadmap_million: release
 growth: release
 	$(REGRASP) growth $(GROWTH) --trials $(GROWTH_TRIALS) -o $(OUT)/growth --results docs/benchmarks/growth
 	$(MAKE) benchmark-page
+
+# Tables 4 and 5 of paper 003: scenarios D-1 to D-4, F-1, F-2. Writes docs/benchmarks/paper003; cut off and run again, it goes on
+# where it was. PAPER003_SEEDS: at most so many trials per scenario.
+PAPER003_SEEDS ?= $(SEEDS)
+paper003: release
+	$(REGRASP) bench suites/paper003.toml --seeds $(PAPER003_SEEDS)
 
 # docs/benchmarks.md again, from what was measured.
 benchmark-page: release

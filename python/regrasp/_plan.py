@@ -208,6 +208,12 @@ class Plan:
 
     def __repr__(self) -> str:
         transfers, relocations = self.statistics["transfers"], self.statistics["relocations"]
+        if self.promises.get("tracking") is not None:
+            # What the statistics call transfers are sub-goals there (docs/plan-format.md).
+            relocated = f", {relocations} relocations" if relocations else ""
+            return (
+                f"<Plan: tracking over {transfers} sub-goals{relocated}, {self.n_waypoints} waypoints, {self.duration:.1f} s>"
+            )
         return (
             f"<Plan: {transfers} transfers, {relocations} relocations, {self.n_waypoints} waypoints, {self.duration:.1f} s, "
             f"closure margin {self.promises['kept_margin']:.4f}>"

@@ -49,6 +49,7 @@ def plan(
     method: algorithm; "gait" where nothing else is said.
     margin: closure margin asked of every holding set, in [0, 1).
     improve: seconds spent on a better plan after the first; `improve_work`: the same by work.
+    method, margin, improve, improve_work: of in-hand tasks; refused for tasks of kind "tracking".
     settings: settings of the planner, with the keys of "settings" in a plan file; the other arguments win over it.
     progress: called now and then, by this thread, with a `Progress`; what it raises stops the search and is raised.
 

@@ -6,6 +6,7 @@ import json
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -130,3 +131,14 @@ def test_tracking_tasks_are_planned_and_judged() -> None:
     assert {"rolling", "pure_rolling", "sliding"} <= used
     with pytest.raises(regrasp.InputError, match="goal_weight"):
         regrasp.plan(scene, settings={"goal_weight": -1})
+    on_path = plan.statistics["transfers"]
+    assert f"over {on_path} sub-goals" in repr(plan) and "transfer" not in repr(plan)
+
+
+@pytest.mark.parametrize("argument", [{"method": "gait"}, {"margin": 0.01}, {"improve": 1}, {"improve_work": 10}])
+def test_arguments_of_in_hand_tasks_are_refused_for_tracking(argument: dict[str, Any]) -> None:
+    scene = regrasp.load_scene(SCENES / "football.toml")
+    with pytest.raises(regrasp.InputError, match="tracking") as caught:
+        regrasp.plan(scene, **argument)
+    (name,) = argument
+    assert caught.value.code == "A507" and name in caught.value.element and caught.value.fix

@@ -2,8 +2,8 @@
 
 use crate::limits::Limits;
 use crate::roadmap::{self, GraphFacts};
-use crate::row::Row;
-use crate::summary::{Summary, ms, summarise};
+use crate::row::{Row, is_tracking};
+use crate::summary::{Spread, Summary, dash, gap, ms, summarise};
 use std::fmt::Write;
 
 /// Most misses that are listed per CSV file.
@@ -44,35 +44,82 @@ fn heading(name: &str) -> String {
     escaped(file.strip_suffix(".csv").unwrap_or(file))
 }
 
+/// In-hand planning and tracking have a table each.
 fn table(rows: &[Row], limits: &Limits, out: &mut String) {
-    out.push_str(
-        "| scene | method | solved | within limit | accepted | min | median | mean | max | floors | check ms | nodes | transfers | relocations | margin | gap mm |\n\
-         |---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+    let summaries = summarise(rows);
+    let (tracking, in_hand): (Vec<&Summary>, Vec<&Summary>) =
+        summaries.iter().partition(|summary| is_tracking(&summary.method));
+    if tracking.is_empty() || !in_hand.is_empty() {
+        let columns = ["floors", "check ms", "nodes", "transfers", "relocations", "margin", "gap mm"];
+        table_of(&in_hand, rows, limits, &columns, out, |summary| {
+            vec![
+                summary.floors(),
+                check_ms(summary),
+                mean(summary.nodes, 0),
+                mean(summary.transfers, 1),
+                mean(summary.relocations, 1),
+                summary.min_margin.map_or_else(dash, |x| format!("{x:.4}")),
+                gap(summary),
+            ]
+        });
+    }
+    if !tracking.is_empty() {
+        if !in_hand.is_empty() {
+            out.push('\n');
+        }
+        let columns = ["check ms", "nodes", "sub-goals tried", "sub-goals on the path", "relocations", "gap mm"];
+        table_of(&tracking, rows, limits, &columns, out, |summary| {
+            vec![
+                check_ms(summary),
+                mean(summary.nodes, 0),
+                mean(summary.samples, 1),
+                mean(summary.transfers, 1),
+                mean(summary.relocations, 1),
+                gap(summary),
+            ]
+        });
+    }
+}
+
+/// A table of `summaries`: who, share solved and accepted, times, then `columns` with what `cells` says.
+fn table_of(
+    summaries: &[&Summary],
+    rows: &[Row],
+    limits: &Limits,
+    columns: &[&str],
+    out: &mut String,
+    cells: impl Fn(&Summary) -> Vec<String>,
+) {
+    let _ = writeln!(
+        out,
+        "| scene | method | solved | within limit | accepted | min | median | mean | max | {} |\n|{}",
+        columns.join(" | "),
+        "---|".repeat(9 + columns.len())
     );
-    for summary in &summarise(rows) {
-        let [min, median, mean, max] =
-            summary.plan_cpu_s.map_or(["-".to_owned(), "-".into(), "-".into(), "-".into()], |s| {
-                [ms(s.min), ms(s.median), ms(s.mean), ms(s.max)]
-            });
-        let dash = || "-".to_owned();
+    for summary in summaries {
+        let times =
+            summary.plan_cpu_s.map_or([dash(), dash(), dash(), dash()], |s| [s.min, s.median, s.mean, s.max].map(ms));
         let _ = writeln!(
             out,
-            "| {} | {} | {}/{} | {} | {} | {min} | {median} | {mean} | {max} | {} | {} | {} | {} | {} | {} | {} |",
+            "| {} | {} | {}/{} | {} | {} | {} | {} |",
             escaped(&summary.scene),
             escaped(&summary.method),
             summary.solved,
             summary.runs,
             within_limit(summary, rows, limits).unwrap_or_else(dash),
             summary.accepted.map_or_else(dash, |n| format!("{n}/{}", summary.solved)),
-            summary.floors(),
-            summary.check_s.map_or_else(dash, |s| ms(s.mean)),
-            summary.nodes.map_or_else(dash, |s| format!("{:.0}", s.mean)),
-            summary.transfers.map_or_else(dash, |s| format!("{:.1}", s.mean)),
-            summary.relocations.map_or_else(dash, |s| format!("{:.1}", s.mean)),
-            summary.min_margin.map_or_else(dash, |x| format!("{x:.4}")),
-            summary.min_clearance.map_or_else(dash, |x| format!("{:.3}", 1e3 * x)),
+            times.join(" | "),
+            cells(summary).join(" | "),
         );
     }
+}
+
+fn check_ms(summary: &Summary) -> String {
+    summary.check_s.map_or_else(dash, |s| ms(s.mean))
+}
+
+fn mean(spread: Option<Spread>, decimals: usize) -> String {
+    spread.map_or_else(dash, |s| format!("{:.decimals$}", s.mean))
 }
 
 /// `19/20 (10 s)`: seeds with a plan, not rejected, in at most the scene's limit of processor time; none without a limit.
@@ -182,6 +229,28 @@ mod tests {
         assert!(page.contains("## classic\n"));
         let at = |text: &str| page.find(text).unwrap();
         assert!(at("## v\n") < at("## Classic method over") && at("## Classic method over") < at("## w\n"), "{page}");
+    }
+
+    #[test]
+    fn tracking_has_a_table_with_its_own_words() {
+        let row = |method: &str| Row {
+            scene: "football".into(),
+            method: method.into(),
+            status: "solved".into(),
+            nodes: 992,
+            samples: 41,
+            transfers: 40,
+            ..Row::default()
+        };
+        let part = |rows| markdown(&[("a.csv".into(), rows)], &[], &[], &Limits::new());
+        let page = part(vec![row("tracking")]);
+        assert!(!page.contains("transfers") && page.contains("| sub-goals tried | sub-goals on the path |"), "{page}");
+        assert!(page.contains("| 992 | 41.0 | 40.0 | 0.0 | - |"), "{page}");
+        let both = part(vec![row("tracking"), row("gait")]);
+        assert!(
+            both.contains("| 992 | 40.0 | 0.0 | - | - |") && both.contains("| 992 | 41.0 | 40.0 | 0.0 | - |"),
+            "{both}"
+        );
     }
 
     #[test]

@@ -76,13 +76,13 @@ pub struct Row {
     pub accepted: Option<bool>,
     /// Nodes of the search.
     pub nodes: u64,
-    /// Configurations sampled.
+    /// Configurations sampled; in tracking, sub-goals tried.
     pub samples: u64,
     /// Configurations looked at.
     pub work: u64,
     /// Restarts.
     pub restarts: u64,
-    /// Transfers in the plan.
+    /// Transfers in the plan; in tracking, sub-goals on its path.
     pub transfers: u64,
     /// Single-finger relocations in the plan.
     pub relocations: u64,
@@ -100,6 +100,23 @@ pub struct Row {
     pub cut_by_time: bool,
     /// Commonest cause of a failure, first violation of a rejected plan, or what has no floor.
     pub cause: String,
+}
+
+impl Row {
+    /// True for a row of finger tracking: `samples` then counts the sub-goals tried, `transfers` those on the path.
+    pub fn is_tracking(&self) -> bool {
+        is_tracking(&self.method)
+    }
+
+    /// True for a solved seed whose plan was not proven again at the planner's resolution; tracking has no floor.
+    pub fn lacks_floor(&self) -> bool {
+        self.status == "solved" && self.floor_s.is_none() && !self.is_tracking()
+    }
+}
+
+/// True for the name of finger tracking's method, also where it is part of another's.
+pub fn is_tracking(method: &str) -> bool {
+    method.split('+').next() == Some(tracking::METHOD)
 }
 
 /// The word for a failure's kind, as its JSON spells it.

@@ -1,6 +1,6 @@
 //! Smallest, median, mean and largest per scene and method.
 
-use crate::row::Row;
+use crate::row::{Row, is_tracking};
 use serde::Serialize;
 
 /// Smallest, median, mean and largest of some numbers.
@@ -53,11 +53,11 @@ pub struct Summary {
     pub check_s: Option<Spread>,
     /// Nodes over the solved seeds.
     pub nodes: Option<Spread>,
-    /// Grasps and contacts sampled over the solved seeds.
+    /// Grasps and contacts sampled over the solved seeds; in tracking, sub-goals tried.
     pub samples: Option<Spread>,
     /// Configurations looked at over the solved seeds.
     pub work: Option<Spread>,
-    /// Transfers per plan.
+    /// Transfers per plan; in tracking, sub-goals on its path.
     pub transfers: Option<Spread>,
     /// Relocations per plan.
     pub relocations: Option<Spread>,
@@ -110,7 +110,7 @@ pub fn summary_of_rows(runs: &[&Row]) -> Summary {
         plan_s: over(|row| row.plan_s),
         plan_cpu_s: over(|row| row.plan_cpu_s),
         floor_multiple: (floor > 0.0).then(|| planned / floor),
-        without_floor: solved.len() - floored.len(),
+        without_floor: solved.iter().filter(|row| row.lacks_floor()).count(),
         check_s: Spread::of(solved.iter().filter_map(|row| row.check_s)),
         nodes: over(|row| row.nodes as f64),
         samples: over(|row| row.samples as f64),
@@ -122,38 +122,76 @@ pub fn summary_of_rows(runs: &[&Row]) -> Summary {
     }
 }
 
-/// The summaries as a table of fixed columns, for a terminal.
+/// The summaries as tables of fixed columns, for a terminal: one of in-hand planning, one of tracking.
 pub fn table(summaries: &[Summary]) -> String {
+    let (tracking, in_hand): (Vec<&Summary>, Vec<&Summary>) =
+        summaries.iter().partition(|summary| is_tracking(&summary.method));
+    let mut out = String::new();
+    if tracking.is_empty() || !in_hand.is_empty() {
+        out.push_str(&table_of(&in_hand, &[("floors", 6), ("check ms", 9), ("margin", 7), ("gap mm", 7)], |summary| {
+            vec![
+                summary.floors(),
+                summary.check_s.map_or_else(dash, |spread| ms(spread.mean)),
+                summary.min_margin.map_or_else(dash, |x| format!("{x:.4}")),
+                gap(summary),
+            ]
+        }));
+    }
+    if !tracking.is_empty() {
+        // Means of what tables 4 and 5 of paper 003 count.
+        let columns = [("check ms", 9), ("nodes", 7), ("tried", 7), ("on path", 7), ("gap mm", 7)];
+        out.push_str(&table_of(&tracking, &columns, |summary| {
+            let mean = |spread: Option<Spread>| spread.map_or_else(dash, |spread| format!("{:.1}", spread.mean));
+            vec![
+                summary.check_s.map_or_else(dash, |spread| ms(spread.mean)),
+                mean(summary.nodes),
+                mean(summary.samples),
+                mean(summary.transfers),
+                gap(summary),
+            ]
+        }));
+    }
+    out
+}
+
+/// A table of `summaries`: scene, method, solved, accepted, times, then `columns` (name, width) with what `cells` says.
+fn table_of(summaries: &[&Summary], columns: &[(&str, usize)], cells: impl Fn(&Summary) -> Vec<String>) -> String {
     let width = summaries.iter().map(|summary| summary.scene.len()).max().unwrap_or(0).max(5);
+    let further = |texts: Vec<String>| -> String {
+        columns.iter().zip(texts).map(|((_, width), text)| format!("  {text:>width$}")).collect()
+    };
     let mut out = format!(
-        "{:<width$}  {:<10}  {:>9}  {:>9}  {:>34}  {:>6}  {:>9}  {:>7}  {:>7}\n",
+        "{:<width$}  {:<10}  {:>9}  {:>9}  {:>34}{}\n",
         "scene",
         "method",
         "solved",
         "accepted",
         "plan cpu ms min/median/mean/max",
-        "floors",
-        "check ms",
-        "margin",
-        "gap mm"
+        further(columns.iter().map(|(name, _)| (*name).to_owned()).collect())
     );
     for summary in summaries {
-        let times = summary.plan_cpu_s.map_or("-".into(), |spread| {
+        let times = summary.plan_cpu_s.map_or_else(dash, |spread| {
             format!("{}/{}/{}/{}", ms(spread.min), ms(spread.median), ms(spread.mean), ms(spread.max))
         });
         out.push_str(&format!(
-            "{:<width$}  {:<10}  {:>9}  {:>9}  {times:>34}  {:>6}  {:>9}  {:>7}  {:>7}\n",
+            "{:<width$}  {:<10}  {:>9}  {:>9}  {times:>34}{}\n",
             summary.scene,
             summary.method,
             format!("{}/{}", summary.solved, summary.runs),
-            summary.accepted.map_or("-".into(), |n| format!("{n}/{}", summary.solved)),
-            summary.floors(),
-            summary.check_s.map_or("-".into(), |spread| ms(spread.mean)),
-            summary.min_margin.map_or("-".into(), |x| format!("{x:.4}")),
-            summary.min_clearance.map_or("-".into(), |x| format!("{:.3}", 1e3 * x)),
+            summary.accepted.map_or_else(dash, |n| format!("{n}/{}", summary.solved)),
+            further(cells(summary)),
         ));
     }
     out
+}
+
+/// Smallest clearance, in millimetres.
+pub(crate) fn gap(summary: &Summary) -> String {
+    summary.min_clearance.map_or_else(dash, |x| format!("{:.3}", 1e3 * x))
+}
+
+pub(crate) fn dash() -> String {
+    "-".to_owned()
 }
 
 /// Seconds as milliseconds with three significant digits.
@@ -174,6 +212,25 @@ mod tests {
     fn spread_of_a_known_list() {
         assert_eq!(Spread::of([]), None);
         assert_eq!(Spread::of([4.0, 1.0, 2.0, 5.0]), Some(Spread { min: 1.0, median: 3.0, mean: 3.0, max: 5.0 }));
+    }
+
+    #[test]
+    fn tracking_has_no_floor_and_a_table_with_its_own_words() {
+        let row = |method: &str| Row {
+            scene: "s".into(),
+            method: method.into(),
+            status: "solved".into(),
+            samples: 41,
+            transfers: 40,
+            ..Row::default()
+        };
+        let summaries = summarise(&[row("tracking"), row("gait"), row("tracking+gaiting")]);
+        assert_eq!(summaries.iter().map(|summary| summary.without_floor).collect::<Vec<_>>(), [0, 1, 0]);
+        let text = table(&summaries);
+        let (in_hand, tracking) = text.split_at(text.rfind("scene ").unwrap());
+        assert!(in_hand.contains("floors") && in_hand.contains("1 without") && !in_hand.contains("tracking"), "{text}");
+        assert!(tracking.contains("tried") && tracking.contains("on path") && !tracking.contains("floors"), "{text}");
+        assert!(tracking.contains("41.0     40.0"), "{text}");
     }
 
     #[test]

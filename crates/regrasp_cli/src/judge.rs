@@ -32,15 +32,19 @@ pub fn judge(loaded: &LoadedScene, plan: &regrasp::Plan, talk: &Talk) -> Result<
     let started = Instant::now();
     let query = loaded.task.query(plan.seed);
     let report = check(&loaded.scene, Some(&query), plan, &CheckSettings::default());
-    say(&report, started.elapsed(), talk);
+    say(&report, plan.promises.tracking.is_some(), started.elapsed(), talk);
     Ok(report)
 }
 
 /// Says what the checker said.
-fn say(report: &Report, elapsed: Duration, talk: &Talk) {
+fn say(report: &Report, is_tracking: bool, elapsed: Duration, talk: &Talk) {
     let seconds = elapsed.as_secs_f64();
     talk.event("check", json!({ "accepted": report.accepted(), "seconds": seconds, "report": report }));
-    let margin = report.min_margin.map_or("-".into(), |margin| format!("{margin:.4}"));
+    let margin = match report.min_margin {
+        None if is_tracking => "not judged (what slides closes nothing)".into(),
+        None => "-".into(),
+        Some(margin) => format!("{margin:.4}"),
+    };
     let clearance = report.min_clearance.as_ref().map_or("-".into(), |clearance| {
         format!("{:.2} mm ({} and {})", 1e3 * clearance.distance, clearance.pair[0], clearance.pair[1])
     });

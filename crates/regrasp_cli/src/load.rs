@@ -53,17 +53,53 @@ pub fn settings(search: &Search, n_threads: usize) -> Result<InHandSettings, Sto
     Ok(settings)
 }
 
-/// Settings for a task of this kind: those of a tracking task are the file's alone.
+/// Settings for a task of this kind: those of a tracking task are the file's alone (`A507`: a flag that has no meaning there).
 pub fn for_task(task: TaskKind, search: &Search, n_threads: usize) -> Result<PlannerSettings, Stop> {
     if task == TaskKind::InHand {
         return Ok(PlannerSettings { in_hand: settings(search, n_threads)?, ..PlannerSettings::default() });
     }
+    refuse_flags_of_in_hand(search)?;
     let file = search.settings.as_deref();
     let tracking: TrackingSettings = file.map_or_else(|| Ok(TrackingSettings::default()), settings_file)?;
     if let (Err(problem), Some(path)) = (tracking.validate(), file) {
         return Err(Stop::BadInput(Diagnostic::new("A503", Place::file(path), problem).into()));
     }
     Ok(PlannerSettings { tracking, ..PlannerSettings::default() })
+}
+
+/// Refuses flags that say something about in-hand planning only (`A507`).
+fn refuse_flags_of_in_hand(search: &Search) -> Result<(), Stop> {
+    let flags = [
+        ("--method", search.method.is_some(), "it chooses among the methods of in-hand planning"),
+        ("--margin", search.margin.is_some(), "what slides closes nothing, so that closure is not judged"),
+        ("--improve", search.improve.is_some(), "plans of tracking are not improved"),
+        ("--improve-work", search.improve_work.is_some(), "plans of tracking are not improved"),
+    ];
+    match flags.into_iter().find(|(_, is_given, _)| *is_given) {
+        None => Ok(()),
+        Some((flag, _, why)) => {
+            Err(not_for_tracking(flag, why, "leave it out; --settings has all of tracking (docs/tracking.md)"))
+        }
+    }
+}
+
+/// An argument of in-hand tasks, given for a scene with a task of kind `tracking` (`A507`).
+fn not_for_tracking(argument: &str, why: &str, fix: &str) -> Stop {
+    let problem = format!("is not for a task of kind \"tracking\": {why}");
+    let diagnostic = Diagnostic::new("A507", Place::file("command line"), problem).element("argument", argument);
+    Stop::BadInput(diagnostic.expected("a task of kind \"in_hand\"").fix(fix).into())
+}
+
+/// Reads a scene, as [`scene`], that `what` can do something with in-hand tasks of only (`A507`).
+pub fn in_hand_scene(path: &Path, what: &str, common: &Common, talk: &Talk) -> Result<LoadedScene, Stop> {
+    let loaded = scene(path, common, talk)?;
+    match loaded.task.kind {
+        TaskKind::InHand => Ok(loaded),
+        TaskKind::Tracking => {
+            let why = format!("{what} of in-hand tasks only ({})", path.display());
+            Err(not_for_tracking("SCENE", &why, "name another scene; regrasp plan and bench plan this one"))
+        }
+    }
 }
 
 /// Settings of the planner: defaults, then the file, then the rest.

@@ -329,15 +329,15 @@ pub struct ForcePromises {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Statistics {
-    /// Nodes of the roadmap or tree when the search ended.
+    /// Nodes of the roadmap or tree when the search ended; in tracking, cells that sub-goals are in.
     pub nodes: u64,
-    /// Configurations sampled.
+    /// Configurations sampled; in tracking, sub-goals that the local planner tried to reach.
     pub samples: u64,
     /// Configurations looked at (kinematics and collision): the unit of the work budget.
     pub work: u64,
     /// Restarts used.
     pub restarts: u64,
-    /// Transfers in the plan.
+    /// Transfers in the plan; in tracking, sub-goals on its path.
     pub transfers: u64,
     /// Transfers in the plan during which some finger is free.
     pub transfers_with_free_fingers: u64,

@@ -94,7 +94,7 @@ fn judged_as_written(plan: &regrasp::Plan, scene: &Scene) -> Result<(regrasp::Pl
     Ok((plan, report))
 }
 
-/// Settings of the planner: defaults, then the JSON, then what has an argument of its own.
+/// An error of an argument of `regrasp.plan`.
 fn bad(code: &'static str, problem: String) -> Diagnostic {
     Diagnostic::new(code, Place::file("regrasp.plan"), problem)
 }
@@ -116,6 +116,7 @@ fn settings(task: TaskKind, request: &Request) -> Result<PlannerSettings, Diagno
     match task {
         TaskKind::InHand => Ok(PlannerSettings { in_hand: in_hand(request)?, ..PlannerSettings::default() }),
         TaskKind::Tracking => {
+            refuse_arguments_of_in_hand(request)?;
             let tracking: TrackingSettings = given(request)?;
             tracking.validate().map_err(|problem| bad("A503", problem).element("argument", "settings"))?;
             Ok(PlannerSettings { tracking, ..PlannerSettings::default() })
@@ -123,6 +124,24 @@ fn settings(task: TaskKind, request: &Request) -> Result<PlannerSettings, Diagno
     }
 }
 
+/// Refuses arguments that say something about in-hand planning only, as the command line does (`A507`).
+fn refuse_arguments_of_in_hand(request: &Request) -> Result<(), Diagnostic> {
+    let arguments = [
+        ("method", request.method.is_some(), "it chooses among the methods of in-hand planning"),
+        ("margin", request.margin.is_some(), "what slides closes nothing, so that closure is not judged"),
+        ("improve", request.improve.is_some(), "plans of tracking are not improved"),
+        ("improve_work", request.improve_work.is_some(), "plans of tracking are not improved"),
+    ];
+    match arguments.into_iter().find(|(_, is_given, _)| *is_given) {
+        None => Ok(()),
+        Some((argument, _, why)) => Err(bad("A507", format!("is not for a task of kind \"tracking\": {why}"))
+            .element("argument", argument)
+            .expected("a task of kind \"in_hand\"")
+            .fix("leave it out; `settings` has all of tracking (docs/tracking.md)")),
+    }
+}
+
+/// Settings of the in-hand planner: defaults, then the JSON, then what has an argument of its own.
 fn in_hand(request: &Request) -> Result<InHandSettings, Diagnostic> {
     let mut settings: InHandSettings = given(request)?;
     settings.n_threads = request.threads;

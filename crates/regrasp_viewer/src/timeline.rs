@@ -1,6 +1,6 @@
 //! A plan read along time: waypoints of all segments in a row, and what every finger does meanwhile.
 
-use regrasp_geometry::{Point, Pose};
+use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_plan::plan::{ContactMode, Plan, Segment, SegmentKind, Waypoint};
 
 /// One waypoint, with the segment it belongs to. The waypoint that two segments share comes twice, as in the plan.
@@ -40,6 +40,12 @@ pub fn moving_finger(plan: &Plan, segment: &Segment) -> Option<usize> {
     plan.fingers.iter().position(|finger| finger == name)
 }
 
+/// Index of the finger that the object rolls on in a segment of tracking.
+pub fn rolling_finger(plan: &Plan, segment: &Segment) -> Option<usize> {
+    let name = segment.rolling_finger.as_ref()?;
+    plan.fingers.iter().position(|finger| finger == name)
+}
+
 /// Angle by which the object is turned at a waypoint, from where it started, in radians.
 pub fn turned(plan: &Plan, waypoint: &Waypoint) -> f64 {
     let [start, now] = start_and(plan, waypoint);
@@ -62,12 +68,32 @@ fn start_and(plan: &Plan, waypoint: &Waypoint) -> [Pose; 2] {
 pub enum Doing {
     /// Holds at one point.
     Holds,
-    /// Holds and rolls.
+    /// Holds and rolls, or twists where it touches.
     Rolls,
+    /// Holds and slides; it may roll and twist meanwhile.
+    Slides,
     /// Moves from contact to contact, or away, or to one.
     Moves,
     /// Is free while another finger or the object moves.
     Waits,
+}
+
+impl Doing {
+    /// True while the finger touches the object.
+    pub fn holds(self) -> bool {
+        matches!(self, Doing::Holds | Doing::Rolls | Doing::Slides)
+    }
+}
+
+/// What a finger does between two neighbouring waypoints of a segment at which it holds: in tracking the mode of the first
+/// one, else rolling where both say so.
+fn while_holding(kind: SegmentKind, before: ContactMode, mode: ContactMode) -> Doing {
+    match before {
+        _ if kind != SegmentKind::Tracking && before != mode => Doing::Holds,
+        before if before.slides() => Doing::Slides,
+        ContactMode::Fixed | ContactMode::Free => Doing::Holds,
+        _ => Doing::Rolls,
+    }
 }
 
 /// A stretch of time in which a finger does one thing.
@@ -98,8 +124,8 @@ pub fn stretches(plan: &Plan, finger: usize) -> Vec<Stretch> {
                 let holds = mode != ContactMode::Free && before != ContactMode::Free;
                 // Between two segments everything rests.
                 let doing = match (holds, k > 0) {
-                    (true, true) if mode != ContactMode::Fixed && before == mode => Doing::Rolls,
-                    (true, _) => Doing::Holds,
+                    (true, true) => while_holding(segment.kind, before, mode),
+                    (true, false) => Doing::Holds,
                     (false, true) if moves => Doing::Moves,
                     (false, _) => Doing::Waits,
                 };
@@ -123,7 +149,7 @@ pub struct Marks {
 /// When `finger` lets go and lands.
 pub fn marks(plan: &Plan, finger: usize) -> Marks {
     let mut marks = Marks::default();
-    let on = |stretch: &Stretch| matches!(stretch.doing, Doing::Holds | Doing::Rolls);
+    let on = |stretch: &Stretch| stretch.doing.holds();
     let stretches = stretches(plan, finger);
     // A finger may let go in the first moment, and land in the last.
     let ends = [
@@ -151,4 +177,71 @@ pub fn marks(plan: &Plan, finger: usize) -> Marks {
 pub fn contact_point(waypoint: &Waypoint, finger: usize) -> Option<Point> {
     let contact = waypoint.contacts.get(finger).filter(|contact| contact.holds())?;
     Some(Pose::from(&waypoint.world_from_object) * Point::from(contact.point_in_object?))
+}
+
+/// Which fingers move and roll for a while, in tracking.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Roles {
+    /// The finger that moves.
+    pub moving: Option<usize>,
+    /// The resting finger that the object rolls on.
+    pub rolling: Option<usize>,
+    /// From when, in seconds.
+    pub from: f64,
+    /// Until when, in seconds.
+    pub until: f64,
+}
+
+/// The roles of fingers along the tracking segments of a plan; neighbours with the same ones are one.
+pub fn roles(plan: &Plan) -> Vec<Roles> {
+    let mut found: Vec<Roles> = Vec::new();
+    for segment in &plan.segments {
+        let is_tracking = segment.kind == SegmentKind::Tracking;
+        let (moving, rolling) = (moving_finger(plan, segment), rolling_finger(plan, segment));
+        let (from, until) = segment_span(segment);
+        match found.last_mut() {
+            Some(last) if is_tracking && (last.moving, last.rolling) == (moving, rolling) => last.until = until,
+            _ if is_tracking => found.push(Roles { moving, rolling, from, until }),
+            _ => {}
+        }
+    }
+    found
+}
+
+/// Rotation vectors of the object in the world, one for each of [`steps`]: of the vectors of an orientation (they differ by
+/// whole turns about its axis), the shortest at the first step, then the nearest to the one before.
+pub fn rotation_vectors(plan: &Plan) -> Vec<Vector> {
+    let mut found: Vec<Vector> = Vec::new();
+    for step in steps(plan) {
+        let shortest = Pose::from(&step.waypoint.world_from_object).rotation.scaled_axis();
+        found.push(found.last().map_or(shortest, |before| nearest_vector(&shortest, before)));
+    }
+    found
+}
+
+/// The rotation vector of the same orientation as `vector` that is nearest to `to`.
+pub fn nearest_vector(vector: &Vector, to: &Vector) -> Vector {
+    let Some(axis) = vector.try_normalize(1e-12) else {
+        // No turn: whole turns about any axis; those about that of `to` are nearest.
+        let turns = (to.norm() / std::f64::consts::TAU).round();
+        return to.try_normalize(1e-12).map_or(*vector, |axis| axis * (turns * std::f64::consts::TAU));
+    };
+    let turns = ((to.dot(&axis) - vector.norm()) / std::f64::consts::TAU).round();
+    vector + axis * (turns * std::f64::consts::TAU)
+}
+
+/// Angle by which the object turns all along the plan: the sum of those between neighbouring waypoints, in radians.
+pub fn angle_along(plan: &Plan) -> f64 {
+    let steps = steps(plan);
+    let rotation = |step: &Step| Pose::from(&step.waypoint.world_from_object).rotation;
+    steps.windows(2).map(|pair| rotation(&pair[0]).angle_to(&rotation(&pair[1]))).sum()
+}
+
+/// Where a finger touches at each of [`steps`]: contact point and outward normal, in the object frame; none while it is free.
+pub fn trace(plan: &Plan, finger: usize) -> Vec<Option<(Point, Vector)>> {
+    let at = |step: &Step| {
+        let contact = step.waypoint.contacts.get(finger).filter(|contact| contact.holds())?;
+        Some((Point::from(contact.point_in_object?), Vector::from(contact.normal_in_object?)))
+    };
+    steps(plan).iter().map(at).collect()
 }

@@ -1,6 +1,7 @@
 //! Suites: the tables and figures of a paper, measured again. `docs/suite-format.md` says what a suite file may contain.
 //!
-//! Codes: B600 not TOML or not the shape of a suite, B601 another format or version, B602 a value that makes no sense.
+//! Codes: B600 not TOML or not the shape of a suite, B601 another format or version, B602 a value that makes no sense, B603
+//! settings of another kind of task than the scene's.
 
 /// The results of a suite as Markdown.
 pub mod results;
@@ -8,8 +9,9 @@ pub mod results;
 pub mod rows;
 
 use regrasp_base::{Diagnostic, InputError, Place};
-use regrasp_planners::InHandSettings;
 use regrasp_planners::in_hand::Alpha;
+use regrasp_planners::{InHandSettings, TrackingSettings};
+use regrasp_scene::TaskKind;
 use serde::Deserialize;
 use serde::de::Error as _;
 use std::path::{Path, PathBuf};
@@ -76,9 +78,12 @@ pub struct Published {
     /// Nodes of the graph.
     #[serde(default)]
     pub nodes: Vec<f64>,
-    /// Nodes generated, where the paper tells them from those of the graph.
+    /// Nodes generated, where the paper tells them from those of the graph; of tracking, sub-goals tried.
     #[serde(default)]
     pub generated: Vec<f64>,
+    /// Of tracking, sub-goals on the path.
+    #[serde(default)]
+    pub on_path: Vec<f64>,
 }
 
 /// A scene, planned with many seeds.
@@ -100,6 +105,12 @@ pub struct Entry {
     /// Largest mean processor time asked for, in seconds: the results say whether it was met.
     #[serde(default)]
     pub mean_at_most_s: Option<f64>,
+    /// Smallest share of trials that is asked to be solved, of 1; where there is none, `mean_at_most_s` asks for all.
+    #[serde(default)]
+    pub solved_at_least: Option<f64>,
+    /// Settings of tracking, for scenes with a task of that kind; what is left out has its default.
+    #[serde(default)]
+    pub tracking: Option<TrackingSettings>,
     /// Settings of the planner that are not those of geometry alone, which the papers plan with.
     #[serde(default = "InHandSettings::plain", deserialize_with = "changed_from_plain")]
     pub settings: InHandSettings,
@@ -137,6 +148,24 @@ pub struct Job {
     pub max_work: u64,
     /// Settings of the planner.
     pub settings: InHandSettings,
+    /// Settings of tracking, where the row has some.
+    pub tracking: Option<TrackingSettings>,
+}
+
+impl Job {
+    /// Errors (`B603`, with the place of the suite at `suite_path`): settings that mean nothing for the task of the scene.
+    pub fn refuse_other_task(&self, task: TaskKind, suite_path: &Path) -> Result<(), InputError> {
+        let (key, other) = match task {
+            TaskKind::InHand if self.tracking.is_some() => ("tracking", "settings"),
+            TaskKind::Tracking if self.settings != InHandSettings::plain() => ("settings", "tracking"),
+            _ => return Ok(()),
+        };
+        let problem = format!("\"{}\" has `{key}`, which its scene's task has no use for", self.name);
+        Err(Diagnostic::new("B603", Place::file(suite_path), problem)
+            .expected(format!("`{other}` for {}", self.scene.display()))
+            .fix("leave the key out, or name another scene")
+            .into())
+    }
 }
 
 /// The settings of geometry alone, but for those that are given.
@@ -160,6 +189,7 @@ impl Suite {
             time_limit_s: entry.time_limit_s,
             max_work: entry.max_work.unwrap_or(self.max_work),
             settings,
+            tracking: entry.tracking.clone(),
         };
         let mut jobs = Vec::new();
         for table in &self.tables {
@@ -189,6 +219,12 @@ impl Suite {
             if let Err(problem) = entry.settings.validate() {
                 faults.push(format!("row \"{}\": settings: {problem}", entry.name));
             }
+            if let Some(Err(problem)) = entry.tracking.as_ref().map(TrackingSettings::validate) {
+                faults.push(format!("row \"{}\": tracking: {problem}", entry.name));
+            }
+            if entry.solved_at_least.is_some_and(|share| !(share > 0.0 && share <= 1.0)) {
+                faults.push(format!("row \"{}\": solved_at_least must be above 0 and at most 1", entry.name));
+            }
             if entry.trials == 0 || entry.max_work == Some(0) {
                 faults.push(format!("row \"{}\": trials and max_work must be at least 1", entry.name));
             }
@@ -205,7 +241,7 @@ impl Suite {
             }
         }
         for published in self.tables.iter().flat_map(|table| &table.published) {
-            let lists = [&published.time_s, &published.nodes, &published.generated];
+            let lists = [&published.time_s, &published.nodes, &published.generated, &published.on_path];
             if lists.iter().any(|list| !matches!(list.len(), 0 | 1 | 3)) {
                 faults.push(format!("published \"{}\": give a mean, or smallest, mean and largest", published.name));
             }
@@ -218,6 +254,11 @@ impl Suite {
 }
 
 impl Table {
+    /// True for a table of finger tracking, which counts sub-goals.
+    pub fn is_tracking(&self) -> bool {
+        self.rows.iter().any(|row| row.tracking.is_some()) || self.published.iter().any(|row| !row.on_path.is_empty())
+    }
+
     /// Name of the job of `row`.
     pub fn job_name(&self, row: &Entry) -> String {
         format!("{}/{}", self.title, row.name)
@@ -268,6 +309,7 @@ mod tests {
     use super::rows::SuiteRow;
     use super::*;
     use crate::row::Row;
+    use regrasp_planners::tracking::RollingFinger;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     fn repository() -> PathBuf {
@@ -314,12 +356,14 @@ settings = { method = "visibility", guided_share = 0.0 }
 
     #[test]
     fn the_suites_of_the_repository_name_scenes_that_are_there() {
-        for name in ["paper000", "paper004"] {
+        for name in ["paper000", "paper003", "paper004"] {
             let path = repository().join("suites").join(name).with_extension("toml");
             assert!(is_suite(&path));
             let suite = read(&path).unwrap_or_else(|error| panic!("{error}"));
             for job in suite.jobs(&path) {
                 assert!(job.scene.is_file() && !is_suite(&job.scene), "{}", job.scene.display());
+                let loaded = regrasp_scene::load_scene(&job.scene, &Default::default()).unwrap();
+                assert!(job.refuse_other_task(loaded.task.kind, &path).is_ok(), "{}", job.name);
             }
         }
     }
@@ -350,6 +394,9 @@ settings = { method = "visibility", guided_share = 0.0 }
             ("guided_share = 0.0", "gided_share = 2.0", "B600"),
             ("name = \"f\"", "name = \"../f\"", "letters, digits"),
             ("[1, 5, 9]", "[1, 5]", "smallest, mean and largest"),
+            ("mean_at_most_s = 0.002", "solved_at_least = 99", "solved_at_least must be above 0"),
+            ("mean_at_most_s = 0.002", "tracking = { cell = -1 }", "tracking: cell is -1"),
+            ("mean_at_most_s = 0.002", "tracking = { rolling_finger = \"twice\" }", "B600"),
         ] {
             assert!(GOOD.contains(from), "{from}");
             let error = read_text(&GOOD.replacen(from, to, 1)).unwrap_err();
@@ -389,5 +436,80 @@ settings = { method = "visibility", guided_share = 0.0 }
         assert!(pictures[0].0 == "f.svg" && pictures[0].1.matches("<circle").count() == 1);
         rows[1].row.status = "time_limit".into();
         assert!(results::markdown(&suite, &rows, "").contains("MISSED"), "a miss is no mean");
+    }
+
+    const TRACKING: &str = r#"format = "regrasp-suite"
+format_version = 1
+title = "A suite"
+results = "out"
+[[tables]]
+title = "T"
+[[tables.published]]
+name = "F-1"
+time_s = [43]
+nodes = [247]
+generated = [44]
+on_path = [44]
+[[tables.rows]]
+name = "free"
+scene = "s.toml"
+trials = 4
+solved_at_least = 0.75
+mean_at_most_s = 0.05
+[[tables.rows]]
+name = "once"
+scene = "s.toml"
+trials = 4
+solved_at_least = 0.75
+tracking = { rolling_finger = "once", face_changes = false }
+"#;
+
+    #[test]
+    fn a_table_of_tracking_counts_sub_goals_and_says_which_share_was_solved() {
+        let suite = read_text(TRACKING).unwrap();
+        let jobs = suite.jobs(Path::new("suites/a.toml"));
+        assert_eq!(jobs[0].tracking, None);
+        let once = jobs[1].tracking.as_ref().unwrap();
+        assert!(once.rolling_finger == RollingFinger::Once && !once.face_changes);
+        assert_eq!(
+            TrackingSettings { rolling_finger: RollingFinger::Any, face_changes: true, ..once.clone() },
+            Default::default()
+        );
+        // Of one kind of task only.
+        let at = Path::new("suites/a.toml");
+        assert!(jobs[1].refuse_other_task(TaskKind::Tracking, at).is_ok());
+        let error = jobs[1].refuse_other_task(TaskKind::InHand, at).unwrap_err().to_string();
+        assert!(error.contains("B603") && error.contains("T/once") && error.contains("tracking"), "{error}");
+        let in_hand = Job { settings: InHandSettings::default(), ..jobs[0].clone() };
+        assert!(in_hand.refuse_other_task(TaskKind::Tracking, at).is_err());
+        let row = |job: &str, seed, status: &str| SuiteRow {
+            job: job.into(),
+            inputs: String::new(),
+            row: Row {
+                method: "tracking".into(),
+                status: status.into(),
+                seed,
+                plan_cpu_s: 0.04,
+                accepted: (status == "solved").then_some(true),
+                nodes: 1000,
+                samples: 41 + seed,
+                transfers: 40,
+                cause: if status == "solved" { String::new() } else { "6: weight not balanced".into() },
+                ..Row::default()
+            },
+        };
+        let mut rows: Vec<SuiteRow> = (0..4).map(|seed| row("T/free", seed, "solved")).collect();
+        rows.extend((0..4).map(|seed| row("T/once", seed, if seed == 0 { "solved" } else { "work_spent" })));
+        let page = results::markdown(&suite, &rows, "");
+        assert!(page.contains("| *F-1* | - | - | - | 43.0 s | - | 247 | 44 | 44 | - | - |"), "{page}");
+        let free = "| free | 4/4 (100 %) | 4/4 | 40.0 ms | 40.0 ms | 40.0 ms | 1000 | 42.5 | 40.0 | 0.0 | \
+                    solved at least 75 %: met; mean at most 50.0 ms: met |";
+        assert!(page.contains(free), "{page}");
+        assert!(
+            page.contains("| once | 1/4 (25 %) | 1/1 |") && page.contains("solved at least 75 %: MISSED"),
+            "{page}"
+        );
+        assert!(page.contains("once, not solved: 3 work_spent, mostly 6: weight not balanced"), "{page}");
+        assert!(!page.contains("relocations"), "{page}");
     }
 }

@@ -6,6 +6,7 @@ use crate::chart::{Axis, Panel, Scale, svg};
 use crate::page::{escaped, misses};
 use crate::row::Row;
 use crate::summary::{Spread, Summary, summary_of_rows};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// The section of the results page. `folder` is where its pictures are, as seen from the page: empty or ending in `/`.
@@ -22,7 +23,8 @@ pub fn markdown(suite: &Suite, rows: &[SuiteRow], folder: &str) -> String {
     for figure in &suite.figures {
         figure_section(figure, rows, folder, &mut out);
     }
-    let all: Vec<Row> = rows.iter().map(|row| row.row.clone()).collect();
+    // Tables of tracking say themselves what was not solved.
+    let all: Vec<Row> = rows.iter().filter(|row| !row.row.is_tracking()).map(|row| row.row.clone()).collect();
     misses(&all, &mut out);
     out
 }
@@ -69,6 +71,9 @@ fn table_section(table: &Table, rows: &[SuiteRow], out: &mut String) {
     if !table.note.is_empty() {
         let _ = writeln!(out, "{}\n", table.note.trim());
     }
+    if table.is_tracking() {
+        return tracking_table(table, rows, out);
+    }
     out.push_str(
         "| | solved | accepted | time min | mean | max | nodes min | mean | max | generated, mean | relocations min | mean | floors | asked |\n\
          |---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
@@ -101,10 +106,7 @@ fn measured_row(row: &Entry, summary: &Summary, out: &mut String) {
     };
     let whole = |x: f64| format!("{x:.0}");
     let relocations = spread(summary.relocations, |x| format!("{x:.1}"));
-    let asked = row.mean_at_most_s.map_or_else(dash, |limit| {
-        let is_met = summary.plan_cpu_s.is_some_and(|time| time.mean <= limit) && summary.solved == summary.runs;
-        format!("mean at most {}: {}", seconds(limit), if is_met { "met" } else { "MISSED" })
-    });
+    let asked = asked(row, summary);
     let cap = row.time_limit_s.map_or(String::new(), |limit| format!(", at most {} each", seconds(limit)));
     let _ = writeln!(
         out,
@@ -120,6 +122,90 @@ fn measured_row(row: &Entry, summary: &Summary, out: &mut String) {
         relocations[1],
         summary.floor_multiple.map_or_else(dash, |x| format!("{x:.1}")),
     );
+}
+
+/// What a row asks for, and whether it was met.
+fn asked(row: &Entry, summary: &Summary) -> String {
+    let verdict = |is_met: bool| if is_met { "met" } else { "MISSED" };
+    let share = row.solved_at_least.map(|share| {
+        let is_met = summary.runs > 0 && summary.solved as f64 >= share * summary.runs as f64;
+        format!("solved at least {} %: {}", 100.0 * share, verdict(is_met))
+    });
+    let mean = row.mean_at_most_s.map(|limit| {
+        let is_enough = row.solved_at_least.is_some() || summary.solved == summary.runs;
+        let is_met = summary.plan_cpu_s.is_some_and(|time| time.mean <= limit) && is_enough;
+        format!("mean at most {}: {}", seconds(limit), verdict(is_met))
+    });
+    let all: Vec<String> = share.into_iter().chain(mean).collect();
+    if all.is_empty() { dash() } else { all.join("; ") }
+}
+
+/// A table like tables 4 and 5 of paper 003, with the share of trials solved and what stopped the others.
+fn tracking_table(table: &Table, rows: &[SuiteRow], out: &mut String) {
+    out.push_str(
+        "| | solved | accepted | time min | mean | max | nodes | sub-goals tried | on the path | restarts | asked |\n\
+         |---|---|---|---|---|---|---|---|---|---|---|\n",
+    );
+    for published in &table.published {
+        let mean = |list: &[f64]| three(list)[1].map_or_else(dash, |x| x.to_string());
+        let _ = writeln!(
+            out,
+            "| *{}* | - | - | {} | {} | {} | {} | - | - |",
+            escaped(&published.name),
+            three(&published.time_s).map(|x| x.map_or_else(dash, seconds)).join(" | "),
+            mean(&published.nodes),
+            mean(&published.generated),
+            mean(&published.on_path),
+        );
+    }
+    let mut notes = String::new();
+    for row in &table.rows {
+        let job = table.job_name(row);
+        let runs: Vec<&Row> = rows.iter().filter(|row| row.job == job).map(|row| &row.row).collect();
+        let summary = summary_of_rows(&runs);
+        let mean = |spread: Option<Spread>, decimals: usize| {
+            spread.map_or_else(dash, |spread| format!("{:.decimals$}", spread.mean))
+        };
+        let share = 100.0 * summary.solved as f64 / summary.runs.max(1) as f64;
+        let solved: Vec<&&Row> = runs.iter().filter(|row| row.status == "solved").collect();
+        let times = summary.plan_cpu_s.map_or([dash(), dash(), dash()], |s| [s.min, s.mean, s.max].map(seconds));
+        let _ = writeln!(
+            out,
+            "| {} | {}/{} ({share:.0} %) | {} | {} | {} | {} | {} | {} | {} |",
+            escaped(&row.name),
+            summary.solved,
+            summary.runs,
+            summary.accepted.map_or_else(dash, |n| format!("{n}/{}", summary.solved)),
+            times.join(" | "),
+            mean(summary.nodes, 0),
+            mean(summary.samples, 1),
+            mean(summary.transfers, 1),
+            mean(Spread::of(solved.iter().map(|row| row.restarts as f64)), 1),
+            asked(row, &summary),
+        );
+        not_solved(&row.name, &runs, &mut notes);
+    }
+    if !notes.is_empty() {
+        let _ = write!(out, "\n{notes}");
+    }
+}
+
+/// How many trials of a row have no plan, of each kind of failure, and the cause that most of these name.
+fn not_solved(name: &str, runs: &[&Row], out: &mut String) {
+    let mut kinds: BTreeMap<&str, BTreeMap<&str, usize>> = BTreeMap::new();
+    for row in runs.iter().filter(|row| row.status != "solved") {
+        *kinds.entry(&row.status).or_default().entry(&row.cause).or_default() += 1;
+    }
+    let told: Vec<String> = kinds
+        .iter()
+        .map(|(status, causes)| {
+            let commonest = causes.iter().max_by_key(|(_, count)| **count).map_or("", |(cause, _)| *cause);
+            format!("{} {status}, mostly {commonest}", causes.values().sum::<usize>())
+        })
+        .collect();
+    if !told.is_empty() {
+        let _ = writeln!(out, "- {}, not solved: {}", escaped(name), escaped(&told.join("; ")));
+    }
 }
 
 fn figure_section(figure: &Figure, rows: &[SuiteRow], folder: &str, out: &mut String) {

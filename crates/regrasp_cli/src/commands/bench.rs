@@ -120,7 +120,7 @@ pub fn say_row(row: &Row, talk: &Talk) {
         talk.say(format!("miss   {} seed {}: {}{left}; {}", row.scene, row.seed, row.status, row.cause));
     } else if row.accepted == Some(false) {
         talk.say(format!("REJECTED   {} seed {}: {}", row.scene, row.seed, row.cause));
-    } else if row.floor_s.is_none() {
+    } else if row.lacks_floor() {
         talk.say(format!("NO FLOOR   {} seed {}: {}", row.scene, row.seed, row.cause));
     }
 }

@@ -32,7 +32,10 @@ pub fn run(arguments: &args::Campaign, common: &Common, talk: &Talk) -> Result<(
 }
 
 fn load_all(scenes: &[PathBuf], common: &Common, talk: &Talk) -> Result<Vec<LoadedScene>, Stop> {
-    load::scene_files(scenes)?.iter().map(|path| load::scene(path, common, talk)).collect()
+    load::scene_files(scenes)?
+        .iter()
+        .map(|path| load::in_hand_scene(path, "campaigns make plans", common, talk))
+        .collect()
 }
 
 /// Query `i` is seed `i / n` of scene `i % n`.

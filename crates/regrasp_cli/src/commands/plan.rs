@@ -13,6 +13,7 @@ use regrasp::base::files;
 use regrasp::plan::format;
 use regrasp::plan::plan::Statistics;
 use regrasp::planners::FailureKind;
+use regrasp::scene::TaskKind;
 use regrasp::{Budget, Failure, InHandQuery, Plan, PlannerSettings, Scene};
 use serde_json::json;
 use std::fmt::Write;
@@ -152,6 +153,12 @@ pub fn say_query(query: &InHandQuery, seed: u64, n_threads: usize, talk: &Talk) 
     let distance = (goal.translation.vector - start.translation.vector).norm();
     let n_way = query.world_from_object_way.len();
     let way = if n_way == 0 { String::new() } else { format!(", {}", counted(n_way, "way pose")) };
+    if query.task == TaskKind::Tracking {
+        // The goal says no position, and one thread searches.
+        talk.say(format!("query  rotation {:.0} deg, by tracking, seed {seed}", angle.to_degrees()));
+        talk.event("query", json!({ "angle": angle, "way_poses": n_way, "seed": seed, "threads": 1 }));
+        return;
+    }
     talk.say(format!(
         "query  rotation {:.0} deg, translation {:.1} mm{way}, seed {seed}, {}",
         angle.to_degrees(),
@@ -197,7 +204,7 @@ pub fn say_plan(plan: &Plan, seconds: f64, talk: &Talk) {
     if plan.promises.tracking.is_some() {
         let Statistics { nodes, samples, transfers, .. } = plan.statistics;
         talk.say(format!(
-            "plan   {}, {} sub-goals on the path of {} tried and {} made, {} waypoints   {}",
+            "plan   {}, {} sub-goals on the path of {} tried in {} cells seen, {} waypoints   {}",
             counted(plan.segments.len(), "segment"),
             grouped(transfers),
             grouped(samples),
@@ -277,9 +284,10 @@ pub fn failure_text(failure: &Failure) -> String {
     if let Some(miss) = &failure.nearest_miss {
         let _ = writeln!(
             out,
-            "  nearest: the object came within {:.0} deg and {:.1} mm of {}",
+            "  nearest: the object came within {:.0} deg{} of {}",
             miss.angle_left.to_degrees(),
-            1e3 * miss.distance_left,
+            // A goal of tracking says no position.
+            if miss.distance_left > 1e-5 { format!(" and {:.1} mm", 1e3 * miss.distance_left) } else { String::new() },
             failure.leg.map_or("the goal".to_owned(), |leg| format!("the end of leg {leg}"))
         );
     }

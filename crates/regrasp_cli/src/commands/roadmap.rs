@@ -24,6 +24,9 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
+/// Why a scene with another task is refused.
+const ROADMAPS: &str = "roadmaps are graphs of grasps";
+
 /// Does what is asked of a roadmap.
 pub fn run(arguments: &args::Roadmap, common: &Common, talk: &Talk) -> Result<(), Stop> {
     match &arguments.action {
@@ -39,7 +42,7 @@ pub fn run(arguments: &args::Roadmap, common: &Common, talk: &Talk) -> Result<()
 fn run_build(arguments: &args::RoadmapBuild, common: &Common, talk: &Talk) -> Result<(), Stop> {
     refuse_unwritable(&arguments.output)?;
     let cancelled = interrupt::flag()?;
-    let loaded = load::scene(&arguments.scene, common, talk)?;
+    let loaded = load::in_hand_scene(&arguments.scene, ROADMAPS, common, talk)?;
     let n_threads = arguments.threads.unwrap_or_else(available_threads);
     let settings = load::planner_settings(arguments.settings.as_deref(), None, arguments.margin, n_threads)?;
     let mut build: BuildSettings =
@@ -113,7 +116,7 @@ fn run_query(arguments: &args::RoadmapQuery, common: &Common, talk: &Talk) -> Re
     let cancelled = interrupt::flag()?;
     let roadmap = open(&arguments.roadmap, talk)?;
     refuse_other_settings(&roadmap, arguments)?;
-    let loaded = load::scene(&arguments.scene, common, talk)?;
+    let loaded = load::in_hand_scene(&arguments.scene, ROADMAPS, common, talk)?;
     let query = loaded.task.query(arguments.seed);
     say_query(&query, arguments.seed, 1, talk);
     let mut planner = RoadmapPlanner::new(&arguments.roadmap, &roadmap, &loaded.scene)?;
@@ -148,7 +151,7 @@ fn run_picture(arguments: &args::RoadmapPicture, common: &Common, talk: &Talk) -
         let title = format!("Graph {name}, goal: its first pose");
         return pictures::write_roadmap(&arguments.output, &story, &title, talk);
     };
-    let loaded = load::scene(scene, common, talk)?;
+    let loaded = load::in_hand_scene(scene, ROADMAPS, common, talk)?;
     let query = loaded.task.query(arguments.seed);
     say_query(&query, arguments.seed, 1, talk);
     let planner = RoadmapPlanner::new(&arguments.roadmap, &roadmap, &loaded.scene)?;
@@ -265,7 +268,7 @@ fn say_census(census: &Census, talk: &Talk) {
 fn run_bench(arguments: &args::RoadmapBench, common: &Common, talk: &Talk) -> Result<(), Stop> {
     let cancelled = interrupt::flag()?;
     let roadmap = open(&arguments.roadmap, talk)?;
-    let loaded = load::scene(&arguments.scene, common, talk)?;
+    let loaded = load::in_hand_scene(&arguments.scene, ROADMAPS, common, talk)?;
     let mut planner = RoadmapPlanner::new(&arguments.roadmap, &roadmap, &loaded.scene)?;
     if arguments.smooth {
         planner = planner.smoothing();

@@ -81,6 +81,7 @@ fn prepare(
         job.trials = job.trials.min(arguments.seeds.unwrap_or(u64::MAX));
         let loaded = regrasp::scene::load_scene(&job.scene, &load::options(common))?;
         loaded.notes.iter().for_each(|note| talk.note(note));
+        job.refuse_other_task(loaded.task.kind, path)?;
         let inputs = inputs_hash(&program, &loaded.scene, &job);
         plan.push(Part { job, loaded, inputs, done: Vec::new() });
     }
@@ -126,7 +127,7 @@ fn measure(
     let job = &part.job;
     let settings = RunSettings {
         planner: job.settings.clone(),
-        tracking: Default::default(),
+        tracking: job.tracking.clone().unwrap_or_default(),
         max_work: job.max_work,
         time_limit: job.time_limit_s.map(Duration::from_secs_f64),
         judge: Judge::Checker,

@@ -11,6 +11,7 @@ mod places;
 mod roadmap;
 mod roadmap_file;
 mod suite;
+mod tracking;
 mod view;
 #[path = "../../../../tests/support/wide_scene.rs"]
 mod wide_scene;

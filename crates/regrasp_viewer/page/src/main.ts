@@ -6,6 +6,7 @@ import { ChartStack } from "./charts/stack";
 import { button, el, icon } from "./dom";
 import { keepLink, readLink } from "./link";
 import { Motion, still } from "./motion";
+import { OrientationPath } from "./orientation_path";
 import { Player } from "./player";
 import type { Story } from "./story";
 import { Theme } from "./theme";
@@ -77,6 +78,7 @@ function start(): void {
   const moves = story.plan !== null && motion.end > motion.start;
   const transport = moves ? new Transport(motion, player, theme) : null;
   const charts = moves ? new ChartStack(story, motion, player, theme) : null;
+  const path = motion.isTracking && story.plan ? new OrientationPath(story.plan, motion, player, theme) : null;
   const ball = new Ball(story, motion, player, theme);
 
   app.replaceChildren(
@@ -96,6 +98,7 @@ function start(): void {
         }),
         charts ? el("section", { class: "card", "aria-label": "Charts over time" }, charts.element) : null,
         panels.components(story),
+        path?.element,
         ball.element,
         panels.facts(story),
       ),
@@ -110,6 +113,7 @@ function start(): void {
     player.onTime((time) => stage.setTime(time));
   }
   charts?.draw();
+  path?.draw();
   ball.draw();
 
   const follow = () => {

@@ -59,6 +59,14 @@ export function rotationBetween(from: Quat, to: Quat): Vec3 {
   return scale(imaginary, (2 * Math.atan2(halfSine, delta[3])) / halfSine);
 }
 
+/** The rotation vector of the same orientation as `vector` that is nearest to `to`: they differ by whole turns about its axis. */
+export function nearestVector(vector: Vec3, to: Vec3): Vec3 {
+  const length = norm(vector);
+  const axis = length > 1e-12 ? scale(vector, 1 / length) : unit(to);
+  const turns = Math.round((dot(to, axis) - length) / (2 * Math.PI));
+  return add(vector, scale(axis, 2 * Math.PI * turns));
+}
+
 /** Position linear, orientation by the shortest great circle, at `t` in [0, 1]. */
 export function interpolatePose(from: Pose, to: Pose, t: number): Pose {
   return {

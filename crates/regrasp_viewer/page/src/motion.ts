@@ -7,6 +7,8 @@ export interface Stretch {
   kind: Segment["kind"];
   /** Index of the finger that moves, -1 in transfers. */
   moving: number;
+  /** In tracking, index of the finger that the object rolls on; else -1. */
+  rolling: number;
   /** First and last waypoint, in the order of all waypoints. */
   first: number;
   last: number;
@@ -19,14 +21,17 @@ export interface Hold {
   finger: number;
   start: number;
   end: number;
-  /** Parts of it, each fixed or rolling; they touch. */
-  spans: { start: number; end: number; mode: "fixed" | "rolling" }[];
-  /** Where the contact is on the object: one point while it stays, more while it rolls. */
+  /** Parts of it, each of one mode; they touch. */
+  spans: { start: number; end: number; mode: Holding }[];
+  /** Where the contact is on the object: one point while it stays, more while it rolls or slides. */
   path: { time: number; point: Vec3; normal: Vec3 }[];
 }
 
+/** What a finger that touches the object does: stays, rolls (or twists), slides (and may roll and twist). */
+export type Holding = "fixed" | "rolling" | "sliding";
+
 export interface ContactNow {
-  mode: "fixed" | "rolling" | "free";
+  mode: Holding | "free";
   point: Vec3;
   normal: Vec3;
   force: Vec3 | null;
@@ -37,8 +42,12 @@ const FREE: ContactNow = { mode: "free", point: [0, 0, 0], normal: [0, 0, 1], fo
 const holds = (contact: Contact | undefined): boolean => contact !== undefined && contact.mode !== "free";
 
 export class Motion {
+  /** True for plans of finger tracking. */
+  readonly isTracking: boolean;
   readonly waypoints: Waypoint[] = [];
   readonly times: number[] = [];
+  /** Index of the segment of every waypoint. */
+  private readonly segmentOf: number[] = [];
   readonly stretches: Stretch[] = [];
   readonly nFingers: number;
   readonly start: number;
@@ -48,16 +57,19 @@ export class Motion {
 
   constructor(plan: Plan) {
     this.nFingers = plan.fingers.length;
+    this.isTracking = plan.segments.some((segment) => segment.kind === "tracking");
     for (const segment of plan.segments) {
       const first = this.waypoints.length;
       for (const waypoint of segment.waypoints) {
+        this.segmentOf.push(this.stretches.length);
         this.waypoints.push(waypoint);
         this.times.push(waypoint.time);
       }
       const last = this.waypoints.length - 1;
       this.stretches.push({
         kind: segment.kind,
-        moving: segment.kind === "regrasp" ? plan.fingers.indexOf(segment.moving_finger ?? "") : -1,
+        moving: segment.kind === "transfer" ? -1 : plan.fingers.indexOf(segment.moving_finger ?? ""),
+        rolling: segment.kind === "tracking" ? plan.fingers.indexOf(segment.rolling_finger ?? "") : -1,
         first,
         last,
         start: this.times[first],
@@ -109,12 +121,21 @@ export class Motion {
       const normalFrom = from.normal_in_object ?? [0, 0, 1];
       const forces = from.force_in_object && to.force_in_object;
       return {
-        mode: from.mode === "rolling" && to.mode === "rolling" ? "rolling" : "fixed",
+        mode: this.holding(index, from, to),
         point: lerp(pointFrom, to.point_in_object ?? pointFrom, u),
         normal: unit(lerp(normalFrom, to.normal_in_object ?? normalFrom, u)),
         force: forces ? lerp(from.force_in_object!, to.force_in_object!, u) : null,
       };
     });
+  }
+
+  /** What a finger that touches at waypoint `index` and the next one does in between. */
+  private holding(index: number, from: Contact, to: Contact): Holding {
+    const segment = this.segmentOf[index];
+    if (this.stretches[segment].kind !== "tracking") return from.mode === "rolling" && to.mode === "rolling" ? "rolling" : "fixed";
+    // Between two segments everything rests.
+    if (this.segmentOf[index + 1] !== segment || from.mode === "fixed") return "fixed";
+    return from.mode === "sliding" || from.mode === "pure_sliding" ? "sliding" : "rolling";
   }
 
   /** Index of the stretch that `time` is in; between two, the earlier. */
@@ -126,9 +147,13 @@ export class Motion {
     return found;
   }
 
-  /** Start of the next or previous relocation seen from `time`; the start or end of the plan where there is none. */
+  /**
+   * Start of the next or previous relocation seen from `time`, in tracking of the next or previous stretch with another moving
+   * finger; the start or end of the plan where there is none.
+   */
   relocationFrom(time: number, step: 1 | -1): number {
-    const starts = this.stretches.filter((s) => s.kind === "regrasp").map((s) => s.start);
+    const begins = (s: Stretch, i: number) => s.kind === "regrasp" || (s.kind === "tracking" && i > 0 && this.stretches[i - 1].moving !== s.moving);
+    const starts = this.stretches.filter(begins).map((s) => s.start);
     if (step > 0) return starts.find((t) => t > time + 1e-6) ?? this.end;
     return starts.reverse().find((t) => t < time - 1e-6) ?? this.start;
   }
@@ -148,7 +173,7 @@ export class Motion {
         continue;
       }
       const [start, end] = [this.times[i], this.times[i + 1]];
-      const mode = from.mode === "rolling" && to.mode === "rolling" ? "rolling" : "fixed";
+      const mode = this.holding(i, from, to);
       const put = (contact: Contact, time: number, hold: Hold) => {
         const point = contact.point_in_object ?? [0, 0, 0];
         const before = hold.path[hold.path.length - 1];

@@ -126,12 +126,23 @@ export interface Plan {
   start: PoseData;
   goal: PoseData;
   segments: Segment[];
-  promises: { friction: number; friction_margin: number; required_margin: number; kept_margin: number; torque_scale: number };
+  promises: {
+    friction: number; friction_margin: number; required_margin: number; kept_margin: number; torque_scale: number;
+    /** Of plans of finger tracking only. */
+    tracking?: { goal_tolerance: number; sliding_friction: number };
+  };
   inputs: { role: string; name: string; sha256: string }[];
-  statistics: { transfers: number; relocations: number };
+  /** In tracking: `transfers` are sub-goals on the path, `samples` sub-goals tried, `nodes` cells that sub-goals are in. */
+  statistics: { transfers: number; relocations: number; samples?: number; nodes?: number };
 }
 
-export interface Segment { kind: "transfer" | "regrasp"; moving_finger?: string; waypoints: Waypoint[] }
+export interface Segment {
+  kind: "transfer" | "regrasp" | "tracking";
+  moving_finger?: string;
+  /** In tracking, the resting finger that the object rolls on. */
+  rolling_finger?: string;
+  waypoints: Waypoint[];
+}
 
 export interface Waypoint {
   time: number;
@@ -143,7 +154,8 @@ export interface Waypoint {
 }
 
 export interface Contact {
-  mode: "fixed" | "rolling" | "free";
+  /** In tracking it says what the contact does on the way to the next waypoint. */
+  mode: "fixed" | "rolling" | "pure_rolling" | "twisting" | "pure_sliding" | "sliding" | "free";
   point_in_object?: [number, number, number];
   normal_in_object?: [number, number, number];
   force_in_object?: [number, number, number];

@@ -4,11 +4,12 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { load } from "./support.mjs";
-import { matricesOf, matrix, poseMatrix, synthetic } from "./synthetic.mjs";
+import { matricesOf, matrix, poseMatrix, synthetic, tracking } from "./synthetic.mjs";
 
 const { linkPoses } = await load("kinematics");
 const { Motion } = await load("motion");
 const math = await load("math");
+const { rotationVectors, anglesAlong } = await load("orientation_path");
 const { readLink, writeLink } = await load("link");
 
 /** Numbers in [-1, 1) that are the same every time. */
@@ -127,4 +128,34 @@ test("links are read as they were written, and nonsense is not read", () => {
   for (const hash of ["", "#", "#t=", "#t=abc&cam=1,2,3", "#cam=1,2,0,0,0,0", "#cam=1,2,NaN,0,0,0", "#t=Infinity&cam=,,,,,", "#%%%=&t=1e999"]) {
     assert.deepEqual(readLink(hash), { time: null, camera: null }, hash);
   }
+});
+
+test("rotation vectors are continuous, those of the poses, and as long a way as the angles between them", () => {
+  const story = synthetic({ duration: 60, triangles: 200 });
+  const motion = new Motion(tracking(story).plan);
+  const vectors = rotationVectors(motion);
+  let sum = 0;
+  motion.waypoints.forEach((waypoint, i) => {
+    // The same orientation, by matrices.
+    const turned = poseMatrix({ position: [0, 0, 0], quat_xyzw: math.fromRotationVector(vectors[i]) });
+    near(turned, poseMatrix({ position: [0, 0, 0], quat_xyzw: waypoint.world_from_object.quat_xyzw }), 1e-9);
+    if (i === 0) return;
+    assert.ok(Math.hypot(...vectors[i].map((x, k) => x - vectors[i - 1][k])) < 0.6, `waypoint ${i} jumps`);
+    // All turns are about one axis: the way is as long as the vectors' difference.
+    sum += Math.hypot(...vectors[i].map((x, k) => x - vectors[i - 1][k]));
+  });
+  assert.ok(sum > 2 * Math.PI, "more than a whole turn");
+  assert.ok(Math.abs(sum - anglesAlong(motion).at(-1)) < 1e-9, `${sum}`);
+});
+
+test("tracking: modes are those of the way to the next waypoint, and nothing holds still but between segments", () => {
+  const plan = tracking(synthetic({ duration: 12, triangles: 200 })).plan;
+  const motion = new Motion(plan);
+  for (const segment of plan.segments) {
+    const [from, to] = [segment.waypoints[0].time, segment.waypoints.at(-1).time];
+    const modes = motion.contacts((from + to) / 2).map((contact) => contact.mode);
+    const expected = plan.fingers.map((name) => (name === segment.moving_finger || name === segment.rolling_finger ? "rolling" : "sliding"));
+    assert.deepEqual(modes, expected);
+  }
+  for (const holds of motion.holds) assert.equal(holds.length, 1, "no finger leaves the object");
 });

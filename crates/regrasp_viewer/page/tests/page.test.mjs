@@ -5,7 +5,7 @@ import { readFileSync } from "node:fs";
 import { after, before, test } from "node:test";
 import { wrap } from "../tools/wrap.mjs";
 import { colours, difference, hasChromium, launch, open, pixels, shownTime } from "./support.mjs";
-import { synthetic } from "./synthetic.mjs";
+import { synthetic, tracking } from "./synthetic.mjs";
 
 const options = { skip: hasChromium ? false : "SKIPPED: no Chromium", timeout: 120_000 };
 if (!hasChromium) console.log("SKIPPED: no Chromium: tests of the page in a browser");
@@ -53,6 +53,40 @@ test("a plan that the planner made is shown without its shapes too", options, as
   const opened = await open(browser, story);
   assert.equal(await opened.page.locator(".figures dd").first().innerText(), "2");
   assert.equal(await opened.page.locator(".facts tr").count(), story.facts.length);
+  await finish(opened);
+});
+
+test("tracking is told with its own words, marks and path", options, async () => {
+  const story = tracking(ball);
+  const opened = await open(browser, story, { hash: "#t=0.5" });
+  const { page } = opened;
+  assert.equal(await page.locator(".figures dt").first().innerText(), "Sub-goals on the path");
+  assert.equal(await page.locator(".figures dd").first().innerText(), "40");
+  const [first, second] = story.plan.segments;
+  assert.equal(await page.locator(".caption").textContent(),
+    `${first.moving_finger} moves (dark rim), the object rolls on ${first.rolling_finger} (grey rim)`);
+  const states = await page.locator(".legend .state").allTextContents();
+  assert.deepEqual(states, ["rolls, moving finger", "rolls, object on it", "slides", "slides"]);
+  assert.match(await page.locator("#chart-gait").innerText(), /slides[^]*moving finger[^]*object rolls on it/);
+  assert.doesNotMatch(await page.locator("body").innerText(), /transfer|relocat/i);
+  assert.equal(await page.locator("#chart-margin").count(), 0, "no margin was judged");
+  // The fingertips' rims change with who moves.
+  const before = await picture(page);
+  await page.getByRole("button", { name: "Next change of the moving finger" }).click();
+  assert.ok(Math.abs((await shownTime(page)) - second.waypoints[0].time) < 1e-6);
+  assert.match(await page.locator(".caption").textContent(), new RegExp(`^${second.moving_finger} moves`));
+  await page.waitForTimeout(400);
+  assert.ok(difference(before, await picture(page)) > 0.001);
+  const path = page.locator(".orientation-path");
+  await path.scrollIntoViewIfNeeded();
+  assert.ok(colours(pixels(await path.locator(".ball-plot").screenshot())).different > 20);
+  const told = await path.locator(".readout").textContent();
+  const [, turned, all] = told.match(/turned ([0-9.]+)\u00b0 of ([0-9.]+)\u00b0 along the path/).map(Number);
+  assert.ok(turned > 1 && turned < all, told);
+  const still = pixels(await path.locator(".ball-plot").screenshot());
+  await path.locator("canvas[role=img]").focus();
+  await page.keyboard.press("ArrowLeft");
+  assert.ok(difference(still, pixels(await path.locator(".ball-plot").screenshot())) > 0.01, "it can be turned");
   await finish(opened);
 });
 

@@ -306,3 +306,36 @@ export function synthetic(options = {}) {
     roadmap: roadmap ? graph() : null,
   };
 }
+
+/** The story as one of finger tracking: its transfers only, in parts in which the fingers take turns to move. Not a planner either. */
+export function tracking(story) {
+  const plan = story.plan;
+  const n = plan.fingers.length;
+  const kept = [];
+  const segments = [];
+  let at = 0;
+  for (const segment of plan.segments) {
+    const indices = segment.waypoints.map((_, i) => at + i);
+    at += segment.waypoints.length;
+    if (segment.kind !== "transfer") continue;
+    const half = Math.ceil(indices.length / 2);
+    for (const part of [indices.slice(0, half), indices.slice(half - 1)]) {
+      const moving = segments.length % n;
+      const rolling = (moving + 1) % n;
+      const modes = plan.fingers.map((_, f) => (f === moving ? "rolling" : f === rolling ? "pure_rolling" : "sliding"));
+      const own = part.map((i) => segment.waypoints[i - indices[0]]);
+      segments.push({
+        kind: "tracking", moving_finger: plan.fingers[moving], rolling_finger: plan.fingers[rolling],
+        waypoints: own.map((w) => ({ ...w, contacts: w.contacts.map((c, f) => ({ ...c, mode: modes[f] })) })),
+      });
+      kept.push(...part);
+    }
+  }
+  const promises = { ...plan.promises, tracking: { goal_tolerance: 0.021, sliding_friction: 0.7 } };
+  const { margin, clearance, pair } = story.judged;
+  return {
+    ...story,
+    plan: { ...plan, task: "tracking", method: "tracking", segments, promises, statistics: { transfers: 40, relocations: 0, samples: 41, nodes: 992 } },
+    judged: { ...story.judged, margin: kept.map(() => null), clearance: kept.map((i) => clearance[i]), pair: kept.map((i) => pair[i]) },
+  };
+}

@@ -16,10 +16,14 @@ mod joints;
 mod margin;
 /// The way of the object's orientation.
 mod orientation;
+/// The way of the object's rotation vectors in space.
+mod orientation_path;
 /// SVG text: elements, escaping, numbers, axes.
 pub mod svg;
 /// The time axis, and a panel over it.
 mod time_axis;
+/// Where fingers touched the object.
+mod traces;
 
 pub use causes::causes;
 pub use clearance::clearance;
@@ -28,6 +32,8 @@ pub use gait::gait;
 pub use joints::joints;
 pub use margin::margin;
 pub use orientation::orientation;
+pub use orientation_path::orientation_path;
+pub use traces::traces;
 
 use crate::story::Story;
 
@@ -47,6 +53,10 @@ pub fn all(story: &Story) -> Vec<Chart> {
         add("joints", joints(plan, &story.scene));
         add("forces", forces(plan));
         add("orientation", orientation(plan, story.roadmap.as_ref()));
+        if plan.promises.tracking.is_some() {
+            add("orientation_path", orientation_path(plan));
+            add("traces", traces(plan, &story.scene));
+        }
     }
     if let Some(failure) = &story.failure {
         add("causes", causes(failure));
@@ -59,6 +69,9 @@ fn title(plan: &regrasp_plan::Plan) -> String {
     use regrasp_geometry::Pose;
     let [start, goal] = [&plan.start, &plan.goal].map(|pose| Pose::from(pose).rotation);
     let angle = start.angle_to(&goal).to_degrees();
+    if plan.promises.tracking.is_some() {
+        return format!("{angle:.0}\u{b0} over {} sub-goals", plan.statistics.transfers);
+    }
     let counted = |n: u64, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
     format!(
         "{angle:.0}\u{b0} in {} and {}",

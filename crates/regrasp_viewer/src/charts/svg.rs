@@ -166,6 +166,16 @@ impl Svg {
         format!("url(#roll{number})")
     }
 
+    /// The lines of fingers that slide; `number` as in [`Svg::stripes`].
+    pub fn lines(&mut self, number: usize, color: &str) -> String {
+        self.push(format!(
+            "<defs><pattern id=\"slide{number}\" width=\"4\" height=\"4\" patternUnits=\"userSpaceOnUse\">\
+             <rect width=\"4\" height=\"4\" fill=\"{color}\" fill-opacity=\"0.3\"/>\
+             <rect width=\"4\" height=\"1.5\" fill=\"{color}\"/></pattern></defs>"
+        ));
+        format!("url(#slide{number})")
+    }
+
     /// The picture, its title as its name for readers that speak.
     pub fn finish(self, title: &str) -> String {
         let [width, height] = [self.width, self.height].map(short);

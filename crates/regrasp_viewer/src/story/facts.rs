@@ -20,12 +20,29 @@ pub(super) fn plan_facts(plan: &Plan, report: &Report, judged: &Judged) -> Vec<(
     let angle = start.rotation.angle_to(&goal.rotation).to_degrees();
     let distance = 1e3 * (goal.translation.vector - start.translation.vector).norm();
     let way = if plan.way_poses.is_empty() { String::new() } else { format!(", {} way poses", plan.way_poses.len()) };
-    fact("Asked", format!("{angle:.0}\u{b0}, {distance:.1} mm{way}"));
     let counts = &plan.statistics;
-    fact("Relocations", counts.relocations.to_string());
-    let free = counts.transfers_with_free_fingers;
-    let free = if free == 0 { String::new() } else { format!(", {free} with a free finger") };
-    fact("Transfers", format!("{}{free}", counts.transfers));
+    match &plan.promises.tracking {
+        // The goal says no position, and what are transfers elsewhere are sub-goals.
+        Some(tracking) => {
+            let within = tracking.goal_tolerance.to_degrees();
+            fact("Asked", format!("{angle:.0}\u{b0}, within {within:.1}\u{b0}, by tracking"));
+            let (tried, nodes) = (counts.samples, counts.nodes);
+            fact("Sub-goals", format!("{} on the path, {tried} tried, {nodes} cells seen", counts.transfers));
+            if counts.relocations > 0 {
+                fact("Relocations", counts.relocations.to_string());
+            }
+            for (cause, count) in &counts.failures {
+                fact("Steps that failed", format!("{count}, {cause}"));
+            }
+        }
+        None => {
+            fact("Asked", format!("{angle:.0}\u{b0}, {distance:.1} mm{way}"));
+            fact("Relocations", counts.relocations.to_string());
+            let free = counts.transfers_with_free_fingers;
+            let free = if free == 0 { String::new() } else { format!(", {free} with a free finger") };
+            fact("Transfers", format!("{}{free}", counts.transfers));
+        }
+    }
     fact("Duration", format!("{:.1} s", report.duration));
     if let Some((margin, time)) = least(plan, &judged.margin) {
         let required = judged.required_margin;

@@ -1,8 +1,10 @@
 //! Margin and clearance along a plan, from the checker's own functions.
 
 use super::Judged;
+use crate::timeline;
 use regrasp_plan::Plan;
 use regrasp_plan::check::{Along, Report, along};
+use regrasp_plan::plan::SegmentKind;
 use regrasp_scene::Scene;
 
 /// Violations that are told one by one.
@@ -19,7 +21,13 @@ pub(super) fn judged(scene: &Scene, plan: &Plan, report: &Report) -> Judged {
     }
     let margin = match found.margin.is_empty() {
         true => vec![None; n_waypoints],
-        false => found.margin.into_iter().map(Some).collect(),
+        // What slides closes nothing: there the checker judges forces and not closure.
+        false => found
+            .margin
+            .into_iter()
+            .zip(timeline::steps(plan))
+            .map(|(margin, step)| (plan.segments[step.segment].kind != SegmentKind::Tracking).then_some(margin))
+            .collect(),
     };
     Judged {
         accepted: report.accepted(),

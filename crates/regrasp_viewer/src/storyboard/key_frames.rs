@@ -19,6 +19,8 @@ pub enum Event {
     Lands,
     /// A free finger moves, and stays free.
     MovesFreely,
+    /// A finger moves on the object, which rolls on another.
+    Tracks,
     /// The object moves.
     ObjectMoves,
     /// The plan ends.
@@ -40,8 +42,12 @@ pub struct KeyFrame {
     pub event: Event,
     /// The finger that moves.
     pub moving: Option<usize>,
+    /// The finger that the object rolls on, in tracking.
+    pub rolling: Option<usize>,
     /// Centres of the moving finger's tip all along its segment, in the world.
     pub path: Vec<Point>,
+    /// In tracking, where each finger touched the object until then, in its frame; else empty.
+    pub traces: Vec<Vec<Point>>,
     /// Joint positions.
     pub joints: Vec<f64>,
     /// Pose of the object in the world.
@@ -52,9 +58,13 @@ pub struct KeyFrame {
 
 impl KeyFrame {
     /// What happens, in words.
-    pub fn text(&self, finger: Option<&str>) -> String {
+    pub fn text(&self, finger: Option<&str>, rolling: Option<&str>) -> String {
         let finger = finger.unwrap_or("a finger");
         match self.event {
+            Event::Tracks => match rolling {
+                Some(rolling) => format!("{finger} moves, {rolling} rolls"),
+                None => format!("{finger} moves"),
+            },
             Event::Start => "start".into(),
             Event::Relocates => format!("{finger} relocates"),
             Event::LetsGo => format!("{finger} lets go"),
@@ -141,6 +151,7 @@ fn key_frame(scene: &SceneStory, plan: &Plan, steps: &[Step], step: usize) -> Ke
     let event = match (step, moving) {
         (0, _) => Event::Start,
         (_, _) if is_end => Event::Goal,
+        (_, Some(_)) if data.kind == SegmentKind::Tracking => Event::Tracks,
         (_, Some(finger)) => match (holds(0, finger), holds(data.waypoints.len() - 1, finger)) {
             (true, true) => Event::Relocates,
             (true, false) => Event::LetsGo,
@@ -156,9 +167,19 @@ fn key_frame(scene: &SceneStory, plan: &Plan, steps: &[Step], step: usize) -> Ke
         moved: timeline::moved(plan, waypoint),
         event,
         moving,
+        rolling: timeline::rolling_finger(plan, data).filter(|_| !is_end),
         path: if moving.is_some() { tip_path(scene, plan, segment) } else { Vec::new() },
+        traces: match data.kind {
+            SegmentKind::Tracking => (0..plan.fingers.len()).map(|finger| trace_until(plan, finger, step)).collect(),
+            SegmentKind::Transfer | SegmentKind::Regrasp => Vec::new(),
+        },
         joints: waypoint.joints.clone(),
         world_from_object: waypoint.world_from_object,
         contacts: waypoint.contacts.clone(),
     }
+}
+
+/// Contacts of a finger up to a step, in the object frame.
+fn trace_until(plan: &Plan, finger: usize, step: usize) -> Vec<Point> {
+    timeline::trace(plan, finger).into_iter().take(step + 1).flatten().map(|(point, _)| point).collect()
 }

@@ -184,7 +184,8 @@ fn caption(sheet: &mut Sheet, plan: &Plan, frame: &KeyFrame, layout: &Layout, k:
     sheet.write(&moment, middle, first, layout.text, "#222222", Anchor::Middle);
     let (dot, room) = (0.28 * layout.text, 1.0 * layout.text);
     let name = frame.moving.and_then(|finger| plan.fingers.get(finger));
-    let text = frame.text(name.map(String::as_str));
+    let rolling = frame.rolling.and_then(|finger| plan.fingers.get(finger));
+    let text = frame.text(name.map(String::as_str), rolling.map(String::as_str));
     let text = sheet.fitted(&regrasp_base::diagnostic::printable(&text), layout.text, width - room);
     let second = first + 1.25 * layout.text;
     match frame.moving {

@@ -216,6 +216,12 @@ impl<'s> Stage<'s> {
                 }
             }
         }
+        for (finger, trace) in frame.traces.iter().enumerate() {
+            let points: Vec<Point> =
+                thinned(trace, 0.03 * size).iter().map(|point| world_from_object * point).collect();
+            let color = mixed(linear(palette::color(finger)), [0.0; 3], 0.35);
+            marks.extend(marks::rope(&points, 0.016 * size, color, MARK_BODY + finger as u32));
+        }
         if let Some(finger) = frame.moving {
             let color = linear(palette::color(finger));
             marks.extend(marks::rope(&frame.path, 0.03 * size, color, MARK_BODY + finger as u32));
@@ -226,6 +232,17 @@ impl<'s> Stage<'s> {
             Layer { models: marks, in_front: 1.0, hidden: 0.45, is_framed: true },
         ]
     }
+}
+
+/// The first and the last of `points`, and of those in between what is farther than `step` from the one before.
+fn thinned(points: &[Point], step: f64) -> Vec<Point> {
+    let mut kept: Vec<Point> = Vec::new();
+    for (k, point) in points.iter().enumerate() {
+        if k + 1 == points.len() || kept.last().is_none_or(|last| (point - last).norm() > step) {
+            kept.push(*point);
+        }
+    }
+    kept
 }
 
 fn triangles_of(mesh: &MeshStory) -> Option<Triangles> {

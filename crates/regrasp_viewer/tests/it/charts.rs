@@ -15,16 +15,16 @@ fn box_story() -> Story {
     Sample::new("scenes/box_90x.toml", LoadOptions::default()).story()
 }
 
-fn parsed(svg: &str) -> Document<'_> {
+pub fn parsed(svg: &str) -> Document<'_> {
     Document::parse(svg).unwrap_or_else(|error| panic!("{error}: {svg}"))
 }
 
-fn number(node: &Node, name: &str) -> f64 {
+pub fn number(node: &Node, name: &str) -> f64 {
     node.attribute(name).and_then(|value| value.parse().ok()).unwrap_or_else(|| panic!("no {name}"))
 }
 
 /// The points of the runs of a path.
-fn runs(path: &Node) -> Vec<Vec<[f64; 2]>> {
+pub fn runs(path: &Node) -> Vec<Vec<[f64; 2]>> {
     let data = path.attribute("d").expect("a path has data");
     let point = |text: &str| {
         let (x, y) = text.split_once(' ').expect("two coordinates");

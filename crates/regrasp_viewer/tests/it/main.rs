@@ -10,3 +10,4 @@ mod sample;
 mod scene;
 mod storyboard;
 mod tessellation;
+mod tracking;

@@ -4,7 +4,7 @@ use crate::places::{repository, shared_models};
 use regrasp_base::Budget;
 use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, Report, check};
-use regrasp_planners::{InHandSettings, plan_in_hand};
+use regrasp_planners::{PlannerSettings, plan};
 use regrasp_robot::import::LoadOptions;
 use regrasp_scene::{InHandQuery, LoadedScene, load_scene};
 use regrasp_viewer::story::{Outcome, Story, Telling, tell};
@@ -30,7 +30,7 @@ impl Sample {
         let loaded = load_scene(&repository().join(scene), &options).unwrap_or_else(|error| panic!("{error}"));
         let query = loaded.task.query(0);
         let budget = Budget::work(5_000_000);
-        let plan = plan_in_hand(&loaded.scene, &query, &InHandSettings::default(), 0, &budget, &|_| {})
+        let plan = plan(&loaded.scene, &query, &PlannerSettings::default(), 0, &budget, &|_| {})
             .unwrap_or_else(|failure| panic!("{failure}"));
         let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
         assert!(report.accepted(), "{:?}", report.violations);
@@ -40,6 +40,11 @@ impl Sample {
     /// The sphere in the wide hand.
     pub fn sphere() -> Self {
         Sample::new("scenes/sphere_90x.toml", LoadOptions::default())
+    }
+
+    /// The football, turned by tracking.
+    pub fn football() -> Self {
+        Sample::new("scenes/football.toml", LoadOptions::default())
     }
 
     pub fn story(&self) -> Story {

@@ -18,7 +18,11 @@ export class ChartStack {
 
   constructor(story: Story, private readonly motion: Motion, private readonly player: Player, theme: Theme) {
     const specs: ChartSpec[] = [gaitChart(story, motion)];
-    if (story.judged) specs.push(marginChart(story, motion), clearanceChart(story, motion));
+    if (story.judged) {
+      // What slides closes nothing: a plan of tracking alone has no margin at all.
+      if (!motion.isTracking || story.judged.margin.some((margin) => margin !== null)) specs.push(marginChart(story, motion));
+      specs.push(clearanceChart(story, motion));
+    }
     if (jointGroups(story).length > 0) specs.push(jointChart(story, motion, () => this.draw()));
     if (motion.hasForces) specs.push(forceChart(story, motion));
     this.charts = specs.map((spec) => new Chart(spec, motion, theme));

@@ -16,7 +16,7 @@ const HELP: [string[], string][] = [
   [["Space"], "Play, pause"],
   [["\u2190", "\u2192"], "Back, forward 0.1 s (with Shift 1 s)"],
   [[",", "."], "Previous, next waypoint"],
-  [["[", "]"], "Previous, next relocation"],
+  [["[", "]"], "Previous, next relocation (in tracking, change of the moving finger)"],
   [["Home", "End"], "Start, end"],
   [["<", ">"], "Slower, faster"],
   [["R"], "Repeat"],

@@ -39,12 +39,15 @@ export function figures(story: Story, motion: Motion, seek: (time: number) => vo
     return link;
   };
   const relocations = motion.stretches.filter((s) => s.kind === "regrasp").length;
-  put("Relocations", String(relocations), "", `${motion.stretches.length - relocations} transfers`);
+  if (story.plan.promises.tracking) {
+    const { transfers, samples, nodes } = story.plan.statistics;
+    put("Sub-goals on the path", String(transfers), "", `${samples} tried, ${nodes} cells seen${relocations ? `, ${relocations} relocations` : ""}`);
+  } else put("Relocations", String(relocations), "", `${motion.stretches.length - relocations} transfers`);
   put("Duration", (motion.end - motion.start).toFixed(1), "s", `${motion.waypoints.length} waypoints`);
   if (story.judged) {
     const { margin, clearance, required_margin, pair, pairs } = story.judged;
     const i = indexOfLeast(margin);
-    if (i < 0) put("Closure margin", "\u2013", "", "not judged");
+    if (i < 0) put("Closure margin", "\u2013", "", motion.isTracking ? "what slides closes nothing" : "not judged");
     else put("Closure margin", margin[i]!.toFixed(4), "", `required ${required_margin}`, go(i));
     const k = indexOfLeast(clearance);
     if (k < 0) put("Clearance", "\u2013", "", "not judged");

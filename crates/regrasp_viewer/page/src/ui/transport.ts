@@ -1,4 +1,4 @@
-// Play, scrub, speed, relocations; the strip above the scrubber shows which finger relocates when.
+// Play, scrub, speed, relocations; the strip above the scrubber shows which finger relocates, or moves in tracking, when.
 
 import { button, el, icon } from "../dom";
 import type { Motion } from "../motion";
@@ -23,6 +23,7 @@ export class Transport {
     this.repeat = button(icon("repeat"), "Repeat", () => player.setRepeats(!player.repeats), "button quiet repeat");
     this.speed = el("select", { "aria-label": "Speed", class: "speed" }, ...SPEEDS.map((s) => el("option", { value: s, selected: s === 1 }, `${s}\u00d7`)));
     this.speed.addEventListener("change", () => player.setSpeed(Number(this.speed.value)));
+    const what = motion.isTracking ? "change of the moving finger" : "relocation";
     this.element = el(
       "div",
       { class: "transport", role: "group", "aria-label": "Playback" },
@@ -30,9 +31,9 @@ export class Transport {
       el(
         "div",
         { class: "buttons" },
-        button(icon("previous"), "Previous relocation", () => step(player, motion, -1), "button quiet"),
+        button(icon("previous"), `Previous ${what}`, () => step(player, motion, -1), "button quiet"),
         this.play,
-        button(icon("next"), "Next relocation", () => step(player, motion, 1), "button quiet"),
+        button(icon("next"), `Next ${what}`, () => step(player, motion, 1), "button quiet"),
         this.clock,
         el("span", { class: "gap" }),
         this.repeat,
@@ -77,9 +78,9 @@ export class Transport {
     context.fillStyle = this.theme.colours.line;
     context.fillRect(x(this.motion.start), 2, width - thumb, 2);
     for (const stretch of this.motion.stretches) {
-      if (stretch.kind !== "regrasp") continue;
+      if (stretch.kind === "transfer") continue;
       context.fillStyle = fingerColour(stretch.moving);
-      context.fillRect(x(stretch.start), 0, Math.max(2, x(stretch.end) - x(stretch.start)), 6);
+      context.fillRect(x(stretch.start), 0, Math.max(stretch.kind === "regrasp" ? 2 : 0.5, x(stretch.end) - x(stretch.start)), 6);
     }
   }
 }

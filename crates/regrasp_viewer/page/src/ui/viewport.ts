@@ -18,7 +18,7 @@ const LAYERS: [Layer, string][] = [
   ["obstacles", "Obstacles"],
 ];
 
-const STATES = { fixed: "holds", rolling: "rolls", moving: "moves", free: "free" } as const;
+const STATES = { fixed: "holds", rolling: "rolls", sliding: "slides", moving: "moves", free: "free" } as const;
 
 export class Viewport {
   readonly element: HTMLElement;
@@ -127,11 +127,17 @@ export class Viewport {
     if (!stretch) return;
     const same = motion.stretches.filter((s) => s.kind === stretch.kind);
     const number = `${same.indexOf(stretch) + 1} of ${same.length}`;
-    const name = story.scene.fingers[stretch.moving]?.name;
-    setText(this.caption, stretch.kind === "regrasp" ? `Relocation ${number}${name ? `: ${name} moves` : ""}` : `Transfer ${number}`);
+    const [name, under] = [stretch.moving, stretch.rolling].map((finger) => story.scene.fingers[finger]?.name);
+    const said = {
+      transfer: `Transfer ${number}`,
+      regrasp: `Relocation ${number}${name ? `: ${name} moves` : ""}`,
+      tracking: `${name} moves (dark rim), the object rolls on ${under} (grey rim)`,
+    };
+    setText(this.caption, said[stretch.kind]);
     motion.contacts(time).forEach((contact, i) => {
       const moves = contact.mode === "free" && stretch.moving === i;
-      setText(this.states[i], STATES[moves ? "moving" : contact.mode]);
+      const role = stretch.kind !== "tracking" ? "" : stretch.moving === i ? ", moving finger" : stretch.rolling === i ? ", object on it" : "";
+      setText(this.states[i], STATES[moves ? "moving" : contact.mode] + role);
       this.states[i].parentElement!.classList.toggle("away", contact.mode === "free");
     });
   }

@@ -53,6 +53,7 @@ export class Contacts {
   readonly trace: Group;
   private readonly discs: Part[];
   private readonly rings: Part[];
+  private readonly brokenRings: Part[];
   private readonly normals: Part;
   private readonly cones: Part[];
   private readonly shafts: Part[];
@@ -69,12 +70,14 @@ export class Contacts {
     this.forceReach = 1.3 * objectSize;
     this.discs = seenThrough(new CircleGeometry(size, 20).translate(0, 0, size * 0.06), n);
     this.rings = seenThrough(new RingGeometry(size * 0.55, size * 1.15, 24).translate(0, 0, size * 0.06), n);
+    const arc = (from: number) => new RingGeometry(size * 0.55, size * 1.15, 8, 1, from, Math.PI / 3).translate(0, 0, size * 0.06);
+    this.brokenRings = seenThrough(mergeGeometries([0, 1, 2].map((k) => arc((k * 2 * Math.PI) / 3)))!, n);
     this.normals = new Part(new CylinderGeometry(size * 0.12, size * 0.12, reach, 6, 1, true).rotateX(Math.PI / 2).translate(0, 0, reach / 2), n, {});
     const veil = { transparent: true, depthWrite: false, vertexColors: true };
     this.cones = [new Part(coneGeometry(reach, Math.max(scene.friction, 1e-3)), n, veil, 2)];
     this.shafts = seenThrough(new CylinderGeometry(size * 0.24, size * 0.24, 1, 8, 1, true).translate(0, -0.5, 0), n);
     this.heads = seenThrough(new ConeGeometry(size * 0.7, size * 1.6, 12).translate(0, -size * 0.8, 0), n);
-    for (const part of [...this.discs, ...this.rings, this.normals, ...this.cones, ...this.shafts, ...this.heads]) this.current.add(part.mesh);
+    for (const part of [...this.discs, ...this.rings, ...this.brokenRings, this.normals, ...this.cones, ...this.shafts, ...this.heads]) this.current.add(part.mesh);
     this.trace = traceOf(motion, objectSize);
   }
 
@@ -88,15 +91,17 @@ export class Contacts {
   }
 
   show(time: number): void {
-    let [fixed, rolling] = [false, false];
+    let [fixed, rolling, sliding] = [false, false, false];
     this.motion.contacts(time).forEach(({ mode, point, normal, force }, i) => {
       const at = new Vector3(...point);
       const turned = new Quaternion().setFromUnitVectors(Z, new Vector3(...normal));
       const here = mode === "free" ? null : new Matrix4().compose(at, turned, new Vector3(1, 1, 1));
       fixed ||= mode === "fixed";
       rolling ||= mode === "rolling";
+      sliding ||= mode === "sliding";
       for (const part of this.discs) part.put(i, mode === "fixed" ? here : null);
       for (const part of this.rings) part.put(i, mode === "rolling" ? here : null);
+      for (const part of this.brokenRings) part.put(i, mode === "sliding" ? here : null);
       this.normals.put(i, here);
       for (const part of this.cones) part.put(i, here);
       const length = force && this.largestForce > 0 ? (norm(force) / this.largestForce) * this.forceReach : 0;
@@ -106,12 +111,13 @@ export class Contacts {
     });
     for (const part of this.discs) part.mesh.visible = fixed;
     for (const part of this.rings) part.mesh.visible = rolling;
+    for (const part of this.brokenRings) part.mesh.visible = sliding;
   }
 }
 
 const MOST_ARCS = 200;
 
-/** Placements as dots, rolling as ribbons, relocations as dotted arcs from contact to contact. */
+/** Placements as dots, rolling and sliding as ribbons, relocations as dotted arcs from contact to contact. */
 function traceOf(motion: Motion, size: number): Group {
   const trace = new Group();
   const width = 0.022 * size;

@@ -1,8 +1,8 @@
 // The 3-D view. It draws when something changed, never on its own.
 
 import {
-  Box3, Color, CustomBlending, DirectionalLight, EdgesGeometry, Group, HemisphereLight, LineBasicMaterial, LineSegments, MathUtils, Mesh,
-  MeshLambertMaterial, NoToneMapping, OneFactor, OneMinusSrcAlphaFactor, PerspectiveCamera, Quaternion, Raycaster, Scene, Sphere, SrcAlphaFactor, Vector2, Vector3, WebGLRenderer, type BufferGeometry, type Material,
+  BackSide, Box3, Color, CustomBlending, DirectionalLight, EdgesGeometry, Group, HemisphereLight, LineBasicMaterial, LineSegments, MathUtils, Mesh, MeshBasicMaterial,
+  MeshLambertMaterial, NoToneMapping, OneFactor, OneMinusSrcAlphaFactor, PerspectiveCamera, Quaternion, Raycaster, Scene, Sphere, SphereGeometry, SrcAlphaFactor, Vector2, Vector3, WebGLRenderer, type BufferGeometry, type Material,
   type MeshLambertMaterialParameters,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
@@ -35,6 +35,8 @@ export class Stage {
   private readonly obstacles = new Group();
   private readonly contacts: Contacts;
   private readonly ghosts: Ghost[] = [];
+  /** In tracking, around every fingertip: dark on the moving finger, grey on the one that the object rolls on. */
+  private readonly rims: Mesh[] = [];
   private readonly shapes: { mesh: Mesh; role: PieceStory["role"]; name: string }[] = [];
   private readonly handMaterials: MeshLambertMaterial[] = [];
   private readonly hasVisual: boolean;
@@ -87,6 +89,7 @@ export class Stage {
     const size = body ? Math.max(...body.half.toArray()) : 0.03;
     this.contacts = new Contacts(story.scene, motion, size, largestForce(motion));
     this.object.add(this.contacts.current, this.contacts.trace);
+    if (motion.isTracking) this.addRims();
     this.addLights(this.scene);
     if (body) this.addGhosts(body.geometry, body.middle, body.half);
     this.setTime(motion.start);
@@ -126,6 +129,25 @@ export class Stage {
       this.shapes.push({ mesh, role, name: pieces[0].name });
     }
     return body;
+  }
+
+  /** Shells around the tips of which only the far side is drawn: what shows beyond the tip is its outline. */
+  private addRims(): void {
+    for (const finger of this.story.scene.fingers) {
+      const rim = new Mesh(new SphereGeometry(1.13 * finger.tip_radius, 32, 20), new MeshBasicMaterial({ side: BackSide }));
+      rim.position.set(...finger.tip_center_in_link);
+      rim.visible = false;
+      (this.links[finger.tip_link] ?? this.scene).add(rim);
+      this.rims.push(rim);
+    }
+  }
+
+  private showRims(time: number): void {
+    const stretch = this.motion.stretches[this.motion.stretchAt(time)];
+    this.rims.forEach((rim, finger) => {
+      rim.visible = finger === stretch?.moving || finger === stretch?.rolling;
+      (rim.material as MeshBasicMaterial).color.set(finger === stretch?.moving ? this.theme.colours.ink : this.theme.colours.muted);
+    });
   }
 
   private linkMaterial(finger: number, isTip: boolean): MeshLambertMaterial {
@@ -257,6 +279,7 @@ export class Stage {
     const now = this.motion.object(time);
     place(this.object, now);
     this.contacts.show(time);
+    this.showRims(time);
     for (const { group, pose } of this.ghosts) {
       const near = norm(sub(pose.position, now.position)) < 5e-4 && norm(rotationBetween(pose.quat, now.quat)) < 0.02;
       group.visible = this.layers.ghosts && !near;
