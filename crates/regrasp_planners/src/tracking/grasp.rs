@@ -23,6 +23,8 @@ pub struct TrackingGrasp {
     pub world_from_link: PerFinger<Placement>,
     /// Where the tips touch, in the object frame.
     pub touches: PerFinger<Touch>,
+    /// Angle by which the moving tip was turned aside half-way to here, where the step was long.
+    pub bent: f64,
 }
 
 impl TrackingGrasp {
@@ -36,7 +38,7 @@ impl TrackingGrasp {
             world_from_link.push(link);
             touches.push(Touch::of(&model.scene.object.surface, &center)?);
         }
-        Some(TrackingGrasp { world_from_object, joints: state.joints.clone(), world_from_link, touches })
+        Some(TrackingGrasp { world_from_object, joints: state.joints.clone(), world_from_link, touches, bent: 0.0 })
     }
 
     /// Contacts of all fingers.

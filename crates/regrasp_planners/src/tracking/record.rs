@@ -18,7 +18,10 @@ pub fn settings_of(settings: &TrackingSettings) -> serde_json::Value {
     serde_json::to_value(settings).unwrap_or_default()
 }
 
-/// Steps in a row with the same roles and modes, as one segment from `start`.
+/// Turn aside, half-way in long steps, that a segment adds up: there and back it twists by twice as much, and checkers allow 2e-3.
+const MOST_BENT: f64 = 5e-4;
+
+/// Steps in a row with the same roles, modes and times, as one segment from `start`.
 struct Stretch<'s> {
     start: &'s TrackingGrasp,
     steps: Vec<&'s Step>,
@@ -73,11 +76,17 @@ pub fn record(
 fn stretches<'s>(start: &'s TrackingGrasp, steps: &[&'s Step]) -> Vec<Stretch<'s>> {
     let mut stretches: Vec<Stretch> = Vec::new();
     let mut here = start;
+    let mut bent = 0.0;
     for step in steps {
+        bent += step.end.bent;
         let goes_on = stretches.last().and_then(|stretch| stretch.steps.last()).is_some_and(|last| {
-            last.roles == step.roles && last.relative.iter().zip(&step.relative).all(|(a, b)| a.mode == b.mode)
+            bent <= MOST_BENT
+                && last.roles == step.roles
+                && last.seconds == step.seconds
+                && last.relative.iter().zip(&step.relative).all(|(a, b)| a.mode == b.mode)
         });
         if !goes_on {
+            bent = step.end.bent;
             stretches.push(Stretch { start: here, steps: Vec::new() });
         }
         if let Some(stretch) = stretches.last_mut() {

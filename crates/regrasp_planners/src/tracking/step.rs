@@ -24,9 +24,8 @@ const UNTWISTINGS: usize = 3;
 /// A fingertip that slides slower than this, in metres per second, neither slides nor rolls for sure: friction has no direction.
 const SLOWEST: f64 = 1e-4;
 
-/// Joints go straight from step to step: half-way the tip of a long step may be turned aside by this angle. A hundred such steps twist
-/// by less than checkers allow in a segment (2e-3).
-const MOST_BENT: f64 = 1e-5;
+/// Joints go straight from step to step: half-way the tip of a long step may be turned aside by this angle.
+const MOST_BENT: f64 = 2e-4;
 
 /// Work of a step, in the unit of in-hand planning: a configuration looked at. By measurement, some 50 against 2 microseconds.
 pub const STEP_WORK: u64 = 25;
@@ -154,6 +153,7 @@ impl<'m, 'a> Stepper<'m, 'a> {
             }
         };
         let mut end = grasp.clone();
+        end.bent = 0.0;
         end.world_from_object = object;
         for (&finger, touch) in resting.iter().zip(&rest_touches) {
             end.touches[finger] = *touch;
@@ -206,7 +206,8 @@ impl<'m, 'a> Stepper<'m, 'a> {
                 let from = &grasp.world_from_link[moving].rotation;
                 let whole = turn_between(from, &link.rotation);
                 let half = turn_between(from, &chain.last_frame(&middle).rotation);
-                if (half - 0.5 * whole).norm() > MOST_BENT {
+                end.bent = (half - 0.5 * whole).norm();
+                if end.bent > MOST_BENT {
                     return Err(NoStep::TooLong);
                 }
             }
