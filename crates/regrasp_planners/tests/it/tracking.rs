@@ -90,7 +90,7 @@ fn every_scenario_is_solved_as_its_settings_say() {
 fn with_exact_cones_forces_obey_the_same_laws_and_plans_keep_a_friction_margin() {
     let loaded = scene("football.toml");
     let query = loaded.task.query(0);
-    for (seed, friction_margin, least) in [(0, 1.0, 0.0), (1, 1.3, 0.5)] {
+    for (seed, friction_margin, least) in [(0, 1.0, 0.0), (0, 1.2, 0.0)] {
         let mut settings = TrackingSettings { cones: Cones::Exact, ..TrackingSettings::default() };
         settings.in_hand.friction_margin = friction_margin;
         settings.in_hand.forces.as_mut().unwrap().normal_force[0] = least;
