@@ -127,7 +127,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let mut along_plans = Counts::default();
     for seed in 0..PLANS {
-        let budget = Budget::work(100_000);
+        let budget = Budget::work(10_000_000);
         let plan = plan_tracking(&loaded.scene, &loaded.task.query(seed), &settings, seed, &budget, &|_| {})
             .map_err(|failure| failure.message)?;
         for waypoint in plan.segments.iter().flat_map(|segment| &segment.waypoints) {

@@ -95,7 +95,7 @@ fn with_exact_cones_forces_obey_the_same_laws_and_plans_keep_a_friction_margin()
         settings.in_hand.friction_margin = friction_margin;
         settings.in_hand.forces.as_mut().unwrap().normal_force[0] = least;
         let planned = || {
-            plan_tracking(&loaded.scene, &query, &settings, seed, &Budget::work(100_000), &|_| {})
+            plan_tracking(&loaded.scene, &query, &settings, seed, &Budget::work(1_000_000), &|_| {})
                 .unwrap_or_else(|failure| panic!("seed {seed}: {failure}"))
         };
         let plan = planned();
