@@ -38,7 +38,7 @@ PLAIN := --settings docs/benchmarks/plain.json
 ALLEGRO_BENCH = $(PACKAGES) --time-limit 20 --threads 1 --seeds $(ALLEGRO_SEEDS)
 SOFT_BENCH = $(PACKAGES) --time-limit 6 --threads 1 --seeds $(ALLEGRO_SEEDS)
 
-.PHONY: all demo gallery test replay test-rust test-python test-page page python bench paper003 growth benchmark-page campaign fuzz docs release $(ROADMAPS)
+.PHONY: all demo gallery test replay replay-tracking test-rust test-python test-page page python bench paper003 growth benchmark-page campaign fuzz docs release $(ROADMAPS)
 
 all: release
 
@@ -176,6 +176,16 @@ replay: python
 	$(SIMULATE) $(REPLAY) --gravity down --mass-scale 0.5,1,1.5 --seeds $(CONTROL_SEEDS) -o $(OUT)/replay --name mass
 	$(SIMULATE) $(REPLAY) --gravity down --speed 1,2 --seeds $(CONTROL_SEEDS) -o $(OUT)/replay --name speed
 	cp $(OUT)/replay/*.csv $(OUT)/replay/*.md docs/benchmarks/replay/
+
+# Replays of 20 plans of tracking: as the paper has them, and with exact cones, a friction margin and normal forces from 0.5 to
+# 20 N. Some half an hour. Writes docs/benchmarks/replay.
+TRACKING_SEEDS ?= 20
+replay-tracking: python
+	[ -d $(VENV) ] || { echo "error: replays need the Python package (see above)" >&2; exit 1; }
+	mkdir -p $(OUT)/replay-tracking $(OUT)/replay-tracking-paper docs/benchmarks/replay
+	$(SIMULATE) scenes/football.toml --gravity plan --controllers B,H --seeds $(TRACKING_SEEDS) -o $(OUT)/replay-tracking-paper --name tracking_paper
+	$(SIMULATE) scenes/football.toml --gravity plan --controllers B,C2,H --settings docs/benchmarks/tracking_replay.json --seeds $(TRACKING_SEEDS) -o $(OUT)/replay-tracking --name tracking
+	cp $(OUT)/replay-tracking*/*.csv $(OUT)/replay-tracking*/*.md docs/benchmarks/replay/
 
 # Slow: same bytes on 1, 2 and 8 threads (100 queries), and the checker against broken and good plans; torsion and couplings
 # are broken in plans for real hands.

@@ -23,7 +23,15 @@ impl Set {
     /// With `more` newtons along x.
     fn problem(&self, more: f64) -> ForceProblem<'_> {
         let load = Wrench::at_center_of_mass(self.weight + Vector::new(more, 0.0, 0.0));
-        ForceProblem { grips: &self.grips, joints: &self.joints, reserves: &[], frame: &FRAME, load, limits: LIMITS }
+        ForceProblem {
+            grips: &self.grips,
+            joints: &self.joints,
+            reserves: &[],
+            rubbing: &[],
+            frame: &FRAME,
+            load,
+            limits: LIMITS,
+        }
     }
 }
 

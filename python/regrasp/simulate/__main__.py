@@ -113,9 +113,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--mjcf", type=Path, metavar="FILE", help="model to use, as written by regrasp export --mjcf")
     parser.add_argument(
         "--controller",
-        choices=("A", "B", "C2"),
+        choices=("A", "B", "C2", "H"),
         default="B",
-        help="A squeezes by position, B feeds forces forward, C2 is B with feedback of the object's pose [default: B]",
+        help="A squeezes by position, B feeds forces forward, C2 is B with feedback of the object's pose, "
+        "H is C2 that gives along the normal, for tracking [default: B]",
     )
     parser.add_argument("--feedback", action="store_const", const="C2", dest="controller", help="the same as --controller C2")
     parser.add_argument(

@@ -30,8 +30,11 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "no-rolling": {"transfer": "fixed"},
     "no-margin": {"friction_margin": 1.0},
 }
-GRAVITIES = ("up", "down", "side")
-CONTROLLERS = ("A", "B", "C2")
+#: Where the palm faces; ``plan``: gravity as scene and settings have it.
+GRAVITIES = ("up", "down", "side", "plan")
+CONTROLLERS = ("A", "B", "C2", "H")
+#: Controllers that hold the start grasp in a way of their own: their static holds are measured apart.
+HOLD_APART = ("A", "H")
 #: Drift of a static hold beyond which the object has fallen, in millimetres.
 FALLEN_MM = 50.0
 
@@ -113,10 +116,9 @@ def _replay(job: Job, controllers: Sequence[str]) -> None:
                 noslip=job.noslip,
             )
             xml = regrasp.export_mjcf(plan, scene)
-            # Controller A holds in a way of its own; the others start alike.
-            known = None if controller == "A" else drift
+            known = None if controller in HOLD_APART else drift
             report = simulate(json.loads(plan.to_json()), xml, settings, drift=known).report
-            drift = drift if controller == "A" else report.drift
+            drift = drift if controller in HOLD_APART else report.drift
             assert report.drift is not None
             lost, touched, dropped = report.lost_contacts, report.unplanned_contacts, report.dropped
             row |= {
@@ -151,7 +153,9 @@ def _plan(job: Job, scene: Any) -> tuple[Any, str]:
     failed = job.plan_path.with_suffix(".failed")
     if failed.exists():
         return None, failed.read_text()
-    settings = {**json.loads(job.settings), **VARIANTS[job.variant], "gravity": _down(job, scene)}
+    settings = {**json.loads(job.settings), **VARIANTS[job.variant]}
+    if job.gravity != "plan":
+        settings["gravity"] = _down(job, scene)
     found = regrasp.plan(scene, seed=job.seed, settings=settings, time_limit=job.time_limit)
     job.plan_path.parent.mkdir(parents=True, exist_ok=True)
     if isinstance(found, regrasp.Plan):
@@ -327,7 +331,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--name", default="campaign", help="name of the tables [default: campaign]")
     parser.add_argument("--seeds", type=int, default=10, help="plans per scene and direction [default: 10]")
     parser.add_argument("--first-seed", type=int, default=0)
-    parser.add_argument("--gravity", type=words(GRAVITIES), default=list(GRAVITIES), help="[default: up,down,side]")
+    parser.add_argument("--gravity", type=words(GRAVITIES), default=["up", "down", "side"], help="of up, down, side, plan [default: up,down,side]")
     parser.add_argument("--controllers", type=words(CONTROLLERS), default=["B", "C2"], help="[default: B,C2]")
     parser.add_argument("--variants", type=words(tuple(VARIANTS)), default=["default"], help=f"of {', '.join(VARIANTS)}")
     parser.add_argument("--friction-scale", type=scales, default=[1.0])

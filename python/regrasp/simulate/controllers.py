@@ -16,12 +16,15 @@ LARGEST_OFFSET = 0.01
 LARGEST_RELIEF = 0.5
 #: Speed at which a tip that retreated too far comes back, in metres per second.
 RETURN_SPEED = 0.005
+#: Controller H: share of a tip's stiffness along the normal that is taken away. A tip that slides, or stands where the object
+#: slides over it, must press as planned wherever the object is (hybrid control: Raibert, Craig 1981).
+NORMAL_GIVE = 0.9
 #: Time in which a free finger takes up the error of the object, in seconds.
 FREE_FOLLOW_TIME = 0.05
 
 
 class Controller:
-    """Commands of a replay: computed in advance for A and B, corrected at every tick for C2."""
+    """Commands of a replay: computed in advance for A and B, corrected at every tick for C2 and H."""
 
     def __init__(self, rig: Rig, ref: Reference, settings: Settings) -> None:
         jacobians, contacts = contact_jacobians(rig)
@@ -39,12 +42,15 @@ class Controller:
         """Commands without torques, at every tick."""
         self.commands = self.servo + self.torques
         """Commands at every tick."""
-        self.has_feedback = settings.controller == "C2"
+        self.has_feedback = settings.controller in ("C2", "H")
 
     def feedback(self, rig: Rig, ref: Reference, settings: Settings) -> Feedback:
         """A fresh feedback loop over these commands."""
         retreats = _largest_retreats(rig, self._jacobians)
-        return Feedback(rig, ref, settings, self.commands, self._inverses, self._contacts, retreats)
+        feedback = Feedback(rig, ref, settings, self.commands, self._inverses, self._contacts, retreats)
+        if settings.controller == "H":
+            feedback.give(NORMAL_GIVE, rig, self._jacobians)
+        return feedback
 
 
 class Feedback:
@@ -53,6 +59,8 @@ class Feedback:
     A pressing finger's offset grows by gain * (displacement that its contact lacks). A free finger takes up the
     displacement of the real object from the planned one, so that it lands where it should on the real object; offsets are
     continuous over landing and lifting. A pressing finger retreats from the object no farther than `LARGEST_RELIEF` allows.
+
+    H: beside that, targets of pressing tips follow the tips along the normal by the share `give`.
     """
 
     def __init__(
@@ -77,8 +85,20 @@ class Feedback:
         self._gain = pressing * (settings.feedback_gain * settings.tick) - self._leak
         self._return = RETURN_SPEED * settings.tick
         self._offsets = np.zeros((len(rig.fingers), 3))
+        self._give = 0.0
+        self._jacobians = np.zeros(0)
+        self._joint_qpos = np.zeros(0, dtype=np.int64)
+        self._pressing = ref.presses.astype(np.float64)
         self._position = slice(rig.object_qpos, rig.object_qpos + 3)
         self._quat = slice(rig.object_qpos + 3, rig.object_qpos + 7)
+
+    def give(self, share: float, rig: Rig, jacobians: Array) -> None:
+        """Takes ``share`` of the stiffness along the normal from pressing tips."""
+        self._give = share
+        self._jacobians = jacobians
+        model = rig.model
+        joints = [model.jnt_qposadr[model.joint(name).id] for name in rig.plan["joint_names"]]
+        self._joint_qpos = np.array(joints, dtype=np.int64)
 
     def command(self, k: int, qpos: Array) -> Array:
         """The command at tick ``k``, with the object where ``qpos`` has it."""
@@ -98,6 +118,10 @@ class Feedback:
         np.maximum(-LARGEST_OFFSET, np.minimum(LARGEST_OFFSET, offsets + change), out=offsets)
         too_far = (offsets * normals).sum(axis=1) - limits
         offsets -= np.maximum(too_far, 0.0)[:, None] * normals
+        if self._give > 0.0:
+            moved = self._jacobians[ref.waypoint[k]] @ (qpos[self._joint_qpos] - ref.joints[k])
+            given = self._give * self._pressing[k] * ((moved - offsets) * normals).sum(axis=1)
+            return self._commands[k] + self._inverse[ref.waypoint[k]] @ (offsets + given[:, None] * normals).ravel()
         return self._commands[k] + self._inverse[ref.waypoint[k]] @ offsets.ravel()
 
 

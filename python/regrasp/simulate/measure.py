@@ -168,8 +168,9 @@ def _dropped(rig: Rig, ref: Reference, ticks: NDArray[np.int64], at: int, forces
 def _slip(
     rig: Rig, ref: Reference, track: Track, ticks: NDArray[np.int64], forces: Array
 ) -> list[list[float | None]]:
-    """Sliding of tips over the object: the relative velocity at the contact, across the normal, integrated in the object
-    frame; the farthest from where the segment began. Rolling without slipping gives zero."""
+    """Sliding of tips over the object that is not planned: the relative velocity at the contact, across the normal, less that of
+    the plan, integrated in the object frame; the farthest from where the segment began. Rolling without slipping gives
+    zero, and so does sliding in tracking as the plan has it."""
     n = len(ticks)
     turn = rotation_matrices(track.object_quat_wxyz[:n])
     origin = track.object_position[:n]
@@ -192,12 +193,33 @@ def _slip(
         length = np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
         normal = normal / length
         across = relative - np.einsum("ki,ki->k", relative, normal)[:, None] * normal
+        across -= planned_sliding(rig, ref, f)[ticks]
         across[~touches] = 0.0
         for s in np.unique(segments[touches]):
             during = segments == s
             path = np.cumsum(across[during], axis=0) * ref.tick
             out[int(s)][f] = float(np.linalg.norm(path, axis=1).max())
     return out
+
+
+def planned_sliding(rig: Rig, ref: Reference, finger: int) -> Array:
+    """Velocity of a fingertip over the object that the plan has at every tick, in the object frame: its mean over a step goes
+    with the parameter of the motion."""
+    points = waypoints_of(rig.plan)
+    still = (0.0, 0.0, 0.0)
+    mean = np.array([point["contacts"][finger].get("relative_velocity_in_object") or still for point in points])
+    times = np.array([point["time"] for point in points])
+    # Between segments everything rests; after the last waypoint nothing is.
+    step = np.append(np.diff(times), 0.0)[:, None] * mean
+    index = np.repeat(np.arange(len(rig.plan["segments"])), [len(s["waypoints"]) for s in rig.plan["segments"]])
+    step[np.append(np.diff(index) > 0, True)] = 0.0
+    rate = np.diff(ref.fraction, append=ref.fraction[-1:])
+    # Where a tick passes a waypoint, the part on either side counts.
+    passes = np.diff(ref.waypoint, append=ref.waypoint[-1:]) > 0
+    moved = np.where(passes, 1.0 - ref.fraction, rate)[:, None] * step[ref.waypoint]
+    after = np.minimum(np.arange(1, ref.n_ticks + 1), ref.n_ticks - 1)
+    moved += np.where(passes, ref.fraction[after], 0.0)[:, None] * step[ref.waypoint[after]]
+    return moved / ref.tick
 
 
 def _unplanned(

@@ -16,6 +16,10 @@ REFERENCE_STIFFNESS = 5.0
 REFERENCE_DAMPING = 0.08
 #: Reach of the prototype's fingers, in metres.
 REFERENCE_REACH = 0.108
+#: Factor of stiffness and damping for controller H, which takes most of the stiffness along the normal away again. By hand.
+HYBRID_STIFFNESS = 10.0
+#: See `Settings.controller`.
+CONTROLLERS = ("A", "B", "C2", "H")
 #: Damping of inverse Jacobians, in metres per radian.
 INVERSE_DAMPING = 0.005
 
@@ -26,7 +30,8 @@ class Settings:
 
     controller: str = "B"
     """``A``: joint PD with targets pushed into the object, no forces. ``B``: joint PD on the plan with its joint torques and
-    velocities fed forward. ``C2``: ``B`` with slow feedback of the object's pose."""
+    velocities fed forward. ``C2``: ``B`` with slow feedback of the object's pose. ``H``: ``C2`` with stiffer tips that give along
+    the normal: for contacts that slide."""
     gravity: str | tuple[float, float, float] = "plan"
     """``plan``, ``up`` (the palm faces up), ``down``, ``side``, or a vector in the world in m/s^2."""
     friction_scale: float = 1.0
@@ -65,7 +70,10 @@ class FingerModel:
     joints: NDArray[np.int64]
     """Indices of its joints in the plan's ``joint_names``."""
     reach: float
-    """Distance from its first joint to the tip along the straight finger, in metres."""
+    """Distance from its first turning joint to the tip along the straight finger, in metres. To the surface of the tip where
+    joints slide: a free fingertip turns about its centre."""
+    slides: NDArray[np.bool_]
+    """Which of its joints slide."""
     touching: frozenset[int]
     """Geoms that touch the object when the finger holds."""
 
@@ -84,9 +92,9 @@ class Rig:
     pin: int
     """The equality that holds the object where it starts."""
     stiffness: Array
-    """Per joint of the plan, in N m/rad."""
+    """Per joint of the plan, in N m/rad; in N/m where it slides."""
     damping: Array
-    """Per joint of the plan, in N m s/rad."""
+    """Per joint of the plan, in N m s/rad; in N s/m where it slides."""
     drives: Array
     """Velocities of the model's degrees of freedom over those of the plan's joints; shape (nv, n_joints)."""
     palm_axis: Array
@@ -105,8 +113,8 @@ class Rig:
 
 def make_rig(xml: str, plan: Plan, settings: Settings) -> Rig:
     """The model in ``xml`` (see ``regrasp export --mjcf``) as ``settings`` want it. Raises ``PlanError``."""
-    if settings.controller not in ("A", "B", "C2"):
-        raise PlanError(f"no controller {settings.controller!r}; there are A, B and C2")
+    if settings.controller not in CONTROLLERS:
+        raise PlanError(f"no controller {settings.controller!r}; there are {', '.join(CONTROLLERS)}")
     if settings.controller != "A" and not waypoints_of(plan)[0].get("joint_torques"):
         raise PlanError("the plan has no forces; only controller A (a squeeze by position) can replay it")
     try:
@@ -121,7 +129,8 @@ def make_rig(xml: str, plan: Plan, settings: Settings) -> Rig:
     names: list[str] = plan["joint_names"]
     drives = _drives(model, names)
     fingers = [_finger(model, name, names) for name in plan["fingers"]]
-    stiffness, damping = _gains(fingers, len(names), settings.stiffness_scale)
+    scale = settings.stiffness_scale * (HYBRID_STIFFNESS if settings.controller == "H" else 1.0)
+    stiffness, damping = _gains(fingers, len(names), scale)
     _make_servos(model, names, stiffness, damping)
     palm_axis, side_axis = _palm_axes(model, fingers, object_body)
     sensors = [*plan["fingers"], "object"]
@@ -236,10 +245,10 @@ def _make_servos(model: MjModel, names: list[str], stiffness: Array, damping: Ar
 
 
 def _gains(fingers: list[FingerModel], n_joints: int, scale: float) -> tuple[Array, Array]:
-    """Stiffness and damping per joint: all tips are about as stiff as those of the prototype."""
+    """Stiffness and damping per joint: all tips are about as stiff as those of the prototype, whether joints turn or slide."""
     factor = np.ones(n_joints)
     for finger in fingers:
-        factor[finger.joints] = (finger.reach / REFERENCE_REACH) ** 2
+        factor[finger.joints] = np.where(finger.slides, 1.0, finger.reach**2) / REFERENCE_REACH**2
     return scale * REFERENCE_STIFFNESS * factor, scale * REFERENCE_DAMPING * factor
 
 
@@ -266,17 +275,28 @@ def _finger(model: MjModel, name: str, joint_names: list[str]) -> FingerModel:
         if object_geom in (a, b) and model.pair_dim[p] != 3:
             touching.update({a, b}.intersection(on_tip))
     joints: list[int] = []
-    reach = float(np.linalg.norm(site.pos))
+    sliding: list[int] = []
+    reach = 0.0
+    way = float(np.linalg.norm(site.pos))
     link = body
     while True:
-        carried = [int(model.body_jntadr[link]) + k for k in range(model.body_jntnum[link])]
-        joints += [joint_names.index(model.joint(k).name) for k in carried if model.joint(k).name in joint_names]
+        for k in range(int(model.body_jntadr[link]), int(model.body_jntadr[link] + model.body_jntnum[link])):
+            turns = model.jnt_type[k] == mujoco.mjtJoint.mjJNT_HINGE
+            reach = way if turns else reach
+            if model.joint(k).name in joint_names:
+                index = joint_names.index(model.joint(k).name)
+                joints.append(index)
+                sliding += [] if turns else [index]
         parent = int(model.body_parentid[link])
         if model.body_jntnum[parent] == 0:
             break
-        reach += float(np.linalg.norm(model.body_pos[link]))
+        way += float(np.linalg.norm(model.body_pos[link]))
         link = parent
-    return FingerModel(name, int(site.id), body, np.array(sorted(joints)), reach, frozenset(touching))
+    if sliding:
+        reach += max((float(model.geom_size[geom, 0]) for geom in touching), default=0.0)
+    joints.sort()
+    slides = np.isin(joints, sliding)
+    return FingerModel(name, int(site.id), body, np.array(joints), reach, slides, frozenset(touching))
 
 
 def _palm_axes(model: MjModel, fingers: list[FingerModel], object_body: int) -> tuple[Array, Array]:

@@ -23,6 +23,8 @@ pub type Forces<const D: usize> = ArrayVec<Coordinates<D>, MAX_GRIPS>;
 pub struct Block<const D: usize> {
     /// Wrench of a unit of each coordinate; zero for those that the contact does not transmit.
     pub map: [[f64; 6]; D],
+    /// What each coordinate should be.
+    pub wish: [f64; D],
     /// Slope of the cone; zero for contacts without friction, of which only the normal force is limited.
     pub friction: f64,
     /// What the cone is narrower by, in newtons.
@@ -50,7 +52,7 @@ pub enum Limit {
     Joint(usize),
 }
 
-/// Minimise `sum |f_t|^2 + weight (f_n - squeeze)^2` subject to `sum map f = balance` and all limits.
+/// Minimise `sum |f_t - wish_t|^2 + weight (f_n - wish_n)^2` subject to `sum map f = balance` and all limits.
 #[derive(Debug, Clone)]
 pub struct Program<const D: usize> {
     /// Contacts. Their maps are orthonormal row by row, but for the rows from `rank` on, which are zero.
@@ -59,9 +61,9 @@ pub struct Program<const D: usize> {
     pub balance: [f64; 6],
     /// Number of rows.
     rank: usize,
-    /// Normal force wished for.
+    /// Size of the forces: what the barrier and the band go by.
     pub squeeze: f64,
-    /// Weight of that wish.
+    /// Weight of the wish for normal forces.
     pub weight: f64,
 }
 
@@ -134,7 +136,12 @@ impl<const D: usize> Program<D> {
             step.push(&block.map, &hessian);
         }
         step.factor(self.rank);
-        let wish = self.blocks.iter().map(|_| unit(self.weight * self.squeeze)).collect();
+        let weighted = |block: &Block<D>| {
+            let mut wish = block.wish;
+            wish[0] *= self.weight;
+            wish
+        };
+        let wish = self.blocks.iter().map(weighted).collect();
         step.solve(&wish, &self.balance).0
     }
 
@@ -298,7 +305,8 @@ impl<const D: usize> Program<D> {
         let mut value = 0.0;
         for (block, f) in self.blocks.iter().zip(forces) {
             let across: f64 = f[1..].iter().map(|x| x * x).sum();
-            value += wish * (across + self.weight * (f[0] - self.squeeze) * (f[0] - self.squeeze));
+            let off: f64 = f[1..].iter().zip(&block.wish[1..]).map(|(x, wished)| (x - wished) * (x - wished)).sum();
+            value += wish * (off + self.weight * (f[0] - block.wish[0]) * (f[0] - block.wish[0]));
             // One logarithm of the product: factors are newtons, far from under- and overflow.
             let mut product = 1.0;
             let mut is_inside = true;
@@ -340,12 +348,6 @@ impl<const D: usize> Block<D> {
             tell(Limit::Joint(joint), limit - torque.abs());
         }
     }
-}
-
-fn unit<const D: usize>(normal: f64) -> Coordinates<D> {
-    let mut coordinates = [0.0; D];
-    coordinates[0] = normal;
-    coordinates
 }
 
 fn dot<const D: usize>(a: &Forces<D>, b: &Forces<D>) -> f64 {
@@ -425,8 +427,8 @@ impl<const D: usize> Point<D> {
             let mut mixed = [0.0; D];
             let mut hessian = [[0.0; D]; D];
             for i in 0..D {
-                let (weight, wished) = if i == 0 { (program.weight, program.squeeze) } else { (1.0, 0.0) };
-                descent[i] = -2.0 * wish * weight * (f[i] - wished);
+                let weight = if i == 0 { program.weight } else { 1.0 };
+                descent[i] = -2.0 * wish * weight * (f[i] - block.wish[i]);
                 hessian[i][i] = 2.0 * wish * weight + TINY;
             }
             for (slack, slope) in [(f[0] - block.least + give, 1.0), (block.largest - f[0] + give, -1.0)] {

@@ -8,6 +8,9 @@
 //! physics (replays in MuJoCo); Buss, Hashimoto, Moore, *Dextrous hand grasping force optimization*, IEEE T-RA 12 (1996),
 //! minimise over the same cones with the same kind of barrier.
 //!
+//! A fingertip that slides has friction of full size in a direction that is known: only its normal force is left open, and
+//! counts alone. Where forces across the normal are wished for, `|f_t - wish|^2` counts instead of `|f_t|^2`.
+//!
 //! Joint torques carry the contact forces only: fingers whose own weight counts need that on top.
 
 use super::barrier::{Block, Infeasible, Program};
@@ -77,6 +80,16 @@ pub struct Reserve {
     pub joints: ArrayVec<f64, MAX_ROWS>,
 }
 
+/// What the motion of a contact says about its force.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rubbing {
+    /// Friction on the object per newton of normal force where the fingertip slides: across the normal, opposite to the
+    /// velocity of the object over the fingertip, as long as the coefficient. None where it does not slide.
+    pub sliding: Option<Vector>,
+    /// Force wished for across the normal, in newtons. Of a fingertip that slides, its part along `sliding` counts.
+    pub wish: Vector,
+}
+
 /// Limits and wishes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ForceLimits {
@@ -99,6 +112,8 @@ pub struct ForceProblem<'a> {
     pub joints: &'a [JointRows],
     /// Room to be kept at each; may be empty.
     pub reserves: &'a [Reserve],
+    /// How each moves; empty where none does, and no force across the normal is wished for.
+    pub rubbing: &'a [Rubbing],
     /// Centre of mass, torque scale, friction counted on.
     pub frame: &'a GraspFrame,
     /// What the contacts have to balance.
@@ -161,11 +176,11 @@ fn distribute_in<const D: usize>(
     warm: Option<&[ContactForce]>,
 ) -> Result<BalancedForces, NoForces> {
     let start = warm.filter(|warm| warm.len() == problem.grips.len()).map(|warm| {
-        problem.grips.iter().zip(warm).map(|(grip, exerted)| coordinates::<D>(problem, grip, exerted)).collect()
+        warm.iter().enumerate().map(|(index, exerted)| coordinates::<D>(problem, index, exerted)).collect()
     });
     let solved = program::<D>(problem, Relaxed::default()).ok_or(NoForces::NotBalanced)?.minimum(start);
     let forces = solved.map_err(|infeasible| cause::<D>(problem, &infeasible))?;
-    Ok(problem.grips.iter().zip(&forces).map(|(grip, f)| exerted(problem.frame.friction, grip, f)).collect())
+    Ok(forces.iter().enumerate().map(|(index, f)| combined(&axes_at::<D>(problem, index), f)).collect())
 }
 
 /// Which limit would have to give: the kind whose absence leaves forces, weakest first.
@@ -212,10 +227,14 @@ fn program<const D: usize>(problem: &ForceProblem, relaxed: Relaxed) -> Option<P
     for (index, grip) in problem.grips.iter().enumerate() {
         let reserve = problem.reserves.get(index);
         let room = reserve.map_or(0.0, |reserve| reserve.normal);
-        let rubs = grip.model_at(frame.friction) != ContactModel::Frictionless;
+        let rubbing = problem.rubbing.get(index);
+        let slides = rubbing.is_some_and(|rubbing| rubbing.sliding.is_some());
+        let rubs = !slides && grip.model_at(frame.friction) != ContactModel::Frictionless;
         let friction = if rubs { frame.friction } else { 0.0 };
+        let axes = axes_at::<D>(problem, index);
         let mut block = Block {
             map: [[0.0; 6]; D],
+            wish: wish(problem, rubbing, &axes),
             friction,
             shift: friction * room + reserve.map_or(0.0, |reserve| reserve.tangential),
             least: if relaxed.least { room } else { limits.least + room },
@@ -224,7 +243,6 @@ fn program<const D: usize>(problem: &ForceProblem, relaxed: Relaxed) -> Option<P
             limits: ArrayVec::new(),
         };
         let arm = (grip.contact.point_in_object - frame.center_of_mass) / frame.torque_scale;
-        let axes = axes::<D>(problem.frame.friction, grip);
         for (column, axis) in block.map.iter_mut().zip(&axes) {
             let torque = arm.cross(&axis.force)
                 + grip.contact.normal_in_object.into_inner() * (axis.torsion / frame.torque_scale);
@@ -264,8 +282,41 @@ pub(super) fn axes<const D: usize>(friction: f64, grip: &Grip) -> [ContactForce;
     axes
 }
 
-fn coordinates<const D: usize>(problem: &ForceProblem, grip: &Grip, exerted: &ContactForce) -> [f64; D] {
-    axes::<D>(problem.frame.friction, grip).map(|axis| {
+/// The same for a contact of `problem`: one that slides has a single coordinate, its normal force.
+fn axes_at<const D: usize>(problem: &ForceProblem, index: usize) -> [ContactForce; D] {
+    let grip = &problem.grips[index];
+    match problem.rubbing.get(index).and_then(|rubbing| rubbing.sliding) {
+        None => axes(problem.frame.friction, grip),
+        Some(friction) => {
+            let mut axes = [ContactForce { force: Vector::zeros(), torsion: 0.0 }; D];
+            axes[0].force = friction - grip.contact.normal_in_object.into_inner();
+            axes
+        }
+    }
+}
+
+/// Coordinates wished for. Where a fingertip slides, force across the normal goes with the normal force: of
+/// `weight (f_n - squeeze)^2 - 2 f_t . wish` the minimum is wished for.
+fn wish<const D: usize>(problem: &ForceProblem, rubbing: Option<&Rubbing>, axes: &[ContactForce; D]) -> [f64; D] {
+    let mut wish = [0.0; D];
+    wish[0] = problem.limits.squeeze;
+    match rubbing {
+        None => {}
+        Some(Rubbing { sliding: Some(friction), wish: across }) => {
+            wish[0] += friction.dot(across) / problem.limits.squeeze_weight;
+        }
+        Some(Rubbing { sliding: None, wish: across }) => {
+            wish[1..].iter_mut().zip(&axes[1..]).for_each(|(wish, axis)| *wish = axis.force.dot(across));
+        }
+    }
+    wish
+}
+
+fn coordinates<const D: usize>(problem: &ForceProblem, index: usize, exerted: &ContactForce) -> [f64; D] {
+    let mut axes = axes_at::<D>(problem, index);
+    // That of the normal force is no unit vector where the fingertip slides.
+    axes[0].force = -problem.grips[index].contact.normal_in_object.into_inner();
+    axes.map(|axis| {
         let along_torsion = if axis.torsion > 0.0 { exerted.torsion / axis.torsion } else { 0.0 };
         axis.force.dot(&exerted.force) + along_torsion
     })
@@ -273,8 +324,12 @@ fn coordinates<const D: usize>(problem: &ForceProblem, grip: &Grip, exerted: &Co
 
 /// What a contact exerts that has these coordinates over its axes.
 pub(super) fn exerted<const D: usize>(friction: f64, grip: &Grip, coordinates: &[f64; D]) -> ContactForce {
+    combined(&axes::<D>(friction, grip), coordinates)
+}
+
+fn combined<const D: usize>(axes: &[ContactForce; D], coordinates: &[f64; D]) -> ContactForce {
     let mut sum = ContactForce { force: Vector::zeros(), torsion: 0.0 };
-    for (axis, x) in axes::<D>(friction, grip).iter().zip(coordinates) {
+    for (axis, x) in axes.iter().zip(coordinates) {
         sum.force += axis.force * *x;
         sum.torsion += axis.torsion * x;
     }

@@ -12,5 +12,6 @@ pub mod linear_program;
 mod newton_step;
 
 pub use force_distribution::{
-    BalancedForces, ForceLimits, ForceProblem, JointRow, JointRows, NoForces, Reserve, Wrench, can_balance, distribute,
+    BalancedForces, ForceLimits, ForceProblem, JointRow, JointRows, NoForces, Reserve, Rubbing, Wrench, can_balance,
+    distribute,
 };

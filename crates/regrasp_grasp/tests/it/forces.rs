@@ -6,7 +6,7 @@ use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, S
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, UnitVector, Vector};
 use regrasp_grasp::wrench::any_direction::{answer, reserves};
-use regrasp_grasp::wrench::{BalancedForces, JointRow, JointRows, Reserve, can_balance, distribute};
+use regrasp_grasp::wrench::{BalancedForces, JointRow, JointRows, Reserve, Rubbing, can_balance, distribute};
 use regrasp_grasp::{
     Contact, ContactForce, ContactModel, ForceLimits, ForceProblem, GraspFrame, Grip, NoForces, Wrench,
 };
@@ -16,7 +16,7 @@ const LIMITS: ForceLimits = ForceLimits { least: 2.0, largest: 15.0, squeeze: 4.
 const BARRIER: f64 = 1e-3 * 16.0;
 
 fn problem<'a>(grips: &'a [Grip], joints: &'a [JointRows], load: Wrench) -> ForceProblem<'a> {
-    ForceProblem { grips, joints, reserves: &[], frame: &FRAME, load, limits: LIMITS }
+    ForceProblem { grips, joints, reserves: &[], rubbing: &[], frame: &FRAME, load, limits: LIMITS }
 }
 
 fn weight(rng: &mut Rng) -> Wrench {
@@ -63,6 +63,18 @@ fn assert_good(problem: &ForceProblem, forces: &BalancedForces) {
     }
 }
 
+/// Columns of a contact of the problem: a single one where it slides.
+fn columns_at(problem: &ForceProblem, index: usize) -> Vec<[f64; 6]> {
+    let grip = &problem.grips[index];
+    let Some(friction) = problem.rubbing.get(index).and_then(|rubbing| rubbing.sliding) else {
+        return columns(grip, problem.frame);
+    };
+    let force = friction - grip.contact.normal_in_object.into_inner();
+    let arm = grip.contact.point_in_object - problem.frame.center_of_mass;
+    let moment = arm.cross(&force) / problem.frame.torque_scale;
+    vec![[force.x, force.y, force.z, moment.x, moment.y, moment.z]]
+}
+
 /// The same program without a barrier, by clarabel: the least objective, or none. The other value is how far all limits
 /// have to give for any forces at all: negative where they need not, infinite where no forces whatever balance.
 fn by_clarabel(problem: &ForceProblem) -> (Option<f64>, f64) {
@@ -71,7 +83,7 @@ fn by_clarabel(problem: &ForceProblem) -> (Option<f64>, f64) {
 
 fn solve_by_clarabel(problem: &ForceProblem, gives: bool) -> Option<f64> {
     let mu = problem.frame.friction;
-    let columns: Vec<Vec<[f64; 6]>> = problem.grips.iter().map(|grip| columns(grip, problem.frame)).collect();
+    let columns: Vec<Vec<[f64; 6]>> = (0..problem.grips.len()).map(|index| columns_at(problem, index)).collect();
     let n: usize = columns.iter().map(Vec::len).sum();
     let width = n + 1;
     let mut rows: Vec<Vec<f64>> = Vec::new();
@@ -134,11 +146,19 @@ fn solve_by_clarabel(problem: &ForceProblem, gives: bool) -> Option<f64> {
     let mut q = vec![0.0; width];
     let mut constant = 0.0;
     start = 0;
-    for of_grip in columns.iter().filter(|_| !gives) {
+    for (i, of_grip) in columns.iter().enumerate().filter(|_| !gives) {
+        // Less twice the force across the normal times that wished for.
+        if let Some(rubbing) = problem.rubbing.get(i) {
+            let normal = problem.grips[i].contact.normal_in_object.into_inner();
+            let wish = rubbing.wish - normal * normal.dot(&rubbing.wish);
+            for (k, column) in of_grip.iter().enumerate() {
+                q[start + k] -= 2.0 * wish.dot(&Vector::new(column[0], column[1], column[2]));
+            }
+        }
         for k in 0..of_grip.len() {
             p[start + k][start + k] = 2.0 * if k == 0 { problem.limits.squeeze_weight } else { 1.0 };
         }
-        q[start] = -2.0 * problem.limits.squeeze_weight * problem.limits.squeeze;
+        q[start] -= 2.0 * problem.limits.squeeze_weight * problem.limits.squeeze;
         constant += problem.limits.squeeze_weight * problem.limits.squeeze.powi(2);
         start += of_grip.len();
     }
@@ -187,6 +207,58 @@ fn agrees_with_another_solver() {
         }
     }
     assert!(n_solved > 300 && n_refused > 300 && n_band < 30, "{n_solved} {n_refused} {n_band}");
+}
+
+/// Friction of what slides has its full size and its direction; what does not slide is in its cone; wishes count.
+#[test]
+fn contacts_that_slide_agree_with_another_solver() {
+    let mut rng = Rng::keyed(9, "forces", 0);
+    let (mut n_solved, mut n_refused, mut n_band) = (0, 0, 0);
+    for round in 0..3000 {
+        let n = 3 + rng.below(3);
+        let grips = grips(&vec![ContactModel::Point; n], &mut rng);
+        let rubbing: Vec<Rubbing> = grips
+            .iter()
+            .map(|grip| {
+                let normal = grip.contact.normal_in_object.into_inner();
+                let mut across = || Vector::from(rng.direction()).cross(&normal);
+                let (along, wish) = (across().normalize(), across() * 2.0);
+                Rubbing { sliding: rng.chance(0.4).then_some(along * 0.6), wish }
+            })
+            .collect();
+        let problem = ForceProblem { rubbing: &rubbing, ..problem(&grips, &[], weight(&mut rng)) };
+        let ours = distribute(&problem, None);
+        assert_eq!(can_balance(&problem), ours.is_ok());
+        let (theirs, give) = by_clarabel(&problem);
+        if give.abs() < 2e-3 {
+            n_band += 1;
+            continue;
+        }
+        assert_eq!(ours.is_ok(), give < 0.0, "{round}: {ours:?} {theirs:?} {give}");
+        let (Ok(forces), Some(theirs)) = (&ours, theirs) else {
+            n_refused += 1;
+            continue;
+        };
+        n_solved += 1;
+        let rest = problem.load.with_forces(&grips, forces, problem.frame);
+        assert!(rest.force.norm() < 1e-9 && rest.torque.norm() < 1e-10, "{rest:?}");
+        let mut ours = 0.0;
+        for ((grip, rubbing), force) in grips.iter().zip(&rubbing).zip(forces) {
+            let c = grip.components(force, FRAME.friction);
+            assert!(c.normal > LIMITS.least && c.normal < LIMITS.largest);
+            ours += LIMITS.squeeze_weight * (c.normal - LIMITS.squeeze).powi(2) - 2.0 * c.tangential.dot(&rubbing.wish);
+            match rubbing.sliding {
+                Some(friction) => assert!((c.tangential - friction * c.normal).norm() < 1e-12 * c.normal),
+                None => {
+                    assert!(grip.depth(&c, FRAME.friction) > 0.0, "{c:?}");
+                    ours += c.tangential.norm_squared();
+                }
+            }
+        }
+        assert!(ours > theirs - 1e-6 * (1.0 + theirs.abs()), "{ours} {theirs}");
+        assert!(ours < theirs + 4.0 * n as f64 * BARRIER + 1e-6, "{ours} {theirs}");
+    }
+    assert!(n_solved > 100 && n_refused > 100 && n_band < 60, "{n_solved} {n_refused} {n_band}");
 }
 
 #[test]

@@ -73,6 +73,11 @@ impl ForceModel {
         }
     }
 
+    /// Limits and wishes.
+    pub fn limits(&self) -> &ForceLimits {
+        &self.limits
+    }
+
     /// Weight of the object, in the world; zero where its direction is not known.
     pub fn weight_in_world(&self) -> Vector {
         self.gravity.in_world().unwrap_or_else(Vector::zeros) * self.mass
@@ -162,6 +167,7 @@ impl Held {
             grips: &self.grips,
             joints: &self.joints,
             reserves,
+            rubbing: &[],
             frame: &model.frame,
             load: self.load,
             limits: forces.limits,

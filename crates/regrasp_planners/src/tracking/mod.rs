@@ -8,7 +8,7 @@
 /// Start and hand as the query gives them.
 mod endpoints;
 /// Contact forces at one moment.
-mod forces;
+pub mod forces;
 /// Where object and fingertips are.
 mod grasp;
 /// From a grasp towards a sub-goal.
@@ -24,7 +24,7 @@ pub mod settings;
 /// One step of time.
 mod step;
 
-pub use settings::{METHOD, RollingFinger, TrackingSettings};
+pub use settings::{Cones, METHOD, RollingFinger, TrackingSettings};
 
 use crate::failure::{Cause, Failure, FailureKind, NearestMiss};
 use crate::in_hand::Progress;

@@ -17,6 +17,17 @@ pub enum RollingFinger {
     Once,
 }
 
+/// Where contact forces of fingertips that do not slide are (paper 003, section 6.2.3).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Cones {
+    /// In pyramids of four sides inscribed in the friction cones; of least power, as in the paper.
+    #[default]
+    Pyramid,
+    /// In the cones; well inside them, near the normal force that the settings wish for.
+    Exact,
+}
+
 /// Settings of [`super::plan_tracking`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -39,6 +50,8 @@ pub struct TrackingSettings {
     pub face_changes: bool,
     /// Which finger the object rolls on.
     pub rolling_finger: RollingFinger,
+    /// Where forces are.
+    pub cones: Cones,
     /// Choices tried in a row before a sub-goal is given up (paper 003, section 6.2.4, `bound_2`: 50).
     pub trials: usize,
     /// What the distance left to the goal counts in the order in which sub-goals are tried, beside the way to them: 1 is the
@@ -66,6 +79,7 @@ impl Default for TrackingSettings {
             rolling_velocity: 2.86f64.to_radians(),
             face_changes: true,
             rolling_finger: RollingFinger::Any,
+            cones: Cones::Pyramid,
             trials: 50,
             goal_weight: 1.2,
             nodes: 2000,

@@ -302,23 +302,25 @@ impl<'m, 'a> Stepper<'m, 'a> {
         end: &TrackingGrasp,
         relative: &PerFinger<Relative>,
     ) -> Result<[Forces; 2], NoStep> {
-        let at_end = self.balanced_at(end, grasp, end, relative)?;
-        Ok([self.balanced_at(grasp, grasp, end, relative)?, at_end])
+        let at_end = self.balanced_at(end, grasp, end, relative, None)?;
+        Ok([self.balanced_at(grasp, grasp, end, relative, Some(&at_end))?, at_end])
     }
 
     /// Forces at `grasp` where nothing moves.
     pub fn balanced_at_rest(&self, grasp: &TrackingGrasp) -> Result<Forces, NoStep> {
         let relative: PerFinger<Relative> = grasp.touches.iter().map(|_| Relative::STILL).collect();
-        self.balanced_at(grasp, grasp, grasp, &relative)
+        self.balanced_at(grasp, grasp, grasp, &relative, None)
     }
 
-    /// Forces at `here`, an end of the step between two grasps in which the fingertips move as `relative` has it.
+    /// Forces at `here`, an end of the step between two grasps in which the fingertips move as `relative` has it;
+    /// `near` may be those of a moment close by.
     fn balanced_at(
         &self,
         here: &TrackingGrasp,
         from: &TrackingGrasp,
         to: &TrackingGrasp,
         relative: &PerFinger<Relative>,
+        near: Option<&Forces>,
     ) -> Result<Forces, NoStep> {
         let (model, object) = (self.model, &here.world_from_object);
         let load = self.load(object);
@@ -336,7 +338,7 @@ impl<'m, 'a> Stepper<'m, 'a> {
             }
         };
         let contacts: PerFinger<Pressing> = (0..model.n_fingers()).map(pressing).collect();
-        let forces = balance(&contacts, &load).map_err(|_| NoStep::Unbalanced)?;
+        let forces = balance(&contacts, &load, near).map_err(|_| NoStep::Unbalanced)?;
         let is_strong = |finger: usize| {
             let contact = object.point(&contacts[finger].point);
             let torques = self.torques(here, finger, &contact, &object.vector(&forces[finger]));
@@ -354,7 +356,8 @@ impl<'m, 'a> Stepper<'m, 'a> {
             torque_scale: frame.torque_scale,
             friction: frame.friction,
             sliding_friction: self.model.scene.object.friction,
-            normal_force: self.settings.in_hand.forces.map_or([0.0, f64::MAX], |forces| forces.normal_force),
+            limits: *self.forces.limits(),
+            cones: self.settings.cones,
         }
     }
 

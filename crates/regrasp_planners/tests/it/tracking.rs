@@ -8,7 +8,7 @@ use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, check};
 use regrasp_plan::plan::{ContactMode, ContactState, Segment, SegmentKind};
 use regrasp_planners::in_hand::InHandSettings;
-use regrasp_planners::tracking::RollingFinger;
+use regrasp_planners::tracking::{Cones, RollingFinger};
 use regrasp_planners::{Failure, FailureKind, TrackingSettings, plan_in_hand, plan_tracking};
 use regrasp_scene::{GraspRequest, Gravity, InHandQuery, LoadedScene};
 use std::collections::BTreeSet;
@@ -82,6 +82,38 @@ fn every_scenario_is_solved_as_its_settings_say() {
                 }
             }
         }
+    }
+}
+
+/// The option beside the paper's pyramids: forces inside the exact cones, with room for friction that is less than counted on.
+#[test]
+fn with_exact_cones_forces_obey_the_same_laws_and_plans_keep_a_friction_margin() {
+    let loaded = scene("football.toml");
+    let query = loaded.task.query(0);
+    for (seed, friction_margin, least) in [(0, 1.0, 0.0), (0, 1.2, 0.0)] {
+        let mut settings = TrackingSettings { cones: Cones::Exact, ..TrackingSettings::default() };
+        settings.in_hand.friction_margin = friction_margin;
+        settings.in_hand.forces.as_mut().unwrap().normal_force[0] = least;
+        let planned = || {
+            plan_tracking(&loaded.scene, &query, &settings, seed, &Budget::work(1_000_000), &|_| {})
+                .unwrap_or_else(|failure| panic!("seed {seed}: {failure}"))
+        };
+        let plan = planned();
+        let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+        assert!(report.accepted(), "seed {seed}: {:?}", report.violations.first());
+        assert!(report.max_force_residual.unwrap() < 1e-6 && report.max_moment_residual.unwrap() < 1e-7);
+        assert!(report.max_sliding_force_error.unwrap() < 1e-9);
+        let states = plan.segments.iter().flat_map(|segment| &segment.waypoints).flat_map(|w| &w.contacts);
+        for state in states {
+            let normal = Vector::from(state.normal_in_object.unwrap());
+            let force = Vector::from(state.force_in_object.unwrap());
+            let pressing = -force.dot(&normal);
+            assert!(pressing > least);
+            let across = (force + normal * pressing).norm();
+            let friction = 0.7 / if state.mode.slides() { 1.0 } else { friction_margin };
+            assert!(across < friction * pressing * (1.0 + 1e-9), "{:?}: {across} of {pressing}", state.mode);
+        }
+        assert_eq!(regrasp_plan::format::to_json(&plan), regrasp_plan::format::to_json(&planned()), "seed {seed}");
     }
 }
 
