@@ -6,7 +6,7 @@ use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, check};
 use regrasp_plan::plan::Improvement;
 use regrasp_planners::in_hand::{NotProven, validate_once};
-use regrasp_planners::{Failure, InHandSettings, PlannerSettings, Progress, TrackingSettings, plan, tracking};
+use regrasp_planners::{Failure, InHandSettings, PlannerSettings, Progress, TrackingSettings, plan};
 use regrasp_scene::{InHandQuery, Scene, TaskKind};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -153,7 +153,7 @@ pub(crate) fn plan_only(problem: Problem, settings: &RunSettings) -> (Row, Optio
         scene: problem.scene.name.clone(),
         method: match problem.query.task {
             TaskKind::InHand => method_name(&settings.planner),
-            TaskKind::Tracking => tracking::METHOD.into(),
+            TaskKind::Tracking => settings.tracking.method.name().into(),
         },
         seed: problem.seed,
         ..Row::default()

@@ -4,11 +4,11 @@
 /// Attempts, one after the other or several at once.
 mod attempts;
 /// Contacts that a finger could take, and how far it could follow with them.
-mod candidates;
+pub(crate) mod candidates;
 /// The baseline of paper 000.
 mod classic;
 /// Combinations of candidates: closure, release, worth.
-mod combine;
+pub(crate) mod combine;
 /// Joining components of a roadmap.
 mod connect;
 /// What plans cost.
@@ -24,7 +24,7 @@ mod first_try;
 /// Contact forces of the fingers.
 pub(crate) mod forces;
 /// Forces and torques along a plan.
-mod forces_along;
+pub(crate) mod forces_along;
 /// Postures of free fingers.
 mod free;
 /// Two gait trees that grow until they meet.
@@ -50,7 +50,7 @@ pub(crate) mod record;
 /// Sequences of relocations from one grasp to another.
 mod regrasp;
 /// The relocation of one finger.
-mod relocate;
+pub(crate) mod relocate;
 /// Many queries on one roadmap.
 pub mod roadmap;
 #[cfg(test)]

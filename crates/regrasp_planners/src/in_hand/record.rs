@@ -162,6 +162,11 @@ impl<'m, 'a> Recorder<'m, 'a> {
         }
     }
 
+    /// What has been written down, without forces and times.
+    pub fn into_segments(self) -> Vec<Segment> {
+        self.segments
+    }
+
     fn begin(&mut self, kind: SegmentKind, moving_finger: Option<String>, n: usize) {
         let waypoints = Vec::with_capacity(1 + n);
         self.segments.push(Segment { kind, moving_finger, rolling_finger: None, waypoints });

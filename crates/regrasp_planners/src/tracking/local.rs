@@ -8,6 +8,7 @@ use arrayvec::ArrayVec;
 use nalgebra::UnitQuaternion;
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, UnitVector, Vector, frame};
+use regrasp_robot::kinematics::whole_pose::has_all_directions;
 
 /// Time of a local plan in units of that to the sub-goal (paper 003: `bound_1`, twice).
 const MOST_TIME: f64 = 5.0;
@@ -15,6 +16,9 @@ const MOST_TIME: f64 = 5.0;
 const LEAST_ALIGNED: f64 = 0.2;
 /// Cosine below which roles are looked for that follow better.
 const WELL_ALIGNED: f64 = 0.5;
+/// The same where the moving finger cannot choose how its tip turns: a change of roles helps its reach nothing. By measurement, the
+/// wide hand's sphere: 120 segments in place of 1400, in a third of the time.
+const STILL_ALIGNED: f64 = 0.15;
 /// How much chance counts against alignment when roles are chosen.
 const CHANCE: f64 = 0.4;
 /// Share of failures after which the object rests while the moving finger rolls (the paper draws from rest and motion).
@@ -229,9 +233,15 @@ impl Local<'_, '_, '_> {
         }
     }
 
+    /// True where a finger can roll while the object rests; another one follows it, and rests where it does.
+    fn rolls_by_itself(&self, finger: usize) -> bool {
+        has_all_directions(self.stepper.model.fingers[finger].ik.chain())
+    }
+
     /// The choice of the step before, where its roles still lead towards the goal.
     fn keep(&self, here: &TrackingGrasp, choice: &Choice, left: &Vector) -> Option<Choice> {
-        let prospect = self.prospect(here, choice.roles, left).filter(|prospect| prospect.cosine >= WELL_ALIGNED)?;
+        let least = if self.rolls_by_itself(choice.roles.moving) { WELL_ALIGNED } else { STILL_ALIGNED };
+        let prospect = self.prospect(here, choice.roles, left).filter(|prospect| prospect.cosine >= least)?;
         let control = self.control_home(here, choice.roles.moving, Some(&prospect.tip_way), self.time_step());
         Some(Choice { turn: Some(prospect.turn), control, ..*choice })
     }
@@ -295,13 +305,16 @@ impl Local<'_, '_, '_> {
         }
         let object_rests = has_failed && self.rng.chance(REST_SHARE);
         let (roles, moves) = match best {
-            Some((_, roles, prospect)) => (roles, Some(prospect).filter(|_| !object_rests)),
+            Some((_, roles, prospect)) => {
+                let rests = object_rests && self.rolls_by_itself(roles.moving);
+                (roles, Some(prospect).filter(|_| !rests))
+            }
             // Nothing leads there: a finger that rolls on while the object rests may change that.
             None if object_rests => {
                 let moving = tried.guilty.unwrap_or_else(|| self.rng.below(n));
                 let others: ArrayVec<usize, MAX_FINGERS> = (0..n).filter(|&finger| finger != moving).collect();
                 let rolling = self.rolling.unwrap_or_else(|| others[self.rng.below(others.len())]);
-                if rolling == moving {
+                if rolling == moving || !self.rolls_by_itself(moving) {
                     return None;
                 }
                 (Roles { moving, rolling }, None)

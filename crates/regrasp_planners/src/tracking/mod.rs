@@ -9,6 +9,8 @@
 mod endpoints;
 /// Contact forces at one moment.
 pub mod forces;
+/// Relocations through the air.
+mod gaiting;
 /// Where object and fingertips are.
 mod grasp;
 /// From a grasp towards a sub-goal.
@@ -24,20 +26,21 @@ pub mod settings;
 /// One step of time.
 mod step;
 
-pub use settings::{Cones, METHOD, RollingFinger, TrackingSettings};
+pub use settings::{Cones, RollingFinger, TrackingMethod, TrackingSettings};
 
 use crate::failure::{Cause, Failure, FailureKind, NearestMiss};
 use crate::in_hand::Progress;
 use crate::in_hand::model::Model;
 use crate::in_hand::settings::gravity_of;
 use crate::in_hand::workspace::Workspace;
+use gaiting::Move;
 use grasp::TrackingGrasp;
 use regrasp_base::{Budget, Rng};
 use regrasp_plan::Plan;
 use regrasp_plan::plan::{PoseData, Statistics};
 use regrasp_scene::{InHandQuery, Scene};
 use search::{Counts, Ended, search};
-use step::{Step, Stepper};
+use step::Stepper;
 
 /// Searches that are begun before none is begun any more. By hand.
 const MOST_RESTARTS: u64 = 20;
@@ -79,8 +82,8 @@ pub fn plan_tracking(
             Ok(last) => {
                 let path = found.path_to(last);
                 counts.on_path = path.len() as u64 - 1;
-                let steps: Vec<&Step> = path.iter().flat_map(|&node| &found.nodes[node].steps).collect();
-                return Ok(record::record(&stepper, query, seed, &first, &steps, statistics(&counts)));
+                let moves: Vec<&Move> = path.iter().flat_map(|&node| &found.nodes[node].moves).collect();
+                return Ok(record::record(&stepper, query, seed, &first, &moves, statistics(&counts)));
             }
             Err(Ended::Exhausted) if counts.restarts < MOST_RESTARTS => counts.restarts += 1,
             Err(ended) => return Err(failure(&ended, &counts, nearest)),

@@ -1,8 +1,9 @@
 //! The plan as it is written to a file.
 
 use super::forces::Forces;
+use super::gaiting::{Move, Relocation};
 use super::grasp::{PerFinger, TrackingGrasp};
-use super::settings::{METHOD, TrackingSettings};
+use super::settings::TrackingSettings;
 use super::step::{Relative, Step, Stepper};
 use crate::in_hand::model::Model;
 use crate::in_hand::record::{CONTACT_TOLERANCE, SLIP_TOLERANCE, plan_of};
@@ -21,10 +22,30 @@ pub fn settings_of(settings: &TrackingSettings) -> serde_json::Value {
 /// Turn aside, half-way in long steps, that a segment adds up: there and back it twists by twice as much, and checkers allow 2e-3.
 const MOST_BENT: f64 = 5e-4;
 
-/// Steps in a row with the same roles, modes and times, as one segment from `start`.
-struct Stretch<'s> {
-    start: &'s TrackingGrasp,
-    steps: Vec<&'s Step>,
+/// What becomes a segment.
+enum Stretch<'s> {
+    /// Steps in a row with the same roles, modes and times, from `start`.
+    Tracked { start: &'s TrackingGrasp, steps: Vec<&'s Step> },
+    /// A finger goes through the air.
+    Relocated(&'s Relocation),
+}
+
+impl Stretch<'_> {
+    /// Closure margin of what holds while a finger goes through the air.
+    fn margin(&self) -> Option<f64> {
+        match self {
+            Stretch::Tracked { .. } => None,
+            Stretch::Relocated(relocation) => Some(relocation.margin),
+        }
+    }
+
+    /// Least time from waypoint to waypoint, in seconds.
+    fn least_span(&self) -> f64 {
+        match self {
+            Stretch::Tracked { steps, .. } => steps[0].seconds,
+            Stretch::Relocated(_) => timing::LEAST_SPAN,
+        }
+    }
 }
 
 /// Makes the plan of `steps`, which begin at `start`.
@@ -33,27 +54,34 @@ pub fn record(
     query: &InHandQuery,
     seed: u64,
     (start, forces_at_rest): &(TrackingGrasp, Forces),
-    steps: &[&Step],
+    moves: &[&Move],
     statistics: Statistics,
 ) -> Plan {
     let (model, settings) = (stepper.model, stepper.settings);
-    let stretches = stretches(start, steps);
+    let stretches = stretches(start, moves);
     let mut segments: Vec<Segment> = stretches.iter().map(|stretch| segment(stepper, stretch)).collect();
     if segments.is_empty() {
         segments.push(at_rest(stepper, start, forces_at_rest));
     }
     let motion = timing::limits(model);
     timing::assign_times(model, &motion, &mut segments, |index| {
-        stretches.get(index).map_or(settings.time_step, |stretch| stretch.steps[0].seconds)
+        stretches.get(index).map_or(settings.time_step, Stretch::least_span)
     });
     for (segment, stretch) in segments.iter_mut().zip(&stretches) {
-        add_velocities(segment, stretch);
+        if let Stretch::Tracked { steps, .. } = stretch {
+            add_velocities(segment, steps);
+        }
     }
+    let margins: Vec<f64> = stretches.iter().filter_map(Stretch::margin).collect();
+    let kept_margin = margins.iter().copied().fold(f64::INFINITY, f64::min);
+    // Closure is promised where fingers go through the air.
+    let (required_margin, kept_margin) =
+        if margins.is_empty() { (0.0, 0.0) } else { (model.settings.closure_margin, kept_margin) };
     let promises = Promises {
         contact_tolerance: CONTACT_TOLERANCE,
         friction: model.frame.friction,
-        required_margin: 0.0,
-        kept_margin: 0.0,
+        required_margin,
+        kept_margin,
         torque_scale: model.frame.torque_scale,
         friction_margin: model.settings.friction_margin,
         slip_tolerance: SLIP_TOLERANCE,
@@ -65,49 +93,57 @@ pub fn record(
         forces: Some(stepper.forces.promises()),
     };
     Plan {
-        method: METHOD.into(),
+        method: settings.method.name().into(),
         seed,
         settings: settings_of(settings),
-        statistics,
+        statistics: Statistics { relocations: margins.len() as u64, ..statistics },
         ..plan_of(model.scene, query, promises, segments)
     }
 }
 
-fn stretches<'s>(start: &'s TrackingGrasp, steps: &[&'s Step]) -> Vec<Stretch<'s>> {
+fn stretches<'s>(start: &'s TrackingGrasp, moves: &[&'s Move]) -> Vec<Stretch<'s>> {
     let mut stretches: Vec<Stretch> = Vec::new();
     let mut here = start;
-    let mut bent = 0.0;
-    for step in steps {
-        bent += step.end.bent;
-        let goes_on = stretches.last().and_then(|stretch| stretch.steps.last()).is_some_and(|last| {
-            bent <= MOST_BENT
-                && last.roles == step.roles
-                && last.seconds == step.seconds
-                && last.relative.iter().zip(&step.relative).all(|(a, b)| a.mode == b.mode)
-        });
-        if !goes_on {
-            bent = step.end.bent;
-            stretches.push(Stretch { start: here, steps: Vec::new() });
+    for &one in moves {
+        match (one, stretches.last_mut()) {
+            (Move::Relocation(relocation), _) => stretches.push(Stretch::Relocated(relocation)),
+            (Move::Step(step), Some(Stretch::Tracked { steps, .. })) if goes_on(steps, step) => steps.push(step),
+            (Move::Step(step), _) => stretches.push(Stretch::Tracked { start: here, steps: vec![step] }),
         }
-        if let Some(stretch) = stretches.last_mut() {
-            stretch.steps.push(step);
-        }
-        here = &step.end;
+        here = one.end();
     }
     stretches
 }
 
+/// True where `step` has the roles, modes and time of the steps before.
+fn goes_on(steps: &[&Step], step: &Step) -> bool {
+    let bent: f64 = steps.iter().map(|one| one.end.bent).sum();
+    steps.last().is_some_and(|last| {
+        bent + step.end.bent <= MOST_BENT
+            && last.roles == step.roles
+            && last.seconds == step.seconds
+            && last.relative.iter().zip(&step.relative).all(|(a, b)| a.mode == b.mode)
+    })
+}
+
 fn segment(stepper: &Stepper, stretch: &Stretch) -> Segment {
+    match stretch {
+        Stretch::Tracked { start, steps } => tracked(stepper, start, steps),
+        Stretch::Relocated(relocation) => relocation.segment.clone(),
+    }
+}
+
+fn tracked(stepper: &Stepper, start: &TrackingGrasp, steps: &[&Step]) -> Segment {
     let model = stepper.model;
-    let roles = stretch.steps[0].roles;
+    let roles = steps[0].roles;
     let name = |finger: usize| Some(model.scene.hand.fingers[finger].name.clone());
-    let mut here = stretch.start;
-    let mut waypoints = Vec::with_capacity(1 + stretch.steps.len());
-    for step in &stretch.steps {
+    let mut here = start;
+    let mut waypoints = Vec::with_capacity(1 + steps.len());
+    for step in steps {
         waypoints.push(waypoint(stepper, here, &step.relative, &step.forces[0]));
         here = &step.end;
     }
-    let last = stretch.steps[stretch.steps.len() - 1];
+    let last = steps[steps.len() - 1];
     waypoints.push(waypoint(stepper, here, &last.relative, &last.forces[1]));
     Segment {
         kind: SegmentKind::Tracking,
@@ -161,12 +197,12 @@ fn waypoint(stepper: &Stepper, grasp: &TrackingGrasp, relative: &PerFinger<Relat
 }
 
 /// Relative velocities, now that the times are known: those of the way to the next waypoint, at the last of that to it.
-fn add_velocities(segment: &mut Segment, stretch: &Stretch) {
+fn add_velocities(segment: &mut Segment, steps: &[&Step]) {
     let times: Vec<f64> = segment.waypoints.iter().map(|waypoint| waypoint.time).collect();
     for (k, waypoint) in segment.waypoints.iter_mut().enumerate() {
-        let step = k.min(stretch.steps.len() - 1);
+        let step = k.min(steps.len() - 1);
         let seconds = times[step + 1] - times[step];
-        for (state, relative) in waypoint.contacts.iter_mut().zip(&stretch.steps[step].relative) {
+        for (state, relative) in waypoint.contacts.iter_mut().zip(&steps[step].relative) {
             let is_still = state.mode == ContactMode::Fixed;
             let (slid, turned) =
                 if is_still { (Vector::zeros(), Vector::zeros()) } else { (relative.slid, relative.turned) };

@@ -1,10 +1,11 @@
 //! The high level (paper 003, section 5): A* over cells of the orientation space. Nodes are grasps; from each, nominal turns at
 //! extreme velocities lead to sub-goals in cells that no grasp is in yet; the local planner finds out whether they do.
 
+use super::gaiting::{Move, change_grasp};
 use super::grasp::{TrackingGrasp, turn_to};
 use super::local::{Failures, Homes, Local};
-use super::settings::{RollingFinger, TrackingSettings};
-use super::step::{Asked, Roles, Step, Stepper};
+use super::settings::{RollingFinger, TrackingMethod, TrackingSettings};
+use super::step::{Asked, Roles, Stepper};
 use crate::in_hand::Progress;
 use nalgebra::UnitQuaternion;
 use regrasp_base::{Budget, Interrupt, Rng};
@@ -12,14 +13,19 @@ use regrasp_geometry::Vector;
 use std::cmp::Ordering;
 use std::collections::{BTreeSet, BinaryHeap};
 
+/// How often the grasp of one node is changed through the air. By hand.
+const MOST_CHANGES: usize = 3;
+
 /// A grasp that was reached.
 pub struct Node {
     /// The grasp.
     pub grasp: TrackingGrasp,
     /// The node it was reached from.
     pub parent: Option<usize>,
-    /// Steps from there.
-    pub steps: Vec<Step>,
+    /// Motions from there.
+    pub moves: Vec<Move>,
+    /// How often its grasp was changed through the air to go on.
+    n_changes: usize,
     /// Length of the way in orientation space.
     length: f64,
 }
@@ -146,7 +152,7 @@ impl<'g> Graph<'g> {
             nearest: (0, f64::INFINITY),
         };
         let target = graph.cells.of(&orientation);
-        graph.add(Node { grasp: start.clone(), parent: None, steps: Vec::new(), length: 0.0 }, target);
+        graph.add(Node { grasp: start.clone(), parent: None, moves: Vec::new(), n_changes: 0, length: 0.0 }, target);
         graph
     }
 
@@ -277,21 +283,35 @@ pub fn search(
         without_gain += 1;
         let nearest_before = graph.nearest.0;
         let from = &graph.nodes[best.node];
-        let before: Option<Roles> = from.steps.last().map(|step| step.roles);
+        let before: Option<Roles> = match from.moves.last() {
+            Some(Move::Step(step)) => Some(step.roles),
+            _ => None,
+        };
         let work_before = stepper.work;
         let mut local = Local { stepper, rng, rolling, homes: &homes, failures: &mut counts.failures };
         let planned = local.plan(&from.grasp, &best.orientation, settings.goal_tolerance, before);
+        let gaits = settings.method == TrackingMethod::TrackingAndGaiting && from.n_changes < MOST_CHANGES;
+        let changed = match !planned.arrived && gaits {
+            true => change_grasp(&mut local, &from.grasp, goal),
+            false => None,
+        };
+        graph.nodes[best.node].n_changes += usize::from(!planned.arrived && gaits);
+        let moves = changed.or_else(|| {
+            let steps: Vec<Move> = planned.steps.into_iter().map(Move::from).collect();
+            (!steps.is_empty()).then_some(steps)
+        });
         counts.work += stepper.work - work_before;
-        let Some(last) = planned.steps.last() else { continue };
-        let grasp = last.end.clone();
-        let here = grasp.orientation();
-        // What ends elsewhere is a node too, where no other is.
-        let target = if planned.arrived { target } else { graph.cells.of(&here) };
-        if !planned.arrived && graph.taken.contains(&target) {
+        let here = moves.as_deref().and_then(<[Move]>::last).map(|last| last.end().clone());
+        // Where no finger is relocated, what ends elsewhere is a node too, where no other is.
+        let was_relocated = !planned.arrived && moves.as_ref().is_some_and(|moves| matches!(moves[0], Move::Relocation(_)));
+        let (Some(moves), Some(grasp)) = (moves, here) else { continue };
+        let target = if planned.arrived { target } else { graph.cells.of(&grasp.orientation()) };
+        if !planned.arrived && !was_relocated && graph.taken.contains(&target) {
             continue;
         }
+        let from = &graph.nodes[best.node];
         let length = from.length + turn_to(&from.grasp.orientation(), &grasp.orientation()).norm();
-        let is_goal = graph.add(Node { grasp, parent: Some(best.node), steps: planned.steps, length }, target);
+        let is_goal = graph.add(Node { grasp, parent: Some(best.node), moves, n_changes: 0, length }, target);
         if graph.nearest.0 != nearest_before {
             without_gain = 0;
         }

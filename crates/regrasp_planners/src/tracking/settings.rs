@@ -3,8 +3,30 @@
 use crate::in_hand::{ForceSettings, InHandSettings};
 use serde::{Deserialize, Serialize};
 
-/// Name of the method in plans.
-pub const METHOD: &str = "tracking";
+/// What fingers may do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum TrackingMethod {
+    /// They never leave the object (paper 003).
+    #[default]
+    #[serde(rename = "tracking")]
+    Tracking,
+    /// Where tracking gets no farther, one is relocated through the air while the others hold.
+    #[serde(rename = "tracking+gaiting")]
+    TrackingAndGaiting,
+}
+
+impl TrackingMethod {
+    /// All of them.
+    pub const ALL: [TrackingMethod; 2] = [TrackingMethod::Tracking, TrackingMethod::TrackingAndGaiting];
+
+    /// As settings, plans and command lines spell it.
+    pub fn name(self) -> &'static str {
+        match self {
+            TrackingMethod::Tracking => "tracking",
+            TrackingMethod::TrackingAndGaiting => "tracking+gaiting",
+        }
+    }
+}
 
 /// Which resting finger the object rolls on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -32,6 +54,8 @@ pub enum Cones {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrackingSettings {
+    /// What fingers may do.
+    pub method: TrackingMethod,
     /// Time of a step (paper 003, table 2: 0.1 s).
     pub time_step: f64,
     /// Time of a step in which the object rests while a fingertip rolls back on one face.
@@ -70,6 +94,7 @@ pub struct TrackingSettings {
 impl Default for TrackingSettings {
     fn default() -> Self {
         TrackingSettings {
+            method: TrackingMethod::Tracking,
             time_step: 0.1,
             rest_step: 0.5,
             sub_goal_time: 2.0,

@@ -11,4 +11,5 @@ mod segments;
 mod soft_and_coupled;
 mod tips;
 mod tracking;
+mod tracking_gaits;
 mod way_poses;

@@ -23,9 +23,9 @@ fn center_in_world(loaded: &LoadedScene, world_from_object: &Pose) -> Point {
     world_from_object * loaded.scene.object.center_of_mass
 }
 
-/// Scenes of the papers that are more than a turn in place.
-const PAPER_SCENES: [&str; 7] =
-    ["bulb", "cubic", "diamond", "ellipsoid_free", "ellipsoid_obstacle", "football", "pencil"];
+/// Scenes of the papers that are more than a turn in place, and those of tracking, which have a start grasp.
+const PAPER_SCENES: [&str; 8] =
+    ["bulb", "cubic", "diamond", "ellipsoid_free", "ellipsoid_obstacle", "football", "pencil", "tracking_sphere_wide"];
 
 #[test]
 fn scenes_of_the_bundled_hands_load_without_models() {
@@ -111,7 +111,9 @@ fn the_cube_turns_all_the_way_in_three_legs() {
 fn allegro_scenes_start_at_home_and_turn_by_what_their_name_says() {
     let Some(models) = shared_models() else { return };
     let options = with_models(&models);
-    let paths = scenes_in("allegro");
+    let mut paths = scenes_in("allegro");
+    // Those of tracking begin with a grasp, at one place.
+    paths.retain(|path| !path.file_stem().is_some_and(|stem| stem.to_string_lossy().starts_with("tracking_")));
     assert_eq!(paths.len(), 19);
     let home = Point::new(0.082, 0.003, 0.005);
     for path in paths {
@@ -190,6 +192,28 @@ fn the_allegro_grasp_of_the_notes_touches_the_sphere() {
         // The notes give whole degrees: half a degree over 150 mm is 1.3 mm.
         assert!(((tip - center).norm() - 0.044).abs() < 0.003, "{} {}", finger.name, (tip - center).norm());
     }
+}
+
+fn check_start_touches(loaded: &LoadedScene) {
+    let query = loaded.task.query(0);
+    assert_eq!(query.task, regrasp_scene::TaskKind::Tracking);
+    let GraspRequest::Contacts(contacts) = &query.start_grasp else { panic!("contacts are given") };
+    assert_eq!(contacts.len(), loaded.scene.hand.fingers.len());
+    let regrasp_geometry::Shape::Sphere { radius } = loaded.scene.object.shape else { panic!("a sphere") };
+    for contact in contacts {
+        assert!((contact.coords.norm() - radius).abs() < 1e-8);
+    }
+    let turn = query.world_from_object_goal.rotation * query.world_from_object_start.rotation.inverse();
+    let expected = nalgebra::UnitQuaternion::from_scaled_axis(nalgebra::Vector3::z() * 90f64.to_radians());
+    assert!(turn.angle_to(&expected) < 1e-9);
+}
+
+#[test]
+fn spheres_of_tracking_by_real_fingers_begin_with_contacts_on_them() {
+    check_start_touches(&load(&repository().join("scenes/tracking_sphere_wide.toml"), &LoadOptions::default()));
+    let Some(models) = shared_models() else { return };
+    let path = repository().join("scenes/allegro/tracking_sphere32_z.toml");
+    check_start_touches(&load(&path, &with_models(&models)));
 }
 
 /// Paper 003, section 7: masses, friction, orientations, radii and reach.

@@ -1,0 +1,137 @@
+//! Tracking by fingers of real hands, alone and with relocations through the air, against the checker and closed forms.
+
+use crate::in_hand_methods::scene;
+use crate::places::{repository, shared_models};
+use regrasp_base::Budget;
+use regrasp_geometry::{Pose, Vector};
+use regrasp_plan::Plan;
+use regrasp_plan::check::{CheckSettings, check};
+use regrasp_plan::plan::{ContactMode, Segment, SegmentKind};
+use regrasp_planners::tracking::TrackingMethod;
+use regrasp_planners::{Failure, TrackingSettings, plan_tracking};
+use regrasp_robot::import::{LoadOptions, ResolveOptions};
+use regrasp_scene::{InHandQuery, LoadedScene, load_scene};
+
+fn plan_with(
+    loaded: &LoadedScene,
+    query: &InHandQuery,
+    method: TrackingMethod,
+    seed: u64,
+    work: u64,
+) -> Result<Plan, Failure> {
+    let settings = TrackingSettings { method, ..TrackingSettings::default() };
+    plan_tracking(&loaded.scene, query, &settings, seed, &Budget::work(work), &|_| {})
+}
+
+/// Queries with other goals: 8 degrees about each axis, either way.
+fn small_turns(loaded: &LoadedScene) -> Vec<InHandQuery> {
+    let turned = |axis: Vector| {
+        let mut query = loaded.task.query(0);
+        let turn = nalgebra::UnitQuaternion::from_scaled_axis(axis * 8f64.to_radians());
+        query.world_from_object_goal.rotation = turn * query.world_from_object_start.rotation;
+        query
+    };
+    [Vector::x(), Vector::y(), Vector::z()].into_iter().flat_map(|axis| [turned(axis), turned(-axis)]).collect()
+}
+
+fn accepted(loaded: &LoadedScene, query: &InHandQuery, plan: &Plan) {
+    let report = check(&loaded.scene, Some(query), plan, &CheckSettings::default());
+    assert!(report.accepted(), "seed {}: {:?}", plan.seed, report.violations.first());
+    assert!(report.max_sliding_force_error.unwrap() < 1e-9);
+    let is_mixed = plan.segments.iter().any(|segment| segment.kind == SegmentKind::Regrasp);
+    match report.min_margin {
+        Some(margin) => assert!(is_mixed && margin >= plan.promises.required_margin - 1e-9),
+        None => assert!(!is_mixed && plan.promises.required_margin == 0.0),
+    }
+}
+
+/// The largest angle between the turn of a step of a tracking segment and the normal of the rolling finger's contact.
+fn largest_off_axis(plan: &Plan, segment: &Segment) -> f64 {
+    let rolling = plan.fingers.iter().position(|name| Some(name) == segment.rolling_finger.as_ref()).unwrap();
+    let mut largest: f64 = 0.0;
+    for pair in segment.waypoints.windows(2) {
+        let [from, to] = [0, 1].map(|k| Pose::from(&pair[k].world_from_object));
+        let turn = (to.rotation * from.rotation.inverse()).scaled_axis();
+        let normal = from.rotation * Vector::from(pair[0].contacts[rolling].normal_in_object.unwrap());
+        if turn.norm() > 1e-6 {
+            largest = largest.max(turn.cross(&normal).norm() / turn.norm());
+        }
+    }
+    largest
+}
+
+/// Three resting balls leave a sphere its centre; where it does not slip on one of them it turns about the normal there. The
+/// moving finger has too few joints to choose how its tip turns and follows without sliding.
+#[test]
+fn a_sphere_turns_about_the_contact_of_the_rolling_finger() {
+    let loaded = scene("tracking_sphere_wide.toml");
+    let mut n_solved = 0;
+    for query in small_turns(&loaded) {
+        let Ok(plan) = plan_with(&loaded, &query, TrackingMethod::Tracking, 0, 300_000) else { continue };
+        n_solved += 1;
+        assert_eq!((plan.method.as_str(), plan.statistics.relocations), ("tracking", 0));
+        accepted(&loaded, &query, &plan);
+        let start = Pose::from(&plan.start);
+        for segment in &plan.segments {
+            assert_eq!(segment.kind, SegmentKind::Tracking);
+            assert!(largest_off_axis(&plan, segment) < 1e-6, "{}", largest_off_axis(&plan, segment));
+            let moving = plan.fingers.iter().position(|name| Some(name) == segment.moving_finger.as_ref()).unwrap();
+            for waypoint in &segment.waypoints {
+                let pose = Pose::from(&waypoint.world_from_object);
+                assert!((pose.translation.vector - start.translation.vector).norm() < 1e-9);
+                assert_eq!(waypoint.contacts[moving].mode, ContactMode::Rolling);
+            }
+        }
+    }
+    assert!(n_solved >= 2, "{n_solved} of 6 turns by tracking alone");
+}
+
+/// All seeds are solved and accepted, the same twice, with fingers through the air between tracking.
+fn is_turned_with_gaits(loaded: &LoadedScene, seeds: u64) {
+    for seed in 0..seeds {
+        let query = loaded.task.query(seed);
+        let plan = plan_with(loaded, &query, TrackingMethod::TrackingAndGaiting, seed, 20_000_000)
+            .unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
+        accepted(loaded, &query, &plan);
+        assert_eq!(plan.method, "tracking+gaiting");
+        let n_of = |kind: SegmentKind| plan.segments.iter().filter(|segment| segment.kind == kind).count() as u64;
+        assert!(n_of(SegmentKind::Regrasp) > 0 && n_of(SegmentKind::Tracking) > 0);
+        assert_eq!(n_of(SegmentKind::Regrasp), plan.statistics.relocations);
+        let again = plan_with(loaded, &query, TrackingMethod::TrackingAndGaiting, seed, 20_000_000).unwrap();
+        assert_eq!(regrasp_plan::format::to_json(&plan), regrasp_plan::format::to_json(&again), "seed {seed}");
+    }
+}
+
+#[test]
+fn the_wide_hand_turns_a_sphere_by_tracking_and_gaits_where_tracking_alone_does_not() {
+    let loaded = scene("tracking_sphere_wide.toml");
+    is_turned_with_gaits(&loaded, 4);
+    let query = loaded.task.query(0);
+    let failure = plan_with(&loaded, &query, TrackingMethod::Tracking, 0, 500_000).unwrap_err();
+    let miss = failure.nearest_miss.as_ref().expect("the start is the nearest");
+    assert!(miss.angle_left < 80f64.to_radians(), "{failure}");
+}
+
+#[test]
+fn the_allegro_hand_turns_a_sphere_by_tracking_and_gaits() {
+    let Some(models) = shared_models() else { return };
+    let packages = vec![("models".into(), models)];
+    let options = LoadOptions { resolve: ResolveOptions { packages, search_paths: vec![] }, ..LoadOptions::default() };
+    let path = repository().join("scenes/allegro/tracking_sphere32_z.toml");
+    let loaded = load_scene(&path, &options).unwrap_or_else(|error| panic!("{error}"));
+    is_turned_with_gaits(&loaded, 3);
+}
+
+/// Fingertips that reach to a ball, on an object that is no sphere.
+#[test]
+fn fingertips_with_a_reach_go_through_the_air_within_it() {
+    let loaded = scene("football.toml");
+    let mut n_relocations = 0;
+    for seed in 0..3 {
+        let query = loaded.task.query(seed);
+        let plan = plan_with(&loaded, &query, TrackingMethod::TrackingAndGaiting, seed, 2_000_000).unwrap();
+        accepted(&loaded, &query, &plan);
+        n_relocations += plan.statistics.relocations;
+    }
+    assert!(n_relocations > 0, "else another test is to be written");
+}
