@@ -11,6 +11,8 @@ mod forces;
 mod free;
 /// Good plans in hands of other contacts and couplings.
 mod hand;
+/// Tracking and relocations in one plan.
+mod mixed;
 /// Fingertips that roll, and fingertips that are said to.
 mod rolling;
 /// Times and velocities.
@@ -66,6 +68,7 @@ pub fn mutants(plan: &Plan, scene: &Scene, rng: &mut Rng) -> Vec<Mutant> {
     breeder.break_forces();
     breeder.break_times();
     breeder.break_tracking();
+    breeder.break_mixed();
     breeder.found
 }
 

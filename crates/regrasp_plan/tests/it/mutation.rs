@@ -142,7 +142,7 @@ fn every_mutant_of_tracking_is_rejected_for_a_fitting_reason() {
     let scenes = [&ball, &gaited, &cuboid, &mesh];
     let plans: Vec<(&Scene, Plan)> = scenes.into_iter().zip(plans).collect();
     let (counts, kinds) = judge_mutants(&plans, 6);
-    for name in TRACKING_MUTANTS {
+    for name in TRACKING_MUTANTS.into_iter().chain(MIXED_MUTANTS) {
         assert!(counts.get(name).is_some_and(|count| *count >= 5), "{name} was only made {:?} times", counts.get(name));
     }
     for kind in [
@@ -159,6 +159,17 @@ fn every_mutant_of_tracking_is_rejected_for_a_fitting_reason() {
         assert!(kinds.contains(&kind), "{kind:?} was never the reason");
     }
 }
+
+/// Every kind of damage that only tracking with relocations between has.
+const MIXED_MUTANTS: [&str; 7] = [
+    "relocation passed off as tracking",
+    "relocation left out between tracking",
+    "relocated finger tracks on from where it was",
+    "finger slides while another one is in the air",
+    "finger is tracked while another one is in the air",
+    "finger in the air is said to slide",
+    "object tracks on while a finger is in the air",
+];
 
 /// Every kind of damage that only tracking has.
 const TRACKING_MUTANTS: [&str; 74] = [

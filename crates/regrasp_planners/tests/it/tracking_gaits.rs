@@ -2,15 +2,17 @@
 
 use crate::in_hand_methods::scene;
 use crate::places::{repository, shared_models};
-use regrasp_base::Budget;
+use regrasp_base::{Budget, Rng};
 use regrasp_geometry::{Pose, Vector};
 use regrasp_plan::Plan;
+use regrasp_plan::check::mutation::mutants;
 use regrasp_plan::check::{CheckSettings, check};
 use regrasp_plan::plan::{ContactMode, Segment, SegmentKind};
 use regrasp_planners::tracking::TrackingMethod;
 use regrasp_planners::{Failure, TrackingSettings, plan_tracking};
 use regrasp_robot::import::{LoadOptions, ResolveOptions};
 use regrasp_scene::{InHandQuery, LoadedScene, load_scene};
+use std::collections::BTreeSet;
 
 fn plan_with(
     loaded: &LoadedScene,
@@ -120,6 +122,31 @@ fn the_allegro_hand_turns_a_sphere_by_tracking_and_gaits() {
     let path = repository().join("scenes/allegro/tracking_sphere32_z.toml");
     let loaded = load_scene(&path, &options).unwrap_or_else(|error| panic!("{error}"));
     is_turned_with_gaits(&loaded, 3);
+}
+
+/// Plans with relocations between tracking, broken in each known way, are rejected for a reason that fits.
+#[test]
+fn mutants_of_mixed_plans_are_rejected() {
+    let loaded = scene("tracking_sphere_wide.toml");
+    let query = loaded.task.query(1);
+    let plan = plan_with(&loaded, &query, TrackingMethod::TrackingAndGaiting, 1, 20_000_000).unwrap();
+    let (mut names, mut wrong) = (BTreeSet::new(), Vec::new());
+    for mutant in mutants(&plan, &loaded.scene, &mut Rng::keyed(6, "mixed_mutants", 0)) {
+        let judged_in = mutant.scene.as_ref().unwrap_or(&loaded.scene);
+        let report = check(judged_in, Some(&query), &mutant.plan, &CheckSettings::default());
+        names.insert(mutant.name);
+        if !report.violations.iter().any(|violation| mutant.expected.contains(&violation.kind)) {
+            let found = report.violations.first().map(|violation| violation.kind);
+            wrong.push(format!("{}: wanted one of {:?}, found {found:?}", mutant.name, mutant.expected));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+    for name in
+        ["relocated finger tracks on from where it was", "sliding said to be rolling", "relocation without lift"]
+    {
+        assert!(names.contains(name), "{name} was never made");
+    }
+    assert!(names.len() > 100, "{}", names.len());
 }
 
 /// Fingertips that reach to a ball, on an object that is no sphere.

@@ -405,7 +405,7 @@ fn promises(plan: &mut Plan) -> Option<&mut TrackingPromises> {
     plan.promises.tracking.as_mut()
 }
 
-fn turn(pose: &mut PoseData, angle: f64, rng: &mut Rng) {
+pub(super) fn turn(pose: &mut PoseData, angle: f64, rng: &mut Rng) {
     let turned = Pose::rotation(Vector::from(rng.direction()) * angle).rotation * Pose::from(&*pose).rotation;
     let mut rotated = Pose::from(&*pose);
     rotated.rotation = turned;
