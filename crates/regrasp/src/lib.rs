@@ -21,6 +21,6 @@ pub use regrasp_viewer as viewer;
 pub use regrasp_base::{Budget, InputError};
 pub use regrasp_plan::Plan;
 pub use regrasp_planners::{
-    Failure, InHandSettings, Method, PlannerSettings, TrackingSettings, plan_in_hand, plan_tracking,
+    Failure, InHandSettings, Method, PlannerSettings, TrackingMethod, TrackingSettings, plan_in_hand, plan_tracking,
 };
 pub use regrasp_scene::{InHandQuery, Scene};

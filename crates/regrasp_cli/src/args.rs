@@ -6,8 +6,8 @@ use regrasp_bench::growth::Curve;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Methods of the in-hand planner, as `regrasp_planners::Method` spells them.
-pub const METHODS: [&str; 3] = ["gait", "visibility", "classic"];
+/// Methods of the in-hand planner, as `regrasp_planners::Method` spells them, and of tracking, as `TrackingMethod` does.
+pub const METHODS: [&str; 5] = ["gait", "visibility", "classic", "tracking", "tracking+gaiting"];
 
 /// Most threads that may be asked for.
 const MAX_THREADS: i64 = 1024;
@@ -105,7 +105,7 @@ pub struct Inspect {
 /// How to search.
 #[derive(Debug, Args)]
 pub struct Search {
-    /// Algorithm [default: gait, the best by measurement]
+    /// Algorithm [default: gait, the best by measurement; for tasks of tracking: tracking]
     #[arg(long, value_parser = PossibleValuesParser::new(METHODS))]
     pub method: Option<String>,
     /// All settings of the planner, as a plan file has them; what other flags say wins over it
@@ -553,7 +553,9 @@ mod tests {
     fn methods_are_those_of_the_planner() {
         for name in METHODS {
             let value = serde_json::Value::from(name);
-            assert!(serde_json::from_value::<regrasp::Method>(value).is_ok(), "{name}");
+            let is_in_hand = serde_json::from_value::<regrasp::Method>(value.clone()).is_ok();
+            let is_tracking = serde_json::from_value::<regrasp::TrackingMethod>(value).is_ok();
+            assert!(is_in_hand != is_tracking, "{name}");
         }
     }
 

@@ -53,14 +53,18 @@ pub fn settings(search: &Search, n_threads: usize) -> Result<InHandSettings, Sto
     Ok(settings)
 }
 
-/// Settings for a task of this kind: those of a tracking task are the file's alone (`A507`: a flag that has no meaning there).
+/// Settings for a task of this kind: those of a tracking task are the file's, but for the method (`A507`: a flag that has no meaning
+/// there).
 pub fn for_task(task: TaskKind, search: &Search, n_threads: usize) -> Result<PlannerSettings, Stop> {
     if task == TaskKind::InHand {
         return Ok(PlannerSettings { in_hand: settings(search, n_threads)?, ..PlannerSettings::default() });
     }
     refuse_flags_of_in_hand(search)?;
     let file = search.settings.as_deref();
-    let tracking: TrackingSettings = file.map_or_else(|| Ok(TrackingSettings::default()), settings_file)?;
+    let mut tracking: TrackingSettings = file.map_or_else(|| Ok(TrackingSettings::default()), settings_file)?;
+    if let Some(name) = search.method.as_deref() {
+        tracking.method = method_named(name)?;
+    }
     if let (Err(problem), Some(path)) = (tracking.validate(), file) {
         return Err(Stop::BadInput(Diagnostic::new("A503", Place::file(path), problem).into()));
     }
@@ -70,7 +74,6 @@ pub fn for_task(task: TaskKind, search: &Search, n_threads: usize) -> Result<Pla
 /// Refuses flags that say something about in-hand planning only (`A507`).
 fn refuse_flags_of_in_hand(search: &Search) -> Result<(), Stop> {
     let flags = [
-        ("--method", search.method.is_some(), "it chooses among the methods of in-hand planning"),
         ("--margin", search.margin.is_some(), "what slides closes nothing, so that closure is not judged"),
         ("--improve", search.improve.is_some(), "plans of tracking are not improved"),
         ("--improve-work", search.improve_work.is_some(), "plans of tracking are not improved"),
@@ -111,9 +114,8 @@ pub fn planner_settings(
 ) -> Result<InHandSettings, Stop> {
     let mut settings: InHandSettings = file.map_or_else(|| Ok(InHandSettings::default()), settings_file)?;
     settings.n_threads = n_threads;
-    // The argument parser lets only the planner's own spellings through; a test holds the two lists together.
-    if let Some(method) = method.and_then(|name| serde_json::from_value(name.into()).ok()) {
-        settings.method = method;
+    if let Some(name) = method {
+        settings.method = method_named(name)?;
     }
     if let Some(margin) = margin {
         settings.closure_margin = margin;
@@ -125,6 +127,15 @@ pub fn planner_settings(
             None => Err(Stop::argument("A503", "--margin", problem, "a number in [0, 1)")),
         },
     }
+}
+
+/// The method of a planner as its settings spell it. The argument parser lets only spellings of some planner through; a test
+/// holds the lists together. Errors: a method of the other kind of task (`A507`).
+fn method_named<T: serde::de::DeserializeOwned>(name: &str) -> Result<T, Stop> {
+    serde_json::from_value(name.into()).map_err(|error| {
+        let problem = format!("is \"{name}\", which does not plan tasks of this kind: {error}");
+        Stop::argument("A507", "--method", problem, "a method of the scene's task")
+    })
 }
 
 /// A JSON file of settings. Errors: as [`regrasp::base::files::read_text`], and not such settings (`A504`).

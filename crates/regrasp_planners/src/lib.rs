@@ -14,7 +14,7 @@ pub mod tracking;
 pub use failure::{Cause, Failure, FailureKind, NearestMiss};
 pub use in_hand::{InHandSettings, Method, Progress, plan_in_hand};
 pub use outline::{Outline, OutlineEdge, OutlineNode};
-pub use tracking::{TrackingSettings, plan_tracking};
+pub use tracking::{TrackingMethod, TrackingSettings, plan_tracking};
 
 use regrasp_base::Budget;
 use regrasp_plan::Plan;
