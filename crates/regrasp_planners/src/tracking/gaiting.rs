@@ -5,7 +5,7 @@
 //! the others closed and their forces within their cones. Which finger lands where is found by looking ahead: of some
 //! footholds of every finger that may leave, that one is taken from which tracking leads farthest towards the goal.
 
-use super::grasp::{PerFinger, TrackingGrasp, turn_to};
+use super::grasp::{TrackingGrasp, turn_to};
 use super::local::Local;
 use super::step::{Step, Stepper};
 use crate::in_hand::candidates::draw_footholds;
@@ -105,18 +105,13 @@ pub fn change_grasp(local: &mut Local, from: &TrackingGrasp, goal: &UnitQuaterni
     })
 }
 
-/// Fingers that may leave a grasp, as bits: the others are closed.
+/// Fingers that may leave a grasp, as bits: the others are closed. None where a finger is on an edge, or near one: in-hand planning
+/// holds on faces only.
 fn may_leave(model: &Model, grasp: &TrackingGrasp) -> u32 {
     let object = &model.scene.object;
-    // In-hand planning holds on faces only.
-    let is_on_face = |finger: usize| {
-        let touch = &grasp.touches[finger];
-        object.surface.crease_distance(&touch.foot) >= object.edge_distance
-    };
-    let on_faces: PerFinger<bool> = (0..model.n_fingers()).map(is_on_face).collect();
-    let others_on_faces = |leaving: usize| (0..model.n_fingers()).all(|finger| finger == leaving || on_faces[finger]);
-    let closed = releasable(model, &grasp.contacts(), model.all_fingers());
-    (0..model.n_fingers()).filter(|&finger| others_on_faces(finger)).map(|finger| closed & (1 << finger)).sum()
+    let on_faces =
+        grasp.touches.iter().all(|touch| object.surface.crease_distance(&touch.foot) >= object.edge_distance);
+    if on_faces { releasable(model, &grasp.contacts(), model.all_fingers()) } else { 0 }
 }
 
 /// Some footholds of every finger that may leave.

@@ -3,7 +3,7 @@
 //! 1999.
 //!
 //! At every instant one fingertip moves and the others rest. On one of these the object rolls without sliding; over the
-//! others it rolls and slides.
+//! others it rolls and slides. Where that gets no farther a finger may be relocated through the air: `gaiting`.
 
 /// Start and hand as the query gives them.
 mod endpoints;

@@ -141,3 +141,14 @@ fn benchmark_pages_of_what_is_no_benchmark() {
     complains(&run, "F001", "rows.csv", &["cannot be read"]);
     assert!(!folder.path("page.md").exists());
 }
+
+/// Each kind of task has its methods; one of the other kind is no synonym for the default.
+#[test]
+fn methods_of_another_kind_of_task() {
+    let folder = Folder::new();
+    let run = folder.run(&["plan", "scene.toml", "--method", "tracking+gaiting"]);
+    complains(&run, "A507", "--method", &["tracking+gaiting", "gait", "visibility"]);
+    let wide = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/tracking_sphere_wide.toml");
+    let run = folder.run(&["plan", wide, "--method", "visibility"]);
+    complains(&run, "A507", "--method", &["visibility", "tracking+gaiting"]);
+}
