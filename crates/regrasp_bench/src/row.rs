@@ -6,7 +6,7 @@ use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, check};
 use regrasp_plan::plan::Improvement;
 use regrasp_planners::in_hand::{NotProven, validate_once};
-use regrasp_planners::{Failure, InHandSettings, PlannerSettings, Progress, TrackingSettings, plan};
+use regrasp_planners::{Failure, InHandSettings, PlannerSettings, Progress, TrackingMethod, TrackingSettings, plan};
 use regrasp_scene::{InHandQuery, Scene, TaskKind};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -116,7 +116,7 @@ impl Row {
 
 /// True for the name of finger tracking's method, also where it is part of another's.
 pub fn is_tracking(method: &str) -> bool {
-    method.split('+').next() == Some(tracking::METHOD)
+    method.split('+').next() == Some(TrackingMethod::Tracking.name())
 }
 
 /// The word for a failure's kind, as its JSON spells it.

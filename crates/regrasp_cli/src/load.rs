@@ -134,7 +134,10 @@ pub fn planner_settings(
 fn method_named<T: serde::de::DeserializeOwned>(name: &str) -> Result<T, Stop> {
     serde_json::from_value(name.into()).map_err(|error| {
         let problem = format!("is \"{name}\", which does not plan tasks of this kind: {error}");
-        Stop::argument("A507", "--method", problem, "a method of the scene's task")
+        let diagnostic = Diagnostic::new("A507", Place::file("command line"), problem).element("argument", "--method");
+        Stop::BadInput(
+            diagnostic.expected("a method of the scene's task").fix("leave it out, or name one of these").into(),
+        )
     })
 }
 

@@ -303,7 +303,8 @@ pub fn search(
         counts.work += stepper.work - work_before;
         let here = moves.as_deref().and_then(<[Move]>::last).map(|last| last.end().clone());
         // Where no finger is relocated, what ends elsewhere is a node too, where no other is.
-        let was_relocated = !planned.arrived && moves.as_ref().is_some_and(|moves| matches!(moves[0], Move::Relocation(_)));
+        let was_relocated =
+            !planned.arrived && moves.as_ref().is_some_and(|moves| matches!(moves[0], Move::Relocation(_)));
         let (Some(moves), Some(grasp)) = (moves, here) else { continue };
         let target = if planned.arrived { target } else { graph.cells.of(&grasp.orientation()) };
         if !planned.arrived && !was_relocated && graph.taken.contains(&target) {
