@@ -177,7 +177,7 @@ impl Local<'_, '_, '_> {
         let size = model.frame.torque_scale;
         for moving in 0..model.n_fingers() {
             let mut before = self.lag(here, moving);
-            if before < FAR * size {
+            if before < FAR * size || !self.rolls_by_itself(moving) {
                 continue;
             }
             let rolling = self.rolling.filter(|once| *once != moving).unwrap_or((moving + 1) % model.n_fingers());
