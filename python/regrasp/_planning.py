@@ -18,7 +18,7 @@ from ._model import Scene, _load_scene, load_scene
 from ._plan import Plan
 from ._result import Failure, Progress, Report, failure_of, report_of
 
-METHODS = ("gait", "visibility", "classic")
+METHODS = ("gait", "visibility", "classic", "tracking", "tracking+gaiting")
 MAX_THREADS = 1024
 
 
@@ -29,7 +29,7 @@ def plan(
     threads: int = 1,
     time_limit: float | None = None,
     max_work: int = 20_000_000,
-    method: Literal["gait", "visibility", "classic"] | None = None,
+    method: Literal["gait", "visibility", "classic", "tracking", "tracking+gaiting"] | None = None,
     margin: float | None = None,
     improve: float | None = None,
     improve_work: int | None = None,
@@ -46,10 +46,10 @@ def plan(
     threads: threads that search at once.
     time_limit: seconds after which the search is cut; the plan then says so (`statistics["cut_by_time"]`).
     max_work: limit in configurations looked at, the same on every machine.
-    method: algorithm; "gait" where nothing else is said.
+    method: algorithm; "gait" where nothing else is said, "tracking" for tasks of that kind.
     margin: closure margin asked of every holding set, in [0, 1).
     improve: seconds spent on a better plan after the first; `improve_work`: the same by work.
-    method, margin, improve, improve_work: of in-hand tasks; refused for tasks of kind "tracking".
+    margin, improve, improve_work: of in-hand tasks; refused for tasks of kind "tracking".
     settings: settings of the planner, with the keys of "settings" in a plan file; the other arguments win over it.
     progress: called now and then, by this thread, with a `Progress`; what it raises stops the search and is raised.
 

@@ -111,13 +111,16 @@ fn given<T: Default + serde::de::DeserializeOwned>(request: &Request) -> Result<
     })
 }
 
-/// Settings for a task of this kind: those of a tracking task are the given ones alone.
+/// Settings for a task of this kind: those of a tracking task are the given ones, but for the method.
 fn settings(task: TaskKind, request: &Request) -> Result<PlannerSettings, Diagnostic> {
     match task {
         TaskKind::InHand => Ok(PlannerSettings { in_hand: in_hand(request)?, ..PlannerSettings::default() }),
         TaskKind::Tracking => {
             refuse_arguments_of_in_hand(request)?;
-            let tracking: TrackingSettings = given(request)?;
+            let mut tracking: TrackingSettings = given(request)?;
+            if let Some(method) = &request.method {
+                tracking.method = method_named(method)?;
+            }
             tracking.validate().map_err(|problem| bad("A503", problem).element("argument", "settings"))?;
             Ok(PlannerSettings { tracking, ..PlannerSettings::default() })
         }
@@ -127,7 +130,6 @@ fn settings(task: TaskKind, request: &Request) -> Result<PlannerSettings, Diagno
 /// Refuses arguments that say something about in-hand planning only, as the command line does (`A507`).
 fn refuse_arguments_of_in_hand(request: &Request) -> Result<(), Diagnostic> {
     let arguments = [
-        ("method", request.method.is_some(), "it chooses among the methods of in-hand planning"),
         ("margin", request.margin.is_some(), "what slides closes nothing, so that closure is not judged"),
         ("improve", request.improve.is_some(), "plans of tracking are not improved"),
         ("improve_work", request.improve_work.is_some(), "plans of tracking are not improved"),
@@ -141,13 +143,21 @@ fn refuse_arguments_of_in_hand(request: &Request) -> Result<(), Diagnostic> {
     }
 }
 
+/// A method of the planner, as its settings spell it. Errors: a method of the other kind of task (`A507`).
+fn method_named<T: serde::de::DeserializeOwned>(name: &str) -> Result<T, Diagnostic> {
+    serde_json::from_value(name.into()).map_err(|error| {
+        bad("A507", format!("is \"{name}\", which does not plan tasks of this kind: {error}"))
+            .element("argument", "method")
+            .fix("leave it out, or name a method of the scene's task")
+    })
+}
+
 /// Settings of the in-hand planner: defaults, then the JSON, then what has an argument of its own.
 fn in_hand(request: &Request) -> Result<InHandSettings, Diagnostic> {
     let mut settings: InHandSettings = given(request)?;
     settings.n_threads = request.threads;
     if let Some(method) = &request.method {
-        settings.method = serde_json::from_value(method.as_str().into())
-            .map_err(|error| bad("A510", error.to_string()).element("argument", "method"))?;
+        settings.method = method_named(method)?;
     }
     if let Some(margin) = request.margin {
         settings.closure_margin = margin;
