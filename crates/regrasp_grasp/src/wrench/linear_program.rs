@@ -14,6 +14,8 @@ pub const MAX_COLUMNS: usize = 36;
 const SMALLEST: f64 = 1e-10;
 /// What is left of the first phase that still counts as feasible.
 const FEASIBLE: f64 = 1e-9;
+/// What a solution may leave of the equations, with the largest unknown of size one.
+const EXACT: f64 = 1e-9;
 /// Pivots by the steepest rule; then Bland's takes over.
 const STEEPEST: usize = 60;
 /// Pivots after which there is no answer: rounding goes in circles.
@@ -38,6 +40,8 @@ pub enum NoSolution {
     Unbounded,
     /// Rounding does not let the method end.
     Circles,
+    /// The method ended, but rounding has led it off the equations.
+    Inexact,
 }
 
 impl LinearProgram {
@@ -67,7 +71,16 @@ impl LinearProgram {
                 *value = tableau.right[row].max(0.0);
             }
         }
-        Ok(x)
+        if self.is_solved_by(&x) { Ok(x) } else { Err(NoSolution::Inexact) }
+    }
+
+    /// True where `x` fulfils the equations: pivots near zero lose digits.
+    fn is_solved_by(&self, x: &[f64]) -> bool {
+        let size = x.iter().fold(1.0, |a: f64, b| a.max(b.abs()));
+        (0..self.n_rows).all(|row| {
+            let sum: f64 = x.iter().zip(&self.columns).map(|(x, column)| x * column[row]).sum();
+            (sum - self.right[row]).abs() <= EXACT * size
+        })
     }
 }
 
@@ -253,6 +266,44 @@ mod tests {
             }
         }
         assert!(n_feasible > 50 && n_infeasible > 50, "{n_feasible} {n_infeasible}");
+    }
+
+    /// Nearly parallel columns: a pivot near zero, after which the equations would be off by more than the unknowns' rounding.
+    #[test]
+    fn a_solution_fulfils_the_equations_or_there_is_none() {
+        let mut rng = Rng::keyed(2, "linear_program", 0);
+        let mut n_solved = 0;
+        for _ in 0..2000 {
+            let m = 4;
+            let mut columns = Vec::new();
+            for k in 0..8 {
+                let mut column = if k % 2 == 0 { [0.0; MAX_ROWS] } else { columns[k - 1] };
+                let size = if k % 2 == 0 { 1.0 } else { 10f64.powf(rng.uniform(-10.0, -8.0)) };
+                column[..m].iter_mut().for_each(|entry: &mut f64| *entry += size * rng.uniform(-1.0, 1.0));
+                columns.push(column);
+            }
+            let mut right = [0.0; 4];
+            for column in &columns {
+                let share = rng.uniform(0.0, 1.0);
+                right.iter_mut().zip(column).for_each(|(sum, entry)| *sum += share * entry);
+            }
+            let mut program = LinearProgram::new(&right);
+            columns.into_iter().for_each(|column| _ = program.add(column, rng.uniform(0.1, 1.0)));
+            match program.solve() {
+                Ok(x) => {
+                    n_solved += 1;
+                    let size = x.iter().fold(1.0, |a: f64, b| a.max(*b));
+                    for row in 0..m {
+                        let sum: f64 = x.iter().zip(&program.columns).map(|(x, column)| x * column[row]).sum();
+                        assert!((sum - right[row]).abs() <= 1e-9 * size);
+                    }
+                    let off: Vec<f64> = x.iter().map(|x| x + 1e-8 * size).collect();
+                    assert!(!program.is_solved_by(&off));
+                }
+                Err(why) => assert_eq!(why, NoSolution::Inexact),
+            }
+        }
+        assert!(n_solved > 1900, "{n_solved}");
     }
 
     fn column(first: f64, second: f64) -> [f64; MAX_ROWS] {

@@ -22,7 +22,8 @@ fn plan_with(loaded: &LoadedScene, query: &InHandQuery, seed: u64) -> Result<Pla
 #[test]
 fn the_football_is_turned_and_every_plan_is_accepted() {
     let loaded = scene("football.toml");
-    for seed in 0..4 {
+    // Seed 94 comes by columns that are nearly parallel: forces were off by 0.6 mN there.
+    for seed in [0, 1, 2, 3, 94] {
         let query = loaded.task.query(seed);
         let plan = plan_with(&loaded, &query, seed).unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
         let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
