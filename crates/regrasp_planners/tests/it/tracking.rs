@@ -160,6 +160,11 @@ fn what_tracking_is_not_made_for_is_refused_by_name() {
     let off = InHandQuery { start_grasp: GraspRequest::Contacts(points), ..query.clone() };
     refused(&loaded, &off, FailureKind::StartInvalid, "off the surface");
 
+    let mut dented = scene("diamond.toml");
+    let query_of_diamond = dented.task.query(0);
+    dented.scene.object = scene("bulb.toml").scene.object;
+    refused(&dented, &query_of_diamond, FailureKind::Impossible, "is not convex");
+
     let in_hand = plan_in_hand(&loaded.scene, &query, &InHandSettings::default(), 0, &Budget::work(10), &|_| {});
     assert!(in_hand.unwrap_err().message.contains("tracking"));
 }
@@ -177,6 +182,19 @@ fn a_goal_out_of_reach_is_a_failure_with_its_causes_and_the_nearest_miss() {
     let miss = failure.nearest_miss.expect("the start is the nearest");
     let whole = query.world_from_object_start.rotation.angle_to(&query.world_from_object_goal.rotation);
     assert!(miss.angle_left <= whole + 1e-9 && miss.angle_left > 0.5 * whole);
+}
+
+/// All normals in one plane: three fingertips that rest do not tell how the object turns in it.
+#[test]
+fn coplanar_normals_are_told_as_a_cause() {
+    let mut loaded = scene("football.toml");
+    loaded.scene.reach = None;
+    let around = [0.2f64, 1.7, 3.3, 4.9].map(|angle| Point::new(0.09 * angle.cos(), 0.09 * angle.sin(), 0.0));
+    let query = InHandQuery { start_grasp: GraspRequest::Contacts(around.to_vec()), ..loaded.task.query(0) };
+    let failure = plan_with(&loaded, &query, 0).unwrap_err();
+    let told = failure.causes.iter().find(|cause| cause.reason.starts_with("7: resting fingers tell no motion"));
+    assert!(told.is_some_and(|cause| cause.count > 0), "{failure}");
+    assert!(failure.nearest_miss.is_some());
 }
 
 #[test]

@@ -24,8 +24,17 @@ fn center_in_world(loaded: &LoadedScene, world_from_object: &Pose) -> Point {
 }
 
 /// Scenes of the papers that are more than a turn in place, and those of tracking, which have a start grasp.
-const PAPER_SCENES: [&str; 8] =
-    ["bulb", "cubic", "diamond", "ellipsoid_free", "ellipsoid_obstacle", "football", "pencil", "tracking_sphere_wide"];
+const PAPER_SCENES: [&str; 9] = [
+    "bulb",
+    "cubic",
+    "diamond",
+    "ellipsoid_free",
+    "ellipsoid_obstacle",
+    "football",
+    "football_pivot",
+    "pencil",
+    "tracking_sphere_wide",
+];
 
 #[test]
 fn scenes_of_the_bundled_hands_load_without_models() {
@@ -219,7 +228,12 @@ fn spheres_of_tracking_by_real_fingers_begin_with_contacts_on_them() {
 /// Paper 003, section 7: masses, friction, orientations, radii and reach.
 #[test]
 fn scenes_of_finger_tracking_are_those_of_the_paper() {
-    let ends = [("diamond", [0.5, 0.4, 0.4], [-0.5, -0.5, 0.7]), ("football", [0.5, 0.7, 0.4], [-0.6, -0.5, 0.8])];
+    let football = ([0.5, 0.7, 0.4], [-0.6, -0.5, 0.8]);
+    let ends = [
+        ("diamond", [0.5, 0.4, 0.4], [-0.5, -0.5, 0.7]),
+        ("football", football.0, football.1),
+        ("football_pivot", football.0, football.1),
+    ];
     for (name, start, goal) in ends {
         let loaded = load(&repository().join("scenes").join(format!("{name}.toml")), &LoadOptions::default());
         let (scene, query) = (&loaded.scene, loaded.task.query(3));
@@ -231,7 +245,7 @@ fn scenes_of_finger_tracking_are_those_of_the_paper() {
         }
         for finger in &scene.hand.fingers {
             assert!((0.02..=0.04).contains(&finger.tip.radius()));
-            assert_eq!(finger.tip.pad.is_some(), name == "football");
+            assert_eq!(finger.tip.pad.is_some(), name.starts_with("football"));
         }
         let regrasp_scene::GraspRequest::Contacts(contacts) = &query.start_grasp else { panic!("contacts are given") };
         for (finger, contact) in scene.hand.fingers.iter().zip(contacts) {
@@ -239,7 +253,9 @@ fn scenes_of_finger_tracking_are_those_of_the_paper() {
             assert!((foot.point_in_object - contact).norm() < 1e-8);
             let center = query.world_from_object_start
                 * (foot.point_in_object + foot.normal_in_object.into_inner() * finger.tip.radius());
-            assert!((finger.ik.tip(&finger.rest) - center).norm() < 2e-6, "the tip rests where it touches first");
+            let away = (finger.ik.tip(&finger.rest) - center).norm();
+            // Those of the diamond rest where half of the turn is done.
+            assert!(if name == "diamond" { away < 0.1 } else { away < 2e-6 }, "{name}: {away}");
         }
     }
 }
