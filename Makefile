@@ -182,9 +182,10 @@ replay: python
 TRACKING_SEEDS ?= 20
 replay-tracking: python
 	[ -d $(VENV) ] || { echo "error: replays need the Python package (see above)" >&2; exit 1; }
-	mkdir -p $(OUT)/replay-tracking $(OUT)/replay-tracking-paper docs/benchmarks/replay
+	mkdir -p $(OUT)/replay-tracking $(OUT)/replay-tracking-paper $(OUT)/replay-tracking-gaiting docs/benchmarks/replay
 	$(SIMULATE) scenes/football.toml --gravity plan --controllers B,H --seeds $(TRACKING_SEEDS) -o $(OUT)/replay-tracking-paper --name tracking_paper
 	$(SIMULATE) scenes/football.toml --gravity plan --controllers B,C2,H --settings docs/benchmarks/tracking_replay.json --seeds $(TRACKING_SEEDS) -o $(OUT)/replay-tracking --name tracking
+	$(SIMULATE) scenes/tracking_sphere_wide.toml --gravity plan --controllers B,C2,H --settings docs/benchmarks/gaiting_replay.json --seeds $(TRACKING_SEEDS) -o $(OUT)/replay-tracking-gaiting --name gaiting
 	cp $(OUT)/replay-tracking*/*.csv $(OUT)/replay-tracking*/*.md docs/benchmarks/replay/
 
 # Slow: same bytes on 1, 2 and 8 threads (100 queries), and the checker against broken and good plans; torsion and couplings

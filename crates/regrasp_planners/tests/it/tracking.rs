@@ -184,6 +184,29 @@ fn a_goal_out_of_reach_is_a_failure_with_its_causes_and_the_nearest_miss() {
     assert!(miss.angle_left <= whole + 1e-9 && miss.angle_left > 0.5 * whole);
 }
 
+/// Paper 003, conclusion: with three fingertips two rest, and of the object's turn two components are free.
+#[test]
+fn three_fingertips_turn_a_ball_on_two_that_rest() {
+    let loaded = scene("three_fingertips.toml");
+    for seed in 0..3 {
+        let query = loaded.task.query(seed);
+        let plan = plan_with(&loaded, &query, seed).unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
+        let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+        assert!(report.accepted(), "seed {seed}: {:?}", report.violations.first());
+        let waypoints = plan.segments.iter().flat_map(|segment| &segment.waypoints);
+        let modes: BTreeSet<String> = waypoints
+            .filter(|waypoint| waypoint.contacts.iter().any(|contact| contact.mode == ContactMode::Sliding))
+            .map(|waypoint| {
+                let mut modes: Vec<String> =
+                    waypoint.contacts.iter().map(|contact| format!("{:?}", contact.mode)).collect();
+                modes.sort();
+                modes.join(" ")
+            })
+            .collect();
+        assert_eq!(modes.into_iter().collect::<Vec<_>>(), ["PureRolling Rolling Sliding"]);
+    }
+}
+
 /// All normals in one plane: three fingertips that rest do not tell how the object turns in it.
 #[test]
 fn coplanar_normals_are_told_as_a_cause() {

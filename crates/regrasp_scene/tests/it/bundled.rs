@@ -24,7 +24,7 @@ fn center_in_world(loaded: &LoadedScene, world_from_object: &Pose) -> Point {
 }
 
 /// Scenes of the papers that are more than a turn in place, and those of tracking, which have a start grasp.
-const PAPER_SCENES: [&str; 9] = [
+const PAPER_SCENES: [&str; 10] = [
     "bulb",
     "cubic",
     "diamond",
@@ -33,6 +33,7 @@ const PAPER_SCENES: [&str; 9] = [
     "football",
     "football_pivot",
     "pencil",
+    "three_fingertips",
     "tracking_sphere_wide",
 ];
 
