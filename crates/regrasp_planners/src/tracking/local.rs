@@ -50,11 +50,11 @@ struct Prospect {
     tip_way: Vector,
 }
 
-/// Where fingertips have their homes: their centres.
+/// Where the centres of the fingertips have their homes: places that moving fingers roll back to.
 pub enum Homes {
-    /// In the object frame.
+    /// They turn with the object: points in the object frame.
     OnObject(PerFinger<Point>),
-    /// In the world.
+    /// They stay where they are: points in the world.
     InWorld(PerFinger<Point>),
 }
 
@@ -170,8 +170,8 @@ impl Local<'_, '_, '_> {
         LocalPlan { steps, arrived }
     }
 
-    /// While the object rests, rolls fingers back that have come far from home: the paper's object at rest (section 6.2.4,
-    /// `w_O` of zero), with a purpose.
+    /// While the object rests, rolls fingers back that are [`FAR`] from home until they are [`NEAR`] or come no nearer: the
+    /// paper's object at rest (section 6.2.4, `w_O` of zero), with a purpose. `here` becomes the end of what is added to `steps`.
     fn restore(&mut self, here: &mut TrackingGrasp, steps: &mut Vec<Step>) {
         let model = self.stepper.model;
         let size = model.frame.torque_scale;
@@ -206,6 +206,7 @@ impl Local<'_, '_, '_> {
         }
     }
 
+    /// A fingertip's home as the object lies.
     fn home_in_object(&self, here: &TrackingGrasp, finger: usize) -> Point {
         match self.homes {
             Homes::OnObject(centers) => centers[finger],
@@ -341,14 +342,18 @@ impl Local<'_, '_, '_> {
         let (x, y) = frame::tangents(&UnitVector::new_unchecked(ball.normal));
         let arm = ball.normal * self.stepper.model.fingers[moving].tip_radius;
         let most = settings.rolling_velocity * seconds;
-        let ahead = if tip_way.is_none() { 1.0 } else { AHEAD / settings.time_step };
         let mut home = self.home_in_object(here, moving);
-        if let (Homes::InWorld(_), Some(tip_way)) = (self.homes, tip_way) {
-            home -= here.world_from_object.vector_to_child(tip_way) * ahead;
+        // Where the object rests, only this step is sure to be rolled so; else others like it follow.
+        let mut n_steps = 1.0;
+        if let Some(tip_way) = tip_way {
+            n_steps = AHEAD / settings.time_step;
+            if matches!(self.homes, Homes::InWorld(_)) {
+                home -= here.world_from_object.vector_to_child(tip_way) * n_steps;
+            }
         }
         let left = |control: &[f64; 2]| {
             let turn = x.into_inner() * control[0] + y.into_inner() * control[1];
-            (ball.center + turn.cross(&arm) * ahead - home).norm()
+            (ball.center + turn.cross(&arm) * n_steps - home).norm()
         };
         let controls = (0..9).map(|k| [f64::from(k % 3 - 1) * most, f64::from(k / 3 - 1) * most]);
         controls.min_by(|a, b| left(a).total_cmp(&left(b))).unwrap_or([0.0; 2])

@@ -1,5 +1,8 @@
 //! The high level (paper 003, section 5): A* over cells of the orientation space. Nodes are grasps; from each, nominal turns at
 //! extreme velocities lead to sub-goals in cells that no grasp is in yet; the local planner finds out whether they do.
+//!
+//! Unlike the paper's: a sub-goal straight on is added; a local plan that ends elsewhere, where no grasp is, is a node too; the
+//! distance left counts [`TrackingSettings::goal_weight`]; after [`TrackingSettings::patience`] sub-goals in vain the search ends.
 
 use super::gaiting::{Move, change_grasp};
 use super::grasp::{TrackingGrasp, turn_to};
@@ -173,14 +176,15 @@ impl<'g> Graph<'g> {
         is_goal
     }
 
-    /// Adds the sub-goals of a node: turns at extreme velocities about the axes of the world, and the goal where it is as near.
+    /// Adds the sub-goals of a node: turns at extreme velocities about the axes of the world, one straight to the goal, and the
+    /// goal itself where it is as near: that one is tried although its cell may be taken.
     fn expand(&mut self, node: usize) {
         let turn = self.settings.object_velocity * self.settings.sub_goal_time;
         let from = self.nodes[node].grasp.orientation();
-        if turn_to(&from, &self.goal).amax() <= turn {
+        let left = turn_to(&from, &self.goal);
+        if left.amax() <= turn {
             self.open(node, &from, self.goal, true);
         }
-        let left = turn_to(&from, &self.goal);
         self.open(node, &from, UnitQuaternion::from_scaled_axis(left * (turn / left.amax()).min(1.0)) * from, false);
         for x in -1..=1 {
             for y in -1..=1 {
@@ -290,23 +294,16 @@ pub fn search(
         let work_before = stepper.work;
         let mut local = Local { stepper, rng, rolling, homes: &homes, failures: &mut counts.failures };
         let planned = local.plan(&from.grasp, &best.orientation, settings.goal_tolerance, before);
-        let gaits = settings.method == TrackingMethod::TrackingAndGaiting && from.n_changes < MOST_CHANGES;
-        let changed = match !planned.arrived && gaits {
-            true => change_grasp(&mut local, &from.grasp, goal),
-            false => None,
-        };
-        graph.nodes[best.node].n_changes += usize::from(!planned.arrived && gaits);
-        let moves = changed.or_else(|| {
-            let steps: Vec<Move> = planned.steps.into_iter().map(Move::from).collect();
-            (!steps.is_empty()).then_some(steps)
-        });
+        let gaits =
+            !planned.arrived && settings.method == TrackingMethod::TrackingAndGaiting && from.n_changes < MOST_CHANGES;
+        let changed = if gaits { change_grasp(&mut local, &from.grasp, goal) } else { None };
+        graph.nodes[best.node].n_changes += usize::from(gaits);
         counts.work += stepper.work - work_before;
-        let here = moves.as_deref().and_then(<[Move]>::last).map(|last| last.end().clone());
-        // Where no finger is relocated, what ends elsewhere is a node too, where no other is.
-        let was_relocated =
-            !planned.arrived && moves.as_ref().is_some_and(|moves| matches!(moves[0], Move::Relocation(_)));
-        let (Some(moves), Some(grasp)) = (moves, here) else { continue };
+        let was_relocated = changed.is_some();
+        let moves: Vec<Move> = changed.unwrap_or_else(|| planned.steps.into_iter().map(Move::from).collect());
+        let Some(grasp) = moves.last().map(|last| last.end().clone()) else { continue };
         let target = if planned.arrived { target } else { graph.cells.of(&grasp.orientation()) };
+        // A grasp with a finger elsewhere is another one in the same cell.
         if !planned.arrived && !was_relocated && graph.taken.contains(&target) {
             continue;
         }

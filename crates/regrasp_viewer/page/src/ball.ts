@@ -7,16 +7,13 @@ import type { Motion } from "./motion";
 import type { Player } from "./player";
 import type { Story } from "./story";
 import { COMPONENTS, type Theme } from "./theme";
+import { cleared, keyOf, markEnd, markNow, turnable, type KeyItem } from "./turnable";
 
 const HEIGHT = 280;
 
 export class Ball {
   readonly element: HTMLElement;
-  private readonly base = el("canvas", {
-    role: "img",
-    tabindex: 0,
-    "aria-label": "Orientation of the object as a point in the ball of rotation vectors. Drag or use the arrow keys to turn.",
-  });
+  private readonly base = turnable("Orientation of the object as a point in the ball of rotation vectors.", (x, y) => this.rotateBy(x, y));
   private readonly over = el("canvas", { "aria-hidden": "true", class: "over" });
   private readonly readout = el("span", { class: "readout" });
   private turn: Quat = multiply(fromRotationVector([-1.1, 0, 0]), fromRotationVector([0, 0, 0.6]));
@@ -55,51 +52,20 @@ export class Ball {
       el("div", { class: "ball-plot" }, this.base, this.over),
       this.key(sizes),
     );
-    this.listen();
     player.onTime(() => this.drawNow());
     theme.onChange(() => this.draw());
     new ResizeObserver(() => this.draw()).observe(this.base);
   }
 
   private key(sizes: Map<number, number>): HTMLElement {
-    const key = el("ul", { class: "key" });
-    const item = (text: string, colour: string | null, kind: string) => {
-      const dot = el("span", { class: `dot ${kind}` });
-      if (colour) dot.style.background = colour;
-      key.append(el("li", {}, dot, text));
-    };
-    item("start", null, "start");
-    item("goal", null, "goal");
+    const items: KeyItem[] = [];
     const groups = [...this.rank].filter(([component]) => sizes.get(component)! > 1);
-    for (const [component, rank] of groups.slice(0, 4)) item(`component ${rank + 1}: ${sizes.get(component)} nodes`, COMPONENTS[rank] ?? "#9aa2a9", "");
-    if (groups.length > 4) item(`${groups.length - 4} further components`, "#9aa2a9", "");
+    for (const [component, rank] of groups.slice(0, 4)) items.push([`component ${rank + 1}: ${sizes.get(component)} nodes`, COMPONENTS[rank] ?? "#9aa2a9", ""]);
+    if (groups.length > 4) items.push([`${groups.length - 4} further components`, "#9aa2a9", ""]);
     const alone = this.rank.size - groups.length;
-    if (this.story.roadmap?.solution.length) item("node of the plan", null, "ring");
-    if (alone > 0) item(`${alone} isolated node${alone === 1 ? "" : "s"}`, null, "hollow");
-    return el("div", {}, key, el("p", { class: "note" },
-      "Distance from the centre is the angle turned since the start, direction its axis; the rim is 180\u00b0, where opposite points are the same."));
-  }
-
-  private listen(): void {
-    let last: PointerEvent | null = null;
-    this.base.addEventListener("pointerdown", (event) => {
-      last = event;
-      this.base.setPointerCapture(event.pointerId);
-    });
-    this.base.addEventListener("pointermove", (event) => {
-      if (!last) return;
-      this.rotateBy((event.clientX - last.clientX) / 90, (event.clientY - last.clientY) / 90);
-      last = event;
-    });
-    for (const end of ["pointerup", "pointercancel"]) this.base.addEventListener(end, () => { last = null; });
-    this.base.addEventListener("keydown", (event) => {
-      const steps: Record<string, [number, number]> = { ArrowLeft: [-0.15, 0], ArrowRight: [0.15, 0], ArrowUp: [0, -0.15], ArrowDown: [0, 0.15] };
-      const step = steps[event.key];
-      if (!step) return;
-      event.preventDefault();
-      event.stopPropagation();
-      this.rotateBy(...step);
-    });
+    if (this.story.roadmap?.solution.length) items.push(["node of the plan", null, "ring"]);
+    if (alone > 0) items.push([`${alone} isolated node${alone === 1 ? "" : "s"}`, null, "hollow"]);
+    return keyOf(items, "Distance from the centre is the angle turned since the start, direction its axis; the rim is 180\u00b0, where opposite points are the same.");
   }
 
   private rotateBy(x: number, y: number): void {
@@ -108,19 +74,9 @@ export class Ball {
   }
 
   private prepare(canvas: HTMLCanvasElement): { context: CanvasRenderingContext2D; place: (v: Vec3) => [number, number, number]; radius: number; centre: [number, number] } | null {
-    const width = canvas.clientWidth;
-    const context = canvas.getContext("2d");
-    if (width === 0 || !context) return null;
-    const ratio = Math.min(devicePixelRatio || 1, 2);
-    const [pixelsWide, pixelsHigh] = [Math.round(width * ratio), Math.round(HEIGHT * ratio)];
-    if (canvas.width !== pixelsWide || canvas.height !== pixelsHigh) {
-      canvas.width = pixelsWide;
-      canvas.height = pixelsHigh;
-    }
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.clearRect(0, 0, width, HEIGHT);
-    context.font = `11px ${getComputedStyle(document.body).fontFamily}`;
-    context.textBaseline = "middle";
+    const drawn = cleared(canvas, HEIGHT);
+    if (!drawn) return null;
+    const { context, width } = drawn;
     const radius = Math.min(width, HEIGHT) / 2 - 22;
     const centre: [number, number] = [width / 2, HEIGHT / 2];
     const place = (v: Vec3): [number, number, number] => {
@@ -147,8 +103,10 @@ export class Ball {
     this.axes(context, place);
     this.graph(context, place);
     this.line(context, place);
-    this.mark(context, place([0, 0, 0]), "start");
-    this.mark(context, place(this.goal), "goal");
+    for (const [at, kind] of [[[0, 0, 0], "start"], [this.goal, "goal"]] as [Vec3, "start" | "goal"][]) {
+      const [x, y] = place(at);
+      markEnd(context, this.theme, [x, y], kind);
+    }
     this.drawNow();
   }
 
@@ -237,7 +195,6 @@ export class Ball {
 
   private line(context: CanvasRenderingContext2D, place: (v: Vec3) => [number, number, number]): void {
     const { colours } = this.theme;
-    context.lineJoin = "round";
     const stroke = (points: Vec3[], dash: number[], width: number) => {
       context.strokeStyle = colours.ink;
       context.lineWidth = width;
@@ -265,24 +222,6 @@ export class Ball {
     if (run.length > 1) stroke(run, [], 2);
   }
 
-  private mark(context: CanvasRenderingContext2D, [x, y]: [number, number, number], kind: "start" | "goal"): void {
-    const { colours } = this.theme;
-    context.fillStyle = colours.panel;
-    context.strokeStyle = colours.ink;
-    context.lineWidth = 1.75;
-    context.beginPath();
-    if (kind === "start") context.arc(x, y, 4.5, 0, 2 * Math.PI);
-    else {
-      context.moveTo(x, y - 6);
-      context.lineTo(x + 6, y);
-      context.lineTo(x, y + 6);
-      context.lineTo(x - 6, y);
-      context.closePath();
-    }
-    context.fill();
-    context.stroke();
-  }
-
   private drawNow(): void {
     const made = this.prepare(this.over);
     const now = rotationBetween(this.origin, this.motion.object(this.player.time).quat);
@@ -291,13 +230,7 @@ export class Ball {
     if (!made) return;
     const { context, place } = made;
     const [x, y] = place(now);
-    context.fillStyle = this.theme.colours.accent;
-    context.strokeStyle = this.theme.colours.panel;
-    context.lineWidth = 2;
-    context.beginPath();
-    context.arc(x, y, 6, 0, 2 * Math.PI);
-    context.fill();
-    context.stroke();
+    markNow(context, this.theme, [x, y], 6);
   }
 
   private left(now: Vec3): number {

@@ -7,6 +7,7 @@ import type { Motion } from "./motion";
 import type { Player } from "./player";
 import type { Plan } from "./story";
 import { fingerColour, type Theme } from "./theme";
+import { cleared, keyOf, markEnd, markNow, turnable } from "./turnable";
 import { ticks, tickText } from "./charts/frame";
 
 const HEIGHT = 320;
@@ -36,11 +37,10 @@ export function anglesAlong(motion: Motion): number[] {
 
 export class OrientationPath {
   readonly element: HTMLElement;
-  private readonly base = el("canvas", {
-    role: "img",
-    tabindex: 0,
-    "aria-label": "Path of the object's orientation in the space of rotation vectors, and its projection on the plane of x and y. Drag or use the arrow keys to turn.",
-  });
+  private readonly base = turnable(
+    "Path of the object's orientation in the space of rotation vectors, and its projection on the plane of x and y.",
+    (x, y) => this.turnBy(x, y),
+  );
   private readonly over = el("canvas", { "aria-hidden": "true", class: "over" });
   private readonly readout = el("span", { class: "readout" });
   private azimuth = -0.95;
@@ -64,48 +64,14 @@ export class OrientationPath {
       { class: "card ball orientation-path" },
       el("div", { class: "chart-head" }, el("h2", {}, "Orientation path"), this.readout),
       el("div", { class: "ball-plot path-plot" }, this.base, this.over),
-      this.key(plan),
+      keyOf(
+        plan.fingers.map((name, i) => [`${name} moves`, fingerColour(i), ""]),
+        "Rotation vectors of the object in the world, in radians: direction is the axis of the turn, length its angle. Grey: the path on the plane of x and y.",
+      ),
     );
-    this.listen();
     player.onTime(() => this.drawNow());
     theme.onChange(() => this.draw());
     new ResizeObserver(() => this.draw()).observe(this.base);
-  }
-
-  private key(plan: Plan): HTMLElement {
-    const key = el("ul", { class: "key" });
-    const item = (text: string, colour: string | null, kind: string) => {
-      const dot = el("span", { class: `dot ${kind}` });
-      if (colour) dot.style.background = colour;
-      key.append(el("li", {}, dot, text));
-    };
-    item("start", null, "start");
-    item("goal", null, "goal");
-    plan.fingers.forEach((name, i) => item(`${name} moves`, fingerColour(i), ""));
-    return el("div", {}, key, el("p", { class: "note" },
-      "Rotation vectors of the object in the world, in radians: direction is the axis of the turn, length its angle. Grey: the path on the plane of x and y."));
-  }
-
-  private listen(): void {
-    let last: PointerEvent | null = null;
-    this.base.addEventListener("pointerdown", (event) => {
-      last = event;
-      this.base.setPointerCapture(event.pointerId);
-    });
-    this.base.addEventListener("pointermove", (event) => {
-      if (!last) return;
-      this.turnBy((event.clientX - last.clientX) / 90, (event.clientY - last.clientY) / 90);
-      last = event;
-    });
-    for (const end of ["pointerup", "pointercancel"]) this.base.addEventListener(end, () => { last = null; });
-    this.base.addEventListener("keydown", (event) => {
-      const steps: Record<string, [number, number]> = { ArrowLeft: [-0.15, 0], ArrowRight: [0.15, 0], ArrowUp: [0, -0.15], ArrowDown: [0, 0.15] };
-      const step = steps[event.key];
-      if (!step) return;
-      event.preventDefault();
-      event.stopPropagation();
-      this.turnBy(...step);
-    });
   }
 
   private turnBy(x: number, y: number): void {
@@ -116,20 +82,9 @@ export class OrientationPath {
 
   /** The context, cleared, and where a rotation vector lies on it. */
   private prepare(canvas: HTMLCanvasElement): { context: CanvasRenderingContext2D; place: (v: Vec3) => [number, number] } | null {
-    const width = canvas.clientWidth;
-    const context = canvas.getContext("2d");
-    if (width === 0 || !context) return null;
-    const ratio = Math.min(devicePixelRatio || 1, 2);
-    const [pixelsWide, pixelsHigh] = [Math.round(width * ratio), Math.round(HEIGHT * ratio)];
-    if (canvas.width !== pixelsWide || canvas.height !== pixelsHigh) {
-      canvas.width = pixelsWide;
-      canvas.height = pixelsHigh;
-    }
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.clearRect(0, 0, width, HEIGHT);
-    context.font = `11px ${getComputedStyle(document.body).fontFamily}`;
-    context.textBaseline = "middle";
-    context.lineJoin = "round";
+    const drawn = cleared(canvas, HEIGHT);
+    if (!drawn) return null;
+    const { context, width } = drawn;
     const middle = scale(add(this.low, this.high), 0.5);
     // The box fits, whatever its azimuth.
     const [wide, deep, high] = sub(this.high, this.low);
@@ -163,8 +118,8 @@ export class OrientationPath {
     stroke(this.path.map(onPlane), colours.faint, 1.5);
     for (const end of [this.path[0], this.goal]) stroke([end, onPlane(end)], colours.faint, 1, [2, 3]);
     for (const { first, last, moving } of this.motion.stretches) stroke(this.path.slice(first, last + 1), moving < 0 ? colours.ink : fingerColour(moving), 2.5);
-    this.mark(context, place(this.path[0]), "start");
-    this.mark(context, place(this.goal), "goal");
+    markEnd(context, this.theme, place(this.path[0]), "start");
+    markEnd(context, this.theme, place(this.goal), "goal");
     this.drawNow();
   }
 
@@ -202,22 +157,6 @@ export class OrientationPath {
     axis(2, (z) => [low[0], high[1], z], (z) => [middle[0], middle[1], z]);
   }
 
-  private mark(context: CanvasRenderingContext2D, [x, y]: [number, number], kind: "start" | "goal"): void {
-    const { colours } = this.theme;
-    context.fillStyle = colours.panel;
-    context.strokeStyle = colours.ink;
-    context.lineWidth = 1.75;
-    context.beginPath();
-    if (kind === "start") context.arc(x, y, 4.5, 0, 2 * Math.PI);
-    else {
-      context.moveTo(x, y - 6);
-      for (const [right, down] of [[6, 0], [0, 6], [-6, 0]]) context.lineTo(x + right, y + down);
-      context.closePath();
-    }
-    context.fill();
-    context.stroke();
-  }
-
   private drawNow(): void {
     const { index, u } = this.motion.moment(this.player.time);
     const before = this.path[index];
@@ -228,14 +167,7 @@ export class OrientationPath {
     const made = this.prepare(this.over);
     if (!made) return;
     const { context, place } = made;
-    for (const [at, radius] of [[[now[0], now[1], 0], 3.5], [now, 6]] as [Vec3, number][]) {
-      context.fillStyle = this.theme.colours.accent;
-      context.strokeStyle = this.theme.colours.panel;
-      context.lineWidth = 2;
-      context.beginPath();
-      context.arc(...place(at), radius, 0, 2 * Math.PI);
-      context.fill();
-      context.stroke();
-    }
+    markNow(context, this.theme, place([now[0], now[1], 0]), 3.5);
+    markNow(context, this.theme, place(now), 6);
   }
 }
