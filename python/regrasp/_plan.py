@@ -30,12 +30,21 @@ CONTACT_MODES = ("free", "fixed", "rolling", "pure_rolling", "twisting", "pure_s
 class Segment:
     """A piece of motion: waypoints `start` to `stop` (exclusive) of the plan's arrays."""
 
-    kind: Literal["transfer", "regrasp"]
-    """In a transfer the object moves; in a regrasp it stands still and one finger moves."""
+    kind: Literal["transfer", "regrasp", "tracking"]
+    """In a transfer the object moves; in a regrasp it stands still and one finger moves; in tracking all touch it and some move."""
     moving_finger: str | None
-    """The finger that moves, in a regrasp."""
+    """The finger that moves, in a regrasp or in tracking."""
     start: int
     stop: int
+    also_moving: tuple[str, ...] = ()
+    """In tracking by more than four fingers, others that move with it."""
+    rolling_finger: str | None = None
+    """In tracking, the resting finger that the object rolls on without sliding."""
+
+    @property
+    def moving(self) -> tuple[str, ...]:
+        """All fingers that move."""
+        return (*(() if self.moving_finger is None else (self.moving_finger,)), *self.also_moving)
 
     @property
     def slice(self) -> slice:
@@ -243,7 +252,7 @@ class Plan:
 
     def _table(self) -> str:
         rows = "".join(
-            f"<tr><td>{index}</td><td>{segment.kind}</td><td>{escape(segment.moving_finger or '')}</td>"
+            f"<tr><td>{index}</td><td>{segment.kind}</td><td>{escape(', '.join(segment.moving))}</td>"
             f"<td>{self.times[segment.start]:.2f} s</td><td>{segment.stop - segment.start}</td></tr>"
             for index, segment in enumerate(self.segments)
         )
@@ -256,6 +265,7 @@ def _segments(entries: list[dict[str, Any]]) -> tuple[Segment, ...]:
     start = 0
     for entry in entries:
         stop = start + entry["n_waypoints"]
-        segments.append(Segment(entry["kind"], entry["moving_finger"], start, stop))
+        also = tuple(entry["also_moving"])
+        segments.append(Segment(entry["kind"], entry["moving_finger"], start, stop, also, entry["rolling_finger"]))
         start = stop
     return tuple(segments)

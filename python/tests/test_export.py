@@ -115,6 +115,9 @@ def test_numpy_reads_the_arrays_without_pickle(plan: regrasp.Plan, tmp_path: Pat
     assert arrays["segment_kinds"].tolist() == [segment.kind for segment in plan.segments]
     moving = [None if k < 0 else plan.fingers[k] for k in arrays["segment_moving_fingers"].tolist()]
     assert moving == [segment.moving_finger for segment in plan.segments]
+    moves = [[name in segment.moving for name in plan.fingers] for segment in plan.segments]
+    np.testing.assert_array_equal(arrays["segment_moves"].astype(bool), moves)
+    assert arrays["segment_rolling_fingers"].tolist() == [-1 if s.rolling_finger is None else plan.fingers.index(s.rolling_finger) for s in plan.segments]
     assert ("joint_torques" in arrays) == (plan.joint_torques is not None)
 
 

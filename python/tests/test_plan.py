@@ -55,6 +55,7 @@ def test_arrays_say_what_the_file_says(plan: regrasp.Plan) -> None:
     assert plan.joints.shape == (n, j) and plan.contact_points_in_object.shape == (n, f, 3)
     for segment, entry in zip(plan.segments, file["segments"], strict=True):
         assert (segment.kind, segment.moving_finger) == (entry["kind"], entry.get("moving_finger"))
+        assert (segment.also_moving, segment.rolling_finger) == (tuple(entry.get("also_moving", ())), entry.get("rolling_finger"))
         assert plan.times[segment.slice].tolist() == [w["time"] for w in entry["waypoints"]]
     assert all(plan.segments[s].start <= k < plan.segments[s].stop for k, s in enumerate(plan.segment_of_waypoint))
     for name in ("promises", "statistics", "settings", "seed", "method", "tool"):

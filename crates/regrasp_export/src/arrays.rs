@@ -40,8 +40,12 @@ pub struct PlanArrays {
     pub segment_of_waypoint: Vec<i64>,
     /// s: kind of each segment.
     pub segment_kinds: Vec<SegmentKind>,
-    /// s: index of the finger that moves, -1 in transfers.
+    /// s: index of the finger that moves, of several the first, -1 in transfers.
     pub segment_moving_fingers: Vec<i64>,
+    /// s x f: 1 where the finger moves in a regrasp or in tracking, else 0.
+    pub segment_moves: Vec<i64>,
+    /// s: index of the finger that the object rolls on in tracking, else -1.
+    pub segment_rolling_fingers: Vec<i64>,
     /// s + 1: index of the first waypoint of each segment, and n.
     pub segment_starts: Vec<i64>,
 }
@@ -142,6 +146,20 @@ impl PlanArrays {
                 .segments
                 .iter()
                 .map(|segment| finger_number(&plan.fingers, segment.moving_finger.as_deref()))
+                .collect(),
+            segment_moves: plan
+                .segments
+                .iter()
+                .flat_map(|segment| {
+                    let moves =
+                        |name| segment.moving_finger.as_ref() == Some(name) || segment.also_moving.contains(name);
+                    plan.fingers.iter().map(move |name| i64::from(moves(name)))
+                })
+                .collect(),
+            segment_rolling_fingers: plan
+                .segments
+                .iter()
+                .map(|segment| finger_number(&plan.fingers, segment.rolling_finger.as_deref()))
                 .collect(),
             segment_starts,
         }

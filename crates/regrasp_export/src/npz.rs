@@ -25,6 +25,8 @@ pub fn to_npz(plan: &Plan) -> Vec<u8> {
     let kinds: Vec<&str> = arrays.segment_kinds.iter().map(|&kind| kind_name(kind)).collect();
     file.add("segment_kinds", &texts(&[kinds.len()], &kinds));
     file.add("segment_moving_fingers", &integers(&[kinds.len()], &arrays.segment_moving_fingers));
+    file.add("segment_moves", &integers(&[kinds.len(), arrays.fingers.len()], &arrays.segment_moves));
+    file.add("segment_rolling_fingers", &integers(&[kinds.len()], &arrays.segment_rolling_fingers));
     file.add("segment_starts", &integers(&[kinds.len() + 1], &arrays.segment_starts));
     file.finish()
 }

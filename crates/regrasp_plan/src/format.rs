@@ -68,6 +68,9 @@ pub fn to_json(plan: &Plan) -> String {
         if let Some(finger) = &segment.moving_finger {
             let _ = write!(out, "\"moving_finger\": {}, ", compact(finger));
         }
+        if !segment.also_moving.is_empty() {
+            let _ = write!(out, "\"also_moving\": {}, ", compact(&segment.also_moving));
+        }
         if let Some(finger) = &segment.rolling_finger {
             let _ = write!(out, "\"rolling_finger\": {}, ", compact(finger));
         }
@@ -259,6 +262,7 @@ impl Reader<'_> {
             }
             self.finger_of(plan, &at, segment, "moving_finger", &segment.moving_finger);
             self.finger_of(plan, &at, segment, "rolling_finger", &segment.rolling_finger);
+            self.also_moving(plan, &at, segment);
             for (j, waypoint) in segment.waypoints.iter().enumerate() {
                 self.waypoint(plan, &[at[0], at[1], Key("waypoints"), Index(j)], waypoint);
             }
@@ -284,6 +288,22 @@ impl Reader<'_> {
             }
             None if is_asked => self.fail("C408", at, format!("is a {kind} without \"{key}\""), "its name".into()),
             _ => {}
+        }
+    }
+
+    /// Fingers that a tracking segment names beside its moving finger: of the plan's, each once.
+    fn also_moving(&mut self, plan: &Plan, at: &[Step; 2], segment: &Segment) {
+        for (i, finger) in segment.also_moving.iter().enumerate() {
+            let steps = [at[0], at[1], Step::Key("also_moving"), Step::Index(i)];
+            if segment.kind != SegmentKind::Tracking {
+                let expected = "no \"also_moving\": in a tracking segment only".into();
+                self.fail("C408", &steps, format!("names \"{finger}\""), expected);
+            } else if !plan.fingers.contains(finger) {
+                let expected = format!("one of {}", plan.fingers.join(", "));
+                self.fail("C408", &steps, format!("\"{finger}\" is not in \"fingers\""), expected);
+            } else if segment.moving_finger.as_ref() == Some(finger) || segment.also_moving[..i].contains(finger) {
+                self.fail("C408", &steps, format!("names \"{finger}\" again"), "each finger once".into());
+            }
         }
     }
 

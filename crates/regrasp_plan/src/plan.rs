@@ -210,6 +210,9 @@ pub struct Segment {
     /// The finger that moves, in a regrasp and in tracking.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moving_finger: Option<String>,
+    /// In tracking, other fingers that move at the same time, where the hand has more than four.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub also_moving: Vec<String>,
     /// In tracking, the resting finger that the object rolls on without sliding (paper 003, section 6.1.2: `F_t`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rolling_finger: Option<String>,

@@ -63,7 +63,7 @@ impl Plan {
         })
     }
 
-    /// Everything but the waypoints, as JSON: the keys of a plan file, and of each segment kind, moving finger and number of
+    /// Everything but the waypoints, as JSON: the keys of a plan file, and of each segment kind, fingers and number of
     /// waypoints.
     fn header(&self, py: Python<'_>) -> PyResult<String> {
         guarded(py, || {
@@ -73,6 +73,8 @@ impl Plan {
                 json!({
                     "kind": segment.kind,
                     "moving_finger": segment.moving_finger,
+                    "also_moving": segment.also_moving,
+                    "rolling_finger": segment.rolling_finger,
                     "n_waypoints": segment.waypoints.len(),
                 })
             });

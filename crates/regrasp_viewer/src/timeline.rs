@@ -34,7 +34,13 @@ pub fn segment_span(segment: &Segment) -> (f64, f64) {
     (at(segment.waypoints.first()), at(segment.waypoints.last()))
 }
 
-/// Index of the finger that moves in a segment.
+/// Indices of all fingers that move in a segment, in the order in which it names them.
+pub fn moving_fingers(plan: &Plan, segment: &Segment) -> Vec<usize> {
+    let index = |name: &String| plan.fingers.iter().position(|finger| finger == name);
+    segment.moving_finger.iter().chain(&segment.also_moving).filter_map(index).collect()
+}
+
+/// Index of the finger that moves in a segment, of several the first.
 pub fn moving_finger(plan: &Plan, segment: &Segment) -> Option<usize> {
     let name = segment.moving_finger.as_ref()?;
     plan.fingers.iter().position(|finger| finger == name)
@@ -182,8 +188,8 @@ pub fn contact_point(waypoint: &Waypoint, finger: usize) -> Option<Point> {
 /// Which fingers move and roll for a while, in tracking.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Roles {
-    /// The finger that moves.
-    pub moving: Option<usize>,
+    /// The fingers that move.
+    pub moving: Vec<usize>,
     /// The resting finger that the object rolls on.
     pub rolling: Option<usize>,
     /// From when, in seconds.
@@ -197,10 +203,10 @@ pub fn roles(plan: &Plan) -> Vec<Roles> {
     let mut found: Vec<Roles> = Vec::new();
     for segment in &plan.segments {
         let is_tracking = segment.kind == SegmentKind::Tracking;
-        let (moving, rolling) = (moving_finger(plan, segment), rolling_finger(plan, segment));
+        let (moving, rolling) = (moving_fingers(plan, segment), rolling_finger(plan, segment));
         let (from, until) = segment_span(segment);
         match found.last_mut() {
-            Some(last) if is_tracking && (last.moving, last.rolling) == (moving, rolling) => last.until = until,
+            Some(last) if is_tracking && last.moving == moving && last.rolling == rolling => last.until = until,
             _ if is_tracking => found.push(Roles { moving, rolling, from, until }),
             _ => {}
         }

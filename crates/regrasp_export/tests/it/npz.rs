@@ -110,6 +110,10 @@ fn segments_and_their_waypoints_agree() {
         assert_eq!(arrays["segment_kinds"].texts()[s], kind);
         let moving = usize::try_from(arrays["segment_moving_fingers"].integers()[s]).ok();
         assert_eq!(moving.map(|finger| &plan.fingers[finger]), segment.moving_finger.as_ref());
+        let n = plan.fingers.len();
+        let moves = &arrays["segment_moves"].integers()[s * n..(s + 1) * n];
+        assert!(moves.iter().enumerate().all(|(f, &one)| (one == 1) == (moving == Some(f)) && one <= 1));
+        assert_eq!(arrays["segment_rolling_fingers"].integers()[s], -1);
     }
     assert_eq!(*starts.last().unwrap() as usize, segment_of.len());
 }

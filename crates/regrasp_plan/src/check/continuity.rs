@@ -292,7 +292,7 @@ pub fn check_roles(model: &Model, plan: &Plan, settings: &CheckSettings, log: &m
     for (s, segment) in plan.segments.iter().enumerate() {
         match segment.kind {
             SegmentKind::Transfer => {
-                check_rolling_finger_absent(segment, s, log);
+                check_tracking_names_absent(segment, s, log);
                 if segment.moving_finger.is_some() {
                     let message = "a transfer names a moving finger";
                     log.push(Violation::new(Kind::WrongMovingFinger, message).when(Moment::at(s, 0)));
@@ -303,13 +303,12 @@ pub fn check_roles(model: &Model, plan: &Plan, settings: &CheckSettings, log: &m
                 }
             }
             SegmentKind::Regrasp => {
-                check_rolling_finger_absent(segment, s, log);
+                check_tracking_names_absent(segment, s, log);
                 check_regrasp_roles(model, segment, s, settings, log);
             }
             SegmentKind::Tracking => {
                 tracking::check_tracking_roles(model, segment, s, settings, log);
-                let [moving, _] = tracking::named_fingers(model, segment);
-                let others = (0..model.fingers.len()).filter(|f| Some(*f) != moving);
+                let others = (0..model.fingers.len()).filter(|&f| !tracking::may_move(model, segment, f));
                 others.for_each(|f| check_rests(model, segment, s, f, settings, log));
             }
         }
@@ -317,7 +316,11 @@ pub fn check_roles(model: &Model, plan: &Plan, settings: &CheckSettings, log: &m
     }
 }
 
-fn check_rolling_finger_absent(segment: &Segment, s: usize, log: &mut Log) {
+fn check_tracking_names_absent(segment: &Segment, s: usize, log: &mut Log) {
+    if !segment.also_moving.is_empty() {
+        let message = "other moving fingers are named outside tracking";
+        log.push(Violation::new(Kind::WrongMovingFinger, message).when(Moment::at(s, 0)));
+    }
     if segment.rolling_finger.is_some() {
         let message = "a rolling finger is named outside tracking";
         log.push(Violation::new(Kind::WrongRollingFinger, message).when(Moment::at(s, 0)));
@@ -331,8 +334,7 @@ fn check_rests(model: &Model, segment: &Segment, s: usize, f: usize, settings: &
         let moved = finger.coordinates.clone().map(|k| (waypoint.joints[k] - first.joints[k]).abs());
         let moved = moved.fold(0.0, f64::max);
         if moved > settings.meeting_tolerance {
-            let message =
-                format!("finger \"{}\" moves {moved:.3e} while another one is the moving finger", finger.name);
+            let message = format!("finger \"{}\" moves {moved:.3e}, but is no moving finger", finger.name);
             let violation = Violation::new(Kind::WrongMovingFinger, message).when(Moment::at(s, w));
             let violation = violation.subjects([finger.name.as_str()]);
             log.push(violation.amount(moved, settings.meeting_tolerance));

@@ -1,4 +1,4 @@
-//! Tracking: every fingertip stays on the object, one finger moves, and every contact is in the mode that the plan says
+//! Tracking: every fingertip stays on the object, the fingers named move, and every contact is in the mode that the plan says
 //! with the relative velocity that it says, by poses alone (paper 003, sections 6.1.2 and 6.2.2, table 1).
 //!
 //! What a fingertip does from a waypoint to the next belongs to the first of the two, and at the last waypoint to that as well.
@@ -37,7 +37,16 @@ use regrasp_geometry::{Pose, Shape, Vector};
 /// metres: a tenth of the way in a tenth of a second at the smallest sliding speed counts as sliding.
 const UNKNOWN_SLIDE: (f64, f64) = (1e-3, 1e-9);
 
-/// Indices of the fingers that a tracking segment names: the moving and the rolling one.
+/// Least number of fingers that rest while the object moves (paper 003, section 8: two of three).
+const FEWEST_RESTING: usize = 2;
+
+/// True where a tracking segment says that finger `f` moves.
+pub fn may_move(model: &Model, segment: &Segment, f: usize) -> bool {
+    let name = &model.fingers[f].name;
+    segment.moving_finger.as_ref() == Some(name) || segment.also_moving.contains(name)
+}
+
+/// Indices of the fingers that a tracking segment names: the (first) moving and the rolling one.
 pub fn named_fingers(model: &Model, segment: &Segment) -> [Option<usize>; 2] {
     [&segment.moving_finger, &segment.rolling_finger]
         .map(|name| model.fingers.iter().position(|finger| Some(&finger.name) == name.as_ref()))
@@ -50,8 +59,21 @@ pub fn check_tracking_roles(model: &Model, segment: &Segment, s: usize, settings
         let message = format!("moving finger {:?} is none of the hand's", segment.moving_finger);
         log.push(Violation::new(Kind::WrongMovingFinger, message).when(Moment::at(s, 0)));
     }
-    if rolling.is_none() || rolling == moving {
-        let what = if rolling.is_none() { "none of the hand's" } else { "the moving one" };
+    for name in &segment.also_moving {
+        let again = segment.also_moving.iter().filter(|other| *other == name).count() > 1;
+        let unknown = !model.fingers.iter().any(|finger| finger.name == *name);
+        if unknown || again || segment.moving_finger.as_ref() == Some(name) {
+            let message = format!("\"{name}\" is named as also moving, but is none of the hand's or named twice");
+            log.push(Violation::new(Kind::WrongMovingFinger, message).when(Moment::at(s, 0)));
+        }
+    }
+    let n_resting = (0..model.fingers.len()).filter(|&f| !may_move(model, segment, f)).count();
+    if n_resting < FEWEST_RESTING {
+        let message = format!("{n_resting} fingers rest, fewer than {FEWEST_RESTING}");
+        log.push(Violation::new(Kind::WrongMovingFinger, message).when(Moment::at(s, 0)));
+    }
+    if rolling.is_none_or(|rolling| may_move(model, segment, rolling)) {
+        let what = if rolling.is_none() { "none of the hand's" } else { "one that moves" };
         let message = format!("rolling finger {:?} is {what}", segment.rolling_finger);
         log.push(Violation::new(Kind::WrongRollingFinger, message).when(Moment::at(s, 0)));
     }

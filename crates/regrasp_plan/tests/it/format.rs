@@ -3,7 +3,7 @@
 use crate::sample;
 use proptest::prelude::*;
 use regrasp_plan::format::{from_json, schema, to_json};
-use regrasp_plan::{ContactMode, Plan};
+use regrasp_plan::{ContactMode, Plan, SegmentKind};
 use std::path::Path;
 use std::sync::LazyLock;
 
@@ -36,6 +36,15 @@ fn the_schema_in_the_repository_is_the_one_of_the_types() {
         std::fs::write(&path, schema()).unwrap();
     }
     assert_eq!(std::fs::read_to_string(&path).unwrap_or_default(), schema(), "run with REGRASP_WRITE_SCHEMA=1");
+}
+
+/// Makes the second segment one of tracking that moves the first finger and others.
+fn name_others(plan: &mut Plan, others: &[&str]) {
+    let segment = &mut plan.segments[1];
+    segment.kind = SegmentKind::Tracking;
+    segment.moving_finger = Some("f0".into());
+    segment.rolling_finger = Some("f3".into());
+    segment.also_moving = others.iter().map(|name| (*name).to_owned()).collect();
 }
 
 #[test]
@@ -74,6 +83,9 @@ fn every_kind_of_damage_is_named_with_its_place() {
         ("C408", cut(&|p| p.segments[1].moving_finger = Some("thumb".into())), "thumb".into()),
         ("C408", cut(&|p| p.segments[1].moving_finger = None), "without".into()),
         ("C408", cut(&|p| p.segments[0].moving_finger = Some("f0".into())), "transfer".into()),
+        ("C408", cut(&|p| p.segments[1].also_moving = vec!["f0".into()]), "in a tracking segment only".into()),
+        ("C408", cut(&|p| name_others(p, &["thumb"])), "thumb".into()),
+        ("C408", cut(&|p| name_others(p, &["f1", "f2", "f1"])), "again".into()),
         ("C408", cut(&|p| p.joint_names[1] = p.joint_names[0].clone()), "twice".into()),
         ("C409", cut(&|p| p.promises.friction = -0.1), "promises.friction".into()),
         ("C409", cut(&|p| p.inputs[0].sha256 = "abc".into()), "abc".into()),

@@ -78,7 +78,16 @@ pub fn transfer(course: &Course, grasp: &Grasp, n_steps: usize) -> (Segment, Gra
         }
         waypoints.push(waypoint.clone());
     }
-    (Segment { kind: SegmentKind::Transfer, moving_finger: None, rolling_finger: None, waypoints }, now)
+    (
+        Segment {
+            kind: SegmentKind::Transfer,
+            moving_finger: None,
+            also_moving: Vec::new(),
+            rolling_finger: None,
+            waypoints,
+        },
+        now,
+    )
 }
 
 /// Rolling transfer, relocation of a finger, rolling transfer.

@@ -169,7 +169,7 @@ impl<'m, 'a> Recorder<'m, 'a> {
 
     fn begin(&mut self, kind: SegmentKind, moving_finger: Option<String>, n: usize) {
         let waypoints = Vec::with_capacity(1 + n);
-        self.segments.push(Segment { kind, moving_finger, rolling_finger: None, waypoints });
+        self.segments.push(Segment { kind, moving_finger, also_moving: Vec::new(), rolling_finger: None, waypoints });
         self.push_here();
     }
 
@@ -201,7 +201,13 @@ impl<'m, 'a> Recorder<'m, 'a> {
             // Start and goal are the same and any grasp will do: hold still.
             let waypoints = vec![self.here.clone(), self.here];
             let (moving_finger, rolling_finger) = (None, None);
-            self.segments.push(Segment { kind: SegmentKind::Transfer, moving_finger, rolling_finger, waypoints });
+            self.segments.push(Segment {
+                kind: SegmentKind::Transfer,
+                moving_finger,
+                also_moving: Vec::new(),
+                rolling_finger,
+                waypoints,
+            });
         }
         let statistics = Statistics {
             transfers: self.transfers,

@@ -17,13 +17,13 @@ fn impossible(message: String, advice: &str) -> Failure {
 }
 
 /// Refuses hands, objects and gravity that tracking is not made for (paper 003, section 3.1: convex objects, fingertips that
-/// are balls; at least two of them rest).
+/// are balls; at least two of them rest; section 8: three fingertips or more).
 pub fn refuse(model: &Model, gravity: &Gravity) -> Result<(), Failure> {
     let object = &model.scene.object;
     let n = model.n_fingers();
-    if !(3..=4).contains(&n) {
-        let message = format!("the hand has {n} fingers: tracking moves one and rests two or three");
-        return Err(impossible(message, "use a hand of three or four fingers"));
+    if n < 3 {
+        let message = format!("the hand has {n} fingers: tracking moves one and rests at least two");
+        return Err(impossible(message, "use a hand of three fingers or more"));
     }
     let names = model.scene.hand.fingers.iter().map(|finger| finger.name.as_str());
     if let Some((name, _)) = names.zip(&model.fingers).find(|(_, f)| f.tip_radius == 0.0 || f.ellipsoid.is_some()) {

@@ -23,7 +23,7 @@ pub struct TrackingGrasp {
     pub world_from_link: PerFinger<Placement>,
     /// Where the tips touch, in the object frame.
     pub touches: PerFinger<Touch>,
-    /// Angle by which the moving tip was turned aside half-way to here, where the step was long.
+    /// Largest angle by which a moving tip was turned aside half-way to here, where the step was long.
     pub bent: f64,
 }
 

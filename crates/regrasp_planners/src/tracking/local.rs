@@ -2,7 +2,7 @@
 
 use super::grasp::{PerFinger, TrackingGrasp, turn_to};
 use super::object_motion::ObjectMotion;
-use super::step::{Asked, NoStep, Roles, STEP_WORK, Step, Stepper};
+use super::step::{Asked, Controls, Fingers, NoStep, Roles, STEP_WORK, Step, Stepper, each};
 use crate::in_hand::model::{MAX_FINGERS, Model};
 use arrayvec::ArrayVec;
 use nalgebra::UnitQuaternion;
@@ -44,10 +44,18 @@ const LAG_WEIGHT: f64 = 0.3;
 struct Prospect {
     /// Of the angle between the wanted turn and the one that they allow.
     cosine: f64,
+    /// Motion of the object's origin in a step, in the world.
+    shift: Vector,
     /// Turn of the object in a step, in the world.
     turn: Vector,
-    /// Way of the moving tip in a step, rolling aside, in the world.
-    tip_way: Vector,
+}
+
+impl Prospect {
+    /// Way of a moving tip in a step, rolling aside, in the world.
+    fn tip_way(&self, model: &Model, here: &TrackingGrasp, finger: usize) -> Vector {
+        let tip = here.tip_in_world(model, finger);
+        self.shift + self.turn.cross(&(tip.coords - here.world_from_object.translation))
+    }
 }
 
 /// Where the centres of the fingertips have their homes: places that moving fingers roll back to.
@@ -73,20 +81,20 @@ impl Homes {
 #[derive(Default)]
 struct Tried {
     n: usize,
-    /// The finger that has to move.
-    guilty: Option<usize>,
-    /// Roles that fail whatever the moving finger does.
-    useless: ArrayVec<Roles, 30>,
+    /// Fingers of which one has to move; where there are none, any may.
+    guilty: Fingers,
+    /// Roles that fail whatever the moving fingers do.
+    useless: Vec<Roles>,
 }
 
 /// How often steps failed, by the paper's numbers; 0 for what it does not list.
 pub type Failures = [u64; 8];
 
-/// Roles and the moving finger's control, kept from step to step while they do.
+/// Roles and the moving fingers' controls, kept from step to step while they do.
 #[derive(Debug, Clone, Copy)]
 struct Choice {
     roles: Roles,
-    control: [f64; 2],
+    controls: Controls,
     /// Turn of the object in a step, in the world; none where it rests.
     turn: Option<Vector>,
 }
@@ -130,8 +138,8 @@ impl Local<'_, '_, '_> {
         self.restore(&mut here, &mut steps);
         let n_restored = steps.len();
         let mut choice = before.map(|roles| {
-            let control = self.control_home(&here, roles.moving, Some(&Vector::zeros()), settings.time_step);
-            Choice { roles, control, turn: None }
+            let way = |_| Some(Vector::zeros());
+            Choice { roles, controls: self.controls_home(&here, roles.moving, way, settings.time_step), turn: None }
         });
         while steps.len() - n_restored < most_steps {
             let left = turn_to(&here.orientation(), goal);
@@ -144,13 +152,13 @@ impl Local<'_, '_, '_> {
                 let kept = choice.filter(|_| tried.n == 0).and_then(|choice| self.keep(&here, &choice, &left));
                 let next = kept.or_else(|| self.choose(&here, &left, &tried, choice));
                 tried.n += 1;
-                tried.guilty = None;
+                tried.guilty = 0;
                 let Some(next) = next else {
                     self.failures[NoStep::Degenerate.number()] += 1;
                     continue;
                 };
                 choice = Some(next);
-                let Choice { roles, control: rolled, turn } = next;
+                let Choice { roles, controls: rolled, turn } = next;
                 match self.stepper.step(&here, &Asked { roles, turn, rolled, seconds: settings.time_step }) {
                     Ok(step) => {
                         made = Some(step);
@@ -184,8 +192,9 @@ impl Local<'_, '_, '_> {
             let settings = self.stepper.settings;
             let mut seconds = settings.rest_step.max(settings.time_step);
             loop {
-                let rolled = self.control_home(here, moving, None, seconds);
-                let asked = Asked { roles: Roles { moving, rolling }, turn: None, rolled, seconds };
+                let roles = Roles { moving: 1 << moving, rolling };
+                let rolled = self.controls_home(here, roles.moving, |_| None, seconds);
+                let asked = Asked { roles, turn: None, rolled, seconds };
                 let step = match self.stepper.step(here, &asked) {
                     Ok(step) => step,
                     Err(NoStep::TooLong) => {
@@ -223,9 +232,9 @@ impl Local<'_, '_, '_> {
     /// control, 4 moves the guilty one, 5 to 7 change the roles.
     fn learn(&self, tried: &mut Tried, choice: &Choice, failure: NoStep) {
         tried.guilty = match failure {
-            NoStep::BrokenContact(finger) => Some(finger),
-            NoStep::Collision | NoStep::MovingPad => Some(choice.roles.moving),
-            _ => None,
+            NoStep::BrokenContact(finger) => 1 << finger,
+            NoStep::Collision | NoStep::MovingPad => choice.roles.moving,
+            _ => 0,
         };
         let whatever_it_does =
             matches!(failure, NoStep::BrokenContact(_) | NoStep::RestingPad | NoStep::Degenerate | NoStep::Unbalanced);
@@ -241,10 +250,12 @@ impl Local<'_, '_, '_> {
 
     /// The choice of the step before, where its roles still lead towards the goal.
     fn keep(&self, here: &TrackingGrasp, choice: &Choice, left: &Vector) -> Option<Choice> {
-        let least = if self.rolls_by_itself(choice.roles.moving) { WELL_ALIGNED } else { STILL_ALIGNED };
+        let Roles { moving, .. } = choice.roles;
+        let least = if each(moving).any(|finger| self.rolls_by_itself(finger)) { WELL_ALIGNED } else { STILL_ALIGNED };
         let prospect = self.prospect(here, choice.roles, left).filter(|prospect| prospect.cosine >= least)?;
-        let control = self.control_home(here, choice.roles.moving, Some(&prospect.tip_way), self.time_step());
-        Some(Choice { turn: Some(prospect.turn), control, ..*choice })
+        let way = |finger| Some(prospect.tip_way(self.stepper.model, here, finger));
+        let controls = self.controls_home(here, moving, way, self.time_step());
+        Some(Choice { turn: Some(prospect.turn), controls, ..*choice })
     }
 
     /// What these roles promise where `left` is the turn left to the sub-goal.
@@ -253,7 +264,7 @@ impl Local<'_, '_, '_> {
     /// farther than to where it is nearest to the sub-goal.
     fn prospect(&self, here: &TrackingGrasp, roles: Roles, left: &Vector) -> Option<Prospect> {
         let model = self.stepper.model;
-        let resting: PerFinger<usize> = (0..model.n_fingers()).filter(|&finger| finger != roles.moving).collect();
+        let resting: PerFinger<usize> = each(model.all_fingers() & !roles.moving).collect();
         let motion = ObjectMotion::new(model, here, &resting, roles.rolling, left)?;
         let (shift, allowed) = motion.twist(left);
         let cosine = allowed.dot(left) / (allowed.norm() * left.norm());
@@ -261,9 +272,7 @@ impl Local<'_, '_, '_> {
         let most = settings.object_velocity * settings.time_step / allowed.amax();
         let share = (allowed.dot(left) / allowed.norm_squared()).min(most);
         let (shift, allowed) = (shift * share, allowed * share);
-        let tip = here.tip_in_world(model, roles.moving);
-        let tip_way = shift + allowed.cross(&(tip.coords - here.world_from_object.translation));
-        Some(Prospect { cosine, turn: allowed, tip_way })
+        Some(Prospect { cosine, shift, turn: allowed })
     }
 
     /// How far along its reach a tip is that goes on like this for [`AHEAD`]: 1 at the end; 0 where reach has no end.
@@ -274,67 +283,85 @@ impl Local<'_, '_, '_> {
         (tip - model.fingers[finger].tip_at_rest).norm() / reach
     }
 
-    /// Other roles: those that lead best towards the goal and whose moving finger has reach left, with some chance.
+    /// Other roles: those that lead best towards the goal and whose moving fingers have reach left, with some chance.
     fn choose(&mut self, here: &TrackingGrasp, left: &Vector, tried: &Tried, before: Option<Choice>) -> Option<Choice> {
         self.stepper.work += STEP_WORK;
-        let n = self.stepper.model.n_fingers();
+        let model = self.stepper.model;
+        let n = model.n_fingers();
         let has_failed = tried.n > 0;
         let chance = if has_failed { 1.0 } else { CHANCE };
         let mut best: Option<(f64, Roles, Prospect)> = None;
-        for moving in (0..n).filter(|&finger| tried.guilty.is_none_or(|guilty| guilty == finger)) {
-            for rolling in (0..n).filter(|&finger| finger != moving) {
-                let roles = Roles { moving, rolling };
-                if self.rolling.is_some_and(|once| once != rolling) || tried.useless.contains(&roles) {
-                    continue;
-                }
-                let noise = self.rng.uniform(0.0, chance);
-                let Some(prospect) = self.prospect(here, roles, left).filter(|p| p.cosine >= LEAST_ALIGNED) else {
-                    continue;
-                };
-                let share = self.reach_share(here, moving, &prospect.tip_way);
-                if share > 1.0 {
-                    continue;
-                }
-                // Changing roles costs a pause.
-                let kept = if before.is_some_and(|before| before.roles == roles) && !has_failed { KEPT } else { 0.0 };
-                let lag = self.lag(here, moving) / self.stepper.model.frame.torque_scale;
-                let worth = prospect.cosine + noise + kept - REACH_WEIGHT * share * share + LAG_WEIGHT * lag;
-                if best.as_ref().is_none_or(|(most, _, _)| worth > *most) {
-                    best = Some((worth, roles, prospect));
-                }
+        for roles in Roles::all(n).filter(|roles| tried.guilty == 0 || roles.moving & tried.guilty != 0) {
+            if self.rolling.is_some_and(|once| once != roles.rolling) || tried.useless.contains(&roles) {
+                continue;
+            }
+            let noise = self.rng.uniform(0.0, chance);
+            let Some(prospect) = self.prospect(here, roles, left).filter(|p| p.cosine >= LEAST_ALIGNED) else {
+                continue;
+            };
+            let share = |finger| self.reach_share(here, finger, &prospect.tip_way(model, here, finger));
+            let share = each(roles.moving).map(share).fold(0.0, f64::max);
+            if share > 1.0 {
+                continue;
+            }
+            // Changing roles costs a pause.
+            let kept = if before.is_some_and(|before| before.roles == roles) && !has_failed { KEPT } else { 0.0 };
+            let lag = each(roles.moving).map(|finger| self.lag(here, finger)).fold(0.0, f64::max);
+            let lag = lag / model.frame.torque_scale;
+            let worth = prospect.cosine + noise + kept - REACH_WEIGHT * share * share + LAG_WEIGHT * lag;
+            if best.as_ref().is_none_or(|(most, _, _)| worth > *most) {
+                best = Some((worth, roles, prospect));
             }
         }
         let object_rests = has_failed && self.rng.chance(REST_SHARE);
         let (roles, moves) = match best {
             Some((_, roles, prospect)) => {
-                let rests = object_rests && self.rolls_by_itself(roles.moving);
+                let rests = object_rests && each(roles.moving).any(|finger| self.rolls_by_itself(finger));
                 (roles, Some(prospect).filter(|_| !rests))
             }
             // Nothing leads there: a finger that rolls on while the object rests may change that.
             None if object_rests => {
-                let moving = tried.guilty.unwrap_or_else(|| self.rng.below(n));
+                let moving = each(tried.guilty).next().unwrap_or_else(|| self.rng.below(n));
                 let others: ArrayVec<usize, MAX_FINGERS> = (0..n).filter(|&finger| finger != moving).collect();
                 let rolling = self.rolling.unwrap_or_else(|| others[self.rng.below(others.len())]);
                 if rolling == moving || !self.rolls_by_itself(moving) {
                     return None;
                 }
-                (Roles { moving, rolling }, None)
+                (Roles { moving: 1 << moving, rolling }, None)
             }
             None => return None,
         };
-        let tip_way = moves.as_ref().map(|prospect| prospect.tip_way);
-        let control = match has_failed {
-            true => self.drawn_control(),
-            false => self.control_home(here, roles.moving, tip_way.as_ref(), self.time_step()),
+        let controls = match has_failed {
+            true => self.drawn_controls(roles.moving),
+            false => {
+                let way = |finger| moves.as_ref().map(|prospect| prospect.tip_way(model, here, finger));
+                self.controls_home(here, roles.moving, way, self.time_step())
+            }
         };
-        Some(Choice { roles, control, turn: moves.map(|prospect| prospect.turn) })
+        Some(Choice { roles, controls, turn: moves.map(|prospect| prospect.turn) })
     }
 
     fn time_step(&self) -> f64 {
         self.stepper.settings.time_step
     }
 
-    /// The control of the moving finger for a step of `seconds`, of the extremes (paper 003, eq. 10), that leads it nearest to its
+    /// The controls of moving fingers for a step of `seconds` that lead them home; `tip_way` is the way of a finger's tip in the
+    /// world with the object, none where this rests.
+    fn controls_home(
+        &self,
+        here: &TrackingGrasp,
+        moving: Fingers,
+        tip_way: impl Fn(usize) -> Option<Vector>,
+        seconds: f64,
+    ) -> Controls {
+        let mut controls = Controls::default();
+        for finger in each(moving) {
+            controls[finger] = self.control_home(here, finger, tip_way(finger).as_ref(), seconds);
+        }
+        controls
+    }
+
+    /// The control of a moving finger for a step of `seconds`, of the extremes (paper 003, eq. 10), that leads it nearest to its
     /// home; `tip_way` is the way of its tip in the world with the object, none where this rests.
     fn control_home(&self, here: &TrackingGrasp, moving: usize, tip_way: Option<&Vector>, seconds: f64) -> [f64; 2] {
         let settings = self.stepper.settings;
@@ -359,9 +386,13 @@ impl Local<'_, '_, '_> {
         controls.min_by(|a, b| left(a).total_cmp(&left(b))).unwrap_or([0.0; 2])
     }
 
-    /// A control of the moving finger, drawn from the extremes (paper 003, eq. 10).
-    fn drawn_control(&mut self) -> [f64; 2] {
+    /// Controls of moving fingers, drawn from the extremes (paper 003, eq. 10).
+    fn drawn_controls(&mut self, moving: Fingers) -> Controls {
         let most = self.stepper.settings.rolling_velocity * self.time_step();
-        std::array::from_fn(|_| most * (self.rng.below(3) as f64 - 1.0))
+        let mut controls = Controls::default();
+        for finger in each(moving) {
+            controls[finger] = std::array::from_fn(|_| most * (self.rng.below(3) as f64 - 1.0));
+        }
+        controls
     }
 }

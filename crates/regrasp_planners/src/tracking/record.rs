@@ -4,7 +4,7 @@ use super::forces::Forces;
 use super::gaiting::{Move, Relocation};
 use super::grasp::{PerFinger, TrackingGrasp};
 use super::settings::TrackingSettings;
-use super::step::{Relative, Step, Stepper};
+use super::step::{Relative, Roles, Step, Stepper, each};
 use crate::in_hand::model::Model;
 use crate::in_hand::record::{CONTACT_TOLERANCE, SLIP_TOLERANCE, plan_of};
 use crate::in_hand::timing;
@@ -134,9 +134,6 @@ fn segment(stepper: &Stepper, stretch: &Stretch) -> Segment {
 }
 
 fn tracked(stepper: &Stepper, start: &TrackingGrasp, steps: &[&Step]) -> Segment {
-    let model = stepper.model;
-    let roles = steps[0].roles;
-    let name = |finger: usize| Some(model.scene.hand.fingers[finger].name.clone());
     let mut here = start;
     let mut waypoints = Vec::with_capacity(1 + steps.len());
     for step in steps {
@@ -145,10 +142,18 @@ fn tracked(stepper: &Stepper, start: &TrackingGrasp, steps: &[&Step]) -> Segment
     }
     let last = steps[steps.len() - 1];
     waypoints.push(waypoint(stepper, here, &last.relative, &last.forces[1]));
+    tracking_segment(stepper.model, &steps[0].roles, waypoints)
+}
+
+/// A segment of tracking in which the fingers have these roles.
+fn tracking_segment(model: &Model, roles: &Roles, waypoints: Vec<Waypoint>) -> Segment {
+    let name = |finger: usize| model.scene.hand.fingers[finger].name.clone();
+    let mut moving = each(roles.moving).map(name);
     Segment {
         kind: SegmentKind::Tracking,
-        moving_finger: name(roles.moving),
-        rolling_finger: name(roles.rolling),
+        moving_finger: moving.next(),
+        also_moving: moving.collect(),
+        rolling_finger: Some(name(roles.rolling)),
         waypoints,
     }
 }
@@ -157,13 +162,7 @@ fn tracked(stepper: &Stepper, start: &TrackingGrasp, steps: &[&Step]) -> Segment
 fn at_rest(stepper: &Stepper, start: &TrackingGrasp, forces: &Forces) -> Segment {
     let relative: PerFinger<Relative> = start.touches.iter().map(|_| Relative::STILL).collect();
     let waypoint = waypoint(stepper, start, &relative, forces);
-    let name = |finger: usize| Some(stepper.model.scene.hand.fingers[finger].name.clone());
-    Segment {
-        kind: SegmentKind::Tracking,
-        moving_finger: name(0),
-        rolling_finger: name(1),
-        waypoints: vec![waypoint.clone(), waypoint],
-    }
+    tracking_segment(stepper.model, &Roles { moving: 1, rolling: 1 }, vec![waypoint.clone(), waypoint])
 }
 
 fn waypoint(stepper: &Stepper, grasp: &TrackingGrasp, relative: &PerFinger<Relative>, forces: &[Vector]) -> Waypoint {

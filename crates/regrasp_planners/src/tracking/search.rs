@@ -8,7 +8,7 @@ use super::gaiting::{Move, change_grasp};
 use super::grasp::{TrackingGrasp, turn_to};
 use super::local::{Failures, Homes, Local};
 use super::settings::{RollingFinger, TrackingMethod, TrackingSettings};
-use super::step::{Asked, Roles, Stepper};
+use super::step::{Asked, Controls, Roles, Stepper};
 use crate::in_hand::Progress;
 use nalgebra::UnitQuaternion;
 use regrasp_base::{Budget, Interrupt, Rng};
@@ -224,14 +224,9 @@ fn rolling_finger(stepper: &mut Stepper, start: &TrackingGrasp, turn: &Vector, r
     let step = turn * (settings.object_velocity * settings.time_step / turn.amax());
     let mut worth = |rolling: usize| {
         let mut along = 0.0;
-        for moving in (0..n).filter(|&finger| finger != rolling) {
+        for roles in Roles::all(n).filter(|roles| roles.rolling == rolling) {
             stepper.workspace.set(&start.world_from_object.to_pose(), &start.joints, &start.contacts());
-            let asked = Asked {
-                roles: Roles { moving, rolling },
-                turn: Some(step),
-                rolled: [0.0; 2],
-                seconds: settings.time_step,
-            };
+            let asked = Asked { roles, turn: Some(step), rolled: Controls::default(), seconds: settings.time_step };
             if let Ok(made) = stepper.step(start, &asked) {
                 let turned = turn_to(&start.orientation(), &made.end.orientation());
                 along += turned.dot(turn) / (turned.norm() * turn.norm());

@@ -6,7 +6,7 @@ use super::grasp::{PerFinger, TrackingGrasp};
 use super::object_motion::ObjectMotion;
 use super::settings::TrackingSettings;
 use crate::in_hand::forces::ForceModel;
-use crate::in_hand::model::Model;
+use crate::in_hand::model::{MAX_FINGERS, Model};
 use crate::in_hand::roll::RollStep;
 use crate::in_hand::workspace::{TipMode, Workspace};
 use nalgebra::Rotation3;
@@ -30,14 +30,44 @@ const MOST_BENT: f64 = 2e-4;
 /// Work of a step, in the unit of in-hand planning: a configuration looked at. By measurement, some 50 against 2 microseconds.
 pub const STEP_WORK: u64 = 25;
 
+/// Fingers that rest while the object moves, where the hand has more than three (paper 003, section 4).
+const RESTING: usize = 3;
+
+/// Fingers, as bits.
+pub type Fingers = u32;
+
+/// The fingers of a set, in order.
+pub fn each(fingers: Fingers) -> impl Iterator<Item = usize> {
+    (0..MAX_FINGERS).filter(move |finger| fingers & (1 << finger) != 0)
+}
+
 /// Who does what.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Roles {
-    /// The finger that moves.
-    pub moving: usize,
+    /// The fingers that move.
+    pub moving: Fingers,
     /// The resting finger on which the object rolls.
     pub rolling: usize,
 }
+
+impl Roles {
+    /// True where the finger moves.
+    pub fn moves(&self, finger: usize) -> bool {
+        self.moving & (1 << finger) != 0
+    }
+
+    /// All roles that `n` fingers can have while the object moves: three rest, of three fingers two.
+    pub fn all(n: usize) -> impl Iterator<Item = Roles> {
+        let n_moving = n.saturating_sub(RESTING).max(1);
+        let sets = (0..1u32 << n).filter(move |set| set.count_ones() as usize == n_moving);
+        sets.flat_map(move |moving| {
+            (0..n).map(move |rolling| Roles { moving, rolling }).filter(|roles| !roles.moves(roles.rolling))
+        })
+    }
+}
+
+/// How each moving fingertip turns relative to the object, about the tangents of its contact (paper 003, eq. 10).
+pub type Controls = [[f64; 2]; MAX_FINGERS];
 
 /// What is asked of a step.
 #[derive(Debug, Clone, Copy)]
@@ -46,21 +76,20 @@ pub struct Asked {
     pub roles: Roles,
     /// Turn of the object, in the world, of which as many components are kept as the contacts leave free; none: it rests.
     pub turn: Option<Vector>,
-    /// Turn of the moving fingertip relative to the object, about the tangents of its contact (paper 003, eq. 10). Fingers that
-    /// cannot choose follow the object without sliding.
-    pub rolled: [f64; 2],
-    /// How long the step takes. More than the settings' step only where the moving fingertip keeps its face.
+    /// How the moving fingertips roll. Fingers that cannot choose follow the object without sliding.
+    pub rolled: Controls,
+    /// How long the step takes. More than the settings' step only where moving fingertips keep their faces.
     pub seconds: f64,
 }
 
 /// Why a step cannot be made (paper 003, section 6.2.4, failures 1 to 7).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum NoStep {
-    /// 1: the moving finger collides with another, or with anything but the object.
+    /// 1: a moving finger collides with another, or with anything but the object.
     Collision,
-    /// 2: the moving finger cannot reach.
+    /// 2: a moving finger cannot reach.
     OutOfReach,
-    /// 3: the moving fingertip would touch outside its pad: with the planar part of a hemisphere.
+    /// 3: a moving fingertip would touch outside its pad: with the planar part of a hemisphere.
     MovingPad,
     /// 4: the contact of this resting finger comes to an edge or vertex.
     BrokenContact(usize),
@@ -70,9 +99,9 @@ pub enum NoStep {
     Unbalanced,
     /// 7: the resting fingers do not tell the object's motion, or it does not lead to the goal.
     Degenerate,
-    /// The moving finger may not change its face, and would.
+    /// A moving finger may not change its face, and would.
     FaceChange,
-    /// In a step this long the moving finger would leave its face, or its joints would lead it aside.
+    /// In a step this long a moving finger would leave its face, or its joints would lead it aside.
     TooLong,
 }
 
@@ -144,7 +173,7 @@ impl<'m, 'a> Stepper<'m, 'a> {
         self.work += STEP_WORK;
         let model = self.model;
         let Roles { moving, rolling } = asked.roles;
-        let resting: PerFinger<usize> = (0..model.n_fingers()).filter(|&finger| finger != moving).collect();
+        let resting: PerFinger<usize> = each(model.all_fingers() & !moving).collect();
         let (object, rest_touches) = match &asked.turn {
             None => (grasp.world_from_object, resting.iter().map(|&finger| grasp.touches[finger]).collect()),
             Some(turn) => {
@@ -164,7 +193,9 @@ impl<'m, 'a> Stepper<'m, 'a> {
                 return Err(NoStep::RestingPad);
             }
         }
-        self.move_finger(grasp, asked, &mut end)?;
+        for finger in each(moving) {
+            self.move_finger(finger, grasp, asked, &mut end)?;
+        }
         let relative = self.relative(grasp, &end, asked)?;
         let forces = self.balanced(grasp, &end, &relative)?;
         self.workspace.roll_to(&end.contacts());
@@ -183,16 +214,23 @@ impl<'m, 'a> Stepper<'m, 'a> {
                 && surface.same_face(&from.foot, &to.foot))
     }
 
-    /// The moving finger at the end of the step.
-    fn move_finger(&self, grasp: &TrackingGrasp, asked: &Asked, end: &mut TrackingGrasp) -> Result<(), NoStep> {
-        let (model, moving) = (self.model, asked.roles.moving);
+    /// A moving finger at the end of the step.
+    fn move_finger(
+        &self,
+        moving: usize,
+        grasp: &TrackingGrasp,
+        asked: &Asked,
+        end: &mut TrackingGrasp,
+    ) -> Result<(), NoStep> {
+        let model = self.model;
         let finger = &model.fingers[moving];
         let chain = finger.ik.chain();
         let start = &grasp.touches[moving];
         let is_long = asked.seconds > self.settings.time_step;
         let touch = if has_all_directions(chain) {
             let (x, y) = frame::tangents(&UnitVector::new_unchecked(start.ball.normal));
-            let turn = x.into_inner() * asked.rolled[0] + y.into_inner() * asked.rolled[1];
+            let [about_x, about_y] = asked.rolled[moving];
+            let turn = x.into_inner() * about_x + y.into_inner() * about_y;
             let (turn, touch) = self.roll_purely(moving, start, &turn).ok_or(NoStep::OutOfReach)?;
             let object_from_link = Rotation3::new(turn).into_inner() * grasp.object_from_link(moving);
             let rotation = end.world_from_object.rotation * object_from_link;
@@ -206,10 +244,11 @@ impl<'m, 'a> Stepper<'m, 'a> {
                 let from = &grasp.world_from_link[moving].rotation;
                 let whole = turn_between(from, &link.rotation);
                 let half = turn_between(from, &chain.last_frame(&middle).rotation);
-                end.bent = (half - 0.5 * whole).norm();
-                if end.bent > MOST_BENT {
+                let bent = (half - 0.5 * whole).norm();
+                if bent > MOST_BENT {
                     return Err(NoStep::TooLong);
                 }
+                end.bent = end.bent.max(bent);
             }
             end.world_from_link[moving] = chain.last_frame(&joints);
             end.joints[moving] = joints;
@@ -276,7 +315,7 @@ impl<'m, 'a> Stepper<'m, 'a> {
             let turned = turn_between(&grasp.object_from_link(finger), &end.object_from_link(finger));
             let radius = model.fingers[finger].tip_radius;
             let slid = slip(radius, &grasp.touches[finger].ball, &end.touches[finger].ball, &turned);
-            let mode = if finger == asked.roles.moving {
+            let mode = if asked.roles.moves(finger) {
                 match has_all_directions(model.fingers[finger].ik.chain()) {
                     true => ContactMode::PureRolling,
                     false => ContactMode::Rolling,

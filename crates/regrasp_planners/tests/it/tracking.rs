@@ -2,9 +2,10 @@
 
 use crate::in_hand_methods::scene;
 use nalgebra::UnitQuaternion;
-use regrasp_base::Budget;
+use regrasp_base::{Budget, Rng};
 use regrasp_geometry::{Point, Vector};
 use regrasp_plan::Plan;
+use regrasp_plan::check::mutation::mutants;
 use regrasp_plan::check::{CheckSettings, check};
 use regrasp_plan::plan::{ContactMode, ContactState, Segment, SegmentKind};
 use regrasp_planners::in_hand::InHandSettings;
@@ -204,6 +205,47 @@ fn three_fingertips_turn_a_ball_on_two_that_rest() {
             })
             .collect();
         assert_eq!(modes.into_iter().collect::<Vec<_>>(), ["PureRolling Rolling Sliding"]);
+    }
+}
+
+/// Paper 003, conclusion: of more than four fingertips three rest. Plans broken in what they say of the others are rejected.
+#[test]
+fn of_five_fingertips_three_rest_and_two_move() {
+    let loaded = scene("five_fingertips.toml");
+    let mut broken = BTreeSet::new();
+    for seed in 0..3 {
+        let query = loaded.task.query(seed);
+        let plan = plan_with(&loaded, &query, seed).unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
+        let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+        assert!(report.accepted(), "seed {seed}: {:?}", report.violations.first());
+        assert!(report.max_force_residual.unwrap() < 1e-6 && report.max_sliding_force_error.unwrap() < 1e-9);
+        let mut pairs = BTreeSet::new();
+        for segment in &plan.segments {
+            let ends = [&segment.waypoints[0], &segment.waypoints[segment.waypoints.len() - 1]];
+            let object_moves = ends[0].world_from_object != ends[1].world_from_object;
+            let moved: Vec<usize> = (0..5)
+                .filter(|f| (6 * f..6 * f + 6).any(|k| (ends[0].joints[k] - ends[1].joints[k]).abs() > 1e-9))
+                .collect();
+            assert!(moved.len() <= 1 + segment.also_moving.len(), "{moved:?}");
+            // While the object rests, one or two may roll.
+            assert!(segment.also_moving.len() == 1 || !object_moves);
+            let slides = |contact: &&ContactState| contact.mode == ContactMode::Sliding;
+            assert_eq!(ends[0].contacts.iter().filter(slides).count(), if object_moves { 2 } else { 0 });
+            pairs.extend(object_moves.then(|| (segment.moving_finger.clone(), segment.also_moving.clone())));
+        }
+        assert!(pairs.len() >= 4, "hands change: {pairs:?}");
+        for mutant in mutants(&plan, &loaded.scene, &mut Rng::keyed(seed, "five_mutants", 0)) {
+            let judged_in = mutant.scene.as_ref().unwrap_or(&loaded.scene);
+            let report = check(judged_in, Some(&query), &mutant.plan, &CheckSettings::default());
+            let is_told = report.violations.iter().any(|violation| mutant.expected.contains(&violation.kind));
+            assert!(is_told, "seed {seed}: {} expects {:?}", mutant.name, mutant.expected);
+            broken.insert(mutant.name);
+        }
+    }
+    for name in
+        ["finger that also moves not named", "finger named twice as moving", "rolling finger named as also moving"]
+    {
+        assert!(broken.contains(name), "{name} was never made");
     }
 }
 

@@ -24,12 +24,13 @@ fn center_in_world(loaded: &LoadedScene, world_from_object: &Pose) -> Point {
 }
 
 /// Scenes of the papers that are more than a turn in place, and those of tracking, which have a start grasp.
-const PAPER_SCENES: [&str; 10] = [
+const PAPER_SCENES: [&str; 11] = [
     "bulb",
     "cubic",
     "diamond",
     "ellipsoid_free",
     "ellipsoid_obstacle",
+    "five_fingertips",
     "football",
     "football_pivot",
     "pencil",

@@ -5,8 +5,10 @@ import { clamp, interpolatePose, lerp, norm, poseFrom, sub, unit, type Pose, typ
 
 export interface Stretch {
   kind: Segment["kind"];
-  /** Index of the finger that moves, -1 in transfers. */
+  /** Index of the finger that moves, of several the first, -1 in transfers. */
   moving: number;
+  /** Indices of all fingers that move. */
+  allMoving: number[];
   /** In tracking, index of the finger that the object rolls on; else -1. */
   rolling: number;
   /** First and last waypoint, in the order of all waypoints. */
@@ -59,6 +61,8 @@ export class Motion {
     this.nFingers = plan.fingers.length;
     this.isTracking = plan.segments.some((segment) => segment.kind === "tracking");
     for (const segment of plan.segments) {
+      const names = segment.kind === "transfer" ? [] : [segment.moving_finger ?? "", ...(segment.also_moving ?? [])];
+      const allMoving = names.map((name) => plan.fingers.indexOf(name)).filter((finger) => finger >= 0);
       const first = this.waypoints.length;
       for (const waypoint of segment.waypoints) {
         this.segmentOf.push(this.stretches.length);
@@ -68,7 +72,8 @@ export class Motion {
       const last = this.waypoints.length - 1;
       this.stretches.push({
         kind: segment.kind,
-        moving: segment.kind === "transfer" ? -1 : plan.fingers.indexOf(segment.moving_finger ?? ""),
+        moving: allMoving[0] ?? -1,
+        allMoving,
         rolling: segment.kind === "tracking" ? plan.fingers.indexOf(segment.rolling_finger ?? "") : -1,
         first,
         last,
@@ -148,11 +153,11 @@ export class Motion {
   }
 
   /**
-   * Start of the next or previous relocation seen from `time`, in tracking of the next or previous stretch with another moving
-   * finger; the start or end of the plan where there is none.
+   * Start of the next or previous relocation seen from `time`, in tracking of the next or previous stretch with other moving
+   * fingers; the start or end of the plan where there is none.
    */
   relocationFrom(time: number, step: 1 | -1): number {
-    const begins = (s: Stretch, i: number) => s.kind === "regrasp" || (s.kind === "tracking" && i > 0 && this.stretches[i - 1].moving !== s.moving);
+    const begins = (s: Stretch, i: number) => s.kind === "regrasp" || (s.kind === "tracking" && i > 0 && String(this.stretches[i - 1].allMoving) !== String(s.allMoving));
     const starts = this.stretches.filter(begins).map((s) => s.start);
     if (step > 0) return starts.find((t) => t > time + 1e-6) ?? this.end;
     return starts.reverse().find((t) => t < time - 1e-6) ?? this.start;

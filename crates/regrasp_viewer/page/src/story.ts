@@ -139,6 +139,8 @@ export interface Plan {
 export interface Segment {
   kind: "transfer" | "regrasp" | "tracking";
   moving_finger?: string;
+  /** In tracking, others that move with it. */
+  also_moving?: string[];
   /** In tracking, the resting finger that the object rolls on. */
   rolling_finger?: string;
   waypoints: Waypoint[];

@@ -56,8 +56,8 @@ pub fn gait(plan: &Plan) -> String {
 fn roles(svg: &mut Svg, plan: &Plan, time: &Scale) {
     for roles in timeline::roles(plan) {
         let (x, end) = (time.at(roles.from), time.at(roles.until));
-        for (finger, fill, class) in [(roles.moving, INK, "moving"), (roles.rolling, ROLLED_ON, "rolled-on")] {
-            let Some(finger) = finger else { continue };
+        let moving = roles.moving.iter().map(|finger| (finger, INK, "moving"));
+        for (finger, fill, class) in moving.chain(roles.rolling.iter().map(|finger| (finger, ROLLED_ON, "rolled-on"))) {
             let y = TOP + ROW * (finger + 1) as f64 - GAP + 1.0;
             svg.rect([x, y], [end - x, STRIP], fill, &format!("class=\"{class}\""));
         }

@@ -6,7 +6,7 @@ use super::{Breeder, Mutant, move_tip};
 use crate::check::continuity::{contact_of, pose_difference};
 use crate::check::model::Model;
 use crate::check::surface;
-use crate::check::tracking::named_fingers;
+use crate::check::tracking::{may_move, named_fingers};
 use crate::check::violation::ViolationKind::{
     self, Collision, ContactModeWrong, ContactNormalWrong, ContactOffTip, GoalMismatch, GraspChanges, JointJump,
     OutOfReach, PromiseBroken, RelativeMotionMissing, RelativeVelocityWrong, SlidingForceWrong, Slip, StartMismatch,
@@ -207,11 +207,35 @@ impl Breeder<'_> {
         let model = self.model;
         self.add("resting finger moves in tracking", &[WrongMovingFinger], |plan, rng| {
             let (s, w, f) = pick_tracked(plan, model, rng, |_| true)?;
-            let [moving, _] = named_fingers(model, &plan.segments[s]);
             let coordinates = model.fingers[f].coordinates.clone();
             let k = coordinates.start + rng.below(coordinates.len());
             plan.segments[s].waypoints[w].joints[k] += rng.uniform(1e-6, 1e-4);
-            (moving != Some(f)).then_some(())
+            (!may_move(model, &plan.segments[s], f)).then_some(())
+        });
+        self.add("finger that also moves not named", &[WrongMovingFinger], |plan, rng| {
+            let (s, w, f) = pick_moving(plan, model, rng, |_| true)?;
+            let segment = &mut plan.segments[s];
+            let moved = |k: usize| (segment.waypoints[w].joints[k] - segment.waypoints[0].joints[k]).abs() > 1e-6;
+            let moves = model.fingers[f].coordinates.clone().any(moved);
+            let named = segment.also_moving.iter().position(|name| *name == model.fingers[f].name)?;
+            segment.also_moving.remove(named);
+            moves.then_some(())
+        });
+        self.add("finger named twice as moving", &[WrongMovingFinger], |plan, rng| {
+            let segment = any_segment(plan, rng, SegmentKind::Tracking)?;
+            segment.also_moving.push(segment.moving_finger.clone()?);
+            Some(())
+        });
+        self.add("rolling finger named as also moving", &[WrongRollingFinger], |plan, rng| {
+            let segment = any_segment(plan, rng, SegmentKind::Tracking)?;
+            segment.also_moving.push(segment.rolling_finger.clone()?);
+            Some(())
+        });
+        self.add("other moving fingers named in a regrasp or transfer", &[WrongMovingFinger], |plan, rng| {
+            let kind = if rng.chance(0.5) { SegmentKind::Regrasp } else { SegmentKind::Transfer };
+            let name = plan.fingers.last()?.clone();
+            any_segment(plan, rng, kind)?.also_moving.push(name);
+            Some(())
         });
         self.add("another finger named as moving in tracking", &[WrongMovingFinger], |plan, rng| {
             let segment = any_segment(plan, rng, SegmentKind::Tracking)?;
@@ -461,7 +485,7 @@ fn pick_tracked(
     pick(&mut found, rng).copied()
 }
 
-/// As [`pick_tracked`], the moving finger.
+/// As [`pick_tracked`], a moving finger.
 fn pick_moving(
     plan: &Plan,
     model: &Model,
@@ -470,9 +494,10 @@ fn pick_moving(
 ) -> Option<(usize, usize, usize)> {
     let mut found = Vec::new();
     for (s, segment) in plan.segments.iter().enumerate().filter(|(_, segment)| segment.kind == SegmentKind::Tracking) {
-        let Some(f) = named_fingers(model, segment)[0] else { continue };
-        let inner = 1..segment.waypoints.len() - 1;
-        found.extend(inner.filter(|&w| fits(&segment.waypoints[w].contacts[f])).map(|w| (s, w, f)));
+        for f in (0..model.fingers.len()).filter(|&f| may_move(model, segment, f)) {
+            let inner = 1..segment.waypoints.len() - 1;
+            found.extend(inner.filter(|&w| fits(&segment.waypoints[w].contacts[f])).map(|w| (s, w, f)));
+        }
     }
     pick(&mut found, rng).copied()
 }

@@ -19,7 +19,7 @@ export function gaitChart(story: Story, motion: Motion): ChartSpec {
   return {
     id: "gait",
     title: "Gait",
-    summary: `One row per finger, bars while it holds the object. ${fingers.length} fingers, ${motion.isTracking ? "one moves at a time" : `${relocations} relocations`}.`,
+    summary: `One row per finger, bars while it holds the object. ${fingers.length} fingers, ${motion.isTracking ? `${Math.max(...motion.stretches.map((s) => s.allMoving.length)) > 1 ? "some move" : "one moves"} at a time` : `${relocations} relocations`}.`,
     height: bottom + 20,
     below: key(motion.isTracking),
     draw(drawing) {
@@ -29,7 +29,7 @@ export function gaitChart(story: Story, motion: Motion): ChartSpec {
     },
     readout(time) {
       const stretch = motion.stretches[motion.stretchAt(time)];
-      if (stretch?.kind === "tracking") return `${fingers[stretch.moving]?.name} moves, ${fingers[stretch.rolling]?.name} rolls`;
+      if (stretch?.kind === "tracking") return `${stretch.allMoving.map((finger) => fingers[finger]?.name).join(" and ")} moves, ${fingers[stretch.rolling]?.name} rolls`;
       return stretch?.kind === "regrasp" ? "relocation" : "transfer";
     },
   };
@@ -71,9 +71,10 @@ function row(drawing: Drawing, motion: Motion, name: string, finger: number, y: 
 /** Strips under the bars of a finger: it moves, or the object rolls on it. */
 function roles({ context, colours, x }: Drawing, motion: Motion, finger: number, y: number): void {
   motion.stretches.forEach((stretch, i) => {
-    if (stretch.kind !== "tracking" || (stretch.moving !== finger && stretch.rolling !== finger)) return;
-    context.fillStyle = stretch.moving === finger ? colours.ink : colours.muted;
-    context.globalAlpha = stretch.moving === finger ? 1 : 0.55;
+    const moves = stretch.allMoving.includes(finger);
+    if (stretch.kind !== "tracking" || (!moves && stretch.rolling !== finger)) return;
+    context.fillStyle = moves ? colours.ink : colours.muted;
+    context.globalAlpha = moves ? 1 : 0.55;
     // Up to the next stretch: everything rests in between.
     const end = motion.stretches[i + 1]?.start ?? stretch.end;
     context.fillRect(x(stretch.start), y, Math.max(0.5, x(end) - x(stretch.start)), STRIP);

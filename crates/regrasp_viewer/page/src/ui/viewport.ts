@@ -127,16 +127,16 @@ export class Viewport {
     if (!stretch) return;
     const same = motion.stretches.filter((s) => s.kind === stretch.kind);
     const number = `${same.indexOf(stretch) + 1} of ${same.length}`;
-    const [name, under] = [stretch.moving, stretch.rolling].map((finger) => story.scene.fingers[finger]?.name);
+    const [name, under] = [stretch.allMoving, [stretch.rolling]].map((fingers) => fingers.map((finger) => story.scene.fingers[finger]?.name).join(" and "));
     const said = {
       transfer: `Transfer ${number}`,
       regrasp: `Relocation ${number}${name ? `: ${name} moves` : ""}`,
-      tracking: `${name} moves (dark rim), the object rolls on ${under} (grey rim)`,
+      tracking: `${name} ${stretch.allMoving.length > 1 ? "move" : "moves"} (dark rim), the object rolls on ${under} (grey rim)`,
     };
     setText(this.caption, said[stretch.kind]);
     motion.contacts(time).forEach((contact, i) => {
       const moves = contact.mode === "free" && stretch.moving === i;
-      const role = stretch.kind !== "tracking" ? "" : stretch.moving === i ? ", moving finger" : stretch.rolling === i ? ", object on it" : "";
+      const role = stretch.kind !== "tracking" ? "" : stretch.allMoving.includes(i) ? ", moving finger" : stretch.rolling === i ? ", object on it" : "";
       setText(this.states[i], STATES[moves ? "moving" : contact.mode] + role);
       this.states[i].parentElement!.classList.toggle("away", contact.mode === "free");
     });

@@ -145,8 +145,9 @@ export class Stage {
   private showRims(time: number): void {
     const stretch = this.motion.stretches[this.motion.stretchAt(time)];
     this.rims.forEach((rim, finger) => {
-      rim.visible = finger === stretch?.moving || finger === stretch?.rolling;
-      (rim.material as MeshBasicMaterial).color.set(finger === stretch?.moving ? this.theme.colours.ink : this.theme.colours.muted);
+      const moves = stretch?.allMoving.includes(finger) ?? false;
+      rim.visible = moves || finger === stretch?.rolling;
+      (rim.material as MeshBasicMaterial).color.set(moves ? this.theme.colours.ink : this.theme.colours.muted);
     });
   }
 
