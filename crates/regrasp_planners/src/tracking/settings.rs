@@ -1,7 +1,9 @@
 //! Settings of finger tracking. Lengths in metres, angles in radians, velocities per second.
 
 use crate::in_hand::{ForceSettings, InHandSettings};
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::Value;
 
 /// What fingers may do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -87,8 +89,27 @@ pub struct TrackingSettings {
     /// Sub-goals tried in a row that lead no nearer to the goal, before the search begins anew. By hand.
     pub patience: usize,
     /// What in-hand planning is asked: clearance, speed, forces, friction margin. As the paper: friction is that of the scene, and
-    /// a finger may touch without pressing.
+    /// a finger may touch without pressing. Keys that a file does not give, also of `forces`, are tracking's, not in-hand planning's.
+    #[serde(deserialize_with = "over_defaults")]
     pub in_hand: InHandSettings,
+}
+
+/// In-hand settings of which a file gives some.
+fn over_defaults<'de, D: Deserializer<'de>>(deserializer: D) -> Result<InHandSettings, D::Error> {
+    let mut whole = serde_json::to_value(TrackingSettings::default().in_hand).map_err(D::Error::custom)?;
+    let given = Value::deserialize(deserializer)?;
+    let (Value::Object(whole_keys), Value::Object(given)) = (&mut whole, given) else {
+        return Err(D::Error::custom("in_hand is an object"));
+    };
+    for (key, value) in given {
+        match (whole_keys.get_mut(&key), value) {
+            (Some(Value::Object(forces)), Value::Object(some)) if key == "forces" => forces.extend(some),
+            (_, value) => {
+                whole_keys.insert(key, value);
+            }
+        }
+    }
+    serde_json::from_value(whole).map_err(D::Error::custom)
 }
 
 impl Default for TrackingSettings {
@@ -149,5 +170,35 @@ impl TrackingSettings {
             return Err("trials and nodes are at least 1".into());
         }
         self.in_hand.validate().map_err(|message| format!("in_hand: {message}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<TrackingSettings, String> {
+        serde_json::from_str(text).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn keys_that_are_not_given_are_those_of_tracking() {
+        let whole = TrackingSettings::default();
+        assert_eq!(read("{}").unwrap(), whole);
+        assert_eq!(read(r#"{"in_hand": {}}"#).unwrap(), whole);
+        assert_eq!(read(&serde_json::to_string(&whole).unwrap()).unwrap(), whole);
+        let some = read(r#"{"in_hand": {"clearance": 0.001, "forces": {"torque_share": 0.5}}}"#).unwrap();
+        let forces = ForceSettings { torque_share: 0.5, ..whole.in_hand.forces.unwrap() };
+        let in_hand = InHandSettings { clearance: 0.001, forces: Some(forces), ..whole.in_hand.clone() };
+        assert_eq!(some, TrackingSettings { in_hand, ..whole });
+        assert_eq!(read(r#"{"in_hand": {"forces": null}}"#).unwrap().in_hand.forces, None);
+    }
+
+    #[test]
+    fn keys_that_are_none_are_refused() {
+        for text in [r#"{"in_hand": {"clearence": 1}}"#, r#"{"in_hand": {"forces": {"pull": 1}}}"#, r#"{"in_hand": 3}"#]
+        {
+            assert!(read(text).is_err(), "{text}");
+        }
     }
 }
