@@ -186,7 +186,7 @@ pub fn contact_point(waypoint: &Waypoint, finger: usize) -> Option<Point> {
 }
 
 /// Which fingers move and roll for a while, in tracking.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Roles {
     /// The fingers that move.
     pub moving: Vec<usize>,

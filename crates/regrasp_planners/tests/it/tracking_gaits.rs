@@ -6,7 +6,7 @@ use regrasp_base::{Budget, Rng};
 use regrasp_geometry::{Pose, Vector};
 use regrasp_plan::Plan;
 use regrasp_plan::check::mutation::mutants;
-use regrasp_plan::check::{CheckSettings, check};
+use regrasp_plan::check::{CheckSettings, Violation, ViolationKind, check};
 use regrasp_plan::plan::{ContactMode, Segment, SegmentKind};
 use regrasp_planners::tracking::TrackingMethod;
 use regrasp_planners::{Failure, TrackingSettings, plan_tracking};
@@ -147,4 +147,30 @@ fn mutants_of_mixed_plans_are_rejected() {
         assert!(names.contains(name), "{name} was never made");
     }
     assert!(names.len() > 100, "{}", names.len());
+}
+
+/// Where fingers have a reach they keep to it in the air too: the checker looks between waypoints as well, where joints go straight.
+#[test]
+fn fingers_keep_to_their_reach_in_the_air() {
+    let mut loaded = scene("tracking_sphere_wide.toml");
+    let query = loaded.task.query(0);
+    let plan = |loaded: &LoadedScene| plan_with(loaded, &query, TrackingMethod::TrackingAndGaiting, 0, 20_000_000);
+    let free = plan(&loaded).unwrap();
+    let out_of_reach = |loaded: &LoadedScene| -> Vec<SegmentKind> {
+        let report = check(&loaded.scene, Some(&query), &free, &CheckSettings::default());
+        let is_reach = |violation: &&Violation| violation.kind == ViolationKind::OutOfReach;
+        let segments = report.violations.iter().filter(is_reach).filter_map(|violation| violation.at);
+        segments.map(|at| free.segments[at.segment].kind).collect()
+    };
+    // A reach that the plan made without one exceeds, in the air at first.
+    let reaches = (1..100).rev().map(|k| 1e-3 * f64::from(k));
+    let exceeded = reaches.into_iter().find(|&reach| {
+        loaded.scene.reach = Some(reach);
+        !out_of_reach(&loaded).is_empty()
+    });
+    loaded.scene.reach = exceeded;
+    assert!(out_of_reach(&loaded).contains(&SegmentKind::Regrasp), "{exceeded:?}");
+    let kept = plan(&loaded).unwrap_or_else(|failure| panic!("{exceeded:?}: {failure}"));
+    accepted(&loaded, &query, &kept);
+    assert!(kept.statistics.relocations > 0);
 }
