@@ -256,6 +256,23 @@ fn the_gait_tells_sliding_from_rolling_and_marks_who_moves_and_who_is_rolled_on(
 }
 
 #[test]
+fn all_fingers_that_move_are_marked() {
+    let mut plan = football().plan.clone();
+    let strips = |plan: &Plan| charts::gait(plan).matches("class=\"moving\"").count();
+    let before = (strips(&plan), timeline::roles(&plan));
+    for segment in &mut plan.segments {
+        let rests = |name: &&String| {
+            segment.moving_finger.as_ref() != Some(name) && segment.rolling_finger.as_ref() != Some(name)
+        };
+        segment.also_moving = plan.fingers.iter().filter(rests).take(1).cloned().collect();
+    }
+    assert_eq!(strips(&plan), 2 * before.0);
+    for (after, before) in timeline::roles(&plan).iter().zip(&before.1) {
+        assert_eq!((after.moving.len(), after.moving[0], after.rolling), (2, before.moving[0], before.rolling));
+    }
+}
+
+#[test]
 fn charts_facts_and_frames_say_nothing_of_transfers_and_relocations() {
     let story = football().story();
     let names: Vec<&str> = charts::all(&story).iter().map(|chart| chart.0).collect();
