@@ -306,8 +306,7 @@ impl Local<'_, '_, '_> {
             }
             // Changing roles costs a pause.
             let kept = if before.is_some_and(|before| before.roles == roles) && !has_failed { KEPT } else { 0.0 };
-            let rolling_home = each(roles.moving).filter(|&finger| self.rolls_by_itself(finger));
-            let lag = rolling_home.map(|finger| self.lag(here, finger)).fold(0.0, f64::max);
+            let lag = each(roles.moving).map(|finger| self.lag(here, finger)).fold(0.0, f64::max);
             let lag = lag / model.frame.torque_scale;
             let worth = prospect.cosine + noise + kept - REACH_WEIGHT * share * share + LAG_WEIGHT * lag;
             if best.as_ref().is_none_or(|(most, _, _)| worth > *most) {
