@@ -291,7 +291,9 @@ impl Local<'_, '_, '_> {
         let has_failed = tried.n > 0;
         let chance = if has_failed { 1.0 } else { CHANCE };
         let mut best: Option<(f64, Roles, Prospect)> = None;
-        for roles in Roles::all(n).filter(|roles| tried.guilty == 0 || roles.moving & tried.guilty != 0) {
+        for roles in Roles::all(n, self.stepper.settings.resting_fingers)
+            .filter(|roles| tried.guilty == 0 || roles.moving & tried.guilty != 0)
+        {
             if self.rolling.is_some_and(|once| once != roles.rolling) || tried.useless.contains(&roles) {
                 continue;
             }

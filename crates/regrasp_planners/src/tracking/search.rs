@@ -224,7 +224,7 @@ fn rolling_finger(stepper: &mut Stepper, start: &TrackingGrasp, turn: &Vector, r
     let step = turn * (settings.object_velocity * settings.time_step / turn.amax());
     let mut worth = |rolling: usize| {
         let mut along = 0.0;
-        for roles in Roles::all(n).filter(|roles| roles.rolling == rolling) {
+        for roles in Roles::all(n, settings.resting_fingers).filter(|roles| roles.rolling == rolling) {
             stepper.workspace.set(&start.world_from_object.to_pose(), &start.joints, &start.contacts());
             let asked = Asked { roles, turn: Some(step), rolled: Controls::default(), seconds: settings.time_step };
             if let Ok(made) = stepper.step(start, &asked) {

@@ -74,6 +74,8 @@ pub struct TrackingSettings {
     pub rolling_velocity: f64,
     /// True where the moving finger may go from face to face of the object (scenarios D-1 and D-3).
     pub face_changes: bool,
+    /// Fingers that rest while the object moves, 3 as in the paper, or 2; the others move. Hands of three fingers rest two.
+    pub resting_fingers: usize,
     /// Which finger the object rolls on.
     pub rolling_finger: RollingFinger,
     /// Where forces are.
@@ -124,6 +126,7 @@ impl Default for TrackingSettings {
             object_velocity: 1.43f64.to_radians(),
             rolling_velocity: 2.86f64.to_radians(),
             face_changes: true,
+            resting_fingers: 3,
             rolling_finger: RollingFinger::Any,
             cones: Cones::Pyramid,
             trials: 50,
@@ -165,6 +168,9 @@ impl TrackingSettings {
         }
         if self.in_hand.forces.is_none() {
             return Err("in_hand.forces is none; tracking needs forces".into());
+        }
+        if !(2..=3).contains(&self.resting_fingers) {
+            return Err(format!("resting_fingers is {}; it must be 2 or 3", self.resting_fingers));
         }
         if self.trials == 0 || self.nodes == 0 {
             return Err("trials and nodes are at least 1".into());

@@ -30,9 +30,6 @@ const MOST_BENT: f64 = 2e-4;
 /// Work of a step, in the unit of in-hand planning: a configuration looked at. By measurement, some 50 against 2 microseconds.
 pub const STEP_WORK: u64 = 25;
 
-/// Fingers that rest while the object moves, where the hand has more than three (paper 003, section 4).
-const RESTING: usize = 3;
-
 /// Fingers, as bits.
 pub type Fingers = u32;
 
@@ -56,9 +53,9 @@ impl Roles {
         self.moving & (1 << finger) != 0
     }
 
-    /// All roles that `n` fingers can have while the object moves: three rest, of three fingers two.
-    pub fn all(n: usize) -> impl Iterator<Item = Roles> {
-        let n_moving = n.saturating_sub(RESTING).max(1);
+    /// All roles that `n` fingers can have while the object moves: `resting` of them rest, and one moves at least.
+    pub fn all(n: usize, resting: usize) -> impl Iterator<Item = Roles> {
+        let n_moving = n.saturating_sub(resting).max(1);
         let sets = (0..1u32 << n).filter(move |set| set.count_ones() as usize == n_moving);
         sets.flat_map(move |moving| {
             (0..n).map(move |rolling| Roles { moving, rolling }).filter(|roles| !roles.moves(roles.rolling))

@@ -114,6 +114,49 @@ fn the_wide_hand_turns_a_sphere_by_tracking_and_gaits_where_tracking_alone_does_
     assert!(miss.angle_left < 90f64.to_radians(), "{failure}");
 }
 
+/// Fingers that slide while the object moves, and that move, in the tracking segments of a plan.
+fn sliding_and_moving(plan: &Plan) -> BTreeSet<(usize, usize)> {
+    let tracked = plan.segments.iter().filter(|segment| segment.kind == SegmentKind::Tracking);
+    let counts = tracked.map(|segment| {
+        let contacts = &segment.waypoints[0].contacts;
+        let n_sliding = contacts.iter().filter(|contact| contact.mode == ContactMode::Sliding).count();
+        (n_sliding, 1 + segment.also_moving.len())
+    });
+    counts.collect()
+}
+
+/// Where two fingers rest one slides, and the others stick.
+#[test]
+fn two_fingers_of_the_wide_hand_may_move_at_a_time() {
+    let loaded = scene("tracking_sphere_wide.toml");
+    let method = TrackingMethod::TrackingAndGaiting;
+    let settings = TrackingSettings { method, resting_fingers: 2, ..TrackingSettings::default() };
+    for seed in 0..3 {
+        let query = loaded.task.query(seed);
+        let budget = Budget::work(20_000_000);
+        let plan = plan_tracking(&loaded.scene, &query, &settings, seed, &budget, &|_| {})
+            .unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
+        accepted(&loaded, &query, &plan);
+        assert_eq!(sliding_and_moving(&plan), BTreeSet::from([(1, 2)]), "seed {seed}");
+    }
+    for resting_fingers in [0, 1, 4] {
+        let told = TrackingSettings { resting_fingers, ..TrackingSettings::default() }.validate().unwrap_err();
+        assert!(told.contains("resting_fingers"), "{told}");
+    }
+}
+
+#[test]
+fn six_fingers_turn_a_sphere_by_tracking_alone() {
+    let loaded = scene("tracking_sphere_six.toml");
+    for seed in 0..3 {
+        let query = loaded.task.query(seed);
+        let plan = plan_with(&loaded, &query, TrackingMethod::Tracking, seed, 20_000_000)
+            .unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
+        accepted(&loaded, &query, &plan);
+        assert_eq!(sliding_and_moving(&plan), BTreeSet::from([(2, 3)]), "seed {seed}");
+    }
+}
+
 #[test]
 fn the_allegro_hand_turns_a_sphere_by_tracking_and_gaits() {
     let Some(models) = shared_models() else { return };

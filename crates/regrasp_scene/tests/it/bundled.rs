@@ -24,7 +24,7 @@ fn center_in_world(loaded: &LoadedScene, world_from_object: &Pose) -> Point {
 }
 
 /// Scenes of the papers that are more than a turn in place, and those of tracking, which have a start grasp.
-const PAPER_SCENES: [&str; 11] = [
+const PAPER_SCENES: [&str; 12] = [
     "bulb",
     "cubic",
     "diamond",
@@ -35,6 +35,7 @@ const PAPER_SCENES: [&str; 11] = [
     "football_pivot",
     "pencil",
     "three_fingertips",
+    "tracking_sphere_six",
     "tracking_sphere_wide",
 ];
 
