@@ -177,16 +177,17 @@ replay: python
 	$(SIMULATE) $(REPLAY) --gravity down --speed 1,2 --seeds $(CONTROL_SEEDS) -o $(OUT)/replay --name speed
 	cp $(OUT)/replay/*.csv $(OUT)/replay/*.md docs/benchmarks/replay/
 
-# Replays of 20 plans of tracking: as the paper has them, and with exact cones, a friction margin and normal forces from 0.5 to
-# 20 N. Some half an hour. Writes docs/benchmarks/replay.
+# Replays of 20 plans of tracking: as the paper has them; with exact cones, a friction margin and normal forces from 0.5 to
+# 20 N; of the wide hand with gaits; of six fingers. Some half an hour. Writes docs/benchmarks/replay.
 TRACKING_SEEDS ?= 20
 replay-tracking: python
 	[ -d $(VENV) ] || { echo "error: replays need the Python package (see above)" >&2; exit 1; }
-	mkdir -p $(OUT)/replay-tracking $(OUT)/replay-tracking-paper $(OUT)/replay-tracking-gaiting docs/benchmarks/replay
-	$(SIMULATE) scenes/football.toml --gravity plan --controllers B,H --seeds $(TRACKING_SEEDS) -o $(OUT)/replay-tracking-paper --name tracking_paper
-	$(SIMULATE) scenes/football.toml --gravity plan --controllers B,C2,H --settings docs/benchmarks/tracking_replay.json --seeds $(TRACKING_SEEDS) -o $(OUT)/replay-tracking --name tracking
-	$(SIMULATE) scenes/tracking_sphere_wide.toml --gravity plan --controllers B,C2,H --settings docs/benchmarks/gaiting_replay.json --seeds $(TRACKING_SEEDS) -o $(OUT)/replay-tracking-gaiting --name gaiting
-	cp $(OUT)/replay-tracking*/*.csv $(OUT)/replay-tracking*/*.md docs/benchmarks/replay/
+	mkdir -p $(OUT)/replay-tracking docs/benchmarks/replay
+	$(SIMULATE) scenes/football.toml --gravity plan --controllers B,H --seeds $(TRACKING_SEEDS) -o $(OUT)/replay-tracking/paper --name tracking_paper
+	$(SIMULATE) scenes/football.toml --gravity plan --controllers B,C2,H --settings docs/benchmarks/tracking_replay.json --seeds $(TRACKING_SEEDS) -o $(OUT)/replay-tracking/football --name tracking
+	$(SIMULATE) scenes/tracking_sphere_wide.toml --gravity plan --controllers B,C2,H --settings docs/benchmarks/gaiting_replay.json --seeds $(TRACKING_SEEDS) -o $(OUT)/replay-tracking/gaiting --name gaiting
+	$(SIMULATE) scenes/tracking_sphere_six.toml --gravity plan --controllers B,C2,H --settings docs/benchmarks/six_replay.json --seeds $(TRACKING_SEEDS) -o $(OUT)/replay-tracking/six --name tracking_six
+	cp $(OUT)/replay-tracking/*/*.csv $(OUT)/replay-tracking/*/*.md docs/benchmarks/replay/
 
 # Slow: same bytes on 1, 2 and 8 threads (100 queries), and the checker against broken and good plans; torsion and couplings
 # are broken in plans for real hands.
