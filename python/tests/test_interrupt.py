@@ -6,12 +6,21 @@ import os
 import signal
 import threading
 import time
+from collections.abc import Iterator
 
 import pytest
 import regrasp
 
 # An hour of improving, were it not stopped.
 LONG = {"improve": 3600.0, "max_work": 10**15}
+
+
+@pytest.fixture(autouse=True)
+def ctrl_c() -> Iterator[None]:
+    """Processes that a shell began in the background ignore Ctrl-C: the search would go on for an hour."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def test_ctrl_c_stops_a_search(box: regrasp.Scene) -> None:
