@@ -37,7 +37,7 @@ class Segment:
     start: int
     stop: int
     also_moving: tuple[str, ...] = ()
-    """In tracking by more than four fingers, others that move with it."""
+    """In tracking, others that move at the same time."""
     rolling_finger: str | None = None
     """In tracking, the resting finger that the object rolls on without sliding."""
 

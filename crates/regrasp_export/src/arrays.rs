@@ -151,8 +151,7 @@ impl PlanArrays {
                 .segments
                 .iter()
                 .flat_map(|segment| {
-                    let moves =
-                        |name| segment.moving_finger.as_ref() == Some(name) || segment.also_moving.contains(name);
+                    let moves = |name| segment.moving_fingers().any(|moving| moving == name);
                     plan.fingers.iter().map(move |name| i64::from(moves(name)))
                 })
                 .collect(),

@@ -196,8 +196,8 @@ pub enum SegmentKind {
     /// The object stays and one finger moves: to another contact, away from one to stay free, from free to a contact, or
     /// from one free posture to another. The others rest, those that hold and those that are free.
     Regrasp,
-    /// The object moves or rests, every finger touches it all along, and one finger moves (paper 003, section 3.1: finger
-    /// tracking). Of the others, which rest, one rolls without sliding, and all may roll, slide and twist as the object moves.
+    /// The object moves or rests, every finger touches it all along, and some fingers move, of four in the paper one (paper 003,
+    /// section 3.1: finger tracking). Of the others, which rest, one rolls without sliding, and all may roll, slide and twist as the object moves.
     Tracking,
 }
 
@@ -207,10 +207,10 @@ pub enum SegmentKind {
 pub struct Segment {
     /// Its kind.
     pub kind: SegmentKind,
-    /// The finger that moves, in a regrasp and in tracking.
+    /// The finger that moves, in a regrasp and in tracking; of several the first.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moving_finger: Option<String>,
-    /// In tracking, other fingers that move at the same time, where the hand has more than four.
+    /// In tracking, other fingers that move at the same time, where there are some.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub also_moving: Vec<String>,
     /// In tracking, the resting finger that the object rolls on without sliding (paper 003, section 6.1.2: `F_t`).
@@ -219,6 +219,19 @@ pub struct Segment {
     /// At least two; the first is the last of the segment before, but for time and forces: the finger that is about to lift
     /// has none left, one that has landed none yet.
     pub waypoints: Vec<Waypoint>,
+}
+
+impl Segment {
+    /// A transfer along `waypoints`.
+    pub fn transfer(waypoints: Vec<Waypoint>) -> Self {
+        let (moving_finger, rolling_finger) = (None, None);
+        Segment { kind: SegmentKind::Transfer, moving_finger, also_moving: Vec::new(), rolling_finger, waypoints }
+    }
+
+    /// Names of all fingers that it says move.
+    pub fn moving_fingers(&self) -> impl Iterator<Item = &String> {
+        self.moving_finger.iter().chain(&self.also_moving)
+    }
 }
 
 /// A pose that the object has to pass between start and goal, and when it does.

@@ -37,7 +37,7 @@ pub fn segment_span(segment: &Segment) -> (f64, f64) {
 /// Indices of all fingers that move in a segment, in the order in which it names them.
 pub fn moving_fingers(plan: &Plan, segment: &Segment) -> Vec<usize> {
     let index = |name: &String| plan.fingers.iter().position(|finger| finger == name);
-    segment.moving_finger.iter().chain(&segment.also_moving).filter_map(index).collect()
+    segment.moving_fingers().filter_map(index).collect()
 }
 
 /// Index of the finger that moves in a segment, of several the first.

@@ -43,7 +43,7 @@ const FEWEST_RESTING: usize = 2;
 /// True where a tracking segment says that finger `f` moves.
 pub fn may_move(model: &Model, segment: &Segment, f: usize) -> bool {
     let name = &model.fingers[f].name;
-    segment.moving_finger.as_ref() == Some(name) || segment.also_moving.contains(name)
+    segment.moving_fingers().any(|moving| moving == name)
 }
 
 /// Indices of the fingers that a tracking segment names: the (first) moving and the rolling one.

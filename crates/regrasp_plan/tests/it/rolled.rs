@@ -8,7 +8,7 @@ use regrasp_grasp::Grip;
 use regrasp_plan::check::ViolationKind;
 use regrasp_plan::check::closure::{Body, margin};
 use regrasp_plan::check::continuity::contact_of;
-use regrasp_plan::{ContactMode, ContactState, Plan, Segment, SegmentKind};
+use regrasp_plan::{ContactMode, ContactState, Plan, Segment};
 use regrasp_scene::Scene;
 
 /// Steps of the integration between two waypoints.
@@ -78,16 +78,7 @@ pub fn transfer(course: &Course, grasp: &Grasp, n_steps: usize) -> (Segment, Gra
         }
         waypoints.push(waypoint.clone());
     }
-    (
-        Segment {
-            kind: SegmentKind::Transfer,
-            moving_finger: None,
-            also_moving: Vec::new(),
-            rolling_finger: None,
-            waypoints,
-        },
-        now,
-    )
+    (Segment::transfer(waypoints), now)
 }
 
 /// Rolling transfer, relocation of a finger, rolling transfer.

@@ -264,16 +264,7 @@ fn transfer_with(
         Pose::from_parts(Translation3::from(from.translation.vector + shift * t), rotation)
     };
     let waypoints = (0..=n_steps).map(|k| waypoint(&pose_at(k as f64 / n_steps as f64), grasp, lifted)).collect();
-    (
-        Segment {
-            kind: SegmentKind::Transfer,
-            moving_finger: None,
-            also_moving: Vec::new(),
-            rolling_finger: None,
-            waypoints,
-        },
-        pose_at(1.0),
-    )
+    (Segment::transfer(waypoints), pose_at(1.0))
 }
 
 pub fn regrasp(pose: &Pose, grasp: &Grasp, finger: usize, to: Vector, lift: f64) -> (Segment, Grasp) {
@@ -293,10 +284,7 @@ pub fn regrasp(pose: &Pose, grasp: &Grasp, finger: usize, to: Vector, lift: f64)
     (1..n_steps).for_each(|k| free(to * (touch + lift * (1.0 - k as f64 / n_steps as f64))));
     waypoints.push(waypoint(pose, &after, None));
     let moving_finger = Some(format!("f{finger}"));
-    (
-        Segment { kind: SegmentKind::Regrasp, moving_finger, also_moving: Vec::new(), rolling_finger: None, waypoints },
-        after,
-    )
+    (Segment { kind: SegmentKind::Regrasp, moving_finger, ..Segment::transfer(waypoints) }, after)
 }
 
 pub fn around(azimuth_deg: f64, elevation_deg: f64) -> Vector {

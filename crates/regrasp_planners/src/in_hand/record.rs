@@ -169,7 +169,7 @@ impl<'m, 'a> Recorder<'m, 'a> {
 
     fn begin(&mut self, kind: SegmentKind, moving_finger: Option<String>, n: usize) {
         let waypoints = Vec::with_capacity(1 + n);
-        self.segments.push(Segment { kind, moving_finger, also_moving: Vec::new(), rolling_finger: None, waypoints });
+        self.segments.push(Segment { kind, moving_finger, ..Segment::transfer(waypoints) });
         self.push_here();
     }
 
@@ -200,14 +200,7 @@ impl<'m, 'a> Recorder<'m, 'a> {
         if self.segments.is_empty() {
             // Start and goal are the same and any grasp will do: hold still.
             let waypoints = vec![self.here.clone(), self.here];
-            let (moving_finger, rolling_finger) = (None, None);
-            self.segments.push(Segment {
-                kind: SegmentKind::Transfer,
-                moving_finger,
-                also_moving: Vec::new(),
-                rolling_finger,
-                waypoints,
-            });
+            self.segments.push(Segment::transfer(waypoints));
         }
         let statistics = Statistics {
             transfers: self.transfers,

@@ -6,8 +6,8 @@
 //! - pyramids of four sides inscribed in the cones: the linear program of eq. (13). Of all forces those of least power
 //!   `P = -q' . (f_ext + G f')`, with `f'` the tangential parts (minimum power principle, Peshkin and Sanderson 1989); what is
 //!   then left open goes to small forces. They lie at corners of what is allowed, and jump from corner to corner;
-//! - the exact cones: forces well inside, those of `regrasp_grasp::wrench::distribute`, which changes little where contacts change little. Least
-//!   power is a wish beside its own for small forces across the normal and for the normal force of the settings: together
+//! - the exact cones: forces well inside, those of `regrasp_grasp::wrench::distribute`, which changes little where contacts
+//!   change little. Least power is a wish beside its own for small forces across the normal and for the normal force of the settings: together
 //!   they ask for `|f_t|^2 + POWER P`.
 
 use super::settings::Cones;

@@ -2,8 +2,9 @@
 //! *Global Planning for Dexterous Re-orientation of Rigid Objects: Finger Tracking with Rolling and Sliding*, INRIA RR-3770,
 //! 1999.
 //!
-//! At every instant three fingertips rest and the others move: one of four; of three fingertips two rest. On one of those that
-//! rest the object rolls without sliding; over the others it rolls and slides. Where that gets no farther a finger may be relocated through the air: `gaiting`.
+//! At every instant three fingertips rest and the others move: one of four; of three fingertips two rest, of others if the
+//! settings say so. On one of those that rest the object rolls without sliding; over the others it rolls and slides. Where that
+//! gets no farther a finger may be relocated through the air: `gaiting`.
 
 /// Start and hand as the query gives them.
 mod endpoints;

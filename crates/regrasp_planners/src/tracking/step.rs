@@ -53,7 +53,8 @@ impl Roles {
         self.moving & (1 << finger) != 0
     }
 
-    /// All roles that `n` fingers can have while the object moves: `resting` of them rest, and one moves at least.
+    /// All roles that `n` fingers can have while the object moves: `resting` of them rest, fewer where else none would move (paper
+    /// 003, sections 3.1 and 8).
     pub fn all(n: usize, resting: usize) -> impl Iterator<Item = Roles> {
         let n_moving = n.saturating_sub(resting).max(1);
         let sets = (0..1u32 << n).filter(move |set| set.count_ones() as usize == n_moving);

@@ -18,6 +18,12 @@ export interface Stretch {
   end: number;
 }
 
+/** Who moves in a stretch, in words. */
+export function whoMoves(stretch: Stretch, fingers: { name: string }[]): string {
+  const names = stretch.allMoving.map((finger) => fingers[finger]?.name);
+  return `${names.join(" and ")} ${names.length > 1 ? "move" : "moves"}`;
+}
+
 /** A finger on the object from landing to lifting off. */
 export interface Hold {
   finger: number;

@@ -7,7 +7,7 @@ import { load } from "./support.mjs";
 import { matricesOf, matrix, poseMatrix, synthetic, tracking } from "./synthetic.mjs";
 
 const { linkPoses } = await load("kinematics");
-const { Motion } = await load("motion");
+const { Motion, whoMoves } = await load("motion");
 const math = await load("math");
 const { rotationVectors, anglesAlong } = await load("orientation_path");
 const { readLink, writeLink } = await load("link");
@@ -146,6 +146,18 @@ test("rotation vectors are continuous, those of the poses, and as long a way as 
   });
   assert.ok(sum > 2 * Math.PI, "more than a whole turn");
   assert.ok(Math.abs(sum - anglesAlong(motion).at(-1)) < 1e-9, `${sum}`);
+});
+
+test("tracking: all fingers that move are named", () => {
+  const story = tracking(synthetic({ duration: 12, triangles: 200 }));
+  const [first, second] = story.plan.fingers;
+  const segments = story.plan.segments.map((segment, i) => (i === 0 ? { ...segment, moving_finger: second, also_moving: [first] } : segment));
+  const motion = new Motion({ ...story.plan, segments });
+  assert.deepEqual([motion.stretches[0].moving, motion.stretches[0].allMoving], [1, [1, 0]]);
+  assert.equal(whoMoves(motion.stretches[0], story.scene.fingers), `${second} and ${first} move`);
+  const alone = motion.stretches[1];
+  assert.deepEqual(alone.allMoving, [alone.moving]);
+  assert.equal(whoMoves(alone, story.scene.fingers), `${story.plan.fingers[alone.moving]} moves`);
 });
 
 test("tracking: modes are those of the way to the next waypoint, and nothing holds still but between segments", () => {

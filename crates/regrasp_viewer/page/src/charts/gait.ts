@@ -1,7 +1,7 @@
 // Which finger holds when: solid bars hold a fixed contact, hatched bars roll, lined bars slide, a thin line moves, dots stay free.
 // In tracking, under the bars: ink while the finger is the moving one, grey while the object rolls on it.
 
-import type { Motion } from "../motion";
+import { whoMoves, type Motion } from "../motion";
 import type { Story } from "../story";
 import { fingerColour } from "../theme";
 import { el, svg } from "../dom";
@@ -16,10 +16,11 @@ export function gaitChart(story: Story, motion: Motion): ChartSpec {
   const fingers = story.scene.fingers;
   const bottom = TOP + ROW * fingers.length;
   const relocations = motion.stretches.filter((s) => s.kind === "regrasp").length;
+  const mostMoving = motion.stretches.some((s) => s.allMoving.length > 1) ? "some move" : "one moves";
   return {
     id: "gait",
     title: "Gait",
-    summary: `One row per finger, bars while it holds the object. ${fingers.length} fingers, ${motion.isTracking ? `${Math.max(...motion.stretches.map((s) => s.allMoving.length)) > 1 ? "some move" : "one moves"} at a time` : `${relocations} relocations`}.`,
+    summary: `One row per finger, bars while it holds the object. ${fingers.length} fingers, ${motion.isTracking ? `${mostMoving} at a time` : `${relocations} relocations`}.`,
     height: bottom + 20,
     below: key(motion.isTracking),
     draw(drawing) {
@@ -29,7 +30,7 @@ export function gaitChart(story: Story, motion: Motion): ChartSpec {
     },
     readout(time) {
       const stretch = motion.stretches[motion.stretchAt(time)];
-      if (stretch?.kind === "tracking") return `${stretch.allMoving.map((finger) => fingers[finger]?.name).join(" and ")} moves, ${fingers[stretch.rolling]?.name} rolls`;
+      if (stretch?.kind === "tracking") return `${whoMoves(stretch, fingers)}, ${fingers[stretch.rolling]?.name} rolls`;
       return stretch?.kind === "regrasp" ? "relocation" : "transfer";
     },
   };

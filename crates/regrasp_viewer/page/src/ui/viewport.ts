@@ -1,7 +1,7 @@
 // The 3-D view with what lies over it: what happens now, who holds, layers, start and goal.
 
 import { button, el, icon, setText } from "../dom";
-import type { Motion } from "../motion";
+import { whoMoves, type Motion } from "../motion";
 import type { Player } from "../player";
 import type { Story } from "../story";
 import { fingerColour } from "../theme";
@@ -127,11 +127,11 @@ export class Viewport {
     if (!stretch) return;
     const same = motion.stretches.filter((s) => s.kind === stretch.kind);
     const number = `${same.indexOf(stretch) + 1} of ${same.length}`;
-    const [name, under] = [stretch.allMoving, [stretch.rolling]].map((fingers) => fingers.map((finger) => story.scene.fingers[finger]?.name).join(" and "));
+    const [name, under] = [stretch.moving, stretch.rolling].map((finger) => story.scene.fingers[finger]?.name);
     const said = {
       transfer: `Transfer ${number}`,
       regrasp: `Relocation ${number}${name ? `: ${name} moves` : ""}`,
-      tracking: `${name} ${stretch.allMoving.length > 1 ? "move" : "moves"} (dark rim), the object rolls on ${under} (grey rim)`,
+      tracking: `${whoMoves(stretch, story.scene.fingers)} (dark rim), the object rolls on ${under} (grey rim)`,
     };
     setText(this.caption, said[stretch.kind]);
     motion.contacts(time).forEach((contact, i) => {
