@@ -15,10 +15,11 @@ use regrasp_base::diagnostic::{did_you_mean, number};
 use regrasp_base::toml_table::{Codes, Entry, Found, Table};
 use regrasp_base::{Diagnostic, InputError, Place, files};
 use regrasp_geometry::frame::direction;
-use regrasp_geometry::{Point, UnitVector, Vector};
+use regrasp_geometry::{Point, Vector};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Instant;
 
 /// The value of `format` in a hand file.
 pub const FORMAT: &str = "regrasp-hand";
@@ -45,7 +46,26 @@ pub struct LoadOptions {
     pub lenient: bool,
     /// Contact model of fingertips of which the hand file says nothing.
     pub contact: ContactModel,
+    /// Wall-clock instant after which reading is given up (`F004`). It cuts and never changes what is read.
+    pub deadline: Option<Instant>,
 }
+
+impl LoadOptions {
+    /// Err when the deadline has passed before `path` was read and made ready (`F004`).
+    pub fn check_time(&self, path: &Path) -> Result<(), InputError> {
+        match self.deadline {
+            Some(deadline) if Instant::now() >= deadline => {
+                Err(Diagnostic::new(OUT_OF_TIME, Place::file(path), "the time limit passed while this file was read")
+                    .fix("allow more time, or simplify the meshes")
+                    .into())
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The code of reading that a deadline cut.
+pub const OUT_OF_TIME: &str = "F004";
 
 /// A file that was read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -87,6 +107,7 @@ pub fn load_hand(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Input
 
 fn load_bare_urdf(path: &Path, options: &LoadOptions) -> Result<LoadedHand, InputError> {
     let LoadedRobot { robot, inputs, mut notes } = load_robot(path, options)?;
+    options.check_time(path)?;
     let robot = Arc::new(robot);
     let spec = crate::inspect::guess::guess_hand(&robot, options.contact, path)?;
     notes.push(format!(
@@ -113,6 +134,7 @@ fn load_hand_file(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
     let Parts { robot, spec, inputs: read } = parts.expect("what could not be read has left a diagnostic");
     let mut inputs = vec![own];
     inputs.extend(read);
+    options.check_time(path)?;
     let (hand, more) = assemble(&robot, &spec, path)?;
     notes.extend(more);
     refuse_wrong_unit(&hand, path)?;

@@ -66,6 +66,9 @@ pub(super) fn object(root: &mut Table, files: &mut Files, found: &mut Found) -> 
         center_is_inside(&shape, &center_of_mass, center, found)?;
     }
     // Both take long for meshes of a million triangles.
+    if !files.is_in_time(found) {
+        return None;
+    }
     let (surface, mesh_body) = std::thread::scope(|scope| {
         let mesh_body = scope.spawn(|| MeshBody::of(&shape));
         let surface = Surface::with_crease_angle(&shape, crease_angle);
@@ -262,6 +265,9 @@ fn obstacle(entry: &Entry, files: &mut Files, found: &mut Found) -> Option<Obsta
         let diagnostic =
             entry.error("S107", found, "has a mesh with an origin").fix("place the obstacle by its position instead");
         found.diagnostics.push(diagnostic);
+        return None;
+    }
+    if !files.is_in_time(found) {
         return None;
     }
     let mesh_body = MeshBody::of(&read.shape);

@@ -19,6 +19,7 @@ use crate::robot::{Link, Robot};
 use regrasp_base::diagnostic::{Lines, bad_name};
 use regrasp_base::{Diagnostic, InputError, files};
 use regrasp_geometry::TriangleMesh;
+use regrasp_geometry::import::{MAX_TRIANGLES, too_many};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -47,7 +48,7 @@ pub fn load_robot(path: &Path, options: &LoadOptions) -> Result<LoadedRobot, Inp
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let input = LoadedInput { role: "urdf".into(), name, path: path.to_owned(), sha256: files::sha256(&bytes) };
     let text = files::text_of(path, bytes)?;
-    let mut meshes = Meshes { options: options.clone(), read: BTreeMap::new(), n_missed: 0, inputs: vec![input] };
+    let mut meshes = Meshes { options: options.clone(), read: BTreeMap::new(), n_triangles: 0, n_missed: 0, inputs: vec![input] };
     let (robot, notes) = parse_robot(path, &text, options.lenient, &mut meshes)?;
     Ok(LoadedRobot { robot, inputs: meshes.inputs, notes })
 }
@@ -104,6 +105,8 @@ pub(crate) fn parse_robot(
 pub(crate) struct Meshes {
     options: LoadOptions,
     read: BTreeMap<PathBuf, Result<Arc<TriangleMesh>, InputError>>,
+    /// Triangles of all of them.
+    n_triangles: usize,
     /// Names that led to no file so far.
     n_missed: usize,
     /// The URDF and every mesh read so far.
@@ -127,12 +130,18 @@ impl Meshes {
         if let Some(known) = self.read.get(&resolved.path) {
             return known.clone();
         }
+        self.options.check_time(&resolved.path)?;
         let bytes = files::read(&resolved.path);
         let mesh = bytes.and_then(|bytes| {
             let sha256 = files::sha256(&bytes);
             let input = LoadedInput { role: "mesh".into(), name: name.to_owned(), path: resolved.path.clone(), sha256 };
             self.inputs.push(input);
-            regrasp_geometry::import::read_mesh(&resolved.path, &bytes).map(Arc::new)
+            let mesh = regrasp_geometry::import::read_mesh(&resolved.path, &bytes)?;
+            self.n_triangles += mesh.triangles().len();
+            match self.n_triangles > MAX_TRIANGLES {
+                true => Err(too_many(model, self.n_triangles)),
+                false => Ok(Arc::new(mesh)),
+            }
         });
         self.read.insert(resolved.path, mesh.clone());
         mesh
