@@ -3,8 +3,8 @@
 use cpu_time::{ProcessTime, ThreadTime};
 use regrasp_base::Budget;
 use regrasp_plan::check::{CheckSettings, check};
-use regrasp_plan::{Plan, format};
 use regrasp_plan::plan::Improvement;
+use regrasp_plan::{Plan, format};
 use regrasp_planners::in_hand::{NotProven, validate_once};
 use regrasp_planners::{Failure, InHandSettings, PlannerSettings, Progress, TrackingMethod, TrackingSettings, plan};
 use regrasp_scene::{InHandQuery, Scene, TaskKind};
