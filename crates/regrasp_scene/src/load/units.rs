@@ -97,7 +97,7 @@ pub(super) fn list(v: regrasp_geometry::Vector) -> String {
 
 /// A size with so many decimals; a far too large one by its power of ten.
 pub(super) fn shown(size: f64, decimals: usize) -> String {
-    if size < 1e6 { format!("{size:.decimals$}") } else { format!("{size:.1e}") }
+    if size.abs() < 1e6 { format!("{size:.decimals$}") } else { format!("{size:.1e}") }
 }
 
 /// Distance of the object from the nearest finger base, and the reach, when no finger can touch the object there.
