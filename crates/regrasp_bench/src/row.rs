@@ -3,7 +3,7 @@
 use cpu_time::{ProcessTime, ThreadTime};
 use regrasp_base::Budget;
 use regrasp_plan::Plan;
-use regrasp_plan::check::{CheckSettings, check};
+use regrasp_plan::check::{CheckSettings, Level, check};
 use regrasp_plan::plan::Improvement;
 use regrasp_planners::in_hand::{NotProven, validate_once};
 use regrasp_planners::{Failure, InHandSettings, PlannerSettings, Progress, TrackingMethod, TrackingSettings, plan};
@@ -46,8 +46,8 @@ pub struct RunSettings {
 /// Whether plans are judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Judge {
-    /// By the independent checker.
-    Checker,
+    /// By the independent checker, for this level.
+    Checker(Level),
     /// Not at all.
     Skip,
 }
@@ -72,8 +72,11 @@ pub struct Row {
     pub floor_s: Option<f64>,
     /// Wall-clock time of the checker.
     pub check_s: Option<f64>,
-    /// The checker's verdict.
+    /// The checker's verdict, for the level that was asked for.
     pub accepted: Option<bool>,
+    /// The highest level at which the checker finds nothing wrong.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub level: Option<Level>,
     /// Nodes of the search.
     pub nodes: u64,
     /// Configurations sampled; in tracking, sub-goals tried.
@@ -206,17 +209,19 @@ pub(crate) fn measure(problem: Problem, plan: &Plan, settings: &InHandSettings, 
             Err(not_proven) => row.cause = not_proven.to_string(),
         }
     }
-    if asked == Judge::Checker {
-        judge(problem, plan, row);
+    if let Judge::Checker(level) = asked {
+        judge(problem, plan, level, row);
     }
 }
 
 /// Judges a plan and enters what came of it.
-fn judge(problem: Problem, plan: &Plan, row: &mut Row) {
+fn judge(problem: Problem, plan: &Plan, level: Level, row: &mut Row) {
     let started = Instant::now();
-    let report = check(problem.scene, Some(problem.query), plan, &CheckSettings::default());
+    let settings = CheckSettings { level, ..CheckSettings::default() };
+    let report = check(problem.scene, Some(problem.query), plan, &settings);
     row.check_s = Some(started.elapsed().as_secs_f64());
     row.accepted = Some(report.accepted());
+    row.level = report.reached;
     row.min_margin = report.min_margin;
     row.min_clearance = report.min_clearance.as_ref().map(|clearance| clearance.distance);
     if let Some(violation) = report.violations.first() {

@@ -36,7 +36,10 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
         return suite::run(path, arguments, common, talk);
     }
     let files = load::scene_files(&arguments.scenes)?;
-    let mut scenes = files.iter().map(|path| load::scene(path, common, talk)).collect::<Result<Vec<_>, _>>()?;
+    let mut scenes = files
+        .iter()
+        .map(|path| Ok(arguments.judging.scene(load::scene(path, common, talk)?)))
+        .collect::<Result<Vec<_>, Stop>>()?;
     let (planner, tracking) = bench_settings(&scenes, arguments)?;
     let improves = planner.improve_work > 0;
     let cancelled = interrupt::flag()?;
@@ -56,7 +59,7 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
         max_work: arguments.search.max_work,
         time_limit: arguments.search.time_limit,
         improve_for: arguments.search.improve,
-        judge: if arguments.no_check { Judge::Skip } else { Judge::Checker },
+        judge: if arguments.no_check { Judge::Skip } else { Judge::Checker(arguments.judging.level()) },
         cancelled: Arc::clone(&cancelled),
     };
     let mut rows = Vec::new();

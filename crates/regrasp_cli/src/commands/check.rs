@@ -17,8 +17,8 @@ pub fn run(arguments: &args::Check, common: &Common, talk: &Talk) -> Result<(), 
     interrupt::flag()?;
     let plan = format::from_json(&arguments.plan, &files::read(&arguments.plan)?)?;
     let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref())?;
-    let loaded = load::scene(&scene_path, common, talk)?;
-    if judge::judge(&loaded, &plan, talk)?.accepted() { Ok(()) } else { Err(Stop::Rejected) }
+    let loaded = arguments.judging.scene(load::scene(&scene_path, common, talk)?);
+    if judge::judge(&loaded, &plan, &arguments.judging, talk)?.accepted() { Ok(()) } else { Err(Stop::Rejected) }
 }
 
 /// The scene file of `plan`, which was read from `plan_path`: `named`, what `--scene` says, whatever the plan says; without

@@ -8,6 +8,7 @@ use crate::stop::Stop;
 use crate::talk::{Talk, duration, grouped};
 use regrasp::InHandSettings;
 use regrasp::base::files;
+use regrasp::plan::check::Level;
 use regrasp::scene::LoadedScene;
 use regrasp_bench::growth::{Curve, GrowthRow, Point, batch, header, line, pictures, table, timed_load, write_scene};
 use regrasp_bench::row::Judge;
@@ -40,7 +41,7 @@ pub fn run(arguments: &args::Growth, talk: &Talk) -> Result<(), Stop> {
         tracking: Default::default(),
         max_work: arguments.max_work,
         time_limit: Some(arguments.time_limit),
-        judge: Judge::Checker,
+        judge: Judge::Checker(Level::Geometry),
         improve_for: None,
         cancelled,
     };

@@ -1,6 +1,6 @@
 //! `regrasp plan`: plan a scene, check the plan, then write it.
 
-use crate::args::{self, Common};
+use crate::args::{self, Common, Judging};
 use crate::commands::pictures;
 use crate::interrupt;
 use crate::judge;
@@ -34,7 +34,7 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
         return Err(Stop::argument("A505", "--report", problem, "another file"));
     }
     let cancelled = interrupt::flag()?;
-    let loaded = load::scene(&arguments.scene, common, talk)?;
+    let loaded = arguments.judging.scene(load::scene(&arguments.scene, common, talk)?);
     for path in written.into_iter().flatten() {
         let read = loaded.scene.inputs.iter().map(|input| input.path.as_path());
         refuse_input(path, read.chain(arguments.search.settings.as_deref()))?;
@@ -64,7 +64,8 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
         }
         (found, _) => found?,
     };
-    judge_and_write(&plan, arguments.output.as_deref(), &arguments.scene, page.as_ref(), common, talk)
+    let output = arguments.output.as_deref();
+    judge_and_write(&plan, output, &arguments.scene, page.as_ref(), common, &arguments.judging, talk)
 }
 
 /// Judges a plan; writes it to `output`, or to stdout, if it is accepted. A page is written of every plan.
@@ -74,12 +75,13 @@ pub fn judge_and_write(
     scene: &Path,
     page: Option<&Page>,
     common: &Common,
+    judging: &Judging,
     talk: &Talk,
 ) -> Result<(), Stop> {
     let bytes = format::to_json(plan);
     // Judged is what will be written, in a scene read afresh: the checker starts from files.
     let plan_path = output.unwrap_or(Path::new("plan.json"));
-    let report = judge::judge_bytes(plan_path, bytes.as_bytes(), scene, &load::options(common), talk)?;
+    let report = judge::judge_bytes(plan_path, bytes.as_bytes(), scene, common, judging, talk)?;
     if let Some(page) = page {
         page.write_plan(plan, &report, talk)?;
     }

@@ -11,6 +11,7 @@ use crate::stop::Stop;
 use crate::talk::{Talk, counted, duration, grouped};
 use regrasp::Budget;
 use regrasp::base::files;
+use regrasp::plan::check::Level;
 use regrasp::planners::FailureKind;
 use regrasp::planners::in_hand::roadmap::{
     About, BuildSettings, BuildStage, Census, GraspRoadmap, QueryMemory, Region, RoadmapPlanner, build_roadmap,
@@ -116,7 +117,7 @@ fn run_query(arguments: &args::RoadmapQuery, common: &Common, talk: &Talk) -> Re
     let cancelled = interrupt::flag()?;
     let roadmap = open(&arguments.roadmap, talk)?;
     refuse_other_settings(&roadmap, arguments)?;
-    let loaded = load::in_hand_scene(&arguments.scene, ROADMAPS, common, talk)?;
+    let loaded = arguments.judging.scene(load::in_hand_scene(&arguments.scene, ROADMAPS, common, talk)?);
     let query = loaded.task.query(arguments.seed);
     say_query(&query, arguments.seed, 1, talk);
     let mut planner = RoadmapPlanner::new(&arguments.roadmap, &roadmap, &loaded.scene)?;
@@ -131,7 +132,8 @@ fn run_query(arguments: &args::RoadmapQuery, common: &Common, talk: &Talk) -> Re
         Err(failure) => return Err(Stop::NoPlan(Box::new(failure))),
     };
     say_plan(&answer.plan, started.elapsed().as_secs_f64(), talk);
-    judge_and_write(&answer.plan, arguments.output.as_deref(), &arguments.scene, None, common, talk)?;
+    let output = arguments.output.as_deref();
+    judge_and_write(&answer.plan, output, &arguments.scene, None, common, &arguments.judging, talk)?;
     if arguments.grow {
         drop(planner);
         save(&roadmap.grown_by(&answer), &arguments.roadmap, talk)?;
@@ -163,7 +165,9 @@ fn run_picture(arguments: &args::RoadmapPicture, common: &Common, talk: &Talk) -
         Err(failure) => return Err(Stop::NoPlan(Box::new(failure))),
     };
     say_plan(&answer.plan, started.elapsed().as_secs_f64(), talk);
-    if !judge::judge(&loaded, &answer.plan, talk)?.accepted() {
+    // The graph's motions are geometry: their contacts stay where they are.
+    let judging = args::Judging { level: Some(Level::Geometry.name().into()), gravity: None };
+    if !judge::judge(&loaded, &answer.plan, &judging, talk)?.accepted() {
         return Err(Stop::Rejected);
     }
     // With start and goal of the query as nodes.
@@ -268,7 +272,7 @@ fn say_census(census: &Census, talk: &Talk) {
 fn run_bench(arguments: &args::RoadmapBench, common: &Common, talk: &Talk) -> Result<(), Stop> {
     let cancelled = interrupt::flag()?;
     let roadmap = open(&arguments.roadmap, talk)?;
-    let loaded = load::in_hand_scene(&arguments.scene, ROADMAPS, common, talk)?;
+    let loaded = arguments.judging.scene(load::in_hand_scene(&arguments.scene, ROADMAPS, common, talk)?);
     let mut planner = RoadmapPlanner::new(&arguments.roadmap, &roadmap, &loaded.scene)?;
     if arguments.smooth {
         planner = planner.smoothing();
@@ -290,7 +294,7 @@ fn run_bench(arguments: &args::RoadmapBench, common: &Common, talk: &Talk) -> Re
         tracking: Default::default(),
         max_work: 20_000_000,
         time_limit: None,
-        judge: if arguments.no_check { Judge::Skip } else { Judge::Checker },
+        judge: if arguments.no_check { Judge::Skip } else { Judge::Checker(arguments.judging.level()) },
         improve_for: None,
         cancelled: Arc::clone(&cancelled),
     };

@@ -8,6 +8,7 @@ use crate::load;
 use crate::stop::Stop;
 use crate::talk::Talk;
 use regrasp::base::files;
+use regrasp::plan::check::Level;
 use regrasp::scene::LoadedScene;
 use regrasp_bench::at_once::in_order;
 use regrasp_bench::csv::Writer;
@@ -130,7 +131,7 @@ fn measure(
         tracking: job.tracking.clone().unwrap_or_default(),
         max_work: job.max_work,
         time_limit: job.time_limit_s.map(Duration::from_secs_f64),
-        judge: Judge::Checker,
+        judge: Judge::Checker(Level::Geometry),
         improve_for: None,
         cancelled: Arc::clone(cancelled),
     };

@@ -36,7 +36,7 @@ pub fn run(arguments: &args::View, common: &Common, talk: &Talk) -> Result<(), S
     pictures::refuse(arguments, own.into_iter().flatten())?;
     let plan = format::from_json(&arguments.plan, &files::read(&arguments.plan)?)?;
     let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref())?;
-    let loaded = load::scene(&scene_path, common, talk)?;
+    let loaded = arguments.judging.scene(load::scene(&scene_path, common, talk)?);
     for path in wanted.into_iter().chain(arguments.png.as_deref()) {
         refuse_input(path, loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
     }
@@ -48,7 +48,7 @@ pub fn run(arguments: &args::View, common: &Common, talk: &Talk) -> Result<(), S
         }
         None => None,
     };
-    let report = judge::judge(&loaded, &plan, talk)?;
+    let report = judge::judge(&loaded, &plan, &arguments.judging, talk)?;
     let packages = load::options(common).resolve;
     let story = pages::story(&Telling {
         scene: &loaded.scene,

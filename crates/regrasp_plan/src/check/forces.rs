@@ -32,7 +32,7 @@ use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactState, ForcePromises, Plan, Segment, Waypoint};
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp::ContactModel;
-use regrasp_scene::{Gravity, Object, Scene};
+use regrasp_scene::{Object, Scene};
 
 /// Standard gravity, in metres per second squared (CGPM 1901).
 pub(super) const GRAVITY: f64 = 9.80665;
@@ -154,16 +154,13 @@ fn check_promises(scene: &Scene, model: &Model, promises: &ForcePromises, log: &
         broken("mass", promises.mass, object.mass, message);
     }
     let promised = promises.gravity_in_world.map(Vector::from);
-    let differs = match scene.gravity {
-        Some(Gravity::Direction(down)) => {
-            promised.is_none_or(|promised| (promised - down.into_inner() * GRAVITY).norm() > GRAVITY_TOLERANCE)
-        }
-        Some(Gravity::Any) => promised.is_some(),
-        // The scene leaves the direction to the plan.
-        None => false,
+    let asked = scene.gravity().in_world().map(|gravity| gravity.normalize() * GRAVITY);
+    let agree = match (promised, asked) {
+        (Some(promised), Some(asked)) => (promised - asked).norm() <= GRAVITY_TOLERANCE,
+        (promised, asked) => promised.is_none() && asked.is_none(),
     };
-    if differs {
-        let message = format!("gravity {promised:?}, the scene states {:?}", scene.gravity);
+    if !agree {
+        let message = format!("gravity {}, judged is under {}", in_words(promised), in_words(asked));
         broken("gravity_in_world", f64::NAN, f64::NAN, message);
     }
     if let Some(gravity) = promises.gravity_in_world.map(|gravity| Vector::from(gravity).norm())
@@ -186,6 +183,10 @@ fn check_promises(scene: &Scene, model: &Model, promises: &ForcePromises, log: &
     for limit in promises.joint_torques.iter().flatten().filter(|limit| **limit < 0.0) {
         broken("joint_torques", *limit, 0.0, format!("a torque limit of {limit}"));
     }
+}
+
+fn in_words(gravity_in_world: Option<Vector>) -> String {
+    gravity_in_world.map_or("that of any direction".into(), |g| format!("[{:.4}, {:.4}, {:.4}] m/s^2", g.x, g.y, g.z))
 }
 
 /// What everything is judged by.

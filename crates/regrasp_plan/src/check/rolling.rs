@@ -3,8 +3,8 @@
 //! A tip is a ball fixed to its link. In the object frame its centre goes along `c(t)` and the link turns; the point of
 //! the surface nearest to `c` is the contact and `n` the direction from there. The material point of the link that touches
 //! is at `c - r n`. Rolling without slipping means that its velocity seen from the object has no part across `n` (paper
-//! 004, section IV-C; paper 003, section 6.2.2). Turning about `n` is no slip: soft fingertips twist, and resist it with
-//! the torsion of their contact model, but do not slide.
+//! 004, section IV-C; paper 003, section 6.2.2). Here slip is judged by segment, against what the plan promises; `slip` judges
+//! it from landing to lifting, with the turn of soft fingertips about `n`.
 
 use crate::check::contact::error_at;
 use crate::check::continuity::{pose_between, pose_difference};
@@ -232,6 +232,18 @@ impl<'a> Roll<'a> {
             Some((self.finger.point_facing(&-link.fixed_view::<3, 3>(0, 0).tr_mul(&normal)), normal))
         };
         integral(|n_pieces| slide(&object_from_link, &touching, n_pieces), allowed)
+    }
+
+    /// How far the contact travels over the object, by chords of half a step; zero where no surface is near.
+    pub fn travel(&self) -> f64 {
+        let [start, middle, end] = [0.0, 0.5, 1.0].map(|t| self.contact(t).map(|(point, _)| point));
+        let chord = |a: Option<Point>, b: Option<Point>| a.zip(b).map_or(0.0, |(a, b)| (b - a).norm());
+        chord(start, middle) + chord(middle, end)
+    }
+
+    /// Size of the link's turn over the object about `normal`, in the object frame, from the step's beginning to its end.
+    pub fn turn_about(&self, normal: &Vector) -> f64 {
+        turn_between(&self.object_from_link(0.0), &self.object_from_link(1.0)).dot(normal).abs()
     }
 
     /// How the link turns over the object; none where no surface is near.

@@ -1,7 +1,6 @@
 //! Contact forces of the hand's fingers: what balances the object's weight within all limits.
 
 use super::model::{MAX_FINGERS, Model};
-use super::settings::gravity_of;
 use super::settings::{ForceSettings, InHandSettings};
 use super::workspace::{Contacts, HandJoints, Workspace};
 use arrayvec::ArrayVec;
@@ -58,7 +57,7 @@ impl ForceModel {
         Some(ForceModel {
             limits: ForceLimits { least, largest, squeeze, squeeze_weight },
             mass: scene.object.mass,
-            gravity: gravity_of(scene, settings.gravity.as_ref()).unwrap_or_default(),
+            gravity: scene.gravity(),
             torques: scene.hand.fingers.iter().map(|f| f.chain.names.iter().map(torque).collect()).collect(),
         })
     }

@@ -87,8 +87,7 @@ mod visibility;
 pub(crate) mod workspace;
 
 pub use settings::{
-    Alpha, AnyDirection, CostWeights, FirstTry, ForceSettings, GravityInHand, InHandSettings, Method, ReleaseRule,
-    SpeedSettings, TransferMode,
+    Alpha, CostWeights, FirstTry, ForceSettings, InHandSettings, Method, ReleaseRule, SpeedSettings, TransferMode,
 };
 pub use validate::{NotProven, validate_once};
 
@@ -131,7 +130,6 @@ pub fn plan_in_hand(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Plan, Failure> {
     settings.validate().expect("settings are validated where they are read");
-    refuse_two_gravities(scene, settings)?;
     if query.task != TaskKind::InHand {
         let message = format!("a task of kind \"{}\" is none of the in-hand planner's", query.task.name());
         return Err(Failure::bare(FailureKind::Impossible, message, "plan it with plan_tracking, or regrasp plan"));
@@ -198,15 +196,6 @@ fn plan_with(
             let has_tried_all = interrupt == Interrupt::WorkSpent && max_work < budget.max_work;
             Err(if has_tried_all { refuse_after_transfers(&model, failure) } else { failure })
         }
-    }
-}
-
-/// The scene's gravity and that of the settings are one, where both are stated.
-fn refuse_two_gravities(scene: &Scene, settings: &InHandSettings) -> Result<(), Failure> {
-    let advice = "state gravity in the scene or in the settings, not in both";
-    match settings::gravity_of(scene, settings.gravity.as_ref()) {
-        Ok(_) => Ok(()),
-        Err(message) => Err(Failure::bare(FailureKind::Impossible, message, advice)),
     }
 }
 

@@ -139,8 +139,9 @@ pub struct Model<'a> {
 }
 
 impl<'a> Model<'a> {
-    /// Prepares `scene`.
+    /// Prepares `scene`; the scene's limits bound the settings.
     pub fn new(scene: &'a Scene, settings: &InHandSettings) -> Self {
+        let settings = settings.within(&scene.limits);
         let hand = &scene.hand;
         assert!(hand.fingers.len() <= MAX_FINGERS, "hands of more than {MAX_FINGERS} fingers");
         let mut bodies = Vec::new();
@@ -260,11 +261,11 @@ impl<'a> Model<'a> {
                 torque_scale: scene.object.radius,
                 friction,
             },
-            forces: ForceModel::new(scene, settings),
+            forces: ForceModel::new(scene, &settings),
             object_reach: bodies[object].center.coords.norm() + bodies[object].radius,
             radii: bodies.iter().map(|body| body.radius).collect(),
             bodies,
-            settings: settings.clone(),
+            settings,
         }
     }
 

@@ -4,7 +4,6 @@
 use super::super::endpoints::{End, given_grasp, object_blocked_by, refuse_buried_object};
 use super::super::model::Model;
 use super::super::record::Recorder;
-use super::super::refuse_two_gravities;
 use super::super::search::{Search, Stop};
 use super::super::settings::InHandSettings;
 use super::super::shorten::{Arrival, transfer_regrasp};
@@ -115,7 +114,6 @@ impl<'a> RoadmapPlanner<'a> {
         let model = &self.model;
         let poses = (query.world_from_object_start, query.world_from_object_goal);
         refuse_way_poses(query)?;
-        refuse_two_gravities(model.scene, &model.settings)?;
         refuse_buried_object(model, End::Start, &poses.0)?;
         refuse_buried_object(model, End::Goal, &poses.1)?;
         let mut rng = Rng::keyed(seed, "given_grasps", 0);
