@@ -7,6 +7,8 @@
 pub mod along;
 /// Room for the weight in every direction.
 mod any_gravity;
+/// Closure and pads of rolling contacts between waypoints.
+pub mod between;
 /// Everything that can collide, and which pairs must not.
 pub mod bodies;
 /// Force closure with margin, by exact second-order cones.
@@ -338,7 +340,9 @@ fn judge(
     }
     contact::check_pads(model, plan, log);
     contact::check_contacts(&scene.object, model, plan, settings, log);
-    report.min_margin = promises::check_closure(&scene.object, model, plan, settings, log);
+    let at_waypoints = promises::check_closure(&scene.object, model, plan, settings, log);
+    let between = between::check_between(&scene.object, model, plan, settings, log);
+    report.min_margin = at_waypoints.into_iter().chain(between).reduce(f64::min);
     promises::check_promises(&scene.object, plan, settings, report.min_margin, log);
     limits::check_limits(scene, model, plan, log);
     times::check_times(&scene.object, model, plan, settings, log);

@@ -241,6 +241,11 @@ impl<'a> Roll<'a> {
         chord(start, middle) + chord(middle, end)
     }
 
+    /// As [`FingerModel::off_pad`] at `t`, where the object's outward normal is `normal`, in the object frame.
+    pub fn off_pad(&self, t: f64, normal: &Vector) -> Option<(f64, f64)> {
+        self.finger.faces_off_pad(&-self.object_from_link(t).fixed_view::<3, 3>(0, 0).tr_mul(normal))
+    }
+
     /// Size of the link's turn over the object about `normal`, in the object frame, from the step's beginning to its end.
     pub fn turn_about(&self, normal: &Vector) -> f64 {
         turn_between(&self.object_from_link(0.0), &self.object_from_link(1.0)).dot(normal).abs()
