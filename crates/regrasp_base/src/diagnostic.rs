@@ -36,7 +36,7 @@ impl Place {
 
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", printable(&self.file.to_string_lossy()))?;
+        write!(f, "{}", printable_line(&self.file.to_string_lossy()))?;
         if let Some(line) = self.line {
             write!(f, ":{line}")?;
             if let Some(column) = self.column {
@@ -44,6 +44,28 @@ impl fmt::Display for Place {
             }
         }
         Ok(())
+    }
+}
+
+/// Where the lines of a text begin: made once, it finds the place of any byte without counting lines again.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Lines {
+    /// Byte offsets at which lines begin; the first is 0.
+    starts: Vec<usize>,
+}
+
+impl Lines {
+    /// The lines of `text`, which line feeds end.
+    pub fn of(text: &str) -> Self {
+        let after_line_feed = text.bytes().enumerate().filter(|&(_, byte)| byte == b'\n').map(|(at, _)| at + 1);
+        Lines { starts: std::iter::once(0).chain(after_line_feed).collect() }
+    }
+
+    /// The place of byte `offset` in `file`, the same as [`Place::at_offset`] gives for the text.
+    pub fn place(&self, file: impl AsRef<Path>, offset: usize) -> Place {
+        let line = self.starts.partition_point(|&start| start <= offset).max(1);
+        let column = offset - self.starts[line - 1] + 1;
+        Place { file: file.as_ref().to_owned(), line: Some(line as u32), column: Some(column as u32) }
     }
 }
 
@@ -68,13 +90,14 @@ pub struct Diagnostic {
 }
 
 impl Diagnostic {
-    /// A diagnostic with its code, place and problem; the rest is added with the methods below.
+    /// A diagnostic with its code, place and problem; the rest is added with the methods below. Texts that are too long to
+    /// read lose their middle.
     pub fn new(code: &'static str, place: Place, problem: impl Into<String>) -> Self {
         Diagnostic {
             code,
             place,
             element: String::new(),
-            problem: problem.into(),
+            problem: shortened(problem.into(), MAX_TEXT),
             expected: String::new(),
             fix: String::new(),
         }
@@ -83,21 +106,21 @@ impl Diagnostic {
     /// Names the element, such as `joint "j2"`.
     #[must_use]
     pub fn element(mut self, kind: &str, name: &str) -> Self {
-        self.element = format!("{kind} \"{name}\"");
+        self.element = format!("{kind} \"{}\"", shortened(name.to_owned(), MAX_SHOWN_NAME));
         self
     }
 
     /// Says what would have been right.
     #[must_use]
     pub fn expected(mut self, expected: impl Into<String>) -> Self {
-        self.expected = expected.into();
+        self.expected = shortened(expected.into(), MAX_TEXT);
         self
     }
 
     /// Says what to do.
     #[must_use]
     pub fn fix(mut self, fix: impl Into<String>) -> Self {
-        self.fix = fix.into();
+        self.fix = shortened(fix.into(), MAX_TEXT);
         self
     }
 }
@@ -106,29 +129,38 @@ impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} {}", self.code, self.place)?;
         if !self.element.is_empty() {
-            write!(f, " {}", printable(&self.element))?;
+            write!(f, " {}", printable_line(&self.element))?;
         }
-        write!(f, ": {}", printable(&self.problem))?;
+        write!(f, ": {}", printable_line(&self.problem))?;
         if !self.expected.is_empty() {
-            write!(f, "; expected {}", printable(&self.expected))?;
+            write!(f, "; expected {}", printable_line(&self.expected))?;
         }
         if !self.fix.is_empty() {
-            write!(f, "\n  fix: {}", printable(&self.fix))?;
+            write!(f, "\n  fix: {}", printable_line(&self.fix))?;
         }
         Ok(())
     }
 }
 
+/// Diagnostics that one run lists; the others are counted.
+pub const MAX_DIAGNOSTICS: usize = 20;
+/// Longest text of a diagnostic, in characters.
+const MAX_TEXT: usize = 2_000;
+/// Longest name that a diagnostic shows whole, in characters.
+const MAX_SHOWN_NAME: usize = 120;
+
 /// Input that cannot be used: at least one diagnostic.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct InputError {
-    /// Every cause found, in the order found; never empty.
+    /// The causes in the order found, at most [`MAX_DIAGNOSTICS`]; never empty.
     pub diagnostics: Vec<Diagnostic>,
+    /// How many more causes were found.
+    pub n_more: usize,
 }
 
 impl From<Diagnostic> for InputError {
     fn from(diagnostic: Diagnostic) -> Self {
-        InputError { diagnostics: vec![diagnostic] }
+        InputError { diagnostics: vec![diagnostic], n_more: 0 }
     }
 }
 
@@ -140,27 +172,48 @@ impl fmt::Display for InputError {
             }
             write!(f, "{diagnostic}")?;
         }
+        if self.n_more > 0 {
+            write!(f, "\nand {} more", with_commas(self.n_more))?;
+        }
         Ok(())
     }
 }
 
 impl std::error::Error for InputError {}
 
-/// Gathers diagnostics so that all causes are reported in one run.
+/// Gathers diagnostics so that all causes are reported in one run: the first [`MAX_DIAGNOSTICS`] in full, the others by
+/// their number.
 #[derive(Debug, Default)]
 pub struct Diagnostics {
     found: Vec<Diagnostic>,
+    n_more: usize,
 }
 
 impl Diagnostics {
     /// Adds one.
     pub fn push(&mut self, diagnostic: Diagnostic) {
-        self.found.push(diagnostic);
+        if !self.counted_only() {
+            self.found.push(diagnostic);
+        }
+    }
+
+    /// True when the list is full; one more is counted then. Asked before a text that costs much to make, such as the
+    /// search for a similar name: a hostile file asks for it a hundred thousand times.
+    pub fn counted_only(&mut self) -> bool {
+        let is_full = self.is_full();
+        self.n_more += usize::from(is_full);
+        is_full
+    }
+
+    /// True when what is added is counted only.
+    pub fn is_full(&self) -> bool {
+        self.found.len() >= MAX_DIAGNOSTICS
     }
 
     /// Adds all of an error.
     pub fn extend(&mut self, error: InputError) {
-        self.found.extend(error.diagnostics);
+        error.diagnostics.into_iter().for_each(|diagnostic| self.push(diagnostic));
+        self.n_more += error.n_more;
     }
 
     /// True when nothing was found.
@@ -170,19 +223,79 @@ impl Diagnostics {
 
     /// `Ok(value)` when nothing was found, else every diagnostic.
     pub fn into_result<T>(self, value: T) -> Result<T, InputError> {
-        if self.found.is_empty() { Ok(value) } else { Err(InputError { diagnostics: self.found }) }
+        if self.found.is_empty() {
+            return Ok(value);
+        }
+        Err(InputError { diagnostics: self.found, n_more: self.n_more })
     }
 }
 
-/// `text` without control characters and without direction marks, so that names in files cannot drive a terminal.
+/// True for characters that can drive a terminal or turn the order of letters around: control characters, line and
+/// paragraph separators, and the marks, embeddings, overrides and isolates of the Unicode bidirectional algorithm.
+fn is_hostile(c: char) -> bool {
+    c.is_control()
+        || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+/// `text`, which has line feeds of our own, with every other hostile character replaced, so that names in files cannot drive a
+/// terminal.
 pub fn printable(text: &str) -> String {
-    text.chars()
-        .map(|c| {
-            let hostile =
-                (c.is_control() && c != '\n') || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-            if hostile { '\u{fffd}' } else { c }
-        })
-        .collect()
+    text.chars().map(|c| if is_hostile(c) && c != '\n' { '\u{fffd}' } else { c }).collect()
+}
+
+/// `text` on one line: as [`printable`], and without line feeds, so that no name can start a line of its own.
+pub fn printable_line(text: &str) -> String {
+    text.chars().map(|c| if is_hostile(c) { '\u{fffd}' } else { c }).collect()
+}
+
+/// Longest name of a link, joint, finger, object or obstacle, in characters.
+pub const MAX_NAME: usize = 256;
+
+/// What is wrong with a name that a file gives to something: it is too long, or has a character that no terminal should see.
+pub fn fault_of_name(name: &str) -> Option<String> {
+    if name.len() > MAX_NAME && name.chars().count() > MAX_NAME {
+        return Some(format!("the name has {} characters", with_commas(name.chars().count())));
+    }
+    let hostile = name.chars().find(|&c| is_hostile(c))?;
+    Some(format!("the name has the character U+{:04X}", u32::from(hostile)))
+}
+
+/// What [`fault_of_name`] asks of a name.
+pub const GOOD_NAME: &str = "at most 256 characters, without control characters and direction marks";
+
+/// A name that cannot be used, at `place`; None for a good one. Error: `V004`.
+pub fn bad_name(place: impl FnOnce() -> Place, kind: &str, name: &str) -> Option<Diagnostic> {
+    let fault = fault_of_name(name)?;
+    Some(Diagnostic::new("V004", place(), fault).element(kind, name).expected(GOOD_NAME))
+}
+
+/// `text` without its middle where it has more than `limit` characters.
+pub fn shortened(text: String, limit: usize) -> String {
+    // A character has at least one byte.
+    if text.len() <= limit {
+        return text;
+    }
+    let n = text.chars().count();
+    if n <= limit {
+        return text;
+    }
+    let (first, last) = (limit * 3 / 4, limit / 4);
+    let at = |index: usize| text.char_indices().nth(index).map_or(text.len(), |(at, _)| at);
+    let left_out = with_commas(n - first - last);
+    format!("{} [... {left_out} characters ...] {}", &text[..at(first)], &text[at(n - last)..])
+}
+
+/// `n` with commas between thousands.
+fn with_commas(n: usize) -> String {
+    let digits = n.to_string();
+    let mut out = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(digit);
+    }
+    out
 }
 
 /// `x` with all its digits, as people write it: very large and very small numbers with an exponent.
@@ -238,6 +351,58 @@ mod tests {
     #[test]
     fn names_cannot_drive_a_terminal() {
         assert_eq!(printable("a\u{1b}[2Jb\u{202e}c"), "a\u{fffd}[2Jb\u{fffd}c");
+    }
+
+    #[test]
+    fn no_name_starts_a_line_of_its_own_or_turns_letters_around() {
+        let hostile = "a\ncheck ACCEPTED\u{200f}\u{61c}\u{2028}";
+        assert_eq!(printable_line(hostile), "a\u{fffd}check ACCEPTED\u{fffd}\u{fffd}\u{fffd}");
+        assert_eq!(printable(hostile).lines().count(), 2);
+        let place = Place::line("a\nb", 1);
+        let diagnostic = Diagnostic::new("U120", place, hostile).element("joint", hostile).expected(hostile).fix(hostile);
+        let text = diagnostic.to_string();
+        assert_eq!(text.lines().count(), 2, "the diagnostic and its fix: {text}");
+        assert!(fault_of_name(hostile).is_some_and(|fault| fault.contains("U+000A")));
+        assert!(fault_of_name("\u{202e}").is_some_and(|fault| fault.contains("U+202E")));
+        assert_eq!(fault_of_name("Daumen (größer) 拇指"), None);
+        assert_eq!(fault_of_name(&"ü".repeat(MAX_NAME)), None);
+        assert!(fault_of_name(&"ü".repeat(MAX_NAME + 1)).is_some_and(|fault| fault.contains("257")));
+        assert!(GOOD_NAME.contains(&MAX_NAME.to_string()));
+    }
+
+    #[test]
+    fn long_texts_lose_their_middle() {
+        assert_eq!(shortened("ab".repeat(4), 8), "abababab");
+        assert_eq!(shortened("äb".repeat(600), 8), "äbäbäb [... 1,192 characters ...] äb");
+        let place = Place::line("a", 1);
+        let name = "n".repeat(1_000_000);
+        let problem = format!("link \"{name}\" does not exist");
+        let text = Diagnostic::new("U132", place, problem).element("joint", &name).expected(&name).to_string();
+        assert!(text.len() < 6_000 && text.contains("does not exist"), "{}", text.len());
+    }
+
+    #[test]
+    fn the_first_causes_are_listed_and_the_others_counted() {
+        let one = |line| Diagnostic::new("S101", Place::line("a", line), "is unknown");
+        let mut found = Diagnostics::default();
+        (1..=20_000).for_each(|line| found.push(one(line)));
+        let mut all = Diagnostics::default();
+        all.push(one(0));
+        assert!(!all.counted_only());
+        all.extend(found.into_result(()).unwrap_err());
+        assert!(all.is_full() && all.counted_only());
+        let error = all.into_result(()).unwrap_err();
+        assert_eq!((error.diagnostics.len(), error.n_more), (MAX_DIAGNOSTICS, 19_982));
+        assert!(error.to_string().ends_with("\nand 19,982 more"), "{error}");
+    }
+
+    #[test]
+    fn lines_are_those_of_places() {
+        let text = "a\n\nbü\n c";
+        let lines = Lines::of(text);
+        for offset in 0..=text.len() {
+            assert_eq!(lines.place("f", offset), Place::at_offset("f", text, offset), "{offset}");
+        }
     }
 
     #[test]

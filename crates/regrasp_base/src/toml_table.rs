@@ -3,7 +3,7 @@
 //!
 //! Hand files and scene files are read by it; each has codes of its own (`toml_table::Codes`). V001: a number is not finite.
 
-use crate::diagnostic::{Diagnostic, Diagnostics, Place, did_you_mean, number, printable};
+use crate::diagnostic::{Diagnostic, Diagnostics, Place, Lines, bad_name, did_you_mean, number, printable_line};
 use std::ops::Range;
 use std::path::Path;
 use toml::Spanned;
@@ -38,6 +38,7 @@ pub struct Codes {
 pub struct Found<'a> {
     path: &'a Path,
     text: &'a str,
+    lines: Lines,
     codes: Codes,
     /// Errors.
     pub diagnostics: Diagnostics,
@@ -48,18 +49,18 @@ pub struct Found<'a> {
 impl<'a> Found<'a> {
     /// Nothing found yet in `text`, the content of `path`.
     pub fn new(path: &'a Path, text: &'a str, codes: Codes) -> Self {
-        Found { path, text, codes, diagnostics: Diagnostics::default(), notes: Vec::new() }
+        Found { path, text, lines: Lines::of(text), codes, diagnostics: Diagnostics::default(), notes: Vec::new() }
     }
 
     /// The place of `span`.
     pub fn place(&self, span: &Range<usize>) -> Place {
-        Place::at_offset(self.path, self.text, span.start)
+        self.lines.place(self.path, span.start)
     }
 
     /// Adds a note that begins with its place.
     pub fn note(&mut self, span: &Range<usize>, text: impl AsRef<str>) {
         let note = format!("{}: {}", self.place(span), text.as_ref());
-        self.notes.push(printable(&note));
+        self.notes.push(printable_line(&note));
     }
 
     /// Parses the text. Errors (`syntax`): empty, XML, or not TOML; then up to five faults and a count of the others.
@@ -244,6 +245,9 @@ impl<'a> Entry<'a> {
         if let Some(choice) = choices.iter().find(|choice| **choice == text) {
             return Some(choice);
         }
+        if found.diagnostics.counted_only() {
+            return None;
+        }
         let diagnostic = self
             .error(
                 found.codes.unknown_word,
@@ -261,6 +265,20 @@ impl<'a> Entry<'a> {
             DeValue::Boolean(value) => Some(*value),
             _ => {
                 self.wrong_type(found, "true or false");
+                None
+            }
+        }
+    }
+
+    /// A text that is the name of something. Errors: another type (`wrong_type`), a name that no terminal should see or that is
+    /// too long (`V004`).
+    pub fn name(&self, found: &mut Found) -> Option<&'a str> {
+        let text = self.text(found)?;
+        match bad_name(|| found.place(&self.span), "key", text) {
+            None => Some(text),
+            Some(mut diagnostic) => {
+                diagnostic.element = format!("key \"{}\"", self.name);
+                found.diagnostics.push(diagnostic);
                 None
             }
         }
@@ -383,6 +401,9 @@ impl<'a> Table<'a> {
             .collect();
         unknown.sort_by_key(|(_, span)| span.start);
         for (key, span) in unknown {
+            if found.diagnostics.counted_only() {
+                continue;
+            }
             let mut diagnostic =
                 Diagnostic::new(found.codes.unknown_key, found.place(&span), "is not a key that exists here")
                     .element("key", &self.name_of(key))

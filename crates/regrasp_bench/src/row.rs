@@ -2,13 +2,14 @@
 
 use cpu_time::{ProcessTime, ThreadTime};
 use regrasp_base::Budget;
-use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, Level, check};
+use regrasp_plan::{Plan, format};
 use regrasp_plan::plan::Improvement;
 use regrasp_planners::in_hand::{NotProven, validate_once};
 use regrasp_planners::{Failure, InHandSettings, PlannerSettings, Progress, TrackingMethod, TrackingSettings, plan};
 use regrasp_scene::{InHandQuery, Scene, TaskKind};
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
@@ -214,11 +215,19 @@ pub(crate) fn measure(problem: Problem, plan: &Plan, settings: &InHandSettings, 
     }
 }
 
-/// Judges a plan and enters what came of it.
+/// Judges a plan, as it reads from the file that `regrasp plan` would write, and enters what came of it.
 fn judge(problem: Problem, plan: &Plan, level: Level, row: &mut Row) {
+    let plan = match format::from_json(Path::new("plan.json"), format::to_json(plan).as_bytes()) {
+        Ok(plan) => plan,
+        Err(error) => {
+            row.accepted = Some(false);
+            row.cause = error.diagnostics.first().map_or_else(String::new, ToString::to_string);
+            return;
+        }
+    };
     let started = Instant::now();
     let settings = CheckSettings { level, ..CheckSettings::default() };
-    let report = check(problem.scene, Some(problem.query), plan, &settings);
+    let report = check(problem.scene, Some(problem.query), &plan, &settings);
     row.check_s = Some(started.elapsed().as_secs_f64());
     row.accepted = Some(report.accepted());
     row.level = report.reached;

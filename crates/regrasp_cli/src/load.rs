@@ -5,9 +5,10 @@ use crate::stop::Stop;
 use crate::talk::{Talk, counted, duration, grouped};
 use regrasp::base::{Diagnostic, Place};
 use regrasp::geometry::Shape;
-use regrasp::robot::import::{LoadOptions, ResolveOptions};
+use regrasp::planners::FailureKind;
+use regrasp::robot::import::{LoadOptions, OUT_OF_TIME, ResolveOptions};
 use regrasp::scene::{LoadedScene, TaskKind, load_scene};
-use regrasp::{InHandSettings, PlannerSettings, Scene, TrackingSettings};
+use regrasp::{Failure, InHandSettings, InputError, PlannerSettings, Scene, TrackingSettings};
 use serde_json::json;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -30,14 +31,36 @@ pub fn options(common: &Common) -> LoadOptions {
 
 /// Reads a scene and says what was read.
 pub fn scene(path: &Path, common: &Common, talk: &Talk) -> Result<LoadedScene, Stop> {
+    scene_by(path, common, None, talk)
+}
+
+/// As [`scene`], but reading is given up when `deadline` has passed: there is no plan then.
+pub fn scene_by(path: &Path, common: &Common, deadline: Option<Instant>, talk: &Talk) -> Result<LoadedScene, Stop> {
     let started = Instant::now();
-    let loaded = load_scene(path, &options(common))?;
+    let loaded = load_scene(path, &LoadOptions { deadline, ..options(common) }).map_err(in_time_or_no_plan)?;
     for note in &loaded.notes {
         talk.note(note);
     }
     let seconds = started.elapsed().as_secs_f64();
     say_scene(&loaded.scene, seconds, talk);
     Ok(loaded)
+}
+
+/// Why reading stopped: bad input, or the time limit, within which no plan was found.
+fn in_time_or_no_plan(error: InputError) -> Stop {
+    match error.diagnostics.iter().find(|diagnostic| diagnostic.code == OUT_OF_TIME) {
+        None => Stop::BadInput(error),
+        Some(late) => Stop::NoPlan(Box::new(Failure {
+            kind: FailureKind::TimeLimit,
+            message: format!("{}: {}", late.place, late.problem),
+            advice: format!("--time-limit: {}", late.fix),
+            causes: Vec::new(),
+            leg: None,
+            nearest_miss: None,
+            reached: None,
+            statistics: Default::default(),
+        })),
+    }
 }
 
 /// Settings of the planner: defaults, then the settings file, then the flags.

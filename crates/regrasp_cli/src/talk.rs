@@ -3,7 +3,7 @@
 //! Everything that came from a file goes through `printable` on its way to a terminal.
 
 use crate::stop::Stop;
-use regrasp::base::diagnostic::printable;
+use regrasp::base::diagnostic::{printable, printable_line};
 use serde_json::{Value, json};
 use std::io::{self, IsTerminal, Write};
 use std::sync::Mutex;
@@ -33,10 +33,10 @@ impl Talk {
         io::stderr().is_terminal()
     }
 
-    /// A line of talk: nothing with `--quiet` or `--json`.
+    /// A line of talk: nothing with `--quiet` or `--json`. Names in it may come from files: whatever they hold, it stays one line.
     pub fn say(&self, line: impl AsRef<str>) {
         if !self.quiet && !self.json {
-            self.line_to_stderr(line.as_ref());
+            self.line_to_stderr(&printable_line(line.as_ref()));
         }
     }
 
@@ -69,7 +69,7 @@ impl Talk {
     pub fn stop(&self, stop: &Stop) {
         match stop {
             Stop::BadInput(error) => {
-                self.event("error", json!({ "diagnostics": error.diagnostics }));
+                self.event("error", json!({ "diagnostics": error.diagnostics, "more": error.n_more }));
                 self.line_to_stderr(&format!("error: {error}"));
             }
             Stop::NoPlan(failure) => {

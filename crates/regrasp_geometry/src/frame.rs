@@ -90,6 +90,22 @@ pub fn pose_distance(a: &Pose, b: &Pose, length: f64) -> f64 {
     (a.translation.vector - b.translation.vector).norm() + length * rotation_between(a, b).norm()
 }
 
+/// The direction of `vector`, however long or short: its square may overflow or underflow. None for the zero vector and for
+/// numbers that are not finite.
+pub fn direction(vector: &Vector) -> Option<UnitVector> {
+    let largest = vector.amax();
+    if largest == 0.0 || !vector.iter().all(|x| x.is_finite()) {
+        return None;
+    }
+    // Divided, not multiplied by the inverse, which overflows for the smallest numbers.
+    Some(UnitVector::new_normalize(vector / largest))
+}
+
+/// The length of `vector`, infinite only where it is no number.
+pub fn length(vector: &Vector) -> f64 {
+    vector.x.hypot(vector.y).hypot(vector.z)
+}
+
 /// Any two unit vectors that make a right-handed frame `(x, y, normal)` with `normal`.
 pub fn tangents(normal: &UnitVector) -> (UnitVector, UnitVector) {
     // Duff et al. 2017, "Building an orthonormal basis, revisited".
@@ -116,6 +132,20 @@ mod tests {
         let half = interpolate_pose(&from, &to, 0.5);
         let whole = rotation_between(&from, &to).norm();
         assert!((rotation_between(&from, &half).norm() - 0.5 * whole).abs() < 1e-12);
+    }
+
+    #[test]
+    fn directions_do_not_depend_on_lengths() {
+        let asked = Vector::new(3.0, 0.0, -4.0);
+        let expected = Vector::new(0.6, 0.0, -0.8);
+        for factor in [1.0, 1e200, 4e307, 1e-9, 1e-200, 1e-300] {
+            assert!((direction(&(asked * factor)).unwrap().into_inner() - expected).norm() < 1e-15, "{factor}");
+            assert!((length(&(asked * factor)) / factor / 5.0 - 1.0).abs() < 1e-12, "{factor}");
+        }
+        assert_eq!(direction(&Vector::new(0.0, 1e-320, 0.0)).unwrap(), Vector::y_axis());
+        assert_eq!(direction(&Vector::zeros()), None);
+        assert_eq!(direction(&Vector::new(f64::INFINITY, 0.0, 0.0)), None);
+        assert_eq!(direction(&Vector::new(1.0, f64::NAN, 0.0)), None);
     }
 
     #[test]

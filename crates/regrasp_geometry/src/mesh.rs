@@ -79,8 +79,7 @@ impl TriangleMesh {
         for corners in triangles {
             let corners = corners.map(|i| merged_from[i as usize]);
             let [a, b, c] = corners.map(|i| vertices[i as usize]);
-            let longest = (b - a).norm_squared().max((c - a).norm_squared()).max((c - b).norm_squared());
-            if (b - a).cross(&(c - a)).norm() <= 1e-14 * longest || longest == 0.0 {
+            if has_no_area(&(b - a), &(c - a), &(c - b)) {
                 statistics.zero_area_dropped += 1;
             } else {
                 kept.push(corners);
@@ -157,6 +156,22 @@ impl TriangleMesh {
         let mirrored = scale.x * scale.y * scale.z < 0.0;
         Ok(if mirrored { mesh.flipped() } else { mesh })
     }
+}
+
+/// True when the triangle with these edges has no area beside the square of its longest edge.
+fn has_no_area(ab: &Vector, ac: &Vector, bc: &Vector) -> bool {
+    let longest = ab.norm_squared().max(ac.norm_squared()).max(bc.norm_squared());
+    // Where squares overflow or underflow, the triangle is looked at in units of its own size.
+    if !(1e-200..1e200).contains(&longest) {
+        let size = ab.amax().max(ac.amax()).max(bc.amax());
+        if size == 0.0 || !size.is_finite() {
+            return true;
+        }
+        let [ab, ac, bc] = [ab, ac, bc].map(|edge| edge / size);
+        let longest = ab.norm_squared().max(ac.norm_squared()).max(bc.norm_squared());
+        return ab.cross(&ac).norm() <= 1e-14 * longest;
+    }
+    ab.cross(ac).norm() <= 1e-14 * longest
 }
 
 /// Vertices without duplicates, and for each old vertex the index of the one that stands for it: the first.
@@ -308,6 +323,19 @@ mod tests {
         assert_eq!(flipped.statistics().flipped_edges, 3);
         assert_eq!(flipped.statistics().vertices_merged, 1);
         assert_eq!(flipped.statistics().zero_area_dropped, 1);
+    }
+
+    #[test]
+    fn triangles_keep_their_area_in_any_unit() {
+        for size in [1e-200, 1e-160, 1e-3, 1e3, 1e160, 1e200] {
+            let (vertices, mut triangles) = tetrahedron();
+            let vertices: Vec<Point> = vertices.into_iter().map(|p| p * size).collect();
+            triangles.push([0, 1, 1]);
+            let mesh = TriangleMesh::new(vertices, triangles).unwrap();
+            assert_eq!((mesh.triangles().len(), mesh.statistics().zero_area_dropped), (4, 1), "{size}");
+            let back = mesh.scaled(Vector::repeat(0.05 / size)).unwrap();
+            assert!((back.signed_volume() / (0.05f64.powi(3) / 6.0) - 1.0).abs() < 1e-12, "{size}");
+        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use crate::plan::{
     ContactMode, ContactState, FORMAT, FORMAT_VERSION, ForcePromises, Plan, PoseData, Segment, SegmentKind,
 };
-use regrasp_base::diagnostic::{Diagnostics, number};
+use regrasp_base::diagnostic::{Diagnostics, GOOD_NAME, fault_of_name, number};
 use regrasp_base::{Diagnostic, InputError, Place};
 use serde::Deserialize;
 use std::fmt::Write as _;
@@ -22,8 +22,6 @@ mod caps {
     pub const POSITION: f64 = 1e6;
     /// Largest time, velocity, acceleration, force, torque or mass.
     pub const SIZE: f64 = 1e9;
-    /// Diagnostics per file; a broken writer breaks every waypoint in the same way.
-    pub const DIAGNOSTICS: usize = 20;
 }
 
 /// How far a quaternion's or a normal's length may be from one.
@@ -99,7 +97,7 @@ pub fn from_json(path: &Path, bytes: &[u8]) -> Result<Plan, InputError> {
     let text = regrasp_base::files::text_of(path, bytes.to_vec())?;
     check_header(path, &text)?;
     let plan: Plan = serde_json::from_str(&text).map_err(|error| syntax_error(path, &error))?;
-    let mut reader = Reader { path, text: &text, found: Diagnostics::default(), count: 0 };
+    let mut reader = Reader { path, text: &text, found: Diagnostics::default() };
     reader.validate(&plan);
     reader.found.into_result(plan)
 }
@@ -162,13 +160,12 @@ struct Reader<'a> {
     path: &'a Path,
     text: &'a str,
     found: Diagnostics,
-    count: usize,
 }
 
 impl Reader<'_> {
     fn fail(&mut self, code: &'static str, steps: &[Step], problem: String, expected: String) {
-        self.count += 1;
-        if self.count > caps::DIAGNOSTICS {
+        // A broken writer breaks every waypoint in the same way.
+        if self.found.counted_only() {
             return;
         }
         let offset = locate(self.text, steps).unwrap_or(0);
@@ -205,6 +202,9 @@ impl Reader<'_> {
                 self.fail("C404", &[Key(key)], "is empty".into(), "at least one name".into());
             }
             for (i, name) in names.iter().enumerate() {
+                if let Some(fault) = fault_of_name(name) {
+                    self.fail("V004", &[Key(key), Index(i)], fault, GOOD_NAME.into());
+                }
                 if names[..i].contains(name) {
                     self.fail("C408", &[Key(key), Index(i)], format!("\"{name}\" is used twice"), "each once".into());
                 }
@@ -347,7 +347,7 @@ impl Reader<'_> {
     fn force_promises(&mut self, plan: &Plan, forces: &ForcePromises) {
         use Step::Key;
         let inside = |key| [Key("promises"), Key("forces"), Key(key)];
-        self.within(&inside("mass"), forces.mass, 1e-9, caps::SIZE);
+        self.within(&inside("mass"), forces.mass, 0.0, caps::SIZE);
         for component in forces.gravity_in_world.into_iter().flatten() {
             self.within(&inside("gravity_in_world"), component, -1e3, 1e3);
         }

@@ -9,6 +9,11 @@ use regrasp_geometry::{Pose, Shape};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+/// Most fingers of a hand: planners and contact forces have room for so many.
+pub const MAX_FINGERS: usize = 6;
+/// Most joints of a finger, those that follow others among them.
+pub const MAX_FINGER_JOINTS: usize = 16;
+
 /// Index of a finger in [`Hand::fingers`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct FingerId(pub usize);

@@ -1,5 +1,6 @@
 //! Which way things fall.
 
+use regrasp_geometry::frame::direction;
 use regrasp_geometry::{UnitVector, Vector};
 use regrasp_robot::Hand;
 
@@ -16,9 +17,9 @@ pub enum Gravity {
 }
 
 impl Gravity {
-    /// Along `down_in_hand`, as seen from the hand's base, where it stands. None for the zero vector.
+    /// Along `down_in_hand`, as seen from the hand's base, where it stands. None for the zero vector and numbers that are not finite.
     pub fn in_hand(hand: &Hand, down_in_hand: &Vector) -> Option<Self> {
-        let down = UnitVector::try_new(*down_in_hand, 1e-9)?;
+        let down = direction(down_in_hand)?;
         Some(Gravity::Direction(hand.world_from_base.rotation * down))
     }
 

@@ -34,7 +34,9 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
         return Err(Stop::argument("A505", "--report", problem, "another file"));
     }
     let cancelled = interrupt::flag()?;
-    let loaded = arguments.judging.scene(load::scene(&arguments.scene, common, talk)?);
+    // Reading counts too: a mesh of a million triangles takes seconds.
+    let deadline = arguments.search.time_limit.and_then(|limit| Instant::now().checked_add(limit));
+    let loaded = arguments.judging.scene(load::scene_by(&arguments.scene, common, deadline, talk)?);
     for path in written.into_iter().flatten() {
         let read = loaded.scene.inputs.iter().map(|input| input.path.as_path());
         refuse_input(path, read.chain(arguments.search.settings.as_deref()))?;
@@ -46,7 +48,7 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
 
     let limits = Limits {
         max_work: arguments.search.max_work,
-        time_limit: arguments.search.time_limit,
+        time_limit: deadline.map(|deadline| deadline.saturating_duration_since(Instant::now())),
         improve_for: arguments.search.improve,
         cancelled,
     };

@@ -30,7 +30,12 @@ pub fn core_support(shape: &Shape, direction: &Vector, hint: &mut u32) -> Point 
         Shape::Cylinder { half_length, radius } => {
             let flat = direction.x.hypot(direction.y);
             let scale = if flat > 0.0 { radius / flat } else { 0.0 };
-            Point::new(direction.x * scale, direction.y * scale, half_length.copysign(direction.z))
+            // The quotient overflows when the direction is within 1e-300 of the axis.
+            let [x, y] = match scale.is_finite() {
+                true => [direction.x * scale, direction.y * scale],
+                false => [direction.x / flat * radius, direction.y / flat * radius],
+            };
+            Point::new(x, y, half_length.copysign(direction.z))
         }
         Shape::Ellipsoid { radii } => {
             let scaled = direction.component_mul(radii);
@@ -75,4 +80,18 @@ pub fn gap_along(
     direction.dot(&(parent_from_b.translation - parent_from_a.translation))
         - support_value(a, &in_a, &mut hints[0])
         - support_value(b, &in_b, &mut hints[1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_support_of_a_cylinder_is_on_its_rim_however_near_its_axis_the_direction_is() {
+        let shape = Shape::Cylinder { half_length: 0.005, radius: 0.055 };
+        for tiny in [1e-3, 1e-200, 1e-300, 1e-310, 5e-324] {
+            let found = core_support(&shape, &Vector::new(0.0, -tiny, 1.0), &mut 0);
+            assert!((found - Point::new(0.0, -0.055, 0.005)).norm() < 1e-12, "{tiny}: {found}");
+        }
+    }
 }

@@ -20,11 +20,8 @@ use std::path::Path;
 pub use obj::read_obj;
 pub use stl::read_stl;
 
-/// Most triangles that are read from a file.
-pub const MAX_TRIANGLES: usize = 5_000_000;
-
-/// Faults of one file that are listed one by one; the rest is counted.
-const MAX_FAULTS: usize = 20;
+/// Most triangles that are read from a file. A planner and a checker need about half a kilobyte for each.
+pub const MAX_TRIANGLES: usize = 1_500_000;
 
 /// Reads an STL or OBJ file, told apart by the extension of `path` in upper or lower case.
 ///
@@ -46,35 +43,30 @@ pub fn read_mesh(path: &Path, bytes: &[u8]) -> Result<TriangleMesh, InputError> 
     }
 }
 
-/// The faults of one file, in the order found; the first [`MAX_FAULTS`] in full.
+/// The faults of one file, in the order found.
 struct Faults<'a> {
     path: &'a Path,
     found: Diagnostics,
-    n_found: usize,
 }
 
 impl<'a> Faults<'a> {
     fn new(path: &'a Path) -> Self {
-        Faults { path, found: Diagnostics::default(), n_found: 0 }
+        Faults { path, found: Diagnostics::default() }
     }
 
     fn push(&mut self, diagnostic: Diagnostic) {
-        self.n_found += 1;
-        if self.n_found <= MAX_FAULTS {
-            self.found.push(diagnostic);
-        }
+        self.found.push(diagnostic);
     }
 
     fn at_line(&mut self, code: &'static str, line: u32, problem: String, expected: &str) {
+        if self.found.counted_only() {
+            return;
+        }
         self.push(Diagnostic::new(code, Place::line(self.path, line), problem).expected(expected));
     }
 
     /// The mesh, when there were no faults.
-    fn finish(mut self, vertices: Vec<Point>, triangles: Vec<[u32; 3]>) -> Result<TriangleMesh, InputError> {
-        if self.n_found > MAX_FAULTS {
-            let more = format!("has {} more faults of these kinds", self.n_found - MAX_FAULTS);
-            self.found.push(Diagnostic::new("M202", Place::file(self.path), more));
-        }
+    fn finish(self, vertices: Vec<Point>, triangles: Vec<[u32; 3]>) -> Result<TriangleMesh, InputError> {
         self.found.into_result(())?;
         TriangleMesh::new(vertices, triangles).map_err(|error| {
             let code = match error {
@@ -98,11 +90,40 @@ fn check_encoding(path: &Path, bytes: &[u8]) -> Result<(), InputError> {
     }
 }
 
-fn too_many(path: &Path, n_triangles: usize) -> InputError {
+/// A mesh, or all meshes of a file, of too many triangles (`M220`).
+pub fn too_many(path: &Path, n_triangles: usize) -> InputError {
     Diagnostic::new("M220", Place::file(path), format!("has {n_triangles} triangles"))
-        .expected(format!("at most {MAX_TRIANGLES}"))
+        .expected(format!("at most {MAX_TRIANGLES}, in all meshes of a scene or of a robot together"))
         .fix("simplify the mesh, e.g. with MeshLab or trimesh simplify_quadric_decimation")
         .into()
+}
+
+/// Lines with their numbers, from 1; a line feed, a carriage return, or both end them.
+struct TextLines<'a> {
+    rest: Option<&'a [u8]>,
+    line: u32,
+}
+
+impl<'a> TextLines<'a> {
+    fn of(bytes: &'a [u8]) -> Self {
+        TextLines { rest: Some(bytes), line: 0 }
+    }
+}
+
+impl<'a> Iterator for TextLines<'a> {
+    type Item = (u32, &'a [u8]);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let rest = self.rest?;
+        self.line += 1;
+        let Some(end) = rest.iter().position(|&b| b == b'\n' || b == b'\r') else {
+            self.rest = None;
+            return Some((self.line, rest));
+        };
+        let after = if rest[end..].starts_with(b"\r\n") { end + 2 } else { end + 1 };
+        self.rest = rest.get(after..);
+        Some((self.line, &rest[..end]))
+    }
 }
 
 /// Words of a line, between ASCII white space.
@@ -146,8 +167,8 @@ fn coordinates<'w>(
         };
         match number(word) {
             Some(value) if value.is_finite() => point[k] = value,
-            Some(value) => {
-                faults.at_line("M203", line, format!("a vertex has the coordinate {value}"), "finite numbers");
+            Some(_) => {
+                faults.at_line("M203", line, format!("a vertex has the coordinate {}", shown(word)), "finite numbers");
                 return Point::origin();
             }
             None => {

@@ -1,7 +1,7 @@
 //! Wavefront OBJ: vertices and faces. Everything else, materials included, has no part in planning and is skipped.
 
 use super::polygon::{MAX_CONCAVE, triangulate};
-use super::{Faults, MAX_TRIANGLES, check_encoding, coordinates, shown, too_many, words};
+use super::{Faults, MAX_TRIANGLES, TextLines, check_encoding, coordinates, shown, too_many, words};
 use crate::frame::Point;
 use crate::mesh::TriangleMesh;
 use regrasp_base::InputError;
@@ -21,7 +21,7 @@ pub fn read_obj(path: &Path, bytes: &[u8]) -> Result<TriangleMesh, InputError> {
     let mut corners: Vec<i64> = Vec::new();
     let mut faces: Vec<(u32, usize)> = Vec::new();
     let mut n_triangles = 0;
-    for (line, statement) in Statements::new(bytes) {
+    for (line, statement) in Statements(TextLines::of(bytes)) {
         let mut words = words(&statement);
         match words.next() {
             Some(b"v") => {
@@ -40,7 +40,7 @@ pub fn read_obj(path: &Path, bytes: &[u8]) -> Result<TriangleMesh, InputError> {
                 }
                 let n_corners = corners.len() - start;
                 if n_corners < 3 {
-                    if faults.n_found == 0 {
+                    if faults.found.is_empty() {
                         let problem = format!("a face has {n_corners} corners");
                         faults.at_line("M240", line, problem, "at least three");
                     }
@@ -97,31 +97,7 @@ fn corner(word: &[u8], n_vertices: usize) -> Result<i64, (&'static str, String)>
 }
 
 /// Lines with their numbers; a backslash at the end of a line joins it to the next.
-struct Statements<'a> {
-    rest: Option<&'a [u8]>,
-    line: u32,
-}
-
-impl<'a> Statements<'a> {
-    fn new(bytes: &'a [u8]) -> Self {
-        Statements { rest: Some(bytes), line: 0 }
-    }
-
-    fn next_line(&mut self) -> Option<&'a [u8]> {
-        let rest = self.rest?;
-        self.line += 1;
-        match rest.iter().position(|&b| b == b'\n') {
-            Some(end) => {
-                self.rest = rest.get(end + 1..);
-                rest.get(..end)
-            }
-            None => {
-                self.rest = None;
-                Some(rest)
-            }
-        }
-    }
-}
+struct Statements<'a>(TextLines<'a>);
 
 /// The part before a comment, without white space at its end.
 fn content(line: &[u8]) -> &[u8] {
@@ -132,11 +108,11 @@ impl<'a> Iterator for Statements<'a> {
     type Item = (u32, Cow<'a, [u8]>);
 
     fn next(&mut self) -> Option<Self::Item> {
-        let first = content(self.next_line()?);
-        let line = self.line;
+        let (line, first) = self.0.next()?;
+        let first = content(first);
         let Some(part) = first.strip_suffix(b"\\") else { return Some((line, Cow::Borrowed(first))) };
         let mut joined = part.to_vec();
-        while let Some(next) = self.next_line() {
+        for (_, next) in self.0.by_ref() {
             joined.push(b' ');
             let next = content(next);
             let Some(part) = next.strip_suffix(b"\\") else {

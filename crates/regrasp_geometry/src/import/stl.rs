@@ -1,6 +1,6 @@
 //! STL, binary and ASCII. Normals in the file are not used: the winding says which side is outside.
 
-use super::{Faults, MAX_TRIANGLES, check_encoding, coordinates, shown, too_many, words};
+use super::{Faults, MAX_TRIANGLES, TextLines, check_encoding, coordinates, shown, too_many, words};
 use crate::frame::Point;
 use crate::mesh::TriangleMesh;
 use regrasp_base::{Diagnostic, InputError, Place};
@@ -108,7 +108,7 @@ fn read_ascii(path: &Path, bytes: &[u8]) -> Result<TriangleMesh, InputError> {
     let mut vertices: Vec<Point> = Vec::new();
     let mut state = State::Start;
     let mut last_line = 1;
-    for (line, text) in (1u32..).zip(bytes.split(|&b| b == b'\n')) {
+    for (line, text) in TextLines::of(bytes) {
         let mut words = words(text);
         while let Some(word) = words.next() {
             last_line = line;

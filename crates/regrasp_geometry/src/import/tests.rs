@@ -68,6 +68,8 @@ fn every_dialect_gives_the_tetrahedron() {
         stl(format!("\u{feff}{}", ascii()).as_bytes()),
         obj(OBJ),
         obj(&OBJ.replace('\n', "\r\n")),
+        obj(&OBJ.replace('\n', "\r")),
+        stl(ascii().replace('\n', "\r").as_bytes()),
         obj(&format!("\u{feff}{OBJ}")),
     ];
     for (i, mesh) in meshes.into_iter().enumerate() {
@@ -105,6 +107,32 @@ fn faulty_stl_is_refused_with_its_place() {
     assert_eq!(faults(stl(b"solid nothing\nendsolid\n")), [("M202", None)]);
     assert_eq!(faults(stl(b"\xff\xfes\0o\0l\0i\0d\0")), [("M204", None)]);
     assert_eq!(faults(read_mesh(Path::new("a.dae"), b"<x/>")), [("M200", None)]);
+}
+
+#[test]
+fn lines_are_counted_whatever_ends_them() {
+    for end in ["\n", "\r", "\r\n"] {
+        let text = ["v 0 0 0", "", "v 1 0 0", "v 0 1 0", "f 1 2 9"].join(end);
+        assert_eq!(faults(obj(&text)), [("M241", Some(5))], "{end:?}");
+    }
+}
+
+#[test]
+fn numbers_in_messages_are_as_written() {
+    for seen in ["1e309", "-1e999", "inf"] {
+        let message = obj(&format!("v {seen} 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")).unwrap_err().to_string();
+        assert!(message.contains(&format!("the coordinate {seen};")) && message.len() < 100, "{message}");
+    }
+}
+
+#[test]
+fn meshes_of_too_many_triangles_are_refused_before_they_are_read() {
+    let mut bytes = vec![0; 84 + 50 * (MAX_TRIANGLES + 1)];
+    bytes[80..84].copy_from_slice(&(MAX_TRIANGLES as u32 + 1).to_le_bytes());
+    assert_eq!(faults(stl(&bytes)), [("M220", None)]);
+    let text = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{}", "f 1 2 3\n".repeat(MAX_TRIANGLES + 1));
+    assert_eq!(faults(obj(&text)), [("M220", None)]);
+    assert_eq!(MAX_TRIANGLES, 1_500_000, "docs/scene-format.md says so");
 }
 
 #[test]

@@ -17,7 +17,8 @@ use super::forces::ForceModel;
 use super::settings::{InHandSettings, TransferMode};
 
 /// Most fingers a hand may have.
-pub const MAX_FINGERS: usize = 6;
+pub const MAX_FINGERS: usize = regrasp_robot::hand::MAX_FINGERS;
+const _: () = assert!(MAX_FINGERS <= regrasp_grasp::wrench::force_distribution::MAX_GRIPS);
 
 /// A finger, prepared.
 #[derive(Debug)]

@@ -6,7 +6,7 @@
 use super::finger_chain::{make_chain, rest_posture};
 use super::tip_split;
 use crate::contact_model::ContactModel;
-use crate::hand::{Finger, FingerShape, Hand, PalmShape, convex_of};
+use crate::hand::{Finger, FingerShape, Hand, MAX_FINGERS, PalmShape, convex_of};
 use crate::robot::{Joint, JointId, JointKind, LinkId, Robot};
 use crate::tip::{Pad, Tip, TipEllipsoid, TipShape, fit};
 use nalgebra::{Translation3, UnitQuaternion};
@@ -76,10 +76,17 @@ pub(super) struct Carried {
     pub(super) body_from_link: Pose,
 }
 
-/// The hand, and remarks. Errors: `U206`..`U212`.
+/// The hand, and remarks. Errors: `U206`..`U212`, too many fingers (`U221`) or joints of a finger (`U222`).
 pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Result<(Hand, Vec<String>), InputError> {
     let mut found = Diagnostics::default();
     let mut notes = Vec::new();
+    if spec.fingers.len() > MAX_FINGERS {
+        let problem = format!("has {} fingers", spec.fingers.len());
+        return Err(Diagnostic::new("U221", Place::file(file), problem)
+            .expected(format!("at most {MAX_FINGERS}"))
+            .fix(format!("write a hand file that names at most {MAX_FINGERS} of them (docs/hand-format.md)"))
+            .into());
+    }
     let moving = moving_joints(robot, spec, &mut found);
     // Every later step needs the chains.
     std::mem::take(&mut found).into_result(())?;

@@ -1,7 +1,9 @@
 //! Couplings that a hand file adds to those of the URDF: `position = multiplier * position(leader) + offset`.
 
 use super::hand_file::known_joint;
+use super::urdf::{GOOD_COUPLING, check_coupling};
 use crate::robot::{JointId, JointKind, Mimic, Robot};
+use regrasp_base::diagnostic::number;
 use regrasp_base::toml_table::{Entry, Found, Table};
 
 /// Reads `[[couplings]]` into the joints of `robot`; a joint that follows a follower follows the leader of the chain.
@@ -47,10 +49,12 @@ fn read_one<'a>(mut table: Table<'a>, robot: &Robot, found: &mut Found) -> Optio
     let joint = table.required(found, "joint", "add joint = \"...\", the one that follows");
     let leader = table.required(found, "leader", "add leader = \"...\", the joint that it follows");
     let multiplier = match table.optional("multiplier") {
-        Some(entry) => entry.number_that(found, "a multiplier that is not 0", |x| x != 0.0),
+        Some(entry) => entry.number_that(found, GOOD_COUPLING, |x| check_coupling(x, 0.0).is_ok()),
         None => Some(1.0),
     };
-    let offset = table.optional("offset").map_or(Some(0.0), |entry| entry.number(found));
+    let offset = table
+        .optional("offset")
+        .map_or(Some(0.0), |entry| entry.number_that(found, GOOD_COUPLING, |x| check_coupling(1.0, x).is_ok()));
     table.finish(found);
     let mut moving = |entry: &Entry| {
         let joint = known_joint(entry, robot, found)?;
@@ -103,8 +107,13 @@ fn refuse_empty_range(robot: &Robot, joint: JointId, place: &Entry, found: &mut 
     let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
     if high < own.lower || low > own.upper {
         let problem = format!(
-            "joint \"{}\" follows joint \"{}\" to {low}..{high}, outside its own limits {}..{}",
-            follower.name, leader.name, own.lower, own.upper
+            "joint \"{}\" follows joint \"{}\" to {}..{}, outside its own limits {}..{}",
+            follower.name,
+            leader.name,
+            number(low),
+            number(high),
+            number(own.lower),
+            number(own.upper)
         );
         refuse(place, "U143", problem, "ranges that overlap", found);
     }

@@ -1,15 +1,18 @@
 //! The chain of a finger and its rest posture.
 
 use super::assemble::{Carried, FingerSpec};
+use crate::hand::MAX_FINGER_JOINTS;
 use crate::kinematics::chain::{Chain, ChainJoint, Motion};
+use crate::kinematics::finger_ik::MAX_COORDINATES;
 use crate::robot::{JointId, JointKind, LinkId, Robot};
 use regrasp_base::Diagnostic;
-use regrasp_base::diagnostic::{Diagnostics, did_you_mean};
+use regrasp_base::diagnostic::{Diagnostics, did_you_mean, number};
 use std::collections::BTreeMap;
 
 /// The serial chain over `joints`, with followers folded into their leaders' coordinates.
 ///
-/// Reports: leaders that are not on the chain (`U209`), limits that leave no position (`U143`).
+/// Reports: leaders that are not on the chain (`U209`), limits that leave no position (`U143`), too many joints
+/// (`U222`).
 pub(super) fn make_chain(
     robot: &Robot,
     spec: &FingerSpec,
@@ -18,6 +21,13 @@ pub(super) fn make_chain(
     found: &mut Diagnostics,
 ) -> Option<Chain> {
     let independent: Vec<JointId> = joints.iter().copied().filter(|j| robot.joints[j.0].mimic.is_none()).collect();
+    if independent.len() > MAX_COORDINATES || joints.len() > MAX_FINGER_JOINTS {
+        let problem = format!("has {} joints, {} of them independent", joints.len(), independent.len());
+        let expected = format!("at most {MAX_FINGER_JOINTS} joints, at most {MAX_COORDINATES} of them independent");
+        let diagnostic = Diagnostic::new("U222", spec.place.clone(), problem).element("finger", &spec.name);
+        found.push(diagnostic.expected(expected).fix("first_joint = \"...\" holds the joints before it"));
+        return None;
+    }
     let (mut chain_joints, mut names, mut lower, mut upper) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for id in &independent {
         let joint = &robot.joints[id.0];
@@ -84,6 +94,9 @@ pub(super) fn rest_posture(spec: &FingerSpec, chain: &Chain, found: &mut Diagnos
         .collect();
     for (name, value, place) in &spec.rest {
         let Some(k) = chain.names.iter().position(|other| other == name) else {
+            if found.counted_only() {
+                continue;
+            }
             let meant = did_you_mean(name, chain.names.iter().map(String::as_str));
             found.push(
                 Diagnostic::new(
@@ -99,9 +112,9 @@ pub(super) fn rest_posture(spec: &FingerSpec, chain: &Chain, found: &mut Diagnos
         };
         if *value < chain.lower[k] || *value > chain.upper[k] {
             found.push(
-                Diagnostic::new("U212", place.clone(), format!("rest position {value} is outside the limits"))
+                Diagnostic::new("U212", place.clone(), format!("rest position {} is outside the limits", number(*value)))
                     .element("joint", name)
-                    .expected(format!("{}..{}", chain.lower[k], chain.upper[k])),
+                    .expected(format!("{}..{}", number(chain.lower[k]), number(chain.upper[k]))),
             );
             continue;
         }

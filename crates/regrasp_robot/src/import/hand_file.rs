@@ -8,16 +8,18 @@ use super::resolve::{ResolveOptions, resolve_own};
 use super::srdf::{LoadedSrdf, load_srdf};
 use super::urdf::{LoadedRobot, load_robot};
 use crate::contact_model::{self, ContactModel};
-use crate::hand::Hand;
+use crate::hand::{Hand, MAX_FINGERS};
 use crate::robot::{JointId, LinkId, Robot};
 use nalgebra::{Quaternion, UnitQuaternion};
-use regrasp_base::diagnostic::did_you_mean;
+use regrasp_base::diagnostic::{did_you_mean, number};
 use regrasp_base::toml_table::{Codes, Entry, Found, Table};
 use regrasp_base::{Diagnostic, InputError, Place, files};
-use regrasp_geometry::{Point, UnitVector, Vector};
+use regrasp_geometry::frame::direction;
+use regrasp_geometry::{Point, Vector};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Instant;
 
 /// The value of `format` in a hand file.
 pub const FORMAT: &str = "regrasp-hand";
@@ -44,7 +46,26 @@ pub struct LoadOptions {
     pub lenient: bool,
     /// Contact model of fingertips of which the hand file says nothing.
     pub contact: ContactModel,
+    /// Wall-clock instant after which reading is given up (`F004`). It cuts and never changes what is read.
+    pub deadline: Option<Instant>,
 }
+
+impl LoadOptions {
+    /// Err when the deadline has passed before `path` was read and made ready (`F004`).
+    pub fn check_time(&self, path: &Path) -> Result<(), InputError> {
+        match self.deadline {
+            Some(deadline) if Instant::now() >= deadline => {
+                Err(Diagnostic::new(OUT_OF_TIME, Place::file(path), "the time limit passed while this file was read")
+                    .fix("allow more time, or simplify the meshes")
+                    .into())
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The code of reading that a deadline cut.
+pub const OUT_OF_TIME: &str = "F004";
 
 /// A file that was read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -86,6 +107,7 @@ pub fn load_hand(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Input
 
 fn load_bare_urdf(path: &Path, options: &LoadOptions) -> Result<LoadedHand, InputError> {
     let LoadedRobot { robot, inputs, mut notes } = load_robot(path, options)?;
+    options.check_time(path)?;
     let robot = Arc::new(robot);
     let spec = crate::inspect::guess::guess_hand(&robot, options.contact, path)?;
     notes.push(format!(
@@ -112,6 +134,7 @@ fn load_hand_file(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
     let Parts { robot, spec, inputs: read } = parts.expect("what could not be read has left a diagnostic");
     let mut inputs = vec![own];
     inputs.extend(read);
+    options.check_time(path)?;
     let (hand, more) = assemble(&robot, &spec, path)?;
     notes.extend(more);
     refuse_wrong_unit(&hand, path)?;
@@ -250,6 +273,12 @@ fn read_fingers(entry: &Entry, robot: &Robot, contact: ContactModel, found: &mut
         let diagnostic = entry.error("U202", found, "is empty").expected("at least one [[fingers]] table");
         found.diagnostics.push(diagnostic);
     }
+    if items.len() > MAX_FINGERS {
+        let problem = format!("has {} fingers", items.len());
+        let diagnostic = entry.error("U221", found, problem).expected(format!("at most {MAX_FINGERS}, which can be planned for"));
+        found.diagnostics.push(diagnostic.fix("leave out [[fingers]] that are not needed; their links are held and become palm"));
+        return Vec::new();
+    }
     items.iter().filter_map(|item| read_finger(item.table(found)?, robot, contact, found)).collect()
 }
 
@@ -259,7 +288,7 @@ fn read_finger(
     default_contact: ContactModel,
     found: &mut Found,
 ) -> Option<FingerSpec> {
-    let name = table.required(found, "name", "add name = \"thumb\"").and_then(|entry| entry.text(found));
+    let name = table.required(found, "name", "add name = \"thumb\"").and_then(|entry| entry.name(found));
     let tip_link = table
         .required(found, "tip_link", "add tip_link = \"...\", the link that touches")
         .and_then(|entry| known_link(&entry, robot, found));
@@ -341,7 +370,7 @@ fn lengths(entry: &Entry, found: &mut Found) -> Option<Vector> {
         return Some(radii);
     }
     let expected = "three lengths above 0, in metres, none less than a fifth of another";
-    let problem = format!("is [{}, {}, {}]", radii.x, radii.y, radii.z);
+    let problem = format!("is [{}, {}, {}]", number(radii.x), number(radii.y), number(radii.z));
     found.diagnostics.push(entry.error("U213", found, problem).expected(expected));
     None
 }
@@ -349,10 +378,11 @@ fn lengths(entry: &Entry, found: &mut Found) -> Option<Vector> {
 fn unit_quaternion(entry: &Entry, found: &mut Found) -> Option<UnitQuaternion<f64>> {
     let [x, y, z, w] = entry.numbers::<4>(found)?;
     let quaternion = Quaternion::new(w, x, y, z);
-    if (quaternion.norm() - 1.0).abs() <= 1e-6 {
+    let length = x.hypot(y).hypot(z.hypot(w));
+    if (length - 1.0).abs() <= 1e-6 {
         return Some(UnitQuaternion::from_quaternion(quaternion));
     }
-    let problem = format!("has length {}", quaternion.norm());
+    let problem = format!("has length {}", number(length));
     found.diagnostics.push(entry.error("U213", found, problem).expected("a unit quaternion, x y z w"));
     None
 }
@@ -361,8 +391,7 @@ fn read_pad(mut table: Table, found: &mut Found) -> Option<PadSpec> {
     let axis = table
         .required(found, "axis", "add axis = [0.0, 0.0, 1.0], out of the pad, in the frame of the tip link")
         .and_then(|entry| {
-            let given = Vector::from(entry.numbers::<3>(found)?);
-            let axis = UnitVector::try_new(given, 1e-9);
+            let axis = direction(&Vector::from(entry.numbers::<3>(found)?));
             if axis.is_none() {
                 let problem = "is the zero vector, which is no direction";
                 found.diagnostics.push(
@@ -424,6 +453,9 @@ pub(super) fn known_joint(entry: &Entry, robot: &Robot, found: &mut Found) -> Op
 }
 
 fn refuse_name<'n>(entry: &Entry, kind: &str, name: &str, names: impl Iterator<Item = &'n str>, found: &mut Found) {
+    if found.diagnostics.counted_only() {
+        return;
+    }
     let meant = did_you_mean(name, names);
     let diagnostic = entry
         .error("U205", found, format!("the robot has no {kind} \"{name}\""))

@@ -23,6 +23,6 @@ pub mod urdf;
 /// XML elements and attributes with their places.
 pub(crate) mod xml;
 
-pub use hand_file::{LoadOptions, LoadedHand, LoadedInput, load_hand};
+pub use hand_file::{LoadOptions, LoadedHand, LoadedInput, OUT_OF_TIME, load_hand};
 pub use resolve::ResolveOptions;
 pub use urdf::{LoadedRobot, load_robot};

@@ -39,12 +39,32 @@ pub struct Resolved {
 /// Errors (without element): `U101` not found, with every path tried; `U102` no file name; `U103` refused because it is
 /// fetched, absolute or leaves the allowed folders.
 pub fn resolve(name: &str, model: &Path, place: Place, options: &ResolveOptions) -> Result<Resolved, Diagnostic> {
+    resolve_with(name, model, place, options, Hints::SameNameNear)
+}
+
+/// What a message about a missing file says besides where it was looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Hints {
+    /// Nothing.
+    None,
+    /// Where a file of the same name is: some thousand folder entries are looked at.
+    SameNameNear,
+}
+
+/// As [`resolve`], with the hints asked for.
+pub(crate) fn resolve_with(
+    name: &str,
+    model: &Path,
+    place: Place,
+    options: &ResolveOptions,
+    hints: Hints,
+) -> Result<Resolved, Diagnostic> {
+    let search = Search { folder: folder_of(model), options, hints };
     if name.trim().is_empty() {
         return Err(Diagnostic::new("U102", place, "the file name is empty").expected("a path or package://NAME/PATH"));
     }
-    let folder = folder_of(model);
     if let Some(rest) = name.strip_prefix("package://").or_else(|| name.strip_prefix("model://")) {
-        return in_package(name, rest, &folder, place, options);
+        return in_package(name, rest, place, &search);
     }
     if let Some((scheme, path)) = name.split_once("://") {
         if scheme != "file" {
@@ -56,9 +76,24 @@ pub fn resolve(name: &str, model: &Path, place: Place, options: &ResolveOptions)
             .expected("a file")
             .fix("download it and name the file"));
         }
-        return within(name, Path::new(path), &folder, &[], place, options);
+        return within(name, Path::new(path), &[], place, &search);
     }
-    within(name, &folder.join(name), &folder, &[], place, options)
+    within(name, &search.folder.join(name), &[], place, &search)
+}
+
+/// Where files are looked for.
+struct Search<'a> {
+    /// The folder of the model.
+    folder: PathBuf,
+    options: &'a ResolveOptions,
+    hints: Hints,
+}
+
+impl Search<'_> {
+    /// A file with the same last name near the model, where hints are asked for.
+    fn same_name(&self, wanted: &Path) -> Option<PathBuf> {
+        if self.hints == Hints::None { None } else { same_name_near(&self.folder, wanted) }
+    }
 }
 
 /// The file that the user's own file `file` names: as [`resolve`], but any local path is allowed.
@@ -83,13 +118,7 @@ fn folder_of(model: &Path) -> PathBuf {
     }
 }
 
-fn in_package(
-    name: &str,
-    rest: &str,
-    folder: &Path,
-    place: Place,
-    options: &ResolveOptions,
-) -> Result<Resolved, Diagnostic> {
+fn in_package(name: &str, rest: &str, place: Place, search: &Search) -> Result<Resolved, Diagnostic> {
     let (package, inside) = match rest.split_once('/') {
         Some((package, inside)) if !package.is_empty() && !inside.trim_matches('/').is_empty() => (package, inside),
         _ => {
@@ -99,7 +128,7 @@ fn in_package(
     };
     let inside = Path::new(inside.trim_start_matches('/'));
     let mut tried = Vec::new();
-    for (source, root) in package_roots(package, folder, options, &mut tried) {
+    for (source, root) in package_roots(package, &search.folder, search.options, &mut tried) {
         let (path, mut notes) = match existing(&root.join(inside)) {
             Some(found) => found,
             None => {
@@ -110,11 +139,12 @@ fn in_package(
         if source == Source::FolderOfThatName {
             notes.push(format!("package \"{package}\" has no package.xml; the folder {} is taken", root.display()));
         }
-        let resolved = within(name, &path, folder, &[root], place, options)?;
+        let resolved = within(name, &path, &[root], place, search)?;
         return Ok(Resolved { path: resolved.path, notes });
     }
     let numbered: Vec<String> = tried.iter().enumerate().map(|(i, text)| format!("({}) {text}", i + 1)).collect();
-    let hint = same_name_near(folder, inside)
+    let hint = search
+        .same_name(inside)
         .map_or(String::new(), |p| format!(" (a file of that name is at {})", p.display()));
     Err(Diagnostic::new("U101", place, format!("\"{name}\" not found; looked in: {}", numbered.join(" ")))
         .fix(format!("--package {package}=DIR{hint}")))
@@ -219,13 +249,13 @@ fn package_name(dir: &Path) -> Option<String> {
 fn within(
     name: &str,
     path: &Path,
-    folder: &Path,
     more_roots: &[PathBuf],
     place: Place,
-    options: &ResolveOptions,
+    search: &Search,
 ) -> Result<Resolved, Diagnostic> {
     let Some((path, notes)) = existing(path) else {
-        let hint = same_name_near(folder, Path::new(name))
+        let hint = search
+            .same_name(Path::new(name))
             .map_or(String::new(), |found| format!("a file of that name is at {}", found.display()));
         let problem = if path.is_dir() { "is a folder" } else { "not found" };
         return Err(Diagnostic::new("U101", place, format!("\"{name}\" {problem}; looked in: {}", path.display()))
@@ -234,7 +264,7 @@ fn within(
     };
     let real = fs::canonicalize(&path)
         .map_err(|error| Diagnostic::new("U101", place.clone(), format!("\"{name}\" cannot be followed: {error}")))?;
-    let allowed = allowed_roots(folder, more_roots, options);
+    let allowed = allowed_roots(&search.folder, more_roots, search.options);
     if !allowed.iter().any(|root| real.starts_with(root)) {
         let roots: Vec<String> = allowed.iter().map(|root| root.display().to_string()).collect();
         return Err(Diagnostic::new(

@@ -3,7 +3,7 @@
 use super::hand_file::LoadedInput;
 use super::xml::{Named, Reader, children, parse};
 use crate::robot::{JointId, LinkId, Robot};
-use regrasp_base::diagnostic::did_you_mean;
+use regrasp_base::diagnostic::{Lines, did_you_mean};
 use regrasp_base::{Diagnostic, InputError, files};
 use roxmltree::Node;
 use std::path::Path;
@@ -87,12 +87,13 @@ pub(crate) fn parse_srdf(
 ) -> Result<(Srdf, Vec<String>), InputError> {
     let document = parse(path, text)?;
     let root = document.root_element();
-    let mut reader = Reader::new(path, lenient);
+    let lines = Lines::of(text);
+    let mut reader = Reader::new(path, &lines, lenient);
     reader.refuse_other_root(root)?;
     let mut srdf = Srdf::default();
     for node in children(root, "group") {
         // Groups without a name are references inside other groups in old files.
-        let Some(name) = reader.required(node, "name", ("group", "")) else { continue };
+        let Some(name) = reader.required_name(node, "name", "group") else { continue };
         srdf.groups.push(read_group(&mut reader, node, name, robot));
     }
     let group_names: Vec<String> = srdf.groups.iter().map(|group| group.name.clone()).collect();
@@ -108,8 +109,7 @@ pub(crate) fn parse_srdf(
             srdf.disabled_pairs.push(DisabledPair { links: (a.min(b), a.max(b)), reason });
         }
     }
-    let Reader { found, notes, .. } = reader;
-    found.into_result((srdf, notes))
+    reader.finish(srdf)
 }
 
 fn read_group<'a, 'i: 'a>(reader: &mut Reader<'a>, node: Node<'a, 'i>, name: &str, robot: &Robot) -> Group {
@@ -133,7 +133,7 @@ fn read_end_effector<'a, 'i: 'a>(
     robot: &Robot,
     groups: &[String],
 ) -> Option<EndEffector> {
-    let name = reader.required(node, "name", ("end_effector", ""))?;
+    let name = reader.required_name(node, "name", "end_effector")?;
     let element = ("end_effector", name);
     let parent_link = known_link(reader, node, "parent_link", element, robot);
     let group = reader.required(node, "group", element)?;
@@ -191,6 +191,9 @@ fn unknown<'n>(
     };
     if reader.lenient {
         reader.note(node, element, format!("skipped: there is no {kind} \"{name}\""));
+        return;
+    }
+    if reader.found.counted_only() {
         return;
     }
     let meant = did_you_mean(name, candidates);

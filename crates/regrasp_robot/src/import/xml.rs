@@ -1,6 +1,6 @@
 //! XML elements and attributes with their places, and every problem gathered.
 
-use regrasp_base::diagnostic::Diagnostics;
+use regrasp_base::diagnostic::{Diagnostics, Lines, bad_name};
 use regrasp_base::{Diagnostic, InputError, Place};
 use roxmltree::Node;
 use std::path::Path;
@@ -9,23 +9,27 @@ use std::path::Path;
 const MAX_NODES: u32 = 1_000_000;
 /// Deepest nesting of elements; URDF and SRDF need 6.
 const MAX_DEPTH: usize = 64;
+/// Most attributes of an element; URDF needs 4. The parser compares each with all others.
+const MAX_ATTRIBUTES: usize = 256;
+/// Most declarations of name spaces in a file; the parser compares each with all others.
+const MAX_NAMESPACES: usize = 1_000;
+/// Remarks about one file that are told one by one; the others are counted.
+const MAX_NOTES: usize = 100;
 
 /// The XML tree of `text`, the content of `file`.
 ///
-/// Errors: not well formed (`U100`), a document type declaration (`U104`), too deep or too large (`U105`).
+/// Errors: not well formed (`U100`), a document type declaration (`U104`), too deep, too large, or too much of something (`U105`).
 pub(crate) fn parse<'a>(file: &Path, text: &'a str) -> Result<roxmltree::Document<'a>, InputError> {
     if text.trim().is_empty() {
         return Err(Diagnostic::new("U100", Place::file(file), "is empty").into());
     }
-    refuse_deep_nesting(file, text)?;
+    refuse_hostile_markup(file, text)?;
     let options = roxmltree::ParsingOptions { allow_dtd: false, nodes_limit: MAX_NODES, ..Default::default() };
     roxmltree::Document::parse_with_options(text, options).map_err(|error| {
         let at = error.pos();
         let place = Place { file: file.to_owned(), line: Some(at.row), column: Some(at.col) };
         match error {
-            roxmltree::Error::DtdDetected => Diagnostic::new("U104", place, "has a document type declaration (DTD)")
-                .expected("plain XML without entities")
-                .fix("remove the <!DOCTYPE ...> line"),
+            roxmltree::Error::DtdDetected => dtd(place),
             roxmltree::Error::NodesLimitReached => {
                 Diagnostic::new("U105", place, format!("has more than {MAX_NODES} XML nodes"))
             }
@@ -42,59 +46,112 @@ pub(crate) fn parse<'a>(file: &Path, text: &'a str) -> Result<roxmltree::Documen
     })
 }
 
-/// Counts open tags without a tree, so that hostile nesting cannot exhaust the stack of the parser.
-fn refuse_deep_nesting(file: &Path, text: &str) -> Result<(), InputError> {
-    let bytes = text.as_bytes();
-    let (mut depth, mut at) = (0usize, 0usize);
-    let skip_past =
-        |from: usize, end: &str| text.get(from..).and_then(|rest| rest.find(end)).map(|k| from + k + end.len());
-    while let Some(open) = text.get(at..).and_then(|rest| rest.find('<')).map(|k| at + k) {
-        let rest = &bytes[open..];
-        let end = if rest.starts_with(b"<!--") {
-            skip_past(open + 4, "-->")
-        } else if rest.starts_with(b"<![CDATA[") {
-            skip_past(open, "]]>")
+/// What the markup of a file has been found to hold so far.
+#[derive(Default)]
+struct Markup {
+    depth: usize,
+    n_namespaces: usize,
+}
+
+/// Walks over the markup without a tree, so that nothing that costs the parser more than its bytes reaches it: deep nesting,
+/// elements of thousands of attributes, thousands of name spaces. Where the markup is broken it stops; the parser says why.
+fn refuse_hostile_markup(file: &Path, text: &str) -> Result<(), InputError> {
+    let after = |from: usize, end: &str| text.get(from..)?.find(end).map(|k| from + k + end.len());
+    let mut markup = Markup::default();
+    let mut at = 0;
+    while let Some(open) = after(at, "<").map(|end| end - 1) {
+        let rest = &text[open..];
+        // Quotes mean nothing in comments, character data and processing instructions, nor in closing tags.
+        let end = if rest.starts_with("<!--") {
+            after(open + 4, "-->")
+        } else if rest.starts_with("<![CDATA[") {
+            after(open + 9, "]]>")
+        } else if rest.starts_with("<?") {
+            after(open + 2, "?>")
+        } else if rest.starts_with("<!DOCTYPE") {
+            return Err(dtd(Place::at_offset(file, text, open)).into());
+        } else if rest.starts_with("<!") {
+            None
+        } else if rest.starts_with("</") {
+            markup.depth = markup.depth.saturating_sub(1);
+            after(open + 2, ">")
         } else {
-            tag_end(bytes, open)
+            let end = markup.open_tag(text.as_bytes(), open);
+            if let Some(problem) = markup.excess(text.as_bytes().get(open..end.unwrap_or(text.len())).unwrap_or_default()) {
+                return Err(Diagnostic::new("U105", Place::at_offset(file, text, open), problem).into());
+            }
+            end
         };
         let Some(end) = end else { return Ok(()) };
-        match rest.get(1) {
-            Some(b'/') => depth = depth.saturating_sub(1),
-            Some(b'!' | b'?') => {}
-            _ if bytes[end - 2] == b'/' => {}
-            _ => depth += 1,
-        }
-        if depth > MAX_DEPTH {
-            let place = Place::at_offset(file, text, open);
-            return Err(Diagnostic::new("U105", place, format!("nests more than {MAX_DEPTH} elements")).into());
-        }
         at = end;
     }
     Ok(())
 }
 
-/// Index after the `>` that ends the tag at `open`; quoted values may contain `>`.
-fn tag_end(bytes: &[u8], open: usize) -> Option<usize> {
-    let mut quote = None;
-    for (k, &byte) in bytes.iter().enumerate().skip(open + 1) {
-        match (quote, byte) {
-            (None, b'>') => return Some(k + 1),
-            (None, b'"' | b'\'') => quote = Some(byte),
-            (Some(q), _) if q == byte => quote = None,
-            _ => {}
+impl Markup {
+    /// Index after the `>` that ends the tag which opens at `open`; quoted values may contain `>`. None where there is no end.
+    fn open_tag(&mut self, bytes: &[u8], open: usize) -> Option<usize> {
+        let mut quote = None;
+        let mut end = None;
+        for (k, &byte) in bytes.iter().enumerate().skip(open + 1) {
+            match (quote, byte) {
+                (None, b'>') => {
+                    end = Some(k + 1);
+                    break;
+                }
+                (None, b'"' | b'\'') => quote = Some(byte),
+                // What follows is another tag, and this one is broken.
+                (None, b'<') => return None,
+                (Some(q), _) if q == byte => quote = None,
+                _ => {}
+            }
         }
+        let end = end?;
+        self.depth += usize::from(bytes[end - 2] != b'/');
+        Some(end)
     }
-    None
+
+    /// What `tag` has too much of, after it was opened.
+    fn excess(&mut self, tag: &[u8]) -> Option<String> {
+        let (mut quote, mut n_attributes) = (None, 0);
+        for (k, &byte) in tag.iter().enumerate() {
+            match (quote, byte) {
+                (None, b'"' | b'\'') => quote = Some(byte),
+                (None, b'=') => n_attributes += 1,
+                (None, b'x') if tag[k..].starts_with(b"xmlns") && tag[k - 1].is_ascii_whitespace() => {
+                    self.n_namespaces += 1;
+                }
+                (Some(q), _) if q == byte => quote = None,
+                _ => {}
+            }
+        }
+        let counts = [
+            (self.depth, MAX_DEPTH, "elements inside each other"),
+            (n_attributes, MAX_ATTRIBUTES, "attributes in one element"),
+            (self.n_namespaces, MAX_NAMESPACES, "declarations of name spaces"),
+        ];
+        let (_, limit, what) = counts.into_iter().find(|(count, limit, _)| count > limit)?;
+        Some(format!("has more than {limit} {what}"))
+    }
+}
+
+fn dtd(place: Place) -> Diagnostic {
+    Diagnostic::new("U104", place, "has a document type declaration (DTD)")
+        .expected("plain XML without entities")
+        .fix("remove the <!DOCTYPE ...> line")
 }
 
 /// A file under reading: its problems and remarks so far.
 pub(crate) struct Reader<'a> {
     /// The file, as the user named it.
     pub file: &'a Path,
+    /// Where its lines begin.
+    pub lines: &'a Lines,
     /// Problems.
     pub found: Diagnostics,
     /// Remarks that do not stop the reading.
-    pub notes: Vec<String>,
+    notes: Vec<String>,
+    n_more_notes: usize,
     /// Whether what cannot be used is dropped with a note where that is safe.
     pub lenient: bool,
 }
@@ -103,8 +160,16 @@ pub(crate) struct Reader<'a> {
 pub(crate) type Named<'a> = (&'a str, &'a str);
 
 impl<'a> Reader<'a> {
-    pub fn new(file: &'a Path, lenient: bool) -> Self {
-        Reader { file, found: Diagnostics::default(), notes: Vec::new(), lenient }
+    pub fn new(file: &'a Path, lines: &'a Lines, lenient: bool) -> Self {
+        Reader { file, lines, found: Diagnostics::default(), notes: Vec::new(), n_more_notes: 0, lenient }
+    }
+
+    /// `value` and the remarks, when there were no problems.
+    pub fn finish<T>(mut self, value: T) -> Result<(T, Vec<String>), InputError> {
+        if self.n_more_notes > 0 {
+            self.notes.push(format!("{}: and {} more notes", Place::file(self.file), self.n_more_notes));
+        }
+        self.found.into_result((value, self.notes))
     }
 
     /// Err when the outermost element is not `<robot>` (`U106`).
@@ -118,31 +183,57 @@ impl<'a> Reader<'a> {
 
     /// Where `node` begins.
     pub fn place(&self, node: Node) -> Place {
-        let at = node.document().text_pos_at(node.range().start);
-        Place { file: self.file.to_owned(), line: Some(at.row), column: Some(at.col) }
+        self.lines.place(self.file, node.range().start)
     }
 
     /// Where attribute `name` of `node` stands, else where the node begins.
     pub fn attribute_place(&self, node: Node, name: &str) -> Place {
-        let Some(attribute) = node.attribute_node(name) else { return self.place(node) };
-        let at = node.document().text_pos_at(attribute.range().start);
-        Place { file: self.file.to_owned(), line: Some(at.row), column: Some(at.col) }
+        match node.attribute_node(name) {
+            Some(attribute) => self.lines.place(self.file, attribute.range().start),
+            None => self.place(node),
+        }
     }
 
     /// A remark with its place.
     pub fn note(&mut self, node: Node, element: Named, remark: impl AsRef<str>) {
-        let place = self.place(node);
-        self.notes.push(format!("{place} {} \"{}\": {}", element.0, element.1, remark.as_ref()));
+        if self.notes.len() < MAX_NOTES {
+            let place = self.place(node);
+            self.notes.push(format!("{place} {} \"{}\": {}", element.0, element.1, remark.as_ref()));
+        } else {
+            self.n_more_notes += 1;
+        }
+    }
+
+    /// A remark about another file, told once.
+    pub fn note_once(&mut self, remark: String) {
+        if self.notes.contains(&remark) {
+            return;
+        }
+        if self.notes.len() < MAX_NOTES {
+            self.notes.push(remark);
+        } else {
+            self.n_more_notes += 1;
+        }
+    }
+
+    /// The name in attribute `name`, which must be there and be fit to be shown (`U112`, `V004`).
+    pub fn required_name<'n>(&mut self, node: Node<'n, '_>, name: &str, kind: &str) -> Option<&'n str> {
+        let value = self.required(node, name, (kind, ""))?;
+        let bad = bad_name(|| self.attribute_place(node, name), kind, value);
+        let is_good = bad.is_none();
+        bad.into_iter().for_each(|diagnostic| self.found.push(diagnostic));
+        is_good.then_some(value)
     }
 
     /// The value of attribute `name`, which must be there and not be blank (`U112`).
     pub fn required<'n>(&mut self, node: Node<'n, '_>, name: &str, element: Named) -> Option<&'n str> {
-        let (tag, place) = (node.tag_name().name(), self.place(node));
+        let tag = node.tag_name().name();
         let problem = match node.attribute(name) {
             Some(value) if !value.trim().is_empty() => return Some(value),
             Some(_) => format!("<{tag}> has an empty attribute {name}"),
             None => format!("<{tag}> has no attribute {name}"),
         };
+        let place = self.place(node);
         let diagnostic = Diagnostic::new("U112", place, problem).expected(format!("<{tag} {name}=\"...\">"));
         self.found.push(named(diagnostic, element));
         None

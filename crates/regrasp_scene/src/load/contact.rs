@@ -10,11 +10,14 @@ pub(super) fn apply(entry: &Entry, hand: &mut Hand, found: &mut Found) -> Option
     let mut is_good = true;
     for (name, value) in entry.table(found)?.all() {
         let Some(finger) = hand.finger_named(name) else {
+            is_good = false;
+            if found.diagnostics.counted_only() {
+                continue;
+            }
             let names = hand.fingers.iter().map(|finger| finger.name.as_str());
             let problem = format!("is not a finger of the hand{}", suggestion(name, names));
             let diagnostic = value.error("S120", found, problem);
             found.diagnostics.push(diagnostic);
-            is_good = false;
             continue;
         };
         let contact = value.table(found).and_then(|mut table| {

@@ -5,6 +5,7 @@ use regrasp_base::Diagnostic;
 use regrasp_base::files;
 use regrasp_base::toml_table::{Entry, Found};
 use regrasp_geometry::TriangleMesh;
+use regrasp_geometry::import::{MAX_TRIANGLES, too_many};
 use regrasp_robot::import::{LoadOptions, resolve};
 use std::path::{Path, PathBuf};
 
@@ -15,13 +16,15 @@ pub(super) struct Files<'a> {
     pub options: &'a LoadOptions,
     /// In the order in which they were read, the scene file first.
     pub inputs: Vec<InputFile>,
+    /// Triangles of all meshes read so far.
+    n_triangles: usize,
 }
 
 impl<'a> Files<'a> {
     /// No file yet but the scene file itself, with its bytes.
     pub fn new(scene: &'a Path, bytes: &[u8], options: &'a LoadOptions) -> Self {
         let name = scene.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-        let mut files = Files { scene, options, inputs: Vec::new() };
+        let mut files = Files { scene, options, inputs: Vec::new(), n_triangles: 0 };
         files.record("scene", name, scene, bytes);
         files
     }
@@ -78,18 +81,28 @@ impl<'a> Files<'a> {
         self.inputs.push(InputFile { role: role.to_owned(), name, path: path.to_owned(), sha256 });
     }
 
+    /// False when the deadline has passed, with a diagnostic (`F004`).
+    pub fn is_in_time(&self, found: &mut Found) -> bool {
+        self.options.check_time(self.scene).map_err(|error| found.diagnostics.extend(error)).is_ok()
+    }
+
     /// The mesh in the file that `entry` names, in the file's frame and unit.
     pub fn mesh(&mut self, entry: &Entry, found: &mut Found) -> Option<TriangleMesh> {
         let path = self.locate(entry, found)?;
-        let read = files::read(&path).and_then(|bytes| {
+        let read = self.options.check_time(&path).and_then(|()| files::read(&path)).and_then(|bytes| {
             let mesh = regrasp_geometry::import::read_mesh(&path, &bytes)?;
-            Ok((bytes, mesh))
+            self.n_triangles += mesh.triangles().len();
+            if self.n_triangles > MAX_TRIANGLES {
+                return Err(too_many(self.scene, self.n_triangles));
+            }
+            // The bytes are not needed any more when the mesh is made ready, which takes several times as many.
+            Ok((files::sha256(&bytes), mesh))
         });
         match read {
-            Ok((bytes, mesh)) => {
+            Ok((sha256, mesh)) => {
                 let name = entry.text(found)?.to_owned();
-                self.record("mesh", name, &path, &bytes);
-                Some(mesh)
+                self.inputs.push(InputFile { role: "mesh".to_owned(), name, path, sha256 });
+                self.is_in_time(found).then_some(mesh)
             }
             Err(error) => {
                 found.diagnostics.extend(error);

@@ -19,7 +19,7 @@ pub(super) fn gravity(root: &mut Table, hand: Option<&Hand>, found: &mut Found) 
         return None;
     }
     let down_in_hand = Vector::from(entry.numbers::<3>(found)?);
-    if down_in_hand.norm() <= 1e-9 {
+    if down_in_hand == Vector::zeros() {
         let diagnostic = entry.error("S107", found, "is the zero vector, which is no direction");
         found.diagnostics.push(diagnostic.expected(EXPECTED));
         return None;

@@ -24,6 +24,7 @@ use crate::query::TaskKind;
 use crate::scene::{InputFile, Scene};
 use files::Files;
 use regrasp_base::InputError;
+use regrasp_base::diagnostic::printable_line;
 use regrasp_base::toml_table::{Codes, Found, Table};
 use regrasp_geometry::Pose;
 use regrasp_robot::Hand;
@@ -72,7 +73,7 @@ pub fn load_scene(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Inp
     let parts = diagnostics.into_result(parts)?;
     let Parts { hand, reach, object, obstacles, gravity, limits, task } =
         parts.expect("what could not be read has left a diagnostic");
-    let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    let name = path.file_stem().map_or_else(String::new, |stem| printable_line(&stem.to_string_lossy()));
     let scene = Scene { name, hand, reach, object, obstacles, gravity, limits, inputs: files.inputs };
     Ok(LoadedScene { scene, task, notes })
 }

@@ -3,6 +3,7 @@
 use super::files::Files;
 use super::pose;
 use super::shape::{self, Origin, ReadShape};
+use super::units::list;
 use crate::object::Object;
 use crate::scene::Obstacle;
 use regrasp_base::diagnostic::number;
@@ -12,9 +13,14 @@ use regrasp_geometry::mass::{Solid, solid_properties};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::surface::DEFAULT_CREASE_ANGLE;
 use regrasp_geometry::{Point, Shape, Surface};
+use std::collections::BTreeSet;
 
 /// Contacts keep this distance from creases when the file says nothing, in metres (in-hand-notes section 1).
 const DEFAULT_EDGE_DISTANCE: f64 = 0.004;
+/// Largest friction coefficient: plans hold no larger one.
+const MAX_FRICTION: f64 = 1e3;
+/// Largest mass, in kilograms: plans hold no contact forces that carry more.
+const MAX_MASS: f64 = 1e6;
 /// Friction coefficients above this are noted: no known pair of materials has them.
 const UNLIKELY_FRICTION: f64 = 2.0;
 /// Masses above this are noted, in kilograms.
@@ -24,7 +30,7 @@ const UNLIKELY_MASS: f64 = 20.0;
 pub(super) fn object(root: &mut Table, files: &mut Files, found: &mut Found) -> Option<Object> {
     let fix = "add [object] with name, a shape such as sphere = { radius = 0.03 }, mass and friction";
     let mut table = root.required(found, "object", fix)?.table(found)?;
-    let name = table.optional("name").and_then(|entry| entry.text(found)).unwrap_or("object").to_owned();
+    let name = table.optional("name").and_then(|entry| entry.name(found)).unwrap_or("object").to_owned();
     let read = shape::shape(&mut table, files, found);
     let friction = table.required(found, "friction", "add friction = 0.8").and_then(|entry| friction(&entry, found));
     let edge_entry = table.optional("edge_distance");
@@ -44,7 +50,7 @@ pub(super) fn object(root: &mut Table, files: &mut Files, found: &mut Found) -> 
     let placed = read.and_then(|read| placed(read, given_mass.as_ref(), &given_center, &table, found));
     let no_room = placed.as_ref().zip(edge_distance).and_then(|((shape, ..), distance)| no_room(shape, distance));
     if let Some(room) = no_room {
-        let (distance, expected) = (edge_distance?, format!("an edge_distance below {room} m"));
+        let (distance, expected) = (number(edge_distance?), format!("an edge_distance below {room} m"));
         let problem = format!("edge_distance {distance} m leaves no place for a contact");
         let diagnostic = match &edge_entry {
             Some(entry) => entry.error("S107", found, problem),
@@ -60,6 +66,9 @@ pub(super) fn object(root: &mut Table, files: &mut Files, found: &mut Found) -> 
         center_is_inside(&shape, &center_of_mass, center, found)?;
     }
     // Both take long for meshes of a million triangles.
+    if !files.is_in_time(found) {
+        return None;
+    }
     let (surface, mesh_body) = std::thread::scope(|scope| {
         let mesh_body = scope.spawn(|| MeshBody::of(&shape));
         let surface = Surface::with_crease_angle(&shape, crease_angle);
@@ -90,7 +99,7 @@ pub(super) fn object(root: &mut Table, files: &mut Files, found: &mut Found) -> 
 }
 
 fn friction(entry: &Entry, found: &mut Found) -> Option<f64> {
-    let friction = entry.number_that(found, "a friction coefficient of 0 or more", |x| x >= 0.0)?;
+    let friction = entry.number_that(found, "a friction coefficient from 0 to 1000", |x| (0.0..=MAX_FRICTION).contains(&x))?;
     if friction == 0.0 {
         found.note(&entry.span, "friction 0: fingertips can only push along the normal");
     } else if friction > UNLIKELY_FRICTION {
@@ -125,7 +134,7 @@ fn mass(table: &mut Table, found: &mut Found) -> Option<GivenMass> {
             .number_that(found, "a density above 0, in kg/m^3 (water has 1000)", |x| x > 0.0)
             .map(GivenMass::Density),
         [entry] => {
-            let mass = entry.number_that(found, "a mass of 0 or more, in kilograms", |x| x >= 0.0)?;
+            let mass = entry.number_that(found, "a mass from 0 to 1000000, in kilograms", |x| (0.0..=MAX_MASS).contains(&x))?;
             if mass == 0.0 {
                 found.note(&entry.span, "mass 0: the object has no weight");
             } else if mass > UNLIKELY_MASS {
@@ -195,7 +204,16 @@ fn placed(
     };
     let mass = match mass? {
         GivenMass::Mass(mass) => *mass,
-        GivenMass::Density(density) => density * solid.as_ref()?.volume,
+        GivenMass::Density(density) => {
+            let mass = density * solid.as_ref()?.volume;
+            if mass > MAX_MASS {
+                let problem = format!("with density {} it weighs {} kg", number(*density), number(mass));
+                let diagnostic = table.error("S107", found, problem);
+                found.diagnostics.push(diagnostic.expected("at most 1000000 kg; densities are in kg/m^3 (water has 1000)"));
+                return None;
+            }
+            mass
+        }
     };
     Some((shape, mass, center))
 }
@@ -207,7 +225,7 @@ fn center_is_inside(shape: &Shape, center: &Point, entry: &Entry, found: &mut Fo
         return Some(());
     }
     let diagnostic = entry
-        .error("S107", found, format!("is {:?}, outside the object", [center.x, center.y, center.z]))
+        .error("S107", found, format!("is {}, outside the object", list(center.coords)))
         .expected(format!(
             "a point of the object frame between {:.4?} and {:.4?}",
             low.coords.as_slice(),
@@ -222,9 +240,10 @@ pub(super) fn obstacles(root: &mut Table, files: &mut Files, found: &mut Found) 
     let entries =
         root.optional("obstacles").and_then(|entry| entry.entries(found, "tables [[obstacles]]")).unwrap_or_default();
     let mut obstacles: Vec<Obstacle> = Vec::new();
+    let mut names = BTreeSet::new();
     for entry in entries {
         let Some(obstacle) = obstacle(&entry, files, found) else { continue };
-        if obstacles.iter().any(|other| other.name == obstacle.name) {
+        if !names.insert(obstacle.name.clone()) {
             let diagnostic = entry
                 .error("S112", found, format!("has the name \"{}\", as another obstacle", obstacle.name))
                 .expected("names that differ");
@@ -237,7 +256,7 @@ pub(super) fn obstacles(root: &mut Table, files: &mut Files, found: &mut Found) 
 
 fn obstacle(entry: &Entry, files: &mut Files, found: &mut Found) -> Option<Obstacle> {
     let mut table = entry.table(found)?;
-    let name = table.required(found, "name", "add name = \"table\"").and_then(|entry| entry.text(found));
+    let name = table.required(found, "name", "add name = \"table\"").and_then(|entry| entry.name(found));
     let read = shape::shape(&mut table, files, found);
     let pose = pose::pose(&mut table, found);
     table.finish(found);
@@ -246,6 +265,9 @@ fn obstacle(entry: &Entry, files: &mut Files, found: &mut Found) -> Option<Obsta
         let diagnostic =
             entry.error("S107", found, "has a mesh with an origin").fix("place the obstacle by its position instead");
         found.diagnostics.push(diagnostic);
+        return None;
+    }
+    if !files.is_in_time(found) {
         return None;
     }
     let mesh_body = MeshBody::of(&read.shape);

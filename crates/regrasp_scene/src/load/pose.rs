@@ -1,7 +1,9 @@
 //! Positions, orientations and turns in scene files.
 
 use nalgebra::UnitQuaternion;
+use regrasp_base::diagnostic::number;
 use regrasp_base::toml_table::{Entry, Found, Table};
+use regrasp_geometry::frame::{direction, length};
 use regrasp_geometry::{Pose, UnitVector, Vector, pose_from};
 use std::f64::consts::TAU;
 
@@ -42,8 +44,9 @@ pub(super) fn quaternion(table: &mut Table, found: &mut Found) -> Option<[f64; 4
     };
     if entry.name.ends_with("rotation_vector") {
         let vector = Vector::from(entry.numbers::<3>(found)?);
-        if vector.norm() > TAU {
-            let diagnostic = entry.error("S107", found, format!("turns by {:.3} rad", vector.norm()));
+        let angle = length(&vector);
+        if angle > TAU {
+            let diagnostic = entry.error("S107", found, format!("turns by {} rad", number(angle)));
             found.diagnostics.push(diagnostic.expected("an axis times an angle of at most 2 pi radians"));
             return None;
         }
@@ -61,7 +64,7 @@ pub(super) fn quaternion(table: &mut Table, found: &mut Found) -> Option<[f64; 4
     }
     if !norm.is_finite() || (norm - 1.0).abs() > QUATERNION_TOLERANCE {
         let diagnostic = entry
-            .error("V002", found, format!("has length {norm:.6}"))
+            .error("V002", found, format!("has length {}", number(norm)))
             .expected(format!("a unit quaternion (length 1 within {QUATERNION_TOLERANCE})"))
             .fix(format!("divided by its length it is {:.9?}", [a, b, c, d].map(|part| part / norm)));
         found.diagnostics.push(diagnostic);
@@ -101,8 +104,7 @@ fn axis(entry: &Entry, found: &mut Found) -> Option<UnitVector> {
             _ => Vector::z_axis(),
         });
     }
-    let direction = Vector::from(entry.numbers::<3>(found)?);
-    let axis = UnitVector::try_new(direction, 1e-9);
+    let axis = direction(&Vector::from(entry.numbers::<3>(found)?));
     if axis.is_none() {
         let diagnostic = entry.error("S107", found, "is the zero vector, which is no axis").expected("a direction");
         found.diagnostics.push(diagnostic);

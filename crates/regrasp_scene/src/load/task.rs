@@ -4,6 +4,7 @@ use super::pose;
 use crate::query::{GraspRequest, InHandQuery, TaskKind};
 use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_base::Rng;
+use regrasp_base::diagnostic::number;
 use regrasp_base::toml_table::{Entry, Found, Table, suggestion};
 use regrasp_geometry::frame::rotation_between;
 use regrasp_geometry::{Point, Pose, UnitVector, Vector, pose_from};
@@ -347,10 +348,13 @@ pub(super) fn joint_values(table: &Table, hand: &Hand, all_needed: bool, found: 
     let mut is_good = true;
     for (name, entry) in table.all() {
         let Some(index) = names.iter().position(|known| known == name) else {
+            is_good = false;
+            if found.diagnostics.counted_only() {
+                continue;
+            }
             let problem = format!("is not a joint of the hand{}", suggestion(name, names.iter().map(String::as_str)));
             let diagnostic = entry.error("S120", found, problem).expected(names.join(", "));
             found.diagnostics.push(diagnostic);
-            is_good = false;
             continue;
         };
         let Some(value) = entry.number(found) else {
@@ -361,8 +365,8 @@ pub(super) fn joint_values(table: &Table, hand: &Hand, all_needed: bool, found: 
             (Some(slot), Some((lower, upper))) if value >= *lower && value <= *upper => *slot = Some(value),
             (_, Some((lower, upper))) => {
                 let diagnostic = entry
-                    .error("P303", found, format!("is {value}, outside the joint's limits"))
-                    .expected(format!("{lower} to {upper} (radians or metres)"));
+                    .error("P303", found, format!("is {}, outside the joint's limits", number(value)))
+                    .expected(format!("{} to {} (radians or metres)", number(*lower), number(*upper)));
                 found.diagnostics.push(diagnostic);
                 is_good = false;
             }
@@ -391,11 +395,14 @@ fn contact_points(table: &Table, hand: &Hand, found: &mut Found) -> Option<Vec<P
     for (name, entry) in table.all() {
         let slot = hand.finger_named(name).and_then(|finger| points.get_mut(finger.0));
         let Some(slot) = slot else {
+            is_good = false;
+            if found.diagnostics.counted_only() {
+                continue;
+            }
             let names: Vec<&str> = hand.fingers.iter().map(|finger| finger.name.as_str()).collect();
             let problem = format!("is not a finger of the hand{}", suggestion(name, names.iter().copied()));
             let diagnostic = entry.error("S120", found, problem).expected(names.join(", "));
             found.diagnostics.push(diagnostic);
-            is_good = false;
             continue;
         };
         *slot = entry.numbers::<3>(found).map(Point::from);

@@ -91,7 +91,7 @@ pub(super) fn check_contacts(hand: &Hand, object: &Object, task: &InHandTask, ro
 }
 
 /// A vector as a list of a scene file.
-fn list(v: regrasp_geometry::Vector) -> String {
+pub(super) fn list(v: regrasp_geometry::Vector) -> String {
     format!("[{}, {}, {}]", number(v.x), number(v.y), number(v.z))
 }
 

@@ -2,6 +2,7 @@
 //! and nothing written.
 
 mod arguments;
+mod extremes;
 mod meshes;
 mod plans;
 mod roadmaps;

@@ -209,7 +209,7 @@ impl GraspRoadmap {
             let problem = "has tables of other fingers than the hand that it names";
             diagnostics.push(Diagnostic::new("R606", Place::file(path), problem).fix(rebuild));
         }
-        if diagnostics.is_empty() { Ok(()) } else { Err(InputError { diagnostics }) }
+        if diagnostics.is_empty() { Ok(()) } else { Err(InputError { diagnostics, n_more: 0 }) }
     }
 
     /// Refuses settings that other motions are feasible with than those of the roadmap: the closure margin, the release rule,
@@ -226,7 +226,7 @@ impl GraspRoadmap {
                     .fix("build a roadmap with these settings: regrasp roadmap build --settings FILE.json, or --margin")
             })
             .collect();
-        if diagnostics.is_empty() { Ok(()) } else { Err(InputError { diagnostics }) }
+        if diagnostics.is_empty() { Ok(()) } else { Err(InputError { diagnostics, n_more: 0 }) }
     }
 
     fn has_joints_of(&self, scene: &Scene) -> bool {

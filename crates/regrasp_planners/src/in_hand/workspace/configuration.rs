@@ -60,7 +60,7 @@ pub fn place_finger(model: &Model, configuration: &mut Configuration, finger: us
 }
 
 /// Most moving joints of a finger.
-const MAX_BODIES: usize = 16;
+const MAX_BODIES: usize = regrasp_robot::hand::MAX_FINGER_JOINTS;
 
 /// The configuration in the middle of a step.
 pub fn midway(model: &Model, from: &Configuration, to: &Configuration) -> Configuration {

@@ -143,7 +143,7 @@ fn read_mesh(reader: &mut Reader, node: Node, element: Named, meshes: &mut Meshe
         None => reader.required(node, "filename", element)?,
     };
     let place = reader.attribute_place(node, "filename");
-    let found = meshes.get(name, reader.file, place.clone(), &mut reader.notes);
+    let found = meshes.get(name, reader.file, place.clone(), reader);
     let scale = scale?;
     let scaled = found.and_then(|mesh| {
         if scale == Vector::repeat(1.0) {

@@ -1,16 +1,25 @@
 //! Joints of a URDF: type, axis, limits.
 
+use super::MAX_LINKS;
 use super::geometry::read_origin;
 use crate::import::xml::{Reader, child, children};
 use crate::robot::{Joint, JointKind, Limits};
 use nalgebra::{Translation3, UnitQuaternion};
-use regrasp_base::Diagnostic;
+use regrasp_base::{Diagnostic, InputError};
 use regrasp_base::diagnostic::{did_you_mean, number};
+use regrasp_geometry::frame::{direction, length};
 use regrasp_geometry::{Pose, UnitVector, Vector};
 use roxmltree::Node;
 
 /// Joint types of the URDF form.
 const TYPES: [&str; 6] = ["revolute", "continuous", "prismatic", "fixed", "floating", "planar"];
+
+/// Limits of speed and effort above this limit nothing, in SI units.
+const MAX_BOUND: f64 = 1e9;
+/// With a lower limit of speed a motion of a radian would take longer than eleven days; in radians or metres per second.
+const MIN_VELOCITY: f64 = 1e-6;
+/// Largest limit of a joint's position, in radians or metres: plans hold no larger ones.
+const MAX_POSITION: f64 = 1e6;
 
 /// A joint before its links are known.
 pub(super) struct DraftJoint<'a, 'input> {
@@ -24,17 +33,22 @@ pub(super) struct DraftJoint<'a, 'input> {
     pub limits: Option<Limits>,
 }
 
-/// All joints that can be read; problems go to the reader.
+/// All joints that can be read; problems go to the reader. Errors: too many (`U105`).
 pub(super) fn read_joints<'a, 'input: 'a>(
     reader: &mut Reader<'a>,
     root: Node<'a, 'input>,
-) -> Vec<DraftJoint<'a, 'input>> {
+) -> Result<Vec<DraftJoint<'a, 'input>>, InputError> {
+    // Every joint carries a link of its own.
+    if let Some(node) = children(root, "joint").nth(MAX_LINKS) {
+        let place = reader.place(node);
+        return Err(Diagnostic::new("U105", place, format!("has more than {MAX_LINKS} joints")).into());
+    }
     // Transmissions and sensors hold elements called <joint> too; only those directly below <robot> are joints.
-    children(root, "joint").filter_map(|node| read_joint(reader, node)).collect()
+    Ok(children(root, "joint").filter_map(|node| read_joint(reader, node)).collect())
 }
 
 fn read_joint<'a, 'input: 'a>(reader: &mut Reader<'a>, node: Node<'a, 'input>) -> Option<DraftJoint<'a, 'input>> {
-    let name = reader.required(node, "name", ("joint", ""))?;
+    let name = reader.required_name(node, "name", "joint")?;
     let element = ("joint", name);
     let known = ["origin", "parent", "child", "axis", "calibration", "dynamics", "limit", "mimic", "safety_controller"];
     reader.note_misspelt_children(node, &known, element);
@@ -124,8 +138,7 @@ fn read_axis(reader: &mut Reader, node: Node, name: &str) -> Option<UnitVector> 
         return Some(Vector::x_axis());
     };
     let given = Vector::from(reader.numbers(axis, "xyz", None, ("joint", name))?);
-    let length = given.norm();
-    if length < 1e-9 {
+    let Some(direction) = direction(&given) else {
         let place = reader.attribute_place(axis, "xyz");
         let seen = axis.attribute("xyz").unwrap_or_default();
         reader.found.push(
@@ -134,12 +147,13 @@ fn read_axis(reader: &mut Reader, node: Node, name: &str) -> Option<UnitVector> 
                 .expected("a direction, such as \"0 0 1\""),
         );
         return None;
-    }
+    };
+    let length = length(&given);
     // Axes written with a few digits are never exactly of length one; only a wrong length is worth a word.
     if (length - 1.0).abs() > 1e-3 {
-        reader.note(axis, ("joint", name), format!("axis has length {length}; taken as a direction"));
+        reader.note(axis, ("joint", name), format!("axis has length {}; taken as a direction", number(length)));
     }
-    Some(UnitVector::new_unchecked(given / length))
+    Some(direction)
 }
 
 fn read_limits(reader: &mut Reader, node: Node, name: &str, kind: Option<JointKind>) -> Option<Limits> {
@@ -169,14 +183,25 @@ fn read_limits(reader: &mut Reader, node: Node, name: &str, kind: Option<JointKi
     let [lower] = reader.numbers(limit, "lower", Some([0.0]), element)?;
     let [upper] = reader.numbers(limit, "upper", Some([0.0]), element)?;
     let velocity = read_bound(reader, limit, "velocity", name);
+    let velocity = velocity.and_then(|velocity| likely_velocity(reader, limit, velocity, name));
     let effort = read_bound(reader, limit, "effort", name);
     if lower > upper {
         let place = reader.attribute_place(limit, "lower");
         reader.found.push(
-            Diagnostic::new("U121", place, format!("lower limit {lower} is above upper limit {upper}"))
+            Diagnostic::new("U121", place, format!("lower limit {} is above upper limit {}", number(lower), number(upper)))
                 .element("joint", name)
                 .expected("lower <= upper")
-                .fix(format!("swap them: lower=\"{upper}\" upper=\"{lower}\"")),
+                .fix(format!("swap them: lower=\"{}\" upper=\"{}\"", number(upper), number(lower))),
+        );
+        return None;
+    }
+    if let Some((attribute, far)) = [("lower", lower), ("upper", upper)].into_iter().find(|(_, q)| q.abs() > MAX_POSITION) {
+        let place = reader.attribute_place(limit, attribute);
+        reader.found.push(
+            Diagnostic::new("U124", place, format!("{attribute} limit is {}", number(far)))
+                .element("joint", name)
+                .expected(format!("at most {} in size, in radians or metres", number(MAX_POSITION)))
+                .fix(if word == "revolute" { "type=\"continuous\" if it turns without end" } else { "" }),
         );
         return None;
     }
@@ -190,13 +215,29 @@ fn read_limits(reader: &mut Reader, node: Node, name: &str, kind: Option<JointKi
     Some(Limits { lower, upper, velocity, effort })
 }
 
-/// The highest speed or effort; 0 means "not given" in many files and is taken so, with a note.
+/// The highest speed or effort; 0 means "not given" in many files and is taken so, with a note, as are numbers so large that they
+/// limit nothing.
 fn read_bound(reader: &mut Reader, limit: Node, attribute: &str, name: &str) -> Option<f64> {
     let value = reader.number(limit, attribute, ("joint", name))?;
-    if value > 0.0 {
+    if value > 0.0 && value <= MAX_BOUND {
         return Some(value);
     }
-    reader.note(limit, ("joint", name), format!("{attribute} limit {value} is taken as not given"));
+    reader.note(limit, ("joint", name), format!("{attribute} limit {} is taken as not given", number(value)));
+    None
+}
+
+/// The highest speed, unless no plan would ever end with it. Error: `U123`.
+fn likely_velocity(reader: &mut Reader, limit: Node, velocity: f64, name: &str) -> Option<f64> {
+    if velocity >= MIN_VELOCITY {
+        return Some(velocity);
+    }
+    let place = reader.attribute_place(limit, "velocity");
+    reader.found.push(
+        Diagnostic::new("U123", place, format!("velocity limit is {}", number(velocity)))
+            .element("joint", name)
+            .expected(format!("at least {}, in radians or metres per second", number(MIN_VELOCITY)))
+            .fix("velocity=\"0\" where the limit is not known"),
+    );
     None
 }
 

@@ -4,12 +4,26 @@ use super::joint::DraftJoint;
 use crate::import::xml::{Reader, child};
 use crate::robot::{Joint, JointId, JointKind, Mimic};
 use regrasp_base::Diagnostic;
-use regrasp_base::diagnostic::did_you_mean;
+use regrasp_base::diagnostic::{did_you_mean, number};
 use std::collections::BTreeMap;
+
+/// Multipliers above this and below its inverse, and offsets above it, are no gears of a hand.
+const MAX_COUPLING: f64 = 1e6;
+
+/// What [`check_coupling`] asks.
+pub(crate) const GOOD_COUPLING: &str = "a multiplier of size 1e-6 to 1e6 that is not 0, and an offset of size up to 1e6";
+
+/// What is wrong with the numbers of a coupling.
+pub(crate) fn check_coupling(multiplier: f64, offset: f64) -> Result<(), String> {
+    if !(1.0 / MAX_COUPLING..=MAX_COUPLING).contains(&multiplier.abs()) {
+        return Err(format!("multiplier {}", number(multiplier)));
+    }
+    if offset.abs() > MAX_COUPLING { Err(format!("offset {}", number(offset))) } else { Ok(()) }
+}
 
 /// The joints with their couplings; a joint that follows a follower follows the leader of the chain.
 ///
-/// Reports: unknown leader (`U140`), cycle (`U141`), multiplier 0 (`U142`), limits that leave no position (`U143`),
+/// Reports: unknown leader (`U140`), cycle (`U141`), multiplier 0 or far from 1 (`U142`), limits that leave no position (`U143`),
 /// a leader that cannot move (`U144`).
 pub(super) fn resolve(reader: &mut Reader, mut joints: Vec<Joint>, drafts: &[DraftJoint]) -> Vec<Joint> {
     let index: BTreeMap<String, JointId> =
@@ -63,12 +77,12 @@ fn read_mimic(
         }
         return None;
     };
-    if multiplier == 0.0 {
+    if let Err(problem) = check_coupling(multiplier, offset) {
         reader.found.push(
-            Diagnostic::new("U142", place, format!("follows joint \"{leader}\" with multiplier 0"))
+            Diagnostic::new("U142", place, format!("follows joint \"{leader}\" with {problem}"))
                 .element("joint", draft.name)
-                .expected("a multiplier that is not 0")
-                .fix("type=\"fixed\" if it does not move"),
+                .expected(GOOD_COUPLING)
+                .fix(if multiplier == 0.0 { "type=\"fixed\" if it does not move" } else { "" }),
         );
         return None;
     }
@@ -126,8 +140,12 @@ fn refuse_empty_ranges(reader: &mut Reader, joints: &[Joint], drafts: &[DraftJoi
         if high < own.lower || low > own.upper {
             let place = reader.place(draft.node);
             let problem = format!(
-                "follows joint \"{}\" to {low}..{high}, outside its own limits {}..{}",
-                leader.name, own.lower, own.upper
+                "follows joint \"{}\" to {}..{}, outside its own limits {}..{}",
+                leader.name,
+                number(low),
+                number(high),
+                number(own.lower),
+                number(own.upper)
             );
             reader.found.push(
                 Diagnostic::new("U143", place, problem).element("joint", draft.name).expected("ranges that overlap"),

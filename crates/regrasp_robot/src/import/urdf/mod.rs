@@ -10,17 +10,24 @@ mod mimic;
 mod tree;
 mod visual;
 
+pub(crate) use mimic::{GOOD_COUPLING, check_coupling};
+
 use super::hand_file::{LoadOptions, LoadedInput};
+use super::resolve::Hints;
 use super::xml::{Reader, children, parse};
 use crate::robot::{Link, Robot};
+use regrasp_base::diagnostic::{Lines, bad_name};
 use regrasp_base::{Diagnostic, InputError, files};
 use regrasp_geometry::TriangleMesh;
+use regrasp_geometry::import::{MAX_TRIANGLES, too_many};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Most links in a robot.
+/// Most links in a robot, and most joints.
 const MAX_LINKS: usize = 1_000;
+/// Names of missing mesh files for which files of the same name are looked for elsewhere.
+const MAX_HINTS: usize = 20;
 
 /// A robot with what it was read from.
 #[derive(Debug, Clone)]
@@ -41,7 +48,7 @@ pub fn load_robot(path: &Path, options: &LoadOptions) -> Result<LoadedRobot, Inp
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let input = LoadedInput { role: "urdf".into(), name, path: path.to_owned(), sha256: files::sha256(&bytes) };
     let text = files::text_of(path, bytes)?;
-    let mut meshes = Meshes { options: options.clone(), read: BTreeMap::new(), inputs: vec![input] };
+    let mut meshes = Meshes { options: options.clone(), read: BTreeMap::new(), n_triangles: 0, n_missed: 0, inputs: vec![input] };
     let (robot, notes) = parse_robot(path, &text, options.lenient, &mut meshes)?;
     Ok(LoadedRobot { robot, inputs: meshes.inputs, notes })
 }
@@ -55,22 +62,26 @@ pub(crate) fn parse_robot(
 ) -> Result<(Robot, Vec<String>), InputError> {
     let document = parse(path, text)?;
     let root = document.root_element();
-    let mut reader = Reader::new(path, lenient);
+    let lines = Lines::of(text);
+    let mut reader = Reader::new(path, &lines, lenient);
     reader.refuse_other_root(root)?;
     reader.note_misspelt_children(root, &["link", "joint", "material", "transmission", "gazebo"], ("robot", ""));
     let name = root.attribute("name").unwrap_or_default().to_owned();
+    if let Some(diagnostic) = bad_name(|| reader.attribute_place(root, "name"), "robot", &name) {
+        reader.found.push(diagnostic);
+    }
 
     let mut links = Vec::new();
     let mut link_nodes = Vec::new();
     for node in children(root, "link") {
-        let Some(link_name) = reader.required(node, "name", ("link", "")) else { continue };
+        let Some(link_name) = reader.required_name(node, "name", "link") else { continue };
         if links.len() == MAX_LINKS {
             let place = reader.place(node);
             return Err(Diagnostic::new("U105", place, format!("has more than {MAX_LINKS} links")).into());
         }
         reader.note_misspelt_children(node, &["inertial", "visual", "collision"], ("link", link_name));
         let collision = geometry::read_collisions(&mut reader, node, link_name, meshes);
-        let visual = visual::read_visuals(path, node, link_name);
+        let visual = visual::read_visuals(path, &lines, node, link_name);
         links.push(Link { name: link_name.to_owned(), collision, visual, parent_joint: None });
         link_nodes.push(node);
     }
@@ -78,14 +89,13 @@ pub(crate) fn parse_robot(
         let place = reader.place(root);
         reader.found.push(Diagnostic::new("U130", place, "has no <link>").expected("at least one link with a name"));
     }
-    let draft_joints = joint::read_joints(&mut reader, root);
+    let draft_joints = joint::read_joints(&mut reader, root)?;
     tree::refuse_duplicates(&mut reader, "link", links.iter().map(|l| l.name.as_str()).zip(link_nodes.iter().copied()));
     tree::refuse_duplicates(&mut reader, "joint", draft_joints.iter().map(|j| (j.name, j.node)));
     let (joints, root_link) = tree::assemble(&mut reader, root, &mut links, &link_nodes, &draft_joints);
     let joints = mimic::resolve(&mut reader, joints, &draft_joints);
     let joints = joint::freeze_unmoving(&mut reader, joints, &draft_joints);
-    let Reader { found, notes, .. } = reader;
-    let root_link = found.into_result(root_link)?;
+    let (root_link, notes) = reader.finish(root_link)?;
     // Without a problem there is a root: `assemble` reports its absence.
     let root = root_link.ok_or_else(|| Diagnostic::new("U134", regrasp_base::Place::file(path), "has no root link"))?;
     Ok((Robot { name, links, joints, root }, notes))
@@ -95,6 +105,10 @@ pub(crate) fn parse_robot(
 pub(crate) struct Meshes {
     options: LoadOptions,
     read: BTreeMap<PathBuf, Result<Arc<TriangleMesh>, InputError>>,
+    /// Triangles of all of them.
+    n_triangles: usize,
+    /// Names that led to no file so far.
+    n_missed: usize,
     /// The URDF and every mesh read so far.
     inputs: Vec<LoadedInput>,
 }
@@ -106,23 +120,28 @@ impl Meshes {
         name: &str,
         model: &Path,
         place: regrasp_base::Place,
-        notes: &mut Vec<String>,
+        reader: &mut Reader,
     ) -> Result<Arc<TriangleMesh>, InputError> {
-        let resolved = super::resolve::resolve(name, model, place, &self.options.resolve)?;
-        for note in resolved.notes {
-            if !notes.contains(&note) {
-                notes.push(note);
-            }
-        }
+        let hints = if self.n_missed < MAX_HINTS { Hints::SameNameNear } else { Hints::None };
+        let resolved = super::resolve::resolve_with(name, model, place, &self.options.resolve, hints);
+        self.n_missed += usize::from(resolved.is_err());
+        let resolved = resolved?;
+        resolved.notes.into_iter().for_each(|note| reader.note_once(note));
         if let Some(known) = self.read.get(&resolved.path) {
             return known.clone();
         }
+        self.options.check_time(&resolved.path)?;
         let bytes = files::read(&resolved.path);
         let mesh = bytes.and_then(|bytes| {
             let sha256 = files::sha256(&bytes);
             let input = LoadedInput { role: "mesh".into(), name: name.to_owned(), path: resolved.path.clone(), sha256 };
             self.inputs.push(input);
-            regrasp_geometry::import::read_mesh(&resolved.path, &bytes).map(Arc::new)
+            let mesh = regrasp_geometry::import::read_mesh(&resolved.path, &bytes)?;
+            self.n_triangles += mesh.triangles().len();
+            match self.n_triangles > MAX_TRIANGLES {
+                true => Err(too_many(model, self.n_triangles)),
+                false => Ok(Arc::new(mesh)),
+            }
         });
         self.read.insert(resolved.path, mesh.clone());
         mesh

@@ -4,21 +4,22 @@ use super::geometry::{SHAPES, read_origin, read_primitive};
 use crate::import::resolve::{ResolveOptions, resolve};
 use crate::import::xml::{Reader, child, children};
 use crate::robot::{Visual, VisualGeometry, VisualMesh};
+use regrasp_base::diagnostic::Lines;
 use regrasp_base::{Diagnostic, InputError, Place, files};
 use regrasp_geometry::{TriangleMesh, Vector};
 use roxmltree::Node;
 use std::path::Path;
 
 /// The visual elements of the link at `node` of the robot file `model`.
-pub(super) fn read_visuals(model: &Path, node: Node, link: &str) -> Vec<Visual> {
-    children(node, "visual").filter_map(|visual| read_visual(model, visual, link)).collect()
+pub(super) fn read_visuals(model: &Path, lines: &Lines, node: Node, link: &str) -> Vec<Visual> {
+    children(node, "visual").filter_map(|visual| read_visual(model, lines, visual, link)).collect()
 }
 
 /// None for an element without a pose or a geometry that could be placed.
-fn read_visual(model: &Path, visual: Node, link: &str) -> Option<Visual> {
+fn read_visual(model: &Path, lines: &Lines, visual: Node, link: &str) -> Option<Visual> {
     let element = ("link", link);
     // What is found wrong here stays here.
-    let mut reader = Reader::new(model, true);
+    let mut reader = Reader::new(model, lines, true);
     let parent_from_visual = read_origin(&mut reader, visual, element)?;
     let geometry = child(visual, "geometry")?;
     let known = geometry.children().find(|c| c.is_element() && SHAPES.contains(&c.tag_name().name()));
