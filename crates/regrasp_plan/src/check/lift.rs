@@ -93,6 +93,9 @@ impl Search<'_> {
             let mut step = Step::new(bodies, from, to);
             let speed = pairs.iter().map(|pair| step.speed(pair.a)).fold(0.0, f64::max);
             let n_samples = ((speed / self.settings.resolution).ceil() as usize).clamp(1, MOST_SAMPLES);
+            if !self.log.work.spend(n_samples as u64, "how fingertips lift off and land") {
+                return None;
+            }
             for sample in 0..=n_samples {
                 let t = match direction {
                     Direction::Forward => sample as f64 / n_samples as f64,

@@ -16,6 +16,7 @@ use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, Plan, SegmentKind, Waypoint};
 use nalgebra::{Matrix4, Rotation3, UnitQuaternion};
 use regrasp_geometry::{Point, Pose, Shape, Vector};
+use std::cell::Cell;
 
 /// Pieces after which no finer sum is made; what is then unknown counts as slip.
 const MOST_PIECES: usize = 128;
@@ -27,6 +28,10 @@ const TURN_PIECES: usize = 8;
 /// Motion that is too small to be divided further when it cannot be told whether the tip is on the surface, as a share
 /// of the contact tolerance.
 const SMALLEST_PIECE: f64 = 1e-3;
+
+/// Configurations of a step after which it counts as not shown that the tip is on the surface; no plan of the planner needs a
+/// hundredth.
+const MOST_LOOKED: u64 = 100_000;
 
 /// What rolling amounts to in a plan.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -61,6 +66,9 @@ pub fn check_rolling(shape: &Shape, model: &Model, plan: &Plan, settings: &Check
                         (error, fraction) = (between, at);
                     }
                     let slip = roll.slip(UNKNOWN_SHARE * slip_tolerance);
+                    if !log.work.spend(roll.looked(), "fingertips that roll") {
+                        return rolled;
+                    }
                     sum += slip;
                     if slip > worst.0 {
                         worst = (slip, w);
@@ -105,6 +113,8 @@ pub struct Roll<'a> {
     speed: f64,
     /// Bound of the second derivative of the centre in the object frame.
     acceleration: f64,
+    /// Configurations looked at.
+    looked: Cell<u64>,
 }
 
 /// A tip over the surface, in the object frame.
@@ -138,10 +148,16 @@ impl<'a> Roll<'a> {
         let inside = finger.surface.curvature_radii().map_or(0.0, |[_, flattest]| 2.0 * flattest);
         let patch = Patch::near(shape, &start, finger.radius + inside + 2.0 * tolerance + speed);
         let speed = speed_in_object(finger, from, to);
-        Roll { finger, from, to, world_from_object, patch, speed, acceleration }
+        Roll { finger, from, to, world_from_object, patch, speed, acceleration, looked: Cell::new(0) }
+    }
+
+    /// Configurations looked at so far.
+    pub fn looked(&self) -> u64 {
+        self.looked.get()
     }
 
     fn object_from_link(&self, t: f64) -> Matrix4<f64> {
+        self.looked.set(self.looked.get() + 1);
         let joints: Vec<f64> = self.from.joints.iter().zip(&self.to.joints).map(|(a, b)| a + t * (b - a)).collect();
         let [start, end] = &self.world_from_object;
         pose_between(start, end, t).inverse().to_homogeneous() * self.finger.path.world_from_link(&joints)
@@ -197,6 +213,9 @@ impl<'a> Roll<'a> {
         };
         let mut pending = vec![(known(0.0), known(1.0))];
         while let Some((from, to)) = pending.pop() {
+            if self.looked() > MOST_LOOKED {
+                return (f64::INFINITY, from.0);
+            }
             let span = to.0 - from.0;
             let (way, stray) = match self.finger.surface {
                 TipSurface::Ball => ((to.1 - from.1).norm(), self.acceleration * span * span / 8.0),

@@ -241,6 +241,9 @@ impl Track<'_> {
             if let Some(next) = self.segment.waypoints.get(w + 1) {
                 let roll = Roll::new(self.finger, waypoint, next, shape, self.tolerance);
                 let (between, fraction) = roll.off_surface(self.tolerance);
+                if !self.log.work.spend(roll.looked(), "fingertips in tracking") {
+                    break;
+                }
                 note(between, fraction);
             }
             let off = self.point_error(waypoint).unwrap_or(0.0);
@@ -281,7 +284,11 @@ impl Track<'_> {
                 false => unknown,
             };
             // A tip that is nowhere near is off its contact.
-            let (Some((slide, unknown)), Some(turning)) = (roll.sliding(allowed), roll.turning()) else { continue };
+            let (slid, turned) = (roll.sliding(allowed), roll.turning());
+            if !self.log.work.spend(roll.looked(), "modes of contacts in tracking") {
+                return;
+            }
+            let (Some((slide, unknown)), Some(turning)) = (slid, turned) else { continue };
             self.add_up(mode, slide.norm() + unknown, &turning, w);
             let span = to.time - from.time;
             if span <= 0.0 {
@@ -394,7 +401,12 @@ pub fn check_reach(reach: f64, model: &Model, plan: &Plan, settings: &CheckSetti
     for (s, segment) in plan.segments.iter().enumerate() {
         for finger in &model.fingers {
             let steps = segment.waypoints.windows(2).enumerate();
-            let far = steps.filter_map(|(w, ends)| Some((w, too_far(finger, &ends[0], &ends[1], limit)?))).next();
+            let work = &mut log.work;
+            let far = steps.map_while(|(w, ends)| {
+                let (far, looked) = too_far(finger, &ends[0], &ends[1], limit);
+                work.spend(looked, "how far fingertips reach").then_some((w, far))
+            });
+            let far = far.filter_map(|(w, far)| Some((w, far?))).next();
             let Some((w, (distance, t))) = far else { continue };
             let message = format!(
                 "the tip of finger \"{}\" is {distance:.6} m from where it rests, {reach:.6} m are allowed",
@@ -407,8 +419,9 @@ pub fn check_reach(reach: f64, model: &Model, plan: &Plan, settings: &CheckSetti
     }
 }
 
-/// Where in a step the tip's centre is farther than `limit` from where it rests, or may be, and how far.
-fn too_far(finger: &FingerModel, from: &Waypoint, to: &Waypoint, limit: f64) -> Option<(f64, f64)> {
+/// Where in a step the tip's centre is farther than `limit` from where it rests, or may be, and how far; and the number of
+/// configurations looked at.
+fn too_far(finger: &FingerModel, from: &Waypoint, to: &Waypoint, limit: f64) -> (Option<(f64, f64)>, u64) {
     let acceleration = finger.path.rates(&finger.center, 0.0, &from.joints, &to.joints).acceleration;
     let distance = |t: f64| {
         let joints: Vec<f64> = from.joints.iter().zip(&to.joints).map(|(a, b)| a + t * (b - a)).collect();
@@ -416,9 +429,10 @@ fn too_far(finger: &FingerModel, from: &Waypoint, to: &Waypoint, limit: f64) -> 
     };
     let ends = [0.0, 1.0].map(|t| (distance(t), t));
     let mut pending = vec![ends];
+    let mut looked = 2;
     while let Some([first, second]) = pending.pop() {
         if let Some(&far) = [first, second].iter().find(|(distance, _)| !(*distance <= limit)) {
-            return Some(far);
+            return (Some(far), looked);
         }
         let span = second.1 - first.1;
         let most = first.0.max(second.0) + acceleration * span * span / 8.0;
@@ -426,13 +440,14 @@ fn too_far(finger: &FingerModel, from: &Waypoint, to: &Waypoint, limit: f64) -> 
             continue;
         }
         if span < SMALLEST_SPAN {
-            return Some((most, first.1));
+            return (Some((most, first.1)), looked);
         }
         let middle = 0.5 * (first.1 + second.1);
         let middle = (distance(middle), middle);
+        looked += 1;
         pending.extend([[middle, second], [first, middle]]);
     }
-    None
+    (None, looked)
 }
 
 /// Share of a step that is not divided further.
