@@ -199,7 +199,7 @@ pub(crate) fn plan_only(problem: Problem, settings: &RunSettings) -> (Row, Optio
 /// Enters what a plan is like: its motions, its floor and, if asked, the checker's verdict.
 pub(crate) fn measure(problem: Problem, plan: &Plan, settings: &InHandSettings, asked: Judge, row: &mut Row) {
     row.transfers = plan.statistics.transfers;
-    row.relocations = plan.statistics.relocations;
+    row.relocations = plan.n_relocations();
     if problem.query.task == TaskKind::InHand {
         match floor(problem.scene, plan, settings) {
             Ok(seconds) => row.floor_s = Some(seconds),

@@ -140,7 +140,10 @@ mod tests {
     fn one_file_for_two_outputs_is_refused_however_it_is_spelled() {
         let folder = tempfile::tempdir().unwrap();
         let outputs = |a: &str, b: &str| {
-            Outputs::new([Output::new("--output", &folder.path().join(a)), Output::new("--report", &folder.path().join(b))])
+            Outputs::new([
+                Output::new("--output", &folder.path().join(a)),
+                Output::new("--report", &folder.path().join(b)),
+            ])
         };
         assert!(outputs("o.json", "./o.json").is_err());
         assert!(outputs("o.json", "o.html").is_ok());

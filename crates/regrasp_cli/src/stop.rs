@@ -33,9 +33,7 @@ impl Stop {
     /// A file that cannot be written (`F003`).
     pub fn unwritable(path: &Path, error: &std::io::Error) -> Stop {
         Stop::BadInput(
-            Diagnostic::new("F003", Place::file(path), format!("cannot be written: {error}"))
-                .fix(fix_of(error))
-                .into(),
+            Diagnostic::new("F003", Place::file(path), format!("cannot be written: {error}")).fix(fix_of(error)).into(),
         )
     }
 

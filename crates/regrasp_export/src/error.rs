@@ -10,7 +10,9 @@ pub const LATEST_TIME: f64 = i32::MAX as f64;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ExportError {
     /// A format gives every text of an array the width of the longest.
-    #[error("{what} need {characters} characters, the longest ({longest}) for each of them; at most {MOST_CHARACTERS} are written")]
+    #[error(
+        "{what} need {characters} characters, the longest ({longest}) for each of them; at most {MOST_CHARACTERS} are written"
+    )]
     TextTooLong {
         /// Which texts.
         what: &'static str,
@@ -21,8 +23,8 @@ pub enum ExportError {
     },
     /// Controllers demand times that increase, and a point that is left out is a motion that is left out.
     #[error(
-        "segment {segment}, waypoint {waypoint} is at {time} s, {}",
-        before.map_or("which no trajectory holds".to_owned(), |before| format!("after a waypoint at {before} s"))
+        "segment {segment}, waypoint {waypoint} is at {time:?} s, {}",
+        before.map_or("which no trajectory holds".to_owned(), |before| format!("after a waypoint at {before:?} s"))
     )]
     WrongTime {
         /// Index of the segment.
@@ -51,10 +53,13 @@ impl ExportError {
             ExportError::WrongTime { before: None, .. } => {
                 ("a time from 0 to 2147483647 s", "plan again, or correct the times")
             }
-            ExportError::WrongTime { .. } => {
-                ("times that increase within a segment by 1 ns or more, and never decrease", "plan again, or correct the times")
+            ExportError::WrongTime { .. } => (
+                "times that increase within a segment by 1 ns or more, and never decrease",
+                "plan again, or correct the times",
+            ),
+            ExportError::TextTooLong { .. } => {
+                ("names of ordinary length", "shorten the names in the robot file and plan again")
             }
-            ExportError::TextTooLong { .. } => ("names of ordinary length", "shorten the names in the robot file and plan again"),
         }
     }
 }

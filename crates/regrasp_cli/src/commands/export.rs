@@ -63,7 +63,9 @@ pub fn run(arguments: &args::Export, common: &Common, talk: &Talk) -> Result<(),
 /// A plan that a format cannot hold (`C421`, `C422`).
 fn unfit(path: &Path, wrong: &export::ExportError) -> Stop {
     let (expected, fix) = wrong.expected_and_fix();
-    Stop::BadInput(Diagnostic::new(wrong.code(), Place::file(path), wrong.to_string()).expected(expected).fix(fix).into())
+    Stop::BadInput(
+        Diagnostic::new(wrong.code(), Place::file(path), wrong.to_string()).expected(expected).fix(fix).into(),
+    )
 }
 
 /// The MuJoCo model. Errors: the plan is for another hand (`C408`).

@@ -196,9 +196,9 @@ pub fn say_plan(plan: &Plan, seconds: f64, talk: &Talk) {
         return;
     }
     talk.say(format!(
-        "plan   {}, {}, {} waypoints, closure margin {:.4}{}   {}",
+        "plan   {}, {}, {} waypoints, closure margin at least {:.4} (planned){}   {}",
         counted(plan.statistics.transfers as usize, "transfer"),
-        counted(plan.statistics.relocations as usize, "relocation"),
+        counted(plan.n_relocations() as usize, "relocation"),
         grouped(waypoints as u64),
         plan.promises.kept_margin,
         if plan.statistics.cut_by_time { ", cut by the time limit" } else { "" },

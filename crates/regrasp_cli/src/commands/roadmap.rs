@@ -42,7 +42,8 @@ pub fn run(arguments: &args::Roadmap, common: &Common, talk: &Talk) -> Result<()
 /// Builds and saves.
 fn run_build(arguments: &args::RoadmapBuild, common: &Common, talk: &Talk) -> Result<(), Stop> {
     let written = Outputs::new([Output::new("--output", &arguments.output)])?;
-    written.refuse_inputs([&arguments.settings, &arguments.build_settings].into_iter().flatten().map(PathBuf::as_path))?;
+    written
+        .refuse_inputs([&arguments.settings, &arguments.build_settings].into_iter().flatten().map(PathBuf::as_path))?;
     let cancelled = interrupt::flag()?;
     let loaded = load::in_hand_scene(&arguments.scene, ROADMAPS, common, talk)?;
     written.refuse_inputs(loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;

@@ -73,7 +73,7 @@ fn times_that_do_not_increase_are_refused() {
     });
     assert!(backwards.starts_with("segment 0, waypoint 1 is at 9"), "{backwards}");
     let still = wrong(&|plan| plan.segments[0].waypoints[1].time = plan.segments[0].waypoints[0].time);
-    assert_eq!(still, "segment 0, waypoint 1 is at 0 s, after a waypoint at 0 s");
+    assert_eq!(still, "segment 0, waypoint 1 is at 0.0 s, after a waypoint at 0.0 s");
     let late = wrong(&|plan| plan.segments.last_mut().unwrap().waypoints.last_mut().unwrap().time = 1e300);
     assert!(late.ends_with("which no trajectory holds"), "{late}");
     wrong(&|plan| plan.segments[0].waypoints[0].time = -1.0);

@@ -65,6 +65,8 @@ pub fn check_collision(
                 for (t0, t1, floor) in pieces(w, if is_moving_tip { free } else { None }, may_touch, tolerance, apart) {
                     match certify(&mut step, pair, (t0, t1), track.bound, floor, settings.resolution) {
                         Ok(bound) => track.bound = bound,
+                        // Cut, and not too near.
+                        Err(_) if step.n_pieces > step.most_pieces => break,
                         Err(breach) => {
                             log.push(violation(bodies, pair, s, w, floor, &breach));
                             *track = Track { bound: f64::NEG_INFINITY, reported_in: Some(s) };

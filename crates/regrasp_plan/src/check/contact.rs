@@ -93,13 +93,7 @@ pub fn error_at(finger: &FingerModel, waypoint: &Waypoint, f: usize) -> f64 {
 }
 
 /// Upper bound of the error over the closed step, where it is largest, and the number of samples taken.
-fn error_between(
-    finger: &FingerModel,
-    from: &Waypoint,
-    to: &Waypoint,
-    f: usize,
-    tolerance: f64,
-) -> (f64, f64, usize) {
+fn error_between(finger: &FingerModel, from: &Waypoint, to: &Waypoint, f: usize, tolerance: f64) -> (f64, f64, usize) {
     let Some(contact) = contact_of(&from.contacts[f]) else { return (f64::INFINITY, 0.0, 0) };
     let (start, end) = (Pose::from(&from.world_from_object), Pose::from(&to.world_from_object));
     // Between samples no more than a twentieth of the tolerance may be unknown.

@@ -47,6 +47,9 @@ pub fn free_part(
         true => Some((n_steps - 1, 1.0)),
         false => search.run(last, (0..n_steps).rev().map(|w| (w, Direction::Backward)).collect()),
     };
+    if search.log.work.cut().is_some() {
+        return None;
+    }
     let (Some(lifted), Some(landing)) = (lifted, landing) else {
         search.report(Moment::at(s, 0), "never gets clear of the object".into(), 0.0, settings.lift_clearance);
         return None;

@@ -29,10 +29,10 @@ pub mod find_scene;
 pub mod forces;
 /// The checker's own forward kinematics and motion bounds.
 pub mod kinematics;
-/// What is too large to be judged.
-pub mod limits;
 /// Lifting and landing of moving fingertips.
 pub mod lift;
+/// What is too large to be judged.
+pub mod limits;
 /// The scene as the checker sees it.
 pub mod model;
 /// One step between two waypoints, and certificates of separation.
@@ -334,14 +334,7 @@ fn judge(
 }
 
 /// Fingertips on the object, at and between waypoints.
-fn judge_tips(
-    scene: &Scene,
-    plan: &Plan,
-    settings: &CheckSettings,
-    model: &Model,
-    log: &mut Log,
-    report: &mut Report,
-) {
+fn judge_tips(scene: &Scene, plan: &Plan, settings: &CheckSettings, model: &Model, log: &mut Log, report: &mut Report) {
     let rolled = rolling::check_rolling(&scene.object.shape, model, plan, settings, log);
     let tracked = tracking::check_tracking(&scene.object.shape, model, plan, settings, log);
     let held = contact::check_tips(model, plan, log);

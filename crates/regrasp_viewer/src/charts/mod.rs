@@ -83,6 +83,6 @@ fn title(plan: &regrasp_plan::Plan) -> String {
     format!(
         "{angle:.0}\u{b0} in {} and {}",
         counted(plan.statistics.transfers, "transfer"),
-        counted(plan.statistics.relocations, "relocation")
+        counted(plan.n_relocations(), "relocation")
     )
 }
