@@ -359,7 +359,8 @@ mod tests {
         assert_eq!(printable_line(hostile), "a\u{fffd}check ACCEPTED\u{fffd}\u{fffd}\u{fffd}");
         assert_eq!(printable(hostile).lines().count(), 2);
         let place = Place::line("a\nb", 1);
-        let diagnostic = Diagnostic::new("U120", place, hostile).element("joint", hostile).expected(hostile).fix(hostile);
+        let diagnostic =
+            Diagnostic::new("U120", place, hostile).element("joint", hostile).expected(hostile).fix(hostile);
         let text = diagnostic.to_string();
         assert_eq!(text.lines().count(), 2, "the diagnostic and its fix: {text}");
         assert!(fault_of_name(hostile).is_some_and(|fault| fault.contains("U+000A")));

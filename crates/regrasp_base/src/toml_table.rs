@@ -3,7 +3,7 @@
 //!
 //! Hand files and scene files are read by it; each has codes of its own (`toml_table::Codes`). V001: a number is not finite.
 
-use crate::diagnostic::{Diagnostic, Diagnostics, Place, Lines, bad_name, did_you_mean, number, printable_line};
+use crate::diagnostic::{Diagnostic, Diagnostics, Lines, Place, bad_name, did_you_mean, number, printable_line};
 use std::ops::Range;
 use std::path::Path;
 use toml::Spanned;

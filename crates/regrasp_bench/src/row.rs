@@ -3,8 +3,8 @@
 use cpu_time::{ProcessTime, ThreadTime};
 use regrasp_base::Budget;
 use regrasp_plan::check::{CheckSettings, Level, check};
-use regrasp_plan::{Plan, format};
 use regrasp_plan::plan::Improvement;
+use regrasp_plan::{Plan, format};
 use regrasp_planners::in_hand::{NotProven, validate_once};
 use regrasp_planners::{Failure, InHandSettings, PlannerSettings, Progress, TrackingMethod, TrackingSettings, plan};
 use regrasp_scene::{InHandQuery, Scene, TaskKind};
@@ -203,7 +203,7 @@ pub(crate) fn plan_only(problem: Problem, settings: &RunSettings) -> (Row, Optio
 /// Enters what a plan is like: its motions, its floor and, if asked, the checker's verdict.
 pub(crate) fn measure(problem: Problem, plan: &Plan, settings: &InHandSettings, asked: Judge, row: &mut Row) {
     row.transfers = plan.statistics.transfers;
-    row.relocations = plan.statistics.relocations;
+    row.relocations = plan.n_relocations();
     if problem.query.task == TaskKind::InHand {
         match floor(problem.scene, plan, settings) {
             Ok(seconds) => row.floor_s = Some(seconds),

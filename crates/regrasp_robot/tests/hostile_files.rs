@@ -39,7 +39,8 @@ fn nothing_hides_deep_nesting_from_the_guard() {
     }
     // What is no nesting is none: tags in comments, character data, values and instructions.
     let tags = "<a>".repeat(100);
-    let flat = format!("<?x {tags}?><robot name='r' note='>'><!-- {tags} --><link name='a'/><![CDATA[{tags}]]></robot>");
+    let flat =
+        format!("<?x {tags}?><robot name='r' note='>'><!-- {tags} --><link name='a'/><![CDATA[{tags}]]></robot>");
     assert_eq!(robot(&flat).unwrap(), Vec::<String>::new());
     assert_eq!(first_code(robot("<!DOCTYPE robot [ <!ENTITY a 'b'> ]><robot/>")), "U104");
     assert_eq!(first_code(robot("<robot><!ELEMENT></robot>")), "U100");
@@ -78,7 +79,8 @@ fn a_megabyte_of_faults_is_read_in_time_listed_in_part_and_counted() {
         let mesh = |i| format!("<collision><geometry><mesh filename='{name}{i}/a.obj'/></geometry></collision>\n");
         assert_eq!(first_code(robot(&link(repeated(12_000, mesh)))), "U101");
     }
-    let joints = repeated(20_000, |i| format!("<joint name='j{i}' type='fixed'><parent link='x'/><child link='y'/></joint>"));
+    let joints =
+        repeated(20_000, |i| format!("<joint name='j{i}' type='fixed'><parent link='x'/><child link='y'/></joint>"));
     assert_eq!(first_code(robot(&format!("<robot name='r'><link name='a'/>{joints}</robot>"))), "U105");
 }
 
@@ -99,7 +101,8 @@ fn write_hand(folder: &Path, n_fingers: usize, n_joints: usize, n_followers: usi
             );
             parent = link;
         }
-        let _ = write!(hand, "[[fingers]]\nname = \"f{finger}\"\ntip_link = \"{parent}\"\ntip = {{ shape = \"point\" }}\n");
+        let _ =
+            write!(hand, "[[fingers]]\nname = \"f{finger}\"\ntip_link = \"{parent}\"\ntip = {{ shape = \"point\" }}\n");
     }
     fs::write(folder.join("hand.urdf"), urdf + "</robot>").unwrap();
     let path = folder.join("hand.toml");
@@ -109,13 +112,9 @@ fn write_hand(folder: &Path, n_fingers: usize, n_joints: usize, n_followers: usi
 
 #[test]
 fn hands_of_more_fingers_or_joints_than_planners_have_room_for_are_refused() {
-    for (n_fingers, n_joints, n_followers, code) in [
-        (6, 2, 0, ""),
-        (7, 2, 0, "U221"),
-        (2, 12, 4, ""),
-        (2, 13, 0, "U222"),
-        (2, 12, 5, "U222"),
-    ] {
+    for (n_fingers, n_joints, n_followers, code) in
+        [(6, 2, 0, ""), (7, 2, 0, "U221"), (2, 12, 4, ""), (2, 13, 0, "U222"), (2, 12, 5, "U222")]
+    {
         let folder = tempfile::tempdir().unwrap();
         let path = write_hand(folder.path(), n_fingers, n_joints, n_followers);
         for path in [path, folder.path().join("hand.urdf")] {
@@ -141,7 +140,8 @@ fn a_megabyte_of_names_that_do_not_exist_is_read_in_time() {
     fs::write(folder.path().join("hand.urdf"), urdf + "</robot>").unwrap();
     let hand = fs::read_to_string(&path).unwrap();
     let pairs = repeated(25_000, |i| format!("[\"a_lynk_{i}\", \"another_lynk_{i}\"],\n"));
-    fs::write(&path, hand.replacen("[[fingers]]", &format!("srdf = \"hand.srdf\"\nallow = [{pairs}]\n[[fingers]]"), 1)).unwrap();
+    fs::write(&path, hand.replacen("[[fingers]]", &format!("srdf = \"hand.srdf\"\nallow = [{pairs}]\n[[fingers]]"), 1))
+        .unwrap();
     let disabled = repeated(15_000, |i| format!("<disable_collisions link1='a_lynk_{i}' link2='b_lynk_{i}'/>\n"));
     fs::write(folder.path().join("hand.srdf"), format!("<robot name='r'>{disabled}</robot>")).unwrap();
     let started = Instant::now();
@@ -166,7 +166,8 @@ fn names_that_drive_a_terminal_or_fill_it_are_refused() {
     }
     assert!(robot(&link(&"ü".repeat(256))).is_ok());
     // Names that are asked for and do not exist are shown in part.
-    let joint = format!("<joint name='j' type='fixed'><parent link='{}'/><child link='a'/></joint>", "n".repeat(1_000_000));
+    let joint =
+        format!("<joint name='j' type='fixed'><parent link='{}'/><child link='a'/></joint>", "n".repeat(1_000_000));
     let error = robot(&format!("<robot name='r'><link name='a'/>{joint}</robot>")).unwrap_err();
     assert_eq!(error.diagnostics[0].code, "U132");
     assert!(error.to_string().len() < 4_000, "{}", error.to_string().len());
@@ -213,7 +214,9 @@ fn axes_of_any_length_are_directions() {
 #[test]
 fn limits_that_no_plan_can_hold_are_refused_or_taken_as_not_given() {
     let limit = |text: &str| joint_of(&format!("<axis xyz='0 0 1'/><limit {text}/>"));
-    for (velocity, expected) in [("4", Some(4.0)), ("1e308", None), ("1e9", Some(1e9)), ("0", None), ("1e-6", Some(1e-6))] {
+    for (velocity, expected) in
+        [("4", Some(4.0)), ("1e308", None), ("1e9", Some(1e9)), ("0", None), ("1e-6", Some(1e-6))]
+    {
         let joint = limit(&format!("lower='-1' upper='1' effort='{velocity}' velocity='{velocity}'")).unwrap();
         let limits = joint.limits.unwrap();
         assert_eq!((limits.velocity, limits.effort), (expected, expected), "{velocity}");
@@ -224,7 +227,8 @@ fn limits_that_no_plan_can_hold_are_refused_or_taken_as_not_given() {
     assert_eq!(limit("lower='-1e300' upper='1'").unwrap_err(), "U124");
     assert_eq!(limit("lower='-1' upper='1.1e6'").unwrap_err(), "U124");
     assert!(limit("lower='-1e6' upper='1e6'").is_ok());
-    for coupling in ["multiplier='1e7'", "multiplier='1e-320'", "multiplier='-1e-7'", "offset='1e7'", "multiplier='0'"] {
+    for coupling in ["multiplier='1e7'", "multiplier='1e-320'", "multiplier='-1e-7'", "offset='1e7'", "multiplier='0'"]
+    {
         let inside = format!("<axis xyz='0 0 1'/><limit lower='-1e6' upper='1e6'/><mimic joint='j' {coupling}/>");
         assert_eq!(joint_of(&inside).unwrap_err(), "U142", "{coupling}");
     }

@@ -1,9 +1,10 @@
 //! `regrasp growth`: how loading and planning grow with fingers, triangles, obstacles and threads.
 
 use super::bench::{make_folder_of, say_row};
-use super::plan::{available_threads, refuse_unwritable};
+use super::plan::available_threads;
 use crate::args;
 use crate::interrupt;
+use crate::outputs::refuse_unwritable;
 use crate::stop::Stop;
 use crate::talk::{Talk, duration, grouped};
 use regrasp::InHandSettings;
@@ -143,5 +144,8 @@ fn write(curve: Curve, rows: &[GrowthRow], folder: &Path, talk: &Talk) -> Result
         files::write_atomic(&path, text.as_bytes()).map_err(|error| Stop::unwritable(&path, &error))?;
         talk.say(format!("wrote  {}", path.display()));
     }
-    if talk.is_json() { Ok(()) } else { talk.data(&table(curve, rows)) }
+    if !talk.is_json() {
+        talk.data(&table(curve, rows));
+    }
+    Ok(())
 }

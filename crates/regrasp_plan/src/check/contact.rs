@@ -30,6 +30,7 @@ pub fn check_tips(model: &Model, plan: &Plan, log: &mut Log) -> f64 {
     for (s, segment) in plan.segments.iter().enumerate().filter(|(_, one)| one.kind != SegmentKind::Tracking) {
         let moving = moving_finger(model, segment);
         for (f, finger) in model.fingers.iter().enumerate() {
+            let mut samples = 0;
             let mut report = |error: f64, at: Moment| {
                 largest = largest.max(error);
                 if error > tolerance {
@@ -49,11 +50,15 @@ pub fn check_tips(model: &Model, plan: &Plan, log: &mut Log) -> f64 {
                     continue;
                 };
                 if holds(waypoint, f) && holds(next, f) {
-                    let (error, fraction) = error_between(finger, waypoint, next, f, tolerance);
+                    let (error, fraction, looked) = error_between(finger, waypoint, next, f, tolerance);
+                    samples += looked as u64;
                     if report(error, Moment { segment: s, waypoint: w, fraction }) {
                         break;
                     }
                 }
+            }
+            if !log.work.spend(samples, "fingertips on their contacts") {
+                return largest;
             }
         }
     }
@@ -87,9 +92,9 @@ pub fn error_at(finger: &FingerModel, waypoint: &Waypoint, f: usize) -> f64 {
     error(finger, &waypoint.joints, &Pose::from(&waypoint.world_from_object), &contact)
 }
 
-/// Upper bound of the error over the closed step, and where it is largest.
-fn error_between(finger: &FingerModel, from: &Waypoint, to: &Waypoint, f: usize, tolerance: f64) -> (f64, f64) {
-    let Some(contact) = contact_of(&from.contacts[f]) else { return (f64::INFINITY, 0.0) };
+/// Upper bound of the error over the closed step, where it is largest, and the number of samples taken.
+fn error_between(finger: &FingerModel, from: &Waypoint, to: &Waypoint, f: usize, tolerance: f64) -> (f64, f64, usize) {
+    let Some(contact) = contact_of(&from.contacts[f]) else { return (f64::INFINITY, 0.0, 0) };
     let (start, end) = (Pose::from(&from.world_from_object), Pose::from(&to.world_from_object));
     // Between samples no more than a twentieth of the tolerance may be unknown.
     let allowed = (0.05 * tolerance).max(1e-9);
@@ -118,7 +123,7 @@ fn error_between(finger: &FingerModel, from: &Waypoint, to: &Waypoint, f: usize,
             worst = (error, t);
         }
     }
-    (worst.0 + remainder, worst.1)
+    (worst.0 + remainder, worst.1, n_samples)
 }
 
 /// Every fingertip that holds touches with its pad, at waypoints.

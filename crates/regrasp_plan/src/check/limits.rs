@@ -1,85 +1,97 @@
-//! What a plan allows itself, against what scene, hand file and checker allow: the measure is never the plan's.
-//!
-//! A plan may promise to keep to tighter limits than the scene's ([`regrasp_scene::Limits`]), never to looser ones:
-//!
-//! - speed of fingertips and object, joint velocities (the robot's where it states one), joint accelerations, normal forces;
-//! - friction: closure and forces count on the scene's over the friction margin, or on less;
-//! - contact forces are there: in tracking always, because what slides is held by forces alone; elsewhere from level `forces` on.
+//! What is too large to be judged: leaps, which motion bounds would follow for ever, and more work than the checker does.
 
-use crate::check::Log;
-use crate::check::level::Level;
+use crate::check::continuity::pose_difference;
 use crate::check::model::Model;
 use crate::check::violation::{Violation, ViolationKind as Kind};
+use crate::check::{CheckSettings, Log};
 use crate::plan::Plan;
-use regrasp_scene::Scene;
 
-/// Limits may be exceeded by this share: rounding.
-const ROUNDING: f64 = 1e-9;
-/// Friction margin that in-hand plans keep where the scene states none; see [`regrasp_scene::Limits::friction_margin`].
-const IN_HAND_FRICTION_MARGIN: f64 = 1.5;
-/// The same for tracking.
-const TRACKING_FRICTION_MARGIN: f64 = 1.0;
+/// The first joint that is so far beyond its limits, or first step that is so long, that motion between waypoints is not
+/// judged, in words.
+pub fn leap(model: &Model, plan: &Plan, settings: &CheckSettings) -> Option<String> {
+    for (s, segment) in plan.segments.iter().enumerate() {
+        for (w, waypoint) in segment.waypoints.iter().enumerate() {
+            for row in &model.limits {
+                let position = row.multiplier * waypoint.joints[row.coordinate] + row.offset;
+                let beyond = (row.lower - position).max(position - row.upper);
+                if !(beyond <= settings.followed(model.slides[row.coordinate])) {
+                    return Some(format!(
+                        "segment {s}, waypoint {w}: joint \"{}\" is at {position:.4e}, {beyond:.1e} beyond its limits",
+                        row.name
+                    ));
+                }
+            }
+        }
+        for (w, pair) in segment.waypoints.windows(2).enumerate() {
+            for (k, name) in model.joint_names.iter().enumerate() {
+                let step = (pair[1].joints[k] - pair[0].joints[k]).abs();
+                if !(step <= settings.followed(model.slides[k])) {
+                    return Some(format!("segment {s}, waypoint {w}: joint \"{name}\" moves {step:.1e} in one step"));
+                }
+            }
+            let (distance, _) = pose_difference(&pair[0].world_from_object, &pair[1].world_from_object);
+            if !(distance <= settings.followed_slide) {
+                return Some(format!("segment {s}, waypoint {w}: the object moves {distance:.1e} m in one step"));
+            }
+        }
+    }
+    None
+}
 
-/// Judges what the plan allows itself.
-pub fn check_limits(scene: &Scene, model: &Model, plan: &Plan, log: &mut Log) {
-    check_motion(scene, model, plan, log);
-    check_friction_margin(scene, plan, log);
-    let is_tracking = plan.promises.tracking.is_some();
-    match &plan.promises.forces {
-        None => {
-            let (level, why) = match is_tracking {
-                true => (Level::Geometry, "what slides is held by forces alone"),
-                false => (Level::Forces, "nothing says what holds the object"),
-            };
-            let message = format!("the plan has no contact forces: {why}");
-            log.push(Violation::new(Kind::ForcesAbsent, message).from_level(level));
-        }
-        Some(forces) => {
-            let (asked, limit) = (forces.normal_force[1], scene.limits.normal_force);
-            exceeded(log, "normal_force", None, (asked, limit), "N", Level::Forces);
-        }
+impl CheckSettings {
+    /// How far a joint may go in a step, or be beyond its limits, for its motion to be judged.
+    fn followed(&self, slides: bool) -> f64 {
+        if slides { self.followed_slide } else { self.followed_turn }
     }
 }
 
-fn check_motion(scene: &Scene, model: &Model, plan: &Plan, log: &mut Log) {
-    let (motion, limits) = (&plan.promises.motion, &scene.limits);
-    exceeded(log, "largest_speed", None, (motion.largest_speed, limits.largest_speed), "m/s", Level::Motion);
-    for (k, name) in model.joint_names.iter().enumerate() {
-        let is_limited = model.drives.iter().any(|drive| drive.coordinate == k && drive.velocity.is_some());
-        if !is_limited {
-            let pair = (motion.joint_velocities[k], limits.joint_velocity);
-            exceeded(log, "joint_velocities", Some(name), pair, "per second", Level::Motion);
+/// Work of the checker: configurations, samples and distances looked at.
+#[derive(Debug, Clone, Copy)]
+pub struct Work {
+    spent: u64,
+    most: u64,
+    /// What was being judged when the work was spent.
+    cut: Option<&'static str>,
+}
+
+impl Default for Work {
+    fn default() -> Self {
+        Work { spent: 0, most: u64::MAX, cut: None }
+    }
+}
+
+impl Work {
+    /// Work of at most so many units.
+    pub fn of(most: u64) -> Self {
+        Work { most, ..Work::default() }
+    }
+
+    /// Counts `units` spent on judging `what`. False from when on more is spent than allowed: nothing more is judged then.
+    #[must_use]
+    pub fn spend(&mut self, units: u64, what: &'static str) -> bool {
+        self.spent = self.spent.saturating_add(units);
+        if self.spent > self.most && self.cut.is_none() {
+            self.cut = Some(what);
         }
-        let pair = (motion.joint_accelerations[k], limits.joint_acceleration);
-        exceeded(log, "joint_accelerations", Some(name), pair, "per second squared", Level::Motion);
+        self.cut.is_none()
+    }
+
+    /// Units that may still be spent, and one: who spends that has spent too much.
+    pub fn left(&self) -> u64 {
+        (self.most - self.spent.min(self.most)).saturating_add(1)
+    }
+
+    /// What was cut, in words.
+    pub fn cut(&self) -> Option<String> {
+        self.cut.map(|what| format!("{what}, after {} units of work", self.most))
     }
 }
 
-fn exceeded(log: &mut Log, key: &str, joint: Option<&str>, (asked, limit): (f64, f64), unit: &str, level: Level) {
-    if asked <= limit * (1.0 + ROUNDING) {
-        return;
-    }
-    let of = joint.map_or(String::new(), |joint| format!(" of joint \"{joint}\""));
-    let message = format!(
-        "the plan allows itself {key}{of} of {asked} {unit}, the scene's limits (key \"limits\") are {limit} {unit}"
-    );
-    let subjects = std::iter::once(key).chain(joint);
-    log.push(Violation::new(Kind::LimitExceeded, message).subjects(subjects).amount(asked, limit).from_level(level));
-}
-
-/// The friction counted on is at most the scene's over the friction margin that is asked for.
-fn check_friction_margin(scene: &Scene, plan: &Plan, log: &mut Log) {
-    let asked = scene.limits.friction_margin.unwrap_or(match plan.promises.tracking.is_some() {
-        true => TRACKING_FRICTION_MARGIN,
-        false => IN_HAND_FRICTION_MARGIN,
-    });
-    let (counted_on, limit) = (plan.promises.friction, scene.object.friction / asked);
-    if counted_on > limit * (1.0 + ROUNDING) {
-        let message = format!(
-            "the plan counts on friction {counted_on}, at most {limit} is accepted: {} of the scene over a margin of {asked} (key \"limits.friction_margin\")",
-            scene.object.friction
-        );
-        let violation = Violation::new(Kind::FrictionMarginTooSmall, message).subjects(["friction"]);
-        log.push(violation.amount(counted_on, limit).from_level(Level::Forces));
+/// Reports what was left out for want of work: such a plan is not accepted.
+pub fn report_cut(log: &mut Log, left_out: &mut Vec<String>) {
+    if let Some(cut) = log.work.cut() {
+        let message = format!("the plan is too large or its steps are too long to be judged whole: not judged {cut}");
+        log.push(Violation::new(Kind::NotJudged, message));
+        left_out.push(cut);
     }
 }

@@ -3,6 +3,8 @@
 //! It shares no decision with the planner: own forward kinematics from the robot's joints, own closed forms of
 //! surfaces, force closure by exact cones with a certificate, distances by parry, and motion bounds between waypoints.
 
+/// What a plan allows itself, against what scene and checker allow.
+pub mod allowance;
 /// Margin and clearance at every waypoint.
 pub mod along;
 /// Room for the weight in every direction.
@@ -35,7 +37,7 @@ pub mod kinematics;
 pub mod level;
 /// Lifting and landing of moving fingertips.
 pub mod lift;
-/// What plan and scene allow, against each other.
+/// What is too large to be judged.
 pub mod limits;
 /// The scene as the checker sees it.
 pub mod model;
@@ -108,6 +110,14 @@ pub struct CheckSettings {
     pub largest_turn: f64,
     /// Largest slide of a joint or of the object in one step, in metres.
     pub largest_slide: f64,
+    /// Where a joint turns farther than this in a step, or is farther beyond its limits, in radians, motion between waypoints is
+    /// not judged: the plan is rejected anyway, and following such a motion has no end.
+    pub followed_turn: f64,
+    /// The same for sliding joints and the object, in metres.
+    pub followed_slide: f64,
+    /// Configurations, samples and distances that are looked at; what is left then is not judged, and the plan is rejected.
+    /// Plans of the planner need less than a hundredth.
+    pub most_work: u64,
     /// Contacts may be this far off the object's surface, in metres.
     pub surface_tolerance: f64,
     /// Contact normals may be this far off the surface's, in radians.
@@ -172,6 +182,9 @@ impl Default for CheckSettings {
             limit_tolerance: 1e-9,
             largest_turn: 0.5,
             largest_slide: 0.05,
+            followed_turn: 10.0,
+            followed_slide: 1.0,
+            most_work: 20_000_000,
             surface_tolerance: 1e-5,
             normal_tolerance: 1e-3,
             force_tolerance: 1e-6,
@@ -217,6 +230,8 @@ pub struct Report {
     pub gravity_in_world: Option<[f64; 3]>,
     /// What is wrong, at most some of each kind; empty when the plan is accepted.
     pub violations: Vec<Violation>,
+    /// What was not judged, and why; empty when everything was. Such a plan is never accepted.
+    pub left_out: Vec<String>,
     /// How many violations were found, those not listed included.
     pub n_violations: usize,
     /// Smallest closure margin of a holding set; none when none was judged.
@@ -250,9 +265,9 @@ pub struct Report {
 }
 
 impl Report {
-    /// True when nothing is wrong.
+    /// True when nothing is wrong, and everything was judged.
     pub fn accepted(&self) -> bool {
-        self.n_violations == 0
+        self.n_violations == 0 && self.left_out.is_empty()
     }
 }
 
@@ -263,6 +278,8 @@ pub struct Log {
     /// By the level from which they count.
     counts: [usize; Level::ALL.len()],
     most_per_kind: usize,
+    /// Work done, and how much may be.
+    pub work: limits::Work,
 }
 
 impl Log {
@@ -285,7 +302,8 @@ impl Log {
 ///
 /// `scene` must be loaded afresh from the files: the hashes in `scene.inputs` are compared with those of the plan.
 pub fn check(scene: &Scene, query: Option<&InHandQuery>, plan: &Plan, settings: &CheckSettings) -> Report {
-    let mut log = Log { most_per_kind: settings.most_per_kind, ..Log::default() };
+    let work = limits::Work::of(settings.most_work);
+    let mut log = Log { most_per_kind: settings.most_per_kind, work, ..Log::default() };
     let mut report = Report::default();
     promises::check_inputs(plan, &scene.inputs, &mut log);
     match Model::new(scene) {
@@ -296,6 +314,7 @@ pub fn check(scene: &Scene, query: Option<&InHandQuery>, plan: &Plan, settings: 
             }
         }
     }
+    limits::report_cut(&mut log, &mut report.left_out);
     report.level = settings.level;
     report.gravity_in_world = scene.gravity().in_world().map(Into::into);
     report.reached = Level::ALL.into_iter().rev().find(|level| log.count_at(*level) == 0);
@@ -329,22 +348,20 @@ fn judge(
     continuity::check_meeting(plan, settings, log);
     continuity::check_joints(model, plan, settings, log);
     continuity::check_roles(model, plan, settings, log);
-    let rolled = rolling::check_rolling(&scene.object.shape, model, plan, settings, log);
-    let tracked = tracking::check_tracking(&scene.object.shape, model, plan, settings, log);
-    report.max_hold_slip = slip::check_slip(&scene.object.shape, model, plan, settings, log);
-    let held = contact::check_tips(model, plan, log);
-    report.max_contact_error = held.max(rolled.max_contact_error).max(tracked.max_contact_error);
-    report.max_slip = [rolled.max_slip, tracked.max_slip].into_iter().flatten().reduce(f64::max);
-    if let Some(reach) = scene.reach {
-        tracking::check_reach(reach, model, plan, settings, log);
+    let leap = limits::leap(model, plan, settings);
+    if leap.is_none() {
+        judge_tips(scene, plan, settings, model, log, report);
     }
     contact::check_pads(model, plan, log);
     contact::check_contacts(&scene.object, model, plan, settings, log);
     let at_waypoints = promises::check_closure(&scene.object, model, plan, settings, log);
-    let between = between::check_between(&scene.object, model, plan, settings, log);
+    let between = match leap {
+        None => between::check_between(&scene.object, model, plan, settings, log),
+        Some(_) => None,
+    };
     report.min_margin = at_waypoints.into_iter().chain(between).reduce(f64::min);
     promises::check_promises(&scene.object, plan, settings, report.min_margin, log);
-    limits::check_limits(scene, model, plan, log);
+    allowance::check_allowance(scene, model, plan, log);
     times::check_times(&scene.object, model, plan, settings, log);
     report.duration = times::duration(plan);
     if let Some(balance) = forces::check_forces(scene, model, plan, settings, log) {
@@ -355,9 +372,26 @@ fn judge(
     }
     match bodies::Bodies::new(scene, model) {
         Err(message) => log.push(Violation::new(ViolationKind::WrongScene, message)),
+        _ if leap.is_some() => {
+            report.left_out.extend(leap.map(|leap| format!("motion between waypoints: {leap}")));
+        }
         Ok(bodies) => {
             (report.min_clearance, report.n_distances) =
                 collision::check_collision(&bodies, model, plan, settings, log);
         }
+    }
+}
+
+/// Fingertips on the object, at and between waypoints.
+fn judge_tips(scene: &Scene, plan: &Plan, settings: &CheckSettings, model: &Model, log: &mut Log, report: &mut Report) {
+    let rolled = rolling::check_rolling(&scene.object.shape, model, plan, settings, log);
+    let tracked = tracking::check_tracking(&scene.object.shape, model, plan, settings, log);
+    let known = rolled.steps.into_iter().chain(tracked.steps).collect();
+    report.max_hold_slip = slip::check_slip(&scene.object.shape, model, plan, &known, settings, log);
+    let held = contact::check_tips(model, plan, log);
+    report.max_contact_error = held.max(rolled.max_contact_error).max(tracked.max_contact_error);
+    report.max_slip = [rolled.max_slip, tracked.max_slip].into_iter().flatten().reduce(f64::max);
+    if let Some(reach) = scene.reach {
+        tracking::check_reach(reach, model, plan, settings, log);
     }
 }

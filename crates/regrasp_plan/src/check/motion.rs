@@ -11,6 +11,9 @@ use regrasp_geometry::{Point, Pose, Vector};
 /// Farther apart than this, pairs are not measured exactly, in metres.
 const SEARCH_DISTANCE: f64 = 0.03;
 
+/// Poses of a carrier that are kept for a step.
+const MOST_POSES: usize = 256;
+
 /// How far a pair is shifted when its distance is not resolved, in metres, and the directions tried.
 const NUDGE: f64 = 1e-5;
 const NUDGES: [[f64; 3]; 6] =
@@ -35,6 +38,10 @@ pub struct Step<'a> {
     rates: Vec<Rates>,
     /// Distances measured so far.
     pub n_distances: u64,
+    /// Pieces of motion looked at so far.
+    pub n_pieces: u64,
+    /// Pieces that may be looked at.
+    pub most_pieces: u64,
 }
 
 impl<'a> Step<'a> {
@@ -78,6 +85,8 @@ impl<'a> Step<'a> {
             moves,
             rates,
             n_distances: 0,
+            n_pieces: 0,
+            most_pieces: u64::MAX,
         }
     }
 
@@ -95,7 +104,10 @@ impl<'a> Step<'a> {
             Carrier::Object => pose_between(&self.object_from, &self.object_to, t),
             Carrier::World => Pose::identity(),
         };
-        self.poses[carrier].push((t, pose));
+        // What is looked for is among the last; a long search would cost more than the pose.
+        if self.poses[carrier].len() < MOST_POSES {
+            self.poses[carrier].push((t, pose));
+        }
         pose
     }
 
@@ -230,6 +242,10 @@ fn certify_piece(
     floor: f64,
     resolution: f64,
 ) -> Result<f64, Breach> {
+    step.n_pieces += 1;
+    if step.n_pieces > step.most_pieces {
+        return Err(Breach { t: t0, distance: None });
+    }
     let chord = step.chord(pair, t0, t1);
     let stray = whole_stray * (t1 - t0) * (t1 - t0);
     let needed = floor + chord + stray;

@@ -10,12 +10,15 @@ use crate::check::contact::error_at;
 use crate::check::continuity::{pose_between, pose_difference};
 use crate::check::model::{FingerModel, Model};
 use crate::check::patch::Patch;
+use crate::check::slip::StepSlip;
 use crate::check::tip::TipSurface;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, Plan, SegmentKind, Waypoint};
 use nalgebra::{Matrix4, Rotation3, UnitQuaternion};
 use regrasp_geometry::{Point, Pose, Shape, Vector};
+use std::cell::Cell;
+use std::collections::BTreeMap;
 
 /// Pieces after which no finer sum is made; what is then unknown counts as slip.
 const MOST_PIECES: usize = 128;
@@ -28,9 +31,15 @@ const TURN_PIECES: usize = 8;
 /// of the contact tolerance.
 const SMALLEST_PIECE: f64 = 1e-3;
 
+/// Configurations of a step after which it counts as not shown that the tip is on the surface; no plan of the planner needs a
+/// hundredth.
+const MOST_LOOKED: u64 = 100_000;
+
 /// What rolling amounts to in a plan.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Rolled {
+    /// Slip of the steps in which a finger does not slide on purpose, by finger, segment and waypoint.
+    pub steps: BTreeMap<(usize, usize, usize), StepSlip>,
     /// Largest slip of a finger in a segment, in metres; none when no finger rolls.
     pub max_slip: Option<f64>,
     /// Largest distance of a rolling tip from its contact at waypoints, and from the surface where that was measured
@@ -61,6 +70,10 @@ pub fn check_rolling(shape: &Shape, model: &Model, plan: &Plan, settings: &Check
                         (error, fraction) = (between, at);
                     }
                     let slip = roll.slip(UNKNOWN_SHARE * slip_tolerance);
+                    rolled.steps.insert((f, s, w), StepSlip::of(&roll, finger, slip));
+                    if !log.work.spend(roll.looked(), "fingertips that roll") {
+                        return rolled;
+                    }
                     sum += slip;
                     if slip > worst.0 {
                         worst = (slip, w);
@@ -105,6 +118,8 @@ pub struct Roll<'a> {
     speed: f64,
     /// Bound of the second derivative of the centre in the object frame.
     acceleration: f64,
+    /// Configurations looked at.
+    looked: Cell<u64>,
 }
 
 /// A tip over the surface, in the object frame.
@@ -138,10 +153,16 @@ impl<'a> Roll<'a> {
         let inside = finger.surface.curvature_radii().map_or(0.0, |[_, flattest]| 2.0 * flattest);
         let patch = Patch::near(shape, &start, finger.radius + inside + 2.0 * tolerance + speed);
         let speed = speed_in_object(finger, from, to);
-        Roll { finger, from, to, world_from_object, patch, speed, acceleration }
+        Roll { finger, from, to, world_from_object, patch, speed, acceleration, looked: Cell::new(0) }
+    }
+
+    /// Configurations looked at so far.
+    pub fn looked(&self) -> u64 {
+        self.looked.get()
     }
 
     fn object_from_link(&self, t: f64) -> Matrix4<f64> {
+        self.looked.set(self.looked.get() + 1);
         let joints: Vec<f64> = self.from.joints.iter().zip(&self.to.joints).map(|(a, b)| a + t * (b - a)).collect();
         let [start, end] = &self.world_from_object;
         pose_between(start, end, t).inverse().to_homogeneous() * self.finger.path.world_from_link(&joints)
@@ -197,6 +218,9 @@ impl<'a> Roll<'a> {
         };
         let mut pending = vec![(known(0.0), known(1.0))];
         while let Some((from, to)) = pending.pop() {
+            if self.looked() > MOST_LOOKED {
+                return (f64::INFINITY, from.0);
+            }
             let span = to.0 - from.0;
             let (way, stray) = match self.finger.surface {
                 TipSurface::Ball => ((to.1 - from.1).norm(), self.acceleration * span * span / 8.0),

@@ -25,6 +25,7 @@ use regrasp_geometry::Shape;
 use regrasp_grasp::ContactModel;
 use schemars::JsonSchema;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Slip of a finger in one step.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -38,6 +39,16 @@ pub struct StepSlip {
 }
 
 impl StepSlip {
+    /// Of a round fingertip whose touching point slides so far.
+    pub fn of(roll: &Roll, finger: &FingerModel, slide: f64) -> Self {
+        let torsion_radius = torsion_radius(finger);
+        let twist = match torsion_radius > 0.0 {
+            true => torsion_radius * roll.turning().map_or(f64::INFINITY, |turning| turning.twist),
+            false => 0.0,
+        };
+        StepSlip { slide, twist, travel: roll.travel() }
+    }
+
     fn slip(&self) -> f64 {
         self.slide + self.twist
     }
@@ -65,10 +76,13 @@ pub struct HoldSlip {
 }
 
 /// Judges slip from landing to lifting of every contact. The largest, where the object or a holding finger moves.
+///
+/// `known` is what `rolling` and `tracking` have measured, by finger, segment and waypoint; fixed contacts are measured here.
 pub fn check_slip(
     shape: &Shape,
     model: &Model,
     plan: &Plan,
+    known: &BTreeMap<(usize, usize, usize), StepSlip>,
     settings: &CheckSettings,
     log: &mut Log,
 ) -> Option<HoldSlip> {
@@ -86,10 +100,10 @@ pub fn check_slip(
                 if modes.contains(&ContactMode::Free) {
                     hold.end(f, finger, settings, log, &mut worst);
                     hold = Hold::begin(Moment::at(s, w + 1));
-                } else if !modes[0].slides()
-                    && let Some(step) = step_slip(shape, finger, f, segment, w, settings)
-                {
-                    hold.add(step, modes[0], Moment::at(s, w));
+                } else if !modes[0].slides() {
+                    let known = known.get(&(f, s, w)).copied();
+                    let step = known.or_else(|| fixed_slip(shape, finger, f, (segment, w), settings, log));
+                    step.into_iter().for_each(|step| hold.add(step, modes[0], Moment::at(s, w)));
                 }
             }
         }
@@ -155,34 +169,34 @@ impl Hold {
     }
 }
 
-/// Slip of finger `f` from waypoint `w` to the next; none where neither it nor the object moves.
-fn step_slip(
+/// Slip of finger `f` from waypoint `w` of the segment to the next; none where neither it nor the object moves.
+fn fixed_slip(
     shape: &Shape,
     finger: &FingerModel,
     f: usize,
-    segment: &Segment,
-    w: usize,
+    (segment, w): (&Segment, usize),
     settings: &CheckSettings,
+    log: &mut Log,
 ) -> Option<StepSlip> {
     let (from, to) = (&segment.waypoints[w], &segment.waypoints[w + 1]);
     let (shift, turn) = pose_difference(&from.world_from_object, &to.world_from_object);
     if shift == 0.0 && turn == 0.0 && !finger.path.moves(&from.joints, &to.joints) {
         return None;
     }
-    let torsion_radius = match finger.contact {
-        ContactModel::SoftFinger { torsion_radius } => torsion_radius,
-        ContactModel::Point | ContactModel::Frictionless => 0.0,
-    };
     let roll = Roll::new(finger, from, to, shape, settings.largest_contact_tolerance);
-    if finger.radius == 0.0 {
+    let step = if finger.radius == 0.0 {
         // A sharp tip stays on its contact within the contact tolerance, which `contact` judges.
         let normal = contact_of(&from.contacts[f])?.normal_in_object.into_inner();
-        return Some(StepSlip { twist: torsion_radius * roll.turn_about(&normal), ..StepSlip::default() });
-    }
-    let slide = roll.slip(UNKNOWN_SHARE * settings.largest_slip_tolerance);
-    let twist = match torsion_radius > 0.0 {
-        true => torsion_radius * roll.turning().map_or(f64::INFINITY, |turning| turning.twist),
-        false => 0.0,
+        StepSlip { twist: torsion_radius(finger) * roll.turn_about(&normal), ..StepSlip::default() }
+    } else {
+        StepSlip::of(&roll, finger, roll.slip(UNKNOWN_SHARE * settings.largest_slip_tolerance))
     };
-    Some(StepSlip { slide, twist, travel: roll.travel() })
+    log.work.spend(roll.looked(), "fixed contacts").then_some(step)
+}
+
+fn torsion_radius(finger: &FingerModel) -> f64 {
+    match finger.contact {
+        ContactModel::SoftFinger { torsion_radius } => torsion_radius,
+        ContactModel::Point | ContactModel::Frictionless => 0.0,
+    }
 }

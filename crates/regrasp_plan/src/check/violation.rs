@@ -131,6 +131,8 @@ pub enum ViolationKind {
     JointAcceleration,
     /// Joint velocities that do not belong to the motion.
     VelocityInconsistent,
+    /// The plan asks for more work than the checker does: the rest of it was not judged.
+    NotJudged,
 }
 
 /// One thing that is wrong.

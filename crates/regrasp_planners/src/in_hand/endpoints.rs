@@ -1,7 +1,7 @@
 //! Start and goal as the query gives them: what is wrong with them is said before any search.
 
 use super::combine::releasable;
-use super::model::{Body, Carrier, Model};
+use super::model::{Body, Carrier, FingerModel, Model};
 use super::settings::Method;
 use super::state::GraspState;
 use super::transfer::ik_settings;
@@ -56,11 +56,13 @@ pub fn refuse_hopeless(model: &Model, query: &InHandQuery) -> Result<(), Failure
     if model.settings.method != Method::Gait || !may_try_transfers {
         refuse_impossible(model)?;
     }
-    refuse_buried_object(model, End::Start, &query.world_from_object_start)?;
-    for (index, pose) in query.world_from_object_way.iter().enumerate() {
-        refuse_buried_object(model, End::Way(index + 1), pose)?;
+    let way = query.world_from_object_way.iter().enumerate().map(|(index, pose)| (End::Way(index + 1), pose));
+    let ends = [(End::Start, &query.world_from_object_start)].into_iter().chain(way);
+    for (end, pose) in ends.chain([(End::Goal, &query.world_from_object_goal)]) {
+        refuse_buried_object(model, end, pose)?;
+        refuse_object_out_of_reach(model, end, pose)?;
     }
-    refuse_buried_object(model, End::Goal, &query.world_from_object_goal)
+    Ok(())
 }
 
 /// Refuses hands of which the others can never hold while one finger is away.
@@ -80,7 +82,7 @@ fn refuse_holding_nothing(model: &Model) -> Result<(), Failure> {
     let message = format!(
         "the hand has {} and friction {}: all of them together cannot hold an object",
         fingers_in_words(model),
-        model.frame.friction
+        friction_in_words(model)
     );
     Err(Failure::bare(FailureKind::Impossible, message, MORE_FINGERS))
 }
@@ -93,12 +95,18 @@ fn fingers_in_words(model: &Model) -> String {
     format!("{} fingers with contacts {models:?}", model.n_fingers())
 }
 
+/// The friction that is planned with, and how it comes from what the scene says.
+pub fn friction_in_words(model: &Model) -> String {
+    let (friction, margin) = (model.scene.object.friction, model.settings.friction_margin);
+    if margin == 1.0 { format!("{friction}") } else { format!("{friction} of the scene over a margin of {margin}") }
+}
+
 fn never_released(model: &Model) -> String {
     format!(
         "the hand has {} and friction {}: while one of them is away the others cannot hold an object (fewer than three points \
          cannot: it turns about the line through two of them). Such a hand can never change its grasp",
         fingers_in_words(model),
-        model.frame.friction
+        friction_in_words(model)
     )
 }
 
@@ -179,7 +187,7 @@ pub fn given_grasp(
                 "the {} grasp is not force closed with the margin asked for: {margin:.4} of {}, at friction {}",
                 end.name(),
                 model.settings.closure_margin,
-                model.frame.friction
+                friction_in_words(model)
             ),
             "move the contacts apart, or ask for a smaller margin",
         ));
@@ -217,6 +225,7 @@ pub fn given_grasp_at(
         GraspRequest::Joints(values) => from_joints(model, end, world_from_object, values)?,
         GraspRequest::Contacts(points) => from_contacts(model, end, world_from_object, points, near)?,
     };
+    refuse_out_of_reach(model, end, &state.joints)?;
     let mut workspace = Workspace::new(model);
     workspace.set(world_from_object, &state.joints, &state.contacts);
     if !workspace.is_clear(TipMode::AllHold) {
@@ -229,6 +238,47 @@ pub fn given_grasp_at(
         ));
     }
     Ok(Some(state))
+}
+
+/// Refuses a grasp with a tip farther from where it rests than the scene allows.
+fn refuse_out_of_reach(model: &Model, end: End, joints: &HandJoints) -> Result<(), Failure> {
+    let Some(reach) = model.scene.reach else { return Ok(()) };
+    for (f, (finger, own)) in model.fingers.iter().zip(joints).enumerate() {
+        let away = (finger.ik.tip(own) - finger.tip_at_rest).norm();
+        if !(away <= reach) {
+            let (name, end_name) = (&model.scene.hand.fingers[f].name, end.name());
+            let message = format!(
+                "at the {end_name} finger \"{name}\" is {away:.3} m from where it rests, its reach is {reach} m"
+            );
+            return Err(end.failure(message, "choose another contact or rest posture, or a larger reach"));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a pose at which too few fingers can touch the object without going farther than the scene allows.
+pub fn refuse_object_out_of_reach(model: &Model, end: End, world_from_object: &Pose) -> Result<(), Failure> {
+    let Some(reach) = model.scene.reach else { return Ok(()) };
+    let placement = Placement::from(world_from_object);
+    let surface = &model.scene.object.surface;
+    let gap = |finger: &FingerModel| {
+        let (_, distance) = surface.project_signed(&placement.point_to_child(&finger.tip_at_rest));
+        distance.abs() - finger.tip_radius
+    };
+    let touching = model.fingers.iter().filter(|&finger| !(gap(finger) > reach));
+    let touching: Vec<ContactModel> = touching.map(|finger| finger.contact).collect();
+    if may_close(&touching, model.frame.friction) {
+        return Ok(());
+    }
+    let message = format!(
+        "at the {} only {} of {} fingers can touch the object \"{}\" within the reach of {reach} m that the scene allows",
+        end.name(),
+        touching.len(),
+        model.n_fingers(),
+        model.bodies[model.object].name
+    );
+    Err(end
+        .failure(message, "move the object nearer to where the fingertips rest, or allow a larger reach (hand.reach)"))
 }
 
 fn from_joints(model: &Model, end: End, world_from_object: &Pose, values: &[f64]) -> Result<GraspState, Failure> {

@@ -1,5 +1,6 @@
 //! Contact forces of the hand's fingers: what balances the object's weight within all limits.
 
+use super::endpoints::friction_in_words;
 use super::model::{MAX_FINGERS, Model};
 use super::settings::{ForceSettings, InHandSettings};
 use super::workspace::{Contacts, HandJoints, Workspace};
@@ -100,7 +101,7 @@ impl Unbalanced {
         let finger_name = |f: usize| model.scene.hand.fingers[f].name.as_str();
         let limits = model.forces.as_ref().map_or([0.0; 2], |forces| [forces.limits.least, forces.limits.largest]);
         let cause = match *self {
-            Unbalanced::AtAnyForce => format!("friction {:.3} does not hold it at any force", model.frame.friction),
+            Unbalanced::AtAnyForce => format!("friction {} does not hold it at any force", friction_in_words(model)),
             Unbalanced::TooLight(f) => {
                 format!("finger \"{}\" would have to press with less than {} N", finger_name(f), limits[0])
             }

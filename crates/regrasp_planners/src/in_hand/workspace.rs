@@ -9,6 +9,8 @@
 mod configuration;
 /// Obstacles near the bodies that move.
 mod nearby;
+/// How far tips may be from where they rest.
+mod reach;
 
 use super::forces::Refusals;
 use super::model::{Carrier, MAX_FINGERS, Model, Pair};
@@ -204,22 +206,22 @@ impl<'a> Workspace<'a> {
         self.set_finger(finger, joints);
     }
 
-    /// True when no pair is too near now.
+    /// True when no pair is too near now, and no tip too far away.
     pub fn is_clear(&mut self, mode: TipMode) -> bool {
         self.work += 1;
         self.align(None);
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
-        self.all_are_clear(None, mode)
+        self.is_within_reach(None) && self.all_are_clear(None, mode)
     }
 
-    /// True when no pair of one finger is too near now.
+    /// True when no pair of one finger is too near now, and its tip not too far away.
     pub fn finger_is_clear(&mut self, finger: usize, mode: TipMode) -> bool {
         self.work += 1;
         self.align(None);
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
-        self.all_are_clear(Some(finger), mode)
+        self.is_within_reach(Some(finger)) && self.all_are_clear(Some(finger), mode)
     }
 
     /// True when one finger is clear of the object, the palm and obstacles now, whatever the other fingers do.
@@ -229,10 +231,11 @@ impl<'a> Workspace<'a> {
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
         let moving = &self.model.fingers[finger];
-        self.in_turn(moving.pairs.len(), &moving.turns, mode, |this, k| {
-            let pair = moving.pairs[k];
-            this.is_between_fingers(pair) || this.pair_is_clear(pair, mode)
-        })
+        self.is_within_reach(Some(finger))
+            && self.in_turn(moving.pairs.len(), &moving.turns, mode, |this, k| {
+                let pair = moving.pairs[k];
+                this.is_between_fingers(pair) || this.pair_is_clear(pair, mode)
+            })
     }
 
     /// True when two fingers with these joints are clear of each other.
@@ -287,7 +290,7 @@ impl<'a> Workspace<'a> {
         self.stale = Stale::Nothing;
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
-        self.all_are_clear(None, TipMode::AllHold)
+        self.is_within_reach(None) && self.all_are_clear(None, TipMode::AllHold)
     }
 
     /// Moves one finger if the step is clear; stays otherwise.
@@ -303,13 +306,14 @@ impl<'a> Workspace<'a> {
         self.work += 1;
         self.bound_motion(moving);
         let model = self.model;
-        if self.all_are_clear(moving, mode) {
+        let is_within_reach = self.is_within_reach(moving);
+        if is_within_reach && self.all_are_clear(moving, mode) {
             std::mem::swap(&mut self.now, &mut self.next);
             return true;
         }
         // Pairs tested before the one that failed have their slack at `next`; it is not known at `now` any more.
         self.forget_slack();
-        if halvings == 0 || !self.end_is_clear(self.blocking_index, mode) {
+        if !is_within_reach || halvings == 0 || !self.end_is_clear(self.blocking_index, mode) {
             return false;
         }
         self.stale = Stale::Everything;

@@ -4,7 +4,7 @@ use super::forces::Forces;
 use super::grasp::TrackingGrasp;
 use super::step::Stepper;
 use crate::failure::{Failure, FailureKind};
-use crate::in_hand::endpoints::{End, Near, given_grasp_at};
+use crate::in_hand::endpoints::{End, Near, friction_in_words, given_grasp_at};
 use crate::in_hand::model::Model;
 use regrasp_geometry::{Shape, TriangleMesh};
 use regrasp_scene::{Gravity, InHandQuery};
@@ -70,20 +70,11 @@ pub fn start(stepper: &Stepper, query: &InHandQuery) -> Result<(TrackingGrasp, F
     let invalid = |message: String, advice: &str| Failure::bare(FailureKind::StartInvalid, message, advice);
     let grasp = TrackingGrasp::of(model, &state)
         .ok_or_else(|| invalid("a fingertip's centre is inside the object at the start".into(), "move it out"))?;
-    for (finger, of_model) in model.fingers.iter().enumerate() {
-        let away = (grasp.tip_in_world(model, finger) - of_model.tip_at_rest).norm();
-        if let Some(reach) = model.scene.reach.filter(|reach| away > *reach) {
-            let name = &model.scene.hand.fingers[finger].name;
-            let message =
-                format!("at the start finger \"{name}\" is {away:.3} m from where it rests, its reach is {reach} m");
-            return Err(invalid(message, "choose another contact or rest posture, or a larger reach"));
-        }
-    }
     let Ok(forces) = stepper.balanced_at_rest(&grasp) else {
         let [least, largest] = stepper.settings.in_hand.forces.map_or([0.0, f64::MAX], |forces| forces.normal_force);
         let message = format!(
-            "at the start no contact forces balance the weight: friction {:.3}, normal forces from {least} N to {largest} N",
-            model.frame.friction
+            "at the start no contact forces balance the weight: friction {}, normal forces from {least} N to {largest} N",
+            friction_in_words(model)
         );
         return Err(invalid(message, "choose other contacts, or allow larger forces"));
     };

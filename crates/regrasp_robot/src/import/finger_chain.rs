@@ -112,9 +112,13 @@ pub(super) fn rest_posture(spec: &FingerSpec, chain: &Chain, found: &mut Diagnos
         };
         if *value < chain.lower[k] || *value > chain.upper[k] {
             found.push(
-                Diagnostic::new("U212", place.clone(), format!("rest position {} is outside the limits", number(*value)))
-                    .element("joint", name)
-                    .expected(format!("{}..{}", number(chain.lower[k]), number(chain.upper[k]))),
+                Diagnostic::new(
+                    "U212",
+                    place.clone(),
+                    format!("rest position {} is outside the limits", number(*value)),
+                )
+                .element("joint", name)
+                .expected(format!("{}..{}", number(chain.lower[k]), number(chain.upper[k]))),
             );
             continue;
         }

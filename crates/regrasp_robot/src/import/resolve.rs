@@ -143,9 +143,8 @@ fn in_package(name: &str, rest: &str, place: Place, search: &Search) -> Result<R
         return Ok(Resolved { path: resolved.path, notes });
     }
     let numbered: Vec<String> = tried.iter().enumerate().map(|(i, text)| format!("({}) {text}", i + 1)).collect();
-    let hint = search
-        .same_name(inside)
-        .map_or(String::new(), |p| format!(" (a file of that name is at {})", p.display()));
+    let hint =
+        search.same_name(inside).map_or(String::new(), |p| format!(" (a file of that name is at {})", p.display()));
     Err(Diagnostic::new("U101", place, format!("\"{name}\" not found; looked in: {}", numbered.join(" ")))
         .fix(format!("--package {package}=DIR{hint}")))
 }

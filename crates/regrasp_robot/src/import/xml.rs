@@ -77,7 +77,9 @@ fn refuse_hostile_markup(file: &Path, text: &str) -> Result<(), InputError> {
             after(open + 2, ">")
         } else {
             let end = markup.open_tag(text.as_bytes(), open);
-            if let Some(problem) = markup.excess(text.as_bytes().get(open..end.unwrap_or(text.len())).unwrap_or_default()) {
+            if let Some(problem) =
+                markup.excess(text.as_bytes().get(open..end.unwrap_or(text.len())).unwrap_or_default())
+            {
                 return Err(Diagnostic::new("U105", Place::at_offset(file, text, open), problem).into());
             }
             end

@@ -99,7 +99,8 @@ pub(super) fn object(root: &mut Table, files: &mut Files, found: &mut Found) -> 
 }
 
 fn friction(entry: &Entry, found: &mut Found) -> Option<f64> {
-    let friction = entry.number_that(found, "a friction coefficient from 0 to 1000", |x| (0.0..=MAX_FRICTION).contains(&x))?;
+    let friction =
+        entry.number_that(found, "a friction coefficient from 0 to 1000", |x| (0.0..=MAX_FRICTION).contains(&x))?;
     if friction == 0.0 {
         found.note(&entry.span, "friction 0: fingertips can only push along the normal");
     } else if friction > UNLIKELY_FRICTION {
@@ -134,7 +135,8 @@ fn mass(table: &mut Table, found: &mut Found) -> Option<GivenMass> {
             .number_that(found, "a density above 0, in kg/m^3 (water has 1000)", |x| x > 0.0)
             .map(GivenMass::Density),
         [entry] => {
-            let mass = entry.number_that(found, "a mass from 0 to 1000000, in kilograms", |x| (0.0..=MAX_MASS).contains(&x))?;
+            let mass = entry
+                .number_that(found, "a mass from 0 to 1000000, in kilograms", |x| (0.0..=MAX_MASS).contains(&x))?;
             if mass == 0.0 {
                 found.note(&entry.span, "mass 0: the object has no weight");
             } else if mass > UNLIKELY_MASS {
@@ -209,7 +211,9 @@ fn placed(
             if mass > MAX_MASS {
                 let problem = format!("with density {} it weighs {} kg", number(*density), number(mass));
                 let diagnostic = table.error("S107", found, problem);
-                found.diagnostics.push(diagnostic.expected("at most 1000000 kg; densities are in kg/m^3 (water has 1000)"));
+                found
+                    .diagnostics
+                    .push(diagnostic.expected("at most 1000000 kg; densities are in kg/m^3 (water has 1000)"));
                 return None;
             }
             mass
@@ -224,13 +228,9 @@ fn center_is_inside(shape: &Shape, center: &Point, entry: &Entry, found: &mut Fo
     if (0..3).all(|k| center[k] >= low[k] && center[k] <= high[k]) {
         return Some(());
     }
-    let diagnostic = entry
-        .error("S107", found, format!("is {}, outside the object", list(center.coords)))
-        .expected(format!(
-            "a point of the object frame between {:.4?} and {:.4?}",
-            low.coords.as_slice(),
-            high.coords.as_slice()
-        ));
+    let diagnostic = entry.error("S107", found, format!("is {}, outside the object", list(center.coords))).expected(
+        format!("a point of the object frame between {:.4?} and {:.4?}", low.coords.as_slice(), high.coords.as_slice()),
+    );
     found.diagnostics.push(diagnostic);
     None
 }

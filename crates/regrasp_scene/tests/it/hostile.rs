@@ -28,7 +28,13 @@ fn a_megabyte_of_faults_is_read_in_time_listed_in_part_and_counted() {
         (repeated(80_000, &|i| format!("k{i} = 1\n")) + GOOD, 80_000),
         (GOOD.to_owned() + &repeated(20_000, &|_| "[[obstacles]]\n".into()), 60_000),
         (GOOD.to_owned() + &repeated(12_000, &|_| obstacle.into()), 11_999),
-        (with("hand.toml\"", &format!("hand.toml\"\nrest = {{ {} a = 1 }}", repeated(60_000, &|i| format!("k{i} = 1, ")))), 60_001),
+        (
+            with(
+                "hand.toml\"",
+                &format!("hand.toml\"\nrest = {{ {} a = 1 }}", repeated(60_000, &|i| format!("k{i} = 1, "))),
+            ),
+            60_001,
+        ),
     ] {
         let folder = Folder::new();
         let started = Instant::now();
@@ -72,7 +78,8 @@ fn names_that_drive_a_terminal_or_fill_it_are_refused() {
     for name in ["a\\ncheck  ACCEPTED", "a\\u001b[2J", "a\\u202e", "a\\u200f", &"n".repeat(1_000_000)] {
         let folder = Folder::new();
         let object = with("name = \"sphere\"", &format!("name = \"{name}\""));
-        let obstacle = format!("{GOOD}\n[[obstacles]]\nname = \"{name}\"\nsphere = {{ radius = 0.01 }}\nposition = [1, 1, 1]\n");
+        let obstacle =
+            format!("{GOOD}\n[[obstacles]]\nname = \"{name}\"\nsphere = {{ radius = 0.01 }}\nposition = [1, 1, 1]\n");
         for text in [object, obstacle] {
             let messages = folder.messages(&text);
             assert!(messages.starts_with("V004 scene.toml:"), "{messages}");

@@ -5,8 +5,8 @@ use super::geometry::read_origin;
 use crate::import::xml::{Reader, child, children};
 use crate::robot::{Joint, JointKind, Limits};
 use nalgebra::{Translation3, UnitQuaternion};
-use regrasp_base::{Diagnostic, InputError};
 use regrasp_base::diagnostic::{did_you_mean, number};
+use regrasp_base::{Diagnostic, InputError};
 use regrasp_geometry::frame::{direction, length};
 use regrasp_geometry::{Pose, UnitVector, Vector};
 use roxmltree::Node;
@@ -188,14 +188,20 @@ fn read_limits(reader: &mut Reader, node: Node, name: &str, kind: Option<JointKi
     if lower > upper {
         let place = reader.attribute_place(limit, "lower");
         reader.found.push(
-            Diagnostic::new("U121", place, format!("lower limit {} is above upper limit {}", number(lower), number(upper)))
-                .element("joint", name)
-                .expected("lower <= upper")
-                .fix(format!("swap them: lower=\"{}\" upper=\"{}\"", number(upper), number(lower))),
+            Diagnostic::new(
+                "U121",
+                place,
+                format!("lower limit {} is above upper limit {}", number(lower), number(upper)),
+            )
+            .element("joint", name)
+            .expected("lower <= upper")
+            .fix(format!("swap them: lower=\"{}\" upper=\"{}\"", number(upper), number(lower))),
         );
         return None;
     }
-    if let Some((attribute, far)) = [("lower", lower), ("upper", upper)].into_iter().find(|(_, q)| q.abs() > MAX_POSITION) {
+    if let Some((attribute, far)) =
+        [("lower", lower), ("upper", upper)].into_iter().find(|(_, q)| q.abs() > MAX_POSITION)
+    {
         let place = reader.attribute_place(limit, attribute);
         reader.found.push(
             Diagnostic::new("U124", place, format!("{attribute} limit is {}", number(far)))

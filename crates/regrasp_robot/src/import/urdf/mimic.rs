@@ -11,7 +11,8 @@ use std::collections::BTreeMap;
 const MAX_COUPLING: f64 = 1e6;
 
 /// What [`check_coupling`] asks.
-pub(crate) const GOOD_COUPLING: &str = "a multiplier of size 1e-6 to 1e6 that is not 0, and an offset of size up to 1e6";
+pub(crate) const GOOD_COUPLING: &str =
+    "a multiplier of size 1e-6 to 1e6 that is not 0, and an offset of size up to 1e6";
 
 /// What is wrong with the numbers of a coupling.
 pub(crate) fn check_coupling(multiplier: f64, offset: f64) -> Result<(), String> {

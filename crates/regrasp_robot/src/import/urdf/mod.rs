@@ -48,7 +48,8 @@ pub fn load_robot(path: &Path, options: &LoadOptions) -> Result<LoadedRobot, Inp
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let input = LoadedInput { role: "urdf".into(), name, path: path.to_owned(), sha256: files::sha256(&bytes) };
     let text = files::text_of(path, bytes)?;
-    let mut meshes = Meshes { options: options.clone(), read: BTreeMap::new(), n_triangles: 0, n_missed: 0, inputs: vec![input] };
+    let mut meshes =
+        Meshes { options: options.clone(), read: BTreeMap::new(), n_triangles: 0, n_missed: 0, inputs: vec![input] };
     let (robot, notes) = parse_robot(path, &text, options.lenient, &mut meshes)?;
     Ok(LoadedRobot { robot, inputs: meshes.inputs, notes })
 }
