@@ -7,6 +7,8 @@
 pub mod along;
 /// Room for the weight in every direction.
 mod any_gravity;
+/// Where joints and object are between two waypoints.
+pub mod between;
 /// Everything that can collide, and which pairs must not.
 pub mod bodies;
 /// Force closure with margin, by exact second-order cones.
