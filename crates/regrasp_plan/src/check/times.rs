@@ -29,8 +29,8 @@ const ROUNDING: f64 = 1e-6;
 /// Share of the largest speed that may stay unknown of a fingertip between the moments at which it is measured. What is unknown
 /// counts as speed.
 const UNKNOWN_SPEED: f64 = 0.005;
-/// Most moments of a step at which the speed of a fingertip is measured.
-const MOST_MOMENTS: usize = 64;
+/// Share of a step that is not divided further for that.
+const SMALLEST_SPAN: f64 = 1.0 / 1024.0;
 
 /// Time from the first waypoint to the last, in seconds.
 pub fn duration(plan: &Plan) -> f64 {
@@ -160,13 +160,21 @@ fn tip_way(finger: &FingerModel, motion: &Between, limit: f64) -> f64 {
         finger.path.velocity(&finger.center, &motion.joints_at(u), &rates).norm()
     };
     let unknown = finger.path.rates(&finger.center, 0.0, &motion.joint_bounds()).jerk / 8.0;
-    let ends = speed(0.0).max(speed(1.0));
-    if ends + unknown <= limit || !unknown.is_finite() {
-        return ends + unknown;
+    let mut largest: f64 = 0.0;
+    let mut pending = vec![[0.0, 1.0].map(|u| (u, speed(u)))];
+    while let Some([first, last]) = pending.pop() {
+        let span = last.0 - first.0;
+        let most = first.1.max(last.1) + unknown * span * span;
+        let is_known = unknown * span * span <= UNKNOWN_SPEED * limit || span <= SMALLEST_SPAN;
+        if most <= limit || is_known || !most.is_finite() {
+            largest = largest.max(most);
+            continue;
+        }
+        let middle = 0.5 * (first.0 + last.0);
+        let middle = (middle, speed(middle));
+        pending.extend([[middle, last], [first, middle]]);
     }
-    let n = ((unknown / (UNKNOWN_SPEED * limit)).sqrt().ceil() as usize).clamp(2, MOST_MOMENTS);
-    let inner = (1..n).map(|i| speed(i as f64 / n as f64));
-    inner.fold(ends, f64::max) + unknown / (n * n) as f64
+    largest
 }
 
 /// Largest speed of the object's centre of mass and angular speed times radius, in metres per unit of the parameter.

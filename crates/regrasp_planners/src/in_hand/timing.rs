@@ -19,7 +19,7 @@ mod step;
 
 use super::model::Model;
 use super::record::CONTACT_TOLERANCE;
-use path::Path;
+use path::{Path, Stray};
 use regrasp_plan::plan::{MotionLimits, Segment, SegmentKind, Waypoint};
 use speeds::Speeds;
 
@@ -29,6 +29,9 @@ pub const LEAST_SPAN: f64 = 1e-3;
 const ROUNDS: usize = 4;
 /// Share of what the search leaves between it and the checker that the motion may stray from the chords.
 const STRAY_SHARE: f64 = 0.5;
+/// How far links may turn aside of the chords in a segment of tracking, there and back, in radians: a quarter of what checkers
+/// allow to contacts that do not turn.
+const TRACKED_TURN: f64 = 5e-4;
 /// More than rounding.
 const ROUNDING: f64 = 1e-6;
 
@@ -64,7 +67,8 @@ fn largest_stray(model: &Model) -> f64 {
 /// `SpeedSettings::ramp` passes between segments where forces change.
 pub fn assign_times(model: &Model, limits: &MotionLimits, segments: &mut [Segment], least_span: impl Fn(usize) -> f64) {
     let mut now = 0.0;
-    let mut timing = Timing { path: Path::new(model, limits), speeds: Speeds::default(), stray: largest_stray(model) };
+    let way = largest_stray(model);
+    let mut timing = Timing { path: Path::new(model, limits), speeds: Speeds::default(), way };
     let mut before: Option<SegmentKind> = None;
     for (index, segment) in segments.iter_mut().enumerate() {
         let goes_on = (before, segment.kind) == (Some(SegmentKind::Transfer), SegmentKind::Transfer);
@@ -72,7 +76,8 @@ pub fn assign_times(model: &Model, limits: &MotionLimits, segments: &mut [Segmen
             now += model.settings.speed.ramp;
         }
         before = Some(segment.kind);
-        timing.assign(&mut segment.waypoints, now, least_span(index));
+        let stray = timing.stray(segment);
+        timing.assign(&mut segment.waypoints, now, least_span(index), stray);
         now = segment.waypoints.last().map_or(now, |last| last.time);
     }
 }
@@ -81,24 +86,33 @@ pub fn assign_times(model: &Model, limits: &MotionLimits, segments: &mut [Segmen
 struct Timing<'m, 'a> {
     path: Path<'m, 'a>,
     speeds: Speeds,
-    /// How far the motion may stray from the chords, in metres.
-    stray: f64,
+    /// How far points of the hand may stray from the chords, in metres.
+    way: f64,
 }
 
 impl Timing<'_, '_> {
-    fn assign(&mut self, waypoints: &mut [Waypoint], start: f64, least_span: f64) {
-        let Timing { path, speeds, stray } = self;
-        path.begin(waypoints, *stray);
-        for round in 0..=ROUNDS {
+    /// How far fingers may stray from the chords of a segment. In tracking, turns of its steps add up.
+    fn stray(&self, segment: &Segment) -> Stray {
+        let turn = match segment.kind {
+            SegmentKind::Tracking => 0.5 * TRACKED_TURN / segment.waypoints.len() as f64,
+            SegmentKind::Transfer | SegmentKind::Regrasp => f64::INFINITY,
+        };
+        Stray { way: self.way, turn }
+    }
+
+    fn assign(&mut self, waypoints: &mut [Waypoint], start: f64, least_span: f64, stray: Stray) {
+        let Timing { path, speeds, .. } = self;
+        path.begin(waypoints, stray);
+        for round in 0.. {
             path.find_steps(waypoints, least_span);
             speeds.find(path);
-            // In the last round all that strays too far stops.
+            // After some rounds all that strays too far stops.
             let mut is_done = true;
             for k in 0..path.steps.len() {
                 let strays = path.stray(k, speeds.speeds[k], speeds.speeds[k + 1], speeds.spans[k]);
-                if strays > *stray * (1.0 + ROUNDING) {
+                if strays > 1.0 + ROUNDING {
                     is_done = false;
-                    path.slow_down(k, if round + 1 < ROUNDS { *stray / strays } else { 0.0 });
+                    path.slow_down(k, if round < ROUNDS { 1.0 / strays } else { 0.0 });
                 }
             }
             if is_done {

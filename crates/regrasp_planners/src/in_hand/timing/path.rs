@@ -9,13 +9,16 @@ use regrasp_robot::kinematics::chain::Motion;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use std::ops::Range;
 
-/// Share of the largest speed of fingertips and object that is aimed at. It is exact at waypoints and half-way between, and the
-/// checker counts what it does not know.
+/// Share of the largest speed of fingertips and object that is aimed at. It is exact at waypoints, and the checker counts what it
+/// does not know.
 const AIMED_AT: f64 = 0.985;
-/// Share of the largest speed that fingertips keep at all moments looked at.
+/// Moments of a step, beside waypoints, at which fingertips aim at it.
+const MOMENTS: [f64; 3] = [0.25, 0.5, 0.75];
+/// Share of the largest speed that fingertips keep in the end.
 const KEPT: f64 = 0.993;
-/// Moments of a step, beside waypoints, at which fingertips are looked at in the end.
-const LOOKS: [f64; 3] = [0.25, 0.5, 0.75];
+/// Looks at the fingertips in a step for that, of any length, and of one longer than this, in radians or metres of all joints.
+const LOOKS: [usize; 2] = [8, 16];
+const LONG_STEP: f64 = 0.12;
 /// Joints nearer to their limits than this do not go beyond where the waypoints are, in radians or metres.
 const NEAR_LIMIT: f64 = 0.02;
 /// With velocities up to this many times the mean ones on both sides cubics never turn back (Fritsch and Carlson 1980).
@@ -23,11 +26,22 @@ const MONOTONE: f64 = 1.5;
 /// A waypoint at which joints would go slower than this share of the path's speed is one at which they stop.
 const LEAST_SHARE: f64 = 0.05;
 
+/// How far fingers may stray from the chords.
+#[derive(Debug, Clone, Copy)]
+pub struct Stray {
+    /// Any point of them, in metres.
+    pub way: f64,
+    /// Any link of them, in radians.
+    pub turn: f64,
+}
+
 /// A finger with what the timing asks of it.
 struct Finger {
     coordinates: Range<usize>,
     /// By coordinate: how far any point of the finger goes at most per unit of it, in metres.
     levers: Vec<f64>,
+    /// By coordinate: how far any link of the finger turns at most per unit of it, in radians.
+    turns: Vec<f64>,
 }
 
 /// The path of a segment.
@@ -48,8 +62,9 @@ pub struct Path<'m, 'a> {
     /// Step by step and joint by joint, the chord's direction.
     chords: Vec<f64>,
     lengths: Vec<f64>,
-    /// How far fingers stray from the chord of a step per path speed at its ends and second.
+    /// How far fingers stray from the chord of a step per path speed at its ends and second, as shares of what they may.
     strays: Vec<Vec<[f64; 2]>>,
+    allowed: Stray,
 }
 
 impl<'m, 'a> Path<'m, 'a> {
@@ -60,7 +75,7 @@ impl<'m, 'a> Path<'m, 'a> {
             let chain = of_model.ik.chain();
             let coordinates = first..first + chain.n_coordinates();
             first = coordinates.end;
-            let mut levers = vec![0.0; chain.n_coordinates()];
+            let [mut levers, mut turns] = [vec![0.0; chain.n_coordinates()], vec![0.0; chain.n_coordinates()]];
             let mut length = of_model.ik.center_in_body().coords.norm() + of_model.tip_radius;
             for joint in chain.joints.iter().rev() {
                 let slide = chain.lower[joint.coordinate].abs().max(chain.upper[joint.coordinate].abs());
@@ -69,9 +84,10 @@ impl<'m, 'a> Path<'m, 'a> {
                     Motion::Slide => (1.0, joint.multiplier.abs() * slide + joint.offset.abs()),
                 };
                 levers[joint.coordinate] += joint.multiplier.abs() * per_unit;
+                turns[joint.coordinate] += if joint.motion == Motion::Turn { joint.multiplier.abs() } else { 0.0 };
                 length += joint.parent_from_joint.translation.vector.norm() + longer;
             }
-            Finger { coordinates, levers }
+            Finger { coordinates, levers, turns }
         };
         let fingers: Vec<Finger> = model.fingers.iter().map(finger).collect();
         Path {
@@ -86,12 +102,14 @@ impl<'m, 'a> Path<'m, 'a> {
             chords: Vec::new(),
             lengths: Vec::new(),
             strays: Vec::new(),
+            allowed: Stray { way: 0.0, turn: 0.0 },
         }
     }
 
-    /// The chords of a segment, and directions at its waypoints that stray at most by `stray` metres.
-    pub fn begin(&mut self, waypoints: &[Waypoint], stray: f64) {
+    /// The chords of a segment, and directions at its waypoints that stray no farther than allowed.
+    pub fn begin(&mut self, waypoints: &[Waypoint], allowed: Stray) {
         let n = self.n_joints;
+        self.allowed = allowed;
         self.chords.clear();
         self.lengths.clear();
         for pair in waypoints.windows(2) {
@@ -107,12 +125,12 @@ impl<'m, 'a> Path<'m, 'a> {
         self.stops.clear();
         self.stops.resize(waypoints.len(), true);
         for k in 1..waypoints.len().saturating_sub(1) {
-            self.find_direction(k, &waypoints[k], stray);
+            self.find_direction(k, &waypoints[k]);
         }
     }
 
     /// The direction of the parabola through waypoint `k` and its neighbours, by length of the chords.
-    fn find_direction(&mut self, k: usize, waypoint: &Waypoint, stray: f64) {
+    fn find_direction(&mut self, k: usize, waypoint: &Waypoint) {
         let n = self.n_joints;
         let (before, after) = (self.lengths[k - 1], self.lengths[k]);
         if before == 0.0 || after == 0.0 {
@@ -141,7 +159,7 @@ impl<'m, 'a> Path<'m, 'a> {
             .map(|(chord, length)| 0.25 * length * self.off_chord(chord, &direction))
             .into_iter()
             .fold(0.0, f64::max);
-        let share = if off > stray { stray / off } else { 1.0 };
+        let share = if off > 1.0 { 1.0 / off } else { 1.0 };
         if share >= LEAST_SHARE {
             self.stops[k] = false;
             let own = &mut self.directions[k * n..(k + 1) * n];
@@ -149,9 +167,9 @@ impl<'m, 'a> Path<'m, 'a> {
         }
     }
 
-    /// How far a point of any finger goes at most aside of the chord, per unit of the path.
+    /// How far any finger goes at most aside of the chord per unit of the path, as a share of what it may.
     fn off_chord(&self, chord: &[f64], direction: &[f64]) -> f64 {
-        self.fingers.iter().map(|finger| off_chord(finger, chord, direction)).fold(0.0, f64::max)
+        self.fingers.iter().map(|finger| off_chord(finger, chord, direction, self.allowed)).fold(0.0, f64::max)
     }
 
     /// What limits the steps and the waypoints.
@@ -214,13 +232,16 @@ impl<'m, 'a> Path<'m, 'a> {
             if own.iter().all(|direction| direction.iter().all(|value| *value == 0.0)) {
                 continue;
             }
-            let half_way: Coordinates =
-                from.joints[range.clone()].iter().zip(&to.joints[range]).map(|(a, b)| 0.5 * (a + b)).collect();
-            let jacobian = of_model.ik.tip_jacobian(&half_way);
-            let [chord, first, last] = own.map(|direction| speed(&jacobian, direction));
-            tips.push(TipRow { chord, ends: [first, last] });
+            let (from, to) = (&from.joints[range.clone()], &to.joints[range]);
+            for moment in MOMENTS {
+                let there: Coordinates = from.iter().zip(to).map(|(a, b)| a + moment * (b - a)).collect();
+                let jacobian = of_model.ik.tip_jacobian(&there);
+                let [chord, first, last] = own.map(|direction| speed(&jacobian, direction));
+                tips.push(TipRow { moment, chord, ends: [first, last] });
+            }
         }
-        let strays = self.fingers.iter().map(|finger| ends.map(|end| off_chord(finger, chord, end))).collect();
+        let off = |finger| ends.map(|end| off_chord(finger, chord, end, self.allowed));
+        let strays = self.fingers.iter().map(off).collect();
         self.strays.push(strays);
         Step { length, rows, tips, tip_speed, least_span }
     }
@@ -242,8 +263,8 @@ impl<'m, 'a> Path<'m, 'a> {
         fastest.fold(0.0, f64::max) + turn.norm() * self.model.frame.torque_scale
     }
 
-    /// How far points of the hand stray at most from where they would be on the chord of step `k`, in metres, with these path speeds
-    /// at its ends.
+    /// How far the fingers stray at most from where they would be on the chord of step `k`, with these path speeds at its ends, as
+    /// a share of what they may.
     ///
     /// Across the chord the cubic has no change, only its two ends' velocities: `T u (1 - u)^2` times one and `T u^2 (1 - u)` times
     /// the other. A single one strays by 4/27 of that, two equal ones by 1/4.
@@ -270,45 +291,66 @@ impl<'m, 'a> Path<'m, 'a> {
         }
     }
 
-    /// By how much all must be slower so that fingertips keep their largest speed at the moments looked at; at least one.
+    /// By how much all must be slower so that fingertips keep their largest speed; at least one.
     pub fn too_fast(&self, waypoints: &[Waypoint], speeds: &Speeds) -> f64 {
-        let n = self.n_joints;
         let mut most: f64 = 1.0;
         for (k, pair) in waypoints.windows(2).enumerate() {
-            let span = speeds.spans[k];
             for (finger, of_model) in self.fingers.iter().zip(&self.model.fingers) {
-                let range = finger.coordinates.clone();
+                let range = &finger.coordinates;
                 let (from, to) = (&pair[0].joints[range.clone()], &pair[1].joints[range.clone()]);
-                let ends = [k, k + 1].map(|k| (&self.directions[k * n..][range.clone()], speeds.speeds[k] * span));
-                if from == to && ends.iter().all(|(direction, _)| direction.iter().all(|value| *value == 0.0)) {
+                let ends = [k, k + 1].map(|k| &self.directions[k * self.n_joints..][range.clone()]);
+                if from == to && ends.iter().all(|direction| direction.iter().all(|value| *value == 0.0)) {
                     continue;
                 }
-                for u in LOOKS {
+                let tangents = [k, k + 1].map(|end| speeds.speeds[end] * speeds.spans[k]);
+                let speed_at = |u: f64| {
                     let v = 1.0 - u;
                     let [blend, first, last] = [u * u * (3.0 - 2.0 * u), u * v * v, -u * u * v];
                     let [rate, first_rate, last_rate] = [6.0 * u * v, v * (1.0 - 3.0 * u), u * (3.0 * u - 2.0)];
                     let (mut joints, mut rates) = (Coordinates::new(), Coordinates::new());
                     for j in 0..from.len() {
-                        let (change, a, b) = (to[j] - from[j], ends[0].0[j] * ends[0].1, ends[1].0[j] * ends[1].1);
+                        let (change, a, b) = (to[j] - from[j], ends[0][j] * tangents[0], ends[1][j] * tangents[1]);
                         joints.push(from[j] + blend * change + first * a + last * b);
                         rates.push(rate * change + first_rate * a + last_rate * b);
                     }
-                    let speed = speed(&of_model.ik.tip_jacobian(&joints), &rates).norm() / span;
-                    most = most.max(speed / (KEPT * self.limits.largest_speed));
-                }
+                    speed(&of_model.ik.tip_jacobian(&joints), &rates).norm()
+                };
+                let n_looks = LOOKS[usize::from(self.lengths[k] > LONG_STEP)];
+                let way = largest((0..=n_looks).map(|look| speed_at(look as f64 / n_looks as f64)));
+                most = most.max(way / (speeds.spans[k] * KEPT * self.limits.largest_speed));
             }
         }
         most
     }
 }
 
+/// The largest of values that are taken evenly from a smooth function, and of the parabolas through three of them.
+fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    let (mut before, mut now, mut most): (f64, f64, f64) = (f64::NEG_INFINITY, f64::NEG_INFINITY, 0.0);
+    for after in values {
+        if now >= before && now >= after && before.is_finite() {
+            let bend = 2.0 * now - before - after;
+            most = most.max(now + if bend > 0.0 { (after - before).powi(2) / (8.0 * bend) } else { 0.0 });
+        }
+        most = most.max(after);
+        (before, now) = (now, after);
+    }
+    most
+}
+
 fn speed(jacobian: &[Vector], rates: &[f64]) -> Vector {
     jacobian.iter().zip(rates).map(|(column, rate)| column * *rate).sum()
 }
 
-/// How far a point of the finger goes at most aside of the chord, per unit of the path.
-fn off_chord(finger: &Finger, chord: &[f64], direction: &[f64]) -> f64 {
+/// How far the finger goes at most aside of the chord per unit of the path, as a share of what it may.
+fn off_chord(finger: &Finger, chord: &[f64], direction: &[f64], allowed: Stray) -> f64 {
     let along: f64 = chord.iter().zip(direction).map(|(a, b)| a * b).sum();
-    let own = finger.coordinates.clone().zip(&finger.levers);
-    own.map(|(k, lever)| lever * (direction[k] - along * chord[k]).abs()).sum()
+    let [mut way, mut turn] = [0.0, 0.0];
+    for (j, k) in finger.coordinates.clone().enumerate() {
+        let off = (direction[k] - along * chord[k]).abs();
+        way += finger.levers[j] * off;
+        turn += finger.turns[j] * off;
+    }
+    let share = |off: f64, allowed: f64| if off > 0.0 { off / allowed } else { 0.0 };
+    share(way, allowed.way).max(share(turn, allowed.turn))
 }

@@ -9,6 +9,8 @@ use super::step::Step;
 
 /// Shares of the speeds at both ends of a step that are tried, from 0 to 1.
 const SHARES: usize = 16;
+/// Where the joints stop at neither end, these first and last ones are left out: no waypoint has the speed zero then.
+const LEFT_OUT: usize = 2;
 /// Halvings after which a largest or smallest number that keeps the limits counts as found.
 const HALVINGS: usize = 10;
 /// Rounds in which single speeds are changed where that saves time.
@@ -55,7 +57,8 @@ impl Speeds {
         self.reachable.resize(path.steps.len() + 1, f64::INFINITY);
         for (k, step) in path.steps.iter().enumerate().rev().filter(|&(k, _)| !path.stops[k]) {
             let next = self.reachable[k + 1];
-            let most = shares().map(|share| share * step.largest_sum(share).min(next / (1.0 - share)));
+            let shares = if path.stops[k + 1] { shares(1, 0) } else { shares(LEFT_OUT, LEFT_OUT) };
+            let most = shares.map(|share| share * step.largest_sum(share).min(next / (1.0 - share)));
             self.reachable[k] = most.fold(0.0, f64::max).min(path.caps[k]);
         }
     }
@@ -69,7 +72,7 @@ impl Speeds {
             // From rest: the fastest at the end, and of these the shortest.
             (true, false) => {
                 let mut best = (0.0, 0.0);
-                for share in shares() {
+                for share in shares(0, 1) {
                     let sum = step.largest_sum(share).min(most / (1.0 - share));
                     let to = sum * (1.0 - share);
                     if to > best.0 * (1.0 + 1e-9) || (to >= best.0 * (1.0 - 1e-9) && sum > best.1) {
@@ -79,8 +82,8 @@ impl Speeds {
                 self.speeds[k + 1] = best.0 * KEPT;
                 best.1
             }
-            (false, true) => shares()
-                .filter(|&share| share > 0.0 && share * step.largest_sum(share) >= from * KEPT)
+            (false, true) => shares(1, 0)
+                .filter(|&share| share * step.largest_sum(share) >= from * KEPT)
                 .map(|share| from / share)
                 .fold(from, f64::max),
             (false, false) => {
@@ -136,7 +139,8 @@ impl Speeds {
 /// The least share of the first speed with which `from` is allowed: the fastest speed at the end.
 fn least_share(step: &Step, from: f64) -> f64 {
     let allows = |share: f64| share * step.largest_sum(share) >= from;
-    let Some(mut high) = shares().filter(|&share| share > 0.0).find(|&share| allows(share)) else { return 1.0 };
+    let mut tried = shares(LEFT_OUT, LEFT_OUT);
+    let Some(mut high) = tried.find(|&share| allows(share)) else { return 0.5 };
     let mut low = high - 1.0 / SHARES as f64;
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
@@ -148,6 +152,7 @@ fn least_share(step: &Step, from: f64) -> f64 {
     high
 }
 
-fn shares() -> impl Iterator<Item = f64> {
-    (0..=SHARES).map(|i| i as f64 / SHARES as f64)
+/// Shares from 0 to 1 without so many first and last ones.
+fn shares(first: usize, last: usize) -> impl Iterator<Item = f64> {
+    (first..=SHARES - last).map(|i| i as f64 / SHARES as f64)
 }

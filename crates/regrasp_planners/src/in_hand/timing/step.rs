@@ -20,13 +20,24 @@ pub struct Row {
     pub acceleration: f64,
 }
 
-/// A fingertip, with the Jacobian half-way between the waypoints.
+/// A fingertip at a moment between the waypoints, with the Jacobian there.
 #[derive(Debug, Clone, Copy)]
 pub struct TipRow {
+    /// Share of the step's time.
+    pub moment: f64,
     /// How it goes along the chord, in metres per unit of the path.
     pub chord: Vector,
     /// How it would go in the directions of both ends.
     pub ends: [Vector; 2],
+}
+
+impl TipRow {
+    /// Its velocity, with these even speed along the chord and path speeds at both ends.
+    fn velocity(&self, even: f64, speeds: [f64; 2]) -> Vector {
+        let (u, v) = (self.moment, 1.0 - self.moment);
+        let ends = [v * (1.0 - 3.0 * u) * speeds[0], u * (3.0 * u - 2.0) * speeds[1]];
+        self.chord * (6.0 * u * v * even) + self.ends[0] * ends[0] + self.ends[1] * ends[1]
+    }
 }
 
 /// A step: what limits it.
@@ -56,8 +67,7 @@ impl Step {
             bend = bend.max((middle - first).abs().max((last - middle).abs()) / row.acceleration);
         }
         for tip in &self.tips {
-            let half_way = 0.75 * tip.chord - 0.25 * (tip.ends[0] * share + tip.ends[1] * (1.0 - share));
-            pace = pace.max(half_way.norm() / self.tip_speed);
+            pace = pace.max(tip.velocity(0.5, [share, 1.0 - share]).norm() / self.tip_speed);
         }
         // The velocities are those of a parabola with these Bernstein coefficients, and the acceleration twice the difference
         // of two of them over the time.
@@ -75,10 +85,7 @@ impl Step {
                 let bend = 2.0 * rate * (middle - first).abs().max((last - middle).abs());
                 peak(first, middle, last) <= row.velocity && bend <= row.acceleration
             })
-            && self.tips.iter().all(|tip| {
-                let ends = tip.ends[0] * speeds[0] + tip.ends[1] * speeds[1];
-                (1.5 * even * tip.chord - 0.25 * ends).norm() <= self.tip_speed
-            })
+            && self.tips.iter().all(|tip| tip.velocity(even, speeds).norm() <= self.tip_speed)
     }
 }
 
