@@ -1,6 +1,7 @@
 //! What can be judged from the waypoints alone: names, numbers, start and goal, meeting of segments, limits, jumps, and
 //! which finger may change what.
 
+use crate::check::between::Between;
 use crate::check::model::Model;
 use crate::check::tracking;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
@@ -247,7 +248,7 @@ pub fn contacts_agree(a: &ContactState, b: &ContactState, tolerance: f64) -> boo
     a.holds() == b.holds() && near(a.point_in_object, b.point_in_object) && near(a.normal_in_object, b.normal_in_object)
 }
 
-/// Limits at every waypoint (motion between is linear, so they hold there too), and steps that are jumps.
+/// Limits at every waypoint and between, and steps that are jumps.
 pub fn check_joints(model: &Model, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
     for (s, segment) in plan.segments.iter().enumerate() {
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
@@ -266,6 +267,7 @@ pub fn check_joints(model: &Model, plan: &Plan, settings: &CheckSettings, log: &
         }
         for (w, pair) in segment.waypoints.windows(2).enumerate() {
             let at = Moment::at(s, w);
+            check_limits_between(model, &pair[0], &pair[1], at, settings, log);
             for (k, name) in model.joint_names.iter().enumerate() {
                 let step = (pair[1].joints[k] - pair[0].joints[k]).abs();
                 let limit = if model.slides[k] { settings.largest_slide } else { settings.largest_turn };
@@ -282,6 +284,35 @@ pub fn check_joints(model: &Model, plan: &Plan, settings: &CheckSettings, log: &
                 let violation = Violation::new(Kind::JointJump, message).when(at).subjects(["object"]);
                 log.push(violation.amount(distance.max(angle), settings.largest_turn));
             }
+        }
+    }
+}
+
+/// Limits where the cubic of a joint goes beyond its two waypoints.
+fn check_limits_between(
+    model: &Model,
+    from: &Waypoint,
+    to: &Waypoint,
+    at: Moment,
+    settings: &CheckSettings,
+    log: &mut Log,
+) {
+    let motion = Between::new(from, to);
+    for row in &model.limits {
+        let position = |way: f64| row.multiplier * (from.joints[row.coordinate] + way) + row.offset;
+        let ends = [0.0, motion.joint(row.coordinate).change].map(position);
+        let range = motion.joint(row.coordinate).range().map(position);
+        let beyond = |[a, b]: [f64; 2]| (row.lower - a.min(b)).max(a.max(b) - row.upper);
+        if beyond(range) > settings.limit_tolerance && beyond(ends) <= settings.limit_tolerance {
+            let message = format!(
+                "joint \"{}\" goes {:.3e} beyond [{:.6}, {:.6}] between two waypoints",
+                row.name,
+                beyond(range),
+                row.lower,
+                row.upper
+            );
+            let violation = Violation::new(Kind::JointLimit, message).when(at).subjects([row.name.as_str()]);
+            log.push(violation.amount(beyond(range), settings.limit_tolerance));
         }
     }
 }

@@ -22,8 +22,9 @@
 //!
 //! Mass, gravity and torque limits of the plan are held against scene and robot.
 
+use crate::check::between::Between;
 use crate::check::closure::Body;
-use crate::check::continuity::{contact_of, moving_finger, pose_between};
+use crate::check::continuity::{contact_of, moving_finger};
 use crate::check::kinematics::DrivenAxis;
 use crate::check::model::{FingerModel, Model};
 use crate::check::rolling::Roll;
@@ -381,6 +382,8 @@ impl Judge<'_> {
     /// What is left half-way from a waypoint to the next, as a share of the sum of all normal forces.
     fn check_half_way(&self, segment: &Segment, at: Moment, log: &mut Log) -> f64 {
         let (from, to) = (&segment.waypoints[at.waypoint], &segment.waypoints[at.waypoint + 1]);
+        let motion = Between::new(from, to);
+        let half_way = motion.half_way();
         let mut exerted = Vec::new();
         for (f, (before, after)) in from.contacts.iter().zip(&to.contacts).enumerate() {
             let (Some(first), Some(second)) = (contact_of(before), contact_of(after)) else { continue };
@@ -392,14 +395,13 @@ impl Judge<'_> {
             } else {
                 let tolerance = self.plan.promises.contact_tolerance;
                 let roll = Roll::new(&self.model.fingers[f], from, to, &self.object.shape, tolerance);
-                let Some(contact) = roll.contact(0.5) else { continue };
+                let Some(contact) = roll.contact(half_way) else { continue };
                 contact
             };
             exerted.push(Exerted { finger: f, point, normal, force, torsion, slides: None });
         }
         let pressing: f64 = exerted.iter().map(Exerted::pressing).sum();
-        let ends = [from, to].map(|waypoint| Pose::from(&waypoint.world_from_object));
-        let (force, moment) = self.residual(&pose_between(&ends[0], &ends[1], 0.5), &exerted);
+        let (force, moment) = self.residual(&motion.object_at(half_way), &exerted);
         // Fingers that do not press leave room for no imbalance, and nothing is divided by zero.
         let share = force.norm().hypot(moment.norm() / self.object.radius) / pressing.max(1e-9);
         let limit = self.settings.half_way_imbalance;
@@ -409,7 +411,7 @@ impl Judge<'_> {
                 force.norm(),
                 moment.norm()
             );
-            let violation = Violation::new(Kind::ForceUnbalanced, message).when(Moment { fraction: 0.5, ..at });
+            let violation = Violation::new(Kind::ForceUnbalanced, message).when(Moment { fraction: half_way, ..at });
             log.push(violation.subjects(["object"]).amount(share, limit));
         }
         share

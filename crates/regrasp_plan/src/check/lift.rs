@@ -104,8 +104,7 @@ impl Search<'_> {
                     Direction::Forward => sample as f64 / n_samples as f64,
                     Direction::Backward => 1.0 - sample as f64 / n_samples as f64,
                 };
-                let joints: Vec<f64> = from.joints.iter().zip(&to.joints).map(|(a, b)| a + t * (b - a)).collect();
-                let way = self.finger.center_in_world(&joints) - at_contact;
+                let way = self.finger.center_in_world(&step.joints(t)) - at_contact;
                 let along = way.dot(&normal);
                 let sideways = (way - normal * along).norm();
                 let at = Moment { segment: self.s, waypoint: w, fraction: t };

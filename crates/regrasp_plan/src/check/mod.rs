@@ -9,7 +9,7 @@ pub mod allowance;
 pub mod along;
 /// Room for the weight in every direction.
 mod any_gravity;
-/// Closure and pads of rolling contacts between waypoints.
+/// Where joints and object are between two waypoints.
 pub mod between;
 /// Everything that can collide, and which pairs must not.
 pub mod bodies;
@@ -51,6 +51,8 @@ pub mod patch;
 pub mod promises;
 /// Fingertips that roll.
 pub mod rolling;
+/// Closure and pads of rolling contacts between waypoints.
+pub mod rolling_closure;
 /// How far contacts slip from landing to lifting.
 pub mod slip;
 /// Distance from the object's surface and the normals there.
@@ -356,7 +358,7 @@ fn judge(
     contact::check_contacts(&scene.object, model, plan, settings, log);
     let at_waypoints = promises::check_closure(&scene.object, model, plan, settings, log);
     let between = match leap {
-        None => between::check_between(&scene.object, model, plan, settings, log),
+        None => rolling_closure::check_rolling_closure(&scene.object, model, plan, settings, log),
         Some(_) => None,
     };
     report.min_margin = at_waypoints.into_iter().chain(between).reduce(f64::min);

@@ -6,9 +6,10 @@
 //! 004, section IV-C; paper 003, section 6.2.2). Here slip is judged by segment, against what the plan promises; `slip` judges
 //! it from landing to lifting, with the turn of soft fingertips about `n`.
 
+use crate::check::between::Between;
 use crate::check::contact::error_at;
-use crate::check::continuity::{pose_between, pose_difference};
 use crate::check::model::{FingerModel, Model};
+use crate::check::motion::ObjectRates;
 use crate::check::patch::Patch;
 use crate::check::slip::StepSlip;
 use crate::check::tip::TipSurface;
@@ -110,9 +111,7 @@ pub(super) fn off_contact(finger: &FingerModel, error: f64, tolerance: f64) -> V
 /// A rolling fingertip between two waypoints; the parameter runs from 0 to 1.
 pub struct Roll<'a> {
     finger: &'a FingerModel,
-    from: &'a Waypoint,
-    to: &'a Waypoint,
-    world_from_object: [Pose; 2],
+    motion: Between<'a>,
     patch: Patch<'a>,
     /// Bound of the speed of whatever touches in the object frame.
     speed: f64,
@@ -146,14 +145,14 @@ impl<'a> Roll<'a> {
         shape: &'a Shape,
         tolerance: f64,
     ) -> Self {
-        let world_from_object = [from, to].map(|waypoint| Pose::from(&waypoint.world_from_object));
-        let (speed, acceleration) = bounds_in_object(finger, from, to);
-        let start = world_from_object[0].inverse() * finger.center_in_world(&from.joints);
+        let motion = Between::new(from, to);
+        let (speed, acceleration) = bounds_in_object(finger, &motion, from, to);
+        let start = Pose::from(&from.world_from_object).inverse() * finger.center_in_world(&from.joints);
         // Feet are sought from the centre, and from inside an ellipsoid.
         let inside = finger.surface.curvature_radii().map_or(0.0, |[_, flattest]| 2.0 * flattest);
         let patch = Patch::near(shape, &start, finger.radius + inside + 2.0 * tolerance + speed);
-        let speed = speed_in_object(finger, from, to);
-        Roll { finger, from, to, world_from_object, patch, speed, acceleration, looked: Cell::new(0) }
+        let speed = speed_in_object(finger, &motion, from, to);
+        Roll { finger, motion, patch, speed, acceleration, looked: Cell::new(0) }
     }
 
     /// Configurations looked at so far.
@@ -163,9 +162,8 @@ impl<'a> Roll<'a> {
 
     fn object_from_link(&self, t: f64) -> Matrix4<f64> {
         self.looked.set(self.looked.get() + 1);
-        let joints: Vec<f64> = self.from.joints.iter().zip(&self.to.joints).map(|(a, b)| a + t * (b - a)).collect();
-        let [start, end] = &self.world_from_object;
-        pose_between(start, end, t).inverse().to_homogeneous() * self.finger.path.world_from_link(&joints)
+        let link = self.finger.path.world_from_link(&self.motion.joints_at(t));
+        self.motion.object_at(t).inverse().to_homogeneous() * link
     }
 
     /// Where the tip touches, and the normal there, in the object frame.
@@ -315,26 +313,22 @@ fn turn_between(before: &Matrix4<f64>, after: &Matrix4<f64>) -> Vector {
 }
 
 /// Speed and acceleration bounds of the tip's centre seen from the object, per step and per step squared.
-///
-/// The second derivative of `R^T (p - o)` with constant angular velocity `w` and velocity `o'` is
-/// `p'' - 2 w x (p' - o') + w x (w x (p - o))`, turned.
-pub fn bounds_in_object(finger: &FingerModel, from: &Waypoint, to: &Waypoint) -> (f64, f64) {
-    let (shift, turn) = pose_difference(&from.world_from_object, &to.world_from_object);
-    let rates = finger.path.rates(&finger.center, 0.0, &from.joints, &to.joints);
+pub fn bounds_in_object(finger: &FingerModel, motion: &Between, from: &Waypoint, to: &Waypoint) -> (f64, f64) {
+    let object = ObjectRates::new(motion, from, to);
+    let rates = finger.path.rates(&finger.center, 0.0, &motion.joint_bounds());
     let origin = Pose::from(&from.world_from_object) * Point::origin();
-    let relative = rates.speed + shift;
-    let arm = (finger.center_in_world(&from.joints) - origin).norm() + relative;
-    (relative + turn * arm, rates.acceleration + 2.0 * turn * relative + turn * turn * arm)
+    let arm = (finger.center_in_world(&from.joints) - origin).norm();
+    (object.speed_seen(&rates, arm), object.acceleration_seen(&rates, arm))
 }
 
 /// Bound of the speed, per step, of whatever of a tip touches, seen from the object: of the points of the tip, and of the place
 /// on it that faces a direction ([`TipSurface::wander`](crate::check::tip::TipSurface::wander)).
-pub fn speed_in_object(finger: &FingerModel, from: &Waypoint, to: &Waypoint) -> f64 {
-    let (shift, turn) = pose_difference(&from.world_from_object, &to.world_from_object);
+pub fn speed_in_object(finger: &FingerModel, motion: &Between, from: &Waypoint, to: &Waypoint) -> f64 {
     let reach = finger.radius + finger.surface.wander();
-    let relative = finger.path.rates(&finger.center, reach, &from.joints, &to.joints).speed + shift;
+    let rates = finger.path.rates(&finger.center, reach, &motion.joint_bounds());
     let origin = Pose::from(&from.world_from_object) * Point::origin();
-    relative + turn * ((finger.center_in_world(&from.joints) - origin).norm() + reach + relative)
+    let arm = (finger.center_in_world(&from.joints) - origin).norm() + reach;
+    ObjectRates::new(motion, from, to).speed_seen(&rates, arm)
 }
 
 /// Length of an integral with what is unknown of it; infinite without one.

@@ -14,6 +14,7 @@
 //! has to roll at every level. The turn of soft fingertips about the normal, and the slip of fixed contacts over which a round
 //! fingertip pivots, count from level `motion` on.
 
+use crate::check::between::Between;
 use crate::check::continuity::{contact_of, moving_finger, pose_difference};
 use crate::check::level::Level;
 use crate::check::model::{FingerModel, Model};
@@ -180,7 +181,7 @@ fn fixed_slip(
 ) -> Option<StepSlip> {
     let (from, to) = (&segment.waypoints[w], &segment.waypoints[w + 1]);
     let (shift, turn) = pose_difference(&from.world_from_object, &to.world_from_object);
-    if shift == 0.0 && turn == 0.0 && !finger.path.moves(&from.joints, &to.joints) {
+    if shift == 0.0 && turn == 0.0 && !finger.path.moves(&Between::new(from, to).joint_bounds()) {
         return None;
     }
     let roll = Roll::new(finger, from, to, shape, settings.largest_contact_tolerance);

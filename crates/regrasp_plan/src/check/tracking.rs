@@ -24,6 +24,7 @@
 //! `turn_tolerance` for turns, each summed over the steps of a segment so that nothing cancels. In every step is faster
 //! than `smallest_sliding_speed`. Relative velocities are means: slide and turn over the time of the step.
 
+use crate::check::between::Between;
 use crate::check::contact::error_at;
 use crate::check::continuity::contact_of;
 use crate::check::model::{FingerModel, Model};
@@ -431,11 +432,9 @@ pub fn check_reach(reach: f64, model: &Model, plan: &Plan, settings: &CheckSetti
 /// Where in a step the tip's centre is farther than `limit` from where it rests, or may be, and how far; and the number of
 /// configurations looked at.
 fn too_far(finger: &FingerModel, from: &Waypoint, to: &Waypoint, limit: f64) -> (Option<(f64, f64)>, u64) {
-    let acceleration = finger.path.rates(&finger.center, 0.0, &from.joints, &to.joints).acceleration;
-    let distance = |t: f64| {
-        let joints: Vec<f64> = from.joints.iter().zip(&to.joints).map(|(a, b)| a + t * (b - a)).collect();
-        (finger.center_in_world(&joints) - finger.center_at_rest).norm()
-    };
+    let motion = Between::new(from, to);
+    let acceleration = finger.path.rates(&finger.center, 0.0, &motion.joint_bounds()).acceleration;
+    let distance = |t: f64| (finger.center_in_world(&motion.joints_at(t)) - finger.center_at_rest).norm();
     let ends = [0.0, 1.0].map(|t| (distance(t), t));
     let mut pending = vec![ends];
     let mut looked = 2;

@@ -13,7 +13,7 @@ mod reach_map;
 mod three_r;
 
 use super::body_frame::BodyFrame;
-use super::chain::Chain;
+use super::chain::{Chain, JointLine, Motion};
 use arrayvec::ArrayVec;
 use numeric::NumericIk;
 use regrasp_base::Rng;
@@ -215,6 +215,22 @@ impl FingerIk {
     #[inline]
     pub fn tip(&self, coordinates: &[f64]) -> Point {
         self.chain.last_frame(coordinates).point(&self.center_in_body)
+    }
+
+    /// Columns of the Jacobian of the tip's centre, one per coordinate, in the base frame.
+    pub fn tip_jacobian(&self, coordinates: &[f64]) -> ArrayVec<Vector, MAX_COORDINATES> {
+        let mut lines: ArrayVec<JointLine, { 2 * MAX_COORDINATES }> = ArrayVec::new();
+        let tip = self.chain.joint_lines(coordinates, &mut lines).point(&self.center_in_body).coords;
+        let mut columns: ArrayVec<Vector, MAX_COORDINATES> =
+            (0..self.chain.n_coordinates()).map(|_| Vector::zeros()).collect();
+        for (joint, line) in self.chain.joints.iter().zip(&lines) {
+            let column = match joint.motion {
+                Motion::Turn => line.axis.cross(&(tip - line.origin)),
+                Motion::Slide => line.axis,
+            };
+            columns[joint.coordinate] += joint.multiplier * column;
+        }
+        columns
     }
 }
 
