@@ -17,5 +17,5 @@ pub use collision_pairs::{CollisionPairs, FingerShapeId, collision_pairs};
 pub use gravity::{Gravity, STANDARD_GRAVITY};
 pub use load::{Goal, InHandTask, LoadedScene, StartOrientation, load_scene};
 pub use object::Object;
-pub use query::{GraspRequest, InHandQuery, TaskKind};
+pub use query::{GRASP_TOLERANCE, GRASP_TURN_TOLERANCE, GraspRequest, InHandQuery, TaskKind};
 pub use scene::{InputFile, Obstacle, Scene};

@@ -91,7 +91,7 @@ impl Bodies {
             Bodies { carriers: vec![Carrier::Object, Carrier::World], items: Vec::new(), pairs: Vec::new() };
         bodies.add_hand(scene, model)?;
         let object = &scene.object;
-        bodies.add(&object.name, Owner::Object, OBJECT, &Pose::identity(), &object.shape)?;
+        bodies.add(&object.name, Owner::Object, OBJECT, &Pose::identity(), object.solid())?;
         for obstacle in &scene.obstacles {
             let placed = &obstacle.placed;
             bodies.add(&obstacle.name, Owner::Obstacle, WORLD, &placed.parent_from_shape, &placed.shape)?;

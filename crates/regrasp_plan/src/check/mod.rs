@@ -21,6 +21,8 @@ pub mod continuity;
 pub mod edges;
 /// Obstacles that are too far away to matter in a step.
 pub mod far;
+/// Grasps that the query gives.
+pub mod given;
 /// `regrasp check`: everything is read afresh from files.
 pub mod files;
 /// The scene file of a plan, where nobody says which it is.
@@ -282,6 +284,7 @@ fn judge(
 ) {
     report.n_waypoints = plan.segments.iter().map(|segment| segment.waypoints.len()).sum();
     continuity::check_ends(query, plan, settings, log);
+    given::check_given(&scene.object.shape, query, model, plan, settings, log);
     way::check_way(query, plan, settings, log);
     continuity::check_meeting(plan, settings, log);
     continuity::check_joints(model, plan, settings, log);

@@ -29,8 +29,12 @@ pub(crate) mod forces_along;
 mod free;
 /// Two gait trees that grow until they meet.
 mod gait;
+/// Hands that are inside something.
+pub(crate) mod inside;
 /// Linear paths in GS_n.
 mod grasp_path;
+/// Given joints and contacts that nearly touch.
+mod given;
 /// Grasps at a given object pose.
 mod grasps;
 /// Better plans after the first.
@@ -86,6 +90,7 @@ mod visibility;
 /// Configurations and continuous collision tests.
 pub(crate) mod workspace;
 
+pub use given::{MovedFinger, moved_fingers};
 pub use settings::{
     Alpha, AnyDirection, CostWeights, FirstTry, ForceSettings, GravityInHand, InHandSettings, Method, ReleaseRule,
     SpeedSettings, TransferMode,

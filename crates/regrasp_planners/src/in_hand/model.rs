@@ -81,6 +81,8 @@ pub struct Body {
     pub center: Point,
     /// Radius of the bounding ball.
     pub radius: f64,
+    /// Some point of the shape, in the body frame: where it is inside a mesh, the body is that crosses none of its triangles.
+    pub middle: Point,
     /// What moves it.
     pub carrier: Carrier,
     /// Name for messages.
@@ -157,6 +159,7 @@ impl<'a> Model<'a> {
                     carrier_from_body: Placement::from(body_from_shape),
                     center,
                     radius,
+                    middle: shape.middle(),
                     carrier: Carrier::Finger { finger: f, link, bound },
                     name: format!("{name} ({})", finger.name),
                 });
@@ -203,7 +206,7 @@ impl<'a> Model<'a> {
         let object = bodies.len();
         bodies.push(Body {
             carrier: Carrier::Object,
-            ..fixed_body(&scene.object.shape, scene.object.mesh_body.as_ref(), &Pose::identity(), &scene.object.name)
+            ..fixed_body(scene.object.solid(), scene.object.mesh_body.as_ref(), &Pose::identity(), &scene.object.name)
         });
         for obstacle in &scene.obstacles {
             let (shape, place) = (&obstacle.placed.shape, &obstacle.placed.parent_from_shape);
@@ -344,6 +347,7 @@ fn fixed_body(shape: &Shape, mesh_body: Option<&MeshBody>, world_from_shape: &Po
             carrier_from_body: Placement::from(place),
             center,
             radius,
+            middle: shape.middle(),
             carrier: Carrier::World,
             name: name.to_owned(),
         }

@@ -550,8 +550,9 @@ impl<'a> Workspace<'a> {
         // Whatever the moment, one of the two ends is at most half of the motion away.
         let needed = required + 0.5 * relative_motion;
         let mut smallest = 0.0;
+        // Outside at one end and apart all along is outside all along.
         if tree.is_apart(&body.shape, &now, needed, &mut smallest)
-            && tree.is_apart(&body.shape, &next, needed, &mut smallest)
+            && tree.is_outside((&body.shape, &body.middle), &next, needed, &mut smallest)
         {
             self.slack[index] = smallest;
             return true;
@@ -585,7 +586,10 @@ impl<'a> Workspace<'a> {
                 let highest = corners.iter().map(|p| normal_in_object.dot(&p.coords)).fold(f64::NEG_INFINITY, f64::max);
                 lowest - highest >= -allowed
             });
-            if !is_apart {
+            // What it may press into lies below; where it is thicker than that, it must not be inside with all of the rest.
+            let middle = object_from_tip.point(&tip.middle);
+            let is_thick = normal_in_object.dot(&middle.coords) - lowest > allowed;
+            if !is_apart || (is_thick && tree.holds(&middle)) {
                 return false;
             }
         }
