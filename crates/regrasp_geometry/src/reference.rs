@@ -37,7 +37,8 @@ const MAX_STEPS: usize = 40;
 pub enum Answer {
     /// At least this far apart, in m, above zero. Proven by a separating plane.
     SeparatedBy(f64),
-    /// They share points; the depth in m, at least zero, is parry's estimate (of one triangle for meshes).
+    /// They share points, or are too near to tell; the depth in m, at least zero, is parry's estimate, or, where that fails, the
+    /// overlap along some axis, which is no smaller (of one triangle for meshes).
     Penetrating(f64),
     /// Not decided: counts as a collision.
     Unresolved,
@@ -321,7 +322,20 @@ fn answer_and_axis(a: &Convex, b: &Convex, a_from_b: &ParryPose, max: f64) -> (A
             return (Answer::Penetrating(margins - reached), ParryVector::ZERO);
         }
     }
-    (shallow, ParryVector::ZERO)
+    if shallow != Answer::Unresolved {
+        return (shallow, ParryVector::ZERO);
+    }
+    // Whatever the search said: along any axis the overlap bounds the depth from above.
+    let axes = [ParryVector::X, ParryVector::Y, ParryVector::Z];
+    let of_b = axes.map(|axis| a_from_b.transform_vector(axis));
+    let mut all = vec![first_axis, -first_axis];
+    all.extend(axes.iter().chain(&of_b).flat_map(|&axis| [axis, -axis]));
+    let (gap, axis) = widest_slab(a, b, a_from_b, &all, 0.0);
+    match gap {
+        gap if !gap.is_finite() => (Answer::Unresolved, ParryVector::ZERO),
+        gap if gap > 0.0 => (Answer::SeparatedBy(gap), axis),
+        gap => (Answer::Penetrating(-gap), ParryVector::ZERO),
+    }
 }
 
 /// Width of the widest slab found between `a` and `b`, starting across `axes`; not above zero when none separates them.

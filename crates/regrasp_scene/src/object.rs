@@ -10,11 +10,11 @@ pub struct Object {
     pub name: String,
     /// Its shape: contacts lie on the surface of this one.
     pub shape: Shape,
-    /// Its convex hull, where other bodies keep away from that (`solid = "hull"`).
+    /// Its convex hull, where all but the fingertips keep away from that (`solid = "hull"`).
     pub hull: Option<Shape>,
     /// Largest distance of a point of the object from its centre of mass, in metres: the torque scale of grasp quality.
     pub radius: f64,
-    /// For a mesh without a hull in its place, what collision tests ask of it.
+    /// For a mesh, what collision tests ask of it.
     pub mesh_body: Option<MeshBody>,
     /// The surface that fingertips touch.
     pub surface: Surface,
@@ -31,7 +31,7 @@ pub struct Object {
 }
 
 impl Object {
-    /// What other bodies keep away from: the shape, or its hull.
+    /// What all but the fingertips keep away from: the shape, or its hull.
     pub fn solid(&self) -> &Shape {
         self.hull.as_ref().unwrap_or(&self.shape)
     }

@@ -8,7 +8,6 @@ use super::transfer::ik_settings;
 use super::workspace::{TipMode, Workspace};
 use regrasp_base::Rng;
 use regrasp_geometry::collision::Placement;
-use regrasp_geometry::collision::support::support_value;
 use regrasp_geometry::{Point, Pose, UnitVector, Vector, interpolate_pose};
 use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::{Coordinates, IkSettings};
@@ -61,8 +60,7 @@ impl Way {
 /// Draws a contact on the object that lies towards `finger`, with the object at `world_from_object`.
 ///
 /// A ray from a random inner point within a wide cone about the finger's working place: twice as quick as drawing by
-/// area (in-hand-notes, 5). The contact is where the ray leaves the solid: where that happens more than once, any of them, but
-/// the last where a hull stands for the object, as the others are under it.
+/// area (in-hand-notes, 5). The contact is where the ray leaves the solid: where that happens more than once, any of them.
 pub fn draw_contact(model: &Model, finger: usize, world_from_object: &Placement, rng: &mut Rng) -> Option<Contact> {
     (0..RAYS).find_map(|_| draw_contact_once(model, finger, world_from_object, rng))
 }
@@ -80,7 +78,6 @@ fn draw_contact_once(model: &Model, finger: usize, world_from_object: &Placement
     let chosen = match exits.len() {
         0 => return None,
         1 => 0,
-        n if object.hull.is_some() => n - 1,
         n => rng.below(n),
     };
     let hit = exits.swap_remove(chosen);
@@ -93,17 +90,7 @@ fn draw_contact_once(model: &Model, finger: usize, world_from_object: &Placement
     if object.surface.crease_distance(&hit) < object.edge_distance {
         return None;
     }
-    let contact = Contact { point_in_object: hit.point_in_object, normal_in_object: hit.normal_in_object };
-    is_bare(model, &contact).then_some(contact)
-}
-
-/// False where the hull that stands for the object is in the way of a tip on its surface.
-fn is_bare(model: &Model, contact: &Contact) -> bool {
-    model.scene.object.hull.as_ref().is_none_or(|hull| {
-        let outward = contact.normal_in_object.into_inner();
-        let over = support_value(hull, &outward, &mut 0) - outward.dot(&contact.point_in_object.coords);
-        over <= model.settings.contact_allowance
-    })
+    Some(Contact { point_in_object: hit.point_in_object, normal_in_object: hit.normal_in_object })
 }
 
 /// Joints of `finger` at `contact` from which it can be lifted again, clear of everything but the other fingers; the

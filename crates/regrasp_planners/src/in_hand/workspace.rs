@@ -536,12 +536,15 @@ impl<'a> Workspace<'a> {
     fn trees_apart(&mut self, index: usize, required: f64) -> bool {
         let pair = self.pairs[index];
         let model = self.model;
-        let (mesh, other) = match (&model.bodies[pair.a].tree, &model.bodies[pair.b].tree) {
-            (_, Some(_)) => (pair.b, pair.a),
-            (Some(_), None) => (pair.a, pair.b),
+        let tree_of = |body: usize| match pair.tip_of {
+            Some(_) => model.bodies[body].tree_for_tips.as_ref(),
+            None => model.bodies[body].tree.as_ref(),
+        };
+        let (mesh, other, tree) = match (tree_of(pair.a), tree_of(pair.b)) {
+            (_, Some(tree)) => (pair.b, pair.a, tree),
+            (Some(tree), None) => (pair.a, pair.b, tree),
             (None, None) => return false,
         };
-        let Some(tree) = &model.bodies[mesh].tree else { return false };
         let body = &model.bodies[other];
         let now = self.now.at(model, mesh).inverse_then(self.now.at(model, other));
         let next = self.next.at(model, mesh).inverse_then(self.next.at(model, other));
@@ -575,7 +578,7 @@ impl<'a> Workspace<'a> {
             if gap >= -allowed {
                 continue;
             }
-            let Some(tree) = &object.tree else { return false };
+            let Some(tree) = &object.tree_for_tips else { return false };
             let object_from_tip = at_object.inverse_then(at_tip);
             let normal_in_object = at_object.vector_to_child(&normal);
             let in_tip = object_from_tip.vector_to_child(&-normal_in_object);

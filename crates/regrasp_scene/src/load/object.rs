@@ -61,7 +61,7 @@ pub(super) fn object(root: &mut Table, files: &mut Files, found: &mut Found) -> 
     }
     // Both take long for meshes of a million triangles.
     let (surface, mesh_body) = std::thread::scope(|scope| {
-        let mesh_body = scope.spawn(|| if hull.is_none() { MeshBody::of(&shape) } else { None });
+        let mesh_body = scope.spawn(|| MeshBody::of(&shape));
         let surface = Surface::with_crease_angle(&shape, crease_angle);
         (surface, mesh_body.join().expect("preparing a mesh does not panic"))
     });
