@@ -20,5 +20,5 @@ pub use gravity::{Gravity, STANDARD_GRAVITY};
 pub use limits::Limits;
 pub use load::{Goal, InHandTask, LoadedScene, StartOrientation, load_scene};
 pub use object::Object;
-pub use query::{GraspRequest, InHandQuery, TaskKind};
+pub use query::{GRASP_TOLERANCE, GRASP_TURN_TOLERANCE, GraspRequest, InHandQuery, TaskKind};
 pub use scene::{InputFile, Obstacle, Scene};

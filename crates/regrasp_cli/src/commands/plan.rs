@@ -14,6 +14,7 @@ use regrasp::base::files;
 use regrasp::plan::format;
 use regrasp::plan::plan::Statistics;
 use regrasp::planners::FailureKind;
+use regrasp::planners::in_hand::moved_fingers;
 use regrasp::scene::TaskKind;
 use regrasp::{Budget, Failure, InHandQuery, Plan, PlannerSettings, Scene};
 use serde_json::json;
@@ -179,7 +180,21 @@ pub fn search(
         Err(failure) => return Err(Stop::NoPlan(Box::new(failure))),
     };
     say_plan(&plan, started.elapsed().as_secs_f64(), talk);
+    say_moved(scene, query, &plan, talk);
     Ok(plan)
+}
+
+/// Says which fingers the plan has elsewhere than the query, because they did not touch there.
+fn say_moved(scene: &Scene, query: &InHandQuery, plan: &Plan, talk: &Talk) {
+    for moved in moved_fingers(scene, query, plan) {
+        let micrometres = 1e6 * moved.distance;
+        talk.say(format!(
+            "note   at the {} finger \"{}\" did not touch as given: it was moved by {micrometres:.0} micrometres",
+            moved.end, moved.finger
+        ));
+        let event = json!({ "end": moved.end, "finger": moved.finger, "distance": moved.distance });
+        talk.event("moved", event);
+    }
 }
 
 /// Says what was found, in how many seconds.

@@ -8,7 +8,7 @@ use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, ContactState, FORMAT, FORMAT_VERSION, Plan, PoseData, Segment, SegmentKind, Waypoint};
 use regrasp_geometry::{Pose, UnitVector, Vector};
-use regrasp_scene::{GraspRequest, InHandQuery, TaskKind};
+use regrasp_scene::{InHandQuery, TaskKind};
 
 /// Tasks that there are.
 const TASKS: [&str; 2] = ["in_hand", "tracking"];
@@ -177,9 +177,9 @@ pub fn check_ends(query: Option<&InHandQuery>, plan: &Plan, settings: &CheckSett
             log.push(violation.amount(distance.max(angle), settings.pose_tolerance));
         }
         let Some(query) = query else { continue };
-        let (pose, grasp) = match kind {
-            Kind::StartMismatch => (&query.world_from_object_start, &query.start_grasp),
-            _ => (&query.world_from_object_goal, &query.goal_grasp),
+        let pose = match kind {
+            Kind::StartMismatch => &query.world_from_object_start,
+            _ => &query.world_from_object_goal,
         };
         let (distance, angle) = pose_difference(&PoseData::from(pose), asked);
         let distance = if within.is_some() { 0.0 } else { distance };
@@ -188,29 +188,6 @@ pub fn check_ends(query: Option<&InHandQuery>, plan: &Plan, settings: &CheckSett
             let violation = Violation::new(kind, message).subjects(["object"]);
             log.push(violation.amount(distance.max(angle), settings.pose_tolerance));
         }
-        let error = grasp_error(grasp, waypoint);
-        if error > settings.pose_tolerance {
-            let message = format!("the {name} grasp is {error:.3e} (m or rad) from the one asked for");
-            log.push(Violation::new(kind, message).when(at).amount(error, settings.pose_tolerance));
-        }
-    }
-}
-
-fn grasp_error(asked: &GraspRequest, waypoint: &Waypoint) -> f64 {
-    match asked {
-        GraspRequest::Automatic => 0.0,
-        GraspRequest::Joints(joints) if joints.len() != waypoint.joints.len() => f64::INFINITY,
-        GraspRequest::Joints(joints) => {
-            joints.iter().zip(&waypoint.joints).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
-        }
-        GraspRequest::Contacts(points) if points.len() != waypoint.contacts.len() => f64::INFINITY,
-        GraspRequest::Contacts(points) => points
-            .iter()
-            .zip(&waypoint.contacts)
-            .map(|(asked, contact)| {
-                contact.point_in_object.map_or(f64::INFINITY, |point| (Vector::from(point) - asked.coords).norm())
-            })
-            .fold(0.0, f64::max),
     }
 }
 

@@ -31,6 +31,8 @@ pub mod files;
 pub mod find_scene;
 /// Contact forces and joint torques.
 pub mod forces;
+/// Grasps that the query gives.
+pub mod given;
 /// The checker's own forward kinematics and motion bounds.
 pub mod kinematics;
 /// How much a verdict covers.
@@ -346,6 +348,7 @@ fn judge(
 ) {
     report.n_waypoints = plan.segments.iter().map(|segment| segment.waypoints.len()).sum();
     continuity::check_ends(query, plan, settings, log);
+    given::check_given(&scene.object.shape, query, model, plan, settings, log);
     way::check_way(query, plan, settings, log);
     continuity::check_meeting(plan, settings, log);
     continuity::check_joints(model, plan, settings, log);

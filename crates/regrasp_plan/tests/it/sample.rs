@@ -154,6 +154,7 @@ fn hand() -> Hand {
 
 /// The object: a sphere whose centre of mass is its centre.
 fn object() -> Object {
+        hull: None,
     let shape = Shape::Sphere { radius: OBJECT_RADIUS };
     Object {
         name: "ball".into(),

@@ -1,6 +1,8 @@
 //! Start and goal as the query gives them: what is wrong with them is said before any search.
 
 use super::combine::releasable;
+use super::given::{self, NoTouch};
+use super::inside::refuse_hand_inside;
 use super::model::{Body, Carrier, FingerModel, Model};
 use super::settings::Method;
 use super::state::GraspState;
@@ -10,14 +12,11 @@ use crate::failure::{Failure, FailureKind};
 use regrasp_base::Rng;
 use regrasp_geometry::collision::{Answer, Placement, separation};
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
+use regrasp_grasp::ContactModel;
 use regrasp_grasp::closure::may_close;
-use regrasp_grasp::{Contact, ContactModel};
 use regrasp_robot::kinematics::finger_ik::{Coordinates, IkSettings};
 use regrasp_robot::kinematics::whole_pose::{has_all_directions, joints_of_pose};
-use regrasp_scene::{GraspRequest, InHandQuery};
-
-/// Distance of a given fingertip from the surface, and of a given contact point, that still counts as touching.
-const TOUCHING: f64 = 1e-4;
+use regrasp_scene::{GRASP_TOLERANCE, GraspRequest, InHandQuery};
 
 /// Which pose of the query.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,7 +61,7 @@ pub fn refuse_hopeless(model: &Model, query: &InHandQuery) -> Result<(), Failure
         refuse_buried_object(model, end, pose)?;
         refuse_object_out_of_reach(model, end, pose)?;
     }
-    Ok(())
+    refuse_hand_inside(model, &query.world_from_object_start)
 }
 
 /// Refuses hands of which the others can never hold while one finger is away.
@@ -157,15 +156,14 @@ pub fn object_blocked_by<'m>(model: &'m Model, world_from_object: &Pose) -> Opti
             &mut [0; 2],
         );
         let exactly_apart = || {
-            let tree_apart =
-                |tree: &regrasp_geometry::collision::MeshTree, mesh_at: &Placement, shape, at: &Placement| {
-                    tree.is_apart(shape, &mesh_at.inverse_then(at), clearance, &mut 0.0)
-                };
-            object.tree.as_ref().is_some_and(|tree| tree_apart(tree, &at_object, &body.shape, &body.carrier_from_body))
-                || body
-                    .tree
-                    .as_ref()
-                    .is_some_and(|tree| tree_apart(tree, &body.carrier_from_body, &object.shape, &at_object))
+            let outside = |mesh: &Body, mesh_at: &Placement, other: &Body, at: &Placement| {
+                let mesh_from_other = mesh_at.inverse_then(at);
+                mesh.tree.as_ref().is_some_and(|tree| {
+                    tree.is_outside((&other.shape, &other.middle), &mesh_from_other, clearance, &mut 0.0)
+                })
+            };
+            outside(object, &at_object, body, &body.carrier_from_body)
+                || outside(body, &body.carrier_from_body, object, &at_object)
         };
         !matches!(answer, Answer::SeparatedBy(_)) && !exactly_apart()
     })
@@ -299,24 +297,23 @@ fn from_joints(model: &Model, end: End, world_from_object: &Pose, values: &[f64]
                 "give joint positions within the limits; regrasp inspect prints them",
             ));
         }
-        // No finger moves by the rounding of the given joints: the contact is the one that the tip has as it stands.
-        let surface = &model.scene.object.surface;
-        let Some((contact, distance)) = finger.contact_at(surface, &own, &placement) else {
-            return Err(end.failure(
-                format!("at the {} the tip of finger \"{name}\" has no contact: it is deep in the object", end.name()),
-                "correct the joints or give contacts",
-            ));
-        };
-        if distance.abs() > TOUCHING {
-            return Err(end.failure(
-                format!(
-                    "at the {} the tip of finger \"{name}\" is {:.2} mm off the surface",
-                    end.name(),
-                    distance * 1e3
-                ),
-                "correct the joints or give contacts",
-            ));
-        }
+        let (contact, own) =
+            given::touching(finger, &model.scene.object.surface, &own, &placement).map_err(|no_touch| {
+                let off = |gap: f64| {
+                    let side = if gap < 0.0 { "inside" } else { "off" };
+                    format!("is {:.2} mm {side} the surface", gap.abs() * 1e3)
+                };
+                let problem = match no_touch {
+                    NoTouch::Inside => "has no contact: it is deep in the object".to_owned(),
+                    NoTouch::Off(gap) => format!("{}; at most {} mm are put right", off(gap), GRASP_TOLERANCE * 1e3),
+                    NoTouch::Stuck(gap) => format!("{}, and no joints near the given ones touch", off(gap)),
+                };
+                let message = format!("at the {} the tip of finger \"{name}\" {problem}", end.name());
+                end.failure(
+                    message,
+                    "correct the joints, give contacts, or let the planner choose (grasp = \"automatic\")",
+                )
+            })?;
         if !finger.pad_faces(&own, &placement.vector(&contact.normal_in_object)) {
             return Err(end.failure(
                 format!("at the {} finger \"{name}\" touches outside its pad", end.name()),
@@ -340,17 +337,17 @@ fn from_contacts(
     let (mut joints, mut contacts) = (HandJoints::new(), Contacts::new());
     for (f, point) in points.iter().enumerate() {
         let name = &model.scene.hand.fingers[f].name;
-        let surface = &model.scene.object.surface;
-        let foot = surface.project(point);
-        let distance = (point - foot.point_in_object).norm();
-        if distance > TOUCHING {
-            return Err(end.failure(
-                format!("the {} contact of finger \"{name}\" is {:.2} mm off the surface", end.name(), distance * 1e3),
-                "give a point on the surface, in the object frame",
-            ));
+        let (contact, distance) = given::contact_for(&model.fingers[f], &model.scene.object.surface, point);
+        if distance > GRASP_TOLERANCE {
+            let message = format!(
+                "the {} contact of finger \"{name}\" is {:.2} mm from the nearest place that the tip can touch; at most {} mm \
+                 are put right",
+                end.name(),
+                distance * 1e3,
+                GRASP_TOLERANCE * 1e3
+            );
+            return Err(end.failure(message, "give a point on the surface, in the object frame"));
         }
-        let foot = surface.settle(&foot, model.fingers[f].settle_radius).unwrap_or(foot);
-        let contact = Contact { point_in_object: foot.point_in_object, normal_in_object: foot.normal_in_object };
         let mut workspace = Workspace::new(model);
         workspace.place_object(world_from_object);
         let reached = match &mut near {

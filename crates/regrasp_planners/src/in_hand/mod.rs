@@ -29,12 +29,16 @@ pub(crate) mod forces_along;
 mod free;
 /// Two gait trees that grow until they meet.
 mod gait;
+/// Given joints and contacts that nearly touch.
+mod given;
 /// Linear paths in GS_n.
 mod grasp_path;
 /// Grasps at a given object pose.
 mod grasps;
 /// Better plans after the first.
 mod improve;
+/// Hands that are inside something.
+pub(crate) mod inside;
 /// Legs of a query, from way pose to way pose.
 mod legs;
 /// Links between grasps.
@@ -86,6 +90,7 @@ mod visibility;
 /// Configurations and continuous collision tests.
 pub(crate) mod workspace;
 
+pub use given::{MovedFinger, moved_fingers};
 pub use settings::{
     Alpha, CostWeights, FirstTry, ForceSettings, InHandSettings, Method, ReleaseRule, SpeedSettings, TransferMode,
 };

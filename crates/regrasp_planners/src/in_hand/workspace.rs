@@ -540,12 +540,15 @@ impl<'a> Workspace<'a> {
     fn trees_apart(&mut self, index: usize, required: f64) -> bool {
         let pair = self.pairs[index];
         let model = self.model;
-        let (mesh, other) = match (&model.bodies[pair.a].tree, &model.bodies[pair.b].tree) {
-            (_, Some(_)) => (pair.b, pair.a),
-            (Some(_), None) => (pair.a, pair.b),
+        let tree_of = |body: usize| match pair.tip_of {
+            Some(_) => model.bodies[body].tree_for_tips.as_ref(),
+            None => model.bodies[body].tree.as_ref(),
+        };
+        let (mesh, other, tree) = match (tree_of(pair.a), tree_of(pair.b)) {
+            (_, Some(tree)) => (pair.b, pair.a, tree),
+            (Some(tree), None) => (pair.a, pair.b, tree),
             (None, None) => return false,
         };
-        let Some(tree) = &model.bodies[mesh].tree else { return false };
         let body = &model.bodies[other];
         let now = self.now.at(model, mesh).inverse_then(self.now.at(model, other));
         let next = self.next.at(model, mesh).inverse_then(self.next.at(model, other));
@@ -554,8 +557,9 @@ impl<'a> Workspace<'a> {
         // Whatever the moment, one of the two ends is at most half of the motion away.
         let needed = required + 0.5 * relative_motion;
         let mut smallest = 0.0;
+        // Outside at one end and apart all along is outside all along.
         if tree.is_apart(&body.shape, &now, needed, &mut smallest)
-            && tree.is_apart(&body.shape, &next, needed, &mut smallest)
+            && tree.is_outside((&body.shape, &body.middle), &next, needed, &mut smallest)
         {
             self.slack[index] = smallest;
             return true;
@@ -578,7 +582,7 @@ impl<'a> Workspace<'a> {
             if gap >= -allowed {
                 continue;
             }
-            let Some(tree) = &object.tree else { return false };
+            let Some(tree) = &object.tree_for_tips else { return false };
             let object_from_tip = at_object.inverse_then(at_tip);
             let normal_in_object = at_object.vector_to_child(&normal);
             let in_tip = object_from_tip.vector_to_child(&-normal_in_object);
@@ -589,7 +593,10 @@ impl<'a> Workspace<'a> {
                 let highest = corners.iter().map(|p| normal_in_object.dot(&p.coords)).fold(f64::NEG_INFINITY, f64::max);
                 lowest - highest >= -allowed
             });
-            if !is_apart {
+            // What it may press into lies below; where it is thicker than that, it must not be inside with all of the rest.
+            let middle = object_from_tip.point(&tip.middle);
+            let is_thick = normal_in_object.dot(&middle.coords) - lowest > allowed;
+            if !is_apart || (is_thick && tree.holds(&middle)) {
                 return false;
             }
         }

@@ -125,6 +125,9 @@ fn hand(hand: &Hand, reach: Option<f64>) -> Digest {
 fn object(object: &Object) -> Digest {
     let mut feed = Feed::default();
     feed.shape(&object.shape);
+    if let Some(hull) = &object.hull {
+        feed.shape(hull);
+    }
     feed.point(&object.center_of_mass);
     feed.numbers([object.edge_distance, object.crease_angle]);
     feed.digest()
