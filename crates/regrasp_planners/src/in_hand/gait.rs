@@ -6,7 +6,9 @@
 use super::model::MAX_FINGERS;
 use super::search::{Search, Stop};
 use super::shorten::{Arrival, change_grasp, change_grasp_over, whole_transfer};
+use super::spin::{self, Meeting};
 use super::state::{GraspState, Sequence};
+use super::transfer::is_carried_out;
 use super::tree::{Node, Place, Tree, land};
 use crate::outline::{Outline, OutlineEdge};
 use arrayvec::ArrayVec;
@@ -156,10 +158,43 @@ fn bridge(search: &mut Search, trees: &mut [Tree; 2], growing: usize, node: usiz
         }
     }
     let place = nearest.1?;
+    if spin::is_restricted(search.model(), state.holding) {
+        return bridge_halfway(search, (tree, other), (node, place), growing);
+    }
     let across = whole_transfer(search, state, other.places[place].pool.world_from_object())?;
     let (there, join) = join(search, &across, other, place)?;
     let way = tree.trace(node).then(join)?.then(other.trace(there).reversed())?;
     Some(from_the_start(growing, way))
+}
+
+/// From a new node and from one of `place` of the other tree to a pose between them, and there from one grasp into the other:
+/// where soft fingertips leave the object few directions, transfers seldom arrive where the other tree is.
+fn bridge_halfway(
+    search: &mut Search,
+    (tree, other): (&Tree, &Tree),
+    (node, place): (usize, usize),
+    growing: usize,
+) -> Option<Sequence> {
+    let model = search.model();
+    let state = tree.nodes[node].state();
+    let there = &other.places[place].nodes;
+    let drawn: ArrayVec<usize, JOINS> = (0..JOINS.min(there.len())).map(|_| there[search.rng.below(there.len())]).collect();
+    drawn.into_iter().find_map(|there| {
+        let theirs = other.nodes[there].state();
+        let Meeting { moments: [mine, their_moments] } = spin::meet(model, [state, theirs])?;
+        let mut rng = Rng::child(&search.rng, "halfway", 0);
+        search.rng.bits();
+        let workspace = &mut search.workspace;
+        if !is_carried_out(workspace, state, &mine) || !is_carried_out(workspace, theirs, &their_moments) {
+            return None;
+        }
+        let (mut way, mut back) = (Sequence::at(state.clone()), Sequence::at(theirs.clone()));
+        way.push_transfer(mine);
+        back.push_transfer(their_moments);
+        let join = change_grasp(search, &way, back.end(), Arrival::Exact, &mut rng)?;
+        let way = tree.trace(node).then(join)?.then(back.reversed())?.then(other.trace(there).reversed())?;
+        Some(from_the_start(growing, way))
+    })
 }
 
 /// `way` and then relocations into exactly one of the nodes at `place` of `other`, which has the object pose that `way`
