@@ -10,6 +10,8 @@
 //! ([`pursue`]). It seldom ends exactly there: two transfers with different grasps can meet exactly ([`meet`]), as
 //! `k + k'` conditions on their common pose leave a choice for up to six.
 
+use super::candidates::Candidate;
+use super::combine::Choice;
 use super::model::{MAX_FINGERS, Model};
 use super::roll::{NoStep, STEP_SPIN};
 use super::state::{GraspState, Moment};
@@ -18,6 +20,8 @@ use arrayvec::ArrayVec;
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector6};
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Pose, Vector, frame};
+use regrasp_grasp::Contact;
+use regrasp_robot::kinematics::finger_ik::Coordinates;
 
 /// Shift of the centre of mass, and turn times the object's radius, in the world, in metres.
 pub type Twist = Vector6<f64>;
@@ -58,6 +62,18 @@ fn moved(model: &Model, from: &Pose, twist: &Twist) -> Pose {
     Pose::from_parts(origin.coords.into(), rotation)
 }
 
+/// The turn of `finger` about its contact's normal per twist of the object, with the object at `placement`. None near a
+/// singularity.
+fn condition(model: &Model, finger: usize, placement: &Placement, contact: &Contact, joints: &Coordinates) -> Option<Twist> {
+    let center = placement.point(&model.frame.center_of_mass);
+    let normal = placement.vector(&contact.normal_in_object);
+    let point = placement.point(&contact.point_in_object);
+    let ik = model.fingers[finger].ik;
+    let gradient = ik.turn_per_motion(joints, &(point - ik.tip(joints)), &normal)?;
+    let by_turn = ((point - center).cross(&gradient) - normal) / model.turn_length();
+    Some(Twist::new(gradient.x, gradient.y, gradient.z, by_turn.x, by_turn.y, by_turn.z))
+}
+
 /// Turns about contact normals per twist of the object: one row for each finger that restricts it.
 #[derive(Debug, Clone, Default)]
 struct Conditions {
@@ -68,17 +84,9 @@ impl Conditions {
     /// Those of the fingers of `holding`. None where a finger is near a singularity.
     fn of(model: &Model, holding: u32, here: &Moment) -> Option<Self> {
         let placement = Placement::from(&here.world_from_object);
-        let center = placement.point(&model.frame.center_of_mass);
         let mut rows = ArrayVec::new();
         for finger in (0..model.n_fingers()).filter(|&f| holding & (1 << f) != 0 && model.restricts_motion(f)) {
-            let contact = &here.contacts[finger];
-            let normal = placement.vector(&contact.normal_in_object);
-            let point = placement.point(&contact.point_in_object);
-            let ik = model.fingers[finger].ik;
-            let arm = point - ik.tip(&here.joints[finger]);
-            let gradient = ik.turn_per_motion(&here.joints[finger], &arm, &normal)?;
-            let by_turn = ((point - center).cross(&gradient) - normal) / model.turn_length();
-            rows.push(Twist::new(gradient.x, gradient.y, gradient.z, by_turn.x, by_turn.y, by_turn.z));
+            rows.push(condition(model, finger, &placement, &here.contacts[finger], &here.joints[finger])?);
         }
         Some(Conditions { rows })
     }
@@ -275,4 +283,46 @@ fn step_together(
         twist -= both.least(&spins)?;
     }
     None
+}
+
+/// How freely combinations of candidates let the object go where it is wanted.
+#[derive(Debug)]
+pub struct Freedom {
+    /// The twist wanted, of length one.
+    wanted: Twist,
+    /// The condition of each finger with each of its candidates; none where it has none.
+    rows: Vec<Vec<Option<Twist>>>,
+}
+
+impl Freedom {
+    /// On the way from `here` to `target`. None where nothing restricts the object's motion.
+    pub fn towards(model: &Model, options: &[Vec<Candidate>], here: &Pose, target: &Pose) -> Option<Self> {
+        let wanted = twist_between(model, here, target).try_normalize(1e-9)?;
+        if !(0..model.n_fingers()).any(|finger| model.restricts_motion(finger)) {
+            return None;
+        }
+        let placement = Placement::from(here);
+        let of_finger = |(finger, candidates): (usize, &Vec<Candidate>)| {
+            let of = |candidate: &Candidate| {
+                let contact = candidate.contact.filter(|_| model.restricts_motion(finger))?;
+                condition(model, finger, &placement, &contact, &candidate.joints)
+            };
+            candidates.iter().map(of).collect()
+        };
+        Some(Freedom { wanted, rows: options.iter().enumerate().map(of_finger).collect() })
+    }
+
+    /// Share of the twist wanted that is left with these candidates.
+    pub fn share(&self, choice: &Choice) -> f64 {
+        let mut across: ArrayVec<Twist, MAX_FINGERS> = ArrayVec::new();
+        let mut left = self.wanted;
+        for row in choice.iter().zip(&self.rows).filter_map(|(&option, rows)| rows[option]) {
+            let rest = across.iter().fold(row, |rest, axis| rest - axis * axis.dot(&rest));
+            if let Some(axis) = rest.try_normalize(1e-6 * row.norm()) {
+                left -= axis * axis.dot(&left);
+                across.push(axis);
+            }
+        }
+        left.norm()
+    }
 }
