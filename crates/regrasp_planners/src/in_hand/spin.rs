@@ -36,8 +36,8 @@ const LEAST_WAY: f64 = 0.02;
 const MAX_HALVINGS: i32 = 4;
 /// Steps of a transfer that does not go straight, for each straight one.
 const MOST_STEPS: usize = 4;
-/// How far from both ends transfers may meet, as a multiple of the distance between them. By hand.
-const FARTHEST_MEETING: f64 = 2.5;
+/// How far from both ends transfers may meet: a multiple of the distance between them, and a distance, in metres. By hand.
+const FARTHEST_MEETING: (f64, f64) = (2.5, 0.03);
 
 /// True when some finger of `holding` leaves the object only some directions.
 pub fn is_restricted(model: &Model, holding: u32) -> bool {
@@ -223,16 +223,11 @@ pub fn meet(model: &Model, states: [&GraspState; 2]) -> Option<Meeting> {
         if both.rows.len() > 6 {
             return None;
         }
-        // The first goes by `x`, the second by `x - d`: neither spins, and the sum of squares is least.
         let d = apart(&here);
-        let mut wanted: Spins = conditions[0].rows.iter().map(|_| 0.0).collect();
-        wanted.extend(conditions[1].turns(&d));
-        let halfway = d * 0.5;
-        let lacking: Spins = wanted.iter().zip(both.turns(&halfway)).map(|(a, b)| a - b).collect();
-        let first = halfway + both.least(&lacking)?;
+        let first = first_way(&conditions, &both, &d)?;
         let ways = [first, first - d];
         let longest = ways[0].norm().max(ways[1].norm());
-        if made[0].max(made[1]) + longest > FARTHEST_MEETING * whole + full {
+        if made[0].max(made[1]) + longest > FARTHEST_MEETING.0 * whole + FARTHEST_MEETING.1 {
             return None;
         }
         if longest <= length
@@ -260,6 +255,28 @@ pub fn meet(model: &Model, states: [&GraspState; 2]) -> Option<Meeting> {
         }
     }
     None
+}
+
+/// Of two grasps that are `d` apart the first goes by `x` and the second by `x - d` so that they meet: neither turns about
+/// a normal, and the sum of squares is least. To first order.
+fn first_way(conditions: &[Conditions; 2], both: &Conditions, d: &Twist) -> Option<Twist> {
+    let mut wanted: Spins = conditions[0].rows.iter().map(|_| 0.0).collect();
+    wanted.extend(conditions[1].turns(d));
+    let halfway = d * 0.5;
+    let lacking: Spins = wanted.iter().zip(both.turns(&halfway)).map(|(a, b)| a - b).collect();
+    Some(halfway + both.least(&lacking)?)
+}
+
+/// How far the one that goes farther would have to go to meet, to first order. None where they cannot.
+pub fn way_to_meeting(model: &Model, states: [&GraspState; 2]) -> Option<f64> {
+    let here = states.map(GraspState::moment);
+    let conditions =
+        [Conditions::of(model, states[0].holding, &here[0])?, Conditions::of(model, states[1].holding, &here[1])?];
+    let both = conditions[0].clone().and(&conditions[1]);
+    let d = twist_between(model, &here[0].world_from_object, &here[1].world_from_object);
+    let first = if both.rows.len() > 6 { None } else { first_way(&conditions, &both, &d) }?;
+    let longest = first.norm().max((first - d).norm());
+    (longest < FARTHEST_MEETING.0 * d.norm() + FARTHEST_MEETING.1).then_some(longest)
 }
 
 /// The last step of both to one pose, about `first` from where the first one is.
