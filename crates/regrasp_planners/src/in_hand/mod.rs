@@ -69,6 +69,8 @@ mod sequence_tests;
 pub mod settings;
 /// Random shortcuts.
 mod shorten;
+/// Motions in which soft fingertips do not turn about their normals.
+mod spin;
 /// Points of GS_n and the motions between them.
 pub(crate) mod state;
 /// Why attempts failed.

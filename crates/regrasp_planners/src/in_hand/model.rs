@@ -300,6 +300,20 @@ impl<'a> Model<'a> {
         self.settings.transfer == TransferMode::Rolling && self.fingers[finger].tip_radius > 0.0
     }
 
+    /// True when `finger` rolls and must not turn about the contact's normal: a soft fingertip holds on to what it touches.
+    #[inline]
+    pub fn resists_spin(&self, finger: usize) -> bool {
+        let has_torsion = matches!(self.fingers[finger].contact, ContactModel::SoftFinger { torsion_radius } if torsion_radius > 0.0);
+        has_torsion && self.rolls(finger)
+    }
+
+    /// True when the object must move so that soft fingertips do not turn about their normals: `finger` resists, and has no
+    /// joint to spare with which it could turn along with the object.
+    #[inline]
+    pub fn restricts_motion(&self, finger: usize) -> bool {
+        self.resists_spin(finger) && !self.fingers[finger].ik.is_redundant()
+    }
+
     /// True when some finger rolls: contacts then travel while the object moves.
     #[inline]
     pub fn any_rolls(&self) -> bool {

@@ -64,6 +64,17 @@ pub struct Asked {
     pub error: Vector,
     /// That point as seen from the tip's centre, in metres.
     pub arm: Vector,
+    /// A turn of the last body, where one is asked for too.
+    pub turn: Option<AskedTurn>,
+}
+
+/// A turn of the last body about an axis, in the base frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AskedTurn {
+    /// The axis, a unit vector.
+    pub axis: Vector,
+    /// Angle that is still to go, in radians.
+    pub left: f64,
 }
 
 /// Inverse kinematics of one finger, prepared.
@@ -186,6 +197,13 @@ impl FingerIk {
         asked: impl FnMut(&BodyFrame) -> Option<Asked>,
     ) -> Option<Coordinates> {
         numeric::follow(&self.chain, &self.center_in_body, start, settings, asked)
+    }
+
+    /// How fast the last body turns about `axis` for each velocity of the point at `arm` from the tip's centre: a vector in
+    /// the base frame, in radians per metre. Of the joint velocities that move the point so, the least count. None near a
+    /// singularity.
+    pub fn turn_per_motion(&self, coordinates: &[f64], arm: &Vector, axis: &Vector) -> Option<Vector> {
+        numeric::turn_per_motion(&self.chain, &self.center_in_body, coordinates, arm, axis)
     }
 
     /// The tip's centre, in the frame of the last body.
