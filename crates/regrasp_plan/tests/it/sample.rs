@@ -154,13 +154,13 @@ fn hand() -> Hand {
 
 /// The object: a sphere whose centre of mass is its centre.
 fn object() -> Object {
-        hull: None,
     let shape = Shape::Sphere { radius: OBJECT_RADIUS };
     Object {
         name: "ball".into(),
         surface: surface_of(&shape),
         radius: OBJECT_RADIUS,
         mesh_body: None,
+        hull: None,
         shape,
         mass: 0.1,
         center_of_mass: Point::origin(),

@@ -64,7 +64,13 @@ fn moved(model: &Model, from: &Pose, twist: &Twist) -> Pose {
 
 /// The turn of `finger` about its contact's normal per twist of the object, with the object at `placement`. None near a
 /// singularity.
-fn condition(model: &Model, finger: usize, placement: &Placement, contact: &Contact, joints: &Coordinates) -> Option<Twist> {
+fn condition(
+    model: &Model,
+    finger: usize,
+    placement: &Placement,
+    contact: &Contact,
+    joints: &Coordinates,
+) -> Option<Twist> {
     let center = placement.point(&model.frame.center_of_mass);
     let normal = placement.vector(&contact.normal_in_object);
     let point = placement.point(&contact.point_in_object);
@@ -123,13 +129,7 @@ fn are_still(spins: &[f64]) -> bool {
 }
 
 /// The step by `twist`, corrected until nothing turns about a normal.
-fn step(
-    model: &Model,
-    holding: u32,
-    here: &Moment,
-    twist: &Twist,
-    conditions: &Conditions,
-) -> Result<Moment, NoStep> {
+fn step(model: &Model, holding: u32, here: &Moment, twist: &Twist, conditions: &Conditions) -> Result<Moment, NoStep> {
     let mut twist = *twist;
     for _ in 0..CORRECTIONS {
         let pose = moved(model, &here.world_from_object, &twist);
