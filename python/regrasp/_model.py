@@ -258,10 +258,14 @@ class Query:
     """World from object at the goal."""
 
 
+Source = tuple[str, dict[str, str], bool, list[float] | str | None]
+"""What a scene was read from: file, packages, lenient, gravity instead of the file's."""
+
+
 class Scene:
     """Hand, object, obstacles and task. Made by `load_scene`."""
 
-    def __init__(self, native: _regrasp.Scene, source: tuple[str, dict[str, str], bool]) -> None:
+    def __init__(self, native: _regrasp.Scene, source: Source) -> None:
         fields: dict[str, Any] = json.loads(native.describe())
         self._native = native
         self._source = source
@@ -312,21 +316,31 @@ class Scene:
         return f"<Scene {self.name!r}: {self.hand.name}, {self.object.shape.kind} {self.object.name!r}{obstacles}>"
 
 
-def load_scene(path: StrPath, *, packages: Mapping[str, StrPath] | None = None, lenient: bool = False) -> Scene:
+def load_scene(
+    path: StrPath,
+    *,
+    packages: Mapping[str, StrPath] | None = None,
+    lenient: bool = False,
+    gravity: Sequence[float] | Literal["any"] | None = None,
+) -> Scene:
     """Reads a scene file and every file it names.
 
     `packages` says where `package://NAME/` is; `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH` are looked at after it. With
     `lenient`, what cannot be understood in robot files is dropped and listed in `notes`, instead of refused.
 
+    gravity: instead of the scene file's: a direction in the frame of the hand's base link, or "any". Plans are made and judged
+    under it.
+
     Raises `InputError`, with every cause found.
     """
     named = {name: os.fspath(folder) for name, folder in (packages or {}).items()}
-    return _load_scene(os.fspath(path), named, lenient)
+    stated = gravity if gravity is None or isinstance(gravity, str) else [float(x) for x in gravity]
+    return _load_scene(os.fspath(path), named, lenient, stated)
 
 
-def _load_scene(path: str, packages: dict[str, str], lenient: bool) -> Scene:
-    native = _regrasp.Scene.load(path, load_options("load_scene", packages, lenient))
-    return Scene(native, (path, packages, lenient))
+def _load_scene(path: str, packages: dict[str, str], lenient: bool, gravity: list[float] | str | None) -> Scene:
+    native = _regrasp.Scene.load(path, load_options("load_scene", packages, lenient), gravity)
+    return Scene(native, (path, packages, lenient, gravity))
 
 
 def load_hand(path: StrPath, *, packages: Mapping[str, StrPath] | None = None, lenient: bool = False) -> Hand:

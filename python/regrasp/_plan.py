@@ -19,7 +19,7 @@ import numpy.typing as npt
 from . import _regrasp
 from ._arguments import StrPath
 from ._errors import InputError
-from ._model import FloatArray, Pose, pose_of
+from ._model import FloatArray, Pose, Source, pose_of
 from ._result import Report
 
 CONTACT_MODES = ("free", "fixed", "rolling", "pure_rolling", "twisting", "pure_sliding", "sliding")
@@ -68,7 +68,7 @@ class Plan:
         self.path: str | None = path
         """The file it was read from, or last saved to."""
         # The scene it was planned for, when `plan` made it: path, packages, lenient.
-        self._source: tuple[str, dict[str, str], bool] | None = None
+        self._source: Source | None = None
         self.report: Report | None = report
         """What the checker said when `plan` made it."""
         self.joint_names: tuple[str, ...] = tuple(fields["joint_names"])

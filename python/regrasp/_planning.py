@@ -21,6 +21,9 @@ from ._result import Failure, Progress, Report, failure_of, report_of
 METHODS = ("gait", "visibility", "classic", "tracking", "tracking+gaiting")
 MAX_THREADS = 1024
 
+Level = Literal["geometry", "forces", "motion"]
+"""What a plan is judged for; a higher level asks for all that the lower ones ask for."""
+
 
 def plan(
     scene: Scene | StrPath,
@@ -34,6 +37,7 @@ def plan(
     improve: float | None = None,
     improve_work: int | None = None,
     settings: Mapping[str, Any] | None = None,
+    level: Level = "motion",
     progress: Callable[[Progress], object] | None = None,
 ) -> Plan | Failure:
     """Plans how the hand takes the object from start to goal, and has the plan judged by the independent checker.
@@ -51,6 +55,8 @@ def plan(
     improve: seconds spent on a better plan after the first; `improve_work`: the same by work.
     margin, improve, improve_work: of in-hand tasks; refused for tasks of kind "tracking".
     settings: settings of the planner, with the keys of "settings" in a plan file; the other arguments win over it.
+    level: what the plan is judged for: "geometry" (poses alone), "forces" (and contact forces) or "motion" (and that nothing
+    slips or goes too fast).
     progress: called now and then, by this thread, with a `Progress`; what it raises stops the search and is raised.
 
     The interpreter's lock is released while the search runs, and Ctrl-C stops it. Raises `InputError`, and `InternalError`
@@ -74,6 +80,7 @@ def plan(
         "margin": margin,
         "improve_work": improve_work,
         "settings": None if settings is None else _settings_text(settings),
+        "level": level,
         "progress": None if progress is None else _listener(progress),
     }
     found, outcome = _regrasp.plan(scene._native, request)
@@ -104,6 +111,7 @@ def check(
     *,
     packages: Mapping[str, StrPath] | None = None,
     lenient: bool = False,
+    level: Level = "motion",
 ) -> Report:
     """Judges a plan in its scene, by the checker that knows no planner.
 
@@ -111,11 +119,12 @@ def check(
     scene: a scene, taken as it was read, or a scene file, which is read now; without it, the scene that `plan` planned for,
     read afresh, or the file that the plan names: beside the plan file, in one of the folders above it, or in the current one.
     packages, lenient: as in `load_scene`, for scene files.
+    level: as in `plan`. `Report.reached` says which level the plan reaches.
 
     Raises `InputError` for files that cannot be used. What is wrong with the plan is no exception but in the report.
     """
     plan, scene = _with_scene(plan, scene, packages, lenient)
-    return report_of(json.loads(_regrasp.check(plan._native, scene._native)))
+    return report_of(json.loads(_regrasp.check(plan._native, scene._native, level)))
 
 
 def export_mjcf(

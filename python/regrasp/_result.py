@@ -107,6 +107,12 @@ class Report:
     """Largest distance of a holding fingertip from its contact, in metres, certified between waypoints."""
     max_slip: float | None
     """Largest slip of a finger that rolls, in a segment, in metres; none when no finger rolls."""
+    max_hold_slip: float | None
+    """Largest slip of a contact from landing to lifting, in metres; none when no contact moves."""
+    level: str
+    """What the plan was judged for: "geometry", "forces" or "motion"."""
+    reached: str | None
+    """The highest level at which nothing is wrong."""
     max_force_residual: float | None
     """Largest imbalance of forces and weight at a waypoint, in newtons; none in plans without forces."""
     max_moment_residual: float | None
@@ -129,7 +135,7 @@ class Report:
         return self.ok
 
     def __str__(self) -> str:
-        head = "accepted" if self.ok else f"rejected: {self.n_violations} violations"
+        head = f"accepted for {self.level}" if self.ok else f"rejected for {self.level}: {self.n_violations} violations"
         return "\n  ".join([head, *(violation.text for violation in self.violations)])
 
 
@@ -149,6 +155,9 @@ def report_of(fields: Mapping[str, Any]) -> Report:
         ),
         max_contact_error=fields["max_contact_error"],
         max_slip=fields["max_slip"],
+        max_hold_slip=None if fields["max_hold_slip"] is None else fields["max_hold_slip"]["slip"],
+        level=fields["level"],
+        reached=fields["reached"],
         max_force_residual=fields["max_force_residual"],
         max_moment_residual=fields["max_moment_residual"],
         duration=fields["duration"],

@@ -16,7 +16,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let arrays = PlanArrays::new(&plan);
     println!("{} waypoints of {} joints", arrays.n_waypoints, arrays.joint_names.len());
-    println!("plan.npz: {} bytes, for numpy.load", to_npz(&plan).len());
-    println!("trajectory.yaml: {} lines, for `ros2 topic pub --once`", to_ros2(&plan).lines().count());
+    println!("plan.npz: {} bytes, for numpy.load", to_npz(&plan)?.len());
+    println!("trajectory.yaml: {} lines, for `ros2 topic pub --once`", to_ros2(&plan)?.lines().count());
     Ok(())
 }

@@ -74,38 +74,124 @@ pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Refuses a `path` where something stands that is no file, such as a folder, a pipe or a device: writing by renaming would
-/// put a file in its place.
+/// Refuses a `path` where something stands that is no file, such as a folder, a pipe or a device, or that is read-only:
+/// writing by renaming would put another file in its place.
 pub fn refuse_other_than_file(path: &Path) -> io::Result<()> {
     match fs::metadata(path) {
         Ok(metadata) if metadata.is_dir() => Err(io::Error::from(io::ErrorKind::IsADirectory)),
         Ok(metadata) if !metadata.is_file() => {
             Err(io::Error::new(io::ErrorKind::InvalidInput, "it is there and is not a regular file"))
         }
-        _ => Ok(()),
+        Ok(metadata) if metadata.permissions().readonly() => Err(io::Error::from(io::ErrorKind::PermissionDenied)),
+        Ok(_) => Ok(()),
+        // The file that a symbolic link leads to need not exist, but links in a circle lead nowhere.
+        Err(_) => target_of(path).map(|_| ()),
     }
+}
+
+/// Symbolic links that are followed one after the other, as many as Linux follows.
+const MOST_LINKS: usize = 40;
+
+/// The file that writing to `path` writes: where symbolic links lead, whether it exists or not.
+///
+/// Errors: links that cannot be read, or that lead in a circle.
+pub fn target_of(path: &Path) -> io::Result<PathBuf> {
+    let mut target = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        match fs::symlink_metadata(&target) {
+            Ok(metadata) if metadata.is_symlink() => {
+                let link = fs::read_link(&target)?;
+                // A relative link starts from the folder that it is in; an absolute one replaces the path.
+                target = target.parent().unwrap_or(Path::new("")).join(link);
+            }
+            _ => return Ok(target),
+        }
+    }
+    Err(io::Error::other("symbolic links lead in a circle"))
+}
+
+/// True when writing to `a` and to `b` writes one file, whatever the two are spelled like: through symbolic links, through
+/// hard links, and where the file does not exist yet.
+pub fn is_same_file(a: &Path, b: &Path) -> bool {
+    let (Ok(a), Ok(b)) = (target_of(a), target_of(b)) else { return a == b };
+    match (fs::metadata(&a), fs::metadata(&b)) {
+        (Ok(first), Ok(second)) => is_one_file(&first, &second) || is_same_path(&a, &b),
+        (Err(_), Err(_)) => is_same_path(&a, &b),
+        _ => false,
+    }
+}
+
+#[cfg(unix)]
+fn is_one_file(a: &fs::Metadata, b: &fs::Metadata) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    (a.dev(), a.ino()) == (b.dev(), b.ino())
+}
+
+#[cfg(not(unix))]
+fn is_one_file(_: &fs::Metadata, _: &fs::Metadata) -> bool {
+    false
+}
+
+/// True when two paths without symbolic links at their ends name the same place.
+fn is_same_path(a: &Path, b: &Path) -> bool {
+    let real = |path: &Path| -> Option<PathBuf> {
+        let folder = match path.parent()? {
+            folder if folder.as_os_str().is_empty() => Path::new("."),
+            folder => folder,
+        };
+        Some(real_folder(folder)?.join(path.file_name()?))
+    };
+    a == b || real(a).is_some_and(|real_a| Some(real_a) == real(b))
+}
+
+/// The folder as the system spells it; of one that does not exist yet, its nearest ancestor that does, and the rest.
+fn real_folder(folder: &Path) -> Option<PathBuf> {
+    if let Ok(real) = folder.canonicalize() {
+        return Some(real);
+    }
+    let above = match folder.parent()? {
+        above if above.as_os_str().is_empty() => Path::new("."),
+        above => above,
+    };
+    Some(real_folder(above)?.join(folder.file_name()?))
 }
 
 /// Writes `bytes` to `path` through a temporary file beside it, synced and renamed: the file is whole or unchanged.
 ///
-/// Errors: what the system says, and what stands at `path` is not a regular file.
+/// Symbolic links stay, and the file that they lead to is written. A file that exists keeps its permissions.
+///
+/// Errors: what the system says, and what stands at `path` is not a regular file, or is read-only.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> io::Result<()> {
     refuse_other_than_file(path)?;
+    let path = target_of(path)?;
     let name = path.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "path has no file name"))?;
     let mut temporary_name = name.to_owned();
     temporary_name.push(format!(".{}.tmp", std::process::id()));
     let temporary: PathBuf = path.with_file_name(temporary_name);
     let result = (|| {
-        let mut file = fs::File::create(&temporary)?;
+        let mut file = create_like(&temporary, &path)?;
         file.write_all(bytes)?;
         file.sync_all()?;
-        fs::rename(&temporary, path)
+        fs::rename(&temporary, &path)
     })();
     if result.is_err() {
         // Best effort: the error that matters is the first one.
         let _ = fs::remove_file(&temporary);
     }
     result
+}
+
+/// Creates a file with the permissions of `existing`, where that is there. Nobody who may not read that can read this, at no
+/// moment.
+fn create_like(path: &Path, existing: &Path) -> io::Result<fs::File> {
+    let Ok(metadata) = fs::metadata(existing) else { return fs::File::create(path) };
+    let mut options = fs::File::options();
+    options.write(true).create(true).truncate(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    let file = options.open(path)?;
+    file.set_permissions(metadata.permissions())?;
+    Ok(file)
 }
 
 #[cfg(test)]
@@ -136,5 +222,94 @@ mod tests {
         let missing = std::env::temp_dir().join("regrasp_no_such_dir").join("plan.json");
         assert!(write_atomic(&missing, b"x").is_err());
         assert!(!missing.exists());
+    }
+
+    /// A folder that is removed at the end of the test.
+    #[cfg(unix)]
+    struct Folder(PathBuf);
+
+    #[cfg(unix)]
+    impl Folder {
+        fn new(name: &str) -> Self {
+            let folder = std::env::temp_dir().join(format!("regrasp_files_{name}_{}", std::process::id()));
+            fs::create_dir_all(&folder).unwrap();
+            Folder(folder)
+        }
+    }
+
+    #[cfg(unix)]
+    impl Drop for Folder {
+        fn drop(&mut self) {
+            let _ = fs::remove_dir_all(&self.0);
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_stay_and_what_they_lead_to_is_written() {
+        let folder = Folder::new("links");
+        let [file, link, dangling, new] = ["file", "link", "dangling", "new"].map(|name| folder.0.join(name));
+        fs::write(&file, b"old").unwrap();
+        std::os::unix::fs::symlink("file", &link).unwrap();
+        std::os::unix::fs::symlink(&new, &dangling).unwrap();
+        for (path, target) in [(&link, &file), (&dangling, &new)] {
+            write_atomic(path, b"written").unwrap();
+            assert!(fs::symlink_metadata(path).unwrap().is_symlink());
+            assert_eq!(fs::read(target).unwrap(), b"written");
+        }
+        let circle = folder.0.join("circle");
+        std::os::unix::fs::symlink("circle", &circle).unwrap();
+        assert!(write_atomic(&circle, b"x").is_err());
+        assert_eq!(fs::read_dir(&folder.0).unwrap().count(), 5, "nothing else is left behind");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn permissions_stay_and_read_only_files_are_refused() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = Folder::new("modes");
+        let file = folder.0.join("file");
+        for mode in [0o600, 0o640, 0o666] {
+            fs::write(&file, b"old").unwrap();
+            fs::set_permissions(&file, fs::Permissions::from_mode(mode)).unwrap();
+            write_atomic(&file, b"new").unwrap();
+            assert_eq!(fs::metadata(&file).unwrap().permissions().mode() & 0o777, mode);
+        }
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o444)).unwrap();
+        let refused = write_atomic(&file, b"over").unwrap_err();
+        assert_eq!(refused.kind(), io::ErrorKind::PermissionDenied);
+        assert_eq!(fs::read(&file).unwrap(), b"new");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn one_file_under_two_names_is_one_file() {
+        let folder = Folder::new("same");
+        let at = |name: &str| folder.0.join(name);
+        fs::write(at("file"), b"x").unwrap();
+        fs::write(at("other"), b"x").unwrap();
+        fs::create_dir(at("sub")).unwrap();
+        fs::hard_link(at("file"), at("hard")).unwrap();
+        std::os::unix::fs::symlink("file", at("soft")).unwrap();
+        std::os::unix::fs::symlink("missing", at("dangling")).unwrap();
+        std::os::unix::fs::symlink(".", at("here")).unwrap();
+        let same = [
+            ["file", "file"],
+            ["file", "./file"],
+            ["file", "sub/../file"],
+            ["file", "hard"],
+            ["file", "soft"],
+            ["hard", "here/soft"],
+            ["missing", "sub/../missing"],
+            ["missing", "dangling"],
+            ["missing", "here/missing"],
+            ["new/missing", "here/new/missing"],
+        ];
+        for [a, b] in same {
+            assert!(is_same_file(&at(a), &at(b)) && is_same_file(&at(b), &at(a)), "{a} and {b}");
+        }
+        for [a, b] in [["file", "other"], ["file", "missing"], ["missing", "sub/missing"], ["soft", "dangling"]] {
+            assert!(!is_same_file(&at(a), &at(b)), "{a} and {b}");
+        }
     }
 }

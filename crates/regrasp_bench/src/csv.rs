@@ -2,11 +2,12 @@
 
 use crate::row::Row;
 use regrasp_base::{Diagnostic, InputError, Place};
+use regrasp_plan::check::Level;
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-const COLUMNS: [&str; 19] = [
+const COLUMNS: [&str; 20] = [
     "scene",
     "method",
     "seed",
@@ -16,6 +17,7 @@ const COLUMNS: [&str; 19] = [
     "floor_s",
     "check_s",
     "accepted",
+    LEVEL,
     "nodes",
     "samples",
     "work",
@@ -27,6 +29,9 @@ const COLUMNS: [&str; 19] = [
     "angle_left_deg",
     "cause",
 ];
+
+/// The column that files of earlier versions lack.
+const LEVEL: &str = "level";
 
 /// The header line.
 pub fn header() -> String {
@@ -46,6 +51,7 @@ pub fn line(row: &Row) -> String {
         optional(row.floor_s),
         optional(row.check_s),
         row.accepted.map(|value| value.to_string()).unwrap_or_default(),
+        row.level.map(|level| level.name().to_owned()).unwrap_or_default(),
         row.nodes.to_string(),
         row.samples.to_string(),
         row.work.to_string(),
@@ -133,7 +139,9 @@ pub fn read_leading(path: &Path, text: &str, leading: &[&str]) -> Result<Vec<(Ve
     let mut records = records(text).into_iter();
     let names = records.next().map(|(_, fields)| fields).unwrap_or_default();
     let expected: Vec<&str> = leading.iter().copied().chain(COLUMNS).collect();
-    if names != expected {
+    let without_level: Vec<&str> = expected.iter().copied().filter(|name| *name != LEVEL).collect();
+    let level_at = COLUMNS.iter().position(|name| *name == LEVEL).filter(|_| names == without_level);
+    if names != expected && level_at.is_none() {
         return Err(Diagnostic::new("V020", Place::line(path, 1), format!("has the columns {}", names.join(",")))
             .expected(expected.join(","))
             .fix("give a CSV file that `regrasp bench --csv` of this version wrote")
@@ -141,7 +149,10 @@ pub fn read_leading(path: &Path, text: &str, leading: &[&str]) -> Result<Vec<(Ve
     }
     records
         .map(|(line, mut fields)| {
-            let own = fields.split_off(leading.len().min(fields.len()));
+            let mut own = fields.split_off(leading.len().min(fields.len()));
+            if let Some(at) = level_at.filter(|at| *at <= own.len()) {
+                own.insert(at, String::new());
+            }
             row_of(&own)
                 .map(|row| (fields, row))
                 .ok_or_else(|| Diagnostic::new("V021", Place::line(path, line), "is not a row of a benchmark").into())
@@ -160,6 +171,7 @@ fn row_of(fields: &[String]) -> Option<Row> {
         floor_s,
         check_s,
         accepted,
+        level,
         nodes,
         samples,
         work,
@@ -185,6 +197,7 @@ fn row_of(fields: &[String]) -> Option<Row> {
         floor_s: optional(floor_s)?,
         check_s: optional(check_s)?,
         accepted: if accepted.is_empty() { None } else { Some(accepted.parse().ok()?) },
+        level: if level.is_empty() { None } else { Some(Level::named(level)?) },
         nodes: nodes.parse().ok()?,
         samples: samples.parse().ok()?,
         work: work.parse().ok()?,
@@ -246,7 +259,12 @@ mod tests {
         let path = folder.join("rows.csv");
         let rows = [
             Row { scene: "a,\"b\"\nc".into(), plan_s: 0.1 + 0.2, floor_s: Some(1e-7), seed: 7, ..Row::default() },
-            Row { accepted: Some(true), cause: "finger \"x\" cannot".into(), ..Row::default() },
+            Row {
+                accepted: Some(true),
+                level: Some(Level::Forces),
+                cause: "finger \"x\" cannot".into(),
+                ..Row::default()
+            },
         ];
         let mut writer = Writer::create(&path).unwrap();
         for row in &rows {

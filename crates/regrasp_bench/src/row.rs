@@ -2,7 +2,7 @@
 
 use cpu_time::{ProcessTime, ThreadTime};
 use regrasp_base::Budget;
-use regrasp_plan::check::{CheckSettings, check};
+use regrasp_plan::check::{CheckSettings, Level, check};
 use regrasp_plan::plan::Improvement;
 use regrasp_plan::{Plan, format};
 use regrasp_planners::in_hand::{NotProven, validate_once};
@@ -47,8 +47,8 @@ pub struct RunSettings {
 /// Whether plans are judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Judge {
-    /// By the independent checker.
-    Checker,
+    /// By the independent checker, for this level.
+    Checker(Level),
     /// Not at all.
     Skip,
 }
@@ -73,8 +73,11 @@ pub struct Row {
     pub floor_s: Option<f64>,
     /// Wall-clock time of the checker.
     pub check_s: Option<f64>,
-    /// The checker's verdict.
+    /// The checker's verdict, for the level that was asked for.
     pub accepted: Option<bool>,
+    /// The highest level at which the checker finds nothing wrong.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub level: Option<Level>,
     /// Nodes of the search.
     pub nodes: u64,
     /// Configurations sampled; in tracking, sub-goals tried.
@@ -200,20 +203,20 @@ pub(crate) fn plan_only(problem: Problem, settings: &RunSettings) -> (Row, Optio
 /// Enters what a plan is like: its motions, its floor and, if asked, the checker's verdict.
 pub(crate) fn measure(problem: Problem, plan: &Plan, settings: &InHandSettings, asked: Judge, row: &mut Row) {
     row.transfers = plan.statistics.transfers;
-    row.relocations = plan.statistics.relocations;
+    row.relocations = plan.n_relocations();
     if problem.query.task == TaskKind::InHand {
         match floor(problem.scene, plan, settings) {
             Ok(seconds) => row.floor_s = Some(seconds),
             Err(not_proven) => row.cause = not_proven.to_string(),
         }
     }
-    if asked == Judge::Checker {
-        judge(problem, plan, row);
+    if let Judge::Checker(level) = asked {
+        judge(problem, plan, level, row);
     }
 }
 
 /// Judges a plan, as it reads from the file that `regrasp plan` would write, and enters what came of it.
-fn judge(problem: Problem, plan: &Plan, row: &mut Row) {
+fn judge(problem: Problem, plan: &Plan, level: Level, row: &mut Row) {
     let plan = match format::from_json(Path::new("plan.json"), format::to_json(plan).as_bytes()) {
         Ok(plan) => plan,
         Err(error) => {
@@ -223,9 +226,11 @@ fn judge(problem: Problem, plan: &Plan, row: &mut Row) {
         }
     };
     let started = Instant::now();
-    let report = check(problem.scene, Some(problem.query), &plan, &CheckSettings::default());
+    let settings = CheckSettings { level, ..CheckSettings::default() };
+    let report = check(problem.scene, Some(problem.query), &plan, &settings);
     row.check_s = Some(started.elapsed().as_secs_f64());
     row.accepted = Some(report.accepted());
+    row.level = report.reached;
     row.min_margin = report.min_margin;
     row.min_clearance = report.min_clearance.as_ref().map(|clearance| clearance.distance);
     if let Some(violation) = report.violations.first() {

@@ -2,6 +2,8 @@
 
 use clap::builder::PossibleValuesParser;
 use clap::{ArgGroup, Args, Parser, Subcommand};
+use regrasp::plan::check::Level;
+use regrasp::scene::{Gravity, LoadedScene};
 use regrasp_bench::growth::Curve;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -128,6 +130,45 @@ pub struct Search {
     pub improve_work: Option<u64>,
 }
 
+/// By what plans are judged, and gravity that they are planned under.
+#[derive(Debug, Default, Args)]
+pub struct Judging {
+    /// What plans are judged for: geometry (poses alone), forces (and contact forces), motion (and that nothing slips or goes too
+    /// fast) [default: motion]
+    #[arg(long, value_name = "LEVEL", value_parser = PossibleValuesParser::new(Level::ALL.map(Level::name)))]
+    pub level: Option<String>,
+    /// Gravity instead of the scene's: a direction X,Y,Z in the frame of the hand's base link, or any
+    #[arg(long, value_name = "X,Y,Z", value_parser = gravity, allow_hyphen_values = true)]
+    pub gravity: Option<GravityInHand>,
+}
+
+impl Judging {
+    /// What plans are judged for.
+    pub fn level(&self) -> Level {
+        self.level.as_deref().and_then(Level::named).unwrap_or_default()
+    }
+
+    /// A scene under the gravity asked for, else under its own.
+    pub fn scene(&self, loaded: LoadedScene) -> LoadedScene {
+        let Some(asked) = self.gravity else { return loaded };
+        let gravity = match asked {
+            GravityInHand::Any => Some(Gravity::Any),
+            GravityInHand::Direction(down) => Gravity::in_hand(&loaded.scene.hand, &down.into()),
+        };
+        // The zero vector is refused where the argument is read.
+        LoadedScene { scene: loaded.scene.under_gravity(gravity.unwrap_or_default()), ..loaded }
+    }
+}
+
+/// Gravity as seen from the hand's base link.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum GravityInHand {
+    /// Along this direction, of any length.
+    Direction([f64; 3]),
+    /// Any direction.
+    Any,
+}
+
 /// `regrasp plan`
 #[derive(Debug, Args)]
 pub struct Plan {
@@ -151,6 +192,9 @@ pub struct Plan {
     /// How to search.
     #[command(flatten)]
     pub search: Search,
+    /// By what plans are judged.
+    #[command(flatten)]
+    pub judging: Judging,
 }
 
 /// `regrasp check`
@@ -161,6 +205,9 @@ pub struct Check {
     /// Scene file [default: the one that the plan names, beside the plan or in the current folder]
     #[arg(long, value_name = "FILE")]
     pub scene: Option<PathBuf>,
+    /// By what plans are judged.
+    #[command(flatten)]
+    pub judging: Judging,
 }
 
 /// `regrasp view`
@@ -201,6 +248,9 @@ pub struct View {
     /// Show the graph of this roadmap file too
     #[arg(long, value_name = "FILE.roadmap")]
     pub with_roadmap: Option<PathBuf>,
+    /// By what plans are judged.
+    #[command(flatten)]
+    pub judging: Judging,
 }
 
 /// `regrasp export`
@@ -224,6 +274,9 @@ pub struct Export {
     /// Write what the checker rejects too
     #[arg(long)]
     pub no_check: bool,
+    /// By what plans are judged.
+    #[command(flatten)]
+    pub judging: Judging,
 }
 
 /// `regrasp simulate`
@@ -269,6 +322,9 @@ pub struct Bench {
     /// For --page: seconds by scene, within which it should be solved
     #[arg(long, value_name = "FILE.json", requires = "page")]
     pub limits: Option<PathBuf>,
+    /// By what plans are judged.
+    #[command(flatten)]
+    pub judging: Judging,
 }
 
 /// `regrasp growth`
@@ -403,6 +459,9 @@ pub struct RoadmapQuery {
     /// Work limit, in configurations looked at: the same on every machine
     #[arg(long, value_name = "N", default_value_t = 1_000_000, value_parser = whole_number, allow_negative_numbers = true)]
     pub max_work: u64,
+    /// By what plans are judged.
+    #[command(flatten)]
+    pub judging: Judging,
 }
 
 /// `regrasp roadmap bench`
@@ -433,6 +492,9 @@ pub struct RoadmapBench {
     /// Do not judge the plans
     #[arg(long)]
     pub no_check: bool,
+    /// By what plans are judged.
+    #[command(flatten)]
+    pub judging: Judging,
 }
 
 /// `regrasp campaign`
@@ -485,6 +547,19 @@ fn package(text: &str) -> Result<(String, PathBuf), String> {
             false => Err(format!("{folder} is not a folder")),
         },
         _ => Err("expected NAME=DIR, such as allegro=/models/allegro".into()),
+    }
+}
+
+fn gravity(text: &str) -> Result<GravityInHand, String> {
+    if text == "any" {
+        return Ok(GravityInHand::Any);
+    }
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, z]) if [x, y, z].iter().all(|c| c.is_finite()) && [x, y, z].iter().any(|c| *c != 0.0) => {
+            Ok(GravityInHand::Direction([x, y, z]))
+        }
+        _ => Err("expected a direction such as 0,0,-1 in the frame of the hand's base link, or any".into()),
     }
 }
 

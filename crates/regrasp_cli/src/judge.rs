@@ -1,10 +1,11 @@
 //! What the checker said, in words and as an event.
 
+use crate::args::{Common, Judging};
+use crate::load;
 use crate::stop::Stop;
 use crate::talk::{Talk, counted, duration, grouped};
-use regrasp::plan::check::{CheckSettings, Report, check};
+use regrasp::plan::check::{CheckSettings, Level, Report, check};
 use regrasp::plan::format;
-use regrasp::robot::import::LoadOptions;
 use regrasp::scene::{LoadedScene, load_scene};
 use serde_json::json;
 use std::path::Path;
@@ -18,22 +19,49 @@ pub fn judge_bytes(
     plan_path: &Path,
     bytes: &[u8],
     scene_path: &Path,
-    options: &LoadOptions,
+    common: &Common,
+    judging: &Judging,
     talk: &Talk,
 ) -> Result<Report, Stop> {
     let plan = format::from_json(plan_path, bytes)
         .map_err(|error| Stop::Internal(format!("a plan just made is not a plan file: {error}")))?;
-    let loaded = load_scene(scene_path, options)?;
-    judge(&loaded, &plan, talk)
+    let loaded = judging.scene(load_scene(scene_path, &load::options(common))?);
+    judge(&loaded, &plan, judging, talk)
 }
 
 /// Judges a plan in a scene that was read for it, against the query of the plan's seed, and says what came of it.
-pub fn judge(loaded: &LoadedScene, plan: &regrasp::Plan, talk: &Talk) -> Result<Report, Stop> {
+pub fn judge(loaded: &LoadedScene, plan: &regrasp::Plan, judging: &Judging, talk: &Talk) -> Result<Report, Stop> {
     let started = Instant::now();
     let query = loaded.task.query(plan.seed);
-    let report = check(&loaded.scene, Some(&query), plan, &CheckSettings::default());
+    let settings = CheckSettings { level: judging.level(), ..CheckSettings::default() };
+    let report = check(&loaded.scene, Some(&query), plan, &settings);
     say(&report, plan.promises.tracking.is_some(), started.elapsed(), talk);
     Ok(report)
+}
+
+/// The verdict, with the level that it is for.
+fn verdict(report: &Report) -> String {
+    let asked = report.level.name();
+    match (report.accepted(), report.reached) {
+        (true, _) if report.level == Level::Motion => "ACCEPTED".into(),
+        (true, _) => format!("ACCEPTED for {asked} only"),
+        (false, Some(reached)) => format!("REJECTED for {asked}; accepted for {} only", reached.name()),
+        (false, None) => "REJECTED".into(),
+    }
+}
+
+/// How far fingertips slip from landing to lifting.
+fn slip_in_words(report: &Report) -> String {
+    report.max_hold_slip.map_or("no contact moves".into(), |hold| {
+        let millimetres = 1e3 * hold.slip;
+        let verb = if report.reached == Some(Level::Motion) { "slip" } else { "would slip" };
+        format!("fingertips {verb} at most {millimetres:.3} mm from landing to lifting")
+    })
+}
+
+/// Gravity that the plan was judged under.
+fn gravity_in_words(report: &Report) -> String {
+    report.gravity_in_world.map_or("of any direction".into(), |[x, y, z]| format!("[{x:.2}, {y:.2}, {z:.2}] m/s^2"))
 }
 
 /// Says what the checker said.
@@ -43,14 +71,15 @@ fn say(report: &Report, is_tracking: bool, elapsed: Duration, talk: &Talk) {
     let margin = match report.min_margin {
         None if is_tracking => "not judged (what slides closes nothing)".into(),
         None => "-".into(),
-        Some(margin) => format!("{margin:.4}"),
+        // The plan promises a bound that the planner proves quickly; this one is proven with exact cones, and is no smaller.
+        Some(margin) => format!("{margin:.4} (exact cones)"),
     };
     let clearance = report.min_clearance.as_ref().map_or("-".into(), |clearance| {
         format!("{:.2} mm ({} and {})", 1e3 * clearance.distance, clearance.pair[0], clearance.pair[1])
     });
     talk.say(format!(
-        "check  {}   {} waypoints, {} distances, exact cones   {}",
-        if report.accepted() { "ACCEPTED" } else { "REJECTED" },
+        "check  {}   {} waypoints, {} distances   {}",
+        verdict(report),
         grouped(report.n_waypoints as u64),
         grouped(report.n_distances),
         duration(seconds),
@@ -59,8 +88,12 @@ fn say(report: &Report, is_tracking: bool, elapsed: Duration, talk: &Talk) {
         "       closure margin {margin}, clearance {clearance}, fingertips within {:.3} mm of their contacts",
         1e3 * report.max_contact_error
     ));
+    talk.say(format!("       {}, gravity {}", slip_in_words(report), gravity_in_words(report)));
     for violation in report.violations.iter().take(SHOWN) {
         talk.say(format!("  {violation}"));
+    }
+    for what in &report.left_out {
+        talk.say(format!("  not judged: {what}"));
     }
     let shown = report.violations.len().min(SHOWN);
     if report.n_violations > shown {

@@ -202,7 +202,7 @@ fn say_scene(scene: &Scene, seconds: f64, talk: &Talk) {
     talk.say(format!(
         "object {}   {}   {:.3} kg   friction {}",
         object.name,
-        shape_text(&object.shape),
+        shape_text(&object.shape) + if object.hull.is_some() { ", its hull for collision" } else { "" },
         object.mass,
         object.friction
     ));

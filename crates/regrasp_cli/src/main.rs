@@ -12,6 +12,8 @@ mod interrupt;
 mod judge;
 /// Models from disk, with what the environment says about packages.
 mod load;
+/// Files that a command writes.
+mod outputs;
 /// Pages for a browser.
 mod pages;
 /// What is printed while a search runs.
@@ -50,7 +52,18 @@ fn main() -> ExitCode {
         }
     };
     talk.result(code);
-    ExitCode::from(code)
+    ExitCode::from(with_lost(code, talk.lost(), &talk))
+}
+
+/// The exit code where some of the output was lost: no result that nobody got is a good one.
+fn with_lost(code: u8, lost: Option<Stop>, talk: &talk::Talk) -> u8 {
+    match lost {
+        Some(stop) if code < stop.exit_code() => {
+            talk.stop(&stop);
+            stop.exit_code()
+        }
+        _ => code,
+    }
 }
 
 /// Runs `work`; a panic in it is an internal error. Nothing that `work` touched is used afterwards but the talk.
@@ -71,9 +84,14 @@ fn refused_arguments(error: &clap::Error) -> ExitCode {
         talk.event("error", serde_json::json!({ "diagnostics": [diagnostic] }));
         talk.result(2);
     }
-    // A closed stdout or stderr leaves nobody to tell.
-    let _ = error.print();
-    ExitCode::from(if is_error { 2 } else { 0 })
+    match error.print() {
+        Err(lost) if !is_error => {
+            let talk = talk::Talk::new(false, false);
+            ExitCode::from(with_lost(0, Some(Stop::unwritable("stdout".as_ref(), &lost)), &talk))
+        }
+        // A closed stderr leaves nobody to tell.
+        _ => ExitCode::from(if is_error { 2 } else { 0 }),
+    }
 }
 
 #[cfg(test)]

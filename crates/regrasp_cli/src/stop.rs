@@ -33,9 +33,7 @@ impl Stop {
     /// A file that cannot be written (`F003`).
     pub fn unwritable(path: &Path, error: &std::io::Error) -> Stop {
         Stop::BadInput(
-            Diagnostic::new("F003", Place::file(path), format!("cannot be written: {error}"))
-                .fix("name a file in a folder that exists and may be written to")
-                .into(),
+            Diagnostic::new("F003", Place::file(path), format!("cannot be written: {error}")).fix(fix_of(error)).into(),
         )
     }
 
@@ -48,6 +46,20 @@ impl Stop {
     ) -> Stop {
         let place = Place::file("command line");
         Stop::BadInput(Diagnostic::new(code, place, problem).element("argument", argument).expected(expected).into())
+    }
+}
+
+/// What can be done about a file that could not be written.
+fn fix_of(error: &std::io::Error) -> &'static str {
+    use std::io::ErrorKind;
+    match error.kind() {
+        ErrorKind::NotFound | ErrorKind::NotADirectory => "name a file in a folder that exists",
+        ErrorKind::PermissionDenied => "allow writing to it and to its folder, or name another file",
+        ErrorKind::ReadOnlyFilesystem => "name a file on a disk that can be written to",
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "make room on the disk, or name a file on another one",
+        ErrorKind::IsADirectory => "name a file, not a folder",
+        ErrorKind::BrokenPipe => "let the program that reads the output read all of it",
+        _ => "name another file",
     }
 }
 

@@ -13,14 +13,14 @@ use std::sync::Mutex;
 pub struct Talk {
     json: bool,
     quiet: bool,
-    // Progress may come from a search thread while the main thread talks.
-    lock: Mutex<()>,
+    // Progress may come from a search thread while the main thread talks. Holds the first error of stdout.
+    lost: Mutex<Option<io::Error>>,
 }
 
 impl Talk {
     /// How to talk.
     pub fn new(json: bool, quiet: bool) -> Self {
-        Talk { json, quiet, lock: Mutex::new(()) }
+        Talk { json, quiet, lost: Mutex::new(None) }
     }
 
     /// True with `--json`.
@@ -46,17 +46,20 @@ impl Talk {
             if let Some(map) = fields.as_object_mut() {
                 map.insert("event".into(), json!(name));
             }
-            // A reader that went away is no reason to change the exit code.
-            let _ = self.write_stdout(&format!("{fields}\n"));
+            self.write_stdout(&format!("{fields}\n"));
         }
     }
 
-    /// Data for stdout. Errors: stdout cannot be written to; a reader that went away is no error.
-    pub fn data(&self, text: &str) -> Result<(), Stop> {
-        match self.write_stdout(text) {
-            Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Stop::unwritable("stdout".as_ref(), &error)),
-            _ => Ok(()),
-        }
+    /// Data for stdout.
+    pub fn data(&self, text: &str) {
+        self.write_stdout(text);
+    }
+
+    /// Why stdout holds less than was written to it: a full disk, a reader that went away. No command that lost some of its
+    /// output ends well.
+    pub fn lost(&self) -> Option<Stop> {
+        let lost = self.lost.lock().ok()?;
+        lost.as_ref().map(|error| Stop::unwritable("stdout".as_ref(), error))
     }
 
     /// A remark that a user should not miss: shown unless `--quiet`, and an event.
@@ -101,15 +104,17 @@ impl Talk {
         self.event("result", json!({ "exit_code": exit_code }));
     }
 
-    fn write_stdout(&self, text: &str) -> io::Result<()> {
-        let _guard = self.lock.lock();
+    fn write_stdout(&self, text: &str) {
+        let Ok(mut lost) = self.lost.lock() else { return };
+        if lost.is_some() {
+            return;
+        }
         let mut stdout = io::stdout().lock();
-        stdout.write_all(text.as_bytes())?;
-        stdout.flush()
+        *lost = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()).err();
     }
 
     fn line_to_stderr(&self, line: &str) {
-        let _guard = self.lock.lock();
+        let _guard = self.lost.lock();
         // A closed stderr leaves nobody to tell.
         let _ = writeln!(io::stderr(), "{}", printable(line));
     }

@@ -4,6 +4,8 @@
 
 /// A plan as arrays over all waypoints.
 pub mod arrays;
+/// Why a plan cannot be written in a format.
+pub mod error;
 /// MuJoCo models of a plan's scene.
 pub mod mjcf;
 /// Arrays for numpy: `.npz` without pickle.
@@ -12,6 +14,7 @@ pub mod npz;
 pub mod ros2;
 
 pub use arrays::PlanArrays;
+pub use error::ExportError;
 pub use mjcf::{Mjcf, MjcfError, to_mjcf};
 pub use npz::to_npz;
 pub use ros2::to_ros2;

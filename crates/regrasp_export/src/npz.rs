@@ -2,13 +2,24 @@
 //! `numpy.load` reads it with `allow_pickle=False`.
 
 use crate::arrays::{CONTACT_MODES, Numbers, NumericArray, PlanArrays, kind_name};
+use crate::error::{ExportError, MOST_CHARACTERS};
 use regrasp_plan::Plan;
 use std::io::{Cursor, Write};
 use zip::write::{SimpleFileOptions, ZipWriter};
 use zip::{CompressionMethod, DateTime};
 
 /// The bytes of an `.npz` file with the arrays of `plan`, names as in [`PlanArrays`].
-pub fn to_npz(plan: &Plan) -> Vec<u8> {
+///
+/// Errors: a name so long that an array of names would be huge.
+pub fn to_npz(plan: &Plan) -> Result<Vec<u8>, ExportError> {
+    for (what, texts) in [
+        ("the joint names", plan.joint_names.as_slice()),
+        ("the finger names", &plan.fingers),
+        ("the tool's name", std::slice::from_ref(&plan.tool)),
+        ("the method's name", std::slice::from_ref(&plan.method)),
+    ] {
+        refuse_too_long(what, texts)?;
+    }
     let arrays = PlanArrays::new(plan);
     let mut file = Npz::new();
     file.add("format", &texts(&[], &["regrasp-arrays"]));
@@ -28,7 +39,16 @@ pub fn to_npz(plan: &Plan) -> Vec<u8> {
     file.add("segment_moves", &integers(&[kinds.len(), arrays.fingers.len()], &arrays.segment_moves));
     file.add("segment_rolling_fingers", &integers(&[kinds.len()], &arrays.segment_rolling_fingers));
     file.add("segment_starts", &integers(&[kinds.len() + 1], &arrays.segment_starts));
-    file.finish()
+    Ok(file.finish())
+}
+
+/// Refuses texts whose array would have more characters than [`MOST_CHARACTERS`].
+fn refuse_too_long(what: &'static str, texts: &[String]) -> Result<(), ExportError> {
+    let longest = texts.iter().map(|text| text.chars().count()).max().unwrap_or(0);
+    match longest.saturating_mul(texts.len()) {
+        characters if characters > MOST_CHARACTERS => Err(ExportError::TextTooLong { what, characters, longest }),
+        _ => Ok(()),
+    }
 }
 
 /// An archive being written to memory.

@@ -3,6 +3,7 @@
 //! Only independent joints are in it: coupled ones follow by the robot's mechanism, and a controller does not command them.
 //! Accelerations are left empty, as the message allows: controllers then interpolate positions and velocities.
 
+use crate::error::{ExportError, LATEST_TIME};
 use regrasp_plan::{Plan, Waypoint};
 use std::fmt::Write;
 
@@ -13,7 +14,9 @@ const NANOSECONDS: u64 = 1_000_000_000;
 ///
 /// Where one segment ends and the next begins at the same time, only the first waypoint of the next is written: controllers
 /// demand times that increase. `effort` holds the joint torques of plans with forces, and is empty in others.
-pub fn to_ros2(plan: &Plan) -> String {
+///
+/// Errors: times that do not increase, or that no message holds.
+pub fn to_ros2(plan: &Plan) -> Result<String, ExportError> {
     let mut out = format!(
         "# trajectory_msgs/JointTrajectory, written by {}. Radians, metres, seconds.\n",
         plan.tool.replace(char::is_control, " ")
@@ -21,7 +24,7 @@ pub fn to_ros2(plan: &Plan) -> String {
     out.push_str("header:\n  stamp: {sec: 0, nanosec: 0}\n  frame_id: \"\"\n");
     let names: Vec<String> = plan.joint_names.iter().map(|name| quoted(name)).collect();
     let _ = writeln!(out, "joint_names: [{}]\npoints:", names.join(", "));
-    for (waypoint, nanoseconds) in points(plan) {
+    for (waypoint, nanoseconds) in points(plan)? {
         let _ = writeln!(out, "- positions: {}", list(&waypoint.joints));
         let _ = writeln!(out, "  velocities: {}", list(&waypoint.joint_velocities));
         out.push_str("  accelerations: []\n");
@@ -29,20 +32,29 @@ pub fn to_ros2(plan: &Plan) -> String {
         let (sec, nanosec) = (nanoseconds / NANOSECONDS, nanoseconds % NANOSECONDS);
         let _ = writeln!(out, "  time_from_start: {{sec: {sec}, nanosec: {nanosec}}}");
     }
-    out
+    Ok(out)
 }
 
-/// Waypoints with their times in nanoseconds, which increase.
-fn points(plan: &Plan) -> Vec<(&Waypoint, u64)> {
+/// Waypoints with their times in nanoseconds, which increase. Only where segments meet may two have the same.
+fn points(plan: &Plan) -> Result<Vec<(&Waypoint, u64)>, ExportError> {
     let mut points: Vec<(&Waypoint, u64)> = Vec::new();
-    for waypoint in plan.segments.iter().flat_map(|segment| &segment.waypoints) {
-        let nanoseconds = (waypoint.time * NANOSECONDS as f64).round() as u64;
-        while points.last().is_some_and(|&(_, last)| nanoseconds <= last) {
-            points.pop();
+    for (s, segment) in plan.segments.iter().enumerate() {
+        for (w, waypoint) in segment.waypoints.iter().enumerate() {
+            let time = waypoint.time;
+            let wrong = |before| ExportError::WrongTime { segment: s, waypoint: w, time, before };
+            if !(0.0..=LATEST_TIME).contains(&time) {
+                return Err(wrong(None));
+            }
+            let nanoseconds = (time * NANOSECONDS as f64).round() as u64;
+            match points.last() {
+                Some((_, last)) if w == 0 && nanoseconds == *last => drop(points.pop()),
+                Some((before, last)) if nanoseconds <= *last => return Err(wrong(Some(before.time))),
+                _ => {}
+            }
+            points.push((waypoint, nanoseconds));
         }
-        points.push((waypoint, nanoseconds));
     }
-    points
+    Ok(points)
 }
 
 fn list(values: &[f64]) -> String {

@@ -256,6 +256,11 @@ impl EdgeSide {
         self.side as usize % 3
     }
 
+    /// Its two vertices, the lower one first.
+    pub(crate) fn ends(&self) -> [u32; 2] {
+        self.ends
+    }
+
     pub(crate) fn same_edge(&self, other: &EdgeSide) -> bool {
         self.ends == other.ends
     }

@@ -3,12 +3,14 @@
 //! parry's GJK proposes, a separating plane decides: a pair is called separated only by the width of the slab between
 //! two parallel planes that the support functions of both shapes confirm (Boyd, Vandenberghe 2004, 8.2). GJK stopping
 //! early, a wrong witness or a NaN therefore end as `Answer::Unresolved`, never as a clearance. Balls and capsules are
-//! a point and a segment with a margin, so that shallow contact of round fingertips needs no EPA.
+//! a point and a segment with a margin, so that shallow contact of round fingertips needs no EPA. A mesh is a solid: what
+//! touches no triangle may be inside (`inside.rs`).
 
 use crate::frame::{Point, Pose};
 use crate::hull::HullError;
 use crate::mesh::TriangleMesh;
 use crate::shape::Shape;
+pub use inside::Inside;
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::{Pose as ParryPose, Rotation as ParryRotation, Vector as ParryVector};
 use parry3d_f64::query::PointQuery;
@@ -17,6 +19,7 @@ use parry3d_f64::query::gjk::{self, CsoPoint, GJKResult, VoronoiSimplex};
 use parry3d_f64::shape::{ConvexPolyhedron, SupportMap, TriMesh, TriMeshFlags};
 use std::cell::Cell;
 
+mod inside;
 #[cfg(test)]
 mod tests;
 
@@ -34,7 +37,8 @@ const MAX_STEPS: usize = 40;
 pub enum Answer {
     /// At least this far apart, in m, above zero. Proven by a separating plane.
     SeparatedBy(f64),
-    /// They share points; the depth in m, at least zero, is parry's estimate (of one triangle for meshes).
+    /// They share points, or are too near to tell; the depth in m, at least zero, is parry's estimate, or, where that fails, the
+    /// overlap along some axis, which is no smaller (of one triangle for meshes).
     Penetrating(f64),
     /// Not decided: counts as a collision.
     Unresolved,
@@ -72,13 +76,32 @@ enum Body {
 struct Convex {
     core: Core,
     margin: f64,
+    /// Some point of the core.
+    middle: ParryVector,
+}
+
+impl Convex {
+    fn new(core: Core, margin: f64) -> Self {
+        let middle = match &core {
+            Core::Point(point) => *point,
+            Core::Triangle([a, b, c]) => (*a + *b + *c) / 3.0,
+            Core::Polyhedron(polyhedron) => {
+                let points = polyhedron.points();
+                points.iter().fold(ParryVector::ZERO, |sum, point| sum + *point) / points.len() as f64
+            }
+            Core::Segment { .. } | Core::Box { .. } | Core::Cylinder { .. } | Core::Ellipsoid { .. } => {
+                ParryVector::ZERO
+            }
+        };
+        Convex { core, margin, middle }
+    }
 }
 
 #[derive(Clone)]
 struct MeshBody {
     mesh: TriMesh,
-    /// Whether the mesh bounds a solid, so that what touches no triangle may still be inside.
-    is_solid: bool,
+    /// What touches no triangle may still be inside.
+    inside: Inside,
     /// A vertex of each connected part.
     part_vertices: Vec<ParryVector>,
 }
@@ -131,7 +154,7 @@ impl ReferenceShape {
     /// Prepares `shape`. Errors when parry cannot use a polyhedron or mesh.
     pub fn new(shape: &Shape) -> Result<Self, ReferenceError> {
         let (center, radius) = shape.bounding_sphere();
-        let convex = |core, margin| Body::Convex(Convex { core, margin });
+        let convex = |core, margin| Body::Convex(Convex::new(core, margin));
         let body = match shape {
             Shape::Sphere { radius } => convex(Core::Point(ParryVector::ZERO), *radius),
             Shape::Capsule { half_length, radius } => convex(Core::Segment { half_length: *half_length }, *radius),
@@ -158,11 +181,7 @@ impl ReferenceShape {
 
 impl MeshBody {
     fn new(mesh: &TriangleMesh) -> Result<Self, ReferenceError> {
-        let is_solid = mesh.statistics().is_watertight();
-        let mut triangles = mesh.triangles().to_vec();
-        if is_solid && mesh.signed_volume() < 0.0 {
-            triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
-        }
+        let triangles = mesh.triangles().to_vec();
         let vertices: Vec<ParryVector> = mesh.vertices().iter().map(vector).collect();
         // One vertex per connected part, by union-find over vertices.
         let mut root: Vec<u32> = (0..vertices.len() as u32).collect();
@@ -183,19 +202,19 @@ impl MeshBody {
         parts.sort_unstable();
         parts.dedup();
         let part_vertices = parts.iter().map(|&i| vertices[i as usize]).collect();
-        let flags = if is_solid { TriMeshFlags::ORIENTED } else { TriMeshFlags::empty() };
-        let mesh = TriMesh::with_flags(vertices, triangles, flags)
+        let inside = Inside::of(mesh);
+        let mesh = TriMesh::with_flags(vertices, triangles, TriMeshFlags::empty())
             .map_err(|error| ReferenceError::Refused { kind: "mesh", reason: error.to_string() })?;
-        Ok(MeshBody { mesh, is_solid, part_vertices })
+        Ok(MeshBody { mesh, inside, part_vertices })
     }
 
-    /// How deep `point` lies inside the solid; None outside, or when there is no inside.
+    fn holds(&self, point: ParryVector) -> bool {
+        self.mesh.local_aabb().contains_local_point(point) && self.inside.holds(&Point::new(point.x, point.y, point.z))
+    }
+
+    /// How deep `point` lies inside the solid; None outside.
     fn depth_of(&self, point: ParryVector) -> Option<f64> {
-        if !self.is_solid || !self.mesh.local_aabb().contains_local_point(point) {
-            return None;
-        }
-        let projection = self.mesh.project_local_point(point, false);
-        projection.is_inside.then(|| (projection.point - point).length())
+        self.holds(point).then(|| (self.mesh.project_local_point(point, false).point - point).length())
     }
 }
 
@@ -225,7 +244,7 @@ pub fn distance(a: &ReferenceShape, world_from_a: &Pose, b: &ReferenceShape, wor
     }
 }
 
-/// Distance of `point_in_world` from the shape's surface in m, negative inside; an open mesh has no inside. NaN when it
+/// Distance of `point_in_world` from the shape's surface in m, negative inside. NaN when it
 /// cannot be told, which no comparison takes for a clearance.
 pub fn point_distance(shape: &ReferenceShape, world_from_shape: &Pose, point_in_world: &Point) -> f64 {
     let point = vector(&world_from_shape.inverse_transform_point(point_in_world));
@@ -236,7 +255,7 @@ pub fn point_distance(shape: &ReferenceShape, world_from_shape: &Pose, point_in_
         Body::Mesh(body) => {
             let projection = body.mesh.project_local_point(point, false);
             let distance = (projection.point - point).length();
-            if body.is_solid && projection.is_inside { -distance } else { distance }
+            if body.holds(point) { -distance } else { distance }
         }
         Body::Convex(convex) => {
             let to_core = match &convex.core {
@@ -252,8 +271,8 @@ pub fn point_distance(shape: &ReferenceShape, world_from_shape: &Pose, point_in_
                 Core::Cylinder { half_length, radius } => parry3d_f64::shape::Cylinder::new(*half_length, *radius)
                     .distance_to_local_point(ParryVector::new(point.x, point.z, point.y), false),
                 core => {
-                    let ball = Convex { core: Core::Point(point), margin: 0.0 };
-                    let shape = Convex { core: core.clone(), margin: 0.0 };
+                    let ball = Convex::new(Core::Point(point), 0.0);
+                    let shape = Convex::new(core.clone(), 0.0);
                     match between_convex(&shape, &ball, &ParryPose::IDENTITY, f64::MAX) {
                         Answer::SeparatedBy(distance) => distance,
                         Answer::Penetrating(depth) => -depth,
@@ -303,7 +322,20 @@ fn answer_and_axis(a: &Convex, b: &Convex, a_from_b: &ParryPose, max: f64) -> (A
             return (Answer::Penetrating(margins - reached), ParryVector::ZERO);
         }
     }
-    (shallow, ParryVector::ZERO)
+    if shallow != Answer::Unresolved {
+        return (shallow, ParryVector::ZERO);
+    }
+    // Whatever the search said: along any axis the overlap bounds the depth from above.
+    let axes = [ParryVector::X, ParryVector::Y, ParryVector::Z];
+    let of_b = axes.map(|axis| a_from_b.transform_vector(axis));
+    let mut all = vec![first_axis, -first_axis];
+    all.extend(axes.iter().chain(&of_b).flat_map(|&axis| [axis, -axis]));
+    let (gap, axis) = widest_slab(a, b, a_from_b, &all, 0.0);
+    match gap {
+        gap if !gap.is_finite() => (Answer::Unresolved, ParryVector::ZERO),
+        gap if gap > 0.0 => (Answer::SeparatedBy(gap), axis),
+        gap => (Answer::Penetrating(-gap), ParryVector::ZERO),
+    }
 }
 
 /// Width of the widest slab found between `a` and `b`, starting across `axes`; not above zero when none separates them.
@@ -382,7 +414,7 @@ fn penetration(a: &Convex, b: &Convex, a_from_b: &ParryPose, simplex: &VoronoiSi
 fn mesh_to_convex(body: &MeshBody, convex: &Convex, mesh_from_convex: &ParryPose, max: f64) -> Answer {
     let answer = triangles_to_convex(body, convex, mesh_from_convex, max);
     if let Answer::SeparatedBy(_) = answer {
-        let inner = mesh_from_convex.transform_point(convex.core.local_support_point(ParryVector::X));
+        let inner = mesh_from_convex.transform_point(convex.middle);
         if let Some(depth) = body.depth_of(inner) {
             return Answer::Penetrating(depth);
         }
@@ -414,7 +446,7 @@ fn triangles_to_convex(body: &MeshBody, convex: &Convex, mesh_from_convex: &Parr
             if corners.iter().all(|corner| from - corner.dot(axis) >= best) {
                 return None;
             }
-            let triangle = Convex { core: Core::Triangle(corners), margin: 0.0 };
+            let triangle = Convex::new(Core::Triangle(corners), 0.0);
             match answer_and_axis(&triangle, convex, mesh_from_convex, best.min(max)) {
                 (Answer::SeparatedBy(gap), axis) => {
                     let axis = axis.normalize_or_zero();
@@ -445,7 +477,7 @@ fn mesh_to_mesh(a: &MeshBody, b: &MeshBody, a_from_b: &ParryPose, max: f64) -> A
     let mut nearest = max;
     let mut unresolved = false;
     for triangle in b.mesh.triangles() {
-        let triangle = Convex { core: Core::Triangle([triangle.a, triangle.b, triangle.c]), margin: 0.0 };
+        let triangle = Convex::new(Core::Triangle([triangle.a, triangle.b, triangle.c]), 0.0);
         match triangles_to_convex(a, &triangle, a_from_b, nearest) {
             Answer::SeparatedBy(gap) => nearest = nearest.min(gap),
             Answer::Penetrating(depth) => return Answer::Penetrating(depth),

@@ -5,7 +5,7 @@ use crate::hull::ConvexHull;
 use crate::mesh::TriangleMesh;
 use std::sync::Arc;
 
-/// A solid (or, for an open mesh, a surface) in its own frame. Lengths in metres, all positive.
+/// A solid in its own frame; of an open sheet of triangles only the surface is left. Lengths in metres, all positive.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
     /// Ball about the origin.
@@ -72,6 +72,18 @@ impl Shape {
             Shape::Ellipsoid { radii } => (Point::origin(), radii.max()),
             Shape::Convex(hull) => ball_of(hull.vertices()),
             Shape::Mesh(mesh) => ball_of(mesh.vertices()),
+        }
+    }
+
+    /// Some point of a convex shape; of a mesh the mean of its vertices.
+    pub fn middle(&self) -> Point {
+        let mean = |points: &[Point]| {
+            Point::from(points.iter().map(|p| p.coords).sum::<Vector>() / points.len().max(1) as f64)
+        };
+        match self {
+            Shape::Convex(hull) => mean(hull.vertices()),
+            Shape::Mesh(mesh) => mean(mesh.vertices()),
+            _ => Point::origin(),
         }
     }
 

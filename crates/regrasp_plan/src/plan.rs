@@ -234,6 +234,17 @@ impl Segment {
     }
 }
 
+/// Relocations among `segments`: how often a finger lands on a contact. The one definition, for statistics, tables, page and
+/// charts. A finger that lifts off and stays free is none. `fingers` are named in the order of the contacts.
+pub fn relocations(fingers: &[String], segments: &[Segment]) -> u64 {
+    let lands = |segment: &&Segment| {
+        let moving = segment.moving_finger.as_ref().and_then(|name| fingers.iter().position(|finger| finger == name));
+        let last = segment.waypoints.last().zip(moving).and_then(|(waypoint, finger)| waypoint.contacts.get(finger));
+        segment.kind == SegmentKind::Regrasp && last.is_some_and(ContactState::holds)
+    };
+    segments.iter().filter(lands).count() as u64
+}
+
 /// A pose that the object has to pass between start and goal, and when it does.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -357,7 +368,7 @@ pub struct Statistics {
     pub transfers: u64,
     /// Transfers in the plan during which some finger is free.
     pub transfers_with_free_fingers: u64,
-    /// Relocations in the plan: how often a finger lands on a contact.
+    /// Relocations in the plan: how often a finger lands on a contact ([`relocations`]).
     pub relocations: u64,
     /// True when a wall-clock limit cut something, so that another machine may find another plan.
     pub cut_by_time: bool,
@@ -388,7 +399,7 @@ pub struct Improvement {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlanFigures {
-    /// Single-finger relocations.
+    /// Relocations: how often a finger lands on a contact ([`relocations`]).
     pub relocations: u64,
     /// Transfers.
     pub transfers: u64,
@@ -439,4 +450,11 @@ pub struct Plan {
     pub segments: Vec<Segment>,
     /// Counts of the search.
     pub statistics: Statistics,
+}
+
+impl Plan {
+    /// How often a finger lands on a contact ([`relocations`]), counted from the segments.
+    pub fn n_relocations(&self) -> u64 {
+        relocations(&self.fingers, &self.segments)
+    }
 }

@@ -110,6 +110,7 @@ fn object(object: &Object) -> Value {
     json!({
         "name": object.name,
         "shape": shape(&object.shape),
+        "collides_as_hull": object.hull.is_some(),
         "mass": object.mass,
         "center_of_mass": <[f64; 3]>::from(object.center_of_mass.coords),
         "friction": object.friction,

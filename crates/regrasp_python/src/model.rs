@@ -5,8 +5,9 @@ use crate::error;
 use crate::guard::guarded;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
+use regrasp::base::{Diagnostic, Place};
 use regrasp::robot::import::{LoadOptions, ResolveOptions, load_hand};
-use regrasp::scene::{LoadedScene, load_scene};
+use regrasp::scene::{Gravity, LoadedScene, load_scene};
 use std::path::{Path, PathBuf};
 
 /// How files are read, as the package passes it: packages by name and folder, folders to search, lenient.
@@ -23,12 +24,42 @@ pub struct Scene {
     pub loaded: LoadedScene,
     path: PathBuf,
     options: LoadOptions,
+    gravity: Option<GravityInHand>,
+}
+
+/// Gravity instead of the scene file's, as seen from the hand's base link.
+#[derive(FromPyObject, Debug, Clone)]
+enum GravityInHand {
+    /// Along this direction, of any length.
+    Direction([f64; 3]),
+    /// The word "any".
+    Word(String),
+}
+
+/// Reads a scene, under the gravity given.
+fn read(
+    path: &Path,
+    options: &LoadOptions,
+    gravity: Option<&GravityInHand>,
+) -> Result<LoadedScene, regrasp::InputError> {
+    let loaded = load_scene(path, options)?;
+    let gravity = match gravity {
+        None => return Ok(loaded),
+        Some(GravityInHand::Word(word)) => (word == "any").then_some(Gravity::Any),
+        Some(GravityInHand::Direction(down)) => Gravity::in_hand(&loaded.scene.hand, &(*down).into()),
+    };
+    let Some(gravity) = gravity else {
+        let diagnostic = Diagnostic::new("A503", Place::file("regrasp.load_scene"), "is no direction");
+        let expected = "a direction in the frame of the hand's base link, or \"any\"";
+        return Err(diagnostic.element("argument", "gravity").expected(expected).into());
+    };
+    Ok(LoadedScene { scene: loaded.scene.under_gravity(gravity), ..loaded })
 }
 
 impl Scene {
     /// The same scene, read afresh: the checker starts from files.
     pub fn read_again(&self) -> Result<LoadedScene, regrasp::InputError> {
-        load_scene(&self.path, &self.options)
+        read(&self.path, &self.options, self.gravity.as_ref())
     }
 
     /// Where its packages are.
@@ -44,13 +75,14 @@ impl Scene {
 
 #[pymethods]
 impl Scene {
-    /// Reads the scene file at `path`.
+    /// Reads the scene file at `path`; `gravity` stands above the file's.
     #[staticmethod]
-    fn load(py: Python<'_>, path: PathBuf, options: Options) -> PyResult<Self> {
+    fn load(py: Python<'_>, path: PathBuf, options: Options, gravity: Option<GravityInHand>) -> PyResult<Self> {
         guarded(py, || {
             let options = load_options(options);
-            let loaded = py.detach(|| load_scene(&path, &options)).map_err(|error| error::input(py, &error))?;
-            Ok(Scene { loaded, path, options })
+            let loaded =
+                py.detach(|| read(&path, &options, gravity.as_ref())).map_err(|error| error::input(py, &error))?;
+            Ok(Scene { loaded, path, options, gravity })
         })
     }
 

@@ -6,10 +6,17 @@ use crate::model::Scene;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use regrasp::base::{Diagnostic, Place, files};
-use regrasp::export::{PlanArrays, to_mjcf, to_npz, to_ros2};
+use regrasp::export::{ExportError, PlanArrays, to_mjcf, to_npz, to_ros2};
 use regrasp::plan::format;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+
+/// A plan that cannot be written in a format, as `InputError`.
+fn export_error(py: Python<'_>, wrong: &ExportError) -> PyErr {
+    let (expected, fix) = wrong.expected_and_fix();
+    let diagnostic = Diagnostic::new(wrong.code(), Place::file("plan"), wrong.to_string());
+    error::input(py, &diagnostic.expected(expected).fix(fix).into())
+}
 
 /// A plan.
 #[pyclass(frozen, module = "regrasp._regrasp")]
@@ -45,12 +52,15 @@ impl Plan {
 
     /// The bytes of an archive of arrays for numpy.
     fn to_npz<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        guarded(py, || Ok(PyBytes::new(py, &py.detach(|| to_npz(&self.plan)))))
+        guarded(py, || {
+            let npz = py.detach(|| to_npz(&self.plan)).map_err(|wrong| export_error(py, &wrong))?;
+            Ok(PyBytes::new(py, &npz))
+        })
     }
 
     /// A ROS 2 trajectory, as YAML.
     fn to_ros2(&self, py: Python<'_>) -> PyResult<String> {
-        guarded(py, || Ok(py.detach(|| to_ros2(&self.plan))))
+        guarded(py, || py.detach(|| to_ros2(&self.plan)).map_err(|wrong| export_error(py, &wrong)))
     }
 
     /// The MuJoCo model of `scene` with a keyframe per waypoint, and where it differs from the scene.

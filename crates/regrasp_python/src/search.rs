@@ -7,7 +7,7 @@ use crate::plan::Plan;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use regrasp::base::{Diagnostic, Place};
-use regrasp::plan::check::{CheckSettings, Report};
+use regrasp::plan::check::{CheckSettings, Level, Report};
 use regrasp::plan::format;
 use regrasp::planners::Progress;
 use regrasp::scene::TaskKind;
@@ -34,6 +34,7 @@ pub struct Request {
     margin: Option<f64>,
     improve_work: Option<u64>,
     settings: Option<String>,
+    level: String,
     progress: Option<Py<PyAny>>,
 }
 
@@ -42,6 +43,7 @@ pub struct Request {
 pub fn plan(py: Python<'_>, scene: &Scene, request: Request) -> PyResult<(Option<Plan>, String)> {
     guarded(py, || {
         let task = scene.loaded.task.kind;
+        let level = level_named(&request.level).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
         let settings = settings(task, &request).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
         let query = scene.loaded.task.query(request.seed);
         let started = Instant::now();
@@ -56,7 +58,8 @@ pub fn plan(py: Python<'_>, scene: &Scene, request: Request) -> PyResult<(Option
             Ok(plan) => plan,
             Err(failure) => return Ok((None, failed(&failure))),
         };
-        let (plan, report) = py.detach(|| judged_as_written(&plan, scene)).map_err(|error| error::input(py, &error))?;
+        let (plan, report) =
+            py.detach(|| judged_as_written(&plan, scene, level)).map_err(|error| error::input(py, &error))?;
         if report.accepted() {
             return Ok((Some(Plan { plan }), self::report(&report)));
         }
@@ -66,11 +69,13 @@ pub fn plan(py: Python<'_>, scene: &Scene, request: Request) -> PyResult<(Option
 
 /// Judges `plan` in `scene` as it was read, against the query of the plan's seed, and returns the report as JSON.
 #[pyfunction]
-pub fn check(py: Python<'_>, plan: &Plan, scene: &Scene) -> PyResult<String> {
+pub fn check(py: Python<'_>, plan: &Plan, scene: &Scene, level: &str) -> PyResult<String> {
     guarded(py, || {
+        let level = level_named(level).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
         let judged = py.detach(|| {
             let query = scene.loaded.task.query(plan.plan.seed);
-            regrasp::plan::check::check(&scene.loaded.scene, Some(&query), &plan.plan, &CheckSettings::default())
+            let settings = CheckSettings { level, ..CheckSettings::default() };
+            regrasp::plan::check::check(&scene.loaded.scene, Some(&query), &plan.plan, &settings)
         });
         Ok(report(&judged))
     })
@@ -85,13 +90,27 @@ pub fn find_scene(py: Python<'_>, plan: &Plan, path: PathBuf, current: PathBuf) 
 }
 
 /// Judges the bytes that a file of `plan` would have, in a scene that is read afresh: the checker starts from files.
-fn judged_as_written(plan: &regrasp::Plan, scene: &Scene) -> Result<(regrasp::Plan, Report), regrasp::InputError> {
+fn judged_as_written(
+    plan: &regrasp::Plan,
+    scene: &Scene,
+    level: Level,
+) -> Result<(regrasp::Plan, Report), regrasp::InputError> {
     let plan = format::from_json(Path::new("plan.json"), format::to_json(plan).as_bytes())
         .expect("a plan just made is a plan file");
     let again = scene.read_again()?;
     let query = again.task.query(plan.seed);
-    let report = regrasp::plan::check::check(&again.scene, Some(&query), &plan, &CheckSettings::default());
+    let settings = CheckSettings { level, ..CheckSettings::default() };
+    let report = regrasp::plan::check::check(&again.scene, Some(&query), &plan, &settings);
     Ok((plan, report))
+}
+
+/// The level of this name. Errors: there is none (`A503`).
+fn level_named(name: &str) -> Result<Level, Diagnostic> {
+    Level::named(name).ok_or_else(|| {
+        bad("A503", format!("is \"{name}\""))
+            .element("argument", "level")
+            .expected("\"geometry\", \"forces\" or \"motion\"")
+    })
 }
 
 /// An error of an argument of `regrasp.plan`.

@@ -8,8 +8,10 @@ use regrasp_geometry::{Point, Shape, Surface};
 pub struct Object {
     /// Name.
     pub name: String,
-    /// Its shape.
+    /// Its shape: contacts lie on the surface of this one.
     pub shape: Shape,
+    /// Its convex hull, where all but the fingertips keep away from that (`solid = "hull"`).
+    pub hull: Option<Shape>,
     /// Largest distance of a point of the object from its centre of mass, in metres: the torque scale of grasp quality.
     pub radius: f64,
     /// For a mesh, what collision tests ask of it.
@@ -26,4 +28,11 @@ pub struct Object {
     pub edge_distance: f64,
     /// Edges of a mesh that fold by more than this are creases, in radians.
     pub crease_angle: f64,
+}
+
+impl Object {
+    /// What all but the fingertips keep away from: the shape, or its hull.
+    pub fn solid(&self) -> &Shape {
+        self.hull.as_ref().unwrap_or(&self.shape)
+    }
 }

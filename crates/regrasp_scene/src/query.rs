@@ -2,6 +2,12 @@
 
 use regrasp_geometry::{Point, Pose};
 
+/// Given fingertips and contacts may be this far off the object's surface, in metres. They are moved to the nearest contact,
+/// no finger farther than this; where that is not enough the scene is refused. Planner and checker go by this one number.
+pub const GRASP_TOLERANCE: f64 = 5e-4;
+/// A joint may turn by this much for it, in radians: as far as the tolerance is at 10 mm from its axis.
+pub const GRASP_TURN_TOLERANCE: f64 = 0.05;
+
 /// How the grasp at the start or at the goal is given.
 #[derive(Debug, Clone, PartialEq)]
 pub enum GraspRequest {

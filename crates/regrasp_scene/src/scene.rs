@@ -1,6 +1,7 @@
 //! The scene: hand, object, obstacles.
 
 use crate::gravity::Gravity;
+use crate::limits::Limits;
 use crate::object::Object;
 use regrasp_geometry::collision::MeshBody;
 use regrasp_geometry::shape::PlacedShape;
@@ -45,8 +46,24 @@ pub struct Scene {
     pub object: Object,
     /// Obstacles.
     pub obstacles: Vec<Obstacle>,
-    /// Gravity, where the file states it; along the world's -Z otherwise, unless a planner is told another direction.
+    /// Gravity, where the file states it; along the world's -Z otherwise.
     pub gravity: Option<Gravity>,
+    /// What a plan may ask of hand and object.
+    pub limits: Limits,
     /// The files it was read from, the scene file first.
     pub inputs: Vec<InputFile>,
+}
+
+impl Scene {
+    /// Gravity as planners plan with it and the checker judges by it.
+    pub fn gravity(&self) -> Gravity {
+        self.gravity.unwrap_or_default()
+    }
+
+    /// The same scene under another gravity, whatever its file says.
+    #[must_use]
+    pub fn under_gravity(mut self, gravity: Gravity) -> Self {
+        self.gravity = Some(gravity);
+        self
+    }
 }

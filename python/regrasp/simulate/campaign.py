@@ -155,8 +155,9 @@ def _plan(job: Job, scene: Any) -> tuple[Any, str]:
         return None, failed.read_text()
     settings = {**json.loads(job.settings), **VARIANTS[job.variant]}
     if job.gravity != "plan":
-        settings["gravity"] = _down(job, scene)
-    found = regrasp.plan(scene, seed=job.seed, settings=settings, time_limit=job.time_limit)
+        scene = regrasp.load_scene(job.scene, packages=dict(job.packages), gravity=_down(job, scene))
+    # Variants leave out what holds or moves the object: replays show what that costs.
+    found = regrasp.plan(scene, seed=job.seed, settings=settings, time_limit=job.time_limit, level="geometry")
     job.plan_path.parent.mkdir(parents=True, exist_ok=True)
     if isinstance(found, regrasp.Plan):
         _write(job.plan_path, found.to_json().decode())
@@ -175,7 +176,7 @@ def _down(job: Job, scene: Any) -> list[float]:
 
     # Which way the palm faces shows in any plan.
     for seed in range(100):
-        plan = regrasp.plan(scene, seed=seed, settings={"forces": None, "friction_margin": 1.0})
+        plan = regrasp.plan(scene, seed=seed, settings={"forces": None, "friction_margin": 1.0}, level="geometry")
         if isinstance(plan, regrasp.Plan):
             rig = make_rig(regrasp.export_mjcf(plan, scene), json.loads(plan.to_json()), Settings(controller="A"))
             world_from_hand = scene.hand.world_from_base.matrix[:3, :3]

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from .model import Rig, Settings, contact_jacobians, gravity_of, inverses, normals_in_world
+from .model import Rig, Settings, angular_jacobians, contact_jacobians, gravity_of, inverses, normals_in_world
 from .reference import Array, Reference, held_at_waypoints, rotation_matrices, waypoints_of
+from .torsion import Spinning, least_forces, spinning
 
 #: Largest offset of a fingertip by feedback, in metres.
 LARGEST_OFFSET = 0.01
@@ -31,9 +32,16 @@ class Controller:
         self._inverses = inverses(jacobians)
         self._contacts = contacts
         self._jacobians = jacobians
-        self.torques = ref.blend(_torques(rig, jacobians, contacts, settings))
+        torques = _torques(rig, jacobians, contacts, settings)
+        spin = None
+        if settings.controller != "A" and settings.torsion_told != 0.0:
+            spin = spinning(rig, contacts, settings.torsion_told)
+            torques = torques + _against_torsion(rig, jacobians, spin)
+        self.torques = ref.blend(torques)
         """Fed forward, at every tick."""
         targets = ref.joints
+        if spin is not None:
+            targets = targets + ref.blend(np.einsum("kjfl,kfl->kj", self._inverses, spin.slips))
         if settings.controller == "A":
             held = held_at_waypoints(rig.plan)
             inward = -settings.squeeze * normals_in_world(rig.plan) * held[:, :, None]
@@ -169,21 +177,15 @@ def _torques(rig: Rig, jacobians: Array, contacts: Array, settings: Settings) ->
     center = np.array(rig.model.body_ipos[rig.object_body])
     for k, point in enumerate(points):
         pose = point["world_from_object"]
-        forces = _least_forces(contacts[k][held[k]] - _place(pose, center), lift)
+        forces = least_forces(contacts[k][held[k]] - _place(pose, center), lift, np.zeros(3))
         torques[k] += np.einsum("fij,fi->j", jacobians[k][held[k]], forces)
     return torques
 
 
-def _least_forces(arms: Array, force: Array) -> Array:
-    """Least forces at ``arms`` from the centre of mass that sum up to ``force`` and turn nothing."""
-    grasp = np.zeros((6, 3 * len(arms)))
-    for f, (x, y, z) in enumerate(arms):
-        grasp[:3, 3 * f : 3 * f + 3] = np.eye(3)
-        grasp[3:, 3 * f : 3 * f + 3] = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
-    wrench = np.concatenate((force, np.zeros(3)))
-    # Torques in units of a finger's width, so that both halves count alike.
-    scale = np.repeat((1.0, 30.0), 3)
-    return (np.linalg.pinv(grasp * scale[:, None]) @ (wrench * scale)).reshape(-1, 3)
+def _against_torsion(rig: Rig, jacobians: Array, spin: Spinning) -> Array:
+    """Torques that exert the moments of fingertips that spin, and the forces that balance them, at every waypoint."""
+    about = spin.moments[:, :, None] * normals_in_world(rig.plan)
+    return np.einsum("kfij,kfi->kj", angular_jacobians(rig), about) + np.einsum("kfij,kfi->kj", jacobians, spin.forces)
 
 
 def _place(pose: dict[str, list[float]], point: Array) -> Array:

@@ -40,6 +40,9 @@ class Settings:
     """Mass of the simulated object over the one that the plan counts on."""
     torsion: float | None = None
     """Torsional friction of all fingertips, in metres, before it is scaled; without it the model's."""
+    torsion_told: float | None = None
+    """Torsional friction of hard fingertips that the controller makes up for, in metres; without it that of the simulation. None of
+    it with 0, and by controller A."""
     speed: float = 1.0
     """Times faster than planned."""
     noslip: bool = True
@@ -193,6 +196,24 @@ def contact_jacobians(rig: Rig) -> tuple[Array, Array]:
             # Joints of other fingers do not move this one.
             jacobians[k, f][:, finger.joints] = (full @ rig.drives)[:, finger.joints]
     return jacobians, where
+
+
+def angular_jacobians(rig: Rig) -> Array:
+    """Angular velocity of every fingertip over the velocities of the plan's joints, at every waypoint: shape (n_waypoints,
+    n_fingers, 3, n_joints)."""
+    model = rig.model
+    data = mujoco.MjData(model)
+    n_joints = len(rig.plan["joint_names"])
+    jacobians = np.zeros((model.nkey, len(rig.fingers), 3, n_joints))
+    full = np.zeros((3, model.nv))
+    for k in range(model.nkey):
+        mujoco.mj_resetDataKeyframe(model, data, k)
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        for f, finger in enumerate(rig.fingers):
+            mujoco.mj_jac(model, data, None, full, np.zeros(3), finger.body)
+            jacobians[k, f][:, finger.joints] = (full @ rig.drives)[:, finger.joints]
+    return jacobians
 
 
 def inverses(jacobians: Array) -> Array:

@@ -62,6 +62,7 @@ mod tests {
     use super::*;
     use crate::growth::{Curve, Point, write_scene};
     use crate::row::Judge;
+    use regrasp_plan::check::Level;
     use regrasp_planners::InHandSettings;
 
     #[test]
@@ -76,7 +77,7 @@ mod tests {
             tracking: Default::default(),
             max_work: 1_000_000,
             time_limit: None,
-            judge: Judge::Checker,
+            judge: Judge::Checker(Level::Geometry),
             improve_for: None,
             cancelled: Default::default(),
         };

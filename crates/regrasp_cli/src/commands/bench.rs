@@ -1,15 +1,15 @@
 //! `regrasp bench`: plan scenes with many seeds and tabulate; or make the page of CSV files; suites are in `suite`.
 
-use super::plan::{refuse_input, refuse_unwritable};
 use super::suite;
 use crate::args::{self, Common};
 use crate::interrupt;
 use crate::load;
+use crate::outputs::{Output, Outputs};
 use crate::stop::Stop;
-use crate::talk::Talk;
+use crate::talk::{Talk, counted};
 use regrasp::base::files;
 use regrasp::scene::{LoadedScene, TaskKind};
-use regrasp::{InHandSettings, TrackingSettings};
+use regrasp::{InHandSettings, InputError, TrackingSettings};
 use regrasp_bench::at_once::in_order;
 use regrasp_bench::growth;
 use regrasp_bench::roadmap::GraphFacts;
@@ -36,15 +36,16 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
         return suite::run(path, arguments, common, talk);
     }
     let files = load::scene_files(&arguments.scenes)?;
-    let mut scenes = files.iter().map(|path| load::scene(path, common, talk)).collect::<Result<Vec<_>, _>>()?;
+    let (mut scenes, bad) = load_scenes(&files, arguments, common, talk)?;
     let (planner, tracking) = bench_settings(&scenes, arguments)?;
     let improves = planner.improve_work > 0;
     let cancelled = interrupt::flag()?;
     let mut writer = match &arguments.csv {
         Some(path) => {
+            let read = scenes.iter().flat_map(|loaded| &loaded.scene.inputs).map(|input| input.path.as_path());
+            let read = read.chain(files.iter().map(PathBuf::as_path)).chain(arguments.search.settings.as_deref());
             make_folder_of(path)?;
-            refuse_unwritable(path)?;
-            refuse_input(path, arguments.scenes.iter().map(PathBuf::as_path))?;
+            Outputs::new(of_rows(path))?.refuse_inputs(read)?;
             let header = if improves { improvement::header() } else { csv::header() };
             Some(csv::Writer::with_text(path, header).map_err(|error| Stop::unwritable(path, &error))?)
         }
@@ -56,7 +57,7 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
         max_work: arguments.search.max_work,
         time_limit: arguments.search.time_limit,
         improve_for: arguments.search.improve,
-        judge: if arguments.no_check { Judge::Skip } else { Judge::Checker },
+        judge: if arguments.no_check { Judge::Skip } else { Judge::Checker(arguments.judging.level()) },
         cancelled: Arc::clone(&cancelled),
     };
     let mut rows = Vec::new();
@@ -87,11 +88,55 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
     for summary in &summaries {
         talk.event("summary", json!(summary));
     }
-    if talk.is_json() {
+    if !talk.is_json() {
+        talk.data(&summary::table(&summaries));
+        if improves {
+            talk.data(&improvement::table(&rows));
+        }
+    }
+    end_of(bad, files.len(), talk)
+}
+
+/// Reads the scenes. One that cannot be read is left out, so that the others are planned; it is told of at the end again.
+/// Errors: none can be read.
+fn load_scenes(
+    files: &[PathBuf],
+    arguments: &args::Bench,
+    common: &Common,
+    talk: &Talk,
+) -> Result<(Vec<LoadedScene>, Vec<InputError>), Stop> {
+    let (mut scenes, mut bad) = (Vec::new(), Vec::new());
+    for path in files {
+        match load::scene(path, common, talk) {
+            Ok(scene) => scenes.push(arguments.judging.scene(scene)),
+            Err(Stop::BadInput(error)) => {
+                talk.note(&format!("{} is left out: it cannot be read", path.display()));
+                talk.event("left_out", json!({ "scene": path, "diagnostics": error.diagnostics }));
+                bad.push(error);
+            }
+            Err(stop) => return Err(stop),
+        }
+    }
+    match scenes.is_empty() {
+        true => end_of(bad, files.len(), talk).map(|()| (scenes, Vec::new())),
+        false => Ok((scenes, bad)),
+    }
+}
+
+/// Bad input where scenes were left out, with all that is wrong with them.
+fn end_of(bad: Vec<InputError>, n_scenes: usize, talk: &Talk) -> Result<(), Stop> {
+    if bad.is_empty() {
         return Ok(());
     }
-    talk.data(&summary::table(&summaries))?;
-    if improves { talk.data(&improvement::table(&rows)) } else { Ok(()) }
+    talk.say(format!("{} of {} could not be read and had no trial:", bad.len(), counted(n_scenes, "scene")));
+    let n_more = bad.iter().map(|error| error.n_more).sum();
+    let diagnostics = bad.into_iter().flat_map(|error| error.diagnostics).collect();
+    Err(Stop::BadInput(InputError { diagnostics, n_more }))
+}
+
+/// The files of rows that go to `path`: the file, and that of the rows until all are there.
+pub fn of_rows(path: &Path) -> [Output; 2] {
+    [Output::new("--csv", path), Output::beside("--csv", csv::partial_path(path))]
 }
 
 /// Settings of both planners. A file of settings is that of the task that all scenes have (`A505` where they differ).
@@ -128,8 +173,7 @@ pub fn say_row(row: &Row, talk: &Talk) {
 /// The page of CSV files, of facts about graphs and, after them, of suites with what was measured of them.
 fn write_page(path: &Path, inputs: &[PathBuf], limits: Option<&Path>, talk: &Talk) -> Result<(), Stop> {
     make_folder_of(path)?;
-    refuse_unwritable(path)?;
-    refuse_input(path, inputs.iter().map(PathBuf::as_path).chain(limits))?;
+    Outputs::new([Output::new("--page", path)])?.refuse_inputs(inputs.iter().map(PathBuf::as_path).chain(limits))?;
     let limits = limits.map_or_else(|| Ok(Limits::new()), limits::read)?;
     let (mut parts, mut graphs, mut sections, mut curves) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for file in inputs {

@@ -16,18 +16,21 @@ pub fn run(arguments: &args::Check, common: &Common, talk: &Talk) -> Result<(), 
     // The flag is not asked here: the process ends by itself shortly after Ctrl-C.
     interrupt::flag()?;
     let plan = format::from_json(&arguments.plan, &files::read(&arguments.plan)?)?;
-    let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref())?;
-    let loaded = load::scene(&scene_path, common, talk)?;
-    if judge::judge(&loaded, &plan, talk)?.accepted() { Ok(()) } else { Err(Stop::Rejected) }
+    let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref(), "--scene FILE")?;
+    let loaded = arguments.judging.scene(load::scene(&scene_path, common, talk)?);
+    if judge::judge(&loaded, &plan, &arguments.judging, talk)?.accepted() { Ok(()) } else { Err(Stop::Rejected) }
 }
 
 /// The scene file of `plan`, which was read from `plan_path`: `named`, what `--scene` says, whatever the plan says; without
-/// it the one that [`find_scene`] finds, with the current folder as the last to look in.
+/// it the one that [`find_scene`] finds, with the current folder as the last to look in. `how` is the way to name one.
 ///
 /// Errors: without `named`, the plan names no scene file, or none is found (`C420`).
-pub fn scene_of(plan_path: &Path, plan: &Plan, named: Option<&Path>) -> Result<PathBuf, Stop> {
-    match named {
-        Some(path) => Ok(path.to_owned()),
-        None => Ok(find_scene(plan_path, plan, std::env::current_dir().ok().as_deref())?),
+pub fn scene_of(plan_path: &Path, plan: &Plan, named: Option<&Path>, how: &str) -> Result<PathBuf, Stop> {
+    if let Some(path) = named {
+        return Ok(path.to_owned());
     }
+    find_scene(plan_path, plan, std::env::current_dir().ok().as_deref()).map_err(|mut error| {
+        error.diagnostics.iter_mut().for_each(|one| one.fix = format!("name the scene file: {how}"));
+        Stop::BadInput(error)
+    })
 }

@@ -46,7 +46,8 @@ pub fn run(arguments: &args::Demo, common: &Common, talk: &Talk) -> Result<(), S
     let bytes = format::to_json(&plan);
     let (plan_path, chart_path) = (folder.join("plan.json"), folder.join("gait.svg"));
     let options = load::options(common);
-    let report = judge::judge_bytes(&plan_path, bytes.as_bytes(), &scene_path, &options, talk)?;
+    let report =
+        judge::judge_bytes(&plan_path, bytes.as_bytes(), &scene_path, common, &args::Judging::default(), talk)?;
     if !report.accepted() {
         return Err(Stop::Rejected);
     }

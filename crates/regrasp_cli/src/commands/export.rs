@@ -4,10 +4,10 @@
 
 use crate::args::{self, Common};
 use crate::commands::check::scene_of;
-use crate::commands::plan::{refuse_input, refuse_unwritable};
 use crate::interrupt;
 use crate::judge;
 use crate::load;
+use crate::outputs::{Output, Outputs};
 use crate::stop::Stop;
 use crate::talk::Talk;
 use regrasp::base::{Diagnostic, Place, files};
@@ -18,57 +18,63 @@ use serde_json::json;
 use std::path::Path;
 
 /// How a plan becomes the bytes of a file; the scene is there for formats that need it, and where the plan is judged.
-type Write = fn(&Plan, Option<&Scene>, &Talk) -> Result<Vec<u8>, Stop>;
+type Write = fn(&Path, &Plan, Option<&Scene>, &Talk) -> Result<Vec<u8>, Stop>;
 
 /// Reads, judges, writes.
 pub fn run(arguments: &args::Export, common: &Common, talk: &Talk) -> Result<(), Stop> {
     // The flag is not asked here: the process ends by itself shortly after Ctrl-C.
     interrupt::flag()?;
-    let formats: [(&str, Option<&Path>, Write); 3] = [
-        ("npz", arguments.npz.as_deref(), |plan, _, _| Ok(export::to_npz(plan))),
-        ("ros2", arguments.ros2.as_deref(), |plan, _, _| Ok(export::to_ros2(plan).into_bytes())),
-        ("mjcf", arguments.mjcf.as_deref(), mjcf),
+    let path = arguments.plan.as_path();
+    let formats: [(&'static str, Option<&Path>, Write); 3] = [
+        ("--npz", arguments.npz.as_deref(), |path, plan, _, _| {
+            export::to_npz(plan).map_err(|wrong| unfit(path, &wrong))
+        }),
+        ("--ros2", arguments.ros2.as_deref(), |path, plan, _, _| {
+            Ok(export::to_ros2(plan).map_err(|wrong| unfit(path, &wrong))?.into_bytes())
+        }),
+        ("--mjcf", arguments.mjcf.as_deref(), mjcf),
     ];
-    let wanted: Vec<(&str, &Path, Write)> =
+    let wanted: Vec<(&'static str, &Path, Write)> =
         formats.into_iter().filter_map(|(name, path, write)| Some((name, path?, write))).collect();
-    for (k, &(name, path, _)) in wanted.iter().enumerate() {
-        refuse_unwritable(path)?;
-        refuse_input(path, [arguments.plan.as_path()].into_iter().chain(arguments.scene.as_deref()))?;
-        if wanted[..k].iter().any(|&(_, other, _)| other == path) {
-            let problem = format!("is {}, which another format is written to", path.display());
-            return Err(Stop::argument("A505", &format!("--{name}"), problem, "one file for each format"));
-        }
-    }
+    let written = Outputs::new(wanted.iter().map(|&(format, path, _)| Output::new(format, path)))?;
+    written.refuse_inputs([arguments.plan.as_path()].into_iter().chain(arguments.scene.as_deref()))?;
     let plan = format::from_json(&arguments.plan, &files::read(&arguments.plan)?)?;
     let mut scene = None;
     if !arguments.no_check || arguments.mjcf.is_some() {
-        let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref())?;
-        let loaded = load::scene(&scene_path, common, talk)?;
-        for &(_, path, _) in &wanted {
-            refuse_input(path, loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
-        }
-        if !arguments.no_check && !judge::judge(&loaded, &plan, talk)?.accepted() {
+        let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref(), "--scene FILE")?;
+        let loaded = arguments.judging.scene(load::scene(&scene_path, common, talk)?);
+        written.refuse_inputs(loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
+        if !arguments.no_check && !judge::judge(&loaded, &plan, &arguments.judging, talk)?.accepted() {
             return Err(Stop::Rejected);
         }
         scene = Some(loaded.scene);
     }
-    for (name, path, write) in wanted {
-        let bytes = write(&plan, scene.as_ref(), talk)?;
+    // All are made before any is written: what one format cannot hold leaves no files of the others.
+    let made = wanted.into_iter().map(|(name, to, write)| Ok((name, to, write(path, &plan, scene.as_ref(), talk)?)));
+    for (name, path, bytes) in made.collect::<Result<Vec<_>, Stop>>()? {
         files::write_atomic(path, &bytes).map_err(|error| Stop::unwritable(path, &error))?;
         let sha256 = files::sha256(&bytes);
-        talk.event("written", json!({ "format": name, "path": path, "sha256": sha256 }));
+        talk.event("written", json!({ "format": name.trim_start_matches('-'), "path": path, "sha256": sha256 }));
         talk.say(format!("wrote  {}   sha256 {sha256}", path.display()));
     }
     Ok(())
 }
 
+/// A plan that a format cannot hold (`C421`, `C422`).
+fn unfit(path: &Path, wrong: &export::ExportError) -> Stop {
+    let (expected, fix) = wrong.expected_and_fix();
+    Stop::BadInput(
+        Diagnostic::new(wrong.code(), Place::file(path), wrong.to_string()).expected(expected).fix(fix).into(),
+    )
+}
+
 /// The MuJoCo model. Errors: the plan is for another hand (`C408`).
-fn mjcf(plan: &Plan, scene: Option<&Scene>, talk: &Talk) -> Result<Vec<u8>, Stop> {
+fn mjcf(path: &Path, plan: &Plan, scene: Option<&Scene>, talk: &Talk) -> Result<Vec<u8>, Stop> {
     let Some(scene) = scene else {
         return Err(Stop::Internal("a MuJoCo model was asked for without a scene".into()));
     };
     let model = export::to_mjcf(scene, plan).map_err(|error| {
-        let diagnostic = Diagnostic::new("C408", Place::file("plan"), error.to_string());
+        let diagnostic = Diagnostic::new("C408", Place::file(path), error.to_string());
         Stop::BadInput(diagnostic.fix("name the scene that the plan was made for: --scene FILE").into())
     })?;
     for note in &model.notes {

@@ -1,13 +1,15 @@
 //! `regrasp growth`: how loading and planning grow with fingers, triangles, obstacles and threads.
 
 use super::bench::{make_folder_of, say_row};
-use super::plan::{available_threads, refuse_unwritable};
+use super::plan::available_threads;
 use crate::args;
 use crate::interrupt;
+use crate::outputs::refuse_unwritable;
 use crate::stop::Stop;
 use crate::talk::{Talk, duration, grouped};
 use regrasp::InHandSettings;
 use regrasp::base::files;
+use regrasp::plan::check::Level;
 use regrasp::scene::LoadedScene;
 use regrasp_bench::growth::{Curve, GrowthRow, Point, batch, header, line, pictures, table, timed_load, write_scene};
 use regrasp_bench::row::Judge;
@@ -40,7 +42,7 @@ pub fn run(arguments: &args::Growth, talk: &Talk) -> Result<(), Stop> {
         tracking: Default::default(),
         max_work: arguments.max_work,
         time_limit: Some(arguments.time_limit),
-        judge: Judge::Checker,
+        judge: Judge::Checker(Level::Geometry),
         improve_for: None,
         cancelled,
     };
@@ -142,5 +144,8 @@ fn write(curve: Curve, rows: &[GrowthRow], folder: &Path, talk: &Talk) -> Result
         files::write_atomic(&path, text.as_bytes()).map_err(|error| Stop::unwritable(&path, &error))?;
         talk.say(format!("wrote  {}", path.display()));
     }
-    if talk.is_json() { Ok(()) } else { talk.data(&table(curve, rows)) }
+    if !talk.is_json() {
+        talk.data(&table(curve, rows));
+    }
+    Ok(())
 }

@@ -1,9 +1,9 @@
 //! `regrasp inspect`: what a hand is like, and a hand file for it.
 
-use super::plan::{refuse_input, refuse_unwritable};
 use crate::args::{self, Common};
 use crate::interrupt;
 use crate::load;
+use crate::outputs::{refuse_input, refuse_unwritable};
 use crate::stop::Stop;
 use crate::talk::{Talk, counted, grouped};
 use regrasp::base::{Rng, files};
@@ -41,7 +41,7 @@ pub fn run(arguments: &args::Inspect, common: &Common, talk: &Talk) -> Result<()
         }),
     );
     if !talk.is_json() {
-        talk.data(&report(&found))?;
+        talk.data(&report(&found));
     }
     match (&found.hand, &arguments.output) {
         (Err(error), Some(_)) => Err(Stop::BadInput(error.clone())),

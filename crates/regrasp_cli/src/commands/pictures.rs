@@ -1,8 +1,8 @@
 //! Pictures made without a browser: the storyboard, the charts and the graph.
 
 use super::bench::make_folder_of;
-use super::plan::{refuse_input, refuse_unwritable};
 use crate::args;
+use crate::outputs::Output;
 use crate::stop::Stop;
 use crate::talk::{Talk, grouped};
 use regrasp::base::{Diagnostic, Place, files};
@@ -12,14 +12,26 @@ use regrasp::viewer::storyboard::{StoryboardError, StoryboardSettings, storyboar
 use regrasp::viewer::{charts, roadmap_picture::roadmap_picture};
 use regrasp::{Failure, InHandQuery};
 use serde_json::json;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Refuses what cannot be written, before anything is made; `inputs` are the files that the command reads.
-pub fn refuse<'a>(arguments: &args::View, inputs: impl Iterator<Item = &'a Path> + Clone) -> Result<(), Stop> {
-    if let Some(path) = &arguments.png {
-        refuse_unwritable(path)?;
-        refuse_input(path, inputs)?;
-    }
+/// Names of the pictures of a failure.
+pub const OF_FAILURE: [&str; 2] = ["causes.svg", "reached.svg"];
+/// Name of the picture of a graph in a folder of charts.
+const OF_ROADMAP: &str = "roadmap.svg";
+
+/// The pictures that the arguments ask for.
+pub fn outputs(arguments: &args::View) -> impl Iterator<Item = Output> {
+    let storyboard = arguments.png.iter().map(|path| Output::new("--png", path));
+    let names = || charts::NAMES.iter().map(|name| format!("{name}.svg")).chain([OF_ROADMAP.to_owned()]);
+    let in_folder = move |folder: &PathBuf| {
+        let folder = folder.clone();
+        names().map(move |name| Output::beside("--svg", folder.join(name)))
+    };
+    storyboard.chain(arguments.svg.iter().flat_map(in_folder))
+}
+
+/// Makes the folder of the charts, before anything else is made.
+pub fn make_folder(arguments: &args::View) -> Result<(), Stop> {
     match &arguments.svg {
         Some(folder) => std::fs::create_dir_all(folder).map_err(|error| Stop::unwritable(folder, &error)),
         None => Ok(()),
@@ -50,7 +62,7 @@ pub fn write(arguments: &args::View, story: &Story, talk: &Talk) -> Result<(), S
         }
         if let Some(roadmap) = &story.roadmap {
             let picture = roadmap_picture(roadmap, &format!("Graph of {}", story.title));
-            put(&folder.join("roadmap.svg"), picture.as_bytes(), talk)?;
+            put(&folder.join(OF_ROADMAP), picture.as_bytes(), talk)?;
         }
     }
     Ok(())
@@ -60,11 +72,11 @@ pub fn write(arguments: &args::View, story: &Story, talk: &Talk) -> Result<(), S
 pub fn write_failure(folder: &Path, failure: &Failure, query: &InHandQuery, talk: &Talk) -> Result<(), Stop> {
     std::fs::create_dir_all(folder).map_err(|error| Stop::unwritable(folder, &error))?;
     if let Some(chart) = charts::causes(&told::failure_story(failure)) {
-        put(&folder.join("causes.svg"), chart.as_bytes(), talk)?;
+        put(&folder.join(OF_FAILURE[0]), chart.as_bytes(), talk)?;
     }
     if let Some(reached) = told::reached_story(failure, &query.world_from_object_goal) {
         let picture = roadmap_picture(&reached, "Grasps that the search reached");
-        put(&folder.join("reached.svg"), picture.as_bytes(), talk)?;
+        put(&folder.join(OF_FAILURE[1]), picture.as_bytes(), talk)?;
     }
     Ok(())
 }

@@ -1,10 +1,11 @@
 //! `regrasp plan`: plan a scene, check the plan, then write it.
 
-use crate::args::{self, Common};
+use crate::args::{self, Common, Judging};
 use crate::commands::pictures;
 use crate::interrupt;
 use crate::judge;
 use crate::load;
+use crate::outputs::{Output, Outputs, refuse_no_folder};
 use crate::pages::Page;
 use crate::progress::ProgressLines;
 use crate::stop::Stop;
@@ -13,11 +14,11 @@ use regrasp::base::files;
 use regrasp::plan::format;
 use regrasp::plan::plan::Statistics;
 use regrasp::planners::FailureKind;
+use regrasp::planners::in_hand::moved_fingers;
 use regrasp::scene::TaskKind;
 use regrasp::{Budget, Failure, InHandQuery, Plan, PlannerSettings, Scene};
 use serde_json::json;
 use std::fmt::Write;
-use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -25,22 +26,13 @@ use std::time::{Duration, Instant};
 
 /// Plans, checks, writes.
 pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), Stop> {
-    let written = [arguments.output.as_deref(), arguments.report.as_deref()];
-    for path in written.iter().flatten() {
-        refuse_unwritable(path)?;
-    }
-    if arguments.report.is_some() && arguments.report == arguments.output {
-        let problem = "is where the plan is written to";
-        return Err(Stop::argument("A505", "--report", problem, "another file"));
-    }
+    let written = outputs(arguments)?;
     let cancelled = interrupt::flag()?;
     // Reading counts too: a mesh of a million triangles takes seconds.
     let deadline = arguments.search.time_limit.and_then(|limit| Instant::now().checked_add(limit));
-    let loaded = load::scene_by(&arguments.scene, common, deadline, talk)?;
-    for path in written.into_iter().flatten() {
-        let read = loaded.scene.inputs.iter().map(|input| input.path.as_path());
-        refuse_input(path, read.chain(arguments.search.settings.as_deref()))?;
-    }
+    let loaded = arguments.judging.scene(load::scene_by(&arguments.scene, common, deadline, talk)?);
+    let read = loaded.scene.inputs.iter().map(|input| input.path.as_path());
+    written.refuse_inputs(read.chain(arguments.search.settings.as_deref()))?;
     let query = loaded.task.query(arguments.seed);
     let n_threads = arguments.threads.unwrap_or_else(available_threads);
     let settings = load::for_task(query.task, &arguments.search, n_threads)?;
@@ -66,7 +58,24 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
         }
         (found, _) => found?,
     };
-    judge_and_write(&plan, arguments.output.as_deref(), &arguments.scene, page.as_ref(), common, talk)
+    let output = arguments.output.as_deref();
+    judge_and_write(&plan, output, &arguments.scene, page.as_ref(), common, &arguments.judging, talk)
+}
+
+/// The files that the arguments name, those of a failure too.
+fn outputs(arguments: &args::Plan) -> Result<Outputs, Stop> {
+    let plan = arguments.output.iter().flat_map(|path| of_plan(path));
+    let page = arguments.report.iter().map(|path| Output::new("--report", path));
+    let in_folder = |folder: &PathBuf| pictures::OF_FAILURE.map(|name| Output::beside("--failure", folder.join(name)));
+    let pictures = arguments.failure.iter().flat_map(in_folder);
+    let outputs = Outputs::new(plan.chain(page).chain(pictures))?;
+    arguments.failure.as_deref().map_or(Ok(()), refuse_no_folder)?;
+    Ok(outputs)
+}
+
+/// The files of a plan that goes to `path`: the plan, or the rejected one.
+pub fn of_plan(path: &Path) -> [Output; 2] {
+    [Output::new("--output", path), Output::beside("--output", rejected_path(path))]
 }
 
 /// Judges a plan; writes it to `output`, or to stdout, if it is accepted. A page is written of every plan.
@@ -76,12 +85,13 @@ pub fn judge_and_write(
     scene: &Path,
     page: Option<&Page>,
     common: &Common,
+    judging: &Judging,
     talk: &Talk,
 ) -> Result<(), Stop> {
     let bytes = format::to_json(plan);
     // Judged is what will be written, in a scene read afresh: the checker starts from files.
     let plan_path = output.unwrap_or(Path::new("plan.json"));
-    let report = judge::judge_bytes(plan_path, bytes.as_bytes(), scene, &load::options(common), talk)?;
+    let report = judge::judge_bytes(plan_path, bytes.as_bytes(), scene, common, judging, talk)?;
     if let Some(page) = page {
         page.write_plan(plan, &report, talk)?;
     }
@@ -89,12 +99,12 @@ pub fn judge_and_write(
         return Err(rejected(output, &bytes, talk));
     }
     let Some(path) = output else {
-        return if talk.is_json() {
+        if talk.is_json() {
             talk.event("written", json!({ "sha256": files::sha256(bytes.as_bytes()), "plan": plan }));
-            Ok(())
         } else {
-            talk.data(&bytes)
-        };
+            talk.data(&bytes);
+        }
+        return Ok(());
     };
     files::write_atomic(path, bytes.as_bytes()).map_err(|error| Stop::unwritable(path, &error))?;
     let sha256 = files::sha256(bytes.as_bytes());
@@ -119,33 +129,6 @@ pub struct Limits {
 /// Threads of this machine.
 pub fn available_threads() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get)
-}
-
-/// Refuses a path that cannot be written, before any work is done (`F003`).
-pub fn refuse_unwritable(path: &Path) -> Result<(), Stop> {
-    let fail = |error: io::Error| Err(Stop::unwritable(path, &error));
-    if let Err(error) = files::refuse_other_than_file(path) {
-        return fail(error);
-    }
-    let Some(name) = path.file_name() else {
-        return fail(io::Error::new(io::ErrorKind::InvalidInput, "the path has no file name"));
-    };
-    let mut probe_name = name.to_owned();
-    probe_name.push(format!(".{}.probe", std::process::id()));
-    let probe = path.with_file_name(probe_name);
-    match std::fs::File::create_new(&probe).and_then(|_| std::fs::remove_file(&probe)) {
-        Ok(()) => Ok(()),
-        Err(error) => fail(error),
-    }
-}
-
-/// Refuses to write over a file that this command reads (`F003`).
-pub fn refuse_input<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a Path>) -> Result<(), Stop> {
-    let Ok(real) = path.canonicalize() else { return Ok(()) };
-    match inputs.into_iter().find(|input| input.canonicalize().is_ok_and(|input| input == real)) {
-        None => Ok(()),
-        Some(_) => Err(Stop::unwritable(path, &io::Error::other("it is an input of this command"))),
-    }
 }
 
 /// Says what is asked.
@@ -197,7 +180,21 @@ pub fn search(
         Err(failure) => return Err(Stop::NoPlan(Box::new(failure))),
     };
     say_plan(&plan, started.elapsed().as_secs_f64(), talk);
+    say_moved(scene, query, &plan, talk);
     Ok(plan)
+}
+
+/// Says which fingers the plan has elsewhere than the query, because they did not touch there.
+fn say_moved(scene: &Scene, query: &InHandQuery, plan: &Plan, talk: &Talk) {
+    for moved in moved_fingers(scene, query, plan) {
+        let micrometres = 1e6 * moved.distance;
+        talk.say(format!(
+            "note   at the {} finger \"{}\" did not touch as given: it was moved by {micrometres:.0} micrometres",
+            moved.end, moved.finger
+        ));
+        let event = json!({ "end": moved.end, "finger": moved.finger, "distance": moved.distance });
+        talk.event("moved", event);
+    }
 }
 
 /// Says what was found, in how many seconds.
@@ -218,9 +215,9 @@ pub fn say_plan(plan: &Plan, seconds: f64, talk: &Talk) {
         return;
     }
     talk.say(format!(
-        "plan   {}, {}, {} waypoints, closure margin {:.4}{}   {}",
+        "plan   {}, {}, {} waypoints, closure margin at least {:.4} (planned){}   {}",
         counted(plan.statistics.transfers as usize, "transfer"),
-        counted(plan.statistics.relocations as usize, "relocation"),
+        counted(plan.n_relocations() as usize, "relocation"),
         grouped(waypoints as u64),
         plan.promises.kept_margin,
         if plan.statistics.cut_by_time { ", cut by the time limit" } else { "" },
@@ -352,16 +349,5 @@ mod tests {
         ] {
             assert!(text.contains(part), "{part} is missing in\n{text}");
         }
-    }
-
-    #[test]
-    fn a_path_that_cannot_be_written_is_refused_and_a_good_one_left_as_it_was() {
-        let folder = tempfile::tempdir().unwrap();
-        assert!(refuse_unwritable(&folder.path().join("missing").join("plan.json")).is_err());
-        assert!(refuse_unwritable(folder.path()).is_err());
-        assert!(refuse_unwritable(&folder.path().join("plan.json")).is_ok());
-        assert!(refuse_input(&folder.path().join("plan.json"), [folder.path()]).is_ok());
-        assert!(refuse_input(&folder.path().join("."), [folder.path()]).is_err());
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 }

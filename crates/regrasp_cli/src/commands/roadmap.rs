@@ -1,16 +1,18 @@
 //! `regrasp roadmap`: many queries on one saved graph of a hand and an object.
 
-use super::bench::{make_folder_of, say_row};
+use super::bench::{make_folder_of, of_rows, say_row};
 use super::pictures;
-use super::plan::{available_threads, judge_and_write, refuse_input, refuse_unwritable, say_plan, say_query};
+use super::plan::{available_threads, judge_and_write, of_plan, say_plan, say_query};
 use crate::args::{self, Common, RoadmapAction};
 use crate::interrupt;
 use crate::judge;
 use crate::load;
+use crate::outputs::{Output, Outputs};
 use crate::stop::Stop;
 use crate::talk::{Talk, counted, duration, grouped};
 use regrasp::Budget;
 use regrasp::base::files;
+use regrasp::plan::check::Level;
 use regrasp::planners::FailureKind;
 use regrasp::planners::in_hand::roadmap::{
     About, BuildSettings, BuildStage, Census, GraspRoadmap, QueryMemory, Region, RoadmapPlanner, build_roadmap,
@@ -19,7 +21,7 @@ use regrasp::told;
 use regrasp_bench::row::Judge;
 use regrasp_bench::{Problem, RunSettings, csv, roadmap as bench, summarise, summary};
 use serde_json::json;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -40,9 +42,12 @@ pub fn run(arguments: &args::Roadmap, common: &Common, talk: &Talk) -> Result<()
 
 /// Builds and saves.
 fn run_build(arguments: &args::RoadmapBuild, common: &Common, talk: &Talk) -> Result<(), Stop> {
-    refuse_unwritable(&arguments.output)?;
+    let written = Outputs::new([Output::new("--output", &arguments.output)])?;
+    written
+        .refuse_inputs([&arguments.settings, &arguments.build_settings].into_iter().flatten().map(PathBuf::as_path))?;
     let cancelled = interrupt::flag()?;
     let loaded = load::in_hand_scene(&arguments.scene, ROADMAPS, common, talk)?;
+    written.refuse_inputs(loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
     let n_threads = arguments.threads.unwrap_or_else(available_threads);
     let settings = load::planner_settings(arguments.settings.as_deref(), None, arguments.margin, n_threads)?;
     let mut build: BuildSettings =
@@ -107,16 +112,16 @@ fn open(path: &Path, talk: &Talk) -> Result<GraspRoadmap, Stop> {
 
 /// Answers the query of a scene, checks the plan, writes it, and lets the roadmap grow if asked.
 fn run_query(arguments: &args::RoadmapQuery, common: &Common, talk: &Talk) -> Result<(), Stop> {
-    if let Some(path) = &arguments.output {
-        refuse_unwritable(path)?;
-    }
-    if arguments.grow {
-        refuse_unwritable(&arguments.roadmap)?;
-    }
+    let plan = Outputs::new(arguments.output.iter().flat_map(|path| of_plan(path)))?;
+    plan.refuse_inputs([arguments.roadmap.as_path()].into_iter().chain(arguments.settings.as_deref()))?;
+    let grown = Outputs::new(arguments.grow.then(|| Output::new("--grow", &arguments.roadmap)))?;
     let cancelled = interrupt::flag()?;
     let roadmap = open(&arguments.roadmap, talk)?;
     refuse_other_settings(&roadmap, arguments)?;
-    let loaded = load::in_hand_scene(&arguments.scene, ROADMAPS, common, talk)?;
+    let loaded = arguments.judging.scene(load::in_hand_scene(&arguments.scene, ROADMAPS, common, talk)?);
+    for written in [plan, grown] {
+        written.refuse_inputs(loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
+    }
     let query = loaded.task.query(arguments.seed);
     say_query(&query, arguments.seed, 1, talk);
     let mut planner = RoadmapPlanner::new(&arguments.roadmap, &roadmap, &loaded.scene)?;
@@ -131,7 +136,8 @@ fn run_query(arguments: &args::RoadmapQuery, common: &Common, talk: &Talk) -> Re
         Err(failure) => return Err(Stop::NoPlan(Box::new(failure))),
     };
     say_plan(&answer.plan, started.elapsed().as_secs_f64(), talk);
-    judge_and_write(&answer.plan, arguments.output.as_deref(), &arguments.scene, None, common, talk)?;
+    let output = arguments.output.as_deref();
+    judge_and_write(&answer.plan, output, &arguments.scene, None, common, &arguments.judging, talk)?;
     if arguments.grow {
         drop(planner);
         save(&roadmap.grown_by(&answer), &arguments.roadmap, talk)?;
@@ -141,8 +147,8 @@ fn run_query(arguments: &args::RoadmapQuery, common: &Common, talk: &Talk) -> Re
 
 /// Draws a graph; with a scene also the answer to its query, which is judged like any other.
 fn run_picture(arguments: &args::RoadmapPicture, common: &Common, talk: &Talk) -> Result<(), Stop> {
-    refuse_unwritable(&arguments.output)?;
-    refuse_input(&arguments.output, [arguments.roadmap.as_path()].into_iter().chain(arguments.scene.as_deref()))?;
+    let written = Outputs::new([Output::new("--output", &arguments.output)])?;
+    written.refuse_inputs([arguments.roadmap.as_path()].into_iter().chain(arguments.scene.as_deref()))?;
     let cancelled = interrupt::flag()?;
     let roadmap = open(&arguments.roadmap, talk)?;
     let name = arguments.roadmap.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
@@ -152,6 +158,7 @@ fn run_picture(arguments: &args::RoadmapPicture, common: &Common, talk: &Talk) -
         return pictures::write_roadmap(&arguments.output, &story, &title, talk);
     };
     let loaded = load::in_hand_scene(scene, ROADMAPS, common, talk)?;
+    written.refuse_inputs(loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
     let query = loaded.task.query(arguments.seed);
     say_query(&query, arguments.seed, 1, talk);
     let planner = RoadmapPlanner::new(&arguments.roadmap, &roadmap, &loaded.scene)?;
@@ -163,7 +170,9 @@ fn run_picture(arguments: &args::RoadmapPicture, common: &Common, talk: &Talk) -
         Err(failure) => return Err(Stop::NoPlan(Box::new(failure))),
     };
     say_plan(&answer.plan, started.elapsed().as_secs_f64(), talk);
-    if !judge::judge(&loaded, &answer.plan, talk)?.accepted() {
+    // The graph's motions are geometry: their contacts stay where they are.
+    let judging = args::Judging { level: Some(Level::Geometry.name().into()), gravity: None };
+    if !judge::judge(&loaded, &answer.plan, &judging, talk)?.accepted() {
         return Err(Stop::Rejected);
     }
     // With start and goal of the query as nodes.
@@ -202,7 +211,8 @@ fn run_info(path: &Path, talk: &Talk) -> Result<(), Stop> {
         );
         return Ok(());
     }
-    talk.data(&info_text(path, bytes, seconds, about, &census))
+    talk.data(&info_text(path, bytes, seconds, about, &census));
+    Ok(())
 }
 
 fn info_text(path: &Path, bytes: u64, seconds: f64, about: &About, census: &Census) -> String {
@@ -267,30 +277,30 @@ fn say_census(census: &Census, talk: &Talk) {
 /// Random queries with the roadmap, and without it for comparison.
 fn run_bench(arguments: &args::RoadmapBench, common: &Common, talk: &Talk) -> Result<(), Stop> {
     let cancelled = interrupt::flag()?;
+    for path in [&arguments.csv, &arguments.graph].into_iter().flatten() {
+        make_folder_of(path)?;
+    }
+    let rows = arguments.csv.iter().flat_map(|path| of_rows(path));
+    let facts = arguments.graph.iter().map(|path| Output::new("--graph", path));
+    let written = Outputs::new(rows.chain(facts))?;
+    written.refuse_inputs([arguments.roadmap.as_path()])?;
     let roadmap = open(&arguments.roadmap, talk)?;
-    let loaded = load::in_hand_scene(&arguments.scene, ROADMAPS, common, talk)?;
+    let loaded = arguments.judging.scene(load::in_hand_scene(&arguments.scene, ROADMAPS, common, talk)?);
+    written.refuse_inputs(loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
     let mut planner = RoadmapPlanner::new(&arguments.roadmap, &roadmap, &loaded.scene)?;
     if arguments.smooth {
         planner = planner.smoothing();
     }
     let mut writer = match &arguments.csv {
-        Some(path) => {
-            make_folder_of(path)?;
-            refuse_unwritable(path)?;
-            Some(csv::Writer::create(path).map_err(|error| Stop::unwritable(path, &error))?)
-        }
+        Some(path) => Some(csv::Writer::create(path).map_err(|error| Stop::unwritable(path, &error))?),
         None => None,
     };
-    if let Some(path) = &arguments.graph {
-        make_folder_of(path)?;
-        refuse_unwritable(path)?;
-    }
     let settings = RunSettings {
         planner: planner.settings().clone(),
         tracking: Default::default(),
         max_work: 20_000_000,
         time_limit: None,
-        judge: if arguments.no_check { Judge::Skip } else { Judge::Checker },
+        judge: if arguments.no_check { Judge::Skip } else { Judge::Checker(arguments.judging.level()) },
         improve_for: None,
         cancelled: Arc::clone(&cancelled),
     };
@@ -328,5 +338,8 @@ fn run_bench(arguments: &args::RoadmapBench, common: &Common, talk: &Talk) -> Re
     for summary in &summaries {
         talk.event("summary", json!(summary));
     }
-    if talk.is_json() { Ok(()) } else { talk.data(&summary::table(&summaries)) }
+    if !talk.is_json() {
+        talk.data(&summary::table(&summaries));
+    }
+    Ok(())
 }

@@ -1,13 +1,14 @@
 //! `regrasp bench SUITE.toml`: the tables and figures of a paper, measured again; what an earlier run measured is kept.
 
 use super::bench::{make_folder_of, say_row};
-use super::plan::refuse_unwritable;
 use crate::args::{self, Common};
 use crate::interrupt;
 use crate::load;
+use crate::outputs::refuse_unwritable;
 use crate::stop::Stop;
 use crate::talk::Talk;
 use regrasp::base::files;
+use regrasp::plan::check::Level;
 use regrasp::scene::LoadedScene;
 use regrasp_bench::at_once::in_order;
 use regrasp_bench::csv::Writer;
@@ -130,7 +131,7 @@ fn measure(
         tracking: job.tracking.clone().unwrap_or_default(),
         max_work: job.max_work,
         time_limit: job.time_limit_s.map(Duration::from_secs_f64),
-        judge: Judge::Checker,
+        judge: Judge::Checker(Level::Geometry),
         improve_for: None,
         cancelled: Arc::clone(cancelled),
     };
@@ -166,7 +167,10 @@ fn write_results(suite: &Suite, rows: &[SuiteRow], folder: &Path, talk: &Talk) -
     for summary in &summaries {
         talk.event("summary", json!(summary));
     }
-    if talk.is_json() { Ok(()) } else { talk.data(&summary::table(&summaries)) }
+    if !talk.is_json() {
+        talk.data(&summary::table(&summaries));
+    }
+    Ok(())
 }
 
 /// The section of a suite for a page at `page`, from the rows measured before.

@@ -5,10 +5,10 @@
 use crate::args::{self, Common};
 use crate::commands::check::scene_of;
 use crate::commands::pictures;
-use crate::commands::plan::{refuse_input, refuse_unwritable};
 use crate::interrupt;
 use crate::judge;
 use crate::load;
+use crate::outputs::{Output, Outputs};
 use crate::pages;
 use crate::stop::Stop;
 use crate::talk::Talk;
@@ -18,28 +18,21 @@ use regrasp::planners::in_hand::roadmap::GraspRoadmap;
 use regrasp::told;
 use regrasp::viewer::story::{Outcome, Telling};
 use serde_json::json;
-use std::path::Path;
 
 /// Reads, judges, writes.
 pub fn run(arguments: &args::View, common: &Common, talk: &Talk) -> Result<(), Stop> {
     // The flag is not asked here: the process ends by itself shortly after Ctrl-C.
     interrupt::flag()?;
-    let wanted: Vec<&Path> = [&arguments.output, &arguments.story].into_iter().flatten().map(|p| p.as_path()).collect();
+    let named = [("--output", &arguments.output), ("--story", &arguments.story)];
+    let named = named.into_iter().filter_map(|(argument, path)| Some(Output::new(argument, path.as_deref()?)));
+    let written = Outputs::new(named.chain(pictures::outputs(arguments)))?;
     let own = [Some(arguments.plan.as_path()), arguments.scene.as_deref(), arguments.with_roadmap.as_deref()];
-    for path in &wanted {
-        refuse_unwritable(path)?;
-        refuse_input(path, own.into_iter().flatten())?;
-    }
-    if arguments.output.is_some() && arguments.output == arguments.story {
-        return Err(Stop::argument("A505", "--story", "is where the page is written to", "another file"));
-    }
-    pictures::refuse(arguments, own.into_iter().flatten())?;
+    written.refuse_inputs(own.into_iter().flatten())?;
+    pictures::make_folder(arguments)?;
     let plan = format::from_json(&arguments.plan, &files::read(&arguments.plan)?)?;
-    let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref())?;
-    let loaded = load::scene(&scene_path, common, talk)?;
-    for path in wanted.into_iter().chain(arguments.png.as_deref()) {
-        refuse_input(path, loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
-    }
+    let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref(), "regrasp view PLAN SCENE")?;
+    let loaded = arguments.judging.scene(load::scene(&scene_path, common, talk)?);
+    written.refuse_inputs(loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
     let roadmap = match &arguments.with_roadmap {
         Some(path) => {
             let roadmap = GraspRoadmap::read(path)?;
@@ -48,7 +41,7 @@ pub fn run(arguments: &args::View, common: &Common, talk: &Talk) -> Result<(), S
         }
         None => None,
     };
-    let report = judge::judge(&loaded, &plan, talk)?;
+    let report = judge::judge(&loaded, &plan, &arguments.judging, talk)?;
     let packages = load::options(common).resolve;
     let story = pages::story(&Telling {
         scene: &loaded.scene,

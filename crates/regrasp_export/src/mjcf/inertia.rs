@@ -55,7 +55,7 @@ fn of_shape(placed: &PlacedShape, density: f64) -> Option<Inertial> {
 
 /// Mass and centre of mass of `object`, with the inertia of an even solid of its shape (of its hull, for an open mesh).
 pub(super) fn of_object(object: &Object) -> Inertial {
-    let solid = solid_properties(&object.shape).or_else(|error| match &object.shape {
+    let solid = solid_properties(object.solid()).or_else(|error| match &object.shape {
         Shape::Mesh(mesh) => match ConvexHull::new(mesh.vertices()) {
             Ok(hull) => solid_properties(&Shape::Convex(Arc::new(hull))),
             Err(_) => Err(error),

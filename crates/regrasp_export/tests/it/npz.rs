@@ -68,7 +68,7 @@ fn waypoints(plan: &Plan) -> Vec<&Waypoint> {
 #[test]
 fn every_number_of_the_plan_is_where_its_name_says() {
     let plan = &*PLAN;
-    let arrays = read(&to_npz(plan));
+    let arrays = read(&to_npz(plan).unwrap());
     let (n, j, f) = (waypoints(plan).len(), plan.joint_names.len(), plan.fingers.len());
     assert_eq!(arrays["joint_names"].texts(), plan.joint_names);
     assert_eq!(arrays["fingers"].texts(), plan.fingers);
@@ -99,7 +99,7 @@ fn every_number_of_the_plan_is_where_its_name_says() {
 #[test]
 fn segments_and_their_waypoints_agree() {
     let plan = &*PLAN;
-    let arrays = read(&to_npz(plan));
+    let arrays = read(&to_npz(plan).unwrap());
     let starts = arrays["segment_starts"].integers();
     let segment_of = arrays["segment_of_waypoint"].integers();
     for (s, segment) in plan.segments.iter().enumerate() {
@@ -131,11 +131,23 @@ fn torques_are_there_when_the_plan_has_them() {
             waypoint.joint_torques = waypoint.joints.iter().map(|joint| 0.1 * joint).collect();
         }
     }
-    let arrays = read(&to_npz(&plan));
+    let arrays = read(&to_npz(&plan).unwrap());
     let joints = arrays["joints"].floats();
     assert!(arrays["joint_torques"].floats().iter().zip(joints).all(|(&torque, joint)| torque == 0.1 * joint));
     for segment in &mut plan.segments {
         segment.waypoints.iter_mut().for_each(|waypoint| waypoint.joint_torques.clear());
     }
-    assert!(!read(&to_npz(&plan)).contains_key("joint_torques"));
+    assert!(!read(&to_npz(&plan).unwrap()).contains_key("joint_torques"));
+}
+
+/// Every name of an array takes as much room as the longest: a name of 8 MB would take 8 GB.
+#[test]
+fn names_that_would_fill_the_memory_are_refused() {
+    let mut plan = PLAN.clone();
+    plan.joint_names[3] = "j".repeat(100_000);
+    let refused = to_npz(&plan).unwrap_err();
+    assert_eq!(refused.code(), "C422");
+    assert!(refused.to_string().contains("the joint names need 1200000 characters"), "{refused}");
+    plan.joint_names[3] = "j".repeat(1000);
+    assert!(to_npz(&plan).unwrap().len() < 1_000_000);
 }

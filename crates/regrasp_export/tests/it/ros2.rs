@@ -24,7 +24,7 @@ fn times(text: &str) -> Vec<u64> {
 #[test]
 fn times_increase_and_every_posture_is_there() {
     let plan = &*PLAN;
-    let text = to_ros2(plan);
+    let text = to_ros2(plan).unwrap();
     let times = times(&text);
     assert!(times.windows(2).all(|pair| pair[0] < pair[1]), "{times:?}");
     let n_waypoints: usize = plan.segments.iter().map(|segment| segment.waypoints.len()).sum();
@@ -47,11 +47,34 @@ fn where_segments_meet_the_torques_of_the_next_are_written() {
             waypoint.joint_torques = vec![s as f64; waypoint.joints.len()];
         }
     }
-    let text = to_ros2(&plan);
+    let text = to_ros2(&plan).unwrap();
     let (efforts, times) = (lists(&text, "effort: "), times(&text));
     for (s, segment) in plan.segments.iter().enumerate() {
         let start = (segment.waypoints[0].time * 1e9).round() as u64;
         let at = times.iter().position(|&time| time == start).expect("every segment begins");
         assert_eq!(efforts[at][0], s as f64);
     }
+}
+
+/// A point that is left out is a motion that is left out: nothing is dropped in silence.
+#[test]
+fn times_that_do_not_increase_are_refused() {
+    let wrong = |change: &dyn Fn(&mut regrasp_plan::Plan)| {
+        let mut plan = PLAN.clone();
+        change(&mut plan);
+        let refused = to_ros2(&plan).unwrap_err();
+        assert_eq!(refused.code(), "C421");
+        refused.to_string()
+    };
+    let backwards = wrong(&|plan| {
+        for waypoint in plan.segments.iter_mut().flat_map(|segment| &mut segment.waypoints) {
+            waypoint.time = 100.0 - waypoint.time;
+        }
+    });
+    assert!(backwards.starts_with("segment 0, waypoint 1 is at 9"), "{backwards}");
+    let still = wrong(&|plan| plan.segments[0].waypoints[1].time = plan.segments[0].waypoints[0].time);
+    assert_eq!(still, "segment 0, waypoint 1 is at 0.0 s, after a waypoint at 0.0 s");
+    let late = wrong(&|plan| plan.segments.last_mut().unwrap().waypoints.last_mut().unwrap().time = 1e300);
+    assert!(late.ends_with("which no trajectory holds"), "{late}");
+    wrong(&|plan| plan.segments[0].waypoints[0].time = -1.0);
 }

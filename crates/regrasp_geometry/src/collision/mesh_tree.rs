@@ -1,10 +1,12 @@
 //! Convex shapes against triangle meshes, through a tree of boxes.
 //!
-//! A mesh counts as its surface: a shape wholly inside a closed mesh is apart from it. Motions start outside and are
-//! checked continuously, so that nothing gets inside without crossing the surface.
+//! Distances are those from the triangles, and [`MeshTree::holds`] tells what is inside. A convex shape that is apart from all
+//! triangles is wholly inside or wholly outside, so that one point of it is asked. Along a motion that stays apart from
+//! the triangles one moment is enough.
 
 use super::gjk::{Answer, separation};
 use super::placement::Placement;
+use super::winding::{self, Dipole};
 use crate::frame::{Point, Pose, Vector};
 use crate::hull::ConvexHull;
 use crate::mesh::TriangleMesh;
@@ -17,6 +19,10 @@ use std::sync::Arc;
 pub struct MeshTree {
     nodes: Vec<Node>,
     corners: Vec<[Point; 3]>,
+    /// By node: its triangles from far away.
+    dipoles: Vec<Dipole>,
+    /// 1, or -1 for a mesh that is wound inside out.
+    orientation: f64,
 }
 
 #[derive(Debug, Clone)]
@@ -88,12 +94,60 @@ impl MeshTree {
     pub fn new(mesh: &TriangleMesh) -> Self {
         let mut corners: Vec<[Point; 3]> = (0..mesh.triangles().len()).map(|i| mesh.corners(i)).collect();
         let mut nodes = Vec::with_capacity(corners.len());
-        build(&mut corners, 0, &mut nodes);
-        MeshTree { nodes, corners }
+        let mut dipoles = Vec::with_capacity(corners.len());
+        build(&mut corners, 0, &mut nodes, &mut dipoles);
+        MeshTree { nodes, corners, dipoles, orientation: winding::orientation(mesh) }
+    }
+
+    /// True when `point`, in the mesh frame, is inside: the triangles wind about it by more than half a turn.
+    pub fn holds(&self, point: &Point) -> bool {
+        let root = &self.nodes[0];
+        if (0..3).any(|k| point[k] < root.low[k] || point[k] > root.high[k]) {
+            return false;
+        }
+        let exactly = || self.corners.iter().map(|corners| winding::of_triangle(corners, point)).sum::<f64>();
+        winding::is_inside(self.orientation * self.winding_about(point), || self.orientation * exactly())
+    }
+
+    /// About how many turns the triangles wind about `point`.
+    fn winding_about(&self, point: &Point) -> f64 {
+        let mut turns = 0.0;
+        let mut stack = [0u32; 64];
+        let mut n_stack = 1;
+        while n_stack > 0 {
+            n_stack -= 1;
+            let index = stack[n_stack] as usize;
+            if let Some(far) = self.dipoles[index].winding(point) {
+                turns += far;
+                continue;
+            }
+            let node = &self.nodes[index];
+            if node.n_triangles == 0 {
+                stack[n_stack] = node.first;
+                stack[n_stack + 1] = node.right;
+                n_stack += 2;
+                continue;
+            }
+            let first = node.first as usize;
+            let corners = &self.corners[first..first + node.n_triangles as usize];
+            turns += corners.iter().map(|corners| winding::of_triangle(corners, point)).sum::<f64>();
+        }
+        turns
+    }
+
+    /// As [`MeshTree::is_apart`], but a shape that is inside the mesh is not apart from it. `middle` is any point of the shape.
+    pub fn is_outside(
+        &self,
+        (shape, middle): (&Shape, &Point),
+        mesh_from_shape: &Placement,
+        required: f64,
+        smallest: &mut f64,
+    ) -> bool {
+        self.is_apart(shape, mesh_from_shape, required, smallest) && !self.holds(&mesh_from_shape.point(middle))
     }
 
     /// True when the convex `shape`, placed in the mesh frame, is proved to be apart from every triangle by at least
-    /// `required`. `smallest` receives a lower bound of the distance when true.
+    /// `required`, whether inside or outside. `smallest` receives a lower bound of the distance when true.
     pub fn is_apart(&self, shape: &Shape, mesh_from_shape: &Placement, required: f64, smallest: &mut f64) -> bool {
         self.all_near(shape, mesh_from_shape, required, smallest, &mut |_| false)
     }
@@ -184,18 +238,19 @@ fn triangle_separation(shape: &Shape, mesh_from_shape: &Placement, corners: &[Po
     super::gjk::separation_from_points(shape, mesh_from_shape, corners, required)
 }
 
-fn build(corners: &mut [[Point; 3]], first: usize, nodes: &mut Vec<Node>) -> u32 {
+fn build(corners: &mut [[Point; 3]], first: usize, nodes: &mut Vec<Node>, dipoles: &mut Vec<Dipole>) -> u32 {
     let (low, high) = corners.iter().flatten().fold((corners[0][0], corners[0][0]), |(l, h), p| (l.inf(p), h.sup(p)));
     let index = nodes.len();
     nodes.push(Node { low, high, first: first as u32, n_triangles: corners.len() as u32, right: 0 });
+    dipoles.push(Dipole::of(corners));
     if corners.len() > LEAF_SIZE {
         let axis = (high - low).imax();
         let key = |c: &[Point; 3]| c[0][axis] + c[1][axis] + c[2][axis];
         let middle = corners.len() / 2;
         corners.select_nth_unstable_by(middle, |a, b| key(a).total_cmp(&key(b)));
         let (left_part, right_part) = corners.split_at_mut(middle);
-        let left = build(left_part, first, nodes);
-        let right = build(right_part, first + middle, nodes);
+        let left = build(left_part, first, nodes, dipoles);
+        let right = build(right_part, first + middle, nodes, dipoles);
         nodes[index] = Node { low, high, first: left, n_triangles: 0, right };
     }
     index as u32
@@ -247,6 +302,72 @@ mod tests {
             n_of[usize::from(found)] += 1;
         }
         assert!(n_of.iter().all(|&n| n > 100), "{n_of:?}");
+    }
+
+    /// A closed box from `low` to `high`, twelve triangles wound outwards.
+    fn cuboid(low: [f64; 3], high: [f64; 3]) -> (Vec<Point>, Vec<[u32; 3]>) {
+        let vertices =
+            (0..8).map(|i| Point::from(Vector::from_fn(|k, _| if i >> k & 1 == 1 { high[k] } else { low[k] })));
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        (vertices.collect(), quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect())
+    }
+
+    #[test]
+    fn winding_numbers_are_those_of_all_triangles_and_the_checkers_other_way_agrees() {
+        let bumpy = ball(40);
+        // Two closed boxes that overlap, a box with a hollow, a box without a lid, a box wound inside out.
+        let (mut vertices, mut triangles) = cuboid([-1.0; 3], [0.2; 3]);
+        let (others, more) = cuboid([-0.2; 3], [1.0; 3]);
+        vertices.extend(others);
+        triangles.extend(more.iter().map(|corners| corners.map(|i| i + 8)));
+        let overlapping = TriangleMesh::new(vertices.clone(), triangles.clone()).unwrap();
+        let (mut vertices, mut triangles) = cuboid([-1.0; 3], [1.0; 3]);
+        let lidless = TriangleMesh::new(vertices.clone(), triangles[..10].to_vec()).unwrap();
+        let inverted = TriangleMesh::new(vertices.clone(), triangles.clone()).unwrap().flipped();
+        let (others, more) = cuboid([-0.5; 3], [0.5; 3]);
+        vertices.extend(others);
+        triangles.extend(more.iter().map(|[a, b, c]| [a + 8, c + 8, b + 8]));
+        let hollow = TriangleMesh::new(vertices, triangles).unwrap();
+        let mut rng = Rng::keyed(3, "mesh_tree", 0);
+        for mesh in [bumpy, overlapping, lidless, inverted, hollow] {
+            let tree = MeshTree::new(&mesh);
+            let other = crate::reference::Inside::of(&mesh);
+            let mut n_inside = 0;
+            for _ in 0..3000 {
+                let point = Point::from(Vector::from(rng.direction()) * rng.uniform(0.0, 1.7));
+                let exact: f64 = tree.corners.iter().map(|corners| winding::of_triangle(corners, &point)).sum();
+                assert!((tree.winding_about(&point) - exact).abs() < 0.03, "{point}");
+                assert!((other.winding(&point) - exact).abs() < 1e-9, "{point} {} {exact}", other.winding(&point));
+                let is_inside = mesh.signed_volume().signum() * exact > 0.5;
+                assert_eq!(tree.holds(&point), is_inside, "{point}");
+                assert_eq!(other.holds(&point), is_inside, "{point}");
+                n_inside += usize::from(is_inside);
+            }
+            assert!((100..2900).contains(&n_inside), "{n_inside}");
+        }
+    }
+
+    #[test]
+    fn an_open_sheet_holds_nothing() {
+        let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+        let vertices = corners.map(|[x, y]| Point::new(x, y, 0.0)).to_vec();
+        let sheet = TriangleMesh::new(vertices, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+        let tree = MeshTree::new(&sheet);
+        for z in [-1e-6, 1e-6, -0.01, 0.01] {
+            assert!(!tree.holds(&Point::new(0.1, 0.2, z)));
+        }
+    }
+
+    #[test]
+    fn a_shape_inside_is_not_outside_though_it_is_apart_from_the_triangles() {
+        let (vertices, triangles) = cuboid([-1.0; 3], [1.0; 3]);
+        let tree = MeshTree::new(&TriangleMesh::new(vertices, triangles).unwrap());
+        let shape = Shape::Sphere { radius: 0.1 };
+        let middle = Point::origin();
+        for (x, is_outside) in [(0.0, false), (0.8, false), (0.95, false), (1.05, false), (1.2, true)] {
+            let at = Placement { translation: Vector::new(x, 0.1, 0.2), ..Placement::IDENTITY };
+            assert_eq!(tree.is_outside((&shape, &middle), &at, 0.01, &mut 0.0), is_outside, "{x}");
+        }
     }
 
     #[test]

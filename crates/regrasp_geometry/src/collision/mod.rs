@@ -14,6 +14,8 @@ pub mod mesh_tree;
 pub mod placement;
 /// Support functions of convex shapes.
 pub mod support;
+/// What lies inside a mesh.
+mod winding;
 
 pub use ball_tree::{Ball, BallTree};
 pub use gjk::{Answer, separation};

@@ -101,7 +101,8 @@ impl MeshSurface {
         for i in (0..topology.triangles.len()).filter(|&i| is_outer[i]) {
             for k in (0..3).filter(|&k| is_crease[i][k]) {
                 let j = topology.neighbours[i][k];
-                if j == NONE || (i as u32) < j {
+                // An edge with the triangle of lower number; with the other one where that is inside.
+                if j == NONE || (i as u32) < j || !is_outer[j as usize] {
                     let corners = corners_of(i as u32);
                     crease_edges.push([corners[k], corners[(k + 1) % 3]]);
                 }
@@ -157,6 +158,16 @@ impl MeshSurface {
         a * weights[0] + b * weights[1] + c * weights[2]
     }
 
+    /// False for a point of a triangle that is inside the mesh there.
+    fn is_outer(&self, facet: u32, point: &Point) -> bool {
+        match &self.inside_test {
+            Some(test) if self.partly_outer[facet as usize] => {
+                !test.is_inside(point, &self.face_normals[facet as usize])
+            }
+            _ => true,
+        }
+    }
+
     fn surface_point(&self, facet: u32, point: Point) -> SurfacePoint {
         let normal = unit_or(self.normal_at(facet, &point), self.face_normal(facet));
         SurfacePoint::new(point, normal, facet)
@@ -205,13 +216,7 @@ impl SurfaceKind for MeshSurface {
             let (root, share) = (rng.unit().sqrt(), rng.unit());
             let point = a + (b - a) * (root * (1.0 - share)) + (c - a) * (root * share);
             let facet = self.outer[rank];
-            let is_outer = match &self.inside_test {
-                Some(test) if self.partly_outer[facet as usize] => {
-                    !test.is_inside(&point, &self.face_normals[facet as usize])
-                }
-                _ => true,
-            };
-            if is_outer {
+            if self.is_outer(facet, &point) {
                 return self.surface_point(facet, point);
             }
         }
@@ -228,6 +233,23 @@ impl SurfaceKind for MeshSurface {
         });
         let (rank, t) = hit?;
         Some(self.surface_point(self.outer[rank], origin + direction.as_ref() * t))
+    }
+
+    fn exits(&self, origin: &Point, direction: &UnitVector) -> Vec<SurfacePoint> {
+        let mut hits: Vec<(f64, u32)> = Vec::new();
+        self.bvh.along_ray(origin, direction, |rank, limit| {
+            let facet = self.outer[rank];
+            if self.face_normals[facet as usize].dot(direction) > 0.0
+                && let Some(t) = meet(&self.corners[rank], origin, direction)
+            {
+                hits.push((t, facet));
+            }
+            limit
+        });
+        hits.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let at = |(t, facet): (f64, u32)| (facet, origin + direction.as_ref() * t);
+        let is_outer = |(facet, point): &(u32, Point)| self.is_outer(*facet, point);
+        hits.into_iter().map(at).filter(is_outer).map(|(facet, point)| self.surface_point(facet, point)).collect()
     }
 
     fn project(&self, point: &Point) -> SurfacePoint {
@@ -348,8 +370,9 @@ fn outer_triangles(
         let middle = Point::from((a.coords + b.coords + c.coords) / 3.0);
         // Corners a little inwards, because parts often meet there.
         let probes = [middle, a + (middle - a) * 1e-3, b + (middle - b) * 1e-3, c + (middle - c) * 1e-3];
-        let n_inside = probes.iter().filter(|p| test.is_inside(p, &face_normals[i])).count();
-        if n_inside < probes.len() {
+        let is_inside = |p: &Point| test.is_inside(p, &face_normals[i]);
+        // Where another part may come through the triangle, some points that were not looked at may be outside.
+        if !probes.iter().all(is_inside) || test.may_cross(topology.part_of[i], &[a, b, c]) {
             outer.push(i as u32);
             partly[i] = true;
         }
@@ -363,6 +386,7 @@ struct InsideTest {
     bvh: Bvh,
     corners: Vec<[Point; 3]>,
     normals: Vec<Vector>,
+    parts: Vec<u32>,
     /// Per part: whether its box meets that of another part that encloses something.
     is_overlapped: Vec<bool>,
     step: f64,
@@ -392,10 +416,23 @@ impl InsideTest {
         Some(InsideTest {
             corners: order.iter().map(|&i| corners_of(i)).collect(),
             normals: order.iter().map(|&i| face_normals[i]).collect(),
+            parts: order.iter().map(|&i| topology.part_of[i]).collect(),
             bvh,
             is_overlapped,
             step: 1e-7 * (whole.high - whole.low).norm(),
         })
+    }
+
+    /// False when no triangle of another part meets this triangle of `part`, as their boxes are apart.
+    fn may_cross(&self, part: u32, corners: &[Point; 3]) -> bool {
+        let own = Aabb::of(corners);
+        let middle = Point::from((own.low + own.high) / 2.0);
+        let reach = (own.high - own.low).norm() / 2.0 + self.step;
+        let mut may = false;
+        self.bvh.within(&middle, reach * reach, |rank| {
+            may |= self.parts[rank] != part && Aabb::of(&self.corners[rank]).overlaps(&own);
+        });
+        may
     }
 
     /// Whether the point just off the surface along `normal` is enclosed: the vote of three rays.

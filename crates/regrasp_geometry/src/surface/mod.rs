@@ -82,6 +82,11 @@ trait SurfaceKind: std::fmt::Debug + Send + Sync {
     fn area(&self) -> f64;
     fn sample(&self, rng: &mut Rng) -> SurfacePoint;
     fn cast_ray(&self, origin: &Point, direction: &UnitVector) -> Option<SurfacePoint>;
+    /// Where the ray leaves the solid, nearest first.
+    fn exits(&self, origin: &Point, direction: &UnitVector) -> Vec<SurfacePoint> {
+        // A convex shape is left once.
+        self.cast_ray(origin, direction).into_iter().collect()
+    }
     fn project(&self, point: &Point) -> SurfacePoint;
     fn signed_distance(&self, point: &Point) -> f64;
     /// Both, of a point that is no farther from the surface than `reach`.
@@ -161,6 +166,12 @@ impl Surface {
     /// or outside.
     pub fn cast_ray(&self, origin: &Point, direction: &UnitVector) -> Option<SurfacePoint> {
         self.kind.cast_ray(origin, direction)
+    }
+
+    /// Where the ray from `origin` along `direction` leaves the solid, nearest first; for convex shapes of a ray from inside. A
+    /// ray from the hollow of a cup leaves through the outer wall only.
+    pub fn exits(&self, origin: &Point, direction: &UnitVector) -> Vec<SurfacePoint> {
+        self.kind.exits(origin, direction)
     }
 
     /// The point of the surface nearest to `point`, from inside or outside.

@@ -47,6 +47,10 @@ pub struct Item {
     body_depth: usize,
     /// True for what may touch the object while the finger holds.
     pub is_tip: bool,
+    /// True for the shape of an object of which the hull stands for it to all but fingertips.
+    is_for_tips_only: bool,
+    /// True for that hull.
+    is_hull: bool,
     /// The shape.
     pub shape: ReferenceShape,
     /// Pose of the shape in the carrier's frame.
@@ -92,6 +96,11 @@ impl Bodies {
         bodies.add_hand(scene, model)?;
         let object = &scene.object;
         bodies.add(&object.name, Owner::Object, OBJECT, &Pose::identity(), &object.shape)?;
+        // Fingertips touch the shape; everything else keeps away from the hull, where there is one.
+        if let Some(hull) = &object.hull {
+            bodies.items.last_mut().expect("the object was just added").is_for_tips_only = true;
+            bodies.add(&object.name, Owner::Object, OBJECT, &Pose::identity(), hull)?.is_hull = true;
+        }
         for obstacle in &scene.obstacles {
             let placed = &obstacle.placed;
             bodies.add(&obstacle.name, Owner::Obstacle, WORLD, &placed.parent_from_shape, &placed.shape)?;
@@ -117,6 +126,8 @@ impl Bodies {
             link: None,
             body_depth: 0,
             is_tip: false,
+            is_for_tips_only: false,
+            is_hull: false,
             shape: reference,
             carrier_from_shape: *carrier_from_shape,
             center: carrier_from_shape * center,
@@ -181,7 +192,11 @@ impl Bodies {
                     (Some(p), Some(q)) => scene.hand.may_touch(p, q),
                     _ => false,
                 };
-                if judged && !allowed {
+                // Of an object with a hull, tips ask for the shape and all others for the hull.
+                let tip_on_object =
+                    matches!((first.owner, second.owner), (Owner::Finger(_), Owner::Object)) && first.is_tip;
+                let is_other = |item: &Item| if tip_on_object { item.is_hull } else { item.is_for_tips_only };
+                if judged && !allowed && !is_other(first) && !is_other(second) {
                     let tip_of = match (first.owner, second.owner) {
                         (Owner::Finger(f), Owner::Object) if first.is_tip => Some(f),
                         _ => None,

@@ -41,6 +41,7 @@ pub fn check_collision(
         let is_free: Vec<bool> = (0..model.fingers.len()).map(|f| is_free_throughout(segment, f)).collect();
         for (w, ends) in segment.waypoints.windows(2).enumerate() {
             let mut step = Step::new(bodies, &ends[0], &ends[1]);
+            step.most_pieces = log.work.left();
             let known = clearance.as_ref().map_or(f64::INFINITY, |c| c.distance.max(0.0));
             let forget = |index: usize| tracks[index].bound = f64::NEG_INFINITY;
             for &index in looked.in_step(bodies, &mut step, known, forget) {
@@ -58,9 +59,14 @@ pub fn check_collision(
                     continue;
                 }
                 let is_moving_tip = may_touch && pair.tip_of == moving;
+                if step.n_pieces >= step.most_pieces {
+                    break;
+                }
                 for (t0, t1, floor) in pieces(w, if is_moving_tip { free } else { None }, may_touch, tolerance, apart) {
                     match certify(&mut step, pair, (t0, t1), track.bound, floor, settings.resolution) {
                         Ok(bound) => track.bound = bound,
+                        // Cut, and not too near.
+                        Err(_) if step.n_pieces > step.most_pieces => break,
                         Err(breach) => {
                             log.push(violation(bodies, pair, s, w, floor, &breach));
                             *track = Track { bound: f64::NEG_INFINITY, reported_in: Some(s) };
@@ -70,6 +76,9 @@ pub fn check_collision(
                 }
             }
             n_distances += step.n_distances;
+            if !log.work.spend(step.n_pieces + 1, "collisions") {
+                return (clearance, n_distances);
+            }
         }
     }
     (clearance, n_distances)

@@ -1,7 +1,8 @@
 //! Fingertips on their contacts, at waypoints and between them, and contacts on the object. Tips that roll between two
 //! waypoints are judged in `rolling`.
 
-use crate::check::continuity::{contact_of, moving_finger, pose_between};
+use crate::check::between::Between;
+use crate::check::continuity::{contact_of, moving_finger};
 use crate::check::edges::Edges;
 use crate::check::model::{FingerModel, Model};
 use crate::check::rolling::{bounds_in_object, speed_in_object};
@@ -30,6 +31,7 @@ pub fn check_tips(model: &Model, plan: &Plan, log: &mut Log) -> f64 {
     for (s, segment) in plan.segments.iter().enumerate().filter(|(_, one)| one.kind != SegmentKind::Tracking) {
         let moving = moving_finger(model, segment);
         for (f, finger) in model.fingers.iter().enumerate() {
+            let mut samples = 0;
             let mut report = |error: f64, at: Moment| {
                 largest = largest.max(error);
                 if error > tolerance {
@@ -49,11 +51,15 @@ pub fn check_tips(model: &Model, plan: &Plan, log: &mut Log) -> f64 {
                     continue;
                 };
                 if holds(waypoint, f) && holds(next, f) {
-                    let (error, fraction) = error_between(finger, waypoint, next, f, tolerance);
+                    let (error, fraction, looked) = error_between(finger, waypoint, next, f, tolerance);
+                    samples += looked as u64;
                     if report(error, Moment { segment: s, waypoint: w, fraction }) {
                         break;
                     }
                 }
+            }
+            if !log.work.spend(samples, "fingertips on their contacts") {
+                return largest;
             }
         }
     }
@@ -87,38 +93,34 @@ pub fn error_at(finger: &FingerModel, waypoint: &Waypoint, f: usize) -> f64 {
     error(finger, &waypoint.joints, &Pose::from(&waypoint.world_from_object), &contact)
 }
 
-/// Upper bound of the error over the closed step, and where it is largest.
-fn error_between(finger: &FingerModel, from: &Waypoint, to: &Waypoint, f: usize, tolerance: f64) -> (f64, f64) {
-    let Some(contact) = contact_of(&from.contacts[f]) else { return (f64::INFINITY, 0.0) };
-    let (start, end) = (Pose::from(&from.world_from_object), Pose::from(&to.world_from_object));
+/// Upper bound of the error over the closed step, where it is largest, and the number of samples taken.
+fn error_between(finger: &FingerModel, from: &Waypoint, to: &Waypoint, f: usize, tolerance: f64) -> (f64, f64, usize) {
+    let Some(contact) = contact_of(&from.contacts[f]) else { return (f64::INFINITY, 0.0, 0) };
+    let motion = Between::new(from, to);
     // Between samples no more than a twentieth of the tolerance may be unknown.
     let allowed = (0.05 * tolerance).max(1e-9);
     let (n_samples, remainder) = match finger.surface {
         TipSurface::Ball => {
-            let (_, acceleration) = bounds_in_object(finger, from, to);
+            let (_, acceleration) = bounds_in_object(finger, &motion, from, to);
             let n_samples = ((acceleration / (8.0 * allowed)).sqrt().ceil() as usize).clamp(1, MOST_SAMPLES);
             (n_samples, acceleration / (8.0 * (n_samples * n_samples) as f64))
         }
         // The error changes no faster than the point that touches moves, and that wanders over the tip.
         TipSurface::Ellipsoid { .. } => {
-            let speed = speed_in_object(finger, from, to);
+            let speed = speed_in_object(finger, &motion, from, to);
             let n_samples = ((speed / (2.0 * allowed)).ceil() as usize).clamp(1, MOST_SAMPLES);
             (n_samples, speed / (2.0 * n_samples as f64))
         }
     };
     let mut worst = (0.0, 0.0);
-    let mut joints = from.joints.clone();
     for sample in 0..=n_samples {
         let t = sample as f64 / n_samples as f64;
-        for (k, joint) in joints.iter_mut().enumerate() {
-            *joint = from.joints[k] + t * (to.joints[k] - from.joints[k]);
-        }
-        let error = error(finger, &joints, &pose_between(&start, &end, t), &contact);
+        let error = error(finger, &motion.joints_at(t), &motion.object_at(t), &contact);
         if error > worst.0 {
             worst = (error, t);
         }
     }
-    (worst.0 + remainder, worst.1)
+    (worst.0 + remainder, worst.1, n_samples)
 }
 
 /// Every fingertip that holds touches with its pad, at waypoints.

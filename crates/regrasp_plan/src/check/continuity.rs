@@ -1,13 +1,14 @@
 //! What can be judged from the waypoints alone: names, numbers, start and goal, meeting of segments, limits, jumps, and
 //! which finger may change what.
 
+use crate::check::between::Between;
 use crate::check::model::Model;
 use crate::check::tracking;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, ContactState, FORMAT, FORMAT_VERSION, Plan, PoseData, Segment, SegmentKind, Waypoint};
 use regrasp_geometry::{Pose, UnitVector, Vector};
-use regrasp_scene::{GraspRequest, InHandQuery, TaskKind};
+use regrasp_scene::{InHandQuery, TaskKind};
 
 /// Tasks that there are.
 const TASKS: [&str; 2] = ["in_hand", "tracking"];
@@ -176,9 +177,9 @@ pub fn check_ends(query: Option<&InHandQuery>, plan: &Plan, settings: &CheckSett
             log.push(violation.amount(distance.max(angle), settings.pose_tolerance));
         }
         let Some(query) = query else { continue };
-        let (pose, grasp) = match kind {
-            Kind::StartMismatch => (&query.world_from_object_start, &query.start_grasp),
-            _ => (&query.world_from_object_goal, &query.goal_grasp),
+        let pose = match kind {
+            Kind::StartMismatch => &query.world_from_object_start,
+            _ => &query.world_from_object_goal,
         };
         let (distance, angle) = pose_difference(&PoseData::from(pose), asked);
         let distance = if within.is_some() { 0.0 } else { distance };
@@ -187,29 +188,6 @@ pub fn check_ends(query: Option<&InHandQuery>, plan: &Plan, settings: &CheckSett
             let violation = Violation::new(kind, message).subjects(["object"]);
             log.push(violation.amount(distance.max(angle), settings.pose_tolerance));
         }
-        let error = grasp_error(grasp, waypoint);
-        if error > settings.pose_tolerance {
-            let message = format!("the {name} grasp is {error:.3e} (m or rad) from the one asked for");
-            log.push(Violation::new(kind, message).when(at).amount(error, settings.pose_tolerance));
-        }
-    }
-}
-
-fn grasp_error(asked: &GraspRequest, waypoint: &Waypoint) -> f64 {
-    match asked {
-        GraspRequest::Automatic => 0.0,
-        GraspRequest::Joints(joints) if joints.len() != waypoint.joints.len() => f64::INFINITY,
-        GraspRequest::Joints(joints) => {
-            joints.iter().zip(&waypoint.joints).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
-        }
-        GraspRequest::Contacts(points) if points.len() != waypoint.contacts.len() => f64::INFINITY,
-        GraspRequest::Contacts(points) => points
-            .iter()
-            .zip(&waypoint.contacts)
-            .map(|(asked, contact)| {
-                contact.point_in_object.map_or(f64::INFINITY, |point| (Vector::from(point) - asked.coords).norm())
-            })
-            .fold(0.0, f64::max),
     }
 }
 
@@ -247,7 +225,7 @@ pub fn contacts_agree(a: &ContactState, b: &ContactState, tolerance: f64) -> boo
     a.holds() == b.holds() && near(a.point_in_object, b.point_in_object) && near(a.normal_in_object, b.normal_in_object)
 }
 
-/// Limits at every waypoint (motion between is linear, so they hold there too), and steps that are jumps.
+/// Limits at every waypoint and between, and steps that are jumps.
 pub fn check_joints(model: &Model, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
     for (s, segment) in plan.segments.iter().enumerate() {
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
@@ -266,6 +244,7 @@ pub fn check_joints(model: &Model, plan: &Plan, settings: &CheckSettings, log: &
         }
         for (w, pair) in segment.waypoints.windows(2).enumerate() {
             let at = Moment::at(s, w);
+            check_limits_between(model, &pair[0], &pair[1], at, settings, log);
             for (k, name) in model.joint_names.iter().enumerate() {
                 let step = (pair[1].joints[k] - pair[0].joints[k]).abs();
                 let limit = if model.slides[k] { settings.largest_slide } else { settings.largest_turn };
@@ -282,6 +261,35 @@ pub fn check_joints(model: &Model, plan: &Plan, settings: &CheckSettings, log: &
                 let violation = Violation::new(Kind::JointJump, message).when(at).subjects(["object"]);
                 log.push(violation.amount(distance.max(angle), settings.largest_turn));
             }
+        }
+    }
+}
+
+/// Limits where the cubic of a joint goes beyond its two waypoints.
+fn check_limits_between(
+    model: &Model,
+    from: &Waypoint,
+    to: &Waypoint,
+    at: Moment,
+    settings: &CheckSettings,
+    log: &mut Log,
+) {
+    let motion = Between::new(from, to);
+    for row in &model.limits {
+        let position = |way: f64| row.multiplier * (from.joints[row.coordinate] + way) + row.offset;
+        let ends = [0.0, motion.joint(row.coordinate).change].map(position);
+        let range = motion.joint(row.coordinate).range().map(position);
+        let beyond = |[a, b]: [f64; 2]| (row.lower - a.min(b)).max(a.max(b) - row.upper);
+        if beyond(range) > settings.limit_tolerance && beyond(ends) <= settings.limit_tolerance {
+            let message = format!(
+                "joint \"{}\" goes {:.3e} beyond [{:.6}, {:.6}] between two waypoints",
+                row.name,
+                beyond(range),
+                row.lower,
+                row.upper
+            );
+            let violation = Violation::new(Kind::JointLimit, message).when(at).subjects([row.name.as_str()]);
+            log.push(violation.amount(beyond(range), settings.limit_tolerance));
         }
     }
 }

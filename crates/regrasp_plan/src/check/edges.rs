@@ -182,6 +182,58 @@ mod tests {
         assert!((Edges::of(&alone, CREASE_ANGLE).distance(&point, 1.0) - 0.02).abs() < 1e-12);
     }
 
+    /// A closed cylinder along z from `low` to `high`, with its caps before or after its sides.
+    fn cylinder(radius: f64, [low, high]: [f64; 2], caps_first: bool, parts: &mut (Vec<Point>, Vec<[u32; 3]>)) {
+        let (vertices, triangles) = parts;
+        let (first, n) = (vertices.len() as u32, 24);
+        for height in [low, high] {
+            vertices.extend((0..n).map(|k| {
+                let (sin, cos) = (f64::from(k) / f64::from(n) * 2.0 * PI).sin_cos();
+                Point::new(radius * cos, radius * sin, height)
+            }));
+        }
+        vertices.extend([Point::new(0.0, 0.0, low), Point::new(0.0, 0.0, high)]);
+        let of = |k: u32| (k, (k + 1) % n);
+        let sides = (0..n).map(of).flat_map(|(a, b)| [[a, b, n + b], [a, n + b, n + a]]);
+        let caps = (0..n).map(of).flat_map(|(a, b)| [[2 * n, b, a], [2 * n + 1, n + a, n + b]]);
+        let all: Vec<[u32; 3]> = if caps_first { caps.chain(sides).collect() } else { sides.chain(caps).collect() };
+        triangles.extend(all.iter().map(|corners| corners.map(|i| i + first)));
+    }
+
+    #[test]
+    fn the_surface_of_overlapping_parts_misses_no_edge_that_is_seen_here() {
+        let mut rng = Rng::keyed(4, "edges", 0);
+        let mut n_near = 0;
+        for trial in 0..24 {
+            let mut parts = (Vec::new(), Vec::new());
+            if trial % 2 == 0 {
+                // Cylinders of one radius, each a little way into the next: rims lie in the wall of another part.
+                let mut at = -0.04;
+                for _ in 0..3 {
+                    let end = at + rng.uniform(0.02, 0.03);
+                    cylinder(0.025, [at, end], rng.chance(0.5), &mut parts);
+                    at = end - rng.uniform(0.002, 0.006);
+                }
+            } else {
+                for _ in 0..3 {
+                    let half = Vector::from_fn(|_, _| rng.uniform(0.01, 0.03));
+                    let center = Vector::from_fn(|_, _| rng.uniform(-0.015, 0.015));
+                    box_triangles(center, half, &mut parts.0, &mut parts.1);
+                }
+            }
+            let shape = Shape::Mesh(Arc::new(TriangleMesh::new(parts.0, parts.1).unwrap()));
+            let surface = Surface::with_crease_angle(&shape, CREASE_ANGLE).unwrap();
+            let edges = Edges::of(&shape, CREASE_ANGLE);
+            for _ in 0..150 {
+                let at = surface.sample(&mut rng);
+                let (theirs, ours) = (surface.crease_distance(&at), edges.distance(&at.point_in_object, 0.01));
+                assert!(ours >= 0.01 || theirs <= ours + 1e-9, "{trial} {} {theirs} {ours}", at.point_in_object);
+                n_near += usize::from(ours < 0.004);
+            }
+        }
+        assert!(n_near > 300, "{n_near}");
+    }
+
     #[test]
     fn scanned_objects_have_the_edges_that_their_surfaces_have() {
         let models = std::env::var_os("REGRASP_MODELS").map(PathBuf::from).or_else(|| {

@@ -22,8 +22,9 @@
 //!
 //! Mass, gravity and torque limits of the plan are held against scene and robot.
 
+use crate::check::between::Between;
 use crate::check::closure::Body;
-use crate::check::continuity::{contact_of, moving_finger, pose_between};
+use crate::check::continuity::{contact_of, moving_finger};
 use crate::check::kinematics::DrivenAxis;
 use crate::check::model::{FingerModel, Model};
 use crate::check::rolling::Roll;
@@ -32,7 +33,7 @@ use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactState, ForcePromises, Plan, Segment, Waypoint};
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp::ContactModel;
-use regrasp_scene::{Gravity, Object, Scene};
+use regrasp_scene::{Object, Scene};
 
 /// Standard gravity, in metres per second squared (CGPM 1901).
 pub(super) const GRAVITY: f64 = 9.80665;
@@ -154,16 +155,13 @@ fn check_promises(scene: &Scene, model: &Model, promises: &ForcePromises, log: &
         broken("mass", promises.mass, object.mass, message);
     }
     let promised = promises.gravity_in_world.map(Vector::from);
-    let differs = match scene.gravity {
-        Some(Gravity::Direction(down)) => {
-            promised.is_none_or(|promised| (promised - down.into_inner() * GRAVITY).norm() > GRAVITY_TOLERANCE)
-        }
-        Some(Gravity::Any) => promised.is_some(),
-        // The scene leaves the direction to the plan.
-        None => false,
+    let asked = scene.gravity().in_world().map(|gravity| gravity.normalize() * GRAVITY);
+    let agree = match (promised, asked) {
+        (Some(promised), Some(asked)) => (promised - asked).norm() <= GRAVITY_TOLERANCE,
+        (promised, asked) => promised.is_none() && asked.is_none(),
     };
-    if differs {
-        let message = format!("gravity {promised:?}, the scene states {:?}", scene.gravity);
+    if !agree {
+        let message = format!("gravity {}, judged is under {}", in_words(promised), in_words(asked));
         broken("gravity_in_world", f64::NAN, f64::NAN, message);
     }
     if let Some(gravity) = promises.gravity_in_world.map(|gravity| Vector::from(gravity).norm())
@@ -186,6 +184,10 @@ fn check_promises(scene: &Scene, model: &Model, promises: &ForcePromises, log: &
     for limit in promises.joint_torques.iter().flatten().filter(|limit| **limit < 0.0) {
         broken("joint_torques", *limit, 0.0, format!("a torque limit of {limit}"));
     }
+}
+
+fn in_words(gravity_in_world: Option<Vector>) -> String {
+    gravity_in_world.map_or("that of any direction".into(), |g| format!("[{:.4}, {:.4}, {:.4}] m/s^2", g.x, g.y, g.z))
 }
 
 /// What everything is judged by.
@@ -380,6 +382,8 @@ impl Judge<'_> {
     /// What is left half-way from a waypoint to the next, as a share of the sum of all normal forces.
     fn check_half_way(&self, segment: &Segment, at: Moment, log: &mut Log) -> f64 {
         let (from, to) = (&segment.waypoints[at.waypoint], &segment.waypoints[at.waypoint + 1]);
+        let motion = Between::new(from, to);
+        let half_way = motion.half_way();
         let mut exerted = Vec::new();
         for (f, (before, after)) in from.contacts.iter().zip(&to.contacts).enumerate() {
             let (Some(first), Some(second)) = (contact_of(before), contact_of(after)) else { continue };
@@ -391,14 +395,13 @@ impl Judge<'_> {
             } else {
                 let tolerance = self.plan.promises.contact_tolerance;
                 let roll = Roll::new(&self.model.fingers[f], from, to, &self.object.shape, tolerance);
-                let Some(contact) = roll.contact(0.5) else { continue };
+                let Some(contact) = roll.contact(half_way) else { continue };
                 contact
             };
             exerted.push(Exerted { finger: f, point, normal, force, torsion, slides: None });
         }
         let pressing: f64 = exerted.iter().map(Exerted::pressing).sum();
-        let ends = [from, to].map(|waypoint| Pose::from(&waypoint.world_from_object));
-        let (force, moment) = self.residual(&pose_between(&ends[0], &ends[1], 0.5), &exerted);
+        let (force, moment) = self.residual(&motion.object_at(half_way), &exerted);
         // Fingers that do not press leave room for no imbalance, and nothing is divided by zero.
         let share = force.norm().hypot(moment.norm() / self.object.radius) / pressing.max(1e-9);
         let limit = self.settings.half_way_imbalance;
@@ -408,7 +411,7 @@ impl Judge<'_> {
                 force.norm(),
                 moment.norm()
             );
-            let violation = Violation::new(Kind::ForceUnbalanced, message).when(Moment { fraction: 0.5, ..at });
+            let violation = Violation::new(Kind::ForceUnbalanced, message).when(Moment { fraction: half_way, ..at });
             log.push(violation.subjects(["object"]).amount(share, limit));
         }
         share

@@ -2,6 +2,7 @@
 //!
 //! Matrices are 4 x 4 and rotations are Rodrigues' formula; nothing here asks `regrasp_robot::Chain`.
 
+use crate::check::between::JointBounds;
 use nalgebra::{Matrix3, Matrix4, Rotation3, Translation3, UnitQuaternion};
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_robot::{Hand, JointKind, LinkId, Robot};
@@ -34,8 +35,15 @@ impl PathJoint {
         self.multiplier * self.coordinate.map_or(self.at_rest, |k| joints[k]) + self.offset
     }
 
-    fn rate(&self, from: &[f64], to: &[f64]) -> f64 {
-        self.coordinate.map_or(0.0, |k| (self.multiplier * (to[k] - from[k])).abs())
+    /// Largest speed and acceleration of the joint, and size of its position.
+    fn bounds(&self, joints: &[JointBounds]) -> JointBounds {
+        let Some(k) = self.coordinate else {
+            let size = (self.multiplier * self.at_rest + self.offset).abs();
+            return JointBounds { speed: 0.0, acceleration: 0.0, jerk: 0.0, size };
+        };
+        let (factor, JointBounds { speed, acceleration, jerk, size }) = (self.multiplier.abs(), joints[k]);
+        let size = factor * size + self.offset.abs();
+        JointBounds { speed: factor * speed, acceleration: factor * acceleration, jerk: factor * jerk, size }
     }
 }
 
@@ -81,6 +89,8 @@ pub struct Rates {
     pub speed: f64,
     /// Largest acceleration of a point, in metres per step squared.
     pub acceleration: f64,
+    /// Largest change of that, in metres per step cubed.
+    pub jerk: f64,
 }
 
 impl Path {
@@ -151,34 +161,50 @@ impl Path {
         axes
     }
 
-    /// True when some joint of the path moves between two joint vectors.
-    pub fn moves(&self, from: &[f64], to: &[f64]) -> bool {
-        self.joints.iter().any(|joint| joint.rate(from, to) > 0.0)
+    /// Velocity of `center` (in the link frame) when the coordinates move with these rates.
+    pub fn velocity(&self, center: &Point, joints: &[f64], rates: &[f64]) -> Vector {
+        let point = self.world_from_link(joints).transform_point(center);
+        let of_joint = |axis: DrivenAxis| {
+            let per_joint = if axis.slides { axis.direction } else { axis.direction.cross(&(point - axis.origin)) };
+            per_joint * (axis.multiplier * rates[axis.coordinate])
+        };
+        self.axes(joints).into_iter().map(of_joint).sum()
     }
 
-    /// Bounds for every point within `radius` of `center` (in the link frame) while the joints go from `from` to `to`.
+    /// True when some joint of the path moves.
+    pub fn moves(&self, joints: &[JointBounds]) -> bool {
+        self.joints.iter().any(|joint| joint.bounds(joints).speed > 0.0)
+    }
+
+    /// Bounds for every point within `radius` of `center` (in the link frame) while joints move within these bounds.
     ///
-    /// The point is a sum of vectors, each fixed in one body. A body turned by joints of rates `r_i` turns such a
-    /// vector of length `l` with speed at most `(sum r_i) l` and acceleration at most `(sum r_i)^2 l`, because every
-    /// second derivative of a product of rotations is a product of matrices of norm at most one.
-    pub fn rates(&self, center: &Point, radius: f64, from: &[f64], to: &[f64]) -> Rates {
+    /// The point is a sum of vectors, each fixed in one body. A body turned by joints of rates `r_i` and accelerations `a_i`
+    /// turns such a vector of length `l` with speed at most `(sum r_i) l` and acceleration at most `((sum r_i)^2 + sum a_i) l`,
+    /// because every derivative of a product of rotations by their angles is a product of matrices of norm at most one.
+    pub fn rates(&self, center: &Point, radius: f64, joints: &[JointBounds]) -> Rates {
         let mut rates = Rates::default();
-        let mut turning = 0.0;
+        let (mut turning, mut bending, mut jerking) = (0.0, 0.0, 0.0);
         for (k, joint) in self.joints.iter().enumerate() {
-            let rate = joint.rate(from, to);
+            let bounds = joint.bounds(joints);
             let mut length = match self.joints.get(k + 1) {
                 Some(next) => next.parent_from_joint.fixed_view::<3, 1>(0, 3).norm(),
                 None => (self.last_from_link.transform_point(center).coords).norm() + radius,
             };
-            let mut sliding = 0.0;
+            let mut slide = JointBounds { speed: 0.0, acceleration: 0.0, jerk: 0.0, size: 0.0 };
             if joint.slides {
-                length += joint.largest_slide.max(joint.position(from).abs()).max(joint.position(to).abs());
-                sliding = rate;
+                length += joint.largest_slide.max(bounds.size);
+                slide = bounds;
             } else {
-                turning += rate;
+                turning += bounds.speed;
+                bending += bounds.acceleration;
+                jerking += bounds.jerk;
             }
-            rates.speed += turning * length + sliding;
-            rates.acceleration += turning * turning * length + 2.0 * turning * sliding;
+            // Derivatives of a turning vector of length one: the products are sums over all joints.
+            let second = turning * turning + bending;
+            let third = turning * turning * turning + 3.0 * turning * bending + jerking;
+            rates.speed += turning * length + slide.speed;
+            rates.acceleration += second * length + 2.0 * turning * slide.speed + slide.acceleration;
+            rates.jerk += third * length + 3.0 * (second * slide.speed + turning * slide.acceleration) + slide.jerk;
         }
         rates
     }

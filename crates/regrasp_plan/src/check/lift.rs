@@ -47,6 +47,9 @@ pub fn free_part(
         true => Some((n_steps - 1, 1.0)),
         false => search.run(last, (0..n_steps).rev().map(|w| (w, Direction::Backward)).collect()),
     };
+    if search.log.work.cut().is_some() {
+        return None;
+    }
     let (Some(lifted), Some(landing)) = (lifted, landing) else {
         search.report(Moment::at(s, 0), "never gets clear of the object".into(), 0.0, settings.lift_clearance);
         return None;
@@ -93,13 +96,15 @@ impl Search<'_> {
             let mut step = Step::new(bodies, from, to);
             let speed = pairs.iter().map(|pair| step.speed(pair.a)).fold(0.0, f64::max);
             let n_samples = ((speed / self.settings.resolution).ceil() as usize).clamp(1, MOST_SAMPLES);
+            if !self.log.work.spend(n_samples as u64, "how fingertips lift off and land") {
+                return None;
+            }
             for sample in 0..=n_samples {
                 let t = match direction {
                     Direction::Forward => sample as f64 / n_samples as f64,
                     Direction::Backward => 1.0 - sample as f64 / n_samples as f64,
                 };
-                let joints: Vec<f64> = from.joints.iter().zip(&to.joints).map(|(a, b)| a + t * (b - a)).collect();
-                let way = self.finger.center_in_world(&joints) - at_contact;
+                let way = self.finger.center_in_world(&step.joints(t)) - at_contact;
                 let along = way.dot(&normal);
                 let sideways = (way - normal * along).norm();
                 let at = Moment { segment: self.s, waypoint: w, fraction: t };

@@ -1,7 +1,8 @@
 //! One step between two waypoints: where everything is in between, and how far it can have come.
 
+use crate::check::between::Between;
 use crate::check::bodies::{Bodies, Carrier, Item, OBJECT, Pair};
-use crate::check::continuity::{pose_between, pose_difference};
+use crate::check::continuity::pose_difference;
 use crate::check::kinematics::{Rates, pose_of};
 use crate::plan::Waypoint;
 use nalgebra::Translation3;
@@ -11,22 +12,19 @@ use regrasp_geometry::{Point, Pose, Vector};
 /// Farther apart than this, pairs are not measured exactly, in metres.
 const SEARCH_DISTANCE: f64 = 0.03;
 
+/// Poses of a carrier that are kept for a step.
+const MOST_POSES: usize = 256;
+
 /// How far a pair is shifted when its distance is not resolved, in metres, and the directions tried.
 const NUDGE: f64 = 1e-5;
 const NUDGES: [[f64; 3]; 6] =
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
 
-/// A step between two waypoints. Its parameter runs from 0 to 1.
+/// A step between two waypoints. Its parameter is the share of its time, from 0 to 1.
 pub struct Step<'a> {
     bodies: &'a Bodies,
-    from: &'a Waypoint,
-    to: &'a Waypoint,
-    object_from: Pose,
-    object_to: Pose,
-    /// How far the object's origin moves, in metres.
-    shift: f64,
-    /// How far the object turns, in radians.
-    turn: f64,
+    motion: Between<'a>,
+    object: ObjectRates,
     /// Per carrier, the poses asked for so far.
     poses: Vec<Vec<(f64, Pose)>>,
     /// Per carrier, whether it moves at all in this step.
@@ -35,18 +33,24 @@ pub struct Step<'a> {
     rates: Vec<Rates>,
     /// Distances measured so far.
     pub n_distances: u64,
+    /// Pieces of motion looked at so far.
+    pub n_pieces: u64,
+    /// Pieces that may be looked at.
+    pub most_pieces: u64,
 }
 
 impl<'a> Step<'a> {
     /// The step from one waypoint to the next.
     pub fn new(bodies: &'a Bodies, from: &'a Waypoint, to: &'a Waypoint) -> Self {
-        let (shift, turn) = pose_difference(&from.world_from_object, &to.world_from_object);
+        let motion = Between::new(from, to);
+        let joints = motion.joint_bounds();
+        let object = ObjectRates::new(&motion, from, to);
         let moves: Vec<bool> = bodies
             .carriers
             .iter()
             .map(|carrier| match carrier {
-                Carrier::Link(path) => path.moves(&from.joints, &to.joints),
-                Carrier::Object => shift > 0.0 || turn > 0.0,
+                Carrier::Link(path) => path.moves(&joints),
+                Carrier::Object => object.shift > 0.0 || object.turn > 0.0,
                 Carrier::World => false,
             })
             .collect();
@@ -57,27 +61,22 @@ impl<'a> Step<'a> {
                 _ if !moves[item.carrier] => Rates::default(),
                 Carrier::Link(path) => {
                     let center = item.center;
-                    path.rates(&center, item.spin_radius, &from.joints, &to.joints)
+                    path.rates(&center, item.spin_radius, &joints)
                 }
-                Carrier::Object => {
-                    let reach = item.center.coords.norm() + item.spin_radius;
-                    Rates { speed: shift + turn * reach, acceleration: turn * turn * reach }
-                }
+                Carrier::Object => object.of_points_within(item.center.coords.norm() + item.spin_radius),
                 Carrier::World => Rates::default(),
             })
             .collect();
         Step {
             bodies,
-            from,
-            to,
-            object_from: Pose::from(&from.world_from_object),
-            object_to: Pose::from(&to.world_from_object),
-            shift,
-            turn,
+            motion,
+            object,
             poses: vec![Vec::new(); bodies.carriers.len()],
             moves,
             rates,
             n_distances: 0,
+            n_pieces: 0,
+            most_pieces: u64::MAX,
         }
     }
 
@@ -87,15 +86,14 @@ impl<'a> Step<'a> {
             return *pose;
         }
         let pose = match &self.bodies.carriers[carrier] {
-            Carrier::Link(path) => {
-                let joints: Vec<f64> =
-                    self.from.joints.iter().zip(&self.to.joints).map(|(a, b)| a + t * (b - a)).collect();
-                pose_of(&path.world_from_link(&joints))
-            }
-            Carrier::Object => pose_between(&self.object_from, &self.object_to, t),
+            Carrier::Link(path) => pose_of(&path.world_from_link(&self.motion.joints_at(t))),
+            Carrier::Object => self.motion.object_at(t),
             Carrier::World => Pose::identity(),
         };
-        self.poses[carrier].push((t, pose));
+        // What is looked for is among the last; a long search would cost more than the pose.
+        if self.poses[carrier].len() < MOST_POSES {
+            self.poses[carrier].push((t, pose));
+        }
         pose
     }
 
@@ -143,12 +141,14 @@ impl<'a> Step<'a> {
         if self.bodies.items[pair.b].carrier != OBJECT {
             return (a.acceleration + b.acceleration) / 8.0;
         }
-        // Second derivative of R^T (p - o) with constant angular velocity w and velocity o':
-        // p'' - 2 w x (p' - o') + w x (w x (p - o)).
-        let item = &self.bodies.items[pair.a];
-        let arm = (self.center(pair.a, 0.0) - self.object_from * Point::origin()).norm();
-        let arm = arm + item.spin_radius + a.speed + self.shift;
-        (a.acceleration + 2.0 * self.turn * (a.speed + self.shift) + self.turn * self.turn * arm) / 8.0
+        let origin = self.pose(OBJECT, 0.0) * Point::origin();
+        let arm = (self.center(pair.a, 0.0) - origin).norm() + self.bodies.items[pair.a].spin_radius;
+        self.object.acceleration_seen(&a, arm) / 8.0
+    }
+
+    /// Joints at `t`.
+    pub fn joints(&self, t: f64) -> Vec<f64> {
+        self.motion.joints_at(t)
     }
 
     /// Distance between the balls that contain the two items: a lower bound of theirs.
@@ -181,6 +181,57 @@ impl<'a> Step<'a> {
                 signed(&(Translation3::from(shift) * pose_a)).map(|distance| distance - NUDGE)
             })
         })
+    }
+}
+
+/// How the object moves in a step: bounds, per step.
+#[derive(Debug, Clone, Copy)]
+pub struct ObjectRates {
+    /// Speed of its origin, in metres.
+    pub shift: f64,
+    /// Angular speed, in radians.
+    pub turn: f64,
+    /// Acceleration of its origin.
+    shift_bend: f64,
+    /// Angular acceleration.
+    turn_bend: f64,
+}
+
+impl ObjectRates {
+    /// Bounds for the motion from one waypoint to the next.
+    pub fn new(motion: &Between, from: &Waypoint, to: &Waypoint) -> Self {
+        let (shift, turn) = pose_difference(&from.world_from_object, &to.world_from_object);
+        let (slope, bend) = (motion.sigma().largest_slope(), motion.sigma().largest_bend());
+        ObjectRates { shift: shift * slope, turn: turn * slope, shift_bend: shift * bend, turn_bend: turn * bend }
+    }
+
+    /// Bounds for points of the object that are no farther than `reach` from its origin.
+    pub fn of_points_within(&self, reach: f64) -> Rates {
+        Rates {
+            speed: self.shift + self.turn * reach,
+            acceleration: self.shift_bend + (self.turn * self.turn + self.turn_bend) * reach,
+            jerk: f64::INFINITY,
+        }
+    }
+
+    /// Bound of the acceleration, seen from the object, of points that move in the world within `rates`, and are `arm` from the
+    /// object's origin when the step begins.
+    ///
+    /// The second derivative of `R^T (p - o)` with angular velocity `w` is
+    /// `p'' - o'' - w' x (p - o) - 2 w x (p' - o') + w x (w x (p - o))`, turned.
+    pub fn acceleration_seen(&self, rates: &Rates, arm: f64) -> f64 {
+        let relative = rates.speed + self.shift;
+        let arm = arm + relative;
+        rates.acceleration
+            + self.shift_bend
+            + 2.0 * self.turn * relative
+            + (self.turn * self.turn + self.turn_bend) * arm
+    }
+
+    /// Bound of the speed of the same points, seen from the object.
+    pub fn speed_seen(&self, rates: &Rates, arm: f64) -> f64 {
+        let relative = rates.speed + self.shift;
+        relative + self.turn * (arm + relative)
     }
 }
 
@@ -230,6 +281,10 @@ fn certify_piece(
     floor: f64,
     resolution: f64,
 ) -> Result<f64, Breach> {
+    step.n_pieces += 1;
+    if step.n_pieces > step.most_pieces {
+        return Err(Breach { t: t0, distance: None });
+    }
     let chord = step.chord(pair, t0, t1);
     let stray = whole_stray * (t1 - t0) * (t1 - t0);
     let needed = floor + chord + stray;

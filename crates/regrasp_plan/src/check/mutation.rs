@@ -11,10 +11,14 @@ mod forces;
 mod free;
 /// Good plans in hands of other contacts and couplings.
 mod hand;
+/// Plans that allow themselves more than the scene does.
+mod limits;
 /// Tracking and relocations in one plan.
 mod mixed;
 /// Fingertips that roll, and fingertips that are said to.
 mod rolling;
+/// Objects that turn though nothing drives them.
+mod still;
 /// Times and velocities.
 mod times;
 /// Tracking: modes, relative velocities, friction of what slides.
@@ -69,6 +73,8 @@ pub fn mutants(plan: &Plan, scene: &Scene, rng: &mut Rng) -> Vec<Mutant> {
     breeder.break_times();
     breeder.break_tracking();
     breeder.break_mixed();
+    breeder.break_limits();
+    breeder.break_drive();
     breeder.found
 }
 

@@ -3,19 +3,23 @@
 //! A tip is a ball fixed to its link. In the object frame its centre goes along `c(t)` and the link turns; the point of
 //! the surface nearest to `c` is the contact and `n` the direction from there. The material point of the link that touches
 //! is at `c - r n`. Rolling without slipping means that its velocity seen from the object has no part across `n` (paper
-//! 004, section IV-C; paper 003, section 6.2.2). Turning about `n` is no slip: soft fingertips twist, and resist it with
-//! the torsion of their contact model, but do not slide.
+//! 004, section IV-C; paper 003, section 6.2.2). Here slip is judged by segment, against what the plan promises; `slip` judges
+//! it from landing to lifting, with the turn of soft fingertips about `n`.
 
+use crate::check::between::Between;
 use crate::check::contact::error_at;
-use crate::check::continuity::{pose_between, pose_difference};
 use crate::check::model::{FingerModel, Model};
+use crate::check::motion::ObjectRates;
 use crate::check::patch::Patch;
+use crate::check::slip::StepSlip;
 use crate::check::tip::TipSurface;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, Plan, SegmentKind, Waypoint};
 use nalgebra::{Matrix4, Rotation3, UnitQuaternion};
 use regrasp_geometry::{Point, Pose, Shape, Vector};
+use std::cell::Cell;
+use std::collections::BTreeMap;
 
 /// Pieces after which no finer sum is made; what is then unknown counts as slip.
 const MOST_PIECES: usize = 128;
@@ -28,9 +32,15 @@ const TURN_PIECES: usize = 8;
 /// of the contact tolerance.
 const SMALLEST_PIECE: f64 = 1e-3;
 
+/// Configurations of a step after which it counts as not shown that the tip is on the surface; no plan of the planner needs a
+/// hundredth.
+const MOST_LOOKED: u64 = 100_000;
+
 /// What rolling amounts to in a plan.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Rolled {
+    /// Slip of the steps in which a finger does not slide on purpose, by finger, segment and waypoint.
+    pub steps: BTreeMap<(usize, usize, usize), StepSlip>,
     /// Largest slip of a finger in a segment, in metres; none when no finger rolls.
     pub max_slip: Option<f64>,
     /// Largest distance of a rolling tip from its contact at waypoints, and from the surface where that was measured
@@ -61,6 +71,10 @@ pub fn check_rolling(shape: &Shape, model: &Model, plan: &Plan, settings: &Check
                         (error, fraction) = (between, at);
                     }
                     let slip = roll.slip(UNKNOWN_SHARE * slip_tolerance);
+                    rolled.steps.insert((f, s, w), StepSlip::of(&roll, finger, slip));
+                    if !log.work.spend(roll.looked(), "fingertips that roll") {
+                        return rolled;
+                    }
                     sum += slip;
                     if slip > worst.0 {
                         worst = (slip, w);
@@ -97,14 +111,14 @@ pub(super) fn off_contact(finger: &FingerModel, error: f64, tolerance: f64) -> V
 /// A rolling fingertip between two waypoints; the parameter runs from 0 to 1.
 pub struct Roll<'a> {
     finger: &'a FingerModel,
-    from: &'a Waypoint,
-    to: &'a Waypoint,
-    world_from_object: [Pose; 2],
+    motion: Between<'a>,
     patch: Patch<'a>,
     /// Bound of the speed of whatever touches in the object frame.
     speed: f64,
     /// Bound of the second derivative of the centre in the object frame.
     acceleration: f64,
+    /// Configurations looked at.
+    looked: Cell<u64>,
 }
 
 /// A tip over the surface, in the object frame.
@@ -131,20 +145,25 @@ impl<'a> Roll<'a> {
         shape: &'a Shape,
         tolerance: f64,
     ) -> Self {
-        let world_from_object = [from, to].map(|waypoint| Pose::from(&waypoint.world_from_object));
-        let (speed, acceleration) = bounds_in_object(finger, from, to);
-        let start = world_from_object[0].inverse() * finger.center_in_world(&from.joints);
+        let motion = Between::new(from, to);
+        let (speed, acceleration) = bounds_in_object(finger, &motion, from, to);
+        let start = Pose::from(&from.world_from_object).inverse() * finger.center_in_world(&from.joints);
         // Feet are sought from the centre, and from inside an ellipsoid.
         let inside = finger.surface.curvature_radii().map_or(0.0, |[_, flattest]| 2.0 * flattest);
         let patch = Patch::near(shape, &start, finger.radius + inside + 2.0 * tolerance + speed);
-        let speed = speed_in_object(finger, from, to);
-        Roll { finger, from, to, world_from_object, patch, speed, acceleration }
+        let speed = speed_in_object(finger, &motion, from, to);
+        Roll { finger, motion, patch, speed, acceleration, looked: Cell::new(0) }
+    }
+
+    /// Configurations looked at so far.
+    pub fn looked(&self) -> u64 {
+        self.looked.get()
     }
 
     fn object_from_link(&self, t: f64) -> Matrix4<f64> {
-        let joints: Vec<f64> = self.from.joints.iter().zip(&self.to.joints).map(|(a, b)| a + t * (b - a)).collect();
-        let [start, end] = &self.world_from_object;
-        pose_between(start, end, t).inverse().to_homogeneous() * self.finger.path.world_from_link(&joints)
+        self.looked.set(self.looked.get() + 1);
+        let link = self.finger.path.world_from_link(&self.motion.joints_at(t));
+        self.motion.object_at(t).inverse().to_homogeneous() * link
     }
 
     /// Where the tip touches, and the normal there, in the object frame.
@@ -197,6 +216,9 @@ impl<'a> Roll<'a> {
         };
         let mut pending = vec![(known(0.0), known(1.0))];
         while let Some((from, to)) = pending.pop() {
+            if self.looked() > MOST_LOOKED {
+                return (f64::INFINITY, from.0);
+            }
             let span = to.0 - from.0;
             let (way, stray) = match self.finger.surface {
                 TipSurface::Ball => ((to.1 - from.1).norm(), self.acceleration * span * span / 8.0),
@@ -232,6 +254,23 @@ impl<'a> Roll<'a> {
             Some((self.finger.point_facing(&-link.fixed_view::<3, 3>(0, 0).tr_mul(&normal)), normal))
         };
         integral(|n_pieces| slide(&object_from_link, &touching, n_pieces), allowed)
+    }
+
+    /// How far the contact travels over the object, by chords of half a step; zero where no surface is near.
+    pub fn travel(&self) -> f64 {
+        let [start, middle, end] = [0.0, 0.5, 1.0].map(|t| self.contact(t).map(|(point, _)| point));
+        let chord = |a: Option<Point>, b: Option<Point>| a.zip(b).map_or(0.0, |(a, b)| (b - a).norm());
+        chord(start, middle) + chord(middle, end)
+    }
+
+    /// As [`FingerModel::off_pad`] at `t`, where the object's outward normal is `normal`, in the object frame.
+    pub fn off_pad(&self, t: f64, normal: &Vector) -> Option<(f64, f64)> {
+        self.finger.faces_off_pad(&-self.object_from_link(t).fixed_view::<3, 3>(0, 0).tr_mul(normal))
+    }
+
+    /// Size of the link's turn over the object about `normal`, in the object frame, from the step's beginning to its end.
+    pub fn turn_about(&self, normal: &Vector) -> f64 {
+        turn_between(&self.object_from_link(0.0), &self.object_from_link(1.0)).dot(normal).abs()
     }
 
     /// How the link turns over the object; none where no surface is near.
@@ -274,26 +313,22 @@ fn turn_between(before: &Matrix4<f64>, after: &Matrix4<f64>) -> Vector {
 }
 
 /// Speed and acceleration bounds of the tip's centre seen from the object, per step and per step squared.
-///
-/// The second derivative of `R^T (p - o)` with constant angular velocity `w` and velocity `o'` is
-/// `p'' - 2 w x (p' - o') + w x (w x (p - o))`, turned.
-pub fn bounds_in_object(finger: &FingerModel, from: &Waypoint, to: &Waypoint) -> (f64, f64) {
-    let (shift, turn) = pose_difference(&from.world_from_object, &to.world_from_object);
-    let rates = finger.path.rates(&finger.center, 0.0, &from.joints, &to.joints);
+pub fn bounds_in_object(finger: &FingerModel, motion: &Between, from: &Waypoint, to: &Waypoint) -> (f64, f64) {
+    let object = ObjectRates::new(motion, from, to);
+    let rates = finger.path.rates(&finger.center, 0.0, &motion.joint_bounds());
     let origin = Pose::from(&from.world_from_object) * Point::origin();
-    let relative = rates.speed + shift;
-    let arm = (finger.center_in_world(&from.joints) - origin).norm() + relative;
-    (relative + turn * arm, rates.acceleration + 2.0 * turn * relative + turn * turn * arm)
+    let arm = (finger.center_in_world(&from.joints) - origin).norm();
+    (object.speed_seen(&rates, arm), object.acceleration_seen(&rates, arm))
 }
 
 /// Bound of the speed, per step, of whatever of a tip touches, seen from the object: of the points of the tip, and of the place
 /// on it that faces a direction ([`TipSurface::wander`](crate::check::tip::TipSurface::wander)).
-pub fn speed_in_object(finger: &FingerModel, from: &Waypoint, to: &Waypoint) -> f64 {
-    let (shift, turn) = pose_difference(&from.world_from_object, &to.world_from_object);
+pub fn speed_in_object(finger: &FingerModel, motion: &Between, from: &Waypoint, to: &Waypoint) -> f64 {
     let reach = finger.radius + finger.surface.wander();
-    let relative = finger.path.rates(&finger.center, reach, &from.joints, &to.joints).speed + shift;
+    let rates = finger.path.rates(&finger.center, reach, &motion.joint_bounds());
     let origin = Pose::from(&from.world_from_object) * Point::origin();
-    relative + turn * ((finger.center_in_world(&from.joints) - origin).norm() + reach + relative)
+    let arm = (finger.center_in_world(&from.joints) - origin).norm() + reach;
+    ObjectRates::new(motion, from, to).speed_seen(&rates, arm)
 }
 
 /// Length of an integral with what is unknown of it; infinite without one.

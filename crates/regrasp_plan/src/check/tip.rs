@@ -114,9 +114,13 @@ impl FingerModel {
     /// Angle between the tip's outward normal towards the outward normal `normal` of the object, in the world, and the pad's
     /// axis, and the largest allowed, in radians; none when the tip may touch anywhere, or the angle is allowed.
     pub fn off_pad(&self, joints: &[f64], normal: &Vector) -> Option<(f64, f64)> {
-        let Pad { axis_in_body, cosine } = self.pad.as_ref()?;
         let link = self.path.world_from_link(joints);
-        let outward = -link.fixed_view::<3, 3>(0, 0).tr_mul(normal);
+        self.faces_off_pad(&-link.fixed_view::<3, 3>(0, 0).tr_mul(normal))
+    }
+
+    /// The same for the tip's outward normal where it touches, in the frame of the last moving body.
+    pub fn faces_off_pad(&self, outward: &Vector) -> Option<(f64, f64)> {
+        let Pad { axis_in_body, cosine } = self.pad.as_ref()?;
         let (angle, allowed) = (outward.angle(axis_in_body), cosine.clamp(-1.0, 1.0).acos());
         (angle > allowed + PAD_TOLERANCE).then_some((angle, allowed))
     }

@@ -24,14 +24,17 @@
 //! `turn_tolerance` for turns, each summed over the steps of a segment so that nothing cancels. In every step is faster
 //! than `smallest_sliding_speed`. Relative velocities are means: slide and turn over the time of the step.
 
+use crate::check::between::Between;
 use crate::check::contact::error_at;
 use crate::check::continuity::contact_of;
 use crate::check::model::{FingerModel, Model};
 use crate::check::rolling::{Roll, Rolled, Turning, UNKNOWN_SHARE, off_contact};
+use crate::check::slip::StepSlip;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
 use regrasp_geometry::{Pose, Shape, Vector};
+use std::collections::BTreeMap;
 
 /// Share of a slide that may stay unknown where it is compared with the plan's relative velocity, and what may anyway, in
 /// metres: a tenth of the way in a tenth of a second at the smallest sliding speed counts as sliding.
@@ -148,6 +151,7 @@ pub fn check_present(model: &Model, segment: &Segment, s: usize, log: &mut Log) 
 /// Judges every contact of every tracking segment.
 pub fn check_tracking(shape: &Shape, model: &Model, plan: &Plan, settings: &CheckSettings, log: &mut Log) -> Rolled {
     let mut rolled = Rolled::default();
+    let mut steps = BTreeMap::new();
     let tolerance = plan.promises.contact_tolerance.min(settings.largest_contact_tolerance);
     let slip_tolerance = plan.promises.slip_tolerance.min(settings.largest_slip_tolerance);
     for (s, segment) in plan.segments.iter().enumerate().filter(|(_, one)| one.kind == SegmentKind::Tracking) {
@@ -162,6 +166,7 @@ pub fn check_tracking(shape: &Shape, model: &Model, plan: &Plan, settings: &Chec
                 slip_tolerance,
                 sums: Default::default(),
                 still: 0.0,
+                steps: &mut steps,
                 log,
             };
             let error = track.check_touch(shape);
@@ -173,7 +178,7 @@ pub fn check_tracking(shape: &Shape, model: &Model, plan: &Plan, settings: &Chec
             }
         }
     }
-    rolled
+    Rolled { steps, ..rolled }
 }
 
 /// A sum over the steps of a segment, and its largest part with the waypoint that it belongs to.
@@ -211,6 +216,7 @@ struct Track<'a> {
     sums: [Sum; 4],
     /// Time of the steps in modes that do not slide, in seconds.
     still: f64,
+    steps: &'a mut BTreeMap<(usize, usize, usize), StepSlip>,
     log: &'a mut Log,
 }
 
@@ -241,6 +247,9 @@ impl Track<'_> {
             if let Some(next) = self.segment.waypoints.get(w + 1) {
                 let roll = Roll::new(self.finger, waypoint, next, shape, self.tolerance);
                 let (between, fraction) = roll.off_surface(self.tolerance);
+                if !self.log.work.spend(roll.looked(), "fingertips in tracking") {
+                    break;
+                }
                 note(between, fraction);
             }
             let off = self.point_error(waypoint).unwrap_or(0.0);
@@ -281,8 +290,16 @@ impl Track<'_> {
                 false => unknown,
             };
             // A tip that is nowhere near is off its contact.
-            let (Some((slide, unknown)), Some(turning)) = (roll.sliding(allowed), roll.turning()) else { continue };
+            let (slid, turned) = (roll.sliding(allowed), roll.turning());
+            if !self.log.work.spend(roll.looked(), "modes of contacts in tracking") {
+                return;
+            }
+            let (Some((slide, unknown)), Some(turning)) = (slid, turned) else { continue };
             self.add_up(mode, slide.norm() + unknown, &turning, w);
+            if !mode.slides() {
+                let step = StepSlip::of(&roll, self.finger, slide.norm() + unknown);
+                self.steps.insert((self.f, self.s, w), step);
+            }
             let span = to.time - from.time;
             if span <= 0.0 {
                 continue;
@@ -394,7 +411,12 @@ pub fn check_reach(reach: f64, model: &Model, plan: &Plan, settings: &CheckSetti
     for (s, segment) in plan.segments.iter().enumerate() {
         for finger in &model.fingers {
             let steps = segment.waypoints.windows(2).enumerate();
-            let far = steps.filter_map(|(w, ends)| Some((w, too_far(finger, &ends[0], &ends[1], limit)?))).next();
+            let work = &mut log.work;
+            let far = steps.map_while(|(w, ends)| {
+                let (far, looked) = too_far(finger, &ends[0], &ends[1], limit);
+                work.spend(looked, "how far fingertips reach").then_some((w, far))
+            });
+            let far = far.filter_map(|(w, far)| Some((w, far?))).next();
             let Some((w, (distance, t))) = far else { continue };
             let message = format!(
                 "the tip of finger \"{}\" is {distance:.6} m from where it rests, {reach:.6} m are allowed",
@@ -407,18 +429,18 @@ pub fn check_reach(reach: f64, model: &Model, plan: &Plan, settings: &CheckSetti
     }
 }
 
-/// Where in a step the tip's centre is farther than `limit` from where it rests, or may be, and how far.
-fn too_far(finger: &FingerModel, from: &Waypoint, to: &Waypoint, limit: f64) -> Option<(f64, f64)> {
-    let acceleration = finger.path.rates(&finger.center, 0.0, &from.joints, &to.joints).acceleration;
-    let distance = |t: f64| {
-        let joints: Vec<f64> = from.joints.iter().zip(&to.joints).map(|(a, b)| a + t * (b - a)).collect();
-        (finger.center_in_world(&joints) - finger.center_at_rest).norm()
-    };
+/// Where in a step the tip's centre is farther than `limit` from where it rests, or may be, and how far; and the number of
+/// configurations looked at.
+fn too_far(finger: &FingerModel, from: &Waypoint, to: &Waypoint, limit: f64) -> (Option<(f64, f64)>, u64) {
+    let motion = Between::new(from, to);
+    let acceleration = finger.path.rates(&finger.center, 0.0, &motion.joint_bounds()).acceleration;
+    let distance = |t: f64| (finger.center_in_world(&motion.joints_at(t)) - finger.center_at_rest).norm();
     let ends = [0.0, 1.0].map(|t| (distance(t), t));
     let mut pending = vec![ends];
+    let mut looked = 2;
     while let Some([first, second]) = pending.pop() {
         if let Some(&far) = [first, second].iter().find(|(distance, _)| !(*distance <= limit)) {
-            return Some(far);
+            return (Some(far), looked);
         }
         let span = second.1 - first.1;
         let most = first.0.max(second.0) + acceleration * span * span / 8.0;
@@ -426,13 +448,14 @@ fn too_far(finger: &FingerModel, from: &Waypoint, to: &Waypoint, limit: f64) -> 
             continue;
         }
         if span < SMALLEST_SPAN {
-            return Some((most, first.1));
+            return (Some((most, first.1)), looked);
         }
         let middle = 0.5 * (first.1 + second.1);
         let middle = (distance(middle), middle);
+        looked += 1;
         pending.extend([[middle, second], [first, middle]]);
     }
-    None
+    (None, looked)
 }
 
 /// Share of a step that is not divided further.

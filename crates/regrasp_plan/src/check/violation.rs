@@ -1,5 +1,6 @@
 //! What can be wrong with a plan: kind, moment, who, how much.
 
+use crate::check::level::Level;
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::fmt;
@@ -76,7 +77,7 @@ pub enum ViolationKind {
     WrongRollingFinger,
     /// A holding fingertip is not on its contact.
     ContactOffTip,
-    /// A fingertip that should roll, twist or stay slides over the object.
+    /// A fingertip that should roll, twist or stay slides over the object, or a soft one turns about the normal.
     Slip,
     /// A fingertip's centre leaves the ball that the scene allows it.
     OutOfReach,
@@ -98,6 +99,12 @@ pub enum ViolationKind {
     LandingOrLiftingNotFree,
     /// A promise is not one that a plan may make, or is not kept.
     PromiseBroken,
+    /// The plan has no contact forces where they are asked for.
+    ForcesAbsent,
+    /// The plan allows itself more than scene, hand file or checker do: speed, velocity, acceleration, normal force.
+    LimitExceeded,
+    /// Closure and forces count on more friction than the scene's over the friction margin that is asked for.
+    FrictionMarginTooSmall,
     /// A force or torque is missing in a plan that promises forces, or there is one in a plan that promises none.
     ForceMissing,
     /// The contact forces do not balance the object's weight.
@@ -124,6 +131,8 @@ pub enum ViolationKind {
     JointAcceleration,
     /// Joint velocities that do not belong to the motion.
     VelocityInconsistent,
+    /// The plan asks for more work than the checker does: the rest of it was not judged.
+    NotJudged,
 }
 
 /// One thing that is wrong.
@@ -141,12 +150,22 @@ pub struct Violation {
     pub amount: Option<f64>,
     /// What would have been allowed, in the same unit.
     pub limit: Option<f64>,
+    /// The lowest level of verdict at which this counts.
+    pub level: Level,
 }
 
 impl Violation {
     /// A violation without a moment and without an amount.
     pub fn new(kind: ViolationKind, message: impl Into<String>) -> Self {
-        Violation { kind, at: None, subjects: Vec::new(), message: message.into(), amount: None, limit: None }
+        Violation {
+            kind,
+            at: None,
+            subjects: Vec::new(),
+            message: message.into(),
+            amount: None,
+            limit: None,
+            level: Level::Geometry,
+        }
     }
 
     /// The same, at a moment.
@@ -160,6 +179,13 @@ impl Violation {
     #[must_use]
     pub fn subjects<'a>(mut self, subjects: impl IntoIterator<Item = &'a str>) -> Self {
         self.subjects = subjects.into_iter().map(str::to_owned).collect();
+        self
+    }
+
+    /// The same, counted only where a plan is judged for this level or a higher one.
+    #[must_use]
+    pub fn from_level(mut self, level: Level) -> Self {
+        self.level = level;
         self
     }
 

@@ -3,7 +3,7 @@
 use crate::sample::{self, judge, kinds};
 use regrasp_geometry::{Point, Shape, TriangleMesh};
 use regrasp_plan::Plan;
-use regrasp_plan::check::{CheckSettings, Moment, ViolationKind, check, check_files};
+use regrasp_plan::check::{CheckSettings, Level, Moment, ViolationKind, check, check_files};
 use regrasp_plan::format::to_json;
 use regrasp_robot::import::LoadOptions;
 use regrasp_scene::{GraspRequest, InHandQuery};
@@ -102,7 +102,8 @@ fn a_plan_is_held_to_the_query() {
     let judge = |change: &dyn Fn(&mut InHandQuery)| {
         let mut query = sample::query(&plan);
         change(&mut query);
-        let report = check(&scene, Some(&query), &plan, &CheckSettings::default());
+        let report =
+            check(&scene, Some(&query), &plan, &CheckSettings { level: Level::Geometry, ..CheckSettings::default() });
         report.violations.iter().map(|violation| violation.kind).collect::<Vec<_>>()
     };
     assert!(judge(&|query| query.start_grasp = GraspRequest::Joints(first.joints.clone())).is_empty());

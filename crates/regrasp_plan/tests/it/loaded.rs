@@ -4,13 +4,13 @@
 
 use crate::sample::{self, TIP_RADIUS, judge, kinds};
 use nalgebra::{DMatrix, DVector};
-use regrasp_geometry::{Point, Pose, Vector};
+use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 use regrasp_plan::check::ViolationKind;
 use regrasp_plan::check::continuity::contact_of;
 use regrasp_plan::plan::{ForcePromises, SegmentKind};
 use regrasp_plan::{Plan, Segment, Waypoint};
 use regrasp_robot::ContactModel;
-use regrasp_scene::Scene;
+use regrasp_scene::{Gravity, Scene};
 
 const GRAVITY_IN_WORLD: [f64; 3] = [0.0, 0.0, -9.80665];
 /// Internal force per distance of a contact from the centroid of all, in newtons per metre.
@@ -192,10 +192,13 @@ fn room_for_every_direction_is_room_for_each() {
     let mut rng = regrasp_base::Rng::keyed(1, "directions", 0);
     for scene in [sample::scene(), sample::soft_scene()] {
         let mut plan = any_gravity_plan(&scene);
-        assert!(judge(&scene, &plan).accepted(), "{:#?}", judge(&scene, &plan));
         // The shortest forces that carry a weight, on top.
         let down = Vector::from(rng.direction()) * 9.80665;
         let squeezed = plan.clone();
+        let under_any = scene.clone().under_gravity(Gravity::Any);
+        assert!(judge(&under_any, &plan).accepted(), "{:#?}", judge(&under_any, &plan));
+        // A plan does not choose its gravity: that of any direction is for scenes that ask for it.
+        assert_eq!(kinds(&judge(&scene, &plan)), [ViolationKind::PromiseBroken]);
         for segment in &mut plan.segments {
             let moving = segment.moving_finger.as_ref().map(|name| name[1..].parse::<usize>().unwrap());
             for waypoint in &mut segment.waypoints {
@@ -204,10 +207,11 @@ fn room_for_every_direction_is_room_for_each() {
             }
         }
         plan.promises.forces.as_mut().unwrap().gravity_in_world = Some(down.into());
-        assert!(judge(&scene, &plan).accepted(), "{:#?}", judge(&scene, &plan));
+        let under_it = scene.clone().under_gravity(Gravity::Direction(UnitVector::new_normalize(down)));
+        assert!(judge(&under_it, &plan).accepted(), "{:#?}", judge(&under_it, &plan));
         // A heavier object leaves too little room, for one limit or the other.
         let mut plan = squeezed;
-        let mut heavy = scene.clone();
+        let mut heavy = under_any;
         heavy.object.mass *= 20.0;
         plan.promises.forces.as_mut().unwrap().mass *= 20.0;
         let found = kinds(&judge(&heavy, &plan));
@@ -232,7 +236,7 @@ fn every_rule_of_forces_is_broken_by_itself() {
         (&scene, &|p| p.segments[0].waypoints[3].joint_torques.clear(), &[ForceMissing]),
         (&scene, &|p| forces(p).mass *= 1.001, &[ForceUnbalanced, PromiseBroken]),
         (&scene, &|p| forces(p).gravity_in_world = Some([0.0, 0.0, -9.7]), &[ForceUnbalanced, PromiseBroken]),
-        (&scene, &|p| forces(p).gravity_in_world = Some([0.0, -9.80665, 0.0]), &[ForceUnbalanced]),
+        (&scene, &|p| forces(p).gravity_in_world = Some([0.0, -9.80665, 0.0]), &[ForceUnbalanced, PromiseBroken]),
         (&scene, &|p| forces(p).joint_torques[4] = None, &[PromiseBroken]),
         (&scene, &|p| forces(p).joint_torques[4] = Some(1.5), &[PromiseBroken]),
         (&scene, &|p| forces(p).joint_torques[4] = Some(0.01), &[TorqueLimit]),

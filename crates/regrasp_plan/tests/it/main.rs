@@ -2,6 +2,7 @@
 
 mod check;
 mod format;
+mod levels;
 mod loaded;
 mod motion;
 mod mutation;

@@ -4,7 +4,7 @@
 use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Point, Pose, Shape, Vector};
-use regrasp_plan::check::{CheckSettings, Report, ViolationKind, check};
+use regrasp_plan::check::{CheckSettings, Level, Report, ViolationKind, check};
 use regrasp_plan::plan::{FORMAT, FORMAT_VERSION, MotionLimits, PlanInput, PoseData, Promises, Statistics, WayPose};
 use regrasp_plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
 use regrasp_robot::hand::PalmShape;
@@ -160,6 +160,7 @@ fn object() -> Object {
         surface: surface_of(&shape),
         radius: OBJECT_RADIUS,
         mesh_body: None,
+        hull: None,
         shape,
         mass: 0.1,
         center_of_mass: Point::origin(),
@@ -177,6 +178,8 @@ pub fn scene() -> Scene {
     Scene {
         reach: None,
         gravity: None,
+        // The sample counts on all of its friction.
+        limits: regrasp_scene::Limits { friction_margin: Some(1.0), ..Default::default() },
         name: "sample".into(),
         hand: hand().placed_at(&world_from_hand()),
         object: object(),
@@ -433,9 +436,14 @@ pub fn query(plan: &Plan) -> InHandQuery {
     }
 }
 
-/// What the checker says of `plan` as an answer to its own query.
+/// What the checker says of the geometry, and of the forces where there are any, of `plan` as an answer to its own query.
 pub fn judge(scene: &Scene, plan: &Plan) -> Report {
-    check(scene, Some(&query(plan)), plan, &CheckSettings::default())
+    judge_for(Level::Geometry, scene, plan)
+}
+
+/// What the checker says of `plan` at this level.
+pub fn judge_for(level: Level, scene: &Scene, plan: &Plan) -> Report {
+    check(scene, Some(&query(plan)), plan, &CheckSettings { level, ..CheckSettings::default() })
 }
 
 /// The kinds of violations, each once.

@@ -43,6 +43,7 @@ fn scene(shape: Shape) -> Scene {
     let hand = load_hand(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}")).hand;
     scene.hand = hand.placed_at(&sample::world_from_hand());
     scene.object = Object {
+        hull: None,
         name: "object".into(),
         surface: Surface::of(&shape).unwrap(),
         radius: shape.reach_from(&Point::origin()),

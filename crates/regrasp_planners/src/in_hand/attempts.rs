@@ -88,12 +88,16 @@ impl Left {
         let leg = (n_legs > 1).then_some(self.leg + 1);
         let where_stuck = leg.map_or(String::new(), |leg| format!("leg {leg} of {n_legs} failed: "));
         let causes = self.tally.causes(model);
+        let more = match interrupt {
+            Interrupt::WorkSpent => "allow more work (--max-work, max_work)",
+            Interrupt::Deadline | Interrupt::Cancelled => "allow more time (--time-limit, time_limit)",
+        };
         let advice = match causes.first() {
             Some(cause) if nearest_miss.is_none() => {
                 format!("move the start pose to where the fingers reach around the object (mostly: {})", cause.reason)
             }
-            Some(cause) => format!("allow more time, or ease what stops it most: {}", cause.reason),
-            None => "allow more time".into(),
+            Some(cause) => format!("{more}, or ease what stops it most: {}", cause.reason),
+            None => more.into(),
         };
         Failure {
             kind: interrupt.into(),

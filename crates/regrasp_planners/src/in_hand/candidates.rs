@@ -60,7 +60,7 @@ impl Way {
 /// Draws a contact on the object that lies towards `finger`, with the object at `world_from_object`.
 ///
 /// A ray from a random inner point within a wide cone about the finger's working place: twice as quick as drawing by
-/// area (in-hand-notes, 5). Every point of the surface can be drawn.
+/// area (in-hand-notes, 5). The contact is where the ray leaves the solid: where that happens more than once, any of them.
 pub fn draw_contact(model: &Model, finger: usize, world_from_object: &Placement, rng: &mut Rng) -> Option<Contact> {
     (0..RAYS).find_map(|_| draw_contact_once(model, finger, world_from_object, rng))
 }
@@ -74,7 +74,13 @@ fn draw_contact_once(model: &Model, finger: usize, world_from_object: &Placement
     let towards = world_from_object.point_to_child(&model.fingers[finger].tip_at_rest) - inner;
     let direction = towards.normalize() * PULL + Vector::from(rng.direction());
     let direction = UnitVector::try_new(direction, 1e-9)?;
-    let hit = object.surface.cast_ray(&inner, &direction)?;
+    let mut exits = object.surface.exits(&inner, &direction);
+    let chosen = match exits.len() {
+        0 => return None,
+        1 => 0,
+        n => rng.below(n),
+    };
+    let hit = exits.swap_remove(chosen);
     let finger_model = &model.fingers[finger];
     let rough = Contact { point_in_object: hit.point_in_object, normal_in_object: hit.normal_in_object };
     if !finger_model.may_reach(world_from_object, &rough) {

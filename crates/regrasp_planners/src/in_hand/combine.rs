@@ -4,6 +4,7 @@ use super::candidates::Candidate;
 use super::free::most_free;
 use super::model::{MAX_FINGERS, Model};
 use super::settings::ReleaseRule;
+use super::spin::Freedom;
 use super::workspace::Workspace;
 use arrayvec::ArrayVec;
 use regrasp_grasp::{Contact, ContactModel, Grip, closure};
@@ -274,11 +275,13 @@ impl ClashTable {
 
 /// The best closed combinations of `options` that fit together, with no more free fingers than the settings allow, best
 /// first. With `least_follow`, option 0 of a finger is
-/// where it is, others cost a relocation, and all must follow at least that share of the way.
+/// where it is, others cost a relocation, and all must follow at least that share of the way. `freedom` says which share of
+/// the way a combination leaves to the object.
 pub fn rank(
     workspace: &mut Workspace,
     options: &[Vec<Candidate>],
     table: &mut ClosureTable,
+    freedom: Option<&Freedom>,
     least_follow: Option<f64>,
     n_wanted: usize,
 ) -> Vec<Ranked> {
@@ -307,6 +310,7 @@ pub fn rank(
             continue;
         }
         let follow = (0..n).map(|f| options[f][choice[f]].follow).fold(1.0, f64::min);
+        let follow = follow * freedom.map_or(1.0, |freedom| freedom.share(&choice));
         if follow < least_follow {
             continue;
         }

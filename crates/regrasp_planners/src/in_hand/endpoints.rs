@@ -1,7 +1,9 @@
 //! Start and goal as the query gives them: what is wrong with them is said before any search.
 
 use super::combine::releasable;
-use super::model::{Body, Carrier, Model};
+use super::given::{self, NoTouch};
+use super::inside::refuse_hand_inside;
+use super::model::{Body, Carrier, FingerModel, Model};
 use super::settings::Method;
 use super::state::GraspState;
 use super::transfer::ik_settings;
@@ -10,14 +12,11 @@ use crate::failure::{Failure, FailureKind};
 use regrasp_base::Rng;
 use regrasp_geometry::collision::{Answer, Placement, separation};
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
+use regrasp_grasp::ContactModel;
 use regrasp_grasp::closure::may_close;
-use regrasp_grasp::{Contact, ContactModel};
 use regrasp_robot::kinematics::finger_ik::{Coordinates, IkSettings};
 use regrasp_robot::kinematics::whole_pose::{has_all_directions, joints_of_pose};
-use regrasp_scene::{GraspRequest, InHandQuery};
-
-/// Distance of a given fingertip from the surface, and of a given contact point, that still counts as touching.
-const TOUCHING: f64 = 1e-4;
+use regrasp_scene::{GRASP_TOLERANCE, GraspRequest, InHandQuery};
 
 /// Which pose of the query.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,11 +55,13 @@ pub fn refuse_hopeless(model: &Model, query: &InHandQuery) -> Result<(), Failure
     if model.settings.method != Method::Gait || !may_try_transfers {
         refuse_impossible(model)?;
     }
-    refuse_buried_object(model, End::Start, &query.world_from_object_start)?;
-    for (index, pose) in query.world_from_object_way.iter().enumerate() {
-        refuse_buried_object(model, End::Way(index + 1), pose)?;
+    let way = query.world_from_object_way.iter().enumerate().map(|(index, pose)| (End::Way(index + 1), pose));
+    let ends = [(End::Start, &query.world_from_object_start)].into_iter().chain(way);
+    for (end, pose) in ends.chain([(End::Goal, &query.world_from_object_goal)]) {
+        refuse_buried_object(model, end, pose)?;
+        refuse_object_out_of_reach(model, end, pose)?;
     }
-    refuse_buried_object(model, End::Goal, &query.world_from_object_goal)
+    refuse_hand_inside(model, &query.world_from_object_start)
 }
 
 /// Refuses hands of which the others can never hold while one finger is away.
@@ -80,7 +81,7 @@ fn refuse_holding_nothing(model: &Model) -> Result<(), Failure> {
     let message = format!(
         "the hand has {} and friction {}: all of them together cannot hold an object",
         fingers_in_words(model),
-        model.frame.friction
+        friction_in_words(model)
     );
     Err(Failure::bare(FailureKind::Impossible, message, MORE_FINGERS))
 }
@@ -93,12 +94,18 @@ fn fingers_in_words(model: &Model) -> String {
     format!("{} fingers with contacts {models:?}", model.n_fingers())
 }
 
+/// The friction that is planned with, and how it comes from what the scene says.
+pub fn friction_in_words(model: &Model) -> String {
+    let (friction, margin) = (model.scene.object.friction, model.settings.friction_margin);
+    if margin == 1.0 { format!("{friction}") } else { format!("{friction} of the scene over a margin of {margin}") }
+}
+
 fn never_released(model: &Model) -> String {
     format!(
         "the hand has {} and friction {}: while one of them is away the others cannot hold an object (fewer than three points \
          cannot: it turns about the line through two of them). Such a hand can never change its grasp",
         fingers_in_words(model),
-        model.frame.friction
+        friction_in_words(model)
     )
 }
 
@@ -149,15 +156,14 @@ pub fn object_blocked_by<'m>(model: &'m Model, world_from_object: &Pose) -> Opti
             &mut [0; 2],
         );
         let exactly_apart = || {
-            let tree_apart =
-                |tree: &regrasp_geometry::collision::MeshTree, mesh_at: &Placement, shape, at: &Placement| {
-                    tree.is_apart(shape, &mesh_at.inverse_then(at), clearance, &mut 0.0)
-                };
-            object.tree.as_ref().is_some_and(|tree| tree_apart(tree, &at_object, &body.shape, &body.carrier_from_body))
-                || body
-                    .tree
-                    .as_ref()
-                    .is_some_and(|tree| tree_apart(tree, &body.carrier_from_body, &object.shape, &at_object))
+            let outside = |mesh: &Body, mesh_at: &Placement, other: &Body, at: &Placement| {
+                let mesh_from_other = mesh_at.inverse_then(at);
+                mesh.tree.as_ref().is_some_and(|tree| {
+                    tree.is_outside((&other.shape, &other.middle), &mesh_from_other, clearance, &mut 0.0)
+                })
+            };
+            outside(object, &at_object, body, &body.carrier_from_body)
+                || outside(body, &body.carrier_from_body, object, &at_object)
         };
         !matches!(answer, Answer::SeparatedBy(_)) && !exactly_apart()
     })
@@ -179,7 +185,7 @@ pub fn given_grasp(
                 "the {} grasp is not force closed with the margin asked for: {margin:.4} of {}, at friction {}",
                 end.name(),
                 model.settings.closure_margin,
-                model.frame.friction
+                friction_in_words(model)
             ),
             "move the contacts apart, or ask for a smaller margin",
         ));
@@ -217,6 +223,7 @@ pub fn given_grasp_at(
         GraspRequest::Joints(values) => from_joints(model, end, world_from_object, values)?,
         GraspRequest::Contacts(points) => from_contacts(model, end, world_from_object, points, near)?,
     };
+    refuse_out_of_reach(model, end, &state.joints)?;
     let mut workspace = Workspace::new(model);
     workspace.set(world_from_object, &state.joints, &state.contacts);
     if !workspace.is_clear(TipMode::AllHold) {
@@ -229,6 +236,47 @@ pub fn given_grasp_at(
         ));
     }
     Ok(Some(state))
+}
+
+/// Refuses a grasp with a tip farther from where it rests than the scene allows.
+fn refuse_out_of_reach(model: &Model, end: End, joints: &HandJoints) -> Result<(), Failure> {
+    let Some(reach) = model.scene.reach else { return Ok(()) };
+    for (f, (finger, own)) in model.fingers.iter().zip(joints).enumerate() {
+        let away = (finger.ik.tip(own) - finger.tip_at_rest).norm();
+        if !(away <= reach) {
+            let (name, end_name) = (&model.scene.hand.fingers[f].name, end.name());
+            let message = format!(
+                "at the {end_name} finger \"{name}\" is {away:.3} m from where it rests, its reach is {reach} m"
+            );
+            return Err(end.failure(message, "choose another contact or rest posture, or a larger reach"));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a pose at which too few fingers can touch the object without going farther than the scene allows.
+pub fn refuse_object_out_of_reach(model: &Model, end: End, world_from_object: &Pose) -> Result<(), Failure> {
+    let Some(reach) = model.scene.reach else { return Ok(()) };
+    let placement = Placement::from(world_from_object);
+    let surface = &model.scene.object.surface;
+    let gap = |finger: &FingerModel| {
+        let (_, distance) = surface.project_signed(&placement.point_to_child(&finger.tip_at_rest));
+        distance.abs() - finger.tip_radius
+    };
+    let touching = model.fingers.iter().filter(|&finger| !(gap(finger) > reach));
+    let touching: Vec<ContactModel> = touching.map(|finger| finger.contact).collect();
+    if may_close(&touching, model.frame.friction) {
+        return Ok(());
+    }
+    let message = format!(
+        "at the {} only {} of {} fingers can touch the object \"{}\" within the reach of {reach} m that the scene allows",
+        end.name(),
+        touching.len(),
+        model.n_fingers(),
+        model.bodies[model.object].name
+    );
+    Err(end
+        .failure(message, "move the object nearer to where the fingertips rest, or allow a larger reach (hand.reach)"))
 }
 
 fn from_joints(model: &Model, end: End, world_from_object: &Pose, values: &[f64]) -> Result<GraspState, Failure> {
@@ -249,24 +297,23 @@ fn from_joints(model: &Model, end: End, world_from_object: &Pose, values: &[f64]
                 "give joint positions within the limits; regrasp inspect prints them",
             ));
         }
-        // No finger moves by the rounding of the given joints: the contact is the one that the tip has as it stands.
-        let surface = &model.scene.object.surface;
-        let Some((contact, distance)) = finger.contact_at(surface, &own, &placement) else {
-            return Err(end.failure(
-                format!("at the {} the tip of finger \"{name}\" has no contact: it is deep in the object", end.name()),
-                "correct the joints or give contacts",
-            ));
-        };
-        if distance.abs() > TOUCHING {
-            return Err(end.failure(
-                format!(
-                    "at the {} the tip of finger \"{name}\" is {:.2} mm off the surface",
-                    end.name(),
-                    distance * 1e3
-                ),
-                "correct the joints or give contacts",
-            ));
-        }
+        let (contact, own) =
+            given::touching(finger, &model.scene.object.surface, &own, &placement).map_err(|no_touch| {
+                let off = |gap: f64| {
+                    let side = if gap < 0.0 { "inside" } else { "off" };
+                    format!("is {:.2} mm {side} the surface", gap.abs() * 1e3)
+                };
+                let problem = match no_touch {
+                    NoTouch::Inside => "has no contact: it is deep in the object".to_owned(),
+                    NoTouch::Off(gap) => format!("{}; at most {} mm are put right", off(gap), GRASP_TOLERANCE * 1e3),
+                    NoTouch::Stuck(gap) => format!("{}, and no joints near the given ones touch", off(gap)),
+                };
+                let message = format!("at the {} the tip of finger \"{name}\" {problem}", end.name());
+                end.failure(
+                    message,
+                    "correct the joints, give contacts, or let the planner choose (grasp = \"automatic\")",
+                )
+            })?;
         if !finger.pad_faces(&own, &placement.vector(&contact.normal_in_object)) {
             return Err(end.failure(
                 format!("at the {} finger \"{name}\" touches outside its pad", end.name()),
@@ -290,17 +337,17 @@ fn from_contacts(
     let (mut joints, mut contacts) = (HandJoints::new(), Contacts::new());
     for (f, point) in points.iter().enumerate() {
         let name = &model.scene.hand.fingers[f].name;
-        let surface = &model.scene.object.surface;
-        let foot = surface.project(point);
-        let distance = (point - foot.point_in_object).norm();
-        if distance > TOUCHING {
-            return Err(end.failure(
-                format!("the {} contact of finger \"{name}\" is {:.2} mm off the surface", end.name(), distance * 1e3),
-                "give a point on the surface, in the object frame",
-            ));
+        let (contact, distance) = given::contact_for(&model.fingers[f], &model.scene.object.surface, point);
+        if distance > GRASP_TOLERANCE {
+            let message = format!(
+                "the {} contact of finger \"{name}\" is {:.2} mm from the nearest place that the tip can touch; at most {} mm \
+                 are put right",
+                end.name(),
+                distance * 1e3,
+                GRASP_TOLERANCE * 1e3
+            );
+            return Err(end.failure(message, "give a point on the surface, in the object frame"));
         }
-        let foot = surface.settle(&foot, model.fingers[f].settle_radius).unwrap_or(foot);
-        let contact = Contact { point_in_object: foot.point_in_object, normal_in_object: foot.normal_in_object };
         let mut workspace = Workspace::new(model);
         workspace.place_object(world_from_object);
         let reached = match &mut near {

@@ -1,7 +1,7 @@
 //! Contact forces of the hand's fingers: what balances the object's weight within all limits.
 
+use super::endpoints::friction_in_words;
 use super::model::{MAX_FINGERS, Model};
-use super::settings::gravity_of;
 use super::settings::{ForceSettings, InHandSettings};
 use super::workspace::{Contacts, HandJoints, Workspace};
 use arrayvec::ArrayVec;
@@ -59,7 +59,7 @@ impl ForceModel {
         Some(ForceModel {
             limits: ForceLimits { least, largest, squeeze, squeeze_weight },
             mass: scene.object.mass,
-            gravity: gravity_of(scene, settings.gravity.as_ref()).unwrap_or_default(),
+            gravity: scene.gravity(),
             torques: scene.hand.fingers.iter().map(|f| f.chain.names.iter().map(torque).collect()).collect(),
         })
     }
@@ -102,7 +102,7 @@ impl Unbalanced {
         let finger_name = |f: usize| model.scene.hand.fingers[f].name.as_str();
         let limits = model.forces.as_ref().map_or([0.0; 2], |forces| [forces.limits.least, forces.limits.largest]);
         let cause = match *self {
-            Unbalanced::AtAnyForce => format!("friction {:.3} does not hold it at any force", model.frame.friction),
+            Unbalanced::AtAnyForce => format!("friction {} does not hold it at any force", friction_in_words(model)),
             Unbalanced::TooLight(f) => {
                 format!("finger \"{}\" would have to press with less than {} N", finger_name(f), limits[0])
             }

@@ -5,6 +5,7 @@ use super::model::Model;
 use super::relocate::hover;
 use super::search::Search;
 use super::settings::ReleaseRule;
+use super::spin;
 use super::state::GraspState;
 use regrasp_geometry::Pose;
 use regrasp_geometry::collision::Placement;
@@ -29,7 +30,9 @@ pub fn most_free(model: &Model) -> usize {
 /// where a finger is free already.
 pub fn draw_leavable(search: &mut Search, state: &GraspState, n_tries: u32) -> u32 {
     let model = search.model();
-    if most_free(model) == 0 || (state.is_held_by_all() && n_tries <= model.settings.free_after) {
+    // Every soft finger that is free leaves the object one direction more.
+    let is_early = n_tries <= model.settings.free_after && !spin::is_restricted(model, state.holding);
+    if most_free(model) == 0 || (state.is_held_by_all() && is_early) {
         return 0;
     }
     if !search.rng.chance(model.settings.free_share) {

@@ -6,7 +6,9 @@
 use super::model::MAX_FINGERS;
 use super::search::{Search, Stop};
 use super::shorten::{Arrival, change_grasp, change_grasp_over, whole_transfer};
+use super::spin::{self, Meeting};
 use super::state::{GraspState, Sequence};
+use super::transfer::is_carried_out;
 use super::tree::{Node, Place, Tree, land};
 use crate::outline::{Outline, OutlineEdge};
 use arrayvec::ArrayVec;
@@ -23,6 +25,9 @@ const EAGER_NODES: usize = 10;
 /// Nodes from which on grasps are joined over third ones too: easy queries are solved by then. By measurement on the wide
 /// hand's boxes, which take a tenth longer without.
 const HARD_NODES: u64 = 30;
+
+/// Nodes of the other tree of which it is estimated how far they are from a common pose with a new one.
+const MEETINGS_LOOKED_AT: usize = 64;
 
 /// Where an extension aims.
 enum Target {
@@ -148,6 +153,9 @@ fn bridge(search: &mut Search, trees: &mut [Tree; 2], growing: usize, node: usiz
     let [first, second] = trees;
     let (tree, other) = if growing == 0 { (&*first, second) } else { (&*second, first) };
     let state = tree.nodes[node].state();
+    if spin::is_restricted(search.model(), state.holding) {
+        return bridge_halfway(search, (tree, other), node, growing);
+    }
     let mut nearest = (f64::INFINITY, None);
     for (index, place) in other.places.iter().enumerate() {
         let distance = search.distance(&state.world_from_object, place.pool.world_from_object());
@@ -160,6 +168,40 @@ fn bridge(search: &mut Search, trees: &mut [Tree; 2], growing: usize, node: usiz
     let (there, join) = join(search, &across, other, place)?;
     let way = tree.trace(node).then(join)?.then(other.trace(there).reversed())?;
     Some(from_the_start(growing, way))
+}
+
+/// From a new node and from one of the other tree to a pose between them, and there from one grasp into the other: where soft
+/// fingertips leave the object few directions, transfers seldom arrive where the other tree is.
+fn bridge_halfway(search: &mut Search, (tree, other): (&Tree, &Tree), node: usize, growing: usize) -> Option<Sequence> {
+    let model = search.model();
+    let state = tree.nodes[node].state();
+    let n_seen = other.nodes.len().min(MEETINGS_LOOKED_AT);
+    let mut seen: Vec<(f64, usize)> = Vec::with_capacity(n_seen);
+    for k in 0..n_seen {
+        let there = if n_seen == other.nodes.len() { k } else { search.rng.below(other.nodes.len()) };
+        if let Some(way) = spin::way_to_meeting(model, [state, other.nodes[there].state()]) {
+            seen.push((way, there));
+        }
+    }
+    seen.sort_by(|a, b| a.0.total_cmp(&b.0));
+    seen.dedup_by_key(|(_, there)| *there);
+    let drawn: ArrayVec<usize, JOINS> = seen.iter().map(|(_, there)| *there).take(JOINS).collect();
+    drawn.into_iter().find_map(|there| {
+        let theirs = other.nodes[there].state();
+        let Meeting { moments: [mine, their_moments] } = spin::meet(model, [state, theirs])?;
+        let mut rng = Rng::child(&search.rng, "halfway", 0);
+        search.rng.bits();
+        let workspace = &mut search.workspace;
+        if !is_carried_out(workspace, state, &mine) || !is_carried_out(workspace, theirs, &their_moments) {
+            return None;
+        }
+        let (mut way, mut back) = (Sequence::at(state.clone()), Sequence::at(theirs.clone()));
+        way.push_transfer(mine);
+        back.push_transfer(their_moments);
+        let join = change_grasp(search, &way, back.end(), Arrival::Exact, &mut rng)?;
+        let way = tree.trace(node).then(join)?.then(back.reversed())?.then(other.trace(there).reversed())?;
+        Some(from_the_start(growing, way))
+    })
 }
 
 /// `way` and then relocations into exactly one of the nodes at `place` of `other`, which has the object pose that `way`

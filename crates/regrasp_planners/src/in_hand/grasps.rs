@@ -3,16 +3,22 @@
 use super::candidates::Candidate;
 use super::combine::{ClosureTable, rank};
 use super::search::Search;
+use super::spin::Freedom;
 use super::state::GraspState;
 use super::tally::Reason;
 use super::workspace::TipMode;
 use regrasp_geometry::Pose;
 
 /// The best grasp that `options` make, closed and clear.
-pub fn choose_grasp(search: &mut Search, world_from_object: &Pose, options: &[Vec<Candidate>]) -> Option<GraspState> {
+pub fn choose_grasp(
+    search: &mut Search,
+    world_from_object: &Pose,
+    options: &[Vec<Candidate>],
+    freedom: Option<&Freedom>,
+) -> Option<GraspState> {
     let model = search.model();
     let mut table = ClosureTable::new(model, options);
-    let ranked = rank(&mut search.workspace, options, &mut table, None, GRASPS_TRIED);
+    let ranked = rank(&mut search.workspace, options, &mut table, freedom, None, GRASPS_TRIED);
     search.tally.note_releases(&table, world_from_object);
     for combination in ranked {
         let chosen = |f: usize| &options[f][combination.choice[f]];

@@ -29,12 +29,16 @@ pub(crate) mod forces_along;
 mod free;
 /// Two gait trees that grow until they meet.
 mod gait;
+/// Given joints and contacts that nearly touch.
+mod given;
 /// Linear paths in GS_n.
 mod grasp_path;
 /// Grasps at a given object pose.
 mod grasps;
 /// Better plans after the first.
 mod improve;
+/// Hands that are inside something.
+pub(crate) mod inside;
 /// Legs of a query, from way pose to way pose.
 mod legs;
 /// Links between grasps.
@@ -65,6 +69,8 @@ mod sequence_tests;
 pub mod settings;
 /// Random shortcuts.
 mod shorten;
+/// Motions in which soft fingertips do not turn about their normals.
+mod spin;
 /// Points of GS_n and the motions between them.
 pub(crate) mod state;
 /// Why attempts failed.
@@ -86,9 +92,9 @@ mod visibility;
 /// Configurations and continuous collision tests.
 pub(crate) mod workspace;
 
+pub use given::{MovedFinger, moved_fingers};
 pub use settings::{
-    Alpha, AnyDirection, CostWeights, FirstTry, ForceSettings, GravityInHand, InHandSettings, Method, ReleaseRule,
-    SpeedSettings, TransferMode,
+    Alpha, CostWeights, FirstTry, ForceSettings, InHandSettings, Method, ReleaseRule, SpeedSettings, TransferMode,
 };
 pub use validate::{NotProven, validate_once};
 
@@ -131,7 +137,6 @@ pub fn plan_in_hand(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Plan, Failure> {
     settings.validate().expect("settings are validated where they are read");
-    refuse_two_gravities(scene, settings)?;
     if query.task != TaskKind::InHand {
         let message = format!("a task of kind \"{}\" is none of the in-hand planner's", query.task.name());
         return Err(Failure::bare(FailureKind::Impossible, message, "plan it with plan_tracking, or regrasp plan"));
@@ -198,15 +203,6 @@ fn plan_with(
             let has_tried_all = interrupt == Interrupt::WorkSpent && max_work < budget.max_work;
             Err(if has_tried_all { refuse_after_transfers(&model, failure) } else { failure })
         }
-    }
-}
-
-/// The scene's gravity and that of the settings are one, where both are stated.
-fn refuse_two_gravities(scene: &Scene, settings: &InHandSettings) -> Result<(), Failure> {
-    let advice = "state gravity in the scene or in the settings, not in both";
-    match settings::gravity_of(scene, settings.gravity.as_ref()) {
-        Ok(_) => Ok(()),
-        Err(message) => Err(Failure::bare(FailureKind::Impossible, message, advice)),
     }
 }
 

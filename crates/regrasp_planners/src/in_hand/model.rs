@@ -10,7 +10,7 @@ use regrasp_robot::kinematics::body_frame::BodyFrame;
 use regrasp_robot::kinematics::finger_ik::FingerIk;
 use regrasp_robot::kinematics::motion_bound::MotionBound;
 use regrasp_robot::tip::{Pad, TipEllipsoid, is_same_surface};
-use regrasp_scene::Scene;
+use regrasp_scene::{Object, Scene};
 use std::sync::Arc;
 
 use super::forces::ForceModel;
@@ -76,12 +76,16 @@ pub struct Body {
     pub shape: Shape,
     /// The exact triangles, where the hull is not the mesh.
     pub tree: Option<Arc<MeshTree>>,
+    /// The triangles that fingertips touch: those of the mesh also where its hull stands for it to everything else.
+    pub tree_for_tips: Option<Arc<MeshTree>>,
     /// Pose in its carrier's frame.
     pub carrier_from_body: Placement,
     /// Centre of the bounding ball, in the body frame.
     pub center: Point,
     /// Radius of the bounding ball.
     pub radius: f64,
+    /// Some point of the shape, in the body frame: where it is inside a mesh, the body is that crosses none of its triangles.
+    pub middle: Point,
     /// What moves it.
     pub carrier: Carrier,
     /// Name for messages.
@@ -140,8 +144,9 @@ pub struct Model<'a> {
 }
 
 impl<'a> Model<'a> {
-    /// Prepares `scene`.
+    /// Prepares `scene`; the scene's limits bound the settings.
     pub fn new(scene: &'a Scene, settings: &InHandSettings) -> Self {
+        let settings = settings.within(&scene.limits);
         let hand = &scene.hand;
         assert!(hand.fingers.len() <= MAX_FINGERS, "hands of more than {MAX_FINGERS} fingers");
         let mut bodies = Vec::new();
@@ -155,9 +160,11 @@ impl<'a> Model<'a> {
                 bodies.push(Body {
                     shape: shape.clone(),
                     tree: None,
+                    tree_for_tips: None,
                     carrier_from_body: Placement::from(body_from_shape),
                     center,
                     radius,
+                    middle: shape.middle(),
                     carrier: Carrier::Finger { finger: f, link, bound },
                     name: format!("{name} ({})", finger.name),
                 });
@@ -202,10 +209,7 @@ impl<'a> Model<'a> {
             links.push((part.link, false));
         }
         let object = bodies.len();
-        bodies.push(Body {
-            carrier: Carrier::Object,
-            ..fixed_body(&scene.object.shape, scene.object.mesh_body.as_ref(), &Pose::identity(), &scene.object.name)
-        });
+        bodies.push(object_body(&scene.object));
         for obstacle in &scene.obstacles {
             let (shape, place) = (&obstacle.placed.shape, &obstacle.placed.parent_from_shape);
             bodies.push(fixed_body(shape, obstacle.mesh_body.as_ref(), place, &obstacle.name));
@@ -261,11 +265,11 @@ impl<'a> Model<'a> {
                 torque_scale: scene.object.radius,
                 friction,
             },
-            forces: ForceModel::new(scene, settings),
+            forces: ForceModel::new(scene, &settings),
             object_reach: bodies[object].center.coords.norm() + bodies[object].radius,
             radii: bodies.iter().map(|body| body.radius).collect(),
             bodies,
-            settings: settings.clone(),
+            settings,
         }
     }
 
@@ -294,6 +298,21 @@ impl<'a> Model<'a> {
     #[inline]
     pub fn rolls(&self, finger: usize) -> bool {
         self.settings.transfer == TransferMode::Rolling && self.fingers[finger].tip_radius > 0.0
+    }
+
+    /// True when `finger` rolls and must not turn about the contact's normal: a soft fingertip holds on to what it touches.
+    #[inline]
+    pub fn resists_spin(&self, finger: usize) -> bool {
+        let has_torsion =
+            matches!(self.fingers[finger].contact, ContactModel::SoftFinger { torsion_radius } if torsion_radius > 0.0);
+        has_torsion && self.rolls(finger)
+    }
+
+    /// True when the object must move so that soft fingertips do not turn about their normals: `finger` resists, and has no
+    /// joint to spare with which it could turn along with the object.
+    #[inline]
+    pub fn restricts_motion(&self, finger: usize) -> bool {
+        self.resists_spin(finger) && !self.fingers[finger].ik.is_redundant()
     }
 
     /// True when some finger rolls: contacts then travel while the object moves.
@@ -341,10 +360,12 @@ fn fixed_body(shape: &Shape, mesh_body: Option<&MeshBody>, world_from_shape: &Po
         let (center, radius) = shape.bounding_sphere();
         Body {
             shape: shape.clone(),
+            tree_for_tips: Option::clone(&tree),
             tree,
             carrier_from_body: Placement::from(place),
             center,
             radius,
+            middle: shape.middle(),
             carrier: Carrier::World,
             name: name.to_owned(),
         }
@@ -354,6 +375,13 @@ fn fixed_body(shape: &Shape, mesh_body: Option<&MeshBody>, world_from_shape: &Po
         Some(MeshBody { bound, tree }) => body(&bound.shape, Some(tree), &(world_from_shape * bound.parent_from_shape)),
         None => body(shape, None, world_from_shape),
     }
+}
+
+/// The object: its triangles decide for everything, or where its hull stands for it for fingertips alone.
+fn object_body(object: &Object) -> Body {
+    let body = fixed_body(&object.shape, object.mesh_body.as_ref(), &Pose::identity(), &object.name);
+    let tree = Option::clone(&body.tree).filter(|_| object.hull.is_none());
+    Body { carrier: Carrier::Object, tree, ..body }
 }
 
 /// The bounding balls of bodies that nothing moves, in the world.

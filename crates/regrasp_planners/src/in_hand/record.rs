@@ -12,7 +12,7 @@ use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 use regrasp_grasp::Contact;
 use regrasp_plan::plan::{
     ContactMode, ContactState, FORMAT, FORMAT_VERSION, Plan, PlanInput, PoseData, Promises, Segment, SegmentKind,
-    Statistics, WayPose, Waypoint,
+    Statistics, WayPose, Waypoint, relocations,
 };
 use regrasp_scene::{InHandQuery, Scene};
 
@@ -56,7 +56,6 @@ pub struct Recorder<'m, 'a> {
     kept_margin: f64,
     transfers: u64,
     transfers_with_free_fingers: u64,
-    relocations: u64,
 }
 
 impl<'m, 'a> Recorder<'m, 'a> {
@@ -80,7 +79,6 @@ impl<'m, 'a> Recorder<'m, 'a> {
             kept_margin: f64::INFINITY,
             transfers: 0,
             transfers_with_free_fingers: 0,
-            relocations: 0,
         }
     }
 
@@ -137,7 +135,6 @@ impl<'m, 'a> Recorder<'m, 'a> {
     pub fn begin_regrasp(&mut self, finger: usize, contact: Option<&Contact>, n: usize) {
         let others = self.holding & !(1 << finger);
         self.keep(others);
-        self.relocations += u64::from(contact.is_some());
         let name = self.model.scene.hand.fingers[finger].name.clone();
         self.here.contacts = resting(&self.contacts, self.holding);
         self.begin(SegmentKind::Regrasp, Some(name), n);
@@ -205,7 +202,7 @@ impl<'m, 'a> Recorder<'m, 'a> {
         let statistics = Statistics {
             transfers: self.transfers,
             transfers_with_free_fingers: self.transfers_with_free_fingers,
-            relocations: self.relocations,
+            relocations: relocations(&finger_names(self.model.scene), &self.segments),
             ..statistics
         };
         let model = self.model;
@@ -238,6 +235,10 @@ impl<'m, 'a> Recorder<'m, 'a> {
     }
 }
 
+fn finger_names(scene: &Scene) -> Vec<String> {
+    scene.hand.fingers.iter().map(|finger| finger.name.clone()).collect()
+}
+
 /// A plan of `segments` for a query; method, seed, settings, way poses and statistics are left to be said.
 pub fn plan_of(scene: &Scene, query: &InHandQuery, promises: Promises, segments: Vec<Segment>) -> Plan {
     Plan {
@@ -255,7 +256,7 @@ pub fn plan_of(scene: &Scene, query: &InHandQuery, promises: Promises, segments:
             .collect(),
         promises,
         joint_names: scene.hand.joint_names(),
-        fingers: scene.hand.fingers.iter().map(|finger| finger.name.clone()).collect(),
+        fingers: finger_names(scene),
         start: PoseData::from(&query.world_from_object_start),
         way_poses: Vec::new(),
         goal: PoseData::from(&query.world_from_object_goal),

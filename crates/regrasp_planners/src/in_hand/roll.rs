@@ -14,10 +14,13 @@ use regrasp_grasp::Contact;
 use regrasp_grasp::contact::rolling::{Ball, Touch, slip, turn_between};
 use regrasp_grasp::contact::rolling_ellipsoid::{self, Stance};
 use regrasp_robot::kinematics::body_frame::BodyFrame;
-use regrasp_robot::kinematics::finger_ik::{Asked, Coordinates, IkSettings, Preference};
+use regrasp_robot::kinematics::finger_ik::{Asked, AskedTurn, Coordinates, IkSettings, Preference};
 
 /// Slip that one step may leave: segments have up to some hundred steps, and parts of a step hide some of it.
 const STEP_SLIP: f64 = 0.002 * SLIP_TOLERANCE;
+
+/// Turn about the normal that one step of a soft fingertip may leave, in radians.
+pub const STEP_SPIN: f64 = 2e-5;
 
 /// Parts of a step over which slip is summed: on meshes the ball tips over edges between triangles. By measurement on
 /// allegro/apple_x, where two parts leave 62 um over a segment.
@@ -40,6 +43,8 @@ pub struct Rolled {
     pub foot: SurfacePoint,
     /// Joints of the finger.
     pub joints: Coordinates,
+    /// Turn of the tip over the object about the normal, in radians; of soft fingertips only.
+    pub spin: f64,
 }
 
 impl Rolled {
@@ -64,6 +69,15 @@ impl Touching {
         let normal_in_object = UnitVector::new_unchecked(self.stance.normal);
         Contact { point_in_object: self.foot.point_in_object, normal_in_object }
     }
+}
+
+/// What is left of a motion when rolling is taken off.
+#[derive(Debug, Clone, Copy, Default)]
+struct Slipped {
+    /// How far the tip slid over the object, in the object frame.
+    way: Vector,
+    /// How far it turned about the normal, in radians; of soft fingertips only.
+    spin: f64,
 }
 
 /// The step that a rolling fingertip makes while the object moves from `from` to `to`, both world from object.
@@ -110,6 +124,14 @@ impl<'a> RollStep<'a> {
         self.model.fingers[self.finger].touch(&self.model.scene.object.surface, link, object, &self.start.normal)
     }
 
+    /// Turn of the tip over the object about the normal from one stance to the other.
+    fn spin(&self, from: &Stance, to: &Stance) -> f64 {
+        if !self.model.resists_spin(self.finger) {
+            return 0.0;
+        }
+        turn_between(&from.object_from_link, &to.object_from_link).dot(&(from.normal + to.normal).normalize())
+    }
+
     fn slip(&self, from: &Stance, to: &Stance) -> Vector {
         let finger = &self.model.fingers[self.finger];
         match finger.ellipsoid {
@@ -122,49 +144,59 @@ impl<'a> RollStep<'a> {
         }
     }
 
-    /// Joints without slip at the end of the step, by the midpoint rule, less what is known of its error.
-    fn solve(&self, near: &Coordinates, settings: &IkSettings, error: &Vector) -> Option<Rolled> {
+    /// Joints without slip at the end of the step, by the midpoint rule, less what is known of its error. Soft fingertips
+    /// with a joint to spare also turn along with the object.
+    fn solve(&self, near: &Coordinates, settings: &IkSettings, error: &Slipped) -> Option<Rolled> {
         let finger = &self.model.fingers[self.finger];
+        let turns_along = self.model.resists_spin(self.finger) && finger.ik.is_redundant();
         let mut end = None;
         let asked = |link: &BodyFrame| {
             let touch = self.touch(link, self.to)?;
             let normal = touch.stance.normal;
-            let slipped = self.slip(&self.start, &touch.stance) + error;
+            let slipped = self.slip(&self.start, &touch.stance) + error.way;
             let off = slipped - normal * normal.dot(&slipped) + normal * touch.gap;
             end = Some(touch);
             let arm = match finger.ellipsoid {
                 None => -self.to.vector(&(normal * finger.tip_radius)),
                 Some(_) => finger.arm(link, &self.to.vector(&normal)),
             };
-            Some(Asked { error: -self.to.vector(&off), arm })
+            let turn = turns_along.then(|| AskedTurn {
+                axis: self.to.vector(&normal),
+                left: -self.spin(&self.start, &touch.stance) - error.spin,
+            });
+            Some(Asked { error: -self.to.vector(&off), arm, turn })
         };
         let joints = finger.ik.follow(near, settings, asked)?;
         let end = end.filter(|end: &Touching| {
             finger.pad.is_none_or(|pad| pad.holds(&-end.stance.object_from_link.tr_mul(&end.stance.normal)))
         })?;
-        Some(Rolled { contact: end.contact(), foot: end.foot, joints })
+        let spin = self.spin(&self.start, &end.stance);
+        Some(Rolled { contact: end.contact(), foot: end.foot, joints, spin })
     }
 
     /// The end of a long step, for looking ahead: no look at what happens half-way.
     pub fn coarse(&self, max_step: f64) -> Option<Rolled> {
-        self.solve(self.joints, &self.settings(max_step), &Vector::zeros())
+        self.solve(self.joints, &self.settings(max_step), &Slipped::default())
     }
 
     /// The end of the step; `between` places the object at a share of it. The tip may leave the surface by `allowed` on the
     /// way.
     pub fn fine(&self, between: impl Fn(f64) -> Placement, allowed: f64) -> Result<Rolled, NoStep> {
         let mut settings = self.settings(self.model.settings.joint_step);
-        let mut error = Vector::zeros();
+        let is_soft = self.model.resists_spin(self.finger);
+        let turns_along = is_soft && self.model.fingers[self.finger].ik.is_redundant();
+        let mut error = Slipped::default();
         let mut end = self.solve(self.joints, &settings, &error).ok_or(NoStep::OutOfReach)?;
         // Corrections change the step by little: nothing else is to change.
         settings.preference = None;
         for correction in 0..=CORRECTIONS {
             let left = self.slip_over_parts(&end, &between, allowed).ok_or(NoStep::TooLong)?;
-            if left.norm() <= STEP_SLIP {
-                return Ok(end);
+            if left.way.norm() <= STEP_SLIP && (!turns_along || left.spin.abs() <= STEP_SPIN) {
+                return Ok(Rolled { spin: left.spin, ..end });
             }
             if correction < CORRECTIONS {
-                error += left;
+                error.way += left.way;
+                error.spin += left.spin;
                 end = self.solve(&end.joints, &settings, &error).ok_or(NoStep::OutOfReach)?;
             }
         }
@@ -173,12 +205,16 @@ impl<'a> RollStep<'a> {
 
     /// Slip over parts of the step, while the joints move linearly: what the rule over the whole of it leaves out. None where
     /// the tip is farther from the surface than `allowed`, or deeper, at the end of a part.
-    fn slip_over_parts(&self, end: &Rolled, between: &impl Fn(f64) -> Placement, allowed: f64) -> Option<Vector> {
+    fn slip_over_parts(&self, end: &Rolled, between: &impl Fn(f64) -> Placement, allowed: f64) -> Option<Slipped> {
         let n_parts = if self.model.scene.object.surface.mesh().is_some() { PARTS_ON_MESH } else { PARTS };
         let finger = &self.model.fingers[self.finger];
         let chain = finger.ik.chain();
         let mut before = self.start;
-        let mut sum = Vector::zeros();
+        let mut sum = Slipped::default();
+        let mut add = |from: &Stance, to: &Stance| {
+            sum.way += self.slip(from, to);
+            sum.spin += self.spin(from, to);
+        };
         for k in 1..n_parts {
             let t = k as f64 / n_parts as f64;
             let joints: Coordinates = self.joints.iter().zip(&end.joints).map(|(a, b)| a + t * (b - a)).collect();
@@ -186,11 +222,12 @@ impl<'a> RollStep<'a> {
             if touch.gap.abs() > allowed {
                 return None;
             }
-            sum += self.slip(&before, &touch.stance);
+            add(&before, &touch.stance);
             before = touch.stance;
         }
         let last = RollStep::new(self.model, self.finger, &end.contact, &end.joints, self.to, self.to).start;
-        Some(sum + self.slip(&before, &last))
+        add(&before, &last);
+        Some(sum)
     }
 }
 

@@ -148,7 +148,9 @@ impl<'a> Search<'a> {
         let work = self.workspace.work;
         if work >= self.next_report {
             self.next_report = work + REPORT_EVERY;
-            let angle_left = self.nearest.as_ref().map_or(std::f64::consts::PI, |(_, state)| self.angle_left(state));
+            // Before anything is reached, all of the leg is left.
+            let nearest = self.nearest.as_ref().map_or(&self.start, |(_, state)| &state.world_from_object);
+            let angle_left = frame::rotation_between(nearest, &self.goal).norm();
             (self.progress)(Progress { nodes: self.n_nodes, work, restarts: self.attempt as u64, angle_left });
         }
         if self.winner.load(Ordering::Relaxed) < self.attempt {
@@ -169,11 +171,6 @@ impl<'a> Search<'a> {
     /// Distance between poses, with angles weighed by the object's radius.
     pub fn distance(&self, a: &Pose, b: &Pose) -> f64 {
         frame::pose_distance(a, b, self.model().turn_length())
-    }
-
-    /// Angle between a state and the goal pose.
-    pub fn angle_left(&self, state: &GraspState) -> f64 {
-        frame::rotation_between(&state.world_from_object, &self.goal).norm()
     }
 
     /// Takes note of a state, for the nearest miss.

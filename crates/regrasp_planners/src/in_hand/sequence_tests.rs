@@ -175,7 +175,7 @@ fn draw_partly_bound(search: &mut Search) -> Option<(GraspState, u32)> {
     if options.iter().any(Vec::is_empty) {
         return None;
     }
-    let state = choose_grasp(search, &pose, &options)?;
+    let state = choose_grasp(search, &pose, &options, None)?;
     let released = releasable(search.model(), &state.contacts, state.holding);
     (released != state.holding).then_some((state, released))
 }

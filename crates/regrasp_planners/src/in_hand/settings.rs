@@ -2,7 +2,7 @@
 
 mod physics;
 
-pub use physics::{AnyDirection, FirstTry, ForceSettings, GravityInHand, SpeedSettings, gravity_of};
+pub use physics::{FirstTry, ForceSettings, SpeedSettings};
 
 use serde::{Deserialize, Serialize};
 
@@ -227,8 +227,6 @@ pub struct InHandSettings {
     pub cost: CostWeights,
     /// Contact forces; none for plans that say nothing about them.
     pub forces: Option<ForceSettings>,
-    /// Gravity, where the scene leaves it open.
-    pub gravity: Option<GravityInHand>,
     /// How fast plans are carried out.
     pub speed: SpeedSettings,
     /// Schedule of alpha, for the methods of paper 000.
@@ -273,7 +271,6 @@ impl Default for InHandSettings {
             improve_work: 0,
             cost: CostWeights::default(),
             forces: Some(ForceSettings::default()),
-            gravity: None,
             speed: SpeedSettings::default(),
             alpha: Alpha::Constant { value: 0.9 },
             guided_share: 0.9,
@@ -341,7 +338,6 @@ impl InHandSettings {
         if let Some(forces) = &self.forces {
             forces.validate()?;
         }
-        self.gravity.as_ref().map_or(Ok(()), GravityInHand::validate)?;
         self.speed.validate()?;
         self.alpha.validate()
     }

@@ -1,26 +1,39 @@
 //! When each waypoint is passed, and how fast.
 //!
-//! Every segment goes from rest to rest. Between two waypoints it takes at least as long as the speed limits ask; the
-//! pace rises from nothing and falls to nothing evenly, within [`EASE`]. Velocities are those of the monotone cubic
-//! through the waypoints (Fritsch, Butland, *A method for constructing local monotone piecewise cubic interpolants*,
-//! 1984), so that cubic Hermite interpolation overshoots nowhere; where they change from one waypoint to the next faster, on
-//! average, than the acceleration limits allow, time is stretched. Peaks of the acceleration in between are not limited.
+//! Between two waypoints every joint follows the cubic through its positions, velocities and times; the object follows the
+//! joints' motion along their chord (`docs/plan-format.md`, Time). Every segment goes from rest to rest.
+//!
+//! - Directions ([`path`]): at a waypoint the joints go along the parabola through it and its neighbours. Where that leads too
+//!   far off the chords, which the search has tested, they go slower than the path, or stop.
+//! - Speeds ([`speeds`]): a backward pass finds how fast each waypoint may be passed so that the rest can still be reached. A
+//!   forward pass goes as fast as that allows. This is time-optimal up to the spacing of the waypoints (Pham and Pham 2018), for
+//!   limits in closed form ([`step`]): velocities and accelerations of joints, speeds of fingertips and object.
+//! - Last, each step is made as short as the velocities at its ends allow.
+
+/// Directions at the waypoints.
+mod path;
+/// How fast each waypoint is passed.
+mod speeds;
+/// The limits of one step.
+mod step;
 
 use super::model::Model;
-use regrasp_geometry::{Point, Pose, frame};
+use super::record::CONTACT_TOLERANCE;
+use path::{Path, Stray};
 use regrasp_plan::plan::{MotionLimits, Segment, SegmentKind, Waypoint};
-use regrasp_robot::kinematics::finger_ik::Coordinates;
+use speeds::Speeds;
 
-/// Time in which the pace of a segment rises and falls, in seconds: a fraction of what a transfer takes.
-const EASE: f64 = 0.1;
 /// Least time from one waypoint to the next, in seconds.
 pub const LEAST_SPAN: f64 = 1e-3;
-/// Peak of the velocity of a cubic from rest to rest over its mean.
-const PEAK: f64 = 1.5;
-/// Rounds in which single spans are stretched before whole segments are.
-const ROUNDS: usize = 12;
-/// Largest stretch of a span in a round.
-const MOST_STRETCH: f64 = 2.0;
+/// Rounds in which directions are changed where the motion strays too far from the chords.
+const ROUNDS: usize = 4;
+/// Share of what the search leaves between it and the checker that the motion may stray from the chords.
+const STRAY_SHARE: f64 = 0.5;
+/// How far links may turn aside of the chords in a segment of tracking, there and back, in radians: a quarter of what checkers
+/// allow to contacts that do not turn.
+const TRACKED_TURN: f64 = 5e-4;
+/// More than rounding.
+const ROUNDING: f64 = 1e-6;
 
 /// Limits that plans promise.
 pub fn limits(model: &Model) -> MotionLimits {
@@ -43,10 +56,19 @@ pub fn limits(model: &Model) -> MotionLimits {
     }
 }
 
-/// Gives every waypoint its time and its velocities, `least_span` seconds or more apart; `SpeedSettings::ramp` passes between segments where forces change.
+/// How far the motion may stray from the chords, in metres: the search keeps `clearance`, and leaves the contact tolerance
+/// less the contact allowance.
+fn largest_stray(model: &Model) -> f64 {
+    let settings = &model.settings;
+    STRAY_SHARE * settings.clearance.min(CONTACT_TOLERANCE - settings.contact_allowance).max(0.0)
+}
+
+/// Gives every waypoint its time and its velocities. No step is passed faster than in `least_span` seconds.
+/// `SpeedSettings::ramp` passes between segments where forces change.
 pub fn assign_times(model: &Model, limits: &MotionLimits, segments: &mut [Segment], least_span: impl Fn(usize) -> f64) {
     let mut now = 0.0;
-    let mut timing = Timing::new(model, limits);
+    let way = largest_stray(model);
+    let mut timing = Timing { path: Path::new(model, limits), speeds: Speeds::default(), way };
     let mut before: Option<SegmentKind> = None;
     for (index, segment) in segments.iter_mut().enumerate() {
         let goes_on = (before, segment.kind) == (Some(SegmentKind::Transfer), SegmentKind::Transfer);
@@ -54,155 +76,59 @@ pub fn assign_times(model: &Model, limits: &MotionLimits, segments: &mut [Segmen
             now += model.settings.speed.ramp;
         }
         before = Some(segment.kind);
-        timing.least_span = least_span(index);
-        timing.assign(&mut segment.waypoints, now);
+        let stray = timing.stray(segment);
+        timing.assign(&mut segment.waypoints, now, least_span(index), stray);
         now = segment.waypoints.last().map_or(now, |last| last.time);
     }
 }
 
 /// Times of one segment after the other.
 struct Timing<'m, 'a> {
-    model: &'m Model<'a>,
-    limits: &'m MotionLimits,
-    least_span: f64,
-    /// Least time from each waypoint to the next.
-    spans: Vec<f64>,
-    /// Time of each waypoint after the first.
-    times: Vec<f64>,
-    /// Velocities, waypoint by waypoint.
-    velocities: Vec<f64>,
+    path: Path<'m, 'a>,
+    speeds: Speeds,
+    /// How far points of the hand may stray from the chords, in metres.
+    way: f64,
 }
 
-impl<'m, 'a> Timing<'m, 'a> {
-    fn new(model: &'m Model<'a>, limits: &'m MotionLimits) -> Self {
-        Timing { model, limits, least_span: LEAST_SPAN, spans: Vec::new(), times: Vec::new(), velocities: Vec::new() }
+impl Timing<'_, '_> {
+    /// How far fingers may stray from the chords of a segment. In tracking, turns of its steps add up.
+    fn stray(&self, segment: &Segment) -> Stray {
+        let turn = match segment.kind {
+            SegmentKind::Tracking => 0.5 * TRACKED_TURN / segment.waypoints.len() as f64,
+            SegmentKind::Transfer | SegmentKind::Regrasp => f64::INFINITY,
+        };
+        Stray { way: self.way, turn }
     }
 
-    fn assign(&mut self, waypoints: &mut [Waypoint], start: f64) {
-        self.spans.clear();
-        for pair in waypoints.windows(2) {
-            self.spans.push(self.least_span(&pair[0], &pair[1]));
-        }
+    fn assign(&mut self, waypoints: &mut [Waypoint], start: f64, least_span: f64, stray: Stray) {
+        let Timing { path, speeds, .. } = self;
+        path.begin(waypoints, stray);
         for round in 0.. {
-            self.ease();
-            self.find_velocities(waypoints);
-            let most = self.stretch(waypoints.len(), MOST_STRETCH);
-            if most <= 1.0 {
-                break;
-            }
-            if round == ROUNDS {
-                // Slower by so much everywhere, accelerations fall with the square.
-                let slower = most.sqrt() * (1.0 + 1e-9);
-                self.times.iter_mut().for_each(|time| *time *= slower);
-                self.velocities.iter_mut().for_each(|velocity| *velocity /= slower);
-                break;
-            }
-        }
-        let n_joints = self.limits.joint_velocities.len();
-        for (k, waypoint) in waypoints.iter_mut().enumerate() {
-            waypoint.time = start + self.times[k];
-            waypoint.joint_velocities.clear();
-            waypoint.joint_velocities.extend_from_slice(&self.velocities[k * n_joints..(k + 1) * n_joints]);
-        }
-    }
-
-    /// Time that the limits of speed and of joint velocities ask for between two waypoints.
-    fn least_span(&self, from: &Waypoint, to: &Waypoint) -> f64 {
-        let mut way = self.object_way(from, to);
-        let mut span = self.least_span;
-        let mut first = 0;
-        for (finger, of_model) in self.model.fingers.iter().enumerate() {
-            let range = first..first + of_model.ik.chain().n_coordinates();
-            first = range.end;
-            let (a, b) = (&from.joints[range.clone()], &to.joints[range.clone()]);
-            if a == b {
-                continue;
-            }
-            way = way.max(self.tip_way(finger, a, b));
-            for ((a, b), velocity) in a.iter().zip(b).zip(&self.limits.joint_velocities[range]) {
-                span = span.max(PEAK * (b - a).abs() / velocity);
-            }
-        }
-        span.max(way / self.limits.largest_speed)
-    }
-
-    /// How far a point of the object can go, no farther from the centre of mass than its radius.
-    fn object_way(&self, from: &Waypoint, to: &Waypoint) -> f64 {
-        if from.world_from_object == to.world_from_object {
-            return 0.0;
-        }
-        let (from, to) = (Pose::from(&from.world_from_object), Pose::from(&to.world_from_object));
-        let center: &Point = &self.model.frame.center_of_mass;
-        let angle = frame::rotation_between(&from, &to).norm();
-        (from * center - to * center).norm() + angle * self.model.frame.torque_scale
-    }
-
-    /// How far a fingertip's centre goes, by way of the middle of the step.
-    fn tip_way(&self, finger: usize, from: &[f64], to: &[f64]) -> f64 {
-        let ik = self.model.fingers[finger].ik;
-        let middle: Coordinates = from.iter().zip(to).map(|(a, b)| 0.5 * (a + b)).collect();
-        let [from, middle, to] = [from, &middle, to].map(|joints| ik.tip(joints));
-        (middle - from).norm() + (to - middle).norm()
-    }
-
-    /// Times at which the spans are over, at a pace that rises and falls evenly and is at most one.
-    fn ease(&mut self) {
-        self.times.clear();
-        let total: f64 = self.spans.iter().sum();
-        let eased = |done: f64| (2.0 * EASE * done).sqrt();
-        let (half, end) =
-            if total > EASE { (0.5 * EASE, total + EASE) } else { (0.5 * total, 2.0 * eased(0.5 * total)) };
-        let mut done = 0.0;
-        self.times.push(0.0);
-        for (k, span) in self.spans.iter().enumerate() {
-            done += span;
-            self.times.push(if k + 1 == self.spans.len() {
-                end
-            } else if done <= half {
-                eased(done)
-            } else if done >= total - half {
-                end - eased((total - done).max(0.0))
-            } else {
-                done + 0.5 * EASE
-            });
-        }
-    }
-
-    /// Velocities at the waypoints: zero at both ends and where a joint turns back, else the weighted harmonic mean of the
-    /// mean velocities before and after.
-    fn find_velocities(&mut self, waypoints: &[Waypoint]) {
-        let n_joints = self.limits.joint_velocities.len();
-        self.velocities.clear();
-        self.velocities.resize(waypoints.len() * n_joints, 0.0);
-        for k in 1..waypoints.len().saturating_sub(1) {
-            let (before, after) = (self.times[k] - self.times[k - 1], self.times[k + 1] - self.times[k]);
-            let (weight_before, weight_after) = (before + 2.0 * after, 2.0 * before + after);
-            for j in 0..n_joints {
-                let [a, b, c] = [k - 1, k, k + 1].map(|k| waypoints[k].joints[j]);
-                let (slope_before, slope_after) = ((b - a) / before, (c - b) / after);
-                if slope_before * slope_after > 0.0 {
-                    // The longer span counts less: Fritsch and Butland, 1984, eq. 2 with Brodlie's weights.
-                    let sum = weight_before / slope_before + weight_after / slope_after;
-                    self.velocities[k * n_joints + j] = (weight_before + weight_after) / sum;
+            path.find_steps(waypoints, least_span);
+            speeds.find(path);
+            // After some rounds all that strays too far stops.
+            let mut is_done = true;
+            for k in 0..path.steps.len() {
+                let strays = path.stray(k, speeds.speeds[k], speeds.speeds[k + 1], speeds.spans[k]);
+                if strays > 1.0 + ROUNDING {
+                    is_done = false;
+                    path.slow_down(k, if round < ROUNDS { 1.0 / strays } else { 0.0 });
                 }
             }
-        }
-    }
-
-    /// Stretches the spans in which accelerations are above their limits; the largest acceleration over its limit.
-    fn stretch(&mut self, n_waypoints: usize, most_stretch: f64) -> f64 {
-        let n_joints = self.limits.joint_velocities.len();
-        let mut most: f64 = 0.0;
-        for k in 0..n_waypoints.saturating_sub(1) {
-            let span = self.times[k + 1] - self.times[k];
-            let (from, to) = self.velocities[k * n_joints..(k + 2) * n_joints].split_at(n_joints);
-            let accelerations = from.iter().zip(to).zip(&self.limits.joint_accelerations);
-            let over = accelerations.map(|((a, b), limit)| (b - a).abs() / (span * limit)).fold(0.0, f64::max);
-            if over > 1.0 {
-                self.spans[k] *= (1.05 * over.sqrt()).min(most_stretch);
+            if is_done {
+                break;
             }
-            most = most.max(over);
         }
-        most
+        let slower = path.too_fast(waypoints, speeds);
+        let n_joints = path.n_joints;
+        let mut now = start;
+        for (k, waypoint) in waypoints.iter_mut().enumerate() {
+            now += k.checked_sub(1).map_or(0.0, |before| speeds.spans[before] * slower);
+            waypoint.time = now;
+            let speed = speeds.speeds[k] / slower;
+            let directions = &path.directions[k * n_joints..(k + 1) * n_joints];
+            waypoint.joint_velocities.clear();
+            waypoint.joint_velocities.extend(directions.iter().map(|direction| direction * speed));
+        }
     }
 }

@@ -81,7 +81,7 @@ impl FingerModel<'_> {
                 let asked = |link: &BodyFrame| {
                     let arm = arm_of(ellipsoid, link, &normal);
                     let error = point - (link.point(self.ik.center_in_body()) + arm);
-                    Some(Asked { error, arm })
+                    Some(Asked { error, arm, turn: None })
                 };
                 self.ik.follow(seed, settings, asked)?
             }

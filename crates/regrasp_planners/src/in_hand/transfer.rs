@@ -2,11 +2,13 @@
 //! over it (paper 004, section IV-C).
 
 use super::forces::balances;
-use super::model::Model;
+use super::model::{MAX_FINGERS, Model};
 use super::record::CONTACT_TOLERANCE;
 use super::roll::{NoStep, RollStep};
+use super::spin;
 use super::state::{GraspState, Moment};
 use super::workspace::{HandJoints, TipMode, Workspace};
+use arrayvec::ArrayVec;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::frame::{self, PoseLine};
 use regrasp_geometry::{Pose, UnitVector};
@@ -59,6 +61,19 @@ pub fn transfer(workspace: &mut Workspace, start: &GraspState, goal: &Pose, mome
     })
 }
 
+/// True when `moments` of a transfer from `start` are clear of collisions, with forces that hold the weight.
+pub fn is_carried_out(workspace: &mut Workspace, start: &GraspState, moments: &[Moment]) -> bool {
+    if !holds_weight(workspace, &start.moment(), start.holding) {
+        return false;
+    }
+    workspace.set_state(start);
+    moments.iter().all(|there| {
+        workspace.roll_to(&there.contacts);
+        workspace.step(&there.world_from_object, &there.joints, TipMode::AllHold)
+            && holds_weight(workspace, there, start.holding)
+    })
+}
+
 fn holds_weight(workspace: &mut Workspace, there: &Moment, holding: u32) -> bool {
     balances(workspace, &there.world_from_object, &there.joints, &there.contacts, holding)
 }
@@ -72,6 +87,9 @@ pub fn follow(
     moments: &mut Vec<Moment>,
     mut is_clear: impl FnMut(&Moment) -> bool,
 ) -> f64 {
+    if spin::is_restricted(model, start.holding) {
+        return spin::pursue(model, start, goal, moments, is_clear);
+    }
     let steps = n_steps(model, &start.world_from_object, goal, model.settings.step);
     let line = PoseLine::between(&start.world_from_object, goal);
     let shortest = 1.0 / (steps << MAX_HALVINGS) as f64;
@@ -100,16 +118,31 @@ pub fn follow(
     1.0
 }
 
+/// Turns about contact normals in a step, in radians, of each finger that restricts the object's motion.
+pub type Spins = ArrayVec<f64, { 2 * MAX_FINGERS }>;
+
 /// One step of the object to `pose`, with fingers that follow; the ones that hold are closed there.
 fn step(model: &Model, start: &GraspState, here: &Moment, pose: &Pose) -> Result<Moment, NoStep> {
+    let there = step_joints(model, start.holding, here, pose)?.0;
+    if is_closed(model, &there, start.holding) { Ok(there) } else { Err(NoStep::OutOfReach) }
+}
+
+/// True unless contacts that roll no longer hold the object.
+pub fn is_closed(model: &Model, there: &Moment, holding: u32) -> bool {
+    !model.any_rolls() || model.closure_margin(&there.contacts, holding) >= model.settings.closure_margin
+}
+
+/// One step of the object to `pose`, with fingers of `holding` that follow, and how they turn about their normals.
+pub fn step_joints(model: &Model, holding: u32, here: &Moment, pose: &Pose) -> Result<(Moment, Spins), NoStep> {
     let (from, to) = (Placement::from(&here.world_from_object), Placement::from(pose));
     let line = PoseLine::between(&here.world_from_object, pose);
     let between = |t: f64| Placement::from(&line.at(t));
     let mut joints = HandJoints::new();
     let mut contacts = here.contacts.clone();
+    let mut spins = Spins::new();
     for finger in 0..model.n_fingers() {
         let own = &here.joints[finger];
-        joints.push(if !start.holds(finger) {
+        joints.push(if holding & (1 << finger) == 0 {
             // What is free stays where it is.
             own.clone()
         } else if model.rolls(finger) {
@@ -117,6 +150,9 @@ fn step(model: &Model, start: &GraspState, here: &Moment, pose: &Pose) -> Result
                 RollStep::new(model, finger, &contacts[finger], own, &from, &to).fine(between, HALFWAY_ALLOWED)?;
             if !rolled.keeps_off_edges(model) {
                 return Err(NoStep::OutOfReach);
+            }
+            if model.restricts_motion(finger) {
+                spins.push(rolled.spin);
             }
             contacts[finger] = rolled.contact;
             rolled.joints
@@ -128,10 +164,7 @@ fn step(model: &Model, start: &GraspState, here: &Moment, pose: &Pose) -> Result
             there
         });
     }
-    if model.any_rolls() && model.closure_margin(&contacts, start.holding) < model.settings.closure_margin {
-        return Err(NoStep::OutOfReach);
-    }
-    Ok(Moment { world_from_object: *pose, joints, contacts })
+    Ok((Moment { world_from_object: *pose, joints, contacts }, spins))
 }
 
 /// Most often that a step is halved because fingertips stray from their contacts on the way.

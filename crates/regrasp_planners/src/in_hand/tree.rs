@@ -9,6 +9,7 @@ use super::pool::Pool;
 use super::regrasp::{Tried, regrasp};
 use super::relocate::{Foothold, can_lift, lift_is_within_reach};
 use super::search::Search;
+use super::spin::Freedom;
 use super::state::{GraspState, Moment, Motion, Sequence};
 use super::tally::Reason;
 use super::transfer::transfer;
@@ -193,9 +194,12 @@ fn extend(search: &mut Search, tree: &mut Tree, node: usize, target: &Pose) -> O
         options.push(of_finger);
     }
     let mut table = ClosureTable::new(model, &options);
-    let present = options.iter().map(|of_finger| of_finger[0].follow).fold(1.0, f64::min);
+    let freedom = Freedom::towards(model, &options, &state.world_from_object, target);
+    let here: Choice = options.iter().map(|_| 0).collect();
+    let present = options.iter().map(|of_finger| of_finger[0].follow).fold(1.0, f64::min)
+        * freedom.as_ref().map_or(1.0, |freedom| freedom.share(&here));
     let least = if search.rng.chance(model.settings.aimless_share) { 0.0 } else { present + LEAST_GAIN };
-    let ranked = rank(&mut search.workspace, &options, &mut table, Some(least), COMBINATIONS);
+    let ranked = rank(&mut search.workspace, &options, &mut table, freedom.as_ref(), Some(least), COMBINATIONS);
     search.tally.note_releases(&table, &state.world_from_object);
     if ranked.is_empty() {
         search.tally.add(Reason::NotClosed);
@@ -341,7 +345,7 @@ pub fn land(search: &mut Search, tree: &mut Tree, way: Sequence) -> Option<Seque
         return Some(way);
     }
     let mut table = ClosureTable::new(model, &options);
-    let ranked = rank(&mut search.workspace, &options, &mut table, Some(0.0), LANDINGS);
+    let ranked = rank(&mut search.workspace, &options, &mut table, None, Some(0.0), LANDINGS);
     let lands = |choice: &Choice| (0..options.len()).all(|f| options[f].len() == 1 || choice[f] != 0);
     let mut tried = Tried::default();
     let mut rng = Rng::child(&search.rng, "landing", 0);
@@ -378,7 +382,8 @@ fn sow(search: &mut Search, tree: &mut Tree) -> Option<usize> {
         }
         options.push(candidates);
     }
-    match choose_grasp(search, &pose, &options) {
+    let freedom = Freedom::towards(model, &options, &pose, &tree.aim);
+    match choose_grasp(search, &pose, &options, freedom.as_ref()) {
         Some(state) => {
             let here = Sequence::at(state.clone());
             let node = tree.add_root(state);

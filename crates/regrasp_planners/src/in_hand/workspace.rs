@@ -9,6 +9,8 @@
 mod configuration;
 /// Obstacles near the bodies that move.
 mod nearby;
+/// How far tips may be from where they rest.
+mod reach;
 
 use super::forces::Refusals;
 use super::model::{Carrier, MAX_FINGERS, Model, Pair};
@@ -204,22 +206,22 @@ impl<'a> Workspace<'a> {
         self.set_finger(finger, joints);
     }
 
-    /// True when no pair is too near now.
+    /// True when no pair is too near now, and no tip too far away.
     pub fn is_clear(&mut self, mode: TipMode) -> bool {
         self.work += 1;
         self.align(None);
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
-        self.all_are_clear(None, mode)
+        self.is_within_reach(None) && self.all_are_clear(None, mode)
     }
 
-    /// True when no pair of one finger is too near now.
+    /// True when no pair of one finger is too near now, and its tip not too far away.
     pub fn finger_is_clear(&mut self, finger: usize, mode: TipMode) -> bool {
         self.work += 1;
         self.align(None);
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
-        self.all_are_clear(Some(finger), mode)
+        self.is_within_reach(Some(finger)) && self.all_are_clear(Some(finger), mode)
     }
 
     /// True when one finger is clear of the object, the palm and obstacles now, whatever the other fingers do.
@@ -229,10 +231,11 @@ impl<'a> Workspace<'a> {
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
         let moving = &self.model.fingers[finger];
-        self.in_turn(moving.pairs.len(), &moving.turns, mode, |this, k| {
-            let pair = moving.pairs[k];
-            this.is_between_fingers(pair) || this.pair_is_clear(pair, mode)
-        })
+        self.is_within_reach(Some(finger))
+            && self.in_turn(moving.pairs.len(), &moving.turns, mode, |this, k| {
+                let pair = moving.pairs[k];
+                this.is_between_fingers(pair) || this.pair_is_clear(pair, mode)
+            })
     }
 
     /// True when two fingers with these joints are clear of each other.
@@ -287,7 +290,7 @@ impl<'a> Workspace<'a> {
         self.stale = Stale::Nothing;
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
-        self.all_are_clear(None, TipMode::AllHold)
+        self.is_within_reach(None) && self.all_are_clear(None, TipMode::AllHold)
     }
 
     /// Moves one finger if the step is clear; stays otherwise.
@@ -303,13 +306,14 @@ impl<'a> Workspace<'a> {
         self.work += 1;
         self.bound_motion(moving);
         let model = self.model;
-        if self.all_are_clear(moving, mode) {
+        let is_within_reach = self.is_within_reach(moving);
+        if is_within_reach && self.all_are_clear(moving, mode) {
             std::mem::swap(&mut self.now, &mut self.next);
             return true;
         }
         // Pairs tested before the one that failed have their slack at `next`; it is not known at `now` any more.
         self.forget_slack();
-        if halvings == 0 || !self.end_is_clear(self.blocking_index, mode) {
+        if !is_within_reach || halvings == 0 || !self.end_is_clear(self.blocking_index, mode) {
             return false;
         }
         self.stale = Stale::Everything;
@@ -536,12 +540,15 @@ impl<'a> Workspace<'a> {
     fn trees_apart(&mut self, index: usize, required: f64) -> bool {
         let pair = self.pairs[index];
         let model = self.model;
-        let (mesh, other) = match (&model.bodies[pair.a].tree, &model.bodies[pair.b].tree) {
-            (_, Some(_)) => (pair.b, pair.a),
-            (Some(_), None) => (pair.a, pair.b),
+        let tree_of = |body: usize| match pair.tip_of {
+            Some(_) => model.bodies[body].tree_for_tips.as_ref(),
+            None => model.bodies[body].tree.as_ref(),
+        };
+        let (mesh, other, tree) = match (tree_of(pair.a), tree_of(pair.b)) {
+            (_, Some(tree)) => (pair.b, pair.a, tree),
+            (Some(tree), None) => (pair.a, pair.b, tree),
             (None, None) => return false,
         };
-        let Some(tree) = &model.bodies[mesh].tree else { return false };
         let body = &model.bodies[other];
         let now = self.now.at(model, mesh).inverse_then(self.now.at(model, other));
         let next = self.next.at(model, mesh).inverse_then(self.next.at(model, other));
@@ -550,8 +557,9 @@ impl<'a> Workspace<'a> {
         // Whatever the moment, one of the two ends is at most half of the motion away.
         let needed = required + 0.5 * relative_motion;
         let mut smallest = 0.0;
+        // Outside at one end and apart all along is outside all along.
         if tree.is_apart(&body.shape, &now, needed, &mut smallest)
-            && tree.is_apart(&body.shape, &next, needed, &mut smallest)
+            && tree.is_outside((&body.shape, &body.middle), &next, needed, &mut smallest)
         {
             self.slack[index] = smallest;
             return true;
@@ -574,7 +582,7 @@ impl<'a> Workspace<'a> {
             if gap >= -allowed {
                 continue;
             }
-            let Some(tree) = &object.tree else { return false };
+            let Some(tree) = &object.tree_for_tips else { return false };
             let object_from_tip = at_object.inverse_then(at_tip);
             let normal_in_object = at_object.vector_to_child(&normal);
             let in_tip = object_from_tip.vector_to_child(&-normal_in_object);
@@ -585,7 +593,10 @@ impl<'a> Workspace<'a> {
                 let highest = corners.iter().map(|p| normal_in_object.dot(&p.coords)).fold(f64::NEG_INFINITY, f64::max);
                 lowest - highest >= -allowed
             });
-            if !is_apart {
+            // What it may press into lies below; where it is thicker than that, it must not be inside with all of the rest.
+            let middle = object_from_tip.point(&tip.middle);
+            let is_thick = normal_in_object.dot(&middle.coords) - lowest > allowed;
+            if !is_apart || (is_thick && tree.holds(&middle)) {
                 return false;
             }
         }

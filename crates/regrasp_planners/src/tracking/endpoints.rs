@@ -4,7 +4,8 @@ use super::forces::Forces;
 use super::grasp::TrackingGrasp;
 use super::step::Stepper;
 use crate::failure::{Failure, FailureKind};
-use crate::in_hand::endpoints::{End, Near, given_grasp_at};
+use crate::in_hand::endpoints::{End, Near, friction_in_words, given_grasp_at, refuse_buried_object};
+use crate::in_hand::inside::refuse_hand_inside;
 use crate::in_hand::model::Model;
 use regrasp_geometry::{Shape, TriangleMesh};
 use regrasp_scene::{Gravity, InHandQuery};
@@ -34,7 +35,7 @@ pub fn refuse(model: &Model, gravity: &Gravity) -> Result<(), Failure> {
         && let Some(depth) = dent(mesh, FLAT * object.radius)
     {
         let message = format!("the object \"{}\" is not convex: it has a dent of {:.2} mm", object.name, 1e3 * depth);
-        return Err(impossible(message, "give solid = \"hull\" for its convex hull, or turn it with an in_hand task"));
+        return Err(impossible(message, "give a convex mesh file, or turn it with an in_hand task"));
     }
     if matches!(gravity, Gravity::Any) {
         let message =
@@ -63,6 +64,8 @@ fn dent(mesh: &TriangleMesh, allowed: f64) -> Option<f64> {
 pub fn start(stepper: &Stepper, query: &InHandQuery) -> Result<(TrackingGrasp, Forces), Failure> {
     let model = stepper.model;
     let pose = &query.world_from_object_start;
+    refuse_buried_object(model, End::Start, pose)?;
+    refuse_hand_inside(model, pose)?;
     let state = given_grasp_at(model, End::Start, pose, &query.start_grasp, Near::Rest)?.ok_or_else(|| {
         let message = "tracking begins with a given grasp, and the start has none".to_owned();
         impossible(message, "give [start] grasp = { contacts = { finger = [x, y, z] } }")
@@ -70,20 +73,11 @@ pub fn start(stepper: &Stepper, query: &InHandQuery) -> Result<(TrackingGrasp, F
     let invalid = |message: String, advice: &str| Failure::bare(FailureKind::StartInvalid, message, advice);
     let grasp = TrackingGrasp::of(model, &state)
         .ok_or_else(|| invalid("a fingertip's centre is inside the object at the start".into(), "move it out"))?;
-    for (finger, of_model) in model.fingers.iter().enumerate() {
-        let away = (grasp.tip_in_world(model, finger) - of_model.tip_at_rest).norm();
-        if let Some(reach) = model.scene.reach.filter(|reach| away > *reach) {
-            let name = &model.scene.hand.fingers[finger].name;
-            let message =
-                format!("at the start finger \"{name}\" is {away:.3} m from where it rests, its reach is {reach} m");
-            return Err(invalid(message, "choose another contact or rest posture, or a larger reach"));
-        }
-    }
     let Ok(forces) = stepper.balanced_at_rest(&grasp) else {
         let [least, largest] = stepper.settings.in_hand.forces.map_or([0.0, f64::MAX], |forces| forces.normal_force);
         let message = format!(
-            "at the start no contact forces balance the weight: friction {:.3}, normal forces from {least} N to {largest} N",
-            model.frame.friction
+            "at the start no contact forces balance the weight: friction {}, normal forces from {least} N to {largest} N",
+            friction_in_words(model)
         );
         return Err(invalid(message, "choose other contacts, or allow larger forces"));
     };

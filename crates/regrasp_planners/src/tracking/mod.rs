@@ -32,7 +32,6 @@ pub use settings::{Cones, RollingFinger, TrackingMethod, TrackingSettings};
 use crate::failure::{Cause, Failure, FailureKind, NearestMiss};
 use crate::in_hand::Progress;
 use crate::in_hand::model::Model;
-use crate::in_hand::settings::gravity_of;
 use crate::in_hand::workspace::Workspace;
 use gaiting::Move;
 use grasp::TrackingGrasp;
@@ -61,10 +60,8 @@ pub fn plan_tracking(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Plan, Failure> {
     settings.validate().expect("settings are validated where they are read");
-    let gravity = gravity_of(scene, settings.in_hand.gravity.as_ref())
-        .map_err(|message| Failure::bare(FailureKind::Impossible, message, "state gravity in one of both"))?;
     let model = Model::new(scene, &settings.in_hand);
-    endpoints::refuse(&model, &gravity)?;
+    endpoints::refuse(&model, &scene.gravity())?;
     let forces = model.forces.as_ref().expect("settings without forces do not validate");
     let mut stepper = Stepper { model: &model, settings, forces, workspace: Workspace::new(&model), work: 0 };
     let first = endpoints::start(&stepper, query)?;

@@ -92,12 +92,13 @@ pub fn record(
         motion,
         forces: Some(stepper.forces.promises()),
     };
+    let plan = plan_of(model.scene, query, promises, segments);
     Plan {
         method: settings.method.name().into(),
         seed,
         settings: settings_of(settings),
-        statistics: Statistics { relocations: margins.len() as u64, ..statistics },
-        ..plan_of(model.scene, query, promises, segments)
+        statistics: Statistics { relocations: plan.n_relocations(), ..statistics },
+        ..plan
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::in_hand_methods::scene;
 use regrasp_base::Budget;
 use regrasp_geometry::{Pose, frame, interpolate_pose};
-use regrasp_plan::check::{CheckSettings, check};
+use regrasp_plan::check::{CheckSettings, Level, check};
 use regrasp_plan::plan::{Improvement, Waypoint};
 use regrasp_plan::{Plan, SegmentKind};
 use regrasp_planners::in_hand::{CostWeights, InHandSettings, Method, plan_in_hand, validate_once};
@@ -18,7 +18,8 @@ fn settings(improve_work: u64) -> InHandSettings {
 fn plan(loaded: &LoadedScene, query: &InHandQuery, settings: &InHandSettings, seed: u64) -> Plan {
     let budget = Budget::work(20_000_000);
     let plan = plan_in_hand(&loaded.scene, query, settings, seed, &budget, &|_| {}).unwrap();
-    let report = check(&loaded.scene, Some(query), &plan, &CheckSettings::default());
+    let report =
+        check(&loaded.scene, Some(query), &plan, &CheckSettings { level: Level::Geometry, ..CheckSettings::default() });
     assert!(report.accepted(), "{} seed {seed}: {:#?}", loaded.scene.name, report.violations);
     assert!(report.min_margin.is_none_or(|margin| margin >= plan.promises.kept_margin - 1e-9), "promises hold");
     assert_eq!(validate_once(&loaded.scene, &plan, settings), Ok(()));
@@ -101,7 +102,10 @@ fn time_only_cuts_and_the_plan_says_so() {
     let little = Budget { improve_for: Some(Duration::from_millis(300)), ..Budget::work(20_000_000) };
     let cut = plan_in_hand(&loaded.scene, &query, &settings(u64::MAX), 3, &little, &|_| {}).unwrap();
     assert!(cut.statistics.cut_by_time && improvement(&cut).improved.cost <= improvement(&cut).first.cost);
-    assert!(check(&loaded.scene, Some(&query), &cut, &CheckSettings::default()).accepted());
+    assert!(
+        check(&loaded.scene, Some(&query), &cut, &CheckSettings { level: Level::Geometry, ..CheckSettings::default() })
+            .accepted()
+    );
 }
 
 #[test]

@@ -10,9 +10,9 @@ use regrasp_grasp::{Contact, ContactForce, ContactModel, Grip};
 use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, check};
 use regrasp_plan::plan::{SegmentKind, Waypoint};
-use regrasp_planners::in_hand::{AnyDirection, ForceSettings, GravityInHand, InHandSettings, plan_in_hand};
-use regrasp_planners::{Failure, FailureKind};
-use regrasp_scene::{Gravity, LoadedScene, Scene};
+use regrasp_planners::Failure;
+use regrasp_planners::in_hand::{ForceSettings, InHandSettings, plan_in_hand};
+use regrasp_scene::{Gravity, Limits, LoadedScene, Scene};
 
 const SCENES: [&str; 4] = ["sphere_90x.toml", "box_90x.toml", "soft_pair_roll.toml", "shadow/sphere32_z.toml"];
 
@@ -227,8 +227,8 @@ fn plans_for_any_direction_hold_in_each() {
     let mut rng = Rng::keyed(1, "directions", 0);
     for name in ["sphere_90x.toml", "box_90x.toml"] {
         let loaded = scene(name);
-        let any = InHandSettings { gravity: Some(GravityInHand::Any(AnyDirection::Any)), ..settings() };
-        let plan = plan_with(&loaded, &any, 0).unwrap_or_else(|failure| panic!("{name}: {failure}"));
+        let loaded = LoadedScene { scene: loaded.scene.under_gravity(Gravity::Any), ..loaded };
+        let plan = plan_with(&loaded, &settings(), 0).unwrap_or_else(|failure| panic!("{name}: {failure}"));
         assert_eq!(plan.promises.forces.as_ref().expect("forces were asked for").gravity_in_world, None);
         let object = &loaded.scene.object;
         for (s, segment) in plan.segments.iter().enumerate() {
@@ -290,7 +290,10 @@ fn without_forces_there_is_no_plan_and_the_cause_is_named() {
     assert!(causes.contains("no contact forces balance the weight: "), "{causes}");
     let strong = ForceSettings { normal_force: [2.0, 500.0], ..ForceSettings::default() };
     let (causes, _) = fails(
-        &changed("sphere_90x.toml", |scene| scene.object.mass = 20.0),
+        &changed("sphere_90x.toml", |scene| {
+            scene.object.mass = 20.0;
+            scene.limits.normal_force = 500.0;
+        }),
         &InHandSettings { forces: Some(strong), ..settings() },
     );
     assert!(causes.contains(" would need more than 1 N m"), "{causes}");
@@ -308,20 +311,23 @@ fn without_forces_there_is_no_plan_and_the_cause_is_named() {
 }
 
 #[test]
-fn gravity_may_be_stated_once() {
-    let along_x = GravityInHand::Direction([3.0, 0.0, 0.0]);
-    let asked = InHandSettings { gravity: Some(along_x), ..settings() };
-    let loaded = scene("sphere_90x.toml");
-    let plan = plan_with(&loaded, &asked, 0).expect("a sphere held from the side");
-    let gravity = plan.promises.forces.and_then(|forces| forces.gravity_in_world).expect("a direction");
-    assert!((Vector::from(gravity) - Vector::new(9.80665, 0.0, 0.0)).norm() < 1e-12);
-    let stated = |gravity| changed("sphere_90x.toml", |scene| scene.gravity = Some(gravity));
-    assert!(plan_with(&stated(Gravity::Direction(Vector::x_axis())), &asked, 0).is_ok());
-    let failure = plan_with(&stated(Gravity::default()), &asked, 0).expect_err("two directions");
-    assert_eq!(failure.kind, FailureKind::Impossible);
-    assert_eq!(
-        failure.message,
-        "the scene states gravity along [0.000, 0.000, -1.000] of the world, the settings along [1.000, 0.000, 0.000] of \
-         the world: leave one of them out"
-    );
+fn gravity_is_the_scenes_or_the_worlds_down() {
+    let of = |loaded: &LoadedScene| {
+        let plan = plan_with(loaded, &settings(), 0).expect("a sphere is held from any side");
+        Vector::from(plan.promises.forces.and_then(|forces| forces.gravity_in_world).expect("a direction"))
+    };
+    assert!((of(&scene("sphere_90x.toml")) - Vector::new(0.0, 0.0, -9.80665)).norm() < 1e-12);
+    let sideways = changed("sphere_90x.toml", |scene| scene.gravity = Some(Gravity::Direction(Vector::x_axis())));
+    assert!((of(&sideways) - Vector::new(9.80665, 0.0, 0.0)).norm() < 1e-12);
+}
+
+/// Settings ask for more than the scene allows: the plan keeps to the scene.
+#[test]
+fn plans_keep_to_the_limits_of_the_scene() {
+    let tight = Limits { largest_speed: 0.02, joint_acceleration: 5.0, normal_force: 6.0, ..Limits::default() };
+    let loaded = changed("sphere_90x.toml", |scene| scene.limits = tight);
+    let plan = plan_with(&loaded, &settings(), 0).expect("a slow plan");
+    assert_eq!(plan.promises.motion.largest_speed, 0.02);
+    assert!(plan.promises.motion.joint_accelerations.iter().all(|limit| *limit == 5.0));
+    assert_eq!(plan.promises.forces.expect("forces").normal_force, [2.0, 6.0]);
 }

@@ -5,7 +5,7 @@ use crate::in_hand_methods::scene;
 use regrasp_base::Budget;
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Pose, Shape, Vector};
-use regrasp_plan::check::{CheckSettings, check};
+use regrasp_plan::check::{CheckSettings, Level, check};
 use regrasp_planners::in_hand::roadmap::{
     BuildSettings, GraspRoadmap, QueryMemory, Region, RoadmapPlanner, build_roadmap, seal,
 };
@@ -34,7 +34,12 @@ fn answers_are_accepted_and_the_graph_grows_by_them() {
         let query = planner.random_query(seed);
         let answer = planner.plan(&query, seed, &Budget::work(1_000_000), &mut memory);
         let answer = answer.unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
-        let report = check(&loaded.scene, Some(&query), &answer.plan, &CheckSettings::default());
+        let report = check(
+            &loaded.scene,
+            Some(&query),
+            &answer.plan,
+            &CheckSettings { level: Level::Geometry, ..CheckSettings::default() },
+        );
         assert!(report.accepted(), "seed {seed}: {report:#?}");
         let again =
             planner.plan(&query, seed, &Budget::work(1_000_000), &mut QueryMemory::default()).expect("answered");
@@ -217,7 +222,12 @@ fn later_queries_use_what_earlier_ones_found() {
         let planner = RoadmapPlanner::new(path, roadmap, &loaded.scene).expect("built for this scene");
         let query = planner.random_query(seed);
         let answer = planner.plan(&query, seed, &Budget::work(1_000_000), &mut memory).expect("answered");
-        let report = check(&loaded.scene, Some(&query), &answer.plan, &CheckSettings::default());
+        let report = check(
+            &loaded.scene,
+            Some(&query),
+            &answer.plan,
+            &CheckSettings { level: Level::Geometry, ..CheckSettings::default() },
+        );
         assert!(report.accepted(), "seed {seed}: {report:#?}");
         answer
     };

@@ -12,10 +12,10 @@ use std::sync::Arc;
 /// A shape that reaches at most this many radii from the centre belongs to the tip as a whole.
 const WHOLE_WITHIN: f64 = 2.0;
 /// A phalanx is cut this many radii behind the centre: cutting at the centre would forbid contacts on the side of the ball.
-/// Between the cut and the ball a capsule as wide as the ball stands out by 0.03 radii, which nothing covers.
 const CUT_BEHIND: f64 = 0.5;
-/// What lies ahead of the cut and stands out of the ball by no more than this is left to the ball, in metres.
-const NEGLIGIBLE: f64 = 1e-4;
+/// What lies ahead of the cut and stands out of the ball by no more than this is left to the ball, in metres: less than half
+/// of the clearance that free tips keep, and than what they must keep.
+const NEGLIGIBLE: f64 = 4e-5;
 
 /// The shapes of a tip link whose tip is `own`, a ball or an ellipsoid, all in the frame of `body`, whose joint is the origin.
 ///
@@ -100,13 +100,18 @@ fn shorten_capsule(ends: [Point; 2], cut: &Point, axis: &UnitVector, radius: f64
         return Behind::Unknown;
     }
     let end = ends[near] + (ends[far] - ends[near]) * (ahead[near] / (ahead[near] - ahead[far]));
-    let along = end - ends[near];
+    // Both halves have the ball about the cut, so that together they are the whole.
+    Behind::Part(capsule([ends[near], end], radius), Some(capsule([end, ends[far]], radius)))
+}
+
+/// The capsule between two centres.
+fn capsule([from, to]: [Point; 2], radius: f64) -> PlacedShape {
+    let along = to - from;
     let rotation = UnitQuaternion::rotation_between(&nalgebra::Vector3::z(), &along)
         .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&nalgebra::Vector3::x_axis(), std::f64::consts::PI));
-    let middle = nalgebra::center(&end, &ends[near]);
+    let middle = nalgebra::center(&from, &to);
     let shape = Shape::Capsule { half_length: 0.5 * along.norm(), radius };
-    let part = PlacedShape { parent_from_shape: Pose::from_parts(Translation3::from(middle.coords), rotation), shape };
-    Behind::Part(part, None)
+    PlacedShape { parent_from_shape: Pose::from_parts(Translation3::from(middle.coords), rotation), shape }
 }
 
 /// The hulls of the points on either side of the cut, each with the edges' crossings.
@@ -203,6 +208,34 @@ mod tests {
     }
 
     #[test]
+    fn nothing_of_a_capsule_is_lost_that_is_wider_or_longer_than_the_ball() {
+        let turned = UnitQuaternion::from_axis_angle(&nalgebra::Vector3::y_axis(), std::f64::consts::FRAC_PI_2);
+        let mut rng = regrasp_base::Rng::keyed(2, "split", 0);
+        for (wider, end) in [(1.0, 0.07), (1.2, 0.068), (0.9, 0.075)] {
+            let (middle, half_length, radius) = ((0.01 + end) / 2.0, (end - 0.01) / 2.0, wider * RADIUS);
+            let at = Pose::from_parts(Translation3::new(middle, 0.0, 0.0), turned);
+            let placed = PlacedShape { parent_from_shape: at, shape: Shape::Capsule { half_length, radius } };
+            let center = Point::new(0.07, 0.0, 0.0);
+            let shapes = split(vec![placed], LinkId(3), 1, &ball(&center));
+            let holds = |shape: &PlacedShape, point: &Point| {
+                let own = shape.parent_from_shape.inverse_transform_point(point);
+                match shape.shape {
+                    Shape::Sphere { radius } => own.coords.norm() <= radius + 1e-9,
+                    Shape::Capsule { half_length, radius } => {
+                        (own.coords - Vector3::z() * own.z.clamp(-half_length, half_length)).norm() <= radius + 1e-9
+                    }
+                    _ => panic!("{shape:?}"),
+                }
+            };
+            for _ in 0..2000 {
+                let across = Vector3::new(0.0, rng.normal(), rng.normal()).normalize() * radius;
+                let on_side = Point::new(rng.uniform(0.01, end), across.y, across.z);
+                assert!(shapes.iter().any(|shape| holds(&shape.placed, &on_side)), "{wider} {end} {on_side}");
+            }
+        }
+    }
+
+    #[test]
     fn a_capsule_is_shortened_to_the_cut_and_a_small_tip_is_left_whole() {
         let turned = UnitQuaternion::from_axis_angle(&nalgebra::Vector3::y_axis(), std::f64::consts::FRAC_PI_2);
         let at = |x: f64| Pose::from_parts(Translation3::new(x, 0.0, 0.0), turned);
@@ -210,12 +243,14 @@ mod tests {
             PlacedShape { parent_from_shape: at(0.04), shape: Shape::Capsule { half_length: 0.03, radius: RADIUS } };
         let small = PlacedShape { parent_from_shape: at(0.07), shape: Shape::Sphere { radius: RADIUS } };
         let shapes = split(vec![capsule, small.clone()], LinkId(3), 1, &ball(&Point::new(0.07, 0.0, 0.0)));
-        assert_eq!(shapes.len(), 2);
+        assert_eq!(shapes.len(), 3);
         assert_eq!((shapes[1].is_tip, &shapes[1].placed), (true, &small));
         let Shape::Capsule { half_length, radius } = shapes[0].placed.shape else { panic!("{:?}", shapes[0]) };
         assert!(!shapes[0].is_tip && radius == RADIUS);
         let ends = [-half_length, half_length].map(|z| shapes[0].placed.parent_from_shape * Point::new(0.0, 0.0, z));
         let (low, high) = (ends[0].x.min(ends[1].x), ends[0].x.max(ends[1].x));
         assert!((low - 0.01).abs() < 1e-12 && (high - 0.065).abs() < 1e-12, "{low} {high}");
+        let Shape::Capsule { half_length, radius } = shapes[2].placed.shape else { panic!("{:?}", shapes[2]) };
+        assert!(shapes[2].is_tip && radius == RADIUS && (half_length - 0.0025).abs() < 1e-12);
     }
 }

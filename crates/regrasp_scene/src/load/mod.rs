@@ -9,6 +9,7 @@
 mod contact;
 mod files;
 mod gravity;
+mod limits;
 mod object;
 mod pose;
 mod shape;
@@ -18,6 +19,7 @@ mod units;
 pub use task::{Goal, InHandTask, StartOrientation};
 
 use crate::gravity::Gravity;
+use crate::limits::Limits;
 use crate::query::TaskKind;
 use crate::scene::{InputFile, Scene};
 use files::Files;
@@ -69,10 +71,10 @@ pub fn load_scene(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Inp
     let parts = document.as_ref().and_then(|document| read(Table::root(document), &mut files, &mut found));
     let (notes, diagnostics) = (found.notes, found.diagnostics);
     let parts = diagnostics.into_result(parts)?;
-    let Parts { hand, reach, object, obstacles, gravity, task } =
+    let Parts { hand, reach, object, obstacles, gravity, limits, task } =
         parts.expect("what could not be read has left a diagnostic");
     let name = path.file_stem().map_or_else(String::new, |stem| printable_line(&stem.to_string_lossy()));
-    let scene = Scene { name, hand, reach, object, obstacles, gravity, inputs: files.inputs };
+    let scene = Scene { name, hand, reach, object, obstacles, gravity, limits, inputs: files.inputs };
     Ok(LoadedScene { scene, task, notes })
 }
 
@@ -82,6 +84,7 @@ struct Parts {
     object: crate::object::Object,
     obstacles: Vec<crate::scene::Obstacle>,
     gravity: Option<Gravity>,
+    limits: Limits,
     task: InHandTask,
 }
 
@@ -94,6 +97,7 @@ fn read(mut root: Table, files: &mut Files, found: &mut Found) -> Option<Parts> 
     let hand = hand(&mut root, files, found);
     let (hand, reach) = hand.map_or((None, None), |(hand, reach)| (Some(hand), reach));
     let gravity = gravity::gravity(&mut root, hand.as_ref(), found);
+    let limits = limits::limits(&mut root, found);
     let object = object::object(&mut root, files, found);
     let obstacles = object::obstacles(&mut root, files, found);
     let start = task::start(&mut root, hand.as_ref(), found);
@@ -106,7 +110,7 @@ fn read(mut root: Table, files: &mut Files, found: &mut Found) -> Option<Parts> 
         }
     }
     root.finish(found);
-    Some(Parts { hand: hand?, reach, object: object?, obstacles, gravity, task: task? })
+    Some(Parts { hand: hand?, reach, object: object?, obstacles, gravity, limits, task: task? })
 }
 
 /// `task`. Errors: missing (`S102`), another task (`S105`).

@@ -48,7 +48,7 @@ pub(super) fn object(root: &mut Table, files: &mut Files, found: &mut Found) -> 
     let center = table.optional("center_of_mass");
     let given_center = center.as_ref().map(|entry| entry.numbers::<3>(found).map(Point::from));
     let placed = read.and_then(|read| placed(read, given_mass.as_ref(), &given_center, &table, found));
-    let no_room = placed.as_ref().zip(edge_distance).and_then(|((shape, ..), distance)| no_room(shape, distance));
+    let no_room = placed.as_ref().zip(edge_distance).and_then(|(placed, distance)| no_room(&placed.shape, distance));
     if let Some(room) = no_room {
         let (distance, expected) = (number(edge_distance?), format!("an edge_distance below {room} m"));
         let problem = format!("edge_distance {distance} m leaves no place for a contact");
@@ -60,7 +60,7 @@ pub(super) fn object(root: &mut Table, files: &mut Files, found: &mut Found) -> 
     }
     table.finish(found);
 
-    let (shape, mass, center_of_mass) = placed?;
+    let Placed { shape, hull, mass, center_of_mass } = placed?;
     let (edge_distance, crease_angle) = (edge_distance?, crease_angle?);
     if let Some(center) = &center {
         center_is_inside(&shape, &center_of_mass, center, found)?;
@@ -87,6 +87,7 @@ pub(super) fn object(root: &mut Table, files: &mut Files, found: &mut Found) -> 
     Some(Object {
         name,
         shape,
+        hull,
         radius,
         mesh_body,
         surface,
@@ -160,7 +161,16 @@ fn mass(table: &mut Table, found: &mut Found) -> Option<GivenMass> {
     }
 }
 
-/// Shape in the object frame, mass and centre of mass, where the volume is asked for only if something needs it.
+/// The object in its own frame.
+struct Placed {
+    shape: Shape,
+    hull: Option<Shape>,
+    mass: f64,
+    center_of_mass: Point,
+}
+
+/// Shape in the object frame, mass and centre of mass, where the volume is asked for only if something needs it: that of the
+/// hull where it stands for the inside.
 ///
 /// Errors: the shape has no volume and something needs it (`M210`).
 fn placed(
@@ -169,11 +179,11 @@ fn placed(
     given_center: &Option<Option<Point>>,
     table: &Table,
     found: &mut Found,
-) -> Option<(Shape, f64, Point)> {
+) -> Option<Placed> {
     let needs_solid =
         read.origin == Origin::Center || given_center.is_none() || matches!(mass, Some(GivenMass::Density(_)));
     let solid: Option<Solid> = if needs_solid {
-        match solid_properties(&read.shape) {
+        match solid_properties(read.hull.as_ref().unwrap_or(&read.shape)) {
             Ok(solid) => Some(solid),
             Err(error) => {
                 let diagnostic = table
@@ -192,9 +202,10 @@ fn placed(
         Origin::Center => -solid.as_ref()?.center_of_mass.coords,
         Origin::Point(point) => -point,
     };
-    let shape = match shape::shifted(&read.shape, shift) {
-        Ok(shape) => shape,
-        Err(reason) => {
+    let shifted = |shape| shape::shifted(shape, shift);
+    let (shape, hull) = match (shifted(&read.shape), read.hull.as_ref().map(shifted).transpose()) {
+        (Ok(shape), Ok(hull)) => (shape, hull),
+        (Err(reason), _) | (_, Err(reason)) => {
             let diagnostic = table.error("M205", found, format!("cannot be moved to its origin: {reason}"));
             found.diagnostics.push(diagnostic);
             return None;
@@ -219,7 +230,7 @@ fn placed(
             mass
         }
     };
-    Some((shape, mass, center))
+    Some(Placed { shape, hull, mass, center_of_mass: center })
 }
 
 /// Reports a given centre of mass outside the object's bounds (`S107`): a mistake of frame or unit.
@@ -271,7 +282,9 @@ fn obstacle(entry: &Entry, files: &mut Files, found: &mut Found) -> Option<Obsta
     if !files.is_in_time(found) {
         return None;
     }
-    let mesh_body = MeshBody::of(&read.shape);
-    let placed = PlacedShape { parent_from_shape: pose, shape: read.shape };
+    // Nothing touches an obstacle on purpose: its hull is all there is of it.
+    let shape = read.hull.unwrap_or(read.shape);
+    let mesh_body = MeshBody::of(&shape);
+    let placed = PlacedShape { parent_from_shape: pose, shape };
     Some(Obstacle { name: name.to_owned(), placed, mesh_body })
 }

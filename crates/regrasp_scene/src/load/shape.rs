@@ -38,6 +38,8 @@ pub(super) enum Origin {
 pub(super) struct ReadShape {
     /// The shape, in the frame of the file.
     pub shape: Shape,
+    /// Its convex hull, where that stands for its inside.
+    pub hull: Option<Shape>,
     /// Where its frame is to lie.
     pub origin: Origin,
 }
@@ -63,7 +65,7 @@ pub(super) fn shape(table: &mut Table, files: &mut Files, found: &mut Found) -> 
     let shape = primitive(kind, &mut inside, found);
     inside.finish(found);
     let shape = shape?;
-    has_likely_size(&shape, kind, found).then_some(ReadShape { shape, origin: Origin::File })
+    has_likely_size(&shape, kind, found).then_some(ReadShape { shape, hull: None, origin: Origin::File })
 }
 
 fn primitive(kind: &Entry, table: &mut Table, found: &mut Found) -> Option<Shape> {
@@ -156,10 +158,10 @@ fn mesh(kind: &Entry, files: &mut Files, found: &mut Found) -> Option<ReadShape>
         }
     };
     note_statistics(&scaled, kind, found);
-    let shape = match solid {
-        Solid::Mesh => Shape::Mesh(Arc::new(scaled)),
+    let hull = match solid {
+        Solid::Mesh => None,
         Solid::Hull => match ConvexHull::new(scaled.vertices()) {
-            Ok(hull) => Shape::Convex(Arc::new(hull)),
+            Ok(hull) => Some(Shape::Convex(Arc::new(hull))),
             Err(error) => {
                 let diagnostic = kind.error("M206", found, error.to_string()).fix("give a mesh that has an inside");
                 found.diagnostics.push(diagnostic);
@@ -167,8 +169,9 @@ fn mesh(kind: &Entry, files: &mut Files, found: &mut Found) -> Option<ReadShape>
             }
         },
     };
+    let shape = Shape::Mesh(Arc::new(scaled));
     let is_good = has_likely_size(&shape, kind, found) && has_likely_place(&shape, origin, kind, found);
-    is_good.then_some(ReadShape { shape, origin })
+    is_good.then_some(ReadShape { shape, hull, origin })
 }
 
 /// Reports a mesh that is farther from its own frame than any object is large (`M204`): the object would turn about a

@@ -2,14 +2,12 @@
 
 use super::task::{Goal, InHandTask, StartOrientation};
 use crate::object::Object;
-use crate::query::GraspRequest;
+use crate::query::{GRASP_TOLERANCE, GraspRequest};
 use regrasp_base::diagnostic::number;
 use regrasp_base::toml_table::{Found, Table};
 use regrasp_geometry::{Point, Pose};
 use regrasp_robot::Hand;
 
-/// Given contacts may be off the surface by this much, in metres: the contact tolerance of plans (issue 2).
-const CONTACT_TOLERANCE: f64 = 5e-4;
 /// Hand and object may differ in size by this factor (reliability R15).
 const MAX_SIZE_RATIO: f64 = 20.0;
 
@@ -71,7 +69,7 @@ pub(super) fn check_contacts(hand: &Hand, object: &Object, task: &InHandTask, ro
         let Some(entry) = root.optional(key) else { continue };
         for (finger, point) in hand.fingers.iter().zip(points) {
             let distance = object.surface.signed_distance(point);
-            if distance.abs() <= CONTACT_TOLERANCE {
+            if distance.abs() <= GRASP_TOLERANCE {
                 continue;
             }
             let side = if distance > 0.0 { "outside" } else { "inside" };
@@ -83,7 +81,7 @@ pub(super) fn check_contacts(hand: &Hand, object: &Object, task: &InHandTask, ro
             );
             let diagnostic = entry
                 .error("P304", found, problem)
-                .expected(format!("a point of the surface within {} mm", CONTACT_TOLERANCE * 1000.0))
+                .expected(format!("a point of the surface within {} mm", GRASP_TOLERANCE * 1000.0))
                 .fix(format!("the nearest point is [{:.6}, {:.6}, {:.6}]", nearest.x, nearest.y, nearest.z));
             found.diagnostics.push(diagnostic);
         }

@@ -169,6 +169,12 @@ export class Motion {
     return starts.reverse().find((t) => t < time - 1e-6) ?? this.start;
   }
 
+  /** How often a finger lands on a contact. One that lifts off and stays free is no relocation. */
+  get nRelocations(): number {
+    const lands = (s: Stretch) => s.kind === "regrasp" && holds(this.waypoints[s.last]?.contacts[s.moving]);
+    return this.stretches.filter(lands).length;
+  }
+
   private holdsOf(finger: number): Hold[] {
     const found: Hold[] = [];
     let open: Hold | null = null;

@@ -40,10 +40,17 @@ use crate::story::Story;
 /// A chart, and the name of its file without extension.
 pub type Chart = (&'static str, String);
 
+/// Names of all charts that there are.
+pub const NAMES: [&str; 9] =
+    ["gait", "margin", "clearance", "joints", "forces", "orientation", "orientation_path", "traces", "causes"];
+
 /// Every chart that the story has data for.
 pub fn all(story: &Story) -> Vec<Chart> {
     let mut charts = Vec::new();
-    let mut add = |name: &'static str, chart: Option<String>| charts.extend(chart.map(|chart| (name, chart)));
+    let mut add = |name: &'static str, chart: Option<String>| {
+        debug_assert!(NAMES.contains(&name), "{name} is not in the list of names");
+        charts.extend(chart.map(|chart| (name, chart)));
+    };
     if let Some(plan) = &story.plan {
         add("gait", Some(gait(plan)));
         if let Some(judged) = &story.judged {
@@ -76,6 +83,6 @@ fn title(plan: &regrasp_plan::Plan) -> String {
     format!(
         "{angle:.0}\u{b0} in {} and {}",
         counted(plan.statistics.transfers, "transfer"),
-        counted(plan.statistics.relocations, "relocation")
+        counted(plan.n_relocations(), "relocation")
     )
 }

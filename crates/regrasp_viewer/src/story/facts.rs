@@ -11,6 +11,7 @@ pub(super) fn plan_facts(plan: &Plan, report: &Report, judged: &Judged) -> Vec<(
     let mut facts: Vec<(String, String)> = Vec::new();
     let mut fact = |label: &str, value: String| facts.push((label.to_owned(), value));
     let verdict = match report.n_violations {
+        0 if !report.accepted() => "REJECTED: not judged whole".to_owned(),
         0 => format!("ACCEPTED: {} waypoints, {} distances", report.n_waypoints, report.n_distances),
         1 => "REJECTED: 1 violation".to_owned(),
         n => format!("REJECTED: {n} violations"),
@@ -28,8 +29,8 @@ pub(super) fn plan_facts(plan: &Plan, report: &Report, judged: &Judged) -> Vec<(
             fact("Asked", format!("{angle:.0}\u{b0}, within {within:.1}\u{b0}, by tracking"));
             let (tried, nodes) = (counts.samples, counts.nodes);
             fact("Sub-goals", format!("{} on the path, {tried} tried, {nodes} cells seen", counts.transfers));
-            if counts.relocations > 0 {
-                fact("Relocations", counts.relocations.to_string());
+            if plan.n_relocations() > 0 {
+                fact("Relocations", plan.n_relocations().to_string());
             }
             for (cause, count) in &counts.failures {
                 fact("Steps that failed", format!("{count}, {cause}"));
@@ -37,7 +38,7 @@ pub(super) fn plan_facts(plan: &Plan, report: &Report, judged: &Judged) -> Vec<(
         }
         None => {
             fact("Asked", format!("{angle:.0}\u{b0}, {distance:.1} mm{way}"));
-            fact("Relocations", counts.relocations.to_string());
+            fact("Relocations", plan.n_relocations().to_string());
             let free = counts.transfers_with_free_fingers;
             let free = if free == 0 { String::new() } else { format!(", {free} with a free finger") };
             fact("Transfers", format!("{}{free}", counts.transfers));

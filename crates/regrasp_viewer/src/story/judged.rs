@@ -19,6 +19,7 @@ pub(super) fn judged(scene: &Scene, plan: &Plan, report: &Report) -> Judged {
     if report.n_violations > violations.len() {
         violations.push(format!("and {} more", report.n_violations - violations.len()));
     }
+    violations.extend(report.left_out.iter().map(|what| format!("not judged: {what}")));
     let margin = match found.margin.is_empty() {
         true => vec![None; n_waypoints],
         // What slides closes nothing: there the checker judges forces and not closure.

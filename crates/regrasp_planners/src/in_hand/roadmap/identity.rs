@@ -20,8 +20,8 @@ pub struct Identity {
     pub fingers: Vec<String>,
     /// Name of the robot that the hand is of.
     pub hand_name: String,
-    /// The hand as it stands in the world: chains, limits, couplings, tips, shapes, pairs that may touch. What its tips
-    /// transmit is apart.
+    /// The hand as it stands in the world: chains, limits, couplings, tips, how far these may reach, shapes, pairs that may
+    /// touch. What its tips transmit is apart.
     pub hand: Digest,
     /// Contact model of every fingertip.
     pub contacts: Vec<ContactModel>,
@@ -46,7 +46,7 @@ impl Identity {
         Identity {
             fingers: scene.hand.fingers.iter().map(|finger| finger.name.clone()).collect(),
             hand_name: scene.hand.robot.name.clone(),
-            hand: hand(&scene.hand),
+            hand: hand(&scene.hand, scene.reach),
             contacts: scene.hand.fingers.iter().map(|finger| finger.tip.contact).collect(),
             object_name: scene.object.name.clone(),
             object: object(&scene.object),
@@ -56,7 +56,8 @@ impl Identity {
     }
 }
 
-fn hand(hand: &Hand) -> Digest {
+/// `reach` is what the scene allows the tips; without one the digest is that of the hand alone.
+fn hand(hand: &Hand, reach: Option<f64>) -> Digest {
     let mut feed = Feed::default();
     feed.count(hand.fingers.len());
     for finger in &hand.fingers {
@@ -117,12 +118,16 @@ fn hand(hand: &Hand) -> Digest {
         feed.count(a.0);
         feed.count(b.0);
     }
+    feed.numbers(reach);
     feed.digest()
 }
 
 fn object(object: &Object) -> Digest {
     let mut feed = Feed::default();
     feed.shape(&object.shape);
+    if let Some(hull) = &object.hull {
+        feed.shape(hull);
+    }
     feed.point(&object.center_of_mass);
     feed.numbers([object.edge_distance, object.crease_angle]);
     feed.digest()

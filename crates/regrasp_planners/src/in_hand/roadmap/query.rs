@@ -1,10 +1,9 @@
 //! Answering queries (paper 004, section IV-D): start and goal are linked to the graph, the graph is searched, the path is
 //! smoothed.
 
-use super::super::endpoints::{End, given_grasp, object_blocked_by, refuse_buried_object};
+use super::super::endpoints::{End, given_grasp, object_blocked_by, refuse_buried_object, refuse_object_out_of_reach};
 use super::super::model::Model;
 use super::super::record::Recorder;
-use super::super::refuse_two_gravities;
 use super::super::search::{Search, Stop};
 use super::super::settings::InHandSettings;
 use super::super::shorten::{Arrival, transfer_regrasp};
@@ -115,9 +114,10 @@ impl<'a> RoadmapPlanner<'a> {
         let model = &self.model;
         let poses = (query.world_from_object_start, query.world_from_object_goal);
         refuse_way_poses(query)?;
-        refuse_two_gravities(model.scene, &model.settings)?;
-        refuse_buried_object(model, End::Start, &poses.0)?;
-        refuse_buried_object(model, End::Goal, &poses.1)?;
+        for (end, pose) in [(End::Start, &poses.0), (End::Goal, &poses.1)] {
+            refuse_buried_object(model, end, pose)?;
+            refuse_object_out_of_reach(model, end, pose)?;
+        }
         let mut rng = Rng::keyed(seed, "given_grasps", 0);
         let start_grasp = given_grasp(model, End::Start, &poses.0, &query.start_grasp, &mut rng)?;
         let goal_grasp = given_grasp(model, End::Goal, &poses.1, &query.goal_grasp, &mut rng)?;

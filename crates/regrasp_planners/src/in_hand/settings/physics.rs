@@ -1,7 +1,7 @@
 //! Settings of forces, gravity and time.
 
-use regrasp_geometry::Vector;
-use regrasp_scene::{Gravity, Scene};
+use super::InHandSettings;
+use regrasp_scene::Limits;
 use serde::{Deserialize, Serialize};
 
 /// Contact forces along a plan.
@@ -84,73 +84,6 @@ impl Default for FirstTry {
 /// Largest force of a finger that makes sense, in newtons.
 const MAX_FORCE: f64 = 1e4;
 
-/// Gravity as seen from the hand: a direction of any length but zero in the frame of its base, or `"any"`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
-pub enum GravityInHand {
-    /// Downwards.
-    Direction([f64; 3]),
-    /// Whichever.
-    Any(AnyDirection),
-}
-
-/// The word `"any"`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum AnyDirection {
-    /// The word.
-    #[serde(rename = "any")]
-    Any,
-}
-
-impl GravityInHand {
-    pub(super) fn validate(&self) -> Result<(), String> {
-        match self {
-            GravityInHand::Direction(down)
-                if !(Vector::from(*down).norm() > 1e-9 && down.iter().all(|x| x.is_finite())) =>
-            {
-                Err(format!("gravity is {down:?}; it must be a direction in the hand's frame, or \"any\""))
-            }
-            _ => Ok(()),
-        }
-    }
-
-    fn of(&self, scene: &Scene) -> Gravity {
-        match self {
-            GravityInHand::Direction(down) => Gravity::in_hand(&scene.hand, &Vector::from(*down)).unwrap_or_default(),
-            GravityInHand::Any(_) => Gravity::Any,
-        }
-    }
-}
-
-/// Gravity that is planned with: the scene's, else that of the settings, else along the world's -Z.
-///
-/// Errors: the scene states one and the settings another.
-pub fn gravity_of(scene: &Scene, stated: Option<&GravityInHand>) -> Result<Gravity, String> {
-    let stated = stated.map(|gravity| gravity.of(scene));
-    match (scene.gravity, stated) {
-        (Some(scenes), Some(ours)) if !are_same(&scenes, &ours) => Err(format!(
-            "the scene states gravity {}, the settings {}: leave one of them out",
-            in_words(&scenes),
-            in_words(&ours)
-        )),
-        (scenes, ours) => Ok(scenes.or(ours).unwrap_or_default()),
-    }
-}
-
-fn are_same(a: &Gravity, b: &Gravity) -> bool {
-    match (a, b) {
-        (Gravity::Direction(a), Gravity::Direction(b)) => (a.into_inner() - b.into_inner()).norm() < 1e-9,
-        (a, b) => a == b,
-    }
-}
-
-fn in_words(gravity: &Gravity) -> String {
-    match gravity {
-        Gravity::Direction(down) => format!("along [{:.3}, {:.3}, {:.3}] of the world", down.x, down.y, down.z),
-        Gravity::Any => "in any direction".into(),
-    }
-}
-
 /// How fast plans are carried out. Plans are quasi-static: forces balance the weight, not accelerations.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -194,6 +127,25 @@ impl SpeedSettings {
     }
 }
 
+impl InHandSettings {
+    /// The same within the limits of a scene, which no plan may exceed.
+    #[must_use]
+    pub fn within(&self, limits: &Limits) -> Self {
+        let mut within = self.clone();
+        let speed = &mut within.speed;
+        speed.largest_speed = speed.largest_speed.min(limits.largest_speed);
+        speed.joint_velocity = speed.joint_velocity.min(limits.joint_velocity);
+        speed.joint_acceleration = speed.joint_acceleration.min(limits.joint_acceleration);
+        if let Some(forces) = &mut within.forces {
+            forces.normal_force = forces.normal_force.map(|force| force.min(limits.normal_force));
+            forces.squeeze = forces.squeeze.min(limits.normal_force);
+        }
+        within.friction_margin =
+            limits.friction_margin.map_or(self.friction_margin, |least| self.friction_margin.max(least));
+        within
+    }
+}
+
 /// Slowest and fastest that a plan may be carried out: times stay numbers that make sense.
 const LEAST_SPEED: f64 = 1e-6;
 /// See there.
@@ -202,6 +154,7 @@ const MAX_SPEED: f64 = 1e6;
 #[cfg(test)]
 mod tests {
     use super::super::InHandSettings;
+    use regrasp_scene::Limits;
 
     #[test]
     fn bad_settings_are_told() {
@@ -218,23 +171,32 @@ mod tests {
             ),
             (r#"{"forces": {"torque_share": 1.5}}"#, "forces.torque_share is 1.5; it must be above 0 and at most 1"),
             (r#"{"forces": {"squeeze_weight": 0}}"#, "forces.squeeze_weight is 0; it must be above 0 and at most 1000"),
-            (
-                r#"{"gravity": [0, 0, 0]}"#,
-                "gravity is [0.0, 0.0, 0.0]; it must be a direction in the hand's frame, or \"any\"",
-            ),
             (r#"{"speed": {"largest_speed": 0}}"#, "speed.largest_speed is 0; it must be between 0.000001 and 1000000"),
             (r#"{"speed": {"ramp": -1}}"#, "speed.ramp is -1; it must be between 0 and 60 seconds"),
         ] {
             assert_eq!(read(text).unwrap().validate(), Err(message.into()), "{text}");
         }
-        for text in [r#"{"gravity": "down"}"#, r#"{"gravity": [1, 2]}"#, r#"{"forces": {"fmax": 3}}"#] {
+        // Gravity belongs to the scene: what is judged by the scene's must not be planned under another.
+        for text in [r#"{"gravity": "any"}"#, r#"{"forces": {"fmax": 3}}"#] {
             assert!(read(text).is_err(), "{text}");
         }
-        for gravity in [r#""any""#, "[0.0,1.0,0.0]"] {
-            let settings = read(&format!(r#"{{"gravity": {gravity}, "forces": null}}"#)).unwrap();
-            assert_eq!(settings.validate(), Ok(()));
-            assert_eq!(serde_json::to_string(&settings.gravity).unwrap(), gravity);
-            assert_eq!(settings.forces, None);
-        }
+        assert_eq!(read(r#"{"forces": null}"#).unwrap().forces, None);
+    }
+
+    #[test]
+    fn settings_are_bounded_by_the_limits_of_the_scene() {
+        let settings = InHandSettings::default();
+        assert_eq!(settings.within(&Limits::default()), settings);
+        let tight = Limits {
+            largest_speed: 0.01,
+            joint_velocity: 0.5,
+            joint_acceleration: 3.0,
+            normal_force: 3.0,
+            friction_margin: Some(2.0),
+        };
+        let within = settings.within(&tight);
+        let (speed, forces) = (within.speed, within.forces.unwrap());
+        assert_eq!((speed.largest_speed, speed.joint_velocity, speed.joint_acceleration), (0.01, 0.5, 3.0));
+        assert_eq!((forces.normal_force, forces.squeeze, within.friction_margin), ([2.0, 3.0], 3.0, 2.0));
     }
 }

@@ -13,7 +13,7 @@ mod reach_map;
 mod three_r;
 
 use super::body_frame::BodyFrame;
-use super::chain::Chain;
+use super::chain::{Chain, JointLine, Motion};
 use arrayvec::ArrayVec;
 use numeric::NumericIk;
 use regrasp_base::Rng;
@@ -64,6 +64,17 @@ pub struct Asked {
     pub error: Vector,
     /// That point as seen from the tip's centre, in metres.
     pub arm: Vector,
+    /// A turn of the last body, where one is asked for too.
+    pub turn: Option<AskedTurn>,
+}
+
+/// A turn of the last body about an axis, in the base frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AskedTurn {
+    /// The axis, a unit vector.
+    pub axis: Vector,
+    /// Angle that is still to go, in radians.
+    pub left: f64,
 }
 
 /// Inverse kinematics of one finger, prepared.
@@ -188,6 +199,13 @@ impl FingerIk {
         numeric::follow(&self.chain, &self.center_in_body, start, settings, asked)
     }
 
+    /// How fast the last body turns about `axis` for each velocity of the point at `arm` from the tip's centre: a vector in
+    /// the base frame, in radians per metre. Of the joint velocities that move the point so, the least count. None near a
+    /// singularity.
+    pub fn turn_per_motion(&self, coordinates: &[f64], arm: &Vector, axis: &Vector) -> Option<Vector> {
+        numeric::turn_per_motion(&self.chain, &self.center_in_body, coordinates, arm, axis)
+    }
+
     /// The tip's centre, in the frame of the last body.
     pub fn center_in_body(&self) -> &Point {
         &self.center_in_body
@@ -215,6 +233,22 @@ impl FingerIk {
     #[inline]
     pub fn tip(&self, coordinates: &[f64]) -> Point {
         self.chain.last_frame(coordinates).point(&self.center_in_body)
+    }
+
+    /// Columns of the Jacobian of the tip's centre, one per coordinate, in the base frame.
+    pub fn tip_jacobian(&self, coordinates: &[f64]) -> ArrayVec<Vector, MAX_COORDINATES> {
+        let mut lines: ArrayVec<JointLine, { 2 * MAX_COORDINATES }> = ArrayVec::new();
+        let tip = self.chain.joint_lines(coordinates, &mut lines).point(&self.center_in_body).coords;
+        let mut columns: ArrayVec<Vector, MAX_COORDINATES> =
+            (0..self.chain.n_coordinates()).map(|_| Vector::zeros()).collect();
+        for (joint, line) in self.chain.joints.iter().zip(&lines) {
+            let column = match joint.motion {
+                Motion::Turn => line.axis.cross(&(tip - line.origin)),
+                Motion::Slide => line.axis,
+            };
+            columns[joint.coordinate] += joint.multiplier * column;
+        }
+        columns
     }
 }
 

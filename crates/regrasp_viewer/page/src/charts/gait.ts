@@ -15,7 +15,7 @@ const TOP = 4;
 export function gaitChart(story: Story, motion: Motion): ChartSpec {
   const fingers = story.scene.fingers;
   const bottom = TOP + ROW * fingers.length;
-  const relocations = motion.stretches.filter((s) => s.kind === "regrasp").length;
+  const relocations = motion.nRelocations;
   const mostMoving = motion.stretches.some((s) => s.allMoving.length > 1) ? "some move" : "one moves";
   return {
     id: "gait",

@@ -38,11 +38,12 @@ export function figures(story: Story, motion: Motion, seek: (time: number) => vo
     link.addEventListener("click", () => seek(time));
     return link;
   };
-  const relocations = motion.stretches.filter((s) => s.kind === "regrasp").length;
+  const relocations = motion.nRelocations;
+  const transfers = motion.stretches.filter((s) => s.kind === "transfer").length;
   if (story.plan.promises.tracking) {
-    const { transfers, samples, nodes } = story.plan.statistics;
-    put("Sub-goals on the path", String(transfers), "", `${samples} tried, ${nodes} cells seen${relocations ? `, ${relocations} relocations` : ""}`);
-  } else put("Relocations", String(relocations), "", `${motion.stretches.length - relocations} transfers`);
+    const { transfers: onPath, samples, nodes } = story.plan.statistics;
+    put("Sub-goals on the path", String(onPath), "", `${samples} tried, ${nodes} cells seen${relocations ? `, ${relocations} relocations` : ""}`);
+  } else put("Relocations", String(relocations), "", `${transfers} transfers`);
   put("Duration", (motion.end - motion.start).toFixed(1), "s", `${motion.waypoints.length} waypoints`);
   if (story.judged) {
     const { margin, clearance, required_margin, pair, pairs } = story.judged;

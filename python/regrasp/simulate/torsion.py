@@ -1,0 +1,153 @@
+"""Torsional friction of hard fingertips: what it does to the object along a plan, and the forces that make up for it.
+
+A plan for point contacts counts on no moment about a contact's normal. Real fingertips touch with a small patch: a tip that
+spins against the object drags it along with a moment of up to the torsional friction times the normal force. The direction of
+the spin is known from the plan, so the moment is too, and the fingers can balance it in advance (feed-forward of friction:
+Armstrong-Helouvry, Dupont, Canudas de Wit 1994, section 4).
+
+The moment of a contact follows the spin by Dahl's model: from rest it grows with the angle spun and saturates. It stays while
+nothing spins, and is zero at landing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._mujoco import mujoco
+from .model import Rig, normals_in_world
+from .reference import Array, held_at_waypoints, rotation_matrices, waypoints_of
+
+#: Angle of spin at which the moment of a contact is full, in radians. By hand: about as much as a fingertip's joints give.
+BREAKAWAY = 0.01
+#: Share of its normal force that a contact has left for moments at least, however large its tangential force. By hand.
+LEAST_ROOM = 0.3
+
+
+def spins(rig: Rig) -> Array:
+    """Turn of each fingertip over the object about the contact's outward normal, from the waypoint before to each one, in
+    radians; zero where the finger does not hold at both. Shape (n_waypoints, n_fingers)."""
+    points = waypoints_of(rig.plan)
+    held = held_at_waypoints(rig.plan)
+    xyzw = np.array([point["world_from_object"]["quat_xyzw"] for point in points])
+    world_from_object = rotation_matrices(xyzw[:, [3, 0, 1, 2]])
+    normals = np.einsum("kij,kfi->kfj", world_from_object, normals_in_world(rig.plan))
+    out = np.zeros((len(points), len(rig.fingers)))
+    before = None
+    data = mujoco.MjData(rig.model)
+    for k in range(len(points)):
+        mujoco.mj_resetDataKeyframe(rig.model, data, k)
+        mujoco.mj_kinematics(rig.model, data)
+        tips = np.array([data.xmat[finger.body].reshape(3, 3) for finger in rig.fingers])
+        over = np.einsum("ji,fjl->fil", world_from_object[k], tips)
+        if before is not None:
+            turns = np.einsum("fij,flj->fil", over, before)
+            # Rotation vectors, for the small turns of a step.
+            vectors = 0.5 * np.stack(
+                (turns[:, 2, 1] - turns[:, 1, 2], turns[:, 0, 2] - turns[:, 2, 0], turns[:, 1, 0] - turns[:, 0, 1]), axis=1
+            )
+            middle = normals[k] + normals[k - 1]
+            length = np.linalg.norm(middle, axis=1)
+            about = np.einsum("fi,fi->f", vectors, middle) / np.maximum(length, 1e-9)
+            out[k] = np.where(held[k] & held[k - 1], about, 0.0)
+        before = over
+    return out
+
+
+def saturations(spun: Array, held: NDArray[np.bool_]) -> Array:
+    """Share of its full moment that each contact has reached, with the sign of the spin, at every waypoint: Dahl's model.
+    Both arguments have the shape (n_waypoints, n_fingers)."""
+    share = np.zeros(spun.shape)
+    for k in range(1, len(spun)):
+        turn = spun[k] / BREAKAWAY
+        to = np.sign(turn)
+        share[k] = np.where(held[k], to + (share[k - 1] - to) * np.exp(-np.abs(turn)), 0.0)
+        share[k] = np.where(held[k] & (turn == 0.0), share[k - 1], share[k])
+    return share
+
+
+@dataclass(frozen=True)
+class Spinning:
+    """What spinning does at every contact, at every waypoint."""
+
+    moments: Array
+    """On the object, about the contact's outward normal, in newton metres. Shape (n_waypoints, n_fingers)."""
+    forces: Array
+    """Added to the planned contact forces, they keep the object in balance; in the world. Shape (n_waypoints, n_fingers, 3)."""
+    slips: Array
+    """How far the tip has slid over the object since it landed, in the world. Shape (n_waypoints, n_fingers, 3)."""
+
+
+def friction_of(rig: Rig) -> tuple[Array, Array]:
+    """Friction and torsional friction (in metres) of every fingertip on the object. The second is zero where the plan counts on
+    it, for soft fingertips, and where a tip has none."""
+    model = rig.model
+    out = np.zeros((2, len(rig.fingers)))
+    for p in range(model.npair):
+        geoms = {int(model.pair_geom1[p]), int(model.pair_geom2[p])}
+        if rig.object_geom in geoms and model.pair_dim[p] == 4:
+            for f, finger in enumerate(rig.fingers):
+                if geoms & finger.touching:
+                    out[:, f] = np.maximum(out[:, f], model.pair_friction[p, [0, 2]])
+    for f in range(len(rig.fingers)):
+        if any(point["contacts"][f].get("torsion") is not None for point in waypoints_of(rig.plan)):
+            out[1, f] = 0.0
+    return out[0], out[1]
+
+
+def spinning(rig: Rig, contacts: Array, told: float | None = None) -> Spinning:
+    """Moments and slip of fingertips that spin as planned, with the planned contact forces at ``contacts`` in the world.
+
+    A contact slides when tangential force f and moment m reach the ellipsoid (f / friction)^2 + (m / torsion)^2 = n^2 of the
+    normal force n. It then slides along the ellipsoid's normal there (Howe, Cutkosky 1996): where it spins it also creeps
+    along f. ``told`` is torsional friction in place of the model's.
+    """
+    friction, torsion = friction_of(rig)
+    if told is not None:
+        torsion = np.where(torsion > 0.0, told, 0.0)
+    points = waypoints_of(rig.plan)
+    normals = normals_in_world(rig.plan)
+    held = held_at_waypoints(rig.plan)
+    xyzw = np.array([point["world_from_object"]["quat_xyzw"] for point in points])
+    turns = rotation_matrices(xyzw[:, [3, 0, 1, 2]])
+    planned = np.array([[contact.get("force_in_object") or (0.0,) * 3 for contact in point["contacts"]] for point in points])
+    planned = np.einsum("kij,kfj->kfi", turns, planned)
+    push = -np.einsum("kfi,kfi->kf", planned, normals)
+    spun = spins(rig)
+    share = saturations(spun, held)
+    slippery = 1.0 / np.maximum(friction, 1e-9)
+
+    def room(forces: Array) -> tuple[Array, Array]:
+        """Tangential forces, and what they leave of the normal forces for moments."""
+        across = forces - np.einsum("kfi,kfi->kf", forces, normals)[:, :, None] * normals
+        taken = np.linalg.norm(across, axis=2) * slippery
+        return across, np.sqrt(np.maximum(push**2 - taken**2, (LEAST_ROOM * push) ** 2))
+
+    moments = share * torsion * room(planned)[1]
+    added = np.zeros(planned.shape)
+    center = np.array(rig.model.body_ipos[rig.object_body])
+    for k, point in enumerate(points):
+        arms = contacts[k][held[k]] - (np.array(point["world_from_object"]["position"]) + turns[k] @ center)
+        torque = -(moments[k][:, None] * normals[k]).sum(axis=0)
+        added[k][held[k]] = least_forces(arms, np.zeros(3), torque)
+    across, left = room(planned + added)
+    rate = torsion * slippery**2 / np.maximum(left, 1e-9)
+    step = (np.abs(spun) * share**2 * rate)[:, :, None] * across
+    slips = np.zeros(step.shape)
+    for k in range(1, len(points)):
+        slips[k] = np.where(held[k][:, None], slips[k - 1] + step[k], 0.0)
+    return Spinning(moments, added, slips)
+
+
+def least_forces(arms: Array, force: Array, torque: Array) -> Array:
+    """Least forces at ``arms`` from the centre of mass that sum up to ``force``, and to ``torque`` about it."""
+    grasp = np.zeros((6, 3 * len(arms)))
+    for f, (x, y, z) in enumerate(arms):
+        grasp[:3, 3 * f : 3 * f + 3] = np.eye(3)
+        grasp[3:, 3 * f : 3 * f + 3] = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
+    wrench = np.concatenate((force, torque))
+    # Torques in units of a finger's width, so that both halves count alike.
+    scale = np.repeat((1.0, 30.0), 3)
+    return (np.linalg.pinv(grasp * scale[:, None]) @ (wrench * scale)).reshape(-1, 3)
