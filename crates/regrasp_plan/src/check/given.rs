@@ -2,17 +2,17 @@
 //! touch, by no more than `GRASP_TOLERANCE`; one that touches as it is stays.
 
 use crate::check::model::{FingerModel, Model};
-use crate::check::surface;
+use crate::check::surface::SortedShape;
 use crate::check::tip::TipSurface;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{Plan, Waypoint};
-use regrasp_geometry::{Pose, Shape, Vector};
+use regrasp_geometry::{Pose, Vector};
 use regrasp_scene::{GRASP_TOLERANCE, GRASP_TURN_TOLERANCE, GraspRequest, InHandQuery};
 
 /// Compares the first and the last waypoint with the grasps that the query gives.
 pub fn check_given(
-    shape: &Shape,
+    shape: &SortedShape,
     query: Option<&InHandQuery>,
     model: &Model,
     plan: &Plan,
@@ -79,12 +79,12 @@ pub fn check_given(
 
 /// Distance of a tip with these joints from the surface, of the object where the waypoint has it; of a tip that is no ball it is
 /// not worked out and counts as large.
-fn gap(shape: &Shape, finger: &FingerModel, joints: &[f64], waypoint: &Waypoint) -> f64 {
+fn gap(shape: &SortedShape, finger: &FingerModel, joints: &[f64], waypoint: &Waypoint) -> f64 {
     match finger.surface {
         TipSurface::Ball => {
             let object = Pose::from(&waypoint.world_from_object);
             let center = object.inverse_transform_point(&finger.center_in_world(joints));
-            surface::nearest(shape, &center).distance - finger.radius
+            shape.nearest(&center).distance - finger.radius
         }
         TipSurface::Ellipsoid { .. } => f64::INFINITY,
     }

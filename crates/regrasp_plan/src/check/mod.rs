@@ -350,7 +350,7 @@ fn judge(
 ) {
     report.n_waypoints = plan.segments.iter().map(|segment| segment.waypoints.len()).sum();
     continuity::check_ends(query, plan, settings, log);
-    given::check_given(&scene.object.shape, query, model, plan, settings, log);
+    given::check_given(&model.shape, query, model, plan, settings, log);
     way::check_way(query, plan, settings, log);
     continuity::check_meeting(plan, settings, log);
     continuity::check_joints(model, plan, settings, log);
@@ -391,10 +391,10 @@ fn judge(
 
 /// Fingertips on the object, at and between waypoints.
 fn judge_tips(scene: &Scene, plan: &Plan, settings: &CheckSettings, model: &Model, log: &mut Log, report: &mut Report) {
-    let rolled = rolling::check_rolling(&scene.object.shape, model, plan, settings, log);
-    let tracked = tracking::check_tracking(&scene.object.shape, model, plan, settings, log);
+    let rolled = rolling::check_rolling(&model.shape, model, plan, settings, log);
+    let tracked = tracking::check_tracking(&model.shape, model, plan, settings, log);
     let known = rolled.steps.into_iter().chain(tracked.steps).collect();
-    report.max_hold_slip = slip::check_slip(&scene.object.shape, model, plan, &known, settings, log);
+    report.max_hold_slip = slip::check_slip(&model.shape, model, plan, &known, settings, log);
     let held = contact::check_tips(model, plan, log);
     report.max_contact_error = held.max(rolled.max_contact_error).max(tracked.max_contact_error);
     report.max_slip = [rolled.max_slip, tracked.max_slip].into_iter().flatten().reduce(f64::max);

@@ -1,6 +1,7 @@
 //! The scene as the checker sees it: paths to links, joint limits and fingertips, straight from the robot.
 
 use crate::check::kinematics::{Path, world_from_root};
+use crate::check::surface::SortedShape;
 use crate::check::tip::TipSurface;
 use nalgebra::Matrix4;
 use regrasp_geometry::{Point, Pose};
@@ -93,6 +94,8 @@ pub struct Model {
     pub drives: Vec<DriveRow>,
     /// Where the robot's root stands.
     pub world_from_root: Pose,
+    /// The object's shape, ready to be asked for what is near.
+    pub shape: SortedShape,
 }
 
 impl Model {
@@ -132,7 +135,8 @@ impl Model {
             slides.push(robot.joints[id.0].kind == JointKind::Prismatic);
         }
         let (limits, drives) = joint_rows(scene, &joint_names)?;
-        Ok(Model { slides, limits, drives, joint_names, fingers, world_from_root })
+        let shape = SortedShape::of(&scene.object.shape);
+        Ok(Model { slides, limits, drives, joint_names, fingers, world_from_root, shape })
     }
 }
 

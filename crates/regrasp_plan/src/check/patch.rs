@@ -3,7 +3,7 @@
 //! Closed forms for primitives (Eberly, "Distance from a Point to an Ellipse, an Ellipsoid", 2013, for the ellipsoid);
 //! polyhedra keep the triangles that come near.
 
-use crate::check::surface::nearest_on_edge;
+use crate::check::surface::{SortedShape, nearest_on_edge};
 use regrasp_geometry::{Point, Shape, Vector};
 
 /// Most steps of Newton's method for an ellipsoid; it converges from one side, and quadratically at the end.
@@ -27,24 +27,17 @@ pub struct Facet {
 
 impl<'a> Patch<'a> {
     /// All of the surface of `shape` within `reach` of `center`, and perhaps more; in the frame of the shape.
-    pub fn near(shape: &'a Shape, center: &Point, reach: f64) -> Self {
-        let (vertices, triangles) = match shape {
-            Shape::Convex(hull) => (hull.vertices(), hull.triangles()),
-            Shape::Mesh(mesh) => (mesh.vertices(), mesh.triangles()),
-            primitive => return Patch::Primitive(primitive),
+    pub fn near(shape: &'a SortedShape, center: &Point, reach: f64) -> Self {
+        let pieces = match shape {
+            SortedShape::Polyhedron(pieces) => pieces,
+            SortedShape::Primitive(primitive) => return Patch::Primitive(primitive),
         };
-        let facet = |triangle: &[u32; 3]| {
-            let corners = triangle.map(|i| vertices[i as usize]);
+        let facets = pieces.near(center, reach).into_iter().map(|triangle| {
+            let corners = pieces.corners(triangle);
             let [a, b, c] = &corners;
-            let squares = ((a - center).norm_squared(), (b - a).norm_squared().max((c - a).norm_squared()));
-            // Most are so far away that no root is needed: (x + y)^2 is at most 2 x^2 + 2 y^2.
-            if squares.0 > 2.0 * (reach * reach + squares.1) {
-                return None;
-            }
-            let facet = Facet { reach: squares.1.sqrt(), corners };
-            (squares.0.sqrt() <= reach + facet.reach).then_some(facet)
-        };
-        Patch::Triangles(triangles.iter().filter_map(facet).collect())
+            Facet { reach: (b - a).norm_squared().max((c - a).norm_squared()).sqrt(), corners }
+        });
+        Patch::Triangles(facets.filter(|facet| (facet.corners[0] - center).norm() <= reach + facet.reach).collect())
     }
 
     /// The point of the patch that is nearest to `point`; none when the patch is empty.
@@ -185,7 +178,7 @@ mod tests {
                 if theirs < 1e-4 {
                     continue;
                 }
-                let foot = Patch::near(&shape, &point, theirs + 1e-3).foot(&point).unwrap();
+                let foot = Patch::near(&SortedShape::of(&shape), &point, theirs + 1e-3).foot(&point).unwrap();
                 assert!(nearest(&shape, &foot).distance < 1e-9, "{shape:?} {point}");
                 let tolerance = if matches!(shape, Shape::Ellipsoid { .. }) { 1e-6 } else { 1e-9 };
                 assert!(((point - foot).norm() - theirs).abs() < tolerance, "{shape:?} {point} {foot} {theirs}");
@@ -201,7 +194,7 @@ mod tests {
             let on = Point::from(Vector::from(rng.direction()).component_mul(&Vector::new(0.02, 0.03, 0.045)));
             let normal = nearest(&shape, &on).normals[0];
             let away = rng.uniform(-2e-3, 0.02);
-            let foot = Patch::near(&shape, &on, 1.0).foot(&(on + normal * away)).unwrap();
+            let foot = Patch::near(&SortedShape::of(&shape), &on, 1.0).foot(&(on + normal * away)).unwrap();
             assert!((foot - on).norm() < 1e-9, "{on} {foot}");
         }
     }

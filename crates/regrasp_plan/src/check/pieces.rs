@@ -9,10 +9,10 @@ const PER_PIECE: f64 = 64.0;
 const MOST_CELLS: f64 = 256.0;
 
 /// A surface made of triangles, in pieces.
-#[derive(Debug)]
-pub struct Pieces<'a> {
-    vertices: &'a [Point],
-    triangles: &'a [[u32; 3]],
+#[derive(Debug, Clone)]
+pub struct Pieces {
+    /// The hull or mesh.
+    shape: Shape,
     /// Numbers of triangles, piece after piece.
     order: Vec<u32>,
     pieces: Vec<Piece>,
@@ -21,24 +21,28 @@ pub struct Pieces<'a> {
 }
 
 /// Triangles of one cell of a grid, by their middles, and the box that holds them whole.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Piece {
     low: Point,
     high: Point,
+    /// No edge of its triangles is longer, in metres.
+    longest_edge: f64,
     range: std::ops::Range<usize>,
 }
 
-impl<'a> Pieces<'a> {
-    /// The triangles of a hull or mesh; None for primitives.
-    pub fn of(shape: &'a Shape) -> Option<Self> {
-        match shape {
-            Shape::Convex(hull) => Some(Pieces::new(hull.vertices(), hull.triangles())),
-            Shape::Mesh(mesh) => Some(Pieces::new(mesh.vertices(), mesh.triangles())),
-            _ => None,
-        }
+/// Corners and triangles of a hull or mesh; None for primitives.
+fn polyhedron(shape: &Shape) -> Option<(&[Point], &[[u32; 3]])> {
+    match shape {
+        Shape::Convex(hull) => Some((hull.vertices(), hull.triangles())),
+        Shape::Mesh(mesh) => Some((mesh.vertices(), mesh.triangles())),
+        _ => None,
     }
+}
 
-    fn new(vertices: &'a [Point], triangles: &'a [[u32; 3]]) -> Self {
+impl Pieces {
+    /// The triangles of a hull or mesh; None for primitives.
+    pub fn of(shape: &Shape) -> Option<Self> {
+        let (vertices, triangles) = polyhedron(shape)?;
         let middle = |corners: &[u32; 3]| corners.iter().map(|&i| vertices[i as usize].coords).sum::<Vector>() / 3.0;
         let infinity = Vector::repeat(f64::INFINITY);
         let (low, high) = triangles.iter().map(middle).fold((infinity, -infinity), |(l, h), p| (l.inf(&p), h.sup(&p)));
@@ -57,7 +61,13 @@ impl<'a> Pieces<'a> {
         for members in order.chunk_by(|&a, &b| cells[a as usize] == cells[b as usize]) {
             let corners = members.iter().flat_map(|&i| triangles[i as usize]).map(|i| vertices[i as usize]);
             let (low, high) = corners.fold((infinity, -infinity), |(l, h), p| (l.inf(&p.coords), h.sup(&p.coords)));
-            pieces.push(Piece { low: low.into(), high: high.into(), range: start..start + members.len() });
+            let edge = |&i: &u32| {
+                let [a, b, c] = triangles[i as usize].map(|i| vertices[i as usize]);
+                (b - a).norm_squared().max((c - a).norm_squared()).max((c - b).norm_squared())
+            };
+            let longest_edge = members.iter().map(edge).fold(0.0, f64::max).sqrt();
+            let range = start..start + members.len();
+            pieces.push(Piece { low: low.into(), high: high.into(), longest_edge, range });
             start += members.len();
         }
         let origin = vertices[0];
@@ -68,12 +78,31 @@ impl<'a> Pieces<'a> {
                 a.dot(&b.cross(&c))
             })
             .sum();
-        Pieces { vertices, triangles, order, pieces, outward: if volume < 0.0 { -1.0 } else { 1.0 } }
+        let outward = if volume < 0.0 { -1.0 } else { 1.0 };
+        Some(Pieces { shape: shape.clone(), order, pieces, outward })
+    }
+
+    /// The hull or mesh.
+    pub fn shape(&self) -> &Shape {
+        &self.shape
+    }
+
+    /// Numbers of triangles, in order: all that a triangle's longest edge and `reach` bring to `point`, and perhaps more.
+    pub fn near(&self, point: &Point, reach: f64) -> Vec<usize> {
+        let pieces = self.pieces.iter().filter(|piece| piece.bound(point) <= reach + piece.longest_edge);
+        let mut found: Vec<usize> =
+            pieces.flat_map(|piece| &self.order[piece.range.clone()]).map(|&triangle| triangle as usize).collect();
+        found.sort_unstable();
+        found
     }
 
     /// Corners of a triangle.
     pub fn corners(&self, triangle: usize) -> [Point; 3] {
-        self.triangles[triangle].map(|i| self.vertices[i as usize])
+        match &self.shape {
+            Shape::Convex(hull) => hull.triangles()[triangle].map(|i| hull.vertices()[i as usize]),
+            Shape::Mesh(mesh) => mesh.corners(triangle),
+            _ => unreachable!("pieces are of hulls and meshes"),
+        }
     }
 
     /// Outward unit normal of a triangle.

@@ -12,12 +12,13 @@ use crate::check::model::{FingerModel, Model};
 use crate::check::motion::ObjectRates;
 use crate::check::patch::Patch;
 use crate::check::slip::StepSlip;
+use crate::check::surface::SortedShape;
 use crate::check::tip::TipSurface;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, Plan, SegmentKind, Waypoint};
 use nalgebra::{Matrix4, Rotation3, UnitQuaternion};
-use regrasp_geometry::{Point, Pose, Shape, Vector};
+use regrasp_geometry::{Point, Pose, Vector};
 use std::cell::Cell;
 use std::collections::BTreeMap;
 
@@ -49,7 +50,13 @@ pub struct Rolled {
 }
 
 /// Judges every step in which a finger rolls.
-pub fn check_rolling(shape: &Shape, model: &Model, plan: &Plan, settings: &CheckSettings, log: &mut Log) -> Rolled {
+pub fn check_rolling(
+    shape: &SortedShape,
+    model: &Model,
+    plan: &Plan,
+    settings: &CheckSettings,
+    log: &mut Log,
+) -> Rolled {
     let tolerance = plan.promises.contact_tolerance.min(settings.largest_contact_tolerance);
     let slip_tolerance = plan.promises.slip_tolerance.min(settings.largest_slip_tolerance);
     let mut rolled = Rolled::default();
@@ -142,7 +149,7 @@ impl<'a> Roll<'a> {
         finger: &'a FingerModel,
         from: &'a Waypoint,
         to: &'a Waypoint,
-        shape: &'a Shape,
+        shape: &'a SortedShape,
         tolerance: f64,
     ) -> Self {
         let motion = Between::new(from, to);

@@ -36,9 +36,8 @@ pub fn check_rolling_closure(
     let mut proof: Option<Certificate> = None;
     for (s, segment) in plan.segments.iter().enumerate().filter(|(_, one)| one.kind == SegmentKind::Transfer) {
         for (w, pair) in segment.waypoints.windows(2).enumerate() {
-            let holders: Vec<Holder> = (0..model.fingers.len())
-                .filter_map(|f| Holder::new(object, model, &pair[0], &pair[1], f, settings))
-                .collect();
+            let holders: Vec<Holder> =
+                (0..model.fingers.len()).filter_map(|f| Holder::new(model, &pair[0], &pair[1], f, settings)).collect();
             if !holders.iter().any(|holder| holder.roll.is_some()) {
                 continue;
             }
@@ -88,7 +87,6 @@ struct Holder<'a> {
 
 impl<'a> Holder<'a> {
     fn new(
-        object: &'a Object,
         model: &'a Model,
         from: &'a Waypoint,
         to: &'a Waypoint,
@@ -98,7 +96,7 @@ impl<'a> Holder<'a> {
         let at_start = contact_of(&from.contacts[finger]).filter(|_| to.contacts[finger].holds())?;
         let rolls = from.contacts[finger].mode == ContactMode::Rolling && model.fingers[finger].radius > 0.0;
         let tolerance = settings.largest_contact_tolerance;
-        let roll = rolls.then(|| Roll::new(&model.fingers[finger], from, to, &object.shape, tolerance));
+        let roll = rolls.then(|| Roll::new(&model.fingers[finger], from, to, &model.shape, tolerance));
         Some(Holder { finger, at_start, roll })
     }
 

@@ -19,10 +19,10 @@ use crate::check::continuity::{contact_of, moving_finger, pose_difference};
 use crate::check::level::Level;
 use crate::check::model::{FingerModel, Model};
 use crate::check::rolling::{Roll, UNKNOWN_SHARE};
+use crate::check::surface::SortedShape;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, Plan, Segment};
-use regrasp_geometry::Shape;
 use regrasp_grasp::ContactModel;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -80,7 +80,7 @@ pub struct HoldSlip {
 ///
 /// `known` is what `rolling` and `tracking` have measured, by finger, segment and waypoint; fixed contacts are measured here.
 pub fn check_slip(
-    shape: &Shape,
+    shape: &SortedShape,
     model: &Model,
     plan: &Plan,
     known: &BTreeMap<(usize, usize, usize), StepSlip>,
@@ -172,7 +172,7 @@ impl Hold {
 
 /// Slip of finger `f` from waypoint `w` of the segment to the next; none where neither it nor the object moves.
 fn fixed_slip(
-    shape: &Shape,
+    shape: &SortedShape,
     finger: &FingerModel,
     f: usize,
     (segment, w): (&Segment, usize),

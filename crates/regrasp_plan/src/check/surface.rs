@@ -68,26 +68,26 @@ fn nearest_of(pieces: &Pieces, point: &Point) -> Nearest {
     Nearest { distance, normals: near.into_iter().map(|triangle| pieces.normal(triangle)).collect() }
 }
 
-/// A surface of which many points are asked: polyhedra are sorted once.
-#[derive(Debug)]
-pub enum Sorted<'a> {
+/// A shape of whose surface many points are asked: the triangles of polyhedra are sorted once.
+#[derive(Debug, Clone)]
+pub enum SortedShape {
     /// Closed forms need no preparation.
-    Primitive(&'a Shape),
+    Primitive(Shape),
     /// Triangles in pieces.
-    Polyhedron(Pieces<'a>),
+    Polyhedron(Pieces),
 }
 
-impl<'a> Sorted<'a> {
+impl SortedShape {
     /// Prepares `shape`.
-    pub fn of(shape: &'a Shape) -> Self {
-        Pieces::of(shape).map_or(Sorted::Primitive(shape), Sorted::Polyhedron)
+    pub fn of(shape: &Shape) -> Self {
+        Pieces::of(shape).map_or_else(|| SortedShape::Primitive(shape.clone()), SortedShape::Polyhedron)
     }
 
     /// As [`nearest`].
     pub fn nearest(&self, point: &Point) -> Nearest {
         match self {
-            Sorted::Primitive(shape) => nearest(shape, point),
-            Sorted::Polyhedron(pieces) => nearest_of(pieces, point),
+            SortedShape::Primitive(shape) => nearest(shape, point),
+            SortedShape::Polyhedron(pieces) => nearest_of(pieces, point),
         }
     }
 }
@@ -185,8 +185,8 @@ mod tests {
         triangles.extend(triangles.clone().into_iter().take(50));
         let mesh = TriangleMesh::new(vertices, triangles).unwrap();
         let shape = Shape::Mesh(std::sync::Arc::new(mesh.clone()));
-        let sorted = Sorted::of(&shape);
-        let Sorted::Polyhedron(pieces) = &sorted else { panic!("a mesh has triangles") };
+        let sorted = SortedShape::of(&shape);
+        let SortedShape::Polyhedron(pieces) = &sorted else { panic!("a mesh has triangles") };
         for _ in 0..500 {
             let point = Point::from(Vector::from(rng.direction()) * rng.uniform(0.0, 0.12));
             let distances: Vec<f64> =

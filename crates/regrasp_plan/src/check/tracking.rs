@@ -30,10 +30,11 @@ use crate::check::continuity::contact_of;
 use crate::check::model::{FingerModel, Model};
 use crate::check::rolling::{Roll, Rolled, Turning, UNKNOWN_SHARE, off_contact};
 use crate::check::slip::StepSlip;
+use crate::check::surface::SortedShape;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
-use regrasp_geometry::{Pose, Shape, Vector};
+use regrasp_geometry::{Pose, Vector};
 use std::collections::BTreeMap;
 
 /// Share of a slide that may stay unknown where it is compared with the plan's relative velocity, and what may anyway, in
@@ -149,7 +150,13 @@ pub fn check_present(model: &Model, segment: &Segment, s: usize, log: &mut Log) 
 }
 
 /// Judges every contact of every tracking segment.
-pub fn check_tracking(shape: &Shape, model: &Model, plan: &Plan, settings: &CheckSettings, log: &mut Log) -> Rolled {
+pub fn check_tracking(
+    shape: &SortedShape,
+    model: &Model,
+    plan: &Plan,
+    settings: &CheckSettings,
+    log: &mut Log,
+) -> Rolled {
     let mut rolled = Rolled::default();
     let mut steps = BTreeMap::new();
     let tolerance = plan.promises.contact_tolerance.min(settings.largest_contact_tolerance);
@@ -232,7 +239,7 @@ impl Track<'_> {
 
     /// The tip is on its contact at waypoints, with the point that the plan says, and on the surface between them. The largest
     /// error.
-    fn check_touch(&mut self, shape: &Shape) -> f64 {
+    fn check_touch(&mut self, shape: &SortedShape) -> f64 {
         let mut largest: (f64, Moment) = (0.0, Moment::at(self.s, 0));
         let mut worst_point: (f64, usize) = (0.0, 0);
         for (w, waypoint) in self.segment.waypoints.iter().enumerate() {
@@ -278,7 +285,7 @@ impl Track<'_> {
     }
 
     /// Modes and relative velocities of all steps.
-    fn check_modes(&mut self, shape: &Shape) {
+    fn check_modes(&mut self, shape: &SortedShape) {
         let n_steps = self.segment.waypoints.len() - 1;
         for w in 0..n_steps {
             let (from, to) = (&self.segment.waypoints[w], &self.segment.waypoints[w + 1]);

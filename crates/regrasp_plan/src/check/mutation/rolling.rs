@@ -143,7 +143,7 @@ pub(super) fn slide(
     let side = x.into_inner() * angle.cos() + y.into_inner() * angle.sin();
     let away = model.fingers[f].center_from_contact(waypoint, &contact.normal_in_object);
     let center = contact.point_in_object + away + side * way;
-    let foot = Patch::near(shape, &center, radius + 1e-3).foot(&center)?;
+    let foot = Patch::near(&model.shape, &center, radius + 1e-3).foot(&center)?;
     let normal = match model.fingers[f].surface {
         TipSurface::Ball => UnitVector::new_normalize(center - foot).into_inner(),
         // Its centre is not over its contact; the surface is smooth where fingers roll.

@@ -46,7 +46,7 @@ impl Breeder<'_> {
 
     /// The largest turn of a finger's tip about its contact's normal in a transfer in which it rolls, in radians.
     fn twist_of(&self, f: usize) -> f64 {
-        let shape = &self.scene.object.shape;
+        let shape = &self.model.shape;
         let of = |segment: &Segment| -> f64 {
             let pairs = segment.waypoints.windows(2).filter(|pair| pair[0].contacts[f].mode == ContactMode::Rolling);
             let roll = |pair: &[Waypoint]| Roll::new(&self.model.fingers[f], &pair[0], &pair[1], shape, 1e-3).turning();
