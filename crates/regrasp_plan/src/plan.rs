@@ -269,7 +269,7 @@ pub struct Promises {
     pub friction_margin: f64,
     /// Closure margin that every holding set keeps (see `regrasp_grasp::margin`); dimensionless.
     pub required_margin: f64,
-    /// Smallest margin that the planner found along the plan: a lower bound of the Ferrari-Canny radius.
+    /// Smallest margin that the planner found at the waypoints: a lower bound of the Ferrari-Canny radius.
     pub kept_margin: f64,
     /// Length by which torques are divided in the margin, in metres.
     pub torque_scale: f64,

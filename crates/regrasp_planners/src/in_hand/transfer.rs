@@ -139,6 +139,7 @@ pub fn step_joints(model: &Model, holding: u32, here: &Moment, pose: &Pose) -> R
     let between = |t: f64| Placement::from(&line.at(t));
     let mut joints = HandJoints::new();
     let mut contacts = here.contacts.clone();
+    let mut halfway = here.contacts.clone();
     let mut spins = Spins::new();
     for finger in 0..model.n_fingers() {
         let own = &here.joints[finger];
@@ -155,6 +156,7 @@ pub fn step_joints(model: &Model, holding: u32, here: &Moment, pose: &Pose) -> R
                 spins.push(rolled.spin);
             }
             contacts[finger] = rolled.contact;
+            halfway[finger] = rolled.halfway.unwrap_or(rolled.contact);
             rolled.joints
         } else {
             let there = follow_contact(model, finger, &contacts[finger], &to, own).ok_or(NoStep::OutOfReach)?;
@@ -163,6 +165,10 @@ pub fn step_joints(model: &Model, holding: u32, here: &Moment, pose: &Pose) -> R
             }
             there
         });
+    }
+    // Contacts travel between waypoints too, and the grasp closes there as well: a shorter step may do.
+    if model.any_rolls() && model.closure_margin(&halfway, holding) < model.settings.closure_margin {
+        return Err(NoStep::TooLong);
     }
     Ok((Moment { world_from_object: *pose, joints, contacts }, spins))
 }
