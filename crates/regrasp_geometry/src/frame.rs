@@ -138,7 +138,7 @@ mod tests {
     fn directions_do_not_depend_on_lengths() {
         let asked = Vector::new(3.0, 0.0, -4.0);
         let expected = Vector::new(0.6, 0.0, -0.8);
-        for factor in [1.0, 1e200, 4e307, 1e-9, 1e-200, 1e-300] {
+        for factor in [1.0, 1e200, 3e307, 1e-9, 1e-200, 1e-300] {
             assert!((direction(&(asked * factor)).unwrap().into_inner() - expected).norm() < 1e-15, "{factor}");
             assert!((length(&(asked * factor)) / factor / 5.0 - 1.0).abs() < 1e-12, "{factor}");
         }

@@ -32,12 +32,21 @@ pub enum HullError {
 /// Below this many vertices the support is found by looking at all of them.
 const BRUTE_FORCE_LIMIT: usize = 24;
 
+/// Up to this many points [`ConvexHull::new`] is exact.
+const EXACT_UP_TO: usize = 20_000;
+
 /// Directions in which [`ConvexHull::around`] looks for extreme points.
 const N_DIRECTIONS: usize = 1500;
 
 impl ConvexHull {
-    /// The hull of `points`, verified by substitution.
+    /// The hull of `points`, verified by substitution. Of more than 20,000 points, which take the exact algorithm minutes, that
+    /// of [`ConvexHull::around`].
     pub fn new(points: &[Point]) -> Result<Self, HullError> {
+        if points.len() <= EXACT_UP_TO { ConvexHull::exact(points) } else { ConvexHull::around(points) }
+    }
+
+    /// The hull itself, whatever the number of points.
+    fn exact(points: &[Point]) -> Result<Self, HullError> {
         let (vertices, triangles) = crate::reference::convex_hull(points)?;
         ConvexHull::from_polyhedron(vertices, triangles, &PointTree::new(points))
     }
@@ -275,7 +284,7 @@ mod tests {
         let mut rng = Rng::keyed(2, "hull", 0);
         for (index, n) in [10, 300, 20_000].into_iter().enumerate() {
             let points = cloud(n, 10 + index as u64);
-            let (exact, around) = (ConvexHull::new(&points).unwrap(), ConvexHull::around(&points).unwrap());
+            let (exact, around) = (ConvexHull::exact(&points).unwrap(), ConvexHull::around(&points).unwrap());
             for _ in 0..500 {
                 let direction = Vector::from(rng.direction());
                 let (mut hint, mut other) = (0, 0);
@@ -287,6 +296,18 @@ mod tests {
         }
         let flat: Vec<Point> = cloud(100, 20).into_iter().map(|p| Point::new(p.x, p.y, 0.0)).collect();
         assert!(matches!(ConvexHull::around(&flat), Err(HullError::Flat { .. })));
+    }
+
+    #[test]
+    fn the_hull_of_a_million_points_takes_seconds() {
+        let mut rng = Rng::keyed(7, "hull", 0);
+        let points: Vec<Point> = (0..1_000_000).map(|_| Point::from(Vector::from(rng.direction()) * 0.05)).collect();
+        let started = std::time::Instant::now();
+        let hull = ConvexHull::new(&points).unwrap();
+        assert!(started.elapsed().as_secs() < 20, "{:?}", started.elapsed());
+        assert!(hull.vertices().len() <= N_DIRECTIONS);
+        let size = hull.vertices().iter().map(|v| v.coords.norm()).fold(0.0, f64::max);
+        assert!(size < 0.05 * 1.01, "{size}");
     }
 
     #[test]

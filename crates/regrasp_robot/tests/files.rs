@@ -195,8 +195,11 @@ fn hostile_xml_is_refused() {
     let links: String = (0..1001).map(|i| format!("<link name='l{i}'/>")).collect();
     assert_eq!(load_text(format!("<robot>{links}</robot>")), "U105");
     // Comments and attributes that look like tags do not count as nesting.
-    let harmless =
-        format!("<robot name='r'><!-- {} --><link name='{}'/></robot>", "<a>".repeat(100), "&lt;a>".repeat(100));
+    let harmless = format!(
+        "<robot name='r'><!-- {} --><link name='a' note='{}'/></robot>",
+        "<a>".repeat(100),
+        "&lt;a>".repeat(100)
+    );
     assert!(load(&write(folder.path(), "hand.urdf", harmless)).is_ok());
 }
 

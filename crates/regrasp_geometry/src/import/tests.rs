@@ -158,7 +158,7 @@ fn faulty_obj_is_refused_with_its_place_and_all_faults_at_once() {
     assert_eq!(faults(obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999999999999999999\n")), [("M240", Some(4))]);
     let many = format!("v 0 0 0\n{}", "f 0 0 0\n".repeat(100));
     let found = faults(obj(&many));
-    assert_eq!(found.len(), MAX_FAULTS + 1);
+    assert_eq!(found.len(), regrasp_base::diagnostic::MAX_DIAGNOSTICS);
 }
 
 #[test]

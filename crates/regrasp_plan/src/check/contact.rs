@@ -149,6 +149,7 @@ pub fn check_pads(model: &Model, plan: &Plan, log: &mut Log) {
 pub fn check_contacts(object: &Object, model: &Model, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
     let mut seen = BTreeSet::new();
     let edges = Edges::of(&object.shape, object.crease_angle);
+    let sorted = surface::Sorted::of(&object.shape);
     let least = object.edge_distance - settings.surface_tolerance;
     for (s, segment) in plan.segments.iter().enumerate() {
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
@@ -162,7 +163,7 @@ pub fn check_contacts(object: &Object, model: &Model, plan: &Plan, settings: &Ch
                 let tell = |kind, message: String, amount, limit| {
                     Violation::new(kind, message).when(Moment::at(s, w)).subjects([name]).amount(amount, limit)
                 };
-                let nearest = surface::nearest(&object.shape, &Point::from(point));
+                let nearest = sorted.nearest(&Point::from(point));
                 if nearest.distance > settings.surface_tolerance {
                     let message =
                         format!("the contact of finger \"{name}\" is {:.3e} m off the surface", nearest.distance);

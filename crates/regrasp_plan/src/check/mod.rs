@@ -49,6 +49,8 @@ pub mod motion;
 pub mod mutation;
 /// A piece of the object's surface near a fingertip.
 pub mod patch;
+/// The triangles of a polyhedron in pieces, for questions about what is near.
+mod pieces;
 /// What the plan promises, and whether the promises may be made and are kept.
 pub mod promises;
 /// Fingertips that roll.

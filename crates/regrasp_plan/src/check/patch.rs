@@ -33,12 +33,18 @@ impl<'a> Patch<'a> {
             Shape::Mesh(mesh) => (mesh.vertices(), mesh.triangles()),
             primitive => return Patch::Primitive(primitive),
         };
-        let facets = triangles.iter().map(|triangle| {
+        let facet = |triangle: &[u32; 3]| {
             let corners = triangle.map(|i| vertices[i as usize]);
             let [a, b, c] = &corners;
-            Facet { reach: (b - a).norm_squared().max((c - a).norm_squared()).sqrt(), corners }
-        });
-        Patch::Triangles(facets.filter(|facet| (facet.corners[0] - center).norm() <= reach + facet.reach).collect())
+            let squares = ((a - center).norm_squared(), (b - a).norm_squared().max((c - a).norm_squared()));
+            // Most are so far away that no root is needed: (x + y)^2 is at most 2 x^2 + 2 y^2.
+            if squares.0 > 2.0 * (reach * reach + squares.1) {
+                return None;
+            }
+            let facet = Facet { reach: squares.1.sqrt(), corners };
+            (squares.0.sqrt() <= reach + facet.reach).then_some(facet)
+        };
+        Patch::Triangles(triangles.iter().filter_map(facet).collect())
     }
 
     /// The point of the patch that is nearest to `point`; none when the patch is empty.

@@ -1,5 +1,6 @@
 //! Distance from the object's surface and the normals there, by closed forms and by looking at every triangle.
 
+use crate::check::pieces::Pieces;
 use regrasp_geometry::{Point, Shape, Vector};
 
 /// The surface near a point.
@@ -25,8 +26,7 @@ pub fn nearest(shape: &Shape, point: &Point) -> Nearest {
             let value = point.coords.component_div(radii).norm_squared() - 1.0;
             Nearest { distance: value.abs() / gradient.norm().max(1e-9), normals: vec![gradient.normalize()] }
         }
-        Shape::Convex(hull) => triangles(hull.vertices(), hull.triangles(), point),
-        Shape::Mesh(mesh) => triangles(mesh.vertices(), mesh.triangles(), point),
+        Shape::Convex(_) | Shape::Mesh(_) => nearest_of(&Pieces::of(shape).expect("a polyhedron has triangles"), point),
     }
 }
 
@@ -62,43 +62,34 @@ fn cylinder(point: &Point, half_length: f64, radius: f64) -> Nearest {
 /// Two faces whose distances differ by less than this, in metres, both count as nearest.
 const SAME_DISTANCE: f64 = 1e-7;
 
-fn triangles(vertices: &[Point], triangles: &[[u32; 3]], point: &Point) -> Nearest {
-    let corners = |triangle: &[u32; 3]| triangle.map(|i| vertices[i as usize]);
-    let mut best = f64::INFINITY;
-    let mut near: Vec<(f64, usize)> = Vec::new();
-    for (index, triangle) in triangles.iter().enumerate() {
-        let corners = corners(triangle);
-        // A corner farther than the longest edge and the best so far cannot belong to a nearer triangle.
-        let reach = (corners[1] - corners[0]).norm_squared().max((corners[2] - corners[0]).norm_squared()).sqrt();
-        if (corners[0] - point).norm() - reach > best + SAME_DISTANCE {
-            continue;
-        }
-        let distance = distance_to_triangle(point, &corners);
-        best = best.min(distance);
-        near.push((distance, index));
-    }
-    let outward = if signed_volume(vertices, triangles) < 0.0 { -1.0 } else { 1.0 };
-    let normals = near
-        .iter()
-        .filter(|(distance, _)| *distance <= best + SAME_DISTANCE)
-        .map(|(_, index)| {
-            let [a, b, c] = corners(&triangles[*index]);
-            (b - a).cross(&(c - a)).normalize() * outward
-        })
-        .collect();
-    Nearest { distance: best, normals }
+/// The part of a polyhedron that is nearest to a point.
+fn nearest_of(pieces: &Pieces, point: &Point) -> Nearest {
+    let (distance, near) = pieces.nearest(point, SAME_DISTANCE, |corners| distance_to_triangle(point, corners));
+    Nearest { distance, normals: near.into_iter().map(|triangle| pieces.normal(triangle)).collect() }
 }
 
-/// Six times the volume; negative when the triangles are wound inside out.
-fn signed_volume(vertices: &[Point], triangles: &[[u32; 3]]) -> f64 {
-    let origin = vertices[0];
-    triangles
-        .iter()
-        .map(|triangle| {
-            let [a, b, c] = triangle.map(|i| vertices[i as usize] - origin);
-            a.dot(&b.cross(&c))
-        })
-        .sum()
+/// A surface of which many points are asked: polyhedra are sorted once.
+#[derive(Debug)]
+pub enum Sorted<'a> {
+    /// Closed forms need no preparation.
+    Primitive(&'a Shape),
+    /// Triangles in pieces.
+    Polyhedron(Pieces<'a>),
+}
+
+impl<'a> Sorted<'a> {
+    /// Prepares `shape`.
+    pub fn of(shape: &'a Shape) -> Self {
+        Pieces::of(shape).map_or(Sorted::Primitive(shape), Sorted::Polyhedron)
+    }
+
+    /// As [`nearest`].
+    pub fn nearest(&self, point: &Point) -> Nearest {
+        match self {
+            Sorted::Primitive(shape) => nearest(shape, point),
+            Sorted::Polyhedron(pieces) => nearest_of(pieces, point),
+        }
+    }
 }
 
 /// Angle between `direction` and the cone that `normals` span: where a ball touches an edge or a corner, its normal is
@@ -177,6 +168,34 @@ mod tests {
             let (a, b) = (nearest(&cuboid, &point), nearest(&mesh, &point));
             assert!((a.distance - b.distance).abs() < 1e-12, "{point} {} {}", a.distance, b.distance);
             assert!(a.normals.iter().all(|n| b.normals.iter().any(|m| (n - m).norm() < 1e-9)) || a.normals.len() > 1);
+        }
+    }
+
+    #[test]
+    fn pieces_tell_what_all_triangles_tell() {
+        let mut rng = Rng::keyed(4, "surface", 0);
+        // Triangles of all sizes, some as large as the whole, some of them many times.
+        let mut vertices = Vec::new();
+        for i in 0..3000 {
+            let middle = Vector::from(rng.direction()) * 0.05;
+            let size = if i % 300 == 0 { 0.1 } else { 0.002 };
+            vertices.extend((0..3).map(|_| Point::from(middle + Vector::from(rng.direction()) * size)));
+        }
+        let mut triangles: Vec<[u32; 3]> = (0..3000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        triangles.extend(triangles.clone().into_iter().take(50));
+        let mesh = TriangleMesh::new(vertices, triangles).unwrap();
+        let shape = Shape::Mesh(std::sync::Arc::new(mesh.clone()));
+        let sorted = Sorted::of(&shape);
+        let Sorted::Polyhedron(pieces) = &sorted else { panic!("a mesh has triangles") };
+        for _ in 0..500 {
+            let point = Point::from(Vector::from(rng.direction()) * rng.uniform(0.0, 0.12));
+            let distances: Vec<f64> =
+                (0..mesh.triangles().len()).map(|i| distance_to_triangle(&point, &mesh.corners(i))).collect();
+            let least = distances.iter().copied().fold(f64::INFINITY, f64::min);
+            let near = (0..distances.len()).filter(|&i| distances[i] <= least + SAME_DISTANCE);
+            let expected = Nearest { distance: least, normals: near.map(|i| pieces.normal(i)).collect() };
+            assert_eq!(sorted.nearest(&point), expected);
+            assert_eq!(nearest(&shape, &point), expected);
         }
     }
 

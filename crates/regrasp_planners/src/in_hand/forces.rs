@@ -5,6 +5,7 @@ use super::model::{MAX_FINGERS, Model};
 use super::settings::{ForceSettings, InHandSettings};
 use super::workspace::{Contacts, HandJoints, Workspace};
 use arrayvec::ArrayVec;
+use regrasp_base::diagnostic::number;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Pose, Vector};
 use regrasp_grasp::wrench::any_direction::reserves;
@@ -113,7 +114,7 @@ impl Unbalanced {
                 let slides = chain.joints.iter().any(|joint| joint.coordinate == j && joint.motion == Motion::Slide);
                 let limit = model.forces.as_ref().map_or(0.0, |forces| forces.torques[f][j]);
                 let unit = if slides { "N" } else { "N m" };
-                format!("joint \"{}\" would need more than {limit} {unit}", chain.names[j])
+                format!("joint \"{}\" would need more than {} {unit}", chain.names[j], number(limit))
             }
         };
         let what = match model.forces.as_ref().map(|forces| forces.gravity) {

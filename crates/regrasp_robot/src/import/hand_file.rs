@@ -151,7 +151,7 @@ fn refuse_wrong_unit(hand: &Hand, path: &Path) -> Result<(), InputError> {
     if (0.01..=5.0).contains(&span) {
         let Some(finger) = hand.fingers.iter().find(|finger| finger.tip.radius() > span) else { return Ok(()) };
         let problem =
-            format!("its tip has a radius of {} m, more than the {span:.4} m of the hand", finger.tip.radius());
+            format!("its tip has a radius of {} m, more than the {span:.4} m of the hand", number(finger.tip.radius()));
         return Err(Diagnostic::new("U217", Place::file(path), problem)
             .element("finger", &finger.name)
             .expected("a radius in metres")
@@ -165,11 +165,16 @@ fn refuse_wrong_unit(hand: &Hand, path: &Path) -> Result<(), InputError> {
     Err(Diagnostic::new(
         "U216",
         Place::file(path),
-        format!("the joints and tips of the hand are spread over {span:.4} m"),
+        format!("the joints and tips of the hand are spread over {} m", shown_span(span)),
     )
     .expected(format!("a hand in metres; this one {guess}"))
     .fix(format!("multiply every length of the URDF by {factor}"))
     .into())
+}
+
+/// Metres with four decimals, where they say something.
+fn shown_span(span: f64) -> String {
+    if (1e-3..1e6).contains(&span) { format!("{span:.4}") } else { format!("{span:.1e}") }
 }
 
 /// What a hand file says.

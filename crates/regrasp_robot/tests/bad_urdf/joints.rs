@@ -174,8 +174,10 @@ refused!(
 <joint name="follow" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/><limit lower="-1" upper="1"/>
 <mimic joint="lead" multiplier="0"/></joint>
 </robot>"#,
-    [r#"U142 hand.urdf:5:8 joint "follow": follows joint "lead" with multiplier 0; expected a multiplier that is not 0
-  fix: type="fixed" if it does not move"#]
+    [
+        r#"U142 hand.urdf:5:8 joint "follow": follows joint "lead" with multiplier 0; expected a multiplier of size 1e-6 to 1e6 that is not 0, and an offset of size up to 1e6
+  fix: type="fixed" if it does not move"#
+    ]
 );
 
 refused!(

@@ -3,7 +3,7 @@
 use super::files::Files;
 use super::pose;
 use super::shape::{self, Origin, ReadShape};
-use super::units::list;
+use super::units::{list, shown};
 use crate::object::Object;
 use crate::scene::Obstacle;
 use regrasp_base::diagnostic::number;
@@ -239,9 +239,10 @@ fn center_is_inside(shape: &Shape, center: &Point, entry: &Entry, found: &mut Fo
     if (0..3).all(|k| center[k] >= low[k] && center[k] <= high[k]) {
         return Some(());
     }
-    let diagnostic = entry.error("S107", found, format!("is {}, outside the object", list(center.coords))).expected(
-        format!("a point of the object frame between {:.4?} and {:.4?}", low.coords.as_slice(), high.coords.as_slice()),
-    );
+    let corner = |point: Point| point.coords.iter().map(|x| shown(*x, 4)).collect::<Vec<_>>().join(", ");
+    let diagnostic = entry
+        .error("S107", found, format!("is {}, outside the object", list(center.coords)))
+        .expected(format!("a point of the object frame between [{}] and [{}]", corner(low), corner(high)));
     found.diagnostics.push(diagnostic);
     None
 }

@@ -1,7 +1,7 @@
 //! Positions, orientations and turns in scene files.
 
+use super::units::shown;
 use nalgebra::UnitQuaternion;
-use regrasp_base::diagnostic::number;
 use regrasp_base::toml_table::{Entry, Found, Table};
 use regrasp_geometry::frame::{direction, length};
 use regrasp_geometry::{Pose, UnitVector, Vector, pose_from};
@@ -46,7 +46,7 @@ pub(super) fn quaternion(table: &mut Table, found: &mut Found) -> Option<[f64; 4
         let vector = Vector::from(entry.numbers::<3>(found)?);
         let angle = length(&vector);
         if angle > TAU {
-            let diagnostic = entry.error("S107", found, format!("turns by {} rad", number(angle)));
+            let diagnostic = entry.error("S107", found, format!("turns by {} rad", shown(angle, 3)));
             found.diagnostics.push(diagnostic.expected("an axis times an angle of at most 2 pi radians"));
             return None;
         }
@@ -64,7 +64,7 @@ pub(super) fn quaternion(table: &mut Table, found: &mut Found) -> Option<[f64; 4
     }
     if !norm.is_finite() || (norm - 1.0).abs() > QUATERNION_TOLERANCE {
         let diagnostic = entry
-            .error("V002", found, format!("has length {}", number(norm)))
+            .error("V002", found, format!("has length {}", shown(norm, 6)))
             .expected(format!("a unit quaternion (length 1 within {QUATERNION_TOLERANCE})"))
             .fix(format!("divided by its length it is {:.9?}", [a, b, c, d].map(|part| part / norm)));
         found.diagnostics.push(diagnostic);

@@ -96,7 +96,7 @@ fn lengths(table: &mut Table, key: &'static str, found: &mut Found) -> Option<Ve
         return Some(lengths);
     }
     let diagnostic = entries
-        .error("S107", found, format!("has the length {}", lengths.min()))
+        .error("S107", found, format!("has the length {}", number(lengths.min())))
         .expected("lengths above 0, in metres");
     found.diagnostics.push(diagnostic);
     None

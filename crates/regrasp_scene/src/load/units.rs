@@ -93,9 +93,9 @@ pub(super) fn list(v: regrasp_geometry::Vector) -> String {
     format!("[{}, {}, {}]", number(v.x), number(v.y), number(v.z))
 }
 
-/// Metres with so many decimals; far too many metres by their power of ten.
-fn shown(metres: f64, decimals: usize) -> String {
-    if metres < 1e6 { format!("{metres:.decimals$}") } else { format!("{metres:.1e}") }
+/// A size with so many decimals; a far too large one by its power of ten.
+pub(super) fn shown(size: f64, decimals: usize) -> String {
+    if size.abs() < 1e6 { format!("{size:.decimals$}") } else { format!("{size:.1e}") }
 }
 
 /// Distance of the object from the nearest finger base, and the reach, when no finger can touch the object there.

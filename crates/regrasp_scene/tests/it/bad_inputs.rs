@@ -151,10 +151,10 @@ fn lengths_of_zero_or_less() {
 fn friction_below_zero_is_refused_and_odd_friction_is_noted() {
     refused(
         &with("friction = 0.8", "friction = -0.8"),
-        "S107 scene.toml:12:12 key \"object.friction\": is -0.8; expected a friction coefficient of 0 or more",
+        "S107 scene.toml:12:12 key \"object.friction\": is -0.8; expected a friction coefficient from 0 to 1000",
     );
     noted(&with("friction = 0.8", "friction = 0"), "scene.toml:12:12: friction 0");
-    noted(&with("friction = 0.8", "friction = 1e9"), "friction 1000000000 is more than");
+    noted(&with("friction = 0.8", "friction = 900"), "friction 900 is more than");
 }
 
 #[test]
@@ -349,7 +349,7 @@ fn origin_of_a_mesh_moves_it() {
 fn centre_of_mass_outside_the_object() {
     refused_with(
         &with("mass = 0.1", "mass = 0.1\ncenter_of_mass = [0, 0, 20]"),
-        &["S107 scene.toml:12:18 key \"object.center_of_mass\": is [0.0, 0.0, 20.0], outside the object"],
+        &["S107 scene.toml:12:18 key \"object.center_of_mass\": is [0, 0, 20], outside the object"],
     );
 }
 
@@ -472,7 +472,7 @@ fn enormous_numbers_are_shown_short() {
         let messages = Folder::new().messages(&with(from, to));
         assert!(messages.contains("1e") && messages.len() < 250, "{messages}");
     }
-    noted(&with("mass = 0.1", "mass = 1e300"), "mass 1e300 kg");
+    noted(&with("mass = 0.1", "mass = 1e5"), "mass 100000 kg");
 }
 
 #[test]

@@ -77,7 +77,7 @@ fn numbers_that_no_plan_can_hold_are_refused() {
 fn names_that_drive_a_terminal_or_fill_it_are_refused() {
     for name in ["a\\ncheck  ACCEPTED", "a\\u001b[2J", "a\\u202e", "a\\u200f", &"n".repeat(1_000_000)] {
         let folder = Folder::new();
-        let object = with("name = \"sphere\"", &format!("name = \"{name}\""));
+        let object = with("name = \"ball\"", &format!("name = \"{name}\""));
         let obstacle =
             format!("{GOOD}\n[[obstacles]]\nname = \"{name}\"\nsphere = {{ radius = 0.01 }}\nposition = [1, 1, 1]\n");
         for text in [object, obstacle] {

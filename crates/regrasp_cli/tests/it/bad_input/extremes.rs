@@ -56,7 +56,7 @@ fn the_length_of_a_direction_means_nothing() {
 #[test]
 fn no_name_forges_a_verdict() {
     let forged = "a\\ncheck  ACCEPTED   40 waypoints";
-    for (file, old) in [("scene.toml", "name = \"sphere\""), ("hand.toml", "name = \"east\"")] {
+    for (file, old) in [("scene.toml", "name = \"ball\""), ("hand.toml", "name = \"east\"")] {
         let folder = Folder::new();
         folder.edit(file, old, &format!("name = \"{forged}\""));
         let run = folder.run(&["plan", "scene.toml", "--max-work", "1"]);

@@ -26,6 +26,8 @@ use std::sync::Arc;
 
 /// Most links in a robot, and most joints.
 const MAX_LINKS: usize = 1_000;
+/// Most collision shapes in a robot: each is tested against many others.
+const MAX_COLLISIONS: usize = 10_000;
 /// Names of missing mesh files for which files of the same name are looked for elsewhere.
 const MAX_HINTS: usize = 20;
 
@@ -72,6 +74,11 @@ pub(crate) fn parse_robot(
         reader.found.push(diagnostic);
     }
 
+    let mut collisions = children(root, "link").flat_map(|link| children(link, "collision"));
+    if let Some(node) = collisions.nth(MAX_COLLISIONS) {
+        let problem = format!("has more than {MAX_COLLISIONS} <collision> elements");
+        return Err(Diagnostic::new("U105", reader.place(node), problem).into());
+    }
     let mut links = Vec::new();
     let mut link_nodes = Vec::new();
     for node in children(root, "link") {
