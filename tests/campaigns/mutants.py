@@ -130,7 +130,7 @@ def commands(rng, target):
         ["check", plan],
         ["view", plan, scene, "-o", "page.html", "--story", "story.json"],
         ["view", plan, scene, "--svg", "charts"],
-        ["view", plan, scene, "--png", "board.png", "--width", "200", "--frames", "1"],
+        ["view", plan, scene, "--png", "board.png", "--width", "300", "--frames", "2"],
         ["export", plan, "--scene", scene, "--npz", "a.npz", "--ros2", "a.yaml", "--mjcf", "a.xml"],
         ["export", plan, "--scene", scene, "--npz", "a.npz", "--no-check"],
         ["export", plan, "--ros2", "a.yaml", "--no-check"],
