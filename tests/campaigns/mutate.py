@@ -83,7 +83,7 @@ def line_mutant(rng, text, quote):
     elif draw < 0.77:
         lines[i], lines[j] = lines[j], lines[i]
     elif draw < 0.82:
-        lines[i : i + 1] = [lines[i]] * rng.choice([2, 10, 100, 1000, 5000])
+        lines[i : i + 1] = [lines[i]] * min(rng.choice([2, 10, 100, 1000, 5000]), 1 + MOST_BYTES // (len(lines[i]) + 1))
     elif draw < 0.86:
         lines[i] = rng.choice([lines[i] * 3, lines[i].strip(), lines[i] + " " + lines[j], lines[i][::-1], lines[i].upper()])
     elif draw < 0.90:
@@ -93,7 +93,8 @@ def line_mutant(rng, text, quote):
     elif draw < 0.97:
         return rng.choice(["\r\n", "\r", "\n\n", " "]).join(lines)
     else:
-        return text.replace(rng.choice([" ", "=", "\"", "[", "]", "<", ">", "0", "."]), rng.choice(["", "  ", "\t", "=", "\"", "\0", "\ufeff"]))
+        old = rng.choice([" ", "=", "\"", "[", "]", "<", ">", "0", "."])
+        return text.replace(old, rng.choice(["", "  ", "\t", "=", "\"", "\0", "\ufeff"]))
     return "\n".join(lines)
 
 
@@ -237,7 +238,8 @@ def json_mutant(rng, text):
             elif change == 2:
                 old[i], old[j] = old[j], old[i]
             elif change == 3:
-                old[i : i + 1] = [old[i]] * rng.choice([2, 10, 100])
+                size = len(json_text(old[i]))
+                old[i : i + 1] = [old[i]] * min(rng.choice([2, 10, 100]), 1 + MOST_BYTES // (size + 1))
             elif change == 4:
                 old.reverse()
             else:
@@ -301,7 +303,8 @@ def stl_mutant(rng, data):
             data = bytearray(cut(rng, bytes(data)))
         elif draw < 0.95 and len(data) > 134:
             facet = 84 + 50 * rng.randrange((len(data) - 84) // 50)
-            data += data[facet : facet + 50] * rng.choice([1, 100, 5000])
+            if len(data) < MOST_BYTES:
+                data += data[facet : facet + 50] * rng.choice([1, 100, 5000])
             data[80:84] = struct.pack("<I", (len(data) - 84) // 50)
         else:
             data[:5] = b"solid"
