@@ -1,8 +1,8 @@
 //! The plan and its parts. `docs/plan-format.md` and `schema/plan.schema.json` say the same.
 //!
-//! Between two waypoints every joint moves linearly and the object's pose as `interpolate_pose` says, both with the
-//! same parameter, which is linear in time; contact forces change linearly too, in the object frame. Between two segments
-//! everything rests while forces change.
+//! Between two waypoints every joint follows the cubic through positions, velocities and times. The object's pose moves as
+//! `interpolate_pose` says, with the joints' progress along their chord as its parameter. Contact forces are linear in that
+//! parameter, in the object frame. Between two segments everything rests while forces change.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
