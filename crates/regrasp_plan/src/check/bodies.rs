@@ -193,7 +193,8 @@ impl Bodies {
                     _ => false,
                 };
                 // Of an object with a hull, tips ask for the shape and all others for the hull.
-                let tip_on_object = matches!((first.owner, second.owner), (Owner::Finger(_), Owner::Object)) && first.is_tip;
+                let tip_on_object =
+                    matches!((first.owner, second.owner), (Owner::Finger(_), Owner::Object)) && first.is_tip;
                 let is_other = |item: &Item| if tip_on_object { item.is_hull } else { item.is_for_tips_only };
                 if judged && !allowed && !is_other(first) && !is_other(second) {
                     let tip_of = match (first.owner, second.owner) {

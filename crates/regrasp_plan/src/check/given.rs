@@ -23,7 +23,13 @@ pub fn check_given(
     let n_last = last.waypoints.len().saturating_sub(1);
     let ends = [
         (Kind::StartMismatch, "start", &query.start_grasp, first.waypoints.first(), Moment::at(0, 0)),
-        (Kind::GoalMismatch, "goal", &query.goal_grasp, last.waypoints.last(), Moment::at(plan.segments.len() - 1, n_last)),
+        (
+            Kind::GoalMismatch,
+            "goal",
+            &query.goal_grasp,
+            last.waypoints.last(),
+            Moment::at(plan.segments.len() - 1, n_last),
+        ),
     ];
     for (kind, name, asked, waypoint, at) in ends {
         let Some(waypoint) = waypoint else { continue };
@@ -44,7 +50,7 @@ pub fn check_given(
             }
             GraspRequest::Joints(joints) => {
                 for finger in &model.fingers {
-                    let touches = gap(shape, finger, joints, waypoint).abs() <= settings.surface_tolerance;
+                    let touches = gap(shape, finger, joints, waypoint).abs() <= settings.pose_tolerance;
                     let exactly = settings.pose_tolerance;
                     let [reach, turn] = if touches { [exactly; 2] } else { [GRASP_TOLERANCE, GRASP_TURN_TOLERANCE] };
                     let own = finger.coordinates.clone();

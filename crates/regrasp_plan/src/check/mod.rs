@@ -21,14 +21,14 @@ pub mod continuity;
 pub mod edges;
 /// Obstacles that are too far away to matter in a step.
 pub mod far;
-/// Grasps that the query gives.
-pub mod given;
 /// `regrasp check`: everything is read afresh from files.
 pub mod files;
 /// The scene file of a plan, where nobody says which it is.
 pub mod find_scene;
 /// Contact forces and joint torques.
 pub mod forces;
+/// Grasps that the query gives.
+pub mod given;
 /// The checker's own forward kinematics and motion bounds.
 pub mod kinematics;
 /// Lifting and landing of moving fingertips.

@@ -154,9 +154,9 @@ fn hand() -> Hand {
 
 /// The object: a sphere whose centre of mass is its centre.
 fn object() -> Object {
-        hull: None,
     let shape = Shape::Sphere { radius: OBJECT_RADIUS };
     Object {
+        hull: None,
         name: "ball".into(),
         surface: surface_of(&shape),
         radius: OBJECT_RADIUS,

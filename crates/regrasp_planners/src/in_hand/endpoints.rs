@@ -12,8 +12,8 @@ use crate::failure::{Failure, FailureKind};
 use regrasp_base::Rng;
 use regrasp_geometry::collision::{Answer, Placement, separation};
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
-use regrasp_grasp::closure::may_close;
 use regrasp_grasp::ContactModel;
+use regrasp_grasp::closure::may_close;
 use regrasp_robot::kinematics::finger_ik::{Coordinates, IkSettings};
 use regrasp_robot::kinematics::whole_pose::{has_all_directions, joints_of_pose};
 use regrasp_scene::{GRASP_TOLERANCE, GraspRequest, InHandQuery};
@@ -248,19 +248,23 @@ fn from_joints(model: &Model, end: End, world_from_object: &Pose, values: &[f64]
                 "give joint positions within the limits; regrasp inspect prints them",
             ));
         }
-        let (contact, own) = given::touching(finger, &model.scene.object.surface, &own, &placement).map_err(|no_touch| {
-            let off = |gap: f64| {
-                let side = if gap < 0.0 { "inside" } else { "off" };
-                format!("is {:.2} mm {side} the surface", gap.abs() * 1e3)
-            };
-            let problem = match no_touch {
-                NoTouch::Inside => "has no contact: it is deep in the object".to_owned(),
-                NoTouch::Off(gap) => format!("{}; at most {} mm are put right", off(gap), GRASP_TOLERANCE * 1e3),
-                NoTouch::Stuck(gap) => format!("{}, and no joints near the given ones touch", off(gap)),
-            };
-            let message = format!("at the {} the tip of finger \"{name}\" {problem}", end.name());
-            end.failure(message, "correct the joints, give contacts, or let the planner choose (grasp = \"automatic\")")
-        })?;
+        let (contact, own) =
+            given::touching(finger, &model.scene.object.surface, &own, &placement).map_err(|no_touch| {
+                let off = |gap: f64| {
+                    let side = if gap < 0.0 { "inside" } else { "off" };
+                    format!("is {:.2} mm {side} the surface", gap.abs() * 1e3)
+                };
+                let problem = match no_touch {
+                    NoTouch::Inside => "has no contact: it is deep in the object".to_owned(),
+                    NoTouch::Off(gap) => format!("{}; at most {} mm are put right", off(gap), GRASP_TOLERANCE * 1e3),
+                    NoTouch::Stuck(gap) => format!("{}, and no joints near the given ones touch", off(gap)),
+                };
+                let message = format!("at the {} the tip of finger \"{name}\" {problem}", end.name());
+                end.failure(
+                    message,
+                    "correct the joints, give contacts, or let the planner choose (grasp = \"automatic\")",
+                )
+            })?;
         if !finger.pad_faces(&own, &placement.vector(&contact.normal_in_object)) {
             return Err(end.failure(
                 format!("at the {} finger \"{name}\" touches outside its pad", end.name()),

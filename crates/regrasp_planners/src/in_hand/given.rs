@@ -48,8 +48,7 @@ pub fn touching(
         let normal = contact.normal_in_object.into_inner();
         let wanted = Contact { point_in_object: contact.point_in_object - normal * left, ..contact };
         let settings = IkSettings { limit_margin: 0.0, preference: None, max_step: GRASP_TURN_TOLERANCE };
-        joints =
-            finger.touch_near(world_from_object, &wanted, &joints, &settings).ok_or(NoTouch::Stuck(gap))?;
+        joints = finger.touch_near(world_from_object, &wanted, &joints, &settings).ok_or(NoTouch::Stuck(gap))?;
         (contact, left) = finger.contact_at(surface, &joints, world_from_object).ok_or(NoTouch::Stuck(gap))?;
     }
     Err(NoTouch::Stuck(gap))

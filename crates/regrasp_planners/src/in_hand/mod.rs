@@ -29,16 +29,16 @@ pub(crate) mod forces_along;
 mod free;
 /// Two gait trees that grow until they meet.
 mod gait;
-/// Hands that are inside something.
-pub(crate) mod inside;
-/// Linear paths in GS_n.
-mod grasp_path;
 /// Given joints and contacts that nearly touch.
 mod given;
+/// Linear paths in GS_n.
+mod grasp_path;
 /// Grasps at a given object pose.
 mod grasps;
 /// Better plans after the first.
 mod improve;
+/// Hands that are inside something.
+pub(crate) mod inside;
 /// Legs of a query, from way pose to way pose.
 mod legs;
 /// Links between grasps.

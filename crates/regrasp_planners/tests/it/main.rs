@@ -9,6 +9,7 @@ mod places;
 mod roadmaps;
 mod segments;
 mod soft_and_coupled;
+mod solids;
 mod tips;
 mod tracking;
 mod tracking_gaits;
