@@ -10,6 +10,7 @@ mod reach;
 mod roadmaps;
 mod segments;
 mod soft_and_coupled;
+mod solids;
 mod tips;
 mod tracking;
 mod tracking_gaits;
