@@ -294,7 +294,8 @@ fn links_that_may_touch_are_neighbours_in_the_tree() {
                 }
             }
         };
-        let with_shapes: Vec<usize> = (0..robot.links.len()).filter(|&l| !robot.links[l].collision.is_empty()).collect();
+        let with_shapes: Vec<usize> =
+            (0..robot.links.len()).filter(|&l| !robot.links[l].collision.is_empty()).collect();
         for &a in &with_shapes {
             for &b in with_shapes.iter().filter(|&&b| b != a) {
                 let (body_a, body_b) = (body_of(a), body_of(b));
@@ -313,7 +314,8 @@ fn links_that_may_touch_are_neighbours_in_the_tree() {
 fn coupled_joints_follow_the_numbers_of_the_robot_file() {
     let Some(models) = shared_models() else { return };
     let options = LoadOptions::default();
-    let robot = load_robot(&models.join("robots/pr2/pr2.urdf"), &LoadOptions { lenient: true, ..options }).unwrap().robot;
+    let robot =
+        load_robot(&models.join("robots/pr2/pr2.urdf"), &LoadOptions { lenient: true, ..options }).unwrap().robot;
     let text = fs::read_to_string(models.join("robots/pr2/pr2.urdf")).unwrap();
     let document = text.split("<joint ").skip(1).map(|part| part.split("</joint>").next().unwrap());
     let mut n_coupled = 0;
@@ -327,7 +329,12 @@ fn coupled_joints_follow_the_numbers_of_the_robot_file() {
         let joint = &robot.joints[robot.joint_named(&attribute(part, "name").unwrap()).unwrap().0];
         let found = joint.mimic.as_ref().expect("it is coupled");
         assert_eq!(robot.joints[found.joint.0].name, attribute(mimic, "joint").unwrap());
-        assert_eq!((found.multiplier, found.offset), (number("multiplier", 1.0), number("offset", 0.0)), "{}", joint.name);
+        assert_eq!(
+            (found.multiplier, found.offset),
+            (number("multiplier", 1.0), number("offset", 0.0)),
+            "{}",
+            joint.name
+        );
         n_coupled += 1;
     }
     assert_eq!(n_coupled, 10);

@@ -62,7 +62,9 @@ pub fn transfer(workspace: &mut Workspace, start: &GraspState, goal: &Pose, mome
             && holds_weight(workspace, there, start.holding)
     });
     let is_near = (LEAST_SHARE_FOR_ARRIVAL..1.0).contains(&share);
-    if is_near && !model.may_release && spin::is_restricted(model, start.holding)
+    if is_near
+        && !model.may_release
+        && spin::is_restricted(model, start.holding)
         && let Some(others) = spin::arrive(model, start, goal)
         && is_carried_out(workspace, start, &others)
     {

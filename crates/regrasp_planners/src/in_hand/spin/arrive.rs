@@ -49,7 +49,8 @@ pub fn arrive(model: &Model, start: &GraspState, goal: &Pose) -> Option<Vec<Mome
         }
         let square = &slopes * slopes.transpose();
         let damping = 1e-8 * square.trace();
-        let pull = (square + DMatrix::identity(6, 6) * damping).cholesky()?.solve(&DVector::from(error.as_slice().to_vec()));
+        let pull =
+            (square + DMatrix::identity(6, 6) * damping).cholesky()?.solve(&DVector::from(error.as_slice().to_vec()));
         let change = slopes.transpose() * pull;
         offsets -= &change * (LARGEST_CHANGE / change.norm()).min(1.0);
         if offsets.norm() > LARGEST_OFFSET {
