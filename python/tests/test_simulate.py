@@ -125,17 +125,34 @@ def test_rotations_agree_with_mujoco() -> None:
             np.testing.assert_allclose(rotation_vector(quat), vector, atol=1e-9)
 
 
+def bezier(a: Any, b: Any, first: Any, last: Any, u: float) -> Any:
+    """Cubic by de Casteljau: another way than the one tested."""
+    points = [a, a + first / 3.0, b - last / 3.0, b]
+    while len(points) > 1:
+        points = [(1.0 - u) * p + u * q for p, q in zip(points, points[1:])]
+    return points[0]
+
+
 @pytest.mark.parametrize("speed", [1.0, 2.0])
-def test_the_reference_goes_through_the_waypoints_on_straight_lines(short: tuple[dict[str, Any], str], speed: float) -> None:
+def test_the_reference_goes_through_the_waypoints_on_cubics(short: tuple[dict[str, Any], str], speed: float) -> None:
     plan, _ = short
     ref = reference(plan, speed=speed)
     points = waypoints_of(plan)
     joints = np.array([point["joints"] for point in points])
     assert ref.n_ticks * ref.tick == pytest.approx(points[-1]["time"] / speed, abs=3 * ref.tick)
-    on_line = (1 - ref.fraction[:, None]) * joints[ref.waypoint] + ref.fraction[:, None] * joints[ref.waypoint + 1]
-    np.testing.assert_allclose(ref.joints, on_line, atol=1e-12)
+    times = np.array([point["time"] for point in points]) / speed
+    velocities = np.array([point["joint_velocities"] for point in points]) * speed
     assert np.all((ref.fraction >= 0) & (ref.fraction <= 1))
-    # Velocities are what the positions do, by differences; across a waypoint, where lines bend, these are means.
+    for tick in range(0, ref.n_ticks, 7):
+        k = ref.waypoint[tick]
+        span = times[k + 1] - times[k]
+        u = min((times[0] + tick * ref.tick - times[k]) / max(span, 1e-12), 1.0)
+        cubic = bezier(joints[k], joints[k + 1], velocities[k] * span, velocities[k + 1] * span, u)
+        np.testing.assert_allclose(ref.joints[tick], cubic, atol=1e-10)
+        chord = joints[k + 1] - joints[k]
+        if chord @ chord > 1e-12:
+            np.testing.assert_allclose(ref.fraction[tick], (cubic - joints[k]) @ chord / (chord @ chord), atol=1e-6)
+    # Velocities are what the positions do, by differences.
     differences = np.gradient(ref.joints, ref.tick, axis=0)
     largest = np.abs(ref.joint_velocities).max()
     assert largest > 0.05

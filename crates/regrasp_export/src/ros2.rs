@@ -1,7 +1,8 @@
 //! ROS 2 `trajectory_msgs/JointTrajectory` as YAML, as `ros2 topic pub` reads it.
 //!
 //! Only independent joints are in it: coupled ones follow by the robot's mechanism, and a controller does not command them.
-//! Accelerations are left empty, as the message allows: controllers then interpolate positions and velocities.
+//! Accelerations are left empty, as the message allows: controllers then interpolate positions and velocities by cubics, which
+//! are the motion that the plan means.
 
 use crate::error::{ExportError, LATEST_TIME};
 use regrasp_plan::{Plan, Waypoint};

@@ -1,8 +1,8 @@
 //! The plan and its parts. `docs/plan-format.md` and `schema/plan.schema.json` say the same.
 //!
-//! Between two waypoints every joint moves linearly and the object's pose as `interpolate_pose` says, both with the
-//! same parameter, which is linear in time; contact forces change linearly too, in the object frame. Between two segments
-//! everything rests while forces change.
+//! Between two waypoints every joint follows the cubic through positions, velocities and times. The object's pose moves as
+//! `interpolate_pose` says, with the joints' progress along their chord as its parameter. Contact forces are linear in that
+//! parameter, in the object frame. Between two segments everything rests while forces change.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -269,7 +269,7 @@ pub struct Promises {
     pub friction_margin: f64,
     /// Closure margin that every holding set keeps (see `regrasp_grasp::margin`); dimensionless.
     pub required_margin: f64,
-    /// Smallest margin that the planner found along the plan: a lower bound of the Ferrari-Canny radius.
+    /// Smallest margin that the planner found at the waypoints: a lower bound of the Ferrari-Canny radius.
     pub kept_margin: f64,
     /// Length by which torques are divided in the margin, in metres.
     pub torque_scale: f64,

@@ -264,3 +264,78 @@ fn frames_agree_with_products_of_matrices() {
         assert!((origin.coords - nalgebra::Vector3::from(expected)).norm() < 2e-9, "{file} {origin}");
     }
 }
+
+/// Links that may touch without the hand file saying so, worked out from the tree alone: walking from a link to the root, fixed
+/// joints and bodies without shapes are passed, and the first other body with shapes is a neighbour. The planner and the
+/// checker share this rule, so that a mistake in it would hide from both.
+#[test]
+fn links_that_may_touch_are_neighbours_in_the_tree() {
+    for name in ["wide_four_finger", "tight_four_finger", "six_finger", "soft_pair"] {
+        let hand = load_hand(&bundled(name), &LoadOptions::default()).unwrap().hand;
+        let robot = &hand.robot;
+        // The link at the root of the body that carries `link`, by fixed joints alone.
+        let body_of = |mut link: usize| {
+            while let Some(joint) = robot.links[link].parent_joint.map(|id| &robot.joints[id.0]) {
+                if joint.kind != regrasp_robot::JointKind::Fixed {
+                    break;
+                }
+                link = joint.parent.0;
+            }
+            link
+        };
+        let has_shapes =
+            |body: usize| (0..robot.links.len()).any(|l| body_of(l) == body && !robot.links[l].collision.is_empty());
+        let parent_body = |body: usize| {
+            let mut above = body;
+            loop {
+                above = body_of(robot.joints[robot.links[above].parent_joint?.0].parent.0);
+                if has_shapes(above) {
+                    return Some(above);
+                }
+            }
+        };
+        let with_shapes: Vec<usize> =
+            (0..robot.links.len()).filter(|&l| !robot.links[l].collision.is_empty()).collect();
+        for &a in &with_shapes {
+            for &b in with_shapes.iter().filter(|&&b| b != a) {
+                let (body_a, body_b) = (body_of(a), body_of(b));
+                let expected =
+                    body_a == body_b || parent_body(body_a) == Some(body_b) || parent_body(body_b) == Some(body_a);
+                let found = hand.may_touch(regrasp_robot::LinkId(a), regrasp_robot::LinkId(b));
+                let names = [a, b].map(|link| robot.links[link].name.as_str());
+                assert_eq!(found, expected, "{name}: {names:?}");
+            }
+        }
+    }
+}
+
+/// A coupled joint is where its coupling says, for the planner's chains and by the numbers of the robot file alike.
+#[test]
+fn coupled_joints_follow_the_numbers_of_the_robot_file() {
+    let Some(models) = shared_models() else { return };
+    let options = LoadOptions::default();
+    let robot =
+        load_robot(&models.join("robots/pr2/pr2.urdf"), &LoadOptions { lenient: true, ..options }).unwrap().robot;
+    let text = fs::read_to_string(models.join("robots/pr2/pr2.urdf")).unwrap();
+    let document = text.split("<joint ").skip(1).map(|part| part.split("</joint>").next().unwrap());
+    let mut n_coupled = 0;
+    for part in document.filter(|part| part.contains("<mimic ")) {
+        let attribute = |text: &str, key: &str| {
+            let value = text.split(&format!("{key}=\"")).nth(1)?;
+            Some(value.split('"').next().unwrap().to_owned())
+        };
+        let mimic = part.split("<mimic ").nth(1).unwrap().split('>').next().unwrap();
+        let number = |key: &str, default: f64| attribute(mimic, key).map_or(default, |text| text.parse().unwrap());
+        let joint = &robot.joints[robot.joint_named(&attribute(part, "name").unwrap()).unwrap().0];
+        let found = joint.mimic.as_ref().expect("it is coupled");
+        assert_eq!(robot.joints[found.joint.0].name, attribute(mimic, "joint").unwrap());
+        assert_eq!(
+            (found.multiplier, found.offset),
+            (number("multiplier", 1.0), number("offset", 0.0)),
+            "{}",
+            joint.name
+        );
+        n_coupled += 1;
+    }
+    assert_eq!(n_coupled, 10);
+}

@@ -1,4 +1,4 @@
-"""``python -m regrasp.simulate plan.json``: exit code 0 kept, 1 dropped, 2 bad input."""
+"""``python -m regrasp.simulate plan.json``: exit code 0 kept, 1 lost, 2 bad input."""
 
 from __future__ import annotations
 
@@ -36,6 +36,7 @@ def main(arguments: list[str] | None = None) -> int:
             friction_scale=options.friction_scale,
             mass_scale=options.mass_scale,
             torsion=options.torsion,
+        torsion_told=options.torsion_told,
             speed=options.speed,
             noslip=not options.no_noslip,
             hold_time=options.hold_time,
@@ -79,7 +80,7 @@ def summary(report: Report) -> str:
         at = report.dropped
         who = f", {at.finger} let go first" if at.finger else ""
         moving = f" of {at.moving_finger}" if at.moving_finger else ""
-        lines.append(f"DROPPED at {at.time:.2f} of {report.duration:.1f} s, segment {at.segment}, {at.kind}{moving}{who}")
+        lines.append(f"LOST ({at.cause}) at {at.time:.2f} of {report.duration:.1f} s, segment {at.segment}, {at.kind}{moving}{who}")
     final = _pose(report.final_position_error, report.final_angle_error)
     lines.append(f"error  {final} at the end, {_pose(report.largest_position_error, report.largest_angle_error)} at most")
     lines.append(
@@ -129,6 +130,12 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--friction-scale", type=_positive, default=1.0, help="friction of the simulation over the scene's")
     parser.add_argument("--mass-scale", type=_positive, default=1.0, help="mass of the object over the planned one")
     parser.add_argument("--torsion", type=float, metavar="M", help="torsional friction of all fingertips, in metres")
+    parser.add_argument(
+        "--torsion-told",
+        type=float,
+        metavar="M",
+        help="what the controller makes up for of it, for hard fingertips; 0: nothing [default: all]",
+    )
     parser.add_argument("--speed", type=_positive, default=1.0, help="times faster than planned")
     parser.add_argument("--squeeze", type=_positive, default=0.003, metavar="M", help="of controller A, in metres")
     parser.add_argument("--no-noslip", action="store_true", help="without MuJoCo's solver against creep")

@@ -15,7 +15,7 @@ import json
 import math
 import multiprocessing
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,6 +52,7 @@ class Job:
     mass_scale: float
     speed: float
     torsion: float | None
+    torsion_told: float | None
     noslip: bool
     packages: tuple[tuple[str, str], ...]
     settings: str
@@ -60,16 +61,23 @@ class Job:
     folder: str
 
     @property
+    def scene_name(self) -> str:
+        """Its file's name, with the folder's where that is not the scenes' own."""
+        path = Path(self.scene)
+        return path.stem if path.parent.name in ("", "scenes") else f"{path.parent.name}/{path.stem}"
+
+    @property
     def plan_path(self) -> Path:
         """Where the plan is kept."""
-        return Path(self.folder) / "plans" / self.variant / Path(self.scene).stem / f"{self.gravity}-{self.seed}.json"
+        return Path(self.folder) / "plans" / self.variant / self.scene_name / f"{self.gravity}-{self.seed}.json"
 
     def result_path(self, controller: str) -> Path:
         """Where the result of a replay is kept."""
         conditions = f"f{self.friction_scale:g}-m{self.mass_scale:g}-v{self.speed:g}"
         conditions += "" if self.torsion is None else f"-t{self.torsion:g}"
+        conditions += "" if self.torsion_told is None else f"-k{self.torsion_told:g}"
         conditions += "" if self.noslip else "-creep"
-        place = Path(self.folder) / "results" / self.variant / Path(self.scene).stem / f"{controller}-{conditions}"
+        place = Path(self.folder) / "results" / self.variant / self.scene_name / f"{controller}-{conditions}"
         return place / f"{self.gravity}-{self.seed}.json"
 
 
@@ -92,7 +100,7 @@ def _replay(job: Job, controllers: Sequence[str]) -> None:
     drift = None
     for controller in controllers:
         row: dict[str, Any] = {
-            "scene": Path(job.scene).stem,
+            "scene": job.scene_name,
             "variant": job.variant,
             "gravity": job.gravity,
             "controller": controller,
@@ -101,6 +109,7 @@ def _replay(job: Job, controllers: Sequence[str]) -> None:
             "mass_scale": job.mass_scale,
             "speed": job.speed,
             "torsion": job.torsion,
+            "torsion_told": job.torsion_told,
             "noslip": job.noslip,
             "planned": plan is not None,
             "cause": cause,
@@ -113,6 +122,7 @@ def _replay(job: Job, controllers: Sequence[str]) -> None:
                 mass_scale=job.mass_scale,
                 speed=job.speed,
                 torsion=job.torsion,
+                torsion_told=job.torsion_told,
                 noslip=job.noslip,
             )
             xml = regrasp.export_mjcf(plan, scene)
@@ -134,6 +144,7 @@ def _replay(job: Job, controllers: Sequence[str]) -> None:
                 "unplanned": " ".join("+".join(touch.geoms) for touch in touched),
                 "duration": round(report.duration, 3),
                 "largest_force": round(report.largest_normal_force, 3),
+                "lost_by": dropped.cause if dropped else "",
                 "dropped_segment": dropped.segment if dropped else "",
                 "dropped_kind": dropped.kind if dropped else "",
                 "dropped_finger": (dropped.finger or "") if dropped else "",
@@ -192,9 +203,9 @@ def _write(path: Path, text: str) -> None:
     part.replace(path)
 
 
-def table(rows: Iterable[dict[str, Any]]) -> str:
-    """A Markdown table: one line per scene, kind of plan, gravity, controller and conditions."""
-    keys = ("scene", "variant", "gravity", "controller", "friction_scale", "mass_scale", "speed", "torsion", "noslip")
+def table(rows: Sequence[dict[str, Any]]) -> str:
+    """Markdown tables: one line per scene, kind of plan, gravity, controller and conditions; sums; and every miss."""
+    keys = ("scene", "variant", "gravity", "controller", "friction_scale", "mass_scale", "speed", "torsion", "torsion_told", "noslip")
     groups: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
     for row in rows:
         groups.setdefault(tuple(row[key] for key in keys), []).append(row)
@@ -204,7 +215,7 @@ def table(rows: Iterable[dict[str, Any]]) -> str:
         "|" + "---|" * 15,
     ]
     for group, members in sorted(groups.items(), key=lambda item: [str(value) for value in item[0]]):
-        scene, variant, gravity, controller, friction, mass, speed, torsion, noslip = group
+        scene, variant, gravity, controller, friction, mass, speed, torsion, told, noslip = group
         seen = [row for row in members if row["planned"]]
         kept = [row for row in seen if row["kept"]]
         conditions = [
@@ -214,6 +225,7 @@ def table(rows: Iterable[dict[str, Any]]) -> str:
                 (f"mass x {mass:g}", mass == 1.0),
                 (f"speed x {speed:g}", speed == 1.0),
                 (f"torsion {1e3 * (torsion or 0.0):g} mm", torsion is None),
+                (f"told {1e3 * (told or 0.0):g} mm", told is None),
                 ("noslip off", noslip),
             )
             if not usual
@@ -236,7 +248,47 @@ def table(rows: Iterable[dict[str, Any]]) -> str:
             _drift(seen),
         ]
         lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n" + _totals(rows) + _misses(rows)
+
+
+def _totals(rows: Sequence[dict[str, Any]]) -> str:
+    """One line per controller over all scenes."""
+    lines = ["", "| controller | planned | kept | within 5 mm, 5 deg | within 2 mm, 2 deg |", "|" + "---|" * 5]
+    for controller in sorted({row["controller"] for row in rows}):
+        of_it = [row for row in rows if row["controller"] == controller]
+        seen = [row for row in of_it if row["planned"]]
+        counts = [len(seen), *(sum(bool(is_so(row)) for row in seen) for is_so in (_kept, _within(5), _within(2)))]
+        totals = [len(of_it), len(seen), len(seen), len(seen)]
+        shares = [f"{n} of {total} ({100.0 * n / max(total, 1):.1f} %)" for n, total in zip(counts, totals)]
+        lines.append("| " + " | ".join([controller, *shares]) + " |")
     return "\n".join(lines) + "\n"
+
+
+def _kept(row: dict[str, Any]) -> bool:
+    return bool(row["kept"])
+
+
+def _within(limit: float) -> Callable[[dict[str, Any]], bool]:
+    return lambda row: bool(row["kept"]) and row["final_mm"] < limit and row["final_deg"] < limit
+
+
+def _misses(rows: Sequence[dict[str, Any]]) -> str:
+    """The replays that lost the object or ended too far off, one by one, and the queries without a plan."""
+    lines = ["", "| scene | gravity | seed | controller | what |", "|" + "---|" * 5]
+    for row in sorted(rows, key=lambda row: (row["scene"], row["gravity"], row["seed"], row["controller"])):
+        if not row["planned"]:
+            what = f"no plan: {row['cause']}"
+        elif not row["kept"]:
+            finger = f", {row['dropped_finger']} let go first" if row["dropped_finger"] else ""
+            where = f"{row['dropped_time']:.2f} s, segment {row['dropped_segment']} ({row['dropped_kind']}){finger}"
+            what = f"lost ({row['lost_by']}) at {where}"
+        elif not _within(5)(row):
+            what = f"ended {row['final_mm']:.2f} mm {row['final_deg']:.2f} deg off"
+        else:
+            continue
+        cells = [row["scene"], row["gravity"], str(row["seed"]), row["controller"], what.replace("|", "/")]
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n" if len(lines) > 3 else ""
 
 
 def _one(rows: list[dict[str, Any]], of: Any, key: str) -> str:
@@ -275,6 +327,7 @@ def main(arguments: list[str] | None = None) -> int:
             mass_scale=mass,
             speed=speed,
             torsion=options.torsion,
+            torsion_told=options.torsion_told,
             noslip=not options.no_noslip,
             packages=tuple((name, str(folder)) for name, folder in options.package),
             settings=json.dumps(settings),
@@ -339,6 +392,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--mass-scale", type=scales, default=[1.0])
     parser.add_argument("--speed", type=scales, default=[1.0])
     parser.add_argument("--torsion", type=float, metavar="M", help="torsional friction of all fingertips, in metres")
+    parser.add_argument("--torsion-told", type=float, metavar="M", help="what the controller makes up for of it")
     parser.add_argument("--no-noslip", action="store_true", help="without MuJoCo's solver against creep")
     parser.add_argument("--settings", type=Path, metavar="FILE.json", help="settings of the planner")
     parser.add_argument("--time-limit", type=float, default=60.0, metavar="S", help="for one plan [default: 60]")

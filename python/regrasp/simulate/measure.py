@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 from ._mujoco import MjModel, mujoco
 from .model import Rig, Settings
 from .reference import Array, Reference, rotation_matrices, waypoints_of
-from .replay import DROPPED, Drift, Track, pose_errors
+from .replay import Drift, Track, pose_errors
+
+#: The object is lost where its centre of mass is farther from the plan, in metres,
+LARGEST_POSITION_ERROR = 0.010
+#: where it is turned farther, in radians,
+LARGEST_ANGLE_ERROR = np.radians(20.0)
+#: or where no fingertip presses on it for longer than so many seconds.
+LONGEST_OFF_FINGERS = 0.024
 
 #: A contact that should hold counts as lost when it is away for longer, in seconds.
 LOST_AFTER = 0.024
@@ -50,11 +57,14 @@ class UnplannedContact:
 class Dropped:
     """Where the object was lost."""
 
+    cause: str
+    """``position``, ``angle`` or ``off the fingers``."""
+
     segment: int
     kind: str
     """``transfer`` or ``regrasp``."""
     time: float
-    """When it was more than 30 mm away, in seconds from the start of the plan."""
+    """When it was, in seconds from the start of the plan."""
     finger: str | None
     """Of the fingers that should hold, the one that lost its contact first in the second before."""
     moving_finger: str | None
@@ -101,10 +111,16 @@ def report(rig: Rig, ref: Reference, track: Track, torques: Array, drift: Drift 
     seen = np.concatenate((track.object_position, track.object_quat_wxyz), axis=1)
     wanted = np.concatenate((ref.object_position, ref.object_quat_wxyz), axis=1)[ticks]
     position, angle = pose_errors(rig, seen, wanted)
-    away = np.flatnonzero(~(position <= DROPPED))
-    kept = len(away) == 0
+    lost_at = {
+        "position": np.flatnonzero(~(position <= LARGEST_POSITION_ERROR)),
+        "angle": np.flatnonzero(~(angle <= LARGEST_ANGLE_ERROR)),
+        "off the fingers": _off_fingers(ref, track.sensors[:, rig.normal_force]),
+    }
+    first = {cause: int(ticks_lost[0]) for cause, ticks_lost in lost_at.items() if len(ticks_lost)}
+    cause = min(first, key=lambda name: first[name], default="")
+    kept = not first
     # What is flung about afterwards says nothing.
-    end = track.n_ticks if kept else int(away[0]) + 1
+    end = track.n_ticks if kept else first[cause] + 1
     forces = track.sensors[:end, rig.normal_force]
     lost = _lost_contacts(rig, ref, ticks[:end], forces)
     slip = _slip(rig, ref, track, ticks[:end], forces)
@@ -112,7 +128,7 @@ def report(rig: Rig, ref: Reference, track: Track, torques: Array, drift: Drift 
     gx, gy, gz = (float(g) for g in rig.model.opt.gravity)
     return Report(
         kept=kept,
-        dropped=None if kept else _dropped(rig, ref, ticks, int(away[0]), forces),
+        dropped=None if kept else _dropped(rig, ref, ticks, cause, first[cause], forces),
         largest_position_error=float(position[:end].max()),
         largest_angle_error=float(angle[:end].max()),
         final_position_error=float(position[-1]),
@@ -149,7 +165,16 @@ def _lost_contacts(rig: Rig, ref: Reference, ticks: NDArray[np.int64], forces: A
     return sorted(lost, key=lambda contact: contact.time)
 
 
-def _dropped(rig: Rig, ref: Reference, ticks: NDArray[np.int64], at: int, forces: Array) -> Dropped:
+def _off_fingers(ref: Reference, forces: Array) -> NDArray[np.int64]:
+    """Ticks at which no fingertip has pressed on the object for too long."""
+    longest = round(LONGEST_OFF_FINGERS / ref.tick)
+    runs = _runs((forces <= 0.0).all(axis=1))
+    return np.array([first + longest for first, end in runs if end - first > longest], dtype=np.int64)
+
+
+def _dropped(
+    rig: Rig, ref: Reference, ticks: NDArray[np.int64], cause: str, at: int, forces: Array
+) -> Dropped:
     segment = int(ref.segment[ticks[at]])
     described = rig.plan["segments"][segment]
     begin = max(0, at - round(1.0 / ref.tick))
@@ -157,6 +182,7 @@ def _dropped(rig: Rig, ref: Reference, ticks: NDArray[np.int64], at: int, forces
     first = [int(np.argmax(column)) if column.any() else at + 1 for column in without.T]
     finger = int(np.argmin(first))
     return Dropped(
+        cause=cause,
         segment=segment,
         kind=described["kind"],
         time=at * ref.tick,

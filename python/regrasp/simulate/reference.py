@@ -1,10 +1,9 @@
 """A plan in time: what hand and object should do at every control tick.
 
-Between two waypoints the motion stays on the plan's own line (joints linearly, the object as ``interpolate_pose`` of the
-planner says, all with one parameter), so that what the checker accepted is what is replayed. Only the timing along the line
-is smoothed: the parameter is the cubic Hermite polynomial whose slopes are the plan's joint velocities projected on the line,
-limited to ``[0, 3]`` so that it never turns back (Fritsch and Carlson 1980). Between two segments everything rests while
-forces change linearly.
+Between two waypoints every joint follows the cubic through the plan's positions, velocities and times. The object follows
+``interpolate_pose`` of the planner. Its parameter is the cubic from 0 to 1 whose slopes at both ends are the joint velocities
+projected on the joints' chord (docs/plan-format.md, Time). This is the motion that the checker judges. Between two segments
+everything rests while forces change linearly.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ class Reference:
     waypoint: NDArray[np.int64]
     """Index of the waypoint passed last, counted over all segments. Shape (n,)."""
     fraction: Array
-    """How far on the line to the next waypoint, in [0, 1]. Shape (n,)."""
+    """Parameter of the object and the forces on the way to the next waypoint, in [0, 1]. Shape (n,)."""
     joints: Array
     """In the order of the plan's ``joint_names``. Shape (n, n_joints)."""
     joint_velocities: Array
@@ -112,7 +111,13 @@ def reference(plan: Plan, *, tick: float = 0.004, speed: float = 1.0) -> Referen
     end_slope = np.where(moves, np.clip(slope * np.einsum("ij,ij->i", line, velocities[1:]), 0.0, 3.0), 1.0)
     a, b = start_slope[index], end_slope[index]
     s = u * (a + u * ((3.0 - 2.0 * a - b) + u * (a + b - 2.0)))
-    rate = (a + u * (2.0 * (3.0 - 2.0 * a - b) + u * 3.0 * (a + b - 2.0))) / duration[index]
+    # Cubic Hermite polynomials and their derivatives: of the change, and of the velocities at both ends.
+    v, span = 1.0 - u, duration[index]
+    polynomials = u * u * (3.0 - 2.0 * u), u * v * v * span, -u * u * v * span
+    derivatives = 6.0 * u * v / span, v * (1.0 - 3.0 * u), u * (3.0 * u - 2.0)
+    ends = line[index], velocities[:-1][index], velocities[1:][index]
+    way = np.sum([share[:, None] * end for share, end in zip(polynomials, ends)], axis=0)
+    velocity = np.sum([share[:, None] * end for share, end in zip(derivatives, ends)], axis=0)
 
     position, quat = _object_poses(points, index, s)
     held = held_at_waypoints(plan)
@@ -121,8 +126,8 @@ def reference(plan: Plan, *, tick: float = 0.004, speed: float = 1.0) -> Referen
         segment=segment_of[index],
         waypoint=index,
         fraction=s,
-        joints=joints[index] + s[:, None] * line[index],
-        joint_velocities=rate[:, None] * line[index],
+        joints=joints[index] + way,
+        joint_velocities=velocity,
         object_position=position,
         object_quat_wxyz=quat,
         # In a pause only those hold that hold before and after: the others' forces go up from zero or down to it.

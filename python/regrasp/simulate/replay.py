@@ -13,8 +13,8 @@ from .controllers import Controller
 from .model import Rig, Settings
 from .reference import Array, Reference, rotation_matrices
 
-#: Position error of the object at which it counts as dropped, in metres.
-DROPPED = 0.030
+#: Position error of the object at which a replay ends: it is gone. In metres.
+GONE = 0.060
 #: The static hold settles for so long before its drift is measured, in seconds.
 SETTLE_TIME = 0.5
 
@@ -127,7 +127,7 @@ def replay(rig: Rig, ref: Reference, controller: Controller, gripped: MjData, se
         contacts.append(data.contact.geom.copy())
         if k % 10 == 0:
             away = qpos[k, first : first + 3] - ref.object_position[tick]
-            if not float(away @ away) < (2.0 * DROPPED) ** 2:
+            if not float(away @ away) < GONE**2:
                 seen = k + 1
                 break
     counts = np.array([len(geoms) for geoms in contacts])

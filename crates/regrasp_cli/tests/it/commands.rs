@@ -137,16 +137,6 @@ fn a_broken_plan_is_rejected_with_exit_code_1() {
     assert!(run.err.contains("InputHashMismatch"), "{}", run.err);
 }
 
-#[test]
-fn a_reader_that_goes_away_is_no_panic() {
-    let folder = Folder::new();
-    let mut child = folder.command(&["plan", "scene.toml"]).spawn().unwrap();
-    drop(child.stdout.take());
-    let run = Run::of(child.wait_with_output().unwrap());
-    assert_eq!(run.code, Some(0), "{run:?}");
-    assert!(!run.err.contains("panicked"), "{}", run.err);
-}
-
 /// Ctrl-C ends a search within 100 ms with exit code 130. The best of three counts: the machine may be busy.
 #[cfg(unix)]
 #[test]

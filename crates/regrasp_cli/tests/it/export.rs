@@ -59,5 +59,5 @@ fn files_that_cannot_be_read_or_written() {
         complains(&export(&["plan.json", "--ros2", input]), "F003", input, &["an input of this command"]);
     }
     let same = export(&["plan.json", "--npz", "a", "--ros2", "a"]);
-    complains(&same, "A505", "command line", &["--ros2", "another format"]);
+    complains(&same, "A505", "command line", &["--ros2", "the file that --npz writes to"]);
 }

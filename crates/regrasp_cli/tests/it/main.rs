@@ -5,6 +5,8 @@ mod commands;
 mod export;
 mod folder;
 mod growth;
+#[cfg(unix)]
+mod outputs;
 mod pictures;
 #[path = "../../../../tests/support/places.rs"]
 mod places;

@@ -10,7 +10,7 @@ use crate::plan::{Plan, Waypoint};
 use regrasp_geometry::{Pose, Vector};
 use regrasp_scene::{GRASP_TOLERANCE, GRASP_TURN_TOLERANCE, GraspRequest, InHandQuery};
 
-/// Compares the first and the last waypoint with the grasps that the query gives.
+/// Compares the first and the last waypoint with the grasps that the query gives; one finger is reported for each.
 pub fn check_given(
     shape: &SortedShape,
     query: Option<&InHandQuery>,
@@ -50,7 +50,7 @@ pub fn check_given(
             }
             GraspRequest::Joints(joints) => {
                 for finger in &model.fingers {
-                    let touches = gap(shape, finger, joints, waypoint).abs() <= settings.surface_tolerance;
+                    let touches = gap(shape, finger, joints, waypoint).abs() <= settings.pose_tolerance;
                     let exactly = settings.pose_tolerance;
                     let [reach, turn] = if touches { [exactly; 2] } else { [GRASP_TOLERANCE, GRASP_TURN_TOLERANCE] };
                     let own = finger.coordinates.clone();
@@ -58,8 +58,10 @@ pub fn check_given(
                     let moved = (finger.center_in_world(joints) - finger.center_in_world(&waypoint.joints)).norm();
                     if turned > turn + exactly {
                         tell(&finger.name, "largest joint", turned, turn);
+                        break;
                     } else if moved > reach + exactly {
                         tell(&finger.name, "tip", moved, reach);
+                        break;
                     }
                 }
             }
@@ -70,6 +72,7 @@ pub fn check_given(
                         .map_or(f64::INFINITY, |point| (Vector::from(point) - asked.coords).norm());
                     if moved > GRASP_TOLERANCE + settings.pose_tolerance {
                         tell(&finger.name, "contact", moved, GRASP_TOLERANCE);
+                        break;
                     }
                 }
             }

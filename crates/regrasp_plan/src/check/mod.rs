@@ -367,7 +367,7 @@ fn judge(
         Some(_) => None,
     };
     report.min_margin = at_waypoints.into_iter().chain(between).reduce(f64::min);
-    promises::check_promises(&scene.object, plan, settings, report.min_margin, log);
+    promises::check_promises(&scene.object, plan, settings, at_waypoints, log);
     allowance::check_allowance(scene, model, plan, log);
     times::check_times(&scene.object, model, plan, settings, log);
     report.duration = times::duration(plan);

@@ -153,3 +153,66 @@ fn a_contact_near_an_edge_of(shape: Shape) {
         assert_eq!(found, reported);
     }
 }
+
+/// A leap is rejected for what it is, and motion bounds do not follow it for minutes.
+#[test]
+fn leaps_are_rejected_at_once_and_the_report_says_what_was_left_out() {
+    let scene = sample::scene();
+    let plan = sample::plan(&scene);
+    for value in [20.0, 1e3, 1e4, 1e6, -1e6] {
+        let mut leaping = plan.clone();
+        leaping.segments[1].waypoints[2].joints[2] = value;
+        let started = std::time::Instant::now();
+        let report = judge(&scene, &leaping);
+        assert!(started.elapsed().as_secs_f64() < 2.0, "{value}: {:?}", started.elapsed());
+        let kinds = kinds(&report);
+        for kind in [ViolationKind::JointLimit, ViolationKind::JointJump] {
+            assert!(kinds.contains(&kind), "{value}: {kinds:?}");
+        }
+        assert!(!report.accepted() && report.left_out.len() == 1, "{:?}", report.left_out);
+        assert!(report.left_out[0].starts_with("motion between waypoints: segment 1"), "{:?}", report.left_out);
+    }
+    // The object may not leap either.
+    let mut leaping = plan.clone();
+    leaping.segments[0].waypoints[1].world_from_object.position[0] = 1e6;
+    let report = judge(&scene, &leaping);
+    assert!(kinds(&report).contains(&ViolationKind::JointJump) && report.left_out.len() == 1, "{report:?}");
+    assert!(judge(&scene, &plan).left_out.is_empty());
+}
+
+/// A plan that asks for more work than the checker does is not accepted, whatever is right with it so far.
+#[test]
+fn what_is_cut_by_the_work_limit_is_not_accepted() {
+    let scene = sample::scene();
+    let plan = sample::plan(&scene);
+    let with = |most_work: u64| check(&scene, None, &plan, &CheckSettings { most_work, ..CheckSettings::default() });
+    let whole = with(CheckSettings::default().most_work);
+    assert!(whole.accepted(), "{whole:?}");
+    // By a hundredth of the limit this plan is judged whole.
+    assert_eq!(with(CheckSettings::default().most_work / 100), whole);
+    for most_work in [0, 1, 100, 1000] {
+        let report = with(most_work);
+        assert_eq!(kinds(&report), [ViolationKind::NotJudged], "{report:?}");
+        assert!(!report.accepted() && report.left_out.len() == 1, "{:?}", report.left_out);
+    }
+}
+
+/// One definition of relocations, counted from the segments: a finger lands. What a file says of itself does not count.
+#[test]
+fn relocations_are_landings() {
+    let scene = sample::scene();
+    let mut plan = sample::plan_with_free_finger(&scene);
+    let regrasps = plan.segments.iter().filter(|segment| segment.kind == regrasp_plan::SegmentKind::Regrasp);
+    let lands = |segment: &&regrasp_plan::Segment| {
+        let (first, last) = (&segment.waypoints[0], segment.waypoints.last().unwrap());
+        (0..plan.fingers.len()).any(|f| {
+            last.contacts[f].holds() && {
+                !first.contacts[f].holds() || first.contacts[f].point_in_object != last.contacts[f].point_in_object
+            }
+        })
+    };
+    let (n_regrasps, n_landings) = (regrasps.clone().count(), regrasps.filter(lands).count() as u64);
+    plan.statistics.relocations = 99;
+    assert_eq!(plan.n_relocations(), n_landings);
+    assert!(n_landings < n_regrasps as u64, "a finger lifts off and stays free");
+}

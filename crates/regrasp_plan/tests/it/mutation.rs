@@ -50,7 +50,7 @@ fn every_mutant_is_rejected_for_a_fitting_reason() {
     let (counts, kinds) = judge_mutants(&plans, 8);
     // All but one that needs an edge of a box, one that needs a finger of more than three joints, four of coupled joints,
     // and those that tracking alone has.
-    assert_eq!(counts.len(), 130, "{counts:?}");
+    assert_eq!(counts.len(), 135, "{counts:?}");
     for (name, count) in &counts {
         assert!(*count >= 5, "{name} was only made {count} times");
     }
@@ -82,6 +82,12 @@ fn every_mutant_is_rejected_for_a_fitting_reason() {
         "no time for forces to change",
         "joint acceleration promised below the motion's",
         "velocity with which the motion turns back",
+        "velocity where a joint rests",
+        "joint accelerates too fast between waypoints only",
+        "time squeezed until a joint accelerates too fast",
+        "joint too fast between waypoints only",
+        "fingertip too fast between waypoints only",
+        "velocity with which a fingertip leaves its contact",
     ] {
         assert!(counts.contains_key(name), "{name} was never made");
     }

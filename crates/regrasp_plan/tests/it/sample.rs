@@ -156,6 +156,7 @@ fn hand() -> Hand {
 fn object() -> Object {
     let shape = Shape::Sphere { radius: OBJECT_RADIUS };
     Object {
+        hull: None,
         name: "ball".into(),
         surface: surface_of(&shape),
         radius: OBJECT_RADIUS,

@@ -154,7 +154,8 @@ fn bridge(search: &mut Search, trees: &mut [Tree; 2], growing: usize, node: usiz
     let (tree, other) = if growing == 0 { (&*first, second) } else { (&*second, first) };
     let state = tree.nodes[node].state();
     if spin::is_restricted(search.model(), state.holding) {
-        return bridge_halfway(search, (tree, other), node, growing);
+        // Hands that never change their grasp have to arrive by one transfer.
+        return if search.model().may_release { bridge_halfway(search, (tree, other), node, growing) } else { None };
     }
     let mut nearest = (f64::INFINITY, None);
     for (index, place) in other.places.iter().enumerate() {

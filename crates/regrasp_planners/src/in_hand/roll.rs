@@ -45,6 +45,8 @@ pub struct Rolled {
     pub joints: Coordinates,
     /// Turn of the tip over the object about the normal, in radians; of soft fingertips only.
     pub spin: f64,
+    /// Contact halfway, where a fine step looked at it.
+    pub halfway: Option<Contact>,
 }
 
 impl Rolled {
@@ -74,6 +76,8 @@ impl Touching {
 /// What is left of a motion when rolling is taken off.
 #[derive(Debug, Clone, Copy, Default)]
 struct Slipped {
+    /// Contact halfway, where it was looked at.
+    halfway: Option<Contact>,
     /// How far the tip slid over the object, in the object frame.
     way: Vector,
     /// How far it turned about the normal, in radians; of soft fingertips only.
@@ -171,7 +175,7 @@ impl<'a> RollStep<'a> {
             finger.pad.is_none_or(|pad| pad.holds(&-end.stance.object_from_link.tr_mul(&end.stance.normal)))
         })?;
         let spin = self.spin(&self.start, &end.stance);
-        Some(Rolled { contact: end.contact(), foot: end.foot, joints, spin })
+        Some(Rolled { contact: end.contact(), foot: end.foot, joints, spin, halfway: None })
     }
 
     /// The end of a long step, for looking ahead: no look at what happens half-way.
@@ -192,7 +196,7 @@ impl<'a> RollStep<'a> {
         for correction in 0..=CORRECTIONS {
             let left = self.slip_over_parts(&end, &between, allowed).ok_or(NoStep::TooLong)?;
             if left.way.norm() <= STEP_SLIP && (!turns_along || left.spin.abs() <= STEP_SPIN) {
-                return Ok(Rolled { spin: left.spin, ..end });
+                return Ok(Rolled { spin: left.spin, halfway: left.halfway, ..end });
             }
             if correction < CORRECTIONS {
                 error.way += left.way;
@@ -204,12 +208,13 @@ impl<'a> RollStep<'a> {
     }
 
     /// Slip over parts of the step, while the joints move linearly: what the rule over the whole of it leaves out. None where
-    /// the tip is farther from the surface than `allowed`, or deeper, at the end of a part.
+    /// the tip is farther from the surface than `allowed`, or deeper, or touches outside its pad, at the end of a part.
     fn slip_over_parts(&self, end: &Rolled, between: &impl Fn(f64) -> Placement, allowed: f64) -> Option<Slipped> {
         let n_parts = if self.model.scene.object.surface.mesh().is_some() { PARTS_ON_MESH } else { PARTS };
         let finger = &self.model.fingers[self.finger];
         let chain = finger.ik.chain();
         let mut before = self.start;
+        let mut halfway = None;
         let mut sum = Slipped::default();
         let mut add = |from: &Stance, to: &Stance| {
             sum.way += self.slip(from, to);
@@ -219,15 +224,19 @@ impl<'a> RollStep<'a> {
             let t = k as f64 / n_parts as f64;
             let joints: Coordinates = self.joints.iter().zip(&end.joints).map(|(a, b)| a + t * (b - a)).collect();
             let touch = self.touch(&chain.last_frame(&joints), &between(t))?;
-            if touch.gap.abs() > allowed {
+            let facing = -touch.stance.object_from_link.tr_mul(&touch.stance.normal);
+            if touch.gap.abs() > allowed || finger.pad.is_some_and(|pad| !pad.holds(&facing)) {
                 return None;
+            }
+            if 2 * k == n_parts {
+                halfway = Some(touch.contact());
             }
             add(&before, &touch.stance);
             before = touch.stance;
         }
         let last = RollStep::new(self.model, self.finger, &end.contact, &end.joints, self.to, self.to).start;
         add(&before, &last);
-        Some(sum)
+        Some(Slipped { halfway, ..sum })
     }
 }
 

@@ -10,6 +10,9 @@
 //! ([`pursue`]). It seldom ends exactly there: two transfers with different grasps can meet exactly ([`meet`]), as
 //! `k + k'` conditions on their common pose leave a choice for up to six.
 
+/// Transfers that end exactly at their goal, by themselves.
+mod arrive;
+
 use super::candidates::Candidate;
 use super::combine::Choice;
 use super::model::{MAX_FINGERS, Model};
@@ -17,13 +20,14 @@ use super::roll::{NoStep, STEP_SPIN};
 use super::state::{GraspState, Moment};
 use super::transfer::{Spins, is_closed, step_joints};
 use arrayvec::ArrayVec;
+pub use arrive::arrive;
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector6};
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Pose, Vector, frame};
 use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 
-/// Shift of the centre of mass, and turn times the object's radius, in the world, in metres.
+/// Shift of the centre of mass, and turn times a length, in the world, in metres.
 pub type Twist = Vector6<f64>;
 
 /// Corrections of a step by the turns about normals that it leaves.
@@ -48,7 +52,7 @@ pub fn is_restricted(model: &Model, holding: u32) -> bool {
 pub fn twist_between(model: &Model, from: &Pose, to: &Pose) -> Twist {
     let center = &model.frame.center_of_mass;
     let shift = to * center - from * center;
-    let turn = frame::rotation_between(from, to) * model.turn_length();
+    let turn = frame::rotation_between(from, to) * turn_length(model);
     Twist::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
 }
 
@@ -56,7 +60,7 @@ pub fn twist_between(model: &Model, from: &Pose, to: &Pose) -> Twist {
 fn moved(model: &Model, from: &Pose, twist: &Twist) -> Pose {
     let center = &model.frame.center_of_mass;
     let shift = Vector::new(twist[0], twist[1], twist[2]);
-    let turn = Vector::new(twist[3], twist[4], twist[5]) / model.turn_length();
+    let turn = Vector::new(twist[3], twist[4], twist[5]) / turn_length(model);
     let rotation = UnitQuaternion::from_scaled_axis(turn) * from.rotation;
     let origin = from * center + shift - rotation * center.coords;
     Pose::from_parts(origin.coords.into(), rotation)
@@ -76,7 +80,7 @@ fn condition(
     let point = placement.point(&contact.point_in_object);
     let ik = model.fingers[finger].ik;
     let gradient = ik.turn_per_motion(joints, &(point - ik.tip(joints)), &normal)?;
-    let by_turn = ((point - center).cross(&gradient) - normal) / model.turn_length();
+    let by_turn = ((point - center).cross(&gradient) - normal) / turn_length(model);
     Some(Twist::new(gradient.x, gradient.y, gradient.z, by_turn.x, by_turn.y, by_turn.z))
 }
 
@@ -343,3 +347,12 @@ impl Freedom {
         left.norm()
     }
 }
+
+/// Length by which turns are weighed against shifts here: about that of a finger's links, as a turn that a finger has to go along
+/// with shifts its tip by so much. By measurement on the spheres of D'Claw and TriFinger.
+fn turn_length(model: &Model) -> f64 {
+    2.0 * model.turn_length()
+}
+
+#[cfg(test)]
+mod tests;

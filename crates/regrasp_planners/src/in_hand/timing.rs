@@ -28,7 +28,7 @@ pub const LEAST_SPAN: f64 = 1e-3;
 /// Rounds in which directions are changed where the motion strays too far from the chords.
 const ROUNDS: usize = 4;
 /// Share of what the search leaves between it and the checker that the motion may stray from the chords.
-const STRAY_SHARE: f64 = 0.5;
+const STRAY_SHARE: f64 = 0.75;
 /// How far links may turn aside of the chords in a segment of tracking, there and back, in radians: a quarter of what checkers
 /// allow to contacts that do not turn.
 const TRACKED_TURN: f64 = 5e-4;

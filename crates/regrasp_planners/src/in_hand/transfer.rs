@@ -54,12 +54,29 @@ pub fn transfer(workspace: &mut Workspace, start: &GraspState, goal: &Pose, mome
         return 0.0;
     }
     workspace.set_state(start);
-    follow(workspace.model, start, goal, moments, |there| {
+    let n_before = moments.len();
+    let model = workspace.model;
+    let share = follow(model, start, goal, moments, |there| {
         workspace.roll_to(&there.contacts);
         workspace.step(&there.world_from_object, &there.joints, TipMode::AllHold)
             && holds_weight(workspace, there, start.holding)
-    })
+    });
+    let is_near = (LEAST_SHARE_FOR_ARRIVAL..1.0).contains(&share);
+    if is_near
+        && !model.may_release
+        && spin::is_restricted(model, start.holding)
+        && let Some(others) = spin::arrive(model, start, goal)
+        && is_carried_out(workspace, start, &others)
+    {
+        moments.truncate(n_before);
+        moments.extend(others);
+        return 1.0;
+    }
+    share
 }
+
+/// Share of its way that a transfer must come towards its goal before another way there is sought with the same grasp. By hand.
+const LEAST_SHARE_FOR_ARRIVAL: f64 = 0.6;
 
 /// True when `moments` of a transfer from `start` are clear of collisions, with forces that hold the weight.
 pub fn is_carried_out(workspace: &mut Workspace, start: &GraspState, moments: &[Moment]) -> bool {
@@ -139,6 +156,7 @@ pub fn step_joints(model: &Model, holding: u32, here: &Moment, pose: &Pose) -> R
     let between = |t: f64| Placement::from(&line.at(t));
     let mut joints = HandJoints::new();
     let mut contacts = here.contacts.clone();
+    let mut halfway = here.contacts.clone();
     let mut spins = Spins::new();
     for finger in 0..model.n_fingers() {
         let own = &here.joints[finger];
@@ -155,6 +173,7 @@ pub fn step_joints(model: &Model, holding: u32, here: &Moment, pose: &Pose) -> R
                 spins.push(rolled.spin);
             }
             contacts[finger] = rolled.contact;
+            halfway[finger] = rolled.halfway.unwrap_or(rolled.contact);
             rolled.joints
         } else {
             let there = follow_contact(model, finger, &contacts[finger], &to, own).ok_or(NoStep::OutOfReach)?;
@@ -163,6 +182,10 @@ pub fn step_joints(model: &Model, holding: u32, here: &Moment, pose: &Pose) -> R
             }
             there
         });
+    }
+    // Contacts travel between waypoints too, and the grasp closes there as well: a shorter step may do.
+    if model.any_rolls() && model.closure_margin(&halfway, holding) < model.settings.closure_margin {
+        return Err(NoStep::TooLong);
     }
     Ok((Moment { world_from_object: *pose, joints, contacts }, spins))
 }

@@ -72,16 +72,17 @@ fn validate_segment(model: &Model, workspace: &mut Workspace, segment: &Segment)
     match (segment.kind, moving) {
         (SegmentKind::Transfer, _) => {
             for (k, waypoint) in waypoints.iter().enumerate().skip(1) {
-                let pose = Pose::from(&waypoint.world_from_object);
+                let here = state_at(waypoint);
                 if waypoint.contacts != waypoints[k - 1].contacts {
-                    let here = state_at(waypoint);
                     let margin = model.closure_margin(&here.contacts, here.holding);
                     if margin < model.settings.closure_margin {
                         return Err((k, not_closed(model, margin)));
                     }
                     workspace.roll_to(&here.contacts);
                 }
-                if !workspace.step(&pose, &joints_of(model, waypoint), TipMode::AllHold) {
+                if !workspace.step(&here.world_from_object, &here.joints, TipMode::AllHold)
+                    && !is_clear_backwards(workspace, &here, &state_at(&waypoints[k - 1]))
+                {
                     return Err((k, in_the_way(workspace)));
                 }
             }
@@ -101,6 +102,22 @@ fn validate_segment(model: &Model, workspace: &mut Workspace, segment: &Segment)
 
 fn not_closed(model: &Model, margin: f64) -> String {
     format!("closure margin {margin:.4} of {}", model.settings.closure_margin)
+}
+
+/// True when the step from `before` to `here` is proven from its end: the search grows a tree from the goal too, whose transfers are
+/// proven backwards. A step with a tip that rolls is tested with the contact normals of the end that it leads to, so that one way may
+/// be proven where the other is not. The workspace is left at `here`.
+fn is_clear_backwards(workspace: &mut Workspace, here: &GraspState, before: &GraspState) -> bool {
+    let blocking_pair = workspace.blocking_pair;
+    workspace.set_state(here);
+    workspace.roll_to(&before.contacts);
+    let is_clear = workspace.step(&before.world_from_object, &before.joints, TipMode::AllHold);
+    workspace.set_state(here);
+    if !is_clear {
+        // What stood in the way forwards is what is told.
+        workspace.blocking_pair = blocking_pair;
+    }
+    is_clear
 }
 
 /// The bodies that stopped the last step.

@@ -73,6 +73,8 @@ pub struct Workspace<'a> {
     now: Configuration,
     next: Configuration,
     stale: Stale,
+    /// False in a test of a step: what was outside a mesh where it began, and crosses no triangle, is outside all along.
+    stands: bool,
     /// Pairs that something is known of: those of the model, then those with obstacles that were ever near.
     pairs: Vec<Pair>,
     /// Which obstacles are near.
@@ -115,6 +117,7 @@ impl<'a> Workspace<'a> {
         Workspace {
             next: now.clone(),
             stale: Stale::Nothing,
+            stands: true,
             now,
             pairs: model.pairs.clone(),
             nearby: Nearby::new(model),
@@ -206,30 +209,30 @@ impl<'a> Workspace<'a> {
         self.set_finger(finger, joints);
     }
 
-    /// True when no pair is too near now, and no tip too far away.
-    pub fn is_clear(&mut self, mode: TipMode) -> bool {
+    /// Tested next is where everything is now, not a step.
+    fn stand(&mut self) {
         self.work += 1;
         self.align(None);
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
+        self.stands = true;
+    }
+
+    /// True when no pair is too near now, and no tip too far away.
+    pub fn is_clear(&mut self, mode: TipMode) -> bool {
+        self.stand();
         self.is_within_reach(None) && self.all_are_clear(None, mode)
     }
 
     /// True when no pair of one finger is too near now, and its tip not too far away.
     pub fn finger_is_clear(&mut self, finger: usize, mode: TipMode) -> bool {
-        self.work += 1;
-        self.align(None);
-        self.motion.fill(0.0);
-        self.deviation.fill(0.0);
+        self.stand();
         self.is_within_reach(Some(finger)) && self.all_are_clear(Some(finger), mode)
     }
 
     /// True when one finger is clear of the object, the palm and obstacles now, whatever the other fingers do.
     pub fn finger_alone_is_clear(&mut self, finger: usize, mode: TipMode) -> bool {
-        self.work += 1;
-        self.align(None);
-        self.motion.fill(0.0);
-        self.deviation.fill(0.0);
+        self.stand();
         let moving = &self.model.fingers[finger];
         self.is_within_reach(Some(finger))
             && self.in_turn(moving.pairs.len(), &moving.turns, mode, |this, k| {
@@ -240,14 +243,11 @@ impl<'a> Workspace<'a> {
 
     /// True when two fingers with these joints are clear of each other.
     pub fn fingers_are_clear(&mut self, first: (usize, &Coordinates), second: (usize, &Coordinates)) -> bool {
-        self.work += 1;
         let model = self.model;
         let (f, g) = (first.0.min(second.0), first.0.max(second.0));
         self.set_finger(first.0, first.1);
         self.set_finger(second.0, second.1);
-        self.align(None);
-        self.motion.fill(0.0);
-        self.deviation.fill(0.0);
+        self.stand();
         self.forget_slack();
         model.fingers[f].pairs_with[g].iter().all(|&pair| self.pair_is_clear(pair, TipMode::AllHold))
     }
@@ -275,7 +275,6 @@ impl<'a> Workspace<'a> {
     /// What lies between is not tested: contacts that slide are no motion that is carried out (paths in GS_n, paper 000,
     /// section 4.1). How far bodies move only spares tests of what is far apart.
     pub fn slide(&mut self, world_from_object: &Pose, joints: &HandJoints, contacts: &Contacts) -> bool {
-        self.work += 1;
         self.contacts.clone_from(contacts);
         place_object(self.model, &mut self.next, world_from_object);
         for finger in 0..self.model.n_fingers() {
@@ -288,8 +287,7 @@ impl<'a> Workspace<'a> {
         self.nearby.drift(&self.motion);
         self.now.clone_from(&self.next);
         self.stale = Stale::Nothing;
-        self.motion.fill(0.0);
-        self.deviation.fill(0.0);
+        self.stand();
         self.is_within_reach(None) && self.all_are_clear(None, TipMode::AllHold)
     }
 
@@ -304,6 +302,7 @@ impl<'a> Workspace<'a> {
     /// Tests the step from `now` to `next`; on success `now` becomes `next`. Only pairs of `moving` are looked at.
     fn try_step(&mut self, moving: Option<usize>, mode: TipMode, halvings: u32) -> bool {
         self.work += 1;
+        self.stands = false;
         self.bound_motion(moving);
         let model = self.model;
         let is_within_reach = self.is_within_reach(moving);
@@ -557,9 +556,9 @@ impl<'a> Workspace<'a> {
         // Whatever the moment, one of the two ends is at most half of the motion away.
         let needed = required + 0.5 * relative_motion;
         let mut smallest = 0.0;
-        // Outside at one end and apart all along is outside all along.
-        if tree.is_apart(&body.shape, &now, needed, &mut smallest)
-            && tree.is_outside((&body.shape, &body.middle), &next, needed, &mut smallest)
+        if (self.stands || tree.is_apart(&body.shape, &now, needed, &mut smallest))
+            && tree.is_apart(&body.shape, &next, needed, &mut smallest)
+            && !(self.stands && tree.holds(&next.point(&body.middle)))
         {
             self.slack[index] = smallest;
             return true;
@@ -573,7 +572,7 @@ impl<'a> Workspace<'a> {
         let (tip, object) = (&self.model.bodies[pair.a], &self.model.bodies[pair.b]);
         self.slack[index] = f64::NEG_INFINITY;
         let allowed = self.model.settings.contact_allowance - self.deviation[pair.a] - self.deviation[pair.b];
-        for configuration in [&self.now, &self.next] {
+        for configuration in &[&self.now, &self.next][usize::from(self.stands)..] {
             let (at_tip, at_object) = (&configuration.placements[pair.a], &configuration.placements[pair.b]);
             let normal = normal_in_world.unwrap_or_else(|| at_object.vector(&self.contacts[finger].normal_in_object));
             // The gap along the inward normal, from tip to object.
@@ -588,15 +587,14 @@ impl<'a> Workspace<'a> {
             let in_tip = object_from_tip.vector_to_child(&-normal_in_object);
             let lowest = normal_in_object.dot(&object_from_tip.translation)
                 - regrasp_geometry::collision::support::support_value(&tip.shape, &in_tip, &mut self.hints[index][0]);
-            let mut smallest = 0.0;
-            let is_apart = tree.all_near(&tip.shape, &object_from_tip, 0.0, &mut smallest, &mut |corners| {
+            let is_apart = tree.all_near(&tip.shape, &object_from_tip, 0.0, &mut 0.0, &mut |corners| {
                 let highest = corners.iter().map(|p| normal_in_object.dot(&p.coords)).fold(f64::NEG_INFINITY, f64::max);
                 lowest - highest >= -allowed
             });
             // What it may press into lies below; where it is thicker than that, it must not be inside with all of the rest.
             let middle = object_from_tip.point(&tip.middle);
             let is_thick = normal_in_object.dot(&middle.coords) - lowest > allowed;
-            if !is_apart || (is_thick && tree.holds(&middle)) {
+            if !is_apart || self.stands && is_thick && tree.holds(&middle) {
                 return false;
             }
         }

@@ -6,9 +6,11 @@ mod in_hand_methods;
 mod physics;
 #[path = "../../../../tests/support/places.rs"]
 mod places;
+mod reach;
 mod roadmaps;
 mod segments;
 mod soft_and_coupled;
+mod solids;
 mod tips;
 mod tracking;
 mod tracking_gaits;

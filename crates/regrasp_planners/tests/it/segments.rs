@@ -88,3 +88,25 @@ fn segments_of_a_hand_with_redundant_fingers_meet_exactly() {
     }
     assert!(n_plans >= 12, "{n_plans} plans");
 }
+
+/// Transfers of the tree from the goal are proven from their ends. With tips that are hulls and roll, a step may be proven one way only.
+#[test]
+fn plans_of_hands_with_rolling_hulls_are_proven_again() {
+    let Some(models) = shared_models() else { return };
+    let packages = vec![("models".into(), models)];
+    let options = LoadOptions { resolve: ResolveOptions { packages, search_paths: vec![] }, ..LoadOptions::default() };
+    let mut n_plans = 0;
+    for name in ["dclaw/soft_sphere32_y", "dclaw/soft_sphere32_x", "dclaw/soft_sphere32_z"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../scenes/{name}.toml"));
+        let loaded = load_scene(&path, &options).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let settings = InHandSettings::default();
+        for seed in 0..16 {
+            let query = loaded.task.query(seed);
+            let found = plan_in_hand(&loaded.scene, &query, &settings, seed, &Budget::work(100_000), &|_| {});
+            let Ok(plan) = found else { continue };
+            n_plans += 1;
+            assert_eq!(validate_once(&loaded.scene, &plan, &settings), Ok(()), "{name}, seed {seed}");
+        }
+    }
+    assert!(n_plans >= 40, "{n_plans} plans");
+}

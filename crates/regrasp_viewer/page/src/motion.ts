@@ -47,6 +47,14 @@ export interface ContactNow {
 
 const FREE: ContactNow = { mode: "free", point: [0, 0, 0], normal: [0, 0, 1], force: null };
 
+/** Joints that move less than this, all together, rest. */
+const RESTS = 1e-9;
+
+/** The cubic from 0 with these change and slopes at both ends, at `u` in [0, 1]. */
+function cubic(change: number, first: number, last: number, u: number): number {
+  return u * (first + u * (3 * change - 2 * first - last + u * (first + last - 2 * change)));
+}
+
 const holds = (contact: Contact | undefined): boolean => contact !== undefined && contact.mode !== "free";
 
 export class Motion {
@@ -107,24 +115,47 @@ export class Motion {
     return { index: low, u: span > 0 ? clamp((time - this.times[low]) / span, 0, 1) : 0 };
   }
 
+  /** Joints on the cubics through positions and velocities of the waypoints before and after. */
   joints(time: number): number[] {
     const { index, u } = this.moment(time);
-    const from = this.waypoints[index].joints;
-    const to = this.waypoints[index + 1]?.joints;
-    return to === undefined || u === 0 ? from : from.map((q, i) => q + (to[i] - q) * u);
+    const [from, to] = [this.waypoints[index], this.waypoints[index + 1]];
+    if (to === undefined || u === 0) return from.joints;
+    const span = this.times[index + 1] - this.times[index];
+    return from.joints.map((q, i) => q + cubic(to.joints[i] - q, from.joint_velocities[i] * span, to.joint_velocities[i] * span, u));
+  }
+
+  /**
+   * The parameter of object, contacts and forces, in [0, 1], a share `u` of the time after waypoint `index`. At both ends it is
+   * as fast as the joints are along their chord; where they rest it is linear.
+   */
+  parameter(index: number, u: number): number {
+    const [from, to] = [this.waypoints[index], this.waypoints[index + 1]];
+    if (to === undefined || u === 0) return 0;
+    const span = this.times[index + 1] - this.times[index];
+    let [square, first, last] = [0, 0, 0];
+    from.joints.forEach((q, i) => {
+      const change = to.joints[i] - q;
+      square += change * change;
+      first += change * from.joint_velocities[i] * span;
+      last += change * to.joint_velocities[i] * span;
+    });
+    if (square <= RESTS * RESTS) return u;
+    return clamp(cubic(1, clamp(first / square, 0, 3), clamp(last / square, 0, 3), u), 0, 1);
   }
 
   object(time: number): Pose {
     const { index, u } = this.moment(time);
     const from = poseFrom(this.waypoints[index].world_from_object);
     const next = this.waypoints[index + 1];
-    return next === undefined || u === 0 ? from : interpolatePose(from, poseFrom(next.world_from_object), u);
+    if (next === undefined || u === 0) return from;
+    return interpolatePose(from, poseFrom(next.world_from_object), this.parameter(index, u));
   }
 
   contacts(time: number): ContactNow[] {
     const { index, u } = this.moment(time);
     const now = this.waypoints[index].contacts;
     const next = this.waypoints[index + 1]?.contacts;
+    const t = this.parameter(index, u);
     return now.map((from, finger) => {
       const to = u === 0 ? from : next?.[finger];
       if (to === undefined || !holds(from) || !holds(to)) return FREE;
@@ -133,9 +164,9 @@ export class Motion {
       const forces = from.force_in_object && to.force_in_object;
       return {
         mode: this.holding(index, from, to),
-        point: lerp(pointFrom, to.point_in_object ?? pointFrom, u),
-        normal: unit(lerp(normalFrom, to.normal_in_object ?? normalFrom, u)),
-        force: forces ? lerp(from.force_in_object!, to.force_in_object!, u) : null,
+        point: lerp(pointFrom, to.point_in_object ?? pointFrom, t),
+        normal: unit(lerp(normalFrom, to.normal_in_object ?? normalFrom, t)),
+        force: forces ? lerp(from.force_in_object!, to.force_in_object!, t) : null,
       };
     });
   }

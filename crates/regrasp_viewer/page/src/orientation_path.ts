@@ -161,7 +161,7 @@ export class OrientationPath {
     const { index, u } = this.motion.moment(this.player.time);
     const before = this.path[index];
     const now = nearestVector(rotationBetween(STILL, this.motion.object(this.player.time).quat), before);
-    const length = this.along[index] + u * ((this.along[index + 1] ?? this.along[index]) - this.along[index]);
+    const length = this.along[index] + this.motion.parameter(index, u) * ((this.along[index + 1] ?? this.along[index]) - this.along[index]);
     const degrees = (radians: number) => ((radians * 180) / Math.PI).toFixed(1);
     setText(this.readout, `turned ${degrees(length)}\u00b0 of ${degrees(this.along[this.along.length - 1])}\u00b0 along the path`);
     const made = this.prepare(this.over);

@@ -85,6 +85,8 @@ export interface PieceStory {
 /** One number per waypoint, all segments joined in order (the shared waypoint between two segments counts twice). */
 export interface Judged {
   accepted: boolean;
+  /** What the plan was judged for. */
+  level: "geometry" | "forces" | "motion";
   /** First violations, as text. */
   violations: string[];
   /** Closure margin of the holding fingers; null where it could not be judged. */

@@ -91,6 +91,37 @@ test("a motion gives its waypoints, and half-way half of everything", () => {
   assert.deepEqual(motion.joints(1e9), motion.waypoints.at(-1).joints);
 });
 
+test("joints follow cubics with the plan's velocities, and the object goes as they do along their chords", () => {
+  const motion = new Motion(sphere.plan);
+  const h = 1e-8;
+  let moving = 0;
+  for (let i = 0; i + 1 < motion.times.length; i++) {
+    const [from, to] = [motion.waypoints[i], motion.waypoints[i + 1]];
+    const span = motion.times[i + 1] - motion.times[i];
+    if (span < 1e-3) continue;
+    near(motion.joints(motion.times[i + 1] - 1e-12), to.joints, 1e-9);
+    from.joints.forEach((_, k) => {
+      const rate = (time) => (motion.joints(time + h)[k] - motion.joints(time)[k]) / h;
+      near([rate(motion.times[i]), rate(motion.times[i + 1] - h)], [from.joint_velocities[k], to.joint_velocities[k]], 1e-3);
+    });
+    const chord = to.joints.map((q, k) => q - from.joints[k]);
+    const square = chord.reduce((sum, x) => sum + x * x, 0);
+    if (square < 1e-12) continue;
+    const slopes = [from, to].map((w) => (w.joint_velocities.reduce((sum, v, k) => sum + v * chord[k], 0) * span) / square);
+    // The checker refuses others; the numbers of this story are rounded.
+    if (slopes.some((slope) => slope < 0 || slope > 3)) continue;
+    moving++;
+    for (const u of [0.1, 0.35, 0.5, 0.8]) {
+      const joints = motion.joints(motion.times[i] + u * span);
+      const along = joints.reduce((sum, q, k) => sum + (q - from.joints[k]) * chord[k], 0) / square;
+      near([motion.parameter(i, u)], [along], 1e-6);
+      const pose = math.interpolatePose(math.poseFrom(from.world_from_object), math.poseFrom(to.world_from_object), along);
+      near(motion.object(motion.times[i] + u * span).position, pose.position, 1e-9);
+    }
+  }
+  assert.ok(moving > 20, `${moving} steps`);
+});
+
 test("holds cover exactly the time in which a finger is on the object", () => {
   for (const { plan } of [synthetic({ duration: 12, triangles: 400 }), sphere]) {
     const motion = new Motion(plan);

@@ -35,7 +35,7 @@ test("opens from disk with hand, object and charts", options, async () => {
   await page.waitForTimeout(400);
   const { different, commonest } = colours(await picture(page));
   assert.ok(different > 500 && commonest < 0.9, `${different} colours, ${commonest} of one`);
-  assert.equal(await page.locator(".verdict").textContent(), "Accepted by the checker");
+  assert.equal(await page.locator(".verdict").textContent(), "Accepted by the checker for motion");
   const charts = page.locator(".chart canvas[role=img]");
   assert.equal(await charts.count(), 5);
   for (let i = 0; i < 5; i++) {
@@ -399,7 +399,7 @@ test("a page without a plan says why", options, async () => {
 test("a rejected plan says so first", options, async () => {
   const story = { ...ball, judged: { ...ball.judged, accepted: false, violations: ["finger \"index\" slips 0.4 mm at 3.1 s"], margin: ball.judged.margin.map(() => null) } };
   const opened = await open(browser, story);
-  assert.equal(await opened.page.locator(".verdict").textContent(), "Rejected by the checker");
+  assert.equal(await opened.page.locator(".verdict").textContent(), "Rejected by the checker for motion");
   assert.match(await opened.page.locator(".wrong").innerText(), /slips 0\.4 mm/);
   await finish(opened);
 });

@@ -271,7 +271,7 @@ export function synthetic(options = {}) {
     statistics: { transfers: nRounds, relocations: nRounds * nFingers },
   };
   const judged = {
-    accepted: true, violations: [], required_margin: 0.02, pairs,
+    accepted: true, level: "motion", violations: [], required_margin: 0.02, pairs,
     margin: all.map((w) => 0.06 + 0.028 * Math.sin(1.3 * w.time) - (w.contacts.some((c) => c.mode === "free") ? 0.012 : 0)),
     clearance: all.map((w) => 0.0021 + 0.0016 * Math.sin(0.9 * w.time + 1)),
     pair: all.map((w) => (Math.sin(0.9 * w.time) > 0 ? 0 : 1)),

@@ -12,7 +12,12 @@ pub(super) fn plan_facts(plan: &Plan, report: &Report, judged: &Judged) -> Vec<(
     let mut fact = |label: &str, value: String| facts.push((label.to_owned(), value));
     let verdict = match report.n_violations {
         0 if !report.accepted() => "REJECTED: not judged whole".to_owned(),
-        0 => format!("ACCEPTED: {} waypoints, {} distances", report.n_waypoints, report.n_distances),
+        0 => format!(
+            "ACCEPTED for {}: {} waypoints, {} distances",
+            report.level.name(),
+            report.n_waypoints,
+            report.n_distances
+        ),
         1 => "REJECTED: 1 violation".to_owned(),
         n => format!("REJECTED: {n} violations"),
     };

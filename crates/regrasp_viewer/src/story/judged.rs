@@ -32,6 +32,7 @@ pub(super) fn judged(scene: &Scene, plan: &Plan, report: &Report) -> Judged {
     };
     Judged {
         accepted: report.accepted(),
+        level: report.level,
         violations,
         margin,
         required_margin: plan.promises.required_margin,

@@ -21,6 +21,7 @@ pub use telling::{Outcome, Telling, tell};
 
 pub use regrasp_plan::plan::PoseData;
 
+use regrasp_plan::check::Level;
 use regrasp_plan::Plan;
 use serde::{Deserialize, Serialize};
 
@@ -205,6 +206,8 @@ pub struct PieceStory {
 pub struct Judged {
     /// Verdict.
     pub accepted: bool,
+    /// What the plan was judged for: `geometry`, `forces` or `motion`.
+    pub level: Level,
     /// First violations, as text.
     pub violations: Vec<String>,
     /// Closure margin of the holding fingers; none where it could not be judged.

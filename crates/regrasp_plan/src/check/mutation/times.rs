@@ -2,11 +2,13 @@
 
 use super::Breeder;
 use super::choice::{any_drive, any_waypoint, pick, pick_waypoint, waypoints_mut};
+use crate::check::between::Between;
 use crate::check::model::Model;
 use crate::check::violation::ViolationKind::{
-    JointAcceleration, JointTooFast, NotANumber, PromiseBroken, TimeOrder, TooFast, VelocityInconsistent, WrongScene,
+    ContactOffTip, JointAcceleration, JointTooFast, NotANumber, PromiseBroken, TimeOrder, TooFast,
+    VelocityInconsistent, WrongScene,
 };
-use crate::plan::{Plan, Segment, SegmentKind, Waypoint};
+use crate::plan::{ContactMode, Plan, Segment, SegmentKind, Waypoint};
 use regrasp_base::Rng;
 use regrasp_geometry::Vector;
 
@@ -111,19 +113,22 @@ impl Breeder<'_> {
             Some(())
         });
         self.add("velocity against the motion", &[VelocityInconsistent], |plan, rng| {
-            change_velocity(plan, rng, |before, after, rng| {
-                (before * after > 0.0 && before.abs() > 1e-4).then(|| -0.5 * before * rng.uniform(0.1, 1.0))
-            })
+            change_velocities(plan, rng, |rng| -rng.uniform(0.05, 0.5))
         });
         self.add("velocity with which the motion turns back", &[VelocityInconsistent], |plan, rng| {
-            change_velocity(plan, rng, |before, after, rng| {
-                let slower = if before.abs() < after.abs() { before } else { after };
-                (before * after > 0.0 && slower.abs() > 1e-4).then(|| slower * rng.uniform(3.1, 4.0))
-            })
+            change_velocities(plan, rng, |rng| rng.uniform(3.05, 4.0))
         });
-        self.add("velocity where a joint turns round or rests", &[VelocityInconsistent], |plan, rng| {
-            change_velocity(plan, rng, |before, after, rng| (before * after <= 0.0).then(|| rng.uniform(1e-5, 1e-3)))
+        self.add("velocity where a joint rests", &[VelocityInconsistent], |plan, rng| {
+            let (s, w) = pick_inner(plan, rng)?;
+            let waypoints = &mut plan.segments[s].waypoints;
+            let moved = |k: usize, other: usize| (waypoints[other].joints[k] - waypoints[w].joints[k]).abs();
+            let resting: Vec<usize> =
+                (0..waypoints[w].joints.len()).filter(|&k| moved(k, w - 1).max(moved(k, w + 1)) < 1e-9).collect();
+            let k = *resting.get(rng.below(resting.len().max(1)))?;
+            waypoints[w].joint_velocities[k] = rng.uniform(1e-5, 1e-3);
+            Some(())
         });
+        self.break_between();
         self.add("velocity is not a number", &[NotANumber], |plan, rng| {
             let waypoint = any_waypoint(plan, rng)?;
             *pick(&mut waypoint.joint_velocities, rng)? = f64::INFINITY;
@@ -131,6 +136,88 @@ impl Breeder<'_> {
         });
         self.add("velocities of one joint too few", &[WrongScene], |plan, rng| {
             any_waypoint(plan, rng)?.joint_velocities.pop().map(|_| ())
+        });
+    }
+}
+
+impl Breeder<'_> {
+    /// All is well at the waypoints and on average, but not between.
+    fn break_between(&mut self) {
+        let model = self.model;
+        self.add("joint accelerates too fast between waypoints only", &[JointAcceleration], |plan, rng| {
+            let (s, w) = pick_inner(plan, rng)?;
+            let limits = plan.promises.motion.joint_accelerations.clone();
+            let waypoints = &mut plan.segments[s].waypoints;
+            let span = waypoints[w + 1].time - waypoints[w].time;
+            let first = rng.below(limits.len());
+            for k in (0..limits.len()).map(|i| (first + i) % limits.len()) {
+                let acceleration = limits[k] * rng.uniform(1.02, 1.3) * if rng.chance(0.5) { 1.0 } else { -1.0 };
+                let (mean, after) = (mean(&waypoints[w], &waypoints[w + 1], k), waypoints[w + 1].joint_velocities[k]);
+                // The acceleration when the cubic begins is (6 mean - 4 velocity - 2 velocity after) / span.
+                let velocity = 0.25 * (6.0 * mean - 2.0 * after - acceleration * span);
+                let before = std::mem::replace(&mut waypoints[w].joint_velocities[k], velocity);
+                let is_whole = [w - 1, w].iter().all(|&w| !Between::new(&waypoints[w], &waypoints[w + 1]).is_broken());
+                if mean.abs() > 1e-3 && is_whole && (after - velocity).abs() < limits[k] * span {
+                    return Some(());
+                }
+                waypoints[w].joint_velocities[k] = before;
+            }
+            None
+        });
+        self.add("time squeezed until a joint accelerates too fast", &[JointAcceleration], |plan, rng| {
+            let (s, w) = pick_step(plan, rng)?;
+            let limits = plan.promises.motion.joint_accelerations.clone();
+            let (from, mut to) = (plan.segments[s].waypoints[w].clone(), plan.segments[s].waypoints[w + 1].clone());
+            let span = to.time - from.time;
+            let squeezed = (1..40).map(|i| span * 0.93f64.powi(i)).find(|span| {
+                to.time = from.time + span;
+                let motion = Between::new(&from, &to);
+                let too_fast = |(k, limit): (usize, &f64)| motion.joint(k).largest_bend() > 1.01 * limit * span * span;
+                !motion.is_broken() && limits.iter().enumerate().any(too_fast)
+            })?;
+            shift_after(plan, s, w, squeezed - span);
+            Some(())
+        });
+        self.add("joint too fast between waypoints only", &[JointTooFast], |plan, rng| {
+            let k = rng.below(plan.joint_names.len());
+            let (mut at_waypoints, mut between): (f64, f64) = (0.0, 0.0);
+            for (from, to) in steps(plan) {
+                let ends = from.joint_velocities[k].abs().max(to.joint_velocities[k].abs());
+                at_waypoints = at_waypoints.max(ends).max(mean(from, to, k).abs());
+                between = between.max(Between::new(from, to).joint(k).largest_slope() / (to.time - from.time));
+            }
+            plan.promises.motion.joint_velocities[k] = at_waypoints + (between - at_waypoints) * rng.uniform(0.1, 0.9);
+            (at_waypoints > 1e-6 && between > 1.02 * at_waypoints).then_some(())
+        });
+        self.add("fingertip too fast between waypoints only", &[TooFast], |plan, rng| {
+            let speed = |(from, to): (&Waypoint, &Waypoint)| longest_way(model, from, to) / (to.time - from.time);
+            let (mean, peak) = steps(plan)
+                .map(|(from, to)| (speed((from, to)), Between::new(from, to).sigma().largest_slope()))
+                .fold((0.0, 0.0), |best: (f64, f64), step| if step.0 > best.0 { step } else { best });
+            // The way along the chord is nearly even.
+            plan.promises.motion.largest_speed = mean * (1.0 + (peak - 1.0) * rng.uniform(0.1, 0.7));
+            (mean > 1e-6 && peak > 1.1).then_some(())
+        });
+        let expected = [ContactOffTip, JointAcceleration, VelocityInconsistent];
+        self.add("velocity with which a fingertip leaves its contact", &expected, |plan, rng| {
+            let tolerance = plan.promises.contact_tolerance;
+            let (s, w) = pick_waypoint(plan, rng, SegmentKind::Transfer)?;
+            let segment = &mut plan.segments[s];
+            if w == 0 || w + 1 == segment.waypoints.len() {
+                return None;
+            }
+            let f = rng.below(model.fingers.len());
+            let span = segment.waypoints[w + 1].time - segment.waypoints[w].time;
+            let waypoint = &mut segment.waypoints[w];
+            let mut rates = vec![0.0; waypoint.joints.len()];
+            let k = model.fingers[f].coordinates.clone().nth(rng.below(model.fingers[f].coordinates.len()))?;
+            rates[k] = 1.0;
+            let finger = &model.fingers[f];
+            let lever = finger.path.velocity(&finger.center, &waypoint.joints, &rates).norm();
+            // The cubic strays by 4/27 of the velocity that is aside, times the time.
+            let aside = rng.uniform(3.0, 5.0) * tolerance / (lever * span * 4.0 / 27.0);
+            waypoint.joint_velocities[k] += if rng.chance(0.5) { aside } else { -aside };
+            (lever > 0.01 && waypoint.contacts[f].mode == ContactMode::Fixed).then_some(())
         });
     }
 }
@@ -175,19 +262,20 @@ fn mean(from: &Waypoint, to: &Waypoint, k: usize) -> f64 {
     (to.joints[k] - from.joints[k]) / (to.time - from.time)
 }
 
-/// Gives some joint at some inner waypoint another velocity, by the mean velocities before and after.
-fn change_velocity(plan: &mut Plan, rng: &mut Rng, change: impl Fn(f64, f64, &mut Rng) -> Option<f64>) -> Option<()> {
-    let kind = if rng.chance(0.5) { SegmentKind::Transfer } else { SegmentKind::Regrasp };
-    let (s, w) = pick_waypoint(plan, rng, kind)?;
+/// A segment and a waypoint of it that is not its first or last.
+fn pick_inner(plan: &Plan, rng: &mut Rng) -> Option<(usize, usize)> {
+    let s = rng.below(plan.segments.len().max(1));
+    let n_inner = plan.segments.get(s)?.waypoints.len().checked_sub(2)?;
+    (n_inner > 0).then(|| (s, 1 + rng.below(n_inner)))
+}
+
+/// Gives all joints at some inner waypoint this many times the mean velocities of the step that follows.
+fn change_velocities(plan: &mut Plan, rng: &mut Rng, times: impl Fn(&mut Rng) -> f64) -> Option<()> {
+    let (s, w) = pick_inner(plan, rng)?;
     let waypoints = &mut plan.segments[s].waypoints;
-    let first = rng.below(plan.joint_names.len());
-    for i in 0..plan.joint_names.len() {
-        let k = (first + i) % plan.joint_names.len();
-        let (before, after) = (mean(&waypoints[w - 1], &waypoints[w], k), mean(&waypoints[w], &waypoints[w + 1], k));
-        if let Some(velocity) = change(before, after, rng) {
-            waypoints[w].joint_velocities[k] = velocity;
-            return Some(());
-        }
-    }
-    None
+    let times = times(rng);
+    let means: Vec<f64> = (0..plan.joint_names.len()).map(|k| mean(&waypoints[w], &waypoints[w + 1], k)).collect();
+    waypoints[w].joint_velocities = means.iter().map(|mean| times * mean).collect();
+    let way: f64 = means.iter().map(|mean| mean.abs()).sum::<f64>() * (waypoints[w + 1].time - waypoints[w].time);
+    (way > 1e-6).then_some(())
 }

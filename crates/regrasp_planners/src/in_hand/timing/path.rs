@@ -21,6 +21,8 @@ const LOOKS: [usize; 2] = [8, 16];
 const LONG_STEP: f64 = 0.12;
 /// Joints nearer to their limits than this do not go beyond where the waypoints are, in radians or metres.
 const NEAR_LIMIT: f64 = 0.02;
+/// Rounding of shares of what fingers may stray.
+const SHARE_ROUNDING: f64 = 1e-9;
 /// With velocities up to this many times the mean ones on both sides cubics never turn back (Fritsch and Carlson 1980).
 const MONOTONE: f64 = 1.5;
 /// A waypoint at which joints would go slower than this share of the path's speed is one at which they stop.
@@ -275,6 +277,12 @@ impl<'m, 'a> Path<'m, 'a> {
             (0.25 * a.max(b)).min(4.0 / 27.0 * (a + b))
         };
         self.strays[k].iter().map(most).fold(0.0, f64::max)
+    }
+
+    /// True where the fingers stray no farther than they may when the first path speed is this share of both, and the step lasts
+    /// twice its length over their sum.
+    pub fn allows(&self, k: usize, share: f64) -> bool {
+        self.stray(k, share, 1.0 - share, 2.0 * self.lengths[k]) <= 1.0 + SHARE_ROUNDING
     }
 
     /// Makes the directions at both ends of step `k` this much shorter; where little is left, the joints stop.

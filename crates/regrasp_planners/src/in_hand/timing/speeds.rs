@@ -5,7 +5,6 @@
 //! joints stop, path speeds before and after say nothing about each other.
 
 use super::path::Path;
-use super::step::Step;
 
 /// Shares of the speeds at both ends of a step that are tried, from 0 to 1.
 const SHARES: usize = 16;
@@ -58,7 +57,9 @@ impl Speeds {
         for (k, step) in path.steps.iter().enumerate().rev().filter(|&(k, _)| !path.stops[k]) {
             let next = self.reachable[k + 1];
             let shares = if path.stops[k + 1] { shares(1, 0) } else { shares(LEFT_OUT, LEFT_OUT) };
-            let most = shares.map(|share| share * step.largest_sum(share).min(next / (1.0 - share)));
+            let most = shares
+                .filter(|&share| path.allows(k, share))
+                .map(|share| share * step.largest_sum(share).min(next / (1.0 - share)));
             self.reachable[k] = most.fold(0.0, f64::max).min(path.caps[k]);
         }
     }
@@ -72,7 +73,7 @@ impl Speeds {
             // From rest: the fastest at the end, and of these the shortest.
             (true, false) => {
                 let mut best = (0.0, 0.0);
-                for share in shares(0, 1) {
+                for share in shares(0, 1).filter(|&share| path.allows(k, share)) {
                     let sum = step.largest_sum(share).min(most / (1.0 - share));
                     let to = sum * (1.0 - share);
                     if to > best.0 * (1.0 + 1e-9) || (to >= best.0 * (1.0 - 1e-9) && sum > best.1) {
@@ -83,11 +84,11 @@ impl Speeds {
                 best.1
             }
             (false, true) => shares(1, 0)
-                .filter(|&share| share * step.largest_sum(share) >= from * KEPT)
+                .filter(|&share| path.allows(k, share) && share * step.largest_sum(share) >= from * KEPT)
                 .map(|share| from / share)
                 .fold(from, f64::max),
             (false, false) => {
-                let share = least_share(step, from);
+                let share = least_share(path, k, from);
                 self.speeds[k + 1] = (from * (1.0 - share) / share).min(most) * KEPT;
                 from + self.speeds[k + 1]
             }
@@ -126,6 +127,8 @@ impl Speeds {
                     starts.next().map(|start| self.shortest(path, step, speeds, start))
                 });
                 if let [Some(before), Some(after)] = spans
+                    && path.stray(k - 1, self.speeds[k - 1], speed, before) <= 1.0
+                    && path.stray(k, speed, self.speeds[k + 1], after) <= 1.0
                     && before + after < (self.spans[k - 1] + self.spans[k]) * (1.0 - 1e-6)
                 {
                     self.speeds[k] = speed;
@@ -137,8 +140,8 @@ impl Speeds {
 }
 
 /// The least share of the first speed with which `from` is allowed: the fastest speed at the end.
-fn least_share(step: &Step, from: f64) -> f64 {
-    let allows = |share: f64| share * step.largest_sum(share) >= from;
+fn least_share(path: &Path, k: usize, from: f64) -> f64 {
+    let allows = |share: f64| path.allows(k, share) && share * path.steps[k].largest_sum(share) >= from;
     let mut tried = shares(LEFT_OUT, LEFT_OUT);
     let Some(mut high) = tried.find(|&share| allows(share)) else { return 0.5 };
     let mut low = high - 1.0 / SHARES as f64;

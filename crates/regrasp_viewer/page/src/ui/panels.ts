@@ -14,8 +14,8 @@ export function verdict(story: Story): HTMLElement {
     : story.judged === null
       ? ["unknown", "Not checked", null]
       : story.judged.accepted
-        ? ["good", "Accepted", "by the checker"]
-        : ["bad", "Rejected", "by the checker"];
+        ? ["good", "Accepted", `by the checker for ${story.judged.level}`]
+        : ["bad", "Rejected", `by the checker for ${story.judged.level}`];
   return el(
     "p",
     { class: `verdict ${kind}`, role: "status" },
