@@ -196,6 +196,12 @@ mod tests {
             let expected = Nearest { distance: least, normals: near.map(|i| pieces.normal(i)).collect() };
             assert_eq!(sorted.nearest(&point), expected);
             assert_eq!(nearest(&shape, &point), expected);
+            // What some reach brings near is found, and not everything.
+            let reach = rng.uniform(0.0, 0.02);
+            let found = pieces.near(&point, reach);
+            assert!(found.is_sorted() && found.len() < mesh.triangles().len());
+            let missed = (0..distances.len()).find(|i| distances[*i] <= reach && found.binary_search(i).is_err());
+            assert_eq!(missed, None, "{point} {reach}");
         }
     }
 
