@@ -21,8 +21,8 @@ pub use telling::{Outcome, Telling, tell};
 
 pub use regrasp_plan::plan::PoseData;
 
-use regrasp_plan::check::Level;
 use regrasp_plan::Plan;
+use regrasp_plan::check::Level;
 use serde::{Deserialize, Serialize};
 
 /// Value of [`Story::format`].
