@@ -122,7 +122,7 @@ fn damaged_forces_are_named_with_their_place() {
         ("C404", &|p| p.segments[0].waypoints[2].joint_torques.clear(), "waypoints[2].joint_torques"),
         ("C404", &|p| _ = p.promises.forces.as_mut().unwrap().joint_torques.pop(), "forces.joint_torques"),
         ("C407", &|p| p.segments[0].waypoints[2].contacts[0].force_in_object = None, "lacks its force"),
-        ("C409", &|p| p.promises.forces.as_mut().unwrap().mass = 0.0, "forces.mass"),
+        ("C409", &|p| p.promises.forces.as_mut().unwrap().mass = -0.1, "forces.mass"),
         ("C409", &|p| p.promises.forces.as_mut().unwrap().normal_force = [3.0, 2.0], "forces.normal_force"),
         ("C409", &|p| p.promises.forces.as_mut().unwrap().joint_torques[1] = Some(-1.0), "forces.joint_torques"),
         ("C409", &|p| p.promises.forces.as_mut().unwrap().gravity_in_world = Some([0.0, 0.0, 1e6]), "gravity_in_world"),
@@ -150,7 +150,8 @@ fn a_file_full_of_damage_gives_a_short_answer() {
     let mut plan = GOOD.0.clone();
     plan.segments.iter_mut().flat_map(|s| &mut s.waypoints).for_each(|w| w.joints.clear());
     let message = read(&to_json(&plan)).unwrap_err();
-    assert_eq!(message.lines().count(), 20, "{message}");
+    assert_eq!(message.lines().count(), 21, "{message}");
+    assert!(message.lines().last().is_some_and(|line| line.starts_with("and ") && line.ends_with(" more")), "{message}");
 }
 
 proptest! {
