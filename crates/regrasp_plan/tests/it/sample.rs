@@ -161,7 +161,6 @@ fn object() -> Object {
         surface: surface_of(&shape),
         radius: OBJECT_RADIUS,
         mesh_body: None,
-        hull: None,
         shape,
         mass: 0.1,
         center_of_mass: Point::origin(),
