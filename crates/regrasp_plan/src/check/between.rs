@@ -130,9 +130,8 @@ impl<'a> Between<'a> {
         let slope_is_sound = |slope: f64| (-SLOPE_ROUNDING..=LARGEST_SLOPE + SLOPE_ROUNDING).contains(&slope);
         let largest = if rests(&joints) { LEAST_CHORD } else { LARGEST_TANGENT };
         let is_short = |joint: &Cubic| joint.first.abs().max(joint.last.abs()) <= largest;
-        let is_broken = !(span > 0.0
-            && [sigma.first, sigma.last].into_iter().all(slope_is_sound)
-            && joints.iter().all(is_short));
+        let is_broken =
+            !(span > 0.0 && [sigma.first, sigma.last].into_iter().all(slope_is_sound) && joints.iter().all(is_short));
         let mut motion = Between { from, joints, sigma, object, is_broken };
         if is_broken {
             motion.joints.iter_mut().for_each(|joint| *joint = Cubic::line(joint.change));
@@ -214,7 +213,8 @@ fn sigma(joints: &[Cubic]) -> Cubic {
         return Cubic::line(1.0);
     }
     let square: f64 = joints.iter().map(|joint| joint.change * joint.change).sum();
-    let along = |slope: &dyn Fn(&Cubic) -> f64| joints.iter().map(|joint| joint.change * slope(joint)).sum::<f64>() / square;
+    let along =
+        |slope: &dyn Fn(&Cubic) -> f64| joints.iter().map(|joint| joint.change * slope(joint)).sum::<f64>() / square;
     Cubic { change: 1.0, first: along(&|joint| joint.first), last: along(&|joint| joint.last) }
 }
 

@@ -60,15 +60,7 @@ impl<'a> Step<'a> {
                 Carrier::World => Rates::default(),
             })
             .collect();
-        Step {
-            bodies,
-            motion,
-            object,
-            poses: vec![Vec::new(); bodies.carriers.len()],
-            moves,
-            rates,
-            n_distances: 0,
-        }
+        Step { bodies, motion, object, poses: vec![Vec::new(); bodies.carriers.len()], moves, rates, n_distances: 0 }
     }
 
     /// Pose of a carrier in the world.

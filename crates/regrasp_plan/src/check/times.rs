@@ -105,14 +105,7 @@ fn check_joint_speeds(model: &Model, plan: &Plan, motion: &Between, span: f64, a
     }
 }
 
-fn check_accelerations(
-    plan: &Plan,
-    motion: &Between,
-    span: f64,
-    at: Moment,
-    settings: &CheckSettings,
-    log: &mut Log,
-) {
+fn check_accelerations(plan: &Plan, motion: &Between, span: f64, at: Moment, settings: &CheckSettings, log: &mut Log) {
     for (k, name) in plan.joint_names.iter().enumerate() {
         let limit = plan.promises.motion.joint_accelerations[k];
         let acceleration = motion.joint(k).largest_bend() / (span * span);

@@ -5,7 +5,8 @@ use super::choice::{any_drive, any_waypoint, pick, pick_waypoint, waypoints_mut}
 use crate::check::between::Between;
 use crate::check::model::Model;
 use crate::check::violation::ViolationKind::{
-    ContactOffTip, JointAcceleration, JointTooFast, NotANumber, PromiseBroken, TimeOrder, TooFast, VelocityInconsistent, WrongScene,
+    ContactOffTip, JointAcceleration, JointTooFast, NotANumber, PromiseBroken, TimeOrder, TooFast,
+    VelocityInconsistent, WrongScene,
 };
 use crate::plan::{ContactMode, Plan, Segment, SegmentKind, Waypoint};
 use regrasp_base::Rng;

@@ -57,7 +57,9 @@ impl Speeds {
         for (k, step) in path.steps.iter().enumerate().rev().filter(|&(k, _)| !path.stops[k]) {
             let next = self.reachable[k + 1];
             let shares = if path.stops[k + 1] { shares(1, 0) } else { shares(LEFT_OUT, LEFT_OUT) };
-            let most = shares.filter(|&share| path.allows(k, share)).map(|share| share * step.largest_sum(share).min(next / (1.0 - share)));
+            let most = shares
+                .filter(|&share| path.allows(k, share))
+                .map(|share| share * step.largest_sum(share).min(next / (1.0 - share)));
             self.reachable[k] = most.fold(0.0, f64::max).min(path.caps[k]);
         }
     }
