@@ -66,9 +66,8 @@ impl Step {
             pace = pace.max(peak(first, middle, last) / row.velocity);
             bend = bend.max((middle - first).abs().max((last - middle).abs()) / row.acceleration);
         }
-        for tip in &self.tips {
-            pace = pace.max(tip.velocity(0.5, [share, 1.0 - share]).norm() / self.tip_speed);
-        }
+        let tips = self.tips.iter().map(|tip| tip.velocity(0.5, [share, 1.0 - share]).norm_squared());
+        pace = pace.max(tips.fold(0.0, f64::max).sqrt() / self.tip_speed);
         // The velocities are those of a parabola with these Bernstein coefficients, and the acceleration twice the difference
         // of two of them over the time.
         (1.0 / pace).min((self.length / bend).sqrt())
@@ -85,7 +84,7 @@ impl Step {
                 let bend = 2.0 * rate * (middle - first).abs().max((last - middle).abs());
                 peak(first, middle, last) <= row.velocity && bend <= row.acceleration
             })
-            && self.tips.iter().all(|tip| tip.velocity(even, speeds).norm() <= self.tip_speed)
+            && self.tips.iter().all(|tip| tip.velocity(even, speeds).norm_squared() <= self.tip_speed * self.tip_speed)
     }
 }
 
