@@ -21,6 +21,8 @@ const LOOKS: [usize; 2] = [8, 16];
 const LONG_STEP: f64 = 0.12;
 /// Joints nearer to their limits than this do not go beyond where the waypoints are, in radians or metres.
 const NEAR_LIMIT: f64 = 0.02;
+/// Links are about this thick, in metres.
+const LINK_RADIUS: f64 = 0.01;
 /// Rounding of shares of what fingers may stray.
 const SHARE_ROUNDING: f64 = 1e-9;
 /// With velocities up to this many times the mean ones on both sides cubics never turn back (Fritsch and Carlson 1980).
@@ -40,8 +42,6 @@ pub struct Stray {
 /// A finger with what the timing asks of it.
 struct Finger {
     coordinates: Range<usize>,
-    /// By coordinate: how far any point of the finger goes at most per unit of it, in metres.
-    levers: Vec<f64>,
     /// By coordinate: how far any link of the finger turns at most per unit of it, in radians.
     turns: Vec<f64>,
 }
@@ -77,19 +77,11 @@ impl<'m, 'a> Path<'m, 'a> {
             let chain = of_model.ik.chain();
             let coordinates = first..first + chain.n_coordinates();
             first = coordinates.end;
-            let [mut levers, mut turns] = [vec![0.0; chain.n_coordinates()], vec![0.0; chain.n_coordinates()]];
-            let mut length = of_model.ik.center_in_body().coords.norm() + of_model.tip_radius;
-            for joint in chain.joints.iter().rev() {
-                let slide = chain.lower[joint.coordinate].abs().max(chain.upper[joint.coordinate].abs());
-                let (per_unit, longer) = match joint.motion {
-                    Motion::Turn => (length, 0.0),
-                    Motion::Slide => (1.0, joint.multiplier.abs() * slide + joint.offset.abs()),
-                };
-                levers[joint.coordinate] += joint.multiplier.abs() * per_unit;
-                turns[joint.coordinate] += if joint.motion == Motion::Turn { joint.multiplier.abs() } else { 0.0 };
-                length += joint.parent_from_joint.translation.vector.norm() + longer;
+            let mut turns = vec![0.0; chain.n_coordinates()];
+            for joint in chain.joints.iter().filter(|joint| joint.motion == Motion::Turn) {
+                turns[joint.coordinate] += joint.multiplier.abs();
             }
-            Finger { coordinates, levers, turns }
+            Finger { coordinates, turns }
         };
         let fingers: Vec<Finger> = model.fingers.iter().map(finger).collect();
         Path {
@@ -131,47 +123,71 @@ impl<'m, 'a> Path<'m, 'a> {
         }
     }
 
-    /// The direction of the parabola through waypoint `k` and its neighbours, by length of the chords.
+    /// The direction of the parabola through waypoint `k` and its neighbours, by length of the chords. Where that strays too far,
+    /// the direction from the one neighbour to the other: it strays less from the longer chord.
     fn find_direction(&mut self, k: usize, waypoint: &Waypoint) {
         let n = self.n_joints;
-        let (before, after) = (self.lengths[k - 1], self.lengths[k]);
+        let [before, after] = [self.lengths[k - 1], self.lengths[k]];
         if before == 0.0 || after == 0.0 {
             return;
         }
-        let (first, second) = self.chords[(k - 1) * n..(k + 1) * n].split_at(n);
-        let mut direction: Vec<f64> =
-            first.iter().zip(second).map(|(a, b)| (after * a + before * b) / (before + after)).collect();
+        let chords = [&self.chords[(k - 1) * n..k * n], &self.chords[k * n..(k + 1) * n]];
+        let blend = |weights: [f64; 2]| {
+            let blended = chords[0].iter().zip(chords[1]);
+            let blended = blended.map(|(a, b)| (weights[0] * a + weights[1] * b) / (before + after)).collect();
+            let direction = self.within_limits(blended, chords, &waypoint.joints);
+            let turns_back = chords.iter().any(|chord| dot(chord, &direction) <= 0.0);
+            // Two such ends stray by a quarter of this.
+            let off = chords
+                .iter()
+                .zip([before, after])
+                .map(|(chord, length)| 0.25 * length * self.off_chord(&waypoint.joints, chord, &direction));
+            (if turns_back { f64::INFINITY } else { off.fold(0.0, f64::max) }, direction)
+        };
+        let mut best = blend([after, before]);
+        if best.0 > 1.0 {
+            let other = blend([before, after]);
+            best = if other.0 < best.0 { other } else { best };
+        }
+        let share = if best.0 > 1.0 { 1.0 / best.0 } else { 1.0 };
+        if share >= LEAST_SHARE {
+            self.stops[k] = false;
+            let own = &mut self.directions[k * n..(k + 1) * n];
+            own.iter_mut().zip(&best.1).for_each(|(own, direction)| *own = share * direction);
+        }
+    }
+
+    /// A direction with which joints that are near their limits do not go beyond where the waypoints are.
+    fn within_limits(&self, mut direction: Vec<f64>, chords: [&[f64]; 2], joints: &[f64]) -> Vec<f64> {
         for (finger, of_model) in self.fingers.iter().zip(&self.model.fingers) {
             let chain = of_model.ik.chain();
             for (j, k) in finger.coordinates.clone().enumerate() {
-                let position = waypoint.joints[k];
-                if (position - chain.lower[j]).min(chain.upper[j] - position) < NEAR_LIMIT {
-                    let (a, b) = (first[k], second[k]);
+                if (joints[k] - chain.lower[j]).min(chain.upper[j] - joints[k]) < NEAR_LIMIT {
+                    let (a, b) = (chords[0][k], chords[1][k]);
                     let most = if a * b > 0.0 { MONOTONE * a.abs().min(b.abs()) } else { 0.0 };
                     direction[k] = direction[k].clamp(-most, most);
                 }
             }
         }
-        let along = |chord: &[f64]| chord.iter().zip(&direction).map(|(a, b)| a * b).sum::<f64>();
-        if along(first) <= 0.0 || along(second) <= 0.0 {
-            return;
-        }
-        // Two such ends stray by a quarter of this.
-        let off = [(first, before), (second, after)]
-            .map(|(chord, length)| 0.25 * length * self.off_chord(chord, &direction))
-            .into_iter()
-            .fold(0.0, f64::max);
-        let share = if off > 1.0 { 1.0 / off } else { 1.0 };
-        if share >= LEAST_SHARE {
-            self.stops[k] = false;
-            let own = &mut self.directions[k * n..(k + 1) * n];
-            own.iter_mut().zip(&direction).for_each(|(own, direction)| *own = share * direction);
-        }
+        direction
     }
 
     /// How far any finger goes at most aside of the chord per unit of the path, as a share of what it may.
-    fn off_chord(&self, chord: &[f64], direction: &[f64]) -> f64 {
-        self.fingers.iter().map(|finger| off_chord(finger, chord, direction, self.allowed)).fold(0.0, f64::max)
+    fn off_chord(&self, joints: &[f64], chord: &[f64], direction: &[f64]) -> f64 {
+        let of_finger = |f: usize| self.finger_off_chord(f, joints, chord, direction);
+        (0..self.fingers.len()).map(of_finger).fold(0.0, f64::max)
+    }
+
+    fn finger_off_chord(&self, f: usize, joints: &[f64], chord: &[f64], direction: &[f64]) -> f64 {
+        let (finger, ik) = (&self.fingers[f], self.model.fingers[f].ik);
+        let along = dot(chord, direction);
+        let off: Coordinates = finger.coordinates.clone().map(|k| direction[k] - along * chord[k]).collect();
+        if off.iter().all(|off| *off == 0.0) {
+            return 0.0;
+        }
+        let way = ik.displacement(&joints[finger.coordinates.clone()], &off, LINK_RADIUS);
+        let turn: f64 = off.iter().zip(&finger.turns).map(|(off, per_unit)| off.abs() * per_unit).sum();
+        (way / self.allowed.way).max(turn / self.allowed.turn)
     }
 
     /// What limits the steps and the waypoints.
@@ -215,6 +231,7 @@ impl<'m, 'a> Path<'m, 'a> {
             self.strays.push(vec![[0.0; 2]; self.fingers.len()]);
             return Step { least_span: least, ..Step::default() };
         }
+        let (from_joints, to_joints) = (&from.joints, &to.joints);
         let chord = &self.chords[k * n..(k + 1) * n];
         let ends = [k, k + 1].map(|k| &self.directions[k * n..(k + 1) * n]);
         let mut rows: Vec<Row> = (0..n)
@@ -226,7 +243,7 @@ impl<'m, 'a> Path<'m, 'a> {
             })
             .filter(|row| row.chord != 0.0 || row.ends != [0.0; 2])
             .collect();
-        let along = ends.map(|end| chord.iter().zip(end).map(|(a, b)| a * b).sum());
+        let along = ends.map(|end| dot(chord, end));
         rows.push(Row { chord: 1.0, ends: along, velocity: length / least, acceleration: f64::INFINITY });
         let mut tips = Vec::new();
         for (finger, of_model) in self.fingers.iter().zip(&self.model.fingers) {
@@ -243,8 +260,11 @@ impl<'m, 'a> Path<'m, 'a> {
                 tips.push(TipRow { moment, chord, ends: [first, last] });
             }
         }
-        let off = |finger| ends.map(|end| off_chord(finger, chord, end, self.allowed));
-        let strays = self.fingers.iter().map(off).collect();
+        let off = |f| {
+            [(from_joints, ends[0]), (to_joints, ends[1])]
+                .map(|(joints, end)| self.finger_off_chord(f, joints, chord, end))
+        };
+        let strays = (0..self.fingers.len()).map(off).collect();
         self.strays.push(strays);
         Step { length, rows, tips, tip_speed, least_span }
     }
@@ -347,19 +367,10 @@ fn largest(values: impl Iterator<Item = f64>) -> f64 {
     most
 }
 
-fn speed(jacobian: &[Vector], rates: &[f64]) -> Vector {
-    jacobian.iter().zip(rates).map(|(column, rate)| column * *rate).sum()
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// How far the finger goes at most aside of the chord per unit of the path, as a share of what it may.
-fn off_chord(finger: &Finger, chord: &[f64], direction: &[f64], allowed: Stray) -> f64 {
-    let along: f64 = chord.iter().zip(direction).map(|(a, b)| a * b).sum();
-    let [mut way, mut turn] = [0.0, 0.0];
-    for (j, k) in finger.coordinates.clone().enumerate() {
-        let off = (direction[k] - along * chord[k]).abs();
-        way += finger.levers[j] * off;
-        turn += finger.turns[j] * off;
-    }
-    let share = |off: f64, allowed: f64| if off > 0.0 { off / allowed } else { 0.0 };
-    share(way, allowed.way).max(share(turn, allowed.turn))
+fn speed(jacobian: &[Vector], rates: &[f64]) -> Vector {
+    jacobian.iter().zip(rates).map(|(column, rate)| column * *rate).sum()
 }

@@ -7,15 +7,17 @@
 use super::path::Path;
 
 /// Shares of the speeds at both ends of a step that are tried, from 0 to 1.
-const SHARES: usize = 16;
+const SHARES: usize = 10;
 /// Where the joints stop at neither end, these first and last ones are left out: no waypoint has the speed zero then.
-const LEFT_OUT: usize = 2;
+const LEFT_OUT: usize = 1;
 /// Halvings after which a largest or smallest number that keeps the limits counts as found.
-const HALVINGS: usize = 10;
+const HALVINGS: usize = 6;
+/// A step that is not allowed to be shorter by this factor is as short as it can be.
+const TELLS: f64 = 1.003;
 /// Rounds in which single speeds are changed where that saves time.
-const SWEEPS: usize = 3;
+const SWEEPS: usize = 1;
 /// By which factors.
-const CHANGES: [f64; 4] = [1.12, 0.88, 1.03, 0.97];
+const CHANGES: [f64; 2] = [1.1, 0.92];
 /// Shares of what is allowed that is taken: rounding.
 const KEPT: f64 = 1.0 - 1e-9;
 
@@ -88,7 +90,7 @@ impl Speeds {
                 .map(|share| from / share)
                 .fold(from, f64::max),
             (false, false) => {
-                let share = least_share(path, k, from);
+                let share = least_share(path, k, from, most);
                 self.speeds[k + 1] = (from * (1.0 - share) / share).min(most) * KEPT;
                 from + self.speeds[k + 1]
             }
@@ -100,6 +102,10 @@ impl Speeds {
     fn shortest(&self, path: &Path, k: usize, speeds: [f64; 2], span: f64) -> f64 {
         let step = &path.steps[k];
         let mut allowed = 1.0 / span;
+        // Most steps are as short as they can be.
+        if !step.allows(speeds, allowed * TELLS) {
+            return span;
+        }
         let mut factor = 1.25;
         for _ in 0..HALVINGS {
             if step.allows(speeds, allowed * factor) {
@@ -122,9 +128,8 @@ impl Speeds {
                 let spans = [k - 1, k].map(|step| {
                     let speeds = if step == k { [speed, self.speeds[k + 1]] } else { [self.speeds[k - 1], speed] };
                     let span = self.spans[step];
-                    let start = [1.0, 1.06, 0.94].into_iter().map(|factor| span * factor);
-                    let mut starts = start.filter(|span| path.steps[step].allows(speeds, 1.0 / span));
-                    starts.next().map(|start| self.shortest(path, step, speeds, start))
+                    let is_allowed = path.steps[step].allows(speeds, 1.0 / span);
+                    is_allowed.then(|| self.shortest(path, step, speeds, span))
                 });
                 if let [Some(before), Some(after)] = spans
                     && path.stray(k - 1, self.speeds[k - 1], speed, before) <= 1.0
@@ -139,9 +144,14 @@ impl Speeds {
     }
 }
 
-/// The least share of the first speed with which `from` is allowed: the fastest speed at the end.
-fn least_share(path: &Path, k: usize, from: f64) -> f64 {
+/// The least share of the first speed with which `from` is allowed, and the speed at the end no larger than `most`: the fastest
+/// there.
+fn least_share(path: &Path, k: usize, from: f64, most: f64) -> f64 {
     let allows = |share: f64| path.allows(k, share) && share * path.steps[k].largest_sum(share) >= from;
+    let fastest = from / (from + most);
+    if allows(fastest) {
+        return fastest;
+    }
     let mut tried = shares(LEFT_OUT, LEFT_OUT);
     let Some(mut high) = tried.find(|&share| allows(share)) else { return 0.5 };
     let mut low = high - 1.0 / SHARES as f64;

@@ -66,9 +66,8 @@ impl Step {
             pace = pace.max(peak(first, middle, last) / row.velocity);
             bend = bend.max((middle - first).abs().max((last - middle).abs()) / row.acceleration);
         }
-        for tip in &self.tips {
-            pace = pace.max(tip.velocity(0.5, [share, 1.0 - share]).norm() / self.tip_speed);
-        }
+        let tips = self.tips.iter().map(|tip| tip.velocity(0.5, [share, 1.0 - share]).norm_squared());
+        pace = pace.max(tips.fold(0.0, f64::max).sqrt() / self.tip_speed);
         // The velocities are those of a parabola with these Bernstein coefficients, and the acceleration twice the difference
         // of two of them over the time.
         (1.0 / pace).min((self.length / bend).sqrt())
@@ -85,7 +84,7 @@ impl Step {
                 let bend = 2.0 * rate * (middle - first).abs().max((last - middle).abs());
                 peak(first, middle, last) <= row.velocity && bend <= row.acceleration
             })
-            && self.tips.iter().all(|tip| tip.velocity(even, speeds).norm() <= self.tip_speed)
+            && self.tips.iter().all(|tip| tip.velocity(even, speeds).norm_squared() <= self.tip_speed * self.tip_speed)
     }
 }
 
@@ -96,4 +95,65 @@ fn peak(first: f64, middle: f64, last: f64) -> f64 {
         return ends;
     }
     ends.max(((first * last - middle * middle) / (first - 2.0 * middle + last)).abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use regrasp_base::Rng;
+
+    fn step(rng: &mut Rng) -> Step {
+        let mut row = || {
+            let chord = rng.uniform(-1.0, 1.0);
+            let ends = [rng.uniform(0.5, 1.5), rng.uniform(0.5, 1.5)]
+                .map(|share| chord * share + 0.1 * rng.uniform(-1.0, 1.0));
+            Row { chord, ends, velocity: rng.uniform(0.5, 2.0), acceleration: rng.uniform(5.0, 20.0) }
+        };
+        let rows = (0..4).map(|_| row()).collect();
+        Step { length: rng.uniform(0.01, 0.3), rows, tips: Vec::new(), tip_speed: 0.04, least_span: 1e-3 }
+    }
+
+    #[test]
+    fn the_largest_sum_is_allowed_and_no_larger_one() {
+        let mut rng = Rng::keyed(1, "largest sum", 0);
+        for _ in 0..500 {
+            let (step, share) = (step(&mut rng), rng.unit());
+            let sum = step.largest_sum(share);
+            let allows = |sum: f64| step.allows([share * sum, (1.0 - share) * sum], 0.5 * sum / step.length);
+            assert!(allows(sum * (1.0 - 1e-9)));
+            assert!(!allows(sum * (1.0 + 1e-6)));
+            // Scaled down, it stays allowed.
+            assert!(allows(0.3 * sum));
+        }
+    }
+
+    #[test]
+    fn what_is_allowed_keeps_velocity_and_acceleration_at_every_moment() {
+        let mut rng = Rng::keyed(2, "allowed", 0);
+        for _ in 0..200 {
+            let (step, share) = (step(&mut rng), rng.unit());
+            let sum = step.largest_sum(share);
+            let span = 2.0 * step.length / sum;
+            let mut closest: f64 = 0.0;
+            for row in &step.rows {
+                let [first, last] = [row.ends[0] * share * sum, row.ends[1] * (1.0 - share) * sum];
+                let mean = row.chord * step.length / span;
+                let velocity = |u: f64| {
+                    let v = 1.0 - u;
+                    6.0 * u * v * mean + v * (1.0 - 3.0 * u) * first + u * (3.0 * u - 2.0) * last
+                };
+                for i in 0..=100 {
+                    let u = f64::from(i) / 100.0;
+                    let acceleration = (velocity(u + 1e-5) - velocity(u - 1e-5)) / (2e-5 * span);
+                    assert!(acceleration.abs() <= row.acceleration * (1.0 + 1e-6));
+                    closest = closest.max(acceleration.abs() / row.acceleration);
+                    // Ends are limited where waypoints are.
+                    let ends = first.abs().max(last.abs());
+                    assert!(velocity(u).abs() <= row.velocity.max(ends) * (1.0 + 1e-9));
+                    closest = closest.max(velocity(u).abs() / row.velocity);
+                }
+            }
+            assert!(closest > 0.999, "{closest}");
+        }
+    }
 }

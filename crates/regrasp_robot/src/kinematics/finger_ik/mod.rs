@@ -235,6 +235,29 @@ impl FingerIk {
         self.chain.last_frame(coordinates).point(&self.center_in_body)
     }
 
+    /// How far points of the finger move, to first order, when the coordinates change by `changes`, at most: joints, the tip's centre,
+    /// and what is no farther than `radius` from the lines between them.
+    pub fn displacement(&self, coordinates: &[f64], changes: &[f64], radius: f64) -> f64 {
+        let mut lines: ArrayVec<JointLine, { 2 * MAX_COORDINATES }> = ArrayVec::new();
+        let tip = self.chain.joint_lines(coordinates, &mut lines).point(&self.center_in_body).coords;
+        // The bodies so far move by `shift + turn x point`.
+        let (mut shift, mut turn, mut most) = (Vector::zeros(), Vector::zeros(), 0.0f64);
+        for (i, (joint, line)) in self.chain.joints.iter().zip(&lines).enumerate() {
+            let change = line.axis * (joint.multiplier * changes[joint.coordinate]);
+            match joint.motion {
+                Motion::Turn => {
+                    turn += change;
+                    shift -= change.cross(&line.origin);
+                }
+                Motion::Slide => shift += change,
+            }
+            let end = lines.get(i + 1).map_or(tip, |next| next.origin);
+            let moved = |point: &Vector| (shift + turn.cross(point)).norm();
+            most = most.max(moved(&line.origin).max(moved(&end)) + radius * turn.norm());
+        }
+        most
+    }
+
     /// Columns of the Jacobian of the tip's centre, one per coordinate, in the base frame.
     pub fn tip_jacobian(&self, coordinates: &[f64]) -> ArrayVec<Vector, MAX_COORDINATES> {
         let mut lines: ArrayVec<JointLine, { 2 * MAX_COORDINATES }> = ArrayVec::new();

@@ -330,3 +330,25 @@ fn redundant_tracking_moves_little_and_stays_on_target() {
     let told = format!("{n_reached} of {n_wanted} waypoints, largest step {largest:.3} rad");
     assert!(largest <= 0.4 && n_reached * 10 >= n_wanted * 8, "{told}");
 }
+
+#[test]
+fn displacements_and_jacobians_of_tips_agree_with_finite_differences() {
+    let mut rng = Rng::keyed(12, "displacement", 0);
+    for _ in 0..40 {
+        let (chain, center) = random_turning(4, 1.0, &mut rng);
+        let ik = FingerIk::new(&chain, &center);
+        let at = random_coordinates(&chain, &mut rng);
+        let changes: Vec<f64> = at.iter().map(|_| rng.uniform(-1.0, 1.0)).collect();
+        let h = 1e-6;
+        let moved = |sign: f64| -> Vec<f64> { at.iter().zip(&changes).map(|(q, d)| q + sign * h * d).collect() };
+        let way = (ik.tip(&moved(1.0)) - ik.tip(&moved(-1.0))) / (2.0 * h);
+        let jacobian = ik.tip_jacobian(&at);
+        let expected: Vector = jacobian.iter().zip(&changes).map(|(column, change)| column * *change).sum();
+        assert!((way - expected).norm() < 1e-8);
+        // The tip is one of the points; others may go farther.
+        let most = ik.displacement(&at, &changes, 0.0);
+        assert!(most >= way.norm() - 1e-9);
+        let levers: f64 = changes.iter().map(|change| change.abs()).sum::<f64>() * 10.0;
+        assert!(most <= levers && ik.displacement(&at, &changes, 0.01) >= most);
+    }
+}
