@@ -322,10 +322,11 @@ fn answer_and_axis(a: &Convex, b: &Convex, a_from_b: &ParryPose, max: f64) -> (A
             return (Answer::Penetrating(margins - reached), ParryVector::ZERO);
         }
     }
-    if shallow != Answer::Unresolved {
+    let has_faces = |shape: &Convex| matches!(shape.core, Core::Box { .. }) && shape.margin == 0.0;
+    if shallow != Answer::Unresolved || !has_faces(a) || !has_faces(b) {
         return (shallow, ParryVector::ZERO);
     }
-    // Whatever the search said: along any axis the overlap bounds the depth from above.
+    // Along any axis the overlap bounds the depth from above; along that of a face it mostly is the depth.
     let axes = [ParryVector::X, ParryVector::Y, ParryVector::Z];
     let of_b = axes.map(|axis| a_from_b.transform_vector(axis));
     let mut all = vec![first_axis, -first_axis];

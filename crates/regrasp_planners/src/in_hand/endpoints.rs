@@ -340,8 +340,8 @@ fn from_contacts(
         let (contact, distance) = given::contact_for(&model.fingers[f], &model.scene.object.surface, point);
         if distance > GRASP_TOLERANCE {
             let message = format!(
-                "the {} contact of finger \"{name}\" is {:.2} mm from the nearest place that the tip can touch; at most {} mm \
-                 are put right",
+                "the {} contact of finger \"{name}\" is {:.2} mm off the surface that its tip can touch; at most {} mm are put \
+                 right",
                 end.name(),
                 distance * 1e3,
                 GRASP_TOLERANCE * 1e3
