@@ -40,7 +40,7 @@ PLAIN_BENCH := $(PLAIN) --level geometry
 ALLEGRO_BENCH = $(PACKAGES) --time-limit 20 --threads 1 --seeds $(ALLEGRO_SEEDS)
 SOFT_BENCH = $(PACKAGES) --time-limit 6 --threads 1 --seeds $(ALLEGRO_SEEDS)
 
-.PHONY: all demo gallery test replay replay-tracking test-rust test-python test-page page python bench paper003 growth benchmark-page campaign fuzz docs release $(ROADMAPS)
+.PHONY: all demo gallery test replay replay-tracking test-rust test-python test-page page python bench paper003 growth benchmark-page campaign fuzz fuzz-program docs release $(ROADMAPS)
 
 all: release
 
@@ -212,6 +212,12 @@ fuzz:
 	  mkdir -p fuzz/corpus/$$target && cp -n fuzz/seeds/$$target/* fuzz/corpus/$$target/ ; \
 	  TMPDIR=$(FUZZ_TMP) cargo +nightly fuzz run --sanitizer none $$target -- -runs=$(FUZZ_RUNS) -max_len=4096 -timeout=30 -rss_limit_mb=1024 || exit 1 ; \
 	done
+
+# Broken files of every kind against the whole program, 10 s and 1 GB each. $(OUT)/mutants keeps what went wrong.
+FUZZ_PROGRAM_RUNS ?= 20000
+FUZZ_PROGRAM_SEED ?= 0
+fuzz-program: release
+	$(PYTHON) tests/campaigns/mutants.py --runs $(FUZZ_PROGRAM_RUNS) --seed $(FUZZ_PROGRAM_SEED) -o $(OUT)/mutants
 
 docs:
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace --no-deps

@@ -193,7 +193,12 @@ impl Surface {
     /// The contact of a ball of radius `tip_radius` that touches the surface near `near` and penetrates nowhere; its
     /// normal points from the contact to the ball's centre. See `settle.rs`. None when no such ball is within reach.
     pub fn settle(&self, near: &SurfacePoint, tip_radius: f64) -> Option<SurfacePoint> {
-        settle::settle(self, near, tip_radius)
+        self.settle_counted(near, tip_radius, &mut 0)
+    }
+
+    /// The same; adds the number of distances that were measured, which is what it costs, to `n_measured`.
+    pub fn settle_counted(&self, near: &SurfacePoint, tip_radius: f64, n_measured: &mut u64) -> Option<SurfacePoint> {
+        settle::settle(self, near, tip_radius, n_measured)
     }
 
     /// Straight-line distance to the nearest crease (edge of a box, rim of a cylinder, sharp or open edge of a mesh);

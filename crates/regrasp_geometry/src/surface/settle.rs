@@ -12,12 +12,19 @@ const TOLERANCE: f64 = 1e-9;
 /// Pushes before giving up; wide grooves take 2 to 20.
 const MAX_PUSHES: usize = 100;
 
-pub(super) fn settle(surface: &Surface, near: &SurfacePoint, tip_radius: f64) -> Option<SurfacePoint> {
+/// Adds the distances measured to `n_measured`.
+pub(super) fn settle(
+    surface: &Surface,
+    near: &SurfacePoint,
+    tip_radius: f64,
+    n_measured: &mut u64,
+) -> Option<SurfacePoint> {
     if tip_radius == 0.0 {
         return Some(*near);
     }
     let mut center = near.point_in_object + near.normal_in_object.as_ref() * tip_radius;
     for push in 0..MAX_PUSHES {
+        *n_measured += 1;
         // The ball touches the point that it comes from.
         let (nearest, signed) = surface.kind.project_signed(&center, tip_radius);
         let away = center - nearest.point_in_object;

@@ -61,14 +61,41 @@ impl Way {
 ///
 /// A ray from a random inner point within a wide cone about the finger's working place: twice as quick as drawing by
 /// area (in-hand-notes, 5). The contact is where the ray leaves the solid: where that happens more than once, any of them.
-pub fn draw_contact(model: &Model, finger: usize, world_from_object: &Placement, rng: &mut Rng) -> Option<Contact> {
-    (0..RAYS).find_map(|_| draw_contact_once(model, finger, world_from_object, rng))
+///
+/// None too when the work allowed is spent on contacts that do not fit.
+pub fn draw_contact(
+    workspace: &mut Workspace,
+    finger: usize,
+    world_from_object: &Placement,
+    rng: &mut Rng,
+) -> Option<Contact> {
+    if workspace.is_spent_on_draws() {
+        return None;
+    }
+    let mut n_measured = 0;
+    let draw = |_| draw_contact_once(workspace.model, finger, world_from_object, rng, &mut n_measured);
+    let found = (0..RAYS).find_map(draw);
+    // A contact that is found costs what is done with it; one that is not would cost nothing.
+    let free = if found.is_some() { MEASURED_FREE } else { 0 };
+    workspace.count_draws(n_measured.saturating_sub(free) / MEASURED_PER_WORK);
+    found
 }
+
+/// Distances from the surface that the draw of a contact may take at no cost where one is found; most take a few.
+const MEASURED_FREE: u64 = 100;
+/// Distances from the surface that count as a configuration: on a mesh of ten thousand triangles they take as long.
+const MEASURED_PER_WORK: u64 = 10;
 
 /// Rays drawn for one contact: most of those that miss the finger's reach cost little.
 const RAYS: usize = 24;
 
-fn draw_contact_once(model: &Model, finger: usize, world_from_object: &Placement, rng: &mut Rng) -> Option<Contact> {
+fn draw_contact_once(
+    model: &Model,
+    finger: usize,
+    world_from_object: &Placement,
+    rng: &mut Rng,
+    n_measured: &mut u64,
+) -> Option<Contact> {
     let object = &model.scene.object;
     let inner = object.center_of_mass + Vector::from(rng.direction()) * (0.4 * model.frame.torque_scale * rng.unit());
     let towards = world_from_object.point_to_child(&model.fingers[finger].tip_at_rest) - inner;
@@ -86,7 +113,7 @@ fn draw_contact_once(model: &Model, finger: usize, world_from_object: &Placement
     if !finger_model.may_reach(world_from_object, &rough) {
         return None;
     }
-    let hit = object.surface.settle(&hit, finger_model.settle_radius)?;
+    let hit = object.surface.settle_counted(&hit, finger_model.settle_radius, n_measured)?;
     if object.surface.crease_distance(&hit) < object.edge_distance {
         return None;
     }
@@ -192,7 +219,7 @@ pub fn draw_footholds(
         if n_found == n_wanted {
             return;
         }
-        let Some(contact) = draw_contact(workspace.model, finger, world_from_object, rng) else { continue };
+        let Some(contact) = draw_contact(workspace, finger, world_from_object, rng) else { continue };
         let Some(joints) = reach(workspace, finger, &contact, world_from_object, rng) else { continue };
         found(contact, joints);
         n_found += 1;

@@ -124,11 +124,10 @@ fn draw_footholds(
     world_from_object: &Pose,
     placement: &Placement,
 ) -> Vec<Candidate> {
-    let model = search.model();
     let mut found = Vec::with_capacity(CONTACTS);
     search.workspace.place_object(world_from_object);
     for _ in 0..4 * CONTACTS {
-        let Some(contact) = draw_contact(model, finger, placement, &mut search.rng) else { continue };
+        let Some(contact) = draw_contact(&mut search.workspace, finger, placement, &mut search.rng) else { continue };
         if let Some(joints) = reach(&mut search.workspace, finger, &contact, placement, &mut search.rng) {
             found.push(Candidate { contact: Some(contact), joints, follow: 1.0 });
             if found.len() == CONTACTS {

@@ -82,8 +82,10 @@ impl<'a> Search<'a> {
         winner: &'a AtomicUsize,
         progress: &'a (dyn Fn(Progress) + Sync),
     ) -> Self {
+        let mut workspace = Workspace::new(model);
+        workspace.draws.work_limit = work_limit;
         Search {
-            workspace: Workspace::new(model),
+            workspace,
             rng: Rng::keyed(seed, "attempt", attempt as u64),
             tally: Tally::default(),
             leg: 0,

@@ -5,8 +5,12 @@
 //! ends by more than their deviations, it separates them all along: two support evaluations prove a step. Where bodies
 //! are far apart the distance known from before, less what both have moved since, proves it for nothing.
 
+/// One or two fingers, whatever the others do.
+mod alone;
 /// Where everything is at one moment.
 mod configuration;
+/// What draws of contacts cost.
+mod draws;
 /// Obstacles near the bodies that move.
 mod nearby;
 /// How far tips may be from where they rest.
@@ -17,6 +21,7 @@ use super::model::{Carrier, MAX_FINGERS, Model, Pair};
 use super::state::GraspState;
 use arrayvec::ArrayVec;
 use configuration::{Configuration, midway, place_finger, place_object};
+use draws::Draws;
 use nearby::Nearby;
 use regrasp_geometry::collision::{Answer, Placement, gap_along, separation};
 use regrasp_geometry::{Pose, Vector, frame};
@@ -96,8 +101,10 @@ pub struct Workspace<'a> {
     free: u32,
     /// Iterations of RRT-Connect that a relocation is worth just now.
     pub rrt_iterations: usize,
-    /// Configurations looked at.
+    /// Configurations looked at, and what draws of contacts cost beside.
     pub work: u64,
+    /// What draws of contacts cost.
+    pub draws: Draws,
     /// Grasps refused for want of forces.
     pub refusals: Refusals,
     /// The pair that stopped the last failed step.
@@ -131,6 +138,7 @@ impl<'a> Workspace<'a> {
             free: 0,
             rrt_iterations: model.settings.rrt_iterations,
             work: 0,
+            draws: Draws::default(),
             refusals: Refusals::default(),
             blocking_pair: None,
             blocking_index: 0,
@@ -228,36 +236,6 @@ impl<'a> Workspace<'a> {
     pub fn finger_is_clear(&mut self, finger: usize, mode: TipMode) -> bool {
         self.stand();
         self.is_within_reach(Some(finger)) && self.all_are_clear(Some(finger), mode)
-    }
-
-    /// True when one finger is clear of the object, the palm and obstacles now, whatever the other fingers do.
-    pub fn finger_alone_is_clear(&mut self, finger: usize, mode: TipMode) -> bool {
-        self.stand();
-        let moving = &self.model.fingers[finger];
-        self.is_within_reach(Some(finger))
-            && self.in_turn(moving.pairs.len(), &moving.turns, mode, |this, k| {
-                let pair = moving.pairs[k];
-                this.is_between_fingers(pair) || this.pair_is_clear(pair, mode)
-            })
-    }
-
-    /// True when two fingers with these joints are clear of each other.
-    pub fn fingers_are_clear(&mut self, first: (usize, &Coordinates), second: (usize, &Coordinates)) -> bool {
-        let model = self.model;
-        let (f, g) = (first.0.min(second.0), first.0.max(second.0));
-        self.set_finger(first.0, first.1);
-        self.set_finger(second.0, second.1);
-        self.stand();
-        self.forget_slack();
-        model.fingers[f].pairs_with[g].iter().all(|&pair| self.pair_is_clear(pair, TipMode::AllHold))
-    }
-
-    fn is_between_fingers(&self, pair: usize) -> bool {
-        let pair = &self.model.pairs[pair];
-        match (&self.model.bodies[pair.a].carrier, &self.model.bodies[pair.b].carrier) {
-            (Carrier::Finger { finger: f, .. }, Carrier::Finger { finger: g, .. }) => f != g,
-            _ => false,
-        }
     }
 
     /// Moves everything to the next configuration if the step is clear; stays otherwise.

@@ -93,3 +93,57 @@ fn progress_says_no_more_than_the_turn_asked_for() {
     let seen = seen.into_inner().unwrap();
     assert!(!seen.is_empty() && seen.iter().all(|left| *left <= asked + 1e-9), "{seen:?} of {asked}");
 }
+
+/// A mesh of ten thousand triangles so thin that fingertips hardly fit: drawing contacts is what takes the time, and work counts it.
+#[test]
+fn work_counts_draws_of_contacts_that_do_not_fit() {
+    let mut loaded = scene("sphere_90x.toml");
+    loaded.scene.object = thin_object();
+    let query = loaded.task.query(0);
+    let settings = InHandSettings { n_threads: 1, ..InHandSettings::default() };
+    let started = std::time::Instant::now();
+    let max_work = 2_000;
+    let found = plan_in_hand(&loaded.scene, &query, &settings, 0, &Budget::work(max_work), &|_| {});
+    let work = found.map_or_else(|failure| failure.statistics.work, |plan| plan.statistics.work);
+    assert!(work < 2 * max_work, "{work} units of {max_work}");
+    assert!(started.elapsed().as_secs_f64() < 2.0, "{work} units took {:?}", started.elapsed());
+}
+
+/// A flat, finely corrugated plate: every ball of a fingertip's size slides from groove to groove.
+fn thin_object() -> regrasp_scene::Object {
+    let folder = tempfile::tempdir().unwrap();
+    let (n, pitch, depth) = (70usize, 0.0006, 0.0008);
+    let mut text = String::new();
+    for side in [0.0, 1.0] {
+        for i in 0..=n {
+            for j in 0..=n {
+                let [x, y] = [i, j].map(|k| (k as f64 - n as f64 / 2.0) * pitch);
+                let wave = if (i + j) % 2 == 0 { 0.0 } else { depth };
+                let z = if side == 0.0 { -0.002 - wave } else { 0.002 + wave };
+                text += &format!("v {x} {y} {z}\n");
+            }
+        }
+    }
+    let at = |side: usize, i: usize, j: usize| 1 + side * (n + 1) * (n + 1) + i * (n + 1) + j;
+    let mut quad = |a: usize, b: usize, c: usize, d: usize| text += &format!("f {a} {b} {c}\nf {a} {c} {d}\n");
+    for i in 0..n {
+        for j in 0..n {
+            quad(at(1, i, j), at(1, i + 1, j), at(1, i + 1, j + 1), at(1, i, j + 1));
+            quad(at(0, i, j), at(0, i, j + 1), at(0, i + 1, j + 1), at(0, i + 1, j));
+        }
+        quad(at(0, i, 0), at(0, i + 1, 0), at(1, i + 1, 0), at(1, i, 0));
+        quad(at(0, i, n), at(1, i, n), at(1, i + 1, n), at(0, i + 1, n));
+        quad(at(0, 0, i), at(1, 0, i), at(1, 0, i + 1), at(0, 0, i + 1));
+        quad(at(0, n, i), at(0, n, i + 1), at(1, n, i + 1), at(1, n, i));
+    }
+    std::fs::write(folder.path().join("plate.obj"), text).unwrap();
+    let hand = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/hands/wide_four_finger/hand.toml");
+    let scene = format!(
+        "format = \"regrasp-scene\"\nformat_version = 1\ntask = \"in_hand\"\n[hand]\nfile = \"{hand}\"\n\
+         [object]\nname = \"plate\"\nmesh = {{ file = \"plate.obj\" }}\nmass = 0.1\nfriction = 0.8\n\
+         [start]\nposition = [0.0, 0.0, 0.078]\n[goal]\nturn = {{ axis = \"x\", angle_deg = 90 }}\n"
+    );
+    std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    let options = regrasp_robot::LoadOptions::default();
+    regrasp_scene::load_scene(&folder.path().join("scene.toml"), &options).unwrap().scene.object
+}
