@@ -186,7 +186,8 @@ def test_a_load_that_nobody_told_of_is_dropped_and_the_report_says_where(short: 
     report = simulate(plan, xml, Settings(gravity="down", mass_scale=30.0, hold_time=0.0)).report
     assert not report.kept
     assert report.dropped is not None and 0 <= report.dropped.segment < len(plan["segments"])
-    assert report.largest_position_error > 0.03
+    assert report.dropped.cause in ("position", "angle", "off the fingers")
+    assert report.largest_position_error > 0.01 or report.largest_angle_error > math.radians(20)
     assert report.lost_contacts
 
 
@@ -227,7 +228,7 @@ def test_the_command_line_says_kept_dropped_or_bad_input(tmp_path: Path, capsys:
     report = json.loads((tmp_path / "report.json").read_text())
     assert report["format"] == "regrasp-replay" and report["kept"] is True
     assert main([*usual, "--mass-scale", "30", "--gravity", "down"]) == 1
-    assert "DROPPED" in capsys.readouterr().out
+    assert "LOST (" in capsys.readouterr().out
     (tmp_path / "broken.json").write_text("{")
     assert main([str(tmp_path / "broken.json")]) == 2
     assert "not JSON" in capsys.readouterr().err

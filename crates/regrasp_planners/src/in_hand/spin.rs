@@ -19,7 +19,7 @@ use super::model::{MAX_FINGERS, Model};
 use super::roll::{NoStep, STEP_SPIN};
 use super::state::{GraspState, Moment};
 use super::transfer::{Spins, is_closed, step_joints};
-pub use arrive::arrive;
+pub use arrive::{Arrival, arrive};
 use arrayvec::ArrayVec;
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector6};
 use regrasp_geometry::collision::Placement;
