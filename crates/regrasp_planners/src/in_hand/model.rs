@@ -298,7 +298,8 @@ impl<'a> Model<'a> {
     /// True when `finger` rolls and must not turn about the contact's normal: a soft fingertip holds on to what it touches.
     #[inline]
     pub fn resists_spin(&self, finger: usize) -> bool {
-        let has_torsion = matches!(self.fingers[finger].contact, ContactModel::SoftFinger { torsion_radius } if torsion_radius > 0.0);
+        let has_torsion =
+            matches!(self.fingers[finger].contact, ContactModel::SoftFinger { torsion_radius } if torsion_radius > 0.0);
         has_torsion && self.rolls(finger)
     }
 

@@ -19,8 +19,8 @@ use super::model::{MAX_FINGERS, Model};
 use super::roll::{NoStep, STEP_SPIN};
 use super::state::{GraspState, Moment};
 use super::transfer::{Spins, is_closed, step_joints};
-pub use arrive::{Arrival, arrive};
 use arrayvec::ArrayVec;
+pub use arrive::{Arrival, arrive};
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector6};
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Pose, Vector, frame};
@@ -68,7 +68,13 @@ fn moved(model: &Model, from: &Pose, twist: &Twist) -> Pose {
 
 /// The turn of `finger` about its contact's normal per twist of the object, with the object at `placement`. None near a
 /// singularity.
-fn condition(model: &Model, finger: usize, placement: &Placement, contact: &Contact, joints: &Coordinates) -> Option<Twist> {
+fn condition(
+    model: &Model,
+    finger: usize,
+    placement: &Placement,
+    contact: &Contact,
+    joints: &Coordinates,
+) -> Option<Twist> {
     let center = placement.point(&model.frame.center_of_mass);
     let normal = placement.vector(&contact.normal_in_object);
     let point = placement.point(&contact.point_in_object);
@@ -127,13 +133,7 @@ fn are_still(spins: &[f64]) -> bool {
 }
 
 /// The step by `twist`, corrected until nothing turns about a normal.
-fn step(
-    model: &Model,
-    holding: u32,
-    here: &Moment,
-    twist: &Twist,
-    conditions: &Conditions,
-) -> Result<Moment, NoStep> {
+fn step(model: &Model, holding: u32, here: &Moment, twist: &Twist, conditions: &Conditions) -> Result<Moment, NoStep> {
     let mut twist = *twist;
     for _ in 0..CORRECTIONS {
         let pose = moved(model, &here.world_from_object, &twist);
@@ -211,8 +211,9 @@ pub struct Meeting {
     pub moments: [Vec<Moment>; 2],
 }
 
-/// Looks for a pose between `states` at which both arrive. Collisions and forces are not looked at.
-pub fn meet(model: &Model, states: [&GraspState; 2]) -> Option<Meeting> {
+/// Looks for a pose between `states` at which both arrive. Collisions and forces are not looked at. Steps of the
+/// object count as `work`.
+pub fn meet(model: &Model, states: [&GraspState; 2], work: &mut u64) -> Option<Meeting> {
     let full = model.settings.step;
     let mut moments = [Vec::new(), Vec::new()];
     let mut here = states.map(GraspState::moment);
@@ -243,6 +244,7 @@ pub fn meet(model: &Model, states: [&GraspState; 2]) -> Option<Meeting> {
             return Some(Meeting { moments });
         }
         let share = (length / longest).min(0.5);
+        *work += 2;
         let steps = [0, 1].map(|k| step(model, states[k].holding, &here[k], &(ways[k] * share), &conditions[k]));
         match steps {
             [Ok(a), Ok(b)] => {

@@ -367,7 +367,7 @@ const LANDINGS: usize = 64;
 /// Adds a grasp near `state` and the transfer that takes it to the tree's aim, for hands that never change their grasp.
 fn arrive(search: &mut Search, tree: &mut Tree, state: &GraspState) -> Option<usize> {
     let aim = tree.aim;
-    let Some(Arrival { start, moments }) = spin::arrive(search.model(), state, &aim) else {
+    let Some(Arrival { start, moments }) = spin::arrive(search.model(), state, &aim, &mut search.workspace.work) else {
         let root = tree.add_root(state.clone());
         return advance(search, tree, root, &aim, Sequence::at(state.clone())).or(Some(root));
     };

@@ -39,13 +39,14 @@ pub struct Arrival {
     pub moments: Vec<Moment>,
 }
 
-/// A transfer from a grasp near `near` that ends at exactly `goal`. Collisions and forces are not looked at.
-pub fn arrive(model: &Model, near: &GraspState, goal: &Pose) -> Option<Arrival> {
+/// A transfer from a grasp near `near` that ends at exactly `goal`. Collisions and forces are not looked at. Steps of the
+/// object count as `work`.
+pub fn arrive(model: &Model, near: &GraspState, goal: &Pose, work: &mut u64) -> Option<Arrival> {
     let n = 2 * model.n_fingers() + 6 * WAVES;
     let mut numbers = DVector::zeros(n);
     let mut before = LARGEST_ERROR / PROGRESS * twist_between(model, &near.world_from_object, goal).norm();
     for _ in 0..MAX_ITERATIONS {
-        let found = go(model, near, goal, &numbers)?;
+        let found = go(model, near, goal, &numbers, work)?;
         let error = left(model, &found, goal);
         if error.norm() < NEAR {
             return end_at(model, found, goal);
@@ -59,7 +60,7 @@ pub fn arrive(model: &Model, near: &GraspState, goal: &Pose) -> Option<Arrival> 
         for k in 0..n {
             let mut probe = numbers.clone();
             probe[k] += PROBE;
-            let change = left(model, &go(model, near, goal, &probe)?, goal) - error;
+            let change = left(model, &go(model, near, goal, &probe, work)?, goal) - error;
             slopes.set_column(k, &(change / PROBE));
         }
         let square = &slopes * slopes.transpose();
@@ -100,7 +101,7 @@ fn shifted(model: &Model, near: &GraspState, numbers: &DVector<f64>) -> Option<G
 }
 
 /// The transfer with these numbers.
-fn go(model: &Model, near: &GraspState, goal: &Pose, numbers: &DVector<f64>) -> Option<Arrival> {
+fn go(model: &Model, near: &GraspState, goal: &Pose, numbers: &DVector<f64>, work: &mut u64) -> Option<Arrival> {
     let start = shifted(model, near, numbers)?;
     let offsets = 2 * model.n_fingers();
     let line = PoseLine::between(&start.world_from_object, goal);
@@ -118,6 +119,7 @@ fn go(model: &Model, near: &GraspState, goal: &Pose, numbers: &DVector<f64>) -> 
         let target = moved(model, &line.at(t), &offset);
         let conditions = Conditions::of(model, start.holding, &here)?;
         let way = conditions.project(&twist_between(model, &here.world_from_object, &target))?;
+        *work += 1;
         here = step(model, start.holding, &here, &way, &conditions).ok()?;
         moments.push(here.clone());
     }

@@ -96,7 +96,7 @@ fn two_grasps_meet_at_one_pose() {
         for _ in 0..60 {
             let (Some(a), Some(b)) = (draw_state(search), draw_state(search)) else { continue };
             let model = search.model();
-            let Some(Meeting { moments }) = meet(model, [&a, &b]) else { continue };
+            let Some(Meeting { moments }) = meet(model, [&a, &b], &mut 0) else { continue };
             let last = |k: usize| moments[k].last().unwrap().world_from_object;
             assert_eq!(last(0), last(1));
             assert_still(model, &a, &moments[0]);
