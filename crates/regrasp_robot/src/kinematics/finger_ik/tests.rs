@@ -342,8 +342,8 @@ fn chains_with_a_joint_to_spare_turn_as_asked_while_they_move() {
             let start = random_coordinates(&chain, &mut rng);
             let ik = FingerIk::new(&chain, &center);
             let from = chain.last_frame(&start);
-            let (axis, angle) = (Vector::from(rng.direction()), rng.uniform(-0.05, 0.05));
-            let target = from.point(&center) + Vector::from(rng.direction()) * 0.002;
+            let (axis, angle) = (Vector::from(rng.direction()), rng.uniform(-0.01, 0.01));
+            let target = from.point(&center) + Vector::from(rng.direction()) * 0.0005;
             let about = |link: &BodyFrame| frame::turn_between(&from.rotation, &link.rotation).dot(&axis);
             let asked = |link: &BodyFrame| {
                 let turn = Some(AskedTurn { axis, left: angle - about(link) });
