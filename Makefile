@@ -163,9 +163,14 @@ benchmark-page: release
 	$(REGRASP) bench --page docs/benchmarks.md --limits docs/benchmarks/limits.json $(wildcard $(BENCHMARKS:%=docs/benchmarks/%.csv) $(ROADMAPS:%=docs/benchmarks/%.json) $(GROWTH:%=docs/benchmarks/growth/%.csv)) suites/*.toml
 
 # Replays in MuJoCo: 50 plans per scene and direction of gravity, with and without feedback of the object's pose; the negative
-# controls; friction, mass and speed other than planned. Some 20 minutes. Writes docs/benchmarks/replay.
+# controls; friction, mass and speed other than planned; 5 plans of every in-hand scene with gravity as planned. Some 50 minutes.
+# Writes docs/benchmarks/replay.
 REPLAY := $(addprefix scenes/,$(addsuffix .toml,sphere_90x sphere_180z box_90x))
 REPLAY_ALLEGRO := $(addprefix scenes/allegro/,$(addsuffix .toml,sphere32_x cube57_y cube57_z))
+# Every in-hand scene that has a plan, gravity as planned.
+REPLAY_SCENES := $(filter-out scenes/out_of_reach.toml,$(shell grep -l 'task = "in_hand"' scenes/*.toml))
+REPLAY_MODELS := $(shell grep -l 'task = "in_hand"' scenes/allegro/*.toml scenes/shadow/*.toml scenes/dclaw/soft_*.toml scenes/trifinger/soft_*.toml)
+SCENE_SEEDS ?= 5
 REPLAY_SEEDS ?= 50
 CONTROL_SEEDS ?= 10
 SIMULATE = $(VENV)/bin/python -m regrasp.simulate.campaign
@@ -177,6 +182,7 @@ replay: python
 	$(SIMULATE) $(REPLAY) --gravity down --friction-scale 0.8,1,1.2 --seeds $(CONTROL_SEEDS) -o $(OUT)/replay --name friction
 	$(SIMULATE) $(REPLAY) --gravity down --mass-scale 0.5,1,1.5 --seeds $(CONTROL_SEEDS) -o $(OUT)/replay --name mass
 	$(SIMULATE) $(REPLAY) --gravity down --speed 1,2 --seeds $(CONTROL_SEEDS) -o $(OUT)/replay --name speed
+	$(SIMULATE) $(REPLAY_SCENES) $(if $(PACKAGES),$(REPLAY_MODELS)) $(PACKAGES) --gravity plan --seeds $(SCENE_SEEDS) -o $(OUT)/replay --name scenes
 	cp $(OUT)/replay/*.csv $(OUT)/replay/*.md docs/benchmarks/replay/
 
 # Replays of 20 plans of tracking: as the paper has them; with exact cones, a friction margin and normal forces from 0.5 to

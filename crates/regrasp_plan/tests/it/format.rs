@@ -151,7 +151,10 @@ fn a_file_full_of_damage_gives_a_short_answer() {
     plan.segments.iter_mut().flat_map(|s| &mut s.waypoints).for_each(|w| w.joints.clear());
     let message = read(&to_json(&plan)).unwrap_err();
     assert_eq!(message.lines().count(), 21, "{message}");
-    assert!(message.lines().last().is_some_and(|line| line.starts_with("and ") && line.ends_with(" more")), "{message}");
+    assert!(
+        message.lines().last().is_some_and(|line| line.starts_with("and ") && line.ends_with(" more")),
+        "{message}"
+    );
 }
 
 proptest! {

@@ -189,7 +189,8 @@ fn bridge_halfway(search: &mut Search, (tree, other): (&Tree, &Tree), node: usiz
     let drawn: ArrayVec<usize, JOINS> = seen.iter().map(|(_, there)| *there).take(JOINS).collect();
     drawn.into_iter().find_map(|there| {
         let theirs = other.nodes[there].state();
-        let Meeting { moments: [mine, their_moments] } = spin::meet(model, [state, theirs])?;
+        let Meeting { moments: [mine, their_moments] } =
+            spin::meet(model, [state, theirs], &mut search.workspace.work)?;
         let mut rng = Rng::child(&search.rng, "halfway", 0);
         search.rng.bits();
         let workspace = &mut search.workspace;

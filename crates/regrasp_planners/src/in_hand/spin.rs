@@ -20,7 +20,7 @@ use super::roll::{NoStep, STEP_SPIN};
 use super::state::{GraspState, Moment};
 use super::transfer::{Spins, is_closed, step_joints};
 use arrayvec::ArrayVec;
-pub use arrive::arrive;
+pub use arrive::{Arrival, arrive};
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector6};
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Pose, Vector, frame};
@@ -211,8 +211,9 @@ pub struct Meeting {
     pub moments: [Vec<Moment>; 2],
 }
 
-/// Looks for a pose between `states` at which both arrive. Collisions and forces are not looked at.
-pub fn meet(model: &Model, states: [&GraspState; 2]) -> Option<Meeting> {
+/// Looks for a pose between `states` at which both arrive. Collisions and forces are not looked at. Steps of the
+/// object count as `work`.
+pub fn meet(model: &Model, states: [&GraspState; 2], work: &mut u64) -> Option<Meeting> {
     let full = model.settings.step;
     let mut moments = [Vec::new(), Vec::new()];
     let mut here = states.map(GraspState::moment);
@@ -243,6 +244,7 @@ pub fn meet(model: &Model, states: [&GraspState; 2]) -> Option<Meeting> {
             return Some(Meeting { moments });
         }
         let share = (length / longest).min(0.5);
+        *work += 2;
         let steps = [0, 1].map(|k| step(model, states[k].holding, &here[k], &(ways[k] * share), &conditions[k]));
         match steps {
             [Ok(a), Ok(b)] => {

@@ -54,29 +54,12 @@ pub fn transfer(workspace: &mut Workspace, start: &GraspState, goal: &Pose, mome
         return 0.0;
     }
     workspace.set_state(start);
-    let n_before = moments.len();
-    let model = workspace.model;
-    let share = follow(model, start, goal, moments, |there| {
+    follow(workspace.model, start, goal, moments, |there| {
         workspace.roll_to(&there.contacts);
         workspace.step(&there.world_from_object, &there.joints, TipMode::AllHold)
             && holds_weight(workspace, there, start.holding)
-    });
-    let is_near = (LEAST_SHARE_FOR_ARRIVAL..1.0).contains(&share);
-    if is_near
-        && !model.may_release
-        && spin::is_restricted(model, start.holding)
-        && let Some(others) = spin::arrive(model, start, goal)
-        && is_carried_out(workspace, start, &others)
-    {
-        moments.truncate(n_before);
-        moments.extend(others);
-        return 1.0;
-    }
-    share
+    })
 }
-
-/// Share of its way that a transfer must come towards its goal before another way there is sought with the same grasp. By hand.
-const LEAST_SHARE_FOR_ARRIVAL: f64 = 0.6;
 
 /// True when `moments` of a transfer from `start` are clear of collisions, with forces that hold the weight.
 pub fn is_carried_out(workspace: &mut Workspace, start: &GraspState, moments: &[Moment]) -> bool {

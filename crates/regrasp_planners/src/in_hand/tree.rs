@@ -9,10 +9,10 @@ use super::pool::Pool;
 use super::regrasp::{Tried, regrasp};
 use super::relocate::{Foothold, can_lift, lift_is_within_reach};
 use super::search::Search;
-use super::spin::Freedom;
+use super::spin::{self, Arrival, Freedom};
 use super::state::{GraspState, Moment, Motion, Sequence};
 use super::tally::Reason;
-use super::transfer::transfer;
+use super::transfer::{is_carried_out, transfer};
 use super::unlock::{draw_bound_finger, unlock};
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;
@@ -121,7 +121,11 @@ impl Tree {
 
     /// One step of growth towards `target`: the new node, if there is one.
     pub fn grow(&mut self, search: &mut Search, target: &Pose) -> Option<usize> {
-        match pick(search, self, target) {
+        // Hands that have to arrive by one transfer look for the grasp with which they do.
+        let model = search.model();
+        let tries_grasps = self.root_is_free && !model.may_release && spin::is_restricted(model, model.all_fingers());
+        let picked = if tries_grasps { None } else { pick(search, self, target) };
+        match picked {
             Some(node) => {
                 self.nodes[node].n_tries += 1;
                 let place = self.nodes[node].place;
@@ -360,6 +364,24 @@ pub fn land(search: &mut Search, tree: &mut Tree, way: Sequence) -> Option<Seque
 /// Grasps that fingers which are free at an end may land in.
 const LANDINGS: usize = 64;
 
+/// Adds a grasp near `state` and the transfer that takes it to the tree's aim, for hands that never change their grasp.
+fn arrive(search: &mut Search, tree: &mut Tree, state: &GraspState) -> Option<usize> {
+    let aim = tree.aim;
+    let Some(Arrival { start, moments }) = spin::arrive(search.model(), state, &aim, &mut search.workspace.work) else {
+        let root = tree.add_root(state.clone());
+        return advance(search, tree, root, &aim, Sequence::at(state.clone())).or(Some(root));
+    };
+    let is_clear = is_carried_out(&mut search.workspace, &start, &moments);
+    let mut way = Sequence::at(start.clone());
+    let root = tree.add_root(start);
+    if !is_clear {
+        return Some(root);
+    }
+    way.push_transfer(moments);
+    let place = tree.add_place(search, &aim);
+    Some(tree.add_node(Node { parent: Some(root), way, n_tries: 0, place }))
+}
+
 /// Chooses a new grasp at the tree's end of the query, where no finger has to move for it, and takes it towards the aim.
 fn sow(search: &mut Search, tree: &mut Tree) -> Option<usize> {
     let model = search.model();
@@ -384,6 +406,7 @@ fn sow(search: &mut Search, tree: &mut Tree) -> Option<usize> {
     }
     let freedom = Freedom::towards(model, &options, &pose, &tree.aim);
     match choose_grasp(search, &pose, &options, freedom.as_ref()) {
+        Some(state) if !model.may_release && spin::is_restricted(model, state.holding) => arrive(search, tree, &state),
         Some(state) => {
             let here = Sequence::at(state.clone());
             let node = tree.add_root(state);

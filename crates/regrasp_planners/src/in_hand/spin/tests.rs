@@ -1,6 +1,7 @@
 //! Turns about contact normals, measured another way.
 
-use super::super::explore::draw_state;
+use super::super::grasps::choose_grasp;
+use super::super::pool::Pool;
 use super::super::roadmap_tests::with_settings;
 use super::super::search::Search;
 use super::super::settings::InHandSettings;
@@ -33,6 +34,18 @@ fn turn(model: &Model, finger: usize, from: &Moment, to: &Moment) -> f64 {
         .sum()
 }
 
+/// A closed grasp of both fingers at a pose near the way.
+fn draw_state(search: &mut Search) -> Option<GraspState> {
+    let (pose, goal, n) = (search.draw_pose(), search.goal, search.model().n_fingers());
+    let mut pool = Pool::new(&pose, &goal, n);
+    search.workspace.place_object(&pose);
+    let options: Vec<Vec<Candidate>> = (0..n).map(|finger| pool.towards_aim(search, finger, 6)).collect();
+    if options.iter().any(Vec::is_empty) {
+        return None;
+    }
+    choose_grasp(search, &pose, &options, None)
+}
+
 fn elsewhere(search: &mut Search, pose: &Pose, distance: f64, angle: f64) -> Pose {
     let shift = Vector::from(search.rng.direction()) * distance;
     let turn = UnitQuaternion::from_scaled_axis(Vector::from(search.rng.direction()) * angle);
@@ -56,7 +69,7 @@ fn assert_still(model: &Model, start: &GraspState, moments: &[Moment]) {
 fn conditions_are_the_turns_that_steps_make() {
     with_settings("soft_pair_roll.toml", &InHandSettings::default(), |search| {
         let mut n_compared = 0;
-        for _ in 0..40 {
+        for _ in 0..200 {
             let Some(state) = draw_state(search) else { continue };
             let goal = elsewhere(search, &state.world_from_object, 1e-4, 3e-3);
             let model = search.model();
@@ -77,7 +90,7 @@ fn conditions_are_the_turns_that_steps_make() {
 fn soft_fingertips_do_not_turn_about_their_normals() {
     with_settings("soft_pair_roll.toml", &InHandSettings::default(), |search| {
         let mut n_moments = 0;
-        for _ in 0..60 {
+        for _ in 0..300 {
             let Some(state) = draw_state(search) else { continue };
             let goal = elsewhere(search, &state.world_from_object, 0.004, 0.3);
             let mut moments = Vec::new();
@@ -93,10 +106,10 @@ fn soft_fingertips_do_not_turn_about_their_normals() {
 fn two_grasps_meet_at_one_pose() {
     with_settings("soft_pair_roll.toml", &InHandSettings::default(), |search| {
         let mut n_met = 0;
-        for _ in 0..60 {
+        for _ in 0..300 {
             let (Some(a), Some(b)) = (draw_state(search), draw_state(search)) else { continue };
             let model = search.model();
-            let Some(Meeting { moments }) = meet(model, [&a, &b]) else { continue };
+            let Some(Meeting { moments }) = meet(model, [&a, &b], &mut 0) else { continue };
             let last = |k: usize| moments[k].last().unwrap().world_from_object;
             assert_eq!(last(0), last(1));
             assert_still(model, &a, &moments[0]);

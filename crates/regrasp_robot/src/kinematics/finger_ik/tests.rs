@@ -4,7 +4,7 @@ use super::*;
 use crate::kinematics::samples::*;
 use crate::places::shared_models;
 use nalgebra::{DVector, Matrix3};
-use regrasp_geometry::Vector;
+use regrasp_geometry::{Vector, frame};
 
 /// Every solution strictly inside the limits that Newton steps find from a grid of `n` values per coordinate.
 fn brute_force(chain: &Chain, center: &Point, target: &Point, n: usize) -> Vec<DVector<f64>> {
@@ -331,24 +331,52 @@ fn redundant_tracking_moves_little_and_stays_on_target() {
     assert!(largest <= 0.4 && n_reached * 10 >= n_wanted * 8, "{told}");
 }
 
+/// A point of the last body is moved and the body is turned about an axis at once; both come out, by the frames alone.
 #[test]
-fn displacements_and_jacobians_of_tips_agree_with_finite_differences() {
-    let mut rng = Rng::keyed(12, "displacement", 0);
-    for _ in 0..40 {
-        let (chain, center) = random_turning(4, 1.0, &mut rng);
-        let ik = FingerIk::new(&chain, &center);
-        let at = random_coordinates(&chain, &mut rng);
-        let changes: Vec<f64> = at.iter().map(|_| rng.uniform(-1.0, 1.0)).collect();
-        let h = 1e-6;
-        let moved = |sign: f64| -> Vec<f64> { at.iter().zip(&changes).map(|(q, d)| q + sign * h * d).collect() };
-        let way = (ik.tip(&moved(1.0)) - ik.tip(&moved(-1.0))) / (2.0 * h);
-        let jacobian = ik.tip_jacobian(&at);
-        let expected: Vector = jacobian.iter().zip(&changes).map(|(column, change)| column * *change).sum();
-        assert!((way - expected).norm() < 1e-8);
-        // The tip is one of the points; others may go farther.
-        let most = ik.displacement(&at, &changes, 0.0);
-        assert!(most >= way.norm() - 1e-9);
-        let levers: f64 = changes.iter().map(|change| change.abs()).sum::<f64>() * 10.0;
-        assert!(most <= levers && ik.displacement(&at, &changes, 0.01) >= most);
+fn chains_with_a_joint_to_spare_turn_as_asked_while_they_move() {
+    let mut rng = Rng::keyed(11, "turns", 0);
+    let mut n_made = 0;
+    for n in [4, 5, 6] {
+        for _ in 0..60 {
+            let (chain, center) = random_turning(n, 0.12, &mut rng);
+            let start = random_coordinates(&chain, &mut rng);
+            let ik = FingerIk::new(&chain, &center);
+            let from = chain.last_frame(&start);
+            let (axis, angle) = (Vector::from(rng.direction()), rng.uniform(-0.01, 0.01));
+            let target = from.point(&center) + Vector::from(rng.direction()) * 0.0005;
+            let about = |link: &BodyFrame| frame::turn_between(&from.rotation, &link.rotation).dot(&axis);
+            let asked = |link: &BodyFrame| {
+                let turn = Some(AskedTurn { axis, left: angle - about(link) });
+                Some(Asked { error: target - link.point(&center), arm: Vector::zeros(), turn })
+            };
+            let Some(found) = ik.follow(&start, &IkSettings::default(), asked) else { continue };
+            let link = chain.last_frame(&found);
+            assert!((link.point(&center) - target).norm() < 1e-8);
+            assert!((about(&link) - angle).abs() < 1e-6);
+            n_made += 1;
+        }
     }
+    assert!(n_made > 90, "too few steps were made: {n_made} of 180");
+}
+
+/// Against a small step of [`FingerIk::follow`] of a chain that has no choice.
+#[test]
+fn the_turn_per_motion_is_that_of_a_small_step() {
+    let (chain, center) = wide_finger();
+    let ik = FingerIk::new(&chain, &center);
+    let mut rng = Rng::keyed(12, "turn per motion", 0);
+    let mut n_compared = 0;
+    for _ in 0..100 {
+        let start = random_coordinates(&chain, &mut rng);
+        let (axis, shift) = (Vector::from(rng.direction()), Vector::from(rng.direction()) * 1e-6);
+        let Some(gradient) = ik.turn_per_motion(&start, &Vector::zeros(), &axis) else { continue };
+        let Some(end) = ik.solve_near(&(ik.tip(&start) + shift), &start, &IkSettings::default()) else { continue };
+        let (from, to) = (chain.last_frame(&start), chain.last_frame(&end));
+        let turn = frame::turn_between(&from.rotation, &to.rotation).dot(&axis);
+        if gradient.norm() < 100.0 {
+            assert!((turn - gradient.dot(&shift)).abs() < 1e-7, "{turn} {}", gradient.dot(&shift));
+            n_compared += 1;
+        }
+    }
+    assert!(n_compared > 50, "too little was compared: {n_compared}");
 }
