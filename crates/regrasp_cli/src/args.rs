@@ -1,21 +1,19 @@
 //! Arguments. The spellings are a promise to scripts.
 
+mod judging;
+mod values;
+
+pub use judging::Judging;
+use values::{count, degrees, margin, metres, package, seconds, threads, trials, whole_number};
+
 use clap::builder::PossibleValuesParser;
 use clap::{ArgGroup, Args, Parser, Subcommand};
-use regrasp::plan::check::Level;
-use regrasp::scene::{Gravity, LoadedScene};
 use regrasp_bench::growth::Curve;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// Methods of the in-hand planner, as `regrasp_planners::Method` spells them, and of tracking, as `TrackingMethod` does.
 pub const METHODS: [&str; 5] = ["gait", "visibility", "classic", "tracking", "tracking+gaiting"];
-
-/// Most threads that may be asked for.
-const MAX_THREADS: i64 = 1024;
-
-/// Most trials that may be asked of a point of a growth curve; plans of a batch are kept until all are there.
-const MAX_TRIALS: u64 = 100_000;
 
 /// Plans how a multi-fingered hand turns an object, and judges plans independently.
 ///
@@ -128,45 +126,6 @@ pub struct Search {
     /// The same by work, in configurations looked at: the same plan on every machine
     #[arg(long, value_name = "N", value_parser = whole_number, allow_negative_numbers = true)]
     pub improve_work: Option<u64>,
-}
-
-/// By what plans are judged, and gravity that they are planned under.
-#[derive(Debug, Default, Args)]
-pub struct Judging {
-    /// What plans are judged for: geometry (poses alone), forces (and contact forces), motion (and that nothing slips or goes too
-    /// fast) [default: motion]
-    #[arg(long, value_name = "LEVEL", value_parser = PossibleValuesParser::new(Level::ALL.map(Level::name)))]
-    pub level: Option<String>,
-    /// Gravity instead of the scene's: a direction X,Y,Z in the frame of the hand's base link, or any
-    #[arg(long, value_name = "X,Y,Z", value_parser = gravity, allow_hyphen_values = true)]
-    pub gravity: Option<GravityInHand>,
-}
-
-impl Judging {
-    /// What plans are judged for.
-    pub fn level(&self) -> Level {
-        self.level.as_deref().and_then(Level::named).unwrap_or_default()
-    }
-
-    /// A scene under the gravity asked for, else under its own.
-    pub fn scene(&self, loaded: LoadedScene) -> LoadedScene {
-        let Some(asked) = self.gravity else { return loaded };
-        let gravity = match asked {
-            GravityInHand::Any => Some(Gravity::Any),
-            GravityInHand::Direction(down) => Gravity::in_hand(&loaded.scene.hand, &down.into()),
-        };
-        // The zero vector is refused where the argument is read.
-        LoadedScene { scene: loaded.scene.under_gravity(gravity.unwrap_or_default()), ..loaded }
-    }
-}
-
-/// Gravity as seen from the hand's base link.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum GravityInHand {
-    /// Along this direction, of any length.
-    Direction([f64; 3]),
-    /// Any direction.
-    Any,
 }
 
 /// `regrasp plan`
@@ -538,80 +497,6 @@ pub enum CampaignKind {
         #[command(flatten)]
         search: Search,
     },
-}
-
-fn package(text: &str) -> Result<(String, PathBuf), String> {
-    match text.split_once('=') {
-        Some((name, folder)) if !name.is_empty() && !folder.is_empty() => match Path::new(folder).is_dir() {
-            true => Ok((name.to_owned(), PathBuf::from(folder))),
-            false => Err(format!("{folder} is not a folder")),
-        },
-        _ => Err("expected NAME=DIR, such as allegro=/models/allegro".into()),
-    }
-}
-
-fn gravity(text: &str) -> Result<GravityInHand, String> {
-    if text == "any" {
-        return Ok(GravityInHand::Any);
-    }
-    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
-    match numbers.as_deref() {
-        Ok(&[x, y, z]) if [x, y, z].iter().all(|c| c.is_finite()) && [x, y, z].iter().any(|c| *c != 0.0) => {
-            Ok(GravityInHand::Direction([x, y, z]))
-        }
-        _ => Err("expected a direction such as 0,0,-1 in the frame of the hand's base link, or any".into()),
-    }
-}
-
-fn whole_number(text: &str) -> Result<u64, String> {
-    text.parse().map_err(|_| format!("expected a whole number from 0 to {}", u64::MAX))
-}
-
-fn count(text: &str) -> Result<u64, String> {
-    text.parse().ok().filter(|n| *n > 0).ok_or_else(|| "expected a whole number above 0".to_owned())
-}
-
-fn trials(text: &str) -> Result<u64, String> {
-    match text.parse() {
-        Ok(n) if (1..=MAX_TRIALS).contains(&n) => Ok(n),
-        _ => Err(format!("expected a number of trials between 1 and {MAX_TRIALS}")),
-    }
-}
-
-fn seconds(text: &str) -> Result<Duration, String> {
-    let value: f64 = text.parse().map_err(|_| "expected a number of seconds".to_owned())?;
-    if !(value > 0.0 && value <= 1e7) {
-        return Err(format!("is {value}; expected a number of seconds between 0 (exclusive) and 1e7"));
-    }
-    Ok(Duration::from_secs_f64(value))
-}
-
-fn margin(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(value) if (0.0..1.0).contains(&value) => Ok(value),
-        _ => Err("expected a number in [0, 1)".into()),
-    }
-}
-
-fn metres(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
-        _ => Err("expected a number of metres from 0 to 1".into()),
-    }
-}
-
-fn degrees(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(value) if value > 0.0 && value <= 180.0 => Ok(value),
-        _ => Err("expected a number of degrees above 0 and at most 180".into()),
-    }
-}
-
-fn threads(text: &str) -> Result<usize, String> {
-    match text.parse::<i64>() {
-        Ok(n) if (1..=MAX_THREADS).contains(&n) => Ok(n as usize),
-        _ => Err(format!("expected a number of threads between 1 and {MAX_THREADS}")),
-    }
 }
 
 #[cfg(test)]

@@ -27,7 +27,8 @@ fn folder_with_graph() -> Folder {
 
 /// Asks with `--json`; the run and the work that the plan says it took.
 fn ask(folder: &Folder, more: &[&str]) -> (Run, u64) {
-    let mut arguments = vec!["roadmap", "query", "a.roadmap", "scene.toml", "-o", "plan.json", "--json"];
+    let mut arguments =
+        vec!["roadmap", "query", "a.roadmap", "scene.toml", "-o", "plan.json", "--json", "--level", "forces"];
     arguments.extend(more);
     let run = folder.run(&arguments);
     assert_eq!(run.code, Some(0), "{run:?}");
@@ -88,8 +89,9 @@ fn a_write_that_is_cut_off_leaves_the_old_file_whole() {
     assert!(old.len() > limit * 1024, "{} bytes are written before the limit stops it", old.len());
     let with_limit = |before: &str| {
         let program = env!("CARGO_BIN_EXE_regrasp");
-        let script =
-            format!("{before} ulimit -f {limit}; exec \"{program}\" roadmap query a.roadmap scene.toml --grow --quiet");
+        let script = format!(
+            "{before} ulimit -f {limit}; exec \"{program}\" roadmap query a.roadmap scene.toml --grow --quiet --level forces"
+        );
         let mut command = Command::new("sh");
         command.args(["-c", &script]).current_dir(folder.path("")).stdin(Stdio::null());
         Run::of(command.stdout(Stdio::piped()).stderr(Stdio::piped()).output().expect("there is a shell"))

@@ -134,9 +134,13 @@ fn the_graph_of_a_roadmap_is_shown_with_the_way_through_it() {
         assert_eq!(ends[0]["component"], ends[1]["component"], "an edge joins components");
     }
     // A plan made on the graph goes through its nodes.
-    let query = folder.run(&["roadmap", "query", "a.roadmap", "scene.toml", "-o", "on.json", "--grow"]);
+    let query =
+        folder.run(&["roadmap", "query", "a.roadmap", "scene.toml", "-o", "on.json", "--grow", "--level", "forces"]);
     assert_eq!(query.code, Some(0), "{query:?}");
-    assert_eq!(folder.run(&["view", "on.json", "-o", "on.html", "--with-roadmap", "a.roadmap"]).code, Some(0));
+    assert_eq!(
+        folder.run(&["view", "on.json", "-o", "on.html", "--with-roadmap", "a.roadmap", "--level", "forces"]).code,
+        Some(0)
+    );
     let told = story(&folder, "on.html");
     assert!(told["roadmap"]["solution"].as_array().unwrap().len() >= 2, "{}", told["roadmap"]["solution"]);
 }
@@ -166,7 +170,7 @@ fn xml(text: &str) -> String {
 #[test]
 fn markup_in_files_and_their_names_stays_text() {
     let (link, finger, object) =
-        ("</script><script>alert(1)</script>", "<img src=x onerror=alert(2)>", "<!--<script>]]>\u{202e}");
+        ("</script><script>alert(1)</script>", "<img src=x onerror=alert(2)>", "<!--<script>]]>");
     let folder = Folder::new();
     let replaced = |name: &str, changes: &[(&str, String)]| {
         let mut text = std::fs::read_to_string(folder.path(name)).unwrap();

@@ -185,7 +185,10 @@ fn leaps_are_rejected_at_once_and_the_report_says_what_was_left_out() {
 fn what_is_cut_by_the_work_limit_is_not_accepted() {
     let scene = sample::scene();
     let plan = sample::plan(&scene);
-    let with = |most_work: u64| check(&scene, None, &plan, &CheckSettings { most_work, ..CheckSettings::default() });
+    let with = |most_work: u64| {
+        let settings = CheckSettings { level: Level::Geometry, most_work, ..CheckSettings::default() };
+        check(&scene, None, &plan, &settings)
+    };
     let whole = with(CheckSettings::default().most_work);
     assert!(whole.accepted(), "{whole:?}");
     // By a hundredth of the limit this plan is judged whole.

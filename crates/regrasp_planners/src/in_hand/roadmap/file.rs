@@ -369,7 +369,15 @@ fn data_of(about: &About) -> AboutData {
 
 fn about(reader: &mut Reader, sizes: &Sizes) -> Result<About, String> {
     let bytes = reader.take_padded(sizes.about).ok_or("ends within what it says about itself")?;
-    let data: AboutData = serde_json::from_slice(bytes).map_err(|error| format!("says about itself: {error}"))?;
+    let wrong = |error: serde_json::Error| format!("says about itself: {error}");
+    let mut data: serde_json::Value = serde_json::from_slice(bytes).map_err(wrong)?;
+    // Settings of earlier versions could state gravity; those that did not are today's.
+    if let Some(settings) = data.get_mut("settings").and_then(|settings| settings.as_object_mut())
+        && settings.get("gravity").is_some_and(serde_json::Value::is_null)
+    {
+        settings.remove("gravity");
+    }
+    let data: AboutData = serde_json::from_value(data).map_err(wrong)?;
     data.settings.validate()?;
     data.build.validate()?;
     data.region.validate()?;

@@ -320,9 +320,26 @@ impl<'m, 'a> Path<'m, 'a> {
         }
     }
 
-    /// By how much all must be slower so that fingertips keep their largest speed; at least one.
-    pub fn too_fast(&self, waypoints: &[Waypoint], speeds: &Speeds) -> f64 {
+    /// The same for joints alone. Where a forward pass finds nothing that its limits allow, a step may exceed them; slowed down as
+    /// a whole, a segment keeps its shape.
+    fn joints_too_fast(&self, waypoints: &[Waypoint], speeds: &Speeds) -> f64 {
         let mut most: f64 = 1.0;
+        for (k, pair) in waypoints.windows(2).enumerate() {
+            let span = speeds.spans[k];
+            for j in 0..self.n_joints {
+                let ends = [k, k + 1].map(|end| self.directions[end * self.n_joints + j] * speeds.speeds[end] * span);
+                let [slope, bend] = steepest(pair[1].joints[j] - pair[0].joints[j], ends[0], ends[1]);
+                let velocity = slope / (span * self.limits.joint_velocities[j]);
+                let acceleration = bend / (span * span * self.limits.joint_accelerations[j]);
+                most = most.max(velocity).max(acceleration.sqrt());
+            }
+        }
+        most
+    }
+
+    /// By how much all must be slower so that joints keep their limits and fingertips their largest speed; at least one.
+    pub fn too_fast(&self, waypoints: &[Waypoint], speeds: &Speeds) -> f64 {
+        let mut most = self.joints_too_fast(waypoints, speeds);
         for (k, pair) in waypoints.windows(2).enumerate() {
             for (finger, of_model) in self.fingers.iter().zip(&self.model.fingers) {
                 let range = &finger.coordinates;
@@ -351,6 +368,17 @@ impl<'m, 'a> Path<'m, 'a> {
         }
         most
     }
+}
+
+/// Largest sizes of the slope and of the second derivative of the cubic with this change and these slopes at both ends.
+fn steepest(change: f64, first: f64, last: f64) -> [f64; 2] {
+    let bends = [6.0 * change - 4.0 * first - 2.0 * last, 2.0 * first + 4.0 * last - 6.0 * change];
+    let mut slope = first.abs().max(last.abs());
+    if bends[0] * bends[1] < 0.0 {
+        let u = bends[0] / (bends[0] - bends[1]);
+        slope = slope.max((first + u * bends[0] + 0.5 * u * u * (bends[1] - bends[0])).abs());
+    }
+    [slope, bends[0].abs().max(bends[1].abs())]
 }
 
 /// The largest of values that are taken evenly from a smooth function, and of the parabolas through three of them.

@@ -1,0 +1,58 @@
+//! By what plans are judged: level and gravity.
+
+use clap::Args;
+use clap::builder::PossibleValuesParser;
+use regrasp::plan::check::Level;
+use regrasp::scene::{Gravity, LoadedScene};
+
+/// By what plans are judged, and gravity that they are planned under.
+#[derive(Debug, Default, Args)]
+pub struct Judging {
+    /// What plans are judged for: geometry (poses alone), forces (and contact forces), motion (and that nothing slips or goes too
+    /// fast) [default: motion]
+    #[arg(long, value_name = "LEVEL", value_parser = PossibleValuesParser::new(Level::ALL.map(Level::name)))]
+    pub level: Option<String>,
+    /// Gravity instead of the scene's: a direction X,Y,Z in the frame of the hand's base link, or any
+    #[arg(long, value_name = "X,Y,Z", value_parser = gravity, allow_hyphen_values = true)]
+    pub gravity: Option<GravityInHand>,
+}
+
+impl Judging {
+    /// What plans are judged for.
+    pub fn level(&self) -> Level {
+        self.level.as_deref().and_then(Level::named).unwrap_or_default()
+    }
+
+    /// A scene under the gravity asked for, else under its own.
+    pub fn scene(&self, loaded: LoadedScene) -> LoadedScene {
+        let Some(asked) = self.gravity else { return loaded };
+        let gravity = match asked {
+            GravityInHand::Any => Some(Gravity::Any),
+            GravityInHand::Direction(down) => Gravity::in_hand(&loaded.scene.hand, &down.into()),
+        };
+        // The zero vector is refused where the argument is read.
+        LoadedScene { scene: loaded.scene.under_gravity(gravity.unwrap_or_default()), ..loaded }
+    }
+}
+
+/// Gravity as seen from the hand's base link.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum GravityInHand {
+    /// Along this direction, of any length.
+    Direction([f64; 3]),
+    /// Any direction.
+    Any,
+}
+
+fn gravity(text: &str) -> Result<GravityInHand, String> {
+    if text == "any" {
+        return Ok(GravityInHand::Any);
+    }
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, z]) if [x, y, z].iter().all(|c| c.is_finite()) && [x, y, z].iter().any(|c| *c != 0.0) => {
+            Ok(GravityInHand::Direction([x, y, z]))
+        }
+        _ => Err("expected a direction such as 0,0,-1 in the frame of the hand's base link, or any".into()),
+    }
+}
