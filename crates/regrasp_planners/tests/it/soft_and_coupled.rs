@@ -46,9 +46,7 @@ fn mutants_of_accepted_plans(name: &str, models: &Path, seeds: std::ops::Range<u
 fn three_soft_fingers_hold_by_two_while_the_third_moves() {
     let Some(models) = shared_models() else { return };
     let mut names = mutants_of_accepted_plans("dclaw/soft_sphere32_x.toml", &models, 0..3);
-    names.extend(mutants_of_accepted_plans("trifinger/soft_cube57_z.toml", &models, 0..1));
-    // A phalanx whose end stands out of its ball was pressed into the cube here.
-    names.extend(mutants_of_accepted_plans("dclaw/soft_cube57_z.toml", &models, 13..14));
+    names.extend(mutants_of_accepted_plans("trifinger/soft_sphere32_z.toml", &models, 0..1));
     for wanted in [
         "torsion that two fingers hold by is absent",
         "torsion that two fingers hold by is a thousandth",

@@ -159,7 +159,11 @@ fn what_tracking_is_not_made_for_is_refused_by_name() {
     refused(&loaded, &overlapping, FailureKind::StartInvalid, "collide");
     points[1] = Point::new(0.0, 0.0, 0.2);
     let off = InHandQuery { start_grasp: GraspRequest::Contacts(points), ..query.clone() };
-    refused(&loaded, &off, FailureKind::StartInvalid, "off the surface");
+    // Within the scene's reach such a contact is out of reach.
+    refused(&loaded, &off, FailureKind::StartInvalid, "its reach is");
+    let mut far = scene("football.toml");
+    far.scene.reach = None;
+    refused(&far, &off, FailureKind::StartInvalid, "off the surface");
 
     let mut dented = scene("diamond.toml");
     let query_of_diamond = dented.task.query(0);

@@ -22,7 +22,8 @@ fn the_series_has_the_smallest_values_of_the_report() {
         let least = found.margin.iter().copied().fold(f64::INFINITY, f64::min);
         let reported = sample.report.min_margin.unwrap();
         assert!(has_rolling(&sample.plan));
-        assert!((least - reported).abs() < 1e-9, "{least} {reported}");
+        // The report looks between waypoints too.
+        assert!(reported <= least + 1e-9 && reported > 0.5 * least, "{least} {reported}");
         // The report looks at the waypoints that steps begin with.
         let reported = sample.report.min_clearance.as_ref().unwrap();
         let mut begin =
