@@ -222,6 +222,8 @@ class Object:
     """Coulomb coefficient between fingertips and object."""
     radius: float
     """Largest distance of its surface from its centre of mass."""
+    collides_as_hull: bool
+    """True where its convex hull stands for it, but to fingertips."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,7 +25,9 @@ def test_good_plans_are_accepted(plan: regrasp.Plan, box: regrasp.Scene) -> None
     assert report.n_waypoints == plan.n_waypoints
     assert report.min_margin is not None and report.min_margin >= plan.promises["required_margin"]
     assert report.min_clearance is not None and report.min_clearance.distance > 0
-    assert str(report) == "accepted"
+    assert str(report) == "accepted for motion"
+    assert (report.level, report.reached) == ("motion", "motion")
+    assert report.max_hold_slip is not None and report.max_hold_slip < 1e-4
 
 
 def test_violations_say_when_who_and_how_much(plan: regrasp.Plan, box: regrasp.Scene) -> None:

@@ -43,7 +43,8 @@ def planned(name: str, seed: int = 1, **settings: Any) -> tuple[regrasp.Plan, st
         pytest.skip("SKIPPED: the shared models are not here")
     packages = {"models": MODELS} if MODELS.is_dir() else {}
     scene = regrasp.load_scene(SCENES / f"{name}.toml", packages=packages)
-    plan = regrasp.plan(scene, seed=seed, settings=settings)
+    # Replays show what plans without forces or rolling cost.
+    plan = regrasp.plan(scene, seed=seed, settings=settings, level="geometry")
     assert isinstance(plan, regrasp.Plan), plan
     return plan, regrasp.export_mjcf(plan, scene)
 

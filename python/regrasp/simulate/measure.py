@@ -168,7 +168,7 @@ def _lost_contacts(rig: Rig, ref: Reference, ticks: NDArray[np.int64], forces: A
 def _off_fingers(ref: Reference, forces: Array) -> NDArray[np.int64]:
     """Ticks at which no fingertip has pressed on the object for too long."""
     longest = round(LONGEST_OFF_FINGERS / ref.tick)
-    runs = _runs((forces <= 0.0).all(axis=1))
+    runs = _runs(np.asarray((forces <= 0.0).all(axis=1), dtype=np.bool_))
     return np.array([first + longest for first, end in runs if end - first > longest], dtype=np.int64)
 
 
