@@ -101,7 +101,8 @@ pub struct CheckSettings {
     /// Largest slip of a contact from landing to lifting as a share of the way that it travels over the object. In the same
     /// plans it is 0.1 % at most where the contact travels 5 mm or more.
     pub slip_share: f64,
-    /// What a contact may slip however little it travels, in metres: rounding, and the chords of integrated steps.
+    /// What a contact may slip however little it travels, in metres: rolling is integrated in steps, and over the edges of
+    /// meshes it leaves 0.02 mm.
     pub slip_floor: f64,
     /// Closure margin asked of every holding set even if the plan promises less; dimensionless.
     pub smallest_margin: f64,
@@ -179,7 +180,7 @@ impl Default for CheckSettings {
             level: Level::Motion,
             largest_slip: 0.1e-3,
             slip_share: 0.005,
-            slip_floor: 0.01e-3,
+            slip_floor: 0.05e-3,
             largest_contact_tolerance: 0.5e-3,
             largest_slip_tolerance: 0.1e-3,
             smallest_margin: 0.0,

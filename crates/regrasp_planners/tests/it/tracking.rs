@@ -156,13 +156,12 @@ fn what_tracking_is_not_made_for_is_refused_by_name() {
     let GraspRequest::Contacts(mut points) = query.start_grasp.clone() else { panic!("contacts are given") };
     points[1] = points[0];
     let overlapping = InHandQuery { start_grasp: GraspRequest::Contacts(points.clone()), ..query.clone() };
-    refused(&loaded, &overlapping, FailureKind::StartInvalid, "collide");
-    points[1] = Point::new(0.0, 0.0, 0.2);
-    let off = InHandQuery { start_grasp: GraspRequest::Contacts(points), ..query.clone() };
-    // Within the scene's reach such a contact is out of reach.
-    refused(&loaded, &off, FailureKind::StartInvalid, "its reach is");
+    refused(&loaded, &overlapping, FailureKind::StartInvalid, "its reach is");
     let mut far = scene("football.toml");
     far.scene.reach = None;
+    refused(&far, &overlapping, FailureKind::StartInvalid, "collide");
+    points[1] = Point::new(0.0, 0.0, 0.2);
+    let off = InHandQuery { start_grasp: GraspRequest::Contacts(points), ..query.clone() };
     refused(&far, &off, FailureKind::StartInvalid, "off the surface");
 
     let mut dented = scene("diamond.toml");
