@@ -1,7 +1,7 @@
 //! Closure and pads of rolling contacts between waypoints, with contacts that the checker moves itself.
 //!
-//! From one waypoint to the next a rolling contact travels as the motion takes it: [`Roll::contact`] says where it is. Closure
-//! and pads are judged at moments between which no contact travels farther than [`LARGEST_TRAVEL`], and halfway at least. Both
+//! From one waypoint to the next a rolling contact travels as the motion takes it: `Roll::contact` says where it is. Closure
+//! and pads are judged at moments between which no contact travels farther than `LARGEST_TRAVEL`, and halfway at least. Both
 //! change continuously with the contacts, and waypoints themselves are judged in `promises` and `contact`.
 
 use crate::check::closure::{Body, Certificate, certified_margin, margin_by};

@@ -3,7 +3,7 @@
 //! - Time rises in a segment. The next one begins no earlier than it ends, and `shortest_pause` later where a contact force
 //!   is by then another, beyond `force_tolerance`.
 //! - At every moment between two waypoints the velocity and the acceleration of every joint, on the cubic of
-//!   [`Between`], are at most the promised ones, and the velocity of every joint, coupled ones too, at most the robot's.
+//!   `Between`, are at most the promised ones, and the velocity of every joint, coupled ones too, at most the robot's.
 //! - At every moment the speed in the world of every tip's centre and of the object (speed of its centre of mass, and angular
 //!   speed times radius) is at most the promised one.
 //! - Velocities are zero at both ends of a segment and where a joint rests before and after. The object's parameter, which they
