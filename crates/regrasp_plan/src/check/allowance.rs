@@ -67,12 +67,17 @@ fn exceeded(log: &mut Log, key: &str, joint: Option<&str>, (asked, limit): (f64,
     log.push(Violation::new(Kind::LimitExceeded, message).subjects(subjects).amount(asked, limit).from_level(level));
 }
 
-/// The friction counted on is at most the scene's over the friction margin that is asked for.
-fn check_friction_margin(scene: &Scene, plan: &Plan, log: &mut Log) {
-    let asked = scene.limits.friction_margin.unwrap_or(match plan.promises.tracking.is_some() {
+/// The friction margin that is asked for: the scene's, else that of the plan's task.
+pub(super) fn friction_margin(scene: &Scene, plan: &Plan) -> f64 {
+    scene.limits.friction_margin.unwrap_or(match plan.promises.tracking.is_some() {
         true => TRACKING_FRICTION_MARGIN,
         false => IN_HAND_FRICTION_MARGIN,
-    });
+    })
+}
+
+/// The friction counted on is at most the scene's over the friction margin that is asked for.
+fn check_friction_margin(scene: &Scene, plan: &Plan, log: &mut Log) {
+    let asked = friction_margin(scene, plan);
     let (counted_on, limit) = (plan.promises.friction, scene.object.friction / asked);
     if counted_on > limit * (1.0 + ROUNDING) {
         let message = format!(

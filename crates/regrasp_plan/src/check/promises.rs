@@ -22,7 +22,7 @@ use regrasp_scene::{InputFile, Object};
 use std::collections::BTreeSet;
 
 /// How much smaller than required a margin may come out: two solvers, one number.
-const MARGIN_TOLERANCE: f64 = 1e-9;
+pub(super) const MARGIN_TOLERANCE: f64 = 1e-9;
 /// How far the kept margin may be above the one found here before it is a broken promise.
 const KEPT_MARGIN_TOLERANCE: f64 = 1e-6;
 /// The torque scale may differ from the object's radius by this share of it: rounding.

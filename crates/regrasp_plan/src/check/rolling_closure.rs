@@ -7,6 +7,7 @@
 use crate::check::closure::{Body, Certificate, certified_margin, margin_by};
 use crate::check::continuity::contact_of;
 use crate::check::model::Model;
+use crate::check::promises::MARGIN_TOLERANCE;
 use crate::check::rolling::Roll;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
@@ -19,8 +20,6 @@ use regrasp_scene::Object;
 const LARGEST_TRAVEL: f64 = 1e-3;
 /// Most moments judged in a step.
 const MOST_MOMENTS: usize = 7;
-/// How much smaller than required a margin may come out: two solvers, one number.
-const MARGIN_TOLERANCE: f64 = 1e-9;
 
 /// Judges the steps of all transfers in which a finger rolls; the smallest margin between waypoints.
 pub fn check_rolling_closure(

@@ -2,6 +2,7 @@
 
 use super::Breeder;
 use super::choice::{any_drive, waypoints_mut};
+use crate::check::allowance::friction_margin;
 use crate::check::violation::ViolationKind::{ForcesAbsent, FrictionMarginTooSmall, LimitExceeded, PromiseBroken};
 use crate::plan::Plan;
 use regrasp_base::Rng;
@@ -33,9 +34,8 @@ impl Breeder<'_> {
             Some(())
         });
         let friction = self.scene.object.friction;
-        let is_tracking = self.plan.promises.tracking.is_some();
+        let margin = friction_margin(self.scene, self.plan);
         self.add("friction margin given up", &[FrictionMarginTooSmall], |plan, rng| {
-            let margin = limits.friction_margin.unwrap_or(if is_tracking { 1.0 } else { 1.5 });
             plan.promises.friction_margin = rng.uniform(1.0, 0.5 * (1.0 + margin));
             plan.promises.friction = friction / plan.promises.friction_margin;
             (margin > 1.01 && friction > 0.0).then_some(())
