@@ -188,7 +188,7 @@ fn settings_error(path: &Path, line: usize, column: usize, problem: &str) -> Sto
 /// Says what a scene is made of.
 fn say_scene(scene: &Scene, seconds: f64, talk: &Talk) {
     let hand = &scene.hand;
-    let n_mimic = hand.robot.joints.iter().filter(|joint| joint.mimic.is_some()).count();
+    let n_mimic = hand.robot.joints.iter().filter(|joint| joint.coupling.is_some()).count();
     let n_shapes = hand.palm.len() + hand.fingers.iter().map(|finger| finger.shapes.len()).sum::<usize>();
     talk.say(format!(
         "hand   {}   {} ({n_mimic} mimic)   {}   {}   loaded in {}",

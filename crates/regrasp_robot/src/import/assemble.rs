@@ -6,6 +6,7 @@
 use super::finger_chain::{make_chain, rest_posture};
 use super::tip_split;
 use crate::contact_model::ContactModel;
+use crate::coupling::Coupling;
 use crate::hand::{Finger, FingerShape, Hand, MAX_FINGERS, PalmShape, convex_of};
 use crate::robot::{Joint, JointId, JointKind, LinkId, Robot};
 use crate::tip::{Pad, Tip, TipEllipsoid, TipShape, fit};
@@ -234,11 +235,12 @@ fn held_at(
     if joint.kind == JointKind::Fixed {
         return Pose::identity();
     }
-    let position = match joint.mimic {
-        Some(mimic) if owner.contains_key(&mimic.joint) => {
+    let on_finger = |coupling: &Coupling| coupling.terms.iter().find(|(leader, _)| owner.contains_key(leader)).copied();
+    let position = match &joint.coupling {
+        Some(coupling) if let Some((leader, _)) = on_finger(coupling) => {
             let problem = format!(
                 "follows finger joint \"{}\" but is on no finger: linkages are not supported",
-                robot.joints[mimic.joint.0].name
+                robot.joints[leader.0].name
             );
             found.push(
                 Diagnostic::new("U209", Place::file(file), problem)
@@ -248,7 +250,7 @@ fn held_at(
             );
             return Pose::identity();
         }
-        Some(mimic) => mimic.multiplier * nearest_to_zero(&robot.joints[mimic.joint.0]) + mimic.offset,
+        Some(coupling) => coupling.position(|leader| nearest_to_zero(&robot.joints[leader.0])),
         None => nearest_to_zero(joint),
     };
     notes.push(format!("joint \"{}\" belongs to no finger; held at {position}", joint.name));

@@ -10,7 +10,7 @@ mod mimic;
 mod tree;
 mod visual;
 
-pub(crate) use mimic::{GOOD_COUPLING, check_coupling};
+pub(crate) use mimic::{GOOD_COUPLING, check_coupling, refuse_empty_range};
 
 use super::hand_file::{LoadOptions, LoadedInput};
 use super::resolve::Hints;

@@ -58,8 +58,7 @@ struct Window {
 
 impl Window {
     fn new(joint: &ChainJoint, chain: &Chain) -> Self {
-        let at = |coordinate: f64| joint.multiplier * coordinate + joint.offset;
-        let (a, b) = (at(chain.lower[joint.coordinate]), at(chain.upper[joint.coordinate]));
+        let [a, b] = joint.range(chain);
         let half = 0.5 * (b - a).abs() + 1e-6;
         if half < PI {
             let (sine, cosine) = (0.5 * (a + b)).sin_cos();
@@ -116,12 +115,18 @@ impl ThreeR {
     /// None unless the chain has three turning joints with a coordinate each and can move its tip in three directions.
     pub fn new(chain: &Chain, center_in_body: &Point) -> Option<Self> {
         let joints: &[_; 3] = chain.joints.as_slice().try_into().ok()?;
+        if !chain.linear_limits.is_empty() {
+            return None;
+        }
         let mut driven = [false; 3];
-        for joint in joints {
-            if joint.motion != Motion::Turn || joint.multiplier == 0.0 || chain.n_coordinates() != 3 {
+        let mut drives = [(0, 1.0, 0.0); 3];
+        for (joint, drive) in joints.iter().zip(&mut drives) {
+            let (coordinate, multiplier) = joint.drive.single()?;
+            if joint.motion != Motion::Turn || multiplier == 0.0 || chain.n_coordinates() != 3 {
                 return None;
             }
-            driven[joint.coordinate] = true;
+            driven[coordinate] = true;
+            *drive = (coordinate, multiplier, joint.drive.offset);
         }
         if driven.contains(&false) {
             return None;
@@ -193,7 +198,7 @@ impl ThreeR {
             height,
             half_square,
             twist_height,
-            drives: joints.each_ref().map(|joint| (joint.coordinate, joint.multiplier, joint.offset)),
+            drives,
             windows: joints.each_ref().map(|joint| Window::new(joint, chain)),
             center_in_body: *center_in_body,
         })
