@@ -249,7 +249,7 @@ fn bad_terms_are_refused() {
         ),
         (
             terms(&format!("[{}, {}]", one("a_mid", 1.0), one("b_low", 1.0))),
-            "U209 hand.toml:7:1 finger \"a\": joint \"a_end\" follows joint \"b_low\", which is on another finger"
+            "U209 hand.toml:8:1 finger \"a\": joint \"a_end\" follows joint \"b_low\", which is on another finger"
                 .into(),
         ),
         (format!("{LEVEL}leader = \"a_mid\"\n"), "U201 hand.toml:8:1 key \"couplings[0].leader\"".into()),

@@ -96,7 +96,7 @@ fn draw_contact_once(
     rng: &mut Rng,
     n_measured: &mut u64,
 ) -> Option<Contact> {
-    let object = &model.scene.object;
+    let object = &model.view.object;
     let inner = object.center_of_mass + Vector::from(rng.direction()) * (0.4 * model.frame.torque_scale * rng.unit());
     let towards = world_from_object.point_to_child(&model.fingers[finger].tip_at_rest) - inner;
     let direction = towards.normalize() * PULL + Vector::from(rng.direction());
@@ -235,9 +235,9 @@ pub fn draw_pose(model: &Model, start: &Pose, goal: &Pose, rng: &mut Rng) -> Pos
     let along = interpolate_pose(start, goal, rng.unit());
     let shift = Vector::from(rng.direction()) * (distance * rng.unit().cbrt());
     let turn = Vector::new(rng.normal(), rng.normal(), rng.normal()) * angle;
-    let center = along * model.scene.object.center_of_mass;
+    let center = along * model.view.object.center_of_mass;
     let rotation = nalgebra::UnitQuaternion::from_scaled_axis(turn) * along.rotation;
     // Turn about the centre of mass, then shift.
-    let origin: Point = center + shift - rotation * model.scene.object.center_of_mass.coords;
+    let origin: Point = center + shift - rotation * model.view.object.center_of_mass.coords;
     Pose::from_parts(origin.coords.into(), rotation)
 }

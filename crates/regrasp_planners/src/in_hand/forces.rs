@@ -18,7 +18,7 @@ use regrasp_plan::plan::ForcePromises;
 use regrasp_robot::kinematics::body_frame::BodyFrame;
 use regrasp_robot::kinematics::chain::Motion;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
-use regrasp_scene::{Gravity, STANDARD_GRAVITY, Scene};
+use regrasp_scene::{Gravity, HandView, STANDARD_GRAVITY};
 use std::collections::BTreeMap;
 
 /// What contact forces balance, and their limits.
@@ -49,18 +49,18 @@ pub enum Unbalanced {
 
 impl ForceModel {
     /// Of a scene; None for plans without forces.
-    pub fn new(scene: &Scene, settings: &InHandSettings) -> Option<Self> {
+    pub fn new(view: &HandView, settings: &InHandSettings) -> Option<Self> {
         let ForceSettings { squeeze, squeeze_weight, normal_force: [least, largest], torque_share } = settings.forces?;
         let effort = |name: &String| {
-            let joint = scene.hand.robot.joint_named(name)?;
-            scene.hand.robot.joints[joint.0].limits?.effort
+            let joint = view.hand.robot.joint_named(name)?;
+            view.hand.robot.joints[joint.0].limits?.effort
         };
         let torque = |name: &String| effort(name).map_or(f64::INFINITY, |effort| effort * torque_share);
         Some(ForceModel {
             limits: ForceLimits { least, largest, squeeze, squeeze_weight },
-            mass: scene.object.mass,
-            gravity: scene.gravity(),
-            torques: scene.hand.fingers.iter().map(|f| f.chain.names.iter().map(torque).collect()).collect(),
+            mass: view.object.mass,
+            gravity: view.gravity,
+            torques: view.hand.fingers.iter().map(|f| f.chain.names.iter().map(torque).collect()).collect(),
         })
     }
 
@@ -99,7 +99,7 @@ impl ForceModel {
 impl Unbalanced {
     /// In words.
     pub fn in_words(&self, model: &Model) -> String {
-        let finger_name = |f: usize| model.scene.hand.fingers[f].name.as_str();
+        let finger_name = |f: usize| model.view.hand.fingers[f].name.as_str();
         let limits = model.forces.as_ref().map_or([0.0; 2], |forces| [forces.limits.least, forces.limits.largest]);
         let cause = match *self {
             Unbalanced::AtAnyForce => format!("friction {} does not hold it at any force", friction_in_words(model)),
@@ -110,7 +110,7 @@ impl Unbalanced {
                 format!("finger \"{}\" would have to press with more than {} N", finger_name(f), limits[1])
             }
             Unbalanced::TooWeak(f, j) => {
-                let chain = &model.scene.hand.fingers[f].chain;
+                let chain = &model.view.hand.fingers[f].chain;
                 let slides =
                     chain.joints.iter().any(|joint| joint.drive.multiplier(j) != 0.0 && joint.motion == Motion::Slide);
                 let limit = model.forces.as_ref().map_or(0.0, |forces| forces.torques[f][j]);
@@ -262,7 +262,7 @@ fn joint_rows(
     world_from_object: &Placement,
     contact: &Contact,
 ) -> JointRows {
-    let of_hand = &model.scene.hand.fingers[finger];
+    let of_hand = &model.view.hand.fingers[finger];
     let chain = &of_hand.chain;
     let mut frames: ArrayVec<BodyFrame, MAX_BODIES> = (0..chain.joints.len()).map(|_| BodyFrame::IDENTITY).collect();
     chain.forward_frames(joints, &mut frames);

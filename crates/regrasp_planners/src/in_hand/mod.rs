@@ -99,6 +99,7 @@ pub use settings::{
 pub use validate::{NotProven, validate_once};
 
 use crate::failure::{Failure, FailureKind};
+use crate::in_world::{failure_in_world, plan_in_world};
 use attempts::{Left, run_attempts};
 use endpoints::{End, given_grasp, refuse_after_transfers, refuse_hopeless};
 use legs::{Legs, Solution, plan_legs};
@@ -106,7 +107,7 @@ use model::Model;
 use regrasp_base::{Budget, Interrupt, Rng};
 use regrasp_plan::Plan;
 use regrasp_plan::plan::Statistics;
-use regrasp_scene::{InHandQuery, Scene, TaskKind};
+use regrasp_scene::{HandView, InHandQuery};
 use search::{Search, Stop};
 use std::sync::atomic::AtomicUsize;
 use tally::Reason;
@@ -124,12 +125,13 @@ pub struct Progress {
     pub angle_left: f64,
 }
 
-/// Plans how the hand takes the object from start to goal.
+/// Plans how the hand of `view` takes its object from start to goal. The search is in the hand's frame; query and plan are in the
+/// world. The hand and the object that the query names must be those of the view.
 ///
 /// The plan is the same for the same scene, query, settings and seed on any number of threads. `progress` is called now
 /// and then, from whichever thread is searching. Panics if `settings.validate()` fails.
 pub fn plan_in_hand(
-    scene: &Scene,
+    view: &HandView,
     query: &InHandQuery,
     settings: &InHandSettings,
     seed: u64,
@@ -137,14 +139,24 @@ pub fn plan_in_hand(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Plan, Failure> {
     settings.validate().expect("settings are validated where they are read");
-    if query.task != TaskKind::InHand {
-        let message = format!("a task of kind \"{}\" is none of the in-hand planner's", query.task.name());
-        return Err(Failure::bare(FailureKind::Impossible, message, "plan it with plan_tracking, or regrasp plan"));
-    }
+    let seen = view.hand_from_world().map(|hand_from_world| query.seen_from(&hand_from_world));
+    let found = plan_in_hand_frame(view, seen.as_ref().unwrap_or(query), settings, seed, budget, progress);
+    found.map(|plan| plan_in_world(view, plan)).map_err(|failure| failure_in_world(view, failure))
+}
+
+/// As [`plan_in_hand`], with the query and the answer in the hand's frame.
+fn plan_in_hand_frame(
+    view: &HandView,
+    query: &InHandQuery,
+    settings: &InHandSettings,
+    seed: u64,
+    budget: &Budget,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Plan, Failure> {
     let mut spent = 0;
-    for (first, work) in first_try::first_tries(scene, settings, budget) {
+    for (first, work) in first_try::first_tries(view, settings, budget) {
         let left = Budget { max_work: budget.max_work.saturating_sub(spent), ..budget.clone() };
-        match plan_with(scene, query, &first, seed, (&left, work), progress) {
+        match plan_with(view, query, &first, seed, (&left, work), progress) {
             Ok(mut plan) => {
                 plan.statistics.work += spent;
                 return Ok(Plan { settings: record::settings_of(settings), ..plan });
@@ -154,7 +166,7 @@ pub fn plan_in_hand(
         }
     }
     let left = Budget { max_work: budget.max_work.saturating_sub(spent), ..budget.clone() };
-    let mut found = plan_with(scene, query, settings, seed, (&left, left.max_work), progress);
+    let mut found = plan_with(view, query, settings, seed, (&left, left.max_work), progress);
     let (Ok(Plan { statistics, .. }) | Err(Failure { statistics, .. })) = &mut found;
     statistics.work += spent;
     found
@@ -163,7 +175,7 @@ pub fn plan_in_hand(
 /// As [`plan_in_hand`], with the clearance and closure margin of the settings. The number beside the budget is the work of the
 /// first plan; what improves it has the whole budget.
 fn plan_with(
-    scene: &Scene,
+    view: &HandView,
     query: &InHandQuery,
     settings: &InHandSettings,
     seed: u64,
@@ -171,7 +183,7 @@ fn plan_with(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Plan, Failure> {
     let budget = &Budget { max_work: first_work.min(whole.max_work), ..whole.clone() };
-    let model = Model::new(scene, &effective(settings));
+    let model = Model::new(view, &effective(settings));
     refuse_hopeless(&model, query)?;
     let poses = query.poses();
     let (start_pose, goal_pose) = (query.world_from_object_start, query.world_from_object_goal);

@@ -27,7 +27,7 @@ impl Passages {
     /// Looks along the axes of the object at both ends, as far as poses wander; none in scenes without obstacles.
     pub fn of(model: &Model, ends: [&Pose; 2]) -> Self {
         let mut ways_out = Vec::new();
-        if model.scene.obstacles.is_empty() {
+        if model.view.obstacles.is_empty() {
             return Passages { ways_out };
         }
         let length = model.turn_length();
@@ -82,7 +82,7 @@ mod tests {
     fn passages_of(name: &str) -> (Vec<WayOut>, Vec<Pose>) {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes").join(name);
         let loaded = load_scene(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
-        let poses = loaded.task.query(0).poses();
+        let poses = loaded.task().query(0).poses();
         let model = Model::new(&loaded.scene, &InHandSettings::default());
         let ways_out = poses.windows(2).flat_map(|leg| Passages::of(&model, [&leg[0], &leg[1]]).ways_out).collect();
         (ways_out, poses)

@@ -14,7 +14,8 @@ use regrasp_plan::plan::{
     ContactMode, ContactState, FORMAT, FORMAT_VERSION, Plan, PlanInput, PoseData, Promises, Segment, SegmentKind,
     Statistics, WayPose, Waypoint, relocations,
 };
-use regrasp_scene::{InHandQuery, Scene};
+use regrasp_scene::query::IN_HAND;
+use regrasp_scene::{HandView, InHandQuery};
 
 /// Largest distance of a holding fingertip from its contact that plans promise, in metres (issue: at most 0.5 mm).
 pub const CONTACT_TOLERANCE: f64 = 0.0005;
@@ -63,7 +64,7 @@ impl<'m, 'a> Recorder<'m, 'a> {
     pub fn at(model: &'m Model<'a>, start: &GraspState, joins: bool) -> Self {
         let here = Waypoint {
             time: 0.0,
-            joint_velocities: vec![0.0; model.scene.hand.n_joints()],
+            joint_velocities: vec![0.0; model.view.hand.n_joints()],
             joint_torques: Vec::new(),
             joints: start.joints.iter().flatten().copied().collect(),
             world_from_object: PoseData::from(&start.world_from_object),
@@ -135,7 +136,7 @@ impl<'m, 'a> Recorder<'m, 'a> {
     pub fn begin_regrasp(&mut self, finger: usize, contact: Option<&Contact>, n: usize) {
         let others = self.holding & !(1 << finger);
         self.keep(others);
-        let name = self.model.scene.hand.fingers[finger].name.clone();
+        let name = self.model.view.hand.fingers[finger].name.clone();
         self.here.contacts = resting(&self.contacts, self.holding);
         self.begin(SegmentKind::Regrasp, Some(name), n);
         self.contacts[finger] = contact.copied().unwrap_or_else(no_contact);
@@ -202,7 +203,7 @@ impl<'m, 'a> Recorder<'m, 'a> {
         let statistics = Statistics {
             transfers: self.transfers,
             transfers_with_free_fingers: self.transfers_with_free_fingers,
-            relocations: relocations(&finger_names(self.model.scene), &self.segments),
+            relocations: relocations(&finger_names(self.model.view), &self.segments),
             ..statistics
         };
         let model = self.model;
@@ -230,36 +231,41 @@ impl<'m, 'a> Recorder<'m, 'a> {
             settings: settings_of(&model.settings),
             way_poses: way_poses(query, &self.segments, steps_to_way),
             statistics,
-            ..plan_of(model.scene, query, promises, self.segments)
+            ..plan_of(
+                model.view,
+                (IN_HAND, [&query.world_from_object_start, &query.world_from_object_goal]),
+                promises,
+                self.segments,
+            )
         })
     }
 }
 
-fn finger_names(scene: &Scene) -> Vec<String> {
-    scene.hand.fingers.iter().map(|finger| finger.name.clone()).collect()
+fn finger_names(view: &HandView) -> Vec<String> {
+    view.hand.fingers.iter().map(|finger| finger.name.clone()).collect()
 }
 
-/// A plan of `segments` for a query; method, seed, settings, way poses and statistics are left to be said.
-pub fn plan_of(scene: &Scene, query: &InHandQuery, promises: Promises, segments: Vec<Segment>) -> Plan {
+/// A plan of `segments` for a task with the object's poses at its ends; method, seed, settings, way poses and statistics are left to be said.
+pub fn plan_of(view: &HandView, (task, ends): (&str, [&Pose; 2]), promises: Promises, segments: Vec<Segment>) -> Plan {
     Plan {
         format: FORMAT.into(),
         format_version: FORMAT_VERSION,
         tool: concat!("regrasp ", env!("CARGO_PKG_VERSION")).into(),
-        task: query.task.name().into(),
+        task: task.into(),
         method: String::new(),
         seed: 0,
         settings: serde_json::Value::Null,
-        inputs: scene
+        inputs: view
             .inputs
             .iter()
             .map(|i| PlanInput { role: i.role.clone(), name: i.name.clone(), sha256: i.sha256.clone() })
             .collect(),
         promises,
-        joint_names: scene.hand.joint_names(),
-        fingers: finger_names(scene),
-        start: PoseData::from(&query.world_from_object_start),
+        joint_names: view.hand.joint_names(),
+        fingers: finger_names(view),
+        start: PoseData::from(ends[0]),
         way_poses: Vec::new(),
-        goal: PoseData::from(&query.world_from_object_goal),
+        goal: PoseData::from(ends[1]),
         segments,
         statistics: Statistics::default(),
     }

@@ -32,7 +32,7 @@ pub(super) fn with_search(name: &str, test: impl FnOnce(&mut Search)) {
 pub(super) fn with_settings(name: &str, settings: &InHandSettings, test: impl FnOnce(&mut Search)) {
     let loaded = scene(name);
     let model = Model::new(&loaded.scene, &super::effective(settings));
-    let query = loaded.task.query(0);
+    let query = loaded.task().query(0);
     let poses = (query.world_from_object_start, query.world_from_object_goal);
     let (budget, winner) = (Budget::unlimited(), AtomicUsize::new(usize::MAX));
     test(&mut Search::new(&model, poses, (0, 0), (&budget, u64::MAX), &winner, &|_| {}));
@@ -67,7 +67,7 @@ fn paths_on_the_sphere_follow_great_circles_and_stay_closed_without_any_finger()
     with_search("sphere_90x.toml", |search| {
         let model = search.model();
         let body = Body {
-            center_of_mass: model.scene.object.center_of_mass,
+            center_of_mass: model.view.object.center_of_mass,
             torque_scale: model.frame.torque_scale,
             friction: model.frame.friction,
         };
@@ -95,7 +95,7 @@ fn paths_on_the_sphere_follow_great_circles_and_stay_closed_without_any_finger()
 fn paths_on_the_box_cross_no_edge() {
     with_search("box_90x.toml", |search| {
         let model = search.model();
-        let object = &model.scene.object;
+        let object = &model.view.object;
         for (a, b, path) in linked_pairs(search, 3) {
             for k in 1..8 {
                 let t = f64::from(k) / 8.0;

@@ -27,7 +27,7 @@ use regrasp_base::{Budget, Interrupt, Rng};
 use regrasp_geometry::Pose;
 use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
-use regrasp_scene::Scene;
+use regrasp_scene::HandView;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicUsize;
@@ -86,7 +86,7 @@ pub struct BuildStage {
     pub work: u64,
 }
 
-/// Builds a roadmap of `scene` over `region`, with `settings.n_threads` threads.
+/// Builds a roadmap of `view` over `region`, which is in the hand's frame, with `settings.n_threads` threads.
 ///
 /// Contacts stay where they are while the object moves, whatever the settings say: where a fingertip rolls to depends on the
 /// way that it came, and a graph has many ways to each of its grasps.
@@ -94,7 +94,7 @@ pub struct BuildStage {
 /// Failures: a hand that can never do it, a spent budget, an interruption, or no grasp anywhere. Panics if settings or
 /// region are not valid.
 pub fn build_roadmap(
-    scene: &Scene,
+    view: &HandView,
     region: &Region,
     build: &BuildSettings,
     settings: &InHandSettings,
@@ -104,12 +104,12 @@ pub fn build_roadmap(
 ) -> Result<GraspRoadmap, Failure> {
     settings.validate().and_then(|()| build.validate()).and_then(|()| region.validate()).expect("validated by callers");
     let settings = InHandSettings { method: Method::Gait, transfer: TransferMode::Fixed, ..settings.clone() };
-    let model = Model::new(scene, &settings);
+    let model = Model::new(view, &settings);
     refuse_impossible(&model)?;
     let mut builder = Builder::new(&model, region, build, seed, budget, progress)?;
     builder.run()?;
     let about = About {
-        identity: Identity::of(scene),
+        identity: Identity::of(view),
         region: *region,
         settings,
         build: build.clone(),
