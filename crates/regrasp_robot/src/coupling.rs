@@ -1,6 +1,6 @@
 //! Couplings: joints whose position is a sum over other joints, and the limits that follow for those.
 
-use crate::robot::JointId;
+use crate::ids::JointId;
 use arrayvec::ArrayVec;
 
 /// Most joints that one joint may follow.

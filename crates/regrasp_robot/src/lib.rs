@@ -8,6 +8,8 @@ pub mod contact_model;
 pub mod coupling;
 /// A hand: a palm and serial fingers.
 pub mod hand;
+/// Ids of links and joints.
+pub mod ids;
 /// Readers: URDF, SRDF, `package://` paths, hand files.
 pub mod import;
 /// What a robot and a hand are like: joints, meshes, units, fingers guessed, links that always or never touch.

@@ -1,17 +1,10 @@
 //! Links and joints of a robot, as read.
 
 use crate::coupling::Coupling;
+pub use crate::ids::{JointId, LinkId};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Pose, Shape, UnitVector, Vector};
 use std::path::PathBuf;
-
-/// Index of a link in [`Robot::links`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct LinkId(pub usize);
-
-/// Index of a joint in [`Robot::joints`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct JointId(pub usize);
 
 /// A rigid body.
 #[derive(Debug, Clone)]

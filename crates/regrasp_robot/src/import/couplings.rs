@@ -1,6 +1,6 @@
 //! Couplings that a hand or robot file adds to those of the URDF: a joint follows one or several others.
 
-use super::hand_file::known_joint;
+use super::names::known_joint;
 use super::urdf::{GOOD_COUPLING, check_coupling, refuse_empty_range};
 use crate::coupling::{self, Coupling, MAX_TERMS, Terms, Unresolved};
 use crate::robot::{JointId, JointKind, Robot};

@@ -1,6 +1,6 @@
 //! The chain of a finger and its rest posture.
 
-use super::assemble::{Carried, FingerSpec};
+use super::spec::{Carried, FingerSpec};
 use crate::coupling::{Coupling, LinearLimit};
 use crate::hand::MAX_FINGER_JOINTS;
 use crate::kinematics::chain::{Chain, ChainJoint, Motion};

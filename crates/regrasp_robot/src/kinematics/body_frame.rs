@@ -3,7 +3,7 @@
 //! Composing and applying them takes about half the work of quaternion poses, and a joint's whole motion is three
 //! precomputed matrices (Rodrigues' formula): `R(q) = A + sin(q) B + cos(q) C`.
 
-use super::chain::{ChainJoint, Motion};
+use super::chain_joint::{ChainJoint, Motion};
 use super::trig::sin_cos;
 use nalgebra::Matrix3;
 use regrasp_geometry::Vector;

@@ -1,44 +1,11 @@
 //! Serial chains, forward kinematics and Jacobians.
 
 use super::body_frame::{BodyFrame, PreparedJoint};
-use crate::coupling::{Coupling, LinearLimit, bring_within};
+pub use super::chain_joint::{ChainJoint, Motion};
+use crate::coupling::{LinearLimit, bring_within};
 use arrayvec::ArrayVec;
 use nalgebra::{Matrix3xX, Translation3, UnitQuaternion};
-use regrasp_geometry::{Point, Pose, UnitVector, Vector};
-
-/// How a chain joint moves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Motion {
-    /// Turns about the axis, in radians.
-    Turn,
-    /// Slides along the axis, in metres.
-    Slide,
-}
-
-/// One moving joint of a chain. Fixed joints are folded into `parent_from_joint`.
-#[derive(Debug, Clone)]
-pub struct ChainJoint {
-    /// Pose of the joint frame at position zero in the frame of the body before it (the hand base, for the first).
-    pub parent_from_joint: Pose,
-    /// Axis, in the joint frame.
-    pub axis: UnitVector,
-    /// How it moves.
-    pub motion: Motion,
-    /// Coordinates of the chain that drive it.
-    pub drive: Coupling<usize>,
-}
-
-impl ChainJoint {
-    /// Position of the joint at the chain's `coordinates`.
-    pub fn position(&self, coordinates: &[f64]) -> f64 {
-        self.drive.position(|k| coordinates[k])
-    }
-
-    /// Lowest and highest position of the joint while the coordinates of `chain` keep their own limits.
-    pub fn range(&self, chain: &Chain) -> [f64; 2] {
-        self.drive.range(|k| [chain.lower[k], chain.upper[k]])
-    }
-}
+use regrasp_geometry::{Point, Pose, Vector};
 
 /// Where a joint's axis is.
 #[derive(Debug, Clone, Copy)]
@@ -226,6 +193,8 @@ fn joint_motion(joint: &ChainJoint, position: f64) -> Pose {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::coupling::Coupling;
+    use regrasp_geometry::UnitVector;
 
     fn chain() -> Chain {
         let joint = |z: f64, axis: Vector, motion, coordinate, multiplier| ChainJoint {

@@ -99,7 +99,7 @@ impl MotionBound {
 
 /// Largest absolute position of sliding joint `i` within the limits of its coordinate.
 fn longest_slide(chain: &Chain, i: usize) -> f64 {
-    let [lower, upper] = chain.joints[i].range(chain);
+    let [lower, upper] = chain.joints[i].range([&chain.lower, &chain.upper]);
     lower.abs().max(upper.abs())
 }
 

@@ -127,7 +127,7 @@ fn finger_reach(finger: &regrasp_robot::Finger) -> f64 {
         .iter()
         .filter(|joint| joint.motion == regrasp_robot::Motion::Slide)
         .map(|joint| {
-            let [lower, upper] = joint.range(chain);
+            let [lower, upper] = joint.range([&chain.lower, &chain.upper]);
             lower.abs().max(upper.abs())
         })
         .sum();
