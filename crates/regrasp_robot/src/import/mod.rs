@@ -9,15 +9,18 @@
 
 /// A hand from a robot and the choice of its fingers.
 pub(crate) mod assemble;
+mod chain;
 mod couplings;
-mod finger_chain;
 /// `hand.toml`, and hands guessed from a bare URDF.
 pub mod hand_file;
+mod hulls;
 mod names;
 /// How files are read, and which were.
 pub mod options;
 /// `package://` and relative paths, below allowed folders.
 pub mod resolve;
+/// `robot.toml`: models, arms and hands that make one manipulator.
+pub mod robot_file;
 /// What a hand is to be made of.
 pub(crate) mod spec;
 /// SRDF: groups, end effectors, pairs of links that are not tested.
@@ -31,4 +34,5 @@ pub(crate) mod xml;
 pub use hand_file::{LoadedHand, load_hand};
 pub use options::{LoadOptions, LoadedInput, OUT_OF_TIME};
 pub use resolve::ResolveOptions;
+pub use robot_file::{LoadedManipulator, load_manipulator};
 pub use urdf::{LoadedRobot, load_robot};
