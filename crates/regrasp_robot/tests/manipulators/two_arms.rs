@@ -179,16 +179,16 @@ fn rest_and_home_are_taken_and_refused_outside_limits() {
     let more = "[rest]\ntorso_1 = -0.5\ntorso_2 = 1.0\n";
     assert_eq!(robot(&format!("{ROBOT}{more}")).unwrap().layout.rest()[..3], [0.0, -0.5, 1.0]);
     for (more, expected) in [
-        ("[rest]\ntorso_1 = 9.0\n", "U212 robot.toml:31:11 joint \"torso_1\": rest position 9 is outside the limits"),
+        ("[rest]\ntorso_1 = 9.0\n", "U212 robot.toml:29:11 joint \"torso_1\": rest position 9 is outside the limits"),
         (
             "[rest]\ntorso_1 = -0.5\n",
-            "U212 robot.toml:31:11 joint \"torso_1\": the rest posture takes a joint that follows",
+            "U212 robot.toml:29:11 joint \"torso_1\": the rest posture takes a joint that follows",
         ),
         (
             "[rest]\ntorso_3 = -0.5\n",
-            "U205 robot.toml:31:11 key \"rest\": the common part has no independent joint \"torso_3\"",
+            "U205 robot.toml:29:11 key \"rest\": the common part has no independent joint \"torso_3\"",
         ),
-        ("[rest]\nright_arm_1 = 0.0\n", "U205 robot.toml:31:15 key \"rest\": the common part has no independent joint"),
+        ("[rest]\nright_arm_1 = 0.0\n", "U205 robot.toml:29:15 key \"rest\": the common part has no independent joint"),
     ] {
         let seen = robot(&format!("{ROBOT}{more}")).unwrap_err().join("\n");
         assert!(seen.starts_with(expected), "{seen}\nexpected {expected}");
