@@ -29,13 +29,13 @@ mod step;
 
 pub use settings::{Cones, RollingFinger, TrackingMethod, TrackingSettings};
 
-use crate::failure::{Cause, Failure, FailureKind, NearestMiss};
-use crate::in_hand::Progress;
-use crate::in_hand::model::Model;
-use crate::in_hand::workspace::Workspace;
 use gaiting::Move;
 use grasp::TrackingGrasp;
 use regrasp_base::{Budget, Rng};
+use regrasp_manipulation::failure::{Cause, Failure, FailureKind, NearestMiss};
+use regrasp_manipulation::model::Model;
+use regrasp_manipulation::progress::Progress;
+use regrasp_manipulation::workspace::Workspace;
 use regrasp_plan::Plan;
 use regrasp_plan::plan::{PoseData, Statistics};
 use regrasp_scene::{InHandQuery, Scene};
@@ -47,10 +47,9 @@ const MOST_RESTARTS: u64 = 20;
 
 /// Plans how the fingertips turn the object to the goal's orientation.
 ///
-/// The plan is the same for the same scene, query, settings and seed. `progress` is called after every sub-goal. Panics if
-/// `settings.validate()` fails.
+/// The plan is the same for the same scene, query, settings and seed. `progress` is called after every sub-goal.
 ///
-/// Errors: the start is none, or the search ends without a plan.
+/// Errors: the settings do not validate, the start is none, or the search ends without a plan.
 pub fn plan_tracking(
     scene: &Scene,
     query: &InHandQuery,
@@ -59,8 +58,8 @@ pub fn plan_tracking(
     budget: &Budget,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Plan, Failure> {
-    settings.validate().expect("settings are validated where they are read");
-    let model = Model::new(scene, &settings.in_hand);
+    settings.validate().map_err(|problem| Failure::of_settings(&problem))?;
+    let model = Model::new(scene, &settings.in_hand.physics);
     endpoints::refuse(&model, &scene.gravity())?;
     let forces = model.forces.as_ref().expect("settings without forces do not validate");
     let mut stepper = Stepper { model: &model, settings, forces, workspace: Workspace::new(&model), work: 0 };
