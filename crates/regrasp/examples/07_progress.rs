@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             cancelled.store(true, Ordering::Relaxed);
         }
     };
-    match plan_in_hand(&loaded.scene, &loaded.task.query(0), &settings, 0, &budget, &watch) {
+    match plan_in_hand(&loaded.view(), loaded.task().query(0).as_in_hand().unwrap(), &settings, 0, &budget, &watch) {
         Ok(plan) => println!("stopped with the best plan so far: {} relocations", plan.statistics.relocations),
         Err(failure) if failure.kind == FailureKind::Interrupted => println!("stopped before a plan was found"),
         Err(failure) => return Err(failure.into()),

@@ -7,7 +7,8 @@ use regrasp::base::{Diagnostic, Place};
 use regrasp::geometry::Shape;
 use regrasp::planners::FailureKind;
 use regrasp::robot::import::{LoadOptions, OUT_OF_TIME, ResolveOptions};
-use regrasp::scene::{LoadedScene, TaskKind, load_scene};
+use regrasp::scene::query::IN_HAND;
+use regrasp::scene::{LoadedScene, Task, load_scene};
 use regrasp::{Failure, InHandSettings, InputError, PlannerSettings, Scene, TrackingSettings};
 use serde_json::json;
 use std::ffi::OsString;
@@ -80,8 +81,8 @@ pub fn settings(search: &Search, n_threads: usize) -> Result<InHandSettings, Sto
 
 /// Settings for a task of this kind: those of a tracking task are the file's, but for the method (`A507`: a flag that has no meaning
 /// there).
-pub fn for_task(task: TaskKind, search: &Search, n_threads: usize) -> Result<PlannerSettings, Stop> {
-    if task == TaskKind::InHand {
+pub fn for_task(task: &Task, search: &Search, n_threads: usize) -> Result<PlannerSettings, Stop> {
+    if task.kind_name() == IN_HAND {
         return Ok(PlannerSettings { in_hand: settings(search, n_threads)?, ..PlannerSettings::default() });
     }
     refuse_flags_of_in_hand(search)?;
@@ -121,9 +122,9 @@ fn not_for_tracking(argument: &str, why: &str, fix: &str) -> Stop {
 /// Reads a scene, as [`scene`], that `what` can do something with in-hand tasks of only (`A507`).
 pub fn in_hand_scene(path: &Path, what: &str, common: &Common, talk: &Talk) -> Result<LoadedScene, Stop> {
     let loaded = scene(path, common, talk)?;
-    match loaded.task.kind {
-        TaskKind::InHand => Ok(loaded),
-        TaskKind::Tracking => {
+    match loaded.task().kind_name() {
+        IN_HAND => Ok(loaded),
+        _ => {
             let why = format!("{what} of in-hand tasks only ({})", path.display());
             Err(not_for_tracking("SCENE", &why, "name another scene; regrasp plan and bench plan this one"))
         }
@@ -189,7 +190,7 @@ fn settings_error(path: &Path, line: usize, column: usize, problem: &str) -> Sto
 
 /// Says what a scene is made of.
 fn say_scene(scene: &Scene, seconds: f64, talk: &Talk) {
-    let hand = &scene.hand;
+    let hand = &scene.hands[0].hand;
     let n_mimic = hand.robot.joints.iter().filter(|joint| joint.mimic.is_some()).count();
     let n_shapes = hand.palm.len() + hand.fingers.iter().map(|finger| finger.shapes.len()).sum::<usize>();
     talk.say(format!(
@@ -200,7 +201,7 @@ fn say_scene(scene: &Scene, seconds: f64, talk: &Talk) {
         counted(n_shapes, "collision shape"),
         duration(seconds),
     ));
-    let object = &scene.object;
+    let object = &scene.objects[0];
     talk.say(format!(
         "object {}   {}   {:.3} kg   friction {}",
         object.name,

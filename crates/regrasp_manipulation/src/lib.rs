@@ -11,6 +11,8 @@ pub mod failure;
 pub mod forces;
 /// Grasps and the motions between them.
 pub mod grasp;
+/// From the hand's frame into the world.
+pub mod in_world;
 /// The scene prepared for planning.
 pub mod model;
 /// What a graph of grasps looks like.

@@ -12,7 +12,7 @@ use regrasp_robot::kinematics::body_frame::BodyFrame;
 use regrasp_robot::kinematics::finger_ik::FingerIk;
 use regrasp_robot::kinematics::motion_bound::MotionBound;
 use regrasp_robot::tip::{Pad, TipEllipsoid, is_same_surface};
-use regrasp_scene::{Object, Scene};
+use regrasp_scene::{HandView, Object};
 use std::sync::Arc;
 
 /// Most fingers a hand may have.
@@ -114,8 +114,8 @@ pub struct Turn {
 /// The scene, prepared.
 #[derive(Debug)]
 pub struct Model<'a> {
-    /// The scene.
-    pub scene: &'a Scene,
+    /// The scene as the hand sees it.
+    pub view: &'a HandView<'a>,
     /// Fingers.
     pub fingers: Vec<FingerModel<'a>>,
     /// Bodies: fingers first, then palm, object, obstacles.
@@ -143,10 +143,10 @@ pub struct Model<'a> {
 }
 
 impl<'a> Model<'a> {
-    /// Prepares `scene`; the scene's limits bound the settings.
-    pub fn new(scene: &'a Scene, settings: &PhysicsSettings) -> Self {
-        let settings = settings.within(&scene.limits);
-        let hand = &scene.hand;
+    /// Prepares `view`; the scene's limits bound the settings.
+    pub fn new(view: &'a HandView<'a>, settings: &PhysicsSettings) -> Self {
+        let settings = settings.within(&view.limits);
+        let hand = &view.hand;
         assert!(hand.fingers.len() <= MAX_FINGERS, "hands of more than {MAX_FINGERS} fingers");
         let mut bodies = Vec::new();
         let mut links = Vec::new();
@@ -208,17 +208,17 @@ impl<'a> Model<'a> {
             links.push((part.link, false));
         }
         let object = bodies.len();
-        bodies.push(object_body(&scene.object));
-        for obstacle in &scene.obstacles {
+        bodies.push(object_body(&view.object));
+        for obstacle in view.obstacles.iter() {
             let (shape, place) = (&obstacle.placed.shape, &obstacle.placed.parent_from_shape);
             bodies.push(fixed_body(shape, obstacle.mesh_body.as_ref(), place, &obstacle.name));
         }
         let mut pairs = Vec::new();
         let mut turns = Vec::new();
-        let has_obstacles = !scene.obstacles.is_empty();
+        let has_obstacles = !view.obstacles.is_empty();
         for a in 0..=object {
             pairs.extend(
-                (a + 1..=object).filter_map(|b| pair_of(scene, &bodies, &links, [a, b], n_finger_bodies, object)),
+                (a + 1..=object).filter_map(|b| pair_of(view, &bodies, &links, [a, b], n_finger_bodies, object)),
             );
             if has_obstacles && !matches!(bodies[a].carrier, Carrier::World) {
                 turns.push(Turn { n_before: pairs.len(), body: a });
@@ -234,7 +234,7 @@ impl<'a> Model<'a> {
                 let fingers = [finger_of(pair.a), finger_of(pair.b)];
                 g != f && (fingers == [Some(f), Some(g)] || fingers == [Some(g), Some(f)])
             };
-            finger.pairs_with = (0..scene.hand.fingers.len())
+            finger.pairs_with = (0..view.hand.fingers.len())
                 .map(|g| (0..pairs.len()).filter(|&p| between(&pairs[p], g)).collect())
                 .collect();
             finger.pairs = (0..pairs.len()).filter(|&p| moves(pairs[p].a) || moves(pairs[p].b)).collect();
@@ -244,7 +244,7 @@ impl<'a> Model<'a> {
             };
             finger.turns = turns.iter().filter(|turn| moves(turn.body)).map(among_its_own).collect();
         }
-        let friction = scene.object.friction / settings.friction_margin;
+        let friction = view.object.friction / settings.friction_margin;
         let others_may_hold = |away: usize| {
             let others: Vec<ContactModel> =
                 (0..fingers.len()).filter(|&f| f != away).map(|f| fingers[f].contact).collect();
@@ -252,7 +252,7 @@ impl<'a> Model<'a> {
         };
         let may_release = (0..fingers.len()).any(others_may_hold);
         Model {
-            scene,
+            view,
             may_release,
             fingers,
             object,
@@ -260,11 +260,11 @@ impl<'a> Model<'a> {
             turns,
             obstacles: balls_of(&bodies[object + 1..]),
             frame: GraspFrame {
-                center_of_mass: scene.object.center_of_mass,
-                torque_scale: scene.object.radius,
+                center_of_mass: view.object.center_of_mass,
+                torque_scale: view.object.radius,
                 friction,
             },
-            forces: ForceModel::new(scene, &settings),
+            forces: ForceModel::new(view, &settings),
             object_reach: bodies[object].center.coords.norm() + bodies[object].radius,
             radii: bodies.iter().map(|body| body.radius).collect(),
             bodies,
@@ -391,7 +391,7 @@ fn balls_of(bodies: &[Body]) -> BallTree {
 
 /// The pair `(a, b)` of hand and object if it is one to keep apart.
 fn pair_of(
-    scene: &Scene,
+    view: &HandView,
     bodies: &[Body],
     links: &[(regrasp_robot::LinkId, bool)],
     [a, b]: [usize; 2],
@@ -407,7 +407,7 @@ fn pair_of(
             }
             _ => false,
         };
-        if palm_only || one_link || scene.hand.may_touch(links[a].0, links[b].0) {
+        if palm_only || one_link || view.hand.may_touch(links[a].0, links[b].0) {
             return None;
         }
         return Some(Pair { a, b, tip_of: None });
@@ -431,7 +431,7 @@ pub fn fingers_in_words(model: &Model) -> String {
 
 /// The friction that is planned with, and how it comes from what the scene says.
 pub fn friction_in_words(model: &Model) -> String {
-    let (friction, margin) = (model.scene.object.friction, model.settings.friction_margin);
+    let (friction, margin) = (model.view.object.friction, model.settings.friction_margin);
     if margin == 1.0 { format!("{friction}") } else { format!("{friction} of the scene over a margin of {margin}") }
 }
 

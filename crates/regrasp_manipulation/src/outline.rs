@@ -53,6 +53,13 @@ impl Outline {
         Outline { nodes: poses.into_iter().enumerate().map(node).collect(), edges }
     }
 
+    /// The same graph with every pose of the object replaced by `moved` of it.
+    #[must_use]
+    pub(crate) fn moved_by(mut self, moved: impl Fn(&Pose) -> Pose) -> Self {
+        self.nodes.iter_mut().for_each(|node| node.world_from_object = moved(&node.world_from_object));
+        self
+    }
+
     /// Number of connected components.
     pub fn n_components(&self) -> usize {
         self.nodes.iter().map(|node| node.component + 1).max().unwrap_or(0)

@@ -215,7 +215,7 @@ fn turned(from: &Vector, to: &Vector, angle: f64, t: f64) -> Vector {
 
 /// Moves `tip` (object frame) out to the distance `away` from the surface if it is nearer; the direction of the surface.
 fn push_out(model: &Model, tip: &mut Point, away: f64) -> Option<Vector> {
-    let surface = &model.scene.object.surface;
+    let surface = &model.view.object.surface;
     for _ in 0..4 {
         let (foot, distance) = surface.project_signed(tip);
         let outward =

@@ -38,7 +38,7 @@ const ROUNDING: f64 = 1e-6;
 /// Limits that plans promise.
 pub fn limits(model: &Model) -> MotionLimits {
     let speed = &model.settings.speed;
-    let robot = &model.scene.hand.robot;
+    let robot = &model.view.hand.robot;
     let velocity = |name: &String| {
         let leader = robot.joint_named(name)?;
         let own = robot.joints[leader.0].limits.and_then(|limits| limits.velocity);
@@ -48,7 +48,7 @@ pub fn limits(model: &Model) -> MotionLimits {
         });
         own.into_iter().chain(coupled).reduce(f64::min)
     };
-    let names = model.scene.hand.joint_names();
+    let names = model.view.hand.joint_names();
     MotionLimits {
         largest_speed: speed.largest_speed,
         joint_velocities: names.iter().map(|name| velocity(name).unwrap_or(speed.joint_velocity)).collect(),

@@ -118,7 +118,7 @@ impl<'a> Workspace<'a> {
     pub fn new(model: &'a Model<'a>) -> Self {
         let bodies = &model.bodies[..model.first_obstacle()];
         let placements: Vec<Placement> = bodies.iter().map(|body| body.carrier_from_body).collect();
-        let joints = model.scene.hand.fingers.iter().map(|finger| finger.rest.iter().copied().collect()).collect();
+        let joints = model.view.hand.fingers.iter().map(|finger| finger.rest.iter().copied().collect()).collect();
         let centers = bodies.iter().map(|body| body.carrier_from_body.point(&body.center)).collect();
         let now = Configuration { joints, world_from_object: Pose::identity(), placements, centers };
         Workspace {

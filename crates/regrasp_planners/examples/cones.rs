@@ -108,7 +108,7 @@ fn ask(grasp: &Grasp, load: &Load, counts: &mut Counts) {
 fn main() -> Result<(), Box<dyn Error>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/football.toml");
     let loaded = load_scene(&path, &LoadOptions::default())?;
-    let object = &loaded.scene.object;
+    let object = &loaded.scene.objects[0];
     let settings = TrackingSettings::default();
     let InHandSettings { forces: Some(forces), .. } = settings.in_hand else { return Err("no forces".into()) };
     let [least, largest] = forces.normal_force;
@@ -128,8 +128,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut along_plans = Counts::default();
     for seed in 0..PLANS {
         let budget = Budget::work(10_000_000);
-        let plan = plan_tracking(&loaded.scene, &loaded.task.query(seed), &settings, seed, &budget, &|_| {})
-            .map_err(|failure| failure.message)?;
+        let plan = plan_tracking(
+            &loaded.view(),
+            loaded.task().query(seed).as_tracking().unwrap(),
+            &settings,
+            seed,
+            &budget,
+            &|_| {},
+        )
+        .map_err(|failure| failure.message)?;
         for waypoint in plan.segments.iter().flat_map(|segment| &segment.waypoints) {
             let point = |state: &regrasp_plan::plan::ContactState| {
                 Some((Point::from(state.point_in_object?), Vector::from(state.normal_in_object?)))

@@ -19,7 +19,7 @@ pub use tracking::{TrackingMethod, TrackingSettings, plan_tracking};
 
 use regrasp_base::Budget;
 use regrasp_plan::Plan;
-use regrasp_scene::{InHandQuery, Scene, TaskKind};
+use regrasp_scene::{HandView, Manipulation, Query, Scene, State};
 
 /// Settings for every kind of task.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -30,19 +30,21 @@ pub struct PlannerSettings {
     pub tracking: TrackingSettings,
 }
 
-/// Plans `query` with the planner of its task: [`plan_in_hand`] or [`plan_tracking`].
+/// Plans `query` with the planner of its task: [`plan_in_hand`] or [`plan_tracking`]. All that the query does not name rests in
+/// `state`.
 ///
 /// Errors: as that planner.
 pub fn plan(
-    scene: &Scene,
-    query: &InHandQuery,
+    (scene, state): (&Scene, &State),
+    query: &Query,
     settings: &PlannerSettings,
     seed: u64,
     budget: &Budget,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Plan, Failure> {
-    match query.task {
-        TaskKind::InHand => plan_in_hand(scene, query, &settings.in_hand, seed, budget, progress),
-        TaskKind::Tracking => plan_tracking(scene, query, &settings.tracking, seed, budget, progress),
+    let view = HandView::of(&Manipulation::of(scene, state, query));
+    match query {
+        Query::InHand(query) => plan_in_hand(&view, query, &settings.in_hand, seed, budget, progress),
+        Query::Tracking(query) => plan_tracking(&view, query, &settings.tracking, seed, budget, progress),
     }
 }

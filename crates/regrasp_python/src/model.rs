@@ -46,7 +46,9 @@ fn read(
     let gravity = match gravity {
         None => return Ok(loaded),
         Some(GravityInHand::Word(word)) => (word == "any").then_some(Gravity::Any),
-        Some(GravityInHand::Direction(down)) => Gravity::in_hand(&loaded.scene.hand, &(*down).into()),
+        Some(GravityInHand::Direction(down)) => {
+            Gravity::along(&loaded.manipulation().world_from_hand(), &(*down).into())
+        }
     };
     let Some(gravity) = gravity else {
         let diagnostic = Diagnostic::new("A503", Place::file("regrasp.load_scene"), "is no direction");
@@ -93,12 +95,12 @@ impl Scene {
 
     /// The poses that the query of `seed` asks for, from start to goal, as JSON.
     fn query(&self, py: Python<'_>, seed: u64) -> PyResult<String> {
-        guarded(py, || Ok(describe::query(&self.loaded.task.query(seed)).to_string()))
+        guarded(py, || Ok(describe::query(&self.loaded.task().query(seed)).to_string()))
     }
 
     /// Tip centres in the world, as [`Hand::tips`] gives them.
     fn tips<'py>(&self, py: Python<'py>, joints: &[u8]) -> PyResult<Bound<'py, PyBytes>> {
-        guarded(py, || tips(py, &self.loaded.scene.hand, joints))
+        guarded(py, || tips(py, &self.loaded.scene.hands[0].hand, joints))
     }
 }
 

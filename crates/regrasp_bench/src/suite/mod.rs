@@ -11,7 +11,8 @@ pub mod rows;
 use regrasp_base::{Diagnostic, InputError, Place};
 use regrasp_planners::in_hand::Alpha;
 use regrasp_planners::{InHandSettings, TrackingSettings};
-use regrasp_scene::TaskKind;
+use regrasp_scene::Task;
+use regrasp_scene::query::{IN_HAND, TRACKING};
 use serde::Deserialize;
 use serde::de::Error as _;
 use std::path::{Path, PathBuf};
@@ -154,10 +155,10 @@ pub struct Job {
 
 impl Job {
     /// Errors (`B603`, with the place of the suite at `suite_path`): settings that mean nothing for the task of the scene.
-    pub fn refuse_other_task(&self, task: TaskKind, suite_path: &Path) -> Result<(), InputError> {
-        let (key, other) = match task {
-            TaskKind::InHand if self.tracking.is_some() => ("tracking", "settings"),
-            TaskKind::Tracking if self.settings != InHandSettings::plain() => ("settings", "tracking"),
+    pub fn refuse_other_task(&self, task: &Task, suite_path: &Path) -> Result<(), InputError> {
+        let (key, other) = match task.kind_name() {
+            IN_HAND if self.tracking.is_some() => ("tracking", "settings"),
+            TRACKING if self.settings != InHandSettings::plain() => ("settings", "tracking"),
             _ => return Ok(()),
         };
         let problem = format!("\"{}\" has `{key}`, which its scene's task has no use for", self.name);
@@ -364,7 +365,7 @@ settings = { method = "visibility", guided_share = 0.0 }
             for job in suite.jobs(&path) {
                 assert!(job.scene.is_file() && !is_suite(&job.scene), "{}", job.scene.display());
                 let loaded = regrasp_scene::load_scene(&job.scene, &Default::default()).unwrap();
-                assert!(job.refuse_other_task(loaded.task.kind, &path).is_ok(), "{}", job.name);
+                assert!(job.refuse_other_task(loaded.task(), &path).is_ok(), "{}", job.name);
             }
         }
     }

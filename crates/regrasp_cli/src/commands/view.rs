@@ -36,15 +36,15 @@ pub fn run(arguments: &args::View, common: &Common, talk: &Talk) -> Result<(), S
     let roadmap = match &arguments.with_roadmap {
         Some(path) => {
             let roadmap = GraspRoadmap::read(path)?;
-            roadmap.refuse_other_scene(path, &loaded.scene)?;
-            Some(told::roadmap_story(&roadmap, &plan))
+            roadmap.refuse_other_scene(path, &loaded.view())?;
+            Some(told::roadmap_story(&roadmap, &loaded.view(), &plan))
         }
         None => None,
     };
     let report = judge::judge(&loaded, &plan, &arguments.judging, talk)?;
     let packages = load::options(common).resolve;
     let story = pages::story(&Telling {
-        scene: &loaded.scene,
+        task: loaded.manipulation(),
         query: None,
         outcome: Outcome::Planned { plan: &plan, report: &report },
         title: arguments.title.as_deref(),

@@ -10,7 +10,7 @@ use regrasp_geometry::{ConvexHull, Point, Pose, Shape, pose_from};
 use regrasp_plan::Plan;
 use regrasp_robot::tip::is_same_surface;
 use regrasp_robot::{Finger, Hand, JointId, JointKind, LinkId, Motion, TipShape};
-use regrasp_scene::Scene;
+use regrasp_scene::{HandView, Manipulation, Obstacle};
 use std::sync::Arc;
 
 /// Gravity where the plan says nothing, in m/s^2: along -z of the world.
@@ -35,7 +35,7 @@ pub(super) struct GeomNames {
     pub touching: Vec<Vec<String>>,
     /// Of `Hand::palm`.
     pub palm: Vec<String>,
-    /// Of `Scene::obstacles`.
+    /// Of obstacles and everything else that rests.
     pub obstacles: Vec<String>,
     /// Of the object.
     pub object: String,
@@ -63,39 +63,41 @@ struct OwnTip {
     placed: PlacedShape,
 }
 
-pub(super) fn write(scene: &Scene, plan: &Plan) -> Mjcf {
-    let hand = &scene.hand;
+pub(super) fn write(task: &Manipulation, plan: &Plan) -> Mjcf {
+    let (scene, hand) = (task.scene, task.hand());
+    let fixed: Vec<Obstacle> = scene.obstacles.iter().cloned().chain(task.bystanders()).collect();
     let moving: Vec<Vec<JointId>> = hand.fingers.iter().map(|finger| moving_joints(hand, finger)).collect();
-    let names = geom_names(scene);
+    let names = geom_names(hand, &fixed);
     let object = unique("object", hand);
     let mut xml = Xml::default();
     xml.open("mujoco", &[("model", scene.name.clone())]);
     write_settings(&mut xml, plan);
-    write_meshes(&mut xml, scene, &names);
+    write_meshes(&mut xml, task, &fixed, &names);
     xml.open("worldbody", &[]);
     xml.leaf("light", &[("pos", "0.3 -0.3 1".into()), ("dir", "-0.3 0.3 -1".into()), ("directional", "true".into())]);
-    for (obstacle, name) in scene.obstacles.iter().zip(&names.obstacles) {
+    for (obstacle, name) in fixed.iter().zip(&names.obstacles) {
         let body_from_shape = obstacle.placed.parent_from_shape;
         write_geom(
             &mut xml,
             &Geom { name, look: Look::Color(OBSTACLE_COLOR), body_from_shape, shape: &obstacle.placed.shape },
         );
     }
-    write_hand(&mut xml, hand, &moving, &names);
-    write_object(&mut xml, scene, plan, &names, &object);
+    write_hand(&mut xml, task, &moving, &names);
+    write_object(&mut xml, task, plan, &names, &object);
     xml.close();
-    pairs::write(&mut xml, scene, &names);
+    pairs::write(&mut xml, &HandView::of(task), &names);
     write_equalities(&mut xml, hand, &moving, &object);
     write_actuators(&mut xml, hand, &moving);
     write_sensors(&mut xml, hand, &object);
     write_keyframes(&mut xml, hand, plan);
     xml.close();
-    Mjcf { xml: xml.finish(), notes: notes(scene) }
+    Mjcf { xml: xml.finish(), notes: notes(task, &fixed) }
 }
 
-fn notes(scene: &Scene) -> Vec<String> {
-    let shapes = scene.obstacles.iter().map(|obstacle| (obstacle.name.as_str(), &obstacle.placed.shape));
-    std::iter::once((scene.object.name.as_str(), &scene.object.shape))
+fn notes(task: &Manipulation, fixed: &[Obstacle]) -> Vec<String> {
+    let object = task.object();
+    let shapes = fixed.iter().map(|obstacle| (obstacle.name.as_str(), &obstacle.placed.shape));
+    std::iter::once((object.name.as_str(), &object.shape))
         .chain(shapes)
         .filter(|(_, shape)| is_hollowed(shape))
         .map(|(name, _)| format!("\"{name}\" is not convex; MuJoCo collides with its convex hull"))
@@ -126,8 +128,7 @@ fn unique(name: &str, hand: &Hand) -> String {
     name
 }
 
-fn geom_names(scene: &Scene) -> GeomNames {
-    let hand = &scene.hand;
+fn geom_names(hand: &Hand, fixed: &[Obstacle]) -> GeomNames {
     let mut used = vec![0; hand.robot.links.len()];
     let mut name_of = |link: LinkId| {
         used[link.0] += 1;
@@ -156,7 +157,7 @@ fn geom_names(scene: &Scene) -> GeomNames {
         fingers,
         touching,
         palm,
-        obstacles: scene.obstacles.iter().map(|obstacle| format!("obstacle:{}", obstacle.name)).collect(),
+        obstacles: fixed.iter().map(|obstacle| format!("obstacle:{}", obstacle.name)).collect(),
         object: "object".into(),
     }
 }
@@ -214,16 +215,16 @@ fn write_settings(xml: &mut Xml, plan: &Plan) {
     xml.close();
 }
 
-fn write_meshes(xml: &mut Xml, scene: &Scene, names: &GeomNames) {
-    let hand = &scene.hand;
+fn write_meshes(xml: &mut Xml, task: &Manipulation, fixed: &[Obstacle], names: &GeomNames) {
+    let hand = task.hand();
     let fingers = hand
         .fingers
         .iter()
         .zip(&names.fingers)
         .flat_map(|(finger, names)| finger.shapes.iter().map(|shape| &shape.placed.shape).zip(names));
     let palm = hand.palm.iter().map(|shape| &shape.placed.shape).zip(&names.palm);
-    let obstacles = scene.obstacles.iter().map(|obstacle| &obstacle.placed.shape).zip(&names.obstacles);
-    let object = std::iter::once((&scene.object.shape, &names.object));
+    let obstacles = fixed.iter().map(|obstacle| &obstacle.placed.shape).zip(&names.obstacles);
+    let object = std::iter::once((&task.object().shape, &names.object));
     xml.open("asset", &[]);
     let texture = |kind: &str, pattern: &str, colors: [&str; 2]| {
         let side = if kind == "cube" { "64" } else { "16" };
@@ -252,17 +253,17 @@ fn write_meshes(xml: &mut Xml, scene: &Scene, names: &GeomNames) {
     xml.close();
 }
 
-fn write_hand(xml: &mut Xml, hand: &Hand, moving: &[Vec<JointId>], names: &GeomNames) {
-    let base_from_world = hand.world_from_base.inverse();
+fn write_hand(xml: &mut Xml, task: &Manipulation, moving: &[Vec<JointId>], names: &GeomNames) {
+    let hand = task.hand();
     let link_name = |link: LinkId| hand.robot.links[link.0].name.clone();
-    open_body(xml, link_name(hand.base), &hand.world_from_base, false);
+    open_body(xml, link_name(hand.base), &task.world_from_hand(), false);
     for (palm, name) in hand.palm.iter().zip(&names.palm) {
-        let body_from_shape = base_from_world * palm.placed.parent_from_shape;
+        let body_from_shape = palm.placed.parent_from_shape;
         write_geom(xml, &Geom { name, look: Look::Color(PALM_COLOR), body_from_shape, shape: &palm.placed.shape });
     }
     for (index, finger) in hand.fingers.iter().enumerate() {
         let color = FINGER_COLORS[index % FINGER_COLORS.len()];
-        let mut parent = base_from_world;
+        let mut parent = Pose::identity();
         for (body, (joint, &id)) in finger.chain.joints.iter().zip(&moving[index]).enumerate() {
             let as_read = &hand.robot.joints[id.0];
             open_body(xml, link_name(as_read.child), &(parent * joint.parent_from_joint), true);
@@ -351,16 +352,16 @@ fn write_tip(xml: &mut Xml, finger: &Finger, names: &[String], color: &str) {
     );
 }
 
-fn write_object(xml: &mut Xml, scene: &Scene, plan: &Plan, names: &GeomNames, name: &str) {
+fn write_object(xml: &mut Xml, task: &Manipulation, plan: &Plan, names: &GeomNames, name: &str) {
     let start = &plan.segments[0].waypoints[0].world_from_object;
     open_body(xml, name.to_owned(), &pose_from(start.position, start.quat_xyzw), false);
     xml.leaf("freejoint", &[("name", name.to_owned())]);
-    write_inertial(xml, &inertia::of_object(&scene.object));
+    write_inertial(xml, &inertia::of_object(task.object()));
     let geom = Geom {
         name: &names.object,
         look: Look::Checkers,
         body_from_shape: Pose::identity(),
-        shape: &scene.object.shape,
+        shape: &task.object().shape,
     };
     write_geom(xml, &geom);
     xml.close();

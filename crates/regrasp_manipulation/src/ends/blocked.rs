@@ -59,9 +59,9 @@ pub fn object_blocked_by<'m>(model: &'m Model, world_from_object: &Pose) -> Opti
 
 /// Refuses a pose at which too few fingers can touch the object without going farther than the scene allows.
 pub fn refuse_object_out_of_reach(model: &Model, end: End, world_from_object: &Pose) -> Result<(), Failure> {
-    let Some(reach) = model.scene.reach else { return Ok(()) };
+    let Some(reach) = model.view.reach else { return Ok(()) };
     let placement = Placement::from(world_from_object);
-    let surface = &model.scene.object.surface;
+    let surface = &model.view.object.surface;
     let gap = |finger: &FingerModel| {
         let (_, distance) = surface.project_signed(&placement.point_to_child(&finger.tip_at_rest));
         distance.abs() - finger.tip_radius

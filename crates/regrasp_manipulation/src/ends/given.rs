@@ -7,7 +7,7 @@ use regrasp_grasp::Contact;
 use regrasp_plan::Plan;
 use regrasp_plan::plan::Waypoint;
 use regrasp_robot::kinematics::finger_ik::{Coordinates, IkSettings};
-use regrasp_scene::{GRASP_TOLERANCE, GRASP_TURN_TOLERANCE, GraspRequest, InHandQuery, Scene};
+use regrasp_scene::{GRASP_TOLERANCE, GRASP_TURN_TOLERANCE, GraspRequest, HandView, Query};
 
 /// A tip that is no farther off the surface than this, in metres, touches as it stands: half of what the checker allows.
 const TOUCHES: f64 = 5e-6;
@@ -72,14 +72,14 @@ pub struct MovedFinger {
 }
 
 /// Which given fingertips and contacts `plan` has moved onto the surface, and how far.
-pub fn moved_fingers(scene: &Scene, query: &InHandQuery, plan: &Plan) -> Vec<MovedFinger> {
+pub fn moved_fingers(view: &HandView, query: &Query, plan: &Plan) -> Vec<MovedFinger> {
     let first = plan.segments.first().and_then(|segment| segment.waypoints.first());
     let last = plan.segments.last().and_then(|segment| segment.waypoints.last());
-    let ends = [("start", &query.start_grasp, first), ("goal", &query.goal_grasp, last)];
+    let ends = [("start", query.start_grasp(), first), ("goal", query.goal_grasp(), last)];
     let mut moved = Vec::new();
     for (end, grasp, waypoint) in ends {
         let Some(waypoint) = waypoint else { continue };
-        for (finger, distance) in scene.hand.fingers.iter().zip(distances(scene, grasp, waypoint)) {
+        for (finger, distance) in view.hand.fingers.iter().zip(distances(view, grasp, waypoint)) {
             if distance > WORTH_A_WORD {
                 moved.push(MovedFinger { end, finger: finger.name.clone(), distance });
             }
@@ -89,7 +89,7 @@ pub fn moved_fingers(scene: &Scene, query: &InHandQuery, plan: &Plan) -> Vec<Mov
 }
 
 /// Per finger, how far it is from what is asked.
-fn distances(scene: &Scene, asked: &GraspRequest, waypoint: &Waypoint) -> Vec<f64> {
+fn distances(view: &HandView, asked: &GraspRequest, waypoint: &Waypoint) -> Vec<f64> {
     match asked {
         GraspRequest::Automatic => Vec::new(),
         GraspRequest::Contacts(points) => {
@@ -104,7 +104,7 @@ fn distances(scene: &Scene, asked: &GraspRequest, waypoint: &Waypoint) -> Vec<f6
                 let ends = values.get(own.clone()).zip(waypoint.joints.get(own));
                 ends.map_or(0.0, |(a, b)| (finger.ik.tip(a) - finger.ik.tip(b)).norm())
             };
-            scene.hand.fingers.iter().map(tip_moved).collect()
+            view.hand.fingers.iter().map(tip_moved).collect()
         }
     }
 }

@@ -56,11 +56,11 @@ pub fn given_grasp_at(
 
 /// Refuses a grasp with a tip farther from where it rests than the scene allows.
 fn refuse_out_of_reach(model: &Model, end: End, joints: &HandJoints) -> Result<(), Failure> {
-    let Some(reach) = model.scene.reach else { return Ok(()) };
+    let Some(reach) = model.view.reach else { return Ok(()) };
     for (f, (finger, own)) in model.fingers.iter().zip(joints).enumerate() {
         let away = (finger.ik.tip(own) - finger.tip_at_rest).norm();
         if !(away <= reach) {
-            let (name, end_name) = (&model.scene.hand.fingers[f].name, end.name());
+            let (name, end_name) = (&model.view.hand.fingers[f].name, end.name());
             let message = format!(
                 "at the {end_name} finger \"{name}\" is {away:.3} m from where it rests, its reach is {reach} m"
             );
@@ -75,7 +75,7 @@ fn from_joints(model: &Model, end: End, world_from_object: &Pose, values: &[f64]
     let (mut joints, mut contacts) = (HandJoints::new(), Contacts::new());
     let mut rest = values;
     for (f, finger) in model.fingers.iter().enumerate() {
-        let name = &model.scene.hand.fingers[f].name;
+        let name = &model.view.hand.fingers[f].name;
         let chain = finger.ik.chain();
         let n = chain.n_coordinates();
         assert!(rest.len() >= n, "joint vectors have one value per joint");
@@ -89,7 +89,7 @@ fn from_joints(model: &Model, end: End, world_from_object: &Pose, values: &[f64]
             ));
         }
         let (contact, own) =
-            given::touching(finger, &model.scene.object.surface, &own, &placement).map_err(|no_touch| {
+            given::touching(finger, &model.view.object.surface, &own, &placement).map_err(|no_touch| {
                 let off = |gap: f64| {
                     let side = if gap < 0.0 { "inside" } else { "off" };
                     format!("is {:.2} mm {side} the surface", gap.abs() * 1e3)
@@ -127,8 +127,8 @@ fn from_contacts(
     let placement = Placement::from(world_from_object);
     let (mut joints, mut contacts) = (HandJoints::new(), Contacts::new());
     for (f, point) in points.iter().enumerate() {
-        let name = &model.scene.hand.fingers[f].name;
-        let (contact, distance) = given::contact_for(&model.fingers[f], &model.scene.object.surface, point);
+        let name = &model.view.hand.fingers[f].name;
+        let (contact, distance) = given::contact_for(&model.fingers[f], &model.view.object.surface, point);
         if distance > GRASP_TOLERANCE {
             let message = format!(
                 "the {} contact of finger \"{name}\" is {:.2} mm off the surface that its tip can touch; at most {} mm are put \
@@ -146,7 +146,7 @@ fn from_contacts(
                 .find_map(|_| crate::grasp::contact::reach(&mut workspace, f, &contact, &placement, rng)),
             Near::Rest => {
                 let settings = IkSettings { limit_margin: 0.0, preference: None, max_step: FROM_REST };
-                let (finger, rest) = (&model.fingers[f], &model.scene.hand.fingers[f].rest);
+                let (finger, rest) = (&model.fingers[f], &model.view.hand.fingers[f].rest);
                 let chain = finger.ik.chain();
                 if has_all_directions(chain) {
                     let rotation = chain.last_frame(rest).rotation;

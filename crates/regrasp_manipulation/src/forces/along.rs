@@ -62,7 +62,7 @@ fn in_transfer(
 
 fn in_regrasp(model: &Model, forces: &ForceModel, segment: &mut Segment) -> Result<(), Unbalanced> {
     let moving = segment.moving_finger.as_ref();
-    let moving = moving.and_then(|name| model.scene.hand.finger_named(name)).map(|finger| finger.0);
+    let moving = moving.and_then(|name| model.view.hand.finger_named(name)).map(|finger| finger.0);
     let Some(first) = segment.waypoints.first() else { return Ok(()) };
     let held = held(model, forces, first, moving);
     let found = held.forces(model, forces, None)?;

@@ -21,7 +21,7 @@ use regrasp_scene::{Gravity, STANDARD_GRAVITY};
 impl Unbalanced {
     /// In words.
     pub fn in_words(&self, model: &Model) -> String {
-        let finger_name = |f: usize| model.scene.hand.fingers[f].name.as_str();
+        let finger_name = |f: usize| model.view.hand.fingers[f].name.as_str();
         let limits = model.forces.as_ref().map_or([0.0; 2], |forces| [forces.limits.least, forces.limits.largest]);
         let cause = match *self {
             Unbalanced::AtAnyForce => format!("friction {} does not hold it at any force", friction_in_words(model)),
@@ -32,7 +32,7 @@ impl Unbalanced {
                 format!("finger \"{}\" would have to press with more than {} N", finger_name(f), limits[1])
             }
             Unbalanced::TooWeak(f, j) => {
-                let chain = &model.scene.hand.fingers[f].chain;
+                let chain = &model.view.hand.fingers[f].chain;
                 let slides = chain.joints.iter().any(|joint| joint.coordinate == j && joint.motion == Motion::Slide);
                 let limit = model.forces.as_ref().map_or(0.0, |forces| forces.torques[f][j]);
                 let unit = if slides { "N" } else { "N m" };
@@ -161,7 +161,7 @@ fn joint_rows(
     world_from_object: &Placement,
     contact: &Contact,
 ) -> JointRows {
-    let of_hand = &model.scene.hand.fingers[finger];
+    let of_hand = &model.view.hand.fingers[finger];
     let chain = &of_hand.chain;
     let mut frames: ArrayVec<BodyFrame, MAX_BODIES> = (0..chain.joints.len()).map(|_| BodyFrame::IDENTITY).collect();
     chain.forward_frames(joints, &mut frames);

@@ -8,7 +8,7 @@ use regrasp_geometry::collision::Placement;
 use regrasp_grasp::wrench::force_distribution::MAX_ROWS;
 use regrasp_grasp::wrench::{ForceLimits, Wrench};
 use regrasp_plan::plan::ForcePromises;
-use regrasp_scene::{Gravity, Scene};
+use regrasp_scene::{Gravity, HandView};
 use std::collections::BTreeMap;
 
 /// What contact forces balance, and their limits.
@@ -39,18 +39,18 @@ pub enum Unbalanced {
 
 impl ForceModel {
     /// Of a scene; None for plans without forces.
-    pub fn new(scene: &Scene, settings: &PhysicsSettings) -> Option<Self> {
+    pub fn new(view: &HandView, settings: &PhysicsSettings) -> Option<Self> {
         let ForceSettings { squeeze, squeeze_weight, normal_force: [least, largest], torque_share } = settings.forces?;
         let effort = |name: &String| {
-            let joint = scene.hand.robot.joint_named(name)?;
-            scene.hand.robot.joints[joint.0].limits?.effort
+            let joint = view.hand.robot.joint_named(name)?;
+            view.hand.robot.joints[joint.0].limits?.effort
         };
         let torque = |name: &String| effort(name).map_or(f64::INFINITY, |effort| effort * torque_share);
         Some(ForceModel {
             limits: ForceLimits { least, largest, squeeze, squeeze_weight },
-            mass: scene.object.mass,
-            gravity: scene.gravity(),
-            torques: scene.hand.fingers.iter().map(|f| f.chain.names.iter().map(torque).collect()).collect(),
+            mass: view.object.mass,
+            gravity: view.gravity,
+            torques: view.hand.fingers.iter().map(|f| f.chain.names.iter().map(torque).collect()).collect(),
         })
     }
 

@@ -53,7 +53,7 @@ fn draw_contact_once(
     rng: &mut Rng,
     n_measured: &mut u64,
 ) -> Option<Contact> {
-    let object = &model.scene.object;
+    let object = &model.view.object;
     let inner = object.center_of_mass + Vector::from(rng.direction()) * (0.4 * model.frame.torque_scale * rng.unit());
     let towards = world_from_object.point_to_child(&model.fingers[finger].tip_at_rest) - inner;
     let direction = towards.normalize() * PULL + Vector::from(rng.direction());

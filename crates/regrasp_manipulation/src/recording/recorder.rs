@@ -16,6 +16,7 @@ use regrasp_plan::plan::{
     relocations,
 };
 use regrasp_scene::InHandQuery;
+use regrasp_scene::query::IN_HAND;
 
 /// A plan in the making: motions are written down one after the other, each from where the one before ended.
 pub struct Recorder<'m, 'a> {
@@ -38,7 +39,7 @@ impl<'m, 'a> Recorder<'m, 'a> {
     pub fn at(model: &'m Model<'a>, start: &GraspState, joins: bool) -> Self {
         let here = Waypoint {
             time: 0.0,
-            joint_velocities: vec![0.0; model.scene.hand.n_joints()],
+            joint_velocities: vec![0.0; model.view.hand.n_joints()],
             joint_torques: Vec::new(),
             joints: start.joints.iter().flatten().copied().collect(),
             world_from_object: PoseData::from(&start.world_from_object),
@@ -110,7 +111,7 @@ impl<'m, 'a> Recorder<'m, 'a> {
     pub fn begin_regrasp(&mut self, finger: usize, contact: Option<&Contact>, n: usize) {
         let others = self.holding & !(1 << finger);
         self.keep(others);
-        let name = self.model.scene.hand.fingers[finger].name.clone();
+        let name = self.model.view.hand.fingers[finger].name.clone();
         self.here.contacts = resting(&self.contacts, self.holding);
         self.begin(SegmentKind::Regrasp, Some(name), n);
         self.contacts[finger] = contact.copied().unwrap_or_else(no_contact);
@@ -177,7 +178,7 @@ impl<'m, 'a> Recorder<'m, 'a> {
         let statistics = Statistics {
             transfers: self.transfers,
             transfers_with_free_fingers: self.transfers_with_free_fingers,
-            relocations: relocations(&finger_names(self.model.scene), &self.segments),
+            relocations: relocations(&finger_names(self.model.view), &self.segments),
             ..statistics
         };
         let model = self.model;
@@ -200,7 +201,13 @@ impl<'m, 'a> Recorder<'m, 'a> {
             seed,
             way_poses: way_poses(query, &self.segments, steps_to_way),
             statistics,
-            ..plan_of(model.scene, query, promises, self.segments)
+            ..plan_of(
+                model.view,
+                IN_HAND,
+                [&query.world_from_object_start, &query.world_from_object_goal],
+                promises,
+                self.segments,
+            )
         })
     }
 }

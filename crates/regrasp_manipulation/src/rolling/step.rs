@@ -53,7 +53,7 @@ pub struct Rolled {
 impl Rolled {
     /// True where the contact keeps the distance from edges that the scene asks for.
     pub fn keeps_off_edges(&self, model: &Model) -> bool {
-        let object = &model.scene.object;
+        let object = &model.view.object;
         object.surface.crease_distance(&self.foot) >= object.edge_distance
     }
 }
@@ -126,7 +126,7 @@ impl<'a> RollStep<'a> {
 
     /// Where the tip is, with the link at `link` and the object at `object`.
     fn touch(&self, link: &BodyFrame, object: &Placement) -> Option<Touching> {
-        self.model.fingers[self.finger].touch(&self.model.scene.object.surface, link, object, &self.start.normal)
+        self.model.fingers[self.finger].touch(&self.model.view.object.surface, link, object, &self.start.normal)
     }
 
     /// Turn of the tip over the object about the normal from one stance to the other.
@@ -211,7 +211,7 @@ impl<'a> RollStep<'a> {
     /// Slip over parts of the step, while the joints move linearly: what the rule over the whole of it leaves out. None where
     /// the tip is farther from the surface than `allowed`, or deeper, or touches outside its pad, at the end of a part.
     fn slip_over_parts(&self, end: &Rolled, between: &impl Fn(f64) -> Placement, allowed: f64) -> Option<Slipped> {
-        let n_parts = if self.model.scene.object.surface.mesh().is_some() { PARTS_ON_MESH } else { PARTS };
+        let n_parts = if self.model.view.object.surface.mesh().is_some() { PARTS_ON_MESH } else { PARTS };
         let finger = &self.model.fingers[self.finger];
         let chain = finger.ik.chain();
         let mut before = self.start;

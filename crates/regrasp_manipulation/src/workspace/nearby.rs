@@ -75,7 +75,7 @@ impl Nearby {
             others: f64::NEG_INFINITY,
             looks: Vec::new(),
             epoch: 1,
-            tracks: vec![0; model.scene.obstacles.len()],
+            tracks: vec![0; model.view.obstacles.len()],
         };
         Nearby { around: vec![around; n_bodies], tracks: Vec::new() }
     }

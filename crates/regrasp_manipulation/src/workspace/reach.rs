@@ -8,7 +8,7 @@ impl Workspace<'_> {
     /// a tip strays from the line between its ends by no more than its bound says, and the line stays in the ball.
     pub(super) fn is_within_reach(&mut self, moving: Option<usize>) -> bool {
         let model = self.model;
-        let Some(reach) = model.scene.reach else { return true };
+        let Some(reach) = model.view.reach else { return true };
         let stays = |finger: usize| {
             let (tip, ends) = (&model.fingers[finger], [&self.now.joints[finger], &self.next.joints[finger]]);
             let change: Coordinates = ends[0].iter().zip(ends[1]).map(|(a, b)| (b - a).abs()).collect();

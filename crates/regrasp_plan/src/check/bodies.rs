@@ -7,7 +7,7 @@ use regrasp_geometry::reference::ReferenceShape;
 use regrasp_geometry::{Point, Pose, Shape};
 use regrasp_robot::LinkId;
 use regrasp_robot::hand::convex_of;
-use regrasp_scene::Scene;
+use regrasp_scene::Manipulation;
 
 /// What carries an item.
 #[derive(Debug, Clone)]
@@ -90,22 +90,22 @@ const WORLD: usize = 1;
 
 impl Bodies {
     /// Reads all shapes of `scene`. Err with a message when a shape cannot be used for queries.
-    pub fn new(scene: &Scene, model: &Model) -> Result<Self, String> {
+    pub fn new(task: &Manipulation, model: &Model) -> Result<Self, String> {
         let mut bodies =
             Bodies { carriers: vec![Carrier::Object, Carrier::World], items: Vec::new(), pairs: Vec::new() };
-        bodies.add_hand(scene, model)?;
-        let object = &scene.object;
+        bodies.add_hand(task, model)?;
+        let object = task.object();
         bodies.add(&object.name, Owner::Object, OBJECT, &Pose::identity(), &object.shape)?;
         // Fingertips touch the shape; everything else keeps away from the hull, where there is one.
         if let Some(hull) = &object.hull {
             bodies.items.last_mut().expect("the object was just added").is_for_tips_only = true;
             bodies.add(&object.name, Owner::Object, OBJECT, &Pose::identity(), hull)?.is_hull = true;
         }
-        for obstacle in &scene.obstacles {
+        for obstacle in &task.scene.obstacles {
             let placed = &obstacle.placed;
             bodies.add(&obstacle.name, Owner::Obstacle, WORLD, &placed.parent_from_shape, &placed.shape)?;
         }
-        bodies.add_pairs(scene);
+        bodies.add_pairs(task);
         Ok(bodies)
     }
 
@@ -137,8 +137,8 @@ impl Bodies {
         Ok(self.items.last_mut().expect("an item was just added"))
     }
 
-    fn add_hand(&mut self, scene: &Scene, model: &Model) -> Result<(), String> {
-        let robot = &scene.hand.robot;
+    fn add_hand(&mut self, task: &Manipulation, model: &Model) -> Result<(), String> {
+        let robot = &task.hand().robot;
         for (l, link) in robot.links.iter().enumerate() {
             let path = Path::new(robot, LinkId(l), &model.world_from_root, &model.joint_names)?;
             // A link is a finger's when one of that finger's coordinates moves it.
@@ -172,7 +172,7 @@ impl Bodies {
         Ok(())
     }
 
-    fn add_pairs(&mut self, scene: &Scene) {
+    fn add_pairs(&mut self, task: &Manipulation) {
         let moves = |&a: &usize| self.items[a].owner != Owner::Obstacle;
         for a in (0..self.items.len()).filter(moves) {
             for b in 0..self.items.len() {
@@ -189,7 +189,7 @@ impl Bodies {
                     _ => false,
                 };
                 let allowed = match (first.link, second.link) {
-                    (Some(p), Some(q)) => scene.hand.may_touch(p, q),
+                    (Some(p), Some(q)) => task.hand().may_touch(p, q),
                     _ => false,
                 };
                 // Of an object with a hull, tips ask for the shape and all others for the hull.

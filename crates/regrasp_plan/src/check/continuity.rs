@@ -8,7 +8,8 @@ use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, ContactState, FORMAT, FORMAT_VERSION, Plan, PoseData, Segment, SegmentKind, Waypoint};
 use regrasp_geometry::{Pose, UnitVector, Vector};
-use regrasp_scene::{InHandQuery, TaskKind};
+use regrasp_scene::Query;
+use regrasp_scene::query::TRACKING;
 
 /// Tasks that there are.
 const TASKS: [&str; 2] = ["in_hand", "tracking"];
@@ -23,7 +24,7 @@ pub fn check_form(model: &Model, plan: &Plan, log: &mut Log) {
         log.push(Violation::new(Kind::WrongScene, message));
     }
     let is_tracking = plan.promises.tracking.is_some();
-    if is_tracking != (plan.task == TaskKind::Tracking.name()) {
+    if is_tracking != (plan.task == TRACKING) {
         let message =
             format!("promises {} tracking in a task \"{}\"", if is_tracking { "of" } else { "without" }, plan.task);
         log.push(Violation::new(Kind::WrongScene, message));
@@ -147,12 +148,12 @@ pub fn pose_between(from: &Pose, to: &Pose, t: f64) -> Pose {
 }
 
 /// Start and goal: the plan against the query, and the first and last waypoint against the plan's own header.
-pub fn check_ends(query: Option<&InHandQuery>, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
+pub fn check_ends(query: Option<&Query>, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
     let Some((first, last)) = ends(plan) else { return };
     if let Some(query) = query
-        && plan.task != query.task.name()
+        && plan.task != query.task()
     {
-        let message = format!("the plan's task is \"{}\", the scene's \"{}\"", plan.task, query.task.name());
+        let message = format!("the plan's task is \"{}\", the scene's \"{}\"", plan.task, query.task());
         log.push(Violation::new(Kind::WrongScene, message));
     }
     let last_moment = Moment::at(plan.segments.len() - 1, plan.segments.last().map_or(0, |s| s.waypoints.len() - 1));
@@ -178,8 +179,8 @@ pub fn check_ends(query: Option<&InHandQuery>, plan: &Plan, settings: &CheckSett
         }
         let Some(query) = query else { continue };
         let pose = match kind {
-            Kind::StartMismatch => &query.world_from_object_start,
-            _ => &query.world_from_object_goal,
+            Kind::StartMismatch => query.start(),
+            _ => query.goal(),
         };
         let (distance, angle) = pose_difference(&PoseData::from(pose), asked);
         let distance = if within.is_some() { 0.0 } else { distance };

@@ -232,7 +232,7 @@ pub fn pose_of(matrix: &Matrix4<f64>) -> Pose {
 }
 
 /// Where the hand's root stands, from where its base stands; joints above the base rest.
-pub fn world_from_root(hand: &Hand) -> Result<Pose, String> {
+pub fn world_from_root(hand: &Hand, world_from_hand: &Pose) -> Result<Pose, String> {
     let root_from_base = Path::new(&hand.robot, hand.base, &Pose::identity(), &[])?.world_from_link(&[]);
-    Ok(hand.world_from_base * pose_of(&root_from_base).inverse())
+    Ok(world_from_hand * pose_of(&root_from_base).inverse())
 }

@@ -7,7 +7,7 @@ use nalgebra::Matrix4;
 use regrasp_geometry::{Point, Pose};
 use regrasp_robot::tip::Pad;
 use regrasp_robot::{ContactModel, JointKind, LinkId};
-use regrasp_scene::Scene;
+use regrasp_scene::Manipulation;
 
 /// A finger with its tip; a sharp tip is a ball of radius zero.
 #[derive(Debug, Clone)]
@@ -100,11 +100,11 @@ pub struct Model {
 
 impl Model {
     /// Reads the hand of `scene`. Err with a message when the hand contradicts itself.
-    pub fn new(scene: &Scene) -> Result<Self, String> {
-        let hand = &scene.hand;
+    pub fn new(task: &Manipulation) -> Result<Self, String> {
+        let hand = task.hand();
         let robot = &hand.robot;
         let joint_names = hand.joint_names();
-        let world_from_root = world_from_root(hand)?;
+        let world_from_root = world_from_root(hand, &task.world_from_hand())?;
         let mut fingers = Vec::new();
         let mut first = 0;
         let at_rest: Vec<f64> = hand.fingers.iter().flat_map(|finger| finger.rest.iter().copied()).collect();
@@ -134,14 +134,14 @@ impl Model {
             let id = robot.joint_named(name).ok_or_else(|| format!("the robot has no joint \"{name}\""))?;
             slides.push(robot.joints[id.0].kind == JointKind::Prismatic);
         }
-        let (limits, drives) = joint_rows(scene, &joint_names)?;
-        let shape = SortedShape::of(&scene.object.shape);
+        let (limits, drives) = joint_rows(task, &joint_names)?;
+        let shape = SortedShape::of(&task.object().shape);
         Ok(Model { slides, limits, drives, joint_names, fingers, world_from_root, shape })
     }
 }
 
-fn joint_rows(scene: &Scene, joint_names: &[String]) -> Result<(Vec<LimitRow>, Vec<DriveRow>), String> {
-    let robot = &scene.hand.robot;
+fn joint_rows(task: &Manipulation, joint_names: &[String]) -> Result<(Vec<LimitRow>, Vec<DriveRow>), String> {
+    let robot = &task.hand().robot;
     let (mut rows, mut drives) = (Vec::new(), Vec::new());
     for (i, joint) in robot.joints.iter().enumerate() {
         let (driver, multiplier, offset) = match &joint.mimic {

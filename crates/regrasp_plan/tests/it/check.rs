@@ -139,8 +139,8 @@ fn a_contact_near_an_edge_is_reported() {
 
 fn a_contact_near_an_edge_of(shape: Shape) {
     let mut scene = sample::scene();
-    scene.object.shape = shape;
-    scene.object.edge_distance = 0.004;
+    scene.objects[0].shape = shape;
+    scene.objects[0].edge_distance = 0.004;
     let mut plan = sample::plan(&scene);
     let r = sample::OBJECT_RADIUS;
     for (y, reported) in [(r - 0.005, false), (r - 0.003, true)] {

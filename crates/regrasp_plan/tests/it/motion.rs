@@ -15,7 +15,7 @@ use regrasp_scene::Scene;
 use regrasp_scene::scene::Obstacle;
 
 fn random_joints(scene: &Scene, rng: &mut Rng) -> Vec<f64> {
-    let chains = scene.hand.fingers.iter().map(|finger| &finger.chain);
+    let chains = scene.hands[0].hand.fingers.iter().map(|finger| &finger.chain);
     chains.flat_map(|chain| chain.lower.iter().zip(&chain.upper)).map(|(low, high)| rng.uniform(*low, *high)).collect()
 }
 
@@ -26,7 +26,7 @@ fn tips_are_where_the_chains_say() {
     let mut rng = Rng::keyed(1, "tips", 0);
     for _ in 0..200 {
         let joints = random_joints(&scene, &mut rng);
-        for (finger, ours) in scene.hand.fingers.iter().zip(&model.fingers) {
+        for (finger, ours) in scene.hands[0].hand.fingers.iter().zip(&model.fingers) {
             let theirs = finger.chain.tip(&joints[ours.coordinates.clone()], &finger.tip.center_in_body);
             assert!((ours.center_in_world(&joints) - theirs).norm() < 1e-12);
         }

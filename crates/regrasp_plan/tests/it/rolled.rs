@@ -172,7 +172,7 @@ fn the_smallest_margin_of_contacts_that_roll_is_that_of_every_waypoint_by_itself
             let holding = contacts.iter().enumerate().filter(|(_, contact)| contact.holds());
             let grip = |(f, state): (usize, &ContactState)| Grip {
                 contact: contact_of(state).unwrap(),
-                model: scene.hand.fingers[f].tip.contact,
+                model: scene.hands[0].hand.fingers[f].tip.contact,
             };
             margin(&holding.map(grip).collect::<Vec<_>>(), &body)
         };

@@ -310,7 +310,7 @@ pub fn plan(scene: &Scene) -> Plan {
 }
 
 pub fn plan_of(scene: &Scene, start: &Pose, goal: &Pose, segments: Vec<Segment>) -> Plan {
-    let joint_names = scene.hand.joint_names();
+    let joint_names = scene.hands[0].hand.joint_names();
     let mut plan = Plan {
         format: FORMAT.into(),
         format_version: FORMAT_VERSION,
@@ -385,7 +385,7 @@ pub fn plan_with_free_finger(scene: &Scene) -> Plan {
 /// With soft fingertips, of which two hold the sphere.
 pub fn soft_scene() -> Scene {
     let mut scene = scene();
-    for finger in &mut scene.hand.fingers {
+    for finger in &mut scene.hands[0].hand.fingers {
         finger.tip.contact = regrasp_robot::ContactModel::SoftFinger { torsion_radius: 0.005 };
     }
     scene

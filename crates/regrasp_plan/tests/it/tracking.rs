@@ -105,7 +105,7 @@ fn every_rule_of_tracking_is_broken_by_itself() {
     let mut elsewhere = good.clone();
     elsewhere.goal.position = [0.3, 0.0, 0.0];
     assert!(judge(&scene, &elsewhere).accepted());
-    scene.reach = Some(0.004);
+    scene.hands[0].reach = Some(0.004);
     assert_eq!(kinds(&judge(&scene, &good)), [OutOfReach]);
 }
 

@@ -37,10 +37,11 @@ use refusals::{given_grasp, refuse_after_transfers, refuse_hopeless};
 use regrasp_base::{Budget, Interrupt, Rng};
 use regrasp_manipulation::ends::end::End;
 use regrasp_manipulation::failure::{Failure, FailureKind};
+use regrasp_manipulation::in_world::{failure_in_world, plan_in_world};
 use regrasp_manipulation::model::Model;
 use regrasp_plan::Plan;
 use regrasp_plan::plan::Statistics;
-use regrasp_scene::{InHandQuery, Scene, TaskKind};
+use regrasp_scene::{HandView, InHandQuery};
 use searching::attempts::{Left, run_attempts};
 use searching::first_try;
 use searching::legs::{Legs, Solution, plan_legs};
@@ -49,20 +50,21 @@ use std::sync::atomic::AtomicUsize;
 /// What is asked: a query and the seed of all random numbers.
 #[derive(Clone, Copy)]
 struct Asked<'a> {
-    scene: &'a Scene,
+    view: &'a HandView<'a>,
     query: &'a InHandQuery,
     seed: u64,
     progress: &'a (dyn Fn(Progress) + Sync),
 }
 
-/// Plans how the hand takes the object from start to goal.
+/// Plans how the hand of `view` takes its object from start to goal. The search is in the hand's frame; query and plan are in the
+/// world. The hand and the object that the query names must be those of the view.
 ///
 /// The plan is the same for the same scene, query, settings and seed on any number of threads. `progress` is called now
 /// and then, from whichever thread is searching.
 ///
 /// Errors: why there is no plan; settings that do not validate among the reasons.
 pub fn plan_in_hand(
-    scene: &Scene,
+    view: &HandView,
     query: &InHandQuery,
     settings: &InHandSettings,
     seed: u64,
@@ -70,15 +72,18 @@ pub fn plan_in_hand(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Plan, Failure> {
     settings.validate().map_err(|problem| Failure::of_settings(&problem))?;
-    if query.task != TaskKind::InHand {
-        let message = format!("a task of kind \"{}\" is none of the in-hand planner's", query.task.name());
-        return Err(Failure::bare(FailureKind::Impossible, message, "plan it with plan_tracking, or regrasp plan"));
-    }
-    let asked = Asked { scene, query, seed, progress };
+    let seen = view.hand_from_world().map(|hand_from_world| query.seen_from(&hand_from_world));
+    let asked = Asked { view, query: seen.as_ref().unwrap_or(query), seed, progress };
+    let found = plan_in_hand_frame(&asked, settings, budget);
+    found.map(|plan| plan_in_world(view, plan)).map_err(|failure| failure_in_world(view, failure))
+}
+
+/// As [`plan_in_hand`], with the query and the answer in the hand's frame.
+fn plan_in_hand_frame(asked: &Asked, settings: &InHandSettings, budget: &Budget) -> Result<Plan, Failure> {
     let mut spent = 0;
-    for (first, work) in first_try::first_tries(scene, settings, budget) {
+    for (first, work) in first_try::first_tries(asked.view, settings, budget) {
         let left = Budget { max_work: budget.max_work.saturating_sub(spent), ..budget.clone() };
-        match plan_with(&asked, &first, &left, work) {
+        match plan_with(asked, &first, &left, work) {
             Ok(mut plan) => {
                 plan.statistics.work += spent;
                 return Ok(Plan { settings: record::settings_of(settings), ..plan });
@@ -88,7 +93,7 @@ pub fn plan_in_hand(
         }
     }
     let left = Budget { max_work: budget.max_work.saturating_sub(spent), ..budget.clone() };
-    let mut found = plan_with(&asked, settings, &left, left.max_work);
+    let mut found = plan_with(asked, settings, &left, left.max_work);
     let (Ok(Plan { statistics, .. }) | Err(Failure { statistics, .. })) = &mut found;
     statistics.work += spent;
     found
@@ -97,10 +102,10 @@ pub fn plan_in_hand(
 /// As [`plan_in_hand`], with the clearance and closure margin of the settings. `first_work` is the work of the first plan; what
 /// improves it has the `whole` budget.
 fn plan_with(asked: &Asked, settings: &InHandSettings, whole: &Budget, first_work: u64) -> Result<Plan, Failure> {
-    let Asked { scene, query, seed, progress } = *asked;
+    let Asked { view, query, seed, progress } = *asked;
     let budget = &Budget { max_work: first_work.min(whole.max_work), ..whole.clone() };
-    let settings = &effective(settings).within(&scene.limits);
-    let model = Model::new(scene, &settings.physics);
+    let settings = &effective(settings).within(&view.limits);
+    let model = Model::new(view, &settings.physics);
     refuse_hopeless(&model, settings, query)?;
     let poses = query.poses();
     let (start_pose, goal_pose) = (query.world_from_object_start, query.world_from_object_goal);

@@ -70,7 +70,7 @@ fn paths_on_the_sphere_follow_great_circles_and_stay_closed_without_any_finger()
     with_search("sphere_90x.toml", |search| {
         let model = search.model();
         let body = Body {
-            center_of_mass: model.scene.object.center_of_mass,
+            center_of_mass: model.view.object.center_of_mass,
             torque_scale: model.frame.torque_scale,
             friction: model.frame.friction,
         };
@@ -98,7 +98,7 @@ fn paths_on_the_sphere_follow_great_circles_and_stay_closed_without_any_finger()
 fn paths_on_the_box_cross_no_edge() {
     with_search("box_90x.toml", |search| {
         let model = search.model();
-        let object = &model.scene.object;
+        let object = &model.view.object;
         for (a, b, path) in linked_pairs(search, 3) {
             for k in 1..8 {
                 let t = f64::from(k) / 8.0;

@@ -10,7 +10,7 @@ use regrasp_manipulation::ends::given_grasp::{Near, given_grasp_at};
 use regrasp_manipulation::ends::inside::refuse_hand_inside;
 use regrasp_manipulation::failure::{Failure, FailureKind};
 use regrasp_manipulation::model::{Model, friction_in_words};
-use regrasp_scene::{Gravity, InHandQuery};
+use regrasp_scene::{Gravity, TrackingQuery};
 
 /// Vertices of a mesh may be this far in front of one of its triangles, as a share of the object's radius: rounding.
 const FLAT: f64 = 1e-6;
@@ -22,13 +22,13 @@ fn impossible(message: String, advice: &str) -> Failure {
 /// Refuses hands, objects and gravity that tracking is not made for (paper 003, section 3.1: convex objects, fingertips that
 /// are balls; at least two of them rest; section 8: three fingertips or more).
 pub fn refuse(model: &Model, gravity: &Gravity) -> Result<(), Failure> {
-    let object = &model.scene.object;
+    let object = &model.view.object;
     let n = model.n_fingers();
     if n < 3 {
         let message = format!("the hand has {n} fingers: tracking moves one and rests at least two");
         return Err(impossible(message, "use a hand of three fingers or more"));
     }
-    let names = model.scene.hand.fingers.iter().map(|finger| finger.name.as_str());
+    let names = model.view.hand.fingers.iter().map(|finger| finger.name.as_str());
     if let Some((name, _)) = names.zip(&model.fingers).find(|(_, f)| f.tip_radius == 0.0 || f.ellipsoid.is_some()) {
         let message = format!("the tip of finger \"{name}\" is no ball: tracking rolls balls");
         return Err(impossible(message, "give the tip shape = \"sphere\" in the hand file"));
@@ -63,7 +63,7 @@ fn dent(mesh: &TriangleMesh, allowed: f64) -> Option<f64> {
 /// The grasp at the start, and forces that hold it.
 ///
 /// Errors: none is given, or it collides, is out of reach, or holds nothing.
-pub fn start(stepper: &Stepper, query: &InHandQuery) -> Result<(TrackingGrasp, Forces), Failure> {
+pub fn start(stepper: &Stepper, query: &TrackingQuery) -> Result<(TrackingGrasp, Forces), Failure> {
     let model = stepper.model;
     let pose = &query.world_from_object_start;
     refuse_buried_object(model, End::Start, pose)?;

@@ -107,7 +107,7 @@ pub fn change_grasp(local: &mut Local, from: &TrackingGrasp, goal: &UnitQuaterni
 /// Fingers that may leave a grasp, as bits: the others are closed. None where a finger is on an edge, or near one: in-hand planning
 /// holds on faces only.
 fn may_leave(model: &Model, grasp: &TrackingGrasp) -> u32 {
-    let object = &model.scene.object;
+    let object = &model.view.object;
     let on_faces =
         grasp.touches.iter().all(|touch| object.surface.crease_distance(&touch.foot) >= object.edge_distance);
     if on_faces { releasable(model, &grasp.contacts(), model.all_fingers()) } else { 0 }
@@ -144,7 +144,7 @@ fn options(local: &mut Local, from: &TrackingGrasp) -> Vec<Change> {
 /// True where a tip is so near to where it rests that it may go through the air there.
 fn is_near(stepper: &Stepper, tip: &regrasp_geometry::Point, finger: usize) -> bool {
     let model = stepper.model;
-    model.scene.reach.is_none_or(|reach| (tip - model.fingers[finger].tip_at_rest).norm() <= AIR_REACH * reach)
+    model.view.reach.is_none_or(|reach| (tip - model.fingers[finger].tip_at_rest).norm() <= AIR_REACH * reach)
 }
 
 /// The relocation that leads to `option`; none where no way through the air is found, or nothing holds meanwhile.

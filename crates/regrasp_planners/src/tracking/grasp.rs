@@ -36,7 +36,7 @@ impl TrackingGrasp {
             let link = finger.ik.chain().last_frame(joints);
             let center = world_from_object.point_to_child(&link.point(finger.ik.center_in_body()));
             world_from_link.push(link);
-            touches.push(Touch::of(&model.scene.object.surface, &center)?);
+            touches.push(Touch::of(&model.view.object.surface, &center)?);
         }
         Some(TrackingGrasp { world_from_object, joints: state.joints.clone(), world_from_link, touches, bent: 0.0 })
     }

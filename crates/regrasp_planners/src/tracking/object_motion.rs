@@ -123,7 +123,7 @@ impl<'a> ObjectMotion<'a> {
             for (row, &finger) in self.resting.iter().enumerate() {
                 let of_model = &self.model.fingers[finger];
                 let center = self.grasp.world_from_link[finger].point(of_model.ik.center_in_body());
-                let touch = Touch::of(&self.model.scene.object.surface, &object.point_to_child(&center))?;
+                let touch = Touch::of(&self.model.view.object.surface, &object.point_to_child(&center))?;
                 residual[row] = touch.distance - of_model.tip_radius;
                 if finger == self.rolling {
                     let start = &self.grasp.touches[finger];

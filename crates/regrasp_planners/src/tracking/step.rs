@@ -205,7 +205,7 @@ impl<'m, 'a> Stepper<'m, 'a> {
 
     /// True where a ball keeps its face: on smooth surfaces always.
     fn stays_on_its_face(&self, from: &Touch, to: &Touch) -> bool {
-        let surface = &self.model.scene.object.surface;
+        let surface = &self.model.view.object.surface;
         let has_creases = surface.crease_distance(&to.foot).is_finite();
         !has_creases
             || ((to.ball.normal - to.foot.normal_in_object.into_inner()).norm() < ON_FACE
@@ -261,7 +261,7 @@ impl<'m, 'a> Stepper<'m, 'a> {
             end.world_from_link[moving] = chain.last_frame(&rolled.joints);
             end.joints[moving] = rolled.joints;
             let center = to.point_to_child(&end.world_from_link[moving].point(finger.ik.center_in_body()));
-            Touch::of(&model.scene.object.surface, &center).ok_or(NoStep::OutOfReach)?
+            Touch::of(&model.view.object.surface, &center).ok_or(NoStep::OutOfReach)?
         };
         if !self.stays_on_its_face(start, &touch) {
             if is_long {
@@ -273,7 +273,7 @@ impl<'m, 'a> Stepper<'m, 'a> {
         }
         end.touches[moving] = touch;
         let tip = end.world_from_link[moving].point(finger.ik.center_in_body());
-        if model.scene.reach.is_some_and(|reach| (tip - finger.tip_at_rest).norm() > reach) {
+        if model.view.reach.is_some_and(|reach| (tip - finger.tip_at_rest).norm() > reach) {
             return Err(NoStep::OutOfReach);
         }
         if !finger.pad_faces(&end.joints[moving], &end.normal_in_world(moving)) {
@@ -297,7 +297,7 @@ impl<'m, 'a> Stepper<'m, 'a> {
 
     /// Where the ball of `finger` touches after it has rolled by the rotation vector `turn`, in the object frame.
     fn roll(&self, finger: usize, from: &Touch, turn: &Vector) -> Option<Touch> {
-        let surface = &self.model.scene.object.surface;
+        let surface = &self.model.view.object.surface;
         roll_step(|center| Touch::of(surface, center), self.model.fingers[finger].tip_radius, from, turn)
     }
 
@@ -392,7 +392,7 @@ impl<'m, 'a> Stepper<'m, 'a> {
             center_of_mass: frame.center_of_mass,
             torque_scale: frame.torque_scale,
             friction: frame.friction,
-            sliding_friction: self.model.scene.object.friction,
+            sliding_friction: self.model.view.object.friction,
             limits: *self.forces.limits(),
             cones: self.settings.cones,
         }

@@ -18,11 +18,15 @@ fn settings(improve_work: u64) -> InHandSettings {
 fn plan(loaded: &LoadedScene, query: &InHandQuery, settings: &InHandSettings, seed: u64) -> Plan {
     let budget = Budget::work(20_000_000);
     let plan = plan_in_hand(&loaded.scene, query, settings, seed, &budget, &|_| {}).unwrap();
-    let report =
-        check(&loaded.scene, Some(query), &plan, &CheckSettings { level: Level::Geometry, ..CheckSettings::default() });
+    let report = check(
+        (&loaded.scene, &loaded.state),
+        Some(query),
+        &plan,
+        &CheckSettings { level: Level::Geometry, ..CheckSettings::default() },
+    );
     assert!(report.accepted(), "{} seed {seed}: {:#?}", loaded.scene.name, report.violations);
     assert!(report.min_margin.is_none_or(|margin| margin >= plan.promises.kept_margin - 1e-9), "promises hold");
-    assert_eq!(validate_once(&loaded.scene, &plan, settings), Ok(()));
+    assert_eq!(validate_once(&loaded.view(), &plan, settings), Ok(()));
     plan
 }
 
@@ -32,7 +36,7 @@ fn improvement(plan: &Plan) -> &Improvement {
 
 /// The cost of a plan from what is in its file.
 fn cost_of_file(loaded: &LoadedScene, plan: &Plan, weights: &CostWeights) -> f64 {
-    let turn_length = loaded.scene.object.radius;
+    let turn_length = loaded.scene.objects[0].radius;
     let (mut relocations, mut object_path, mut joint_path) = (0.0, 0.0, 0.0);
     for segment in &plan.segments {
         relocations += f64::from(u8::from(segment.kind == SegmentKind::Regrasp));
@@ -53,7 +57,7 @@ fn cost_of_file(loaded: &LoadedScene, plan: &Plan, weights: &CostWeights) -> f64
 fn improved_plans_are_the_same_on_any_number_of_threads_and_cost_what_they_say() {
     for name in ["box_90x.toml", "box_180z.toml", "sphere_180x.toml"] {
         let loaded = scene(name);
-        let query = loaded.task.query(1);
+        let query = loaded.task().query(1);
         let asked = settings(60_000);
         let improved = plan(&loaded, &query, &asked, 1);
         for n_threads in [2, 8] {
@@ -80,7 +84,7 @@ fn improved_plans_are_the_same_on_any_number_of_threads_and_cost_what_they_say()
 #[test]
 fn more_work_never_makes_a_plan_worse() {
     let loaded = scene("box_180x.toml");
-    let query = loaded.task.query(2);
+    let query = loaded.task().query(2);
     let mut last = f64::INFINITY;
     for work in [1, 3_000, 20_000, 30_000, 60_000, 120_000] {
         let plan = plan(&loaded, &query, &settings(work), 2);
@@ -94,17 +98,24 @@ fn more_work_never_makes_a_plan_worse() {
 #[test]
 fn time_only_cuts_and_the_plan_says_so() {
     let loaded = scene("box_180x.toml");
-    let query = loaded.task.query(3);
+    let query = loaded.task().query(3);
     let first = plan(&loaded, &query, &settings(0), 3);
     let none_left = Budget { improve_for: Some(Duration::ZERO), ..Budget::work(20_000_000) };
-    let cut = plan_in_hand(&loaded.scene, &query, &settings(u64::MAX), 3, &none_left, &|_| {}).unwrap();
+    let cut =
+        plan_in_hand(&loaded.view(), query.as_in_hand().unwrap(), &settings(u64::MAX), 3, &none_left, &|_| {}).unwrap();
     assert!(cut.statistics.cut_by_time && cut.segments == first.segments);
     let little = Budget { improve_for: Some(Duration::from_millis(300)), ..Budget::work(20_000_000) };
-    let cut = plan_in_hand(&loaded.scene, &query, &settings(u64::MAX), 3, &little, &|_| {}).unwrap();
+    let cut =
+        plan_in_hand(&loaded.view(), query.as_in_hand().unwrap(), &settings(u64::MAX), 3, &little, &|_| {}).unwrap();
     assert!(cut.statistics.cut_by_time && improvement(&cut).improved.cost <= improvement(&cut).first.cost);
     assert!(
-        check(&loaded.scene, Some(&query), &cut, &CheckSettings { level: Level::Geometry, ..CheckSettings::default() })
-            .accepted()
+        check(
+            (&loaded.scene, &loaded.state),
+            Some(&query),
+            &cut,
+            &CheckSettings { level: Level::Geometry, ..CheckSettings::default() }
+        )
+        .accepted()
     );
 }
 
@@ -114,7 +125,7 @@ fn relocations_of_boxes_fall_by_half() {
     for name in ["box_90x.toml", "box_180z.toml", "box_180x.toml"] {
         let loaded = scene(name);
         for seed in 0..3 {
-            let plan = plan(&loaded, &loaded.task.query(seed), &settings(200_000), seed);
+            let plan = plan(&loaded, &loaded.task().query(seed), &settings(200_000), seed);
             first += improvement(&plan).first.relocations;
             improved += improvement(&plan).improved.relocations;
         }
@@ -125,7 +136,7 @@ fn relocations_of_boxes_fall_by_half() {
 #[test]
 fn given_grasps_and_way_poses_stay() {
     let loaded = scene("box_90x.toml");
-    let free = loaded.task.query(4);
+    let free = loaded.task().query(4);
     let found = plan(&loaded, &free, &settings(0), 4);
     let waypoints = |plan: &Plan| -> Vec<Waypoint> {
         plan.segments.iter().flat_map(|segment| segment.waypoints.iter().cloned()).collect()
@@ -155,7 +166,7 @@ fn given_grasps_and_way_poses_stay() {
 #[test]
 fn the_weights_decide_what_is_better() {
     let loaded = scene("box_180x.toml");
-    let query = loaded.task.query(5);
+    let query = loaded.task().query(5);
     let margins = CostWeights { margin: 20.0, ..CostWeights::default() };
     let tight = plan(&loaded, &query, &settings(300_000), 5);
     let wide = plan(&loaded, &query, &InHandSettings { cost: margins, ..settings(300_000) }, 5);
@@ -167,7 +178,7 @@ fn the_weights_decide_what_is_better() {
 fn the_methods_of_the_paper_are_improved_under_their_release_rule() {
     let loaded = scene("sphere_90x.toml");
     let asked = InHandSettings { method: Method::Visibility, ..settings(200_000) };
-    let plan = plan(&loaded, &loaded.task.query(6), &asked, 6);
+    let plan = plan(&loaded, &loaded.task().query(6), &asked, 6);
     let told = improvement(&plan);
     assert!(told.improved.cost < told.first.cost, "{told:?}");
     let recorded: InHandSettings = serde_json::from_value(plan.settings.clone()).unwrap();

@@ -15,11 +15,11 @@ use regrasp_scene::{LoadedScene, Obstacle, Scene};
 use std::path::Path;
 
 fn small_roadmap(loaded: &LoadedScene, n_threads: usize) -> GraspRoadmap {
-    let query = loaded.task.query(0);
-    let region = Region::around(&query.poses(), &loaded.scene.object.center_of_mass, 0.005, 1.0);
+    let query = loaded.task().query(0);
+    let region = Region::around(&query.poses(), &loaded.scene.objects[0].center_of_mass, 0.005, 1.0);
     let build = BuildSettings { places: 40, grasps: 60, neighbours: 12, ..BuildSettings::default() };
     let settings = InHandSettings { n_threads, ..InHandSettings::default() };
-    build_roadmap(&loaded.scene, &region, &build, &settings, 3, &Budget::unlimited(), &|_| {})
+    build_roadmap(&loaded.view(), &region, &build, &settings, 3, &Budget::unlimited(), &|_| {})
         .unwrap_or_else(|failure| panic!("{failure}"))
 }
 
@@ -106,12 +106,12 @@ fn broken_bytes_are_refused() {
 type Change = (&'static str, fn(&mut Scene), &'static str);
 
 const CHANGES: [Change; 22] = [
-    ("friction", |scene| scene.object.friction *= 0.5, "R612"),
-    ("object size", |scene| scene.object.shape = Shape::Sphere { radius: 0.0321 }, "R611"),
-    ("object kind", |scene| scene.object.shape = Shape::Cuboid { half_extents: Vector::repeat(0.03) }, "R611"),
-    ("center of mass", |scene| scene.object.center_of_mass.x += 1e-4, "R611"),
-    ("edge distance", |scene| scene.object.edge_distance += 1e-4, "R611"),
-    ("crease angle", |scene| scene.object.crease_angle += 0.1, "R611"),
+    ("friction", |scene| scene.objects[0].friction *= 0.5, "R612"),
+    ("object size", |scene| scene.objects[0].shape = Shape::Sphere { radius: 0.0321 }, "R611"),
+    ("object kind", |scene| scene.objects[0].shape = Shape::Cuboid { half_extents: Vector::repeat(0.03) }, "R611"),
+    ("center of mass", |scene| scene.objects[0].center_of_mass.x += 1e-4, "R611"),
+    ("edge distance", |scene| scene.objects[0].edge_distance += 1e-4, "R611"),
+    ("crease angle", |scene| scene.objects[0].crease_angle += 0.1, "R611"),
     ("an obstacle", |scene| scene.obstacles.push(plate()), "R613"),
     ("a soft fingertip", |scene| tip(scene).contact = ContactModel::SoftFinger { torsion_radius: 0.005 }, "R614"),
     ("a slippery fingertip", |scene| tip(scene).contact = ContactModel::Frictionless, "R614"),
@@ -122,20 +122,20 @@ const CHANGES: [Change; 22] = [
     ("joint axis", |scene| joint(scene).axis = -joint(scene).axis, "R610"),
     ("coupling", |scene| joint(scene).multiplier = 0.9, "R610"),
     ("coupling offset", |scene| joint(scene).offset = 0.1, "R610"),
-    ("lower limit", |scene| scene.hand.fingers[1].chain.lower[0] += 1e-3, "R610"),
-    ("upper limit", |scene| scene.hand.fingers[1].chain.upper[2] -= 1e-3, "R610"),
-    ("finger name", |scene| scene.hand.fingers[3].name.push('s'), "R610"),
-    ("finger shapes", |scene| drop(scene.hand.fingers[0].shapes.pop()), "R610"),
-    ("palm", |scene| scene.hand.palm[0].placed.parent_from_shape.translation.z -= 1e-3, "R610"),
-    ("pairs that may touch", |scene| assert!(scene.hand.allowed_pairs.insert((LinkId(0), LinkId(5)))), "R610"),
+    ("lower limit", |scene| scene.hands[0].hand.fingers[1].chain.lower[0] += 1e-3, "R610"),
+    ("upper limit", |scene| scene.hands[0].hand.fingers[1].chain.upper[2] -= 1e-3, "R610"),
+    ("finger name", |scene| scene.hands[0].hand.fingers[3].name.push('s'), "R610"),
+    ("finger shapes", |scene| drop(scene.hands[0].hand.fingers[0].shapes.pop()), "R610"),
+    ("palm", |scene| scene.hands[0].hand.palm[0].placed.parent_from_shape.translation.z -= 1e-3, "R610"),
+    ("pairs that may touch", |scene| assert!(scene.hands[0].hand.allowed_pairs.insert((LinkId(0), LinkId(5)))), "R610"),
 ];
 
 fn tip(scene: &mut Scene) -> &mut Tip {
-    &mut scene.hand.fingers[2].tip
+    &mut scene.hands[0].hand.fingers[2].tip
 }
 
 fn joint(scene: &mut Scene) -> &mut ChainJoint {
-    &mut scene.hand.fingers[1].chain.joints[2]
+    &mut scene.hands[0].hand.fingers[1].chain.joints[2]
 }
 
 fn plate() -> Obstacle {

@@ -25,10 +25,17 @@ fn mutants_of_accepted_plans(name: &str, models: &Path, seeds: std::ops::Range<u
     let settings = InHandSettings::default();
     let mut names = BTreeSet::new();
     for seed in seeds {
-        let query = loaded.task.query(seed);
-        let plan = plan_in_hand(&loaded.scene, &query, &settings, seed, &Budget::work(20_000_000), &|_| {})
-            .unwrap_or_else(|failure| panic!("{name}, seed {seed}: {failure}"));
-        assert_eq!(validate_once(&loaded.scene, &plan, &settings), Ok(()), "{name}, seed {seed}");
+        let query = loaded.task().query(seed);
+        let plan = plan_in_hand(
+            &loaded.view(),
+            query.as_in_hand().unwrap(),
+            &settings,
+            seed,
+            &Budget::work(20_000_000),
+            &|_| {},
+        )
+        .unwrap_or_else(|failure| panic!("{name}, seed {seed}: {failure}"));
+        assert_eq!(validate_once(&loaded.view(), &plan, &settings), Ok(()), "{name}, seed {seed}");
         let judge = |scene: &Scene, plan: &Plan| check(scene, Some(&query), plan, &CheckSettings::default());
         let report = judge(&loaded.scene, &plan);
         assert!(report.accepted(), "{name}, seed {seed}: {report:#?}");

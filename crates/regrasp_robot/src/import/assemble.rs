@@ -119,10 +119,7 @@ pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Resu
             notes.push(format!("finger \"{}\": tip link \"{}\" has no collision geometry", finger.name, link.name));
         }
     }
-    found.into_result((
-        Hand { robot: robot.clone(), base: spec.base, world_from_base: Pose::identity(), fingers, palm, allowed_pairs },
-        notes,
-    ))
+    found.into_result((Hand { robot: robot.clone(), base: spec.base, fingers, palm, allowed_pairs }, notes))
 }
 
 /// The moving joints of each finger, base first.

@@ -108,12 +108,12 @@ fn grasps_are_read_by_name() {
 #[test]
 fn hand_pose_and_rest_posture_take_effect() {
     let folder = Folder::new();
-    let plain = folder.load(GOOD).unwrap().scene.hand;
+    let plain = folder.load(GOOD).unwrap().scene.hands[0].hand;
     let text = GOOD.replace(
         "file = \"hand.toml\"",
         "file = \"hand.toml\"\nworld_from_hand = { position = [0.1, 0.0, 0.0], quat_xyzw = [0, 0, 1, 0] }\nrest = { west_abduction = 0.25 }",
     );
-    let moved = folder.load(&text.replace("[0.0, 0.0, 0.078]", "[0.1, 0.0, 0.078]")).unwrap().scene.hand;
+    let moved = folder.load(&text.replace("[0.0, 0.0, 0.078]", "[0.1, 0.0, 0.078]")).unwrap().scene.hands[0].hand;
     assert_eq!(moved.fingers[2].rest[0], 0.25);
     assert_eq!(moved.fingers[2].rest[1], plain.fingers[2].rest[1]);
     let tip =

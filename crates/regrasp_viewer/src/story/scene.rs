@@ -12,7 +12,7 @@ use regrasp_plan::check::kinematics::world_from_root;
 use regrasp_robot::hand::convex_of;
 use regrasp_robot::tip::is_same_surface;
 use regrasp_robot::{Hand, Joint, JointKind, LinkId, ResolveOptions, Robot, VisualGeometry};
-use regrasp_scene::Scene;
+use regrasp_scene::Manipulation;
 use std::sync::Arc;
 
 /// Most triangles in a page, each mesh counted once: less than 3 MB of text.
@@ -22,13 +22,13 @@ const MOST_TRIANGLES: usize = 120_000;
 ///
 /// Err with a message when couplings of the robot lead nowhere.
 pub(super) fn scene_story(
-    scene: &Scene,
+    task: &Manipulation,
     packages: &ResolveOptions,
 ) -> Result<(SceneStory, Vec<(String, String)>), String> {
-    let hand = &scene.hand;
+    let hand = task.hand();
     let tree = Tree::new(hand);
     let mut shapes = Shapes::default();
-    let mut pieces = collision_pieces(scene, &tree, &mut shapes);
+    let mut pieces = collision_pieces(task, &tree, &mut shapes);
     let (visual, mut notes) = visual_pieces(hand, &tree, &pieces, packages, &mut shapes);
     pieces.extend(visual);
     let names = hand.joint_names();
@@ -46,11 +46,11 @@ pub(super) fn scene_story(
     let meshes = shapes.packed(&mut notes);
     let story = SceneStory {
         links: tree.links.clone(),
-        world_from_root: PoseData::from(&world_from_root(hand)?),
+        world_from_root: PoseData::from(&world_from_root(hand, &task.world_from_hand())?),
         joints,
         fingers: fingers(hand, &tree),
-        friction: scene.object.friction,
-        gravity_in_world: scene.gravity.unwrap_or_default().in_world().map(Into::into),
+        friction: task.object().friction,
+        gravity_in_world: task.scene.gravity().in_world().map(Into::into),
         meshes,
         pieces,
     };
@@ -174,8 +174,8 @@ impl SceneStory {
 }
 
 /// What planner and checker keep apart: meshes of links as their hulls, and the balls of fingertips.
-fn collision_pieces(scene: &Scene, tree: &Tree, shapes: &mut Shapes) -> Vec<PieceStory> {
-    let hand = &scene.hand;
+fn collision_pieces(task: &Manipulation, tree: &Tree, shapes: &mut Shapes) -> Vec<PieceStory> {
+    let hand = task.hand();
     let mut pieces = Vec::new();
     for (place, id) in tree.ids.iter().enumerate() {
         let link = &hand.robot.links[id.0];
@@ -207,8 +207,8 @@ fn collision_pieces(scene: &Scene, tree: &Tree, shapes: &mut Shapes) -> Vec<Piec
         let (name, from_mesh) = (name.to_owned(), PoseData::from(from_mesh));
         pieces.push(PieceStory { on, name, role: Role::Collision, mesh, from_mesh, is_tip: false });
     };
-    add(OtherCarrier::Object, &scene.object.name, &Pose::identity(), &scene.object.shape);
-    for obstacle in &scene.obstacles {
+    add(OtherCarrier::Object, &task.object().name, &Pose::identity(), &task.object().shape);
+    for obstacle in task.scene.obstacles.iter().chain(&task.bystanders()) {
         add(OtherCarrier::World, &obstacle.name, &obstacle.placed.parent_from_shape, &obstacle.placed.shape);
     }
     pieces

@@ -41,7 +41,8 @@ fn a_plan_of_another_scene_has_no_series_but_a_page() {
     let mut other = sample.plan.clone();
     other.joint_names.pop();
     assert!(along(&sample.loaded.scene, &other).is_err());
-    let report = check(&sample.loaded.scene, Some(&sample.query), &other, &CheckSettings::default());
+    let report =
+        check((&sample.loaded.scene, &sample.loaded.state), Some(&sample.query), &other, &CheckSettings::default());
     assert!(!report.accepted());
     let judged = sample.story_of(&other, &report).judged.unwrap();
     assert!(!judged.accepted && !judged.violations.is_empty());
@@ -57,7 +58,8 @@ fn a_rejected_plan_says_so() {
             waypoint.joints[1] += 0.2;
         }
     }
-    let report = check(&sample.loaded.scene, Some(&sample.query), &broken, &CheckSettings::default());
+    let report =
+        check((&sample.loaded.scene, &sample.loaded.state), Some(&sample.query), &broken, &CheckSettings::default());
     let story = sample.story_of(&broken, &report);
     assert!(story.facts.iter().any(|(label, value)| label == "Checker" && value.starts_with("REJECTED")));
     assert!(!story.judged.unwrap().violations.is_empty());

@@ -28,11 +28,11 @@ pub fn options_with_models() -> Option<LoadOptions> {
 impl Sample {
     pub fn new(scene: &str, options: LoadOptions) -> Self {
         let loaded = load_scene(&repository().join(scene), &options).unwrap_or_else(|error| panic!("{error}"));
-        let query = loaded.task.query(0);
+        let query = loaded.task().query(0);
         let budget = Budget::work(5_000_000);
         let plan = plan(&loaded.scene, &query, &PlannerSettings::default(), 0, &budget, &|_| {})
             .unwrap_or_else(|failure| panic!("{failure}"));
-        let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+        let report = check((&loaded.scene, &loaded.state), Some(&query), &plan, &CheckSettings::default());
         assert!(report.accepted(), "{:?}", report.violations);
         Sample { options, loaded, query, plan, report }
     }

@@ -79,12 +79,12 @@ fn links_are_where_the_hand_has_them() {
         let scene = load_scene(&repository().join(path), &options).unwrap().scene;
         let story = story_of(&scene, &options);
         let names: Vec<&str> = story.scene.joints.iter().map(|joint| joint.name.as_str()).collect();
-        assert_eq!(names, scene.hand.joint_names());
+        assert_eq!(names, scene.hands[0].hand.joint_names());
         for (place, link) in story.scene.links.iter().enumerate() {
             assert!(link.parent < place as i32 && (link.parent >= 0) == (place > 0), "{path}: {}", link.name);
             assert_eq!(link.joint >= 0, link.kind != LinkKind::Fixed);
         }
-        assert_same_kinematics(&scene.hand, &story.scene);
+        assert_same_kinematics(&scene.hands[0].hand, &story.scene);
         let has_mimic =
             story.scene.links.iter().any(|link| link.joint >= 0 && link.multiplier != 1.0 || link.offset != 0.0);
         let shares = |link: usize| story.scene.links.iter().filter(|l| l.joint == link as i32).count() > 1;
@@ -104,7 +104,7 @@ fn every_shape_is_drawn_once_and_every_piece_has_its_mesh() {
         assert!(pack::unpack(mesh).is_some());
     }
     assert!(story.pieces.iter().all(|piece| piece.mesh < story.meshes.len() && piece.role == Role::Collision));
-    let n_link_shapes: usize = scene.hand.robot.links.iter().map(|link| link.collision.len()).sum();
+    let n_link_shapes: usize = scene.hands[0].hand.robot.links.iter().map(|link| link.collision.len()).sum();
     let on_links = story.pieces.iter().filter(|piece| matches!(piece.on, Carrier::Link(_)));
     assert!(on_links.clone().count() >= n_link_shapes);
     assert_eq!(

@@ -64,13 +64,13 @@ fn obstacle(index: usize, shape: Shape, position: Vector, rng: &mut Rng) -> Obst
 fn scene_with(n_obstacles: usize, rng: &mut Rng) -> LoadedScene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/box_90x.toml");
     let mut loaded = load_scene(&path, &LoadOptions::default()).unwrap();
-    loaded.scene.obstacles = (0..n_obstacles).map(|index| random_obstacle(index, rng)).collect();
+    loaded.view.obstacles = (0..n_obstacles).map(|index| random_obstacle(index, rng)).collect();
     loaded
 }
 
 /// Makes a workspace test every pair with every obstacle, in turn, as if all of them were near.
 fn look_at_all(workspace: &mut Workspace) {
-    let n = workspace.model.scene.obstacles.len();
+    let n = workspace.model.view.obstacles.len();
     let everywhere = |index| Ball { center: Point::origin(), radius: f64::INFINITY, index };
     for around in &mut workspace.nearby.around {
         around.near = (0..n as u32).map(everywhere).collect();
@@ -318,7 +318,7 @@ fn obstacles_that_touch_the_clearance_are_judged_as_by_testing_all() {
     let settings = PhysicsSettings::default();
     let model = Model::new(&bare.scene, &settings);
     let mut workspace = Workspace::new(&model);
-    let joints: HandJoints = bare.scene.hand.fingers.iter().map(|f| f.rest.iter().copied().collect()).collect();
+    let joints: HandJoints = bare.view.hand.fingers.iter().map(|f| f.rest.iter().copied().collect()).collect();
     let contacts = Contacts::new();
     let home = Pose::translation(0.0, 0.0, 0.16);
     workspace.set_held(&home, &joints, &contacts, 0);
@@ -333,7 +333,7 @@ fn obstacles_that_touch_the_clearance_are_judged_as_by_testing_all() {
         let away = radius + size + settings.clearance + off;
         let position = workspace.now.at(&model, body).point(center).coords + Vector::from(rng.direction()) * away;
         let mut loaded = bare.clone();
-        loaded.scene.obstacles = vec![obstacle(0, Shape::Sphere { radius: size }, position, &mut rng)];
+        loaded.view.obstacles = vec![obstacle(0, Shape::Sphere { radius: size }, position, &mut rng)];
         let model = Model::new(&loaded.scene, &settings);
         let (mut culled, mut all) = (Workspace::new(&model), Workspace::new(&model));
         look_at_all(&mut all);

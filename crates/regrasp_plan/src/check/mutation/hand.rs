@@ -14,7 +14,7 @@ impl Breeder<'_> {
     pub(super) fn break_contact_models(&mut self) {
         // Sets of fingers that hold somewhere, and the torsion that they count on.
         let holding: Vec<Vec<usize>> = waypoints(self.plan).map(holders).collect();
-        let fingers = &self.scene.hand.fingers;
+        let fingers = &self.task.hand().fingers;
         let is_soft = |f: usize| matches!(fingers[f].tip.contact, ContactModel::SoftFinger { .. });
         let pair = holding.iter().find(|set| set.len() == 2 && set.iter().any(|&f| is_soft(f))).cloned();
         let promises = &self.plan.promises;
@@ -63,8 +63,8 @@ impl Breeder<'_> {
 
     pub(super) fn break_couplings(&mut self) {
         let moving = &self.plan.segments;
-        let coupled: Vec<usize> = (0..self.scene.hand.robot.joints.len())
-            .filter(|&joint| self.scene.hand.robot.joints[joint].mimic.is_some())
+        let coupled: Vec<usize> = (0..self.task.hand().robot.joints.len())
+            .filter(|&joint| self.task.hand().robot.joints[joint].mimic.is_some())
             .filter(|&joint| self.model.fingers.iter().any(|finger| finger.moving_joints.contains(&joint)))
             .collect();
         let is_held = moving.iter().any(|segment| segment.kind == SegmentKind::Transfer);
@@ -81,7 +81,7 @@ impl Breeder<'_> {
             joint.mimic = None;
             is_held.then_some(())
         });
-        let (model, robot) = (self.model, &self.scene.hand.robot);
+        let (model, robot) = (self.model, &self.task.hand().robot);
         self.add("coupled joint beyond its limit", &[JointLimit], |plan, rng| {
             let is_follower = |name: &str| robot.joint_named(name).is_some_and(|id| robot.joints[id.0].mimic.is_some());
             let rows: Vec<_> = model.limits.iter().filter(|row| is_follower(&row.name)).collect();

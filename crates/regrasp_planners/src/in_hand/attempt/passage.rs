@@ -27,7 +27,7 @@ impl Passages {
     /// Looks along the axes of the object at both ends, as far as poses wander; none in scenes without obstacles.
     pub fn of(model: &Model, wander_distance: f64, ends: [&Pose; 2]) -> Self {
         let mut ways_out = Vec::new();
-        if model.scene.obstacles.is_empty() {
+        if model.view.obstacles.is_empty() {
             return Passages { ways_out };
         }
         let length = model.turn_length();

@@ -13,9 +13,9 @@ pub fn draw_pose(model: &Model, settings: &SearchSettings, start: &Pose, goal: &
     let along = interpolate_pose(start, goal, rng.unit());
     let shift = Vector::from(rng.direction()) * (distance * rng.unit().cbrt());
     let turn = Vector::new(rng.normal(), rng.normal(), rng.normal()) * angle;
-    let center = along * model.scene.object.center_of_mass;
+    let center = along * model.view.object.center_of_mass;
     let rotation = nalgebra::UnitQuaternion::from_scaled_axis(turn) * along.rotation;
     // Turn about the centre of mass, then shift.
-    let origin: Point = center + shift - rotation * model.scene.object.center_of_mass.coords;
+    let origin: Point = center + shift - rotation * model.view.object.center_of_mass.coords;
     Pose::from_parts(origin.coords.into(), rotation)
 }

@@ -93,7 +93,7 @@ impl Tally {
             .filter_map(|finger| {
                 let Release { seen, best_at } = &self.releases[finger];
                 let at = best_at.as_ref().filter(|_| seen.n_held == 0)?;
-                let (name, p) = (&model.scene.hand.fingers[finger].name, at.translation.vector);
+                let (name, p) = (&model.view.hand.fingers[finger].name, at.translation.vector);
                 Some(format!(
                     "\"{name}\" (the others are closed in none of {} closed grasps; nearest: margin {:.4} of {required}, with \
                      the object at [{:.4}, {:.4}, {:.4}] m, turned by {:.1} degrees)",
@@ -112,7 +112,7 @@ impl Tally {
     /// The causes in words, commonest first.
     pub fn causes(&self, model: &Model) -> Vec<Cause> {
         let total: u64 = self.counts.values().sum();
-        let finger_name = |f: usize| model.scene.hand.fingers[f].name.as_str();
+        let finger_name = |f: usize| model.view.hand.fingers[f].name.as_str();
         let mut causes: Vec<Cause> = self
             .counts
             .iter()

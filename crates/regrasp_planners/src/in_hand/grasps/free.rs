@@ -65,7 +65,7 @@ fn best_of(
 ) -> Option<Candidate> {
     let model = search.model();
     let chain = model.fingers[finger].ik.chain();
-    postures.push(model.scene.hand.fingers[finger].rest.iter().copied().collect());
+    postures.push(model.view.hand.fingers[finger].rest.iter().copied().collect());
     for _ in 0..DRAWN {
         let margin = model.settings.limit_margin;
         let limits = chain.lower.iter().zip(&chain.upper);

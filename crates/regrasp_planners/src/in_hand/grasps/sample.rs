@@ -28,7 +28,7 @@ pub fn draw_state(search: &mut Search) -> Option<GraspState> {
 /// A pose anyhow turned, with its centre of mass near the way from `start` to `goal`.
 fn draw_turned_pose(search: &mut Search, start: &Pose, goal: &Pose) -> Pose {
     let model = search.model();
-    let center = model.scene.object.center_of_mass;
+    let center = model.view.object.center_of_mass;
     let along = interpolate_pose(start, goal, search.rng.unit()) * center;
     let radius = search.settings.search.wander_distance * search.rng.unit().cbrt();
     let place = along + Vector::from(search.rng.direction()) * radius;

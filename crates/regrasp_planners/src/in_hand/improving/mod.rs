@@ -249,7 +249,7 @@ fn push_own(search: &mut Search, course: &Course, tracks: &mut [Vec<Track>], own
 fn straight(model: &Model, legs: &Legs, rng: &mut Rng) -> Course {
     let mut corners = Vec::new();
     for (leg, pair) in legs.poses.windows(2).enumerate() {
-        if let Some(half) = half_of_the_other_way(&pair[0], &pair[1], &model.scene.object.center_of_mass)
+        if let Some(half) = half_of_the_other_way(&pair[0], &pair[1], &model.view.object.center_of_mass)
             && rng.chance(0.5)
         {
             corners.push(Corner::station(half));

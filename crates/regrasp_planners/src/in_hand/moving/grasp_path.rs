@@ -123,7 +123,7 @@ fn in_reach(model: &Model, finger: usize, contact: &Contact, world_from_object: 
 impl Way {
     /// None when a contact would have to cross a crease, or has no shortest way.
     fn new(model: &Model, from: &GraspState, to: &GraspState) -> Option<Self> {
-        let surface = &model.scene.object.surface;
+        let surface = &model.view.object.surface;
         let contacts = from
             .contacts
             .iter()
@@ -152,7 +152,7 @@ impl Way {
 
     /// The contacts at `t`, as the fingertips really touch; None where one is too near an edge.
     fn contacts_at(&self, model: &Model, t: f64) -> Option<Contacts> {
-        let object = &model.scene.object;
+        let object = &model.view.object;
         self.contacts
             .iter()
             .zip(&model.fingers)

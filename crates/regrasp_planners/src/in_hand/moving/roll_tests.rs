@@ -31,7 +31,7 @@ fn integrate(model: &Model, finger: usize, joints: &Coordinates, from: &Pose, to
     let rate = |q: &[f64], t: f64| -> Vec<f64> {
         let pose = interpolate_pose(from, to, t);
         let center = ik.tip(q);
-        let surface = &model.scene.object.surface;
+        let surface = &model.view.object.surface;
         let foot = surface.project(&pose.inverse_transform_point(&center));
         let point: Point = pose * foot.point_in_object;
         let mut normal = (center - point).normalize();
@@ -126,7 +126,7 @@ fn tips_stay_one_radius_from_the_surface_and_contacts_under_them() {
                     let center = moment.world_from_object.inverse_transform_point(&center);
                     let at = contact.point_in_object + contact.normal_in_object.into_inner() * radius;
                     assert!((center - at).norm() < 2e-9);
-                    let distance = model.scene.object.surface.signed_distance(&center);
+                    let distance = model.view.object.surface.signed_distance(&center);
                     assert!((distance - radius).abs() < 2e-9);
                 }
             }

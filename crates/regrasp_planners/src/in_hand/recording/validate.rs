@@ -7,12 +7,13 @@ use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp::Contact;
 use regrasp_manipulation::grasp::state::GraspState;
+use regrasp_manipulation::in_world::plan_in_hand_frame;
 use regrasp_manipulation::model::Model;
 use regrasp_manipulation::recording::waypoint::{contact_of, joints_of};
 use regrasp_manipulation::workspace::{TipMode, Workspace};
 use regrasp_plan::plan::{Plan, Segment, SegmentKind, Waypoint};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
-use regrasp_scene::Scene;
+use regrasp_scene::HandView;
 
 /// What could not be proven of a plan at the planner's resolution.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -37,8 +38,9 @@ impl std::error::Error for NotProven {}
 /// Steps through every waypoint of `plan` once, as the planner does: kinematics, collision and closure.
 ///
 /// Errors: the first step that is not proven.
-pub fn validate_once(scene: &Scene, plan: &Plan, settings: &InHandSettings) -> Result<(), NotProven> {
-    let model = Model::new(scene, &settings.physics);
+pub fn validate_once(view: &HandView, plan: &Plan, settings: &InHandSettings) -> Result<(), NotProven> {
+    let plan = &plan_in_hand_frame(view, plan);
+    let model = Model::new(view, &settings.physics);
     let mut workspace = Workspace::new(&model);
     for (index, segment) in plan.segments.iter().enumerate() {
         validate_segment(&model, &mut workspace, segment).map_err(|(waypoint, cause)| NotProven {
@@ -61,7 +63,7 @@ fn validate_segment(model: &Model, workspace: &mut Workspace, segment: &Segment)
     let Some((start, end)) = ends.map(|(first, last)| (state_at(first), state_at(last))) else {
         return Err((0, "the segment has no waypoints".into()));
     };
-    let moving = segment.moving_finger.as_ref().and_then(|name| model.scene.hand.finger_named(name)).map(|id| id.0);
+    let moving = segment.moving_finger.as_ref().and_then(|name| model.view.hand.finger_named(name)).map(|id| id.0);
     let holding = start.holding & !moving.map_or(0, |finger| 1 << finger);
     let margin = model.closure_margin(&start.contacts, holding);
     if margin < model.settings.closure_margin {

@@ -28,7 +28,7 @@ use regrasp_manipulation::model::{Model, releasable};
 use regrasp_manipulation::relocation::{Foothold, relocate};
 use regrasp_manipulation::settings::{PhysicsSettings, TransferMode};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
-use regrasp_scene::Scene;
+use regrasp_scene::HandView;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicUsize;
@@ -87,7 +87,7 @@ pub struct BuildStage {
     pub work: u64,
 }
 
-/// Builds a roadmap of `scene` over `region`, with `settings.n_threads` threads.
+/// Builds a roadmap of `view` over `region`, which is in the hand's frame, with `settings.n_threads` threads.
 ///
 /// Contacts stay where they are while the object moves, whatever the settings say: where a fingertip rolls to depends on the
 /// way that it came, and a graph has many ways to each of its grasps.
@@ -95,7 +95,7 @@ pub struct BuildStage {
 /// Failures: a hand that can never do it, a spent budget, an interruption, or no grasp anywhere. Panics if settings or
 /// region are not valid.
 pub fn build_roadmap(
-    scene: &Scene,
+    view: &HandView,
     region: &Region,
     build: &BuildSettings,
     settings: &InHandSettings,
@@ -107,13 +107,13 @@ pub fn build_roadmap(
     valid.map_err(|problem| Failure::of_settings(&problem))?;
     let physics = PhysicsSettings { transfer: TransferMode::Fixed, ..settings.physics.clone() };
     let settings = InHandSettings { method: Method::Gait, physics, ..settings.clone() };
-    let within = settings.within(&scene.limits);
-    let model = Model::new(scene, &within.physics);
+    let within = settings.within(&view.limits);
+    let model = Model::new(view, &within.physics);
     refuse_impossible(&model)?;
     let mut builder = Builder::new(&model, &within, region, build, seed, budget, progress)?;
     builder.run()?;
     let about = About {
-        identity: Identity::of(scene),
+        identity: Identity::of(view),
         region: *region,
         settings,
         build: build.clone(),

@@ -51,7 +51,7 @@ pub fn spread_contacts(model: &Model, n: usize, seed: u64) -> Vec<Vec<Contact>> 
 
 /// A contact drawn by area, as the fingertip really touches, off the creases.
 fn draw(model: &Model, finger: usize, rng: &mut Rng) -> Option<Contact> {
-    let object = &model.scene.object;
+    let object = &model.view.object;
     let drawn = object.surface.sample(rng);
     let settled = object.surface.settle(&drawn, model.fingers[finger].settle_radius)?;
     (object.surface.crease_distance(&settled) >= object.edge_distance)

@@ -8,7 +8,7 @@ use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Point, Pose, Shape};
 use regrasp_robot::kinematics::chain::Motion;
 use regrasp_robot::{ContactModel, Hand, TipShape};
-use regrasp_scene::{Object, Scene};
+use regrasp_scene::{HandView, Object};
 
 /// A SHA-256.
 pub type Digest = [u8; 32];
@@ -37,21 +37,21 @@ pub struct Identity {
 
 impl Identity {
     /// Of a scene.
-    pub fn of(scene: &Scene) -> Self {
+    pub fn of(view: &HandView) -> Self {
         let mut obstacles = Feed::default();
-        obstacles.count(scene.obstacles.len());
-        for obstacle in &scene.obstacles {
+        obstacles.count(view.obstacles.len());
+        for obstacle in view.obstacles.iter() {
             obstacles.placed(&obstacle.placed);
         }
         Identity {
-            fingers: scene.hand.fingers.iter().map(|finger| finger.name.clone()).collect(),
-            hand_name: scene.hand.robot.name.clone(),
-            hand: hand(&scene.hand, scene.reach),
-            contacts: scene.hand.fingers.iter().map(|finger| finger.tip.contact).collect(),
-            object_name: scene.object.name.clone(),
-            object: object(&scene.object),
+            fingers: view.hand.fingers.iter().map(|finger| finger.name.clone()).collect(),
+            hand_name: view.hand.robot.name.clone(),
+            hand: hand(&view.hand, view.reach),
+            contacts: view.hand.fingers.iter().map(|finger| finger.tip.contact).collect(),
+            object_name: view.object.name.clone(),
+            object: object(&view.object),
             obstacles: obstacles.digest(),
-            friction: scene.object.friction,
+            friction: view.object.friction,
         }
     }
 }

@@ -22,12 +22,13 @@ use regrasp_manipulation::ends::end::End;
 use regrasp_manipulation::failure::{Failure, FailureKind};
 use regrasp_manipulation::grasp::sequence::{Motion, Sequence};
 use regrasp_manipulation::grasp::state::GraspState;
+use regrasp_manipulation::in_world::{failure_in_world, plan_in_world};
 use regrasp_manipulation::model::Model;
 use regrasp_manipulation::recording::recorder::Recorder;
 use regrasp_plan::Plan;
 use regrasp_plan::plan::Statistics;
 use regrasp_roadmap::AStar;
-use regrasp_scene::{GraspRequest, InHandQuery, Scene};
+use regrasp_scene::{GraspRequest, HandView, InHandQuery};
 use std::path::Path;
 use std::sync::atomic::AtomicUsize;
 
@@ -70,10 +71,10 @@ impl<'a> RoadmapPlanner<'a> {
     /// Opens a roadmap, which came from `path`, for a scene.
     ///
     /// Errors: it was built for another one (`R610` to `R614`), or its tables are not of the hand it names (`R606`).
-    pub fn new(path: &Path, roadmap: &'a GraspRoadmap, scene: &'a Scene) -> Result<Self, InputError> {
-        roadmap.refuse_other_scene(path, scene)?;
-        let settings = roadmap.about.settings.within(&scene.limits);
-        Ok(RoadmapPlanner { model: Model::new(scene, &settings.physics), settings, roadmap, smooth: false })
+    pub fn new(path: &Path, roadmap: &'a GraspRoadmap, view: &'a HandView<'a>) -> Result<Self, InputError> {
+        roadmap.refuse_other_scene(path, view)?;
+        let settings = roadmap.about.settings.within(&view.limits);
+        Ok(RoadmapPlanner { model: Model::new(view, &settings.physics), settings, roadmap, smooth: false })
     }
 
     /// With transfers that follow each other with one grasp made one, where that is free: shorter motions, slower answers.
@@ -93,14 +94,15 @@ impl<'a> RoadmapPlanner<'a> {
         let draw = |purpose: &str| {
             let mut rng = Rng::keyed(seed, purpose, 0);
             loop {
-                let pose = self.roadmap.about.region.draw(&self.model.scene.object.center_of_mass, &mut rng);
+                let pose = self.roadmap.about.region.draw(&self.model.view.object.center_of_mass, &mut rng);
                 if object_blocked_by(&self.model, &pose).is_none() {
-                    return pose;
+                    return self.model.view.world_from(&pose);
                 }
             }
         };
         InHandQuery {
-            task: regrasp_scene::TaskKind::InHand,
+            hand: self.model.view.hand_index,
+            object: self.model.view.object_index,
             world_from_object_start: draw("random_start"),
             world_from_object_way: Vec::new(),
             world_from_object_goal: draw("random_goal"),
@@ -111,6 +113,21 @@ impl<'a> RoadmapPlanner<'a> {
 
     /// Answers a query without way poses. The same query, seed and roadmap give the same plan.
     pub fn plan(
+        &self,
+        query: &InHandQuery,
+        seed: u64,
+        budget: &Budget,
+        memory: &mut QueryMemory,
+    ) -> Result<Answer, Failure> {
+        let view = self.model.view;
+        let seen = view.hand_from_world().map(|hand_from_world| query.seen_from(&hand_from_world));
+        let found = self.plan_in_hand_frame(seen.as_ref().unwrap_or(query), seed, budget, memory);
+        found
+            .map(|answer| Answer { plan: plan_in_world(view, answer.plan), ..answer })
+            .map_err(|failure| failure_in_world(view, failure))
+    }
+
+    fn plan_in_hand_frame(
         &self,
         query: &InHandQuery,
         seed: u64,
@@ -289,7 +306,7 @@ impl<'a> RoadmapPlanner<'a> {
             End::Start => ("start", &search.start),
             End::Way(_) | End::Goal => ("goal", &search.goal),
         };
-        let center_of_mass = self.model.scene.object.center_of_mass;
+        let center_of_mass = self.model.view.object.center_of_mass;
         let inside = self.roadmap.about.region.contains(pose, &center_of_mass, 1e-9);
         let place = if inside { "which is in its region" } else { "which is outside its region" };
         self.failure(format!("no grasp of the roadmap can be taken to the {name}, {place}"), search)

@@ -7,7 +7,7 @@ use regrasp_geometry::collision::support::support_value;
 use regrasp_geometry::{Vector, frame};
 use regrasp_manipulation::settings::PhysicsSettings;
 use regrasp_robot::Finger;
-use regrasp_scene::Scene;
+use regrasp_scene::HandView;
 
 /// Directions across a link in which its width is measured.
 const DIRECTIONS: usize = 32;
@@ -17,10 +17,10 @@ const SHARE_FOR_BOTH: f64 = 1.0 / 3.0;
 
 /// Settings and work of what is tried first, in order; none where there is nothing to try: more clearance and more closure, and
 /// more clearance alone.
-pub fn first_tries(scene: &Scene, settings: &InHandSettings, budget: &Budget) -> Vec<(InHandSettings, u64)> {
+pub fn first_tries(view: &HandView, settings: &InHandSettings, budget: &Budget) -> Vec<(InHandSettings, u64)> {
     let Some(wanted) = settings.search.first_try.filter(|_| settings.method == Method::Gait) else { return Vec::new() };
     let can_keep = |finger: &Finger| stand_back(finger).is_none_or(|back| back >= 2.0 * wanted.clearance);
-    let keeps_away = wanted.clearance > settings.physics.clearance && scene.hand.fingers.iter().all(can_keep);
+    let keeps_away = wanted.clearance > settings.physics.clearance && view.hand.fingers.iter().all(can_keep);
     let closes_more = wanted.closure_margin > settings.physics.closure_margin;
     let with = |keeps_away: bool, closes_more: bool, share: f64| {
         let clearance = if keeps_away { wanted.clearance } else { settings.physics.clearance };
@@ -72,7 +72,7 @@ mod tests {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/sphere_90x.toml");
         let scene = regrasp_scene::load_scene(&path, &LoadOptions::default()).unwrap().scene;
         // Tips of 5 mm on capsules of 4 mm.
-        for finger in &scene.hand.fingers {
+        for finger in &view.hand.fingers {
             assert!((stand_back(finger).unwrap() - 0.001).abs() < 1e-9);
         }
         let with = |wanted: FirstTry| {

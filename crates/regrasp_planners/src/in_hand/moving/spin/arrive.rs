@@ -83,7 +83,7 @@ fn left(model: &Model, found: &Arrival, goal: &Pose) -> Twist {
 /// The grasp with its contacts shifted over the surface by two numbers each.
 fn shifted(model: &Model, near: &GraspState, numbers: &DVector<f64>) -> Option<GraspState> {
     let placement = Placement::from(&near.world_from_object);
-    let object = &model.scene.object;
+    let object = &model.view.object;
     let mut start = near.clone();
     for finger in (0..model.n_fingers()).filter(|&finger| near.holds(finger)) {
         let Contact { point_in_object, normal_in_object } = near.contacts[finger];

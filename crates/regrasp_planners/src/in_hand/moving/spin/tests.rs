@@ -15,7 +15,7 @@ const PARTS: usize = 16;
 /// The turn of `finger` about its normal from one moment to the next: rotations of the link seen from the object, projected on
 /// the direction from the nearest point of the surface to the tip's centre, in many parts.
 fn turn(model: &Model, finger: usize, from: &Moment, to: &Moment) -> f64 {
-    let surface = &model.scene.object.surface;
+    let surface = &model.view.object.surface;
     let ik = model.fingers[finger].ik;
     let at = |t: f64| {
         let pose = interpolate_pose(&from.world_from_object, &to.world_from_object, t);
