@@ -82,9 +82,11 @@ pub fn settings(search: &Search, n_threads: usize) -> Result<InHandSettings, Sto
     let file = search.settings.as_deref();
     let mut settings = planner_settings(file, search.method.as_deref(), search.margin, n_threads)?;
     match search.improve_work {
-        Some(work) => settings.improve_work = work,
+        Some(work) => settings.improvement.improve_work = work,
         // Time alone is to end it.
-        None if search.improve.is_some() && settings.improve_work == 0 => settings.improve_work = u64::MAX,
+        None if search.improve.is_some() && settings.improvement.improve_work == 0 => {
+            settings.improvement.improve_work = u64::MAX
+        }
         None => {}
     }
     Ok(settings)
@@ -155,7 +157,7 @@ pub fn planner_settings(
         settings.method = method_named(name)?;
     }
     if let Some(margin) = margin {
-        settings.closure_margin = margin;
+        settings.physics.closure_margin = margin;
     }
     match settings.validate() {
         Ok(()) => Ok(settings),

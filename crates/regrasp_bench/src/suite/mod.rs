@@ -199,7 +199,8 @@ impl Suite {
         for figure in &self.figures {
             for curve in &figure.curves {
                 for &value in &figure.alpha {
-                    let settings = InHandSettings { alpha: Alpha::Constant { value }, ..curve.settings.clone() };
+                    let mut settings = curve.settings.clone();
+                    settings.baselines.alpha = Alpha::Constant { value };
                     jobs.push(job(figure.job_name(curve, value), curve, settings));
                 }
             }

@@ -39,7 +39,7 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
     let files = load::scene_files(&arguments.scenes)?;
     let (mut scenes, bad) = load_scenes(&files, arguments, common, talk)?;
     let (planner, tracking) = bench_settings(&scenes, arguments)?;
-    let improves = planner.improve_work > 0;
+    let improves = planner.improvement.improve_work > 0;
     let cancelled = interrupt::flag()?;
     let mut writer = match &arguments.csv {
         Some(path) => {
