@@ -31,9 +31,10 @@ pub(super) fn with_search(name: &str, test: impl FnOnce(&mut Search)) {
 /// The same with other settings.
 pub(super) fn with_settings(name: &str, settings: &InHandSettings, test: impl FnOnce(&mut Search)) {
     let loaded = scene(name);
-    let model = Model::new(&loaded.scene, &super::effective(settings));
+    let view = loaded.view();
+    let model = Model::new(&view, &super::effective(settings));
     let query = loaded.task().query(0);
-    let poses = (query.world_from_object_start, query.world_from_object_goal);
+    let poses = (*query.start(), *query.goal());
     let (budget, winner) = (Budget::unlimited(), AtomicUsize::new(usize::MAX));
     test(&mut Search::new(&model, poses, (0, 0), (&budget, u64::MAX), &winner, &|_| {}));
 }

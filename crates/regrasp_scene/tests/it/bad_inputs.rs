@@ -99,8 +99,8 @@ fn another_format_version_or_task() {
         &["S105 scene.toml:1:10 key \"format\": is \"regrasp-plan\"", "\"regrasp-scene\""],
     );
     refused_with(
-        &with("format_version = 1", "format_version = 2"),
-        &["S105 scene.toml:2:18 key \"format_version\": is 2; expected 1"],
+        &with("format_version = 1", "format_version = 3"),
+        &["S105 scene.toml:2:18 key \"format_version\": is 3; expected 1 or 2"],
     );
     refused_with(
         &with("\"in_hand\"", "\"dual_arm\""),
@@ -113,8 +113,8 @@ fn gravity_that_is_no_direction() {
     let stated = |gravity: &str| with("task = \"in_hand\"\n", &format!("task = \"in_hand\"\ngravity = {gravity}\n"));
     refused(
         &stated("[0, 0.0, 0]"),
-        "S107 scene.toml:4:11 key \"gravity\": is the zero vector, which is no direction; expected a direction in the hand's \
-         frame, of any length, or \"any\"",
+        "S107 scene.toml:4:11 key \"gravity\": is the zero vector, which is no direction; expected a direction of any length, \
+         in the hand's frame (version 1) or the world's (version 2), or \"any\"",
     );
     refused_with(&stated("\"down\""), &["S104 scene.toml:4:11 key \"gravity\": is \"down\"", "\"any\""]);
     refused_with(&stated("9.81"), &["S103 scene.toml:4:11 key \"gravity\": is 9.81"]);
@@ -428,7 +428,7 @@ fn obstacles_of_one_name() {
     let obstacle = "\n[[obstacles]]\nname = \"wall\"\nbox = { size = [0.1, 0.1, 0.01] }\nposition = [0, 0, 0.5]\n";
     refused_with(
         &format!("{GOOD}{obstacle}{obstacle}"),
-        &["S112 scene.toml:25:1", "has the name \"wall\", as another obstacle"],
+        &["S112 scene.toml:25:1", "has the name \"wall\", as another body of the scene"],
     );
 }
 

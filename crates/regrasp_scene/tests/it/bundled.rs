@@ -254,8 +254,8 @@ fn scenes_of_finger_tracking_are_those_of_the_paper() {
         for (finger, contact) in scene.hands[0].hand.fingers.iter().zip(contacts) {
             let foot = scene.objects[0].surface.project(contact);
             assert!((foot.point_in_object - contact).norm() < 1e-8);
-            let center = query.start()
-                * (foot.point_in_object + foot.normal_in_object.into_inner() * finger.tip.radius());
+            let center =
+                query.start() * (foot.point_in_object + foot.normal_in_object.into_inner() * finger.tip.radius());
             let away = (finger.ik.tip(&finger.rest) - center).norm();
             // Those of the diamond rest where half of the turn is done.
             assert!(if name == "diamond" { away < 0.1 } else { away < 2e-6 }, "{name}: {away}");
