@@ -479,11 +479,16 @@ tracking = { rolling_finger = "once", face_changes = false }
         );
         // Of one kind of task only.
         let at = Path::new("suites/a.toml");
-        assert!(jobs[1].refuse_other_task(TaskKind::Tracking, at).is_ok());
-        let error = jobs[1].refuse_other_task(TaskKind::InHand, at).unwrap_err().to_string();
+        let loaded = |name: &str| {
+            let path = repository().join("scenes").join(name);
+            regrasp_scene::load_scene(&path, &Default::default()).unwrap_or_else(|error| panic!("{error}"))
+        };
+        let (turn, track) = (loaded("sphere_90x.toml"), loaded("football.toml"));
+        assert!(jobs[1].refuse_other_task(track.task(), at).is_ok());
+        let error = jobs[1].refuse_other_task(turn.task(), at).unwrap_err().to_string();
         assert!(error.contains("B603") && error.contains("T/once") && error.contains("tracking"), "{error}");
         let in_hand = Job { settings: InHandSettings::default(), ..jobs[0].clone() };
-        assert!(in_hand.refuse_other_task(TaskKind::Tracking, at).is_err());
+        assert!(in_hand.refuse_other_task(track.task(), at).is_err());
         let row = |job: &str, seed, status: &str| SuiteRow {
             job: job.into(),
             inputs: String::new(),

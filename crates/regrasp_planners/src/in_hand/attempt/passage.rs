@@ -84,14 +84,12 @@ mod tests {
     fn passages_of(name: &str) -> (Vec<WayOut>, Vec<Pose>) {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes").join(name);
         let loaded = load_scene(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
-        let poses = loaded.task.query(0).poses();
-        let model = Model::new(&loaded.scene, &PhysicsSettings::default());
-        let ways_out = poses
-            .windows(2)
-            .flat_map(|leg| {
-                Passages::of(&model, SearchSettings::default().wander_distance, [&leg[0], &leg[1]]).ways_out
-            })
-            .collect();
+        let poses = loaded.task().query(0).as_in_hand().unwrap().poses();
+        let view = loaded.view();
+        let model = Model::new(&view, &PhysicsSettings::default());
+        let ways_out = poses.windows(2).flat_map(|leg| {
+            Passages::of(&model, SearchSettings::default().wander_distance, [&leg[0], &leg[1]]).ways_out
+        }).collect();
         (ways_out, poses)
     }
 

@@ -70,14 +70,15 @@ mod tests {
     #[test]
     fn the_wide_hand_stands_back_by_what_its_urdf_says() {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/sphere_90x.toml");
-        let scene = regrasp_scene::load_scene(&path, &LoadOptions::default()).unwrap().scene;
+        let loaded = regrasp_scene::load_scene(&path, &LoadOptions::default()).unwrap();
+        let view = loaded.view();
         // Tips of 5 mm on capsules of 4 mm.
         for finger in &view.hand.fingers {
             assert!((stand_back(finger).unwrap() - 0.001).abs() < 1e-9);
         }
         let with = |wanted: FirstTry| {
             let settings = InHandSettings { first_try: Some(wanted), ..InHandSettings::default() };
-            first_tries(&scene, &settings, &Budget::work(1000))
+            first_tries(&view, &settings, &Budget::work(1000))
         };
         let (usual, wanted) = (InHandSettings::default(), FirstTry::default());
         assert!(with(FirstTry { closure_margin: 0.0, ..wanted }).is_empty());
