@@ -205,7 +205,7 @@ fn settings_error(path: &Path, line: usize, column: usize, problem: &str) -> Sto
 fn say_scene(loaded: &LoadedScene, seconds: f64, talk: &Talk) {
     let (scene, task) = (&loaded.scene, loaded.manipulation());
     let hand = task.hand();
-    let n_mimic = hand.robot.joints.iter().filter(|joint| joint.mimic.is_some()).count();
+    let n_mimic = hand.robot.joints.iter().filter(|joint| joint.coupling.is_some()).count();
     let n_shapes = hand.palm.len() + hand.fingers.iter().map(|finger| finger.shapes.len()).sum::<usize>();
     talk.say(format!(
         "hand   {}   {} ({n_mimic} mimic)   {}   {}   loaded in {}",

@@ -43,8 +43,9 @@ pub fn limits(model: &Model) -> MotionLimits {
         let leader = robot.joint_named(name)?;
         let own = robot.joints[leader.0].limits.and_then(|limits| limits.velocity);
         let coupled = robot.joints.iter().filter_map(|joint| {
-            let mimic = joint.mimic.filter(|mimic| mimic.joint == leader && mimic.multiplier != 0.0)?;
-            Some(joint.limits?.velocity? / mimic.multiplier.abs())
+            let coupling = joint.coupling.as_ref().filter(|coupling| coupling.multiplier(leader) != 0.0)?;
+            // All leaders may go at this speed at once.
+            Some(joint.limits?.velocity? / coupling.gain())
         });
         own.into_iter().chain(coupled).reduce(f64::min)
     };

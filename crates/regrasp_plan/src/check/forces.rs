@@ -173,9 +173,9 @@ fn check_promises(task: &Manipulation, model: &Model, promises: &ForcePromises, 
     if !(least >= 0.0 && least <= largest) {
         broken("normal_force", least, largest, format!("normal forces from {least} N to {largest} N"));
     }
-    for drive in model.drives.iter().filter(|drive| !drive.follows) {
-        let Some(effort) = drive.effort else { continue };
-        let promised = promises.joint_torques[drive.coordinate].unwrap_or(f64::INFINITY);
+    for drive in &model.drives {
+        let (Some(coordinate), Some(effort)) = (drive.own_coordinate(), drive.effort) else { continue };
+        let promised = promises.joint_torques[coordinate].unwrap_or(f64::INFINITY);
         if promised > effort * (1.0 + ROUNDING) {
             let message = format!("torque {promised} of joint \"{}\", the robot allows {effort}", drive.name);
             broken("joint_torques", promised, effort, message);
