@@ -158,7 +158,7 @@ fn refuse_arguments_of_in_hand(request: &Request) -> Result<(), Diagnostic> {
         Some((argument, _, why)) => Err(bad("A507", format!("is not for a task of kind \"tracking\": {why}"))
             .element("argument", argument)
             .expected("a task of kind \"in_hand\"")
-            .fix("leave it out; `settings` has all of tracking (docs/tracking.md)")),
+            .fix("leave it out; `settings` has all of tracking (docs/reference/tracking.md)")),
     }
 }
 
