@@ -119,9 +119,11 @@ fn refuse_flags_of_in_hand(search: &Search) -> Result<(), Stop> {
     ];
     match flags.into_iter().find(|(_, is_given, _)| *is_given) {
         None => Ok(()),
-        Some((flag, _, why)) => {
-            Err(not_for_tracking(flag, why, "leave it out; --settings has all of tracking (docs/tracking.md)"))
-        }
+        Some((flag, _, why)) => Err(not_for_tracking(
+            flag,
+            why,
+            "leave it out; --settings has all of tracking (docs/reference/tracking.md)",
+        )),
     }
 }
 

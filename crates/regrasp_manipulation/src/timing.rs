@@ -1,7 +1,7 @@
 //! When each waypoint is passed, and how fast.
 //!
 //! Between two waypoints every joint follows the cubic through its positions, velocities and times; the object follows the
-//! joints' motion along their chord (`docs/plan-format.md`, Time). Every segment goes from rest to rest.
+//! joints' motion along their chord (`docs/reference/plan-format.md`, Time). Every segment goes from rest to rest.
 //!
 //! - Directions ([`path`]): at a waypoint the joints go along the parabola through it and its neighbours. Where that leads too
 //!   far off the chords, which the search has tested, they go slower than the path, or stop.

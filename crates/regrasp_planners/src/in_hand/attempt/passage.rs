@@ -87,9 +87,12 @@ mod tests {
         let poses = loaded.task().query(0).as_in_hand().unwrap().poses();
         let view = loaded.view();
         let model = Model::new(&view, &PhysicsSettings::default());
-        let ways_out = poses.windows(2).flat_map(|leg| {
-            Passages::of(&model, SearchSettings::default().wander_distance, [&leg[0], &leg[1]]).ways_out
-        }).collect();
+        let ways_out = poses
+            .windows(2)
+            .flat_map(|leg| {
+                Passages::of(&model, SearchSettings::default().wander_distance, [&leg[0], &leg[1]]).ways_out
+            })
+            .collect();
         (ways_out, poses)
     }
 
