@@ -1,4 +1,4 @@
-//! What pyramids of four sides lose against the exact friction cones, in tracking: `docs/tracking.md` has the table.
+//! What pyramids of four sides lose against the exact friction cones, in tracking: `docs/reference/tracking.md` has the table.
 //!
 //!     cargo run --release -p regrasp_planners --example cones
 //!

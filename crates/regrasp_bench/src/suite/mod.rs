@@ -1,4 +1,4 @@
-//! Suites: the tables and figures of a paper, measured again. `docs/suite-format.md` says what a suite file may contain.
+//! Suites: the tables and figures of a paper, measured again. `docs/reference/suite-format.md` says what a suite file may contain.
 //!
 //! Codes: B600 not TOML or not the shape of a suite, B601 another format or version, B602 a value that makes no sense, B603
 //! settings of another kind of task than the scene's.
@@ -199,7 +199,8 @@ impl Suite {
         for figure in &self.figures {
             for curve in &figure.curves {
                 for &value in &figure.alpha {
-                    let settings = InHandSettings { alpha: Alpha::Constant { value }, ..curve.settings.clone() };
+                    let mut settings = curve.settings.clone();
+                    settings.baselines.alpha = Alpha::Constant { value };
                     jobs.push(job(figure.job_name(curve, value), curve, settings));
                 }
             }
@@ -290,7 +291,7 @@ pub fn read(path: &Path) -> Result<Suite, InputError> {
     let suite: Suite = toml::from_str(&text).map_err(|error| {
         let place = Place::at_offset(path, &text, error.span().map_or(0, |span| span.start));
         Diagnostic::new("B600", place, error.message().trim().replace('\n', "; "))
-            .expected("a suite file as in docs/suite-format.md")
+            .expected("a suite file as in docs/reference/suite-format.md")
     })?;
     if suite.format != FORMAT || suite.format_version != FORMAT_VERSION {
         let seen = format!("is \"{}\" version {}", suite.format, suite.format_version);

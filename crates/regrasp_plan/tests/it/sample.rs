@@ -9,8 +9,8 @@ use regrasp_plan::plan::{FORMAT, FORMAT_VERSION, MotionLimits, PlanInput, PoseDa
 use regrasp_plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
 use regrasp_robot::hand::PalmShape;
 use regrasp_robot::{
-    Chain, ChainJoint, Finger, FingerShape, Hand, Joint, JointId, JointKind, Limits, Link, LinkId, Motion, Robot, Tip,
-    TipShape,
+    Chain, ChainJoint, Coupling, Finger, FingerShape, Hand, Joint, JointId, JointKind, Limits, Link, LinkId, Motion,
+    Robot, Tip, TipShape,
 };
 use regrasp_scene::scene::InputFile;
 use regrasp_scene::{GraspRequest, InHandQuery, Manipulation, Object, Query, Scene, SceneHand, State, TrackingQuery};
@@ -88,7 +88,7 @@ fn robot() -> Robot {
                 parent_from_joint,
                 axis,
                 limits,
-                mimic: None,
+                coupling: None,
             });
             parent = child;
         }
@@ -108,9 +108,7 @@ fn hand() -> Hand {
                         parent_from_joint: joint.parent_from_joint,
                         axis: joint.axis,
                         motion: Motion::Turn,
-                        coordinate: j,
-                        multiplier: 1.0,
-                        offset: 0.0,
+                        drive: Coupling::independent(j),
                     }
                 })
                 .collect();

@@ -61,9 +61,13 @@ fn names_places_and_tasks_are_those_of_the_file() {
     assert_eq!(tasks, [("turn_ball", 0, 0), ("turn_box", 1, 1)]);
     assert_eq!(loaded.task_named("turn_box"), Some(&loaded.tasks[1]));
     assert_eq!(loaded.task_named("turn_lamp"), None);
+    assert_eq!(loaded.clone().choosing("turn_box").map(|chosen| chosen.task().clone()), Some(loaded.tasks[1].clone()));
     for (task, angle) in loaded.tasks.iter().zip([90f64, 45.0]) {
         let query = task.query(3);
-        assert_eq!((query.hand(), query.object(), query.task()), (task.hand, task.object, "in_hand"));
+        assert_eq!(
+            (query.name(), query.hand(), query.object(), query.task()),
+            (task.name.as_str(), task.hand, task.object, "in_hand")
+        );
         // Without [start] the object starts where it rests.
         assert_eq!(*query.start(), loaded.state.world_from_objects[task.object]);
         let turn = query.goal().rotation * query.start().rotation.inverse();
@@ -231,7 +235,7 @@ goal = { turn = { axis = "x", angle_deg = 90 } }
 "#;
     let (one, two) = (load(GOOD), load(text));
     assert_eq!((&one.tasks, &one.state), (&two.tasks, &two.state));
-    assert_eq!((one.task().name.as_str(), one.task().query(5)), ("in_hand", two.task().query(5)));
+    assert_eq!((one.task().name.as_str(), one.task().query(5)), ("", two.task().query(5)));
     assert_eq!((&one.scene.hands[0].name, one.view().obstacles.len()), (&two.scene.hands[0].name, 0));
     assert_eq!(two.view().hand_from_world(), None);
 }
@@ -240,7 +244,7 @@ goal = { turn = { axis = "x", angle_deg = 90 } }
 fn tasks_without_names_have_names_that_differ() {
     let names = |text: &str| load(text).tasks.into_iter().map(|task| task.name).collect::<Vec<_>>();
     let text = SCENE.replace("name = \"turn_ball\"\n", "").replace("name = \"turn_box\"\n", "");
-    assert_eq!(names(&text), ["in_hand", "in_hand_2"]);
+    assert_eq!(names(&text), ["task_1", "task_2"]);
 }
 
 #[test]
