@@ -9,7 +9,7 @@ use regrasp::planners::FailureKind;
 use regrasp::robot::import::{LoadOptions, OUT_OF_TIME, ResolveOptions};
 use regrasp::scene::query::IN_HAND;
 use regrasp::scene::{LoadedScene, Task, load_scene};
-use regrasp::{Failure, InHandSettings, InputError, PlannerSettings, Scene, TrackingSettings};
+use regrasp::{Failure, InHandSettings, InputError, PlannerSettings, TrackingSettings};
 use serde_json::json;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -39,12 +39,25 @@ pub fn scene(path: &Path, common: &Common, talk: &Talk) -> Result<LoadedScene, S
 pub fn scene_by(path: &Path, common: &Common, deadline: Option<Instant>, talk: &Talk) -> Result<LoadedScene, Stop> {
     let started = Instant::now();
     let loaded = load_scene(path, &LoadOptions { deadline, ..options(common) }).map_err(in_time_or_no_plan)?;
+    let loaded = match &common.task {
+        Some(name) => choose(loaded, name, path)?,
+        None => loaded,
+    };
     for note in &loaded.notes {
         talk.note(note);
     }
     let seconds = started.elapsed().as_secs_f64();
-    say_scene(&loaded.scene, seconds, talk);
+    say_scene(&loaded, seconds, talk);
     Ok(loaded)
+}
+
+/// The scene with the task asked for as its first. Errors: it has none of that name (`A508`).
+fn choose(loaded: LoadedScene, name: &str, path: &Path) -> Result<LoadedScene, Stop> {
+    let names: Vec<String> = loaded.tasks.iter().map(|task| format!("\"{}\"", task.name)).collect();
+    loaded.choosing(name).ok_or_else(|| {
+        let problem = format!("{} has no task \"{name}\"", path.display());
+        Stop::argument("A508", "--task", problem, &format!("one of {}", names.join(", ")))
+    })
 }
 
 /// Why reading stopped: bad input, or the time limit, within which no plan was found.
@@ -189,8 +202,9 @@ fn settings_error(path: &Path, line: usize, column: usize, problem: &str) -> Sto
 }
 
 /// Says what a scene is made of.
-fn say_scene(scene: &Scene, seconds: f64, talk: &Talk) {
-    let hand = &scene.hands[0].hand;
+fn say_scene(loaded: &LoadedScene, seconds: f64, talk: &Talk) {
+    let (scene, task) = (&loaded.scene, loaded.manipulation());
+    let hand = task.hand();
     let n_mimic = hand.robot.joints.iter().filter(|joint| joint.mimic.is_some()).count();
     let n_shapes = hand.palm.len() + hand.fingers.iter().map(|finger| finger.shapes.len()).sum::<usize>();
     talk.say(format!(
@@ -201,7 +215,7 @@ fn say_scene(scene: &Scene, seconds: f64, talk: &Talk) {
         counted(n_shapes, "collision shape"),
         duration(seconds),
     ));
-    let object = &scene.objects[0];
+    let object = task.object();
     talk.say(format!(
         "object {}   {}   {:.3} kg   friction {}",
         object.name,
@@ -209,8 +223,18 @@ fn say_scene(scene: &Scene, seconds: f64, talk: &Talk) {
         object.mass,
         object.friction
     ));
-    if !scene.obstacles.is_empty() {
-        talk.say(format!("world  {}", counted(scene.obstacles.len(), "obstacle")));
+    let others = [
+        (scene.hands.len() - 1, "other hand"),
+        (scene.objects.len() - 1, "other object"),
+        (scene.supports.len(), "support"),
+        (scene.obstacles.len(), "obstacle"),
+    ];
+    let others: Vec<String> = others.iter().filter(|(n, _)| *n > 0).map(|&(n, what)| counted(n, what)).collect();
+    if !others.is_empty() {
+        talk.say(format!("world  {}", others.join(", ")));
+    }
+    if loaded.tasks.len() > 1 {
+        talk.say(format!("task   \"{}\", one of {}", loaded.task().name, loaded.tasks.len()));
     }
     talk.event(
         "loaded",
@@ -222,6 +246,11 @@ fn say_scene(scene: &Scene, seconds: f64, talk: &Talk) {
             "object": object.name,
             "shape": object.shape.kind(),
             "obstacles": scene.obstacles.len(),
+            "task": loaded.task().name,
+            "tasks": loaded.tasks.iter().map(|task| task.name.as_str()).collect::<Vec<_>>(),
+            "hands": scene.hands.iter().map(|hand| hand.name.as_str()).collect::<Vec<_>>(),
+            "objects": scene.objects.iter().map(|object| object.name.as_str()).collect::<Vec<_>>(),
+            "supports": scene.supports.iter().map(|support| support.body.name.as_str()).collect::<Vec<_>>(),
             "seconds": seconds,
             "inputs": scene.inputs.iter().map(|input| json!({
                 "role": input.role, "name": input.name, "path": input.path, "sha256": input.sha256,

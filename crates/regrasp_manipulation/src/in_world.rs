@@ -7,8 +7,9 @@ use regrasp_plan::Plan;
 use regrasp_plan::plan::PoseData;
 use regrasp_scene::HandView;
 
-/// `plan`, made in the hand's frame, in the world.
-pub fn plan_in_world(view: &HandView, plan: Plan) -> Plan {
+/// `plan`, made in the hand's frame, in the world, as the answer to the query of this name.
+pub fn plan_in_world(view: &HandView, query: &str, plan: Plan) -> Plan {
+    let plan = Plan { query: query.to_owned(), ..plan };
     match view.hand_from_world() {
         Some(_) => plan_seen_from(&view.world_from_hand, plan),
         None => plan,

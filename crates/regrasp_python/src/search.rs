@@ -36,6 +36,7 @@ pub struct Request {
     improve_work: Option<u64>,
     settings: Option<String>,
     level: String,
+    task: Option<String>,
     progress: Option<Py<PyAny>>,
 }
 
@@ -43,10 +44,10 @@ pub struct Request {
 #[pyfunction]
 pub fn plan(py: Python<'_>, scene: &Scene, request: Request) -> PyResult<(Option<Plan>, String)> {
     guarded(py, || {
-        let task = scene.loaded.task();
+        let task = scene.task(py, request.task.as_deref())?;
         let level = level_named(&request.level).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
         let settings = settings(task, &request).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
-        let query = scene.loaded.task().query(request.seed);
+        let query = task.query(request.seed);
         let started = Instant::now();
         let seconds = |value: Option<f64>| value.map(Duration::from_secs_f64);
         let (deadline, improve_for) =
@@ -81,7 +82,7 @@ pub fn check(py: Python<'_>, plan: &Plan, scene: &Scene, level: &str) -> PyResul
     guarded(py, || {
         let level = level_named(level).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
         let judged = py.detach(|| {
-            let query = scene.loaded.task().query(plan.plan.seed);
+            let query = scene.loaded.task_for(&plan.plan.query).query(plan.plan.seed);
             let settings = CheckSettings { level, ..CheckSettings::default() };
             regrasp::plan::check::check((&scene.loaded.scene, &scene.loaded.state), Some(&query), &plan.plan, &settings)
         });
@@ -106,7 +107,7 @@ fn judged_as_written(
     let plan = format::from_json(Path::new("plan.json"), format::to_json(plan).as_bytes())
         .expect("a plan just made is a plan file");
     let again = scene.read_again()?;
-    let query = again.task().query(plan.seed);
+    let query = again.task_for(&plan.query).query(plan.seed);
     let settings = CheckSettings { level, ..CheckSettings::default() };
     let report = regrasp::plan::check::check((&again.scene, &again.state), Some(&query), &plan, &settings);
     Ok((plan, report))

@@ -24,11 +24,13 @@ mod searching;
 #[cfg(test)]
 mod sequence_tests;
 
-pub use crate::settings::{Alpha, CostWeights, FirstTry, InHandSettings, Method, ReleaseRule};
+pub use crate::settings::{
+    Alpha, BaselineSettings, CostWeights, FirstTry, ImprovementSettings, InHandSettings, Method, ReleaseRule, SearchSettings,
+};
 pub use recording::validate::{NotProven, validate_once};
 pub use regrasp_manipulation::ends::given::{MovedFinger, moved_fingers};
 pub use regrasp_manipulation::progress::Progress;
-pub use regrasp_manipulation::settings::{ForceSettings, SpeedSettings, TransferMode};
+pub use regrasp_manipulation::settings::{ForceSettings, PhysicsSettings, SpeedSettings, TransferMode};
 
 use attempt::search::{Context, Search, Stop};
 use attempt::tally::Reason;
@@ -75,7 +77,7 @@ pub fn plan_in_hand(
     let seen = view.hand_from_world().map(|hand_from_world| query.seen_from(&hand_from_world));
     let asked = Asked { view, query: seen.as_ref().unwrap_or(query), seed, progress };
     let found = plan_in_hand_frame(&asked, settings, budget);
-    found.map(|plan| plan_in_world(view, plan)).map_err(|failure| failure_in_world(view, failure))
+    found.map(|plan| plan_in_world(view, &query.name, plan)).map_err(|failure| failure_in_world(view, failure))
 }
 
 /// As [`plan_in_hand`], with the query and the answer in the hand's frame.

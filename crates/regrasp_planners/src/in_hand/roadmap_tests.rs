@@ -32,9 +32,11 @@ pub(super) fn with_search(name: &str, test: impl FnOnce(&mut Search)) {
 /// The same with other settings.
 pub(super) fn with_settings(name: &str, settings: &InHandSettings, test: impl FnOnce(&mut Search)) {
     let loaded = scene(name);
-    let model = Model::new(&loaded.scene, &crate::in_hand::effective(settings));
-    let query = loaded.task.query(0);
-    let poses = [query.world_from_object_start, query.world_from_object_goal];
+    let view = loaded.view();
+    let settings = &crate::in_hand::effective(settings).within(&view.limits);
+    let model = Model::new(&view, &settings.physics);
+    let poses = loaded.task().query(0).poses();
+    let poses = [poses[0], poses[poses.len() - 1]];
     let (budget, winner) = (Budget::unlimited(), AtomicUsize::new(usize::MAX));
     let (winner, progress) = (&winner, &|_| {});
     let context = Context { model: &model, settings, seed: 0, budget: &budget, winner, progress };

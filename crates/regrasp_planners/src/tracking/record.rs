@@ -162,6 +162,7 @@ fn tracking_segment(model: &Model, roles: &Roles, waypoints: Vec<Waypoint>) -> S
         kind: SegmentKind::Tracking,
         moving_finger: moving.next(),
         also_moving: moving.collect(),
+        held_by: Vec::new(),
         rolling_finger: Some(name(roles.rolling)),
         waypoints,
     }

@@ -1,5 +1,6 @@
 //! How far tips may be from where they rest, and what is said where nothing is found.
 
+use regrasp_planners::in_hand::PhysicsSettings;
 use crate::in_hand_methods::scene;
 use regrasp_base::Budget;
 use regrasp_plan::check::{CheckSettings, check};
@@ -89,7 +90,7 @@ fn what_is_advised_is_what_was_short_and_friction_is_that_of_the_scene() {
         .unwrap();
     let joints = plan.segments[0].waypoints[0].joints.clone();
     let query = InHandQuery { start_grasp: GraspRequest::Joints(joints), ..query };
-    let strict = InHandSettings { closure_margin: 0.9, ..settings };
+    let strict = InHandSettings { physics: PhysicsSettings { closure_margin: 0.9, ..settings.physics }, ..settings };
     let failure = plan_in_hand(&loaded.view(), query.as_in_hand().unwrap(), &strict, 0, &Budget::work(1000), &|_| {})
         .unwrap_err();
     assert!(failure.message.ends_with("at friction 0.8 of the scene over a margin of 1.5"), "{failure}");

@@ -42,7 +42,7 @@ pub(super) fn one_hand(root: &mut Table, files: &mut Files, found: &mut Found) -
     let inner = hand.as_ref().map(|hand| &hand.hand);
     let start = task::start(root, inner, None, found);
     let kind = kind.unwrap_or(TaskKind::InHand);
-    let heading = Heading { name: kind.name().to_owned(), kind, hand: 0, object: 0 };
+    let heading = Heading { name: String::new(), kind, hand: 0, object: 0 };
     let task = task::task(root, heading, start, inner, found);
     if let (Some(hand), Some(object), Some(entry)) = (&hand, &object, &object_entry) {
         units::check_sizes(&hand.hand, object, entry, found);
@@ -82,7 +82,8 @@ pub(super) fn several(root: &mut Table, files: &mut Files, found: &mut Found) ->
     let mut tasks = Vec::new();
     for (index, entry) in entries.iter().enumerate() {
         let Some(mut table) = entry.table(found) else { continue };
-        let task = task_of(&mut table, index, &hands, &objects, found);
+        let default_name = if entries.len() == 1 { String::new() } else { format!("task_{}", index + 1) };
+        let task = task_of(&mut table, default_name, &hands, &objects, found);
         table.finish(found);
         let Some(task) = task else { continue };
         task_names.add(&task.name, entry, found);
@@ -142,13 +143,12 @@ fn objects(root: &mut Table, names: &mut Names, files: &mut Files, found: &mut F
 /// One of `[[tasks]]`.
 fn task_of(
     table: &mut Table,
-    index: usize,
+    default_name: String,
     hands: &[SceneHand],
     objects: &[(Object, Pose)],
     found: &mut Found,
 ) -> Option<Task> {
     let kind = task_kind(table, found)?;
-    let default_name = if index == 0 { kind.name().to_owned() } else { format!("{}_{}", kind.name(), index + 1) };
     let name = table.optional("name").map_or(Some(default_name), |entry| entry.name(found).map(str::to_owned));
     let hand_names: Vec<&str> = hands.iter().map(|hand| hand.name.as_str()).collect();
     let object_names: Vec<&str> = objects.iter().map(|(object, _)| object.name.as_str()).collect();

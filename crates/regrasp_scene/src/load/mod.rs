@@ -71,6 +71,27 @@ impl LoadedScene {
         self.tasks.iter().find(|task| task.name == name)
     }
 
+    /// The task of a plan for the query called `name`: the one of that name, else the first.
+    pub fn task_for(&self, name: &str) -> &Task {
+        self.task_named(name).unwrap_or(self.task())
+    }
+
+    /// The same scene with the task of a plan for the query called `name` as its first.
+    #[must_use]
+    pub fn for_query(self, name: &str) -> Self {
+        match self.task_named(name) {
+            Some(_) => self.choosing(name).expect("the scene has a task of this name"),
+            None => self,
+        }
+    }
+
+    /// The same scene with the task called `name` as its first; none where it has none of that name.
+    pub fn choosing(mut self, name: &str) -> Option<Self> {
+        let index = self.tasks.iter().position(|task| task.name == name)?;
+        self.tasks[..=index].rotate_right(1);
+        Some(self)
+    }
+
     /// The hand and the object of `task`, among everything else.
     pub fn manipulation_of(&self, task: &Task) -> Manipulation<'_> {
         let (hand_index, object_index) = (task.hand, task.object);

@@ -64,7 +64,7 @@ fn obstacle(index: usize, shape: Shape, position: Vector, rng: &mut Rng) -> Obst
 fn scene_with(n_obstacles: usize, rng: &mut Rng) -> LoadedScene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/box_90x.toml");
     let mut loaded = load_scene(&path, &LoadOptions::default()).unwrap();
-    loaded.view.obstacles = (0..n_obstacles).map(|index| random_obstacle(index, rng)).collect();
+    loaded.scene.obstacles = (0..n_obstacles).map(|index| random_obstacle(index, rng)).collect();
     loaded
 }
 
@@ -192,8 +192,9 @@ struct Met {
 fn compare(n_obstacles: usize, n_questions: usize, index: u64, met: &mut Met) -> Vec<(bool, u64)> {
     let mut rng = Rng::keyed(7, "nearby", index);
     let loaded = scene_with(n_obstacles, &mut rng);
-    let model = Model::new(&loaded.scene, &PhysicsSettings::default());
-    let joints: HandJoints = loaded.scene.hand.fingers.iter().map(|f| f.rest.iter().copied().collect()).collect();
+    let view = loaded.view();
+    let model = Model::new(&view, &PhysicsSettings::default());
+    let joints: HandJoints = view.hand.fingers.iter().map(|f| f.rest.iter().copied().collect()).collect();
     let contact = Contact { point_in_object: Point::origin(), normal_in_object: Vector::z_axis() };
     let contacts: Contacts = joints.iter().map(|_| contact).collect();
     let home = Pose::translation(0.0, 0.0, 0.16);
@@ -273,7 +274,8 @@ fn the_first_obstacle_in_the_way_of_the_object_is_named() {
     for (index, n_obstacles) in [1, 10, 40].into_iter().enumerate() {
         let mut rng = Rng::keyed(9, "nearby", index as u64);
         let loaded = scene_with(n_obstacles, &mut rng);
-        let model = Model::new(&loaded.scene, &PhysicsSettings::default());
+        let view = loaded.view();
+        let model = Model::new(&view, &PhysicsSettings::default());
         let shapes = reference_bodies(&model.bodies);
         let object = shapes[model.object].as_ref().unwrap();
         for _ in 0..300 {
@@ -316,9 +318,10 @@ fn obstacles_that_touch_the_clearance_are_judged_as_by_testing_all() {
     let mut n_blocked = 0;
     let bare = scene_with(0, &mut rng);
     let settings = PhysicsSettings::default();
-    let model = Model::new(&bare.scene, &settings);
+    let view = bare.view();
+    let model = Model::new(&view, &settings);
     let mut workspace = Workspace::new(&model);
-    let joints: HandJoints = bare.view.hand.fingers.iter().map(|f| f.rest.iter().copied().collect()).collect();
+    let joints: HandJoints = view.hand.fingers.iter().map(|f| f.rest.iter().copied().collect()).collect();
     let contacts = Contacts::new();
     let home = Pose::translation(0.0, 0.0, 0.16);
     workspace.set_held(&home, &joints, &contacts, 0);
@@ -333,8 +336,9 @@ fn obstacles_that_touch_the_clearance_are_judged_as_by_testing_all() {
         let away = radius + size + settings.clearance + off;
         let position = workspace.now.at(&model, body).point(center).coords + Vector::from(rng.direction()) * away;
         let mut loaded = bare.clone();
-        loaded.view.obstacles = vec![obstacle(0, Shape::Sphere { radius: size }, position, &mut rng)];
-        let model = Model::new(&loaded.scene, &settings);
+        loaded.scene.obstacles = vec![obstacle(0, Shape::Sphere { radius: size }, position, &mut rng)];
+        let view = loaded.view();
+        let model = Model::new(&view, &settings);
         let (mut culled, mut all) = (Workspace::new(&model), Workspace::new(&model));
         look_at_all(&mut all);
         for workspace in [&mut culled, &mut all] {

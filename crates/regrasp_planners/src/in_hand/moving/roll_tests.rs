@@ -1,5 +1,6 @@
 //! Rolling fingertips against the velocity constraint, integrated another way.
 
+use crate::in_hand::PhysicsSettings;
 use super::*;
 use crate::in_hand::attempt::search::Search;
 use crate::in_hand::grasps::sample::draw_state;
@@ -12,7 +13,7 @@ use regrasp_manipulation::grasp::sequence::Motion;
 use regrasp_manipulation::settings::TransferMode;
 
 fn rolling() -> InHandSettings {
-    InHandSettings { transfer: TransferMode::Rolling, ..InHandSettings::default() }
+    InHandSettings { physics: PhysicsSettings { transfer: TransferMode::Rolling, ..PhysicsSettings::default() }, ..InHandSettings::default() }
 }
 
 /// A pose a few steps away.

@@ -101,6 +101,7 @@ impl<'a> RoadmapPlanner<'a> {
             }
         };
         InHandQuery {
+            name: String::new(),
             hand: self.model.view.hand_index,
             object: self.model.view.object_index,
             world_from_object_start: draw("random_start"),
@@ -123,7 +124,7 @@ impl<'a> RoadmapPlanner<'a> {
         let seen = view.hand_from_world().map(|hand_from_world| query.seen_from(&hand_from_world));
         let found = self.plan_in_hand_frame(seen.as_ref().unwrap_or(query), seed, budget, memory);
         found
-            .map(|answer| Answer { plan: plan_in_world(view, answer.plan), ..answer })
+            .map(|answer| Answer { plan: plan_in_world(view, &query.name, answer.plan), ..answer })
             .map_err(|failure| failure_in_world(view, failure))
     }
 

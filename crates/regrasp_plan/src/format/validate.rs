@@ -1,164 +1,69 @@
-//! Reading and writing `plan.json`, and its JSON Schema. `docs/plan-format.md` describes the file.
+//! What a plan file may not say.
 
-use crate::plan::{
-    ContactMode, ContactState, FORMAT, FORMAT_VERSION, ForcePromises, Plan, PoseData, Segment, SegmentKind,
-};
+use super::caps;
+use super::locate::{Step, locate};
+use crate::plan::{ContactMode, ContactState, FORMAT_VERSION, ForcePromises, Plan, PoseData, Segment, SegmentKind};
 use regrasp_base::diagnostic::{Diagnostics, GOOD_NAME, fault_of_name, number};
 use regrasp_base::{Diagnostic, InputError, Place};
-use serde::Deserialize;
-use std::fmt::Write as _;
 use std::path::Path;
-
-/// Largest numbers of things in a plan file, so that a hostile file is refused before it costs anything.
-mod caps {
-    pub const BYTES: u64 = regrasp_base::files::MAX_FILE_BYTES;
-    pub const JOINTS: usize = 1_000;
-    pub const FINGERS: usize = 64;
-    pub const INPUTS: usize = 10_000;
-    pub const SEGMENTS: usize = 100_000;
-    pub const WAYPOINTS: usize = 2_000_000;
-    pub const WAY_POSES: usize = 10_000;
-    /// Largest position, in metres or radians.
-    pub const POSITION: f64 = 1e6;
-    /// Largest time, velocity, acceleration, force, torque or mass.
-    pub const SIZE: f64 = 1e9;
-}
 
 /// How far a quaternion's or a normal's length may be from one.
 const UNIT_TOLERANCE: f64 = 1e-9;
 
-/// `plan` as the bytes of a plan file: the same plan gives the same bytes; numbers are the shortest that read back
-/// the same; every waypoint stands on a line of its own.
-///
-/// Panics if the plan holds a NaN or an infinity, which JSON cannot express.
-pub fn to_json(plan: &Plan) -> String {
-    assert!(all_numbers(plan).all(f64::is_finite), "a plan with a number that is not finite cannot be written");
-    fn compact<T: serde::Serialize>(value: &T) -> String {
-        serde_json::to_string(value).expect("plan types always serialise")
-    }
-    let mut out = String::from("{\n");
-    let mut field = |name: &str, value: String| {
-        let _ = writeln!(out, "  \"{name}\": {value},");
-    };
-    field("format", compact(&plan.format));
-    field("format_version", compact(&plan.format_version));
-    field("tool", compact(&plan.tool));
-    field("task", compact(&plan.task));
-    field("method", compact(&plan.method));
-    field("seed", compact(&plan.seed));
-    field("settings", compact(&plan.settings));
-    let inputs: Vec<String> = plan.inputs.iter().map(|input| format!("    {}", compact(input))).collect();
-    field("inputs", if inputs.is_empty() { "[]".into() } else { format!("[\n{}\n  ]", inputs.join(",\n")) });
-    field("promises", compact(&plan.promises));
-    field("joint_names", compact(&plan.joint_names));
-    field("fingers", compact(&plan.fingers));
-    field("start", compact(&plan.start));
-    if !plan.way_poses.is_empty() {
-        let way_poses: Vec<String> = plan.way_poses.iter().map(|pose| format!("    {}", compact(pose))).collect();
-        field("way_poses", format!("[\n{}\n  ]", way_poses.join(",\n")));
-    }
-    field("goal", compact(&plan.goal));
-    field("statistics", compact(&plan.statistics));
-    out.push_str("  \"segments\": [");
-    for (i, segment) in plan.segments.iter().enumerate() {
-        out.push_str(if i == 0 { "\n" } else { ",\n" });
-        let _ = write!(out, "    {{\"kind\": {}, ", compact(&segment.kind));
-        if let Some(finger) = &segment.moving_finger {
-            let _ = write!(out, "\"moving_finger\": {}, ", compact(finger));
-        }
-        if !segment.also_moving.is_empty() {
-            let _ = write!(out, "\"also_moving\": {}, ", compact(&segment.also_moving));
-        }
-        if let Some(finger) = &segment.rolling_finger {
-            let _ = write!(out, "\"rolling_finger\": {}, ", compact(finger));
-        }
-        out.push_str("\"waypoints\": [");
-        for (j, waypoint) in segment.waypoints.iter().enumerate() {
-            out.push_str(if j == 0 { "\n      " } else { ",\n      " });
-            out.push_str(&compact(waypoint));
-        }
-        out.push_str("\n    ]}");
-    }
-    out.push_str("\n  ]\n}\n");
-    out
-}
-
-/// Reads a plan from `bytes`, which came from `path`.
-///
-/// Errors, with line and column: not JSON or not the shape of a plan (`C401`), another format (`C402`), another version
-/// (`C403`), vectors of the wrong length (`C404`), a quaternion or normal that is not of length one (`C405`), no
-/// motion (`C406`), a contact that lacks something or has too much (`C407`), a name used twice or unknown (`C408`), a
-/// number that makes no sense (`C409`), too much of something (`C410`).
-pub fn from_json(path: &Path, bytes: &[u8]) -> Result<Plan, InputError> {
-    if bytes.len() as u64 > caps::BYTES {
-        let problem = format!("has {} bytes, more than the limit of {}", bytes.len(), caps::BYTES);
-        return Err(Diagnostic::new("C410", Place::file(path), problem).into());
-    }
-    let text = regrasp_base::files::text_of(path, bytes.to_vec())?;
-    check_header(path, &text)?;
-    let plan: Plan = serde_json::from_str(&text).map_err(|error| syntax_error(path, &error))?;
-    let mut reader = Reader { path, text: &text, found: Diagnostics::default() };
+/// `plan`, which `text` of version `version` says, if nothing is wrong with it.
+pub(super) fn validate(path: &Path, text: &str, version: u32, plan: Plan) -> Result<Plan, InputError> {
+    let mut reader = Reader { path, text, version, plan: &plan, found: Diagnostics::default() };
     reader.validate(&plan);
-    reader.found.into_result(plan)
+    let found = reader.found;
+    found.into_result(plan)
 }
 
-/// The JSON Schema of a plan file, as pretty JSON: the content of `schema/plan.schema.json`.
-pub fn schema() -> String {
-    let schema = schemars::schema_for!(Plan);
-    let mut text = serde_json::to_string_pretty(&schema).expect("a schema always serialises");
-    text.push('\n');
-    text
+/// A diagnostic about the value that `steps` lead to.
+pub(super) fn diagnostic(path: &Path, text: &str, code: &'static str, steps: &[Step], problem: String) -> Diagnostic {
+    let offset = locate(text, steps).unwrap_or(0);
+    let name: String = steps
+        .iter()
+        .map(|step| match step {
+            Step::Key(key) => format!(".{key}"),
+            Step::Index(index) => format!("[{index}]"),
+        })
+        .collect();
+    Diagnostic::new(code, Place::at_offset(path, text, offset), problem).element("key", name.trim_start_matches('.'))
 }
 
-fn syntax_error(path: &Path, error: &serde_json::Error) -> Diagnostic {
-    let place =
-        Place { file: path.to_owned(), line: Some(error.line() as u32), column: Some(error.column().max(1) as u32) };
-    let message = error.to_string();
-    // serde_json repeats the place at the end of its message.
-    let problem = message.rsplit_once(" at line ").map_or(message.as_str(), |(problem, _)| problem);
-    Diagnostic::new("C401", place, problem).expected("a plan file as in schema/plan.schema.json")
-}
-
-/// Format and version first: their message helps more than the first key that a later version has and this one not.
-fn check_header(path: &Path, text: &str) -> Result<(), InputError> {
-    #[derive(Deserialize)]
-    struct Header {
-        #[serde(default)]
-        format: Option<serde_json::Value>,
-        #[serde(default)]
-        format_version: Option<serde_json::Value>,
+/// Where a file of version 3 has what the plan has at `steps`.
+fn in_file<'a>(plan: &Plan, steps: &[Step<'a>]) -> Vec<Step<'a>> {
+    use Step::{Index, Key};
+    match steps {
+        [Key(key @ ("joint_names" | "fingers")), rest @ ..] => [&[Key("hands"), Index(0), Key(key)], rest].concat(),
+        [Key("segments"), Index(s), Key("moving_finger"), rest @ ..] => {
+            [&[Key("segments"), Index(*s), Key("moving"), Index(0)], rest].concat()
+        }
+        [Key("segments"), Index(s), Key("also_moving"), Index(i)] => {
+            vec![Key("segments"), Index(*s), Key("moving"), Index(i + 1)]
+        }
+        [Key("segments"), Index(s), Key("waypoints"), Index(w), Key(key), rest @ ..] => {
+            let at = [Key("segments"), Index(*s), Key("waypoints"), Index(*w)];
+            match (*key, rest) {
+                ("world_from_object", _) => [&at[..], &[Key("world_from_objects"), Index(0)], rest].concat(),
+                ("contacts", [Index(finger), rest @ ..]) => {
+                    // Free fingers have no entry.
+                    let contacts = &plan.segments[*s].waypoints[*w].contacts;
+                    let before = contacts.iter().take(*finger).filter(|state| **state != ContactState::FREE).count();
+                    [&at[..], &[Key("contacts"), Index(before)], rest].concat()
+                }
+                _ => [&at[..], &[Key(key)], rest].concat(),
+            }
+        }
+        _ => steps.to_vec(),
     }
-    let header: Header = serde_json::from_str(text).map_err(|error| syntax_error(path, &error))?;
-    let place = |key| locate(text, &[Step::Key(key)]).unwrap_or(0);
-    if header.format.as_ref().and_then(|value| value.as_str()) != Some(FORMAT) {
-        let seen = header.format.map_or("is missing".to_owned(), |value| format!("is {value}"));
-        return Err(Diagnostic::new("C402", Place::at_offset(path, text, place("format")), seen)
-            .element("key", "format")
-            .expected(format!("\"{FORMAT}\""))
-            .fix("give a file that `regrasp plan` wrote")
-            .into());
-    }
-    if header.format_version.as_ref().and_then(serde_json::Value::as_u64) != Some(u64::from(FORMAT_VERSION)) {
-        let seen = header.format_version.map_or("is missing".to_owned(), |value| format!("is {value}"));
-        return Err(Diagnostic::new("C403", Place::at_offset(path, text, place("format_version")), seen)
-            .element("key", "format_version")
-            .expected(FORMAT_VERSION.to_string())
-            .fix("use a version of regrasp that reads it, or plan again")
-            .into());
-    }
-    Ok(())
-}
-
-/// A step into a JSON document.
-#[derive(Debug, Clone, Copy)]
-enum Step<'a> {
-    Key(&'a str),
-    Index(usize),
 }
 
 struct Reader<'a> {
     path: &'a Path,
     text: &'a str,
+    version: u32,
+    plan: &'a Plan,
     found: Diagnostics,
 }
 
@@ -168,17 +73,8 @@ impl Reader<'_> {
         if self.found.counted_only() {
             return;
         }
-        let offset = locate(self.text, steps).unwrap_or(0);
-        let mut diagnostic = Diagnostic::new(code, Place::at_offset(self.path, self.text, offset), problem);
-        let name: String = steps
-            .iter()
-            .map(|step| match step {
-                Step::Key(key) => format!(".{key}"),
-                Step::Index(index) => format!("[{index}]"),
-            })
-            .collect();
-        diagnostic = diagnostic.element("key", name.trim_start_matches('.')).expected(expected);
-        self.found.push(diagnostic);
+        let steps = if self.version == FORMAT_VERSION { in_file(self.plan, steps) } else { steps.to_vec() };
+        self.found.push(diagnostic(self.path, self.text, code, &steps, problem).expected(expected));
     }
 
     fn validate(&mut self, plan: &Plan) {
@@ -195,6 +91,12 @@ impl Reader<'_> {
             if seen > limit {
                 self.fail("C410", &[Key(key)], format!("has {seen} entries"), format!("at most {limit}"));
                 return;
+            }
+        }
+        for (key, name) in [("hands", &plan.hand), ("objects", &plan.object), ("query", &plan.query)] {
+            // Plans of version 2 name no object, and most plans no query.
+            if let Some(fault) = fault_of_name(name).filter(|_| !name.is_empty()) {
+                self.fail("V004", &[Key(key)], fault, GOOD_NAME.into());
             }
         }
         for (key, names) in [("joint_names", &plan.joint_names), ("fingers", &plan.fingers)] {
@@ -446,107 +348,6 @@ impl Reader<'_> {
         }
         if pose.position.iter().any(|x| x.abs() > caps::POSITION) {
             self.fail("C409", steps, format!("has position {:?}", pose.position), "metres".into());
-        }
-    }
-}
-
-/// Every floating-point number of the plan.
-fn all_numbers(plan: &Plan) -> impl Iterator<Item = f64> + '_ {
-    let way = plan.way_poses.iter().flat_map(|way_pose| way_pose.world_from_object.numbers());
-    let waypoints = plan.segments.iter().flat_map(|segment| &segment.waypoints).flat_map(crate::Waypoint::numbers);
-    plan.promises.numbers().chain(plan.start.numbers()).chain(way).chain(plan.goal.numbers()).chain(waypoints)
-}
-
-/// Byte offset of the value that `steps` lead to. `text` is valid JSON, or nothing is found.
-fn locate(text: &str, steps: &[Step]) -> Option<usize> {
-    let mut cursor = Cursor { bytes: text.as_bytes(), at: 0 };
-    cursor.skip_space();
-    for step in steps {
-        match step {
-            Step::Key(wanted) => {
-                cursor.expect(b'{')?;
-                loop {
-                    cursor.skip_space();
-                    let key = cursor.string()?;
-                    cursor.skip_space();
-                    cursor.expect(b':')?;
-                    cursor.skip_space();
-                    if key == wanted.as_bytes() {
-                        break;
-                    }
-                    cursor.skip_value()?;
-                    cursor.skip_space();
-                    cursor.expect(b',')?;
-                }
-            }
-            Step::Index(wanted) => {
-                cursor.expect(b'[')?;
-                for _ in 0..*wanted {
-                    cursor.skip_space();
-                    cursor.skip_value()?;
-                    cursor.skip_space();
-                    cursor.expect(b',')?;
-                }
-                cursor.skip_space();
-            }
-        }
-    }
-    Some(cursor.at)
-}
-
-/// Walks over JSON text that a real parser has already accepted.
-struct Cursor<'a> {
-    bytes: &'a [u8],
-    at: usize,
-}
-
-impl<'a> Cursor<'a> {
-    fn peek(&self) -> Option<u8> {
-        self.bytes.get(self.at).copied()
-    }
-
-    fn skip_space(&mut self) {
-        while self.peek().is_some_and(|b| b.is_ascii_whitespace()) {
-            self.at += 1;
-        }
-    }
-
-    fn expect(&mut self, byte: u8) -> Option<()> {
-        (self.peek()? == byte).then(|| self.at += 1)
-    }
-
-    fn string(&mut self) -> Option<&'a [u8]> {
-        self.expect(b'"')?;
-        let from = self.at;
-        while self.peek()? != b'"' {
-            self.at += if self.peek()? == b'\\' { 2 } else { 1 };
-        }
-        self.at += 1;
-        self.bytes.get(from..self.at - 1)
-    }
-
-    fn skip_value(&mut self) -> Option<()> {
-        let mut depth = 0usize;
-        loop {
-            match self.peek()? {
-                b'"' => {
-                    self.string()?;
-                }
-                b'{' | b'[' => {
-                    depth += 1;
-                    self.at += 1;
-                }
-                b'}' | b']' if depth == 0 => return Some(()),
-                b'}' | b']' => {
-                    depth -= 1;
-                    self.at += 1;
-                }
-                b',' if depth == 0 => return Some(()),
-                _ => self.at += 1,
-            }
-            if depth == 0 && matches!(self.peek()?, b',' | b'}' | b']') {
-                return Some(());
-            }
         }
     }
 }
