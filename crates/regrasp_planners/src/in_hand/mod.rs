@@ -25,7 +25,8 @@ mod searching;
 mod sequence_tests;
 
 pub use crate::settings::{
-    Alpha, BaselineSettings, CostWeights, FirstTry, ImprovementSettings, InHandSettings, Method, ReleaseRule, SearchSettings,
+    Alpha, BaselineSettings, CostWeights, FirstTry, ImprovementSettings, InHandSettings, Method, ReleaseRule,
+    SearchSettings,
 };
 pub use recording::validate::{NotProven, validate_once};
 pub use regrasp_manipulation::ends::given::{MovedFinger, moved_fingers};

@@ -35,8 +35,8 @@ pub(super) fn with_settings(name: &str, settings: &InHandSettings, test: impl Fn
     let view = loaded.view();
     let settings = &crate::in_hand::effective(settings).within(&view.limits);
     let model = Model::new(&view, &settings.physics);
-    let poses = loaded.task().query(0).poses();
-    let poses = [poses[0], poses[poses.len() - 1]];
+    let query = loaded.task().query(0);
+    let poses = [*query.start(), *query.goal()];
     let (budget, winner) = (Budget::unlimited(), AtomicUsize::new(usize::MAX));
     let (winner, progress) = (&winner, &|_| {});
     let context = Context { model: &model, settings, seed: 0, budget: &budget, winner, progress };

@@ -1,18 +1,21 @@
 //! Better plans after the first: never worse, accepted, the same on any number of threads, cut at any moment.
 
-use regrasp_planners::in_hand::ImprovementSettings;
 use crate::in_hand_methods::scene;
 use regrasp_base::Budget;
 use regrasp_geometry::{Pose, frame, interpolate_pose};
 use regrasp_plan::check::{CheckSettings, Level, check};
 use regrasp_plan::plan::{Improvement, Waypoint};
 use regrasp_plan::{Plan, SegmentKind};
+use regrasp_planners::in_hand::ImprovementSettings;
 use regrasp_planners::in_hand::{CostWeights, InHandSettings, Method, plan_in_hand, validate_once};
 use regrasp_scene::{GraspRequest, InHandQuery, LoadedScene};
 use std::time::Duration;
 
 fn settings(improve_work: u64) -> InHandSettings {
-    InHandSettings { improvement: ImprovementSettings { improve_work, ..InHandSettings::plain().improvement }, ..InHandSettings::plain() }
+    InHandSettings {
+        improvement: ImprovementSettings { improve_work, ..InHandSettings::plain().improvement },
+        ..InHandSettings::plain()
+    }
 }
 
 /// Plans, and has the plan judged.
@@ -170,7 +173,15 @@ fn the_weights_decide_what_is_better() {
     let query = loaded.task().query(5);
     let margins = CostWeights { margin: 20.0, ..CostWeights::default() };
     let tight = plan(&loaded, &query, &settings(300_000), 5);
-    let wide = plan(&loaded, &query, &InHandSettings { improvement: ImprovementSettings { cost: margins, ..settings(300_000).improvement }, ..settings(300_000) }, 5);
+    let wide = plan(
+        &loaded,
+        &query,
+        &InHandSettings {
+            improvement: ImprovementSettings { cost: margins, ..settings(300_000).improvement },
+            ..settings(300_000)
+        },
+        5,
+    );
     assert!(improvement(&wide).improved.kept_margin > improvement(&wide).first.kept_margin, "{:?}", improvement(&wide));
     assert!(improvement(&tight).improved.relocations < improvement(&tight).first.relocations);
 }

@@ -1,6 +1,5 @@
 //! Forces, torques, times and velocities of plans, substituted into what they have to satisfy.
 
-use regrasp_planners::in_hand::PhysicsSettings;
 use crate::in_hand_methods::scene;
 use crate::places::shared_models;
 use crate::soft_and_coupled;
@@ -12,13 +11,21 @@ use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, Level, check};
 use regrasp_plan::plan::{SegmentKind, Waypoint};
 use regrasp_planners::Failure;
+use regrasp_planners::in_hand::PhysicsSettings;
 use regrasp_planners::in_hand::{ForceSettings, InHandSettings, plan_in_hand};
 use regrasp_scene::{Gravity, Limits, LoadedScene, Scene};
 
 const SCENES: [&str; 4] = ["sphere_90x.toml", "box_90x.toml", "soft_pair_roll.toml", "shadow/sphere32_z.toml"];
 
 fn settings() -> InHandSettings {
-    InHandSettings { physics: PhysicsSettings { friction_margin: 1.5, forces: Some(ForceSettings::default()), ..PhysicsSettings::default() }, ..InHandSettings::default() }
+    InHandSettings {
+        physics: PhysicsSettings {
+            friction_margin: 1.5,
+            forces: Some(ForceSettings::default()),
+            ..PhysicsSettings::default()
+        },
+        ..InHandSettings::default()
+    }
 }
 
 fn plan_with(loaded: &LoadedScene, settings: &InHandSettings, seed: u64) -> Result<Plan, Failure> {
@@ -339,7 +346,10 @@ fn without_forces_there_is_no_plan_and_the_cause_is_named() {
     );
     assert!(causes.contains(" would need more than 1 N m"), "{causes}");
     let weak = ForceSettings { torque_share: 0.1, ..ForceSettings::default() };
-    let (causes, advice) = fails(&scene("sphere_90x.toml"), &InHandSettings { physics: PhysicsSettings { forces: Some(weak), ..settings().physics }, ..settings() });
+    let (causes, advice) = fails(
+        &scene("sphere_90x.toml"),
+        &InHandSettings { physics: PhysicsSettings { forces: Some(weak), ..settings().physics }, ..settings() },
+    );
     assert!(causes.contains("balance the weight: joint \"") && causes.contains(" would need more than 0.1 N m"));
     assert!(advice.contains("no contact forces"), "{advice}");
     // The same without asking about forces.

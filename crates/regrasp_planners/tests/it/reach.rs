@@ -1,10 +1,10 @@
 //! How far tips may be from where they rest, and what is said where nothing is found.
 
-use regrasp_planners::in_hand::PhysicsSettings;
 use crate::in_hand_methods::scene;
 use regrasp_base::Budget;
 use regrasp_plan::check::{CheckSettings, check};
 use regrasp_planners::FailureKind;
+use regrasp_planners::in_hand::PhysicsSettings;
 use regrasp_planners::in_hand::{InHandSettings, Progress, plan_in_hand};
 use regrasp_scene::{GraspRequest, InHandQuery, LoadedScene};
 use std::sync::Mutex;

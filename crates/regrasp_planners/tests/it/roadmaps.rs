@@ -1,12 +1,12 @@
 //! A saved roadmap answers queries with plans that the checker accepts, comes back from its bytes as it was, and is refused
 //! where it is broken or was built for something else.
 
-use regrasp_planners::in_hand::SearchSettings;
 use crate::in_hand_methods::scene;
 use regrasp_base::Budget;
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Pose, Shape, Vector};
 use regrasp_plan::check::{CheckSettings, Level, check};
+use regrasp_planners::in_hand::SearchSettings;
 use regrasp_planners::in_hand::roadmap::{
     BuildSettings, GraspRoadmap, QueryMemory, Region, RoadmapPlanner, build_roadmap, seal,
 };
@@ -208,7 +208,11 @@ fn settings_that_decide_what_is_feasible_are_refused_when_they_changed() {
         let text = refused.to_string();
         assert!(text.contains("R615") && text.contains(name), "{text}");
     }
-    let searching = InHandSettings { n_threads: 7, search: SearchSettings { shortcuts: 99, candidates: 2, ..roadmap.about().settings.clone().search }, ..roadmap.about().settings.clone() };
+    let searching = InHandSettings {
+        n_threads: 7,
+        search: SearchSettings { shortcuts: 99, candidates: 2, ..roadmap.about().settings.clone().search },
+        ..roadmap.about().settings.clone()
+    };
     assert!(roadmap.refuse_other_settings(path, &searching).is_ok());
 }
 

@@ -84,7 +84,7 @@ mod tests {
     fn passages_of(name: &str) -> (Vec<WayOut>, Vec<Pose>) {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes").join(name);
         let loaded = load_scene(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
-        let poses = loaded.task().query(0).poses();
+        let poses = loaded.task().query(0).as_in_hand().unwrap().poses();
         let view = loaded.view();
         let model = Model::new(&view, &PhysicsSettings::default());
         let ways_out = poses

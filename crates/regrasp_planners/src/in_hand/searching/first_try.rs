@@ -85,7 +85,10 @@ mod tests {
         assert!(with(FirstTry { closure_margin: 0.0, ..wanted }).is_empty());
         let asked = |tries: &[(InHandSettings, u64)]| -> Vec<(f64, f64, u64)> {
             assert!(tries.iter().all(|(settings, _)| settings.search.first_try.is_none()));
-            tries.iter().map(|(settings, work)| (settings.physics.clearance, settings.physics.closure_margin, *work)).collect()
+            tries
+                .iter()
+                .map(|(settings, work)| (settings.physics.clearance, settings.physics.closure_margin, *work))
+                .collect()
         };
         assert_eq!(asked(&with(wanted)), [(usual.physics.clearance, wanted.closure_margin, 250)]);
         let nearer = FirstTry { clearance: 0.0005, work: 90, ..wanted };
