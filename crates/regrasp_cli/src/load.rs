@@ -119,9 +119,11 @@ fn refuse_flags_of_in_hand(search: &Search) -> Result<(), Stop> {
     ];
     match flags.into_iter().find(|(_, is_given, _)| *is_given) {
         None => Ok(()),
-        Some((flag, _, why)) => {
-            Err(not_for_tracking(flag, why, "leave it out; --settings has all of tracking (docs/tracking.md)"))
-        }
+        Some((flag, _, why)) => Err(not_for_tracking(
+            flag,
+            why,
+            "leave it out; --settings has all of tracking (docs/reference/tracking.md)",
+        )),
     }
 }
 
@@ -205,7 +207,7 @@ fn settings_error(path: &Path, line: usize, column: usize, problem: &str) -> Sto
 fn say_scene(loaded: &LoadedScene, seconds: f64, talk: &Talk) {
     let (scene, task) = (&loaded.scene, loaded.manipulation());
     let hand = task.hand();
-    let n_mimic = hand.robot.joints.iter().filter(|joint| joint.mimic.is_some()).count();
+    let n_mimic = hand.robot.joints.iter().filter(|joint| joint.coupling.is_some()).count();
     let n_shapes = hand.palm.len() + hand.fingers.iter().map(|finger| finger.shapes.len()).sum::<usize>();
     talk.say(format!(
         "hand   {}   {} ({n_mimic} mimic)   {}   {}   loaded in {}",

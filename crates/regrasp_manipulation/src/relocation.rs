@@ -271,7 +271,10 @@ fn around(
     let as_joints = |q: &[f64]| -> Coordinates { q.iter().copied().collect() };
     let corners = RrtConnect::new().plan(start, goal, &lower, &upper, &settings, rng, |from, to| {
         workspace.set_finger(finger, &as_joints(from));
-        joint_line(workspace, finger, &as_joints(from), &as_joints(to), mode, &mut Vec::new())
+        // The limits of sums hold between configurations that keep them.
+        chain.within_linear_limits(to, 0.0)
+            && chain.within_linear_limits(from, 0.0)
+            && joint_line(workspace, finger, &as_joints(from), &as_joints(to), mode, &mut Vec::new())
     })?;
     let mut path = Vec::new();
     workspace.set_finger(finger, start);

@@ -1,7 +1,7 @@
 //! When each waypoint is passed, and how fast.
 //!
 //! Between two waypoints every joint follows the cubic through its positions, velocities and times; the object follows the
-//! joints' motion along their chord (`docs/plan-format.md`, Time). Every segment goes from rest to rest.
+//! joints' motion along their chord (`docs/reference/plan-format.md`, Time). Every segment goes from rest to rest.
 //!
 //! - Directions ([`path`]): at a waypoint the joints go along the parabola through it and its neighbours. Where that leads too
 //!   far off the chords, which the search has tested, they go slower than the path, or stop.
@@ -43,8 +43,9 @@ pub fn limits(model: &Model) -> MotionLimits {
         let leader = robot.joint_named(name)?;
         let own = robot.joints[leader.0].limits.and_then(|limits| limits.velocity);
         let coupled = robot.joints.iter().filter_map(|joint| {
-            let mimic = joint.mimic.filter(|mimic| mimic.joint == leader && mimic.multiplier != 0.0)?;
-            Some(joint.limits?.velocity? / mimic.multiplier.abs())
+            let coupling = joint.coupling.as_ref().filter(|coupling| coupling.multiplier(leader) != 0.0)?;
+            // All leaders may go at this speed at once.
+            Some(joint.limits?.velocity? / coupling.gain())
         });
         own.into_iter().chain(coupled).reduce(f64::min)
     };

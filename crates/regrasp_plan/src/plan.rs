@@ -1,4 +1,4 @@
-//! The plan and its parts. `docs/plan-format.md` and `schema/plan.schema.json` say the same.
+//! The plan and its parts. `docs/reference/plan-format.md` and `schema/plan.schema.json` say the same.
 //!
 //! Between two waypoints every joint follows the cubic through positions, velocities and times. The object's pose moves as
 //! `interpolate_pose` says, with the joints' progress along their chord as its parameter. Contact forces are linear in that
@@ -348,7 +348,7 @@ pub struct ForcePromises {
     /// Mass of the object, in kilograms.
     pub mass: f64,
     /// Gravity in the world, in metres per second squared; absent when the grasp holds whatever its direction: forces then
-    /// balance no weight, and leave room for that of every direction (`docs/plan-format.md`, forces).
+    /// balance no weight, and leave room for that of every direction (`docs/reference/plan-format.md`, forces).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gravity_in_world: Option<[f64; 3]>,
     /// Least and largest normal force of a finger that holds, in newtons.

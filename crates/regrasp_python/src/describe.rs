@@ -3,7 +3,7 @@
 use regrasp::geometry::{Pose, Shape};
 use regrasp::plan::plan::PoseData;
 use regrasp::robot::hand::Finger;
-use regrasp::robot::robot::{Joint, JointKind, Limits};
+use regrasp::robot::robot::{Joint, JointId, JointKind, Limits};
 use regrasp::robot::tip::TipShape;
 use regrasp::robot::{ContactModel, Hand};
 use regrasp::scene::{Gravity, InputFile, LoadedScene, Object, Obstacle, Query, SceneHand};
@@ -60,13 +60,17 @@ pub fn hand(hand: &Hand) -> Value {
             }));
         }
     }
+    let name_of = |leader: &JointId| &hand.robot.joints[leader.0].name;
     let coupled = hand.robot.joints.iter().filter_map(|joint| {
-        let mimic = joint.mimic?;
+        let coupling = joint.coupling.as_ref()?;
+        let mut leaders = coupling.terms.iter().map(|(leader, multiplier)| (name_of(leader), multiplier));
+        let (follows, multiplier) = leaders.next()?;
         Some(json!({
             "name": joint.name,
-            "follows": hand.robot.joints[mimic.joint.0].name,
-            "multiplier": mimic.multiplier,
-            "offset": mimic.offset,
+            "follows": follows,
+            "multiplier": multiplier,
+            "offset": coupling.offset,
+            "others": leaders.collect::<Vec<_>>(),
         }))
     });
     json!({

@@ -167,7 +167,7 @@ fn refuse_arguments_of_in_hand(request: &Request) -> Result<(), Diagnostic> {
         Some((argument, _, why)) => Err(bad("A507", format!("is not for a task of kind \"tracking\": {why}"))
             .element("argument", argument)
             .expected("a task of kind \"in_hand\"")
-            .fix("leave it out; `settings` has all of tracking (docs/tracking.md)")),
+            .fix("leave it out; `settings` has all of tracking (docs/reference/tracking.md)")),
     }
 }
 
@@ -188,12 +188,14 @@ fn in_hand(request: &Request) -> Result<InHandSettings, Diagnostic> {
         settings.method = method_named(method)?;
     }
     if let Some(margin) = request.margin {
-        settings.closure_margin = margin;
+        settings.physics.closure_margin = margin;
     }
     match request.improve_work {
-        Some(work) => settings.improve_work = work,
+        Some(work) => settings.improvement.improve_work = work,
         // Time alone is to end it.
-        None if request.improve.is_some() && settings.improve_work == 0 => settings.improve_work = u64::MAX,
+        None if request.improve.is_some() && settings.improvement.improve_work == 0 => {
+            settings.improvement.improve_work = u64::MAX
+        }
         None => {}
     }
     settings.validate().map_err(|problem| bad("A503", problem).element("argument", "settings"))?;

@@ -9,7 +9,7 @@ use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{ConvexHull, Point, Pose, Shape, pose_from};
 use regrasp_plan::Plan;
 use regrasp_robot::tip::is_same_surface;
-use regrasp_robot::{Finger, Hand, JointId, JointKind, LinkId, Motion, TipShape};
+use regrasp_robot::{Coupling, Finger, Hand, Joint, JointId, JointKind, LinkId, Motion, TipShape};
 use regrasp_scene::{HandView, Manipulation, Obstacle};
 use std::sync::Arc;
 
@@ -86,6 +86,7 @@ pub(super) fn write(task: &Manipulation, plan: &Plan) -> Mjcf {
     write_object(&mut xml, task, plan, &names, &object);
     xml.close();
     pairs::write(&mut xml, &HandView::of(task), &names);
+    write_sums(&mut xml, hand, &moving);
     write_equalities(&mut xml, hand, &moving, &object);
     write_actuators(&mut xml, hand, &moving);
     write_sensors(&mut xml, hand, &object);
@@ -300,10 +301,11 @@ fn write_joint(xml: &mut Xml, hand: &Hand, finger: &Finger, body: usize, id: Joi
         Motion::Turn => attributes.push(("type", "hinge".into())),
         Motion::Slide => attributes.extend([("type", "slide".into()), ("class", "slide".into())]),
     }
-    let limits = match as_read.mimic {
+    let limits = match (&as_read.coupling, joint.drive.single()) {
         // The coupling holds a follower within its limits, which the leader's already respect.
-        Some(_) => None,
-        None => Some((finger.chain.lower[joint.coordinate], finger.chain.upper[joint.coordinate])),
+        (Some(_), Some(_)) => None,
+        (Some(_), None) => as_read.limits.map(|limits| (limits.lower, limits.upper)),
+        (None, single) => single.map(|(k, _)| (finger.chain.lower[k], finger.chain.upper[k])),
     };
     if let Some((lower, upper)) =
         limits.filter(|(lower, upper)| lower.is_finite() && upper.is_finite() && lower < upper)
@@ -392,23 +394,57 @@ fn place(pose: &Pose) -> [(&'static str, String); 2] {
     [("pos", numbers(pose.translation.vector.iter().copied())), ("quat", numbers([q.w, q.x, q.y, q.z]))]
 }
 
+/// A tendon for each joint that follows several others: its length is the joint's position less the leaders' share.
+fn write_sums(xml: &mut Xml, hand: &Hand, moving: &[Vec<JointId>]) {
+    let sums: Vec<(&Joint, &Coupling)> = moving
+        .iter()
+        .flatten()
+        .map(|id| &hand.robot.joints[id.0])
+        .filter_map(|joint| Some((joint, joint.coupling.as_ref().filter(|coupling| coupling.single().is_none())?)))
+        .collect();
+    if sums.is_empty() {
+        return;
+    }
+    xml.open("tendon", &[]);
+    for (joint, coupling) in sums {
+        xml.open("fixed", &[("name", sum_name(joint))]);
+        xml.leaf("joint", &[("joint", joint.name.clone()), ("coef", "1".into())]);
+        for (leader, multiplier) in &coupling.terms {
+            let name = hand.robot.joints[leader.0].name.clone();
+            xml.leaf("joint", &[("joint", name), ("coef", numbers([-multiplier]))]);
+        }
+        xml.close();
+    }
+    xml.close();
+}
+
+fn sum_name(follower: &Joint) -> String {
+    format!("{}:leaders", follower.name)
+}
+
 /// Followers, and the pin that can hold the object where it starts.
 fn write_equalities(xml: &mut Xml, hand: &Hand, moving: &[Vec<JointId>], object: &str) {
     xml.open("equality", &[]);
     for (finger, ids) in hand.fingers.iter().zip(moving) {
         for (joint, id) in finger.chain.joints.iter().zip(ids) {
             let as_read = &hand.robot.joints[id.0];
-            let Some(mimic) = as_read.mimic else { continue };
-            xml.leaf(
-                "joint",
-                &[
-                    ("joint1", as_read.name.clone()),
-                    ("joint2", hand.robot.joints[mimic.joint.0].name.clone()),
-                    ("polycoef", numbers([joint.offset, joint.multiplier, 0.0, 0.0, 0.0])),
-                    ("solref", "0.004 1".into()),
-                    ("solimp", "0.99 0.999 0.0001".into()),
-                ],
-            );
+            let Some(coupling) = &as_read.coupling else { continue };
+            let stiff = [("solref", "0.004 1".to_owned()), ("solimp", "0.99 0.999 0.0001".to_owned())];
+            let offset = joint.drive.offset;
+            match coupling.single() {
+                Some((leader, multiplier)) => {
+                    let what = [
+                        ("joint1", as_read.name.clone()),
+                        ("joint2", hand.robot.joints[leader.0].name.clone()),
+                        ("polycoef", numbers([offset, multiplier, 0.0, 0.0, 0.0])),
+                    ];
+                    xml.leaf("joint", &[&what[..], &stiff].concat());
+                }
+                None => {
+                    let what = [("tendon1", sum_name(as_read)), ("polycoef", numbers([offset, 0.0, 0.0, 0.0, 0.0]))];
+                    xml.leaf("tendon", &[&what[..], &stiff].concat());
+                }
+            }
         }
     }
     xml.leaf(
@@ -429,7 +465,7 @@ fn write_actuators(xml: &mut Xml, hand: &Hand, moving: &[Vec<JointId>]) {
     xml.open("actuator", &[]);
     for id in moving.iter().flatten() {
         let joint = &hand.robot.joints[id.0];
-        if joint.mimic.is_some() {
+        if joint.coupling.is_some() {
             continue;
         }
         let mut attributes = vec![("name", joint.name.clone()), ("joint", joint.name.clone())];
@@ -467,9 +503,7 @@ fn write_keyframes(xml: &mut Xml, hand: &Hand, plan: &Plan) {
             let mut first = 0;
             for finger in &hand.fingers {
                 let coordinates = &waypoint.joints[first..first + finger.chain.n_coordinates()];
-                let position =
-                    |joint: &regrasp_robot::ChainJoint| joint.multiplier * coordinates[joint.coordinate] + joint.offset;
-                qpos.extend(finger.chain.joints.iter().map(position));
+                qpos.extend(finger.chain.joints.iter().map(|joint| joint.position(coordinates)));
                 first += finger.chain.n_coordinates();
             }
             let pose = &waypoint.world_from_object;

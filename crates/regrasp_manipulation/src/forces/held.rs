@@ -33,7 +33,8 @@ impl Unbalanced {
             }
             Unbalanced::TooWeak(f, j) => {
                 let chain = &model.view.hand.fingers[f].chain;
-                let slides = chain.joints.iter().any(|joint| joint.coordinate == j && joint.motion == Motion::Slide);
+                let slides =
+                    chain.joints.iter().any(|joint| joint.drive.multiplier(j) != 0.0 && joint.motion == Motion::Slide);
                 let limit = model.forces.as_ref().map_or(0.0, |forces| forces.torques[f][j]);
                 let unit = if slides { "N" } else { "N m" };
                 format!("joint \"{}\" would need more than {} {unit}", chain.names[j], number(limit))
@@ -172,13 +173,15 @@ fn joint_rows(
         limits.iter().map(|&limit| JointRow { per_force: Vector::zeros(), per_torsion: 0.0, limit }).collect();
     for (joint, frame) in chain.joints.iter().zip(&frames) {
         let axis = frame.vector(&joint.axis);
-        let row = &mut rows[joint.coordinate];
-        match joint.motion {
-            Motion::Turn => {
-                row.per_force += axis.cross(&(touching - frame.translation)) * joint.multiplier;
-                row.per_torsion += axis.dot(&normal) * joint.multiplier;
+        for &(k, multiplier) in &joint.drive.terms {
+            let row = &mut rows[k];
+            match joint.motion {
+                Motion::Turn => {
+                    row.per_force += axis.cross(&(touching - frame.translation)) * multiplier;
+                    row.per_torsion += axis.dot(&normal) * multiplier;
+                }
+                Motion::Slide => row.per_force += axis * multiplier,
             }
-            Motion::Slide => row.per_force += axis * joint.multiplier,
         }
     }
     for row in &mut rows {

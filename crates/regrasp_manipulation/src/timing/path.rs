@@ -79,7 +79,7 @@ impl<'m, 'a> Path<'m, 'a> {
             first = coordinates.end;
             let mut turns = vec![0.0; chain.n_coordinates()];
             for joint in chain.joints.iter().filter(|joint| joint.motion == Motion::Turn) {
-                turns[joint.coordinate] += joint.multiplier.abs();
+                joint.drive.terms.iter().for_each(|&(k, multiplier)| turns[k] += multiplier.abs());
             }
             Finger { coordinates, turns }
         };
@@ -161,6 +161,11 @@ impl<'m, 'a> Path<'m, 'a> {
     fn within_limits(&self, mut direction: Vec<f64>, chords: [&[f64]; 2], joints: &[f64]) -> Vec<f64> {
         for (finger, of_model) in self.fingers.iter().zip(&self.model.fingers) {
             let chain = of_model.ik.chain();
+            // A sum near its limit goes nowhere but along the chords: its coordinates stop.
+            let own = &joints[finger.coordinates.clone()];
+            for limit in chain.linear_limits.iter().filter(|limit| limit.room(own) < NEAR_LIMIT) {
+                limit.terms.iter().for_each(|(j, _)| direction[finger.coordinates.start + j] = 0.0);
+            }
             for (j, k) in finger.coordinates.clone().enumerate() {
                 if (joints[k] - chain.lower[j]).min(chain.upper[j] - joints[k]) < NEAR_LIMIT {
                     let (a, b) = (chords[0][k], chords[1][k]);

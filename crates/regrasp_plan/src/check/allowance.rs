@@ -45,7 +45,7 @@ fn check_motion(task: &Manipulation, model: &Model, plan: &Plan, log: &mut Log) 
     let (motion, limits) = (&plan.promises.motion, &task.scene.limits);
     exceeded(log, "largest_speed", None, (motion.largest_speed, limits.largest_speed), "m/s", Level::Motion);
     for (k, name) in model.joint_names.iter().enumerate() {
-        let is_limited = model.drives.iter().any(|drive| drive.coordinate == k && drive.velocity.is_some());
+        let is_limited = model.drives.iter().any(|row| row.drive.is_driven_by(k) && row.velocity.is_some());
         if !is_limited {
             let pair = (motion.joint_velocities[k], limits.joint_velocity);
             exceeded(log, "joint_velocities", Some(name), pair, "per second", Level::Motion);

@@ -146,8 +146,8 @@ impl Bodies {
             let owner = path
                 .joints
                 .iter()
-                .filter_map(|joint| joint.coordinate)
-                .find_map(|k| model.fingers.iter().position(|finger| finger.coordinates.contains(&k)))
+                .flat_map(|joint| &joint.drive.terms)
+                .find_map(|&(k, _)| model.fingers.iter().position(|finger| finger.coordinates.contains(&k)))
                 .map_or(Owner::Palm, Owner::Finger);
             let body_depth = path.joints.len();
             let is_tip = matches!(owner, Owner::Finger(f) if model.fingers[f].tip_link.0 == l);

@@ -231,7 +231,7 @@ pub fn check_joints(model: &Model, plan: &Plan, settings: &CheckSettings, log: &
     for (s, segment) in plan.segments.iter().enumerate() {
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
             for row in &model.limits {
-                let position = row.multiplier * waypoint.joints[row.coordinate] + row.offset;
+                let position = row.drive.position(&waypoint.joints);
                 let beyond = (row.lower - position).max(position - row.upper);
                 if beyond > settings.limit_tolerance {
                     let message = format!(
@@ -277,9 +277,9 @@ fn check_limits_between(
 ) {
     let motion = Between::new(from, to);
     for row in &model.limits {
-        let position = |way: f64| row.multiplier * (from.joints[row.coordinate] + way) + row.offset;
-        let ends = [0.0, motion.joint(row.coordinate).change].map(position);
-        let range = motion.joint(row.coordinate).range().map(position);
+        let (start, way) = (row.drive.position(&from.joints), row.drive.motion(&motion));
+        let ends = [start, start + way.change];
+        let range = way.range().map(|way| start + way);
         let beyond = |[a, b]: [f64; 2]| (row.lower - a.min(b)).max(a.max(b) - row.upper);
         if beyond(range) > settings.limit_tolerance && beyond(ends) <= settings.limit_tolerance {
             let message = format!(

@@ -1,4 +1,4 @@
-//! Contact forces and joint torques, by substitution, as `docs/plan-format.md` (forces) asks.
+//! Contact forces and joint torques, by substitution, as `docs/reference/plan-format.md` (forces) asks.
 //!
 //! Forces are those of the fingers on the object, in the object frame; moments are about its centre of mass. Tolerances are
 //! fields of `CheckSettings`. At every waypoint
@@ -173,9 +173,9 @@ fn check_promises(task: &Manipulation, model: &Model, promises: &ForcePromises, 
     if !(least >= 0.0 && least <= largest) {
         broken("normal_force", least, largest, format!("normal forces from {least} N to {largest} N"));
     }
-    for drive in model.drives.iter().filter(|drive| !drive.follows) {
-        let Some(effort) = drive.effort else { continue };
-        let promised = promises.joint_torques[drive.coordinate].unwrap_or(f64::INFINITY);
+    for drive in &model.drives {
+        let (Some(coordinate), Some(effort)) = (drive.own_coordinate(), drive.effort) else { continue };
+        let promised = promises.joint_torques[coordinate].unwrap_or(f64::INFINITY);
         if promised > effort * (1.0 + ROUNDING) {
             let message = format!("torque {promised} of joint \"{}\", the robot allows {effort}", drive.name);
             broken("joint_torques", promised, effort, message);

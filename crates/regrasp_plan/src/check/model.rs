@@ -1,6 +1,6 @@
 //! The scene as the checker sees it: paths to links, joint limits and fingertips, straight from the robot.
 
-use crate::check::kinematics::{Path, world_from_root};
+use crate::check::kinematics::{Drive, Path, world_from_root};
 use crate::check::surface::SortedShape;
 use crate::check::tip::TipSurface;
 use nalgebra::Matrix4;
@@ -38,6 +38,22 @@ pub struct FingerModel {
     pub moving_joints: Vec<usize>,
 }
 
+impl LimitRow {
+    /// Brings the joint to `position` by the first coordinate that drives it alone.
+    pub fn put(&self, joints: &mut [f64], position: f64) {
+        let Some(&(k, multiplier)) = self.drive.terms.first() else { return };
+        let others = self.drive.position(joints) - multiplier * joints[k];
+        joints[k] = (position - others) / multiplier;
+    }
+}
+
+impl DriveRow {
+    /// The coordinate of the joint, unless it follows others.
+    pub fn own_coordinate(&self) -> Option<usize> {
+        if self.follows { None } else { self.drive.single() }
+    }
+}
+
 impl FingerModel {
     /// Centre of the tip in the world.
     pub fn center_in_world(&self, joints: &[f64]) -> Point {
@@ -45,17 +61,13 @@ impl FingerModel {
     }
 }
 
-/// The limits of one joint, as a function of the coordinate that drives it.
+/// The limits of one joint, as a function of the coordinates that drive it.
 #[derive(Debug, Clone)]
 pub struct LimitRow {
     /// Name of the joint.
     pub name: String,
-    /// Index in the joint vector.
-    pub coordinate: usize,
-    /// Position is `multiplier * coordinate + offset`.
-    pub multiplier: f64,
-    /// See `multiplier`.
-    pub offset: f64,
+    /// What gives it its position.
+    pub drive: Drive,
     /// Lowest position.
     pub lower: f64,
     /// Highest position.
@@ -67,10 +79,8 @@ pub struct LimitRow {
 pub struct DriveRow {
     /// Name of the joint.
     pub name: String,
-    /// Index in the joint vector of the coordinate that drives it.
-    pub coordinate: usize,
-    /// The joint moves this much as fast as its coordinate; 1 for the driven joint itself.
-    pub multiplier: f64,
+    /// What gives it its position: its own coordinate, unless it follows others.
+    pub drive: Drive,
     /// True for a joint that follows another: it has no drive of its own.
     pub follows: bool,
     /// Highest speed, in rad/s or m/s, where the robot says one.
@@ -144,30 +154,20 @@ fn joint_rows(task: &Manipulation, joint_names: &[String]) -> Result<(Vec<LimitR
     let robot = &task.hand().robot;
     let (mut rows, mut drives) = (Vec::new(), Vec::new());
     for (i, joint) in robot.joints.iter().enumerate() {
-        let (driver, multiplier, offset) = match &joint.mimic {
-            Some(mimic) => (mimic.joint.0, mimic.multiplier, mimic.offset),
-            None => (i, 1.0, 0.0),
-        };
-        let driver_name = &robot.joints.get(driver).ok_or("a coupled joint follows one that does not exist")?.name;
-        let Some(coordinate) = joint_names.iter().position(|name| name == driver_name) else { continue };
+        let drive = Drive::of(robot, i, joint_names)?;
+        if drive.terms.is_empty() {
+            continue;
+        }
         drives.push(DriveRow {
             name: joint.name.clone(),
-            coordinate,
-            multiplier,
-            follows: joint.mimic.is_some(),
+            drive: drive.clone(),
+            follows: joint.coupling.is_some(),
             velocity: joint.limits.and_then(|limits| limits.velocity),
             effort: joint.limits.and_then(|limits| limits.effort),
         });
         let bounded = matches!(joint.kind, JointKind::Revolute | JointKind::Prismatic);
         if let (true, Some(limits)) = (bounded, &joint.limits) {
-            rows.push(LimitRow {
-                name: joint.name.clone(),
-                coordinate,
-                multiplier,
-                offset,
-                lower: limits.lower,
-                upper: limits.upper,
-            });
+            rows.push(LimitRow { name: joint.name.clone(), drive, lower: limits.lower, upper: limits.upper });
         }
     }
     Ok((rows, drives))

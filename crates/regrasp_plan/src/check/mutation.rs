@@ -237,7 +237,7 @@ impl Breeder<'_> {
             let row = limits.get(rng.below(limits.len().max(1)))?;
             let beyond = rng.uniform(0.5f64, 1.0).to_radians();
             let position = if rng.chance(0.5) { row.lower - beyond } else { row.upper + beyond };
-            any_waypoint(plan, rng)?.joints[row.coordinate] = (position - row.offset) / row.multiplier;
+            row.put(&mut any_waypoint(plan, rng)?.joints, position);
             Some(())
         });
         let model = self.model;

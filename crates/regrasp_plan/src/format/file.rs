@@ -1,4 +1,4 @@
-//! The plan file of version 3 as it stands on disk. `docs/plan-format.md` and `schema/plan.schema.json` say the same.
+//! The plan file of version 3 as it stands on disk. `docs/reference/plan-format.md` and `schema/plan.schema.json` say the same.
 //!
 //! The file has room for several hands and objects. This version plans for one hand and one object at a time: [`FilePlan::plan`]
 //! refuses files with more.

@@ -1,4 +1,4 @@
-//! Reading and writing `plan.json`, and its JSON Schema. `docs/plan-format.md` describes the file.
+//! Reading and writing `plan.json`, and its JSON Schema. `docs/reference/plan-format.md` describes the file.
 
 /// The file as it stands on disk.
 mod file;

@@ -6,6 +6,7 @@ mod in_hand_methods;
 mod physics;
 #[path = "../../../../tests/support/places.rs"]
 mod places;
+mod queries;
 mod reach;
 mod roadmaps;
 mod segments;

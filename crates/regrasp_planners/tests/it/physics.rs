@@ -2,13 +2,14 @@
 
 use crate::in_hand_methods::scene;
 use crate::places::shared_models;
+use crate::queries::Queries;
 use crate::soft_and_coupled;
 use nalgebra::{DMatrix, UnitQuaternion};
 use regrasp_base::{Budget, Rng};
 use regrasp_geometry::{Point, Pose, UnitVector, Vector, frame};
 use regrasp_grasp::{Contact, ContactForce, ContactModel, Grip};
 use regrasp_plan::Plan;
-use regrasp_plan::check::{CheckSettings, Level, check};
+use regrasp_plan::check::{CheckSettings, Level};
 use regrasp_plan::plan::{SegmentKind, Waypoint};
 use regrasp_planners::Failure;
 use regrasp_planners::in_hand::PhysicsSettings;
@@ -29,9 +30,9 @@ fn settings() -> InHandSettings {
 }
 
 fn plan_with(loaded: &LoadedScene, settings: &InHandSettings, seed: u64) -> Result<Plan, Failure> {
-    let (query, budget) = (loaded.task().query(seed), Budget::work(3_000_000));
-    let plan = plan_in_hand(&loaded.view(), query.as_in_hand().unwrap(), settings, seed, &budget, &|_| {})?;
-    let report = check((&loaded.scene, &loaded.state), Some(&query), &plan, &CheckSettings::default());
+    let (query, budget) = (loaded.in_hand(seed), Budget::work(3_000_000));
+    let plan = plan_in_hand(&loaded.view(), &query, settings, seed, &budget, &|_| {})?;
+    let report = loaded.judge(&query, &plan, &CheckSettings::default());
     assert!(report.accepted(), "seed {seed}: {report:#?}");
     Ok(plan)
 }
@@ -328,8 +329,7 @@ fn changed(name: &str, change: impl FnOnce(&mut Scene)) -> LoadedScene {
 fn without_forces_there_is_no_plan_and_the_cause_is_named() {
     let budget = Budget::work(60_000);
     let fails = |loaded: &LoadedScene, settings: &InHandSettings| {
-        let failure =
-            plan_in_hand(&loaded.view(), loaded.task().query(0).as_in_hand().unwrap(), settings, 0, &budget, &|_| {});
+        let failure = plan_in_hand(&loaded.view(), &loaded.in_hand(0), settings, 0, &budget, &|_| {});
         let failure = failure.expect_err("nothing balances it");
         let causes: Vec<&str> = failure.causes.iter().map(|cause| cause.reason.as_str()).collect();
         (causes.join("\n"), failure.advice)
@@ -355,10 +355,9 @@ fn without_forces_there_is_no_plan_and_the_cause_is_named() {
     // The same without asking about forces.
     let heavy = changed("sphere_90x.toml", |scene| scene.objects[0].mass = 20.0);
     let plain = InHandSettings { physics: PhysicsSettings { forces: None, ..settings().physics }, ..settings() };
-    let query = heavy.task().query(0);
-    let plan = plan_in_hand(&heavy.view(), query.as_in_hand().unwrap(), &plain, 0, &budget, &|_| {})
-        .expect("geometry knows no weight");
-    let report = check((&heavy.scene, &heavy.state), Some(&query), &plan, &CheckSettings::default());
+    let query = heavy.in_hand(0);
+    let plan = plan_in_hand(&heavy.view(), &query, &plain, 0, &budget, &|_| {}).expect("geometry knows no weight");
+    let report = heavy.judge(&query, &plan, &CheckSettings::default());
     assert_eq!(report.reached, Some(Level::Geometry), "{report:#?}");
     assert!(plan.promises.forces.is_none());
     let waypoints = || plan.segments.iter().flat_map(|segment| &segment.waypoints);

@@ -2,8 +2,9 @@
 
 use crate::in_hand_methods::scene;
 use crate::places::shared_models;
+use crate::queries::Queries;
 use regrasp_base::Budget;
-use regrasp_plan::check::{CheckSettings, check};
+use regrasp_plan::check::CheckSettings;
 use regrasp_plan::{ContactMode, Plan, Waypoint};
 use regrasp_planners::in_hand::BaselineSettings;
 use regrasp_planners::in_hand::SearchSettings;
@@ -43,17 +44,16 @@ fn backwards(plan: &Plan) -> Plan {
 fn judge(loaded: &LoadedScene, settings: &InHandSettings, seeds: std::ops::Range<u64>, max_work: u64) -> usize {
     let mut n_plans = 0;
     for seed in seeds {
-        let query = loaded.task().query(seed);
+        let query = loaded.in_hand(seed);
         let which = format!("{}, {:?}, seed {seed}", loaded.scene.name, settings.method);
-        let found =
-            plan_in_hand(&loaded.view(), query.as_in_hand().unwrap(), settings, seed, &Budget::work(max_work), &|_| {});
+        let found = plan_in_hand(&loaded.view(), &query, settings, seed, &Budget::work(max_work), &|_| {});
         let Ok(plan) = found else { continue };
         n_plans += 1;
         assert_meets(&plan, &which);
         assert_eq!(validate_once(&loaded.view(), &plan, settings), Ok(()), "{which}");
         assert_eq!(validate_once(&loaded.view(), &backwards(&plan), settings), Ok(()), "{which}, backwards");
         let strict = CheckSettings { meeting_tolerance: 0.0, ..CheckSettings::default() };
-        let report = check((&loaded.scene, &loaded.state), Some(&query), &plan, &strict);
+        let report = loaded.judge(&query, &plan, &strict);
         assert!(report.accepted(), "{which}: {:#?}", report.violations);
     }
     n_plans
@@ -111,15 +111,8 @@ fn plans_of_hands_with_rolling_hulls_are_proven_again() {
         let loaded = load_scene(&path, &options).unwrap_or_else(|e| panic!("{name}: {e}"));
         let settings = InHandSettings::default();
         for seed in 0..8 {
-            let query = loaded.task().query(seed);
-            let found = plan_in_hand(
-                &loaded.view(),
-                query.as_in_hand().unwrap(),
-                &settings,
-                seed,
-                &Budget::work(100_000),
-                &|_| {},
-            );
+            let query = loaded.in_hand(seed);
+            let found = plan_in_hand(&loaded.view(), &query, &settings, seed, &Budget::work(100_000), &|_| {});
             let Ok(plan) = found else { continue };
             n_plans += 1;
             assert_eq!(validate_once(&loaded.view(), &plan, &settings), Ok(()), "{name}, seed {seed}");

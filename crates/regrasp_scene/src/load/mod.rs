@@ -1,4 +1,4 @@
-//! The scene file. `docs/scene-format.md` says what it may contain.
+//! The scene file. `docs/reference/scene-format.md` says what it may contain.
 //!
 //! Codes: S100 not TOML, S101 unknown key, S102 missing key, S103 wrong type, S104 unknown word, S105 another format,
 //! S106 exactly one of several, S107 number out of range, S110 file not found, S112 name used twice, S120 unknown joint

@@ -127,9 +127,8 @@ fn finger_reach(finger: &regrasp_robot::Finger) -> f64 {
         .iter()
         .filter(|joint| joint.motion == regrasp_robot::Motion::Slide)
         .map(|joint| {
-            let range = chain.lower.get(joint.coordinate).zip(chain.upper.get(joint.coordinate));
-            let position = |q: f64| (joint.multiplier * q + joint.offset).abs();
-            range.map_or(0.0, |(lower, upper)| position(*lower).max(position(*upper)))
+            let [lower, upper] = joint.range([&chain.lower, &chain.upper]);
+            lower.abs().max(upper.abs())
         })
         .sum();
     links + slides + finger.tip.center_in_body.coords.norm() + finger.tip.radius()

@@ -74,12 +74,12 @@ impl Breeder<'_> {
         });
         self.add("torque limit promised above the robot's", &[PromiseBroken], |plan, rng| {
             let drive = any_drive(model, rng, |drive| drive.effort.is_some())?;
-            promises(plan)?.joint_torques[drive.coordinate] = Some(drive.effort? * rng.uniform(1.001, 1.1));
+            promises(plan)?.joint_torques[drive.own_coordinate()?] = Some(drive.effort? * rng.uniform(1.001, 1.1));
             Some(())
         });
         self.add("torque limit left out", &[PromiseBroken], |plan, rng| {
             let drive = any_drive(model, rng, |drive| drive.effort.is_some())?;
-            promises(plan)?.joint_torques[drive.coordinate] = None;
+            promises(plan)?.joint_torques[drive.own_coordinate()?] = None;
             Some(())
         });
         self.add("torque limit below a torque", &[TorqueLimit], |plan, rng| {

@@ -23,9 +23,11 @@ impl Breeder<'_> {
         });
         self.add("joint velocity promised above the scene's", &[LimitExceeded], |plan, rng| {
             let drive = any_drive(model, rng, |drive| {
-                !model.drives.iter().any(|other| other.coordinate == drive.coordinate && other.velocity.is_some())
+                !model.drives.iter().any(|other| {
+                    drive.own_coordinate().is_some_and(|k| other.drive.is_driven_by(k)) && other.velocity.is_some()
+                })
             })?;
-            plan.promises.motion.joint_velocities[drive.coordinate] =
+            plan.promises.motion.joint_velocities[drive.own_coordinate()?] =
                 limits.joint_velocity * log_uniform(rng, 1.001, 1e6);
             Some(())
         });

@@ -69,7 +69,11 @@ fn best_of(
     for _ in 0..DRAWN {
         let margin = model.settings.limit_margin;
         let limits = chain.lower.iter().zip(&chain.upper);
-        postures.push(limits.map(|(l, u)| search.rng.uniform(l + margin, (u - margin).max(l + margin))).collect());
+        let drawn: Coordinates =
+            limits.map(|(l, u)| search.rng.uniform(l + margin, (u - margin).max(l + margin))).collect();
+        if chain.within_linear_limits(&drawn, margin) {
+            postures.push(drawn);
+        }
     }
     let mut best: Option<Candidate> = None;
     for joints in postures {

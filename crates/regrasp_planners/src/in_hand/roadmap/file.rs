@@ -1,4 +1,4 @@
-//! The roadmap file. `docs/roadmap-format.md` says the same in words.
+//! The roadmap file. `docs/reference/roadmap-format.md` says the same in words.
 //!
 //! Codes: R601 not a roadmap file, R602 another version, R603 not as long as it says, R604 damaged, R605 what it says
 //! about itself cannot be understood, R606 contradicts itself.

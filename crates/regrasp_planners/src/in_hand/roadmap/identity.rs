@@ -70,8 +70,15 @@ fn hand(hand: &Hand, reach: Option<f64>) -> Digest {
                 Motion::Turn => 0,
                 Motion::Slide => 1,
             });
-            feed.count(joint.coordinate);
-            feed.numbers([joint.multiplier, joint.offset]);
+            for (at, &(coordinate, multiplier)) in joint.drive.terms.iter().enumerate() {
+                if at > 0 {
+                    // Marks further leaders: no coordinate has this number.
+                    feed.count(usize::MAX);
+                }
+                feed.count(coordinate);
+                feed.numbers([multiplier]);
+            }
+            feed.numbers([joint.drive.offset]);
         }
         feed.count(finger.chain.n_coordinates());
         for name in &finger.chain.names {
@@ -79,6 +86,13 @@ fn hand(hand: &Hand, reach: Option<f64>) -> Digest {
         }
         feed.numbers(finger.chain.lower.iter().copied());
         feed.numbers(finger.chain.upper.iter().copied());
+        for limit in &finger.chain.linear_limits {
+            for &(coordinate, multiplier) in &limit.terms {
+                feed.count(coordinate);
+                feed.numbers([multiplier]);
+            }
+            feed.numbers([limit.lower, limit.upper]);
+        }
         feed.numbers(finger.rest.iter().copied());
         feed.point(&finger.tip.center_in_body);
         match &finger.tip.shape {
