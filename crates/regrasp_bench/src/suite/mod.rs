@@ -378,8 +378,8 @@ settings = { method = "visibility", guided_share = 0.0 }
         assert_eq!(names, ["T/fast", "f/c/0.25", "f/c/0.5"]);
         assert_eq!(jobs[0].scene, Path::new("suites/s.toml"));
         assert_eq!((jobs[0].settings.n_threads, jobs[0].max_work), (1, 20_000_000));
-        assert_eq!(jobs[1].settings.alpha, Alpha::Constant { value: 0.25 });
-        assert_eq!((jobs[1].settings.guided_share, jobs[1].time_limit_s), (0.0, Some(3.0)));
+        assert_eq!(jobs[1].settings.baselines.alpha, Alpha::Constant { value: 0.25 });
+        assert_eq!((jobs[1].settings.baselines.guided_share, jobs[1].time_limit_s), (0.0, Some(3.0)));
     }
 
     #[test]

@@ -9,7 +9,7 @@ pub(super) fn finger_names(view: &HandView) -> Vec<String> {
 }
 
 /// A plan of `segments` for a task with the object's poses at its `ends`; method, seed, settings, way poses and statistics are
-/// left to be said.
+/// left to be said. The hand holds the object all along.
 pub fn plan_of(view: &HandView, task: &str, ends: [&Pose; 2], promises: Promises, segments: Vec<Segment>) -> Plan {
     Plan {
         format: FORMAT.into(),

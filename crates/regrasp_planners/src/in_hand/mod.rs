@@ -24,11 +24,14 @@ mod searching;
 #[cfg(test)]
 mod sequence_tests;
 
-pub use crate::settings::{Alpha, CostWeights, FirstTry, InHandSettings, Method, ReleaseRule};
+pub use crate::settings::{
+    Alpha, BaselineSettings, CostWeights, FirstTry, ImprovementSettings, InHandSettings, Method, ReleaseRule,
+    SearchSettings,
+};
 pub use recording::validate::{NotProven, validate_once};
 pub use regrasp_manipulation::ends::given::{MovedFinger, moved_fingers};
 pub use regrasp_manipulation::progress::Progress;
-pub use regrasp_manipulation::settings::{ForceSettings, SpeedSettings, TransferMode};
+pub use regrasp_manipulation::settings::{ForceSettings, PhysicsSettings, SpeedSettings, TransferMode};
 
 use attempt::search::{Context, Search, Stop};
 use attempt::tally::Reason;

@@ -33,7 +33,8 @@ pub(super) fn with_search(name: &str, test: impl FnOnce(&mut Search)) {
 pub(super) fn with_settings(name: &str, settings: &InHandSettings, test: impl FnOnce(&mut Search)) {
     let loaded = scene(name);
     let view = loaded.view();
-    let model = Model::new(&view, &crate::in_hand::effective(settings));
+    let settings = &crate::in_hand::effective(settings).within(&view.limits);
+    let model = Model::new(&view, &settings.physics);
     let query = loaded.task().query(0);
     let poses = [*query.start(), *query.goal()];
     let (budget, winner) = (Budget::unlimited(), AtomicUsize::new(usize::MAX));

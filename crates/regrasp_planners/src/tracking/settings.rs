@@ -198,7 +198,7 @@ mod tests {
         assert_eq!(read(r#"{"in_hand": {}}"#).unwrap(), whole);
         assert_eq!(read(&serde_json::to_string(&whole).unwrap()).unwrap(), whole);
         let some = read(r#"{"in_hand": {"clearance": 0.001, "forces": {"torque_share": 0.5}}}"#).unwrap();
-        let forces = ForceSettings { torque_share: 0.5, ..whole.in_hand.forces.unwrap() };
+        let forces = ForceSettings { torque_share: 0.5, ..whole.in_hand.physics.forces.unwrap() };
         let physics = PhysicsSettings { clearance: 0.001, forces: Some(forces), ..whole.in_hand.physics.clone() };
         let in_hand = InHandSettings { physics, ..whole.in_hand.clone() };
         assert_eq!(some, TrackingSettings { in_hand, ..whole });

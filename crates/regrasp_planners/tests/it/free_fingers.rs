@@ -6,6 +6,8 @@ use regrasp_base::{Budget, Rng};
 use regrasp_plan::check::mutation::mutants;
 use regrasp_plan::check::{CheckSettings, check};
 use regrasp_plan::{ContactMode, Plan, Waypoint};
+use regrasp_planners::in_hand::PhysicsSettings;
+use regrasp_planners::in_hand::SearchSettings;
 use regrasp_planners::in_hand::{InHandSettings, plan_in_hand, validate_once};
 use regrasp_planners::{Failure, FailureKind};
 use regrasp_scene::LoadedScene;
@@ -13,8 +15,14 @@ use std::collections::BTreeSet;
 
 /// Settings with which fingers are left free as often as can be.
 fn eager(least_holding: usize) -> InHandSettings {
-    let usual = InHandSettings { first_try: None, ..InHandSettings::default() };
-    InHandSettings { least_holding, free_after: 0, free_share: 1.0, shortcuts: 0, ..usual }
+    let usual = InHandSettings {
+        search: SearchSettings { first_try: None, ..SearchSettings::default() },
+        ..InHandSettings::default()
+    };
+    InHandSettings {
+        search: SearchSettings { least_holding, free_after: 0, free_share: 1.0, shortcuts: 0, ..usual.search },
+        ..usual
+    }
 }
 
 fn try_plan(loaded: &LoadedScene, settings: &InHandSettings, seed: u64) -> Result<Plan, Failure> {
@@ -143,7 +151,10 @@ fn a_failure_names_the_fingers_that_could_never_be_released() {
     loaded.scene.hands[0].hand.fingers.truncate(3);
     let soft = regrasp_robot::ContactModel::SoftFinger { torsion_radius: 0.0005 };
     loaded.scene.hands[0].hand.fingers.iter_mut().for_each(|finger| finger.tip.contact = soft);
-    let settings = InHandSettings { closure_margin: 0.02, ..InHandSettings::default() };
+    let settings = InHandSettings {
+        physics: PhysicsSettings { closure_margin: 0.02, ..PhysicsSettings::default() },
+        ..InHandSettings::default()
+    };
     let query = loaded.in_hand(0);
     let found = plan_in_hand(&loaded.view(), &query, &settings, 0, &Budget::work(60_000), &|_| {});
     let failure = found.expect_err("no finger can be released");

@@ -7,12 +7,16 @@ use regrasp_geometry::{Pose, frame, interpolate_pose};
 use regrasp_plan::check::{CheckSettings, Level};
 use regrasp_plan::plan::{Improvement, Waypoint};
 use regrasp_plan::{Plan, SegmentKind};
+use regrasp_planners::in_hand::ImprovementSettings;
 use regrasp_planners::in_hand::{CostWeights, InHandSettings, Method, plan_in_hand, validate_once};
 use regrasp_scene::{GraspRequest, InHandQuery, LoadedScene};
 use std::time::Duration;
 
 fn settings(improve_work: u64) -> InHandSettings {
-    InHandSettings { improve_work, ..InHandSettings::plain() }
+    InHandSettings {
+        improvement: ImprovementSettings { improve_work, ..InHandSettings::plain().improvement },
+        ..InHandSettings::plain()
+    }
 }
 
 /// Plans, and has the plan judged.
@@ -64,7 +68,7 @@ fn improved_plans_are_the_same_on_any_number_of_threads_and_cost_what_they_say()
         assert!(first.statistics.improvement.is_none());
         let told = improvement(&improved);
         for (plan, figures) in [(&first, &told.first), (&improved, &told.improved)] {
-            let cost = cost_of_file(&loaded, plan, &asked.cost);
+            let cost = cost_of_file(&loaded, plan, &asked.improvement.cost);
             assert!((cost - figures.cost).abs() < 1e-6, "{name}: {cost} and {figures:?}");
             assert_eq!(plan.statistics.relocations, figures.relocations);
             assert_eq!(plan.statistics.transfers, figures.transfers);
@@ -157,7 +161,15 @@ fn the_weights_decide_what_is_better() {
     let query = loaded.in_hand(5);
     let margins = CostWeights { margin: 20.0, ..CostWeights::default() };
     let tight = plan(&loaded, &query, &settings(300_000), 5);
-    let wide = plan(&loaded, &query, &InHandSettings { cost: margins, ..settings(300_000) }, 5);
+    let wide = plan(
+        &loaded,
+        &query,
+        &InHandSettings {
+            improvement: ImprovementSettings { cost: margins, ..settings(300_000).improvement },
+            ..settings(300_000)
+        },
+        5,
+    );
     assert!(improvement(&wide).improved.kept_margin > improvement(&wide).first.kept_margin, "{:?}", improvement(&wide));
     assert!(improvement(&tight).improved.relocations < improvement(&tight).first.relocations);
 }
@@ -190,7 +202,7 @@ fn the_methods_of_the_paper_are_improved_under_their_release_rule() {
             let others: Vec<_> = (0..contacts.len()).filter(|&f| f != away).map(|f| contacts[f]).collect();
             let others: [_; 3] = others.try_into().expect("a hand of four");
             let margin = regrasp_grasp::closure::three::prove(&others, &frame).map_or(0.0, |(margin, _)| margin);
-            assert!(margin >= recorded.closure_margin, "finger {away} could not be let go: {margin}");
+            assert!(margin >= recorded.physics.closure_margin, "finger {away} could not be let go: {margin}");
         }
     }
 }

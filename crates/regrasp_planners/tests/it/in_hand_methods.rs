@@ -5,6 +5,8 @@ use crate::queries::Queries;
 use regrasp_base::Budget;
 use regrasp_plan::Plan;
 use regrasp_plan::check::CheckSettings;
+use regrasp_planners::in_hand::BaselineSettings;
+use regrasp_planners::in_hand::SearchSettings;
 use regrasp_planners::in_hand::{Alpha, InHandSettings, Method, Progress, ReleaseRule, plan_in_hand, validate_once};
 use regrasp_robot::import::LoadOptions;
 use regrasp_scene::{LoadedScene, load_scene};
@@ -21,7 +23,12 @@ pub fn scene(name: &str) -> LoadedScene {
 pub fn settings(method: Method, n_threads: usize) -> InHandSettings {
     // Alpha as in paper 000's box example.
     let alpha = Alpha::Decreasing { start: 0.5, step: 0.005, end: 0.3 };
-    InHandSettings { method, n_threads, alpha, ..InHandSettings::default() }
+    InHandSettings {
+        method,
+        n_threads,
+        baselines: BaselineSettings { alpha, ..BaselineSettings::default() },
+        ..InHandSettings::default()
+    }
 }
 
 fn plan(loaded: &LoadedScene, settings: &InHandSettings, seed: u64) -> Plan {
@@ -64,10 +71,13 @@ fn plans_for_the_box_are_accepted_and_reproducible() {
 fn methods_of_the_paper_have_its_release_rule_and_say_so() {
     let loaded = scene("sphere_90x.toml");
     for method in [Method::Visibility, Method::Classic] {
-        let asked = InHandSettings { release_rule: ReleaseRule::WhereOthersHold, ..settings(method, 1) };
+        let asked = InHandSettings {
+            search: SearchSettings { release_rule: ReleaseRule::WhereOthersHold, ..settings(method, 1).search },
+            ..settings(method, 1)
+        };
         let plan = plan(&loaded, &asked, 5);
         let recorded: InHandSettings = serde_json::from_value(plan.settings).expect("settings as they were written");
-        assert_eq!(recorded.release_rule, ReleaseRule::EverywhereEveryFinger);
+        assert_eq!(recorded.search.release_rule, ReleaseRule::EverywhereEveryFinger);
     }
 }
 

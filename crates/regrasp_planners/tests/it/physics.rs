@@ -12,13 +12,21 @@ use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, Level};
 use regrasp_plan::plan::{SegmentKind, Waypoint};
 use regrasp_planners::Failure;
+use regrasp_planners::in_hand::PhysicsSettings;
 use regrasp_planners::in_hand::{ForceSettings, InHandSettings, plan_in_hand};
 use regrasp_scene::{Gravity, Limits, LoadedScene, Scene};
 
 const SCENES: [&str; 4] = ["sphere_90x.toml", "box_90x.toml", "soft_pair_roll.toml", "shadow/sphere32_z.toml"];
 
 fn settings() -> InHandSettings {
-    InHandSettings { friction_margin: 1.5, forces: Some(ForceSettings::default()), ..InHandSettings::default() }
+    InHandSettings {
+        physics: PhysicsSettings {
+            friction_margin: 1.5,
+            forces: Some(ForceSettings::default()),
+            ..PhysicsSettings::default()
+        },
+        ..InHandSettings::default()
+    }
 }
 
 fn plan_with(loaded: &LoadedScene, settings: &InHandSettings, seed: u64) -> Result<Plan, Failure> {
@@ -217,7 +225,7 @@ fn check_tips(loaded: &LoadedScene, from: &Waypoint, to: &Waypoint, largest: f64
 fn plans_rest_between_segments_and_keep_to_their_limits() {
     for_plans(|name, loaded, plan| {
         let limits = &plan.promises.motion;
-        let speed = settings().speed;
+        let speed = settings().physics.speed;
         assert_eq!(plan.segments[0].waypoints[0].time, 0.0);
         let mut fastest: f64 = 0.0;
         for (s, segment) in plan.segments.iter().enumerate() {
@@ -334,16 +342,19 @@ fn without_forces_there_is_no_plan_and_the_cause_is_named() {
             scene.objects[0].mass = 20.0;
             scene.limits.normal_force = 500.0;
         }),
-        &InHandSettings { forces: Some(strong), ..settings() },
+        &InHandSettings { physics: PhysicsSettings { forces: Some(strong), ..settings().physics }, ..settings() },
     );
     assert!(causes.contains(" would need more than 1 N m"), "{causes}");
     let weak = ForceSettings { torque_share: 0.1, ..ForceSettings::default() };
-    let (causes, advice) = fails(&scene("sphere_90x.toml"), &InHandSettings { forces: Some(weak), ..settings() });
+    let (causes, advice) = fails(
+        &scene("sphere_90x.toml"),
+        &InHandSettings { physics: PhysicsSettings { forces: Some(weak), ..settings().physics }, ..settings() },
+    );
     assert!(causes.contains("balance the weight: joint \"") && causes.contains(" would need more than 0.1 N m"));
     assert!(advice.contains("no contact forces"), "{advice}");
     // The same without asking about forces.
     let heavy = changed("sphere_90x.toml", |scene| scene.objects[0].mass = 20.0);
-    let plain = InHandSettings { forces: None, ..settings() };
+    let plain = InHandSettings { physics: PhysicsSettings { forces: None, ..settings().physics }, ..settings() };
     let query = heavy.in_hand(0);
     let plan = plan_in_hand(&heavy.view(), &query, &plain, 0, &budget, &|_| {}).expect("geometry knows no weight");
     let report = heavy.judge(&query, &plan, &CheckSettings::default());

@@ -5,6 +5,7 @@ use crate::queries::Queries;
 use regrasp_base::Budget;
 use regrasp_plan::check::CheckSettings;
 use regrasp_planners::FailureKind;
+use regrasp_planners::in_hand::PhysicsSettings;
 use regrasp_planners::in_hand::{InHandSettings, Progress, plan_in_hand};
 use regrasp_scene::{GraspRequest, InHandQuery, LoadedScene};
 use std::sync::Mutex;
@@ -77,7 +78,7 @@ fn what_is_advised_is_what_was_short_and_friction_is_that_of_the_scene() {
     let plan = plan_in_hand(&loaded.view(), &query, &settings, 0, &Budget::work(400_000), &|_| {}).unwrap();
     let joints = plan.segments[0].waypoints[0].joints.clone();
     let query = InHandQuery { start_grasp: GraspRequest::Joints(joints), ..query };
-    let strict = InHandSettings { closure_margin: 0.9, ..settings };
+    let strict = InHandSettings { physics: PhysicsSettings { closure_margin: 0.9, ..settings.physics }, ..settings };
     let failure = plan_in_hand(&loaded.view(), &query, &strict, 0, &Budget::work(1000), &|_| {}).unwrap_err();
     assert!(failure.message.ends_with("at friction 0.8 of the scene over a margin of 1.5"), "{failure}");
 }

@@ -7,6 +7,7 @@ use regrasp_base::Budget;
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Pose, Shape, Vector};
 use regrasp_plan::check::{CheckSettings, Level};
+use regrasp_planners::in_hand::SearchSettings;
 use regrasp_planners::in_hand::roadmap::{
     BuildSettings, GraspRoadmap, QueryMemory, Region, RoadmapPlanner, build_roadmap, seal,
 };
@@ -186,13 +187,13 @@ fn whatever_decides_what_is_feasible_is_refused_when_it_changed() {
 fn settings_that_decide_what_is_feasible_are_refused_when_they_changed() {
     type Change = (&'static str, fn(&mut InHandSettings));
     const CHANGES: [Change; 7] = [
-        ("closure_margin", |settings| settings.closure_margin = 0.01),
-        ("release_rule", |settings| settings.release_rule = ReleaseRule::EverywhereEveryFinger),
-        ("step", |settings| settings.step *= 2.0),
-        ("clearance", |settings| settings.clearance *= 2.0),
-        ("contact_allowance", |settings| settings.contact_allowance *= 0.5),
-        ("limit_margin", |settings| settings.limit_margin *= 2.0),
-        ("joint_step", |settings| settings.joint_step *= 0.5),
+        ("closure_margin", |settings| settings.physics.closure_margin = 0.01),
+        ("release_rule", |settings| settings.search.release_rule = ReleaseRule::EverywhereEveryFinger),
+        ("step", |settings| settings.physics.step *= 2.0),
+        ("clearance", |settings| settings.physics.clearance *= 2.0),
+        ("contact_allowance", |settings| settings.physics.contact_allowance *= 0.5),
+        ("limit_margin", |settings| settings.physics.limit_margin *= 2.0),
+        ("joint_step", |settings| settings.physics.joint_step *= 0.5),
     ];
     let loaded = scene("sphere_90x.toml");
     let path = Path::new("sphere.roadmap");
@@ -205,7 +206,11 @@ fn settings_that_decide_what_is_feasible_are_refused_when_they_changed() {
         let text = refused.to_string();
         assert!(text.contains("R615") && text.contains(name), "{text}");
     }
-    let searching = InHandSettings { shortcuts: 99, candidates: 2, n_threads: 7, ..roadmap.about().settings.clone() };
+    let searching = InHandSettings {
+        n_threads: 7,
+        search: SearchSettings { shortcuts: 99, candidates: 2, ..roadmap.about().settings.clone().search },
+        ..roadmap.about().settings.clone()
+    };
     assert!(roadmap.refuse_other_settings(path, &searching).is_ok());
 }
 

@@ -6,6 +6,8 @@ use crate::queries::Queries;
 use regrasp_base::Budget;
 use regrasp_plan::check::CheckSettings;
 use regrasp_plan::{ContactMode, Plan, Waypoint};
+use regrasp_planners::in_hand::BaselineSettings;
+use regrasp_planners::in_hand::SearchSettings;
 use regrasp_planners::in_hand::{InHandSettings, Method, plan_in_hand, validate_once};
 use regrasp_robot::import::{LoadOptions, ResolveOptions};
 use regrasp_scene::{LoadedScene, load_scene};
@@ -59,7 +61,11 @@ fn judge(loaded: &LoadedScene, settings: &InHandSettings, seeds: std::ops::Range
 
 /// Many shortcuts, so that plans are cut and joined as much as they can be.
 fn much_cut(method: Method) -> InHandSettings {
-    InHandSettings { method, shortcuts: 40, ..InHandSettings::default() }
+    InHandSettings {
+        method,
+        search: SearchSettings { shortcuts: 40, ..SearchSettings::default() },
+        ..InHandSettings::default()
+    }
 }
 
 #[test]
@@ -71,7 +77,10 @@ fn segments_of_the_gait_meet_exactly() {
 
 #[test]
 fn segments_of_the_papers_methods_meet_exactly() {
-    let uniform = InHandSettings { guided_share: 0.0, ..much_cut(Method::Visibility) };
+    let uniform = InHandSettings {
+        baselines: BaselineSettings { guided_share: 0.0, ..much_cut(Method::Visibility).baselines },
+        ..much_cut(Method::Visibility)
+    };
     assert!(judge(&scene("tight_sphere_180z.toml"), &uniform, 0..20, 100_000) >= 18);
     assert!(judge(&scene("sphere_180x.toml"), &much_cut(Method::Classic), 0..10, 100_000) >= 5);
 }

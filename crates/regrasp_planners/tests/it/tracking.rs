@@ -94,8 +94,8 @@ fn with_exact_cones_forces_obey_the_same_laws_and_plans_keep_a_friction_margin()
     let query = loaded.tracking(0);
     for (seed, friction_margin, least) in [(0, 1.0, 0.0), (0, 1.2, 0.0)] {
         let mut settings = TrackingSettings { cones: Cones::Exact, ..TrackingSettings::default() };
-        settings.in_hand.friction_margin = friction_margin;
-        settings.in_hand.forces.as_mut().unwrap().normal_force[0] = least;
+        settings.in_hand.physics.friction_margin = friction_margin;
+        settings.in_hand.physics.forces.as_mut().unwrap().normal_force[0] = least;
         let planned = || {
             plan_tracking(&loaded.view(), &query, &settings, seed, &Budget::work(1_000_000), &|_| {})
                 .unwrap_or_else(|failure| panic!("seed {seed}: {failure}"))

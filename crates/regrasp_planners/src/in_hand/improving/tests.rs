@@ -25,7 +25,7 @@ fn with_gaits(name: &str, n_tracks: usize, test: impl FnOnce(&mut Gaits)) {
         for finger in 0..search.model().n_fingers() {
             let drawn = draw_tracks(search, &course, finger, DRAWN, &mut rng).unwrap();
             tracks.push(covers(&course, drawn, n_tracks));
-            alone.push(Alone::new(&course, &tracks[finger], [None; 2], &search.model().settings.cost));
+            alone.push(Alone::new(&course, &tracks[finger], [None; 2], &search.settings.improvement.cost));
         }
         let foothold = |t: &Track| Candidate { contact: Some(t.contact), joints: t.joints[0].clone(), follow: 0.0 };
         let contacts: Vec<Vec<Candidate>> = tracks.iter().map(|tracks| tracks.iter().map(foothold).collect()).collect();
@@ -66,7 +66,7 @@ fn what_a_proven_gait_costs_is_no_less_than_the_search_said() {
         let mut rng = Rng::keyed(2, "proof", 0);
         let solution = gaits.cheapest_proven(NO_LIMITS, GREED, 50, &mut rng).unwrap().expect("a gait that is proven");
         let said = gaits.cheapest(NO_LIMITS, GREED).expect("what is proven is still there").cost;
-        let cost = figures(gaits.model(), &solution.way).cost;
+        let cost = figures(gaits.model(), &CostWeights::default(), &solution.way).cost;
         assert!(said <= cost + 1e-9, "{said} and {cost}");
     });
 }
@@ -111,10 +111,10 @@ fn a_bound_with_grasps_at_both_ends_counts_the_fingers_that_must_move() {
                 Motion::Transfer(_) => None,
             })
             .collect();
-        let free = lower_bound(model, &poses, None, None);
-        let given = lower_bound(model, &poses, Some(way.start()), Some(way.end()));
-        let weights = model.settings.cost;
+        let weights = search.settings.improvement.cost;
+        let free = lower_bound(model, &weights, &poses, None, None);
+        let given = lower_bound(model, &weights, &poses, Some(way.start()), Some(way.end()));
         assert!(!moved.is_empty() && given >= free + weights.relocation * moved.len() as f64 - 1e-9);
-        assert!(given <= figures(model, &way).cost);
+        assert!(given <= figures(model, &weights, &way).cost);
     });
 }

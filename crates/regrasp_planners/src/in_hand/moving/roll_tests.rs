@@ -1,18 +1,26 @@
 //! Rolling fingertips against the velocity constraint, integrated another way.
 
-use super::*;
+use crate::in_hand::PhysicsSettings;
 use crate::in_hand::attempt::search::Search;
 use crate::in_hand::grasps::sample::draw_state;
 use crate::in_hand::regrasping::change::whole_transfer;
 use crate::in_hand::roadmap_tests::with_settings;
 use crate::settings::InHandSettings;
 use nalgebra::Matrix3xX;
+use regrasp_geometry::Vector;
+use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Point, Pose, interpolate_pose};
+use regrasp_grasp::contact::rolling_ellipsoid::{self, Stance};
 use regrasp_manipulation::grasp::sequence::Motion;
+use regrasp_manipulation::model::Model;
 use regrasp_manipulation::settings::TransferMode;
+use regrasp_robot::kinematics::finger_ik::Coordinates;
 
 fn rolling() -> InHandSettings {
-    InHandSettings { transfer: TransferMode::Rolling, ..InHandSettings::default() }
+    InHandSettings {
+        physics: PhysicsSettings { transfer: TransferMode::Rolling, ..PhysicsSettings::default() },
+        ..InHandSettings::default()
+    }
 }
 
 /// A pose a few steps away.

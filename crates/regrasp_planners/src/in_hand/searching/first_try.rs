@@ -77,18 +77,22 @@ mod tests {
             assert!((stand_back(finger).unwrap() - 0.001).abs() < 1e-9);
         }
         let with = |wanted: FirstTry| {
-            let settings = InHandSettings { first_try: Some(wanted), ..InHandSettings::default() };
+            let search = SearchSettings { first_try: Some(wanted), ..SearchSettings::default() };
+            let settings = InHandSettings { search, ..InHandSettings::default() };
             first_tries(&view, &settings, &Budget::work(1000))
         };
         let (usual, wanted) = (InHandSettings::default(), FirstTry::default());
         assert!(with(FirstTry { closure_margin: 0.0, ..wanted }).is_empty());
         let asked = |tries: &[(InHandSettings, u64)]| -> Vec<(f64, f64, u64)> {
-            assert!(tries.iter().all(|(settings, _)| settings.first_try.is_none()));
-            tries.iter().map(|(settings, work)| (settings.clearance, settings.closure_margin, *work)).collect()
+            assert!(tries.iter().all(|(settings, _)| settings.search.first_try.is_none()));
+            tries
+                .iter()
+                .map(|(settings, work)| (settings.physics.clearance, settings.physics.closure_margin, *work))
+                .collect()
         };
-        assert_eq!(asked(&with(wanted)), [(usual.clearance, wanted.closure_margin, 250)]);
+        assert_eq!(asked(&with(wanted)), [(usual.physics.clearance, wanted.closure_margin, 250)]);
         let nearer = FirstTry { clearance: 0.0005, work: 90, ..wanted };
-        let both = [(0.0005, wanted.closure_margin, 30), (0.0005, usual.closure_margin, 90)];
+        let both = [(0.0005, wanted.closure_margin, 30), (0.0005, usual.physics.closure_margin, 90)];
         assert_eq!(asked(&with(nearer)), both);
     }
 }

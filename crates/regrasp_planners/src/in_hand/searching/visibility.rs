@@ -4,7 +4,7 @@
 /// Joining components of a roadmap.
 mod connect;
 /// Paths in GS_n cut into transfers and regrasps.
-mod decompose;
+pub mod decompose;
 /// Sampling GS_n.
 pub mod explore;
 /// Links between grasps.

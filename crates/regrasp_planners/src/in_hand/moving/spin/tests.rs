@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::in_hand::attempt::search::Search;
+use crate::in_hand::grasps::candidate::Candidate;
 use crate::in_hand::grasps::choose::choose_grasp;
 use crate::in_hand::grasps::pool::Pool;
 use crate::in_hand::moving::transfer::transfer;
