@@ -27,12 +27,8 @@ impl Comparison {
 
 /// Plans `problem` with each number of threads; only work is limited.
 pub fn compare(problem: Problem, settings: &InHandSettings, budget: &Budget, threads: &[usize]) -> Comparison {
-    let mut comparison = Comparison {
-        scene: problem.task.scene.name.clone(),
-        seed: problem.seed,
-        digests: Vec::new(),
-        status: String::new(),
-    };
+    let mut comparison =
+        Comparison { scene: problem.name(), seed: problem.seed, digests: Vec::new(), status: String::new() };
     let view = HandView::of(&problem.task);
     let query = problem.query.as_in_hand().expect("campaigns refuse scenes of other tasks");
     for &n_threads in threads {

@@ -50,7 +50,7 @@ impl Campaign {
     /// A plan that is rejected has no mutants: they would prove nothing.
     pub fn add(&mut self, problem: Problem, plan: &Plan, per_kind: u64) {
         let settings = CheckSettings::default();
-        let misjudged = |what: String| Misjudged { scene: problem.task.scene.name.clone(), seed: problem.seed, what };
+        let misjudged = |what: String| Misjudged { scene: problem.name(), seed: problem.seed, what };
         self.good += 1;
         let report = check(problem.in_state(), Some(problem.query), plan, &settings);
         if !report.accepted() {

@@ -43,8 +43,7 @@ fn answer(
     settings: &RunSettings,
     memory: &mut QueryMemory,
 ) -> (Row, Option<Plan>) {
-    let mut row =
-        Row { scene: problem.task.scene.name.clone(), method: "roadmap".into(), seed: problem.seed, ..Row::default() };
+    let mut row = Row { scene: problem.name(), method: "roadmap".into(), seed: problem.seed, ..Row::default() };
     let started = (Instant::now(), ThreadTime::now());
     let budget = Budget {
         max_work: settings.max_work,

@@ -26,6 +26,14 @@ pub struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
+    /// Name of the scene, with that of the task where the scene has several.
+    pub fn name(&self) -> String {
+        match self.query.name() {
+            "" => self.task.scene.name.clone(),
+            name => format!("{}:{name}", self.task.scene.name),
+        }
+    }
+
     /// The scene, and where everything that the query does not name rests.
     pub fn in_state(&self) -> (&'a Scene, &'a State) {
         (self.task.scene, self.task.state)
@@ -161,7 +169,7 @@ pub(crate) fn measured(
 /// Plans one seed: the plan, if there is one, is neither measured nor judged yet.
 pub(crate) fn plan_only(problem: Problem, settings: &RunSettings) -> (Row, Option<Plan>) {
     let mut row = Row {
-        scene: problem.task.scene.name.clone(),
+        scene: problem.name(),
         method: match problem.query {
             Query::InHand(_) => method_name(&settings.planner),
             Query::Tracking(_) => settings.tracking.method.name().into(),

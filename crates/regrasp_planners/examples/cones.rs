@@ -1,4 +1,4 @@
-//! What pyramids of four sides lose against the exact friction cones, in tracking: `docs/tracking.md` has the table.
+//! What pyramids of four sides lose against the exact friction cones, in tracking: `docs/reference/tracking.md` has the table.
 //!
 //!     cargo run --release -p regrasp_planners --example cones
 //!
@@ -11,7 +11,7 @@ use regrasp_geometry::{Point, Vector};
 use regrasp_grasp::wrench::ForceLimits;
 use regrasp_planners::tracking::forces::{Load, Pressing, balance};
 use regrasp_planners::tracking::{Cones, plan_tracking};
-use regrasp_planners::{InHandSettings, TrackingSettings};
+use regrasp_planners::TrackingSettings;
 use regrasp_robot::import::LoadOptions;
 use regrasp_scene::load_scene;
 use std::error::Error;
@@ -110,7 +110,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let loaded = load_scene(&path, &LoadOptions::default())?;
     let object = &loaded.scene.objects[0];
     let settings = TrackingSettings::default();
-    let InHandSettings { forces: Some(forces), .. } = settings.in_hand else { return Err("no forces".into()) };
+    let Some(forces) = settings.in_hand.physics.forces else { return Err("no forces".into()) };
     let [least, largest] = forces.normal_force;
     let load = Load {
         weight: Vector::zeros(),

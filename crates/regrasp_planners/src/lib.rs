@@ -2,20 +2,19 @@
 //!
 //! A planner is a free function of scene, query, settings, seed and budget that returns a plan or says why not.
 
-/// Why no plan was found.
-pub mod failure;
 /// In-hand manipulation by grasp subspaces (papers 000 and 004).
 pub mod in_hand;
-/// From the hand's frame into the world.
-mod in_world;
-/// What a graph of grasps looks like.
-pub mod outline;
+/// Settings of the in-hand planner, which tracking has too.
+pub mod settings;
 /// Finger tracking (paper 003).
 pub mod tracking;
 
-pub use failure::{Cause, Failure, FailureKind, NearestMiss};
-pub use in_hand::{InHandSettings, Method, Progress, plan_in_hand};
-pub use outline::{Outline, OutlineEdge, OutlineNode};
+pub use in_hand::plan_in_hand;
+pub use regrasp_manipulation::failure::{Cause, Failure, FailureKind, NearestMiss};
+pub use regrasp_manipulation::outline::{Outline, OutlineEdge, OutlineNode};
+pub use regrasp_manipulation::progress::Progress;
+pub use regrasp_manipulation::{failure, outline};
+pub use settings::{InHandSettings, Method};
 pub use tracking::{TrackingMethod, TrackingSettings, plan_tracking};
 
 use regrasp_base::Budget;
@@ -34,7 +33,7 @@ pub struct PlannerSettings {
 /// Plans `query` with the planner of its task: [`plan_in_hand`] or [`plan_tracking`]. All that the query does not name rests in
 /// `state`.
 ///
-/// Panics if the settings of that planner do not validate. Errors: as that planner.
+/// Errors: as that planner.
 pub fn plan(
     (scene, state): (&Scene, &State),
     query: &Query,

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use regrasp::base::{Diagnostic, Place};
 use regrasp::robot::import::{LoadOptions, ResolveOptions, load_hand};
-use regrasp::scene::{Gravity, LoadedScene, load_scene};
+use regrasp::scene::{Gravity, LoadedScene, Task, load_scene};
 use std::path::{Path, PathBuf};
 
 /// How files are read, as the package passes it: packages by name and folder, folders to search, lenient.
@@ -64,6 +64,15 @@ impl Scene {
         read(&self.path, &self.options, self.gravity.as_ref())
     }
 
+    /// The task of this name; the first where none is asked for. Errors: there is none of that name (`A508`).
+    pub fn task(&self, py: Python<'_>, name: Option<&str>) -> PyResult<&Task> {
+        let Some(name) = name else { return Ok(self.loaded.task()) };
+        self.loaded.task_named(name).ok_or_else(|| {
+            let names: Vec<&str> = self.loaded.tasks.iter().map(|task| task.name.as_str()).collect();
+            error::argument(py, "scene", "task", format!("is \"{name}\""), &format!("one of {}", names.join(", ")))
+        })
+    }
+
     /// Where its packages are.
     pub fn packages(&self) -> &ResolveOptions {
         &self.options.resolve
@@ -94,8 +103,9 @@ impl Scene {
     }
 
     /// The poses that the query of `seed` asks for, from start to goal, as JSON.
-    fn query(&self, py: Python<'_>, seed: u64) -> PyResult<String> {
-        guarded(py, || Ok(describe::query(&self.loaded.task().query(seed)).to_string()))
+    #[pyo3(signature = (seed, task=None))]
+    fn query(&self, py: Python<'_>, seed: u64, task: Option<&str>) -> PyResult<String> {
+        guarded(py, || Ok(describe::query(&self.task(py, task)?.query(seed)).to_string()))
     }
 
     /// Tip centres in the world, as [`Hand::tips`] gives them.

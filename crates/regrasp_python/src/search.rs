@@ -36,6 +36,7 @@ pub struct Request {
     improve_work: Option<u64>,
     settings: Option<String>,
     level: String,
+    task: Option<String>,
     progress: Option<Py<PyAny>>,
 }
 
@@ -43,10 +44,10 @@ pub struct Request {
 #[pyfunction]
 pub fn plan(py: Python<'_>, scene: &Scene, request: Request) -> PyResult<(Option<Plan>, String)> {
     guarded(py, || {
-        let task = scene.loaded.task();
+        let task = scene.task(py, request.task.as_deref())?;
         let level = level_named(&request.level).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
         let settings = settings(task, &request).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
-        let query = scene.loaded.task().query(request.seed);
+        let query = task.query(request.seed);
         let started = Instant::now();
         let seconds = |value: Option<f64>| value.map(Duration::from_secs_f64);
         let (deadline, improve_for) =
@@ -81,7 +82,7 @@ pub fn check(py: Python<'_>, plan: &Plan, scene: &Scene, level: &str) -> PyResul
     guarded(py, || {
         let level = level_named(level).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
         let judged = py.detach(|| {
-            let query = scene.loaded.task().query(plan.plan.seed);
+            let query = scene.loaded.task_for(&plan.plan.query).query(plan.plan.seed);
             let settings = CheckSettings { level, ..CheckSettings::default() };
             regrasp::plan::check::check((&scene.loaded.scene, &scene.loaded.state), Some(&query), &plan.plan, &settings)
         });
@@ -106,7 +107,7 @@ fn judged_as_written(
     let plan = format::from_json(Path::new("plan.json"), format::to_json(plan).as_bytes())
         .expect("a plan just made is a plan file");
     let again = scene.read_again()?;
-    let query = again.task().query(plan.seed);
+    let query = again.task_for(&plan.query).query(plan.seed);
     let settings = CheckSettings { level, ..CheckSettings::default() };
     let report = regrasp::plan::check::check((&again.scene, &again.state), Some(&query), &plan, &settings);
     Ok((plan, report))
@@ -166,7 +167,7 @@ fn refuse_arguments_of_in_hand(request: &Request) -> Result<(), Diagnostic> {
         Some((argument, _, why)) => Err(bad("A507", format!("is not for a task of kind \"tracking\": {why}"))
             .element("argument", argument)
             .expected("a task of kind \"in_hand\"")
-            .fix("leave it out; `settings` has all of tracking (docs/tracking.md)")),
+            .fix("leave it out; `settings` has all of tracking (docs/reference/tracking.md)")),
     }
 }
 
@@ -187,12 +188,14 @@ fn in_hand(request: &Request) -> Result<InHandSettings, Diagnostic> {
         settings.method = method_named(method)?;
     }
     if let Some(margin) = request.margin {
-        settings.closure_margin = margin;
+        settings.physics.closure_margin = margin;
     }
     match request.improve_work {
-        Some(work) => settings.improve_work = work,
+        Some(work) => settings.improvement.improve_work = work,
         // Time alone is to end it.
-        None if request.improve.is_some() && settings.improve_work == 0 => settings.improve_work = u64::MAX,
+        None if request.improve.is_some() && settings.improvement.improve_work == 0 => {
+            settings.improvement.improve_work = u64::MAX
+        }
         None => {}
     }
     settings.validate().map_err(|problem| bad("A503", problem).element("argument", "settings"))?;

@@ -27,6 +27,8 @@ pub const TRACKING: &str = "tracking";
 /// A goal pose of one object, reached in one hand by relocating fingers (Saut 2011; Sahbani 2007). All poses are in the world.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InHandQuery {
+    /// Name of the task in the scene file; empty where the file has only one.
+    pub name: String,
     /// The hand, by its index in `Scene::hands`.
     pub hand: usize,
     /// The object, by its index in `Scene::objects`.
@@ -69,6 +71,8 @@ impl InHandQuery {
 /// 1999, sec. 3.3). All poses are in the world.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackingQuery {
+    /// Name of the task in the scene file; empty where the file has only one.
+    pub name: String,
     /// The hand, by its index in `Scene::hands`.
     pub hand: usize,
     /// The object, by its index in `Scene::objects`.
@@ -138,6 +142,14 @@ impl Query {
         match self {
             Query::Tracking(query) => Some(query),
             Query::InHand(_) => None,
+        }
+    }
+
+    /// Name of the task in the scene file; empty where the file has only one.
+    pub fn name(&self) -> &str {
+        match self {
+            Query::InHand(query) => &query.name,
+            Query::Tracking(query) => &query.name,
         }
     }
 

@@ -102,7 +102,7 @@ mod tests {
     #[test]
     fn hands_have_as_many_soft_tips_as_asked_evenly_placed() {
         for size in Curve::Fingers.sizes().iter().copied() {
-            let hand = loaded(Point { curve: Curve::Fingers, object: "sphere", size }).scene.hands[0].hand;
+            let hand = loaded(Point { curve: Curve::Fingers, object: "sphere", size }).scene.hands.remove(0).hand;
             assert_eq!(hand.fingers.len(), size as usize);
             let tip = |finger: &Finger| {
                 let mut poses = Vec::new();
@@ -124,8 +124,8 @@ mod tests {
     #[test]
     fn the_finger_is_that_of_the_bundled_hand() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/six_finger_sphere_90x.toml");
-        let bundled = load_scene(&path, &Default::default()).unwrap().scene.hands[0].hand;
-        let written = loaded(Point { curve: Curve::Fingers, object: "sphere", size: 6 }).scene.hands[0].hand;
+        let bundled = load_scene(&path, &Default::default()).unwrap().scene.hands.remove(0).hand;
+        let written = loaded(Point { curve: Curve::Fingers, object: "sphere", size: 6 }).scene.hands.remove(0).hand;
         assert_eq!(bundled.fingers.len(), written.fingers.len());
         for (a, b) in bundled.fingers.iter().zip(&written.fingers) {
             assert_eq!((&a.chain.lower, &a.chain.upper, &a.rest), (&b.chain.lower, &b.chain.upper, &b.rest));

@@ -1,4 +1,4 @@
-//! Suites: the tables and figures of a paper, measured again. `docs/suite-format.md` says what a suite file may contain.
+//! Suites: the tables and figures of a paper, measured again. `docs/reference/suite-format.md` says what a suite file may contain.
 //!
 //! Codes: B600 not TOML or not the shape of a suite, B601 another format or version, B602 a value that makes no sense, B603
 //! settings of another kind of task than the scene's.
@@ -199,7 +199,8 @@ impl Suite {
         for figure in &self.figures {
             for curve in &figure.curves {
                 for &value in &figure.alpha {
-                    let settings = InHandSettings { alpha: Alpha::Constant { value }, ..curve.settings.clone() };
+                    let mut settings = curve.settings.clone();
+                    settings.baselines.alpha = Alpha::Constant { value };
                     jobs.push(job(figure.job_name(curve, value), curve, settings));
                 }
             }
@@ -290,7 +291,7 @@ pub fn read(path: &Path) -> Result<Suite, InputError> {
     let suite: Suite = toml::from_str(&text).map_err(|error| {
         let place = Place::at_offset(path, &text, error.span().map_or(0, |span| span.start));
         Diagnostic::new("B600", place, error.message().trim().replace('\n', "; "))
-            .expected("a suite file as in docs/suite-format.md")
+            .expected("a suite file as in docs/reference/suite-format.md")
     })?;
     if suite.format != FORMAT || suite.format_version != FORMAT_VERSION {
         let seen = format!("is \"{}\" version {}", suite.format, suite.format_version);
@@ -377,8 +378,8 @@ settings = { method = "visibility", guided_share = 0.0 }
         assert_eq!(names, ["T/fast", "f/c/0.25", "f/c/0.5"]);
         assert_eq!(jobs[0].scene, Path::new("suites/s.toml"));
         assert_eq!((jobs[0].settings.n_threads, jobs[0].max_work), (1, 20_000_000));
-        assert_eq!(jobs[1].settings.alpha, Alpha::Constant { value: 0.25 });
-        assert_eq!((jobs[1].settings.guided_share, jobs[1].time_limit_s), (0.0, Some(3.0)));
+        assert_eq!(jobs[1].settings.baselines.alpha, Alpha::Constant { value: 0.25 });
+        assert_eq!((jobs[1].settings.baselines.guided_share, jobs[1].time_limit_s), (0.0, Some(3.0)));
     }
 
     #[test]
@@ -478,11 +479,16 @@ tracking = { rolling_finger = "once", face_changes = false }
         );
         // Of one kind of task only.
         let at = Path::new("suites/a.toml");
-        assert!(jobs[1].refuse_other_task(TaskKind::Tracking, at).is_ok());
-        let error = jobs[1].refuse_other_task(TaskKind::InHand, at).unwrap_err().to_string();
+        let loaded = |name: &str| {
+            let path = repository().join("scenes").join(name);
+            regrasp_scene::load_scene(&path, &Default::default()).unwrap_or_else(|error| panic!("{error}"))
+        };
+        let (turn, track) = (loaded("sphere_90x.toml"), loaded("football.toml"));
+        assert!(jobs[1].refuse_other_task(track.task(), at).is_ok());
+        let error = jobs[1].refuse_other_task(turn.task(), at).unwrap_err().to_string();
         assert!(error.contains("B603") && error.contains("T/once") && error.contains("tracking"), "{error}");
         let in_hand = Job { settings: InHandSettings::default(), ..jobs[0].clone() };
-        assert!(in_hand.refuse_other_task(TaskKind::Tracking, at).is_err());
+        assert!(in_hand.refuse_other_task(track.task(), at).is_err());
         let row = |job: &str, seed, status: &str| SuiteRow {
             job: job.into(),
             inputs: String::new(),

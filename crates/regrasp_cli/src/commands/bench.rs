@@ -39,7 +39,7 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
     let files = load::scene_files(&arguments.scenes)?;
     let (mut scenes, bad) = load_scenes(&files, arguments, common, talk)?;
     let (planner, tracking) = bench_settings(&scenes, arguments)?;
-    let improves = planner.improve_work > 0;
+    let improves = planner.improvement.improve_work > 0;
     let cancelled = interrupt::flag()?;
     let mut writer = match &arguments.csv {
         Some(path) => {
@@ -109,7 +109,13 @@ fn load_scenes(
     let (mut scenes, mut bad) = (Vec::new(), Vec::new());
     for path in files {
         match load::scene(path, common, talk) {
-            Ok(scene) => scenes.push(arguments.judging.scene(scene)),
+            Ok(loaded) => {
+                let loaded = arguments.judging.scene(loaded);
+                // Of several tasks each is a problem of its own, but where one was asked for.
+                let n_tasks = if common.task.is_some() { 1 } else { loaded.tasks.len() };
+                let names: Vec<String> = loaded.tasks.iter().take(n_tasks).map(|task| task.name.clone()).collect();
+                scenes.extend(names.iter().map(|name| loaded.clone().for_query(name)));
+            }
             Err(Stop::BadInput(error)) => {
                 talk.note(&format!("{} is left out: it cannot be read", path.display()));
                 talk.event("left_out", json!({ "scene": path, "diagnostics": error.diagnostics }));

@@ -271,6 +271,7 @@ pub fn failure_text(failure: &Failure) -> String {
     let heading = match failure.kind {
         FailureKind::StartInvalid => "NO PLAN: the start is not valid",
         FailureKind::GoalInvalid => "NO PLAN: the goal is not valid",
+        FailureKind::SettingsInvalid => "NO PLAN: the settings make no sense",
         FailureKind::WayInvalid => "NO PLAN: a way pose is not valid",
         FailureKind::Impossible => "NO PLAN: impossible with this hand and these contacts",
         FailureKind::NotConnected => "NO PLAN on this roadmap (not a proof)",

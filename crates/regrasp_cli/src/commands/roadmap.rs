@@ -197,7 +197,7 @@ fn refuse_other_settings(roadmap: &GraspRoadmap, arguments: &args::RoadmapQuery)
         None => roadmap.about().settings.clone(),
     };
     if let Some(margin) = arguments.margin {
-        asked.closure_margin = margin;
+        asked.physics.closure_margin = margin;
     }
     Ok(roadmap.refuse_other_settings(&arguments.roadmap, &asked)?)
 }
@@ -259,7 +259,7 @@ fn info_text(path: &Path, bytes: u64, seconds: f64, about: &About, census: &Cens
             counted(census.relocations, "relocation")
         ),
         format!("components  {}: {}", census.components.len(), components.join(", ")),
-        format!("margin      {} asked of every holding set", about.settings.closure_margin),
+        format!("margin      {} asked of every holding set", about.settings.physics.closure_margin),
         format!(
             "built       seed {}, grown by {}",
             about.seed,

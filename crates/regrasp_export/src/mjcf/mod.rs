@@ -3,7 +3,7 @@
 //! What may touch in the model is what the checker keeps apart (`regrasp_scene::collision_pairs`), pair by pair; pairs that
 //! the hand allows never touch. A round fingertip touches the object with its ball, as the plan means it, and everything else
 //! with the shapes of its link. MuJoCo collides with convex hulls of meshes: an object that is not convex is written as
-//! its hull, and a note says so. `docs/simulate.md` has the settings and where they come from.
+//! its hull, and a note says so. `docs/reference/replay.md` has the settings and where they come from.
 
 mod inertia;
 mod model;

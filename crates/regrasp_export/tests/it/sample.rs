@@ -5,7 +5,7 @@ use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, check};
 use regrasp_planners::{InHandSettings, plan_in_hand};
 use regrasp_robot::import::LoadOptions;
-use regrasp_scene::{LoadedScene, Scene, load_scene};
+use regrasp_scene::{LoadedScene, load_scene};
 use std::path::Path;
 use std::sync::LazyLock;
 
@@ -15,7 +15,7 @@ fn load() -> LoadedScene {
 }
 
 /// The scene that [`PLAN`] is for.
-pub static SCENE: LazyLock<Scene> = LazyLock::new(|| load().scene);
+pub static LOADED: LazyLock<LoadedScene> = LazyLock::new(load);
 
 /// The sphere of the bundled wide hand, turned about x.
 pub static PLAN: LazyLock<Plan> = LazyLock::new(|| {

@@ -1,6 +1,6 @@
 //! Everything that can collide, and which pairs must not.
 
-use crate::check::kinematics::Path;
+use crate::check::kinematics::{Path, pose_of};
 use crate::check::model::Model;
 use nalgebra::{Rotation3, UnitQuaternion};
 use regrasp_geometry::reference::ReferenceShape;
@@ -105,6 +105,7 @@ impl Bodies {
             let placed = &obstacle.placed;
             bodies.add(&obstacle.name, Owner::Obstacle, WORLD, &placed.parent_from_shape, &placed.shape)?;
         }
+        bodies.add_resting(task)?;
         bodies.add_pairs(task);
         Ok(bodies)
     }
@@ -168,6 +169,39 @@ impl Bodies {
                 let item = self.add(&name, Owner::Finger(f), carrier, &at, &shape)?;
                 (item.link, item.body_depth, item.is_tip) = (Some(finger.tip_link), finger.path.joints.len(), true);
             }
+        }
+        Ok(())
+    }
+
+    /// What rests beside the obstacles: supports, the other hands in their postures, the other objects where they are.
+    fn add_resting(&mut self, task: &Manipulation) -> Result<(), String> {
+        let (scene, state) = (task.scene, task.state);
+        for support in &scene.supports {
+            let placed = &support.body.placed;
+            self.add(&support.body.name, Owner::Obstacle, WORLD, &placed.parent_from_shape, &placed.shape)?;
+        }
+        for (h, other) in scene.hands.iter().enumerate().filter(|(h, _)| *h != task.hand_index) {
+            let (robot, joints) = (&other.hand.robot, &state.hand_joints[h]);
+            let model = Model::new(&Manipulation { hand_index: h, ..*task })?;
+            for (l, link) in robot.links.iter().enumerate() {
+                let path = Path::new(robot, LinkId(l), &model.world_from_root, &model.joint_names)?;
+                let world_from_link = pose_of(&path.world_from_link(joints));
+                let name = format!("{}/{}", other.name, link.name);
+                for placed in &link.collision {
+                    let shape = convex_of(&placed.shape).map_err(|error| format!("link \"{name}\": {error}"))?;
+                    self.add(&name, Owner::Obstacle, WORLD, &(world_from_link * placed.parent_from_shape), &shape)?;
+                }
+            }
+            for finger in &model.fingers {
+                let Some((shape, turn)) = finger.own_shape() else { continue };
+                let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));
+                let at = Pose::from_parts(finger.center.coords.into(), turn);
+                let at = pose_of(&finger.path.world_from_link(joints)) * at;
+                self.add(&format!("{}/tip of {}", other.name, finger.name), Owner::Obstacle, WORLD, &at, &shape)?;
+            }
+        }
+        for (o, other) in scene.objects.iter().enumerate().filter(|(o, _)| *o != task.object_index) {
+            self.add(&other.name, Owner::Obstacle, WORLD, &state.world_from_objects[o], other.solid())?;
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! Contact forces and joint torques, by substitution, as `docs/plan-format.md` (forces) asks.
+//! Contact forces and joint torques, by substitution, as `docs/reference/plan-format.md` (forces) asks.
 //!
 //! Forces are those of the fingers on the object, in the object frame; moments are about its centre of mass. Tolerances are
 //! fields of `CheckSettings`. At every waypoint

@@ -33,6 +33,8 @@ pub mod find_scene;
 pub mod forces;
 /// Grasps that the query gives.
 pub mod given;
+/// Who holds the object.
+mod holders;
 /// The checker's own forward kinematics and motion bounds.
 pub mod kinematics;
 /// How much a verdict covers.
@@ -307,25 +309,27 @@ impl Log {
 
 /// Judges `plan` in `scene`; with a `query`, also whether it answers that query.
 ///
-/// `scene` must be loaded afresh from the files: the hashes in `task.scene.inputs` are compared with those of the plan.
+/// `scene` must be loaded afresh from the files: the hashes in `scene.inputs` are compared with those of the plan.
 /// All that the plan does not move rests in `state`.
 pub fn check((scene, state): (&Scene, &State), query: Option<&Query>, plan: &Plan, settings: &CheckSettings) -> Report {
-    let task = &query.map_or(Manipulation::first(scene, state), |query| Manipulation::of(scene, state, query));
     let work = limits::Work::of(settings.most_work);
     let mut log = Log { most_per_kind: settings.most_per_kind, work, ..Log::default() };
     let mut report = Report::default();
-    promises::check_inputs(plan, &task.scene.inputs, &mut log);
-    match Model::new(task) {
-        Err(message) => log.push(Violation::new(ViolationKind::WrongScene, message)),
-        Ok(model) => {
+    promises::check_inputs(plan, &scene.inputs, &mut log);
+    let wrong_scene = |message| Violation::new(ViolationKind::WrongScene, message);
+    let found = holders::manipulation(scene, state, query, plan)
+        .and_then(|task| Ok((task, Model::new(&task).map_err(wrong_scene)?)));
+    match found {
+        Err(violation) => log.push(violation),
+        Ok((task, model)) => {
             if form_is_sound(&model, plan, &mut log) {
-                judge(task, query, plan, settings, &model, &mut log, &mut report);
+                judge(&task, query, plan, settings, &model, &mut log, &mut report);
             }
         }
     }
     limits::report_cut(&mut log, &mut report.left_out);
     report.level = settings.level;
-    report.gravity_in_world = task.scene.gravity().in_world().map(Into::into);
+    report.gravity_in_world = scene.gravity().in_world().map(Into::into);
     report.reached = Level::ALL.into_iter().rev().find(|level| log.count_at(*level) == 0);
     report.n_violations = log.count_at(settings.level);
     report.violations = log.found;
@@ -358,6 +362,7 @@ fn judge(
     continuity::check_meeting(plan, settings, log);
     continuity::check_joints(model, plan, settings, log);
     continuity::check_roles(model, plan, settings, log);
+    holders::check_holders(plan, log);
     let leap = limits::leap(model, plan, settings);
     if leap.is_none() {
         judge_tips(task, plan, settings, model, log, report);

@@ -166,6 +166,26 @@ impl Breeder<'_> {
         });
         self.add("two joint names swapped", &[WrongScene], |plan, rng| swap_two(&mut plan.joint_names, rng));
         self.add("two finger names swapped", &[WrongScene], |plan, rng| swap_two(&mut plan.fingers, rng));
+        self.add("hand of another name", &[WrongScene], |plan, _| {
+            plan.hand.push('2');
+            Some(())
+        });
+        self.add("object of another name", &[WrongScene], |plan, _| {
+            plan.object.push('2');
+            Some(())
+        });
+        self.add("answer to a query of another name", &[WrongScene], |plan, _| {
+            plan.query.push('2');
+            Some(())
+        });
+        self.add("object said to be held by nobody", &[WrongHolder], |plan, rng| {
+            pick(&mut plan.segments, rng)?.held_by.clear();
+            Some(())
+        });
+        self.add("object said to be held by another hand too", &[WrongHolder], |plan, rng| {
+            pick(&mut plan.segments, rng)?.held_by.push("other".into());
+            Some(())
+        });
         self.add("task renamed", &[WrongScene], |plan, _| {
             plan.task = if plan.task == "tracking" { "in_hand" } else { "tracking" }.into();
             Some(())

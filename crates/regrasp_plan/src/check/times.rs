@@ -1,4 +1,4 @@
-//! When waypoints are passed, and how fast joints, fingertips and object go, as `docs/plan-format.md` (time) asks.
+//! When waypoints are passed, and how fast joints, fingertips and object go, as `docs/reference/plan-format.md` (time) asks.
 //!
 //! - Time rises in a segment. The next one begins no earlier than it ends, and `shortest_pause` later where a contact force
 //!   is by then another, beyond `force_tolerance`.

@@ -179,7 +179,7 @@ fn what_is_balanced_at_waypoints_far_apart_is_not_in_between() {
 /// Forces that balance nothing, for gravity of any direction.
 pub fn any_gravity_plan(scene: &Scene) -> Plan {
     let mut weightless = scene.clone();
-    weightless.object.mass = 0.0;
+    weightless.objects[0].mass = 0.0;
     let mut plan = load(crate::rolled::plan(scene, 10), &weightless);
     let forces = plan.promises.forces.as_mut().unwrap();
     (forces.mass, forces.gravity_in_world) = (scene.objects[0].mass, None);
@@ -212,7 +212,7 @@ fn room_for_every_direction_is_room_for_each() {
         // A heavier object leaves too little room, for one limit or the other.
         let mut plan = squeezed;
         let mut heavy = under_any;
-        heavy.object.mass *= 20.0;
+        heavy.objects[0].mass *= 20.0;
         plan.promises.forces.as_mut().unwrap().mass *= 20.0;
         let found = kinds(&judge(&heavy, &plan));
         assert!(found.contains(&ViolationKind::ForceOutsideCone), "{found:?}");

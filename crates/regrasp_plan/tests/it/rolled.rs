@@ -156,7 +156,7 @@ fn sharp_tips_and_resting_objects_do_not_roll() {
     resting.iter_mut().for_each(|waypoint| waypoint.contacts[0].mode = ContactMode::Rolling);
     assert!(kinds(&judge(&scene, &plan)).contains(&ViolationKind::WrongContactMode));
     let mut sharp = sample::scene();
-    for finger in &mut sharp.hand.fingers {
+    for finger in &mut sharp.hands[0].hand.fingers {
         finger.tip.shape = regrasp_robot::TipShape::Point;
     }
     assert!(kinds(&judge(&sharp, &plan)).contains(&ViolationKind::WrongContactMode));

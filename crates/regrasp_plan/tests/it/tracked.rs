@@ -41,7 +41,7 @@ fn scene(shape: Shape) -> Scene {
     let mut scene = sample::scene();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/hands/four_fingertips/hand.toml");
     let hand = load_hand(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}")).hand;
-    scene.hands[0].hand = hand.placed_at(&sample::world_from_hand());
+    scene.hands[0].hand = hand;
     scene.objects[0] = Object {
         hull: None,
         name: "object".into(),

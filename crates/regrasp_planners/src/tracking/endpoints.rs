@@ -1,13 +1,15 @@
 //! What is wrong with a tracking query is said before any search.
 
-use super::forces::Forces;
-use super::grasp::TrackingGrasp;
-use super::step::Stepper;
-use crate::failure::{Failure, FailureKind};
-use crate::in_hand::endpoints::{End, Near, friction_in_words, given_grasp_at, refuse_buried_object};
-use crate::in_hand::inside::refuse_hand_inside;
-use crate::in_hand::model::Model;
+use crate::tracking::forces::Forces;
+use crate::tracking::grasp::TrackingGrasp;
+use crate::tracking::step::Stepper;
 use regrasp_geometry::{Shape, TriangleMesh};
+use regrasp_manipulation::ends::blocked::refuse_buried_object;
+use regrasp_manipulation::ends::end::End;
+use regrasp_manipulation::ends::given_grasp::{Near, given_grasp_at};
+use regrasp_manipulation::ends::inside::refuse_hand_inside;
+use regrasp_manipulation::failure::{Failure, FailureKind};
+use regrasp_manipulation::model::{Model, friction_in_words};
 use regrasp_scene::{Gravity, TrackingQuery};
 
 /// Vertices of a mesh may be this far in front of one of its triangles, as a share of the object's radius: rounding.
@@ -74,7 +76,8 @@ pub fn start(stepper: &Stepper, query: &TrackingQuery) -> Result<(TrackingGrasp,
     let grasp = TrackingGrasp::of(model, &state)
         .ok_or_else(|| invalid("a fingertip's centre is inside the object at the start".into(), "move it out"))?;
     let Ok(forces) = stepper.balanced_at_rest(&grasp) else {
-        let [least, largest] = stepper.settings.in_hand.forces.map_or([0.0, f64::MAX], |forces| forces.normal_force);
+        let [least, largest] =
+            stepper.settings.in_hand.physics.forces.map_or([0.0, f64::MAX], |forces| forces.normal_force);
         let message = format!(
             "at the start no contact forces balance the weight: friction {}, normal forces from {least} N to {largest} N",
             friction_in_words(model)

@@ -5,18 +5,17 @@
 //! the others closed and their forces within their cones. Which finger lands where is found by looking ahead: of some
 //! footholds of every finger that may leave, that one is taken from which tracking leads farthest towards the goal.
 
-use super::grasp::{TrackingGrasp, turn_to};
-use super::local::Local;
-use super::step::{Step, Stepper};
-use crate::in_hand::candidates::draw_footholds;
-use crate::in_hand::combine::releasable;
-use crate::in_hand::forces_along::add_forces;
-use crate::in_hand::model::Model;
-use crate::in_hand::record::Recorder;
-use crate::in_hand::relocate::{Foothold, relocate};
-use crate::in_hand::state::GraspState;
+use crate::tracking::grasp::{TrackingGrasp, turn_to};
+use crate::tracking::local::Local;
+use crate::tracking::step::{Step, Stepper};
 use nalgebra::UnitQuaternion;
 use regrasp_grasp::Contact;
+use regrasp_manipulation::forces::along::add_forces;
+use regrasp_manipulation::grasp::contact::draw_footholds;
+use regrasp_manipulation::grasp::state::GraspState;
+use regrasp_manipulation::model::{Model, releasable};
+use regrasp_manipulation::recording::recorder::Recorder;
+use regrasp_manipulation::relocation::{Foothold, relocate};
 use regrasp_plan::plan::Segment;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 

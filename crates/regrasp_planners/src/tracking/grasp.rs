@@ -1,13 +1,13 @@
 //! Where object and fingertips are.
 
-use crate::in_hand::model::{MAX_FINGERS, Model};
-use crate::in_hand::state::GraspState;
-use crate::in_hand::workspace::{Contacts, HandJoints};
 use arrayvec::ArrayVec;
 use nalgebra::UnitQuaternion;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Point, Vector};
 use regrasp_grasp::contact::rolling::Touch;
+use regrasp_manipulation::grasp::state::GraspState;
+use regrasp_manipulation::model::{MAX_FINGERS, Model};
+use regrasp_manipulation::workspace::{Contacts, HandJoints};
 
 /// One fingertip each.
 pub type PerFinger<T> = ArrayVec<T, MAX_FINGERS>;

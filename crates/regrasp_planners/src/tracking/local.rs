@@ -1,13 +1,13 @@
 //! The local planner (paper 003, section 6.2.4, `LocalReOrientation`): from a grasp towards a sub-goal, step by step.
 
-use super::grasp::{PerFinger, TrackingGrasp, turn_to};
-use super::object_motion::ObjectMotion;
-use super::step::{Asked, Controls, Fingers, NoStep, Roles, STEP_WORK, Step, Stepper, each};
-use crate::in_hand::model::{MAX_FINGERS, Model};
+use crate::tracking::grasp::{PerFinger, TrackingGrasp, turn_to};
+use crate::tracking::object_motion::ObjectMotion;
+use crate::tracking::step::{Asked, Controls, Fingers, NoStep, Roles, STEP_WORK, Step, Stepper, each};
 use arrayvec::ArrayVec;
 use nalgebra::UnitQuaternion;
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, UnitVector, Vector, frame};
+use regrasp_manipulation::model::{MAX_FINGERS, Model};
 use regrasp_robot::kinematics::whole_pose::has_all_directions;
 
 /// Time of a local plan in units of that to the sub-goal (paper 003: `bound_1`, twice).

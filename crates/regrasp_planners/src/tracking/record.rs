@@ -1,14 +1,15 @@
 //! The plan as it is written to a file.
 
-use super::forces::Forces;
-use super::gaiting::{Move, Relocation};
-use super::grasp::{PerFinger, TrackingGrasp};
-use super::settings::TrackingSettings;
-use super::step::{Relative, Roles, Step, Stepper, each};
-use crate::in_hand::model::Model;
-use crate::in_hand::record::{CONTACT_TOLERANCE, SLIP_TOLERANCE, plan_of};
-use crate::in_hand::timing;
+use crate::tracking::forces::Forces;
+use crate::tracking::gaiting::{Move, Relocation};
+use crate::tracking::grasp::{PerFinger, TrackingGrasp};
+use crate::tracking::settings::TrackingSettings;
+use crate::tracking::step::{Relative, Roles, Step, Stepper, each};
 use regrasp_geometry::Vector;
+use regrasp_manipulation::model::Model;
+use regrasp_manipulation::recording::plan::plan_of;
+use regrasp_manipulation::timing;
+use regrasp_manipulation::tolerances::{CONTACT_TOLERANCE, SLIP_TOLERANCE};
 use regrasp_plan::plan::{
     ContactMode, ContactState, Plan, PoseData, Promises, Segment, SegmentKind, Statistics, TrackingPromises, Waypoint,
 };
@@ -95,7 +96,8 @@ pub fn record(
     };
     let plan = plan_of(
         model.view,
-        (TRACKING, [&query.world_from_object_start, &query.world_from_object_goal]),
+        TRACKING,
+        [&query.world_from_object_start, &query.world_from_object_goal],
         promises,
         segments,
     );
@@ -160,6 +162,7 @@ fn tracking_segment(model: &Model, roles: &Roles, waypoints: Vec<Waypoint>) -> S
         kind: SegmentKind::Tracking,
         moving_finger: moving.next(),
         also_moving: moving.collect(),
+        held_by: Vec::new(),
         rolling_finger: Some(name(roles.rolling)),
         waypoints,
     }

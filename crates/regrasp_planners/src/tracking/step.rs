@@ -1,18 +1,18 @@
 //! One step of time: the object moves on the fingertips that rest, one fingertip moves, and forces hold all of it (paper 003,
 //! sections 6.2.1 to 6.2.3).
 
-use super::forces::{Forces, Load, Pressing, balance};
-use super::grasp::{PerFinger, TrackingGrasp};
-use super::object_motion::ObjectMotion;
-use super::settings::TrackingSettings;
-use crate::in_hand::forces::ForceModel;
-use crate::in_hand::model::{MAX_FINGERS, Model};
-use crate::in_hand::roll::RollStep;
-use crate::in_hand::workspace::{TipMode, Workspace};
+use crate::tracking::forces::{Forces, Load, Pressing, balance};
+use crate::tracking::grasp::{PerFinger, TrackingGrasp};
+use crate::tracking::object_motion::ObjectMotion;
+use crate::tracking::settings::TrackingSettings;
 use nalgebra::Rotation3;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Point, UnitVector, Vector, frame, interpolate_pose};
 use regrasp_grasp::contact::rolling::{Touch, roll_step, slip, turn_between};
+use regrasp_manipulation::forces::limits::ForceModel;
+use regrasp_manipulation::model::{MAX_FINGERS, Model};
+use regrasp_manipulation::rolling::step::RollStep;
+use regrasp_manipulation::workspace::{TipMode, Workspace};
 use regrasp_plan::plan::ContactMode;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use regrasp_robot::kinematics::whole_pose::{has_all_directions, joints_of_pose, torques};
@@ -256,7 +256,7 @@ impl<'m, 'a> Stepper<'m, 'a> {
             let (from_pose, to_pose) = (from.to_pose(), to.to_pose());
             let between = |t: f64| Placement::from(&interpolate_pose(&from_pose, &to_pose, t));
             let step = RollStep::new(model, moving, &start.contact(), &grasp.joints[moving], &from, &to);
-            let allowed = 0.2 * crate::in_hand::record::CONTACT_TOLERANCE;
+            let allowed = 0.2 * regrasp_manipulation::tolerances::CONTACT_TOLERANCE;
             let rolled = step.fine(between, allowed).map_err(|_| NoStep::OutOfReach)?;
             end.world_from_link[moving] = chain.last_frame(&rolled.joints);
             end.joints[moving] = rolled.joints;

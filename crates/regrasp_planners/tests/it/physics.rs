@@ -2,28 +2,37 @@
 
 use crate::in_hand_methods::scene;
 use crate::places::shared_models;
+use crate::queries::Queries;
 use crate::soft_and_coupled;
 use nalgebra::{DMatrix, UnitQuaternion};
 use regrasp_base::{Budget, Rng};
 use regrasp_geometry::{Point, Pose, UnitVector, Vector, frame};
 use regrasp_grasp::{Contact, ContactForce, ContactModel, Grip};
 use regrasp_plan::Plan;
-use regrasp_plan::check::{CheckSettings, Level, check};
+use regrasp_plan::check::{CheckSettings, Level};
 use regrasp_plan::plan::{SegmentKind, Waypoint};
 use regrasp_planners::Failure;
+use regrasp_planners::in_hand::PhysicsSettings;
 use regrasp_planners::in_hand::{ForceSettings, InHandSettings, plan_in_hand};
 use regrasp_scene::{Gravity, Limits, LoadedScene, Scene};
 
 const SCENES: [&str; 4] = ["sphere_90x.toml", "box_90x.toml", "soft_pair_roll.toml", "shadow/sphere32_z.toml"];
 
 fn settings() -> InHandSettings {
-    InHandSettings { friction_margin: 1.5, forces: Some(ForceSettings::default()), ..InHandSettings::default() }
+    InHandSettings {
+        physics: PhysicsSettings {
+            friction_margin: 1.5,
+            forces: Some(ForceSettings::default()),
+            ..PhysicsSettings::default()
+        },
+        ..InHandSettings::default()
+    }
 }
 
 fn plan_with(loaded: &LoadedScene, settings: &InHandSettings, seed: u64) -> Result<Plan, Failure> {
-    let (query, budget) = (loaded.task().query(seed), Budget::work(3_000_000));
-    let plan = plan_in_hand(&loaded.view(), query.as_in_hand().unwrap(), settings, seed, &budget, &|_| {})?;
-    let report = check((&loaded.scene, &loaded.state), Some(&query), &plan, &CheckSettings::default());
+    let (query, budget) = (loaded.in_hand(seed), Budget::work(3_000_000));
+    let plan = plan_in_hand(&loaded.view(), &query, settings, seed, &budget, &|_| {})?;
+    let report = loaded.judge(&query, &plan, &CheckSettings::default());
     assert!(report.accepted(), "seed {seed}: {report:#?}");
     Ok(plan)
 }
@@ -216,7 +225,7 @@ fn check_tips(loaded: &LoadedScene, from: &Waypoint, to: &Waypoint, largest: f64
 fn plans_rest_between_segments_and_keep_to_their_limits() {
     for_plans(|name, loaded, plan| {
         let limits = &plan.promises.motion;
-        let speed = settings().speed;
+        let speed = settings().physics.speed;
         assert_eq!(plan.segments[0].waypoints[0].time, 0.0);
         let mut fastest: f64 = 0.0;
         for (s, segment) in plan.segments.iter().enumerate() {
@@ -320,8 +329,7 @@ fn changed(name: &str, change: impl FnOnce(&mut Scene)) -> LoadedScene {
 fn without_forces_there_is_no_plan_and_the_cause_is_named() {
     let budget = Budget::work(60_000);
     let fails = |loaded: &LoadedScene, settings: &InHandSettings| {
-        let failure =
-            plan_in_hand(&loaded.view(), loaded.task().query(0).as_in_hand().unwrap(), settings, 0, &budget, &|_| {});
+        let failure = plan_in_hand(&loaded.view(), &loaded.in_hand(0), settings, 0, &budget, &|_| {});
         let failure = failure.expect_err("nothing balances it");
         let causes: Vec<&str> = failure.causes.iter().map(|cause| cause.reason.as_str()).collect();
         (causes.join("\n"), failure.advice)
@@ -334,20 +342,22 @@ fn without_forces_there_is_no_plan_and_the_cause_is_named() {
             scene.objects[0].mass = 20.0;
             scene.limits.normal_force = 500.0;
         }),
-        &InHandSettings { forces: Some(strong), ..settings() },
+        &InHandSettings { physics: PhysicsSettings { forces: Some(strong), ..settings().physics }, ..settings() },
     );
     assert!(causes.contains(" would need more than 1 N m"), "{causes}");
     let weak = ForceSettings { torque_share: 0.1, ..ForceSettings::default() };
-    let (causes, advice) = fails(&scene("sphere_90x.toml"), &InHandSettings { forces: Some(weak), ..settings() });
+    let (causes, advice) = fails(
+        &scene("sphere_90x.toml"),
+        &InHandSettings { physics: PhysicsSettings { forces: Some(weak), ..settings().physics }, ..settings() },
+    );
     assert!(causes.contains("balance the weight: joint \"") && causes.contains(" would need more than 0.1 N m"));
     assert!(advice.contains("no contact forces"), "{advice}");
     // The same without asking about forces.
     let heavy = changed("sphere_90x.toml", |scene| scene.objects[0].mass = 20.0);
-    let plain = InHandSettings { forces: None, ..settings() };
-    let query = heavy.task().query(0);
-    let plan = plan_in_hand(&heavy.view(), query.as_in_hand().unwrap(), &plain, 0, &budget, &|_| {})
-        .expect("geometry knows no weight");
-    let report = check((&heavy.scene, &heavy.state), Some(&query), &plan, &CheckSettings::default());
+    let plain = InHandSettings { physics: PhysicsSettings { forces: None, ..settings().physics }, ..settings() };
+    let query = heavy.in_hand(0);
+    let plan = plan_in_hand(&heavy.view(), &query, &plain, 0, &budget, &|_| {}).expect("geometry knows no weight");
+    let report = heavy.judge(&query, &plan, &CheckSettings::default());
     assert_eq!(report.reached, Some(Level::Geometry), "{report:#?}");
     assert!(plan.promises.forces.is_none());
     let waypoints = || plan.segments.iter().flat_map(|segment| &segment.waypoints);

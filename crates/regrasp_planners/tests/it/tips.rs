@@ -1,5 +1,6 @@
 //! Fingertips that are no balls, and pads: ellipsoids and meshes roll and hold, and touch where they may.
 
+use crate::queries::Queries;
 use regrasp_base::{Budget, Rng};
 use regrasp_geometry::{Pose, UnitVector, Vector};
 use regrasp_plan::check::mutation::mutants;
@@ -19,18 +20,11 @@ fn load(name: &str) -> LoadedScene {
 }
 
 fn plan(loaded: &LoadedScene, settings: &InHandSettings, seed: u64) -> Result<Plan, Failure> {
-    plan_in_hand(
-        &loaded.view(),
-        loaded.task().query(seed).as_in_hand().unwrap(),
-        settings,
-        seed,
-        &Budget::work(2_000_000),
-        &|_| {},
-    )
+    plan_in_hand(&loaded.view(), &loaded.in_hand(seed), settings, seed, &Budget::work(2_000_000), &|_| {})
 }
 
 fn judge(loaded: &LoadedScene, plan: &Plan) -> Report {
-    check((&loaded.scene, &loaded.state), Some(&loaded.task().query(plan.seed)), plan, &CheckSettings::default())
+    loaded.judge(&loaded.in_hand(plan.seed), plan, &CheckSettings::default())
 }
 
 /// Outward normals of the tips where they hold, in the frame of their last link, with the finger.
@@ -101,11 +95,11 @@ fn every_mutant_of_such_a_plan_is_rejected_for_a_fitting_reason() {
         let loaded = load(name);
         let good = plan(&loaded, &InHandSettings::default(), 1).unwrap();
         let query = loaded.task().query(1);
-        let found = mutants(&good, &loaded.scene, &mut Rng::keyed(1, "tips", 0));
+        let found = mutants(&good, loaded.manipulation(), &mut Rng::keyed(1, "tips", 0));
         assert!(found.iter().any(|mutant| mutant.name == "pad that ends beside the contact"));
         for mutant in found {
             let scene = mutant.scene.as_ref().unwrap_or(&loaded.scene);
-            let report = check(scene, Some(&query), &mutant.plan, &CheckSettings::default());
+            let report = check((scene, &loaded.state), Some(&query), &mutant.plan, &CheckSettings::default());
             let fits = report.violations.iter().any(|violation| mutant.expected.contains(&violation.kind));
             assert!(fits, "{name}, {}: {report:#?}", mutant.name);
         }

@@ -27,7 +27,7 @@ pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Resu
         let problem = format!("has {} fingers", spec.fingers.len());
         return Err(Diagnostic::new("U221", Place::file(file), problem)
             .expected(format!("at most {MAX_FINGERS}"))
-            .fix(format!("write a hand file that names at most {MAX_FINGERS} of them (docs/hand-format.md)"))
+            .fix(format!("write a hand file that names at most {MAX_FINGERS} of them (docs/reference/hand-format.md)"))
             .into());
     }
     let moving = moving_joints(robot, spec, &mut found);

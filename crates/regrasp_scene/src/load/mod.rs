@@ -1,4 +1,4 @@
-//! The scene file. `docs/scene-format.md` says what it may contain.
+//! The scene file. `docs/reference/scene-format.md` says what it may contain.
 //!
 //! Codes: S100 not TOML, S101 unknown key, S102 missing key, S103 wrong type, S104 unknown word, S105 another format,
 //! S106 exactly one of several, S107 number out of range, S110 file not found, S112 name used twice, S120 unknown joint
@@ -69,6 +69,27 @@ impl LoadedScene {
     /// The task called `name`.
     pub fn task_named(&self, name: &str) -> Option<&Task> {
         self.tasks.iter().find(|task| task.name == name)
+    }
+
+    /// The task of a plan for the query called `name`: the one of that name, else the first.
+    pub fn task_for(&self, name: &str) -> &Task {
+        self.task_named(name).unwrap_or(self.task())
+    }
+
+    /// The same scene with the task of a plan for the query called `name` as its first.
+    #[must_use]
+    pub fn for_query(self, name: &str) -> Self {
+        match self.task_named(name) {
+            Some(_) => self.choosing(name).expect("the scene has a task of this name"),
+            None => self,
+        }
+    }
+
+    /// The same scene with the task called `name` as its first; none where it has none of that name.
+    pub fn choosing(mut self, name: &str) -> Option<Self> {
+        let index = self.tasks.iter().position(|task| task.name == name)?;
+        self.tasks[..=index].rotate_right(1);
+        Some(self)
     }
 
     /// The hand and the object of `task`, among everything else.

@@ -99,7 +99,7 @@ impl TaskKind {
 /// A task of a scene file, before a seed resolves its randomness.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Task {
-    /// Its name, unique among the tasks of the scene.
+    /// Its name, unique among the tasks of the scene; empty where the file has only one.
     pub name: String,
     /// The hand, by its index in `Scene::hands`.
     pub hand: usize,
@@ -141,10 +141,11 @@ impl Task {
         let n_legs = self.goal.n_legs();
         way.extend((1..n_legs).map(|leg| self.goal.pose_at(&start, leg as f64 / n_legs as f64)));
         let (start_grasp, goal_grasp) = (self.start_grasp.clone(), self.goal_grasp.clone());
-        let (hand, object) = (self.hand, self.object);
+        let (name, hand, object) = (self.name.clone(), self.hand, self.object);
         let goal = self.goal.pose(&start);
         match self.kind {
             TaskKind::InHand => Query::InHand(InHandQuery {
+                name,
                 hand,
                 object,
                 world_from_object_start: start,
@@ -154,6 +155,7 @@ impl Task {
                 goal_grasp,
             }),
             TaskKind::Tracking => Query::Tracking(TrackingQuery {
+                name,
                 hand,
                 object,
                 world_from_object_start: start,

@@ -11,7 +11,7 @@ const OBSTACLE: &str = "\n[[obstacles]]\nname = \"wall\"\nbox = { size = [0.01, 
 #[test]
 fn every_pair_is_there_or_has_a_reason_not_to_be() {
     let mut loaded = Folder::new().load(&format!("{GOOD}{OBSTACLE}")).unwrap();
-    let pairs = collision_pairs(&loaded.scene);
+    let pairs = collision_pairs(&loaded.view());
     let hand = &loaded.scene.hands[0].hand;
     let n_shapes: usize = hand.fingers.iter().map(|finger| finger.shapes.len()).sum();
     assert_eq!(pairs.tip_object.len() + pairs.link_object.len(), n_shapes);
@@ -39,7 +39,7 @@ fn every_pair_is_there_or_has_a_reason_not_to_be() {
     let link = |id: FingerShapeId| hand.fingers[id.finger.0].shapes[id.shape].link;
     let (a, b) = (link(a), link(b));
     loaded.scene.hands[0].hand.allowed_pairs.insert((a.min(b), a.max(b)));
-    let fewer = collision_pairs(&loaded.scene);
+    let fewer = collision_pairs(&loaded.view());
     assert!(fewer.finger_finger.len() < pairs.finger_finger.len());
     assert_eq!(fewer.within_finger.len(), pairs.within_finger.len());
 }
@@ -48,8 +48,8 @@ fn every_pair_is_there_or_has_a_reason_not_to_be() {
 fn near_at_rest(loaded: &LoadedScene, required: f64) -> Vec<String> {
     let scene = &loaded.scene;
     let hand = &scene.hands[0].hand;
-    let pairs = collision_pairs(scene);
-    let world_from_object = Placement::from(&loaded.task().query(0).world_from_object_start);
+    let pairs = collision_pairs(&loaded.view());
+    let world_from_object = Placement::from(loaded.task().query(0).start());
     let bodies: Vec<Vec<Pose>> = hand
         .fingers
         .iter()

@@ -15,7 +15,7 @@ export interface Story {
   scene: SceneStory;
   /** Poses asked for: start, then way poses, then goal; in the world. At least two, or empty when unknown. */
   asked: PoseData[];
-  /** The plan file as it is (docs/plan-format.md), or null when none was found. */
+  /** The plan file as it is (docs/reference/plan-format.md), or null when none was found. */
   plan: Plan | null;
   /** What the checker measured; null when there is no plan. */
   judged: Judged | null;
@@ -120,7 +120,7 @@ export interface RoadmapStory {
   solution: number[];
 }
 
-// ---- the plan file (docs/plan-format.md); only what the page reads ----
+// ---- the plan file (docs/reference/plan-format.md); only what the page reads ----
 
 export interface Plan {
   format: "regrasp-plan";

@@ -16,7 +16,7 @@ fn has_rolling(plan: &Plan) -> bool {
 #[test]
 fn the_series_has_the_smallest_values_of_the_report() {
     for sample in samples() {
-        let found = along(&sample.loaded.scene, &sample.plan).unwrap();
+        let found = along(&sample.loaded.manipulation(), &sample.plan).unwrap();
         let n_waypoints: usize = sample.plan.segments.iter().map(|segment| segment.waypoints.len()).sum();
         assert_eq!((found.margin.len(), found.clearance.len()), (n_waypoints, n_waypoints));
         let least = found.margin.iter().copied().fold(f64::INFINITY, f64::min);
@@ -40,7 +40,7 @@ fn a_plan_of_another_scene_has_no_series_but_a_page() {
     let sample = Sample::sphere();
     let mut other = sample.plan.clone();
     other.joint_names.pop();
-    assert!(along(&sample.loaded.scene, &other).is_err());
+    assert!(along(&sample.loaded.manipulation(), &other).is_err());
     let report =
         check((&sample.loaded.scene, &sample.loaded.state), Some(&sample.query), &other, &CheckSettings::default());
     assert!(!report.accepted());

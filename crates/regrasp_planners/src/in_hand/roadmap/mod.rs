@@ -36,13 +36,13 @@ pub use identity::{Digest, Identity};
 pub use query::{Answer, QueryMemory, RoadmapPlanner};
 pub use region::Region;
 
-use super::settings::InHandSettings;
-use crate::in_world::outline_in_world;
-use crate::outline::{Outline, OutlineEdge};
+use crate::settings::InHandSettings;
 use graph::Graph;
 use index::{Costs, Index};
 use landmarks::Landmarks;
 use regrasp_base::{Diagnostic, InputError, Place};
+use regrasp_manipulation::in_world::outline_in_world;
+use regrasp_manipulation::outline::{Outline, OutlineEdge};
 use regrasp_robot::ContactModel;
 use regrasp_scene::HandView;
 use std::collections::{BTreeMap, BTreeSet};
@@ -248,14 +248,14 @@ impl GraspRoadmap {
 fn feasibility(settings: &InHandSettings) -> [(&'static str, serde_json::Value); 8] {
     use serde_json::json;
     [
-        ("closure_margin", json!(settings.closure_margin)),
-        ("friction_margin", json!(settings.friction_margin)),
-        ("release_rule", json!(settings.release_rule)),
-        ("step", json!(settings.step)),
-        ("clearance", json!(settings.clearance)),
-        ("contact_allowance", json!(settings.contact_allowance)),
-        ("limit_margin", json!(settings.limit_margin)),
-        ("joint_step", json!(settings.joint_step)),
+        ("closure_margin", json!(settings.physics.closure_margin)),
+        ("friction_margin", json!(settings.physics.friction_margin)),
+        ("release_rule", json!(settings.search.release_rule)),
+        ("step", json!(settings.physics.step)),
+        ("clearance", json!(settings.physics.clearance)),
+        ("contact_allowance", json!(settings.physics.contact_allowance)),
+        ("limit_margin", json!(settings.physics.limit_margin)),
+        ("joint_step", json!(settings.physics.joint_step)),
     ]
 }
 

@@ -1,8 +1,8 @@
 //! The poses of the object that a roadmap covers, and places spread over them.
 
-use super::super::model::Model;
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, Vector, frame, pose_from};
+use regrasp_manipulation::model::Model;
 use serde::{Deserialize, Serialize};
 
 /// Poses with the object's centre of mass in a box of the hand's frame and its orientation within an angle of a reference.
@@ -106,7 +106,7 @@ pub fn spread_places(model: &Model, region: &Region, n: usize, seed: u64) -> Vec
         let mut best: Option<(f64, Pose)> = None;
         for _ in 0..CANDIDATES {
             let pose = region.draw(&center_of_mass, &mut rng);
-            if super::super::endpoints::object_blocked_by(model, &pose).is_some() {
+            if regrasp_manipulation::ends::blocked::object_blocked_by(model, &pose).is_some() {
                 continue;
             }
             let nearest = nearness(&places, &pose, model.turn_length());
