@@ -23,4 +23,4 @@ pub use regrasp_plan::Plan;
 pub use regrasp_planners::{
     Failure, InHandSettings, Method, PlannerSettings, TrackingMethod, TrackingSettings, plan_in_hand, plan_tracking,
 };
-pub use regrasp_scene::{InHandQuery, Scene};
+pub use regrasp_scene::{HandView, InHandQuery, Manipulation, Query, Scene, State, TrackingQuery};

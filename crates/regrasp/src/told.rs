@@ -5,6 +5,7 @@ use regrasp_geometry::frame::{parts_of, pose_distance, rotation_between};
 use regrasp_plan::Plan;
 use regrasp_planners::in_hand::roadmap::GraspRoadmap;
 use regrasp_planners::{Failure, Outline, OutlineEdge, OutlineNode};
+use regrasp_scene::HandView;
 use regrasp_viewer::story::{
     CauseStory, FailureStory, NearestMissStory, RoadmapEdge, RoadmapEdgeKind, RoadmapNode, RoadmapStory,
 };
@@ -64,9 +65,9 @@ fn kind_of(failure: &Failure) -> String {
     value.as_str().unwrap_or_default().to_owned()
 }
 
-/// The graph of a saved roadmap, with the way of `plan` through it where the plan was made on it.
-pub fn roadmap_story(roadmap: &GraspRoadmap, plan: &Plan) -> RoadmapStory {
-    let outline = roadmap.outline();
+/// The graph of a roadmap opened for `view`, with the way of `plan` through it where the plan was made on it.
+pub fn roadmap_story(roadmap: &GraspRoadmap, view: &HandView, plan: &Plan) -> RoadmapStory {
+    let outline = roadmap.outline_in_world(view);
     let mut story = outline_story(&outline, &Pose::from(&plan.goal));
     story.solution = way_through(&outline, plan);
     story

@@ -43,8 +43,7 @@ fn answer(
     settings: &RunSettings,
     memory: &mut QueryMemory,
 ) -> (Row, Option<Plan>) {
-    let mut row =
-        Row { scene: problem.scene.name.clone(), method: "roadmap".into(), seed: problem.seed, ..Row::default() };
+    let mut row = Row { scene: problem.name(), method: "roadmap".into(), seed: problem.seed, ..Row::default() };
     let started = (Instant::now(), ThreadTime::now());
     let budget = Budget {
         max_work: settings.max_work,
@@ -52,7 +51,8 @@ fn answer(
         improve_for: None,
         cancelled: Arc::clone(&settings.cancelled),
     };
-    let outcome = planner.plan(problem.query, problem.seed, &budget, memory);
+    let query = problem.query.as_in_hand().expect("queries of roadmaps are in-hand queries");
+    let outcome = planner.plan(query, problem.seed, &budget, memory);
     row.plan_s = started.0.elapsed().as_secs_f64();
     row.plan_cpu_s = started.1.elapsed().as_secs_f64();
     match outcome {

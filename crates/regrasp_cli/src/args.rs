@@ -42,6 +42,9 @@ pub struct Common {
     /// No talk; errors are still shown
     #[arg(long, global = true)]
     pub quiet: bool,
+    /// Task of a scene that has several, by its name [default: the first; in bench: all]
+    #[arg(long = "task", value_name = "NAME", global = true)]
+    pub task: Option<String>,
     /// Drop what cannot be understood in robot files and list it, instead of refusing
     #[arg(long, global = true)]
     pub lenient: bool,

@@ -10,7 +10,8 @@ use regrasp::base::{Diagnostic, Place};
 use regrasp::plan::check::{CheckSettings, Level, Report};
 use regrasp::plan::format;
 use regrasp::planners::Progress;
-use regrasp::scene::TaskKind;
+use regrasp::scene::Task;
+use regrasp::scene::query::IN_HAND;
 use regrasp::{Budget, Failure, InHandSettings, PlannerSettings, TrackingSettings};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -35,6 +36,7 @@ pub struct Request {
     improve_work: Option<u64>,
     settings: Option<String>,
     level: String,
+    task: Option<String>,
     progress: Option<Py<PyAny>>,
 }
 
@@ -42,17 +44,24 @@ pub struct Request {
 #[pyfunction]
 pub fn plan(py: Python<'_>, scene: &Scene, request: Request) -> PyResult<(Option<Plan>, String)> {
     guarded(py, || {
-        let task = scene.loaded.task.kind;
+        let task = scene.task(py, request.task.as_deref())?;
         let level = level_named(&request.level).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
         let settings = settings(task, &request).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
-        let query = scene.loaded.task.query(request.seed);
+        let query = task.query(request.seed);
         let started = Instant::now();
         let seconds = |value: Option<f64>| value.map(Duration::from_secs_f64);
         let (deadline, improve_for) =
             (seconds(request.time_limit).map(|limit| started + limit), seconds(request.improve));
         let found = watched(py, request.progress.as_ref(), |cancelled, report| {
             let budget = Budget { max_work: request.max_work, deadline, improve_for, cancelled };
-            regrasp::planners::plan(&scene.loaded.scene, &query, &settings, request.seed, &budget, report)
+            regrasp::planners::plan(
+                (&scene.loaded.scene, &scene.loaded.state),
+                &query,
+                &settings,
+                request.seed,
+                &budget,
+                report,
+            )
         })?;
         let plan = match found {
             Ok(plan) => plan,
@@ -73,9 +82,9 @@ pub fn check(py: Python<'_>, plan: &Plan, scene: &Scene, level: &str) -> PyResul
     guarded(py, || {
         let level = level_named(level).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
         let judged = py.detach(|| {
-            let query = scene.loaded.task.query(plan.plan.seed);
+            let query = scene.loaded.task_for(&plan.plan.query).query(plan.plan.seed);
             let settings = CheckSettings { level, ..CheckSettings::default() };
-            regrasp::plan::check::check(&scene.loaded.scene, Some(&query), &plan.plan, &settings)
+            regrasp::plan::check::check((&scene.loaded.scene, &scene.loaded.state), Some(&query), &plan.plan, &settings)
         });
         Ok(report(&judged))
     })
@@ -98,9 +107,9 @@ fn judged_as_written(
     let plan = format::from_json(Path::new("plan.json"), format::to_json(plan).as_bytes())
         .expect("a plan just made is a plan file");
     let again = scene.read_again()?;
-    let query = again.task.query(plan.seed);
+    let query = again.task_for(&plan.query).query(plan.seed);
     let settings = CheckSettings { level, ..CheckSettings::default() };
-    let report = regrasp::plan::check::check(&again.scene, Some(&query), &plan, &settings);
+    let report = regrasp::plan::check::check((&again.scene, &again.state), Some(&query), &plan, &settings);
     Ok((plan, report))
 }
 
@@ -131,10 +140,10 @@ fn given<T: Default + serde::de::DeserializeOwned>(request: &Request) -> Result<
 }
 
 /// Settings for a task of this kind: those of a tracking task are the given ones, but for the method.
-fn settings(task: TaskKind, request: &Request) -> Result<PlannerSettings, Diagnostic> {
-    match task {
-        TaskKind::InHand => Ok(PlannerSettings { in_hand: in_hand(request)?, ..PlannerSettings::default() }),
-        TaskKind::Tracking => {
+fn settings(task: &Task, request: &Request) -> Result<PlannerSettings, Diagnostic> {
+    match task.kind_name() {
+        IN_HAND => Ok(PlannerSettings { in_hand: in_hand(request)?, ..PlannerSettings::default() }),
+        _ => {
             refuse_arguments_of_in_hand(request)?;
             let mut tracking: TrackingSettings = given(request)?;
             if let Some(method) = &request.method {
@@ -179,12 +188,14 @@ fn in_hand(request: &Request) -> Result<InHandSettings, Diagnostic> {
         settings.method = method_named(method)?;
     }
     if let Some(margin) = request.margin {
-        settings.closure_margin = margin;
+        settings.physics.closure_margin = margin;
     }
     match request.improve_work {
-        Some(work) => settings.improve_work = work,
+        Some(work) => settings.improvement.improve_work = work,
         // Time alone is to end it.
-        None if request.improve.is_some() && settings.improve_work == 0 => settings.improve_work = u64::MAX,
+        None if request.improve.is_some() && settings.improvement.improve_work == 0 => {
+            settings.improvement.improve_work = u64::MAX
+        }
         None => {}
     }
     settings.validate().map_err(|problem| bad("A503", problem).element("argument", "settings"))?;

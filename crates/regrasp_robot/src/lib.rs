@@ -4,8 +4,12 @@
 
 /// What a fingertip can transmit where it touches.
 pub mod contact_model;
+/// Joints that follow others.
+pub mod coupling;
 /// A hand: a palm and serial fingers.
 pub mod hand;
+/// Ids of links and joints.
+pub mod ids;
 /// Readers: URDF, SRDF, `package://` paths, hand files.
 pub mod import;
 /// What a robot and a hand are like: joints, meshes, units, fingers guessed, links that always or never touch.
@@ -18,10 +22,11 @@ pub mod robot;
 pub mod tip;
 
 pub use contact_model::ContactModel;
+pub use coupling::{Coupling, LinearLimit};
 pub use hand::{Finger, FingerId, FingerShape, Hand};
 pub use import::{LoadOptions, LoadedHand, LoadedInput, LoadedRobot, ResolveOptions, load_hand, load_robot};
 pub use kinematics::chain::{Chain, ChainJoint, Motion};
-pub use robot::{Joint, JointId, JointKind, Limits, Link, LinkId, Mimic, Robot, Visual, VisualGeometry, VisualMesh};
+pub use robot::{Joint, JointId, JointKind, Limits, Link, LinkId, Robot, Visual, VisualGeometry, VisualMesh};
 pub use tip::{Tip, TipShape};
 
 #[cfg(test)]

@@ -8,7 +8,8 @@ use crate::outputs::{Output, Outputs};
 use crate::stop::Stop;
 use crate::talk::{Talk, counted};
 use regrasp::base::files;
-use regrasp::scene::{LoadedScene, TaskKind};
+use regrasp::scene::LoadedScene;
+use regrasp::scene::query::TRACKING;
 use regrasp::{InHandSettings, InputError, TrackingSettings};
 use regrasp_bench::at_once::in_order;
 use regrasp_bench::growth;
@@ -38,7 +39,7 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
     let files = load::scene_files(&arguments.scenes)?;
     let (mut scenes, bad) = load_scenes(&files, arguments, common, talk)?;
     let (planner, tracking) = bench_settings(&scenes, arguments)?;
-    let improves = planner.improve_work > 0;
+    let improves = planner.improvement.improve_work > 0;
     let cancelled = interrupt::flag()?;
     let mut writer = match &arguments.csv {
         Some(path) => {
@@ -65,8 +66,8 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
         let n_seeds = arguments.seeds.unwrap_or(DEFAULT_SEEDS).min(u64::MAX - arguments.first_seed);
         let job = |index: usize| {
             let seed = arguments.first_seed + index as u64;
-            let query = loaded.task.query(seed);
-            run_one(Problem { scene: &loaded.scene, query: &query, seed }, &settings)
+            let query = loaded.task().query(seed);
+            run_one(Problem { task: loaded.manipulation(), query: &query, seed }, &settings)
         };
         in_order(n_seeds as usize, arguments.at_once, job, |_, row| {
             if cancelled.load(Ordering::Relaxed) {
@@ -108,7 +109,13 @@ fn load_scenes(
     let (mut scenes, mut bad) = (Vec::new(), Vec::new());
     for path in files {
         match load::scene(path, common, talk) {
-            Ok(scene) => scenes.push(arguments.judging.scene(scene)),
+            Ok(loaded) => {
+                let loaded = arguments.judging.scene(loaded);
+                // Of several tasks each is a problem of its own, but where one was asked for.
+                let n_tasks = if common.task.is_some() { 1 } else { loaded.tasks.len() };
+                let names: Vec<String> = loaded.tasks.iter().take(n_tasks).map(|task| task.name.clone()).collect();
+                scenes.extend(names.iter().map(|name| loaded.clone().for_query(name)));
+            }
             Err(Stop::BadInput(error)) => {
                 talk.note(&format!("{} is left out: it cannot be read", path.display()));
                 talk.event("left_out", json!({ "scene": path, "diagnostics": error.diagnostics }));
@@ -141,13 +148,13 @@ pub fn of_rows(path: &Path) -> [Output; 2] {
 
 /// Settings of both planners. A file of settings is that of the task that all scenes have (`A505` where they differ).
 fn bench_settings(scenes: &[LoadedScene], arguments: &args::Bench) -> Result<(InHandSettings, TrackingSettings), Stop> {
-    let is_tracking = |loaded: &LoadedScene| loaded.task.kind == TaskKind::Tracking;
-    if scenes.iter().any(is_tracking) {
-        if arguments.search.settings.is_some() && !scenes.iter().all(is_tracking) {
+    let is_tracking = |loaded: &&LoadedScene| loaded.task().kind_name() == TRACKING;
+    if let Some(first) = scenes.iter().find(is_tracking) {
+        if arguments.search.settings.is_some() && !scenes.iter().all(|loaded| is_tracking(&loaded)) {
             let problem = "is for scenes of two kinds of tasks";
             return Err(Stop::argument("A505", "--settings", problem, "scenes of one kind"));
         }
-        let tracking = load::for_task(TaskKind::Tracking, &arguments.search, arguments.threads)?.tracking;
+        let tracking = load::for_task(first.task(), &arguments.search, arguments.threads)?.tracking;
         let in_hand = InHandSettings { n_threads: arguments.threads, ..InHandSettings::default() };
         return Ok((in_hand, tracking));
     }

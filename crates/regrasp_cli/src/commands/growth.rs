@@ -106,8 +106,8 @@ fn plan(
         return (rows, Some(seconds));
     }
     let of_seed = |seed: u64| {
-        let query = loaded.task.query(seed);
-        run_one(Problem { scene: &loaded.scene, query: &query, seed }, settings)
+        let query = loaded.task().query(seed);
+        run_one(Problem { task: loaded.manipulation(), query: &query, seed }, settings)
     };
     let goes_on = |_: &u64| !settings.cancelled.load(Ordering::Relaxed);
     ((0..n_trials).take_while(goes_on).map(of_seed).collect(), None)

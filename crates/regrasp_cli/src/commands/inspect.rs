@@ -155,7 +155,11 @@ fn joint_line(joint: &JointRow, width: usize, out: &mut String) {
         joint.child
     );
     if let Some(follows) = &joint.follows {
-        let _ = write!(out, "  = {} * {} + {}", follows.multiplier, follows.joint, follows.offset);
+        let _ = write!(out, "  = {} * {}", follows.multiplier, follows.joint);
+        for leader in &follows.others {
+            let _ = write!(out, " + {} * {}", leader.multiplier, leader.joint);
+        }
+        let _ = write!(out, " + {}", follows.offset);
     }
     out.push('\n');
 }

@@ -11,7 +11,7 @@ mod pairs;
 mod xml;
 
 use regrasp_plan::Plan;
-use regrasp_scene::Scene;
+use regrasp_scene::Manipulation;
 
 /// A model, ready to be written to a file or loaded from memory.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -37,21 +37,21 @@ pub enum MjcfError {
     },
 }
 
-/// The MuJoCo model of `scene`, with the waypoints of `plan` as keyframes `segment_waypoint`, both from 0.
+/// The MuJoCo model of the scene of `task`, with the waypoints of `plan` as keyframes `segment_waypoint`, both from 0.
 ///
 /// Names: bodies and joints as links and joints of the robot; the object is the body `object` (with underscores where a link
 /// has that name) with the free joint of the same name; of each finger the site `FINGER:tip` at the tip's centre and, for
 /// a round tip, the geom `FINGER:tip`; other geoms are `LINK:k`, `obstacle:NAME` and `object`.
 ///
 /// Errors: the plan is not for this scene's hand.
-pub fn to_mjcf(scene: &Scene, plan: &Plan) -> Result<Mjcf, MjcfError> {
-    let fingers: Vec<String> = scene.hand.fingers.iter().map(|finger| finger.name.clone()).collect();
+pub fn to_mjcf(task: &Manipulation, plan: &Plan) -> Result<Mjcf, MjcfError> {
+    let fingers: Vec<String> = task.hand().fingers.iter().map(|finger| finger.name.clone()).collect();
     for (what, in_plan, in_scene) in
-        [("joints", &plan.joint_names, &scene.hand.joint_names()), ("fingers", &plan.fingers, &fingers)]
+        [("joints", &plan.joint_names, &task.hand().joint_names()), ("fingers", &plan.fingers, &fingers)]
     {
         if in_plan != in_scene {
             return Err(MjcfError::AnotherHand { what, plan: in_plan.join(", "), scene: in_scene.join(", ") });
         }
     }
-    Ok(model::write(scene, plan))
+    Ok(model::write(task, plan))
 }

@@ -3,7 +3,7 @@
 use super::model::GeomNames;
 use super::xml::{Xml, numbers};
 use regrasp_robot::{ContactModel, Finger};
-use regrasp_scene::{FingerShapeId, Scene, collision_pairs};
+use regrasp_scene::{FingerShapeId, HandView, collision_pairs};
 
 /// Torsional friction of a fingertip that counts as a point, in metres (physics notes, section 1): none touches at a point.
 const POINT_TORSION: f64 = 0.002;
@@ -11,11 +11,11 @@ const POINT_TORSION: f64 = 0.002;
 const ROLLING: f64 = 0.0001;
 
 /// Writes the pairs: fingertips with the object as the plan means them, then what should never touch.
-pub(super) fn write(xml: &mut Xml, scene: &Scene, names: &GeomNames) {
-    let pairs = collision_pairs(scene);
-    let friction = scene.object.friction;
+pub(super) fn write(xml: &mut Xml, view: &HandView, names: &GeomNames) {
+    let pairs = collision_pairs(view);
+    let friction = view.object.friction;
     xml.open("contact", &[]);
-    for (index, finger) in scene.hand.fingers.iter().enumerate() {
+    for (index, finger) in view.hand.fingers.iter().enumerate() {
         let (condim, coefficients) = friction_of(finger, friction);
         for tip in &names.touching[index] {
             xml.leaf(

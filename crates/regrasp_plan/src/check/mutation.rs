@@ -35,7 +35,7 @@ use nalgebra::{DMatrix, DVector};
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, Shape, UnitVector, Vector};
 use regrasp_robot::Hand;
-use regrasp_scene::Scene;
+use regrasp_scene::{Manipulation, Scene};
 
 /// A broken plan.
 #[derive(Debug, Clone)]
@@ -53,10 +53,10 @@ pub struct Mutant {
 /// All mutants that `plan`, which must be a good one, has; places and amounts are drawn from `rng`.
 ///
 /// Kinds of damage that the plan offers no place for (a regrasp, an edge, an input file) are left out.
-/// Panics if the checker cannot read the hand of `scene`.
-pub fn mutants(plan: &Plan, scene: &Scene, rng: &mut Rng) -> Vec<Mutant> {
-    let model = Model::new(scene).expect("a good plan was checked in this scene");
-    let mut breeder = Breeder { plan, scene, model: &model, rng, found: Vec::new() };
+/// Panics if the checker cannot read the hand of `part`.
+pub fn mutants(plan: &Plan, task: Manipulation, rng: &mut Rng) -> Vec<Mutant> {
+    let model = Model::new(&task).expect("a good plan was checked in this scene");
+    let mut breeder = Breeder { plan, task, model: &model, rng, found: Vec::new() };
     breeder.break_header();
     breeder.break_way();
     breeder.break_order();
@@ -80,7 +80,7 @@ pub fn mutants(plan: &Plan, scene: &Scene, rng: &mut Rng) -> Vec<Mutant> {
 
 struct Breeder<'a> {
     plan: &'a Plan,
-    scene: &'a Scene,
+    task: Manipulation<'a>,
     model: &'a Model,
     rng: &'a mut Rng,
     found: Vec<Mutant>,
@@ -107,15 +107,15 @@ impl Breeder<'_> {
         expected: &[ViolationKind],
         damage: impl FnOnce(&mut Hand, &mut Rng) -> Option<()>,
     ) {
-        let mut scene = self.scene.clone();
-        if damage(&mut scene.hand, self.rng).is_some() {
+        let mut scene = self.task.scene.clone();
+        if damage(&mut scene.hands[self.task.hand_index].hand, self.rng).is_some() {
             let plan = self.plan.clone();
             self.found.push(Mutant { name, plan, scene: Some(scene), expected: expected.to_vec() });
         }
     }
 
     fn break_header(&mut self) {
-        let scene_friction = self.scene.object.friction;
+        let scene_friction = self.task.object().friction;
         self.add("friction promise raised", &[FrictionAboveScene], |plan, rng| {
             plan.promises.friction = scene_friction * rng.uniform(1.0001, 1.05);
             (scene_friction > 0.0).then_some(())
@@ -166,6 +166,26 @@ impl Breeder<'_> {
         });
         self.add("two joint names swapped", &[WrongScene], |plan, rng| swap_two(&mut plan.joint_names, rng));
         self.add("two finger names swapped", &[WrongScene], |plan, rng| swap_two(&mut plan.fingers, rng));
+        self.add("hand of another name", &[WrongScene], |plan, _| {
+            plan.hand.push('2');
+            Some(())
+        });
+        self.add("object of another name", &[WrongScene], |plan, _| {
+            plan.object.push('2');
+            Some(())
+        });
+        self.add("answer to a query of another name", &[WrongScene], |plan, _| {
+            plan.query.push('2');
+            Some(())
+        });
+        self.add("object said to be held by nobody", &[WrongHolder], |plan, rng| {
+            pick(&mut plan.segments, rng)?.held_by.clear();
+            Some(())
+        });
+        self.add("object said to be held by another hand too", &[WrongHolder], |plan, rng| {
+            pick(&mut plan.segments, rng)?.held_by.push("other".into());
+            Some(())
+        });
         self.add("task renamed", &[WrongScene], |plan, _| {
             plan.task = if plan.task == "tracking" { "in_hand" } else { "tracking" }.into();
             Some(())
@@ -217,7 +237,7 @@ impl Breeder<'_> {
             let row = limits.get(rng.below(limits.len().max(1)))?;
             let beyond = rng.uniform(0.5f64, 1.0).to_radians();
             let position = if rng.chance(0.5) { row.lower - beyond } else { row.upper + beyond };
-            any_waypoint(plan, rng)?.joints[row.coordinate] = (position - row.offset) / row.multiplier;
+            row.put(&mut any_waypoint(plan, rng)?.joints, position);
             Some(())
         });
         let model = self.model;
@@ -265,7 +285,7 @@ impl Breeder<'_> {
     }
 
     fn break_contacts(&mut self) {
-        let (model, scene) = (self.model, self.scene);
+        let (model, task) = (self.model, self.task);
         // The tip of one holding finger leaves its contact at one waypoint of a transfer: lifted, pressed in, or aside.
         for (name, along) in [("contact lifted early", 1.0), ("tip pressed into the object", -1.0), ("tip slides", 0.0)]
         {
@@ -298,10 +318,10 @@ impl Breeder<'_> {
                 (point, UnitVector::new_normalize(turned))
             })
         });
-        if let Shape::Cuboid { half_extents } = scene.object.shape
-            && scene.object.edge_distance > 1e-4
+        if let Shape::Cuboid { half_extents } = task.object().shape
+            && task.object().edge_distance > 1e-4
         {
-            let distance = scene.object.edge_distance;
+            let distance = task.object().edge_distance;
             let may_cross = self.plan.promises.tracking.is_some();
             self.add("contact at an edge", &[ContactTooNearEdge], |plan, rng| {
                 if may_cross {
@@ -326,7 +346,7 @@ impl Breeder<'_> {
         });
         self.add("all contacts on one side", &[ClosureLost], |plan, rng| {
             let segment = any_closed(plan, rng)?;
-            let center = scene.object.center_of_mass;
+            let center = task.object().center_of_mass;
             let pole = Vector::from(rng.direction());
             for waypoint in &mut segment.waypoints {
                 for contact in &mut waypoint.contacts {
@@ -406,7 +426,7 @@ impl Breeder<'_> {
     }
 
     fn break_relocations(&mut self) {
-        let (model, scene) = (self.model, self.scene);
+        let (model, task) = (self.model, self.task);
         self.add("relocation without lift", &[LandingOrLiftingNotFree, Collision], |plan, rng| {
             // The tip goes straight through the object or along its surface, in small steps.
             let segment = any_segment(plan, rng, SegmentKind::Regrasp)?;
@@ -447,7 +467,7 @@ impl Breeder<'_> {
             let f = moving_finger(model, &plan.segments[s])?;
             let waypoint = &mut plan.segments[s].waypoints[w];
             let other = (f + 1 + rng.below(model.fingers.len() - 1)) % model.fingers.len();
-            let hand_may_touch = scene.hand.may_touch(model.fingers[f].tip_link, model.fingers[other].tip_link);
+            let hand_may_touch = task.hand().may_touch(model.fingers[f].tip_link, model.fingers[other].tip_link);
             let target = model.fingers[other].center_in_world(&waypoint.joints);
             let here = model.fingers[f].center_in_world(&waypoint.joints);
             let reach = (model.fingers[f].radius + model.fingers[other].radius - 1e-3).max(1e-3);

@@ -1,6 +1,7 @@
 //! Tests of plan files and of the checker.
 
 mod check;
+mod couplings;
 mod format;
 mod levels;
 mod loaded;

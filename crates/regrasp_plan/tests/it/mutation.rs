@@ -5,7 +5,7 @@ use regrasp_base::Rng;
 use regrasp_plan::Plan;
 use regrasp_plan::check::mutation::mutants;
 use regrasp_plan::check::{CheckSettings, ViolationKind, check};
-use regrasp_scene::Scene;
+use regrasp_scene::{Manipulation, Scene};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What came of the mutants of some plans, each looked at `rounds` times with other random places: how often each was made,
@@ -17,10 +17,11 @@ fn judge_mutants(plans: &[(&Scene, Plan)], rounds: usize) -> (BTreeMap<&'static 
     for round in 0..rounds * plans.len() {
         let (scene, plan) = &plans[round % plans.len()];
         let query = sample::query(plan);
-        for mutant in mutants(plan, scene, &mut Rng::keyed(1, "mutation", round as u64)) {
+        let state = sample::state(scene);
+        for mutant in mutants(plan, Manipulation::first(scene, &state), &mut Rng::keyed(1, "mutation", round as u64)) {
             // Header mutants also change what was asked for, so the query is only given for the others.
             let judged_in = mutant.scene.as_ref().unwrap_or(scene);
-            let report = check(judged_in, Some(&query), &mutant.plan, &CheckSettings::default());
+            let report = check((judged_in, &state), Some(&query), &mutant.plan, &CheckSettings::default());
             let found: BTreeSet<ViolationKind> = report.violations.iter().map(|v| v.kind).collect();
             *counts.entry(mutant.name).or_default() += 1;
             if !mutant.expected.iter().any(|kind| found.contains(kind)) {

@@ -4,8 +4,9 @@
 //! joint moves is palm; moving joints that belong to no finger are held at the position nearest to zero.
 
 use super::finger_chain::{make_chain, rest_posture};
+use super::spec::{Body, Carried, FingerSpec, HandSpec, TipSpec};
 use super::tip_split;
-use crate::contact_model::ContactModel;
+use crate::coupling::Coupling;
 use crate::hand::{Finger, FingerShape, Hand, MAX_FINGERS, PalmShape, convex_of};
 use crate::robot::{Joint, JointId, JointKind, LinkId, Robot};
 use crate::tip::{Pad, Tip, TipEllipsoid, TipShape, fit};
@@ -13,68 +14,10 @@ use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_base::diagnostic::Diagnostics;
 use regrasp_base::{Diagnostic, InputError, Place};
 use regrasp_geometry::shape::PlacedShape;
-use regrasp_geometry::{ConvexHull, Point, Pose, Shape, TriangleMesh, UnitVector, Vector};
+use regrasp_geometry::{ConvexHull, Point, Pose, Shape, TriangleMesh};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::Path;
 use std::sync::Arc;
-
-/// What is a finger of a hand, by the ids of a robot.
-#[derive(Debug, Clone)]
-pub(crate) struct HandSpec {
-    /// The link whose frame is the hand frame.
-    pub base: LinkId,
-    /// The fingers.
-    pub fingers: Vec<FingerSpec>,
-    /// Pairs of links that are never tested, smaller id first.
-    pub allow: BTreeSet<(LinkId, LinkId)>,
-}
-
-/// A finger to be made.
-#[derive(Debug, Clone)]
-pub(crate) struct FingerSpec {
-    pub name: String,
-    pub tip_link: LinkId,
-    /// First joint of the chain; moving joints before it are held. The first after the base where none is given.
-    pub first_joint: Option<JointId>,
-    pub tip: TipSpec,
-    /// Where the tip may touch; anywhere without one.
-    pub pad: Option<PadSpec>,
-    pub contact: ContactModel,
-    /// Rest posture by joint name, with the place of each name; the rest in the middle of the limits.
-    pub rest: Vec<(String, f64, Place)>,
-    /// Where it stands, for messages.
-    pub place: Place,
-}
-
-/// A tip to be made; points are in the frame of the tip link.
-#[derive(Debug, Clone)]
-pub(crate) enum TipSpec {
-    Sphere { radius: f64, center: Point },
-    Ellipsoid { radii: Vector, center: Point, link_from_ellipsoid: UnitQuaternion<f64> },
-    Point { position: Point },
-    Hull { center: Point },
-}
-
-/// The part of a tip that may touch; the axis is in the frame of the tip link.
-#[derive(Debug, Clone)]
-pub(crate) struct PadSpec {
-    pub axis: UnitVector,
-    pub angle: f64,
-}
-
-/// A rigid body of a hand.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Body {
-    Palm,
-    Finger { finger: usize, body: usize },
-}
-
-/// Where a link is: its body, and its pose in the body's frame (the base frame, for the palm).
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Carried {
-    body: Body,
-    pub(super) body_from_link: Pose,
-}
 
 /// The hand, and remarks. Errors: `U206`..`U212`, too many fingers (`U221`) or joints of a finger (`U222`).
 pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Result<(Hand, Vec<String>), InputError> {
@@ -119,10 +62,7 @@ pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Resu
             notes.push(format!("finger \"{}\": tip link \"{}\" has no collision geometry", finger.name, link.name));
         }
     }
-    found.into_result((
-        Hand { robot: robot.clone(), base: spec.base, world_from_base: Pose::identity(), fingers, palm, allowed_pairs },
-        notes,
-    ))
+    found.into_result((Hand { robot: robot.clone(), base: spec.base, fingers, palm, allowed_pairs }, notes))
 }
 
 /// The moving joints of each finger, base first.
@@ -234,11 +174,12 @@ fn held_at(
     if joint.kind == JointKind::Fixed {
         return Pose::identity();
     }
-    let position = match joint.mimic {
-        Some(mimic) if owner.contains_key(&mimic.joint) => {
+    let on_finger = |coupling: &Coupling| coupling.terms.iter().find(|(leader, _)| owner.contains_key(leader)).copied();
+    let position = match &joint.coupling {
+        Some(coupling) if let Some((leader, _)) = on_finger(coupling) => {
             let problem = format!(
                 "follows finger joint \"{}\" but is on no finger: linkages are not supported",
-                robot.joints[mimic.joint.0].name
+                robot.joints[leader.0].name
             );
             found.push(
                 Diagnostic::new("U209", Place::file(file), problem)
@@ -248,7 +189,7 @@ fn held_at(
             );
             return Pose::identity();
         }
-        Some(mimic) => mimic.multiplier * nearest_to_zero(&robot.joints[mimic.joint.0]) + mimic.offset,
+        Some(coupling) => coupling.position(|leader| nearest_to_zero(&robot.joints[leader.0])),
         None => nearest_to_zero(joint),
     };
     notes.push(format!("joint \"{}\" belongs to no finger; held at {position}", joint.name));

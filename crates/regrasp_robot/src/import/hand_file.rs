@@ -2,16 +2,19 @@
 //!
 //! A bare URDF is accepted too; its fingers and tips are then guessed as `inspect` does.
 
-use super::assemble::{FingerSpec, HandSpec, PadSpec, TipSpec, assemble};
+use super::assemble::assemble;
 use super::couplings;
-use super::resolve::{ResolveOptions, resolve_own};
+use super::names::{known_joint, known_link};
+use super::options::{LoadOptions, LoadedInput};
+use super::resolve::resolve_own;
+use super::spec::{FingerSpec, HandSpec, PadSpec, TipSpec};
 use super::srdf::{LoadedSrdf, load_srdf};
 use super::urdf::{LoadedRobot, load_robot};
 use crate::contact_model::{self, ContactModel};
 use crate::hand::{Hand, MAX_FINGERS};
-use crate::robot::{JointId, LinkId, Robot};
+use crate::robot::{LinkId, Robot};
 use nalgebra::{Quaternion, UnitQuaternion};
-use regrasp_base::diagnostic::{did_you_mean, number};
+use regrasp_base::diagnostic::number;
 use regrasp_base::toml_table::{Codes, Entry, Found, Table};
 use regrasp_base::{Diagnostic, InputError, Place, files};
 use regrasp_geometry::frame::direction;
@@ -19,7 +22,6 @@ use regrasp_geometry::{Point, Vector};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 
 /// The value of `format` in a hand file.
 pub const FORMAT: &str = "regrasp-hand";
@@ -35,50 +37,6 @@ const CODES: Codes = Codes {
     other_format: "U204",
     out_of_range: "U213",
 };
-
-/// How hands and robots are read.
-#[derive(Debug, Clone, Default)]
-pub struct LoadOptions {
-    /// Where packages are.
-    pub resolve: ResolveOptions,
-    /// Drop, with a note, what is not supported or not found: joints of unsupported types are held fixed, collision
-    /// geometry that cannot be read is left out, unknown links in an SRDF are skipped.
-    pub lenient: bool,
-    /// Contact model of fingertips of which the hand file says nothing.
-    pub contact: ContactModel,
-    /// Wall-clock instant after which reading is given up (`F004`). It cuts and never changes what is read.
-    pub deadline: Option<Instant>,
-}
-
-impl LoadOptions {
-    /// Err when the deadline has passed before `path` was read and made ready (`F004`).
-    pub fn check_time(&self, path: &Path) -> Result<(), InputError> {
-        match self.deadline {
-            Some(deadline) if Instant::now() >= deadline => {
-                Err(Diagnostic::new(OUT_OF_TIME, Place::file(path), "the time limit passed while this file was read")
-                    .fix("allow more time, or simplify the meshes")
-                    .into())
-            }
-            _ => Ok(()),
-        }
-    }
-}
-
-/// The code of reading that a deadline cut.
-pub const OUT_OF_TIME: &str = "F004";
-
-/// A file that was read.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LoadedInput {
-    /// What it is for: `hand`, `urdf`, `srdf`, `mesh`.
-    pub role: String,
-    /// How the file that names it spells it; the file name for the outermost.
-    pub name: String,
-    /// Where it was found.
-    pub path: PathBuf,
-    /// SHA-256 of its bytes, lower-case hexadecimal.
-    pub sha256: String,
-}
 
 /// A hand with what it was read from.
 #[derive(Debug, Clone)]
@@ -440,34 +398,4 @@ fn read_pairs(entry: &Entry, robot: &Robot, found: &mut Found) -> BTreeSet<(Link
         }
     }
     pairs
-}
-
-fn known_link(entry: &Entry, robot: &Robot, found: &mut Found) -> Option<LinkId> {
-    let name = entry.text(found)?;
-    let link = robot.link_named(name);
-    if link.is_none() {
-        refuse_name(entry, "link", name, robot.links.iter().map(|link| link.name.as_str()), found);
-    }
-    link
-}
-
-pub(super) fn known_joint(entry: &Entry, robot: &Robot, found: &mut Found) -> Option<JointId> {
-    let name = entry.text(found)?;
-    let joint = robot.joint_named(name);
-    if joint.is_none() {
-        refuse_name(entry, "joint", name, robot.joints.iter().map(|joint| joint.name.as_str()), found);
-    }
-    joint
-}
-
-fn refuse_name<'n>(entry: &Entry, kind: &str, name: &str, names: impl Iterator<Item = &'n str>, found: &mut Found) {
-    if found.diagnostics.counted_only() {
-        return;
-    }
-    let meant = did_you_mean(name, names);
-    let diagnostic = entry
-        .error("U205", found, format!("the robot has no {kind} \"{name}\""))
-        .expected(format!("the name of a {kind} of the URDF"))
-        .fix(meant.map_or(String::new(), |meant| format!("did you mean \"{meant}\"?")));
-    found.diagnostics.push(diagnostic);
 }

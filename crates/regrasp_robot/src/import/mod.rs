@@ -13,8 +13,13 @@ mod couplings;
 mod finger_chain;
 /// `hand.toml`, and hands guessed from a bare URDF.
 pub mod hand_file;
+mod names;
+/// How files are read, and which were.
+pub mod options;
 /// `package://` and relative paths, below allowed folders.
 pub mod resolve;
+/// What a hand is to be made of.
+pub(crate) mod spec;
 /// SRDF: groups, end effectors, pairs of links that are not tested.
 pub mod srdf;
 mod tip_split;
@@ -23,6 +28,7 @@ pub mod urdf;
 /// XML elements and attributes with their places.
 pub(crate) mod xml;
 
-pub use hand_file::{LoadOptions, LoadedHand, LoadedInput, OUT_OF_TIME, load_hand};
+pub use hand_file::{LoadedHand, load_hand};
+pub use options::{LoadOptions, LoadedInput, OUT_OF_TIME};
 pub use resolve::ResolveOptions;
 pub use urdf::{LoadedRobot, load_robot};

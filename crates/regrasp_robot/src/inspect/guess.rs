@@ -5,7 +5,7 @@
 
 use super::tip_sphere::fit_tip;
 use crate::contact_model::ContactModel;
-use crate::import::assemble::{FingerSpec, HandSpec, TipSpec};
+use crate::import::spec::{FingerSpec, HandSpec, TipSpec};
 use crate::robot::{JointId, JointKind, LinkId, Robot};
 use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_base::{Diagnostic, InputError, Place};

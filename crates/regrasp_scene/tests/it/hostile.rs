@@ -46,10 +46,10 @@ fn a_megabyte_of_faults_is_read_in_time_listed_in_part_and_counted() {
 
 #[test]
 fn directions_of_any_length_are_directions() {
-    let expected = Folder::new().load(GOOD).unwrap().task.goal;
+    let expected = Folder::new().load(GOOD).unwrap().task().goal.clone();
     for axis in ["[1e200, 0, 0]", "[1e-200, 0.0, 0]", "[1e-320, 0, 0]", "[1.7e308, 0, 0]"] {
         let loaded = Folder::new().load(&with("axis = \"x\"", &format!("axis = {axis}"))).unwrap();
-        assert_eq!(loaded.task.goal, expected, "{axis}");
+        assert_eq!(loaded.task().goal, expected, "{axis}");
         assert_eq!(loaded.notes, Vec::<String>::new());
     }
     let down = Folder::new().load(&with("task =", "gravity = [0, 0, -1]\ntask =")).unwrap().scene.gravity;

@@ -50,10 +50,14 @@ export interface LinkStory {
   /** Frame of the joint in the parent link, at joint position 0. */
   parent_from_joint: PoseData;
   axis: [number, number, number];
-  /** Index in `joints` that drives it, -1 for fixed ones. Position = multiplier * joints[joint] + offset. */
+  /**
+   * Index in `joints` that drives it, -1 for fixed ones. Position = multiplier * joints[joint] + offset, plus the same
+   * product for each of `others`.
+   */
   joint: number;
   multiplier: number;
   offset: number;
+  others?: { joint: number; multiplier: number }[];
   /** Index in `fingers` of the finger it belongs to, -1 for the palm. */
   finger: number;
 }

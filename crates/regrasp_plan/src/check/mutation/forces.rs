@@ -25,7 +25,7 @@ impl Breeder<'_> {
     }
 
     fn break_friction_margin(&mut self) {
-        let scene_friction = self.scene.object.friction;
+        let scene_friction = self.task.object().friction;
         self.add("friction margin invented", &[FrictionAboveScene], |plan, rng| {
             plan.promises.friction_margin *= rng.uniform(1.01, 1.2);
             (plan.promises.friction * plan.promises.friction_margin > scene_friction * 1.0001).then_some(())
@@ -42,9 +42,9 @@ impl Breeder<'_> {
             promises(plan)?.mass *= rng.uniform(0.9, 0.9999);
             Some(())
         });
-        let mut scene = self.scene.clone();
+        let mut scene = self.task.scene.clone();
         if self.plan.promises.forces.is_some() {
-            scene.object.mass *= self.rng.uniform(1.001, 1.1);
+            scene.objects[self.task.object_index].mass *= self.rng.uniform(1.001, 1.1);
             let plan = self.plan.clone();
             let name = "object heavier than it was";
             self.found.push(Mutant { name, plan, scene: Some(scene), expected: vec![PromiseBroken] });
@@ -57,7 +57,7 @@ impl Breeder<'_> {
         });
         if let Some(gravity) = self.plan.promises.forces.as_ref().and_then(|forces| forces.gravity_in_world) {
             let tilt = nalgebra::Rotation3::new(Vector::from(self.rng.direction()) * self.rng.uniform(1e-3, 0.1));
-            let mut scene = self.scene.clone();
+            let mut scene = self.task.scene.clone();
             scene.gravity = Some(Gravity::Direction(UnitVector::new_normalize(tilt * Vector::from(gravity))));
             let turned = (Vector::from(gravity) - tilt * Vector::from(gravity)).norm() > 1e-3;
             if turned {
@@ -74,12 +74,12 @@ impl Breeder<'_> {
         });
         self.add("torque limit promised above the robot's", &[PromiseBroken], |plan, rng| {
             let drive = any_drive(model, rng, |drive| drive.effort.is_some())?;
-            promises(plan)?.joint_torques[drive.coordinate] = Some(drive.effort? * rng.uniform(1.001, 1.1));
+            promises(plan)?.joint_torques[drive.own_coordinate()?] = Some(drive.effort? * rng.uniform(1.001, 1.1));
             Some(())
         });
         self.add("torque limit left out", &[PromiseBroken], |plan, rng| {
             let drive = any_drive(model, rng, |drive| drive.effort.is_some())?;
-            promises(plan)?.joint_torques[drive.coordinate] = None;
+            promises(plan)?.joint_torques[drive.own_coordinate()?] = None;
             Some(())
         });
         self.add("torque limit below a torque", &[TorqueLimit], |plan, rng| {

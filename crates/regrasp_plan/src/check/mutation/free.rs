@@ -13,11 +13,12 @@ use crate::plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoin
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp::Grip;
+use regrasp_scene::Manipulation;
 
 impl Breeder<'_> {
     pub(super) fn break_free_fingers(&mut self) {
-        let (model, scene) = (self.model, self.scene);
-        let body = Body::of(&scene.object, self.plan);
+        let (model, task) = (self.model, self.task);
+        let body = Body::of(task.object(), self.plan);
         let required = self.plan.promises.required_margin;
         let holds_without = |waypoint: &Waypoint, left_out: usize| {
             let grips: Vec<Grip> = (0..model.fingers.len())
@@ -49,14 +50,14 @@ impl Breeder<'_> {
             let w = rng.below(n_waypoints);
             let depth = rng.uniform(0.0, 0.2e-3);
             let waypoint = &mut plan.segments[s].waypoints[w];
-            let (foot, normal) = beneath(model, scene, waypoint, f)?;
+            let (foot, normal) = beneath(model, &task, waypoint, f)?;
             let center = foot + normal * (model.fingers[f].radius - depth);
             let target = Pose::from(&waypoint.world_from_object) * center;
             move_tip(model, f, &mut waypoint.joints, &target)
         });
         self.add("finger declared holding that is away", &[ContactOffTip], |plan, rng| {
             let (s, f) = pick_free(plan, model, rng)?;
-            let (foot, normal) = beneath(model, scene, &plan.segments[s].waypoints[0], f)?;
+            let (foot, normal) = beneath(model, &task, &plan.segments[s].waypoints[0], f)?;
             let contact = ContactState::at(ContactMode::Fixed, foot.into(), normal.into());
             plan.segments[s].waypoints.iter_mut().for_each(|waypoint| waypoint.contacts[f] = contact);
             Some(())
@@ -64,7 +65,7 @@ impl Breeder<'_> {
         self.add("free finger holds for a moment", &[WrongContactMode], |plan, rng| {
             let (s, f) = pick_free(plan, model, rng)?;
             let w = 1 + rng.below(plan.segments[s].waypoints.len() - 1);
-            let (foot, normal) = beneath(model, scene, &plan.segments[s].waypoints[w], f)?;
+            let (foot, normal) = beneath(model, &task, &plan.segments[s].waypoints[w], f)?;
             plan.segments[s].waypoints[w].contacts[f] =
                 ContactState::at(ContactMode::Fixed, foot.into(), normal.into());
             Some(())
@@ -96,8 +97,8 @@ fn pick_free(plan: &Plan, model: &Model, rng: &mut Rng) -> Option<(usize, usize)
 }
 
 /// The point of the object's surface nearest to the tip of finger `f` and the outward normal there, in the object frame.
-fn beneath(model: &Model, scene: &regrasp_scene::Scene, waypoint: &Waypoint, f: usize) -> Option<(Point, Vector)> {
-    let object = &scene.object;
+fn beneath(model: &Model, task: &Manipulation, waypoint: &Waypoint, f: usize) -> Option<(Point, Vector)> {
+    let object = task.object();
     let pose = Pose::from(&waypoint.world_from_object);
     let tip = pose.inverse() * model.fingers[f].center_in_world(&waypoint.joints);
     let foot = object.surface.project(&tip);

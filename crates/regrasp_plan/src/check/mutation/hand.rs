@@ -14,7 +14,7 @@ impl Breeder<'_> {
     pub(super) fn break_contact_models(&mut self) {
         // Sets of fingers that hold somewhere, and the torsion that they count on.
         let holding: Vec<Vec<usize>> = waypoints(self.plan).map(holders).collect();
-        let fingers = &self.scene.hand.fingers;
+        let fingers = &self.task.hand().fingers;
         let is_soft = |f: usize| matches!(fingers[f].tip.contact, ContactModel::SoftFinger { .. });
         let pair = holding.iter().find(|set| set.len() == 2 && set.iter().any(|&f| is_soft(f))).cloned();
         let promises = &self.plan.promises;
@@ -63,31 +63,32 @@ impl Breeder<'_> {
 
     pub(super) fn break_couplings(&mut self) {
         let moving = &self.plan.segments;
-        let coupled: Vec<usize> = (0..self.scene.hand.robot.joints.len())
-            .filter(|&joint| self.scene.hand.robot.joints[joint].mimic.is_some())
+        let coupled: Vec<usize> = (0..self.task.hand().robot.joints.len())
+            .filter(|&joint| self.task.hand().robot.joints[joint].coupling.is_some())
             .filter(|&joint| self.model.fingers.iter().any(|finger| finger.moving_joints.contains(&joint)))
             .collect();
         let is_held = moving.iter().any(|segment| segment.kind == SegmentKind::Transfer);
         self.add_hand("coupling broken by three degrees", &[ContactOffTip], |hand, rng| {
             let joint = *coupled.get(rng.below(coupled.len().max(1)))?;
-            let mimic = Arc::make_mut(&mut hand.robot).joints[joint].mimic.as_mut()?;
-            mimic.offset += 3f64.to_radians();
+            let coupling = Arc::make_mut(&mut hand.robot).joints[joint].coupling.as_mut()?;
+            coupling.offset += 3f64.to_radians();
             is_held.then_some(())
         });
         self.add_hand("coupling left out", &[ContactOffTip], |hand, rng| {
             let joint = *coupled.get(rng.below(coupled.len().max(1)))?;
             let joint = &mut Arc::make_mut(&mut hand.robot).joints[joint];
             // What follows nothing and is driven by nothing rests.
-            joint.mimic = None;
+            joint.coupling = None;
             is_held.then_some(())
         });
-        let (model, robot) = (self.model, &self.scene.hand.robot);
+        let (model, robot) = (self.model, &self.task.hand().robot);
         self.add("coupled joint beyond its limit", &[JointLimit], |plan, rng| {
-            let is_follower = |name: &str| robot.joint_named(name).is_some_and(|id| robot.joints[id.0].mimic.is_some());
+            let is_follower =
+                |name: &str| robot.joint_named(name).is_some_and(|id| robot.joints[id.0].coupling.is_some());
             let rows: Vec<_> = model.limits.iter().filter(|row| is_follower(&row.name)).collect();
             let row = rows.get(rng.below(rows.len().max(1)))?;
             let position = row.upper + rng.uniform(0.5f64, 1.0).to_radians();
-            any_waypoint(plan, rng)?.joints[row.coordinate] = (position - row.offset) / row.multiplier;
+            row.put(&mut any_waypoint(plan, rng)?.joints, position);
             Some(())
         });
         self.add("coupled joint named as if it were free", &[WrongScene], |plan, rng| {

@@ -10,7 +10,7 @@ use regrasp_geometry::Vector;
 
 impl Breeder<'_> {
     pub(super) fn break_limits(&mut self) {
-        let (limits, model) = (self.scene.limits, self.model);
+        let (limits, model) = (self.task.scene.limits, self.model);
         self.add("speed promised above the scene's", &[LimitExceeded], |plan, rng| {
             plan.promises.motion.largest_speed = limits.largest_speed * log_uniform(rng, 1.001, 1e7);
             Some(())
@@ -23,9 +23,11 @@ impl Breeder<'_> {
         });
         self.add("joint velocity promised above the scene's", &[LimitExceeded], |plan, rng| {
             let drive = any_drive(model, rng, |drive| {
-                !model.drives.iter().any(|other| other.coordinate == drive.coordinate && other.velocity.is_some())
+                !model.drives.iter().any(|other| {
+                    drive.own_coordinate().is_some_and(|k| other.drive.is_driven_by(k)) && other.velocity.is_some()
+                })
             })?;
-            plan.promises.motion.joint_velocities[drive.coordinate] =
+            plan.promises.motion.joint_velocities[drive.own_coordinate()?] =
                 limits.joint_velocity * log_uniform(rng, 1.001, 1e6);
             Some(())
         });
@@ -33,8 +35,8 @@ impl Breeder<'_> {
             plan.promises.forces.as_mut()?.normal_force[1] = limits.normal_force * log_uniform(rng, 1.001, 1e7);
             Some(())
         });
-        let friction = self.scene.object.friction;
-        let margin = friction_margin(self.scene, self.plan);
+        let friction = self.task.object().friction;
+        let margin = friction_margin(&self.task, self.plan);
         self.add("friction margin given up", &[FrictionMarginTooSmall], |plan, rng| {
             plan.promises.friction_margin = rng.uniform(1.0, 0.5 * (1.0 + margin));
             plan.promises.friction = friction / plan.promises.friction_margin;
@@ -49,7 +51,7 @@ impl Breeder<'_> {
     }
 
     fn break_gravity(&mut self) {
-        let has_direction = self.scene.gravity().in_world().is_some();
+        let has_direction = self.task.scene.gravity().in_world().is_some();
         self.add("gravity turned aside", &[PromiseBroken], |plan, rng| {
             let gravity = plan.promises.forces.as_mut()?.gravity_in_world.as_mut()?;
             let down = Vector::from(*gravity);

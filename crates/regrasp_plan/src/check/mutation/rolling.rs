@@ -16,7 +16,7 @@ use regrasp_geometry::{Pose, Shape, UnitVector, Vector};
 
 impl Breeder<'_> {
     pub(super) fn break_rolling(&mut self) {
-        let (model, shape) = (self.model, &self.scene.object.shape);
+        let (model, shape) = (self.model, &self.task.object().shape);
         self.add("slip tolerance raised", &[PromiseBroken], |plan, rng| {
             plan.promises.slip_tolerance = rng.uniform(0.11e-3, 0.2e-3);
             Some(())

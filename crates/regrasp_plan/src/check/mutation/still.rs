@@ -14,7 +14,7 @@ const SHARE: f64 = 0.9;
 
 impl Breeder<'_> {
     pub(super) fn break_drive(&mut self) {
-        let (model, object) = (self.model, &self.scene.object);
+        let (model, object) = (self.model, self.task.object());
         let Shape::Sphere { radius } = object.shape else { return self.break_softness() };
         let is_centered = object.center_of_mass.coords.norm() < 1e-9;
         self.add("sphere turns between fingers that stand still", &[Slip], |plan, rng| {

@@ -80,7 +80,7 @@ impl Breeder<'_> {
         });
         self.add("joint velocity promised above the robot's", &[PromiseBroken], |plan, rng| {
             let drive = any_drive(model, rng, |drive| drive.velocity.is_some())?;
-            plan.promises.motion.joint_velocities[drive.coordinate] = drive.velocity? * rng.uniform(1.001, 1.1);
+            plan.promises.motion.joint_velocities[drive.own_coordinate()?] = drive.velocity? * rng.uniform(1.001, 1.1);
             Some(())
         });
         self.add("joint velocity promised below the motion's", &[JointTooFast], |plan, rng| {

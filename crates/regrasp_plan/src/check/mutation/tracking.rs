@@ -91,12 +91,13 @@ impl Breeder<'_> {
             contact.mode = if contact.mode == Rolling { PureRolling } else { Rolling };
             Some(())
         });
+        let task = self.task;
         self.add("moving fingertip that rolls slides there and back", &[Slip], |plan, rng| {
             let still = |contact: &ContactState| !contact.mode.slides();
             let (s, w, f) = pick_moving(plan, model, rng, still)?;
             let way = plan.promises.slip_tolerance * rng.uniform(1.0, 3.0);
             let angle = rng.uniform(0.0, std::f64::consts::TAU);
-            let shape = &self.scene.object.shape;
+            let shape = &task.object().shape;
             slide(model, shape, &mut plan.segments[s].waypoints[w], f, angle, way)
         });
     }
@@ -286,7 +287,7 @@ impl Breeder<'_> {
     }
 
     fn break_tracked_contacts(&mut self) {
-        let (model, shape) = (self.model, &self.scene.object.shape);
+        let (model, shape) = (self.model, &self.task.object().shape);
         self.add("point on the tip elsewhere", &[ContactOffTip], |plan, rng| {
             let (s, w, f) = pick_tracked(plan, model, rng, |_| true)?;
             let way = Vector::from(rng.direction()) * (plan.promises.contact_tolerance * rng.uniform(2.1, 4.0));
@@ -398,10 +399,10 @@ impl Breeder<'_> {
             promises(plan)?;
             plan.promises.forces.as_mut()?.gravity_in_world.take().map(|_| ())
         });
-        let has_place = self.plan.promises.tracking.is_some() && self.scene.object.friction > 0.0;
+        let has_place = self.plan.promises.tracking.is_some() && self.task.object().friction > 0.0;
         if has_place {
-            let mut scene = self.scene.clone();
-            scene.object.friction *= self.rng.uniform(1.001, 1.1);
+            let mut scene = self.task.scene.clone();
+            scene.objects[self.task.object_index].friction *= self.rng.uniform(1.001, 1.1);
             let places = places(self.plan, model, |segment, f| segment.waypoints[0].contacts[f].mode.slides());
             let expected = if places.is_empty() { vec![PromiseBroken] } else { vec![SlidingForceWrong] };
             let name = "object with more friction than it had";
@@ -415,11 +416,11 @@ impl Breeder<'_> {
             self.plan.segments.iter().flat_map(|s| &s.waypoints).map(distance).fold(0.0, f64::max)
         };
         let farthest = self.model.fingers.iter().map(far).fold(0.0, f64::max);
-        if self.scene.reach.is_none() || farthest < 1e-4 {
+        if self.task.scene.hands[self.task.hand_index].reach.is_none() || farthest < 1e-4 {
             return;
         }
-        let mut scene = self.scene.clone();
-        scene.reach = Some(farthest * self.rng.uniform(0.9, 0.9999));
+        let mut scene = self.task.scene.clone();
+        scene.hands[self.task.hand_index].reach = Some(farthest * self.rng.uniform(0.9, 0.9999));
         let (plan, expected) = (self.plan.clone(), vec![OutOfReach]);
         self.found.push(Mutant { name: "reach shorter than the way", plan, scene: Some(scene), expected });
     }

@@ -4,12 +4,12 @@
 //! (same contacts, other place) or the relocation of one finger (same place); both can be gone both ways. Both store their
 //! joints between the ends; the object's poses follow from the ends.
 
-use super::super::model::MAX_FINGERS;
-use super::super::state::GraspState;
-use super::super::workspace::{Contacts, HandJoints};
 use arrayvec::ArrayVec;
 use regrasp_geometry::Pose;
 use regrasp_grasp::Contact;
+use regrasp_manipulation::grasp::state::GraspState;
+use regrasp_manipulation::model::MAX_FINGERS;
+use regrasp_manipulation::workspace::{Contacts, HandJoints};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use std::collections::BTreeMap;
 
