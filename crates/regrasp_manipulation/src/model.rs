@@ -15,8 +15,8 @@ use regrasp_robot::tip::{Pad, TipEllipsoid, is_same_surface};
 use regrasp_scene::{HandView, Object};
 use std::sync::Arc;
 
-/// Most fingers a hand may have.
-pub const MAX_FINGERS: usize = regrasp_robot::hand::MAX_FINGERS;
+/// Most fingers that planners have room for: grasps are kept in arrays of this size. The checker has no such limit.
+pub const MAX_FINGERS: usize = 6;
 const _: () = assert!(MAX_FINGERS <= regrasp_grasp::wrench::force_distribution::MAX_GRIPS);
 
 /// A finger, prepared.

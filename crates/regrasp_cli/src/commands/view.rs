@@ -31,7 +31,7 @@ pub fn run(arguments: &args::View, common: &Common, talk: &Talk) -> Result<(), S
     pictures::make_folder(arguments)?;
     let plan = format::from_json(&arguments.plan, &files::read(&arguments.plan)?)?;
     let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref(), "regrasp view PLAN SCENE")?;
-    let loaded = arguments.judging.scene(load::scene(&scene_path, common, talk)?).for_query(&plan.query);
+    let loaded = arguments.judging.scene(load::scene_of_plan(&scene_path, &plan, common, talk)?);
     written.refuse_inputs(loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
     let roadmap = match &arguments.with_roadmap {
         Some(path) => {
