@@ -258,8 +258,7 @@ fn read_fingers(entry: &Entry, robot: &Robot, contact: ContactModel, found: &mut
     }
     if items.len() > MAX_FINGERS {
         let problem = format!("has {} fingers", items.len());
-        let diagnostic =
-            entry.error("U221", found, problem).expected(format!("at most {MAX_FINGERS}, which can be planned for"));
+        let diagnostic = entry.error("U221", found, problem).expected(format!("at most {MAX_FINGERS}"));
         found
             .diagnostics
             .push(diagnostic.fix("leave out [[fingers]] that are not needed; their links are held and become palm"));

@@ -1,11 +1,11 @@
-//! Readers: URDF, SRDF, `package://` paths, hand files.
+//! Readers: URDF, SRDF, `package://` paths, hand files, robot files.
 //!
 //! Own readers over an XML and a TOML parser, because every message must name file, line, element, value and fix.
 //! They read files that the caller names and files that those name, below allowed folders; no environment, no
 //! subprocess, no network.
 //!
 //! Codes: U10x files and XML, U11x numbers and attributes, U12x joints, U13x the tree, U14x couplings, U15x geometry,
-//! U16x SRDF, U2xx hand files, V001 numbers that are not finite.
+//! U16x SRDF, U2xx hand files and robot files, V001 numbers that are not finite.
 
 /// A hand from a robot and the choice of its fingers.
 pub(crate) mod assemble;
