@@ -1,7 +1,8 @@
 //! Pages for a browser.
 
 use crate::stop::Stop;
-use crate::talk::{Talk, grouped};
+use crate::talk::Talk;
+use crate::words::grouped;
 use regrasp::base::files;
 use regrasp::plan::check::Report;
 use regrasp::robot::ResolveOptions;
