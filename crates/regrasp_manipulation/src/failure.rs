@@ -108,7 +108,8 @@ impl Failure {
         if n_fingers <= MAX_FINGERS {
             return Ok(());
         }
-        let message = format!("hand \"{}\" has {n_fingers} fingers; this version plans for {MAX_FINGERS}", view.hand_name);
+        let message =
+            format!("hand \"{}\" has {n_fingers} fingers; this version plans for {MAX_FINGERS}", view.hand_name);
         Err(Failure::bare(FailureKind::Impossible, message, "name fewer of them in the hand file"))
     }
 

@@ -79,6 +79,12 @@ pub struct Moment {
 }
 
 impl GraspState {
+    /// The state at a moment of a transfer with this grasp.
+    pub fn at(&self, moment: &Moment) -> Self {
+        let Moment { world_from_object, joints, contacts } = moment.clone();
+        GraspState { world_from_object, joints, contacts, holding: self.holding }
+    }
+
     /// This state as a moment of a transfer.
     pub fn moment(&self) -> Moment {
         Moment {
