@@ -1,6 +1,6 @@
 //! Why no plan was found: a result, with causes and the nearest miss, not an error.
 
-use crate::model::MAX_FINGERS;
+use crate::grasp::state::MAX_FINGERS;
 use crate::outline::Outline;
 use regrasp_base::Interrupt;
 use regrasp_plan::plan::{PoseData, Statistics};
@@ -108,7 +108,8 @@ impl Failure {
         if n_fingers <= MAX_FINGERS {
             return Ok(());
         }
-        let message = format!("hand \"{}\" has {n_fingers} fingers; this version plans for {MAX_FINGERS}", view.hand_name);
+        let message =
+            format!("hand \"{}\" has {n_fingers} fingers; this version plans for {MAX_FINGERS}", view.hand_name);
         Err(Failure::bare(FailureKind::Impossible, message, "name fewer of them in the hand file"))
     }
 

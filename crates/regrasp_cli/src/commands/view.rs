@@ -13,9 +13,9 @@ use crate::pages;
 use crate::stop::Stop;
 use crate::talk::Talk;
 use regrasp::base::files;
+use regrasp::pictures::roadmap_story;
 use regrasp::plan::format;
 use regrasp::planners::in_hand::roadmap::GraspRoadmap;
-use regrasp::told;
 use regrasp::viewer::story::{Outcome, Telling};
 use serde_json::json;
 
@@ -37,7 +37,7 @@ pub fn run(arguments: &args::View, common: &Common, talk: &Talk) -> Result<(), S
         Some(path) => {
             let roadmap = GraspRoadmap::read(path)?;
             roadmap.refuse_other_scene(path, &loaded.view())?;
-            Some(told::roadmap_story(&roadmap, &loaded.view(), &plan))
+            Some(roadmap_story(&roadmap, &loaded.view(), &plan))
         }
         None => None,
     };

@@ -35,8 +35,9 @@ fn the_wrist_of_a_hand_is_part_of_the_configuration() {
     let common = hand.layout.range(Part::Common);
     let names: Vec<String> = hand.layout.names();
     assert_eq!(names[common.clone()], ["WRJ2", "WRJ1"]);
-    let limits: Vec<(f64, f64)> = hand.layout.coordinates[common].iter().map(|c| (c.lower, c.upper)).collect();
-    assert_eq!(limits, [(-0.523_598_775_598, 0.174_532_925_199), (-0.698_131_700_798, 0.488_692_190_558)]);
+    let in_degrees = |radians: f64| radians.to_degrees().round();
+    let limits = hand.layout.coordinates[common].iter().map(|c| [c.lower, c.upper].map(in_degrees));
+    assert_eq!(limits.collect::<Vec<_>>(), [[-30.0, 10.0], [-40.0, 28.0]]);
     let tree = text::Tree::of(&std::fs::read_to_string(models.join("hands/shadow/shadow_right.urdf")).unwrap());
     let mut rng = Rng::keyed(1, "wrist", 0);
     let mut poses = Vec::new();

@@ -120,7 +120,7 @@ fn read(
         found.diagnostics.push(diagnostic.fix("add at least one [[models]] or [[hands]] table"));
     }
     root.finish(found);
-    let name = name.map_or_else(|| Some(file_stem(path)), |name| name)?;
+    let name = name.unwrap_or_else(|| Some(file_stem(path)))?;
     let mut draft = models::read(models.as_ref(), &name, (path, options), found)?;
     if let Some(entry) = &couplings {
         couplings::read(entry, &mut draft.tree, found);
