@@ -9,9 +9,9 @@
 use regrasp_base::{Budget, Rng};
 use regrasp_geometry::{Point, Vector};
 use regrasp_grasp::wrench::ForceLimits;
+use regrasp_planners::TrackingSettings;
 use regrasp_planners::tracking::forces::{Load, Pressing, balance};
 use regrasp_planners::tracking::{Cones, plan_tracking};
-use regrasp_planners::TrackingSettings;
 use regrasp_robot::import::LoadOptions;
 use regrasp_scene::load_scene;
 use std::error::Error;
