@@ -186,6 +186,12 @@ impl Breeder<'_> {
             pick(&mut plan.segments, rng)?.held_by.push("other".into());
             Some(())
         });
+        self.add("object let go by all fingers, said to be held by nobody", &[WrongHolder], |plan, rng| {
+            let segment = pick(&mut plan.segments, rng)?;
+            segment.held_by.clear();
+            pick(&mut segment.waypoints, rng)?.contacts.fill(ContactState::FREE);
+            Some(())
+        });
         self.add("task renamed", &[WrongScene], |plan, _| {
             plan.task = if plan.task == "tracking" { "in_hand" } else { "tracking" }.into();
             Some(())

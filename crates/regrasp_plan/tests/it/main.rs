@@ -9,5 +9,6 @@ mod motion;
 mod mutation;
 mod rolled;
 mod sample;
+mod several;
 mod tracked;
 mod tracking;
