@@ -385,8 +385,8 @@ impl<'a> Table<'a> {
             found.diagnostics.push(diagnostic.expected(expected));
             return None;
         }
-        // What is missing has been reported; the newest version tells the most of the rest.
-        Some(seen.unwrap_or(newest))
+        // What is missing has been reported. Files that say no version are mostly of the first.
+        Some(seen.unwrap_or(versions.first().copied().unwrap_or(newest)))
     }
 
     /// Every key with its value, for tables whose keys are names that the user chose.

@@ -1,9 +1,18 @@
 //! Points of GS_n and GS_k: an object pose, the contacts of the fingers that hold, the joints of all.
 
-use crate::workspace::{Contacts, HandJoints};
+use arrayvec::ArrayVec;
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
+
+/// Most fingers that planners have room for: grasps are kept in arrays of this size. The checker has no such limit.
+pub const MAX_FINGERS: usize = 6;
+const _: () = assert!(MAX_FINGERS <= regrasp_grasp::wrench::force_distribution::MAX_GRIPS);
+
+/// Joint positions of all fingers.
+pub type HandJoints = ArrayVec<Coordinates, MAX_FINGERS>;
+/// One contact per finger.
+pub type Contacts = ArrayVec<Contact, MAX_FINGERS>;
 
 /// Some fingers hold the object, the others are free, each with a posture of its own: a configuration in GS_k with its
 /// independent fingers; in GS_n where all hold (paper 000, sections 3.2 and 4.1).
@@ -79,6 +88,12 @@ pub struct Moment {
 }
 
 impl GraspState {
+    /// The state at a moment of a transfer with this grasp.
+    pub fn at(&self, moment: &Moment) -> Self {
+        let Moment { world_from_object, joints, contacts } = moment.clone();
+        GraspState { world_from_object, joints, contacts, holding: self.holding }
+    }
+
     /// This state as a moment of a transfer.
     pub fn moment(&self) -> Moment {
         Moment {

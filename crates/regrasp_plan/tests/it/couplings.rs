@@ -6,7 +6,7 @@ use regrasp_plan::check::model::Model;
 use regrasp_plan::check::violation::ViolationKind;
 use regrasp_plan::check::{CheckSettings, check};
 use regrasp_robot::{Chain, Coupling, JointId, LinearLimit};
-use regrasp_scene::{Manipulation, Scene};
+use regrasp_scene::Scene;
 use std::sync::Arc;
 
 /// The sample's scene with a first finger whose last joint turns back by half of what the first turns and all of what the
@@ -37,9 +37,7 @@ fn scene() -> Scene {
 #[test]
 fn tips_velocities_and_limits_agree_with_the_chain() {
     let scene = scene();
-    let state = sample::state(&scene);
-    let model = Model::new(&Manipulation::first(&scene, &state)).unwrap();
-    let world_from_hand = scene.hands[0].world_from_hand;
+    let model = sample::with_task(&scene, Model::new).unwrap();
     let (ours, theirs) = (&model.fingers[0], &scene.hands[0].hand.fingers[0]);
     assert_eq!(ours.coordinates, 0..2);
     let row = model.limits.iter().find(|row| row.name == "f0_j2").unwrap();
@@ -48,7 +46,10 @@ fn tips_velocities_and_limits_agree_with_the_chain() {
     for _ in 0..300 {
         let joints: Vec<f64> = (0..model.joint_names.len()).map(|_| rng.uniform(-1.0, 1.0)).collect();
         let center = ours.center_in_world(&joints);
-        assert!((center - world_from_hand * theirs.chain.tip(&joints[..2], &theirs.tip.center_in_body)).norm() < 1e-12);
+        assert!(
+            (center - sample::world_from_hand() * theirs.chain.tip(&joints[..2], &theirs.tip.center_in_body)).norm()
+                < 1e-12
+        );
         let rates: Vec<f64> = joints.iter().map(|_| rng.uniform(-1.0, 1.0)).collect();
         let [before, after] = [-1e-6, 1e-6].map(|h| {
             let moved: Vec<f64> = joints.iter().zip(&rates).map(|(q, rate)| q + h * rate).collect();
@@ -69,7 +70,6 @@ fn tips_velocities_and_limits_agree_with_the_chain() {
 #[test]
 fn a_sum_beyond_its_limits_is_reported_at_waypoints_and_between() {
     let coupled = scene();
-    let state = sample::state(&coupled);
     let mut plan = sample::plan(&sample::scene());
     let follower = plan.joint_names.iter().position(|name| name == "f0_j2").unwrap();
     plan.joint_names.remove(follower);
@@ -82,7 +82,7 @@ fn a_sum_beyond_its_limits_is_reported_at_waypoints_and_between() {
         waypoint.joints[1] = 0.1 - 0.5 * waypoint.joints[0];
     }
     let beyond = |plan: &regrasp_plan::Plan| {
-        let report = check((&coupled, &state), None, plan, &CheckSettings::default());
+        let report = check((&coupled, &sample::state(&coupled)), None, plan, &CheckSettings::default());
         let of_follower = report.violations.iter().filter(|violation| violation.subjects.iter().any(|s| s == "f0_j2"));
         of_follower.filter(|violation| violation.kind == ViolationKind::JointLimit).count()
     };
