@@ -6,7 +6,6 @@ mod format;
 mod levels;
 mod loaded;
 mod motion;
-mod mutation;
 mod rolled;
 mod sample;
 mod several;

@@ -2,8 +2,8 @@
 
 use crate::{sample, tracked};
 use regrasp_base::Rng;
+use regrasp_mutations::mutants;
 use regrasp_plan::Plan;
-use regrasp_plan::check::mutation::mutants;
 use regrasp_plan::check::{CheckSettings, ViolationKind, check};
 use regrasp_scene::{Manipulation, Scene};
 use std::collections::{BTreeMap, BTreeSet};
