@@ -14,7 +14,7 @@ use regrasp_manipulation::forces::along::add_forces;
 use regrasp_manipulation::grasp::contact::draw_footholds;
 use regrasp_manipulation::grasp::state::GraspState;
 use regrasp_manipulation::model::{Model, releasable};
-use regrasp_manipulation::recording::recorder::Recorder;
+use regrasp_manipulation::recording::recorder::{Joins, Recorder};
 use regrasp_manipulation::relocation::{Foothold, relocate};
 use regrasp_plan::plan::Segment;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
@@ -170,7 +170,7 @@ fn carry_out(local: &mut Local, from: &TrackingGrasp, option: &Change) -> Option
     if !path.iter().all(|joints| is_near(stepper, &model.fingers[finger].ik.tip(joints), finger)) {
         return None;
     }
-    let mut recorder = Recorder::at(model, &state, false);
+    let mut recorder = Recorder::at(model, &state, Joins::Nothing);
     recorder.begin_regrasp(finger, Some(&lands), path.len());
     path.iter().for_each(|joints| recorder.finger_at(finger, joints.iter().copied()));
     recorder.end_regrasp();
