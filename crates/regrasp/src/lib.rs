@@ -4,6 +4,8 @@
 //! [`scene`] reads files, [`planners`] plans, [`plan`] holds the plan and its checker. Frames, units and the glossary are in
 //! `CONVENTIONS.md`; the tower of crates is in `ARCHITECTURE.md`.
 
+/// Settings from several places.
+pub mod settings;
 /// What pages are told of what only planners know.
 pub mod told;
 
