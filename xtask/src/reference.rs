@@ -2,6 +2,7 @@
 
 mod codes;
 mod command_line;
+mod printed;
 mod settings;
 
 use crate::run::{Outcome, regrasp};
@@ -16,6 +17,9 @@ pub fn task(arguments: &[String]) -> Outcome {
         _ => return Err(format!("cargo xtask reference takes --check or nothing, not {arguments:?}")),
     };
     let program = regrasp()?;
+    if checks {
+        printed::check(&program)?;
+    }
     let sources = sources()?;
     let pages = [
         ("command-line.md", command_line::page(&program)?),

@@ -4,10 +4,10 @@
 //! [`scene`] reads files, [`planners`] plans, [`plan`] holds the plan and its checker. Frames, units and the glossary are in
 //! `CONVENTIONS.md`; the tower of crates is in `ARCHITECTURE.md`.
 
+/// Failures and roadmaps as the data that pages are made of.
+pub mod pictures;
 /// Settings from several places.
 pub mod settings;
-/// What pages are told of what only planners know.
-pub mod told;
 
 pub use regrasp_base as base;
 pub use regrasp_export as export;

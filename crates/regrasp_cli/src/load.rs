@@ -11,7 +11,7 @@ use regrasp::robot::import::{LoadOptions, OUT_OF_TIME, ResolveOptions};
 use regrasp::scene::query::IN_HAND;
 use regrasp::scene::{LoadedScene, Task, load_scene};
 use regrasp::settings::{Argument, Overrides, SettingsError, read, settings_for};
-use regrasp::{Failure, InHandSettings, InputError, PlannerSettings, TrackingSettings};
+use regrasp::{Failure, InHandSettings, InputError, PlannerSettings};
 use serde_json::json;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -37,13 +37,28 @@ pub fn scene(path: &Path, common: &Common, talk: &Talk) -> Result<LoadedScene, S
     scene_by(path, common, None, talk)
 }
 
+/// As [`scene`], with the task that `plan` answers as its first.
+pub fn scene_of_plan(path: &Path, plan: &regrasp::Plan, common: &Common, talk: &Talk) -> Result<LoadedScene, Stop> {
+    read_scene(path, &plan.query, common, None, talk)
+}
+
 /// As [`scene`], but reading is given up when `deadline` has passed: there is no plan then.
 pub fn scene_by(path: &Path, common: &Common, deadline: Option<Instant>, talk: &Talk) -> Result<LoadedScene, Stop> {
+    read_scene(path, "", common, deadline, talk)
+}
+
+fn read_scene(
+    path: &Path,
+    plan_query: &str,
+    common: &Common,
+    deadline: Option<Instant>,
+    talk: &Talk,
+) -> Result<LoadedScene, Stop> {
     let started = Instant::now();
     let loaded = load_scene(path, &LoadOptions { deadline, ..options(common) }).map_err(in_time_or_no_plan)?;
     let loaded = match &common.task {
         Some(name) => choose(loaded, name, path)?,
-        None => loaded,
+        None => loaded.for_query(plan_query),
     };
     for note in &loaded.notes {
         talk.note(note);

@@ -4,9 +4,9 @@ use crate::stop::Stop;
 use crate::talk::Talk;
 use crate::words::grouped;
 use regrasp::base::files;
+use regrasp::pictures::{failure_facts, failure_story, reached_story};
 use regrasp::plan::check::Report;
 use regrasp::robot::ResolveOptions;
-use regrasp::told;
 use regrasp::viewer::page;
 use regrasp::viewer::story::{Outcome, RoadmapStory, Story, Telling, tell};
 use regrasp::{Failure, Manipulation, Plan, Query};
@@ -35,9 +35,9 @@ impl<'a> Page<'a> {
 
     /// Writes the page of a failure.
     pub fn write_failure(&self, failure: &Failure, talk: &Talk) -> Result<(), Stop> {
-        let outcome = Outcome::Failed(told::failure_story(failure));
-        let reached = told::reached_story(failure, self.query.goal());
-        write(self.path, &self.story(outcome, told::failure_facts(failure), reached)?, talk)
+        let outcome = Outcome::Failed(failure_story(failure));
+        let reached = reached_story(failure, self.query.goal());
+        write(self.path, &self.story(outcome, failure_facts(failure), reached)?, talk)
     }
 
     fn story(

@@ -1,8 +1,10 @@
 //! Why no plan was found: a result, with causes and the nearest miss, not an error.
 
+use crate::grasp::state::MAX_FINGERS;
 use crate::outline::Outline;
 use regrasp_base::Interrupt;
 use regrasp_plan::plan::{PoseData, Statistics};
+use regrasp_scene::HandView;
 use serde::Serialize;
 
 /// What kind of failure.
@@ -98,6 +100,17 @@ impl Failure {
             reached: None,
             statistics: Statistics::default(),
         }
+    }
+
+    /// Refuses a hand of more fingers than planners have room for.
+    pub fn refuse_many_fingers(view: &HandView) -> Result<(), Self> {
+        let n_fingers = view.hand.fingers.len();
+        if n_fingers <= MAX_FINGERS {
+            return Ok(());
+        }
+        let message =
+            format!("hand \"{}\" has {n_fingers} fingers; this version plans for {MAX_FINGERS}", view.hand_name);
+        Err(Failure::bare(FailureKind::Impossible, message, "name fewer of them in the hand file"))
     }
 
     /// Of settings that do not validate; `problem` says what is wrong with them.

@@ -35,6 +35,8 @@ GRAVITIES = ("up", "down", "side", "plan")
 CONTROLLERS = ("A", "B", "C2", "H")
 #: Controllers that hold the start grasp in a way of their own: their static holds are measured apart.
 HOLD_APART = ("A", "H")
+#: Limit of work for one plan where none is given, in configurations: the default of :func:`regrasp.plan`.
+MAX_WORK = 20_000_000
 #: Drift of a static hold beyond which the object has fallen, in millimetres.
 FALLEN_MM = 50.0
 
@@ -57,7 +59,8 @@ class Job:
     packages: tuple[tuple[str, str], ...]
     settings: str
     """Settings of the planner as JSON; those of the variant win over them."""
-    time_limit: float
+    time_limit: float | None
+    max_work: int
     folder: str
 
     @property
@@ -168,7 +171,7 @@ def _plan(job: Job, scene: Any) -> tuple[Any, str]:
     if job.gravity != "plan":
         scene = regrasp.load_scene(job.scene, packages=dict(job.packages), gravity=_down(job, scene))
     # Variants leave out what holds or moves the object: replays show what that costs.
-    found = regrasp.plan(scene, seed=job.seed, settings=settings, time_limit=job.time_limit, level="geometry")
+    found = regrasp.plan(scene, seed=job.seed, settings=settings, time_limit=job.time_limit, max_work=job.max_work, level="geometry")
     job.plan_path.parent.mkdir(parents=True, exist_ok=True)
     if isinstance(found, regrasp.Plan):
         _write(job.plan_path, found.to_json().decode())
@@ -331,7 +334,8 @@ def main(arguments: list[str] | None = None) -> int:
             noslip=not options.no_noslip,
             packages=tuple((name, str(folder)) for name, folder in options.package),
             settings=json.dumps(settings),
-            time_limit=options.time_limit,
+            time_limit=options.time_limit or (None if options.max_work else 60.0),
+            max_work=options.max_work or MAX_WORK,
             folder=str(options.output),
         )
         for scene in options.scenes
@@ -395,7 +399,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--torsion-told", type=float, metavar="M", help="what the controller makes up for of it")
     parser.add_argument("--no-noslip", action="store_true", help="without MuJoCo's solver against creep")
     parser.add_argument("--settings", type=Path, metavar="FILE.json", help="settings of the planner")
-    parser.add_argument("--time-limit", type=float, default=60.0, metavar="S", help="for one plan [default: 60]")
+    parser.add_argument("--time-limit", type=float, metavar="S", help="for one plan [default: 60, or none with --max-work]")
+    parser.add_argument("--max-work", type=int, metavar="N", help="configurations for one plan: the same plans on every machine")
     parser.add_argument("--package", type=package, action="append", default=[], metavar="NAME=DIR")
     parser.add_argument("--processes", type=int, default=2)
     return parser

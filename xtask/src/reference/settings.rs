@@ -12,7 +12,6 @@ struct Field {
     name: String,
     kind: String,
     doc: String,
-    is_flat: bool,
 }
 
 /// The page.
@@ -40,7 +39,7 @@ pub fn page(program: &Path, sources: &[Source]) -> Result<String, String> {
 
 /// A table of the fields of `kind`, and tables of the settings inside.
 fn table(values: &Value, kind: &str, prefix: &str, sources: &[Source], out: &mut String) -> Result<(), String> {
-    let fields = all_fields(kind, sources)?;
+    let fields = all_fields(kind, values, sources)?;
     let _ = write!(out, "\n| key | default | meaning |\n|---|---|---|\n");
     let mut inner = Vec::new();
     for field in &fields {
@@ -76,13 +75,14 @@ fn inner_kind(kind: &str) -> &str {
     inner.rsplit("::").next().unwrap_or(inner)
 }
 
-/// The fields of `kind`, those of flattened groups in their place.
-fn all_fields(kind: &str, sources: &[Source]) -> Result<Vec<Field>, String> {
+/// The fields of `kind`. A plan holds settings flat: a group that it has no key for stands for the fields of the group.
+fn all_fields(kind: &str, values: &Value, sources: &[Source]) -> Result<Vec<Field>, String> {
     let source = find(kind, sources).ok_or_else(|| format!("no source has the struct {kind}"))?;
     let mut found = Vec::new();
     for field in fields(source, kind) {
-        match field.is_flat {
-            true => found.extend(all_fields(inner_kind(&field.kind), sources)?),
+        let is_group = values.get(&field.name).is_none() && find(inner_kind(&field.kind), sources).is_some();
+        match is_group {
+            true => found.extend(all_fields(inner_kind(&field.kind), values, sources)?),
             false => found.push(field),
         }
     }
@@ -99,19 +99,18 @@ fn find<'a>(kind: &str, sources: &'a [Source]) -> Option<&'a str> {
 fn fields(source: &str, kind: &str) -> Vec<Field> {
     let head = format!("pub struct {kind} {{");
     let body = source.split(&head).nth(1).unwrap_or_default();
-    let (mut found, mut doc, mut is_flat, mut is_skipped) = (Vec::new(), Vec::new(), false, false);
+    let (mut found, mut doc, mut is_skipped) = (Vec::new(), Vec::new(), false);
     for line in body.lines().skip(1).map(str::trim).take_while(|line| *line != "}") {
         if let Some(words) = line.strip_prefix("///") {
             doc.push(words.trim().to_owned());
         } else if line.starts_with("#[") {
-            is_flat |= line.contains("flatten");
             is_skipped |= line.contains("serde(skip)");
         } else if let Some((name, kind)) = line.strip_prefix("pub ").and_then(|rest| rest.split_once(": ")) {
             if !is_skipped {
                 let kind = kind.trim_end_matches(',').to_owned();
-                found.push(Field { name: name.to_owned(), kind, doc: plain(&doc.join(" ")), is_flat });
+                found.push(Field { name: name.to_owned(), kind, doc: plain(&doc.join(" ")) });
             }
-            (doc, is_flat, is_skipped) = (Vec::new(), false, false);
+            (doc, is_skipped) = (Vec::new(), false);
         }
     }
     found

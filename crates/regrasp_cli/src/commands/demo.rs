@@ -19,11 +19,11 @@ use std::path::Path;
 const MAX_WORK: u64 = 5_000_000;
 /// The scene, relative to the output folder.
 const SCENE: &str = "scenes/sphere_180z.toml";
-/// The files of the repository that the demo needs, so that an installed binary needs no repository.
+/// The files that the demo needs, so that an installed binary needs no repository: copies, which a test of `xtask` compares.
 const FILES: [(&str, &str); 3] = [
-    (SCENE, include_str!("../../../../scenes/sphere_180z.toml")),
-    ("assets/hands/wide_four_finger/hand.toml", include_str!("../../../../assets/hands/wide_four_finger/hand.toml")),
-    ("assets/hands/wide_four_finger/hand.urdf", include_str!("../../../../assets/hands/wide_four_finger/hand.urdf")),
+    (SCENE, include_str!("../../demo/scenes/sphere_180z.toml")),
+    ("assets/hands/wide_four_finger/hand.toml", include_str!("../../demo/assets/hands/wide_four_finger/hand.toml")),
+    ("assets/hands/wide_four_finger/hand.urdf", include_str!("../../demo/assets/hands/wide_four_finger/hand.urdf")),
 ];
 
 /// Writes the bundled files, plans, checks, writes plan, picture and page.

@@ -12,12 +12,12 @@ use crate::stop::Stop;
 use crate::talk::Talk;
 use crate::words::{counted, duration, grouped};
 use regrasp::base::files;
+use regrasp::pictures::{roadmap_from_first, roadmap_story};
 use regrasp::plan::check::Level;
 use regrasp::planners::FailureKind;
 use regrasp::planners::in_hand::roadmap::{
     About, BuildSettings, BuildStage, Census, GraspRoadmap, QueryMemory, Region, RoadmapPlanner, build_roadmap,
 };
-use regrasp::told;
 use regrasp::{Budget, InHandQuery, Query};
 use regrasp_bench::row::Judge;
 use regrasp_bench::{Problem, RunSettings, csv, roadmap as bench, summarise, summary};
@@ -155,7 +155,7 @@ fn run_picture(arguments: &args::RoadmapPicture, common: &Common, talk: &Talk) -
     let roadmap = open(&arguments.roadmap, talk)?;
     let name = arguments.roadmap.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     let Some(scene) = &arguments.scene else {
-        let story = told::roadmap_from_first(&roadmap);
+        let story = roadmap_from_first(&roadmap);
         let title = format!("Graph {name}, goal: its first pose");
         return pictures::write_roadmap(&arguments.output, &story, &title, talk);
     };
@@ -178,7 +178,7 @@ fn run_picture(arguments: &args::RoadmapPicture, common: &Common, talk: &Talk) -
         return Err(Stop::Rejected);
     }
     // With start and goal of the query as nodes.
-    let story = told::roadmap_story(&roadmap.grown_by(&answer), &view, &answer.plan);
+    let story = roadmap_story(&roadmap.grown_by(&answer), &view, &answer.plan);
     let title = format!("Graph {name}, goal of {}", loaded.scene.name);
     pictures::write_roadmap(&arguments.output, &story, &title, talk)
 }

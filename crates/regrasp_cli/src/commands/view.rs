@@ -13,9 +13,9 @@ use crate::pages;
 use crate::stop::Stop;
 use crate::talk::Talk;
 use regrasp::base::files;
+use regrasp::pictures::roadmap_story;
 use regrasp::plan::format;
 use regrasp::planners::in_hand::roadmap::GraspRoadmap;
-use regrasp::told;
 use regrasp::viewer::story::{Outcome, Telling};
 use serde_json::json;
 
@@ -31,13 +31,13 @@ pub fn run(arguments: &args::View, common: &Common, talk: &Talk) -> Result<(), S
     pictures::make_folder(arguments)?;
     let plan = format::from_json(&arguments.plan, &files::read(&arguments.plan)?)?;
     let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref(), "regrasp view PLAN SCENE")?;
-    let loaded = arguments.judging.scene(load::scene(&scene_path, common, talk)?).for_query(&plan.query);
+    let loaded = arguments.judging.scene(load::scene_of_plan(&scene_path, &plan, common, talk)?);
     written.refuse_inputs(loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
     let roadmap = match &arguments.with_roadmap {
         Some(path) => {
             let roadmap = GraspRoadmap::read(path)?;
             roadmap.refuse_other_scene(path, &loaded.view())?;
-            Some(told::roadmap_story(&roadmap, &loaded.view(), &plan))
+            Some(roadmap_story(&roadmap, &loaded.view(), &plan))
         }
         None => None,
     };

@@ -5,8 +5,8 @@ use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 
-/// Most fingers a hand may have.
-pub const MAX_FINGERS: usize = regrasp_robot::hand::MAX_FINGERS;
+/// Most fingers that planners have room for: grasps are kept in arrays of this size. The checker has no such limit.
+pub const MAX_FINGERS: usize = 6;
 const _: () = assert!(MAX_FINGERS <= regrasp_grasp::wrench::force_distribution::MAX_GRIPS);
 
 /// Joint positions of all fingers.
@@ -88,6 +88,12 @@ pub struct Moment {
 }
 
 impl GraspState {
+    /// The state at a moment of a transfer with this grasp.
+    pub fn at(&self, moment: &Moment) -> Self {
+        let Moment { world_from_object, joints, contacts } = moment.clone();
+        GraspState { world_from_object, joints, contacts, holding: self.holding }
+    }
+
     /// This state as a moment of a transfer.
     pub fn moment(&self) -> Moment {
         Moment {

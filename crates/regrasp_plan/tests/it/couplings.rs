@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// second does, within limits of its own.
 fn scene() -> Scene {
     let mut scene = sample::scene();
-    let finger = &mut scene.hand.fingers[0];
+    let finger = &mut scene.hands[0].hand.fingers[0];
     let chain = &finger.chain;
     let terms = [(0, -0.5), (1, -1.0)];
     let mut joints = chain.joints.clone();
@@ -23,7 +23,7 @@ fn scene() -> Scene {
     let coupled = Chain::new(joints, chain.names[..2].to_vec(), chain.lower[..2].to_vec(), chain.upper[..2].to_vec());
     finger.chain = coupled.with_linear_limits(vec![linear]);
     finger.rest.pop();
-    let robot = Arc::make_mut(&mut scene.hand.robot);
+    let robot = Arc::make_mut(&mut scene.hands[0].hand.robot);
     let leader = |j: usize| robot.joint_named(&format!("f0_j{j}")).unwrap();
     let terms: [(JointId, f64); 2] = [(leader(0), -0.5), (leader(1), -1.0)];
     let follower = leader(2);
@@ -37,8 +37,8 @@ fn scene() -> Scene {
 #[test]
 fn tips_velocities_and_limits_agree_with_the_chain() {
     let scene = scene();
-    let model = Model::new(&scene).unwrap();
-    let (ours, theirs) = (&model.fingers[0], &scene.hand.fingers[0]);
+    let model = sample::with_task(&scene, Model::new).unwrap();
+    let (ours, theirs) = (&model.fingers[0], &scene.hands[0].hand.fingers[0]);
     assert_eq!(ours.coordinates, 0..2);
     let row = model.limits.iter().find(|row| row.name == "f0_j2").unwrap();
     let mut rng = Rng::keyed(1, "couplings", 0);
@@ -46,7 +46,10 @@ fn tips_velocities_and_limits_agree_with_the_chain() {
     for _ in 0..300 {
         let joints: Vec<f64> = (0..model.joint_names.len()).map(|_| rng.uniform(-1.0, 1.0)).collect();
         let center = ours.center_in_world(&joints);
-        assert!((center - theirs.chain.tip(&joints[..2], &theirs.tip.center_in_body)).norm() < 1e-12);
+        assert!(
+            (center - sample::world_from_hand() * theirs.chain.tip(&joints[..2], &theirs.tip.center_in_body)).norm()
+                < 1e-12
+        );
         let rates: Vec<f64> = joints.iter().map(|_| rng.uniform(-1.0, 1.0)).collect();
         let [before, after] = [-1e-6, 1e-6].map(|h| {
             let moved: Vec<f64> = joints.iter().zip(&rates).map(|(q, rate)| q + h * rate).collect();
@@ -79,7 +82,7 @@ fn a_sum_beyond_its_limits_is_reported_at_waypoints_and_between() {
         waypoint.joints[1] = 0.1 - 0.5 * waypoint.joints[0];
     }
     let beyond = |plan: &regrasp_plan::Plan| {
-        let report = check(&coupled, None, plan, &CheckSettings::default());
+        let report = check((&coupled, &sample::state(&coupled)), None, plan, &CheckSettings::default());
         let of_follower = report.violations.iter().filter(|violation| violation.subjects.iter().any(|s| s == "f0_j2"));
         of_follower.filter(|violation| violation.kind == ViolationKind::JointLimit).count()
     };

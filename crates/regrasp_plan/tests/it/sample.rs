@@ -324,6 +324,9 @@ pub fn plan_of(scene: &Scene, start: &Pose, goal: &Pose, segments: Vec<Segment>)
         format_version: FORMAT_VERSION,
         tool: "test".into(),
         task: "in_hand".into(),
+        query: String::new(),
+        hand: "hand".into(),
+        object: scene.objects[0].name.clone(),
         method: "by hand".into(),
         seed: 0,
         settings: serde_json::json!({"lift": 0.004}),
@@ -356,6 +359,8 @@ pub fn plan_of(scene: &Scene, start: &Pose, goal: &Pose, segments: Vec<Segment>)
         segments,
         statistics: Statistics::default(),
     };
+    let holders = vec![plan.hand.clone()];
+    plan.segments.iter_mut().for_each(|segment| segment.held_by.clone_from(&holders));
     let mut now = 0.0;
     for waypoint in plan.segments.iter_mut().flat_map(|segment| &mut segment.waypoints) {
         waypoint.time = now;
@@ -437,14 +442,24 @@ pub fn query(plan: &Plan) -> Query {
     if plan.task != regrasp_scene::query::TRACKING {
         return in_hand_query(plan).into();
     }
-    let InHandQuery { hand, object, world_from_object_start, world_from_object_goal, start_grasp, goal_grasp, .. } =
-        in_hand_query(plan);
-    TrackingQuery { hand, object, world_from_object_start, world_from_object_goal, start_grasp, goal_grasp }.into()
+    let InHandQuery {
+        name,
+        hand,
+        object,
+        world_from_object_start,
+        world_from_object_goal,
+        start_grasp,
+        goal_grasp,
+        ..
+    } = in_hand_query(plan);
+    TrackingQuery { name, hand, object, world_from_object_start, world_from_object_goal, start_grasp, goal_grasp }
+        .into()
 }
 
 /// The query that [`plan`] answers, if it is an in-hand plan.
 pub fn in_hand_query(plan: &Plan) -> InHandQuery {
     InHandQuery {
+        name: plan.query.clone(),
         hand: 0,
         object: 0,
         world_from_object_start: Pose::from(&plan.start),

@@ -75,6 +75,7 @@ pub fn plan_in_hand(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Plan, Failure> {
     settings.validate().map_err(|problem| Failure::of_settings(&problem))?;
+    Failure::refuse_many_fingers(view)?;
     let seen = view.hand_from_world().map(|hand_from_world| query.seen_from(&hand_from_world));
     let asked = Asked { view, query: seen.as_ref().unwrap_or(query), seed, progress };
     let found = plan_in_hand_frame(&asked, settings, budget);

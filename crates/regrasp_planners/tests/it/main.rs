@@ -11,9 +11,12 @@ mod queries;
 mod reach;
 mod roadmaps;
 mod segments;
+mod several;
 mod soft_and_coupled;
 mod solids;
 mod tips;
 mod tracking;
 mod tracking_gaits;
+#[path = "../../../../tests/support/two_hands.rs"]
+mod two_hands;
 mod way_poses;

@@ -38,7 +38,7 @@ pub(super) fn one_hand(root: &mut Table, files: &mut Files, found: &mut Found) -
         .as_ref()
         .and_then(|entry| entry.table(found))
         .and_then(|table| object::object(table, files, found));
-    let obstacles = object::fixed_bodies(root, "obstacles", &mut Names::default(), files, found);
+    let obstacles = object::fixed_bodies(root, "obstacles", &mut Names::of("body of the scene"), files, found);
     let inner = hand.as_ref().map(|hand| &hand.hand);
     let start = task::start(root, inner, None, found);
     let kind = kind.unwrap_or(TaskKind::InHand);
@@ -66,7 +66,7 @@ pub(super) fn one_hand(root: &mut Table, files: &mut Files, found: &mut Found) -
 
 /// Version 2: `[robot]`, `[[objects]]`, `[[supports]]`, `[[obstacles]]`, `[[tasks]]`.
 pub(super) fn several(root: &mut Table, files: &mut Files, found: &mut Found) -> Option<Parts> {
-    let mut names = Names::default();
+    let mut names = Names::of("body of the scene");
     let hands = hands(root, &mut names, files, found);
     let gravity = gravity::gravity(root, Some(&Pose::identity()), found);
     let limits = limits::limits(root, found);
@@ -78,7 +78,7 @@ pub(super) fn several(root: &mut Table, files: &mut Files, found: &mut Found) ->
     let fix = "add [[tasks]] with task = \"in_hand\", hand, object and goal";
     let entries = root.required(found, "tasks", fix)?.entries(found, "tables [[tasks]]")?;
     let (hands, objects) = bodies?;
-    let mut task_names = Names::default();
+    let mut task_names = Names::of("task");
     let mut tasks = Vec::new();
     for (index, entry) in entries.iter().enumerate() {
         let Some(mut table) = entry.table(found) else { continue };
@@ -148,17 +148,23 @@ fn task_of(
     objects: &[(Object, Pose)],
     found: &mut Found,
 ) -> Option<Task> {
-    let kind = task_kind(table, found)?;
+    let known_kind = task_kind(table, found);
+    let kind = known_kind.unwrap_or(TaskKind::InHand);
     let name = table.optional("name").map_or(Some(default_name), |entry| entry.name(found).map(str::to_owned));
     let hand_names: Vec<&str> = hands.iter().map(|hand| hand.name.as_str()).collect();
     let object_names: Vec<&str> = objects.iter().map(|(object, _)| object.name.as_str()).collect();
     let hand = which(table, "hand", &hand_names, found);
     let object = which(table, "object", &object_names, found);
-    let (hand, object) = (hand?, object?);
-    let (placed, (body, resting)) = (&hands[hand], &objects[object]);
-    let start = task::start(table, Some(&placed.hand), Some(*resting), found);
-    let heading = Heading { name: name?, kind, hand, object };
-    let task = task::task(table, heading, start, Some(&placed.hand), found)?;
+    // All keys are read whatever is unknown: none of them is then said not to exist.
+    let resting = object.map_or(Pose::identity(), |object| objects[object].1);
+    let inner = hand.map(|hand| &hands[hand].hand);
+    let start = task::start(table, inner, Some(resting), found);
+    let is_known = known_kind.is_some() && name.is_some();
+    let (name, indices) = (name.unwrap_or_default(), (hand.unwrap_or(0), object.unwrap_or(0)));
+    let heading = Heading { name, kind, hand: indices.0, object: indices.1 };
+    let task = task::task(table, heading, start, inner, found).filter(|_| is_known);
+    let (placed, body) = (&hands[hand?], &objects[object?].0);
+    let task = task?;
     if let Some(entry) = table.optional("object").or_else(|| table.optional("goal")) {
         units::check_sizes(&placed.hand, body, &entry, found);
     }

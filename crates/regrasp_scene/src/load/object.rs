@@ -267,16 +267,23 @@ pub(super) fn fixed_bodies(
     bodies
 }
 
-/// The names of the bodies of a scene. They all differ.
-#[derive(Default)]
-pub(super) struct Names(BTreeSet<String>);
+/// Names that all differ: those of the bodies of a scene, or those of its tasks.
+pub(super) struct Names {
+    what: &'static str,
+    known: BTreeSet<String>,
+}
 
 impl Names {
-    /// Adds the name of the body of `entry`. Errors: another body has it (`S112`).
+    /// No names so far; `what` has them.
+    pub fn of(what: &'static str) -> Self {
+        Names { what, known: BTreeSet::new() }
+    }
+
+    /// Adds the name of `entry`. Errors: another one has it (`S112`).
     pub fn add(&mut self, name: &str, entry: &Entry, found: &mut Found) {
-        if !self.0.insert(name.to_owned()) {
+        if !self.known.insert(name.to_owned()) {
             let diagnostic = entry
-                .error("S112", found, format!("has the name \"{name}\", as another body of the scene"))
+                .error("S112", found, format!("has the name \"{name}\", as another {}", self.what))
                 .expected("names that differ");
             found.diagnostics.push(diagnostic);
         }

@@ -24,6 +24,8 @@ pub enum Reason {
     TooNear(Pair),
     /// Between two grasps a contact would have to cross an edge of the object.
     Crease,
+    /// A transfer stopped short of the goal: soft fingertips would have to turn about their contacts' normals.
+    WouldTurn,
     /// There are no contact forces that balance the weight.
     NoForces(Unbalanced),
     /// A path in GS_n could not be cut into transfers and regrasps.
@@ -52,6 +54,8 @@ impl Release {
 pub struct Tally {
     counts: std::collections::BTreeMap<Reason, u64>,
     releases: [Release; MAX_FINGERS],
+    /// The smallest turn about a contact normal for want of which a transfer stopped short of the goal, in radians.
+    least_turn: Option<f64>,
 }
 
 impl Tally {
@@ -65,6 +69,12 @@ impl Tally {
         *self.counts.entry(reason).or_default() += count;
     }
 
+    /// One more transfer that stopped short of the goal because fingertips would have to turn by `turn` about a contact normal.
+    pub fn note_turn(&mut self, turn: f64) {
+        self.add(Reason::WouldTurn);
+        self.least_turn = Some(self.least_turn.map_or(turn, |least| least.min(turn)));
+    }
+
     /// What was seen of letting `finger` go.
     pub fn release(&self, finger: usize) -> &Held {
         &self.releases[finger].seen
@@ -75,6 +85,7 @@ impl Tally {
         for (&reason, count) in &other.counts {
             *self.counts.entry(reason).or_default() += count;
         }
+        self.least_turn = [self.least_turn, other.least_turn].into_iter().flatten().min_by(f64::total_cmp);
         for (release, more) in self.releases.iter_mut().zip(&other.releases) {
             release.add(&more.seen, more.best_at);
         }
@@ -127,6 +138,10 @@ impl Tally {
                     }
                     Reason::OutOfReach => "a finger reaches no farther while the object moves".into(),
                     Reason::Crease => "a contact would have to slide over an edge of the object".into(),
+                    Reason::WouldTurn => format!(
+                        "soft fingertips would have to turn about their contact normals, by {:.2} degrees at least",
+                        self.least_turn.unwrap_or(0.0).to_degrees()
+                    ),
                     Reason::NoForces(unbalanced) => unbalanced.in_words(model),
                     Reason::NotDecomposed => {
                         "a path with sliding contacts has no transfers and regrasps near it".into()
@@ -155,6 +170,7 @@ impl Tally {
                 Reason::OutOfReach => "out_of_reach",
                 Reason::TooNear(_) => "too_near",
                 Reason::Crease => "crease",
+                Reason::WouldTurn => "would_turn",
                 Reason::NoForces(_) => "no_forces",
                 Reason::NotDecomposed => "not_decomposed",
             };

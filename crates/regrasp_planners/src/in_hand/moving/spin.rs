@@ -24,7 +24,7 @@ use crate::in_hand::moving::step::{Spins, is_closed, step_joints};
 
 use arrayvec::ArrayVec;
 
-pub use arrive::{Arrival, arrive};
+pub use arrive::{Arrival, LOOP_REACH, arrive, arrive_by_loop};
 
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector6};
 
@@ -217,6 +217,16 @@ pub fn pursue(
     }
     // It has not arrived, whatever is left.
     if pushed == 0 { 0.0 } else { (1.0 - best / whole).clamp(0.0, 1.0 - 1e-9) }
+}
+
+/// Where the object can come no nearer to `goal` because fingertips would turn about their normals: the largest of these turns
+/// on the rest of the way, in radians, to first order. None where something else stops it.
+pub fn turn_needed(model: &Model, state: &GraspState, goal: &Pose) -> Option<f64> {
+    let left = twist_between(model, &state.world_from_object, goal);
+    let conditions = Conditions::of(model, state.holding, &state.moment())?;
+    let way = conditions.project(&left)?;
+    let is_stopped = way.norm() < LEAST_HEADWAY * left.norm() || way.norm() < LEAST_WAY * model.settings.step;
+    is_stopped.then(|| conditions.turns(&left).iter().fold(0.0, |most: f64, turn| most.max(turn.abs())))
 }
 
 /// Transfers of two grasps to a pose of the object that both reach without turning about normals.

@@ -105,6 +105,7 @@ pub fn build_roadmap(
 ) -> Result<GraspRoadmap, Failure> {
     let valid = settings.validate().and_then(|()| build.validate()).and_then(|()| region.validate());
     valid.map_err(|problem| Failure::of_settings(&problem))?;
+    Failure::refuse_many_fingers(view)?;
     let physics = PhysicsSettings { transfer: TransferMode::Fixed, ..settings.physics.clone() };
     let settings = InHandSettings { method: Method::Gait, physics, ..settings.clone() };
     let within = settings.within(&view.limits);

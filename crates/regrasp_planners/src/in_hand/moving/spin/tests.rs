@@ -120,3 +120,48 @@ fn two_grasps_meet_at_one_pose() {
         assert!(n_met >= 3, "too few meetings: {n_met}");
     });
 }
+
+#[test]
+fn loops_end_exactly_at_poses_that_no_straight_transfer_reaches() {
+    with_settings("soft_pair_roll.toml", &InHandSettings::default(), |search| {
+        let mut n_closed = 0;
+        for _ in 0..60 {
+            let Some(state) = draw_state(search) else { continue };
+            let goal = elsewhere(search, &state.world_from_object, 5e-4, 0.01);
+            let model = search.model();
+            let mut straight = Vec::new();
+            if pursue(model, &state, &goal, &mut straight, |_| true) == 1.0 {
+                continue;
+            }
+            let Some(found) = arrive_by_loop(model, &state, &goal, &mut search.rng, &mut 0) else { continue };
+            assert_eq!(found.start, state);
+            assert_eq!(found.moments.last().unwrap().world_from_object, goal);
+            assert_still(model, &state, &found.moments);
+            n_closed += 1;
+        }
+        assert!(n_closed >= 3, "too few loops close: {n_closed}");
+    });
+}
+
+#[test]
+fn the_turn_that_stops_a_transfer_is_the_one_that_a_step_would_make() {
+    with_settings("soft_pair_roll.toml", &InHandSettings::default(), |search| {
+        let mut n_compared = 0;
+        for _ in 0..200 {
+            let Some(state) = draw_state(search) else { continue };
+            let goal = elsewhere(search, &state.world_from_object, 1e-4, 3e-3);
+            let model = search.model();
+            let mut moments = Vec::new();
+            if pursue(model, &state, &goal, &mut moments, |_| true) == 1.0 {
+                continue;
+            }
+            let end = moments.last().map_or_else(|| state.clone(), |last| state.at(last));
+            let Some(needed) = turn_needed(model, &end, &goal) else { continue };
+            let Ok((_, spins)) = step_joints(model, end.holding, &end.moment(), &goal) else { continue };
+            let made = spins.iter().fold(0.0, |most: f64, spin| most.max(spin.abs()));
+            assert!((made - needed).abs() < 5e-5 + 0.05 * needed, "{made} {needed}");
+            n_compared += 1;
+        }
+        assert!(n_compared >= 10, "too little was compared: {n_compared}");
+    });
+}

@@ -11,7 +11,7 @@ use crate::in_hand::grasps::free::{draw_leavable, free_posture, free_posture_at}
 use crate::in_hand::grasps::freedom::Freedom;
 use crate::in_hand::grasps::pool::Pool;
 use crate::in_hand::moving::spin;
-use crate::in_hand::moving::spin::Arrival;
+use crate::in_hand::moving::spin::{Arrival, LOOP_REACH};
 use crate::in_hand::moving::transfer::{is_carried_out, transfer};
 use crate::in_hand::regrasping::regrasp::{Tried, regrasp};
 use crate::in_hand::regrasping::unlock::{draw_bound_finger, unlock};
@@ -283,6 +283,17 @@ fn advance(search: &mut Search, tree: &mut Tree, parent: usize, target: &Pose, m
     let share = transfer(&mut search.workspace, &from, target, &mut moments);
     // What no forces balance is counted by itself.
     let lacks_forces = search.workspace.refusals.n_seen() > n_refused;
+    let model = search.model();
+    let may_close_in = model.may_release && *target == tree.aim && spin::is_restricted(model, from.holding);
+    if share < 1.0
+        && may_close_in
+        && let Some(arrival) = close_in(search, &from, &moments, target)
+    {
+        moments.extend(arrival);
+        place = tree.add_place(search, target);
+        way.push_transfer(moments);
+        return Some(tree.add_node(Node { parent: Some(parent), way, n_tries: 0, place }));
+    }
     if share < 1.0 {
         back_off(search, &from, &mut moments);
     }
@@ -297,6 +308,22 @@ fn advance(search: &mut Search, tree: &mut Tree, parent: usize, target: &Pose, m
     }
     let has_moved = !way.steps().is_empty();
     has_moved.then(|| tree.add_node(Node { parent: Some(parent), way, n_tries: 0, place }))
+}
+
+/// The rest of a transfer from `from` that came near `goal` with `moments` and stopped because soft fingertips would have to
+/// turn about their normals: a loop that ends exactly there.
+fn close_in(search: &mut Search, from: &GraspState, moments: &[Moment], goal: &Pose) -> Option<Vec<Moment>> {
+    let model = search.model();
+    let end = moments.last().map_or_else(|| from.clone(), |last| from.at(last));
+    let turn = spin::turn_needed(model, &end, goal)?;
+    search.tally.note_turn(turn);
+    if spin::twist_between(model, &end.world_from_object, goal).norm() > LOOP_REACH {
+        return None;
+    }
+    let mut rng = Rng::child(&search.rng, "loop", 0);
+    search.rng.bits();
+    let Arrival { moments, .. } = spin::arrive_by_loop(model, &end, goal, &mut rng, &mut search.workspace.work)?;
+    is_carried_out(&mut search.workspace, &end, &moments).then_some(moments)
 }
 
 /// Shortens a transfer that stopped at a limit or against something to where most fingers that may let go can be lifted.

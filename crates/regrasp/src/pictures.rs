@@ -1,4 +1,6 @@
-//! What pages are told of what only planners know: failures and roadmaps, as the plain data of `regrasp_viewer::story`.
+//! Failures and roadmaps as the plain data that pages and pictures are made of (`regrasp_viewer::story`).
+//!
+//! The viewer knows no planner: what only planners know is converted here.
 
 use regrasp_geometry::Pose;
 use regrasp_geometry::frame::{parts_of, pose_distance, rotation_between};
