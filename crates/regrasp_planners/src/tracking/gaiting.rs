@@ -7,7 +7,7 @@
 
 use crate::tracking::grasp::{TrackingGrasp, turn_to};
 use crate::tracking::local::Local;
-use crate::tracking::step::{Step, Stepper};
+use crate::tracking::step::{Stepper, TrackingStep};
 use nalgebra::UnitQuaternion;
 use regrasp_grasp::Contact;
 use regrasp_manipulation::forces::along::add_forces;
@@ -32,7 +32,7 @@ const AIR_REACH: f64 = 0.98;
 #[derive(Debug, Clone)]
 pub enum Move {
     /// All fingers touch, one moves.
-    Step(Box<Step>),
+    Step(Box<TrackingStep>),
     /// One finger goes through the air.
     Relocation(Box<Relocation>),
 }
@@ -47,8 +47,8 @@ impl Move {
     }
 }
 
-impl From<Step> for Move {
-    fn from(step: Step) -> Self {
+impl From<TrackingStep> for Move {
+    fn from(step: TrackingStep) -> Self {
         Move::Step(Box::new(step))
     }
 }
@@ -69,7 +69,7 @@ struct Change {
     finger: usize,
     grasp: TrackingGrasp,
     /// Steps from there towards the goal.
-    steps: Vec<Step>,
+    steps: Vec<TrackingStep>,
     /// Angle gained by them, less where they end in a grasp that no finger may leave.
     worth: f64,
 }

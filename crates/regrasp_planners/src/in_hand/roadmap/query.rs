@@ -60,7 +60,7 @@ pub struct QueryMemory {
 
 /// A plan, and what the roadmap can learn from it.
 #[derive(Debug)]
-pub struct Answer {
+pub struct RoadmapAnswer {
     /// The plan.
     pub plan: Plan,
     /// Links of start and goal to the graph.
@@ -119,12 +119,12 @@ impl<'a> RoadmapPlanner<'a> {
         seed: u64,
         budget: &Budget,
         memory: &mut QueryMemory,
-    ) -> Result<Answer, Failure> {
+    ) -> Result<RoadmapAnswer, Failure> {
         let view = self.model.view;
         let seen = view.hand_from_world().map(|hand_from_world| query.seen_from(&hand_from_world));
         let found = self.plan_in_hand_frame(seen.as_ref().unwrap_or(query), seed, budget, memory);
         found
-            .map(|answer| Answer { plan: plan_in_world(view, &query.name, answer.plan), ..answer })
+            .map(|answer| RoadmapAnswer { plan: plan_in_world(view, &query.name, answer.plan), ..answer })
             .map_err(|failure| failure_in_world(view, failure))
     }
 
@@ -134,7 +134,7 @@ impl<'a> RoadmapPlanner<'a> {
         seed: u64,
         budget: &Budget,
         memory: &mut QueryMemory,
-    ) -> Result<Answer, Failure> {
+    ) -> Result<RoadmapAnswer, Failure> {
         let model = &self.model;
         let poses = [query.world_from_object_start, query.world_from_object_goal];
         refuse_way_poses(query)?;
@@ -161,7 +161,7 @@ impl<'a> RoadmapPlanner<'a> {
         start_grasp: Option<GraspState>,
         goal_grasp: Option<GraspState>,
         memory: &mut QueryMemory,
-    ) -> Result<Result<Answer, Failure>, Stop> {
+    ) -> Result<Result<RoadmapAnswer, Failure>, Stop> {
         let (roadmap, landmarks) = (self.roadmap, &self.roadmap.landmarks);
         let mut start = QueryEnd::new(search.start, start_grasp);
         let mut goal = QueryEnd::new(search.goal, goal_grasp);
@@ -217,7 +217,7 @@ impl<'a> RoadmapPlanner<'a> {
                     }
                 };
                 (plan.method, plan.settings) = ("roadmap".into(), settings_of(&self.settings));
-                return Ok(Ok(Answer { plan, links: [first, last] }));
+                return Ok(Ok(RoadmapAnswer { plan, links: [first, last] }));
             }
         }
         Ok(Err(match seen {
@@ -354,7 +354,7 @@ fn straighten(search: &mut Search, way: &mut Sequence) {
 impl GraspRoadmap {
     /// The roadmap with the ends of an answered query as new places, each linked by the motions found.
     #[must_use]
-    pub fn grown_by(self, answer: &Answer) -> Self {
+    pub fn grown_by(self, answer: &RoadmapAnswer) -> Self {
         let GraspRoadmap { mut about, graph, mut landmarks, .. } = self;
         let mut registry = Registry::new(graph);
         let before = (registry.graph().nodes.len(), registry.graph().edges.len());
