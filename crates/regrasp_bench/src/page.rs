@@ -189,8 +189,8 @@ fn ratios(parts: &[(String, Vec<Row>)], out: &mut String) {
     if !lines.is_empty() {
         let _ = write!(
             out,
-            "\n## Classic method over the method of paper 000\n\n\
-             Mean planning time over the solved seeds, in ms. Paper 000 reports 116 for its sphere and 13 for its box.\n\n\
+            "\n## Classic method over the method of Saut 2011\n\n\
+             Mean planning time over the solved seeds, in ms. Saut 2011 reports 116 for its sphere and 13 for its box.\n\n\
              | scene | classic | visibility | ratio |\n|---|---|---|---|\n{lines}"
         );
     }

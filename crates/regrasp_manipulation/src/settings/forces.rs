@@ -12,11 +12,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ForceSettings {
-    /// Normal force wished for (notes on physics, section 1).
+    /// Normal force wished for (by simulation of a prototype).
     pub squeeze: f64,
-    /// What a square of a newton beside that counts, against one of tangential force (ibid.).
+    /// What a square of a newton beside that counts, against one of tangential force (by simulation of a prototype).
     pub squeeze_weight: f64,
-    /// Least and largest normal force (ibid.: below 2 N contacts were lost).
+    /// Least and largest normal force (by simulation of a prototype: below 2 N contacts were lost).
     pub normal_force: [f64; 2],
     /// Share of the robot's effort limits that contact forces may take; the rest is for what is not planned. URDF files
     /// give what the joint can do, so all of it by default.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SpeedSettings {
-    /// Largest speed of fingertips and of the object's surface, in metres per second (notes on physics, section 1; 0.08
+    /// Largest speed of fingertips and of the object's surface, in metres per second (by simulation of a prototype; 0.08
     /// made no clear difference).
     pub largest_speed: f64,
     /// Largest velocity of joints of which the robot has none, in radians or metres per second: what small servos do.
@@ -14,7 +14,7 @@ pub struct SpeedSettings {
     /// Largest acceleration of joints, in radians or metres per second squared, as robot files have none: from rest to
     /// the velocity above in a tenth of a second.
     pub joint_acceleration: f64,
-    /// Time in which forces change between two segments, in seconds (notes on physics, section 1; 0.05 made no
+    /// Time in which forces change between two segments, in seconds (by simulation of a prototype; 0.05 made no
     /// difference).
     pub ramp: f64,
 }

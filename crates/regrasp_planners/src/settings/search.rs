@@ -9,9 +9,9 @@ pub enum Method {
     /// Gait trees from start and goal that meet: relocate with look-ahead, transfer as far as possible. The default, by
     /// measurement.
     Gait,
-    /// Paper 000: visibility PRM in GS_n, components joined by transfer-regrasp paths, dichotomic decomposition.
+    /// Saut 2011: visibility PRM in GS_n, components joined by transfer-regrasp paths, dichotomic decomposition.
     Visibility,
-    /// Paper 000's baseline: visibility PRM whose local method is one transfer-regrasp or regrasp-transfer.
+    /// Saut 2011's baseline: visibility PRM whose local method is one transfer-regrasp or regrasp-transfer.
     Classic,
 }
 
@@ -31,9 +31,9 @@ impl Method {
 #[serde(rename_all = "snake_case")]
 pub enum ReleaseRule {
     /// Where the other fingers are closed; grasps in between need closure of all only. The default: on real hands the
-    /// paper's rule leaves too little (real-hands-notes, 2e).
+    /// Saut 2011's rule leaves too little (by measurement on a prototype).
     WhereOthersHold,
-    /// Every set of n-1 fingers is closed in every grasp (paper 000, section 4.2.2).
+    /// Every set of n-1 fingers is closed in every grasp (Saut 2011, sec. 4.2.2).
     EverywhereEveryFinger,
 }
 
@@ -66,22 +66,22 @@ impl Default for FirstTry {
 /// How grasps and motions are looked for. Lengths in metres, angles in radians.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SearchSettings {
-    /// When a finger may let go; the methods of paper 000 always use the paper's rule.
+    /// When a finger may let go; the methods of Saut 2011 always use its own rule.
     pub release_rule: ReleaseRule,
     /// A first try with more room; none goes without.
     pub first_try: Option<FirstTry>,
     /// How far the object may wander from the straight way from start to goal. By measurement on allegro/box_y: 20 mm solves
-    /// more within a work limit than 12 (in-hand-notes, 1) or 30.
+    /// more within a work limit than 12 (by measurement on a prototype) or 30.
     pub wander_distance: f64,
-    /// How far it may turn away from it, standard deviation (in-hand-notes, 3: 0.4 rad).
+    /// How far it may turn away from it, standard deviation (by measurement on a prototype: 0.4 rad).
     pub wander_angle: f64,
-    /// Share of poses drawn as far off the straight way as the object is large: long objects must travel to turn (paper 000,
-    /// section 5.1, example 3). By measurement: with 0.2 the pencil takes a fifth of the work of 0; against 0.1
+    /// Share of poses drawn as far off the straight way as the object is large: long objects must travel to turn (Saut 2011,
+    /// sec. 5.1, example 3). By measurement: with 0.2 the pencil takes a fifth of the work of 0; against 0.1
     /// it saves 20 % on allegro/cube57_x and 32 % on box_y, and costs 50 % on cylinder20_y and 24 % on cube57_y.
     pub far_share: f64,
-    /// Share of poses drawn straight out of a passage, where an end of the way lies in one (paper 000, example 4).
+    /// Share of poses drawn straight out of a passage, where an end of the way lies in one (Saut 2011, example 4).
     pub passage_share: f64,
-    /// Share of extensions towards the goal, the others towards a pose nearby (real-hands-notes, 2: 0.75).
+    /// Share of extensions towards the goal, the others towards a pose nearby (by measurement on a prototype: 0.75).
     pub goal_share: f64,
     /// What a try at a pose costs when the next pose is chosen, as a share of the object's radius.
     pub try_fee: f64,
@@ -92,7 +92,7 @@ pub struct SearchSettings {
     /// Of these, how many are kept for combining.
     pub candidates_kept: usize,
     /// Least number of fingers that hold while the object moves, where they are closed; the others may be free meanwhile (paths
-    /// through GS_k, paper 000, section 3.2). With the number of fingers, or more, all hold.
+    /// through GS_k, Saut 2011, sec. 3.1). With the number of fingers, or more, all hold.
     pub least_holding: usize,
     /// True when a hand of three or more fingers that can never change its grasp, such as three hard fingers, is to try with
     /// transfers alone; it is refused at once otherwise. Two fingers always try.
@@ -105,7 +105,7 @@ pub struct SearchSettings {
     /// grasps by themselves, so that restarts are rare. By measurement, 20 seeds: against 300,000 a million saves 30 % on
     /// allegro/box_x and about a tenth on cube45_x and cube57_x, and costs a quarter on cylinder20_x.
     pub restart_work: u64,
-    /// Random shortcuts tried on the plan found (in-hand-notes, 3).
+    /// Random shortcuts tried on the plan found (by measurement on a prototype).
     pub shortcuts: usize,
 }
 
