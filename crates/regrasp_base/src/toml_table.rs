@@ -46,6 +46,22 @@ pub struct Found<'a> {
     pub notes: Vec<String>,
 }
 
+/// Most brackets that are open at once. The parser calls itself for each, and takes broken files for deeper than they are.
+const MAX_OPEN: usize = 128;
+
+/// Where more than [`MAX_OPEN`] brackets are open, those in strings and comments among them.
+fn too_deep(text: &str) -> Option<usize> {
+    let mut n_open = 0usize;
+    text.bytes().position(|byte| {
+        match byte {
+            b'[' | b'{' => n_open += 1,
+            b']' | b'}' => n_open = n_open.saturating_sub(1),
+            _ => {}
+        }
+        n_open > MAX_OPEN
+    })
+}
+
 impl<'a> Found<'a> {
     /// Nothing found yet in `text`, the content of `path`.
     pub fn new(path: &'a Path, text: &'a str, codes: Codes) -> Self {
@@ -71,6 +87,12 @@ impl<'a> Found<'a> {
             let diagnostic =
                 Diagnostic::new(self.codes.syntax, Place::file(self.path), problem).expected("a TOML file");
             self.diagnostics.push(diagnostic);
+            return None;
+        }
+        if let Some(at) = too_deep(self.text) {
+            let problem = format!("opens more than {MAX_OPEN} brackets that are not closed");
+            let diagnostic = Diagnostic::new(self.codes.syntax, self.place(&(at..at)), problem);
+            self.diagnostics.push(diagnostic.fix("close every [ and { where its list or table ends"));
             return None;
         }
         let (table, errors) = DeTable::parse_recoverable(self.text);

@@ -1,8 +1,8 @@
 //! First and improved plans side by side. Rows are those of `csv`, after columns of their own.
 
 use crate::csv;
-use crate::page::escaped;
 use crate::row::Row;
+use crate::text::escaped;
 use regrasp_base::{Diagnostic, InputError, Place};
 use regrasp_plan::plan::{Improvement, PlanFigures};
 use std::fmt::Write;

@@ -1,8 +1,8 @@
 //! Random queries on a roadmap: answer, judge, measure; and what a graph is like, for the page.
 
-use crate::page::escaped;
 use crate::row::{Problem, Row, RunSettings, measured, plan_only, status_of};
 use crate::summary::{Spread, ms};
+use crate::text::escaped;
 use cpu_time::{ProcessTime, ThreadTime};
 use regrasp_base::{Budget, Diagnostic, InputError, Place, files};
 use regrasp_plan::Plan;

@@ -3,7 +3,8 @@
 use crate::args::{Common, Judging};
 use crate::load;
 use crate::stop::Stop;
-use crate::talk::{Talk, counted, duration, grouped};
+use crate::talk::Talk;
+use crate::words::{counted, duration, grouped};
 use regrasp::plan::check::{CheckSettings, Level, Report, check};
 use regrasp::plan::format;
 use regrasp::scene::{LoadedScene, load_scene};

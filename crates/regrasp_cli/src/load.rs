@@ -2,7 +2,8 @@
 
 use crate::args::{Common, Search};
 use crate::stop::Stop;
-use crate::talk::{Talk, counted, duration, grouped};
+use crate::talk::Talk;
+use crate::words::{counted, duration, grouped};
 use regrasp::base::{Diagnostic, Place};
 use regrasp::geometry::Shape;
 use regrasp::planners::FailureKind;

@@ -1,7 +1,8 @@
 //! Pages for a browser.
 
 use crate::stop::Stop;
-use crate::talk::{Talk, grouped};
+use crate::talk::Talk;
+use crate::words::grouped;
 use regrasp::base::files;
 use regrasp::pictures::{failure_facts, failure_story, reached_story};
 use regrasp::plan::check::Report;

@@ -1,6 +1,6 @@
 //! Why no plan was found: a result, with causes and the nearest miss, not an error.
 
-use crate::model::MAX_FINGERS;
+use crate::grasp::state::MAX_FINGERS;
 use crate::outline::Outline;
 use regrasp_base::Interrupt;
 use regrasp_plan::plan::{PoseData, Statistics};

@@ -3,6 +3,7 @@
 //! Built once per query, shared by all threads, never changed.
 
 use crate::forces::limits::ForceModel;
+use crate::grasp::state::MAX_FINGERS;
 use crate::settings::{PhysicsSettings, TransferMode};
 use arrayvec::ArrayVec;
 use regrasp_geometry::collision::{Ball, BallTree, MeshBody, MeshTree, Placement};
@@ -14,10 +15,6 @@ use regrasp_robot::kinematics::motion_bound::MotionBound;
 use regrasp_robot::tip::{Pad, TipEllipsoid, is_same_surface};
 use regrasp_scene::{HandView, Object};
 use std::sync::Arc;
-
-/// Most fingers that planners have room for: grasps are kept in arrays of this size. The checker has no such limit.
-pub const MAX_FINGERS: usize = 6;
-const _: () = assert!(MAX_FINGERS <= regrasp_grasp::wrench::force_distribution::MAX_GRIPS);
 
 /// A finger, prepared.
 #[derive(Debug)]

@@ -17,21 +17,14 @@ mod nearby;
 mod reach;
 
 use crate::forces::limits::Refusals;
-use crate::grasp::state::GraspState;
-use crate::model::{Carrier, MAX_FINGERS, Model, Pair};
-use arrayvec::ArrayVec;
+use crate::grasp::state::{Contacts, GraspState, HandJoints};
+use crate::model::{Carrier, Model, Pair};
 use configuration::{Configuration, midway, place_finger, place_object};
 use draws::Draws;
 use nearby::Nearby;
 use regrasp_geometry::collision::{Answer, Placement, gap_along, separation};
 use regrasp_geometry::{Pose, Vector, frame};
-use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
-
-/// Joint positions of all fingers.
-pub type HandJoints = ArrayVec<Coordinates, MAX_FINGERS>;
-/// One contact per finger.
-pub type Contacts = ArrayVec<Contact, MAX_FINGERS>;
 
 /// What the fingertips do during a step.
 #[derive(Debug, Clone, Copy, PartialEq)]

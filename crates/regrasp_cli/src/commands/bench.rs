@@ -1,12 +1,14 @@
 //! `regrasp bench`: plan scenes with many seeds and tabulate; or make the page of CSV files; suites are in `suite`.
 
+use super::rows::{make_folder_of, of_rows, say_row};
 use super::suite;
 use crate::args::{self, Common};
 use crate::interrupt;
 use crate::load;
 use crate::outputs::{Output, Outputs};
 use crate::stop::Stop;
-use crate::talk::{Talk, counted};
+use crate::talk::Talk;
+use crate::words::counted;
 use regrasp::base::files;
 use regrasp::scene::LoadedScene;
 use regrasp::scene::query::TRACKING;
@@ -16,9 +18,7 @@ use regrasp_bench::growth;
 use regrasp_bench::roadmap::GraphFacts;
 use regrasp_bench::row::Judge;
 use regrasp_bench::suite::is_suite;
-use regrasp_bench::{
-    Limits, Problem, Row, RunSettings, csv, improvement, limits, page, run as run_one, summarise, summary,
-};
+use regrasp_bench::{Limits, Problem, RunSettings, csv, improvement, limits, page, run as run_one, summarise, summary};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -141,11 +141,6 @@ fn end_of(bad: Vec<InputError>, n_scenes: usize, talk: &Talk) -> Result<(), Stop
     Err(Stop::BadInput(InputError { diagnostics, n_more }))
 }
 
-/// The files of rows that go to `path`: the file, and that of the rows until all are there.
-pub fn of_rows(path: &Path) -> [Output; 2] {
-    [Output::new("--csv", path), Output::beside("--csv", csv::partial_path(path))]
-}
-
 /// Settings of both planners. A file of settings is that of the task that all scenes have (`A505` where they differ).
 fn bench_settings(scenes: &[LoadedScene], arguments: &args::Bench) -> Result<(InHandSettings, TrackingSettings), Stop> {
     let is_tracking = |loaded: &&LoadedScene| loaded.task().kind_name() == TRACKING;
@@ -163,19 +158,6 @@ fn bench_settings(scenes: &[LoadedScene], arguments: &args::Bench) -> Result<(In
 
 /// Seeds per scene where none are given.
 const DEFAULT_SEEDS: u64 = 20;
-
-/// One line per miss, rejection or plan without floor; other solved seeds stay silent but for `--json`.
-pub fn say_row(row: &Row, talk: &Talk) {
-    talk.event("row", json!(row));
-    if row.status != "solved" {
-        let left = row.angle_left_deg.map_or(String::new(), |angle| format!(", {angle:.0} deg left"));
-        talk.say(format!("miss   {} seed {}: {}{left}; {}", row.scene, row.seed, row.status, row.cause));
-    } else if row.accepted == Some(false) {
-        talk.say(format!("REJECTED   {} seed {}: {}", row.scene, row.seed, row.cause));
-    } else if row.lacks_floor() {
-        talk.say(format!("NO FLOOR   {} seed {}: {}", row.scene, row.seed, row.cause));
-    }
-}
 
 /// The page of CSV files, of facts about graphs and, after them, of suites with what was measured of them.
 fn write_page(path: &Path, inputs: &[PathBuf], limits: Option<&Path>, talk: &Talk) -> Result<(), Stop> {
@@ -204,14 +186,4 @@ fn write_page(path: &Path, inputs: &[PathBuf], limits: Option<&Path>, talk: &Tal
     files::write_atomic(path, text.as_bytes()).map_err(|error| Stop::unwritable(path, &error))?;
     talk.say(format!("wrote  {}", path.display()));
     Ok(())
-}
-
-/// Makes the folder of a file that this command is about to write.
-pub fn make_folder_of(path: &Path) -> Result<(), Stop> {
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => {
-            std::fs::create_dir_all(folder).map_err(|error| Stop::unwritable(folder, &error))
-        }
-        _ => Ok(()),
-    }
 }

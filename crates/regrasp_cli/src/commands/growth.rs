@@ -1,12 +1,13 @@
 //! `regrasp growth`: how loading and planning grow with fingers, triangles, obstacles and threads.
 
-use super::bench::{make_folder_of, say_row};
 use super::plan::available_threads;
+use super::rows::{make_folder_of, say_row};
 use crate::args;
 use crate::interrupt;
 use crate::outputs::refuse_unwritable;
 use crate::stop::Stop;
-use crate::talk::{Talk, duration, grouped};
+use crate::talk::Talk;
+use crate::words::{duration, grouped};
 use regrasp::InHandSettings;
 use regrasp::base::files;
 use regrasp::plan::check::Level;

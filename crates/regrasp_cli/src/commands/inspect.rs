@@ -5,7 +5,8 @@ use crate::interrupt;
 use crate::load;
 use crate::outputs::{refuse_input, refuse_unwritable};
 use crate::stop::Stop;
-use crate::talk::{Talk, counted, grouped};
+use crate::talk::Talk;
+use crate::words::{counted, grouped};
 use regrasp::base::{Rng, files};
 use regrasp::robot::inspect::{
     HandInspection, InspectSettings, Inspection, JointRow, RobotInspection, hand_file_text, inspect,

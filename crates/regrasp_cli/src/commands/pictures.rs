@@ -1,10 +1,11 @@
 //! Pictures made without a browser: the storyboard, the charts and the graph.
 
-use super::bench::make_folder_of;
+use super::rows::make_folder_of;
 use crate::args;
 use crate::outputs::Output;
 use crate::stop::Stop;
-use crate::talk::{Talk, grouped};
+use crate::talk::Talk;
+use crate::words::grouped;
 use regrasp::base::{Diagnostic, Place, files};
 use regrasp::pictures::{failure_story, reached_story};
 use regrasp::viewer::story::{RoadmapStory, Story};

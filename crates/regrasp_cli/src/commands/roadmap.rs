@@ -1,15 +1,16 @@
 //! `regrasp roadmap`: many queries on one saved graph of a hand and an object.
 
-use super::bench::{make_folder_of, of_rows, say_row};
 use super::pictures;
 use super::plan::{available_threads, judge_and_write, of_plan, say_plan, say_query};
+use super::rows::{make_folder_of, of_rows, say_row};
 use crate::args::{self, Common, RoadmapAction};
 use crate::interrupt;
 use crate::judge;
 use crate::load;
 use crate::outputs::{Output, Outputs};
 use crate::stop::Stop;
-use crate::talk::{Talk, counted, duration, grouped};
+use crate::talk::Talk;
+use crate::words::{counted, duration, grouped};
 use regrasp::base::files;
 use regrasp::pictures::{roadmap_from_first, roadmap_story};
 use regrasp::plan::check::Level;

@@ -1,6 +1,6 @@
 //! `regrasp bench SUITE.toml`: the tables and figures of a paper, measured again; what an earlier run measured is kept.
 
-use super::bench::{make_folder_of, say_row};
+use super::rows::{make_folder_of, say_row};
 use crate::args::{self, Common};
 use crate::interrupt;
 use crate::load;

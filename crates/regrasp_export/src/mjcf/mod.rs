@@ -7,7 +7,6 @@
 
 mod inertia;
 mod model;
-mod pairs;
 mod xml;
 
 use regrasp_plan::Plan;

@@ -1,8 +1,10 @@
 //! The model as an MJCF document.
 
+mod pairs;
+
+use super::Mjcf;
 use super::inertia::{self, Inertial};
 use super::xml::{Xml, numbers};
-use super::{Mjcf, pairs};
 use nalgebra::UnitQuaternion;
 use regrasp_geometry::mass::solid_properties;
 use regrasp_geometry::shape::PlacedShape;

@@ -6,10 +6,9 @@
 
 use crate::forces::held::Held;
 use crate::forces::limits::{ForceModel, Unbalanced};
-use crate::grasp::state::no_contact;
+use crate::grasp::state::{Contacts, no_contact};
 use crate::model::Model;
 use crate::recording::waypoint::{contact_of, joints_of};
-use crate::workspace::Contacts;
 use regrasp_geometry::Pose;
 use regrasp_geometry::collision::Placement;
 use regrasp_grasp::ContactModel;

@@ -1,8 +1,9 @@
 //! Contact forces of the hand's fingers: what balances the object's weight within all limits.
 
 use crate::forces::limits::{CAUSE_EVERY, ForceModel, Unbalanced};
-use crate::model::{MAX_FINGERS, Model, friction_in_words};
-use crate::workspace::{Contacts, HandJoints, Workspace};
+use crate::grasp::state::{Contacts, HandJoints, MAX_FINGERS};
+use crate::model::{Model, friction_in_words};
+use crate::workspace::Workspace;
 use arrayvec::ArrayVec;
 use regrasp_base::diagnostic::number;
 use regrasp_geometry::collision::Placement;

@@ -1,6 +1,6 @@
 //! What contact forces balance, and their limits.
 
-use crate::model::MAX_FINGERS;
+use crate::grasp::state::MAX_FINGERS;
 use crate::settings::{ForceSettings, PhysicsSettings};
 use arrayvec::ArrayVec;
 use regrasp_geometry::Vector;

@@ -1,9 +1,18 @@
 //! Points of GS_n and GS_k: an object pose, the contacts of the fingers that hold, the joints of all.
 
-use crate::workspace::{Contacts, HandJoints};
+use arrayvec::ArrayVec;
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
+
+/// Most fingers that planners have room for: grasps are kept in arrays of this size. The checker has no such limit.
+pub const MAX_FINGERS: usize = 6;
+const _: () = assert!(MAX_FINGERS <= regrasp_grasp::wrench::force_distribution::MAX_GRIPS);
+
+/// Joint positions of all fingers.
+pub type HandJoints = ArrayVec<Coordinates, MAX_FINGERS>;
+/// One contact per finger.
+pub type Contacts = ArrayVec<Contact, MAX_FINGERS>;
 
 /// Some fingers hold the object, the others are free, each with a posture of its own: a configuration in GS_k with its
 /// independent fingers; in GS_n where all hold (Saut 2011, sec. 3.1 and 4.1).

@@ -3,12 +3,11 @@
 use crate::forces::along::add_forces;
 use crate::forces::limits::Unbalanced;
 use crate::grasp::sequence::{Motion, Sequence};
-use crate::grasp::state::{GraspState, Moment, no_contact};
+use crate::grasp::state::{Contacts, GraspState, Moment, no_contact};
 use crate::model::Model;
 use crate::recording::plan::{finger_names, plan_of};
 use crate::timing;
 use crate::tolerances::{CONTACT_TOLERANCE, SLIP_TOLERANCE};
-use crate::workspace::Contacts;
 use regrasp_geometry::Pose;
 use regrasp_grasp::Contact;
 use regrasp_plan::plan::{

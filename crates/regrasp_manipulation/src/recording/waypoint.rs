@@ -1,7 +1,7 @@
 //! What a waypoint says when it is read back.
 
+use crate::grasp::state::HandJoints;
 use crate::model::Model;
-use crate::workspace::HandJoints;
 use regrasp_geometry::{Point, UnitVector, Vector};
 use regrasp_grasp::Contact;
 use regrasp_plan::plan::{ContactState, Waypoint};

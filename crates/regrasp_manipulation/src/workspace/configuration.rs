@@ -1,7 +1,7 @@
 //! Where everything is at one moment.
 
+use crate::grasp::state::HandJoints;
 use crate::model::{Carrier, Model};
-use crate::workspace::HandJoints;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Point, Pose, interpolate_pose};
 use regrasp_robot::kinematics::finger_ik::Coordinates;

@@ -16,7 +16,7 @@ use regrasp_geometry::{Point, UnitVector, Vector, frame};
 use regrasp_grasp::wrench::linear_program::{LinearProgram, MAX_ROWS, NoSolution};
 use regrasp_grasp::wrench::{ForceLimits, ForceProblem, Rubbing, Wrench, distribute};
 use regrasp_grasp::{Contact, ContactForce, ContactModel, GraspFrame, Grip};
-use regrasp_manipulation::model::MAX_FINGERS;
+use regrasp_manipulation::grasp::state::MAX_FINGERS;
 
 /// What a watt counts against squares of newtons: by hand. At 2.5 mm/s, the speed of the football's surface, forces of
 /// half a newton along the motion are wished for.

@@ -5,9 +5,8 @@ use nalgebra::UnitQuaternion;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Point, Vector};
 use regrasp_grasp::contact::rolling::Touch;
-use regrasp_manipulation::grasp::state::GraspState;
-use regrasp_manipulation::model::{MAX_FINGERS, Model};
-use regrasp_manipulation::workspace::{Contacts, HandJoints};
+use regrasp_manipulation::grasp::state::{Contacts, GraspState, HandJoints, MAX_FINGERS};
+use regrasp_manipulation::model::Model;
 
 /// One fingertip each.
 pub type PerFinger<T> = ArrayVec<T, MAX_FINGERS>;

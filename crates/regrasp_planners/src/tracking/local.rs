@@ -7,7 +7,8 @@ use arrayvec::ArrayVec;
 use nalgebra::UnitQuaternion;
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, UnitVector, Vector, frame};
-use regrasp_manipulation::model::{MAX_FINGERS, Model};
+use regrasp_manipulation::grasp::state::MAX_FINGERS;
+use regrasp_manipulation::model::Model;
 use regrasp_robot::kinematics::whole_pose::has_all_directions;
 
 /// Time of a local plan in units of that to the sub-goal (Cherif 1999: `bound_1`, twice).

@@ -137,3 +137,12 @@ fn scenes_name_any_regular_file_and_nothing_else() {
         assert_eq!(load(file).unwrap_err().diagnostics[0].code, code, "{file}");
     }
 }
+
+#[test]
+fn brackets_that_are_never_closed_are_refused_at_once() {
+    // A line pasted again and again: the parser would call itself for every bracket.
+    for line in ["box = { size =hand.toml\"\n", "a = [\n", "b = [{ c = \"\"\"{ \n"] {
+        let error = Folder::new().load(&format!("{GOOD}{}", line.repeat(10_000))).unwrap_err().to_string();
+        assert!(error.contains("S100") && error.contains("not closed"), "{error}");
+    }
+}

@@ -9,7 +9,6 @@ use super::{
 };
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Pose, Shape, UnitVector, Vector};
-use regrasp_plan::check::kinematics::world_from_root;
 use regrasp_robot::hand::convex_of;
 use regrasp_robot::tip::is_same_surface;
 use regrasp_robot::{Coupling, Hand, Joint, JointId, JointKind, LinkId, ResolveOptions, Robot, VisualGeometry};
@@ -20,12 +19,7 @@ use std::sync::Arc;
 const MOST_TRIANGLES: usize = 120_000;
 
 /// The scene, with remarks on what could not be shown as it is. Visual meshes are looked for in `packages`.
-///
-/// Err with a message when couplings of the robot lead nowhere.
-pub(super) fn scene_story(
-    task: &Manipulation,
-    packages: &ResolveOptions,
-) -> Result<(SceneStory, Vec<(String, String)>), String> {
+pub(super) fn scene_story(task: &Manipulation, packages: &ResolveOptions) -> (SceneStory, Vec<(String, String)>) {
     let hand = task.hand();
     let tree = Tree::new(hand);
     let mut shapes = Shapes::default();
@@ -45,9 +39,9 @@ pub(super) fn scene_story(
     };
     let joints = names.iter().zip(limits).map(joint).collect();
     let meshes = shapes.packed(&mut notes);
-    let story = SceneStory {
+    let mut story = SceneStory {
         links: tree.links.clone(),
-        world_from_root: PoseData::from(&world_from_root(hand, &task.world_from_hand())?),
+        world_from_root: PoseData::from(&Pose::identity()),
         joints,
         fingers: fingers(hand, &tree),
         friction: task.object().friction,
@@ -55,7 +49,10 @@ pub(super) fn scene_story(
         meshes,
         pieces,
     };
-    Ok((story, notes))
+    // No coordinate of the hand moves its base.
+    let root_from_base = story.world_from_links(&vec![0.0; names.len()])[tree.place_of[hand.base.0]];
+    story.world_from_root = PoseData::from(&(task.world_from_hand() * root_from_base.inverse()));
+    (story, notes)
 }
 
 fn fingers(hand: &Hand, tree: &Tree) -> Vec<FingerStory> {

@@ -44,7 +44,7 @@ pub struct Telling<'a> {
 
 /// The story. Err with a message when the robot contradicts itself.
 pub fn tell(telling: &Telling) -> Result<Story, String> {
-    let (mut scene, notes) = scene_story(&telling.task, telling.packages)?;
+    let (mut scene, notes) = scene_story(&telling.task, telling.packages);
     let mut facts = telling.facts.clone();
     let mut asked: Vec<PoseData> = telling.query.map_or_else(Vec::new, |query| {
         let poses = std::iter::once(query.start()).chain(query.way()).chain([query.goal()]);

@@ -1,9 +1,10 @@
 //! Leaving out far obstacles against testing all of them in turn: the same answers and the same bits of everything known.
 
 use crate::ends::blocked::object_blocked_by;
+use crate::grasp::state::{Contacts, HandJoints};
 use crate::model::{Body, Carrier, Model};
 use crate::settings::PhysicsSettings;
-use crate::workspace::{Contacts, HandJoints, TipMode, Workspace};
+use crate::workspace::{TipMode, Workspace};
 use regrasp_base::Rng;
 use regrasp_geometry::collision::{Ball, MeshBody};
 use regrasp_geometry::reference::{Answer, ReferenceShape, distance};

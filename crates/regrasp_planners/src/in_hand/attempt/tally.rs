@@ -4,7 +4,8 @@ use crate::in_hand::attempt::release::Held;
 use regrasp_geometry::Pose;
 use regrasp_manipulation::failure::Cause;
 use regrasp_manipulation::forces::limits::Unbalanced;
-use regrasp_manipulation::model::{MAX_FINGERS, Model, Pair};
+use regrasp_manipulation::grasp::state::MAX_FINGERS;
+use regrasp_manipulation::model::{Model, Pair};
 
 /// A reason for which an attempt of the search failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -4,7 +4,8 @@ use crate::in_hand::attempt::release::Held;
 use crate::in_hand::grasps::candidate::{Candidate, Choice};
 use arrayvec::ArrayVec;
 use regrasp_grasp::{Contact, ContactModel, Grip, closure};
-use regrasp_manipulation::model::{MAX_FINGERS, Model};
+use regrasp_manipulation::grasp::state::MAX_FINGERS;
+use regrasp_manipulation::model::Model;
 use std::collections::BTreeMap;
 
 /// Closure of every set of fingers over candidates, computed when first asked for.

@@ -5,7 +5,8 @@ use crate::in_hand::moving::spin::{Twist, condition, twist_between};
 use arrayvec::ArrayVec;
 use regrasp_geometry::Pose;
 use regrasp_geometry::collision::Placement;
-use regrasp_manipulation::model::{MAX_FINGERS, Model};
+use regrasp_manipulation::grasp::state::MAX_FINGERS;
+use regrasp_manipulation::model::Model;
 
 /// How freely combinations of candidates let the object go where it is wanted.
 #[derive(Debug)]

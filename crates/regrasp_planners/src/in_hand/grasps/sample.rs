@@ -7,8 +7,8 @@ use crate::in_hand::grasps::closure_table::ClosureTable;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Pose, Vector, frame, interpolate_pose};
 use regrasp_manipulation::grasp::contact::{draw_contact, reach};
-use regrasp_manipulation::grasp::state::GraspState;
-use regrasp_manipulation::workspace::{Contacts, HandJoints, TipMode};
+use regrasp_manipulation::grasp::state::{Contacts, GraspState, HandJoints};
+use regrasp_manipulation::workspace::TipMode;
 
 /// Contacts drawn per finger and pose. By measurement: with 1 most poses of a box find no closed grasp, 5 are too dear.
 const CONTACTS: usize = 3;

@@ -6,9 +6,8 @@ use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Pose, frame};
 use regrasp_grasp::Contact;
 use regrasp_manipulation::grasp::sequence::{Motion, Sequence};
-use regrasp_manipulation::grasp::state::GraspState;
+use regrasp_manipulation::grasp::state::{GraspState, HandJoints};
 use regrasp_manipulation::model::Model;
-use regrasp_manipulation::workspace::HandJoints;
 use regrasp_plan::plan::PlanFigures;
 use regrasp_robot::kinematics::finger_ik::{Coordinates, IkSettings};
 

@@ -10,10 +10,9 @@ use regrasp_geometry::collision::Placement;
 use regrasp_geometry::surface::Geodesic;
 use regrasp_geometry::{Pose, UnitVector, frame, interpolate_pose};
 use regrasp_grasp::Contact;
-use regrasp_manipulation::grasp::state::GraspState;
-use regrasp_manipulation::model::{MAX_FINGERS, Model, releasable};
+use regrasp_manipulation::grasp::state::{Contacts, GraspState, HandJoints, MAX_FINGERS};
+use regrasp_manipulation::model::{Model, releasable};
 use regrasp_manipulation::rolling::follow::{follow_contact, ik_settings};
-use regrasp_manipulation::workspace::{Contacts, HandJoints};
 
 /// Parameters at which a path is looked at first of all: most paths that fail do so there, for little.
 const FIRST_LOOKS: [f64; 3] = [0.5, 0.25, 0.75];

@@ -13,7 +13,8 @@
 /// Transfers that end exactly at their goal, by themselves.
 mod arrive;
 
-use regrasp_manipulation::model::{MAX_FINGERS, Model};
+use regrasp_manipulation::grasp::state::MAX_FINGERS;
+use regrasp_manipulation::model::Model;
 
 use regrasp_manipulation::rolling::step::{NoStep, STEP_SPIN};
 

@@ -5,12 +5,11 @@ use regrasp_geometry::collision::Placement;
 use regrasp_geometry::frame::PoseLine;
 use regrasp_geometry::{Pose, frame};
 use regrasp_grasp::Contact;
-use regrasp_manipulation::grasp::state::Moment;
-use regrasp_manipulation::model::{MAX_FINGERS, Model};
+use regrasp_manipulation::grasp::state::{HandJoints, MAX_FINGERS, Moment};
+use regrasp_manipulation::model::Model;
 use regrasp_manipulation::rolling::follow::follow_contact;
 use regrasp_manipulation::rolling::step::{NoStep, RollStep};
 use regrasp_manipulation::tolerances::CONTACT_TOLERANCE;
-use regrasp_manipulation::workspace::HandJoints;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 
 /// Number of steps from `from` to `to` of which none moves a point of the object by more than the step length.

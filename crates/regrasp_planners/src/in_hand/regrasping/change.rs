@@ -10,9 +10,9 @@ use regrasp_base::Rng;
 use regrasp_geometry::Pose;
 use regrasp_geometry::collision::Placement;
 use regrasp_manipulation::grasp::sequence::Sequence;
-use regrasp_manipulation::grasp::state::{GraspState, Moment};
+use regrasp_manipulation::grasp::state::{GraspState, HandJoints, Moment};
 use regrasp_manipulation::rolling::follow::follow_contact;
-use regrasp_manipulation::workspace::{HandJoints, TipMode, Workspace};
+use regrasp_manipulation::workspace::{TipMode, Workspace};
 
 /// Joints nearer than this differ by what solvers leave: they are set on each other, in radians or metres.
 pub const SAME_POSTURE: f64 = 1e-6;

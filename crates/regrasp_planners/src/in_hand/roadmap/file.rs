@@ -13,7 +13,7 @@ use crate::settings::InHandSettings;
 use regrasp_base::{Diagnostic, InputError, Place, files};
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 use regrasp_grasp::Contact;
-use regrasp_manipulation::model::MAX_FINGERS;
+use regrasp_manipulation::grasp::state::MAX_FINGERS;
 use regrasp_robot::ContactModel;
 use regrasp_robot::kinematics::finger_ik;
 use serde::{Deserialize, Serialize};

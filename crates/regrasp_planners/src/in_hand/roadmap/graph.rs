@@ -7,9 +7,7 @@
 use arrayvec::ArrayVec;
 use regrasp_geometry::Pose;
 use regrasp_grasp::Contact;
-use regrasp_manipulation::grasp::state::GraspState;
-use regrasp_manipulation::model::MAX_FINGERS;
-use regrasp_manipulation::workspace::{Contacts, HandJoints};
+use regrasp_manipulation::grasp::state::{Contacts, GraspState, HandJoints, MAX_FINGERS};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use std::collections::BTreeMap;
 

@@ -4,9 +4,7 @@ use crate::in_hand::roadmap::graph::{Edge, FootholdIds, Graph, Leg, NOT_STORED, 
 use arrayvec::ArrayVec;
 use regrasp_geometry::Pose;
 use regrasp_grasp::Contact;
-use regrasp_manipulation::grasp::state::GraspState;
-use regrasp_manipulation::model::MAX_FINGERS;
-use regrasp_manipulation::workspace::HandJoints;
+use regrasp_manipulation::grasp::state::{GraspState, HandJoints, MAX_FINGERS};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;

@@ -6,10 +6,9 @@ use arrayvec::ArrayVec;
 use regrasp_geometry::Pose;
 use regrasp_geometry::frame::PoseLine;
 use regrasp_manipulation::grasp::sequence::Sequence;
-use regrasp_manipulation::grasp::state::{GraspState, Moment};
-use regrasp_manipulation::model::{MAX_FINGERS, Model};
+use regrasp_manipulation::grasp::state::{GraspState, HandJoints, MAX_FINGERS, Moment};
+use regrasp_manipulation::model::Model;
 use regrasp_manipulation::recording::recorder::Recorder;
-use regrasp_manipulation::workspace::HandJoints;
 
 /// Largest difference between the joints that a transfer ends in and those stored, in radians or metres.
 const SAME_POSTURE: f64 = 2e-6;

@@ -16,8 +16,7 @@ use arrayvec::ArrayVec;
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;
 use regrasp_manipulation::grasp::sequence::Sequence;
-use regrasp_manipulation::grasp::state::GraspState;
-use regrasp_manipulation::model::MAX_FINGERS;
+use regrasp_manipulation::grasp::state::{GraspState, MAX_FINGERS};
 use regrasp_manipulation::outline::{Outline, OutlineEdge};
 
 /// Nodes at a common pose whose grasps are tried to be joined: any at first, in hard queries those most like the grasp that

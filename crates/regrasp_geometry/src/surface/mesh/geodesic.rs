@@ -6,12 +6,12 @@
 //! steps of Sharp, Crane 2020 (FlipOut) on a strip instead of on an intrinsic triangulation; the result is the same
 //! kind of path: locally shortest, and in practice within a few percent of the shortest.
 
-use super::SurfacePoint;
-use super::geodesic::{Bend, Geodesic, Leg};
-use super::mesh::{MeshSurface, barycentric};
-use super::mesh_topology::{NONE, angle_at};
-use super::sparse::Sparse;
+use super::{MeshSurface, barycentric};
 use crate::frame::Point;
+use crate::surface::SurfacePoint;
+use crate::surface::geodesic::{Bend, Geodesic, Leg};
+use crate::surface::mesh_topology::{NONE, angle_at};
+use crate::surface::sparse::Sparse;
 use nalgebra::Vector2;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};

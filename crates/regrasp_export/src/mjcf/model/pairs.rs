@@ -1,7 +1,7 @@
 //! Which geoms of the model may touch, and with what friction.
 
-use super::model::GeomNames;
-use super::xml::{Xml, numbers};
+use super::GeomNames;
+use crate::mjcf::xml::{Xml, numbers};
 use regrasp_robot::{ContactModel, Finger};
 use regrasp_scene::{FingerShapeId, HandView, collision_pairs};
 

@@ -1,7 +1,7 @@
 //! One Newton step over forces that balance: a small system per contact, joined by six equations that are solved first, as
 //! the Hessian is block-diagonal (Boyd, Vandenberghe, *Convex Optimization*, 2004, 10.4.2: elimination).
 
-use super::barrier::{Forces, MAX_GRIPS};
+use super::{Forces, MAX_GRIPS};
 use arrayvec::ArrayVec;
 
 /// A factored Newton system `H step + map^T y = descent`, `map step = rest`.

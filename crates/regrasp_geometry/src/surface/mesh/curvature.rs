@@ -4,9 +4,9 @@
 //! triangle from the differences of its corner normals, averaged over the fans of the triangle's corners. Fans end at
 //! creases, so a flat face stays flat up to its edges.
 
-use super::mesh::{MeshSurface, barycentric};
-use super::{SurfacePoint, across};
+use super::{MeshSurface, barycentric};
 use crate::frame::{UnitVector, Vector, tangents};
+use crate::surface::{SurfacePoint, across};
 use nalgebra::{Matrix2, Matrix3};
 
 /// Principal curvatures at `at`, larger first, convex positive.
