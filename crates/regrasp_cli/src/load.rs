@@ -129,7 +129,7 @@ pub fn for_task(task: &Task, search: &Search, n_threads: usize) -> Result<Planne
 /// Refuses flags that say something about in-hand planning only (`A507`).
 fn refuse_flags_of_in_hand(search: &Search) -> Result<(), Stop> {
     let flags = [
-        ("--margin", search.margin.is_some(), "what slides closes nothing, so that closure is not judged"),
+        ("--margin", search.margin.is_some(), "force closure is not defined for sliding contacts"),
         ("--improve", search.improve.is_some(), "plans of tracking are not improved"),
         ("--improve-work", search.improve_work.is_some(), "plans of tracking are not improved"),
     ];

@@ -152,7 +152,7 @@ fn settings(task: &Task, request: &Request) -> Result<PlannerSettings, Diagnosti
 /// Refuses arguments that say something about in-hand planning only, as the command line does (`A507`).
 fn refuse_arguments_of_in_hand(request: &Request) -> Result<(), Diagnostic> {
     let arguments = [
-        ("margin", request.margin.is_some(), "what slides closes nothing, so that closure is not judged"),
+        ("margin", request.margin.is_some(), "force closure is not defined for sliding contacts"),
         ("improve", request.improve.is_some(), "plans of tracking are not improved"),
         ("improve_work", request.improve_work.is_some(), "plans of tracking are not improved"),
     ];
