@@ -76,8 +76,8 @@ impl Alpha {
 pub struct BaselineSettings {
     /// Schedule of alpha, for the methods of Saut 2011.
     pub alpha: Alpha,
-    /// Share of the poses that the methods of Saut 2011 draw around the way from start to goal. The others are turned
-    /// anyhow, as Saut 2011 has all (section 4.2.2): with 0 both methods take several times as long, `Classic` most.
+    /// Share of poses that the methods of Saut 2011 draw near the path from start to goal. The others are drawn
+    /// uniformly, as in Saut 2011, sec. 4.2.2. With 0 both methods take several times as long, `classic` most.
     pub guided_share: f64,
 }
 

@@ -131,10 +131,15 @@ impl Tally {
             .map(|(&reason, &count)| Cause {
                 reason: match reason {
                     Reason::NoContact(f) => format!("finger \"{}\" found no contact within its reach", finger_name(f)),
-                    Reason::NotClosed => "found no grasp in which the other fingers still hold the object after one lifts".into(),
+                    Reason::NotClosed => {
+                        "found no grasp in which the other fingers still hold the object after one lifts".into()
+                    }
                     Reason::NoWayOver => "found no collision-free path for the fingers to the next grasp".into(),
                     Reason::Bound(f) => {
-                        format!("finger \"{}\" cannot lift: the other fingers would not hold the object", finger_name(f))
+                        format!(
+                            "finger \"{}\" cannot lift: the other fingers would not hold the object",
+                            finger_name(f)
+                        )
                     }
                     Reason::OutOfReach => "a finger reached the end of its workspace while the object moved".into(),
                     Reason::Crease => "a contact would have to cross an edge of the object".into(),
@@ -147,7 +152,10 @@ impl Tally {
                         "a path in GS_n could not be decomposed into transfers and regrasps".into()
                     }
                     Reason::TooNear(pair) => {
-                        format!("\"{}\" comes too close to \"{}\"", model.bodies[pair.a].name, model.bodies[pair.b].name)
+                        format!(
+                            "\"{}\" comes too close to \"{}\"",
+                            model.bodies[pair.a].name, model.bodies[pair.b].name
+                        )
                     }
                 },
                 count,
