@@ -3,7 +3,7 @@
 use super::files::Files;
 use super::pose;
 use super::shape::{self, Origin, ReadShape};
-use super::units::{list, shown};
+use super::numbers::{list, shown};
 use crate::object::Object;
 use crate::scene::Obstacle;
 use regrasp_base::diagnostic::number;
