@@ -16,21 +16,25 @@ use regrasp_scene::{Manipulation, Obstacle};
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 const OBSTACLE_COLOR: &str = "0.5 0.45 0.4 1";
 const SUPPORT_COLOR: &str = "0.62 0.58 0.5 1";
+const ROBOT_COLOR: &str = "0.7 0.71 0.74 1";
 
 /// Everything that stands in the model.
 pub(super) struct Model<'a> {
     pub task: &'a Manipulation<'a>,
     pub names: &'a Names,
+    /// Links of robots that belong to no hand, where they rest.
+    links: &'a [Obstacle],
     pub hands: Vec<ModelHand<'a>>,
     pub objects: Vec<ModelObject<'a>>,
 }
 
 pub(super) fn write(task: &Manipulation, plan: &Plan) -> Mjcf {
     let scene = task.scene;
-    let names = Names::of(scene);
+    let links = task.robot_bodies();
+    let names = Names::of(scene, &links);
     let gravity = plan.promises.forces.as_ref().map_or(Some(GRAVITY), |forces| forces.gravity_in_world);
     let gravity = gravity.unwrap_or(GRAVITY);
-    let model = Model::new(task, plan, &names, &Vector::from(gravity));
+    let model = Model::new(task, plan, (&names, &links), &Vector::from(gravity));
     let mut xml = Xml::default();
     xml.open("mujoco", &[("model", scene.name.clone())]);
     write_settings(&mut xml, gravity);
@@ -81,12 +85,17 @@ fn write_settings(xml: &mut Xml, gravity: [f64; 3]) {
 }
 
 impl<'a> Model<'a> {
-    fn new(task: &'a Manipulation<'a>, plan: &Plan, names: &'a Names, gravity: &Vector) -> Self {
+    fn new(
+        task: &'a Manipulation<'a>,
+        plan: &Plan,
+        (names, links): (&'a Names, &'a [Obstacle]),
+        gravity: &Vector,
+    ) -> Self {
         let scene = task.scene;
         let hands = scene.hands.iter().zip(&names.hands).enumerate();
         let hands = hands.map(|(index, (placed, names))| {
             let drive = if index == task.hand_index { Drive::Motors } else { Drive::Servos };
-            ModelHand::new(placed, names, drive)
+            ModelHand::new(placed, task.state.world_from_hand(scene, index), names, drive)
         });
         let start = &plan.segments[0].waypoints[0].world_from_object;
         let objects = scene.objects.iter().zip(&names.objects).zip(&task.state.world_from_objects).enumerate();
@@ -98,16 +107,17 @@ impl<'a> Model<'a> {
             };
             ModelObject { object, names, world_from_object, hold }
         });
-        Model { task, names, hands: hands.collect(), objects: objects.collect() }
+        Model { task, names, links, hands: hands.collect(), objects: objects.collect() }
     }
 
-    /// Obstacles, then supports, each with the name of its geom and its colour.
+    /// Obstacles, supports, then links of robots, each with the name of its geom and its colour.
     fn fixed(&self) -> impl Iterator<Item = (&'a Obstacle, &'a str, &'static str)> {
-        let Model { task, names, .. } = *self;
+        let Model { task, names, links, .. } = *self;
         let obstacles = task.scene.obstacles.iter().zip(&names.obstacles);
         let obstacles = obstacles.map(|(body, name)| (body, name.as_str(), OBSTACLE_COLOR));
         let supports = task.scene.supports.iter().zip(&names.supports);
-        obstacles.chain(supports.map(|(support, name)| (&support.body, name.as_str(), SUPPORT_COLOR)))
+        let links = links.iter().zip(&names.links).map(|(body, name)| (body, name.as_str(), ROBOT_COLOR));
+        obstacles.chain(supports.map(|(support, name)| (&support.body, name.as_str(), SUPPORT_COLOR))).chain(links)
     }
 
     fn write_assets(&self, xml: &mut Xml) {

@@ -7,7 +7,7 @@ use super::tip::{own_tip, tip_name};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_robot::tip::is_same_surface;
 use regrasp_robot::{Hand, JointId, LinkId};
-use regrasp_scene::{Manipulation, Scene};
+use regrasp_scene::{Manipulation, Obstacle, Scene};
 
 /// Names of a hand.
 pub(super) struct HandNames {
@@ -43,11 +43,13 @@ pub(super) struct Names {
     pub supports: Vec<String>,
     /// Geoms of the obstacles.
     pub obstacles: Vec<String>,
+    /// Geoms of the links of robots that belong to no hand.
+    pub links: Vec<String>,
 }
 
 impl Names {
-    /// The names of everything in `scene`.
-    pub fn of(scene: &Scene) -> Self {
+    /// The names of everything in `scene`; `links` are those of robots that belong to no hand.
+    pub fn of(scene: &Scene, links: &[Obstacle]) -> Self {
         let has_one_of_each = scene.hands.len() == 1 && scene.objects.len() == 1;
         let prefix = |name: &str| if has_one_of_each { String::new() } else { format!("{name}/") };
         let hands: Vec<HandNames> =
@@ -65,13 +67,15 @@ impl Names {
             objects: scene.objects.iter().map(|each| object(&each.name)).collect(),
             supports: scene.supports.iter().map(|support| format!("support:{}", support.body.name)).collect(),
             obstacles: scene.obstacles.iter().map(|obstacle| format!("obstacle:{}", obstacle.name)).collect(),
+            links: links.iter().enumerate().map(|(index, link)| format!("link:{}:{index}", link.name)).collect(),
             hands,
         }
     }
 
     /// The geoms of `HandView::obstacles` of `task`, in that order; two shapes that are written as one geom have the same name.
     pub fn around(&self, task: &Manipulation) -> Vec<&str> {
-        let mut names: Vec<&str> = self.obstacles.iter().chain(&self.supports).map(String::as_str).collect();
+        let fixed = self.obstacles.iter().chain(&self.supports).chain(&self.links);
+        let mut names: Vec<&str> = fixed.map(String::as_str).collect();
         for (index, placed) in task.scene.hands.iter().enumerate().filter(|(index, _)| *index != task.hand_index) {
             let own = &self.hands[index];
             names.extend(own.palm.iter().map(String::as_str));

@@ -13,6 +13,8 @@ mod any_gravity;
 pub mod between;
 /// Everything that can collide, and which pairs must not.
 pub mod bodies;
+/// Hands that robots carry.
+mod carried;
 /// Force closure with margin, by exact second-order cones.
 pub mod closure;
 /// No collision at any moment.

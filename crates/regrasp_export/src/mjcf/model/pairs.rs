@@ -52,7 +52,8 @@ pub(super) fn write(xml: &mut Xml, model: &Model) {
     add_moved(&mut pairs, model);
     for object in model.objects.iter().filter(|object| object.hold == Hold::Support) {
         let own = object.names.geom.as_str();
-        let fixed = model.names.supports.iter().chain(&model.names.obstacles).map(String::as_str);
+        let names = &model.names;
+        let fixed = names.supports.iter().chain(&names.obstacles).chain(&names.links).map(String::as_str);
         let hands = model.names.hands.iter().flat_map(|hand| hand.geoms());
         let objects = model.names.objects.iter().map(|other| other.geom.as_str());
         for other in fixed.chain(hands).chain(objects).filter(|other| *other != own) {
