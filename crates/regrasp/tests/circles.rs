@@ -216,8 +216,8 @@ fn read_path(tokens: &[String], mut at: usize, head: &[String], paths: &mut Vec<
             }
             return at + 1;
         }
-        // `self` at the end of a list is the module itself.
-        if !(token == "self" && !path.is_empty()) {
+        // `self` at the end of a list is the module itself, at the beginning of a path it counts.
+        if token != "self" || path.is_empty() {
             path.push(token.clone());
         }
         at += 1;
