@@ -1,11 +1,11 @@
 //! No collision at any moment: distances by parry, motion bounds between the moments where they are measured.
 
 use crate::check::bodies::{Bodies, Owner, Pair};
-use crate::check::continuity::{is_free_throughout, moving_finger};
 use crate::check::far::Looked;
 use crate::check::lift::{FreePart, free_part};
 use crate::check::model::Model;
 use crate::check::motion::{Breach, Step, certify};
+use crate::check::roles::{is_free_throughout, moving_finger};
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Clearance, Log};
 use crate::plan::Plan;

@@ -2,9 +2,9 @@
 //! the next one from there. One that is free at an end of its motion has nothing to leave or reach there.
 
 use crate::check::bodies::{Bodies, Owner, Pair};
-use crate::check::continuity::contact_of;
 use crate::check::model::FingerModel;
 use crate::check::motion::Step;
+use crate::check::roles::contact_of;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, Segment, Waypoint};

@@ -12,8 +12,8 @@
 //! Tolerances, for rounding and two solvers, are the constants below.
 
 use crate::check::closure::{Body, Certificate, certified_margin, margin_by};
-use crate::check::continuity::{contact_of, moving_finger};
 use crate::check::model::Model;
+use crate::check::roles::{contact_of, moving_finger};
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{Plan, SegmentKind, Waypoint};
