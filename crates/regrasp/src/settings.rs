@@ -94,7 +94,7 @@ fn in_hand(text: Option<&str>, asked: &Overrides) -> Result<InHandSettings, Sett
 
 fn tracking(text: Option<&str>, asked: &Overrides) -> Result<TrackingSettings, SettingsError> {
     let arguments = [
-        (Argument::Margin, asked.margin.is_some(), "what slides closes nothing, so that closure is not judged"),
+        (Argument::Margin, asked.margin.is_some(), "force closure is not defined for sliding contacts"),
         (Argument::Improve, asked.improves_for_a_time, "plans of tracking are not improved"),
         (Argument::ImproveWork, asked.improve_work.is_some(), "plans of tracking are not improved"),
     ];

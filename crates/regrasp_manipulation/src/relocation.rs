@@ -1,5 +1,5 @@
 //! The relocation of one finger while the others hold the object still: off along the normal, over, down along the
-//! normal (paper 000, section 4.2.3; the ways over are from in-hand-notes, 4.8).
+//! normal (Saut 2011, sec. 4.2.3).
 
 use crate::model::Model;
 use crate::rolling::follow::ik_settings;

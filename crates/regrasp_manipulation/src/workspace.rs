@@ -243,8 +243,8 @@ impl<'a> Workspace<'a> {
 
     /// Goes to a configuration with other contacts; true when it is clear.
     ///
-    /// What lies between is not tested: contacts that slide are no motion that is carried out (paths in GS_n, paper 000,
-    /// section 4.1). How far bodies move only spares tests of what is far apart.
+    /// What lies between is not tested: contacts that slide are no motion that is carried out (paths in GS_n, Saut 2011,
+    /// sec. 4.1). How far bodies move only spares tests of what is far apart.
     pub fn slide(&mut self, world_from_object: &Pose, joints: &HandJoints, contacts: &Contacts) -> bool {
         self.contacts.clone_from(contacts);
         place_object(self.model, &mut self.next, world_from_object);

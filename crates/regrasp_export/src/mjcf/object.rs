@@ -4,7 +4,7 @@ use super::geom::{Geom, Look, Weight, as_collided, open_body, write_geom, write_
 use super::inertia;
 use super::names::ObjectNames;
 use super::xml::Xml;
-use regrasp_geometry::collision::{Answer, Placement, separation};
+use regrasp_geometry::collision::{Answer, Placed, Placement, separation};
 use regrasp_geometry::{Pose, Shape, Vector};
 use regrasp_scene::{Object, Support};
 
@@ -87,6 +87,13 @@ pub(super) fn hold_at_rest(object: &Object, world_from_object: &Pose, supports: 
 /// True where an object at a pose is proved to be apart from a placed body.
 fn is_apart((object, world_from_object): (&Shape, &Pose), (body, world_from_body): &(Shape, Pose)) -> bool {
     let [at, other] = [Placement::from(world_from_object), Placement::from(world_from_body)];
-    let answer = separation(object, &at, body, &other, STANDS_WITHIN, STANDS_WITHIN, &mut Vector::zeros(), &mut [0; 2]);
+    let answer = separation(
+        Placed { shape: object, at: &at },
+        Placed { shape: body, at: &other },
+        STANDS_WITHIN,
+        STANDS_WITHIN,
+        &mut Vector::zeros(),
+        &mut [0; 2],
+    );
     matches!(answer, Answer::SeparatedBy(_))
 }

@@ -1,7 +1,7 @@
-//! Beyond paper 003: where tracking gets no farther, as a finger is out of reach or no forces balance the weight, one finger is
+//! Beyond Cherif 1999: where tracking gets no farther, as a finger is out of reach or no forces balance the weight, one finger is
 //! relocated through the air while the others hold, and tracking goes on (`method = "tracking+gaiting"`).
 //!
-//! The relocation is one of in-hand planning (paper 000, section 4.2.3): off along the normal, over, down along the normal, with
+//! The relocation is one of in-hand planning (Saut 2011, sec. 4.2.3): off along the normal, over, down along the normal, with
 //! the others closed and their forces within their cones. Which finger lands where is found by looking ahead: of some
 //! footholds of every finger that may leave, that one is taken from which tracking leads farthest towards the goal.
 

@@ -1,4 +1,4 @@
-//! Key frames of a plan in one picture, like figures 7 to 9 of paper 000.
+//! Key frames of a plan in one picture, like figures 7 to 9 of Saut 2011.
 
 /// Which moments are shown.
 pub mod key_frames;

@@ -1,4 +1,4 @@
-//! How a contact of a fingertip with the object moves (paper 003, sections 6.1.2 and 6.2.2, appendix A).
+//! How a contact of a fingertip with the object moves (Cherif 1999, sec. 6.1.2 and 6.2.2, appendix A).
 //!
 //! A relative velocity in (`mode::RelativeVelocity`), a contact moved on both surfaces out, in three forms with the same
 //! result: `montana` in charts, `chart_free` on any surface, meshes too, and `ball_on_polyhedron` over faces, edges and

@@ -1,6 +1,6 @@
-//! Contact modes and their forces (paper 003, sections 6.1.1 and 6.1.2, table 1, equations 4, 6, 11).
+//! Contact modes and their forces (Cherif 1999, sec. 6.1.1 and 6.1.2, table 1, equations 4, 6, 11).
 //!
-//! Where the paper is not followed: equation 4 lets the tangential force on the object point along the velocity of the object
+//! Where Cherif 1999 is not followed: equation 4 lets the tangential force on the object point along the velocity of the object
 //! over the fingertip; friction opposes it.
 
 use nalgebra::{Matrix6, Rotation3};

@@ -46,7 +46,7 @@ pub fn whole_transfer(search: &mut Search, from: &GraspState, goal: &Pose) -> Op
     Some(way)
 }
 
-/// Transfer with the first grasp, then change to the second (paper 000, algorithm 2).
+/// Transfer with the first grasp, then change to the second (Saut 2011, algorithm 2).
 pub fn transfer_regrasp(
     search: &mut Search,
     from: &GraspState,
@@ -62,7 +62,7 @@ pub fn transfer_regrasp(
     change_grasp(search, &way, to, arrival, rng)
 }
 
-/// Change to the second grasp, then transfer (paper 000, section 4.3); where fingertips roll, to the contacts from which they
+/// Change to the second grasp, then transfer (Saut 2011, sec. 4.3); where fingertips roll, to the contacts from which they
 /// roll into those of the second grasp. None where the object has nowhere to go: that is
 /// [`transfer_regrasp`].
 pub fn regrasp_transfer(

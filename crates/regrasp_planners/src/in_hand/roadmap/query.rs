@@ -1,4 +1,4 @@
-//! Answering queries (paper 004, section IV-D): start and goal are linked to the graph, the graph is searched, the path is
+//! Answering queries (Sahbani 2007, sec. IV-D): start and goal are linked to the graph, the graph is searched, the path is
 //! smoothed.
 
 use crate::in_hand::attempt::search::{Context, Search, Stop};

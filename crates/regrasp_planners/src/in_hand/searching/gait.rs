@@ -1,6 +1,6 @@
 //! Two gait trees, from the start and from the goal, that grow until they meet.
 //!
-//! In place of sampling GS_n and linking (paper 000, section 4.2) the trees only ever hold what is feasible. Motions can be
+//! In place of sampling GS_n and linking (Saut 2011, sec. 4.2) the trees only ever hold what is feasible. Motions can be
 //! gone backwards, so what leads from the goal leads to it.
 
 /// A tree of grasps that grows by gaits.

@@ -1,5 +1,5 @@
 //! Random shortcuts over a sequence of motions: one transfer and one regrasp, in either order, in place of many
-//! (paper 000, section 4.2.1, last step; in-hand-notes, section 3).
+//! (Saut 2011, sec. 4.2.1, last step).
 
 use crate::in_hand::attempt::search::{Search, Stop};
 use crate::in_hand::regrasping::change::{Arrival, regrasp_transfer, transfer_regrasp, whole_transfer};

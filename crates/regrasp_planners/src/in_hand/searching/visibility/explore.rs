@@ -1,5 +1,5 @@
-//! explore(): samples GS_n by the random loop generator and links the samples inside it (paper 000, section 4.2.2; paper
-//! 004, algorithm 2).
+//! explore(): samples GS_n by the random loop generator and links the samples inside it (Saut 2011, sec. 4.2.2;
+//! Sahbani 2007, algorithm 2).
 
 use crate::in_hand::attempt::search::{Search, Stop};
 use crate::in_hand::grasps::sample::draw_state;
