@@ -3,7 +3,7 @@
 use crate::check::carried::world_from_base;
 use crate::check::kinematics::{Drive, Path, world_from_root};
 use crate::check::surface::SortedShape;
-use crate::check::tip::TipSurface;
+use crate::check::tip_surface::TipSurface;
 use nalgebra::Matrix4;
 use regrasp_geometry::{Point, Pose};
 use regrasp_robot::tip::Pad;

@@ -12,14 +12,14 @@
 //! Tolerances, for rounding and two solvers, are the constants below.
 
 use crate::check::closure::{Body, Certificate, certified_margin, margin_by};
-use crate::check::continuity::{contact_of, moving_finger};
 use crate::check::model::Model;
+use crate::check::roles::{contact_of, moving_finger};
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{Plan, SegmentKind, Waypoint};
 use regrasp_grasp::{Contact, Grip};
 use regrasp_scene::{InputFile, Object};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// How much smaller than required a margin may come out: two solvers, one number.
 pub(super) const MARGIN_TOLERANCE: f64 = 1e-9;
@@ -31,9 +31,14 @@ const SCALE_TOLERANCE: f64 = 1e-9;
 const FRICTION_TOLERANCE: f64 = 1e-9;
 
 /// The files of the plan against those of the scene as loaded now.
+///
+/// Files of several hands may have the same name, each in a folder of its own: the first in the plan is the first in the scene.
 pub fn check_inputs(plan: &Plan, inputs: &[InputFile], log: &mut Log) {
+    let mut n_seen: BTreeMap<(&str, &str), usize> = BTreeMap::new();
     for input in &plan.inputs {
-        match inputs.iter().find(|file| file.role == input.role && file.name == input.name) {
+        let n_before = n_seen.entry((&input.role, &input.name)).or_default();
+        let mut alike = inputs.iter().filter(|file| file.role == input.role && file.name == input.name);
+        match alike.nth(*n_before) {
             None => {
                 let message = format!("{} \"{}\" is not among the scene's files", input.role, input.name);
                 log.push(Violation::new(Kind::InputHashMismatch, message).subjects([input.name.as_str()]));
@@ -47,11 +52,15 @@ pub fn check_inputs(plan: &Plan, inputs: &[InputFile], log: &mut Log) {
             }
             Some(_) => {}
         }
+        *n_before += 1;
     }
     for file in inputs {
-        if !plan.inputs.iter().any(|input| input.role == file.role && input.name == file.name) {
-            let message = format!("the scene reads {} \"{}\", the plan was made without it", file.role, file.name);
-            log.push(Violation::new(Kind::InputHashMismatch, message).subjects([file.name.as_str()]));
+        match n_seen.get_mut(&(file.role.as_str(), file.name.as_str())).filter(|n_left| **n_left > 0) {
+            Some(n_left) => *n_left -= 1,
+            None => {
+                let message = format!("the scene reads {} \"{}\", the plan was made without it", file.role, file.name);
+                log.push(Violation::new(Kind::InputHashMismatch, message).subjects([file.name.as_str()]));
+            }
         }
     }
 }
