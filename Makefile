@@ -171,6 +171,7 @@ REPLAY_ALLEGRO := $(addprefix scenes/allegro/,$(addsuffix .toml,sphere32_x cube5
 REPLAY_SCENES := $(filter-out scenes/out_of_reach.toml,$(shell grep -l 'task = "in_hand"' scenes/*.toml))
 REPLAY_MODELS := $(shell grep -l 'task = "in_hand"' scenes/allegro/*.toml scenes/shadow/*.toml scenes/dclaw/soft_*.toml scenes/trifinger/soft_*.toml)
 SCENE_SEEDS ?= 5
+SCENE_WORK ?= 1000000
 REPLAY_SEEDS ?= 50
 CONTROL_SEEDS ?= 10
 SIMULATE = $(VENV)/bin/python -m regrasp.simulate.campaign
@@ -182,7 +183,7 @@ replay: python
 	$(SIMULATE) $(REPLAY) --gravity down --friction-scale 0.8,1,1.2 --seeds $(CONTROL_SEEDS) -o $(OUT)/replay --name friction
 	$(SIMULATE) $(REPLAY) --gravity down --mass-scale 0.5,1,1.5 --seeds $(CONTROL_SEEDS) -o $(OUT)/replay --name mass
 	$(SIMULATE) $(REPLAY) --gravity down --speed 1,2 --seeds $(CONTROL_SEEDS) -o $(OUT)/replay --name speed
-	$(SIMULATE) $(REPLAY_SCENES) $(if $(PACKAGES),$(REPLAY_MODELS)) $(PACKAGES) --gravity plan --seeds $(SCENE_SEEDS) -o $(OUT)/replay --name scenes
+	$(SIMULATE) $(REPLAY_SCENES) $(if $(PACKAGES),$(REPLAY_MODELS)) $(PACKAGES) --gravity plan --seeds $(SCENE_SEEDS) --max-work $(SCENE_WORK) -o $(OUT)/replay --name scenes
 	cp $(OUT)/replay/*.csv $(OUT)/replay/*.md docs/benchmarks/replay/
 
 # Replays of 20 plans of tracking: as the paper has them; with exact cones, a friction margin and normal forces from 0.5 to

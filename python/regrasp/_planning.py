@@ -138,7 +138,7 @@ def export_mjcf(
 
     plan, scene, packages, lenient: as in `check`.
 
-    Warns where the model differs from the scene: MuJoCo collides with convex hulls. Raises `InputError`.
+    Warns where the model differs from the scene: MuJoCo collides with convex shapes only. Raises `InputError`.
     """
     plan, scene = _with_scene(plan, scene, packages, lenient)
     xml, notes = plan._native.to_mjcf(scene._native)

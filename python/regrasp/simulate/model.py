@@ -89,7 +89,8 @@ class Rig:
     plan: Plan
     fingers: list[FingerModel]
     object_body: int
-    object_geom: int
+    object_geoms: frozenset[int]
+    """Convex parts of the object."""
     object_qpos: int
     """First of the seven coordinates of the object's free joint."""
     pin: int
@@ -142,7 +143,7 @@ def make_rig(xml: str, plan: Plan, settings: Settings) -> Rig:
         plan=plan,
         fingers=fingers,
         object_body=object_body,
-        object_geom=int(model.geom("object").id),
+        object_geoms=_object_geoms(model),
         object_qpos=int(model.jnt_qposadr[object_joint]),
         pin=int(model.equality("pin").id),
         stiffness=stiffness,
@@ -284,16 +285,21 @@ def _drives(model: MjModel, names: list[str]) -> Array:
     return drives
 
 
+def _object_geoms(model: MjModel) -> frozenset[int]:
+    body = int(model.jnt_bodyid[_free_joint(model)])
+    return frozenset(g for g in range(model.ngeom) if model.geom_bodyid[g] == body)
+
+
 def _finger(model: MjModel, name: str, joint_names: list[str]) -> FingerModel:
     site = model.site(f"{name}:tip")
     body = int(model.site_bodyid[site.id])
-    object_geom = model.geom("object").id
+    object_geoms = _object_geoms(model)
     on_tip = [g for g in range(model.ngeom) if model.geom_bodyid[g] == body]
     touching: set[int] = set()
     for p in range(model.npair):
         a, b = int(model.pair_geom1[p]), int(model.pair_geom2[p])
         # Pairs that the plan does not use have condim 3 (class "unplanned").
-        if object_geom in (a, b) and model.pair_dim[p] != 3:
+        if object_geoms & {a, b} and model.pair_dim[p] != 3:
             touching.update({a, b}.intersection(on_tip))
     joints: list[int] = []
     sliding: list[int] = []

@@ -2,11 +2,12 @@
 //!
 //! What may touch in the model is what the checker keeps apart (`regrasp_scene::collision_pairs`), pair by pair; pairs that
 //! the hand allows never touch. A round fingertip touches the object with its ball, as the plan means it, and everything else
-//! with the shapes of its link. MuJoCo collides with convex hulls of meshes: an object that is not convex is written as
-//! its hull, and a note says so. `docs/simulate.md` has the settings and where they come from.
+//! with the shapes of its link. MuJoCo collides with convex shapes only: an object that is not convex is cut into convex parts, and
+//! a note says by how much they exceed it. `docs/simulate.md` has the settings and where they come from.
 
 mod inertia;
 mod model;
+mod object;
 mod pairs;
 mod xml;
 
@@ -41,7 +42,8 @@ pub enum MjcfError {
 ///
 /// Names: bodies and joints as links and joints of the robot; the object is the body `object` (with underscores where a link
 /// has that name) with the free joint of the same name; of each finger the site `FINGER:tip` at the tip's centre and, for
-/// a round tip, the geom `FINGER:tip`; other geoms are `LINK:k`, `obstacle:NAME` and `object`.
+/// a round tip, the geom `FINGER:tip`; other geoms are `LINK:k`, `obstacle:NAME` and `object`, with
+/// `object:1` and so on for further convex parts.
 ///
 /// Errors: the plan is not for this scene's hand.
 pub fn to_mjcf(scene: &Scene, plan: &Plan) -> Result<Mjcf, MjcfError> {

@@ -1,25 +1,22 @@
 //! The model as an MJCF document.
 
 use super::inertia::{self, Inertial};
+use super::object::{ObjectShape, is_hollowed, object_names};
 use super::xml::{Xml, numbers};
 use super::{Mjcf, pairs};
 use nalgebra::UnitQuaternion;
-use regrasp_geometry::mass::solid_properties;
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{ConvexHull, Point, Pose, Shape, pose_from};
 use regrasp_plan::Plan;
 use regrasp_robot::tip::is_same_surface;
 use regrasp_robot::{Finger, Hand, JointId, JointKind, LinkId, Motion, TipShape};
 use regrasp_scene::Scene;
-use std::sync::Arc;
 
 /// Gravity where the plan says nothing, in m/s^2: along -z of the world.
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 /// Radius of the ball that stands for a sharp tip, in metres: its surface is this far from the point, no more than a
 /// plan may promise.
 const POINT_RADIUS: f64 = 0.0005;
-/// A mesh whose hull has this much more volume is not convex for a note.
-const CONVEX_WITHIN: f64 = 0.01;
 const PALM_COLOR: &str = "0.55 0.56 0.6 1";
 const OBSTACLE_COLOR: &str = "0.5 0.45 0.4 1";
 const OBJECT_MATERIAL: &str = "object";
@@ -37,8 +34,8 @@ pub(super) struct GeomNames {
     pub palm: Vec<String>,
     /// Of `Scene::obstacles`.
     pub obstacles: Vec<String>,
-    /// Of the object.
-    pub object: String,
+    /// Of the object: one for each of its convex parts.
+    pub object: Vec<String>,
 }
 
 /// A geom to be written.
@@ -66,12 +63,13 @@ struct OwnTip {
 pub(super) fn write(scene: &Scene, plan: &Plan) -> Mjcf {
     let hand = &scene.hand;
     let moving: Vec<Vec<JointId>> = hand.fingers.iter().map(|finger| moving_joints(hand, finger)).collect();
-    let names = geom_names(scene);
+    let shape = ObjectShape::of(&scene.object);
+    let names = geom_names(scene, &shape);
     let object = unique("object", hand);
     let mut xml = Xml::default();
     xml.open("mujoco", &[("model", scene.name.clone())]);
     write_settings(&mut xml, plan);
-    write_meshes(&mut xml, scene, &names);
+    write_meshes(&mut xml, scene, &shape, &names);
     xml.open("worldbody", &[]);
     xml.leaf("light", &[("pos", "0.3 -0.3 1".into()), ("dir", "-0.3 0.3 -1".into()), ("directional", "true".into())]);
     for (obstacle, name) in scene.obstacles.iter().zip(&names.obstacles) {
@@ -82,7 +80,7 @@ pub(super) fn write(scene: &Scene, plan: &Plan) -> Mjcf {
         );
     }
     write_hand(&mut xml, hand, &moving, &names);
-    write_object(&mut xml, scene, plan, &names, &object);
+    write_object(&mut xml, scene, plan, (&shape, &names), &object);
     xml.close();
     pairs::write(&mut xml, scene, &names);
     write_equalities(&mut xml, hand, &moving, &object);
@@ -90,23 +88,16 @@ pub(super) fn write(scene: &Scene, plan: &Plan) -> Mjcf {
     write_sensors(&mut xml, hand, &object);
     write_keyframes(&mut xml, hand, plan);
     xml.close();
-    Mjcf { xml: xml.finish(), notes: notes(scene) }
+    Mjcf { xml: xml.finish(), notes: notes(scene, &shape) }
 }
 
-fn notes(scene: &Scene) -> Vec<String> {
+fn notes(scene: &Scene, object: &ObjectShape) -> Vec<String> {
+    let of_object = object.note.as_ref().map(|note| format!("\"{}\" is not convex; {note}", scene.object.name));
     let shapes = scene.obstacles.iter().map(|obstacle| (obstacle.name.as_str(), &obstacle.placed.shape));
-    std::iter::once((scene.object.name.as_str(), &scene.object.shape))
-        .chain(shapes)
+    let of_obstacles = shapes
         .filter(|(_, shape)| is_hollowed(shape))
-        .map(|(name, _)| format!("\"{name}\" is not convex; MuJoCo collides with its convex hull"))
-        .collect()
-}
-
-fn is_hollowed(shape: &Shape) -> bool {
-    let Shape::Mesh(mesh) = shape else { return false };
-    let (Ok(solid), Ok(hull)) = (solid_properties(shape), ConvexHull::new(mesh.vertices())) else { return true };
-    solid_properties(&Shape::Convex(Arc::new(hull)))
-        .is_ok_and(|hull| hull.volume > solid.volume * (1.0 + CONVEX_WITHIN))
+        .map(|(name, _)| format!("\"{name}\" is not convex; MuJoCo collides with its convex hull"));
+    of_object.into_iter().chain(of_obstacles).collect()
 }
 
 /// Joints of the chain of `finger`, base first, as the robot names them.
@@ -126,7 +117,7 @@ fn unique(name: &str, hand: &Hand) -> String {
     name
 }
 
-fn geom_names(scene: &Scene) -> GeomNames {
+fn geom_names(scene: &Scene, object: &ObjectShape) -> GeomNames {
     let hand = &scene.hand;
     let mut used = vec![0; hand.robot.links.len()];
     let mut name_of = |link: LinkId| {
@@ -157,7 +148,7 @@ fn geom_names(scene: &Scene) -> GeomNames {
         touching,
         palm,
         obstacles: scene.obstacles.iter().map(|obstacle| format!("obstacle:{}", obstacle.name)).collect(),
-        object: "object".into(),
+        object: object_names(object),
     }
 }
 
@@ -214,7 +205,7 @@ fn write_settings(xml: &mut Xml, plan: &Plan) {
     xml.close();
 }
 
-fn write_meshes(xml: &mut Xml, scene: &Scene, names: &GeomNames) {
+fn write_meshes(xml: &mut Xml, scene: &Scene, object: &ObjectShape, names: &GeomNames) {
     let hand = &scene.hand;
     let fingers = hand
         .fingers
@@ -223,7 +214,7 @@ fn write_meshes(xml: &mut Xml, scene: &Scene, names: &GeomNames) {
         .flat_map(|(finger, names)| finger.shapes.iter().map(|shape| &shape.placed.shape).zip(names));
     let palm = hand.palm.iter().map(|shape| &shape.placed.shape).zip(&names.palm);
     let obstacles = scene.obstacles.iter().map(|obstacle| &obstacle.placed.shape).zip(&names.obstacles);
-    let object = std::iter::once((&scene.object.shape, &names.object));
+    let object = object.parts.iter().zip(&names.object);
     xml.open("asset", &[]);
     let texture = |kind: &str, pattern: &str, colors: [&str; 2]| {
         let side = if kind == "cube" { "64" } else { "16" };
@@ -351,18 +342,14 @@ fn write_tip(xml: &mut Xml, finger: &Finger, names: &[String], color: &str) {
     );
 }
 
-fn write_object(xml: &mut Xml, scene: &Scene, plan: &Plan, names: &GeomNames, name: &str) {
+fn write_object(xml: &mut Xml, scene: &Scene, plan: &Plan, (shape, names): (&ObjectShape, &GeomNames), body: &str) {
     let start = &plan.segments[0].waypoints[0].world_from_object;
-    open_body(xml, name.to_owned(), &pose_from(start.position, start.quat_xyzw), false);
-    xml.leaf("freejoint", &[("name", name.to_owned())]);
+    open_body(xml, body.to_owned(), &pose_from(start.position, start.quat_xyzw), false);
+    xml.leaf("freejoint", &[("name", body.to_owned())]);
     write_inertial(xml, &inertia::of_object(&scene.object));
-    let geom = Geom {
-        name: &names.object,
-        look: Look::Checkers,
-        body_from_shape: Pose::identity(),
-        shape: &scene.object.shape,
-    };
-    write_geom(xml, &geom);
+    for (shape, name) in shape.parts.iter().zip(&names.object) {
+        write_geom(xml, &Geom { name, look: Look::Checkers, body_from_shape: Pose::identity(), shape });
+    }
     xml.close();
 }
 

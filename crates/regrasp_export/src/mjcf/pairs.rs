@@ -17,12 +17,13 @@ pub(super) fn write(xml: &mut Xml, scene: &Scene, names: &GeomNames) {
     xml.open("contact", &[]);
     for (index, finger) in scene.hand.fingers.iter().enumerate() {
         let (condim, coefficients) = friction_of(finger, friction);
-        for tip in &names.touching[index] {
+        for (tip, part) in names.touching[index].iter().flat_map(|tip| names.object.iter().map(move |part| (tip, part)))
+        {
             xml.leaf(
                 "pair",
                 &[
                     ("geom1", tip.clone()),
-                    ("geom2", names.object.clone()),
+                    ("geom2", part.clone()),
                     ("condim", condim.to_string()),
                     ("friction", numbers(coefficients)),
                 ],
@@ -37,7 +38,7 @@ pub(super) fn write(xml: &mut Xml, scene: &Scene, names: &GeomNames) {
     };
     let of_finger = |id: FingerShapeId| names.fingers[id.finger.0][id.shape].as_str();
     for &id in &pairs.link_object {
-        unplanned(xml, of_finger(id), &names.object);
+        names.object.iter().for_each(|part| unplanned(xml, of_finger(id), part));
     }
     for &(a, b) in pairs.finger_finger.iter().chain(&pairs.within_finger) {
         unplanned(xml, of_finger(a), of_finger(b));
@@ -49,10 +50,10 @@ pub(super) fn write(xml: &mut Xml, scene: &Scene, names: &GeomNames) {
         unplanned(xml, of_finger(id), &names.obstacles[obstacle]);
     }
     for &palm in &pairs.palm_object {
-        unplanned(xml, &names.palm[palm], &names.object);
+        names.object.iter().for_each(|part| unplanned(xml, &names.palm[palm], part));
     }
     for &obstacle in &pairs.object_obstacle {
-        unplanned(xml, &names.obstacles[obstacle], &names.object);
+        names.object.iter().for_each(|part| unplanned(xml, &names.obstacles[obstacle], part));
     }
     xml.close();
 }
