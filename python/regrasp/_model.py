@@ -100,12 +100,14 @@ class Joint:
 
 @dataclass(frozen=True)
 class CoupledJoint:
-    """A joint that follows another: `position = multiplier * position(follows) + offset`."""
+    """A joint that follows others: `position = multiplier * position(follows) + offset`, and more terms in `others`."""
 
     name: str
     follows: str
     multiplier: float
     offset: float
+    others: tuple[tuple[str, float], ...] = ()
+    """More joints that it follows, with their multipliers."""
 
 
 @dataclass(frozen=True)
@@ -145,7 +147,10 @@ class Hand:
         self.world_from_base: Pose = pose_of(fields["world_from_base"])
         self.joints: tuple[Joint, ...] = tuple(_joint(entry) for entry in fields["joints"])
         """Independent joints, finger by finger: the order of every joint vector."""
-        self.coupled_joints: tuple[CoupledJoint, ...] = tuple(CoupledJoint(**entry) for entry in fields["coupled_joints"])
+        self.coupled_joints: tuple[CoupledJoint, ...] = tuple(
+            CoupledJoint(**{**entry, "others": tuple((name, factor) for name, factor in entry["others"])})
+            for entry in fields["coupled_joints"]
+        )
         self.fingers: tuple[Finger, ...] = tuple(_finger(entry) for entry in fields["fingers"])
         """Fingers, in the order of every contact list."""
         self.notes: tuple[str, ...] = tuple(fields.get("notes", ()))

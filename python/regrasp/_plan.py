@@ -82,7 +82,7 @@ class Plan:
         self.inputs: tuple[Mapping[str, str], ...] = tuple(fields["inputs"])
         """Files it was made from: `role`, `name`, `sha256`; the scene file first."""
         self.promises: Mapping[str, Any] = fields["promises"]
-        """What the checker holds it to; docs/plan-format.md has the keys."""
+        """What the checker holds it to; docs/reference/plan-format.md has the keys."""
         self.statistics: Mapping[str, Any] = fields["statistics"]
         """Counts of the search."""
         self.start: Pose = pose_of(fields["start"])
@@ -112,11 +112,11 @@ class Plan:
         self.path = os.fspath(path)
 
     def to_npz(self, path: StrPath | None = None) -> bytes:
-        """The arrays as an `.npz` file, without pickle; written to `path` too, if given (docs/export-formats.md)."""
+        """The arrays as an `.npz` file, without pickle; written to `path` too, if given (docs/reference/export-formats.md)."""
         return self._exported(path, self._native.to_npz())
 
     def to_ros2(self, path: StrPath | None = None) -> str:
-        """A ROS 2 `trajectory_msgs/JointTrajectory` as YAML; written to `path` too, if given (docs/export-formats.md)."""
+        """A ROS 2 `trajectory_msgs/JointTrajectory` as YAML; written to `path` too, if given (docs/reference/export-formats.md)."""
         return self._exported(path, self._native.to_ros2().encode()).decode()
 
     @staticmethod
@@ -218,7 +218,7 @@ class Plan:
     def __repr__(self) -> str:
         transfers, relocations = self.statistics["transfers"], self.statistics["relocations"]
         if self.promises.get("tracking") is not None:
-            # What the statistics call transfers are sub-goals there (docs/plan-format.md).
+            # What the statistics call transfers are sub-goals there (docs/reference/plan-format.md).
             relocated = f", {relocations} relocations" if relocations else ""
             return (
                 f"<Plan: tracking over {transfers} sub-goals{relocated}, {self.n_waypoints} waypoints, {self.duration:.1f} s>"

@@ -38,6 +38,7 @@ def plan(
     improve_work: int | None = None,
     settings: Mapping[str, Any] | None = None,
     level: Level = "motion",
+    task: str | None = None,
     progress: Callable[[Progress], object] | None = None,
 ) -> Plan | Failure:
     """Plans how the hand takes the object from start to goal, and has the plan judged by the independent checker.
@@ -57,6 +58,7 @@ def plan(
     settings: settings of the planner, with the keys of "settings" in a plan file; the other arguments win over it.
     level: what the plan is judged for: "geometry" (poses alone), "forces" (and contact forces) or "motion" (and that nothing
     slips or goes too fast).
+    task: name of the task, of a scene with several; the first where nothing is said.
     progress: called now and then, by this thread, with a `Progress`; what it raises stops the search and is raised.
 
     The interpreter's lock is released while the search runs, and Ctrl-C stops it. Raises `InputError`, and `InternalError`
@@ -81,6 +83,7 @@ def plan(
         "improve_work": improve_work,
         "settings": None if settings is None else _settings_text(settings),
         "level": level,
+        "task": task,
         "progress": None if progress is None else _listener(progress),
     }
     found, outcome = _regrasp.plan(scene._native, request)

@@ -64,7 +64,7 @@ class Violation:
     """One thing that is wrong with a plan."""
 
     kind: str
-    """docs/plan-format.md lists the kinds; one never changes its meaning."""
+    """docs/reference/plan-format.md lists the kinds; one never changes its meaning."""
     moment: Moment | None
     """When, where it has a moment."""
     subjects: tuple[str, ...]

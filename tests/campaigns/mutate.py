@@ -314,7 +314,7 @@ def stl_mutant(rng, data):
 
 
 def checksum(data):
-    """That of docs/roadmap-format.md: four lanes of words, mixed."""
+    """That of docs/reference/roadmap-format.md: four lanes of words, mixed."""
     mask = (1 << 64) - 1
 
     def mix(lane, word):

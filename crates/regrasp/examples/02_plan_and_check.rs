@@ -15,11 +15,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = std::env::args_os().nth(1).map_or_else(|| PathBuf::from(bundled), PathBuf::from);
     let loaded = load_scene(&path, &LoadOptions::default())?;
     let seed = 7;
-    let query = loaded.task.query(seed);
+    let query = loaded.task().query(seed);
 
     // The budget counts configurations looked at, so that every machine finds the same plan.
     let budget = Budget::work(5_000_000);
-    let plan = match plan_in_hand(&loaded.scene, &query, &InHandSettings::default(), seed, &budget, &|_| {}) {
+    let plan = match plan_in_hand(
+        &loaded.view(),
+        query.as_in_hand().unwrap(),
+        &InHandSettings::default(),
+        seed,
+        &budget,
+        &|_| {},
+    ) {
         Ok(plan) => plan,
         Err(failure) => return Err(format!("no plan: {failure}").into()),
     };
@@ -33,7 +40,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     }
 
-    let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+    let report = check((&loaded.scene, &loaded.state), Some(&query), &plan, &CheckSettings::default());
     for violation in &report.violations {
         println!("{violation}");
     }

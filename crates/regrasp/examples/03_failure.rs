@@ -11,7 +11,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
     let loaded = load_scene(&scenes.join("box_180x.toml"), &LoadOptions::default())?;
     let budget = Budget::work(2_000);
-    let result = plan_in_hand(&loaded.scene, &loaded.task.query(0), &InHandSettings::default(), 0, &budget, &|_| {});
+    let result = plan_in_hand(
+        &loaded.view(),
+        loaded.task().query(0).as_in_hand().unwrap(),
+        &InHandSettings::default(),
+        0,
+        &budget,
+        &|_| {},
+    );
     let Err(failure) = result else {
         return Err("two thousand configurations are not enough for half a turn of a box".into());
     };

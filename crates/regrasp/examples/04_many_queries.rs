@@ -16,7 +16,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let settings = InHandSettings::default();
     let solve = |seed: u64| -> Result<Plan, Failure> {
         let budget = Budget::work(5_000_000);
-        plan_in_hand(&loaded.scene, &loaded.task.query(seed), &settings, seed, &budget, &|_| {})
+        plan_in_hand(&loaded.view(), loaded.task().query(seed).as_in_hand().unwrap(), &settings, seed, &budget, &|_| {})
     };
 
     let n_threads = std::thread::available_parallelism()?.get() as u64;
@@ -34,7 +34,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let accepted = results.iter().filter(|(seed, result)| {
         result.as_ref().is_ok_and(|plan| {
-            check(&loaded.scene, Some(&loaded.task.query(*seed)), plan, &CheckSettings::default()).accepted()
+            check((&loaded.scene, &loaded.state), Some(&loaded.task().query(*seed)), plan, &CheckSettings::default())
+                .accepted()
         })
     });
     println!("{} of {} solved and accepted by the checker", accepted.count(), seeds.len());

@@ -11,8 +11,9 @@ use std::path::Path;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/sphere_90x.toml");
     let loaded = load_scene(&path, &LoadOptions::default())?;
-    let (query, budget) = (loaded.task.query(1), Budget::work(5_000_000));
-    let plan = plan_in_hand(&loaded.scene, &query, &InHandSettings::default(), 1, &budget, &|_| {})?;
+    let (query, budget) = (loaded.task().query(1), Budget::work(5_000_000));
+    let plan =
+        plan_in_hand(&loaded.view(), query.as_in_hand().unwrap(), &InHandSettings::default(), 1, &budget, &|_| {})?;
 
     let arrays = PlanArrays::new(&plan);
     println!("{} waypoints of {} joints", arrays.n_waypoints, arrays.joint_names.len());

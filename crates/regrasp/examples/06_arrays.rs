@@ -12,8 +12,9 @@ use std::path::Path;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/sphere_180z.toml");
     let loaded = load_scene(&path, &LoadOptions::default())?;
-    let (query, budget) = (loaded.task.query(3), Budget::work(5_000_000));
-    let plan = plan_in_hand(&loaded.scene, &query, &InHandSettings::default(), 3, &budget, &|_| {})?;
+    let (query, budget) = (loaded.task().query(3), Budget::work(5_000_000));
+    let plan =
+        plan_in_hand(&loaded.view(), query.as_in_hand().unwrap(), &InHandSettings::default(), 3, &budget, &|_| {})?;
 
     // Every array travels with its names: rows are waypoints, columns are `joint_names` or `fingers`.
     let arrays = PlanArrays::new(&plan);

@@ -4,8 +4,8 @@
 //! [`scene`] reads files, [`planners`] plans, [`plan`] holds the plan and its checker. Frames, units and the glossary are in
 //! `CONVENTIONS.md`; the tower of crates is in `ARCHITECTURE.md`.
 
-/// What pages are told of what only planners know.
-pub mod told;
+/// Failures and roadmaps as the data that pages are made of.
+pub mod pictures;
 
 pub use regrasp_base as base;
 pub use regrasp_export as export;
@@ -23,4 +23,4 @@ pub use regrasp_plan::Plan;
 pub use regrasp_planners::{
     Failure, InHandSettings, Method, PlannerSettings, TrackingMethod, TrackingSettings, plan_in_hand, plan_tracking,
 };
-pub use regrasp_scene::{InHandQuery, Scene};
+pub use regrasp_scene::{HandView, InHandQuery, Manipulation, Query, Scene, State, TrackingQuery};

@@ -46,6 +46,22 @@ pub struct Found<'a> {
     pub notes: Vec<String>,
 }
 
+/// Most brackets that are open at once. The parser calls itself for each, and takes broken files for deeper than they are.
+const MAX_OPEN: usize = 128;
+
+/// Where more than [`MAX_OPEN`] brackets are open, those in strings and comments among them.
+fn too_deep(text: &str) -> Option<usize> {
+    let mut n_open = 0usize;
+    text.bytes().position(|byte| {
+        match byte {
+            b'[' | b'{' => n_open += 1,
+            b']' | b'}' => n_open = n_open.saturating_sub(1),
+            _ => {}
+        }
+        n_open > MAX_OPEN
+    })
+}
+
 impl<'a> Found<'a> {
     /// Nothing found yet in `text`, the content of `path`.
     pub fn new(path: &'a Path, text: &'a str, codes: Codes) -> Self {
@@ -71,6 +87,12 @@ impl<'a> Found<'a> {
             let diagnostic =
                 Diagnostic::new(self.codes.syntax, Place::file(self.path), problem).expected("a TOML file");
             self.diagnostics.push(diagnostic);
+            return None;
+        }
+        if let Some(at) = too_deep(self.text) {
+            let problem = format!("opens more than {MAX_OPEN} brackets that are not closed");
+            let diagnostic = Diagnostic::new(self.codes.syntax, self.place(&(at..at)), problem);
+            self.diagnostics.push(diagnostic.fix("close every [ and { where its list or table ends"));
             return None;
         }
         let (table, errors) = DeTable::parse_recoverable(self.text);
@@ -353,10 +375,15 @@ impl<'a> Table<'a> {
     /// True if `format` and `format_version`, which every file of ours begins with, say that it is of this kind; the rest
     /// of another file would only be noise. Errors: missing (`missing_key`), another format or version (`other_format`).
     pub fn is_of_format(&mut self, found: &mut Found, format: &str, version: f64) -> bool {
+        self.version_of_format(found, format, &[version]).is_some()
+    }
+
+    /// As [`Table::is_of_format`] for a format with several versions: the one that the file has, among `versions`.
+    pub fn version_of_format(&mut self, found: &mut Found, format: &str, versions: &[f64]) -> Option<f64> {
         let fix = format!("add format = \"{format}\" as the first line");
+        let newest = versions.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let format_entry = self.required(found, "format", &fix);
-        let version_entry = self.required(found, "format_version", &format!("add format_version = {version}"));
-        let mut is_ours = true;
+        let version_entry = self.required(found, "format_version", &format!("add format_version = {newest}"));
         if let Some(entry) = &format_entry
             && let Some(text) = entry.text(found)
             && text != format
@@ -365,19 +392,23 @@ impl<'a> Table<'a> {
                 .error(found.codes.other_format, found, format!("is \"{text}\""))
                 .expected(format!("\"{format}\""));
             found.diagnostics.push(diagnostic);
-            return false;
+            return None;
         }
-        if let Some(entry) = &version_entry
-            && let Some(seen) = entry.number(found)
-            && seen != version
+        let seen = version_entry.as_ref().and_then(|entry| entry.number(found));
+        if let (Some(entry), Some(seen)) = (&version_entry, seen)
+            && !versions.contains(&seen)
         {
-            let diagnostic = entry
-                .error(found.codes.other_format, found, format!("is {}", number(seen)))
-                .expected(format!("{version}, the version that this program reads"));
-            found.diagnostics.push(diagnostic);
-            is_ours = false;
+            let known = versions.iter().map(ToString::to_string).collect::<Vec<_>>().join(" or ");
+            let expected = match versions {
+                [_] => format!("{known}, the version that this program reads"),
+                _ => format!("{known}, the versions that this program reads"),
+            };
+            let diagnostic = entry.error(found.codes.other_format, found, format!("is {}", number(seen)));
+            found.diagnostics.push(diagnostic.expected(expected));
+            return None;
         }
-        is_ours
+        // What is missing has been reported. Files that say no version are mostly of the first.
+        Some(seen.unwrap_or(versions.first().copied().unwrap_or(newest)))
     }
 
     /// Every key with its value, for tables whose keys are names that the user chose.

@@ -1,4 +1,4 @@
-//! Rows as CSV (RFC 4180): written whole at the end, appended one by one to `FILE.partial` meanwhile.
+//! Rows as CSV: written whole at the end, appended one by one to `FILE.partial` meanwhile.
 
 use crate::row::Row;
 use regrasp_base::{Diagnostic, InputError, Place};
@@ -40,12 +40,25 @@ pub fn header() -> String {
 
 /// One line.
 pub fn line(row: &Row) -> String {
+    line_after(&[], row)
+}
+
+/// One line with fields of other columns before those of the row.
+pub(crate) fn line_after(leading: &[String], row: &Row) -> String {
+    let mut writer = ::csv::Writer::from_writer(Vec::new());
+    let written = writer.write_record(leading.iter().chain(&fields(row))).and_then(|()| Ok(writer.flush()?));
+    written.expect("memory takes every record");
+    let bytes = writer.into_inner().expect("memory takes every record");
+    String::from_utf8(bytes).expect("all fields are text")
+}
+
+fn fields(row: &Row) -> [String; COLUMNS.len()] {
     let optional = |value: Option<f64>| value.map(|x| x.to_string()).unwrap_or_default();
-    let fields = [
-        quoted(&row.scene),
-        quoted(&row.method),
+    [
+        row.scene.clone(),
+        row.method.clone(),
         row.seed.to_string(),
-        quoted(&row.status),
+        row.status.clone(),
         row.plan_s.to_string(),
         row.plan_cpu_s.to_string(),
         optional(row.floor_s),
@@ -61,14 +74,8 @@ pub fn line(row: &Row) -> String {
         optional(row.min_margin),
         optional(row.min_clearance),
         optional(row.angle_left_deg),
-        quoted(&row.cause),
-    ];
-    fields.join(",") + "\n"
-}
-
-pub(crate) fn quoted(text: &str) -> String {
-    let needs_quotes = text.contains([',', '"', '\n', '\r']);
-    if needs_quotes { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+        row.cause.clone(),
+    ]
 }
 
 /// Rows on their way to a CSV file: a crash loses at most the row in flight.
@@ -214,38 +221,13 @@ fn row_of(fields: &[String]) -> Option<Row> {
 
 /// Records with the line each begins on.
 fn records(text: &str) -> Vec<(u32, Vec<String>)> {
-    let mut found = Vec::new();
-    let mut fields = vec![String::new()];
-    let (mut line, mut began) = (1, 1);
-    let mut in_quotes = false;
-    let mut characters = text.chars().peekable();
-    while let Some(c) = characters.next() {
-        line += u32::from(c == '\n');
-        match c {
-            '"' if in_quotes && characters.peek() == Some(&'"') => {
-                characters.next();
-                push(&mut fields, '"');
-            }
-            '"' => in_quotes = !in_quotes,
-            ',' if !in_quotes => fields.push(String::new()),
-            '\r' if !in_quotes => {}
-            '\n' if !in_quotes => {
-                found.push((began, std::mem::replace(&mut fields, vec![String::new()])));
-                began = line;
-            }
-            c => push(&mut fields, c),
-        }
-    }
-    if fields.iter().any(|field| !field.is_empty()) {
-        found.push((began, fields));
-    }
-    found
-}
-
-fn push(fields: &mut [String], c: char) {
-    if let Some(field) = fields.last_mut() {
-        field.push(c);
-    }
+    let mut reader = ::csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text.as_bytes());
+    let with_line = |record: ::csv::StringRecord| {
+        let line = record.position().map_or(0, ::csv::Position::line);
+        (u32::try_from(line).unwrap_or(u32::MAX), record.iter().map(str::to_owned).collect())
+    };
+    // Text in memory has no other error than not being text.
+    reader.records().map_while(Result::ok).map(with_line).collect()
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use crate::row::{Problem, status_of};
 use regrasp_base::{Budget, files};
 use regrasp_planners::{InHandSettings, Progress, plan_in_hand};
+use regrasp_scene::HandView;
 
 /// One query with each number of threads.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,17 +27,14 @@ impl Comparison {
 
 /// Plans `problem` with each number of threads; only work is limited.
 pub fn compare(problem: Problem, settings: &InHandSettings, budget: &Budget, threads: &[usize]) -> Comparison {
-    let mut comparison = Comparison {
-        scene: problem.scene.name.clone(),
-        seed: problem.seed,
-        digests: Vec::new(),
-        status: String::new(),
-    };
+    let mut comparison =
+        Comparison { scene: problem.name(), seed: problem.seed, digests: Vec::new(), status: String::new() };
+    let view = HandView::of(&problem.task);
+    let query = problem.query.as_in_hand().expect("campaigns refuse scenes of other tasks");
     for &n_threads in threads {
         let settings = InHandSettings { n_threads, ..settings.clone() };
         let silent = |_: Progress| {};
-        let (status, bytes) = match plan_in_hand(problem.scene, problem.query, &settings, problem.seed, budget, &silent)
-        {
+        let (status, bytes) = match plan_in_hand(&view, query, &settings, problem.seed, budget, &silent) {
             Ok(plan) => ("solved".to_owned(), regrasp_plan::format::to_json(&plan)),
             Err(failure) => (status_of(&failure), serde_json::to_string(&failure).unwrap_or_default()),
         };

@@ -1,8 +1,8 @@
 //! First and improved plans side by side. Rows are those of `csv`, after columns of their own.
 
 use crate::csv;
-use crate::page::escaped;
 use crate::row::Row;
+use crate::text::escaped;
 use regrasp_base::{Diagnostic, InputError, Place};
 use regrasp_plan::plan::{Improvement, PlanFigures};
 use std::fmt::Write;
@@ -34,27 +34,30 @@ pub fn header() -> String {
 
 /// One line; what has no plan has empty columns of ours.
 pub fn line(row: &Row) -> String {
-    let own = match &row.improvement {
+    let own: Vec<String> = match &row.improvement {
         Some(improvement) => {
             let figures = |f: &PlanFigures| {
-                format!(
-                    "{},{},{},{},{},{}",
-                    f.relocations, f.transfers, f.object_path, f.joint_path, f.kept_margin, f.cost
-                )
+                [
+                    f.relocations.to_string(),
+                    f.transfers.to_string(),
+                    f.object_path.to_string(),
+                    f.joint_path.to_string(),
+                    f.kept_margin.to_string(),
+                    f.cost.to_string(),
+                ]
             };
-            format!(
-                "{},{},{},{},{},{}",
-                figures(&improvement.first),
-                figures(&improvement.improved),
-                improvement.lower_bound,
-                improvement.rounds,
-                improvement.work,
-                row.cut_by_time
-            )
+            let of_search = [
+                improvement.lower_bound.to_string(),
+                improvement.rounds.to_string(),
+                improvement.work.to_string(),
+                row.cut_by_time.to_string(),
+            ];
+            let of_plans = figures(&improvement.first).into_iter().chain(figures(&improvement.improved));
+            of_plans.chain(of_search).collect()
         }
-        None => ",".repeat(LEADING.len() - 1),
+        None => vec![String::new(); LEADING.len()],
     };
-    format!("{own},{}", csv::line(row))
+    csv::line_after(&own, row)
 }
 
 /// True when the file begins with the columns of [`header`]. Errors: as [`regrasp_base::files::read_text`].

@@ -28,6 +28,8 @@ pub mod row;
 pub mod suite;
 /// Smallest, median, mean and largest per scene and method.
 pub mod summary;
+/// Text for pages.
+mod text;
 
 pub use limits::Limits;
 pub use row::{Problem, Row, RunSettings, run};

@@ -2,8 +2,8 @@
 
 use crate::row::Problem;
 use regrasp_base::Rng;
+use regrasp_mutations::mutants;
 use regrasp_plan::Plan;
-use regrasp_plan::check::mutation::mutants;
 use regrasp_plan::check::{CheckSettings, check};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -50,9 +50,9 @@ impl Campaign {
     /// A plan that is rejected has no mutants: they would prove nothing.
     pub fn add(&mut self, problem: Problem, plan: &Plan, per_kind: u64) {
         let settings = CheckSettings::default();
-        let misjudged = |what: String| Misjudged { scene: problem.scene.name.clone(), seed: problem.seed, what };
+        let misjudged = |what: String| Misjudged { scene: problem.name(), seed: problem.seed, what };
         self.good += 1;
-        let report = check(problem.scene, Some(problem.query), plan, &settings);
+        let report = check(problem.in_state(), Some(problem.query), plan, &settings);
         if !report.accepted() {
             let first = report.violations.first().map_or(String::new(), ToString::to_string);
             self.false_alarms.push(misjudged(first));
@@ -62,13 +62,13 @@ impl Campaign {
             return;
         }
         let mut rng = Rng::keyed(problem.seed, "mutation campaign", 0);
-        for mutant in mutants(plan, problem.scene, &mut rng) {
+        for mutant in mutants(plan, problem.task, &mut rng) {
             let count = self.kinds.entry(mutant.name).or_default();
             if count.made >= per_kind {
                 continue;
             }
-            let scene = mutant.scene.as_ref().unwrap_or(problem.scene);
-            let report = check(scene, Some(problem.query), &mutant.plan, &settings);
+            let scene = mutant.scene.as_ref().unwrap_or(problem.task.scene);
+            let report = check((scene, problem.task.state), Some(problem.query), &mutant.plan, &settings);
             count.made += 1;
             count.rejected += u64::from(!report.accepted());
             let fits = report.violations.iter().any(|violation| mutant.expected.contains(&violation.kind));

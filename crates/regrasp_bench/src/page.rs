@@ -4,6 +4,7 @@ use crate::limits::Limits;
 use crate::roadmap::{self, GraphFacts};
 use crate::row::{Row, is_tracking};
 use crate::summary::{Spread, Summary, dash, gap, ms, summarise};
+use crate::text::escaped;
 use std::fmt::Write;
 
 /// Most misses that are listed per CSV file.
@@ -194,10 +195,6 @@ fn ratios(parts: &[(String, Vec<Row>)], out: &mut String) {
              | scene | classic | visibility | ratio |\n|---|---|---|---|\n{lines}"
         );
     }
-}
-
-pub(crate) fn escaped(text: &str) -> String {
-    regrasp_base::diagnostic::printable(text).replace('|', "\\|").replace('<', "&lt;").replace('\n', " ")
 }
 
 #[cfg(test)]

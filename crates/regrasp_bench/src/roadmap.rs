@@ -1,8 +1,8 @@
 //! Random queries on a roadmap: answer, judge, measure; and what a graph is like, for the page.
 
-use crate::page::escaped;
 use crate::row::{Problem, Row, RunSettings, measured, plan_only, status_of};
 use crate::summary::{Spread, ms};
+use crate::text::escaped;
 use cpu_time::{ProcessTime, ThreadTime};
 use regrasp_base::{Budget, Diagnostic, InputError, Place, files};
 use regrasp_plan::Plan;
@@ -43,8 +43,7 @@ fn answer(
     settings: &RunSettings,
     memory: &mut QueryMemory,
 ) -> (Row, Option<Plan>) {
-    let mut row =
-        Row { scene: problem.scene.name.clone(), method: "roadmap".into(), seed: problem.seed, ..Row::default() };
+    let mut row = Row { scene: problem.name(), method: "roadmap".into(), seed: problem.seed, ..Row::default() };
     let started = (Instant::now(), ThreadTime::now());
     let budget = Budget {
         max_work: settings.max_work,
@@ -52,7 +51,8 @@ fn answer(
         improve_for: None,
         cancelled: Arc::clone(&settings.cancelled),
     };
-    let outcome = planner.plan(problem.query, problem.seed, &budget, memory);
+    let query = problem.query.as_in_hand().expect("queries of roadmaps are in-hand queries");
+    let outcome = planner.plan(query, problem.seed, &budget, memory);
     row.plan_s = started.0.elapsed().as_secs_f64();
     row.plan_cpu_s = started.1.elapsed().as_secs_f64();
     match outcome {

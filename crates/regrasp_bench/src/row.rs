@@ -7,22 +7,37 @@ use regrasp_plan::plan::Improvement;
 use regrasp_plan::{Plan, format};
 use regrasp_planners::in_hand::{NotProven, validate_once};
 use regrasp_planners::{Failure, InHandSettings, PlannerSettings, Progress, TrackingMethod, TrackingSettings, plan};
-use regrasp_scene::{InHandQuery, Scene, TaskKind};
+use regrasp_scene::{HandView, Manipulation, Query, Scene, State};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-/// A scene and one query in it.
+/// One query in a scene.
 #[derive(Debug, Clone, Copy)]
 pub struct Problem<'a> {
-    /// Scene.
-    pub scene: &'a Scene,
+    /// The hand and the object of the query, in their scene.
+    pub task: Manipulation<'a>,
     /// Query of this seed.
-    pub query: &'a InHandQuery,
+    pub query: &'a Query,
     /// Seed.
     pub seed: u64,
+}
+
+impl<'a> Problem<'a> {
+    /// Name of the scene, with that of the task where the scene has several.
+    pub fn name(&self) -> String {
+        match self.query.name() {
+            "" => self.task.scene.name.clone(),
+            name => format!("{}:{name}", self.task.scene.name),
+        }
+    }
+
+    /// The scene, and where everything that the query does not name rests.
+    pub fn in_state(&self) -> (&'a Scene, &'a State) {
+        (self.task.scene, self.task.state)
+    }
 }
 
 /// How to run.
@@ -154,10 +169,10 @@ pub(crate) fn measured(
 /// Plans one seed: the plan, if there is one, is neither measured nor judged yet.
 pub(crate) fn plan_only(problem: Problem, settings: &RunSettings) -> (Row, Option<Plan>) {
     let mut row = Row {
-        scene: problem.scene.name.clone(),
-        method: match problem.query.task {
-            TaskKind::InHand => method_name(&settings.planner),
-            TaskKind::Tracking => settings.tracking.method.name().into(),
+        scene: problem.name(),
+        method: match problem.query {
+            Query::InHand(_) => method_name(&settings.planner),
+            Query::Tracking(_) => settings.tracking.method.name().into(),
         },
         seed: problem.seed,
         ..Row::default()
@@ -171,7 +186,7 @@ pub(crate) fn plan_only(problem: Problem, settings: &RunSettings) -> (Row, Optio
     };
     let silent = |_: Progress| {};
     let planner = PlannerSettings { in_hand: settings.planner.clone(), tracking: settings.tracking.clone() };
-    let outcome = plan(problem.scene, problem.query, &planner, problem.seed, &budget, &silent);
+    let outcome = plan(problem.in_state(), problem.query, &planner, problem.seed, &budget, &silent);
     row.plan_s = started.0.elapsed().as_secs_f64();
     // Other trials may run beside this one: only several threads of one search need the time of all.
     let cpu = if settings.planner.n_threads == 1 { started.2.elapsed() } else { started.1.elapsed() };
@@ -204,8 +219,8 @@ pub(crate) fn plan_only(problem: Problem, settings: &RunSettings) -> (Row, Optio
 pub(crate) fn measure(problem: Problem, plan: &Plan, settings: &InHandSettings, asked: Judge, row: &mut Row) {
     row.transfers = plan.statistics.transfers;
     row.relocations = plan.n_relocations();
-    if problem.query.task == TaskKind::InHand {
-        match floor(problem.scene, plan, settings) {
+    if problem.query.as_in_hand().is_some() {
+        match floor(&HandView::of(&problem.task), plan, settings) {
             Ok(seconds) => row.floor_s = Some(seconds),
             Err(not_proven) => row.cause = not_proven.to_string(),
         }
@@ -227,7 +242,7 @@ fn judge(problem: Problem, plan: &Plan, level: Level, row: &mut Row) {
     };
     let started = Instant::now();
     let settings = CheckSettings { level, ..CheckSettings::default() };
-    let report = check(problem.scene, Some(problem.query), &plan, &settings);
+    let report = check(problem.in_state(), Some(problem.query), &plan, &settings);
     row.check_s = Some(started.elapsed().as_secs_f64());
     row.accepted = Some(report.accepted());
     row.level = report.reached;
@@ -239,11 +254,11 @@ fn judge(problem: Problem, plan: &Plan, level: Level, row: &mut Row) {
 }
 
 /// Processor time to validate `plan` once at the planner's resolution, the least of three.
-fn floor(scene: &Scene, plan: &Plan, settings: &InHandSettings) -> Result<f64, NotProven> {
+fn floor(view: &HandView, plan: &Plan, settings: &InHandSettings) -> Result<f64, NotProven> {
     let mut least = f64::INFINITY;
     for _ in 0..3 {
         let started = ThreadTime::now();
-        validate_once(scene, plan, settings)?;
+        validate_once(view, plan, settings)?;
         least = least.min(started.elapsed().as_secs_f64());
     }
     Ok(least)

@@ -18,7 +18,7 @@ pub const METHODS: [&str; 5] = ["gait", "visibility", "classic", "tracking", "tr
 /// Plans how a multi-fingered hand turns an object, and judges plans independently.
 ///
 /// First steps: `regrasp demo`; for a hand of your own `regrasp inspect hand.urdf -o hand.toml`, then a scene file
-/// (docs/scene-format.md), `regrasp plan scene.toml -o plan.json`, `regrasp check plan.json`.
+/// (docs/reference/scene-format.md), `regrasp plan scene.toml -o plan.json`, `regrasp check plan.json`.
 #[derive(Debug, Parser)]
 #[command(name = "regrasp", version, max_term_width = 110, arg_required_else_help = true)]
 pub struct Arguments {
@@ -42,6 +42,9 @@ pub struct Common {
     /// No talk; errors are still shown
     #[arg(long, global = true)]
     pub quiet: bool,
+    /// Task of a scene that has several, by its name [default: the first; in bench: all]
+    #[arg(long = "task", value_name = "NAME", global = true)]
+    pub task: Option<String>,
     /// Drop what cannot be understood in robot files and list it, instead of refusing
     #[arg(long, global = true)]
     pub lenient: bool,

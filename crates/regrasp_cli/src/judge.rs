@@ -3,7 +3,8 @@
 use crate::args::{Common, Judging};
 use crate::load;
 use crate::stop::Stop;
-use crate::talk::{Talk, counted, duration, grouped};
+use crate::talk::Talk;
+use crate::words::{counted, duration, grouped};
 use regrasp::plan::check::{CheckSettings, Level, Report, check};
 use regrasp::plan::format;
 use regrasp::scene::{LoadedScene, load_scene};
@@ -32,9 +33,9 @@ pub fn judge_bytes(
 /// Judges a plan in a scene that was read for it, against the query of the plan's seed, and says what came of it.
 pub fn judge(loaded: &LoadedScene, plan: &regrasp::Plan, judging: &Judging, talk: &Talk) -> Result<Report, Stop> {
     let started = Instant::now();
-    let query = loaded.task.query(plan.seed);
+    let query = loaded.task_for(&plan.query).query(plan.seed);
     let settings = CheckSettings { level: judging.level(), ..CheckSettings::default() };
-    let report = check(&loaded.scene, Some(&query), plan, &settings);
+    let report = check((&loaded.scene, &loaded.state), Some(&query), plan, &settings);
     say(&report, plan.promises.tracking.is_some(), started.elapsed(), talk);
     Ok(report)
 }

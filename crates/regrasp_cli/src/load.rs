@@ -2,13 +2,15 @@
 
 use crate::args::{Common, Search};
 use crate::stop::Stop;
-use crate::talk::{Talk, counted, duration, grouped};
+use crate::talk::Talk;
+use crate::words::{counted, duration, grouped};
 use regrasp::base::{Diagnostic, Place};
 use regrasp::geometry::Shape;
 use regrasp::planners::FailureKind;
 use regrasp::robot::import::{LoadOptions, OUT_OF_TIME, ResolveOptions};
-use regrasp::scene::{LoadedScene, TaskKind, load_scene};
-use regrasp::{Failure, InHandSettings, InputError, PlannerSettings, Scene, TrackingSettings};
+use regrasp::scene::query::IN_HAND;
+use regrasp::scene::{LoadedScene, Task, load_scene};
+use regrasp::{Failure, InHandSettings, InputError, PlannerSettings, TrackingSettings};
 use serde_json::json;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -34,16 +36,44 @@ pub fn scene(path: &Path, common: &Common, talk: &Talk) -> Result<LoadedScene, S
     scene_by(path, common, None, talk)
 }
 
+/// As [`scene`], with the task that `plan` answers as its first.
+pub fn scene_of_plan(path: &Path, plan: &regrasp::Plan, common: &Common, talk: &Talk) -> Result<LoadedScene, Stop> {
+    read_scene(path, &plan.query, common, None, talk)
+}
+
 /// As [`scene`], but reading is given up when `deadline` has passed: there is no plan then.
 pub fn scene_by(path: &Path, common: &Common, deadline: Option<Instant>, talk: &Talk) -> Result<LoadedScene, Stop> {
+    read_scene(path, "", common, deadline, talk)
+}
+
+fn read_scene(
+    path: &Path,
+    plan_query: &str,
+    common: &Common,
+    deadline: Option<Instant>,
+    talk: &Talk,
+) -> Result<LoadedScene, Stop> {
     let started = Instant::now();
     let loaded = load_scene(path, &LoadOptions { deadline, ..options(common) }).map_err(in_time_or_no_plan)?;
+    let loaded = match &common.task {
+        Some(name) => choose(loaded, name, path)?,
+        None => loaded.for_query(plan_query),
+    };
     for note in &loaded.notes {
         talk.note(note);
     }
     let seconds = started.elapsed().as_secs_f64();
-    say_scene(&loaded.scene, seconds, talk);
+    say_scene(&loaded, seconds, talk);
     Ok(loaded)
+}
+
+/// The scene with the task asked for as its first. Errors: it has none of that name (`A508`).
+fn choose(loaded: LoadedScene, name: &str, path: &Path) -> Result<LoadedScene, Stop> {
+    let names: Vec<String> = loaded.tasks.iter().map(|task| format!("\"{}\"", task.name)).collect();
+    loaded.choosing(name).ok_or_else(|| {
+        let problem = format!("{} has no task \"{name}\"", path.display());
+        Stop::argument("A508", "--task", problem, &format!("one of {}", names.join(", ")))
+    })
 }
 
 /// Why reading stopped: bad input, or the time limit, within which no plan was found.
@@ -68,9 +98,11 @@ pub fn settings(search: &Search, n_threads: usize) -> Result<InHandSettings, Sto
     let file = search.settings.as_deref();
     let mut settings = planner_settings(file, search.method.as_deref(), search.margin, n_threads)?;
     match search.improve_work {
-        Some(work) => settings.improve_work = work,
+        Some(work) => settings.improvement.improve_work = work,
         // Time alone is to end it.
-        None if search.improve.is_some() && settings.improve_work == 0 => settings.improve_work = u64::MAX,
+        None if search.improve.is_some() && settings.improvement.improve_work == 0 => {
+            settings.improvement.improve_work = u64::MAX
+        }
         None => {}
     }
     Ok(settings)
@@ -78,8 +110,8 @@ pub fn settings(search: &Search, n_threads: usize) -> Result<InHandSettings, Sto
 
 /// Settings for a task of this kind: those of a tracking task are the file's, but for the method (`A507`: a flag that has no meaning
 /// there).
-pub fn for_task(task: TaskKind, search: &Search, n_threads: usize) -> Result<PlannerSettings, Stop> {
-    if task == TaskKind::InHand {
+pub fn for_task(task: &Task, search: &Search, n_threads: usize) -> Result<PlannerSettings, Stop> {
+    if task.kind_name() == IN_HAND {
         return Ok(PlannerSettings { in_hand: settings(search, n_threads)?, ..PlannerSettings::default() });
     }
     refuse_flags_of_in_hand(search)?;
@@ -103,9 +135,11 @@ fn refuse_flags_of_in_hand(search: &Search) -> Result<(), Stop> {
     ];
     match flags.into_iter().find(|(_, is_given, _)| *is_given) {
         None => Ok(()),
-        Some((flag, _, why)) => {
-            Err(not_for_tracking(flag, why, "leave it out; --settings has all of tracking (docs/tracking.md)"))
-        }
+        Some((flag, _, why)) => Err(not_for_tracking(
+            flag,
+            why,
+            "leave it out; --settings has all of tracking (docs/reference/tracking.md)",
+        )),
     }
 }
 
@@ -119,9 +153,9 @@ fn not_for_tracking(argument: &str, why: &str, fix: &str) -> Stop {
 /// Reads a scene, as [`scene`], that `what` can do something with in-hand tasks of only (`A507`).
 pub fn in_hand_scene(path: &Path, what: &str, common: &Common, talk: &Talk) -> Result<LoadedScene, Stop> {
     let loaded = scene(path, common, talk)?;
-    match loaded.task.kind {
-        TaskKind::InHand => Ok(loaded),
-        TaskKind::Tracking => {
+    match loaded.task().kind_name() {
+        IN_HAND => Ok(loaded),
+        _ => {
             let why = format!("{what} of in-hand tasks only ({})", path.display());
             Err(not_for_tracking("SCENE", &why, "name another scene; regrasp plan and bench plan this one"))
         }
@@ -141,7 +175,7 @@ pub fn planner_settings(
         settings.method = method_named(name)?;
     }
     if let Some(margin) = margin {
-        settings.closure_margin = margin;
+        settings.physics.closure_margin = margin;
     }
     match settings.validate() {
         Ok(()) => Ok(settings),
@@ -186,9 +220,10 @@ fn settings_error(path: &Path, line: usize, column: usize, problem: &str) -> Sto
 }
 
 /// Says what a scene is made of.
-fn say_scene(scene: &Scene, seconds: f64, talk: &Talk) {
-    let hand = &scene.hand;
-    let n_mimic = hand.robot.joints.iter().filter(|joint| joint.mimic.is_some()).count();
+fn say_scene(loaded: &LoadedScene, seconds: f64, talk: &Talk) {
+    let (scene, task) = (&loaded.scene, loaded.manipulation());
+    let hand = task.hand();
+    let n_mimic = hand.robot.joints.iter().filter(|joint| joint.coupling.is_some()).count();
     let n_shapes = hand.palm.len() + hand.fingers.iter().map(|finger| finger.shapes.len()).sum::<usize>();
     talk.say(format!(
         "hand   {}   {} ({n_mimic} mimic)   {}   {}   loaded in {}",
@@ -198,7 +233,7 @@ fn say_scene(scene: &Scene, seconds: f64, talk: &Talk) {
         counted(n_shapes, "collision shape"),
         duration(seconds),
     ));
-    let object = &scene.object;
+    let object = task.object();
     talk.say(format!(
         "object {}   {}   {:.3} kg   friction {}",
         object.name,
@@ -206,8 +241,18 @@ fn say_scene(scene: &Scene, seconds: f64, talk: &Talk) {
         object.mass,
         object.friction
     ));
-    if !scene.obstacles.is_empty() {
-        talk.say(format!("world  {}", counted(scene.obstacles.len(), "obstacle")));
+    let others = [
+        (scene.hands.len() - 1, "other hand"),
+        (scene.objects.len() - 1, "other object"),
+        (scene.supports.len(), "support"),
+        (scene.obstacles.len(), "obstacle"),
+    ];
+    let others: Vec<String> = others.iter().filter(|(n, _)| *n > 0).map(|&(n, what)| counted(n, what)).collect();
+    if !others.is_empty() {
+        talk.say(format!("world  {}", others.join(", ")));
+    }
+    if loaded.tasks.len() > 1 {
+        talk.say(format!("task   \"{}\", one of {}", loaded.task().name, loaded.tasks.len()));
     }
     talk.event(
         "loaded",
@@ -219,6 +264,11 @@ fn say_scene(scene: &Scene, seconds: f64, talk: &Talk) {
             "object": object.name,
             "shape": object.shape.kind(),
             "obstacles": scene.obstacles.len(),
+            "task": loaded.task().name,
+            "tasks": loaded.tasks.iter().map(|task| task.name.as_str()).collect::<Vec<_>>(),
+            "hands": scene.hands.iter().map(|hand| hand.name.as_str()).collect::<Vec<_>>(),
+            "objects": scene.objects.iter().map(|object| object.name.as_str()).collect::<Vec<_>>(),
+            "supports": scene.supports.iter().map(|support| support.body.name.as_str()).collect::<Vec<_>>(),
             "seconds": seconds,
             "inputs": scene.inputs.iter().map(|input| json!({
                 "role": input.role, "name": input.name, "path": input.path, "sha256": input.sha256,

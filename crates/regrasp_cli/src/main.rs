@@ -6,6 +6,8 @@
 mod args;
 /// One file per command.
 mod commands;
+/// Failures for people.
+mod failure_text;
 /// Ctrl-C, SIGTERM, and the promise to stop within 100 ms.
 mod interrupt;
 /// What the checker said, in words and as an event.
@@ -22,6 +24,8 @@ mod progress;
 mod stop;
 /// Data to stdout, talk to stderr.
 mod talk;
+/// Numbers in words.
+mod words;
 
 use clap::Parser;
 use regrasp::base::{Diagnostic, Place};

@@ -1,14 +1,15 @@
 //! Pages for a browser.
 
 use crate::stop::Stop;
-use crate::talk::{Talk, grouped};
+use crate::talk::Talk;
+use crate::words::grouped;
 use regrasp::base::files;
+use regrasp::pictures::{failure_facts, failure_story, reached_story};
 use regrasp::plan::check::Report;
 use regrasp::robot::ResolveOptions;
-use regrasp::told;
 use regrasp::viewer::page;
 use regrasp::viewer::story::{Outcome, RoadmapStory, Story, Telling, tell};
-use regrasp::{Failure, InHandQuery, Plan, Scene};
+use regrasp::{Failure, Manipulation, Plan, Query};
 use serde_json::json;
 use std::path::Path;
 
@@ -16,15 +17,15 @@ use std::path::Path;
 #[derive(Debug)]
 pub struct Page<'a> {
     path: &'a Path,
-    scene: &'a Scene,
-    query: &'a InHandQuery,
+    task: Manipulation<'a>,
+    query: &'a Query,
     packages: &'a ResolveOptions,
 }
 
 impl<'a> Page<'a> {
     /// A page at `path`; visual meshes are looked for in `packages`.
-    pub fn new(path: &'a Path, scene: &'a Scene, query: &'a InHandQuery, packages: &'a ResolveOptions) -> Self {
-        Page { path, scene, query, packages }
+    pub fn new(path: &'a Path, task: Manipulation<'a>, query: &'a Query, packages: &'a ResolveOptions) -> Self {
+        Page { path, task, query, packages }
     }
 
     /// Writes the page of a plan, whatever the checker said of it.
@@ -34,9 +35,9 @@ impl<'a> Page<'a> {
 
     /// Writes the page of a failure.
     pub fn write_failure(&self, failure: &Failure, talk: &Talk) -> Result<(), Stop> {
-        let outcome = Outcome::Failed(told::failure_story(failure));
-        let reached = told::reached_story(failure, &self.query.world_from_object_goal);
-        write(self.path, &self.story(outcome, told::failure_facts(failure), reached)?, talk)
+        let outcome = Outcome::Failed(failure_story(failure));
+        let reached = reached_story(failure, self.query.goal());
+        write(self.path, &self.story(outcome, failure_facts(failure), reached)?, talk)
     }
 
     fn story(
@@ -46,7 +47,7 @@ impl<'a> Page<'a> {
         roadmap: Option<RoadmapStory>,
     ) -> Result<Story, Stop> {
         let telling = Telling {
-            scene: self.scene,
+            task: self.task,
             query: Some(self.query),
             outcome,
             title: None,

@@ -1,6 +1,7 @@
 //! What is printed while a search runs: one line per interval, no carriage returns.
 
-use crate::talk::{Talk, grouped};
+use crate::talk::Talk;
+use crate::words::grouped;
 use regrasp::planners::Progress;
 use serde_json::json;
 use std::sync::Mutex;

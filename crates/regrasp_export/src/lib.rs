@@ -1,4 +1,4 @@
-//! Plans in the formats of other tools. Knows no planner; `docs/export-formats.md` describes what is written.
+//! Plans in the formats of other tools. Knows no planner; `docs/reference/export-formats.md` describes what is written.
 //!
 //! Everything written is a function of the plan alone: the same plan gives the same bytes.
 

@@ -1,5 +1,10 @@
 //! Convex hulls with adjacency, for support queries.
 
+/// As parry computes it.
+mod quick;
+
+pub use quick::convex_hull;
+
 use crate::frame::{Point, Vector};
 
 /// A convex polyhedron. Every point it was built from lies inside it within `1e-9` of its size.
@@ -47,7 +52,7 @@ impl ConvexHull {
 
     /// The hull itself, whatever the number of points.
     fn exact(points: &[Point]) -> Result<Self, HullError> {
-        let (vertices, triangles) = crate::reference::convex_hull(points)?;
+        let (vertices, triangles) = quick::convex_hull(points)?;
         ConvexHull::from_polyhedron(vertices, triangles, &PointTree::new(points))
     }
 
@@ -69,7 +74,7 @@ impl ConvexHull {
         extreme.sort_unstable();
         extreme.dedup();
         let extreme: Vec<Point> = extreme.into_iter().map(|i| tree.points[i]).collect();
-        let (mut vertices, triangles) = crate::reference::convex_hull(&extreme)?;
+        let (mut vertices, triangles) = quick::convex_hull(&extreme)?;
         let center = Point::from(vertices.iter().map(|v| v.coords).sum::<Vector>() / vertices.len() as f64);
         let mut scale: f64 = 1.0;
         for corners in &triangles {

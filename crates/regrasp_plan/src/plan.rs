@@ -1,4 +1,4 @@
-//! The plan and its parts. `docs/plan-format.md` and `schema/plan.schema.json` say the same.
+//! The plan and its parts. `docs/reference/plan-format.md` and `schema/plan.schema.json` say the same.
 //!
 //! Between two waypoints every joint follows the cubic through positions, velocities and times. The object's pose moves as
 //! `interpolate_pose` says, with the joints' progress along their chord as its parameter. Contact forces are linear in that
@@ -10,7 +10,9 @@ use serde::{Deserialize, Serialize};
 /// Value of [`Plan::format`].
 pub const FORMAT: &str = "regrasp-plan";
 /// Value of [`Plan::format_version`] that this version writes.
-pub const FORMAT_VERSION: u32 = 2;
+pub const FORMAT_VERSION: u32 = 3;
+/// Hand and object of plans that name none: those of format version 2, and of scenes with one of each.
+pub const ONLY_HAND: &str = "hand";
 
 /// A pose on disk.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -84,7 +86,7 @@ impl ContactMode {
 }
 
 /// Contact of one finger at one waypoint.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ContactState {
     /// What the finger does.
@@ -148,7 +150,7 @@ impl ContactState {
 }
 
 /// The state of hand and object at one moment.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Waypoint {
     /// When, in seconds from the start.
@@ -202,7 +204,7 @@ pub enum SegmentKind {
 }
 
 /// A piece of motion.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Segment {
     /// Its kind.
@@ -213,6 +215,9 @@ pub struct Segment {
     /// In tracking, other fingers that move at the same time, where there are some.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub also_moving: Vec<String>,
+    /// Who holds the object: names of hands and supports of the scene.
+    #[serde(skip)]
+    pub held_by: Vec<String>,
     /// In tracking, the resting finger that the object rolls on without sliding (paper 003, section 6.1.2: `F_t`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rolling_finger: Option<String>,
@@ -225,7 +230,8 @@ impl Segment {
     /// A transfer along `waypoints`.
     pub fn transfer(waypoints: Vec<Waypoint>) -> Self {
         let (moving_finger, rolling_finger) = (None, None);
-        Segment { kind: SegmentKind::Transfer, moving_finger, also_moving: Vec::new(), rolling_finger, waypoints }
+        let (also_moving, held_by) = (Vec::new(), Vec::new());
+        Segment { kind: SegmentKind::Transfer, moving_finger, also_moving, held_by, rolling_finger, waypoints }
     }
 
     /// Names of all fingers that it says move.
@@ -342,7 +348,7 @@ pub struct ForcePromises {
     /// Mass of the object, in kilograms.
     pub mass: f64,
     /// Gravity in the world, in metres per second squared; absent when the grasp holds whatever its direction: forces then
-    /// balance no weight, and leave room for that of every direction (`docs/plan-format.md`, forces).
+    /// balance no weight, and leave room for that of every direction (`docs/reference/plan-format.md`, forces).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gravity_in_world: Option<[f64; 3]>,
     /// Least and largest normal force of a finger that holds, in newtons.
@@ -413,8 +419,11 @@ pub struct PlanFigures {
     pub cost: f64,
 }
 
-/// A plan: how to take the object from start to goal.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// A plan: how a hand takes an object from start to goal. All else of the scene rests meanwhile.
+///
+/// [`crate::format`] reads and writes plan files. Serde alone gives the shape of format version 2, which names no task, hand, object
+/// or holder.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plan {
     /// Always `regrasp-plan`.
@@ -425,6 +434,15 @@ pub struct Plan {
     pub tool: String,
     /// Kind of task: `in_hand` or `tracking`.
     pub task: String,
+    /// Name of the task in the scene file; empty where the file has only one.
+    #[serde(skip)]
+    pub query: String,
+    /// Name of the hand that moves the object.
+    #[serde(skip)]
+    pub hand: String,
+    /// Name of the object that is moved; empty in plans of format version 2, which name none.
+    #[serde(skip)]
+    pub object: String,
     /// Method that planned it.
     pub method: String,
     /// Seed.

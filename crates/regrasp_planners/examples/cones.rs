@@ -1,4 +1,4 @@
-//! What pyramids of four sides lose against the exact friction cones, in tracking: `docs/tracking.md` has the table.
+//! What pyramids of four sides lose against the exact friction cones, in tracking: `docs/reference/tracking.md` has the table.
 //!
 //!     cargo run --release -p regrasp_planners --example cones
 //!
@@ -9,9 +9,9 @@
 use regrasp_base::{Budget, Rng};
 use regrasp_geometry::{Point, Vector};
 use regrasp_grasp::wrench::ForceLimits;
+use regrasp_planners::TrackingSettings;
 use regrasp_planners::tracking::forces::{Load, Pressing, balance};
 use regrasp_planners::tracking::{Cones, plan_tracking};
-use regrasp_planners::{InHandSettings, TrackingSettings};
 use regrasp_robot::import::LoadOptions;
 use regrasp_scene::load_scene;
 use std::error::Error;
@@ -108,9 +108,9 @@ fn ask(grasp: &Grasp, load: &Load, counts: &mut Counts) {
 fn main() -> Result<(), Box<dyn Error>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/football.toml");
     let loaded = load_scene(&path, &LoadOptions::default())?;
-    let object = &loaded.scene.object;
+    let object = &loaded.scene.objects[0];
     let settings = TrackingSettings::default();
-    let InHandSettings { forces: Some(forces), .. } = settings.in_hand else { return Err("no forces".into()) };
+    let Some(forces) = settings.in_hand.physics.forces else { return Err("no forces".into()) };
     let [least, largest] = forces.normal_force;
     let load = Load {
         weight: Vector::zeros(),
@@ -128,8 +128,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut along_plans = Counts::default();
     for seed in 0..PLANS {
         let budget = Budget::work(10_000_000);
-        let plan = plan_tracking(&loaded.scene, &loaded.task.query(seed), &settings, seed, &budget, &|_| {})
-            .map_err(|failure| failure.message)?;
+        let plan = plan_tracking(
+            &loaded.view(),
+            loaded.task().query(seed).as_tracking().unwrap(),
+            &settings,
+            seed,
+            &budget,
+            &|_| {},
+        )
+        .map_err(|failure| failure.message)?;
         for waypoint in plan.segments.iter().flat_map(|segment| &segment.waypoints) {
             let point = |state: &regrasp_plan::plan::ContactState| {
                 Some((Point::from(state.point_in_object?), Vector::from(state.normal_in_object?)))

@@ -2,23 +2,24 @@
 //!
 //! A planner is a free function of scene, query, settings, seed and budget that returns a plan or says why not.
 
-/// Why no plan was found.
-pub mod failure;
 /// In-hand manipulation by grasp subspaces (papers 000 and 004).
 pub mod in_hand;
-/// What a graph of grasps looks like.
-pub mod outline;
+/// Settings of the in-hand planner, which tracking has too.
+pub mod settings;
 /// Finger tracking (paper 003).
 pub mod tracking;
 
-pub use failure::{Cause, Failure, FailureKind, NearestMiss};
-pub use in_hand::{InHandSettings, Method, Progress, plan_in_hand};
-pub use outline::{Outline, OutlineEdge, OutlineNode};
+pub use in_hand::plan_in_hand;
+pub use regrasp_manipulation::failure::{Cause, Failure, FailureKind, NearestMiss};
+pub use regrasp_manipulation::outline::{Outline, OutlineEdge, OutlineNode};
+pub use regrasp_manipulation::progress::Progress;
+pub use regrasp_manipulation::{failure, outline};
+pub use settings::{InHandSettings, Method};
 pub use tracking::{TrackingMethod, TrackingSettings, plan_tracking};
 
 use regrasp_base::Budget;
 use regrasp_plan::Plan;
-use regrasp_scene::{InHandQuery, Scene, TaskKind};
+use regrasp_scene::{HandView, Manipulation, Query, Scene, State};
 
 /// Settings for every kind of task.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -29,19 +30,21 @@ pub struct PlannerSettings {
     pub tracking: TrackingSettings,
 }
 
-/// Plans `query` with the planner of its task: [`plan_in_hand`] or [`plan_tracking`].
+/// Plans `query` with the planner of its task: [`plan_in_hand`] or [`plan_tracking`]. All that the query does not name rests in
+/// `state`.
 ///
-/// Panics if the settings of that planner do not validate. Errors: as that planner.
+/// Errors: as that planner.
 pub fn plan(
-    scene: &Scene,
-    query: &InHandQuery,
+    (scene, state): (&Scene, &State),
+    query: &Query,
     settings: &PlannerSettings,
     seed: u64,
     budget: &Budget,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Plan, Failure> {
-    match query.task {
-        TaskKind::InHand => plan_in_hand(scene, query, &settings.in_hand, seed, budget, progress),
-        TaskKind::Tracking => plan_tracking(scene, query, &settings.tracking, seed, budget, progress),
+    let view = HandView::of(&Manipulation::of(scene, state, query));
+    match query {
+        Query::InHand(query) => plan_in_hand(&view, query, &settings.in_hand, seed, budget, progress),
+        Query::Tracking(query) => plan_tracking(&view, query, &settings.tracking, seed, budget, progress),
     }
 }

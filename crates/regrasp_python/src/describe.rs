@@ -3,10 +3,10 @@
 use regrasp::geometry::{Pose, Shape};
 use regrasp::plan::plan::PoseData;
 use regrasp::robot::hand::Finger;
-use regrasp::robot::robot::{Joint, JointKind, Limits};
+use regrasp::robot::robot::{Joint, JointId, JointKind, Limits};
 use regrasp::robot::tip::TipShape;
 use regrasp::robot::{ContactModel, Hand};
-use regrasp::scene::{Gravity, InHandQuery, InputFile, LoadedScene, Object, Obstacle};
+use regrasp::scene::{Gravity, InputFile, LoadedScene, Object, Obstacle, Query, SceneHand};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -16,8 +16,8 @@ pub fn scene(loaded: &LoadedScene, path: &Path) -> Value {
     json!({
         "name": scene.name,
         "path": path.to_string_lossy(),
-        "hand": hand(&scene.hand),
-        "object": object(&scene.object),
+        "hand": placed_hand(&scene.hands[0]),
+        "object": object(&scene.objects[0]),
         "gravity": scene.gravity.as_ref().map(gravity),
         "obstacles": scene.obstacles.iter().map(obstacle).collect::<Vec<_>>(),
         "inputs": scene.inputs.iter().map(input).collect::<Vec<_>>(),
@@ -26,15 +26,22 @@ pub fn scene(loaded: &LoadedScene, path: &Path) -> Value {
 }
 
 /// The poses of a query.
-pub fn query(query: &InHandQuery) -> Value {
+pub fn query(query: &Query) -> Value {
     json!({
-        "start": pose(&query.world_from_object_start),
-        "way": query.world_from_object_way.iter().map(pose).collect::<Vec<_>>(),
-        "goal": pose(&query.world_from_object_goal),
+        "start": pose(query.start()),
+        "way": query.way().iter().map(pose).collect::<Vec<_>>(),
+        "goal": pose(query.goal()),
     })
 }
 
-/// A hand.
+/// A hand in its scene.
+fn placed_hand(placed: &SceneHand) -> Value {
+    let mut value = hand(&placed.hand);
+    value["world_from_base"] = pose(&placed.world_from_hand);
+    value
+}
+
+/// A hand by itself.
 pub fn hand(hand: &Hand) -> Value {
     let mut joints = Vec::new();
     for finger in &hand.fingers {
@@ -53,19 +60,23 @@ pub fn hand(hand: &Hand) -> Value {
             }));
         }
     }
+    let name_of = |leader: &JointId| &hand.robot.joints[leader.0].name;
     let coupled = hand.robot.joints.iter().filter_map(|joint| {
-        let mimic = joint.mimic?;
+        let coupling = joint.coupling.as_ref()?;
+        let mut leaders = coupling.terms.iter().map(|(leader, multiplier)| (name_of(leader), multiplier));
+        let (follows, multiplier) = leaders.next()?;
         Some(json!({
             "name": joint.name,
-            "follows": hand.robot.joints[mimic.joint.0].name,
-            "multiplier": mimic.multiplier,
-            "offset": mimic.offset,
+            "follows": follows,
+            "multiplier": multiplier,
+            "offset": coupling.offset,
+            "others": leaders.collect::<Vec<_>>(),
         }))
     });
     json!({
         "name": hand.robot.name,
         "base_link": hand.robot.links[hand.base.0].name,
-        "world_from_base": pose(&hand.world_from_base),
+        "world_from_base": pose(&Pose::identity()),
         "joints": joints,
         "coupled_joints": coupled.collect::<Vec<_>>(),
         "fingers": hand.fingers.iter().map(|finger| self::finger(hand, finger)).collect::<Vec<_>>(),

@@ -35,7 +35,7 @@ pub fn guarded<T>(py: Python<'_>, work: impl FnOnce() -> PyResult<T>) -> PyResul
 pub fn panic_for_tests(py: Python<'_>, message: &str, in_search: bool) -> PyResult<()> {
     guarded(py, || {
         if in_search {
-            return crate::search::watched(py, None, |_, _| panic!("{message}"));
+            return crate::watch::watched(py, None, |_, _| panic!("{message}"));
         }
         panic!("{message}")
     })

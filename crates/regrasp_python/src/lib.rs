@@ -17,6 +17,8 @@ mod plan;
 mod search;
 /// Pages of plans.
 mod view;
+/// Searches that the interpreter watches.
+mod watch;
 
 use pyo3::prelude::*;
 

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use regrasp::base::{Diagnostic, Place};
 use regrasp::robot::import::{LoadOptions, ResolveOptions, load_hand};
-use regrasp::scene::{Gravity, LoadedScene, load_scene};
+use regrasp::scene::{Gravity, LoadedScene, Task, load_scene};
 use std::path::{Path, PathBuf};
 
 /// How files are read, as the package passes it: packages by name and folder, folders to search, lenient.
@@ -46,7 +46,9 @@ fn read(
     let gravity = match gravity {
         None => return Ok(loaded),
         Some(GravityInHand::Word(word)) => (word == "any").then_some(Gravity::Any),
-        Some(GravityInHand::Direction(down)) => Gravity::in_hand(&loaded.scene.hand, &(*down).into()),
+        Some(GravityInHand::Direction(down)) => {
+            Gravity::along(&loaded.manipulation().world_from_hand(), &(*down).into())
+        }
     };
     let Some(gravity) = gravity else {
         let diagnostic = Diagnostic::new("A503", Place::file("regrasp.load_scene"), "is no direction");
@@ -60,6 +62,15 @@ impl Scene {
     /// The same scene, read afresh: the checker starts from files.
     pub fn read_again(&self) -> Result<LoadedScene, regrasp::InputError> {
         read(&self.path, &self.options, self.gravity.as_ref())
+    }
+
+    /// The task of this name; the first where none is asked for. Errors: there is none of that name (`A508`).
+    pub fn task(&self, py: Python<'_>, name: Option<&str>) -> PyResult<&Task> {
+        let Some(name) = name else { return Ok(self.loaded.task()) };
+        self.loaded.task_named(name).ok_or_else(|| {
+            let names: Vec<&str> = self.loaded.tasks.iter().map(|task| task.name.as_str()).collect();
+            error::argument(py, "scene", "task", format!("is \"{name}\""), &format!("one of {}", names.join(", ")))
+        })
     }
 
     /// Where its packages are.
@@ -92,13 +103,14 @@ impl Scene {
     }
 
     /// The poses that the query of `seed` asks for, from start to goal, as JSON.
-    fn query(&self, py: Python<'_>, seed: u64) -> PyResult<String> {
-        guarded(py, || Ok(describe::query(&self.loaded.task.query(seed)).to_string()))
+    #[pyo3(signature = (seed, task=None))]
+    fn query(&self, py: Python<'_>, seed: u64, task: Option<&str>) -> PyResult<String> {
+        guarded(py, || Ok(describe::query(&self.task(py, task)?.query(seed)).to_string()))
     }
 
     /// Tip centres in the world, as [`Hand::tips`] gives them.
     fn tips<'py>(&self, py: Python<'py>, joints: &[u8]) -> PyResult<Bound<'py, PyBytes>> {
-        guarded(py, || tips(py, &self.loaded.scene.hand, joints))
+        guarded(py, || tips(py, &self.loaded.scene.hands[0].hand, joints))
     }
 }
 

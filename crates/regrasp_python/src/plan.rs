@@ -66,7 +66,8 @@ impl Plan {
     /// The MuJoCo model of `scene` with a keyframe per waypoint, and where it differs from the scene.
     fn to_mjcf(&self, py: Python<'_>, scene: &Scene) -> PyResult<(String, Vec<String>)> {
         guarded(py, || {
-            let model = py.detach(|| to_mjcf(&scene.loaded.scene, &self.plan));
+            let model = py
+                .detach(|| to_mjcf(&scene.loaded.manipulation_of(scene.loaded.task_for(&self.plan.query)), &self.plan));
             let model = model
                 .map_err(|wrong| error::argument(py, "export_mjcf", "scene", wrong.to_string(), "the plan's scene"))?;
             Ok((model.xml, model.notes))

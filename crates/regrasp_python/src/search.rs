@@ -4,22 +4,17 @@ use crate::error;
 use crate::guard::guarded;
 use crate::model::Scene;
 use crate::plan::Plan;
+use crate::watch::watched;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 use regrasp::base::{Diagnostic, Place};
 use regrasp::plan::check::{CheckSettings, Level, Report};
 use regrasp::plan::format;
-use regrasp::planners::Progress;
-use regrasp::scene::TaskKind;
+use regrasp::scene::Task;
+use regrasp::scene::query::IN_HAND;
 use regrasp::{Budget, Failure, InHandSettings, PlannerSettings, TrackingSettings};
 use serde_json::json;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
-
-/// How often a waiting caller looks for signals and progress.
-const LISTEN_EVERY: Duration = Duration::from_millis(20);
 
 /// What is asked of a search, beside scene and settings; see `regrasp.plan`.
 #[derive(FromPyObject)]
@@ -35,6 +30,7 @@ pub struct Request {
     improve_work: Option<u64>,
     settings: Option<String>,
     level: String,
+    task: Option<String>,
     progress: Option<Py<PyAny>>,
 }
 
@@ -42,17 +38,24 @@ pub struct Request {
 #[pyfunction]
 pub fn plan(py: Python<'_>, scene: &Scene, request: Request) -> PyResult<(Option<Plan>, String)> {
     guarded(py, || {
-        let task = scene.loaded.task.kind;
+        let task = scene.task(py, request.task.as_deref())?;
         let level = level_named(&request.level).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
         let settings = settings(task, &request).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
-        let query = scene.loaded.task.query(request.seed);
+        let query = task.query(request.seed);
         let started = Instant::now();
         let seconds = |value: Option<f64>| value.map(Duration::from_secs_f64);
         let (deadline, improve_for) =
             (seconds(request.time_limit).map(|limit| started + limit), seconds(request.improve));
         let found = watched(py, request.progress.as_ref(), |cancelled, report| {
             let budget = Budget { max_work: request.max_work, deadline, improve_for, cancelled };
-            regrasp::planners::plan(&scene.loaded.scene, &query, &settings, request.seed, &budget, report)
+            regrasp::planners::plan(
+                (&scene.loaded.scene, &scene.loaded.state),
+                &query,
+                &settings,
+                request.seed,
+                &budget,
+                report,
+            )
         })?;
         let plan = match found {
             Ok(plan) => plan,
@@ -73,9 +76,9 @@ pub fn check(py: Python<'_>, plan: &Plan, scene: &Scene, level: &str) -> PyResul
     guarded(py, || {
         let level = level_named(level).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
         let judged = py.detach(|| {
-            let query = scene.loaded.task.query(plan.plan.seed);
+            let query = scene.loaded.task_for(&plan.plan.query).query(plan.plan.seed);
             let settings = CheckSettings { level, ..CheckSettings::default() };
-            regrasp::plan::check::check(&scene.loaded.scene, Some(&query), &plan.plan, &settings)
+            regrasp::plan::check::check((&scene.loaded.scene, &scene.loaded.state), Some(&query), &plan.plan, &settings)
         });
         Ok(report(&judged))
     })
@@ -98,9 +101,9 @@ fn judged_as_written(
     let plan = format::from_json(Path::new("plan.json"), format::to_json(plan).as_bytes())
         .expect("a plan just made is a plan file");
     let again = scene.read_again()?;
-    let query = again.task.query(plan.seed);
+    let query = again.task_for(&plan.query).query(plan.seed);
     let settings = CheckSettings { level, ..CheckSettings::default() };
-    let report = regrasp::plan::check::check(&again.scene, Some(&query), &plan, &settings);
+    let report = regrasp::plan::check::check((&again.scene, &again.state), Some(&query), &plan, &settings);
     Ok((plan, report))
 }
 
@@ -131,10 +134,10 @@ fn given<T: Default + serde::de::DeserializeOwned>(request: &Request) -> Result<
 }
 
 /// Settings for a task of this kind: those of a tracking task are the given ones, but for the method.
-fn settings(task: TaskKind, request: &Request) -> Result<PlannerSettings, Diagnostic> {
-    match task {
-        TaskKind::InHand => Ok(PlannerSettings { in_hand: in_hand(request)?, ..PlannerSettings::default() }),
-        TaskKind::Tracking => {
+fn settings(task: &Task, request: &Request) -> Result<PlannerSettings, Diagnostic> {
+    match task.kind_name() {
+        IN_HAND => Ok(PlannerSettings { in_hand: in_hand(request)?, ..PlannerSettings::default() }),
+        _ => {
             refuse_arguments_of_in_hand(request)?;
             let mut tracking: TrackingSettings = given(request)?;
             if let Some(method) = &request.method {
@@ -158,7 +161,7 @@ fn refuse_arguments_of_in_hand(request: &Request) -> Result<(), Diagnostic> {
         Some((argument, _, why)) => Err(bad("A507", format!("is not for a task of kind \"tracking\": {why}"))
             .element("argument", argument)
             .expected("a task of kind \"in_hand\"")
-            .fix("leave it out; `settings` has all of tracking (docs/tracking.md)")),
+            .fix("leave it out; `settings` has all of tracking (docs/reference/tracking.md)")),
     }
 }
 
@@ -179,12 +182,14 @@ fn in_hand(request: &Request) -> Result<InHandSettings, Diagnostic> {
         settings.method = method_named(method)?;
     }
     if let Some(margin) = request.margin {
-        settings.closure_margin = margin;
+        settings.physics.closure_margin = margin;
     }
     match request.improve_work {
-        Some(work) => settings.improve_work = work,
+        Some(work) => settings.improvement.improve_work = work,
         // Time alone is to end it.
-        None if request.improve.is_some() && settings.improve_work == 0 => settings.improve_work = u64::MAX,
+        None if request.improve.is_some() && settings.improvement.improve_work == 0 => {
+            settings.improvement.improve_work = u64::MAX
+        }
         None => {}
     }
     settings.validate().map_err(|problem| bad("A503", problem).element("argument", "settings"))?;
@@ -217,59 +222,4 @@ fn report(report: &Report) -> String {
         entry["text"] = violation.to_string().into();
     }
     value.to_string()
-}
-
-/// Runs `work` on a thread of its own, without the interpreter's lock, while this one tells `listener` of progress and hears
-/// signals. What the listener or a signal handler raises stops the search, and is raised.
-pub fn watched<T: Send>(
-    py: Python<'_>,
-    listener: Option<&Py<PyAny>>,
-    work: impl FnOnce(Arc<AtomicBool>, &(dyn Fn(Progress) + Sync)) -> T + Send,
-) -> PyResult<T> {
-    let cancelled = Arc::new(AtomicBool::new(false));
-    let latest = Mutex::new(None);
-    py.detach(|| {
-        std::thread::scope(|scope| {
-            let (ended, end) = mpsc::channel::<()>();
-            let flag = Arc::clone(&cancelled);
-            let worker = scope.spawn(|| {
-                // Dropped at the end, also when `work` panics.
-                let _ended = ended;
-                work(flag, &|progress| {
-                    if let Ok(mut latest) = latest.lock() {
-                        *latest = Some(progress);
-                    }
-                })
-            });
-            let mut raised = None;
-            loop {
-                let is_over = end.recv_timeout(LISTEN_EVERY) != Err(mpsc::RecvTimeoutError::Timeout);
-                if raised.is_none()
-                    && let Err(error) = Python::attach(|py| listen(py, listener, &latest))
-                {
-                    cancelled.store(true, Ordering::Relaxed);
-                    raised = Some(error);
-                }
-                if is_over {
-                    break;
-                }
-            }
-            let result = worker.join().unwrap_or_else(|payload| std::panic::resume_unwind(payload));
-            raised.map_or(Ok(result), Err)
-        })
-    })
-}
-
-/// Runs signal handlers (on the main thread), and tells the listener of the latest progress, if it has not heard of it.
-fn listen(py: Python<'_>, listener: Option<&Py<PyAny>>, latest: &Mutex<Option<Progress>>) -> PyResult<()> {
-    py.check_signals()?;
-    let news = latest.lock().ok().and_then(|mut latest| latest.take());
-    let (Some(listener), Some(progress)) = (listener, news) else { return Ok(()) };
-    let fields = PyDict::new(py);
-    fields.set_item("nodes", progress.nodes)?;
-    fields.set_item("work", progress.work)?;
-    fields.set_item("restarts", progress.restarts)?;
-    fields.set_item("angle_left", progress.angle_left)?;
-    listener.call1(py, (fields,))?;
-    Ok(())
 }

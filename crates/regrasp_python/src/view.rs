@@ -15,10 +15,11 @@ pub fn page(py: Python<'_>, plan: &Plan, scene: &Scene, title: Option<String>) -
     guarded(py, || {
         let made = py.detach(|| {
             let loaded = &scene.loaded;
-            let query = loaded.task.query(plan.plan.seed);
-            let report = check(&loaded.scene, Some(&query), &plan.plan, &CheckSettings::default());
+            let task = loaded.task_for(&plan.plan.query);
+            let query = task.query(plan.plan.seed);
+            let report = check((&loaded.scene, &loaded.state), Some(&query), &plan.plan, &CheckSettings::default());
             let telling = Telling {
-                scene: &loaded.scene,
+                task: loaded.manipulation_of(task),
                 query: None,
                 outcome: Outcome::Planned { plan: &plan.plan, report: &report },
                 title: title.as_deref(),

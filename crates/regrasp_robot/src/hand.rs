@@ -4,13 +4,13 @@ use crate::kinematics::chain::Chain;
 use crate::kinematics::finger_ik::FingerIk;
 use crate::robot::{LinkId, Robot};
 use crate::tip::Tip;
+use regrasp_geometry::Shape;
 use regrasp_geometry::shape::PlacedShape;
-use regrasp_geometry::{Pose, Shape};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// Most fingers of a hand: planners and contact forces have room for so many.
-pub const MAX_FINGERS: usize = 6;
+/// Most fingers of a hand: more are a mistake in the file. Planners may take fewer.
+pub const MAX_FINGERS: usize = 64;
 /// Most joints of a finger, those that follow others among them.
 pub const MAX_FINGER_JOINTS: usize = 16;
 
@@ -65,15 +65,14 @@ pub struct PalmShape {
     pub placed: PlacedShape,
 }
 
-/// A palm and serial fingers. All poses are in the frame in which [`Hand::world_from_base`] places the base.
+/// A palm and serial fingers. All poses are in the hand's own frame, that of its base: where the hand stands in the world is
+/// not part of it.
 #[derive(Debug, Clone)]
 pub struct Hand {
     /// The robot it was made from.
     pub robot: Arc<Robot>,
     /// The link whose frame is the hand frame.
     pub base: LinkId,
-    /// Where the base stands: the identity until [`Hand::placed_at`] says otherwise.
-    pub world_from_base: Pose,
     /// Fingers, in the order of the hand file.
     pub fingers: Vec<Finger>,
     /// The palm.
@@ -101,20 +100,6 @@ impl Hand {
     /// True when links `a` and `b` are never tested against each other.
     pub fn may_touch(&self, a: LinkId, b: LinkId) -> bool {
         a == b || self.allowed_pairs.contains(&(a.min(b), a.max(b)))
-    }
-
-    /// The same hand with its base placed at `world_from_hand`: every pose it gives is then in the world.
-    #[must_use]
-    pub fn placed_at(mut self, world_from_hand: &Pose) -> Self {
-        self.world_from_base = world_from_hand * self.world_from_base;
-        for finger in &mut self.fingers {
-            finger.chain.place_at(world_from_hand);
-            finger.ik = FingerIk::new(&finger.chain, &finger.tip.center_in_body);
-        }
-        for shape in &mut self.palm {
-            shape.placed.parent_from_shape = world_from_hand * shape.placed.parent_from_shape;
-        }
-        self
     }
 }
 

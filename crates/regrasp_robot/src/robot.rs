@@ -1,16 +1,11 @@
 //! Links and joints of a robot, as read.
 
+use crate::coupling::Coupling;
+pub use crate::ids::{JointId, LinkId};
+use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Pose, Shape, UnitVector, Vector};
 use std::path::PathBuf;
-
-/// Index of a link in [`Robot::links`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct LinkId(pub usize);
-
-/// Index of a joint in [`Robot::joints`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct JointId(pub usize);
 
 /// A rigid body.
 #[derive(Debug, Clone)]
@@ -82,17 +77,6 @@ pub struct Limits {
     pub effort: Option<f64>,
 }
 
-/// A joint that follows another: `position = multiplier * position(joint) + offset`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Mimic {
-    /// The joint followed; never itself a mimic joint (chains are resolved on loading).
-    pub joint: JointId,
-    /// Factor.
-    pub multiplier: f64,
-    /// Offset, in radians or metres.
-    pub offset: f64,
-}
-
 /// A joint between two links.
 #[derive(Debug, Clone)]
 pub struct Joint {
@@ -110,8 +94,29 @@ pub struct Joint {
     pub axis: UnitVector,
     /// Limits; always present for revolute and prismatic joints.
     pub limits: Option<Limits>,
-    /// The coupling, for a joint that is not independent.
-    pub mimic: Option<Mimic>,
+    /// What it follows, for a joint that is not independent. Leaders are independent joints: loading resolves followers of
+    /// followers.
+    pub coupling: Option<Coupling>,
+}
+
+impl Joint {
+    /// False for a fixed joint.
+    pub fn moves(&self) -> bool {
+        self.kind != JointKind::Fixed
+    }
+
+    /// Pose of the child's frame in the joint frame at `position`; the identity for a fixed joint.
+    pub fn motion(&self, position: f64) -> Pose {
+        match self.kind {
+            JointKind::Fixed => Pose::identity(),
+            JointKind::Prismatic => {
+                Pose::from_parts(Translation3::from(self.axis.into_inner() * position), UnitQuaternion::identity())
+            }
+            JointKind::Revolute | JointKind::Continuous => {
+                Pose::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&self.axis, position))
+            }
+        }
+    }
 }
 
 /// A tree of links and joints, as read.

@@ -67,9 +67,10 @@ fn couplings_of_file_and_urdf_are_merged_into_chains() {
     let hand = load(&hand_file(&more, ""), &LoadOptions::default()).unwrap();
     assert_eq!(hand.joint_names(), ["a_side", "a_low", "b_low"]);
     let end = &hand.robot.joints[hand.robot.joint_named("a_end").unwrap().0];
-    let mimic = end.mimic.unwrap();
-    assert_eq!(hand.robot.joints[mimic.joint.0].name, "a_low");
-    assert!((mimic.multiplier - 0.25).abs() < 1e-15 && (mimic.offset - 0.1).abs() < 1e-15);
+    let follows = end.coupling.as_ref().unwrap();
+    let (leader, multiplier) = follows.single().unwrap();
+    assert_eq!(hand.robot.joints[leader.0].name, "a_low");
+    assert!((multiplier - 0.25).abs() < 1e-15 && (follows.offset - 0.1).abs() < 1e-15);
     // The URDF's own coupling may be repeated, not changed.
     assert!(load(&hand_file(&coupling("b_end", "b_low", "multiplier = 2"), ""), &LoadOptions::default()).is_ok());
     let error =
@@ -173,6 +174,92 @@ fn contact_models_come_from_the_finger_or_the_default() {
         let seen = load(&hand_file("", contact), &LoadOptions::default()).unwrap_err().join("\n");
         assert!(seen.starts_with(expected), "{seen}\nexpected {expected}");
     }
+}
+
+/// The last joint keeps its link level: it turns back by what two others turn.
+const LEVEL: &str = "[[couplings]]\njoint = \"a_end\"\nterms = [{ leader = \"a_mid\", multiplier = -1.0 }, \
+                     { leader = \"a_low\", multiplier = -1.0 }]\noffset = 1.3\n";
+
+#[test]
+fn a_joint_may_follow_several_others_and_limits_their_sum() {
+    let hand = load(&hand_file(LEVEL, ""), &LoadOptions::default()).unwrap();
+    assert_eq!(hand.joint_names(), ["a_side", "a_low", "a_mid", "b_low"]);
+    let chain = &hand.fingers[0].chain;
+    // Each leader keeps its own limits; a_end within 0..1.2 asks 0.1 <= a_low + a_mid <= 1.3 of both.
+    assert_eq!((chain.lower.as_slice(), chain.upper.as_slice()), (&[-0.35, -0.3, 0.0][..], &[0.35, 1.6, 1.6][..]));
+    let free = load(&hand_file("", ""), &LoadOptions::default()).unwrap();
+    let mut rng = Rng::keyed(5, "level", 0);
+    let (mut within, mut outside) = (0, 0);
+    for _ in 0..500 {
+        let q: Vec<f64> = chain.lower.iter().zip(&chain.upper).map(|(&low, &high)| rng.uniform(low, high)).collect();
+        let end = 1.3 - q[1] - q[2];
+        assert_eq!(chain.within_limits(&q, 0.0), (0.0..=1.2).contains(&end));
+        *if chain.within_limits(&q, 0.0) { &mut within } else { &mut outside } += 1;
+        let room = chain.limit_distance(&q);
+        // Moved by less than the room, every limit is still kept; moved the worst way by more, one is not.
+        if room > 1e-6 {
+            for way in [1.0, -1.0] {
+                let moved: Vec<f64> = q.iter().map(|q| q + way * 0.999 * room).collect();
+                assert!(chain.within_limits(&moved, 0.0) && chain.within_limits(&q, 0.999 * room));
+            }
+            assert!(!chain.within_limits(&q, 1.001 * room));
+        }
+        let tip = Point::new(0.0, 0.0, 0.02);
+        let explicit = free.fingers[0].chain.tip(&[q[0], q[1], q[2], end], &tip);
+        assert!((chain.tip(&q, &tip) - explicit).norm() < 1e-15);
+    }
+    assert!(within > 100 && outside > 100);
+    assert!(chain.within_limits(&hand.fingers[0].rest, 0.0));
+}
+
+#[test]
+fn inspect_writes_couplings_with_several_leaders_so_that_they_are_read_again() {
+    let hand = load(&hand_file(LEVEL, ""), &LoadOptions::default()).unwrap();
+    let written = regrasp_robot::inspect::hand_file_text(&hand, "hand.urdf", &Default::default());
+    let again = load(&written, &LoadOptions::default()).unwrap();
+    assert_eq!(again.fingers[0].chain.linear_limits, hand.fingers[0].chain.linear_limits);
+    let end = |hand: &Hand| hand.robot.joints[hand.robot.joint_named("a_end").unwrap().0].coupling.clone();
+    assert_eq!(end(&again), end(&hand));
+}
+
+#[test]
+fn bad_terms_are_refused() {
+    let terms = |terms: &str| format!("[[couplings]]\njoint = \"a_end\"\nterms = {terms}\n");
+    let one = |leader: &str, multiplier: f64| format!("{{ leader = \"{leader}\", multiplier = {multiplier} }}");
+    let key = "hand.toml:6:9 key \"couplings[0].terms\"";
+    for (more, expected) in [
+        (terms("[]"), format!("U213 {key}: has 0 terms")),
+        (
+            terms(&format!("[{}, {}]", one("a_mid", 1.0), one("a_mid", -1.0))),
+            "U213 hand.toml:6:48 key \"couplings[0].terms[1]\": names leader \"a_mid\" twice".into(),
+        ),
+        (
+            terms(&format!("[{}, {}]", one("a_mid", 1.0), one("a_end", 1.0))),
+            "U141 hand.toml:5:9 key \"couplings[0].joint\": joint \"a_end\" follows itself".into(),
+        ),
+        (
+            terms(&format!("[{}]", one("a_mid", 0.0))),
+            "U213 hand.toml:6:43 key \"couplings[0].terms[0].multiplier\": is 0".into(),
+        ),
+        (
+            terms(&format!("[{}, {}]\noffset = 9.0", one("a_mid", 1.0), one("a_low", 1.0))),
+            "U143 hand.toml:5:9 key \"couplings[0].joint\": joint \"a_end\" follows joints \"a_low\" and \"a_mid\" to \
+             8.7..12.2, outside its own limits 0..1.2"
+                .into(),
+        ),
+        (
+            terms(&format!("[{}, {}]", one("a_mid", 1.0), one("b_low", 1.0))),
+            "U209 hand.toml:8:1 finger \"a\": joint \"a_end\" follows joint \"b_low\", which is on another finger"
+                .into(),
+        ),
+        (format!("{LEVEL}leader = \"a_mid\"\n"), "U201 hand.toml:8:1 key \"couplings[0].leader\"".into()),
+    ] {
+        let seen = load(&hand_file(&more, ""), &LoadOptions::default()).unwrap_err().join("\n");
+        assert!(seen.starts_with(&expected), "{seen}\nexpected {expected}");
+    }
+    let rest = hand_file(LEVEL, "rest = { a_low = 1.5, a_mid = 1.5 }");
+    let seen = load(&rest, &LoadOptions::default()).unwrap_err().join("\n");
+    assert!(seen.starts_with("U212 ") && seen.contains("joint \"a_end\", which follows, outside its limits"), "{seen}");
 }
 
 #[test]

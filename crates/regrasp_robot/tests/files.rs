@@ -258,9 +258,10 @@ fn chains_of_followers_follow_the_first() {
         joint("j1", "a", "b", ""),
     );
     let robot = load(&write(folder.path(), "hand.urdf", text)).unwrap().robot;
-    let mimic = robot.joints[0].mimic.unwrap();
+    let coupling = robot.joints[0].coupling.as_ref().unwrap();
+    let (leader, multiplier) = coupling.single().unwrap();
     // j3 = 2 (3 j1 + 0.5) + 1
-    assert_eq!((robot.joints[mimic.joint.0].name.as_str(), mimic.multiplier, mimic.offset), ("j1", 6.0, 2.0));
+    assert_eq!((robot.joints[leader.0].name.as_str(), multiplier, coupling.offset), ("j1", 6.0, 2.0));
 }
 
 #[test]

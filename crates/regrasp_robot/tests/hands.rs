@@ -140,7 +140,7 @@ fn independent_joints_of_shared_robots_are_as_listed() {
     ] {
         let robot = load_robot(&models.join(file), &LoadOptions::default()).unwrap().robot;
         let moving: Vec<_> = robot.joints.iter().filter(|j| j.kind != regrasp_robot::JointKind::Fixed).collect();
-        let n_followers = moving.iter().filter(|joint| joint.mimic.is_some()).count();
+        let n_followers = moving.iter().filter(|joint| joint.coupling.is_some()).count();
         let seen = (robot.links.len(), moving.len() - n_followers, n_followers);
         assert_eq!(seen, (links, independent, followers), "{file}");
     }
@@ -327,14 +327,10 @@ fn coupled_joints_follow_the_numbers_of_the_robot_file() {
         let mimic = part.split("<mimic ").nth(1).unwrap().split('>').next().unwrap();
         let number = |key: &str, default: f64| attribute(mimic, key).map_or(default, |text| text.parse().unwrap());
         let joint = &robot.joints[robot.joint_named(&attribute(part, "name").unwrap()).unwrap().0];
-        let found = joint.mimic.as_ref().expect("it is coupled");
-        assert_eq!(robot.joints[found.joint.0].name, attribute(mimic, "joint").unwrap());
-        assert_eq!(
-            (found.multiplier, found.offset),
-            (number("multiplier", 1.0), number("offset", 0.0)),
-            "{}",
-            joint.name
-        );
+        let found = joint.coupling.as_ref().expect("it is coupled");
+        let (leader, multiplier) = found.single().expect("it follows one joint");
+        assert_eq!(robot.joints[leader.0].name, attribute(mimic, "joint").unwrap());
+        assert_eq!((multiplier, found.offset), (number("multiplier", 1.0), number("offset", 0.0)), "{}", joint.name);
         n_coupled += 1;
     }
     assert_eq!(n_coupled, 10);

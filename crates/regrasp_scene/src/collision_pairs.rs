@@ -1,9 +1,9 @@
-//! Who may not touch whom in a scene: every pair that planner and checker have to keep apart.
+//! Who may not touch whom around one hand: every pair that its planner has to keep apart.
 //!
 //! Left out: pairs that the hand allows (`Hand::may_touch`), neighbours in a finger (bodies joined by one joint, and the
 //! palm with every first body), and pairs that never move against each other (palm and obstacles).
 
-use crate::scene::Scene;
+use crate::hand_view::HandView;
 use regrasp_robot::{FingerId, Hand, LinkId};
 
 /// A collision shape of a finger: `hand.fingers[finger].shapes[shape]`.
@@ -15,7 +15,7 @@ pub struct FingerShapeId {
     pub shape: usize,
 }
 
-/// The pairs of a scene, each kind in the order of fingers, shapes, palm and obstacles.
+/// The pairs of a view, each kind in the order of fingers, shapes, palm and obstacles.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct CollisionPairs {
     /// Shapes of tip links, which may touch the object but not enter it.
@@ -28,21 +28,21 @@ pub struct CollisionPairs {
     pub within_finger: Vec<(FingerShapeId, FingerShapeId)>,
     /// Finger shape and index in `Hand::palm`.
     pub finger_palm: Vec<(FingerShapeId, usize)>,
-    /// Finger shape and index in `Scene::obstacles`.
+    /// Finger shape and index in [`HandView::obstacles`].
     pub finger_obstacle: Vec<(FingerShapeId, usize)>,
     /// Indices in `Hand::palm`: the object against each.
     pub palm_object: Vec<usize>,
-    /// Indices in `Scene::obstacles`: the object against each.
+    /// Indices in [`HandView::obstacles`]: the object against each.
     pub object_obstacle: Vec<usize>,
 }
 
-/// The pairs of `scene`.
-pub fn collision_pairs(scene: &Scene) -> CollisionPairs {
-    let hand = &scene.hand;
+/// The pairs of `view`.
+pub fn collision_pairs(view: &HandView) -> CollisionPairs {
+    let hand = view.hand;
     let shapes = finger_shapes(hand);
     let mut pairs = CollisionPairs {
         palm_object: (0..hand.palm.len()).collect(),
-        object_obstacle: (0..scene.obstacles.len()).collect(),
+        object_obstacle: (0..view.obstacles.len()).collect(),
         ..CollisionPairs::default()
     };
     for (i, &a) in shapes.iter().enumerate() {
@@ -65,7 +65,7 @@ pub fn collision_pairs(scene: &Scene) -> CollisionPairs {
         if shape_of(hand, a).body > 0 {
             pairs.finger_palm.extend(palm.map(|(index, _)| (a, index)));
         }
-        pairs.finger_obstacle.extend((0..scene.obstacles.len()).map(|obstacle| (a, obstacle)));
+        pairs.finger_obstacle.extend((0..view.obstacles.len()).map(|obstacle| (a, obstacle)));
     }
     pairs
 }

@@ -1,8 +1,7 @@
 //! Which way things fall.
 
 use regrasp_geometry::frame::direction;
-use regrasp_geometry::{UnitVector, Vector};
-use regrasp_robot::Hand;
+use regrasp_geometry::{Pose, UnitVector, Vector};
 
 /// Standard gravity, in metres per second squared (ISO 80000-3).
 pub const STANDARD_GRAVITY: f64 = 9.80665;
@@ -17,10 +16,11 @@ pub enum Gravity {
 }
 
 impl Gravity {
-    /// Along `down_in_hand`, as seen from the hand's base, where it stands. None for the zero vector and numbers that are not finite.
-    pub fn in_hand(hand: &Hand, down_in_hand: &Vector) -> Option<Self> {
-        let down = direction(down_in_hand)?;
-        Some(Gravity::Direction(hand.world_from_base.rotation * down))
+    /// Along `down`, of any length, in a frame that is turned by `world_from_frame`. None for the zero vector and numbers that are
+    /// not finite.
+    pub fn along(world_from_frame: &Pose, down: &Vector) -> Option<Self> {
+        let down = direction(down)?;
+        Some(Gravity::Direction(world_from_frame.rotation * down))
     }
 
     /// Acceleration in the world; None where the direction is not known.

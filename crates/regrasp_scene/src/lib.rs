@@ -1,24 +1,33 @@
-//! Robots, objects and obstacles, the scene file, and who may touch whom. Knows no planner.
+//! Hands, objects, supports and obstacles, the scene file, and who may touch whom. Knows no planner.
 
 /// Who may not touch whom.
 pub mod collision_pairs;
 /// Which way things fall.
 pub mod gravity;
+/// The scene as one hand sees it.
+pub mod hand_view;
 /// What a plan may ask of hand and object.
 pub mod limits;
 /// The scene file.
 pub mod load;
+/// One hand that manipulates one object.
+pub mod manipulation;
 /// The object that is manipulated.
 pub mod object;
-/// What is asked: start and goal of the object, and how the grasps are given.
+/// What is asked: start and goal of an object, and how the grasps are given.
 pub mod query;
-/// The scene: hand, object, obstacles.
+/// The scene: hands, objects, supports, obstacles.
 pub mod scene;
+/// What moves in a scene.
+pub mod state;
 
 pub use collision_pairs::{CollisionPairs, FingerShapeId, collision_pairs};
 pub use gravity::{Gravity, STANDARD_GRAVITY};
+pub use hand_view::HandView;
 pub use limits::Limits;
-pub use load::{Goal, InHandTask, LoadedScene, StartOrientation, load_scene};
+pub use load::{Goal, LoadedScene, StartOrientation, Task, load_scene};
+pub use manipulation::Manipulation;
 pub use object::Object;
-pub use query::{GRASP_TOLERANCE, GRASP_TURN_TOLERANCE, GraspRequest, InHandQuery, TaskKind};
-pub use scene::{InputFile, Obstacle, Scene};
+pub use query::{GRASP_TOLERANCE, GRASP_TURN_TOLERANCE, GraspRequest, InHandQuery, Query, TrackingQuery};
+pub use scene::{InputFile, Obstacle, Scene, SceneHand, Support};
+pub use state::{Holder, State};

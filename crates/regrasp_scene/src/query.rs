@@ -1,4 +1,4 @@
-//! What is asked: start, way and goal of the object, and how the grasps are given.
+//! What is asked: start, way and goal of an object, and how the grasps are given.
 
 use regrasp_geometry::{Point, Pose};
 
@@ -19,35 +19,25 @@ pub enum GraspRequest {
     Contacts(Vec<Point>),
 }
 
-/// Kind of task.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TaskKind {
-    /// A goal pose, reached by relocating fingers (papers 000 and 004).
-    InHand,
-    /// A goal orientation, wherever the object then is, reached with every finger on the object (paper 003, section 3.3).
-    Tracking,
-}
+/// The name of each kind of task, as scene and plan files spell it.
+pub const IN_HAND: &str = "in_hand";
+/// See [`IN_HAND`].
+pub const TRACKING: &str = "tracking";
 
-impl TaskKind {
-    /// As scene and plan files spell it.
-    pub fn name(self) -> &'static str {
-        match self {
-            TaskKind::InHand => "in_hand",
-            TaskKind::Tracking => "tracking",
-        }
-    }
-}
-
-/// An in-hand query, with all randomness of the scene file resolved.
+/// A goal pose of one object, reached in one hand by relocating fingers (Saut 2011; Sahbani 2007). All poses are in the world.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InHandQuery {
-    /// What is asked of the goal: its pose, or its orientation alone.
-    pub task: TaskKind,
+    /// Name of the task in the scene file; empty where the file has only one.
+    pub name: String,
+    /// The hand, by its index in `Scene::hands`.
+    pub hand: usize,
+    /// The object, by its index in `Scene::objects`.
+    pub object: usize,
     /// Object pose at the start.
     pub world_from_object_start: Pose,
     /// Object poses to be passed between start and goal, in order.
     pub world_from_object_way: Vec<Pose>,
-    /// Object pose at the goal. In tracking its position is that of the start, and not asked for.
+    /// Object pose at the goal.
     pub world_from_object_goal: Pose,
     /// Grasp at the start.
     pub start_grasp: GraspRequest,
@@ -62,5 +52,160 @@ impl InHandQuery {
         poses.extend(&self.world_from_object_way);
         poses.push(self.world_from_object_goal);
         poses
+    }
+
+    /// The same query seen from another frame: every pose becomes `frame_from_world` times itself.
+    #[must_use]
+    pub fn seen_from(&self, frame_from_world: &Pose) -> Self {
+        let seen = |pose: &Pose| frame_from_world * pose;
+        InHandQuery {
+            world_from_object_start: seen(&self.world_from_object_start),
+            world_from_object_way: self.world_from_object_way.iter().map(seen).collect(),
+            world_from_object_goal: seen(&self.world_from_object_goal),
+            ..self.clone()
+        }
+    }
+}
+
+/// A goal orientation of one object, wherever the object then is, reached with every finger of one hand on it (Cherif & Gupta
+/// 1999, sec. 3.3). All poses are in the world.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrackingQuery {
+    /// Name of the task in the scene file; empty where the file has only one.
+    pub name: String,
+    /// The hand, by its index in `Scene::hands`.
+    pub hand: usize,
+    /// The object, by its index in `Scene::objects`.
+    pub object: usize,
+    /// Object pose at the start.
+    pub world_from_object_start: Pose,
+    /// Object pose at the goal. Its position is that of the start, and not asked for.
+    pub world_from_object_goal: Pose,
+    /// Grasp at the start.
+    pub start_grasp: GraspRequest,
+    /// Grasp at the goal. The planner of tracking cannot be asked for one.
+    pub goal_grasp: GraspRequest,
+}
+
+impl TrackingQuery {
+    /// The same query seen from another frame: every pose becomes `frame_from_world` times itself.
+    #[must_use]
+    pub fn seen_from(&self, frame_from_world: &Pose) -> Self {
+        TrackingQuery {
+            world_from_object_start: frame_from_world * self.world_from_object_start,
+            world_from_object_goal: frame_from_world * self.world_from_object_goal,
+            ..self.clone()
+        }
+    }
+}
+
+/// What is asked of a scene, with all randomness of its file resolved: one variant per task.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Query {
+    /// See [`InHandQuery`].
+    InHand(InHandQuery),
+    /// See [`TrackingQuery`].
+    Tracking(TrackingQuery),
+}
+
+impl From<InHandQuery> for Query {
+    fn from(query: InHandQuery) -> Self {
+        Query::InHand(query)
+    }
+}
+
+impl From<TrackingQuery> for Query {
+    fn from(query: TrackingQuery) -> Self {
+        Query::Tracking(query)
+    }
+}
+
+impl Query {
+    /// Name of its task, as scene and plan files spell it.
+    pub fn task(&self) -> &'static str {
+        match self {
+            Query::InHand(_) => IN_HAND,
+            Query::Tracking(_) => TRACKING,
+        }
+    }
+
+    /// The in-hand query, if it is one.
+    pub fn as_in_hand(&self) -> Option<&InHandQuery> {
+        match self {
+            Query::InHand(query) => Some(query),
+            Query::Tracking(_) => None,
+        }
+    }
+
+    /// The tracking query, if it is one.
+    pub fn as_tracking(&self) -> Option<&TrackingQuery> {
+        match self {
+            Query::Tracking(query) => Some(query),
+            Query::InHand(_) => None,
+        }
+    }
+
+    /// Name of the task in the scene file; empty where the file has only one.
+    pub fn name(&self) -> &str {
+        match self {
+            Query::InHand(query) => &query.name,
+            Query::Tracking(query) => &query.name,
+        }
+    }
+
+    /// The hand that is asked, by its index in `Scene::hands`.
+    pub fn hand(&self) -> usize {
+        match self {
+            Query::InHand(query) => query.hand,
+            Query::Tracking(query) => query.hand,
+        }
+    }
+
+    /// The object that is asked about, by its index in `Scene::objects`.
+    pub fn object(&self) -> usize {
+        match self {
+            Query::InHand(query) => query.object,
+            Query::Tracking(query) => query.object,
+        }
+    }
+
+    /// Object pose at the start.
+    pub fn start(&self) -> &Pose {
+        match self {
+            Query::InHand(query) => &query.world_from_object_start,
+            Query::Tracking(query) => &query.world_from_object_start,
+        }
+    }
+
+    /// Object poses to be passed between start and goal, in order.
+    pub fn way(&self) -> &[Pose] {
+        match self {
+            Query::InHand(query) => &query.world_from_object_way,
+            Query::Tracking(_) => &[],
+        }
+    }
+
+    /// Object pose at the goal; of tracking only its orientation is asked for.
+    pub fn goal(&self) -> &Pose {
+        match self {
+            Query::InHand(query) => &query.world_from_object_goal,
+            Query::Tracking(query) => &query.world_from_object_goal,
+        }
+    }
+
+    /// Grasp at the start.
+    pub fn start_grasp(&self) -> &GraspRequest {
+        match self {
+            Query::InHand(query) => &query.start_grasp,
+            Query::Tracking(query) => &query.start_grasp,
+        }
+    }
+
+    /// Grasp at the goal.
+    pub fn goal_grasp(&self) -> &GraspRequest {
+        match self {
+            Query::InHand(query) => &query.goal_grasp,
+            Query::Tracking(query) => &query.goal_grasp,
+        }
     }
 }

@@ -1,8 +1,9 @@
-//! The scene: hand, object, obstacles.
+//! The scene: hands, objects, supports, obstacles. What moves is in [`crate::State`].
 
 use crate::gravity::Gravity;
 use crate::limits::Limits;
 use crate::object::Object;
+use regrasp_geometry::Pose;
 use regrasp_geometry::collision::MeshBody;
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_robot::Hand;
@@ -11,12 +12,33 @@ use std::path::PathBuf;
 /// Something fixed in the world that nothing may touch.
 #[derive(Debug, Clone)]
 pub struct Obstacle {
-    /// Name, unique in the scene.
+    /// Name, unique among the bodies of the scene.
     pub name: String,
     /// Its shape, placed in the world.
     pub placed: PlacedShape,
     /// For a mesh, what collision tests ask of it.
     pub mesh_body: Option<MeshBody>,
+}
+
+/// Something fixed in the world that objects may stand on. Hands keep away from it, as from an obstacle.
+#[derive(Debug, Clone)]
+pub struct Support {
+    /// Its name, its shape placed in the world, and what collision tests ask of it.
+    pub body: Obstacle,
+}
+
+/// A hand with its place in the scene.
+#[derive(Debug, Clone)]
+pub struct SceneHand {
+    /// Name, unique among the bodies of the scene.
+    pub name: String,
+    /// The hand, in its own frame.
+    pub hand: Hand,
+    /// Where its base stands, in the world.
+    pub world_from_hand: Pose,
+    /// Radius, in metres, of the balls that the centres of the fingertips may not leave: each is about where the tip is in the
+    /// rest posture (Cherif & Gupta 1999, sec. 7: 0.1 m). None where the joints alone say what a finger reaches.
+    pub reach: Option<f64>,
 }
 
 /// A file that the scene was made from.
@@ -32,23 +54,22 @@ pub struct InputFile {
     pub sha256: String,
 }
 
-/// Everything a planner plans in. Never changes after loading.
+/// Everything that planners plan in and the checker judges by. Never changes after loading.
 #[derive(Debug, Clone)]
 pub struct Scene {
     /// Name: the scene file's name without its extension.
     pub name: String,
-    /// The hand, already placed in the world: every pose it gives is in the world frame.
-    pub hand: Hand,
-    /// Radius, in metres, of the balls that the centres of the fingertips may not leave: each is about where the tip is in the
-    /// rest posture (paper 003, section 7: 0.1 m). None where the joints alone say what a finger reaches.
-    pub reach: Option<f64>,
-    /// The object.
-    pub object: Object,
-    /// Obstacles.
+    /// The hands, in the order of the file. At least one.
+    pub hands: Vec<SceneHand>,
+    /// The objects that hands can move, in the order of the file. At least one.
+    pub objects: Vec<Object>,
+    /// What objects may stand on.
+    pub supports: Vec<Support>,
+    /// What nothing may touch.
     pub obstacles: Vec<Obstacle>,
     /// Gravity, where the file states it; along the world's -Z otherwise.
     pub gravity: Option<Gravity>,
-    /// What a plan may ask of hand and object.
+    /// What a plan may ask of hands and objects.
     pub limits: Limits,
     /// The files it was read from, the scene file first.
     pub inputs: Vec<InputFile>,
@@ -65,5 +86,15 @@ impl Scene {
     pub fn under_gravity(mut self, gravity: Gravity) -> Self {
         self.gravity = Some(gravity);
         self
+    }
+
+    /// Index of the hand called `name`.
+    pub fn hand_named(&self, name: &str) -> Option<usize> {
+        self.hands.iter().position(|hand| hand.name == name)
+    }
+
+    /// Index of the object called `name`.
+    pub fn object_named(&self, name: &str) -> Option<usize> {
+        self.objects.iter().position(|object| object.name == name)
     }
 }

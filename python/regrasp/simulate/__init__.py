@@ -5,7 +5,7 @@
     report = simulate(plan, xml).report
     print(report.kept, report.final_position_error)
 
-``python -m regrasp.simulate plan.json`` does the same; ``docs/simulate.md`` says what is simulated and how. Needs the extra
+``python -m regrasp.simulate plan.json`` does the same; ``docs/reference/replay.md`` says what is simulated and how. Needs the extra
 ``sim``: ``pip install "regrasp[sim]"``.
 """
 

@@ -106,7 +106,7 @@ def _bad_input(problem: str) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m regrasp.simulate",
-        description="Replays a plan in MuJoCo and says whether the object is kept. docs/simulate.md describes it.",
+        description="Replays a plan in MuJoCo and says whether the object is kept. docs/reference/replay.md describes it.",
     )
     parser.add_argument("plan", type=Path, help="plan file")
     parser.add_argument("--scene", type=Path, help="scene file [default: the one that the plan names]")

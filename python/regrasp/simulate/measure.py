@@ -73,7 +73,7 @@ class Dropped:
 
 @dataclass(frozen=True)
 class Report:
-    """The result of a replay, in metres, radians, seconds and newtons; ``docs/simulate.md`` describes the keys."""
+    """The result of a replay, in metres, radians, seconds and newtons; ``docs/reference/replay.md`` describes the keys."""
 
     kept: bool
     dropped: Dropped | None

@@ -2,7 +2,7 @@
 
 Between two waypoints every joint follows the cubic through the plan's positions, velocities and times. The object follows
 ``interpolate_pose`` of the planner. Its parameter is the cubic from 0 to 1 whose slopes at both ends are the joint velocities
-projected on the joints' chord (docs/plan-format.md, Time). This is the motion that the checker judges. Between two segments
+projected on the joints' chord (docs/reference/plan-format.md, Time). This is the motion that the checker judges. Between two segments
 everything rests while forces change linearly.
 """
 

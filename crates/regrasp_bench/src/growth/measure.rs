@@ -39,8 +39,8 @@ pub fn timed_load(path: &Path) -> Result<(LoadedScene, Cost), InputError> {
 /// Plans the queries of seeds 0 to `n` - 1, `n_at_once` at a time; then measures and judges every plan. The time is the
 /// wall-clock time from the first query to the last plan.
 pub fn batch(loaded: &LoadedScene, n: usize, n_at_once: usize, settings: &RunSettings) -> (Vec<Row>, f64) {
-    let queries: Vec<_> = (0..n as u64).map(|seed| loaded.task.query(seed)).collect();
-    let problem = |index: usize| Problem { scene: &loaded.scene, query: &queries[index], seed: index as u64 };
+    let queries: Vec<_> = (0..n as u64).map(|seed| loaded.task().query(seed)).collect();
+    let problem = |index: usize| Problem { task: loaded.manipulation(), query: &queries[index], seed: index as u64 };
     let mut planned = Vec::with_capacity(n);
     let started = Instant::now();
     let plan = |index: usize| plan_only(problem(index), settings);

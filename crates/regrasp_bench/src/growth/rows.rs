@@ -34,17 +34,16 @@ pub fn header() -> String {
 
 /// One line.
 pub fn line(row: &GrowthRow) -> String {
-    let batch_s = row.batch_s.map(|seconds| seconds.to_string()).unwrap_or_default();
-    format!(
-        "{},{},{},{},{},{batch_s},{},{}",
-        row.curve.name(),
-        csv::quoted(&row.object),
-        row.size,
-        row.load.wall_s,
-        row.load.cpu_s,
-        row.cores,
-        csv::line(&row.row)
-    )
+    let leading = [
+        row.curve.name().to_owned(),
+        row.object.clone(),
+        row.size.to_string(),
+        row.load.wall_s.to_string(),
+        row.load.cpu_s.to_string(),
+        row.batch_s.map(|seconds| seconds.to_string()).unwrap_or_default(),
+        row.cores.to_string(),
+    ];
+    csv::line_after(&leading, &row.row)
 }
 
 /// True when the file begins with the columns of [`header`]. Errors: as [`files::read_text`].

@@ -102,7 +102,7 @@ mod tests {
     #[test]
     fn hands_have_as_many_soft_tips_as_asked_evenly_placed() {
         for size in Curve::Fingers.sizes().iter().copied() {
-            let hand = loaded(Point { curve: Curve::Fingers, object: "sphere", size }).scene.hand;
+            let hand = loaded(Point { curve: Curve::Fingers, object: "sphere", size }).scene.hands.remove(0).hand;
             assert_eq!(hand.fingers.len(), size as usize);
             let tip = |finger: &Finger| {
                 let mut poses = Vec::new();
@@ -124,8 +124,8 @@ mod tests {
     #[test]
     fn the_finger_is_that_of_the_bundled_hand() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/six_finger_sphere_90x.toml");
-        let bundled = load_scene(&path, &Default::default()).unwrap().scene.hand;
-        let written = loaded(Point { curve: Curve::Fingers, object: "sphere", size: 6 }).scene.hand;
+        let bundled = load_scene(&path, &Default::default()).unwrap().scene.hands.remove(0).hand;
+        let written = loaded(Point { curve: Curve::Fingers, object: "sphere", size: 6 }).scene.hands.remove(0).hand;
         assert_eq!(bundled.fingers.len(), written.fingers.len());
         for (a, b) in bundled.fingers.iter().zip(&written.fingers) {
             assert_eq!((&a.chain.lower, &a.chain.upper, &a.rest), (&b.chain.lower, &b.chain.upper, &b.rest));
@@ -145,7 +145,7 @@ mod tests {
             let scene = loaded(point).scene;
             let n_obstacles = if point.curve == Curve::Obstacles { point.size as usize } else { 0 };
             assert_eq!(scene.obstacles.len(), n_obstacles);
-            if let Shape::Mesh(mesh) = &scene.object.shape {
+            if let Shape::Mesh(mesh) = &scene.objects[0].shape {
                 assert!(point.curve == Curve::Triangles && mesh.statistics().is_watertight());
                 assert_eq!(mesh.triangles().len(), point.size as usize);
                 let exact = 4.0 / 3.0 * PI * RADII.iter().product::<f64>();

@@ -3,9 +3,10 @@
 use super::rows::GrowthRow;
 use super::{Cost, Curve};
 use crate::chart::{Axis, Panel, Scale, svg};
-use crate::page::{escaped, misses};
+use crate::page::misses;
 use crate::row::Row;
 use crate::summary::{Spread, Summary, ms, summary_of_rows};
+use crate::text::escaped;
 use std::fmt::Write;
 
 /// Loading the largest mesh may take so long, in seconds of wall-clock time.

@@ -1,4 +1,4 @@
-//! Suites: the tables and figures of a paper, measured again. `docs/suite-format.md` says what a suite file may contain.
+//! Suites: the tables and figures of a paper, measured again. `docs/reference/suite-format.md` says what a suite file may contain.
 //!
 //! Codes: B600 not TOML or not the shape of a suite, B601 another format or version, B602 a value that makes no sense, B603
 //! settings of another kind of task than the scene's.
@@ -11,7 +11,8 @@ pub mod rows;
 use regrasp_base::{Diagnostic, InputError, Place};
 use regrasp_planners::in_hand::Alpha;
 use regrasp_planners::{InHandSettings, TrackingSettings};
-use regrasp_scene::TaskKind;
+use regrasp_scene::Task;
+use regrasp_scene::query::{IN_HAND, TRACKING};
 use serde::Deserialize;
 use serde::de::Error as _;
 use std::path::{Path, PathBuf};
@@ -154,10 +155,10 @@ pub struct Job {
 
 impl Job {
     /// Errors (`B603`, with the place of the suite at `suite_path`): settings that mean nothing for the task of the scene.
-    pub fn refuse_other_task(&self, task: TaskKind, suite_path: &Path) -> Result<(), InputError> {
-        let (key, other) = match task {
-            TaskKind::InHand if self.tracking.is_some() => ("tracking", "settings"),
-            TaskKind::Tracking if self.settings != InHandSettings::plain() => ("settings", "tracking"),
+    pub fn refuse_other_task(&self, task: &Task, suite_path: &Path) -> Result<(), InputError> {
+        let (key, other) = match task.kind_name() {
+            IN_HAND if self.tracking.is_some() => ("tracking", "settings"),
+            TRACKING if self.settings != InHandSettings::plain() => ("settings", "tracking"),
             _ => return Ok(()),
         };
         let problem = format!("\"{}\" has `{key}`, which its scene's task has no use for", self.name);
@@ -198,7 +199,8 @@ impl Suite {
         for figure in &self.figures {
             for curve in &figure.curves {
                 for &value in &figure.alpha {
-                    let settings = InHandSettings { alpha: Alpha::Constant { value }, ..curve.settings.clone() };
+                    let mut settings = curve.settings.clone();
+                    settings.baselines.alpha = Alpha::Constant { value };
                     jobs.push(job(figure.job_name(curve, value), curve, settings));
                 }
             }
@@ -289,7 +291,7 @@ pub fn read(path: &Path) -> Result<Suite, InputError> {
     let suite: Suite = toml::from_str(&text).map_err(|error| {
         let place = Place::at_offset(path, &text, error.span().map_or(0, |span| span.start));
         Diagnostic::new("B600", place, error.message().trim().replace('\n', "; "))
-            .expected("a suite file as in docs/suite-format.md")
+            .expected("a suite file as in docs/reference/suite-format.md")
     })?;
     if suite.format != FORMAT || suite.format_version != FORMAT_VERSION {
         let seen = format!("is \"{}\" version {}", suite.format, suite.format_version);
@@ -363,7 +365,7 @@ settings = { method = "visibility", guided_share = 0.0 }
             for job in suite.jobs(&path) {
                 assert!(job.scene.is_file() && !is_suite(&job.scene), "{}", job.scene.display());
                 let loaded = regrasp_scene::load_scene(&job.scene, &Default::default()).unwrap();
-                assert!(job.refuse_other_task(loaded.task.kind, &path).is_ok(), "{}", job.name);
+                assert!(job.refuse_other_task(loaded.task(), &path).is_ok(), "{}", job.name);
             }
         }
     }
@@ -376,8 +378,8 @@ settings = { method = "visibility", guided_share = 0.0 }
         assert_eq!(names, ["T/fast", "f/c/0.25", "f/c/0.5"]);
         assert_eq!(jobs[0].scene, Path::new("suites/s.toml"));
         assert_eq!((jobs[0].settings.n_threads, jobs[0].max_work), (1, 20_000_000));
-        assert_eq!(jobs[1].settings.alpha, Alpha::Constant { value: 0.25 });
-        assert_eq!((jobs[1].settings.guided_share, jobs[1].time_limit_s), (0.0, Some(3.0)));
+        assert_eq!(jobs[1].settings.baselines.alpha, Alpha::Constant { value: 0.25 });
+        assert_eq!((jobs[1].settings.baselines.guided_share, jobs[1].time_limit_s), (0.0, Some(3.0)));
     }
 
     #[test]
@@ -477,11 +479,16 @@ tracking = { rolling_finger = "once", face_changes = false }
         );
         // Of one kind of task only.
         let at = Path::new("suites/a.toml");
-        assert!(jobs[1].refuse_other_task(TaskKind::Tracking, at).is_ok());
-        let error = jobs[1].refuse_other_task(TaskKind::InHand, at).unwrap_err().to_string();
+        let loaded = |name: &str| {
+            let path = repository().join("scenes").join(name);
+            regrasp_scene::load_scene(&path, &Default::default()).unwrap_or_else(|error| panic!("{error}"))
+        };
+        let (turn, track) = (loaded("sphere_90x.toml"), loaded("football.toml"));
+        assert!(jobs[1].refuse_other_task(track.task(), at).is_ok());
+        let error = jobs[1].refuse_other_task(turn.task(), at).unwrap_err().to_string();
         assert!(error.contains("B603") && error.contains("T/once") && error.contains("tracking"), "{error}");
         let in_hand = Job { settings: InHandSettings::default(), ..jobs[0].clone() };
-        assert!(in_hand.refuse_other_task(TaskKind::Tracking, at).is_err());
+        assert!(in_hand.refuse_other_task(track.task(), at).is_err());
         let row = |job: &str, seed, status: &str| SuiteRow {
             job: job.into(),
             inputs: String::new(),

@@ -3,9 +3,10 @@
 use super::rows::SuiteRow;
 use super::{Entry, Figure, Published, Suite, Table};
 use crate::chart::{Axis, Panel, Scale, svg};
-use crate::page::{escaped, misses};
+use crate::page::misses;
 use crate::row::Row;
 use crate::summary::{Spread, Summary, summary_of_rows};
+use crate::text::escaped;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 

@@ -29,7 +29,7 @@ pub fn header() -> String {
 
 /// One line.
 pub fn line(row: &SuiteRow) -> String {
-    format!("{},{},{}", csv::quoted(&row.job), row.inputs, csv::line(&row.row))
+    csv::line_after(&[row.job.clone(), row.inputs.clone()], &row.row)
 }
 
 /// Hash of everything that the rows of `job` depend on but for the seed: the program (by the hash of its file), the files

@@ -28,7 +28,7 @@ impl Judging {
         let Some(asked) = self.gravity else { return loaded };
         let gravity = match asked {
             GravityInHand::Any => Some(Gravity::Any),
-            GravityInHand::Direction(down) => Gravity::in_hand(&loaded.scene.hand, &down.into()),
+            GravityInHand::Direction(down) => Gravity::along(&loaded.manipulation().world_from_hand(), &down.into()),
         };
         // The zero vector is refused where the argument is read.
         LoadedScene { scene: loaded.scene.under_gravity(gravity.unwrap_or_default()), ..loaded }

@@ -1,23 +1,24 @@
 //! `regrasp bench`: plan scenes with many seeds and tabulate; or make the page of CSV files; suites are in `suite`.
 
+use super::rows::{make_folder_of, of_rows, say_row};
 use super::suite;
 use crate::args::{self, Common};
 use crate::interrupt;
 use crate::load;
 use crate::outputs::{Output, Outputs};
 use crate::stop::Stop;
-use crate::talk::{Talk, counted};
+use crate::talk::Talk;
+use crate::words::counted;
 use regrasp::base::files;
-use regrasp::scene::{LoadedScene, TaskKind};
+use regrasp::scene::LoadedScene;
+use regrasp::scene::query::TRACKING;
 use regrasp::{InHandSettings, InputError, TrackingSettings};
 use regrasp_bench::at_once::in_order;
 use regrasp_bench::growth;
 use regrasp_bench::roadmap::GraphFacts;
 use regrasp_bench::row::Judge;
 use regrasp_bench::suite::is_suite;
-use regrasp_bench::{
-    Limits, Problem, Row, RunSettings, csv, improvement, limits, page, run as run_one, summarise, summary,
-};
+use regrasp_bench::{Limits, Problem, RunSettings, csv, improvement, limits, page, run as run_one, summarise, summary};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -38,7 +39,7 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
     let files = load::scene_files(&arguments.scenes)?;
     let (mut scenes, bad) = load_scenes(&files, arguments, common, talk)?;
     let (planner, tracking) = bench_settings(&scenes, arguments)?;
-    let improves = planner.improve_work > 0;
+    let improves = planner.improvement.improve_work > 0;
     let cancelled = interrupt::flag()?;
     let mut writer = match &arguments.csv {
         Some(path) => {
@@ -65,8 +66,8 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
         let n_seeds = arguments.seeds.unwrap_or(DEFAULT_SEEDS).min(u64::MAX - arguments.first_seed);
         let job = |index: usize| {
             let seed = arguments.first_seed + index as u64;
-            let query = loaded.task.query(seed);
-            run_one(Problem { scene: &loaded.scene, query: &query, seed }, &settings)
+            let query = loaded.task().query(seed);
+            run_one(Problem { task: loaded.manipulation(), query: &query, seed }, &settings)
         };
         in_order(n_seeds as usize, arguments.at_once, job, |_, row| {
             if cancelled.load(Ordering::Relaxed) {
@@ -108,7 +109,13 @@ fn load_scenes(
     let (mut scenes, mut bad) = (Vec::new(), Vec::new());
     for path in files {
         match load::scene(path, common, talk) {
-            Ok(scene) => scenes.push(arguments.judging.scene(scene)),
+            Ok(loaded) => {
+                let loaded = arguments.judging.scene(loaded);
+                // Of several tasks each is a problem of its own, but where one was asked for.
+                let n_tasks = if common.task.is_some() { 1 } else { loaded.tasks.len() };
+                let names: Vec<String> = loaded.tasks.iter().take(n_tasks).map(|task| task.name.clone()).collect();
+                scenes.extend(names.iter().map(|name| loaded.clone().for_query(name)));
+            }
             Err(Stop::BadInput(error)) => {
                 talk.note(&format!("{} is left out: it cannot be read", path.display()));
                 talk.event("left_out", json!({ "scene": path, "diagnostics": error.diagnostics }));
@@ -134,20 +141,15 @@ fn end_of(bad: Vec<InputError>, n_scenes: usize, talk: &Talk) -> Result<(), Stop
     Err(Stop::BadInput(InputError { diagnostics, n_more }))
 }
 
-/// The files of rows that go to `path`: the file, and that of the rows until all are there.
-pub fn of_rows(path: &Path) -> [Output; 2] {
-    [Output::new("--csv", path), Output::beside("--csv", csv::partial_path(path))]
-}
-
 /// Settings of both planners. A file of settings is that of the task that all scenes have (`A505` where they differ).
 fn bench_settings(scenes: &[LoadedScene], arguments: &args::Bench) -> Result<(InHandSettings, TrackingSettings), Stop> {
-    let is_tracking = |loaded: &LoadedScene| loaded.task.kind == TaskKind::Tracking;
-    if scenes.iter().any(is_tracking) {
-        if arguments.search.settings.is_some() && !scenes.iter().all(is_tracking) {
+    let is_tracking = |loaded: &&LoadedScene| loaded.task().kind_name() == TRACKING;
+    if let Some(first) = scenes.iter().find(is_tracking) {
+        if arguments.search.settings.is_some() && !scenes.iter().all(|loaded| is_tracking(&loaded)) {
             let problem = "is for scenes of two kinds of tasks";
             return Err(Stop::argument("A505", "--settings", problem, "scenes of one kind"));
         }
-        let tracking = load::for_task(TaskKind::Tracking, &arguments.search, arguments.threads)?.tracking;
+        let tracking = load::for_task(first.task(), &arguments.search, arguments.threads)?.tracking;
         let in_hand = InHandSettings { n_threads: arguments.threads, ..InHandSettings::default() };
         return Ok((in_hand, tracking));
     }
@@ -156,19 +158,6 @@ fn bench_settings(scenes: &[LoadedScene], arguments: &args::Bench) -> Result<(In
 
 /// Seeds per scene where none are given.
 const DEFAULT_SEEDS: u64 = 20;
-
-/// One line per miss, rejection or plan without floor; other solved seeds stay silent but for `--json`.
-pub fn say_row(row: &Row, talk: &Talk) {
-    talk.event("row", json!(row));
-    if row.status != "solved" {
-        let left = row.angle_left_deg.map_or(String::new(), |angle| format!(", {angle:.0} deg left"));
-        talk.say(format!("miss   {} seed {}: {}{left}; {}", row.scene, row.seed, row.status, row.cause));
-    } else if row.accepted == Some(false) {
-        talk.say(format!("REJECTED   {} seed {}: {}", row.scene, row.seed, row.cause));
-    } else if row.lacks_floor() {
-        talk.say(format!("NO FLOOR   {} seed {}: {}", row.scene, row.seed, row.cause));
-    }
-}
 
 /// The page of CSV files, of facts about graphs and, after them, of suites with what was measured of them.
 fn write_page(path: &Path, inputs: &[PathBuf], limits: Option<&Path>, talk: &Talk) -> Result<(), Stop> {
@@ -197,14 +186,4 @@ fn write_page(path: &Path, inputs: &[PathBuf], limits: Option<&Path>, talk: &Tal
     files::write_atomic(path, text.as_bytes()).map_err(|error| Stop::unwritable(path, &error))?;
     talk.say(format!("wrote  {}", path.display()));
     Ok(())
-}
-
-/// Makes the folder of a file that this command is about to write.
-pub fn make_folder_of(path: &Path) -> Result<(), Stop> {
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => {
-            std::fs::create_dir_all(folder).map_err(|error| Stop::unwritable(folder, &error))
-        }
-        _ => Ok(()),
-    }
 }

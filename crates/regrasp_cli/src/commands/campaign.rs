@@ -56,9 +56,14 @@ fn determinism(
     };
     let (mut n_same, mut n_solved) = (0, 0);
     for i in 0..queries {
-        let LoadedScene { scene, task, .. } = &scenes[(i % scenes.len() as u64) as usize];
+        let loaded = &scenes[(i % scenes.len() as u64) as usize];
         let seed = i / scenes.len() as u64;
-        let comparison = compare(Problem { scene, query: &task.query(seed), seed }, &settings, &budget, threads);
+        let comparison = compare(
+            Problem { task: loaded.manipulation(), query: &loaded.task().query(seed), seed },
+            &settings,
+            &budget,
+            threads,
+        );
         if cancelled.load(Ordering::Relaxed) {
             return Err(Stop::Interrupted);
         }
@@ -96,9 +101,9 @@ fn mutations(
     let mut campaign = Campaign::default();
     let mut unsolved = 0;
     for i in 0..good {
-        let LoadedScene { scene, task, .. } = &scenes[(i % scenes.len() as u64) as usize];
+        let loaded = &scenes[(i % scenes.len() as u64) as usize];
         let seed = i / scenes.len() as u64;
-        let query = task.query(seed);
+        let query = loaded.task().query(seed);
         let deadline = search.time_limit.map(|limit| Instant::now() + limit);
         let budget = Budget {
             max_work: search.max_work,
@@ -106,8 +111,9 @@ fn mutations(
             improve_for: search.improve,
             cancelled: Arc::clone(cancelled),
         };
-        match plan_in_hand(scene, &query, &settings, seed, &budget, &|_| {}) {
-            Ok(plan) => campaign.add(Problem { scene, query: &query, seed }, &plan, mutants),
+        let asked = query.as_in_hand().expect("scenes of other tasks were refused");
+        match plan_in_hand(&loaded.view(), asked, &settings, seed, &budget, &|_| {}) {
+            Ok(plan) => campaign.add(Problem { task: loaded.manipulation(), query: &query, seed }, &plan, mutants),
             Err(_) => unsolved += 1,
         }
         if cancelled.load(Ordering::Relaxed) {

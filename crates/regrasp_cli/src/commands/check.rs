@@ -17,7 +17,7 @@ pub fn run(arguments: &args::Check, common: &Common, talk: &Talk) -> Result<(), 
     interrupt::flag()?;
     let plan = format::from_json(&arguments.plan, &files::read(&arguments.plan)?)?;
     let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref(), "--scene FILE")?;
-    let loaded = arguments.judging.scene(load::scene(&scene_path, common, talk)?);
+    let loaded = arguments.judging.scene(load::scene_of_plan(&scene_path, &plan, common, talk)?);
     if judge::judge(&loaded, &plan, &arguments.judging, talk)?.accepted() { Ok(()) } else { Err(Stop::Rejected) }
 }
 

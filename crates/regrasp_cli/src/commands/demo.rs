@@ -19,11 +19,11 @@ use std::path::Path;
 const MAX_WORK: u64 = 5_000_000;
 /// The scene, relative to the output folder.
 const SCENE: &str = "scenes/sphere_180z.toml";
-/// The files of the repository that the demo needs, so that an installed binary needs no repository.
+/// The files that the demo needs, so that an installed binary needs no repository: copies, which a test of `xtask` compares.
 const FILES: [(&str, &str); 3] = [
-    (SCENE, include_str!("../../../../scenes/sphere_180z.toml")),
-    ("assets/hands/wide_four_finger/hand.toml", include_str!("../../../../assets/hands/wide_four_finger/hand.toml")),
-    ("assets/hands/wide_four_finger/hand.urdf", include_str!("../../../../assets/hands/wide_four_finger/hand.urdf")),
+    (SCENE, include_str!("../../demo/scenes/sphere_180z.toml")),
+    ("assets/hands/wide_four_finger/hand.toml", include_str!("../../demo/assets/hands/wide_four_finger/hand.toml")),
+    ("assets/hands/wide_four_finger/hand.urdf", include_str!("../../demo/assets/hands/wide_four_finger/hand.urdf")),
 ];
 
 /// Writes the bundled files, plans, checks, writes plan, picture and page.
@@ -36,13 +36,13 @@ pub fn run(arguments: &args::Demo, common: &Common, talk: &Talk) -> Result<(), S
     }
     let scene_path = folder.join(SCENE);
     let loaded = load::scene(&scene_path, common, talk)?;
-    let query = loaded.task.query(arguments.seed);
+    let query = loaded.task().query(arguments.seed);
     let n_threads = available_threads();
     let in_hand = InHandSettings { n_threads, ..InHandSettings::default() };
     let settings = PlannerSettings { in_hand, ..PlannerSettings::default() };
     say_query(&query, arguments.seed, n_threads, talk);
     let limits = Limits { max_work: MAX_WORK, time_limit: None, improve_for: None, cancelled };
-    let plan = search(&loaded.scene, &query, &settings, arguments.seed, &limits, talk)?;
+    let plan = search(&loaded.manipulation(), &query, &settings, arguments.seed, &limits, talk)?;
     let bytes = format::to_json(&plan);
     let (plan_path, chart_path) = (folder.join("plan.json"), folder.join("gait.svg"));
     let options = load::options(common);
@@ -59,7 +59,7 @@ pub fn run(arguments: &args::Demo, common: &Common, talk: &Talk) -> Result<(), S
     talk.say(format!("chart  {}   which finger holds when; open it in a browser", chart_path.display()));
     talk.say(format!("next   regrasp check {}", plan_path.display()));
     let page_path = folder.join("plan.html");
-    Page::new(&page_path, &loaded.scene, &query, &options.resolve).write_plan(&plan, &report, talk)
+    Page::new(&page_path, loaded.manipulation(), &query, &options.resolve).write_plan(&plan, &report, talk)
 }
 
 /// Writes a file and the folders above it.

@@ -13,12 +13,12 @@ use crate::talk::Talk;
 use regrasp::base::{Diagnostic, Place, files};
 use regrasp::export;
 use regrasp::plan::format;
-use regrasp::{Plan, Scene};
+use regrasp::{Manipulation, Plan};
 use serde_json::json;
 use std::path::Path;
 
 /// How a plan becomes the bytes of a file; the scene is there for formats that need it, and where the plan is judged.
-type Write = fn(&Path, &Plan, Option<&Scene>, &Talk) -> Result<Vec<u8>, Stop>;
+type Write = fn(&Path, &Plan, Option<&Manipulation>, &Talk) -> Result<Vec<u8>, Stop>;
 
 /// Reads, judges, writes.
 pub fn run(arguments: &args::Export, common: &Common, talk: &Talk) -> Result<(), Stop> {
@@ -42,15 +42,16 @@ pub fn run(arguments: &args::Export, common: &Common, talk: &Talk) -> Result<(),
     let mut scene = None;
     if !arguments.no_check || arguments.mjcf.is_some() {
         let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref(), "--scene FILE")?;
-        let loaded = arguments.judging.scene(load::scene(&scene_path, common, talk)?);
+        let loaded = arguments.judging.scene(load::scene_of_plan(&scene_path, &plan, common, talk)?);
         written.refuse_inputs(loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
         if !arguments.no_check && !judge::judge(&loaded, &plan, &arguments.judging, talk)?.accepted() {
             return Err(Stop::Rejected);
         }
-        scene = Some(loaded.scene);
+        scene = Some(loaded);
     }
+    let task = scene.as_ref().map(|loaded| loaded.manipulation());
     // All are made before any is written: what one format cannot hold leaves no files of the others.
-    let made = wanted.into_iter().map(|(name, to, write)| Ok((name, to, write(path, &plan, scene.as_ref(), talk)?)));
+    let made = wanted.into_iter().map(|(name, to, write)| Ok((name, to, write(path, &plan, task.as_ref(), talk)?)));
     for (name, path, bytes) in made.collect::<Result<Vec<_>, Stop>>()? {
         files::write_atomic(path, &bytes).map_err(|error| Stop::unwritable(path, &error))?;
         let sha256 = files::sha256(&bytes);
@@ -69,11 +70,11 @@ fn unfit(path: &Path, wrong: &export::ExportError) -> Stop {
 }
 
 /// The MuJoCo model. Errors: the plan is for another hand (`C408`).
-fn mjcf(path: &Path, plan: &Plan, scene: Option<&Scene>, talk: &Talk) -> Result<Vec<u8>, Stop> {
-    let Some(scene) = scene else {
+fn mjcf(path: &Path, plan: &Plan, task: Option<&Manipulation>, talk: &Talk) -> Result<Vec<u8>, Stop> {
+    let Some(task) = task else {
         return Err(Stop::Internal("a MuJoCo model was asked for without a scene".into()));
     };
-    let model = export::to_mjcf(scene, plan).map_err(|error| {
+    let model = export::to_mjcf(task, plan).map_err(|error| {
         let diagnostic = Diagnostic::new("C408", Place::file(path), error.to_string());
         Stop::BadInput(diagnostic.fix("name the scene that the plan was made for: --scene FILE").into())
     })?;

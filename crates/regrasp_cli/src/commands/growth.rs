@@ -1,12 +1,13 @@
 //! `regrasp growth`: how loading and planning grow with fingers, triangles, obstacles and threads.
 
-use super::bench::{make_folder_of, say_row};
 use super::plan::available_threads;
+use super::rows::{make_folder_of, say_row};
 use crate::args;
 use crate::interrupt;
 use crate::outputs::refuse_unwritable;
 use crate::stop::Stop;
-use crate::talk::{Talk, duration, grouped};
+use crate::talk::Talk;
+use crate::words::{duration, grouped};
 use regrasp::InHandSettings;
 use regrasp::base::files;
 use regrasp::plan::check::Level;
@@ -106,8 +107,8 @@ fn plan(
         return (rows, Some(seconds));
     }
     let of_seed = |seed: u64| {
-        let query = loaded.task.query(seed);
-        run_one(Problem { scene: &loaded.scene, query: &query, seed }, settings)
+        let query = loaded.task().query(seed);
+        run_one(Problem { task: loaded.manipulation(), query: &query, seed }, settings)
     };
     let goes_on = |_: &u64| !settings.cancelled.load(Ordering::Relaxed);
     ((0..n_trials).take_while(goes_on).map(of_seed).collect(), None)

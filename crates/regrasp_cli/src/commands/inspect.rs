@@ -5,11 +5,13 @@ use crate::interrupt;
 use crate::load;
 use crate::outputs::{refuse_input, refuse_unwritable};
 use crate::stop::Stop;
-use crate::talk::{Talk, counted, grouped};
+use crate::talk::Talk;
+use crate::words::{counted, grouped};
 use regrasp::base::{Rng, files};
 use regrasp::robot::inspect::{
     HandInspection, InspectSettings, Inspection, JointRow, RobotInspection, hand_file_text, inspect,
 };
+use regrasp::robot::{Finger, Hand};
 use serde_json::json;
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
@@ -92,7 +94,7 @@ fn report(found: &Inspection) -> String {
     let mut out = String::new();
     robot_part(&found.robot, &mut out);
     match &found.hand {
-        Ok((_, table)) => hand_part(table, &mut out),
+        Ok((hand, table)) => hand_part(hand, table, &mut out),
         Err(error) => {
             let _ = writeln!(out, "\nnot a hand as it stands:\n{error}");
         }
@@ -154,12 +156,16 @@ fn joint_line(joint: &JointRow, width: usize, out: &mut String) {
         joint.child
     );
     if let Some(follows) = &joint.follows {
-        let _ = write!(out, "  = {} * {} + {}", follows.multiplier, follows.joint, follows.offset);
+        let _ = write!(out, "  = {} * {}", follows.multiplier, follows.joint);
+        for leader in &follows.others {
+            let _ = write!(out, " + {} * {}", leader.multiplier, leader.joint);
+        }
+        let _ = write!(out, " + {}", follows.offset);
     }
     out.push('\n');
 }
 
-fn hand_part(hand: &HandInspection, out: &mut String) {
+fn hand_part(model: &Hand, hand: &HandInspection, out: &mut String) {
     let _ = writeln!(
         out,
         "\nhand on {}: {}, span {:.1} cm",
@@ -167,17 +173,29 @@ fn hand_part(hand: &HandInspection, out: &mut String) {
         counted(hand.fingers.len(), "finger"),
         100.0 * hand.span
     );
-    for finger in &hand.fingers {
+    let at_rest = tips_at_rest(model);
+    for (finger, tip_at_rest) in hand.fingers.iter().zip(&at_rest) {
         let tip = match finger.tip_shape {
             "sphere" => format!("ball of radius {:.1} mm", 1e3 * finger.tip_radius),
             shape => shape.to_owned(),
         };
         let _ = writeln!(
             out,
-            "  {:<10}  tip {} ({tip})  joints {}",
+            "  {:<10}  tip {} ({tip}), at rest at {}  joints {}",
             finger.name,
             finger.tip_link,
+            metres(tip_at_rest),
             finger.joints.join(", ")
+        );
+    }
+    if !at_rest.is_empty() {
+        let sum = at_rest.iter().fold([0.0; 3], |sum, tip| std::array::from_fn(|axis| sum[axis] + tip[axis]));
+        let middle = sum.map(|value| value / at_rest.len() as f64);
+        let _ = writeln!(
+            out,
+            "  middle of the fingertips at rest: {} m, in the frame of {}: a first guess for the object's start",
+            metres(&middle),
+            hand.base
         );
     }
     let pairs = &hand.pairs;
@@ -207,9 +225,26 @@ fn hand_part(hand: &HandInspection, out: &mut String) {
     }
 }
 
+/// Centres of the fingertips in the rest posture, in the frame of the hand's base link.
+fn tips_at_rest(hand: &Hand) -> Vec<[f64; 3]> {
+    let centre = |finger: &Finger| finger.chain.tip(&finger.rest, &finger.tip.center_in_body).coords.into();
+    hand.fingers.iter().map(centre).collect()
+}
+
+/// `[0.082, -0.003, 0.005]`, as a scene file takes it. Values that round to zero have no sign.
+fn metres(point: &[f64; 3]) -> String {
+    let [x, y, z] = point.map(|value| (value * 1000.0).round() / 1000.0 + 0.0);
+    format!("[{x:.3}, {y:.3}, {z:.3}]")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn positions_are_as_scene_files_take_them() {
+        assert_eq!(metres(&[0.0821, -0.0002, 1.0]), "[0.082, 0.000, 1.000]");
+    }
 
     #[test]
     fn paths_are_seen_from_the_hand_file() {

@@ -10,6 +10,7 @@ mod inspect;
 mod pictures;
 pub mod plan;
 mod roadmap;
+mod rows;
 mod simulate;
 mod suite;
 mod view;

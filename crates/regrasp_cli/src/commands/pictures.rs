@@ -1,16 +1,17 @@
 //! Pictures made without a browser: the storyboard, the charts and the graph.
 
-use super::bench::make_folder_of;
+use super::rows::make_folder_of;
 use crate::args;
 use crate::outputs::Output;
 use crate::stop::Stop;
-use crate::talk::{Talk, grouped};
+use crate::talk::Talk;
+use crate::words::grouped;
 use regrasp::base::{Diagnostic, Place, files};
-use regrasp::told;
+use regrasp::pictures::{failure_story, reached_story};
 use regrasp::viewer::story::{RoadmapStory, Story};
 use regrasp::viewer::storyboard::{StoryboardError, StoryboardSettings, storyboard};
 use regrasp::viewer::{charts, roadmap_picture::roadmap_picture};
-use regrasp::{Failure, InHandQuery};
+use regrasp::{Failure, Query};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -69,12 +70,12 @@ pub fn write(arguments: &args::View, story: &Story, talk: &Talk) -> Result<(), S
 }
 
 /// Writes what there is to be seen of a failure: the causes as bars, and the graph that the search had reached.
-pub fn write_failure(folder: &Path, failure: &Failure, query: &InHandQuery, talk: &Talk) -> Result<(), Stop> {
+pub fn write_failure(folder: &Path, failure: &Failure, query: &Query, talk: &Talk) -> Result<(), Stop> {
     std::fs::create_dir_all(folder).map_err(|error| Stop::unwritable(folder, &error))?;
-    if let Some(chart) = charts::causes(&told::failure_story(failure)) {
+    if let Some(chart) = charts::causes(&failure_story(failure)) {
         put(&folder.join(OF_FAILURE[0]), chart.as_bytes(), talk)?;
     }
-    if let Some(reached) = told::reached_story(failure, &query.world_from_object_goal) {
+    if let Some(reached) = reached_story(failure, query.goal()) {
         let picture = roadmap_picture(&reached, "Grasps that the search reached");
         put(&folder.join(OF_FAILURE[1]), picture.as_bytes(), talk)?;
     }

@@ -9,16 +9,15 @@ use crate::outputs::{Output, Outputs, refuse_no_folder};
 use crate::pages::Page;
 use crate::progress::ProgressLines;
 use crate::stop::Stop;
-use crate::talk::{Talk, counted, duration, grouped};
+use crate::talk::Talk;
+use crate::words::{counted, duration, grouped};
 use regrasp::base::files;
 use regrasp::plan::format;
 use regrasp::plan::plan::Statistics;
 use regrasp::planners::FailureKind;
 use regrasp::planners::in_hand::moved_fingers;
-use regrasp::scene::TaskKind;
-use regrasp::{Budget, Failure, InHandQuery, Plan, PlannerSettings, Scene};
+use regrasp::{Budget, HandView, Manipulation, Plan, PlannerSettings, Query};
 use serde_json::json;
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -33,9 +32,9 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
     let loaded = arguments.judging.scene(load::scene_by(&arguments.scene, common, deadline, talk)?);
     let read = loaded.scene.inputs.iter().map(|input| input.path.as_path());
     written.refuse_inputs(read.chain(arguments.search.settings.as_deref()))?;
-    let query = loaded.task.query(arguments.seed);
+    let query = loaded.task().query(arguments.seed);
     let n_threads = arguments.threads.unwrap_or_else(available_threads);
-    let settings = load::for_task(query.task, &arguments.search, n_threads)?;
+    let settings = load::for_task(loaded.task(), &arguments.search, n_threads)?;
     say_query(&query, arguments.seed, n_threads, talk);
 
     let limits = Limits {
@@ -45,8 +44,8 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
         cancelled,
     };
     let packages = load::options(common).resolve;
-    let page = arguments.report.as_deref().map(|path| Page::new(path, &loaded.scene, &query, &packages));
-    let plan = match (search(&loaded.scene, &query, &settings, arguments.seed, &limits, talk), &page) {
+    let page = arguments.report.as_deref().map(|path| Page::new(path, loaded.manipulation(), &query, &packages));
+    let plan = match (search(&loaded.manipulation(), &query, &settings, arguments.seed, &limits, talk), &page) {
         (Err(Stop::NoPlan(failure)), page) => {
             if let Some(page) = page {
                 page.write_failure(&failure, talk)?;
@@ -132,13 +131,13 @@ pub fn available_threads() -> usize {
 }
 
 /// Says what is asked.
-pub fn say_query(query: &InHandQuery, seed: u64, n_threads: usize, talk: &Talk) {
-    let (start, goal) = (&query.world_from_object_start, &query.world_from_object_goal);
+pub fn say_query(query: &Query, seed: u64, n_threads: usize, talk: &Talk) {
+    let (start, goal) = (query.start(), query.goal());
     let angle = start.rotation.angle_to(&goal.rotation);
     let distance = (goal.translation.vector - start.translation.vector).norm();
-    let n_way = query.world_from_object_way.len();
+    let n_way = query.way().len();
     let way = if n_way == 0 { String::new() } else { format!(", {}", counted(n_way, "way pose")) };
-    if query.task == TaskKind::Tracking {
+    if query.as_tracking().is_some() {
         // The goal says no position, and one thread searches.
         talk.say(format!("query  rotation {:.0} deg, by tracking, seed {seed}", angle.to_degrees()));
         talk.event("query", json!({ "angle": angle, "way_poses": n_way, "seed": seed, "threads": 1 }));
@@ -158,8 +157,8 @@ pub fn say_query(query: &InHandQuery, seed: u64, n_threads: usize, talk: &Talk) 
 
 /// Searches, with progress, and says what was found.
 pub fn search(
-    scene: &Scene,
-    query: &InHandQuery,
+    task: &Manipulation,
+    query: &Query,
     settings: &PlannerSettings,
     seed: u64,
     limits: &Limits,
@@ -174,19 +173,19 @@ pub fn search(
         cancelled: Arc::clone(&limits.cancelled),
     };
     let report = |progress| lines.report(progress);
-    let plan = match regrasp::planners::plan(scene, query, settings, seed, &budget, &report) {
+    let plan = match regrasp::planners::plan((task.scene, task.state), query, settings, seed, &budget, &report) {
         Ok(plan) => plan,
         Err(failure) if failure.kind == FailureKind::Interrupted => return Err(Stop::Interrupted),
         Err(failure) => return Err(Stop::NoPlan(Box::new(failure))),
     };
     say_plan(&plan, started.elapsed().as_secs_f64(), talk);
-    say_moved(scene, query, &plan, talk);
+    say_moved(task, query, &plan, talk);
     Ok(plan)
 }
 
 /// Says which fingers the plan has elsewhere than the query, because they did not touch there.
-fn say_moved(scene: &Scene, query: &InHandQuery, plan: &Plan, talk: &Talk) {
-    for moved in moved_fingers(scene, query, plan) {
+fn say_moved(task: &Manipulation, query: &Query, plan: &Plan, talk: &Talk) {
+    for moved in moved_fingers(&HandView::of(task), query, plan) {
         let micrometres = 1e6 * moved.distance;
         talk.say(format!(
             "note   at the {} finger \"{}\" did not touch as given: it was moved by {micrometres:.0} micrometres",
@@ -265,89 +264,4 @@ fn rejected_path(path: &Path) -> PathBuf {
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(".rejected.json");
     path.with_file_name(name)
-}
-
-/// A failure for people: what, why most often, how near, what to try.
-pub fn failure_text(failure: &Failure) -> String {
-    let heading = match failure.kind {
-        FailureKind::StartInvalid => "NO PLAN: the start is not valid",
-        FailureKind::GoalInvalid => "NO PLAN: the goal is not valid",
-        FailureKind::WayInvalid => "NO PLAN: a way pose is not valid",
-        FailureKind::Impossible => "NO PLAN: impossible with this hand and these contacts",
-        FailureKind::NotConnected => "NO PLAN on this roadmap (not a proof)",
-        FailureKind::WorkSpent => "NO PLAN within the work allowed (not a proof)",
-        FailureKind::TimeLimit => "NO PLAN within the time limit (not a proof)",
-        FailureKind::Interrupted => "interrupted",
-    };
-    let mut out = format!("{heading}\n  {}\n", failure.message);
-    if let Some(miss) = &failure.nearest_miss {
-        let _ = writeln!(
-            out,
-            "  nearest: the object came within {:.0} deg{} of {}",
-            miss.angle_left.to_degrees(),
-            // A goal of tracking says no position.
-            if miss.distance_left > 1e-5 { format!(" and {:.1} mm", 1e3 * miss.distance_left) } else { String::new() },
-            failure.leg.map_or("the goal".to_owned(), |leg| format!("the end of leg {leg}"))
-        );
-    }
-    if !failure.causes.is_empty() {
-        let tried: u64 = failure.causes.iter().map(|cause| cause.count).sum();
-        let _ = writeln!(out, "  {} tries of the search failed:", grouped(tried));
-        for cause in failure.causes.iter().take(8) {
-            let _ = writeln!(out, "    {:>5.1} %  {}", 100.0 * cause.share, cause.reason);
-        }
-    }
-    let statistics = &failure.statistics;
-    if statistics.work > 0 {
-        let _ = writeln!(
-            out,
-            "  searched: {} nodes, {} configurations, {}",
-            grouped(statistics.nodes),
-            grouped(statistics.work),
-            counted(statistics.restarts as usize, "restart")
-        );
-    }
-    if !failure.advice.is_empty() {
-        let _ = writeln!(out, "  try: {}", failure.advice);
-    }
-    out
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use regrasp::plan::plan::PoseData;
-    use regrasp::planners::{Cause, NearestMiss};
-
-    #[test]
-    fn a_failure_is_told_with_causes_nearest_miss_and_advice() {
-        let failure = Failure {
-            kind: FailureKind::TimeLimit,
-            message: "no way in 2 s".into(),
-            advice: "more time: --time-limit 20".into(),
-            causes: vec![
-                Cause { reason: "finger \"thumb\" cannot reach a new contact".into(), count: 3000, share: 0.75 },
-                Cause { reason: "closure lost".into(), count: 1000, share: 0.25 },
-            ],
-            leg: Some(2),
-            nearest_miss: Some(Box::new(NearestMiss {
-                world_from_object: PoseData { position: [0.0; 3], quat_xyzw: [0.0, 0.0, 0.0, 1.0] },
-                angle_left: 61f64.to_radians(),
-                distance_left: 0.0012,
-                joints: vec![],
-            })),
-            reached: None,
-            statistics: Default::default(),
-        };
-        let text = failure_text(&failure);
-        for part in [
-            "not a proof",
-            "within 61 deg and 1.2 mm of the end of leg 2",
-            "4 000 tries",
-            "75.0 %  finger \"thumb\"",
-            "try: more time",
-        ] {
-            assert!(text.contains(part), "{part} is missing in\n{text}");
-        }
-    }
 }

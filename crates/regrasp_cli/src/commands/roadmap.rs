@@ -1,23 +1,24 @@
 //! `regrasp roadmap`: many queries on one saved graph of a hand and an object.
 
-use super::bench::{make_folder_of, of_rows, say_row};
 use super::pictures;
 use super::plan::{available_threads, judge_and_write, of_plan, say_plan, say_query};
+use super::rows::{make_folder_of, of_rows, say_row};
 use crate::args::{self, Common, RoadmapAction};
 use crate::interrupt;
 use crate::judge;
 use crate::load;
 use crate::outputs::{Output, Outputs};
 use crate::stop::Stop;
-use crate::talk::{Talk, counted, duration, grouped};
-use regrasp::Budget;
+use crate::talk::Talk;
+use crate::words::{counted, duration, grouped};
 use regrasp::base::files;
+use regrasp::pictures::{roadmap_from_first, roadmap_story};
 use regrasp::plan::check::Level;
 use regrasp::planners::FailureKind;
 use regrasp::planners::in_hand::roadmap::{
     About, BuildSettings, BuildStage, Census, GraspRoadmap, QueryMemory, Region, RoadmapPlanner, build_roadmap,
 };
-use regrasp::told;
+use regrasp::{Budget, InHandQuery, Query};
 use regrasp_bench::row::Judge;
 use regrasp_bench::{Problem, RunSettings, csv, roadmap as bench, summarise, summary};
 use serde_json::json;
@@ -56,9 +57,10 @@ fn run_build(arguments: &args::RoadmapBuild, common: &Common, talk: &Talk) -> Re
         build.places = usize::try_from(places).unwrap_or(usize::MAX);
     }
     build.validate().map_err(|problem| Stop::argument("A505", "--build-settings", problem, "settings of a build"))?;
-    let query = loaded.task.query(arguments.seed);
-    let poses = [query.world_from_object_start, query.world_from_object_goal];
-    let center_of_mass = loaded.scene.object.center_of_mass;
+    let query = loaded.task().query(arguments.seed);
+    let view = loaded.view();
+    let poses = [query.start(), query.goal()].map(|pose| view.hand_from(pose));
+    let center_of_mass = view.object.center_of_mass;
     let region = Region::around(&poses, &center_of_mass, arguments.within, arguments.angle.to_radians());
 
     let started = Instant::now();
@@ -80,7 +82,7 @@ fn run_build(arguments: &args::RoadmapBuild, common: &Common, talk: &Talk) -> Re
             }),
         );
     };
-    let built = build_roadmap(&loaded.scene, &region, &build, &settings, arguments.seed, &budget, &progress);
+    let built = build_roadmap(&view, &region, &build, &settings, arguments.seed, &budget, &progress);
     let roadmap = match built {
         Ok(roadmap) => roadmap,
         Err(failure) if failure.kind == FailureKind::Interrupted => return Err(Stop::Interrupted),
@@ -122,15 +124,15 @@ fn run_query(arguments: &args::RoadmapQuery, common: &Common, talk: &Talk) -> Re
     for written in [plan, grown] {
         written.refuse_inputs(loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
     }
-    let query = loaded.task.query(arguments.seed);
+    let (query, view) = (loaded.task().query(arguments.seed), loaded.view());
     say_query(&query, arguments.seed, 1, talk);
-    let mut planner = RoadmapPlanner::new(&arguments.roadmap, &roadmap, &loaded.scene)?;
+    let mut planner = RoadmapPlanner::new(&arguments.roadmap, &roadmap, &view)?;
     if arguments.smooth {
         planner = planner.smoothing();
     }
     let budget = Budget { cancelled, ..Budget::work(arguments.max_work) };
     let started = Instant::now();
-    let answer = match planner.plan(&query, arguments.seed, &budget, &mut QueryMemory::default()) {
+    let answer = match planner.plan(in_hand_of(&query), arguments.seed, &budget, &mut QueryMemory::default()) {
         Ok(answer) => answer,
         Err(failure) if failure.kind == FailureKind::Interrupted => return Err(Stop::Interrupted),
         Err(failure) => return Err(Stop::NoPlan(Box::new(failure))),
@@ -153,18 +155,18 @@ fn run_picture(arguments: &args::RoadmapPicture, common: &Common, talk: &Talk) -
     let roadmap = open(&arguments.roadmap, talk)?;
     let name = arguments.roadmap.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     let Some(scene) = &arguments.scene else {
-        let story = told::roadmap_from_first(&roadmap);
+        let story = roadmap_from_first(&roadmap);
         let title = format!("Graph {name}, goal: its first pose");
         return pictures::write_roadmap(&arguments.output, &story, &title, talk);
     };
     let loaded = load::in_hand_scene(scene, ROADMAPS, common, talk)?;
     written.refuse_inputs(loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
-    let query = loaded.task.query(arguments.seed);
+    let (query, view) = (loaded.task().query(arguments.seed), loaded.view());
     say_query(&query, arguments.seed, 1, talk);
-    let planner = RoadmapPlanner::new(&arguments.roadmap, &roadmap, &loaded.scene)?;
+    let planner = RoadmapPlanner::new(&arguments.roadmap, &roadmap, &view)?;
     let budget = Budget { cancelled, ..Budget::work(arguments.max_work) };
     let started = Instant::now();
-    let answer = match planner.plan(&query, arguments.seed, &budget, &mut QueryMemory::default()) {
+    let answer = match planner.plan(in_hand_of(&query), arguments.seed, &budget, &mut QueryMemory::default()) {
         Ok(answer) => answer,
         Err(failure) if failure.kind == FailureKind::Interrupted => return Err(Stop::Interrupted),
         Err(failure) => return Err(Stop::NoPlan(Box::new(failure))),
@@ -176,9 +178,14 @@ fn run_picture(arguments: &args::RoadmapPicture, common: &Common, talk: &Talk) -
         return Err(Stop::Rejected);
     }
     // With start and goal of the query as nodes.
-    let story = told::roadmap_story(&roadmap.grown_by(&answer), &answer.plan);
+    let story = roadmap_story(&roadmap.grown_by(&answer), &view, &answer.plan);
     let title = format!("Graph {name}, goal of {}", loaded.scene.name);
     pictures::write_roadmap(&arguments.output, &story, &title, talk)
+}
+
+/// The in-hand query, of a scene whose task was looked at when it was read.
+fn in_hand_of(query: &Query) -> &InHandQuery {
+    query.as_in_hand().expect("scenes of other tasks were refused")
 }
 
 /// Refuses settings asked for that the roadmap was not built with; what is not asked for is as the roadmap has it.
@@ -191,7 +198,7 @@ fn refuse_other_settings(roadmap: &GraspRoadmap, arguments: &args::RoadmapQuery)
         None => roadmap.about().settings.clone(),
     };
     if let Some(margin) = arguments.margin {
-        asked.closure_margin = margin;
+        asked.physics.closure_margin = margin;
     }
     Ok(roadmap.refuse_other_settings(&arguments.roadmap, &asked)?)
 }
@@ -253,7 +260,7 @@ fn info_text(path: &Path, bytes: u64, seconds: f64, about: &About, census: &Cens
             counted(census.relocations, "relocation")
         ),
         format!("components  {}: {}", census.components.len(), components.join(", ")),
-        format!("margin      {} asked of every holding set", about.settings.closure_margin),
+        format!("margin      {} asked of every holding set", about.settings.physics.closure_margin),
         format!(
             "built       seed {}, grown by {}",
             about.seed,
@@ -287,7 +294,8 @@ fn run_bench(arguments: &args::RoadmapBench, common: &Common, talk: &Talk) -> Re
     let roadmap = open(&arguments.roadmap, talk)?;
     let loaded = arguments.judging.scene(load::in_hand_scene(&arguments.scene, ROADMAPS, common, talk)?);
     written.refuse_inputs(loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
-    let mut planner = RoadmapPlanner::new(&arguments.roadmap, &roadmap, &loaded.scene)?;
+    let view = loaded.view();
+    let mut planner = RoadmapPlanner::new(&arguments.roadmap, &roadmap, &view)?;
     if arguments.smooth {
         planner = planner.smoothing();
     }
@@ -309,8 +317,8 @@ fn run_bench(arguments: &args::RoadmapBench, common: &Common, talk: &Talk) -> Re
     let seeds: Vec<u64> = (0..arguments.queries).map(|number| arguments.first_seed.saturating_add(number)).collect();
     let mut n_single = usize::try_from(arguments.single).unwrap_or(usize::MAX);
     for block in seeds.chunks(bench::BLOCK) {
-        let queries: Vec<_> = block.iter().map(|&seed| planner.random_query(seed)).collect();
-        let problem = |(query, &seed)| Problem { scene: &loaded.scene, query, seed };
+        let queries: Vec<_> = block.iter().map(|&seed| Query::from(planner.random_query(seed))).collect();
+        let problem = |(query, &seed)| Problem { task: loaded.manipulation(), query, seed };
         let problems: Vec<Problem> = queries.iter().zip(block).map(problem).collect();
         let found = bench::run(&planner, &problems, n_single, &settings, &mut memory);
         n_single = n_single.saturating_sub(block.len());

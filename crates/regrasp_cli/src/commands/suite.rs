@@ -1,6 +1,6 @@
 //! `regrasp bench SUITE.toml`: the tables and figures of a paper, measured again; what an earlier run measured is kept.
 
-use super::bench::{make_folder_of, say_row};
+use super::rows::{make_folder_of, say_row};
 use crate::args::{self, Common};
 use crate::interrupt;
 use crate::load;
@@ -82,7 +82,7 @@ fn prepare(
         job.trials = job.trials.min(arguments.seeds.unwrap_or(u64::MAX));
         let loaded = regrasp::scene::load_scene(&job.scene, &load::options(common))?;
         loaded.notes.iter().for_each(|note| talk.note(note));
-        job.refuse_other_task(loaded.task.kind, path)?;
+        job.refuse_other_task(loaded.task(), path)?;
         let inputs = inputs_hash(&program, &loaded.scene, &job);
         plan.push(Part { job, loaded, inputs, done: Vec::new() });
     }
@@ -138,8 +138,8 @@ fn measure(
     let missing: Vec<usize> = (0..part.done.len()).filter(|&seed| part.done[seed].is_none()).collect();
     let run_seed = |index: usize| {
         let seed = missing[index] as u64;
-        let query = part.loaded.task.query(seed);
-        run_one(Problem { scene: &part.loaded.scene, query: &query, seed }, &settings)
+        let query = part.loaded.task().query(seed);
+        run_one(Problem { task: part.loaded.manipulation(), query: &query, seed }, &settings)
     };
     in_order(missing.len(), n_at_once, run_seed, |index, row| {
         if cancelled.load(Ordering::Relaxed) {

@@ -13,9 +13,9 @@ use crate::pages;
 use crate::stop::Stop;
 use crate::talk::Talk;
 use regrasp::base::files;
+use regrasp::pictures::roadmap_story;
 use regrasp::plan::format;
 use regrasp::planners::in_hand::roadmap::GraspRoadmap;
-use regrasp::told;
 use regrasp::viewer::story::{Outcome, Telling};
 use serde_json::json;
 
@@ -31,20 +31,20 @@ pub fn run(arguments: &args::View, common: &Common, talk: &Talk) -> Result<(), S
     pictures::make_folder(arguments)?;
     let plan = format::from_json(&arguments.plan, &files::read(&arguments.plan)?)?;
     let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref(), "regrasp view PLAN SCENE")?;
-    let loaded = arguments.judging.scene(load::scene(&scene_path, common, talk)?);
+    let loaded = arguments.judging.scene(load::scene_of_plan(&scene_path, &plan, common, talk)?);
     written.refuse_inputs(loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
     let roadmap = match &arguments.with_roadmap {
         Some(path) => {
             let roadmap = GraspRoadmap::read(path)?;
-            roadmap.refuse_other_scene(path, &loaded.scene)?;
-            Some(told::roadmap_story(&roadmap, &plan))
+            roadmap.refuse_other_scene(path, &loaded.view())?;
+            Some(roadmap_story(&roadmap, &loaded.view(), &plan))
         }
         None => None,
     };
     let report = judge::judge(&loaded, &plan, &arguments.judging, talk)?;
     let packages = load::options(common).resolve;
     let story = pages::story(&Telling {
-        scene: &loaded.scene,
+        task: loaded.manipulation(),
         query: None,
         outcome: Outcome::Planned { plan: &plan, report: &report },
         title: arguments.title.as_deref(),

@@ -3,16 +3,14 @@
 //! What may touch in the model is what the checker keeps apart (`regrasp_scene::collision_pairs`), pair by pair; pairs that
 //! the hand allows never touch. A round fingertip touches the object with its ball, as the plan means it, and everything else
 //! with the shapes of its link. MuJoCo collides with convex shapes only: an object that is not convex is cut into convex parts, and
-//! a note says by how much they exceed it. `docs/simulate.md` has the settings and where they come from.
+//! a note says by how much they exceed it. `docs/reference/replay.md` has the settings and where they come from.
 
 mod inertia;
 mod model;
-mod object;
-mod pairs;
 mod xml;
 
 use regrasp_plan::Plan;
-use regrasp_scene::Scene;
+use regrasp_scene::Manipulation;
 
 /// A model, ready to be written to a file or loaded from memory.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -38,7 +36,7 @@ pub enum MjcfError {
     },
 }
 
-/// The MuJoCo model of `scene`, with the waypoints of `plan` as keyframes `segment_waypoint`, both from 0.
+/// The MuJoCo model of the scene of `task`, with the waypoints of `plan` as keyframes `segment_waypoint`, both from 0.
 ///
 /// Names: bodies and joints as links and joints of the robot; the object is the body `object` (with underscores where a link
 /// has that name) with the free joint of the same name; of each finger the site `FINGER:tip` at the tip's centre and, for
@@ -46,14 +44,14 @@ pub enum MjcfError {
 /// `object:1` and so on for further convex parts.
 ///
 /// Errors: the plan is not for this scene's hand.
-pub fn to_mjcf(scene: &Scene, plan: &Plan) -> Result<Mjcf, MjcfError> {
-    let fingers: Vec<String> = scene.hand.fingers.iter().map(|finger| finger.name.clone()).collect();
+pub fn to_mjcf(task: &Manipulation, plan: &Plan) -> Result<Mjcf, MjcfError> {
+    let fingers: Vec<String> = task.hand().fingers.iter().map(|finger| finger.name.clone()).collect();
     for (what, in_plan, in_scene) in
-        [("joints", &plan.joint_names, &scene.hand.joint_names()), ("fingers", &plan.fingers, &fingers)]
+        [("joints", &plan.joint_names, &task.hand().joint_names()), ("fingers", &plan.fingers, &fingers)]
     {
         if in_plan != in_scene {
             return Err(MjcfError::AnotherHand { what, plan: in_plan.join(", "), scene: in_scene.join(", ") });
         }
     }
-    Ok(model::write(scene, plan))
+    Ok(model::write(task, plan))
 }

@@ -1,16 +1,19 @@
 //! The model as an MJCF document.
 
+mod object;
+mod pairs;
+
+use super::Mjcf;
 use super::inertia::{self, Inertial};
-use super::object::{ObjectShape, is_hollowed, object_names};
 use super::xml::{Xml, numbers};
-use super::{Mjcf, pairs};
 use nalgebra::UnitQuaternion;
+use object::{ObjectShape, is_hollowed, object_names};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{ConvexHull, Point, Pose, Shape, pose_from};
 use regrasp_plan::Plan;
 use regrasp_robot::tip::is_same_surface;
-use regrasp_robot::{Finger, Hand, JointId, JointKind, LinkId, Motion, TipShape};
-use regrasp_scene::Scene;
+use regrasp_robot::{Coupling, Finger, Hand, Joint, JointId, JointKind, LinkId, Motion, TipShape};
+use regrasp_scene::{HandView, Manipulation, Obstacle};
 
 /// Gravity where the plan says nothing, in m/s^2: along -z of the world.
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
@@ -32,7 +35,7 @@ pub(super) struct GeomNames {
     pub touching: Vec<Vec<String>>,
     /// Of `Hand::palm`.
     pub palm: Vec<String>,
-    /// Of `Scene::obstacles`.
+    /// Of obstacles and everything else that rests.
     pub obstacles: Vec<String>,
     /// Of the object: one for each of its convex parts.
     pub object: Vec<String>,
@@ -60,40 +63,42 @@ struct OwnTip {
     placed: PlacedShape,
 }
 
-pub(super) fn write(scene: &Scene, plan: &Plan) -> Mjcf {
-    let hand = &scene.hand;
+pub(super) fn write(task: &Manipulation, plan: &Plan) -> Mjcf {
+    let (scene, hand) = (task.scene, task.hand());
+    let fixed: Vec<Obstacle> = scene.obstacles.iter().cloned().chain(task.bystanders()).collect();
     let moving: Vec<Vec<JointId>> = hand.fingers.iter().map(|finger| moving_joints(hand, finger)).collect();
-    let shape = ObjectShape::of(&scene.object);
-    let names = geom_names(scene, &shape);
+    let shape = ObjectShape::of(task.object());
+    let names = geom_names(hand, &fixed, &shape);
     let object = unique("object", hand);
     let mut xml = Xml::default();
     xml.open("mujoco", &[("model", scene.name.clone())]);
     write_settings(&mut xml, plan);
-    write_meshes(&mut xml, scene, &shape, &names);
+    write_meshes(&mut xml, task, (&shape, &fixed), &names);
     xml.open("worldbody", &[]);
     xml.leaf("light", &[("pos", "0.3 -0.3 1".into()), ("dir", "-0.3 0.3 -1".into()), ("directional", "true".into())]);
-    for (obstacle, name) in scene.obstacles.iter().zip(&names.obstacles) {
+    for (obstacle, name) in fixed.iter().zip(&names.obstacles) {
         let body_from_shape = obstacle.placed.parent_from_shape;
         write_geom(
             &mut xml,
             &Geom { name, look: Look::Color(OBSTACLE_COLOR), body_from_shape, shape: &obstacle.placed.shape },
         );
     }
-    write_hand(&mut xml, hand, &moving, &names);
-    write_object(&mut xml, scene, plan, (&shape, &names), &object);
+    write_hand(&mut xml, task, &moving, &names);
+    write_object(&mut xml, task, plan, (&shape, &names), &object);
     xml.close();
-    pairs::write(&mut xml, scene, &names);
+    pairs::write(&mut xml, &HandView::of(task), &names);
+    write_sums(&mut xml, hand, &moving);
     write_equalities(&mut xml, hand, &moving, &object);
     write_actuators(&mut xml, hand, &moving);
     write_sensors(&mut xml, hand, &object);
     write_keyframes(&mut xml, hand, plan);
     xml.close();
-    Mjcf { xml: xml.finish(), notes: notes(scene, &shape) }
+    Mjcf { xml: xml.finish(), notes: notes(task, &shape, &fixed) }
 }
 
-fn notes(scene: &Scene, object: &ObjectShape) -> Vec<String> {
-    let of_object = object.note.as_ref().map(|note| format!("\"{}\" is not convex; {note}", scene.object.name));
-    let shapes = scene.obstacles.iter().map(|obstacle| (obstacle.name.as_str(), &obstacle.placed.shape));
+fn notes(task: &Manipulation, object: &ObjectShape, fixed: &[Obstacle]) -> Vec<String> {
+    let of_object = object.note.as_ref().map(|note| format!("\"{}\" is not convex; {note}", task.object().name));
+    let shapes = fixed.iter().map(|obstacle| (obstacle.name.as_str(), &obstacle.placed.shape));
     let of_obstacles = shapes
         .filter(|(_, shape)| is_hollowed(shape))
         .map(|(name, _)| format!("\"{name}\" is not convex; MuJoCo collides with its convex hull"));
@@ -117,8 +122,7 @@ fn unique(name: &str, hand: &Hand) -> String {
     name
 }
 
-fn geom_names(scene: &Scene, object: &ObjectShape) -> GeomNames {
-    let hand = &scene.hand;
+fn geom_names(hand: &Hand, fixed: &[Obstacle], object: &ObjectShape) -> GeomNames {
     let mut used = vec![0; hand.robot.links.len()];
     let mut name_of = |link: LinkId| {
         used[link.0] += 1;
@@ -147,7 +151,7 @@ fn geom_names(scene: &Scene, object: &ObjectShape) -> GeomNames {
         fingers,
         touching,
         palm,
-        obstacles: scene.obstacles.iter().map(|obstacle| format!("obstacle:{}", obstacle.name)).collect(),
+        obstacles: fixed.iter().map(|obstacle| format!("obstacle:{}", obstacle.name)).collect(),
         object: object_names(object),
     }
 }
@@ -205,15 +209,15 @@ fn write_settings(xml: &mut Xml, plan: &Plan) {
     xml.close();
 }
 
-fn write_meshes(xml: &mut Xml, scene: &Scene, object: &ObjectShape, names: &GeomNames) {
-    let hand = &scene.hand;
+fn write_meshes(xml: &mut Xml, task: &Manipulation, (object, fixed): (&ObjectShape, &[Obstacle]), names: &GeomNames) {
+    let hand = task.hand();
     let fingers = hand
         .fingers
         .iter()
         .zip(&names.fingers)
         .flat_map(|(finger, names)| finger.shapes.iter().map(|shape| &shape.placed.shape).zip(names));
     let palm = hand.palm.iter().map(|shape| &shape.placed.shape).zip(&names.palm);
-    let obstacles = scene.obstacles.iter().map(|obstacle| &obstacle.placed.shape).zip(&names.obstacles);
+    let obstacles = fixed.iter().map(|obstacle| &obstacle.placed.shape).zip(&names.obstacles);
     let object = object.parts.iter().zip(&names.object);
     xml.open("asset", &[]);
     let texture = |kind: &str, pattern: &str, colors: [&str; 2]| {
@@ -243,17 +247,17 @@ fn write_meshes(xml: &mut Xml, scene: &Scene, object: &ObjectShape, names: &Geom
     xml.close();
 }
 
-fn write_hand(xml: &mut Xml, hand: &Hand, moving: &[Vec<JointId>], names: &GeomNames) {
-    let base_from_world = hand.world_from_base.inverse();
+fn write_hand(xml: &mut Xml, task: &Manipulation, moving: &[Vec<JointId>], names: &GeomNames) {
+    let hand = task.hand();
     let link_name = |link: LinkId| hand.robot.links[link.0].name.clone();
-    open_body(xml, link_name(hand.base), &hand.world_from_base, false);
+    open_body(xml, link_name(hand.base), &task.world_from_hand(), false);
     for (palm, name) in hand.palm.iter().zip(&names.palm) {
-        let body_from_shape = base_from_world * palm.placed.parent_from_shape;
+        let body_from_shape = palm.placed.parent_from_shape;
         write_geom(xml, &Geom { name, look: Look::Color(PALM_COLOR), body_from_shape, shape: &palm.placed.shape });
     }
     for (index, finger) in hand.fingers.iter().enumerate() {
         let color = FINGER_COLORS[index % FINGER_COLORS.len()];
-        let mut parent = base_from_world;
+        let mut parent = Pose::identity();
         for (body, (joint, &id)) in finger.chain.joints.iter().zip(&moving[index]).enumerate() {
             let as_read = &hand.robot.joints[id.0];
             open_body(xml, link_name(as_read.child), &(parent * joint.parent_from_joint), true);
@@ -290,10 +294,11 @@ fn write_joint(xml: &mut Xml, hand: &Hand, finger: &Finger, body: usize, id: Joi
         Motion::Turn => attributes.push(("type", "hinge".into())),
         Motion::Slide => attributes.extend([("type", "slide".into()), ("class", "slide".into())]),
     }
-    let limits = match as_read.mimic {
+    let limits = match (&as_read.coupling, joint.drive.single()) {
         // The coupling holds a follower within its limits, which the leader's already respect.
-        Some(_) => None,
-        None => Some((finger.chain.lower[joint.coordinate], finger.chain.upper[joint.coordinate])),
+        (Some(_), Some(_)) => None,
+        (Some(_), None) => as_read.limits.map(|limits| (limits.lower, limits.upper)),
+        (None, single) => single.map(|(k, _)| (finger.chain.lower[k], finger.chain.upper[k])),
     };
     if let Some((lower, upper)) =
         limits.filter(|(lower, upper)| lower.is_finite() && upper.is_finite() && lower < upper)
@@ -342,11 +347,17 @@ fn write_tip(xml: &mut Xml, finger: &Finger, names: &[String], color: &str) {
     );
 }
 
-fn write_object(xml: &mut Xml, scene: &Scene, plan: &Plan, (shape, names): (&ObjectShape, &GeomNames), body: &str) {
+fn write_object(
+    xml: &mut Xml,
+    task: &Manipulation,
+    plan: &Plan,
+    (shape, names): (&ObjectShape, &GeomNames),
+    body: &str,
+) {
     let start = &plan.segments[0].waypoints[0].world_from_object;
     open_body(xml, body.to_owned(), &pose_from(start.position, start.quat_xyzw), false);
     xml.leaf("freejoint", &[("name", body.to_owned())]);
-    write_inertial(xml, &inertia::of_object(&scene.object));
+    write_inertial(xml, &inertia::of_object(task.object()));
     for (shape, name) in shape.parts.iter().zip(&names.object) {
         write_geom(xml, &Geom { name, look: Look::Checkers, body_from_shape: Pose::identity(), shape });
     }
@@ -378,23 +389,57 @@ fn place(pose: &Pose) -> [(&'static str, String); 2] {
     [("pos", numbers(pose.translation.vector.iter().copied())), ("quat", numbers([q.w, q.x, q.y, q.z]))]
 }
 
+/// A tendon for each joint that follows several others: its length is the joint's position less the leaders' share.
+fn write_sums(xml: &mut Xml, hand: &Hand, moving: &[Vec<JointId>]) {
+    let sums: Vec<(&Joint, &Coupling)> = moving
+        .iter()
+        .flatten()
+        .map(|id| &hand.robot.joints[id.0])
+        .filter_map(|joint| Some((joint, joint.coupling.as_ref().filter(|coupling| coupling.single().is_none())?)))
+        .collect();
+    if sums.is_empty() {
+        return;
+    }
+    xml.open("tendon", &[]);
+    for (joint, coupling) in sums {
+        xml.open("fixed", &[("name", sum_name(joint))]);
+        xml.leaf("joint", &[("joint", joint.name.clone()), ("coef", "1".into())]);
+        for (leader, multiplier) in &coupling.terms {
+            let name = hand.robot.joints[leader.0].name.clone();
+            xml.leaf("joint", &[("joint", name), ("coef", numbers([-multiplier]))]);
+        }
+        xml.close();
+    }
+    xml.close();
+}
+
+fn sum_name(follower: &Joint) -> String {
+    format!("{}:leaders", follower.name)
+}
+
 /// Followers, and the pin that can hold the object where it starts.
 fn write_equalities(xml: &mut Xml, hand: &Hand, moving: &[Vec<JointId>], object: &str) {
     xml.open("equality", &[]);
     for (finger, ids) in hand.fingers.iter().zip(moving) {
         for (joint, id) in finger.chain.joints.iter().zip(ids) {
             let as_read = &hand.robot.joints[id.0];
-            let Some(mimic) = as_read.mimic else { continue };
-            xml.leaf(
-                "joint",
-                &[
-                    ("joint1", as_read.name.clone()),
-                    ("joint2", hand.robot.joints[mimic.joint.0].name.clone()),
-                    ("polycoef", numbers([joint.offset, joint.multiplier, 0.0, 0.0, 0.0])),
-                    ("solref", "0.004 1".into()),
-                    ("solimp", "0.99 0.999 0.0001".into()),
-                ],
-            );
+            let Some(coupling) = &as_read.coupling else { continue };
+            let stiff = [("solref", "0.004 1".to_owned()), ("solimp", "0.99 0.999 0.0001".to_owned())];
+            let offset = joint.drive.offset;
+            match coupling.single() {
+                Some((leader, multiplier)) => {
+                    let what = [
+                        ("joint1", as_read.name.clone()),
+                        ("joint2", hand.robot.joints[leader.0].name.clone()),
+                        ("polycoef", numbers([offset, multiplier, 0.0, 0.0, 0.0])),
+                    ];
+                    xml.leaf("joint", &[&what[..], &stiff].concat());
+                }
+                None => {
+                    let what = [("tendon1", sum_name(as_read)), ("polycoef", numbers([offset, 0.0, 0.0, 0.0, 0.0]))];
+                    xml.leaf("tendon", &[&what[..], &stiff].concat());
+                }
+            }
         }
     }
     xml.leaf(
@@ -415,7 +460,7 @@ fn write_actuators(xml: &mut Xml, hand: &Hand, moving: &[Vec<JointId>]) {
     xml.open("actuator", &[]);
     for id in moving.iter().flatten() {
         let joint = &hand.robot.joints[id.0];
-        if joint.mimic.is_some() {
+        if joint.coupling.is_some() {
             continue;
         }
         let mut attributes = vec![("name", joint.name.clone()), ("joint", joint.name.clone())];
@@ -453,9 +498,7 @@ fn write_keyframes(xml: &mut Xml, hand: &Hand, plan: &Plan) {
             let mut first = 0;
             for finger in &hand.fingers {
                 let coordinates = &waypoint.joints[first..first + finger.chain.n_coordinates()];
-                let position =
-                    |joint: &regrasp_robot::ChainJoint| joint.multiplier * coordinates[joint.coordinate] + joint.offset;
-                qpos.extend(finger.chain.joints.iter().map(position));
+                qpos.extend(finger.chain.joints.iter().map(|joint| joint.position(coordinates)));
                 first += finger.chain.n_coordinates();
             }
             let pose = &waypoint.world_from_object;

@@ -1,6 +1,6 @@
 //! What stands in a MuJoCo model; the Python tests load it into MuJoCo.
 
-use crate::sample::{PLAN, SCENE};
+use crate::sample::{LOADED, PLAN};
 use regrasp_export::{MjcfError, to_mjcf};
 use regrasp_scene::collision_pairs;
 use std::collections::BTreeSet;
@@ -14,8 +14,8 @@ fn values<'x>(xml: &'x str, name: &str, key: &str) -> Vec<&'x str> {
 
 #[test]
 fn exactly_what_the_checker_keeps_apart_may_touch_and_the_tips() {
-    let xml = to_mjcf(&SCENE, &PLAN).expect("the plan's scene").xml;
-    let pairs = collision_pairs(&SCENE);
+    let xml = to_mjcf(&LOADED.manipulation(), &PLAN).expect("the plan's scene").xml;
+    let pairs = collision_pairs(&LOADED.view());
     let unplanned = pairs.link_object.len()
         + pairs.finger_finger.len()
         + pairs.within_finger.len()
@@ -25,7 +25,7 @@ fn exactly_what_the_checker_keeps_apart_may_touch_and_the_tips() {
         + pairs.object_obstacle.len();
     assert_eq!(values(&xml, "pair", "class").len(), unplanned);
     let (a, b) = (values(&xml, "pair", "geom1"), values(&xml, "pair", "geom2"));
-    assert_eq!(a.len(), unplanned + SCENE.hand.fingers.len());
+    assert_eq!(a.len(), unplanned + LOADED.scene.hands[0].hand.fingers.len());
     let all: BTreeSet<(&str, &str)> = a.iter().zip(&b).map(|(&a, &b)| (a.min(b), a.max(b))).collect();
     assert_eq!(all.len(), a.len(), "a pair stands there twice");
     let geoms: BTreeSet<&str> = values(&xml, "geom", "name").into_iter().collect();
@@ -35,7 +35,7 @@ fn exactly_what_the_checker_keeps_apart_may_touch_and_the_tips() {
 
 #[test]
 fn every_waypoint_is_a_keyframe_and_every_joint_has_a_motor() {
-    let xml = to_mjcf(&SCENE, &PLAN).expect("the plan's scene").xml;
+    let xml = to_mjcf(&LOADED.manipulation(), &PLAN).expect("the plan's scene").xml;
     let n_waypoints: usize = PLAN.segments.iter().map(|segment| segment.waypoints.len()).sum();
     assert_eq!(values(&xml, "key", "name").len(), n_waypoints);
     assert_eq!(values(&xml, "motor", "joint"), PLAN.joint_names);
@@ -52,7 +52,8 @@ fn every_waypoint_is_a_keyframe_and_every_joint_has_a_motor() {
 #[test]
 fn an_object_that_is_not_convex_is_written_in_parts_that_everything_may_touch() {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/bulb.toml");
-    let bulb = regrasp_scene::load_scene(&path, &Default::default()).expect("a bundled scene").scene;
+    let bulb = regrasp_scene::load_scene(&path, &Default::default()).expect("a bundled scene");
+    let bulb = bulb.manipulation();
     let mjcf = to_mjcf(&bulb, &PLAN).expect("the same hand");
     let geoms = values(&mjcf.xml, "geom", "name");
     let parts: Vec<&str> = geoms.into_iter().filter(|name| name.starts_with("object")).collect();
@@ -62,7 +63,7 @@ fn an_object_that_is_not_convex_is_written_in_parts_that_everything_may_touch() 
         a.iter().zip(&b).filter(|(_, other)| **other == part).map(|(name, _)| *name).collect()
     };
     let first = touched_by("object");
-    assert!(first.len() > bulb.hand.fingers.len() + bulb.obstacles.len());
+    assert!(first.len() > bulb.hand().fingers.len() + bulb.scene.obstacles.len());
     assert!(parts.iter().all(|part| touched_by(part) == first));
     assert!(mjcf.notes.iter().any(|note| note.contains("convex parts")), "{:?}", mjcf.notes);
     // The hull of the bulb is a cone from globe to screw, wider than the socket's hole of 11 mm radius. No part is.
@@ -79,8 +80,8 @@ fn an_object_that_is_not_convex_is_written_in_parts_that_everything_may_touch() 
 fn a_plan_for_another_hand_is_refused() {
     let mut plan = PLAN.clone();
     plan.joint_names[0] = "elbow".into();
-    assert!(matches!(to_mjcf(&SCENE, &plan), Err(MjcfError::AnotherHand { what: "joints", .. })));
+    assert!(matches!(to_mjcf(&LOADED.manipulation(), &plan), Err(MjcfError::AnotherHand { what: "joints", .. })));
     let mut plan = PLAN.clone();
     plan.fingers.swap(0, 1);
-    assert!(matches!(to_mjcf(&SCENE, &plan), Err(MjcfError::AnotherHand { what: "fingers", .. })));
+    assert!(matches!(to_mjcf(&LOADED.manipulation(), &plan), Err(MjcfError::AnotherHand { what: "fingers", .. })));
 }

@@ -5,7 +5,7 @@ use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, check};
 use regrasp_planners::{InHandSettings, plan_in_hand};
 use regrasp_robot::import::LoadOptions;
-use regrasp_scene::{LoadedScene, Scene, load_scene};
+use regrasp_scene::{LoadedScene, load_scene};
 use std::path::Path;
 use std::sync::LazyLock;
 
@@ -15,16 +15,17 @@ fn load() -> LoadedScene {
 }
 
 /// The scene that [`PLAN`] is for.
-pub static SCENE: LazyLock<Scene> = LazyLock::new(|| load().scene);
+pub static LOADED: LazyLock<LoadedScene> = LazyLock::new(load);
 
 /// The sphere of the bundled wide hand, turned about x.
 pub static PLAN: LazyLock<Plan> = LazyLock::new(|| {
     let loaded = load();
-    let query = loaded.task.query(3);
+    let query = loaded.task().query(3);
     let budget = Budget::work(1_000_000);
     let plan =
-        plan_in_hand(&loaded.scene, &query, &InHandSettings::default(), 3, &budget, &|_| {}).expect("an easy query");
-    let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+        plan_in_hand(&loaded.view(), query.as_in_hand().unwrap(), &InHandSettings::default(), 3, &budget, &|_| {})
+            .expect("an easy query");
+    let report = check((&loaded.scene, &loaded.state), Some(&query), &plan, &CheckSettings::default());
     assert!(report.accepted(), "{:?}", report.violations);
     plan
 });

@@ -132,7 +132,7 @@ fn meshes_of_too_many_triangles_are_refused_before_they_are_read() {
     assert_eq!(faults(stl(&bytes)), [("M220", None)]);
     let text = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{}", "f 1 2 3\n".repeat(MAX_TRIANGLES + 1));
     assert_eq!(faults(obj(&text)), [("M220", None)]);
-    assert_eq!(MAX_TRIANGLES, 1_500_000, "docs/scene-format.md says so");
+    assert_eq!(MAX_TRIANGLES, 1_500_000, "docs/reference/scene-format.md says so");
 }
 
 #[test]

@@ -4,10 +4,15 @@
 //! Normals are interpolated between vertices, but not across creases. Where parts of the mesh overlap, what lies inside
 //! another part does not belong to the surface.
 
+/// How it bends.
+mod curvature;
+/// Shortest ways on it.
+mod geodesic;
+
 use super::bvh::{Aabb, Bvh};
 use super::geodesic::Geodesic;
 use super::mesh_topology::{NONE, Topology, angle_at, creases, face_normals, patches};
-use super::{SurfaceError, SurfaceKind, SurfacePoint, mesh_curvature, mesh_geodesic, unit_or};
+use super::{SurfaceError, SurfaceKind, SurfacePoint, unit_or};
 use crate::frame::{Point, UnitVector, Vector};
 use crate::mesh::TriangleMesh;
 use nalgebra::Matrix3;
@@ -278,15 +283,15 @@ impl SurfaceKind for MeshSurface {
     }
 
     fn curvature(&self, at: &SurfacePoint) -> [f64; 2] {
-        mesh_curvature::curvature(self, at)
+        curvature::curvature(self, at)
     }
 
     fn shape_operator(&self, at: &SurfacePoint) -> Matrix3<f64> {
-        mesh_curvature::shape_operator(self, at)
+        curvature::shape_operator(self, at)
     }
 
     fn geodesic(&self, a: &SurfacePoint, b: &SurfacePoint) -> Option<Geodesic> {
-        mesh_geodesic::geodesic(self, a, b)
+        geodesic::geodesic(self, a, b)
     }
 }
 

@@ -10,8 +10,6 @@ mod cylinder;
 mod ellipsoid;
 mod geodesic;
 mod mesh;
-mod mesh_curvature;
-mod mesh_geodesic;
 mod mesh_topology;
 mod settle;
 mod smooth_geodesic;

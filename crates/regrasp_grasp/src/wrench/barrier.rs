@@ -5,8 +5,11 @@
 //! barrier, 11.4 phase I). The barrier's weight is fixed: its minimum is unique, lies strictly inside all limits, and
 //! depends analytically on the data.
 
-use super::newton_step::Step;
+/// One Newton step.
+mod newton_step;
+
 use arrayvec::ArrayVec;
+use newton_step::Step;
 
 /// Most contacts.
 pub const MAX_GRIPS: usize = 6;

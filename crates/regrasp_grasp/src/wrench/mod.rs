@@ -9,8 +9,6 @@ pub mod force_distribution;
 /// Small dense linear programs.
 pub mod linear_program;
 /// Newton steps, contact by contact.
-mod newton_step;
-
 pub use force_distribution::{
     BalancedForces, ForceLimits, ForceProblem, JointRow, JointRows, NoForces, Reserve, Rubbing, Wrench, can_balance,
     distribute,

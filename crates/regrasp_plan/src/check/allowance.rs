@@ -11,7 +11,7 @@ use crate::check::level::Level;
 use crate::check::model::Model;
 use crate::check::violation::{Violation, ViolationKind as Kind};
 use crate::plan::Plan;
-use regrasp_scene::Scene;
+use regrasp_scene::Manipulation;
 
 /// Limits may be exceeded by this share: rounding.
 const ROUNDING: f64 = 1e-9;
@@ -21,9 +21,9 @@ const IN_HAND_FRICTION_MARGIN: f64 = 1.5;
 const TRACKING_FRICTION_MARGIN: f64 = 1.0;
 
 /// Judges what the plan allows itself.
-pub fn check_allowance(scene: &Scene, model: &Model, plan: &Plan, log: &mut Log) {
-    check_motion(scene, model, plan, log);
-    check_friction_margin(scene, plan, log);
+pub fn check_allowance(task: &Manipulation, model: &Model, plan: &Plan, log: &mut Log) {
+    check_motion(task, model, plan, log);
+    check_friction_margin(task, plan, log);
     let is_tracking = plan.promises.tracking.is_some();
     match &plan.promises.forces {
         None => {
@@ -35,17 +35,17 @@ pub fn check_allowance(scene: &Scene, model: &Model, plan: &Plan, log: &mut Log)
             log.push(Violation::new(Kind::ForcesAbsent, message).from_level(level));
         }
         Some(forces) => {
-            let (asked, limit) = (forces.normal_force[1], scene.limits.normal_force);
+            let (asked, limit) = (forces.normal_force[1], task.scene.limits.normal_force);
             exceeded(log, "normal_force", None, (asked, limit), "N", Level::Forces);
         }
     }
 }
 
-fn check_motion(scene: &Scene, model: &Model, plan: &Plan, log: &mut Log) {
-    let (motion, limits) = (&plan.promises.motion, &scene.limits);
+fn check_motion(task: &Manipulation, model: &Model, plan: &Plan, log: &mut Log) {
+    let (motion, limits) = (&plan.promises.motion, &task.scene.limits);
     exceeded(log, "largest_speed", None, (motion.largest_speed, limits.largest_speed), "m/s", Level::Motion);
     for (k, name) in model.joint_names.iter().enumerate() {
-        let is_limited = model.drives.iter().any(|drive| drive.coordinate == k && drive.velocity.is_some());
+        let is_limited = model.drives.iter().any(|row| row.drive.is_driven_by(k) && row.velocity.is_some());
         if !is_limited {
             let pair = (motion.joint_velocities[k], limits.joint_velocity);
             exceeded(log, "joint_velocities", Some(name), pair, "per second", Level::Motion);
@@ -68,21 +68,21 @@ fn exceeded(log: &mut Log, key: &str, joint: Option<&str>, (asked, limit): (f64,
 }
 
 /// The friction margin that is asked for: the scene's, else that of the plan's task.
-pub(super) fn friction_margin(scene: &Scene, plan: &Plan) -> f64 {
-    scene.limits.friction_margin.unwrap_or(match plan.promises.tracking.is_some() {
+pub fn friction_margin(task: &Manipulation, plan: &Plan) -> f64 {
+    task.scene.limits.friction_margin.unwrap_or(match plan.promises.tracking.is_some() {
         true => TRACKING_FRICTION_MARGIN,
         false => IN_HAND_FRICTION_MARGIN,
     })
 }
 
 /// The friction counted on is at most the scene's over the friction margin that is asked for.
-fn check_friction_margin(scene: &Scene, plan: &Plan, log: &mut Log) {
-    let asked = friction_margin(scene, plan);
-    let (counted_on, limit) = (plan.promises.friction, scene.object.friction / asked);
+fn check_friction_margin(task: &Manipulation, plan: &Plan, log: &mut Log) {
+    let asked = friction_margin(task, plan);
+    let (counted_on, limit) = (plan.promises.friction, task.object().friction / asked);
     if counted_on > limit * (1.0 + ROUNDING) {
         let message = format!(
             "the plan counts on friction {counted_on}, at most {limit} is accepted: {} of the scene over a margin of {asked} (key \"limits.friction_margin\")",
-            scene.object.friction
+            task.object().friction
         );
         let violation = Violation::new(Kind::FrictionMarginTooSmall, message).subjects(["friction"]);
         log.push(violation.amount(counted_on, limit).from_level(Level::Forces));

@@ -8,7 +8,7 @@ use crate::check::motion::Step;
 use crate::check::promises::{Holder, grips_of, holders};
 use crate::check::{CheckSettings, Log, form_is_sound};
 use crate::plan::{Plan, Segment, SegmentKind, Waypoint};
-use regrasp_scene::Scene;
+use regrasp_scene::Manipulation;
 use std::collections::BTreeMap;
 
 /// With more fingers than this, whose subsets are many, the cone programs are not solved at every waypoint.
@@ -42,16 +42,16 @@ pub struct Along {
 }
 
 /// Margin and clearance along `plan`. Err with a message when the plan is not of this scene, or its form is broken.
-pub fn along(scene: &Scene, plan: &Plan) -> Result<Along, String> {
-    let model = Model::new(scene)?;
+pub fn along(task: &Manipulation, plan: &Plan) -> Result<Along, String> {
+    let model = Model::new(task)?;
     let mut log = Log { most_per_kind: CheckSettings::default().most_per_kind, ..Log::default() };
     if !form_is_sound(&model, plan, &mut log) {
         let first = log.found.first().map(ToString::to_string);
         return Err(first.unwrap_or_else(|| "the plan's form is broken".into()));
     }
-    let bodies = Bodies::new(scene, &model)?;
+    let bodies = Bodies::new(task, &model)?;
     let mut along = Along::default();
-    let mut margins = Margins { body: Body::of(&scene.object, plan), known: BTreeMap::new(), last: None };
+    let mut margins = Margins { body: Body::of(task.object(), plan), known: BTreeMap::new(), last: None };
     let mut clearances = Clearances { bodies: &bodies, names: BTreeMap::new(), nearest: 0 };
     for segment in &plan.segments {
         let moving = moving_finger(&model, segment);

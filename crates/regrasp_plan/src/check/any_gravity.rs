@@ -3,7 +3,7 @@
 //! `K` are the force columns of the least-norm right inverse of the grasp map. Forces `f` that balance nothing, less `w K d`,
 //! balance a weight of `w` newtons along the unit vector `d`. Over all `d`, a row `k` of `K` changes by at most `w |k|`, rows
 //! `T` together by at most `w` times their largest singular value, and what is linear in them alike: what is kept free by as
-//! much is enough for every direction (`docs/plan-format.md`, forces).
+//! much is enough for every direction (`docs/reference/plan-format.md`, forces).
 
 use crate::check::Log;
 use crate::check::closure::{grasp_map, right_inverse};

@@ -1,4 +1,4 @@
-//! Where joints and object are between two waypoints, as `docs/plan-format.md` (Time) defines it, with bounds of how fast.
+//! Where joints and object are between two waypoints, as `docs/reference/plan-format.md` (Time) defines it, with bounds of how fast.
 //!
 //! Every joint follows the cubic through its positions, velocities and times. The object follows
 //! [`pose_between`](crate::check::continuity::pose_between) at the parameter `sigma`: a cubic from 0 to 1 whose slopes at both

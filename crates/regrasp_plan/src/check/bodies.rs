@@ -1,13 +1,13 @@
 //! Everything that can collide, and which pairs must not.
 
-use crate::check::kinematics::Path;
+use crate::check::kinematics::{Path, pose_of};
 use crate::check::model::Model;
 use nalgebra::{Rotation3, UnitQuaternion};
 use regrasp_geometry::reference::ReferenceShape;
 use regrasp_geometry::{Point, Pose, Shape};
 use regrasp_robot::LinkId;
 use regrasp_robot::hand::convex_of;
-use regrasp_scene::Scene;
+use regrasp_scene::Manipulation;
 
 /// What carries an item.
 #[derive(Debug, Clone)]
@@ -29,8 +29,17 @@ pub enum Owner {
     Palm,
     /// The object.
     Object,
-    /// An obstacle.
+    /// An obstacle or a support.
     Obstacle,
+    /// Another hand or another object, which rests.
+    Resting,
+}
+
+impl Owner {
+    /// True for what stands still all through the plan, whatever the hand does.
+    pub fn stands_still(self) -> bool {
+        matches!(self, Owner::Obstacle | Owner::Resting)
+    }
 }
 
 /// A shape on its carrier.
@@ -90,22 +99,23 @@ const WORLD: usize = 1;
 
 impl Bodies {
     /// Reads all shapes of `scene`. Err with a message when a shape cannot be used for queries.
-    pub fn new(scene: &Scene, model: &Model) -> Result<Self, String> {
+    pub fn new(task: &Manipulation, model: &Model) -> Result<Self, String> {
         let mut bodies =
             Bodies { carriers: vec![Carrier::Object, Carrier::World], items: Vec::new(), pairs: Vec::new() };
-        bodies.add_hand(scene, model)?;
-        let object = &scene.object;
+        bodies.add_hand(task, model)?;
+        let object = task.object();
         bodies.add(&object.name, Owner::Object, OBJECT, &Pose::identity(), &object.shape)?;
         // Fingertips touch the shape; everything else keeps away from the hull, where there is one.
         if let Some(hull) = &object.hull {
             bodies.items.last_mut().expect("the object was just added").is_for_tips_only = true;
             bodies.add(&object.name, Owner::Object, OBJECT, &Pose::identity(), hull)?.is_hull = true;
         }
-        for obstacle in &scene.obstacles {
+        for obstacle in &task.scene.obstacles {
             let placed = &obstacle.placed;
             bodies.add(&obstacle.name, Owner::Obstacle, WORLD, &placed.parent_from_shape, &placed.shape)?;
         }
-        bodies.add_pairs(scene);
+        bodies.add_resting(task)?;
+        bodies.add_pairs(task);
         Ok(bodies)
     }
 
@@ -137,16 +147,16 @@ impl Bodies {
         Ok(self.items.last_mut().expect("an item was just added"))
     }
 
-    fn add_hand(&mut self, scene: &Scene, model: &Model) -> Result<(), String> {
-        let robot = &scene.hand.robot;
+    fn add_hand(&mut self, task: &Manipulation, model: &Model) -> Result<(), String> {
+        let robot = &task.hand().robot;
         for (l, link) in robot.links.iter().enumerate() {
             let path = Path::new(robot, LinkId(l), &model.world_from_root, &model.joint_names)?;
             // A link is a finger's when one of that finger's coordinates moves it.
             let owner = path
                 .joints
                 .iter()
-                .filter_map(|joint| joint.coordinate)
-                .find_map(|k| model.fingers.iter().position(|finger| finger.coordinates.contains(&k)))
+                .flat_map(|joint| &joint.drive.terms)
+                .find_map(|&(k, _)| model.fingers.iter().position(|finger| finger.coordinates.contains(&k)))
                 .map_or(Owner::Palm, Owner::Finger);
             let body_depth = path.joints.len();
             let is_tip = matches!(owner, Owner::Finger(f) if model.fingers[f].tip_link.0 == l);
@@ -172,8 +182,41 @@ impl Bodies {
         Ok(())
     }
 
-    fn add_pairs(&mut self, scene: &Scene) {
-        let moves = |&a: &usize| self.items[a].owner != Owner::Obstacle;
+    /// What rests beside the obstacles: supports, the other hands in their postures, the other objects where they are.
+    fn add_resting(&mut self, task: &Manipulation) -> Result<(), String> {
+        let (scene, state) = (task.scene, task.state);
+        for support in &scene.supports {
+            let placed = &support.body.placed;
+            self.add(&support.body.name, Owner::Obstacle, WORLD, &placed.parent_from_shape, &placed.shape)?;
+        }
+        for (h, other) in scene.hands.iter().enumerate().filter(|(h, _)| *h != task.hand_index) {
+            let (robot, joints) = (&other.hand.robot, &state.hand_joints[h]);
+            let model = Model::new(&Manipulation { hand_index: h, ..*task })?;
+            for (l, link) in robot.links.iter().enumerate() {
+                let path = Path::new(robot, LinkId(l), &model.world_from_root, &model.joint_names)?;
+                let world_from_link = pose_of(&path.world_from_link(joints));
+                let name = format!("{}/{}", other.name, link.name);
+                for placed in &link.collision {
+                    let shape = convex_of(&placed.shape).map_err(|error| format!("link \"{name}\": {error}"))?;
+                    self.add(&name, Owner::Resting, WORLD, &(world_from_link * placed.parent_from_shape), &shape)?;
+                }
+            }
+            for finger in &model.fingers {
+                let Some((shape, turn)) = finger.own_shape() else { continue };
+                let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));
+                let at = Pose::from_parts(finger.center.coords.into(), turn);
+                let at = pose_of(&finger.path.world_from_link(joints)) * at;
+                self.add(&format!("{}/tip of {}", other.name, finger.name), Owner::Resting, WORLD, &at, &shape)?;
+            }
+        }
+        for (o, other) in scene.objects.iter().enumerate().filter(|(o, _)| *o != task.object_index) {
+            self.add(&other.name, Owner::Resting, WORLD, &state.world_from_objects[o], other.solid())?;
+        }
+        Ok(())
+    }
+
+    fn add_pairs(&mut self, task: &Manipulation) {
+        let moves = |&a: &usize| !self.items[a].owner.stands_still();
         for a in (0..self.items.len()).filter(moves) {
             for b in 0..self.items.len() {
                 let (first, second) = (&self.items[a], &self.items[b]);
@@ -184,12 +227,14 @@ impl Bodies {
                     }
                     (Owner::Finger(_), Owner::Finger(_)) => a < b,
                     (Owner::Finger(_), Owner::Palm) => first.body_depth > 1,
-                    (Owner::Finger(_) | Owner::Object, Owner::Obstacle) => true,
+                    (Owner::Finger(_) | Owner::Object, Owner::Obstacle | Owner::Resting) => true,
+                    // The palm may be mounted on an obstacle, but not stand in another hand or object.
+                    (Owner::Palm, Owner::Resting) => true,
                     (Owner::Finger(_), Owner::Object) | (Owner::Object, Owner::Palm) => true,
                     _ => false,
                 };
                 let allowed = match (first.link, second.link) {
-                    (Some(p), Some(q)) => scene.hand.may_touch(p, q),
+                    (Some(p), Some(q)) => task.hand().may_touch(p, q),
                     _ => false,
                 };
                 // Of an object with a hull, tips ask for the shape and all others for the hull.

@@ -55,7 +55,7 @@ impl Body {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Certificate {
     /// The contacts that take part, one bit each.
-    subset: u32,
+    subset: u64,
     /// True when soft fingers are taken as points.
     hardened: bool,
     /// Force of each contact that takes part, in the object frame, and its moment about the normal over its torsion radius.
@@ -71,27 +71,62 @@ pub fn margin(grips: &[Grip], body: &Body) -> f64 {
 
 /// As [`margin`], with what proves it; none when no closure could be proved.
 pub fn certified_margin(grips: &[Grip], body: &Body) -> Option<(f64, Certificate)> {
-    let n_contacts = grips.len();
-    assert!(n_contacts <= 16, "the subsets of {n_contacts} contacts are too many");
-    let mut best: Option<(f64, Certificate)> = None;
-    let mut look = |subset: u32, hardened: bool| {
-        let chosen = chosen(grips, subset, hardened);
-        let least = best.as_ref().map_or(0.0, |(margin, _)| *margin);
-        if let Some((margin, forces)) = solved_margin(&chosen, body).filter(|(margin, _)| *margin > least) {
-            let forces = forces_in_object(&chosen, &forces, body);
-            best = Some((margin, Certificate { subset, hardened, forces }));
-        }
-    };
-    for subset in 0u32..1 << n_contacts {
-        let n_soft = (0..n_contacts).filter(|i| subset >> i & 1 == 1 && torsion_radius(&grips[*i]).is_some()).count();
+    let mut search = SubsetSearch { grips, body, best: None };
+    match grips.len() {
+        n if n <= MOST_FOR_ALL_SUBSETS => (0..1 << n).for_each(|subset| _ = search.look(subset)),
+        _ => search.descend(),
+    }
+    search.best
+}
+
+/// With more contacts than this not all subsets are tried: there are 2^n.
+const MOST_FOR_ALL_SUBSETS: usize = 6;
+
+/// Looks for the subset of contacts with the largest margin.
+struct SubsetSearch<'a> {
+    grips: &'a [Grip],
+    body: &'a Body,
+    best: Option<(f64, Certificate)>,
+}
+
+impl SubsetSearch<'_> {
+    /// Tries the contacts whose bit is set: soft fingers taken as such, then as points. Returns their margin.
+    fn look(&mut self, subset: u64) -> f64 {
+        let in_it = (0..self.grips.len()).filter(|i| subset >> i & 1 == 1);
+        let n_soft = in_it.filter(|i| torsion_radius(&self.grips[*i]).is_some()).count();
+        let mut found = 0.0f64;
         if subset.count_ones() >= 3 || (subset.count_ones() == 2 && n_soft > 0) {
-            look(subset, false);
+            found = self.solve(subset, false);
         }
         if subset.count_ones() >= 3 && n_soft > 0 {
-            look(subset, true);
+            found = found.max(self.solve(subset, true));
+        }
+        found
+    }
+
+    fn solve(&mut self, subset: u64, hardened: bool) -> f64 {
+        let chosen = chosen(self.grips, subset, hardened);
+        let Some((margin, forces)) = solved_margin(&chosen, self.body) else { return 0.0 };
+        if margin > self.best.as_ref().map_or(0.0, |(best, _)| *best) {
+            let forces = forces_in_object(&chosen, &forces, self.body);
+            self.best = Some((margin, Certificate { subset, hardened, forces }));
+        }
+        margin
+    }
+
+    /// From all contacts leaves out one at a time, the one without which the margin is largest. What is not tried can only make
+    /// the answer too small: it stays a lower bound.
+    fn descend(&mut self) {
+        let n_contacts = self.grips.len().min(u64::BITS as usize);
+        let mut subset = u64::MAX >> (u64::BITS as usize - n_contacts);
+        self.look(subset);
+        while subset.count_ones() > 3 {
+            let bits = (0..n_contacts).filter(|i| subset >> i & 1 == 1);
+            let without: Vec<(f64, u64)> = bits.map(|i| subset & !(1 << i)).map(|one| (self.look(one), one)).collect();
+            let Some(&(_, best)) = without.iter().max_by(|a, b| a.0.total_cmp(&b.0)) else { return };
+            subset = best;
         }
     }
-    best
 }
 
 /// The margin that forces found for other contacts of the same fingers prove for these; mostly a little smaller than
@@ -113,7 +148,7 @@ pub fn margin_by(certificate: &Certificate, grips: &[Grip], body: &Body) -> f64 
     substituted_margin(&grasp_map, &right_inverse, &cones, &shares, forces, body.friction)
 }
 
-fn chosen(grips: &[Grip], subset: u32, hardened: bool) -> Vec<Grip> {
+fn chosen(grips: &[Grip], subset: u64, hardened: bool) -> Vec<Grip> {
     let chosen: Vec<Grip> = (0..grips.len()).filter(|i| subset >> i & 1 == 1).map(|i| grips[i]).collect();
     if hardened { hardened_grips(&chosen) } else { chosen }
 }

@@ -8,7 +8,8 @@ use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, ContactState, FORMAT, FORMAT_VERSION, Plan, PoseData, Segment, SegmentKind, Waypoint};
 use regrasp_geometry::{Pose, UnitVector, Vector};
-use regrasp_scene::{InHandQuery, TaskKind};
+use regrasp_scene::Query;
+use regrasp_scene::query::TRACKING;
 
 /// Tasks that there are.
 const TASKS: [&str; 2] = ["in_hand", "tracking"];
@@ -23,7 +24,7 @@ pub fn check_form(model: &Model, plan: &Plan, log: &mut Log) {
         log.push(Violation::new(Kind::WrongScene, message));
     }
     let is_tracking = plan.promises.tracking.is_some();
-    if is_tracking != (plan.task == TaskKind::Tracking.name()) {
+    if is_tracking != (plan.task == TRACKING) {
         let message =
             format!("promises {} tracking in a task \"{}\"", if is_tracking { "of" } else { "without" }, plan.task);
         log.push(Violation::new(Kind::WrongScene, message));
@@ -147,12 +148,12 @@ pub fn pose_between(from: &Pose, to: &Pose, t: f64) -> Pose {
 }
 
 /// Start and goal: the plan against the query, and the first and last waypoint against the plan's own header.
-pub fn check_ends(query: Option<&InHandQuery>, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
+pub fn check_ends(query: Option<&Query>, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
     let Some((first, last)) = ends(plan) else { return };
     if let Some(query) = query
-        && plan.task != query.task.name()
+        && plan.task != query.task()
     {
-        let message = format!("the plan's task is \"{}\", the scene's \"{}\"", plan.task, query.task.name());
+        let message = format!("the plan's task is \"{}\", the scene's \"{}\"", plan.task, query.task());
         log.push(Violation::new(Kind::WrongScene, message));
     }
     let last_moment = Moment::at(plan.segments.len() - 1, plan.segments.last().map_or(0, |s| s.waypoints.len() - 1));
@@ -178,8 +179,8 @@ pub fn check_ends(query: Option<&InHandQuery>, plan: &Plan, settings: &CheckSett
         }
         let Some(query) = query else { continue };
         let pose = match kind {
-            Kind::StartMismatch => &query.world_from_object_start,
-            _ => &query.world_from_object_goal,
+            Kind::StartMismatch => query.start(),
+            _ => query.goal(),
         };
         let (distance, angle) = pose_difference(&PoseData::from(pose), asked);
         let distance = if within.is_some() { 0.0 } else { distance };
@@ -230,7 +231,7 @@ pub fn check_joints(model: &Model, plan: &Plan, settings: &CheckSettings, log: &
     for (s, segment) in plan.segments.iter().enumerate() {
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
             for row in &model.limits {
-                let position = row.multiplier * waypoint.joints[row.coordinate] + row.offset;
+                let position = row.drive.position(&waypoint.joints);
                 let beyond = (row.lower - position).max(position - row.upper);
                 if beyond > settings.limit_tolerance {
                     let message = format!(
@@ -276,9 +277,9 @@ fn check_limits_between(
 ) {
     let motion = Between::new(from, to);
     for row in &model.limits {
-        let position = |way: f64| row.multiplier * (from.joints[row.coordinate] + way) + row.offset;
-        let ends = [0.0, motion.joint(row.coordinate).change].map(position);
-        let range = motion.joint(row.coordinate).range().map(position);
+        let (start, way) = (row.drive.position(&from.joints), row.drive.motion(&motion));
+        let ends = [start, start + way.change];
+        let range = way.range().map(|way| start + way);
         let beyond = |[a, b]: [f64; 2]| (row.lower - a.min(b)).max(a.max(b) - row.upper);
         if beyond(range) > settings.limit_tolerance && beyond(ends) <= settings.limit_tolerance {
             let message = format!(

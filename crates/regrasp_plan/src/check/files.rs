@@ -38,8 +38,8 @@ pub fn check_files(
         None => scene_beside(plan_path, &plan)?,
     };
     let loaded = load_scene(&scene_path, options)?;
-    let query = loaded.task.query(plan.seed);
-    let report = check(&loaded.scene, Some(&query), &plan, settings);
+    let query = loaded.task_for(&plan.query).query(plan.seed);
+    let report = check((&loaded.scene, &loaded.state), Some(&query), &plan, settings);
     Ok(CheckedFiles { plan, scene_path, report, notes: loaded.notes })
 }
 

@@ -1,4 +1,4 @@
-//! Contact forces and joint torques, by substitution, as `docs/plan-format.md` (forces) asks.
+//! Contact forces and joint torques, by substitution, as `docs/reference/plan-format.md` (forces) asks.
 //!
 //! Forces are those of the fingers on the object, in the object frame; moments are about its centre of mass. Tolerances are
 //! fields of `CheckSettings`. At every waypoint
@@ -33,7 +33,7 @@ use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactState, ForcePromises, Plan, Segment, Waypoint};
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp::ContactModel;
-use regrasp_scene::{Object, Scene};
+use regrasp_scene::{Manipulation, Object};
 
 /// Standard gravity, in metres per second squared (CGPM 1901).
 pub(super) const GRAVITY: f64 = 9.80665;
@@ -84,18 +84,18 @@ impl Exerted {
 
 /// Judges forces and torques of the whole plan; none when it promises no forces, and has none.
 pub fn check_forces(
-    scene: &Scene,
+    task: &Manipulation,
     model: &Model,
     plan: &Plan,
     settings: &CheckSettings,
     log: &mut Log,
 ) -> Option<Balance> {
-    let object = &scene.object;
+    let object = task.object();
     let Some(promises) = &plan.promises.forces else {
         check_absent(plan, log);
         return None;
     };
-    check_promises(scene, model, promises, log);
+    check_promises(task, model, promises, log);
     if plan.promises.tracking.is_some() && promises.gravity_in_world.is_none() {
         let message = "gravity of any direction in tracking: friction of what slides has but one";
         log.push(Violation::new(Kind::PromiseBroken, message).subjects(["gravity_in_world"]));
@@ -145,8 +145,8 @@ fn check_absent(plan: &Plan, log: &mut Log) {
 }
 
 /// Mass, gravity and limits against scene and robot.
-fn check_promises(scene: &Scene, model: &Model, promises: &ForcePromises, log: &mut Log) {
-    let object = &scene.object;
+fn check_promises(task: &Manipulation, model: &Model, promises: &ForcePromises, log: &mut Log) {
+    let object = task.object();
     let mut broken = |name: &str, amount: f64, limit: f64, message: String| {
         log.push(Violation::new(Kind::PromiseBroken, message).subjects([name]).amount(amount, limit));
     };
@@ -155,7 +155,7 @@ fn check_promises(scene: &Scene, model: &Model, promises: &ForcePromises, log: &
         broken("mass", promises.mass, object.mass, message);
     }
     let promised = promises.gravity_in_world.map(Vector::from);
-    let asked = scene.gravity().in_world().map(|gravity| gravity.normalize() * GRAVITY);
+    let asked = task.scene.gravity().in_world().map(|gravity| gravity.normalize() * GRAVITY);
     let agree = match (promised, asked) {
         (Some(promised), Some(asked)) => (promised - asked).norm() <= GRAVITY_TOLERANCE,
         (promised, asked) => promised.is_none() && asked.is_none(),
@@ -173,9 +173,9 @@ fn check_promises(scene: &Scene, model: &Model, promises: &ForcePromises, log: &
     if !(least >= 0.0 && least <= largest) {
         broken("normal_force", least, largest, format!("normal forces from {least} N to {largest} N"));
     }
-    for drive in model.drives.iter().filter(|drive| !drive.follows) {
-        let Some(effort) = drive.effort else { continue };
-        let promised = promises.joint_torques[drive.coordinate].unwrap_or(f64::INFINITY);
+    for drive in &model.drives {
+        let (Some(coordinate), Some(effort)) = (drive.own_coordinate(), drive.effort) else { continue };
+        let promised = promises.joint_torques[coordinate].unwrap_or(f64::INFINITY);
         if promised > effort * (1.0 + ROUNDING) {
             let message = format!("torque {promised} of joint \"{}\", the robot allows {effort}", drive.name);
             broken("joint_torques", promised, effort, message);
@@ -427,19 +427,19 @@ fn sliding_direction(state: &ContactState, normal: &Vector) -> Option<Vector> {
 }
 
 /// Work of a joint against a force and a couple of its finger's tip, per unit of the coordinate that drives it.
-pub(super) struct JointWork {
+pub struct JointWork {
     /// Index of the coordinate in the joint vector.
-    pub(super) coordinate: usize,
+    pub coordinate: usize,
     /// The work, in newton metres, or newtons of a sliding joint.
-    pub(super) torque: f64,
+    pub torque: f64,
     /// The largest that the work of so great a force and couple could be: force times the largest lever arm, and the couple.
-    pub(super) size: f64,
+    pub size: f64,
 }
 
 /// The work of every joint of `finger` when its tip exerts `force` and `couple` where the object's outward normal is
 /// `normal`, all three in the object frame. The force acts where the tip touches, one radius from its centre: that is the
 /// contact within the contact tolerance.
-pub(super) fn torques_of(
+pub fn torques_of(
     finger: &FingerModel,
     waypoint: &Waypoint,
     normal: &Vector,

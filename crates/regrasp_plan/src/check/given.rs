@@ -8,12 +8,12 @@ use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{Plan, Waypoint};
 use regrasp_geometry::{Pose, Vector};
-use regrasp_scene::{GRASP_TOLERANCE, GRASP_TURN_TOLERANCE, GraspRequest, InHandQuery};
+use regrasp_scene::{GRASP_TOLERANCE, GRASP_TURN_TOLERANCE, GraspRequest, Query};
 
 /// Compares the first and the last waypoint with the grasps that the query gives; one finger is reported for each.
 pub fn check_given(
     shape: &SortedShape,
-    query: Option<&InHandQuery>,
+    query: Option<&Query>,
     model: &Model,
     plan: &Plan,
     settings: &CheckSettings,
@@ -22,11 +22,11 @@ pub fn check_given(
     let (Some(query), Some(first), Some(last)) = (query, plan.segments.first(), plan.segments.last()) else { return };
     let n_last = last.waypoints.len().saturating_sub(1);
     let ends = [
-        (Kind::StartMismatch, "start", &query.start_grasp, first.waypoints.first(), Moment::at(0, 0)),
+        (Kind::StartMismatch, "start", query.start_grasp(), first.waypoints.first(), Moment::at(0, 0)),
         (
             Kind::GoalMismatch,
             "goal",
-            &query.goal_grasp,
+            query.goal_grasp(),
             last.waypoints.last(),
             Moment::at(plan.segments.len() - 1, n_last),
         ),

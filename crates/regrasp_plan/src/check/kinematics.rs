@@ -2,7 +2,7 @@
 //!
 //! Matrices are 4 x 4 and rotations are Rodrigues' formula; nothing here asks `regrasp_robot::Chain`.
 
-use crate::check::between::JointBounds;
+use crate::check::between::{Between, Cubic, JointBounds};
 use nalgebra::{Matrix3, Matrix4, Rotation3, Translation3, UnitQuaternion};
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_robot::{Hand, JointKind, LinkId, Robot};
@@ -18,32 +18,89 @@ pub struct PathJoint {
     pub axis: Vector,
     /// True for a sliding joint.
     pub slides: bool,
-    /// Index in the joint vector; none for a joint that no finger drives.
-    pub coordinate: Option<usize>,
-    /// Position is `multiplier * coordinate + offset`.
-    pub multiplier: f64,
-    /// See `multiplier`.
-    pub offset: f64,
-    /// Position of the driving joint when no finger drives it: the allowed one nearest to zero.
-    pub at_rest: f64,
+    /// What gives it its position.
+    pub drive: Drive,
     /// Largest size of the position, for sliding joints.
     pub largest_slide: f64,
 }
 
-impl PathJoint {
-    fn position(&self, joints: &[f64]) -> f64 {
-        self.multiplier * self.coordinate.map_or(self.at_rest, |k| joints[k]) + self.offset
+/// The position of a joint as a function of the joint vector: a sum of multiples of some of its entries, plus a constant.
+#[derive(Debug, Clone)]
+pub struct Drive {
+    /// Index in the joint vector and multiplier of each driving coordinate; none for a joint that no finger drives.
+    pub terms: Vec<(usize, f64)>,
+    /// The constant, with the share of driving joints that no finger moves: those rest at the allowed position nearest to zero.
+    pub offset: f64,
+}
+
+impl Drive {
+    /// What drives joint `id` of `robot` where `joint_names` name the joint vector.
+    ///
+    /// Err with a message when the joint's coupling leads nowhere.
+    pub fn of(robot: &Robot, id: usize, joint_names: &[String]) -> Result<Self, String> {
+        let joint = &robot.joints[id];
+        let (leaders, offset) = match &joint.coupling {
+            Some(coupling) => {
+                (coupling.terms.iter().map(|(leader, factor)| (leader.0, *factor)).collect(), coupling.offset)
+            }
+            None => (vec![(id, 1.0)], 0.0),
+        };
+        let mut drive = Drive { terms: Vec::new(), offset };
+        for (index, multiplier) in leaders {
+            let leader = robot.joints.get(index).ok_or("a coupled joint follows one that does not exist")?;
+            if joint.coupling.is_some() && leader.coupling.is_some() {
+                return Err(format!("joint \"{}\" follows a joint that follows another", joint.name));
+            }
+            match joint_names.iter().position(|name| *name == leader.name) {
+                Some(coordinate) => drive.terms.push((coordinate, multiplier)),
+                None => {
+                    let at_rest = leader.limits.map_or(0.0, |limits| 0f64.max(limits.lower).min(limits.upper));
+                    drive.offset += multiplier * at_rest;
+                }
+            }
+        }
+        Ok(drive)
+    }
+
+    /// Position of the joint.
+    pub fn position(&self, joints: &[f64]) -> f64 {
+        let products = self.terms.iter().map(|&(k, multiplier)| multiplier * joints[k]);
+        products.reduce(|sum, product| sum + product).unwrap_or(0.0) + self.offset
+    }
+
+    /// The coordinate of a joint that one coordinate alone drives.
+    pub fn single(&self) -> Option<usize> {
+        if self.terms.len() == 1 { Some(self.terms[0].0) } else { None }
+    }
+
+    /// True when coordinate `k` moves the joint.
+    pub fn is_driven_by(&self, k: usize) -> bool {
+        self.terms.iter().any(|term| term.0 == k)
+    }
+
+    /// The joint's motion between two waypoints: a sum of cubics is a cubic.
+    pub fn motion(&self, motion: &Between) -> Cubic {
+        let mut sum = Cubic { change: 0.0, first: 0.0, last: 0.0 };
+        for &(k, multiplier) in &self.terms {
+            let Cubic { change, first, last } = *motion.joint(k);
+            sum.change += multiplier * change;
+            sum.first += multiplier * first;
+            sum.last += multiplier * last;
+        }
+        sum
     }
 
     /// Largest speed and acceleration of the joint, and size of its position.
     fn bounds(&self, joints: &[JointBounds]) -> JointBounds {
-        let Some(k) = self.coordinate else {
-            let size = (self.multiplier * self.at_rest + self.offset).abs();
-            return JointBounds { speed: 0.0, acceleration: 0.0, jerk: 0.0, size };
-        };
-        let (factor, JointBounds { speed, acceleration, jerk, size }) = (self.multiplier.abs(), joints[k]);
-        let size = factor * size + self.offset.abs();
-        JointBounds { speed: factor * speed, acceleration: factor * acceleration, jerk: factor * jerk, size }
+        let mut sum = JointBounds { speed: 0.0, acceleration: 0.0, jerk: 0.0, size: self.offset.abs() };
+        for &(k, multiplier) in &self.terms {
+            let factor = multiplier.abs();
+            sum.speed += factor * joints[k].speed;
+            sum.acceleration += factor * joints[k].acceleration;
+            sum.jerk += factor * joints[k].jerk;
+            sum.size += factor * joints[k].size;
+        }
+        sum
     }
 }
 
@@ -56,7 +113,7 @@ pub struct Path {
     pub last_from_link: Matrix4<f64>,
 }
 
-/// A joint's axis where the joints before it have put it, in the world.
+/// A joint's axis where the joints before it have put it, in the world; once for each coordinate that drives the joint.
 #[derive(Debug, Clone, Copy)]
 pub struct DrivenAxis {
     /// Index, in the joint vector, of the coordinate that drives it.
@@ -106,23 +163,12 @@ impl Path {
             if joint.kind == JointKind::Fixed {
                 continue;
             }
-            let (driver, multiplier, offset) = match &joint.mimic {
-                Some(mimic) => (mimic.joint.0, mimic.multiplier, mimic.offset),
-                None => (id.0, 1.0, 0.0),
-            };
-            let driver = robot.joints.get(driver).ok_or("a coupled joint follows one that does not exist")?;
-            if joint.mimic.is_some() && driver.mimic.is_some() {
-                return Err(format!("joint \"{}\" follows a joint that follows another", joint.name));
-            }
             joints.push(PathJoint {
                 joint: id.0,
                 parent_from_joint: pending,
                 axis: joint.axis.into_inner(),
                 slides: joint.kind == JointKind::Prismatic,
-                coordinate: joint_names.iter().position(|name| *name == driver.name),
-                multiplier,
-                offset,
-                at_rest: driver.limits.map_or(0.0, |limits| 0f64.max(limits.lower).min(limits.upper)),
+                drive: Drive::of(robot, id.0, joint_names)?,
                 largest_slide: joint.limits.map_or(0.0, |limits| limits.lower.abs().max(limits.upper.abs())),
             });
             pending = Matrix4::identity();
@@ -134,7 +180,7 @@ impl Path {
     pub fn world_from_link(&self, joints: &[f64]) -> Matrix4<f64> {
         let mut frame = Matrix4::<f64>::identity();
         for joint in &self.joints {
-            frame = frame * joint.parent_from_joint * motion(joint, joint.position(joints));
+            frame = frame * joint.parent_from_joint * motion(joint, joint.drive.position(joints));
         }
         frame * self.last_from_link
     }
@@ -145,18 +191,12 @@ impl Path {
         let mut axes = Vec::new();
         for joint in &self.joints {
             frame *= joint.parent_from_joint;
-            if let Some(coordinate) = joint.coordinate {
-                let direction = frame.transform_vector(&joint.axis);
-                let origin = frame.transform_point(&Point::origin());
-                axes.push(DrivenAxis {
-                    coordinate,
-                    multiplier: joint.multiplier,
-                    slides: joint.slides,
-                    direction,
-                    origin,
-                });
+            let direction = frame.transform_vector(&joint.axis);
+            let origin = frame.transform_point(&Point::origin());
+            for &(coordinate, multiplier) in &joint.drive.terms {
+                axes.push(DrivenAxis { coordinate, multiplier, slides: joint.slides, direction, origin });
             }
-            frame *= motion(joint, joint.position(joints));
+            frame *= motion(joint, joint.drive.position(joints));
         }
         axes
     }
@@ -173,7 +213,7 @@ impl Path {
 
     /// True when some joint of the path moves.
     pub fn moves(&self, joints: &[JointBounds]) -> bool {
-        self.joints.iter().any(|joint| joint.bounds(joints).speed > 0.0)
+        self.joints.iter().any(|joint| joint.drive.bounds(joints).speed > 0.0)
     }
 
     /// Bounds for every point within `radius` of `center` (in the link frame) while joints move within these bounds.
@@ -185,7 +225,7 @@ impl Path {
         let mut rates = Rates::default();
         let (mut turning, mut bending, mut jerking) = (0.0, 0.0, 0.0);
         for (k, joint) in self.joints.iter().enumerate() {
-            let bounds = joint.bounds(joints);
+            let bounds = joint.drive.bounds(joints);
             let mut length = match self.joints.get(k + 1) {
                 Some(next) => next.parent_from_joint.fixed_view::<3, 1>(0, 3).norm(),
                 None => (self.last_from_link.transform_point(center).coords).norm() + radius,
@@ -232,7 +272,7 @@ pub fn pose_of(matrix: &Matrix4<f64>) -> Pose {
 }
 
 /// Where the hand's root stands, from where its base stands; joints above the base rest.
-pub fn world_from_root(hand: &Hand) -> Result<Pose, String> {
+pub fn world_from_root(hand: &Hand, world_from_hand: &Pose) -> Result<Pose, String> {
     let root_from_base = Path::new(&hand.robot, hand.base, &Pose::identity(), &[])?.world_from_link(&[]);
-    Ok(hand.world_from_base * pose_of(&root_from_base).inverse())
+    Ok(world_from_hand * pose_of(&root_from_base).inverse())
 }

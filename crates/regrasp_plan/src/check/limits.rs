@@ -12,9 +12,10 @@ pub fn leap(model: &Model, plan: &Plan, settings: &CheckSettings) -> Option<Stri
     for (s, segment) in plan.segments.iter().enumerate() {
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
             for row in &model.limits {
-                let position = row.multiplier * waypoint.joints[row.coordinate] + row.offset;
+                let position = row.drive.position(&waypoint.joints);
                 let beyond = (row.lower - position).max(position - row.upper);
-                if !(beyond <= settings.followed(model.slides[row.coordinate])) {
+                let slides = row.drive.terms.iter().any(|(k, _)| model.slides[*k]);
+                if !(beyond <= settings.followed(slides)) {
                     return Some(format!(
                         "segment {s}, waypoint {w}: joint \"{}\" is at {position:.4e}, {beyond:.1e} beyond its limits",
                         row.name

@@ -33,6 +33,8 @@ pub mod find_scene;
 pub mod forces;
 /// Grasps that the query gives.
 pub mod given;
+/// Who holds the object.
+mod holders;
 /// The checker's own forward kinematics and motion bounds.
 pub mod kinematics;
 /// How much a verdict covers.
@@ -45,8 +47,6 @@ pub mod limits;
 pub mod model;
 /// One step between two waypoints, and certificates of separation.
 pub mod motion;
-/// Plans broken in one known way each.
-pub mod mutation;
 /// A piece of the object's surface near a fingertip.
 pub mod patch;
 /// The triangles of a polyhedron in pieces, for questions about what is near.
@@ -81,7 +81,7 @@ pub use violation::{Moment, Violation, ViolationKind};
 
 use crate::plan::Plan;
 use model::Model;
-use regrasp_scene::{InHandQuery, Scene};
+use regrasp_scene::{Manipulation, Query, Scene, State};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -308,16 +308,20 @@ impl Log {
 /// Judges `plan` in `scene`; with a `query`, also whether it answers that query.
 ///
 /// `scene` must be loaded afresh from the files: the hashes in `scene.inputs` are compared with those of the plan.
-pub fn check(scene: &Scene, query: Option<&InHandQuery>, plan: &Plan, settings: &CheckSettings) -> Report {
+/// All that the plan does not move rests in `state`.
+pub fn check((scene, state): (&Scene, &State), query: Option<&Query>, plan: &Plan, settings: &CheckSettings) -> Report {
     let work = limits::Work::of(settings.most_work);
     let mut log = Log { most_per_kind: settings.most_per_kind, work, ..Log::default() };
     let mut report = Report::default();
     promises::check_inputs(plan, &scene.inputs, &mut log);
-    match Model::new(scene) {
-        Err(message) => log.push(Violation::new(ViolationKind::WrongScene, message)),
-        Ok(model) => {
+    let wrong_scene = |message| Violation::new(ViolationKind::WrongScene, message);
+    let found = holders::manipulation(scene, state, query, plan)
+        .and_then(|task| Ok((task, Model::new(&task).map_err(wrong_scene)?)));
+    match found {
+        Err(violation) => log.push(violation),
+        Ok((task, model)) => {
             if form_is_sound(&model, plan, &mut log) {
-                judge(scene, query, plan, settings, &model, &mut log, &mut report);
+                judge(&task, query, plan, settings, &model, &mut log, &mut report);
             }
         }
     }
@@ -341,8 +345,8 @@ fn form_is_sound(model: &Model, plan: &Plan, log: &mut Log) -> bool {
 }
 
 fn judge(
-    scene: &Scene,
-    query: Option<&InHandQuery>,
+    task: &Manipulation,
+    query: Option<&Query>,
     plan: &Plan,
     settings: &CheckSettings,
     model: &Model,
@@ -356,29 +360,30 @@ fn judge(
     continuity::check_meeting(plan, settings, log);
     continuity::check_joints(model, plan, settings, log);
     continuity::check_roles(model, plan, settings, log);
+    holders::check_holders(plan, log);
     let leap = limits::leap(model, plan, settings);
     if leap.is_none() {
-        judge_tips(scene, plan, settings, model, log, report);
+        judge_tips(task, plan, settings, model, log, report);
     }
     contact::check_pads(model, plan, log);
-    contact::check_contacts(&scene.object, model, plan, settings, log);
-    let at_waypoints = promises::check_closure(&scene.object, model, plan, settings, log);
+    contact::check_contacts(task.object(), model, plan, settings, log);
+    let at_waypoints = promises::check_closure(task.object(), model, plan, settings, log);
     let between = match leap {
-        None => rolling_closure::check_rolling_closure(&scene.object, model, plan, settings, log),
+        None => rolling_closure::check_rolling_closure(task.object(), model, plan, settings, log),
         Some(_) => None,
     };
     report.min_margin = at_waypoints.into_iter().chain(between).reduce(f64::min);
-    promises::check_promises(&scene.object, plan, settings, at_waypoints, log);
-    allowance::check_allowance(scene, model, plan, log);
-    times::check_times(&scene.object, model, plan, settings, log);
+    promises::check_promises(task.object(), plan, settings, at_waypoints, log);
+    allowance::check_allowance(task, model, plan, log);
+    times::check_times(task.object(), model, plan, settings, log);
     report.duration = times::duration(plan);
-    if let Some(balance) = forces::check_forces(scene, model, plan, settings, log) {
+    if let Some(balance) = forces::check_forces(task, model, plan, settings, log) {
         report.max_force_residual = Some(balance.force);
         report.max_moment_residual = Some(balance.moment);
         report.max_half_way_imbalance = Some(balance.half_way);
         report.max_sliding_force_error = balance.sliding;
     }
-    match bodies::Bodies::new(scene, model) {
+    match bodies::Bodies::new(task, model) {
         Err(message) => log.push(Violation::new(ViolationKind::WrongScene, message)),
         _ if leap.is_some() => {
             report.left_out.extend(leap.map(|leap| format!("motion between waypoints: {leap}")));
@@ -391,7 +396,14 @@ fn judge(
 }
 
 /// Fingertips on the object, at and between waypoints.
-fn judge_tips(scene: &Scene, plan: &Plan, settings: &CheckSettings, model: &Model, log: &mut Log, report: &mut Report) {
+fn judge_tips(
+    task: &Manipulation,
+    plan: &Plan,
+    settings: &CheckSettings,
+    model: &Model,
+    log: &mut Log,
+    report: &mut Report,
+) {
     let rolled = rolling::check_rolling(&model.shape, model, plan, settings, log);
     let tracked = tracking::check_tracking(&model.shape, model, plan, settings, log);
     let known = rolled.steps.into_iter().chain(tracked.steps).collect();
@@ -399,7 +411,7 @@ fn judge_tips(scene: &Scene, plan: &Plan, settings: &CheckSettings, model: &Mode
     let held = contact::check_tips(model, plan, log);
     report.max_contact_error = held.max(rolled.max_contact_error).max(tracked.max_contact_error);
     report.max_slip = [rolled.max_slip, tracked.max_slip].into_iter().flatten().reduce(f64::max);
-    if let Some(reach) = scene.reach {
+    if let Some(reach) = task.scene.hands[task.hand_index].reach {
         tracking::check_reach(reach, model, plan, settings, log);
     }
 }

@@ -1,13 +1,13 @@
 //! The scene as the checker sees it: paths to links, joint limits and fingertips, straight from the robot.
 
-use crate::check::kinematics::{Path, world_from_root};
+use crate::check::kinematics::{Drive, Path, world_from_root};
 use crate::check::surface::SortedShape;
 use crate::check::tip::TipSurface;
 use nalgebra::Matrix4;
 use regrasp_geometry::{Point, Pose};
 use regrasp_robot::tip::Pad;
 use regrasp_robot::{ContactModel, JointKind, LinkId};
-use regrasp_scene::Scene;
+use regrasp_scene::Manipulation;
 
 /// A finger with its tip; a sharp tip is a ball of radius zero.
 #[derive(Debug, Clone)]
@@ -38,6 +38,22 @@ pub struct FingerModel {
     pub moving_joints: Vec<usize>,
 }
 
+impl LimitRow {
+    /// Brings the joint to `position` by the first coordinate that drives it alone.
+    pub fn put(&self, joints: &mut [f64], position: f64) {
+        let Some(&(k, multiplier)) = self.drive.terms.first() else { return };
+        let others = self.drive.position(joints) - multiplier * joints[k];
+        joints[k] = (position - others) / multiplier;
+    }
+}
+
+impl DriveRow {
+    /// The coordinate of the joint, unless it follows others.
+    pub fn own_coordinate(&self) -> Option<usize> {
+        if self.follows { None } else { self.drive.single() }
+    }
+}
+
 impl FingerModel {
     /// Centre of the tip in the world.
     pub fn center_in_world(&self, joints: &[f64]) -> Point {
@@ -45,17 +61,13 @@ impl FingerModel {
     }
 }
 
-/// The limits of one joint, as a function of the coordinate that drives it.
+/// The limits of one joint, as a function of the coordinates that drive it.
 #[derive(Debug, Clone)]
 pub struct LimitRow {
     /// Name of the joint.
     pub name: String,
-    /// Index in the joint vector.
-    pub coordinate: usize,
-    /// Position is `multiplier * coordinate + offset`.
-    pub multiplier: f64,
-    /// See `multiplier`.
-    pub offset: f64,
+    /// What gives it its position.
+    pub drive: Drive,
     /// Lowest position.
     pub lower: f64,
     /// Highest position.
@@ -67,10 +79,8 @@ pub struct LimitRow {
 pub struct DriveRow {
     /// Name of the joint.
     pub name: String,
-    /// Index in the joint vector of the coordinate that drives it.
-    pub coordinate: usize,
-    /// The joint moves this much as fast as its coordinate; 1 for the driven joint itself.
-    pub multiplier: f64,
+    /// What gives it its position: its own coordinate, unless it follows others.
+    pub drive: Drive,
     /// True for a joint that follows another: it has no drive of its own.
     pub follows: bool,
     /// Highest speed, in rad/s or m/s, where the robot says one.
@@ -100,11 +110,11 @@ pub struct Model {
 
 impl Model {
     /// Reads the hand of `scene`. Err with a message when the hand contradicts itself.
-    pub fn new(scene: &Scene) -> Result<Self, String> {
-        let hand = &scene.hand;
+    pub fn new(task: &Manipulation) -> Result<Self, String> {
+        let hand = task.hand();
         let robot = &hand.robot;
         let joint_names = hand.joint_names();
-        let world_from_root = world_from_root(hand)?;
+        let world_from_root = world_from_root(hand, &task.world_from_hand())?;
         let mut fingers = Vec::new();
         let mut first = 0;
         let at_rest: Vec<f64> = hand.fingers.iter().flat_map(|finger| finger.rest.iter().copied()).collect();
@@ -134,40 +144,30 @@ impl Model {
             let id = robot.joint_named(name).ok_or_else(|| format!("the robot has no joint \"{name}\""))?;
             slides.push(robot.joints[id.0].kind == JointKind::Prismatic);
         }
-        let (limits, drives) = joint_rows(scene, &joint_names)?;
-        let shape = SortedShape::of(&scene.object.shape);
+        let (limits, drives) = joint_rows(task, &joint_names)?;
+        let shape = SortedShape::of(&task.object().shape);
         Ok(Model { slides, limits, drives, joint_names, fingers, world_from_root, shape })
     }
 }
 
-fn joint_rows(scene: &Scene, joint_names: &[String]) -> Result<(Vec<LimitRow>, Vec<DriveRow>), String> {
-    let robot = &scene.hand.robot;
+fn joint_rows(task: &Manipulation, joint_names: &[String]) -> Result<(Vec<LimitRow>, Vec<DriveRow>), String> {
+    let robot = &task.hand().robot;
     let (mut rows, mut drives) = (Vec::new(), Vec::new());
     for (i, joint) in robot.joints.iter().enumerate() {
-        let (driver, multiplier, offset) = match &joint.mimic {
-            Some(mimic) => (mimic.joint.0, mimic.multiplier, mimic.offset),
-            None => (i, 1.0, 0.0),
-        };
-        let driver_name = &robot.joints.get(driver).ok_or("a coupled joint follows one that does not exist")?.name;
-        let Some(coordinate) = joint_names.iter().position(|name| name == driver_name) else { continue };
+        let drive = Drive::of(robot, i, joint_names)?;
+        if drive.terms.is_empty() {
+            continue;
+        }
         drives.push(DriveRow {
             name: joint.name.clone(),
-            coordinate,
-            multiplier,
-            follows: joint.mimic.is_some(),
+            drive: drive.clone(),
+            follows: joint.coupling.is_some(),
             velocity: joint.limits.and_then(|limits| limits.velocity),
             effort: joint.limits.and_then(|limits| limits.effort),
         });
         let bounded = matches!(joint.kind, JointKind::Revolute | JointKind::Prismatic);
         if let (true, Some(limits)) = (bounded, &joint.limits) {
-            rows.push(LimitRow {
-                name: joint.name.clone(),
-                coordinate,
-                multiplier,
-                offset,
-                lower: limits.lower,
-                upper: limits.upper,
-            });
+            rows.push(LimitRow { name: joint.name.clone(), drive, lower: limits.lower, upper: limits.upper });
         }
     }
     Ok((rows, drives))

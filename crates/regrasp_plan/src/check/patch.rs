@@ -155,7 +155,7 @@ mod tests {
 
     fn shapes(rng: &mut Rng) -> Vec<Shape> {
         let points: Vec<Point> = (0..40).map(|_| Point::from(Vector::from(rng.direction()) * 0.03)).collect();
-        let (vertices, triangles) = regrasp_geometry::reference::convex_hull(&points).unwrap();
+        let (vertices, triangles) = regrasp_geometry::hull::convex_hull(&points).unwrap();
         let mesh = regrasp_geometry::TriangleMesh::new(vertices, triangles).unwrap();
         vec![
             Shape::Sphere { radius: 0.03 },

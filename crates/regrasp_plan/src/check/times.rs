@@ -1,4 +1,4 @@
-//! When waypoints are passed, and how fast joints, fingertips and object go, as `docs/plan-format.md` (time) asks.
+//! When waypoints are passed, and how fast joints, fingertips and object go, as `docs/reference/plan-format.md` (time) asks.
 //!
 //! - Time rises in a segment. The next one begins no earlier than it ends, and `shortest_pause` later where a contact force
 //!   is by then another, beyond `force_tolerance`.
@@ -73,8 +73,9 @@ pub fn check_times(object: &Object, model: &Model, plan: &Plan, settings: &Check
 /// The promised limits of joints against the robot's.
 fn check_limits(model: &Model, plan: &Plan, log: &mut Log) {
     let motion = &plan.promises.motion;
-    for drive in model.drives.iter().filter(|drive| !drive.follows) {
-        let promised = motion.joint_velocities[drive.coordinate];
+    for drive in &model.drives {
+        let Some(coordinate) = drive.own_coordinate() else { continue };
+        let promised = motion.joint_velocities[coordinate];
         if let Some(limit) = drive.velocity.filter(|limit| promised > limit * (1.0 + ROUNDING)) {
             let message =
                 format!("joint \"{}\" is promised {promised} per second, the robot allows {limit}", drive.name);
@@ -93,10 +94,10 @@ fn check_limits(model: &Model, plan: &Plan, log: &mut Log) {
 
 fn check_joint_speeds(model: &Model, plan: &Plan, motion: &Between, span: f64, at: Moment, log: &mut Log) {
     for drive in &model.drives {
-        let k = drive.coordinate;
-        let promised = plan.promises.motion.joint_velocities[k] * drive.multiplier.abs();
+        let promises = &plan.promises.motion.joint_velocities;
+        let promised: f64 = drive.drive.terms.iter().map(|&(k, multiplier)| promises[k] * multiplier.abs()).sum();
         let limit = drive.velocity.map_or(promised, |limit| limit.min(promised));
-        let speed = motion.joint(k).largest_slope() / span * drive.multiplier.abs();
+        let speed = drive.drive.motion(motion).largest_slope() / span;
         if speed > limit * (1.0 + ROUNDING) {
             let message = format!("joint \"{}\" goes {speed:.4} per second, {limit:.4} is allowed", drive.name);
             let violation = Violation::new(Kind::JointTooFast, message).when(at);

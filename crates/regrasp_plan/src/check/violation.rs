@@ -38,6 +38,8 @@ pub enum ViolationKind {
     InputHashMismatch,
     /// The plan is of another hand or scene: joint names, finger names, task.
     WrongScene,
+    /// The plan says that others hold the object than those that do, or nobody holds it.
+    WrongHolder,
     /// A number is NaN or infinite, or a rotation or normal is not of length one.
     NotANumber,
     /// The plan does not begin where it was asked to.

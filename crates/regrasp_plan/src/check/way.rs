@@ -4,10 +4,10 @@ use crate::check::continuity::pose_difference;
 use crate::check::violation::{Moment, Violation, ViolationKind::WayPoseMissed};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{Plan, PoseData, WayPose};
-use regrasp_scene::InHandQuery;
+use regrasp_scene::Query;
 
 /// Judges the way poses of `plan`: against the motion, against each other, and with a `query` against what was asked.
-pub fn check_way(query: Option<&InHandQuery>, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
+pub fn check_way(query: Option<&Query>, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
     let mut last = (0, 0);
     for (i, way_pose) in plan.way_poses.iter().enumerate() {
         check_passed(i, way_pose, plan, settings, log);
@@ -19,7 +19,7 @@ pub fn check_way(query: Option<&InHandQuery>, plan: &Plan, settings: &CheckSetti
         last = here;
     }
     let Some(query) = query else { return };
-    let asked = &query.world_from_object_way;
+    let asked = query.way();
     if asked.len() != plan.way_poses.len() {
         let message = format!("{} way poses were asked for, the plan has {}", asked.len(), plan.way_poses.len());
         log.push(Violation::new(WayPoseMissed, message));

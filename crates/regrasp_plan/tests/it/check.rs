@@ -100,10 +100,10 @@ fn a_plan_is_held_to_the_query() {
     let first = &plan.segments[0].waypoints[0];
     let points = first.contacts.iter().map(|c| c.point_in_object.unwrap().into()).collect::<Vec<_>>();
     let judge = |change: &dyn Fn(&mut InHandQuery)| {
-        let mut query = sample::query(&plan);
+        let mut query = sample::in_hand_query(&plan);
         change(&mut query);
-        let report =
-            check(&scene, Some(&query), &plan, &CheckSettings { level: Level::Geometry, ..CheckSettings::default() });
+        let settings = CheckSettings { level: Level::Geometry, ..CheckSettings::default() };
+        let report = check((&scene, &sample::state(&scene)), Some(&query.into()), &plan, &settings);
         report.violations.iter().map(|violation| violation.kind).collect::<Vec<_>>()
     };
     assert!(judge(&|query| query.start_grasp = GraspRequest::Joints(first.joints.clone())).is_empty());
@@ -139,14 +139,19 @@ fn a_contact_near_an_edge_is_reported() {
 
 fn a_contact_near_an_edge_of(shape: Shape) {
     let mut scene = sample::scene();
-    scene.object.shape = shape;
-    scene.object.edge_distance = 0.004;
+    scene.objects[0].shape = shape;
+    scene.objects[0].edge_distance = 0.004;
     let mut plan = sample::plan(&scene);
     let r = sample::OBJECT_RADIUS;
     for (y, reported) in [(r - 0.005, false), (r - 0.003, true)] {
         let contact = &mut plan.segments[0].waypoints[0].contacts[0];
         (contact.point_in_object, contact.normal_in_object) = (Some([r, y, 0.0]), Some([1.0, 0.0, 0.0]));
-        let report = check(&scene, None, &plan, &CheckSettings { most_per_kind: 1000, ..CheckSettings::default() });
+        let report = check(
+            (&scene, &sample::state(&scene)),
+            None,
+            &plan,
+            &CheckSettings { most_per_kind: 1000, ..CheckSettings::default() },
+        );
         let found = report.violations.iter().any(|v| {
             v.kind == ViolationKind::ContactTooNearEdge && v.at == Some(Moment::at(0, 0)) && v.subjects == ["f0"]
         });
@@ -187,7 +192,7 @@ fn what_is_cut_by_the_work_limit_is_not_accepted() {
     let plan = sample::plan(&scene);
     let with = |most_work: u64| {
         let settings = CheckSettings { level: Level::Geometry, most_work, ..CheckSettings::default() };
-        check(&scene, None, &plan, &settings)
+        check((&scene, &sample::state(&scene)), None, &plan, &settings)
     };
     let whole = with(CheckSettings::default().most_work);
     assert!(whole.accepted(), "{whole:?}");

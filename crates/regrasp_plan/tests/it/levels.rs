@@ -109,7 +109,7 @@ fn a_soft_fingertip_that_turns_about_the_normal_slips() {
     let plan = rolled::plan(&scene, 10);
     let twist = |torsion_radius: f64| {
         let mut soft = scene.clone();
-        for finger in &mut soft.hand.fingers {
+        for finger in &mut soft.hands[0].hand.fingers {
             finger.tip.contact = ContactModel::SoftFinger { torsion_radius };
         }
         judge_for(Level::Motion, &soft, &plan)

@@ -35,7 +35,7 @@ pub fn load(mut plan: Plan, scene: &Scene) -> Plan {
         }
     }
     plan.promises.forces = Some(ForcePromises {
-        mass: scene.object.mass,
+        mass: scene.objects[0].mass,
         gravity_in_world: Some(GRAVITY_IN_WORLD),
         normal_force: [1.0, 8.0],
         joint_torques: vec![Some(0.9); plan.joint_names.len()],
@@ -84,7 +84,7 @@ fn add_forces(waypoint: &mut Waypoint, moving: Option<usize>, scene: &Scene) {
     for (f, point) in holding.into_iter().zip(points) {
         waypoint.contacts[f].force_in_object = Some(((centroid - point) * SQUEEZE).into());
     }
-    carry(waypoint, moving, scene, &(Vector::from(GRAVITY_IN_WORLD) * scene.object.mass));
+    carry(waypoint, moving, scene, &(Vector::from(GRAVITY_IN_WORLD) * scene.objects[0].mass));
 }
 
 /// Adds the shortest forces and torsions that balance `weight`, which is in the world.
@@ -94,14 +94,14 @@ fn carry(waypoint: &mut Waypoint, moving: Option<usize>, scene: &Scene, weight: 
     let holding: Vec<usize> =
         (0..sample::N_FINGERS).filter(|&f| Some(f) != moving && waypoint.contacts[f].holds()).collect();
     let contacts: Vec<_> = holding.iter().map(|&f| contact_of(&waypoint.contacts[f]).unwrap()).collect();
-    let torsion_radius = |f: usize| match scene.hand.fingers[f].tip.contact {
+    let torsion_radius = |f: usize| match scene.hands[0].hand.fingers[f].tip.contact {
         ContactModel::SoftFinger { torsion_radius } => torsion_radius,
         _ => 0.0,
     };
     // Columns: three of force for each contact, and one of torsion over torsion radius.
     let mut map = DMatrix::<f64>::zeros(6, 4 * contacts.len());
     for (i, (&f, contact)) in holding.iter().zip(&contacts).enumerate() {
-        let arm = contact.point_in_object - scene.object.center_of_mass;
+        let arm = contact.point_in_object - scene.objects[0].center_of_mass;
         map.view_mut((0, 4 * i), (3, 3)).fill_with_identity();
         map.view_mut((3, 4 * i), (3, 3)).copy_from(&arm.cross_matrix());
         map.view_mut((3, 4 * i + 3), (3, 1)).copy_from(&(contact.normal_in_object.into_inner() * torsion_radius(f)));
@@ -179,10 +179,10 @@ fn what_is_balanced_at_waypoints_far_apart_is_not_in_between() {
 /// Forces that balance nothing, for gravity of any direction.
 pub fn any_gravity_plan(scene: &Scene) -> Plan {
     let mut weightless = scene.clone();
-    weightless.object.mass = 0.0;
+    weightless.objects[0].mass = 0.0;
     let mut plan = load(crate::rolled::plan(scene, 10), &weightless);
     let forces = plan.promises.forces.as_mut().unwrap();
-    (forces.mass, forces.gravity_in_world) = (scene.object.mass, None);
+    (forces.mass, forces.gravity_in_world) = (scene.objects[0].mass, None);
     forces.normal_force = [0.5, 8.0];
     plan
 }
@@ -202,7 +202,7 @@ fn room_for_every_direction_is_room_for_each() {
         for segment in &mut plan.segments {
             let moving = segment.moving_finger.as_ref().map(|name| name[1..].parse::<usize>().unwrap());
             for waypoint in &mut segment.waypoints {
-                carry(waypoint, moving, &scene, &(down * scene.object.mass));
+                carry(waypoint, moving, &scene, &(down * scene.objects[0].mass));
                 add_torques(waypoint);
             }
         }
@@ -212,7 +212,7 @@ fn room_for_every_direction_is_room_for_each() {
         // A heavier object leaves too little room, for one limit or the other.
         let mut plan = squeezed;
         let mut heavy = under_any;
-        heavy.object.mass *= 20.0;
+        heavy.objects[0].mass *= 20.0;
         plan.promises.forces.as_mut().unwrap().mass *= 20.0;
         let found = kinds(&judge(&heavy, &plan));
         assert!(found.contains(&ViolationKind::ForceOutsideCone), "{found:?}");

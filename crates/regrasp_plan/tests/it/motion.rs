@@ -15,19 +15,20 @@ use regrasp_scene::Scene;
 use regrasp_scene::scene::Obstacle;
 
 fn random_joints(scene: &Scene, rng: &mut Rng) -> Vec<f64> {
-    let chains = scene.hand.fingers.iter().map(|finger| &finger.chain);
+    let chains = scene.hands[0].hand.fingers.iter().map(|finger| &finger.chain);
     chains.flat_map(|chain| chain.lower.iter().zip(&chain.upper)).map(|(low, high)| rng.uniform(*low, *high)).collect()
 }
 
 #[test]
 fn tips_are_where_the_chains_say() {
     let scene = sample::scene();
-    let model = Model::new(&scene).unwrap();
+    let model = sample::with_task(&scene, Model::new).unwrap();
     let mut rng = Rng::keyed(1, "tips", 0);
     for _ in 0..200 {
         let joints = random_joints(&scene, &mut rng);
-        for (finger, ours) in scene.hand.fingers.iter().zip(&model.fingers) {
-            let theirs = finger.chain.tip(&joints[ours.coordinates.clone()], &finger.tip.center_in_body);
+        for (finger, ours) in scene.hands[0].hand.fingers.iter().zip(&model.fingers) {
+            let theirs = sample::world_from_hand()
+                * finger.chain.tip(&joints[ours.coordinates.clone()], &finger.tip.center_in_body);
             assert!((ours.center_in_world(&joints) - theirs).norm() < 1e-12);
         }
     }
@@ -51,8 +52,8 @@ fn samples(plan: &Plan) -> Vec<Waypoint> {
 #[test]
 fn chords_and_strays_bound_the_true_motion() {
     let scene = sample::scene();
-    let model = Model::new(&scene).unwrap();
-    let bodies = Bodies::new(&scene, &model).unwrap();
+    let model = sample::with_task(&scene, Model::new).unwrap();
+    let bodies = sample::with_task(&scene, |task| Bodies::new(task, &model)).unwrap();
     let mut rng = Rng::keyed(2, "motion", 0);
     let mut tightest: f64 = 0.0;
     for waypoint in samples(&sample::plan(&scene)) {
@@ -94,8 +95,8 @@ fn what_is_certified_is_clear_and_what_is_clear_is_certified() {
             shape: Shape::Capsule { half_length: 0.02, radius: 0.1e-3 },
         },
     });
-    let model = Model::new(&scene).unwrap();
-    let bodies = Bodies::new(&scene, &model).unwrap();
+    let model = sample::with_task(&scene, Model::new).unwrap();
+    let bodies = sample::with_task(&scene, |task| Bodies::new(task, &model)).unwrap();
     let mut rng = Rng::keyed(3, "motion", 0);
     let resolution = 0.05e-3;
     let (mut certified, mut refused, mut in_between) = (0, 0, 0);
@@ -165,8 +166,8 @@ fn pairs_that_are_left_out_stay_apart_all_the_time() {
     let mut scene = sample::scene();
     let mut rng = Rng::keyed(4, "motion", 0);
     scene.obstacles = obstacles(150, &mut rng);
-    let model = Model::new(&scene).unwrap();
-    let bodies = Bodies::new(&scene, &model).unwrap();
+    let model = sample::with_task(&scene, Model::new).unwrap();
+    let bodies = sample::with_task(&scene, |task| Bodies::new(task, &model)).unwrap();
     let mut looked = Looked::new(&bodies);
     let waypoints = samples(&sample::plan(&scene));
     let mut was_out = vec![false; bodies.pairs.len()];
@@ -215,8 +216,8 @@ fn the_smallest_clearance_among_many_obstacles_is_that_of_all_pairs() {
         parent_from_shape: Pose::translation(over.x, over.y, over.z),
         shape: Shape::Sphere { radius: 0.002 },
     };
-    let model = Model::new(&scene).unwrap();
-    let bodies = Bodies::new(&scene, &model).unwrap();
+    let model = sample::with_task(&scene, Model::new).unwrap();
+    let bodies = sample::with_task(&scene, |task| Bodies::new(task, &model)).unwrap();
     let is_obstacle = |item: usize| bodies.items[item].owner == Owner::Obstacle;
     let mut smallest = f64::INFINITY;
     for segment in &plan.segments {
@@ -227,7 +228,12 @@ fn the_smallest_clearance_among_many_obstacles_is_that_of_all_pairs() {
             }
         }
     }
-    let report = regrasp_plan::check::check(&scene, Some(&sample::query(&plan)), &plan, &Default::default());
+    let report = regrasp_plan::check::check(
+        (&scene, &sample::state(&scene)),
+        Some(&sample::query(&plan)),
+        &plan,
+        &Default::default(),
+    );
     let clearance = report.min_clearance.expect("something was measured");
     assert_eq!(clearance.pair[1], "obstacle over the object");
     assert!(clearance.distance == smallest && (smallest - 0.0005).abs() < 1e-9, "{clearance:?}, {smallest}");

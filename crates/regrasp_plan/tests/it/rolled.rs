@@ -156,7 +156,7 @@ fn sharp_tips_and_resting_objects_do_not_roll() {
     resting.iter_mut().for_each(|waypoint| waypoint.contacts[0].mode = ContactMode::Rolling);
     assert!(kinds(&judge(&scene, &plan)).contains(&ViolationKind::WrongContactMode));
     let mut sharp = sample::scene();
-    for finger in &mut sharp.hand.fingers {
+    for finger in &mut sharp.hands[0].hand.fingers {
         finger.tip.shape = regrasp_robot::TipShape::Point;
     }
     assert!(kinds(&judge(&sharp, &plan)).contains(&ViolationKind::WrongContactMode));
@@ -172,7 +172,7 @@ fn the_smallest_margin_of_contacts_that_roll_is_that_of_every_waypoint_by_itself
             let holding = contacts.iter().enumerate().filter(|(_, contact)| contact.holds());
             let grip = |(f, state): (usize, &ContactState)| Grip {
                 contact: contact_of(state).unwrap(),
-                model: scene.hand.fingers[f].tip.contact,
+                model: scene.hands[0].hand.fingers[f].tip.contact,
             };
             margin(&holding.map(grip).collect::<Vec<_>>(), &body)
         };

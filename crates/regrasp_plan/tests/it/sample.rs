@@ -9,11 +9,11 @@ use regrasp_plan::plan::{FORMAT, FORMAT_VERSION, MotionLimits, PlanInput, PoseDa
 use regrasp_plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
 use regrasp_robot::hand::PalmShape;
 use regrasp_robot::{
-    Chain, ChainJoint, Finger, FingerShape, Hand, Joint, JointId, JointKind, Limits, Link, LinkId, Motion, Robot, Tip,
-    TipShape,
+    Chain, ChainJoint, Coupling, Finger, FingerShape, Hand, Joint, JointId, JointKind, Limits, Link, LinkId, Motion,
+    Robot, Tip, TipShape,
 };
 use regrasp_scene::scene::InputFile;
-use regrasp_scene::{GraspRequest, InHandQuery, Object, Scene, TaskKind};
+use regrasp_scene::{GraspRequest, InHandQuery, Manipulation, Object, Query, Scene, SceneHand, State, TrackingQuery};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -88,7 +88,7 @@ fn robot() -> Robot {
                 parent_from_joint,
                 axis,
                 limits,
-                mimic: None,
+                coupling: None,
             });
             parent = child;
         }
@@ -108,9 +108,7 @@ fn hand() -> Hand {
                         parent_from_joint: joint.parent_from_joint,
                         axis: joint.axis,
                         motion: Motion::Turn,
-                        coordinate: j,
-                        multiplier: 1.0,
-                        offset: 0.0,
+                        drive: Coupling::independent(j),
                     }
                 })
                 .collect();
@@ -149,7 +147,7 @@ fn hand() -> Hand {
         }
     }
     let palm = robot.links[0].collision.iter().map(|p| PalmShape { link: LinkId(0), placed: p.clone() }).collect();
-    Hand { robot: Arc::new(robot), base: LinkId(0), world_from_base: Pose::identity(), fingers, palm, allowed_pairs }
+    Hand { robot: Arc::new(robot), base: LinkId(0), fingers, palm, allowed_pairs }
 }
 
 /// The object: a sphere whose centre of mass is its centre.
@@ -176,13 +174,13 @@ fn surface_of(shape: &Shape) -> regrasp_geometry::Surface {
 
 pub fn scene() -> Scene {
     Scene {
-        reach: None,
         gravity: None,
         // The sample counts on all of its friction.
         limits: regrasp_scene::Limits { friction_margin: Some(1.0), ..Default::default() },
         name: "sample".into(),
-        hand: hand().placed_at(&world_from_hand()),
-        object: object(),
+        hands: vec![SceneHand { name: "hand".into(), hand: hand(), world_from_hand: world_from_hand(), reach: None }],
+        objects: vec![object()],
+        supports: Vec::new(),
         obstacles: Vec::new(),
         inputs: ["scene", "urdf"]
             .map(|role| InputFile {
@@ -193,6 +191,16 @@ pub fn scene() -> Scene {
             })
             .to_vec(),
     }
+}
+
+/// The hand at rest and the object of `scene`; where an object is, plans say themselves.
+pub fn state(scene: &Scene) -> State {
+    State::at_rest(scene, vec![Pose::identity(); scene.objects.len()])
+}
+
+/// Runs `ask` on the one hand and the one object of `scene`.
+pub fn with_task<T>(scene: &Scene, ask: impl FnOnce(&Manipulation) -> T) -> T {
+    ask(&Manipulation::first(scene, &state(scene)))
 }
 
 /// Joints of finger `f` that bring its tip's centre to `center_in_hand`.
@@ -310,12 +318,15 @@ pub fn plan(scene: &Scene) -> Plan {
 }
 
 pub fn plan_of(scene: &Scene, start: &Pose, goal: &Pose, segments: Vec<Segment>) -> Plan {
-    let joint_names = scene.hand.joint_names();
+    let joint_names = scene.hands[0].hand.joint_names();
     let mut plan = Plan {
         format: FORMAT.into(),
         format_version: FORMAT_VERSION,
         tool: "test".into(),
         task: "in_hand".into(),
+        query: String::new(),
+        hand: scene.hands[0].name.clone(),
+        object: scene.objects[0].name.clone(),
         method: "by hand".into(),
         seed: 0,
         settings: serde_json::json!({"lift": 0.004}),
@@ -348,6 +359,9 @@ pub fn plan_of(scene: &Scene, start: &Pose, goal: &Pose, segments: Vec<Segment>)
         segments,
         statistics: Statistics::default(),
     };
+    for segment in &mut plan.segments {
+        segment.held_by = vec![plan.hand.clone()];
+    }
     let mut now = 0.0;
     for waypoint in plan.segments.iter_mut().flat_map(|segment| &mut segment.waypoints) {
         waypoint.time = now;
@@ -385,7 +399,7 @@ pub fn plan_with_free_finger(scene: &Scene) -> Plan {
 /// With soft fingertips, of which two hold the sphere.
 pub fn soft_scene() -> Scene {
     let mut scene = scene();
-    for finger in &mut scene.hand.fingers {
+    for finger in &mut scene.hands[0].hand.fingers {
         finger.tip.contact = regrasp_robot::ContactModel::SoftFinger { torsion_radius: 0.005 };
     }
     scene
@@ -425,9 +439,30 @@ pub fn plan_with_way(scene: &Scene) -> Plan {
 }
 
 /// The query that [`plan`] answers.
-pub fn query(plan: &Plan) -> InHandQuery {
+pub fn query(plan: &Plan) -> Query {
+    if plan.task != regrasp_scene::query::TRACKING {
+        return in_hand_query(plan).into();
+    }
+    let InHandQuery {
+        name,
+        hand,
+        object,
+        world_from_object_start,
+        world_from_object_goal,
+        start_grasp,
+        goal_grasp,
+        ..
+    } = in_hand_query(plan);
+    TrackingQuery { name, hand, object, world_from_object_start, world_from_object_goal, start_grasp, goal_grasp }
+        .into()
+}
+
+/// The query that [`plan`] answers, if it is an in-hand plan.
+pub fn in_hand_query(plan: &Plan) -> InHandQuery {
     InHandQuery {
-        task: if plan.task == "tracking" { TaskKind::Tracking } else { TaskKind::InHand },
+        name: plan.query.clone(),
+        hand: 0,
+        object: 0,
         world_from_object_start: Pose::from(&plan.start),
         world_from_object_way: plan.way_poses.iter().map(|pose| Pose::from(&pose.world_from_object)).collect(),
         world_from_object_goal: Pose::from(&plan.goal),
@@ -443,7 +478,7 @@ pub fn judge(scene: &Scene, plan: &Plan) -> Report {
 
 /// What the checker says of `plan` at this level.
 pub fn judge_for(level: Level, scene: &Scene, plan: &Plan) -> Report {
-    check(scene, Some(&query(plan)), plan, &CheckSettings { level, ..CheckSettings::default() })
+    check((scene, &state(scene)), Some(&query(plan)), plan, &CheckSettings { level, ..CheckSettings::default() })
 }
 
 /// The kinds of violations, each once.

@@ -41,8 +41,8 @@ fn scene(shape: Shape) -> Scene {
     let mut scene = sample::scene();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/hands/four_fingertips/hand.toml");
     let hand = load_hand(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}")).hand;
-    scene.hand = hand.placed_at(&sample::world_from_hand());
-    scene.object = Object {
+    scene.hands[0].hand = hand;
+    scene.objects[0] = Object {
         hull: None,
         name: "object".into(),
         surface: Surface::of(&shape).unwrap(),
@@ -55,14 +55,14 @@ fn scene(shape: Shape) -> Scene {
         edge_distance: 0.002,
         crease_angle: DEFAULT_CREASE_ANGLE,
     };
-    scene.reach = Some(0.1);
+    scene.hands[0].reach = Some(0.1);
     scene
 }
 
 /// With soft fingertips: the friction of what slides turns the ball about the two contacts that hold.
 pub fn ball_scene() -> Scene {
     let mut scene = scene(Shape::Sphere { radius: SIZE });
-    for finger in &mut scene.hand.fingers {
+    for finger in &mut scene.hands[0].hand.fingers {
         finger.tip.contact = ContactModel::SoftFinger { torsion_radius: TORSION_RADIUS };
     }
     scene
@@ -141,7 +141,7 @@ fn joints_at(tips: &[Course; 4], t: f64) -> Vec<f64> {
 fn waypoint(scene: &Scene, motion: &Motion, w: usize) -> Waypoint {
     let t = w as f64 / motion.n_steps as f64;
     let object = (motion.object)(t);
-    let shape = &scene.object.shape;
+    let shape = &scene.objects[0].shape;
     // Means of the step to come, by its middle; of the last, that of the one before.
     let step = w.min(motion.n_steps - 1);
     let middle = (step as f64 + 0.5) / motion.n_steps as f64;
@@ -184,7 +184,7 @@ pub fn segment(scene: &Scene, motion: &Motion, squeeze: &[f64; 4]) -> Segment {
     }
     let name = |f: usize| Some(NAMES[f].to_owned());
     let (moving_finger, rolling_finger) = (name(motion.moving), name(motion.rolling));
-    Segment { kind: SegmentKind::Tracking, moving_finger, also_moving: Vec::new(), rolling_finger, waypoints }
+    Segment { kind: SegmentKind::Tracking, moving_finger, rolling_finger, ..Segment::transfer(waypoints) }
 }
 
 /// The forces nearest to the squeeze that balance, friction of what slides given; and torques by virtual work.
@@ -206,7 +206,7 @@ pub fn add_forces(scene: &Scene, waypoint: &mut Waypoint, squeeze: &[f64; 4], id
         } else {
             columns.extend((0..3).map(|k| (f, Vector::ith(k, 1.0), Vector::zeros())));
             wished.extend((normal * -squeeze[f]).iter());
-            if let ContactModel::SoftFinger { torsion_radius } = scene.hand.fingers[f].tip.contact {
+            if let ContactModel::SoftFinger { torsion_radius } = scene.hands[0].hand.fingers[f].tip.contact {
                 columns.push((f, Vector::zeros(), normal * torsion_radius));
                 wished.push(0.0);
             }
@@ -221,7 +221,7 @@ pub fn add_forces(scene: &Scene, waypoint: &mut Waypoint, squeeze: &[f64; 4], id
     let gives = |f: usize| if waypoint.contacts[f].mode.slides() { GIVE } else { squeeze[f] / SQUEEZE[f] };
     let gives = DVector::from_iterator(columns.len(), columns.iter().map(|(f, ..)| gives(*f)));
     let mut load = DVector::zeros(6);
-    load.rows_mut(0, 3).copy_from(&(-down * scene.object.mass));
+    load.rows_mut(0, 3).copy_from(&(-down * scene.objects[0].mass));
     let wished = DVector::from_vec(wished);
     let missing = load - &map * &wished;
     let given = (map * DMatrix::from_diagonal(&gives)).svd(true, true).solve(&missing, 1e-12).unwrap();
@@ -256,7 +256,7 @@ pub fn add_forces(scene: &Scene, waypoint: &mut Waypoint, squeeze: &[f64; 4], id
 
 /// Times and velocities of all segments, and what the plan promises.
 pub fn plan_of(scene: &mut Scene, segments: Vec<Segment>) -> Plan {
-    for (f, finger) in scene.hand.fingers.iter_mut().enumerate() {
+    for (f, finger) in scene.hands[0].hand.fingers.iter_mut().enumerate() {
         finger.rest = segments[0].waypoints[0].joints[6 * f..6 * f + 6].to_vec();
     }
     let mut plan = sample::plan_of(scene, &Pose::identity(), &Pose::identity(), segments);
@@ -291,7 +291,7 @@ pub fn plan_of(scene: &mut Scene, segments: Vec<Segment>) -> Plan {
         PoseData::from(&pose(Pose::from(&start).translation.vector, goal.rotation * turned(Vector::x() * 0.01)));
     plan.promises.friction = FRICTION;
     (plan.promises.required_margin, plan.promises.kept_margin) = (0.0, 0.0);
-    plan.promises.torque_scale = scene.object.radius;
+    plan.promises.torque_scale = scene.objects[0].radius;
     plan.promises.tracking = Some(TrackingPromises { goal_tolerance: 0.02, sliding_friction: FRICTION });
     plan.promises.motion = MotionLimits {
         largest_speed: 0.1,
@@ -299,7 +299,7 @@ pub fn plan_of(scene: &mut Scene, segments: Vec<Segment>) -> Plan {
         joint_accelerations: [1.0, 1.0, 1.0, 10.0, 10.0, 10.0].repeat(4),
     };
     plan.promises.forces = Some(ForcePromises {
-        mass: scene.object.mass,
+        mass: scene.objects[0].mass,
         gravity_in_world: Some(GRAVITY_IN_WORLD),
         normal_force: [0.1, 30.0],
         joint_torques: [50.0, 50.0, 50.0, 5.0, 5.0, 5.0].repeat(4).into_iter().map(Some).collect(),

@@ -1,150 +1,93 @@
 //! In-hand manipulation by grasp subspaces. Paper 000: Saut, Sahbani, Perdereau, Advanced Robotics 25 (2011); paper 004:
 //! Sahbani, Saut, Perdereau (2007).
 
-/// Attempts, one after the other or several at once.
-mod attempts;
-/// Contacts that a finger could take, and how far it could follow with them.
-pub(crate) mod candidates;
-/// The baseline of paper 000.
-mod classic;
-/// Combinations of candidates: closure, release, worth.
-pub(crate) mod combine;
-/// Joining components of a roadmap.
-mod connect;
-/// What plans cost.
-mod cost;
-/// Paths in GS_n cut into transfers and regrasps.
-mod decompose;
-/// Start and goal as the query gives them.
-pub(crate) mod endpoints;
-/// Sampling GS_n.
-mod explore;
-/// A first try with more room.
-mod first_try;
-/// Contact forces of the fingers.
-pub(crate) mod forces;
-/// Forces and torques along a plan.
-pub(crate) mod forces_along;
-/// Postures of free fingers.
-mod free;
-/// Two gait trees that grow until they meet.
-mod gait;
-/// Given joints and contacts that nearly touch.
-mod given;
-/// Linear paths in GS_n.
-mod grasp_path;
-/// Grasps at a given object pose.
+/// One attempt at a query.
+mod attempt;
+/// Contacts, and the grasps that they make.
 mod grasps;
 /// Better plans after the first.
-mod improve;
-/// Hands that are inside something.
-pub(crate) mod inside;
-/// Legs of a query, from way pose to way pose.
-mod legs;
-/// Links between grasps.
-mod link;
-/// The scene prepared for planning.
-pub(crate) mod model;
-/// Narrow passages at the ends of a leg.
-mod passage;
-/// Candidates gathered at one pose.
-mod pool;
-/// The plan as it is written to a file.
-pub(crate) mod record;
-/// Sequences of relocations from one grasp to another.
-mod regrasp;
-/// The relocation of one finger.
-pub(crate) mod relocate;
+mod improving;
+/// Motions of the object.
+mod moving;
+/// The plan of a solution.
+mod recording;
+/// Queries that no search can answer.
+mod refusals;
+/// Changing one grasp into another.
+mod regrasping;
 /// Many queries on one roadmap.
 pub mod roadmap;
 #[cfg(test)]
 mod roadmap_tests;
-/// Fingertips that roll.
-pub(crate) mod roll;
-/// What all methods share.
-mod search;
+/// The methods.
+mod searching;
 #[cfg(test)]
 mod sequence_tests;
-/// Settings.
-pub mod settings;
-/// Random shortcuts.
-mod shorten;
-/// Motions in which soft fingertips do not turn about their normals.
-mod spin;
-/// Points of GS_n and the motions between them.
-pub(crate) mod state;
-/// Why attempts failed.
-mod tally;
-/// Times of waypoints.
-pub(crate) mod timing;
-/// Where fingertips touch, and joints with which they do.
-mod tip;
-/// Transfer paths.
-mod transfer;
-/// A tree of grasps that grows by gaits.
-mod tree;
-/// Moving fingers that are seldom free to move.
-mod unlock;
-/// Validating a plan once at the planner's resolution: the floor of planning time.
-mod validate;
-/// The method of paper 000.
-mod visibility;
-/// Configurations and continuous collision tests.
-pub(crate) mod workspace;
 
-pub use given::{MovedFinger, moved_fingers};
-pub use settings::{
-    Alpha, CostWeights, FirstTry, ForceSettings, InHandSettings, Method, ReleaseRule, SpeedSettings, TransferMode,
+pub use crate::settings::{
+    Alpha, BaselineSettings, CostWeights, FirstTry, ImprovementSettings, InHandSettings, Method, ReleaseRule,
+    SearchSettings,
 };
-pub use validate::{NotProven, validate_once};
+pub use recording::validate::{NotProven, validate_once};
+pub use regrasp_manipulation::ends::given::{MovedFinger, moved_fingers};
+pub use regrasp_manipulation::progress::Progress;
+pub use regrasp_manipulation::settings::{ForceSettings, PhysicsSettings, SpeedSettings, TransferMode};
 
-use crate::failure::{Failure, FailureKind};
-use attempts::{Left, run_attempts};
-use endpoints::{End, given_grasp, refuse_after_transfers, refuse_hopeless};
-use legs::{Legs, Solution, plan_legs};
-use model::Model;
+use attempt::search::{Context, Search, Stop};
+use attempt::tally::Reason;
+use recording::record;
+use refusals::{given_grasp, refuse_after_transfers, refuse_hopeless};
 use regrasp_base::{Budget, Interrupt, Rng};
+use regrasp_manipulation::ends::end::End;
+use regrasp_manipulation::failure::{Failure, FailureKind};
+use regrasp_manipulation::in_world::{failure_in_world, plan_in_world};
+use regrasp_manipulation::model::Model;
 use regrasp_plan::Plan;
 use regrasp_plan::plan::Statistics;
-use regrasp_scene::{InHandQuery, Scene, TaskKind};
-use search::{Search, Stop};
+use regrasp_scene::{HandView, InHandQuery};
+use searching::attempts::{Left, run_attempts};
+use searching::first_try;
+use searching::legs::{Legs, Solution, plan_legs};
 use std::sync::atomic::AtomicUsize;
-use tally::Reason;
 
-/// What a running search tells its caller.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Progress {
-    /// Nodes so far, in this attempt.
-    pub nodes: u64,
-    /// Configurations looked at so far, in this attempt.
-    pub work: u64,
-    /// Index of the attempt.
-    pub restarts: u64,
-    /// Angle from the goal of the nearest pose reached, in radians.
-    pub angle_left: f64,
+/// What is asked: a query and the seed of all random numbers.
+#[derive(Clone, Copy)]
+struct Asked<'a> {
+    view: &'a HandView<'a>,
+    query: &'a InHandQuery,
+    seed: u64,
+    progress: &'a (dyn Fn(Progress) + Sync),
 }
 
-/// Plans how the hand takes the object from start to goal.
+/// Plans how the hand of `view` takes its object from start to goal. The search is in the hand's frame; query and plan are in the
+/// world. The hand and the object that the query names must be those of the view.
 ///
 /// The plan is the same for the same scene, query, settings and seed on any number of threads. `progress` is called now
-/// and then, from whichever thread is searching. Panics if `settings.validate()` fails.
+/// and then, from whichever thread is searching.
+///
+/// Errors: why there is no plan; settings that do not validate among the reasons.
 pub fn plan_in_hand(
-    scene: &Scene,
+    view: &HandView,
     query: &InHandQuery,
     settings: &InHandSettings,
     seed: u64,
     budget: &Budget,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Plan, Failure> {
-    settings.validate().expect("settings are validated where they are read");
-    if query.task != TaskKind::InHand {
-        let message = format!("a task of kind \"{}\" is none of the in-hand planner's", query.task.name());
-        return Err(Failure::bare(FailureKind::Impossible, message, "plan it with plan_tracking, or regrasp plan"));
-    }
+    settings.validate().map_err(|problem| Failure::of_settings(&problem))?;
+    Failure::refuse_many_fingers(view)?;
+    let seen = view.hand_from_world().map(|hand_from_world| query.seen_from(&hand_from_world));
+    let asked = Asked { view, query: seen.as_ref().unwrap_or(query), seed, progress };
+    let found = plan_in_hand_frame(&asked, settings, budget);
+    found.map(|plan| plan_in_world(view, &query.name, plan)).map_err(|failure| failure_in_world(view, failure))
+}
+
+/// As [`plan_in_hand`], with the query and the answer in the hand's frame.
+fn plan_in_hand_frame(asked: &Asked, settings: &InHandSettings, budget: &Budget) -> Result<Plan, Failure> {
     let mut spent = 0;
-    for (first, work) in first_try::first_tries(scene, settings, budget) {
+    for (first, work) in first_try::first_tries(asked.view, settings, budget) {
         let left = Budget { max_work: budget.max_work.saturating_sub(spent), ..budget.clone() };
-        match plan_with(scene, query, &first, seed, (&left, work), progress) {
+        match plan_with(asked, &first, &left, work) {
             Ok(mut plan) => {
                 plan.statistics.work += spent;
                 return Ok(Plan { settings: record::settings_of(settings), ..plan });
@@ -154,25 +97,20 @@ pub fn plan_in_hand(
         }
     }
     let left = Budget { max_work: budget.max_work.saturating_sub(spent), ..budget.clone() };
-    let mut found = plan_with(scene, query, settings, seed, (&left, left.max_work), progress);
+    let mut found = plan_with(asked, settings, &left, left.max_work);
     let (Ok(Plan { statistics, .. }) | Err(Failure { statistics, .. })) = &mut found;
     statistics.work += spent;
     found
 }
 
-/// As [`plan_in_hand`], with the clearance and closure margin of the settings. The number beside the budget is the work of the
-/// first plan; what improves it has the whole budget.
-fn plan_with(
-    scene: &Scene,
-    query: &InHandQuery,
-    settings: &InHandSettings,
-    seed: u64,
-    (whole, first_work): (&Budget, u64),
-    progress: &(dyn Fn(Progress) + Sync),
-) -> Result<Plan, Failure> {
+/// As [`plan_in_hand`], with the clearance and closure margin of the settings. `first_work` is the work of the first plan; what
+/// improves it has the `whole` budget.
+fn plan_with(asked: &Asked, settings: &InHandSettings, whole: &Budget, first_work: u64) -> Result<Plan, Failure> {
+    let Asked { view, query, seed, progress } = *asked;
     let budget = &Budget { max_work: first_work.min(whole.max_work), ..whole.clone() };
-    let model = Model::new(scene, &effective(settings));
-    refuse_hopeless(&model, query)?;
+    let settings = &effective(settings).within(&view.limits);
+    let model = Model::new(view, &settings.physics);
+    refuse_hopeless(&model, settings, query)?;
     let poses = query.poses();
     let (start_pose, goal_pose) = (query.world_from_object_start, query.world_from_object_goal);
     let mut rng = Rng::keyed(seed, "given_grasps", 0);
@@ -180,11 +118,13 @@ fn plan_with(
     let goal_grasp = given_grasp(&model, End::Goal, &goal_pose, &query.goal_grasp, &mut rng)?;
 
     let legs = Legs { poses: &poses, start_grasp: start_grasp.as_ref(), goal_grasp: goal_grasp.as_ref() };
-    let (base_work, max_work) = work_limits(&model, &legs, budget);
+    let (base_work, max_work) = work_limits(&model, settings, &legs, budget);
     let found = run_attempts(settings.n_threads, base_work, max_work, |index, work, winner| {
-        let mut search = Search::new(&model, (start_pose, goal_pose), (seed, index), (budget, work), winner, progress);
+        let context = Context { model: &model, settings, seed, budget, winner, progress };
+        let mut search = Search::new(context, [start_pose, goal_pose], index, work);
         let planned = plan_legs(&mut search, &legs).and_then(|solution| {
-            let plan = record::record(&model, query, seed, &solution, Statistics::default()).map_err(|unbalanced| {
+            let plan = record::record(&model, settings, query, seed, &solution, Statistics::default());
+            let plan = plan.map_err(|unbalanced| {
                 search.tally.add(Reason::NoForces(unbalanced));
                 Stop::Restart
             })?;
@@ -194,9 +134,10 @@ fn plan_with(
     });
     match found {
         Ok(((solution, plan), left, n_restarts)) => {
-            let statistics = left.statistics(n_restarts);
-            let first = (solution, with_counts(plan, statistics));
-            Ok(improved(&model, &legs, query, seed, whole, first, progress))
+            let first = with_counts(plan, left.statistics(n_restarts));
+            let winner = AtomicUsize::new(usize::MAX);
+            let context = Context { model: &model, settings, seed, budget: whole, winner: &winner, progress };
+            Ok(improved(context, &legs, query, solution, first))
         }
         Err((interrupt, left, n_attempts)) => {
             let failure = left.failure(&model, &poses, interrupt, n_attempts);
@@ -207,9 +148,9 @@ fn plan_with(
 }
 
 /// Work of the first attempt, and of all together.
-fn work_limits(model: &Model, legs: &Legs, budget: &Budget) -> (u64, u64) {
-    let base_work = match model.settings.method {
-        Method::Gait => model.settings.restart_work.saturating_mul(legs.n_legs() as u64),
+fn work_limits(model: &Model, settings: &InHandSettings, legs: &Legs, budget: &Budget) -> (u64, u64) {
+    let base_work = match settings.method {
+        Method::Gait => settings.search.restart_work.saturating_mul(legs.n_legs() as u64),
         Method::Visibility | Method::Classic => budget.max_work,
     };
     // A hand that cannot change its grasp has transfers only: what there is to find is found soon.
@@ -221,27 +162,19 @@ const TRANSFERS_WORK: u64 = 40_000;
 
 /// The plan of a solution after the improvement that the settings ask for; the same plan where what is better geometry
 /// leaves no forces.
-fn improved(
-    model: &Model,
-    legs: &Legs,
-    query: &InHandQuery,
-    seed: u64,
-    budget: &Budget,
-    (solution, mut plan): (Solution, Plan),
-    progress: &(dyn Fn(Progress) + Sync),
-) -> Plan {
-    let work = model.settings.improve_work.min(budget.max_work.saturating_sub(plan.statistics.work));
-    if model.settings.improve_work == 0 {
+fn improved(context: Context, legs: &Legs, query: &InHandQuery, solution: Solution, mut plan: Plan) -> Plan {
+    let Context { model, settings, seed, budget, .. } = context;
+    let work = settings.improvement.improve_work.min(budget.max_work.saturating_sub(plan.statistics.work));
+    if settings.improvement.improve_work == 0 {
         return plan;
     }
     let budget = budget.of_improvement();
-    let ends = (legs.poses[0], legs.poses[legs.n_legs()]);
-    let winner = AtomicUsize::new(usize::MAX);
-    let mut search = Search::new(model, ends, (seed, 0), (&budget, work), &winner, progress);
+    let ends = [legs.poses[0], legs.poses[legs.n_legs()]];
+    let mut search = Search::new(Context { budget: &budget, ..context }, ends, 0, work);
     search.rng = Rng::keyed(seed, "improvement", 0);
-    let (solution, mut improvement) = improve::improve(&mut search, legs, solution);
+    let (solution, mut improvement) = improving::improve(&mut search, legs, solution);
     let mut counts = plan.statistics.clone();
-    match record::record(model, query, seed, &solution, Statistics::default()) {
+    match record::record(model, settings, query, seed, &solution, Statistics::default()) {
         Ok(better) => plan = better,
         Err(_) => improvement.improved = improvement.first,
     }
@@ -268,7 +201,7 @@ fn with_counts(mut plan: Plan, counts: Statistics) -> Plan {
 fn effective(settings: &InHandSettings) -> InHandSettings {
     let mut effective = settings.clone();
     if settings.method != Method::Gait {
-        effective.release_rule = ReleaseRule::EverywhereEveryFinger;
+        effective.search.release_rule = ReleaseRule::EverywhereEveryFinger;
     }
     effective
 }

@@ -1,17 +1,17 @@
 //! Tests of what the methods of paper 000 are made of, from inside.
 
-use super::decompose::decompose;
-use super::explore::draw_state;
-use super::grasp_path::GraspPath;
-use super::model::Model;
-use super::search::Search;
-use super::settings::{InHandSettings, Method};
-use super::state::{GraspState, Motion, Sequence};
-use super::workspace::HandJoints;
+use crate::in_hand::attempt::search::{Context, Search};
+use crate::in_hand::grasps::sample::draw_state;
+use crate::in_hand::moving::grasp_path::GraspPath;
+use crate::in_hand::searching::visibility::decompose::decompose;
+use crate::settings::{InHandSettings, Method};
 use regrasp_base::Budget;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Point, Pose};
 use regrasp_grasp::{Contact, Grip};
+use regrasp_manipulation::grasp::sequence::{Motion, Sequence};
+use regrasp_manipulation::grasp::state::{GraspState, HandJoints};
+use regrasp_manipulation::model::Model;
 use regrasp_plan::check::closure::{Body, margin};
 use regrasp_robot::import::LoadOptions;
 use regrasp_scene::{LoadedScene, load_scene};
@@ -31,11 +31,15 @@ pub(super) fn with_search(name: &str, test: impl FnOnce(&mut Search)) {
 /// The same with other settings.
 pub(super) fn with_settings(name: &str, settings: &InHandSettings, test: impl FnOnce(&mut Search)) {
     let loaded = scene(name);
-    let model = Model::new(&loaded.scene, &super::effective(settings));
-    let query = loaded.task.query(0);
-    let poses = (query.world_from_object_start, query.world_from_object_goal);
+    let view = loaded.view();
+    let settings = &crate::in_hand::effective(settings).within(&view.limits);
+    let model = Model::new(&view, &settings.physics);
+    let query = loaded.task().query(0);
+    let poses = [*query.start(), *query.goal()];
     let (budget, winner) = (Budget::unlimited(), AtomicUsize::new(usize::MAX));
-    test(&mut Search::new(&model, poses, (0, 0), (&budget, u64::MAX), &winner, &|_| {}));
+    let (winner, progress) = (&winner, &|_| {});
+    let context = Context { model: &model, settings, seed: 0, budget: &budget, winner, progress };
+    test(&mut Search::new(context, poses, 0, u64::MAX));
 }
 
 /// Pairs of random grasps with a path between them.
@@ -67,7 +71,7 @@ fn paths_on_the_sphere_follow_great_circles_and_stay_closed_without_any_finger()
     with_search("sphere_90x.toml", |search| {
         let model = search.model();
         let body = Body {
-            center_of_mass: model.scene.object.center_of_mass,
+            center_of_mass: model.view.object.center_of_mass,
             torque_scale: model.frame.torque_scale,
             friction: model.frame.friction,
         };
@@ -95,7 +99,7 @@ fn paths_on_the_sphere_follow_great_circles_and_stay_closed_without_any_finger()
 fn paths_on_the_box_cross_no_edge() {
     with_search("box_90x.toml", |search| {
         let model = search.model();
-        let object = &model.scene.object;
+        let object = &model.view.object;
         for (a, b, path) in linked_pairs(search, 3) {
             for k in 1..8 {
                 let t = f64::from(k) / 8.0;

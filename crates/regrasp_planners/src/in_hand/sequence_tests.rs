@@ -1,18 +1,23 @@
 //! Sequences of motions meet exactly, and what arrives somewhere arrives exactly there.
 
-use super::candidates::Candidate;
-use super::combine::{ClosureTable, releasable};
-use super::explore::{draw_state, draw_state_at};
-use super::grasps::choose_grasp;
-use super::pool::Pool;
-use super::roadmap_tests::{with_search, with_settings};
-use super::search::Search;
-use super::settings::InHandSettings;
-use super::shorten::{Arrival, change_grasp, change_grasp_over, regrasp_transfer, shorten, transfer_regrasp};
-use super::state::{GraspState, Moment, Motion, Sequence};
-use super::tally::Tally;
-use super::unlock::{draw_bound_finger, unlock};
+use crate::in_hand::attempt::search::Search;
+use crate::in_hand::attempt::tally::Tally;
+use crate::in_hand::grasps::candidate::Candidate;
+use crate::in_hand::grasps::choose::choose_grasp;
+use crate::in_hand::grasps::closure_table::ClosureTable;
+use crate::in_hand::grasps::pool::Pool;
+use crate::in_hand::grasps::sample::{draw_state, draw_state_at};
+use crate::in_hand::regrasping::change::{
+    Arrival, change_grasp, change_grasp_over, regrasp_transfer, transfer_regrasp,
+};
+use crate::in_hand::regrasping::unlock::{draw_bound_finger, unlock};
+use crate::in_hand::roadmap_tests::{with_search, with_settings};
+use crate::in_hand::searching::shorten::shorten;
+use crate::settings::InHandSettings;
 use regrasp_base::Rng;
+use regrasp_manipulation::grasp::sequence::{Motion, Sequence};
+use regrasp_manipulation::grasp::state::{GraspState, Moment};
+use regrasp_manipulation::model::releasable;
 
 /// `state` with one finger in another posture at the same contact: a little off, as redundant fingers come back to a pose.
 fn other_postures(state: &GraspState) -> Vec<GraspState> {
@@ -218,10 +223,10 @@ fn a_finger_is_bound_only_once_enough_grasps_were_seen_that_do_not_let_it_go() {
         // Drawing takes note as well.
         search.tally = Tally::default();
         for _ in 0..99 {
-            search.tally.note_releases(&table, &state.world_from_object);
+            search.tally.note_releases(table.releases(), &state.world_from_object);
         }
         assert!((0..200).all(|_| draw_bound_finger(search).is_none()), "too few were seen");
-        search.tally.note_releases(&table, &state.world_from_object);
+        search.tally.note_releases(table.releases(), &state.world_from_object);
         let drawn: Vec<Option<usize>> = (0..200).map(|_| draw_bound_finger(search)).collect();
         let fingers = drawn.iter().flatten().fold(0, |bits, finger| bits | 1 << finger);
         assert_eq!(fingers, state.holding & !released, "those that are bound, and no other");

@@ -1,14 +1,16 @@
 //! What is wrong with a tracking query is said before any search.
 
-use super::forces::Forces;
-use super::grasp::TrackingGrasp;
-use super::step::Stepper;
-use crate::failure::{Failure, FailureKind};
-use crate::in_hand::endpoints::{End, Near, friction_in_words, given_grasp_at, refuse_buried_object};
-use crate::in_hand::inside::refuse_hand_inside;
-use crate::in_hand::model::Model;
+use crate::tracking::forces::Forces;
+use crate::tracking::grasp::TrackingGrasp;
+use crate::tracking::step::Stepper;
 use regrasp_geometry::{Shape, TriangleMesh};
-use regrasp_scene::{Gravity, InHandQuery};
+use regrasp_manipulation::ends::blocked::refuse_buried_object;
+use regrasp_manipulation::ends::end::End;
+use regrasp_manipulation::ends::given_grasp::{Near, given_grasp_at};
+use regrasp_manipulation::ends::inside::refuse_hand_inside;
+use regrasp_manipulation::failure::{Failure, FailureKind};
+use regrasp_manipulation::model::{Model, friction_in_words};
+use regrasp_scene::{Gravity, TrackingQuery};
 
 /// Vertices of a mesh may be this far in front of one of its triangles, as a share of the object's radius: rounding.
 const FLAT: f64 = 1e-6;
@@ -20,13 +22,13 @@ fn impossible(message: String, advice: &str) -> Failure {
 /// Refuses hands, objects and gravity that tracking is not made for (paper 003, section 3.1: convex objects, fingertips that
 /// are balls; at least two of them rest; section 8: three fingertips or more).
 pub fn refuse(model: &Model, gravity: &Gravity) -> Result<(), Failure> {
-    let object = &model.scene.object;
+    let object = &model.view.object;
     let n = model.n_fingers();
     if n < 3 {
         let message = format!("the hand has {n} fingers: tracking moves one and rests at least two");
         return Err(impossible(message, "use a hand of three fingers or more"));
     }
-    let names = model.scene.hand.fingers.iter().map(|finger| finger.name.as_str());
+    let names = model.view.hand.fingers.iter().map(|finger| finger.name.as_str());
     if let Some((name, _)) = names.zip(&model.fingers).find(|(_, f)| f.tip_radius == 0.0 || f.ellipsoid.is_some()) {
         let message = format!("the tip of finger \"{name}\" is no ball: tracking rolls balls");
         return Err(impossible(message, "give the tip shape = \"sphere\" in the hand file"));
@@ -61,7 +63,7 @@ fn dent(mesh: &TriangleMesh, allowed: f64) -> Option<f64> {
 /// The grasp at the start, and forces that hold it.
 ///
 /// Errors: none is given, or it collides, is out of reach, or holds nothing.
-pub fn start(stepper: &Stepper, query: &InHandQuery) -> Result<(TrackingGrasp, Forces), Failure> {
+pub fn start(stepper: &Stepper, query: &TrackingQuery) -> Result<(TrackingGrasp, Forces), Failure> {
     let model = stepper.model;
     let pose = &query.world_from_object_start;
     refuse_buried_object(model, End::Start, pose)?;
@@ -74,7 +76,8 @@ pub fn start(stepper: &Stepper, query: &InHandQuery) -> Result<(TrackingGrasp, F
     let grasp = TrackingGrasp::of(model, &state)
         .ok_or_else(|| invalid("a fingertip's centre is inside the object at the start".into(), "move it out"))?;
     let Ok(forces) = stepper.balanced_at_rest(&grasp) else {
-        let [least, largest] = stepper.settings.in_hand.forces.map_or([0.0, f64::MAX], |forces| forces.normal_force);
+        let [least, largest] =
+            stepper.settings.in_hand.physics.forces.map_or([0.0, f64::MAX], |forces| forces.normal_force);
         let message = format!(
             "at the start no contact forces balance the weight: friction {}, normal forces from {least} N to {largest} N",
             friction_in_words(model)

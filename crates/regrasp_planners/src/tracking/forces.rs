@@ -10,13 +10,13 @@
 //!   change little. Least power is a wish beside its own for small forces across the normal and for the normal force of the settings: together
 //!   they ask for `|f_t|^2 + POWER P`.
 
-use super::settings::Cones;
-use crate::in_hand::model::MAX_FINGERS;
+use crate::tracking::settings::Cones;
 use arrayvec::ArrayVec;
 use regrasp_geometry::{Point, UnitVector, Vector, frame};
 use regrasp_grasp::wrench::linear_program::{LinearProgram, MAX_ROWS, NoSolution};
 use regrasp_grasp::wrench::{ForceLimits, ForceProblem, Rubbing, Wrench, distribute};
 use regrasp_grasp::{Contact, ContactForce, ContactModel, GraspFrame, Grip};
+use regrasp_manipulation::grasp::state::MAX_FINGERS;
 
 /// What a watt counts against squares of newtons: by hand. At 2.5 mm/s, the speed of the football's surface, forces of
 /// half a newton along the motion are wished for.

@@ -5,18 +5,17 @@
 //! the others closed and their forces within their cones. Which finger lands where is found by looking ahead: of some
 //! footholds of every finger that may leave, that one is taken from which tracking leads farthest towards the goal.
 
-use super::grasp::{TrackingGrasp, turn_to};
-use super::local::Local;
-use super::step::{Step, Stepper};
-use crate::in_hand::candidates::draw_footholds;
-use crate::in_hand::combine::releasable;
-use crate::in_hand::forces_along::add_forces;
-use crate::in_hand::model::Model;
-use crate::in_hand::record::Recorder;
-use crate::in_hand::relocate::{Foothold, relocate};
-use crate::in_hand::state::GraspState;
+use crate::tracking::grasp::{TrackingGrasp, turn_to};
+use crate::tracking::local::Local;
+use crate::tracking::step::{Step, Stepper};
 use nalgebra::UnitQuaternion;
 use regrasp_grasp::Contact;
+use regrasp_manipulation::forces::along::add_forces;
+use regrasp_manipulation::grasp::contact::draw_footholds;
+use regrasp_manipulation::grasp::state::GraspState;
+use regrasp_manipulation::model::{Model, releasable};
+use regrasp_manipulation::recording::recorder::Recorder;
+use regrasp_manipulation::relocation::{Foothold, relocate};
 use regrasp_plan::plan::Segment;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 
@@ -108,7 +107,7 @@ pub fn change_grasp(local: &mut Local, from: &TrackingGrasp, goal: &UnitQuaterni
 /// Fingers that may leave a grasp, as bits: the others are closed. None where a finger is on an edge, or near one: in-hand planning
 /// holds on faces only.
 fn may_leave(model: &Model, grasp: &TrackingGrasp) -> u32 {
-    let object = &model.scene.object;
+    let object = &model.view.object;
     let on_faces =
         grasp.touches.iter().all(|touch| object.surface.crease_distance(&touch.foot) >= object.edge_distance);
     if on_faces { releasable(model, &grasp.contacts(), model.all_fingers()) } else { 0 }
@@ -145,7 +144,7 @@ fn options(local: &mut Local, from: &TrackingGrasp) -> Vec<Change> {
 /// True where a tip is so near to where it rests that it may go through the air there.
 fn is_near(stepper: &Stepper, tip: &regrasp_geometry::Point, finger: usize) -> bool {
     let model = stepper.model;
-    model.scene.reach.is_none_or(|reach| (tip - model.fingers[finger].tip_at_rest).norm() <= AIR_REACH * reach)
+    model.view.reach.is_none_or(|reach| (tip - model.fingers[finger].tip_at_rest).norm() <= AIR_REACH * reach)
 }
 
 /// The relocation that leads to `option`; none where no way through the air is found, or nothing holds meanwhile.

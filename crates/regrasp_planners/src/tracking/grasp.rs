@@ -1,13 +1,12 @@
 //! Where object and fingertips are.
 
-use crate::in_hand::model::{MAX_FINGERS, Model};
-use crate::in_hand::state::GraspState;
-use crate::in_hand::workspace::{Contacts, HandJoints};
 use arrayvec::ArrayVec;
 use nalgebra::UnitQuaternion;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Point, Vector};
 use regrasp_grasp::contact::rolling::Touch;
+use regrasp_manipulation::grasp::state::{Contacts, GraspState, HandJoints, MAX_FINGERS};
+use regrasp_manipulation::model::Model;
 
 /// One fingertip each.
 pub type PerFinger<T> = ArrayVec<T, MAX_FINGERS>;
@@ -36,7 +35,7 @@ impl TrackingGrasp {
             let link = finger.ik.chain().last_frame(joints);
             let center = world_from_object.point_to_child(&link.point(finger.ik.center_in_body()));
             world_from_link.push(link);
-            touches.push(Touch::of(&model.scene.object.surface, &center)?);
+            touches.push(Touch::of(&model.view.object.surface, &center)?);
         }
         Some(TrackingGrasp { world_from_object, joints: state.joints.clone(), world_from_link, touches, bent: 0.0 })
     }

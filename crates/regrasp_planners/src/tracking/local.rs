@@ -1,13 +1,14 @@
 //! The local planner (paper 003, section 6.2.4, `LocalReOrientation`): from a grasp towards a sub-goal, step by step.
 
-use super::grasp::{PerFinger, TrackingGrasp, turn_to};
-use super::object_motion::ObjectMotion;
-use super::step::{Asked, Controls, Fingers, NoStep, Roles, STEP_WORK, Step, Stepper, each};
-use crate::in_hand::model::{MAX_FINGERS, Model};
+use crate::tracking::grasp::{PerFinger, TrackingGrasp, turn_to};
+use crate::tracking::object_motion::ObjectMotion;
+use crate::tracking::step::{Asked, Controls, Fingers, NoStep, Roles, STEP_WORK, Step, Stepper, each};
 use arrayvec::ArrayVec;
 use nalgebra::UnitQuaternion;
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, UnitVector, Vector, frame};
+use regrasp_manipulation::grasp::state::MAX_FINGERS;
+use regrasp_manipulation::model::Model;
 use regrasp_robot::kinematics::whole_pose::has_all_directions;
 
 /// Time of a local plan in units of that to the sub-goal (paper 003: `bound_1`, twice).
@@ -69,7 +70,7 @@ pub enum Homes {
 impl Homes {
     /// Of a start grasp: on a polyhedron the fingertips belong to the faces that they are on, elsewhere to places in the world.
     pub fn of(model: &Model, start: &TrackingGrasp) -> Self {
-        let surface = &model.scene.object.surface;
+        let surface = &model.view.object.surface;
         match surface.crease_distance(&start.touches[0].foot).is_finite() {
             true => Homes::OnObject(start.touches.iter().map(|touch| touch.ball.center).collect()),
             false => Homes::InWorld(model.fingers.iter().map(|finger| finger.tip_at_rest).collect()),
@@ -278,7 +279,7 @@ impl Local<'_, '_, '_> {
     /// How far along its reach a tip is that goes on like this for [`AHEAD`]: 1 at the end; 0 where reach has no end.
     fn reach_share(&self, here: &TrackingGrasp, finger: usize, tip_way: &Vector) -> f64 {
         let model = self.stepper.model;
-        let Some(reach) = model.scene.reach else { return 0.0 };
+        let Some(reach) = model.view.reach else { return 0.0 };
         let tip = here.tip_in_world(model, finger) + tip_way * (AHEAD / self.stepper.settings.time_step);
         (tip - model.fingers[finger].tip_at_rest).norm() / reach
     }

@@ -29,16 +29,17 @@ mod step;
 
 pub use settings::{Cones, RollingFinger, TrackingMethod, TrackingSettings};
 
-use crate::failure::{Cause, Failure, FailureKind, NearestMiss};
-use crate::in_hand::Progress;
-use crate::in_hand::model::Model;
-use crate::in_hand::workspace::Workspace;
 use gaiting::Move;
 use grasp::TrackingGrasp;
 use regrasp_base::{Budget, Rng};
+use regrasp_manipulation::failure::{Cause, Failure, FailureKind, NearestMiss};
+use regrasp_manipulation::in_world::{failure_in_world, plan_in_world};
+use regrasp_manipulation::model::Model;
+use regrasp_manipulation::progress::Progress;
+use regrasp_manipulation::workspace::Workspace;
 use regrasp_plan::Plan;
 use regrasp_plan::plan::{PoseData, Statistics};
-use regrasp_scene::{InHandQuery, Scene};
+use regrasp_scene::{HandView, TrackingQuery};
 use search::{Counts, Ended, search};
 use step::Stepper;
 
@@ -47,21 +48,35 @@ const MOST_RESTARTS: u64 = 20;
 
 /// Plans how the fingertips turn the object to the goal's orientation.
 ///
-/// The plan is the same for the same scene, query, settings and seed. `progress` is called after every sub-goal. Panics if
-/// `settings.validate()` fails.
+/// The plan is the same for the same scene, query, settings and seed. `progress` is called after every sub-goal.
 ///
-/// Errors: the start is none, or the search ends without a plan.
+/// Errors: the settings do not validate, the start is none, or the search ends without a plan.
 pub fn plan_tracking(
-    scene: &Scene,
-    query: &InHandQuery,
+    view: &HandView,
+    query: &TrackingQuery,
     settings: &TrackingSettings,
     seed: u64,
     budget: &Budget,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Plan, Failure> {
-    settings.validate().expect("settings are validated where they are read");
-    let model = Model::new(scene, &settings.in_hand);
-    endpoints::refuse(&model, &scene.gravity())?;
+    settings.validate().map_err(|problem| Failure::of_settings(&problem))?;
+    Failure::refuse_many_fingers(view)?;
+    let seen = view.hand_from_world().map(|hand_from_world| query.seen_from(&hand_from_world));
+    let found = plan_in_hand_frame(view, seen.as_ref().unwrap_or(query), settings, seed, budget, progress);
+    found.map(|plan| plan_in_world(view, &query.name, plan)).map_err(|failure| failure_in_world(view, failure))
+}
+
+/// As [`plan_tracking`], with the query and the answer in the hand's frame.
+fn plan_in_hand_frame(
+    view: &HandView,
+    query: &TrackingQuery,
+    settings: &TrackingSettings,
+    seed: u64,
+    budget: &Budget,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Plan, Failure> {
+    let model = Model::new(view, &settings.in_hand.physics);
+    endpoints::refuse(&model, &view.gravity)?;
     let forces = model.forces.as_ref().expect("settings without forces do not validate");
     let mut stepper = Stepper { model: &model, settings, forces, workspace: Workspace::new(&model), work: 0 };
     let first = endpoints::start(&stepper, query)?;

@@ -4,12 +4,12 @@
 //! With three resting fingertips one component is free, with two of them two. A step is solved to the end, by Newton's method with
 //! the Jacobian of its beginning: distances of the balls from the surface, slip by the rule of `contact::rolling`.
 
-use super::grasp::{PerFinger, TrackingGrasp};
-use crate::in_hand::model::Model;
+use crate::tracking::grasp::{PerFinger, TrackingGrasp};
 use nalgebra::{Matrix6, Rotation3, Vector6};
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{UnitVector, Vector, frame};
 use regrasp_grasp::contact::rolling::{Touch, slip, turn_between};
+use regrasp_manipulation::model::Model;
 
 /// Rows of the Jacobian smaller than this share of the largest pivot: the resting fingers do not tell how the object moves.
 const DEGENERATE: f64 = 1e-3;
@@ -123,7 +123,7 @@ impl<'a> ObjectMotion<'a> {
             for (row, &finger) in self.resting.iter().enumerate() {
                 let of_model = &self.model.fingers[finger];
                 let center = self.grasp.world_from_link[finger].point(of_model.ik.center_in_body());
-                let touch = Touch::of(&self.model.scene.object.surface, &object.point_to_child(&center))?;
+                let touch = Touch::of(&self.model.view.object.surface, &object.point_to_child(&center))?;
                 residual[row] = touch.distance - of_model.tip_radius;
                 if finger == self.rolling {
                     let start = &self.grasp.touches[finger];

@@ -1,18 +1,20 @@
 //! The plan as it is written to a file.
 
-use super::forces::Forces;
-use super::gaiting::{Move, Relocation};
-use super::grasp::{PerFinger, TrackingGrasp};
-use super::settings::TrackingSettings;
-use super::step::{Relative, Roles, Step, Stepper, each};
-use crate::in_hand::model::Model;
-use crate::in_hand::record::{CONTACT_TOLERANCE, SLIP_TOLERANCE, plan_of};
-use crate::in_hand::timing;
+use crate::tracking::forces::Forces;
+use crate::tracking::gaiting::{Move, Relocation};
+use crate::tracking::grasp::{PerFinger, TrackingGrasp};
+use crate::tracking::settings::TrackingSettings;
+use crate::tracking::step::{Relative, Roles, Step, Stepper, each};
 use regrasp_geometry::Vector;
+use regrasp_manipulation::model::Model;
+use regrasp_manipulation::recording::plan::plan_of;
+use regrasp_manipulation::timing;
+use regrasp_manipulation::tolerances::{CONTACT_TOLERANCE, SLIP_TOLERANCE};
 use regrasp_plan::plan::{
     ContactMode, ContactState, Plan, PoseData, Promises, Segment, SegmentKind, Statistics, TrackingPromises, Waypoint,
 };
-use regrasp_scene::InHandQuery;
+use regrasp_scene::TrackingQuery;
+use regrasp_scene::query::TRACKING;
 
 /// Settings as plans have them.
 pub fn settings_of(settings: &TrackingSettings) -> serde_json::Value {
@@ -51,7 +53,7 @@ impl Stretch<'_> {
 /// Makes the plan of `steps`, which begin at `start`.
 pub fn record(
     stepper: &Stepper,
-    query: &InHandQuery,
+    query: &TrackingQuery,
     seed: u64,
     (start, forces_at_rest): &(TrackingGrasp, Forces),
     moves: &[&Move],
@@ -87,12 +89,18 @@ pub fn record(
         slip_tolerance: SLIP_TOLERANCE,
         tracking: Some(TrackingPromises {
             goal_tolerance: settings.goal_tolerance,
-            sliding_friction: model.scene.object.friction,
+            sliding_friction: model.view.object.friction,
         }),
         motion,
         forces: Some(stepper.forces.promises()),
     };
-    let plan = plan_of(model.scene, query, promises, segments);
+    let plan = plan_of(
+        model.view,
+        TRACKING,
+        [&query.world_from_object_start, &query.world_from_object_goal],
+        promises,
+        segments,
+    );
     Plan {
         method: settings.method.name().into(),
         seed,
@@ -148,12 +156,13 @@ fn tracked(stepper: &Stepper, start: &TrackingGrasp, steps: &[&Step]) -> Segment
 
 /// A segment of tracking in which the fingers have these roles.
 fn tracking_segment(model: &Model, roles: &Roles, waypoints: Vec<Waypoint>) -> Segment {
-    let name = |finger: usize| model.scene.hand.fingers[finger].name.clone();
+    let name = |finger: usize| model.view.hand.fingers[finger].name.clone();
     let mut moving = each(roles.moving).map(name);
     Segment {
         kind: SegmentKind::Tracking,
         moving_finger: moving.next(),
         also_moving: moving.collect(),
+        held_by: Vec::new(),
         rolling_finger: Some(name(roles.rolling)),
         waypoints,
     }
@@ -178,7 +187,7 @@ fn waypoint(stepper: &Stepper, grasp: &TrackingGrasp, relative: &PerFinger<Relat
         let normal: [f64; 3] = contact.normal_in_object.into_inner().into();
         let mut state = ContactState::at(relative[finger].mode, contact.point_in_object.coords.into(), normal);
         state.force_in_object = Some((*force).into());
-        let hand = &model.scene.hand;
+        let hand = &model.view.hand;
         let body_from_tip = hand.robot.fixed_pose_in_body(hand.fingers[finger].tip.link);
         state.relative_velocity_in_object = Some([0.0; 3]);
         state.relative_turn_in_object = Some([0.0; 3]);
@@ -189,7 +198,7 @@ fn waypoint(stepper: &Stepper, grasp: &TrackingGrasp, relative: &PerFinger<Relat
     Waypoint {
         time: 0.0,
         joints: grasp.joints.iter().flatten().copied().collect(),
-        joint_velocities: vec![0.0; model.scene.hand.n_joints()],
+        joint_velocities: vec![0.0; model.view.hand.n_joints()],
         joint_torques,
         world_from_object: PoseData::from(&object.to_pose()),
         contacts,

@@ -4,15 +4,15 @@
 //! Unlike the paper's: a sub-goal straight on is added; a local plan that ends elsewhere, where no grasp is, is a node too; the
 //! distance left counts [`TrackingSettings::goal_weight`]; after [`TrackingSettings::patience`] sub-goals in vain the search ends.
 
-use super::gaiting::{Move, change_grasp};
-use super::grasp::{TrackingGrasp, turn_to};
-use super::local::{Failures, Homes, Local};
-use super::settings::{RollingFinger, TrackingMethod, TrackingSettings};
-use super::step::{Asked, Controls, Roles, Stepper};
-use crate::in_hand::Progress;
+use crate::tracking::gaiting::{Move, change_grasp};
+use crate::tracking::grasp::{TrackingGrasp, turn_to};
+use crate::tracking::local::{Failures, Homes, Local};
+use crate::tracking::settings::{RollingFinger, TrackingMethod, TrackingSettings};
+use crate::tracking::step::{Asked, Controls, Roles, Stepper};
 use nalgebra::UnitQuaternion;
 use regrasp_base::{Budget, Interrupt, Rng};
 use regrasp_geometry::Vector;
+use regrasp_manipulation::progress::Progress;
 use std::cmp::Ordering;
 use std::collections::{BTreeSet, BinaryHeap};
 
@@ -78,7 +78,7 @@ pub struct Counts {
     pub failures: Failures,
     /// Searches begun anew.
     pub restarts: u64,
-    /// Steps and choices of roles that were tried, [`super::step::STEP_WORK`] each.
+    /// Steps and choices of roles that were tried, [`crate::tracking::step::STEP_WORK`] each.
     pub work: u64,
 }
 

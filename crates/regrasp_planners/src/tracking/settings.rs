@@ -1,6 +1,7 @@
 //! Settings of finger tracking. Lengths in metres, angles in radians, velocities per second.
 
-use crate::in_hand::{ForceSettings, InHandSettings};
+use crate::settings::InHandSettings;
+use regrasp_manipulation::settings::{ForceSettings, PhysicsSettings};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
@@ -52,7 +53,7 @@ pub enum Cones {
     Exact,
 }
 
-/// Settings of [`super::plan_tracking`].
+/// Settings of [`crate::tracking::plan_tracking`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrackingSettings {
@@ -134,8 +135,11 @@ impl Default for TrackingSettings {
             nodes: 2000,
             patience: 8,
             in_hand: InHandSettings {
-                friction_margin: 1.0,
-                forces: Some(ForceSettings { normal_force: [0.0, 80.0], ..ForceSettings::default() }),
+                physics: PhysicsSettings {
+                    friction_margin: 1.0,
+                    forces: Some(ForceSettings { normal_force: [0.0, 80.0], ..ForceSettings::default() }),
+                    ..PhysicsSettings::default()
+                },
                 ..InHandSettings::default()
             },
         }
@@ -166,7 +170,7 @@ impl TrackingSettings {
         if self.goal_tolerance > self.cell {
             return Err(format!("goal_tolerance is {}, more than a cell of {}", self.goal_tolerance, self.cell));
         }
-        if self.in_hand.forces.is_none() {
+        if self.in_hand.physics.forces.is_none() {
             return Err("in_hand.forces is none; tracking needs forces".into());
         }
         if !(2..=3).contains(&self.resting_fingers) {
@@ -194,10 +198,11 @@ mod tests {
         assert_eq!(read(r#"{"in_hand": {}}"#).unwrap(), whole);
         assert_eq!(read(&serde_json::to_string(&whole).unwrap()).unwrap(), whole);
         let some = read(r#"{"in_hand": {"clearance": 0.001, "forces": {"torque_share": 0.5}}}"#).unwrap();
-        let forces = ForceSettings { torque_share: 0.5, ..whole.in_hand.forces.unwrap() };
-        let in_hand = InHandSettings { clearance: 0.001, forces: Some(forces), ..whole.in_hand.clone() };
+        let forces = ForceSettings { torque_share: 0.5, ..whole.in_hand.physics.forces.unwrap() };
+        let physics = PhysicsSettings { clearance: 0.001, forces: Some(forces), ..whole.in_hand.physics.clone() };
+        let in_hand = InHandSettings { physics, ..whole.in_hand.clone() };
         assert_eq!(some, TrackingSettings { in_hand, ..whole });
-        assert_eq!(read(r#"{"in_hand": {"forces": null}}"#).unwrap().in_hand.forces, None);
+        assert_eq!(read(r#"{"in_hand": {"forces": null}}"#).unwrap().in_hand.physics.forces, None);
     }
 
     #[test]

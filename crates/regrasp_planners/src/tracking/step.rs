@@ -1,18 +1,19 @@
 //! One step of time: the object moves on the fingertips that rest, one fingertip moves, and forces hold all of it (paper 003,
 //! sections 6.2.1 to 6.2.3).
 
-use super::forces::{Forces, Load, Pressing, balance};
-use super::grasp::{PerFinger, TrackingGrasp};
-use super::object_motion::ObjectMotion;
-use super::settings::TrackingSettings;
-use crate::in_hand::forces::ForceModel;
-use crate::in_hand::model::{MAX_FINGERS, Model};
-use crate::in_hand::roll::RollStep;
-use crate::in_hand::workspace::{TipMode, Workspace};
+use crate::tracking::forces::{Forces, Load, Pressing, balance};
+use crate::tracking::grasp::{PerFinger, TrackingGrasp};
+use crate::tracking::object_motion::ObjectMotion;
+use crate::tracking::settings::TrackingSettings;
 use nalgebra::Rotation3;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Point, UnitVector, Vector, frame, interpolate_pose};
 use regrasp_grasp::contact::rolling::{Touch, roll_step, slip, turn_between};
+use regrasp_manipulation::forces::limits::ForceModel;
+use regrasp_manipulation::grasp::state::MAX_FINGERS;
+use regrasp_manipulation::model::Model;
+use regrasp_manipulation::rolling::step::RollStep;
+use regrasp_manipulation::workspace::{TipMode, Workspace};
 use regrasp_plan::plan::ContactMode;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use regrasp_robot::kinematics::whole_pose::{has_all_directions, joints_of_pose, torques};
@@ -205,7 +206,7 @@ impl<'m, 'a> Stepper<'m, 'a> {
 
     /// True where a ball keeps its face: on smooth surfaces always.
     fn stays_on_its_face(&self, from: &Touch, to: &Touch) -> bool {
-        let surface = &self.model.scene.object.surface;
+        let surface = &self.model.view.object.surface;
         let has_creases = surface.crease_distance(&to.foot).is_finite();
         !has_creases
             || ((to.ball.normal - to.foot.normal_in_object.into_inner()).norm() < ON_FACE
@@ -256,12 +257,12 @@ impl<'m, 'a> Stepper<'m, 'a> {
             let (from_pose, to_pose) = (from.to_pose(), to.to_pose());
             let between = |t: f64| Placement::from(&interpolate_pose(&from_pose, &to_pose, t));
             let step = RollStep::new(model, moving, &start.contact(), &grasp.joints[moving], &from, &to);
-            let allowed = 0.2 * crate::in_hand::record::CONTACT_TOLERANCE;
+            let allowed = 0.2 * regrasp_manipulation::tolerances::CONTACT_TOLERANCE;
             let rolled = step.fine(between, allowed).map_err(|_| NoStep::OutOfReach)?;
             end.world_from_link[moving] = chain.last_frame(&rolled.joints);
             end.joints[moving] = rolled.joints;
             let center = to.point_to_child(&end.world_from_link[moving].point(finger.ik.center_in_body()));
-            Touch::of(&model.scene.object.surface, &center).ok_or(NoStep::OutOfReach)?
+            Touch::of(&model.view.object.surface, &center).ok_or(NoStep::OutOfReach)?
         };
         if !self.stays_on_its_face(start, &touch) {
             if is_long {
@@ -273,7 +274,7 @@ impl<'m, 'a> Stepper<'m, 'a> {
         }
         end.touches[moving] = touch;
         let tip = end.world_from_link[moving].point(finger.ik.center_in_body());
-        if model.scene.reach.is_some_and(|reach| (tip - finger.tip_at_rest).norm() > reach) {
+        if model.view.reach.is_some_and(|reach| (tip - finger.tip_at_rest).norm() > reach) {
             return Err(NoStep::OutOfReach);
         }
         if !finger.pad_faces(&end.joints[moving], &end.normal_in_world(moving)) {
@@ -297,7 +298,7 @@ impl<'m, 'a> Stepper<'m, 'a> {
 
     /// Where the ball of `finger` touches after it has rolled by the rotation vector `turn`, in the object frame.
     fn roll(&self, finger: usize, from: &Touch, turn: &Vector) -> Option<Touch> {
-        let surface = &self.model.scene.object.surface;
+        let surface = &self.model.view.object.surface;
         roll_step(|center| Touch::of(surface, center), self.model.fingers[finger].tip_radius, from, turn)
     }
 
@@ -392,7 +393,7 @@ impl<'m, 'a> Stepper<'m, 'a> {
             center_of_mass: frame.center_of_mass,
             torque_scale: frame.torque_scale,
             friction: frame.friction,
-            sliding_friction: self.model.scene.object.friction,
+            sliding_friction: self.model.view.object.friction,
             limits: *self.forces.limits(),
             cones: self.settings.cones,
         }

@@ -1,10 +1,13 @@
 //! Plans with free fingers, hands that can never let go, and hands of more fingers than an object needs.
 
 use crate::in_hand_methods::scene;
+use crate::queries::Queries;
 use regrasp_base::{Budget, Rng};
-use regrasp_plan::check::mutation::mutants;
+use regrasp_mutations::mutants;
 use regrasp_plan::check::{CheckSettings, check};
 use regrasp_plan::{ContactMode, Plan, Waypoint};
+use regrasp_planners::in_hand::PhysicsSettings;
+use regrasp_planners::in_hand::SearchSettings;
 use regrasp_planners::in_hand::{InHandSettings, plan_in_hand, validate_once};
 use regrasp_planners::{Failure, FailureKind};
 use regrasp_scene::LoadedScene;
@@ -12,12 +15,18 @@ use std::collections::BTreeSet;
 
 /// Settings with which fingers are left free as often as can be.
 fn eager(least_holding: usize) -> InHandSettings {
-    let usual = InHandSettings { first_try: None, ..InHandSettings::default() };
-    InHandSettings { least_holding, free_after: 0, free_share: 1.0, shortcuts: 0, ..usual }
+    let usual = InHandSettings {
+        search: SearchSettings { first_try: None, ..SearchSettings::default() },
+        ..InHandSettings::default()
+    };
+    InHandSettings {
+        search: SearchSettings { least_holding, free_after: 0, free_share: 1.0, shortcuts: 0, ..usual.search },
+        ..usual
+    }
 }
 
 fn try_plan(loaded: &LoadedScene, settings: &InHandSettings, seed: u64) -> Result<Plan, Failure> {
-    plan_in_hand(&loaded.scene, &loaded.task.query(seed), settings, seed, &Budget::work(3_000_000), &|_| {})
+    plan_in_hand(&loaded.view(), &loaded.in_hand(seed), settings, seed, &Budget::work(3_000_000), &|_| {})
 }
 
 /// A plan that was found, accepted, and proven again forwards and backwards.
@@ -25,13 +34,13 @@ fn plan(loaded: &LoadedScene, settings: &InHandSettings, seed: u64) -> Plan {
     let which = format!("{}, seed {seed}", loaded.scene.name);
     let plan = try_plan(loaded, settings, seed).unwrap_or_else(|failure| panic!("{which}: {failure}"));
     let strict = CheckSettings { meeting_tolerance: 0.0, ..CheckSettings::default() };
-    let report = check(&loaded.scene, Some(&loaded.task.query(seed)), &plan, &strict);
+    let report = loaded.judge(&loaded.in_hand(seed), &plan, &strict);
     assert!(report.accepted(), "{which}: {:#?}", report.violations);
-    assert_eq!(validate_once(&loaded.scene, &plan, settings), Ok(()), "{which}");
+    assert_eq!(validate_once(&loaded.view(), &plan, settings), Ok(()), "{which}");
     let mut back = plan.clone();
     back.segments.reverse();
     back.segments.iter_mut().for_each(|segment| segment.waypoints.reverse());
-    assert_eq!(validate_once(&loaded.scene, &back, settings), Ok(()), "{which}, backwards");
+    assert_eq!(validate_once(&loaded.view(), &back, settings), Ok(()), "{which}, backwards");
     plan
 }
 
@@ -77,10 +86,10 @@ fn mutants_of_plans_with_free_fingers_are_rejected() {
     let mut names = BTreeSet::new();
     for seed in 0..6 {
         let plan = plan(&loaded, &eager(3), seed);
-        let query = loaded.task.query(seed);
-        for mutant in mutants(&plan, &loaded.scene, &mut Rng::keyed(seed, "free fingers", 0)) {
+        let query = loaded.task().query(seed);
+        for mutant in mutants(&plan, loaded.manipulation(), &mut Rng::keyed(seed, "free fingers", 0)) {
             let judged_in = mutant.scene.as_ref().unwrap_or(&loaded.scene);
-            let report = check(judged_in, Some(&query), &mutant.plan, &CheckSettings::default());
+            let report = check((judged_in, &loaded.state), Some(&query), &mutant.plan, &CheckSettings::default());
             let fits = report.violations.iter().any(|violation| mutant.expected.contains(&violation.kind));
             assert!(fits, "seed {seed}, {}: {report:#?}", mutant.name);
             names.insert(mutant.name);
@@ -117,10 +126,10 @@ fn two_soft_fingers_roll_an_object_by_a_transfer_alone() {
 fn what_a_transfer_alone_cannot_do_is_refused_after_a_search() {
     let mut loaded = scene("soft_pair_roll.toml");
     // Out of reach of both fingers.
-    let mut query = loaded.task.query(0);
+    let mut query = loaded.in_hand(0);
     query.world_from_object_goal.translation.z += 0.08;
     let settings = InHandSettings::default();
-    let found = plan_in_hand(&loaded.scene, &query, &settings, 0, &Budget::work(3_000_000), &|_| {});
+    let found = plan_in_hand(&loaded.view(), &query, &settings, 0, &Budget::work(3_000_000), &|_| {});
     let failure = found.expect_err("no transfer leads there");
     assert_eq!(failure.kind, FailureKind::Impossible);
     for words in ["can never change its grasp", "no transfer alone was found", "degrees"] {
@@ -129,7 +138,7 @@ fn what_a_transfer_alone_cannot_do_is_refused_after_a_search() {
     assert!(failure.nearest_miss.is_some() && !failure.causes.is_empty());
     // Two hard fingertips hold nothing at all: no search.
     let hard = regrasp_robot::ContactModel::Point;
-    loaded.scene.hand.fingers.iter_mut().for_each(|finger| finger.tip.contact = hard);
+    loaded.scene.hands[0].hand.fingers.iter_mut().for_each(|finger| finger.tip.contact = hard);
     let failure = try_plan(&loaded, &settings, 0).expect_err("nothing holds");
     assert_eq!((failure.kind, failure.statistics.work), (FailureKind::Impossible, 0));
     assert!(failure.message.contains("all of them together cannot hold"), "{}", failure.message);
@@ -139,12 +148,15 @@ fn what_a_transfer_alone_cannot_do_is_refused_after_a_search() {
 fn a_failure_names_the_fingers_that_could_never_be_released() {
     // Three fingers so little soft that two of them never have the margin, which three have.
     let mut loaded = scene("box_90x.toml");
-    loaded.scene.hand.fingers.truncate(3);
+    loaded.scene.hands[0].hand.fingers.truncate(3);
     let soft = regrasp_robot::ContactModel::SoftFinger { torsion_radius: 0.0005 };
-    loaded.scene.hand.fingers.iter_mut().for_each(|finger| finger.tip.contact = soft);
-    let settings = InHandSettings { closure_margin: 0.02, ..InHandSettings::default() };
-    let query = loaded.task.query(0);
-    let found = plan_in_hand(&loaded.scene, &query, &settings, 0, &Budget::work(60_000), &|_| {});
+    loaded.scene.hands[0].hand.fingers.iter_mut().for_each(|finger| finger.tip.contact = soft);
+    let settings = InHandSettings {
+        physics: PhysicsSettings { closure_margin: 0.02, ..PhysicsSettings::default() },
+        ..InHandSettings::default()
+    };
+    let query = loaded.in_hand(0);
+    let found = plan_in_hand(&loaded.view(), &query, &settings, 0, &Budget::work(60_000), &|_| {});
     let failure = found.expect_err("no finger can be released");
     assert_eq!(failure.kind, FailureKind::WorkSpent);
     for words in ["never to be released", "\"east\"", "closed in none of", "nearest: margin", "of 0.02", "degrees"] {

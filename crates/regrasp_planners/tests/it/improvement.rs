@@ -1,28 +1,32 @@
 //! Better plans after the first: never worse, accepted, the same on any number of threads, cut at any moment.
 
 use crate::in_hand_methods::scene;
+use crate::queries::Queries;
 use regrasp_base::Budget;
 use regrasp_geometry::{Pose, frame, interpolate_pose};
-use regrasp_plan::check::{CheckSettings, Level, check};
+use regrasp_plan::check::{CheckSettings, Level};
 use regrasp_plan::plan::{Improvement, Waypoint};
 use regrasp_plan::{Plan, SegmentKind};
+use regrasp_planners::in_hand::ImprovementSettings;
 use regrasp_planners::in_hand::{CostWeights, InHandSettings, Method, plan_in_hand, validate_once};
 use regrasp_scene::{GraspRequest, InHandQuery, LoadedScene};
 use std::time::Duration;
 
 fn settings(improve_work: u64) -> InHandSettings {
-    InHandSettings { improve_work, ..InHandSettings::plain() }
+    InHandSettings {
+        improvement: ImprovementSettings { improve_work, ..InHandSettings::plain().improvement },
+        ..InHandSettings::plain()
+    }
 }
 
 /// Plans, and has the plan judged.
 fn plan(loaded: &LoadedScene, query: &InHandQuery, settings: &InHandSettings, seed: u64) -> Plan {
     let budget = Budget::work(20_000_000);
-    let plan = plan_in_hand(&loaded.scene, query, settings, seed, &budget, &|_| {}).unwrap();
-    let report =
-        check(&loaded.scene, Some(query), &plan, &CheckSettings { level: Level::Geometry, ..CheckSettings::default() });
+    let plan = plan_in_hand(&loaded.view(), query, settings, seed, &budget, &|_| {}).unwrap();
+    let report = loaded.judge(query, &plan, &CheckSettings { level: Level::Geometry, ..CheckSettings::default() });
     assert!(report.accepted(), "{} seed {seed}: {:#?}", loaded.scene.name, report.violations);
     assert!(report.min_margin.is_none_or(|margin| margin >= plan.promises.kept_margin - 1e-9), "promises hold");
-    assert_eq!(validate_once(&loaded.scene, &plan, settings), Ok(()));
+    assert_eq!(validate_once(&loaded.view(), &plan, settings), Ok(()));
     plan
 }
 
@@ -32,7 +36,7 @@ fn improvement(plan: &Plan) -> &Improvement {
 
 /// The cost of a plan from what is in its file.
 fn cost_of_file(loaded: &LoadedScene, plan: &Plan, weights: &CostWeights) -> f64 {
-    let turn_length = loaded.scene.object.radius;
+    let turn_length = loaded.scene.objects[0].radius;
     let (mut relocations, mut object_path, mut joint_path) = (0.0, 0.0, 0.0);
     for segment in &plan.segments {
         relocations += f64::from(u8::from(segment.kind == SegmentKind::Regrasp));
@@ -53,7 +57,7 @@ fn cost_of_file(loaded: &LoadedScene, plan: &Plan, weights: &CostWeights) -> f64
 fn improved_plans_are_the_same_on_any_number_of_threads_and_cost_what_they_say() {
     for name in ["box_90x.toml", "box_180z.toml", "sphere_180x.toml"] {
         let loaded = scene(name);
-        let query = loaded.task.query(1);
+        let query = loaded.in_hand(1);
         let asked = settings(60_000);
         let improved = plan(&loaded, &query, &asked, 1);
         for n_threads in [2, 8] {
@@ -64,7 +68,7 @@ fn improved_plans_are_the_same_on_any_number_of_threads_and_cost_what_they_say()
         assert!(first.statistics.improvement.is_none());
         let told = improvement(&improved);
         for (plan, figures) in [(&first, &told.first), (&improved, &told.improved)] {
-            let cost = cost_of_file(&loaded, plan, &asked.cost);
+            let cost = cost_of_file(&loaded, plan, &asked.improvement.cost);
             assert!((cost - figures.cost).abs() < 1e-6, "{name}: {cost} and {figures:?}");
             assert_eq!(plan.statistics.relocations, figures.relocations);
             assert_eq!(plan.statistics.transfers, figures.transfers);
@@ -80,7 +84,7 @@ fn improved_plans_are_the_same_on_any_number_of_threads_and_cost_what_they_say()
 #[test]
 fn more_work_never_makes_a_plan_worse() {
     let loaded = scene("box_180x.toml");
-    let query = loaded.task.query(2);
+    let query = loaded.in_hand(2);
     let mut last = f64::INFINITY;
     for work in [1, 3_000, 20_000, 30_000, 60_000, 120_000] {
         let plan = plan(&loaded, &query, &settings(work), 2);
@@ -94,17 +98,16 @@ fn more_work_never_makes_a_plan_worse() {
 #[test]
 fn time_only_cuts_and_the_plan_says_so() {
     let loaded = scene("box_180x.toml");
-    let query = loaded.task.query(3);
+    let query = loaded.in_hand(3);
     let first = plan(&loaded, &query, &settings(0), 3);
     let none_left = Budget { improve_for: Some(Duration::ZERO), ..Budget::work(20_000_000) };
-    let cut = plan_in_hand(&loaded.scene, &query, &settings(u64::MAX), 3, &none_left, &|_| {}).unwrap();
+    let cut = plan_in_hand(&loaded.view(), &query, &settings(u64::MAX), 3, &none_left, &|_| {}).unwrap();
     assert!(cut.statistics.cut_by_time && cut.segments == first.segments);
     let little = Budget { improve_for: Some(Duration::from_millis(300)), ..Budget::work(20_000_000) };
-    let cut = plan_in_hand(&loaded.scene, &query, &settings(u64::MAX), 3, &little, &|_| {}).unwrap();
+    let cut = plan_in_hand(&loaded.view(), &query, &settings(u64::MAX), 3, &little, &|_| {}).unwrap();
     assert!(cut.statistics.cut_by_time && improvement(&cut).improved.cost <= improvement(&cut).first.cost);
     assert!(
-        check(&loaded.scene, Some(&query), &cut, &CheckSettings { level: Level::Geometry, ..CheckSettings::default() })
-            .accepted()
+        loaded.judge(&query, &cut, &CheckSettings { level: Level::Geometry, ..CheckSettings::default() }).accepted()
     );
 }
 
@@ -114,7 +117,7 @@ fn relocations_of_boxes_fall_by_half() {
     for name in ["box_90x.toml", "box_180z.toml", "box_180x.toml"] {
         let loaded = scene(name);
         for seed in 0..3 {
-            let plan = plan(&loaded, &loaded.task.query(seed), &settings(200_000), seed);
+            let plan = plan(&loaded, &loaded.in_hand(seed), &settings(200_000), seed);
             first += improvement(&plan).first.relocations;
             improved += improvement(&plan).improved.relocations;
         }
@@ -125,7 +128,7 @@ fn relocations_of_boxes_fall_by_half() {
 #[test]
 fn given_grasps_and_way_poses_stay() {
     let loaded = scene("box_90x.toml");
-    let free = loaded.task.query(4);
+    let free = loaded.in_hand(4);
     let found = plan(&loaded, &free, &settings(0), 4);
     let waypoints = |plan: &Plan| -> Vec<Waypoint> {
         plan.segments.iter().flat_map(|segment| segment.waypoints.iter().cloned()).collect()
@@ -155,10 +158,18 @@ fn given_grasps_and_way_poses_stay() {
 #[test]
 fn the_weights_decide_what_is_better() {
     let loaded = scene("box_180x.toml");
-    let query = loaded.task.query(5);
+    let query = loaded.in_hand(5);
     let margins = CostWeights { margin: 20.0, ..CostWeights::default() };
     let tight = plan(&loaded, &query, &settings(300_000), 5);
-    let wide = plan(&loaded, &query, &InHandSettings { cost: margins, ..settings(300_000) }, 5);
+    let wide = plan(
+        &loaded,
+        &query,
+        &InHandSettings {
+            improvement: ImprovementSettings { cost: margins, ..settings(300_000).improvement },
+            ..settings(300_000)
+        },
+        5,
+    );
     assert!(improvement(&wide).improved.kept_margin > improvement(&wide).first.kept_margin, "{:?}", improvement(&wide));
     assert!(improvement(&tight).improved.relocations < improvement(&tight).first.relocations);
 }
@@ -167,11 +178,11 @@ fn the_weights_decide_what_is_better() {
 fn the_methods_of_the_paper_are_improved_under_their_release_rule() {
     let loaded = scene("sphere_90x.toml");
     let asked = InHandSettings { method: Method::Visibility, ..settings(200_000) };
-    let plan = plan(&loaded, &loaded.task.query(6), &asked, 6);
+    let plan = plan(&loaded, &loaded.in_hand(6), &asked, 6);
     let told = improvement(&plan);
     assert!(told.improved.cost < told.first.cost, "{told:?}");
     let recorded: InHandSettings = serde_json::from_value(plan.settings.clone()).unwrap();
-    let model = &loaded.scene;
+    let object = &loaded.scene.objects[0];
     for segment in &plan.segments {
         let contacts: Vec<_> = segment.waypoints[0]
             .contacts
@@ -183,15 +194,15 @@ fn the_methods_of_the_paper_are_improved_under_their_release_rule() {
             })
             .collect();
         let frame = regrasp_grasp::GraspFrame {
-            center_of_mass: model.object.center_of_mass,
-            torque_scale: model.object.radius,
-            friction: model.object.friction,
+            center_of_mass: object.center_of_mass,
+            torque_scale: object.radius,
+            friction: object.friction,
         };
         for away in 0..contacts.len() {
             let others: Vec<_> = (0..contacts.len()).filter(|&f| f != away).map(|f| contacts[f]).collect();
             let others: [_; 3] = others.try_into().expect("a hand of four");
             let margin = regrasp_grasp::closure::three::prove(&others, &frame).map_or(0.0, |(margin, _)| margin);
-            assert!(margin >= recorded.closure_margin, "finger {away} could not be let go: {margin}");
+            assert!(margin >= recorded.physics.closure_margin, "finger {away} could not be let go: {margin}");
         }
     }
 }

@@ -1,9 +1,12 @@
 //! Every method's plans against the checker, which shares nothing with the planner, and against themselves when
 //! planned again.
 
+use crate::queries::Queries;
 use regrasp_base::Budget;
 use regrasp_plan::Plan;
-use regrasp_plan::check::{CheckSettings, check};
+use regrasp_plan::check::CheckSettings;
+use regrasp_planners::in_hand::BaselineSettings;
+use regrasp_planners::in_hand::SearchSettings;
 use regrasp_planners::in_hand::{Alpha, InHandSettings, Method, Progress, ReleaseRule, plan_in_hand, validate_once};
 use regrasp_robot::import::LoadOptions;
 use regrasp_scene::{LoadedScene, load_scene};
@@ -20,13 +23,18 @@ pub fn scene(name: &str) -> LoadedScene {
 pub fn settings(method: Method, n_threads: usize) -> InHandSettings {
     // Alpha as in paper 000's box example.
     let alpha = Alpha::Decreasing { start: 0.5, step: 0.005, end: 0.3 };
-    InHandSettings { method, n_threads, alpha, ..InHandSettings::default() }
+    InHandSettings {
+        method,
+        n_threads,
+        baselines: BaselineSettings { alpha, ..BaselineSettings::default() },
+        ..InHandSettings::default()
+    }
 }
 
 fn plan(loaded: &LoadedScene, settings: &InHandSettings, seed: u64) -> Plan {
     let ignore = |_: Progress| {};
     let budget = Budget::work(20_000_000);
-    plan_in_hand(&loaded.scene, &loaded.task.query(seed), settings, seed, &budget, &ignore)
+    plan_in_hand(&loaded.view(), &loaded.in_hand(seed), settings, seed, &budget, &ignore)
         .unwrap_or_else(|failure| panic!("{:?}, seed {seed}: {failure}", settings.method))
 }
 
@@ -36,9 +44,9 @@ fn is_judged_valid_and_reproducible(name: &str) {
         for seed in SEEDS {
             let one_thread = settings(method, 1);
             let first = plan(&loaded, &one_thread, seed);
-            assert_eq!(validate_once(&loaded.scene, &first, &one_thread), Ok(()), "{method:?}, seed {seed}");
-            let query = loaded.task.query(seed);
-            let report = check(&loaded.scene, Some(&query), &first, &CheckSettings::default());
+            assert_eq!(validate_once(&loaded.view(), &first, &one_thread), Ok(()), "{method:?}, seed {seed}");
+            let query = loaded.in_hand(seed);
+            let report = loaded.judge(&query, &first, &CheckSettings::default());
             assert!(report.accepted(), "{method:?}, seed {seed}: {report:#?}");
             assert!(first == plan(&loaded, &one_thread, seed), "{method:?}, seed {seed}: another plan the second time");
             assert!(
@@ -63,19 +71,22 @@ fn plans_for_the_box_are_accepted_and_reproducible() {
 fn methods_of_the_paper_have_its_release_rule_and_say_so() {
     let loaded = scene("sphere_90x.toml");
     for method in [Method::Visibility, Method::Classic] {
-        let asked = InHandSettings { release_rule: ReleaseRule::WhereOthersHold, ..settings(method, 1) };
+        let asked = InHandSettings {
+            search: SearchSettings { release_rule: ReleaseRule::WhereOthersHold, ..settings(method, 1).search },
+            ..settings(method, 1)
+        };
         let plan = plan(&loaded, &asked, 5);
         let recorded: InHandSettings = serde_json::from_value(plan.settings).expect("settings as they were written");
-        assert_eq!(recorded.release_rule, ReleaseRule::EverywhereEveryFinger);
+        assert_eq!(recorded.search.release_rule, ReleaseRule::EverywhereEveryFinger);
     }
 }
 
 #[test]
 fn a_spent_budget_is_told_with_its_causes() {
     let loaded = scene("tight_box_90x.toml");
-    let query = loaded.task.query(0);
+    let query = loaded.in_hand(0);
     for method in [Method::Visibility, Method::Classic] {
-        let failure = plan_in_hand(&loaded.scene, &query, &settings(method, 1), 0, &Budget::work(3000), &|_| {})
+        let failure = plan_in_hand(&loaded.view(), &query, &settings(method, 1), 0, &Budget::work(3000), &|_| {})
             .expect_err("3000 configurations are too few for the tight hand");
         assert_eq!(failure.kind, regrasp_planners::FailureKind::WorkSpent);
         assert!(!failure.causes.is_empty() && failure.statistics.nodes >= 2, "{failure:?}");

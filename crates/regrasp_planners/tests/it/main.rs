@@ -6,12 +6,16 @@ mod in_hand_methods;
 mod physics;
 #[path = "../../../../tests/support/places.rs"]
 mod places;
+mod queries;
 mod reach;
 mod roadmaps;
 mod segments;
+mod several;
 mod soft_and_coupled;
 mod solids;
 mod tips;
 mod tracking;
 mod tracking_gaits;
+#[path = "../../../../tests/support/two_hands.rs"]
+mod two_hands;
 mod way_poses;

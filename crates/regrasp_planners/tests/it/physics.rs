@@ -2,28 +2,37 @@
 
 use crate::in_hand_methods::scene;
 use crate::places::shared_models;
+use crate::queries::Queries;
 use crate::soft_and_coupled;
 use nalgebra::{DMatrix, UnitQuaternion};
 use regrasp_base::{Budget, Rng};
 use regrasp_geometry::{Point, Pose, UnitVector, Vector, frame};
 use regrasp_grasp::{Contact, ContactForce, ContactModel, Grip};
 use regrasp_plan::Plan;
-use regrasp_plan::check::{CheckSettings, Level, check};
+use regrasp_plan::check::{CheckSettings, Level};
 use regrasp_plan::plan::{SegmentKind, Waypoint};
 use regrasp_planners::Failure;
+use regrasp_planners::in_hand::PhysicsSettings;
 use regrasp_planners::in_hand::{ForceSettings, InHandSettings, plan_in_hand};
 use regrasp_scene::{Gravity, Limits, LoadedScene, Scene};
 
 const SCENES: [&str; 4] = ["sphere_90x.toml", "box_90x.toml", "soft_pair_roll.toml", "shadow/sphere32_z.toml"];
 
 fn settings() -> InHandSettings {
-    InHandSettings { friction_margin: 1.5, forces: Some(ForceSettings::default()), ..InHandSettings::default() }
+    InHandSettings {
+        physics: PhysicsSettings {
+            friction_margin: 1.5,
+            forces: Some(ForceSettings::default()),
+            ..PhysicsSettings::default()
+        },
+        ..InHandSettings::default()
+    }
 }
 
 fn plan_with(loaded: &LoadedScene, settings: &InHandSettings, seed: u64) -> Result<Plan, Failure> {
-    let (query, budget) = (loaded.task.query(seed), Budget::work(3_000_000));
-    let plan = plan_in_hand(&loaded.scene, &query, settings, seed, &budget, &|_| {})?;
-    let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+    let (query, budget) = (loaded.in_hand(seed), Budget::work(3_000_000));
+    let plan = plan_in_hand(&loaded.view(), &query, settings, seed, &budget, &|_| {})?;
+    let report = loaded.judge(&query, &plan, &CheckSettings::default());
     assert!(report.accepted(), "seed {seed}: {report:#?}");
     Ok(plan)
 }
@@ -58,7 +67,7 @@ fn exerted(waypoint: &Waypoint, finger: usize) -> ContactForce {
 fn forces_balance_the_weight_inside_all_limits() {
     for_plans(|name, loaded, plan| {
         let promised = plan.promises.forces.as_ref().expect("forces were asked for");
-        let object = &loaded.scene.object;
+        let object = &loaded.scene.objects[0];
         assert_eq!((promised.mass, promised.gravity_in_world), (object.mass, Some([0.0, 0.0, -9.80665])), "{name}");
         for (s, segment) in plan.segments.iter().enumerate() {
             for waypoint in &segment.waypoints {
@@ -67,7 +76,7 @@ fn forces_balance_the_weight_inside_all_limits() {
                 let (mut force, mut torque) = (world_from_object.rotation.inverse() * down, Vector::zeros());
                 for finger in 0..plan.fingers.len() {
                     let state = &waypoint.contacts[finger];
-                    let model = loaded.scene.hand.fingers[finger].tip.contact;
+                    let model = loaded.scene.hands[0].hand.fingers[finger].tip.contact;
                     assert_eq!(state.holds(), state.force_in_object.is_some());
                     let is_soft = matches!(model, ContactModel::SoftFinger { .. });
                     assert_eq!(state.torsion.is_some(), state.holds() && is_soft, "{name}");
@@ -108,7 +117,7 @@ fn joint_torques_do_the_work_of_the_forces() {
             for waypoint in segment.waypoints.iter().step_by(5) {
                 let world_from_object = Pose::from(&waypoint.world_from_object);
                 let mut first = 0;
-                for (index, finger) in loaded.scene.hand.fingers.iter().enumerate() {
+                for (index, finger) in loaded.scene.hands[0].hand.fingers.iter().enumerate() {
                     let n_joints = finger.chain.n_coordinates();
                     let joints = &waypoint.joints[first..first + n_joints];
                     let torques = &waypoint.joint_torques[first..first + n_joints];
@@ -157,7 +166,7 @@ fn object_way(scene: &Scene, from: &Waypoint, to: &Waypoint) -> f64 {
         .iter()
         .filter(|direction| direction.norm() > 0.5)
         .map(|direction| {
-            let point = scene.object.center_of_mass + from.rotation.inverse() * direction * scene.object.radius;
+            let point = scene.objects[0].center_of_mass + from.rotation.inverse() * direction * scene.objects[0].radius;
             (to * point - from * point).norm()
         })
         .fold(0.0, f64::max)
@@ -193,7 +202,7 @@ fn progress(from: &Waypoint, to: &Waypoint, u: f64) -> (f64, f64) {
 /// largest speed.
 fn check_tips(loaded: &LoadedScene, from: &Waypoint, to: &Waypoint, largest: f64, name: &str) -> f64 {
     let (span, mut first, mut fastest) = (to.time - from.time, 0, 0.0f64);
-    for finger in &loaded.scene.hand.fingers {
+    for finger in &loaded.scene.hands[0].hand.fingers {
         let range = first..first + finger.chain.n_coordinates();
         first = range.end;
         let tip = |u: f64| finger.ik.tip(&range.clone().map(|j| cubic(from, to, j, u)).collect::<Vec<_>>());
@@ -216,7 +225,7 @@ fn check_tips(loaded: &LoadedScene, from: &Waypoint, to: &Waypoint, largest: f64
 fn plans_rest_between_segments_and_keep_to_their_limits() {
     for_plans(|name, loaded, plan| {
         let limits = &plan.promises.motion;
-        let speed = settings().speed;
+        let speed = settings().physics.speed;
         assert_eq!(plan.segments[0].waypoints[0].time, 0.0);
         let mut fastest: f64 = 0.0;
         for (s, segment) in plan.segments.iter().enumerate() {
@@ -269,7 +278,7 @@ fn plans_for_any_direction_hold_in_each() {
         let loaded = LoadedScene { scene: loaded.scene.under_gravity(Gravity::Any), ..loaded };
         let plan = plan_with(&loaded, &settings(), 0).unwrap_or_else(|failure| panic!("{name}: {failure}"));
         assert_eq!(plan.promises.forces.as_ref().expect("forces were asked for").gravity_in_world, None);
-        let object = &loaded.scene.object;
+        let object = &loaded.scene.objects[0];
         for (s, segment) in plan.segments.iter().enumerate() {
             for waypoint in segment.waypoints.iter().step_by(4) {
                 let holding: Vec<usize> = (0..plan.fingers.len()).filter(|&f| holds(&plan, s, waypoint, f)).collect();
@@ -320,32 +329,35 @@ fn changed(name: &str, change: impl FnOnce(&mut Scene)) -> LoadedScene {
 fn without_forces_there_is_no_plan_and_the_cause_is_named() {
     let budget = Budget::work(60_000);
     let fails = |loaded: &LoadedScene, settings: &InHandSettings| {
-        let failure = plan_in_hand(&loaded.scene, &loaded.task.query(0), settings, 0, &budget, &|_| {});
+        let failure = plan_in_hand(&loaded.view(), &loaded.in_hand(0), settings, 0, &budget, &|_| {});
         let failure = failure.expect_err("nothing balances it");
         let causes: Vec<&str> = failure.causes.iter().map(|cause| cause.reason.as_str()).collect();
         (causes.join("\n"), failure.advice)
     };
-    let (causes, _) = fails(&changed("sphere_90x.toml", |scene| scene.object.mass = 20.0), &settings());
+    let (causes, _) = fails(&changed("sphere_90x.toml", |scene| scene.objects[0].mass = 20.0), &settings());
     assert!(causes.contains("no contact forces balance the weight: "), "{causes}");
     let strong = ForceSettings { normal_force: [2.0, 500.0], ..ForceSettings::default() };
     let (causes, _) = fails(
         &changed("sphere_90x.toml", |scene| {
-            scene.object.mass = 20.0;
+            scene.objects[0].mass = 20.0;
             scene.limits.normal_force = 500.0;
         }),
-        &InHandSettings { forces: Some(strong), ..settings() },
+        &InHandSettings { physics: PhysicsSettings { forces: Some(strong), ..settings().physics }, ..settings() },
     );
     assert!(causes.contains(" would need more than 1 N m"), "{causes}");
     let weak = ForceSettings { torque_share: 0.1, ..ForceSettings::default() };
-    let (causes, advice) = fails(&scene("sphere_90x.toml"), &InHandSettings { forces: Some(weak), ..settings() });
+    let (causes, advice) = fails(
+        &scene("sphere_90x.toml"),
+        &InHandSettings { physics: PhysicsSettings { forces: Some(weak), ..settings().physics }, ..settings() },
+    );
     assert!(causes.contains("balance the weight: joint \"") && causes.contains(" would need more than 0.1 N m"));
     assert!(advice.contains("no contact forces"), "{advice}");
     // The same without asking about forces.
-    let heavy = changed("sphere_90x.toml", |scene| scene.object.mass = 20.0);
-    let plain = InHandSettings { forces: None, ..settings() };
-    let query = heavy.task.query(0);
-    let plan = plan_in_hand(&heavy.scene, &query, &plain, 0, &budget, &|_| {}).expect("geometry knows no weight");
-    let report = check(&heavy.scene, Some(&query), &plan, &CheckSettings::default());
+    let heavy = changed("sphere_90x.toml", |scene| scene.objects[0].mass = 20.0);
+    let plain = InHandSettings { physics: PhysicsSettings { forces: None, ..settings().physics }, ..settings() };
+    let query = heavy.in_hand(0);
+    let plan = plan_in_hand(&heavy.view(), &query, &plain, 0, &budget, &|_| {}).expect("geometry knows no weight");
+    let report = heavy.judge(&query, &plan, &CheckSettings::default());
     assert_eq!(report.reached, Some(Level::Geometry), "{report:#?}");
     assert!(plan.promises.forces.is_none());
     let waypoints = || plan.segments.iter().flat_map(|segment| &segment.waypoints);

@@ -1,16 +1,18 @@
 //! How far tips may be from where they rest, and what is said where nothing is found.
 
 use crate::in_hand_methods::scene;
+use crate::queries::Queries;
 use regrasp_base::Budget;
-use regrasp_plan::check::{CheckSettings, check};
+use regrasp_plan::check::CheckSettings;
 use regrasp_planners::FailureKind;
+use regrasp_planners::in_hand::PhysicsSettings;
 use regrasp_planners::in_hand::{InHandSettings, Progress, plan_in_hand};
 use regrasp_scene::{GraspRequest, InHandQuery, LoadedScene};
 use std::sync::Mutex;
 
 fn within(name: &str, reach: f64) -> LoadedScene {
     let mut loaded = scene(&format!("{name}.toml"));
-    loaded.scene.reach = Some(reach);
+    loaded.scene.hands[0].reach = Some(reach);
     loaded
 }
 
@@ -22,12 +24,12 @@ fn plans_keep_the_reach_of_the_scene_and_are_accepted() {
         let loaded = within(name, reach);
         let mut n_plans = 0;
         for seed in 0..6 {
-            let query = loaded.task.query(seed);
+            let query = loaded.in_hand(seed);
             let settings = InHandSettings::default();
-            let found = plan_in_hand(&loaded.scene, &query, &settings, seed, &Budget::work(400_000), &|_| {});
+            let found = plan_in_hand(&loaded.view(), &query, &settings, seed, &Budget::work(400_000), &|_| {});
             let Ok(plan) = found else { continue };
             n_plans += 1;
-            let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+            let report = loaded.judge(&query, &plan, &CheckSettings::default());
             assert!(report.accepted(), "{name}, reach {reach}, seed {seed}: {:#?}", report.violations);
         }
         assert!(n_plans >= 4, "{name}, reach {reach}: {n_plans} of 6 seeds");
@@ -37,9 +39,9 @@ fn plans_keep_the_reach_of_the_scene_and_are_accepted() {
 #[test]
 fn an_object_out_of_reach_is_refused_before_the_search() {
     let loaded = within("sphere_180z", 0.002);
-    let query = loaded.task.query(0);
+    let query = loaded.in_hand(0);
     let settings = InHandSettings::default();
-    let failure = plan_in_hand(&loaded.scene, &query, &settings, 0, &Budget::work(100_000), &|_| {}).unwrap_err();
+    let failure = plan_in_hand(&loaded.view(), &query, &settings, 0, &Budget::work(100_000), &|_| {}).unwrap_err();
     assert_eq!(failure.kind, FailureKind::StartInvalid);
     assert_eq!(failure.statistics.work, 0);
     assert!(failure.message.contains("reach of 0.002 m that the scene allows"), "{failure}");
@@ -48,14 +50,14 @@ fn an_object_out_of_reach_is_refused_before_the_search() {
 #[test]
 fn a_given_grasp_out_of_reach_is_refused_before_the_search() {
     let mut loaded = scene("sphere_180z.toml");
-    let (query, settings) = (loaded.task.query(0), InHandSettings::default());
-    let plan = plan_in_hand(&loaded.scene, &query, &settings, 0, &Budget::work(400_000), &|_| {}).unwrap();
+    let (query, settings) = (loaded.in_hand(0), InHandSettings::default());
+    let plan = plan_in_hand(&loaded.view(), &query, &settings, 0, &Budget::work(400_000), &|_| {}).unwrap();
     let joints = plan.segments[0].waypoints[0].joints.clone();
     let query = InHandQuery { start_grasp: GraspRequest::Joints(joints), ..query };
     // The least reach, by millimetres, with which fingers can touch the sphere somewhere is not enough for this grasp.
     let failure = (20..60).find_map(|millimetres| {
-        loaded.scene.reach = Some(1e-3 * f64::from(millimetres));
-        let found = plan_in_hand(&loaded.scene, &query, &settings, 0, &Budget::work(100_000), &|_| {});
+        loaded.scene.hands[0].reach = Some(1e-3 * f64::from(millimetres));
+        let found = plan_in_hand(&loaded.view(), &query, &settings, 0, &Budget::work(100_000), &|_| {});
         found.err().filter(|failure| !failure.message.contains("fingers can touch"))
     });
     let failure = failure.expect("a reach that lets fingers touch and not hold like this");
@@ -66,18 +68,18 @@ fn a_given_grasp_out_of_reach_is_refused_before_the_search() {
 #[test]
 fn what_is_advised_is_what_was_short_and_friction_is_that_of_the_scene() {
     let loaded = scene("sphere_180z.toml");
-    let query = loaded.task.query(0);
+    let query = loaded.in_hand(0);
     let settings = InHandSettings::default();
-    let spent = plan_in_hand(&loaded.scene, &query, &settings, 0, &Budget::work(0), &|_| {}).unwrap_err();
+    let spent = plan_in_hand(&loaded.view(), &query, &settings, 0, &Budget::work(0), &|_| {}).unwrap_err();
     assert!(spent.advice.contains("more work") && !spent.advice.contains("time"), "{}", spent.advice);
     let now = Budget::work(100_000).with_deadline(std::time::Instant::now());
-    let late = plan_in_hand(&loaded.scene, &query, &settings, 0, &now, &|_| {}).unwrap_err();
+    let late = plan_in_hand(&loaded.view(), &query, &settings, 0, &now, &|_| {}).unwrap_err();
     assert!(late.advice.contains("more time"), "{}", late.advice);
-    let plan = plan_in_hand(&loaded.scene, &query, &settings, 0, &Budget::work(400_000), &|_| {}).unwrap();
+    let plan = plan_in_hand(&loaded.view(), &query, &settings, 0, &Budget::work(400_000), &|_| {}).unwrap();
     let joints = plan.segments[0].waypoints[0].joints.clone();
     let query = InHandQuery { start_grasp: GraspRequest::Joints(joints), ..query };
-    let strict = InHandSettings { closure_margin: 0.9, ..settings };
-    let failure = plan_in_hand(&loaded.scene, &query, &strict, 0, &Budget::work(1000), &|_| {}).unwrap_err();
+    let strict = InHandSettings { physics: PhysicsSettings { closure_margin: 0.9, ..settings.physics }, ..settings };
+    let failure = plan_in_hand(&loaded.view(), &query, &strict, 0, &Budget::work(1000), &|_| {}).unwrap_err();
     assert!(failure.message.ends_with("at friction 0.8 of the scene over a margin of 1.5"), "{failure}");
 }
 
@@ -85,11 +87,11 @@ fn what_is_advised_is_what_was_short_and_friction_is_that_of_the_scene() {
 #[test]
 fn progress_says_no_more_than_the_turn_asked_for() {
     let loaded = scene("out_of_reach.toml");
-    let query = loaded.task.query(0);
+    let query = loaded.in_hand(0);
     let asked = query.world_from_object_start.rotation.angle_to(&query.world_from_object_goal.rotation);
     let seen = Mutex::new(Vec::new());
     let note = |progress: Progress| seen.lock().unwrap().push(progress.angle_left);
-    let _ = plan_in_hand(&loaded.scene, &query, &InHandSettings::default(), 0, &Budget::work(100_000), &note);
+    let _ = plan_in_hand(&loaded.view(), &query, &InHandSettings::default(), 0, &Budget::work(100_000), &note);
     let seen = seen.into_inner().unwrap();
     assert!(!seen.is_empty() && seen.iter().all(|left| *left <= asked + 1e-9), "{seen:?} of {asked}");
 }
@@ -98,12 +100,12 @@ fn progress_says_no_more_than_the_turn_asked_for() {
 #[test]
 fn work_counts_draws_of_contacts_that_do_not_fit() {
     let mut loaded = scene("sphere_90x.toml");
-    loaded.scene.object = thin_object();
-    let query = loaded.task.query(0);
+    loaded.scene.objects[0] = thin_object();
+    let query = loaded.in_hand(0);
     let settings = InHandSettings { n_threads: 1, ..InHandSettings::default() };
     let started = std::time::Instant::now();
     let max_work = 2_000;
-    let found = plan_in_hand(&loaded.scene, &query, &settings, 0, &Budget::work(max_work), &|_| {});
+    let found = plan_in_hand(&loaded.view(), &query, &settings, 0, &Budget::work(max_work), &|_| {});
     let work = found.map_or_else(|failure| failure.statistics.work, |plan| plan.statistics.work);
     assert!(work < 2 * max_work, "{work} units of {max_work}");
     assert!(started.elapsed().as_secs_f64() < 2.0, "{work} units took {:?}", started.elapsed());
@@ -145,5 +147,5 @@ fn thin_object() -> regrasp_scene::Object {
     );
     std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
     let options = regrasp_robot::LoadOptions::default();
-    regrasp_scene::load_scene(&folder.path().join("scene.toml"), &options).unwrap().scene.object
+    regrasp_scene::load_scene(&folder.path().join("scene.toml"), &options).unwrap().scene.objects.remove(0)
 }

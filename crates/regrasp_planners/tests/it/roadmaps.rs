@@ -2,10 +2,12 @@
 //! where it is broken or was built for something else.
 
 use crate::in_hand_methods::scene;
+use crate::queries::Queries;
 use regrasp_base::Budget;
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Pose, Shape, Vector};
-use regrasp_plan::check::{CheckSettings, Level, check};
+use regrasp_plan::check::{CheckSettings, Level};
+use regrasp_planners::in_hand::SearchSettings;
 use regrasp_planners::in_hand::roadmap::{
     BuildSettings, GraspRoadmap, QueryMemory, Region, RoadmapPlanner, build_roadmap, seal,
 };
@@ -15,11 +17,11 @@ use regrasp_scene::{LoadedScene, Obstacle, Scene};
 use std::path::Path;
 
 fn small_roadmap(loaded: &LoadedScene, n_threads: usize) -> GraspRoadmap {
-    let query = loaded.task.query(0);
-    let region = Region::around(&query.poses(), &loaded.scene.object.center_of_mass, 0.005, 1.0);
+    let query = loaded.in_hand(0);
+    let region = Region::around(&query.poses(), &loaded.scene.objects[0].center_of_mass, 0.005, 1.0);
     let build = BuildSettings { places: 40, grasps: 60, neighbours: 12, ..BuildSettings::default() };
     let settings = InHandSettings { n_threads, ..InHandSettings::default() };
-    build_roadmap(&loaded.scene, &region, &build, &settings, 3, &Budget::unlimited(), &|_| {})
+    build_roadmap(&loaded.view(), &region, &build, &settings, 3, &Budget::unlimited(), &|_| {})
         .unwrap_or_else(|failure| panic!("{failure}"))
 }
 
@@ -28,18 +30,15 @@ fn answers_are_accepted_and_the_graph_grows_by_them() {
     let loaded = scene("sphere_90x.toml");
     let path = Path::new("sphere.roadmap");
     let roadmap = small_roadmap(&loaded, 1);
-    let planner = RoadmapPlanner::new(path, &roadmap, &loaded.scene).expect("built for this scene");
+    let view = loaded.view();
+    let planner = RoadmapPlanner::new(path, &roadmap, &view).expect("built for this scene");
     let (mut memory, mut last) = (QueryMemory::default(), None);
     for seed in 0..20 {
         let query = planner.random_query(seed);
         let answer = planner.plan(&query, seed, &Budget::work(1_000_000), &mut memory);
         let answer = answer.unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
-        let report = check(
-            &loaded.scene,
-            Some(&query),
-            &answer.plan,
-            &CheckSettings { level: Level::Geometry, ..CheckSettings::default() },
-        );
+        let report =
+            loaded.judge(&query, &answer.plan, &CheckSettings { level: Level::Geometry, ..CheckSettings::default() });
         assert!(report.accepted(), "seed {seed}: {report:#?}");
         let again =
             planner.plan(&query, seed, &Budget::work(1_000_000), &mut QueryMemory::default()).expect("answered");
@@ -82,7 +81,8 @@ fn broken_bytes_are_refused() {
     let loaded = scene("sphere_90x.toml");
     let roadmap = small_roadmap(&loaded, 1);
     let path = Path::new("sphere.roadmap");
-    let true_planner = RoadmapPlanner::new(path, &roadmap, &loaded.scene).expect("built for this scene");
+    let view = loaded.view();
+    let true_planner = RoadmapPlanner::new(path, &roadmap, &view).expect("built for this scene");
     let bytes = roadmap.to_bytes();
     for cut in (0..bytes.len()).step_by(bytes.len() / 97) {
         assert!(GraspRoadmap::from_bytes(path, &bytes[..cut]).is_err(), "{cut} bytes");
@@ -94,7 +94,7 @@ fn broken_bytes_are_refused() {
         // With the checksum made good again nothing may panic, whatever it says.
         seal(&mut flipped);
         let Ok(wrong) = GraspRoadmap::from_bytes(path, &flipped) else { continue };
-        let Ok(planner) = RoadmapPlanner::new(path, &wrong, &loaded.scene) else { continue };
+        let Ok(planner) = RoadmapPlanner::new(path, &wrong, &view) else { continue };
         for seed in 0..4 {
             let query = true_planner.random_query(seed);
             let _ = planner.plan(&query, seed, &Budget::work(20_000), &mut QueryMemory::default());
@@ -106,12 +106,12 @@ fn broken_bytes_are_refused() {
 type Change = (&'static str, fn(&mut Scene), &'static str);
 
 const CHANGES: [Change; 22] = [
-    ("friction", |scene| scene.object.friction *= 0.5, "R612"),
-    ("object size", |scene| scene.object.shape = Shape::Sphere { radius: 0.0321 }, "R611"),
-    ("object kind", |scene| scene.object.shape = Shape::Cuboid { half_extents: Vector::repeat(0.03) }, "R611"),
-    ("center of mass", |scene| scene.object.center_of_mass.x += 1e-4, "R611"),
-    ("edge distance", |scene| scene.object.edge_distance += 1e-4, "R611"),
-    ("crease angle", |scene| scene.object.crease_angle += 0.1, "R611"),
+    ("friction", |scene| scene.objects[0].friction *= 0.5, "R612"),
+    ("object size", |scene| scene.objects[0].shape = Shape::Sphere { radius: 0.0321 }, "R611"),
+    ("object kind", |scene| scene.objects[0].shape = Shape::Cuboid { half_extents: Vector::repeat(0.03) }, "R611"),
+    ("center of mass", |scene| scene.objects[0].center_of_mass.x += 1e-4, "R611"),
+    ("edge distance", |scene| scene.objects[0].edge_distance += 1e-4, "R611"),
+    ("crease angle", |scene| scene.objects[0].crease_angle += 0.1, "R611"),
     ("an obstacle", |scene| scene.obstacles.push(plate()), "R613"),
     ("a soft fingertip", |scene| tip(scene).contact = ContactModel::SoftFinger { torsion_radius: 0.005 }, "R614"),
     ("a slippery fingertip", |scene| tip(scene).contact = ContactModel::Frictionless, "R614"),
@@ -120,22 +120,22 @@ const CHANGES: [Change; 22] = [
     ("tip center", |scene| tip(scene).center_in_body.z += 1e-4, "R610"),
     ("link length", |scene| joint(scene).parent_from_joint.translation.x += 1e-4, "R610"),
     ("joint axis", |scene| joint(scene).axis = -joint(scene).axis, "R610"),
-    ("coupling", |scene| joint(scene).multiplier = 0.9, "R610"),
-    ("coupling offset", |scene| joint(scene).offset = 0.1, "R610"),
-    ("lower limit", |scene| scene.hand.fingers[1].chain.lower[0] += 1e-3, "R610"),
-    ("upper limit", |scene| scene.hand.fingers[1].chain.upper[2] -= 1e-3, "R610"),
-    ("finger name", |scene| scene.hand.fingers[3].name.push('s'), "R610"),
-    ("finger shapes", |scene| drop(scene.hand.fingers[0].shapes.pop()), "R610"),
-    ("palm", |scene| scene.hand.palm[0].placed.parent_from_shape.translation.z -= 1e-3, "R610"),
-    ("pairs that may touch", |scene| assert!(scene.hand.allowed_pairs.insert((LinkId(0), LinkId(5)))), "R610"),
+    ("coupling", |scene| joint(scene).drive.terms[0].1 = 0.9, "R610"),
+    ("coupling offset", |scene| joint(scene).drive.offset = 0.1, "R610"),
+    ("lower limit", |scene| scene.hands[0].hand.fingers[1].chain.lower[0] += 1e-3, "R610"),
+    ("upper limit", |scene| scene.hands[0].hand.fingers[1].chain.upper[2] -= 1e-3, "R610"),
+    ("finger name", |scene| scene.hands[0].hand.fingers[3].name.push('s'), "R610"),
+    ("finger shapes", |scene| drop(scene.hands[0].hand.fingers[0].shapes.pop()), "R610"),
+    ("palm", |scene| scene.hands[0].hand.palm[0].placed.parent_from_shape.translation.z -= 1e-3, "R610"),
+    ("pairs that may touch", |scene| assert!(scene.hands[0].hand.allowed_pairs.insert((LinkId(0), LinkId(5)))), "R610"),
 ];
 
 fn tip(scene: &mut Scene) -> &mut Tip {
-    &mut scene.hand.fingers[2].tip
+    &mut scene.hands[0].hand.fingers[2].tip
 }
 
 fn joint(scene: &mut Scene) -> &mut ChainJoint {
-    &mut scene.hand.fingers[1].chain.joints[2]
+    &mut scene.hands[0].hand.fingers[1].chain.joints[2]
 }
 
 fn plate() -> Obstacle {
@@ -152,35 +152,34 @@ fn whatever_decides_what_is_feasible_is_refused_when_it_changed() {
     let path = Path::new("sphere.roadmap");
     let roadmap = GraspRoadmap::from_bytes(path, &small_roadmap(&loaded, 1).to_bytes()).expect("its own bytes");
     for (what, change, code) in CHANGES {
-        let mut changed = loaded.scene.clone();
-        change(&mut changed);
-        let refused = roadmap.refuse_other_scene(path, &changed).expect_err(what);
+        let mut changed = loaded.clone();
+        change(&mut changed.scene);
+        let refused = roadmap.refuse_other_scene(path, &changed.view()).expect_err(what);
         let codes: Vec<&str> = refused.diagnostics.iter().map(|diagnostic| diagnostic.code).collect();
         assert_eq!(codes, [code], "{what}: {refused}");
     }
-    let mut soft = loaded.scene.clone();
-    tip(&mut soft).contact = ContactModel::SoftFinger { torsion_radius: 0.005 };
-    let text = roadmap.refuse_other_scene(path, &soft).expect_err("soft").to_string();
-    let name = &soft.hand.fingers[2].name;
+    let mut soft = loaded.clone();
+    tip(&mut soft.scene).contact = ContactModel::SoftFinger { torsion_radius: 0.005 };
+    let text = roadmap.refuse_other_scene(path, &soft.view()).expect_err("soft").to_string();
+    let name = &soft.scene.hands[0].hand.fingers[2].name;
     for part in [&format!("\"{name}\""), "\"point\"", "\"soft_finger\" with torsion_radius 0.005", "fix: "] {
         assert!(text.contains(part), "{part} in {text}");
     }
     // The torsion radius counts, and comes back from the file.
-    let soft = LoadedScene { scene: soft, ..scene("sphere_90x.toml") };
     let built = GraspRoadmap::from_bytes(path, &small_roadmap(&soft, 1).to_bytes()).expect("its own bytes");
-    assert!(built.refuse_other_scene(path, &soft.scene).is_ok());
-    let mut softer = soft.scene.clone();
-    tip(&mut softer).contact = ContactModel::SoftFinger { torsion_radius: 0.006 };
-    let text = built.refuse_other_scene(path, &softer).expect_err("softer").to_string();
+    assert!(built.refuse_other_scene(path, &soft.view()).is_ok());
+    let mut softer = soft.clone();
+    tip(&mut softer.scene).contact = ContactModel::SoftFinger { torsion_radius: 0.006 };
+    let text = built.refuse_other_scene(path, &softer.view()).expect_err("softer").to_string();
     assert!(text.contains("R614") && text.contains("0.005") && text.contains("0.006"), "{text}");
     // What decides nothing may change.
-    let mut same = loaded.scene.clone();
-    same.object.mass *= 2.0;
-    same.object.name = "ball".into();
-    same.name = "another file".into();
-    assert!(roadmap.refuse_other_scene(path, &same).is_ok());
+    let mut same = loaded.clone();
+    same.scene.objects[0].mass *= 2.0;
+    same.scene.objects[0].name = "ball".into();
+    same.scene.name = "another file".into();
+    assert!(roadmap.refuse_other_scene(path, &same.view()).is_ok());
     for other in ["box_90x.toml", "tight_sphere_180z.toml"] {
-        assert!(roadmap.refuse_other_scene(path, &scene(other).scene).is_err(), "{other}");
+        assert!(roadmap.refuse_other_scene(path, &scene(other).view()).is_err(), "{other}");
     }
 }
 
@@ -188,13 +187,13 @@ fn whatever_decides_what_is_feasible_is_refused_when_it_changed() {
 fn settings_that_decide_what_is_feasible_are_refused_when_they_changed() {
     type Change = (&'static str, fn(&mut InHandSettings));
     const CHANGES: [Change; 7] = [
-        ("closure_margin", |settings| settings.closure_margin = 0.01),
-        ("release_rule", |settings| settings.release_rule = ReleaseRule::EverywhereEveryFinger),
-        ("step", |settings| settings.step *= 2.0),
-        ("clearance", |settings| settings.clearance *= 2.0),
-        ("contact_allowance", |settings| settings.contact_allowance *= 0.5),
-        ("limit_margin", |settings| settings.limit_margin *= 2.0),
-        ("joint_step", |settings| settings.joint_step *= 0.5),
+        ("closure_margin", |settings| settings.physics.closure_margin = 0.01),
+        ("release_rule", |settings| settings.search.release_rule = ReleaseRule::EverywhereEveryFinger),
+        ("step", |settings| settings.physics.step *= 2.0),
+        ("clearance", |settings| settings.physics.clearance *= 2.0),
+        ("contact_allowance", |settings| settings.physics.contact_allowance *= 0.5),
+        ("limit_margin", |settings| settings.physics.limit_margin *= 2.0),
+        ("joint_step", |settings| settings.physics.joint_step *= 0.5),
     ];
     let loaded = scene("sphere_90x.toml");
     let path = Path::new("sphere.roadmap");
@@ -207,7 +206,11 @@ fn settings_that_decide_what_is_feasible_are_refused_when_they_changed() {
         let text = refused.to_string();
         assert!(text.contains("R615") && text.contains(name), "{text}");
     }
-    let searching = InHandSettings { shortcuts: 99, candidates: 2, n_threads: 7, ..roadmap.about().settings.clone() };
+    let searching = InHandSettings {
+        n_threads: 7,
+        search: SearchSettings { shortcuts: 99, candidates: 2, ..roadmap.about().settings.clone().search },
+        ..roadmap.about().settings.clone()
+    };
     assert!(roadmap.refuse_other_settings(path, &searching).is_ok());
 }
 
@@ -218,16 +221,13 @@ fn later_queries_use_what_earlier_ones_found() {
     let path = Path::new("sphere.roadmap");
     let mut roadmap = small_roadmap(&loaded, 1);
     let mut memory = QueryMemory::default();
+    let view = loaded.view();
     let mut ask = |roadmap: &GraspRoadmap, seed: u64| {
-        let planner = RoadmapPlanner::new(path, roadmap, &loaded.scene).expect("built for this scene");
+        let planner = RoadmapPlanner::new(path, roadmap, &view).expect("built for this scene");
         let query = planner.random_query(seed);
         let answer = planner.plan(&query, seed, &Budget::work(1_000_000), &mut memory).expect("answered");
-        let report = check(
-            &loaded.scene,
-            Some(&query),
-            &answer.plan,
-            &CheckSettings { level: Level::Geometry, ..CheckSettings::default() },
-        );
+        let report =
+            loaded.judge(&query, &answer.plan, &CheckSettings { level: Level::Geometry, ..CheckSettings::default() });
         assert!(report.accepted(), "seed {seed}: {report:#?}");
         answer
     };

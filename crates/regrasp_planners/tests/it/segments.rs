@@ -2,9 +2,12 @@
 
 use crate::in_hand_methods::scene;
 use crate::places::shared_models;
+use crate::queries::Queries;
 use regrasp_base::Budget;
-use regrasp_plan::check::{CheckSettings, check};
+use regrasp_plan::check::CheckSettings;
 use regrasp_plan::{ContactMode, Plan, Waypoint};
+use regrasp_planners::in_hand::BaselineSettings;
+use regrasp_planners::in_hand::SearchSettings;
 use regrasp_planners::in_hand::{InHandSettings, Method, plan_in_hand, validate_once};
 use regrasp_robot::import::{LoadOptions, ResolveOptions};
 use regrasp_scene::{LoadedScene, load_scene};
@@ -41,16 +44,16 @@ fn backwards(plan: &Plan) -> Plan {
 fn judge(loaded: &LoadedScene, settings: &InHandSettings, seeds: std::ops::Range<u64>, max_work: u64) -> usize {
     let mut n_plans = 0;
     for seed in seeds {
-        let query = loaded.task.query(seed);
+        let query = loaded.in_hand(seed);
         let which = format!("{}, {:?}, seed {seed}", loaded.scene.name, settings.method);
-        let found = plan_in_hand(&loaded.scene, &query, settings, seed, &Budget::work(max_work), &|_| {});
+        let found = plan_in_hand(&loaded.view(), &query, settings, seed, &Budget::work(max_work), &|_| {});
         let Ok(plan) = found else { continue };
         n_plans += 1;
         assert_meets(&plan, &which);
-        assert_eq!(validate_once(&loaded.scene, &plan, settings), Ok(()), "{which}");
-        assert_eq!(validate_once(&loaded.scene, &backwards(&plan), settings), Ok(()), "{which}, backwards");
+        assert_eq!(validate_once(&loaded.view(), &plan, settings), Ok(()), "{which}");
+        assert_eq!(validate_once(&loaded.view(), &backwards(&plan), settings), Ok(()), "{which}, backwards");
         let strict = CheckSettings { meeting_tolerance: 0.0, ..CheckSettings::default() };
-        let report = check(&loaded.scene, Some(&query), &plan, &strict);
+        let report = loaded.judge(&query, &plan, &strict);
         assert!(report.accepted(), "{which}: {:#?}", report.violations);
     }
     n_plans
@@ -58,7 +61,11 @@ fn judge(loaded: &LoadedScene, settings: &InHandSettings, seeds: std::ops::Range
 
 /// Many shortcuts, so that plans are cut and joined as much as they can be.
 fn much_cut(method: Method) -> InHandSettings {
-    InHandSettings { method, shortcuts: 40, ..InHandSettings::default() }
+    InHandSettings {
+        method,
+        search: SearchSettings { shortcuts: 40, ..SearchSettings::default() },
+        ..InHandSettings::default()
+    }
 }
 
 #[test]
@@ -70,7 +77,10 @@ fn segments_of_the_gait_meet_exactly() {
 
 #[test]
 fn segments_of_the_papers_methods_meet_exactly() {
-    let uniform = InHandSettings { guided_share: 0.0, ..much_cut(Method::Visibility) };
+    let uniform = InHandSettings {
+        baselines: BaselineSettings { guided_share: 0.0, ..much_cut(Method::Visibility).baselines },
+        ..much_cut(Method::Visibility)
+    };
     assert!(judge(&scene("tight_sphere_180z.toml"), &uniform, 0..20, 100_000) >= 18);
     assert!(judge(&scene("sphere_180x.toml"), &much_cut(Method::Classic), 0..10, 100_000) >= 5);
 }
@@ -101,11 +111,11 @@ fn plans_of_hands_with_rolling_hulls_are_proven_again() {
         let loaded = load_scene(&path, &options).unwrap_or_else(|e| panic!("{name}: {e}"));
         let settings = InHandSettings::default();
         for seed in 0..8 {
-            let query = loaded.task.query(seed);
-            let found = plan_in_hand(&loaded.scene, &query, &settings, seed, &Budget::work(100_000), &|_| {});
+            let query = loaded.in_hand(seed);
+            let found = plan_in_hand(&loaded.view(), &query, &settings, seed, &Budget::work(100_000), &|_| {});
             let Ok(plan) = found else { continue };
             n_plans += 1;
-            assert_eq!(validate_once(&loaded.scene, &plan, &settings), Ok(()), "{name}, seed {seed}");
+            assert_eq!(validate_once(&loaded.view(), &plan, &settings), Ok(()), "{name}, seed {seed}");
         }
     }
     assert!(n_plans >= 8, "{n_plans} plans");

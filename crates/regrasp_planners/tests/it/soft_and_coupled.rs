@@ -2,9 +2,10 @@
 //! the checker against the same plans in hands without torsion or with other couplings.
 
 use crate::places::shared_models;
+use crate::queries::Queries;
 use regrasp_base::{Budget, Rng};
+use regrasp_mutations::mutants;
 use regrasp_plan::Plan;
-use regrasp_plan::check::mutation::mutants;
 use regrasp_plan::check::{CheckSettings, check};
 use regrasp_planners::in_hand::{InHandSettings, plan_in_hand, validate_once};
 use regrasp_robot::import::{LoadOptions, ResolveOptions};
@@ -25,14 +26,16 @@ fn mutants_of_accepted_plans(name: &str, models: &Path, seeds: std::ops::Range<u
     let settings = InHandSettings::default();
     let mut names = BTreeSet::new();
     for seed in seeds {
-        let query = loaded.task.query(seed);
-        let plan = plan_in_hand(&loaded.scene, &query, &settings, seed, &Budget::work(20_000_000), &|_| {})
+        let query = loaded.in_hand(seed);
+        let plan = plan_in_hand(&loaded.view(), &query, &settings, seed, &Budget::work(20_000_000), &|_| {})
             .unwrap_or_else(|failure| panic!("{name}, seed {seed}: {failure}"));
-        assert_eq!(validate_once(&loaded.scene, &plan, &settings), Ok(()), "{name}, seed {seed}");
-        let judge = |scene: &Scene, plan: &Plan| check(scene, Some(&query), plan, &CheckSettings::default());
+        assert_eq!(validate_once(&loaded.view(), &plan, &settings), Ok(()), "{name}, seed {seed}");
+        let asked = query.clone().into();
+        let judge =
+            |scene: &Scene, plan: &Plan| check((scene, &loaded.state), Some(&asked), plan, &CheckSettings::default());
         let report = judge(&loaded.scene, &plan);
         assert!(report.accepted(), "{name}, seed {seed}: {report:#?}");
-        for mutant in mutants(&plan, &loaded.scene, &mut Rng::keyed(seed, "soft and coupled", 0)) {
+        for mutant in mutants(&plan, loaded.manipulation(), &mut Rng::keyed(seed, "soft and coupled", 0)) {
             let report = judge(mutant.scene.as_ref().unwrap_or(&loaded.scene), &mutant.plan);
             let fits = report.violations.iter().any(|violation| mutant.expected.contains(&violation.kind));
             assert!(fits, "{name}, seed {seed}, {}: {report:#?}", mutant.name);

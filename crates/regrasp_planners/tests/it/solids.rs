@@ -2,10 +2,11 @@
 //! tolerance: in planner and checker alike.
 
 use crate::places::repository;
+use crate::queries::Queries;
 use regrasp_base::Budget;
 use regrasp_geometry::{Point, Surface, Vector};
 use regrasp_plan::Plan;
-use regrasp_plan::check::{CheckSettings, Report, ViolationKind, check};
+use regrasp_plan::check::{CheckSettings, Report, ViolationKind};
 use regrasp_planners::in_hand::{InHandSettings, moved_fingers, plan_in_hand};
 use regrasp_planners::{Failure, FailureKind};
 use regrasp_robot::LoadOptions;
@@ -65,18 +66,18 @@ impl Drop for Folder {
 const TURN: &str = "{ axis = \"x\", angle_deg = 90 }";
 
 fn plan_for(loaded: &LoadedScene, query: &InHandQuery, seed: u64) -> Result<Plan, Failure> {
-    plan_in_hand(&loaded.scene, query, &InHandSettings::default(), seed, &Budget::work(2_000_000), &|_| {})
+    plan_in_hand(&loaded.view(), query, &InHandSettings::default(), seed, &Budget::work(2_000_000), &|_| {})
 }
 
 fn judge(loaded: &LoadedScene, query: &InHandQuery, plan: &Plan) -> Report {
-    check(&loaded.scene, Some(query), plan, &CheckSettings::default())
+    loaded.judge(query, plan, &CheckSettings::default())
 }
 
 /// Plans some seeds; every plan is accepted.
 fn all_are_accepted(loaded: &LoadedScene, seeds: u64) -> Vec<Plan> {
     let mut plans = Vec::new();
     for seed in 0..seeds {
-        let query = loaded.task.query(seed);
+        let query = loaded.in_hand(seed);
         let plan = plan_for(loaded, &query, seed).unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
         let report = judge(loaded, &query, &plan);
         assert!(report.accepted(), "seed {seed}: {:#?}", report.violations);
@@ -148,13 +149,13 @@ fn what_starts_inside_a_mesh_is_refused_before_any_search() {
         (folder.load(None, SPHERE, TURN, &obstacle("low.obj")), ["palm", "block"]),
     ];
     for (loaded, names) in &scenes {
-        let failure = plan_for(loaded, &loaded.task.query(0), 0).unwrap_err();
+        let failure = plan_for(loaded, &loaded.in_hand(0), 0).unwrap_err();
         assert_eq!((failure.kind, failure.statistics.work), (FailureKind::StartInvalid, 0), "{failure}");
         assert!(names.iter().all(|name| failure.message.contains(name)), "{failure}");
     }
     // A plan made without the obstacles is rejected with them.
     let without = folder.load(None, SPHERE, TURN, "");
-    let query = without.task.query(0);
+    let query = without.in_hand(0);
     let plan = plan_for(&without, &query, 0).unwrap();
     assert!(judge(&without, &query, &plan).accepted());
     for (loaded, _) in scenes.iter().take(2) {
@@ -176,7 +177,7 @@ fn contacts_of_an_object_with_a_hull_lie_on_its_mesh() {
     folder.write_mesh("waist.obj", &revolved(&rings));
     let turn = "{ axis = \"z\", angle_deg = 45 }";
     let loaded = folder.load(None, "mesh = { file = \"waist.obj\", solid = \"hull\" }", turn, "");
-    let object = &loaded.scene.object;
+    let object = &loaded.scene.objects[0];
     for plan in all_are_accepted(&loaded, 3) {
         for contact in plan.segments.iter().flat_map(|s| &s.waypoints).flat_map(|w| &w.contacts) {
             let Some(point) = contact.point_in_object.map(Point::from) else { continue };
@@ -193,10 +194,10 @@ fn contacts_of_an_object_with_a_hull_lie_on_its_mesh() {
         mesh_body: None,
         ..object.clone()
     };
-    let of_hull =
-        LoadedScene { scene: regrasp_scene::Scene { object: as_hull, ..loaded.scene.clone() }, ..loaded.clone() };
+    let mut of_hull = loaded.clone();
+    of_hull.scene.objects[0] = as_hull;
     for seed in 0..3 {
-        let query = of_hull.task.query(seed);
+        let query = of_hull.in_hand(seed);
         let plan = plan_for(&of_hull, &query, seed).unwrap();
         assert!(judge(&of_hull, &query, &plan).accepted());
         let report = judge(&loaded, &query, &plan);
@@ -253,7 +254,7 @@ fn given_grasps_that_nearly_touch_are_put_right_and_others_refused() {
     let turn = "{ axis = \"z\", angle_deg = 30 }";
     for object in [SPHERE, "box = { size = [0.06, 0.06, 0.06] }", "mesh = { file = \"round.obj\" }"] {
         let loaded = folder.load(None, object, turn, "");
-        let automatic = loaded.task.query(0);
+        let automatic = loaded.in_hand(0);
         let first = plan_for(&loaded, &automatic, 0).unwrap();
         let start = &first.segments[0].waypoints[0];
         let mut n_moved = 0;
@@ -273,7 +274,7 @@ fn given_grasps_that_nearly_touch_are_put_right_and_others_refused() {
             };
             let report = judge(&loaded, &query, &plan);
             assert!(report.accepted(), "{object}, trial {trial}: {:#?}", report.violations);
-            let moved = moved_fingers(&loaded.scene, &query, &plan);
+            let moved = moved_fingers(&loaded.view(), &query.into(), &plan);
             assert!(moved.iter().all(|one| one.end == "start" && one.distance <= GRASP_TOLERANCE), "{moved:?}");
             n_moved += moved.len();
         }
@@ -290,7 +291,7 @@ fn given_grasps_that_nearly_touch_are_put_right_and_others_refused() {
         let near = contacts(0.3e-3);
         let plan = plan_for(&loaded, &near, 1).unwrap_or_else(|failure| panic!("{object}: {failure}"));
         assert!(judge(&loaded, &near, &plan).accepted(), "{object}");
-        let moved = moved_fingers(&loaded.scene, &near, &plan);
+        let moved = moved_fingers(&loaded.view(), &near.into(), &plan);
         // On facets the tip's ball slides a little sideways until it touches.
         let distances = if object.contains("mesh") { 0.29e-3..=GRASP_TOLERANCE } else { 0.28e-3..=0.32e-3 };
         assert!(moved.len() == 4 && moved.iter().all(|one| distances.contains(&one.distance)), "{moved:?}");

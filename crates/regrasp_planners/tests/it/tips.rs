@@ -1,8 +1,9 @@
 //! Fingertips that are no balls, and pads: ellipsoids and meshes roll and hold, and touch where they may.
 
+use crate::queries::Queries;
 use regrasp_base::{Budget, Rng};
 use regrasp_geometry::{Pose, UnitVector, Vector};
-use regrasp_plan::check::mutation::mutants;
+use regrasp_mutations::mutants;
 use regrasp_plan::check::{CheckSettings, Level, Report, check};
 use regrasp_plan::plan::ContactMode;
 use regrasp_plan::{Plan, check::ViolationKind};
@@ -19,11 +20,11 @@ fn load(name: &str) -> LoadedScene {
 }
 
 fn plan(loaded: &LoadedScene, settings: &InHandSettings, seed: u64) -> Result<Plan, Failure> {
-    plan_in_hand(&loaded.scene, &loaded.task.query(seed), settings, seed, &Budget::work(2_000_000), &|_| {})
+    plan_in_hand(&loaded.view(), &loaded.in_hand(seed), settings, seed, &Budget::work(2_000_000), &|_| {})
 }
 
 fn judge(loaded: &LoadedScene, plan: &Plan) -> Report {
-    check(&loaded.scene, Some(&loaded.task.query(plan.seed)), plan, &CheckSettings::default())
+    loaded.judge(&loaded.in_hand(plan.seed), plan, &CheckSettings::default())
 }
 
 /// Outward normals of the tips where they hold, in the frame of their last link, with the finger.
@@ -32,7 +33,7 @@ fn facing(loaded: &LoadedScene, plan: &Plan) -> Vec<(usize, Vector)> {
     for waypoint in plan.segments.iter().flat_map(|segment| &segment.waypoints) {
         let pose = Pose::from(&waypoint.world_from_object);
         let mut joints = waypoint.joints.as_slice();
-        for (f, (finger, contact)) in loaded.scene.hand.fingers.iter().zip(&waypoint.contacts).enumerate() {
+        for (f, (finger, contact)) in loaded.scene.hands[0].hand.fingers.iter().zip(&waypoint.contacts).enumerate() {
             let (own, others) = joints.split_at(finger.chain.n_coordinates());
             joints = others;
             if let Some(normal) = contact.normal_in_object.filter(|_| contact.holds()) {
@@ -53,7 +54,7 @@ fn ellipsoids_and_meshes_roll_without_slipping_and_hold() {
         for seed in 0..6 {
             let plan =
                 plan(&loaded, &settings, seed).unwrap_or_else(|failure| panic!("{name}, seed {seed}: {failure}"));
-            assert_eq!(validate_once(&loaded.scene, &plan, &settings), Ok(()), "{name}, seed {seed}");
+            assert_eq!(validate_once(&loaded.view(), &plan, &settings), Ok(()), "{name}, seed {seed}");
             let report = judge(&loaded, &plan);
             assert!(report.accepted(), "{name}, seed {seed}: {report:#?}");
             assert!(report.max_slip.is_some_and(|slip| slip < 1e-4), "{name}, seed {seed}: {:?}", report.max_slip);
@@ -93,12 +94,12 @@ fn every_mutant_of_such_a_plan_is_rejected_for_a_fitting_reason() {
     for name in ["oval_box_90x.toml", "egg_sphere_180z.toml"] {
         let loaded = load(name);
         let good = plan(&loaded, &InHandSettings::default(), 1).unwrap();
-        let query = loaded.task.query(1);
-        let found = mutants(&good, &loaded.scene, &mut Rng::keyed(1, "tips", 0));
+        let query = loaded.task().query(1);
+        let found = mutants(&good, loaded.manipulation(), &mut Rng::keyed(1, "tips", 0));
         assert!(found.iter().any(|mutant| mutant.name == "pad that ends beside the contact"));
         for mutant in found {
             let scene = mutant.scene.as_ref().unwrap_or(&loaded.scene);
-            let report = check(scene, Some(&query), &mutant.plan, &CheckSettings::default());
+            let report = check((scene, &loaded.state), Some(&query), &mutant.plan, &CheckSettings::default());
             let fits = report.violations.iter().any(|violation| mutant.expected.contains(&violation.kind));
             assert!(fits, "{name}, {}: {report:#?}", mutant.name);
         }
@@ -109,7 +110,7 @@ fn every_mutant_of_such_a_plan_is_rejected_for_a_fitting_reason() {
 fn a_hull_that_stands_off_its_ellipsoid_is_seen() {
     let mut loaded = load("egg_sphere_180z.toml");
     let good = plan(&loaded, &InHandSettings::default(), 1).unwrap();
-    let TipShape::Hull { hull, .. } = &mut loaded.scene.hand.fingers[2].tip.shape else { panic!("a hull") };
+    let TipShape::Hull { hull, .. } = &mut loaded.scene.hands[0].hand.fingers[2].tip.shape else { panic!("a hull") };
     let larger: Vec<_> = hull.vertices().iter().map(|p| p * 1.15).collect();
     *hull = std::sync::Arc::new(regrasp_geometry::ConvexHull::new(&larger).unwrap());
     let report = judge(&loaded, &good);
@@ -129,7 +130,7 @@ fn fingers_touch_with_their_pads_only() {
         .map(|(_, outward)| outward.dot(&axis))
         .fold(f64::INFINITY, f64::min);
     assert!(farthest < pad.cosine - 0.1, "{farthest}");
-    loaded.scene.hand.fingers.iter_mut().for_each(|finger| finger.tip.pad = Some(pad));
+    loaded.scene.hands[0].hand.fingers.iter_mut().for_each(|finger| finger.tip.pad = Some(pad));
     for seed in 0..6 {
         let plan = plan(&loaded, &settings, seed).unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
         let report = judge(&loaded, &plan);
@@ -144,7 +145,7 @@ fn fingers_touch_with_their_pads_only() {
 fn a_finger_whose_pad_faces_the_palm_stays_away_and_the_others_hold() {
     let mut loaded = load("oval_sphere_90x.toml");
     let away = UnitVector::new_normalize(Vector::new(-1.0, 0.0, -1.0));
-    loaded.scene.hand.fingers[1].tip.pad = Some(Pad { axis_in_body: away, cosine: 0.995 });
+    loaded.scene.hands[0].hand.fingers[1].tip.pad = Some(Pad { axis_in_body: away, cosine: 0.995 });
     let plan = plan(&loaded, &InHandSettings::default(), 0).unwrap();
     assert!(judge(&loaded, &plan).accepted());
     assert!(facing(&loaded, &plan).iter().all(|&(f, _)| f != 1));

@@ -1,22 +1,22 @@
 //! Finger tracking against the checker, which shares nothing with the planner, against itself, and on bad input.
 
 use crate::in_hand_methods::scene;
+use crate::queries::Queries;
 use nalgebra::UnitQuaternion;
 use regrasp_base::{Budget, Rng};
 use regrasp_geometry::{Point, Vector};
+use regrasp_mutations::mutants;
 use regrasp_plan::Plan;
-use regrasp_plan::check::mutation::mutants;
-use regrasp_plan::check::{CheckSettings, check};
+use regrasp_plan::check::CheckSettings;
 use regrasp_plan::plan::{ContactMode, ContactState, Segment, SegmentKind};
-use regrasp_planners::in_hand::InHandSettings;
 use regrasp_planners::tracking::{Cones, RollingFinger};
-use regrasp_planners::{Failure, FailureKind, TrackingSettings, plan_in_hand, plan_tracking};
-use regrasp_scene::{GraspRequest, Gravity, InHandQuery, LoadedScene};
+use regrasp_planners::{Failure, FailureKind, TrackingSettings, plan_tracking};
+use regrasp_scene::{GraspRequest, Gravity, LoadedScene, TrackingQuery};
 use std::collections::BTreeSet;
 
-fn plan_with(loaded: &LoadedScene, query: &InHandQuery, seed: u64) -> Result<Plan, Failure> {
+fn plan_with(loaded: &LoadedScene, query: &TrackingQuery, seed: u64) -> Result<Plan, Failure> {
     let settings = TrackingSettings::default();
-    plan_tracking(&loaded.scene, query, &settings, seed, &Budget::work(2_000_000), &|_| {})
+    plan_tracking(&loaded.view(), query, &settings, seed, &Budget::work(2_000_000), &|_| {})
 }
 
 /// Paper 003, scenario F-1.
@@ -25,9 +25,9 @@ fn the_football_is_turned_and_every_plan_is_accepted() {
     let loaded = scene("football.toml");
     // Seed 94 comes by columns that are nearly parallel: forces were off by 0.6 mN there.
     for seed in [0, 1, 2, 3, 94] {
-        let query = loaded.task.query(seed);
+        let query = loaded.tracking(seed);
         let plan = plan_with(&loaded, &query, seed).unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
-        let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+        let report = loaded.judge(&query, &plan, &CheckSettings::default());
         assert!(report.accepted(), "seed {seed}: {:?}", report.violations.first());
         assert!(report.max_force_residual.unwrap() < 1e-6 && report.max_moment_residual.unwrap() < 1e-7);
         assert!(report.max_sliding_force_error.unwrap() < 1e-9);
@@ -60,11 +60,11 @@ fn every_scenario_is_solved_as_its_settings_say() {
     for (name, settings) in scenarios {
         let loaded = scene(name);
         for seed in 0..2 {
-            let query = loaded.task.query(seed);
+            let query = loaded.tracking(seed);
             let what = format!("{name}, {:?}, seed {seed}", settings.rolling_finger);
-            let plan = plan_tracking(&loaded.scene, &query, &settings, seed, &Budget::work(20_000_000), &|_| {})
+            let plan = plan_tracking(&loaded.view(), &query, &settings, seed, &Budget::work(20_000_000), &|_| {})
                 .unwrap_or_else(|failure| panic!("{what}: {failure}"));
-            let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+            let report = loaded.judge(&query, &plan, &CheckSettings::default());
             assert!(report.accepted(), "{what}: {:?}", report.violations.first());
             if settings.rolling_finger == RollingFinger::Once {
                 // Where the object rests, any finger may be named: it rolls on none.
@@ -78,7 +78,7 @@ fn every_scenario_is_solved_as_its_settings_say() {
             if !settings.face_changes {
                 let face = |contact: &ContactState| contact.normal_in_object.unwrap().map(|x| (1e3 * x).round() as i64);
                 let waypoints = || plan.segments.iter().flat_map(|segment| &segment.waypoints);
-                for finger in 0..loaded.scene.hand.fingers.len() {
+                for finger in 0..loaded.scene.hands[0].hand.fingers.len() {
                     let faces: BTreeSet<_> = waypoints().map(|waypoint| face(&waypoint.contacts[finger])).collect();
                     assert_eq!(faces.len(), 1, "{what}: finger {finger} on {faces:?}");
                 }
@@ -91,17 +91,17 @@ fn every_scenario_is_solved_as_its_settings_say() {
 #[test]
 fn with_exact_cones_forces_obey_the_same_laws_and_plans_keep_a_friction_margin() {
     let loaded = scene("football.toml");
-    let query = loaded.task.query(0);
+    let query = loaded.tracking(0);
     for (seed, friction_margin, least) in [(0, 1.0, 0.0), (0, 1.2, 0.0)] {
         let mut settings = TrackingSettings { cones: Cones::Exact, ..TrackingSettings::default() };
-        settings.in_hand.friction_margin = friction_margin;
-        settings.in_hand.forces.as_mut().unwrap().normal_force[0] = least;
+        settings.in_hand.physics.friction_margin = friction_margin;
+        settings.in_hand.physics.forces.as_mut().unwrap().normal_force[0] = least;
         let planned = || {
-            plan_tracking(&loaded.scene, &query, &settings, seed, &Budget::work(1_000_000), &|_| {})
+            plan_tracking(&loaded.view(), &query, &settings, seed, &Budget::work(1_000_000), &|_| {})
                 .unwrap_or_else(|failure| panic!("seed {seed}: {failure}"))
         };
         let plan = planned();
-        let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+        let report = loaded.judge(&query, &plan, &CheckSettings::default());
         assert!(report.accepted(), "seed {seed}: {:?}", report.violations.first());
         assert!(report.max_force_residual.unwrap() < 1e-6 && report.max_moment_residual.unwrap() < 1e-7);
         assert!(report.max_sliding_force_error.unwrap() < 1e-9);
@@ -122,15 +122,15 @@ fn with_exact_cones_forces_obey_the_same_laws_and_plans_keep_a_friction_margin()
 #[test]
 fn a_goal_that_is_the_start_is_a_plan_that_holds_still() {
     let loaded = scene("football.toml");
-    let mut query = loaded.task.query(0);
+    let mut query = loaded.tracking(0);
     query.world_from_object_goal = query.world_from_object_start;
     let plan = plan_with(&loaded, &query, 0).unwrap();
     assert_eq!((plan.segments.len(), plan.segments[0].waypoints.len()), (1, 2));
-    let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+    let report = loaded.judge(&query, &plan, &CheckSettings::default());
     assert!(report.accepted(), "{:?}", report.violations.first());
 }
 
-fn refused(loaded: &LoadedScene, query: &InHandQuery, kind: FailureKind, words: &str) {
+fn refused(loaded: &LoadedScene, query: &TrackingQuery, kind: FailureKind, words: &str) {
     let failure = plan_with(loaded, query, 0).unwrap_err();
     assert_eq!(failure.kind, kind, "{failure}");
     assert!(failure.message.contains(words), "{failure}");
@@ -140,47 +140,44 @@ fn refused(loaded: &LoadedScene, query: &InHandQuery, kind: FailureKind, words: 
 #[test]
 fn what_tracking_is_not_made_for_is_refused_by_name() {
     let mut loaded = scene("football.toml");
-    let query = loaded.task.query(0);
+    let query = loaded.tracking(0);
     loaded.scene.gravity = Some(Gravity::Any);
     refused(&loaded, &query, FailureKind::Impossible, "direction of gravity");
 
     let mut loaded = scene("football.toml");
-    let automatic = InHandQuery { start_grasp: GraspRequest::Automatic, ..query.clone() };
+    let automatic = TrackingQuery { start_grasp: GraspRequest::Automatic, ..query.clone() };
     refused(&loaded, &automatic, FailureKind::Impossible, "the start has none");
 
     // Nearly without friction normals alone would have to carry the football and balance its torques.
-    loaded.scene.object.friction = 0.01;
+    loaded.scene.objects[0].friction = 0.01;
     refused(&loaded, &query, FailureKind::StartInvalid, "no contact forces balance the weight");
 
     let loaded = scene("football.toml");
     let GraspRequest::Contacts(mut points) = query.start_grasp.clone() else { panic!("contacts are given") };
     points[1] = points[0];
-    let overlapping = InHandQuery { start_grasp: GraspRequest::Contacts(points.clone()), ..query.clone() };
+    let overlapping = TrackingQuery { start_grasp: GraspRequest::Contacts(points.clone()), ..query.clone() };
     refused(&loaded, &overlapping, FailureKind::StartInvalid, "its reach is");
     let mut far = scene("football.toml");
-    far.scene.reach = None;
+    far.scene.hands[0].reach = None;
     refused(&far, &overlapping, FailureKind::StartInvalid, "collide");
     points[1] = Point::new(0.0, 0.0, 0.2);
-    let off = InHandQuery { start_grasp: GraspRequest::Contacts(points), ..query.clone() };
+    let off = TrackingQuery { start_grasp: GraspRequest::Contacts(points), ..query.clone() };
     refused(&far, &off, FailureKind::StartInvalid, "off the surface");
 
     let mut dented = scene("diamond.toml");
-    let query_of_diamond = dented.task.query(0);
-    dented.scene.object = scene("bulb.toml").scene.object;
+    let query_of_diamond = dented.tracking(0);
+    dented.scene.objects = scene("bulb.toml").scene.objects;
     refused(&dented, &query_of_diamond, FailureKind::Impossible, "is not convex");
-
-    let in_hand = plan_in_hand(&loaded.scene, &query, &InHandSettings::default(), 0, &Budget::work(10), &|_| {});
-    assert!(in_hand.unwrap_err().message.contains("tracking"));
 }
 
 #[test]
 fn a_goal_out_of_reach_is_a_failure_with_its_causes_and_the_nearest_miss() {
     let mut loaded = scene("football.toml");
     // Fingertips that may not move at all.
-    loaded.scene.reach = Some(1e-4);
-    let query = loaded.task.query(0);
+    loaded.scene.hands[0].reach = Some(1e-4);
+    let query = loaded.tracking(0);
     let settings = TrackingSettings { trials: 5, ..TrackingSettings::default() };
-    let failure = plan_tracking(&loaded.scene, &query, &settings, 0, &Budget::work(50_000), &|_| {}).unwrap_err();
+    let failure = plan_tracking(&loaded.view(), &query, &settings, 0, &Budget::work(50_000), &|_| {}).unwrap_err();
     assert_eq!(failure.kind, FailureKind::WorkSpent);
     assert!(!failure.causes.is_empty(), "{failure}");
     let miss = failure.nearest_miss.expect("the start is the nearest");
@@ -193,9 +190,9 @@ fn a_goal_out_of_reach_is_a_failure_with_its_causes_and_the_nearest_miss() {
 fn three_fingertips_turn_a_ball_on_two_that_rest() {
     let loaded = scene("three_fingertips.toml");
     for seed in 0..3 {
-        let query = loaded.task.query(seed);
+        let query = loaded.tracking(seed);
         let plan = plan_with(&loaded, &query, seed).unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
-        let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+        let report = loaded.judge(&query, &plan, &CheckSettings::default());
         assert!(report.accepted(), "seed {seed}: {:?}", report.violations.first());
         let waypoints = plan.segments.iter().flat_map(|segment| &segment.waypoints);
         let modes: BTreeSet<String> = waypoints
@@ -225,9 +222,9 @@ fn of_five_fingertips_three_rest_and_two_move() {
     let loaded = scene("five_fingertips.toml");
     let mut broken = BTreeSet::new();
     for seed in 0..3 {
-        let query = loaded.task.query(seed);
+        let query = loaded.tracking(seed);
         let plan = plan_with(&loaded, &query, seed).unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
-        let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+        let report = loaded.judge(&query, &plan, &CheckSettings::default());
         assert!(report.accepted(), "seed {seed}: {:?}", report.violations.first());
         assert!(report.max_force_residual.unwrap() < 1e-6 && report.max_sliding_force_error.unwrap() < 1e-9);
         let mut pairs = BTreeSet::new();
@@ -245,9 +242,9 @@ fn of_five_fingertips_three_rest_and_two_move() {
             pairs.extend(object_moves.then(|| (segment.moving_finger.clone(), segment.also_moving.clone())));
         }
         assert!(pairs.len() >= 4, "hands change: {pairs:?}");
-        let all = mutants(&plan, &loaded.scene, &mut Rng::keyed(seed, "five_mutants", 0));
+        let all = mutants(&plan, loaded.manipulation(), &mut Rng::keyed(seed, "five_mutants", 0));
         for mutant in all.into_iter().filter(|mutant| OF_MORE_THAN_FOUR.contains(&mutant.name)) {
-            let report = check(&loaded.scene, Some(&query), &mutant.plan, &CheckSettings::default());
+            let report = loaded.judge(&query, &mutant.plan, &CheckSettings::default());
             let is_told = report.violations.iter().any(|violation| mutant.expected.contains(&violation.kind));
             assert!(is_told, "seed {seed}: {} expects {:?}", mutant.name, mutant.expected);
             broken.insert(mutant.name);
@@ -260,9 +257,9 @@ fn of_five_fingertips_three_rest_and_two_move() {
 #[test]
 fn coplanar_normals_are_told_as_a_cause() {
     let mut loaded = scene("football.toml");
-    loaded.scene.reach = None;
+    loaded.scene.hands[0].reach = None;
     let around = [0.2f64, 1.7, 3.3, 4.9].map(|angle| Point::new(0.09 * angle.cos(), 0.09 * angle.sin(), 0.0));
-    let query = InHandQuery { start_grasp: GraspRequest::Contacts(around.to_vec()), ..loaded.task.query(0) };
+    let query = TrackingQuery { start_grasp: GraspRequest::Contacts(around.to_vec()), ..loaded.tracking(0) };
     let failure = plan_with(&loaded, &query, 0).unwrap_err();
     let told = failure.causes.iter().find(|cause| cause.reason.starts_with("7: resting fingers tell no motion"));
     assert!(told.is_some_and(|cause| cause.count > 0), "{failure}");
@@ -273,11 +270,11 @@ fn coplanar_normals_are_told_as_a_cause() {
 fn small_turns_about_any_axis_end_within_the_tolerance() {
     let loaded = scene("football.toml");
     for (seed, axis) in [Vector::x(), -Vector::y(), Vector::z()].into_iter().enumerate() {
-        let mut query = loaded.task.query(0);
+        let mut query = loaded.tracking(0);
         let turn = UnitQuaternion::from_scaled_axis(axis * 0.12);
         query.world_from_object_goal.rotation = turn * query.world_from_object_start.rotation;
         let plan = plan_with(&loaded, &query, seed as u64).unwrap_or_else(|failure| panic!("{axis:?}: {failure}"));
-        let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+        let report = loaded.judge(&query, &plan, &CheckSettings::default());
         assert!(report.accepted(), "{axis:?}: {:?}", report.violations.first());
     }
 }

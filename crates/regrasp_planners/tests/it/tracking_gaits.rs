@@ -2,33 +2,34 @@
 
 use crate::in_hand_methods::scene;
 use crate::places::{repository, shared_models};
+use crate::queries::Queries;
 use regrasp_base::{Budget, Rng};
 use regrasp_geometry::{Pose, Vector};
+use regrasp_mutations::mutants;
 use regrasp_plan::Plan;
-use regrasp_plan::check::mutation::mutants;
 use regrasp_plan::check::{CheckSettings, Violation, ViolationKind, check};
 use regrasp_plan::plan::{ContactMode, Segment, SegmentKind};
 use regrasp_planners::tracking::TrackingMethod;
 use regrasp_planners::{Failure, TrackingSettings, plan_tracking};
 use regrasp_robot::import::{LoadOptions, ResolveOptions};
-use regrasp_scene::{InHandQuery, LoadedScene, load_scene};
+use regrasp_scene::{LoadedScene, TrackingQuery, load_scene};
 use std::collections::BTreeSet;
 
 fn plan_with(
     loaded: &LoadedScene,
-    query: &InHandQuery,
+    query: &TrackingQuery,
     method: TrackingMethod,
     seed: u64,
     work: u64,
 ) -> Result<Plan, Failure> {
     let settings = TrackingSettings { method, ..TrackingSettings::default() };
-    plan_tracking(&loaded.scene, query, &settings, seed, &Budget::work(work), &|_| {})
+    plan_tracking(&loaded.view(), query, &settings, seed, &Budget::work(work), &|_| {})
 }
 
 /// Queries with other goals: 8 degrees about each axis, either way.
-fn small_turns(loaded: &LoadedScene) -> Vec<InHandQuery> {
+fn small_turns(loaded: &LoadedScene) -> Vec<TrackingQuery> {
     let turned = |axis: Vector| {
-        let mut query = loaded.task.query(0);
+        let mut query = loaded.tracking(0);
         let turn = nalgebra::UnitQuaternion::from_scaled_axis(axis * 8f64.to_radians());
         query.world_from_object_goal.rotation = turn * query.world_from_object_start.rotation;
         query
@@ -36,8 +37,8 @@ fn small_turns(loaded: &LoadedScene) -> Vec<InHandQuery> {
     [Vector::x(), Vector::y(), Vector::z()].into_iter().flat_map(|axis| [turned(axis), turned(-axis)]).collect()
 }
 
-fn accepted(loaded: &LoadedScene, query: &InHandQuery, plan: &Plan) {
-    let report = check(&loaded.scene, Some(query), plan, &CheckSettings::default());
+fn accepted(loaded: &LoadedScene, query: &TrackingQuery, plan: &Plan) {
+    let report = loaded.judge(query, plan, &CheckSettings::default());
     assert!(report.accepted(), "seed {}: {:?}", plan.seed, report.violations.first());
     assert!(report.max_sliding_force_error.unwrap() < 1e-9);
     let is_mixed = plan.segments.iter().any(|segment| segment.kind == SegmentKind::Regrasp);
@@ -91,7 +92,7 @@ fn a_sphere_turns_about_the_contact_of_the_rolling_finger() {
 /// All seeds are solved and accepted, the same twice, with fingers through the air between tracking.
 fn is_turned_with_gaits(loaded: &LoadedScene, seeds: u64) {
     for seed in 0..seeds {
-        let query = loaded.task.query(seed);
+        let query = loaded.tracking(seed);
         let plan = plan_with(loaded, &query, TrackingMethod::TrackingAndGaiting, seed, 20_000_000)
             .unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
         accepted(loaded, &query, &plan);
@@ -108,7 +109,7 @@ fn is_turned_with_gaits(loaded: &LoadedScene, seeds: u64) {
 fn the_wide_hand_turns_a_sphere_by_tracking_and_gaits_where_tracking_alone_does_not() {
     let loaded = scene("tracking_sphere_wide.toml");
     is_turned_with_gaits(&loaded, 4);
-    let query = loaded.task.query(0);
+    let query = loaded.tracking(0);
     let failure = plan_with(&loaded, &query, TrackingMethod::Tracking, 0, 500_000).unwrap_err();
     let miss = failure.nearest_miss.as_ref().expect("the start is the nearest");
     assert!(miss.angle_left < 90f64.to_radians(), "{failure}");
@@ -132,9 +133,9 @@ fn two_fingers_of_the_wide_hand_may_move_at_a_time() {
     let method = TrackingMethod::TrackingAndGaiting;
     let settings = TrackingSettings { method, resting_fingers: 2, ..TrackingSettings::default() };
     for seed in 0..3 {
-        let query = loaded.task.query(seed);
+        let query = loaded.tracking(seed);
         let budget = Budget::work(20_000_000);
-        let plan = plan_tracking(&loaded.scene, &query, &settings, seed, &budget, &|_| {})
+        let plan = plan_tracking(&loaded.view(), &query, &settings, seed, &budget, &|_| {})
             .unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
         accepted(&loaded, &query, &plan);
         assert_eq!(sliding_and_moving(&plan), BTreeSet::from([(1, 2)]), "seed {seed}");
@@ -149,7 +150,7 @@ fn two_fingers_of_the_wide_hand_may_move_at_a_time() {
 fn six_fingers_turn_a_sphere_by_tracking_alone() {
     let loaded = scene("tracking_sphere_six.toml");
     for seed in 0..3 {
-        let query = loaded.task.query(seed);
+        let query = loaded.tracking(seed);
         let plan = plan_with(&loaded, &query, TrackingMethod::Tracking, seed, 20_000_000)
             .unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
         accepted(&loaded, &query, &plan);
@@ -171,12 +172,13 @@ fn the_allegro_hand_turns_a_sphere_by_tracking_and_gaits() {
 #[test]
 fn mutants_of_mixed_plans_are_rejected() {
     let loaded = scene("tracking_sphere_wide.toml");
-    let query = loaded.task.query(1);
+    let query = loaded.tracking(1);
     let plan = plan_with(&loaded, &query, TrackingMethod::TrackingAndGaiting, 1, 20_000_000).unwrap();
     let (mut names, mut wrong) = (BTreeSet::new(), Vec::new());
-    for mutant in mutants(&plan, &loaded.scene, &mut Rng::keyed(6, "mixed_mutants", 0)) {
+    for mutant in mutants(&plan, loaded.manipulation(), &mut Rng::keyed(6, "mixed_mutants", 0)) {
         let judged_in = mutant.scene.as_ref().unwrap_or(&loaded.scene);
-        let report = check(judged_in, Some(&query), &mutant.plan, &CheckSettings::default());
+        let report =
+            check((judged_in, &loaded.state), Some(&query.clone().into()), &mutant.plan, &CheckSettings::default());
         names.insert(mutant.name);
         if !report.violations.iter().any(|violation| mutant.expected.contains(&violation.kind)) {
             let found = report.violations.first().map(|violation| violation.kind);
@@ -196,11 +198,11 @@ fn mutants_of_mixed_plans_are_rejected() {
 #[test]
 fn fingers_keep_to_their_reach_in_the_air() {
     let mut loaded = scene("tracking_sphere_wide.toml");
-    let query = loaded.task.query(0);
+    let query = loaded.tracking(0);
     let plan = |loaded: &LoadedScene| plan_with(loaded, &query, TrackingMethod::TrackingAndGaiting, 0, 20_000_000);
     let free = plan(&loaded).unwrap();
     let out_of_reach = |loaded: &LoadedScene| -> Vec<SegmentKind> {
-        let report = check(&loaded.scene, Some(&query), &free, &CheckSettings::default());
+        let report = loaded.judge(&query, &free, &CheckSettings::default());
         let is_reach = |violation: &&Violation| violation.kind == ViolationKind::OutOfReach;
         let segments = report.violations.iter().filter(is_reach).filter_map(|violation| violation.at);
         segments.map(|at| free.segments[at.segment].kind).collect()
@@ -208,10 +210,10 @@ fn fingers_keep_to_their_reach_in_the_air() {
     // A reach that the plan made without one exceeds, in the air at first.
     let reaches = (1..100).rev().map(|k| 1e-3 * f64::from(k));
     let exceeded = reaches.into_iter().find(|&reach| {
-        loaded.scene.reach = Some(reach);
+        loaded.scene.hands[0].reach = Some(reach);
         !out_of_reach(&loaded).is_empty()
     });
-    loaded.scene.reach = exceeded;
+    loaded.scene.hands[0].reach = exceeded;
     assert!(out_of_reach(&loaded).contains(&SegmentKind::Regrasp), "{exceeded:?}");
     let kept = plan(&loaded).unwrap_or_else(|failure| panic!("{exceeded:?}: {failure}"));
     accepted(&loaded, &query, &kept);

@@ -1,21 +1,22 @@
 //! Queries with way poses, and the scenes of the papers: what they are said to force is shown to be forced.
 
 use crate::in_hand_methods::{scene, settings};
+use crate::queries::Queries;
 use regrasp_base::Budget;
 use regrasp_geometry::{Point, Pose, interpolate_pose};
-use regrasp_plan::check::{CheckSettings, ViolationKind, check};
+use regrasp_plan::check::{CheckSettings, ViolationKind};
 use regrasp_plan::{Plan, SegmentKind};
 use regrasp_planners::in_hand::{InHandSettings, Method, plan_in_hand};
 use regrasp_planners::{Failure, FailureKind};
 use regrasp_scene::{InHandQuery, LoadedScene};
 
 fn try_plan(loaded: &LoadedScene, query: &InHandQuery, settings: &InHandSettings, work: u64) -> Result<Plan, Failure> {
-    plan_in_hand(&loaded.scene, query, settings, 0, &Budget::work(work), &|_| {})
+    plan_in_hand(&loaded.view(), query, settings, 0, &Budget::work(work), &|_| {})
 }
 
 /// Accepted by the checker, and every way pose is where the object is when the plan says so.
 fn is_accepted(loaded: &LoadedScene, query: &InHandQuery, plan: &Plan) {
-    let report = check(&loaded.scene, Some(query), plan, &CheckSettings::default());
+    let report = loaded.judge(query, plan, &CheckSettings::default());
     assert!(report.accepted(), "{}: {:#?}", loaded.scene.name, report.violations);
     assert_eq!(plan.way_poses.len(), query.world_from_object_way.len());
 }
@@ -23,7 +24,7 @@ fn is_accepted(loaded: &LoadedScene, query: &InHandQuery, plan: &Plan) {
 #[test]
 fn every_method_passes_the_way_poses_and_says_when() {
     let loaded = scene("sphere_90x.toml");
-    let mut query = loaded.task.query(0);
+    let mut query = loaded.in_hand(0);
     let (start, goal) = (query.world_from_object_start, query.world_from_object_goal);
     let mut aside = interpolate_pose(&start, &goal, 0.5);
     aside.translation.vector.x += 0.006;
@@ -37,7 +38,7 @@ fn every_method_passes_the_way_poses_and_says_when() {
         others[0].world_from_object_way.pop();
         others[1].world_from_object_way.reverse();
         for other in others {
-            let report = check(&loaded.scene, Some(&other), &plan, &CheckSettings::default());
+            let report = loaded.judge(&other, &plan, &CheckSettings::default());
             assert!(report.violations.iter().any(|v| v.kind == ViolationKind::WayPoseMissed), "{report:#?}");
         }
     }
@@ -46,7 +47,7 @@ fn every_method_passes_the_way_poses_and_says_when() {
 #[test]
 fn a_way_pose_that_is_the_start_costs_nothing() {
     let loaded = scene("sphere_90x.toml");
-    let mut query = loaded.task.query(0);
+    let mut query = loaded.in_hand(0);
     query.world_from_object_way = vec![query.world_from_object_start; 2];
     let plan = try_plan(&loaded, &query, &settings(Method::Gait, 1), 20_000_000).unwrap();
     is_accepted(&loaded, &query, &plan);
@@ -55,7 +56,7 @@ fn a_way_pose_that_is_the_start_costs_nothing() {
 #[test]
 fn a_leg_that_fails_is_named_and_a_buried_way_pose_is_refused_at_once() {
     let loaded = scene("sphere_90x.toml");
-    let mut query = loaded.task.query(0);
+    let mut query = loaded.in_hand(0);
     // Out of everybody's reach: the first leg is easy, the second cannot be done.
     let mut away = query.world_from_object_goal;
     away.translation.vector.z += 0.2;
@@ -82,9 +83,9 @@ fn a_leg_that_fails_is_named_and_a_buried_way_pose_is_refused_at_once() {
 fn the_cube_turns_all_the_way_round() {
     let loaded = scene("cubic.toml");
     for seed in 0..3 {
-        let query = loaded.task.query(seed);
+        let query = loaded.in_hand(seed);
         let plan =
-            plan_in_hand(&loaded.scene, &query, &settings(Method::Gait, 1), seed, &Budget::work(20_000_000), &|_| {});
+            plan_in_hand(&loaded.view(), &query, &settings(Method::Gait, 1), seed, &Budget::work(20_000_000), &|_| {});
         let plan = plan.unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
         is_accepted(&loaded, &query, &plan);
         assert_eq!(plan.way_poses.len(), 2);
@@ -115,8 +116,8 @@ fn the_plate_forces_the_east_finger_to_jump_over_it() {
     for seed in 0..10 {
         let settings = settings(Method::Gait, 1);
         let plan_of = |loaded: &LoadedScene| {
-            let query = loaded.task.query(seed);
-            let plan = plan_in_hand(&loaded.scene, &query, &settings, seed, &Budget::work(20_000_000), &|_| {});
+            let query = loaded.in_hand(seed);
+            let plan = plan_in_hand(&loaded.view(), &query, &settings, seed, &Budget::work(20_000_000), &|_| {});
             let plan = plan.unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
             is_accepted(loaded, &query, &plan);
             plan
@@ -134,15 +135,15 @@ fn the_plate_forces_the_east_finger_to_jump_over_it() {
 #[test]
 fn the_pencil_cannot_be_reversed_by_rotation_alone() {
     let loaded = scene("pencil.toml");
-    let query = loaded.task.query(0);
+    let query = loaded.in_hand(0);
     let (start, goal) = (query.world_from_object_start, query.world_from_object_goal);
     assert!((start.translation.vector - goal.translation.vector).norm() < 1e-12, "reversed in place");
     let along = start * nalgebra::Vector3::z();
     assert!((goal * nalgebra::Vector3::z() + along).norm() < 1e-12, "and end for end");
-    let regrasp_geometry::Shape::Cylinder { half_length, radius } = loaded.scene.object.shape else {
+    let regrasp_geometry::Shape::Cylinder { half_length, radius } = loaded.scene.objects[0].shape else {
         panic!("a cylinder")
     };
-    let west = loaded.scene.hand.fingers.iter().find(|finger| finger.name == "west").expect("a west finger");
+    let west = loaded.scene.hands[0].hand.fingers.iter().find(|finger| finger.name == "west").expect("a west finger");
     let chain = &west.chain;
     let middle = Point::from(start.translation.vector);
     // All pencils at right angles to `along` about one middle fill a disc: the distance of the tip from it.

@@ -3,78 +3,21 @@
 //! Fixed joints are folded into bodies. A finger is the serial chain from the base to its tip link. What no finger
 //! joint moves is palm; moving joints that belong to no finger are held at the position nearest to zero.
 
-use super::finger_chain::{make_chain, rest_posture};
+use super::chain::{ChainOwner, make_chain, middle_of_limits, rest_posture};
+use super::hulls::Hulls;
+use super::spec::{Body, Carried, FingerSpec, HandSpec, TipSpec};
 use super::tip_split;
-use crate::contact_model::ContactModel;
-use crate::hand::{Finger, FingerShape, Hand, MAX_FINGERS, PalmShape, convex_of};
+use crate::coupling::Coupling;
+use crate::hand::{Finger, FingerShape, Hand, MAX_FINGERS, PalmShape};
 use crate::robot::{Joint, JointId, JointKind, LinkId, Robot};
 use crate::tip::{Pad, Tip, TipEllipsoid, TipShape, fit};
-use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_base::diagnostic::Diagnostics;
 use regrasp_base::{Diagnostic, InputError, Place};
 use regrasp_geometry::shape::PlacedShape;
-use regrasp_geometry::{ConvexHull, Point, Pose, Shape, TriangleMesh, UnitVector, Vector};
+use regrasp_geometry::{ConvexHull, Point, Pose, Shape};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::Path;
 use std::sync::Arc;
-
-/// What is a finger of a hand, by the ids of a robot.
-#[derive(Debug, Clone)]
-pub(crate) struct HandSpec {
-    /// The link whose frame is the hand frame.
-    pub base: LinkId,
-    /// The fingers.
-    pub fingers: Vec<FingerSpec>,
-    /// Pairs of links that are never tested, smaller id first.
-    pub allow: BTreeSet<(LinkId, LinkId)>,
-}
-
-/// A finger to be made.
-#[derive(Debug, Clone)]
-pub(crate) struct FingerSpec {
-    pub name: String,
-    pub tip_link: LinkId,
-    /// First joint of the chain; moving joints before it are held. The first after the base where none is given.
-    pub first_joint: Option<JointId>,
-    pub tip: TipSpec,
-    /// Where the tip may touch; anywhere without one.
-    pub pad: Option<PadSpec>,
-    pub contact: ContactModel,
-    /// Rest posture by joint name, with the place of each name; the rest in the middle of the limits.
-    pub rest: Vec<(String, f64, Place)>,
-    /// Where it stands, for messages.
-    pub place: Place,
-}
-
-/// A tip to be made; points are in the frame of the tip link.
-#[derive(Debug, Clone)]
-pub(crate) enum TipSpec {
-    Sphere { radius: f64, center: Point },
-    Ellipsoid { radii: Vector, center: Point, link_from_ellipsoid: UnitQuaternion<f64> },
-    Point { position: Point },
-    Hull { center: Point },
-}
-
-/// The part of a tip that may touch; the axis is in the frame of the tip link.
-#[derive(Debug, Clone)]
-pub(crate) struct PadSpec {
-    pub axis: UnitVector,
-    pub angle: f64,
-}
-
-/// A rigid body of a hand.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Body {
-    Palm,
-    Finger { finger: usize, body: usize },
-}
-
-/// Where a link is: its body, and its pose in the body's frame (the base frame, for the palm).
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Carried {
-    body: Body,
-    pub(super) body_from_link: Pose,
-}
 
 /// The hand, and remarks. Errors: `U206`..`U212`, too many fingers (`U221`) or joints of a finger (`U222`).
 pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Result<(Hand, Vec<String>), InputError> {
@@ -84,7 +27,7 @@ pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Resu
         let problem = format!("has {} fingers", spec.fingers.len());
         return Err(Diagnostic::new("U221", Place::file(file), problem)
             .expected(format!("at most {MAX_FINGERS}"))
-            .fix(format!("write a hand file that names at most {MAX_FINGERS} of them (docs/hand-format.md)"))
+            .fix(format!("write a hand file that names at most {MAX_FINGERS} of them (docs/reference/hand-format.md)"))
             .into());
     }
     let moving = moving_joints(robot, spec, &mut found);
@@ -95,8 +38,8 @@ pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Resu
         .enumerate()
         .flat_map(|(finger, joints)| joints.iter().enumerate().map(move |(body, &joint)| (joint, (finger, body))))
         .collect();
-    let carried = carry(robot, spec.base, &owner, file, &mut found, &mut notes);
-    let mut hulls = Hulls { robot, file, made: Vec::new() };
+    let carried = carry(robot, spec, &owner, file, &mut found, &mut notes);
+    let mut hulls = Hulls::new(robot, file);
     let mut fingers = Vec::new();
     for (index, (finger, joints)) in spec.fingers.iter().zip(&moving).enumerate() {
         fingers.extend(make_finger(robot, index, finger, joints, &carried, &mut hulls, &mut found));
@@ -109,7 +52,7 @@ pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Resu
     let mut allowed_pairs = spec.allow.clone();
     allowed_pairs.extend(adjacent_pairs(robot, &carried, &moving));
     let outside = robot.links.len() - carried.len();
-    if outside > 0 {
+    if outside > 0 && spec.mount.is_none() {
         let base = &robot.links[spec.base.0].name;
         notes.push(format!("{outside} links are not carried by base link \"{base}\" and are not part of the hand"));
     }
@@ -119,10 +62,7 @@ pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Resu
             notes.push(format!("finger \"{}\": tip link \"{}\" has no collision geometry", finger.name, link.name));
         }
     }
-    found.into_result((
-        Hand { robot: robot.clone(), base: spec.base, world_from_base: Pose::identity(), fingers, palm, allowed_pairs },
-        notes,
-    ))
+    found.into_result((Hand { robot: robot.clone(), base: spec.base, fingers, palm, allowed_pairs }, notes))
 }
 
 /// The moving joints of each finger, base first.
@@ -181,19 +121,21 @@ fn moving_joints(robot: &Robot, spec: &HandSpec, found: &mut Diagnostics) -> Vec
 /// Walks from the base over all joints that are not on the way to another part of the robot.
 fn carry(
     robot: &Robot,
-    base: LinkId,
+    spec: &HandSpec,
     owner: &BTreeMap<JointId, (usize, usize)>,
     file: &Path,
     found: &mut Diagnostics,
     notes: &mut Vec<String>,
 ) -> BTreeMap<LinkId, Carried> {
+    let base = spec.base;
     let mut carried = BTreeMap::from([(base, Carried { body: Body::Palm, body_from_link: Pose::identity() })]);
     let mut waiting = VecDeque::from([base]);
     while let Some(link) = waiting.pop_front() {
         let at = carried[&link];
         if let Some(up) = robot.links[link.0].parent_joint {
             let joint = &robot.joints[up.0];
-            if joint.kind == JointKind::Fixed && !carried.contains_key(&joint.parent) {
+            let is_mount = spec.mount == Some(joint.parent);
+            if !joint.moves() && !is_mount && !carried.contains_key(&joint.parent) {
                 let body_from_link = at.body_from_link * joint.parent_from_joint.inverse();
                 carried.insert(joint.parent, Carried { body: at.body, body_from_link });
                 waiting.push_back(joint.parent);
@@ -234,11 +176,12 @@ fn held_at(
     if joint.kind == JointKind::Fixed {
         return Pose::identity();
     }
-    let position = match joint.mimic {
-        Some(mimic) if owner.contains_key(&mimic.joint) => {
+    let on_finger = |coupling: &Coupling| coupling.terms.iter().find(|(leader, _)| owner.contains_key(leader)).copied();
+    let position = match &joint.coupling {
+        Some(coupling) if let Some((leader, _)) = on_finger(coupling) => {
             let problem = format!(
                 "follows finger joint \"{}\" but is on no finger: linkages are not supported",
-                robot.joints[mimic.joint.0].name
+                robot.joints[leader.0].name
             );
             found.push(
                 Diagnostic::new("U209", Place::file(file), problem)
@@ -248,16 +191,11 @@ fn held_at(
             );
             return Pose::identity();
         }
-        Some(mimic) => mimic.multiplier * nearest_to_zero(&robot.joints[mimic.joint.0]) + mimic.offset,
+        Some(coupling) => coupling.position(|leader| nearest_to_zero(&robot.joints[leader.0])),
         None => nearest_to_zero(joint),
     };
     notes.push(format!("joint \"{}\" belongs to no finger; held at {position}", joint.name));
-    match joint.kind {
-        JointKind::Prismatic => {
-            Pose::from_parts(Translation3::from(joint.axis.into_inner() * position), UnitQuaternion::identity())
-        }
-        _ => Pose::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&joint.axis, position)),
-    }
+    joint.motion(position)
 }
 
 fn nearest_to_zero(joint: &Joint) -> f64 {
@@ -273,7 +211,8 @@ fn make_finger(
     hulls: &mut Hulls,
     found: &mut Diagnostics,
 ) -> Option<Finger> {
-    let chain = make_chain(robot, spec, joints, carried, found)?;
+    let owner = ChainOwner { kind: "finger", name: &spec.name, place: &spec.place, rest_key: "rest" };
+    let chain = make_chain(robot, &owner, joints, carried, found)?;
     let body_from_link = carried.get(&spec.tip_link)?.body_from_link;
     let pad = spec.pad.as_ref().map(|pad| Pad { axis_in_body: body_from_link * pad.axis, cosine: pad.angle.cos() });
     let tip = |shape, center_in_body| Tip { link: spec.tip_link, shape, center_in_body, pad, contact: spec.contact };
@@ -318,7 +257,7 @@ fn make_finger(
         (TipSpec::Point { position }, None) => tip(TipShape::Point, body_from_link * position),
         (TipSpec::Sphere { .. } | TipSpec::Ellipsoid { .. }, None) => unreachable!("made above"),
     };
-    let rest = rest_posture(spec, &chain, found);
+    let rest = rest_posture(&owner, &spec.rest, &chain, middle_of_limits(&chain), found);
     Some(Finger::new(spec.name.clone(), chain, tip, shapes, rest))
 }
 
@@ -385,42 +324,4 @@ fn adjacent_pairs(
         }
     }
     pairs
-}
-
-/// Convex collision shapes of links; each mesh gets its hull once.
-struct Hulls<'a> {
-    robot: &'a Robot,
-    file: &'a Path,
-    made: Vec<(Arc<TriangleMesh>, Shape)>,
-}
-
-impl Hulls<'_> {
-    fn of_link(&mut self, link: LinkId, body_from_link: &Pose, found: &mut Diagnostics) -> Vec<PlacedShape> {
-        let robot = self.robot;
-        let link = &robot.links[link.0];
-        let mut placed = Vec::new();
-        for collision in &link.collision {
-            match self.convex(&collision.shape) {
-                Ok(shape) => {
-                    placed.push(PlacedShape { parent_from_shape: body_from_link * collision.parent_from_shape, shape });
-                }
-                Err(error) => found.push(
-                    Diagnostic::new("U210", Place::file(self.file), format!("a collision mesh has no hull: {error}"))
-                        .element("link", &link.name)
-                        .expected("a mesh that encloses a volume"),
-                ),
-            }
-        }
-        placed
-    }
-
-    fn convex(&mut self, shape: &Shape) -> Result<Shape, regrasp_geometry::hull::HullError> {
-        let Shape::Mesh(mesh) = shape else { return convex_of(shape) };
-        if let Some((_, hull)) = self.made.iter().find(|(known, _)| Arc::ptr_eq(known, mesh)) {
-            return Ok(hull.clone());
-        }
-        let hull = convex_of(shape)?;
-        self.made.push((mesh.clone(), hull.clone()));
-        Ok(hull)
-    }
 }

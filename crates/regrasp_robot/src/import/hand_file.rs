@@ -2,16 +2,19 @@
 //!
 //! A bare URDF is accepted too; its fingers and tips are then guessed as `inspect` does.
 
-use super::assemble::{FingerSpec, HandSpec, PadSpec, TipSpec, assemble};
+use super::assemble::assemble;
 use super::couplings;
-use super::resolve::{ResolveOptions, resolve_own};
+use super::names::{known_joint, known_link};
+use super::options::{LoadOptions, LoadedInput};
+use super::resolve::resolve_own;
+use super::spec::{FingerSpec, HandSpec, PadSpec, TipSpec};
 use super::srdf::{LoadedSrdf, load_srdf};
 use super::urdf::{LoadedRobot, load_robot};
 use crate::contact_model::{self, ContactModel};
 use crate::hand::{Hand, MAX_FINGERS};
-use crate::robot::{JointId, LinkId, Robot};
+use crate::robot::{LinkId, Robot};
 use nalgebra::{Quaternion, UnitQuaternion};
-use regrasp_base::diagnostic::{did_you_mean, number};
+use regrasp_base::diagnostic::number;
 use regrasp_base::toml_table::{Codes, Entry, Found, Table};
 use regrasp_base::{Diagnostic, InputError, Place, files};
 use regrasp_geometry::frame::direction;
@@ -19,14 +22,13 @@ use regrasp_geometry::{Point, Vector};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 
 /// The value of `format` in a hand file.
 pub const FORMAT: &str = "regrasp-hand";
 /// The value of `format_version` in a hand file.
 pub const VERSION: f64 = 1.0;
 
-const CODES: Codes = Codes {
+pub(super) const CODES: Codes = Codes {
     syntax: "U200",
     unknown_key: "U201",
     missing_key: "U202",
@@ -35,50 +37,6 @@ const CODES: Codes = Codes {
     other_format: "U204",
     out_of_range: "U213",
 };
-
-/// How hands and robots are read.
-#[derive(Debug, Clone, Default)]
-pub struct LoadOptions {
-    /// Where packages are.
-    pub resolve: ResolveOptions,
-    /// Drop, with a note, what is not supported or not found: joints of unsupported types are held fixed, collision
-    /// geometry that cannot be read is left out, unknown links in an SRDF are skipped.
-    pub lenient: bool,
-    /// Contact model of fingertips of which the hand file says nothing.
-    pub contact: ContactModel,
-    /// Wall-clock instant after which reading is given up (`F004`). It cuts and never changes what is read.
-    pub deadline: Option<Instant>,
-}
-
-impl LoadOptions {
-    /// Err when the deadline has passed before `path` was read and made ready (`F004`).
-    pub fn check_time(&self, path: &Path) -> Result<(), InputError> {
-        match self.deadline {
-            Some(deadline) if Instant::now() >= deadline => {
-                Err(Diagnostic::new(OUT_OF_TIME, Place::file(path), "the time limit passed while this file was read")
-                    .fix("allow more time, or simplify the meshes")
-                    .into())
-            }
-            _ => Ok(()),
-        }
-    }
-}
-
-/// The code of reading that a deadline cut.
-pub const OUT_OF_TIME: &str = "F004";
-
-/// A file that was read.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LoadedInput {
-    /// What it is for: `hand`, `urdf`, `srdf`, `mesh`.
-    pub role: String,
-    /// How the file that names it spells it; the file name for the outermost.
-    pub name: String,
-    /// Where it was found.
-    pub path: PathBuf,
-    /// SHA-256 of its bytes, lower-case hexadecimal.
-    pub sha256: String,
-}
 
 /// A hand with what it was read from.
 #[derive(Debug, Clone)]
@@ -106,6 +64,14 @@ pub fn load_hand(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Input
 }
 
 fn load_bare_urdf(path: &Path, options: &LoadOptions) -> Result<LoadedHand, InputError> {
+    let parts = guessed_parts(path, options)?;
+    let (mut hand, more) = assemble(&parts.robot, &parts.spec, path)?;
+    crate::inspect::rest::bend_towards_palm(&mut hand);
+    refuse_wrong_unit(&hand, path)?;
+    Ok(LoadedHand { hand, inputs: parts.inputs, notes: [parts.notes, more].concat() })
+}
+
+fn guessed_parts(path: &Path, options: &LoadOptions) -> Result<HandParts, InputError> {
     let LoadedRobot { robot, inputs, mut notes } = load_robot(path, options)?;
     options.check_time(path)?;
     let robot = Arc::new(robot);
@@ -114,14 +80,18 @@ fn load_bare_urdf(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
         "{}: fingers and tips were guessed; `regrasp inspect -o hand.toml` writes them down",
         path.display()
     ));
-    let (mut hand, more) = assemble(&robot, &spec, path)?;
-    notes.extend(more);
-    crate::inspect::rest::bend_towards_palm(&mut hand);
-    refuse_wrong_unit(&hand, path)?;
-    Ok(LoadedHand { hand, inputs, notes })
+    Ok(HandParts { robot, spec, inputs, notes })
 }
 
 fn load_hand_file(path: &Path, options: &LoadOptions) -> Result<LoadedHand, InputError> {
+    let parts = hand_file_parts(path, options)?;
+    let (hand, more) = assemble(&parts.robot, &parts.spec, path)?;
+    refuse_wrong_unit(&hand, path)?;
+    Ok(LoadedHand { hand, inputs: parts.inputs, notes: [parts.notes, more].concat() })
+}
+
+/// What a hand file says, before a hand is made of it.
+pub(super) fn hand_file_parts(path: &Path, options: &LoadOptions) -> Result<HandParts, InputError> {
     let bytes = files::read(path)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let own = LoadedInput { role: "hand".into(), name, path: path.to_owned(), sha256: files::sha256(&bytes) };
@@ -129,16 +99,24 @@ fn load_hand_file(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
     let mut found = Found::new(path, &text, CODES);
     let document = found.parse();
     let parts = document.as_ref().and_then(|document| read(Table::root(document), path, options, &mut found));
-    let (mut notes, diagnostics) = (found.notes, found.diagnostics);
+    let (notes, diagnostics) = (found.notes, found.diagnostics);
     let parts = diagnostics.into_result(parts)?;
     let Parts { robot, spec, inputs: read } = parts.expect("what could not be read has left a diagnostic");
-    let mut inputs = vec![own];
-    inputs.extend(read);
     options.check_time(path)?;
-    let (hand, more) = assemble(&robot, &spec, path)?;
-    notes.extend(more);
-    refuse_wrong_unit(&hand, path)?;
-    Ok(LoadedHand { hand, inputs, notes })
+    let inputs = [vec![own], read].concat();
+    Ok(HandParts { robot, spec, inputs, notes })
+}
+
+/// What a hand is to be made of.
+pub(super) struct HandParts {
+    /// The robot of the hand's URDF, with the couplings of the hand file.
+    pub robot: Arc<Robot>,
+    /// The hand, by the ids of that robot.
+    pub spec: HandSpec,
+    /// Files read, the hand file first.
+    pub inputs: Vec<LoadedInput>,
+    /// Remarks.
+    pub notes: Vec<String>,
 }
 
 /// Refuses hands whose joints and tips are spread over less than a centimetre or more than five metres.
@@ -146,7 +124,7 @@ fn load_hand_file(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
 /// Arms with hands are a metre or two; a hand written in millimetres is a hundred metres or more.
 ///
 /// Errors: such a span (`U216`), a fingertip larger than the hand (`U217`).
-fn refuse_wrong_unit(hand: &Hand, path: &Path) -> Result<(), InputError> {
+pub(super) fn refuse_wrong_unit(hand: &Hand, path: &Path) -> Result<(), InputError> {
     let span = crate::inspect::span(hand);
     if (0.01..=5.0).contains(&span) {
         let Some(finger) = hand.fingers.iter().find(|finger| finger.tip.radius() > span) else { return Ok(()) };
@@ -197,7 +175,7 @@ fn read(mut root: Table, path: &Path, options: &LoadOptions, found: &mut Found) 
     let fingers = root.required(found, "fingers", "add at least one [[fingers]] table");
     root.finish(found);
     // Without a robot no name in the rest of the file can be looked up.
-    let (mut robot, mut inputs) = urdf.and_then(|entry| read_robot(&entry, path, options, found))?;
+    let (mut robot, mut inputs) = urdf.and_then(|entry| locate_and_load(&entry, path, options, found))?;
     if let Some(entry) = couplings {
         couplings::read(&entry, &mut robot, found);
     }
@@ -211,11 +189,11 @@ fn read(mut root: Table, path: &Path, options: &LoadOptions, found: &mut Found) 
         allow.extend(loaded.srdf.disabled_pairs.iter().map(|pair| pair.links));
         inputs.push(loaded.input);
     }
-    Some(Parts { robot, spec: HandSpec { base, fingers, allow }, inputs })
+    Some(Parts { robot, spec: HandSpec { base, fingers, mount: None, allow }, inputs })
 }
 
 /// The file that `entry` names.
-fn locate(entry: &Entry, path: &Path, options: &LoadOptions, found: &mut Found) -> Option<PathBuf> {
+pub(super) fn locate(entry: &Entry, path: &Path, options: &LoadOptions, found: &mut Found) -> Option<PathBuf> {
     let name = entry.text(found)?;
     match resolve_own(name, path, found.place(&entry.span), &options.resolve) {
         Ok(resolved) => {
@@ -229,7 +207,7 @@ fn locate(entry: &Entry, path: &Path, options: &LoadOptions, found: &mut Found) 
     }
 }
 
-fn read_robot(
+pub(super) fn locate_and_load(
     entry: &Entry,
     path: &Path,
     options: &LoadOptions,
@@ -251,7 +229,7 @@ fn read_robot(
     }
 }
 
-fn read_srdf(
+pub(super) fn read_srdf(
     entry: &Entry,
     path: &Path,
     robot: &Robot,
@@ -280,8 +258,7 @@ fn read_fingers(entry: &Entry, robot: &Robot, contact: ContactModel, found: &mut
     }
     if items.len() > MAX_FINGERS {
         let problem = format!("has {} fingers", items.len());
-        let diagnostic =
-            entry.error("U221", found, problem).expected(format!("at most {MAX_FINGERS}, which can be planned for"));
+        let diagnostic = entry.error("U221", found, problem).expected(format!("at most {MAX_FINGERS}"));
         found
             .diagnostics
             .push(diagnostic.fix("leave out [[fingers]] that are not needed; their links are held and become palm"));
@@ -383,7 +360,7 @@ fn lengths(entry: &Entry, found: &mut Found) -> Option<Vector> {
     None
 }
 
-fn unit_quaternion(entry: &Entry, found: &mut Found) -> Option<UnitQuaternion<f64>> {
+pub(super) fn unit_quaternion(entry: &Entry, found: &mut Found) -> Option<UnitQuaternion<f64>> {
     let [x, y, z, w] = entry.numbers::<4>(found)?;
     let quaternion = Quaternion::new(w, x, y, z);
     let length = x.hypot(y).hypot(z.hypot(w));
@@ -425,7 +402,7 @@ fn point(table: &mut Table, key: &'static str, found: &mut Found) -> Option<Poin
     }
 }
 
-fn read_pairs(entry: &Entry, robot: &Robot, found: &mut Found) -> BTreeSet<(LinkId, LinkId)> {
+pub(super) fn read_pairs(entry: &Entry, robot: &Robot, found: &mut Found) -> BTreeSet<(LinkId, LinkId)> {
     let expected = "pairs of link names: [[\"link_a\", \"link_b\"], ...]";
     let mut pairs = BTreeSet::new();
     for pair in entry.entries(found, expected).unwrap_or_default() {
@@ -440,34 +417,4 @@ fn read_pairs(entry: &Entry, robot: &Robot, found: &mut Found) -> BTreeSet<(Link
         }
     }
     pairs
-}
-
-fn known_link(entry: &Entry, robot: &Robot, found: &mut Found) -> Option<LinkId> {
-    let name = entry.text(found)?;
-    let link = robot.link_named(name);
-    if link.is_none() {
-        refuse_name(entry, "link", name, robot.links.iter().map(|link| link.name.as_str()), found);
-    }
-    link
-}
-
-pub(super) fn known_joint(entry: &Entry, robot: &Robot, found: &mut Found) -> Option<JointId> {
-    let name = entry.text(found)?;
-    let joint = robot.joint_named(name);
-    if joint.is_none() {
-        refuse_name(entry, "joint", name, robot.joints.iter().map(|joint| joint.name.as_str()), found);
-    }
-    joint
-}
-
-fn refuse_name<'n>(entry: &Entry, kind: &str, name: &str, names: impl Iterator<Item = &'n str>, found: &mut Found) {
-    if found.diagnostics.counted_only() {
-        return;
-    }
-    let meant = did_you_mean(name, names);
-    let diagnostic = entry
-        .error("U205", found, format!("the robot has no {kind} \"{name}\""))
-        .expected(format!("the name of a {kind} of the URDF"))
-        .fix(meant.map_or(String::new(), |meant| format!("did you mean \"{meant}\"?")));
-    found.diagnostics.push(diagnostic);
 }

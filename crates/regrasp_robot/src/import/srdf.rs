@@ -1,6 +1,6 @@
 //! SRDF: groups, end effectors, pairs of links that are never tested. Form: <http://wiki.ros.org/srdf>.
 
-use super::hand_file::LoadedInput;
+use super::options::LoadedInput;
 use super::xml::{Named, Reader, children, parse};
 use crate::robot::{JointId, LinkId, Robot};
 use regrasp_base::diagnostic::{Lines, did_you_mean};

@@ -5,7 +5,7 @@
 
 use super::tip_sphere::fit_tip;
 use crate::contact_model::ContactModel;
-use crate::import::assemble::{FingerSpec, HandSpec, TipSpec};
+use crate::import::spec::{FingerSpec, HandSpec, TipSpec};
 use crate::robot::{JointId, JointKind, LinkId, Robot};
 use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_base::{Diagnostic, InputError, Place};
@@ -42,7 +42,7 @@ pub(crate) fn guess_hand(robot: &Robot, contact: ContactModel, file: &Path) -> R
             place: Place::file(file),
         });
     }
-    Ok(HandSpec { base, fingers, allow: BTreeSet::new() })
+    Ok(HandSpec { base, fingers, mount: None, allow: BTreeSet::new() })
 }
 
 /// Moving joints below which nothing moves, in document order.

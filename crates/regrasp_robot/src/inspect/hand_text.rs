@@ -3,7 +3,7 @@
 use crate::contact_model::ContactModel;
 use crate::hand::{Finger, Hand};
 use crate::import::hand_file::{FORMAT, VERSION};
-use crate::robot::LinkId;
+use crate::robot::{JointId, LinkId};
 use crate::tip::TipShape;
 use regrasp_geometry::Point;
 use std::collections::BTreeSet;
@@ -36,15 +36,22 @@ pub fn hand_file_text(hand: &Hand, urdf: &str, allow: &BTreeSet<(LinkId, LinkId)
         let _ = writeln!(text, "]");
     }
     for joint in &robot.joints {
-        let Some(mimic) = joint.mimic else { continue };
-        let _ = writeln!(
-            text,
-            "\n[[couplings]]\njoint = {}\nleader = {}\nmultiplier = {}\noffset = {}",
-            quoted(&joint.name),
-            quoted(&robot.joints[mimic.joint.0].name),
-            number(mimic.multiplier),
-            number(mimic.offset)
-        );
+        let Some(coupling) = &joint.coupling else { continue };
+        let _ = writeln!(text, "\n[[couplings]]\njoint = {}", quoted(&joint.name));
+        let leader = |id: JointId| quoted(&robot.joints[id.0].name);
+        match coupling.single() {
+            Some((id, multiplier)) => {
+                let _ = writeln!(text, "leader = {}\nmultiplier = {}", leader(id), number(multiplier));
+            }
+            None => {
+                let _ = writeln!(text, "terms = [");
+                for &(id, multiplier) in &coupling.terms {
+                    let _ = writeln!(text, "    {{ leader = {}, multiplier = {} }},", leader(id), number(multiplier));
+                }
+                let _ = writeln!(text, "]");
+            }
+        }
+        let _ = writeln!(text, "offset = {}", number(coupling.offset));
     }
     for finger in &hand.fingers {
         let _ = writeln!(text, "\n[[fingers]]\nname = {}\ntip_link = {}", quoted(&finger.name), name(finger.tip.link));

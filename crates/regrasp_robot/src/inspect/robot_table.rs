@@ -1,6 +1,7 @@
 //! Joints and meshes of a robot as tables, and what looks like a wrong unit.
 
-use crate::robot::{JointKind, Robot};
+use crate::coupling::Coupling;
+use crate::robot::{JointId, JointKind, Robot};
 use regrasp_base::{Diagnostic, Place};
 use regrasp_geometry::Shape;
 use serde::Serialize;
@@ -30,15 +31,36 @@ pub struct JointRow {
     pub follows: Option<Follows>,
 }
 
-/// A coupling: `position = multiplier * position(joint) + offset`.
+/// A coupling: `position = multiplier * position(joint) + offset`, plus the same product for each of `others`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Follows {
-    /// The joint followed.
+    /// The joint followed; the first of several.
     pub joint: String,
-    /// Factor.
+    /// Its multiplier.
     pub multiplier: f64,
     /// Offset, in radians or metres.
     pub offset: f64,
+    /// More joints followed, with their multipliers.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub others: Vec<Leader>,
+}
+
+/// A joint that another follows.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Leader {
+    /// The joint followed.
+    pub joint: String,
+    /// Its multiplier.
+    pub multiplier: f64,
+}
+
+impl Follows {
+    fn new(robot: &Robot, coupling: &Coupling) -> Self {
+        let leader = |&(id, multiplier): &(JointId, f64)| Leader { joint: robot.joints[id.0].name.clone(), multiplier };
+        let Leader { joint, multiplier } = leader(&coupling.terms[0]);
+        let others = coupling.terms[1..].iter().map(leader).collect();
+        Follows { joint, multiplier, offset: coupling.offset, others }
+    }
 }
 
 /// A collision mesh of a link.
@@ -105,11 +127,7 @@ pub fn inspect_robot(robot: &Robot, file: &Path) -> RobotInspection {
             upper: joint.limits.map(|limits| limits.upper),
             velocity: joint.limits.and_then(|limits| limits.velocity),
             effort: joint.limits.and_then(|limits| limits.effort),
-            follows: joint.mimic.map(|mimic| Follows {
-                joint: robot.joints[mimic.joint.0].name.clone(),
-                multiplier: mimic.multiplier,
-                offset: mimic.offset,
-            }),
+            follows: joint.coupling.as_ref().map(|coupling| Follows::new(robot, coupling)),
         })
         .collect();
     let root = robot.links[robot.root.0].name.clone();

@@ -1,6 +1,6 @@
 //! The ball at the distal end of a link, from its collision geometry.
 
-use crate::import::assemble::TipSpec;
+use crate::import::spec::TipSpec;
 use nalgebra::{Matrix4, Vector4};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Point, Shape, Vector};

@@ -3,7 +3,7 @@
 //! Composing and applying them takes about half the work of quaternion poses, and a joint's whole motion is three
 //! precomputed matrices (Rodrigues' formula): `R(q) = A + sin(q) B + cos(q) C`.
 
-use super::chain::{ChainJoint, Motion};
+use super::chain_joint::{ChainJoint, Motion};
 use super::trig::sin_cos;
 use nalgebra::Matrix3;
 use regrasp_geometry::Vector;
@@ -16,6 +16,8 @@ pub(super) struct PreparedJoint {
     coordinate: usize,
     multiplier: f64,
     offset: f64,
+    /// Coordinates besides that one, with their multipliers: none for nearly all joints.
+    others: Box<[(usize, f64)]>,
     /// Origin of the joint frame in the parent body.
     translation: Vector,
     motion: PreparedMotion,
@@ -56,10 +58,12 @@ impl PreparedJoint {
             }
             Motion::Slide => PreparedMotion::Slide { rotation, axis_in_parent: rotation * joint.axis.into_inner() },
         };
+        let (coordinate, multiplier) = joint.drive.terms[0];
         PreparedJoint {
-            coordinate: joint.coordinate,
-            multiplier: joint.multiplier,
-            offset: joint.offset,
+            coordinate,
+            multiplier,
+            offset: joint.drive.offset,
+            others: joint.drive.terms[1..].into(),
             translation: joint.parent_from_joint.translation.vector,
             motion,
         }
@@ -68,7 +72,11 @@ impl PreparedJoint {
     /// `base_from_child`, where `base_from_parent` is given.
     #[inline(always)]
     pub(super) fn child_frame(&self, base_from_parent: &BodyFrame, coordinates: &[f64]) -> BodyFrame {
-        let position = self.multiplier * coordinates[self.coordinate] + self.offset;
+        let mut sum = self.multiplier * coordinates[self.coordinate];
+        for &(k, multiplier) in &self.others {
+            sum += multiplier * coordinates[k];
+        }
+        let position = sum + self.offset;
         match &self.motion {
             PreparedMotion::TurnAligned { rotation, axis, sign } => {
                 let (s, c) = sin_cos(position);

@@ -1,35 +1,11 @@
 //! Serial chains, forward kinematics and Jacobians.
 
 use super::body_frame::{BodyFrame, PreparedJoint};
+pub use super::chain_joint::{ChainJoint, Motion};
+use crate::coupling::{LinearLimit, bring_within};
 use arrayvec::ArrayVec;
 use nalgebra::{Matrix3xX, Translation3, UnitQuaternion};
-use regrasp_geometry::{Point, Pose, UnitVector, Vector};
-
-/// How a chain joint moves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Motion {
-    /// Turns about the axis, in radians.
-    Turn,
-    /// Slides along the axis, in metres.
-    Slide,
-}
-
-/// One moving joint of a chain. Fixed joints are folded into `parent_from_joint`.
-#[derive(Debug, Clone)]
-pub struct ChainJoint {
-    /// Pose of the joint frame at position zero in the frame of the body before it (the hand base, for the first).
-    pub parent_from_joint: Pose,
-    /// Axis, in the joint frame.
-    pub axis: UnitVector,
-    /// How it moves.
-    pub motion: Motion,
-    /// Coordinate of the finger that drives it.
-    pub coordinate: usize,
-    /// Position is `multiplier * coordinate + offset`; 1 and 0 for independent joints.
-    pub multiplier: f64,
-    /// See `multiplier`.
-    pub offset: f64,
-}
+use regrasp_geometry::{Point, Pose, Vector};
 
 /// Where a joint's axis is.
 #[derive(Debug, Clone, Copy)]
@@ -53,6 +29,8 @@ pub struct Chain {
     pub lower: Vec<f64>,
     /// Highest value of each coordinate.
     pub upper: Vec<f64>,
+    /// Limits of joints that follow several coordinates at once.
+    pub linear_limits: Vec<LinearLimit>,
     /// The joints as forward kinematics wants them.
     prepared: Vec<PreparedJoint>,
 }
@@ -63,9 +41,23 @@ impl Chain {
     /// Panics unless `names`, `lower` and `upper` are equally long and every joint's coordinate is among them.
     pub fn new(joints: Vec<ChainJoint>, names: Vec<String>, lower: Vec<f64>, upper: Vec<f64>) -> Self {
         assert!(names.len() == lower.len() && lower.len() == upper.len(), "one name and two limits per coordinate");
-        assert!(joints.iter().all(|joint| joint.coordinate < lower.len()), "a joint without a coordinate");
+        let is_driven = |joint: &ChainJoint| {
+            !joint.drive.terms.is_empty() && joint.drive.terms.iter().all(|(k, _)| *k < lower.len())
+        };
+        assert!(joints.iter().all(is_driven), "a joint without a coordinate");
         let prepared = joints.iter().map(PreparedJoint::new).collect();
-        Chain { joints, names, lower, upper, prepared }
+        Chain { joints, names, lower, upper, linear_limits: Vec::new(), prepared }
+    }
+
+    /// The same chain with limits on sums of coordinates.
+    ///
+    /// Panics if a limit names a coordinate that the chain does not have.
+    #[must_use]
+    pub fn with_linear_limits(mut self, limits: Vec<LinearLimit>) -> Self {
+        let is_known = |limit: &LinearLimit| limit.terms.iter().all(|(k, _)| *k < self.lower.len());
+        assert!(limits.iter().all(is_known), "a limit on a coordinate that the chain does not have");
+        self.linear_limits = limits;
+        self
     }
 
     /// Number of independent coordinates.
@@ -73,21 +65,37 @@ impl Chain {
         self.lower.len()
     }
 
-    /// True when every coordinate keeps `margin` (in its unit) from its limits.
+    /// True when every coordinate can move by `margin` (in its unit) and all limits, those of sums too, are kept.
     pub fn within_limits(&self, coordinates: &[f64], margin: f64) -> bool {
         coordinates
             .iter()
             .zip(self.lower.iter().zip(&self.upper))
             .all(|(&q, (&lower, &upper))| q >= lower + margin && q <= upper - margin)
+            && self.within_linear_limits(coordinates, margin)
     }
 
-    /// Smallest distance of a coordinate from one of its limits; negative outside.
+    /// True when the limits of sums of coordinates are kept while every coordinate moves by at most `margin`.
+    #[inline]
+    pub fn within_linear_limits(&self, coordinates: &[f64], margin: f64) -> bool {
+        self.linear_limits.iter().all(|limit| limit.room(coordinates) >= margin)
+    }
+
+    /// Smallest distance of a coordinate, or of all at once, from a limit; negative outside.
     pub fn limit_distance(&self, coordinates: &[f64]) -> f64 {
-        coordinates
+        let own = coordinates
             .iter()
             .zip(self.lower.iter().zip(&self.upper))
             .map(|(&q, (&lower, &upper))| (q - lower).min(upper - q))
-            .fold(f64::INFINITY, f64::min)
+            .fold(f64::INFINITY, f64::min);
+        self.linear_limits.iter().map(|limit| limit.room(coordinates)).fold(own, f64::min)
+    }
+
+    /// Coordinates near `near`, which keep their own limits, that keep those of sums too. None where no such coordinates are found.
+    pub fn bring_within_limits(&self, near: &[f64]) -> Option<Vec<f64>> {
+        match self.linear_limits.as_slice() {
+            [] => Some(near.to_vec()),
+            limits => bring_within(limits, [&self.lower, &self.upper], near),
+        }
     }
 
     /// Poses of the bodies in the base frame, written to `base_from_body` (one per joint).
@@ -95,7 +103,7 @@ impl Chain {
         base_from_body.clear();
         let mut parent = Pose::identity();
         for joint in &self.joints {
-            let position = joint.multiplier * coordinates[joint.coordinate] + joint.offset;
+            let position = joint.position(coordinates);
             parent = parent * joint.parent_from_joint * joint_motion(joint, position);
             base_from_body.push(parent);
         }
@@ -153,8 +161,10 @@ impl Chain {
                 Motion::Turn => axis.cross(&(point_in_base - Point::from(pose.translation.vector))),
                 Motion::Slide => axis,
             };
-            let mut target = jacobian.column_mut(joint.coordinate);
-            target += joint.multiplier * column;
+            for &(k, multiplier) in &joint.drive.terms {
+                let mut target = jacobian.column_mut(k);
+                target += multiplier * column;
+            }
         }
         jacobian
     }
@@ -183,15 +193,15 @@ fn joint_motion(joint: &ChainJoint, position: f64) -> Pose {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::coupling::Coupling;
+    use regrasp_geometry::UnitVector;
 
     fn chain() -> Chain {
         let joint = |z: f64, axis: Vector, motion, coordinate, multiplier| ChainJoint {
             parent_from_joint: Pose::new(Vector::new(0.01, 0.0, z), Vector::new(0.1, -0.2, 0.3)),
             axis: UnitVector::new_normalize(axis),
             motion,
-            coordinate,
-            multiplier,
-            offset: 0.05,
+            drive: Coupling::one(coordinate, multiplier, 0.05),
         };
         Chain::new(
             vec![

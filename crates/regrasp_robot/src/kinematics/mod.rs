@@ -4,6 +4,8 @@
 pub mod body_frame;
 /// Serial chains, forward kinematics and Jacobians.
 pub mod chain;
+/// One moving joint of a chain.
+pub mod chain_joint;
 /// Finger inverse kinematics to a point.
 pub mod finger_ik;
 /// Bounds on the motion of shapes while coordinates move along a line.

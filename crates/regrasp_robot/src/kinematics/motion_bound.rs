@@ -17,7 +17,7 @@ use super::chain::{Chain, Motion};
 use arrayvec::ArrayVec;
 use regrasp_geometry::Point;
 
-/// Most joints of a chain that bounds are made for.
+/// Most joints of a chain that bounds are made for; a joint with several leaders counts once for each.
 pub const MAX_JOINTS: usize = 24;
 
 /// How one joint moves the shape.
@@ -41,7 +41,7 @@ impl MotionBound {
     /// Bounds for all points within `shape_radius` of `shape_center_in_body`, which body `body` carries.
     ///
     /// Reaches hold for all configurations within the chain's limits. Panics if the chain has no such body, or more
-    /// than [`MAX_JOINTS`] joints.
+    /// than [`MAX_JOINTS`] joints, those with several leaders counted once for each.
     pub fn new(chain: &Chain, body: usize, shape_center_in_body: &Point, shape_radius: f64) -> Self {
         assert!(body < chain.joints.len(), "no body {body} in a chain of {} joints", chain.joints.len());
         let mut levers = ArrayVec::new();
@@ -59,12 +59,13 @@ impl MotionBound {
                 ((next.norm_squared() - along * along).max(0.0).sqrt() + from_origin, next.norm() + from_origin)
             };
             let turns = joint.motion == Motion::Turn;
-            levers.push(Lever {
-                coordinate: joint.coordinate,
-                ratio: joint.multiplier.abs(),
+            // A joint with several leaders moves as several joints about one axis would.
+            levers.extend(joint.drive.terms.iter().map(|&(coordinate, multiplier)| Lever {
+                coordinate,
+                ratio: multiplier.abs(),
                 reach: if turns { from_axis + shape_radius } else { 1.0 },
                 turns,
-            });
+            }));
             from_origin = origin_distance + if turns { 0.0 } else { longest_slide(chain, i) };
         }
         levers.reverse();
@@ -98,14 +99,14 @@ impl MotionBound {
 
 /// Largest absolute position of sliding joint `i` within the limits of its coordinate.
 fn longest_slide(chain: &Chain, i: usize) -> f64 {
-    let joint = &chain.joints[i];
-    let at = |coordinate: f64| (joint.multiplier * coordinate + joint.offset).abs();
-    at(chain.lower[joint.coordinate]).max(at(chain.upper[joint.coordinate]))
+    let [lower, upper] = chain.joints[i].range([&chain.lower, &chain.upper]);
+    lower.abs().max(upper.abs())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::coupling::Coupling;
     use crate::kinematics::body_frame::BodyFrame;
     use crate::kinematics::samples::{random_coordinates, random_turning, wide_finger};
     use regrasp_base::Rng;
@@ -167,9 +168,10 @@ mod tests {
             joints[i % 4].motion = Motion::Slide;
             (lower[i % 4], upper[i % 4]) = (-0.02, 0.05);
             let follower = (i + 1) % 4;
-            joints[follower].coordinate = (i + 2) % 4;
-            joints[follower].multiplier = -0.7;
-            joints[follower].offset = 0.1;
+            joints[follower].drive = Coupling::one((i + 2) % 4, -0.7, 0.1);
+            if i % 2 == 1 {
+                joints[follower].drive.terms.push(((i + 3) % 4, 0.4));
+            }
             let chain = Chain::new(joints, turning.names.clone(), lower, upper);
             let (a, b) = tightness(&chain, 200, &mut rng);
             assert!(a <= 1.0 + 1e-9 && b <= 1.0 + 1e-9, "bound broken: {a} {b}");

@@ -1,6 +1,7 @@
 //! Chains for tests: hands written by their dimensions, random geometries, and real hands read in place.
 
 use super::chain::{Chain, ChainJoint, Motion};
+use crate::coupling::Coupling;
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 
@@ -13,9 +14,7 @@ pub fn turning(joints: &[(Vector, Vector, Vector, f64, f64)]) -> Chain {
             parent_from_joint: Pose::new(*origin, *rotation),
             axis: UnitVector::new_normalize(*axis),
             motion: Motion::Turn,
-            coordinate: i,
-            multiplier: 1.0,
-            offset: 0.0,
+            drive: Coupling::independent(i),
         })
         .collect();
     Chain::new(
@@ -99,9 +98,7 @@ pub fn urdf_chain(path: &std::path::Path, tip_link: &str, center_in_tip: Point) 
                     parent_from_joint,
                     axis: UnitVector::new_normalize(axis),
                     motion: Motion::Turn,
-                    coordinate: 0,
-                    multiplier: 1.0,
-                    offset: 0.0,
+                    drive: Coupling::independent(0),
                 },
                 limit("lower"),
                 limit("upper"),
@@ -116,6 +113,9 @@ pub fn urdf_chain(path: &std::path::Path, tip_link: &str, center_in_tip: Point) 
     joints.reverse();
     let (lower, upper) = (joints.iter().map(|j| j.1).collect(), joints.iter().map(|j| j.2).collect());
     let names = (0..joints.len()).map(|i| format!("joint_{i}")).collect();
-    let joints = joints.into_iter().enumerate().map(|(i, (joint, _, _))| ChainJoint { coordinate: i, ..joint });
+    let joints = joints
+        .into_iter()
+        .enumerate()
+        .map(|(i, (joint, _, _))| ChainJoint { drive: Coupling::independent(i), ..joint });
     (Chain::new(joints.collect(), names, lower, upper), center.expect("a moving joint"))
 }

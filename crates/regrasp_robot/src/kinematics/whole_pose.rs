@@ -26,13 +26,15 @@ pub fn twists(chain: &Chain, coordinates: &[f64], point: &Point) -> ArrayVec<[Ve
         coordinates.iter().map(|_| [Vector::zeros(), Vector::zeros()]).collect();
     for (joint, frame) in chain.joints.iter().zip(frames.iter()) {
         // A joint's axis is the same in the frame before and after its motion.
-        let axis = frame.vector(&joint.axis) * joint.multiplier;
-        let [linear, angular] = &mut twists[joint.coordinate];
-        match joint.motion {
-            Motion::Slide => *linear += axis,
-            Motion::Turn => {
-                *linear += axis.cross(&(point.coords - frame.translation));
-                *angular += axis;
+        for &(k, multiplier) in &joint.drive.terms {
+            let axis = frame.vector(&joint.axis) * multiplier;
+            let [linear, angular] = &mut twists[k];
+            match joint.motion {
+                Motion::Slide => *linear += axis,
+                Motion::Turn => {
+                    *linear += axis.cross(&(point.coords - frame.translation));
+                    *angular += axis;
+                }
             }
         }
     }
@@ -80,6 +82,7 @@ pub fn torques(chain: &Chain, coordinates: &[f64], point: &Point, force: &Vector
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::coupling::Coupling;
     use crate::kinematics::chain::ChainJoint;
     use regrasp_base::Rng;
     use regrasp_geometry::{Pose, UnitVector};
@@ -90,9 +93,7 @@ mod tests {
             parent_from_joint: Pose::new(Vector::from(rng.direction()) * 0.02, Vector::from(rng.direction()) * 0.2),
             axis: UnitVector::new_normalize(Vector::ith(coordinate % 3, 1.0) + Vector::from(rng.direction()) * 0.1),
             motion: if coordinate < 3 { Motion::Slide } else { Motion::Turn },
-            coordinate,
-            multiplier: 1.0,
-            offset: 0.0,
+            drive: Coupling::independent(coordinate),
         };
         let joints = (0..6).map(joint).collect();
         let names = (0..6).map(|k| format!("j{k}")).collect();

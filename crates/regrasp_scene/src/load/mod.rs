@@ -1,4 +1,4 @@
-//! The scene file. `docs/scene-format.md` says what it may contain.
+//! The scene file. `docs/reference/scene-format.md` says what it may contain.
 //!
 //! Codes: S100 not TOML, S101 unknown key, S102 missing key, S103 wrong type, S104 unknown word, S105 another format,
 //! S106 exactly one of several, S107 number out of range, S110 file not found, S112 name used twice, S120 unknown joint
@@ -6,37 +6,37 @@
 //! M210 no volume; P302 out of reach, P303 joint limit, P304 contact off the surface; V001 not finite, V002 quaternion
 //! not of length one, V003 zero quaternion.
 
+mod bodies;
 mod contact;
 mod files;
 mod gravity;
+mod hand;
 mod limits;
+mod numbers;
 mod object;
 mod pose;
 mod shape;
 mod task;
 mod units;
 
-pub use task::{Goal, InHandTask, StartOrientation};
+pub use task::{Goal, StartOrientation, Task};
 
-use crate::gravity::Gravity;
-use crate::limits::Limits;
-use crate::query::TaskKind;
-use crate::scene::{InputFile, Scene};
+use crate::hand_view::HandView;
+use crate::manipulation::Manipulation;
+use crate::scene::Scene;
+use crate::state::State;
+use bodies::Parts;
 use files::Files;
 use regrasp_base::InputError;
 use regrasp_base::diagnostic::printable_line;
 use regrasp_base::toml_table::{Codes, Found, Table};
-use regrasp_geometry::Pose;
-use regrasp_robot::Hand;
-use regrasp_robot::contact_model::{self, ContactModel};
-use regrasp_robot::import::{LoadOptions, load_hand};
-use regrasp_robot::tip::{LARGEST_MISFIT, TipShape};
+use regrasp_robot::import::LoadOptions;
 use std::path::Path;
 
 /// Value of `format` in a scene file.
 pub const FORMAT: &str = "regrasp-scene";
-/// Value of `format_version` that this version reads.
-pub const FORMAT_VERSION: f64 = 1.0;
+/// Values of `format_version` that this version reads. Version 1 has one hand, one object and one task.
+pub const FORMAT_VERSIONS: [f64; 2] = [1.0, 2.0];
 
 const CODES: Codes = Codes {
     syntax: "S100",
@@ -51,12 +51,63 @@ const CODES: Codes = Codes {
 /// A scene file, read.
 #[derive(Debug, Clone)]
 pub struct LoadedScene {
-    /// What the planner plans in.
+    /// What planners plan in.
     pub scene: Scene,
-    /// What is asked.
-    pub task: InHandTask,
+    /// Where everything is at the beginning: hands in their rest postures, objects where they rest.
+    pub state: State,
+    /// What is asked, in the order of the file. At least one task.
+    pub tasks: Vec<Task>,
     /// Things worth knowing that are no errors, each with its place.
     pub notes: Vec<String>,
+}
+
+impl LoadedScene {
+    /// The first task: of most scenes the only one.
+    pub fn task(&self) -> &Task {
+        &self.tasks[0]
+    }
+
+    /// The task called `name`.
+    pub fn task_named(&self, name: &str) -> Option<&Task> {
+        self.tasks.iter().find(|task| task.name == name)
+    }
+
+    /// The task of a plan for the query called `name`: the one of that name, else the first.
+    pub fn task_for(&self, name: &str) -> &Task {
+        self.task_named(name).unwrap_or(self.task())
+    }
+
+    /// The same scene with the task of a plan for the query called `name` as its first.
+    #[must_use]
+    pub fn for_query(self, name: &str) -> Self {
+        match self.task_named(name) {
+            Some(_) => self.choosing(name).expect("the scene has a task of this name"),
+            None => self,
+        }
+    }
+
+    /// The same scene with the task called `name` as its first; none where it has none of that name.
+    pub fn choosing(mut self, name: &str) -> Option<Self> {
+        let index = self.tasks.iter().position(|task| task.name == name)?;
+        self.tasks[..=index].rotate_right(1);
+        Some(self)
+    }
+
+    /// The hand and the object of `task`, among everything else.
+    pub fn manipulation_of(&self, task: &Task) -> Manipulation<'_> {
+        let (hand_index, object_index) = (task.hand, task.object);
+        Manipulation { scene: &self.scene, state: &self.state, hand_index, object_index }
+    }
+
+    /// The hand and the object of the first task.
+    pub fn manipulation(&self) -> Manipulation<'_> {
+        self.manipulation_of(self.task())
+    }
+
+    /// The scene as the hand of the first task sees it.
+    pub fn view(&self) -> HandView<'_> {
+        HandView::of(&self.manipulation())
+    }
 }
 
 /// Reads the scene file at `path` and every file it names.
@@ -71,119 +122,22 @@ pub fn load_scene(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Inp
     let parts = document.as_ref().and_then(|document| read(Table::root(document), &mut files, &mut found));
     let (notes, diagnostics) = (found.notes, found.diagnostics);
     let parts = diagnostics.into_result(parts)?;
-    let Parts { hand, reach, object, obstacles, gravity, limits, task } =
+    let Parts { hands, objects, world_from_objects, supports, obstacles, gravity, limits, tasks } =
         parts.expect("what could not be read has left a diagnostic");
     let name = path.file_stem().map_or_else(String::new, |stem| printable_line(&stem.to_string_lossy()));
-    let scene = Scene { name, hand, reach, object, obstacles, gravity, limits, inputs: files.inputs };
-    Ok(LoadedScene { scene, task, notes })
-}
-
-struct Parts {
-    hand: Hand,
-    reach: Option<f64>,
-    object: crate::object::Object,
-    obstacles: Vec<crate::scene::Obstacle>,
-    gravity: Option<Gravity>,
-    limits: Limits,
-    task: InHandTask,
+    let scene = Scene { name, hands, objects, supports, obstacles, gravity, limits, inputs: files.inputs };
+    let state = State::at_rest(&scene, world_from_objects);
+    Ok(LoadedScene { scene, state, tasks, notes })
 }
 
 /// Reads the whole file; none if anything is missing, with the reason in `found`.
 fn read(mut root: Table, files: &mut Files, found: &mut Found) -> Option<Parts> {
-    if !root.is_of_format(found, FORMAT, FORMAT_VERSION) {
-        return None;
-    }
-    let kind = task_name(&mut root, found);
-    let hand = hand(&mut root, files, found);
-    let (hand, reach) = hand.map_or((None, None), |(hand, reach)| (Some(hand), reach));
-    let gravity = gravity::gravity(&mut root, hand.as_ref(), found);
-    let limits = limits::limits(&mut root, found);
-    let object = object::object(&mut root, files, found);
-    let obstacles = object::obstacles(&mut root, files, found);
-    let start = task::start(&mut root, hand.as_ref(), found);
-    let task = task::task(&mut root, kind.unwrap_or(TaskKind::InHand), start, hand.as_ref(), found);
-    if let (Some(hand), Some(object)) = (&hand, &object) {
-        units::check_sizes(hand, object, &mut root, found);
-        if let Some(task) = &task {
-            units::check_reach(hand, object, task, &mut root, found);
-            units::check_contacts(hand, object, task, &mut root, found);
-        }
-    }
+    let version = root.version_of_format(found, FORMAT, &FORMAT_VERSIONS)?;
+    let parts = if version == 1.0 {
+        bodies::one_hand(&mut root, files, found)
+    } else {
+        bodies::several(&mut root, files, found)
+    };
     root.finish(found);
-    Some(Parts { hand: hand?, reach, object: object?, obstacles, gravity, limits, task: task? })
-}
-
-/// `task`. Errors: missing (`S102`), another task (`S105`).
-fn task_name(root: &mut Table, found: &mut Found) -> Option<TaskKind> {
-    let entry = root.required(found, "task", "add task = \"in_hand\"")?;
-    let text = entry.text(found)?;
-    let known = [TaskKind::InHand, TaskKind::Tracking].into_iter().find(|kind| kind.name() == text);
-    if known.is_none() {
-        let expected = "\"in_hand\" or \"tracking\", the tasks that this version plans";
-        let diagnostic = entry.error("S105", found, format!("is \"{text}\"")).expected(expected);
-        found.diagnostics.push(diagnostic);
-    }
-    known
-}
-
-/// Largest reach that makes sense, in metres.
-const MAX_REACH: f64 = 10.0;
-
-/// `[hand]`: the hand of the file named, placed in the world, with its rest posture and contact models; and the reach.
-fn hand(root: &mut Table, files: &mut Files, found: &mut Found) -> Option<(Hand, Option<f64>)> {
-    let mut table = root.required(found, "hand", "add [hand] with file = \"hand.toml\"")?.table(found)?;
-    let file = table.required(found, "file", "add file = \"hand.toml\" or a .urdf");
-    let pose = match table.optional("world_from_hand") {
-        Some(entry) => entry.table(found).and_then(|mut inside| {
-            let pose = pose::pose(&mut inside, found);
-            inside.finish(found);
-            pose
-        }),
-        None => Some(Pose::identity()),
-    };
-    let rest = table.optional("rest");
-    let default_contact = contact_model::read(&mut table, "contact", ContactModel::default(), "S106", found);
-    let contacts = table.optional("contacts");
-    let reach = table.optional("reach").and_then(|entry| {
-        let expected = format!("a radius from 0 to {MAX_REACH} metres");
-        entry.number_that(found, &expected, |x| (0.0..=MAX_REACH).contains(&x))
-    });
-    table.finish(found);
-    let file = file?;
-    let path = files.locate(&file, found)?;
-    let options = LoadOptions { contact: default_contact?, ..files.options.clone() };
-    let loaded = match load_hand(&path, &options) {
-        Ok(loaded) => loaded,
-        Err(error) => {
-            found.diagnostics.extend(error);
-            return None;
-        }
-    };
-    found.notes.extend(loaded.notes);
-    let name_in_scene = file.text(found)?.to_owned();
-    for input in loaded.inputs {
-        let name = if input.path == path { name_in_scene.clone() } else { input.name };
-        files.inputs.push(InputFile { role: input.role, name, path: input.path, sha256: input.sha256 });
-    }
-    let mut hand = loaded.hand;
-    for finger in &hand.fingers {
-        if let TipShape::Hull { misfit, .. } = finger.tip.shape
-            && misfit > LARGEST_MISFIT
-        {
-            let off = format!("finger \"{}\": the tip's hull is {:.2} mm off an ellipsoid", finger.name, 1e3 * misfit);
-            let diagnostic = file.error("S108", found, off).expected("a rounded tip, within 0.2 mm over its pad");
-            let fix = "in the hand file give the tip a pad around what touches, or shape = \"ellipsoid\" or \"sphere\"";
-            found.diagnostics.push(diagnostic.fix(fix));
-        }
-    }
-    if let Some(entry) = contacts {
-        contact::apply(&entry, &mut hand, found)?;
-    }
-    if let Some(entry) = rest {
-        let mut values = task::joint_values(&entry.table(found)?, &hand, false, found)?.into_iter();
-        for finger in &mut hand.fingers {
-            finger.rest = values.by_ref().take(finger.rest.len()).collect();
-        }
-    }
-    Some((hand.placed_at(&pose?), reach))
+    parts
 }

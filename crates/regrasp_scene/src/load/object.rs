@@ -1,9 +1,9 @@
-//! `[object]` and `[[obstacles]]`.
+//! Objects, supports and obstacles.
 
 use super::files::Files;
+use super::numbers::{list, shown};
 use super::pose;
 use super::shape::{self, Origin, ReadShape};
-use super::units::{list, shown};
 use crate::object::Object;
 use crate::scene::Obstacle;
 use regrasp_base::diagnostic::number;
@@ -26,10 +26,10 @@ const UNLIKELY_FRICTION: f64 = 2.0;
 /// Masses above this are noted, in kilograms.
 const UNLIKELY_MASS: f64 = 20.0;
 
-/// Reads `[object]`.
-pub(super) fn object(root: &mut Table, files: &mut Files, found: &mut Found) -> Option<Object> {
-    let fix = "add [object] with name, a shape such as sphere = { radius = 0.03 }, mass and friction";
-    let mut table = root.required(found, "object", fix)?.table(found)?;
+/// Reads an object from its table.
+pub(super) fn object(mut table: Table, files: &mut Files, found: &mut Found) -> Option<Object> {
+    let span = table.span.clone();
+    let element = table.name.clone();
     let name = table.optional("name").and_then(|entry| entry.name(found)).unwrap_or("object").to_owned();
     let read = shape::shape(&mut table, files, found);
     let friction = table.required(found, "friction", "add friction = 0.8").and_then(|entry| friction(&entry, found));
@@ -77,8 +77,8 @@ pub(super) fn object(root: &mut Table, files: &mut Files, found: &mut Found) -> 
     let surface = match surface {
         Ok(surface) => surface,
         Err(error) => {
-            let diagnostic = regrasp_base::Diagnostic::new("M207", found.place(&root.span), error.to_string())
-                .element("table", "object");
+            let diagnostic =
+                regrasp_base::Diagnostic::new("M207", found.place(&span), error.to_string()).element("table", &element);
             found.diagnostics.push(diagnostic);
             return None;
         }
@@ -247,26 +247,50 @@ fn center_is_inside(shape: &Shape, center: &Point, entry: &Entry, found: &mut Fo
     None
 }
 
-/// Reads `[[obstacles]]`. Errors: two of one name (`S112`).
-pub(super) fn obstacles(root: &mut Table, files: &mut Files, found: &mut Found) -> Vec<Obstacle> {
-    let entries =
-        root.optional("obstacles").and_then(|entry| entry.entries(found, "tables [[obstacles]]")).unwrap_or_default();
-    let mut obstacles: Vec<Obstacle> = Vec::new();
-    let mut names = BTreeSet::new();
-    for entry in entries {
-        let Some(obstacle) = obstacle(&entry, files, found) else { continue };
-        if !names.insert(obstacle.name.clone()) {
+/// Reads the bodies that stand fixed in the world: `[[obstacles]]` or `[[supports]]`.
+///
+/// Errors: a name that another body of the scene has (`S112`).
+pub(super) fn fixed_bodies(
+    root: &mut Table,
+    key: &'static str,
+    names: &mut Names,
+    files: &mut Files,
+    found: &mut Found,
+) -> Vec<Obstacle> {
+    let entries = root.optional(key).and_then(|entry| entry.entries(found, &format!("tables [[{key}]]")));
+    let mut bodies: Vec<Obstacle> = Vec::new();
+    for entry in entries.unwrap_or_default() {
+        let Some(body) = fixed_body(&entry, files, found) else { continue };
+        names.add(&body.name, &entry, found);
+        bodies.push(body);
+    }
+    bodies
+}
+
+/// Names that all differ: those of the bodies of a scene, or those of its tasks.
+pub(super) struct Names {
+    what: &'static str,
+    known: BTreeSet<String>,
+}
+
+impl Names {
+    /// No names so far; `what` has them.
+    pub fn of(what: &'static str) -> Self {
+        Names { what, known: BTreeSet::new() }
+    }
+
+    /// Adds the name of `entry`. Errors: another one has it (`S112`).
+    pub fn add(&mut self, name: &str, entry: &Entry, found: &mut Found) {
+        if !self.known.insert(name.to_owned()) {
             let diagnostic = entry
-                .error("S112", found, format!("has the name \"{}\", as another obstacle", obstacle.name))
+                .error("S112", found, format!("has the name \"{name}\", as another {}", self.what))
                 .expected("names that differ");
             found.diagnostics.push(diagnostic);
         }
-        obstacles.push(obstacle);
     }
-    obstacles
 }
 
-fn obstacle(entry: &Entry, files: &mut Files, found: &mut Found) -> Option<Obstacle> {
+fn fixed_body(entry: &Entry, files: &mut Files, found: &mut Found) -> Option<Obstacle> {
     let mut table = entry.table(found)?;
     let name = table.required(found, "name", "add name = \"table\"").and_then(|entry| entry.name(found));
     let read = shape::shape(&mut table, files, found);

@@ -1,7 +1,7 @@
 //! `[start]`, `[[way]]` and `[goal]`: what is asked, and how a seed resolves what the file leaves open.
 
 use super::pose;
-use crate::query::{GraspRequest, InHandQuery, TaskKind};
+use crate::query::{GraspRequest, IN_HAND, InHandQuery, Query, TRACKING, TrackingQuery};
 use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_base::Rng;
 use regrasp_base::diagnostic::number;
@@ -77,11 +77,36 @@ impl Goal {
     }
 }
 
-/// The in-hand task of a scene file, before a seed resolves its randomness.
+/// What kind of goal a task has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum TaskKind {
+    /// A pose.
+    InHand,
+    /// An orientation.
+    Tracking,
+}
+
+impl TaskKind {
+    /// As scene and plan files spell it.
+    pub fn name(self) -> &'static str {
+        match self {
+            TaskKind::InHand => IN_HAND,
+            TaskKind::Tracking => TRACKING,
+        }
+    }
+}
+
+/// A task of a scene file, before a seed resolves its randomness.
 #[derive(Debug, Clone, PartialEq)]
-pub struct InHandTask {
+pub struct Task {
+    /// Its name, unique among the tasks of the scene; empty where the file has only one.
+    pub name: String,
+    /// The hand, by its index in `Scene::hands`.
+    pub hand: usize,
+    /// The object, by its index in `Scene::objects`.
+    pub object: usize,
     /// Its kind.
-    pub kind: TaskKind,
+    pub(super) kind: TaskKind,
     /// Object pose at the start, before the draw.
     pub world_from_object_start: Pose,
     /// The start position is drawn uniformly from the ball of this radius, in metres; 0 for none.
@@ -98,9 +123,9 @@ pub struct InHandTask {
     pub goal_grasp: GraspRequest,
 }
 
-impl InHandTask {
+impl Task {
     /// The query of `seed`: the same on every machine and for every number of threads.
-    pub fn query(&self, seed: u64) -> InHandQuery {
+    pub fn query(&self, seed: u64) -> Query {
         let mut start = self.world_from_object_start;
         if self.position_within > 0.0 {
             let mut rng = Rng::keyed(seed, "start_position", 0);
@@ -115,14 +140,35 @@ impl InHandTask {
         let mut way: Vec<Pose> = self.way.iter().map(|pose| pose.pose(&start)).collect();
         let n_legs = self.goal.n_legs();
         way.extend((1..n_legs).map(|leg| self.goal.pose_at(&start, leg as f64 / n_legs as f64)));
-        InHandQuery {
-            task: self.kind,
-            world_from_object_start: start,
-            world_from_object_way: way,
-            world_from_object_goal: self.goal.pose(&start),
-            start_grasp: self.start_grasp.clone(),
-            goal_grasp: self.goal_grasp.clone(),
+        let (start_grasp, goal_grasp) = (self.start_grasp.clone(), self.goal_grasp.clone());
+        let (name, hand, object) = (self.name.clone(), self.hand, self.object);
+        let goal = self.goal.pose(&start);
+        match self.kind {
+            TaskKind::InHand => Query::InHand(InHandQuery {
+                name,
+                hand,
+                object,
+                world_from_object_start: start,
+                world_from_object_way: way,
+                world_from_object_goal: goal,
+                start_grasp,
+                goal_grasp,
+            }),
+            TaskKind::Tracking => Query::Tracking(TrackingQuery {
+                name,
+                hand,
+                object,
+                world_from_object_start: start,
+                world_from_object_goal: goal,
+                start_grasp,
+                goal_grasp,
+            }),
         }
+    }
+
+    /// Name of what it asks for, as scene and plan files spell it.
+    pub fn kind_name(&self) -> &'static str {
+        self.kind.name()
     }
 }
 
@@ -134,10 +180,25 @@ pub(super) struct Start {
     grasp: GraspRequest,
 }
 
-/// Reads `[start]`. `hand` is none when the hand file was refused; then grasps are not looked into.
-pub(super) fn start(root: &mut Table, hand: Option<&Hand>, found: &mut Found) -> Option<Start> {
-    let mut table = root.required(found, "start", "add [start] with position = [x, y, z]")?.table(found)?;
-    let pose = pose::pose(&mut table, found);
+impl Start {
+    /// An object that starts where it rests, in a grasp that the planner chooses.
+    pub(super) fn at_rest(pose: Option<Pose>) -> Self {
+        let (orientation, grasp) = (StartOrientation::Given, GraspRequest::Automatic);
+        Start { pose, position_within: 0.0, orientation, grasp }
+    }
+}
+
+/// Reads `[start]`. `hand` is none when the hand file was refused; then grasps are not looked into. Where `resting` is given the
+/// object starts there unless the table says another pose.
+pub(super) fn start(root: &mut Table, hand: Option<&Hand>, resting: Option<Pose>, found: &mut Found) -> Option<Start> {
+    let entry = match resting {
+        Some(_) => root.optional("start"),
+        None => Some(root.required(found, "start", "add [start] with position = [x, y, z]")?),
+    };
+    let Some(entry) = entry else { return Some(Start::at_rest(resting)) };
+    let mut table = entry.table(found)?;
+    let says_pose = !table.present(&["position", "quat_xyzw", "quat_wxyz", "rotation_vector"]).is_empty();
+    let pose = if resting.is_some() && !says_pose { resting } else { pose::pose(&mut table, found) };
     let expected = format!("a radius from 0 to {MAX_POSITION_WITHIN} metres");
     let position_within = table
         .optional("position_within")
@@ -227,14 +288,27 @@ fn orientation_or_turn(table: &mut Table, found: &mut Found) -> Option<Goal> {
 /// How to say a pose.
 const POSE_FIX: &str = "add turn = { axis = \"x\", angle_deg = 90 } or position and quat_xyzw";
 
+/// Whose task it is, and what it is called.
+pub(super) struct Heading {
+    /// Its name.
+    pub name: String,
+    /// Its kind.
+    pub kind: TaskKind,
+    /// Index of the hand.
+    pub hand: usize,
+    /// Index of the object.
+    pub object: usize,
+}
+
 /// Reads `[[way]]` and `[goal]` and joins them with the start.
 pub(super) fn task(
     root: &mut Table,
-    kind: TaskKind,
+    heading: Heading,
     start: Option<Start>,
     hand: Option<&Hand>,
     found: &mut Found,
-) -> Option<InHandTask> {
+) -> Option<Task> {
+    let kind = heading.kind;
     // Tracking knows no poses on the way: [[way]] is then a key that is not known.
     let way = if kind == TaskKind::InHand { way(root, found) } else { Some(Vec::new()) };
     let fix = "add [goal] with turn = { axis = \"x\", angle_deg = 90 } or position and quat_xyzw";
@@ -256,7 +330,10 @@ pub(super) fn task(
     let span = table.span.clone();
     table.finish(found);
     let (start, way, goal) = (start?, way?, goal?);
-    let task = InHandTask {
+    let task = Task {
+        name: heading.name,
+        hand: heading.hand,
+        object: heading.object,
         kind,
         world_from_object_start: start.pose?,
         position_within: start.position_within,
@@ -285,16 +362,16 @@ fn relative_goal(table: &mut Table, found: &mut Found) -> Option<Goal> {
     Some(Goal::Turn { axis, angle, shift: shift? })
 }
 
-fn is_goal_start(task: &InHandTask) -> bool {
+fn is_goal_start(task: &Task) -> bool {
     let is_fixed = task.position_within == 0.0 && task.start_orientation == StartOrientation::Given;
     if !is_fixed && matches!(task.goal, Goal::Pose(_) | Goal::Orientation(_)) {
         return false;
     }
     let query = task.query(0);
-    if !query.world_from_object_way.is_empty() {
+    if !query.way().is_empty() {
         return false;
     }
-    let (start, goal) = (&query.world_from_object_start, &query.world_from_object_goal);
+    let (start, goal) = (query.start(), query.goal());
     (start.translation.vector - goal.translation.vector).norm() < SAME_POSITION
         && rotation_between(start, goal).norm() < SAME_ANGLE
 }

@@ -1,10 +1,12 @@
 //! Mistakes that show only when hand, object and task are seen together: units (reliability R15), reach, contacts.
 
-use super::task::{Goal, InHandTask, StartOrientation};
+use super::numbers::{list, shown};
+use super::task::{Goal, StartOrientation, Task};
 use crate::object::Object;
 use crate::query::{GRASP_TOLERANCE, GraspRequest};
+use crate::scene::SceneHand;
 use regrasp_base::diagnostic::number;
-use regrasp_base::toml_table::{Found, Table};
+use regrasp_base::toml_table::{Entry, Found, Table};
 use regrasp_geometry::{Point, Pose};
 use regrasp_robot::Hand;
 
@@ -12,14 +14,13 @@ use regrasp_robot::Hand;
 const MAX_SIZE_RATIO: f64 = 20.0;
 
 /// Reports a hand and an object that cannot both be in metres (`M201`).
-pub(super) fn check_sizes(hand: &Hand, object: &Object, root: &mut Table, found: &mut Found) {
+pub(super) fn check_sizes(hand: &Hand, object: &Object, entry: &Entry, found: &mut Found) {
     let (low, high) = object.shape.bounds();
     let (hand_size, object_size) = (size_of(hand), (high - low).max());
     let ratio = hand_size / object_size;
     if (1.0 / MAX_SIZE_RATIO..=MAX_SIZE_RATIO).contains(&ratio) {
         return;
     }
-    let Some(entry) = root.optional("object") else { return };
     // Powers of ten only: the factor that was forgotten, not the one that would make it fit.
     let scale = 10f64.powi(if ratio > 1.0 { 3 } else { -3 });
     let diagnostic = entry
@@ -34,14 +35,14 @@ pub(super) fn check_sizes(hand: &Hand, object: &Object, root: &mut Table, found:
 }
 
 /// Reports positions of start, way and goal that no finger can reach whatever its joints do (`P302`).
-pub(super) fn check_reach(hand: &Hand, object: &Object, task: &InHandTask, root: &mut Table, found: &mut Found) {
+pub(super) fn check_reach(hand: &SceneHand, object: &Object, task: &Task, root: &mut Table, found: &mut Found) {
     let query = task.query(0);
     let object_reach = object.shape.reach_from(&Point::origin());
     let slack = task.position_within * 2.0;
     let is_goal_fixed = matches!(task.goal, Goal::Pose(_)) || task.start_orientation == StartOrientation::Given;
-    let mut poses = vec![("start", query.world_from_object_start)];
-    poses.extend(query.world_from_object_way.iter().take(task.way.len()).map(|pose| ("way", *pose)));
-    poses.push(("goal", query.world_from_object_goal));
+    let mut poses = vec![("start", *query.start())];
+    poses.extend(query.way().iter().take(task.way.len()).map(|pose| ("way", *pose)));
+    poses.push(("goal", *query.goal()));
     for (key, pose) in poses {
         if key != "start" && !is_goal_fixed {
             continue;
@@ -63,7 +64,7 @@ pub(super) fn check_reach(hand: &Hand, object: &Object, task: &InHandTask, root:
 }
 
 /// Reports given contacts that do not lie on the object's surface (`P304`), with distance and side.
-pub(super) fn check_contacts(hand: &Hand, object: &Object, task: &InHandTask, root: &mut Table, found: &mut Found) {
+pub(super) fn check_contacts(hand: &Hand, object: &Object, task: &Task, root: &mut Table, found: &mut Found) {
     for (key, grasp) in [("start", &task.start_grasp), ("goal", &task.goal_grasp)] {
         let GraspRequest::Contacts(points) = grasp else { continue };
         let Some(entry) = root.optional(key) else { continue };
@@ -88,19 +89,10 @@ pub(super) fn check_contacts(hand: &Hand, object: &Object, task: &InHandTask, ro
     }
 }
 
-/// A vector as a list of a scene file.
-pub(super) fn list(v: regrasp_geometry::Vector) -> String {
-    format!("[{}, {}, {}]", number(v.x), number(v.y), number(v.z))
-}
-
-/// A size with so many decimals; a far too large one by its power of ten.
-pub(super) fn shown(size: f64, decimals: usize) -> String {
-    if size.abs() < 1e6 { format!("{size:.decimals$}") } else { format!("{size:.1e}") }
-}
-
 /// Distance of the object from the nearest finger base, and the reach, when no finger can touch the object there.
-fn beyond_reach(hand: &Hand, pose: &Pose, object_reach: f64) -> Option<(f64, f64)> {
-    let position = Point::from(pose.translation.vector);
+fn beyond_reach(placed: &SceneHand, pose: &Pose, object_reach: f64) -> Option<(f64, f64)> {
+    let hand = &placed.hand;
+    let position = placed.world_from_hand.inverse_transform_point(&Point::from(pose.translation.vector));
     let mut nearest: Option<(f64, f64)> = None;
     for finger in &hand.fingers {
         let Some(first) = finger.chain.joints.first() else { continue };
@@ -126,9 +118,8 @@ fn finger_reach(finger: &regrasp_robot::Finger) -> f64 {
         .iter()
         .filter(|joint| joint.motion == regrasp_robot::Motion::Slide)
         .map(|joint| {
-            let range = chain.lower.get(joint.coordinate).zip(chain.upper.get(joint.coordinate));
-            let position = |q: f64| (joint.multiplier * q + joint.offset).abs();
-            range.map_or(0.0, |(lower, upper)| position(*lower).max(position(*upper)))
+            let [lower, upper] = joint.range([&chain.lower, &chain.upper]);
+            lower.abs().max(upper.abs())
         })
         .sum();
     links + slides + finger.tip.center_in_body.coords.norm() + finger.tip.radius()

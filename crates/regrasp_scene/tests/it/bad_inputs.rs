@@ -32,7 +32,7 @@ fn noted(text: &str, part: &str) {
 fn the_good_scene_is_good() {
     let loaded = Folder::new().load(GOOD).unwrap();
     assert_eq!(loaded.notes, Vec::<String>::new());
-    assert_eq!(loaded.scene.object.edge_distance, 0.004);
+    assert_eq!(loaded.scene.objects[0].edge_distance, 0.004);
 }
 
 #[test]
@@ -99,8 +99,8 @@ fn another_format_version_or_task() {
         &["S105 scene.toml:1:10 key \"format\": is \"regrasp-plan\"", "\"regrasp-scene\""],
     );
     refused_with(
-        &with("format_version = 1", "format_version = 2"),
-        &["S105 scene.toml:2:18 key \"format_version\": is 2; expected 1"],
+        &with("format_version = 1", "format_version = 3"),
+        &["S105 scene.toml:2:18 key \"format_version\": is 3; expected 1 or 2"],
     );
     refused_with(
         &with("\"in_hand\"", "\"dual_arm\""),
@@ -113,8 +113,8 @@ fn gravity_that_is_no_direction() {
     let stated = |gravity: &str| with("task = \"in_hand\"\n", &format!("task = \"in_hand\"\ngravity = {gravity}\n"));
     refused(
         &stated("[0, 0.0, 0]"),
-        "S107 scene.toml:4:11 key \"gravity\": is the zero vector, which is no direction; expected a direction in the hand's \
-         frame, of any length, or \"any\"",
+        "S107 scene.toml:4:11 key \"gravity\": is the zero vector, which is no direction; expected a direction of any length, \
+         in the hand's frame (version 1) or the world's (version 2), or \"any\"",
     );
     refused_with(&stated("\"down\""), &["S104 scene.toml:4:11 key \"gravity\": is \"down\"", "\"any\""]);
     refused_with(&stated("9.81"), &["S103 scene.toml:4:11 key \"gravity\": is 9.81"]);
@@ -285,7 +285,7 @@ fn a_mesh_in_millimetres() {
     );
     let scaled =
         folder.load(&with("sphere = { radius = 0.032 }", "mesh = { file = \"mm.obj\", scale = 0.001 }")).unwrap();
-    assert!((scaled.scene.object.center_of_mass.coords - nalgebra::Vector3::repeat(0.02)).norm() < 1e-12);
+    assert!((scaled.scene.objects[0].center_of_mass.coords - nalgebra::Vector3::repeat(0.02)).norm() < 1e-12);
 }
 
 #[test]
@@ -296,7 +296,7 @@ fn scale_of_zero_is_refused_and_a_mirror_is_not() {
     refused_with(&mesh("0"), &["S107", "key \"object.mesh.scale\": has a factor of 0"]);
     let folder = Folder::new();
     let loaded = folder.load(&mesh("[-1, 1, 2]")).unwrap();
-    assert!((loaded.scene.object.center_of_mass - nalgebra::Point3::new(-0.02, 0.02, 0.04)).norm() < 1e-12);
+    assert!((loaded.scene.objects[0].center_of_mass - nalgebra::Point3::new(-0.02, 0.02, 0.04)).norm() < 1e-12);
 }
 
 #[test]
@@ -326,9 +326,9 @@ fn an_open_mesh_needs_a_hull_or_its_mass_and_centre() {
     );
     let folder = Folder::new();
     let hull = folder.load(&mesh(", solid = \"hull\"")).unwrap();
-    assert!((hull.scene.object.center_of_mass.coords - nalgebra::Vector3::repeat(0.02)).norm() < 1e-12);
+    assert!((hull.scene.objects[0].center_of_mass.coords - nalgebra::Vector3::repeat(0.02)).norm() < 1e-12);
     let given = mesh("").replace("mass = 0.1", "mass = 0.1\ncenter_of_mass = [0.02, 0.02, 0.02]");
-    assert_eq!(folder.load(&given).unwrap().scene.object.center_of_mass, nalgebra::Point3::from([0.02; 3]));
+    assert_eq!(folder.load(&given).unwrap().scene.objects[0].center_of_mass, nalgebra::Point3::from([0.02; 3]));
 }
 
 #[test]
@@ -337,10 +337,10 @@ fn origin_of_a_mesh_moves_it() {
         with("sphere = { radius = 0.032 }", &format!("mesh = {{ file = \"cube.obj\", origin = {origin} }}"))
     };
     let folder = Folder::new();
-    let centered = folder.load(&mesh("\"center\"")).unwrap().scene.object;
+    let centered = folder.load(&mesh("\"center\"")).unwrap().scene.objects.remove(0);
     assert!(centered.center_of_mass.coords.norm() < 1e-12);
     assert!((centered.shape.bounds().1 - nalgebra::Point3::from([0.02; 3])).norm() < 1e-12);
-    let moved = folder.load(&mesh("[0.0, 0.0, 0.04]")).unwrap().scene.object;
+    let moved = folder.load(&mesh("[0.0, 0.0, 0.04]")).unwrap().scene.objects.remove(0);
     assert!((moved.center_of_mass - nalgebra::Point3::new(0.02, 0.02, -0.02)).norm() < 1e-12);
     refused_with(&mesh("\"centre\""), &["S104", "did you mean \"center\"?"]);
 }
@@ -428,7 +428,7 @@ fn obstacles_of_one_name() {
     let obstacle = "\n[[obstacles]]\nname = \"wall\"\nbox = { size = [0.1, 0.1, 0.01] }\nposition = [0, 0, 0.5]\n";
     refused_with(
         &format!("{GOOD}{obstacle}{obstacle}"),
-        &["S112 scene.toml:25:1", "has the name \"wall\", as another obstacle"],
+        &["S112 scene.toml:25:1", "has the name \"wall\", as another body of the scene"],
     );
 }
 
@@ -443,7 +443,7 @@ fn a_mesh_far_from_its_own_origin() {
         "M204 scene.toml:10:8 key \"object.mesh\": lies 1000 m from the origin of its own file; expected at most 3 m: the \
          object frame is the frame of the file\n  fix: mesh = { file = ..., origin = \"center\" }"
     );
-    let object = folder.load(&mesh(", origin = \"center\"")).unwrap().scene.object;
+    let object = folder.load(&mesh(", origin = \"center\"")).unwrap().scene.objects.remove(0);
     assert!(object.center_of_mass.coords.norm() < 1e-9);
 }
 
@@ -552,11 +552,11 @@ fn contact_models_of_the_scene_reach_the_fingers() {
     let start = GOOD.find("[object]").unwrap();
     let more = "contact = \"soft_finger\"\ntorsion_radius = 0.005\ncontacts = { north = { model = \"frictionless\" } }";
     let text = format!("{}\n{more}\n\n{}", GOOD[..start].trim_end(), &GOOD[start..]);
-    let fingers = Folder::new().load(&text).unwrap().scene.hand.fingers;
+    let fingers = Folder::new().load(&text).unwrap().scene.hands.remove(0).hand.fingers;
     let soft = ContactModel::SoftFinger { torsion_radius: 0.005 };
     let expected = [soft, ContactModel::Frictionless, soft, soft];
     assert_eq!(fingers.iter().map(|finger| finger.tip.contact).collect::<Vec<_>>(), expected);
-    let plain = Folder::new().load(GOOD).unwrap().scene.hand.fingers;
+    let plain = Folder::new().load(GOOD).unwrap().scene.hands.remove(0).hand.fingers;
     assert!(plain.iter().all(|finger| finger.tip.contact == ContactModel::Point));
 }
 

@@ -46,10 +46,10 @@ fn a_megabyte_of_faults_is_read_in_time_listed_in_part_and_counted() {
 
 #[test]
 fn directions_of_any_length_are_directions() {
-    let expected = Folder::new().load(GOOD).unwrap().task.goal;
+    let expected = Folder::new().load(GOOD).unwrap().task().goal.clone();
     for axis in ["[1e200, 0, 0]", "[1e-200, 0.0, 0]", "[1e-320, 0, 0]", "[1.7e308, 0, 0]"] {
         let loaded = Folder::new().load(&with("axis = \"x\"", &format!("axis = {axis}"))).unwrap();
-        assert_eq!(loaded.task.goal, expected, "{axis}");
+        assert_eq!(loaded.task().goal, expected, "{axis}");
         assert_eq!(loaded.notes, Vec::<String>::new());
     }
     let down = Folder::new().load(&with("task =", "gravity = [0, 0, -1]\ntask =")).unwrap().scene.gravity;
@@ -135,5 +135,14 @@ fn scenes_name_any_regular_file_and_nothing_else() {
     }
     for (file, code) in [("zero.obj", "S110"), ("/dev/zero", "S110"), ("..", "S110"), ("https://a.org/b.obj", "U103")] {
         assert_eq!(load(file).unwrap_err().diagnostics[0].code, code, "{file}");
+    }
+}
+
+#[test]
+fn brackets_that_are_never_closed_are_refused_at_once() {
+    // A line pasted again and again: the parser would call itself for every bracket.
+    for line in ["box = { size =hand.toml\"\n", "a = [\n", "b = [{ c = \"\"\"{ \n"] {
+        let error = Folder::new().load(&format!("{GOOD}{}", line.repeat(10_000))).unwrap_err().to_string();
+        assert!(error.contains("S100") && error.contains("not closed"), "{error}");
     }
 }

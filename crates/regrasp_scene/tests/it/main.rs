@@ -10,7 +10,10 @@ mod pairs;
 #[path = "../../../../tests/support/places.rs"]
 mod places;
 mod random_files;
+mod several;
 mod support;
 mod task;
+#[path = "../../../../tests/support/two_hands.rs"]
+mod two_hands;
 #[path = "../../../../tests/support/wide_scene.rs"]
 mod wide_scene;

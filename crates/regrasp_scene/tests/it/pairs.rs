@@ -11,8 +11,8 @@ const OBSTACLE: &str = "\n[[obstacles]]\nname = \"wall\"\nbox = { size = [0.01, 
 #[test]
 fn every_pair_is_there_or_has_a_reason_not_to_be() {
     let mut loaded = Folder::new().load(&format!("{GOOD}{OBSTACLE}")).unwrap();
-    let pairs = collision_pairs(&loaded.scene);
-    let hand = &loaded.scene.hand;
+    let pairs = collision_pairs(&loaded.view());
+    let hand = &loaded.scene.hands[0].hand;
     let n_shapes: usize = hand.fingers.iter().map(|finger| finger.shapes.len()).sum();
     assert_eq!(pairs.tip_object.len() + pairs.link_object.len(), n_shapes);
     assert_eq!(pairs.finger_obstacle.len(), n_shapes);
@@ -38,8 +38,8 @@ fn every_pair_is_there_or_has_a_reason_not_to_be() {
     let (a, b) = pairs.finger_finger[0];
     let link = |id: FingerShapeId| hand.fingers[id.finger.0].shapes[id.shape].link;
     let (a, b) = (link(a), link(b));
-    loaded.scene.hand.allowed_pairs.insert((a.min(b), a.max(b)));
-    let fewer = collision_pairs(&loaded.scene);
+    loaded.scene.hands[0].hand.allowed_pairs.insert((a.min(b), a.max(b)));
+    let fewer = collision_pairs(&loaded.view());
     assert!(fewer.finger_finger.len() < pairs.finger_finger.len());
     assert_eq!(fewer.within_finger.len(), pairs.within_finger.len());
 }
@@ -47,9 +47,9 @@ fn every_pair_is_there_or_has_a_reason_not_to_be() {
 /// Names of the links of pairs that are less than `required` apart, with all fingers at rest and the object at its start.
 fn near_at_rest(loaded: &LoadedScene, required: f64) -> Vec<String> {
     let scene = &loaded.scene;
-    let hand = &scene.hand;
-    let pairs = collision_pairs(scene);
-    let world_from_object = Placement::from(&loaded.task.query(0).world_from_object_start);
+    let hand = &scene.hands[0].hand;
+    let pairs = collision_pairs(&loaded.view());
+    let world_from_object = Placement::from(loaded.task().query(0).start());
     let bodies: Vec<Vec<Pose>> = hand
         .fingers
         .iter()
@@ -69,7 +69,7 @@ fn near_at_rest(loaded: &LoadedScene, required: f64) -> Vec<String> {
         let name = hand.robot.links[palm.link.0].name.clone();
         (&palm.placed.shape, Placement::from(&palm.placed.parent_from_shape), name)
     };
-    let object = || (&scene.object.shape, world_from_object, "object".to_owned());
+    let object = || (&scene.objects[0].shape, world_from_object, "object".to_owned());
     let mut tests = Vec::new();
     tests.extend(
         pairs.finger_finger.iter().chain(&pairs.within_finger).map(|&(a, b)| (finger_shape(a), finger_shape(b))),

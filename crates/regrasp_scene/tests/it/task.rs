@@ -2,10 +2,10 @@
 
 use crate::support::{Folder, GOOD};
 use regrasp_geometry::{Point, Vector};
-use regrasp_scene::{GraspRequest, Gravity, InHandTask};
+use regrasp_scene::{GraspRequest, Gravity, SceneHand, Task};
 
-fn task(text: &str) -> InHandTask {
-    Folder::new().load(text).unwrap_or_else(|error| panic!("{error}")).task
+fn task(text: &str) -> Task {
+    Folder::new().load(text).unwrap_or_else(|error| panic!("{error}")).task().clone()
 }
 
 #[test]
@@ -14,7 +14,7 @@ fn start_positions_fill_the_ball_evenly() {
     let n_seeds = 4000;
     let (mut sum, mut n_inner) = (Vector::zeros(), 0);
     for seed in 0..n_seeds {
-        let offset = task.query(seed).world_from_object_start.translation.vector - Vector::new(0.0, 0.0, 0.078);
+        let offset = task.query(seed).start().translation.vector - Vector::new(0.0, 0.0, 0.078);
         assert!(offset.norm() <= 0.01);
         sum += offset;
         n_inner += usize::from(offset.norm() < 0.005);
@@ -30,11 +30,11 @@ fn start_positions_fill_the_ball_evenly() {
 fn random_orientations_have_no_preferred_direction() {
     let task = task(&GOOD.replace("0.078]", "0.078]\nrandom_orientation = true"));
     let n_seeds = 4000;
-    let sum: Vector = (0..n_seeds).map(|seed| task.query(seed).world_from_object_start.rotation * Vector::z()).sum();
+    let sum: Vector = (0..n_seeds).map(|seed| task.query(seed).start().rotation * Vector::z()).sum();
     // Each component has variance 1/3: the mean's standard deviation is 0.0091.
     assert!((sum / n_seeds as f64).norm() < 0.05);
     let query = task.query(5);
-    let turn = query.world_from_object_goal.rotation * query.world_from_object_start.rotation.inverse();
+    let turn = query.goal().rotation * query.start().rotation.inverse();
     assert!((turn * Vector::y() - Vector::z()).norm() < 1e-12, "90 degrees about the world's x");
 }
 
@@ -42,16 +42,16 @@ fn random_orientations_have_no_preferred_direction() {
 fn goals_are_absolute_or_relative() {
     let absolute = "position = [0.0, 0.01, 0.08]\nquat_wxyz = [0.0, 0.0, 0.0, 1.0]";
     let text = GOOD.replace("turn = { axis = \"x\", angle_deg = 90 }", absolute);
-    let goal = task(&text).query(0).world_from_object_goal;
+    let goal = *task(&text).query(0).goal();
     assert_eq!(goal.translation.vector, Vector::new(0.0, 0.01, 0.08));
     assert!((goal.rotation * Vector::x() + Vector::x()).norm() < 1e-12, "half a turn about z");
 
     let text = GOOD.replace("angle_deg = 90 }", "angle_deg = 90 }\nmove = [0.0, 0.0, 0.01]");
-    let goal = task(&text).query(0).world_from_object_goal;
+    let goal = *task(&text).query(0).goal();
     assert!((goal.translation.vector - Vector::new(0.0, 0.0, 0.088)).norm() < 1e-15);
 
     let text = GOOD.replace("axis = \"x\", angle_deg = 90", "axis = [0, 0, 2], angle_deg = -90");
-    let goal = task(&text).query(0).world_from_object_goal;
+    let goal = *task(&text).query(0).goal();
     assert!((goal.rotation * Vector::y() - Vector::x()).norm() < 1e-12);
 }
 
@@ -60,20 +60,20 @@ fn way_poses_are_absolute_or_seen_from_the_start_as_drawn() {
     let way = "[[way]]\nmove = [0.0, 0.01, 0.0]\n[[way]]\nposition = [0.0, 0.0, 0.07]\n\n[goal]";
     let text = GOOD.replace("[goal]", way).replace("0.078]", "0.078]\nposition_within = 0.01");
     let query = task(&text).query(5);
-    let [first, second] = query.world_from_object_way.as_slice() else { panic!("two poses") };
-    let start = query.world_from_object_start;
+    let [first, second] = query.way() else { panic!("two poses") };
+    let start = query.start();
     assert!((first.translation.vector - start.translation.vector - Vector::new(0.0, 0.01, 0.0)).norm() < 1e-15);
     assert_eq!(first.rotation, start.rotation);
     assert_eq!(second.translation.vector, Vector::new(0.0, 0.0, 0.07));
-    assert_eq!(query.poses().len(), 4);
-    assert_eq!(task(GOOD).query(5).world_from_object_way, []);
+    assert_eq!(query.as_in_hand().unwrap().poses().len(), 4);
+    assert_eq!(task(GOOD).query(5).way(), []);
 }
 
 #[test]
 fn turns_beyond_half_a_turn_are_broken_into_legs_below_it() {
     for (angle, n_legs) in [(180.0, 1), (-180.0, 1), (181.0, 2), (-270.0, 2), (360.0, 3), (539.0, 3), (720.0, 5)] {
         let text = GOOD.replace("angle_deg = 90 }", &format!("angle_deg = {angle} }}\nmove = [0.0, 0.0, 0.006]"));
-        let poses = task(&text).query(0).poses();
+        let poses = task(&text).query(0).as_in_hand().unwrap().poses();
         assert_eq!(poses.len() - 1, n_legs, "{angle}");
         // Added up leg by leg, the angle is the one asked for.
         let sum: f64 = poses.windows(2).map(|p| (p[1].rotation * p[0].rotation.inverse()).scaled_axis().x).sum();
@@ -91,8 +91,8 @@ fn grasps_are_read_by_name() {
         "{ contacts = { south = [0, -0.032, 0], east = [0.032, 0, 0], west = [-0.032, 0, 0], north = [0, 0.032, 0] } }";
     let query = task(&GOOD.replace("0.078]", &format!("0.078]\ngrasp = {contacts}"))).query(0);
     let expected = [[0.032, 0.0, 0.0], [0.0, 0.032, 0.0], [-0.032, 0.0, 0.0], [0.0, -0.032, 0.0]].map(Point::from);
-    assert_eq!(query.start_grasp, GraspRequest::Contacts(expected.to_vec()));
-    assert_eq!(query.goal_grasp, GraspRequest::Automatic);
+    assert_eq!(*query.start_grasp(), GraspRequest::Contacts(expected.to_vec()));
+    assert_eq!(*query.goal_grasp(), GraspRequest::Automatic);
 
     let mut joints = String::new();
     for (finger, abduction) in [("west", 0.3), ("east", 0.1), ("south", 0.4), ("north", 0.2)] {
@@ -101,23 +101,25 @@ fn grasps_are_read_by_name() {
         ));
     }
     let text = format!("{GOOD}grasp = {{ joints = {{ {} }} }}\n", joints.trim_end_matches(", "));
-    let GraspRequest::Joints(values) = task(&text).query(0).goal_grasp else { panic!("joints were given") };
+    let GraspRequest::Joints(values) = task(&text).goal_grasp else { panic!("joints were given") };
     assert_eq!(values, [0.1, 0.5, 0.6, 0.2, 0.5, 0.6, 0.3, 0.5, 0.6, 0.4, 0.5, 0.6]);
 }
 
 #[test]
 fn hand_pose_and_rest_posture_take_effect() {
     let folder = Folder::new();
-    let plain = folder.load(GOOD).unwrap().scene.hand;
+    let plain = folder.load(GOOD).unwrap().scene.hands.remove(0);
     let text = GOOD.replace(
         "file = \"hand.toml\"",
         "file = \"hand.toml\"\nworld_from_hand = { position = [0.1, 0.0, 0.0], quat_xyzw = [0, 0, 1, 0] }\nrest = { west_abduction = 0.25 }",
     );
-    let moved = folder.load(&text.replace("[0.0, 0.0, 0.078]", "[0.1, 0.0, 0.078]")).unwrap().scene.hand;
-    assert_eq!(moved.fingers[2].rest[0], 0.25);
-    assert_eq!(moved.fingers[2].rest[1], plain.fingers[2].rest[1]);
-    let tip =
-        |hand: &regrasp_robot::Hand| hand.fingers[0].chain.tip(&[0.1, 0.2, 0.3], &hand.fingers[0].tip.center_in_body);
+    let moved = folder.load(&text.replace("[0.0, 0.0, 0.078]", "[0.1, 0.0, 0.078]")).unwrap().scene.hands.remove(0);
+    assert_eq!(moved.hand.fingers[2].rest[0], 0.25);
+    assert_eq!(moved.hand.fingers[2].rest[1], plain.hand.fingers[2].rest[1]);
+    let tip = |placed: &SceneHand| {
+        let finger = &placed.hand.fingers[0];
+        placed.world_from_hand * finger.chain.tip(&[0.1, 0.2, 0.3], &finger.tip.center_in_body)
+    };
     let (before, after) = (tip(&plain), tip(&moved));
     assert!((after - Point::new(0.1 - before.x, -before.y, before.z)).norm() < 1e-12);
 }

@@ -10,7 +10,8 @@ export function linkPoses(scene: SceneStory, joints: readonly number[]): Pose[] 
     const parent = link.parent < 0 ? poseFrom(scene.world_from_root) : poses[link.parent];
     let pose = compose(parent, poseFrom(link.parent_from_joint));
     if (link.kind !== "fixed") {
-      const at = link.joint < 0 ? link.offset : link.multiplier * (joints[link.joint] ?? 0) + link.offset;
+      let at = link.joint < 0 ? link.offset : link.multiplier * (joints[link.joint] ?? 0) + link.offset;
+      for (const other of link.others ?? []) at += other.multiplier * (joints[other.joint] ?? 0);
       const moved = scale(link.axis, at);
       pose = compose(
         pose,

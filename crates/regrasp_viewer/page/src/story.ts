@@ -15,7 +15,7 @@ export interface Story {
   scene: SceneStory;
   /** Poses asked for: start, then way poses, then goal; in the world. At least two, or empty when unknown. */
   asked: PoseData[];
-  /** The plan file as it is (docs/plan-format.md), or null when none was found. */
+  /** The plan file as it is (docs/reference/plan-format.md), or null when none was found. */
   plan: Plan | null;
   /** What the checker measured; null when there is no plan. */
   judged: Judged | null;
@@ -50,10 +50,14 @@ export interface LinkStory {
   /** Frame of the joint in the parent link, at joint position 0. */
   parent_from_joint: PoseData;
   axis: [number, number, number];
-  /** Index in `joints` that drives it, -1 for fixed ones. Position = multiplier * joints[joint] + offset. */
+  /**
+   * Index in `joints` that drives it, -1 for fixed ones. Position = multiplier * joints[joint] + offset, plus the same
+   * product for each of `others`.
+   */
   joint: number;
   multiplier: number;
   offset: number;
+  others?: { joint: number; multiplier: number }[];
   /** Index in `fingers` of the finger it belongs to, -1 for the palm. */
   finger: number;
 }
@@ -116,7 +120,7 @@ export interface RoadmapStory {
   solution: number[];
 }
 
-// ---- the plan file (docs/plan-format.md); only what the page reads ----
+// ---- the plan file (docs/reference/plan-format.md); only what the page reads ----
 
 export interface Plan {
   format: "regrasp-plan";

@@ -5,16 +5,16 @@ use crate::timeline;
 use regrasp_plan::Plan;
 use regrasp_plan::check::{Along, Report, along};
 use regrasp_plan::plan::SegmentKind;
-use regrasp_scene::Scene;
+use regrasp_scene::Manipulation;
 
 /// Violations that are told one by one.
 const TOLD: usize = 20;
 
 /// The checker's report and its series. Nothing is measured along a plan that is not of this scene.
-pub(super) fn judged(scene: &Scene, plan: &Plan, report: &Report) -> Judged {
+pub(super) fn judged(task: &Manipulation, plan: &Plan, report: &Report) -> Judged {
     let n_waypoints = plan.segments.iter().map(|segment| segment.waypoints.len()).sum();
     let nothing = |_| Along { margin: Vec::new(), clearance: vec![None; n_waypoints], pairs: Vec::new() };
-    let found = along(scene, plan).unwrap_or_else(nothing);
+    let found = along(task, plan).unwrap_or_else(nothing);
     let mut violations: Vec<String> = report.violations.iter().take(TOLD).map(ToString::to_string).collect();
     if report.n_violations > violations.len() {
         violations.push(format!("and {} more", report.n_violations - violations.len()));

@@ -127,14 +127,27 @@ pub struct LinkStory {
     pub parent_from_joint: PoseData,
     /// Axis in that frame.
     pub axis: [f64; 3],
-    /// Index in `joints` of what drives it, -1 for fixed ones. Position = `multiplier * joints[joint] + offset`.
+    /// Index in `joints` of what drives it, -1 for fixed ones. Position = `multiplier * joints[joint] + offset`, plus the same
+    /// product for each of `others`.
     pub joint: i32,
     /// See `joint`.
     pub multiplier: f64,
     /// See `joint`.
     pub offset: f64,
+    /// More joints that drive it; none for nearly all.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub others: Vec<LeaderStory>,
     /// Index in `fingers` of the finger that it belongs to, -1 for the palm.
     pub finger: i32,
+}
+
+/// A joint that drives another together with more.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct LeaderStory {
+    /// Index in `joints`.
+    pub joint: usize,
+    /// Its multiplier.
+    pub multiplier: f64,
 }
 
 /// A mesh with quantised vertices; [`pack`] writes and reads it.

@@ -4,31 +4,26 @@ use super::pack::pack;
 use super::simplify::simplify;
 use super::tessellate::{Triangles, tessellate};
 use super::{
-    Carrier, FingerStory, JointStory, LinkKind, LinkStory, OtherCarrier, PieceStory, PoseData, Role, SceneStory,
+    Carrier, FingerStory, JointStory, LeaderStory, LinkKind, LinkStory, OtherCarrier, PieceStory, PoseData, Role,
+    SceneStory,
 };
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Pose, Shape, UnitVector, Vector};
-use regrasp_plan::check::kinematics::world_from_root;
 use regrasp_robot::hand::convex_of;
 use regrasp_robot::tip::is_same_surface;
-use regrasp_robot::{Hand, Joint, JointKind, LinkId, ResolveOptions, Robot, VisualGeometry};
-use regrasp_scene::Scene;
+use regrasp_robot::{Coupling, Hand, Joint, JointId, JointKind, LinkId, ResolveOptions, Robot, VisualGeometry};
+use regrasp_scene::Manipulation;
 use std::sync::Arc;
 
 /// Most triangles in a page, each mesh counted once: less than 3 MB of text.
 const MOST_TRIANGLES: usize = 120_000;
 
 /// The scene, with remarks on what could not be shown as it is. Visual meshes are looked for in `packages`.
-///
-/// Err with a message when couplings of the robot lead nowhere.
-pub(super) fn scene_story(
-    scene: &Scene,
-    packages: &ResolveOptions,
-) -> Result<(SceneStory, Vec<(String, String)>), String> {
-    let hand = &scene.hand;
+pub(super) fn scene_story(task: &Manipulation, packages: &ResolveOptions) -> (SceneStory, Vec<(String, String)>) {
+    let hand = task.hand();
     let tree = Tree::new(hand);
     let mut shapes = Shapes::default();
-    let mut pieces = collision_pieces(scene, &tree, &mut shapes);
+    let mut pieces = collision_pieces(task, &tree, &mut shapes);
     let (visual, mut notes) = visual_pieces(hand, &tree, &pieces, packages, &mut shapes);
     pieces.extend(visual);
     let names = hand.joint_names();
@@ -44,17 +39,20 @@ pub(super) fn scene_story(
     };
     let joints = names.iter().zip(limits).map(joint).collect();
     let meshes = shapes.packed(&mut notes);
-    let story = SceneStory {
+    let mut story = SceneStory {
         links: tree.links.clone(),
-        world_from_root: PoseData::from(&world_from_root(hand)?),
+        world_from_root: PoseData::from(&Pose::identity()),
         joints,
         fingers: fingers(hand, &tree),
-        friction: scene.object.friction,
-        gravity_in_world: scene.gravity.unwrap_or_default().in_world().map(Into::into),
+        friction: task.object().friction,
+        gravity_in_world: task.scene.gravity().in_world().map(Into::into),
         meshes,
         pieces,
     };
-    Ok((story, notes))
+    // No coordinate of the hand moves its base.
+    let root_from_base = story.world_from_links(&vec![0.0; names.len()])[tree.place_of[hand.base.0]];
+    story.world_from_root = PoseData::from(&(task.world_from_hand() * root_from_base.inverse()));
+    (story, notes)
 }
 
 fn fingers(hand: &Hand, tree: &Tree) -> Vec<FingerStory> {
@@ -97,6 +95,7 @@ impl Tree {
             joint: -1,
             multiplier: 0.0,
             offset: 0.0,
+            others: Vec::new(),
             finger: -1,
         };
         let mut tree = Tree { links: vec![root], ids: vec![robot.root], place_of: vec![0; robot.links.len()] };
@@ -104,15 +103,21 @@ impl Tree {
         while next < tree.ids.len() {
             for id in robot.joints_from(tree.ids[next]) {
                 let joint = &robot.joints[id.0];
-                let (driver, multiplier, offset) =
-                    joint.mimic.map_or((id, 1.0, 0.0), |mimic| (mimic.joint, mimic.multiplier, mimic.offset));
-                let driver = &robot.joints[driver.0];
-                let coordinate = match joint.kind {
-                    JointKind::Fixed => None,
-                    _ => names.iter().position(|name| *name == driver.name),
+                let drive = joint.coupling.clone().unwrap_or_else(|| Coupling::independent(id));
+                let held = |leader: JointId| {
+                    let limits = robot.joints[leader.0].limits;
+                    limits.map_or(0.0, |limits| 0f64.max(limits.lower).min(limits.upper))
                 };
-                let held = driver.limits.map_or(0.0, |limits| 0f64.max(limits.lower).min(limits.upper));
-                let mut link = carried_link(joint, coordinate, (multiplier, offset), multiplier * held + offset);
+                let (mut driven, mut offset) = (Vec::new(), drive.offset);
+                for &(leader, multiplier) in drive.terms.iter().filter(|_| joint.kind != JointKind::Fixed) {
+                    match names.iter().position(|name| *name == robot.joints[leader.0].name) {
+                        Some(joint) => driven.push(LeaderStory { joint, multiplier }),
+                        None if drive.terms.len() > 1 => offset += multiplier * held(leader),
+                        None => {}
+                    }
+                }
+                let coordinate = driven.first().map(|first| first.joint);
+                let mut link = carried_link(joint, &driven, offset, drive.position(held));
                 link.name.clone_from(&robot.links[joint.child.0].name);
                 link.parent = next as i32;
                 link.finger = match tree.links[next].finger {
@@ -130,24 +135,25 @@ impl Tree {
 }
 
 /// The link that `joint` carries, without name, parent and finger; fixed at `held` where no coordinate drives the joint.
-fn carried_link(joint: &Joint, coordinate: Option<usize>, (multiplier, offset): (f64, f64), held: f64) -> LinkStory {
+fn carried_link(joint: &Joint, driven: &[LeaderStory], offset: f64, held: f64) -> LinkStory {
     let slides = joint.kind == JointKind::Prismatic;
-    let (kind, at_zero) = match (coordinate, joint.kind) {
+    let first = driven.first();
+    let (kind, at_zero) = match (first, joint.kind) {
         (Some(_), _) if slides => (LinkKind::Prismatic, joint.parent_from_joint),
         (Some(_), _) => (LinkKind::Revolute, joint.parent_from_joint),
         (None, JointKind::Fixed) => (LinkKind::Fixed, joint.parent_from_joint),
         (None, _) => (LinkKind::Fixed, joint.parent_from_joint * motion(&joint.axis, slides, held)),
     };
-    let driven = |value: f64| if coordinate.is_some() { value } else { 0.0 };
     LinkStory {
         name: String::new(),
         parent: -1,
         kind,
         parent_from_joint: PoseData::from(&at_zero),
         axis: joint.axis.into_inner().into(),
-        joint: coordinate.map_or(-1, |k| k as i32),
-        multiplier: driven(multiplier),
-        offset: driven(offset),
+        joint: first.map_or(-1, |first| first.joint as i32),
+        multiplier: first.map_or(0.0, |first| first.multiplier),
+        offset: first.map_or(0.0, |_| offset),
+        others: driven.iter().skip(1).copied().collect(),
         finger: -1,
     }
 }
@@ -164,7 +170,9 @@ impl SceneStory {
         let mut poses: Vec<Pose> = Vec::with_capacity(self.links.len());
         for link in &self.links {
             let parent = usize::try_from(link.parent).map_or(Pose::from(&self.world_from_root), |k| poses[k]);
-            let position = usize::try_from(link.joint).map_or(0.0, |k| link.multiplier * joints[k] + link.offset);
+            let others: f64 = link.others.iter().map(|other| other.multiplier * joints[other.joint]).sum();
+            let position =
+                usize::try_from(link.joint).map_or(0.0, |k| link.multiplier * joints[k] + others + link.offset);
             let axis = UnitVector::new_unchecked(Vector::from(link.axis));
             let moved = motion(&axis, link.kind == LinkKind::Prismatic, position);
             poses.push(parent * Pose::from(&link.parent_from_joint) * moved);
@@ -174,8 +182,8 @@ impl SceneStory {
 }
 
 /// What planner and checker keep apart: meshes of links as their hulls, and the balls of fingertips.
-fn collision_pieces(scene: &Scene, tree: &Tree, shapes: &mut Shapes) -> Vec<PieceStory> {
-    let hand = &scene.hand;
+fn collision_pieces(task: &Manipulation, tree: &Tree, shapes: &mut Shapes) -> Vec<PieceStory> {
+    let hand = task.hand();
     let mut pieces = Vec::new();
     for (place, id) in tree.ids.iter().enumerate() {
         let link = &hand.robot.links[id.0];
@@ -207,8 +215,8 @@ fn collision_pieces(scene: &Scene, tree: &Tree, shapes: &mut Shapes) -> Vec<Piec
         let (name, from_mesh) = (name.to_owned(), PoseData::from(from_mesh));
         pieces.push(PieceStory { on, name, role: Role::Collision, mesh, from_mesh, is_tip: false });
     };
-    add(OtherCarrier::Object, &scene.object.name, &Pose::identity(), &scene.object.shape);
-    for obstacle in &scene.obstacles {
+    add(OtherCarrier::Object, &task.object().name, &Pose::identity(), &task.object().shape);
+    for obstacle in task.scene.obstacles.iter().chain(&task.bystanders()) {
         add(OtherCarrier::World, &obstacle.name, &obstacle.placed.parent_from_shape, &obstacle.placed.shape);
     }
     pieces

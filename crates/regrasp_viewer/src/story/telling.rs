@@ -7,7 +7,7 @@ use super::{FORMAT, FailureStory, PoseData, RoadmapStory, Story, VERSION};
 use regrasp_plan::Plan;
 use regrasp_plan::check::Report;
 use regrasp_robot::ResolveOptions;
-use regrasp_scene::{InHandQuery, Scene};
+use regrasp_scene::{Manipulation, Query};
 
 /// What came of a query.
 #[derive(Debug, Clone)]
@@ -26,10 +26,10 @@ pub enum Outcome<'a> {
 /// What a story is made from.
 #[derive(Debug, Clone)]
 pub struct Telling<'a> {
-    /// The scene.
-    pub scene: &'a Scene,
+    /// The hand and the object in their scene.
+    pub task: Manipulation<'a>,
     /// What was asked; else what the plan says was.
-    pub query: Option<&'a InHandQuery>,
+    pub query: Option<&'a Query>,
     /// What came of it.
     pub outcome: Outcome<'a>,
     /// Title; the scene's name where there is none.
@@ -44,14 +44,16 @@ pub struct Telling<'a> {
 
 /// The story. Err with a message when the robot contradicts itself.
 pub fn tell(telling: &Telling) -> Result<Story, String> {
-    let (mut scene, notes) = scene_story(telling.scene, telling.packages)?;
+    let (mut scene, notes) = scene_story(&telling.task, telling.packages);
     let mut facts = telling.facts.clone();
-    let mut asked: Vec<PoseData> =
-        telling.query.map_or_else(Vec::new, |query| query.poses().iter().map(PoseData::from).collect());
+    let mut asked: Vec<PoseData> = telling.query.map_or_else(Vec::new, |query| {
+        let poses = std::iter::once(query.start()).chain(query.way()).chain([query.goal()]);
+        poses.map(PoseData::from).collect()
+    });
     let (plan, measured, failure) = match &telling.outcome {
         Outcome::Failed(failure) => (None, None, Some(failure.clone())),
         Outcome::Planned { plan, report } => {
-            let measured = judged(telling.scene, plan, report);
+            let measured = judged(&telling.task, plan, report);
             facts.extend(plan_facts(plan, report, &measured));
             if asked.is_empty() {
                 let way = plan.way_poses.iter().map(|way| way.world_from_object);
@@ -64,12 +66,12 @@ pub fn tell(telling: &Telling) -> Result<Story, String> {
         }
     };
     facts.extend(notes);
-    let inputs = telling.scene.inputs.iter();
+    let inputs = telling.task.scene.inputs.iter();
     facts.extend(inputs.map(|input| (format!("{} {}", input.role, input.name), format!("sha256 {}", input.sha256))));
     Ok(Story {
         format: FORMAT.into(),
         version: VERSION,
-        title: telling.title.unwrap_or(&telling.scene.name).to_owned(),
+        title: telling.title.unwrap_or(&telling.task.scene.name).to_owned(),
         facts,
         scene,
         asked,

@@ -1,6 +1,6 @@
 //! Which moments are shown.
 
-use super::stage::tip_centers;
+use super::tips::tip_centers;
 use crate::story::SceneStory;
 use crate::timeline::{self, Step};
 use regrasp_geometry::Point;

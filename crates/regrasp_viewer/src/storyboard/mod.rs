@@ -6,6 +6,7 @@ pub mod key_frames;
 pub mod marks;
 /// What stands before the camera.
 mod stage;
+mod tips;
 /// From where everything is seen best.
 mod view;
 

@@ -7,7 +7,7 @@ use crate::render::model::{linear, mixed};
 use crate::render::shade::Layer;
 use crate::render::{Model, Paint, Surface};
 use crate::story::tessellate::Triangles;
-use crate::story::{Carrier, FingerStory, MeshStory, OtherCarrier, PieceStory, Role, SceneStory, pack};
+use crate::story::{Carrier, MeshStory, OtherCarrier, PieceStory, Role, SceneStory, pack};
 use crate::timeline;
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 use regrasp_plan::Plan;
@@ -31,13 +31,6 @@ const NEAR: f64 = 5.0;
 /// Unit vector along an axis.
 pub fn unit(axis: usize) -> Vector {
     Vector::ith(axis, 1.0)
-}
-
-/// Centres of the fingertips in the world, in the order of the fingers.
-pub fn tip_centers(scene: &SceneStory, joints: &[f64]) -> Vec<Point> {
-    let world_from_link = scene.world_from_links(joints);
-    let tip = |finger: &FingerStory| world_from_link[finger.tip_link] * Point::from(finger.tip_center_in_link);
-    scene.fingers.iter().map(tip).collect()
 }
 
 /// A piece with its surface made.

@@ -16,7 +16,7 @@ fn has_rolling(plan: &Plan) -> bool {
 #[test]
 fn the_series_has_the_smallest_values_of_the_report() {
     for sample in samples() {
-        let found = along(&sample.loaded.scene, &sample.plan).unwrap();
+        let found = along(&sample.loaded.manipulation(), &sample.plan).unwrap();
         let n_waypoints: usize = sample.plan.segments.iter().map(|segment| segment.waypoints.len()).sum();
         assert_eq!((found.margin.len(), found.clearance.len()), (n_waypoints, n_waypoints));
         let least = found.margin.iter().copied().fold(f64::INFINITY, f64::min);
@@ -40,8 +40,9 @@ fn a_plan_of_another_scene_has_no_series_but_a_page() {
     let sample = Sample::sphere();
     let mut other = sample.plan.clone();
     other.joint_names.pop();
-    assert!(along(&sample.loaded.scene, &other).is_err());
-    let report = check(&sample.loaded.scene, Some(&sample.query), &other, &CheckSettings::default());
+    assert!(along(&sample.loaded.manipulation(), &other).is_err());
+    let report =
+        check((&sample.loaded.scene, &sample.loaded.state), Some(&sample.query), &other, &CheckSettings::default());
     assert!(!report.accepted());
     let judged = sample.story_of(&other, &report).judged.unwrap();
     assert!(!judged.accepted && !judged.violations.is_empty());
@@ -57,7 +58,8 @@ fn a_rejected_plan_says_so() {
             waypoint.joints[1] += 0.2;
         }
     }
-    let report = check(&sample.loaded.scene, Some(&sample.query), &broken, &CheckSettings::default());
+    let report =
+        check((&sample.loaded.scene, &sample.loaded.state), Some(&sample.query), &broken, &CheckSettings::default());
     let story = sample.story_of(&broken, &report);
     assert!(story.facts.iter().any(|(label, value)| label == "Checker" && value.starts_with("REJECTED")));
     assert!(!story.judged.unwrap().violations.is_empty());

@@ -6,14 +6,14 @@ use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, Report, check};
 use regrasp_planners::{PlannerSettings, plan};
 use regrasp_robot::import::LoadOptions;
-use regrasp_scene::{InHandQuery, LoadedScene, load_scene};
+use regrasp_scene::{LoadedScene, Query, load_scene};
 use regrasp_viewer::story::{Outcome, Story, Telling, tell};
 
 /// A scene with a plan that the checker accepts.
 pub struct Sample {
     pub options: LoadOptions,
     pub loaded: LoadedScene,
-    pub query: InHandQuery,
+    pub query: Query,
     pub plan: Plan,
     pub report: Report,
 }
@@ -28,11 +28,11 @@ pub fn options_with_models() -> Option<LoadOptions> {
 impl Sample {
     pub fn new(scene: &str, options: LoadOptions) -> Self {
         let loaded = load_scene(&repository().join(scene), &options).unwrap_or_else(|error| panic!("{error}"));
-        let query = loaded.task.query(0);
+        let query = loaded.task().query(0);
         let budget = Budget::work(5_000_000);
-        let plan = plan(&loaded.scene, &query, &PlannerSettings::default(), 0, &budget, &|_| {})
+        let plan = plan((&loaded.scene, &loaded.state), &query, &PlannerSettings::default(), 0, &budget, &|_| {})
             .unwrap_or_else(|failure| panic!("{failure}"));
-        let report = check(&loaded.scene, Some(&query), &plan, &CheckSettings::default());
+        let report = check((&loaded.scene, &loaded.state), Some(&query), &plan, &CheckSettings::default());
         assert!(report.accepted(), "{:?}", report.violations);
         Sample { options, loaded, query, plan, report }
     }
@@ -53,7 +53,7 @@ impl Sample {
 
     pub fn story_of(&self, plan: &Plan, report: &Report) -> Story {
         let telling = Telling {
-            scene: &self.loaded.scene,
+            task: self.loaded.manipulation(),
             query: Some(&self.query),
             outcome: Outcome::Planned { plan, report },
             title: None,

@@ -4,10 +4,10 @@ use regrasp_base::Rng;
 use regrasp_geometry::Pose;
 use regrasp_robot::Hand;
 use regrasp_robot::import::LoadOptions;
-use regrasp_scene::{Scene, load_scene};
+use regrasp_scene::{LoadedScene, load_scene};
 use regrasp_viewer::story::{Carrier, FailureStory, LinkKind, Outcome, Role, SceneStory, Story, Telling, pack, tell};
 
-fn story_of(scene: &Scene, options: &LoadOptions) -> Story {
+fn story_of(loaded: &LoadedScene, options: &LoadOptions) -> Story {
     let failure = FailureStory {
         kind: "time_limit".into(),
         message: String::new(),
@@ -16,7 +16,7 @@ fn story_of(scene: &Scene, options: &LoadOptions) -> Story {
         nearest_miss: None,
     };
     let telling = Telling {
-        scene,
+        task: loaded.manipulation(),
         query: None,
         outcome: Outcome::Failed(failure),
         title: None,
@@ -76,15 +76,16 @@ fn links_are_where_the_hand_has_them() {
         );
     }
     for (path, options) in scenes {
-        let scene = load_scene(&repository().join(path), &options).unwrap().scene;
-        let story = story_of(&scene, &options);
+        let loaded = load_scene(&repository().join(path), &options).unwrap();
+        let scene = &loaded.scene;
+        let story = story_of(&loaded, &options);
         let names: Vec<&str> = story.scene.joints.iter().map(|joint| joint.name.as_str()).collect();
-        assert_eq!(names, scene.hand.joint_names());
+        assert_eq!(names, scene.hands[0].hand.joint_names());
         for (place, link) in story.scene.links.iter().enumerate() {
             assert!(link.parent < place as i32 && (link.parent >= 0) == (place > 0), "{path}: {}", link.name);
             assert_eq!(link.joint >= 0, link.kind != LinkKind::Fixed);
         }
-        assert_same_kinematics(&scene.hand, &story.scene);
+        assert_same_kinematics(&scene.hands[0].hand, &story.scene);
         let has_mimic =
             story.scene.links.iter().any(|link| link.joint >= 0 && link.multiplier != 1.0 || link.offset != 0.0);
         let shares = |link: usize| story.scene.links.iter().filter(|l| l.joint == link as i32).count() > 1;
@@ -96,15 +97,16 @@ fn links_are_where_the_hand_has_them() {
 #[test]
 fn every_shape_is_drawn_once_and_every_piece_has_its_mesh() {
     let options = LoadOptions::default();
-    let scene = load_scene(&repository().join("scenes/ellipsoid_obstacle.toml"), &options).unwrap().scene;
-    let story = story_of(&scene, &options).scene;
+    let loaded = load_scene(&repository().join("scenes/ellipsoid_obstacle.toml"), &options).unwrap();
+    let scene = &loaded.scene;
+    let story = story_of(&loaded, &options).scene;
     for (i, mesh) in story.meshes.iter().enumerate() {
         assert!(story.meshes[..i].iter().all(|other| other != mesh), "mesh {i} is there twice");
         assert!(story.pieces.iter().any(|piece| piece.mesh == i), "mesh {i} is of no use");
         assert!(pack::unpack(mesh).is_some());
     }
     assert!(story.pieces.iter().all(|piece| piece.mesh < story.meshes.len() && piece.role == Role::Collision));
-    let n_link_shapes: usize = scene.hand.robot.links.iter().map(|link| link.collision.len()).sum();
+    let n_link_shapes: usize = scene.hands[0].hand.robot.links.iter().map(|link| link.collision.len()).sum();
     let on_links = story.pieces.iter().filter(|piece| matches!(piece.on, Carrier::Link(_)));
     assert!(on_links.clone().count() >= n_link_shapes);
     assert_eq!(
@@ -120,8 +122,9 @@ fn every_shape_is_drawn_once_and_every_piece_has_its_mesh() {
 #[test]
 fn looks_come_from_the_robot_file_and_do_not_matter_to_planning() {
     let Some(options) = options_with_models() else { return };
-    let scene = load_scene(&repository().join("scenes/allegro/cube57_z.toml"), &options).unwrap().scene;
-    let story = story_of(&scene, &options);
+    let loaded = load_scene(&repository().join("scenes/allegro/cube57_z.toml"), &options).unwrap();
+    let scene = &loaded.scene;
+    let story = story_of(&loaded, &options);
     let of_role = |story: &Story, role: Role| story.scene.pieces.iter().filter(|piece| piece.role == role).count();
     assert!(of_role(&story, Role::Visual) > 20);
     assert!(!story.facts.iter().any(|(label, _)| label.starts_with("Looks of")));
@@ -152,7 +155,7 @@ fn what_cannot_be_read_looks_as_it_collides_and_the_facts_name_it() {
 
     let options = LoadOptions::default();
     let loaded = load_scene(&path, &options).unwrap();
-    let story = story_of(&loaded.scene, &options);
+    let story = story_of(&loaded, &options);
     let looks_of = |name: &str| story.facts.iter().find(|(label, _)| *label == format!("Looks of {name}"));
     assert!(looks_of("palm").unwrap().1.contains("palm.dae"), "{:?}", looks_of("palm"));
     assert!(looks_of("east_proximal").is_some() && looks_of("north_proximal").is_none());
@@ -179,8 +182,8 @@ fn a_story_is_the_same_after_json_and_every_time() {
 #[test]
 fn fingertips_are_drawn_as_they_touch_whatever_else_their_link_is() {
     let path = repository().join("scenes/oval_sphere_90x.toml");
-    let scene = load_scene(&path, &LoadOptions::default()).unwrap().scene;
-    let story = story_of(&scene, &LoadOptions::default());
+    let loaded = load_scene(&path, &LoadOptions::default()).unwrap();
+    let story = story_of(&loaded, &LoadOptions::default());
     for finger in &story.scene.fingers {
         let on_tip = |carrier: &Carrier| *carrier == Carrier::Link(finger.tip_link);
         let tips = story.scene.pieces.iter().filter(|piece| on_tip(&piece.on) && piece.is_tip);

@@ -224,3 +224,18 @@ fn forces_found_for_contacts_nearby_prove_a_little_less() {
     }
     assert!(n_useful > 40, "{n_useful}");
 }
+
+#[test]
+fn many_contacts_are_judged_without_trying_all_subsets() {
+    let mut rng = Rng::keyed(7, "many contacts", 0);
+    let body = body(0.6);
+    for n_contacts in [7, 8, 9] {
+        let grips = random_contacts(n_contacts, &mut rng);
+        let mut all = SubsetSearch { grips: &grips, body: &body, best: None };
+        (0..1u64 << n_contacts).for_each(|subset| _ = all.look(subset));
+        let (of_all, found) = (all.best.map_or(0.0, |(margin, _)| margin), margin(&grips, &body));
+        assert!(found <= of_all && found >= 0.9 * of_all, "{n_contacts}: {found} of {of_all}");
+    }
+    // Far more than any hand has.
+    assert!(margin(&random_contacts(20, &mut rng), &body) > 0.0);
+}

@@ -1,20 +1,21 @@
 //! Linking an object pose to the graph: grasps of nodes at places nearby, taken there by one transfer; where none follows,
 //! by a detour of transfers and relocations.
 
-use super::super::gait;
-use super::super::model::MAX_FINGERS;
-use super::super::search::{Search, Stop};
-use super::super::shorten::{Arrival, change_grasp, shorten, whole_transfer};
-use super::super::state::{GraspState, Motion, Sequence};
-use super::super::transfer::ik_settings;
-use super::super::workspace::TipMode;
-use super::GraspRoadmap;
-use super::graph::contact_ids;
-use super::landmarks::Bounds;
-use super::route::same_posture;
+use crate::in_hand::attempt::search::{Search, Stop};
+use crate::in_hand::regrasping::change::{Arrival, change_grasp, whole_transfer};
+use crate::in_hand::roadmap::GraspRoadmap;
+use crate::in_hand::roadmap::graph::contact_ids;
+use crate::in_hand::roadmap::landmarks::Bounds;
+use crate::in_hand::roadmap::route::same_posture;
+use crate::in_hand::searching::gait;
+use crate::in_hand::searching::shorten::shorten;
 use regrasp_base::Rng;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Pose, UnitVector, interpolate_pose};
+use regrasp_manipulation::grasp::sequence::{Motion, Sequence};
+use regrasp_manipulation::grasp::state::{GraspState, MAX_FINGERS};
+use regrasp_manipulation::rolling::follow::ik_settings;
+use regrasp_manipulation::workspace::TipMode;
 use regrasp_robot::kinematics::finger_ik::IkSettings;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;

@@ -4,30 +4,31 @@
 //! Each stage works on all places at once, from the graph as the stage before left it, with random numbers keyed by stage
 //! and place; what was found is added in the order of places. So the graph is the same on any number of threads.
 
-use super::super::combine::releasable;
-use super::super::endpoints::refuse_impossible;
-use super::super::model::Model;
-use super::super::relocate::{Foothold, relocate};
-use super::super::search::{Search, Stop};
-use super::super::settings::{InHandSettings, Method, TransferMode};
-use super::super::shorten::{Arrival, transfer_regrasp};
-use super::super::state::{GraspState, Motion, Sequence, Step};
-use super::super::validate::follow_relocation;
-use super::graph::{FootholdIds, Graph, Leg, Lists, contact_ids};
-use super::grasps::{Reached, spread_contacts};
-use super::identity::Identity;
-use super::index::{Costs, component_sizes, components};
-use super::region::{Region, nearest_places, spread_places};
-use super::registry::Registry;
-use super::route::evenly;
-use super::{About, GraspRoadmap};
-use crate::failure::{Failure, FailureKind};
+use crate::in_hand::attempt::search::{Context, Search, Stop};
+use crate::in_hand::recording::validate::follow_relocation;
+use crate::in_hand::refusals::refuse_impossible;
+use crate::in_hand::regrasping::change::{Arrival, transfer_regrasp};
+use crate::in_hand::roadmap::graph::{FootholdIds, Graph, Leg, Lists, contact_ids};
+use crate::in_hand::roadmap::grasps::{Reached, spread_contacts};
+use crate::in_hand::roadmap::identity::Identity;
+use crate::in_hand::roadmap::index::{Costs, component_sizes, components};
+use crate::in_hand::roadmap::region::{Region, nearest_places, spread_places};
+use crate::in_hand::roadmap::registry::Registry;
+use crate::in_hand::roadmap::route::evenly;
+use crate::in_hand::roadmap::{About, GraspRoadmap};
+use crate::settings::{InHandSettings, Method};
 use rayon::prelude::*;
 use regrasp_base::{Budget, Interrupt, Rng};
 use regrasp_geometry::Pose;
 use regrasp_grasp::Contact;
+use regrasp_manipulation::failure::{Failure, FailureKind};
+use regrasp_manipulation::grasp::sequence::{Motion, Sequence, Step};
+use regrasp_manipulation::grasp::state::GraspState;
+use regrasp_manipulation::model::{Model, releasable};
+use regrasp_manipulation::relocation::{Foothold, relocate};
+use regrasp_manipulation::settings::{PhysicsSettings, TransferMode};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
-use regrasp_scene::Scene;
+use regrasp_scene::HandView;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicUsize;
@@ -86,7 +87,7 @@ pub struct BuildStage {
     pub work: u64,
 }
 
-/// Builds a roadmap of `scene` over `region`, with `settings.n_threads` threads.
+/// Builds a roadmap of `view` over `region`, which is in the hand's frame, with `settings.n_threads` threads.
 ///
 /// Contacts stay where they are while the object moves, whatever the settings say: where a fingertip rolls to depends on the
 /// way that it came, and a graph has many ways to each of its grasps.
@@ -94,7 +95,7 @@ pub struct BuildStage {
 /// Failures: a hand that can never do it, a spent budget, an interruption, or no grasp anywhere. Panics if settings or
 /// region are not valid.
 pub fn build_roadmap(
-    scene: &Scene,
+    view: &HandView,
     region: &Region,
     build: &BuildSettings,
     settings: &InHandSettings,
@@ -102,14 +103,18 @@ pub fn build_roadmap(
     budget: &Budget,
     progress: &(dyn Fn(BuildStage) + Sync),
 ) -> Result<GraspRoadmap, Failure> {
-    settings.validate().and_then(|()| build.validate()).and_then(|()| region.validate()).expect("validated by callers");
-    let settings = InHandSettings { method: Method::Gait, transfer: TransferMode::Fixed, ..settings.clone() };
-    let model = Model::new(scene, &settings);
+    let valid = settings.validate().and_then(|()| build.validate()).and_then(|()| region.validate());
+    valid.map_err(|problem| Failure::of_settings(&problem))?;
+    Failure::refuse_many_fingers(view)?;
+    let physics = PhysicsSettings { transfer: TransferMode::Fixed, ..settings.physics.clone() };
+    let settings = InHandSettings { method: Method::Gait, physics, ..settings.clone() };
+    let within = settings.within(&view.limits);
+    let model = Model::new(view, &within.physics);
     refuse_impossible(&model)?;
-    let mut builder = Builder::new(&model, region, build, seed, budget, progress)?;
+    let mut builder = Builder::new(&model, &within, region, build, seed, budget, progress)?;
     builder.run()?;
     let about = About {
-        identity: Identity::of(scene),
+        identity: Identity::of(view),
         region: *region,
         settings,
         build: build.clone(),
@@ -149,6 +154,7 @@ struct Found {
 
 struct Builder<'b> {
     model: &'b Model<'b>,
+    settings: &'b InHandSettings,
     build: &'b BuildSettings,
     seed: u64,
     budget: &'b Budget,
@@ -172,20 +178,16 @@ const CROWD: usize = 4;
 impl<'b> Builder<'b> {
     fn new(
         model: &'b Model<'b>,
+        settings: &'b InHandSettings,
         region: &Region,
         build: &'b BuildSettings,
         seed: u64,
         budget: &'b Budget,
         progress: &'b (dyn Fn(BuildStage) + Sync),
     ) -> Result<Self, Failure> {
-        let threads =
-            rayon::ThreadPoolBuilder::new().num_threads(model.settings.n_threads).build().map_err(|error| {
-                Failure::bare(
-                    FailureKind::Impossible,
-                    format!("no threads to work with: {error}"),
-                    "ask for fewer threads",
-                )
-            })?;
+        let threads = rayon::ThreadPoolBuilder::new().num_threads(settings.n_threads).build().map_err(|error| {
+            Failure::bare(FailureKind::Impossible, format!("no threads to work with: {error}"), "ask for fewer threads")
+        })?;
         let mut registry = Registry::new(Graph::new(model.fingers.iter().map(|f| f.ik.chain().n_coordinates())));
         let places = spread_places(model, region, build.places, seed);
         let near = |place: usize| -> Vec<u32> {
@@ -197,7 +199,7 @@ impl<'b> Builder<'b> {
         for place in places {
             registry.add_place(place);
         }
-        Ok(Builder { model, build, seed, budget, progress, threads, registry, near, work: 0 })
+        Ok(Builder { model, settings, build, seed, budget, progress, threads, registry, near, work: 0 })
     }
 
     fn run(&mut self) -> Result<(), Failure> {
@@ -220,8 +222,9 @@ impl<'b> Builder<'b> {
         let winner = AtomicUsize::new(usize::MAX);
         let on_place = |&place: &usize| {
             let pose = graph.places[place];
-            let limits = (self.budget, u64::MAX);
-            let mut search = Search::new(self.model, (pose, pose), (self.seed, 0), limits, &winner, &|_| {});
+            let (model, settings, seed, budget) = (self.model, self.settings, self.seed, self.budget);
+            let context = Context { model, settings, seed, budget, winner: &winner, progress: &|_| {} };
+            let mut search = Search::new(context, [pose, pose], 0, u64::MAX);
             search.rng = Rng::keyed(self.seed, name, place as u64);
             let at = AtPlace { graph, place, pose, nodes_at: &nodes_at };
             let outcome = work_on(&mut search, &at);

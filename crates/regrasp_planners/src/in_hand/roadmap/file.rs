@@ -1,19 +1,19 @@
-//! The roadmap file. `docs/roadmap-format.md` says the same in words.
+//! The roadmap file. `docs/reference/roadmap-format.md` says the same in words.
 //!
 //! Codes: R601 not a roadmap file, R602 another version, R603 not as long as it says, R604 damaged, R605 what it says
 //! about itself cannot be understood, R606 contradicts itself.
 
-use super::super::model::MAX_FINGERS;
-use super::bytes::{Reader, Writer, checksum};
-use super::graph::{Edge, Footholds, Graph, Node, Passage};
-use super::identity::{Digest, Identity};
-use super::index::{Costs, Index};
-use super::landmarks::{Landmarks, ROW_BYTES, Row};
-use super::{About, BuildSettings, GraspRoadmap, Region};
-use crate::in_hand::InHandSettings;
+use crate::in_hand::roadmap::bytes::{Reader, Writer, checksum};
+use crate::in_hand::roadmap::graph::{Edge, Footholds, Graph, Node, Passage};
+use crate::in_hand::roadmap::identity::{Digest, Identity};
+use crate::in_hand::roadmap::index::{Costs, Index};
+use crate::in_hand::roadmap::landmarks::{Landmarks, ROW_BYTES, Row};
+use crate::in_hand::roadmap::{About, BuildSettings, GraspRoadmap, Region};
+use crate::settings::InHandSettings;
 use regrasp_base::{Diagnostic, InputError, Place, files};
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 use regrasp_grasp::Contact;
+use regrasp_manipulation::grasp::state::MAX_FINGERS;
 use regrasp_robot::ContactModel;
 use regrasp_robot::kinematics::finger_ik;
 use serde::{Deserialize, Serialize};

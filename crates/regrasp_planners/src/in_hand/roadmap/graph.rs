@@ -4,12 +4,10 @@
 //! (same contacts, other place) or the relocation of one finger (same place); both can be gone both ways. Both store their
 //! joints between the ends; the object's poses follow from the ends.
 
-use super::super::model::MAX_FINGERS;
-use super::super::state::GraspState;
-use super::super::workspace::{Contacts, HandJoints};
 use arrayvec::ArrayVec;
 use regrasp_geometry::Pose;
 use regrasp_grasp::Contact;
+use regrasp_manipulation::grasp::state::{Contacts, GraspState, HandJoints, MAX_FINGERS};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use std::collections::BTreeMap;
 

@@ -1,16 +1,18 @@
 //! The grasps of a roadmap: each finger has a list of contacts spread over the object, the same at every place, so that
 //! grasps of one place share footholds and grasps of different places share contacts.
 
-use super::super::candidates::{Candidate, reach};
-use super::super::combine::{Choice, ClashTable, ClosureTable};
-use super::super::model::Model;
-use super::super::search::Search;
-use super::super::settings::ReleaseRule;
-use super::super::state::GraspState;
+use crate::in_hand::attempt::search::Search;
+use crate::in_hand::grasps::candidate::{Candidate, Choice};
+use crate::in_hand::grasps::closure_table::ClosureTable;
+use crate::in_hand::grasps::combine::ClashTable;
+use crate::settings::ReleaseRule;
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;
 use regrasp_geometry::collision::Placement;
 use regrasp_grasp::Contact;
+use regrasp_manipulation::grasp::contact::reach;
+use regrasp_manipulation::grasp::state::GraspState;
+use regrasp_manipulation::model::Model;
 
 /// Contacts drawn for one, of which the one farthest from those before is taken.
 const CANDIDATES: usize = 12;
@@ -49,7 +51,7 @@ pub fn spread_contacts(model: &Model, n: usize, seed: u64) -> Vec<Vec<Contact>> 
 
 /// A contact drawn by area, as the fingertip really touches, off the creases.
 fn draw(model: &Model, finger: usize, rng: &mut Rng) -> Option<Contact> {
-    let object = &model.scene.object;
+    let object = &model.view.object;
     let drawn = object.surface.sample(rng);
     let settled = object.surface.settle(&drawn, model.fingers[finger].settle_radius)?;
     (object.surface.crease_distance(&settled) >= object.edge_distance)
@@ -135,7 +137,7 @@ impl Reached {
         let finger = choice.len();
         if finger == n {
             let n_releasable = table.n_releasable(choice);
-            let rule = search.model().settings.release_rule;
+            let rule = search.settings.search.release_rule;
             let enough = if rule == ReleaseRule::EverywhereEveryFinger { n } else { 1 };
             if n_releasable >= enough && found.len() < limit {
                 let chosen = |f: usize| &self.options[f][choice[f]];

@@ -8,7 +8,7 @@ use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Point, Pose, Shape};
 use regrasp_robot::kinematics::chain::Motion;
 use regrasp_robot::{ContactModel, Hand, TipShape};
-use regrasp_scene::{Object, Scene};
+use regrasp_scene::{HandView, Object};
 
 /// A SHA-256.
 pub type Digest = [u8; 32];
@@ -37,21 +37,21 @@ pub struct Identity {
 
 impl Identity {
     /// Of a scene.
-    pub fn of(scene: &Scene) -> Self {
+    pub fn of(view: &HandView) -> Self {
         let mut obstacles = Feed::default();
-        obstacles.count(scene.obstacles.len());
-        for obstacle in &scene.obstacles {
+        obstacles.count(view.obstacles.len());
+        for obstacle in view.obstacles.iter() {
             obstacles.placed(&obstacle.placed);
         }
         Identity {
-            fingers: scene.hand.fingers.iter().map(|finger| finger.name.clone()).collect(),
-            hand_name: scene.hand.robot.name.clone(),
-            hand: hand(&scene.hand, scene.reach),
-            contacts: scene.hand.fingers.iter().map(|finger| finger.tip.contact).collect(),
-            object_name: scene.object.name.clone(),
-            object: object(&scene.object),
+            fingers: view.hand.fingers.iter().map(|finger| finger.name.clone()).collect(),
+            hand_name: view.hand.robot.name.clone(),
+            hand: hand(&view.hand, view.reach),
+            contacts: view.hand.fingers.iter().map(|finger| finger.tip.contact).collect(),
+            object_name: view.object.name.clone(),
+            object: object(&view.object),
             obstacles: obstacles.digest(),
-            friction: scene.object.friction,
+            friction: view.object.friction,
         }
     }
 }
@@ -70,8 +70,15 @@ fn hand(hand: &Hand, reach: Option<f64>) -> Digest {
                 Motion::Turn => 0,
                 Motion::Slide => 1,
             });
-            feed.count(joint.coordinate);
-            feed.numbers([joint.multiplier, joint.offset]);
+            for (at, &(coordinate, multiplier)) in joint.drive.terms.iter().enumerate() {
+                if at > 0 {
+                    // Marks further leaders: no coordinate has this number.
+                    feed.count(usize::MAX);
+                }
+                feed.count(coordinate);
+                feed.numbers([multiplier]);
+            }
+            feed.numbers([joint.drive.offset]);
         }
         feed.count(finger.chain.n_coordinates());
         for name in &finger.chain.names {
@@ -79,6 +86,13 @@ fn hand(hand: &Hand, reach: Option<f64>) -> Digest {
         }
         feed.numbers(finger.chain.lower.iter().copied());
         feed.numbers(finger.chain.upper.iter().copied());
+        for limit in &finger.chain.linear_limits {
+            for &(coordinate, multiplier) in &limit.terms {
+                feed.count(coordinate);
+                feed.numbers([multiplier]);
+            }
+            feed.numbers([limit.lower, limit.upper]);
+        }
         feed.numbers(finger.rest.iter().copied());
         feed.point(&finger.tip.center_in_body);
         match &finger.tip.shape {

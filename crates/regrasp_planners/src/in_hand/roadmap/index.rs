@@ -1,7 +1,7 @@
 //! What a graph is searched with: links by node with their costs, nodes by place, components.
 
-use super::graph::{Graph, Lists, Passage};
-use super::region::near_distance;
+use crate::in_hand::roadmap::graph::{Graph, Lists, Passage};
+use crate::in_hand::roadmap::region::near_distance;
 use regrasp_roadmap::Components;
 use std::collections::BTreeMap;
 use std::ops::Range;

@@ -3,8 +3,8 @@
 //! Goldberg and Harrelson, *Computing the shortest path: A\* search meets graph theory* (SODA 2005). Landmarks are chosen
 //! far from each other, as there.
 
-use super::graph::Graph;
-use super::index::Index;
+use crate::in_hand::roadmap::graph::Graph;
+use crate::in_hand::roadmap::index::Index;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 

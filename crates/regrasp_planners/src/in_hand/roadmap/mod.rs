@@ -36,14 +36,15 @@ pub use identity::{Digest, Identity};
 pub use query::{Answer, QueryMemory, RoadmapPlanner};
 pub use region::Region;
 
-use super::settings::InHandSettings;
-use crate::outline::{Outline, OutlineEdge};
+use crate::settings::InHandSettings;
 use graph::Graph;
 use index::{Costs, Index};
 use landmarks::Landmarks;
 use regrasp_base::{Diagnostic, InputError, Place};
+use regrasp_manipulation::in_world::outline_in_world;
+use regrasp_manipulation::outline::{Outline, OutlineEdge};
 use regrasp_robot::ContactModel;
-use regrasp_scene::Scene;
+use regrasp_scene::HandView;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -140,6 +141,7 @@ impl GraspRoadmap {
 
     /// What it looks like: one node for all grasps of a component at a place, which relocations join, and transfers between
     /// places.
+    /// Poses are in the frame of the hand that it was built for; [`GraspRoadmap::outline_in_world`] has them in the world.
     pub fn outline(&self) -> Outline {
         let components = index::components(&self.graph);
         let mut nodes: BTreeMap<(u32, usize), usize> = BTreeMap::new();
@@ -161,12 +163,17 @@ impl GraspRoadmap {
         Outline::new(poses, edges.into_iter().collect())
     }
 
+    /// As [`GraspRoadmap::outline`], in the world of `view`.
+    pub fn outline_in_world(&self, view: &HandView) -> Outline {
+        outline_in_world(view, self.outline())
+    }
+
     /// Refuses a scene that the roadmap was not built for; `path` is where the roadmap came from.
     ///
     /// Errors: another hand (`R610`), object (`R611`), friction (`R612`), set of obstacles (`R613`) or contact model of a
     /// fingertip (`R614`), all that differ; tables that are not of the hand it names (`R606`).
-    pub fn refuse_other_scene(&self, path: &Path, scene: &Scene) -> Result<(), InputError> {
-        let (built, asked) = (&self.about.identity, Identity::of(scene));
+    pub fn refuse_other_scene(&self, path: &Path, view: &HandView) -> Result<(), InputError> {
+        let (built, asked) = (&self.about.identity, Identity::of(view));
         let rebuild = "build a roadmap for this scene: regrasp roadmap build SCENE -o FILE";
         let mut diagnostics = Vec::new();
         let mut differs = |code, what: &str, was: String, is: String| {
@@ -205,7 +212,7 @@ impl GraspRoadmap {
                 differs("R614", &what, contact_text(was), contact_text(is));
             }
         }
-        if diagnostics.is_empty() && !self.has_joints_of(scene) {
+        if diagnostics.is_empty() && !self.has_joints_of(view) {
             let problem = "has tables of other fingers than the hand that it names";
             diagnostics.push(Diagnostic::new("R606", Place::file(path), problem).fix(rebuild));
         }
@@ -229,8 +236,8 @@ impl GraspRoadmap {
         if diagnostics.is_empty() { Ok(()) } else { Err(InputError { diagnostics, n_more: 0 }) }
     }
 
-    fn has_joints_of(&self, scene: &Scene) -> bool {
-        let fingers = &scene.hand.fingers;
+    fn has_joints_of(&self, view: &HandView) -> bool {
+        let fingers = &view.hand.fingers;
         let footholds = &self.graph.footholds;
         fingers.len() == footholds.len()
             && fingers.iter().zip(footholds).all(|(finger, table)| finger.chain.n_coordinates() == table.n_coordinates)
@@ -241,14 +248,14 @@ impl GraspRoadmap {
 fn feasibility(settings: &InHandSettings) -> [(&'static str, serde_json::Value); 8] {
     use serde_json::json;
     [
-        ("closure_margin", json!(settings.closure_margin)),
-        ("friction_margin", json!(settings.friction_margin)),
-        ("release_rule", json!(settings.release_rule)),
-        ("step", json!(settings.step)),
-        ("clearance", json!(settings.clearance)),
-        ("contact_allowance", json!(settings.contact_allowance)),
-        ("limit_margin", json!(settings.limit_margin)),
-        ("joint_step", json!(settings.joint_step)),
+        ("closure_margin", json!(settings.physics.closure_margin)),
+        ("friction_margin", json!(settings.physics.friction_margin)),
+        ("release_rule", json!(settings.search.release_rule)),
+        ("step", json!(settings.physics.step)),
+        ("clearance", json!(settings.physics.clearance)),
+        ("contact_allowance", json!(settings.physics.contact_allowance)),
+        ("limit_margin", json!(settings.physics.limit_margin)),
+        ("joint_step", json!(settings.physics.joint_step)),
     ]
 }
 

@@ -1,29 +1,34 @@
 //! Answering queries (paper 004, section IV-D): start and goal are linked to the graph, the graph is searched, the path is
 //! smoothed.
 
-use super::super::endpoints::{End, given_grasp, object_blocked_by, refuse_buried_object, refuse_object_out_of_reach};
-use super::super::model::Model;
-use super::super::record::Recorder;
-use super::super::search::{Search, Stop};
-use super::super::settings::InHandSettings;
-use super::super::shorten::{Arrival, transfer_regrasp};
-use super::super::state::{GraspState, Motion, Sequence};
-use super::super::tally::Reason;
-use super::GraspRoadmap;
-use super::anchor::{Link, QueryEnd};
-use super::build::legs_of;
-use super::index::Index;
-use super::landmarks::{Bounds, Landmarks};
-use super::region::nearest_places;
-use super::registry::Registry;
-use super::route::Passing;
-use crate::failure::{Failure, FailureKind};
+use crate::in_hand::attempt::search::{Context, Search, Stop};
+use crate::in_hand::attempt::tally::Reason;
+use crate::in_hand::recording::record::settings_of;
+use crate::in_hand::refusals::given_grasp;
+use crate::in_hand::regrasping::change::{Arrival, transfer_regrasp};
+use crate::in_hand::roadmap::GraspRoadmap;
+use crate::in_hand::roadmap::anchor::{Link, QueryEnd};
+use crate::in_hand::roadmap::build::legs_of;
+use crate::in_hand::roadmap::index::Index;
+use crate::in_hand::roadmap::landmarks::{Bounds, Landmarks};
+use crate::in_hand::roadmap::region::nearest_places;
+use crate::in_hand::roadmap::registry::Registry;
+use crate::in_hand::roadmap::route::Passing;
+use crate::settings::InHandSettings;
 use regrasp_base::{Budget, InputError, Rng};
 use regrasp_geometry::Pose;
+use regrasp_manipulation::ends::blocked::{object_blocked_by, refuse_buried_object, refuse_object_out_of_reach};
+use regrasp_manipulation::ends::end::End;
+use regrasp_manipulation::failure::{Failure, FailureKind};
+use regrasp_manipulation::grasp::sequence::{Motion, Sequence};
+use regrasp_manipulation::grasp::state::GraspState;
+use regrasp_manipulation::in_world::{failure_in_world, plan_in_world};
+use regrasp_manipulation::model::Model;
+use regrasp_manipulation::recording::recorder::Recorder;
 use regrasp_plan::Plan;
 use regrasp_plan::plan::Statistics;
 use regrasp_roadmap::AStar;
-use regrasp_scene::{GraspRequest, InHandQuery, Scene};
+use regrasp_scene::{GraspRequest, HandView, InHandQuery};
 use std::path::Path;
 use std::sync::atomic::AtomicUsize;
 
@@ -42,6 +47,7 @@ const GREED: f64 = 2.5;
 #[derive(Debug)]
 pub struct RoadmapPlanner<'a> {
     model: Model<'a>,
+    settings: InHandSettings,
     roadmap: &'a GraspRoadmap,
     smooth: bool,
 }
@@ -65,9 +71,10 @@ impl<'a> RoadmapPlanner<'a> {
     /// Opens a roadmap, which came from `path`, for a scene.
     ///
     /// Errors: it was built for another one (`R610` to `R614`), or its tables are not of the hand it names (`R606`).
-    pub fn new(path: &Path, roadmap: &'a GraspRoadmap, scene: &'a Scene) -> Result<Self, InputError> {
-        roadmap.refuse_other_scene(path, scene)?;
-        Ok(RoadmapPlanner { model: Model::new(scene, &roadmap.about.settings), roadmap, smooth: false })
+    pub fn new(path: &Path, roadmap: &'a GraspRoadmap, view: &'a HandView<'a>) -> Result<Self, InputError> {
+        roadmap.refuse_other_scene(path, view)?;
+        let settings = roadmap.about.settings.within(&view.limits);
+        Ok(RoadmapPlanner { model: Model::new(view, &settings.physics), settings, roadmap, smooth: false })
     }
 
     /// With transfers that follow each other with one grasp made one, where that is free: shorter motions, slower answers.
@@ -78,7 +85,7 @@ impl<'a> RoadmapPlanner<'a> {
 
     /// Settings of the planner that the roadmap's motions were proven with.
     pub fn settings(&self) -> &InHandSettings {
-        &self.model.settings
+        &self.settings
     }
 
     /// A query from one pose of the roadmap's region to another, drawn uniformly by seed among those at which the object
@@ -87,14 +94,16 @@ impl<'a> RoadmapPlanner<'a> {
         let draw = |purpose: &str| {
             let mut rng = Rng::keyed(seed, purpose, 0);
             loop {
-                let pose = self.roadmap.about.region.draw(&self.model.scene.object.center_of_mass, &mut rng);
+                let pose = self.roadmap.about.region.draw(&self.model.view.object.center_of_mass, &mut rng);
                 if object_blocked_by(&self.model, &pose).is_none() {
-                    return pose;
+                    return self.model.view.world_from(&pose);
                 }
             }
         };
         InHandQuery {
-            task: regrasp_scene::TaskKind::InHand,
+            name: String::new(),
+            hand: self.model.view.hand_index,
+            object: self.model.view.object_index,
             world_from_object_start: draw("random_start"),
             world_from_object_way: Vec::new(),
             world_from_object_goal: draw("random_goal"),
@@ -111,18 +120,34 @@ impl<'a> RoadmapPlanner<'a> {
         budget: &Budget,
         memory: &mut QueryMemory,
     ) -> Result<Answer, Failure> {
+        let view = self.model.view;
+        let seen = view.hand_from_world().map(|hand_from_world| query.seen_from(&hand_from_world));
+        let found = self.plan_in_hand_frame(seen.as_ref().unwrap_or(query), seed, budget, memory);
+        found
+            .map(|answer| Answer { plan: plan_in_world(view, &query.name, answer.plan), ..answer })
+            .map_err(|failure| failure_in_world(view, failure))
+    }
+
+    fn plan_in_hand_frame(
+        &self,
+        query: &InHandQuery,
+        seed: u64,
+        budget: &Budget,
+        memory: &mut QueryMemory,
+    ) -> Result<Answer, Failure> {
         let model = &self.model;
-        let poses = (query.world_from_object_start, query.world_from_object_goal);
+        let poses = [query.world_from_object_start, query.world_from_object_goal];
         refuse_way_poses(query)?;
-        for (end, pose) in [(End::Start, &poses.0), (End::Goal, &poses.1)] {
+        for (end, pose) in [(End::Start, &poses[0]), (End::Goal, &poses[1])] {
             refuse_buried_object(model, end, pose)?;
             refuse_object_out_of_reach(model, end, pose)?;
         }
         let mut rng = Rng::keyed(seed, "given_grasps", 0);
-        let start_grasp = given_grasp(model, End::Start, &poses.0, &query.start_grasp, &mut rng)?;
-        let goal_grasp = given_grasp(model, End::Goal, &poses.1, &query.goal_grasp, &mut rng)?;
+        let start_grasp = given_grasp(model, End::Start, &poses[0], &query.start_grasp, &mut rng)?;
+        let goal_grasp = given_grasp(model, End::Goal, &poses[1], &query.goal_grasp, &mut rng)?;
         let winner = AtomicUsize::new(usize::MAX);
-        let mut search = Search::new(model, poses, (seed, 0), (budget, budget.max_work), &winner, &|_| {});
+        let context = Context { model, settings: &self.settings, seed, budget, winner: &winner, progress: &|_| {} };
+        let mut search = Search::new(context, poses, 0, budget.max_work);
         search.rng = Rng::keyed(seed, "roadmap_query", 0);
         let answer = self.answer(&mut search, query, seed, (start_grasp, goal_grasp), memory);
         answer.unwrap_or_else(|stop| Err(self.stopped(&stop, &search)))
@@ -154,7 +179,7 @@ impl<'a> RoadmapPlanner<'a> {
             } else {
                 for (end, which) in [(&mut start, 0), (&mut goal, 1)] {
                     if end.anchors.is_empty() {
-                        self.detour(search, end, (seed, which))?;
+                        self.detour(search, end, which)?;
                     }
                 }
             }
@@ -190,7 +215,7 @@ impl<'a> RoadmapPlanner<'a> {
                         return Ok(Err(self.failure(unbalanced.in_words(&self.model), search)));
                     }
                 };
-                plan.method = "roadmap".into();
+                (plan.method, plan.settings) = ("roadmap".into(), settings_of(&self.settings));
                 return Ok(Ok(Answer { plan, links: [first, last] }));
             }
         }
@@ -202,10 +227,10 @@ impl<'a> RoadmapPlanner<'a> {
     }
 
     /// Links an end by a search of its own.
-    fn detour(&self, search: &mut Search, end: &mut QueryEnd, (seed, which): (u64, usize)) -> Result<(), Stop> {
+    fn detour(&self, search: &mut Search, end: &mut QueryEnd, which: usize) -> Result<(), Stop> {
         for (index, (_, place)) in self.places_around(&end.pose, 0..DETOURS).into_iter().enumerate() {
             let Some(&node) = self.roadmap.index.nodes_at(place).first() else { continue };
-            let mut own = search.for_detour((seed, which * DETOURS + index), DETOUR_WORK.min(search.work_left()));
+            let mut own = search.for_detour(which * DETOURS + index, DETOUR_WORK.min(search.work_left()));
             let found = end.detour(&mut own, self.roadmap, node as usize);
             search.workspace.work += own.workspace.work;
             if found? {
@@ -282,7 +307,7 @@ impl<'a> RoadmapPlanner<'a> {
             End::Start => ("start", &search.start),
             End::Way(_) | End::Goal => ("goal", &search.goal),
         };
-        let center_of_mass = self.model.scene.object.center_of_mass;
+        let center_of_mass = self.model.view.object.center_of_mass;
         let inside = self.roadmap.about.region.contains(pose, &center_of_mass, 1e-9);
         let place = if inside { "which is in its region" } else { "which is outside its region" };
         self.failure(format!("no grasp of the roadmap can be taken to the {name}, {place}"), search)

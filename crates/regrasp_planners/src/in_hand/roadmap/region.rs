@@ -1,19 +1,19 @@
 //! The poses of the object that a roadmap covers, and places spread over them.
 
-use super::super::model::Model;
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, Vector, frame, pose_from};
+use regrasp_manipulation::model::Model;
 use serde::{Deserialize, Serialize};
 
-/// Poses with the object's centre of mass in a box of the world and its orientation within an angle of a reference.
+/// Poses with the object's centre of mass in a box of the hand's frame and its orientation within an angle of a reference.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Region {
-    /// Middle of the box, in the world, in metres.
+    /// Middle of the box, in the hand's frame, in metres.
     pub center: [f64; 3],
-    /// Half the edges of the box, along the world's axes, in metres.
+    /// Half the edges of the box, along the axes of the hand's frame, in metres.
     pub half_extents: [f64; 3],
-    /// Reference orientation, world from object.
+    /// Reference orientation, hand from object.
     pub reference_quat_xyzw: [f64; 4],
     /// Largest angle from the reference, in radians; pi is every orientation.
     pub max_angle: f64,
@@ -99,14 +99,14 @@ const CANDIDATES: u64 = 6;
 
 /// `n` poses spread over the region at which the object itself is clear of palm and obstacles.
 pub fn spread_places(model: &Model, region: &Region, n: usize, seed: u64) -> Vec<Pose> {
-    let center_of_mass = model.scene.object.center_of_mass;
+    let center_of_mass = model.view.object.center_of_mass;
     let mut places: Vec<Pose> = Vec::with_capacity(n);
     for index in 0..n {
         let mut rng = Rng::keyed(seed, "roadmap_place", index as u64);
         let mut best: Option<(f64, Pose)> = None;
         for _ in 0..CANDIDATES {
             let pose = region.draw(&center_of_mass, &mut rng);
-            if super::super::endpoints::object_blocked_by(model, &pose).is_some() {
+            if regrasp_manipulation::ends::blocked::object_blocked_by(model, &pose).is_some() {
                 continue;
             }
             let nearest = nearness(&places, &pose, model.turn_length());

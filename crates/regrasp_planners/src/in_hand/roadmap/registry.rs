@@ -1,12 +1,10 @@
 //! A graph that grows: what is added is looked up first, so that the same grasp is one node whichever way led to it.
 
-use super::super::model::MAX_FINGERS;
-use super::super::state::GraspState;
-use super::super::workspace::HandJoints;
-use super::graph::{Edge, FootholdIds, Graph, Leg, NOT_STORED, Node, Passage};
+use crate::in_hand::roadmap::graph::{Edge, FootholdIds, Graph, Leg, NOT_STORED, Node, Passage};
 use arrayvec::ArrayVec;
 use regrasp_geometry::Pose;
 use regrasp_grasp::Contact;
+use regrasp_manipulation::grasp::state::{GraspState, HandJoints, MAX_FINGERS};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;

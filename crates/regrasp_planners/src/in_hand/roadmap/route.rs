@@ -1,14 +1,14 @@
 //! The motions along a path in the graph.
 
-use super::super::model::{MAX_FINGERS, Model};
-use super::super::record::Recorder;
-use super::super::state::{GraspState, Moment, Sequence};
-use super::super::transfer::follow;
-use super::super::workspace::HandJoints;
-use super::graph::{Graph, NOT_STORED, Passage};
+use crate::in_hand::moving::transfer::follow;
+use crate::in_hand::roadmap::graph::{Graph, NOT_STORED, Passage};
 use arrayvec::ArrayVec;
 use regrasp_geometry::Pose;
 use regrasp_geometry::frame::PoseLine;
+use regrasp_manipulation::grasp::sequence::Sequence;
+use regrasp_manipulation::grasp::state::{GraspState, HandJoints, MAX_FINGERS, Moment};
+use regrasp_manipulation::model::Model;
+use regrasp_manipulation::recording::recorder::Recorder;
 
 /// Largest difference between the joints that a transfer ends in and those stored, in radians or metres.
 const SAME_POSTURE: f64 = 2e-6;

@@ -3,7 +3,7 @@
 use super::MAX_LINKS;
 use super::geometry::read_origin;
 use crate::import::xml::{Reader, child, children};
-use crate::robot::{Joint, JointKind, Limits};
+use crate::robot::{Joint, JointId, JointKind, Limits};
 use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_base::diagnostic::{did_you_mean, number};
 use regrasp_base::{Diagnostic, InputError};
@@ -260,7 +260,9 @@ pub(super) fn freeze_unmoving(reader: &mut Reader, mut joints: Vec<Joint>, draft
     for i in 0..joints.len() {
         let joint = &joints[i];
         let Some(limits) = joint.limits.filter(|limits| limits.lower == limits.upper) else { continue };
-        if joint.mimic.is_some() || joints.iter().any(|other| other.mimic.is_some_and(|m| m.joint.0 == i)) {
+        if joint.coupling.is_some()
+            || joints.iter().flat_map(|other| &other.coupling).any(|c| c.multiplier(JointId(i)) != 0.0)
+        {
             continue;
         }
         let position = limits.lower;

@@ -1,8 +1,9 @@
 //! Joints of a URDF that follow others.
 
 use super::joint::DraftJoint;
+use crate::coupling::{self, Coupling};
 use crate::import::xml::{Reader, child};
-use crate::robot::{Joint, JointId, JointKind, Mimic};
+use crate::robot::{Joint, JointId, JointKind};
 use regrasp_base::Diagnostic;
 use regrasp_base::diagnostic::{did_you_mean, number};
 use std::collections::BTreeMap;
@@ -29,18 +30,28 @@ pub(crate) fn check_coupling(multiplier: f64, offset: f64) -> Result<(), String>
 pub(super) fn resolve(reader: &mut Reader, mut joints: Vec<Joint>, drafts: &[DraftJoint]) -> Vec<Joint> {
     let index: BTreeMap<String, JointId> =
         joints.iter().enumerate().map(|(i, joint)| (joint.name.clone(), JointId(i))).collect();
-    let mut direct: Vec<Option<Mimic>> = vec![None; joints.len()];
+    let mut direct: Vec<Option<Coupling>> = vec![None; joints.len()];
     for draft in drafts {
         if let Some(&id) = index.get(draft.name) {
             direct[id.0] = read_mimic(reader, draft, &joints, &index);
         }
     }
+    let resolved = coupling::resolve(&direct);
     for draft in drafts {
         let Some(&id) = index.get(draft.name) else { continue };
         if joints[id.0].kind == JointKind::Fixed {
             continue;
         }
-        joints[id.0].mimic = follow(reader, id, draft, &joints, &direct);
+        joints[id.0].coupling = resolved[id.0].clone().unwrap_or_else(|_| {
+            let names = way_back(&joints, &direct, id).join(" -> ");
+            let place = reader.place(draft.node);
+            reader.found.push(
+                Diagnostic::new("U141", place, format!("joints follow each other in a cycle: {names}"))
+                    .element("joint", draft.name)
+                    .expected("a joint at the end that follows no other"),
+            );
+            None
+        });
     }
     refuse_empty_ranges(reader, &joints, drafts);
     joints
@@ -51,7 +62,7 @@ fn read_mimic(
     draft: &DraftJoint,
     joints: &[Joint],
     index: &BTreeMap<String, JointId>,
-) -> Option<Mimic> {
+) -> Option<Coupling> {
     let node = child(draft.node, "mimic")?;
     let element = ("joint", draft.name);
     if draft.kind == JointKind::Fixed {
@@ -95,62 +106,55 @@ fn read_mimic(
         );
         return None;
     }
-    Some(Mimic { joint, multiplier, offset })
+    Some(Coupling::one(joint, multiplier, offset))
 }
 
-/// The coupling of joint `id` to the first independent joint of its chain of leaders.
-fn follow(
-    reader: &mut Reader,
-    id: JointId,
-    draft: &DraftJoint,
-    joints: &[Joint],
-    direct: &[Option<Mimic>],
-) -> Option<Mimic> {
-    let mut coupling = direct[id.0]?;
-    let mut names = vec![format!("\"{}\"", draft.name), format!("\"{}\"", joints[coupling.joint.0].name)];
-    while let Some(next) = direct[coupling.joint.0] {
-        let closed = coupling.joint == id;
-        if closed || names.len() > joints.len() {
-            let place = reader.place(draft.node);
-            reader.found.push(
-                Diagnostic::new("U141", place, format!("joints follow each other in a cycle: {}", names.join(" -> ")))
-                    .element("joint", draft.name)
-                    .expected("a joint at the end that follows no other"),
-            );
-            return None;
+/// Names of the joints from `id` along its leaders, up to the first that comes again.
+fn way_back(joints: &[Joint], direct: &[Option<Coupling>], id: JointId) -> Vec<String> {
+    let (mut seen, mut at) = (vec![id], id);
+    while let Some((leader, _)) = direct[at.0].as_ref().and_then(Coupling::single) {
+        let again = seen.contains(&leader);
+        seen.push(leader);
+        if again {
+            break;
         }
-        coupling = Mimic {
-            joint: next.joint,
-            multiplier: coupling.multiplier * next.multiplier,
-            offset: coupling.multiplier * next.offset + coupling.offset,
-        };
-        names.push(format!("\"{}\"", joints[next.joint.0].name));
+        at = leader;
     }
-    Some(coupling)
+    seen.iter().map(|joint| format!("\"{}\"", joints[joint.0].name)).collect()
 }
 
 /// Reports followers whose own limits leave their leader no position.
 fn refuse_empty_ranges(reader: &mut Reader, joints: &[Joint], drafts: &[DraftJoint]) {
     for draft in drafts {
         let Some(follower) = joints.iter().find(|joint| joint.name == draft.name) else { continue };
-        let (Some(mimic), Some(own)) = (follower.mimic, follower.limits) else { continue };
-        let leader = &joints[mimic.joint.0];
-        let Some(limits) = leader.limits else { continue };
-        let ends = [limits.lower, limits.upper].map(|q| mimic.multiplier * q + mimic.offset);
-        let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
-        if high < own.lower || low > own.upper {
+        if let Err(problem) = refuse_empty_range(joints, follower) {
             let place = reader.place(draft.node);
-            let problem = format!(
-                "follows joint \"{}\" to {}..{}, outside its own limits {}..{}",
-                leader.name,
-                number(low),
-                number(high),
-                number(own.lower),
-                number(own.upper)
-            );
             reader.found.push(
                 Diagnostic::new("U143", place, problem).element("joint", draft.name).expected("ranges that overlap"),
             );
         }
     }
+}
+
+/// Err, in words, when the leaders of `follower` never bring it within its own limits.
+pub(crate) fn refuse_empty_range(joints: &[Joint], follower: &Joint) -> Result<(), String> {
+    let (Some(coupling), Some(own)) = (&follower.coupling, follower.limits) else { return Ok(()) };
+    let limits = |leader: JointId| {
+        joints[leader.0].limits.map_or([f64::NEG_INFINITY, f64::INFINITY], |limits| [limits.lower, limits.upper])
+    };
+    let [low, high] = coupling.range(limits);
+    if high >= own.lower && low <= own.upper {
+        return Ok(());
+    }
+    let names: Vec<String> =
+        coupling.terms.iter().map(|(leader, _)| format!("\"{}\"", joints[leader.0].name)).collect();
+    Err(format!(
+        "follows {} {} to {}..{}, outside its own limits {}..{}",
+        if names.len() == 1 { "joint" } else { "joints" },
+        names.join(" and "),
+        number(low),
+        number(high),
+        number(own.lower),
+        number(own.upper)
+    ))
 }

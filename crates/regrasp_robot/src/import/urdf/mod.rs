@@ -10,9 +10,9 @@ mod mimic;
 mod tree;
 mod visual;
 
-pub(crate) use mimic::{GOOD_COUPLING, check_coupling};
+pub(crate) use mimic::{GOOD_COUPLING, check_coupling, refuse_empty_range};
 
-use super::hand_file::{LoadOptions, LoadedInput};
+use super::options::{LoadOptions, LoadedInput};
 use super::resolve::Hints;
 use super::xml::{Reader, children, parse};
 use crate::robot::{Link, Robot};

@@ -80,7 +80,7 @@ pub(super) fn assemble(
             parent_from_joint: draft.parent_from_joint,
             axis: draft.axis,
             limits: draft.limits,
-            mimic: None,
+            coupling: None,
         });
     }
     refuse_cycles(reader, links, link_nodes, &joints);

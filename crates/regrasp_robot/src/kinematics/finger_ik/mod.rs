@@ -243,7 +243,8 @@ impl FingerIk {
         // The bodies so far move by `shift + turn x point`.
         let (mut shift, mut turn, mut most) = (Vector::zeros(), Vector::zeros(), 0.0f64);
         for (i, (joint, line)) in self.chain.joints.iter().zip(&lines).enumerate() {
-            let change = line.axis * (joint.multiplier * changes[joint.coordinate]);
+            let moved = joint.drive.terms.iter().map(|&(k, multiplier)| multiplier * changes[k]);
+            let change = line.axis * moved.reduce(|sum, moved| sum + moved).unwrap_or(0.0);
             match joint.motion {
                 Motion::Turn => {
                     turn += change;
@@ -269,7 +270,9 @@ impl FingerIk {
                 Motion::Turn => line.axis.cross(&(tip - line.origin)),
                 Motion::Slide => line.axis,
             };
-            columns[joint.coordinate] += joint.multiplier * column;
+            for &(k, multiplier) in &joint.drive.terms {
+                columns[k] += multiplier * column;
+            }
         }
         columns
     }

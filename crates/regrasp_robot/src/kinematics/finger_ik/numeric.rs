@@ -7,7 +7,10 @@
 //! The inner functions are compiled for each usual number of coordinates; chains with other numbers run in the next
 //! larger one, with coordinates that move nothing.
 
-use super::reach_map::ReachMap;
+/// Steps of chains whose limits bind several coordinates at once.
+mod linear;
+
+use super::reach_map::{ReachMap, halton};
 use super::{Asked, AskedTurn, Coordinates, IkSettings, MAX_COORDINATES, POSITION_TOLERANCE, Preference};
 use crate::kinematics::body_frame::BodyFrame;
 use crate::kinematics::chain::{Chain, JointLine, Motion};
@@ -63,6 +66,8 @@ pub struct NumericIk {
     length: f64,
     /// Bound on the tip's distance from any joint of the chain; infinite with sliding joints. In metres.
     reach: f64,
+    /// How far joints turn per unit of each coordinate, all together, for chains whose joints may turn against each other.
+    opposed_turns: Option<Coordinates>,
     seeds: Vec<Seed>,
     reach_map: ReachMap,
 }
@@ -87,16 +92,18 @@ impl NumericIk {
             tip_axis_in_body,
             length,
             reach,
+            opposed_turns: linear::opposed_turns(chain),
             seeds: vec![],
             reach_map: ReachMap::new(chain, center_in_body, search_range),
         };
         for i in 0..N_SEEDS {
-            let coordinates: Coordinates = (0..chain.n_coordinates())
+            let sample: Coordinates = (0..chain.n_coordinates())
                 .map(|k| {
                     let (lower, upper) = search_range(chain.lower[k], chain.upper[k]);
                     lower + (upper - lower) * halton(i + 1, k)
                 })
                 .collect();
+            let coordinates = chain.bring_within_limits(&sample).map_or(sample, |kept| kept.into_iter().collect());
             let state = ik.state::<MAX_COORDINATES>(&coordinates);
             ik.seeds.push(Seed { tip: state.tip, tip_axis: state.tip_axis, coordinates });
         }
@@ -271,6 +278,7 @@ impl NumericIk {
             limits[k] = (lower, upper);
             coordinates[k] = start[k].clamp(lower, upper);
         }
+        let linear = linear::kept(&self.chain, settings.limit_margin, None);
         let mut error_before = f64::INFINITY;
         for i in 0..effort.max_steps {
             let state = self.state::<N>(&coordinates);
@@ -282,20 +290,28 @@ impl NumericIk {
             }
             error_before = error_now;
             let wish = preference.filter(|_| n > 3 && i < effort.preference_steps);
-            let step = bounded_step(&state, &error, wish, &coordinates, &limits)?;
+            let step = match linear.as_slice() {
+                [] => bounded_step(&state, &error, wish, &coordinates, &limits)?,
+                sums => linear::limited_step(&state, &error, wish, &coordinates, (&limits, sums))?,
+            };
             let (mut left, mut turned) = (error, 0.0);
             for k in 0..N {
                 coordinates[k] = (coordinates[k] + step[k]).clamp(limits[k].0, limits[k].1);
                 left -= state.slides[k] * step[k];
-                turned += step[k].abs() * state.spins[k].norm();
+                turned += step[k].abs()
+                    * match &self.opposed_turns {
+                        None => state.spins[k].norm(),
+                        Some(turns) => turns.get(k).copied().unwrap_or(0.0),
+                    };
             }
             // The rest of a linear step is at most half the square of the turn times the reach: no need to look.
             if wish.is_none() && left.norm() + 0.5 * turned * turned * self.reach < 0.5 * POSITION_TOLERANCE {
-                return Some(coordinates[..n].iter().copied().collect());
+                return linear::keeps(&linear, &coordinates).then(|| coordinates[..n].iter().copied().collect());
             }
         }
         let error = target.coords - self.state::<N>(&coordinates).tip;
-        (error.norm() < POSITION_TOLERANCE).then(|| coordinates[..n].iter().copied().collect())
+        let is_solved = error.norm() < POSITION_TOLERANCE && linear::keeps(&linear, &coordinates);
+        is_solved.then(|| coordinates[..n].iter().copied().collect())
     }
 }
 
@@ -317,13 +333,15 @@ fn state_of<const N: usize>(
     let tip_axis = last.vector(tip_axis_in_body);
     let mut state = State { tip, tip_axis, slides: [Vector::zeros(); N], spins: [Vector::zeros(); N] };
     for (joint, line) in chain.joints.iter().zip(&lines) {
-        let axis = line.axis * joint.multiplier;
-        match joint.motion {
-            Motion::Turn => {
-                state.slides[joint.coordinate] += axis.cross(&(tip - line.origin));
-                state.spins[joint.coordinate] += axis;
+        for &(k, multiplier) in &joint.drive.terms {
+            let axis = line.axis * multiplier;
+            match joint.motion {
+                Motion::Turn => {
+                    state.slides[k] += axis.cross(&(tip - line.origin));
+                    state.spins[k] += axis;
+                }
+                Motion::Slide => state.slides[k] += axis,
             }
-            Motion::Slide => state.slides[joint.coordinate] += axis,
         }
     }
     (state, last)
@@ -365,6 +383,7 @@ fn follow_in<const N: usize>(
         );
         coordinates[k] = start[k];
     }
+    let linear = linear::kept(chain, settings.limit_margin, Some(start));
     let axis = tip_axis(center_in_body);
     let mut first_determinant = 0.0;
     let mut error_before = f64::INFINITY;
@@ -384,7 +403,7 @@ fn follow_in<const N: usize>(
         if wish.is_none() && error_now < FOLLOW_TOLERANCE {
             let is_near = (0..n).all(|k| (coordinates[k] - start[k]).abs() <= settings.max_step);
             // Without redundancy the branches are separated by the sign of the Jacobian's determinant.
-            return (is_near && determinant * first_determinant > 0.0)
+            return (is_near && determinant * first_determinant > 0.0 && linear::keeps(&linear, &coordinates))
                 .then(|| coordinates[..n].iter().copied().collect());
         }
         if i > CRAWL_STEPS && error_now > 0.5 * error_before {
@@ -392,7 +411,8 @@ fn follow_in<const N: usize>(
         }
         error_before = error_now;
         let step = match &turn {
-            None => bounded_step(&state, &error, wish, &coordinates, &limits)?,
+            None if linear.is_empty() => bounded_step(&state, &error, wish, &coordinates, &limits)?,
+            None => linear::limited_step(&state, &error, wish, &coordinates, (&limits, &linear))?,
             Some(turn) => turning_step(&state, &error, turn, &coordinates, &limits)?,
         };
         for k in 0..n {
@@ -574,17 +594,4 @@ fn search_range(lower: f64, upper: f64) -> (f64, f64) {
         (false, true) => (upper - 2.0 * PI, upper),
         (false, false) => (-PI, PI),
     }
-}
-
-/// Element `i` of the van der Corput sequence in the `k`-th prime base (Halton 1960).
-pub(super) fn halton(i: usize, k: usize) -> f64 {
-    const PRIMES: [usize; MAX_COORDINATES] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37];
-    let base = PRIMES[k];
-    let (mut rest, mut value, mut place) = (i, 0.0, 1.0);
-    while rest > 0 {
-        place /= base as f64;
-        value += place * (rest % base) as f64;
-        rest /= base;
-    }
-    value
 }

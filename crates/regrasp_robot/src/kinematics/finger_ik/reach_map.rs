@@ -1,5 +1,6 @@
 //! Where a tip can be at all: cells of space, so that targets out of reach cost a look and not a search.
 
+use super::MAX_COORDINATES;
 use crate::kinematics::chain::Chain;
 use regrasp_geometry::{Point, Vector};
 
@@ -25,7 +26,7 @@ impl ReachMap {
             .map(|i| {
                 for (k, coordinate) in coordinates.iter_mut().enumerate() {
                     let (lower, upper) = range(chain.lower[k], chain.upper[k]);
-                    *coordinate = lower + (upper - lower) * super::numeric::halton(i + 1, k);
+                    *coordinate = lower + (upper - lower) * halton(i + 1, k);
                 }
                 chain.last_frame(&coordinates).point(center_in_body).coords
             })
@@ -63,4 +64,17 @@ impl ReachMap {
         let inside = i < self.n_cells[0] && j < self.n_cells[1] && k < self.n_cells[2];
         inside.then(|| (i * self.n_cells[1] + j) * self.n_cells[2] + k)
     }
+}
+
+/// Element `i` of the van der Corput sequence in the `k`-th prime base (Halton 1960).
+pub(super) fn halton(i: usize, k: usize) -> f64 {
+    const PRIMES: [usize; MAX_COORDINATES] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37];
+    let base = PRIMES[k];
+    let (mut rest, mut value, mut place) = (i, 0.0, 1.0);
+    while rest > 0 {
+        place /= base as f64;
+        value += place * (rest % base) as f64;
+        rest /= base;
+    }
+    value
 }

@@ -1,6 +1,7 @@
 //! Inverse kinematics against brute force: a dense grid of seeds, each polished by plain Newton steps.
 
 use super::*;
+use crate::coupling::{Coupling, LinearLimit};
 use crate::kinematics::samples::*;
 use crate::places::shared_models;
 use nalgebra::{DVector, Matrix3};
@@ -133,10 +134,9 @@ fn a_driven_coordinate_order_and_ratio_is_respected() {
     let mut rng = Rng::keyed(4, "ratio", 0);
     let (chain, center) = wide_finger();
     let mut joints = chain.joints.clone();
-    joints[0].coordinate = 2;
-    joints[2].coordinate = 0;
-    joints[1].multiplier = -0.5;
-    joints[1].offset = 0.2;
+    joints[0].drive = Coupling::independent(2);
+    joints[2].drive = Coupling::independent(0);
+    joints[1].drive = Coupling::one(1, -0.5, 0.2);
     let chain = Chain::new(joints, chain.names.clone(), vec![-1.0, -1.5, -0.5], vec![1.5, 1.5, 0.6]);
     compare(&chain, &center, 20, &mut rng);
 }
@@ -379,4 +379,82 @@ fn the_turn_per_motion_is_that_of_a_small_step() {
         }
     }
     assert!(n_compared > 50, "too little was compared: {n_compared}");
+}
+
+/// A planar finger of four joints whose last joint keeps its link level: `q4 = -q1 - q2 - q3`, within limits of its own.
+fn levelled_finger(range: [f64; 2]) -> (Chain, Point) {
+    let lengths = [0.05, 0.04, 0.03, 0.02];
+    let mut origins = vec![(Vector::zeros(), Vector::zeros(), Vector::x(), -1.5, 1.5)];
+    for length in &lengths[..3] {
+        origins.push((Vector::new(0.0, 0.0, *length), Vector::zeros(), Vector::y(), -1.5, 1.5));
+    }
+    let wide = turning(&origins);
+    let mut joints = wide.joints.clone();
+    joints.push(joints[3].clone());
+    joints[4].parent_from_joint.translation.vector = Vector::new(0.0, 0.0, lengths[3]);
+    let terms = [(1, -1.0), (2, -1.0), (3, -1.0)];
+    joints[4].drive = Coupling { terms: terms.into_iter().collect(), offset: 0.1 };
+    let limit = LinearLimit::new("last".into(), &joints[4].drive, range);
+    let chain = Chain::new(joints, wide.names.clone(), wide.lower.clone(), wide.upper.clone());
+    (chain.with_linear_limits(vec![limit]), Point::new(0.0, 0.0, 0.03))
+}
+
+#[test]
+fn limits_of_a_joint_with_several_leaders_are_kept_and_reached() {
+    let mut rng = Rng::keyed(11, "levelled", 0);
+    let range = [-0.4, 0.9];
+    let (chain, center) = levelled_finger(range);
+    let ik = FingerIk::new(&chain, &center);
+    let inside = |q: &[f64]| {
+        let last = 0.1 - q[1] - q[2] - q[3];
+        (range[0]..=range[1]).contains(&last) && q.iter().all(|q| q.abs() <= 1.5)
+    };
+    let (mut found, mut on_limit, mut asked) = (0, 0, 0);
+    while asked < 200 {
+        let q: Vec<f64> = (0..4).map(|_| rng.uniform(-1.5, 1.5)).collect();
+        if !inside(&q) {
+            continue;
+        }
+        asked += 1;
+        let target = ik.tip(&q);
+        for settings in [0.0, 0.02].map(|limit_margin| IkSettings { limit_margin, ..IkSettings::default() }) {
+            let Some(joints) = ik.solve_random(&target, &settings, &mut rng) else { continue };
+            assert!(inside(&joints) && (ik.tip(&joints) - target).norm() < POSITION_TOLERANCE);
+            assert!(chain.linear_limits[0].room(&joints) >= settings.limit_margin);
+            if settings.limit_margin == 0.0 {
+                found += 1;
+                on_limit += usize::from(chain.linear_limits[0].room(&joints) < 1e-6);
+            }
+        }
+    }
+    // Some targets are met with the sum on its limit, where clamping alone would have lost them.
+    assert!(found >= 195 && on_limit >= 8, "{found} of 200 found, {on_limit} of them on the limit");
+}
+
+#[test]
+fn jacobians_with_several_leaders_agree_with_finite_differences() {
+    let mut rng = Rng::keyed(12, "levelled jacobian", 0);
+    let (chain, center) = levelled_finger([-9.0, 9.0]);
+    let ik = FingerIk::new(&chain, &center);
+    for _ in 0..50 {
+        let q: Vec<f64> = (0..4).map(|_| rng.uniform(-1.5, 1.5)).collect();
+        let mut poses = Vec::new();
+        chain.forward(&q, &mut poses);
+        let tip = ik.tip(&q);
+        assert!((poses[4] * center - tip).norm() < 1e-15);
+        let columns = ik.tip_jacobian(&q);
+        let of_chain = chain.jacobian(&poses, &tip);
+        let twists = crate::kinematics::whole_pose::twists(&chain, &q, &tip);
+        for k in 0..4 {
+            let [low, high] = [-1e-6, 1e-6].map(|step| {
+                let mut moved = q.clone();
+                moved[k] += step;
+                ik.tip(&moved)
+            });
+            let difference = (high - low) / 2e-6;
+            for column in [columns[k], of_chain.column(k).into_owned(), twists[k][0]] {
+                assert!((column - difference).norm() < 1e-9);
+            }
+        }
+    }
 }

@@ -58,8 +58,7 @@ struct Window {
 
 impl Window {
     fn new(joint: &ChainJoint, chain: &Chain) -> Self {
-        let at = |coordinate: f64| joint.multiplier * coordinate + joint.offset;
-        let (a, b) = (at(chain.lower[joint.coordinate]), at(chain.upper[joint.coordinate]));
+        let [a, b] = joint.range([&chain.lower, &chain.upper]);
         let half = 0.5 * (b - a).abs() + 1e-6;
         if half < PI {
             let (sine, cosine) = (0.5 * (a + b)).sin_cos();
@@ -81,6 +80,21 @@ enum Axes {
     Meeting,
     Parallel,
     Skew,
+}
+
+/// What is asked of a solution.
+struct Goal<'a> {
+    chain: &'a Chain,
+    /// The target, from the foot of the common normal on axis 1.
+    from_axis: Vector,
+    limit_margin: f64,
+}
+
+/// The component of the rotated arm that the equations give at once.
+#[derive(Clone, Copy)]
+enum Known {
+    X(f64),
+    Y(f64),
 }
 
 /// The closed form of one chain, prepared. Everything is in the base frame with all joint angles zero.
@@ -116,12 +130,18 @@ impl ThreeR {
     /// None unless the chain has three turning joints with a coordinate each and can move its tip in three directions.
     pub fn new(chain: &Chain, center_in_body: &Point) -> Option<Self> {
         let joints: &[_; 3] = chain.joints.as_slice().try_into().ok()?;
+        if !chain.linear_limits.is_empty() {
+            return None;
+        }
         let mut driven = [false; 3];
-        for joint in joints {
-            if joint.motion != Motion::Turn || joint.multiplier == 0.0 || chain.n_coordinates() != 3 {
+        let mut drives = [(0, 1.0, 0.0); 3];
+        for (joint, drive) in joints.iter().zip(&mut drives) {
+            let (coordinate, multiplier) = joint.drive.single()?;
+            if joint.motion != Motion::Turn || multiplier == 0.0 || chain.n_coordinates() != 3 {
                 return None;
             }
-            driven[joint.coordinate] = true;
+            driven[coordinate] = true;
+            *drive = (coordinate, multiplier, joint.drive.offset);
         }
         if driven.contains(&false) {
             return None;
@@ -193,7 +213,7 @@ impl ThreeR {
             height,
             half_square,
             twist_height,
-            drives: joints.each_ref().map(|joint| (joint.coordinate, joint.multiplier, joint.offset)),
+            drives,
             windows: joints.each_ref().map(|joint| Window::new(joint, chain)),
             center_in_body: *center_in_body,
         })
@@ -218,6 +238,7 @@ impl ThreeR {
     fn candidates(&self, chain: &Chain, target: &Point, limit_margin: f64) -> Candidates {
         let mut candidates = Candidates::new();
         let from_axis = target.coords - self.origin_1;
+        let goal = Goal { chain, from_axis, limit_margin };
         // Distance and height equations: rho . e1 * offset = distance(q3), rho . e2 * twist_sine = rise(q3).
         let distance = Wave {
             constant: 0.5 * from_axis.norm_squared() - self.half_square.constant,
@@ -233,13 +254,13 @@ impl ThreeR {
             Axes::Meeting => {
                 for (c, s) in zeros_of(&distance) {
                     let rho_y = rise.at(c, s) / self.twist_sine;
-                    self.both_signs(chain, &from_axis, limit_margin, (c, s), rho_y, true, &mut candidates);
+                    self.both_signs(&goal, (c, s), Known::Y(rho_y), &mut candidates);
                 }
             }
             Axes::Parallel => {
                 for (c, s) in zeros_of(&rise) {
                     let rho_x = distance.at(c, s) / self.offset;
-                    self.both_signs(chain, &from_axis, limit_margin, (c, s), rho_x, false, &mut candidates);
+                    self.both_signs(&goal, (c, s), Known::X(rho_x), &mut candidates);
                 }
             }
             Axes::Skew => {
@@ -247,7 +268,7 @@ impl ThreeR {
                 let rho_y = scaled(&rise, 1.0 / self.twist_sine);
                 for (c, s) in circle_zeros(&rho_x, &rho_y, &self.x, &self.y) {
                     let rho = (rho_x.at(c, s), rho_y.at(c, s));
-                    self.finish(chain, &from_axis, limit_margin, (c, s), rho, &mut candidates);
+                    self.finish(&goal, (c, s), rho, &mut candidates);
                 }
             }
         }
@@ -297,29 +318,24 @@ impl ThreeR {
     }
 
     /// One component of the rotated arm is known; the other follows from its length, up to the sign.
-    fn both_signs(
-        &self,
-        chain: &Chain,
-        from_axis: &Vector,
-        limit_margin: f64,
-        joint_3: (f64, f64),
-        known: f64,
-        known_is_y: bool,
-        candidates: &mut Candidates,
-    ) {
+    fn both_signs(&self, goal: &Goal, joint_3: (f64, f64), known: Known, candidates: &mut Candidates) {
         if !self.windows[2].may_hold(joint_3.0, joint_3.1, 1.0) {
             return;
         }
         let (x, y) = (self.x.at(joint_3.0, joint_3.1), self.y.at(joint_3.0, joint_3.1));
         let length_squared = x * x + y * y;
-        let rest = length_squared - known * known;
+        let (Known::X(value) | Known::Y(value)) = known;
+        let rest = length_squared - value * value;
         if rest < -1e-9 * length_squared {
             return;
         }
         let other = rest.max(0.0).sqrt();
         for other in [other, -other] {
-            let rho = if known_is_y { (other, known) } else { (known, other) };
-            self.finish(chain, from_axis, limit_margin, joint_3, rho, candidates);
+            let rho = match known {
+                Known::X(x) => (x, other),
+                Known::Y(y) => (other, y),
+            };
+            self.finish(goal, joint_3, rho, candidates);
             if other == 0.0 {
                 break;
             }
@@ -327,15 +343,8 @@ impl ThreeR {
     }
 
     /// Joint 2 turns the arm's `(x, y)` to `rho`, joint 1 brings it to the target; keeps what is within the limits.
-    fn finish(
-        &self,
-        chain: &Chain,
-        from_axis: &Vector,
-        limit_margin: f64,
-        (c, s): (f64, f64),
-        rho: (f64, f64),
-        candidates: &mut Candidates,
-    ) {
+    fn finish(&self, goal: &Goal, (c, s): (f64, f64), rho: (f64, f64), candidates: &mut Candidates) {
+        let &Goal { chain, from_axis, limit_margin } = goal;
         let within = |joint: usize, s: f64, c: f64, length: f64| {
             if !self.windows[joint].may_hold(c, s, length) {
                 return None;
@@ -349,8 +358,8 @@ impl ThreeR {
         let (x, y, height) = (self.x.at(c, s), self.y.at(c, s), self.height.at(c, s));
         let Some(q2) = within(1, x * rho.1 - y * rho.0, x * rho.0 + y * rho.1, x * x + y * y) else { return };
         let before = self.e1 * (self.offset + rho.0) + self.e2 * rho.1 + self.axis_2 * height;
-        let turned = self.axis_1.dot(&before.cross(from_axis));
-        let straight = before.dot(from_axis) - self.axis_1.dot(&before) * self.axis_1.dot(from_axis);
+        let turned = self.axis_1.dot(&before.cross(&from_axis));
+        let straight = before.dot(&from_axis) - self.axis_1.dot(&before) * self.axis_1.dot(&from_axis);
         let Some(q1) = within(0, turned, straight, (turned * turned + straight * straight).sqrt()) else { return };
         let mut coordinates = [0.0; 3];
         for (q, drive) in [q1, q2, q3].into_iter().zip(&self.drives) {

@@ -1,0 +1,92 @@
+//! Failures for people.
+
+use crate::words::{counted, grouped};
+use regrasp::Failure;
+use regrasp::planners::FailureKind;
+use std::fmt::Write;
+
+/// A failure for people: what, why most often, how near, what to try.
+pub fn failure_text(failure: &Failure) -> String {
+    let heading = match failure.kind {
+        FailureKind::StartInvalid => "NO PLAN: the start is not valid",
+        FailureKind::GoalInvalid => "NO PLAN: the goal is not valid",
+        FailureKind::SettingsInvalid => "NO PLAN: the settings make no sense",
+        FailureKind::WayInvalid => "NO PLAN: a way pose is not valid",
+        FailureKind::Impossible => "NO PLAN: impossible with this hand and these contacts",
+        FailureKind::NotConnected => "NO PLAN on this roadmap (not a proof)",
+        FailureKind::WorkSpent => "NO PLAN within the work allowed (not a proof)",
+        FailureKind::TimeLimit => "NO PLAN within the time limit (not a proof)",
+        FailureKind::Interrupted => "interrupted",
+    };
+    let mut out = format!("{heading}\n  {}\n", failure.message);
+    if let Some(miss) = &failure.nearest_miss {
+        let _ = writeln!(
+            out,
+            "  nearest: the object came within {:.0} deg{} of {}",
+            miss.angle_left.to_degrees(),
+            // A goal of tracking says no position.
+            if miss.distance_left > 1e-5 { format!(" and {:.1} mm", 1e3 * miss.distance_left) } else { String::new() },
+            failure.leg.map_or("the goal".to_owned(), |leg| format!("the end of leg {leg}"))
+        );
+    }
+    if !failure.causes.is_empty() {
+        let tried: u64 = failure.causes.iter().map(|cause| cause.count).sum();
+        let _ = writeln!(out, "  {} tries of the search failed:", grouped(tried));
+        for cause in failure.causes.iter().take(8) {
+            let _ = writeln!(out, "    {:>5.1} %  {}", 100.0 * cause.share, cause.reason);
+        }
+    }
+    let statistics = &failure.statistics;
+    if statistics.work > 0 {
+        let _ = writeln!(
+            out,
+            "  searched: {} nodes, {} configurations, {}",
+            grouped(statistics.nodes),
+            grouped(statistics.work),
+            counted(statistics.restarts as usize, "restart")
+        );
+    }
+    if !failure.advice.is_empty() {
+        let _ = writeln!(out, "  try: {}", failure.advice);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use regrasp::plan::plan::PoseData;
+    use regrasp::planners::{Cause, NearestMiss};
+
+    #[test]
+    fn a_failure_is_told_with_causes_nearest_miss_and_advice() {
+        let failure = Failure {
+            kind: FailureKind::TimeLimit,
+            message: "no way in 2 s".into(),
+            advice: "more time: --time-limit 20".into(),
+            causes: vec![
+                Cause { reason: "finger \"thumb\" cannot reach a new contact".into(), count: 3000, share: 0.75 },
+                Cause { reason: "closure lost".into(), count: 1000, share: 0.25 },
+            ],
+            leg: Some(2),
+            nearest_miss: Some(Box::new(NearestMiss {
+                world_from_object: PoseData { position: [0.0; 3], quat_xyzw: [0.0, 0.0, 0.0, 1.0] },
+                angle_left: 61f64.to_radians(),
+                distance_left: 0.0012,
+                joints: vec![],
+            })),
+            reached: None,
+            statistics: Default::default(),
+        };
+        let text = failure_text(&failure);
+        for part in [
+            "not a proof",
+            "within 61 deg and 1.2 mm of the end of leg 2",
+            "4 000 tries",
+            "75.0 %  finger \"thumb\"",
+            "try: more time",
+        ] {
+            assert!(text.contains(part), "{part} is missing in\n{text}");
+        }
+    }
+}

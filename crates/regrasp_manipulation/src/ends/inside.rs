@@ -1,0 +1,67 @@
+//! A hand that is inside something is refused before any search.
+
+use crate::failure::{Failure, FailureKind};
+use crate::model::{Body, Carrier, Model};
+use regrasp_geometry::collision::{Answer, Placement, separation};
+use regrasp_geometry::{Point, Pose, Shape, Vector};
+use regrasp_robot::kinematics::chain::Motion;
+
+/// Radius of a ball that stands for a point, in metres.
+const POINT: f64 = 1e-9;
+
+/// Refuses a hand of which the palm, or what a finger begins with, is inside an obstacle or inside the object at the start.
+pub fn refuse_hand_inside(model: &Model, world_from_object_start: &Pose) -> Result<(), Failure> {
+    let object = &model.bodies[model.object];
+    let at_object = Placement::from(world_from_object_start).then(&object.carrier_from_body);
+    let obstacles = model.bodies[model.first_obstacle()..].iter();
+    let solids = obstacles.map(|body| (body, body.carrier_from_body)).chain([(object, at_object)]);
+    for (solid, at) in solids {
+        if let Some(part) = palm_inside(model, solid, &at).or_else(|| finger_inside(model, solid, &at)) {
+            let message = format!("at the start \"{part}\" is inside \"{}\"; nothing was moved", solid.name);
+            let advice = "move the hand, the object or the obstacle; correct world_from_hand or the mesh's scale";
+            return Err(Failure::bare(FailureKind::StartInvalid, message, advice));
+        }
+    }
+    Ok(())
+}
+
+/// The first part of the palm, when all of its parts are inside: a mount may hold one of them.
+fn palm_inside<'m>(model: &'m Model, solid: &Body, at: &Placement) -> Option<&'m str> {
+    let palm = || model.bodies[..model.object].iter().filter(|body| matches!(body.carrier, Carrier::World));
+    let middle = |body: &Body| body.carrier_from_body.point(&body.middle);
+    let is_inside = palm().all(|body| holds(solid, at, &middle(body)));
+    palm().next().filter(|_| is_inside).map(|body| body.name.as_str())
+}
+
+/// A first body of a finger that is inside whatever its joint does: the ball in which it turns is.
+fn finger_inside<'m>(model: &'m Model, solid: &Body, at: &Placement) -> Option<&'m str> {
+    model.fingers.iter().find_map(|finger| {
+        let first = finger.ik.chain().joints.first()?;
+        let base = Point::from(first.parent_from_joint.translation.vector);
+        let begins = |body: &&Body| matches!(body.carrier, Carrier::Finger { link: 0, .. });
+        let bodies = || model.bodies[finger.bodies.clone()].iter().filter(begins);
+        let reach = |body: &Body| body.carrier_from_body.point(&body.center).coords.norm() + body.radius;
+        let radius = bodies().map(reach).fold(0.0, f64::max);
+        let slides = matches!(first.motion, Motion::Slide);
+        let tree = solid.tree.as_ref()?;
+        let ball = Placement { translation: base.coords, ..Placement::IDENTITY };
+        let seen = at.inverse_then(&ball);
+        let is_deep = !slides
+            && radius > 0.0
+            && tree.is_apart(&Shape::Sphere { radius }, &seen, 0.0, &mut 0.0)
+            && tree.holds(&Point::from(seen.translation));
+        bodies().next().filter(|_| is_deep).map(|body| body.name.as_str())
+    })
+}
+
+/// True when `point`, in the world, is inside `solid`.
+fn holds(solid: &Body, at: &Placement, point: &Point) -> bool {
+    if let Some(tree) = &solid.tree {
+        return tree.holds(&at.point_to_child(point));
+    }
+    let speck = Shape::Sphere { radius: POINT };
+    let there = Placement { translation: point.coords, ..Placement::IDENTITY };
+    let mut direction = Vector::zeros();
+    let answer = separation(&speck, &there, &solid.shape, at, 0.0, 0.0, &mut direction, &mut [0; 2]);
+    !matches!(answer, Answer::SeparatedBy(_))
+}

@@ -1,0 +1,122 @@
+//! Contacts that a finger can reach, drawn at random.
+
+use crate::model::Model;
+use crate::relocation::{Foothold, lift_is_within_reach};
+use crate::rolling::follow::ik_settings;
+use crate::workspace::{TipMode, Workspace};
+use regrasp_base::Rng;
+use regrasp_geometry::collision::Placement;
+use regrasp_geometry::{UnitVector, Vector};
+use regrasp_grasp::Contact;
+use regrasp_robot::kinematics::finger_ik::Coordinates;
+
+/// How strongly rays are drawn towards the finger. By hand: half of the rays fall within 55 degrees.
+const PULL: f64 = 0.9;
+
+/// Draws a contact on the object that lies towards `finger`, with the object at `world_from_object`.
+///
+/// A ray from a random inner point within a wide cone about the finger's working place: twice as quick as drawing by
+/// area (in-hand-notes, 5). The contact is where the ray leaves the solid: where that happens more than once, any of them.
+///
+/// None too when the work allowed is spent on contacts that do not fit.
+pub fn draw_contact(
+    workspace: &mut Workspace,
+    finger: usize,
+    world_from_object: &Placement,
+    rng: &mut Rng,
+) -> Option<Contact> {
+    if workspace.is_spent_on_draws() {
+        return None;
+    }
+    let mut n_measured = 0;
+    let draw = |_| draw_contact_once(workspace.model, finger, world_from_object, rng, &mut n_measured);
+    let found = (0..RAYS).find_map(draw);
+    // A contact that is found costs what is done with it; one that is not would cost nothing.
+    let free = if found.is_some() { MEASURED_FREE } else { 0 };
+    workspace.count_draws(n_measured.saturating_sub(free) / MEASURED_PER_WORK);
+    found
+}
+
+/// Distances from the surface that the draw of a contact may take at no cost where one is found; most take a few.
+const MEASURED_FREE: u64 = 100;
+
+/// Distances from the surface that count as a configuration: on a mesh of ten thousand triangles they take as long.
+const MEASURED_PER_WORK: u64 = 10;
+
+/// Rays drawn for one contact: most of those that miss the finger's reach cost little.
+const RAYS: usize = 24;
+
+fn draw_contact_once(
+    model: &Model,
+    finger: usize,
+    world_from_object: &Placement,
+    rng: &mut Rng,
+    n_measured: &mut u64,
+) -> Option<Contact> {
+    let object = &model.view.object;
+    let inner = object.center_of_mass + Vector::from(rng.direction()) * (0.4 * model.frame.torque_scale * rng.unit());
+    let towards = world_from_object.point_to_child(&model.fingers[finger].tip_at_rest) - inner;
+    let direction = towards.normalize() * PULL + Vector::from(rng.direction());
+    let direction = UnitVector::try_new(direction, 1e-9)?;
+    let mut exits = object.surface.exits(&inner, &direction);
+    let chosen = match exits.len() {
+        0 => return None,
+        1 => 0,
+        n => rng.below(n),
+    };
+    let hit = exits.swap_remove(chosen);
+    let finger_model = &model.fingers[finger];
+    let rough = Contact { point_in_object: hit.point_in_object, normal_in_object: hit.normal_in_object };
+    if !finger_model.may_reach(world_from_object, &rough) {
+        return None;
+    }
+    let hit = object.surface.settle_counted(&hit, finger_model.settle_radius, n_measured)?;
+    if object.surface.crease_distance(&hit) < object.edge_distance {
+        return None;
+    }
+    Some(Contact { point_in_object: hit.point_in_object, normal_in_object: hit.normal_in_object })
+}
+
+/// Joints of `finger` at `contact` from which it can be lifted again, clear of everything but the other fingers; the
+/// workspace has the object in place.
+pub fn reach(
+    workspace: &mut Workspace,
+    finger: usize,
+    contact: &Contact,
+    world_from_object: &Placement,
+    rng: &mut Rng,
+) -> Option<Coordinates> {
+    let model = workspace.model;
+    let normal = UnitVector::new_unchecked(world_from_object.vector(&contact.normal_in_object));
+    let settings = ik_settings(model, finger, normal);
+    let joints = model.fingers[finger].touch_random(world_from_object, contact, &settings, rng)?;
+    if !lift_is_within_reach(model, world_from_object, finger, &Foothold { contact: Some(contact), joints: &joints }) {
+        return None;
+    }
+    workspace.set_finger(finger, &joints);
+    let mode = TipMode::Near { finger, normal_in_world: normal.into_inner() };
+    workspace.finger_alone_is_clear(finger, mode).then_some(joints)
+}
+
+/// Draws contacts of `finger` that it can take, with its joints there: up to `n_wanted`, each given to `found`.
+///
+/// The workspace has the object at `world_from_object` and keeps it there; the finger is left anywhere.
+pub fn draw_footholds(
+    workspace: &mut Workspace,
+    finger: usize,
+    world_from_object: &Placement,
+    n_wanted: usize,
+    rng: &mut Rng,
+    mut found: impl FnMut(Contact, Coordinates),
+) {
+    let mut n_found = 0;
+    for _ in 0..8 * n_wanted {
+        if n_found == n_wanted {
+            return;
+        }
+        let Some(contact) = draw_contact(workspace, finger, world_from_object, rng) else { continue };
+        let Some(joints) = reach(workspace, finger, &contact, world_from_object, rng) else { continue };
+        found(contact, joints);
+        n_found += 1;
+    }
+}

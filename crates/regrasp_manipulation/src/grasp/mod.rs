@@ -1,0 +1,8 @@
+//! Grasps, the contacts that they are made of, and the motions between them.
+
+/// Contacts that a finger can reach, drawn at random.
+pub mod contact;
+/// Motions from grasp to grasp.
+pub mod sequence;
+/// Points of GS_n and GS_k.
+pub mod state;

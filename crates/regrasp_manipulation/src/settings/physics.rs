@@ -1,0 +1,87 @@
+//! Settings of motions: what contacts do, what is kept, and how plans are carried out. Every default says where it comes from.
+
+use super::{ForceSettings, SpeedSettings};
+use regrasp_scene::Limits;
+use serde::{Deserialize, Serialize};
+
+/// What contacts do while the object moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TransferMode {
+    /// Round fingertips roll without slipping, and contacts travel on both surfaces (paper 004, section IV-C). Sharp tips keep
+    /// their contacts. The default: real tips roll, and in a simulation plans that ignore it end 12 to 29 degrees off
+    /// (physics-notes, 3).
+    Rolling,
+    /// Contacts stay where they are on the object (paper 000, section 3.2), as if tips were points.
+    Fixed,
+}
+
+/// What motions keep, and how they are carried out. Lengths in metres, angles in radians.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PhysicsSettings {
+    /// What contacts do while the object moves.
+    pub transfer: TransferMode,
+    /// What the scene's friction coefficient is divided by: closure and forces count on that much only. At least 1. The default
+    /// kept 20 of 20 plans in simulation where 1 kept 2 of 8 (physics-notes, 3).
+    pub friction_margin: f64,
+    /// Closure margin asked of every holding set; dimensionless, in `[0, 1)`. See `regrasp_grasp::margin`. By hand:
+    /// 0.005 is about a tenth of what a good grasp of three has.
+    pub closure_margin: f64,
+    /// Longest step of the object or a fingertip between waypoints (in-hand-notes, 4.10: 2 to 3 mm).
+    pub step: f64,
+    /// Distance that bodies keep which do not touch. By hand.
+    pub clearance: f64,
+    /// How far the tip link of a holding finger may press into the object in the model. By hand: well below the
+    /// contact tolerance of 0.5 mm.
+    pub contact_allowance: f64,
+    /// Distance kept from joint limits (in-hand-notes, 4.4).
+    pub limit_margin: f64,
+    /// Largest change of a joint in one step that counts as continuous (real-hands-notes, 5.3).
+    pub joint_step: f64,
+    /// Heights to lift a finger to, tried in this order (in-hand-notes, 4.4, and real-hands-notes, 2).
+    pub lift_heights: Vec<f64>,
+    /// Attempts of RRT-Connect for a moving finger (in-hand-notes, 4.8).
+    pub rrt_iterations: usize,
+    /// Contact forces; none for plans that say nothing about them.
+    pub forces: Option<ForceSettings>,
+    /// How fast plans are carried out.
+    pub speed: SpeedSettings,
+}
+
+impl Default for PhysicsSettings {
+    fn default() -> Self {
+        PhysicsSettings {
+            transfer: TransferMode::Rolling,
+            friction_margin: 1.5,
+            closure_margin: 0.005,
+            step: 0.003,
+            clearance: 0.0002,
+            contact_allowance: 0.0003,
+            limit_margin: 0.01,
+            joint_step: 0.4,
+            lift_heights: vec![0.006, 0.0024, 0.001, 0.0004],
+            rrt_iterations: 100,
+            forces: Some(ForceSettings::default()),
+            speed: SpeedSettings::default(),
+        }
+    }
+}
+
+impl PhysicsSettings {
+    /// The same within the limits of a scene, which no plan may exceed.
+    #[must_use]
+    pub fn within(&self, limits: &Limits) -> Self {
+        let mut within = self.clone();
+        let speed = &mut within.speed;
+        speed.largest_speed = speed.largest_speed.min(limits.largest_speed);
+        speed.joint_velocity = speed.joint_velocity.min(limits.joint_velocity);
+        speed.joint_acceleration = speed.joint_acceleration.min(limits.joint_acceleration);
+        if let Some(forces) = &mut within.forces {
+            forces.normal_force = forces.normal_force.map(|force| force.min(limits.normal_force));
+            forces.squeeze = forces.squeeze.min(limits.normal_force);
+        }
+        within.friction_margin =
+            limits.friction_margin.map_or(self.friction_margin, |least| self.friction_margin.max(least));
+        within
+    }
+}

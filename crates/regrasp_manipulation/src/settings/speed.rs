@@ -1,0 +1,53 @@
+//! Settings of times.
+
+use serde::{Deserialize, Serialize};
+
+/// How fast plans are carried out. Plans are quasi-static: forces balance the weight, not accelerations.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SpeedSettings {
+    /// Largest speed of fingertips and of the object's surface, in metres per second (notes on physics, section 1; 0.08
+    /// made no clear difference).
+    pub largest_speed: f64,
+    /// Largest velocity of joints of which the robot has none, in radians or metres per second: what small servos do.
+    pub joint_velocity: f64,
+    /// Largest acceleration of joints, in radians or metres per second squared, as robot files have none: from rest to
+    /// the velocity above in a tenth of a second.
+    pub joint_acceleration: f64,
+    /// Time in which forces change between two segments, in seconds (notes on physics, section 1; 0.05 made no
+    /// difference).
+    pub ramp: f64,
+}
+
+impl Default for SpeedSettings {
+    fn default() -> Self {
+        SpeedSettings { largest_speed: 0.04, joint_velocity: 2.0, joint_acceleration: 20.0, ramp: 0.25 }
+    }
+}
+
+impl SpeedSettings {
+    /// What is wrong with the settings, if anything.
+    pub fn validate(&self) -> Result<(), String> {
+        let SpeedSettings { largest_speed, joint_velocity, joint_acceleration, ramp } = *self;
+        let positive = [
+            ("largest_speed", largest_speed),
+            ("joint_velocity", joint_velocity),
+            ("joint_acceleration", joint_acceleration),
+        ];
+        match positive.iter().find(|(_, value)| !(*value >= LEAST_SPEED && *value <= MAX_SPEED)) {
+            Some((name, value)) => {
+                Err(format!("speed.{name} is {value}; it must be between {LEAST_SPEED} and {MAX_SPEED}"))
+            }
+            None if !(0.0..=60.0).contains(&ramp) => {
+                Err(format!("speed.ramp is {ramp}; it must be between 0 and 60 seconds"))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+/// Slowest and fastest that a plan may be carried out: times stay numbers that make sense.
+const LEAST_SPEED: f64 = 1e-6;
+
+/// See there.
+const MAX_SPEED: f64 = 1e6;

@@ -1,0 +1,181 @@
+//! Why attempts failed: counted on the way, told when no plan is found.
+
+use crate::in_hand::attempt::release::Held;
+use regrasp_geometry::Pose;
+use regrasp_manipulation::failure::Cause;
+use regrasp_manipulation::forces::limits::Unbalanced;
+use regrasp_manipulation::grasp::state::MAX_FINGERS;
+use regrasp_manipulation::model::{Model, Pair};
+
+/// A reason for which an attempt of the search failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Reason {
+    /// No contact was found that a finger reaches, clear of object, palm and obstacles.
+    NoContact(usize),
+    /// The contacts found make no closed grasp with a finger that may let go.
+    NotClosed,
+    /// A closed grasp was found, but the fingers find no free way to it in any order.
+    NoWayOver,
+    /// A closed grasp was found that this finger has to leave its contact for, but the others do not hold without it.
+    Bound(usize),
+    /// A transfer stopped at once: a finger reaches no farther.
+    OutOfReach,
+    /// A transfer stopped at once: this pair of bodies was too near.
+    TooNear(Pair),
+    /// Between two grasps a contact would have to cross an edge of the object.
+    Crease,
+    /// A transfer stopped short of the goal: soft fingertips would have to turn about their contacts' normals.
+    WouldTurn,
+    /// There are no contact forces that balance the weight.
+    NoForces(Unbalanced),
+    /// A path in GS_n could not be cut into transfers and regrasps.
+    NotDecomposed,
+}
+
+/// Grasps looked at in which a finger holds, and what the others would do without it.
+#[derive(Debug, Clone, Default)]
+struct Release {
+    seen: Held,
+    /// Pose of the object where the margin of the others was largest.
+    best_at: Option<Pose>,
+}
+
+impl Release {
+    fn add(&mut self, seen: &Held, at: Option<Pose>) {
+        if seen.n_grasps > 0 && (self.best_at.is_none() || seen.best > self.seen.best) {
+            self.best_at = at;
+        }
+        self.seen.add(seen);
+    }
+}
+
+/// Counts per reason.
+#[derive(Debug, Clone, Default)]
+pub struct Tally {
+    counts: std::collections::BTreeMap<Reason, u64>,
+    releases: [Release; MAX_FINGERS],
+    /// The smallest turn about a contact normal for want of which a transfer stopped short of the goal, in radians.
+    least_turn: Option<f64>,
+}
+
+impl Tally {
+    /// One more failure for `reason`.
+    pub fn add(&mut self, reason: Reason) {
+        *self.counts.entry(reason).or_default() += 1;
+    }
+
+    /// So many more failures for `reason`.
+    pub fn add_many(&mut self, reason: Reason, count: u64) {
+        *self.counts.entry(reason).or_default() += count;
+    }
+
+    /// One more transfer that stopped short of the goal because fingertips would have to turn by `turn` about a contact normal.
+    pub fn note_turn(&mut self, turn: f64) {
+        self.add(Reason::WouldTurn);
+        self.least_turn = Some(self.least_turn.map_or(turn, |least| least.min(turn)));
+    }
+
+    /// What was seen of letting `finger` go.
+    pub fn release(&self, finger: usize) -> &Held {
+        &self.releases[finger].seen
+    }
+
+    /// Adds another tally.
+    pub fn merge(&mut self, other: &Tally) {
+        for (&reason, count) in &other.counts {
+            *self.counts.entry(reason).or_default() += count;
+        }
+        self.least_turn = [self.least_turn, other.least_turn].into_iter().flatten().min_by(f64::total_cmp);
+        for (release, more) in self.releases.iter_mut().zip(&other.releases) {
+            release.add(&more.seen, more.best_at);
+        }
+    }
+
+    /// Takes note of the grasps that were looked at with the object at `world_from_object`.
+    pub fn note_releases(&mut self, seen: &[Held], world_from_object: &Pose) {
+        for (release, seen) in self.releases.iter_mut().zip(seen) {
+            release.add(seen, Some(*world_from_object));
+        }
+    }
+
+    /// The fingers that could let go nowhere, in words; None where every finger could somewhere, or none was asked about.
+    pub fn bound_fingers(&self, model: &Model) -> Option<String> {
+        let required = model.settings.closure_margin;
+        let bound: Vec<String> = (0..model.n_fingers())
+            .filter_map(|finger| {
+                let Release { seen, best_at } = &self.releases[finger];
+                let at = best_at.as_ref().filter(|_| seen.n_held == 0)?;
+                let (name, p) = (&model.view.hand.fingers[finger].name, at.translation.vector);
+                Some(format!(
+                    "\"{name}\" (the others are closed in none of {} closed grasps; nearest: margin {:.4} of {required}, with \
+                     the object at [{:.4}, {:.4}, {:.4}] m, turned by {:.1} degrees)",
+                    seen.n_grasps,
+                    seen.best,
+                    p.x,
+                    p.y,
+                    p.z,
+                    at.rotation.angle().to_degrees()
+                ))
+            })
+            .collect();
+        (!bound.is_empty()).then(|| format!("never to be released: {}", bound.join(", ")))
+    }
+
+    /// The causes in words, commonest first.
+    pub fn causes(&self, model: &Model) -> Vec<Cause> {
+        let total: u64 = self.counts.values().sum();
+        let finger_name = |f: usize| model.view.hand.fingers[f].name.as_str();
+        let mut causes: Vec<Cause> = self
+            .counts
+            .iter()
+            .map(|(&reason, &count)| Cause {
+                reason: match reason {
+                    Reason::NoContact(f) => format!("finger \"{}\" finds no contact it reaches", finger_name(f)),
+                    Reason::NotClosed => "no closed grasp of which a finger may let go".into(),
+                    Reason::NoWayOver => "no free way for the fingers to the next grasp".into(),
+                    Reason::Bound(f) => {
+                        format!("finger \"{}\" cannot be released: the others are not closed", finger_name(f))
+                    }
+                    Reason::OutOfReach => "a finger reaches no farther while the object moves".into(),
+                    Reason::Crease => "a contact would have to slide over an edge of the object".into(),
+                    Reason::WouldTurn => format!(
+                        "soft fingertips would have to turn about their contact normals, by {:.2} degrees at least",
+                        self.least_turn.unwrap_or(0.0).to_degrees()
+                    ),
+                    Reason::NoForces(unbalanced) => unbalanced.in_words(model),
+                    Reason::NotDecomposed => {
+                        "a path with sliding contacts has no transfers and regrasps near it".into()
+                    }
+                    Reason::TooNear(pair) => {
+                        format!("\"{}\" comes too near \"{}\"", model.bodies[pair.a].name, model.bodies[pair.b].name)
+                    }
+                },
+                count,
+                share: count as f64 / total as f64,
+            })
+            .collect();
+        causes.sort_by_key(|cause| std::cmp::Reverse(cause.count));
+        causes
+    }
+
+    /// Counts by reason, without names of bodies: for statistics.
+    pub fn counts(&self) -> std::collections::BTreeMap<String, u64> {
+        let mut counts = std::collections::BTreeMap::new();
+        for (reason, count) in &self.counts {
+            let key = match reason {
+                Reason::NoContact(_) => "no_contact",
+                Reason::NotClosed => "not_closed",
+                Reason::NoWayOver => "no_way_over",
+                Reason::Bound(_) => "not_released",
+                Reason::OutOfReach => "out_of_reach",
+                Reason::TooNear(_) => "too_near",
+                Reason::Crease => "crease",
+                Reason::WouldTurn => "would_turn",
+                Reason::NoForces(_) => "no_forces",
+                Reason::NotDecomposed => "not_decomposed",
+            };
+            *counts.entry(key.to_owned()).or_default() += count;
+        }
+        counts
+    }
+}

@@ -1,0 +1,12 @@
+//! Motions of the object with fingers that keep their contacts, roll, or are free (paper 000, section 4.2.3).
+
+/// Linear paths in GS_n.
+pub mod grasp_path;
+#[cfg(test)]
+mod roll_tests;
+/// Motions in which soft fingertips do not turn about their normals.
+pub mod spin;
+/// One step of the object.
+pub mod step;
+/// Transfer paths.
+pub mod transfer;

@@ -1,0 +1,106 @@
+//! Start and goal as the query gives them: what is wrong with them is said before any search.
+
+use crate::settings::{InHandSettings, Method};
+use regrasp_base::Rng;
+use regrasp_geometry::Pose;
+use regrasp_grasp::ContactModel;
+use regrasp_grasp::closure::may_close;
+use regrasp_manipulation::ends::blocked::{refuse_buried_object, refuse_object_out_of_reach};
+use regrasp_manipulation::ends::end::End;
+use regrasp_manipulation::ends::given_grasp::{Near, given_grasp_at};
+use regrasp_manipulation::ends::inside::refuse_hand_inside;
+use regrasp_manipulation::failure::{Failure, FailureKind};
+use regrasp_manipulation::grasp::state::GraspState;
+use regrasp_manipulation::model::{Model, fingers_in_words, friction_in_words, releasable};
+use regrasp_scene::{GraspRequest, InHandQuery};
+
+/// Refuses what no search can find: hands that cannot hold or never change their grasp, poses at which the object is buried.
+pub fn refuse_hopeless(model: &Model, settings: &InHandSettings, query: &InHandQuery) -> Result<(), Failure> {
+    refuse_holding_nothing(model)?;
+    let may_try_transfers = model.n_fingers() == 2 || settings.search.transfers_alone;
+    if settings.method != Method::Gait || !may_try_transfers {
+        refuse_impossible(model)?;
+    }
+    let way = query.world_from_object_way.iter().enumerate().map(|(index, pose)| (End::Way(index + 1), pose));
+    let ends = [(End::Start, &query.world_from_object_start)].into_iter().chain(way);
+    for (end, pose) in ends.chain([(End::Goal, &query.world_from_object_goal)]) {
+        refuse_buried_object(model, end, pose)?;
+        refuse_object_out_of_reach(model, end, pose)?;
+    }
+    refuse_hand_inside(model, &query.world_from_object_start)
+}
+
+/// Refuses hands of which the others can never hold while one finger is away.
+pub fn refuse_impossible(model: &Model) -> Result<(), Failure> {
+    if model.may_release {
+        return Ok(());
+    }
+    Err(Failure::bare(FailureKind::Impossible, never_released(model), MORE_FINGERS))
+}
+
+/// Refuses hands that cannot hold an object even with all fingers.
+fn refuse_holding_nothing(model: &Model) -> Result<(), Failure> {
+    let all: Vec<ContactModel> = model.fingers.iter().map(|finger| finger.contact).collect();
+    if may_close(&all, model.frame.friction) {
+        return Ok(());
+    }
+    let message = format!(
+        "the hand has {} and friction {}: all of them together cannot hold an object",
+        fingers_in_words(model),
+        friction_in_words(model)
+    );
+    Err(Failure::bare(FailureKind::Impossible, message, MORE_FINGERS))
+}
+
+const MORE_FINGERS: &str =
+    "use a hand with at least 4 fingers, or declare soft fingertips, of which two can hold (contact = \"soft_finger\")";
+
+fn never_released(model: &Model) -> String {
+    format!(
+        "the hand has {} and friction {}: while one of them is away the others cannot hold an object (fewer than three points \
+         cannot: it turns about the line through two of them). Such a hand can never change its grasp",
+        fingers_in_words(model),
+        friction_in_words(model)
+    )
+}
+
+/// What a search with such a hand that found no transfer comes to: `failure` with the reason for which transfers are all that
+/// it has.
+pub fn refuse_after_transfers(model: &Model, failure: Failure) -> Failure {
+    Failure {
+        kind: FailureKind::Impossible,
+        message: format!("{}, and no transfer alone was found: {}", never_released(model), failure.message),
+        advice: MORE_FINGERS.into(),
+        ..failure
+    }
+}
+
+/// The grasp that the query gives at one end; None where the planner chooses.
+pub fn given_grasp(
+    model: &Model,
+    end: End,
+    world_from_object: &Pose,
+    request: &GraspRequest,
+    rng: &mut Rng,
+) -> Result<Option<GraspState>, Failure> {
+    let Some(state) = given_grasp_at(model, end, world_from_object, request, Near::Any(rng))? else { return Ok(None) };
+    let margin = model.closure_margin(&state.contacts, model.all_fingers());
+    if margin < model.settings.closure_margin {
+        return Err(end.failure(
+            format!(
+                "the {} grasp is not force closed with the margin asked for: {margin:.4} of {}, at friction {}",
+                end.name(),
+                model.settings.closure_margin,
+                friction_in_words(model)
+            ),
+            "move the contacts apart, or ask for a smaller margin",
+        ));
+    }
+    if end == End::Start && model.may_release && releasable(model, &state.contacts, state.holding) == 0 {
+        return Err(end.failure(
+            "in the start grasp no finger may let go: no n-1 of the fingers are force closed".into(),
+            "choose other contacts, or let the planner choose (grasp = \"automatic\")",
+        ));
+    }
+    Ok(Some(state))
+}

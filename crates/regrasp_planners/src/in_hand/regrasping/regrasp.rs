@@ -1,0 +1,207 @@
+//! Sequences of relocations from one grasp to another, the object standing still: which finger first.
+
+use crate::in_hand::grasps::candidate::{Candidate, Choice};
+use crate::in_hand::grasps::closure_table::ClosureTable;
+use regrasp_base::Rng;
+use regrasp_manipulation::forces::held::balances;
+use regrasp_manipulation::grasp::sequence::Sequence;
+use regrasp_manipulation::grasp::state::GraspState;
+use regrasp_manipulation::relocation::{Foothold, relocate};
+use regrasp_manipulation::workspace::Workspace;
+use regrasp_roadmap::astar::{AStar, Limits};
+use regrasp_robot::kinematics::finger_ik::Coordinates;
+
+/// Relocations already tried from one state between one set of options: what moved before decides what is in the way.
+#[derive(Debug, Default)]
+pub struct Tried {
+    /// (options of all fingers before, finger, option after) and the path, if there is one.
+    known: Vec<(Choice, usize, usize, Option<Vec<Coordinates>>)>,
+    /// True when one was refused as the others cannot balance the weight: that is counted by itself.
+    pub lacks_forces: bool,
+}
+
+impl Tried {
+    /// True when this relocation was tried and has no path.
+    fn failed(&self, before: &Choice, finger: usize, option: usize) -> bool {
+        self.known.iter().any(|(c, f, o, path)| path.is_none() && *f == finger && *o == option && c == before)
+    }
+}
+
+/// Moves fingers one at a time from option 0 of each to `goal`; each leaves only where the others that hold are closed.
+///
+/// Depth first over the orders; what failed once is not tried again. `start` holds the options 0.
+pub fn regrasp(
+    workspace: &mut Workspace,
+    start: &GraspState,
+    options: &[Vec<Candidate>],
+    goal: &Choice,
+    table: &mut ClosureTable,
+    tried: &mut Tried,
+    rng: &mut Rng,
+) -> Option<Sequence> {
+    let mut current: Choice = goal.iter().map(|_| 0).collect();
+    let mut dead: Vec<Choice> = Vec::new();
+    let mut order: Vec<(usize, usize)> = Vec::new();
+    if !search(workspace, start, options, goal, table, tried, rng, &mut current, &mut dead, &mut order) {
+        return None;
+    }
+    let mut way = Sequence::at(start.clone());
+    for (finger, which) in order {
+        way.push_regrasp(finger, options[finger][goal[finger]].contact, tried.known[which].3.clone()?);
+    }
+    Some(way)
+}
+
+/// Moves fingers one at a time from option 0 of each by the fewest relocations to a choice that is a goal, over other
+/// options where need be: where two grasps have too few fingers in common to hold by, a third one leads from one to the
+/// other. `n_away` is at most the number of relocations that a choice is away from a goal.
+///
+/// The order is sought in closure alone; a relocation that is then found impossible is left out and the order sought again,
+/// with `n_tries` relocations tried in all. `start` holds the options 0.
+pub fn regrasp_over(
+    workspace: &mut Workspace,
+    start: &GraspState,
+    options: &[Vec<Candidate>],
+    is_goal: impl Fn(&Choice) -> bool,
+    n_away: impl Fn(&Choice) -> f64,
+    table: &mut ClosureTable,
+    n_tries: usize,
+    rng: &mut Rng,
+) -> Option<Sequence> {
+    let n = options.len();
+    let all = (1u32 << n) - 1;
+    let base = options.iter().map(Vec::len).max().unwrap_or(1);
+    let as_node = |choice: &Choice| choice.iter().rev().fold(0, |node, &option| node * base + option);
+    let as_choice = |mut node: usize| -> Choice {
+        let digit = |_| {
+            let option = node % base;
+            node /= base;
+            option
+        };
+        (0..n).map(digit).collect()
+    };
+    let first: Choice = (0..n).map(|_| 0).collect();
+    let (mut tried, mut search) = (Tried::default(), AStar::new());
+    loop {
+        let limits = Limits { n_expanded: MOST_GRASPS, ..Limits::NONE };
+        let neighbours = |node: usize, edges: &mut Vec<(usize, f64)>| {
+            let choice = as_choice(node);
+            for finger in 0..n {
+                if !table.is_closed(&choice, all & !(1 << finger)) {
+                    continue;
+                }
+                for option in (0..options[finger].len()).filter(|&option| option != choice[finger]) {
+                    // The others hold wherever the finger lands.
+                    if !tried.failed(&choice, finger, option) {
+                        let mut next = choice.clone();
+                        next[finger] = option;
+                        edges.push((as_node(&next), 1.0));
+                    }
+                }
+            }
+        };
+        let is_there = |node: usize| is_goal(&as_choice(node));
+        let n_left = |node: usize| n_away(&as_choice(node));
+        let path = search.cheapest_path_within(limits, as_node(&first), is_there, neighbours, n_left)?;
+        let mut way = Sequence::at(start.clone());
+        let is_whole = path.nodes.windows(2).all(|pair| {
+            let (before, after) = (as_choice(pair[0]), as_choice(pair[1]));
+            let Some(finger) = (0..n).find(|&finger| before[finger] != after[finger]) else { return false };
+            let option = after[finger];
+            let which = try_relocation(workspace, start, options, &before, finger, option, &mut tried, rng);
+            let Some(path) = &tried.known[which].3 else { return false };
+            way.push_regrasp(finger, options[finger][option].contact, path.clone());
+            true
+        });
+        if is_whole {
+            return Some(way);
+        }
+        if tried.known.len() >= n_tries {
+            return None;
+        }
+    }
+}
+
+/// Most grasps looked at for an order.
+const MOST_GRASPS: usize = 400;
+
+fn search(
+    workspace: &mut Workspace,
+    start: &GraspState,
+    options: &[Vec<Candidate>],
+    goal: &Choice,
+    table: &mut ClosureTable,
+    tried: &mut Tried,
+    rng: &mut Rng,
+    current: &mut Choice,
+    dead: &mut Vec<Choice>,
+    order: &mut Vec<(usize, usize)>,
+) -> bool {
+    if current == goal {
+        return true;
+    }
+    if dead.contains(current) {
+        return false;
+    }
+    let all = (1u32 << options.len()) - 1;
+    for finger in 0..options.len() {
+        if current[finger] == goal[finger] || !table.is_closed(current, all & !(1 << finger)) {
+            continue;
+        }
+        let which = try_relocation(workspace, start, options, current, finger, goal[finger], tried, rng);
+        if tried.known[which].3.is_none() {
+            continue;
+        }
+        let before = std::mem::replace(&mut current[finger], goal[finger]);
+        order.push((finger, which));
+        if search(workspace, start, options, goal, table, tried, rng, current, dead, order) {
+            return true;
+        }
+        order.pop();
+        current[finger] = before;
+    }
+    dead.push(current.clone());
+    false
+}
+
+/// Index in `tried` of the relocation of `finger` from where `current` has it to `option`.
+fn try_relocation(
+    workspace: &mut Workspace,
+    start: &GraspState,
+    options: &[Vec<Candidate>],
+    current: &Choice,
+    finger: usize,
+    option: usize,
+    tried: &mut Tried,
+    rng: &mut Rng,
+) -> usize {
+    let known = tried.known.iter().position(|(c, f, o, _)| c == current && *f == finger && *o == option);
+    if let Some(which) = known {
+        return which;
+    }
+    let mut state = start.clone();
+    for (f, &taken) in current.iter().enumerate() {
+        if taken != 0 {
+            state.set_contact(f, options[f][taken].contact);
+            state.joints[f].clone_from(&options[f][taken].joints);
+        }
+    }
+    let others = state.holding & !(1 << finger);
+    if !balances(workspace, &state.world_from_object, &state.joints, &state.contacts, others) {
+        tried.lacks_forces = true;
+        tried.known.push((current.clone(), finger, option, None));
+        return tried.known.len() - 1;
+    }
+    workspace.set_state(&state);
+    let to = &options[finger][option];
+    let path = relocate(
+        workspace,
+        &state.world_from_object,
+        finger,
+        Foothold { contact: state.contact(finger).as_ref(), joints: &state.joints[finger] },
+        Foothold { contact: to.contact.as_ref(), joints: &to.joints },
+        rng,
+    );
+    tried.known.push((current.clone(), finger, option, path));
+    tried.known.len() - 1
+}

@@ -1,0 +1,26 @@
+//! The baseline of paper 000, section 5.1, "classic method": a visibility PRM whose local method is one transfer-regrasp
+//! or regrasp-transfer.
+
+use crate::in_hand::attempt::search::{Search, Stop};
+use crate::in_hand::searching::visibility::explore::{explore, roadmap_of};
+use crate::in_hand::searching::visibility::link::LocalMethod;
+use crate::in_hand::searching::visibility::{ends, note_nearest, solution};
+use regrasp_manipulation::grasp::sequence::Sequence;
+use regrasp_manipulation::grasp::state::GraspState;
+
+/// Looks for motions from `start` to the goal pose and `goal_grasp`; what is not given is drawn.
+pub fn build(
+    search: &mut Search,
+    start: Option<GraspState>,
+    goal_grasp: Option<&GraspState>,
+) -> Result<Sequence, Stop> {
+    let (start, goal) = ends(search, start, goal_grasp)?;
+    let mut roadmap = roadmap_of(search, &start, &goal, LocalMethod::TransferRegrasp)?;
+    loop {
+        if let Some(way) = solution(search, &mut roadmap)? {
+            return Ok(way);
+        }
+        explore(search, &mut roadmap, LocalMethod::TransferRegrasp)?;
+        note_nearest(search, &roadmap);
+    }
+}

@@ -1,0 +1,55 @@
+//! Settings of the improvement of plans.
+
+use serde::{Deserialize, Serialize};
+
+/// What a plan costs: a weighted sum, of which improvement looks for less. Weights are at least 0.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CostWeights {
+    /// Of one relocation.
+    pub relocation: f64,
+    /// Of a metre that the object goes; angles count with the object's radius.
+    pub object_path: f64,
+    /// Of a radian, or metre, that a joint goes, all joints together.
+    pub joint_path: f64,
+    /// Of a closure margin as small as the one asked for; one of twice that costs half.
+    pub margin: f64,
+}
+
+impl Default for CostWeights {
+    /// Relocations first: by hand, so that in the plans of the bundled scenes all the rest together costs about as much as
+    /// one of them.
+    fn default() -> Self {
+        CostWeights { relocation: 1.0, object_path: 1.0, joint_path: 0.01, margin: 0.2 }
+    }
+}
+
+impl CostWeights {
+    pub(super) fn validate(&self) -> Result<(), String> {
+        let CostWeights { relocation, object_path, joint_path, margin } = *self;
+        let weights =
+            [("relocation", relocation), ("object_path", object_path), ("joint_path", joint_path), ("margin", margin)];
+        match weights.iter().find(|(_, weight)| !(*weight >= 0.0 && *weight <= MAX_WEIGHT)) {
+            Some((name, weight)) => Err(format!("cost.{name} is {weight}; it must be between 0 and {MAX_WEIGHT}")),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Largest weight of a cost: sums stay exact enough.
+const MAX_WEIGHT: f64 = 1e6;
+
+/// What is done about a plan after the first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImprovementSettings {
+    /// Work spent on a better plan after the first one: units of the work budget; 0 for none.
+    pub improve_work: u64,
+    /// What makes a plan better.
+    pub cost: CostWeights,
+}
+
+impl Default for ImprovementSettings {
+    fn default() -> Self {
+        ImprovementSettings { improve_work: 0, cost: CostWeights::default() }
+    }
+}

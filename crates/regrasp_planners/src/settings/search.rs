@@ -1,0 +1,134 @@
+//! Settings of the search. Every default says where it comes from.
+
+use serde::{Deserialize, Serialize};
+
+/// Which algorithm plans.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Gait trees from start and goal that meet: relocate with look-ahead, transfer as far as possible. The default, by
+    /// measurement.
+    Gait,
+    /// Paper 000: visibility PRM in GS_n, components joined by transfer-regrasp paths, dichotomic decomposition.
+    Visibility,
+    /// Paper 000's baseline: visibility PRM whose local method is one transfer-regrasp or regrasp-transfer.
+    Classic,
+}
+
+impl Method {
+    /// As settings, plans and command lines spell it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::Gait => "gait",
+            Method::Visibility => "visibility",
+            Method::Classic => "classic",
+        }
+    }
+}
+
+/// When a finger may let go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ReleaseRule {
+    /// Where the other fingers are closed; grasps in between need closure of all only. The default: on real hands the
+    /// paper's rule leaves too little (real-hands-notes, 2e).
+    WhereOthersHold,
+    /// Every set of n-1 fingers is closed in every grasp (paper 000, section 4.2.2).
+    EverywhereEveryFinger,
+}
+
+/// A first try of the planner with more room than it asks for in the end.
+///
+/// Carried out on joints that give, links stray from their planned places by up to a millimetre: of 20 plans for cubes in the
+/// Allegro hand that dropped the cube in simulation with the usual clearance, 18 had links that touched what they should not
+/// (docs/benchmarks/replay). Fingertips that turn on the spot drag the object along, which plans for point contacts do not
+/// know of: of 50 plans that turn a sphere below the palm, 6 ended more than 2 mm or 2 degrees off in simulation with the
+/// usual closure margin, none with four times as much.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FirstTry {
+    /// Distance that bodies keep which do not touch, in metres.
+    /// As far as the hand's links can stand back: where they cannot, the usual clearance does.
+    pub clearance: f64,
+    /// Closure margin of every holding set; the usual one where that is larger.
+    pub closure_margin: f64,
+    /// Work after which the planner makes do with the usual ones. By hand: enough for most turns of an Allegro hand,
+    /// about half a second.
+    pub work: u64,
+}
+
+impl Default for FirstTry {
+    fn default() -> Self {
+        FirstTry { clearance: 0.001, closure_margin: 0.02, work: 150_000 }
+    }
+}
+
+/// How grasps and motions are looked for. Lengths in metres, angles in radians.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SearchSettings {
+    /// When a finger may let go; the methods of paper 000 always use the paper's rule.
+    pub release_rule: ReleaseRule,
+    /// A first try with more room; none goes without.
+    pub first_try: Option<FirstTry>,
+    /// How far the object may wander from the straight way from start to goal. By measurement on allegro/box_y: 20 mm solves
+    /// more within a work limit than 12 (in-hand-notes, 1) or 30.
+    pub wander_distance: f64,
+    /// How far it may turn away from it, standard deviation (in-hand-notes, 3: 0.4 rad).
+    pub wander_angle: f64,
+    /// Share of poses drawn as far off the straight way as the object is large: long objects must travel to turn (paper 000,
+    /// section 5.1, example 3). By measurement: with 0.2 the pencil takes a fifth of the work of 0; against 0.1
+    /// it saves 20 % on allegro/cube57_x and 32 % on box_y, and costs 50 % on cylinder20_y and 24 % on cube57_y.
+    pub far_share: f64,
+    /// Share of poses drawn straight out of a passage, where an end of the way lies in one (paper 000, example 4).
+    pub passage_share: f64,
+    /// Share of extensions towards the goal, the others towards a pose nearby (real-hands-notes, 2: 0.75).
+    pub goal_share: f64,
+    /// What a try at a pose costs when the next pose is chosen, as a share of the object's radius.
+    pub try_fee: f64,
+    /// Share of extensions whose relocations need not bring the object on: they turn the grasp over in dead ends.
+    pub aimless_share: f64,
+    /// New contacts looked at per finger and extension. By measurement, see docs/benchmarks.md.
+    pub candidates: usize,
+    /// Of these, how many are kept for combining.
+    pub candidates_kept: usize,
+    /// Least number of fingers that hold while the object moves, where they are closed; the others may be free meanwhile (paths
+    /// through GS_k, paper 000, section 3.2). With the number of fingers, or more, all hold.
+    pub least_holding: usize,
+    /// True when a hand of three or more fingers that can never change its grasp, such as three hard fingers, is to try with
+    /// transfers alone; it is refused at once otherwise. Two fingers always try.
+    pub transfers_alone: bool,
+    /// Extensions tried at a pose before one of them may leave fingers free that hold.
+    pub free_after: u32,
+    /// Share of the extensions after that which may.
+    pub free_share: f64,
+    /// Work after which a search starts again from nothing; grows by as much with every fourth restart. Trees take new start
+    /// grasps by themselves, so that restarts are rare. By measurement, 20 seeds: against 300,000 a million saves 30 % on
+    /// allegro/box_x and about a tenth on cube45_x and cube57_x, and costs a quarter on cylinder20_x.
+    pub restart_work: u64,
+    /// Random shortcuts tried on the plan found (in-hand-notes, 3).
+    pub shortcuts: usize,
+}
+
+impl Default for SearchSettings {
+    fn default() -> Self {
+        SearchSettings {
+            release_rule: ReleaseRule::WhereOthersHold,
+            first_try: Some(FirstTry::default()),
+            wander_distance: 0.02,
+            wander_angle: 0.4,
+            far_share: 0.2,
+            passage_share: 0.5,
+            goal_share: 0.7,
+            try_fee: 0.6,
+            aimless_share: 0.6,
+            candidates: 6,
+            candidates_kept: 3,
+            least_holding: 2,
+            transfers_alone: false,
+            free_after: 3,
+            free_share: 0.5,
+            restart_work: 1_000_000,
+            shortcuts: 8,
+        }
+    }
+}

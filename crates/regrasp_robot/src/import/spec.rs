@@ -1,0 +1,78 @@
+//! What a hand is to be made of, by the ids of a robot.
+
+use crate::contact_model::ContactModel;
+use crate::robot::{JointId, LinkId};
+use nalgebra::UnitQuaternion;
+use regrasp_base::Place;
+use regrasp_geometry::{Point, Pose, UnitVector, Vector};
+use std::collections::BTreeSet;
+
+/// What is a finger of a hand, by the ids of a robot.
+#[derive(Debug, Clone)]
+pub(crate) struct HandSpec {
+    /// The link whose frame is the hand frame.
+    pub base: LinkId,
+    /// The fingers.
+    pub fingers: Vec<FingerSpec>,
+    /// The link that the hand is mounted on and that is not part of it. Without one, all that is fixed to the base is the hand's.
+    pub mount: Option<LinkId>,
+    /// Pairs of links that are never tested, smaller id first.
+    pub allow: BTreeSet<(LinkId, LinkId)>,
+}
+
+/// Positions by name of joint, each with its place.
+pub(crate) type Positions = Vec<(String, f64, Place)>;
+
+/// A finger to be made.
+#[derive(Debug, Clone)]
+pub(crate) struct FingerSpec {
+    pub name: String,
+    pub tip_link: LinkId,
+    /// First joint of the chain; moving joints before it are held. The first after the base where none is given.
+    pub first_joint: Option<JointId>,
+    pub tip: TipSpec,
+    /// Where the tip may touch; anywhere without one.
+    pub pad: Option<PadSpec>,
+    pub contact: ContactModel,
+    /// Rest posture by joint name, with the place of each name; the rest in the middle of the limits.
+    pub rest: Positions,
+    /// Where it stands, for messages.
+    pub place: Place,
+}
+
+/// A tip to be made; points are in the frame of the tip link.
+#[derive(Debug, Clone)]
+pub(crate) enum TipSpec {
+    Sphere { radius: f64, center: Point },
+    Ellipsoid { radii: Vector, center: Point, link_from_ellipsoid: UnitQuaternion<f64> },
+    Point { position: Point },
+    Hull { center: Point },
+}
+
+/// The part of a tip that may touch; the axis is in the frame of the tip link.
+#[derive(Debug, Clone)]
+pub(crate) struct PadSpec {
+    pub axis: UnitVector,
+    pub angle: f64,
+}
+
+/// A rigid body of a hand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Body {
+    /// What no finger joint moves.
+    Palm,
+    /// What a finger's joint carries.
+    Finger {
+        /// Index of the finger.
+        finger: usize,
+        /// Index of the joint on the finger's chain.
+        body: usize,
+    },
+}
+
+/// Where a link is: its body, and its pose in the body's frame (the base frame, for the palm).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Carried {
+    pub(super) body: Body,
+    pub(super) body_from_link: Pose,
+}

@@ -1,0 +1,206 @@
+//! The bodies and tasks of a scene file, by the two versions of the format.
+
+use super::files::Files;
+use super::object::{self, Names};
+use super::task::{self, Heading, Task, TaskKind};
+use super::{gravity, hand, limits, pose, units};
+use crate::gravity::Gravity;
+use crate::limits::Limits;
+use crate::object::Object;
+use crate::scene::{Obstacle, SceneHand, Support};
+use regrasp_base::toml_table::{Entry, Found, Table, suggestion};
+use regrasp_geometry::Pose;
+
+/// What a scene file says, read.
+pub(super) struct Parts {
+    pub hands: Vec<SceneHand>,
+    pub objects: Vec<Object>,
+    pub world_from_objects: Vec<Pose>,
+    pub supports: Vec<Support>,
+    pub obstacles: Vec<Obstacle>,
+    pub gravity: Option<Gravity>,
+    pub limits: Limits,
+    pub tasks: Vec<Task>,
+}
+
+/// Version 1: `[hand]`, `[object]`, `[[obstacles]]` and one task.
+pub(super) fn one_hand(root: &mut Table, files: &mut Files, found: &mut Found) -> Option<Parts> {
+    let kind = task_kind(root, found);
+    let hand = root
+        .required(found, "hand", "add [hand] with file = \"hand.toml\"")
+        .and_then(|entry| entry.table(found))
+        .and_then(|table| hand::hand(table, "hand".to_owned(), files, found));
+    let gravity = gravity::gravity(root, hand.as_ref().map(|hand| &hand.world_from_hand), found);
+    let limits = limits::limits(root, found);
+    let fix = "add [object] with name, a shape such as sphere = { radius = 0.03 }, mass and friction";
+    let object_entry = root.required(found, "object", fix);
+    let object = object_entry
+        .as_ref()
+        .and_then(|entry| entry.table(found))
+        .and_then(|table| object::object(table, files, found));
+    let obstacles = object::fixed_bodies(root, "obstacles", &mut Names::of("body of the scene"), files, found);
+    let inner = hand.as_ref().map(|hand| &hand.hand);
+    let start = task::start(root, inner, None, found);
+    let kind = kind.unwrap_or(TaskKind::InHand);
+    let heading = Heading { name: String::new(), kind, hand: 0, object: 0 };
+    let task = task::task(root, heading, start, inner, found);
+    if let (Some(hand), Some(object), Some(entry)) = (&hand, &object, &object_entry) {
+        units::check_sizes(&hand.hand, object, entry, found);
+        if let Some(task) = &task {
+            units::check_reach(hand, object, task, root, found);
+            units::check_contacts(&hand.hand, object, task, root, found);
+        }
+    }
+    let task = task?;
+    Some(Parts {
+        hands: vec![hand?],
+        objects: vec![object?],
+        world_from_objects: vec![task.world_from_object_start],
+        supports: Vec::new(),
+        obstacles,
+        gravity,
+        limits,
+        tasks: vec![task],
+    })
+}
+
+/// Version 2: `[robot]`, `[[objects]]`, `[[supports]]`, `[[obstacles]]`, `[[tasks]]`.
+pub(super) fn several(root: &mut Table, files: &mut Files, found: &mut Found) -> Option<Parts> {
+    let mut names = Names::of("body of the scene");
+    let hands = hands(root, &mut names, files, found);
+    let gravity = gravity::gravity(root, Some(&Pose::identity()), found);
+    let limits = limits::limits(root, found);
+    let objects = objects(root, &mut names, files, found);
+    let supports = object::fixed_bodies(root, "supports", &mut names, files, found);
+    let supports = supports.into_iter().map(|body| Support { body }).collect();
+    let obstacles = object::fixed_bodies(root, "obstacles", &mut names, files, found);
+    let bodies = hands.zip(objects);
+    let fix = "add [[tasks]] with task = \"in_hand\", hand, object and goal";
+    let entries = root.required(found, "tasks", fix)?.entries(found, "tables [[tasks]]")?;
+    let (hands, objects) = bodies?;
+    let mut task_names = Names::of("task");
+    let mut tasks = Vec::new();
+    for (index, entry) in entries.iter().enumerate() {
+        let Some(mut table) = entry.table(found) else { continue };
+        let default_name = if entries.len() == 1 { String::new() } else { format!("task_{}", index + 1) };
+        let task = task_of(&mut table, default_name, &hands, &objects, found);
+        table.finish(found);
+        let Some(task) = task else { continue };
+        task_names.add(&task.name, entry, found);
+        tasks.push(task);
+    }
+    if tasks.is_empty() && found.diagnostics.is_empty() {
+        let diagnostic = root.error("S102", found, "asks for nothing").fix(fix);
+        found.diagnostics.push(diagnostic);
+    }
+    let (objects, world_from_objects) = objects.into_iter().unzip();
+    Some(Parts { hands, objects, world_from_objects, supports, obstacles, gravity, limits, tasks })
+}
+
+/// `[robot]` with its hands. None where one of them could not be read.
+fn hands(root: &mut Table, names: &mut Names, files: &mut Files, found: &mut Found) -> Option<Vec<SceneHand>> {
+    let fix = "add [[robot.hands]] with name and file = \"hand.toml\"";
+    let mut robot = root.required(found, "robot", fix)?.table(found)?;
+    let entries = robot.required(found, "hands", fix).and_then(|entry| entry.entries(found, "tables [[robot.hands]]"));
+    robot.finish(found);
+    let mut hands = Vec::new();
+    for entry in &entries? {
+        let Some(mut table) = entry.table(found) else { continue };
+        let name = table.required(found, "name", "add name = \"right\"").and_then(|entry| entry.name(found));
+        let Some(hand) = hand::hand(table, name.unwrap_or("hand").to_owned(), files, found) else { continue };
+        names.add(&hand.name, entry, found);
+        hands.push(hand);
+    }
+    if hands.is_empty() && found.diagnostics.is_empty() {
+        let diagnostic = root.error("S102", found, "has no hand").fix(fix);
+        found.diagnostics.push(diagnostic);
+    }
+    found.diagnostics.is_empty().then_some(hands)
+}
+
+/// `[[objects]]`, each with the pose at which it rests. None where one of them could not be read.
+fn objects(root: &mut Table, names: &mut Names, files: &mut Files, found: &mut Found) -> Option<Vec<(Object, Pose)>> {
+    let fix = "add [[objects]] with name, a shape such as sphere = { radius = 0.03 }, mass, friction and position";
+    let entries = root.required(found, "objects", fix)?.entries(found, "tables [[objects]]")?;
+    let mut objects = Vec::new();
+    for entry in &entries {
+        let Some(mut table) = entry.table(found) else { continue };
+        if table.required(found, "name", "add name = \"cube\"").is_none() {
+            continue;
+        }
+        let pose = pose::pose(&mut table, found);
+        let Some(object) = object::object(table, files, found) else { continue };
+        names.add(&object.name, entry, found);
+        objects.extend(pose.map(|pose| (object, pose)));
+    }
+    if objects.is_empty() && found.diagnostics.is_empty() {
+        let diagnostic = root.error("S102", found, "has no object").fix(fix);
+        found.diagnostics.push(diagnostic);
+    }
+    found.diagnostics.is_empty().then_some(objects)
+}
+
+/// One of `[[tasks]]`.
+fn task_of(
+    table: &mut Table,
+    default_name: String,
+    hands: &[SceneHand],
+    objects: &[(Object, Pose)],
+    found: &mut Found,
+) -> Option<Task> {
+    let known_kind = task_kind(table, found);
+    let kind = known_kind.unwrap_or(TaskKind::InHand);
+    let name = table.optional("name").map_or(Some(default_name), |entry| entry.name(found).map(str::to_owned));
+    let hand_names: Vec<&str> = hands.iter().map(|hand| hand.name.as_str()).collect();
+    let object_names: Vec<&str> = objects.iter().map(|(object, _)| object.name.as_str()).collect();
+    let hand = which(table, "hand", &hand_names, found);
+    let object = which(table, "object", &object_names, found);
+    // All keys are read whatever is unknown: none of them is then said not to exist.
+    let resting = object.map_or(Pose::identity(), |object| objects[object].1);
+    let inner = hand.map(|hand| &hands[hand].hand);
+    let start = task::start(table, inner, Some(resting), found);
+    let is_known = known_kind.is_some() && name.is_some();
+    let (name, indices) = (name.unwrap_or_default(), (hand.unwrap_or(0), object.unwrap_or(0)));
+    let heading = Heading { name, kind, hand: indices.0, object: indices.1 };
+    let task = task::task(table, heading, start, inner, found).filter(|_| is_known);
+    let (placed, body) = (&hands[hand?], &objects[object?].0);
+    let task = task?;
+    if let Some(entry) = table.optional("object").or_else(|| table.optional("goal")) {
+        units::check_sizes(&placed.hand, body, &entry, found);
+    }
+    units::check_reach(placed, body, &task, table, found);
+    units::check_contacts(&placed.hand, body, &task, table, found);
+    Some(task)
+}
+
+/// The one of `names` that `key` says; where there is only one it may be left out. Errors: unknown (`S120`), missing (`S102`).
+fn which(table: &mut Table, key: &'static str, names: &[&str], found: &mut Found) -> Option<usize> {
+    let entry: Entry = match names {
+        [_] => match table.optional(key) {
+            Some(entry) => entry,
+            None => return Some(0),
+        },
+        _ => table.required(found, key, &format!("add {key} = \"{}\"", names[0]))?,
+    };
+    let name = entry.text(found)?;
+    let known = names.iter().position(|known| *known == name);
+    if known.is_none() {
+        let problem =
+            format!("is \"{name}\", which the scene does not have{}", suggestion(name, names.iter().copied()));
+        found.diagnostics.push(entry.error("S120", found, problem).expected(names.join(", ")));
+    }
+    known
+}
+
+/// `task`. Errors: missing (`S102`), another task (`S105`).
+fn task_kind(table: &mut Table, found: &mut Found) -> Option<TaskKind> {
+    let entry = table.required(found, "task", "add task = \"in_hand\"")?;
+    let text = entry.text(found)?;
+    let known = [TaskKind::InHand, TaskKind::Tracking].into_iter().find(|kind| kind.name() == text);
+    if known.is_none() {
+        let expected = "\"in_hand\" or \"tracking\", the tasks that this version plans";
+        let diagnostic = entry.error("S105", found, format!("is \"{text}\"")).expected(expected);
+        found.diagnostics.push(diagnostic);
+    }
+    known
+}

@@ -1,0 +1,102 @@
+//! One hand that manipulates one object, among everything else of a scene.
+
+use crate::object::Object;
+use crate::query::Query;
+use crate::scene::{Obstacle, Scene, SceneHand};
+use crate::state::State;
+use regrasp_geometry::Pose;
+use regrasp_geometry::collision::MeshBody;
+use regrasp_geometry::shape::PlacedShape;
+use regrasp_robot::{Hand, LinkId};
+
+/// One hand and the object that it manipulates. All else of the scene rests in `state`.
+#[derive(Debug, Clone, Copy)]
+pub struct Manipulation<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Where the other hands and objects rest.
+    pub state: &'a State,
+    /// Index of the hand in [`Scene::hands`].
+    pub hand_index: usize,
+    /// Index of the object in [`Scene::objects`].
+    pub object_index: usize,
+}
+
+impl<'a> Manipulation<'a> {
+    /// What `query` asks for.
+    pub fn of(scene: &'a Scene, state: &'a State, query: &Query) -> Self {
+        Manipulation { scene, state, hand_index: query.hand(), object_index: query.object() }
+    }
+
+    /// The first object in the first hand: of most scenes there is no other.
+    pub fn first(scene: &'a Scene, state: &'a State) -> Self {
+        Manipulation { scene, state, hand_index: 0, object_index: 0 }
+    }
+
+    /// The hand, in its own frame.
+    pub fn hand(&self) -> &'a Hand {
+        &self.placed_hand().hand
+    }
+
+    /// The hand with its place in the scene.
+    pub fn placed_hand(&self) -> &'a SceneHand {
+        &self.scene.hands[self.hand_index]
+    }
+
+    /// Where the hand's base stands in the world.
+    pub fn world_from_hand(&self) -> Pose {
+        self.placed_hand().world_from_hand
+    }
+
+    /// The object.
+    pub fn object(&self) -> &'a Object {
+        &self.scene.objects[self.object_index]
+    }
+
+    /// What rests and is no obstacle of the scene: supports, the other hands in their postures, the other objects. In the world.
+    pub fn bystanders(&self) -> Vec<Obstacle> {
+        let mut bodies: Vec<Obstacle> = self.scene.supports.iter().map(|support| support.body.clone()).collect();
+        let others = self.scene.hands.iter().enumerate().filter(|(index, _)| *index != self.hand_index);
+        bodies.extend(others.flat_map(|(index, other)| bodies_of_hand(other, &self.state.hand_joints[index])));
+        let others = self.scene.objects.iter().enumerate().filter(|(index, _)| *index != self.object_index);
+        bodies.extend(others.map(|(index, other)| Obstacle {
+            name: other.name.clone(),
+            placed: PlacedShape {
+                parent_from_shape: self.state.world_from_objects[index],
+                shape: other.solid().clone(),
+            },
+            mesh_body: if other.hull.is_some() { MeshBody::of(other.solid()) } else { other.mesh_body.clone() },
+        }));
+        bodies
+    }
+}
+
+/// The collision shapes of a hand in a posture, placed in the world.
+fn bodies_of_hand(other: &SceneHand, joints: &[f64]) -> Vec<Obstacle> {
+    let hand = &other.hand;
+    let link_name = |link: LinkId| hand.robot.links[link.0].name.clone();
+    let mut parts: Vec<(String, PlacedShape)> =
+        hand.palm.iter().map(|palm| (link_name(palm.link), palm.placed.clone())).collect();
+    let mut first = 0;
+    for finger in &hand.fingers {
+        let end = first + finger.chain.n_coordinates();
+        let mut hand_from_body = Vec::new();
+        finger.chain.forward(&joints[first..end], &mut hand_from_body);
+        first = end;
+        let placed_by = |body: usize, placed: &PlacedShape| PlacedShape {
+            parent_from_shape: hand_from_body[body] * placed.parent_from_shape,
+            shape: placed.shape.clone(),
+        };
+        let shapes = finger.shapes.iter();
+        parts.extend(shapes.map(|shape| (link_name(shape.link), placed_by(shape.body, &shape.placed))));
+        if let Some(own) = finger.tip.own_shape() {
+            parts.push((format!("tip of {}", finger.name), placed_by(finger.chain.joints.len() - 1, &own)));
+        }
+    }
+    let in_world = |(link, placed): (String, PlacedShape)| Obstacle {
+        name: format!("{}/{link}", other.name),
+        placed: PlacedShape { parent_from_shape: other.world_from_hand * placed.parent_from_shape, ..placed },
+        mesh_body: None,
+    };
+    parts.into_iter().map(in_world).collect()
+}

@@ -1,0 +1,209 @@
+//! Benchmarks: what `docs/benchmarks.md` shows. One thread, so that times compare.
+
+use crate::campaign::WIDE;
+use crate::run::{Outcome, files, joined, models, number, out, package, regrasp, regrasp_with, run, words};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+const RESULTS: &str = "docs/benchmarks";
+/// Sections of the page, in this order; those without a CSV file are left out.
+const SECTIONS: [&str; 14] = [
+    "rolling_wide",
+    "rolling_allegro",
+    "wide",
+    "visibility",
+    "classic",
+    "improvement",
+    "allegro_required",
+    "allegro_stretch",
+    "allegro_meshes",
+    "dclaw",
+    "trifinger",
+    "shadow",
+    "roadmap_sphere",
+    "roadmap_box",
+];
+const GROWTH: &str = "fingers triangles obstacles threads";
+/// Raw rows above this size are kept compressed.
+const LARGEST_CSV: u64 = 100_000;
+/// Geometry alone, as in the papers: contacts stay where they are while the object moves, no friction is held back, no forces. Such
+/// plans are judged for their geometry.
+const PLAIN: &str = "--settings docs/benchmarks/plain.json --level geometry";
+const REQUIRED: [&str; 10] = [
+    "sphere32_x",
+    "sphere32_z",
+    "sphere32_180x",
+    "cube57_x",
+    "cube57_y",
+    "cube57_z",
+    "cube57_180z",
+    "cylinder20_x",
+    "cylinder20_y",
+    "box_y",
+];
+const STRETCH: [&str; 4] = ["box_x", "box_z", "cube45_x", "cylinder20_z"];
+const MESHES: [&str; 5] = ["rubiks_x", "rubiks_z", "apple_x", "apple_z", "can_y"];
+
+fn allegro(names: &[&str]) -> String {
+    names.iter().map(|name| format!("scenes/allegro/{name}.toml")).collect::<Vec<_>>().join(" ")
+}
+
+/// `bench` of `scenes` into a CSV file of the results.
+fn bench(program: &Path, scenes: &str, options: &str, name: &str) -> Outcome {
+    regrasp_with(program, &format!("bench {scenes} {options} --threads 1 --csv {RESULTS}/{name}.csv"))
+}
+
+/// Everything, then the page. Hours: suites and growth take the most.
+pub fn all(_: &[String]) -> Outcome {
+    let program = regrasp()?;
+    unpack()?;
+    let seeds = number("SEEDS", 200)?;
+    let few = number("CLASSIC_SEEDS", 20)?;
+    let tight = "scenes/tight_sphere_180z.toml";
+    let boxes = "scenes/box_90x.toml scenes/box_180z.toml scenes/box_180x.toml";
+    bench(&program, WIDE, &format!("--seeds {seeds} --time-limit 20"), "rolling_wide")?;
+    let plain_scenes = format!("{WIDE} {tight} scenes/tight_box_90x.toml");
+    bench(&program, &plain_scenes, &format!("{PLAIN} --seeds {seeds} --time-limit 20"), "wide")?;
+    // The two methods of Saut 2011 draw poses uniformly, as that paper does.
+    for method in ["visibility", "classic"] {
+        let settings = "--settings docs/benchmarks/uniform_poses.json --level geometry";
+        bench(&program, tight, &format!("--method {method} {settings} --seeds {few} --time-limit 60"), method)?;
+    }
+    let improvement_seeds = number("IMPROVEMENT_SEEDS", 100)?;
+    bench(&program, boxes, &format!("{PLAIN} --improve 1 --seeds {improvement_seeds}"), "improvement")?;
+    suites(&[])?;
+    roadmaps(&[])?;
+    growth(&[])?;
+    if let Some(models) = models() {
+        let packages = package(&models);
+        let seeds = number("ALLEGRO_SEEDS", 20)?;
+        let of = |limit: u32| format!("{packages} --time-limit {limit} --seeds {seeds}");
+        bench(&program, &allegro(&REQUIRED), &of(20), "rolling_allegro")?;
+        bench(&program, &allegro(&REQUIRED), &format!("{PLAIN} {}", of(20)), "allegro_required")?;
+        bench(&program, &allegro(&STRETCH), &format!("{PLAIN} {}", of(20)), "allegro_stretch")?;
+        bench(&program, &allegro(&MESHES), &format!("{PLAIN} {}", of(20)), "allegro_meshes")?;
+        for hand in ["dclaw", "trifinger"] {
+            let all = files(&format!("scenes/{hand}"), ".toml")?;
+            let is_soft =
+                |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("soft_"));
+            let soft: Vec<PathBuf> = all.into_iter().filter(is_soft).collect();
+            bench(&program, &joined(&soft), &format!("{PLAIN} {}", of(6)), hand)?;
+        }
+        bench(&program, &joined(&files("scenes/shadow", ".toml")?), &format!("{PLAIN} {}", of(20)), "shadow")?;
+    }
+    page(&[])
+}
+
+/// The suites named, or all. A suite that was cut off goes on where it was. `SUITE_SEEDS`: at most so many trials per row.
+pub fn suites(names: &[String]) -> Outcome {
+    let program = regrasp()?;
+    unpack()?;
+    let all = words("paper000 paper004 paper003");
+    let limit = match number("SUITE_SEEDS", 0)? {
+        0 => String::new(),
+        seeds => format!("--seeds {seeds}"),
+    };
+    for name in if names.is_empty() { &all } else { names } {
+        regrasp_with(&program, &format!("bench suites/{name}.toml {limit}"))?;
+    }
+    pack()
+}
+
+/// Random queries on saved graphs, and the same ones without them; `out/roadmaps` keeps the graphs.
+pub fn roadmaps(_: &[String]) -> Outcome {
+    let program = regrasp()?;
+    unpack()?;
+    let folder = out("roadmaps")?;
+    let queries = number("QUERIES", 1000)?;
+    for (name, scene, build, single) in [
+        ("roadmap_sphere", "sphere_90x", "", true),
+        ("roadmap_box", "box_90x", "", true),
+        ("roadmap_million", "box_90x", "--places 1700", false),
+    ] {
+        let graph = folder.join(format!("{name}.roadmap"));
+        let graph = graph.display();
+        let settings = "--settings docs/benchmarks/plain.json";
+        regrasp_with(&program, &format!("roadmap build scenes/{scene}.toml {settings} -o {graph} {build}"))?;
+        let single = if single { format!("--single {queries}") } else { String::new() };
+        regrasp_with(
+            &program,
+            &format!(
+                "roadmap bench {graph} scenes/{scene}.toml {single} --level geometry --queries {queries} \
+                 --csv {RESULTS}/{name}.csv --graph {RESULTS}/{name}.json"
+            ),
+        )?;
+    }
+    pack()
+}
+
+/// How loading and planning grow with fingers, triangles, obstacles and threads; minutes. `out/growth` keeps the scenes.
+pub fn growth(curves: &[String]) -> Outcome {
+    let program = regrasp()?;
+    unpack()?;
+    let curves = if curves.is_empty() { GROWTH.to_owned() } else { curves.join(" ") };
+    let trials = number("GROWTH_TRIALS", 20)?;
+    let folder = out("growth")?;
+    regrasp_with(
+        &program,
+        &format!("growth {curves} --trials {trials} -o {} --results {RESULTS}/growth", folder.display()),
+    )?;
+    pack()
+}
+
+/// `docs/benchmarks.md` again, from what was measured.
+pub fn page(_: &[String]) -> Outcome {
+    let program = regrasp()?;
+    unpack()?;
+    let mut inputs: Vec<String> =
+        SECTIONS.iter().chain(&["roadmap_million"]).map(|name| format!("{name}.csv")).collect();
+    inputs.extend(["roadmap_sphere", "roadmap_box", "roadmap_million"].map(|name| format!("{name}.json")));
+    inputs.extend(words(GROWTH).iter().map(|name| format!("growth/{name}.csv")));
+    let found: Vec<PathBuf> =
+        inputs.iter().map(|name| Path::new(RESULTS).join(name)).filter(|path| path.is_file()).collect();
+    regrasp_with(
+        &program,
+        &format!(
+            "bench --page docs/benchmarks.md --limits {RESULTS}/limits.json {} {}",
+            joined(&found),
+            joined(&files("suites", ".toml")?)
+        ),
+    )?;
+    pack()
+}
+
+/// Unpacks the compressed rows beside their archives.
+fn unpack() -> Outcome {
+    for archive in compressed()? {
+        run("gzip", &words(&format!("-dkf {}", archive.display())))?;
+    }
+    Ok(())
+}
+
+/// Compresses rows above [`LARGEST_CSV`] and leaves the archives alone. The same rows give the same bytes.
+pub fn pack() -> Outcome {
+    for folder in folders()? {
+        for file in files(&folder, ".csv")? {
+            let size = fs::metadata(&file).map_err(|error| format!("{}: {error}", file.display()))?.len();
+            if size > LARGEST_CSV {
+                run("gzip", &words(&format!("-9nf {}", file.display())))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn compressed() -> Result<Vec<PathBuf>, String> {
+    let mut found = Vec::new();
+    for folder in folders()? {
+        found.extend(files(&folder, ".csv.gz")?);
+    }
+    Ok(found)
+}
+
+/// The folder of results, and the folders in it.
+fn folders() -> Result<Vec<String>, String> {
+    let mut found = vec![RESULTS.to_owned()];
+    let inside = files(RESULTS, "")?;
+    found.extend(inside.iter().filter(|path| path.is_dir()).map(|path| path.to_string_lossy().into_owned()));
+    Ok(found)
+}

@@ -1,0 +1,205 @@
+//! Links of README, the book and the other documents: every file and heading that they name exists. Pages of the book lead out of the
+//! book by full addresses only, and every page is in its table of contents.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Component, Path, PathBuf};
+
+/// Where the repository's files are on the web.
+const WEB: &str = "https://github.com/regrasp/regrasp/";
+
+fn root() -> PathBuf {
+    let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));
+    manifest.parent().expect("the crate lies in the repository").to_owned()
+}
+
+/// Markdown files that people read, relative to the repository, sorted.
+fn documents() -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    collect(&root(), Path::new(""), &mut found);
+    found.sort();
+    assert!(found.len() > 40 && found.contains(&PathBuf::from("README.md")), "{found:?}");
+    found
+}
+
+fn collect(root: &Path, inside: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(root.join(inside)).expect("a folder of the repository").flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let path = inside.join(&name);
+        let is_ours = !["target", "node_modules", ".git", "out", "corpus", "artifacts"].contains(&name.as_str());
+        if entry.path().is_dir() && is_ours {
+            collect(root, &path, found);
+        } else if name.ends_with(".md") {
+            found.push(path);
+        }
+    }
+}
+
+/// Text outside of code blocks, with code spans left out.
+fn prose(text: &str) -> String {
+    let (mut out, mut is_code) = (String::new(), false);
+    for line in text.lines() {
+        if line.trim_start().starts_with("```") {
+            is_code = !is_code;
+        } else if !is_code && !line.starts_with("    ") {
+            let outside: String = line.split('`').step_by(2).collect::<Vec<_>>().join("`");
+            out.push_str(&outside);
+        }
+        out.push('\n');
+    }
+    out
+}
+
+/// Targets of `[text](target)` and `![text](target)`, which may be broken over lines.
+fn links(text: &str) -> Vec<String> {
+    let text = prose(text);
+    let begins = text.match_indices("](").map(|(at, _)| at + 2);
+    begins.filter_map(|at| text[at..].find(')').map(|length| text[at..at + length].trim().to_owned())).collect()
+}
+
+/// Anchors of headings, as GitHub and mdBook make them.
+fn anchors(text: &str) -> BTreeSet<String> {
+    let mut is_code = false;
+    let mut found = BTreeSet::new();
+    for line in text.lines() {
+        if line.trim_start().starts_with("```") {
+            is_code = !is_code;
+        }
+        let words = line.trim_start_matches('#');
+        if !is_code && words.len() < line.len() && words.starts_with(' ') {
+            let kept = words.trim().to_lowercase();
+            let kept: String = kept.chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c)).collect();
+            found.insert(kept.replace(' ', "-"));
+        }
+    }
+    found
+}
+
+/// `a/b/../c` as `a/c`; none where it leads out of the repository.
+fn normal(path: &Path) -> Option<PathBuf> {
+    let mut out = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::ParentDir => {
+                if !out.pop() {
+                    return None;
+                }
+            }
+            Component::CurDir => {}
+            part => out.push(part),
+        }
+    }
+    Some(out)
+}
+
+/// What is wrong with the link `target` of the document `from`, if anything.
+fn fault(from: &Path, target: &str) -> Option<String> {
+    let root = root();
+    let (path, anchor) = target.split_once('#').map_or((target, None), |(path, anchor)| (path, Some(anchor)));
+    let on_the_web = path.strip_prefix(WEB);
+    let file = match on_the_web {
+        Some(inside) => match inside.strip_prefix("blob/main/").or_else(|| inside.strip_prefix("tree/main/")) {
+            Some(inside) => PathBuf::from(inside),
+            // Issues, security advisories, the repository itself.
+            None => return None,
+        },
+        None if path.contains("://") || path.starts_with("mailto:") => return None,
+        None if path.is_empty() => from.to_owned(),
+        None => match normal(&from.parent().unwrap_or(Path::new("")).join(path)) {
+            Some(file) => file,
+            None => return Some("leads out of the repository".to_owned()),
+        },
+    };
+    if !root.join(&file).exists() {
+        return Some(format!("{} does not exist", file.display()));
+    }
+    if on_the_web.is_none() && from.starts_with("docs") && !file.starts_with("docs") {
+        return Some(format!("leads out of the book; write {WEB}blob/main/{}", file.display()));
+    }
+    let anchor = anchor?;
+    let text = fs::read_to_string(root.join(&file)).unwrap_or_default();
+    (!anchors(&text).contains(anchor)).then(|| format!("{} has no heading for #{anchor}", file.display()))
+}
+
+#[test]
+fn every_link_leads_somewhere() {
+    let (mut faults, mut n_links) = (Vec::new(), 0);
+    for document in documents() {
+        let text = fs::read_to_string(root().join(&document)).expect("a document");
+        for target in links(&text) {
+            n_links += 1;
+            if let Some(fault) = fault(&document, &target) {
+                faults.push(format!("{}: ({target}) {fault}", document.display()));
+            }
+        }
+    }
+    assert!(n_links > 150, "{n_links} links");
+    assert!(faults.is_empty(), "dead links:\n{}", faults.join("\n"));
+}
+
+#[test]
+fn dead_links_are_found() {
+    let from = Path::new("docs/introduction.md");
+    for target in [
+        "no-such-page.md",
+        "concepts/margin.md#no-such-heading",
+        "../README.md",
+        "../../elsewhere.md",
+        "https://github.com/regrasp/regrasp/blob/main/no-such-file.md",
+    ] {
+        assert!(fault(from, target).is_some(), "{target} counts as alive");
+    }
+    assert_eq!(fault(from, "concepts/margin.md#what-regrasp-does"), None);
+    assert_eq!(links("see [a](b.md) and ![c\nd](e.svg), not `[x](y)`"), ["b.md", "e.svg"]);
+}
+
+#[test]
+fn every_page_is_in_the_table_of_contents() {
+    let summary = fs::read_to_string(root().join("docs/SUMMARY.md")).expect("the table of contents");
+    let listed: BTreeSet<PathBuf> = links(&summary).iter().map(|page| Path::new("docs").join(page)).collect();
+    let pages: BTreeSet<PathBuf> =
+        documents().into_iter().filter(|page| page.starts_with("docs") && !page.ends_with("SUMMARY.md")).collect();
+    let left_out: Vec<_> = pages.difference(&listed).collect();
+    assert!(left_out.is_empty(), "pages that docs/SUMMARY.md leaves out: {left_out:?}");
+}
+
+/// Paths such as `docs/reference/plan-format.md` in code, messages and scenes.
+#[test]
+fn pages_that_code_names_exist() {
+    let mut faults = Vec::new();
+    let mut n_named = 0;
+    for folder in ["crates", "python", "scenes", "suites", "assets", "tests", "xtask", "fuzz/src", "fuzz/fuzz_targets"]
+    {
+        let mut files = Vec::new();
+        collect_sources(&root(), Path::new(folder), &mut files);
+        for file in files {
+            let Ok(text) = fs::read_to_string(root().join(&file)) else { continue };
+            for (at, _) in text.match_indices("docs/") {
+                let is_whole_path = !text[..at].ends_with(|c: char| c.is_alphanumeric() || c == '/' || c == '.');
+                let named: String =
+                    text[at..].chars().take_while(|c| c.is_alphanumeric() || "/-_.".contains(*c)).collect();
+                if is_whole_path && named.ends_with(".md") {
+                    n_named += 1;
+                    if !root().join(&named).is_file() {
+                        faults.push(format!("{}: {named}", file.display()));
+                    }
+                }
+            }
+        }
+    }
+    assert!(n_named > 20, "{n_named} pages named");
+    assert!(faults.is_empty(), "pages that do not exist:\n{}", faults.join("\n"));
+}
+
+fn collect_sources(root: &Path, inside: &Path, found: &mut Vec<PathBuf>) {
+    let Ok(entries) = fs::read_dir(root.join(inside)) else { return };
+    for entry in entries.flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let path = inside.join(&name);
+        if entry.path().is_dir() && name != "node_modules" && name != "dist" {
+            collect_sources(root, &path, found);
+        } else if [".rs", ".py", ".pyi", ".toml", ".ts", ".urdf"].iter().any(|ending| name.ends_with(ending)) {
+            found.push(path);
+        }
+    }
+}
