@@ -15,9 +15,8 @@ use nalgebra::{DMatrix, DVector};
 use regrasp_base::Rng;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::frame::{PoseLine, tangents};
-use regrasp_geometry::{Pose, UnitVector, Vector};
-use regrasp_grasp::closure::closure_margin;
-use regrasp_grasp::{Contact, Grip};
+use regrasp_geometry::{Pose, Vector};
+use regrasp_grasp::Contact;
 use regrasp_manipulation::grasp::state::{GraspState, Moment};
 use regrasp_manipulation::model::Model;
 use regrasp_manipulation::rolling::follow::follow_contact;
@@ -31,9 +30,6 @@ const LOOPS: usize = 4;
 const SIZE_OF_LOOP: f64 = 0.005;
 /// How far from the goal a loop is tried: a twist, in metres. By measurement: loops of 20 to 40 mm close 4 mm.
 pub const LOOP_REACH: f64 = 0.010;
-/// Closure margin asked for along a loop, over that of the settings. By measurement: a loop of D'Claw had 0.8 % less between
-/// waypoints, once timed, than on the chord.
-const ROOM_OF_LOOP: f64 = 1.05;
 /// Way of the target along a loop, as a multiple of the norm of its numbers.
 const WAY_OF_LOOP: f64 = 4.0;
 /// Newton steps.
@@ -72,31 +68,7 @@ pub fn arrive_by_loop(model: &Model, from: &GraspState, goal: &Pose, rng: &mut R
     let problem = Problem { model, near: from, goal, shifts: Shifts::None, waves: WAVES_OF_LOOP };
     (0..LOOPS).find_map(|_| {
         let numbers = DVector::from_fn(problem.n_numbers(), |_, _| SIZE_OF_LOOP * rng.normal());
-        problem.solve(numbers, f64::INFINITY, work).filter(|found| closes_with_room(model, found))
-    })
-}
-
-/// True when the holding fingers close with some room at every moment of a transfer and halfway between moments. Timed motion
-/// leaves the chords of a loop, which is bent more than other transfers, so that the margin there is not quite that of the chords.
-fn closes_with_room(model: &Model, found: &Arrival) -> bool {
-    let holding = found.start.holding;
-    let enough = ROOM_OF_LOOP * model.settings.closure_margin;
-    let closes = |contact_of: &dyn Fn(usize) -> Contact| {
-        let fingers = (0..model.n_fingers()).filter(|finger| holding & (1 << finger) != 0);
-        let grips: Vec<Grip> = fingers.map(|finger| model.grip(finger, &contact_of(finger))).collect();
-        closure_margin(&grips, &model.frame, enough) >= enough
-    };
-    let first = found.start.moment();
-    std::iter::once(&first).chain(&found.moments).zip(&found.moments).all(|(from, to)| {
-        let halfway = |finger: usize| {
-            let (a, b) = (&from.contacts[finger], &to.contacts[finger]);
-            let normal = a.normal_in_object.into_inner() + b.normal_in_object.into_inner();
-            Contact {
-                point_in_object: a.point_in_object + (b.point_in_object - a.point_in_object) * 0.5,
-                normal_in_object: UnitVector::new_normalize(normal),
-            }
-        };
-        closes(&halfway) && closes(&|finger| to.contacts[finger])
+        problem.solve(numbers, f64::INFINITY, work)
     })
 }
 
