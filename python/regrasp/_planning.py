@@ -52,7 +52,7 @@ def plan(
     time_limit: seconds after which the search is cut; the plan then says so (`statistics["cut_by_time"]`).
     max_work: limit in configurations looked at, the same on every machine.
     method: algorithm; "gait" where nothing else is said, "tracking" for tasks of that kind.
-    margin: closure margin asked of every holding set, in [0, 1).
+    margin: force-closure margin that the holding fingers keep, in [0, 1).
     improve: seconds spent on a better plan after the first; `improve_work`: the same by work.
     margin, improve, improve_work: of in-hand tasks; refused for tasks of kind "tracking".
     settings: settings of the planner, with the keys of "settings" in a plan file; the other arguments win over it.
@@ -137,11 +137,12 @@ def export_mjcf(
     packages: Mapping[str, StrPath] | None = None,
     lenient: bool = False,
 ) -> str:
-    """The MuJoCo model of a plan's scene: hand, obstacles, object, and a keyframe for every waypoint.
+    """The MuJoCo model of a plan's scene: hands, objects, supports, obstacles, and a keyframe for every waypoint.
 
     plan, scene, packages, lenient: as in `check`.
 
-    Warns where the model differs from the scene: MuJoCo collides with convex shapes only. Raises `InputError`.
+    Warns where the model differs from the scene: MuJoCo collides with convex hulls, and welds hold objects that stand on no
+    support. Raises `InputError`.
     """
     plan, scene = _with_scene(plan, scene, packages, lenient)
     xml, notes = plan._native.to_mjcf(scene._native)

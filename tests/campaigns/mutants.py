@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Runs the whole program on structure-aware mutants of every kind of file that it reads.
 
-    tests/campaigns/mutants.py --runs 20000                # make fuzz-program
+    tests/campaigns/mutants.py --runs 20000                # cargo xtask fuzz-program
     tests/campaigns/mutants.py --only 1234 -o out          # one mutant again, its files kept
 
 Every run has a folder of its own with good files of which one is broken, and one command. Good are exit codes 0, 1 and 2 within 10 s

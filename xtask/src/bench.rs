@@ -98,7 +98,7 @@ pub fn all(_: &[String]) -> Outcome {
 pub fn suites(names: &[String]) -> Outcome {
     let program = regrasp()?;
     unpack()?;
-    let all = words("paper000 paper004 paper003");
+    let all = words("saut2011 sahbani2007 cherif1999");
     let limit = match number("SUITE_SEEDS", 0)? {
         0 => String::new(),
         seeds => format!("--seeds {seeds}"),

@@ -21,7 +21,7 @@ const TASKS: [Task; 11] = [
         reference::task,
     ),
     ("bench", "measure everything in docs/benchmarks.md; hours", bench::all),
-    ("bench-suite", "measure the suites named, or all: paper000 paper003 paper004", bench::suites),
+    ("bench-suite", "measure the suites named, or all: saut2011 cherif1999 sahbani2007", bench::suites),
     (
         "bench-roadmap",
         "measure queries on roadmaps of sphere and box, and on one of a million motions",

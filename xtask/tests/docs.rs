@@ -198,8 +198,27 @@ fn collect_sources(root: &Path, inside: &Path, found: &mut Vec<PathBuf>) {
         let path = inside.join(&name);
         if entry.path().is_dir() && name != "node_modules" && name != "dist" {
             collect_sources(root, &path, found);
-        } else if [".rs", ".py", ".pyi", ".toml", ".ts", ".urdf"].iter().any(|ending| name.ends_with(ending)) {
+        } else if [".rs", ".py", ".pyi", ".toml", ".ts", ".urdf", ".json"].iter().any(|ending| name.ends_with(ending)) {
             found.push(path);
         }
     }
+}
+
+/// Papers are cited by author and year, as `docs/references.md` lists them; nothing cites a text that is not in the repository.
+#[test]
+fn papers_are_cited_by_author_and_year() {
+    let mut files = documents();
+    for folder in ["crates", "python", "scenes", "suites", "assets", "tests", "xtask/src", "examples", "schema"] {
+        collect_sources(&root(), Path::new(folder), &mut files);
+    }
+    let numbers = ["000", "001", "003", "004"].map(|number| format!("paper {number}"));
+    let notes = ["in-hand", "real-hands", "physics", "bodies", "hard-turns"].map(|topic| format!("{topic}-notes"));
+    let mut faults = Vec::new();
+    for file in files {
+        let text = fs::read_to_string(root().join(&file)).unwrap_or_default().to_lowercase();
+        for words in numbers.iter().chain(&notes).filter(|words| text.contains(*words)) {
+            faults.push(format!("{}: {words}", file.display()));
+        }
+    }
+    assert!(faults.is_empty(), "write author, year and section (docs/references.md):\n{}", faults.join("\n"));
 }

@@ -15,7 +15,7 @@ const MAX_MISSES: usize = 60;
 pub fn markdown(parts: &[(String, Vec<Row>)], graphs: &[GraphFacts], suites: &[String], limits: &Limits) -> String {
     let mut out = String::from(
         "# Benchmarks\n\n\
-         Written by `make bench`; never edited by hand. Planning times are processor times of the planner call over the solved\n\
+         Written by `cargo xtask bench`; never edited by hand. Planning times are processor times of the planner call over the solved\n\
          seeds, in milliseconds; *floor* is the time to validate the final plan once at the planner's resolution, and *floors* is\n\
          mean planning time over mean floor. *within limit* is the share of seeds with an accepted plan in at most the processor\n\
          time in brackets, where one is set. *accepted* is the verdict of the independent checker; *margin* and *gap* are the\n\
@@ -190,8 +190,8 @@ fn ratios(parts: &[(String, Vec<Row>)], out: &mut String) {
     if !lines.is_empty() {
         let _ = write!(
             out,
-            "\n## Classic method over the method of paper 000\n\n\
-             Mean planning time over the solved seeds, in ms. Paper 000 reports 116 for its sphere and 13 for its box.\n\n\
+            "\n## Classic method over the method of Saut 2011\n\n\
+             Mean planning time over the solved seeds, in ms. Saut 2011 reports 116 for its sphere and 13 for its box.\n\n\
              | scene | classic | visibility | ratio |\n|---|---|---|---|\n{lines}"
         );
     }

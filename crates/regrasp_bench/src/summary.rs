@@ -138,7 +138,7 @@ pub fn table(summaries: &[Summary]) -> String {
         }));
     }
     if !tracking.is_empty() {
-        // Means of what tables 4 and 5 of paper 003 count.
+        // Means of what tables 4 and 5 of Cherif 1999 count.
         let columns = [("check ms", 9), ("nodes", 7), ("tried", 7), ("on path", 7), ("gap mm", 7)];
         out.push_str(&table_of(&tracking, &columns, |summary| {
             let mean = |spread: Option<Spread>| spread.map_or_else(dash, |spread| format!("{:.1}", spread.mean));

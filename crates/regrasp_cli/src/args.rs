@@ -15,7 +15,7 @@ use std::time::Duration;
 /// Methods of the in-hand planner, as `regrasp_planners::Method` spells them, and of tracking, as `TrackingMethod` does.
 pub const METHODS: [&str; 5] = ["gait", "visibility", "classic", "tracking", "tracking+gaiting"];
 
-/// Plans how a multi-fingered hand turns an object, and judges plans independently.
+/// Plans in-hand manipulation for multi-fingered hands, and checks plans independently.
 ///
 /// First steps: `regrasp demo`; for a hand of your own `regrasp inspect hand.urdf -o hand.toml`, then a scene file
 /// (docs/reference/scene-format.md), `regrasp plan scene.toml -o plan.json`, `regrasp check plan.json`.
@@ -33,19 +33,19 @@ pub struct Arguments {
 /// What every command takes.
 #[derive(Debug, Args)]
 pub struct Common {
-    /// Where package://NAME/... is; may be repeated
+    /// Folder of package://NAME/...; may be repeated
     #[arg(long = "package", value_name = "NAME=DIR", global = true, value_parser = package)]
     pub packages: Vec<(String, PathBuf)>,
-    /// One JSON object per line on stdout, no talk
+    /// Print one JSON object per line on stdout, and nothing else
     #[arg(long, global = true)]
     pub json: bool,
-    /// No talk; errors are still shown
+    /// Print errors only
     #[arg(long, global = true)]
     pub quiet: bool,
     /// Task of a scene that has several, by its name [default: the first; in bench: all]
     #[arg(long = "task", value_name = "NAME", global = true)]
     pub task: Option<String>,
-    /// Drop what cannot be understood in robot files and list it, instead of refusing
+    /// Skip elements of robot files that cannot be read and list them, instead of refusing the file
     #[arg(long, global = true)]
     pub lenient: bool,
 }
@@ -67,11 +67,11 @@ pub enum Command {
     Export(Export),
     /// Say how to replay a plan in MuJoCo, which the Python package does
     Simulate(Simulate),
-    /// Plan scenes with many seeds and tabulate
+    /// Plan scenes with many seeds and print a table
     Bench(Bench),
     /// Measure how loading and planning grow with fingers, triangles, obstacles and threads
     Growth(Growth),
-    /// Many queries on one saved graph of a hand and an object
+    /// Build a roadmap of a hand and an object, and answer many queries with it
     Roadmap(Roadmap),
     /// Long tests of the tool itself: determinism, and the checker against broken plans
     #[command(hide = true)]
@@ -108,25 +108,25 @@ pub struct Inspect {
 /// How to search.
 #[derive(Debug, Args)]
 pub struct Search {
-    /// Algorithm [default: gait, the best by measurement; for tasks of tracking: tracking]
+    /// Method [default: gait; for tracking tasks: tracking]
     #[arg(long, value_parser = PossibleValuesParser::new(METHODS))]
     pub method: Option<String>,
-    /// All settings of the planner, as a plan file has them; what other flags say wins over it
+    /// Settings of the planner, with the keys of a plan file; other flags win over the file
     #[arg(long, value_name = "FILE.json")]
     pub settings: Option<PathBuf>,
-    /// Closure margin asked of every holding set, in [0, 1)
+    /// Force-closure margin that the holding fingers keep, in [0, 1)
     #[arg(long, value_parser = margin, allow_negative_numbers = true)]
     pub margin: Option<f64>,
-    /// Wall-clock limit in seconds (per seed, in bench); it may only cut
+    /// Time limit in seconds (in bench: per seed)
     #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
     pub time_limit: Option<Duration>,
-    /// Work limit, in configurations looked at: the same on every machine
+    /// Work limit, in configurations examined: the same on every machine
     #[arg(long, value_name = "N", default_value_t = 20_000_000, value_parser = whole_number, allow_negative_numbers = true)]
     pub max_work: u64,
-    /// Look for a better plan after the first, for so many seconds; the plan says if that cut the search
+    /// Improve the first plan for so many seconds
     #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
     pub improve: Option<Duration>,
-    /// The same by work, in configurations looked at: the same plan on every machine
+    /// Improve the first plan for so many configurations: the same plan on every machine
     #[arg(long, value_name = "N", value_parser = whole_number, allow_negative_numbers = true)]
     pub improve_work: Option<u64>,
 }
@@ -142,10 +142,10 @@ pub struct Plan {
     /// Seed
     #[arg(long, default_value_t = 0, value_parser = whole_number, allow_negative_numbers = true)]
     pub seed: u64,
-    /// Write a page for a browser too: of the plan, or of why there is none
+    /// Write a page for a browser too: of the plan, or of the causes when there is none
     #[arg(long, value_name = "FILE.html")]
     pub report: Option<PathBuf>,
-    /// Where no plan is found, write pictures of why to this folder: the causes, and the graph that was reached
+    /// When no plan is found, write pictures of the causes and of the searched graph to this folder
     #[arg(long, value_name = "DIR")]
     pub failure: Option<PathBuf>,
     /// Threads [default: all cores]; the plan does not depend on it
@@ -183,7 +183,7 @@ pub struct View {
     /// Page: one HTML file that opens from disk
     #[arg(short, long, value_name = "plan.html", group = "pictures")]
     pub output: Option<PathBuf>,
-    /// What the page is told, as JSON
+    /// Data of the page, as JSON
     #[arg(long, value_name = "FILE.json", group = "pictures")]
     pub story: Option<PathBuf>,
     /// Storyboard: key frames in one picture
@@ -201,7 +201,7 @@ pub struct View {
     /// Key frames in a row of the storyboard [default: by their number]
     #[arg(long, value_name = "N", requires = "png")]
     pub columns: Option<usize>,
-    /// Draw collision shapes in the storyboard even where it is known what things look like
+    /// Draw collision shapes in the storyboard, also of links with visual meshes
     #[arg(long, requires = "png")]
     pub collision: bool,
     /// Title of the page [default: the scene's name]
@@ -233,7 +233,7 @@ pub struct Export {
     /// Scene file [default: the one that the plan names, beside the plan or in the current folder]
     #[arg(long, value_name = "FILE")]
     pub scene: Option<PathBuf>,
-    /// Write what the checker rejects too
+    /// Write the plan even if the checker rejects it
     #[arg(long)]
     pub no_check: bool,
     /// By what plans are judged.
@@ -263,7 +263,7 @@ pub struct Bench {
     /// Threads of one search
     #[arg(long, default_value = "1", value_parser = threads, allow_negative_numbers = true)]
     pub threads: usize,
-    /// Seeds planned at the same time: as many as there are cores to spare, or times do not compare
+    /// Seeds planned at the same time; more than the idle cores make times incomparable
     #[arg(long, default_value = "1", value_name = "N", value_parser = threads, allow_negative_numbers = true)]
     pub at_once: usize,
     /// How to search.
@@ -281,7 +281,7 @@ pub struct Bench {
     /// Make a Markdown page of CSV files that were written before; plans nothing
     #[arg(long, value_name = "FILE")]
     pub page: Option<PathBuf>,
-    /// For --page: seconds by scene, within which it should be solved
+    /// For --page: time in seconds within which each scene should be solved
     #[arg(long, value_name = "FILE.json", requires = "page")]
     pub limits: Option<PathBuf>,
     /// By what plans are judged.
@@ -307,7 +307,7 @@ pub struct Growth {
     /// Only sizes up to this one
     #[arg(long, value_name = "SIZE", value_parser = whole_number, allow_negative_numbers = true)]
     pub up_to: Option<u64>,
-    /// Wall-clock limit per trial, in seconds; it may only cut
+    /// Time limit per trial, in seconds
     #[arg(long, value_name = "S", default_value = "10", value_parser = seconds, allow_negative_numbers = true)]
     pub time_limit: Duration,
     /// Work limit per trial, in configurations looked at
@@ -326,18 +326,18 @@ pub struct Roadmap {
 /// What can be done with a roadmap.
 #[derive(Debug, Subcommand)]
 pub enum RoadmapAction {
-    /// Build the graph of a scene's hand and object
+    /// Build the roadmap of a scene's hand and object
     Build(RoadmapBuild),
-    /// Plan the turn of a scene on a graph, check the plan, then write it
+    /// Plan the turn of a scene with a roadmap, check the plan, then write it
     Query(RoadmapQuery),
-    /// Show what a graph is of and how large
+    /// Show hand, object and size of a roadmap
     Info {
         /// Roadmap file
         roadmap: PathBuf,
     },
-    /// Draw a graph: how near to the goal its grasps are, its components, and a solution where a scene is given
+    /// Draw a roadmap, and the answer to a query if a scene is given
     Picture(RoadmapPicture),
-    /// Answer random queries on a graph and tabulate
+    /// Answer random queries with a roadmap and print a table
     Bench(RoadmapBench),
 }
 
@@ -361,10 +361,10 @@ pub struct RoadmapBuild {
     /// All settings of the build, as `roadmap info --json` shows them; other flags go before it
     #[arg(long, value_name = "FILE.json")]
     pub build_settings: Option<PathBuf>,
-    /// All settings of the planner, as a plan file has them
+    /// Settings of the planner, with the keys of a plan file
     #[arg(long, value_name = "FILE.json")]
     pub settings: Option<PathBuf>,
-    /// Closure margin asked of every holding set, in [0, 1)
+    /// Force-closure margin that the holding fingers keep, in [0, 1)
     #[arg(long, value_parser = margin, allow_negative_numbers = true)]
     pub margin: Option<f64>,
     /// Seed
@@ -409,16 +409,16 @@ pub struct RoadmapQuery {
     /// Add start and goal to the graph and save it
     #[arg(long)]
     pub grow: bool,
-    /// Make one transfer of those in a row, where that is free: shorter motions, slower answers
+    /// Join successive transfers where that is free of collisions: shorter motions, slower answers
     #[arg(long)]
     pub smooth: bool,
-    /// Settings of the planner that the plan has to keep; refused where the graph was proven with others
+    /// Settings that the plan must keep; refused if the roadmap was built with others
     #[arg(long, value_name = "FILE.json")]
     pub settings: Option<PathBuf>,
-    /// Closure margin that the plan has to keep; refused where the graph was proven with another
+    /// Force-closure margin that the plan must keep; refused if the roadmap was built with another
     #[arg(long, value_parser = margin, allow_negative_numbers = true)]
     pub margin: Option<f64>,
-    /// Work limit, in configurations looked at: the same on every machine
+    /// Work limit, in configurations examined: the same on every machine
     #[arg(long, value_name = "N", default_value_t = 1_000_000, value_parser = whole_number, allow_negative_numbers = true)]
     pub max_work: u64,
     /// By what plans are judged.
@@ -442,7 +442,7 @@ pub struct RoadmapBench {
     /// First seed
     #[arg(long, default_value_t = 0, value_parser = whole_number, allow_negative_numbers = true)]
     pub first_seed: u64,
-    /// Make one transfer of those in a row, where that is free: shorter motions, slower answers
+    /// Join successive transfers where that is free of collisions: shorter motions, slower answers
     #[arg(long)]
     pub smooth: bool,
     /// Write one row per query and method

@@ -70,7 +70,7 @@ fn say(report: &Report, is_tracking: bool, elapsed: Duration, talk: &Talk) {
     let seconds = elapsed.as_secs_f64();
     talk.event("check", json!({ "accepted": report.accepted(), "seconds": seconds, "report": report }));
     let margin = match report.min_margin {
-        None if is_tracking => "not judged (what slides closes nothing)".into(),
+        None if is_tracking => "not defined for sliding contacts".into(),
         None => "-".into(),
         // The plan promises a bound that the planner proves quickly; this one is proven with exact cones, and is no smaller.
         Some(margin) => format!("{margin:.4} (exact cones)"),

@@ -1,5 +1,5 @@
 //! The relocation of one finger while the others hold the object still: off along the normal, over, down along the
-//! normal (paper 000, section 4.2.3; the ways over are from in-hand-notes, 4.8).
+//! normal (Saut 2011, sec. 4.2.3).
 
 use crate::model::Model;
 use crate::rolling::follow::ik_settings;
@@ -269,7 +269,7 @@ fn around(
     let upper: Vec<f64> = chain.upper.iter().zip(start).map(|(u, q)| (u - margin).min(q + 3.2)).collect();
     let settings = RrtSettings { max_iterations: workspace.rrt_iterations, ..RrtSettings::default() };
     let as_joints = |q: &[f64]| -> Coordinates { q.iter().copied().collect() };
-    let corners = RrtConnect::new().plan(start, goal, &lower, &upper, &settings, rng, |from, to| {
+    let corners = RrtConnect::new().plan(start, goal, [&lower, &upper], &settings, rng, |from, to| {
         workspace.set_finger(finger, &as_joints(from));
         // The limits of sums hold between configurations that keep them.
         chain.within_linear_limits(to, 0.0)

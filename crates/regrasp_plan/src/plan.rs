@@ -63,16 +63,16 @@ pub enum ContactMode {
     /// Holds the object; the contact is fixed on the object.
     Fixed,
     /// Holds the object; the contact travels because the fingertip rolls without slipping. It may twist about the normal
-    /// (paper 003, table 1: rolling without sliding).
+    /// (Cherif 1999, table 1: rolling without sliding).
     Rolling,
-    /// As rolling, without twisting about the normal (paper 003, table 1: pure rolling). In tracking only.
+    /// As rolling, without twisting about the normal (Cherif 1999, table 1: pure rolling). In tracking only.
     PureRolling,
-    /// Holds the object at a contact that stays on both, and twists about the normal there (paper 003, table 1: pure
+    /// Holds the object at a contact that stays on both, and twists about the normal there (Cherif 1999, table 1: pure
     /// twisting). In tracking only.
     Twisting,
-    /// Slides over the object and does not turn relative to it (paper 003, table 1: pure sliding). In tracking only.
+    /// Slides over the object and does not turn relative to it (Cherif 1999, table 1: pure sliding). In tracking only.
     PureSliding,
-    /// Slides over the object, and may roll and twist (paper 003, table 1: sliding). In tracking only.
+    /// Slides over the object, and may roll and twist (Cherif 1999, table 1: sliding). In tracking only.
     Sliding,
     /// Does not touch the object.
     Free,
@@ -192,14 +192,14 @@ impl Waypoint {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SegmentKind {
-    /// The object moves; every finger holds all along, at one contact or rolling, or is free all along (paper 000, section
-    /// 3.2: in GS_k k fingers hold and the others are independent; paper 004, section IV-C: rolling).
+    /// The object moves; every finger holds all along, at one contact or rolling, or is free all along (Saut 2011, section
+    /// 3.1: in GS_k k fingers hold and the others are independent; Sahbani 2007, sec. IV-C: rolling).
     Transfer,
     /// The object stays and one finger moves: to another contact, away from one to stay free, from free to a contact, or
     /// from one free posture to another. The others rest, those that hold and those that are free.
     Regrasp,
-    /// The object moves or rests, every finger touches it all along, and some fingers move, of four in the paper one (paper 003,
-    /// section 3.1: finger tracking). Of the others, which rest, one rolls without sliding, and all may roll, slide and twist as the object moves.
+    /// The object moves or rests, every finger touches it all along, and some fingers move, of four in the paper one (Cherif 1999,
+    /// sec. 3.1: finger tracking). Of the others, which rest, one rolls without sliding, and all may roll, slide and twist as the object moves.
     Tracking,
 }
 
@@ -218,7 +218,7 @@ pub struct Segment {
     /// Who holds the object: names of hands and supports of the scene.
     #[serde(skip)]
     pub held_by: Vec<String>,
-    /// In tracking, the resting finger that the object rolls on without sliding (paper 003, section 6.1.2: `F_t`).
+    /// In tracking, the resting finger that the object rolls on without sliding (Cherif 1999, sec. 6.1.2: `F_t`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rolling_finger: Option<String>,
     /// At least two; the first is the last of the segment before, but for time and forces: the finger that is about to lift
@@ -320,7 +320,7 @@ impl Promises {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TrackingPromises {
-    /// Largest angle between the object's last orientation and the goal's, in radians (paper 003, section 5: within a cell).
+    /// Largest angle between the object's last orientation and the goal's, in radians (Cherif 1999, sec. 5: within a cell).
     pub goal_tolerance: f64,
     /// Friction coefficient of fingertips that slide: the scene's, as friction then has its full size.
     pub sliding_friction: f64,

@@ -3,7 +3,7 @@
 //!     cargo run --release -p regrasp_planners --example cones
 //!
 //! Grasps of the football, along plans and drawn at random, each with every choice of the moving and the rolling finger and
-//! both ways that the object can then turn (paper 003, eq. 9, to first order): do forces balance the weight?
+//! both ways that the object can then turn (Cherif 1999, eq. 9, to first order): do forces balance the weight?
 #![allow(clippy::print_stdout)]
 
 use regrasp_base::{Budget, Rng};
@@ -21,7 +21,7 @@ const PLANS: u64 = 10;
 const RANDOM_GRASPS: usize = 20_000;
 /// Of the football, in metres.
 const RADII: [f64; 3] = [0.09, 0.09, 0.12];
-/// Angular velocity, in radians per second (paper 003, table 3: 1.43 degrees).
+/// Angular velocity, in radians per second (Cherif 1999, table 3: 1.43 degrees).
 const TURN: f64 = 0.025;
 
 /// A grasp: points and normals, and the weight, in the object frame.

@@ -2,11 +2,11 @@
 //!
 //! A planner is a free function of scene, query, settings, seed and budget that returns a plan or says why not.
 
-/// In-hand manipulation by grasp subspaces (papers 000 and 004).
+/// In-hand manipulation by grasp subspaces (Saut 2011 and Sahbani 2007).
 pub mod in_hand;
 /// Settings of the in-hand planner, which tracking has too.
 pub mod settings;
-/// Finger tracking (paper 003).
+/// Finger tracking (Cherif 1999).
 pub mod tracking;
 
 pub use in_hand::plan_in_hand;

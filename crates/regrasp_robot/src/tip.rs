@@ -10,7 +10,7 @@ use std::sync::Arc;
 /// What the fingertip is, for contact.
 #[derive(Debug, Clone, PartialEq)]
 pub enum TipShape {
-    /// A sharp tip: contact at one point of the link (paper 000, section 3.1).
+    /// A sharp tip: contact at one point of the link (Saut 2011, sec. 3.1).
     Point,
     /// A ball: contact anywhere on it that the object's normal selects.
     Sphere {

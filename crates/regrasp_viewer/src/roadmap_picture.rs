@@ -1,4 +1,4 @@
-//! A manipulation graph in the plane, like figure 4 of paper 000: how near to the goal each node is, against when it was made.
+//! A manipulation graph in the plane, like figure 4 of Saut 2011: how near to the goal each node is, against when it was made.
 
 use crate::charts::svg::{Anchor, GRID, INK, SOFT, Scale, Svg, fixed};
 use crate::palette;

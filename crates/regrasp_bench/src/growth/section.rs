@@ -114,7 +114,7 @@ pub fn table(curve: Curve, rows: &[GrowthRow]) -> String {
 /// ending in `/`), and rows.
 pub fn section(files: &[(String, String, Vec<GrowthRow>)]) -> String {
     let mut out = String::from(
-        "## Growth\n\nWritten by `make growth`. Hands of equal fingers, evenly placed. Times of planning are processor times on one\n\
+        "## Growth\n\nWritten by `cargo xtask growth`. Hands of equal fingers, evenly placed. Times of planning are processor times on one\n\
          thread in ms, over the trials solved; *times* is the mean over that of the size named in the text. *load* is the least of\n\
          three, in ms of wall-clock time; *configurations* is the mean work of a trial, *us each* the time per configuration. What is\n\
          not solved is in the tables and listed below them.\n",

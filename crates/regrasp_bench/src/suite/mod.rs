@@ -358,7 +358,7 @@ settings = { method = "visibility", guided_share = 0.0 }
 
     #[test]
     fn the_suites_of_the_repository_name_scenes_that_are_there() {
-        for name in ["paper000", "paper003", "paper004"] {
+        for name in ["saut2011", "cherif1999", "sahbani2007"] {
             let path = repository().join("suites").join(name).with_extension("toml");
             assert!(is_suite(&path));
             let suite = read(&path).unwrap_or_else(|error| panic!("{error}"));

@@ -141,7 +141,7 @@ fn asked(row: &Entry, summary: &Summary) -> String {
     if all.is_empty() { dash() } else { all.join("; ") }
 }
 
-/// A table like tables 4 and 5 of paper 003, with the share of trials solved and what stopped the others.
+/// A table like tables 4 and 5 of Cherif 1999, with the share of trials solved and what stopped the others.
 fn tracking_table(table: &Table, rows: &[SuiteRow], out: &mut String) {
     out.push_str(
         "| | solved | accepted | time min | mean | max | nodes | sub-goals tried | on the path | restarts | asked |\n\

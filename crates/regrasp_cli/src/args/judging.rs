@@ -8,8 +8,8 @@ use regrasp::scene::{Gravity, LoadedScene};
 /// By what plans are judged, and gravity that they are planned under.
 #[derive(Debug, Default, Args)]
 pub struct Judging {
-    /// What plans are judged for: geometry (poses alone), forces (and contact forces), motion (and that nothing slips or goes too
-    /// fast) [default: motion]
+    /// What the checker judges: geometry (poses only), forces (also contact forces), motion (also slip, speeds and
+    /// accelerations) [default: motion]
     #[arg(long, value_name = "LEVEL", value_parser = PossibleValuesParser::new(Level::ALL.map(Level::name)))]
     pub level: Option<String>,
     /// Gravity instead of the scene's: a direction X,Y,Z in the frame of the hand's base link, or any

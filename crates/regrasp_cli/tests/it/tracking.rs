@@ -54,17 +54,17 @@ fn plans_rows_and_pages_speak_of_sub_goals() {
     assert!(page.contains("sub-goals on the path") && !page.contains("| transfers |"), "{page}");
 }
 
-/// Scenario F-1 of paper 003 from the suite of the repository, with other results and without the other rows.
+/// Scenario F-1 of Cherif 1999 from the suite of the repository, with other results and without the other rows.
 #[test]
 fn the_suite_of_paper_003_measures_its_scenarios_beside_the_published_numbers() {
     let folder = Folder::new();
-    let suite = std::fs::read_to_string(repository().join("suites/paper003.toml")).expect("the suite");
+    let suite = std::fs::read_to_string(repository().join("suites/cherif1999.toml")).expect("the suite");
     let (head, tables) = suite.split_once("[[tables]]\n").expect("tables");
     let table_5 = &tables[tables.find("title = \"Table 5").expect("table 5")..];
     let after_f1 = table_5.find("[[tables.rows]]\nname = \"F-1, start of F-2\"").expect("the row after F-1");
     let text = format!("{head}[[tables]]\n{}", &table_5[..after_f1])
         .replace("../scenes/football.toml", &football())
-        .replace("../docs/benchmarks/paper003", "results");
+        .replace("../docs/benchmarks/cherif1999", "results");
     folder.write("suite.toml", text);
     let run = folder.run(&["bench", "suite.toml", "--seeds", "2"]);
     assert_eq!(run.code, Some(0), "{run:?}");

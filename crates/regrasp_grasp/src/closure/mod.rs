@@ -87,8 +87,8 @@ pub fn closure_margin(grips: &[Grip], frame: &GraspFrame, enough: f64) -> f64 {
 /// The proof with the largest margin of pairs with a soft finger and of triples as points; where that is below `enough`,
 /// of all contacts together as well. Above `enough` no margin is followed further up.
 ///
-/// More contacts only enlarge the hull of wrenches, and so does torsion: a margin of some is one of all (paper 000,
-/// section 3.1: GS_{k+1} lies in GS_k).
+/// More contacts only enlarge the hull of wrenches, and so does torsion: a margin of some is one of all (Saut 2011,
+/// sec. 3.1: GS_{k+1} lies in GS_k).
 pub fn prove(grips: &[Grip], frame: &GraspFrame, enough: f64) -> Verdict {
     match prove_by_few(grips, frame, enough) {
         Some(few) if few.margin >= enough => Verdict::Closed(few),

@@ -1,4 +1,4 @@
-//! A ball that rolls on a surface without slipping (paper 004, section IV-C; paper 003, table 1: rolling without sliding).
+//! A ball that rolls on a surface without slipping (Sahbani 2007, sec. IV-C; Cherif 1999, table 1: rolling without sliding).
 //!
 //! Seen from the object. The ball's centre `c` keeps one radius from the surface, `n` is the normal at the point that it
 //! touches, `w` the angular velocity of the ball relative to the object. The material points that touch have the same

@@ -16,7 +16,7 @@ const PULL: f64 = 0.9;
 /// Draws a contact on the object that lies towards `finger`, with the object at `world_from_object`.
 ///
 /// A ray from a random inner point within a wide cone about the finger's working place: twice as quick as drawing by
-/// area (in-hand-notes, 5). The contact is where the ray leaves the solid: where that happens more than once, any of them.
+/// area (by measurement on a prototype). The contact is where the ray leaves the solid: where that happens more than once, any of them.
 ///
 /// None too when the work allowed is spent on contacts that do not fit.
 pub fn draw_contact(

@@ -6,7 +6,7 @@ use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use std::ops::RangeInclusive;
 
-/// A feasible elementary motion (paper 000, section 3.2).
+/// A feasible elementary motion (Saut 2011, sec. 3.2).
 #[derive(Debug, Clone, PartialEq)]
 pub enum Motion {
     /// The object moves, every finger keeps its contact or rolls; fingers that are free may move. Moments after the start,

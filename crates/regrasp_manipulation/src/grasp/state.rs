@@ -15,7 +15,7 @@ pub type HandJoints = ArrayVec<Coordinates, MAX_FINGERS>;
 pub type Contacts = ArrayVec<Contact, MAX_FINGERS>;
 
 /// Some fingers hold the object, the others are free, each with a posture of its own: a configuration in GS_k with its
-/// independent fingers; in GS_n where all hold (paper 000, sections 3.2 and 4.1).
+/// independent fingers; in GS_n where all hold (Saut 2011, sec. 3.1 and 4.1).
 #[derive(Debug, Clone, PartialEq)]
 pub struct GraspState {
     /// Object pose.

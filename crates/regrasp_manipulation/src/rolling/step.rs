@@ -1,4 +1,4 @@
-//! Fingertips that roll on the object while it moves (paper 004, section IV-C).
+//! Fingertips that roll on the object while it moves (Sahbani 2007, sec. IV-C).
 //!
 //! The tip is a ball or an ellipsoid that is part of the last link, so it turns as the link does, and the contact travels on
 //! both surfaces. Joints are sought that leave no slip over a step, by the rules of `regrasp_grasp::contact::rolling` and

@@ -7,19 +7,22 @@ use serde::{Deserialize, Serialize};
 /// All are newtons per finger, whatever the object weighs. The least force is what a finger must press with to be in
 /// control of its contact, the largest what fingers and object stand: neither has to do with the object's mass. The
 /// squeeze is a wish; weight is balanced on top of it. The defaults are for objects of some 10 to 300 g: replays
-/// of a prototype kept 59 of 59 plans at 100 g, 16 of 16 at 50 g and 10 of 11 at 300 g where such forces existed at all (notes
-/// on physics, section 3). Heavier objects want a larger `normal_force[1]`; a plan that fails for want of it says so.
+/// of a prototype kept 59 of 59 plans at 100 g, 16 of 16 at 50 g and 10 of 11 at 300 g where such forces existed at all.
+/// Heavier objects need a larger `normal_force[1]`; a failure says so.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ForceSettings {
-    /// Normal force wished for (notes on physics, section 1).
+    /// Normal force that every finger aims at, in newtons. What balances the weight comes on top. Origin: simulation of
+    /// a prototype.
     pub squeeze: f64,
-    /// What a square of a newton beside that counts, against one of tangential force (ibid.).
+    /// Weight of the squared deviation from `squeeze`, against one squared newton of tangential force. Origin:
+    /// simulation of a prototype.
     pub squeeze_weight: f64,
-    /// Least and largest normal force (ibid.: below 2 N contacts were lost).
+    /// Least and largest normal force of a holding finger, in newtons. Origin: simulation of a prototype; below 2 N
+    /// contacts were lost.
     pub normal_force: [f64; 2],
-    /// Share of the robot's effort limits that contact forces may take; the rest is for what is not planned. URDF files
-    /// give what the joint can do, so all of it by default.
+    /// Share of the robot's effort limits that contact forces may use. The default uses all, as URDF files state what
+    /// the joint can do.
     pub torque_share: f64,
 }
 

@@ -8,43 +8,44 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TransferMode {
-    /// Round fingertips roll without slipping, and contacts travel on both surfaces (paper 004, section IV-C). Sharp tips keep
+    /// Round fingertips roll without slipping, and contacts travel on both surfaces (Sahbani 2007, sec. IV-C). Sharp tips keep
     /// their contacts. The default: real tips roll, and in a simulation plans that ignore it end 12 to 29 degrees off
-    /// (physics-notes, 3).
+    /// (by simulation of a prototype).
     Rolling,
-    /// Contacts stay where they are on the object (paper 000, section 3.2), as if tips were points.
+    /// Contacts stay where they are on the object (Saut 2011, sec. 3.2), as if tips were points.
     Fixed,
 }
 
 /// What motions keep, and how they are carried out. Lengths in metres, angles in radians.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhysicsSettings {
-    /// What contacts do while the object moves.
+    /// What contacts do while the object moves: `rolling` or `fixed`.
     pub transfer: TransferMode,
-    /// What the scene's friction coefficient is divided by: closure and forces count on that much only. At least 1. The default
-    /// kept 20 of 20 plans in simulation where 1 kept 2 of 8 (physics-notes, 3).
+    /// Force closure and forces use the scene's friction coefficient divided by this number, at least 1. In simulation
+    /// of a prototype 1.5 kept 20 of 20 plans, and 1 kept 2 of 8.
     pub friction_margin: f64,
-    /// Closure margin asked of every holding set; dimensionless, in `[0, 1)`. See `regrasp_grasp::margin`. By hand:
-    /// 0.005 is about a tenth of what a good grasp of three has.
+    /// Force-closure margin of every set of holding fingers; dimensionless, in `[0, 1)`. See `regrasp_grasp::margin`. By
+    /// hand: a good grasp of three fingers has about ten times the default.
     pub closure_margin: f64,
-    /// Longest step of the object or a fingertip between waypoints (in-hand-notes, 4.10: 2 to 3 mm).
+    /// Longest step of the object or a fingertip between waypoints, in metres. Origin: measurements on a prototype, 2 to
+    /// 3 mm.
     pub step: f64,
-    /// Distance that bodies keep which do not touch. By hand.
+    /// Smallest distance between bodies that must not touch, in metres. By hand.
     pub clearance: f64,
-    /// How far the tip link of a holding finger may press into the object in the model. By hand: well below the
-    /// contact tolerance of 0.5 mm.
+    /// How far the tip link of a holding finger may press into the object in the model, in metres. By hand: well below
+    /// the contact tolerance of 0.5 mm.
     pub contact_allowance: f64,
-    /// Distance kept from joint limits (in-hand-notes, 4.4).
+    /// Distance that joints keep from their limits. Origin: measurements on a prototype.
     pub limit_margin: f64,
-    /// Largest change of a joint in one step that counts as continuous (real-hands-notes, 5.3).
+    /// Largest change of a joint in one step that counts as continuous. Origin: measurements on a prototype.
     pub joint_step: f64,
-    /// Heights to lift a finger to, tried in this order (in-hand-notes, 4.4, and real-hands-notes, 2).
+    /// Heights to which a finger lifts, in metres, tried in this order. Origin: measurements on a prototype.
     pub lift_heights: Vec<f64>,
-    /// Attempts of RRT-Connect for a moving finger (in-hand-notes, 4.8).
+    /// Attempts of RRT-Connect to find a path for a moving finger. Origin: measurements on a prototype.
     pub rrt_iterations: usize,
-    /// Contact forces; none for plans that say nothing about them.
+    /// Contact forces along the plan; `null` for plans without forces.
     pub forces: Option<ForceSettings>,
-    /// How fast plans are carried out.
+    /// Speeds and accelerations of the plan.
     pub speed: SpeedSettings,
 }
 

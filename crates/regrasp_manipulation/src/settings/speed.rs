@@ -6,16 +6,17 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SpeedSettings {
-    /// Largest speed of fingertips and of the object's surface, in metres per second (notes on physics, section 1; 0.08
-    /// made no clear difference).
+    /// Largest speed of fingertips and of the object's surface, in metres per second. Origin: simulation of a prototype;
+    /// 0.08 made no clear difference.
     pub largest_speed: f64,
-    /// Largest velocity of joints of which the robot has none, in radians or metres per second: what small servos do.
+    /// Largest velocity of joints whose robot file states none, in radians or metres per second. What small servos
+    /// reach.
     pub joint_velocity: f64,
-    /// Largest acceleration of joints, in radians or metres per second squared, as robot files have none: from rest to
+    /// Largest acceleration of joints, in radians or metres per second squared, as robot files state none. It reaches
     /// the velocity above in a tenth of a second.
     pub joint_acceleration: f64,
-    /// Time in which forces change between two segments, in seconds (notes on physics, section 1; 0.05 made no
-    /// difference).
+    /// Time in which contact forces change between two segments, in seconds. Origin: simulation of a prototype; 0.05
+    /// made no difference.
     pub ramp: f64,
 }
 

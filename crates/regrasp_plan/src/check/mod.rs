@@ -150,7 +150,7 @@ pub struct CheckSettings {
     pub lift_clearance: f64,
     /// The tip of a finger that is free all through a segment keeps this far from the object, in metres.
     pub free_clearance: f64,
-    /// Largest goal tolerance that a tracking plan may promise, in radians. Paper 003, table 2: a cell of 2.406 degrees.
+    /// Largest goal tolerance that a tracking plan may promise, in radians. Cherif 1999, table 2: a cell of 2.406 degrees.
     pub largest_goal_tolerance: f64,
     /// In tracking, a fingertip that does not turn, or not about the normal, or not across it, may do so by this much in a
     /// segment, in radians: what the largest slip tolerance is at 50 mm from the axis.
@@ -159,8 +159,8 @@ pub struct CheckSettings {
     /// then.
     pub smallest_sliding_speed: f64,
     /// A fingertip that does not slide in tracking slips no faster than this on the mean of a segment, in metres per
-    /// second: short segments would let it slide otherwise. A fiftieth of the velocity at which fingertips slide in paper
-    /// 003 (table 3).
+    /// second: short segments would let it slide otherwise. A fiftieth of the velocity at which fingertips slide in
+    /// Cherif 1999 (table 3).
     pub largest_slip_speed: f64,
     /// Relative velocities and turns of a tracking plan may be off by this share of their size: those at a moment differ
     /// from the means of a step, and nothing but the direction of friction counts on them.

@@ -247,7 +247,7 @@ fn chord_of(item: &Item, from: &Pose, to: &Pose) -> f64 {
     shift + item.spin_radius * 4.0 * quarter * (1.0 - quarter * quarter).sqrt()
 }
 
-/// Where a pair comes too near.
+/// Where a pair comes too close.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Breach {
     /// When, in the step.

@@ -2,8 +2,8 @@
 //!
 //! A tip is a ball fixed to its link. In the object frame its centre goes along `c(t)` and the link turns; the point of
 //! the surface nearest to `c` is the contact and `n` the direction from there. The material point of the link that touches
-//! is at `c - r n`. Rolling without slipping means that its velocity seen from the object has no part across `n` (paper
-//! 004, section IV-C; paper 003, section 6.2.2). Here slip is judged by segment, against what the plan promises; `slip` judges
+//! is at `c - r n`. Rolling without slipping means that its velocity seen from the object has no part across `n`
+//! (Sahbani 2007, sec. IV-C; Cherif 1999, sec. 6.2.2). Here slip is judged by segment, against what the plan promises; `slip` judges
 //! it from landing to lifting, with the turn of soft fingertips about `n`.
 
 use crate::check::between::Between;

@@ -1,5 +1,5 @@
 //! Tracking: every fingertip stays on the object, the fingers named move, and every contact is in the mode that the plan says
-//! with the relative velocity that it says, by poses alone (paper 003, sections 6.1.2 and 6.2.2, table 1).
+//! with the relative velocity that it says, by poses alone (Cherif 1999, sec. 6.1.2 and 6.2.2, table 1).
 //!
 //! What a fingertip does from a waypoint to the next belongs to the first of the two, and at the last waypoint to that as well.
 //! Seen from the object, a step has
@@ -41,7 +41,7 @@ use std::collections::BTreeMap;
 /// metres: a tenth of the way in a tenth of a second at the smallest sliding speed counts as sliding.
 const UNKNOWN_SLIDE: (f64, f64) = (1e-3, 1e-9);
 
-/// Least number of fingers that rest while the object moves (paper 003, section 8: two of three).
+/// Least number of fingers that rest while the object moves (Cherif 1999, sec. 8: two of three).
 const FEWEST_RESTING: usize = 2;
 
 /// True where a tracking segment says that finger `f` moves.

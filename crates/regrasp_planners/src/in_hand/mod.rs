@@ -1,4 +1,4 @@
-//! In-hand manipulation by grasp subspaces. Paper 000: Saut, Sahbani, Perdereau, Advanced Robotics 25 (2011); paper 004:
+//! In-hand manipulation by grasp subspaces. Saut 2011: Saut, Sahbani, Perdereau, Advanced Robotics 25; Sahbani 2007:
 //! Sahbani, Saut, Perdereau (2007).
 
 /// One attempt at a query.
@@ -197,7 +197,7 @@ fn with_counts(mut plan: Plan, counts: Statistics) -> Plan {
     plan
 }
 
-/// The settings that a method really plans with: those of paper 000 have the paper's release rule (section 4.2.2).
+/// The settings that a method really plans with: those of Saut 2011 have its release rule (section 4.2.2).
 fn effective(settings: &InHandSettings) -> InHandSettings {
     let mut effective = settings.clone();
     if settings.method != Method::Gait {

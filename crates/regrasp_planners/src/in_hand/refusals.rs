@@ -93,12 +93,12 @@ pub fn given_grasp(
                 model.settings.closure_margin,
                 friction_in_words(model)
             ),
-            "move the contacts apart, or ask for a smaller margin",
+            "move the contacts apart, or lower the margin (--margin)",
         ));
     }
     if end == End::Start && model.may_release && releasable(model, &state.contacts, state.holding) == 0 {
         return Err(end.failure(
-            "in the start grasp no finger may let go: no n-1 of the fingers are force closed".into(),
+            "in the start grasp no finger can lift: no set of n-1 fingers has force closure".into(),
             "choose other contacts, or let the planner choose (grasp = \"automatic\")",
         ));
     }

@@ -1,4 +1,4 @@
-//! Tests of what the methods of paper 000 are made of, from inside.
+//! Tests of what the methods of Saut 2011 are made of, from inside.
 
 use crate::in_hand::attempt::search::{Context, Search};
 use crate::in_hand::grasps::sample::draw_state;

@@ -1,8 +1,8 @@
-//! Settings of the methods of paper 000.
+//! Settings of the methods of Saut 2011.
 
 use serde::{Deserialize, Serialize};
 
-/// How often `connect_components` is tried instead of `explore` (paper 000, section 5.2): alpha is the share of
+/// How often `connect_components` is tried instead of `explore` (Saut 2011, sec. 5.2): alpha is the share of
 /// `explore`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
@@ -12,7 +12,7 @@ pub enum Alpha {
         /// Value, in `[0, 1]`.
         value: f64,
     },
-    /// From `start`, less by `step` at each attempt to merge components, down to `end` (paper 000, box: 0.5, 0.005, 0.3).
+    /// From `start`, less by `step` at each attempt to merge components, down to `end` (Saut 2011, box: 0.5, 0.005, 0.3).
     Decreasing {
         /// First value.
         start: f64,
@@ -21,7 +21,7 @@ pub enum Alpha {
         /// Last value.
         end: f64,
     },
-    /// Inverse to the size of the graph: `max(end, start / (1 + nodes / scale))` (paper 000, section 5.2, last remark).
+    /// Inverse to the size of the graph: `max(end, start / (1 + nodes / scale))` (Saut 2011, sec. 5.2, last remark).
     Adaptive {
         /// Value of the empty graph.
         start: f64,
@@ -30,7 +30,7 @@ pub enum Alpha {
         /// Number of nodes at which the value is halved.
         scale: f64,
     },
-    /// Biased by growth (paper 004, section IV-A, which gives no formula): merging has the probability `first` in the empty
+    /// Biased by growth (Sahbani 2007, sec. IV-A, which gives no formula): merging has the probability `first` in the empty
     /// graph and comes nearer to `last` as the graph grows, half of the way at `scale` nodes.
     Growing {
         /// Probability of a merge in the empty graph.
@@ -71,13 +71,13 @@ impl Alpha {
     }
 }
 
-/// What the methods of paper 000 are asked beside.
+/// What the methods of Saut 2011 are asked beside.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BaselineSettings {
-    /// Schedule of alpha, for the methods of paper 000.
+    /// Schedule of alpha, for the methods of Saut 2011.
     pub alpha: Alpha,
-    /// Share of the poses that the methods of paper 000 draw around the way from start to goal. The others are turned
-    /// anyhow, as the paper has all (section 4.2.2): with 0 both methods take several times as long, `Classic` most.
+    /// Share of poses that the methods of Saut 2011 draw near the path from start to goal. The others are drawn
+    /// uniformly, as in Saut 2011, sec. 4.2.2. With 0 both methods take several times as long, `classic` most.
     pub guided_share: f64,
 }
 

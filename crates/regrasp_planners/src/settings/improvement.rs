@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CostWeights {
-    /// Of one relocation.
+    /// Cost of one relocation.
     pub relocation: f64,
-    /// Of a metre that the object goes; angles count with the object's radius.
+    /// Cost of one metre of object path; angles count with the object's radius.
     pub object_path: f64,
-    /// Of a radian, or metre, that a joint goes, all joints together.
+    /// Cost of one radian or metre of joint path, summed over all joints.
     pub joint_path: f64,
-    /// Of a closure margin as small as the one asked for; one of twice that costs half.
+    /// Cost of a force-closure margin equal to the required one; twice the margin costs half.
     pub margin: f64,
 }
 
@@ -42,9 +42,9 @@ const MAX_WEIGHT: f64 = 1e6;
 /// What is done about a plan after the first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImprovementSettings {
-    /// Work spent on a better plan after the first one: units of the work budget; 0 for none.
+    /// Work spent on a better plan after the first one; 0 for none.
     pub improve_work: u64,
-    /// What makes a plan better.
+    /// Weights of the cost that improvement reduces.
     pub cost: CostWeights,
 }
 

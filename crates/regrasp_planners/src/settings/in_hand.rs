@@ -18,7 +18,7 @@ pub struct InHandSettings {
     pub physics: PhysicsSettings,
     /// How grasps and motions are looked for.
     pub search: SearchSettings,
-    /// What the methods of paper 000 are asked beside.
+    /// What the methods of Saut 2011 are asked beside.
     pub baselines: BaselineSettings,
     /// What is done about a plan after the first.
     pub improvement: ImprovementSettings,
@@ -38,7 +38,7 @@ impl Default for InHandSettings {
 }
 
 impl InHandSettings {
-    /// The settings of geometry alone, as in paper 000: contacts stay where they are while the object moves, all of the
+    /// The settings of geometry alone, as in Saut 2011: contacts stay where they are while the object moves, all of the
     /// friction is counted on, links keep away no farther than they must, and nobody asks about forces.
     pub fn plain() -> Self {
         InHandSettings {

@@ -1,6 +1,6 @@
 //! Settings of the in-hand planner. Those of tracking have them too, as its keys in files are the same.
 
-/// The methods of paper 000.
+/// The methods of Saut 2011.
 mod baselines;
 /// As files have them.
 mod flat;

@@ -9,9 +9,9 @@ pub enum Method {
     /// Gait trees from start and goal that meet: relocate with look-ahead, transfer as far as possible. The default, by
     /// measurement.
     Gait,
-    /// Paper 000: visibility PRM in GS_n, components joined by transfer-regrasp paths, dichotomic decomposition.
+    /// Saut 2011: visibility PRM in GS_n, components joined by transfer-regrasp paths, dichotomic decomposition.
     Visibility,
-    /// Paper 000's baseline: visibility PRM whose local method is one transfer-regrasp or regrasp-transfer.
+    /// Saut 2011's baseline: visibility PRM whose local method is one transfer-regrasp or regrasp-transfer.
     Classic,
 }
 
@@ -31,9 +31,9 @@ impl Method {
 #[serde(rename_all = "snake_case")]
 pub enum ReleaseRule {
     /// Where the other fingers are closed; grasps in between need closure of all only. The default: on real hands the
-    /// paper's rule leaves too little (real-hands-notes, 2e).
+    /// Saut 2011's rule leaves too little (by measurement on a prototype).
     WhereOthersHold,
-    /// Every set of n-1 fingers is closed in every grasp (paper 000, section 4.2.2).
+    /// Every set of n-1 fingers is closed in every grasp (Saut 2011, sec. 4.2.2).
     EverywhereEveryFinger,
 }
 
@@ -47,12 +47,12 @@ pub enum ReleaseRule {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FirstTry {
-    /// Distance that bodies keep which do not touch, in metres.
-    /// As far as the hand's links can stand back: where they cannot, the usual clearance does.
+    /// Smallest distance between bodies that must not touch, in metres. Where the links cannot keep it, the usual
+    /// clearance holds.
     pub clearance: f64,
-    /// Closure margin of every holding set; the usual one where that is larger.
+    /// Force-closure margin of every set of holding fingers, if it is larger than the usual one.
     pub closure_margin: f64,
-    /// Work after which the planner makes do with the usual ones. By hand: enough for most turns of an Allegro hand,
+    /// Work after which the planner goes on with the usual values. By hand: enough for most turns of an Allegro hand,
     /// about half a second.
     pub work: u64,
 }
@@ -66,46 +66,51 @@ impl Default for FirstTry {
 /// How grasps and motions are looked for. Lengths in metres, angles in radians.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SearchSettings {
-    /// When a finger may let go; the methods of paper 000 always use the paper's rule.
+    /// When a finger may lift. The methods of Saut 2011 always use `everywhere_every_finger`.
     pub release_rule: ReleaseRule,
-    /// A first try with more room; none goes without.
+    /// A first search that asks for more clearance and a larger margin; `null` for none.
     pub first_try: Option<FirstTry>,
-    /// How far the object may wander from the straight way from start to goal. By measurement on allegro/box_y: 20 mm solves
-    /// more within a work limit than 12 (in-hand-notes, 1) or 30.
+    /// How far the object may deviate from the straight path from start to goal, in metres. By measurement on
+    /// allegro/box_y: 20 mm solves more within a work limit than 12 or 30.
     pub wander_distance: f64,
-    /// How far it may turn away from it, standard deviation (in-hand-notes, 3: 0.4 rad).
+    /// How far the object may turn away from that path: standard deviation in radians. Origin: measurements on a
+    /// prototype.
     pub wander_angle: f64,
-    /// Share of poses drawn as far off the straight way as the object is large: long objects must travel to turn (paper 000,
-    /// section 5.1, example 3). By measurement: with 0.2 the pencil takes a fifth of the work of 0; against 0.1
-    /// it saves 20 % on allegro/cube57_x and 32 % on box_y, and costs 50 % on cylinder20_y and 24 % on cube57_y.
+    /// Share of poses drawn as far from the straight path as the object is large, because long objects must travel to
+    /// turn (Saut 2011, sec. 5.1, example 3). By measurement: with 0.2 the pencil takes a fifth of the work of 0.
+    /// Against 0.1 it saves 20 % on allegro/cube57_x and 32 % on box_y, and costs 50 % on cylinder20_y and 24 % on
+    /// cube57_y.
     pub far_share: f64,
-    /// Share of poses drawn straight out of a passage, where an end of the way lies in one (paper 000, example 4).
+    /// Share of poses drawn straight out of a narrow passage, where start or goal lies in one (Saut 2011, sec. 5.1,
+    /// example 4).
     pub passage_share: f64,
-    /// Share of extensions towards the goal, the others towards a pose nearby (real-hands-notes, 2: 0.75).
+    /// Share of extensions towards the goal; the others go towards a pose nearby. Origin: measurements on a prototype,
+    /// 0.75.
     pub goal_share: f64,
-    /// What a try at a pose costs when the next pose is chosen, as a share of the object's radius.
+    /// Penalty of a pose for every earlier attempt at it, as a share of the object's radius.
     pub try_fee: f64,
-    /// Share of extensions whose relocations need not bring the object on: they turn the grasp over in dead ends.
+    /// Share of extensions whose relocations need not bring the object closer to the goal. They change the grasp in dead
+    /// ends.
     pub aimless_share: f64,
-    /// New contacts looked at per finger and extension. By measurement, see docs/benchmarks.md.
+    /// New contacts examined per finger and extension. By measurement, see docs/benchmarks.md.
     pub candidates: usize,
-    /// Of these, how many are kept for combining.
+    /// How many of these contacts are kept and combined to grasps.
     pub candidates_kept: usize,
-    /// Least number of fingers that hold while the object moves, where they are closed; the others may be free meanwhile (paths
-    /// through GS_k, paper 000, section 3.2). With the number of fingers, or more, all hold.
+    /// Least number of fingers that hold while the object moves; the others may be free (paths through GS_k, Saut 2011,
+    /// sec. 3.1). With the number of fingers of the hand, or more, all hold.
     pub least_holding: usize,
-    /// True when a hand of three or more fingers that can never change its grasp, such as three hard fingers, is to try with
-    /// transfers alone; it is refused at once otherwise. Two fingers always try.
+    /// Whether a hand of three or more fingers that can never change its grasp, such as three hard fingertips, tries a
+    /// single transfer. Without it such a hand is refused at once. Two fingers always try.
     pub transfers_alone: bool,
-    /// Extensions tried at a pose before one of them may leave fingers free that hold.
+    /// Extensions tried at a pose before one of them may lift fingers and leave them free.
     pub free_after: u32,
-    /// Share of the extensions after that which may.
+    /// Share of the later extensions that may do so.
     pub free_share: f64,
-    /// Work after which a search starts again from nothing; grows by as much with every fourth restart. Trees take new start
-    /// grasps by themselves, so that restarts are rare. By measurement, 20 seeds: against 300,000 a million saves 30 % on
-    /// allegro/box_x and about a tenth on cube45_x and cube57_x, and costs a quarter on cylinder20_x.
+    /// Work after which a search starts again from nothing; it grows with every fourth restart. By measurement, 20
+    /// seeds: against 300,000 a million saves 30 % on allegro/box_x and about a tenth on cube45_x and cube57_x, and
+    /// costs a quarter on cylinder20_x.
     pub restart_work: u64,
-    /// Random shortcuts tried on the plan found (in-hand-notes, 3).
+    /// Random shortcuts tried on the plan found. Origin: measurements on a prototype.
     pub shortcuts: usize,
 }
 

@@ -19,7 +19,7 @@ fn impossible(message: String, advice: &str) -> Failure {
     Failure::bare(FailureKind::Impossible, message, advice)
 }
 
-/// Refuses hands, objects and gravity that tracking is not made for (paper 003, section 3.1: convex objects, fingertips that
+/// Refuses hands, objects and gravity that tracking is not made for (Cherif 1999, sec. 3.1: convex objects, fingertips that
 /// are balls; at least two of them rest; section 8: three fingertips or more).
 pub fn refuse(model: &Model, gravity: &Gravity) -> Result<(), Failure> {
     let object = &model.view.object;

@@ -1,4 +1,4 @@
-//! Contact forces at one moment (paper 003, section 6.2.3).
+//! Contact forces at one moment (Cherif 1999, sec. 6.2.3).
 //!
 //! They balance the weight, each finger presses within its limits, and friction of fingertips that slide has its full size and
 //! pulls the object along with the fingertip. That of the others is in

@@ -1,8 +1,8 @@
-//! The local planner (paper 003, section 6.2.4, `LocalReOrientation`): from a grasp towards a sub-goal, step by step.
+//! The local planner (Cherif 1999, sec. 6.2.4, `LocalReOrientation`): from a grasp towards a sub-goal, step by step.
 
 use crate::tracking::grasp::{PerFinger, TrackingGrasp, turn_to};
 use crate::tracking::object_motion::ObjectMotion;
-use crate::tracking::step::{Asked, Controls, Fingers, NoStep, Roles, STEP_WORK, Step, Stepper, each};
+use crate::tracking::step::{Asked, Controls, Fingers, NoStep, Roles, STEP_WORK, Stepper, TrackingStep, each};
 use arrayvec::ArrayVec;
 use nalgebra::UnitQuaternion;
 use regrasp_base::Rng;
@@ -11,7 +11,7 @@ use regrasp_manipulation::grasp::state::MAX_FINGERS;
 use regrasp_manipulation::model::Model;
 use regrasp_robot::kinematics::whole_pose::has_all_directions;
 
-/// Time of a local plan in units of that to the sub-goal (paper 003: `bound_1`, twice).
+/// Time of a local plan in units of that to the sub-goal (Cherif 1999: `bound_1`, twice).
 const MOST_TIME: f64 = 5.0;
 /// Cosine of the angle between the wanted turn and the one that the contacts allow, below which roles are not taken. By hand.
 const LEAST_ALIGNED: f64 = 0.2;
@@ -22,7 +22,7 @@ const WELL_ALIGNED: f64 = 0.5;
 const STILL_ALIGNED: f64 = 0.15;
 /// How much chance counts against alignment when roles are chosen.
 const CHANCE: f64 = 0.4;
-/// Share of failures after which the object rests while the moving finger rolls (the paper draws from rest and motion).
+/// Share of failures after which the object rests while the moving finger rolls (Cherif 1999 draws from rest and motion).
 const REST_SHARE: f64 = 0.5;
 
 /// Time that a moving finger is looked ahead, in seconds. By hand.
@@ -88,7 +88,7 @@ struct Tried {
     useless: Vec<Roles>,
 }
 
-/// How often steps failed, by the paper's numbers; 0 for what it does not list.
+/// How often steps failed, by Cherif 1999's numbers; 0 for what it does not list.
 pub type Failures = [u64; 8];
 
 /// Roles and the moving fingers' controls, kept from step to step while they do.
@@ -103,7 +103,7 @@ struct Choice {
 /// What a local plan has come to.
 pub struct LocalPlan {
     /// Its steps.
-    pub steps: Vec<Step>,
+    pub steps: Vec<TrackingStep>,
     /// True when it ends within the tolerance of the sub-goal.
     pub arrived: bool,
 }
@@ -133,7 +133,7 @@ impl Local<'_, '_, '_> {
     ) -> LocalPlan {
         let settings = self.stepper.settings;
         let most_steps = (MOST_TIME * settings.sub_goal_time / settings.time_step).round() as usize;
-        let mut steps: Vec<Step> = Vec::new();
+        let mut steps: Vec<TrackingStep> = Vec::new();
         let mut here = start.clone();
         self.stepper.workspace.set(&here.world_from_object.to_pose(), &here.joints, &here.contacts());
         self.restore(&mut here, &mut steps);
@@ -180,8 +180,8 @@ impl Local<'_, '_, '_> {
     }
 
     /// While the object rests, rolls fingers back that are [`FAR`] from home until they are [`NEAR`] or come no nearer: the
-    /// paper's object at rest (section 6.2.4, `w_O` of zero), with a purpose. `here` becomes the end of what is added to `steps`.
-    fn restore(&mut self, here: &mut TrackingGrasp, steps: &mut Vec<Step>) {
+    /// object at rest of Cherif 1999 (section 6.2.4, `w_O` of zero), with a purpose. `here` becomes the end of what is added to `steps`.
+    fn restore(&mut self, here: &mut TrackingGrasp, steps: &mut Vec<TrackingStep>) {
         let model = self.stepper.model;
         let size = model.frame.torque_scale;
         for moving in 0..model.n_fingers() {
@@ -229,7 +229,7 @@ impl Local<'_, '_, '_> {
         (here.touches[finger].ball.center - self.home_in_object(here, finger)).norm()
     }
 
-    /// What a failure says about what to try next (paper 003, section 6.2.4): 1 and 3 keep the moving finger and change its
+    /// What a failure says about what to try next (Cherif 1999, sec. 6.2.4): 1 and 3 keep the moving finger and change its
     /// control, 4 moves the guilty one, 5 to 7 change the roles.
     fn learn(&self, tried: &mut Tried, choice: &Choice, failure: NoStep) {
         tried.guilty = match failure {
@@ -261,7 +261,7 @@ impl Local<'_, '_, '_> {
 
     /// What these roles promise where `left` is the turn left to the sub-goal.
     ///
-    /// The contacts leave one turn, which the paper takes at the extreme velocity of the largest component wanted. Here it goes no
+    /// The contacts leave one turn, which Cherif 1999 takes at the extreme velocity of the largest component wanted. Here it goes no
     /// farther than to where it is nearest to the sub-goal.
     fn prospect(&self, here: &TrackingGrasp, roles: Roles, left: &Vector) -> Option<Prospect> {
         let model = self.stepper.model;
@@ -364,7 +364,7 @@ impl Local<'_, '_, '_> {
         controls
     }
 
-    /// The control of a moving finger for a step of `seconds`, of the extremes (paper 003, eq. 10), that leads it nearest to its
+    /// The control of a moving finger for a step of `seconds`, of the extremes (Cherif 1999, eq. 10), that leads it nearest to its
     /// home; `tip_way` is the way of its tip in the world with the object, none where this rests.
     fn control_home(&self, here: &TrackingGrasp, moving: usize, tip_way: Option<&Vector>, seconds: f64) -> [f64; 2] {
         let settings = self.stepper.settings;
@@ -389,7 +389,7 @@ impl Local<'_, '_, '_> {
         controls.min_by(|a, b| left(a).total_cmp(&left(b))).unwrap_or([0.0; 2])
     }
 
-    /// Controls of moving fingers, drawn from the extremes (paper 003, eq. 10).
+    /// Controls of moving fingers, drawn from the extremes (Cherif 1999, eq. 10).
     fn drawn_controls(&mut self, moving: Fingers) -> Controls {
         let most = self.stepper.settings.rolling_velocity * self.time_step();
         let mut controls = Controls::default();

@@ -1,4 +1,4 @@
-//! Finger tracking: re-orienting an object by fingertips that roll and slide and never leave it. Paper 003: Cherif, Gupta,
+//! Finger tracking: re-orienting an object by fingertips that roll and slide and never leave it. Cherif 1999: Cherif, Gupta,
 //! *Global Planning for Dexterous Re-orientation of Rigid Objects: Finger Tracking with Rolling and Sliding*, INRIA RR-3770,
 //! 1999.
 //!
@@ -118,7 +118,7 @@ fn statistics(counts: &Counts) -> Statistics {
     }
 }
 
-/// Failures 1 to 7 of paper 003, section 6.2.4, after what it does not list.
+/// Failures 1 to 7 of Cherif 1999, sec. 6.2.4, after what it does not list.
 const FAILURES: [&str; 8] = [
     "moving finger may not change its face",
     "1: moving finger collides",

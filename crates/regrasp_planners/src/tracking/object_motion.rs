@@ -1,4 +1,4 @@
-//! How the object moves on fingertips that rest (paper 003, eq. 8 and 9): they stay in contact, on one of them it rolls without
+//! How the object moves on fingertips that rest (Cherif 1999, eq. 8 and 9): they stay in contact, on one of them it rolls without
 //! sliding, and of its turn the components that are left free are given.
 //!
 //! With three resting fingertips one component is free, with two of them two. A step is solved to the end, by Newton's method with
@@ -65,7 +65,7 @@ impl<'a> ObjectMotion<'a> {
         let mut order = [0, 1, 2];
         order.sort_by(|&a, &b| wanted[b].abs().total_cmp(&wanted[a].abs()));
         let n_given = 6usize.checked_sub(rows.len())?;
-        // The paper fixes the largest component, and another where that tells nothing.
+        // Cherif 1999 fixes the largest component, and another where that tells nothing.
         let choices: &[&[usize]] = match n_given {
             1 => &[&[0], &[1], &[2]],
             2 => &[&[0, 1], &[0, 2], &[1, 2]],

@@ -1,7 +1,7 @@
-//! The high level (paper 003, section 5): A* over cells of the orientation space. Nodes are grasps; from each, nominal turns at
+//! The high level (Cherif 1999, sec. 5): A* over cells of the orientation space. Nodes are grasps; from each, nominal turns at
 //! extreme velocities lead to sub-goals in cells that no grasp is in yet; the local planner finds out whether they do.
 //!
-//! Unlike the paper's: a sub-goal straight on is added; a local plan that ends elsewhere, where no grasp is, is a node too; the
+//! Unlike Cherif 1999's: a sub-goal straight on is added; a local plan that ends elsewhere, where no grasp is, is a node too; the
 //! distance left counts [`TrackingSettings::goal_weight`]; after [`TrackingSettings::patience`] sub-goals in vain the search ends.
 
 use crate::tracking::gaiting::{Move, change_grasp};
@@ -65,10 +65,10 @@ impl Ord for Open {
     }
 }
 
-/// Counts of a search, as in paper 003, tables 4 and 5.
+/// Counts of a search, as in Cherif 1999, tables 4 and 5.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Cells that sub-goals are in: the nodes of the paper's graph.
+    /// Cells that sub-goals are in: the nodes of Cherif 1999's graph.
     pub nodes: u64,
     /// Sub-goals that the local planner was asked for.
     pub explored: u64,
@@ -103,7 +103,7 @@ impl Cells {
     }
 }
 
-/// The graph of the paper, as far as it has been made.
+/// The graph of Cherif 1999, as far as it has been made.
 struct Graph<'g> {
     settings: &'g TrackingSettings,
     goal: UnitQuaternion<f64>,
@@ -111,7 +111,7 @@ struct Graph<'g> {
     nodes: Vec<Node>,
     /// Cells that a grasp is in.
     taken: BTreeSet<[i32; 3]>,
-    /// Cells that a grasp is in or may come into: the nodes of the paper's graph.
+    /// Cells that a grasp is in or may come into: the nodes of Cherif 1999's graph.
     seen: BTreeSet<[i32; 3]>,
     open: BinaryHeap<Open>,
     /// Sub-goals made.

@@ -9,7 +9,7 @@ use serde_json::Value;
 /// What fingers may do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum TrackingMethod {
-    /// They never leave the object (paper 003).
+    /// They never leave the object (Cherif 1999).
     #[default]
     #[serde(rename = "tracking")]
     Tracking,
@@ -35,18 +35,18 @@ impl TrackingMethod {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RollingFinger {
-    /// Any, chosen at each moment (paper 003, scenarios D-1, D-2 and F-1).
+    /// Any, chosen at each moment (Cherif 1999, scenarios D-1, D-2 and F-1).
     #[default]
     Any,
     /// One, chosen once in the beginning (scenarios D-3, D-4 and F-2).
     Once,
 }
 
-/// Where contact forces of fingertips that do not slide are (paper 003, section 6.2.3).
+/// Where contact forces of fingertips that do not slide are (Cherif 1999, sec. 6.2.3).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Cones {
-    /// In pyramids of four sides inscribed in the friction cones; of least power, as in the paper.
+    /// In pyramids of four sides inscribed in the friction cones; of least power, as in Cherif 1999.
     #[default]
     Pyramid,
     /// In the cones; well inside them, near the normal force that the settings wish for.
@@ -59,7 +59,7 @@ pub enum Cones {
 pub struct TrackingSettings {
     /// What fingers may do.
     pub method: TrackingMethod,
-    /// Time of a step (paper 003, table 2: 0.1 s).
+    /// Time of a step (Cherif 1999, table 2: 0.1 s).
     pub time_step: f64,
     /// Time of a step in which the object rests while a fingertip rolls back on one face.
     pub rest_step: f64,
@@ -75,23 +75,23 @@ pub struct TrackingSettings {
     pub rolling_velocity: f64,
     /// True where the moving finger may go from face to face of the object (scenarios D-1 and D-3).
     pub face_changes: bool,
-    /// Fingers that rest while the object moves, 3 as in the paper, or 2; the others move. Hands of three fingers rest two.
+    /// Fingers that rest while the object moves, 3 as in Cherif 1999, or 2; the others move. Hands of three fingers rest two.
     pub resting_fingers: usize,
     /// Which finger the object rolls on.
     pub rolling_finger: RollingFinger,
     /// Where forces are.
     pub cones: Cones,
-    /// Choices tried in a row before a sub-goal is given up (paper 003, section 6.2.4, `bound_2`: 50).
+    /// Choices tried in a row before a sub-goal is given up (Cherif 1999, sec. 6.2.4, `bound_2`: 50).
     pub trials: usize,
     /// What the distance left to the goal counts in the order in which sub-goals are tried, beside the way to them: 1 is the
-    /// paper's A*. By measurement: with 1 neither diamond nor football is solved within 40,000 steps, with 1.2 both in 1,500, with
+    /// Cherif 1999's A*. By measurement: with 1 neither diamond nor football is solved within 40,000 steps, with 1.2 both in 1,500, with
     /// 1.5 in 1,700.
     pub goal_weight: f64,
     /// Nodes of the search over orientations; then it begins anew with other random numbers. By hand.
     pub nodes: usize,
     /// Sub-goals tried in a row that lead no nearer to the goal, before the search begins anew. By hand.
     pub patience: usize,
-    /// What in-hand planning is asked: clearance, speed, forces, friction margin. As the paper: friction is that of the scene, and
+    /// What in-hand planning is asked: clearance, speed, forces, friction margin. As Cherif 1999: friction is that of the scene, and
     /// a finger may touch without pressing. Keys that a file does not give, also of `forces`, are tracking's, not in-hand planning's.
     #[serde(deserialize_with = "over_defaults")]
     pub in_hand: InHandSettings,

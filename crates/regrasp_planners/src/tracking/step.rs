@@ -1,5 +1,5 @@
-//! One step of time: the object moves on the fingertips that rest, one fingertip moves, and forces hold all of it (paper 003,
-//! sections 6.2.1 to 6.2.3).
+//! One step of time: the object moves on the fingertips that rest, one fingertip moves, and forces hold all of it (Cherif 1999,
+//! sec. 6.2.1 to 6.2.3).
 
 use crate::tracking::forces::{Forces, Load, Pressing, balance};
 use crate::tracking::grasp::{PerFinger, TrackingGrasp};
@@ -54,8 +54,8 @@ impl Roles {
         self.moving & (1 << finger) != 0
     }
 
-    /// All roles that `n` fingers can have while the object moves: `resting` of them rest, fewer where else none would move (paper
-    /// 003, sections 3.1 and 8).
+    /// All roles that `n` fingers can have while the object moves: `resting` of them rest, fewer where else none would move
+    /// (Cherif 1999, sec. 3.1 and 8).
     pub fn all(n: usize, resting: usize) -> impl Iterator<Item = Roles> {
         let n_moving = n.saturating_sub(resting).max(1);
         let sets = (0..1u32 << n).filter(move |set| set.count_ones() as usize == n_moving);
@@ -65,7 +65,7 @@ impl Roles {
     }
 }
 
-/// How each moving fingertip turns relative to the object, about the tangents of its contact (paper 003, eq. 10).
+/// How each moving fingertip turns relative to the object, about the tangents of its contact (Cherif 1999, eq. 10).
 pub type Controls = [[f64; 2]; MAX_FINGERS];
 
 /// What is asked of a step.
@@ -81,7 +81,7 @@ pub struct Asked {
     pub seconds: f64,
 }
 
-/// Why a step cannot be made (paper 003, section 6.2.4, failures 1 to 7).
+/// Why a step cannot be made (Cherif 1999, sec. 6.2.4, failures 1 to 7).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum NoStep {
     /// 1: a moving finger collides with another, or with anything but the object.
@@ -105,7 +105,7 @@ pub enum NoStep {
 }
 
 impl NoStep {
-    /// Number in the paper's list; 0 for what it does not list.
+    /// Number in Cherif 1999's list; 0 for what it does not list.
     pub fn number(self) -> usize {
         match self {
             NoStep::FaceChange | NoStep::TooLong => 0,
@@ -139,7 +139,7 @@ impl Relative {
 
 /// A step made.
 #[derive(Debug, Clone)]
-pub struct Step {
+pub struct TrackingStep {
     /// Who did what.
     pub roles: Roles,
     /// How long it takes.
@@ -168,7 +168,7 @@ pub struct Stepper<'m, 'a> {
 
 impl<'m, 'a> Stepper<'m, 'a> {
     /// Takes the step from `grasp`, where the workspace is; the workspace is then at its end, else where it was.
-    pub fn step(&mut self, grasp: &TrackingGrasp, asked: &Asked) -> Result<Step, NoStep> {
+    pub fn step(&mut self, grasp: &TrackingGrasp, asked: &Asked) -> Result<TrackingStep, NoStep> {
         self.work += STEP_WORK;
         let model = self.model;
         let Roles { moving, rolling } = asked.roles;
@@ -201,7 +201,7 @@ impl<'m, 'a> Stepper<'m, 'a> {
         if !self.workspace.step(&object.to_pose(), &end.joints, TipMode::AllHold) {
             return Err(NoStep::Collision);
         }
-        Ok(Step { roles: asked.roles, seconds: asked.seconds, relative, forces, end })
+        Ok(TrackingStep { roles: asked.roles, seconds: asked.seconds, relative, forces, end })
     }
 
     /// True where a ball keeps its face: on smooth surfaces always.
@@ -302,7 +302,7 @@ impl<'m, 'a> Stepper<'m, 'a> {
         roll_step(|center| Touch::of(surface, center), self.model.fingers[finger].tip_radius, from, turn)
     }
 
-    /// Fingertips against the object, as paper 003, table 1 has it.
+    /// Fingertips against the object, as Cherif 1999, table 1 has it.
     fn relative(
         &self,
         grasp: &TrackingGrasp,

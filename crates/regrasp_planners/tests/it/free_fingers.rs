@@ -159,7 +159,8 @@ fn a_failure_names_the_fingers_that_could_never_be_released() {
     let found = plan_in_hand(&loaded.view(), &query, &settings, 0, &Budget::work(60_000), &|_| {});
     let failure = found.expect_err("no finger can be released");
     assert_eq!(failure.kind, FailureKind::WorkSpent);
-    for words in ["never to be released", "\"east\"", "closed in none of", "nearest: margin", "of 0.02", "degrees"] {
+    for words in ["fingers that can never lift", "\"east\"", "hold in none of", "nearest: margin", "of 0.02", "degrees"]
+    {
         assert!(failure.message.contains(words), "{words} is missing: {}", failure.message);
     }
 }

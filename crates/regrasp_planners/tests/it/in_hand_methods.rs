@@ -21,7 +21,7 @@ pub fn scene(name: &str) -> LoadedScene {
 }
 
 pub fn settings(method: Method, n_threads: usize) -> InHandSettings {
-    // Alpha as in paper 000's box example.
+    // Alpha as in Saut 2011's box example.
     let alpha = Alpha::Decreasing { start: 0.5, step: 0.005, end: 0.3 };
     InHandSettings {
         method,

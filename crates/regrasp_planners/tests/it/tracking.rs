@@ -19,7 +19,7 @@ fn plan_with(loaded: &LoadedScene, query: &TrackingQuery, seed: u64) -> Result<P
     plan_tracking(&loaded.view(), query, &settings, seed, &Budget::work(2_000_000), &|_| {})
 }
 
-/// Paper 003, scenario F-1.
+/// Cherif 1999, scenario F-1.
 #[test]
 fn the_football_is_turned_and_every_plan_is_accepted() {
     let loaded = scene("football.toml");
@@ -46,7 +46,7 @@ fn settings(face_changes: bool, rolling_finger: RollingFinger) -> TrackingSettin
     TrackingSettings { face_changes, rolling_finger, ..TrackingSettings::default() }
 }
 
-/// Paper 003, scenarios D-1 to D-4 and F-2.
+/// Cherif 1999, scenarios D-1 to D-4 and F-2.
 #[test]
 fn every_scenario_is_solved_as_its_settings_say() {
     let (any, once) = (RollingFinger::Any, RollingFinger::Once);
@@ -87,7 +87,7 @@ fn every_scenario_is_solved_as_its_settings_say() {
     }
 }
 
-/// The option beside the paper's pyramids: forces inside the exact cones, with room for friction that is less than counted on.
+/// The option beside Cherif 1999's pyramids: forces inside the exact cones, with room for friction that is less than counted on.
 #[test]
 fn with_exact_cones_forces_obey_the_same_laws_and_plans_keep_a_friction_margin() {
     let loaded = scene("football.toml");
@@ -185,7 +185,7 @@ fn a_goal_out_of_reach_is_a_failure_with_its_causes_and_the_nearest_miss() {
     assert!(miss.angle_left <= whole + 1e-9 && miss.angle_left > 0.5 * whole);
 }
 
-/// Paper 003, conclusion: with three fingertips two rest, and of the object's turn two components are free.
+/// Cherif 1999, conclusion: with three fingertips two rest, and of the object's turn two components are free.
 #[test]
 fn three_fingertips_turn_a_ball_on_two_that_rest() {
     let loaded = scene("three_fingertips.toml");
@@ -216,7 +216,7 @@ const OF_MORE_THAN_FOUR: [&str; 4] = [
     "resting finger moves in tracking",
 ];
 
-/// Paper 003, conclusion: of more than four fingertips three rest. Plans broken in what they say of the others are rejected.
+/// Cherif 1999, conclusion: of more than four fingertips three rest. Plans broken in what they say of the others are rejected.
 #[test]
 fn of_five_fingertips_three_rest_and_two_move() {
     let loaded = scene("five_fingertips.toml");

@@ -25,7 +25,7 @@ pub fn turning(joints: &[(Vector, Vector, Vector, f64, f64)]) -> Chain {
     )
 }
 
-/// First finger of the wide hand (in-hand-notes.md, section 1): abduction about the radial axis, then two flexions.
+/// First finger of the wide hand: abduction about the radial axis, then two flexions.
 pub fn wide_finger() -> (Chain, Point) {
     let zero = Vector::zeros();
     let deg = f64::to_radians;

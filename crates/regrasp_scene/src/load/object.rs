@@ -15,7 +15,7 @@ use regrasp_geometry::surface::DEFAULT_CREASE_ANGLE;
 use regrasp_geometry::{Point, Shape, Surface};
 use std::collections::BTreeSet;
 
-/// Contacts keep this distance from creases when the file says nothing, in metres (in-hand-notes section 1).
+/// Contacts keep this distance from creases when the file says nothing, in metres (by measurement on a prototype).
 const DEFAULT_EDGE_DISTANCE: f64 = 0.004;
 /// Largest friction coefficient: plans hold no larger one.
 const MAX_FRICTION: f64 = 1e3;

@@ -5,7 +5,6 @@ use super::task::{Goal, StartOrientation, Task};
 use crate::object::Object;
 use crate::query::{GRASP_TOLERANCE, GraspRequest};
 use crate::scene::SceneHand;
-use regrasp_base::diagnostic::number;
 use regrasp_base::toml_table::{Entry, Found, Table};
 use regrasp_geometry::{Point, Pose};
 use regrasp_robot::Hand;

@@ -192,7 +192,7 @@ fn three_fingered_hands_load() {
 }
 
 /// Home is out in front of the palm and below the fingertips: all tips are balls of 12 mm, and at the grasp of the notes
-/// (real-hands-notes section 1) they touch a sphere of 32 mm at (82, 1, 1) mm.
+/// (by measurement on a prototype) they touch a sphere of 32 mm at (82, 1, 1) mm.
 #[test]
 fn the_allegro_grasp_of_the_notes_touches_the_sphere() {
     let Some(models) = shared_models() else { return };
@@ -229,7 +229,7 @@ fn spheres_of_tracking_by_real_fingers_begin_with_contacts_on_them() {
     check_start_touches(&load(&path, &with_models(&models)));
 }
 
-/// Paper 003, section 7: masses, friction, orientations, radii and reach.
+/// Cherif 1999, sec. 7: masses, friction, orientations, radii and reach.
 #[test]
 fn scenes_of_finger_tracking_are_those_of_the_paper() {
     let football = ([0.5, 0.7, 0.4], [-0.6, -0.5, 0.8]);

@@ -1,5 +1,5 @@
 // The object's rotation vectors in the world along a tracking plan, in space and on the plane of x and y, as in figures 10 to 18 of
-// paper 003; coloured by the finger that moves.
+// Cherif 1999; coloured by the finger that moves.
 
 import { el, setText } from "./dom";
 import { add, fromRotationVector, multiply, nearestVector, norm, rotate, rotationBetween, scale, sub, unit, type Quat, type Vec3 } from "./math";

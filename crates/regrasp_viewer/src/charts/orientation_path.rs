@@ -18,7 +18,7 @@ const MARGIN: f64 = 0.15;
 /// The way on the plane.
 const SHADOW: &str = "#9a9a9a";
 
-/// The path of the object's orientation as in figures 10 to 18 of paper 003: rotation vectors of the object in the world, in
+/// The path of the object's orientation as in figures 10 to 18 of Cherif 1999: rotation vectors of the object in the world, in
 /// radians, seen from obliquely above, with their projection on the plane of x and y; coloured by the finger that moves, start
 /// and goal marked. None for a plan without waypoints.
 pub fn orientation_path(plan: &Plan) -> Option<String> {

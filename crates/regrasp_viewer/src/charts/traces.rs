@@ -30,7 +30,7 @@ const VIEWS: [([(usize, f64); 2], &str); 6] = [
     ([(0, 1.0), (1, -1.0)], "from \u{2212}z"),
 ];
 
-/// Traces of the contacts on the object as in figures 10 to 18 of paper 003, in the object's frame, seen from six sides: what
+/// Traces of the contacts on the object as in figures 10 to 18 of Cherif 1999, in the object's frame, seen from six sides: what
 /// faces away is left out. None where the object's shape is not known, or no finger touches.
 pub fn traces(plan: &Plan, scene: &SceneStory) -> Option<String> {
     let body = Body::of(scene)?;

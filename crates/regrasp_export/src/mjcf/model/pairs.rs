@@ -1,61 +1,100 @@
 //! Which geoms of the model may touch, and with what friction.
+//!
+//! One rule. The hand and the object of the plan may touch what the checker keeps them apart from
+//! (`regrasp_scene::collision_pairs`): themselves, each other and everything around them. An object that stands on a support may
+//! touch everything. What is held in place, by a weld or by servos, does not collide with what else is held in place.
 
-use super::GeomNames;
+use super::Model;
+use crate::mjcf::object::Hold;
 use crate::mjcf::xml::{Xml, numbers};
 use regrasp_robot::{ContactModel, Finger};
 use regrasp_scene::{FingerShapeId, HandView, collision_pairs};
+use std::collections::BTreeSet;
 
 /// Torsional friction of a fingertip that counts as a point, in metres (physics notes, section 1): none touches at a point.
 const POINT_TORSION: f64 = 0.002;
 /// MuJoCo's own coefficients of rolling friction; without effect where `condim` is below 6.
 const ROLLING: f64 = 0.0001;
 
-/// Writes the pairs: fingertips with the object as the plan means them, then what should never touch.
-pub(super) fn write(xml: &mut Xml, view: &HandView, names: &GeomNames) {
-    let pairs = collision_pairs(view);
-    let friction = view.object.friction;
-    xml.open("contact", &[]);
-    for (index, finger) in view.hand.fingers.iter().enumerate() {
-        let (condim, coefficients) = friction_of(finger, friction);
-        for (tip, part) in names.touching[index].iter().flat_map(|tip| names.object.iter().map(move |part| (tip, part)))
-        {
-            xml.leaf(
-                "pair",
-                &[
-                    ("geom1", tip.clone()),
-                    ("geom2", part.clone()),
-                    ("condim", condim.to_string()),
-                    ("friction", numbers(coefficients)),
-                ],
-            );
+/// Writes pairs, each once.
+struct Pairs<'x> {
+    xml: &'x mut Xml,
+    written: BTreeSet<[String; 2]>,
+}
+
+impl Pairs<'_> {
+    /// True the first time that the two are named, in any order.
+    fn is_new(&mut self, a: &str, b: &str) -> bool {
+        self.written.insert([a.min(b).to_owned(), a.max(b).to_owned()])
+    }
+
+    fn planned(&mut self, tip: &str, object: &str, (condim, coefficients): (u8, [f64; 5])) {
+        if self.is_new(tip, object) {
+            let what = [("geom1", tip.to_owned()), ("geom2", object.to_owned()), ("condim", condim.to_string())];
+            self.xml.leaf("pair", &[&what[..], &[("friction", numbers(coefficients))]].concat());
         }
     }
-    let unplanned = |xml: &mut Xml, a: &str, b: &str| {
-        let coefficients = [friction, friction, POINT_TORSION, ROLLING, ROLLING];
-        let attributes = [("class", "unplanned".to_owned()), ("geom1", a.to_owned()), ("geom2", b.to_owned())];
-        let friction = [("friction", numbers(coefficients))];
-        xml.leaf("pair", &[&attributes[..], &friction[..]].concat());
-    };
-    let of_finger = |id: FingerShapeId| names.fingers[id.finger.0][id.shape].as_str();
-    for &id in &pairs.link_object {
-        names.object.iter().for_each(|part| unplanned(xml, of_finger(id), part));
+
+    fn unplanned(&mut self, a: &str, b: &str, friction: f64) {
+        if self.is_new(a, b) {
+            let coefficients = [friction, friction, POINT_TORSION, ROLLING, ROLLING];
+            let what = [("class", "unplanned".to_owned()), ("geom1", a.to_owned()), ("geom2", b.to_owned())];
+            self.xml.leaf("pair", &[&what[..], &[("friction", numbers(coefficients))]].concat());
+        }
     }
-    for &(a, b) in pairs.finger_finger.iter().chain(&pairs.within_finger) {
-        unplanned(xml, of_finger(a), of_finger(b));
-    }
-    for &(id, palm) in &pairs.finger_palm {
-        unplanned(xml, of_finger(id), &names.palm[palm]);
-    }
-    for &(id, obstacle) in &pairs.finger_obstacle {
-        unplanned(xml, of_finger(id), &names.obstacles[obstacle]);
-    }
-    for &palm in &pairs.palm_object {
-        names.object.iter().for_each(|part| unplanned(xml, &names.palm[palm], part));
-    }
-    for &obstacle in &pairs.object_obstacle {
-        names.object.iter().for_each(|part| unplanned(xml, &names.obstacles[obstacle], part));
+}
+
+/// Writes the pairs: fingertips with the object as the plan means them, then what should never touch, then what stands on
+/// supports.
+pub(super) fn write(xml: &mut Xml, model: &Model) {
+    xml.open("contact", &[]);
+    let mut pairs = Pairs { xml, written: BTreeSet::new() };
+    add_moved(&mut pairs, model);
+    for object in model.objects.iter().filter(|object| object.hold == Hold::Support) {
+        let own = &object.names.geoms;
+        let fixed = model.names.supports.iter().chain(&model.names.obstacles).map(String::as_str);
+        let hands = model.names.hands.iter().flat_map(|hand| hand.geoms());
+        let objects = model.names.objects.iter().flat_map(|other| &other.geoms).map(String::as_str);
+        for other in fixed.chain(hands).chain(objects).filter(|other| !own.iter().any(|part| part == other)) {
+            own.iter().for_each(|part| pairs.unplanned(part, other, object.object.friction));
+        }
     }
     xml.close();
+}
+
+/// The pairs of the hand and the object that the plan moves.
+fn add_moved(pairs: &mut Pairs, model: &Model) {
+    let view = HandView::of(model.task);
+    let found = collision_pairs(&view);
+    let (hand, object) = (&model.names.hands[view.hand_index], &model.names.objects[view.object_index].geoms);
+    let around = model.names.around(model.task);
+    let friction = view.object.friction;
+    for (finger, tips) in view.hand.fingers.iter().zip(&hand.touching) {
+        for tip in tips {
+            object.iter().for_each(|part| pairs.planned(tip, part, friction_of(finger, friction)));
+        }
+    }
+    let of_finger = |id: FingerShapeId| hand.fingers[id.finger.0][id.shape].as_str();
+    for &id in &found.link_object {
+        object.iter().for_each(|part| pairs.unplanned(of_finger(id), part, friction));
+    }
+    for &(a, b) in found.finger_finger.iter().chain(&found.within_finger) {
+        pairs.unplanned(of_finger(a), of_finger(b), friction);
+    }
+    for &(id, palm) in &found.finger_palm {
+        pairs.unplanned(of_finger(id), &hand.palm[palm], friction);
+    }
+    for &(id, obstacle) in &found.finger_obstacle {
+        around[obstacle].iter().for_each(|geom| pairs.unplanned(of_finger(id), geom, friction));
+    }
+    for &palm in &found.palm_object {
+        object.iter().for_each(|part| pairs.unplanned(&hand.palm[palm], part, friction));
+    }
+    for &obstacle in &found.object_obstacle {
+        for geom in around[obstacle] {
+            object.iter().for_each(|part| pairs.unplanned(geom, part, friction));
+        }
+    }
 }
 
 /// `condim` and MuJoCo's five friction coefficients of a fingertip on the object.

@@ -1,11 +1,11 @@
-//! Balls that roll, slide and twist over faces, edges and vertices of a convex polyhedron (paper 003, appendix A).
+//! Balls that roll, slide and twist over faces, edges and vertices of a convex polyhedron (Cherif 1999, appendix A).
 //!
 //! The centre of a ball that touches keeps one radius from the polyhedron: it moves on a surface of planes, parts of cylinders
 //! about the edges and parts of spheres about the vertices, smooth but for its curvature. In a contact frame that is carried
 //! along without turning about the normal, constant relative velocities move it along straight lines, helices and great
 //! circles, in closed form; the tip turns about two fixed axes, one after the other. `BallWay::of` joins such stretches.
 //!
-//! The paper puts the fingertip onto the next face at once (equations 14 to 16): `relocate`, `advance_with_jumps`.
+//! Cherif 1999 puts the fingertip onto the next face at once (equations 14 to 16): `relocate`, `advance_with_jumps`.
 
 use super::mode::RelativeVelocity;
 use super::polyhedron::{Feature, Polyhedron};
@@ -395,7 +395,7 @@ pub fn relocate(
     BallContact { feature: Feature::Face(to), pose: ContactPose { object_from_contact, tip_from_contact } }
 }
 
-/// The paper's motion between faces: on the plane of face `face` for the whole duration, then folded over every edge on the way,
+/// Cherif 1999's motion between faces: on the plane of face `face` for the whole duration, then folded over every edge on the way,
 /// at once. The fingertip jumps there; [`BallWay`] does not.
 pub fn advance_with_jumps(
     polyhedron: &Polyhedron,

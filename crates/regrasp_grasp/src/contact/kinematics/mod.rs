@@ -1,4 +1,4 @@
-//! How a contact of a fingertip with the object moves (paper 003, sections 6.1.2 and 6.2.2, appendix A).
+//! How a contact of a fingertip with the object moves (Cherif 1999, sec. 6.1.2 and 6.2.2, appendix A).
 //!
 //! A relative velocity in (`mode::RelativeVelocity`), a contact moved on both surfaces out, in three forms with the same
 //! result: `montana` in charts, `chart_free` on any surface, meshes too, and `ball_on_polyhedron` over faces, edges and
@@ -24,7 +24,7 @@ mod tests;
 pub use ball_on_polyhedron::{Ball, BallContact, BallWay, Stretch, Transition, advance_with_jumps, relocate};
 pub use chart::{ChartedSurface, Coordinates, Forms};
 pub use chart_free::SurfacePair;
-pub use mode::{BodyVelocity, ForceLaw, Mode, ModeTolerances, Motion, RelativeVelocity, motion_of};
+pub use mode::{BodyVelocity, ContactMotion, ForceLaw, Mode, ModeTolerances, RelativeVelocity, motion_of};
 pub use montana::{Advanced, ContactPair, ContactState, RelativeControl};
 pub use polyhedron::{Edge, Face, Feature, NotPolyhedron, Polyhedron};
 

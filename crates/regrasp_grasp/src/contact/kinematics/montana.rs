@@ -1,4 +1,4 @@
-//! Montana's equations (paper 003, equation 12; Montana 1988) in charts of both surfaces.
+//! Montana's equations (Cherif 1999, equation 12; Montana 1988) in charts of both surfaces.
 //!
 //! With relative velocities of the object over the fingertip, in the frame of the object's chart, equation 12 holds as printed.
 //! `R_psi` is a reflection, its own inverse. Angles `psi` as in Montana: turning the object's x by `-psi` about the object's
@@ -54,7 +54,7 @@ pub struct StateRates {
 /// Relative velocities over a time.
 #[derive(Clone, Copy)]
 pub enum RelativeControl<'a> {
-    /// Constant components in the frame of the object's chart, as in the paper: a path that depends on the chart.
+    /// Constant components in the frame of the object's chart, as in Cherif 1999: a path that depends on the chart.
     InChart(RelativeVelocity),
     /// Constant components in a frame that starts as that of the object's chart and does not turn about the normal: paths that
     /// no chart decides. On faces of polyhedra it is the same.

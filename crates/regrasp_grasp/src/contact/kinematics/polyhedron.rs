@@ -1,4 +1,4 @@
-//! Convex polyhedra with their faces, edges and vertices (paper 003, section 3.2 and appendix A).
+//! Convex polyhedra with their faces, edges and vertices (Cherif 1999, sec. 3.2 and appendix A).
 
 use super::chart::ChartedSurface;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};

@@ -1,5 +1,5 @@
 //! Passages: ends of a leg that the object by itself can leave only straight out, such as a hole. Uniform draws seldom find
-//! the way out (paper 000, section 5.1, example 4), so some poses are drawn along it.
+//! the way out (Saut 2011, sec. 5.1, example 4), so some poses are drawn along it.
 
 use regrasp_base::Rng;
 use regrasp_geometry::{Pose, Vector};

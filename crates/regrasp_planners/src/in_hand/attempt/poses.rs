@@ -5,7 +5,7 @@ use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, Vector, interpolate_pose};
 use regrasp_manipulation::model::Model;
 
-/// A random pose near the way from `start` to `goal` (in-hand-notes, 3: biased poses).
+/// A random pose near the way from `start` to `goal` (by measurement on a prototype: biased poses).
 pub fn draw_pose(model: &Model, settings: &SearchSettings, start: &Pose, goal: &Pose, rng: &mut Rng) -> Pose {
     let is_far = rng.chance(settings.far_share);
     let (distance, angle) = (settings.wander_distance, settings.wander_angle);

@@ -107,7 +107,7 @@ impl Tally {
                 let at = best_at.as_ref().filter(|_| seen.n_held == 0)?;
                 let (name, p) = (&model.view.hand.fingers[finger].name, at.translation.vector);
                 Some(format!(
-                    "\"{name}\" (the others are closed in none of {} closed grasps; nearest: margin {:.4} of {required}, with \
+                    "\"{name}\" (the others hold in none of {} closed grasps; nearest: margin {:.4} of {required}, with \
                      the object at [{:.4}, {:.4}, {:.4}] m, turned by {:.1} degrees)",
                     seen.n_grasps,
                     seen.best,
@@ -118,7 +118,7 @@ impl Tally {
                 ))
             })
             .collect();
-        (!bound.is_empty()).then(|| format!("never to be released: {}", bound.join(", ")))
+        (!bound.is_empty()).then(|| format!("fingers that can never lift: {}", bound.join(", ")))
     }
 
     /// The causes in words, commonest first.
@@ -130,24 +130,32 @@ impl Tally {
             .iter()
             .map(|(&reason, &count)| Cause {
                 reason: match reason {
-                    Reason::NoContact(f) => format!("finger \"{}\" finds no contact it reaches", finger_name(f)),
-                    Reason::NotClosed => "no closed grasp of which a finger may let go".into(),
-                    Reason::NoWayOver => "no free way for the fingers to the next grasp".into(),
-                    Reason::Bound(f) => {
-                        format!("finger \"{}\" cannot be released: the others are not closed", finger_name(f))
+                    Reason::NoContact(f) => format!("finger \"{}\" found no contact within its reach", finger_name(f)),
+                    Reason::NotClosed => {
+                        "found no grasp in which the other fingers still hold the object after one lifts".into()
                     }
-                    Reason::OutOfReach => "a finger reaches no farther while the object moves".into(),
-                    Reason::Crease => "a contact would have to slide over an edge of the object".into(),
+                    Reason::NoWayOver => "found no collision-free path for the fingers to the next grasp".into(),
+                    Reason::Bound(f) => {
+                        format!(
+                            "finger \"{}\" cannot lift: the other fingers would not hold the object",
+                            finger_name(f)
+                        )
+                    }
+                    Reason::OutOfReach => "a finger reached the end of its workspace while the object moved".into(),
+                    Reason::Crease => "a contact would have to cross an edge of the object".into(),
                     Reason::WouldTurn => format!(
                         "soft fingertips would have to turn about their contact normals, by {:.2} degrees at least",
                         self.least_turn.unwrap_or(0.0).to_degrees()
                     ),
                     Reason::NoForces(unbalanced) => unbalanced.in_words(model),
                     Reason::NotDecomposed => {
-                        "a path with sliding contacts has no transfers and regrasps near it".into()
+                        "a path in GS_n could not be decomposed into transfers and regrasps".into()
                     }
                     Reason::TooNear(pair) => {
-                        format!("\"{}\" comes too near \"{}\"", model.bodies[pair.a].name, model.bodies[pair.b].name)
+                        format!(
+                            "\"{}\" comes too close to \"{}\"",
+                            model.bodies[pair.a].name, model.bodies[pair.b].name
+                        )
                     }
                 },
                 count,

@@ -1,4 +1,4 @@
-//! Postures of free fingers: out of the way while the others move the object (independent fingers; paper 000, section 3.2).
+//! Postures of free fingers: out of the way while the others move the object (independent fingers; Saut 2011, sec. 3.1).
 
 use crate::in_hand::attempt::search::Search;
 use crate::in_hand::grasps::candidate::{Candidate, Way, clear_share};

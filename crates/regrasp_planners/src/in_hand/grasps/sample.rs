@@ -1,4 +1,4 @@
-//! Random grasps: the random loop generator (paper 000, section 4.2.2).
+//! Random grasps: the random loop generator (Saut 2011, sec. 4.2.2).
 
 use crate::in_hand::attempt::search::Search;
 use crate::in_hand::attempt::tally::Reason;

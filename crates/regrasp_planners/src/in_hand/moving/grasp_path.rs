@@ -1,5 +1,5 @@
 //! Linear paths in GS_n: the object and all contacts move at once, the contacts along geodesics of the object's surface
-//! (paper 000, sections 4.1 and 4.2.2; paper 004, section IV.B).
+//! (Saut 2011, sec. 4.1 and 4.2.2; Sahbani 2007, sec. IV.B).
 //!
 //! No hand can follow such a path as it stands; `decompose.rs` cuts it into transfers and regrasps.
 

@@ -1,4 +1,4 @@
-//! Motions of the object with fingers that keep their contacts, roll, or are free (paper 000, section 4.2.3).
+//! Motions of the object with fingers that keep their contacts, roll, or are free (Saut 2011, sec. 4.2.3).
 
 /// Linear paths in GS_n.
 pub mod grasp_path;

@@ -1,5 +1,5 @@
-//! Transfer paths: the object moves, the fingers follow, with contacts that stay on it (paper 000, section 4.2.3) or roll
-//! over it (paper 004, section IV-C).
+//! Transfer paths: the object moves, the fingers follow, with contacts that stay on it (Saut 2011, sec. 4.2.3) or roll
+//! over it (Sahbani 2007, sec. IV-C).
 
 use crate::in_hand::moving::spin;
 use crate::in_hand::moving::step::{is_closed, n_steps, step_joints};

@@ -126,7 +126,7 @@ fn is_clear_backwards(workspace: &mut Workspace, here: &GraspState, before: &Gra
 fn in_the_way(workspace: &Workspace) -> String {
     workspace.blocking_pair.map_or("a step that is not clear".into(), |pair| {
         let bodies = &workspace.model.bodies;
-        format!("\"{}\" comes too near \"{}\"", bodies[pair.a].name, bodies[pair.b].name)
+        format!("\"{}\" comes too close to \"{}\"", bodies[pair.a].name, bodies[pair.b].name)
     })
 }
 

@@ -5,7 +5,7 @@ use crate::in_hand::grasps::candidate::{Candidate, Choice};
 use crate::in_hand::grasps::closure_table::ClosureTable;
 use crate::in_hand::grasps::pool::Pool;
 use crate::in_hand::moving::transfer::transfer;
-use crate::in_hand::regrasping::regrasp::{Tried, regrasp, regrasp_over};
+use crate::in_hand::regrasping::regrasp::{ChangeGoal, Tried, regrasp, regrasp_over};
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;
 use regrasp_geometry::collision::Placement;
@@ -46,7 +46,7 @@ pub fn whole_transfer(search: &mut Search, from: &GraspState, goal: &Pose) -> Op
     Some(way)
 }
 
-/// Transfer with the first grasp, then change to the second (paper 000, algorithm 2).
+/// Transfer with the first grasp, then change to the second (Saut 2011, algorithm 2).
 pub fn transfer_regrasp(
     search: &mut Search,
     from: &GraspState,
@@ -62,7 +62,7 @@ pub fn transfer_regrasp(
     change_grasp(search, &way, to, arrival, rng)
 }
 
-/// Change to the second grasp, then transfer (paper 000, section 4.3); where fingertips roll, to the contacts from which they
+/// Change to the second grasp, then transfer (Saut 2011, sec. 4.3); where fingertips roll, to the contacts from which they
 /// roll into those of the second grasp. None where the object has nowhere to go: that is
 /// [`transfer_regrasp`].
 pub fn regrasp_transfer(
@@ -196,11 +196,12 @@ fn change(
             of_finger.extend(pool.any(search, finger, OTHERS));
         }
         let mut table = ClosureTable::new(model, &options);
-        let is_goal = |choice: &Choice| *choice == goal;
-        // A finger that is not at its goal has to move once at least.
-        let n_away = |choice: &Choice| choice.iter().zip(&goal).filter(|(a, b)| a != b).count() as f64;
-        let workspace = &mut search.workspace;
-        change = regrasp_over(workspace, way.end(), &options, is_goal, n_away, &mut table, RELOCATIONS, rng);
+        let goal = ChangeGoal {
+            is_there: |choice: &Choice| *choice == goal,
+            // A finger that is not at its goal has to move once at least.
+            n_away: |choice: &Choice| choice.iter().zip(&goal).filter(|(a, b)| a != b).count() as f64,
+        };
+        change = regrasp_over(&mut search.workspace, way.end(), &options, &goal, &mut table, RELOCATIONS, rng);
     }
     search.workspace.rrt_iterations = model.settings.rrt_iterations;
     let way = way.then(change?)?;

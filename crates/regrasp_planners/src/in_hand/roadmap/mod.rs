@@ -1,6 +1,6 @@
-//! Many queries on one roadmap (paper 004, section IV-D): built once for a hand and an object, saved, asked often.
+//! Many queries on one roadmap (Sahbani 2007, sec. IV-D): built once for a hand and an object, saved, asked often.
 //!
-//! The manipulation graph of paper 004 keeps paths in GS_n, which every query would have to decompose. This one keeps
+//! The manipulation graph of Sahbani 2007 keeps paths in GS_n, which every query would have to decompose. This one keeps
 //! grasps, transfers and relocations, proven when it is built, so that a path in it is a plan.
 
 /// Linking an object pose to the graph.
@@ -33,7 +33,7 @@ mod route;
 pub use build::{BuildSettings, BuildStage, build_roadmap};
 pub use file::seal;
 pub use identity::{Digest, Identity};
-pub use query::{Answer, QueryMemory, RoadmapPlanner};
+pub use query::{QueryMemory, RoadmapAnswer, RoadmapPlanner};
 pub use region::Region;
 
 use crate::settings::InHandSettings;

@@ -1,4 +1,4 @@
-//! The baseline of paper 000, section 5.1, "classic method": a visibility PRM whose local method is one transfer-regrasp
+//! The baseline of Saut 2011, sec. 5.1, "classic method": a visibility PRM whose local method is one transfer-regrasp
 //! or regrasp-transfer.
 
 use crate::in_hand::attempt::search::{Search, Stop};

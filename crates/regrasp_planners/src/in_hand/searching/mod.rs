@@ -2,7 +2,7 @@
 
 /// Attempts, one after the other or several at once.
 pub mod attempts;
-/// The baseline of paper 000.
+/// The baseline of Saut 2011.
 pub mod classic;
 /// A first try with more room.
 pub mod first_try;
@@ -12,5 +12,5 @@ pub mod gait;
 pub mod legs;
 /// Random shortcuts.
 pub mod shorten;
-/// The method of paper 000.
+/// The method of Saut 2011.
 pub mod visibility;

@@ -1,4 +1,4 @@
-//! The method of paper 000: a visibility PRM in GS_n, components joined through GS_(n-1), paths in GS_n decomposed
+//! The method of Saut 2011: a visibility PRM in GS_n, components joined through GS_(n-1), paths in GS_n decomposed
 //! (algorithm 1; sections 4.2.1 and 5.2).
 
 /// Joining components of a roadmap.
@@ -90,7 +90,7 @@ pub fn note_nearest(search: &mut Search, roadmap: &Roadmap) {
 
 /// The motions along the cheapest path from start to goal, its paths in GS_n decomposed.
 ///
-/// None when one could not be: that edge is then deleted, and the ends may be apart again (in-hand-notes, 4.4).
+/// None when one could not be: that edge is then deleted, and the ends may be apart again (by measurement on a prototype).
 pub fn solution(search: &mut Search, roadmap: &mut Roadmap) -> Result<Option<Sequence>, Stop> {
     let Some(path) = roadmap.path(START, GOAL) else { return Ok(None) };
     let mut way = Sequence::at(roadmap.nodes()[START].point.clone());

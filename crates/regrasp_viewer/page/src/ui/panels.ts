@@ -48,7 +48,7 @@ export function figures(story: Story, motion: Motion, seek: (time: number) => vo
   if (story.judged) {
     const { margin, clearance, required_margin, pair, pairs } = story.judged;
     const i = indexOfLeast(margin);
-    if (i < 0) put("Closure margin", "\u2013", "", motion.isTracking ? "what slides closes nothing" : "not judged");
+    if (i < 0) put("Closure margin", "\u2013", "", motion.isTracking ? "not defined for sliding contacts" : "not judged");
     else put("Closure margin", margin[i]!.toFixed(4), "", `required ${required_margin}`, go(i));
     const k = indexOfLeast(clearance);
     if (k < 0) put("Clearance", "\u2013", "", "not judged");

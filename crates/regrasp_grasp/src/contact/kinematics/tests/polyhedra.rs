@@ -249,7 +249,7 @@ fn approaching(
     (BallContact { pose: start.pose.turned_by(rng.uniform(-3.0, 3.0)), ..start }, time)
 }
 
-/// Equations 14 and 15 in the paper's words, with the length and the sign that they lack.
+/// Equations 14 and 15 in Cherif 1999's words, with the length and the sign that they lack.
 #[test]
 fn folding_over_an_edge_is_the_papers_with_its_errors_put_right() {
     let mut rng = Rng::keyed(5, "polyhedra", 0);

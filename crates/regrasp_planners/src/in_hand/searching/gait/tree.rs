@@ -1,5 +1,5 @@
 //! A tree of grasps that grows from one end of the query by gaits: relocate fingers with look-ahead, then transfer as far
-//! as the hand can follow. In-hand-notes, section 3, method E; real-hands-notes, section 2, rule F2.
+//! as the hand can follow.
 
 use crate::in_hand::attempt::search::Search;
 use crate::in_hand::attempt::tally::Reason;

@@ -1,5 +1,5 @@
-//! connect_components(): joins components of the roadmap by one transfer and one regrasp, through GS_(n-1) (paper 000,
-//! section 4.2.3; paper 004, algorithm 3).
+//! connect_components(): joins components of the roadmap by one transfer and one regrasp, through GS_(n-1) (Saut 2011,
+//! sec. 4.2.3; Sahbani 2007, algorithm 3).
 
 use crate::in_hand::attempt::search::{Search, Stop};
 use crate::in_hand::searching::visibility::link::{Link, Roadmap, distance, single_sequence};

@@ -1,4 +1,4 @@
-//! transform_path(): cuts a path in GS_n into transfers and regrasps by halving it (paper 000, section 4.3, algorithm 2).
+//! transform_path(): cuts a path in GS_n into transfers and regrasps by halving it (Saut 2011, sec. 4.3, algorithm 2).
 
 use crate::in_hand::attempt::search::{Search, Stop};
 use crate::in_hand::moving::grasp_path::GraspPath;
@@ -6,8 +6,8 @@ use crate::in_hand::searching::visibility::link::single_sequence;
 use regrasp_manipulation::grasp::sequence::Sequence;
 use regrasp_manipulation::grasp::state::GraspState;
 
-/// Halvings after which a piece counts as one that cannot be decomposed. The paper stops where the object's poses are
-/// close; a path may also have equal poses at both ends (in-hand-notes, 4.5).
+/// Halvings after which a piece counts as one that cannot be decomposed. Saut 2011 stops where the object's poses are
+/// close; a path may also have equal poses at both ends (by measurement on a prototype).
 const MAX_HALVINGS: u32 = 11;
 
 /// A piece of a path: its ends, with their parameters.

@@ -1,5 +1,5 @@
-//! explore(): samples GS_n by the random loop generator and links the samples inside it (paper 000, section 4.2.2; paper
-//! 004, algorithm 2).
+//! explore(): samples GS_n by the random loop generator and links the samples inside it (Saut 2011, sec. 4.2.2;
+//! Sahbani 2007, algorithm 2).
 
 use crate::in_hand::attempt::search::{Search, Stop};
 use crate::in_hand::grasps::sample::draw_state;
@@ -31,7 +31,7 @@ pub fn roadmap_of(
     local_method: LocalMethod,
 ) -> Result<Roadmap, Stop> {
     let mut roadmap = Roadmap::new();
-    let (first, second) = (roadmap.add_node(start.clone(), true), roadmap.add_node(goal.clone(), true));
+    let (first, second) = (roadmap.add_guard(start.clone()), roadmap.add_guard(goal.clone()));
     search.n_nodes = 2;
     let mut space = GraspSpace { search, local_method, stop: None };
     if let Some(link) = space.connect(start, goal) {

@@ -1,4 +1,4 @@
-//! Links between grasps: what the roadmaps of paper 000 have for edges, and the local methods that make them.
+//! Links between grasps: what the roadmaps of Saut 2011 have for edges, and the local methods that make them.
 
 use crate::in_hand::attempt::search::{Search, Stop};
 use crate::in_hand::moving::grasp_path::GraspPath;
@@ -25,9 +25,9 @@ pub enum Link {
 /// How two grasps are linked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LocalMethod {
-    /// By a linear path in GS_n (paper 000, section 4.2.2).
+    /// By a linear path in GS_n (Saut 2011, sec. 4.2.2).
     GraspPath,
-    /// By one transfer-regrasp or regrasp-transfer ("classic method", paper 000, section 5.1).
+    /// By one transfer-regrasp or regrasp-transfer ("classic method", Saut 2011, sec. 5.1).
     TransferRegrasp,
 }
 
@@ -72,7 +72,7 @@ pub fn distance(search: &Search, a: &GraspState, b: &GraspState) -> f64 {
     search.distance(&a.world_from_object, &b.world_from_object) + apart / a.contacts.len() as f64
 }
 
-/// One transfer and one regrasp, in either order (paper 000, section 4.3): from exactly `from` to exactly `to`.
+/// One transfer and one regrasp, in either order (Saut 2011, sec. 4.3): from exactly `from` to exactly `to`.
 pub fn single_sequence(search: &mut Search, from: &GraspState, to: &GraspState) -> Option<Sequence> {
     let mut rng = Rng::child(&search.rng, "single_sequence", 0);
     search.rng.bits();
