@@ -7,6 +7,7 @@ use super::geom::{Geom, Look, OBJECT_MATERIAL, is_hollowed, write_geom, write_me
 use super::hand::{Drive, ModelHand};
 use super::names::Names;
 use super::object::{Hold, ModelObject, hold_at_rest};
+use super::solid::ObjectSolid;
 use super::xml::{Xml, numbers};
 use regrasp_geometry::{Pose, Vector, pose_from};
 use regrasp_plan::Plan;
@@ -30,11 +31,12 @@ pub(super) struct Model<'a> {
 
 pub(super) fn write(task: &Manipulation, plan: &Plan) -> Mjcf {
     let scene = task.scene;
+    let solids: Vec<ObjectSolid> = scene.objects.iter().map(ObjectSolid::of).collect();
     let links = task.robot_bodies();
-    let names = Names::of(scene, &links);
+    let names = Names::of(scene, &solids, &links);
     let gravity = plan.promises.forces.as_ref().map_or(Some(GRAVITY), |forces| forces.gravity_in_world);
     let gravity = gravity.unwrap_or(GRAVITY);
-    let model = Model::new(task, plan, (&names, &links), &Vector::from(gravity));
+    let model = Model::new(task, plan, (&names, &solids, &links), &Vector::from(gravity));
     let mut xml = Xml::default();
     xml.open("mujoco", &[("model", scene.name.clone())]);
     write_settings(&mut xml, gravity);
@@ -88,7 +90,7 @@ impl<'a> Model<'a> {
     fn new(
         task: &'a Manipulation<'a>,
         plan: &Plan,
-        (names, links): (&'a Names, &'a [Obstacle]),
+        (names, solids, links): (&'a Names, &'a [ObjectSolid], &'a [Obstacle]),
         gravity: &Vector,
     ) -> Self {
         let scene = task.scene;
@@ -105,7 +107,7 @@ impl<'a> Model<'a> {
             } else {
                 (*at_rest, hold_at_rest(object, at_rest, &scene.supports, gravity))
             };
-            ModelObject { object, names, world_from_object, hold }
+            ModelObject { object, names, solid: &solids[index], world_from_object, hold }
         });
         Model { task, names, links, hands: hands.collect(), objects: objects.collect() }
     }
@@ -139,7 +141,8 @@ impl<'a> Model<'a> {
             write_mesh(xml, &body.placed.shape, name);
         }
         for object in &self.objects {
-            write_mesh(xml, &object.object.shape, &object.names.geom);
+            let parts = object.solid.parts.iter().zip(&object.names.geoms);
+            parts.for_each(|(shape, name)| write_mesh(xml, shape, name));
         }
         xml.close();
     }
@@ -237,17 +240,18 @@ impl<'a> Model<'a> {
     fn notes(&self) -> Vec<String> {
         let moved = &self.objects[self.task.object_index];
         let others = || self.objects.iter().filter(|object| object.hold != Hold::Fingers);
-        let fixed = self.fixed().map(|(body, _, _)| (body.name.as_str(), &body.placed.shape));
-        let hollowed = std::iter::once((moved.object.name.as_str(), &moved.object.shape))
-            .chain(others().map(|object| (object.object.name.as_str(), &object.object.shape)))
-            .chain(fixed)
-            .filter(|(_, shape)| is_hollowed(shape))
-            .map(|(name, _)| format!("\"{name}\" is not convex; MuJoCo collides with its convex hull"));
+        let cut = std::iter::once(moved).chain(others()).filter_map(|object| {
+            let note = object.solid.note.as_ref()?;
+            Some(format!("\"{}\" is not convex; {note}", object.object.name))
+        });
+        let fixed = self.fixed().filter(|(body, _, _)| is_hollowed(&body.placed.shape));
+        let hollowed =
+            fixed.map(|(body, _, _)| format!("\"{}\" is not convex; MuJoCo collides with its convex hull", body.name));
         let pinned = others().filter(|object| object.hold == Hold::Pin).map(|object| {
             let (name, pin) = (&object.object.name, &object.names.pin);
             format!("\"{name}\" stands on no support; the weld \"{pin}\" holds it where the scene has it")
         });
-        hollowed.chain(pinned).collect()
+        cut.chain(hollowed).chain(pinned).collect()
     }
 }
 
