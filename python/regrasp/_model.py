@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -139,9 +139,12 @@ class Finger:
 class Hand:
     """A palm and fingers. Made by `load_hand`, or part of a scene, where it is placed in the world."""
 
-    def __init__(self, native: _regrasp.Hand | _regrasp.Scene, fields: Mapping[str, Any]) -> None:
-        self._native = native
+    def __init__(self, tips: Callable[[bytes], bytes], fields: Mapping[str, Any]) -> None:
+        self._tips = tips
         self.name: str = fields["name"]
+        """Name of the robot."""
+        self.name_in_scene: str | None = fields["name_in_scene"]
+        """What the scene calls it; none for a hand without a scene."""
         self.base_link: str = fields["base_link"]
         """The link whose frame is the hand frame."""
         self.world_from_base: Pose = pose_of(fields["world_from_base"])
@@ -190,7 +193,7 @@ class Hand:
             expected = f"shape ({len(self.joints)},) or (n, {len(self.joints)})"
             raise argument_error("Hand.tips", "joints", f"has shape {values.shape}", expected)
         shape = (*values.shape[:-1], len(self.fingers), 3)
-        return np.ndarray(shape, np.float64, self._native.tips(values.tobytes()))
+        return np.ndarray(shape, np.float64, self._tips(values.tobytes()))
 
     def __repr__(self) -> str:
         fingers = ", ".join(finger.name for finger in self.fingers)
@@ -216,7 +219,7 @@ def _finger(fields: Mapping[str, Any]) -> Finger:
 
 @dataclass(frozen=True, eq=False)
 class Object:
-    """The object that is manipulated. Its frame is that of its shape."""
+    """An object that hands can move. Its frame is that of its shape."""
 
     name: str
     shape: Shape
@@ -229,6 +232,18 @@ class Object:
     """Largest distance of its surface from its centre of mass."""
     collides_as_hull: bool
     """True where its convex hull stands for it, but to fingertips."""
+    world_from_object: Pose
+    """Where it is at the beginning."""
+
+
+def _object(fields: Mapping[str, Any]) -> Object:
+    made = {
+        **fields,
+        "shape": _shape(fields["shape"]),
+        "center_of_mass": _constant(fields["center_of_mass"]),
+        "world_from_object": pose_of(fields["world_from_object"]),
+    }
+    return Object(**made)
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,6 +253,28 @@ class Obstacle:
     name: str
     shape: Shape
     world_from_obstacle: Pose
+
+
+@dataclass(frozen=True, eq=False)
+class Support:
+    """Something fixed in the world that objects may stand on."""
+
+    name: str
+    shape: Shape
+    world_from_support: Pose
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is asked of one hand and one object of a scene."""
+
+    name: str
+    """Empty in scenes of one task."""
+    kind: Literal["in_hand", "tracking"]
+    hand: str
+    """Name of the hand in the scene."""
+    object: str
+    """Name of the object."""
 
 
 @dataclass(frozen=True)
@@ -270,7 +307,7 @@ Source = tuple[str, dict[str, str], bool, list[float] | str | None]
 
 
 class Scene:
-    """Hand, object, obstacles and task. Made by `load_scene`."""
+    """Hands, objects, supports, obstacles and tasks. Made by `load_scene`."""
 
     def __init__(self, native: _regrasp.Scene, source: Source) -> None:
         fields: dict[str, Any] = json.loads(native.describe())
@@ -279,14 +316,23 @@ class Scene:
         self.name: str = fields["name"]
         self.path: str = fields["path"]
         """The scene file, as it was named."""
-        self.hand: Hand = Hand(native, fields["hand"])
-        shape = fields["object"].pop("shape")
-        center = _constant(fields["object"].pop("center_of_mass"))
-        self.object: Object = Object(shape=_shape(shape), center_of_mass=center, **fields["object"])
+        self.hands: tuple[Hand, ...] = tuple(
+            Hand(partial(native.tips, index), entry) for index, entry in enumerate(fields["hands"])
+        )
+        """The hands, in the order of the file; at least one."""
+        self.objects: tuple[Object, ...] = tuple(_object(entry) for entry in fields["objects"])
+        """The objects that hands can move, in the order of the file; at least one."""
+        self.supports: tuple[Support, ...] = tuple(
+            Support(entry["name"], _shape(entry["shape"]), pose_of(entry["world_from_support"]))
+            for entry in fields["supports"]
+        )
+        """What objects may stand on."""
         self.obstacles: tuple[Obstacle, ...] = tuple(
             Obstacle(entry["name"], _shape(entry["shape"]), pose_of(entry["world_from_obstacle"]))
             for entry in fields["obstacles"]
         )
+        self.tasks: tuple[Task, ...] = tuple(Task(**entry) for entry in fields["tasks"])
+        """What is asked, in the order of the file; at least one."""
         gravity = fields["gravity"]
         self.gravity: FloatArray | Literal["any"] | None = (
             _constant(cast("list[float]", gravity)) if isinstance(gravity, list) else gravity
@@ -299,18 +345,28 @@ class Scene:
         """Remarks of the reader."""
 
     @property
+    def hand(self) -> Hand:
+        """The first hand: of most scenes there is no other."""
+        return self.hands[0]
+
+    @property
+    def object(self) -> Object:
+        """The first object: of most scenes there is no other."""
+        return self.objects[0]
+
+    @property
     def start(self) -> Pose:
-        """World from object at the start, as seed 0 draws it where the scene leaves it open."""
+        """World from object at the start of the first task, as seed 0 draws it where the scene leaves it open."""
         return self.query().start
 
     @property
     def goal(self) -> Pose:
-        """World from object at the goal, of seed 0."""
+        """World from object at the goal of the first task, of seed 0."""
         return self.query().goal
 
-    def query(self, *, seed: int = 0) -> Query:
-        """What is asked with `seed`."""
-        fields = json.loads(self._native.query(seed_of("Scene.query", seed)))
+    def query(self, seed: int = 0, *, task: str | None = None) -> Query:
+        """What is asked with `seed`, by the task called `task` or the first. Raises `InputError` (A508) for an unknown task."""
+        fields = json.loads(self._native.query(seed_of("Scene.query", seed), task))
         way = tuple(pose_of(entry) for entry in fields["way"])
         return Query(pose_of(fields["start"]), way, pose_of(fields["goal"]))
 
@@ -319,8 +375,11 @@ class Scene:
         return (_load_scene, self._source)
 
     def __repr__(self) -> str:
-        obstacles = f", {len(self.obstacles)} obstacles" if self.obstacles else ""
-        return f"<Scene {self.name!r}: {self.hand.name}, {self.object.shape.kind} {self.object.name!r}{obstacles}>"
+        hands = [hand.name if len(self.hands) == 1 else f"{hand.name_in_scene} ({hand.name})" for hand in self.hands]
+        objects = [f"{each.shape.kind} {each.name!r}" for each in self.objects]
+        counts = (("supports", self.supports), ("obstacles", self.obstacles))
+        others = [f"{len(bodies)} {what}" for what, bodies in counts if bodies]
+        return f"<Scene {self.name!r}: {', '.join([*hands, *objects, *others])}>"
 
 
 def load_scene(
@@ -353,4 +412,4 @@ def _load_scene(path: str, packages: dict[str, str], lenient: bool, gravity: lis
 def load_hand(path: StrPath, *, packages: Mapping[str, StrPath] | None = None, lenient: bool = False) -> Hand:
     """Reads a hand file, or a URDF whose fingers are then guessed. Arguments and errors as `load_scene`."""
     native = _regrasp.Hand.load(os.fspath(path), load_options("load_hand", packages, lenient))
-    return Hand(native, json.loads(native.describe()))
+    return Hand(native.tips, json.loads(native.describe()))

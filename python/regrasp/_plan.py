@@ -40,6 +40,8 @@ class Segment:
     """In tracking, others that move at the same time."""
     rolling_finger: str | None = None
     """In tracking, the resting finger that the object rolls on without sliding."""
+    held_by: tuple[str, ...] = ()
+    """Who holds the object all along: names of hands and supports."""
 
     @property
     def moving(self) -> tuple[str, ...]:
@@ -71,6 +73,12 @@ class Plan:
         self._source: Source | None = None
         self.report: Report | None = report
         """What the checker said when `plan` made it."""
+        self.query: str = fields["query"]
+        """Name of the scene's task; empty in scenes of one task."""
+        self.hand: str = fields["hand"]
+        """Name in the scene of the hand that moves."""
+        self.object: str = fields["object"]
+        """Name of the object that it moves. All else rests."""
         self.joint_names: tuple[str, ...] = tuple(fields["joint_names"])
         self.fingers: tuple[str, ...] = tuple(fields["fingers"])
         self.method: str = fields["method"]
@@ -266,6 +274,10 @@ def _segments(entries: list[dict[str, Any]]) -> tuple[Segment, ...]:
     for entry in entries:
         stop = start + entry["n_waypoints"]
         also = tuple(entry["also_moving"])
-        segments.append(Segment(entry["kind"], entry["moving_finger"], start, stop, also, entry["rolling_finger"]))
+        segments.append(
+            Segment(
+                entry["kind"], entry["moving_finger"], start, stop, also, entry["rolling_finger"], tuple(entry["held_by"])
+            )
+        )
         start = stop
     return tuple(segments)

@@ -137,11 +137,12 @@ def export_mjcf(
     packages: Mapping[str, StrPath] | None = None,
     lenient: bool = False,
 ) -> str:
-    """The MuJoCo model of a plan's scene: hand, obstacles, object, and a keyframe for every waypoint.
+    """The MuJoCo model of a plan's scene: hands, objects, supports, obstacles, and a keyframe for every waypoint.
 
     plan, scene, packages, lenient: as in `check`.
 
-    Warns where the model differs from the scene: MuJoCo collides with convex hulls. Raises `InputError`.
+    Warns where the model differs from the scene: MuJoCo collides with convex hulls, and welds hold objects that stand on no
+    support. Raises `InputError`.
     """
     plan, scene = _with_scene(plan, scene, packages, lenient)
     xml, notes = plan._native.to_mjcf(scene._native)

@@ -184,8 +184,8 @@ class Failure:
     """No plan, and why. A result, not an exception; false."""
 
     kind: str
-    """"start_invalid", "goal_invalid", "way_invalid", "impossible", "work_spent", "time_limit", or "rejected": a plan was found
-    that the checker does not accept."""
+    """"start_invalid", "goal_invalid", "way_invalid", "settings_invalid", "impossible", "work_spent", "time_limit", or "rejected":
+    a plan was found that the checker does not accept."""
     message: str
     """What happened, with names and numbers."""
     advice: str

@@ -22,6 +22,7 @@ from regrasp.simulate import PlanError, Settings, load, simulate  # noqa: E402
 from regrasp.simulate.__main__ import main  # noqa: E402
 from regrasp.simulate.model import contact_jacobians, make_rig, normals_in_world  # noqa: E402
 from regrasp.simulate import measure  # noqa: E402
+from regrasp.simulate.plans import flat  # noqa: E402
 from regrasp.simulate.reference import (  # noqa: E402
     held_at_waypoints,
     quat_exp,
@@ -50,7 +51,7 @@ def planned(name: str, seed: int = 1, **settings: Any) -> tuple[regrasp.Plan, st
 
 
 def as_data(plan: regrasp.Plan) -> dict[str, Any]:
-    return json.loads(plan.to_json())
+    return flat(json.loads(plan.to_json()))
 
 
 @pytest.fixture(scope="module")

@@ -20,6 +20,7 @@ from regrasp.simulate import Settings, simulate  # noqa: E402
 from regrasp.simulate.measure import planned_sliding  # noqa: E402
 from regrasp.simulate.model import REFERENCE_REACH, REFERENCE_STIFFNESS, contact_jacobians, make_rig  # noqa: E402
 from regrasp.simulate.model import normals_in_world  # noqa: E402
+from regrasp.simulate.plans import flat  # noqa: E402
 from regrasp.simulate.reference import reference, rotation_matrices, waypoints_of  # noqa: E402
 
 #: Of replays: docs/benchmarks/tracking_replay.json.
@@ -38,7 +39,7 @@ def football(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[dict[st
     scene = regrasp.load_scene(path)
     plan = regrasp.plan(scene, seed=1, settings=SETTINGS)
     assert isinstance(plan, regrasp.Plan), plan
-    yield json.loads(plan.to_json()), regrasp.export_mjcf(plan, scene)
+    yield flat(json.loads(plan.to_json())), regrasp.export_mjcf(plan, scene)
 
 
 def test_torques_of_free_fingertips_are_those_of_their_forces(football: tuple[dict[str, Any], str]) -> None:

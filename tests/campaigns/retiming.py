@@ -151,8 +151,8 @@ def optimal(hand: Hand, plan: dict[str, Any], points: list[dict[str, Any]]) -> f
     curve = np.array(joints)
     length = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))))
     path = toppra.SplineInterpolator(length, curve)
-    names, largest = plan["joint_names"], limits["largest_speed"]
-    poses = [np.array(p["world_from_object"]["position"] + p["world_from_object"]["quat_xyzw"]) for p in points]
+    names, largest = plan["hands"][0]["joint_names"], limits["largest_speed"]
+    poses = [np.array(p["world_from_objects"][0]["position"] + p["world_from_objects"][0]["quat_xyzw"]) for p in points]
     ways = [object_way(a, b, plan["promises"]["torque_scale"]) for a, b in zip(poses, poses[1:])]
     chords = [np.array(b["joints"]) - np.array(a["joints"]) for a, b in zip(points, points[1:])]
     grid = np.linspace(0, length[-1], 6 * len(length))

@@ -6,6 +6,8 @@
 
 /// Failures and roadmaps as the data that pages are made of.
 pub mod pictures;
+/// Settings from several places.
+pub mod settings;
 
 pub use regrasp_base as base;
 pub use regrasp_export as export;

@@ -5,16 +5,49 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Each crate, lowest first, with the crates of this workspace that it may use.
-const TOWER: &[(&str, &[&str])] = &[
-    ("regrasp_base", &[]),
-    ("regrasp_geometry", &["regrasp_base"]),
-    ("regrasp_roadmap", &["regrasp_base"]),
-    ("regrasp_robot", &["regrasp_base", "regrasp_geometry"]),
-    ("regrasp_scene", &["regrasp_base", "regrasp_geometry", "regrasp_robot"]),
-    ("regrasp_grasp", &["regrasp_base", "regrasp_geometry", "regrasp_robot", "regrasp_scene"]),
-    ("regrasp_plan", &["regrasp_base", "regrasp_geometry", "regrasp_robot", "regrasp_scene", "regrasp_grasp"]),
-    (
+/// A crate with the crates of this workspace that it may use.
+struct Floor {
+    name: &'static str,
+    /// In what ships.
+    ships_with: &'static [&'static str],
+    /// Beside these, in its tests, benchmarks and examples.
+    tests_with: &'static [&'static str],
+}
+
+/// A crate whose tests need no more than itself.
+const fn floor(name: &'static str, ships_with: &'static [&'static str]) -> Floor {
+    Floor { name, ships_with, tests_with: &[] }
+}
+
+/// Each crate, lowest first. No crate of this workspace is a build dependency of another.
+const TOWER: &[Floor] = &[
+    floor("regrasp_base", &[]),
+    floor("regrasp_geometry", &["regrasp_base"]),
+    floor("regrasp_roadmap", &["regrasp_base"]),
+    floor("regrasp_robot", &["regrasp_base", "regrasp_geometry"]),
+    floor("regrasp_scene", &["regrasp_base", "regrasp_geometry", "regrasp_robot"]),
+    floor("regrasp_grasp", &["regrasp_base", "regrasp_geometry", "regrasp_robot"]),
+    floor("regrasp_plan", &["regrasp_base", "regrasp_geometry", "regrasp_robot", "regrasp_scene", "regrasp_grasp"]),
+    // Broken plans for tests and campaigns.
+    floor(
+        "regrasp_mutations",
+        &["regrasp_base", "regrasp_geometry", "regrasp_robot", "regrasp_scene", "regrasp_grasp", "regrasp_plan"],
+    ),
+    floor(
+        "regrasp_manipulation",
+        &[
+            "regrasp_base",
+            "regrasp_geometry",
+            "regrasp_roadmap",
+            "regrasp_robot",
+            "regrasp_scene",
+            "regrasp_grasp",
+            // Its tests break plans.
+            "regrasp_mutations",
+            "regrasp_plan",
+        ],
+    ),
+    floor(
         "regrasp_planners",
         &[
             "regrasp_base",
@@ -24,34 +57,22 @@ const TOWER: &[(&str, &[&str])] = &[
             "regrasp_scene",
             "regrasp_grasp",
             "regrasp_plan",
+            "regrasp_manipulation",
         ],
     ),
-    (
-        "regrasp_export",
-        &[
-            "regrasp_base",
-            "regrasp_geometry",
-            "regrasp_robot",
-            "regrasp_scene",
-            "regrasp_plan",
-            // Its tests plan.
-            "regrasp_planners",
-        ],
-    ),
-    (
-        "regrasp_viewer",
-        &[
-            "regrasp_base",
-            "regrasp_geometry",
-            "regrasp_robot",
-            "regrasp_scene",
-            "regrasp_grasp",
-            "regrasp_plan",
-            // Its tests plan.
-            "regrasp_planners",
-        ],
-    ),
-    (
+    Floor {
+        name: "regrasp_export",
+        ships_with: &["regrasp_base", "regrasp_geometry", "regrasp_robot", "regrasp_scene", "regrasp_plan"],
+        // Its tests plan.
+        tests_with: &["regrasp_planners"],
+    },
+    Floor {
+        name: "regrasp_viewer",
+        ships_with: &["regrasp_base", "regrasp_geometry", "regrasp_robot", "regrasp_scene", "regrasp_plan"],
+        // Its tests plan.
+        tests_with: &["regrasp_planners"],
+    },
+    floor(
         "regrasp",
         &[
             "regrasp_base",
@@ -66,20 +87,13 @@ const TOWER: &[(&str, &[&str])] = &[
             "regrasp_viewer",
         ],
     ),
-    (
-        "regrasp_bench",
-        &[
-            "regrasp_base",
-            "regrasp_geometry",
-            "regrasp_robot",
-            "regrasp_scene",
-            "regrasp_grasp",
-            "regrasp_plan",
-            "regrasp_planners",
-        ],
-    ),
-    ("regrasp_cli", &["regrasp", "regrasp_bench"]),
-    ("regrasp_python", &["regrasp"]),
+    Floor {
+        name: "regrasp_bench",
+        ships_with: &["regrasp_base", "regrasp_scene", "regrasp_plan", "regrasp_planners", "regrasp_mutations"],
+        tests_with: &["regrasp_geometry", "regrasp_robot"],
+    },
+    floor("regrasp_cli", &["regrasp", "regrasp_bench"]),
+    floor("regrasp_python", &["regrasp"]),
 ];
 
 /// Outside crates that belong to named crates only.
@@ -98,8 +112,11 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// Direct dependencies of every crate of the workspace, of every kind (normal, dev, build).
-fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
+/// A direct dependency: the crate that is needed, and by what: nothing for what ships, else `dev` or `build`.
+type Need = (String, Option<String>);
+
+/// Direct dependencies of every crate of the workspace.
+fn dependencies() -> BTreeMap<String, BTreeSet<Need>> {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--format-version", "1", "--no-deps", "--offline"])
         .current_dir(root())
@@ -108,38 +125,79 @@ fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let metadata: Value = serde_json::from_slice(&output.stdout).expect("cargo metadata is JSON");
     let text = |value: &Value| value.as_str().expect("a string").to_owned();
-    metadata["packages"]
-        .as_array()
-        .expect("packages")
-        .iter()
-        // Tasks of developers: it runs programs and knows no crate.
-        .filter(|package| package["name"] != "xtask")
-        .map(|package| {
-            let needs = package["dependencies"].as_array().expect("dependencies");
-            (text(&package["name"]), needs.iter().map(|need| text(&need["name"])).collect())
-        })
-        .collect()
+    let need = |need: &Value| (text(&need["name"]), need["kind"].as_str().map(str::to_owned));
+    let packages = metadata["packages"].as_array().expect("packages");
+    let of = |package: &Value| package["dependencies"].as_array().expect("dependencies").iter().map(need).collect();
+    // Tasks of developers: they run programs and know no crate.
+    let packages = packages.iter().filter(|package| package["name"] != "xtask");
+    packages.map(|package| (text(&package["name"]), of(package))).collect()
 }
 
 #[test]
 fn every_crate_stands_on_lower_floors_only() {
     let dependencies = dependencies();
-    let ours: BTreeSet<&str> = TOWER.iter().map(|&(name, _)| name).collect();
+    let ours: BTreeSet<&str> = TOWER.iter().map(|floor| floor.name).collect();
     let found: BTreeSet<&str> = dependencies.keys().map(String::as_str).collect();
     assert_eq!(found, ours, "a crate joined or left the workspace: change TOWER and ARCHITECTURE.md too");
-    for &(name, allowed) in TOWER {
-        for need in dependencies[name].iter().filter(|need| ours.contains(need.as_str())) {
-            assert!(allowed.contains(&need.as_str()), "{name} must not depend on {need}");
+    for Floor { name, ships_with, tests_with } in TOWER {
+        let kinds = dependencies[*name].iter().filter(|(need, _)| ours.contains(need.as_str()));
+        for (need, kind) in kinds {
+            let need = need.as_str();
+            let may = match kind.as_deref() {
+                None => ships_with.contains(&need),
+                Some("dev") => ships_with.contains(&need) || tests_with.contains(&need),
+                Some(_) => false,
+            };
+            let kind = kind.as_deref().unwrap_or("normal");
+            assert!(may, "{name} must not depend on {need} (a dependency of the kind \"{kind}\")");
+        }
+    }
+}
+
+/// A row that allows more than is needed is no wall.
+#[test]
+fn the_tower_allows_no_more_than_is_needed_by_tests() {
+    let dependencies = dependencies();
+    for Floor { name, tests_with, .. } in TOWER {
+        for need in *tests_with {
+            let is_needed = dependencies[*name].contains(&((*need).to_owned(), Some("dev".to_owned())));
+            assert!(is_needed, "the tests of {name} do without {need}: change TOWER");
         }
     }
 }
 
 #[test]
 fn the_tower_has_no_way_up() {
-    for (floor, &(name, allowed)) in TOWER.iter().enumerate() {
-        for need in allowed {
-            let below = TOWER[..floor].iter().any(|(lower, _)| lower == need);
+    for (index, Floor { name, ships_with, tests_with }) in TOWER.iter().enumerate() {
+        for need in ships_with.iter().chain(*tests_with) {
+            let below = TOWER[..index].iter().any(|lower| lower.name == *need);
             assert!(below, "{name} may use {need}, which does not stand below it");
+        }
+    }
+}
+
+/// Faces show plans; they do not make them.
+#[test]
+fn exporters_and_viewer_ship_without_planners() {
+    for Floor { name, ships_with, .. } in
+        TOWER.iter().filter(|floor| ["regrasp_export", "regrasp_viewer"].contains(&floor.name))
+    {
+        for planner in ["regrasp_planners", "regrasp_manipulation", "regrasp_roadmap", "regrasp_grasp"] {
+            assert!(!ships_with.contains(&planner), "{name} must not ship with {planner}");
+        }
+    }
+}
+
+/// The checker shares nothing but its results: no face asks its kinematics, distances or cones.
+#[test]
+fn nobody_looks_inside_the_checker() {
+    let inside = ["kinematics", "bodies", "between", "motion", "contact", "tip", "model", "surface", "rolling", "slip"];
+    for floor in TOWER.iter().filter(|floor| floor.name != "regrasp_plan") {
+        for file in sources(&root().join("crates").join(floor.name).join("src")) {
+            let text = std::fs::read_to_string(&file).expect("a source file is readable");
+            for room in inside {
+                assert!(!text.contains(&format!("check::{room}::")), "{} looks into check::{room}", file.display());
+            }
         }
     }
 }
@@ -148,7 +206,8 @@ fn the_tower_has_no_way_up() {
 fn private_dependencies_stay_private() {
     for (name, needs) in dependencies() {
         for &(library, owners) in PRIVATE {
-            assert!(!needs.contains(library) || owners.contains(&name.as_str()), "{name} must not depend on {library}");
+            let needs_it = needs.iter().any(|(need, _)| need == library);
+            assert!(!needs_it || owners.contains(&name.as_str()), "{name} must not depend on {library}");
         }
     }
 }
@@ -163,7 +222,7 @@ fn the_sources_keep_what_the_manifests_promise() {
         ("SystemTime::now", "reads the calendar"),
     ];
     let faces = ["regrasp_cli", "regrasp_bench", "regrasp_python"];
-    for &(name, _) in TOWER.iter().filter(|(name, _)| !faces.contains(name)) {
+    for name in TOWER.iter().map(|floor| floor.name).filter(|name| !faces.contains(name)) {
         let files = sources(&root().join("crates").join(name).join("src"));
         let texts: Vec<String> =
             files.iter().map(|file| std::fs::read_to_string(file).expect("a source file is readable")).collect();
@@ -193,7 +252,7 @@ fn test_modules(text: &str) -> impl Iterator<Item = &str> {
 /// No source file is longer than 600 lines unless its head says why (`Longer than 600 lines because`).
 #[test]
 fn files_stay_short() {
-    for &(name, _) in TOWER {
+    for Floor { name, .. } in TOWER {
         for file in sources(&root().join("crates").join(name).join("src")) {
             let text = std::fs::read_to_string(&file).expect("a source file is readable");
             let lines = text.lines().count();

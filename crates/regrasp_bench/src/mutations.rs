@@ -2,8 +2,8 @@
 
 use crate::row::Problem;
 use regrasp_base::Rng;
+use regrasp_mutations::mutants;
 use regrasp_plan::Plan;
-use regrasp_plan::check::mutation::mutants;
 use regrasp_plan::check::{CheckSettings, check};
 use serde::Serialize;
 use std::collections::BTreeMap;

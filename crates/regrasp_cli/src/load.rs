@@ -10,7 +10,8 @@ use regrasp::planners::FailureKind;
 use regrasp::robot::import::{LoadOptions, OUT_OF_TIME, ResolveOptions};
 use regrasp::scene::query::IN_HAND;
 use regrasp::scene::{LoadedScene, Task, load_scene};
-use regrasp::{Failure, InHandSettings, InputError, PlannerSettings, TrackingSettings};
+use regrasp::settings::{Argument, Overrides, SettingsError, read, settings_for};
+use regrasp::{Failure, InHandSettings, InputError, PlannerSettings};
 use serde_json::json;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -93,54 +94,55 @@ fn in_time_or_no_plan(error: InputError) -> Stop {
     }
 }
 
-/// Settings of the planner: defaults, then the settings file, then the flags.
+/// Settings of the in-hand planner: defaults, then the settings file, then the flags.
 pub fn settings(search: &Search, n_threads: usize) -> Result<InHandSettings, Stop> {
-    let file = search.settings.as_deref();
-    let mut settings = planner_settings(file, search.method.as_deref(), search.margin, n_threads)?;
-    match search.improve_work {
-        Some(work) => settings.improvement.improve_work = work,
-        // Time alone is to end it.
-        None if search.improve.is_some() && settings.improvement.improve_work == 0 => {
-            settings.improvement.improve_work = u64::MAX
-        }
-        None => {}
-    }
-    Ok(settings)
+    Ok(merged(IN_HAND, search.settings.as_deref(), &overrides(search, n_threads))?.in_hand)
 }
 
 /// Settings for a task of this kind: those of a tracking task are the file's, but for the method (`A507`: a flag that has no meaning
 /// there).
 pub fn for_task(task: &Task, search: &Search, n_threads: usize) -> Result<PlannerSettings, Stop> {
-    if task.kind_name() == IN_HAND {
-        return Ok(PlannerSettings { in_hand: settings(search, n_threads)?, ..PlannerSettings::default() });
-    }
-    refuse_flags_of_in_hand(search)?;
-    let file = search.settings.as_deref();
-    let mut tracking: TrackingSettings = file.map_or_else(|| Ok(TrackingSettings::default()), settings_file)?;
-    if let Some(name) = search.method.as_deref() {
-        tracking.method = method_named(name)?;
-    }
-    if let (Err(problem), Some(path)) = (tracking.validate(), file) {
-        return Err(Stop::BadInput(Diagnostic::new("A503", Place::file(path), problem).into()));
-    }
-    Ok(PlannerSettings { tracking, ..PlannerSettings::default() })
+    merged(task.kind_name(), search.settings.as_deref(), &overrides(search, n_threads))
 }
 
-/// Refuses flags that say something about in-hand planning only (`A507`).
-fn refuse_flags_of_in_hand(search: &Search) -> Result<(), Stop> {
-    let flags = [
-        ("--margin", search.margin.is_some(), "force closure is not defined for sliding contacts"),
-        ("--improve", search.improve.is_some(), "plans of tracking are not improved"),
-        ("--improve-work", search.improve_work.is_some(), "plans of tracking are not improved"),
-    ];
-    match flags.into_iter().find(|(_, is_given, _)| *is_given) {
-        None => Ok(()),
-        Some((flag, _, why)) => Err(not_for_tracking(
-            flag,
-            why,
-            "leave it out; --settings has all of tracking (docs/reference/tracking.md)",
-        )),
+/// Settings of the in-hand planner: defaults, then the file, then the margin.
+pub fn planner_settings(file: Option<&Path>, margin: Option<f64>, n_threads: usize) -> Result<InHandSettings, Stop> {
+    Ok(merged(IN_HAND, file, &Overrides { margin, n_threads, ..Overrides::default() })?.in_hand)
+}
+
+fn overrides(search: &Search, n_threads: usize) -> Overrides {
+    Overrides {
+        method: search.method.clone(),
+        margin: search.margin,
+        improves_for_a_time: search.improve.is_some(),
+        improve_work: search.improve_work,
+        n_threads,
     }
+}
+
+/// Settings for tasks of a kind. Errors: what keeps them from being some, at its place.
+fn merged(kind: &str, file: Option<&Path>, asked: &Overrides) -> Result<PlannerSettings, Stop> {
+    let text = file.map(regrasp::base::files::read_text).transpose()?;
+    settings_for(kind, text.as_deref(), asked).map_err(|error| match (error, file) {
+        (SettingsError::NotForTracking { argument, why }, _) => {
+            let flag = match argument {
+                Argument::Margin => "--margin",
+                Argument::Improve => "--improve",
+                Argument::ImproveWork => "--improve-work",
+            };
+            not_for_tracking(flag, why, "leave it out; --settings has all of tracking (docs/reference/tracking.md)")
+        }
+        (SettingsError::OtherMethod { name, problem }, _) => other_method(&name, &problem),
+        (SettingsError::Unreadable { problem, line, column }, Some(path)) => {
+            settings_error(path, line, column, &problem)
+        }
+        (SettingsError::Invalid(problem), Some(path)) => {
+            Stop::BadInput(Diagnostic::new("A503", Place::file(path), problem).into())
+        }
+        (SettingsError::Invalid(problem) | SettingsError::Unreadable { problem, .. }, None) => {
+            Stop::argument("A503", "--margin", problem, "a number in [0, 1)")
+        }
+    })
 }
 
 /// An argument of in-hand tasks, given for a scene with a task of kind `tracking` (`A507`).
@@ -162,54 +164,20 @@ pub fn in_hand_scene(path: &Path, what: &str, common: &Common, talk: &Talk) -> R
     }
 }
 
-/// Settings of the planner: defaults, then the file, then the rest.
-pub fn planner_settings(
-    file: Option<&Path>,
-    method: Option<&str>,
-    margin: Option<f64>,
-    n_threads: usize,
-) -> Result<InHandSettings, Stop> {
-    let mut settings: InHandSettings = file.map_or_else(|| Ok(InHandSettings::default()), settings_file)?;
-    settings.n_threads = n_threads;
-    if let Some(name) = method {
-        settings.method = method_named(name)?;
-    }
-    if let Some(margin) = margin {
-        settings.physics.closure_margin = margin;
-    }
-    match settings.validate() {
-        Ok(()) => Ok(settings),
-        Err(problem) => match file {
-            Some(path) => Err(Stop::BadInput(Diagnostic::new("A503", Place::file(path), problem).into())),
-            None => Err(Stop::argument("A503", "--margin", problem, "a number in [0, 1)")),
-        },
-    }
-}
-
-/// The method of a planner as its settings spell it. The argument parser lets only spellings of some planner through; a test
-/// holds the lists together. Errors: a method of the other kind of task (`A507`).
-fn method_named<T: serde::de::DeserializeOwned>(name: &str) -> Result<T, Stop> {
-    serde_json::from_value(name.into()).map_err(|error| {
-        let problem = format!("is \"{name}\", which does not plan tasks of this kind: {error}");
-        let diagnostic = Diagnostic::new("A507", Place::file("command line"), problem).element("argument", "--method");
-        Stop::BadInput(
-            diagnostic.expected("a method of the scene's task").fix("leave it out, or name one of these").into(),
-        )
-    })
+/// A method that does not plan tasks of this kind (`A507`). The argument parser lets only spellings of some planner through; a test
+/// holds the lists together.
+fn other_method(name: &str, problem: &str) -> Stop {
+    let problem = format!("is \"{name}\", which does not plan tasks of this kind: {problem}");
+    let diagnostic = Diagnostic::new("A507", Place::file("command line"), problem).element("argument", "--method");
+    Stop::BadInput(diagnostic.expected("a method of the scene's task").fix("leave it out, or name one of these").into())
 }
 
 /// A JSON file of settings. Errors: as [`regrasp::base::files::read_text`], and not such settings (`A504`).
-pub fn settings_file<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, Stop> {
+pub fn settings_file<T: Default + serde::de::DeserializeOwned>(path: &Path) -> Result<T, Stop> {
     let text = regrasp::base::files::read_text(path)?;
-    // serde would take a list for the fields in their order, and an empty one for the defaults.
-    if text.trim_start().starts_with('[') {
-        return Err(settings_error(path, 1, 1, "is a list"));
-    }
-    serde_json::from_str(&text).map_err(|error| {
-        let message = error.to_string();
-        // serde_json repeats the place at the end of its message.
-        let problem = message.rsplit_once(" at line ").map_or(message.as_str(), |(problem, _)| problem);
-        settings_error(path, error.line(), error.column().max(1), problem)
+    read(Some(&text)).map_err(|error| match error {
+        SettingsError::Unreadable { problem, line, column } => settings_error(path, line, column, &problem),
+        other => unreachable!("{other:?} where a text is read only"),
     })
 }
 

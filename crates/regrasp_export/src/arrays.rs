@@ -10,6 +10,17 @@ use regrasp_plan::{ContactMode, ContactState, Plan, SegmentKind, Waypoint};
 pub struct PlanArrays {
     /// n: number of waypoints, of all segments together.
     pub n_waypoints: usize,
+    /// Names of the hands that move, h of them.
+    pub hands: Vec<String>,
+    /// Names of the objects that are moved, o of them.
+    pub objects: Vec<String>,
+    /// j: index in `hands` of the hand of each joint.
+    pub hand_of_joint: Vec<i64>,
+    /// f: index in `hands` of the hand of each finger.
+    pub hand_of_finger: Vec<i64>,
+    /// Names of all that hold an object in any segment, k of them, each once, in the order in which they first do: hands and
+    /// supports.
+    pub holders: Vec<String>,
     /// Names of the joints, j of them, in the order of the columns of joint arrays.
     pub joint_names: Vec<String>,
     /// Names of the fingers, f of them, in the order of the columns of contact arrays.
@@ -46,6 +57,8 @@ pub struct PlanArrays {
     pub segment_moves: Vec<i64>,
     /// s: index of the finger that the object rolls on in tracking, else -1.
     pub segment_rolling_fingers: Vec<i64>,
+    /// s x o x k: 1 where the holder holds the object all through the segment, else 0.
+    pub segment_held_by: Vec<i64>,
     /// s + 1: index of the first waypoint of each segment, and n.
     pub segment_starts: Vec<i64>,
 }
@@ -121,9 +134,19 @@ impl PlanArrays {
         for segment in &plan.segments {
             segment_starts.push(segment_starts[segment_starts.len() - 1] + segment.waypoints.len() as i64);
         }
+        let mut holders: Vec<String> = Vec::new();
+        for holder in plan.segments.iter().flat_map(|segment| &segment.held_by) {
+            if !holders.contains(holder) {
+                holders.push(holder.clone());
+            }
+        }
         let of_segments = plan.segments.iter().zip(0_i64..);
         PlanArrays {
             n_waypoints: waypoints.len(),
+            hands: vec![plan.hand.clone()],
+            objects: vec![plan.object.clone()],
+            hand_of_joint: vec![0; plan.joint_names.len()],
+            hand_of_finger: vec![0; plan.fingers.len()],
             joint_names: plan.joint_names.clone(),
             fingers: plan.fingers.clone(),
             times: waypoints.iter().map(|waypoint| waypoint.time).collect(),
@@ -160,6 +183,12 @@ impl PlanArrays {
                 .iter()
                 .map(|segment| finger_number(&plan.fingers, segment.rolling_finger.as_deref()))
                 .collect(),
+            segment_held_by: plan
+                .segments
+                .iter()
+                .flat_map(|segment| holders.iter().map(|holder| i64::from(segment.held_by.contains(holder))))
+                .collect(),
+            holders,
             segment_starts,
         }
     }

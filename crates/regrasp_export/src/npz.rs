@@ -15,20 +15,32 @@ pub fn to_npz(plan: &Plan) -> Result<Vec<u8>, ExportError> {
     for (what, texts) in [
         ("the joint names", plan.joint_names.as_slice()),
         ("the finger names", &plan.fingers),
+        ("the hand's name", std::slice::from_ref(&plan.hand)),
+        ("the object's name", std::slice::from_ref(&plan.object)),
         ("the tool's name", std::slice::from_ref(&plan.tool)),
         ("the method's name", std::slice::from_ref(&plan.method)),
+        ("the task's kind", std::slice::from_ref(&plan.task)),
+        ("the task's name", std::slice::from_ref(&plan.query)),
     ] {
         refuse_too_long(what, texts)?;
     }
     let arrays = PlanArrays::new(plan);
+    refuse_too_long("the names of holders", &arrays.holders)?;
     let mut file = Npz::new();
     file.add("format", &texts(&[], &["regrasp-arrays"]));
     file.add("format_version", &integers(&[], &[1]));
     file.add("tool", &texts(&[], &[&plan.tool]));
     file.add("method", &texts(&[], &[&plan.method]));
     file.add("seed", &npy("<u8", &[], plan.seed.to_le_bytes().into()));
+    file.add("task", &texts(&[], &[&plan.task]));
+    file.add("query", &texts(&[], &[&plan.query]));
+    file.add("hands", &names(&arrays.hands));
+    file.add("objects", &names(&arrays.objects));
+    file.add("holders", &names(&arrays.holders));
     file.add("joint_names", &names(&arrays.joint_names));
     file.add("fingers", &names(&arrays.fingers));
+    file.add("hand_of_joint", &integers(&[arrays.joint_names.len()], &arrays.hand_of_joint));
+    file.add("hand_of_finger", &integers(&[arrays.fingers.len()], &arrays.hand_of_finger));
     file.add("contact_mode_names", &texts(&[CONTACT_MODES.len()], &CONTACT_MODES));
     for NumericArray { name, shape, data } in arrays.numeric() {
         file.add(name, &npy(data.numpy_type(), &shape, data.to_bytes()));
@@ -38,6 +50,8 @@ pub fn to_npz(plan: &Plan) -> Result<Vec<u8>, ExportError> {
     file.add("segment_moving_fingers", &integers(&[kinds.len()], &arrays.segment_moving_fingers));
     file.add("segment_moves", &integers(&[kinds.len(), arrays.fingers.len()], &arrays.segment_moves));
     file.add("segment_rolling_fingers", &integers(&[kinds.len()], &arrays.segment_rolling_fingers));
+    let shape = [kinds.len(), arrays.objects.len(), arrays.holders.len()];
+    file.add("segment_held_by", &integers(&shape, &arrays.segment_held_by));
     file.add("segment_starts", &integers(&[kinds.len() + 1], &arrays.segment_starts));
     Ok(file.finish())
 }

@@ -269,7 +269,7 @@ fn around(
     let upper: Vec<f64> = chain.upper.iter().zip(start).map(|(u, q)| (u - margin).min(q + 3.2)).collect();
     let settings = RrtSettings { max_iterations: workspace.rrt_iterations, ..RrtSettings::default() };
     let as_joints = |q: &[f64]| -> Coordinates { q.iter().copied().collect() };
-    let corners = RrtConnect::new().plan(start, goal, &lower, &upper, &settings, rng, |from, to| {
+    let corners = RrtConnect::new().plan(start, goal, [&lower, &upper], &settings, rng, |from, to| {
         workspace.set_finger(finger, &as_joints(from));
         // The limits of sums hold between configurations that keep them.
         chain.within_linear_limits(to, 0.0)

@@ -22,7 +22,7 @@ use crate::model::{Carrier, Model, Pair};
 use configuration::{Configuration, midway, place_finger, place_object};
 use draws::Draws;
 use nearby::Nearby;
-use regrasp_geometry::collision::{Answer, Placement, gap_along, separation};
+use regrasp_geometry::collision::{Answer, Placed, Placement, gap_along, separation};
 use regrasp_geometry::{Pose, Vector, frame};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 
@@ -418,7 +418,14 @@ impl<'a> Workspace<'a> {
         let hints = &mut self.hints[index];
         let mut at_next = gap_along(&direction, &a.shape, at_a, &b.shape, at_b, hints);
         if !(at_next >= required_at_ends && direction != Vector::zeros()) {
-            let answer = separation(&a.shape, at_a, &b.shape, at_b, required_at_ends, ENOUGH, &mut separating, hints);
+            let answer = separation(
+                Placed { shape: &a.shape, at: at_a },
+                Placed { shape: &b.shape, at: at_b },
+                required_at_ends,
+                ENOUGH,
+                &mut separating,
+                hints,
+            );
             self.directions[index] = self.to_keep(index, &separating);
             match answer {
                 Answer::SeparatedBy(d) => at_next = d,
@@ -436,7 +443,14 @@ impl<'a> Workspace<'a> {
         // The best direction at `now` may separate at `next` as well.
         let mut best_now = separating;
         let hints = &mut self.hints[index];
-        let answer = separation(&a.shape, from_a, &b.shape, from_b, required_at_ends, ENOUGH, &mut best_now, hints);
+        let answer = separation(
+            Placed { shape: &a.shape, at: from_a },
+            Placed { shape: &b.shape, at: from_b },
+            required_at_ends,
+            ENOUGH,
+            &mut best_now,
+            hints,
+        );
         if matches!(answer, Answer::SeparatedBy(_)) {
             let gap = gap_along(&best_now, &a.shape, at_a, &b.shape, at_b, hints);
             if gap >= required_at_ends {

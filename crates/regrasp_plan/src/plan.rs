@@ -216,7 +216,7 @@ pub struct Segment {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub also_moving: Vec<String>,
     /// Who holds the object: names of hands and supports of the scene.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip)]
     pub held_by: Vec<String>,
     /// In tracking, the resting finger that the object rolls on without sliding (Cherif 1999, sec. 6.1.2: `F_t`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -420,6 +420,9 @@ pub struct PlanFigures {
 }
 
 /// A plan: how a hand takes an object from start to goal. All else of the scene rests meanwhile.
+///
+/// [`crate::format`] reads and writes plan files. Serde alone gives the shape of format version 2, which names no task, hand, object
+/// or holder.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plan {
@@ -432,13 +435,13 @@ pub struct Plan {
     /// Kind of task: `in_hand` or `tracking`.
     pub task: String,
     /// Name of the task in the scene file; empty where the file has only one.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
+    #[serde(skip)]
     pub query: String,
     /// Name of the hand that moves the object.
-    #[serde(default)]
+    #[serde(skip)]
     pub hand: String,
-    /// Name of the object that is moved.
-    #[serde(default)]
+    /// Name of the object that is moved; empty in plans of format version 2, which name none.
+    #[serde(skip)]
     pub object: String,
     /// Method that planned it.
     pub method: String,

@@ -6,22 +6,36 @@ use regrasp::robot::hand::Finger;
 use regrasp::robot::robot::{Joint, JointId, JointKind, Limits};
 use regrasp::robot::tip::TipShape;
 use regrasp::robot::{ContactModel, Hand};
-use regrasp::scene::{Gravity, InputFile, LoadedScene, Object, Obstacle, Query, SceneHand};
+use regrasp::scene::{Gravity, InputFile, LoadedScene, Object, Obstacle, Query, Scene, SceneHand, Task};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// A scene, its hand included.
+/// A scene, its hands included.
 pub fn scene(loaded: &LoadedScene, path: &Path) -> Value {
     let scene = &loaded.scene;
+    let objects = scene.objects.iter().zip(&loaded.state.world_from_objects);
+    let supports = scene.supports.iter().map(|support| fixed(&support.body, "world_from_support"));
     json!({
         "name": scene.name,
         "path": path.to_string_lossy(),
-        "hand": placed_hand(&scene.hands[0]),
-        "object": object(&scene.objects[0]),
+        "hands": scene.hands.iter().map(placed_hand).collect::<Vec<_>>(),
+        "objects": objects.map(|(object, at_rest)| self::object(object, at_rest)).collect::<Vec<_>>(),
         "gravity": scene.gravity.as_ref().map(gravity),
-        "obstacles": scene.obstacles.iter().map(obstacle).collect::<Vec<_>>(),
+        "supports": supports.collect::<Vec<_>>(),
+        "obstacles": scene.obstacles.iter().map(|body| fixed(body, "world_from_obstacle")).collect::<Vec<_>>(),
+        "tasks": loaded.tasks.iter().map(|task| self::task(scene, task)).collect::<Vec<_>>(),
         "inputs": scene.inputs.iter().map(input).collect::<Vec<_>>(),
         "notes": loaded.notes,
+    })
+}
+
+/// What a task is about.
+fn task(scene: &Scene, task: &Task) -> Value {
+    json!({
+        "name": task.name,
+        "kind": task.kind_name(),
+        "hand": scene.hands[task.hand].name,
+        "object": scene.objects[task.object].name,
     })
 }
 
@@ -38,6 +52,7 @@ pub fn query(query: &Query) -> Value {
 fn placed_hand(placed: &SceneHand) -> Value {
     let mut value = hand(&placed.hand);
     value["world_from_base"] = pose(&placed.world_from_hand);
+    value["name_in_scene"] = placed.name.as_str().into();
     value
 }
 
@@ -76,6 +91,7 @@ pub fn hand(hand: &Hand) -> Value {
     json!({
         "name": hand.robot.name,
         "base_link": hand.robot.links[hand.base.0].name,
+        "name_in_scene": null,
         "world_from_base": pose(&Pose::identity()),
         "joints": joints,
         "coupled_joints": coupled.collect::<Vec<_>>(),
@@ -117,9 +133,10 @@ fn kind(joint: &Joint) -> &'static str {
     }
 }
 
-fn object(object: &Object) -> Value {
+fn object(object: &Object, at_rest: &Pose) -> Value {
     json!({
         "name": object.name,
+        "world_from_object": pose(at_rest),
         "shape": shape(&object.shape),
         "collides_as_hull": object.hull.is_some(),
         "mass": object.mass,
@@ -133,11 +150,12 @@ fn gravity(gravity: &Gravity) -> Value {
     gravity.in_world().map_or_else(|| json!("any"), |in_world| json!(<[f64; 3]>::from(in_world)))
 }
 
-fn obstacle(obstacle: &Obstacle) -> Value {
+/// A body that does not move, with its pose under `key`.
+fn fixed(body: &Obstacle, key: &str) -> Value {
     json!({
-        "name": obstacle.name,
-        "shape": shape(&obstacle.placed.shape),
-        "world_from_obstacle": pose(&obstacle.placed.parent_from_shape),
+        "name": body.name,
+        "shape": shape(&body.placed.shape),
+        key: pose(&body.placed.parent_from_shape),
     })
 }
 

@@ -6,6 +6,7 @@ use crate::guard::guarded;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use regrasp::base::{Diagnostic, Place};
+use regrasp::geometry::Pose;
 use regrasp::robot::import::{LoadOptions, ResolveOptions, load_hand};
 use regrasp::scene::{Gravity, LoadedScene, Task, load_scene};
 use std::path::{Path, PathBuf};
@@ -108,9 +109,15 @@ impl Scene {
         guarded(py, || Ok(describe::query(&self.task(py, task)?.query(seed)).to_string()))
     }
 
-    /// Tip centres in the world, as [`Hand::tips`] gives them.
-    fn tips<'py>(&self, py: Python<'py>, joints: &[u8]) -> PyResult<Bound<'py, PyBytes>> {
-        guarded(py, || tips(py, &self.loaded.scene.hands[0].hand, joints))
+    /// Tip centres of a hand in the world, as [`Hand::tips`] gives them in the base frame.
+    fn tips<'py>(&self, py: Python<'py>, hand: usize, joints: &[u8]) -> PyResult<Bound<'py, PyBytes>> {
+        guarded(py, || {
+            let hands = &self.loaded.scene.hands;
+            let placed = hands.get(hand).ok_or_else(|| {
+                error::argument(py, "tips", "hand", format!("is {hand}"), &format!("less than {}", hands.len()))
+            })?;
+            tips(py, &placed.hand, &placed.world_from_hand, joints)
+        })
     }
 }
 
@@ -142,11 +149,16 @@ impl Hand {
 
     /// Tip centres for rows of joint positions: doubles in, doubles out, three per finger and row.
     fn tips<'py>(&self, py: Python<'py>, joints: &[u8]) -> PyResult<Bound<'py, PyBytes>> {
-        guarded(py, || tips(py, &self.hand, joints))
+        guarded(py, || tips(py, &self.hand, &Pose::identity(), joints))
     }
 }
 
-fn tips<'py>(py: Python<'py>, hand: &regrasp::robot::Hand, joints: &[u8]) -> PyResult<Bound<'py, PyBytes>> {
+fn tips<'py>(
+    py: Python<'py>,
+    hand: &regrasp::robot::Hand,
+    world_from_hand: &Pose,
+    joints: &[u8],
+) -> PyResult<Bound<'py, PyBytes>> {
     let (values, rest) = joints.as_chunks::<8>();
     let values: Vec<f64> = values.iter().map(|&bytes| f64::from_le_bytes(bytes)).collect();
     if !rest.is_empty() || !values.len().is_multiple_of(hand.n_joints().max(1)) {
@@ -158,7 +170,7 @@ fn tips<'py>(py: Python<'py>, hand: &regrasp::robot::Hand, joints: &[u8]) -> PyR
         let mut left = row;
         for finger in &hand.fingers {
             let own = left.split_off(..finger.chain.n_coordinates()).unwrap_or_default();
-            let tip = finger.chain.tip(own, &finger.tip.center_in_body);
+            let tip = world_from_hand * finger.chain.tip(own, &finger.tip.center_in_body);
             out.extend(tip.iter().flat_map(|value| value.to_le_bytes()));
         }
     }

@@ -80,12 +80,15 @@ impl Plan {
         guarded(py, || {
             let bare = regrasp::Plan { segments: Vec::new(), ..self.plan.clone() };
             let mut header = json!(bare);
+            // Empty names are left out of files.
+            header["query"] = self.plan.query.as_str().into();
             let segments = self.plan.segments.iter().map(|segment| {
                 json!({
                     "kind": segment.kind,
                     "moving_finger": segment.moving_finger,
                     "also_moving": segment.also_moving,
                     "rolling_finger": segment.rolling_finger,
+                    "held_by": segment.held_by,
                     "n_waypoints": segment.waypoints.len(),
                 })
             });

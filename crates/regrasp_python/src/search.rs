@@ -10,8 +10,8 @@ use regrasp::base::{Diagnostic, Place};
 use regrasp::plan::check::{CheckSettings, Level, Report};
 use regrasp::plan::format;
 use regrasp::scene::Task;
-use regrasp::scene::query::IN_HAND;
-use regrasp::{Budget, Failure, InHandSettings, PlannerSettings, TrackingSettings};
+use regrasp::settings::{Argument, Overrides, SettingsError, settings_for};
+use regrasp::{Budget, Failure, PlannerSettings};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -121,79 +121,37 @@ fn bad(code: &'static str, problem: String) -> Diagnostic {
     Diagnostic::new(code, Place::file("regrasp.plan"), problem)
 }
 
-/// Settings as given, else the defaults.
-fn given<T: Default + serde::de::DeserializeOwned>(request: &Request) -> Result<T, Diagnostic> {
-    let Some(text) = &request.settings else { return Ok(T::default()) };
-    serde_json::from_str(text).map_err(|error| {
-        let message = error.to_string();
-        let problem = message.rsplit_once(" at line ").map_or(message.as_str(), |(problem, _)| problem);
-        bad("A504", problem.to_owned())
-            .element("argument", "settings")
-            .expected("keys and values like \"settings\" in a plan file")
-    })
-}
-
-/// Settings for a task of this kind: those of a tracking task are the given ones, but for the method.
+/// Settings for a task of this kind: defaults, then the JSON, then what has an argument of its own.
 fn settings(task: &Task, request: &Request) -> Result<PlannerSettings, Diagnostic> {
-    match task.kind_name() {
-        IN_HAND => Ok(PlannerSettings { in_hand: in_hand(request)?, ..PlannerSettings::default() }),
-        _ => {
-            refuse_arguments_of_in_hand(request)?;
-            let mut tracking: TrackingSettings = given(request)?;
-            if let Some(method) = &request.method {
-                tracking.method = method_named(method)?;
-            }
-            tracking.validate().map_err(|problem| bad("A503", problem).element("argument", "settings"))?;
-            Ok(PlannerSettings { tracking, ..PlannerSettings::default() })
+    let asked = Overrides {
+        method: request.method.clone(),
+        margin: request.margin,
+        improves_for_a_time: request.improve.is_some(),
+        improve_work: request.improve_work,
+        n_threads: request.threads,
+    };
+    settings_for(task.kind_name(), request.settings.as_deref(), &asked).map_err(|error| match error {
+        SettingsError::Unreadable { problem, .. } => bad("A504", problem)
+            .element("argument", "settings")
+            .expected("keys and values like \"settings\" in a plan file"),
+        SettingsError::Invalid(problem) => bad("A503", problem).element("argument", "settings"),
+        SettingsError::OtherMethod { name, problem } => {
+            bad("A507", format!("is \"{name}\", which does not plan tasks of this kind: {problem}"))
+                .element("argument", "method")
+                .fix("leave it out, or name a method of the scene's task")
         }
-    }
-}
-
-/// Refuses arguments that say something about in-hand planning only, as the command line does (`A507`).
-fn refuse_arguments_of_in_hand(request: &Request) -> Result<(), Diagnostic> {
-    let arguments = [
-        ("margin", request.margin.is_some(), "force closure is not defined for sliding contacts"),
-        ("improve", request.improve.is_some(), "plans of tracking are not improved"),
-        ("improve_work", request.improve_work.is_some(), "plans of tracking are not improved"),
-    ];
-    match arguments.into_iter().find(|(_, is_given, _)| *is_given) {
-        None => Ok(()),
-        Some((argument, _, why)) => Err(bad("A507", format!("is not for a task of kind \"tracking\": {why}"))
-            .element("argument", argument)
-            .expected("a task of kind \"in_hand\"")
-            .fix("leave it out; `settings` has all of tracking (docs/reference/tracking.md)")),
-    }
-}
-
-/// A method of the planner, as its settings spell it. Errors: a method of the other kind of task (`A507`).
-fn method_named<T: serde::de::DeserializeOwned>(name: &str) -> Result<T, Diagnostic> {
-    serde_json::from_value(name.into()).map_err(|error| {
-        bad("A507", format!("is \"{name}\", which does not plan tasks of this kind: {error}"))
-            .element("argument", "method")
-            .fix("leave it out, or name a method of the scene's task")
+        SettingsError::NotForTracking { argument, why } => {
+            let argument = match argument {
+                Argument::Margin => "margin",
+                Argument::Improve => "improve",
+                Argument::ImproveWork => "improve_work",
+            };
+            bad("A507", format!("is not for a task of kind \"tracking\": {why}"))
+                .element("argument", argument)
+                .expected("a task of kind \"in_hand\"")
+                .fix("leave it out; `settings` has all of tracking (docs/reference/tracking.md)")
+        }
     })
-}
-
-/// Settings of the in-hand planner: defaults, then the JSON, then what has an argument of its own.
-fn in_hand(request: &Request) -> Result<InHandSettings, Diagnostic> {
-    let mut settings: InHandSettings = given(request)?;
-    settings.n_threads = request.threads;
-    if let Some(method) = &request.method {
-        settings.method = method_named(method)?;
-    }
-    if let Some(margin) = request.margin {
-        settings.physics.closure_margin = margin;
-    }
-    match request.improve_work {
-        Some(work) => settings.improvement.improve_work = work,
-        // Time alone is to end it.
-        None if request.improve.is_some() && settings.improvement.improve_work == 0 => {
-            settings.improvement.improve_work = u64::MAX
-        }
-        None => {}
-    }
-    settings.validate().map_err(|problem| bad("A503", problem).element("argument", "settings"))?;
-    Ok(settings)
 }
 
 fn failed(failure: &Failure) -> String {

@@ -97,7 +97,7 @@ impl RrtConnect {
         RrtConnect::default()
     }
 
-    /// A path of valid straight motions from `start` to `goal` within `lower..=upper`, both ends included; none when
+    /// A path of valid straight motions from `start` to `goal` within `bounds`, the least and the largest coordinates, both ends included; none when
     /// the budget of `settings` was not enough.
     ///
     /// `is_valid` says whether the straight motion between two points, ends included, is valid. `start` and `goal`
@@ -106,12 +106,12 @@ impl RrtConnect {
         &mut self,
         start: &[f64],
         goal: &[f64],
-        lower: &[f64],
-        upper: &[f64],
+        bounds: [&[f64]; 2],
         settings: &RrtSettings,
         rng: &mut Rng,
         mut is_valid: impl FnMut(&[f64], &[f64]) -> bool,
     ) -> Option<Vec<Vec<f64>>> {
+        let [lower, upper] = bounds;
         let dimension = start.len();
         assert!(dimension > 0 && [goal.len(), lower.len(), upper.len()] == [dimension; 3], "one value per dimension");
         if is_valid(start, goal) {
@@ -226,7 +226,7 @@ mod tests {
             let colours = toy.flood();
             let connected = colours[toy.cell(&start)] == colours[toy.cell(&goal)];
             let path =
-                search.plan(&start, &goal, &[0.0; 2], &[toy.size(); 2], &settings, &mut rng, |a, b| toy.sees(a, b));
+                search.plan(&start, &goal, [&[0.0; 2], &[toy.size(); 2]], &settings, &mut rng, |a, b| toy.sees(a, b));
             assert_eq!(path.is_some(), connected, "{start:?} to {goal:?}");
             let Some(path) = path else {
                 n_cut += 1;
@@ -245,7 +245,7 @@ mod tests {
         let toy = Toy::new(3, &[(1, 0), (1, 1), (1, 2)]);
         let mut n_checks = 0;
         let settings = RrtSettings { max_iterations: usize::MAX, max_checks: 500, step: 0.2, n_shortcuts: 5 };
-        let cut = RrtConnect::new().plan(&[0.5; 2], &[2.5; 2], &[0.0; 2], &[3.0; 2], &settings, &mut rng, |a, b| {
+        let cut = RrtConnect::new().plan(&[0.5; 2], &[2.5; 2], [&[0.0; 2], &[3.0; 2]], &settings, &mut rng, |a, b| {
             n_checks += 1;
             n_checks > 1_000_000 || toy.sees(a, b)
         });
@@ -255,7 +255,7 @@ mod tests {
         let settings = RrtSettings { max_iterations: 500, ..RrtSettings::default() };
         let mut run = || {
             let mut rng = Rng::keyed(3, "rrt_toy", 0);
-            search.plan(&[0.5; 2], &[2.5, 0.5], &[0.0; 2], &[3.0; 2], &settings, &mut rng, |a, b| toy.sees(a, b))
+            search.plan(&[0.5; 2], &[2.5, 0.5], [&[0.0; 2], &[3.0; 2]], &settings, &mut rng, |a, b| toy.sees(a, b))
         };
         let first = run();
         assert!(first.is_some());

@@ -94,8 +94,12 @@ impl<P: Clone, M: Clone> VisibilityPrm<P, M> {
         self.n_redundant_in_row
     }
 
-    /// Adds a node unconditionally, without edges (a start, a goal, or what the caller knows to be worth keeping).
-    pub fn add_node(&mut self, point: P, is_guard: bool) -> usize {
+    /// Adds a guard unconditionally, without edges (a start, a goal, or what the caller knows to be worth keeping).
+    pub fn add_guard(&mut self, point: P) -> usize {
+        self.add(point, true)
+    }
+
+    fn add(&mut self, point: P, is_guard: bool) -> usize {
         self.nodes.push(Node { point, is_guard });
         self.edges_of.push(Vec::new());
         self.components.push()
@@ -137,7 +141,7 @@ impl<P: Clone, M: Clone> VisibilityPrm<P, M> {
     /// For a start or goal: its component tells whether the roadmap sees it.
     pub fn attach(&mut self, space: &mut impl Space<Point = P, Motion = M>, point: P) -> usize {
         let seen = self.seen_components(space, &point, |_| true);
-        let node = self.add_node(point, false);
+        let node = self.add(point, false);
         self.link(space, node, seen);
         node
     }
@@ -169,7 +173,7 @@ impl<P: Clone, M: Clone> VisibilityPrm<P, M> {
         match seen.len() {
             0 => {
                 self.n_redundant_in_row = 0;
-                Outcome::Guard(self.add_node(point, true))
+                Outcome::Guard(self.add(point, true))
             }
             1 => {
                 self.n_redundant_in_row += 1;
@@ -177,7 +181,7 @@ impl<P: Clone, M: Clone> VisibilityPrm<P, M> {
             }
             _ => {
                 self.n_redundant_in_row = 0;
-                let node = self.add_node(point, false);
+                let node = self.add(point, false);
                 self.link(space, node, seen);
                 Outcome::Connector(node)
             }
@@ -324,7 +328,7 @@ mod tests {
     fn a_removed_edge_splits_and_a_parallel_one_keeps_together() {
         let mut roadmap: VisibilityPrm<Vec<f64>, f64> = VisibilityPrm::new();
         for i in 0..3 {
-            roadmap.add_node(vec![f64::from(i)], true);
+            roadmap.add_guard(vec![f64::from(i)]);
         }
         roadmap.add_edge(0, 1, 5.0, 5.0);
         roadmap.add_edge(1, 0, 2.0, 2.0);

@@ -193,6 +193,22 @@ impl LinearLimit {
     }
 }
 
+/// Narrows the limits of coordinates to those of a joint that follows one of them; of several, the limit of their sum.
+pub(crate) fn limit_leaders(
+    name: &str,
+    drive: &Coupling<usize>,
+    limits: [f64; 2],
+    (lower, upper): (&mut [f64], &mut [f64]),
+) -> Option<LinearLimit> {
+    let Some((coordinate, multiplier)) = drive.single() else {
+        return Some(LinearLimit::new(name.to_owned(), drive, limits));
+    };
+    let ends = limits.map(|position| (position - drive.offset) / multiplier);
+    lower[coordinate] = lower[coordinate].max(ends[0].min(ends[1]));
+    upper[coordinate] = upper[coordinate].min(ends[0].max(ends[1]));
+    None
+}
+
 /// Coordinates near `near` that keep all limits: projections in turn onto the limits, each by the shortest way
 /// (Agmon 1954). None where no such coordinates are found.
 pub(crate) fn bring_within(limits: &[LinearLimit], [lower, upper]: [&[f64]; 2], near: &[f64]) -> Option<Vec<f64>> {

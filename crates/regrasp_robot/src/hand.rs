@@ -9,8 +9,8 @@ use regrasp_geometry::shape::PlacedShape;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// Most fingers of a hand: planners and contact forces have room for so many.
-pub const MAX_FINGERS: usize = 6;
+/// Most fingers of a hand: more are a mistake in the file. Planners may take fewer.
+pub const MAX_FINGERS: usize = 64;
 /// Most joints of a finger, those that follow others among them.
 pub const MAX_FINGER_JOINTS: usize = 16;
 

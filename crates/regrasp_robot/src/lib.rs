@@ -16,6 +16,8 @@ pub mod import;
 pub mod inspect;
 /// Forward kinematics, Jacobians, inverse kinematics and motion bounds of serial chains.
 pub mod kinematics;
+/// Robots with arms and hands: one tree, one layout of joints.
+pub mod manipulator;
 /// Links and joints of a robot, as read.
 pub mod robot;
 /// Fingertips: what of the last link touches.
@@ -24,8 +26,11 @@ pub mod tip;
 pub use contact_model::ContactModel;
 pub use coupling::{Coupling, LinearLimit};
 pub use hand::{Finger, FingerId, FingerShape, Hand};
-pub use import::{LoadOptions, LoadedHand, LoadedInput, LoadedRobot, ResolveOptions, load_hand, load_robot};
+pub use import::{LoadOptions, LoadedHand, LoadedInput, LoadedManipulator, LoadedRobot, ResolveOptions};
+pub use import::{load_hand, load_manipulator, load_robot};
 pub use kinematics::chain::{Chain, ChainJoint, Motion};
+pub use manipulator::layout::{JointLayout, Part};
+pub use manipulator::{Arm, LinkShape, Manipulator, MountedHand};
 pub use robot::{Joint, JointId, JointKind, Limits, Link, LinkId, Robot, Visual, VisualGeometry, VisualMesh};
 pub use tip::{Tip, TipShape};
 

@@ -2,6 +2,7 @@
 
 use crate::coupling::Coupling;
 pub use crate::ids::{JointId, LinkId};
+use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Pose, Shape, UnitVector, Vector};
 use std::path::PathBuf;
@@ -96,6 +97,26 @@ pub struct Joint {
     /// What it follows, for a joint that is not independent. Leaders are independent joints: loading resolves followers of
     /// followers.
     pub coupling: Option<Coupling>,
+}
+
+impl Joint {
+    /// False for a fixed joint.
+    pub fn moves(&self) -> bool {
+        self.kind != JointKind::Fixed
+    }
+
+    /// Pose of the child's frame in the joint frame at `position`; the identity for a fixed joint.
+    pub fn motion(&self, position: f64) -> Pose {
+        match self.kind {
+            JointKind::Fixed => Pose::identity(),
+            JointKind::Prismatic => {
+                Pose::from_parts(Translation3::from(self.axis.into_inner() * position), UnitQuaternion::identity())
+            }
+            JointKind::Revolute | JointKind::Continuous => {
+                Pose::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&self.axis, position))
+            }
+        }
+    }
 }
 
 /// A tree of links and joints, as read.

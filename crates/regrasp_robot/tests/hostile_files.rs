@@ -113,9 +113,9 @@ fn write_hand(folder: &Path, n_fingers: usize, n_joints: usize, n_followers: usi
 }
 
 #[test]
-fn hands_of_more_fingers_or_joints_than_planners_have_room_for_are_refused() {
+fn hands_of_too_many_fingers_or_joints_are_refused() {
     for (n_fingers, n_joints, n_followers, code) in
-        [(6, 2, 0, ""), (7, 2, 0, "U221"), (2, 12, 4, ""), (2, 13, 0, "U222"), (2, 12, 5, "U222")]
+        [(7, 2, 0, ""), (65, 2, 0, "U221"), (2, 12, 4, ""), (2, 13, 0, "U222"), (2, 12, 5, "U222")]
     {
         let folder = tempfile::tempdir().unwrap();
         let path = write_hand(folder.path(), n_fingers, n_joints, n_followers);

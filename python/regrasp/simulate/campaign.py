@@ -187,12 +187,13 @@ def _down(job: Job, scene: Any) -> list[float]:
     import regrasp
 
     from .model import Settings, gravity_of, make_rig
+    from .plans import flat
 
     # Which way the palm faces shows in any plan.
     for seed in range(100):
         plan = regrasp.plan(scene, seed=seed, settings={"forces": None, "friction_margin": 1.0}, level="geometry")
         if isinstance(plan, regrasp.Plan):
-            rig = make_rig(regrasp.export_mjcf(plan, scene), json.loads(plan.to_json()), Settings(controller="A"))
+            rig = make_rig(regrasp.export_mjcf(plan, scene), flat(json.loads(plan.to_json())), Settings(controller="A"))
             world_from_hand = scene.hand.world_from_base.matrix[:3, :3]
             down = world_from_hand.T @ gravity_of(rig, job.gravity)
             return [round(float(x), 12) for x in down / np.linalg.norm(down)]

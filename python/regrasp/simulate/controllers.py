@@ -105,7 +105,7 @@ class Feedback:
         self._give = share
         self._jacobians = jacobians
         model = rig.model
-        joints = [model.jnt_qposadr[model.joint(name).id] for name in rig.plan["joint_names"]]
+        joints = [model.jnt_qposadr[model.joint(name).id] for name in rig.joint_names]
         self._joint_qpos = np.array(joints, dtype=np.int64)
 
     def command(self, k: int, qpos: Array) -> Array:

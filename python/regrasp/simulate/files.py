@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from .._arguments import StrPath
+from .plans import flat
 from .reference import Plan, PlanError
 
 
@@ -18,16 +19,15 @@ def load(
     packages: Mapping[str, StrPath] | None = None,
     mjcf: StrPath | None = None,
 ) -> tuple[Plan, str]:
-    """The plan in ``path`` and its MuJoCo model: from ``mjcf``, else made from the scene that the plan names.
+    """The plan in ``path``, as ``flat`` gives it, and its MuJoCo model: from ``mjcf``, else made from the scene that the plan names.
 
     Raises ``PlanError`` or ``OSError``.
     """
     try:
-        plan: Any = json.loads(Path(path).read_text(encoding="utf-8"))
+        content: Any = json.loads(Path(path).read_text(encoding="utf-8"))
     except ValueError as error:
         raise PlanError(f"{path}: not JSON ({error})") from None
-    if not _is_plan(plan):
-        raise PlanError(f"{path}: not a plan of format version 2")
+    plan = flat(content, str(path))
     if mjcf is not None:
         return plan, Path(mjcf).read_text(encoding="utf-8")
     import regrasp
@@ -37,6 +37,3 @@ def load(
     except regrasp.RegraspError as error:
         raise PlanError(str(error)) from None
 
-
-def _is_plan(content: Any) -> bool:
-    return isinstance(content, dict) and (content.get("format"), content.get("format_version")) == ("regrasp-plan", 2)  # pyright: ignore[reportUnknownMemberType]

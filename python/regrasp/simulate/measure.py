@@ -251,7 +251,9 @@ def planned_sliding(rig: Rig, ref: Reference, finger: int) -> Array:
 def _unplanned(
     rig: Rig, ref: Reference, track: Track, ticks: NDArray[np.int64], end: int
 ) -> list[UnplannedContact]:
-    before = track.contact_ticks < end
+    # What rests may stand on what rests.
+    is_moved = np.isin(track.contact_geoms, list(rig.moved_geoms)).any(axis=1)
+    before = (track.contact_ticks < end) & is_moved
     at, geoms = track.contact_ticks[before], np.sort(track.contact_geoms[before], axis=1)
     may_touch = ref.presses | (ref.blend(_tip_gaps(rig)) < NEAR)
     planned = np.zeros(len(at), dtype=bool)

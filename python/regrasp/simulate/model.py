@@ -83,13 +83,24 @@ class FingerModel:
 
 @dataclass(frozen=True)
 class Rig:
-    """A MuJoCo model with what the controllers and measurements ask of it."""
+    """A MuJoCo model with what the controllers and measurements ask of it.
+
+    Of a scene with several hands and objects, the hand and the object of the plan. Servos hold the other hands.
+    """
 
     model: MjModel
     plan: Plan
+    joint_names: list[str]
+    """Names in the model of the plan's joints."""
+    motors: NDArray[np.int64]
+    """Per joint of the plan, the index of its motor."""
+    rest_ctrl: Array
+    """Commands of all drives of the model while the plan begins: those of other hands stay as they are here."""
     fingers: list[FingerModel]
     object_body: int
     object_geom: int
+    moved_geoms: frozenset[int]
+    """Geoms of the hand and the object that the plan moves."""
     object_qpos: int
     """First of the seven coordinates of the object's free joint."""
     pin: int
@@ -127,24 +138,32 @@ def make_rig(xml: str, plan: Plan, settings: Settings) -> Rig:
     n_waypoints = len(waypoints_of(plan))
     if model.nkey != n_waypoints:
         raise PlanError(f"the model has {model.nkey} keyframes, the plan {n_waypoints} waypoints; make it from this plan")
-    object_joint = _free_joint(model)
-    object_body = int(model.jnt_bodyid[object_joint])
-    names: list[str] = plan["joint_names"]
+    # In scenes of several hands or objects, names in the model begin with those of hand and object.
+    hand, object_ = _prefix(model, plan, "hand"), _prefix(model, plan, "object")
+    object_geom = int(model.geom(f"{object_}object").id)
+    object_body = int(model.geom_bodyid[object_geom])
+    object_joint = int(model.body_jntadr[object_body])
+    names = [f"{hand}{name}" for name in plan["joint_names"]]
     drives = _drives(model, names)
-    fingers = [_finger(model, name, names) for name in plan["fingers"]]
+    fingers = [_finger(model, name, hand, names, object_geom) for name in plan["fingers"]]
     scale = settings.stiffness_scale * (HYBRID_STIFFNESS if settings.controller == "H" else 1.0)
     stiffness, damping = _gains(fingers, len(names), scale)
-    _make_servos(model, names, stiffness, damping)
+    motors = np.array([model.actuator(name).id for name in names], dtype=np.int64)
+    _make_servos(model, motors, stiffness, damping)
     palm_axis, side_axis = _palm_axes(model, fingers, object_body)
-    sensors = [*plan["fingers"], "object"]
+    sensors = [*(f"{hand}{name}" for name in plan["fingers"]), f"{object_}object"]
     rig = Rig(
         model=model,
         plan=plan,
+        joint_names=names,
+        motors=motors,
+        rest_ctrl=np.array(model.key_ctrl[0]),
         fingers=fingers,
         object_body=object_body,
-        object_geom=int(model.geom("object").id),
+        object_geom=object_geom,
+        moved_geoms=_geoms_below(model, fingers[0].body) | {object_geom},
         object_qpos=int(model.jnt_qposadr[object_joint]),
-        pin=int(model.equality("pin").id),
+        pin=int(model.equality(f"{object_}pin").id),
         stiffness=stiffness,
         damping=damping,
         drives=drives,
@@ -152,7 +171,7 @@ def make_rig(xml: str, plan: Plan, settings: Settings) -> Rig:
         side_axis=side_axis,
         linear_velocity=[_sensor(model, f"{name}:linear_velocity") for name in sensors],
         angular_velocity=[_sensor(model, f"{name}:angular_velocity") for name in sensors],
-        normal_force=np.array([_sensor(model, f"{name}:normal_force").start for name in plan["fingers"]]),
+        normal_force=np.array([_sensor(model, f"{name}:normal_force").start for name in sensors[:-1]]),
         radius=float(plan["promises"]["torque_scale"]),
     )
     _apply(rig, settings)
@@ -251,16 +270,13 @@ def _apply(rig: Rig, settings: Settings) -> None:
     mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
-def _make_servos(model: MjModel, names: list[str], stiffness: Array, damping: Array) -> None:
+def _make_servos(model: MjModel, motors: NDArray[np.int64], stiffness: Array, damping: Array) -> None:
     """Turns motors into joint servos: torque = control + stiffness * (0 - q) - damping * velocity.
 
     With control = stiffness * target + damping * velocity + torque it is a PD controller with both fed forward, that runs at the
     steps of the simulation and keeps the limits of the motors.
     """
-    for j, name in enumerate(names):
-        actuator = model.actuator(name).id
-        if actuator != j:
-            raise PlanError("the model's motors are not in the order of the plan's joints")
+    for j, actuator in enumerate(motors):
         model.actuator_biastype[actuator] = mujoco.mjtBias.mjBIAS_AFFINE
         model.actuator_biasprm[actuator, :3] = (0.0, -stiffness[j], -damping[j])
 
@@ -284,10 +300,9 @@ def _drives(model: MjModel, names: list[str]) -> Array:
     return drives
 
 
-def _finger(model: MjModel, name: str, joint_names: list[str]) -> FingerModel:
-    site = model.site(f"{name}:tip")
+def _finger(model: MjModel, name: str, hand: str, joint_names: list[str], object_geom: int) -> FingerModel:
+    site = model.site(f"{hand}{name}:tip")
     body = int(model.site_bodyid[site.id])
-    object_geom = model.geom("object").id
     on_tip = [g for g in range(model.ngeom) if model.geom_bodyid[g] == body]
     touching: set[int] = set()
     for p in range(model.npair):
@@ -337,11 +352,24 @@ def _palm_axes(model: MjModel, fingers: list[FingerModel], object_body: int) -> 
     return np.sign(way[k]) * world_from_hand[:, k], world_from_hand[:, (k + 1) % 3].copy()
 
 
-def _free_joint(model: MjModel) -> int:
-    free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
-    if len(free) != 1:
-        raise PlanError(f"the model has {len(free)} free bodies; expected the object alone")
-    return int(free[0])
+def _prefix(model: MjModel, plan: Plan, kind: str) -> str:
+    """What stands before the names of the plan's hand or object: nothing in scenes of one hand and one object."""
+    prefix = f"{plan.get(kind, '')}/"
+    expected = plan["joint_names"][0] if kind == "hand" else "object"
+    names: Any = model.actuator if kind == "hand" else model.geom
+    for found in (prefix, ""):
+        try:
+            names(f"{found}{expected}")
+        except KeyError:
+            continue
+        return found
+    raise PlanError(f"the model does not have the plan's {kind} \"{plan.get(kind, '')}\"; make it from this plan")
+
+
+def _geoms_below(model: MjModel, body: int) -> frozenset[int]:
+    """All geoms of the tree of bodies that ``body`` is in."""
+    root = model.body_rootid[body]
+    return frozenset(np.flatnonzero(model.body_rootid[model.geom_bodyid] == root).tolist())
 
 
 def _sensor(model: MjModel, name: str) -> slice:

@@ -66,13 +66,14 @@ def grip(rig: Rig, controller: Controller, settings: Settings) -> MjData:
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     data.time = 0.0
+    data.ctrl[:] = rig.rest_ctrl
     data.eq_active[rig.pin] = 1
     steps = _steps(rig, settings)
     ticks = max(1, round(settings.grip_time / settings.tick))
     for k in range(ticks):
         # Full forces for the last fifth.
         share = min(1.0, 1.25 * (k + 1) / ticks)
-        data.ctrl[:] = controller.servo[0] + share * controller.torques[0]
+        data.ctrl[rig.motors] = controller.servo[0] + share * controller.torques[0]
         mujoco.mj_step(model, data, steps)
     data.eq_active[rig.pin] = 0
     return data
@@ -81,7 +82,7 @@ def grip(rig: Rig, controller: Controller, settings: Settings) -> MjData:
 def hold(rig: Rig, ref: Reference, controller: Controller, gripped: MjData, settings: Settings) -> Drift:
     """Holds the start grasp and measures how far the object creeps. ``gripped`` stays as it is."""
     data = copy.copy(gripped)
-    data.ctrl[:] = controller.commands[0]
+    data.ctrl[rig.motors] = controller.commands[0]
     at = slice(rig.object_qpos, rig.object_qpos + 7)
     stride = 25
     poses: list[Array] = []
@@ -114,12 +115,12 @@ def replay(rig: Rig, ref: Reference, controller: Controller, gripped: MjData, se
     contacts: list[NDArray[np.int32]] = []
     feedback = controller.feedback(rig, ref, settings) if controller.has_feedback else None
     steps = _steps(rig, settings)
-    commands, ctrl, position = controller.commands, data.ctrl, data.qpos
+    commands, ctrl, position, motors = controller.commands, data.ctrl, data.qpos, rig.motors
     first = rig.object_qpos
     seen = n
     for k in range(n):
         tick = min(k, ref.n_ticks - 1)
-        ctrl[:] = feedback.command(tick, position) if feedback is not None else commands[tick]
+        ctrl[motors] = feedback.command(tick, position) if feedback is not None else commands[tick]
         mujoco.mj_step(model, data, steps)
         qpos[k] = position
         sensors[k] = data.sensordata

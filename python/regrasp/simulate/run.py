@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from . import measure, replay
 from .controllers import Controller
 from .model import Rig, Settings, make_rig
+from .plans import flat
 from .reference import Plan, Reference, reference
 
 
@@ -27,6 +28,7 @@ def simulate(plan: Plan, xml: str, settings: Settings | None = None, *, drift: r
     cannot be replayed.
     """
     settings = settings or Settings()
+    plan = flat(plan)
     rig = make_rig(xml, plan, settings)
     ref = reference(plan, tick=settings.tick, speed=settings.speed)
     controller = Controller(rig, ref, settings)

@@ -9,7 +9,7 @@ const GROUPS: [(&str, &str); 11] = [
     ("F0", "Files"),
     ("V0", "Numbers and names"),
     ("U1", "Robot files (URDF, SRDF) and packages"),
-    ("U2", "Hand files"),
+    ("U2", "Hand files and robot files"),
     ("M2", "Meshes"),
     ("S1", "Scene files"),
     ("P3", "Start, goal and grasp"),

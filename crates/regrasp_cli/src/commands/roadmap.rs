@@ -50,7 +50,7 @@ fn run_build(arguments: &args::RoadmapBuild, common: &Common, talk: &Talk) -> Re
     let loaded = load::in_hand_scene(&arguments.scene, ROADMAPS, common, talk)?;
     written.refuse_inputs(loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
     let n_threads = arguments.threads.unwrap_or_else(available_threads);
-    let settings = load::planner_settings(arguments.settings.as_deref(), None, arguments.margin, n_threads)?;
+    let settings = load::planner_settings(arguments.settings.as_deref(), arguments.margin, n_threads)?;
     let mut build: BuildSettings =
         arguments.build_settings.as_deref().map_or_else(|| Ok(BuildSettings::default()), load::settings_file)?;
     if let Some(places) = arguments.places {
@@ -194,7 +194,7 @@ fn refuse_other_settings(roadmap: &GraspRoadmap, arguments: &args::RoadmapQuery)
         return Ok(());
     }
     let mut asked = match arguments.settings.as_deref() {
-        Some(file) => load::planner_settings(Some(file), None, None, 1)?,
+        Some(file) => load::planner_settings(Some(file), None, 1)?,
         None => roadmap.about().settings.clone(),
     };
     if let Some(margin) = arguments.margin {

@@ -1,12 +1,18 @@
-//! A MuJoCo model of a plan's scene: hand, obstacles, object, and a keyframe for every waypoint.
+//! A MuJoCo model of a plan's scene: hands, objects, supports, obstacles, and a keyframe for every waypoint.
 //!
 //! What may touch in the model is what the checker keeps apart (`regrasp_scene::collision_pairs`), pair by pair; pairs that
-//! the hand allows never touch. A round fingertip touches the object with its ball, as the plan means it, and everything else
+//! the hand allows never touch. Servos hold the hands that the plan does not move. An object that the plan does not move stands
+//! on its support, or a weld holds it. A round fingertip touches the object with its ball, as the plan means it, and everything else
 //! with the shapes of its link. MuJoCo collides with convex hulls of meshes: an object that is not convex is written as
 //! its hull, and a note says so. `docs/reference/replay.md` has the settings and where they come from.
 
+mod geom;
+mod hand;
 mod inertia;
 mod model;
+mod names;
+mod object;
+mod tip;
 mod xml;
 
 use regrasp_plan::Plan;
@@ -40,7 +46,8 @@ pub enum MjcfError {
 ///
 /// Names: bodies and joints as links and joints of the robot; the object is the body `object` (with underscores where a link
 /// has that name) with the free joint of the same name; of each finger the site `FINGER:tip` at the tip's centre and, for
-/// a round tip, the geom `FINGER:tip`; other geoms are `LINK:k`, `obstacle:NAME` and `object`.
+/// a round tip, the geom `FINGER:tip`; other geoms are `LINK:k`, `obstacle:NAME`, `support:NAME` and `object`. In scenes of
+/// several hands or objects the name of the hand or object and a slash stand before each: `right/palm`, `box/object`.
 ///
 /// Errors: the plan is not for this scene's hand.
 pub fn to_mjcf(task: &Manipulation, plan: &Plan) -> Result<Mjcf, MjcfError> {

@@ -3,187 +3,49 @@
 mod pairs;
 
 use super::Mjcf;
-use super::inertia::{self, Inertial};
+use super::geom::{Geom, Look, OBJECT_MATERIAL, is_hollowed, write_geom, write_mesh};
+use super::hand::{Drive, ModelHand};
+use super::names::Names;
+use super::object::{Hold, ModelObject, hold_at_rest};
 use super::xml::{Xml, numbers};
-use nalgebra::UnitQuaternion;
-use regrasp_geometry::mass::solid_properties;
-use regrasp_geometry::shape::PlacedShape;
-use regrasp_geometry::{ConvexHull, Point, Pose, Shape, pose_from};
+use regrasp_geometry::{Pose, Vector, pose_from};
 use regrasp_plan::Plan;
-use regrasp_robot::tip::is_same_surface;
-use regrasp_robot::{Coupling, Finger, Hand, Joint, JointId, JointKind, LinkId, Motion, TipShape};
-use regrasp_scene::{HandView, Manipulation, Obstacle};
-use std::sync::Arc;
+use regrasp_scene::{Manipulation, Obstacle};
 
 /// Gravity where the plan says nothing, in m/s^2: along -z of the world.
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
-/// Radius of the ball that stands for a sharp tip, in metres: its surface is this far from the point, no more than a
-/// plan may promise.
-const POINT_RADIUS: f64 = 0.0005;
-/// A mesh whose hull has this much more volume is not convex for a note.
-const CONVEX_WITHIN: f64 = 0.01;
-const PALM_COLOR: &str = "0.55 0.56 0.6 1";
 const OBSTACLE_COLOR: &str = "0.5 0.45 0.4 1";
-const OBJECT_MATERIAL: &str = "object";
-/// Fingers in turn.
-const FINGER_COLORS: [&str; 6] =
-    ["0.3 0.5 0.8 1", "0.8 0.35 0.3 1", "0.35 0.7 0.4 1", "0.65 0.4 0.75 1", "0.3 0.7 0.75 1", "0.85 0.55 0.25 1"];
+const SUPPORT_COLOR: &str = "0.62 0.58 0.5 1";
 
-/// Names of the geoms.
-pub(super) struct GeomNames {
-    /// Of `Finger::shapes`.
-    pub fingers: Vec<Vec<String>>,
-    /// Of each finger, those that touch the object when it holds.
-    pub touching: Vec<Vec<String>>,
-    /// Of `Hand::palm`.
-    pub palm: Vec<String>,
-    /// Of obstacles and everything else that rests.
-    pub obstacles: Vec<String>,
-    /// Of the object.
-    pub object: String,
-}
-
-/// A geom to be written.
-struct Geom<'a> {
-    name: &'a str,
-    look: Look<'a>,
-    body_from_shape: Pose,
-    shape: &'a Shape,
-}
-
-/// How a geom looks.
-enum Look<'a> {
-    /// In one colour.
-    Color(&'a str),
-    /// As the object.
-    Checkers,
-}
-
-/// The ball or ellipsoid of a tip.
-struct OwnTip {
-    name: String,
-    placed: PlacedShape,
+/// Everything that stands in the model.
+pub(super) struct Model<'a> {
+    pub task: &'a Manipulation<'a>,
+    pub names: &'a Names,
+    pub hands: Vec<ModelHand<'a>>,
+    pub objects: Vec<ModelObject<'a>>,
 }
 
 pub(super) fn write(task: &Manipulation, plan: &Plan) -> Mjcf {
-    let (scene, hand) = (task.scene, task.hand());
-    let fixed: Vec<Obstacle> = scene.obstacles.iter().cloned().chain(task.bystanders()).collect();
-    let moving: Vec<Vec<JointId>> = hand.fingers.iter().map(|finger| moving_joints(hand, finger)).collect();
-    let names = geom_names(hand, &fixed);
-    let object = unique("object", hand);
+    let scene = task.scene;
+    let names = Names::of(scene);
+    let gravity = plan.promises.forces.as_ref().map_or(Some(GRAVITY), |forces| forces.gravity_in_world);
+    let gravity = gravity.unwrap_or(GRAVITY);
+    let model = Model::new(task, plan, &names, &Vector::from(gravity));
     let mut xml = Xml::default();
     xml.open("mujoco", &[("model", scene.name.clone())]);
-    write_settings(&mut xml, plan);
-    write_meshes(&mut xml, task, &fixed, &names);
-    xml.open("worldbody", &[]);
-    xml.leaf("light", &[("pos", "0.3 -0.3 1".into()), ("dir", "-0.3 0.3 -1".into()), ("directional", "true".into())]);
-    for (obstacle, name) in fixed.iter().zip(&names.obstacles) {
-        let body_from_shape = obstacle.placed.parent_from_shape;
-        write_geom(
-            &mut xml,
-            &Geom { name, look: Look::Color(OBSTACLE_COLOR), body_from_shape, shape: &obstacle.placed.shape },
-        );
-    }
-    write_hand(&mut xml, task, &moving, &names);
-    write_object(&mut xml, task, plan, &names, &object);
+    write_settings(&mut xml, gravity);
+    model.write_assets(&mut xml);
+    model.write_bodies(&mut xml);
+    pairs::write(&mut xml, &model);
+    model.write_couplings(&mut xml);
+    model.write_drives_and_sensors(&mut xml);
+    model.write_keyframes(&mut xml, plan);
     xml.close();
-    pairs::write(&mut xml, &HandView::of(task), &names);
-    write_sums(&mut xml, hand, &moving);
-    write_equalities(&mut xml, hand, &moving, &object);
-    write_actuators(&mut xml, hand, &moving);
-    write_sensors(&mut xml, hand, &object);
-    write_keyframes(&mut xml, hand, plan);
-    xml.close();
-    Mjcf { xml: xml.finish(), notes: notes(task, &fixed) }
-}
-
-fn notes(task: &Manipulation, fixed: &[Obstacle]) -> Vec<String> {
-    let object = task.object();
-    let shapes = fixed.iter().map(|obstacle| (obstacle.name.as_str(), &obstacle.placed.shape));
-    std::iter::once((object.name.as_str(), &object.shape))
-        .chain(shapes)
-        .filter(|(_, shape)| is_hollowed(shape))
-        .map(|(name, _)| format!("\"{name}\" is not convex; MuJoCo collides with its convex hull"))
-        .collect()
-}
-
-fn is_hollowed(shape: &Shape) -> bool {
-    let Shape::Mesh(mesh) = shape else { return false };
-    let (Ok(solid), Ok(hull)) = (solid_properties(shape), ConvexHull::new(mesh.vertices())) else { return true };
-    solid_properties(&Shape::Convex(Arc::new(hull)))
-        .is_ok_and(|hull| hull.volume > solid.volume * (1.0 + CONVEX_WITHIN))
-}
-
-/// Joints of the chain of `finger`, base first, as the robot names them.
-fn moving_joints(hand: &Hand, finger: &Finger) -> Vec<JointId> {
-    let joints = hand.robot.joints_to(finger.tip.link);
-    let moving: Vec<JointId> =
-        joints.into_iter().filter(|id| hand.robot.joints[id.0].kind != JointKind::Fixed).collect();
-    // Joints between root and base are none of the finger's.
-    moving[moving.len() - finger.chain.joints.len()..].to_vec()
-}
-
-fn unique(name: &str, hand: &Hand) -> String {
-    let mut name = name.to_owned();
-    while hand.robot.link_named(&name).is_some() || hand.robot.joint_named(&name).is_some() {
-        name.push('_');
-    }
-    name
-}
-
-fn geom_names(hand: &Hand, fixed: &[Obstacle]) -> GeomNames {
-    let mut used = vec![0; hand.robot.links.len()];
-    let mut name_of = |link: LinkId| {
-        used[link.0] += 1;
-        format!("{}:{}", hand.robot.links[link.0].name, used[link.0] - 1)
-    };
-    let palm = hand.palm.iter().map(|shape| name_of(shape.link)).collect();
-    let (mut fingers, mut touching) = (Vec::new(), Vec::new());
-    for finger in &hand.fingers {
-        let own = own_tip(finger);
-        let is_own = |placed: &PlacedShape| own.as_ref().is_some_and(|own| is_same_surface(placed, &own.placed));
-        let of_finger: Vec<String> = finger
-            .shapes
-            .iter()
-            .map(|shape| if is_own(&shape.placed) { tip_name(finger) } else { name_of(shape.link) })
-            .collect();
-        touching.push(match own {
-            Some(own) => vec![own.name],
-            None => {
-                let tips = finger.shapes.iter().zip(&of_finger).filter(|(shape, _)| shape.is_tip);
-                tips.map(|(_, name)| name.clone()).collect()
-            }
-        });
-        fingers.push(of_finger);
-    }
-    GeomNames {
-        fingers,
-        touching,
-        palm,
-        obstacles: fixed.iter().map(|obstacle| format!("obstacle:{}", obstacle.name)).collect(),
-        object: "object".into(),
-    }
-}
-
-fn tip_name(finger: &Finger) -> String {
-    format!("{}:tip", finger.name)
-}
-
-/// A small ball for a sharp tip; None for hulls, which are the link's collision geometry.
-fn own_tip(finger: &Finger) -> Option<OwnTip> {
-    let placed = match finger.tip.shape {
-        TipShape::Point => PlacedShape {
-            parent_from_shape: Pose::from_parts(finger.tip.center_in_body.coords.into(), UnitQuaternion::identity()),
-            shape: Shape::Sphere { radius: POINT_RADIUS },
-        },
-        TipShape::Sphere { .. } | TipShape::Ellipsoid(_) | TipShape::Hull { .. } => finger.tip.own_shape()?,
-    };
-    Some(OwnTip { name: tip_name(finger), placed })
+    Mjcf { xml: xml.finish(), notes: model.notes() }
 }
 
 /// Solver, contacts and joints: physics notes, sections 1 and 2.
-fn write_settings(xml: &mut Xml, plan: &Plan) {
-    let gravity = plan.promises.forces.as_ref().map_or(Some(GRAVITY), |forces| forces.gravity_in_world);
+fn write_settings(xml: &mut Xml, gravity: [f64; 3]) {
     xml.leaf(
         "compiler",
         &[("angle", "radian".into()), ("autolimits", "true".into()), ("balanceinertia", "true".into())],
@@ -196,7 +58,7 @@ fn write_settings(xml: &mut Xml, plan: &Plan) {
             ("cone", "elliptic".into()),
             ("impratio", "10".into()),
             ("noslip_iterations", "60".into()),
-            ("gravity", numbers(gravity.unwrap_or(GRAVITY))),
+            ("gravity", numbers(gravity)),
         ],
     );
     xml.open("visual", &[]);
@@ -218,306 +80,167 @@ fn write_settings(xml: &mut Xml, plan: &Plan) {
     xml.close();
 }
 
-fn write_meshes(xml: &mut Xml, task: &Manipulation, fixed: &[Obstacle], names: &GeomNames) {
-    let hand = task.hand();
-    let fingers = hand
-        .fingers
-        .iter()
-        .zip(&names.fingers)
-        .flat_map(|(finger, names)| finger.shapes.iter().map(|shape| &shape.placed.shape).zip(names));
-    let palm = hand.palm.iter().map(|shape| &shape.placed.shape).zip(&names.palm);
-    let obstacles = fixed.iter().map(|obstacle| &obstacle.placed.shape).zip(&names.obstacles);
-    let object = std::iter::once((&task.object().shape, &names.object));
-    xml.open("asset", &[]);
-    let texture = |kind: &str, pattern: &str, colors: [&str; 2]| {
-        let side = if kind == "cube" { "64" } else { "16" };
-        let texture = [("type", kind.to_owned()), ("builtin", pattern.to_owned()), ("width", side.to_owned())];
-        let colors = [("height", side.to_owned()), ("rgb1", colors[0].to_owned()), ("rgb2", colors[1].to_owned())];
-        [&texture[..], &colors[..]].concat()
-    };
-    xml.leaf("texture", &texture("skybox", "flat", ["1 1 1", "1 1 1"]));
-    // Turning shows on a pattern only.
-    let checkers = texture("cube", "checker", ["0.95 0.8 0.35", "0.75 0.45 0.15"]);
-    xml.leaf("texture", &[&[("name", OBJECT_MATERIAL.to_owned())], &checkers[..]].concat());
-    xml.leaf("material", &[("name", OBJECT_MATERIAL.into()), ("texture", OBJECT_MATERIAL.into())]);
-    for (shape, name) in palm.chain(fingers).chain(obstacles).chain(object) {
-        let vertices: Vec<Point> = match shape {
-            Shape::Convex(hull) => hull.vertices().to_vec(),
-            // MuJoCo collides with the hull whatever it is given.
-            Shape::Mesh(mesh) => match ConvexHull::new(mesh.vertices()) {
-                Ok(hull) => hull.vertices().to_vec(),
-                Err(_) => mesh.vertices().to_vec(),
-            },
-            _ => continue,
+impl<'a> Model<'a> {
+    fn new(task: &'a Manipulation<'a>, plan: &Plan, names: &'a Names, gravity: &Vector) -> Self {
+        let scene = task.scene;
+        let hands = scene.hands.iter().zip(&names.hands).enumerate();
+        let hands = hands.map(|(index, (placed, names))| {
+            let drive = if index == task.hand_index { Drive::Motors } else { Drive::Servos };
+            ModelHand::new(placed, names, drive)
+        });
+        let start = &plan.segments[0].waypoints[0].world_from_object;
+        let objects = scene.objects.iter().zip(&names.objects).zip(&task.state.world_from_objects).enumerate();
+        let objects = objects.map(|(index, ((object, names), at_rest))| {
+            let (world_from_object, hold) = if index == task.object_index {
+                (pose_from(start.position, start.quat_xyzw), Hold::Fingers)
+            } else {
+                (*at_rest, hold_at_rest(object, at_rest, &scene.supports, gravity))
+            };
+            ModelObject { object, names, world_from_object, hold }
+        });
+        Model { task, names, hands: hands.collect(), objects: objects.collect() }
+    }
+
+    /// Obstacles, then supports, each with the name of its geom and its colour.
+    fn fixed(&self) -> impl Iterator<Item = (&'a Obstacle, &'a str, &'static str)> {
+        let Model { task, names, .. } = *self;
+        let obstacles = task.scene.obstacles.iter().zip(&names.obstacles);
+        let obstacles = obstacles.map(|(body, name)| (body, name.as_str(), OBSTACLE_COLOR));
+        let supports = task.scene.supports.iter().zip(&names.supports);
+        obstacles.chain(supports.map(|(support, name)| (&support.body, name.as_str(), SUPPORT_COLOR)))
+    }
+
+    fn write_assets(&self, xml: &mut Xml) {
+        xml.open("asset", &[]);
+        let texture = |kind: &str, pattern: &str, colors: [&str; 2]| {
+            let side = if kind == "cube" { "64" } else { "16" };
+            let texture = [("type", kind.to_owned()), ("builtin", pattern.to_owned()), ("width", side.to_owned())];
+            let colors = [("height", side.to_owned()), ("rgb1", colors[0].to_owned()), ("rgb2", colors[1].to_owned())];
+            [&texture[..], &colors[..]].concat()
         };
-        let coordinates = vertices.iter().flat_map(|vertex| [vertex.x, vertex.y, vertex.z]);
-        xml.leaf("mesh", &[("name", name.clone()), ("inertia", "convex".into()), ("vertex", numbers(coordinates))]);
-    }
-    xml.close();
-}
-
-fn write_hand(xml: &mut Xml, task: &Manipulation, moving: &[Vec<JointId>], names: &GeomNames) {
-    let hand = task.hand();
-    let link_name = |link: LinkId| hand.robot.links[link.0].name.clone();
-    open_body(xml, link_name(hand.base), &task.world_from_hand(), false);
-    for (palm, name) in hand.palm.iter().zip(&names.palm) {
-        let body_from_shape = palm.placed.parent_from_shape;
-        write_geom(xml, &Geom { name, look: Look::Color(PALM_COLOR), body_from_shape, shape: &palm.placed.shape });
-    }
-    for (index, finger) in hand.fingers.iter().enumerate() {
-        let color = FINGER_COLORS[index % FINGER_COLORS.len()];
-        let mut parent = Pose::identity();
-        for (body, (joint, &id)) in finger.chain.joints.iter().zip(&moving[index]).enumerate() {
-            let as_read = &hand.robot.joints[id.0];
-            open_body(xml, link_name(as_read.child), &(parent * joint.parent_from_joint), true);
-            parent = Pose::identity();
-            write_joint(xml, hand, finger, body, id);
-            let on_body = || finger.shapes.iter().zip(&names.fingers[index]).filter(|(shape, _)| shape.body == body);
-            write_inertial(xml, &inertia::of_link(on_body().map(|(shape, _)| &shape.placed)));
-            for (shape, name) in on_body() {
-                let body_from_shape = shape.placed.parent_from_shape;
-                write_geom(xml, &Geom { name, look: Look::Color(color), body_from_shape, shape: &shape.placed.shape });
-            }
+        xml.leaf("texture", &texture("skybox", "flat", ["1 1 1", "1 1 1"]));
+        let checkers = texture("cube", "checker", ["0.95 0.8 0.35", "0.75 0.45 0.15"]);
+        xml.leaf("texture", &[&[("name", OBJECT_MATERIAL.to_owned())], &checkers[..]].concat());
+        xml.leaf("material", &[("name", OBJECT_MATERIAL.into()), ("texture", OBJECT_MATERIAL.into())]);
+        for hand in &self.hands {
+            hand.write_meshes(xml);
         }
-        write_tip(xml, finger, &names.fingers[index], color);
-        for _ in &finger.chain.joints {
-            xml.close();
+        for (body, name, _) in self.fixed() {
+            write_mesh(xml, &body.placed.shape, name);
         }
-    }
-    xml.close();
-}
-
-fn open_body(xml: &mut Xml, name: String, parent_from_body: &Pose, is_moving: bool) {
-    let [pos, quat] = place(parent_from_body);
-    let mut attributes = vec![("name", name), pos, quat];
-    if is_moving {
-        attributes.push(("gravcomp", "1".into()));
-    }
-    xml.open("body", &attributes);
-}
-
-fn write_joint(xml: &mut Xml, hand: &Hand, finger: &Finger, body: usize, id: JointId) {
-    let (joint, as_read) = (&finger.chain.joints[body], &hand.robot.joints[id.0]);
-    let mut attributes = vec![("name", as_read.name.clone()), ("axis", numbers(joint.axis.iter().copied()))];
-    match joint.motion {
-        Motion::Turn => attributes.push(("type", "hinge".into())),
-        Motion::Slide => attributes.extend([("type", "slide".into()), ("class", "slide".into())]),
-    }
-    let limits = match (&as_read.coupling, joint.drive.single()) {
-        // The coupling holds a follower within its limits, which the leader's already respect.
-        (Some(_), Some(_)) => None,
-        (Some(_), None) => as_read.limits.map(|limits| (limits.lower, limits.upper)),
-        (None, single) => single.map(|(k, _)| (finger.chain.lower[k], finger.chain.upper[k])),
-    };
-    if let Some((lower, upper)) =
-        limits.filter(|(lower, upper)| lower.is_finite() && upper.is_finite() && lower < upper)
-    {
-        attributes.push(("range", numbers([lower, upper])));
-    }
-    xml.leaf("joint", &attributes);
-}
-
-fn write_inertial(xml: &mut Xml, inertial: &Inertial) {
-    let m = &inertial.inertia;
-    xml.leaf(
-        "inertial",
-        &[
-            ("pos", numbers(inertial.center.iter().copied())),
-            ("mass", numbers([inertial.mass])),
-            ("fullinertia", numbers([m[(0, 0)], m[(1, 1)], m[(2, 2)], m[(0, 1)], m[(0, 2)], m[(1, 2)]])),
-        ],
-    );
-}
-
-fn write_tip(xml: &mut Xml, finger: &Finger, names: &[String], color: &str) {
-    let center = finger.tip.center_in_body;
-    let own = own_tip(finger);
-    if let Some(OwnTip { name, placed }) = own.as_ref().filter(|own| !names.contains(&own.name)) {
-        let body_from_shape = placed.parent_from_shape;
-        write_geom(xml, &Geom { name, look: Look::Color(color), body_from_shape, shape: &placed.shape });
-    }
-    // Every contact of the tip lies in its site, so that the touch sensor sees it.
-    let reach = match own {
-        Some(own) => 1.5 * own.placed.shape.reach_from(&Point::origin()) + 0.001,
-        None => {
-            let tips = finger.shapes.iter().filter(|shape| shape.is_tip);
-            tips.map(|shape| shape.placed.shape.reach_from(&(shape.placed.parent_from_shape.inverse() * center)))
-                .fold(0.001, f64::max)
-        }
-    };
-    xml.leaf(
-        "site",
-        &[
-            ("name", tip_name(finger)),
-            ("pos", numbers(center.iter().copied())),
-            ("size", numbers([reach])),
-            ("rgba", "0 0 0 0".into()),
-        ],
-    );
-}
-
-fn write_object(xml: &mut Xml, task: &Manipulation, plan: &Plan, names: &GeomNames, name: &str) {
-    let start = &plan.segments[0].waypoints[0].world_from_object;
-    open_body(xml, name.to_owned(), &pose_from(start.position, start.quat_xyzw), false);
-    xml.leaf("freejoint", &[("name", name.to_owned())]);
-    write_inertial(xml, &inertia::of_object(task.object()));
-    let geom = Geom {
-        name: &names.object,
-        look: Look::Checkers,
-        body_from_shape: Pose::identity(),
-        shape: &task.object().shape,
-    };
-    write_geom(xml, &geom);
-    xml.close();
-}
-
-fn write_geom(xml: &mut Xml, geom: &Geom) {
-    let (kind, size) = match geom.shape {
-        Shape::Sphere { radius } => ("sphere", vec![*radius]),
-        Shape::Capsule { half_length, radius } => ("capsule", vec![*radius, *half_length]),
-        Shape::Cylinder { half_length, radius } => ("cylinder", vec![*radius, *half_length]),
-        Shape::Cuboid { half_extents } => ("box", half_extents.iter().copied().collect()),
-        Shape::Ellipsoid { radii } => ("ellipsoid", radii.iter().copied().collect()),
-        Shape::Convex(_) | Shape::Mesh(_) => ("mesh", Vec::new()),
-    };
-    let [pos, quat] = place(&geom.body_from_shape);
-    let mut attributes = vec![("name", geom.name.to_owned()), ("type", kind.to_owned()), pos, quat];
-    attributes.push(if kind == "mesh" { ("mesh", geom.name.to_owned()) } else { ("size", numbers(size)) });
-    attributes.push(match geom.look {
-        Look::Color(color) => ("rgba", color.to_owned()),
-        Look::Checkers => ("material", OBJECT_MATERIAL.to_owned()),
-    });
-    xml.leaf("geom", &attributes);
-}
-
-/// Position and orientation; MuJoCo's quaternions are w x y z.
-fn place(pose: &Pose) -> [(&'static str, String); 2] {
-    let q = pose.rotation.coords;
-    [("pos", numbers(pose.translation.vector.iter().copied())), ("quat", numbers([q.w, q.x, q.y, q.z]))]
-}
-
-/// A tendon for each joint that follows several others: its length is the joint's position less the leaders' share.
-fn write_sums(xml: &mut Xml, hand: &Hand, moving: &[Vec<JointId>]) {
-    let sums: Vec<(&Joint, &Coupling)> = moving
-        .iter()
-        .flatten()
-        .map(|id| &hand.robot.joints[id.0])
-        .filter_map(|joint| Some((joint, joint.coupling.as_ref().filter(|coupling| coupling.single().is_none())?)))
-        .collect();
-    if sums.is_empty() {
-        return;
-    }
-    xml.open("tendon", &[]);
-    for (joint, coupling) in sums {
-        xml.open("fixed", &[("name", sum_name(joint))]);
-        xml.leaf("joint", &[("joint", joint.name.clone()), ("coef", "1".into())]);
-        for (leader, multiplier) in &coupling.terms {
-            let name = hand.robot.joints[leader.0].name.clone();
-            xml.leaf("joint", &[("joint", name), ("coef", numbers([-multiplier]))]);
+        for object in &self.objects {
+            write_mesh(xml, &object.object.shape, &object.names.geom);
         }
         xml.close();
     }
-    xml.close();
-}
 
-fn sum_name(follower: &Joint) -> String {
-    format!("{}:leaders", follower.name)
-}
+    fn write_bodies(&self, xml: &mut Xml) {
+        xml.open("worldbody", &[]);
+        xml.leaf(
+            "light",
+            &[("pos", "0.3 -0.3 1".into()), ("dir", "-0.3 0.3 -1".into()), ("directional", "true".into())],
+        );
+        for (body, name, color) in self.fixed() {
+            let (body_from_shape, shape) = (body.placed.parent_from_shape, &body.placed.shape);
+            write_geom(xml, &Geom { name, look: Look::Color(color), body_from_shape, shape });
+        }
+        for hand in &self.hands {
+            hand.write_bodies(xml);
+        }
+        for object in &self.objects {
+            object.write_body(xml);
+        }
+        xml.close();
+    }
 
-/// Followers, and the pin that can hold the object where it starts.
-fn write_equalities(xml: &mut Xml, hand: &Hand, moving: &[Vec<JointId>], object: &str) {
-    xml.open("equality", &[]);
-    for (finger, ids) in hand.fingers.iter().zip(moving) {
-        for (joint, id) in finger.chain.joints.iter().zip(ids) {
-            let as_read = &hand.robot.joints[id.0];
-            let Some(coupling) = &as_read.coupling else { continue };
-            let stiff = [("solref", "0.004 1".to_owned()), ("solimp", "0.99 0.999 0.0001".to_owned())];
-            let offset = joint.drive.offset;
-            match coupling.single() {
-                Some((leader, multiplier)) => {
-                    let what = [
-                        ("joint1", as_read.name.clone()),
-                        ("joint2", hand.robot.joints[leader.0].name.clone()),
-                        ("polycoef", numbers([offset, multiplier, 0.0, 0.0, 0.0])),
-                    ];
-                    xml.leaf("joint", &[&what[..], &stiff].concat());
+    /// Joints that follow others, and the pins of the objects.
+    fn write_couplings(&self, xml: &mut Xml) {
+        if self.hands.iter().any(|hand| !hand.sums().is_empty()) {
+            xml.open("tendon", &[]);
+            for hand in &self.hands {
+                hand.write_sums(xml);
+            }
+            xml.close();
+        }
+        xml.open("equality", &[]);
+        for hand in &self.hands {
+            hand.write_couplings(xml);
+        }
+        for object in &self.objects {
+            object.write_pin(xml);
+        }
+        xml.close();
+    }
+
+    fn write_drives_and_sensors(&self, xml: &mut Xml) {
+        xml.open("actuator", &[]);
+        for hand in &self.hands {
+            hand.write_drives(xml);
+        }
+        xml.close();
+        xml.open("sensor", &[]);
+        for hand in &self.hands {
+            hand.write_sensors(xml);
+        }
+        for object in &self.objects {
+            object.write_sensors(xml);
+        }
+        xml.close();
+    }
+
+    /// A keyframe for every waypoint. What the plan does not move is where the scene has it.
+    fn write_keyframes(&self, xml: &mut Xml, plan: &Plan) {
+        let state = self.task.state;
+        let is_moved = |index: usize| index == self.task.hand_index;
+        xml.open("keyframe", &[]);
+        for (s, segment) in plan.segments.iter().enumerate() {
+            for (w, waypoint) in segment.waypoints.iter().enumerate() {
+                let of_hand = |index: usize| if is_moved(index) { &waypoint.joints } else { &state.hand_joints[index] };
+                let mut qpos: Vec<f64> = Vec::new();
+                for (index, hand) in self.hands.iter().enumerate() {
+                    qpos.extend(hand.positions(of_hand(index)));
                 }
-                None => {
-                    let what = [("tendon1", sum_name(as_read)), ("polycoef", numbers([offset, 0.0, 0.0, 0.0, 0.0]))];
-                    xml.leaf("tendon", &[&what[..], &stiff].concat());
+                for (index, object) in self.objects.iter().enumerate() {
+                    let now = &waypoint.world_from_object;
+                    let (position, [x, y, z, w_last]) = match index == self.task.object_index {
+                        true => (now.position, now.quat_xyzw),
+                        false => coordinates(&object.world_from_object),
+                    };
+                    qpos.extend(position.iter().chain(&[w_last, x, y, z]));
                 }
+                let mut attributes =
+                    vec![("name", format!("{s}_{w}")), ("time", numbers([waypoint.time])), ("qpos", numbers(qpos))];
+                let has_forces = !waypoint.joint_torques.is_empty();
+                if has_forces || self.hands.len() > 1 {
+                    let rest = vec![0.0; plan.joint_names.len()];
+                    let torques = if has_forces { &waypoint.joint_torques } else { &rest };
+                    let commands = |index: usize| if is_moved(index) { torques } else { &state.hand_joints[index] };
+                    let commands = (0..self.hands.len()).flat_map(commands);
+                    attributes.push(("ctrl", numbers(commands.copied())));
+                }
+                xml.leaf("key", &attributes);
             }
         }
+        xml.close();
     }
-    xml.leaf(
-        "weld",
-        &[
-            ("name", "pin".into()),
-            ("body1", object.to_owned()),
-            ("active", "false".into()),
-            ("solref", "0.004 1".into()),
-            ("solimp", "0.99 0.999 0.0001".into()),
-        ],
-    );
-    xml.close();
+
+    fn notes(&self) -> Vec<String> {
+        let moved = &self.objects[self.task.object_index];
+        let others = || self.objects.iter().filter(|object| object.hold != Hold::Fingers);
+        let fixed = self.fixed().map(|(body, _, _)| (body.name.as_str(), &body.placed.shape));
+        let hollowed = std::iter::once((moved.object.name.as_str(), &moved.object.shape))
+            .chain(others().map(|object| (object.object.name.as_str(), &object.object.shape)))
+            .chain(fixed)
+            .filter(|(_, shape)| is_hollowed(shape))
+            .map(|(name, _)| format!("\"{name}\" is not convex; MuJoCo collides with its convex hull"));
+        let pinned = others().filter(|object| object.hold == Hold::Pin).map(|object| {
+            let (name, pin) = (&object.object.name, &object.names.pin);
+            format!("\"{name}\" stands on no support; the weld \"{pin}\" holds it where the scene has it")
+        });
+        hollowed.chain(pinned).collect()
+    }
 }
 
-/// A motor per independent joint, in the order of the plan's joints.
-fn write_actuators(xml: &mut Xml, hand: &Hand, moving: &[Vec<JointId>]) {
-    xml.open("actuator", &[]);
-    for id in moving.iter().flatten() {
-        let joint = &hand.robot.joints[id.0];
-        if joint.coupling.is_some() {
-            continue;
-        }
-        let mut attributes = vec![("name", joint.name.clone()), ("joint", joint.name.clone())];
-        if let Some(effort) = joint.limits.and_then(|limits| limits.effort).filter(|&effort| effort > 0.0) {
-            attributes.push(("forcerange", numbers([-effort, effort])));
-        }
-        xml.leaf("motor", &attributes);
-    }
-    xml.close();
-}
-
-/// Velocities of fingertips and object in the world, and the sum of normal forces on each tip.
-fn write_sensors(xml: &mut Xml, hand: &Hand, object: &str) {
-    xml.open("sensor", &[]);
-    for finger in &hand.fingers {
-        let site = tip_name(finger);
-        for (kind, what) in [("framelinvel", "linear_velocity"), ("frameangvel", "angular_velocity")] {
-            let name = format!("{}:{what}", finger.name);
-            xml.leaf(kind, &[("name", name), ("objtype", "site".into()), ("objname", site.clone())]);
-        }
-        xml.leaf("touch", &[("name", format!("{}:normal_force", finger.name)), ("site", site)]);
-    }
-    for (kind, what) in [("framelinvel", "linear_velocity"), ("frameangvel", "angular_velocity")] {
-        let name = format!("object:{what}");
-        xml.leaf(kind, &[("name", name), ("objtype", "xbody".into()), ("objname", object.to_owned())]);
-    }
-    xml.close();
-}
-
-fn write_keyframes(xml: &mut Xml, hand: &Hand, plan: &Plan) {
-    xml.open("keyframe", &[]);
-    for (s, segment) in plan.segments.iter().enumerate() {
-        for (w, waypoint) in segment.waypoints.iter().enumerate() {
-            let mut qpos = Vec::new();
-            let mut first = 0;
-            for finger in &hand.fingers {
-                let coordinates = &waypoint.joints[first..first + finger.chain.n_coordinates()];
-                qpos.extend(finger.chain.joints.iter().map(|joint| joint.position(coordinates)));
-                first += finger.chain.n_coordinates();
-            }
-            let pose = &waypoint.world_from_object;
-            let [x, y, z, w_last] = pose.quat_xyzw;
-            qpos.extend(pose.position.iter().chain(&[w_last, x, y, z]));
-            let mut attributes =
-                vec![("name", format!("{s}_{w}")), ("time", numbers([waypoint.time])), ("qpos", numbers(qpos))];
-            if !waypoint.joint_torques.is_empty() {
-                attributes.push(("ctrl", numbers(waypoint.joint_torques.iter().copied())));
-            }
-            xml.leaf("key", &attributes);
-        }
-    }
-    xml.close();
+fn coordinates(pose: &Pose) -> ([f64; 3], [f64; 4]) {
+    (pose.translation.vector.into(), pose.rotation.coords.into())
 }

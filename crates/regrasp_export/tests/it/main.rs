@@ -4,3 +4,6 @@ mod mjcf;
 mod npz;
 mod ros2;
 mod sample;
+mod several;
+#[path = "../../../../tests/support/two_hands.rs"]
+mod two_hands;

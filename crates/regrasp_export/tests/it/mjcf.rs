@@ -6,7 +6,7 @@ use regrasp_scene::collision_pairs;
 use std::collections::BTreeSet;
 
 /// Values of `key` in the elements called `name`, in order.
-fn values<'x>(xml: &'x str, name: &str, key: &str) -> Vec<&'x str> {
+pub(crate) fn values<'x>(xml: &'x str, name: &str, key: &str) -> Vec<&'x str> {
     let (start, key) = (format!("<{name} "), format!(" {key}=\""));
     let elements = xml.lines().filter(|line| line.trim_start().starts_with(&start));
     elements.filter_map(|line| line.split_once(&key)?.1.split_once('"')).map(|(value, _)| value).collect()

@@ -119,6 +119,26 @@ fn segments_and_their_waypoints_agree() {
 }
 
 #[test]
+fn hands_objects_and_holders_are_named() {
+    let mut plan = PLAN.clone();
+    let arrays = read(&to_npz(&plan).unwrap());
+    assert_eq!(arrays["hands"].texts(), [plan.hand.as_str()]);
+    assert_eq!(arrays["objects"].texts(), [plan.object.as_str()]);
+    assert_eq!(arrays["holders"].texts(), [plan.hand.as_str()]);
+    assert_eq!(arrays["hand_of_joint"].integers(), vec![0; plan.joint_names.len()]);
+    assert_eq!(arrays["hand_of_finger"].integers(), vec![0; plan.fingers.len()]);
+    assert_eq!(arrays["segment_held_by"].shape, [plan.segments.len(), 1, 1]);
+    assert!(arrays["segment_held_by"].integers().iter().all(|&holds| holds == 1));
+
+    plan.segments[0].held_by = vec!["table".into()];
+    plan.segments[1].held_by = vec!["table".into(), plan.hand.clone()];
+    let arrays = read(&to_npz(&plan).unwrap());
+    assert_eq!(arrays["holders"].texts(), ["table", plan.hand.as_str()]);
+    assert_eq!(arrays["segment_held_by"].shape, [plan.segments.len(), 1, 2]);
+    assert_eq!(arrays["segment_held_by"].integers()[..6], [1, 0, 1, 1, 0, 1]);
+}
+
+#[test]
 fn the_same_plan_gives_the_same_bytes() {
     assert_eq!(to_npz(&PLAN), to_npz(&PLAN.clone()));
 }

@@ -23,20 +23,28 @@ const MAX_ITERATIONS: usize = 48;
 /// Share of the true distance at which a bound is good enough: a rough direction soon fails when the shapes move.
 const NEARLY_EXACT: f64 = 0.98;
 
+/// A shape at its place in a frame that both shapes of a query share.
+#[derive(Debug, Clone, Copy)]
+pub struct Placed<'a> {
+    /// The shape.
+    pub shape: &'a Shape,
+    /// Its place.
+    pub at: &'a Placement,
+}
+
 /// Looks for a direction along which the placed convex shapes are apart by at least `required`.
 ///
-/// `direction` is where to start (from `a` to `b`, any length) and receives the best unit direction found. The search
+/// `direction` is where to start (from `first` to `second`, any length) and receives the best unit direction found. The search
 /// goes on past `required` until the bound is `enough` or within a fiftieth of the true distance.
 pub fn separation(
-    a: &Shape,
-    parent_from_a: &Placement,
-    b: &Shape,
-    parent_from_b: &Placement,
+    first: Placed,
+    second: Placed,
     required: f64,
     enough: f64,
     direction: &mut Vector,
     hints: &mut [u32; 2],
 ) -> Answer {
+    let (Placed { shape: a, at: parent_from_a }, Placed { shape: b, at: parent_from_b }) = (first, second);
     if !(direction.norm_squared() > 1e-30) {
         *direction = parent_from_b.translation - parent_from_a.translation;
     }
@@ -265,7 +273,14 @@ mod tests {
 
     fn distance(a: &Shape, at_a: &Placement, b: &Shape, at_b: &Placement) -> Answer {
         let mut direction = Vector::zeros();
-        separation(a, at_a, b, at_b, 1e-9, f64::INFINITY, &mut direction, &mut [0; 2])
+        separation(
+            Placed { shape: a, at: at_a },
+            Placed { shape: b, at: at_b },
+            1e-9,
+            f64::INFINITY,
+            &mut direction,
+            &mut [0; 2],
+        )
     }
 
     fn random_shape(rng: &mut Rng) -> Shape {
@@ -350,10 +365,8 @@ mod tests {
             let exact = (center.coords - on_axis).norm() - 0.017;
             let mut direction = Vector::zeros();
             let answer = separation(
-                &sphere,
-                &at_sphere,
-                &capsule,
-                &at_capsule,
+                Placed { shape: &sphere, at: &at_sphere },
+                Placed { shape: &capsule, at: &at_capsule },
                 1e-9,
                 exact - 1e-10,
                 &mut direction,

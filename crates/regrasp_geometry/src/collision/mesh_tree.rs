@@ -4,7 +4,7 @@
 //! triangles is wholly inside or wholly outside, so that one point of it is asked. Along a motion that stays apart from
 //! the triangles one moment is enough.
 
-use super::gjk::{Answer, separation};
+use super::gjk::{Answer, Placed, separation};
 use super::placement::Placement;
 use super::winding::{self, Dipole};
 use crate::frame::{Point, Pose, Vector};
@@ -138,7 +138,8 @@ impl MeshTree {
     /// As [`MeshTree::is_apart`], but a shape that is inside the mesh is not apart from it. `middle` is any point of the shape.
     pub fn is_outside(
         &self,
-        (shape, middle): (&Shape, &Point),
+        shape: &Shape,
+        middle: &Point,
         mesh_from_shape: &Placement,
         required: f64,
         smallest: &mut f64,
@@ -189,10 +190,8 @@ impl MeshTree {
             // Of a ball the distance is known already.
             if !matches!(shape, Shape::Sphere { .. })
                 && let Answer::SeparatedBy(d) = separation(
-                    shape,
-                    mesh_from_shape,
-                    &cuboid,
-                    &at_box,
+                    Placed { shape, at: mesh_from_shape },
+                    Placed { shape: &cuboid, at: &at_box },
                     required,
                     required,
                     &mut direction,
@@ -366,7 +365,7 @@ mod tests {
         let middle = Point::origin();
         for (x, is_outside) in [(0.0, false), (0.8, false), (0.95, false), (1.05, false), (1.2, true)] {
             let at = Placement { translation: Vector::new(x, 0.1, 0.2), ..Placement::IDENTITY };
-            assert_eq!(tree.is_outside((&shape, &middle), &at, 0.01, &mut 0.0), is_outside, "{x}");
+            assert_eq!(tree.is_outside(&shape, &middle, &at, 0.01, &mut 0.0), is_outside, "{x}");
         }
     }
 

@@ -1,6 +1,7 @@
 //! parry against distances known by construction, closed forms and surfaces.
 
 use super::*;
+use crate::collision::Placed;
 use crate::collision::{self, Placement, separation};
 use crate::{ConvexHull, Surface, Vector};
 use regrasp_base::Rng;
@@ -99,7 +100,14 @@ impl Seen {
 fn own_code_finds(a: &Shape, world_from_a: &Pose, b: &Shape, world_from_b: &Pose, gap: f64) {
     let (at_a, at_b) = (Placement::from(world_from_a), Placement::from(world_from_b));
     let mut direction = Vector::zeros();
-    match separation(a, &at_a, b, &at_b, 1e-9, f64::INFINITY, &mut direction, &mut [0; 2]) {
+    match separation(
+        Placed { shape: a, at: &at_a },
+        Placed { shape: b, at: &at_b },
+        1e-9,
+        f64::INFINITY,
+        &mut direction,
+        &mut [0; 2],
+    ) {
         collision::Answer::SeparatedBy(lower) => {
             assert!(lower <= gap + 1e-12, "{} {} {gap} {lower}", a.kind(), b.kind());
             assert!(lower >= 0.98 * gap - 1e-9, "{} {} {gap} {lower}", a.kind(), b.kind());

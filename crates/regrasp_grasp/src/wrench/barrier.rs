@@ -9,7 +9,7 @@
 mod newton_step;
 
 use arrayvec::ArrayVec;
-use newton_step::Step;
+use newton_step::NewtonStep;
 
 /// Most contacts.
 pub const MAX_GRIPS: usize = 6;
@@ -132,7 +132,7 @@ impl<const D: usize> Program<D> {
 
     /// The minimum without any limits but balance.
     fn without_limits(&self) -> Forces<D> {
-        let mut step = Step::<D>::default();
+        let mut step = NewtonStep::<D>::default();
         for block in &self.blocks {
             let mut hessian = [[0.0; D]; D];
             (0..D).for_each(|i| hessian[i][i] = if i == 0 { self.weight } else { 1.0 });
@@ -213,7 +213,7 @@ impl<const D: usize> Program<D> {
     }
 
     /// Takes what is left of the balance by rounding away.
-    fn refine(&self, step: &Step<D>, forces: &mut Forces<D>) {
+    fn refine(&self, step: &NewtonStep<D>, forces: &mut Forces<D>) {
         let zero = self.blocks.iter().map(|_| [0.0; D]).collect();
         let (correction, _) = step.solve(&zero, &self.rest(forces));
         *forces = moved(forces, &correction, 1.0);
@@ -412,13 +412,13 @@ struct Point<const D: usize> {
     give_slope: f64,
     /// Second derivative by give.
     give_curvature: f64,
-    step: Step<D>,
+    step: NewtonStep<D>,
 }
 
 impl<const D: usize> Point<D> {
     fn new(program: &Program<D>) -> Self {
         let zero: Forces<D> = program.blocks.iter().map(|_| [0.0; D]).collect();
-        Point { descent: zero.clone(), mixed: zero, give_slope: 0.0, give_curvature: 0.0, step: Step::default() }
+        Point { descent: zero.clone(), mixed: zero, give_slope: 0.0, give_curvature: 0.0, step: NewtonStep::default() }
     }
 
     /// Derivatives of [`Program::value`] at `forces` and `give`.

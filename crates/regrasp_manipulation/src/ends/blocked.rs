@@ -3,7 +3,7 @@
 use crate::ends::end::End;
 use crate::failure::Failure;
 use crate::model::{Body, Carrier, FingerModel, Model};
-use regrasp_geometry::collision::{Answer, Placement, separation};
+use regrasp_geometry::collision::{Answer, Placed, Placement, separation};
 use regrasp_geometry::{Pose, Vector};
 use regrasp_grasp::ContactModel;
 use regrasp_grasp::closure::may_close;
@@ -34,10 +34,8 @@ pub fn object_blocked_by<'m>(model: &'m Model, world_from_object: &Pose) -> Opti
     palm.filter(is_fixed).chain(obstacles).map(|other| &model.bodies[other]).find(|body| {
         let mut direction = Vector::zeros();
         let answer = separation(
-            &object.shape,
-            &at_object,
-            &body.shape,
-            &body.carrier_from_body,
+            Placed { shape: &object.shape, at: &at_object },
+            Placed { shape: &body.shape, at: &body.carrier_from_body },
             clearance,
             clearance,
             &mut direction,
@@ -47,7 +45,7 @@ pub fn object_blocked_by<'m>(model: &'m Model, world_from_object: &Pose) -> Opti
             let outside = |mesh: &Body, mesh_at: &Placement, other: &Body, at: &Placement| {
                 let mesh_from_other = mesh_at.inverse_then(at);
                 mesh.tree.as_ref().is_some_and(|tree| {
-                    tree.is_outside((&other.shape, &other.middle), &mesh_from_other, clearance, &mut 0.0)
+                    tree.is_outside(&other.shape, &other.middle, &mesh_from_other, clearance, &mut 0.0)
                 })
             };
             outside(object, &at_object, body, &body.carrier_from_body)

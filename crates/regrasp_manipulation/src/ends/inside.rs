@@ -2,7 +2,7 @@
 
 use crate::failure::{Failure, FailureKind};
 use crate::model::{Body, Carrier, Model};
-use regrasp_geometry::collision::{Answer, Placement, separation};
+use regrasp_geometry::collision::{Answer, Placed, Placement, separation};
 use regrasp_geometry::{Point, Pose, Shape, Vector};
 use regrasp_robot::kinematics::chain::Motion;
 
@@ -62,6 +62,13 @@ fn holds(solid: &Body, at: &Placement, point: &Point) -> bool {
     let speck = Shape::Sphere { radius: POINT };
     let there = Placement { translation: point.coords, ..Placement::IDENTITY };
     let mut direction = Vector::zeros();
-    let answer = separation(&speck, &there, &solid.shape, at, 0.0, 0.0, &mut direction, &mut [0; 2]);
+    let answer = separation(
+        Placed { shape: &speck, at: &there },
+        Placed { shape: &solid.shape, at },
+        0.0,
+        0.0,
+        &mut direction,
+        &mut [0; 2],
+    );
     !matches!(answer, Answer::SeparatedBy(_))
 }

@@ -17,11 +17,20 @@ use regrasp_plan::plan::{
 use regrasp_scene::InHandQuery;
 use regrasp_scene::query::IN_HAND;
 
+/// Which motions become one segment of the plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Joins {
+    /// None: every motion is a segment.
+    Nothing,
+    /// Transfers that follow each other.
+    TransfersInARow,
+}
+
 /// A plan in the making: motions are written down one after the other, each from where the one before ended.
 pub struct Recorder<'m, 'a> {
     model: &'m Model<'a>,
-    /// Transfers in a row are one.
-    joins: bool,
+    /// Which motions become one segment.
+    joins: Joins,
     segments: Vec<Segment>,
     /// Where the last motion ended.
     here: Waypoint,
@@ -34,8 +43,8 @@ pub struct Recorder<'m, 'a> {
 }
 
 impl<'m, 'a> Recorder<'m, 'a> {
-    /// Begins at a state; with `joins` transfers in a row become one.
-    pub fn at(model: &'m Model<'a>, start: &GraspState, joins: bool) -> Self {
+    /// Begins at a state.
+    pub fn at(model: &'m Model<'a>, start: &GraspState, joins: Joins) -> Self {
         let here = Waypoint {
             time: 0.0,
             joint_velocities: vec![0.0; model.view.hand.n_joints()],
@@ -87,7 +96,7 @@ impl<'m, 'a> Recorder<'m, 'a> {
     /// Begins a transfer of `n` moments, or goes on with the one before.
     pub fn begin_transfer(&mut self, n: usize) {
         let goes_on = self.segments.last().is_some_and(|segment| segment.kind == SegmentKind::Transfer);
-        if self.joins && goes_on {
+        if self.joins == Joins::TransfersInARow && goes_on {
             self.waypoints().reserve(n);
             return;
         }

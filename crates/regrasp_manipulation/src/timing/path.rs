@@ -4,7 +4,7 @@
 mod slower;
 
 use crate::model::Model;
-use crate::timing::step::{Row, Step, TipRow};
+use crate::timing::step::{Row, StepLimits, TipRow};
 use regrasp_geometry::{Pose, Vector, frame};
 use regrasp_plan::plan::{MotionLimits, Waypoint};
 use regrasp_robot::kinematics::chain::Motion;
@@ -56,7 +56,7 @@ pub struct Path<'m, 'a> {
     /// Number of joints.
     pub n_joints: usize,
     /// Steps between waypoints.
-    pub steps: Vec<Step>,
+    pub steps: Vec<StepLimits>,
     /// Waypoint by waypoint and joint by joint, the velocity at path speed one.
     pub directions: Vec<f64>,
     /// Waypoints at which the joints stop.
@@ -228,7 +228,7 @@ impl<'m, 'a> Path<'m, 'a> {
         }
     }
 
-    fn step(&mut self, k: usize, from: &Waypoint, to: &Waypoint, least_span: f64) -> Step {
+    fn step(&mut self, k: usize, from: &Waypoint, to: &Waypoint, least_span: f64) -> StepLimits {
         let n = self.n_joints;
         let (length, tip_speed) = (self.lengths[k], AIMED_AT * self.limits.largest_speed);
         let object = self.object_way(from, to) / tip_speed;
@@ -236,7 +236,7 @@ impl<'m, 'a> Path<'m, 'a> {
         let least = least_span.max(object);
         if length == 0.0 {
             self.strays.push(vec![[0.0; 2]; self.fingers.len()]);
-            return Step { least_span: least, ..Step::default() };
+            return StepLimits { least_span: least, ..StepLimits::default() };
         }
         let (from_joints, to_joints) = (&from.joints, &to.joints);
         let chord = &self.chords[k * n..(k + 1) * n];
@@ -273,7 +273,7 @@ impl<'m, 'a> Path<'m, 'a> {
         };
         let strays = (0..self.fingers.len()).map(off).collect();
         self.strays.push(strays);
-        Step { length, rows, tips, tip_speed, least_span }
+        StepLimits { length, rows, tips, tip_speed, least_span }
     }
 
     /// How fast a point of the object goes at most, no farther from the centre of mass than its radius, in metres per unit of the

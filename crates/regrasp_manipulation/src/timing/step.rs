@@ -42,7 +42,7 @@ impl TipRow {
 
 /// A step: what limits it.
 #[derive(Debug, Clone, Default)]
-pub struct Step {
+pub struct StepLimits {
     /// Length of the chord of all joints.
     pub length: f64,
     /// Joints that move; the object's parameter, in units of the chord's length, is one too.
@@ -55,7 +55,7 @@ pub struct Step {
     pub least_span: f64,
 }
 
-impl Step {
+impl StepLimits {
     /// The largest sum of the path speeds at both ends, of which `share` is the first one, when the step lasts twice its length
     /// over the sum. Velocities at the ends themselves are not looked at.
     pub fn largest_sum(&self, share: f64) -> f64 {
@@ -102,7 +102,7 @@ mod tests {
     use super::*;
     use regrasp_base::Rng;
 
-    fn step(rng: &mut Rng) -> Step {
+    fn step(rng: &mut Rng) -> StepLimits {
         let mut row = || {
             let chord = rng.uniform(-1.0, 1.0);
             let ends = [rng.uniform(0.5, 1.5), rng.uniform(0.5, 1.5)]
@@ -110,7 +110,7 @@ mod tests {
             Row { chord, ends, velocity: rng.uniform(0.5, 2.0), acceleration: rng.uniform(5.0, 20.0) }
         };
         let rows = (0..4).map(|_| row()).collect();
-        Step { length: rng.uniform(0.01, 0.3), rows, tips: Vec::new(), tip_speed: 0.04, least_span: 1e-3 }
+        StepLimits { length: rng.uniform(0.01, 0.3), rows, tips: Vec::new(), tip_speed: 0.04, least_span: 1e-3 }
     }
 
     #[test]

@@ -68,7 +68,7 @@ fn exceeded(log: &mut Log, key: &str, joint: Option<&str>, (asked, limit): (f64,
 }
 
 /// The friction margin that is asked for: the scene's, else that of the plan's task.
-pub(super) fn friction_margin(task: &Manipulation, plan: &Plan) -> f64 {
+pub fn friction_margin(task: &Manipulation, plan: &Plan) -> f64 {
     task.scene.limits.friction_margin.unwrap_or(match plan.promises.tracking.is_some() {
         true => TRACKING_FRICTION_MARGIN,
         false => IN_HAND_FRICTION_MARGIN,

@@ -29,8 +29,17 @@ pub enum Owner {
     Palm,
     /// The object.
     Object,
-    /// An obstacle.
+    /// An obstacle or a support.
     Obstacle,
+    /// Another hand or another object, which rests.
+    Resting,
+}
+
+impl Owner {
+    /// True for what stands still all through the plan, whatever the hand does.
+    pub fn stands_still(self) -> bool {
+        matches!(self, Owner::Obstacle | Owner::Resting)
+    }
 }
 
 /// A shape on its carrier.
@@ -189,7 +198,7 @@ impl Bodies {
                 let name = format!("{}/{}", other.name, link.name);
                 for placed in &link.collision {
                     let shape = convex_of(&placed.shape).map_err(|error| format!("link \"{name}\": {error}"))?;
-                    self.add(&name, Owner::Obstacle, WORLD, &(world_from_link * placed.parent_from_shape), &shape)?;
+                    self.add(&name, Owner::Resting, WORLD, &(world_from_link * placed.parent_from_shape), &shape)?;
                 }
             }
             for finger in &model.fingers {
@@ -197,17 +206,17 @@ impl Bodies {
                 let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));
                 let at = Pose::from_parts(finger.center.coords.into(), turn);
                 let at = pose_of(&finger.path.world_from_link(joints)) * at;
-                self.add(&format!("{}/tip of {}", other.name, finger.name), Owner::Obstacle, WORLD, &at, &shape)?;
+                self.add(&format!("{}/tip of {}", other.name, finger.name), Owner::Resting, WORLD, &at, &shape)?;
             }
         }
         for (o, other) in scene.objects.iter().enumerate().filter(|(o, _)| *o != task.object_index) {
-            self.add(&other.name, Owner::Obstacle, WORLD, &state.world_from_objects[o], other.solid())?;
+            self.add(&other.name, Owner::Resting, WORLD, &state.world_from_objects[o], other.solid())?;
         }
         Ok(())
     }
 
     fn add_pairs(&mut self, task: &Manipulation) {
-        let moves = |&a: &usize| self.items[a].owner != Owner::Obstacle;
+        let moves = |&a: &usize| !self.items[a].owner.stands_still();
         for a in (0..self.items.len()).filter(moves) {
             for b in 0..self.items.len() {
                 let (first, second) = (&self.items[a], &self.items[b]);
@@ -218,7 +227,9 @@ impl Bodies {
                     }
                     (Owner::Finger(_), Owner::Finger(_)) => a < b,
                     (Owner::Finger(_), Owner::Palm) => first.body_depth > 1,
-                    (Owner::Finger(_) | Owner::Object, Owner::Obstacle) => true,
+                    (Owner::Finger(_) | Owner::Object, Owner::Obstacle | Owner::Resting) => true,
+                    // The palm may be mounted on an obstacle, but not stand in another hand or object.
+                    (Owner::Palm, Owner::Resting) => true,
                     (Owner::Finger(_), Owner::Object) | (Owner::Object, Owner::Palm) => true,
                     _ => false,
                 };

@@ -1,6 +1,6 @@
-//! Obstacles so far from an item that a whole step cannot matter to the pair: by balls, before anything is measured.
+//! Obstacles and resting bodies so far from an item that a whole step cannot matter to the pair: by balls, before anything is measured.
 
-use crate::check::bodies::{Bodies, Owner};
+use crate::check::bodies::Bodies;
 use crate::check::motion::Step;
 use regrasp_geometry::Point;
 
@@ -9,7 +9,7 @@ const SPARE: f64 = 0.01;
 /// More than any rounding of lengths.
 const WITH_ROUNDING: f64 = 1.0 + 1e-9;
 
-/// The pairs of one item with all obstacles.
+/// The pairs of one item with all that stands still.
 struct Run {
     item: usize,
     /// The pairs, by index; one after the other.
@@ -34,7 +34,7 @@ impl Looked {
     pub fn new(bodies: &Bodies) -> Self {
         let mut runs: Vec<Run> = Vec::new();
         for (index, pair) in bodies.pairs.iter().enumerate() {
-            if bodies.items[pair.b].owner != Owner::Obstacle {
+            if !bodies.items[pair.b].owner.stands_still() {
                 continue;
             }
             match runs.last_mut() {

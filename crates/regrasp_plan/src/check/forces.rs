@@ -427,19 +427,19 @@ fn sliding_direction(state: &ContactState, normal: &Vector) -> Option<Vector> {
 }
 
 /// Work of a joint against a force and a couple of its finger's tip, per unit of the coordinate that drives it.
-pub(super) struct JointWork {
+pub struct JointWork {
     /// Index of the coordinate in the joint vector.
-    pub(super) coordinate: usize,
+    pub coordinate: usize,
     /// The work, in newton metres, or newtons of a sliding joint.
-    pub(super) torque: f64,
+    pub torque: f64,
     /// The largest that the work of so great a force and couple could be: force times the largest lever arm, and the couple.
-    pub(super) size: f64,
+    pub size: f64,
 }
 
 /// The work of every joint of `finger` when its tip exerts `force` and `couple` where the object's outward normal is
 /// `normal`, all three in the object frame. The force acts where the tip touches, one radius from its centre: that is the
 /// contact within the contact tolerance.
-pub(super) fn torques_of(
+pub fn torques_of(
     finger: &FingerModel,
     waypoint: &Waypoint,
     normal: &Vector,

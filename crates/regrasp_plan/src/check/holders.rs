@@ -47,20 +47,22 @@ fn object_of(scene: &Scene, plan: &Plan) -> Option<usize> {
 }
 
 /// Who holds the object in every segment: the hand, where some finger of it touches the object at every waypoint. The plan has to
-/// say the same.
+/// say the same, and somebody has to hold it.
 pub fn check_holders(plan: &Plan, log: &mut Log) {
     for (s, segment) in plan.segments.iter().enumerate() {
         let found: Vec<&str> = if is_held(segment) { vec![&plan.hand] } else { Vec::new() };
-        if segment.held_by != found {
-            let message = format!(
+        let message = if segment.held_by != found {
+            format!(
                 "the plan says that the object is held by [{}]; by its contacts it is held by [{}]",
                 segment.held_by.join(", "),
                 found.join(", ")
-            );
-            log.push(
-                Violation::new(Kind::WrongHolder, message).when(Moment::at(s, 0)).subjects([plan.object.as_str()]),
-            );
-        }
+            )
+        } else if found.is_empty() {
+            "nobody holds the object: at some waypoint no finger touches it".to_owned()
+        } else {
+            continue;
+        };
+        log.push(Violation::new(Kind::WrongHolder, message).when(Moment::at(s, 0)).subjects([plan.object.as_str()]));
     }
 }
 

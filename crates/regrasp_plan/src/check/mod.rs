@@ -47,8 +47,6 @@ pub mod limits;
 pub mod model;
 /// One step between two waypoints, and certificates of separation.
 pub mod motion;
-/// Plans broken in one known way each.
-pub mod mutation;
 /// A piece of the object's surface near a fingertip.
 pub mod patch;
 /// The triangles of a polyhedron in pieces, for questions about what is near.

@@ -38,7 +38,7 @@ pub enum ViolationKind {
     InputHashMismatch,
     /// The plan is of another hand or scene: joint names, finger names, task.
     WrongScene,
-    /// The plan says that others hold the object than those that do.
+    /// The plan says that others hold the object than those that do, or nobody holds it.
     WrongHolder,
     /// A number is NaN or infinite, or a rotation or normal is not of length one.
     NotANumber,

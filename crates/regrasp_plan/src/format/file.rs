@@ -3,6 +3,7 @@
 //! The file has room for several hands and objects. This version plans for one hand and one object at a time: [`FilePlan::plan`]
 //! refuses files with more.
 
+use super::caps;
 use super::locate::Step;
 use crate::plan::{
     ContactMode, ContactState, Plan, PlanInput, PoseData, Promises, Segment, SegmentKind, Statistics, WayPose, Waypoint,
@@ -199,13 +200,8 @@ impl<'a> FileWaypoint<'a> {
             };
             if finger < next {
                 let problem = format!("\"{}\" stands after a finger that comes later", contact.finger);
-                return Err(fault(
-                    "C408",
-                    &at,
-                    &step("finger"),
-                    problem,
-                    "each finger once, in the order of \"fingers\"",
-                ));
+                let expected = "each finger once, in the order of \"fingers\"";
+                return Err(fault("C408", &at, &step("finger"), problem, expected));
             }
             next = finger + 1;
             if contact.mode == ContactMode::Free {
@@ -301,7 +297,7 @@ impl FilePlan<'_> {
     /// The plan in it.
     ///
     /// Errors: not one hand and one object (`C411`), names that are not known or out of order (`C408`), a contact of a free finger
-    /// (`C407`), lists that are too short or too long (`C404`).
+    /// (`C407`), lists that are too short or too long (`C404`), more fingers than any hand has (`C410`).
     pub fn plan(mut self) -> Result<Plan, Fault> {
         for (key, n) in [("hands", self.hands.len()), ("objects", self.objects.len())] {
             if n != 1 {
@@ -310,6 +306,12 @@ impl FilePlan<'_> {
             }
         }
         let (hand, object) = (self.hands.remove(0), self.objects.remove(0).into_owned());
+        // Every waypoint takes memory for every finger: the number of fingers is looked at before.
+        if hand.fingers.len() > caps::FINGERS {
+            let problem = format!("has {} entries", hand.fingers.len());
+            let at = [Step::Key("hands"), Step::Index(0), Step::Key("fingers")];
+            return Err(fault("C410", &at, &[], problem, &format!("at most {}", caps::FINGERS)));
+        }
         let names = Names { hand: hand.name.into_owned(), object, fingers: hand.fingers.into_owned() };
         let segments = self.segments.into_iter().enumerate();
         let segments =

@@ -24,6 +24,8 @@ mod caps {
     pub const BYTES: u64 = regrasp_base::files::MAX_FILE_BYTES;
     pub const JOINTS: usize = 1_000;
     pub const FINGERS: usize = 64;
+    /// Hands and supports that hold an object at once.
+    pub const HOLDERS: usize = 64;
     pub const INPUTS: usize = 10_000;
     pub const SEGMENTS: usize = 100_000;
     pub const WAYPOINTS: usize = 2_000_000;

@@ -165,6 +165,7 @@ impl Reader<'_> {
             self.finger_of(plan, &at, segment, "moving_finger", &segment.moving_finger);
             self.finger_of(plan, &at, segment, "rolling_finger", &segment.rolling_finger);
             self.also_moving(plan, &at, segment);
+            self.held_by(&at, segment);
             for (j, waypoint) in segment.waypoints.iter().enumerate() {
                 self.waypoint(plan, &[at[0], at[1], Key("waypoints"), Index(j)], waypoint);
             }
@@ -205,6 +206,23 @@ impl Reader<'_> {
                 self.fail("C408", &steps, format!("\"{finger}\" is not in \"fingers\""), expected);
             } else if segment.moving_finger.as_ref() == Some(finger) || segment.also_moving[..i].contains(finger) {
                 self.fail("C408", &steps, format!("names \"{finger}\" again"), "each finger once".into());
+            }
+        }
+    }
+
+    /// Who holds the object: names that can be shown, each once.
+    fn held_by(&mut self, at: &[Step; 2], segment: &Segment) {
+        let steps = [at[0], at[1], Step::Key("held_by")];
+        if segment.held_by.len() > caps::HOLDERS {
+            let problem = format!("has {} names", segment.held_by.len());
+            self.fail("C410", &steps, problem, format!("at most {}", caps::HOLDERS));
+            return;
+        }
+        for (i, name) in segment.held_by.iter().enumerate() {
+            if let Some(fault) = fault_of_name(name) {
+                self.fail("V004", &steps, fault, GOOD_NAME.into());
+            } else if segment.held_by[..i].contains(name) {
+                self.fail("C408", &steps, format!("names \"{name}\" again"), "each holder once".into());
             }
         }
     }

@@ -325,7 +325,7 @@ pub fn plan_of(scene: &Scene, start: &Pose, goal: &Pose, segments: Vec<Segment>)
         tool: "test".into(),
         task: "in_hand".into(),
         query: String::new(),
-        hand: "hand".into(),
+        hand: scene.hands[0].name.clone(),
         object: scene.objects[0].name.clone(),
         method: "by hand".into(),
         seed: 0,
@@ -359,8 +359,9 @@ pub fn plan_of(scene: &Scene, start: &Pose, goal: &Pose, segments: Vec<Segment>)
         segments,
         statistics: Statistics::default(),
     };
-    let holders = vec![plan.hand.clone()];
-    plan.segments.iter_mut().for_each(|segment| segment.held_by.clone_from(&holders));
+    for segment in &mut plan.segments {
+        segment.held_by = vec![plan.hand.clone()];
+    }
     let mut now = 0.0;
     for waypoint in plan.segments.iter_mut().flat_map(|segment| &mut segment.waypoints) {
         waypoint.time = now;

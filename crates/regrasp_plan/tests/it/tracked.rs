@@ -184,14 +184,7 @@ pub fn segment(scene: &Scene, motion: &Motion, squeeze: &[f64; 4]) -> Segment {
     }
     let name = |f: usize| Some(NAMES[f].to_owned());
     let (moving_finger, rolling_finger) = (name(motion.moving), name(motion.rolling));
-    Segment {
-        kind: SegmentKind::Tracking,
-        moving_finger,
-        also_moving: Vec::new(),
-        held_by: Vec::new(),
-        rolling_finger,
-        waypoints,
-    }
+    Segment { kind: SegmentKind::Tracking, moving_finger, rolling_finger, ..Segment::transfer(waypoints) }
 }
 
 /// The forces nearest to the squeeze that balance, friction of what slides given; and torques by virtual work.

@@ -87,7 +87,7 @@ fn shortcuts_between_two_visits_of_a_pose_leave_no_gap() {
                 way.push_transfer(vec![wait_at(&second)]);
                 way.push_transfer(vec![wait_at(&second)]);
                 let end = way.end().clone();
-                shorten(search, &mut way, false);
+                shorten(search, &mut way, Arrival::Exact);
                 n_tried += 1;
                 assert!(*way.start() == first && *way.end() == end);
                 assert!(way.reversed().reversed() == way, "each motion begins where the one before ends");

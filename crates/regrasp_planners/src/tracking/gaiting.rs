@@ -7,14 +7,14 @@
 
 use crate::tracking::grasp::{TrackingGrasp, turn_to};
 use crate::tracking::local::Local;
-use crate::tracking::step::{Step, Stepper};
+use crate::tracking::step::{Stepper, TrackingStep};
 use nalgebra::UnitQuaternion;
 use regrasp_grasp::Contact;
 use regrasp_manipulation::forces::along::add_forces;
 use regrasp_manipulation::grasp::contact::draw_footholds;
 use regrasp_manipulation::grasp::state::GraspState;
 use regrasp_manipulation::model::{Model, releasable};
-use regrasp_manipulation::recording::recorder::Recorder;
+use regrasp_manipulation::recording::recorder::{Joins, Recorder};
 use regrasp_manipulation::relocation::{Foothold, relocate};
 use regrasp_plan::plan::Segment;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
@@ -32,7 +32,7 @@ const AIR_REACH: f64 = 0.98;
 #[derive(Debug, Clone)]
 pub enum Move {
     /// All fingers touch, one moves.
-    Step(Box<Step>),
+    Step(Box<TrackingStep>),
     /// One finger goes through the air.
     Relocation(Box<Relocation>),
 }
@@ -47,8 +47,8 @@ impl Move {
     }
 }
 
-impl From<Step> for Move {
-    fn from(step: Step) -> Self {
+impl From<TrackingStep> for Move {
+    fn from(step: TrackingStep) -> Self {
         Move::Step(Box::new(step))
     }
 }
@@ -69,7 +69,7 @@ struct Change {
     finger: usize,
     grasp: TrackingGrasp,
     /// Steps from there towards the goal.
-    steps: Vec<Step>,
+    steps: Vec<TrackingStep>,
     /// Angle gained by them, less where they end in a grasp that no finger may leave.
     worth: f64,
 }
@@ -170,7 +170,7 @@ fn carry_out(local: &mut Local, from: &TrackingGrasp, option: &Change) -> Option
     if !path.iter().all(|joints| is_near(stepper, &model.fingers[finger].ik.tip(joints), finger)) {
         return None;
     }
-    let mut recorder = Recorder::at(model, &state, false);
+    let mut recorder = Recorder::at(model, &state, Joins::Nothing);
     recorder.begin_regrasp(finger, Some(&lands), path.len());
     path.iter().for_each(|joints| recorder.finger_at(finger, joints.iter().copied()));
     recorder.end_regrasp();

@@ -2,7 +2,7 @@
 
 use crate::tracking::grasp::{PerFinger, TrackingGrasp, turn_to};
 use crate::tracking::object_motion::ObjectMotion;
-use crate::tracking::step::{Asked, Controls, Fingers, NoStep, Roles, STEP_WORK, Step, Stepper, each};
+use crate::tracking::step::{Asked, Controls, Fingers, NoStep, Roles, STEP_WORK, Stepper, TrackingStep, each};
 use arrayvec::ArrayVec;
 use nalgebra::UnitQuaternion;
 use regrasp_base::Rng;
@@ -103,7 +103,7 @@ struct Choice {
 /// What a local plan has come to.
 pub struct LocalPlan {
     /// Its steps.
-    pub steps: Vec<Step>,
+    pub steps: Vec<TrackingStep>,
     /// True when it ends within the tolerance of the sub-goal.
     pub arrived: bool,
 }
@@ -133,7 +133,7 @@ impl Local<'_, '_, '_> {
     ) -> LocalPlan {
         let settings = self.stepper.settings;
         let most_steps = (MOST_TIME * settings.sub_goal_time / settings.time_step).round() as usize;
-        let mut steps: Vec<Step> = Vec::new();
+        let mut steps: Vec<TrackingStep> = Vec::new();
         let mut here = start.clone();
         self.stepper.workspace.set(&here.world_from_object.to_pose(), &here.joints, &here.contacts());
         self.restore(&mut here, &mut steps);
@@ -180,8 +180,8 @@ impl Local<'_, '_, '_> {
     }
 
     /// While the object rests, rolls fingers back that are [`FAR`] from home until they are [`NEAR`] or come no nearer: the
-    /// Cherif 1999's object at rest (section 6.2.4, `w_O` of zero), with a purpose. `here` becomes the end of what is added to `steps`.
-    fn restore(&mut self, here: &mut TrackingGrasp, steps: &mut Vec<Step>) {
+    /// object at rest of Cherif 1999 (section 6.2.4, `w_O` of zero), with a purpose. `here` becomes the end of what is added to `steps`.
+    fn restore(&mut self, here: &mut TrackingGrasp, steps: &mut Vec<TrackingStep>) {
         let model = self.stepper.model;
         let size = model.frame.torque_scale;
         for moving in 0..model.n_fingers() {

@@ -4,7 +4,7 @@ use crate::tracking::forces::Forces;
 use crate::tracking::gaiting::{Move, Relocation};
 use crate::tracking::grasp::{PerFinger, TrackingGrasp};
 use crate::tracking::settings::TrackingSettings;
-use crate::tracking::step::{Relative, Roles, Step, Stepper, each};
+use crate::tracking::step::{Relative, Roles, Stepper, TrackingStep, each};
 use regrasp_geometry::Vector;
 use regrasp_manipulation::model::Model;
 use regrasp_manipulation::recording::plan::plan_of;
@@ -27,7 +27,7 @@ const MOST_BENT: f64 = 5e-4;
 /// What becomes a segment.
 enum Stretch<'s> {
     /// Steps in a row with the same roles, modes and times, from `start`.
-    Tracked { start: &'s TrackingGrasp, steps: Vec<&'s Step> },
+    Tracked { start: &'s TrackingGrasp, steps: Vec<&'s TrackingStep> },
     /// A finger goes through the air.
     Relocated(&'s Relocation),
 }
@@ -125,7 +125,7 @@ fn stretches<'s>(start: &'s TrackingGrasp, moves: &[&'s Move]) -> Vec<Stretch<'s
 }
 
 /// True where `step` has the roles, modes and time of the steps before.
-fn goes_on(steps: &[&Step], step: &Step) -> bool {
+fn goes_on(steps: &[&TrackingStep], step: &TrackingStep) -> bool {
     let bent: f64 = steps.iter().map(|one| one.end.bent).sum();
     steps.last().is_some_and(|last| {
         bent + step.end.bent <= MOST_BENT
@@ -142,7 +142,7 @@ fn segment(stepper: &Stepper, stretch: &Stretch) -> Segment {
     }
 }
 
-fn tracked(stepper: &Stepper, start: &TrackingGrasp, steps: &[&Step]) -> Segment {
+fn tracked(stepper: &Stepper, start: &TrackingGrasp, steps: &[&TrackingStep]) -> Segment {
     let mut here = start;
     let mut waypoints = Vec::with_capacity(1 + steps.len());
     for step in steps {
@@ -206,7 +206,7 @@ fn waypoint(stepper: &Stepper, grasp: &TrackingGrasp, relative: &PerFinger<Relat
 }
 
 /// Relative velocities, now that the times are known: those of the way to the next waypoint, at the last of that to it.
-fn add_velocities(segment: &mut Segment, steps: &[&Step]) {
+fn add_velocities(segment: &mut Segment, steps: &[&TrackingStep]) {
     let times: Vec<f64> = segment.waypoints.iter().map(|waypoint| waypoint.time).collect();
     for (k, waypoint) in segment.waypoints.iter_mut().enumerate() {
         let step = k.min(steps.len() - 1);

@@ -139,7 +139,7 @@ impl Relative {
 
 /// A step made.
 #[derive(Debug, Clone)]
-pub struct Step {
+pub struct TrackingStep {
     /// Who did what.
     pub roles: Roles,
     /// How long it takes.
@@ -168,7 +168,7 @@ pub struct Stepper<'m, 'a> {
 
 impl<'m, 'a> Stepper<'m, 'a> {
     /// Takes the step from `grasp`, where the workspace is; the workspace is then at its end, else where it was.
-    pub fn step(&mut self, grasp: &TrackingGrasp, asked: &Asked) -> Result<Step, NoStep> {
+    pub fn step(&mut self, grasp: &TrackingGrasp, asked: &Asked) -> Result<TrackingStep, NoStep> {
         self.work += STEP_WORK;
         let model = self.model;
         let Roles { moving, rolling } = asked.roles;
@@ -201,7 +201,7 @@ impl<'m, 'a> Stepper<'m, 'a> {
         if !self.workspace.step(&object.to_pose(), &end.joints, TipMode::AllHold) {
             return Err(NoStep::Collision);
         }
-        Ok(Step { roles: asked.roles, seconds: asked.seconds, relative, forces, end })
+        Ok(TrackingStep { roles: asked.roles, seconds: asked.seconds, relative, forces, end })
     }
 
     /// True where a ball keeps its face: on smooth surfaces always.

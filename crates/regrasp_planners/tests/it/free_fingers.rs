@@ -3,7 +3,7 @@
 use crate::in_hand_methods::scene;
 use crate::queries::Queries;
 use regrasp_base::{Budget, Rng};
-use regrasp_plan::check::mutation::mutants;
+use regrasp_mutations::mutants;
 use regrasp_plan::check::{CheckSettings, check};
 use regrasp_plan::{ContactMode, Plan, Waypoint};
 use regrasp_planners::in_hand::PhysicsSettings;

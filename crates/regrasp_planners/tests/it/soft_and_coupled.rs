@@ -4,8 +4,8 @@
 use crate::places::shared_models;
 use crate::queries::Queries;
 use regrasp_base::{Budget, Rng};
+use regrasp_mutations::mutants;
 use regrasp_plan::Plan;
-use regrasp_plan::check::mutation::mutants;
 use regrasp_plan::check::{CheckSettings, check};
 use regrasp_planners::in_hand::{InHandSettings, plan_in_hand, validate_once};
 use regrasp_robot::import::{LoadOptions, ResolveOptions};

@@ -3,7 +3,7 @@
 use crate::queries::Queries;
 use regrasp_base::{Budget, Rng};
 use regrasp_geometry::{Pose, UnitVector, Vector};
-use regrasp_plan::check::mutation::mutants;
+use regrasp_mutations::mutants;
 use regrasp_plan::check::{CheckSettings, Level, Report, check};
 use regrasp_plan::plan::ContactMode;
 use regrasp_plan::{Plan, check::ViolationKind};

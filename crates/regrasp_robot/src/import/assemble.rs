@@ -3,18 +3,18 @@
 //! Fixed joints are folded into bodies. A finger is the serial chain from the base to its tip link. What no finger
 //! joint moves is palm; moving joints that belong to no finger are held at the position nearest to zero.
 
-use super::finger_chain::{make_chain, rest_posture};
+use super::chain::{ChainOwner, make_chain, middle_of_limits, rest_posture};
+use super::hulls::Hulls;
 use super::spec::{Body, Carried, FingerSpec, HandSpec, TipSpec};
 use super::tip_split;
 use crate::coupling::Coupling;
-use crate::hand::{Finger, FingerShape, Hand, MAX_FINGERS, PalmShape, convex_of};
+use crate::hand::{Finger, FingerShape, Hand, MAX_FINGERS, PalmShape};
 use crate::robot::{Joint, JointId, JointKind, LinkId, Robot};
 use crate::tip::{Pad, Tip, TipEllipsoid, TipShape, fit};
-use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_base::diagnostic::Diagnostics;
 use regrasp_base::{Diagnostic, InputError, Place};
 use regrasp_geometry::shape::PlacedShape;
-use regrasp_geometry::{ConvexHull, Point, Pose, Shape, TriangleMesh};
+use regrasp_geometry::{ConvexHull, Point, Pose, Shape};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::Path;
 use std::sync::Arc;
@@ -38,8 +38,8 @@ pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Resu
         .enumerate()
         .flat_map(|(finger, joints)| joints.iter().enumerate().map(move |(body, &joint)| (joint, (finger, body))))
         .collect();
-    let carried = carry(robot, spec.base, &owner, file, &mut found, &mut notes);
-    let mut hulls = Hulls { robot, file, made: Vec::new() };
+    let carried = carry(robot, spec, &owner, file, &mut found, &mut notes);
+    let mut hulls = Hulls::new(robot, file);
     let mut fingers = Vec::new();
     for (index, (finger, joints)) in spec.fingers.iter().zip(&moving).enumerate() {
         fingers.extend(make_finger(robot, index, finger, joints, &carried, &mut hulls, &mut found));
@@ -52,7 +52,7 @@ pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Resu
     let mut allowed_pairs = spec.allow.clone();
     allowed_pairs.extend(adjacent_pairs(robot, &carried, &moving));
     let outside = robot.links.len() - carried.len();
-    if outside > 0 {
+    if outside > 0 && spec.mount.is_none() {
         let base = &robot.links[spec.base.0].name;
         notes.push(format!("{outside} links are not carried by base link \"{base}\" and are not part of the hand"));
     }
@@ -121,19 +121,21 @@ fn moving_joints(robot: &Robot, spec: &HandSpec, found: &mut Diagnostics) -> Vec
 /// Walks from the base over all joints that are not on the way to another part of the robot.
 fn carry(
     robot: &Robot,
-    base: LinkId,
+    spec: &HandSpec,
     owner: &BTreeMap<JointId, (usize, usize)>,
     file: &Path,
     found: &mut Diagnostics,
     notes: &mut Vec<String>,
 ) -> BTreeMap<LinkId, Carried> {
+    let base = spec.base;
     let mut carried = BTreeMap::from([(base, Carried { body: Body::Palm, body_from_link: Pose::identity() })]);
     let mut waiting = VecDeque::from([base]);
     while let Some(link) = waiting.pop_front() {
         let at = carried[&link];
         if let Some(up) = robot.links[link.0].parent_joint {
             let joint = &robot.joints[up.0];
-            if joint.kind == JointKind::Fixed && !carried.contains_key(&joint.parent) {
+            let is_mount = spec.mount == Some(joint.parent);
+            if !joint.moves() && !is_mount && !carried.contains_key(&joint.parent) {
                 let body_from_link = at.body_from_link * joint.parent_from_joint.inverse();
                 carried.insert(joint.parent, Carried { body: at.body, body_from_link });
                 waiting.push_back(joint.parent);
@@ -193,12 +195,7 @@ fn held_at(
         None => nearest_to_zero(joint),
     };
     notes.push(format!("joint \"{}\" belongs to no finger; held at {position}", joint.name));
-    match joint.kind {
-        JointKind::Prismatic => {
-            Pose::from_parts(Translation3::from(joint.axis.into_inner() * position), UnitQuaternion::identity())
-        }
-        _ => Pose::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&joint.axis, position)),
-    }
+    joint.motion(position)
 }
 
 fn nearest_to_zero(joint: &Joint) -> f64 {
@@ -214,7 +211,8 @@ fn make_finger(
     hulls: &mut Hulls,
     found: &mut Diagnostics,
 ) -> Option<Finger> {
-    let chain = make_chain(robot, spec, joints, carried, found)?;
+    let owner = ChainOwner { kind: "finger", name: &spec.name, place: &spec.place, rest_key: "rest" };
+    let chain = make_chain(robot, &owner, joints, carried, found)?;
     let body_from_link = carried.get(&spec.tip_link)?.body_from_link;
     let pad = spec.pad.as_ref().map(|pad| Pad { axis_in_body: body_from_link * pad.axis, cosine: pad.angle.cos() });
     let tip = |shape, center_in_body| Tip { link: spec.tip_link, shape, center_in_body, pad, contact: spec.contact };
@@ -259,7 +257,7 @@ fn make_finger(
         (TipSpec::Point { position }, None) => tip(TipShape::Point, body_from_link * position),
         (TipSpec::Sphere { .. } | TipSpec::Ellipsoid { .. }, None) => unreachable!("made above"),
     };
-    let rest = rest_posture(spec, &chain, found);
+    let rest = rest_posture(&owner, &spec.rest, &chain, middle_of_limits(&chain), found);
     Some(Finger::new(spec.name.clone(), chain, tip, shapes, rest))
 }
 
@@ -326,42 +324,4 @@ fn adjacent_pairs(
         }
     }
     pairs
-}
-
-/// Convex collision shapes of links; each mesh gets its hull once.
-struct Hulls<'a> {
-    robot: &'a Robot,
-    file: &'a Path,
-    made: Vec<(Arc<TriangleMesh>, Shape)>,
-}
-
-impl Hulls<'_> {
-    fn of_link(&mut self, link: LinkId, body_from_link: &Pose, found: &mut Diagnostics) -> Vec<PlacedShape> {
-        let robot = self.robot;
-        let link = &robot.links[link.0];
-        let mut placed = Vec::new();
-        for collision in &link.collision {
-            match self.convex(&collision.shape) {
-                Ok(shape) => {
-                    placed.push(PlacedShape { parent_from_shape: body_from_link * collision.parent_from_shape, shape });
-                }
-                Err(error) => found.push(
-                    Diagnostic::new("U210", Place::file(self.file), format!("a collision mesh has no hull: {error}"))
-                        .element("link", &link.name)
-                        .expected("a mesh that encloses a volume"),
-                ),
-            }
-        }
-        placed
-    }
-
-    fn convex(&mut self, shape: &Shape) -> Result<Shape, regrasp_geometry::hull::HullError> {
-        let Shape::Mesh(mesh) = shape else { return convex_of(shape) };
-        if let Some((_, hull)) = self.made.iter().find(|(known, _)| Arc::ptr_eq(known, mesh)) {
-            return Ok(hull.clone());
-        }
-        let hull = convex_of(shape)?;
-        self.made.push((mesh.clone(), hull.clone()));
-        Ok(hull)
-    }
 }

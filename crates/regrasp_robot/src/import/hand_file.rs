@@ -28,7 +28,7 @@ pub const FORMAT: &str = "regrasp-hand";
 /// The value of `format_version` in a hand file.
 pub const VERSION: f64 = 1.0;
 
-const CODES: Codes = Codes {
+pub(super) const CODES: Codes = Codes {
     syntax: "U200",
     unknown_key: "U201",
     missing_key: "U202",
@@ -64,6 +64,14 @@ pub fn load_hand(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Input
 }
 
 fn load_bare_urdf(path: &Path, options: &LoadOptions) -> Result<LoadedHand, InputError> {
+    let parts = guessed_parts(path, options)?;
+    let (mut hand, more) = assemble(&parts.robot, &parts.spec, path)?;
+    crate::inspect::rest::bend_towards_palm(&mut hand);
+    refuse_wrong_unit(&hand, path)?;
+    Ok(LoadedHand { hand, inputs: parts.inputs, notes: [parts.notes, more].concat() })
+}
+
+fn guessed_parts(path: &Path, options: &LoadOptions) -> Result<HandParts, InputError> {
     let LoadedRobot { robot, inputs, mut notes } = load_robot(path, options)?;
     options.check_time(path)?;
     let robot = Arc::new(robot);
@@ -72,14 +80,18 @@ fn load_bare_urdf(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
         "{}: fingers and tips were guessed; `regrasp inspect -o hand.toml` writes them down",
         path.display()
     ));
-    let (mut hand, more) = assemble(&robot, &spec, path)?;
-    notes.extend(more);
-    crate::inspect::rest::bend_towards_palm(&mut hand);
-    refuse_wrong_unit(&hand, path)?;
-    Ok(LoadedHand { hand, inputs, notes })
+    Ok(HandParts { robot, spec, inputs, notes })
 }
 
 fn load_hand_file(path: &Path, options: &LoadOptions) -> Result<LoadedHand, InputError> {
+    let parts = hand_file_parts(path, options)?;
+    let (hand, more) = assemble(&parts.robot, &parts.spec, path)?;
+    refuse_wrong_unit(&hand, path)?;
+    Ok(LoadedHand { hand, inputs: parts.inputs, notes: [parts.notes, more].concat() })
+}
+
+/// What a hand file says, before a hand is made of it.
+pub(super) fn hand_file_parts(path: &Path, options: &LoadOptions) -> Result<HandParts, InputError> {
     let bytes = files::read(path)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let own = LoadedInput { role: "hand".into(), name, path: path.to_owned(), sha256: files::sha256(&bytes) };
@@ -87,16 +99,24 @@ fn load_hand_file(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
     let mut found = Found::new(path, &text, CODES);
     let document = found.parse();
     let parts = document.as_ref().and_then(|document| read(Table::root(document), path, options, &mut found));
-    let (mut notes, diagnostics) = (found.notes, found.diagnostics);
+    let (notes, diagnostics) = (found.notes, found.diagnostics);
     let parts = diagnostics.into_result(parts)?;
     let Parts { robot, spec, inputs: read } = parts.expect("what could not be read has left a diagnostic");
-    let mut inputs = vec![own];
-    inputs.extend(read);
     options.check_time(path)?;
-    let (hand, more) = assemble(&robot, &spec, path)?;
-    notes.extend(more);
-    refuse_wrong_unit(&hand, path)?;
-    Ok(LoadedHand { hand, inputs, notes })
+    let inputs = [vec![own], read].concat();
+    Ok(HandParts { robot, spec, inputs, notes })
+}
+
+/// What a hand is to be made of.
+pub(super) struct HandParts {
+    /// The robot of the hand's URDF, with the couplings of the hand file.
+    pub robot: Arc<Robot>,
+    /// The hand, by the ids of that robot.
+    pub spec: HandSpec,
+    /// Files read, the hand file first.
+    pub inputs: Vec<LoadedInput>,
+    /// Remarks.
+    pub notes: Vec<String>,
 }
 
 /// Refuses hands whose joints and tips are spread over less than a centimetre or more than five metres.
@@ -104,7 +124,7 @@ fn load_hand_file(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
 /// Arms with hands are a metre or two; a hand written in millimetres is a hundred metres or more.
 ///
 /// Errors: such a span (`U216`), a fingertip larger than the hand (`U217`).
-fn refuse_wrong_unit(hand: &Hand, path: &Path) -> Result<(), InputError> {
+pub(super) fn refuse_wrong_unit(hand: &Hand, path: &Path) -> Result<(), InputError> {
     let span = crate::inspect::span(hand);
     if (0.01..=5.0).contains(&span) {
         let Some(finger) = hand.fingers.iter().find(|finger| finger.tip.radius() > span) else { return Ok(()) };
@@ -155,7 +175,7 @@ fn read(mut root: Table, path: &Path, options: &LoadOptions, found: &mut Found) 
     let fingers = root.required(found, "fingers", "add at least one [[fingers]] table");
     root.finish(found);
     // Without a robot no name in the rest of the file can be looked up.
-    let (mut robot, mut inputs) = urdf.and_then(|entry| read_robot(&entry, path, options, found))?;
+    let (mut robot, mut inputs) = urdf.and_then(|entry| locate_and_load(&entry, path, options, found))?;
     if let Some(entry) = couplings {
         couplings::read(&entry, &mut robot, found);
     }
@@ -169,11 +189,11 @@ fn read(mut root: Table, path: &Path, options: &LoadOptions, found: &mut Found) 
         allow.extend(loaded.srdf.disabled_pairs.iter().map(|pair| pair.links));
         inputs.push(loaded.input);
     }
-    Some(Parts { robot, spec: HandSpec { base, fingers, allow }, inputs })
+    Some(Parts { robot, spec: HandSpec { base, fingers, mount: None, allow }, inputs })
 }
 
 /// The file that `entry` names.
-fn locate(entry: &Entry, path: &Path, options: &LoadOptions, found: &mut Found) -> Option<PathBuf> {
+pub(super) fn locate(entry: &Entry, path: &Path, options: &LoadOptions, found: &mut Found) -> Option<PathBuf> {
     let name = entry.text(found)?;
     match resolve_own(name, path, found.place(&entry.span), &options.resolve) {
         Ok(resolved) => {
@@ -187,7 +207,7 @@ fn locate(entry: &Entry, path: &Path, options: &LoadOptions, found: &mut Found) 
     }
 }
 
-fn read_robot(
+pub(super) fn locate_and_load(
     entry: &Entry,
     path: &Path,
     options: &LoadOptions,
@@ -209,7 +229,7 @@ fn read_robot(
     }
 }
 
-fn read_srdf(
+pub(super) fn read_srdf(
     entry: &Entry,
     path: &Path,
     robot: &Robot,
@@ -238,8 +258,7 @@ fn read_fingers(entry: &Entry, robot: &Robot, contact: ContactModel, found: &mut
     }
     if items.len() > MAX_FINGERS {
         let problem = format!("has {} fingers", items.len());
-        let diagnostic =
-            entry.error("U221", found, problem).expected(format!("at most {MAX_FINGERS}, which can be planned for"));
+        let diagnostic = entry.error("U221", found, problem).expected(format!("at most {MAX_FINGERS}"));
         found
             .diagnostics
             .push(diagnostic.fix("leave out [[fingers]] that are not needed; their links are held and become palm"));
@@ -341,7 +360,7 @@ fn lengths(entry: &Entry, found: &mut Found) -> Option<Vector> {
     None
 }
 
-fn unit_quaternion(entry: &Entry, found: &mut Found) -> Option<UnitQuaternion<f64>> {
+pub(super) fn unit_quaternion(entry: &Entry, found: &mut Found) -> Option<UnitQuaternion<f64>> {
     let [x, y, z, w] = entry.numbers::<4>(found)?;
     let quaternion = Quaternion::new(w, x, y, z);
     let length = x.hypot(y).hypot(z.hypot(w));
@@ -383,7 +402,7 @@ fn point(table: &mut Table, key: &'static str, found: &mut Found) -> Option<Poin
     }
 }
 
-fn read_pairs(entry: &Entry, robot: &Robot, found: &mut Found) -> BTreeSet<(LinkId, LinkId)> {
+pub(super) fn read_pairs(entry: &Entry, robot: &Robot, found: &mut Found) -> BTreeSet<(LinkId, LinkId)> {
     let expected = "pairs of link names: [[\"link_a\", \"link_b\"], ...]";
     let mut pairs = BTreeSet::new();
     for pair in entry.entries(found, expected).unwrap_or_default() {

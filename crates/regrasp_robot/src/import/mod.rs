@@ -1,23 +1,26 @@
-//! Readers: URDF, SRDF, `package://` paths, hand files.
+//! Readers: URDF, SRDF, `package://` paths, hand files, robot files.
 //!
 //! Own readers over an XML and a TOML parser, because every message must name file, line, element, value and fix.
 //! They read files that the caller names and files that those name, below allowed folders; no environment, no
 //! subprocess, no network.
 //!
 //! Codes: U10x files and XML, U11x numbers and attributes, U12x joints, U13x the tree, U14x couplings, U15x geometry,
-//! U16x SRDF, U2xx hand files, V001 numbers that are not finite.
+//! U16x SRDF, U2xx hand files and robot files, V001 numbers that are not finite.
 
 /// A hand from a robot and the choice of its fingers.
 pub(crate) mod assemble;
+mod chain;
 mod couplings;
-mod finger_chain;
 /// `hand.toml`, and hands guessed from a bare URDF.
 pub mod hand_file;
+mod hulls;
 mod names;
 /// How files are read, and which were.
 pub mod options;
 /// `package://` and relative paths, below allowed folders.
 pub mod resolve;
+/// `robot.toml`: models, arms and hands that make one manipulator.
+pub mod robot_file;
 /// What a hand is to be made of.
 pub(crate) mod spec;
 /// SRDF: groups, end effectors, pairs of links that are not tested.
@@ -31,4 +34,5 @@ pub(crate) mod xml;
 pub use hand_file::{LoadedHand, load_hand};
 pub use options::{LoadOptions, LoadedInput, OUT_OF_TIME};
 pub use resolve::ResolveOptions;
+pub use robot_file::{LoadedManipulator, load_manipulator};
 pub use urdf::{LoadedRobot, load_robot};

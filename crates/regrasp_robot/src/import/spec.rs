@@ -14,9 +14,14 @@ pub(crate) struct HandSpec {
     pub base: LinkId,
     /// The fingers.
     pub fingers: Vec<FingerSpec>,
+    /// The link that the hand is mounted on and that is not part of it. Without one, all that is fixed to the base is the hand's.
+    pub mount: Option<LinkId>,
     /// Pairs of links that are never tested, smaller id first.
     pub allow: BTreeSet<(LinkId, LinkId)>,
 }
+
+/// Positions by name of joint, each with its place.
+pub(crate) type Positions = Vec<(String, f64, Place)>;
 
 /// A finger to be made.
 #[derive(Debug, Clone)]
@@ -30,7 +35,7 @@ pub(crate) struct FingerSpec {
     pub pad: Option<PadSpec>,
     pub contact: ContactModel,
     /// Rest posture by joint name, with the place of each name; the rest in the middle of the limits.
-    pub rest: Vec<(String, f64, Place)>,
+    pub rest: Positions,
     /// Where it stands, for messages.
     pub place: Place,
 }

@@ -42,7 +42,7 @@ pub(crate) fn guess_hand(robot: &Robot, contact: ContactModel, file: &Path) -> R
             place: Place::file(file),
         });
     }
-    Ok(HandSpec { base, fingers, allow: BTreeSet::new() })
+    Ok(HandSpec { base, fingers, mount: None, allow: BTreeSet::new() })
 }
 
 /// Moving joints below which nothing moves, in document order.

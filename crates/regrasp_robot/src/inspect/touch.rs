@@ -3,7 +3,7 @@
 use crate::hand::Hand;
 use crate::robot::LinkId;
 use regrasp_base::Rng;
-use regrasp_geometry::collision::{Answer, Placement, separation};
+use regrasp_geometry::collision::{Answer, Placed, Placement, separation};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Point, Pose, Vector};
 use std::collections::BTreeSet;
@@ -99,7 +99,8 @@ impl<'h> Touch<'h> {
             let (mut direction, mut hints) = (Vector::zeros(), [0, 0]);
             let (shape_a, shape_b) = (&a.placed.shape, &b.placed.shape);
             let (at_a, at_b) = (&placements[i].0, &placements[j].0);
-            let answer = separation(shape_a, at_a, shape_b, at_b, 0.0, 0.0, &mut direction, &mut hints);
+            let (first, second) = (Placed { shape: shape_a, at: at_a }, Placed { shape: shape_b, at: at_b });
+            let answer = separation(first, second, 0.0, 0.0, &mut direction, &mut hints);
             !matches!(answer, Answer::SeparatedBy(_))
         };
         self.shape_pairs.iter().map(|pairs| pairs.iter().any(touches)).collect()

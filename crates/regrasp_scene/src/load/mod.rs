@@ -12,6 +12,7 @@ mod files;
 mod gravity;
 mod hand;
 mod limits;
+mod numbers;
 mod object;
 mod pose;
 mod shape;

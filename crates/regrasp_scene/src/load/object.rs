@@ -1,9 +1,9 @@
 //! Objects, supports and obstacles.
 
 use super::files::Files;
+use super::numbers::{list, shown};
 use super::pose;
 use super::shape::{self, Origin, ReadShape};
-use super::units::{list, shown};
 use crate::object::Object;
 use crate::scene::Obstacle;
 use regrasp_base::diagnostic::number;

@@ -1,6 +1,6 @@
 //! Positions, orientations and turns in scene files.
 
-use super::units::shown;
+use super::numbers::shown;
 use nalgebra::UnitQuaternion;
 use regrasp_base::toml_table::{Entry, Found, Table};
 use regrasp_geometry::frame::{direction, length};

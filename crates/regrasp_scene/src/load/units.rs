@@ -1,10 +1,10 @@
 //! Mistakes that show only when hand, object and task are seen together: units (reliability R15), reach, contacts.
 
+use super::numbers::{list, shown};
 use super::task::{Goal, StartOrientation, Task};
 use crate::object::Object;
 use crate::query::{GRASP_TOLERANCE, GraspRequest};
 use crate::scene::SceneHand;
-use regrasp_base::diagnostic::number;
 use regrasp_base::toml_table::{Entry, Found, Table};
 use regrasp_geometry::{Point, Pose};
 use regrasp_robot::Hand;
@@ -86,16 +86,6 @@ pub(super) fn check_contacts(hand: &Hand, object: &Object, task: &Task, root: &m
             found.diagnostics.push(diagnostic);
         }
     }
-}
-
-/// A vector as a list of a scene file.
-pub(super) fn list(v: regrasp_geometry::Vector) -> String {
-    format!("[{}, {}, {}]", number(v.x), number(v.y), number(v.z))
-}
-
-/// A size with so many decimals; a far too large one by its power of ten.
-pub(super) fn shown(size: f64, decimals: usize) -> String {
-    if size.abs() < 1e6 { format!("{size:.decimals$}") } else { format!("{size:.1e}") }
 }
 
 /// Distance of the object from the nearest finger base, and the reach, when no finger can touch the object there.

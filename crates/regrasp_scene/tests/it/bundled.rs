@@ -23,8 +23,8 @@ fn center_in_world(loaded: &LoadedScene, world_from_object: &Pose) -> Point {
     world_from_object * loaded.scene.objects[0].center_of_mass
 }
 
-/// Scenes of the papers that are more than a turn in place, and those of tracking, which have a start grasp.
-const PAPER_SCENES: [&str; 12] = [
+/// Scenes of the papers that are more than a turn in place, and those of tracking, which have a start grasp; and one of several hands.
+const PAPER_SCENES: [&str; 13] = [
     "bulb",
     "cubic",
     "diamond",
@@ -37,6 +37,7 @@ const PAPER_SCENES: [&str; 12] = [
     "three_fingertips",
     "tracking_sphere_six",
     "tracking_sphere_wide",
+    "two_hands",
 ];
 
 #[test]

@@ -18,7 +18,7 @@ use crate::timeline;
 use key_frames::{KeyFrame, key_frames};
 use regrasp_geometry::Pose;
 use regrasp_plan::Plan;
-use stage::Stage;
+use stage::{Shown, Stage};
 
 /// How a storyboard is laid out.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,7 +74,8 @@ pub fn storyboard_picture(story: &Story, settings: &StoryboardSettings) -> Resul
     let frames = key_frames(scene, plan, settings.frames);
     let columns = settings.columns.unwrap_or_else(|| columns_for(frames.len())).clamp(1, frames.len());
     let layout = Layout::new(settings.width, columns, frames.len());
-    let stage = Stage::new(scene, plan, settings.collision).map_err(StoryboardError::Plan)?;
+    let shown = if settings.collision { Shown::CollisionShapes } else { Shown::Visuals };
+    let stage = Stage::new(scene, plan, shown).map_err(StoryboardError::Plan)?;
     let postures: Vec<_> = frames.iter().map(|frame| stage.solid(frame)).collect();
     let layers: Vec<_> = frames.iter().map(|frame| stage.layers(frame)).collect();
     let camera = view::best(&stage, &frames, &postures, &layers, layout.frame_width, layout.frame_height);

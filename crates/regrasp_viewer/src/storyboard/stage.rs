@@ -70,12 +70,21 @@ pub struct Stage<'s> {
     friction: f64,
 }
 
+/// Which surfaces are shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shown {
+    /// What things look like.
+    Visuals,
+    /// What planner and checker keep apart.
+    CollisionShapes,
+}
+
 impl<'s> Stage<'s> {
-    /// Makes all surfaces: of what things look like, or (with `collision`, or where that is not known) of what planner and
+    /// Makes all surfaces: of what things look like, or (where `shown` says so, or where that is not known) of what planner and
     /// checker keep apart. Err with a message when a mesh cannot be read, or there is no object.
-    pub fn new(scene: &'s SceneStory, plan: &Plan, collision: bool) -> Result<Self, String> {
+    pub fn new(scene: &'s SceneStory, plan: &Plan, shown: Shown) -> Result<Self, String> {
         let has_visuals = scene.pieces.iter().any(|piece| piece.role == Role::Visual);
-        let role = if has_visuals && !collision { Role::Visual } else { Role::Collision };
+        let role = if has_visuals && shown == Shown::Visuals { Role::Visual } else { Role::Collision };
         let meshes: Vec<Option<Triangles>> = scene.meshes.iter().map(triangles_of).collect();
         let mesh = |piece: &PieceStory| {
             let found = meshes.get(piece.mesh).and_then(Option::as_ref);

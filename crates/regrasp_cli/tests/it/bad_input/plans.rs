@@ -30,7 +30,12 @@ fn plan_of_another_format() {
 
 #[test]
 fn plan_of_another_version() {
-    plan_is_refused(PLAN.replace("\"format_version\": 2", "\"format_version\": 9"), "C403", "plan.json:3", &["9", "2"]);
+    plan_is_refused(
+        PLAN.replace("\"format_version\": 3", "\"format_version\": 9"),
+        "C403",
+        "plan.json:3",
+        &["9", "3", "2"],
+    );
 }
 
 #[test]
@@ -75,8 +80,8 @@ fn plan_that_is_a_folder() {
 
 #[test]
 fn plan_of_a_version_in_words() {
-    let text = PLAN.replace("\"format_version\": 2", "\"format_version\": \"one\"");
-    plan_is_refused(text, "C403", "plan.json:3", &["one", "2"]);
+    let text = PLAN.replace("\"format_version\": 3", "\"format_version\": \"one\"");
+    plan_is_refused(text, "C403", "plan.json:3", &["one", "3", "2"]);
 }
 
 #[test]

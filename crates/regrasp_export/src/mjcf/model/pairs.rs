@@ -1,60 +1,98 @@
 //! Which geoms of the model may touch, and with what friction.
+//!
+//! One rule. The hand and the object of the plan may touch what the checker keeps them apart from
+//! (`regrasp_scene::collision_pairs`): themselves, each other and everything around them. An object that stands on a support may
+//! touch everything. What is held in place, by a weld or by servos, does not collide with what else is held in place.
 
-use super::GeomNames;
+use super::Model;
+use crate::mjcf::object::Hold;
 use crate::mjcf::xml::{Xml, numbers};
 use regrasp_robot::{ContactModel, Finger};
 use regrasp_scene::{FingerShapeId, HandView, collision_pairs};
+use std::collections::BTreeSet;
 
 /// Torsional friction of a fingertip that counts as a point, in metres (physics notes, section 1): none touches at a point.
 const POINT_TORSION: f64 = 0.002;
 /// MuJoCo's own coefficients of rolling friction; without effect where `condim` is below 6.
 const ROLLING: f64 = 0.0001;
 
-/// Writes the pairs: fingertips with the object as the plan means them, then what should never touch.
-pub(super) fn write(xml: &mut Xml, view: &HandView, names: &GeomNames) {
-    let pairs = collision_pairs(view);
-    let friction = view.object.friction;
-    xml.open("contact", &[]);
-    for (index, finger) in view.hand.fingers.iter().enumerate() {
-        let (condim, coefficients) = friction_of(finger, friction);
-        for tip in &names.touching[index] {
-            xml.leaf(
-                "pair",
-                &[
-                    ("geom1", tip.clone()),
-                    ("geom2", names.object.clone()),
-                    ("condim", condim.to_string()),
-                    ("friction", numbers(coefficients)),
-                ],
-            );
+/// Writes pairs, each once.
+struct Pairs<'x> {
+    xml: &'x mut Xml,
+    written: BTreeSet<[String; 2]>,
+}
+
+impl Pairs<'_> {
+    /// True the first time that the two are named, in any order.
+    fn is_new(&mut self, a: &str, b: &str) -> bool {
+        self.written.insert([a.min(b).to_owned(), a.max(b).to_owned()])
+    }
+
+    fn planned(&mut self, tip: &str, object: &str, (condim, coefficients): (u8, [f64; 5])) {
+        if self.is_new(tip, object) {
+            let what = [("geom1", tip.to_owned()), ("geom2", object.to_owned()), ("condim", condim.to_string())];
+            self.xml.leaf("pair", &[&what[..], &[("friction", numbers(coefficients))]].concat());
         }
     }
-    let unplanned = |xml: &mut Xml, a: &str, b: &str| {
-        let coefficients = [friction, friction, POINT_TORSION, ROLLING, ROLLING];
-        let attributes = [("class", "unplanned".to_owned()), ("geom1", a.to_owned()), ("geom2", b.to_owned())];
-        let friction = [("friction", numbers(coefficients))];
-        xml.leaf("pair", &[&attributes[..], &friction[..]].concat());
-    };
-    let of_finger = |id: FingerShapeId| names.fingers[id.finger.0][id.shape].as_str();
-    for &id in &pairs.link_object {
-        unplanned(xml, of_finger(id), &names.object);
+
+    fn unplanned(&mut self, a: &str, b: &str, friction: f64) {
+        if self.is_new(a, b) {
+            let coefficients = [friction, friction, POINT_TORSION, ROLLING, ROLLING];
+            let what = [("class", "unplanned".to_owned()), ("geom1", a.to_owned()), ("geom2", b.to_owned())];
+            self.xml.leaf("pair", &[&what[..], &[("friction", numbers(coefficients))]].concat());
+        }
     }
-    for &(a, b) in pairs.finger_finger.iter().chain(&pairs.within_finger) {
-        unplanned(xml, of_finger(a), of_finger(b));
-    }
-    for &(id, palm) in &pairs.finger_palm {
-        unplanned(xml, of_finger(id), &names.palm[palm]);
-    }
-    for &(id, obstacle) in &pairs.finger_obstacle {
-        unplanned(xml, of_finger(id), &names.obstacles[obstacle]);
-    }
-    for &palm in &pairs.palm_object {
-        unplanned(xml, &names.palm[palm], &names.object);
-    }
-    for &obstacle in &pairs.object_obstacle {
-        unplanned(xml, &names.obstacles[obstacle], &names.object);
+}
+
+/// Writes the pairs: fingertips with the object as the plan means them, then what should never touch, then what stands on
+/// supports.
+pub(super) fn write(xml: &mut Xml, model: &Model) {
+    xml.open("contact", &[]);
+    let mut pairs = Pairs { xml, written: BTreeSet::new() };
+    add_moved(&mut pairs, model);
+    for object in model.objects.iter().filter(|object| object.hold == Hold::Support) {
+        let own = object.names.geom.as_str();
+        let fixed = model.names.supports.iter().chain(&model.names.obstacles).map(String::as_str);
+        let hands = model.names.hands.iter().flat_map(|hand| hand.geoms());
+        let objects = model.names.objects.iter().map(|other| other.geom.as_str());
+        for other in fixed.chain(hands).chain(objects).filter(|other| *other != own) {
+            pairs.unplanned(own, other, object.object.friction);
+        }
     }
     xml.close();
+}
+
+/// The pairs of the hand and the object that the plan moves.
+fn add_moved(pairs: &mut Pairs, model: &Model) {
+    let view = HandView::of(model.task);
+    let found = collision_pairs(&view);
+    let (hand, object) = (&model.names.hands[view.hand_index], &model.names.objects[view.object_index].geom);
+    let around = model.names.around(model.task);
+    let friction = view.object.friction;
+    for (finger, tips) in view.hand.fingers.iter().zip(&hand.touching) {
+        for tip in tips {
+            pairs.planned(tip, object, friction_of(finger, friction));
+        }
+    }
+    let of_finger = |id: FingerShapeId| hand.fingers[id.finger.0][id.shape].as_str();
+    for &id in &found.link_object {
+        pairs.unplanned(of_finger(id), object, friction);
+    }
+    for &(a, b) in found.finger_finger.iter().chain(&found.within_finger) {
+        pairs.unplanned(of_finger(a), of_finger(b), friction);
+    }
+    for &(id, palm) in &found.finger_palm {
+        pairs.unplanned(of_finger(id), &hand.palm[palm], friction);
+    }
+    for &(id, obstacle) in &found.finger_obstacle {
+        pairs.unplanned(of_finger(id), around[obstacle], friction);
+    }
+    for &palm in &found.palm_object {
+        pairs.unplanned(&hand.palm[palm], object, friction);
+    }
+    for &obstacle in &found.object_obstacle {
+        pairs.unplanned(around[obstacle], object, friction);
+    }
 }
 
 /// `condim` and MuJoCo's five friction coefficients of a fingertip on the object.

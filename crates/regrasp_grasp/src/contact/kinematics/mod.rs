@@ -24,7 +24,7 @@ mod tests;
 pub use ball_on_polyhedron::{Ball, BallContact, BallWay, Stretch, Transition, advance_with_jumps, relocate};
 pub use chart::{ChartedSurface, Coordinates, Forms};
 pub use chart_free::SurfacePair;
-pub use mode::{BodyVelocity, ForceLaw, Mode, ModeTolerances, Motion, RelativeVelocity, motion_of};
+pub use mode::{BodyVelocity, ContactMotion, ForceLaw, Mode, ModeTolerances, RelativeVelocity, motion_of};
 pub use montana::{Advanced, ContactPair, ContactState, RelativeControl};
 pub use polyhedron::{Edge, Face, Feature, NotPolyhedron, Polyhedron};
 

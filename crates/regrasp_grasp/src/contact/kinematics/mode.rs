@@ -150,7 +150,7 @@ pub enum ForceLaw {
 
 /// What a relative velocity is; see [`motion_of`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Motion {
+pub enum ContactMotion {
     /// Nothing moves.
     AtRest,
     /// The contact is kept in this mode.
@@ -218,9 +218,9 @@ impl Mode {
 
 /// The most special mode that permits `velocity`, or why there is none. Speeds across the normal and the rates about axes
 /// across it are measured by their length, so the answer does not depend on the frame's x and y. What is not a number opens.
-pub fn motion_of(velocity: &RelativeVelocity, tolerances: &ModeTolerances) -> Motion {
+pub fn motion_of(velocity: &RelativeVelocity, tolerances: &ModeTolerances) -> ContactMotion {
     if velocity.linear.z > tolerances.linear {
-        return Motion::Presses;
+        return ContactMotion::Presses;
     }
     let turns = [velocity.angular.xy().norm(), velocity.angular.z.abs()];
     if velocity.is_finite()
@@ -228,10 +228,10 @@ pub fn motion_of(velocity: &RelativeVelocity, tolerances: &ModeTolerances) -> Mo
         && velocity.sliding_speed() <= tolerances.linear
         && turns.iter().all(|rate| *rate <= tolerances.angular)
     {
-        return Motion::AtRest;
+        return ContactMotion::AtRest;
     }
     let mode = Mode::ALL.into_iter().find(|mode| mode.permits(velocity, tolerances));
-    mode.map_or(Motion::Opens, Motion::InMode)
+    mode.map_or(ContactMotion::Opens, ContactMotion::InMode)
 }
 
 /// The force on the object at a contact that slides at `velocity`, in the contact frame, in newtons (equation 4, with its sign
@@ -307,20 +307,20 @@ mod tests {
                 assert_eq!(mode.permits(&velocity, &EXACT), table(mode), "{mode:?} {velocity:?}");
             }
             let expected = match (kept, slides, rolls, twists) {
-                (false, ..) if linear.z < 0.0 => Motion::Opens,
-                (false, ..) => Motion::Presses,
-                (_, false, false, false) => Motion::AtRest,
-                (_, false, true, false) => Motion::InMode(Mode::PureRolling),
-                (_, false, false, true) => Motion::InMode(Mode::PureTwisting),
-                (_, false, true, true) => Motion::InMode(Mode::RollingWithoutSliding),
-                (_, true, false, false) => Motion::InMode(Mode::PureSliding),
-                (_, true, ..) => Motion::InMode(Mode::Sliding),
+                (false, ..) if linear.z < 0.0 => ContactMotion::Opens,
+                (false, ..) => ContactMotion::Presses,
+                (_, false, false, false) => ContactMotion::AtRest,
+                (_, false, true, false) => ContactMotion::InMode(Mode::PureRolling),
+                (_, false, false, true) => ContactMotion::InMode(Mode::PureTwisting),
+                (_, false, true, true) => ContactMotion::InMode(Mode::RollingWithoutSliding),
+                (_, true, false, false) => ContactMotion::InMode(Mode::PureSliding),
+                (_, true, ..) => ContactMotion::InMode(Mode::Sliding),
             };
             assert_eq!(motion_of(&velocity, &EXACT), expected);
         }
         let broken = RelativeVelocity { linear: Vector::new(f64::NAN, 0.0, 0.0), angular: Vector::zeros() };
         assert!(Mode::ALL.iter().all(|mode| !mode.permits(&broken, &EXACT)));
-        assert_eq!(motion_of(&broken, &EXACT), Motion::Opens);
+        assert_eq!(motion_of(&broken, &EXACT), ContactMotion::Opens);
     }
 
     /// The material points that touch, followed in the world by differences.

@@ -6,7 +6,7 @@ use arrayvec::ArrayVec;
 
 /// A factored Newton system `H step + map^T y = descent`, `map step = rest`.
 #[derive(Debug, Clone, Default)]
-pub struct Step<const D: usize> {
+pub struct NewtonStep<const D: usize> {
     /// Block by block.
     blocks: ArrayVec<Factored<D>, MAX_GRIPS>,
     /// Cholesky factor of `map H^-1 map^T`, with a reciprocal diagonal.
@@ -22,7 +22,7 @@ struct Factored<const D: usize> {
     whitened: [[f64; 6]; D],
 }
 
-impl<const D: usize> Step<D> {
+impl<const D: usize> NewtonStep<D> {
     /// Forgets all blocks.
     pub fn clear(&mut self) {
         self.blocks.clear();

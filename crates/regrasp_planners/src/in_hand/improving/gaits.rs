@@ -91,7 +91,8 @@ impl<'g, 'a> Gaits<'g, 'a> {
     pub fn new(
         search: &'g mut Search<'a>,
         course: &'g Course,
-        (tracks, contacts): (&'g [Vec<Track>], &'g [Vec<Candidate>]),
+        tracks: &'g [Vec<Track>],
+        contacts: &'g [Vec<Candidate>],
         alone: &'g [Alone],
         goal: Option<&'g Choice>,
         margin: f64,

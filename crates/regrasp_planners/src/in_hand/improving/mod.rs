@@ -138,7 +138,7 @@ fn round(
     let least =
         object_rest(model, &search.settings.improvement.cost, &course)[0] + alone.iter().map(Alone::least).sum::<f64>();
     let margin = margin_to_ask(model, weights, &improvement.improved, least, rng);
-    let mut gaits = Gaits::new(search, &course, (&tracks, &contacts), &alone, goal.as_ref(), margin);
+    let mut gaits = Gaits::new(search, &course, &tracks, &contacts, &alone, goal.as_ref(), margin);
     let mut found: Option<(Solution, PlanFigures)> = None;
     for (which, greed) in [GREED, 1.0].into_iter().enumerate() {
         let cost = found.as_ref().map_or(improvement.improved.cost, |(_, figures)| figures.cost);

@@ -30,7 +30,7 @@ fn with_gaits(name: &str, n_tracks: usize, test: impl FnOnce(&mut Gaits)) {
         let foothold = |t: &Track| Candidate { contact: Some(t.contact), joints: t.joints[0].clone(), follow: 0.0 };
         let contacts: Vec<Vec<Candidate>> = tracks.iter().map(|tracks| tracks.iter().map(foothold).collect()).collect();
         let margin = search.model().settings.closure_margin;
-        test(&mut Gaits::new(search, &course, (&tracks, &contacts), &alone, None, margin));
+        test(&mut Gaits::new(search, &course, &tracks, &contacts, &alone, None, margin));
     });
 }
 

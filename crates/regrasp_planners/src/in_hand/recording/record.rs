@@ -5,7 +5,7 @@ use crate::settings::InHandSettings;
 use regrasp_manipulation::forces::limits::Unbalanced;
 use regrasp_manipulation::grasp::sequence::{Motion, Sequence};
 use regrasp_manipulation::model::Model;
-use regrasp_manipulation::recording::recorder::Recorder;
+use regrasp_manipulation::recording::recorder::{Joins, Recorder};
 use regrasp_plan::plan::{Plan, Statistics};
 use regrasp_scene::InHandQuery;
 
@@ -26,7 +26,7 @@ pub fn record(
     statistics: Statistics,
 ) -> Result<Plan, Unbalanced> {
     let Solution { way, steps_to_way } = solution;
-    let mut recorder = Recorder::at(model, way.start(), false);
+    let mut recorder = Recorder::at(model, way.start(), Joins::Nothing);
     recorder.sequence(way);
     let plan = recorder.finish(query, seed, steps_to_way, statistics)?;
     Ok(Plan { method: settings.method.name().into(), settings: settings_of(settings), ..plan })

@@ -5,7 +5,7 @@ use crate::in_hand::grasps::candidate::{Candidate, Choice};
 use crate::in_hand::grasps::closure_table::ClosureTable;
 use crate::in_hand::grasps::pool::Pool;
 use crate::in_hand::moving::transfer::transfer;
-use crate::in_hand::regrasping::regrasp::{Tried, regrasp, regrasp_over};
+use crate::in_hand::regrasping::regrasp::{ChangeGoal, Tried, regrasp, regrasp_over};
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;
 use regrasp_geometry::collision::Placement;
@@ -196,11 +196,12 @@ fn change(
             of_finger.extend(pool.any(search, finger, OTHERS));
         }
         let mut table = ClosureTable::new(model, &options);
-        let is_goal = |choice: &Choice| *choice == goal;
-        // A finger that is not at its goal has to move once at least.
-        let n_away = |choice: &Choice| choice.iter().zip(&goal).filter(|(a, b)| a != b).count() as f64;
-        let workspace = &mut search.workspace;
-        change = regrasp_over(workspace, way.end(), &options, is_goal, n_away, &mut table, RELOCATIONS, rng);
+        let goal = ChangeGoal {
+            is_there: |choice: &Choice| *choice == goal,
+            // A finger that is not at its goal has to move once at least.
+            n_away: |choice: &Choice| choice.iter().zip(&goal).filter(|(a, b)| a != b).count() as f64,
+        };
+        change = regrasp_over(&mut search.workspace, way.end(), &options, &goal, &mut table, RELOCATIONS, rng);
     }
     search.workspace.rrt_iterations = model.settings.rrt_iterations;
     let way = way.then(change?)?;

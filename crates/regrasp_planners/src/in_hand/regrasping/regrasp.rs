@@ -27,6 +27,15 @@ impl Tried {
     }
 }
 
+/// Relocations over options, of which the options 0 are where the fingers are in `start`.
+struct Relocations<'r, 'm> {
+    workspace: &'r mut Workspace<'m>,
+    start: &'r GraspState,
+    options: &'r [Vec<Candidate>],
+    tried: &'r mut Tried,
+    rng: &'r mut Rng,
+}
+
 /// Moves fingers one at a time from option 0 of each to `goal`; each leaves only where the others that hold are closed.
 ///
 /// Depth first over the orders; what failed once is not tried again. `start` holds the options 0.
@@ -40,11 +49,12 @@ pub fn regrasp(
     rng: &mut Rng,
 ) -> Option<Sequence> {
     let mut current: Choice = goal.iter().map(|_| 0).collect();
-    let mut dead: Vec<Choice> = Vec::new();
-    let mut order: Vec<(usize, usize)> = Vec::new();
-    if !search(workspace, start, options, goal, table, tried, rng, &mut current, &mut dead, &mut order) {
+    let relocations = Relocations { workspace, start, options, tried, rng };
+    let mut orders = Orders { relocations, goal, table, dead: Vec::new(), order: Vec::new() };
+    if !orders.lead_on_from(&mut current) {
         return None;
     }
+    let Orders { order, relocations: Relocations { tried, .. }, .. } = orders;
     let mut way = Sequence::at(start.clone());
     for (finger, which) in order {
         way.push_regrasp(finger, options[finger][goal[finger]].contact, tried.known[which].3.clone()?);
@@ -52,9 +62,17 @@ pub fn regrasp(
     Some(way)
 }
 
+/// What a choice of options is to be changed into.
+pub struct ChangeGoal<G, N> {
+    /// True for a choice that will do.
+    pub is_there: G,
+    /// At most the number of relocations that a choice is away from one that will do.
+    pub n_away: N,
+}
+
 /// Moves fingers one at a time from option 0 of each by the fewest relocations to a choice that is a goal, over other
 /// options where need be: where two grasps have too few fingers in common to hold by, a third one leads from one to the
-/// other. `n_away` is at most the number of relocations that a choice is away from a goal.
+/// other.
 ///
 /// The order is sought in closure alone; a relocation that is then found impossible is left out and the order sought again,
 /// with `n_tries` relocations tried in all. `start` holds the options 0.
@@ -62,8 +80,7 @@ pub fn regrasp_over(
     workspace: &mut Workspace,
     start: &GraspState,
     options: &[Vec<Candidate>],
-    is_goal: impl Fn(&Choice) -> bool,
-    n_away: impl Fn(&Choice) -> f64,
+    goal: &ChangeGoal<impl Fn(&Choice) -> bool, impl Fn(&Choice) -> f64>,
     table: &mut ClosureTable,
     n_tries: usize,
     rng: &mut Rng,
@@ -100,15 +117,17 @@ pub fn regrasp_over(
                 }
             }
         };
-        let is_there = |node: usize| is_goal(&as_choice(node));
-        let n_left = |node: usize| n_away(&as_choice(node));
+        let is_there = |node: usize| (goal.is_there)(&as_choice(node));
+        let n_left = |node: usize| (goal.n_away)(&as_choice(node));
         let path = search.cheapest_path_within(limits, as_node(&first), is_there, neighbours, n_left)?;
         let mut way = Sequence::at(start.clone());
         let is_whole = path.nodes.windows(2).all(|pair| {
             let (before, after) = (as_choice(pair[0]), as_choice(pair[1]));
             let Some(finger) = (0..n).find(|&finger| before[finger] != after[finger]) else { return false };
             let option = after[finger];
-            let which = try_relocation(workspace, start, options, &before, finger, option, &mut tried, rng);
+            let (workspace, rng) = (&mut *workspace, &mut *rng);
+            let mut relocations = Relocations { workspace, start, options, tried: &mut tried, rng };
+            let which = relocations.attempt(&before, finger, option);
             let Some(path) = &tried.known[which].3 else { return false };
             way.push_regrasp(finger, options[finger][option].contact, path.clone());
             true
@@ -125,83 +144,81 @@ pub fn regrasp_over(
 /// Most grasps looked at for an order.
 const MOST_GRASPS: usize = 400;
 
-fn search(
-    workspace: &mut Workspace,
-    start: &GraspState,
-    options: &[Vec<Candidate>],
-    goal: &Choice,
-    table: &mut ClosureTable,
-    tried: &mut Tried,
-    rng: &mut Rng,
-    current: &mut Choice,
-    dead: &mut Vec<Choice>,
-    order: &mut Vec<(usize, usize)>,
-) -> bool {
-    if current == goal {
-        return true;
-    }
-    if dead.contains(current) {
-        return false;
-    }
-    let all = (1u32 << options.len()) - 1;
-    for finger in 0..options.len() {
-        if current[finger] == goal[finger] || !table.is_closed(current, all & !(1 << finger)) {
-            continue;
-        }
-        let which = try_relocation(workspace, start, options, current, finger, goal[finger], tried, rng);
-        if tried.known[which].3.is_none() {
-            continue;
-        }
-        let before = std::mem::replace(&mut current[finger], goal[finger]);
-        order.push((finger, which));
-        if search(workspace, start, options, goal, table, tried, rng, current, dead, order) {
-            return true;
-        }
-        order.pop();
-        current[finger] = before;
-    }
-    dead.push(current.clone());
-    false
+/// Orders of relocations, depth first.
+struct Orders<'o, 'r, 'm, 't> {
+    relocations: Relocations<'r, 'm>,
+    goal: &'o Choice,
+    table: &'o mut ClosureTable<'t>,
+    /// Choices from which nothing leads to the goal.
+    dead: Vec<Choice>,
+    /// Fingers relocated so far, each with the index of its relocation.
+    order: Vec<(usize, usize)>,
 }
 
-/// Index in `tried` of the relocation of `finger` from where `current` has it to `option`.
-fn try_relocation(
-    workspace: &mut Workspace,
-    start: &GraspState,
-    options: &[Vec<Candidate>],
-    current: &Choice,
-    finger: usize,
-    option: usize,
-    tried: &mut Tried,
-    rng: &mut Rng,
-) -> usize {
-    let known = tried.known.iter().position(|(c, f, o, _)| c == current && *f == finger && *o == option);
-    if let Some(which) = known {
-        return which;
-    }
-    let mut state = start.clone();
-    for (f, &taken) in current.iter().enumerate() {
-        if taken != 0 {
-            state.set_contact(f, options[f][taken].contact);
-            state.joints[f].clone_from(&options[f][taken].joints);
+impl Orders<'_, '_, '_, '_> {
+    /// True when relocations lead from `current` to the goal.
+    fn lead_on_from(&mut self, current: &mut Choice) -> bool {
+        let goal = self.goal;
+        if current == goal {
+            return true;
         }
+        if self.dead.contains(current) {
+            return false;
+        }
+        let all = (1u32 << goal.len()) - 1;
+        for finger in 0..goal.len() {
+            if current[finger] == goal[finger] || !self.table.is_closed(current, all & !(1 << finger)) {
+                continue;
+            }
+            let which = self.relocations.attempt(current, finger, goal[finger]);
+            if self.relocations.tried.known[which].3.is_none() {
+                continue;
+            }
+            let before = std::mem::replace(&mut current[finger], goal[finger]);
+            self.order.push((finger, which));
+            if self.lead_on_from(current) {
+                return true;
+            }
+            self.order.pop();
+            current[finger] = before;
+        }
+        self.dead.push(current.clone());
+        false
     }
-    let others = state.holding & !(1 << finger);
-    if !balances(workspace, &state.world_from_object, &state.joints, &state.contacts, others) {
-        tried.lacks_forces = true;
-        tried.known.push((current.clone(), finger, option, None));
-        return tried.known.len() - 1;
+}
+
+impl Relocations<'_, '_> {
+    /// Index in `tried` of the relocation of `finger` from where `current` has it to `option`.
+    fn attempt(&mut self, current: &Choice, finger: usize, option: usize) -> usize {
+        let Relocations { workspace, start, options, tried, rng } = self;
+        let known = tried.known.iter().position(|(c, f, o, _)| c == current && *f == finger && *o == option);
+        if let Some(which) = known {
+            return which;
+        }
+        let mut state = GraspState::clone(start);
+        for (f, &taken) in current.iter().enumerate() {
+            if taken != 0 {
+                state.set_contact(f, options[f][taken].contact);
+                state.joints[f].clone_from(&options[f][taken].joints);
+            }
+        }
+        let others = state.holding & !(1 << finger);
+        if !balances(workspace, &state.world_from_object, &state.joints, &state.contacts, others) {
+            tried.lacks_forces = true;
+            tried.known.push((current.clone(), finger, option, None));
+            return tried.known.len() - 1;
+        }
+        workspace.set_state(&state);
+        let to = &options[finger][option];
+        let path = relocate(
+            workspace,
+            &state.world_from_object,
+            finger,
+            Foothold { contact: state.contact(finger).as_ref(), joints: &state.joints[finger] },
+            Foothold { contact: to.contact.as_ref(), joints: &to.joints },
+            rng,
+        );
+        tried.known.push((current.clone(), finger, option, path));
+        tried.known.len() - 1
     }
-    workspace.set_state(&state);
-    let to = &options[finger][option];
-    let path = relocate(
-        workspace,
-        &state.world_from_object,
-        finger,
-        Foothold { contact: state.contact(finger).as_ref(), joints: &state.joints[finger] },
-        Foothold { contact: to.contact.as_ref(), joints: &to.joints },
-        rng,
-    );
-    tried.known.push((current.clone(), finger, option, path));
-    tried.known.len() - 1
 }

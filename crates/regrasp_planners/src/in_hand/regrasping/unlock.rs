@@ -5,7 +5,7 @@ use crate::in_hand::attempt::search::Search;
 use crate::in_hand::grasps::candidate::{Candidate, Choice};
 use crate::in_hand::grasps::closure_table::ClosureTable;
 use crate::in_hand::grasps::pool::Pool;
-use crate::in_hand::regrasping::regrasp::regrasp_over;
+use crate::in_hand::regrasping::regrasp::{ChangeGoal, regrasp_over};
 use regrasp_base::Rng;
 use regrasp_manipulation::grasp::sequence::Sequence;
 use regrasp_manipulation::grasp::state::GraspState;
@@ -54,7 +54,9 @@ pub fn unlock(search: &mut Search, state: &GraspState, finger: usize, pool: &mut
     let mut table = ClosureTable::new(model, &options);
     let mut rng = Rng::child(&search.rng, "unlock", 0);
     search.rng.bits();
-    let has_moved = |choice: &Choice| choice[finger] != 0;
-    let n_away = |choice: &Choice| f64::from(u8::from(choice[finger] == 0));
-    regrasp_over(&mut search.workspace, state, &options, has_moved, n_away, &mut table, RELOCATIONS, &mut rng)
+    let goal = ChangeGoal {
+        is_there: |choice: &Choice| choice[finger] != 0,
+        n_away: |choice: &Choice| f64::from(u8::from(choice[finger] == 0)),
+    };
+    regrasp_over(&mut search.workspace, state, &options, &goal, &mut table, RELOCATIONS, &mut rng)
 }

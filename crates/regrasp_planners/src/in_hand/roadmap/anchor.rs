@@ -91,6 +91,15 @@ struct Place {
     follows: [Vec<(u32, bool)>; MAX_FINGERS],
 }
 
+/// How far along a path its link to an end goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LinkKind {
+    /// To its first node.
+    Shortest,
+    /// As far as one grasp goes, which makes one transfer of several.
+    Longest,
+}
+
 impl QueryEnd {
     /// An end without anchors.
     pub fn new(pose: Pose, given: Option<GraspState>) -> Self {
@@ -132,19 +141,19 @@ impl QueryEnd {
     }
 
     /// The motions between the end and `path`, which begins at one of the anchors. None when they are not feasible; then the
-    /// anchor is none any more. With `smooth` from the last of the first nodes that have one grasp, if that is feasible.
+    /// anchor is none any more. A longest one begins at the last of the first nodes that have one grasp, if that is feasible.
     pub fn prove(
         &mut self,
         search: &mut Search,
         roadmap: &GraspRoadmap,
         path: impl Iterator<Item = usize> + Clone,
-        smooth: bool,
+        kind: LinkKind,
     ) -> Option<Link> {
         let anchor = path.clone().next()?;
         if let Some(detour) = self.detour.as_ref().filter(|detour| detour.node == anchor) {
             return Some(detour.clone());
         }
-        let link = if smooth { self.longest_link(search, roadmap, path) } else { None };
+        let link = if kind == LinkKind::Longest { self.longest_link(search, roadmap, path) } else { None };
         let link = link.or_else(|| self.link(search, roadmap, anchor, 0));
         if link.is_none() {
             self.anchors.retain(|other| other.node != anchor);
@@ -175,7 +184,7 @@ impl QueryEnd {
             Err(Stop::Restart) => return Ok(false),
             found => found?,
         };
-        shorten(search, &mut way, false);
+        shorten(search, &mut way, Arrival::Exact);
         let way = way.reversed();
         let can_be_kept = comes_out_again(search, &way);
         self.anchors.push(Anchor { node, cost: 0.0 });

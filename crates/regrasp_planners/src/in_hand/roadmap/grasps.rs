@@ -110,48 +110,54 @@ impl Reached {
 
     /// All grasps that the candidates make, closed and clear, with a finger that may let go; at most `limit`.
     pub fn grasps(&self, search: &mut Search, pose: &Pose, limit: usize) -> Vec<GraspState> {
-        let mut found = Vec::new();
+        let found = Vec::new();
         if self.options.iter().any(Vec::is_empty) {
             return found;
         }
         search.workspace.place_object(pose);
-        let mut clashes = ClashTable::new(&self.options);
-        let mut table = ClosureTable::new(search.model(), &self.options);
-        let mut choice = Choice::new();
-        self.complete(search, pose, limit, &mut clashes, &mut table, &mut choice, &mut found);
-        found
+        let mut grasps = GraspsAt {
+            pose,
+            limit,
+            clashes: ClashTable::new(&self.options),
+            table: ClosureTable::new(search.model(), &self.options),
+            found,
+        };
+        self.complete(search, &mut grasps, &mut Choice::new());
+        grasps.found
     }
 
     /// Completes a choice for the first fingers in all ways.
-    fn complete(
-        &self,
-        search: &mut Search,
-        pose: &Pose,
-        limit: usize,
-        clashes: &mut ClashTable,
-        table: &mut ClosureTable,
-        choice: &mut Choice,
-        found: &mut Vec<GraspState>,
-    ) {
+    fn complete(&self, search: &mut Search, grasps: &mut GraspsAt, choice: &mut Choice) {
         let n = self.options.len();
         let finger = choice.len();
         if finger == n {
-            let n_releasable = table.n_releasable(choice);
+            let n_releasable = grasps.table.n_releasable(choice);
             let rule = search.settings.search.release_rule;
             let enough = if rule == ReleaseRule::EverywhereEveryFinger { n } else { 1 };
-            if n_releasable >= enough && found.len() < limit {
+            if n_releasable >= enough && grasps.found.len() < grasps.limit {
                 let chosen = |f: usize| &self.options[f][choice[f]];
                 let fingers = (0..n).map(|f| (chosen(f).contact, chosen(f).joints.clone()));
-                found.push(GraspState::of(*pose, fingers));
+                grasps.found.push(GraspState::of(*grasps.pose, fingers));
             }
             return;
         }
         for option in 0..self.options[finger].len() {
             choice.push(option);
-            if (0..finger).all(|other| clashes.pair(&mut search.workspace, &self.options, other, finger, choice)) {
-                self.complete(search, pose, limit, clashes, table, choice, found);
+            if (0..finger).all(|other| grasps.clashes.pair(&mut search.workspace, &self.options, other, finger, choice))
+            {
+                self.complete(search, grasps, choice);
             }
             choice.pop();
         }
     }
+}
+
+/// Grasps at one pose, as far as they have been found.
+struct GraspsAt<'g> {
+    pose: &'g Pose,
+    /// Most grasps wanted.
+    limit: usize,
+    clashes: ClashTable,
+    table: ClosureTable<'g>,
+    found: Vec<GraspState>,
 }

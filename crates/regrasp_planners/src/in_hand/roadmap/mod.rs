@@ -33,7 +33,7 @@ mod route;
 pub use build::{BuildSettings, BuildStage, build_roadmap};
 pub use file::seal;
 pub use identity::{Digest, Identity};
-pub use query::{Answer, QueryMemory, RoadmapPlanner};
+pub use query::{QueryMemory, RoadmapAnswer, RoadmapPlanner};
 pub use region::Region;
 
 use crate::settings::InHandSettings;

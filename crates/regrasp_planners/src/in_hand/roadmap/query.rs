@@ -7,7 +7,7 @@ use crate::in_hand::recording::record::settings_of;
 use crate::in_hand::refusals::given_grasp;
 use crate::in_hand::regrasping::change::{Arrival, transfer_regrasp};
 use crate::in_hand::roadmap::GraspRoadmap;
-use crate::in_hand::roadmap::anchor::{Link, QueryEnd};
+use crate::in_hand::roadmap::anchor::{Link, LinkKind, QueryEnd};
 use crate::in_hand::roadmap::build::legs_of;
 use crate::in_hand::roadmap::index::Index;
 use crate::in_hand::roadmap::landmarks::{Bounds, Landmarks};
@@ -24,7 +24,7 @@ use regrasp_manipulation::grasp::sequence::{Motion, Sequence};
 use regrasp_manipulation::grasp::state::GraspState;
 use regrasp_manipulation::in_world::{failure_in_world, plan_in_world};
 use regrasp_manipulation::model::Model;
-use regrasp_manipulation::recording::recorder::Recorder;
+use regrasp_manipulation::recording::recorder::{Joins, Recorder};
 use regrasp_plan::Plan;
 use regrasp_plan::plan::Statistics;
 use regrasp_roadmap::AStar;
@@ -49,7 +49,7 @@ pub struct RoadmapPlanner<'a> {
     model: Model<'a>,
     settings: InHandSettings,
     roadmap: &'a GraspRoadmap,
-    smooth: bool,
+    links: LinkKind,
 }
 
 /// Memory of queries, one after the other: saves time, changes nothing.
@@ -60,7 +60,7 @@ pub struct QueryMemory {
 
 /// A plan, and what the roadmap can learn from it.
 #[derive(Debug)]
-pub struct Answer {
+pub struct RoadmapAnswer {
     /// The plan.
     pub plan: Plan,
     /// Links of start and goal to the graph.
@@ -74,13 +74,13 @@ impl<'a> RoadmapPlanner<'a> {
     pub fn new(path: &Path, roadmap: &'a GraspRoadmap, view: &'a HandView<'a>) -> Result<Self, InputError> {
         roadmap.refuse_other_scene(path, view)?;
         let settings = roadmap.about.settings.within(&view.limits);
-        Ok(RoadmapPlanner { model: Model::new(view, &settings.physics), settings, roadmap, smooth: false })
+        Ok(RoadmapPlanner { model: Model::new(view, &settings.physics), settings, roadmap, links: LinkKind::Shortest })
     }
 
     /// With transfers that follow each other with one grasp made one, where that is free: shorter motions, slower answers.
     #[must_use]
     pub fn smoothing(self) -> Self {
-        RoadmapPlanner { smooth: true, ..self }
+        RoadmapPlanner { links: LinkKind::Longest, ..self }
     }
 
     /// Settings of the planner that the roadmap's motions were proven with.
@@ -119,12 +119,12 @@ impl<'a> RoadmapPlanner<'a> {
         seed: u64,
         budget: &Budget,
         memory: &mut QueryMemory,
-    ) -> Result<Answer, Failure> {
+    ) -> Result<RoadmapAnswer, Failure> {
         let view = self.model.view;
         let seen = view.hand_from_world().map(|hand_from_world| query.seen_from(&hand_from_world));
         let found = self.plan_in_hand_frame(seen.as_ref().unwrap_or(query), seed, budget, memory);
         found
-            .map(|answer| Answer { plan: plan_in_world(view, &query.name, answer.plan), ..answer })
+            .map(|answer| RoadmapAnswer { plan: plan_in_world(view, &query.name, answer.plan), ..answer })
             .map_err(|failure| failure_in_world(view, failure))
     }
 
@@ -134,7 +134,7 @@ impl<'a> RoadmapPlanner<'a> {
         seed: u64,
         budget: &Budget,
         memory: &mut QueryMemory,
-    ) -> Result<Answer, Failure> {
+    ) -> Result<RoadmapAnswer, Failure> {
         let model = &self.model;
         let poses = [query.world_from_object_start, query.world_from_object_goal];
         refuse_way_poses(query)?;
@@ -149,7 +149,7 @@ impl<'a> RoadmapPlanner<'a> {
         let context = Context { model, settings: &self.settings, seed, budget, winner: &winner, progress: &|_| {} };
         let mut search = Search::new(context, poses, 0, budget.max_work);
         search.rng = Rng::keyed(seed, "roadmap_query", 0);
-        let answer = self.answer(&mut search, query, seed, (start_grasp, goal_grasp), memory);
+        let answer = self.answer(&mut search, query, seed, start_grasp, goal_grasp, memory);
         answer.unwrap_or_else(|stop| Err(self.stopped(&stop, &search)))
     }
 
@@ -158,9 +158,10 @@ impl<'a> RoadmapPlanner<'a> {
         search: &mut Search,
         query: &InHandQuery,
         seed: u64,
-        (start_grasp, goal_grasp): (Option<GraspState>, Option<GraspState>),
+        start_grasp: Option<GraspState>,
+        goal_grasp: Option<GraspState>,
         memory: &mut QueryMemory,
-    ) -> Result<Result<Answer, Failure>, Stop> {
+    ) -> Result<Result<RoadmapAnswer, Failure>, Stop> {
         let (roadmap, landmarks) = (self.roadmap, &self.roadmap.landmarks);
         let mut start = QueryEnd::new(search.start, start_grasp);
         let mut goal = QueryEnd::new(search.goal, goal_grasp);
@@ -193,11 +194,11 @@ impl<'a> RoadmapPlanner<'a> {
                 let path = self.route(&start, &goal, &mut memory.a_star);
                 n_expanded += memory.a_star.n_expanded();
                 let Some(path) = path else { break };
-                let Some(first) = start.prove(search, roadmap, path.iter().copied(), self.smooth) else {
+                let Some(first) = start.prove(search, roadmap, path.iter().copied(), self.links) else {
                     continue;
                 };
                 let rest = path[first.n_skipped..].iter().rev().copied();
-                let Some(last) = goal.prove(search, roadmap, rest, self.smooth) else {
+                let Some(last) = goal.prove(search, roadmap, rest, self.links) else {
                     continue;
                 };
                 let between = &path[first.n_skipped..path.len() - last.n_skipped];
@@ -216,7 +217,7 @@ impl<'a> RoadmapPlanner<'a> {
                     }
                 };
                 (plan.method, plan.settings) = ("roadmap".into(), settings_of(&self.settings));
-                return Ok(Ok(Answer { plan, links: [first, last] }));
+                return Ok(Ok(RoadmapAnswer { plan, links: [first, last] }));
             }
         }
         Ok(Err(match seen {
@@ -283,8 +284,8 @@ impl<'a> RoadmapPlanner<'a> {
             let edge = self.roadmap.index.edge_between(pair[0], pair[1])?;
             Passing::along(&self.model, graph, edge, pair[0])
         });
-        let mut recorder = Recorder::at(&self.model, to_first.start(), true);
-        if self.smooth {
+        let mut recorder = Recorder::at(&self.model, to_first.start(), Joins::TransfersInARow);
+        if self.links == LinkKind::Longest {
             let mut way = to_first;
             for edge in edges {
                 edge?.push_to(&mut way);
@@ -353,7 +354,7 @@ fn straighten(search: &mut Search, way: &mut Sequence) {
 impl GraspRoadmap {
     /// The roadmap with the ends of an answered query as new places, each linked by the motions found.
     #[must_use]
-    pub fn grown_by(self, answer: &Answer) -> Self {
+    pub fn grown_by(self, answer: &RoadmapAnswer) -> Self {
         let GraspRoadmap { mut about, graph, mut landmarks, .. } = self;
         let mut registry = Registry::new(graph);
         let before = (registry.graph().nodes.len(), registry.graph().edges.len());

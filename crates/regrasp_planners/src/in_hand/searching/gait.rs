@@ -159,7 +159,7 @@ fn bridge(search: &mut Search, trees: &mut [Tree; 2], growing: usize, node: usiz
     let state = tree.nodes[node].state();
     if spin::is_restricted(search.model(), state.holding) {
         // Hands that never change their grasp have to arrive by one transfer.
-        return if search.model().may_release { bridge_halfway(search, (tree, other), node, growing) } else { None };
+        return if search.model().may_release { bridge_halfway(search, tree, other, node, growing) } else { None };
     }
     let mut nearest = (f64::INFINITY, None);
     for (index, place) in other.places.iter().enumerate() {
@@ -177,7 +177,7 @@ fn bridge(search: &mut Search, trees: &mut [Tree; 2], growing: usize, node: usiz
 
 /// From a new node and from one of the other tree to a pose between them, and there from one grasp into the other: where soft
 /// fingertips leave the object few directions, transfers seldom arrive where the other tree is.
-fn bridge_halfway(search: &mut Search, (tree, other): (&Tree, &Tree), node: usize, growing: usize) -> Option<Sequence> {
+fn bridge_halfway(search: &mut Search, tree: &Tree, other: &Tree, node: usize, growing: usize) -> Option<Sequence> {
     let model = search.model();
     let state = tree.nodes[node].state();
     let n_seen = other.nodes.len().min(MEETINGS_LOOKED_AT);

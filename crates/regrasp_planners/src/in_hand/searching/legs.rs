@@ -1,6 +1,7 @@
 //! Legs: a query with way poses is planned pose by pose; the grasp with which one leg ends is where the next begins.
 
 use crate::in_hand::attempt::search::{Search, Stop};
+use crate::in_hand::regrasping::change::Arrival;
 use crate::in_hand::searching::shorten::shorten;
 use crate::in_hand::searching::{classic, gait, visibility};
 use crate::settings::Method;
@@ -65,6 +66,7 @@ fn plan_leg(search: &mut Search, start: Option<GraspState>, goal: Option<&GraspS
         Method::Visibility => visibility::build(search, start, goal)?,
         Method::Classic => classic::build(search, start, goal)?,
     };
-    shorten(search, &mut way, goal.is_none());
+    let at_end = if goal.is_none() { Arrival::AnyPosture } else { Arrival::Exact };
+    shorten(search, &mut way, at_end);
     Ok(way.with_transfers_joined())
 }

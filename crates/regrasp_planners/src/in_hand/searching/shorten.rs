@@ -13,10 +13,11 @@ fn cost(steps: &[Step]) -> (usize, usize) {
     (steps.len() - n_transfers, n_transfers)
 }
 
-/// Tries `settings.shortcuts` random shortcuts on `way`. `end_is_free` when any grasp will do at the end.
+/// Tries `settings.shortcuts` random shortcuts on `way`. `at_end` is what is asked of its end.
 ///
 /// A plan that is already there is never given up: the caller's limits only end the shortening.
-pub fn shorten(search: &mut Search, way: &mut Sequence, end_is_free: bool) {
+pub fn shorten(search: &mut Search, way: &mut Sequence, at_end: Arrival) {
+    let end_is_free = at_end == Arrival::AnyPosture;
     for _ in 0..search.settings.search.shortcuts {
         let n_steps = way.steps().len();
         if n_steps < 2 {

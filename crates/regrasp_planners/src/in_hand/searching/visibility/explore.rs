@@ -31,7 +31,7 @@ pub fn roadmap_of(
     local_method: LocalMethod,
 ) -> Result<Roadmap, Stop> {
     let mut roadmap = Roadmap::new();
-    let (first, second) = (roadmap.add_node(start.clone(), true), roadmap.add_node(goal.clone(), true));
+    let (first, second) = (roadmap.add_guard(start.clone()), roadmap.add_guard(goal.clone()));
     search.n_nodes = 2;
     let mut space = GraspSpace { search, local_method, stop: None };
     if let Some(link) = space.connect(start, goal) {

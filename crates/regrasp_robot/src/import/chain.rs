@@ -1,15 +1,27 @@
-//! The chain of a finger and its rest posture.
+//! The chain of a finger or an arm, and its rest posture.
 
-use super::spec::{Carried, FingerSpec};
-use crate::coupling::{Coupling, LinearLimit};
+use super::spec::Carried;
+use crate::coupling::{Coupling, limit_leaders};
 use crate::hand::MAX_FINGER_JOINTS;
 use crate::kinematics::chain::{Chain, ChainJoint, Motion};
 use crate::kinematics::finger_ik::MAX_COORDINATES;
 use crate::kinematics::motion_bound::MAX_JOINTS;
 use crate::robot::{JointId, JointKind, LinkId, Robot};
-use regrasp_base::Diagnostic;
 use regrasp_base::diagnostic::{Diagnostics, did_you_mean, number};
+use regrasp_base::{Diagnostic, Place};
 use std::collections::BTreeMap;
+
+/// What a chain is made for, for messages.
+pub(super) struct ChainOwner<'a> {
+    /// `finger` or `arm`.
+    pub kind: &'static str,
+    /// Its name.
+    pub name: &'a str,
+    /// Where the file describes it.
+    pub place: &'a Place,
+    /// The key that states its posture.
+    pub rest_key: &'static str,
+}
 
 /// The serial chain over `joints`, with followers folded into their leaders' coordinates.
 ///
@@ -17,7 +29,7 @@ use std::collections::BTreeMap;
 /// (`U222`).
 pub(super) fn make_chain(
     robot: &Robot,
-    spec: &FingerSpec,
+    owner: &ChainOwner,
     joints: &[JointId],
     carried: &BTreeMap<LinkId, Carried>,
     found: &mut Diagnostics,
@@ -26,15 +38,19 @@ pub(super) fn make_chain(
     if independent.len() > MAX_COORDINATES || joints.len() > MAX_FINGER_JOINTS {
         let problem = format!("has {} joints, {} of them independent", joints.len(), independent.len());
         let expected = format!("at most {MAX_FINGER_JOINTS} joints, at most {MAX_COORDINATES} of them independent");
-        let diagnostic = Diagnostic::new("U222", spec.place.clone(), problem).element("finger", &spec.name);
-        found.push(diagnostic.expected(expected).fix("first_joint = \"...\" holds the joints before it"));
+        let diagnostic = Diagnostic::new("U222", owner.place.clone(), problem).element(owner.kind, owner.name);
+        let fix = match owner.kind {
+            "finger" => "first_joint = \"...\" holds the joints before it",
+            _ => "base_link = \"...\", a link farther along; joints above it are common",
+        };
+        found.push(diagnostic.expected(expected).fix(fix));
         return None;
     }
     let n_terms: usize =
         joints.iter().map(|joint| robot.joints[joint.0].coupling.as_ref().map_or(1, |own| own.terms.len())).sum();
     if n_terms > MAX_JOINTS {
         let problem = format!("has joints that follow {n_terms} others in all, counting independent joints once");
-        let diagnostic = Diagnostic::new("U222", spec.place.clone(), problem).element("finger", &spec.name);
+        let diagnostic = Diagnostic::new("U222", owner.place.clone(), problem).element(owner.kind, owner.name);
         found.push(
             diagnostic.expected(format!("at most {MAX_JOINTS}")).fix("terms with fewer leaders in [[couplings]]"),
         );
@@ -60,15 +76,16 @@ pub(super) fn make_chain(
                 joint.name, robot.joints[leader.0].name
             );
             found.push(
-                Diagnostic::new("U209", spec.place.clone(), problem)
-                    .element("finger", &spec.name)
+                Diagnostic::new("U209", owner.place.clone(), problem)
+                    .element(owner.kind, owner.name)
                     .expected("followers on the chain of the joint they follow"),
             );
             complete = false;
             continue;
         };
         if let (Some(_), Some(limits)) = (&joint.coupling, joint.limits) {
-            limit_leaders(&joint.name, &drive, [limits.lower, limits.upper], (&mut lower, &mut upper), &mut linear);
+            let own = [limits.lower, limits.upper];
+            linear.extend(limit_leaders(&joint.name, &drive, own, (&mut lower, &mut upper)));
         }
         let parent = carried.get(&joint.parent)?;
         chain_joints.push(ChainJoint {
@@ -82,8 +99,8 @@ pub(super) fn make_chain(
         if lower[k] > upper[k] {
             let problem = format!("the joints that follow joint \"{name}\" leave it no position");
             found.push(
-                Diagnostic::new("U143", spec.place.clone(), problem)
-                    .element("finger", &spec.name)
+                Diagnostic::new("U143", owner.place.clone(), problem)
+                    .element(owner.kind, owner.name)
                     .expected("limits that overlap"),
             );
             complete = false;
@@ -92,34 +109,28 @@ pub(super) fn make_chain(
     complete.then(|| Chain::new(chain_joints, names, lower, upper).with_linear_limits(linear))
 }
 
-/// Narrows the limits of coordinates to those of a joint that follows them: one leader's own, or the limit of a sum.
-pub(super) fn limit_leaders(
-    name: &str,
-    drive: &Coupling<usize>,
-    limits: [f64; 2],
-    (lower, upper): (&mut [f64], &mut [f64]),
-    linear: &mut Vec<LinearLimit>,
-) {
-    let Some((coordinate, multiplier)) = drive.single() else {
-        linear.push(LinearLimit::new(name.to_owned(), drive, limits));
-        return;
-    };
-    let ends = limits.map(|position| (position - drive.offset) / multiplier);
-    lower[coordinate] = lower[coordinate].max(ends[0].min(ends[1]));
-    upper[coordinate] = upper[coordinate].min(ends[0].max(ends[1]));
-}
-
-/// The rest posture that `spec` asks for, in the middle of the limits where it says nothing.
-///
-/// Reports: unknown joints (`U205`), positions outside the limits (`U212`).
-pub(super) fn rest_posture(spec: &FingerSpec, chain: &Chain, found: &mut Diagnostics) -> Vec<f64> {
-    let mut rest: Vec<f64> = (0..chain.n_coordinates())
+/// The middle of the limits; 0 for coordinates without limits.
+pub(super) fn middle_of_limits(chain: &Chain) -> Vec<f64> {
+    (0..chain.n_coordinates())
         .map(|k| {
             let (lower, upper) = (chain.lower[k], chain.upper[k]);
             if lower.is_finite() && upper.is_finite() { 0.5 * (lower + upper) } else { 0.0 }
         })
-        .collect();
-    for (name, value, place) in &spec.rest {
+        .collect()
+}
+
+/// The posture that `stated` asks for by name of joint, each with its place; `otherwise` where it says nothing.
+///
+/// Reports: unknown joints (`U205`), positions outside the limits (`U212`), limits that leave no posture (`U143`).
+pub(super) fn rest_posture(
+    owner: &ChainOwner,
+    stated: &[(String, f64, Place)],
+    chain: &Chain,
+    otherwise: Vec<f64>,
+    found: &mut Diagnostics,
+) -> Vec<f64> {
+    let mut rest = otherwise;
+    for (name, value, place) in stated {
         let Some(k) = chain.names.iter().position(|other| other == name) else {
             if found.counted_only() {
                 continue;
@@ -129,9 +140,9 @@ pub(super) fn rest_posture(spec: &FingerSpec, chain: &Chain, found: &mut Diagnos
                 Diagnostic::new(
                     "U205",
                     place.clone(),
-                    format!("finger \"{}\" has no independent joint \"{name}\"", spec.name),
+                    format!("{} \"{}\" has no independent joint \"{name}\"", owner.kind, owner.name),
                 )
-                .element("key", "rest")
+                .element("key", owner.rest_key)
                 .expected(format!("one of {}", chain.names.join(", ")))
                 .fix(meant.map_or(String::new(), |meant| format!("did you mean {meant}?"))),
             );
@@ -142,7 +153,7 @@ pub(super) fn rest_posture(spec: &FingerSpec, chain: &Chain, found: &mut Diagnos
                 Diagnostic::new(
                     "U212",
                     place.clone(),
-                    format!("rest position {} is outside the limits", number(*value)),
+                    format!("{} position {} is outside the limits", owner.rest_key, number(*value)),
                 )
                 .element("joint", name)
                 .expected(format!("{}..{}", number(chain.lower[k]), number(chain.upper[k]))),
@@ -154,16 +165,18 @@ pub(super) fn rest_posture(spec: &FingerSpec, chain: &Chain, found: &mut Diagnos
     if chain.within_linear_limits(&rest, 0.0) {
         return rest;
     }
-    let named = |k: usize| spec.rest.iter().find(|(name, _, _)| *name == chain.names[k]);
+    let named = |k: usize| stated.iter().find(|(name, _, _)| *name == chain.names[k]);
     for limit in chain.linear_limits.iter().filter(|limit| limit.room(&rest) < 0.0) {
         // A posture that the file states is kept or refused, never changed.
         if let Some((_, _, place)) = limit.terms.iter().find_map(|(k, _)| named(*k)) {
-            let problem =
-                format!("the rest posture takes joint \"{}\", which follows, outside its limits", limit.joint);
+            let problem = format!(
+                "the {} posture takes joint \"{}\", which follows, outside its limits",
+                owner.rest_key, limit.joint
+            );
             let leaders: Vec<&str> = limit.terms.iter().map(|(k, _)| chain.names[*k].as_str()).collect();
             found.push(
                 Diagnostic::new("U212", place.clone(), problem)
-                    .element("finger", &spec.name)
+                    .element(owner.kind, owner.name)
                     .expected(format!("positions of {} within the limits of their follower", leaders.join(", "))),
             );
             return rest;
@@ -172,7 +185,7 @@ pub(super) fn rest_posture(spec: &FingerSpec, chain: &Chain, found: &mut Diagnos
     let kept = chain.bring_within_limits(&rest);
     if kept.is_none() {
         let problem = "the limits of joints that follow several others leave no posture";
-        let diagnostic = Diagnostic::new("U143", spec.place.clone(), problem).element("finger", &spec.name);
+        let diagnostic = Diagnostic::new("U143", owner.place.clone(), problem).element(owner.kind, owner.name);
         found.push(diagnostic.expected("limits that overlap"));
     }
     kept.unwrap_or(rest)

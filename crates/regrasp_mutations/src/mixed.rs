@@ -3,13 +3,13 @@
 use super::Breeder;
 use super::choice::pick;
 use super::tracking::turn;
-use crate::check::continuity::moving_finger;
-use crate::check::model::Model;
-use crate::check::violation::ViolationKind::{
+use regrasp_base::Rng;
+use regrasp_plan::check::continuity::moving_finger;
+use regrasp_plan::check::model::Model;
+use regrasp_plan::check::violation::ViolationKind::{
     ContactOffTip, ObjectMovesInRegrasp, RelativeMotionMissing, SegmentsDoNotMeet, WrongContactMode,
 };
-use crate::plan::{ContactMode, ContactState, Plan, SegmentKind};
-use regrasp_base::Rng;
+use regrasp_plan::plan::{ContactMode, ContactState, Plan, SegmentKind};
 
 impl Breeder<'_> {
     pub(super) fn break_mixed(&mut self) {

@@ -2,15 +2,15 @@
 
 use super::Breeder;
 use super::choice::{any_drive, any_waypoint, pick, pick_waypoint, waypoints_mut};
-use crate::check::between::Between;
-use crate::check::model::Model;
-use crate::check::violation::ViolationKind::{
+use regrasp_base::Rng;
+use regrasp_geometry::Vector;
+use regrasp_plan::check::between::Between;
+use regrasp_plan::check::model::Model;
+use regrasp_plan::check::violation::ViolationKind::{
     ContactOffTip, JointAcceleration, JointTooFast, NotANumber, PromiseBroken, TimeOrder, TooFast,
     VelocityInconsistent, WrongScene,
 };
-use crate::plan::{ContactMode, Plan, Segment, SegmentKind, Waypoint};
-use regrasp_base::Rng;
-use regrasp_geometry::Vector;
+use regrasp_plan::plan::{ContactMode, Plan, Segment, SegmentKind, Waypoint};
 
 impl Breeder<'_> {
     pub(super) fn break_times(&mut self) {

@@ -1,18 +1,19 @@
 //! Fingers that are free, and fingers that are said to be.
 
+use super::Breeder;
 use super::choice::{pick, pick_waypoint, places, waypoints_mut};
-use super::{Breeder, move_tip};
-use crate::check::closure::{Body, margin};
-use crate::check::continuity::{contact_of, is_free_throughout};
-use crate::check::model::Model;
-use crate::check::surface;
-use crate::check::violation::ViolationKind::{
-    ClosureLost, Collision, ContactOffTip, WrongContactMode, WrongMovingFinger,
-};
-use crate::plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
+use super::edit::move_tip;
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp::Grip;
+use regrasp_plan::check::closure::{Body, margin};
+use regrasp_plan::check::continuity::{contact_of, is_free_throughout};
+use regrasp_plan::check::model::Model;
+use regrasp_plan::check::surface;
+use regrasp_plan::check::violation::ViolationKind::{
+    ClosureLost, Collision, ContactOffTip, WrongContactMode, WrongMovingFinger,
+};
+use regrasp_plan::plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
 use regrasp_scene::Manipulation;
 
 impl Breeder<'_> {

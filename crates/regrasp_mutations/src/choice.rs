@@ -1,8 +1,8 @@
 //! Where plans are damaged: random segments, waypoints, fingers and joints. None where there is nothing to choose from.
 
-use crate::check::model::{DriveRow, Model};
-use crate::plan::{Plan, Segment, SegmentKind, Waypoint};
 use regrasp_base::Rng;
+use regrasp_plan::check::model::{DriveRow, Model};
+use regrasp_plan::plan::{Plan, Segment, SegmentKind, Waypoint};
 
 /// A random one of `items`.
 pub(super) fn pick<'a, T>(items: &'a mut [T], rng: &mut Rng) -> Option<&'a mut T> {

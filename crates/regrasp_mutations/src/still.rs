@@ -1,12 +1,12 @@
 //! Plans in which the object turns though nothing drives it: the joints stand still, and everything but slip is right.
 
 use super::Breeder;
-use crate::check::continuity::contact_of;
-use crate::check::rolling::Roll;
-use crate::check::violation::ViolationKind::Slip;
-use crate::plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
 use nalgebra::UnitQuaternion;
 use regrasp_geometry::{Pose, Shape, Vector};
+use regrasp_plan::check::continuity::contact_of;
+use regrasp_plan::check::rolling::Roll;
+use regrasp_plan::check::violation::ViolationKind::Slip;
+use regrasp_plan::plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
 use regrasp_robot::ContactModel;
 
 /// Slip of a segment of the plans made here, as a share of the slip that a segment may have.
@@ -32,7 +32,7 @@ impl Breeder<'_> {
 
     /// The plan of hard fingertips, which may turn about the normals, in a hand of soft ones, which resist it.
     fn break_softness(&mut self) {
-        let limit = 5.0 * crate::check::CheckSettings::default().largest_slip;
+        let limit = 5.0 * regrasp_plan::check::CheckSettings::default().largest_slip;
         let twists: Vec<f64> = (0..self.model.fingers.len()).map(|f| self.twist_of(f)).collect();
         self.add_hand("fingertips that turn about the normal are soft", &[Slip], |hand, rng| {
             let torsion_radius = rng.uniform(0.004, 0.01);

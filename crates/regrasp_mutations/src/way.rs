@@ -1,10 +1,11 @@
 //! Way poses that are not passed, or not as the plan says.
 
+use super::Breeder;
 use super::choice::{pick, pick_waypoint, swap_two_that};
-use super::{Breeder, shift};
-use crate::check::continuity::pose_difference;
-use crate::check::violation::ViolationKind::WayPoseMissed;
-use crate::plan::SegmentKind;
+use super::edit::shift;
+use regrasp_plan::check::continuity::pose_difference;
+use regrasp_plan::check::violation::ViolationKind::WayPoseMissed;
+use regrasp_plan::plan::SegmentKind;
 
 impl Breeder<'_> {
     pub(super) fn break_way(&mut self) {

@@ -2,17 +2,17 @@
 
 use super::choice::{any_drive, any_segment, any_waypoint, pick, waypoints, waypoints_mut};
 use super::{Breeder, Mutant};
-use crate::check::continuity::{contact_of, moving_finger};
-use crate::check::forces::torques_of;
-use crate::check::model::Model;
-use crate::check::violation::ViolationKind::{
-    ForceMissing, ForceOutsideCone, ForceUnbalanced, FrictionAboveScene, MovingFingerPresses, NormalForceOutOfRange,
-    NotANumber, PromiseBroken, TorqueLimit, TorqueWrong, WrongScene,
-};
-use crate::plan::{ContactState, ForcePromises, Plan, SegmentKind, Waypoint};
 use regrasp_base::Rng;
 use regrasp_geometry::{Pose, UnitVector, Vector};
 use regrasp_grasp::ContactModel;
+use regrasp_plan::check::continuity::{contact_of, moving_finger};
+use regrasp_plan::check::forces::torques_of;
+use regrasp_plan::check::model::Model;
+use regrasp_plan::check::violation::ViolationKind::{
+    ForceMissing, ForceOutsideCone, ForceUnbalanced, FrictionAboveScene, MovingFingerPresses, NormalForceOutOfRange,
+    NotANumber, PromiseBroken, TorqueLimit, TorqueWrong, WrongScene,
+};
+use regrasp_plan::plan::{ContactState, ForcePromises, Plan, SegmentKind, Waypoint};
 use regrasp_scene::Gravity;
 
 impl Breeder<'_> {

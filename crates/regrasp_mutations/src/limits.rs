@@ -2,11 +2,13 @@
 
 use super::Breeder;
 use super::choice::{any_drive, waypoints_mut};
-use crate::check::allowance::friction_margin;
-use crate::check::violation::ViolationKind::{ForcesAbsent, FrictionMarginTooSmall, LimitExceeded, PromiseBroken};
-use crate::plan::Plan;
 use regrasp_base::Rng;
 use regrasp_geometry::Vector;
+use regrasp_plan::check::allowance::friction_margin;
+use regrasp_plan::check::violation::ViolationKind::{
+    ForcesAbsent, FrictionMarginTooSmall, LimitExceeded, PromiseBroken,
+};
+use regrasp_plan::plan::Plan;
 
 impl Breeder<'_> {
     pub(super) fn break_limits(&mut self) {

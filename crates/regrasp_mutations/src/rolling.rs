@@ -1,18 +1,19 @@
 //! Fingertips that roll, and fingertips that are said to.
 
+use super::Breeder;
 use super::choice::{pick, places};
-use super::{Breeder, move_tip};
-use crate::check::continuity::contact_of;
-use crate::check::model::Model;
-use crate::check::patch::Patch;
-use crate::check::surface;
-use crate::check::tip::TipSurface;
-use crate::check::violation::ViolationKind::{
-    ContactOffSurface, ContactOffTip, GraspChanges, PromiseBroken, Slip, WrongContactMode,
-};
-use crate::plan::{ContactMode, Plan, Segment, SegmentKind, Waypoint};
+use super::edit::move_tip;
 use regrasp_base::Rng;
 use regrasp_geometry::{Pose, Shape, UnitVector, Vector};
+use regrasp_plan::check::continuity::contact_of;
+use regrasp_plan::check::model::Model;
+use regrasp_plan::check::patch::Patch;
+use regrasp_plan::check::surface;
+use regrasp_plan::check::tip::TipSurface;
+use regrasp_plan::check::violation::ViolationKind::{
+    ContactOffSurface, ContactOffTip, GraspChanges, PromiseBroken, Slip, WrongContactMode,
+};
+use regrasp_plan::plan::{ContactMode, Plan, Segment, SegmentKind, Waypoint};
 
 impl Breeder<'_> {
     pub(super) fn break_rolling(&mut self) {
@@ -162,7 +163,7 @@ fn arc_between(model: &Model, f: usize, from: &Waypoint, to: &Waypoint) -> Optio
     let normal = contact_of(&from.contacts[f])?.normal_in_object.into_inner();
     let [before, after] = [from, to].map(|waypoint| {
         let world_from_link =
-            crate::check::kinematics::pose_of(&model.fingers[f].path.world_from_link(&waypoint.joints));
+            regrasp_plan::check::kinematics::pose_of(&model.fingers[f].path.world_from_link(&waypoint.joints));
         Pose::from(&waypoint.world_from_object).rotation.inverse() * world_from_link.rotation
     });
     let turn = (after * before.inverse()).scaled_axis();

@@ -2,10 +2,12 @@
 
 use super::Breeder;
 use super::choice::{any_waypoint, waypoints, waypoints_mut};
-use crate::check::continuity::contact_of;
-use crate::check::violation::ViolationKind::{ClosureLost, ContactOffPad, ContactOffTip, JointLimit, WrongScene};
-use crate::plan::{SegmentKind, Waypoint};
 use regrasp_geometry::{Pose, UnitVector, Vector};
+use regrasp_plan::check::continuity::contact_of;
+use regrasp_plan::check::violation::ViolationKind::{
+    ClosureLost, ContactOffPad, ContactOffTip, JointLimit, WrongScene,
+};
+use regrasp_plan::plan::{SegmentKind, Waypoint};
 use regrasp_robot::ContactModel;
 use regrasp_robot::tip::Pad;
 use std::sync::Arc;

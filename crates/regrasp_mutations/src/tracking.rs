@@ -1,22 +1,23 @@
 //! Tracking gone wrong: modes, relative velocities, friction of what slides, roles, reach and goal.
 
 use super::choice::{any_segment, pick, places, waypoints_mut};
+use super::edit::move_tip;
 use super::rolling::{declare, slide};
-use super::{Breeder, Mutant, move_tip};
-use crate::check::continuity::{contact_of, pose_difference};
-use crate::check::model::Model;
-use crate::check::surface;
-use crate::check::tracking::{may_move, named_fingers};
-use crate::check::violation::ViolationKind::{
+use super::{Breeder, Mutant};
+use nalgebra::Rotation3;
+use regrasp_base::Rng;
+use regrasp_geometry::{Pose, Vector};
+use regrasp_plan::check::continuity::{contact_of, pose_difference};
+use regrasp_plan::check::model::Model;
+use regrasp_plan::check::surface;
+use regrasp_plan::check::tracking::{may_move, named_fingers};
+use regrasp_plan::check::violation::ViolationKind::{
     self, Collision, ContactModeWrong, ContactNormalWrong, ContactOffTip, GoalMismatch, GraspChanges, JointJump,
     OutOfReach, PromiseBroken, RelativeMotionMissing, RelativeVelocityWrong, SlidingForceWrong, Slip, StartMismatch,
     WrongContactMode, WrongMovingFinger, WrongRollingFinger, WrongScene,
 };
-use crate::plan::ContactMode::{self, Fixed, PureRolling, PureSliding, Rolling, Sliding, Twisting};
-use crate::plan::{ContactState, Plan, PoseData, Segment, SegmentKind, TrackingPromises, Waypoint};
-use nalgebra::Rotation3;
-use regrasp_base::Rng;
-use regrasp_geometry::{Pose, Vector};
+use regrasp_plan::plan::ContactMode::{self, Fixed, PureRolling, PureSliding, Rolling, Sliding, Twisting};
+use regrasp_plan::plan::{ContactState, Plan, PoseData, Segment, SegmentKind, TrackingPromises, Waypoint};
 use regrasp_robot::{ContactModel, TipShape};
 
 /// What a contact must really do in a segment for a claim to be wrong; none where it is wrong whatever it does.
@@ -411,7 +412,7 @@ impl Breeder<'_> {
     }
 
     fn break_reach(&mut self) {
-        let far = |finger: &crate::check::model::FingerModel| {
+        let far = |finger: &regrasp_plan::check::model::FingerModel| {
             let distance = |w: &Waypoint| (finger.center_in_world(&w.joints) - finger.center_at_rest).norm();
             self.plan.segments.iter().flat_map(|s| &s.waypoints).map(distance).fold(0.0, f64::max)
         };
@@ -445,7 +446,7 @@ fn is_all(segment: &Segment, f: usize, mode: ContactMode) -> bool {
 /// turns from waypoint to waypoint.
 fn does_it(model: &Model, segment: &Segment, f: usize, does: Does, slip_tolerance: f64) -> bool {
     let seen = |waypoint: &Waypoint| {
-        let link = crate::check::kinematics::pose_of(&model.fingers[f].path.world_from_link(&waypoint.joints));
+        let link = regrasp_plan::check::kinematics::pose_of(&model.fingers[f].path.world_from_link(&waypoint.joints));
         Pose::from(&waypoint.world_from_object).rotation.inverse() * link.rotation
     };
     // Least turn that no tolerance covers, in radians.

@@ -1,0 +1,12 @@
+//! The checker rejects every mutant. The good plans are those of the checker's own tests.
+#![allow(dead_code)]
+
+#[path = "../../../regrasp_plan/tests/it/loaded.rs"]
+mod loaded;
+mod mutation;
+#[path = "../../../regrasp_plan/tests/it/rolled.rs"]
+mod rolled;
+#[path = "../../../regrasp_plan/tests/it/sample.rs"]
+mod sample;
+#[path = "../../../regrasp_plan/tests/it/tracked.rs"]
+mod tracked;
