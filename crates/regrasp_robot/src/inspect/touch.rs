@@ -106,7 +106,7 @@ impl<'h> Touch<'h> {
         self.shape_pairs.iter().map(|pairs| pairs.iter().any(touches)).collect()
     }
 
-    /// Per pair, in how many of `n_postures` postures, uniform in the limits, it touches.
+    /// Per pair, in how many of `n_postures` postures, uniform in the limits of joints and brought within those of sums, it touches.
     pub fn count(&self, n_postures: usize, rng: &mut Rng) -> Vec<usize> {
         let mut counts = vec![0; self.pairs.len()];
         for _ in 0..n_postures {
@@ -117,7 +117,8 @@ impl<'h> Touch<'h> {
                 .map(|finger| {
                     let ends = finger.chain.lower.iter().zip(&finger.chain.upper);
                     let finite = |end: f64| if end.is_finite() { end } else { PI.copysign(end) };
-                    ends.map(|(&low, &high)| rng.uniform(finite(low), finite(high))).collect()
+                    let drawn: Vec<f64> = ends.map(|(&low, &high)| rng.uniform(finite(low), finite(high))).collect();
+                    finger.chain.bring_within_limits(&drawn).unwrap_or(drawn)
                 })
                 .collect();
             for (count, touches) in counts.iter_mut().zip(self.touching(&posture)) {
