@@ -131,9 +131,7 @@ impl Tally {
             .map(|(&reason, &count)| Cause {
                 reason: match reason {
                     Reason::NoContact(f) => format!("finger \"{}\" found no contact within its reach", finger_name(f)),
-                    Reason::NotClosed => {
-                        "found no grasp in which the other fingers still hold the object after one lifts".into()
-                    }
+                    Reason::NotClosed => "found no grasp that still holds the object after one finger lifts".into(),
                     Reason::NoWayOver => "found no collision-free path for the fingers to the next grasp".into(),
                     Reason::Bound(f) => {
                         format!(
