@@ -365,7 +365,7 @@ class Scene:
         return self.query().goal
 
     def query(self, seed: int = 0, *, task: str | None = None) -> Query:
-        """What is asked with `seed`, by the task called `task` or the first. Raises `InputError` (A508) for an unknown task."""
+        """What is asked with `seed`, by the task called `task` or the first. Raises `InputError` (A510) for an unknown task."""
         fields = json.loads(self._native.query(seed_of("Scene.query", seed), task))
         way = tuple(pose_of(entry) for entry in fields["way"])
         return Query(pose_of(fields["start"]), way, pose_of(fields["goal"]))
