@@ -91,5 +91,6 @@ fn who_moves(task: &Manipulation) -> Option<(String, String)> {
         scene.objects.iter().map(|object| &object.name).enumerate().filter(|(index, _)| *index != task.object_index);
     let resting: Vec<&str> = hands.chain(objects).map(|(_, name)| name.as_str()).collect();
     let [hand, object] = [&task.placed_hand().name, &task.object().name];
-    (!resting.is_empty()).then(|| ("Moves".to_owned(), format!("{hand} moves {object}; {} at rest", resting.join(", "))))
+    (!resting.is_empty())
+        .then(|| ("Moves".to_owned(), format!("{hand} moves {object}; {} at rest", resting.join(", "))))
 }
