@@ -28,3 +28,15 @@ pub fn guarded<T>(py: Python<'_>, work: impl FnOnce() -> PyResult<T>) -> PyResul
         Err(error::internal(py, &heard.or(said).unwrap_or_else(|| "a panic without a message".into())))
     })
 }
+
+/// Panics, on this thread or on a search thread: for tests that nothing gets past the border.
+#[pyfunction]
+#[pyo3(name = "_panic_for_tests", signature = (message, *, in_search=false))]
+pub fn panic_for_tests(py: Python<'_>, message: &str, in_search: bool) -> PyResult<()> {
+    guarded(py, || {
+        if in_search {
+            return crate::search::watched(py, None, |_, _| panic!("{message}"));
+        }
+        panic!("{message}")
+    })
+}

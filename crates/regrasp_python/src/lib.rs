@@ -7,8 +7,6 @@
 mod describe;
 /// Rust errors as Python exceptions.
 mod error;
-/// A panic on purpose.
-mod for_tests;
 /// No panic crosses the border.
 mod guard;
 /// Hands and scenes, read.
@@ -25,7 +23,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _regrasp {
     #[pymodule_export]
-    use super::for_tests::panic_for_tests;
+    use super::guard::panic_for_tests;
     #[pymodule_export]
     use super::model::{Hand, Scene};
     #[pymodule_export]
