@@ -150,10 +150,7 @@ class Hand:
         self.world_from_base: Pose = pose_of(fields["world_from_base"])
         self.joints: tuple[Joint, ...] = tuple(_joint(entry) for entry in fields["joints"])
         """Independent joints, finger by finger: the order of every joint vector."""
-        self.coupled_joints: tuple[CoupledJoint, ...] = tuple(
-            CoupledJoint(**{**entry, "others": tuple((name, factor) for name, factor in entry["others"])})
-            for entry in fields["coupled_joints"]
-        )
+        self.coupled_joints: tuple[CoupledJoint, ...] = tuple(_coupled_joint(entry) for entry in fields["coupled_joints"])
         self.fingers: tuple[Finger, ...] = tuple(_finger(entry) for entry in fields["fingers"])
         """Fingers, in the order of every contact list."""
         self.notes: tuple[str, ...] = tuple(fields.get("notes", ()))
@@ -213,6 +210,11 @@ def _joint(fields: Mapping[str, Any]) -> Joint:
     )
 
 
+def _coupled_joint(fields: Mapping[str, Any]) -> CoupledJoint:
+    made: dict[str, Any] = {**fields, "others": tuple((name, factor) for name, factor in fields["others"])}
+    return CoupledJoint(**made)
+
+
 def _finger(fields: Mapping[str, Any]) -> Finger:
     return Finger(fields["name"], tuple(fields["joint_names"]), Tip(**fields["tip"]), tuple(fields["rest"]))
 
@@ -237,7 +239,7 @@ class Object:
 
 
 def _object(fields: Mapping[str, Any]) -> Object:
-    made = {
+    made: dict[str, Any] = {
         **fields,
         "shape": _shape(fields["shape"]),
         "center_of_mass": _constant(fields["center_of_mass"]),
@@ -365,7 +367,7 @@ class Scene:
         return self.query().goal
 
     def query(self, seed: int = 0, *, task: str | None = None) -> Query:
-        """What is asked with `seed`, by the task called `task` or the first. Raises `InputError` (A508) for an unknown task."""
+        """What is asked with `seed`, by the task called `task` or the first. Raises `InputError` (A510) for an unknown task."""
         fields = json.loads(self._native.query(seed_of("Scene.query", seed), task))
         way = tuple(pose_of(entry) for entry in fields["way"])
         return Query(pose_of(fields["start"]), way, pose_of(fields["goal"]))

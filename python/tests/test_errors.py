@@ -156,4 +156,4 @@ def test_what_python_passes_is_never_a_panic(scene: regrasp.Scene) -> None:
     with pytest.raises(TypeError):
         _regrasp.Plan()  # type: ignore[call-arg]
     with pytest.raises(regrasp.InputError):
-        scene._native.tips(b"123")
+        scene._native.tips(0, b"123")

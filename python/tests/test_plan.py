@@ -29,12 +29,20 @@ def test_the_same_bytes_as_the_command_line(regrasp_cli, tmp_path: Path, scene: 
 def test_arrays_say_what_the_file_says(plan: regrasp.Plan) -> None:
     file = json.loads(plan.to_json())
     waypoints = [waypoint for segment in file["segments"] for waypoint in segment["waypoints"]]
+    assert [(hand["name"], hand["fingers"], hand["joint_names"]) for hand in file["hands"]] == [
+        (plan.hand, list(plan.fingers), list(plan.joint_names))
+    ]
+    assert file["objects"] == [plan.object]
+    # Free fingers have no entry.
+    free = {"mode": "free"}
+    touching = [{contact["finger"]: contact for contact in w["contacts"]} for w in waypoints]
+    contacts = [[named.get(finger, free) for finger in plan.fingers] for named in touching]
     n, j, f = len(waypoints), len(plan.joint_names), len(plan.fingers)
     np.testing.assert_array_equal(plan.times, [w["time"] for w in waypoints])
     np.testing.assert_array_equal(plan.joints, [w["joints"] for w in waypoints])
     np.testing.assert_array_equal(plan.joint_velocities, [w["joint_velocities"] for w in waypoints])
-    np.testing.assert_array_equal(plan.object_positions, [w["world_from_object"]["position"] for w in waypoints])
-    np.testing.assert_array_equal(plan.object_quat_xyzw, [w["world_from_object"]["quat_xyzw"] for w in waypoints])
+    np.testing.assert_array_equal(plan.object_positions, [w["world_from_objects"][0]["position"] for w in waypoints])
+    np.testing.assert_array_equal(plan.object_quat_xyzw, [w["world_from_objects"][0]["quat_xyzw"] for w in waypoints])
     torques = [w.get("joint_torques") for w in waypoints]
     if plan.joint_torques is None:
         assert torques == [None] * n
@@ -46,16 +54,17 @@ def test_arrays_say_what_the_file_says(plan: regrasp.Plan) -> None:
         ("normal_in_object", plan.contact_normals_in_object),
         ("force_in_object", plan.contact_forces_in_object),
     ]:
-        expected = [[contact.get(name) or nan for contact in w["contacts"]] for w in waypoints]
+        expected = [[contact.get(name) or nan for contact in row] for row in contacts]
         np.testing.assert_array_equal(array, expected)
-    torsions = [[contact.get("torsion", np.nan) for contact in w["contacts"]] for w in waypoints]
+    torsions = [[contact.get("torsion", np.nan) for contact in row] for row in contacts]
     np.testing.assert_array_equal(plan.contact_torsions, torsions)
-    modes = [[contact["mode"] for contact in w["contacts"]] for w in waypoints]
+    modes = [[contact["mode"] for contact in row] for row in contacts]
     assert [[regrasp.CONTACT_MODES[mode] for mode in row] for row in plan.contact_modes] == modes
     assert plan.joints.shape == (n, j) and plan.contact_points_in_object.shape == (n, f, 3)
     for segment, entry in zip(plan.segments, file["segments"], strict=True):
-        assert (segment.kind, segment.moving_finger) == (entry["kind"], entry.get("moving_finger"))
-        assert (segment.also_moving, segment.rolling_finger) == (tuple(entry.get("also_moving", ())), entry.get("rolling_finger"))
+        assert (segment.kind, segment.moving) == (entry["kind"], tuple(entry.get("moving", ())))
+        assert segment.rolling_finger == entry.get("rolling_finger")
+        assert entry["held_by"] == {plan.object: list(segment.held_by)}
         assert plan.times[segment.slice].tolist() == [w["time"] for w in entry["waypoints"]]
     assert all(plan.segments[s].start <= k < plan.segments[s].stop for k, s in enumerate(plan.segment_of_waypoint))
     for name in ("promises", "statistics", "settings", "seed", "method", "tool"):

@@ -65,7 +65,7 @@ impl Scene {
         read(&self.path, &self.options, self.gravity.as_ref())
     }
 
-    /// The task of this name; the first where none is asked for. Errors: there is none of that name (`A508`).
+    /// The task of this name; the first where none is asked for. Errors: there is none of that name (`A510`).
     pub fn task(&self, py: Python<'_>, name: Option<&str>) -> PyResult<&Task> {
         let Some(name) = name else { return Ok(self.loaded.task()) };
         self.loaded.task_named(name).ok_or_else(|| {

@@ -7,7 +7,7 @@ use crate::state::State;
 use regrasp_geometry::Pose;
 use regrasp_geometry::collision::MeshBody;
 use regrasp_geometry::shape::PlacedShape;
-use regrasp_robot::{Hand, JointKind, LinkId, Manipulator};
+use regrasp_robot::{Hand, JointKind, LinkId, Manipulator, Part};
 
 /// One hand and the object that it manipulates. All else of the scene rests in `state`.
 #[derive(Debug, Clone, Copy)]
@@ -100,6 +100,17 @@ impl<'a> Manipulation<'a> {
                 mesh_body: None,
             });
         }
+    }
+}
+
+/// Whether a link of the tree that a hand is made from moves with the hand: it is below the hand's first link, or of the robot
+/// that carries it and with no moving joint between it and the hand's base. Of a hand that stands by itself all links do.
+pub fn is_of_hand(scene: &Scene, hand: usize, link: LinkId) -> bool {
+    let Some(carrier) = scene.hands[hand].carrier else { return true };
+    let robot = &scene.robots[carrier.robot];
+    match robot.part_of(link) {
+        Part::Hand(owner) => owner == carrier.hand,
+        Part::Arm(_) | Part::Common => is_rigid_with_hand(robot, carrier.hand, link),
     }
 }
 

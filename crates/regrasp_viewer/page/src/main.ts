@@ -7,6 +7,7 @@ import { button, el, icon } from "./dom";
 import { keepLink, readLink } from "./link";
 import { Motion, still } from "./motion";
 import { OrientationPath } from "./orientation_path";
+import { planOf } from "./plan";
 import { Player } from "./player";
 import type { Story } from "./story";
 import { Theme } from "./theme";
@@ -16,7 +17,8 @@ import { Transport } from "./ui/transport";
 import { Viewport } from "./ui/viewport";
 import { Stage } from "./view/stage";
 
-function readStory(): Story {
+/** The story, and the plan file that it was told. */
+function readStory(): { story: Story; file: unknown } {
   const text = document.getElementById("story")?.textContent;
   if (!text) throw new Error("This page carries no plan.");
   const story = JSON.parse(text) as Story;
@@ -24,7 +26,9 @@ function readStory(): Story {
   if (story.version !== 1) {
     throw new Error(`This page shows plans of version 1; it carries version ${String(story.version)}. Make it again with one version of regrasp.`);
   }
-  return story;
+  const file: unknown = story.plan;
+  if (story.plan) story.plan = planOf(story.plan);
+  return { story, file };
 }
 
 function stageOf(story: Story, motion: Motion, theme: Theme, onCamera: () => void): Stage | null {
@@ -36,14 +40,14 @@ function stageOf(story: Story, motion: Motion, theme: Theme, onCamera: () => voi
   }
 }
 
-function download(story: Story): void {
-  const address = URL.createObjectURL(new Blob([JSON.stringify(story.plan, null, 1)], { type: "application/json" }));
+function download(file: unknown): void {
+  const address = URL.createObjectURL(new Blob([JSON.stringify(file, null, 1)], { type: "application/json" }));
   const link = el("a", { href: address, download: "plan.json" });
   link.click();
   setTimeout(() => URL.revokeObjectURL(address), 1000);
 }
 
-function header(story: Story, theme: Theme, help: () => void): HTMLElement {
+function header(story: Story, file: unknown, theme: Theme, help: () => void): HTMLElement {
   const scheme = button(icon("sun"), "Light or dark", () => theme.toggle(), "button quiet");
   return el(
     "header",
@@ -51,7 +55,7 @@ function header(story: Story, theme: Theme, help: () => void): HTMLElement {
     el("h1", { title: story.title }, story.title || "Plan"),
     panels.verdict(story),
     el("span", { class: "gap" }),
-    story.plan ? button(icon("download"), "Download plan.json", () => download(story), "button quiet") : null,
+    story.plan ? button(icon("download"), "Download plan.json", () => download(file), "button quiet") : null,
     scheme,
     button("?", "Keys and help", help, "button quiet question"),
   );
@@ -61,8 +65,9 @@ function start(): void {
   const app = document.getElementById("app") ?? document.body.appendChild(el("div", { id: "app" }));
   const theme = new Theme();
   let story: Story;
+  let file: unknown;
   try {
-    story = readStory();
+    ({ story, file } = readStory());
   } catch (error) {
     app.replaceChildren(el("main", { class: "message", role: "alert" }, el("h1", {}, "Nothing to show"), el("p", {}, (error as Error).message)));
     return;
@@ -82,7 +87,7 @@ function start(): void {
   const ball = new Ball(story, motion, player, theme);
 
   app.replaceChildren(
-    header(story, theme, help.open),
+    header(story, file, theme, help.open),
     el(
       "main",
       {},

@@ -254,6 +254,8 @@ export function still(story: Story): Plan {
     task: "in_hand",
     method: "",
     seed: 0,
+    hand: story.scene.hands[story.scene.moving_hand] ?? "",
+    object: story.scene.objects[story.scene.moved_object] ?? "",
     joint_names: story.scene.joints.map((j) => j.name),
     fingers: story.scene.fingers.map((f) => f.name),
     start: story.asked[0] ?? object,

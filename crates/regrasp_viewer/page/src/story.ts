@@ -15,7 +15,7 @@ export interface Story {
   scene: SceneStory;
   /** Poses asked for: start, then way poses, then goal; in the world. At least two, or empty when unknown. */
   asked: PoseData[];
-  /** The plan file as it is (docs/reference/plan-format.md), or null when none was found. */
+  /** The plan, or null when none was found. The page is told the plan file as it is; plan.ts makes this of it. */
   plan: Plan | null;
   /** What the checker measured; null when there is no plan. */
   judged: Judged | null;
@@ -26,7 +26,15 @@ export interface Story {
 }
 
 export interface SceneStory {
-  /** Links of the robot, every parent before its children. */
+  /** Names of all hands of the scene. */
+  hands: string[];
+  /** Index in `hands` of the one that moves: links, joints and fingers are its own. */
+  moving_hand: number;
+  /** Names of all objects of the scene. */
+  objects: string[];
+  /** Index in `objects` of the one that is moved. */
+  moved_object: number;
+  /** Links of the robot of the hand that moves, every parent before its children. */
   links: LinkStory[];
   world_from_root: PoseData;
   /** Same order as `plan.joint_names` and as `joints` of waypoints. */
@@ -74,9 +82,11 @@ export interface MeshStory {
 }
 
 export interface PieceStory {
-  /** What it moves with: index of a link, "object", or "world" for obstacles. */
+  /** What it moves with: index of a link, "object", or "world" for what rests and for obstacles. */
   on: number | "object" | "world";
-  /** Name to show: of the link, object or obstacle. */
+  /** Which kind of body it is of. */
+  part: "hand" | "object" | "support" | "obstacle";
+  /** Name to show: of the object, support or obstacle; of the link, and before it that of a hand at rest and a slash. */
   name: string;
   role: "collision" | "visual";
   mesh: number;
@@ -120,13 +130,19 @@ export interface RoadmapStory {
   solution: number[];
 }
 
-// ---- the plan file (docs/reference/plan-format.md); only what the page reads ----
+// ---- the plan (docs/reference/plan-format.md) as plan.ts makes it of a plan file; only what the page reads ----
 
 export interface Plan {
   format: "regrasp-plan";
   task: string;
   method: string;
   seed: number;
+  /** Name of the scene's task; absent where it has only one. */
+  query?: string;
+  /** Name of the hand that moves. */
+  hand: string;
+  /** Name of the object that it moves. All else rests. */
+  object: string;
   joint_names: string[];
   fingers: string[];
   start: PoseData;
@@ -149,6 +165,8 @@ export interface Segment {
   also_moving?: string[];
   /** In tracking, the resting finger that the object rolls on. */
   rolling_finger?: string;
+  /** Names of hands and supports that hold the object. */
+  held_by?: string[];
   waypoints: Waypoint[];
 }
 

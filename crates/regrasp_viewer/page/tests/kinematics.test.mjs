@@ -8,6 +8,7 @@ import { matricesOf, matrix, poseMatrix, synthetic, tracking } from "./synthetic
 
 const { linkPoses } = await load("kinematics");
 const { Motion, whoMoves } = await load("motion");
+const { planOf } = await load("plan");
 const math = await load("math");
 const { rotationVectors, anglesAlong } = await load("orientation_path");
 const { readLink, writeLink } = await load("link");
@@ -201,4 +202,33 @@ test("tracking: modes are those of the way to the next waypoint, and nothing hol
     assert.deepEqual(modes, expected);
   }
   for (const holds of motion.holds) assert.equal(holds.length, 1, "no finger leaves the object");
+});
+
+test("a plan file of version 3 becomes the plan that it says", () => {
+  const plan = { ...synthetic({ shape: "ball", fingers: 4, duration: 12, triangles: 400 }).plan, hand: "right", object: "ball" };
+  const { hand, object, joint_names, fingers, segments, ...kept } = plan;
+  const file = {
+    ...kept,
+    hands: [{ name: hand, fingers, joint_names }],
+    objects: [object],
+    segments: segments.map(({ moving_finger, also_moving, waypoints, ...segment }) => ({
+      ...segment,
+      ...(moving_finger ? { moving: [moving_finger, ...(also_moving ?? [])] } : {}),
+      held_by: { [object]: [hand] },
+      waypoints: waypoints.map(({ world_from_object, contacts, ...waypoint }) => ({
+        ...waypoint,
+        world_from_objects: [world_from_object],
+        contacts: contacts.flatMap((contact, i) => (contact.mode === "free" ? [] : [{ ...contact, hand, finger: fingers[i], object }])),
+      })),
+    })),
+  };
+  const found = planOf(file);
+  assert.deepEqual(found.segments.map((segment) => segment.held_by), segments.map(() => [hand]));
+  const [told, made] = [new Motion(plan), new Motion(found)];
+  assert.deepEqual(made.stretches, told.stretches);
+  assert.ok(told.stretches.some((stretch) => stretch.moving >= 0) && told.stretches.length > 2);
+  assert.deepEqual(made.holds, told.holds);
+  assert.deepEqual(made.times.map((time) => [made.joints(time), made.object(time)]), told.times.map((time) => [told.joints(time), told.object(time)]));
+  assert.equal(planOf(found), found, "a plan stays as it is");
+  assert.throws(() => planOf({ ...file, objects: ["ball", "box"] }), /1 and 2/);
 });

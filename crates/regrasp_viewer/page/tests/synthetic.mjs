@@ -182,7 +182,8 @@ export function synthetic(options = {}) {
     disc(PALM_FROM_AXIS + 0.014, 0.022), round(TIP, perLink, LINKS[1]), round(TIP * 0.95, perLink, LINKS[2]), round(TIP * 1.1, perLink),
     shape === "ball" ? round(radius, rings(triangles / 2)) : box(radius, radius, radius), box(0.02, 0.02, 0.05),
   ];
-  const piece = (on, name, mesh, is_tip = false, from_mesh = still) => ({ on, name: nameOf(name), role: "collision", mesh, from_mesh, is_tip });
+  const partOf = (on) => (on === "object" ? "object" : on === "world" ? "obstacle" : "hand");
+  const piece = (on, name, mesh, is_tip = false, from_mesh = still) => ({ on, part: partOf(on), name: nameOf(name), role: "collision", mesh, from_mesh, is_tip });
   const pieces = [piece(0, "palm", 0, false, { position: [0, 0, 0.012], quat_xyzw: [0, 0, 0, 1] }), piece("object", shape, 4)];
   links.forEach((link, i) => {
     if (link.joint < 0) return;
@@ -190,7 +191,7 @@ export function synthetic(options = {}) {
     pieces.push(piece(i, link.name, [3, 1, 2][part], part === 2));
   });
   if (obstacle) pieces.push(piece("world", "post", 5, false, { position: [0.13, 0.02, 0.06], quat_xyzw: [0, 0, 0, 1] }));
-  const scene = { links, joints, fingers, world_from_root: still, friction: 0.7, gravity_in_world: [0, 0, -9.80665], meshes, pieces };
+  const scene = { hands: ["hand"], moving_hand: 0, objects: [shape], moved_object: 0, links, joints, fingers, world_from_root: still, friction: 0.7, gravity_in_world: [0, 0, -9.80665], meshes, pieces };
 
   const middle = [0, 0, 0.085];
   const poseAt = (angle) => ({ position: [0.004 * Math.sin(angle), 0, middle[2] + 0.004 * Math.sin(2 * angle)], quat_xyzw: quatOf([0.25, 0.1, 1], angle) });

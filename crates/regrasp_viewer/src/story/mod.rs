@@ -2,14 +2,22 @@
 //!
 //! SI units, radians. Nothing that follows from the plan is stored beside it.
 
+/// What rests in the scene.
+mod at_rest;
 /// Lines of facts about a plan.
 mod facts;
 /// Margin and clearance along a plan.
 mod judged;
+/// The links of a hand.
+mod links;
 /// Numbers of meshes as text.
 pub mod pack;
-/// Links, joints, fingers and what they look like.
+/// Plans in stories as in plan files.
+mod plan_file;
+/// The hand and the object of a plan, and everything around them.
 mod scene;
+/// Shapes as packed meshes.
+mod shapes;
 /// Meshes of fewer triangles.
 mod simplify;
 /// A story from scene, query and plan.
@@ -41,11 +49,12 @@ pub struct Story {
     pub title: String,
     /// Label and value of each line of facts, in order of display: text, never markup.
     pub facts: Vec<(String, String)>,
-    /// Hand, object and obstacles.
+    /// Hands, objects, supports and obstacles.
     pub scene: SceneStory,
     /// Poses asked for: start, then way poses, then goal; in the world. Empty when unknown.
     pub asked: Vec<PoseData>,
-    /// The plan, or none when none was found.
+    /// The plan, or none when none was found. In JSON as in a plan file (`docs/reference/plan-format.md`).
+    #[serde(with = "plan_file")]
     pub plan: Option<Plan>,
     /// What the checker measured; none when there is no plan.
     pub judged: Option<Judged>,
@@ -55,10 +64,18 @@ pub struct Story {
     pub roadmap: Option<RoadmapStory>,
 }
 
-/// Hand, object and obstacles.
+/// The hand and the object of the plan, and everything around them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SceneStory {
-    /// Links of the robot, every parent before its children.
+    /// Names of all hands of the scene.
+    pub hands: Vec<String>,
+    /// Index in `hands` of the one that moves: links, joints and fingers are its own.
+    pub moving_hand: usize,
+    /// Names of all objects of the scene.
+    pub objects: Vec<String>,
+    /// Index in `objects` of the one that is moved.
+    pub moved_object: usize,
+    /// Links of the robot of the hand that moves, every parent before its children.
     pub links: Vec<LinkStory>,
     /// Where the root link stands.
     pub world_from_root: PoseData,
@@ -182,7 +199,7 @@ pub enum Carrier {
 pub enum OtherCarrier {
     /// The object.
     Object,
-    /// Nothing: an obstacle.
+    /// Nothing: a hand or an object at rest, a support, an obstacle.
     World,
 }
 
@@ -196,12 +213,28 @@ pub enum Role {
     Visual,
 }
 
+/// Which kind of body a piece is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Part {
+    /// A hand.
+    Hand,
+    /// An object.
+    Object,
+    /// A support.
+    Support,
+    /// An obstacle.
+    Obstacle,
+}
+
 /// A mesh at its place.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PieceStory {
     /// What it moves with.
     pub on: Carrier,
-    /// Name to show: of the link, object or obstacle.
+    /// Which kind of body it is of.
+    pub part: Part,
+    /// Name to show: of the object, support or obstacle; of the link, and before it that of a hand at rest and a slash.
     pub name: String,
     /// What it is for.
     pub role: Role,

@@ -65,6 +65,7 @@ pub fn tell(telling: &Telling) -> Result<Story, String> {
             (Some((*plan).clone()), Some(measured), None)
         }
     };
+    facts.extend(who_moves(&telling.task));
     facts.extend(notes);
     let inputs = telling.task.scene.inputs.iter();
     facts.extend(inputs.map(|input| (format!("{} {}", input.role, input.name), format!("sha256 {}", input.sha256))));
@@ -80,4 +81,16 @@ pub fn tell(telling: &Telling) -> Result<Story, String> {
         failure,
         roadmap: telling.roadmap.clone(),
     })
+}
+
+/// What moves and what rests, in a scene of several hands or objects.
+fn who_moves(task: &Manipulation) -> Option<(String, String)> {
+    let scene = task.scene;
+    let hands = scene.hands.iter().map(|hand| &hand.name).enumerate().filter(|(index, _)| *index != task.hand_index);
+    let objects =
+        scene.objects.iter().map(|object| &object.name).enumerate().filter(|(index, _)| *index != task.object_index);
+    let resting: Vec<&str> = hands.chain(objects).map(|(_, name)| name.as_str()).collect();
+    let [hand, object] = [&task.placed_hand().name, &task.object().name];
+    (!resting.is_empty())
+        .then(|| ("Moves".to_owned(), format!("{hand} moves {object}; {} at rest", resting.join(", "))))
 }

@@ -7,7 +7,7 @@ use crate::render::model::{linear, mixed};
 use crate::render::shade::Layer;
 use crate::render::{Model, Paint, Surface};
 use crate::story::tessellate::Triangles;
-use crate::story::{Carrier, MeshStory, OtherCarrier, PieceStory, Role, SceneStory, pack};
+use crate::story::{Carrier, MeshStory, OtherCarrier, Part, PieceStory, Role, SceneStory, pack};
 use crate::timeline;
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 use regrasp_plan::Plan;
@@ -18,6 +18,7 @@ pub const AXIS_COLORS: [&str; 3] = ["#b2182b", "#1b7837", "#2166ac"];
 const LINK: &str = "#d9dbde";
 const PALM: &str = "#c3c7cc";
 const OBSTACLE: &str = "#8f98a3";
+const SUPPORT: &str = "#b9b2a6";
 const OBJECT_TONES: [&str; 2] = ["#e9d3ae", "#c9a678"];
 /// Bodies for outlines: links have their own numbers, from `FIRST_LINK` on.
 const OBJECT_BODY: u32 = 0;
@@ -60,6 +61,8 @@ pub struct Stage<'s> {
     is_finger: Vec<bool>,
     object: Vec<Prop>,
     obstacles: Vec<Model>,
+    /// Hands, objects and supports that the plan does not move, placed in the world.
+    at_rest: Vec<Model>,
     /// Middle of the object's bounds, in its frame.
     object_center: Point,
     /// Largest distance of a point of the object from there, in metres.
@@ -109,6 +112,7 @@ impl<'s> Stage<'s> {
             is_finger: Vec::new(),
             object: Vec::new(),
             obstacles: Vec::new(),
+            at_rest: Vec::new(),
             object_center,
             object_radius,
             object_at_start: Pose::from(&plan.start),
@@ -150,9 +154,16 @@ impl<'s> Stage<'s> {
                 self.object.push(Prop { from_mesh, surface, paint, body: OBJECT_BODY });
             }
             Carrier::Other(OtherCarrier::World) => {
-                let body = OBSTACLE_BODY + self.obstacles.len() as u32 % 90;
-                let prop = Prop { from_mesh, surface, paint: Paint::Plain(linear(OBSTACLE)), body };
-                self.obstacles.push(prop.placed(&Pose::identity()));
+                let body = OBSTACLE_BODY + (self.obstacles.len() + self.at_rest.len()) as u32 % 90;
+                let (color, models) = match piece.part {
+                    Part::Hand if piece.is_tip => (LINK, &mut self.at_rest),
+                    Part::Hand => (PALM, &mut self.at_rest),
+                    Part::Object => (OBJECT_TONES[0], &mut self.at_rest),
+                    Part::Support => (SUPPORT, &mut self.at_rest),
+                    Part::Obstacle => (OBSTACLE, &mut self.obstacles),
+                };
+                let prop = Prop { from_mesh, surface, paint: Paint::Plain(linear(color)), body };
+                models.push(prop.placed(&Pose::identity()));
             }
         }
     }
@@ -228,11 +239,15 @@ impl<'s> Stage<'s> {
             let color = linear(palette::color(finger));
             marks.extend(marks::rope(&frame.path, 0.03 * size, color, MARK_BODY + finger as u32));
         }
-        vec![
+        let mut layers = vec![
             Layer { models: self.obstacles.clone(), in_front: 0.40, hidden: 0.0, is_framed: self.obstacles_are_near() },
             Layer { models: cones, in_front: 0.38, hidden: 0.10, is_framed: true },
             Layer { models: marks, in_front: 1.0, hidden: 0.45, is_framed: true },
-        ]
+        ];
+        if !self.at_rest.is_empty() {
+            layers.insert(0, Layer { models: self.at_rest.clone(), in_front: 1.0, hidden: 0.0, is_framed: false });
+        }
+        layers
     }
 }
 

@@ -8,6 +8,9 @@ mod places;
 mod render;
 mod sample;
 mod scene;
+mod several;
 mod storyboard;
 mod tessellation;
 mod tracking;
+#[path = "../../../../tests/support/two_hands.rs"]
+mod two_hands;

@@ -33,6 +33,8 @@ export class Stage {
   private readonly links: Group[];
   private readonly object = new Group();
   private readonly obstacles = new Group();
+  /** Hands, objects and supports that the plan does not move. */
+  private readonly atRest = new Group();
   private readonly contacts: Contacts;
   private readonly ghosts: Ghost[] = [];
   /** In tracking, around every fingertip: dark on the moving finger, grey on the one that the object rolls on. */
@@ -84,7 +86,7 @@ export class Stage {
 
     const decoded = new Map<number, Triangles>();
     this.links = story.scene.links.map(() => new Group());
-    this.scene.add(...this.links, this.object, this.obstacles);
+    this.scene.add(...this.links, this.object, this.obstacles, this.atRest);
     const body = this.addPieces(decoded);
     const size = body ? Math.max(...body.half.toArray()) : 0.03;
     this.contacts = new Contacts(story.scene, motion, size, largestForce(motion));
@@ -111,7 +113,8 @@ export class Stage {
     }
     let body: { geometry: BufferGeometry; middle: Vector3; half: Vector3 } | null = null;
     for (const pieces of groups.values()) {
-      const { on, role, is_tip } = pieces[0];
+      const { on, role, part, is_tip } = pieces[0];
+      const isObstacle = part === "obstacle";
       const geometry = geometryOf(pieces, scene.meshes, decoded);
       let material: Material;
       if (on === "object") {
@@ -120,12 +123,14 @@ export class Stage {
         const half = geometry.boundingBox!.getSize(new Vector3()).multiplyScalar(0.5).max(new Vector3(1e-6, 1e-6, 1e-6));
         material = patterned(middle, half, this.pattern);
         if (!body || role === "visual") body = { geometry, middle, half };
-      } else material = on === "world" ? this.obstacleMaterial() : this.linkMaterial(scene.links[on]?.finger ?? -1, is_tip);
+      } else if (part === "hand") material = this.linkMaterial(on === "world" ? -1 : scene.links[on]?.finger ?? -1, is_tip);
+      else material = isObstacle ? this.obstacleMaterial() : this.restingMaterial(part === "object" ? "objectLight" : "faint");
       const mesh = new Mesh(geometry, material);
-      if (on === "world") mesh.renderOrder = 1;
-      const edges = on === "object" || on === "world" ? this.edges(geometry, on === "world" ? 0.5 : 0.35) : null;
+      if (isObstacle) mesh.renderOrder = 1;
+      const edges = part === "hand" ? null : this.edges(geometry, isObstacle ? 0.5 : 0.35);
       if (edges) mesh.add(edges);
-      (on === "object" ? this.object : on === "world" ? this.obstacles : this.links[on] ?? this.scene).add(mesh);
+      const resting = isObstacle ? this.obstacles : this.atRest;
+      (on === "object" ? this.object : on === "world" ? resting : this.links[on] ?? this.scene).add(mesh);
       this.shapes.push({ mesh, role, name: pieces[0].name });
     }
     return body;
@@ -157,6 +162,13 @@ export class Stage {
     const own = new Color(fingerColour(finger));
     const share = finger < 0 ? 0 : isTip ? 0.9 : 0.4;
     this.repaint.push(() => material.color.set(this.theme.colours.palm).lerp(own, share));
+    return material;
+  }
+
+  /** Of an object or a support that the plan does not move. */
+  private restingMaterial(colour: "objectLight" | "faint"): MeshLambertMaterial {
+    const material = new MeshLambertMaterial();
+    this.repaint.push(() => material.color.set(this.theme.colours[colour]));
     return material;
   }
 
@@ -312,7 +324,7 @@ export class Stage {
     const { pieces } = this.story.scene;
     if (layer === "visual") return this.hasVisual && pieces.some((p) => p.role === "collision");
     if (layer === "seeThrough") return pieces.some((p) => typeof p.on === "number");
-    if (layer === "obstacles") return pieces.some((p) => p.on === "world");
+    if (layer === "obstacles") return pieces.some((p) => p.part === "obstacle");
     if (layer === "forces") return this.motion.hasForces;
     if (layer === "contacts" || layer === "cones" || layer === "trace") return this.motion.holds.some((h) => h.length > 0);
     return this.ghosts.length > 0;
