@@ -46,7 +46,8 @@ fn each_hand_plans_and_every_command_knows_its_plan() {
         }
         // The plan names its task: nobody has to say it again.
         succeeds(folder.run(&["check", &plan]));
-        succeeds(folder.run(&["view", &plan, SCENE, "-o", &name(".html"), "--png", &name(".png")]));
+        succeeds(folder.run(&["view", &plan, SCENE, "-o", &name(".html")]));
+        succeeds(folder.run(&["view", &plan, SCENE, "--png", &name(".png"), "--frames", "2", "--width", "240"]));
         let page = fs::read_to_string(folder.path(&name(".html"))).unwrap();
         let other = TASKS.iter().find(|(other, ..)| *other != task).unwrap();
         for shown in [object, other.2, "table"] {
