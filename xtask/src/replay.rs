@@ -38,8 +38,12 @@ pub fn in_hand(_: &[String]) -> Outcome {
     campaign(&format!("{SCENES} --gravity down --friction-scale 0.8,1,1.2 --seeds {few} {to} --name friction"))?;
     campaign(&format!("{SCENES} --gravity down --mass-scale 0.5,1,1.5 --seeds {few} {to} --name mass"))?;
     campaign(&format!("{SCENES} --gravity down --speed 1,2 --seeds {few} {to} --name speed"))?;
+    // By work, not by time: the same plans on every machine.
+    let work = number("SCENE_WORK", 1_000_000)?;
     let scenes = joined(&in_hand_scenes(with_models.is_some())?);
-    campaign(&format!("{scenes} {packages} --gravity plan --seeds {scene_seeds} {to} --name scenes"))?;
+    campaign(&format!(
+        "{scenes} {packages} --gravity plan --seeds {scene_seeds} --max-work {work} {to} --name scenes"
+    ))?;
     keep(&folder)
 }
 

@@ -47,9 +47,9 @@ const TOWER: &[Floor] = &[
             "regrasp_plan",
         ],
     ),
-    floor(
-        "regrasp_planners",
-        &[
+    Floor {
+        name: "regrasp_planners",
+        ships_with: &[
             "regrasp_base",
             "regrasp_geometry",
             "regrasp_roadmap",
@@ -59,7 +59,8 @@ const TOWER: &[Floor] = &[
             "regrasp_plan",
             "regrasp_manipulation",
         ],
-    ),
+        tests_with: &["regrasp_mutations"],
+    },
     Floor {
         name: "regrasp_export",
         ships_with: &["regrasp_base", "regrasp_geometry", "regrasp_robot", "regrasp_scene", "regrasp_plan"],
@@ -89,7 +90,7 @@ const TOWER: &[Floor] = &[
     ),
     Floor {
         name: "regrasp_bench",
-        ships_with: &["regrasp_base", "regrasp_scene", "regrasp_plan", "regrasp_planners", "regrasp_mutations"],
+        ships_with: &["regrasp_base", "regrasp_scene", "regrasp_plan", "regrasp_mutations", "regrasp_planners"],
         tests_with: &["regrasp_geometry", "regrasp_robot"],
     },
     floor("regrasp_cli", &["regrasp", "regrasp_bench"]),
@@ -188,11 +189,11 @@ fn exporters_and_viewer_ship_without_planners() {
     }
 }
 
-/// The checker shares nothing but its results: no face asks its kinematics, distances or cones.
+/// The checker shares nothing but its results: only plans that are broken for its tests look at how it works.
 #[test]
 fn nobody_looks_inside_the_checker() {
     let inside = ["kinematics", "bodies", "between", "motion", "contact", "tip", "model", "surface", "rolling", "slip"];
-    for floor in TOWER.iter().filter(|floor| floor.name != "regrasp_plan") {
+    for floor in TOWER.iter().filter(|floor| !["regrasp_plan", "regrasp_mutations"].contains(&floor.name)) {
         for file in sources(&root().join("crates").join(floor.name).join("src")) {
             let text = std::fs::read_to_string(&file).expect("a source file is readable");
             for room in inside {

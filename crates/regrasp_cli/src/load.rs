@@ -73,7 +73,7 @@ fn choose(loaded: LoadedScene, name: &str, path: &Path) -> Result<LoadedScene, S
     let names: Vec<String> = loaded.tasks.iter().map(|task| format!("\"{}\"", task.name)).collect();
     loaded.choosing(name).ok_or_else(|| {
         let problem = format!("{} has no task \"{name}\"", path.display());
-        Stop::argument("A508", "--task", problem, &format!("one of {}", names.join(", ")))
+        Stop::argument("A508", "--task", problem, format!("one of {}", names.join(", ")))
     })
 }
 

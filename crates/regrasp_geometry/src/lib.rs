@@ -14,6 +14,8 @@ pub mod import;
 pub mod mass;
 /// Triangle meshes as read, validated, with their statistics.
 pub mod mesh;
+/// Solids in convex parts.
+pub mod parts;
 /// Distance and penetration by parry: the checker's second way of knowing.
 pub mod reference;
 /// The shapes a link, an object or an obstacle can have.

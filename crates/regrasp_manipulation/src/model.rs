@@ -205,7 +205,7 @@ impl<'a> Model<'a> {
             links.push((part.link, false));
         }
         let object = bodies.len();
-        bodies.push(object_body(&view.object));
+        bodies.push(object_body(view.object));
         for obstacle in view.obstacles.iter() {
             let (shape, place) = (&obstacle.placed.shape, &obstacle.placed.parent_from_shape);
             bodies.push(fixed_body(shape, obstacle.mesh_body.as_ref(), place, &obstacle.name));

@@ -4,7 +4,7 @@ use super::Breeder;
 use super::choice::{any_closed, any_segment, any_waypoint, pick, pick_waypoint};
 use super::edit::{move_tip, replace_contact};
 use regrasp_geometry::{Point, Pose, Shape, UnitVector, Vector};
-use regrasp_plan::check::continuity::{contact_of, moving_finger};
+use regrasp_plan::check::roles::{contact_of, moving_finger};
 use regrasp_plan::check::violation::ViolationKind::{
     ClosureLost, Collision, ContactNormalWrong, ContactOffSurface, ContactOffTip, ContactTooNearEdge, GraspChanges,
     NotANumber, WrongContactMode, WrongMovingFinger,

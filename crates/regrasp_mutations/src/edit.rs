@@ -4,8 +4,9 @@ use super::choice::{pick, waypoints_mut};
 use nalgebra::{DMatrix, DVector};
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
-use regrasp_plan::check::continuity::{contact_of, pose_difference};
 use regrasp_plan::check::model::Model;
+use regrasp_plan::check::pose::pose_difference;
+use regrasp_plan::check::roles::contact_of;
 use regrasp_plan::plan::{Plan, PoseData, Segment};
 
 pub(super) fn shift(pose: &mut PoseData, rng: &mut Rng, low: f64, high: f64) {

@@ -5,9 +5,9 @@ use super::{Breeder, Mutant};
 use regrasp_base::Rng;
 use regrasp_geometry::{Pose, UnitVector, Vector};
 use regrasp_grasp::ContactModel;
-use regrasp_plan::check::continuity::{contact_of, moving_finger};
 use regrasp_plan::check::forces::torques_of;
 use regrasp_plan::check::model::Model;
+use regrasp_plan::check::roles::{contact_of, moving_finger};
 use regrasp_plan::check::violation::ViolationKind::{
     ForceMissing, ForceOutsideCone, ForceUnbalanced, FrictionAboveScene, MovingFingerPresses, NormalForceOutOfRange,
     NotANumber, PromiseBroken, TorqueLimit, TorqueWrong, WrongScene,

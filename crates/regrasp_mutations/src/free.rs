@@ -7,8 +7,8 @@ use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp::Grip;
 use regrasp_plan::check::closure::{Body, margin};
-use regrasp_plan::check::continuity::{contact_of, is_free_throughout};
 use regrasp_plan::check::model::Model;
+use regrasp_plan::check::roles::{contact_of, is_free_throughout};
 use regrasp_plan::check::surface;
 use regrasp_plan::check::violation::ViolationKind::{
     ClosureLost, Collision, ContactOffTip, WrongContactMode, WrongMovingFinger,

@@ -3,7 +3,7 @@
 use super::Breeder;
 use super::choice::{any_waypoint, waypoints, waypoints_mut};
 use regrasp_geometry::{Pose, UnitVector, Vector};
-use regrasp_plan::check::continuity::contact_of;
+use regrasp_plan::check::roles::contact_of;
 use regrasp_plan::check::violation::ViolationKind::{
     ClosureLost, ContactOffPad, ContactOffTip, JointLimit, WrongScene,
 };

@@ -4,8 +4,8 @@ use super::Breeder;
 use super::choice::pick;
 use super::tracking::turn;
 use regrasp_base::Rng;
-use regrasp_plan::check::continuity::moving_finger;
 use regrasp_plan::check::model::Model;
+use regrasp_plan::check::roles::moving_finger;
 use regrasp_plan::check::violation::ViolationKind::{
     ContactOffTip, ObjectMovesInRegrasp, RelativeMotionMissing, SegmentsDoNotMeet, WrongContactMode,
 };

@@ -3,7 +3,7 @@
 use super::Breeder;
 use super::choice::{any_segment, any_waypoint, pick};
 use super::edit::shift;
-use regrasp_plan::check::continuity::pose_difference;
+use regrasp_plan::check::pose::pose_difference;
 use regrasp_plan::check::violation::ViolationKind::{
     self, ContactOffTip, GoalMismatch, JointJump, JointLimit, NotANumber, ObjectMovesInRegrasp, SegmentsDoNotMeet,
     StartMismatch,

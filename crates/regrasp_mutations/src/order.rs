@@ -3,7 +3,7 @@
 use super::Breeder;
 use super::choice::pick;
 use super::edit::{goes_somewhere, travel};
-use regrasp_plan::check::continuity::pose_difference;
+use regrasp_plan::check::pose::pose_difference;
 use regrasp_plan::check::violation::ViolationKind::{EmptySegment, GoalMismatch, SegmentsDoNotMeet, StartMismatch};
 use regrasp_plan::plan::SegmentKind;
 

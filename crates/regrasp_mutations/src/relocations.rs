@@ -5,8 +5,8 @@ use super::choice::{any_segment, pick_waypoint};
 use super::edit::move_tip;
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, Vector};
-use regrasp_plan::check::continuity::{contact_of, moving_finger};
 use regrasp_plan::check::model::Model;
+use regrasp_plan::check::roles::{contact_of, moving_finger};
 use regrasp_plan::check::violation::ViolationKind::{Collision, LandingOrLiftingNotFree};
 use regrasp_plan::plan::{ContactState, Plan, SegmentKind, Waypoint};
 

@@ -5,11 +5,11 @@ use super::choice::{pick, places};
 use super::edit::move_tip;
 use regrasp_base::Rng;
 use regrasp_geometry::{Pose, Shape, UnitVector, Vector};
-use regrasp_plan::check::continuity::contact_of;
 use regrasp_plan::check::model::Model;
 use regrasp_plan::check::patch::Patch;
+use regrasp_plan::check::roles::contact_of;
 use regrasp_plan::check::surface;
-use regrasp_plan::check::tip::TipSurface;
+use regrasp_plan::check::tip_surface::TipSurface;
 use regrasp_plan::check::violation::ViolationKind::{
     ContactOffSurface, ContactOffTip, GraspChanges, PromiseBroken, Slip, WrongContactMode,
 };

@@ -3,7 +3,7 @@
 use super::Breeder;
 use nalgebra::UnitQuaternion;
 use regrasp_geometry::{Pose, Shape, Vector};
-use regrasp_plan::check::continuity::contact_of;
+use regrasp_plan::check::roles::contact_of;
 use regrasp_plan::check::rolling::Roll;
 use regrasp_plan::check::violation::ViolationKind::Slip;
 use regrasp_plan::plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};

@@ -7,8 +7,9 @@ use super::{Breeder, Mutant};
 use nalgebra::Rotation3;
 use regrasp_base::Rng;
 use regrasp_geometry::{Pose, Vector};
-use regrasp_plan::check::continuity::{contact_of, pose_difference};
 use regrasp_plan::check::model::Model;
+use regrasp_plan::check::pose::pose_difference;
+use regrasp_plan::check::roles::contact_of;
 use regrasp_plan::check::surface;
 use regrasp_plan::check::tracking::{may_move, named_fingers};
 use regrasp_plan::check::violation::ViolationKind::{

@@ -3,7 +3,7 @@
 use super::Breeder;
 use super::choice::{pick, pick_waypoint, swap_two_that};
 use super::edit::shift;
-use regrasp_plan::check::continuity::pose_difference;
+use regrasp_plan::check::pose::pose_difference;
 use regrasp_plan::check::violation::ViolationKind::WayPoseMissed;
 use regrasp_plan::plan::SegmentKind;
 

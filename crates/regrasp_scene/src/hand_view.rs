@@ -56,7 +56,7 @@ impl<'a> HandView<'a> {
             scene_name: &scene.name,
             hand_name: &own.name,
             hand: &own.hand,
-            world_from_hand: own.world_from_hand,
+            world_from_hand: manipulation.world_from_hand(),
             reach: own.reach,
             object: manipulation.object(),
             obstacles,

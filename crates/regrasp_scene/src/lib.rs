@@ -29,5 +29,5 @@ pub use load::{Goal, LoadedScene, StartOrientation, Task, load_scene};
 pub use manipulation::Manipulation;
 pub use object::Object;
 pub use query::{GRASP_TOLERANCE, GRASP_TURN_TOLERANCE, GraspRequest, InHandQuery, Query, TrackingQuery};
-pub use scene::{InputFile, Obstacle, Scene, SceneHand, Support};
+pub use scene::{HandCarrier, InputFile, Obstacle, Scene, SceneHand, Support};
 pub use state::{Holder, State};

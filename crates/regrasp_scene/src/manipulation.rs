@@ -7,7 +7,7 @@ use crate::state::State;
 use regrasp_geometry::Pose;
 use regrasp_geometry::collision::MeshBody;
 use regrasp_geometry::shape::PlacedShape;
-use regrasp_robot::{Hand, LinkId};
+use regrasp_robot::{Hand, JointKind, LinkId, Manipulator};
 
 /// One hand and the object that it manipulates. All else of the scene rests in `state`.
 #[derive(Debug, Clone, Copy)]
@@ -45,7 +45,7 @@ impl<'a> Manipulation<'a> {
 
     /// Where the hand's base stands in the world.
     pub fn world_from_hand(&self) -> Pose {
-        self.placed_hand().world_from_hand
+        self.state.world_from_hand(self.scene, self.hand_index)
     }
 
     /// The object.
@@ -53,11 +53,16 @@ impl<'a> Manipulation<'a> {
         &self.scene.objects[self.object_index]
     }
 
-    /// What rests and is no obstacle of the scene: supports, the other hands in their postures, the other objects. In the world.
+    /// What rests and is no obstacle of the scene: supports, arms, the other hands in their postures, the other objects. In the
+    /// world.
     pub fn bystanders(&self) -> Vec<Obstacle> {
         let mut bodies: Vec<Obstacle> = self.scene.supports.iter().map(|support| support.body.clone()).collect();
+        bodies.extend(self.robot_bodies());
         let others = self.scene.hands.iter().enumerate().filter(|(index, _)| *index != self.hand_index);
-        bodies.extend(others.flat_map(|(index, other)| bodies_of_hand(other, &self.state.hand_joints[index])));
+        bodies.extend(others.flat_map(|(index, other)| {
+            let world_from_hand = self.state.world_from_hand(self.scene, index);
+            bodies_of_hand(other, &world_from_hand, &self.state.hand_joints[index])
+        }));
         let others = self.scene.objects.iter().enumerate().filter(|(index, _)| *index != self.object_index);
         bodies.extend(others.map(|(index, other)| Obstacle {
             name: other.name.clone(),
@@ -69,10 +74,46 @@ impl<'a> Manipulation<'a> {
         }));
         bodies
     }
+
+    /// The links of robots that belong to no hand, but for those that count as palm of the hand. In the world.
+    pub fn robot_bodies(&self) -> Vec<Obstacle> {
+        let mut bodies = Vec::new();
+        (0..self.scene.robots.len()).for_each(|robot| self.add_robot(robot, &mut bodies));
+        bodies
+    }
+
+    /// Adds the links of a robot that belong to no hand, but for those that count as palm of the hand.
+    fn add_robot(&self, index: usize, bodies: &mut Vec<Obstacle>) {
+        let robot = &self.scene.robots[index];
+        let own = self.placed_hand().carrier.filter(|carrier| carrier.robot == index);
+        let mut world_from_link = Vec::new();
+        robot.link_poses(&self.state.joints_of_robot(self.scene, index), &mut world_from_link);
+        let arms = robot.arms.iter().flat_map(|arm| &arm.shapes);
+        for shape in robot.common.shapes.iter().chain(arms) {
+            if own.is_some_and(|own| is_rigid_with_hand(robot, own.hand, shape.link)) {
+                continue;
+            }
+            let parent_from_shape = world_from_link[shape.link.0] * shape.placed.parent_from_shape;
+            bodies.push(Obstacle {
+                name: format!("{}/{}", robot.name, robot.robot.links[shape.link.0].name),
+                placed: PlacedShape { parent_from_shape, shape: shape.placed.shape.clone() },
+                mesh_body: None,
+            });
+        }
+    }
+}
+
+/// True when no moving joint lies between `link` and the base of a hand: such a link of an arm counts as part of the palm.
+pub(crate) fn is_rigid_with_hand(robot: &Manipulator, hand: usize, link: LinkId) -> bool {
+    let moving = |link| {
+        let joints = robot.robot.joints_to(link).into_iter();
+        joints.filter(|id| robot.robot.joints[id.0].kind != JointKind::Fixed).collect::<Vec<_>>()
+    };
+    moving(link) == moving(robot.hands[hand].hand.base)
 }
 
 /// The collision shapes of a hand in a posture, placed in the world.
-fn bodies_of_hand(other: &SceneHand, joints: &[f64]) -> Vec<Obstacle> {
+fn bodies_of_hand(other: &SceneHand, world_from_hand: &Pose, joints: &[f64]) -> Vec<Obstacle> {
     let hand = &other.hand;
     let link_name = |link: LinkId| hand.robot.links[link.0].name.clone();
     let mut parts: Vec<(String, PlacedShape)> =
@@ -95,7 +136,7 @@ fn bodies_of_hand(other: &SceneHand, joints: &[f64]) -> Vec<Obstacle> {
     }
     let in_world = |(link, placed): (String, PlacedShape)| Obstacle {
         name: format!("{}/{link}", other.name),
-        placed: PlacedShape { parent_from_shape: other.world_from_hand * placed.parent_from_shape, ..placed },
+        placed: PlacedShape { parent_from_shape: world_from_hand * placed.parent_from_shape, ..placed },
         mesh_body: None,
     };
     parts.into_iter().map(in_world).collect()

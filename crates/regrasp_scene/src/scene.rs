@@ -6,7 +6,7 @@ use crate::object::Object;
 use regrasp_geometry::Pose;
 use regrasp_geometry::collision::MeshBody;
 use regrasp_geometry::shape::PlacedShape;
-use regrasp_robot::Hand;
+use regrasp_robot::{Hand, Manipulator};
 use std::path::PathBuf;
 
 /// Something fixed in the world that nothing may touch.
@@ -34,11 +34,22 @@ pub struct SceneHand {
     pub name: String,
     /// The hand, in its own frame.
     pub hand: Hand,
-    /// Where its base stands, in the world.
+    /// Where its base stands, in the world; for a hand that a robot carries, while that robot waits in its rest posture.
     pub world_from_hand: Pose,
+    /// The robot that carries it. None for a hand that stands by itself.
+    pub carrier: Option<HandCarrier>,
     /// Radius, in metres, of the balls that the centres of the fingertips may not leave: each is about where the tip is in the
     /// rest posture (Cherif & Gupta 1999, sec. 7: 0.1 m). None where the joints alone say what a finger reaches.
     pub reach: Option<f64>,
+}
+
+/// Which hand of which robot a hand is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct HandCarrier {
+    /// Index in [`Scene::robots`].
+    pub robot: usize,
+    /// Index in `Manipulator::hands`.
+    pub hand: usize,
 }
 
 /// A file that the scene was made from.
@@ -59,7 +70,9 @@ pub struct InputFile {
 pub struct Scene {
     /// Name: the scene file's name without its extension.
     pub name: String,
-    /// The hands, in the order of the file. At least one.
+    /// The robots that carry hands.
+    pub robots: Vec<Manipulator>,
+    /// The hands, those of robots first, in the order of the file. At least one.
     pub hands: Vec<SceneHand>,
     /// The objects that hands can move, in the order of the file. At least one.
     pub objects: Vec<Object>,

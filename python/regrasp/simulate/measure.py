@@ -258,7 +258,7 @@ def _unplanned(
     may_touch = ref.presses | (ref.blend(_tip_gaps(rig)) < NEAR)
     planned = np.zeros(len(at), dtype=bool)
     for f, finger in enumerate(rig.fingers):
-        tip = np.isin(geoms, list(finger.touching)).any(axis=1) & (geoms == rig.object_geom).any(axis=1)
+        tip = np.isin(geoms, list(finger.touching)).any(axis=1) & np.isin(geoms, list(rig.object_geoms)).any(axis=1)
         planned |= tip & may_touch[ticks[at], f]
     found: list[UnplannedContact] = []
     at, geoms = at[~planned], geoms[~planned]
@@ -279,8 +279,8 @@ def _tip_gaps(rig: Rig) -> Array:
         mujoco.mj_resetDataKeyframe(rig.model, data, k)
         mujoco.mj_kinematics(rig.model, data)
         for f, finger in enumerate(rig.fingers):
-            distances = [mujoco.mj_geomDistance(rig.model, data, geom, rig.object_geom, 0.01, ends) for geom in finger.touching]
-            gaps[k, f] = min(distances)
+            pairs = [(geom, part) for geom in finger.touching for part in rig.object_geoms]
+            gaps[k, f] = min(mujoco.mj_geomDistance(rig.model, data, geom, part, 0.01, ends) for geom, part in pairs)
     return gaps
 
 

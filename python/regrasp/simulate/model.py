@@ -98,7 +98,8 @@ class Rig:
     """Commands of all drives of the model while the plan begins: those of other hands stay as they are here."""
     fingers: list[FingerModel]
     object_body: int
-    object_geom: int
+    object_geoms: frozenset[int]
+    """Convex parts of the object."""
     moved_geoms: frozenset[int]
     """Geoms of the hand and the object that the plan moves."""
     object_qpos: int
@@ -140,12 +141,12 @@ def make_rig(xml: str, plan: Plan, settings: Settings) -> Rig:
         raise PlanError(f"the model has {model.nkey} keyframes, the plan {n_waypoints} waypoints; make it from this plan")
     # In scenes of several hands or objects, names in the model begin with those of hand and object.
     hand, object_ = _prefix(model, plan, "hand"), _prefix(model, plan, "object")
-    object_geom = int(model.geom(f"{object_}object").id)
-    object_body = int(model.geom_bodyid[object_geom])
+    object_body = int(model.geom_bodyid[model.geom(f"{object_}object").id])
+    object_geoms = frozenset(g for g in range(model.ngeom) if model.geom_bodyid[g] == object_body)
     object_joint = int(model.body_jntadr[object_body])
     names = [f"{hand}{name}" for name in plan["joint_names"]]
     drives = _drives(model, names)
-    fingers = [_finger(model, name, hand, names, object_geom) for name in plan["fingers"]]
+    fingers = [_finger(model, name, hand, names, object_geoms) for name in plan["fingers"]]
     scale = settings.stiffness_scale * (HYBRID_STIFFNESS if settings.controller == "H" else 1.0)
     stiffness, damping = _gains(fingers, len(names), scale)
     motors = np.array([model.actuator(name).id for name in names], dtype=np.int64)
@@ -160,8 +161,8 @@ def make_rig(xml: str, plan: Plan, settings: Settings) -> Rig:
         rest_ctrl=np.array(model.key_ctrl[0]),
         fingers=fingers,
         object_body=object_body,
-        object_geom=object_geom,
-        moved_geoms=_geoms_below(model, fingers[0].body) | {object_geom},
+        object_geoms=object_geoms,
+        moved_geoms=_geoms_below(model, fingers[0].body) | object_geoms,
         object_qpos=int(model.jnt_qposadr[object_joint]),
         pin=int(model.equality(f"{object_}pin").id),
         stiffness=stiffness,
@@ -300,7 +301,7 @@ def _drives(model: MjModel, names: list[str]) -> Array:
     return drives
 
 
-def _finger(model: MjModel, name: str, hand: str, joint_names: list[str], object_geom: int) -> FingerModel:
+def _finger(model: MjModel, name: str, hand: str, joint_names: list[str], object_geoms: frozenset[int]) -> FingerModel:
     site = model.site(f"{hand}{name}:tip")
     body = int(model.site_bodyid[site.id])
     on_tip = [g for g in range(model.ngeom) if model.geom_bodyid[g] == body]
@@ -308,7 +309,7 @@ def _finger(model: MjModel, name: str, hand: str, joint_names: list[str], object
     for p in range(model.npair):
         a, b = int(model.pair_geom1[p]), int(model.pair_geom2[p])
         # Pairs that the plan does not use have condim 3 (class "unplanned").
-        if object_geom in (a, b) and model.pair_dim[p] != 3:
+        if object_geoms & {a, b} and model.pair_dim[p] != 3:
             touching.update({a, b}.intersection(on_tip))
     joints: list[int] = []
     sliding: list[int] = []

@@ -87,7 +87,7 @@ def friction_of(rig: Rig) -> tuple[Array, Array]:
     out = np.zeros((2, len(rig.fingers)))
     for p in range(model.npair):
         geoms = {int(model.pair_geom1[p]), int(model.pair_geom2[p])}
-        if rig.object_geom in geoms and model.pair_dim[p] == 4:
+        if rig.object_geoms & geoms and model.pair_dim[p] == 4:
             for f, finger in enumerate(rig.fingers):
                 if geoms & finger.touching:
                     out[:, f] = np.maximum(out[:, f], model.pair_friction[p, [0, 2]])

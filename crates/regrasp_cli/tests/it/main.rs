@@ -14,6 +14,7 @@ mod roadmap;
 mod roadmap_file;
 mod suite;
 mod tracking;
+mod two_hands;
 mod view;
 #[path = "../../../../tests/support/wide_scene.rs"]
 mod wide_scene;

@@ -192,7 +192,7 @@ fn what_a_format_cannot_hold_is_not_exported() {
     let export = |format: &str| folder.run(&["export", "odd.json", "--no-check", format, "out"]);
     complains(&export("--ros2"), "C421", "odd.json", &["segment 0, waypoint 1 is at", "after a waypoint at 100"]);
     // A name that would need gigabytes is refused by the reader.
-    plan["joint_names"][0] = serde_json::Value::from("j".repeat(1_000_000));
+    plan["hands"][0]["joint_names"][0] = serde_json::Value::from("j".repeat(1_000_000));
     folder.write("odd.json", plan.to_string());
     complains(&export("--npz"), "V004", "odd.json", &["the name has 1,000,000 characters"]);
     assert!(!folder.path("out").exists());

@@ -7,7 +7,7 @@ use regrasp_geometry::{ConvexHull, Point, Pose, Shape};
 use std::sync::Arc;
 
 /// A mesh whose hull has this much more volume is not convex for a note.
-const CONVEX_WITHIN: f64 = 0.01;
+pub(super) const CONVEX_WITHIN: f64 = 0.01;
 /// The pattern of objects: turning shows on a pattern only.
 pub(super) const OBJECT_MATERIAL: &str = "object";
 

@@ -34,6 +34,7 @@ pub(super) enum Drive {
 /// A hand of the model.
 pub(super) struct ModelHand<'a> {
     pub placed: &'a SceneHand,
+    pub world_from_hand: Pose,
     pub names: &'a HandNames,
     pub drive: Drive,
     /// Joints of the chain of every finger, base first, as the robot names them.
@@ -41,9 +42,9 @@ pub(super) struct ModelHand<'a> {
 }
 
 impl<'a> ModelHand<'a> {
-    pub fn new(placed: &'a SceneHand, names: &'a HandNames, drive: Drive) -> Self {
+    pub fn new(placed: &'a SceneHand, world_from_hand: Pose, names: &'a HandNames, drive: Drive) -> Self {
         let moving = placed.hand.fingers.iter().map(|finger| moving_joints(&placed.hand, finger)).collect();
-        ModelHand { placed, names, drive, moving }
+        ModelHand { placed, world_from_hand, names, drive, moving }
     }
 
     pub fn hand(&self) -> &'a Hand {
@@ -64,7 +65,7 @@ impl<'a> ModelHand<'a> {
 
     pub fn write_bodies(&self, xml: &mut Xml) {
         let (hand, names) = (self.hand(), self.names);
-        open_body(xml, names.link(hand, hand.base), &self.placed.world_from_hand, Weight::Falls);
+        open_body(xml, names.link(hand, hand.base), &self.world_from_hand, Weight::Falls);
         for (palm, name) in hand.palm.iter().zip(&names.palm) {
             let body_from_shape = palm.placed.parent_from_shape;
             write_geom(xml, &Geom { name, look: Look::Color(PALM_COLOR), body_from_shape, shape: &palm.placed.shape });

@@ -3,8 +3,8 @@
 //! What may touch in the model is what the checker keeps apart (`regrasp_scene::collision_pairs`), pair by pair; pairs that
 //! the hand allows never touch. Servos hold the hands that the plan does not move. An object that the plan does not move stands
 //! on its support, or a weld holds it. A round fingertip touches the object with its ball, as the plan means it, and everything else
-//! with the shapes of its link. MuJoCo collides with convex hulls of meshes: an object that is not convex is written as
-//! its hull, and a note says so. `docs/reference/replay.md` has the settings and where they come from.
+//! with the shapes of its link. MuJoCo collides with convex shapes only: an object that is not convex is cut into
+//! convex parts, and a note says by how much they exceed it. `docs/reference/replay.md` has the settings and where they come from.
 
 mod geom;
 mod hand;
@@ -12,6 +12,7 @@ mod inertia;
 mod model;
 mod names;
 mod object;
+mod solid;
 mod tip;
 mod xml;
 
@@ -46,7 +47,8 @@ pub enum MjcfError {
 ///
 /// Names: bodies and joints as links and joints of the robot; the object is the body `object` (with underscores where a link
 /// has that name) with the free joint of the same name; of each finger the site `FINGER:tip` at the tip's centre and, for
-/// a round tip, the geom `FINGER:tip`; other geoms are `LINK:k`, `obstacle:NAME`, `support:NAME` and `object`. In scenes of
+/// a round tip, the geom `FINGER:tip`; other geoms are `LINK:k`, `obstacle:NAME`, `support:NAME` and `object`, with `object:1`
+/// and so on for further convex parts. In scenes of
 /// several hands or objects the name of the hand or object and a slash stand before each: `right/palm`, `box/object`.
 ///
 /// Errors: the plan is not for this scene's hand.

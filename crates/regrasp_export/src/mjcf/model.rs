@@ -7,6 +7,7 @@ use super::geom::{Geom, Look, OBJECT_MATERIAL, is_hollowed, write_geom, write_me
 use super::hand::{Drive, ModelHand};
 use super::names::Names;
 use super::object::{Hold, ModelObject, hold_at_rest};
+use super::solid::ObjectSolid;
 use super::xml::{Xml, numbers};
 use regrasp_geometry::{Pose, Vector, pose_from};
 use regrasp_plan::Plan;
@@ -16,21 +17,26 @@ use regrasp_scene::{Manipulation, Obstacle};
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 const OBSTACLE_COLOR: &str = "0.5 0.45 0.4 1";
 const SUPPORT_COLOR: &str = "0.62 0.58 0.5 1";
+const ROBOT_COLOR: &str = "0.7 0.71 0.74 1";
 
 /// Everything that stands in the model.
 pub(super) struct Model<'a> {
     pub task: &'a Manipulation<'a>,
     pub names: &'a Names,
+    /// Links of robots that belong to no hand, where they rest.
+    links: &'a [Obstacle],
     pub hands: Vec<ModelHand<'a>>,
     pub objects: Vec<ModelObject<'a>>,
 }
 
 pub(super) fn write(task: &Manipulation, plan: &Plan) -> Mjcf {
     let scene = task.scene;
-    let names = Names::of(scene);
+    let solids: Vec<ObjectSolid> = scene.objects.iter().map(ObjectSolid::of).collect();
+    let links = task.robot_bodies();
+    let names = Names::of(scene, &solids, &links);
     let gravity = plan.promises.forces.as_ref().map_or(Some(GRAVITY), |forces| forces.gravity_in_world);
     let gravity = gravity.unwrap_or(GRAVITY);
-    let model = Model::new(task, plan, &names, &Vector::from(gravity));
+    let model = Model::new(task, plan, (&names, &solids, &links), &Vector::from(gravity));
     let mut xml = Xml::default();
     xml.open("mujoco", &[("model", scene.name.clone())]);
     write_settings(&mut xml, gravity);
@@ -81,12 +87,17 @@ fn write_settings(xml: &mut Xml, gravity: [f64; 3]) {
 }
 
 impl<'a> Model<'a> {
-    fn new(task: &'a Manipulation<'a>, plan: &Plan, names: &'a Names, gravity: &Vector) -> Self {
+    fn new(
+        task: &'a Manipulation<'a>,
+        plan: &Plan,
+        (names, solids, links): (&'a Names, &'a [ObjectSolid], &'a [Obstacle]),
+        gravity: &Vector,
+    ) -> Self {
         let scene = task.scene;
         let hands = scene.hands.iter().zip(&names.hands).enumerate();
         let hands = hands.map(|(index, (placed, names))| {
             let drive = if index == task.hand_index { Drive::Motors } else { Drive::Servos };
-            ModelHand::new(placed, names, drive)
+            ModelHand::new(placed, task.state.world_from_hand(scene, index), names, drive)
         });
         let start = &plan.segments[0].waypoints[0].world_from_object;
         let objects = scene.objects.iter().zip(&names.objects).zip(&task.state.world_from_objects).enumerate();
@@ -96,18 +107,19 @@ impl<'a> Model<'a> {
             } else {
                 (*at_rest, hold_at_rest(object, at_rest, &scene.supports, gravity))
             };
-            ModelObject { object, names, world_from_object, hold }
+            ModelObject { object, names, solid: &solids[index], world_from_object, hold }
         });
-        Model { task, names, hands: hands.collect(), objects: objects.collect() }
+        Model { task, names, links, hands: hands.collect(), objects: objects.collect() }
     }
 
-    /// Obstacles, then supports, each with the name of its geom and its colour.
+    /// Obstacles, supports, then links of robots, each with the name of its geom and its colour.
     fn fixed(&self) -> impl Iterator<Item = (&'a Obstacle, &'a str, &'static str)> {
-        let Model { task, names, .. } = *self;
+        let Model { task, names, links, .. } = *self;
         let obstacles = task.scene.obstacles.iter().zip(&names.obstacles);
         let obstacles = obstacles.map(|(body, name)| (body, name.as_str(), OBSTACLE_COLOR));
         let supports = task.scene.supports.iter().zip(&names.supports);
-        obstacles.chain(supports.map(|(support, name)| (&support.body, name.as_str(), SUPPORT_COLOR)))
+        let links = links.iter().zip(&names.links).map(|(body, name)| (body, name.as_str(), ROBOT_COLOR));
+        obstacles.chain(supports.map(|(support, name)| (&support.body, name.as_str(), SUPPORT_COLOR))).chain(links)
     }
 
     fn write_assets(&self, xml: &mut Xml) {
@@ -129,7 +141,8 @@ impl<'a> Model<'a> {
             write_mesh(xml, &body.placed.shape, name);
         }
         for object in &self.objects {
-            write_mesh(xml, &object.object.shape, &object.names.geom);
+            let parts = object.solid.parts.iter().zip(&object.names.geoms);
+            parts.for_each(|(shape, name)| write_mesh(xml, shape, name));
         }
         xml.close();
     }
@@ -227,17 +240,18 @@ impl<'a> Model<'a> {
     fn notes(&self) -> Vec<String> {
         let moved = &self.objects[self.task.object_index];
         let others = || self.objects.iter().filter(|object| object.hold != Hold::Fingers);
-        let fixed = self.fixed().map(|(body, _, _)| (body.name.as_str(), &body.placed.shape));
-        let hollowed = std::iter::once((moved.object.name.as_str(), &moved.object.shape))
-            .chain(others().map(|object| (object.object.name.as_str(), &object.object.shape)))
-            .chain(fixed)
-            .filter(|(_, shape)| is_hollowed(shape))
-            .map(|(name, _)| format!("\"{name}\" is not convex; MuJoCo collides with its convex hull"));
+        let cut = std::iter::once(moved).chain(others()).filter_map(|object| {
+            let note = object.solid.note.as_ref()?;
+            Some(format!("\"{}\" is not convex; {note}", object.object.name))
+        });
+        let fixed = self.fixed().filter(|(body, _, _)| is_hollowed(&body.placed.shape));
+        let hollowed =
+            fixed.map(|(body, _, _)| format!("\"{}\" is not convex; MuJoCo collides with its convex hull", body.name));
         let pinned = others().filter(|object| object.hold == Hold::Pin).map(|object| {
             let (name, pin) = (&object.object.name, &object.names.pin);
             format!("\"{name}\" stands on no support; the weld \"{pin}\" holds it where the scene has it")
         });
-        hollowed.chain(pinned).collect()
+        cut.chain(hollowed).chain(pinned).collect()
     }
 }
 

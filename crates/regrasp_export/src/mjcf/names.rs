@@ -3,11 +3,13 @@
 //! In a scene of one hand and one object, links, joints and fingers keep their names, and the object is `object`. In all other
 //! scenes the name of the hand or the object and a slash come first: `right/palm`, `box/object`.
 
+use super::solid::ObjectSolid;
 use super::tip::{own_tip, tip_name};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_robot::tip::is_same_surface;
 use regrasp_robot::{Hand, JointId, LinkId};
-use regrasp_scene::{Manipulation, Scene};
+use regrasp_scene::{Manipulation, Obstacle, Scene};
+use std::slice;
 
 /// Names of a hand.
 pub(super) struct HandNames {
@@ -27,8 +29,8 @@ pub(super) struct ObjectNames {
     pub sensor: String,
     /// Its body and its free joint.
     pub body: String,
-    /// Its geom.
-    pub geom: String,
+    /// Its geoms, one for each convex part.
+    pub geoms: Vec<String>,
     /// The equality that holds it where it starts.
     pub pin: String,
 }
@@ -43,47 +45,55 @@ pub(super) struct Names {
     pub supports: Vec<String>,
     /// Geoms of the obstacles.
     pub obstacles: Vec<String>,
+    /// Geoms of the links of robots that belong to no hand.
+    pub links: Vec<String>,
 }
 
 impl Names {
-    /// The names of everything in `scene`.
-    pub fn of(scene: &Scene) -> Self {
+    /// The names of everything in `scene`, of which the objects have these `solids`; `links` are those of robots that belong to no
+    /// hand.
+    pub fn of(scene: &Scene, solids: &[ObjectSolid], links: &[Obstacle]) -> Self {
         let has_one_of_each = scene.hands.len() == 1 && scene.objects.len() == 1;
         let prefix = |name: &str| if has_one_of_each { String::new() } else { format!("{name}/") };
         let hands: Vec<HandNames> =
             scene.hands.iter().map(|placed| HandNames::of(&placed.hand, prefix(&placed.name))).collect();
-        let object = |name: &str| {
+        let object = |name: &str, solid: &ObjectSolid| {
             let prefix = prefix(name);
             let mut body = format!("{prefix}object");
             while scene.hands.iter().zip(&hands).any(|(placed, names)| names.uses(&placed.hand, &body)) {
                 body.push('_');
             }
-            let [sensor, geom] = [format!("{prefix}object"), format!("{prefix}object")];
-            ObjectNames { sensor, body, geom, pin: format!("{prefix}pin") }
+            let sensor = format!("{prefix}object");
+            let part = |k: usize| if k == 0 { sensor.clone() } else { format!("{sensor}:{k}") };
+            let geoms = (0..solid.parts.len()).map(part).collect();
+            ObjectNames { sensor, body, geoms, pin: format!("{prefix}pin") }
         };
         Names {
-            objects: scene.objects.iter().map(|each| object(&each.name)).collect(),
+            objects: scene.objects.iter().zip(solids).map(|(each, solid)| object(&each.name, solid)).collect(),
             supports: scene.supports.iter().map(|support| format!("support:{}", support.body.name)).collect(),
             obstacles: scene.obstacles.iter().map(|obstacle| format!("obstacle:{}", obstacle.name)).collect(),
+            links: links.iter().enumerate().map(|(index, link)| format!("link:{}:{index}", link.name)).collect(),
             hands,
         }
     }
 
-    /// The geoms of `HandView::obstacles` of `task`, in that order; two shapes that are written as one geom have the same name.
-    pub fn around(&self, task: &Manipulation) -> Vec<&str> {
-        let mut names: Vec<&str> = self.obstacles.iter().chain(&self.supports).map(String::as_str).collect();
+    /// The geoms of each of `HandView::obstacles` of `task`, in that order; two shapes that are written as one geom have the same
+    /// name.
+    pub fn around(&self, task: &Manipulation) -> Vec<&[String]> {
+        let fixed = self.obstacles.iter().chain(&self.supports).chain(&self.links);
+        let mut names: Vec<&[String]> = fixed.map(slice::from_ref).collect();
         for (index, placed) in task.scene.hands.iter().enumerate().filter(|(index, _)| *index != task.hand_index) {
             let own = &self.hands[index];
-            names.extend(own.palm.iter().map(String::as_str));
+            names.extend(own.palm.iter().map(slice::from_ref));
             for (f, finger) in placed.hand.fingers.iter().enumerate() {
-                names.extend(own.fingers[f].iter().map(String::as_str));
+                names.extend(own.fingers[f].iter().map(slice::from_ref));
                 if finger.tip.own_shape().is_some() {
-                    names.extend(own.touching[f].iter().map(String::as_str));
+                    names.extend(own.touching[f].iter().map(slice::from_ref));
                 }
             }
         }
         let others = self.objects.iter().enumerate().filter(|(index, _)| *index != task.object_index);
-        names.extend(others.map(|(_, names)| names.geom.as_str()));
+        names.extend(others.map(|(_, names)| names.geoms.as_slice()));
         names
     }
 }

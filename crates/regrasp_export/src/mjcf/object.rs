@@ -3,6 +3,7 @@
 use super::geom::{Geom, Look, Weight, as_collided, open_body, write_geom, write_inertial};
 use super::inertia;
 use super::names::ObjectNames;
+use super::solid::ObjectSolid;
 use super::xml::Xml;
 use regrasp_geometry::collision::{Answer, Placed, Placement, separation};
 use regrasp_geometry::{Pose, Shape, Vector};
@@ -26,6 +27,7 @@ pub(super) enum Hold {
 pub(super) struct ModelObject<'a> {
     pub object: &'a Object,
     pub names: &'a ObjectNames,
+    pub solid: &'a ObjectSolid,
     pub world_from_object: Pose,
     pub hold: Hold,
 }
@@ -35,13 +37,9 @@ impl ModelObject<'_> {
         open_body(xml, self.names.body.clone(), &self.world_from_object, Weight::Falls);
         xml.leaf("freejoint", &[("name", self.names.body.clone())]);
         write_inertial(xml, &inertia::of_object(self.object));
-        let geom = Geom {
-            name: &self.names.geom,
-            look: Look::Checkers,
-            body_from_shape: Pose::identity(),
-            shape: &self.object.shape,
-        };
-        write_geom(xml, &geom);
+        for (shape, name) in self.solid.parts.iter().zip(&self.names.geoms) {
+            write_geom(xml, &Geom { name, look: Look::Checkers, body_from_shape: Pose::identity(), shape });
+        }
         xml.close();
     }
 

@@ -50,6 +50,33 @@ fn every_waypoint_is_a_keyframe_and_every_joint_has_a_motor() {
 }
 
 #[test]
+fn an_object_that_is_not_convex_is_written_in_parts_that_everything_may_touch() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/bulb.toml");
+    let bulb = regrasp_scene::load_scene(&path, &Default::default()).expect("a bundled scene");
+    let bulb = bulb.manipulation();
+    let mjcf = to_mjcf(&bulb, &PLAN).expect("the same hand");
+    let geoms = values(&mjcf.xml, "geom", "name");
+    let parts: Vec<&str> = geoms.into_iter().filter(|name| name.starts_with("object")).collect();
+    assert!(parts.len() >= 2 && parts.contains(&"object") && parts.contains(&"object:1"), "{parts:?}");
+    let (a, b) = (values(&mjcf.xml, "pair", "geom1"), values(&mjcf.xml, "pair", "geom2"));
+    let touched_by = |part: &str| -> BTreeSet<&str> {
+        a.iter().zip(&b).filter(|(_, other)| **other == part).map(|(name, _)| *name).collect()
+    };
+    let first = touched_by("object");
+    assert!(first.len() > bulb.hand().fingers.len() + bulb.scene.obstacles.len());
+    assert!(parts.iter().all(|part| touched_by(part) == first));
+    assert!(mjcf.notes.iter().any(|note| note.contains("convex parts")), "{:?}", mjcf.notes);
+    // The hull of the bulb is a cone from globe to screw, wider than the socket's hole of 11 mm radius. No part is.
+    for part in mjcf.xml.lines().filter(|line| line.contains("<mesh name=\"object")) {
+        let numbers: Vec<f64> =
+            values(part, "mesh", "vertex")[0].split(' ').map(|number| number.parse().expect("a number")).collect();
+        let widest = numbers.chunks(3).map(|p| p[0].hypot(p[1])).fold(0.0, f64::max);
+        let highest = numbers.chunks(3).map(|p| p[2]).fold(f64::NEG_INFINITY, f64::max);
+        assert!(widest < 0.0105 || highest < 0.0385, "a part of radius {widest} reaches up to {highest}");
+    }
+}
+
+#[test]
 fn a_plan_for_another_hand_is_refused() {
     let mut plan = PLAN.clone();
     plan.joint_names[0] = "elbow".into();

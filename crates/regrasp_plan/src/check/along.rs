@@ -2,10 +2,10 @@
 
 use crate::check::bodies::{Bodies, Pair};
 use crate::check::closure::{Body, Certificate, certified_margin, margin_by};
-use crate::check::continuity::{is_free_throughout, moving_finger};
 use crate::check::model::Model;
 use crate::check::motion::Step;
 use crate::check::promises::{Holder, grips_of, holders};
+use crate::check::roles::{is_free_throughout, moving_finger};
 use crate::check::{CheckSettings, Log, form_is_sound};
 use crate::plan::{Plan, Segment, SegmentKind, Waypoint};
 use regrasp_scene::Manipulation;

@@ -1,13 +1,13 @@
 //! Where joints and object are between two waypoints, as `docs/reference/plan-format.md` (Time) defines it, with bounds of how fast.
 //!
 //! Every joint follows the cubic through its positions, velocities and times. The object follows
-//! [`pose_between`](crate::check::continuity::pose_between) at the parameter `sigma`: a cubic from 0 to 1 whose slopes at both
+//! [`pose_between`](crate::check::pose::pose_between) at the parameter `sigma`: a cubic from 0 to 1 whose slopes at both
 //! ends are those of the joints along their chord. Here `u` is the share of the time between the waypoints.
 //!
 //! All bounds are exact. The first derivative of a cubic is a parabola, largest at an end or at its vertex. The second one is
 //! linear, largest at an end.
 
-use crate::check::continuity::pose_between;
+use crate::check::pose::pose_between;
 use crate::plan::Waypoint;
 use regrasp_geometry::Pose;
 

@@ -1,5 +1,6 @@
 //! Everything that can collide, and which pairs must not.
 
+use crate::check::carried::{is_of_hand, joints_above_base, links_of_no_hand};
 use crate::check::kinematics::{Path, pose_of};
 use crate::check::model::Model;
 use nalgebra::{Rotation3, UnitQuaternion};
@@ -149,7 +150,12 @@ impl Bodies {
 
     fn add_hand(&mut self, task: &Manipulation, model: &Model) -> Result<(), String> {
         let robot = &task.hand().robot;
+        // Joints of an arm above the hand are not between bodies of the hand.
+        let above = joints_above_base(task);
         for (l, link) in robot.links.iter().enumerate() {
+            if !is_of_hand(task, LinkId(l)) {
+                continue;
+            }
             let path = Path::new(robot, LinkId(l), &model.world_from_root, &model.joint_names)?;
             // A link is a finger's when one of that finger's coordinates moves it.
             let owner = path
@@ -158,7 +164,7 @@ impl Bodies {
                 .flat_map(|joint| &joint.drive.terms)
                 .find_map(|&(k, _)| model.fingers.iter().position(|finger| finger.coordinates.contains(&k)))
                 .map_or(Owner::Palm, Owner::Finger);
-            let body_depth = path.joints.len();
+            let body_depth = path.joints.len() - above;
             let is_tip = matches!(owner, Owner::Finger(f) if model.fingers[f].tip_link.0 == l);
             self.carriers.push(Carrier::Link(path));
             let carrier = self.carriers.len() - 1;
@@ -176,7 +182,8 @@ impl Bodies {
                 let carrier = self.carriers.len() - 1;
                 let name = format!("tip of {}", finger.name);
                 let item = self.add(&name, Owner::Finger(f), carrier, &at, &shape)?;
-                (item.link, item.body_depth, item.is_tip) = (Some(finger.tip_link), finger.path.joints.len(), true);
+                (item.link, item.body_depth, item.is_tip) =
+                    (Some(finger.tip_link), finger.path.joints.len() - above, true);
             }
         }
         Ok(())
@@ -189,10 +196,17 @@ impl Bodies {
             let placed = &support.body.placed;
             self.add(&support.body.name, Owner::Obstacle, WORLD, &placed.parent_from_shape, &placed.shape)?;
         }
+        for index in 0..scene.robots.len() {
+            self.add_robot(task, index)?;
+        }
         for (h, other) in scene.hands.iter().enumerate().filter(|(h, _)| *h != task.hand_index) {
             let (robot, joints) = (&other.hand.robot, &state.hand_joints[h]);
-            let model = Model::new(&Manipulation { hand_index: h, ..*task })?;
+            let of_other = Manipulation { hand_index: h, ..*task };
+            let model = Model::new(&of_other)?;
             for (l, link) in robot.links.iter().enumerate() {
+                if !is_of_hand(&of_other, LinkId(l)) || is_of_carrier(task, &of_other, LinkId(l)) {
+                    continue;
+                }
                 let path = Path::new(robot, LinkId(l), &model.world_from_root, &model.joint_names)?;
                 let world_from_link = pose_of(&path.world_from_link(joints));
                 let name = format!("{}/{}", other.name, link.name);
@@ -211,6 +225,27 @@ impl Bodies {
         }
         for (o, other) in scene.objects.iter().enumerate().filter(|(o, _)| *o != task.object_index) {
             self.add(&other.name, Owner::Resting, WORLD, &state.world_from_objects[o], other.solid())?;
+        }
+        Ok(())
+    }
+
+    /// The links of a robot that are no hand's. Those that move as the manipulating hand does are in its palm.
+    fn add_robot(&mut self, task: &Manipulation, index: usize) -> Result<(), String> {
+        let robot = &task.scene.robots[index];
+        let carries = task.placed_hand().carrier.is_some_and(|carrier| carrier.robot == index);
+        for (id, world_from_link) in links_of_no_hand(task, index)? {
+            if carries && is_of_hand(task, id) {
+                continue;
+            }
+            let link = &robot.robot.links[id.0];
+            let name = format!("{}/{}", robot.name, link.name);
+            for placed in &link.collision {
+                let shape = convex_of(&placed.shape).map_err(|error| format!("link \"{name}\": {error}"))?;
+                // The arm that carries the hand is where it was built to be: the palm is not kept away from it.
+                let owner = if carries { Owner::Obstacle } else { Owner::Resting };
+                let at = world_from_link * placed.parent_from_shape;
+                self.add(&name, owner, WORLD, &at, &shape)?.link = carries.then_some(id);
+            }
         }
         Ok(())
     }
@@ -251,4 +286,10 @@ impl Bodies {
             }
         }
     }
+}
+
+/// True for a link of the robot that carries both hands, and that counts as palm of the other: it is added with the robot.
+fn is_of_carrier(task: &Manipulation, of_other: &Manipulation, link: LinkId) -> bool {
+    let robots = [task, of_other].map(|one| one.placed_hand().carrier.map(|carrier| carrier.robot));
+    robots[0].is_some() && robots[0] == robots[1] && is_of_hand(task, link)
 }

@@ -1,11 +1,11 @@
 //! No collision at any moment: distances by parry, motion bounds between the moments where they are measured.
 
 use crate::check::bodies::{Bodies, Owner, Pair};
-use crate::check::continuity::{is_free_throughout, moving_finger};
 use crate::check::far::Looked;
-use crate::check::lift::{FreePart, free_part};
+use crate::check::lift::{FreePart, Relocation, free_part};
 use crate::check::model::Model;
 use crate::check::motion::{Breach, Step, certify};
+use crate::check::roles::{is_free_throughout, moving_finger};
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Clearance, Log};
 use crate::plan::Plan;
@@ -36,8 +36,10 @@ pub fn check_collision(
         // Segments may fail to meet; what was known before says nothing then.
         tracks.iter_mut().for_each(|track| track.bound = f64::NEG_INFINITY);
         let moving = moving_finger(model, segment);
-        let free =
-            moving.and_then(|f| free_part(bodies, &model.fingers[f], f, segment, s, settings, log, &mut n_distances));
+        let free = moving.and_then(|f| {
+            let relocation = Relocation { finger: &model.fingers[f], f, segment, s };
+            free_part(bodies, &relocation, settings, log, &mut n_distances)
+        });
         let is_free: Vec<bool> = (0..model.fingers.len()).map(|f| is_free_throughout(segment, f)).collect();
         for (w, ends) in segment.waypoints.windows(2).enumerate() {
             let mut step = Step::new(bodies, &ends[0], &ends[1]);

@@ -2,12 +2,12 @@
 //! waypoints are judged in `rolling`.
 
 use crate::check::between::Between;
-use crate::check::continuity::{contact_of, moving_finger};
 use crate::check::edges::Edges;
 use crate::check::model::{FingerModel, Model};
-use crate::check::rolling::{bounds_in_object, speed_in_object};
+use crate::check::roles::{contact_of, moving_finger};
 use crate::check::surface;
-use crate::check::tip::TipSurface;
+use crate::check::tip_rates::{bounds_in_object, speed_in_object};
+use crate::check::tip_surface::TipSurface;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, Plan, SegmentKind, Waypoint};

@@ -3,11 +3,13 @@
 
 use crate::check::between::Between;
 use crate::check::model::Model;
+use crate::check::pose::pose_difference;
+use crate::check::roles::{contacts_agree, moving_finger};
 use crate::check::tracking;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, ContactState, FORMAT, FORMAT_VERSION, Plan, PoseData, Segment, SegmentKind, Waypoint};
-use regrasp_geometry::{Pose, UnitVector, Vector};
+use regrasp_geometry::Vector;
 use regrasp_scene::Query;
 use regrasp_scene::query::TRACKING;
 
@@ -118,33 +120,9 @@ fn is_pose(pose: &PoseData) -> bool {
     pose.position.iter().all(|x| x.is_finite()) && (length - 1.0).abs() < 1e-9
 }
 
-/// Distance and angle between two poses.
-pub fn pose_difference(a: &PoseData, b: &PoseData) -> (f64, f64) {
-    let (a, b) = (Pose::from(a), Pose::from(b));
-    let (p, q) = (a.rotation.coords, b.rotation.coords);
-    let q = if p.dot(&q) < 0.0 { -q } else { q };
-    ((a.translation.vector - b.translation.vector).norm(), 4.0 * (p - q).norm().atan2((p + q).norm()))
-}
-
 fn poses_agree(a: &PoseData, b: &PoseData, tolerance: f64) -> bool {
     let (distance, angle) = pose_difference(a, b);
     distance <= tolerance && angle <= tolerance
-}
-
-/// The pose `t` of the way between two waypoints: position linear, orientation by the shorter great circle.
-pub fn pose_between(from: &Pose, to: &Pose, t: f64) -> Pose {
-    let a = from.rotation.coords;
-    let b = if a.dot(&to.rotation.coords) < 0.0 { -to.rotation.coords } else { to.rotation.coords };
-    let angle = 2.0 * (a - b).norm().atan2((a + b).norm());
-    let (at_a, at_b) = if angle < 1e-9 {
-        (1.0 - t, t)
-    } else {
-        (((1.0 - t) * angle).sin() / angle.sin(), (t * angle).sin() / angle.sin())
-    };
-    let coords = a * at_a + b * at_b;
-    let rotation = nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::from_vector(coords));
-    let position = from.translation.vector * (1.0 - t) + to.translation.vector * t;
-    Pose::from_parts(nalgebra::Translation3::from(position), rotation)
 }
 
 /// Start and goal: the plan against the query, and the first and last waypoint against the plan's own header.
@@ -214,16 +192,6 @@ pub fn check_meeting(plan: &Plan, settings: &CheckSettings, log: &mut Log) {
             log.push(violation.amount(gap, settings.meeting_tolerance));
         }
     }
-}
-
-/// True when both hold at the same place with the same normal, at a fixed contact or rolling, or both are free.
-pub fn contacts_agree(a: &ContactState, b: &ContactState, tolerance: f64) -> bool {
-    let near = |p: Option<[f64; 3]>, q: Option<[f64; 3]>| match (p, q) {
-        (Some(p), Some(q)) => (Vector::from(p) - Vector::from(q)).norm() <= tolerance,
-        (None, None) => true,
-        _ => false,
-    };
-    a.holds() == b.holds() && near(a.point_in_object, b.point_in_object) && near(a.normal_in_object, b.normal_in_object)
 }
 
 /// Limits at every waypoint and between, and steps that are jumps.
@@ -436,44 +404,4 @@ fn mode_in_words(mode: ContactMode) -> &'static str {
 
 fn is_free(contact: &ContactState) -> bool {
     contact.mode == ContactMode::Free
-}
-
-/// True when finger `f` is free at every waypoint of the segment.
-pub fn is_free_throughout(segment: &Segment, f: usize) -> bool {
-    segment.waypoints.iter().all(|waypoint| is_free(&waypoint.contacts[f]))
-}
-
-/// Index of the finger that moves in a regrasp, where it names one of the hand's; none in a transfer, whatever it names.
-pub fn moving_finger(model: &Model, segment: &Segment) -> Option<usize> {
-    let name = segment.moving_finger.as_deref().filter(|_| segment.kind == SegmentKind::Regrasp)?;
-    model.fingers.iter().position(|finger| finger.name == name)
-}
-
-/// The contact as the closure test takes it.
-pub fn contact_of(state: &ContactState) -> Option<regrasp_grasp::Contact> {
-    Some(regrasp_grasp::Contact {
-        point_in_object: state.point_in_object?.into(),
-        normal_in_object: UnitVector::new_normalize(Vector::from(state.normal_in_object?)),
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use regrasp_base::Rng;
-
-    #[test]
-    fn the_motion_between_waypoints_is_the_one_that_plans_mean() {
-        let mut rng = Rng::keyed(1, "pose_between", 0);
-        for _ in 0..500 {
-            let mut pose = || {
-                let position = std::array::from_fn(|_| rng.uniform(-0.1, 0.1));
-                regrasp_geometry::pose_from(position, rng.quat_xyzw())
-            };
-            let (a, b) = (pose(), pose());
-            let t = rng.unit();
-            let (ours, theirs) = (pose_between(&a, &b, t), regrasp_geometry::interpolate_pose(&a, &b, t));
-            assert!((ours.to_homogeneous() - theirs.to_homogeneous()).norm() < 1e-9);
-        }
-    }
 }

@@ -24,9 +24,9 @@
 
 use crate::check::between::Between;
 use crate::check::closure::Body;
-use crate::check::continuity::{contact_of, moving_finger};
 use crate::check::kinematics::DrivenAxis;
 use crate::check::model::{FingerModel, Model};
+use crate::check::roles::{contact_of, moving_finger};
 use crate::check::rolling::Roll;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};

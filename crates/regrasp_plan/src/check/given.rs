@@ -3,7 +3,7 @@
 
 use crate::check::model::{FingerModel, Model};
 use crate::check::surface::SortedShape;
-use crate::check::tip::TipSurface;
+use crate::check::tip_surface::TipSurface;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{Plan, Waypoint};

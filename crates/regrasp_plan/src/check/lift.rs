@@ -2,9 +2,9 @@
 //! the next one from there. One that is free at an end of its motion has nothing to leave or reach there.
 
 use crate::check::bodies::{Bodies, Owner, Pair};
-use crate::check::continuity::contact_of;
 use crate::check::model::FingerModel;
 use crate::check::motion::Step;
+use crate::check::roles::contact_of;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, Segment, Waypoint};
@@ -22,19 +22,30 @@ const MOST_SAMPLES: usize = 4096;
 /// The part of a regrasp in which the tip must not touch: from (step, parameter) to (step, parameter).
 pub type FreePart = ((usize, f64), (usize, f64));
 
-/// Finds where the lift of `finger` ends and its landing begins, and reports what is wrong with either.
+/// A finger that moves in a regrasp.
+#[derive(Debug, Clone, Copy)]
+pub struct Relocation<'a> {
+    /// The finger.
+    pub finger: &'a FingerModel,
+    /// Its index.
+    pub f: usize,
+    /// The regrasp.
+    pub segment: &'a Segment,
+    /// Its index.
+    pub s: usize,
+}
+
+/// Finds where the lift of the finger ends and its landing begins, and reports what is wrong with either.
 ///
 /// None when the tip never gets clear of the object.
 pub fn free_part(
     bodies: &Bodies,
-    finger: &FingerModel,
-    f: usize,
-    segment: &Segment,
-    s: usize,
+    relocation: &Relocation,
     settings: &CheckSettings,
     log: &mut Log,
     n_distances: &mut u64,
 ) -> Option<FreePart> {
+    let &Relocation { finger, f, segment, s } = relocation;
     let n_steps = segment.waypoints.len() - 1;
     let mut search = Search { bodies, finger, f, segment, s, settings, log, n_distances };
     let (first, last) = (&segment.waypoints[0], &segment.waypoints[n_steps]);

@@ -1,7 +1,7 @@
 //! What is too large to be judged: leaps, which motion bounds would follow for ever, and more work than the checker does.
 
-use crate::check::continuity::pose_difference;
 use crate::check::model::Model;
+use crate::check::pose::pose_difference;
 use crate::check::violation::{Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::Plan;

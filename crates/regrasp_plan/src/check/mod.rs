@@ -13,6 +13,8 @@ mod any_gravity;
 pub mod between;
 /// Everything that can collide, and which pairs must not.
 pub mod bodies;
+/// Hands that robots carry.
+mod carried;
 /// Force closure with margin, by exact second-order cones.
 pub mod closure;
 /// No collision at any moment.
@@ -51,20 +53,30 @@ pub mod motion;
 pub mod patch;
 /// The triangles of a polyhedron in pieces, for questions about what is near.
 mod pieces;
+/// How far apart poses are, and what lies between.
+pub mod pose;
 /// What the plan promises, and whether the promises may be made and are kept.
 pub mod promises;
+/// Which finger moves, and which are free.
+pub mod roles;
 /// Fingertips that roll.
 pub mod rolling;
 /// Closure and pads of rolling contacts between waypoints.
 pub mod rolling_closure;
 /// How far contacts slip from landing to lifting.
 pub mod slip;
+/// How far a contact slips in one step.
+pub mod step_slip;
 /// Distance from the object's surface and the normals there.
 pub mod surface;
 /// When waypoints are passed, and how fast.
 pub mod times;
 /// Fingertips: where they touch.
 pub mod tip;
+/// How fast a fingertip moves at most, seen from the object.
+pub mod tip_rates;
+/// The surface of a fingertip.
+pub mod tip_surface;
 /// Fingertips that stay on the object in tracking, and how far they may go.
 pub mod tracking;
 /// What can be wrong with a plan.

@@ -1,8 +1,9 @@
 //! The scene as the checker sees it: paths to links, joint limits and fingertips, straight from the robot.
 
+use crate::check::carried::world_from_base;
 use crate::check::kinematics::{Drive, Path, world_from_root};
 use crate::check::surface::SortedShape;
-use crate::check::tip::TipSurface;
+use crate::check::tip_surface::TipSurface;
 use nalgebra::Matrix4;
 use regrasp_geometry::{Point, Pose};
 use regrasp_robot::tip::Pad;
@@ -114,7 +115,7 @@ impl Model {
         let hand = task.hand();
         let robot = &hand.robot;
         let joint_names = hand.joint_names();
-        let world_from_root = world_from_root(hand, &task.world_from_hand())?;
+        let world_from_root = world_from_root(hand, &world_from_base(task)?)?;
         let mut fingers = Vec::new();
         let mut first = 0;
         let at_rest: Vec<f64> = hand.fingers.iter().flat_map(|finger| finger.rest.iter().copied()).collect();

@@ -2,8 +2,8 @@
 
 use crate::check::between::Between;
 use crate::check::bodies::{Bodies, Carrier, Item, OBJECT, Pair};
-use crate::check::continuity::pose_difference;
 use crate::check::kinematics::{Rates, pose_of};
+use crate::check::pose::pose_difference;
 use crate::plan::Waypoint;
 use nalgebra::Translation3;
 use regrasp_geometry::reference::{Answer, distance, point_distance};

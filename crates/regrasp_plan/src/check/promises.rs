@@ -12,14 +12,14 @@
 //! Tolerances, for rounding and two solvers, are the constants below.
 
 use crate::check::closure::{Body, Certificate, certified_margin, margin_by};
-use crate::check::continuity::{contact_of, moving_finger};
 use crate::check::model::Model;
+use crate::check::roles::{contact_of, moving_finger};
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
-use crate::plan::{Plan, PlanInput, SegmentKind, Waypoint};
+use crate::plan::{Plan, SegmentKind, Waypoint};
 use regrasp_grasp::{Contact, Grip};
 use regrasp_scene::{InputFile, Object};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// How much smaller than required a margin may come out: two solvers, one number.
 pub(super) const MARGIN_TOLERANCE: f64 = 1e-9;
@@ -31,42 +31,38 @@ const SCALE_TOLERANCE: f64 = 1e-9;
 const FRICTION_TOLERANCE: f64 = 1e-9;
 
 /// The files of the plan against those of the scene as loaded now.
+///
+/// Files of several hands may have the same name, each in a folder of its own: the first in the plan is the first in the scene.
 pub fn check_inputs(plan: &Plan, inputs: &[InputFile], log: &mut Log) {
-    for (name, message) in input_faults(&plan.inputs, inputs) {
-        log.push(Violation::new(Kind::InputHashMismatch, message).subjects([name]));
+    let mut n_seen: BTreeMap<(&str, &str), usize> = BTreeMap::new();
+    for input in &plan.inputs {
+        let n_before = n_seen.entry((&input.role, &input.name)).or_default();
+        let mut alike = inputs.iter().filter(|file| file.role == input.role && file.name == input.name);
+        match alike.nth(*n_before) {
+            None => {
+                let message = format!("{} \"{}\" is not among the scene's files", input.role, input.name);
+                log.push(Violation::new(Kind::InputHashMismatch, message).subjects([input.name.as_str()]));
+            }
+            Some(file) if file.sha256 != input.sha256 => {
+                let message = format!(
+                    "{} \"{}\" has sha256 {}, the plan was made from {}",
+                    input.role, input.name, file.sha256, input.sha256
+                );
+                log.push(Violation::new(Kind::InputHashMismatch, message).subjects([input.name.as_str()]));
+            }
+            Some(_) => {}
+        }
+        *n_before += 1;
     }
-}
-
-/// Names of files that differ, and how. Files of two hands may have one name: each is compared with all files of its role and name.
-fn input_faults<'a>(planned: &'a [PlanInput], found: &'a [InputFile]) -> Vec<(&'a str, String)> {
-    let is_named = |input: &PlanInput, file: &InputFile| file.role == input.role && file.name == input.name;
-    let mut faults = Vec::new();
-    for input in planned {
-        let mut named = found.iter().filter(|file| is_named(input, file)).peekable();
-        let Some(first) = named.peek().copied() else {
-            let message = format!("{} \"{}\" is not among the scene's files", input.role, input.name);
-            faults.push((input.name.as_str(), message));
-            continue;
-        };
-        if !named.any(|file| file.sha256 == input.sha256) {
-            let message = format!(
-                "{} \"{}\" has sha256 {}, the plan was made from {}",
-                input.role, input.name, first.sha256, input.sha256
-            );
-            faults.push((input.name.as_str(), message));
+    for file in inputs {
+        match n_seen.get_mut(&(file.role.as_str(), file.name.as_str())).filter(|n_left| **n_left > 0) {
+            Some(n_left) => *n_left -= 1,
+            None => {
+                let message = format!("the scene reads {} \"{}\", the plan was made without it", file.role, file.name);
+                log.push(Violation::new(Kind::InputHashMismatch, message).subjects([file.name.as_str()]));
+            }
         }
     }
-    for file in found {
-        let mut named = planned.iter().filter(|input| is_named(input, file)).peekable();
-        // A file of the plan with this name that is another one now has been reported above.
-        let is_reported =
-            |input: &PlanInput| found.iter().all(|other| !is_named(input, other) || other.sha256 != input.sha256);
-        if named.peek().is_none() || !named.any(|input| input.sha256 == file.sha256 || is_reported(input)) {
-            let message = format!("the scene reads {} \"{}\", the plan was made without it", file.role, file.name);
-            faults.push((file.name.as_str(), message));
-        }
-    }
-    faults
 }
 
 /// Of so many different sets of contacts one is solved for before the others are looked at.
@@ -249,46 +245,5 @@ pub fn check_promises(object: &Object, plan: &Plan, settings: &CheckSettings, mi
     if promises.friction < 0.0 {
         let message = format!("friction {} is negative", promises.friction);
         broken("friction", promises.friction, 0.0, message);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn planned(files: &[(&str, &str)]) -> Vec<PlanInput> {
-        let input = |&(name, sha256): &(&str, &str)| PlanInput {
-            role: "urdf".into(),
-            name: name.into(),
-            sha256: sha256.into(),
-        };
-        files.iter().map(input).collect()
-    }
-
-    fn found(files: &[(&str, &str)]) -> Vec<InputFile> {
-        let file = |&(name, sha256): &(&str, &str)| InputFile {
-            role: "urdf".into(),
-            name: name.into(),
-            path: name.into(),
-            sha256: sha256.into(),
-        };
-        files.iter().map(file).collect()
-    }
-
-    #[test]
-    fn files_of_two_hands_may_have_one_name() {
-        let of_plan = planned(&[("hand.urdf", "a"), ("hand.urdf", "b")]);
-        assert!(input_faults(&of_plan, &found(&[("hand.urdf", "a"), ("hand.urdf", "b")])).is_empty());
-        for (now, n_faults) in [
-            (vec![("hand.urdf", "a"), ("hand.urdf", "c")], 1),
-            (vec![("hand.urdf", "a")], 1),
-            (vec![("hand.urdf", "a"), ("hand.urdf", "b"), ("hand.urdf", "c")], 1),
-            (vec![("other.urdf", "a"), ("hand.urdf", "b")], 2),
-            (vec![], 2),
-        ] {
-            let now = found(&now);
-            let faults = input_faults(&of_plan, &now);
-            assert_eq!(faults.len(), n_faults, "{now:?}: {faults:?}");
-        }
     }
 }

@@ -9,11 +9,11 @@
 use crate::check::between::Between;
 use crate::check::contact::error_at;
 use crate::check::model::{FingerModel, Model};
-use crate::check::motion::ObjectRates;
 use crate::check::patch::Patch;
-use crate::check::slip::StepSlip;
+use crate::check::step_slip::{StepSlip, torsion_radius};
 use crate::check::surface::SortedShape;
-use crate::check::tip::TipSurface;
+use crate::check::tip_rates::{bounds_in_object, speed_in_object};
+use crate::check::tip_surface::TipSurface;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, Plan, SegmentKind, Waypoint};
@@ -78,7 +78,7 @@ pub fn check_rolling(
                         (error, fraction) = (between, at);
                     }
                     let slip = roll.slip(UNKNOWN_SHARE * slip_tolerance);
-                    rolled.steps.insert((f, s, w), StepSlip::of(&roll, finger, slip));
+                    rolled.steps.insert((f, s, w), roll.step_slip(finger, slip));
                     if !log.work.spend(roll.looked(), "fingertips that roll") {
                         return rolled;
                     }
@@ -263,6 +263,16 @@ impl<'a> Roll<'a> {
         integral(|n_pieces| slide(&object_from_link, &touching, n_pieces), allowed)
     }
 
+    /// Slip of the step, of a round fingertip whose touching point slides so far.
+    pub fn step_slip(&self, finger: &FingerModel, slide: f64) -> StepSlip {
+        let torsion_radius = torsion_radius(finger);
+        let twist = match torsion_radius > 0.0 {
+            true => torsion_radius * self.turning().map_or(f64::INFINITY, |turning| turning.twist),
+            false => 0.0,
+        };
+        StepSlip { slide, twist, travel: self.travel() }
+    }
+
     /// How far the contact travels over the object, by chords of half a step; zero where no surface is near.
     pub fn travel(&self) -> f64 {
         let [start, middle, end] = [0.0, 0.5, 1.0].map(|t| self.contact(t).map(|(point, _)| point));
@@ -317,25 +327,6 @@ pub struct Turning {
 fn turn_between(before: &Matrix4<f64>, after: &Matrix4<f64>) -> Vector {
     let turn = after.fixed_view::<3, 3>(0, 0) * before.fixed_view::<3, 3>(0, 0).transpose();
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn)).scaled_axis()
-}
-
-/// Speed and acceleration bounds of the tip's centre seen from the object, per step and per step squared.
-pub fn bounds_in_object(finger: &FingerModel, motion: &Between, from: &Waypoint, to: &Waypoint) -> (f64, f64) {
-    let object = ObjectRates::new(motion, from, to);
-    let rates = finger.path.rates(&finger.center, 0.0, &motion.joint_bounds());
-    let origin = Pose::from(&from.world_from_object) * Point::origin();
-    let arm = (finger.center_in_world(&from.joints) - origin).norm();
-    (object.speed_seen(&rates, arm), object.acceleration_seen(&rates, arm))
-}
-
-/// Bound of the speed, per step, of whatever of a tip touches, seen from the object: of the points of the tip, and of the place
-/// on it that faces a direction ([`TipSurface::wander`](crate::check::tip::TipSurface::wander)).
-pub fn speed_in_object(finger: &FingerModel, motion: &Between, from: &Waypoint, to: &Waypoint) -> f64 {
-    let reach = finger.radius + finger.surface.wander();
-    let rates = finger.path.rates(&finger.center, reach, &motion.joint_bounds());
-    let origin = Pose::from(&from.world_from_object) * Point::origin();
-    let arm = (finger.center_in_world(&from.joints) - origin).norm() + reach;
-    ObjectRates::new(motion, from, to).speed_seen(&rates, arm)
 }
 
 /// Length of an integral with what is unknown of it; infinite without one.

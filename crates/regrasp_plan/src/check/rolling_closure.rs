@@ -5,9 +5,9 @@
 //! change continuously with the contacts, and waypoints themselves are judged in `promises` and `contact`.
 
 use crate::check::closure::{Body, Certificate, certified_margin, margin_by};
-use crate::check::continuity::contact_of;
 use crate::check::model::Model;
 use crate::check::promises::MARGIN_TOLERANCE;
+use crate::check::roles::contact_of;
 use crate::check::rolling::Roll;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};

@@ -15,53 +15,19 @@
 //! fingertip pivots, count from level `motion` on.
 
 use crate::check::between::Between;
-use crate::check::continuity::{contact_of, moving_finger, pose_difference};
 use crate::check::level::Level;
 use crate::check::model::{FingerModel, Model};
+use crate::check::pose::pose_difference;
+use crate::check::roles::{contact_of, moving_finger};
 use crate::check::rolling::{Roll, UNKNOWN_SHARE};
+use crate::check::step_slip::{StepSlip, torsion_radius};
 use crate::check::surface::SortedShape;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, Plan, Segment};
-use regrasp_grasp::ContactModel;
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
-
-/// Slip of a finger in one step.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct StepSlip {
-    /// Slide of the touching point, in metres.
-    pub slide: f64,
-    /// Turn about the normal of a soft fingertip times its torsion radius, in metres.
-    pub twist: f64,
-    /// How far the contact travels over the object, in metres.
-    pub travel: f64,
-}
-
-impl StepSlip {
-    /// Of a round fingertip whose touching point slides so far.
-    pub fn of(roll: &Roll, finger: &FingerModel, slide: f64) -> Self {
-        let torsion_radius = torsion_radius(finger);
-        let twist = match torsion_radius > 0.0 {
-            true => torsion_radius * roll.turning().map_or(f64::INFINITY, |turning| turning.twist),
-            false => 0.0,
-        };
-        StepSlip { slide, twist, travel: roll.travel() }
-    }
-
-    fn slip(&self) -> f64 {
-        self.slide + self.twist
-    }
-}
-
-impl std::ops::AddAssign for StepSlip {
-    fn add_assign(&mut self, other: Self) {
-        self.slide += other.slide;
-        self.twist += other.twist;
-        self.travel += other.travel;
-    }
-}
 
 /// The contact that slips most from landing to lifting.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
@@ -190,14 +156,7 @@ fn fixed_slip(
         let normal = contact_of(&from.contacts[f])?.normal_in_object.into_inner();
         StepSlip { twist: torsion_radius(finger) * roll.turn_about(&normal), ..StepSlip::default() }
     } else {
-        StepSlip::of(&roll, finger, roll.slip(UNKNOWN_SHARE * settings.largest_slip_tolerance))
+        roll.step_slip(finger, roll.slip(UNKNOWN_SHARE * settings.largest_slip_tolerance))
     };
     log.work.spend(roll.looked(), "fixed contacts").then_some(step)
-}
-
-fn torsion_radius(finger: &FingerModel) -> f64 {
-    match finger.contact {
-        ContactModel::SoftFinger { torsion_radius } => torsion_radius,
-        ContactModel::Point | ContactModel::Frictionless => 0.0,
-    }
 }

@@ -14,8 +14,8 @@
 //! `velocity_tolerance` makes as well. Tolerances named here are fields of `CheckSettings`.
 
 use crate::check::between::Between;
-use crate::check::continuity::pose_difference;
 use crate::check::model::{FingerModel, Model};
+use crate::check::pose::pose_difference;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactState, Plan, Segment, Waypoint};

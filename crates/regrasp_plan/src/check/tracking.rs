@@ -26,10 +26,10 @@
 
 use crate::check::between::Between;
 use crate::check::contact::error_at;
-use crate::check::continuity::contact_of;
 use crate::check::model::{FingerModel, Model};
+use crate::check::roles::{contact_of, contacts_agree};
 use crate::check::rolling::{Roll, Rolled, Turning, UNKNOWN_SHARE, off_contact};
-use crate::check::slip::StepSlip;
+use crate::check::step_slip::StepSlip;
 use crate::check::surface::SortedShape;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
@@ -96,7 +96,7 @@ pub fn check_tracking_roles(model: &Model, segment: &Segment, s: usize, settings
         for w in 1..segment.waypoints.len() {
             let (before, after) = (state(w - 1), state(w));
             let is_fixed = before.mode == ContactMode::Fixed;
-            if is_fixed && !super::continuity::contacts_agree(before, after, settings.meeting_tolerance) {
+            if is_fixed && !contacts_agree(before, after, settings.meeting_tolerance) {
                 let message = format!("the fixed contact of finger \"{}\" is another one here", finger.name);
                 log.push(Violation::new(Kind::GraspChanges, message).when(Moment::at(s, w)));
             }
@@ -304,7 +304,7 @@ impl Track<'_> {
             let (Some((slide, unknown)), Some(turning)) = (slid, turned) else { continue };
             self.add_up(mode, slide.norm() + unknown, &turning, w);
             if !mode.slides() {
-                let step = StepSlip::of(&roll, self.finger, slide.norm() + unknown);
+                let step = roll.step_slip(self.finger, slide.norm() + unknown);
                 self.steps.insert((self.f, self.s, w), step);
             }
             let span = to.time - from.time;

@@ -1,6 +1,6 @@
 //! Poses to be passed between start and goal: those of the query, in its order, each at the waypoint that the plan names.
 
-use crate::check::continuity::pose_difference;
+use crate::check::pose::pose_difference;
 use crate::check::violation::{Moment, Violation, ViolationKind::WayPoseMissed};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{Plan, PoseData, WayPose};

@@ -9,9 +9,12 @@ use crate::plan::{
     ContactMode, ContactState, Plan, PlanInput, PoseData, Promises, Segment, SegmentKind, Statistics, WayPose, Waypoint,
 };
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::de::{Error, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::fmt;
+use std::marker::PhantomData;
 
 /// A hand of the scene that the plan moves.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -80,6 +83,33 @@ pub(super) struct FileWaypoint<'a> {
     pub contacts: Vec<FileContact<'a>>,
 }
 
+/// For every object, who holds it.
+type Holders<'a> = BTreeMap<Cow<'a, str>, Vec<Cow<'a, str>>>;
+
+/// Reads holders. An object named twice is an error: readers would differ in what they take.
+fn each_once<'de, 'a, D: Deserializer<'de>>(deserializer: D) -> Result<Holders<'a>, D::Error> {
+    struct Entries<'a>(PhantomData<Holders<'a>>);
+    impl<'de, 'a> Visitor<'de> for Entries<'a> {
+        type Value = Holders<'a>;
+
+        fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+            f.write_str("names of objects, each with a list of those that hold it")
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
+            let mut found = Holders::new();
+            while let Some((object, holders)) = map.next_entry::<Cow<'a, str>, Vec<Cow<'a, str>>>()? {
+                if found.contains_key(&object) {
+                    return Err(A::Error::custom(format!("duplicate field `{object}`")));
+                }
+                found.insert(object, holders);
+            }
+            Ok(found)
+        }
+    }
+    deserializer.deserialize_map(Entries(PhantomData))
+}
+
 /// A piece of motion.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -95,7 +125,8 @@ pub(super) struct FileSegment<'a> {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rolling_finger: Option<Cow<'a, str>>,
     /// For every object, who holds it: names of hands and supports.
-    pub held_by: BTreeMap<Cow<'a, str>, Vec<Cow<'a, str>>>,
+    #[serde(deserialize_with = "each_once")]
+    pub held_by: Holders<'a>,
     /// At least two; the first is the last of the segment before, but for time and forces.
     pub waypoints: Vec<FileWaypoint<'a>>,
 }

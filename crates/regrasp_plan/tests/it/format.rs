@@ -120,6 +120,10 @@ fn keys_of_one_version_are_refused_in_the_other() {
         refused(&old, &|file| file[key] = "hand".into(), key);
     }
     refused(&old, &|file| file["segments"][0]["held_by"] = json!(["hand"]), "held_by");
+    let (once, twice) = (r#""held_by":{"ball":["hand"]}"#, r#""held_by":{"ball":["table"],"ball":["hand"]}"#);
+    assert!(GOOD.1.contains(once));
+    let message = read(&GOOD.1.replacen(once, twice, 1)).unwrap_err();
+    assert!(message.contains("C401") && message.contains("duplicate field `ball`"), "{message}");
     refused(&new, &|file| file["fingers"] = json!(["f0"]), "fingers");
     refused(&new, &|file| file["segments"][1]["moving_finger"] = "f1".into(), "moving_finger");
     refused(&new, &|file| file["segments"][1]["also_moving"] = json!(["f0"]), "also_moving");

@@ -6,7 +6,7 @@ use crate::sample::{self, TIP_RADIUS, judge, kinds};
 use nalgebra::{DMatrix, DVector};
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 use regrasp_plan::check::ViolationKind;
-use regrasp_plan::check::continuity::contact_of;
+use regrasp_plan::check::roles::contact_of;
 use regrasp_plan::plan::{ForcePromises, SegmentKind};
 use regrasp_plan::{Plan, Segment, Waypoint};
 use regrasp_robot::ContactModel;

@@ -7,7 +7,7 @@ use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp::Grip;
 use regrasp_plan::check::ViolationKind;
 use regrasp_plan::check::closure::{Body, margin};
-use regrasp_plan::check::continuity::contact_of;
+use regrasp_plan::check::roles::contact_of;
 use regrasp_plan::{ContactMode, ContactState, Plan, Segment};
 use regrasp_scene::Scene;
 

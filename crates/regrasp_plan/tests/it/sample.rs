@@ -178,7 +178,14 @@ pub fn scene() -> Scene {
         // The sample counts on all of its friction.
         limits: regrasp_scene::Limits { friction_margin: Some(1.0), ..Default::default() },
         name: "sample".into(),
-        hands: vec![SceneHand { name: "hand".into(), hand: hand(), world_from_hand: world_from_hand(), reach: None }],
+        robots: Vec::new(),
+        hands: vec![SceneHand {
+            name: "hand".into(),
+            hand: hand(),
+            world_from_hand: world_from_hand(),
+            carrier: None,
+            reach: None,
+        }],
         objects: vec![object()],
         supports: Vec::new(),
         obstacles: Vec::new(),

@@ -149,3 +149,28 @@ fn what_rests_is_nowhere_in_the_way() {
     mounted.supports[0].body.placed.shape = Shape::Cuboid { half_extents: Vector::new(0.05, 0.05, 0.03) };
     assert!(judge((&mounted, &good_state), Some(&query), &plan).accepted());
 }
+
+/// Two hands may have robot files of one name in two folders. Which is which counts, and how many there are.
+#[test]
+fn files_of_the_same_name_are_told_apart() {
+    let (mut scene, state) = scene();
+    let mut second = scene.inputs[1].clone();
+    second.sha256 = regrasp_base::files::sha256(b"another hand");
+    scene.inputs.push(second);
+    let (good, query) = plan(&scene);
+    assert_eq!(good.inputs[1].name, good.inputs[2].name);
+    assert!(judge((&scene, &state), Some(&query), &good).accepted());
+    type Change = fn(&mut Plan);
+    let changes: [Change; 4] = [
+        |plan| plan.inputs.swap(1, 2),
+        |plan| plan.inputs.truncate(2),
+        |plan| plan.inputs.push(plan.inputs[2].clone()),
+        |plan| plan.inputs[2] = plan.inputs[1].clone(),
+    ];
+    for (index, change) in changes.into_iter().enumerate() {
+        let mut plan = good.clone();
+        change(&mut plan);
+        let report = judge((&scene, &state), Some(&query), &plan);
+        assert!(finds(&report, ViolationKind::InputHashMismatch), "change {index}: {:#?}", report.violations);
+    }
+}

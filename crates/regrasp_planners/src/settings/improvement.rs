@@ -40,16 +40,10 @@ impl CostWeights {
 const MAX_WEIGHT: f64 = 1e6;
 
 /// What is done about a plan after the first.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct ImprovementSettings {
     /// Work spent on a better plan after the first one; 0 for none.
     pub improve_work: u64,
     /// Weights of the cost that improvement reduces.
     pub cost: CostWeights,
-}
-
-impl Default for ImprovementSettings {
-    fn default() -> Self {
-        ImprovementSettings { improve_work: 0, cost: CostWeights::default() }
-    }
 }

@@ -3,16 +3,18 @@
 use super::files::Files;
 use super::object::{self, Names};
 use super::task::{self, Heading, Task, TaskKind};
-use super::{gravity, hand, limits, pose, units};
+use super::{gravity, hand, limits, pose, robot, units};
 use crate::gravity::Gravity;
 use crate::limits::Limits;
 use crate::object::Object;
 use crate::scene::{Obstacle, SceneHand, Support};
 use regrasp_base::toml_table::{Entry, Found, Table, suggestion};
 use regrasp_geometry::Pose;
+use regrasp_robot::Manipulator;
 
 /// What a scene file says, read.
 pub(super) struct Parts {
+    pub robots: Vec<Manipulator>,
     pub hands: Vec<SceneHand>,
     pub objects: Vec<Object>,
     pub world_from_objects: Vec<Pose>,
@@ -53,6 +55,7 @@ pub(super) fn one_hand(root: &mut Table, files: &mut Files, found: &mut Found) -
     }
     let task = task?;
     Some(Parts {
+        robots: Vec::new(),
         hands: vec![hand?],
         objects: vec![object?],
         world_from_objects: vec![task.world_from_object_start],
@@ -67,17 +70,17 @@ pub(super) fn one_hand(root: &mut Table, files: &mut Files, found: &mut Found) -
 /// Version 2: `[robot]`, `[[objects]]`, `[[supports]]`, `[[obstacles]]`, `[[tasks]]`.
 pub(super) fn several(root: &mut Table, files: &mut Files, found: &mut Found) -> Option<Parts> {
     let mut names = Names::of("body of the scene");
-    let hands = hands(root, &mut names, files, found);
+    let carried = robot_and_hands(root, &mut names, files, found);
     let gravity = gravity::gravity(root, Some(&Pose::identity()), found);
     let limits = limits::limits(root, found);
     let objects = objects(root, &mut names, files, found);
     let supports = object::fixed_bodies(root, "supports", &mut names, files, found);
     let supports = supports.into_iter().map(|body| Support { body }).collect();
     let obstacles = object::fixed_bodies(root, "obstacles", &mut names, files, found);
-    let bodies = hands.zip(objects);
+    let bodies = carried.zip(objects);
     let fix = "add [[tasks]] with task = \"in_hand\", hand, object and goal";
     let entries = root.required(found, "tasks", fix)?.entries(found, "tables [[tasks]]")?;
-    let (hands, objects) = bodies?;
+    let ((robots, hands), objects) = bodies?;
     let mut task_names = Names::of("task");
     let mut tasks = Vec::new();
     for (index, entry) in entries.iter().enumerate() {
@@ -94,16 +97,28 @@ pub(super) fn several(root: &mut Table, files: &mut Files, found: &mut Found) ->
         found.diagnostics.push(diagnostic);
     }
     let (objects, world_from_objects) = objects.into_iter().unzip();
-    Some(Parts { hands, objects, world_from_objects, supports, obstacles, gravity, limits, tasks })
+    Some(Parts { robots, hands, objects, world_from_objects, supports, obstacles, gravity, limits, tasks })
 }
 
-/// `[robot]` with its hands. None where one of them could not be read.
-fn hands(root: &mut Table, names: &mut Names, files: &mut Files, found: &mut Found) -> Option<Vec<SceneHand>> {
-    let fix = "add [[robot.hands]] with name and file = \"hand.toml\"";
-    let mut robot = root.required(found, "robot", fix)?.table(found)?;
-    let entries = robot.required(found, "hands", fix).and_then(|entry| entry.entries(found, "tables [[robot.hands]]"));
-    robot.finish(found);
-    let mut hands = Vec::new();
+/// Robots, and all hands: those that robots carry first.
+type Carried = (Vec<Manipulator>, Vec<SceneHand>);
+
+/// `[robot]`: a robot file with its hands, and hands that stand by themselves. None where one of them could not be read.
+fn robot_and_hands(root: &mut Table, names: &mut Names, files: &mut Files, found: &mut Found) -> Option<Carried> {
+    let fix = "add [[robot.hands]] with name and file = \"hand.toml\", or [robot] with file = \"robot.toml\"";
+    let mut table = root.required(found, "robot", fix)?.table(found)?;
+    let (mut robots, mut hands) = (Vec::new(), Vec::new());
+    if let Some(entry) = table.optional("file") {
+        let (robot, carried) = robot::robot(&entry, &mut table, files, found)?;
+        carried.iter().for_each(|hand| names.add(&hand.name, &entry, found));
+        robots.push(robot);
+        hands.extend(carried);
+    }
+    let entries = match table.optional("hands") {
+        Some(entry) => entry.entries(found, "tables [[robot.hands]]"),
+        None => Some(Vec::new()),
+    };
+    table.finish(found);
     for entry in &entries? {
         let Some(mut table) = entry.table(found) else { continue };
         let name = table.required(found, "name", "add name = \"right\"").and_then(|entry| entry.name(found));
@@ -115,7 +130,7 @@ fn hands(root: &mut Table, names: &mut Names, files: &mut Files, found: &mut Fou
         let diagnostic = root.error("S102", found, "has no hand").fix(fix);
         found.diagnostics.push(diagnostic);
     }
-    found.diagnostics.is_empty().then_some(hands)
+    found.diagnostics.is_empty().then_some((robots, hands))
 }
 
 /// `[[objects]]`, each with the pose at which it rests. None where one of them could not be read.

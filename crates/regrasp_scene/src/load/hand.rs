@@ -3,8 +3,9 @@
 use super::files::Files;
 use super::{contact, pose, task};
 use crate::scene::{InputFile, SceneHand};
-use regrasp_base::toml_table::{Found, Table};
+use regrasp_base::toml_table::{Entry, Found, Table};
 use regrasp_geometry::Pose;
+use regrasp_robot::Hand;
 use regrasp_robot::contact_model::{self, ContactModel};
 use regrasp_robot::import::{LoadOptions, load_hand};
 use regrasp_robot::tip::{LARGEST_MISFIT, TipShape};
@@ -48,6 +49,21 @@ pub(super) fn hand(mut table: Table, name: String, files: &mut Files, found: &mu
         files.inputs.push(InputFile { role: input.role, name, path: input.path, sha256: input.sha256 });
     }
     let mut hand = loaded.hand;
+    refuse_rough_tips(&hand, &file, found);
+    if let Some(entry) = contacts {
+        contact::apply(&entry, &mut hand, found)?;
+    }
+    if let Some(entry) = rest {
+        let mut values = task::joint_values(&entry.table(found)?, &hand, false, found)?.into_iter();
+        for finger in &mut hand.fingers {
+            finger.rest = values.by_ref().take(finger.rest.len()).collect();
+        }
+    }
+    Some(SceneHand { name, hand, world_from_hand: pose?, carrier: None, reach })
+}
+
+/// Refuses tips that are meshes and far from any ellipsoid (`S108`).
+pub(super) fn refuse_rough_tips(hand: &Hand, file: &Entry, found: &mut Found) {
     for finger in &hand.fingers {
         if let TipShape::Hull { misfit, .. } = finger.tip.shape
             && misfit > LARGEST_MISFIT
@@ -58,14 +74,4 @@ pub(super) fn hand(mut table: Table, name: String, files: &mut Files, found: &mu
             found.diagnostics.push(diagnostic.fix(fix));
         }
     }
-    if let Some(entry) = contacts {
-        contact::apply(&entry, &mut hand, found)?;
-    }
-    if let Some(entry) = rest {
-        let mut values = task::joint_values(&entry.table(found)?, &hand, false, found)?.into_iter();
-        for finger in &mut hand.fingers {
-            finger.rest = values.by_ref().take(finger.rest.len()).collect();
-        }
-    }
-    Some(SceneHand { name, hand, world_from_hand: pose?, reach })
 }

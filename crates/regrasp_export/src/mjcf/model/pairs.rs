@@ -51,12 +51,13 @@ pub(super) fn write(xml: &mut Xml, model: &Model) {
     let mut pairs = Pairs { xml, written: BTreeSet::new() };
     add_moved(&mut pairs, model);
     for object in model.objects.iter().filter(|object| object.hold == Hold::Support) {
-        let own = object.names.geom.as_str();
-        let fixed = model.names.supports.iter().chain(&model.names.obstacles).map(String::as_str);
+        let own = &object.names.geoms;
+        let names = &model.names;
+        let fixed = names.supports.iter().chain(&names.obstacles).chain(&names.links).map(String::as_str);
         let hands = model.names.hands.iter().flat_map(|hand| hand.geoms());
-        let objects = model.names.objects.iter().map(|other| other.geom.as_str());
-        for other in fixed.chain(hands).chain(objects).filter(|other| *other != own) {
-            pairs.unplanned(own, other, object.object.friction);
+        let objects = model.names.objects.iter().flat_map(|other| &other.geoms).map(String::as_str);
+        for other in fixed.chain(hands).chain(objects).filter(|other| !own.iter().any(|part| part == other)) {
+            own.iter().for_each(|part| pairs.unplanned(part, other, object.object.friction));
         }
     }
     xml.close();
@@ -66,17 +67,17 @@ pub(super) fn write(xml: &mut Xml, model: &Model) {
 fn add_moved(pairs: &mut Pairs, model: &Model) {
     let view = HandView::of(model.task);
     let found = collision_pairs(&view);
-    let (hand, object) = (&model.names.hands[view.hand_index], &model.names.objects[view.object_index].geom);
+    let (hand, object) = (&model.names.hands[view.hand_index], &model.names.objects[view.object_index].geoms);
     let around = model.names.around(model.task);
     let friction = view.object.friction;
     for (finger, tips) in view.hand.fingers.iter().zip(&hand.touching) {
         for tip in tips {
-            pairs.planned(tip, object, friction_of(finger, friction));
+            object.iter().for_each(|part| pairs.planned(tip, part, friction_of(finger, friction)));
         }
     }
     let of_finger = |id: FingerShapeId| hand.fingers[id.finger.0][id.shape].as_str();
     for &id in &found.link_object {
-        pairs.unplanned(of_finger(id), object, friction);
+        object.iter().for_each(|part| pairs.unplanned(of_finger(id), part, friction));
     }
     for &(a, b) in found.finger_finger.iter().chain(&found.within_finger) {
         pairs.unplanned(of_finger(a), of_finger(b), friction);
@@ -85,13 +86,15 @@ fn add_moved(pairs: &mut Pairs, model: &Model) {
         pairs.unplanned(of_finger(id), &hand.palm[palm], friction);
     }
     for &(id, obstacle) in &found.finger_obstacle {
-        pairs.unplanned(of_finger(id), around[obstacle], friction);
+        around[obstacle].iter().for_each(|geom| pairs.unplanned(of_finger(id), geom, friction));
     }
     for &palm in &found.palm_object {
-        pairs.unplanned(&hand.palm[palm], object, friction);
+        object.iter().for_each(|part| pairs.unplanned(&hand.palm[palm], part, friction));
     }
     for &obstacle in &found.object_obstacle {
-        pairs.unplanned(around[obstacle], object, friction);
+        for geom in around[obstacle] {
+            object.iter().for_each(|part| pairs.unplanned(geom, part, friction));
+        }
     }
 }
 

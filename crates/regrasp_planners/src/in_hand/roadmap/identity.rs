@@ -46,10 +46,10 @@ impl Identity {
         Identity {
             fingers: view.hand.fingers.iter().map(|finger| finger.name.clone()).collect(),
             hand_name: view.hand.robot.name.clone(),
-            hand: hand(&view.hand, view.reach),
+            hand: hand(view.hand, view.reach),
             contacts: view.hand.fingers.iter().map(|finger| finger.tip.contact).collect(),
             object_name: view.object.name.clone(),
-            object: object(&view.object),
+            object: object(view.object),
             obstacles: obstacles.digest(),
             friction: view.object.friction,
         }

@@ -1,0 +1,42 @@
+//! Objects as MuJoCo collides with them: a convex shape, or convex parts of a mesh.
+
+use super::geom::{CONVEX_WITHIN, is_hollowed};
+use regrasp_geometry::Shape;
+use regrasp_geometry::parts::{PartSettings, convex_parts};
+use regrasp_scene::Object;
+use std::sync::Arc;
+
+/// How finely an object is cut. By hand: the bulb needs three parts.
+const PARTS: PartSettings = PartSettings { max_parts: 16, excess: CONVEX_WITHIN };
+
+/// What the object collides with.
+pub(super) struct ObjectSolid {
+    /// Convex shapes in the object's frame; at least one.
+    pub parts: Vec<Shape>,
+    /// Where they differ from the object, if they do.
+    pub note: Option<String>,
+}
+
+impl ObjectSolid {
+    /// Of `object`: parts of a mesh that is a closed solid and not convex, else the shape itself.
+    pub fn of(object: &Object) -> Self {
+        let whole =
+            |note: Option<&str>| ObjectSolid { parts: vec![object.shape.clone()], note: note.map(str::to_owned) };
+        if !is_hollowed(&object.shape) {
+            return whole(None);
+        }
+        let Shape::Mesh(mesh) = &object.shape else { return whole(None) };
+        // Where the scene replaces the object by its hull, the planner kept links away from it.
+        match convex_parts(mesh, &PARTS).filter(|_| object.hull.is_none()) {
+            Some(parts) => ObjectSolid {
+                note: Some(format!(
+                    "MuJoCo collides with {} convex parts, which exceed it by {:.1} % of its volume",
+                    parts.hulls.len(),
+                    100.0 * parts.excess
+                )),
+                parts: parts.hulls.into_iter().map(|hull| Shape::Convex(Arc::new(hull))).collect(),
+            },
+            None => whole(Some("MuJoCo collides with its convex hull")),
+        }
+    }
+}

@@ -1,0 +1,269 @@
+//! Solids in convex parts, for programs that collide convex shapes only.
+//!
+//! The surface is cut by planes across the axes of its frame, one cut after the other, and every piece is replaced by its convex
+//! hull. Each cut is the one of some candidates that takes most volume off the hulls. All corners of a part lie on the surface or
+//! inside, so that a part leaves the surface only where the surface curves inwards.
+
+use crate::frame::{Point, Vector};
+use crate::hull::ConvexHull;
+use crate::mass::solid_properties;
+use crate::mesh::TriangleMesh;
+use crate::shape::Shape;
+use std::sync::Arc;
+
+/// Positions of cuts tried along each axis of a piece.
+const POSITIONS: usize = 15;
+/// Corners from which on candidates are compared by some of the corners only.
+const MANY_CORNERS: usize = 1500;
+/// Least volume that a cut must take off, as a share of the solid's.
+const LEAST_GAIN: f64 = 1e-3;
+
+/// How finely a solid is cut.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PartSettings {
+    /// Most parts.
+    pub max_parts: usize,
+    /// Volume by which all parts together may exceed the solid, as a share of the solid's.
+    pub excess: f64,
+}
+
+/// A solid in convex parts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parts {
+    /// The parts.
+    pub hulls: Vec<ConvexHull>,
+    /// Volume by which they exceed the solid, as a share of the solid's.
+    pub excess: f64,
+}
+
+/// A part of the surface and its hull.
+struct Piece {
+    triangles: Vec<[Point; 3]>,
+    hull: ConvexHull,
+    volume: f64,
+    /// The best cut, and the volume that it takes off; None where there is none.
+    cut: Option<Cut>,
+}
+
+/// Across an axis, at a coordinate.
+#[derive(Debug, Clone, Copy)]
+struct Cut {
+    axis: usize,
+    at: f64,
+    gain: f64,
+}
+
+/// Convex parts of the solid that `mesh` bounds. None where the mesh is no closed solid, or a hull fails.
+pub fn convex_parts(mesh: &TriangleMesh, settings: &PartSettings) -> Option<Parts> {
+    let solid = solid_properties(&Shape::Mesh(Arc::new(mesh.clone()))).ok()?.volume;
+    let triangles = (0..mesh.triangles().len()).map(|index| mesh.corners(index)).collect();
+    let mut pieces = vec![Piece::new(triangles)?];
+    let excess = |pieces: &[Piece]| pieces.iter().map(|piece| piece.volume).sum::<f64>() / solid - 1.0;
+    while pieces.len() < settings.max_parts && excess(&pieces) > settings.excess {
+        let gain = |piece: &Piece| piece.cut.map_or(0.0, |cut| cut.gain);
+        let best = (0..pieces.len()).max_by(|&a, &b| gain(&pieces[a]).total_cmp(&gain(&pieces[b])))?;
+        let Some(cut) = pieces[best].cut.filter(|cut| cut.gain > LEAST_GAIN * solid) else { break };
+        let [below, above] = divide(&pieces[best].triangles, &cut);
+        let (Some(below), Some(above)) = (Piece::new(below), Piece::new(above)) else {
+            pieces[best].cut = None;
+            continue;
+        };
+        pieces[best] = below;
+        pieces.push(above);
+    }
+    let excess = excess(&pieces);
+    Some(Parts { hulls: pieces.into_iter().map(|piece| piece.hull).collect(), excess })
+}
+
+impl Piece {
+    fn new(triangles: Vec<[Point; 3]>) -> Option<Self> {
+        let hull = ConvexHull::new(&corners(&triangles, 1)).ok()?;
+        let volume = volume_of(&hull)?;
+        let cut = best_cut(&triangles);
+        Some(Piece { triangles, hull, volume, cut })
+    }
+}
+
+fn corners(triangles: &[[Point; 3]], stride: usize) -> Vec<Point> {
+    let mut points: Vec<Point> = triangles.iter().flatten().copied().collect();
+    let key = |a: &Point, b: &Point| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z));
+    points.sort_by(key);
+    points.dedup();
+    points.into_iter().step_by(stride).collect()
+}
+
+fn volume_of(hull: &ConvexHull) -> Option<f64> {
+    solid_properties(&Shape::Convex(Arc::new(hull.clone()))).ok().map(|solid| solid.volume)
+}
+
+/// The cut of a piece after which the two hulls have least volume.
+fn best_cut(triangles: &[[Point; 3]]) -> Option<Cut> {
+    let n_corners = 3 * triangles.len();
+    let stride = n_corners.div_ceil(6 * MANY_CORNERS).max(1);
+    let rough = |triangles: &[[Point; 3]]| volume_of(&ConvexHull::new(&corners(triangles, stride)).ok()?);
+    let whole = rough(triangles)?;
+    let mut best: Option<Cut> = None;
+    for axis in 0..3 {
+        let along = || triangles.iter().flatten().map(|corner| corner[axis]);
+        let (low, high) = (along().fold(f64::INFINITY, f64::min), along().fold(f64::NEG_INFINITY, f64::max));
+        for k in 1..=POSITIONS {
+            let at = low + (high - low) * k as f64 / (POSITIONS + 1) as f64;
+            let cut = Cut { axis, at, gain: 0.0 };
+            let [below, above] = divide(triangles, &cut);
+            let (Some(a), Some(b)) = (rough(&below), rough(&above)) else { continue };
+            let gain = whole - a - b;
+            if best.is_none_or(|known| gain > known.gain) {
+                best = Some(Cut { gain, ..cut });
+            }
+        }
+    }
+    best
+}
+
+/// The parts of triangles on either side of a cut, with the cut's face on both.
+///
+/// The face is a fan of triangles over its edges. Where it is not convex the fan covers dents too, but nothing outside of the
+/// hull of its edges.
+fn divide(triangles: &[[Point; 3]], cut: &Cut) -> [Vec<[Point; 3]>; 2] {
+    let mut sides = [Vec::new(), Vec::new()];
+    let mut edges: Vec<[Point; 2]> = Vec::new();
+    for triangle in triangles {
+        for (side, sign) in sides.iter_mut().zip([-1.0, 1.0]) {
+            let edge = clip(triangle, |corner| sign * (corner[cut.axis] - cut.at), side);
+            // Both sides have the same edges.
+            edges.extend(edge.filter(|_| sign < 0.0));
+        }
+    }
+    if let Some(&[center, _]) = edges.first() {
+        for side in &mut sides {
+            side.extend(edges.iter().skip(1).map(|&[from, to]| [center, from, to]));
+        }
+    }
+    sides
+}
+
+/// Adds the part of a triangle where `height` is not negative, in triangles (Sutherland and Hodgman 1974). Returns its edge at
+/// height zero.
+fn clip(triangle: &[Point; 3], height: impl Fn(&Point) -> f64, side: &mut Vec<[Point; 3]>) -> Option<[Point; 2]> {
+    let mut polygon: Vec<Point> = Vec::with_capacity(4);
+    let mut at_zero: Vec<Point> = Vec::with_capacity(3);
+    for k in 0..3 {
+        let (from, to) = (triangle[k], triangle[(k + 1) % 3]);
+        let (a, b) = (height(&from), height(&to));
+        if a >= 0.0 {
+            polygon.push(from);
+        }
+        if a == 0.0 {
+            at_zero.push(from);
+        }
+        if (a > 0.0 && b < 0.0) || (a < 0.0 && b > 0.0) {
+            let way: Vector = to - from;
+            let between = from + way * (a / (a - b));
+            polygon.push(between);
+            at_zero.push(between);
+        }
+    }
+    side.extend((2..polygon.len()).map(|k| [polygon[0], polygon[k - 1], polygon[k]]));
+    match at_zero[..] {
+        [from, to] => Some([from, to]),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    /// A solid of revolution about z through (radius, z), closed at both ends.
+    fn turned(profile: &[(f64, f64)], n: usize) -> TriangleMesh {
+        let mut vertices = Vec::new();
+        for &(radius, z) in profile {
+            let at = |k: usize| TAU * k as f64 / n as f64;
+            vertices.extend((0..n).map(|k| Point::new(radius * at(k).cos(), radius * at(k).sin(), z)));
+        }
+        let (bottom, top) = (vertices.len() as u32, vertices.len() as u32 + 1);
+        vertices.push(Point::new(0.0, 0.0, profile[0].1));
+        vertices.push(Point::new(0.0, 0.0, profile[profile.len() - 1].1));
+        let n32 = n as u32;
+        let mut triangles = Vec::new();
+        for ring in 0..profile.len() as u32 - 1 {
+            for k in 0..n32 {
+                let (a, b) = (ring * n32 + k, ring * n32 + (k + 1) % n32);
+                triangles.extend([[a, b, b + n32], [a, b + n32, a + n32]]);
+            }
+        }
+        let last = (profile.len() as u32 - 1) * n32;
+        for k in 0..n32 {
+            triangles.extend([[bottom, (k + 1) % n32, k], [top, last + k, last + (k + 1) % n32]]);
+        }
+        TriangleMesh::new(vertices, triangles).unwrap()
+    }
+
+    #[test]
+    fn a_stepped_shaft_is_two_parts_that_fill_it() {
+        let shaft = turned(&[(0.024, 0.0), (0.024, 0.03), (0.009, 0.03), (0.009, 0.05)], 24);
+        let parts = convex_parts(&shaft, &PartSettings { max_parts: 8, excess: 0.02 }).unwrap();
+        assert!(parts.excess < 0.02, "{}", parts.excess);
+        assert!((2..=4).contains(&parts.hulls.len()), "{}", parts.hulls.len());
+        let whole = ConvexHull::new(shaft.vertices()).unwrap();
+        assert!(volume_of(&whole).unwrap() > 1.2 * shaft.signed_volume());
+    }
+
+    #[test]
+    fn parts_of_an_hourglass_fill_it_and_hardly_more() {
+        let profile: Vec<(f64, f64)> =
+            (0..=12).map(|k| (f64::from(k) - 6.0) / 6.0).map(|t| (0.01 + 0.02 * t * t, 0.04 * t)).collect();
+        let glass = turned(&profile, 24);
+        let whole = volume_of(&ConvexHull::new(glass.vertices()).unwrap()).unwrap() / glass.signed_volume() - 1.0;
+        let parts = convex_parts(&glass, &PartSettings { max_parts: 16, excess: 0.05 }).unwrap();
+        assert!(
+            whole > 1.0 && (0.0..0.05).contains(&parts.excess),
+            "{whole}: {} in {}",
+            parts.excess,
+            parts.hulls.len()
+        );
+    }
+
+    /// Two cuts across different axes leave a corner inside the solid.
+    #[test]
+    fn parts_reach_the_corners_of_cuts_inside_the_solid() {
+        let cube = ConvexHull::new(
+            &(0..8).map(|k| Point::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2))).collect::<Vec<_>>(),
+        );
+        let cube = cube.unwrap();
+        let mut pieces: Vec<Vec<[Point; 3]>> =
+            vec![cube.triangles().iter().map(|t| t.map(|k| cube.vertices()[k as usize])).collect()];
+        for axis in 0..3 {
+            pieces = pieces.iter().flat_map(|piece| divide(piece, &Cut { axis, at: 0.4, gain: 0.0 })).collect();
+        }
+        let volumes: Vec<f64> =
+            pieces.iter().map(|piece| volume_of(&ConvexHull::new(&corners(piece, 1)).unwrap()).unwrap()).collect();
+        assert!(volumes.len() == 8 && (volumes.iter().sum::<f64>() - 1.0).abs() < 1e-9, "{volumes:?}");
+    }
+
+    #[test]
+    fn every_point_of_the_solid_is_in_a_part_and_a_convex_solid_is_one() {
+        let drop = turned(&[(0.002, 0.0), (0.02, 0.02), (0.024, 0.03), (0.02, 0.04), (0.009, 0.05), (0.009, 0.07)], 16);
+        let parts = convex_parts(&drop, &PartSettings { max_parts: 12, excess: 0.01 }).unwrap();
+        for index in 0..drop.triangles().len() {
+            let [a, b, c] = drop.corners(index);
+            let middle = a + ((b - a) + (c - a)) / 3.0;
+            for point in [a, middle] {
+                let depth = |hull: &ConvexHull| {
+                    // Slivers between corners in a line have no direction.
+                    let outward = |t: &[u32; 3]| {
+                        let [p, q, r] = t.map(|k| hull.vertices()[k as usize]);
+                        let normal = (q - p).cross(&(r - p)).try_normalize(1e-12)?;
+                        Some(normal.dot(&(point - p)))
+                    };
+                    hull.triangles().iter().filter_map(outward).fold(f64::NEG_INFINITY, f64::max)
+                };
+                let nearest = parts.hulls.iter().map(depth).fold(f64::INFINITY, f64::min);
+                assert!(nearest < 1e-6, "{point} is {nearest} m outside of all parts");
+            }
+        }
+        let rod = turned(&[(0.01, 0.0), (0.01, 0.05)], 16);
+        assert_eq!(convex_parts(&rod, &PartSettings { max_parts: 12, excess: 0.01 }).unwrap().hulls.len(), 1);
+    }
+}
