@@ -1,7 +1,7 @@
 //! The pairs of a scene against a count by hand.
 
 use crate::support::{Folder, GOOD, repository, shared_models, with_models};
-use regrasp_geometry::collision::{Answer, Placement, separation};
+use regrasp_geometry::collision::{Answer, Placed, Placement, separation};
 use regrasp_geometry::{Pose, Vector};
 use regrasp_robot::import::LoadOptions;
 use regrasp_scene::{FingerShapeId, LoadedScene, collision_pairs, load_scene};
@@ -80,7 +80,14 @@ fn near_at_rest(loaded: &LoadedScene, required: f64) -> Vec<String> {
     let mut near = Vec::new();
     for ((a, a_placed, a_name), (b, b_placed, b_name)) in tests {
         let mut direction = Vector::zeros();
-        let answer = separation(a, &a_placed, b, &b_placed, required, required, &mut direction, &mut [0, 0]);
+        let answer = separation(
+            Placed { shape: a, at: &a_placed },
+            Placed { shape: b, at: &b_placed },
+            required,
+            required,
+            &mut direction,
+            &mut [0, 0],
+        );
         if !matches!(answer, Answer::SeparatedBy(distance) if distance >= required) {
             near.push(format!("{a_name} and {b_name}"));
         }

@@ -78,7 +78,8 @@ fn names_places_and_tasks_are_those_of_the_file() {
 #[test]
 fn everything_is_at_rest_at_first_and_nobody_holds_anything() {
     let loaded = load(SCENE);
-    let State { hand_joints, world_from_objects, held_by } = &loaded.state;
+    let State { robot_joints, hand_joints, world_from_objects, held_by } = &loaded.state;
+    assert!(robot_joints.is_empty());
     let at_rest = [0.0, -0.8, 1.2].repeat(4);
     let mut left = at_rest.clone();
     left[6] = 0.25;
