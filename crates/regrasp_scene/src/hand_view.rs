@@ -32,6 +32,9 @@ pub struct HandView<'a> {
     pub object: &'a Object,
     /// Obstacles of the scene, then its supports, the other hands in their postures and the other objects where they are.
     pub obstacles: Cow<'a, [Obstacle]>,
+    /// So many of the first obstacles may stand beside the palm: obstacles and supports of the scene, which a hand may be mounted on,
+    /// and the robot that carries it. The palm keeps away from the others.
+    pub n_beside_palm: usize,
     /// Gravity, in the hand's frame.
     pub gravity: Gravity,
     /// What a plan may ask of hand and object.
@@ -46,6 +49,7 @@ impl<'a> HandView<'a> {
         let Manipulation { scene, hand_index, object_index, .. } = *manipulation;
         let own = manipulation.placed_hand();
         let others = manipulation.bystanders();
+        let of_robot = if own.carrier.is_some() { manipulation.robot_bodies().len() } else { 0 };
         let obstacles = match others.is_empty() {
             true => Cow::Borrowed(scene.obstacles.as_slice()),
             false => Cow::Owned(scene.obstacles.iter().cloned().chain(others).collect()),
@@ -60,6 +64,7 @@ impl<'a> HandView<'a> {
             reach: own.reach,
             object: manipulation.object(),
             obstacles,
+            n_beside_palm: scene.obstacles.len() + scene.supports.len() + of_robot,
             gravity: scene.gravity(),
             limits: scene.limits,
             inputs: &scene.inputs,

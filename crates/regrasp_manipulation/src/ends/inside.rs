@@ -25,6 +25,35 @@ pub fn refuse_hand_inside(model: &Model, world_from_object_start: &Pose) -> Resu
     Ok(())
 }
 
+/// Refuses a palm that overlaps another hand, another object or a robot that does not carry it. Neither moves: once is enough.
+pub fn refuse_palm_overlap(model: &Model) -> Result<(), Failure> {
+    let around = &model.bodies[model.first_obstacle() + model.view.n_beside_palm..];
+    let palm = || model.bodies[..model.object].iter().filter(|body| matches!(body.carrier, Carrier::World));
+    for other in around {
+        if let Some(part) = palm().find(|part| !are_apart(part, other)) {
+            let message = format!("\"{}\" overlaps \"{}\", and neither moves", part.name, other.name);
+            return Err(Failure::bare(
+                FailureKind::Impossible,
+                message,
+                "move the hand or the other body in the scene file",
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// True when two bodies that stand still are proved to be apart.
+fn are_apart(part: &Body, other: &Body) -> bool {
+    let (at, there) = (&part.carrier_from_body, &other.carrier_from_body);
+    if let Some(tree) = &other.tree {
+        let seen = there.inverse_then(at);
+        let is_outside = !tree.holds(&there.point_to_child(&at.point(&part.middle)));
+        return is_outside && tree.is_apart(&part.shape, &seen, 0.0, &mut 0.0);
+    }
+    let (first, second) = (Placed { shape: &part.shape, at }, Placed { shape: &other.shape, at: there });
+    matches!(separation(first, second, 0.0, 0.0, &mut Vector::zeros(), &mut [0; 2]), Answer::SeparatedBy(_))
+}
+
 /// The first part of the palm, when all of its parts are inside: a mount may hold one of them.
 fn palm_inside<'m>(model: &'m Model, solid: &Body, at: &Placement) -> Option<&'m str> {
     let palm = || model.bodies[..model.object].iter().filter(|body| matches!(body.carrier, Carrier::World));

@@ -8,7 +8,7 @@ use regrasp_grasp::closure::may_close;
 use regrasp_manipulation::ends::blocked::{refuse_buried_object, refuse_object_out_of_reach};
 use regrasp_manipulation::ends::end::End;
 use regrasp_manipulation::ends::given_grasp::{Near, given_grasp_at};
-use regrasp_manipulation::ends::inside::refuse_hand_inside;
+use regrasp_manipulation::ends::inside::{refuse_hand_inside, refuse_palm_overlap};
 use regrasp_manipulation::failure::{Failure, FailureKind};
 use regrasp_manipulation::grasp::state::GraspState;
 use regrasp_manipulation::model::{Model, fingers_in_words, friction_in_words, releasable};
@@ -27,6 +27,7 @@ pub fn refuse_hopeless(model: &Model, settings: &InHandSettings, query: &InHandQ
         refuse_buried_object(model, end, pose)?;
         refuse_object_out_of_reach(model, end, pose)?;
     }
+    refuse_palm_overlap(model)?;
     refuse_hand_inside(model, &query.world_from_object_start)
 }
 

@@ -7,7 +7,7 @@ use regrasp_geometry::{Shape, TriangleMesh};
 use regrasp_manipulation::ends::blocked::refuse_buried_object;
 use regrasp_manipulation::ends::end::End;
 use regrasp_manipulation::ends::given_grasp::{Near, given_grasp_at};
-use regrasp_manipulation::ends::inside::refuse_hand_inside;
+use regrasp_manipulation::ends::inside::{refuse_hand_inside, refuse_palm_overlap};
 use regrasp_manipulation::failure::{Failure, FailureKind};
 use regrasp_manipulation::model::{Model, friction_in_words};
 use regrasp_scene::{Gravity, TrackingQuery};
@@ -67,6 +67,7 @@ pub fn start(stepper: &Stepper, query: &TrackingQuery) -> Result<(TrackingGrasp,
     let model = stepper.model;
     let pose = &query.world_from_object_start;
     refuse_buried_object(model, End::Start, pose)?;
+    refuse_palm_overlap(model)?;
     refuse_hand_inside(model, pose)?;
     let state = given_grasp_at(model, End::Start, pose, &query.start_grasp, Near::Rest)?.ok_or_else(|| {
         let message = "tracking begins with a given grasp, and the start has none".to_owned();

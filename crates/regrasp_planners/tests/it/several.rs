@@ -103,3 +103,14 @@ fn the_posture_of_the_other_hand_counts() {
     assert!(with([0.0, 0.0, 0.1]), "fingers stretched out are in the way");
     assert!(!with([0.0, -1.3, 0.1]), "fingers turned aside are not");
 }
+
+#[test]
+fn a_palm_in_another_object_is_refused_before_any_search() {
+    let mut loaded = load(SCENE);
+    // The ball is where the palm of the left hand is.
+    loaded.state.world_from_objects[0] = Pose::translation(0.5, 0.0, 0.05);
+    let query = loaded.tasks[1].query(0);
+    let failure = plan_for(&loaded, &query, 0).unwrap_err();
+    assert_eq!(failure.kind, FailureKind::Impossible, "{failure}");
+    assert!(failure.message.contains("overlaps \"ball\""), "{failure}");
+}
