@@ -78,19 +78,24 @@ impl Samples {
         };
         let (columns, rows) = (range(0, self.width), range(1, self.height));
         let edges = [edge(&fixed[1], &fixed[2]), edge(&fixed[2], &fixed[0]), edge(&fixed[0], &fixed[1])];
+        let steps = STEPS as i64;
+        let middle = |c: usize| c as i64 * steps + steps / 2;
+        // From one column to the next every weight changes by the same whole number.
+        let [step_a, step_b, step_c] =
+            [-edges[0].along[1] * steps, -edges[1].along[1] * steps, -edges[2].along[1] * steps];
+        let [least_a, least_b, least_c] = [edges[0].least, edges[1].least, edges[2].least];
         for row in rows {
-            for column in columns.clone() {
-                let [x, y] = [column, row].map(|c| c as i64 * STEPS as i64 + STEPS as i64 / 2);
-                let weights = [0, 1, 2].map(|k| edges[k].value(x, y));
-                if (0..3).any(|k| weights[k] < edges[k].least) {
-                    continue;
+            let (x, y) = (middle(columns.start), middle(row));
+            let (mut a, mut b, mut c) = (edges[0].value(x, y), edges[1].value(x, y), edges[2].value(x, y));
+            for at in row * self.width + columns.start..row * self.width + columns.end {
+                if a >= least_a && b >= least_b && c >= least_c {
+                    let value = (a as f64 * inverse[0] + b as f64 * inverse[1] + c as f64 * inverse[2]) / area as f64;
+                    if value > self.inverse_depth[at] {
+                        self.inverse_depth[at] = value;
+                        self.triangle[at] = number;
+                    }
                 }
-                let value = (0..3).map(|k| weights[k] as f64 * inverse[k]).sum::<f64>() / area as f64;
-                let at = row * self.width + column;
-                if value > self.inverse_depth[at] {
-                    self.inverse_depth[at] = value;
-                    self.triangle[at] = number;
-                }
+                (a, b, c) = (a + step_a, b + step_b, c + step_c);
             }
         }
     }
