@@ -104,9 +104,9 @@ fn a_folder_that_is_a_file_is_found_before_the_search() {
 fn with_lost_stdout(folder: &Folder, arguments: &[&str]) -> [Run; 2] {
     let full = fs::File::options().write(true).open("/dev/full").expect("Linux");
     let to_full = Run::of(folder.command(arguments).stdout(Stdio::from(full)).output().unwrap());
-    let mut child = folder.command(arguments).spawn().unwrap();
-    drop(child.stdout.take());
-    [to_full, Run::of(child.wait_with_output().unwrap())]
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    [to_full, Run::of(folder.command(arguments).stdout(writer).output().unwrap())]
 }
 
 /// No result that nobody got is a good one.

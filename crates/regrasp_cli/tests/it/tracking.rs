@@ -41,7 +41,7 @@ fn plans_rows_and_pages_speak_of_sub_goals() {
     let (folder, scene) = (Folder::new(), football());
     let run = folder.run(&["plan", &scene, "-o", "plan.json"]);
     assert_eq!(run.code, Some(0), "{run:?}");
-    for part in ["rotation 94 deg, by tracking", "sub-goals on the path", "margin not judged"] {
+    for part in ["rotation 94 deg, by tracking", "sub-goals on the path", "margin not defined for sliding contacts"] {
         assert!(run.err.contains(part), "{part} is missing:\n{}", run.err);
     }
     assert!(!run.err.contains("translation"), "the goal says no position:\n{}", run.err);

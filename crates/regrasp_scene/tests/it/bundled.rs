@@ -23,8 +23,8 @@ fn center_in_world(loaded: &LoadedScene, world_from_object: &Pose) -> Point {
     world_from_object * loaded.scene.objects[0].center_of_mass
 }
 
-/// Scenes of the papers that are more than a turn in place, and those of tracking, which have a start grasp; and one of several hands.
-const PAPER_SCENES: [&str; 13] = [
+/// Scenes of the papers that are more than a turn in place, and those of tracking, which have a start grasp; and those of several hands.
+const PAPER_SCENES: [&str; 14] = [
     "bulb",
     "cubic",
     "diamond",
@@ -34,6 +34,7 @@ const PAPER_SCENES: [&str; 13] = [
     "football",
     "football_pivot",
     "pencil",
+    "robot_two_arms",
     "three_fingertips",
     "tracking_sphere_six",
     "tracking_sphere_wide",
