@@ -80,8 +80,10 @@ impl Plan {
         guarded(py, || {
             let bare = regrasp::Plan { segments: Vec::new(), ..self.plan.clone() };
             let mut header = json!(bare);
-            // Empty names are left out of files.
-            header["query"] = self.plan.query.as_str().into();
+            // These are no part of a plan's own serialisation: files have them in other places.
+            for (key, name) in [("query", &self.plan.query), ("hand", &self.plan.hand), ("object", &self.plan.object)] {
+                header[key] = name.as_str().into();
+            }
             let segments = self.plan.segments.iter().map(|segment| {
                 json!({
                     "kind": segment.kind,
