@@ -99,7 +99,8 @@ pub fn judge_and_write(
     }
     let Some(path) = output else {
         if talk.is_json() {
-            talk.event("written", json!({ "sha256": files::sha256(bytes.as_bytes()), "plan": plan }));
+            let as_in_file: serde_json::Value = serde_json::from_str(&bytes).unwrap_or_default();
+            talk.event("written", json!({ "sha256": files::sha256(bytes.as_bytes()), "plan": as_in_file }));
         } else {
             talk.data(&bytes);
         }
