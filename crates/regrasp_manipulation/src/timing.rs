@@ -3,11 +3,11 @@
 //! Between two waypoints every joint follows the cubic through its positions, velocities and times; the object follows the
 //! joints' motion along their chord (`docs/reference/plan-format.md`, Time). Every segment goes from rest to rest.
 //!
-//! - Directions ([`path`]): at a waypoint the joints go along the parabola through it and its neighbours. Where that leads too
+//! - Directions (`path`): at a waypoint the joints go along the parabola through it and its neighbours. Where that leads too
 //!   far off the chords, which the search has tested, they go slower than the path, or stop.
-//! - Speeds ([`speeds`]): a backward pass finds how fast each waypoint may be passed so that the rest can still be reached. A
+//! - Speeds (`speeds`): a backward pass finds how fast each waypoint may be passed so that the rest can still be reached. A
 //!   forward pass goes as fast as that allows. This is time-optimal up to the spacing of the waypoints (Pham and Pham 2018), for
-//!   limits in closed form ([`step`]): velocities and accelerations of joints, speeds of fingertips and object.
+//!   limits in closed form (`step`): velocities and accelerations of joints, speeds of fingertips and object.
 //! - Last, each step is made as short as the velocities at its ends allow.
 
 /// Directions at the waypoints.

@@ -169,7 +169,7 @@ impl<'m, 'a> Recorder<'m, 'a> {
 
     /// The plan.
     ///
-    /// Errors: as [`record`].
+    /// Errors: a moment at which no contact forces balance the weight: a plan without them is none.
     pub fn finish(
         mut self,
         query: &InHandQuery,
