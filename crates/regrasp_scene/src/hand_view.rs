@@ -18,8 +18,6 @@ pub struct HandView<'a> {
     pub hand_index: usize,
     /// Index of the object in `Scene::objects`.
     pub object_index: usize,
-    /// The name of the scene.
-    pub scene_name: &'a str,
     /// The hand's name in the scene.
     pub hand_name: &'a str,
     /// The hand.
@@ -30,7 +28,8 @@ pub struct HandView<'a> {
     pub reach: Option<f64>,
     /// The object.
     pub object: &'a Object,
-    /// Obstacles of the scene, then its supports, the other hands in their postures and the other objects where they are.
+    /// Obstacles of the scene, then its supports, the links of robots that are no hand's, the other hands in their postures and the
+    /// other objects where they are.
     pub obstacles: Cow<'a, [Obstacle]>,
     /// So many of the first obstacles may stand beside the palm: obstacles and supports of the scene, which a hand may be mounted on,
     /// and the robot that carries it. The palm keeps away from the others.
@@ -57,7 +56,6 @@ impl<'a> HandView<'a> {
         let mut view = HandView {
             hand_index,
             object_index,
-            scene_name: &scene.name,
             hand_name: &own.name,
             hand: &own.hand,
             world_from_hand: manipulation.world_from_hand(),

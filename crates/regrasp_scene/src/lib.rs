@@ -30,4 +30,4 @@ pub use manipulation::{Manipulation, is_of_hand};
 pub use object::Object;
 pub use query::{GRASP_TOLERANCE, GRASP_TURN_TOLERANCE, GraspRequest, InHandQuery, Query, TrackingQuery};
 pub use scene::{HandCarrier, InputFile, Obstacle, Scene, SceneHand, Support};
-pub use state::{Holder, State};
+pub use state::State;

@@ -28,11 +28,6 @@ impl<'a> Manipulation<'a> {
         Manipulation { scene, state, hand_index: query.hand(), object_index: query.object() }
     }
 
-    /// The first object in the first hand: of most scenes there is no other.
-    pub fn first(scene: &'a Scene, state: &'a State) -> Self {
-        Manipulation { scene, state, hand_index: 0, object_index: 0 }
-    }
-
     /// The hand, in its own frame.
     pub fn hand(&self) -> &'a Hand {
         &self.placed_hand().hand
@@ -61,7 +56,8 @@ impl<'a> Manipulation<'a> {
         let others = self.scene.hands.iter().enumerate().filter(|(index, _)| *index != self.hand_index);
         bodies.extend(others.flat_map(|(index, other)| {
             let world_from_hand = self.state.world_from_hand(self.scene, index);
-            bodies_of_hand(other, &world_from_hand, &self.state.hand_joints[index])
+            let is_own = |link| self.is_palm_of_both(other, link);
+            bodies_of_hand(other, &world_from_hand, &self.state.hand_joints[index], is_own)
         }));
         let others = self.scene.objects.iter().enumerate().filter(|(index, _)| *index != self.object_index);
         bodies.extend(others.map(|(index, other)| Obstacle {
@@ -73,6 +69,12 @@ impl<'a> Manipulation<'a> {
             mesh_body: if other.hull.is_some() { MeshBody::of(other.solid()) } else { other.mesh_body.clone() },
         }));
         bodies
+    }
+
+    /// True for a link of the robot that carries both hands, and that moves with the hand: it is in its own palm.
+    fn is_palm_of_both(&self, other: &SceneHand, link: LinkId) -> bool {
+        let robots = [self.placed_hand(), other].map(|placed| placed.carrier.map(|carrier| carrier.robot));
+        robots[0].is_some() && robots[0] == robots[1] && is_of_hand(self.scene, self.hand_index, link)
     }
 
     /// The links of robots that belong to no hand, but for those that count as palm of the hand. In the world.
@@ -123,12 +125,17 @@ pub(crate) fn is_rigid_with_hand(robot: &Manipulator, hand: usize, link: LinkId)
     moving(link) == moving(robot.hands[hand].hand.base)
 }
 
-/// The collision shapes of a hand in a posture, placed in the world.
-fn bodies_of_hand(other: &SceneHand, world_from_hand: &Pose, joints: &[f64]) -> Vec<Obstacle> {
+/// The collision shapes of a hand in a posture, placed in the world, but for links of its palm that `leave_out` names.
+fn bodies_of_hand(
+    other: &SceneHand,
+    world_from_hand: &Pose,
+    joints: &[f64],
+    leave_out: impl Fn(LinkId) -> bool,
+) -> Vec<Obstacle> {
     let hand = &other.hand;
     let link_name = |link: LinkId| hand.robot.links[link.0].name.clone();
-    let mut parts: Vec<(String, PlacedShape)> =
-        hand.palm.iter().map(|palm| (link_name(palm.link), palm.placed.clone())).collect();
+    let palm = hand.palm.iter().filter(|palm| !leave_out(palm.link));
+    let mut parts: Vec<(String, PlacedShape)> = palm.map(|palm| (link_name(palm.link), palm.placed.clone())).collect();
     let mut first = 0;
     for finger in &hand.fingers {
         let end = first + finger.chain.n_coordinates();

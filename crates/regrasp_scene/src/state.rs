@@ -1,17 +1,8 @@
-//! What moves in a scene: where joints and objects are, and who holds what.
+//! What moves in a scene: where joints and objects are.
 
 use crate::scene::Scene;
 use regrasp_geometry::Pose;
 use regrasp_robot::manipulator::layout::Part;
-
-/// Who holds an object.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Holder {
-    /// A hand, by its index in [`Scene::hands`].
-    Hand(usize),
-    /// A support, by its index in [`Scene::supports`].
-    Support(usize),
-}
 
 /// One moment of a scene. The scene itself does not change.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,18 +14,15 @@ pub struct State {
     pub hand_joints: Vec<Vec<f64>>,
     /// Pose of every object in the world.
     pub world_from_objects: Vec<Pose>,
-    /// Who holds each object. Empty for an object that rests where it is and that nothing is said of.
-    pub held_by: Vec<Vec<Holder>>,
 }
 
 impl State {
-    /// All robots and hands in their rest postures, the objects at `world_from_objects`, held by nobody.
+    /// All robots and hands in their rest postures, the objects at `world_from_objects`.
     pub fn at_rest(scene: &Scene, world_from_objects: Vec<Pose>) -> Self {
         let rest = |hand: &regrasp_robot::Hand| hand.fingers.iter().flat_map(|f| f.rest.iter().copied()).collect();
         State {
             robot_joints: scene.robots.iter().map(|robot| robot.layout.rest()).collect(),
             hand_joints: scene.hands.iter().map(|hand| rest(&hand.hand)).collect(),
-            held_by: vec![Vec::new(); world_from_objects.len()],
             world_from_objects,
         }
     }

@@ -75,3 +75,34 @@ fn a_hand_plans_wherever_the_arm_has_taken_it() {
     let (PoseData { position, .. }, asked) = (first, query.start().translation.vector);
     assert!((Vector::from(*position) - asked).norm() < 1e-9);
 }
+
+/// Two hands on one bar, which is in the palm of both.
+const BAR: &str = r#"<robot name="bar"><link name="bar"><collision><origin xyz="0 0.25 -0.03"/><geometry>
+<box size="0.03 0.6 0.02"/></geometry></collision></link></robot>"#;
+
+#[test]
+fn two_hands_on_one_rigid_body_are_not_in_their_own_way() {
+    let folder = tempfile::tempdir().unwrap();
+    let hand = repository().join("assets/hands/wide_four_finger/hand.toml").canonicalize().unwrap();
+    let hands: String = [("right", 0.0), ("left", 0.5)]
+        .iter()
+        .map(|(name, y)| {
+            format!(
+                "[[hands]]\nname = \"{name}\"\nhand = {:?}\nmount_link = \"bar\"\nposition = [0.0, {y:?}, 0.0]\n",
+                hand
+            )
+        })
+        .collect();
+    let robot = format!("format = \"regrasp-robot\"\nformat_version = 1\n[[models]]\nurdf = \"bar.urdf\"\n{hands}");
+    let scene = "format = \"regrasp-scene\"\nformat_version = 2\n[robot]\nfile = \"robot.toml\"\n\
+        [[objects]]\nname = \"ball\"\nsphere = { radius = 0.032 }\nmass = 0.1\nfriction = 0.8\nposition = [0.0, 0.5, 0.078]\n\
+        [[tasks]]\ntask = \"in_hand\"\nhand = \"left\"\ngoal = { turn = { axis = \"x\", angle_deg = 90 } }\n";
+    for (name, text) in [("bar.urdf", BAR), ("robot.toml", &robot), ("scene.toml", scene)] {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    let loaded = load_scene(&folder.path().join("scene.toml"), &LoadOptions::default()).unwrap();
+    let query = loaded.task().query(0);
+    let plan = plan_in(&loaded, &loaded.state, &query);
+    let report = judged(&loaded, &loaded.state, &query, &plan);
+    assert!(report.accepted(), "{:#?}", report.violations);
+}

@@ -5,7 +5,7 @@ use crate::two_hands::SCENE;
 use nalgebra::{Rotation3, Translation3, UnitQuaternion};
 use regrasp_geometry::{Pose, Shape, Vector};
 use regrasp_robot::{Hand, JointKind};
-use regrasp_scene::{Gravity, HandView, Holder, LoadedScene, Manipulation, Obstacle, State};
+use regrasp_scene::{Gravity, HandView, LoadedScene, Manipulation, Obstacle, State};
 use std::collections::BTreeMap;
 
 /// The scene of two hands with `from` replaced, which must be there.
@@ -78,7 +78,7 @@ fn names_places_and_tasks_are_those_of_the_file() {
 #[test]
 fn everything_is_at_rest_at_first_and_nobody_holds_anything() {
     let loaded = load(SCENE);
-    let State { robot_joints, hand_joints, world_from_objects, held_by } = &loaded.state;
+    let State { robot_joints, hand_joints, world_from_objects } = &loaded.state;
     assert!(robot_joints.is_empty());
     let at_rest = [0.0, -0.8, 1.2].repeat(4);
     let mut left = at_rest.clone();
@@ -86,7 +86,6 @@ fn everything_is_at_rest_at_first_and_nobody_holds_anything() {
     assert_eq!(hand_joints, &[at_rest, left]);
     assert_eq!(world_from_objects[0], Pose::translation(0.0, 0.0, 0.078));
     assert_near(&world_from_objects[1], &(world_from_left() * Pose::translation(0.0, 0.0, 0.078)), "box");
-    assert_eq!(held_by, &[Vec::<Holder>::new(), Vec::new()]);
 }
 
 #[test]
