@@ -28,6 +28,11 @@ impl<'a> Manipulation<'a> {
         Manipulation { scene, state, hand_index: query.hand(), object_index: query.object() }
     }
 
+    /// The first object in the first hand: of most scenes there is no other.
+    pub fn first(scene: &'a Scene, state: &'a State) -> Self {
+        Manipulation { scene, state, hand_index: 0, object_index: 0 }
+    }
+
     /// The hand, in its own frame.
     pub fn hand(&self) -> &'a Hand {
         &self.placed_hand().hand
