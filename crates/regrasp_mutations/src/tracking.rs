@@ -7,7 +7,7 @@ use super::{Breeder, Mutant};
 use nalgebra::Rotation3;
 use regrasp_base::Rng;
 use regrasp_geometry::{Pose, Vector};
-use regrasp_plan::check::model::Model;
+use regrasp_plan::check::model::CheckedHand;
 use regrasp_plan::check::pose::pose_difference;
 use regrasp_plan::check::roles::contact_of;
 use regrasp_plan::check::surface;
@@ -445,7 +445,7 @@ fn is_all(segment: &Segment, f: usize, mode: ContactMode) -> bool {
 
 /// True when finger `f` clearly does it in the segment: by its stated velocity, which a good plan has right, and by its
 /// turns from waypoint to waypoint.
-fn does_it(model: &Model, segment: &Segment, f: usize, does: Does, slip_tolerance: f64) -> bool {
+fn does_it(model: &CheckedHand, segment: &Segment, f: usize, does: Does, slip_tolerance: f64) -> bool {
     let seen = |waypoint: &Waypoint| {
         let link = regrasp_plan::check::kinematics::pose_of(&model.fingers[f].path.world_from_link(&waypoint.joints));
         Pose::from(&waypoint.world_from_object).rotation.inverse() * link.rotation
@@ -474,7 +474,7 @@ fn does_it(model: &Model, segment: &Segment, f: usize, does: Does, slip_toleranc
 /// An inner waypoint of a tracking segment and a finger whose contact there fits.
 fn pick_tracked(
     plan: &Plan,
-    model: &Model,
+    model: &CheckedHand,
     rng: &mut Rng,
     fits: impl Fn(&ContactState) -> bool,
 ) -> Option<(usize, usize, usize)> {
@@ -491,7 +491,7 @@ fn pick_tracked(
 /// As [`pick_tracked`], a moving finger.
 fn pick_moving(
     plan: &Plan,
-    model: &Model,
+    model: &CheckedHand,
     rng: &mut Rng,
     fits: impl Fn(&ContactState) -> bool,
 ) -> Option<(usize, usize, usize)> {
@@ -508,7 +508,7 @@ fn pick_moving(
 /// Gives a contact that fits another relative velocity, by the one that it has and the normal.
 fn change_velocity(
     plan: &mut Plan,
-    model: &Model,
+    model: &CheckedHand,
     rng: &mut Rng,
     fits: impl Fn(&ContactState) -> bool,
     change: impl Fn(Vector, &Vector) -> Vector,
@@ -522,7 +522,7 @@ fn change_velocity(
 }
 
 /// Gives a contact that turns another relative turn.
-fn change_turn(plan: &mut Plan, model: &Model, rng: &mut Rng, change: impl Fn(Vector) -> Vector) -> Option<()> {
+fn change_turn(plan: &mut Plan, model: &CheckedHand, rng: &mut Rng, change: impl Fn(Vector) -> Vector) -> Option<()> {
     let turns =
         |contact: &ContactState| contact.relative_turn_in_object.is_some_and(|turn| Vector::from(turn).norm() > 1e-2);
     let (s, w, f) = pick_tracked(plan, model, rng, turns)?;
@@ -534,7 +534,7 @@ fn change_turn(plan: &mut Plan, model: &Model, rng: &mut Rng, change: impl Fn(Ve
 /// Gives a fingertip that slides another force across the normal.
 fn change_friction(
     plan: &mut Plan,
-    model: &Model,
+    model: &CheckedHand,
     rng: &mut Rng,
     change: impl Fn(Vector, &Vector) -> Vector,
 ) -> Option<()> {

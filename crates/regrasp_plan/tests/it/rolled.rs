@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Translation3, UnitQuaternion};
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp::Grip;
 use regrasp_plan::check::ViolationKind;
-use regrasp_plan::check::closure::{Body, margin};
+use regrasp_plan::check::closure::{HeldBody, margin};
 use regrasp_plan::check::roles::contact_of;
 use regrasp_plan::{ContactMode, ContactState, Plan, Segment};
 use regrasp_scene::Scene;
@@ -167,7 +167,7 @@ fn the_smallest_margin_of_contacts_that_roll_is_that_of_every_waypoint_by_itself
     for scene in [sample::scene(), sample::soft_scene()] {
         let plan = plan(&scene, 40);
         let body =
-            Body { center_of_mass: Point::origin(), torque_scale: OBJECT_RADIUS, friction: plan.promises.friction };
+            HeldBody { center_of_mass: Point::origin(), torque_scale: OBJECT_RADIUS, friction: plan.promises.friction };
         let margin_at = |contacts: &Vec<ContactState>| {
             let holding = contacts.iter().enumerate().filter(|(_, contact)| contact.holds());
             let grip = |(f, state): (usize, &ContactState)| Grip {

@@ -115,7 +115,7 @@ fn finger_reach(finger: &regrasp_robot::Finger) -> f64 {
     let slides: f64 = chain
         .joints
         .iter()
-        .filter(|joint| joint.motion == regrasp_robot::Motion::Slide)
+        .filter(|joint| joint.motion == regrasp_robot::JointMotion::Slide)
         .map(|joint| {
             let [lower, upper] = joint.range([&chain.lower, &chain.upper]);
             lower.abs().max(upper.abs())
