@@ -471,6 +471,26 @@ fn does_it(model: &CheckedHand, segment: &Segment, f: usize, does: Does, slip_to
     segment.waypoints.windows(2).map(amount).sum::<f64>() > 2.0 * CLEARLY
 }
 
+/// Inner waypoints of tracking segments and fingers, of which one is drawn.
+///
+/// `is_meant` says which fingers of a segment are asked about; `fits`, which of their contacts.
+fn pick_inner(
+    plan: &Plan,
+    model: &CheckedHand,
+    rng: &mut Rng,
+    is_meant: impl Fn(&Segment, usize) -> bool,
+    fits: impl Fn(&ContactState) -> bool,
+) -> Option<(usize, usize, usize)> {
+    let mut found = Vec::new();
+    for (s, segment) in plan.segments.iter().enumerate().filter(|(_, segment)| segment.kind == SegmentKind::Tracking) {
+        for f in (0..model.fingers.len()).filter(|&f| is_meant(segment, f)) {
+            let inner = 1..segment.waypoints.len() - 1;
+            found.extend(inner.filter(|&w| fits(&segment.waypoints[w].contacts[f])).map(|w| (s, w, f)));
+        }
+    }
+    pick(&mut found, rng).copied()
+}
+
 /// An inner waypoint of a tracking segment and a finger whose contact there fits.
 fn pick_tracked(
     plan: &Plan,
@@ -478,14 +498,7 @@ fn pick_tracked(
     rng: &mut Rng,
     fits: impl Fn(&ContactState) -> bool,
 ) -> Option<(usize, usize, usize)> {
-    let mut found = Vec::new();
-    for (s, segment) in plan.segments.iter().enumerate().filter(|(_, segment)| segment.kind == SegmentKind::Tracking) {
-        for (w, waypoint) in segment.waypoints.iter().enumerate().skip(1).take(segment.waypoints.len() - 2) {
-            let fitting = (0..model.fingers.len()).filter(|&f| fits(&waypoint.contacts[f]));
-            found.extend(fitting.map(|f| (s, w, f)));
-        }
-    }
-    pick(&mut found, rng).copied()
+    pick_inner(plan, model, rng, |_, _| true, fits)
 }
 
 /// As [`pick_tracked`], a moving finger.
@@ -495,14 +508,7 @@ fn pick_moving(
     rng: &mut Rng,
     fits: impl Fn(&ContactState) -> bool,
 ) -> Option<(usize, usize, usize)> {
-    let mut found = Vec::new();
-    for (s, segment) in plan.segments.iter().enumerate().filter(|(_, segment)| segment.kind == SegmentKind::Tracking) {
-        for f in (0..model.fingers.len()).filter(|&f| may_move(model, segment, f)) {
-            let inner = 1..segment.waypoints.len() - 1;
-            found.extend(inner.filter(|&w| fits(&segment.waypoints[w].contacts[f])).map(|w| (s, w, f)));
-        }
-    }
-    pick(&mut found, rng).copied()
+    pick_inner(plan, model, rng, |segment, f| may_move(model, segment, f), fits)
 }
 
 /// Gives a contact that fits another relative velocity, by the one that it has and the normal.
