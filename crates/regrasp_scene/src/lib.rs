@@ -25,7 +25,7 @@ pub use collision_pairs::{CollisionPairs, FingerShapeId, collision_pairs};
 pub use gravity::{Gravity, STANDARD_GRAVITY};
 pub use hand_view::HandView;
 pub use limits::Limits;
-pub use load::{Goal, LoadedScene, StartOrientation, Task, load_scene};
+pub use load::{Goal, LoadedScene, StartOrientation, Stock, Task, load_scene, load_scene_text};
 pub use manipulation::{Manipulation, is_of_hand};
 pub use object::Object;
 pub use query::{GRASP_TOLERANCE, GRASP_TURN_TOLERANCE, GraspRequest, InHandQuery, Query, TrackingQuery};

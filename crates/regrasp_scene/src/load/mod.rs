@@ -17,9 +17,11 @@ mod object;
 mod pose;
 mod robot;
 mod shape;
+mod stock;
 mod task;
 mod units;
 
+pub use stock::Stock;
 pub use task::{Goal, StartOrientation, Task};
 
 use crate::hand_view::HandView;
@@ -115,8 +117,20 @@ impl LoadedScene {
 ///
 /// Errors: every cause found, in this file and in those it names.
 pub fn load_scene(path: &Path, options: &LoadOptions) -> Result<LoadedScene, InputError> {
-    let bytes = regrasp_base::files::read(path)?;
-    let mut files = Files::new(path, &bytes, options);
+    load_scene_text(path, options.read(path)?, options, &Stock::default())
+}
+
+/// The scene file with the content `bytes`, as if it stood at `path`, and every file it names. What `stock` has of hands,
+/// robots and meshes is not read again; it must have been filled with the same options.
+///
+/// Errors: as [`load_scene`].
+pub fn load_scene_text(
+    path: &Path,
+    bytes: Vec<u8>,
+    options: &LoadOptions,
+    stock: &Stock,
+) -> Result<LoadedScene, InputError> {
+    let mut files = Files::new(path, &bytes, options, stock);
     let text = regrasp_base::files::text_of(path, bytes)?;
     let mut found = Found::new(path, &text, CODES);
     let document = found.parse();
