@@ -37,7 +37,7 @@ mod _regrasp {
     #[pymodule_export]
     use super::search::{check, find_scene, plan};
     #[pymodule_export]
-    use super::view::page;
+    use super::view::{page, storyboard};
 
     use pyo3::prelude::*;
 
