@@ -2,7 +2,7 @@
 
 use crate::goal::{Goal, poses_from};
 use nalgebra::UnitQuaternion;
-use regrasp_geometry::{Point, Pose};
+use regrasp_geometry::{Point, Pose, Vector};
 
 /// Given fingertips and contacts may be this far off the object's surface, in metres. They are moved to the nearest contact,
 /// no finger farther than this; where that is not enough the scene is refused. Planner and checker go by this one number.
@@ -83,6 +83,27 @@ impl InHandQuery {
         poses.extend(&self.world_from_object_way);
         poses.push(self.world_from_object_goal);
         poses
+    }
+
+    /// True where the object has nowhere to go: what is asked is whether it can be held where it is.
+    pub fn stays(&self) -> bool {
+        let start = &self.world_from_object_start;
+        self.world_from_object_way.iter().chain([&self.world_from_object_goal]).all(|pose| pose == start)
+    }
+
+    /// What asks only whether the object can be held at the start: it is the goal too.
+    #[must_use]
+    pub fn held(&self) -> Self {
+        let stays = Goal::Turn { axis: Vector::z_axis(), angle: 0.0, shift: Vector::zeros() };
+        let open =
+            |choice: &StartChoice| StartChoice { rotation: choice.rotation, way: Vec::new(), goal: stays.clone() };
+        InHandQuery {
+            world_from_object_way: Vec::new(),
+            world_from_object_goal: self.world_from_object_start,
+            goal_grasp: GraspRequest::Automatic,
+            open_start: self.open_start.as_ref().map(open),
+            ..self.clone()
+        }
     }
 
     /// The same query seen from another frame: every pose becomes `frame_from_world` times itself.
@@ -167,6 +188,11 @@ impl Query {
             Query::InHand(query) => Query::InHand(query.started_at(start)),
             Query::Tracking(_) => self.clone(),
         }
+    }
+
+    /// What asks only whether the object can be held at the start; None for tracking, which needs a given start grasp anyway.
+    pub fn held(&self) -> Option<Self> {
+        self.as_in_hand().map(|query| Query::InHand(query.held()))
     }
 
     /// True where the planner chooses the start pose.
