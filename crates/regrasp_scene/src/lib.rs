@@ -26,6 +26,7 @@ pub use gravity::{Gravity, STANDARD_GRAVITY};
 pub use hand_view::HandView;
 pub use limits::Limits;
 pub use load::{Goal, LoadedScene, StartOrientation, Task, load_scene};
+pub use load::{GraspScene, MeshObject, ObjectSource, load_grasp_scene};
 pub use manipulation::{Manipulation, is_of_hand};
 pub use object::Object;
 pub use query::{GRASP_TOLERANCE, GRASP_TURN_TOLERANCE, GraspRequest, InHandQuery, Query, TrackingQuery};
