@@ -28,6 +28,7 @@ pub use goal::Goal;
 pub use gravity::{Gravity, STANDARD_GRAVITY};
 pub use hand_view::HandView;
 pub use limits::Limits;
+pub use load::{GraspScene, MeshObject, ObjectSource, load_grasp_scene};
 pub use load::{LoadedScene, OpenStart, StartOrientation, Task, load_scene, load_scene_text};
 pub use manipulation::{Manipulation, is_of_hand};
 pub use object::Object;

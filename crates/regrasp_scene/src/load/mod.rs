@@ -9,6 +9,7 @@
 mod bodies;
 mod contact;
 mod files;
+mod grasping;
 mod gravity;
 mod hand;
 mod limits;
@@ -20,6 +21,7 @@ mod shape;
 mod task;
 mod units;
 
+pub use grasping::{GraspScene, MeshObject, ObjectSource, load_grasp_scene};
 pub use task::{OpenStart, StartOrientation, Task};
 
 use crate::hand_view::HandView;
