@@ -9,7 +9,7 @@ use regrasp::base::files;
 use regrasp::base::{Diagnostic, Place};
 use regrasp::geometry::Pose;
 use regrasp::robot::import::{KeptFiles, LoadOptions, ResolveOptions, load_hand};
-use regrasp::scene::{Gravity, InputFile, LoadedScene, Stock, Task, load_scene_text};
+use regrasp::scene::{Gravity, InputFile, LoadedScene, Stock, Task, load_scene_with};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -57,7 +57,7 @@ enum GravityInHand {
 
 /// Reads a scene, under the gravity given. What `stock` has is not read again.
 fn read(source: &Source, stock: &Stock) -> Result<LoadedScene, regrasp::InputError> {
-    let loaded = load_scene_text(&source.path, source.text.clone(), &source.options, stock)?;
+    let loaded = load_scene_with(&source.path, source.text.clone(), &source.options, stock)?;
     let gravity = match &source.gravity {
         None => return Ok(loaded),
         Some(GravityInHand::Word(word)) => (word == "any").then_some(Gravity::Any),

@@ -9,6 +9,7 @@
 mod bodies;
 mod contact;
 mod files;
+mod grasping;
 mod gravity;
 mod hand;
 mod limits;
@@ -21,8 +22,9 @@ mod stock;
 mod task;
 mod units;
 
+pub use grasping::{GraspScene, MeshObject, ObjectSource, load_grasp_scene};
 pub use stock::Stock;
-pub use task::{Goal, StartOrientation, Task};
+pub use task::{OpenStart, StartOrientation, Task};
 
 use crate::hand_view::HandView;
 use crate::manipulation::Manipulation;
@@ -117,14 +119,21 @@ impl LoadedScene {
 ///
 /// Errors: every cause found, in this file and in those it names.
 pub fn load_scene(path: &Path, options: &LoadOptions) -> Result<LoadedScene, InputError> {
-    load_scene_text(path, options.read(path)?, options, &Stock::default())
+    load_scene_text(path, options.read(path)?, options)
 }
 
-/// The scene file with the content `bytes`, as if it stood at `path`, and every file it names. What `stock` has of hands,
-/// robots and meshes is not read again; it must have been filled with the same options.
+/// As [`load_scene`], of a scene file that is or could be at `path` and has these bytes.
 ///
 /// Errors: as [`load_scene`].
-pub fn load_scene_text(
+pub fn load_scene_text(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<LoadedScene, InputError> {
+    load_scene_with(path, bytes, options, &Stock::default())
+}
+
+/// As [`load_scene_text`]; what `stock` has of hands, robots and meshes is not read again. It must have been filled with the same
+/// options.
+///
+/// Errors: as [`load_scene`].
+pub fn load_scene_with(
     path: &Path,
     bytes: Vec<u8>,
     options: &LoadOptions,
