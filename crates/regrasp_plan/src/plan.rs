@@ -16,6 +16,7 @@ pub const ONLY_HAND: &str = "hand";
 
 /// A pose on disk.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
 pub struct PoseData {
     /// Position, in metres.
@@ -46,6 +47,7 @@ impl From<&PoseData> for regrasp_geometry::Pose {
 
 /// A file the plan was made from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
 pub struct PlanInput {
     /// What it is for: `scene`, `hand`, `urdf`, `srdf`, `mesh`.
@@ -58,6 +60,7 @@ pub struct PlanInput {
 
 /// What a finger does at a waypoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "snake_case")]
 pub enum ContactMode {
     /// Holds the object; the contact is fixed on the object.
@@ -190,6 +193,7 @@ impl Waypoint {
 
 /// Kind of a segment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "snake_case")]
 pub enum SegmentKind {
     /// The object moves; every finger holds all along, at one contact or rolling, or is free all along (Saut 2011, section
@@ -253,6 +257,7 @@ pub fn relocations(fingers: &[String], segments: &[Segment]) -> u64 {
 
 /// A pose that the object has to pass between start and goal, and when it does.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
 pub struct WayPose {
     /// The pose asked for.
@@ -265,7 +270,9 @@ pub struct WayPose {
 
 /// What the plan promises; the checker holds it to these numbers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
+#[cfg_attr(test, ts(optional_fields))]
 pub struct Promises {
     /// Largest distance of a holding fingertip from its contact at and between waypoints, in metres.
     pub contact_tolerance: f64,
@@ -318,6 +325,7 @@ impl Promises {
 
 /// What a tracking plan promises beside. The goal of such a task is an orientation; where the object then is, is not asked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
 pub struct TrackingPromises {
     /// Largest angle between the object's last orientation and the goal's, in radians (Cherif 1999, sec. 5: within a cell).
@@ -328,6 +336,7 @@ pub struct TrackingPromises {
 
 /// Limits of the motion in time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
 pub struct MotionLimits {
     /// Largest speed of a fingertip's centre, or of a point of the object no farther from its centre of mass than
@@ -343,7 +352,9 @@ pub struct MotionLimits {
 
 /// What the contact forces balance, and their limits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
+#[cfg_attr(test, ts(optional_fields))]
 pub struct ForcePromises {
     /// Mass of the object, in kilograms.
     pub mass: f64,
@@ -360,7 +371,9 @@ pub struct ForcePromises {
 
 /// Counts of the search.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(default, deny_unknown_fields)]
+#[cfg_attr(test, ts(optional_fields))]
 pub struct Statistics {
     /// Nodes of the roadmap or tree when the search ended; in tracking, cells that sub-goals are in.
     pub nodes: u64,
@@ -387,6 +400,7 @@ pub struct Statistics {
 
 /// Looking for a better plan after the first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
 pub struct Improvement {
     /// The first plan.
@@ -403,6 +417,7 @@ pub struct Improvement {
 
 /// What a plan costs, and why.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
 pub struct PlanFigures {
     /// Relocations: how often a finger lands on a contact ([`relocations`]).

@@ -4,6 +4,9 @@
 mod file;
 /// Where a value stands in a JSON text.
 mod locate;
+/// `schema/plan.d.ts`.
+#[cfg(test)]
+mod typescript;
 /// What a plan file may not say.
 mod validate;
 
