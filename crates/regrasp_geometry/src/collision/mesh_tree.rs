@@ -4,7 +4,7 @@
 //! triangles is wholly inside or wholly outside, so that one point of it is asked. Along a motion that stays apart from
 //! the triangles one moment is enough.
 
-use super::gjk::{Answer, Placed, separation};
+use super::gjk::{Placed, Separation, separation};
 use super::placement::Placement;
 use super::winding::{self, Dipole};
 use crate::frame::{Point, Pose, Vector};
@@ -189,7 +189,7 @@ impl MeshTree {
             let mut direction = at_box.translation - mesh_from_shape.translation;
             // Of a ball the distance is known already.
             if !matches!(shape, Shape::Sphere { .. })
-                && let Answer::SeparatedBy(d) = separation(
+                && let Separation::SeparatedBy(d) = separation(
                     Placed { shape, at: mesh_from_shape },
                     Placed { shape: &cuboid, at: &at_box },
                     required,
@@ -213,7 +213,7 @@ impl MeshTree {
                     continue;
                 }
                 match triangle_separation(shape, mesh_from_shape, corners, required) {
-                    Answer::SeparatedBy(d) => *smallest = smallest.min(d),
+                    Separation::SeparatedBy(d) => *smallest = smallest.min(d),
                     _ => return false,
                 }
             }
@@ -233,7 +233,7 @@ fn box_distance(low: &Point, high: &Point, point: &Point) -> f64 {
 }
 
 /// Separation of a convex shape from one triangle, both in the mesh frame.
-fn triangle_separation(shape: &Shape, mesh_from_shape: &Placement, corners: &[Point; 3], required: f64) -> Answer {
+fn triangle_separation(shape: &Shape, mesh_from_shape: &Placement, corners: &[Point; 3], required: f64) -> Separation {
     super::gjk::separation_from_points(shape, mesh_from_shape, corners, required)
 }
 
@@ -294,7 +294,7 @@ mod tests {
                 lowest - highest >= -allowed
             };
             let expected = tree.corners.iter().all(|corners| {
-                matches!(triangle_separation(&shape, &at, corners, 0.0), Answer::SeparatedBy(_)) || passes(corners)
+                matches!(triangle_separation(&shape, &at, corners, 0.0), Separation::SeparatedBy(_)) || passes(corners)
             });
             let found = tree.all_near(&shape, &at, 0.0, &mut 0.0, &mut passes);
             assert_eq!(found, expected);

@@ -92,7 +92,7 @@ pub use slip::HoldSlip;
 pub use violation::{Moment, Violation, ViolationKind};
 
 use crate::plan::Plan;
-use model::Model;
+use model::CheckedHand;
 use regrasp_scene::{Manipulation, Query, Scene, State};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -328,7 +328,7 @@ pub fn check((scene, state): (&Scene, &State), query: Option<&Query>, plan: &Pla
     promises::check_inputs(plan, &scene.inputs, &mut log);
     let wrong_scene = |message| Violation::new(ViolationKind::WrongScene, message);
     let found = holders::manipulation(scene, state, query, plan)
-        .and_then(|task| Ok((task, Model::new(&task).map_err(wrong_scene)?)));
+        .and_then(|task| Ok((task, CheckedHand::new(&task).map_err(wrong_scene)?)));
     match found {
         Err(violation) => log.push(violation),
         Ok((task, model)) => {
@@ -348,7 +348,7 @@ pub fn check((scene, state): (&Scene, &State), query: Option<&Query>, plan: &Pla
 }
 
 /// Whether joints, fingers and waypoints of `plan` are those of the scene: everything else indexes by them.
-fn form_is_sound(model: &Model, plan: &Plan, log: &mut Log) -> bool {
+fn form_is_sound(model: &CheckedHand, plan: &Plan, log: &mut Log) -> bool {
     continuity::check_form(model, plan, log);
     !log.found.iter().any(|violation| {
         use ViolationKind::{EmptySegment, NotANumber, WrongScene};
@@ -361,7 +361,7 @@ fn judge(
     query: Option<&Query>,
     plan: &Plan,
     settings: &CheckSettings,
-    model: &Model,
+    model: &CheckedHand,
     log: &mut Log,
     report: &mut Report,
 ) {
@@ -412,7 +412,7 @@ fn judge_tips(
     task: &Manipulation,
     plan: &Plan,
     settings: &CheckSettings,
-    model: &Model,
+    model: &CheckedHand,
     log: &mut Log,
     report: &mut Report,
 ) {

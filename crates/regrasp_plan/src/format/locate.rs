@@ -2,18 +2,18 @@
 
 /// A step into a JSON document.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Step<'a> {
+pub(super) enum PathStep<'a> {
     Key(&'a str),
     Index(usize),
 }
 
 /// Byte offset of the value that `steps` lead to. `text` is valid JSON, or nothing is found.
-pub(super) fn locate(text: &str, steps: &[Step]) -> Option<usize> {
+pub(super) fn locate(text: &str, steps: &[PathStep]) -> Option<usize> {
     let mut cursor = Cursor { bytes: text.as_bytes(), at: 0 };
     cursor.skip_space();
     for step in steps {
         match step {
-            Step::Key(wanted) => {
+            PathStep::Key(wanted) => {
                 cursor.expect(b'{')?;
                 loop {
                     cursor.skip_space();
@@ -29,7 +29,7 @@ pub(super) fn locate(text: &str, steps: &[Step]) -> Option<usize> {
                     cursor.expect(b',')?;
                 }
             }
-            Step::Index(wanted) => {
+            PathStep::Index(wanted) => {
                 cursor.expect(b'[')?;
                 for _ in 0..*wanted {
                     cursor.skip_space();

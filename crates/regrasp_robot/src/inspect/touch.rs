@@ -3,7 +3,7 @@
 use crate::hand::Hand;
 use crate::robot::LinkId;
 use regrasp_base::Rng;
-use regrasp_geometry::collision::{Answer, Placed, Placement, separation};
+use regrasp_geometry::collision::{Placed, Placement, Separation, separation};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Point, Pose, Vector};
 use std::collections::BTreeSet;
@@ -101,7 +101,7 @@ impl<'h> Touch<'h> {
             let (at_a, at_b) = (&placements[i].0, &placements[j].0);
             let (first, second) = (Placed { shape: shape_a, at: at_a }, Placed { shape: shape_b, at: at_b });
             let answer = separation(first, second, 0.0, 0.0, &mut direction, &mut hints);
-            !matches!(answer, Answer::SeparatedBy(_))
+            !matches!(answer, Separation::SeparatedBy(_))
         };
         self.shape_pairs.iter().map(|pairs| pairs.iter().any(touches)).collect()
     }
