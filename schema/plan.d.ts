@@ -1,6 +1,10 @@
 // Types of a plan file (docs/reference/plan-format.md). Generated from `regrasp_plan::format`: do not edit.
 // REGRASP_WRITE_SCHEMA=1 cargo test -p regrasp_plan --lib writes it anew.
 
+import type { PlanInput, PoseData } from "./record";
+
+export type { PlanInput, PoseData };
+
 /** What a finger does at a waypoint. */
 export type ContactMode = "fixed" | "rolling" | "pure_rolling" | "twisting" | "pure_sliding" | "sliding" | "free";
 
@@ -62,7 +66,7 @@ export type FilePlan = {
   /** Settings of the planner, as they were used. */
   settings: unknown,
   /** Files it was made from, the scene file first. */
-  inputs: Array<PlanInput>,
+  inputs: PlanInput[],
   /** What it promises. */
   promises: Promises,
   /** The hands that it moves. All others of the scene rest. */
@@ -108,7 +112,7 @@ export type FileWaypoint = {
   /** Torques, or forces of sliding joints, with which the joints make the contact forces; absent in plans without forces. */
   joint_torques?: Array<number>,
   /** Pose of every object of `objects`, in the world. */
-  world_from_objects: Array<PoseData>,
+  world_from_objects: PoseData[],
   /** Fingers that touch an object, hand by hand in the order of their fingers. */
   contacts: Array<FileContact>,
 };
@@ -186,24 +190,6 @@ export type PlanFigures = {
   kept_margin: number,
   /** Cost by the weights in the settings. */
   cost: number,
-};
-
-/** A file the plan was made from. */
-export type PlanInput = {
-  /** What it is for: `scene`, `hand`, `urdf`, `srdf`, `mesh`. */
-  role: string,
-  /** How the scene names it: relative to the scene file, or `package://`. */
-  name: string,
-  /** SHA-256 of its bytes, lower-case hexadecimal. */
-  sha256: string,
-};
-
-/** A pose on disk. */
-export type PoseData = {
-  /** Position, in metres. */
-  position: [number, number, number],
-  /** Orientation as a unit quaternion, x y z w, with w >= 0. */
-  quat_xyzw: [number, number, number, number],
 };
 
 /** What the plan promises; the checker holds it to these numbers. */

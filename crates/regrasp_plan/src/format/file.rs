@@ -4,10 +4,10 @@
 //! refuses files with more.
 
 use super::caps;
-use super::locate::PathStep;
 use crate::plan::{
     ContactMode, ContactState, Plan, PlanInput, PoseData, Promises, Segment, SegmentKind, Statistics, WayPose, Waypoint,
 };
+use regrasp_base::json_place::PathStep;
 use schemars::JsonSchema;
 use serde::de::{Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -82,6 +82,7 @@ pub(super) struct FileWaypoint<'a> {
     #[serde(default, skip_serializing_if = "<[f64]>::is_empty")]
     pub joint_torques: Cow<'a, [f64]>,
     /// Pose of every object of `objects`, in the world.
+    #[cfg_attr(test, ts(type = "PoseData[]"))]
     pub world_from_objects: Vec<PoseData>,
     /// Fingers that touch an object, hand by hand in the order of their fingers.
     pub contacts: Vec<FileContact<'a>>,
@@ -161,6 +162,7 @@ pub(super) struct FilePlan<'a> {
     #[cfg_attr(test, ts(type = "unknown"))]
     pub settings: Cow<'a, serde_json::Value>,
     /// Files it was made from, the scene file first.
+    #[cfg_attr(test, ts(type = "PlanInput[]"))]
     pub inputs: Cow<'a, [PlanInput]>,
     /// What it promises.
     pub promises: Cow<'a, Promises>,
@@ -169,11 +171,13 @@ pub(super) struct FilePlan<'a> {
     /// Names of the objects that it moves. All others of the scene rest.
     pub objects: Vec<Cow<'a, str>>,
     /// Pose of the object asked for at the start.
+    #[cfg_attr(test, ts(type = "PoseData"))]
     pub start: PoseData,
     /// Poses asked for between start and goal, in order; absent where none were.
     #[serde(default, skip_serializing_if = "<[WayPose]>::is_empty")]
     pub way_poses: Cow<'a, [WayPose]>,
     /// Pose of the object asked for at the goal.
+    #[cfg_attr(test, ts(type = "PoseData"))]
     pub goal: PoseData,
     /// Counts of the search.
     pub statistics: Cow<'a, Statistics>,

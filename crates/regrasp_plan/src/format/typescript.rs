@@ -9,6 +9,10 @@ use std::path::Path;
 const HEADING: &str = "\
 // Types of a plan file (docs/reference/plan-format.md). Generated from `regrasp_plan::format`: do not edit.
 // REGRASP_WRITE_SCHEMA=1 cargo test -p regrasp_plan --lib writes it anew.
+
+import type { PlanInput, PoseData } from \"./record\";
+
+export type { PlanInput, PoseData };
 ";
 
 #[test]
