@@ -301,6 +301,35 @@ def test_a_narrow_tendon_is_a_coupling(tmp_path: Path):
     assert any('tendon "cord" keeps joint "palm_a"' in note for note in made.notes)
 
 
+def test_tendons_of_fixed_length_are_couplings(tmp_path: Path):
+    """Compared with MuJoCo's own lengths, at reference positions that are not 0."""
+    world = palm().replace('name="palm_a" range', 'name="palm_a" ref="20" range').replace('name="palm_b" range', 'name="palm_b" ref="-10" range')
+    fixed = '<fixed name="{}"><joint joint="palm_a" coef="0.03"/><joint joint="palm_b" coef="{}"/></fixed>'
+    one = '<fixed name="single"><joint joint="{}" coef="-0.02"/></fixed>'
+    cases = [
+        (f"<tendon>{fixed.format('cord', -0.02)}</tendon>", '<tendon tendon1="cord" polycoef="0.001 0 0 0 0"/>', lambda lengths: lengths[0]),
+        (f"<tendon>{one.format('palm_a').replace('single', 'cord')}{one.format('palm_b')}</tendon>", '<tendon tendon1="cord" tendon2="single" polycoef="0.001 0.5 0 0 0"/>', lambda lengths: lengths[0] - 0.5 * lengths[1]),
+    ]  # fmt: skip
+    for index, (tendons, equality, length) in enumerate(cases):
+        folder = tmp_path / str(index)
+        folder.mkdir()
+        rest = f'{tendons}<equality>{equality}</equality><actuator><motor joint="palm_a"/></actuator>'
+        made, urdf, model = converted(folder, world, rest)
+        assert urdf.joints["palm_a"].mimic is None and urdf.joints["palm_b"].mimic is not None
+        assert not made.left_out
+        data = mujoco.MjData(model)
+        for angle in (-0.3, 0.0, 0.4):
+            data.qpos[:] = [angle, urdf.position("palm_b", {"palm_a": angle})]
+            mujoco.mj_fwdPosition(model, data)
+            # The constraint's own error is 0.
+            assert abs(data.efc_pos[0]) < 1e-12
+            assert length(data.ten_length) == pytest.approx(length(model.tendon_length0) + 0.001, abs=1e-12)
+    (tmp_path / "held").mkdir()
+    rest = f'<tendon>{one.format("palm_b")}</tendon><equality><tendon tendon1="single" polycoef="0.004 0 0 0 0"/></equality>'
+    _, urdf, _ = converted(tmp_path / "held", world, rest)
+    assert urdf.joints["palm_b"].kind == "fixed"
+
+
 def test_a_tendon_that_one_actuator_pulls_is_told(tmp_path: Path):
     rest = """<tendon><fixed name="cord"><joint joint="palm_a" coef="0.01"/><joint joint="palm_b" coef="0.01"/></fixed></tendon>
       <actuator><motor tendon="cord" ctrlrange="-2 2"/></actuator>"""

@@ -25,6 +25,7 @@ class Constraints:
         self._lenient = lenient
         self.problems: list[str] = []
         """What a URDF cannot hold."""
+        self._used_tendons: set[int] = set()
 
     def couple(self, source: Source) -> None:
         """Equality constraints and narrow tendons become couplings."""
@@ -32,7 +33,8 @@ class Constraints:
         for index in range(self._model.neq):
             self._equality(index, joints, source)
         for tendon in range(self._model.ntendon):
-            self._tendon(tendon, joints, source)
+            if tendon not in self._used_tendons:
+                self._tendon(tendon, joints, source)
         for joint in joints.values():
             self._refuse_circle(joint, joints)
 
@@ -71,8 +73,11 @@ class Constraints:
                 self._refuse(f'{word} constraint "{name}" closes a loop of links; a URDF is a tree', source)
             else:
                 source.leave_out("connect and weld constraints to what is not the hand", name)
+        elif kind == int(kinds.mjEQ_TENDON):
+            if not self._tendons_equal(index, joints):
+                source.leave_out("equality constraints of tendons over other than two joints of the hand", name)
         else:
-            source.leave_out("equality constraints of tendons and flexes", name)
+            source.leave_out("equality constraints of flexes", name)
 
     def _bodies_of(self, index: int) -> list[int]:
         model = self._model
@@ -111,6 +116,53 @@ class Constraints:
         else:
             offset = follower.reference + constant - first * leader.reference
             follower.coupling = Coupling(leader.name, first, offset)
+
+    def _tendons_equal(self, index: int, joints: dict[str, Joint]) -> bool:
+        """Fixed tendons whose lengths a constraint ties, over two joints in all: a coupling. Over one: it is held."""
+        model = self._model
+        constant, first, *higher = (float(value) for value in model.eq_data[index][:5])
+        tendons = [(int(model.eq_obj1id[index]), 1.0)]
+        if int(model.eq_obj2id[index]) >= 0:
+            tendons.append((int(model.eq_obj2id[index]), -first))
+            if any(higher):
+                return False
+        # The sum of factor times position, over all joints, equals this length.
+        length, terms = constant, dict[int, float]()
+        for tendon, share in tendons:
+            wraps = _fixed_wraps(model, tendon)
+            if not wraps:
+                return False
+            length += share * float(model.tendon_length0[tendon])
+            for joint, factor in wraps:
+                terms[joint] = terms.get(joint, 0.0) + share * factor
+        parts = [(joints.get(self._names.joint(joint)), factor) for joint, factor in terms.items() if factor != 0.0]
+        known = [(joint, factor) for joint, factor in parts if joint is not None]
+        if len(known) < len(parts) or len(known) > 2 or not known:
+            return False
+        # What no actuator moves follows; else what is farther from the palm.
+        order = list(joints)
+        known.sort(key=lambda part: (part[0].is_driven, -order.index(part[0].name)))
+        for (follower, own), (leader, its) in zip(known, reversed(known), strict=True):
+            if follower.coupling is not None or follower.held_at is not None:
+                continue
+            if leader is follower:
+                follower.held_at = length / own
+            elif self._leads_to(leader, follower, joints):
+                continue
+            else:
+                follower.coupling = Coupling(leader.name, -its / own, length / own)
+            self._used_tendons.update(tendon for tendon, _ in tendons)
+            return True
+        return False
+
+    def _leads_to(self, joint: Joint, wanted: Joint, joints: dict[str, Joint]) -> bool:
+        """Whether `joint` follows `wanted`, over others or not."""
+        at: Joint | None = joint
+        for _ in joints:
+            if at is None or at is wanted or at.coupling is None:
+                break
+            at = joints.get(at.coupling.leader)
+        return at is wanted
 
     def _tendon(self, tendon: int, joints: dict[str, Joint], source: Source) -> None:
         """A tendon over two joints whose length has next to no range, one of them without an actuator, is a coupling."""
