@@ -449,6 +449,33 @@ def test_the_command_that_the_reader_of_urdfs_prints_works(tmp_path: Path):
     assert len(regrasp.load_hand(tmp_path / "hand" / "hand.toml").fingers) == 2
 
 
+def test_radians_that_are_taken_for_degrees_are_told(tmp_path: Path):
+    made, _, _ = converted(tmp_path, palm().replace("-60 60", "-1 1"))
+    assert any('angle="radian"' in note for note in made.notes)
+    (tmp_path / "right").mkdir()
+    made, _, _ = converted(tmp_path / "right", palm())
+    assert not made.notes
+
+
+def test_the_command_line_takes_a_base(tmp_path: Path, regrasp_cli: Any):
+    """A hand on an arm, with a head beside it: the fix that is printed works."""
+    arm = ""
+    for name in ("shoulder", "elbow", "wrist"):
+        arm += f'<body name="{name}" pos="0 0 0.1"><joint name="{name}" range="-60 60"/><geom size="0.01"/>'
+    head = '<body name="head" pos="0.2 0 0"><joint name="head" range="-60 60"/><geom type="capsule" size="0.01 0.02"/></body>'
+    world = f'<body name="torso"><geom size="0.02"/>{head}{arm}{palm()}{"</body>" * 3}</body>'
+    made, _, _ = converted(tmp_path, world)
+    assert made.problem is not None and made.problem.code == "U208"
+    assert made.problem.fix == "regrasp inspect with --base palm"
+    options = made.problem.fix.partition("with ")[2].split()
+    done = regrasp_cli("inspect", made.urdf, *options, "-o", made.urdf.with_name("hand.toml"), "--samples", "100")
+    assert done.returncode == 0, done.stderr
+    hand = regrasp.load_hand(made.urdf.with_name("hand.toml"))
+    assert (hand.base_link, hand.joint_names) == ("palm", ("palm_a", "palm_b"))
+    refused = regrasp_cli("inspect", made.urdf.with_name("hand.toml"), "--base", "palm")
+    assert (refused.returncode, "A505" in refused.stderr) == (2, True)
+
+
 def test_urdfs_of_ours_are_plain_xml(gecko: Conversion):
     robot = ElementTree.parse(gecko.urdf).getroot()
     assert (robot.tag, robot.get("name")) == ("robot", "gecko")

@@ -17,6 +17,10 @@ from ._roots import Part, choose_part
 from ._source import Body, FloatArray, Joint, MjcfError, Placed, Source, moved, rotation_of
 
 
+LIKELY_RANGE = 0.12
+"""Hinges of a hand turn farther than this, in radians: it is 7 degrees."""
+
+
 def read(path: Path, *, root: str | None = None, lenient: bool = False) -> Source:
     """The hand in the model file at `path`. Raises `MjcfError`, with every cause found.
 
@@ -69,6 +73,12 @@ class _Reading:
         constraints.allow(source)
         self.problems += constraints.problems
         self.note_rest(source)
+        ranges = [max(map(abs, joint.limits)) for joint in source.joints if joint.limits and joint.kind == "revolute"]
+        if ranges and max(ranges) < LIKELY_RANGE:
+            source.notes.append(
+                f"no hinge turns by more than {max(ranges):.3g} rad: the ranges may be radians that MuJoCo takes for degrees. "
+                'Add <compiler angle="radian"/> to the model then'
+            )
         if self.problems:
             more = "" if self.lenient else "\n--lenient leaves out what a URDF cannot hold, and says what"
             raise MjcfError("\n".join(f"{path}: {problem}" for problem in self.problems) + more)
