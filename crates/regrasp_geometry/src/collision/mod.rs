@@ -19,6 +19,6 @@ mod winding;
 
 pub use ball_tree::{Ball, BallTree};
 pub use gjk::{Placed, Separation, separation};
-pub use mesh_tree::{MeshBody, MeshTree};
+pub use mesh_tree::{HalfSpace, MeshBody, MeshTree};
 pub use placement::Placement;
 pub use support::gap_along;

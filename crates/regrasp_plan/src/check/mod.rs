@@ -93,6 +93,7 @@ pub use violation::{Moment, Violation, ViolationKind};
 
 use crate::plan::Plan;
 use model::CheckedHand;
+use regrasp_geometry::Pose;
 use regrasp_scene::{Manipulation, Query, Scene, State};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -326,6 +327,10 @@ pub fn check((scene, state): (&Scene, &State), query: Option<&Query>, plan: &Pla
     let mut log = Log { most_per_kind: settings.most_per_kind, work, ..Log::default() };
     let mut report = Report::default();
     promises::check_inputs(plan, &scene.inputs, &mut log);
+    // Where the scene leaves the start pose open any is an answer, and the other poses follow from it. That the object may be there
+    // is judged as at every other moment.
+    let started = query.filter(|query| query.has_open_start()).map(|query| query.started_at(&Pose::from(&plan.start)));
+    let query = started.as_ref().or(query);
     let wrong_scene = |message| Violation::new(ViolationKind::WrongScene, message);
     let found = holders::manipulation(scene, state, query, plan)
         .and_then(|task| Ok((task, CheckedHand::new(&task).map_err(wrong_scene)?)));

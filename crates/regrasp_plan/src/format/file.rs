@@ -4,10 +4,10 @@
 //! refuses files with more.
 
 use super::caps;
-use super::locate::PathStep;
 use crate::plan::{
     ContactMode, ContactState, Plan, PlanInput, PoseData, Promises, Segment, SegmentKind, Statistics, WayPose, Waypoint,
 };
+use regrasp_base::json_place::PathStep;
 use schemars::JsonSchema;
 use serde::de::{Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};

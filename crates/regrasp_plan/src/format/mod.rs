@@ -2,14 +2,12 @@
 
 /// The file as it stands on disk.
 mod file;
-/// Where a value stands in a JSON text.
-mod locate;
 /// What a plan file may not say.
 mod validate;
 
 use crate::plan::{FORMAT, FORMAT_VERSION, ONLY_HAND, Plan, Segment};
 use file::{FileHand, FilePlan, FileSegment, FileWaypoint};
-use locate::{PathStep, locate};
+use regrasp_base::json_place::{PathStep, diagnostic, locate};
 use regrasp_base::{Diagnostic, InputError, Place};
 use serde::Deserialize;
 use std::borrow::Cow;
@@ -110,7 +108,7 @@ pub fn from_json(path: &Path, bytes: &[u8]) -> Result<Plan, InputError> {
         _ => {
             let file: FilePlan = serde_json::from_str(&text).map_err(|error| syntax_error(path, &error))?;
             file.plan().map_err(|fault| {
-                validate::diagnostic(path, &text, fault.code, &fault.at, fault.problem).expected(fault.expected)
+                diagnostic(path, &text, fault.code, &fault.at, fault.problem).expected(fault.expected)
             })?
         }
     };

@@ -1,10 +1,10 @@
 //! What a plan file may not say.
 
 use super::caps;
-use super::locate::{PathStep, locate};
 use crate::plan::{ContactMode, ContactState, FORMAT_VERSION, ForcePromises, Plan, PoseData, Segment, SegmentKind};
+use regrasp_base::InputError;
 use regrasp_base::diagnostic::{Diagnostics, GOOD_NAME, fault_of_name, number};
-use regrasp_base::{Diagnostic, InputError, Place};
+use regrasp_base::json_place::{PathStep, diagnostic};
 use std::path::Path;
 
 /// How far a quaternion's or a normal's length may be from one.
@@ -16,25 +16,6 @@ pub(super) fn validate(path: &Path, text: &str, version: u32, plan: Plan) -> Res
     reader.validate(&plan);
     let found = reader.found;
     found.into_result(plan)
-}
-
-/// A diagnostic about the value that `steps` lead to.
-pub(super) fn diagnostic(
-    path: &Path,
-    text: &str,
-    code: &'static str,
-    steps: &[PathStep],
-    problem: String,
-) -> Diagnostic {
-    let offset = locate(text, steps).unwrap_or(0);
-    let name: String = steps
-        .iter()
-        .map(|step| match step {
-            PathStep::Key(key) => format!(".{key}"),
-            PathStep::Index(index) => format!("[{index}]"),
-        })
-        .collect();
-    Diagnostic::new(code, Place::at_offset(path, text, offset), problem).element("key", name.trim_start_matches('.'))
 }
 
 /// Where a file of version 3 has what the plan has at `steps`.

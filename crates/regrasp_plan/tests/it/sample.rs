@@ -475,6 +475,7 @@ pub fn in_hand_query(plan: &Plan) -> InHandQuery {
         world_from_object_goal: Pose::from(&plan.goal),
         start_grasp: GraspRequest::Automatic,
         goal_grasp: GraspRequest::Automatic,
+        open_start: None,
     }
 }
 
