@@ -101,6 +101,9 @@ pub struct Inspect {
     /// Write a hand file
     #[arg(short, long, value_name = "hand.toml")]
     pub output: Option<PathBuf>,
+    /// Base link of the hand in a URDF: its fingers are those below this link [default: guessed]
+    #[arg(long, value_name = "LINK")]
+    pub base: Option<String>,
     /// Postures sampled for the pairs of links that always or never touch
     #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000), allow_negative_numbers = true)]
     pub samples: u32,
