@@ -89,13 +89,16 @@ pub(super) fn object(mut table: Table, tips: Tips, files: &mut Files, found: &mu
     if !files.is_in_time(found) {
         return None;
     }
-    let (surface, mesh_body) = std::thread::scope(|scope| {
-        let mesh_body = scope.spawn(|| MeshBody::of(&shape));
-        let surface = Surface::with_crease_angle(&shape, crease_angle);
-        (surface, mesh_body.join().expect("preparing a mesh does not panic"))
+    let ready = files.stock.ready(shape, crease_angle, |shape| {
+        std::thread::scope(|scope| {
+            let mesh_body = scope.spawn(|| MeshBody::of(shape));
+            let surface = Surface::with_crease_angle(shape, crease_angle);
+            let mesh_body = mesh_body.join().expect("preparing a mesh does not panic");
+            surface.map(|surface| (surface, mesh_body))
+        })
     });
-    let surface = match surface {
-        Ok(surface) => surface,
+    let (shape, surface, mesh_body) = match ready {
+        Ok(ready) => ready,
         Err(error) => {
             let diagnostic =
                 regrasp_base::Diagnostic::new("M207", found.place(&span), error.to_string()).element("table", &element);
