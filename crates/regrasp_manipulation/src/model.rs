@@ -384,9 +384,9 @@ fn object_body(object: &Object) -> Body {
     Body { carrier: Carrier::Object, tree, ..body }
 }
 
-/// Share of the volume of its hull below which an object counts as far from convex. By hand: apples, cubes and bulbs have 0.95 and
-/// more, bananas and mugs 0.7 and less.
-const FOLDED: f64 = 0.9;
+/// Share of the volume of its hull below which an object counts as far from convex. By hand: apples, cubes and bulbs have 0.85 and
+/// more, bananas and mugs 0.65 and less.
+const FOLDED: f64 = 0.8;
 
 /// True where the mesh of `object` fills clearly less than its hull.
 fn folds(object: &Object) -> bool {
