@@ -5,7 +5,7 @@ use std::path::Path;
 
 /// A step into a JSON document.
 #[derive(Debug, Clone, Copy)]
-pub enum Step<'a> {
+pub enum PathStep<'a> {
     /// The value of this key of an object.
     Key(&'a str),
     /// The element of this index of an array.
@@ -13,25 +13,25 @@ pub enum Step<'a> {
 }
 
 /// A diagnostic about the value that `steps` lead to in the JSON `text` of the file at `path`.
-pub fn diagnostic(path: &Path, text: &str, code: &'static str, steps: &[Step], problem: String) -> Diagnostic {
+pub fn diagnostic(path: &Path, text: &str, code: &'static str, steps: &[PathStep], problem: String) -> Diagnostic {
     let offset = locate(text, steps).unwrap_or(0);
     let name: String = steps
         .iter()
         .map(|step| match step {
-            Step::Key(key) => format!(".{key}"),
-            Step::Index(index) => format!("[{index}]"),
+            PathStep::Key(key) => format!(".{key}"),
+            PathStep::Index(index) => format!("[{index}]"),
         })
         .collect();
     Diagnostic::new(code, Place::at_offset(path, text, offset), problem).element("key", name.trim_start_matches('.'))
 }
 
 /// Byte offset of the value that `steps` lead to. `text` is valid JSON, or nothing is found.
-pub fn locate(text: &str, steps: &[Step]) -> Option<usize> {
+pub fn locate(text: &str, steps: &[PathStep]) -> Option<usize> {
     let mut cursor = Cursor { bytes: text.as_bytes(), at: 0 };
     cursor.skip_space();
     for step in steps {
         match step {
-            Step::Key(wanted) => {
+            PathStep::Key(wanted) => {
                 cursor.expect(b'{')?;
                 loop {
                     cursor.skip_space();
@@ -47,7 +47,7 @@ pub fn locate(text: &str, steps: &[Step]) -> Option<usize> {
                     cursor.expect(b',')?;
                 }
             }
-            Step::Index(wanted) => {
+            PathStep::Index(wanted) => {
                 cursor.expect(b'[')?;
                 for _ in 0..*wanted {
                     cursor.skip_space();

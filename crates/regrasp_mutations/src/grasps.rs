@@ -6,7 +6,7 @@ use regrasp_geometry::{Point, Pose, Shape, UnitVector, Vector};
 use regrasp_grasp::list::{GraspList, ListedGrasp};
 use regrasp_grasp::record::PoseData;
 use regrasp_grasp::{Contact, Grip};
-use regrasp_plan::check::closure::{Body, certified_margin};
+use regrasp_plan::check::closure::{HeldBody, certified_margin};
 use regrasp_plan::check::violation::ViolationKind as Kind;
 use regrasp_robot::Hand;
 use regrasp_scene::{GraspScene, Object};
@@ -197,7 +197,7 @@ fn margin(hand: &Hand, object: &Object, list: &GraspList) -> Option<f64> {
         Some(Grip { contact, model: finger.tip.contact })
     };
     let grips: Option<Vec<Grip>> = list.grasps[0].contacts.iter().map(grip).collect();
-    let body = Body {
+    let body = HeldBody {
         center_of_mass: object.center_of_mass,
         torque_scale: object.radius,
         friction: list.promises.friction.min(object.friction),

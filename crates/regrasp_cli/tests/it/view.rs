@@ -5,14 +5,6 @@ use crate::folder::{Folder, Run};
 use crate::places::repository;
 use serde_json::Value;
 
-/// A folder with a plan in it.
-fn planned() -> Folder {
-    let folder = Folder::new();
-    let run = folder.run(&["plan", "scene.toml", "-o", "plan.json"]);
-    assert_eq!(run.code, Some(0), "{run:?}");
-    folder
-}
-
 /// What the page `name` was told.
 fn story(folder: &Folder, name: &str) -> Value {
     let page = std::fs::read_to_string(folder.path(name)).unwrap();
@@ -33,7 +25,7 @@ fn ends_with_page(run: &Run, name: &str) {
 
 #[test]
 fn the_page_of_a_plan_has_the_plan_and_the_verdict() {
-    let folder = planned();
+    let folder = Folder::planned();
     let run = folder.run(&["view", "plan.json", "-o", "plan.html", "--story", "story.json", "--title", "<b>A & B</b>"]);
     assert_eq!(run.code, Some(0), "{run:?}");
     ends_with_page(&run, "plan.html");
@@ -52,7 +44,7 @@ fn the_page_of_a_plan_has_the_plan_and_the_verdict() {
 
 #[test]
 fn a_rejected_plan_has_a_page_that_says_so() {
-    let folder = planned();
+    let folder = Folder::planned();
     folder.edit("scene.toml", "mass = 0.1", "mass = 0.2");
     let run = folder.run(&["view", "plan.json", "-o", "plan.html"]);
     assert_eq!(run.code, Some(0), "{run:?}");
@@ -106,7 +98,7 @@ fn the_demo_ends_with_the_path_of_its_page() {
 
 #[test]
 fn over_ssh_there_is_a_hint() {
-    let folder = planned();
+    let folder = Folder::planned();
     let run = |ssh: bool| {
         let mut command = folder.command(&["view", "plan.json", "-o", "plan.html"]);
         match ssh {
@@ -120,7 +112,7 @@ fn over_ssh_there_is_a_hint() {
 
 #[test]
 fn the_graph_of_a_roadmap_is_shown_with_the_way_through_it() {
-    let folder = planned();
+    let folder = Folder::planned();
     let build = ["roadmap", "build", "scene.toml", "-o", "a.roadmap", "--places", "12", "--angle", "30"];
     assert_eq!(folder.run(&build).code, Some(0));
     let run = folder.run(&["view", "plan.json", "-o", "plan.html", "--with-roadmap", "a.roadmap"]);
@@ -147,7 +139,7 @@ fn the_graph_of_a_roadmap_is_shown_with_the_way_through_it() {
 
 #[test]
 fn files_that_cannot_be_read_or_written() {
-    let folder = planned();
+    let folder = Folder::planned();
     let view = |arguments: &[&str]| folder.run(&[&["view"], arguments].concat());
     complains(&view(&["missing.json", "-o", "a.html"]), "F001", "missing.json", &["cannot be read"]);
     complains(&view(&["plan.json", "-o", "none/a.html"]), "F003", "none/a.html", &["cannot be written"]);

@@ -55,7 +55,7 @@ pub struct MeshSurface {
 
 /// Where on a triangle a point lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Feature {
+pub(crate) enum Feature {
     Inside,
     Edge(usize),
     Corner(usize),
@@ -144,6 +144,13 @@ impl MeshSurface {
     /// Number of triangles, with those that are inside.
     pub fn n_triangles(&self) -> usize {
         self.topology.triangles.len()
+    }
+
+    /// How long its creases are before the next corner, in metres: the mean of their edges, weighed by length. None without creases.
+    pub fn crease_grain(&self) -> Option<f64> {
+        let lengths = || self.crease_edges.iter().map(|[a, b]| (b - a).norm());
+        let (sum, squares) = lengths().fold((0.0, 0.0), |(sum, squares), x| (sum + x, squares + x * x));
+        (sum > 0.0).then(|| squares / sum)
     }
 
     /// Corners of triangle `facet`, counter-clockwise seen from outside.
@@ -479,7 +486,7 @@ fn meet([a, b, c]: &[Point; 3], origin: &Point, direction: &Vector) -> Option<f6
 }
 
 /// Nearest point of a triangle (Ericson 2005, 5.1.5).
-pub(super) fn nearest_on_triangle([a, b, c]: &[Point; 3], p: &Point) -> (Point, Feature) {
+pub(crate) fn nearest_on_triangle([a, b, c]: &[Point; 3], p: &Point) -> (Point, Feature) {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
     if d1 <= 0.0 && d2 <= 0.0 {

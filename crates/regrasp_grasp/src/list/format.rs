@@ -1,7 +1,7 @@
 //! Reading and writing `grasps.json`, and its JSON Schema. `docs/reference/grasp-list-format.md` describes the file.
 
 use super::{FORMAT, FORMAT_VERSION, GraspList, validate};
-use regrasp_base::json_place::{Step, locate};
+use regrasp_base::json_place::{PathStep, locate};
 use regrasp_base::{Diagnostic, InputError, Place};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
@@ -98,7 +98,7 @@ struct Header {
 /// Format and version come first: their message helps more than the first key that a later version has and this one not.
 fn check_header(path: &Path, text: &str) -> Result<(), InputError> {
     let header: Header = serde_json::from_str(text).map_err(|error| syntax_error(path, &error))?;
-    let place = |key| Place::at_offset(path, text, locate(text, &[Step::Key(key)]).unwrap_or(0));
+    let place = |key| Place::at_offset(path, text, locate(text, &[PathStep::Key(key)]).unwrap_or(0));
     let seen = |value: Option<serde_json::Value>| value.map_or("is missing".to_owned(), |value| format!("is {value}"));
     if header.format.as_ref().and_then(|value| value.as_str()) != Some(FORMAT) {
         return Err(Diagnostic::new("G702", place("format"), seen(header.format))

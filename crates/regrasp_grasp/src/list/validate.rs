@@ -4,8 +4,8 @@ use super::{GraspList, ListedContact, ListedGrasp};
 use crate::record::PoseData;
 use regrasp_base::InputError;
 use regrasp_base::diagnostic::{Diagnostics, GOOD_NAME, fault_of_name, number};
-use regrasp_base::json_place::Step::{Index, Key};
-use regrasp_base::json_place::{Step, diagnostic};
+use regrasp_base::json_place::PathStep::{Index, Key};
+use regrasp_base::json_place::{PathStep, diagnostic};
 use std::path::Path;
 
 /// How far a quaternion's or a direction's length may be from one.
@@ -38,7 +38,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn fail(&mut self, code: &'static str, steps: &[Step], problem: String, expected: impl Into<String>) {
+    fn fail(&mut self, code: &'static str, steps: &[PathStep], problem: String, expected: impl Into<String>) {
         // A broken writer breaks every grasp in the same way.
         if !self.found.counted_only() {
             self.found.push(diagnostic(self.path, self.text, code, steps, problem).expected(expected));
@@ -181,7 +181,7 @@ impl Reader<'_> {
         }
     }
 
-    fn contact(&mut self, list: &GraspList, at: &[Step; 4], contact: &ListedContact) {
+    fn contact(&mut self, list: &GraspList, at: &[PathStep; 4], contact: &ListedContact) {
         let inside = |key| [at[0], at[1], at[2], at[3], Key(key)];
         if !list.hand.fingers.contains(&contact.finger) {
             let expected = format!("one of {}", list.hand.fingers.join(", "));
@@ -197,7 +197,7 @@ impl Reader<'_> {
         }
     }
 
-    fn per_joint(&mut self, list: &GraspList, steps: &[Step], n_seen: usize) {
+    fn per_joint(&mut self, list: &GraspList, steps: &[PathStep], n_seen: usize) {
         let n_joints = list.hand.joint_names.len();
         if n_seen != n_joints {
             let expected = format!("{n_joints}, one for each of \"joint_names\"");
@@ -205,27 +205,27 @@ impl Reader<'_> {
         }
     }
 
-    fn within(&mut self, steps: &[Step], value: f64, [low, high]: [f64; 2]) {
+    fn within(&mut self, steps: &[PathStep], value: f64, [low, high]: [f64; 2]) {
         if !(low..=high).contains(&value) {
             let expected = format!("a number from {} to {}", number(low), number(high));
             self.fail("G709", steps, format!("is {}", number(value)), expected);
         }
     }
 
-    fn position(&mut self, steps: &[Step], position: &[f64; 3]) {
+    fn position(&mut self, steps: &[PathStep], position: &[f64; 3]) {
         if position.iter().any(|x| !(x.abs() <= caps::POSITION)) {
             self.fail("G709", steps, format!("is {position:?}"), "metres");
         }
     }
 
-    fn direction(&mut self, steps: &[Step], direction: &[f64; 3]) {
+    fn direction(&mut self, steps: &[PathStep], direction: &[f64; 3]) {
         let length = direction.iter().map(|x| x * x).sum::<f64>().sqrt();
         if !((length - 1.0).abs() <= UNIT_TOLERANCE) {
             self.fail("G705", steps, format!("has length {}", number(length)), "length 1");
         }
     }
 
-    fn pose(&mut self, steps: &[Step], pose: &PoseData) {
+    fn pose(&mut self, steps: &[PathStep], pose: &PoseData) {
         let length = pose.quat_xyzw.iter().map(|x| x * x).sum::<f64>().sqrt();
         if !((length - 1.0).abs() <= UNIT_TOLERANCE) {
             self.fail("G705", steps, format!("has a quaternion of length {}", number(length)), "length 1");

@@ -178,7 +178,7 @@ mod tests {
     use regrasp_base::Rng;
     use regrasp_geometry::{Pose, UnitVector};
     use regrasp_robot::kinematics::finger_ik::IkSettings;
-    use regrasp_robot::{Chain, ChainJoint, Coupling, Motion};
+    use regrasp_robot::{Chain, ChainJoint, Coupling, JointMotion};
 
     /// The right fore finger of the hands of Saut 2010, by the numbers of its joints; the last joint follows the one before.
     fn fore_finger() -> FingerIk {
@@ -188,7 +188,7 @@ mod tests {
                 UnitQuaternion::from_euler_angles(roll, 0.0, 0.0),
             ),
             axis: UnitVector::new_unchecked(Vector::z()),
-            motion: Motion::Turn,
+            motion: JointMotion::Turn,
             drive: Coupling { terms: terms.into_iter().collect(), offset: 0.0 },
         };
         let joints = vec![

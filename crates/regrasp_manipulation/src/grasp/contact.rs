@@ -71,7 +71,7 @@ fn draw_contact_once(
         return None;
     }
     let hit = object.surface.settle_counted(&hit, finger_model.settle_radius, n_measured)?;
-    if object.surface.crease_distance(&hit) < object.edge_distance {
+    if !object.keeps_off_edges(&hit) {
         return None;
     }
     Some(Contact { point_in_object: hit.point_in_object, normal_in_object: hit.normal_in_object })

@@ -7,7 +7,7 @@ use super::caps;
 use crate::plan::{
     ContactMode, ContactState, Plan, PlanInput, PoseData, Promises, Segment, SegmentKind, Statistics, WayPose, Waypoint,
 };
-use regrasp_base::json_place::Step;
+use regrasp_base::json_place::PathStep;
 use schemars::JsonSchema;
 use serde::de::{Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -178,7 +178,7 @@ pub(super) struct Fault {
     /// Code of the error.
     pub code: &'static str,
     /// Where.
-    pub at: Vec<Step<'static>>,
+    pub at: Vec<PathStep<'static>>,
     /// What.
     pub problem: String,
     /// What was expected.
@@ -213,15 +213,21 @@ impl<'a> FileWaypoint<'a> {
     }
 
     /// As a waypoint of a plan of one hand and one object.
-    fn waypoint(self, names: &Names, at: [Step<'static>; 4]) -> Result<Waypoint, Fault> {
+    fn waypoint(self, names: &Names, at: [PathStep<'static>; 4]) -> Result<Waypoint, Fault> {
         let [world_from_object] = self.world_from_objects[..] else {
             let problem = format!("has {} poses", self.world_from_objects.len());
-            return Err(fault("C404", &at, &[Step::Key("world_from_objects")], problem, "one for each of \"objects\""));
+            return Err(fault(
+                "C404",
+                &at,
+                &[PathStep::Key("world_from_objects")],
+                problem,
+                "one for each of \"objects\"",
+            ));
         };
         let mut contacts = vec![ContactState::FREE; names.fingers.len()];
         let mut next = 0;
         for (index, contact) in self.contacts.into_iter().enumerate() {
-            let step = |key| [Step::Key("contacts"), Step::Index(index), Step::Key(key)];
+            let step = |key| [PathStep::Key("contacts"), PathStep::Index(index), PathStep::Key(key)];
             names.expect_hand(&contact.hand).map_err(|name| unknown(&at, &step("hand"), &contact.hand, name))?;
             names
                 .expect_object(&contact.object)
@@ -261,11 +267,17 @@ impl<'a> FileWaypoint<'a> {
     }
 }
 
-fn fault(code: &'static str, at: &[Step<'static>], inside: &[Step<'static>], problem: String, expected: &str) -> Fault {
+fn fault(
+    code: &'static str,
+    at: &[PathStep<'static>],
+    inside: &[PathStep<'static>],
+    problem: String,
+    expected: &str,
+) -> Fault {
     Fault { code, at: [at, inside].concat(), problem, expected: expected.to_owned() }
 }
 
-fn unknown(at: &[Step<'static>], inside: &[Step<'static>], name: &str, known: &str) -> Fault {
+fn unknown(at: &[PathStep<'static>], inside: &[PathStep<'static>], name: &str, known: &str) -> Fault {
     fault("C408", at, inside, format!("\"{name}\" is not in the plan"), known)
 }
 
@@ -302,16 +314,16 @@ impl<'a> FileSegment<'a> {
         }
     }
 
-    fn segment(self, names: &Names, at: [Step<'static>; 2]) -> Result<Segment, Fault> {
-        names.expect_hand(&self.hand).map_err(|name| unknown(&at, &[Step::Key("hand")], &self.hand, name))?;
+    fn segment(self, names: &Names, at: [PathStep<'static>; 2]) -> Result<Segment, Fault> {
+        names.expect_hand(&self.hand).map_err(|name| unknown(&at, &[PathStep::Key("hand")], &self.hand, name))?;
         let mut held_by = Vec::new();
         for (object, holders) in self.held_by {
-            names.expect_object(&object).map_err(|name| unknown(&at, &[Step::Key("held_by")], &object, name))?;
+            names.expect_object(&object).map_err(|name| unknown(&at, &[PathStep::Key("held_by")], &object, name))?;
             held_by = holders.into_iter().map(Cow::into_owned).collect();
         }
         let mut moving = self.moving.into_iter().map(Cow::into_owned);
         let waypoints = self.waypoints.into_iter().enumerate().map(|(index, waypoint)| {
-            waypoint.waypoint(names, [at[0], at[1], Step::Key("waypoints"), Step::Index(index)])
+            waypoint.waypoint(names, [at[0], at[1], PathStep::Key("waypoints"), PathStep::Index(index)])
         });
         Ok(Segment {
             kind: self.kind,
@@ -333,20 +345,20 @@ impl FilePlan<'_> {
         for (key, n) in [("hands", self.hands.len()), ("objects", self.objects.len())] {
             if n != 1 {
                 let expected = "one; this version judges plans in which one hand moves one object and all else rests";
-                return Err(fault("C411", &[], &[Step::Key(key)], format!("has {n} entries"), expected));
+                return Err(fault("C411", &[], &[PathStep::Key(key)], format!("has {n} entries"), expected));
             }
         }
         let (hand, object) = (self.hands.remove(0), self.objects.remove(0).into_owned());
         // Every waypoint takes memory for every finger: the number of fingers is looked at before.
         if hand.fingers.len() > caps::FINGERS {
             let problem = format!("has {} entries", hand.fingers.len());
-            let at = [Step::Key("hands"), Step::Index(0), Step::Key("fingers")];
+            let at = [PathStep::Key("hands"), PathStep::Index(0), PathStep::Key("fingers")];
             return Err(fault("C410", &at, &[], problem, &format!("at most {}", caps::FINGERS)));
         }
         let names = Names { hand: hand.name.into_owned(), object, fingers: hand.fingers.into_owned() };
         let segments = self.segments.into_iter().enumerate();
-        let segments =
-            segments.map(|(index, segment)| segment.segment(&names, [Step::Key("segments"), Step::Index(index)]));
+        let segments = segments
+            .map(|(index, segment)| segment.segment(&names, [PathStep::Key("segments"), PathStep::Index(index)]));
         let segments = segments.collect::<Result<Vec<_>, _>>()?;
         Ok(Plan {
             format: self.format.into_owned(),

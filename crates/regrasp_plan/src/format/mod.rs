@@ -7,7 +7,7 @@ mod validate;
 
 use crate::plan::{FORMAT, FORMAT_VERSION, ONLY_HAND, Plan, Segment};
 use file::{FileHand, FilePlan, FileSegment, FileWaypoint};
-use regrasp_base::json_place::{Step, diagnostic, locate};
+use regrasp_base::json_place::{PathStep, diagnostic, locate};
 use regrasp_base::{Diagnostic, InputError, Place};
 use serde::Deserialize;
 use std::borrow::Cow;
@@ -150,7 +150,7 @@ fn version_of(path: &Path, text: &str) -> Result<u32, InputError> {
         format_version: Option<serde_json::Value>,
     }
     let header: Header = serde_json::from_str(text).map_err(|error| syntax_error(path, &error))?;
-    let place = |key| locate(text, &[Step::Key(key)]).unwrap_or(0);
+    let place = |key| locate(text, &[PathStep::Key(key)]).unwrap_or(0);
     if header.format.as_ref().and_then(|value| value.as_str()) != Some(FORMAT) {
         let seen = header.format.map_or("is missing".to_owned(), |value| format!("is {value}"));
         return Err(Diagnostic::new("C402", Place::at_offset(path, text, place("format")), seen)

@@ -5,7 +5,7 @@
 
 use super::chain::{ChainOwner, make_chain, middle_of_limits, rest_posture};
 use super::hulls::Hulls;
-use super::spec::{Body, Carried, FingerSpec, HandSpec, TipSpec};
+use super::spec::{Carried, FingerSpec, HandSpec, RigidBody, TipSpec};
 use super::tip_split;
 use crate::coupling::Coupling;
 use crate::hand::{Finger, FingerShape, Hand, MAX_FINGERS, PalmShape};
@@ -45,7 +45,7 @@ pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Resu
         fingers.extend(make_finger(robot, index, finger, joints, &carried, &mut hulls, &mut found));
     }
     let mut palm = Vec::new();
-    for (&link, at) in carried.iter().filter(|(_, at)| at.body == Body::Palm) {
+    for (&link, at) in carried.iter().filter(|(_, at)| at.body == RigidBody::Palm) {
         let shapes = hulls.of_link(link, &at.body_from_link, &mut found);
         palm.extend(shapes.into_iter().map(|placed| PalmShape { link, placed }));
     }
@@ -128,7 +128,7 @@ fn carry(
     notes: &mut Vec<String>,
 ) -> BTreeMap<LinkId, Carried> {
     let base = spec.base;
-    let mut carried = BTreeMap::from([(base, Carried { body: Body::Palm, body_from_link: Pose::identity() })]);
+    let mut carried = BTreeMap::from([(base, Carried { body: RigidBody::Palm, body_from_link: Pose::identity() })]);
     let mut waiting = VecDeque::from([base]);
     while let Some(link) = waiting.pop_front() {
         let at = carried[&link];
@@ -148,7 +148,7 @@ fn carry(
             }
             let child = match owner.get(&id) {
                 Some(&(finger, body)) => {
-                    Carried { body: Body::Finger { finger, body }, body_from_link: Pose::identity() }
+                    Carried { body: RigidBody::Finger { finger, body }, body_from_link: Pose::identity() }
                 }
                 None => {
                     let held = held_at(robot, id, owner, file, found, notes);
@@ -227,7 +227,7 @@ fn make_finger(
     let own = round.as_ref().and_then(Tip::own_shape);
     let mut shapes = Vec::new();
     for (&link, at) in carried {
-        let Body::Finger { finger, body } = at.body else { continue };
+        let RigidBody::Finger { finger, body } = at.body else { continue };
         if finger != index {
             continue;
         }
@@ -304,7 +304,7 @@ fn adjacent_pairs(
     carried: &BTreeMap<LinkId, Carried>,
     moving: &[Vec<JointId>],
 ) -> BTreeSet<(LinkId, LinkId)> {
-    let mut links_of: BTreeMap<Body, Vec<LinkId>> = BTreeMap::new();
+    let mut links_of: BTreeMap<RigidBody, Vec<LinkId>> = BTreeMap::new();
     for (&link, at) in carried.iter().filter(|(link, _)| !robot.links[link.0].collision.is_empty()) {
         links_of.entry(at.body).or_default().push(link);
     }
@@ -316,9 +316,9 @@ fn adjacent_pairs(
         add(links, links);
     }
     for (finger, joints) in moving.iter().enumerate() {
-        let bodies = (0..joints.len()).map(|body| Body::Finger { finger, body });
+        let bodies = (0..joints.len()).map(|body| RigidBody::Finger { finger, body });
         let with_shapes: Vec<&Vec<LinkId>> =
-            std::iter::once(Body::Palm).chain(bodies).filter_map(|body| links_of.get(&body)).collect();
+            std::iter::once(RigidBody::Palm).chain(bodies).filter_map(|body| links_of.get(&body)).collect();
         for pair in with_shapes.windows(2) {
             add(pair[0], pair[1]);
         }

@@ -3,7 +3,7 @@
 use super::spec::Carried;
 use crate::coupling::{Coupling, limit_leaders};
 use crate::hand::MAX_FINGER_JOINTS;
-use crate::kinematics::chain::{Chain, ChainJoint, Motion};
+use crate::kinematics::chain::{Chain, ChainJoint, JointMotion};
 use crate::kinematics::finger_ik::MAX_COORDINATES;
 use crate::kinematics::motion_bound::MAX_JOINTS;
 use crate::robot::{JointId, JointKind, LinkId, Robot};
@@ -91,7 +91,7 @@ pub(super) fn make_chain(
         chain_joints.push(ChainJoint {
             parent_from_joint: parent.body_from_link * joint.parent_from_joint,
             axis: joint.axis,
-            motion: if joint.kind == JointKind::Prismatic { Motion::Slide } else { Motion::Turn },
+            motion: if joint.kind == JointKind::Prismatic { JointMotion::Slide } else { JointMotion::Turn },
             drive,
         });
     }

@@ -117,9 +117,9 @@ pub fn load_grasp_scene(
                 notes.clone_from(&loaded.notes);
                 Some(loaded.manipulation().object().clone())
             }
-            (None, Some(entry)) => {
-                entry.table(&mut found).and_then(|table| object::object(table, &mut files, &mut found))
-            }
+            (None, Some(entry)) => entry
+                .table(&mut found)
+                .and_then(|table| object::object(table, object::Tips::of(&hand), &mut files, &mut found)),
             (None, None) => None,
         };
         let (hand, object) = (hand?, object?);

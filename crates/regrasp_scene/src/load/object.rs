@@ -5,13 +5,13 @@ use super::numbers::{list, shown};
 use super::pose;
 use super::shape::{self, Origin, ReadShape};
 use crate::object::Object;
-use crate::scene::Obstacle;
+use crate::scene::{Obstacle, SceneHand};
 use regrasp_base::diagnostic::number;
 use regrasp_base::toml_table::{Entry, Found, Table};
 use regrasp_geometry::collision::MeshBody;
 use regrasp_geometry::mass::{Solid, solid_properties};
 use regrasp_geometry::shape::PlacedShape;
-use regrasp_geometry::surface::DEFAULT_CREASE_ANGLE;
+use regrasp_geometry::surface::{DEFAULT_CREASE_ANGLE, MeshSurface};
 use regrasp_geometry::{Point, Shape, Surface};
 use std::collections::BTreeSet;
 
@@ -26,8 +26,28 @@ const UNLIKELY_FRICTION: f64 = 2.0;
 /// Masses above this are noted, in kilograms.
 const UNLIKELY_MASS: f64 = 20.0;
 
-/// Reads an object from its table.
-pub(super) fn object(mut table: Table, files: &mut Files, found: &mut Found) -> Option<Object> {
+/// The fingertips of all hands of a scene.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Tips {
+    /// All have a radius: each touches an edge with a normal of its own.
+    Round,
+    /// Some are points, or not known.
+    Sharp,
+}
+
+impl Tips {
+    /// Those of `hands`.
+    pub fn of<'a>(hands: impl IntoIterator<Item = &'a SceneHand>) -> Self {
+        let mut fingers = hands.into_iter().flat_map(|hand| &hand.hand.fingers).peekable();
+        match fingers.peek().is_some() && fingers.all(|finger| finger.tip.radius() > 0.0) {
+            true => Tips::Round,
+            false => Tips::Sharp,
+        }
+    }
+}
+
+/// Reads an object from its table; `tips` are those that may touch it.
+pub(super) fn object(mut table: Table, tips: Tips, files: &mut Files, found: &mut Found) -> Option<Object> {
     let span = table.span.clone();
     let element = table.name.clone();
     let name = table.optional("name").and_then(|entry| entry.name(found)).unwrap_or("object").to_owned();
@@ -84,6 +104,19 @@ pub(super) fn object(mut table: Table, files: &mut Files, found: &mut Found) -> 
         }
     };
     let radius = shape.reach_from(&center_of_mass);
+    let grain = surface.mesh().and_then(MeshSurface::crease_grain);
+    let edge_distance = match (edge_entry, tips, grain) {
+        (None, Tips::Round, Some(grain)) if grain < edge_distance => {
+            let millimetres = 1e3 * grain;
+            let problem = format!(
+                "contacts may lie on edges (edge_distance = 0): the mesh folds in pieces of {millimetres:.1} mm, as scans \
+                 do; edge_distance = {edge_distance} keeps contacts off edges"
+            );
+            found.note(&span, problem);
+            0.0
+        }
+        _ => edge_distance,
+    };
     Some(Object {
         name,
         shape,
@@ -184,7 +217,18 @@ fn placed(
         read.origin == Origin::Center || given_center.is_none() || matches!(mass, Some(GivenMass::Density(_)));
     let solid: Option<Solid> = if needs_solid {
         match solid_properties(read.hull.as_ref().unwrap_or(&read.shape)) {
-            Ok(solid) => Some(solid),
+            Ok(solid) => {
+                if solid.closed_share > 0.0 {
+                    let percent = 100.0 * solid.closed_share;
+                    found.note(
+                        &table.span,
+                        format!(
+                            "the mesh has holes of {percent:.2} % of its area, which count as closed for its volume"
+                        ),
+                    );
+                }
+                Some(solid)
+            }
             Err(error) => {
                 let diagnostic = table
                     .error("M210", found, format!("has no volume: {error}"))

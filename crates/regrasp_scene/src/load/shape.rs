@@ -216,7 +216,7 @@ fn origin(entry: &Entry, found: &mut Found) -> Option<Origin> {
 
 /// A closed mesh wound inside out is turned, with a note.
 fn oriented(mesh: TriangleMesh, kind: &Entry, found: &mut Found) -> TriangleMesh {
-    if mesh.statistics().is_watertight() && mesh.signed_volume() < 0.0 {
+    if mesh.statistics().is_closed() && mesh.signed_volume() < 0.0 {
         found.note(&kind.span, "the triangles are wound inside out; they were turned");
         return mesh.flipped();
     }

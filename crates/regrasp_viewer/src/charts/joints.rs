@@ -73,7 +73,7 @@ fn panel(svg: &mut Svg, plan: &Plan, scene: &SceneStory, finger: usize, joints: 
     let steps = timeline::steps(plan);
     for (k, &joint) in joints.iter().enumerate() {
         let Some((lower, upper)) = range(scene, joint) else { continue };
-        let point = |step: &timeline::Step| {
+        let point = |step: &timeline::TimelineStep| {
             let position = *step.waypoint.joints.get(joint)?;
             Some([time.at(step.waypoint.time), values.at((position - lower) / (upper - lower))])
         };

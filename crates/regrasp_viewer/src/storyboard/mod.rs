@@ -121,7 +121,7 @@ fn validate(scene: &SceneStory, plan: &Plan, settings: &StoryboardSettings) -> R
         return Err(StoryboardError::Plan("the plan's fingers are not those of the hand".into()));
     }
     let steps = timeline::steps(plan);
-    let fits = |step: &timeline::Step| {
+    let fits = |step: &timeline::TimelineStep| {
         step.waypoint.joints.len() == plan.joint_names.len() && step.waypoint.contacts.len() == plan.fingers.len()
     };
     if steps.is_empty() || !steps.iter().all(fits) {

@@ -5,7 +5,7 @@ use super::marks;
 use crate::palette;
 use crate::render::model::{linear, mixed};
 use crate::render::shade::Layer;
-use crate::render::{Model, Paint, Surface};
+use crate::render::{Paint, PlacedSurface, Surface};
 use crate::story::tessellate::Triangles;
 use crate::story::{Carrier, MeshStory, OtherCarrier, Part, PieceStory, Role, SceneStory, pack};
 use crate::timeline;
@@ -43,8 +43,8 @@ struct Prop {
 }
 
 impl Prop {
-    fn placed(&self, world_from_carrier: &Pose) -> Model {
-        Model {
+    fn placed(&self, world_from_carrier: &Pose) -> PlacedSurface {
+        PlacedSurface {
             world_from_surface: world_from_carrier * self.from_mesh,
             surface: Arc::clone(&self.surface),
             paint: self.paint.clone(),
@@ -60,9 +60,9 @@ pub struct Stage<'s> {
     /// For every piece of `links`, whether it belongs to a finger.
     is_finger: Vec<bool>,
     object: Vec<Prop>,
-    obstacles: Vec<Model>,
+    obstacles: Vec<PlacedSurface>,
     /// Hands, objects and supports that the plan does not move, placed in the world.
-    at_rest: Vec<Model>,
+    at_rest: Vec<PlacedSurface>,
     /// Middle of the object's bounds, in its frame.
     object_center: Point,
     /// Largest distance of a point of the object from there, in metres.
@@ -169,7 +169,7 @@ impl<'s> Stage<'s> {
     }
 
     /// Obstacles, placed in the world.
-    pub fn obstacles(&self) -> &[Model] {
+    pub fn obstacles(&self) -> &[PlacedSurface] {
         &self.obstacles
     }
 
@@ -196,7 +196,7 @@ impl<'s> Stage<'s> {
     }
 
     /// Object and hand at a moment, the object first.
-    pub fn solid(&self, frame: &KeyFrame) -> Vec<Model> {
+    pub fn solid(&self, frame: &KeyFrame) -> Vec<PlacedSurface> {
         let world_from_link = self.scene.world_from_links(&frame.joints);
         let world_from_object = Pose::from(&frame.world_from_object);
         let object = self.object.iter().map(|prop| prop.placed(&world_from_object));

@@ -1,6 +1,6 @@
 //! Names, files and promises of a list.
 
-use crate::check::model::Model;
+use crate::check::model::CheckedHand;
 use crate::check::violation::{Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log, forces, promises};
 use crate::plan::Plan;
@@ -12,7 +12,7 @@ use regrasp_scene::GraspScene;
 const ROUNDING: f64 = 1e-9;
 
 /// Hand and joints of the list are those of the scene. Nothing can be judged where they are not.
-pub(super) fn check_names(model: &Model, list: &GraspList, log: &mut Log) -> bool {
+pub(super) fn check_names(model: &CheckedHand, list: &GraspList, log: &mut Log) -> bool {
     let mut is_good = true;
     let fingers: Vec<&str> = model.fingers.iter().map(|finger| finger.name.as_str()).collect();
     let joints: Vec<&str> = model.joint_names.iter().map(String::as_str).collect();
@@ -31,7 +31,7 @@ pub(super) fn check_names(model: &Model, list: &GraspList, log: &mut Log) -> boo
 pub(super) fn check_heading(
     scene: &GraspScene,
     list: &GraspList,
-    model: &Model,
+    model: &CheckedHand,
     plan: &Plan,
     settings: &CheckSettings,
     log: &mut Log,

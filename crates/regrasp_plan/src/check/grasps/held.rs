@@ -2,7 +2,7 @@
 
 use super::{Judged, Measured};
 use crate::check::Log;
-use crate::check::closure::{Body, certified_margin};
+use crate::check::closure::{HeldBody, certified_margin};
 use crate::check::contact::{self, check_pads, error_at};
 use crate::check::forces::Judge;
 use crate::check::promises::{MARGIN_TOLERANCE, grips_of, holders};
@@ -68,7 +68,7 @@ fn check_tips(judged: &Judged, index: usize, at: Moment, log: &mut Log, measured
 fn check_margin(judged: &Judged, index: usize, at: Moment, log: &mut Log, measured: &mut Measured) {
     let waypoint = &judged.plan.segments[0].waypoints[index];
     let grips = grips_of(judged.model, &holders(judged.model, None, waypoint));
-    let body = Body::of(judged.scene.manipulation().object(), judged.plan);
+    let body = HeldBody::of(judged.scene.manipulation().object(), judged.plan);
     let found = certified_margin(&grips, &body).map_or(0.0, |(margin, _)| margin);
     measured.margin = Some(measured.margin.map_or(found, |least| least.min(found)));
     let required = judged.plan.promises.required_margin.max(judged.settings.smallest_margin);
@@ -88,7 +88,7 @@ fn check_forces(judged: &Judged, index: usize, at: Moment, log: &mut Log) {
     let task = judged.scene.manipulation();
     let judge = Judge {
         object: task.object(),
-        body: Body::of(task.object(), judged.plan),
+        body: HeldBody::of(task.object(), judged.plan),
         model: judged.model,
         plan: judged.plan,
         promises,

@@ -20,7 +20,7 @@ mod waypoints;
 pub use files::{CheckedGrasps, GraspPaths, check_grasp_files, load_grasp_files, source_of};
 
 use crate::check::bodies::Bodies;
-use crate::check::model::Model;
+use crate::check::model::CheckedHand;
 use crate::check::violation::{Violation, ViolationKind};
 use crate::check::{CheckSettings, Log};
 use regrasp_grasp::list::GraspList;
@@ -104,7 +104,7 @@ impl GraspReport {
 struct Judged<'a> {
     scene: &'a GraspScene,
     list: &'a GraspList,
-    model: &'a Model,
+    model: &'a CheckedHand,
     bodies: &'a Bodies,
     /// Index of the plate below the first stable pose in `bodies`.
     first_plate: usize,
@@ -138,7 +138,7 @@ impl Measured {
 pub fn check_grasps(scene: &GraspScene, list: &GraspList, settings: &CheckSettings, n_threads: usize) -> GraspReport {
     let mut log = Log { most_per_kind: usize::MAX, ..Log::default() };
     let task = scene.manipulation();
-    let prepared = Model::new(&task).and_then(|model| {
+    let prepared = CheckedHand::new(&task).and_then(|model| {
         let mut bodies = Bodies::new(&task, &model)?;
         let first_plate = bodies.items.len();
         stable::add_plates(&mut bodies, list)?;

@@ -4,7 +4,7 @@ use super::waypoints::way_of;
 use super::{Judged, Measured};
 use crate::check::Log;
 use crate::check::bodies::{Bodies, OBJECT, Owner, Pair};
-use crate::check::motion::{Step, certify};
+use crate::check::motion::{WaypointStep, certify};
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use nalgebra::UnitQuaternion;
 use regrasp_geometry::{Point, Pose, Shape, UnitVector, Vector};
@@ -118,7 +118,7 @@ pub(super) fn check_grasp(judged: &Judged, index: usize, log: &mut Log, measured
     let bodies = judged.bodies;
     let of_hand = |a: &usize| matches!(bodies.items[*a].owner, Owner::Finger(_) | Owner::Palm);
     for ends in [[&before, &open], [&open, &closed]] {
-        let mut step = Step::new(bodies, ends[0], ends[1]);
+        let mut step = WaypointStep::new(bodies, ends[0], ends[1]);
         step.most_pieces = MOST_PIECES;
         for &which in &grasp.stable_poses {
             let plate = judged.first_plate + which;

@@ -4,7 +4,7 @@ use super::waypoints::way_of;
 use super::{GraspClearance, Judged, Measured};
 use crate::check::Log;
 use crate::check::bodies::{Owner, Pair};
-use crate::check::motion::{Breach, Step, certify};
+use crate::check::motion::{Breach, WaypointStep, certify};
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 
 /// Pieces of motion that are looked at in one step; a way that needs more is one that nobody makes.
@@ -25,7 +25,7 @@ pub(super) fn check_way(judged: &Judged, index: usize, log: &mut Log, measured: 
         if leaps(judged, ends, index, log) {
             return;
         }
-        let mut step = Step::new(judged.bodies, ends[0], ends[1]);
+        let mut step = WaypointStep::new(judged.bodies, ends[0], ends[1]);
         step.most_pieces = MOST_PIECES;
         for pair in &judged.bodies.pairs {
             let may_touch = closes && touches(pair);
@@ -43,7 +43,14 @@ pub(super) fn check_way(judged: &Judged, index: usize, log: &mut Log, measured: 
 }
 
 /// What a report says of distances in the grasp itself.
-fn measure(judged: &Judged, step: &mut Step, pair: &Pair, may_touch: bool, index: usize, measured: &mut Measured) {
+fn measure(
+    judged: &Judged,
+    step: &mut WaypointStep,
+    pair: &Pair,
+    may_touch: bool,
+    index: usize,
+    measured: &mut Measured,
+) {
     let known = measured.clearance.as_ref().map_or(f64::INFINITY, |clearance| clearance.distance);
     if !may_touch && step.ball_distance(pair, 1.0) >= known {
         return;
