@@ -120,7 +120,8 @@ impl Bodies {
         Ok(bodies)
     }
 
-    fn add(
+    /// Adds a shape that takes part in no pair yet.
+    pub(super) fn add(
         &mut self,
         name: &str,
         owner: Owner,
