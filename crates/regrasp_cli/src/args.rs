@@ -112,6 +112,9 @@ pub struct Inspect {
     pub seed: u64,
 }
 
+/// Work limit where none is given.
+pub const DEFAULT_MAX_WORK: u64 = 20_000_000;
+
 /// How to search.
 #[derive(Debug, Args)]
 pub struct Search {
@@ -124,11 +127,11 @@ pub struct Search {
     /// Force-closure margin that the holding fingers keep, in [0, 1)
     #[arg(long, value_parser = margin, allow_negative_numbers = true)]
     pub margin: Option<f64>,
-    /// Time limit in seconds (in bench: per seed)
+    /// Time limit in seconds (in bench: per seed) [default: 60 in plan, where no other limit is given; else none]
     #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
     pub time_limit: Option<Duration>,
     /// Work limit, in configurations examined: the same on every machine
-    #[arg(long, value_name = "N", default_value_t = 20_000_000, value_parser = whole_number, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_MAX_WORK, value_parser = whole_number, allow_negative_numbers = true)]
     pub max_work: u64,
     /// Improve the first plan for so many seconds
     #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]

@@ -345,7 +345,7 @@ fn an_srdf_gives_groups_end_effectors_and_pairs() {
     let link = |name: &str| hand.robot.link_named(name).unwrap();
     assert!(hand.may_touch(link("a1"), link("b1")));
     assert!(!hand.may_touch(link("a2"), link("b1")));
-    let srdf = load_srdf(&folder.path().join("hand.srdf"), &hand.robot, false).unwrap().srdf;
+    let srdf = load_srdf(&folder.path().join("hand.srdf"), &hand.robot, &LoadOptions::default()).unwrap().srdf;
     let names: Vec<&str> =
         joints_of_group(&srdf, &hand.robot, "both").iter().map(|j| hand.robot.joints[j.0].name.as_str()).collect();
     assert_eq!(names, ["jb1", "ja1", "ja2"]);
@@ -363,7 +363,7 @@ fn unknown_names_in_an_srdf_are_errors_or_notes() {
         SRDF.replace("a_tip", "a_tipp").replace("\"jb1\"", "\"jx_9\"").replace("group=\"both\"", "group=\"bohh\"");
     fs::write(&path, bad).unwrap();
     let prefix = format!("{}/", folder.path().display());
-    let error = load_srdf(&path, &robot, false).unwrap_err();
+    let error = load_srdf(&path, &robot, &LoadOptions::default()).unwrap_err();
     let seen: Vec<String> = error.diagnostics.iter().map(|d| d.to_string().replace(&prefix, "")).collect();
     let expected = [
         "U161 hand.srdf:2:41 group \"a\": tip_link \"a_tipp\" is not a link of the robot; expected the name of a link\n  fix: did you mean \"a_tip\"?",
@@ -371,5 +371,8 @@ fn unknown_names_in_an_srdf_are_errors_or_notes() {
         "U163 hand.srdf:4:27 end_effector \"hand\": group \"bohh\" is not a group of the robot; expected the name of a group\n  fix: did you mean \"both\"?",
     ];
     assert_eq!(seen, expected);
-    assert_eq!(load_srdf(&path, &robot, true).unwrap().notes.len(), 3);
+    assert_eq!(
+        load_srdf(&path, &robot, &LoadOptions { lenient: true, ..LoadOptions::default() }).unwrap().notes.len(),
+        3
+    );
 }

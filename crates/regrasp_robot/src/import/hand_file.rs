@@ -7,7 +7,6 @@ use super::couplings;
 use super::fixes;
 use super::names::{known_joint, known_link};
 use super::options::{LoadOptions, LoadedInput};
-use super::resolve::resolve_own;
 use super::spec::{FingerSpec, HandSpec, PadSpec, TipSpec};
 use super::srdf::{LoadedSrdf, load_srdf};
 use super::urdf::{LoadedRobot, load_robot};
@@ -94,7 +93,7 @@ fn load_hand_file(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
 
 /// What a hand file says, before a hand is made of it.
 pub(super) fn hand_file_parts(path: &Path, options: &LoadOptions) -> Result<HandParts, InputError> {
-    let bytes = files::read(path)?;
+    let bytes = options.read(path)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let own = LoadedInput { role: "hand".into(), name, path: path.to_owned(), sha256: files::sha256(&bytes) };
     let text = files::text_of(path, bytes)?;
@@ -198,7 +197,7 @@ fn read(mut root: Table, path: &Path, options: &LoadOptions, found: &mut Found) 
 /// The file that `entry` names.
 pub(super) fn locate(entry: &Entry, path: &Path, options: &LoadOptions, found: &mut Found) -> Option<PathBuf> {
     let name = entry.text(found)?;
-    match resolve_own(name, path, found.place(&entry.span), &options.resolve) {
+    match options.resolve_own(name, path, found.place(&entry.span)) {
         Ok(resolved) => {
             found.notes.extend(resolved.notes);
             Some(resolved.path)
@@ -240,7 +239,7 @@ pub(super) fn read_srdf(
     found: &mut Found,
 ) -> Option<LoadedSrdf> {
     let srdf = locate(entry, path, options, found)?;
-    match load_srdf(&srdf, robot, options.lenient) {
+    match load_srdf(&srdf, robot, options) {
         Ok(mut loaded) => {
             entry.as_text()?.clone_into(&mut loaded.input.name);
             found.notes.append(&mut loaded.notes);

@@ -16,6 +16,8 @@ mod fixes;
 /// `hand.toml`, and hands guessed from a bare URDF.
 pub mod hand_file;
 mod hulls;
+/// Files held in memory.
+pub mod kept;
 mod names;
 /// How files are read, and which were.
 pub mod options;
@@ -36,6 +38,7 @@ pub mod urdf;
 pub(crate) mod xml;
 
 pub use hand_file::{LoadedHand, load_hand};
+pub use kept::KeptFiles;
 pub use options::{LoadOptions, LoadedInput, OUT_OF_TIME};
 pub use resolve::ResolveOptions;
 pub use robot_file::{LoadedManipulator, load_manipulator};
