@@ -52,7 +52,11 @@ def _expected(name: str) -> str:
     hands = [other for other, about in known.items() if "end_effector" in getattr(about, "tags", ())]
     meant = difflib.get_close_matches(name, list(known), 1)
     hint = f' (did you mean "{meant[0]}"?)' if meant else ""
-    return f"a name of its list{hint}; its hands and grippers are {', '.join(sorted(hands))}" if hands else f"a name of its list{hint}"
+    return (
+        f"a name of its list{hint}; its hands and grippers are {', '.join(sorted(hands))}"
+        if hands
+        else f"a name of its list{hint}"
+    )
 
 
 def _descriptions() -> ModuleType | None:
@@ -73,7 +77,9 @@ def model_file(module: ModuleType) -> str:
         if isinstance(path, str):
             return path
     name = module.__name__.rpartition(".")[2]
-    raise _refused(f'is "{name}", which has neither URDF_PATH nor MJCF_PATH', "a description with a URDF or a MJCF file")
+    raise _refused(
+        f'is "{name}", which has neither URDF_PATH nor MJCF_PATH', "a description with a URDF or a MJCF file"
+    )
 
 
 def packages_of(module: ModuleType) -> tuple[dict[str, str], list[str]]:

@@ -63,7 +63,9 @@ def test_a_model_of_mujoco(descriptions: Path):
 
 
 def test_xacro_is_refused_with_the_command(descriptions: Path, tmp_path: Path):
-    (tmp_path / "hand.urdf.xacro").write_text('<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro"><xacro:hand/></robot>')
+    (tmp_path / "hand.urdf.xacro").write_text(
+        '<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro"><xacro:hand/></robot>'
+    )
     module(descriptions, "wide_hand_description", PACKAGE_PATH=tmp_path, XACRO_PATH=tmp_path / "hand.urdf.xacro")
     with pytest.raises(regrasp.InputError) as caught:
         regrasp.load_hand("wide_hand_description")

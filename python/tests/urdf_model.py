@@ -106,7 +106,14 @@ class Urdf:
         carried = {joint.child for joint in self.joints.values()}
         (self.root,) = (link for link in self.links if link not in carried)
         self.shapes = [
-            Shape(link.get("name", ""), tag, shape.get("name", ""), placed(shape), next(iter(shape.find("geometry"))), path.parent)
+            Shape(
+                link.get("name", ""),
+                tag,
+                shape.get("name", ""),
+                placed(shape),
+                next(iter(shape.find("geometry"))),
+                path.parent,
+            )
             for link in robot.findall("link")
             for tag in ("visual", "collision")
             for shape in link.findall(tag)
@@ -118,7 +125,9 @@ class Urdf:
             if inertial is None:
                 continue
             i = {key: float(value) for key, value in inertial.find("inertia").attrib.items()}
-            tensor = np.array([[i["ixx"], i["ixy"], i["ixz"]], [i["ixy"], i["iyy"], i["iyz"]], [i["ixz"], i["iyz"], i["izz"]]])
+            tensor = np.array(
+                [[i["ixx"], i["ixy"], i["ixz"]], [i["ixy"], i["iyy"], i["iyz"]], [i["ixz"], i["iyz"], i["izz"]]]
+            )
             pose = placed(inertial)
             self.masses[link.get("name", "")] = float(inertial.find("mass").get("value"))
             self.inertias[link.get("name", "")] = (pose[:3, 3], pose[:3, :3] @ tensor @ pose[:3, :3].T)

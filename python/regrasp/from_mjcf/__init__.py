@@ -14,6 +14,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -45,12 +46,14 @@ def convert(
     *,
     root: str | None = None,
     lenient: bool = False,
+    couple: Mapping[str, tuple[str, float]] | None = None,
     velocity: float | None = None,
 ) -> Conversion:
     """Writes `hand.urdf`, `meshes/*.stl` and `hand.toml` into `folder`, which is made.
 
     root: the body that becomes the root link; "world" for the world. Without it the only body of the world with joints.
     lenient: what a URDF cannot hold (ball joints, loops, couplings of higher order) is held or left out, with a note.
+    couple: joints that follow others, beside those of the model: follower to leader and multiplier.
     velocity: highest speed of all joints, in rad/s or m/s; models of MuJoCo have none.
 
     Raises `MjcfError`, and `ImportError` without the `mujoco` package.
@@ -63,7 +66,7 @@ def convert(
         raise ImportError("reading MJCF needs MuJoCo: pip install 'regrasp[sim]'", name="mujoco") from error
     from ._urdf import MARK, mesh_files, stl, urdf_text
 
-    source = read(Path(path), root=root, lenient=lenient)
+    source = read(Path(path), root=root, lenient=lenient, couple=couple)
     folder = Path(folder)
     urdf, hand_file = folder / "hand.urdf", folder / "hand.toml"
     _refuse_foreign(folder, urdf, MARK)
@@ -75,7 +78,9 @@ def convert(
     notes = list(source.notes)
     problem = None
     try:
-        text, remarks = _regrasp.hand_file(os.fspath(urdf), load_options("from_mjcf", None, False), urdf.name, source.allow)
+        text, remarks = _regrasp.hand_file(
+            os.fspath(urdf), load_options("from_mjcf", None, False), urdf.name, source.allow
+        )
         _write(hand_file, text.encode())
         # That fingers were guessed is what this is for.
         notes += [remark for remark in remarks if "were guessed" not in remark]

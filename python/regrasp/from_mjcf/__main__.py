@@ -19,7 +19,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         made = convert(
-            options.model, options.output, root=options.root, lenient=options.lenient, velocity=options.velocity
+            options.model,
+            options.output,
+            root=options.root,
+            lenient=options.lenient,
+            couple=dict(options.couple),
+            velocity=options.velocity,
         )
     except (MjcfError, ImportError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
@@ -52,11 +57,36 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("model", type=Path, help="model file; includes and meshes are found as MuJoCo finds them")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="FOLDER", help="new folder to write into")
-    parser.add_argument("--root", metavar="BODY", help="body that becomes the root link; world for all [default: the only one with joints]")
+    parser.add_argument(
+        "--root",
+        metavar="BODY",
+        help="body that becomes the root link; world for all [default: the only one with joints]",
+    )
     parser.add_argument("--lenient", action="store_true", help="hold or leave out what a URDF cannot hold, with a note")
+    parser.add_argument(
+        "--couple",
+        type=_coupling,
+        action="append",
+        default=[],
+        metavar="JOINT=LEADER",
+        help="a joint that follows another, as tendons make it; 0.8*LEADER by that multiplier; may be repeated",
+    )
     parser.add_argument("--velocity", type=_positive, metavar="V", help="highest speed of all joints, in rad/s or m/s")
     parser.add_argument("--all", action="store_true", help="all names of what is left out")
     return parser
+
+
+def _coupling(text: str) -> tuple[str, tuple[str, float]]:
+    """Reads ``JOINT=LEADER`` and ``JOINT=0.8*LEADER``."""
+    joint, _, rest = text.partition("=")
+    factor, _, leader = rest.rpartition("*")
+    try:
+        multiplier = float(factor or "1")
+    except ValueError:
+        multiplier = math.nan
+    if not (joint and leader and math.isfinite(multiplier) and multiplier != 0.0):
+        raise argparse.ArgumentTypeError("expected JOINT=LEADER or JOINT=0.8*LEADER")
+    return joint, (leader, multiplier)
 
 
 def _positive(text: str) -> float:

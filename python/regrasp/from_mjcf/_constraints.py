@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import json
+import difflib
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -27,9 +28,11 @@ class Constraints:
         """What a URDF cannot hold."""
         self._used_tendons: set[int] = set()
 
-    def couple(self, source: Source) -> None:
-        """Equality constraints and narrow tendons become couplings."""
+    def couple(self, source: Source, stated: Mapping[str, tuple[str, float]]) -> None:
+        """Equality constraints and narrow tendons become couplings, beside those that are `stated`: follower to leader and multiplier."""
         joints = {joint.name: joint for joint in source.joints}
+        for name, (leader, multiplier) in stated.items():
+            self._state(name, leader, multiplier, joints)
         for index in range(self._model.neq):
             self._equality(index, joints, source)
         for tendon in range(self._model.ntendon):
@@ -52,6 +55,15 @@ class Constraints:
             if any(int(model.geom_bodyid[geom]) in inside for geom in pair):
                 name = " and ".join(self._names.other(mujoco.mjtObj.mjOBJ_GEOM, geom) for geom in pair)
                 source.leave_out("contact pairs (friction and condim of their own)", name)
+
+    def _state(self, name: str, leader: str, multiplier: float, joints: dict[str, Joint]) -> None:
+        for unknown in {name, leader} - joints.keys():
+            meant = difflib.get_close_matches(unknown, list(joints), 1)
+            self.problems.append(
+                f'the hand has no joint "{unknown}"' + (f'; did you mean "{meant[0]}"?' if meant else "")
+            )
+        if name in joints and leader in joints:
+            joints[name].coupling = Coupling(leader, multiplier, 0.0)
 
     def _refuse(self, problem: str, source: Source) -> None:
         if self._lenient:
@@ -178,7 +190,9 @@ class Constraints:
 
     def _is_coupling(self, tendon: int, name: str, known: list[tuple[Joint, float]], source: Source) -> bool:
         model = self._model
-        free = [pair for pair in known if not pair[0].is_driven and pair[0].coupling is None and pair[0].held_at is None]
+        free = [
+            pair for pair in known if not pair[0].is_driven and pair[0].coupling is None and pair[0].held_at is None
+        ]
         if not free:
             return False
         (follower, own) = free[0] if len(free) == 1 else known[1]
@@ -195,8 +209,7 @@ class Constraints:
         if follower.coupling is None and _pulls(model, tendon):
             source.notes.append(
                 f'one actuator pulls joints "{leader.name}" and "{follower.name}" by tendon "{name}". Where one follows the other, '
-                f'add to hand.toml, with the multiplier of the real hand:\n[[couplings]]\njoint = {json.dumps(follower.name)}\n'
-                f"leader = {json.dumps(leader.name)}\nmultiplier = 1.0"
+                f'say so: --couple "{follower.name}={leader.name}"'
             )
         return False
 

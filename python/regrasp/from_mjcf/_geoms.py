@@ -45,7 +45,9 @@ class Shapes:
         """What the model says about who collides with whom, and a URDF cannot."""
         model = self._model
         if self._none_collides and self._collide:
-            source.notes.append("no geom collides in the model (contype and conaffinity are 0): all are collision geometry now")
+            source.notes.append(
+                "no geom collides in the model (contype and conaffinity are 0): all are collision geometry now"
+            )
             return
         groups = {(int(model.geom_contype[geom]), int(model.geom_conaffinity[geom])) for geom in self._collide}
         if not all(a[0] & b[1] or b[0] & a[1] for a in groups for b in groups):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,16 +21,23 @@ LIKELY_RANGE = 0.12
 """Hinges of a hand turn farther than this, in radians: it is 7 degrees."""
 
 
-def read(path: Path, *, root: str | None = None, lenient: bool = False) -> Source:
+def read(
+    path: Path,
+    *,
+    root: str | None = None,
+    lenient: bool = False,
+    couple: Mapping[str, tuple[str, float]] | None = None,
+) -> Source:
     """The hand in the model file at `path`. Raises `MjcfError`, with every cause found.
 
     root: the body that becomes the root link; the only body of the world that has joints, without it. "world" takes the world.
+    couple: joints that follow others, whatever the model says: follower to leader and multiplier.
     lenient: joints and constraints that a URDF cannot hold are held or left out, with a note, instead of refused.
     """
     model = compiled(path)
     names = Names(model)
     part = choose_part(model, names, root, path)
-    return _Reading(model, names, part, lenient).source(path)
+    return _Reading(model, names, part, lenient).source(path, couple or {})
 
 
 def compiled(path: Path) -> MjModel:
@@ -52,7 +59,7 @@ class _Reading:
         self.lenient = lenient
         self.problems: list[str] = []
 
-    def source(self, path: Path) -> Source:
+    def source(self, path: Path, couple: Mapping[str, tuple[str, float]]) -> Source:
         model, names = self.model, self.names
         own_name = bytes(model.names).split(b"\0")[0].decode(errors="replace")
         # What MuJoCo calls a model without a name.
@@ -69,7 +76,7 @@ class _Reading:
             source.bodies.append(self.body(body, shapes.of_body(body, source), efforts, source))
         shapes.note_masks(source)
         constraints = Constraints(model, names, self.part, self.lenient)
-        constraints.couple(source)
+        constraints.couple(source, couple)
         constraints.allow(source)
         self.problems += constraints.problems
         self.note_rest(source)
@@ -106,7 +113,9 @@ class _Reading:
         model, name = self.model, self.names.joint(joint)
         types = mujoco.mjtJoint
         kind = int(model.jnt_type[joint])
-        limits = (float(model.jnt_range[joint][0]), float(model.jnt_range[joint][1])) if model.jnt_limited[joint] else None
+        limits = (
+            (float(model.jnt_range[joint][0]), float(model.jnt_range[joint][1])) if model.jnt_limited[joint] else None
+        )
         problem = None
         if kind in (int(types.mjJNT_BALL), int(types.mjJNT_FREE)):
             word = "ball" if kind == int(types.mjJNT_BALL) else "free"
@@ -156,7 +165,9 @@ class _Reading:
         ):
             for index in range(number):
                 source.leave_out(kind, self.names.other(of, index))
-        colliding = (geom for geom in _geoms_of(model, inside) if model.geom_contype[geom] or model.geom_conaffinity[geom])
+        colliding = (
+            geom for geom in _geoms_of(model, inside) if model.geom_contype[geom] or model.geom_conaffinity[geom]
+        )
         frictions = {tuple(model.geom_friction[geom]) for geom in colliding}
         if len(frictions) > 1:
             source.notes.append(f"the geoms have {len(frictions)} different frictions; a scene has one per object")
@@ -170,7 +181,8 @@ def _is_driven(model: MjModel, joint: int) -> bool:
     transmissions = mujoco.mjtTrn
     of_joints = (int(transmissions.mjTRN_JOINT), int(transmissions.mjTRN_JOINTINPARENT))
     return any(
-        int(model.actuator_trntype[k]) in of_joints and int(model.actuator_trnid[k][0]) == joint for k in range(model.nu)
+        int(model.actuator_trntype[k]) in of_joints and int(model.actuator_trnid[k][0]) == joint
+        for k in range(model.nu)
     )
 
 

@@ -49,7 +49,7 @@ def _guess(model: MjModel, names: Names, path: Path) -> int:
         # Where the joints of the root are all there is, they are a finger's, and the world is the palm.
         return only if any(_has_joints(model, child) for child in _children(model, only)) else WORLD
     choices = ", ".join(f'--root "{names.body(body)}"' for body in found)
-    raise MjcfError(f'{path}: several bodies of the world have joints; choose one: {choices}; or --root world for all')
+    raise MjcfError(f"{path}: several bodies of the world have joints; choose one: {choices}; or --root world for all")
 
 
 def _part(model: MjModel, root: int) -> Part:

@@ -46,7 +46,10 @@ def _link(body: Body, files: dict[int, str]) -> Element:
         ElementTree.SubElement(inertial, "mass", value=_number(body.mass))
         xx, yy, zz = (_number(value) for value in body.inertia)
         ElementTree.SubElement(inertial, "inertia", ixx=xx, ixy="0", ixz="0", iyy=yy, iyz="0", izz=zz)
-    for tag, wanted in (("visual", [geom.visible for geom in body.geoms]), ("collision", [geom.collides for geom in body.geoms])):
+    for tag, wanted in (
+        ("visual", [geom.visible for geom in body.geoms]),
+        ("collision", [geom.collides for geom in body.geoms]),
+    ):
         for geom, is_wanted in zip(body.geoms, wanted, strict=True):
             if is_wanted:
                 link.append(_shape(tag, geom, files))

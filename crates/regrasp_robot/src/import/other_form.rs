@@ -23,14 +23,13 @@ pub(super) fn recognised(file: &Path, lines: &Lines, root: Node) -> Option<Diagn
         );
     }
     let unexpanded = root.descendants().filter(Node::is_element).find(|node| is_xacro(node) || has_expression(node))?;
-    let problem = if is_xacro(&unexpanded) {
-        format!("is a xacro file that was not expanded: it has <xacro:{}>", unexpanded.tag_name().name())
-    } else {
-        let tag = unexpanded.tag_name().name();
-        format!("is a xacro file that was not expanded: <{tag}> has an expression in ${{}} or $()")
+    let tag = unexpanded.tag_name().name();
+    let seen = match is_xacro(&unexpanded) {
+        true => format!("it has <xacro:{tag}>"),
+        false => format!("<{tag}> has an expression in ${{}} or $()"),
     };
     Some(
-        Diagnostic::new("U107", place(unexpanded), problem)
+        Diagnostic::new("U107", place(unexpanded), format!("is a xacro file that was not expanded: {seen}"))
             .expected("plain XML")
             .fix(format!("run xacro first: {}", xacro_command(file))),
     )

@@ -27,8 +27,13 @@ pub(crate) fn guess_hand(robot: &Robot, options: &LoadOptions, file: &Path) -> R
     }
     if last_joints.is_empty() {
         let below = stated.map_or(String::new(), |base| format!(" below link \"{}\"", robot.links[base.0].name));
-        let problem = format!("has no joint that moves{below}, so no finger");
-        return Err(Diagnostic::new("U214", Place::file(file), problem).expected("a hand with moving fingers").into());
+        return Err(Diagnostic::new(
+            "U214",
+            Place::file(file),
+            format!("has no joint that moves{below}, so no finger"),
+        )
+        .expected("a hand with moving fingers")
+        .into());
     }
     let base = stated.unwrap_or_else(|| base_link(robot, &last_joints));
     let paths = paths_below(robot, base, &last_joints);
