@@ -5,6 +5,7 @@ mod contact_kinematics;
 mod free_fingers;
 mod improvement;
 mod in_hand_methods;
+mod leap;
 mod physics;
 #[path = "../../../../tests/support/places.rs"]
 mod places;

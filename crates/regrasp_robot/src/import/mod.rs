@@ -13,6 +13,7 @@ mod chain;
 mod couplings;
 /// `hand.toml`, and hands guessed from a bare URDF.
 pub mod hand_file;
+pub(crate) mod hull_tip;
 mod hulls;
 mod names;
 /// How files are read, and which were.
