@@ -13,7 +13,7 @@ use regrasp_grasp::{Contact, ContactModel, GraspFrame, Grip, closure};
 use regrasp_robot::kinematics::body_frame::BodyFrame;
 use regrasp_robot::kinematics::finger_ik::FingerIk;
 use regrasp_robot::kinematics::motion_bound::MotionBound;
-use regrasp_robot::tip::{Pad, TipEllipsoid, is_same_surface};
+use regrasp_robot::tip::{CurvedTip, Pad, is_same_surface};
 use regrasp_scene::{HandView, Object};
 use std::sync::Arc;
 
@@ -25,8 +25,8 @@ pub struct FingerModel<'a> {
     /// Largest distance of the tip's surface from its centre: the radius of a ball, zero for a sharp tip.
     pub tip_radius: f64,
     /// The tip, where it is no ball and not sharp.
-    pub ellipsoid: Option<&'a TipEllipsoid>,
-    /// Radius of a ball that holds the tip when it touches where the tip does: for a ball its own.
+    pub curved: Option<CurvedTip<'a>>,
+    /// Radius of a ball that stands for the tip when contacts are drawn: for a ball its own.
     pub settle_radius: f64,
     /// Where the tip may touch; anywhere without one.
     pub pad: Option<&'a Pad>,
@@ -182,8 +182,8 @@ impl<'a> Model<'a> {
             let ik = &finger.ik;
             fingers.push(FingerModel {
                 tip_radius: finger.tip.radius(),
-                ellipsoid: finger.tip.ellipsoid(),
-                settle_radius: finger.tip.ellipsoid().map_or(finger.tip.radius(), TipEllipsoid::flattest),
+                curved: finger.tip.curved(),
+                settle_radius: finger.tip.curved().map_or(finger.tip.radius(), |tip| tip.settle_radius()),
                 pad: finger.tip.pad.as_ref(),
                 link_at_rest: finger.chain.last_frame(&finger.rest),
                 contact: finger.tip.contact,

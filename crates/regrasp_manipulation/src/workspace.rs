@@ -15,6 +15,8 @@ mod draws;
 mod nearby;
 /// How far tips may be from where they rest.
 mod reach;
+/// What is in the way of contacts.
+pub mod tried;
 
 use crate::forces::limits::Refusals;
 use crate::grasp::state::{Contacts, GraspState, HandJoints};
@@ -25,6 +27,7 @@ use nearby::Nearby;
 use regrasp_geometry::collision::{HalfSpace, Placed, Placement, Separation, gap_along, separation};
 use regrasp_geometry::{Pose, Vector, frame};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
+use tried::Tried;
 
 /// What the fingertips do during a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,6 +101,8 @@ pub struct Workspace<'a> {
     pub work: u64,
     /// What draws of contacts cost.
     pub draws: Draws,
+    /// Contacts that fingers came to, and what was in the way there.
+    pub tried: Tried,
     /// Grasps refused for want of forces.
     pub refusals: Refusals,
     /// The pair that stopped the last failed step.
@@ -132,6 +137,7 @@ impl<'a> Workspace<'a> {
             rrt_iterations: model.settings.rrt_iterations,
             work: 0,
             draws: Draws::default(),
+            tried: Tried::default(),
             refusals: Refusals::default(),
             blocking_pair: None,
             blocking_index: 0,

@@ -191,7 +191,7 @@ refused!(
     a_hull_of_nothing,
     with_finger("tip_link = \"a_tip\"\ntip = { shape = \"mesh\" }"),
     [
-        r#"U210 hand.toml:5:1 finger "a": tip link has no collision geometry with corners; expected box or mesh collision geometry on the tip link
+        r#"U210 hand.toml:5:1 finger "a": tip link has no collision geometry; expected collision geometry of the tip link that encloses a volume
   fix: shape = "sphere" for a round tip"#
     ]
 );

@@ -157,6 +157,13 @@ fn hand_part(model: &Hand, hand: &HandInspection, out: &mut String) {
             "sphere" => format!("ball of radius {:.1} mm", 1e3 * finger.tip_radius),
             shape => shape.to_owned(),
         };
+        let tip = match finger.tip.error {
+            Some(error) if finger.tip_shape == "mesh" => {
+                format!("{tip}, {} within {:.2} mm of its hull", finger.tip.surface, 1e3 * error)
+            }
+            Some(error) => format!("{tip}, within {:.2} mm of the link", 1e3 * error),
+            None => tip,
+        };
         let _ = writeln!(
             out,
             "  {:<10}  tip {} ({tip}), at rest at {}  joints {}",
@@ -165,6 +172,18 @@ fn hand_part(model: &Hand, hand: &HandInspection, out: &mut String) {
             metres(tip_at_rest),
             finger.joints.join(", ")
         );
+        for one in &finger.tip.stands_out {
+            let _ = writeln!(
+                out,
+                "              collision element {} of {} stands out of the {} by {:.2} mm where it may touch: {}, most at {}",
+                one.element,
+                finger.tip_link,
+                finger.tip.surface,
+                1e3 * one.by,
+                counted(one.n_faces, "face"),
+                metres(&one.at)
+            );
+        }
     }
     if !at_rest.is_empty() {
         let sum = at_rest.iter().fold([0.0; 3], |sum, tip| std::array::from_fn(|axis| sum[axis] + tip[axis]));

@@ -115,7 +115,10 @@ pub fn reach(
     }
     workspace.set_finger(finger, &joints);
     let mode = TipMode::Near { finger, normal_in_world: normal.into_inner() };
-    workspace.finger_alone_is_clear(finger, mode).then_some(joints)
+    let is_clear = workspace.finger_alone_is_clear(finger, mode);
+    let blocked_by = workspace.blocking_pair.filter(|_| !is_clear);
+    workspace.tried.add(finger, blocked_by);
+    is_clear.then_some(joints)
 }
 
 /// Draws contacts of `finger` that it can take, with its joints there: up to `n_wanted`, each given to `found`.

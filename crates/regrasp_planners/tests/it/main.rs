@@ -6,6 +6,7 @@ mod folds;
 mod free_fingers;
 mod improvement;
 mod in_hand_methods;
+mod leap;
 mod physics;
 #[path = "../../../../tests/support/places.rs"]
 mod places;

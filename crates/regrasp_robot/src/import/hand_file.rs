@@ -350,10 +350,31 @@ fn read_tip(mut table: Table, found: &mut Found) -> Option<TipSpec> {
             })
         }
         "point" => point(&mut table, "position", found).map(|position| TipSpec::Point { position }),
-        _ => point(&mut table, "center", found).map(|center| TipSpec::Hull { center }),
+        _ => {
+            let elements = match table.optional("collision") {
+                Some(entry) => indices(&entry, found),
+                None => Some(Vec::new()),
+            };
+            point(&mut table, "center", found)
+                .zip(elements)
+                .map(|(center, elements)| TipSpec::Hull { center, elements })
+        }
     };
     table.finish(found);
     tip
+}
+
+/// Indices of `<collision>` elements, at least one.
+fn indices(entry: &Entry, found: &mut Found) -> Option<Vec<usize>> {
+    const EXPECTED: &str = "indices of <collision> elements of the tip link, counted from 0";
+    let entries = entry.entries(found, EXPECTED)?;
+    if entries.is_empty() {
+        let fix = "leave the key out: the tip is then made of all of them";
+        found.diagnostics.push(entry.error("U213", found, "is empty").expected(EXPECTED).fix(fix));
+        return None;
+    }
+    let is_index = |x: f64| x >= 0.0 && x.fract() == 0.0 && x < 1e4;
+    entries.iter().map(|entry| Some(entry.number_that(found, EXPECTED, is_index)? as usize)).collect()
 }
 
 /// Half axes of an ellipsoid, none less than a fifth of another: flatter ones are plates, not fingertips.

@@ -15,6 +15,7 @@ mod couplings;
 mod fixes;
 /// `hand.toml`, and hands guessed from a bare URDF.
 pub mod hand_file;
+pub(crate) mod hull_tip;
 mod hulls;
 /// Files held in memory.
 pub mod kept;

@@ -5,7 +5,7 @@
 
 use super::tip_sphere::fit_tip;
 use crate::import::options::LoadOptions;
-use crate::import::spec::{FingerSpec, HandSpec, TipSpec};
+use crate::import::spec::{FingerSpec, HandSpec, PadSpec, TipSpec};
 use crate::robot::{JointId, JointKind, LinkId, Robot};
 use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_base::diagnostic::did_you_mean;
@@ -43,7 +43,7 @@ pub(crate) fn guess_hand(robot: &Robot, options: &LoadOptions, file: &Path) -> R
     let mut fingers: Vec<FingerSpec> = Vec::new();
     for (index, &last) in last_joints.iter().enumerate() {
         let child = robot.joints[last.0].child;
-        let (tip_link, tip) = guess_tip(robot, child);
+        let (tip_link, (tip, pad)) = guess_tip(robot, child);
         let link_name = &robot.links[tip_link.0].name;
         let mut name = finger_name(link_name, fingers.len() + 1);
         if fingers.iter().any(|other| other.name == name) {
@@ -54,7 +54,7 @@ pub(crate) fn guess_hand(robot: &Robot, options: &LoadOptions, file: &Path) -> R
             tip_link,
             first_joint: first_own_joint(&paths, index),
             tip,
-            pad: None,
+            pad,
             contact: options.contact,
             rest: Vec::new(),
             place: Place::file(file),
@@ -177,32 +177,32 @@ fn base_link(robot: &Robot, last_joints: &[JointId]) -> LinkId {
 }
 
 /// The tip link of the body that `child` is the first link of, and its tip in the link's frame.
-fn guess_tip(robot: &Robot, child: LinkId) -> (LinkId, TipSpec) {
+fn guess_tip(robot: &Robot, child: LinkId) -> (LinkId, (TipSpec, Option<PadSpec>)) {
     let links = rigid_links(robot, child);
-    let mut farthest: Option<(f64, LinkId, Point)> = None;
+    let mut farthest: Option<(f64, LinkId, usize, Point)> = None;
     for (link, body_from_link) in &links {
-        for placed in &robot.links[link.0].collision {
+        for (element, placed) in robot.links[link.0].collision.iter().enumerate() {
             let body_from_shape = body_from_link * placed.parent_from_shape;
             let from_joint = body_from_shape.inverse() * Point::origin();
             let point = body_from_shape * super::tip_sphere::farthest_point(&placed.shape, &from_joint);
             let reach = point.coords.norm();
-            if farthest.is_none_or(|(best, _, _)| reach > best) {
-                farthest = Some((reach, *link, point));
+            if farthest.is_none_or(|(best, ..)| reach > best) {
+                farthest = Some((reach, *link, element, point));
             }
         }
     }
-    if let Some((_, link, point)) = farthest {
+    if let Some((_, link, element, point)) = farthest {
         let body_from_link = links.iter().find(|(other, _)| *other == link).map_or(Pose::identity(), |(_, pose)| *pose);
         let point_in_link = body_from_link.inverse() * point;
         let joint_in_link = body_from_link.inverse() * Point::origin();
-        return (link, fit_tip(&robot.links[link.0].collision, &joint_in_link, &point_in_link));
+        return (link, fit_tip(&robot.links[link.0].collision, &joint_in_link, element, &point_in_link));
     }
     // Without geometry the frame farthest from the joint is the tip.
     let far = links.iter().fold(None, |best: Option<(f64, LinkId)>, (link, pose)| {
         let reach = pose.translation.vector.norm();
         if best.is_none_or(|(most, _)| reach > most) { Some((reach, *link)) } else { best }
     });
-    (far.map_or(child, |(_, link)| link), TipSpec::Point { position: Point::origin() })
+    (far.map_or(child, |(_, link)| link), (TipSpec::Point { position: Point::origin() }, None))
 }
 
 /// Links that move with `link` and hang below it, with their poses in its frame.
