@@ -6,6 +6,8 @@
 
 /// Failures and roadmaps as the data that pages are made of.
 pub mod pictures;
+/// Scene files as text.
+pub mod scene_text;
 /// Settings from several places.
 pub mod settings;
 

@@ -1,9 +1,11 @@
 //! Arguments. The spellings are a promise to scripts.
 
 mod judging;
+mod place;
 mod values;
 
 pub use judging::Judging;
+pub use place::Place;
 use values::{count, degrees, margin, metres, package, seconds, threads, trials, whole_number};
 
 use clap::builder::PossibleValuesParser;
@@ -17,8 +19,8 @@ pub const METHODS: [&str; 5] = ["gait", "visibility", "classic", "tracking", "tr
 
 /// Plans in-hand manipulation for multi-fingered hands, and checks plans independently.
 ///
-/// First steps: `regrasp demo`; for a hand of your own `regrasp inspect hand.urdf -o hand.toml`, then a scene file
-/// (docs/reference/scene-format.md), `regrasp plan scene.toml -o plan.json`, `regrasp check plan.json`.
+/// First steps: `regrasp demo`; for a hand of your own `regrasp inspect hand.urdf -o hand.toml`,
+/// `regrasp place hand.toml object.stl -o scene.toml`, `regrasp plan scene.toml -o plan.json`, `regrasp check plan.json`.
 #[derive(Debug, Parser)]
 #[command(name = "regrasp", version, max_term_width = 110, arg_required_else_help = true)]
 pub struct Arguments {
@@ -57,6 +59,8 @@ pub enum Command {
     Demo(Demo),
     /// Show what a hand is like and write a hand file for it
     Inspect(Inspect),
+    /// Find poses of an object in a hand from which it can be turned, and write a scene
+    Place(Place),
     /// Plan a scene, check the plan, then write it
     Plan(Plan),
     /// Judge a plan from the files alone; exit code 0 accepted, 1 rejected
@@ -97,6 +101,9 @@ pub struct Inspect {
     /// Write a hand file
     #[arg(short, long, value_name = "hand.toml")]
     pub output: Option<PathBuf>,
+    /// Base link of the hand in a URDF: its fingers are those below this link [default: guessed]
+    #[arg(long, value_name = "LINK")]
+    pub base: Option<String>,
     /// Postures sampled for the pairs of links that always or never touch
     #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000), allow_negative_numbers = true)]
     pub samples: u32,

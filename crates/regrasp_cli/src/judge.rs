@@ -33,10 +33,17 @@ pub fn judge_bytes(
 /// Judges a plan in a scene that was read for it, against the query of the plan's seed, and says what came of it.
 pub fn judge(loaded: &LoadedScene, plan: &regrasp::Plan, judging: &Judging, talk: &Talk) -> Result<Report, Stop> {
     let started = Instant::now();
-    let query = loaded.task_for(&plan.query).query(plan.seed);
+    let query = judging.query(loaded.task_for(&plan.query).query(plan.seed))?;
     let settings = CheckSettings { level: judging.level(), ..CheckSettings::default() };
     let report = check((&loaded.scene, &loaded.state), Some(&query), plan, &settings);
     say(&report, plan.promises.tracking.is_some(), started.elapsed(), talk);
+    if query.has_open_start() {
+        let [x, y, z] = plan.start.position;
+        talk.say(format!(
+            "       the scene leaves the start open; the plan starts at [{x:.4}, {y:.4}, {z:.4}] m, turned by {:.1} degrees",
+            regrasp::geometry::Pose::from(&plan.start).rotation.angle().to_degrees()
+        ));
+    }
     Ok(report)
 }
 

@@ -60,12 +60,16 @@ fn read_scene(
         Some(name) => choose(loaded, name, path)?,
         None => loaded.for_query(plan_query),
     };
+    say_loaded(&loaded, started.elapsed().as_secs_f64(), talk);
+    Ok(loaded)
+}
+
+/// Says what was read, and what was noted.
+pub fn say_loaded(loaded: &LoadedScene, seconds: f64, talk: &Talk) {
     for note in &loaded.notes {
         talk.note(note);
     }
-    let seconds = started.elapsed().as_secs_f64();
-    say_scene(&loaded, seconds, talk);
-    Ok(loaded)
+    say_scene(loaded, seconds, talk);
 }
 
 /// The scene with the task asked for as its first. Errors: it has none of that name (`A508`).

@@ -22,7 +22,7 @@ use crate::model::{Carrier, Model, Pair};
 use configuration::{Configuration, midway, place_finger, place_object};
 use draws::Draws;
 use nearby::Nearby;
-use regrasp_geometry::collision::{Answer, HalfSpace, Placed, Placement, gap_along, separation};
+use regrasp_geometry::collision::{HalfSpace, Placed, Placement, Separation, gap_along, separation};
 use regrasp_geometry::{Pose, Vector, frame};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 
@@ -431,8 +431,8 @@ impl<'a> Workspace<'a> {
             );
             self.directions[index] = self.to_keep(index, &separating);
             match answer {
-                Answer::SeparatedBy(d) => at_next = d,
-                Answer::TooNear | Answer::Unresolved => return self.trees_apart(index, required),
+                Separation::SeparatedBy(d) => at_next = d,
+                Separation::TooNear | Separation::Unresolved => return self.trees_apart(index, required),
             }
         }
         let (from_a, from_b) = (&self.now.placements[pair.a], self.now.at(model, pair.b));
@@ -454,7 +454,7 @@ impl<'a> Workspace<'a> {
             &mut best_now,
             hints,
         );
-        if matches!(answer, Answer::SeparatedBy(_)) {
+        if matches!(answer, Separation::SeparatedBy(_)) {
             let gap = gap_along(&best_now, &a.shape, at_a, &b.shape, at_b, hints);
             if gap >= required_at_ends {
                 self.directions[index] = self.to_keep(index, &best_now);

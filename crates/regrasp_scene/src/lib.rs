@@ -2,6 +2,8 @@
 
 /// Who may not touch whom.
 pub mod collision_pairs;
+/// Where an object has to go.
+pub mod goal;
 /// Which way things fall.
 pub mod gravity;
 /// The scene as one hand sees it.
@@ -22,12 +24,14 @@ pub mod scene;
 pub mod state;
 
 pub use collision_pairs::{CollisionPairs, FingerShapeId, collision_pairs};
+pub use goal::Goal;
 pub use gravity::{Gravity, STANDARD_GRAVITY};
 pub use hand_view::HandView;
 pub use limits::Limits;
-pub use load::{Goal, LoadedScene, StartOrientation, Task, load_scene};
+pub use load::{GraspScene, MeshObject, ObjectSource, load_grasp_scene};
+pub use load::{LoadedScene, OpenStart, StartOrientation, Task, load_scene, load_scene_text};
 pub use manipulation::{Manipulation, is_of_hand};
 pub use object::Object;
-pub use query::{GRASP_TOLERANCE, GRASP_TURN_TOLERANCE, GraspRequest, InHandQuery, Query, TrackingQuery};
+pub use query::{GRASP_TOLERANCE, GRASP_TURN_TOLERANCE, GraspRequest, InHandQuery, Query, StartChoice, TrackingQuery};
 pub use scene::{HandCarrier, InputFile, Obstacle, Scene, SceneHand, Support};
 pub use state::State;

@@ -1,6 +1,8 @@
 //! What is asked: start, way and goal of an object, and how the grasps are given.
 
-use regrasp_geometry::{Point, Pose};
+use crate::goal::{Goal, poses_from};
+use nalgebra::UnitQuaternion;
+use regrasp_geometry::{Point, Pose, Vector};
 
 /// Given fingertips and contacts may be this far off the object's surface, in metres. They are moved to the nearest contact,
 /// no finger farther than this; where that is not enough the scene is refused. Planner and checker go by this one number.
@@ -24,6 +26,17 @@ pub const IN_HAND: &str = "in_hand";
 /// See [`IN_HAND`].
 pub const TRACKING: &str = "tracking";
 
+/// A start pose that the planner chooses, and what the other poses are once it has (`position = "auto"` in a scene file).
+#[derive(Debug, Clone, PartialEq)]
+pub struct StartChoice {
+    /// Orientation at the start; None where the planner chooses it too.
+    pub rotation: Option<UnitQuaternion<f64>>,
+    /// Poses on the way.
+    pub way: Vec<Goal>,
+    /// The goal.
+    pub goal: Goal,
+}
+
 /// A goal pose of one object, reached in one hand by relocating fingers (Saut 2011; Sahbani 2007). All poses are in the world.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InHandQuery {
@@ -43,15 +56,54 @@ pub struct InHandQuery {
     pub start_grasp: GraspRequest,
     /// Grasp at the goal.
     pub goal_grasp: GraspRequest,
+    /// Where it is Some the planner chooses the start pose, and the poses above are what comes of a start at the world's origin.
+    pub open_start: Option<StartChoice>,
 }
 
 impl InHandQuery {
+    /// The same query with `start` as the chosen start pose; itself where the start was given.
+    #[must_use]
+    pub fn started_at(&self, start: &Pose) -> Self {
+        let Some(choice) = &self.open_start else { return self.clone() };
+        let rotation = choice.rotation.unwrap_or(start.rotation);
+        let start = Pose::from_parts(start.translation, rotation);
+        let (way, goal) = poses_from(&start, &choice.way, &choice.goal);
+        InHandQuery {
+            world_from_object_start: start,
+            world_from_object_way: way,
+            world_from_object_goal: goal,
+            open_start: None,
+            ..self.clone()
+        }
+    }
+
     /// All poses asked for, from start to goal; a leg leads from each to the next.
     pub fn poses(&self) -> Vec<Pose> {
         let mut poses = vec![self.world_from_object_start];
         poses.extend(&self.world_from_object_way);
         poses.push(self.world_from_object_goal);
         poses
+    }
+
+    /// True where the object has nowhere to go: what is asked is whether it can be held where it is.
+    pub fn stays(&self) -> bool {
+        let start = &self.world_from_object_start;
+        self.world_from_object_way.iter().chain([&self.world_from_object_goal]).all(|pose| pose == start)
+    }
+
+    /// What asks only whether the object can be held at the start: it is the goal too.
+    #[must_use]
+    pub fn held(&self) -> Self {
+        let stays = Goal::Turn { axis: Vector::z_axis(), angle: 0.0, shift: Vector::zeros() };
+        let open =
+            |choice: &StartChoice| StartChoice { rotation: choice.rotation, way: Vec::new(), goal: stays.clone() };
+        InHandQuery {
+            world_from_object_way: Vec::new(),
+            world_from_object_goal: self.world_from_object_start,
+            goal_grasp: GraspRequest::Automatic,
+            open_start: self.open_start.as_ref().map(open),
+            ..self.clone()
+        }
     }
 
     /// The same query seen from another frame: every pose becomes `frame_from_world` times itself.
@@ -127,6 +179,25 @@ impl Query {
             Query::InHand(_) => IN_HAND,
             Query::Tracking(_) => TRACKING,
         }
+    }
+
+    /// The query with `start` as the start pose where the planner chooses that; itself otherwise.
+    #[must_use]
+    pub fn started_at(&self, start: &Pose) -> Self {
+        match self {
+            Query::InHand(query) => Query::InHand(query.started_at(start)),
+            Query::Tracking(_) => self.clone(),
+        }
+    }
+
+    /// What asks only whether the object can be held at the start; None for tracking, which needs a given start grasp anyway.
+    pub fn held(&self) -> Option<Self> {
+        self.as_in_hand().map(|query| Query::InHand(query.held()))
+    }
+
+    /// True where the planner chooses the start pose.
+    pub fn has_open_start(&self) -> bool {
+        self.as_in_hand().is_some_and(|query| query.open_start.is_some())
     }
 
     /// The in-hand query, if it is one.

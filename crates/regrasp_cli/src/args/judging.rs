@@ -1,7 +1,9 @@
 //! By what plans are judged: level and gravity.
 
+use crate::stop::Stop;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
+use regrasp::Query;
 use regrasp::plan::check::Level;
 use regrasp::scene::{Gravity, LoadedScene};
 
@@ -15,12 +17,27 @@ pub struct Judging {
     /// Gravity instead of the scene's: a direction X,Y,Z in the frame of the hand's base link, or any
     #[arg(long, value_name = "X,Y,Z", value_parser = gravity, allow_hyphen_values = true)]
     pub gravity: Option<GravityInHand>,
+    /// Ask only whether the object can be held at the start: one grasp with its forces and its margin. Way and goal of the
+    /// scene do not count
+    #[arg(long)]
+    pub hold: bool,
 }
 
 impl Judging {
     /// What plans are judged for.
     pub fn level(&self) -> Level {
         self.level.as_deref().and_then(Level::named).unwrap_or_default()
+    }
+
+    /// What is asked: `query`, or with `--hold` whether its object can be held at the start. Errors: `--hold` for tracking (`A507`).
+    pub fn query(&self, query: Query) -> Result<Query, Stop> {
+        if !self.hold {
+            return Ok(query);
+        }
+        query.held().ok_or_else(|| {
+            let problem = "is not for a task of kind \"tracking\", which starts with a given grasp";
+            Stop::argument("A507", "--hold", problem, "a task of kind \"in_hand\"")
+        })
     }
 
     /// A scene under the gravity asked for, else under its own.

@@ -55,6 +55,14 @@ pub(super) fn margin(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A number that is not negative.
+pub(super) fn number_from_zero(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(value) if value >= 0.0 && f64::is_finite(value) => Ok(value),
+        _ => Err("expected a number from 0".into()),
+    }
+}
+
 /// A length up to a metre.
 pub(super) fn metres(text: &str) -> Result<f64, String> {
     match text.parse() {

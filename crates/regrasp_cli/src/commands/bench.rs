@@ -38,6 +38,9 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
     }
     let files = load::scene_files(&arguments.scenes)?;
     let (mut scenes, bad) = load_scenes(&files, arguments, common, talk)?;
+    for loaded in &scenes {
+        arguments.judging.query(loaded.task().query(0))?;
+    }
     let (planner, tracking) = bench_settings(&scenes, arguments)?;
     let improves = planner.improvement.improve_work > 0;
     let cancelled = interrupt::flag()?;
@@ -67,6 +70,8 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
         let job = |index: usize| {
             let seed = arguments.first_seed + index as u64;
             let query = loaded.task().query(seed);
+            // Scenes of tracking are refused below.
+            let query = if arguments.judging.hold { query.held().unwrap_or(query) } else { query };
             run_one(Problem { task: loaded.manipulation(), query: &query, seed }, &settings)
         };
         in_order(n_seeds as usize, arguments.at_once, job, |_, row| {

@@ -1,6 +1,7 @@
 //! `regrasp inspect`: what a hand is like, and a hand file for it.
 
 use crate::args::{self, Common};
+use crate::file_names::name_from;
 use crate::interrupt;
 use crate::load;
 use crate::outputs::{refuse_input, refuse_unwritable};
@@ -8,13 +9,13 @@ use crate::stop::Stop;
 use crate::talk::Talk;
 use crate::words::{counted, grouped};
 use regrasp::base::{Rng, files};
+use regrasp::robot::import::LoadOptions;
 use regrasp::robot::inspect::{
     HandInspection, InspectSettings, Inspection, JointRow, RobotInspection, hand_file_text, inspect,
 };
 use regrasp::robot::{Finger, Hand};
 use serde_json::json;
 use std::fmt::Write;
-use std::path::{Component, Path, PathBuf};
 
 /// Pairs of links that are listed one by one.
 const PAIRS_SHOWN: usize = 24;
@@ -24,10 +25,15 @@ pub fn run(arguments: &args::Inspect, common: &Common, talk: &Talk) -> Result<()
     if let Some(path) = &arguments.output {
         refuse_unwritable(path)?;
     }
+    let is_hand_file = arguments.urdf.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
+    if arguments.base.is_some() && is_hand_file {
+        return Err(Stop::argument("A505", "--base", "stands beside a hand file", "a URDF; hand files say base_link"));
+    }
     interrupt::flag()?;
     let settings = InspectSettings { n_postures: arguments.samples as usize };
     let mut rng = Rng::keyed(arguments.seed, "inspect", 0);
-    let found = inspect(&arguments.urdf, &load::options(common), &settings, &mut rng)?;
+    let options = LoadOptions { base: arguments.base.clone(), ..load::options(common) };
+    let found = inspect(&arguments.urdf, &options, &settings, &mut rng)?;
     if let Some(path) = &arguments.output {
         refuse_input(path, found.inputs.iter().map(|input| input.path.as_path()))?;
     }
@@ -48,7 +54,9 @@ pub fn run(arguments: &args::Inspect, common: &Common, talk: &Talk) -> Result<()
     match (&found.hand, &arguments.output) {
         (Err(error), Some(_)) => Err(Stop::BadInput(error.clone())),
         (Ok((hand, table)), Some(path)) => {
-            let urdf = name_of_urdf(path, &found, &arguments.urdf, &common.packages);
+            let read = found.inputs.iter().find(|input| input.role == "urdf");
+            let urdf = read.map_or(arguments.urdf.as_path(), |input| &input.path);
+            let urdf = name_from(path, urdf, &common.packages);
             let text = hand_file_text(hand, &urdf, &table.pairs.always_ids);
             files::write_atomic(path, text.as_bytes()).map_err(|error| Stop::unwritable(path, &error))?;
             talk.event("written", json!({ "path": path }));
@@ -57,36 +65,6 @@ pub fn run(arguments: &args::Inspect, common: &Common, talk: &Talk) -> Result<()
         }
         (_, None) => Ok(()),
     }
-}
-
-/// How the hand file at `hand_file` names the URDF: within a package given, else relative to itself.
-fn name_of_urdf(hand_file: &Path, found: &Inspection, asked: &Path, packages: &[(String, PathBuf)]) -> String {
-    let urdf = found.inputs.iter().find(|input| input.role == "urdf").map_or(asked, |input| &input.path);
-    let absolute = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    let urdf = absolute(urdf);
-    let slashed = |path: &Path| path.to_string_lossy().replace('\\', "/");
-    for (name, folder) in packages {
-        if let Ok(inside) = urdf.strip_prefix(absolute(folder)) {
-            return format!("package://{name}/{}", slashed(inside));
-        }
-    }
-    let folder = match hand_file.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => absolute(parent),
-        _ => absolute(Path::new(".")),
-    };
-    slashed(&relative(&urdf, &folder))
-}
-
-/// `target` as seen from `folder`, both absolute.
-fn relative(target: &Path, folder: &Path) -> PathBuf {
-    let (target_parts, folder_parts): (Vec<Component>, Vec<Component>) =
-        (target.components().collect(), folder.components().collect());
-    let shared = target_parts.iter().zip(&folder_parts).take_while(|(a, b)| a == b).count();
-    if shared == 0 {
-        return target.to_owned();
-    }
-    let up = std::iter::repeat_n(Component::ParentDir, folder_parts.len() - shared);
-    up.chain(target_parts[shared..].iter().copied()).collect()
 }
 
 /// The whole report.
@@ -244,12 +222,5 @@ mod tests {
     #[test]
     fn positions_are_as_scene_files_take_them() {
         assert_eq!(metres(&[0.0821, -0.0002, 1.0]), "[0.082, 0.000, 1.000]");
-    }
-
-    #[test]
-    fn paths_are_seen_from_the_hand_file() {
-        let seen = |target: &str, folder: &str| relative(Path::new(target), Path::new(folder));
-        assert_eq!(seen("/a/b/hand.urdf", "/a/b"), PathBuf::from("hand.urdf"));
-        assert_eq!(seen("/a/b/hand.urdf", "/a/c/d"), PathBuf::from("../../b/hand.urdf"));
     }
 }

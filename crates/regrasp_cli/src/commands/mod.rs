@@ -8,6 +8,7 @@ mod export;
 mod growth;
 mod inspect;
 mod pictures;
+mod place;
 pub mod plan;
 mod roadmap;
 mod rows;
@@ -25,6 +26,7 @@ pub fn run(arguments: &Arguments, talk: &Talk) -> Result<(), Stop> {
     match &arguments.command {
         Command::Demo(demo) => demo::run(demo, common, talk),
         Command::Inspect(inspect) => inspect::run(inspect, common, talk),
+        Command::Place(place) => place::run(place, common, talk),
         Command::Plan(plan) => plan::run(plan, common, talk),
         Command::Check(check) => check::run(check, common, talk),
         Command::View(view) => view::run(view, common, talk),

@@ -69,6 +69,12 @@ pub fn write(arguments: &args::View, story: &Story, talk: &Talk) -> Result<(), S
     Ok(())
 }
 
+/// Writes the usual storyboard of a story.
+pub fn write_storyboard(path: &Path, story: &Story, talk: &Talk) -> Result<(), Stop> {
+    let bytes = storyboard(story, &StoryboardSettings::default()).map_err(|error| Stop::Internal(error.to_string()))?;
+    put(path, &bytes, talk)
+}
+
 /// Writes what there is to be seen of a failure: the causes as bars, and the graph that the search had reached.
 pub fn write_failure(folder: &Path, failure: &Failure, query: &Query, talk: &Talk) -> Result<(), Stop> {
     std::fs::create_dir_all(folder).map_err(|error| Stop::unwritable(folder, &error))?;

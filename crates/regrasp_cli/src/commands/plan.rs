@@ -12,6 +12,7 @@ use crate::stop::Stop;
 use crate::talk::Talk;
 use crate::words::{counted, duration, grouped};
 use regrasp::base::files;
+use regrasp::geometry::Pose;
 use regrasp::plan::format;
 use regrasp::plan::plan::Statistics;
 use regrasp::planners::FailureKind;
@@ -33,7 +34,7 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
     let loaded = arguments.judging.scene(load::scene_by(&arguments.scene, common, deadline, talk)?);
     let read = loaded.scene.inputs.iter().map(|input| input.path.as_path());
     written.refuse_inputs(read.chain(arguments.search.settings.as_deref()))?;
-    let query = loaded.task().query(arguments.seed);
+    let query = arguments.judging.query(loaded.task().query(arguments.seed))?;
     let n_threads = arguments.threads.unwrap_or_else(available_threads);
     let settings = load::for_task(loaded.task(), &arguments.search, n_threads)?;
     say_query(&query, arguments.seed, n_threads, talk);
@@ -45,14 +46,15 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
         cancelled,
     };
     let packages = load::options(common).resolve;
-    let page = arguments.report.as_deref().map(|path| Page::new(path, loaded.manipulation(), &query, &packages));
-    let plan = match (search(&loaded.manipulation(), &query, &settings, arguments.seed, &limits, talk), &page) {
-        (Err(Stop::NoPlan(mut failure)), page) => {
+    let page_of =
+        |query| arguments.report.as_deref().map(|path| Page::new(path, loaded.manipulation(), query, &packages));
+    let plan = match search(&loaded.manipulation(), &query, &settings, arguments.seed, &limits, talk) {
+        Err(Stop::NoPlan(mut failure)) => {
             if failure.kind == FailureKind::TimeLimit && arguments.search.time_limit.is_none() {
                 let seconds = DEFAULT_TIME_LIMIT.as_secs();
                 failure.message += &format!("; {seconds} s is the default time limit, --time-limit 300 allows more");
             }
-            if let Some(page) = page {
+            if let Some(page) = page_of(&query) {
                 page.write_failure(&failure, talk)?;
             }
             if let Some(folder) = &arguments.failure {
@@ -60,8 +62,10 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
             }
             return Err(Stop::NoPlan(failure));
         }
-        (found, _) => found?,
+        found => found?,
     };
+    let query = query.started_at(&Pose::from(&plan.start));
+    let page = page_of(&query);
     let output = arguments.output.as_deref();
     judge_and_write(&plan, output, &arguments.scene, page.as_ref(), common, &arguments.judging, talk)
 }
@@ -147,6 +151,11 @@ pub fn available_threads() -> usize {
 
 /// Says what is asked.
 pub fn say_query(query: &Query, seed: u64, n_threads: usize, talk: &Talk) {
+    if query.as_in_hand().is_some_and(|query| query.stays()) {
+        talk.say(format!("query  can it be held? seed {seed}, {}", counted(n_threads, "thread")));
+        talk.event("query", json!({ "hold": true, "seed": seed, "threads": n_threads }));
+        return;
+    }
     let (start, goal) = (query.start(), query.goal());
     let angle = start.rotation.angle_to(&goal.rotation);
     let distance = (goal.translation.vector - start.translation.vector).norm();
@@ -194,7 +203,13 @@ pub fn search(
         Err(failure) => return Err(Stop::NoPlan(Box::new(failure))),
     };
     say_plan(&plan, started.elapsed().as_secs_f64(), talk);
-    say_moved(task, query, &plan, talk);
+    if query.has_open_start() {
+        let [x, y, z] = plan.start.position;
+        let turn = Pose::from(&plan.start).rotation.angle().to_degrees();
+        talk.say(format!("place  the object starts at [{x:.4}, {y:.4}, {z:.4}] m, turned by {turn:.1} degrees"));
+        talk.event("place", json!({ "start": plan.start }));
+    }
+    say_moved(task, &query.started_at(&Pose::from(&plan.start)), &plan, talk);
     Ok(plan)
 }
 
@@ -214,6 +229,15 @@ fn say_moved(task: &Manipulation, query: &Query, plan: &Plan, talk: &Talk) {
 /// Says what was found, in how many seconds.
 pub fn say_plan(plan: &Plan, seconds: f64, talk: &Talk) {
     let waypoints: usize = plan.segments.iter().map(|segment| segment.waypoints.len()).sum();
+    if let Some(held) = held_in_words(plan) {
+        talk.say(format!("hold   {held}   {}", duration(seconds)));
+        let statistics = &plan.statistics;
+        talk.event(
+            "plan",
+            json!({ "seconds": seconds, "statistics": statistics, "kept_margin": plan.promises.kept_margin, "hold": true }),
+        );
+        return;
+    }
     if plan.promises.tracking.is_some() {
         let Statistics { nodes, samples, transfers, .. } = plan.statistics;
         talk.say(format!(
@@ -257,6 +281,24 @@ pub fn say_plan(plan: &Plan, seconds: f64, talk: &Talk) {
         "plan",
         json!({ "seconds": seconds, "statistics": plan.statistics, "kept_margin": plan.promises.kept_margin }),
     );
+}
+
+/// Who holds the object and how hard, of a plan in which nothing moves.
+fn held_in_words(plan: &Plan) -> Option<String> {
+    let is_still = plan.statistics.transfers == 0 && plan.n_relocations() == 0 && plan.promises.tracking.is_none();
+    let [segment] = plan.segments.as_slice() else { return None };
+    let contacts = &segment.waypoints.first().filter(|_| is_still)?.contacts;
+    let holding = || plan.fingers.iter().zip(contacts).filter(|(_, contact)| contact.holds());
+    let names: Vec<&str> = holding().map(|(name, _)| name.as_str()).collect();
+    let pressed = holding().filter_map(|(_, contact)| {
+        let (force, normal) = (contact.force_in_object?, contact.normal_in_object?);
+        Some(-(0..3).map(|axis| force[axis] * normal[axis]).sum::<f64>())
+    });
+    let pressed: Vec<f64> = pressed.collect();
+    let least = pressed.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = pressed.iter().copied().fold(0.0, f64::max);
+    let forces = if pressed.is_empty() { String::new() } else { format!(", normal forces {least:.2} to {most:.2} N") };
+    Some(format!("by {}: closure margin at least {:.4} (planned){forces}", names.join(", "), plan.promises.kept_margin))
 }
 
 /// Keeps a rejected plan for a bug report, beside where the plan would have gone: never under its name.

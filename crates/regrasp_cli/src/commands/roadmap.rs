@@ -173,7 +173,7 @@ fn run_picture(arguments: &args::RoadmapPicture, common: &Common, talk: &Talk) -
     };
     say_plan(&answer.plan, started.elapsed().as_secs_f64(), talk);
     // The graph's motions are geometry: their contacts stay where they are.
-    let judging = args::Judging { level: Some(Level::Geometry.name().into()), gravity: None };
+    let judging = args::Judging { level: Some(Level::Geometry.name().into()), gravity: None, hold: false };
     if !judge::judge(&loaded, &answer.plan, &judging, talk)?.accepted() {
         return Err(Stop::Rejected);
     }

@@ -4,7 +4,7 @@
 //! triangles is wholly inside or wholly outside, so that one point of it is asked. Along a motion that stays apart from
 //! the triangles one moment is enough.
 
-use super::gjk::{Answer, Placed, separation};
+use super::gjk::{Placed, Separation, separation};
 use super::placement::Placement;
 use super::support::support_value;
 use super::winding::{self, Dipole};
@@ -159,7 +159,7 @@ impl MeshTree {
             }
             // Of a ball the distance is known already.
             if !matches!(shape, Shape::Sphere { .. })
-                && let Answer::SeparatedBy(d) = box_separation(shape, mesh_from_shape, node, required)
+                && let Separation::SeparatedBy(d) = box_separation(shape, mesh_from_shape, node, required)
             {
                 *smallest = smallest.min(d);
                 continue;
@@ -172,7 +172,7 @@ impl MeshTree {
             }
             for corners in self.corners_of(node) {
                 match triangle_separation(shape, mesh_from_shape, corners, required) {
-                    Answer::SeparatedBy(d) => *smallest = smallest.min(d),
+                    Separation::SeparatedBy(d) => *smallest = smallest.min(d),
                     _ => return false,
                 }
             }
@@ -226,7 +226,7 @@ impl MeshTree {
                 {
                     continue;
                 }
-                if !matches!(triangle_separation(shape, mesh_from_shape, corners, 0.0), Answer::SeparatedBy(_)) {
+                if !matches!(triangle_separation(shape, mesh_from_shape, corners, 0.0), Separation::SeparatedBy(_)) {
                     return false;
                 }
             }
@@ -251,7 +251,7 @@ pub struct HalfSpace {
 }
 
 /// Separation of a convex shape from the box of a node, both in the mesh frame.
-fn box_separation(shape: &Shape, mesh_from_shape: &Placement, node: &Node, required: f64) -> Answer {
+fn box_separation(shape: &Shape, mesh_from_shape: &Placement, node: &Node, required: f64) -> Separation {
     let at_box =
         Placement { rotation: Matrix3::identity(), translation: nalgebra::center(&node.low, &node.high).coords };
     let cuboid = Shape::Cuboid { half_extents: (node.high - node.low) / 2.0 };
@@ -277,7 +277,7 @@ fn box_distance(low: &Point, high: &Point, point: &Point) -> f64 {
 }
 
 /// Separation of a convex shape from one triangle, both in the mesh frame.
-fn triangle_separation(shape: &Shape, mesh_from_shape: &Placement, corners: &[Point; 3], required: f64) -> Answer {
+fn triangle_separation(shape: &Shape, mesh_from_shape: &Placement, corners: &[Point; 3], required: f64) -> Separation {
     super::gjk::separation_from_points(shape, mesh_from_shape, corners, required)
 }
 
@@ -343,7 +343,7 @@ mod tests {
                 let below = HalfSpace { normal, level: lowest + rng.uniform(0.0, 0.1) };
                 let expected = tree.corners.iter().all(|corners| {
                     let highest = corners.iter().map(|p| normal.dot(&p.coords)).fold(f64::NEG_INFINITY, f64::max);
-                    matches!(triangle_separation(&shape, &at, corners, 0.0), Answer::SeparatedBy(_))
+                    matches!(triangle_separation(&shape, &at, corners, 0.0), Separation::SeparatedBy(_))
                         || highest <= below.level
                 });
                 assert_eq!(tree.meets_only_below(&shape, (&center, radius), &at, &below), expected);

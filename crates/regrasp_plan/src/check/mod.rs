@@ -92,7 +92,8 @@ pub use slip::HoldSlip;
 pub use violation::{Moment, Violation, ViolationKind};
 
 use crate::plan::Plan;
-use model::Model;
+use model::CheckedHand;
+use regrasp_geometry::Pose;
 use regrasp_scene::{Manipulation, Query, Scene, State};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -326,9 +327,13 @@ pub fn check((scene, state): (&Scene, &State), query: Option<&Query>, plan: &Pla
     let mut log = Log { most_per_kind: settings.most_per_kind, work, ..Log::default() };
     let mut report = Report::default();
     promises::check_inputs(plan, &scene.inputs, &mut log);
+    // Where the scene leaves the start pose open any is an answer, and the other poses follow from it. That the object may be there
+    // is judged as at every other moment.
+    let started = query.filter(|query| query.has_open_start()).map(|query| query.started_at(&Pose::from(&plan.start)));
+    let query = started.as_ref().or(query);
     let wrong_scene = |message| Violation::new(ViolationKind::WrongScene, message);
     let found = holders::manipulation(scene, state, query, plan)
-        .and_then(|task| Ok((task, Model::new(&task).map_err(wrong_scene)?)));
+        .and_then(|task| Ok((task, CheckedHand::new(&task).map_err(wrong_scene)?)));
     match found {
         Err(violation) => log.push(violation),
         Ok((task, model)) => {
@@ -348,7 +353,7 @@ pub fn check((scene, state): (&Scene, &State), query: Option<&Query>, plan: &Pla
 }
 
 /// Whether joints, fingers and waypoints of `plan` are those of the scene: everything else indexes by them.
-fn form_is_sound(model: &Model, plan: &Plan, log: &mut Log) -> bool {
+fn form_is_sound(model: &CheckedHand, plan: &Plan, log: &mut Log) -> bool {
     continuity::check_form(model, plan, log);
     !log.found.iter().any(|violation| {
         use ViolationKind::{EmptySegment, NotANumber, WrongScene};
@@ -361,7 +366,7 @@ fn judge(
     query: Option<&Query>,
     plan: &Plan,
     settings: &CheckSettings,
-    model: &Model,
+    model: &CheckedHand,
     log: &mut Log,
     report: &mut Report,
 ) {
@@ -412,7 +417,7 @@ fn judge_tips(
     task: &Manipulation,
     plan: &Plan,
     settings: &CheckSettings,
-    model: &Model,
+    model: &CheckedHand,
     log: &mut Log,
     report: &mut Report,
 ) {

@@ -11,6 +11,8 @@ mod grasps;
 mod improving;
 /// Motions of the object.
 mod moving;
+/// Where to hold an object.
+pub mod placing;
 /// The plan of a solution.
 mod recording;
 /// Queries that no search can answer.
@@ -42,6 +44,7 @@ use refusals::{given_grasp, refuse_after_transfers, refuse_hopeless};
 use regrasp_base::{Budget, Interrupt, Rng};
 use regrasp_manipulation::ends::end::End;
 use regrasp_manipulation::failure::{Failure, FailureKind};
+use regrasp_manipulation::grasp::sequence::Sequence;
 use regrasp_manipulation::in_world::{failure_in_world, plan_in_world};
 use regrasp_manipulation::model::Model;
 use regrasp_plan::Plan;
@@ -64,6 +67,8 @@ struct Asked<'a> {
 /// Plans how the hand of `view` takes its object from start to goal. The search is in the hand's frame; query and plan are in the
 /// world. The hand and the object that the query names must be those of the view.
 ///
+/// Where the query leaves the start pose open it is chosen first ([`placing`]), and the plan says which it is.
+///
 /// The plan is the same for the same scene, query, settings and seed on any number of threads. `progress` is called now
 /// and then, from whichever thread is searching.
 ///
@@ -78,6 +83,9 @@ pub fn plan_in_hand(
 ) -> Result<Plan, Failure> {
     settings.validate().map_err(|problem| Failure::of_settings(&problem))?;
     Failure::refuse_many_fingers(view)?;
+    if query.open_start.is_some() {
+        return placing::plan_placed(view, query, settings, seed, budget, progress);
+    }
     let seen = view.hand_from_world().map(|hand_from_world| query.seen_from(&hand_from_world));
     let asked = Asked { view, query: seen.as_ref().unwrap_or(query), seed, progress };
     let found = plan_in_hand_frame(&asked, settings, budget);
@@ -129,7 +137,13 @@ fn plan_with(asked: &Asked, settings: &InHandSettings, whole: &Budget, first_wor
     let found = run_attempts(settings.n_threads, base_work, max_work, |index, work, winner| {
         let context = Context { model: &model, settings, seed, budget, winner, progress };
         let mut search = Search::new(context, [start_pose, goal_pose], index, work);
-        let planned = plan_legs(&mut search, &legs).and_then(|solution| {
+        search.holds_only = query.stays();
+        let planned = plan_legs(&mut search, &legs).and_then(|mut solution| {
+            if query.stays() {
+                // Any moment of it holds the object where it is asked for: the first does.
+                solution.way = Sequence::at(solution.way.start().clone());
+                solution.steps_to_way.fill(0);
+            }
             let plan = record::record(&model, settings, query, seed, &solution, Statistics::default());
             let plan = plan.map_err(|unbalanced| {
                 search.tally.add(Reason::NoForces(unbalanced));

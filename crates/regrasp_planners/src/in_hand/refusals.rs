@@ -18,7 +18,7 @@ use regrasp_scene::{GraspRequest, InHandQuery};
 pub fn refuse_hopeless(model: &Model, settings: &InHandSettings, query: &InHandQuery) -> Result<(), Failure> {
     refuse_holding_nothing(model)?;
     let may_try_transfers = model.n_fingers() == 2 || settings.search.transfers_alone;
-    if settings.method != Method::Gait || !may_try_transfers {
+    if !query.stays() && (settings.method != Method::Gait || !may_try_transfers) {
         refuse_impossible(model)?;
     }
     let way = query.world_from_object_way.iter().enumerate().map(|(index, pose)| (End::Way(index + 1), pose));
@@ -40,7 +40,7 @@ pub fn refuse_impossible(model: &Model) -> Result<(), Failure> {
 }
 
 /// Refuses hands that cannot hold an object even with all fingers.
-fn refuse_holding_nothing(model: &Model) -> Result<(), Failure> {
+pub fn refuse_holding_nothing(model: &Model) -> Result<(), Failure> {
     let all: Vec<ContactModel> = model.fingers.iter().map(|finger| finger.contact).collect();
     if may_close(&all, model.frame.friction) {
         return Ok(());

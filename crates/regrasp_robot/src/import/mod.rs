@@ -11,12 +11,16 @@
 pub(crate) mod assemble;
 mod chain;
 mod couplings;
+/// What to write where a hand cannot be made.
+mod fixes;
 /// `hand.toml`, and hands guessed from a bare URDF.
 pub mod hand_file;
 mod hulls;
 mod names;
 /// How files are read, and which were.
 pub mod options;
+/// Files of other forms where a URDF is expected.
+mod other_form;
 /// `package://` and relative paths, below allowed folders.
 pub mod resolve;
 /// `robot.toml`: models, arms and hands that make one manipulator.

@@ -4,6 +4,8 @@
 pub(crate) mod guess;
 /// A hand as the text of a `hand.toml`.
 pub mod hand_text;
+/// Where fingertips reach.
+pub mod reach;
 /// Rest postures.
 pub(crate) mod rest;
 /// Joints and meshes as tables, and what looks like a wrong unit.
@@ -23,6 +25,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 pub use hand_text::hand_file_text;
+pub use reach::{TipReach, TipRegion};
 pub use robot_table::{Follows, JointRow, MeshRow, RobotInspection, inspect_robot};
 
 /// How a hand is inspected.

@@ -3,7 +3,7 @@
 use crate::hand::Hand;
 use crate::robot::LinkId;
 use regrasp_base::Rng;
-use regrasp_geometry::collision::{Answer, Placed, Placement, separation};
+use regrasp_geometry::collision::{Placed, Placement, Separation, separation};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Point, Pose, Vector};
 use std::collections::BTreeSet;
@@ -68,6 +68,32 @@ impl<'h> Touch<'h> {
 
     /// Per pair, whether it touches (or cannot be proved apart) in `posture`: one joint vector per finger.
     pub fn touching(&self, posture: &[Vec<f64>]) -> Vec<bool> {
+        let at = self.placed(posture);
+        self.shape_pairs.iter().map(|pairs| pairs.iter().any(|pair| self.shapes_touch(&at, pair))).collect()
+    }
+
+    /// Per finger, whether it touches itself or the palm in `posture`, but for the `excused` pairs.
+    pub fn fingers_in_their_own_way(&self, posture: &[Vec<f64>], excused: &[bool]) -> Vec<bool> {
+        let at = self.placed(posture);
+        let mut blocked = vec![false; self.hand.fingers.len()];
+        for (pairs, _) in self.shape_pairs.iter().zip(excused).filter(|(_, excused)| !**excused) {
+            for pair in pairs {
+                let of = [pair.0, pair.1].map(|shape| self.shapes[shape].body.map(|(finger, _)| finger));
+                let finger = match of {
+                    [Some(finger), None] | [None, Some(finger)] => finger,
+                    [Some(one), Some(other)] if one == other => one,
+                    _ => continue,
+                };
+                if !blocked[finger] && self.shapes_touch(&at, pair) {
+                    blocked[finger] = true;
+                }
+            }
+        }
+        blocked
+    }
+
+    /// Where every shape is, and the centre of its bounding ball.
+    fn placed(&self, posture: &[Vec<f64>]) -> Vec<(Placement, Point)> {
         let bodies: Vec<Vec<Pose>> = self
             .hand
             .fingers
@@ -79,8 +105,7 @@ impl<'h> Touch<'h> {
                 poses
             })
             .collect();
-        let placements: Vec<(Placement, Point)> = self
-            .shapes
+        self.shapes
             .iter()
             .map(|shape| {
                 let pose = match shape.body {
@@ -90,37 +115,37 @@ impl<'h> Touch<'h> {
                 let rotation = pose.rotation.to_rotation_matrix().into_inner();
                 (Placement { rotation, translation: pose.translation.vector }, pose * shape.center)
             })
-            .collect();
-        let touches = |&(i, j): &(usize, usize)| {
-            let (a, b) = (&self.shapes[i], &self.shapes[j]);
-            if (placements[i].1 - placements[j].1).norm() > a.radius + b.radius {
-                return false;
-            }
-            let (mut direction, mut hints) = (Vector::zeros(), [0, 0]);
-            let (shape_a, shape_b) = (&a.placed.shape, &b.placed.shape);
-            let (at_a, at_b) = (&placements[i].0, &placements[j].0);
-            let (first, second) = (Placed { shape: shape_a, at: at_a }, Placed { shape: shape_b, at: at_b });
-            let answer = separation(first, second, 0.0, 0.0, &mut direction, &mut hints);
-            !matches!(answer, Answer::SeparatedBy(_))
+            .collect()
+    }
+
+    fn shapes_touch(&self, at: &[(Placement, Point)], &(i, j): &(usize, usize)) -> bool {
+        let (a, b) = (&self.shapes[i], &self.shapes[j]);
+        if (at[i].1 - at[j].1).norm() > a.radius + b.radius {
+            return false;
+        }
+        let (mut direction, mut hints) = (Vector::zeros(), [0, 0]);
+        let first = Placed { shape: &a.placed.shape, at: &at[i].0 };
+        let second = Placed { shape: &b.placed.shape, at: &at[j].0 };
+        let answer = separation(first, second, 0.0, 0.0, &mut direction, &mut hints);
+        !matches!(answer, Separation::SeparatedBy(_))
+    }
+
+    /// A posture, uniform in the limits of joints and brought within those of sums.
+    pub fn draw_posture(&self, rng: &mut Rng) -> Vec<Vec<f64>> {
+        let of_finger = |finger: &crate::hand::Finger| {
+            let ends = finger.chain.lower.iter().zip(&finger.chain.upper);
+            let finite = |end: f64| if end.is_finite() { end } else { PI.copysign(end) };
+            let drawn: Vec<f64> = ends.map(|(&low, &high)| rng.uniform(finite(low), finite(high))).collect();
+            finger.chain.bring_within_limits(&drawn).unwrap_or(drawn)
         };
-        self.shape_pairs.iter().map(|pairs| pairs.iter().any(touches)).collect()
+        self.hand.fingers.iter().map(of_finger).collect()
     }
 
     /// Per pair, in how many of `n_postures` postures, uniform in the limits of joints and brought within those of sums, it touches.
     pub fn count(&self, n_postures: usize, rng: &mut Rng) -> Vec<usize> {
         let mut counts = vec![0; self.pairs.len()];
         for _ in 0..n_postures {
-            let posture: Vec<Vec<f64>> = self
-                .hand
-                .fingers
-                .iter()
-                .map(|finger| {
-                    let ends = finger.chain.lower.iter().zip(&finger.chain.upper);
-                    let finite = |end: f64| if end.is_finite() { end } else { PI.copysign(end) };
-                    let drawn: Vec<f64> = ends.map(|(&low, &high)| rng.uniform(finite(low), finite(high))).collect();
-                    finger.chain.bring_within_limits(&drawn).unwrap_or(drawn)
-                })
-                .collect();
+            let posture = self.draw_posture(rng);
             for (count, touches) in counts.iter_mut().zip(self.touching(&posture)) {
                 *count += usize::from(touches);
             }

@@ -42,8 +42,8 @@ pub(super) fn one_hand(root: &mut Table, files: &mut Files, found: &mut Found) -
         .and_then(|table| object::object(table, Hands::of(&hand), files, found));
     let obstacles = object::fixed_bodies(root, "obstacles", &mut Names::of("body of the scene"), files, found);
     let inner = hand.as_ref().map(|hand| &hand.hand);
-    let start = task::start(root, inner, None, found);
     let kind = kind.unwrap_or(TaskKind::InHand);
+    let start = task::start(root, kind, inner, None, found);
     let heading = Heading { name: String::new(), kind, hand: 0, object: 0 };
     let task = task::task(root, heading, start, inner, found);
     if let (Some(hand), Some(object), Some(entry)) = (&hand, &object, &object_entry) {
@@ -180,7 +180,7 @@ fn task_of(
     // All keys are read whatever is unknown: none of them is then said not to exist.
     let resting = object.map_or(Pose::identity(), |object| objects[object].1);
     let inner = hand.map(|hand| &hands[hand].hand);
-    let start = task::start(table, inner, Some(resting), found);
+    let start = task::start(table, kind, inner, Some(resting), found);
     let is_known = known_kind.is_some() && name.is_some();
     let (name, indices) = (name.unwrap_or_default(), (hand.unwrap_or(0), object.unwrap_or(0)));
     let heading = Heading { name, kind, hand: indices.0, object: indices.1 };

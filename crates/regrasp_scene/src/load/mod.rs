@@ -9,6 +9,7 @@
 mod bodies;
 mod contact;
 mod files;
+mod grasping;
 mod gravity;
 mod hand;
 mod limits;
@@ -20,7 +21,8 @@ mod shape;
 mod task;
 mod units;
 
-pub use task::{Goal, StartOrientation, Task};
+pub use grasping::{GraspScene, MeshObject, ObjectSource, load_grasp_scene};
+pub use task::{OpenStart, StartOrientation, Task};
 
 use crate::hand_view::HandView;
 use crate::manipulation::Manipulation;
@@ -115,7 +117,13 @@ impl LoadedScene {
 ///
 /// Errors: every cause found, in this file and in those it names.
 pub fn load_scene(path: &Path, options: &LoadOptions) -> Result<LoadedScene, InputError> {
-    let bytes = regrasp_base::files::read(path)?;
+    load_scene_text(path, regrasp_base::files::read(path)?, options)
+}
+
+/// As [`load_scene`], of a scene file that is or could be at `path` and has these bytes.
+///
+/// Errors: as [`load_scene`].
+pub fn load_scene_text(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<LoadedScene, InputError> {
     let mut files = Files::new(path, &bytes, options);
     let text = regrasp_base::files::text_of(path, bytes)?;
     let mut found = Found::new(path, &text, CODES);

@@ -1,15 +1,14 @@
 //! `[start]`, `[[way]]` and `[goal]`: what is asked, and how a seed resolves what the file leaves open.
 
 use super::pose;
-use crate::query::{GraspRequest, IN_HAND, InHandQuery, Query, TRACKING, TrackingQuery};
-use nalgebra::{Translation3, UnitQuaternion};
+use crate::goal::{Goal, poses_from};
+use crate::query::{GraspRequest, IN_HAND, InHandQuery, Query, StartChoice, TRACKING, TrackingQuery};
 use regrasp_base::Rng;
 use regrasp_base::diagnostic::number;
 use regrasp_base::toml_table::{Entry, Found, Table, suggestion};
 use regrasp_geometry::frame::rotation_between;
-use regrasp_geometry::{Point, Pose, UnitVector, Vector, pose_from};
+use regrasp_geometry::{Point, Pose, Vector, pose_from};
 use regrasp_robot::Hand;
-use std::f64::consts::PI;
 
 /// A start position may be drawn from a ball of at most this radius, in metres.
 const MAX_POSITION_WITHIN: f64 = 1.0;
@@ -29,52 +28,13 @@ pub enum StartOrientation {
     Random,
 }
 
-/// Where the object has to go: the goal, or a pose on the way.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Goal {
-    /// To an orientation in the world, where the start is.
-    Orientation(UnitQuaternion<f64>),
-    /// To a pose of the world.
-    Pose(Pose),
-    /// Turned about its own origin, by world axes, and moved: both as seen from the start.
-    Turn {
-        /// Axis, in the world frame; the turn is applied after the start orientation.
-        axis: UnitVector,
-        /// Angle, in radians; may exceed half a turn.
-        angle: f64,
-        /// Displacement of the object's origin, in the world frame.
-        shift: Vector,
-    },
-}
-
-impl Goal {
-    /// The pose, seen from the start as drawn.
-    fn pose(&self, start: &Pose) -> Pose {
-        self.pose_at(start, 1.0)
-    }
-
-    /// The pose at a share of the turn and the displacement; that of a goal in the world does not depend on it.
-    fn pose_at(&self, start: &Pose, share: f64) -> Pose {
-        match self {
-            Goal::Pose(pose) => *pose,
-            Goal::Orientation(rotation) => Pose::from_parts(start.translation, *rotation),
-            Goal::Turn { axis, angle, shift } => {
-                let position = start.translation.vector + shift * share;
-                let rotation = UnitQuaternion::from_axis_angle(axis, angle * share);
-                Pose::from_parts(Translation3::from(position), rotation * start.rotation)
-            }
-        }
-    }
-
-    /// Legs that a turn is broken into, so that each is below half a turn; half a turn itself is one leg.
-    fn n_legs(&self) -> usize {
-        match self {
-            Goal::Turn { angle, .. } if angle.abs() > PI + SAME_ANGLE => {
-                (angle.abs() / PI + SAME_ANGLE).floor() as usize + 1
-            }
-            _ => 1,
-        }
-    }
+/// What of the start pose the planner chooses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OpenStart {
+    /// The position; the orientation is the file's.
+    Position,
+    /// Position and orientation.
+    Pose,
 }
 
 /// What kind of goal a task has.
@@ -107,8 +67,10 @@ pub struct Task {
     pub object: usize,
     /// Its kind.
     pub(super) kind: TaskKind,
-    /// Object pose at the start, before the draw.
+    /// Object pose at the start, before the draw. Where the planner chooses the position it is the origin of the hand's frame.
     pub world_from_object_start: Pose,
+    /// What of the start pose the planner chooses; none where the file gives all of it.
+    pub open_start: Option<OpenStart>,
     /// The start position is drawn uniformly from the ball of this radius, in metres; 0 for none.
     pub position_within: f64,
     /// Start orientation.
@@ -137,12 +99,9 @@ impl Task {
             let drawn = Rng::keyed(seed, "start_orientation", 0).quat_xyzw();
             start.rotation = pose_from([0.0; 3], drawn).rotation * start.rotation;
         }
-        let mut way: Vec<Pose> = self.way.iter().map(|pose| pose.pose(&start)).collect();
-        let n_legs = self.goal.n_legs();
-        way.extend((1..n_legs).map(|leg| self.goal.pose_at(&start, leg as f64 / n_legs as f64)));
+        let (way, goal) = poses_from(&start, &self.way, &self.goal);
         let (start_grasp, goal_grasp) = (self.start_grasp.clone(), self.goal_grasp.clone());
         let (name, hand, object) = (self.name.clone(), self.hand, self.object);
-        let goal = self.goal.pose(&start);
         match self.kind {
             TaskKind::InHand => Query::InHand(InHandQuery {
                 name,
@@ -153,6 +112,10 @@ impl Task {
                 world_from_object_goal: goal,
                 start_grasp,
                 goal_grasp,
+                open_start: self.open_start.map(|what| {
+                    let rotation = (what == OpenStart::Position).then_some(start.rotation);
+                    StartChoice { rotation, way: self.way.clone(), goal: self.goal.clone() }
+                }),
             }),
             TaskKind::Tracking => Query::Tracking(TrackingQuery {
                 name,
@@ -175,6 +138,7 @@ impl Task {
 /// `[start]`, as far as the file says it.
 pub(super) struct Start {
     pose: Option<Pose>,
+    open: Option<OpenStart>,
     position_within: f64,
     orientation: StartOrientation,
     grasp: GraspRequest,
@@ -184,13 +148,19 @@ impl Start {
     /// An object that starts where it rests, in a grasp that the planner chooses.
     pub(super) fn at_rest(pose: Option<Pose>) -> Self {
         let (orientation, grasp) = (StartOrientation::Given, GraspRequest::Automatic);
-        Start { pose, position_within: 0.0, orientation, grasp }
+        Start { pose, open: None, position_within: 0.0, orientation, grasp }
     }
 }
 
 /// Reads `[start]`. `hand` is none when the hand file was refused; then grasps are not looked into. Where `resting` is given the
 /// object starts there unless the table says another pose.
-pub(super) fn start(root: &mut Table, hand: Option<&Hand>, resting: Option<Pose>, found: &mut Found) -> Option<Start> {
+pub(super) fn start(
+    root: &mut Table,
+    kind: TaskKind,
+    hand: Option<&Hand>,
+    resting: Option<Pose>,
+    found: &mut Found,
+) -> Option<Start> {
     let entry = match resting {
         Some(_) => root.optional("start"),
         None => Some(root.required(found, "start", "add [start] with position = [x, y, z]")?),
@@ -198,20 +168,56 @@ pub(super) fn start(root: &mut Table, hand: Option<&Hand>, resting: Option<Pose>
     let Some(entry) = entry else { return Some(Start::at_rest(resting)) };
     let mut table = entry.table(found)?;
     let says_pose = !table.present(&["position", "quat_xyzw", "quat_wxyz", "rotation_vector"]).is_empty();
-    let pose = if resting.is_some() && !says_pose { resting } else { pose::pose(&mut table, found) };
+    let open = open_start(&mut table, kind, found);
+    let pose = match open {
+        Some(_) => pose::orientation(&mut table, found)
+            .map(|rotation| Pose::from_parts(nalgebra::Translation3::identity(), rotation)),
+        None if resting.is_some() && !says_pose => resting,
+        None => pose::pose(&mut table, found),
+    };
     let expected = format!("a radius from 0 to {MAX_POSITION_WITHIN} metres");
     let position_within = table
         .optional("position_within")
         .and_then(|entry| entry.number_that(found, &expected, |x| (0.0..=MAX_POSITION_WITHIN).contains(&x)));
     let is_random = table.optional("random_orientation").and_then(|entry| entry.boolean(found));
     let grasp = grasp(&mut table, hand, found);
+    if open.is_some() {
+        refuse_beside_open(&mut table, found);
+    }
     table.finish(found);
     Some(Start {
         pose,
+        open: match is_random {
+            Some(true) => open.map(|_| OpenStart::Position),
+            _ => open,
+        },
         position_within: position_within.unwrap_or(0.0),
         orientation: if is_random == Some(true) { StartOrientation::Random } else { StartOrientation::Given },
         grasp,
     })
+}
+
+/// `position = "auto"`: the planner chooses it, and the orientation too where the file gives none.
+fn open_start(table: &mut Table, kind: TaskKind, found: &mut Found) -> Option<OpenStart> {
+    let position = table.optional("position").filter(|entry| entry.as_text().is_some())?;
+    position.choice(found, &["auto"]);
+    if kind == TaskKind::Tracking {
+        let problem = "cannot be \"auto\": a task of kind \"tracking\" needs a start pose and a start grasp";
+        found.diagnostics.push(position.error("S106", found, problem).fix("give the position, in metres"));
+    }
+    let says_orientation = !table.present(&pose::ORIENTATIONS).is_empty();
+    Some(if says_orientation { OpenStart::Position } else { OpenStart::Pose })
+}
+
+/// Refuses what has no meaning where the planner chooses the position (`S106`).
+fn refuse_beside_open(table: &mut Table, found: &mut Found) {
+    for entry in table.present(&["position_within", "grasp"]) {
+        if entry.name.ends_with("grasp") && entry.as_text() == Some("automatic") {
+            continue;
+        }
+        let diagnostic = entry.error("S106", found, "cannot stand beside position = \"auto\"");
+        found.diagnostics.push(diagnostic.fix("leave it out, or give the position"));
+    }
 }
 
 /// Reads `[[way]]`. Errors: as for a goal, but a turn beyond half a turn (`S107`), and too many (`S107`).
@@ -336,6 +342,7 @@ pub(super) fn task(
         object: heading.object,
         kind,
         world_from_object_start: start.pose?,
+        open_start: start.open,
         position_within: start.position_within,
         start_orientation: start.orientation,
         start_grasp: start.grasp,

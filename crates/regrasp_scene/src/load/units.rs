@@ -1,7 +1,8 @@
 //! Mistakes that show only when hand, object and task are seen together: units (reliability R15), reach, contacts.
 
 use super::numbers::{list, shown};
-use super::task::{Goal, StartOrientation, Task};
+use super::task::{StartOrientation, Task};
+use crate::goal::Goal;
 use crate::object::Object;
 use crate::query::{GRASP_TOLERANCE, GraspRequest};
 use crate::scene::SceneHand;
@@ -38,8 +39,9 @@ pub(super) fn check_reach(hand: &SceneHand, object: &Object, task: &Task, root: 
     let query = task.query(0);
     let object_reach = object.shape.reach_from(&Point::origin());
     let slack = task.position_within * 2.0;
-    let is_goal_fixed = matches!(task.goal, Goal::Pose(_)) || task.start_orientation == StartOrientation::Given;
-    let mut poses = vec![("start", *query.start())];
+    let is_goal_fixed = matches!(task.goal, Goal::Pose(_))
+        || (task.start_orientation == StartOrientation::Given && task.open_start.is_none());
+    let mut poses = if task.open_start.is_some() { Vec::new() } else { vec![("start", *query.start())] };
     poses.extend(query.way().iter().take(task.way.len()).map(|pose| ("way", *pose)));
     poses.push(("goal", *query.goal()));
     for (key, pose) in poses {
@@ -47,7 +49,9 @@ pub(super) fn check_reach(hand: &SceneHand, object: &Object, task: &Task, root: 
             continue;
         }
         let Some((distance, reach)) = beyond_reach(hand, &pose, object_reach + slack) else { continue };
-        let Some(entry) = root.optional(key) else { continue };
+        // Without a start the object stands where the scene has it.
+        let instead = if key == "start" { "object" } else { key };
+        let Some(entry) = root.optional(key).or_else(|| root.optional(instead)) else { continue };
         let p = pose.translation.vector;
         let mut diagnostic = entry
             .error("P302", found, format!("position {} is {} m from the hand", list(p), shown(distance, 3)))
@@ -115,7 +119,7 @@ fn finger_reach(finger: &regrasp_robot::Finger) -> f64 {
     let slides: f64 = chain
         .joints
         .iter()
-        .filter(|joint| joint.motion == regrasp_robot::Motion::Slide)
+        .filter(|joint| joint.motion == regrasp_robot::JointMotion::Slide)
         .map(|joint| {
             let [lower, upper] = joint.range([&chain.lower, &chain.upper]);
             lower.abs().max(upper.abs())

@@ -58,6 +58,8 @@ pub struct Search<'a> {
     passages: Passages,
     /// Index of the attempt.
     pub attempt: usize,
+    /// True where the object stays where it is: what is asked is a grasp, not one from which a finger may lift.
+    pub holds_only: bool,
     /// True when a wall-clock limit cut something that a plan was found without.
     pub cut_by_time: bool,
     /// What all attempts at the query have in common.
@@ -109,6 +111,7 @@ impl<'a> Search<'a> {
             goal,
             passages: Passages::default(),
             attempt,
+            holds_only: false,
             cut_by_time: false,
             context,
             work_limit,

@@ -69,6 +69,11 @@ impl Tally {
         *self.counts.entry(reason).or_default() += count;
     }
 
+    /// How many failures there were for `reason`.
+    pub fn count(&self, reason: Reason) -> u64 {
+        self.counts.get(&reason).copied().unwrap_or(0)
+    }
+
     /// One more transfer that stopped short of the goal because fingertips would have to turn by `turn` about a contact normal.
     pub fn note_turn(&mut self, turn: f64) {
         self.add(Reason::WouldTurn);

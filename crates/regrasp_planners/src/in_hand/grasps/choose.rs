@@ -18,7 +18,10 @@ pub fn choose_grasp(
     freedom: Option<&Freedom>,
 ) -> Option<GraspState> {
     let model = search.model();
-    let mut table = ClosureTable::new(model, options);
+    let mut table = match search.holds_only {
+        true => ClosureTable::of_all_sets(model, options),
+        false => ClosureTable::new(model, options),
+    };
     let ranked = rank(search, options, &mut table, freedom, None, GRASPS_TRIED);
     search.tally.note_releases(table.releases(), world_from_object);
     for combination in ranked {

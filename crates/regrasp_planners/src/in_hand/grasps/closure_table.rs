@@ -64,6 +64,11 @@ impl<'a> ClosureTable<'a> {
         }
     }
 
+    /// As [`ClosureTable::new`], where grasps that let nobody go count too.
+    pub fn of_all_sets(model: &'a Model<'a>, options: &'a [Vec<Candidate>]) -> Self {
+        ClosureTable { sets: Sets::All, ..ClosureTable::new(model, options) }
+    }
+
     /// Contact of a finger with its option, which is none of a free posture.
     fn contact(&self, finger: usize, choice: &Choice) -> Contact {
         self.options[finger][choice[finger]].contact.expect("only fingers that hold are asked about")

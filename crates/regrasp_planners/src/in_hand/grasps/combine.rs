@@ -108,8 +108,8 @@ pub fn rank(
         }
         let n_releasable = table.n_releasable(&candidate.choice);
         let rule = search.settings.search.release_rule;
-        if (n_releasable == 0 && model.may_release) || (rule == ReleaseRule::EverywhereEveryFinger && n_releasable < n)
-        {
+        let needs_release = model.may_release && !search.holds_only;
+        if (n_releasable == 0 && needs_release) || (rule == ReleaseRule::EverywhereEveryFinger && n_releasable < n) {
             continue;
         }
         if !clashes.is_clear(&mut search.workspace, options, &candidate.choice) {

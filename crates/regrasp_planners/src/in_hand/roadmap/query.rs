@@ -109,6 +109,7 @@ impl<'a> RoadmapPlanner<'a> {
             world_from_object_goal: draw("random_goal"),
             start_grasp: GraspRequest::Automatic,
             goal_grasp: GraspRequest::Automatic,
+            open_start: None,
         }
     }
 

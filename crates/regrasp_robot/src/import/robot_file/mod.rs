@@ -97,7 +97,7 @@ struct Draft<'a> {
     path: &'a Path,
     options: &'a LoadOptions,
     tree: Robot,
-    models: Vec<models::Model>,
+    models: Vec<models::PlacedUrdf>,
     inputs: Vec<LoadedInput>,
     allow: BTreeSet<(LinkId, LinkId)>,
 }

@@ -1,0 +1,44 @@
+//! What a file that is written calls another one: a path within a package given, else one relative to itself.
+
+use std::path::{Component, Path, PathBuf};
+
+/// How the file at `writer` names `file`.
+pub fn name_from(writer: &Path, file: &Path, packages: &[(String, PathBuf)]) -> String {
+    let absolute = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let file = absolute(file);
+    let slashed = |path: &Path| path.to_string_lossy().replace('\\', "/");
+    for (name, folder) in packages {
+        if let Ok(inside) = file.strip_prefix(absolute(folder)) {
+            return format!("package://{name}/{}", slashed(inside));
+        }
+    }
+    let folder = match writer.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => absolute(parent),
+        _ => absolute(Path::new(".")),
+    };
+    slashed(&relative(&file, &folder))
+}
+
+/// `target` as seen from `folder`, both absolute.
+fn relative(target: &Path, folder: &Path) -> PathBuf {
+    let (target_parts, folder_parts): (Vec<Component>, Vec<Component>) =
+        (target.components().collect(), folder.components().collect());
+    let shared = target_parts.iter().zip(&folder_parts).take_while(|(a, b)| a == b).count();
+    if shared == 0 {
+        return target.to_owned();
+    }
+    let up = std::iter::repeat_n(Component::ParentDir, folder_parts.len() - shared);
+    up.chain(target_parts[shared..].iter().copied()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_are_seen_from_the_file_that_names_them() {
+        let seen = |target: &str, folder: &str| relative(Path::new(target), Path::new(folder));
+        assert_eq!(seen("/a/b/hand.urdf", "/a/b"), PathBuf::from("hand.urdf"));
+        assert_eq!(seen("/a/b/hand.urdf", "/a/c/d"), PathBuf::from("../../b/hand.urdf"));
+    }
+}
