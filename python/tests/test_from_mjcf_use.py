@@ -99,11 +99,11 @@ def test_the_command_line_takes_a_base(tmp_path: Path, regrasp_cli: Any):
     world = f'<body name="torso"><geom size="0.02"/>{head}{arm}{palm()}{"</body>" * 3}</body>'
     made, _, _ = converted(tmp_path, world)
     assert made.problem is not None and made.problem.code == "U208"
-    assert made.problem.fix == "regrasp inspect with --base palm"
+    assert made.problem.fix == "regrasp inspect with --base wrist"
     options = made.problem.fix.partition("with ")[2].split()
     done = regrasp_cli("inspect", made.urdf, *options, "-o", made.urdf.with_name("hand.toml"), "--samples", "100")
     assert done.returncode == 0, done.stderr
     hand = regrasp.load_hand(made.urdf.with_name("hand.toml"))
-    assert (hand.base_link, hand.joint_names) == ("palm", ("palm_a", "palm_b"))
+    assert (hand.base_link, hand.joint_names) == ("wrist", ("palm_a", "palm_b"))
     refused = regrasp_cli("inspect", made.urdf.with_name("hand.toml"), "--base", "palm")
     assert (refused.returncode, "A505" in refused.stderr) == (2, True)
