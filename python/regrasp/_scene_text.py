@@ -118,7 +118,7 @@ def _inside(place: Any, part: str, path: str, so_far: str, function: str) -> Any
 
 
 def _index(entries: list[Any], part: str, path: str, so_far: str, function: str) -> int:
-    names = [entry.get("name") if isinstance(entry, dict) else None for entry in entries]
+    names: list[Any] = [cast("Document", entry).get("name") if isinstance(entry, dict) else None for entry in entries]
     if part in names:
         return names.index(part)
     if part.isdigit() and int(part) < len(entries):

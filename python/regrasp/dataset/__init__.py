@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .info import Summary, summary
-    from .make import Made, make
-    from .merge import Merged, merge
+    from .making import Made, make
+    from .merging import Merged, merge
     from .reading import Episode, read_episodes
     from .specification import Replay, Specification, TaskSpec, read_specification, specification_of
-    from .verify import Verdict, verify
+    from .verifying import Verdict, verify
 
 __all__ = [
     "Episode",
@@ -41,20 +41,20 @@ __all__ = [
 
 _HOMES = {
     "Episode": "reading",
-    "Made": "make",
-    "Merged": "merge",
+    "Made": "making",
+    "Merged": "merging",
     "Replay": "specification",
     "Specification": "specification",
     "Summary": "info",
     "TaskSpec": "specification",
-    "Verdict": "verify",
-    "make": "make",
-    "merge": "merge",
+    "Verdict": "verifying",
+    "make": "making",
+    "merge": "merging",
     "read_episodes": "reading",
     "read_specification": "specification",
     "specification_of": "specification",
     "summary": "info",
-    "verify": "verify",
+    "verify": "verifying",
 }
 
 

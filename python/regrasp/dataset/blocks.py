@@ -1,5 +1,8 @@
 """Blocks of episodes: what one worker makes at a time, and what one shard holds."""
 
+# One package, in parts: what is private to it is not private to a part.
+# pyright: reportPrivateUsage=false
+
 from __future__ import annotations
 
 import os

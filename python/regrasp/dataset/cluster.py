@@ -1,12 +1,9 @@
 """The same blocks on Ray: one machine or a cluster. Ray's retries never change results, because a block is the same anywhere."""
 
-# Ray has no types of its own for what is used here.
-# pyright: reportMissingImports=false, reportMissingTypeStubs=false, reportUnknownMemberType=false
-# pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from importlib import import_module
 from typing import Any
 
 from .blocks import Block, run_block
@@ -24,7 +21,7 @@ def run_on_ray(tasks: tuple[TaskSpec, ...], blocks: Iterable[Block], address: st
     Raises `InputError` (D130) where Ray is absent or not there.
     """
     try:
-        import ray
+        ray: Any = import_module("ray")
     except ImportError:
         raise fault("D130", "--ray", "Ray is not installed", fix='pip install "regrasp[ray]"') from None
     began = not ray.is_initialized()

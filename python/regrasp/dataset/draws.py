@@ -94,7 +94,7 @@ def read_draws(table: Table) -> dict[str, Draw]:
 def _read_into(draws: dict[str, Draw], table: Table, prefix: str) -> None:
     for key in table.values:
         name, value = f"{prefix}{key}", table.get(key)
-        kinds = [kind for kind in KINDS if isinstance(value, dict) and kind in value]
+        kinds: list[Kind] = [kind for kind in KINDS if isinstance(value, dict) and kind in value]
         if kinds:
             inside = table.table(key)
             draw = _draw(inside, kinds[0])
@@ -132,8 +132,7 @@ def _range_problem(kind: Kind, values: list[Any]) -> str:
     whole, real = kind == "integer", kind == "log_range"
     expected = "two whole numbers" if whole else "two numbers above 0" if real else "two numbers, or two lists of numbers"
     expected += ", the lower one first"
-    flat = [entry if isinstance(entry, list) else [entry] for entry in values]
-    lists = cast("list[list[Any]]", flat)
+    lists = [cast("list[Any]", entry) if isinstance(entry, list) else [entry] for entry in values]
     if len(lists) != 2 or len(lists[0]) != len(lists[1]) or type(values[0]) is list and kind != "range":
         return expected
     for low, high in zip(*lists):

@@ -59,14 +59,14 @@ def row_of(task: TaskSpec, index: int) -> Row:
             _failed(row, found)
         else:
             _planned(row, task, found, scene)
+        if row["solved"] and task.replay is not None:
+            from .replaying import replayed
+
+            replayed(row, task.replay, scene)
     except InputError as error:
         row.update(outcome="input_refused", message=_first_line(error), causes=canonical([each.code for each in error.diagnostics]))
     except Unpackable as error:
         row.update(outcome="not_storable", message=str(error))
-    if row["solved"] and task.replay is not None:
-        from .replaying import replayed
-
-        replayed(row, task.replay, scene)  # pyright: ignore[reportPossiblyUnbound]
     return row
 
 

@@ -1,14 +1,11 @@
 """Exports to robomimic's HDF5 and to NPZ archives; `docs/reference/dataset-format.md` has the layouts."""
 
-# h5py has no complete types.
-# pyright: reportMissingImports=false, reportMissingTypeStubs=false, reportUnknownMemberType=false
-# pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 import json
 import os
 from collections.abc import Iterable
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +38,7 @@ def export_robomimic(episodes: Iterable[Episode], path: StrPath, *, fps: float =
     Raises `InputError` (D131) where h5py is absent.
     """
     try:
-        import h5py
+        h5py: Any = import_module("h5py")
     except ImportError:
         raise fault("D131", "export", "h5py is not installed", fix="pip install h5py") from None
     target = Path(os.fspath(path))

@@ -14,10 +14,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pyarrow as pa
-import pyarrow.parquet as pq
-
 from .._arguments import StrPath
+from ._arrow import pa, pq
 from .frames import Frames, all_frames
 from .reading import Episode
 from .tables import fault
@@ -81,7 +79,7 @@ class _Writer:
     features: dict[str, Any] = field(default_factory=dict[str, Any])
     n_frames: int = 0
     n_files: int = 0
-    waiting: list[pa.Table] = field(default_factory=list[pa.Table])
+    waiting: list[Any] = field(default_factory=list[Any])
     n_waiting: int = 0
 
     def add(self, frames: Frames) -> None:
@@ -189,7 +187,7 @@ def _features(frames: Frames, named: dict[str, Array]) -> dict[str, Any]:
     return features
 
 
-def _tasks_table(tasks: dict[str, int]) -> pa.Table:
+def _tasks_table(tasks: dict[str, int]) -> Any:
     """A table that pandas reads with the words as its index."""
     index = "__index_level_0__"
     text = {"field_name": index, "name": None, "pandas_type": "unicode", "numpy_type": "object", "metadata": None}

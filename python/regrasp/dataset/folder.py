@@ -22,11 +22,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-import pyarrow as pa
-import pyarrow.parquet as pq
-
 from .. import _regrasp
 from .._model import Gravity, Scene
+from ._arrow import pa, pq
 from .blocks import Block
 from .schema import METADATA_KEY, SCHEMA
 from .specification import Specification, TaskSpec

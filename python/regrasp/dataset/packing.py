@@ -122,7 +122,7 @@ def unpack(row: Mapping[str, Any]) -> dict[str, Any]:
         for i, finger in enumerate(fingers):
             if modes[k, i] == 0:
                 continue
-            contact = {
+            contact: dict[str, Any] = {
                 "hand": hand["name"],
                 "finger": finger,
                 "object": name,

@@ -7,9 +7,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import pyarrow as pa
-import pyarrow.parquet as pq
-
+from ._arrow import pa, pq
 from .packing import DIGITS, Row
 
 #: Of the layout of columns; part of the name of every shard.
@@ -19,7 +17,7 @@ METADATA_KEY = b"regrasp"
 COMPRESSION_LEVEL = 12
 
 _FLOATS = pa.list_(pa.float64())
-FIELDS: tuple[tuple[str, pa.DataType], ...] = (
+FIELDS: tuple[tuple[str, Any], ...] = (
     ("task", pa.string()),
     ("episode", pa.int64()),
     ("key", pa.string()),
@@ -54,7 +52,7 @@ FIELDS: tuple[tuple[str, pa.DataType], ...] = (
     ("contact_modes", pa.list_(pa.int8())),
     *((name, _FLOATS) for name in DIGITS),
 )
-REPLAY_FIELDS: tuple[tuple[str, pa.DataType], ...] = (
+REPLAY_FIELDS: tuple[tuple[str, Any], ...] = (
     ("replay_controller", pa.string()),
     ("replay_friction_scale", pa.float64()),
     ("replay_mass_scale", pa.float64()),

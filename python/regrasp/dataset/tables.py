@@ -107,7 +107,7 @@ class Table:
         expected = ", ".join(f'"{choice}"' for choice in choices) if choices else "a text"
         value = self._checked(key, default, str, expected, fix)
         if choices and value is not None and value not in choices:
-            near = difflib.get_close_matches(value, choices, 1)
+            near: list[str] = difflib.get_close_matches(str(value), choices, 1)
             self.report("D104", key, f'is "{value}"', expected, f'did you mean "{near[0]}"?' if near else "")
             return default
         return value
