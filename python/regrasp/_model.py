@@ -18,7 +18,7 @@ from typing import Any, Literal, cast
 import numpy as np
 import numpy.typing as npt
 
-from . import _regrasp
+from . import _descriptions, _regrasp
 from ._arguments import StrPath, load_options, seed_of
 from ._errors import argument_error
 from ._scene_text import Document, document_of, posed, sections, sized, table_at, toml_of, with_values
@@ -539,6 +539,29 @@ def _load_scene(path: str, packages: dict[str, str], lenient: bool, gravity: Gra
 
 
 def load_hand(path: StrPath, *, packages: Mapping[str, StrPath] | None = None, lenient: bool = False) -> Hand:
-    """Reads a hand file, or a URDF whose fingers are then guessed. Arguments and errors as `load_scene`."""
+    """Reads a hand file, or a URDF whose fingers are then guessed. Arguments and errors as `load_scene`.
+
+    A name of the package `robot_descriptions`, such as "allegro_hand_description", is a hand as well: its files are fetched once.
+    Raises `ImportError` where that package, or `mujoco` for a MJCF file of it, is not installed.
+    """
+    if isinstance(path, str) and _descriptions.is_description(path):
+        return _load_described(path, packages, lenient)
     native = _regrasp.Hand.load(os.fspath(path), load_options("load_hand", packages, lenient))
+    return Hand(native.tips, json.loads(native.describe()))
+
+
+def _load_described(name: str, packages: Mapping[str, StrPath] | None, lenient: bool) -> Hand:
+    """The hand that `robot_descriptions` calls `name`."""
+    module = _descriptions.fetched(name)
+    file = _descriptions.model_file(module)
+    own, search = _descriptions.packages_of(module)
+    folder = None
+    if file == getattr(module, "MJCF_PATH", None):
+        file, folder = _descriptions.converted(file)
+    try:
+        named, more, is_lenient = load_options("load_hand", {**own, **(packages or {})}, lenient)
+        native = _regrasp.Hand.load(file, (named, [*search, *more], is_lenient))
+    finally:
+        if folder is not None:
+            folder.cleanup()
     return Hand(native.tips, json.loads(native.describe()))

@@ -2,7 +2,20 @@
 
 from typing import Any, final
 
-__all__ = ["Hand", "Plan", "Scene", "__version__", "_panic_for_tests", "check", "find_scene", "page", "parse_toml", "plan", "storyboard"]
+__all__ = [
+    "Hand",
+    "Plan",
+    "Scene",
+    "__version__",
+    "_panic_for_tests",
+    "check",
+    "find_scene",
+    "hand_file",
+    "page",
+    "parse_toml",
+    "plan",
+    "storyboard",
+]
 
 __version__: str
 
@@ -47,6 +60,7 @@ class Plan:
     def header(self) -> str: ...
     def arrays(self) -> dict[str, tuple[str, list[int], bytes]]: ...
 
+def hand_file(path: str, options: _Options, urdf: str, allow: list[tuple[str, str]]) -> tuple[str, list[str]]: ...
 def plan(scene: Scene, request: dict[str, Any]) -> tuple[Plan | None, str]: ...
 def check(plan: Plan, scene: Scene, level: str) -> str: ...
 def parse_toml(text: str, path: str, code: str) -> str: ...

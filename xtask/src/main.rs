@@ -6,6 +6,7 @@ mod campaign;
 mod reference;
 mod replay;
 mod run;
+mod scans;
 
 use run::Outcome;
 use std::process::ExitCode;
@@ -14,7 +15,7 @@ use std::process::ExitCode;
 type Task = (&'static str, &'static str, fn(&[String]) -> Outcome);
 
 /// All tasks, in the order in which `cargo xtask` lists them.
-const TASKS: [Task; 11] = [
+const TASKS: [Task; 12] = [
     (
         "reference",
         "write the generated pages of docs/reference (--check: fail if they are out of date)",
@@ -28,6 +29,7 @@ const TASKS: [Task; 11] = [
         bench::roadmaps,
     ),
     ("growth", "measure how loading and planning grow with fingers, triangles, obstacles and threads", bench::growth),
+    ("bench-scans", "turn scanned objects that are not convex in the Allegro hand", scans::task),
     ("benchmark-page", "write docs/benchmarks.md from what was measured", bench::page),
     ("replay", "replay plans in MuJoCo: six scenes, negative controls, and all in-hand scenes", replay::in_hand),
     ("replay-tracking", "replay tracking plans in MuJoCo", replay::tracking),

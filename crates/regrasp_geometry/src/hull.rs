@@ -120,6 +120,11 @@ impl ConvexHull {
         Ok(ConvexHull { vertices, triangles, starts, neighbours })
     }
 
+    /// The same polyhedron with every corner moved by one rigid motion, `place`.
+    pub fn moved(&self, place: impl Fn(&Point) -> Point) -> Self {
+        ConvexHull { vertices: self.vertices.iter().map(place).collect(), ..self.clone() }
+    }
+
     /// The vertices, in the hull's frame.
     pub fn vertices(&self) -> &[Point] {
         &self.vertices

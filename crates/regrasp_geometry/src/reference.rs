@@ -16,9 +16,11 @@ use parry3d_f64::query::PointQuery;
 use parry3d_f64::query::epa::EPA;
 use parry3d_f64::query::gjk::{self, CsoPoint, GJKResult, VoronoiSimplex};
 use parry3d_f64::shape::{ConvexPolyhedron, SupportMap, TriMesh, TriMeshFlags};
+use polyhedron::Polyhedron;
 use std::cell::Cell;
 
 mod inside;
+mod polyhedron;
 #[cfg(test)]
 mod tests;
 
@@ -112,7 +114,7 @@ enum Core {
     Box { half_extents: ParryVector },
     Cylinder { half_length: f64, radius: f64 },
     Ellipsoid { radii: ParryVector },
-    Polyhedron(Box<ConvexPolyhedron>),
+    Polyhedron(Box<Polyhedron>),
     Triangle([ParryVector; 3]),
 }
 
@@ -170,7 +172,7 @@ impl ReferenceShape {
                     let reason = "it is not a closed convex polyhedron".to_owned();
                     ReferenceError::Refused { kind: shape.kind(), reason }
                 })?;
-                convex(Core::Polyhedron(Box::new(polyhedron)), 0.0)
+                convex(Core::Polyhedron(Box::new(Polyhedron::new(polyhedron, hull.triangles()))), 0.0)
             }
             Shape::Mesh(mesh) => PreparedShape::Mesh(Box::new(MeshBody::new(mesh)?)),
         };

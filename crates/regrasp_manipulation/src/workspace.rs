@@ -15,6 +15,8 @@ mod draws;
 mod nearby;
 /// How far tips may be from where they rest.
 mod reach;
+/// What is in the way of contacts.
+pub mod tried;
 
 use crate::forces::limits::Refusals;
 use crate::grasp::state::{Contacts, GraspState, HandJoints};
@@ -25,6 +27,7 @@ use nearby::Nearby;
 use regrasp_geometry::collision::{HalfSpace, Placed, Placement, Separation, gap_along, separation};
 use regrasp_geometry::{Pose, Vector, frame};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
+use tried::Tried;
 
 /// What the fingertips do during a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,6 +101,8 @@ pub struct Workspace<'a> {
     pub work: u64,
     /// What draws of contacts cost.
     pub draws: Draws,
+    /// Contacts that fingers came to, and what was in the way there.
+    pub tried: Tried,
     /// Grasps refused for want of forces.
     pub refusals: Refusals,
     /// The pair that stopped the last failed step.
@@ -132,6 +137,7 @@ impl<'a> Workspace<'a> {
             rrt_iterations: model.settings.rrt_iterations,
             work: 0,
             draws: Draws::default(),
+            tried: Tried::default(),
             refusals: Refusals::default(),
             blocking_pair: None,
             blocking_index: 0,
@@ -305,7 +311,10 @@ impl<'a> Workspace<'a> {
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
         self.slack[pair] = f64::NEG_INFINITY;
+        // Hollows are narrow beside long steps: there the triangles are asked about the end alone.
+        self.stands = self.model.folds;
         let is_clear = self.pair_is_clear(pair, mode);
+        self.stands = false;
         self.slack[pair] = f64::NEG_INFINITY;
         is_clear
     }
@@ -536,8 +545,12 @@ impl<'a> Workspace<'a> {
         let body = &model.bodies[other];
         let now = self.now.at(model, mesh).inverse_then(self.now.at(model, other));
         let next = self.next.at(model, mesh).inverse_then(self.next.at(model, other));
-        let relative_motion =
-            now.displacement(&next, &body.center, body.radius) + self.deviation_of(mesh) + self.deviation_of(other);
+        let relative_motion = match self.stands {
+            true => 0.0,
+            false => {
+                now.displacement(&next, &body.center, body.radius) + self.deviation_of(mesh) + self.deviation_of(other)
+            }
+        };
         // Whatever the moment, one of the two ends is at most half of the motion away.
         let needed = required + 0.5 * relative_motion;
         let mut smallest = 0.0;

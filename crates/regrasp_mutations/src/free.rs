@@ -52,7 +52,7 @@ impl Breeder<'_> {
             let depth = rng.uniform(0.0, 0.2e-3);
             let waypoint = &mut plan.segments[s].waypoints[w];
             let (foot, normal) = beneath(model, &task, waypoint, f)?;
-            let center = foot + normal * (model.fingers[f].radius - depth);
+            let center = foot + normal * (model.fingers[f].ball_radius() - depth);
             let target = Pose::from(&waypoint.world_from_object) * center;
             move_tip(model, f, &mut waypoint.joints, &target)
         });

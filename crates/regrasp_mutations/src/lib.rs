@@ -13,6 +13,8 @@ mod edit;
 mod forces;
 /// Fingers that are free, and fingers that are said to be.
 mod free;
+/// Grasp lists.
+pub mod grasps;
 /// Good plans in hands of other contacts and couplings.
 mod hand;
 /// Names, promises, inputs.

@@ -56,7 +56,7 @@ impl Breeder<'_> {
             let hand_may_touch = task.hand().may_touch(model.fingers[f].tip_link, model.fingers[other].tip_link);
             let target = model.fingers[other].center_in_world(&waypoint.joints);
             let here = model.fingers[f].center_in_world(&waypoint.joints);
-            let reach = (model.fingers[f].radius + model.fingers[other].radius - 1e-3).max(1e-3);
+            let reach = (model.fingers[f].ball_radius() + model.fingers[other].ball_radius() - 1e-3).max(1e-3);
             if hand_may_touch || waypoint.contacts[f].holds() {
                 return None;
             }

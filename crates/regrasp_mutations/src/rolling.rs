@@ -148,7 +148,9 @@ pub(super) fn slide(
     let normal = match model.fingers[f].surface {
         TipSurface::Ball => UnitVector::new_normalize(center - foot).into_inner(),
         // Its centre is not over its contact; the surface is smooth where fingers roll.
-        TipSurface::Ellipsoid { .. } => surface::nearest(shape, &foot).normals.first()?.normalize(),
+        TipSurface::Ellipsoid { .. } | TipSurface::Smooth(_) => {
+            surface::nearest(shape, &foot).normals.first()?.normalize()
+        }
     };
     let away = model.fingers[f].center_from_contact(waypoint, &normal);
     (waypoint.contacts[f].point_in_object, waypoint.contacts[f].normal_in_object) =
@@ -157,7 +159,7 @@ pub(super) fn slide(
     move_tip(model, f, &mut waypoint.joints, &target)
 }
 
-/// The arc on the ball of finger `f` that its link's turn sweeps, seen from the object and across the first contact's
+/// The arc on the tip of finger `f` that its link's turn sweeps at least, seen from the object and across the first contact's
 /// normal.
 fn arc_between(model: &CheckedHand, f: usize, from: &Waypoint, to: &Waypoint) -> Option<f64> {
     let normal = contact_of(&from.contacts[f])?.normal_in_object.into_inner();
@@ -167,7 +169,11 @@ fn arc_between(model: &CheckedHand, f: usize, from: &Waypoint, to: &Waypoint) ->
         Pose::from(&waypoint.world_from_object).rotation.inverse() * world_from_link.rotation
     });
     let turn = (after * before.inverse()).scaled_axis();
-    Some(model.fingers[f].radius * turn.cross(&normal).norm())
+    let radius = match &model.fingers[f].surface {
+        TipSurface::Ball | TipSurface::Ellipsoid { .. } => model.fingers[f].radius,
+        TipSurface::Smooth(smooth) => smooth.rounding(),
+    };
+    Some(radius * turn.cross(&normal).norm())
 }
 
 /// Some when the link of finger `f` turns so much over its contact that the tip must slide, if the contact stays.

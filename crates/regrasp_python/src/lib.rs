@@ -31,7 +31,7 @@ mod _regrasp {
     #[pymodule_export]
     use super::guard::panic_for_tests;
     #[pymodule_export]
-    use super::model::{Hand, Scene};
+    use super::model::{Hand, Scene, hand_file};
     #[pymodule_export]
     use super::plan::Plan;
     #[pymodule_export]

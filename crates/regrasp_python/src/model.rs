@@ -6,9 +6,10 @@ use crate::guard::guarded;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use regrasp::base::files;
-use regrasp::base::{Diagnostic, Place};
+use regrasp::base::{Diagnostic, Place, Rng};
 use regrasp::geometry::Pose;
 use regrasp::robot::import::{KeptFiles, LoadOptions, ResolveOptions, load_hand};
+use regrasp::robot::inspect::{InspectSettings, hand_file_text, inspect_hand};
 use regrasp::scene::{Gravity, InputFile, LoadedScene, Stock, Task, load_scene_with};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -240,6 +241,31 @@ impl Hand {
     fn tips<'py>(&self, py: Python<'py>, joints: &[u8]) -> PyResult<Bound<'py, PyBytes>> {
         guarded(py, || tips(py, &self.hand, &Pose::identity(), joints))
     }
+}
+
+/// The text of a hand file about the URDF at `path`, as `regrasp inspect` writes it, and the remarks of the reader.
+///
+/// `urdf` is how the file names it. `allow` are names of links that may touch; names of links that there are not are passed over.
+#[pyfunction]
+pub fn hand_file(
+    py: Python<'_>,
+    path: PathBuf,
+    options: Options,
+    urdf: &str,
+    allow: Vec<(String, String)>,
+) -> PyResult<(String, Vec<String>)> {
+    guarded(py, || {
+        let options = load_options(options);
+        let written = py.detach(|| {
+            let loaded = load_hand(&path, &options)?;
+            let table = inspect_hand(&loaded.hand, &InspectSettings::default(), &mut Rng::keyed(0, "inspect", 0));
+            let mut pairs = table.pairs.always_ids;
+            let link = |name: &String| loaded.hand.robot.link_named(name);
+            pairs.extend(allow.iter().filter_map(|(a, b)| link(a).zip(link(b))).map(|(a, b)| (a.min(b), a.max(b))));
+            Ok((hand_file_text(&loaded.hand, urdf, &pairs), loaded.notes))
+        });
+        written.map_err(|error: regrasp::InputError| error::input(py, &error))
+    })
 }
 
 fn tips<'py>(

@@ -5,7 +5,11 @@ use crate::robot::LinkId;
 use nalgebra::{Matrix3, SMatrix, SVector, Translation3, UnitQuaternion};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{ConvexHull, Point, Pose, Shape, UnitVector, Vector};
+use smooth_hull::SmoothHull;
 use std::sync::Arc;
+
+/// Smooth surfaces near convex polyhedra.
+pub mod smooth_hull;
 
 /// What the fingertip is, for contact.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,21 +23,70 @@ pub enum TipShape {
     },
     /// An ellipsoid: contact anywhere on it that the object's normal selects.
     Ellipsoid(TipEllipsoid),
-    /// The convex hull of the tip link's own collision geometry, about [`Tip::center_in_body`] and in the axes of that body.
-    /// It touches where the ellipsoid does that lies nearest to it over the pad.
+    /// The convex hull of collision geometry of the tip link, about [`Tip::center_in_body`] and in the axes of that body. It
+    /// touches where a smooth surface near it does.
     Hull {
         /// The hull.
         hull: Arc<ConvexHull>,
-        /// See [`fit`].
-        fitted: TipEllipsoid,
-        /// How far it is off the hull over the pad, in metres; scenes refuse more than [`LARGEST_MISFIT`].
+        /// The surface that touches.
+        surface: HullSurface,
+        /// How far that is off the hull over the pad, in metres; scenes refuse more than [`LARGEST_MISFIT`].
         misfit: f64,
+        /// Which `<collision>` elements of the tip link it is made of, from 0; all of them where empty.
+        elements: Vec<usize>,
     },
 }
 
-/// Most that the hull of a tip may differ from an ellipsoid over its pad, in metres: what fingertips may press into objects by
-/// default is 0.3 mm.
+/// The smooth surface that stands for the hull of a tip.
+#[derive(Debug, Clone, PartialEq)]
+pub enum HullSurface {
+    /// The ellipsoid nearest to it over the pad, where that is within [`ELLIPSOID_FITS`]. See [`fit`].
+    Ellipsoid(TipEllipsoid),
+    /// A smooth surface that follows any hull.
+    Smooth(Arc<SmoothHull>),
+}
+
+/// Most that the smooth surface of a tip may differ from its hull over the pad, in metres: what fingertips may press into
+/// objects by default is 0.3 mm.
 pub const LARGEST_MISFIT: f64 = 0.2e-3;
+
+/// Most that an ellipsoid may differ from a hull for which it stands, over the pad, in metres.
+pub const ELLIPSOID_FITS: f64 = 0.1e-3;
+
+/// A curved fingertip that is no ball: the point that touches depends on how its link stands.
+#[derive(Debug, Clone, Copy)]
+pub enum CurvedTip<'a> {
+    /// An ellipsoid.
+    Ellipsoid(&'a TipEllipsoid),
+    /// A smooth surface near the hull of a mesh.
+    Smooth(&'a SmoothHull),
+}
+
+impl<'a> From<&'a TipEllipsoid> for CurvedTip<'a> {
+    fn from(ellipsoid: &'a TipEllipsoid) -> Self {
+        CurvedTip::Ellipsoid(ellipsoid)
+    }
+}
+
+impl CurvedTip<'_> {
+    /// From the centre to the point whose outward normal is `normal_in_body`, a unit vector; in the same frame.
+    #[inline]
+    pub fn arm(&self, normal_in_body: &Vector) -> Vector {
+        match self {
+            CurvedTip::Ellipsoid(ellipsoid) => ellipsoid.arm(normal_in_body),
+            CurvedTip::Smooth(surface) => surface.point(normal_in_body),
+        }
+    }
+
+    /// Radius of a ball that stands for the tip when contacts are drawn: for an ellipsoid one that holds it where it touches.
+    /// Faces of meshes are nearly flat; there it is the distance of the tip's farthest point from its centre.
+    pub fn settle_radius(&self) -> f64 {
+        match self {
+            CurvedTip::Ellipsoid(ellipsoid) => ellipsoid.flattest(),
+            CurvedTip::Smooth(surface) => surface.reach(),
+        }
+    }
+}
 
 /// An ellipsoid about [`Tip::center_in_body`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -110,15 +163,21 @@ impl Tip {
         match &self.shape {
             TipShape::Point => 0.0,
             TipShape::Sphere { radius } => *radius,
-            TipShape::Ellipsoid(ellipsoid) | TipShape::Hull { fitted: ellipsoid, .. } => ellipsoid.radii.max(),
+            TipShape::Ellipsoid(ellipsoid) | TipShape::Hull { surface: HullSurface::Ellipsoid(ellipsoid), .. } => {
+                ellipsoid.radii.max()
+            }
+            TipShape::Hull { surface: HullSurface::Smooth(surface), .. } => surface.reach(),
         }
     }
 
-    /// The ellipsoid that touches, for tips that are neither balls nor sharp.
-    pub fn ellipsoid(&self) -> Option<&TipEllipsoid> {
+    /// The surface that touches, for tips that are neither balls nor sharp.
+    pub fn curved(&self) -> Option<CurvedTip<'_>> {
         match &self.shape {
             TipShape::Point | TipShape::Sphere { .. } => None,
-            TipShape::Ellipsoid(ellipsoid) | TipShape::Hull { fitted: ellipsoid, .. } => Some(ellipsoid),
+            TipShape::Ellipsoid(ellipsoid) | TipShape::Hull { surface: HullSurface::Ellipsoid(ellipsoid), .. } => {
+                Some(CurvedTip::Ellipsoid(ellipsoid))
+            }
+            TipShape::Hull { surface: HullSurface::Smooth(surface), .. } => Some(CurvedTip::Smooth(surface)),
         }
     }
 
@@ -248,7 +307,7 @@ pub fn fit(points: &[Point], pad: Option<&Pad>) -> Option<Fit> {
 }
 
 /// Unit vectors spread evenly over the sphere, by a spiral of golden angles.
-fn spiral(n: usize) -> impl Iterator<Item = Vector> {
+pub(crate) fn spiral(n: usize) -> impl Iterator<Item = Vector> {
     const GOLDEN_ANGLE: f64 = 2.399963229728653;
     (0..n).map(move |k| {
         let z = 1.0 - (2 * k + 1) as f64 / n as f64;

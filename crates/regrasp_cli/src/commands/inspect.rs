@@ -9,6 +9,7 @@ use crate::stop::Stop;
 use crate::talk::Talk;
 use crate::words::{counted, grouped};
 use regrasp::base::{Rng, files};
+use regrasp::robot::import::LoadOptions;
 use regrasp::robot::inspect::{
     HandInspection, InspectSettings, Inspection, JointRow, RobotInspection, hand_file_text, inspect,
 };
@@ -24,10 +25,15 @@ pub fn run(arguments: &args::Inspect, common: &Common, talk: &Talk) -> Result<()
     if let Some(path) = &arguments.output {
         refuse_unwritable(path)?;
     }
+    let is_hand_file = arguments.urdf.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
+    if arguments.base.is_some() && is_hand_file {
+        return Err(Stop::argument("A505", "--base", "stands beside a hand file", "a URDF; hand files say base_link"));
+    }
     interrupt::flag()?;
     let settings = InspectSettings { n_postures: arguments.samples as usize };
     let mut rng = Rng::keyed(arguments.seed, "inspect", 0);
-    let found = inspect(&arguments.urdf, &load::options(common), &settings, &mut rng)?;
+    let options = LoadOptions { base: arguments.base.clone(), ..load::options(common) };
+    let found = inspect(&arguments.urdf, &options, &settings, &mut rng)?;
     if let Some(path) = &arguments.output {
         refuse_input(path, found.inputs.iter().map(|input| input.path.as_path()))?;
     }
@@ -151,6 +157,13 @@ fn hand_part(model: &Hand, hand: &HandInspection, out: &mut String) {
             "sphere" => format!("ball of radius {:.1} mm", 1e3 * finger.tip_radius),
             shape => shape.to_owned(),
         };
+        let tip = match finger.tip.error {
+            Some(error) if finger.tip_shape == "mesh" => {
+                format!("{tip}, {} within {:.2} mm of its hull", finger.tip.surface, 1e3 * error)
+            }
+            Some(error) => format!("{tip}, within {:.2} mm of the link", 1e3 * error),
+            None => tip,
+        };
         let _ = writeln!(
             out,
             "  {:<10}  tip {} ({tip}), at rest at {}  joints {}",
@@ -159,6 +172,18 @@ fn hand_part(model: &Hand, hand: &HandInspection, out: &mut String) {
             metres(tip_at_rest),
             finger.joints.join(", ")
         );
+        for one in &finger.tip.stands_out {
+            let _ = writeln!(
+                out,
+                "              collision element {} of {} stands out of the {} by {:.2} mm where it may touch: {}, most at {}",
+                one.element,
+                finger.tip_link,
+                finger.tip.surface,
+                1e3 * one.by,
+                counted(one.n_faces, "face"),
+                metres(&one.at)
+            );
+        }
     }
     if !at_rest.is_empty() {
         let sum = at_rest.iter().fold([0.0; 3], |sum, tip| std::array::from_fn(|axis| sum[axis] + tip[axis]));

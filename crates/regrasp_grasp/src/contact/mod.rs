@@ -10,10 +10,12 @@ pub mod frictionless;
 pub mod kinematics;
 /// Balls that roll on surfaces.
 pub mod rolling;
-/// Ellipsoids that roll.
+/// Ellipsoids, and other curved tips that are no balls, that roll.
 pub mod rolling_ellipsoid;
 /// Soft finger with elliptic torsion.
 pub mod soft_finger;
+/// Where smooth hulls touch.
+mod touch_smooth;
 
 pub use regrasp_robot::ContactModel;
 

@@ -6,18 +6,18 @@
 //! carried without slip: `T1 p - T0 p` has no part across the normal half-way. A midpoint rule, of second order, the same
 //! both ways.
 
-use super::Contact;
+use super::{Contact, touch_smooth};
 use nalgebra::Matrix3;
 use regrasp_geometry::surface::{Surface, SurfacePoint};
 use regrasp_geometry::{Point, UnitVector, Vector};
-use regrasp_robot::tip::TipEllipsoid;
+use regrasp_robot::tip::{CurvedTip, TipEllipsoid};
 
-/// How an ellipsoid stands and which way it touches, seen from the object.
+/// How a tip stands and which way it touches, seen from the object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stance {
     /// Its centre, in the object frame.
     pub center: Point,
-    /// Rotation of the frame in which the ellipsoid is given, in the object frame.
+    /// Rotation of the frame in which the tip is given, in the object frame.
     pub object_from_link: Matrix3<f64>,
     /// Outward normal of the object where they touch, in the object frame.
     pub normal: Vector,
@@ -25,12 +25,12 @@ pub struct Stance {
 
 impl Stance {
     /// The touching point of the tip as seen from its centre, in the object frame.
-    pub fn arm(&self, tip: &TipEllipsoid) -> Vector {
-        self.object_from_link * tip.arm(&-self.object_from_link.tr_mul(&self.normal))
+    pub fn arm<'a>(&self, tip: impl Into<CurvedTip<'a>>) -> Vector {
+        self.object_from_link * tip.into().arm(&-self.object_from_link.tr_mul(&self.normal))
     }
 }
 
-/// An ellipsoid near the surface.
+/// A tip near the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touch {
     /// How it stands, with the normal of the nearest points.
@@ -45,9 +45,16 @@ pub struct Touch {
 const MAX_GUESSES: usize = 60;
 
 impl Touch {
-    /// The touch of an ellipsoid at `stance`, whose normal is the first guess. None inside the object, and where guesses do
-    /// not settle: in hollows narrower than the ellipsoid is curved.
-    pub fn of(surface: &Surface, tip: &TipEllipsoid, stance: &Stance) -> Option<Self> {
+    /// The touch of a tip at `stance`, whose normal is the first guess. None inside the object, and where guesses do not
+    /// settle: in hollows narrower than the tip is curved.
+    pub fn of<'a>(surface: &Surface, tip: impl Into<CurvedTip<'a>>, stance: &Stance) -> Option<Self> {
+        match tip.into() {
+            CurvedTip::Ellipsoid(tip) => Touch::of_ellipsoid(surface, tip, stance),
+            CurvedTip::Smooth(tip) => touch_smooth::touch(surface, tip, stance),
+        }
+    }
+
+    fn of_ellipsoid(surface: &Surface, tip: &TipEllipsoid, stance: &Stance) -> Option<Self> {
         let inner = 0.5 * (tip.flattest() + tip.sharpest());
         let mut stance = *stance;
         for _ in 0..MAX_GUESSES {
@@ -75,9 +82,10 @@ impl Touch {
     }
 }
 
-/// What is left of a step's motion when rolling is taken off: the slip of the ellipsoid over the object, in the object frame,
-/// in metres.
-pub fn slip(tip: &TipEllipsoid, from: &Stance, to: &Stance) -> Vector {
+/// What is left of a step's motion when rolling is taken off: the slip of the tip over the object, in the object frame, in
+/// metres.
+pub fn slip<'a>(tip: impl Into<CurvedTip<'a>>, from: &Stance, to: &Stance) -> Vector {
+    let tip = tip.into();
     let half_way = from.object_from_link.tr_mul(&from.normal) + to.object_from_link.tr_mul(&to.normal);
     let touching = tip.arm(&-half_way.normalize());
     let way = to.center + to.object_from_link * touching - (from.center + from.object_from_link * touching);

@@ -16,6 +16,7 @@ use regrasp_grasp::contact::rolling_ellipsoid;
 use regrasp_grasp::contact::rolling_ellipsoid::Stance;
 use regrasp_robot::kinematics::body_frame::BodyFrame;
 use regrasp_robot::kinematics::finger_ik::{Asked, AskedTurn, Coordinates, IkSettings, Preference};
+use regrasp_robot::tip::CurvedTip;
 
 /// Slip that one step may leave: segments have up to some hundred steps, and parts of a step hide some of it.
 const STEP_SLIP: f64 = 0.002 * SLIP_TOLERANCE;
@@ -27,6 +28,10 @@ pub const STEP_SPIN: f64 = 2e-5;
 /// allegro/apple_x, where two parts leave 62 um over a segment.
 const PARTS: usize = 2;
 const PARTS_ON_MESH: usize = 6;
+/// Parts at most where they are halved until the sum settles, and the change, as a share of the slip allowed, at which it has:
+/// the next change is a quarter of it.
+const MOST_PARTS: usize = 32;
+const SETTLED: f64 = 1.0;
 
 /// Share of the way to the preferred direction that one step of a redundant finger takes: less than where contacts are
 /// fixed, as the tip rolls with it.
@@ -108,7 +113,7 @@ impl<'a> RollStep<'a> {
         let normal = contact.normal_in_object.into_inner();
         let link = of_hand.ik.chain().last_frame(joints);
         let object_from_link = from.rotation.tr_mul(&link.rotation);
-        let center = match of_hand.ellipsoid {
+        let center = match of_hand.curved {
             None => contact.point_in_object + normal * of_hand.tip_radius,
             Some(_) => from.point_to_child(&link.point(of_hand.ik.center_in_body())),
         };
@@ -138,8 +143,8 @@ impl<'a> RollStep<'a> {
 
     fn slip(&self, from: &Stance, to: &Stance) -> Vector {
         let finger = &self.model.fingers[self.finger];
-        match finger.ellipsoid {
-            Some(ellipsoid) => rolling_ellipsoid::slip(ellipsoid, from, to),
+        match finger.curved {
+            Some(tip) => rolling_ellipsoid::slip(tip, from, to),
             None => {
                 let turn = turn_between(&from.object_from_link, &to.object_from_link);
                 let ball = |at: &Stance| Ball { center: at.center, normal: at.normal };
@@ -160,7 +165,7 @@ impl<'a> RollStep<'a> {
             let slipped = self.slip(&self.start, &touch.stance) + error.way;
             let off = slipped - normal * normal.dot(&slipped) + normal * touch.gap;
             end = Some(touch);
-            let arm = match finger.ellipsoid {
+            let arm = match finger.curved {
                 None => -self.to.vector(&(normal * finger.tip_radius)),
                 Some(_) => finger.arm(link, &self.to.vector(&normal)),
             };
@@ -168,7 +173,7 @@ impl<'a> RollStep<'a> {
                 axis: self.to.vector(&normal),
                 left: -self.spin(&self.start, &touch.stance) - error.spin,
             });
-            Some(Asked { error: -self.to.vector(&off), arm, turn })
+            Some(Asked { error: -self.to.vector(&off), arm, travel: None, turn })
         };
         let joints = finger.ik.follow(near, settings, asked)?;
         let end = end.filter(|end: &Touching| {
@@ -209,8 +214,35 @@ impl<'a> RollStep<'a> {
 
     /// Slip over parts of the step, while the joints move linearly: what the rule over the whole of it leaves out. None where
     /// the tip is farther from the surface than `allowed`, or deeper, or touches outside its pad, at the end of a part.
+    ///
+    /// Where the tip may be nearly flat the parts are halved until the sum settles: contacts sweep over such faces.
     fn slip_over_parts(&self, end: &Rolled, between: &impl Fn(f64) -> Placement, allowed: f64) -> Option<Slipped> {
-        let n_parts = if self.model.view.object.surface.mesh().is_some() { PARTS_ON_MESH } else { PARTS };
+        let usual = if self.model.view.object.surface.mesh().is_some() { PARTS_ON_MESH } else { PARTS };
+        let mut sum = self.slip_over(end, between, allowed, usual)?;
+        if !matches!(self.model.fingers[self.finger].curved, Some(CurvedTip::Smooth(_))) {
+            return Some(sum);
+        }
+        let mut n_parts = usual;
+        while n_parts < MOST_PARTS {
+            n_parts *= 2;
+            let finer = self.slip_over(end, between, allowed, n_parts)?;
+            let change = finer.way - sum.way;
+            sum = finer;
+            if change.norm() <= SETTLED * STEP_SLIP {
+                return Some(sum);
+            }
+        }
+        None
+    }
+
+    /// The same over so many parts, an even number.
+    fn slip_over(
+        &self,
+        end: &Rolled,
+        between: &impl Fn(f64) -> Placement,
+        allowed: f64,
+        n_parts: usize,
+    ) -> Option<Slipped> {
         let finger = &self.model.fingers[self.finger];
         let chain = finger.ik.chain();
         let mut before = self.start;
@@ -247,15 +279,15 @@ impl FingerModel<'_> {
     fn touch(&self, surface: &Surface, link: &BodyFrame, object: &Placement, normal: &Vector) -> Option<Touching> {
         let center = object.point_to_child(&link.point(self.ik.center_in_body()));
         let object_from_link = object.rotation.tr_mul(&link.rotation);
-        match self.ellipsoid {
+        match self.curved {
             None => {
                 let touch = Touch::of(surface, &center)?;
                 let stance = Stance { center, object_from_link, normal: touch.ball.normal };
                 Some(Touching { stance, foot: touch.foot, gap: touch.distance - self.tip_radius })
             }
-            Some(ellipsoid) => {
+            Some(tip) => {
                 let stance = Stance { center, object_from_link, normal: *normal };
-                let touch = rolling_ellipsoid::Touch::of(surface, ellipsoid, &stance)?;
+                let touch = rolling_ellipsoid::Touch::of(surface, tip, &stance)?;
                 Some(Touching { stance: touch.stance, foot: touch.foot, gap: touch.gap })
             }
         }
@@ -268,7 +300,7 @@ impl FingerModel<'_> {
         let (foot, distance) = surface.project_signed(&center);
         let away = UnitVector::try_new(center - foot.point_in_object, 1e-6).filter(|_| self.tip_radius > 0.0);
         let normal_in_object = away.unwrap_or(foot.normal_in_object);
-        if self.ellipsoid.is_none() {
+        if self.curved.is_none() {
             let point_in_object = center - normal_in_object.into_inner() * self.tip_radius;
             return Some((Contact { point_in_object, normal_in_object }, distance - self.tip_radius));
         }

@@ -7,8 +7,8 @@ use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Point, Vector};
 use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::body_frame::BodyFrame;
-use regrasp_robot::kinematics::finger_ik::{Asked, Coordinates, IkSettings};
-use regrasp_robot::tip::TipEllipsoid;
+use regrasp_robot::kinematics::finger_ik::{Asked, AskedTravel, Coordinates, IkSettings};
+use regrasp_robot::tip::CurvedTip;
 
 /// Largest change of a joint between a posture that is nearly right and the one that touches, in radians or metres.
 const LARGEST_CORRECTION: f64 = 0.6;
@@ -18,8 +18,8 @@ impl FingerModel<'_> {
     /// parent.
     #[inline]
     pub fn arm(&self, link: &BodyFrame, normal: &Vector) -> Vector {
-        match self.ellipsoid {
-            Some(ellipsoid) => arm_of(ellipsoid, link, normal),
+        match self.curved {
+            Some(tip) => arm_of(tip, link, normal),
             None => -normal * self.tip_radius,
         }
     }
@@ -27,8 +27,8 @@ impl FingerModel<'_> {
     /// As [`FingerModel::arm`], with the link where `joints` have it.
     #[inline]
     pub fn arm_with(&self, joints: &[f64], normal: &Vector) -> Vector {
-        match self.ellipsoid {
-            Some(ellipsoid) => arm_of(ellipsoid, &self.ik.chain().last_frame(joints), normal),
+        match self.curved {
+            Some(tip) => arm_of(tip, &self.ik.chain().last_frame(joints), normal),
             None => -normal * self.tip_radius,
         }
     }
@@ -43,10 +43,10 @@ impl FingerModel<'_> {
     #[inline]
     pub fn center_over(&self, world_from_object: &Placement, contact: &Contact) -> Point {
         let normal = contact.normal_in_object.into_inner();
-        match self.ellipsoid {
+        match self.curved {
             None => world_from_object.point(&(contact.point_in_object + normal * self.tip_radius)),
-            Some(ellipsoid) => {
-                let arm = arm_of(ellipsoid, &self.link_at_rest, &world_from_object.vector(&normal));
+            Some(tip) => {
+                let arm = arm_of(tip, &self.link_at_rest, &world_from_object.vector(&normal));
                 world_from_object.point(&contact.point_in_object) - arm
             }
         }
@@ -55,7 +55,7 @@ impl FingerModel<'_> {
     /// Centre of the tip that touches `contact` with `joints`, in the world.
     #[inline]
     pub fn center_touching(&self, world_from_object: &Placement, contact: &Contact, joints: &[f64]) -> Point {
-        match self.ellipsoid {
+        match self.curved {
             None => self.center_over(world_from_object, contact),
             Some(_) => {
                 let normal = world_from_object.vector(&contact.normal_in_object);
@@ -73,15 +73,15 @@ impl FingerModel<'_> {
         seed: &[f64],
         settings: &IkSettings,
     ) -> Option<Coordinates> {
-        let joints = match self.ellipsoid {
+        let joints = match self.curved {
             None => self.ik.solve_near(&self.center_over(world_from_object, contact), seed, settings)?,
-            Some(ellipsoid) => {
+            Some(tip) => {
                 let point = world_from_object.point(&contact.point_in_object);
                 let normal = world_from_object.vector(&contact.normal_in_object);
                 let asked = |link: &BodyFrame| {
-                    let arm = arm_of(ellipsoid, link, &normal);
+                    let (arm, travel) = arm_and_travel(tip, link, &normal);
                     let error = point - (link.point(self.ik.center_in_body()) + arm);
-                    Some(Asked { error, arm, turn: None })
+                    Some(Asked { error, arm, travel, turn: None })
                 };
                 self.ik.follow(seed, settings, asked)?
             }
@@ -98,7 +98,7 @@ impl FingerModel<'_> {
         rng: &mut Rng,
     ) -> Option<Coordinates> {
         let joints = self.ik.solve_random(&self.center_over(world_from_object, contact), settings, rng)?;
-        match self.ellipsoid {
+        match self.curved {
             None => self.faces(world_from_object, contact, joints),
             Some(_) => {
                 let settings = IkSettings { max_step: LARGEST_CORRECTION, ..*settings };
@@ -116,12 +116,12 @@ impl FingerModel<'_> {
     /// True unless it is known that the tip reaches no place near `contact`.
     #[inline]
     pub fn may_reach(&self, world_from_object: &Placement, contact: &Contact) -> bool {
-        self.ellipsoid.is_some() || self.ik.may_reach(&self.center_over(world_from_object, contact))
+        self.curved.is_some() || self.ik.may_reach(&self.center_over(world_from_object, contact))
     }
 
     /// True when it is proven that no joints within the limits reach `contact`: by a closed form, for balls.
     pub fn cannot_touch(&self, world_from_object: &Placement, contact: &Contact, settings: &IkSettings) -> bool {
-        if self.ellipsoid.is_some() || !self.ik.is_closed_form() {
+        if self.curved.is_some() || !self.ik.is_closed_form() {
             return false;
         }
         let mut solutions = Vec::new();
@@ -131,6 +131,18 @@ impl FingerModel<'_> {
 }
 
 #[inline]
-fn arm_of(ellipsoid: &TipEllipsoid, link: &BodyFrame, normal: &Vector) -> Vector {
-    link.vector(&ellipsoid.arm(&-link.vector_to_child(normal)))
+fn arm_of(tip: CurvedTip, link: &BodyFrame, normal: &Vector) -> Vector {
+    link.vector(&tip.arm(&-link.vector_to_child(normal)))
+}
+
+/// The arm, and where the tip may be nearly flat how its end moves over the tip: without that Newton's steps would not settle.
+fn arm_and_travel(tip: CurvedTip, link: &BodyFrame, normal: &Vector) -> (Vector, Option<AskedTravel>) {
+    match tip {
+        CurvedTip::Ellipsoid(_) => (arm_of(tip, link, normal), None),
+        CurvedTip::Smooth(surface) => {
+            let bend = surface.bend(&-link.vector_to_child(normal));
+            let radii = link.rotation * bend.radii * link.rotation.transpose();
+            (link.vector(&bend.point), Some(AskedTravel { radii, normal: *normal }))
+        }
+    }
 }

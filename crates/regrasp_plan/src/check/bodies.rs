@@ -120,7 +120,8 @@ impl Bodies {
         Ok(bodies)
     }
 
-    fn add(
+    /// Adds a shape that takes part in no pair yet.
+    pub(super) fn add(
         &mut self,
         name: &str,
         owner: Owner,
@@ -165,12 +166,16 @@ impl Bodies {
                 .find_map(|&(k, _)| model.fingers.iter().position(|finger| finger.coordinates.contains(&k)))
                 .map_or(Owner::Palm, Owner::Finger);
             let body_depth = path.joints.len() - above;
-            let is_tip = matches!(owner, Owner::Finger(f) if model.fingers[f].tip_link.0 == l);
+            let tip_of = match owner {
+                Owner::Finger(f) => Some(&model.fingers[f]).filter(|finger| finger.tip_link.0 == l),
+                _ => None,
+            };
             self.carriers.push(Carrier::Link(path));
             let carrier = self.carriers.len() - 1;
-            for placed in &link.collision {
+            for (element, placed) in link.collision.iter().enumerate() {
                 let shape = convex_of(&placed.shape).map_err(|error| format!("link \"{}\": {error}", link.name))?;
                 let item = self.add(&link.name, owner, carrier, &placed.parent_from_shape, &shape)?;
+                let is_tip = tip_of.is_some_and(|finger| finger.tip_has(element));
                 (item.link, item.body_depth, item.is_tip) = (Some(LinkId(l)), body_depth, is_tip);
             }
         }

@@ -79,7 +79,7 @@ fn error(finger: &FingerModel, joints: &[f64], world_from_object: &Pose, contact
             let target = contact.point_in_object + normal * finger.radius;
             (finger.center_in_world(joints) - world_from_object * target).norm()
         }
-        TipSurface::Ellipsoid { .. } => {
+        TipSurface::Ellipsoid { .. } | TipSurface::Smooth(_) => {
             let normal = world_from_object * normal;
             let touching = finger.touching_in_world(joints, &normal);
             (touching - world_from_object * contact.point_in_object).norm() + finger.misfit(joints, &normal)
@@ -106,7 +106,7 @@ fn error_between(finger: &FingerModel, from: &Waypoint, to: &Waypoint, f: usize,
             (n_samples, acceleration / (8.0 * (n_samples * n_samples) as f64))
         }
         // The error changes no faster than the point that touches moves, and that wanders over the tip.
-        TipSurface::Ellipsoid { .. } => {
+        TipSurface::Ellipsoid { .. } | TipSurface::Smooth(_) => {
             let speed = speed_in_object(finger, &motion, from, to);
             let n_samples = ((speed / (2.0 * allowed)).ceil() as usize).clamp(1, MOST_SAMPLES);
             (n_samples, speed / (2.0 * n_samples as f64))

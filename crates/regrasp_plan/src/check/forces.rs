@@ -145,7 +145,7 @@ fn check_absent(plan: &Plan, log: &mut Log) {
 }
 
 /// Mass, gravity and limits against scene and robot.
-fn check_promises(task: &Manipulation, model: &CheckedHand, promises: &ForcePromises, log: &mut Log) {
+pub(super) fn check_promises(task: &Manipulation, model: &CheckedHand, promises: &ForcePromises, log: &mut Log) {
     let object = task.object();
     let mut broken = |name: &str, amount: f64, limit: f64, message: String| {
         log.push(Violation::new(Kind::PromiseBroken, message).subjects([name]).amount(amount, limit));
@@ -202,7 +202,7 @@ pub(super) struct Judge<'a> {
 
 impl Judge<'_> {
     /// What every holding finger exerts; none, and a violation, when a force or torque is missing.
-    fn exerted(&self, waypoint: &Waypoint, at: Moment, log: &mut Log) -> Option<Vec<Exerted>> {
+    pub(super) fn exerted(&self, waypoint: &Waypoint, at: Moment, log: &mut Log) -> Option<Vec<Exerted>> {
         let mut missing = |what: String| {
             log.push(Violation::new(Kind::ForceMissing, what).when(at));
             None
@@ -244,7 +244,13 @@ impl Judge<'_> {
         sum
     }
 
-    fn check_balance(&self, waypoint: &Waypoint, exerted: &[Exerted], at: Moment, log: &mut Log) -> (f64, f64) {
+    pub(super) fn check_balance(
+        &self,
+        waypoint: &Waypoint,
+        exerted: &[Exerted],
+        at: Moment,
+        log: &mut Log,
+    ) -> (f64, f64) {
         let (force, moment) = self.residual(&Pose::from(&waypoint.world_from_object), exerted);
         let (force, moment) = (force.norm(), moment.norm());
         let CheckSettings { force_tolerance, moment_tolerance, .. } = *self.settings;
@@ -260,7 +266,7 @@ impl Judge<'_> {
     }
 
     /// The cone of the finger's contact model, and the range of its normal force.
-    fn check_contact(&self, one: &Exerted, moving: Option<usize>, at: Moment, log: &mut Log) {
+    pub(super) fn check_contact(&self, one: &Exerted, moving: Option<usize>, at: Moment, log: &mut Log) {
         let finger = &self.model.fingers[one.finger];
         let tolerance = self.settings.force_tolerance;
         let mut report = |kind: Kind, message: String, amount: f64, limit: f64| {
@@ -352,7 +358,7 @@ impl Judge<'_> {
 
     /// Torques by virtual work: a coordinate's is the work of force and torsion per unit of it, over all joints that it
     /// drives. Joints of free fingers make none.
-    fn check_torques(&self, waypoint: &Waypoint, exerted: &[Exerted], at: Moment, log: &mut Log) {
+    pub(super) fn check_torques(&self, waypoint: &Waypoint, exerted: &[Exerted], at: Moment, log: &mut Log) {
         let mut expected = vec![0.0; waypoint.joint_torques.len()];
         let mut tolerance = vec![TORQUE_ROUNDING; expected.len()];
         for one in exerted {

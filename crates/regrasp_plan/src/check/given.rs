@@ -89,6 +89,6 @@ fn gap(shape: &SortedShape, finger: &FingerModel, joints: &[f64], waypoint: &Way
             let center = object.inverse_transform_point(&finger.center_in_world(joints));
             shape.nearest(&center).distance - finger.radius
         }
-        TipSurface::Ellipsoid { .. } => f64::INFINITY,
+        TipSurface::Ellipsoid { .. } | TipSurface::Smooth(_) => f64::INFINITY,
     }
 }

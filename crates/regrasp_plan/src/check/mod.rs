@@ -35,6 +35,8 @@ pub mod find_scene;
 pub mod forces;
 /// Grasps that the query gives.
 pub mod given;
+/// The judge of grasp lists.
+pub mod grasps;
 /// Who holds the object.
 mod holders;
 /// The checker's own forward kinematics and motion bounds.
@@ -65,6 +67,8 @@ pub mod rolling;
 pub mod rolling_closure;
 /// How far contacts slip from landing to lifting.
 pub mod slip;
+/// Where smooth hulls touch.
+pub mod smooth_touch;
 /// How far a contact slips in one step.
 pub mod step_slip;
 /// Distance from the object's surface and the normals there.
@@ -87,6 +91,7 @@ pub mod way;
 pub use along::{Along, along};
 pub use files::{CheckedFiles, check_files};
 pub use find_scene::find_scene;
+pub use grasps::{GraspReport, check_grasps};
 pub use level::Level;
 pub use slip::HoldSlip;
 pub use violation::{Moment, Violation, ViolationKind};

@@ -7,7 +7,7 @@ use crate::check::tip_surface::TipSurface;
 use nalgebra::Matrix4;
 use regrasp_geometry::{Point, Pose};
 use regrasp_robot::tip::Pad;
-use regrasp_robot::{ContactModel, JointKind, LinkId};
+use regrasp_robot::{ContactModel, JointKind, LinkId, TipShape};
 use regrasp_scene::Manipulation;
 
 /// A finger with its tip; a sharp tip is a ball of radius zero.
@@ -29,6 +29,8 @@ pub struct FingerModel {
     pub contact: ContactModel,
     /// The link that may touch the object.
     pub tip_link: LinkId,
+    /// Which `<collision>` elements of it may; all where empty.
+    pub tip_elements: Vec<usize>,
     /// Pose of that link in the frame of the last moving body.
     pub body_from_tip_link: Matrix4<f64>,
     /// Centre of the tip in the world when the hand is in its rest posture.
@@ -56,6 +58,11 @@ impl DriveRow {
 }
 
 impl FingerModel {
+    /// True when the `<collision>` element of the tip link with this index may touch the object.
+    pub fn tip_has(&self, element: usize) -> bool {
+        self.tip_elements.is_empty() || self.tip_elements.contains(&element)
+    }
+
     /// Centre of the tip in the world.
     pub fn center_in_world(&self, joints: &[f64]) -> Point {
         self.path.world_from_link(joints).transform_point(&self.center)
@@ -137,6 +144,10 @@ impl CheckedHand {
                 pad: finger.tip.pad,
                 contact: finger.tip.contact,
                 tip_link: finger.tip.link,
+                tip_elements: match &finger.tip.shape {
+                    TipShape::Hull { elements, .. } => elements.clone(),
+                    _ => Vec::new(),
+                },
                 coordinates,
             });
         }

@@ -10,6 +10,7 @@ use crate::check::between::Between;
 use crate::check::contact::error_at;
 use crate::check::model::{CheckedHand, FingerModel};
 use crate::check::patch::Patch;
+use crate::check::smooth_touch::{self, SEEN_FROM};
 use crate::check::step_slip::{StepSlip, torsion_radius};
 use crate::check::surface::SortedShape;
 use crate::check::tip_rates::{bounds_in_object, speed_in_object};
@@ -17,7 +18,7 @@ use crate::check::tip_surface::TipSurface;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, Plan, SegmentKind, Waypoint};
-use nalgebra::{Matrix4, Rotation3, UnitQuaternion};
+use nalgebra::{Matrix3, Matrix4, Rotation3, UnitQuaternion};
 use regrasp_geometry::{Point, Pose, Vector};
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -126,17 +127,19 @@ pub struct Roll<'a> {
     acceleration: f64,
     /// Configurations looked at.
     looked: Cell<u64>,
+    /// Normal where a smooth hull last touched: the next is near.
+    last_normal: Cell<Option<Vector>>,
 }
 
 /// A tip over the surface, in the object frame.
 #[derive(Debug, Clone, Copy)]
-struct Touch {
+pub(super) struct Touch {
     /// The point of the surface nearest to the tip.
-    foot: Point,
+    pub foot: Point,
     /// The direction from there to the tip.
-    normal: Vector,
+    pub normal: Vector,
     /// Distance, negative when the tip presses in.
-    gap: f64,
+    pub gap: f64,
 }
 
 /// Steps of the search for nearest points on an ellipsoid and a surface.
@@ -156,10 +159,13 @@ impl<'a> Roll<'a> {
         let (speed, acceleration) = bounds_in_object(finger, &motion, from, to);
         let start = Pose::from(&from.world_from_object).inverse() * finger.center_in_world(&from.joints);
         // Feet are sought from the centre, and from inside an ellipsoid.
-        let inside = finger.surface.curvature_radii().map_or(0.0, |[_, flattest]| 2.0 * flattest);
+        let inside = match &finger.surface {
+            TipSurface::Smooth(_) => SEEN_FROM,
+            _ => finger.surface.curvature_radii().map_or(0.0, |[_, flattest]| 2.0 * flattest),
+        };
         let patch = Patch::near(shape, &start, finger.radius + inside + 2.0 * tolerance + speed);
         let speed = speed_in_object(finger, &motion, from, to);
-        Roll { finger, motion, patch, speed, acceleration, looked: Cell::new(0) }
+        Roll { finger, motion, patch, speed, acceleration, looked: Cell::new(0), last_normal: Cell::new(None) }
     }
 
     /// Configurations looked at so far.
@@ -186,6 +192,14 @@ impl<'a> Roll<'a> {
         let center = object_from_link.transform_point(&self.finger.center);
         let foot = self.patch.foot(&center)?;
         let mut touch = Touch { foot, normal: (center - foot).try_normalize(1e-9)?, gap: f64::INFINITY };
+        if let TipSurface::Smooth(smooth) = &self.finger.surface {
+            let turn: Matrix3<f64> = object_from_link.fixed_view::<3, 3>(0, 0).into();
+            let first = self.last_normal.get().unwrap_or(touch.normal);
+            let place = smooth_touch::Place { patch: &self.patch, smooth, center, turn };
+            let found = place.touch(&first).or_else(|| place.touch(&touch.normal))?;
+            self.last_normal.set(Some(found.normal));
+            return found.gap.is_finite().then_some(found);
+        }
         let Some([sharpest, flattest]) = self.finger.surface.curvature_radii() else {
             touch.gap = (center - foot).norm() - self.finger.radius;
             return touch.gap.is_finite().then_some(touch);
@@ -227,9 +241,9 @@ impl<'a> Roll<'a> {
                 return (f64::INFINITY, from.0);
             }
             let span = to.0 - from.0;
-            let (way, stray) = match self.finger.surface {
+            let (way, stray) = match &self.finger.surface {
                 TipSurface::Ball => ((to.1 - from.1).norm(), self.acceleration * span * span / 8.0),
-                TipSurface::Ellipsoid { .. } => (self.speed * span, 0.0),
+                TipSurface::Ellipsoid { .. } | TipSurface::Smooth(_) => (self.speed * span, 0.0),
             };
             let most = 0.5 * ((from.2 + to.2).abs() + way) + stray;
             if most <= tolerance || from.2.abs().max(to.2.abs()) > tolerance {

@@ -20,6 +20,15 @@ impl FingerModel {
                 let on_sphere = radii.component_mul(&link_from_axes.tr_mul(outward)).normalize();
                 self.center + link_from_axes * radii.component_mul(&on_sphere)
             }
+            TipSurface::Smooth(smooth) => self.center + smooth.point(outward),
+        }
+    }
+
+    /// Radius of the ball, or largest half axis of the ellipsoid, or of a ball inside the smooth hull.
+    pub fn ball_radius(&self) -> f64 {
+        match &self.surface {
+            TipSurface::Smooth(smooth) => smooth.inner_radius(),
+            TipSurface::Ball | TipSurface::Ellipsoid { .. } => self.radius,
         }
     }
 
@@ -27,7 +36,7 @@ impl FingerModel {
     pub fn touching_in_world(&self, joints: &[f64], normal: &Vector) -> Point {
         match &self.surface {
             TipSurface::Ball => self.center_in_world(joints) - normal * self.radius,
-            TipSurface::Ellipsoid { .. } => {
+            TipSurface::Ellipsoid { .. } | TipSurface::Smooth(_) => {
                 let link = self.path.world_from_link(joints);
                 link.transform_point(&self.point_facing(&-link.fixed_view::<3, 3>(0, 0).tr_mul(normal)))
             }
@@ -39,7 +48,7 @@ impl FingerModel {
     pub fn center_from_contact(&self, waypoint: &Waypoint, normal: &Vector) -> Vector {
         match &self.surface {
             TipSurface::Ball => normal * self.radius,
-            TipSurface::Ellipsoid { .. } => {
+            TipSurface::Ellipsoid { .. } | TipSurface::Smooth(_) => {
                 let pose = Pose::from(&waypoint.world_from_object);
                 let touching = self.touching_in_world(&waypoint.joints, &(pose * normal));
                 pose.inverse() * (self.center_in_world(&waypoint.joints) - touching)
@@ -47,12 +56,21 @@ impl FingerModel {
         }
     }
 
-    /// How far the hull that the ellipsoid stands for reaches beyond it (or less far) towards the outward normal `normal` of
+    /// How far the hull that the surface stands for reaches beyond it (or less far) towards the outward normal `normal` of
     /// the object, in the world; zero for tips that are no hulls.
     pub fn misfit(&self, joints: &[f64], normal: &Vector) -> f64 {
-        let TipSurface::Ellipsoid { hull: Some(hull), .. } = &self.surface else { return 0.0 };
+        let hull = match &self.surface {
+            TipSurface::Ball | TipSurface::Ellipsoid { hull: None, .. } => return 0.0,
+            TipSurface::Ellipsoid { hull: Some(hull), .. } => Some(hull),
+            TipSurface::Smooth(_) => None,
+        };
         let link = self.path.world_from_link(joints);
         let outward = -link.fixed_view::<3, 3>(0, 0).tr_mul(normal);
+        let hull = match (&self.surface, hull) {
+            (_, Some(hull)) => hull,
+            (TipSurface::Smooth(smooth), None) => return smooth.misfit(&outward),
+            _ => return 0.0,
+        };
         let farthest = hull.vertices().iter().map(|p| p.coords.dot(&outward)).fold(f64::NEG_INFINITY, f64::max);
         (farthest - (self.point_facing(&outward) - self.center).dot(&outward)).abs()
     }
@@ -79,7 +97,7 @@ impl FingerModel {
             TipSurface::Ellipsoid { radii, link_from_axes, hull: None } => {
                 Some((Shape::Ellipsoid { radii: *radii }, *link_from_axes))
             }
-            TipSurface::Ball | TipSurface::Ellipsoid { .. } => None,
+            TipSurface::Ball | TipSurface::Ellipsoid { .. } | TipSurface::Smooth(_) => None,
         }
     }
 }

@@ -1,8 +1,10 @@
-//! The surface of a fingertip: balls, sharp tips, and ellipsoids, which touch with another point whenever the link turns.
+//! The surface of a fingertip: balls, sharp tips, and ellipsoids and smooth hulls, which touch with another point whenever the
+//! link turns.
 
 use nalgebra::Matrix3;
 use regrasp_geometry::{ConvexHull, Vector};
-use regrasp_robot::tip::{Tip, TipEllipsoid, TipShape};
+use regrasp_robot::tip::smooth_hull::SmoothHull;
+use regrasp_robot::tip::{HullSurface, Pad, Tip, TipEllipsoid, TipShape};
 use std::sync::Arc;
 
 /// The surface with which a finger touches, about its centre.
@@ -19,6 +21,93 @@ pub enum TipSurface {
         /// The hull that it stands for, about the tip's centre and in the frame of the last moving body.
         hull: Option<Arc<ConvexHull>>,
     },
+    /// A smooth surface near a hull.
+    Smooth(Box<Smooth>),
+}
+
+/// A smooth surface near a hull, in the frame of the last moving body. With the points `v_i`, the exponent `p` and the rounding
+/// `r` it reaches `(sum (v_i . n)^p)^(1/p) + r` from its centre towards a unit vector `n`; sums are over what is positive.
+#[derive(Debug, Clone)]
+pub struct Smooth {
+    points: Vec<Vector>,
+    exponent: f64,
+    /// Points that reach less far than this share of the farthest are left out.
+    least_share: f64,
+    rounding: f64,
+    /// The hull that it stands for, about the tip's centre.
+    hull: Arc<ConvexHull>,
+    /// Largest distance between the two that was measured.
+    misfit: f64,
+    /// Least distance from the centre to a plane that touches.
+    inner_radius: f64,
+}
+
+/// Directions in which a smooth surface is measured against its hull.
+const MEASURED: usize = 3001;
+
+/// Terms smaller than this share of the largest are left out: less than rounding.
+const SMALLEST_TERM: f64 = 1e-17;
+
+impl Smooth {
+    fn of(surface: &SmoothHull, hull: &Arc<ConvexHull>, pad: Option<&Pad>) -> Self {
+        let mut smooth = Smooth {
+            points: surface.points().to_vec(),
+            exponent: f64::from(surface.exponent()),
+            least_share: SMALLEST_TERM.powf(1.0 / f64::from(surface.exponent())),
+            rounding: surface.rounding(),
+            hull: hull.clone(),
+            misfit: 0.0,
+            inner_radius: f64::INFINITY,
+        };
+        let mut hint = 0;
+        for k in 0..MEASURED {
+            // Even in height and, by the golden angle, around.
+            let z = (2 * k + 1) as f64 / MEASURED as f64 - 1.0;
+            let (sine, cosine) = (2.399963229728653 * k as f64).sin_cos();
+            let n = Vector::new((1.0 - z * z).sqrt() * cosine, (1.0 - z * z).sqrt() * sine, z);
+            smooth.inner_radius = smooth.inner_radius.min(smooth.point(&n).dot(&n));
+            if pad.is_none_or(|pad| pad.axis_in_body.dot(&n) >= pad.cosine) {
+                smooth.misfit = smooth.misfit.max(smooth.apart(&n, &mut hint));
+            }
+        }
+        smooth
+    }
+
+    /// The point with the outward normal `n`, a unit vector, from the centre.
+    pub fn point(&self, n: &Vector) -> Vector {
+        let farthest = self.points.iter().map(|point| point.dot(n)).fold(0.0, f64::max);
+        let least = farthest * self.least_share;
+        let (mut sum, mut weighted) = (0.0, Vector::zeros());
+        for point in &self.points {
+            let along = point.dot(n);
+            if along > least {
+                let term = (self.exponent * (along / farthest).ln()).exp();
+                sum += term;
+                weighted += point * (term * farthest / along);
+            }
+        }
+        weighted * sum.powf(1.0 / self.exponent - 1.0) + n * self.rounding
+    }
+
+    /// How far surface and hull are apart towards `n`.
+    fn apart(&self, n: &Vector, hint: &mut u32) -> f64 {
+        (self.hull.support(n, hint).coords.dot(n) - self.point(n).dot(n)).abs()
+    }
+
+    /// Smallest radius of curvature that is sure.
+    pub fn rounding(&self) -> f64 {
+        self.rounding
+    }
+
+    /// Radius of a ball about the centre that is inside.
+    pub fn inner_radius(&self) -> f64 {
+        self.inner_radius
+    }
+
+    /// How far the two are apart, towards `n` and anywhere on the pad.
+    pub fn misfit(&self, n: &Vector) -> f64 {
+        self.misfit.max(self.apart(n, &mut 0))
+    }
 }
 
 impl TipSurface {
@@ -32,14 +121,19 @@ impl TipSurface {
         match &tip.shape {
             TipShape::Point | TipShape::Sphere { .. } => TipSurface::Ball,
             TipShape::Ellipsoid(own) => ellipsoid(own, None),
-            TipShape::Hull { hull, fitted, .. } => ellipsoid(fitted, Some(hull.clone())),
+            TipShape::Hull { hull, surface: HullSurface::Ellipsoid(fitted), .. } => {
+                ellipsoid(fitted, Some(hull.clone()))
+            }
+            TipShape::Hull { hull, surface: HullSurface::Smooth(surface), .. } => {
+                TipSurface::Smooth(Box::new(Smooth::of(surface, hull, tip.pad.as_ref())))
+            }
         }
     }
 
-    /// Smallest and largest radius of curvature of an ellipsoid; none for balls.
+    /// Smallest and largest radius of curvature of an ellipsoid; none for others.
     pub fn curvature_radii(&self) -> Option<[f64; 2]> {
         match self {
-            TipSurface::Ball => None,
+            TipSurface::Ball | TipSurface::Smooth(_) => None,
             TipSurface::Ellipsoid { radii, .. } => {
                 Some([radii.min() * radii.min() / radii.max(), radii.max() * radii.max() / radii.min()])
             }
@@ -48,6 +142,10 @@ impl TipSurface {
 
     /// Bound, in metres per radian of the link's turn over the object, of how far the place that faces a direction wanders
     /// over the tip; for a hull also of how fast what it is off its ellipsoid there changes.
+    ///
+    /// A smooth hull may be nearly flat, so that this is metres. What is judged of it changes no faster than its points move:
+    /// how far the hull is from the contact's plane, and from the contact. Both are less than what is measured, from the point
+    /// that faces the normal.
     pub fn wander(&self) -> f64 {
         let TipSurface::Ellipsoid { radii, hull, .. } = self else { return 0.0 };
         let flattest = self.curvature_radii().map_or(0.0, |[_, flattest]| flattest);

@@ -29,7 +29,7 @@ pub fn refuse(model: &Model, gravity: &Gravity) -> Result<(), Failure> {
         return Err(impossible(message, "use a hand of three fingers or more"));
     }
     let names = model.view.hand.fingers.iter().map(|finger| finger.name.as_str());
-    if let Some((name, _)) = names.zip(&model.fingers).find(|(_, f)| f.tip_radius == 0.0 || f.ellipsoid.is_some()) {
+    if let Some((name, _)) = names.zip(&model.fingers).find(|(_, f)| f.tip_radius == 0.0 || f.curved.is_some()) {
         let message = format!("the tip of finger \"{name}\" is no ball: tracking rolls balls");
         return Err(impossible(message, "give the tip shape = \"sphere\" in the hand file"));
     }

@@ -2,9 +2,11 @@
 
 mod carried;
 mod contact_kinematics;
+mod folds;
 mod free_fingers;
 mod improvement;
 mod in_hand_methods;
+mod leap;
 mod physics;
 #[path = "../../../../tests/support/places.rs"]
 mod places;

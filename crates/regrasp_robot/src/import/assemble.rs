@@ -4,17 +4,19 @@
 //! joint moves is palm; moving joints that belong to no finger are held at the position nearest to zero.
 
 use super::chain::{ChainOwner, make_chain, middle_of_limits, rest_posture};
+use super::fixes;
+use super::hull_tip::HullTips;
 use super::hulls::Hulls;
 use super::spec::{Carried, FingerSpec, HandSpec, RigidBody, TipSpec};
 use super::tip_split;
 use crate::coupling::Coupling;
 use crate::hand::{Finger, FingerShape, Hand, MAX_FINGERS, PalmShape};
 use crate::robot::{Joint, JointId, JointKind, LinkId, Robot};
-use crate::tip::{Pad, Tip, TipEllipsoid, TipShape, fit};
+use crate::tip::{Pad, Tip, TipEllipsoid, TipShape};
 use regrasp_base::diagnostic::Diagnostics;
 use regrasp_base::{Diagnostic, InputError, Place};
+use regrasp_geometry::Pose;
 use regrasp_geometry::shape::PlacedShape;
-use regrasp_geometry::{ConvexHull, Point, Pose, Shape};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::Path;
 use std::sync::Arc;
@@ -39,10 +41,10 @@ pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Resu
         .flat_map(|(finger, joints)| joints.iter().enumerate().map(move |(body, &joint)| (joint, (finger, body))))
         .collect();
     let carried = carry(robot, spec, &owner, file, &mut found, &mut notes);
-    let mut hulls = Hulls::new(robot, file);
+    let (mut hulls, mut hull_tips) = (Hulls::new(robot, file), HullTips::default());
     let mut fingers = Vec::new();
     for (index, (finger, joints)) in spec.fingers.iter().zip(&moving).enumerate() {
-        fingers.extend(make_finger(robot, index, finger, joints, &carried, &mut hulls, &mut found));
+        fingers.extend(make_finger(robot, index, finger, joints, &carried, (&mut hulls, &mut hull_tips), &mut found));
     }
     let mut palm = Vec::new();
     for (&link, at) in carried.iter().filter(|(_, at)| at.body == RigidBody::Palm) {
@@ -85,14 +87,19 @@ fn moving_joints(robot: &Robot, spec: &HandSpec, found: &mut Diagnostics) -> Vec
         let mut joints = Vec::new();
         if !path.starts_with(&base_path) {
             let problem = format!("tip link \"{tip_name}\" is not carried by base link \"{base_name}\"");
-            found.push(say("U206", problem, "a tip link below the base link", String::new()));
+            found.push(say(
+                "U206",
+                problem,
+                "a tip link below the base link",
+                fixes::tip_elsewhere(robot, spec, index),
+            ));
         } else {
             let below = &path[base_path.len()..];
             let first = finger.first_joint.map(|joint| below.iter().position(|&other| other == joint));
             if let Some(None) = first {
                 let joint = finger.first_joint.map_or("", |joint| &robot.joints[joint.0].name);
                 let problem = format!("first joint \"{joint}\" is not between \"{base_name}\" and \"{tip_name}\"");
-                found.push(say("U206", problem, "a joint of the finger", String::new()));
+                found.push(say("U206", problem, "a joint of the finger", fixes::first_joint(robot, below)));
             }
             let from = first.flatten().unwrap_or(0);
             joints.extend(below[from..].iter().copied().filter(|j| robot.joints[j.0].kind != JointKind::Fixed));
@@ -108,9 +115,7 @@ fn moving_joints(robot: &Robot, spec: &HandSpec, found: &mut Diagnostics) -> Vec
         {
             let problem =
                 format!("joint \"{}\" moves finger \"{}\" too", robot.joints[shared.0].name, spec.fingers[other].name);
-            let last_shared = joints.iter().rev().find(|joint| chains[other].contains(joint)).unwrap_or(&shared);
-            let below = &robot.links[robot.joints[last_shared.0].child.0].name;
-            let fix = format!("base_link = \"{below}\", so that shared joints belong to no finger");
+            let fix = fixes::shared_joint(robot, spec, [other, index], [&chains[other], &joints]);
             found.push(say("U208", problem, "fingers that share no joint", fix));
         }
         chains.push(joints);
@@ -187,7 +192,7 @@ fn held_at(
                 Diagnostic::new("U209", Place::file(file), problem)
                     .element("joint", &joint.name)
                     .expected("followers on the chain of the joint they follow")
-                    .fix("make it type=\"fixed\", or leave its link out"),
+                    .fix(fixes::hold_in_urdf(&joint.name)),
             );
             return Pose::identity();
         }
@@ -208,7 +213,7 @@ fn make_finger(
     spec: &FingerSpec,
     joints: &[JointId],
     carried: &BTreeMap<LinkId, Carried>,
-    hulls: &mut Hulls,
+    (hulls, hull_tips): (&mut Hulls, &mut HullTips),
     found: &mut Diagnostics,
 ) -> Option<Finger> {
     let owner = ChainOwner { kind: "finger", name: &spec.name, place: &spec.place, rest_key: "rest" };
@@ -235,17 +240,26 @@ fn make_finger(
         match &own {
             Some(own) if link == spec.tip_link => shapes.extend(tip_split::split(placed, link, body, own)),
             _ => {
-                let is_tip = link == spec.tip_link;
-                shapes.extend(placed.into_iter().map(|placed| FingerShape { body, link, placed, is_tip }));
+                let is_tip = |element: usize| link == spec.tip_link && spec.tip.is_made_of(element);
+                let shape = |(k, placed)| FingerShape { body, link, placed, is_tip: is_tip(k) };
+                shapes.extend(placed.into_iter().enumerate().map(shape));
             }
         }
     }
     shapes.sort_by_key(|shape| (shape.body, shape.link));
     let tip = match (&spec.tip, round) {
         (_, Some(tip)) => tip,
-        (TipSpec::Hull { center }, None) => {
-            let points: Vec<Point> = shapes.iter().filter(|s| s.is_tip).flat_map(|s| corners(&s.placed)).collect();
-            match hull_tip(&points, &(body_from_link * center), pad.as_ref()) {
+        (TipSpec::Hull { center, elements }, None) => {
+            let n_elements = robot.links[spec.tip_link.0].collision.len();
+            if let Some(missing) = elements.iter().find(|&&element| element >= n_elements) {
+                let problem = format!("the tip is to be made of <collision> element {missing} of {n_elements}");
+                let diagnostic = Diagnostic::new("U210", spec.place.clone(), problem).element("finger", &spec.name);
+                found.push(diagnostic.expected("indices from 0 of collision elements of the tip link"));
+                return None;
+            }
+            let own: Vec<&PlacedShape> =
+                shapes.iter().filter(|shape| shape.is_tip).map(|shape| &shape.placed).collect();
+            match hull_tips.make(&own, &(body_from_link * center), pad.as_ref(), elements) {
                 Ok((center, shape)) => tip(shape, center),
                 Err((problem, expected, fix)) => {
                     let diagnostic = Diagnostic::new("U210", spec.place.clone(), problem).element("finger", &spec.name);
@@ -259,43 +273,6 @@ fn make_finger(
     };
     let rest = rest_posture(&owner, &spec.rest, &chain, middle_of_limits(&chain), found);
     Some(Finger::new(spec.name.clone(), chain, tip, shapes, rest))
-}
-
-/// A tip that is the hull of `points` near `center`, all in the frame of its body: the centre of the ellipsoid that is like it,
-/// and the shape; or what is wrong, what was expected, and what helps.
-fn hull_tip(
-    points: &[Point],
-    center: &Point,
-    pad: Option<&Pad>,
-) -> Result<(Point, TipShape), (String, &'static str, &'static str)> {
-    let geometry = "box or mesh collision geometry on the tip link";
-    let near: Vec<Point> = points.iter().map(|p| Point::from(p - center)).collect();
-    let no_hull = |error| (format!("tip link has no hull: {error}"), geometry, "shape = \"sphere\" for a round tip");
-    if near.is_empty() {
-        let problem = "tip link has no collision geometry with corners".to_owned();
-        return Err((problem, geometry, "shape = \"sphere\" for a round tip"));
-    }
-    ConvexHull::new(&near).map_err(no_hull)?;
-    let fit = fit(&near, pad)
-        .ok_or_else(|| ("tip link is flat".to_owned(), geometry, "shape = \"sphere\" for a round tip"))?;
-    let about: Vec<Point> = near.iter().map(|p| Point::from(p - fit.center)).collect();
-    let hull = Arc::new(ConvexHull::new(&about).map_err(no_hull)?);
-    Ok((center + fit.center.coords, TipShape::Hull { hull, fitted: fit.ellipsoid, misfit: fit.misfit }))
-}
-
-/// Corner points of a polyhedral shape in the parent's frame; none for round shapes.
-fn corners(placed: &PlacedShape) -> Vec<Point> {
-    let points = match &placed.shape {
-        Shape::Convex(hull) => hull.vertices().to_vec(),
-        Shape::Cuboid { half_extents: h } => (0..8)
-            .map(|k| {
-                let sign = |bit: usize| if k >> bit & 1 == 0 { -1.0 } else { 1.0 };
-                Point::new(sign(0) * h.x, sign(1) * h.y, sign(2) * h.z)
-            })
-            .collect(),
-        _ => Vec::new(),
-    };
-    points.iter().map(|p| placed.parent_from_shape * p).collect()
 }
 
 /// Pairs of links of one body, and of bodies that follow each other with nothing but bodies without shapes between.

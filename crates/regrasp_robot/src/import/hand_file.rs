@@ -4,6 +4,7 @@
 
 use super::assemble::assemble;
 use super::couplings;
+use super::fixes;
 use super::names::{known_joint, known_link};
 use super::options::{LoadOptions, LoadedInput};
 use super::spec::{FingerSpec, HandSpec, PadSpec, TipSpec};
@@ -55,7 +56,8 @@ pub fn load_hand(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Input
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
     match extension.as_str() {
         "toml" => load_hand_file(path, options),
-        "urdf" | "xml" => load_bare_urdf(path, options),
+        // Xacro files and models of MuJoCo are refused by what is in them.
+        "urdf" | "xml" | "xacro" | "mjcf" => load_bare_urdf(path, options),
         _ => Err(Diagnostic::new("U215", Place::file(path), "is neither a hand file nor a URDF")
             .expected("a file that ends in .toml or .urdf")
             .into()),
@@ -74,7 +76,7 @@ fn guessed_parts(path: &Path, options: &LoadOptions) -> Result<HandParts, InputE
     let LoadedRobot { robot, inputs, mut notes } = load_robot(path, options)?;
     options.check_time(path)?;
     let robot = Arc::new(robot);
-    let spec = crate::inspect::guess::guess_hand(&robot, options.contact, path)?;
+    let spec = crate::inspect::guess::guess_hand(&robot, options, path)?;
     notes.push(format!(
         "{}: fingers and tips were guessed; `regrasp inspect -o hand.toml` writes them down",
         path.display()
@@ -166,12 +168,13 @@ fn read(mut root: Table, path: &Path, options: &LoadOptions, found: &mut Found) 
     if !root.is_of_format(found, FORMAT, VERSION) {
         return None;
     }
-    let urdf = root.required(found, "urdf", "add urdf = \"hand.urdf\"");
+    let urdf = root.required(found, "urdf", &fixes::add_urdf(path));
     let srdf = root.optional("srdf");
     let base = root.optional("base_link");
     let allow = root.optional("allow");
     let couplings = root.optional("couplings");
-    let fingers = root.required(found, "fingers", "add at least one [[fingers]] table");
+    let inspect = fixes::inspect_command(urdf.as_ref().and_then(Entry::as_text), path);
+    let fingers = root.required(found, "fingers", &inspect);
     root.finish(found);
     // Without a robot no name in the rest of the file can be looked up.
     let (mut robot, mut inputs) = urdf.and_then(|entry| locate_and_load(&entry, path, options, found))?;
@@ -181,7 +184,7 @@ fn read(mut root: Table, path: &Path, options: &LoadOptions, found: &mut Found) 
     let robot = Arc::new(robot);
     let base = base.and_then(|entry| known_link(&entry, &robot, found)).unwrap_or(robot.root);
     let mut allow = allow.map_or_else(BTreeSet::new, |entry| read_pairs(&entry, &robot, found));
-    let fingers = fingers.map_or_else(Vec::new, |entry| read_fingers(&entry, &robot, options.contact, found));
+    let fingers = fingers.map_or_else(Vec::new, |entry| read_fingers(&entry, &robot, options.contact, &inspect, found));
     if let Some(entry) = srdf
         && let Some(loaded) = read_srdf(&entry, path, &robot, options, found)
     {
@@ -249,11 +252,17 @@ pub(super) fn read_srdf(
     }
 }
 
-fn read_fingers(entry: &Entry, robot: &Robot, contact: ContactModel, found: &mut Found) -> Vec<FingerSpec> {
+fn read_fingers(
+    entry: &Entry,
+    robot: &Robot,
+    contact: ContactModel,
+    inspect: &str,
+    found: &mut Found,
+) -> Vec<FingerSpec> {
     let items = entry.entries(found, "at least one [[fingers]] table").unwrap_or_default();
     if entry.is_empty_list() {
         let diagnostic = entry.error("U202", found, "is empty").expected("at least one [[fingers]] table");
-        found.diagnostics.push(diagnostic);
+        found.diagnostics.push(diagnostic.fix(inspect));
     }
     if items.len() > MAX_FINGERS {
         let problem = format!("has {} fingers", items.len());
@@ -274,7 +283,7 @@ fn read_finger(
 ) -> Option<FingerSpec> {
     let name = table.required(found, "name", "add name = \"thumb\"").and_then(|entry| entry.name(found));
     let tip_link = table
-        .required(found, "tip_link", "add tip_link = \"...\", the link that touches")
+        .required(found, "tip_link", &fixes::add_tip_link(robot))
         .and_then(|entry| known_link(&entry, robot, found));
     let first_joint = table.optional("first_joint").map(|entry| known_joint(&entry, robot, found));
     let tip = table
@@ -341,10 +350,31 @@ fn read_tip(mut table: Table, found: &mut Found) -> Option<TipSpec> {
             })
         }
         "point" => point(&mut table, "position", found).map(|position| TipSpec::Point { position }),
-        _ => point(&mut table, "center", found).map(|center| TipSpec::Hull { center }),
+        _ => {
+            let elements = match table.optional("collision") {
+                Some(entry) => indices(&entry, found),
+                None => Some(Vec::new()),
+            };
+            point(&mut table, "center", found)
+                .zip(elements)
+                .map(|(center, elements)| TipSpec::Hull { center, elements })
+        }
     };
     table.finish(found);
     tip
+}
+
+/// Indices of `<collision>` elements, at least one.
+fn indices(entry: &Entry, found: &mut Found) -> Option<Vec<usize>> {
+    const EXPECTED: &str = "indices of <collision> elements of the tip link, counted from 0";
+    let entries = entry.entries(found, EXPECTED)?;
+    if entries.is_empty() {
+        let fix = "leave the key out: the tip is then made of all of them";
+        found.diagnostics.push(entry.error("U213", found, "is empty").expected(EXPECTED).fix(fix));
+        return None;
+    }
+    let is_index = |x: f64| x >= 0.0 && x.fract() == 0.0 && x < 1e4;
+    entries.iter().map(|entry| Some(entry.number_that(found, EXPECTED, is_index)? as usize)).collect()
 }
 
 /// Half axes of an ellipsoid, none less than a fifth of another: flatter ones are plates, not fingertips.

@@ -11,14 +11,19 @@
 pub(crate) mod assemble;
 mod chain;
 mod couplings;
+/// What to write where a hand cannot be made.
+mod fixes;
 /// `hand.toml`, and hands guessed from a bare URDF.
 pub mod hand_file;
+pub(crate) mod hull_tip;
 mod hulls;
 /// Files held in memory.
 pub mod kept;
 mod names;
 /// How files are read, and which were.
 pub mod options;
+/// Files of other forms where a URDF is expected.
+mod other_form;
 /// `package://` and relative paths, below allowed folders.
 pub mod resolve;
 /// `robot.toml`: models, arms and hands that make one manipulator.

@@ -18,6 +18,8 @@ pub struct LoadOptions {
     pub lenient: bool,
     /// Contact model of fingertips of which the hand file says nothing.
     pub contact: ContactModel,
+    /// Name of the base link of a hand that is guessed from a bare URDF; hand files have their own.
+    pub base: Option<String>,
     /// Wall-clock instant after which reading is given up (`F004`). It cuts and never changes what is read.
     pub deadline: Option<Instant>,
     /// Files in memory, in place of all files on disk.

@@ -43,10 +43,33 @@ pub(crate) struct FingerSpec {
 /// A tip to be made; points are in the frame of the tip link.
 #[derive(Debug, Clone)]
 pub(crate) enum TipSpec {
-    Sphere { radius: f64, center: Point },
-    Ellipsoid { radii: Vector, center: Point, link_from_ellipsoid: UnitQuaternion<f64> },
-    Point { position: Point },
-    Hull { center: Point },
+    Sphere {
+        radius: f64,
+        center: Point,
+    },
+    Ellipsoid {
+        radii: Vector,
+        center: Point,
+        link_from_ellipsoid: UnitQuaternion<f64>,
+    },
+    Point {
+        position: Point,
+    },
+    /// The hull of the `<collision>` elements of these indices; of all where there are none.
+    Hull {
+        center: Point,
+        elements: Vec<usize>,
+    },
+}
+
+impl TipSpec {
+    /// True when the `<collision>` element of this index belongs to the tip.
+    pub fn is_made_of(&self, element: usize) -> bool {
+        match self {
+            TipSpec::Hull { elements, .. } => elements.is_empty() || elements.contains(&element),
+            TipSpec::Sphere { .. } | TipSpec::Ellipsoid { .. } | TipSpec::Point { .. } => true,
+        }
+    }
 }
 
 /// The part of a tip that may touch; the axis is in the frame of the tip link.

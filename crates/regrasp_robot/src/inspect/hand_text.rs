@@ -1,5 +1,6 @@
 //! A hand as the text of a `hand.toml`.
 
+use super::tip_report::tip_report;
 use crate::contact_model::ContactModel;
 use crate::hand::{Finger, Hand};
 use crate::import::hand_file::{FORMAT, VERSION};
@@ -58,13 +59,18 @@ pub fn hand_file_text(hand: &Hand, urdf: &str, allow: &BTreeSet<(LinkId, LinkId)
         if let Some(first) = first_joint_if_needed(hand, finger) {
             let _ = writeln!(text, "first_joint = {}", quoted(&first));
         }
-        let _ = writeln!(text, "# In the frame of the tip link.\ntip = {}", tip_text(hand, finger));
+        let _ = writeln!(
+            text,
+            "# In the frame of the tip link.{}\ntip = {}",
+            error_text(hand, finger),
+            tip_text(hand, finger)
+        );
         if finger.tip.contact != ContactModel::default() {
             let _ = writeln!(text, "contact = {}", quoted(finger.tip.contact.name()));
         }
         if let Some(pad) = finger.tip.pad {
             let axis = hand.robot.fixed_pose_in_body(finger.tip.link).rotation.inverse() * pad.axis_in_body;
-            let [x, y, z] = [axis.x, axis.y, axis.z].map(number);
+            let [x, y, z] = [axis.x, axis.y, axis.z].map(|x| number(x + 0.0));
             let _ = writeln!(
                 text,
                 "pad = {{ axis = [{x}, {y}, {z}], angle_deg = {} }}",
@@ -87,6 +93,15 @@ pub fn hand_file_text(hand: &Hand, urdf: &str, allow: &BTreeSet<(LinkId, LinkId)
     text
 }
 
+/// How far the tip is off the link's collision geometry, as the rest of a comment.
+fn error_text(hand: &Hand, finger: &Finger) -> String {
+    let report = tip_report(hand, finger);
+    match report.error {
+        Some(error) => format!(" The {} is within {:.2} mm of the collision geometry.", report.surface, 1e3 * error),
+        None => String::new(),
+    }
+}
+
 fn tip_text(hand: &Hand, finger: &Finger) -> String {
     let body_from_link = hand.robot.fixed_pose_in_body(finger.tip.link);
     let [x, y, z] = (body_from_link.inverse() * finger.tip.center_in_body).coords.into();
@@ -104,7 +119,10 @@ fn tip_text(hand: &Hand, finger: &Finger) -> String {
             let (radii, turn) = (list(ellipsoid.radii.as_slice()), list(turn.coords.as_slice()));
             format!("{{ shape = \"ellipsoid\", radii = [{radii}], center = {point}, quat_xyzw = [{turn}] }}")
         }
-        TipShape::Hull { .. } => format!("{{ shape = \"mesh\", center = {point} }}"),
+        TipShape::Hull { elements, .. } if elements.is_empty() => format!("{{ shape = \"mesh\", center = {point} }}"),
+        TipShape::Hull { elements, .. } => {
+            format!("{{ shape = \"mesh\", center = {point}, collision = {elements:?} }}")
+        }
     }
 }
 

@@ -10,7 +10,9 @@ pub mod reach;
 pub(crate) mod rest;
 /// Joints and meshes as tables, and what looks like a wrong unit.
 pub mod robot_table;
-/// Spheres fitted to the distal end of a link.
+/// Tips compared with the geometry of their links.
+pub mod tip_report;
+/// Tips fitted to the distal end of a link.
 mod tip_sphere;
 /// Which links touch.
 mod touch;
@@ -26,6 +28,7 @@ use std::path::Path;
 
 pub use hand_text::hand_file_text;
 pub use reach::{TipReach, TipRegion};
+pub use tip_report::{StandsOut, TipReport, tip_report};
 pub use robot_table::{Follows, JointRow, MeshRow, RobotInspection, inspect_robot};
 
 /// How a hand is inspected.
@@ -56,6 +59,8 @@ pub struct FingerRow {
     pub tip_radius: f64,
     /// Centre of the tip in the frame of the last moving body, in metres.
     pub tip_center_in_body: [f64; 3],
+    /// How well the tip is what the link's collision geometry is.
+    pub tip: TipReport,
     /// Rest posture.
     pub rest: Vec<f64>,
 }
@@ -158,6 +163,7 @@ pub fn inspect_hand(hand: &Hand, settings: &InspectSettings, rng: &mut Rng) -> H
             },
             tip_radius: finger.tip.radius(),
             tip_center_in_body: finger.tip.center_in_body.coords.into(),
+            tip: tip_report(hand, finger),
             rest: finger.rest.clone(),
         })
         .collect();

@@ -1,14 +1,22 @@
-//! The ball at the distal end of a link, from its collision geometry.
+//! The tip at the distal end of a link, from its collision geometry: a ball where one fits, else the geometry itself.
 
-use crate::import::spec::TipSpec;
+use crate::hand::convex_of;
+use crate::import::hull_tip::HullTips;
+use crate::import::spec::{PadSpec, TipSpec};
+use crate::tip::{LARGEST_MISFIT, Pad, TipShape, spiral};
 use nalgebra::{Matrix4, Vector4};
+use regrasp_geometry::collision::support::support_value;
 use regrasp_geometry::shape::PlacedShape;
-use regrasp_geometry::{Point, Shape, Vector};
+use regrasp_geometry::{Point, Shape, UnitVector, Vector};
 
 /// How far, relative to the radius, vertices may be from the fitted ball to count as on it.
 const ON_BALL: f64 = 0.01;
 /// Fewest vertices on a ball.
 const MIN_ON_BALL: usize = 12;
+/// Largest difference between a ball and the outside of the link, in metres.
+const BALL_FITS: f64 = 0.15e-3;
+/// Pads of a whole phalanx that are tried, in degrees from its axis.
+const LONG_PADS: [f64; 5] = [100.0, 80.0, 60.0, 45.0, 30.0];
 /// Slices of the distal end that are tried.
 const SLICES: usize = 60;
 
@@ -47,9 +55,15 @@ pub(super) fn farthest_point(shape: &Shape, from: &Point) -> Point {
     }
 }
 
-/// The tip of a link with collision geometry `shapes`, whose distal end is near `end`, seen from joint origin `joint`
-/// (all in the link frame): a sphere where one fits, else the hull.
-pub(super) fn fit_tip(shapes: &[PlacedShape], joint: &Point, end: &Point) -> TipSpec {
+/// The tip of a link with collision geometry `shapes`, whose distal end `end` is a point of the one of index `element`, seen
+/// from joint origin `joint` (all in the link frame): a sphere where one fits, else the hull of that one. The hull of a whole
+/// phalanx gets a pad.
+pub(super) fn fit_tip(
+    shapes: &[PlacedShape],
+    joint: &Point,
+    element: usize,
+    end: &Point,
+) -> (TipSpec, Option<PadSpec>) {
     for placed in shapes {
         let center = |z: f64| placed.parent_from_shape * Point::new(0.0, 0.0, z);
         let centers: Vec<(Point, f64)> = match placed.shape {
@@ -60,7 +74,7 @@ pub(super) fn fit_tip(shapes: &[PlacedShape], joint: &Point, end: &Point) -> Tip
             _ => Vec::new(),
         };
         if let Some(&(center, radius)) = centers.iter().find(|(c, r)| ((end - c).norm() - r).abs() < 1e-6) {
-            return TipSpec::Sphere { radius, center };
+            return (TipSpec::Sphere { radius, center }, None);
         }
     }
     let vertices: Vec<Point> = shapes
@@ -74,10 +88,54 @@ pub(super) fn fit_tip(shapes: &[PlacedShape], joint: &Point, end: &Point) -> Tip
             vertices.iter().map(move |v| placed.parent_from_shape * v)
         })
         .collect();
-    match fit_distal_ball(&vertices, joint, end) {
-        Some((center, radius)) => TipSpec::Sphere { radius: round(radius), center: center.map(round) },
-        None => TipSpec::Hull { center: *end },
+    let axis = UnitVector::try_new(end - joint, 1e-9);
+    let ball = fit_distal_ball(&vertices, joint, end).map(|(center, radius)| (center.map(round), round(radius)));
+    let fits = |(center, radius): &(Point, f64)| {
+        axis.is_some_and(|axis| ball_error(shapes, center, *radius, &axis) <= BALL_FITS)
+    };
+    if let Some((center, radius)) = ball.filter(fits) {
+        return (TipSpec::Sphere { radius, center }, None);
     }
+    let pad = axis.filter(|axis| is_long(&shapes[element], axis)).map(|axis| pad_of(&shapes[element], end, axis));
+    let elements = if shapes.len() > 1 { vec![element] } else { Vec::new() };
+    (TipSpec::Hull { center: *end, elements }, pad)
+}
+
+/// The widest pad about `axis` over which a smooth surface follows the hull of a phalanx as closely as scenes ask.
+fn pad_of(placed: &PlacedShape, end: &Point, axis: UnitVector) -> PadSpec {
+    let axis = UnitVector::new_normalize(axis.map(|x| (x * 1e4).round()));
+    let follows = |angle: &f64| {
+        let pad = Pad { axis_in_body: axis, cosine: angle.to_radians().cos() };
+        let convex = convex_of(&placed.shape).map(|shape| PlacedShape { shape, ..placed.clone() });
+        let made = convex.ok().and_then(|convex| HullTips::default().make(&[&convex], end, Some(&pad), &[]).ok());
+        made.is_some_and(|(_, tip)| matches!(tip, TipShape::Hull { misfit, .. } if misfit <= LARGEST_MISFIT))
+    };
+    let angle = LONG_PADS.into_iter().find(follows).unwrap_or(LONG_PADS[LONG_PADS.len() - 1]);
+    PadSpec { axis, angle: angle.to_radians() }
+}
+
+/// Largest difference of a ball from the outside of `shapes`, whose directions are within 60 degrees of `axis`.
+fn ball_error(shapes: &[PlacedShape], center: &Point, radius: f64, axis: &UnitVector) -> f64 {
+    let reach = |n: &Vector| {
+        let of = |placed: &PlacedShape| {
+            let own = placed.parent_from_shape.rotation.inverse() * n;
+            (placed.parent_from_shape.translation.vector - center.coords).dot(n)
+                + support_value(&placed.shape, &own, &mut 0)
+        };
+        shapes.iter().map(of).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let front = spiral(1000).filter(|n| n.dot(axis) >= 0.5);
+    front.map(|n| (reach(&n) - radius).abs()).fold(0.0, f64::max)
+}
+
+/// True for a shape that is more than twice as long along `axis` as it is wide.
+fn is_long(placed: &PlacedShape, axis: &UnitVector) -> bool {
+    let extent = |n: &Vector| {
+        let own = placed.parent_from_shape.rotation.inverse() * n;
+        support_value(&placed.shape, &own, &mut 0) + support_value(&placed.shape, &-own, &mut 0)
+    };
+    let (x, y) = regrasp_geometry::frame::tangents(axis);
+    extent(axis) > 2.0 * extent(&x).max(extent(&y))
 }
 
 /// To a hundredth of a millimetre: facets are not better than that, and files stay readable.

@@ -120,7 +120,7 @@ pub fn load_grasp_scene(
             }
             (None, Some(entry)) => entry
                 .table(&mut found)
-                .and_then(|table| object::object(table, object::Tips::of(&hand), &mut files, &mut found)),
+                .and_then(|table| object::object(table, object::Hands::of(&hand), &mut files, &mut found)),
             (None, None) => None,
         };
         let (hand, object) = (hand?, object?);
@@ -129,6 +129,17 @@ pub fn load_grasp_scene(
         }
         Some((hand, object, notes))
     });
+    // Outermost files go by their names alone: the same files are the same wherever they are found.
+    let mesh = match source {
+        ObjectSource::Mesh(mesh) => Some(mesh.path.as_path()),
+        ObjectSource::Scene(_) => None,
+    };
+    for input in &mut files.inputs {
+        let is_outermost = input.path == hand_path || mesh == Some(input.path.as_path());
+        if let Some(name) = input.path.file_name().filter(|_| is_outermost) {
+            input.name = name.to_string_lossy().into_owned();
+        }
+    }
     let (mut all_notes, diagnostics) = (found.notes, found.diagnostics);
     let (hand, object, notes) = diagnostics.into_result(read)?.expect("what could not be read has left a diagnostic");
     all_notes.extend(notes);

@@ -8,6 +8,7 @@ use regrasp_geometry::Pose;
 use regrasp_robot::Hand;
 use regrasp_robot::contact_model::{self, ContactModel};
 use regrasp_robot::import::{LoadOptions, load_hand};
+use regrasp_robot::inspect::tip_report;
 use regrasp_robot::tip::{LARGEST_MISFIT, TipShape};
 
 /// Largest reach that makes sense, in metres.
@@ -50,6 +51,7 @@ pub(super) fn hand(mut table: Table, name: String, files: &mut Files, found: &mu
     }
     let mut hand = loaded.hand;
     refuse_rough_tips(&hand, &file, found);
+    found.notes.extend(notes_on_tips(&hand, &path.display().to_string()));
     if let Some(entry) = contacts {
         contact::apply(&entry, &mut hand, found)?;
     }
@@ -62,13 +64,35 @@ pub(super) fn hand(mut table: Table, name: String, files: &mut Files, found: &mu
     Some(SceneHand { name, hand, world_from_hand: pose?, carrier: None, reach })
 }
 
-/// Refuses tips that are meshes and far from any ellipsoid (`S108`).
+/// What of tip links stands out of the declared tips, and would hit the object first.
+fn notes_on_tips(hand: &Hand, file: &str) -> Vec<String> {
+    let mut notes = Vec::new();
+    for finger in &hand.fingers {
+        let report = tip_report(hand, finger);
+        let Some(worst) = report.stands_out.iter().max_by(|a, b| a.by.total_cmp(&b.by)) else { continue };
+        let [x, y, z] = worst.at.map(|x| 1e3 * x);
+        notes.push(format!(
+            "{file}: finger \"{}\": collision geometry of its tip link stands out of the declared {} by {:.2} mm ({} faces of \
+             <collision> element {}, most at [{x:.1}, {y:.1}, {z:.1}] mm in the link's frame): it touches the object before the tip \
+             does; `regrasp inspect` on the URDF writes a tip that fits",
+            finger.name,
+            report.surface,
+            1e3 * worst.by,
+            worst.n_faces,
+            worst.element
+        ));
+    }
+    notes
+}
+
+/// Refuses tips that are meshes and that no smooth surface follows closely (`S108`).
 pub(super) fn refuse_rough_tips(hand: &Hand, file: &Entry, found: &mut Found) {
     for finger in &hand.fingers {
         if let TipShape::Hull { misfit, .. } = finger.tip.shape
             && misfit > LARGEST_MISFIT
         {
-            let off = format!("finger \"{}\": the tip's hull is {:.2} mm off an ellipsoid", finger.name, 1e3 * misfit);
+            let off =
+                format!("finger \"{}\": the tip's hull is {:.2} mm off its smooth surface", finger.name, 1e3 * misfit);
             let diagnostic = file.error("S108", found, off).expected("a rounded tip, within 0.2 mm over its pad");
             let fix = "in the hand file give the tip a pad around what touches, or shape = \"ellipsoid\" or \"sphere\"";
             found.diagnostics.push(diagnostic.fix(fix));

@@ -143,6 +143,7 @@ impl<'a> Search<'a> {
         for (cause, count) in self.workspace.refusals.counts() {
             tally.add_many(Reason::NoForces(cause), count);
         }
+        tally.tried.merge(&self.workspace.tried);
         tally
     }
 

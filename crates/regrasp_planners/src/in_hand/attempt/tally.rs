@@ -6,6 +6,7 @@ use regrasp_manipulation::failure::Cause;
 use regrasp_manipulation::forces::limits::Unbalanced;
 use regrasp_manipulation::grasp::state::MAX_FINGERS;
 use regrasp_manipulation::model::{Model, Pair};
+use regrasp_manipulation::workspace::tried::Tried;
 
 /// A reason for which an attempt of the search failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -56,6 +57,8 @@ pub struct Tally {
     releases: [Release; MAX_FINGERS],
     /// The smallest turn about a contact normal for want of which a transfer stopped short of the goal, in radians.
     least_turn: Option<f64>,
+    /// What was in the way of contacts.
+    pub tried: Tried,
 }
 
 impl Tally {
@@ -91,6 +94,7 @@ impl Tally {
             *self.counts.entry(reason).or_default() += count;
         }
         self.least_turn = [self.least_turn, other.least_turn].into_iter().flatten().min_by(f64::total_cmp);
+        self.tried.merge(&other.tried);
         for (release, more) in self.releases.iter_mut().zip(&other.releases) {
             release.add(&more.seen, more.best_at);
         }

@@ -44,7 +44,7 @@ fn integrate(model: &Model, finger: usize, joints: &Coordinates, from: &Pose, to
         let point: Point = pose * foot.point_in_object;
         let mut normal = (center - point).normalize();
         // The material points at the contact, fixed in the link and in the object.
-        let touching = match model.fingers[finger].ellipsoid {
+        let touching = match model.fingers[finger].curved {
             None => center - normal * radius,
             Some(ellipsoid) => {
                 let placement = Placement::from(&pose);

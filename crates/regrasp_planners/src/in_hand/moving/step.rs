@@ -83,7 +83,7 @@ pub fn tip_stays(
     let finger = &model.fingers[finger];
     let change: Coordinates = from.iter().zip(to).map(|(a, b)| b - a).collect();
     // What the joints' bound proves needs no look; the object strays as little as the shortest step of a finger.
-    if finger.ellipsoid.is_none() && finger.tip_bound.chord_deviation(&change) < 0.5 * HALFWAY_ALLOWED {
+    if finger.curved.is_none() && finger.tip_bound.chord_deviation(&change) < 0.5 * HALFWAY_ALLOWED {
         return true;
     }
     let joints: Coordinates = from.iter().zip(&change).map(|(q, dq)| q + 0.5 * dq).collect();

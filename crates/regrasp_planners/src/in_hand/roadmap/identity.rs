@@ -7,6 +7,7 @@ use regrasp_base::files::sha256_bytes;
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Point, Pose, Shape};
 use regrasp_robot::kinematics::chain::JointMotion;
+use regrasp_robot::tip::HullSurface;
 use regrasp_robot::{ContactModel, Hand, TipShape};
 use regrasp_scene::{HandView, Object};
 
@@ -101,9 +102,14 @@ fn hand(hand: &Hand, reach: Option<f64>) -> Digest {
                 feed.count(1);
                 feed.numbers([*radius]);
             }
-            TipShape::Hull { hull, .. } => {
+            TipShape::Hull { hull, surface, .. } => {
                 feed.count(2);
                 feed.points(hull.vertices());
+                if let HullSurface::Smooth(surface) = surface {
+                    let points: Vec<Point> = surface.points().iter().map(|point| Point::from(*point)).collect();
+                    feed.points(&points);
+                    feed.numbers([surface.rounding()]);
+                }
             }
             TipShape::Ellipsoid(ellipsoid) => {
                 feed.count(3);

@@ -85,6 +85,7 @@ impl Left {
             )
         });
         let bound = self.tally.bound_fingers(model).map_or(String::new(), |bound| format!("; {bound}"));
+        let in_the_way = self.tally.tried.in_words(model);
         let leg = (n_legs > 1).then_some(self.leg + 1);
         let where_stuck = leg.map_or(String::new(), |leg| format!("leg {leg} of {n_legs} failed: "));
         let causes = self.tally.causes(model);
@@ -93,6 +94,11 @@ impl Left {
             Interrupt::Deadline | Interrupt::Cancelled => "allow more time (--time-limit, time_limit)",
         };
         let advice = match causes.first() {
+            _ if in_the_way.is_some() => {
+                "let `regrasp inspect` on the URDF write fingertips that nothing stands out of, or shrink the links' collision \
+                 geometry where it is larger than the links"
+                    .into()
+            }
             Some(cause) if nearest_miss.is_none() => {
                 format!("move the start pose to where the fingers reach around the object (mostly: {})", cause.reason)
             }
@@ -102,8 +108,9 @@ impl Left {
         Failure {
             kind: interrupt.into(),
             message: format!(
-                "no plan {limit} (not a proof), searching from scratch {}: {where_stuck}{reached}{bound}",
-                times(n_attempts)
+                "no plan {limit} (not a proof), searching from scratch {}: {where_stuck}{reached}{bound}{}",
+                times(n_attempts),
+                in_the_way.as_ref().map_or(String::new(), |told| format!("; {told}"))
             ),
             advice,
             causes,

@@ -15,6 +15,7 @@ mod three_r;
 use super::body_frame::BodyFrame;
 use super::chain::{Chain, JointLine, JointMotion};
 use arrayvec::ArrayVec;
+use nalgebra::Matrix3;
 use numeric::NumericIk;
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, UnitVector, Vector};
@@ -64,8 +65,20 @@ pub struct Asked {
     pub error: Vector,
     /// That point as seen from the tip's centre, in metres.
     pub arm: Vector,
+    /// How that point moves over the last body when the body turns.
+    pub travel: Option<AskedTravel>,
     /// A turn of the last body, where one is asked for too.
     pub turn: Option<AskedTurn>,
+}
+
+/// How the point of a curved fingertip that faces a fixed normal moves over it, in the base frame: by `radii` times the
+/// velocity that the normal has seen from the tip.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AskedTravel {
+    /// Radii of curvature as a matrix, in metres.
+    pub radii: Matrix3<f64>,
+    /// The outward normal of the object.
+    pub normal: Vector,
 }
 
 /// A turn of the last body about an axis, in the base frame.

@@ -389,10 +389,13 @@ fn follow_in<const N: usize>(
     let mut error_before = f64::INFINITY;
     for i in 0..MAX_FOLLOW_STEPS {
         let (mut state, frame) = state_of::<N>(chain, center_in_body, &axis, &coordinates);
-        let Asked { error, arm, turn } = asked(&frame)?;
+        let Asked { error, arm, travel, turn } = asked(&frame)?;
         for k in 0..n {
             let spin = state.spins[k];
             state.slides[k] += spin.cross(&arm);
+            if let Some(travel) = &travel {
+                state.slides[k] += travel.radii * spin.cross(&travel.normal);
+            }
         }
         let determinant = if n == 3 { state.slides[0].cross(&state.slides[1]).dot(&state.slides[2]) } else { 1.0 };
         if i == 0 {

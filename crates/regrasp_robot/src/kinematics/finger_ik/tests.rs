@@ -347,7 +347,7 @@ fn chains_with_a_joint_to_spare_turn_as_asked_while_they_move() {
             let about = |link: &BodyFrame| frame::turn_between(&from.rotation, &link.rotation).dot(&axis);
             let asked = |link: &BodyFrame| {
                 let turn = Some(AskedTurn { axis, left: angle - about(link) });
-                Some(Asked { error: target - link.point(&center), arm: Vector::zeros(), turn })
+                Some(Asked { error: target - link.point(&center), arm: Vector::zeros(), travel: None, turn })
             };
             let Some(found) = ik.follow(&start, &IkSettings::default(), asked) else { continue };
             let link = chain.last_frame(&found);

@@ -1,0 +1,57 @@
+//! Contacts that fingers can bring their tips to, and what is in the way there.
+
+use crate::model::{Model, Pair};
+use std::collections::BTreeMap;
+
+/// A finger with fewer contacts tried is not told about.
+const FEWEST: u64 = 40;
+/// A pair that is in the way of this share of a finger's contacts is told.
+const SHARE: f64 = 0.7;
+
+/// Contacts tried, and those at which two bodies were too near.
+#[derive(Debug, Clone, Default)]
+pub struct Tried {
+    /// By finger.
+    contacts: BTreeMap<usize, u64>,
+    /// By finger and pair.
+    blocked: BTreeMap<(usize, Pair), u64>,
+}
+
+impl Tried {
+    /// One more contact of `finger`, and the pair that is too near there, if one is.
+    pub fn add(&mut self, finger: usize, blocked_by: Option<Pair>) {
+        *self.contacts.entry(finger).or_default() += 1;
+        if let Some(pair) = blocked_by {
+            *self.blocked.entry((finger, pair)).or_default() += 1;
+        }
+    }
+
+    /// Adds what another has counted.
+    pub fn merge(&mut self, other: &Tried) {
+        for (&finger, count) in &other.contacts {
+            *self.contacts.entry(finger).or_default() += count;
+        }
+        for (&key, count) in &other.blocked {
+            *self.blocked.entry(key).or_default() += count;
+        }
+    }
+
+    /// The links of fingers that touch the object before their tips do, at most contacts, in words; None where there are none.
+    pub fn in_words(&self, model: &Model) -> Option<String> {
+        let told: Vec<String> = self
+            .blocked
+            .iter()
+            .filter_map(|(&(finger, pair), &count)| {
+                let tried = *self.contacts.get(&finger)?;
+                let is_own = model.fingers[finger].bodies.contains(&pair.a) && pair.b == model.object;
+                let share = count as f64 / tried as f64;
+                (is_own && tried >= FEWEST && share >= SHARE).then(|| {
+                    let body = &model.bodies[pair.a].name;
+                    let behind = if pair.tip_of.is_some() { "stands out of its tip" } else { "is in the way" };
+                    format!("\"{body}\" {behind} at {:.0} % of the {tried} contacts tried", 100.0 * share)
+                })
+            })
+            .collect();
+        (!told.is_empty()).then(|| format!("links touch the object before fingertips do: {}", told.join(", ")))
+    }
+}

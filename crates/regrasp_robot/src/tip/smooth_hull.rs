@@ -1,0 +1,272 @@
+//! A smooth, strictly convex surface near a convex polyhedron: what a fingertip that is a mesh rolls on.
+//!
+//! With the origin inside and `v_i` corners of the polyhedron, moved a little along their rays, the support function is
+//!
+//! ```text
+//! s_i = max(0, v_i . n)      k(n) = (sum s_i^p)^(1/p)      h(n) = k(n) + r
+//! ```
+//!
+//! for a unit normal `n`: a smoothed maximum, with a small ball of radius `r` on top. It is convex for any `v_i`, because each
+//! `s_i` is convex and not negative. With the shares `a_i = (s_i / k)^p`, which add up to one, and `u_i = v_i k / s_i`, the point
+//! with the normal `n` is `sum a_i u_i + r n`. Its radii of curvature are those of `(p - 1) / k` times the covariance of the
+//! `u_i`, plus `r`. All `u_i` lie in the plane `n . u = k`.
+
+use super::{Pad, spiral};
+use nalgebra::Matrix3;
+use regrasp_geometry::{ConvexHull, Point, Vector};
+
+mod table;
+
+use table::NormalTable;
+
+/// The exponent `p`. Larger ones follow corners more closely, and are less even between them.
+const EXPONENT: i32 = 200;
+/// Points with a smaller share of the largest `s_i` do not count: `0.88^200` is 8e-12.
+const LEAST_SHARE: f64 = 0.88;
+/// Most corners that are kept.
+pub const MOST_POINTS: usize = 512;
+/// Corners are added until none is missed by more than this, in metres.
+const MISSED: f64 = 4e-6;
+/// Directions in which the surface is fitted, and others in which it is measured.
+const FITTED: usize = 4000;
+const MEASURED: usize = 9001;
+/// Rounds of the fit.
+const FIT_ROUNDS: usize = 14;
+/// Radius of the ball on top, in metres, and as a share of the distance from the centre to the nearest face.
+const ROUNDING: f64 = 0.4e-3;
+const ROUNDING_SHARE: f64 = 0.05;
+/// Radius that is left of it at least, as a share.
+const LEAST_ROUNDING: f64 = 0.3;
+
+/// The surface, about its centre.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SmoothHull {
+    points: Vec<Vector>,
+    rounding: f64,
+    reach: f64,
+    table: NormalTable,
+}
+
+/// The point of the surface that has a normal, and how the surface bends there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bend {
+    /// The point, from the centre.
+    pub point: Vector,
+    /// Second derivative of the support function: how the point moves when the normal turns. Its eigenvalues across the normal
+    /// are the radii of curvature, in metres; along the normal it is zero.
+    pub radii: Matrix3<f64>,
+}
+
+impl SmoothHull {
+    /// The surface near `hull`, whose origin lies inside, and its largest distance from it over the pad, in metres: the
+    /// difference of the support functions. None where the origin is not inside.
+    pub fn near(hull: &ConvexHull, pad: Option<&Pad>) -> Option<(Self, f64)> {
+        let depth = depth_of_origin(hull)?;
+        let rounding = ROUNDING.min(ROUNDING_SHARE * depth);
+        let mut hint = 0;
+        let mut target = |n: Vector| {
+            let corner = hull.support(&n, &mut hint).coords;
+            Target { normal: n, corner, support: corner.dot(&n), counts: pad.is_none_or(|pad| pad.holds(&n)) }
+        };
+        let targets: Vec<Target> = spiral(FITTED).map(&mut target).collect();
+        let points = choose(&targets);
+        let mut surface = SmoothHull { table: NormalTable::new(&points, LEAST_SHARE), points, rounding, reach: 0.0 };
+        for _ in 0..FIT_ROUNDS {
+            surface.fit(&targets);
+        }
+        surface.table = NormalTable::new(&surface.points, LEAST_SHARE);
+        let measured: Vec<Target> = spiral(MEASURED).map(&mut target).filter(|target| target.counts).collect();
+        let off = |surface: &Self| {
+            let apart = measured.iter().map(|target| surface.support(&target.normal) - target.support);
+            apart.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), off| (low.min(off), high.max(off)))
+        };
+        // As far outside as inside.
+        let (low, high) = off(&surface);
+        surface.rounding = (rounding - 0.5 * (low + high)).max(LEAST_ROUNDING * rounding);
+        let (low, high) = off(&surface);
+        surface.reach = spiral(FITTED).map(|n| surface.point(&n).norm()).fold(0.0, f64::max);
+        Some((surface, high.abs().max(low.abs())))
+    }
+
+    /// Moves the points along their rays, each by the mean of what is missing in the directions in which it counts.
+    fn fit(&mut self, targets: &[Target]) {
+        let mut sums = vec![(0.0, 0.0); self.points.len()];
+        let mut shares = Vec::new();
+        for target in targets {
+            let smoothed = self.shares(&target.normal, &mut shares);
+            let missing = ((target.support - self.rounding) / smoothed).ln();
+            for &(i, share) in &shares {
+                sums[i].0 += share * missing;
+                sums[i].1 += share;
+            }
+        }
+        for (point, (missing, weight)) in self.points.iter_mut().zip(sums).filter(|(_, (_, weight))| *weight > 1e-9) {
+            *point *= (missing / weight).exp();
+        }
+        self.table.set_points(&self.points);
+    }
+
+    /// The shares of the points towards `n`, by index, and the smoothed maximum.
+    fn shares(&self, n: &Vector, shares: &mut Vec<(usize, f64)>) -> f64 {
+        shares.clear();
+        let (largest, sum) = self.powers(n, |i, _, _, power| shares.push((i, power)));
+        shares.iter_mut().for_each(|(_, share)| *share /= sum);
+        largest * root(sum)
+    }
+
+    /// Calls `each` with every point that counts towards `n`: its index, itself, `s_i`, and `(s_i / max s)^p`. The largest `s_i`,
+    /// and the sum of the powers.
+    #[inline]
+    fn powers(&self, n: &Vector, mut each: impl FnMut(usize, &[f64; 3], f64, f64)) -> (f64, f64) {
+        let (indices, points) = self.table.near(n);
+        let mut along = [0.0; MOST_POINTS];
+        let along = &mut along[..points.len()];
+        let mut largest = 0.0f64;
+        for (along, [x, y, z]) in along.iter_mut().zip(points) {
+            *along = x * n.x + y * n.y + z * n.z;
+            largest = largest.max(*along);
+        }
+        let least = LEAST_SHARE * largest;
+        let mut sum = 0.0;
+        for ((&s, point), &i) in along.iter().zip(points).zip(indices) {
+            if s > least {
+                let power = power(s / largest);
+                sum += power;
+                each(usize::from(i), point, s, power);
+            }
+        }
+        (largest, sum)
+    }
+
+    /// The support function: how far the surface reaches towards the unit vector `n`.
+    pub fn support(&self, n: &Vector) -> f64 {
+        let (largest, sum) = self.powers(n, |_, _, _, _| ());
+        largest * root(sum) + self.rounding
+    }
+
+    /// The point with the outward normal `n`, a unit vector, from the centre.
+    #[inline]
+    pub fn point(&self, n: &Vector) -> Vector {
+        let mut weighted = Vector::zeros();
+        let (largest, sum) = self.powers(n, |_, [x, y, z], s, power| {
+            let weight = power / s;
+            weighted += Vector::new(x * weight, y * weight, z * weight);
+        });
+        weighted * (largest * root(sum) / sum) + n * self.rounding
+    }
+
+    /// The point with the outward normal `n`, a unit vector, and the curvature there.
+    pub fn bend(&self, n: &Vector) -> Bend {
+        // Points of the plane in which all lie, from one of them: differences lose nothing.
+        let mut first: Option<Vector> = None;
+        let mut mean = Vector::zeros();
+        // Sums of the squares and products: xx, yy, zz, xy, xz, yz.
+        let mut squares = [0.0; 6];
+        let (largest, sum) = self.powers(n, |_, [x, y, z], s, power| {
+            let at = Vector::new(x / s, y / s, z / s);
+            let from = at - *first.get_or_insert(at);
+            let weighted = from * power;
+            mean += weighted;
+            let products = [
+                weighted.x * from.x,
+                weighted.y * from.y,
+                weighted.z * from.z,
+                weighted.x * from.y,
+                weighted.x * from.z,
+                weighted.y * from.z,
+            ];
+            squares.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
+        });
+        let smoothed = largest * root(sum);
+        mean /= sum;
+        let [xx, yy, zz, xy, xz, yz] = squares.map(|square| square / sum);
+        let covariance = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) - mean * mean.transpose();
+        let around = Matrix3::identity() - n * n.transpose();
+        Bend {
+            point: (first.unwrap_or_default() + mean) * smoothed + n * self.rounding,
+            radii: covariance * (f64::from(EXPONENT - 1) * smoothed) + around * self.rounding,
+        }
+    }
+
+    /// Largest distance of a point of the surface from the centre.
+    pub fn reach(&self) -> f64 {
+        self.reach
+    }
+
+    /// Smallest radius of curvature that is sure: that of the ball on top.
+    pub fn rounding(&self) -> f64 {
+        self.rounding
+    }
+
+    /// The points `v_i`.
+    pub fn points(&self) -> &[Vector] {
+        &self.points
+    }
+
+    /// The exponent `p`.
+    pub fn exponent(&self) -> i32 {
+        EXPONENT
+    }
+}
+
+/// `q^200`, the same on every machine.
+#[inline]
+fn power(q: f64) -> f64 {
+    let q2 = q * q;
+    let q4 = q2 * q2;
+    let q8 = q4 * q4;
+    let q16 = q8 * q8;
+    let q32 = q16 * q16;
+    let q64 = q32 * q32;
+    q64 * q64 * q64 * q8
+}
+
+/// The `p`-th root of a sum that is at least one.
+#[inline]
+fn root(sum: f64) -> f64 {
+    (sum.ln() / f64::from(EXPONENT)).exp()
+}
+
+/// What the surface is to be in one direction.
+struct Target {
+    normal: Vector,
+    corner: Vector,
+    support: f64,
+    /// False outside the pad.
+    counts: bool,
+}
+
+/// Corners that reach about as far as all of them in all directions: first where the pad is, then elsewhere.
+fn choose(targets: &[Target]) -> Vec<Vector> {
+    let mut chosen: Vec<Vector> = Vec::new();
+    let mut missed: Vec<f64> = targets.iter().map(|target| target.support).collect();
+    while chosen.len() < MOST_POINTS {
+        let worst = |counts: bool| {
+            let of_kind = (0..targets.len()).filter(|&k| !counts || targets[k].counts);
+            of_kind.max_by(|&a, &b| missed[a].total_cmp(&missed[b])).filter(|&k| missed[k] > MISSED)
+        };
+        let Some(k) = worst(true).or_else(|| worst(false)) else { break };
+        let corner = targets[k].corner;
+        for (missed, target) in missed.iter_mut().zip(targets) {
+            *missed = missed.min(target.support - corner.dot(&target.normal));
+        }
+        chosen.push(corner);
+    }
+    chosen
+}
+
+/// Distance from the origin to the nearest face; None where it is not inside.
+pub fn depth_of_origin(hull: &ConvexHull) -> Option<f64> {
+    let corner = |k: u32| hull.vertices()[k as usize];
+    let mut depth = f64::INFINITY;
+    for &[a, b, c] in hull.triangles() {
+        let [a, b, c]: [Point; 3] = [corner(a), corner(b), corner(c)];
+        if let Some(normal) = (b - a).cross(&(c - a)).try_normalize(1e-18) {
+            depth = depth.min(normal.dot(&a.coords));
+        }
+    }
+    (depth > 0.0 && depth.is_finite()).then_some(depth)
+}
+
+#[cfg(test)]
+mod tests;
