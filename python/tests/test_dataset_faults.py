@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -184,30 +183,6 @@ def test_a_worker_without_memory_is_told(tmp_path: Path) -> None:
     assert len(result.lost) == len(blocks_of(specification()))
     assert all(reason for _, reason in result.lost)
     assert make(specification(), tmp_path, workers=1).complete
-
-
-needs_ray = pytest.mark.skipif(find_spec("ray") is None, reason="SKIPPED: Ray is not installed (pip install 'regrasp[ray]')")
-
-
-@needs_ray
-def test_ray_makes_the_same_bytes(tmp_path: Path, undisturbed: dict[str, bytes]) -> None:
-    result = make(specification(), tmp_path, workers=2, ray="local")
-    assert result.complete and shards(tmp_path) == undisturbed
-
-
-@needs_ray
-def test_ray_makes_a_block_again_whose_worker_was_killed(
-    tmp_path: Path, undisturbed: dict[str, bytes], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("REGRASP_TEST_FAULT", f"kill_once:4:{tmp_path / 'killed'}")
-    assert make(specification(), tmp_path / "out", workers=1, ray="local").complete
-    assert (tmp_path / "killed").exists() and shards(tmp_path / "out") == undisturbed
-
-
-@needs_ray
-def test_a_cluster_that_is_not_there_is_told(tmp_path: Path) -> None:
-    with pytest.raises(regrasp.InputError, match="D130"):
-        make(specification(), tmp_path, ray="127.0.0.1:1")
 
 
 def test_ray_that_is_absent_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
