@@ -120,7 +120,7 @@ pub fn load_grasp_scene(
             }
             (None, Some(entry)) => entry
                 .table(&mut found)
-                .and_then(|table| object::object(table, object::Tips::of(&hand), &mut files, &mut found)),
+                .and_then(|table| object::object(table, object::Hands::of(&hand), &mut files, &mut found)),
             (None, None) => None,
         };
         let (hand, object) = (hand?, object?);
