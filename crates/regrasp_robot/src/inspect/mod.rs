@@ -28,8 +28,8 @@ use std::path::Path;
 
 pub use hand_text::hand_file_text;
 pub use reach::{TipReach, TipRegion};
-pub use tip_report::{StandsOut, TipReport, tip_report};
 pub use robot_table::{Follows, JointRow, MeshRow, RobotInspection, inspect_robot};
+pub use tip_report::{StandsOut, TipReport, tip_report};
 
 /// How a hand is inspected.
 #[derive(Debug, Clone, PartialEq)]
