@@ -8,6 +8,7 @@ mod in_hand_methods;
 mod physics;
 #[path = "../../../../tests/support/places.rs"]
 mod places;
+mod placing;
 mod queries;
 mod reach;
 mod roadmaps;

@@ -3,6 +3,7 @@
 //! A finger ends at a moving joint below which nothing moves. Its tip link is the one whose collision geometry reaches
 //! farthest from that joint.
 
+use super::finger_names::{End, finger_names};
 use super::tip_sphere::fit_tip;
 use crate::contact_model::ContactModel;
 use crate::import::spec::{FingerSpec, HandSpec, TipSpec};
@@ -22,26 +23,21 @@ pub(crate) fn guess_hand(robot: &Robot, contact: ContactModel, file: &Path) -> R
             .into());
     }
     let base = base_link(robot, &last_joints);
-    let mut fingers: Vec<FingerSpec> = Vec::new();
-    for &last in &last_joints {
-        let child = robot.joints[last.0].child;
-        let (tip_link, tip) = guess_tip(robot, child);
-        let link_name = &robot.links[tip_link.0].name;
-        let mut name = finger_name(link_name, fingers.len() + 1);
-        if fingers.iter().any(|other| other.name == name) {
-            name.clone_from(link_name);
-        }
-        fingers.push(FingerSpec {
-            name,
-            tip_link,
-            first_joint: None,
-            tip,
-            pad: None,
-            contact,
-            rest: Vec::new(),
-            place: Place::file(file),
-        });
-    }
+    let tips: Vec<(LinkId, TipSpec)> =
+        last_joints.iter().map(|last| guess_tip(robot, robot.joints[last.0].child)).collect();
+    let ends: Vec<End> = last_joints.iter().zip(&tips).map(|(&last, (tip, _))| End { last, tip: *tip }).collect();
+    let names = finger_names(robot, base, &ends);
+    let fingers = tips.into_iter().zip(names).map(|((tip_link, tip), name)| FingerSpec {
+        name,
+        tip_link,
+        first_joint: None,
+        tip,
+        pad: None,
+        contact,
+        rest: Vec::new(),
+        place: Place::file(file),
+    });
+    let fingers = fingers.collect();
     Ok(HandSpec { base, fingers, mount: None, allow: BTreeSet::new() })
 }
 
@@ -119,11 +115,4 @@ pub(super) fn rigid_links(robot: &Robot, link: LinkId) -> Vec<(LinkId, Pose)> {
         next += 1;
     }
     links
-}
-
-/// A short name from that of the tip link, or a number where that has no letters left.
-fn finger_name(link: &str, number: usize) -> String {
-    let short = link.replace("link_", "").replace("_link", "").replace("_tip", "").replace("tip_", "");
-    let short = short.trim_matches('_');
-    if short.contains(|c: char| c.is_alphabetic()) { short.to_owned() } else { format!("finger_{number}") }
 }

@@ -1,5 +1,7 @@
 //! What a robot and a hand are like: joints, limits, meshes, units, fingers and tips, links that always or never touch.
 
+/// Names of fingers.
+mod finger_names;
 /// Fingers and tips guessed from a robot alone.
 pub(crate) mod guess;
 /// A hand as the text of a `hand.toml`.
