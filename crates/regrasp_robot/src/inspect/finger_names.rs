@@ -1,6 +1,6 @@
 //! Names of fingers: from what joints and links are called, else from where the fingers stand.
 
-use super::guess::rigid_links;
+use super::rigid::rigid_links;
 use crate::robot::{JointId, JointKind, LinkId, Robot};
 use regrasp_geometry::{Point, Pose, Vector};
 use std::collections::BTreeSet;

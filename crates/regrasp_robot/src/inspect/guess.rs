@@ -4,11 +4,11 @@
 //! farthest from that joint.
 
 use super::finger_names::{End, finger_names};
+use super::rigid::rigid_links;
 use super::tip_sphere::fit_tip;
 use crate::contact_model::ContactModel;
 use crate::import::spec::{FingerSpec, HandSpec, TipSpec};
 use crate::robot::{JointId, JointKind, LinkId, Robot};
-use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_base::{Diagnostic, InputError, Place};
 use regrasp_geometry::{Point, Pose};
 use std::collections::BTreeSet;
@@ -97,22 +97,4 @@ fn guess_tip(robot: &Robot, child: LinkId) -> (LinkId, TipSpec) {
         if best.is_none_or(|(most, _)| reach > most) { Some((reach, *link)) } else { best }
     });
     (far.map_or(child, |(_, link)| link), TipSpec::Point { position: Point::origin() })
-}
-
-/// Links that move with `link` and hang below it, with their poses in its frame.
-pub(super) fn rigid_links(robot: &Robot, link: LinkId) -> Vec<(LinkId, Pose)> {
-    let identity = Pose::from_parts(Translation3::identity(), UnitQuaternion::identity());
-    let mut links = vec![(link, identity)];
-    let mut next = 0;
-    while next < links.len() {
-        let (current, pose) = links[next];
-        for id in robot.joints_from(current) {
-            let joint = &robot.joints[id.0];
-            if joint.kind == JointKind::Fixed {
-                links.push((joint.child, pose * joint.parent_from_joint));
-            }
-        }
-        next += 1;
-    }
-    links
 }

@@ -10,6 +10,8 @@ pub mod hand_text;
 pub mod reach;
 /// Rest postures.
 pub(crate) mod rest;
+/// Links that move together.
+mod rigid;
 /// Joints and meshes as tables, and what looks like a wrong unit.
 pub mod robot_table;
 /// Spheres fitted to the distal end of a link.
