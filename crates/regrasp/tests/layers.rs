@@ -48,6 +48,19 @@ const TOWER: &[Floor] = &[
         ],
     ),
     Floor {
+        name: "regrasp_grasp_lists",
+        ships_with: &[
+            "regrasp_base",
+            "regrasp_geometry",
+            "regrasp_robot",
+            "regrasp_scene",
+            "regrasp_grasp",
+            "regrasp_manipulation",
+        ],
+        // Its tests check, and break lists.
+        tests_with: &["regrasp_plan", "regrasp_mutations"],
+    },
+    Floor {
         name: "regrasp_planners",
         ships_with: &[
             "regrasp_base",
@@ -83,6 +96,7 @@ const TOWER: &[Floor] = &[
             "regrasp_scene",
             "regrasp_grasp",
             "regrasp_plan",
+            "regrasp_grasp_lists",
             "regrasp_planners",
             "regrasp_export",
             "regrasp_viewer",

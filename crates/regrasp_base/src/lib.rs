@@ -9,6 +9,8 @@ pub mod budget;
 pub mod diagnostic;
 /// Reading with a size cap, hashing, and writing through a temporary file.
 pub mod files;
+/// Where a value stands in a JSON text.
+pub mod json_place;
 /// Random numbers keyed by (seed, purpose, index).
 pub mod random;
 /// TOML tables read strictly, with the place of every key and value.

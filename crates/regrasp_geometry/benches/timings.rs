@@ -7,7 +7,7 @@ mod places;
 use places::shared_models;
 use regrasp_base::Rng;
 use regrasp_geometry::import::read_mesh;
-use regrasp_geometry::reference::{Answer, ReferenceShape, distance};
+use regrasp_geometry::reference::{Clearance, ReferenceShape, distance};
 use regrasp_geometry::{Point, Pose, Shape, Surface, UnitVector, Vector};
 use std::sync::Arc;
 use std::time::Instant;
@@ -101,7 +101,7 @@ fn main() {
             let place = middle + poses[(i + 99) % 4096] * Vector::x() * away;
             let world_from_b = Pose::from_parts(place.into(), turned.rotation);
             let answer = std::hint::black_box(distance(&pa, &Pose::identity(), &pb, &world_from_b, max));
-            n_apart += usize::from(matches!(answer, Answer::SeparatedBy(_)));
+            n_apart += usize::from(matches!(answer, Clearance::SeparatedBy(_)));
         });
         println!("reference {label:35} {ns:8.0} ns, apart {} %", 100 * n_apart / (31 * 200));
     }

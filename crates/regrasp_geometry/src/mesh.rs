@@ -23,12 +23,19 @@ pub struct MeshStatistics {
     pub non_manifold_edges: usize,
     /// Edges whose two triangles are wound against each other.
     pub flipped_edges: usize,
+    /// Edges that triangles walk more often one way than the other.
+    pub unbalanced_edges: usize,
 }
 
 impl MeshStatistics {
     /// True when every edge has exactly two triangles, wound alike.
     pub fn is_watertight(&self) -> bool {
         self.open_edges == 0 && self.non_manifold_edges == 0 && self.flipped_edges == 0
+    }
+
+    /// True when the triangles bound a solid: every edge is walked as often one way as the other. Two parts may share an edge.
+    pub fn is_closed(&self) -> bool {
+        self.unbalanced_edges == 0
     }
 }
 
@@ -266,6 +273,20 @@ impl EdgeSide {
     }
 }
 
+/// Edges that triangles walk more often one way than the other, from and to, as often as that is so: the rims of holes, against
+/// the winding of what would close them.
+pub(crate) fn rims(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
+    let mut rims = Vec::new();
+    for sides in edge_sides(triangles).chunk_by(EdgeSide::same_edge) {
+        let [low, high] = sides[0].ends;
+        let n_up = sides.iter().filter(|side| triangles[side.triangle()][side.corner()] == low).count();
+        let n_down = sides.len() - n_up;
+        rims.extend(std::iter::repeat_n([low, high], n_up.saturating_sub(n_down)));
+        rims.extend(std::iter::repeat_n([high, low], n_down.saturating_sub(n_up)));
+    }
+    rims
+}
+
 /// Sides of all edges by their ends (the lower vertex first), then by triangle and corner.
 pub(crate) fn edge_sides(triangles: &[[u32; 3]]) -> Vec<EdgeSide> {
     let n_vertices = triangles.iter().flatten().max().map_or(0, |&last| last as usize + 1);
@@ -287,6 +308,7 @@ fn count_edges(triangles: &[[u32; 3]], statistics: &mut MeshStatistics) {
     for sides in edge_sides(triangles).chunk_by(EdgeSide::same_edge) {
         // How often the edge is walked from its lower to its higher vertex.
         let n_up = sides.iter().filter(|side| triangles[side.triangle()][side.corner()] == side.ends[0]).count();
+        statistics.unbalanced_edges += usize::from(2 * n_up != sides.len());
         match sides.len() {
             1 => statistics.open_edges += 1,
             2 if n_up != 1 => statistics.flipped_edges += 1,

@@ -33,7 +33,7 @@ const MAX_STEPS: usize = 40;
 
 /// What is known about two shapes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Answer {
+pub enum Clearance {
     /// At least this far apart, in m, above zero. Proven by a separating plane.
     SeparatedBy(f64),
     /// They share points, or are too near to tell; the depth in m, at least zero, is parry's estimate, or, where that fails, the
@@ -59,13 +59,13 @@ pub enum ReferenceError {
 /// A shape prepared for queries.
 #[derive(Clone)]
 pub struct ReferenceShape {
-    body: Body,
+    body: PreparedShape,
     center: Point,
     radius: f64,
 }
 
 #[derive(Clone)]
-enum Body {
+enum PreparedShape {
     Convex(Convex),
     Mesh(Box<MeshBody>),
 }
@@ -153,7 +153,7 @@ impl ReferenceShape {
     /// Prepares `shape`. Errors when parry cannot use a polyhedron or mesh.
     pub fn new(shape: &Shape) -> Result<Self, ReferenceError> {
         let (center, radius) = shape.bounding_sphere();
-        let convex = |core, margin| Body::Convex(Convex::new(core, margin));
+        let convex = |core, margin| PreparedShape::Convex(Convex::new(core, margin));
         let body = match shape {
             Shape::Sphere { radius } => convex(Core::Point(ParryVector::ZERO), *radius),
             Shape::Capsule { half_length, radius } => convex(Core::Segment { half_length: *half_length }, *radius),
@@ -172,7 +172,7 @@ impl ReferenceShape {
                 })?;
                 convex(Core::Polyhedron(Box::new(polyhedron)), 0.0)
             }
-            Shape::Mesh(mesh) => Body::Mesh(Box::new(MeshBody::new(mesh)?)),
+            Shape::Mesh(mesh) => PreparedShape::Mesh(Box::new(MeshBody::new(mesh)?)),
         };
         Ok(ReferenceShape { body, center, radius })
     }
@@ -219,27 +219,33 @@ impl MeshBody {
 
 /// How far apart the shapes are, where that is less than `max`; beyond it the answer is some lower bound of at least
 /// `max`. Anything that is not finite gives [`Answer::Unresolved`].
-pub fn distance(a: &ReferenceShape, world_from_a: &Pose, b: &ReferenceShape, world_from_b: &Pose, max: f64) -> Answer {
+pub fn distance(
+    a: &ReferenceShape,
+    world_from_a: &Pose,
+    b: &ReferenceShape,
+    world_from_b: &Pose,
+    max: f64,
+) -> Clearance {
     let apart = (world_from_a * a.center - world_from_b * b.center).norm() - a.radius - b.radius;
     if !apart.is_finite() || max.is_nan() {
-        return Answer::Unresolved;
+        return Clearance::Unresolved;
     }
     // The search for the nearest triangle starts at `max`: it must not be empty.
     let max = max.max(SMALLEST_MAX);
     // A rounding error of the bounding balls must not look like a clearance.
     let apart = apart - 1e-12 * (a.radius + b.radius + world_from_a.translation.vector.norm());
     if apart > max {
-        return Answer::SeparatedBy(apart);
+        return Clearance::SeparatedBy(apart);
     }
     let a_from_b = parry_pose(&world_from_a.inv_mul(world_from_b));
     if !a_from_b.is_finite() {
-        return Answer::Unresolved;
+        return Clearance::Unresolved;
     }
     match (&a.body, &b.body) {
-        (Body::Convex(a), Body::Convex(b)) => between_convex(a, b, &a_from_b, max),
-        (Body::Mesh(a), Body::Convex(b)) => mesh_to_convex(a, b, &a_from_b, max),
-        (Body::Convex(a), Body::Mesh(b)) => mesh_to_convex(b, a, &a_from_b.inverse(), max),
-        (Body::Mesh(a), Body::Mesh(b)) => mesh_to_mesh(a, b, &a_from_b, max),
+        (PreparedShape::Convex(a), PreparedShape::Convex(b)) => between_convex(a, b, &a_from_b, max),
+        (PreparedShape::Mesh(a), PreparedShape::Convex(b)) => mesh_to_convex(a, b, &a_from_b, max),
+        (PreparedShape::Convex(a), PreparedShape::Mesh(b)) => mesh_to_convex(b, a, &a_from_b.inverse(), max),
+        (PreparedShape::Mesh(a), PreparedShape::Mesh(b)) => mesh_to_mesh(a, b, &a_from_b, max),
     }
 }
 
@@ -251,12 +257,12 @@ pub fn point_distance(shape: &ReferenceShape, world_from_shape: &Pose, point_in_
         return f64::NAN;
     }
     match &shape.body {
-        Body::Mesh(body) => {
+        PreparedShape::Mesh(body) => {
             let projection = body.mesh.project_local_point(point, false);
             let distance = (projection.point - point).length();
             if body.holds(point) { -distance } else { distance }
         }
-        Body::Convex(convex) => {
+        PreparedShape::Convex(convex) => {
             let to_core = match &convex.core {
                 Core::Point(center) => (point - *center).length(),
                 Core::Segment { half_length } => {
@@ -273,9 +279,9 @@ pub fn point_distance(shape: &ReferenceShape, world_from_shape: &Pose, point_in_
                     let ball = Convex::new(Core::Point(point), 0.0);
                     let shape = Convex::new(core.clone(), 0.0);
                     match between_convex(&shape, &ball, &ParryPose::IDENTITY, f64::MAX) {
-                        Answer::SeparatedBy(distance) => distance,
-                        Answer::Penetrating(depth) => -depth,
-                        Answer::Unresolved => f64::NAN,
+                        Clearance::SeparatedBy(distance) => distance,
+                        Clearance::Penetrating(depth) => -depth,
+                        Clearance::Unresolved => f64::NAN,
                     }
                 }
             };
@@ -285,16 +291,16 @@ pub fn point_distance(shape: &ReferenceShape, world_from_shape: &Pose, point_in_
 }
 
 /// GJK on the cores, its axis confirmed by both supports; EPA when the cores meet.
-fn between_convex(a: &Convex, b: &Convex, a_from_b: &ParryPose, max: f64) -> Answer {
+fn between_convex(a: &Convex, b: &Convex, a_from_b: &ParryPose, max: f64) -> Clearance {
     answer_and_axis(a, b, a_from_b, max).0
 }
 
 /// As [`between_convex`], with the axis of the separating slab, which means nothing for other answers.
-fn answer_and_axis(a: &Convex, b: &Convex, a_from_b: &ParryPose, max: f64) -> (Answer, ParryVector) {
+fn answer_and_axis(a: &Convex, b: &Convex, a_from_b: &ParryPose, max: f64) -> (Clearance, ParryVector) {
     let margins = a.margin + b.margin;
     let first_axis = a_from_b.translation.try_normalize().unwrap_or(ParryVector::X);
     let mut simplex = VoronoiSimplex::new();
-    let mut shallow = Answer::Unresolved;
+    let mut shallow = Clearance::Unresolved;
     // GJK may stall on curved shapes; a start from another side mostly helps.
     for axis in [first_axis, ParryVector::new(0.36, 0.48, 0.8), ParryVector::new(-0.8, 0.36, 0.48)] {
         simplex.reset(CsoPoint::from_shapes(a_from_b, &a.core, &b.core, axis));
@@ -305,8 +311,8 @@ fn answer_and_axis(a: &Convex, b: &Convex, a_from_b: &ParryPose, max: f64) -> (A
             GJKResult::Intersection => {
                 // Curved shapes nearly in touch can look so from one side.
                 match penetration(a, b, a_from_b, &simplex) {
-                    Answer::Penetrating(depth) if depth < SHALLOW => shallow = Answer::Penetrating(depth),
-                    Answer::Unresolved => {}
+                    Clearance::Penetrating(depth) if depth < SHALLOW => shallow = Clearance::Penetrating(depth),
+                    Clearance::Unresolved => {}
                     answer => return (answer, ParryVector::ZERO),
                 }
                 continue;
@@ -315,14 +321,14 @@ fn answer_and_axis(a: &Convex, b: &Convex, a_from_b: &ParryPose, max: f64) -> (A
         // The width of the widest slab confirmed is a lower bound of the distance, `reached` an upper bound.
         let (gap, axis) = widest_slab(a, b, a_from_b, &axes, reached - margins);
         if gap > 0.0 {
-            return (Answer::SeparatedBy(gap), axis);
+            return (Clearance::SeparatedBy(gap), axis);
         }
         if reached <= margins {
-            return (Answer::Penetrating(margins - reached), ParryVector::ZERO);
+            return (Clearance::Penetrating(margins - reached), ParryVector::ZERO);
         }
     }
     let has_faces = |shape: &Convex| matches!(shape.core, Core::Box { .. }) && shape.margin == 0.0;
-    if shallow != Answer::Unresolved || !has_faces(a) || !has_faces(b) {
+    if shallow != Clearance::Unresolved || !has_faces(a) || !has_faces(b) {
         return (shallow, ParryVector::ZERO);
     }
     // Along any axis the overlap bounds the depth from above; along that of a face it mostly is the depth.
@@ -332,9 +338,9 @@ fn answer_and_axis(a: &Convex, b: &Convex, a_from_b: &ParryPose, max: f64) -> (A
     all.extend(axes.iter().chain(&of_b).flat_map(|&axis| [axis, -axis]));
     let (gap, axis) = widest_slab(a, b, a_from_b, &all, 0.0);
     match gap {
-        gap if !gap.is_finite() => (Answer::Unresolved, ParryVector::ZERO),
-        gap if gap > 0.0 => (Answer::SeparatedBy(gap), axis),
-        gap => (Answer::Penetrating(-gap), ParryVector::ZERO),
+        gap if !gap.is_finite() => (Clearance::Unresolved, ParryVector::ZERO),
+        gap if gap > 0.0 => (Clearance::SeparatedBy(gap), axis),
+        gap => (Clearance::Penetrating(-gap), ParryVector::ZERO),
     }
 }
 
@@ -385,7 +391,7 @@ fn slab(a: &Convex, b: &Convex, a_from_b: &ParryPose, axis: ParryVector) -> (f64
     (along - a.margin - b.margin - rounding, q - p - axis * along)
 }
 
-fn penetration(a: &Convex, b: &Convex, a_from_b: &ParryPose, simplex: &VoronoiSimplex) -> Answer {
+fn penetration(a: &Convex, b: &Convex, a_from_b: &ParryPose, simplex: &VoronoiSimplex) -> Clearance {
     match EPA::new().closest_points(a_from_b, &a.core, &b.core, simplex) {
         Some((p, q, normal)) => {
             // GJK takes the narrowest gaps for contact; the axis found may still separate.
@@ -393,36 +399,36 @@ fn penetration(a: &Convex, b: &Convex, a_from_b: &ParryPose, simplex: &VoronoiSi
             let reached = if depth < SHALLOW { SHALLOW } else { f64::INFINITY };
             let (gap, _) = widest_slab(a, b, a_from_b, &[normal, -normal], reached);
             if gap > 0.0 {
-                return Answer::SeparatedBy(gap);
+                return Clearance::SeparatedBy(gap);
             }
             // Along the axis of least penetration the shapes overlap by just the depth; EPA sometimes finds another
             // (parry#378).
             let overlap = -slab(a, b, a_from_b, normal).0 - a.margin - b.margin;
             if (overlap - depth).abs() <= 1e-6 + 1e-3 * depth {
-                Answer::Penetrating(depth.max(0.0) + a.margin + b.margin)
+                Clearance::Penetrating(depth.max(0.0) + a.margin + b.margin)
             } else {
-                Answer::Unresolved
+                Clearance::Unresolved
             }
         }
         // Flat cores, such as two segments, may be too thin for EPA, but with a margin they overlap at least by it.
-        None if a.margin + b.margin > 0.0 => Answer::Penetrating(a.margin + b.margin),
-        None => Answer::Unresolved,
+        None if a.margin + b.margin > 0.0 => Clearance::Penetrating(a.margin + b.margin),
+        None => Clearance::Unresolved,
     }
 }
 
 /// The nearest triangle by parry's hierarchy of boxes; a solid also holds what is inside it.
-fn mesh_to_convex(body: &MeshBody, convex: &Convex, mesh_from_convex: &ParryPose, max: f64) -> Answer {
+fn mesh_to_convex(body: &MeshBody, convex: &Convex, mesh_from_convex: &ParryPose, max: f64) -> Clearance {
     let answer = triangles_to_convex(body, convex, mesh_from_convex, max);
-    if let Answer::SeparatedBy(_) = answer {
+    if let Clearance::SeparatedBy(_) = answer {
         let inner = mesh_from_convex.transform_point(convex.middle);
         if let Some(depth) = body.depth_of(inner) {
-            return Answer::Penetrating(depth);
+            return Clearance::Penetrating(depth);
         }
     }
     answer
 }
 
-fn triangles_to_convex(body: &MeshBody, convex: &Convex, mesh_from_convex: &ParryPose, max: f64) -> Answer {
+fn triangles_to_convex(body: &MeshBody, convex: &Convex, mesh_from_convex: &ParryPose, max: f64) -> Clearance {
     let box_of = |axis: ParryVector| convex.core.support_point(mesh_from_convex, axis).dot(axis) + convex.margin;
     let (x, y, z) = (ParryVector::X, ParryVector::Y, ParryVector::Z);
     let bounds = Aabb::new(
@@ -448,7 +454,7 @@ fn triangles_to_convex(body: &MeshBody, convex: &Convex, mesh_from_convex: &Parr
             }
             let triangle = Convex::new(Core::Triangle(corners), 0.0);
             match answer_and_axis(&triangle, convex, mesh_from_convex, best.min(max)) {
-                (Answer::SeparatedBy(gap), axis) => {
+                (Clearance::SeparatedBy(gap), axis) => {
                     let axis = axis.normalize_or_zero();
                     if gap < best && axis != ParryVector::ZERO {
                         let against = convex.core.support_point(mesh_from_convex, -axis).dot(axis) - convex.margin;
@@ -456,8 +462,8 @@ fn triangles_to_convex(body: &MeshBody, convex: &Convex, mesh_from_convex: &Parr
                     }
                     Some(gap)
                 }
-                (Answer::Penetrating(depth), _) => Some(-depth - f64::MIN_POSITIVE),
-                (Answer::Unresolved, _) => {
+                (Clearance::Penetrating(depth), _) => Some(-depth - f64::MIN_POSITIVE),
+                (Clearance::Unresolved, _) => {
                     unresolved.set(true);
                     None
                 }
@@ -465,36 +471,36 @@ fn triangles_to_convex(body: &MeshBody, convex: &Convex, mesh_from_convex: &Parr
         },
     );
     match nearest {
-        Some((_, gap)) if gap <= 0.0 => Answer::Penetrating(-gap),
-        _ if unresolved.get() => Answer::Unresolved,
-        Some((_, gap)) => Answer::SeparatedBy(gap),
-        None => Answer::SeparatedBy(max),
+        Some((_, gap)) if gap <= 0.0 => Clearance::Penetrating(-gap),
+        _ if unresolved.get() => Clearance::Unresolved,
+        Some((_, gap)) => Clearance::SeparatedBy(gap),
+        None => Clearance::SeparatedBy(max),
     }
 }
 
 /// Each triangle of `b` as a convex shape against `a`.
-fn mesh_to_mesh(a: &MeshBody, b: &MeshBody, a_from_b: &ParryPose, max: f64) -> Answer {
+fn mesh_to_mesh(a: &MeshBody, b: &MeshBody, a_from_b: &ParryPose, max: f64) -> Clearance {
     let mut nearest = max;
     let mut unresolved = false;
     for triangle in b.mesh.triangles() {
         let triangle = Convex::new(Core::Triangle([triangle.a, triangle.b, triangle.c]), 0.0);
         match triangles_to_convex(a, &triangle, a_from_b, nearest) {
-            Answer::SeparatedBy(gap) => nearest = nearest.min(gap),
-            Answer::Penetrating(depth) => return Answer::Penetrating(depth),
-            Answer::Unresolved => unresolved = true,
+            Clearance::SeparatedBy(gap) => nearest = nearest.min(gap),
+            Clearance::Penetrating(depth) => return Clearance::Penetrating(depth),
+            Clearance::Unresolved => unresolved = true,
         }
     }
     for vertex in &b.part_vertices {
         if let Some(depth) = a.depth_of(a_from_b.transform_point(*vertex)) {
-            return Answer::Penetrating(depth);
+            return Clearance::Penetrating(depth);
         }
     }
     for vertex in &a.part_vertices {
         if let Some(depth) = b.depth_of(a_from_b.inverse_transform_point(*vertex)) {
-            return Answer::Penetrating(depth);
+            return Clearance::Penetrating(depth);
         }
     }
-    if unresolved { Answer::Unresolved } else { Answer::SeparatedBy(nearest) }
+    if unresolved { Clearance::Unresolved } else { Clearance::SeparatedBy(nearest) }
 }
 
 fn vector(point: &Point) -> ParryVector {

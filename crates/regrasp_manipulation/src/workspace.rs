@@ -22,7 +22,7 @@ use crate::model::{Carrier, Model, Pair};
 use configuration::{Configuration, midway, place_finger, place_object};
 use draws::Draws;
 use nearby::Nearby;
-use regrasp_geometry::collision::{Answer, Placed, Placement, gap_along, separation};
+use regrasp_geometry::collision::{HalfSpace, Placed, Placement, Separation, gap_along, separation};
 use regrasp_geometry::{Pose, Vector, frame};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 
@@ -305,7 +305,10 @@ impl<'a> Workspace<'a> {
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
         self.slack[pair] = f64::NEG_INFINITY;
+        // Hollows are narrow beside long steps: there the triangles are asked about the end alone.
+        self.stands = self.model.folds;
         let is_clear = self.pair_is_clear(pair, mode);
+        self.stands = false;
         self.slack[pair] = f64::NEG_INFINITY;
         is_clear
     }
@@ -428,8 +431,8 @@ impl<'a> Workspace<'a> {
             );
             self.directions[index] = self.to_keep(index, &separating);
             match answer {
-                Answer::SeparatedBy(d) => at_next = d,
-                Answer::TooNear | Answer::Unresolved => return self.trees_apart(index, required),
+                Separation::SeparatedBy(d) => at_next = d,
+                Separation::TooNear | Separation::Unresolved => return self.trees_apart(index, required),
             }
         }
         let (from_a, from_b) = (&self.now.placements[pair.a], self.now.at(model, pair.b));
@@ -451,7 +454,7 @@ impl<'a> Workspace<'a> {
             &mut best_now,
             hints,
         );
-        if matches!(answer, Answer::SeparatedBy(_)) {
+        if matches!(answer, Separation::SeparatedBy(_)) {
             let gap = gap_along(&best_now, &a.shape, at_a, &b.shape, at_b, hints);
             if gap >= required_at_ends {
                 self.directions[index] = self.to_keep(index, &best_now);
@@ -536,8 +539,12 @@ impl<'a> Workspace<'a> {
         let body = &model.bodies[other];
         let now = self.now.at(model, mesh).inverse_then(self.now.at(model, other));
         let next = self.next.at(model, mesh).inverse_then(self.next.at(model, other));
-        let relative_motion =
-            now.displacement(&next, &body.center, body.radius) + self.deviation_of(mesh) + self.deviation_of(other);
+        let relative_motion = match self.stands {
+            true => 0.0,
+            false => {
+                now.displacement(&next, &body.center, body.radius) + self.deviation_of(mesh) + self.deviation_of(other)
+            }
+        };
         // Whatever the moment, one of the two ends is at most half of the motion away.
         let needed = required + 0.5 * relative_motion;
         let mut smallest = 0.0;
@@ -572,10 +579,9 @@ impl<'a> Workspace<'a> {
             let in_tip = object_from_tip.vector_to_child(&-normal_in_object);
             let lowest = normal_in_object.dot(&object_from_tip.translation)
                 - regrasp_geometry::collision::support::support_value(&tip.shape, &in_tip, &mut self.hints[index][0]);
-            let is_apart = tree.all_near(&tip.shape, &object_from_tip, 0.0, &mut 0.0, &mut |corners| {
-                let highest = corners.iter().map(|p| normal_in_object.dot(&p.coords)).fold(f64::NEG_INFINITY, f64::max);
-                lowest - highest >= -allowed
-            });
+            let below = HalfSpace { normal: normal_in_object, level: lowest + allowed };
+            let bounds = (&tip.center, tip.radius);
+            let is_apart = tree.meets_only_below(&tip.shape, bounds, &object_from_tip, &below);
             // What it may press into lies below; where it is thicker than that, it must not be inside with all of the rest.
             let middle = object_from_tip.point(&tip.middle);
             let is_thick = normal_in_object.dot(&middle.coords) - lowest > allowed;

@@ -1,7 +1,7 @@
 //! Where plans are damaged: random segments, waypoints, fingers and joints. None where there is nothing to choose from.
 
 use regrasp_base::Rng;
-use regrasp_plan::check::model::{DriveRow, Model};
+use regrasp_plan::check::model::{CheckedHand, DriveRow};
 use regrasp_plan::plan::{Plan, Segment, SegmentKind, Waypoint};
 
 /// A random one of `items`.
@@ -38,13 +38,17 @@ pub(super) fn any_closed<'a>(plan: &'a mut Plan, rng: &mut Rng) -> Option<&'a mu
 }
 
 /// A random joint that has a drive of its own, of those that fit.
-pub(super) fn any_drive<'a>(model: &'a Model, rng: &mut Rng, fits: impl Fn(&DriveRow) -> bool) -> Option<&'a DriveRow> {
+pub(super) fn any_drive<'a>(
+    model: &'a CheckedHand,
+    rng: &mut Rng,
+    fits: impl Fn(&DriveRow) -> bool,
+) -> Option<&'a DriveRow> {
     let drives: Vec<_> = model.drives.iter().filter(|drive| !drive.follows && fits(drive)).collect();
     drives.get(rng.below(drives.len().max(1))).copied()
 }
 
 /// Segments, and fingers in them, that fit.
-pub(super) fn places(plan: &Plan, model: &Model, fits: impl Fn(&Segment, usize) -> bool) -> Vec<(usize, usize)> {
+pub(super) fn places(plan: &Plan, model: &CheckedHand, fits: impl Fn(&Segment, usize) -> bool) -> Vec<(usize, usize)> {
     (0..plan.segments.len())
         .flat_map(|s| (0..model.fingers.len()).map(move |f| (s, f)))
         .filter(|&(s, f)| fits(&plan.segments[s], f))

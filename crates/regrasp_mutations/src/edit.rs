@@ -4,7 +4,7 @@ use super::choice::{pick, waypoints_mut};
 use nalgebra::{DMatrix, DVector};
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
-use regrasp_plan::check::model::Model;
+use regrasp_plan::check::model::CheckedHand;
 use regrasp_plan::check::pose::pose_difference;
 use regrasp_plan::check::roles::contact_of;
 use regrasp_plan::plan::{Plan, PoseData, Segment};
@@ -33,7 +33,7 @@ pub(super) fn goes_somewhere(segment: &Segment) -> bool {
 /// Moves the tip of finger `f` so that its centre is at `target`, by damped least squares from where it is.
 ///
 /// None when it does not get there within a micrometre.
-pub(super) fn move_tip(model: &Model, f: usize, joints: &mut [f64], target: &Point) -> Option<()> {
+pub(super) fn move_tip(model: &CheckedHand, f: usize, joints: &mut [f64], target: &Point) -> Option<()> {
     let finger = &model.fingers[f];
     let mut trial = joints.to_vec();
     for _ in 0..200 {
@@ -65,7 +65,7 @@ pub(super) fn move_tip(model: &Model, f: usize, joints: &mut [f64], target: &Poi
 /// Replaces one contact wherever it stands, and moves the joints along with it.
 pub(super) fn replace_contact(
     plan: &mut Plan,
-    model: &Model,
+    model: &CheckedHand,
     rng: &mut Rng,
     change: impl Fn(Point, UnitVector, &mut Rng) -> (Point, UnitVector),
 ) -> Option<()> {

@@ -6,7 +6,7 @@ use regrasp_base::Rng;
 use regrasp_geometry::{Pose, UnitVector, Vector};
 use regrasp_grasp::ContactModel;
 use regrasp_plan::check::forces::torques_of;
-use regrasp_plan::check::model::Model;
+use regrasp_plan::check::model::CheckedHand;
 use regrasp_plan::check::roles::{contact_of, moving_finger};
 use regrasp_plan::check::violation::ViolationKind::{
     ForceMissing, ForceOutsideCone, ForceUnbalanced, FrictionAboveScene, MovingFingerPresses, NormalForceOutOfRange,
@@ -322,7 +322,7 @@ fn pressing_of(contact: &ContactState) -> Option<f64> {
 }
 
 /// Normal forces of the fingers that hold, those that lift and land left out.
-fn pressing<'a>(plan: &'a Plan, model: &'a Model) -> impl Iterator<Item = f64> + 'a {
+fn pressing<'a>(plan: &'a Plan, model: &'a CheckedHand) -> impl Iterator<Item = f64> + 'a {
     plan.segments.iter().flat_map(move |segment| {
         let moving = moving_finger(model, segment);
         let contacts = segment.waypoints.iter().flat_map(|waypoint| waypoint.contacts.iter().enumerate());
@@ -368,7 +368,7 @@ fn in_cone(waypoint: &Waypoint, f: usize, friction: f64) -> bool {
 }
 
 /// Gives the joints the torques that make the contact forces.
-fn make_torques(model: &Model, waypoint: &mut Waypoint) {
+fn make_torques(model: &CheckedHand, waypoint: &mut Waypoint) {
     let mut torques = vec![0.0; model.joint_names.len()];
     for (finger, state) in model.fingers.iter().zip(&waypoint.contacts) {
         let (Some(contact), Some(force)) = (contact_of(state), state.force_in_object) else { continue };

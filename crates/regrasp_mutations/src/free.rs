@@ -6,8 +6,8 @@ use super::edit::move_tip;
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp::Grip;
-use regrasp_plan::check::closure::{Body, margin};
-use regrasp_plan::check::model::Model;
+use regrasp_plan::check::closure::{HeldBody, margin};
+use regrasp_plan::check::model::CheckedHand;
 use regrasp_plan::check::roles::{contact_of, is_free_throughout};
 use regrasp_plan::check::surface;
 use regrasp_plan::check::violation::ViolationKind::{
@@ -19,7 +19,7 @@ use regrasp_scene::Manipulation;
 impl Breeder<'_> {
     pub(super) fn break_free_fingers(&mut self) {
         let (model, task) = (self.model, self.task);
-        let body = Body::of(task.object(), self.plan);
+        let body = HeldBody::of(task.object(), self.plan);
         let required = self.plan.promises.required_margin;
         let holds_without = |waypoint: &Waypoint, left_out: usize| {
             let grips: Vec<Grip> = (0..model.fingers.len())
@@ -92,13 +92,13 @@ fn declare_free(plan: &mut Plan, f: usize) -> Option<()> {
 }
 
 /// A transfer, and a finger that is free in it.
-fn pick_free(plan: &Plan, model: &Model, rng: &mut Rng) -> Option<(usize, usize)> {
+fn pick_free(plan: &Plan, model: &CheckedHand, rng: &mut Rng) -> Option<(usize, usize)> {
     let is_free = |segment: &Segment, f| segment.kind == SegmentKind::Transfer && is_free_throughout(segment, f);
     pick(&mut places(plan, model, is_free), rng).copied()
 }
 
 /// The point of the object's surface nearest to the tip of finger `f` and the outward normal there, in the object frame.
-fn beneath(model: &Model, task: &Manipulation, waypoint: &Waypoint, f: usize) -> Option<(Point, Vector)> {
+fn beneath(model: &CheckedHand, task: &Manipulation, waypoint: &Waypoint, f: usize) -> Option<(Point, Vector)> {
     let object = task.object();
     let pose = Pose::from(&waypoint.world_from_object);
     let tip = pose.inverse() * model.fingers[f].center_in_world(&waypoint.joints);

@@ -13,6 +13,8 @@ mod edit;
 mod forces;
 /// Fingers that are free, and fingers that are said to be.
 mod free;
+/// Grasp lists.
+pub mod grasps;
 /// Good plans in hands of other contacts and couplings.
 mod hand;
 /// Names, promises, inputs.
@@ -40,7 +42,7 @@ mod way;
 
 use regrasp_base::Rng;
 use regrasp_plan::Plan;
-use regrasp_plan::check::model::Model;
+use regrasp_plan::check::model::CheckedHand;
 use regrasp_plan::check::violation::ViolationKind;
 use regrasp_robot::Hand;
 use regrasp_scene::{Manipulation, Scene};
@@ -63,7 +65,7 @@ pub struct Mutant {
 /// Kinds of damage that the plan offers no place for (a regrasp, an edge, an input file) are left out.
 /// Panics if the checker cannot read the hand of `part`.
 pub fn mutants(plan: &Plan, task: Manipulation, rng: &mut Rng) -> Vec<Mutant> {
-    let model = Model::new(&task).expect("a good plan was checked in this scene");
+    let model = CheckedHand::new(&task).expect("a good plan was checked in this scene");
     let mut breeder = Breeder { plan, task, model: &model, rng, found: Vec::new() };
     breeder.break_header();
     breeder.break_way();
@@ -89,7 +91,7 @@ pub fn mutants(plan: &Plan, task: Manipulation, rng: &mut Rng) -> Vec<Mutant> {
 struct Breeder<'a> {
     plan: &'a Plan,
     task: Manipulation<'a>,
-    model: &'a Model,
+    model: &'a CheckedHand,
     rng: &'a mut Rng,
     found: Vec<Mutant>,
 }

@@ -4,7 +4,7 @@ use super::Breeder;
 use super::choice::pick;
 use super::tracking::turn;
 use regrasp_base::Rng;
-use regrasp_plan::check::model::Model;
+use regrasp_plan::check::model::CheckedHand;
 use regrasp_plan::check::roles::moving_finger;
 use regrasp_plan::check::violation::ViolationKind::{
     ContactOffTip, ObjectMovesInRegrasp, RelativeMotionMissing, SegmentsDoNotMeet, WrongContactMode,
@@ -69,7 +69,7 @@ impl Breeder<'_> {
 }
 
 /// A relocation in which a finger leaves a contact for another one, and the finger.
-fn pick_relocation(plan: &Plan, model: &Model, rng: &mut Rng) -> Option<(usize, usize)> {
+fn pick_relocation(plan: &Plan, model: &CheckedHand, rng: &mut Rng) -> Option<(usize, usize)> {
     let mut found = Vec::new();
     for (s, segment) in plan.segments.iter().enumerate().filter(|(_, one)| one.kind == SegmentKind::Regrasp) {
         let Some(f) = moving_finger(model, segment) else { continue };
@@ -85,7 +85,7 @@ fn pick_relocation(plan: &Plan, model: &Model, rng: &mut Rng) -> Option<(usize, 
 }
 
 /// A contact of a finger that rests half-way through a relocation.
-fn resting_in_relocation<'p>(plan: &'p mut Plan, model: &Model, rng: &mut Rng) -> Option<&'p mut ContactState> {
+fn resting_in_relocation<'p>(plan: &'p mut Plan, model: &CheckedHand, rng: &mut Rng) -> Option<&'p mut ContactState> {
     let (s, f) = pick_relocation(plan, model, rng)?;
     let n_waypoints = plan.segments[s].waypoints.len();
     let resting = (f + 1 + rng.below(model.fingers.len() - 1)) % model.fingers.len();

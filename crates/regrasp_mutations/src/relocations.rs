@@ -5,7 +5,7 @@ use super::choice::{any_segment, pick_waypoint};
 use super::edit::move_tip;
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, Vector};
-use regrasp_plan::check::model::Model;
+use regrasp_plan::check::model::CheckedHand;
 use regrasp_plan::check::roles::{contact_of, moving_finger};
 use regrasp_plan::check::violation::ViolationKind::{Collision, LandingOrLiftingNotFree};
 use regrasp_plan::plan::{ContactState, Plan, SegmentKind, Waypoint};
@@ -76,7 +76,7 @@ struct End {
 }
 
 /// Puts an extra waypoint after the beginning or before the end of a relocation, with the tip at `target`.
-fn push_free_tip(plan: &mut Plan, model: &Model, rng: &mut Rng, target: impl Fn(&End) -> Point) -> Option<()> {
+fn push_free_tip(plan: &mut Plan, model: &CheckedHand, rng: &mut Rng, target: impl Fn(&End) -> Point) -> Option<()> {
     let segment = any_segment(plan, rng, SegmentKind::Regrasp)?;
     let f = moving_finger(model, segment)?;
     let at_end = rng.chance(0.5);

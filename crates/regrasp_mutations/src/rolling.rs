@@ -5,7 +5,7 @@ use super::choice::{pick, places};
 use super::edit::move_tip;
 use regrasp_base::Rng;
 use regrasp_geometry::{Pose, Shape, UnitVector, Vector};
-use regrasp_plan::check::model::Model;
+use regrasp_plan::check::model::CheckedHand;
 use regrasp_plan::check::patch::Patch;
 use regrasp_plan::check::roles::contact_of;
 use regrasp_plan::check::surface;
@@ -113,7 +113,7 @@ impl Breeder<'_> {
 }
 
 /// A segment, and a finger that rolls in it and gets somewhere.
-fn pick_rolling(plan: &Plan, model: &Model, rng: &mut Rng) -> Option<(usize, usize)> {
+fn pick_rolling(plan: &Plan, model: &CheckedHand, rng: &mut Rng) -> Option<(usize, usize)> {
     let rolls = |segment: &Segment, f: usize| {
         let ends = [segment.waypoints.first(), segment.waypoints.last()];
         let [Some(from), Some(to)] = ends.map(|end| end.and_then(|w| w.contacts[f].point_in_object)) else {
@@ -131,7 +131,7 @@ pub(super) fn declare(plan: &mut Plan, s: usize, f: usize, mode: ContactMode) {
 
 /// Moves contact, tip and joints of finger `f` by `way` along the surface, `angle` from the first tangent.
 pub(super) fn slide(
-    model: &Model,
+    model: &CheckedHand,
     shape: &Shape,
     waypoint: &mut Waypoint,
     f: usize,
@@ -159,7 +159,7 @@ pub(super) fn slide(
 
 /// The arc on the ball of finger `f` that its link's turn sweeps, seen from the object and across the first contact's
 /// normal.
-fn arc_between(model: &Model, f: usize, from: &Waypoint, to: &Waypoint) -> Option<f64> {
+fn arc_between(model: &CheckedHand, f: usize, from: &Waypoint, to: &Waypoint) -> Option<f64> {
     let normal = contact_of(&from.contacts[f])?.normal_in_object.into_inner();
     let [before, after] = [from, to].map(|waypoint| {
         let world_from_link =
@@ -171,7 +171,7 @@ fn arc_between(model: &Model, f: usize, from: &Waypoint, to: &Waypoint) -> Optio
 }
 
 /// Some when the link of finger `f` turns so much over its contact that the tip must slide, if the contact stays.
-fn pivots(model: &Model, segment: &Segment, f: usize, slip_tolerance: f64) -> Option<()> {
+fn pivots(model: &CheckedHand, segment: &Segment, f: usize, slip_tolerance: f64) -> Option<()> {
     let arc = arc_between(model, f, segment.waypoints.first()?, segment.waypoints.last()?)?;
     (arc > 2.0 * slip_tolerance).then_some(())
 }

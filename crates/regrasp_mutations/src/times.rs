@@ -5,7 +5,7 @@ use super::choice::{any_drive, any_waypoint, pick, pick_waypoint, waypoints_mut}
 use regrasp_base::Rng;
 use regrasp_geometry::Vector;
 use regrasp_plan::check::between::Between;
-use regrasp_plan::check::model::Model;
+use regrasp_plan::check::model::CheckedHand;
 use regrasp_plan::check::violation::ViolationKind::{
     ContactOffTip, JointAcceleration, JointTooFast, NotANumber, PromiseBroken, TimeOrder, TooFast,
     VelocityInconsistent, WrongScene,
@@ -250,7 +250,7 @@ fn shift_from(plan: &mut Plan, s: usize, by: f64) {
     plan.segments[s..].iter_mut().for_each(late);
 }
 
-fn longest_way(model: &Model, from: &Waypoint, to: &Waypoint) -> f64 {
+fn longest_way(model: &CheckedHand, from: &Waypoint, to: &Waypoint) -> f64 {
     let ways = model
         .fingers
         .iter()

@@ -7,7 +7,7 @@ use super::{Breeder, Mutant};
 use nalgebra::Rotation3;
 use regrasp_base::Rng;
 use regrasp_geometry::{Pose, Vector};
-use regrasp_plan::check::model::Model;
+use regrasp_plan::check::model::CheckedHand;
 use regrasp_plan::check::pose::pose_difference;
 use regrasp_plan::check::roles::contact_of;
 use regrasp_plan::check::surface;
@@ -445,7 +445,7 @@ fn is_all(segment: &Segment, f: usize, mode: ContactMode) -> bool {
 
 /// True when finger `f` clearly does it in the segment: by its stated velocity, which a good plan has right, and by its
 /// turns from waypoint to waypoint.
-fn does_it(model: &Model, segment: &Segment, f: usize, does: Does, slip_tolerance: f64) -> bool {
+fn does_it(model: &CheckedHand, segment: &Segment, f: usize, does: Does, slip_tolerance: f64) -> bool {
     let seen = |waypoint: &Waypoint| {
         let link = regrasp_plan::check::kinematics::pose_of(&model.fingers[f].path.world_from_link(&waypoint.joints));
         Pose::from(&waypoint.world_from_object).rotation.inverse() * link.rotation
@@ -471,33 +471,19 @@ fn does_it(model: &Model, segment: &Segment, f: usize, does: Does, slip_toleranc
     segment.waypoints.windows(2).map(amount).sum::<f64>() > 2.0 * CLEARLY
 }
 
-/// An inner waypoint of a tracking segment and a finger whose contact there fits.
-fn pick_tracked(
+/// Inner waypoints of tracking segments and fingers, of which one is drawn.
+///
+/// `is_meant` says which fingers of a segment are asked about; `fits`, which of their contacts.
+fn pick_inner(
     plan: &Plan,
-    model: &Model,
+    model: &CheckedHand,
     rng: &mut Rng,
+    is_meant: impl Fn(&Segment, usize) -> bool,
     fits: impl Fn(&ContactState) -> bool,
 ) -> Option<(usize, usize, usize)> {
     let mut found = Vec::new();
     for (s, segment) in plan.segments.iter().enumerate().filter(|(_, segment)| segment.kind == SegmentKind::Tracking) {
-        for (w, waypoint) in segment.waypoints.iter().enumerate().skip(1).take(segment.waypoints.len() - 2) {
-            let fitting = (0..model.fingers.len()).filter(|&f| fits(&waypoint.contacts[f]));
-            found.extend(fitting.map(|f| (s, w, f)));
-        }
-    }
-    pick(&mut found, rng).copied()
-}
-
-/// As [`pick_tracked`], a moving finger.
-fn pick_moving(
-    plan: &Plan,
-    model: &Model,
-    rng: &mut Rng,
-    fits: impl Fn(&ContactState) -> bool,
-) -> Option<(usize, usize, usize)> {
-    let mut found = Vec::new();
-    for (s, segment) in plan.segments.iter().enumerate().filter(|(_, segment)| segment.kind == SegmentKind::Tracking) {
-        for f in (0..model.fingers.len()).filter(|&f| may_move(model, segment, f)) {
+        for f in (0..model.fingers.len()).filter(|&f| is_meant(segment, f)) {
             let inner = 1..segment.waypoints.len() - 1;
             found.extend(inner.filter(|&w| fits(&segment.waypoints[w].contacts[f])).map(|w| (s, w, f)));
         }
@@ -505,10 +491,30 @@ fn pick_moving(
     pick(&mut found, rng).copied()
 }
 
+/// An inner waypoint of a tracking segment and a finger whose contact there fits.
+fn pick_tracked(
+    plan: &Plan,
+    model: &CheckedHand,
+    rng: &mut Rng,
+    fits: impl Fn(&ContactState) -> bool,
+) -> Option<(usize, usize, usize)> {
+    pick_inner(plan, model, rng, |_, _| true, fits)
+}
+
+/// As [`pick_tracked`], a moving finger.
+fn pick_moving(
+    plan: &Plan,
+    model: &CheckedHand,
+    rng: &mut Rng,
+    fits: impl Fn(&ContactState) -> bool,
+) -> Option<(usize, usize, usize)> {
+    pick_inner(plan, model, rng, |segment, f| may_move(model, segment, f), fits)
+}
+
 /// Gives a contact that fits another relative velocity, by the one that it has and the normal.
 fn change_velocity(
     plan: &mut Plan,
-    model: &Model,
+    model: &CheckedHand,
     rng: &mut Rng,
     fits: impl Fn(&ContactState) -> bool,
     change: impl Fn(Vector, &Vector) -> Vector,
@@ -522,7 +528,7 @@ fn change_velocity(
 }
 
 /// Gives a contact that turns another relative turn.
-fn change_turn(plan: &mut Plan, model: &Model, rng: &mut Rng, change: impl Fn(Vector) -> Vector) -> Option<()> {
+fn change_turn(plan: &mut Plan, model: &CheckedHand, rng: &mut Rng, change: impl Fn(Vector) -> Vector) -> Option<()> {
     let turns =
         |contact: &ContactState| contact.relative_turn_in_object.is_some_and(|turn| Vector::from(turn).norm() > 1e-2);
     let (s, w, f) = pick_tracked(plan, model, rng, turns)?;
@@ -534,7 +540,7 @@ fn change_turn(plan: &mut Plan, model: &Model, rng: &mut Rng, change: impl Fn(Ve
 /// Gives a fingertip that slides another force across the normal.
 fn change_friction(
     plan: &mut Plan,
-    model: &Model,
+    model: &CheckedHand,
     rng: &mut Rng,
     change: impl Fn(Vector, &Vector) -> Vector,
 ) -> Option<()> {

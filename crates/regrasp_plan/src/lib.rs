@@ -7,4 +7,7 @@ pub mod format;
 /// The plan and its parts.
 pub mod plan;
 
+/// Grasp lists: their type and file.
+pub use regrasp_grasp::list as grasps;
+
 pub use plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};

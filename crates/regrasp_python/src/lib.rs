@@ -5,6 +5,8 @@
 
 /// Scenes and hands as JSON.
 mod describe;
+/// TOML documents with the lines of their keys.
+mod document;
 /// Rust errors as Python exceptions.
 mod error;
 /// No panic crosses the border.
@@ -27,9 +29,11 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _regrasp {
     #[pymodule_export]
+    use super::document::parse_toml;
+    #[pymodule_export]
     use super::guard::panic_for_tests;
     #[pymodule_export]
-    use super::model::{Hand, Scene};
+    use super::model::{Hand, Scene, hand_file};
     #[pymodule_export]
     use super::place::place;
     #[pymodule_export]
@@ -37,7 +41,7 @@ mod _regrasp {
     #[pymodule_export]
     use super::search::{check, find_scene, plan};
     #[pymodule_export]
-    use super::view::page;
+    use super::view::{page, storyboard};
 
     use pyo3::prelude::*;
 

@@ -1,7 +1,6 @@
 //! Cheapest paths in a graph: A* (Hart, Nilsson, Raphael 1968).
 
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
+use crate::open_list::{OpenList, Rank};
 
 /// A path and its cost.
 #[derive(Debug, Clone, PartialEq)]
@@ -10,30 +9,6 @@ pub struct CheapestPath {
     pub nodes: Vec<usize>,
     /// Sum of the costs of the edges.
     pub cost: f64,
-}
-
-/// An entry of the queue; the greatest is the one with the smallest estimate, then the one that has come farthest, then the
-/// smallest node.
-#[derive(Debug, PartialEq)]
-struct Open {
-    estimate: f64,
-    cost: f64,
-    node: usize,
-}
-
-impl Eq for Open {}
-
-impl Ord for Open {
-    fn cmp(&self, other: &Self) -> Ordering {
-        let farther = self.cost.total_cmp(&other.cost);
-        other.estimate.total_cmp(&self.estimate).then(farther).then(other.node.cmp(&self.node))
-    }
-}
-
-impl PartialOrd for Open {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
 }
 
 /// The cheapest path from `start` to the first node for which `is_goal` holds; none when there is none. One search with
@@ -74,7 +49,7 @@ impl Limits {
 pub struct AStar {
     marks: Vec<Mark>,
     search: u32,
-    queue: BinaryHeap<Open>,
+    queue: OpenList<()>,
     edges: Vec<(usize, f64)>,
     n_expanded: usize,
 }
@@ -119,17 +94,17 @@ impl AStar {
     ) -> Option<CheapestPath> {
         self.begin();
         self.reach(start, start, 0.0);
-        self.queue.push(Open { estimate: heuristic(start), cost: 0.0, node: start });
-        while let Some(open) = self.queue.pop() {
+        self.queue.push(Rank { estimate: heuristic(start), cost: 0.0, number: start }, ());
+        while let Some((open, ())) = self.queue.pop() {
             // A cheaper way was found after this entry was queued.
-            if open.cost > self.marks[open.node].cost {
+            if open.cost > self.marks[open.number].cost {
                 continue;
             }
             if open.estimate >= limits.cost {
                 return None;
             }
-            if is_goal(open.node) {
-                return Some(CheapestPath { nodes: self.way_to(open.node, start), cost: open.cost });
+            if is_goal(open.number) {
+                return Some(CheapestPath { nodes: self.way_to(open.number, start), cost: open.cost });
             }
             if self.n_expanded >= limits.n_expanded {
                 return None;
@@ -137,12 +112,12 @@ impl AStar {
             self.n_expanded += 1;
             let mut edges = std::mem::take(&mut self.edges);
             edges.clear();
-            neighbours(open.node, &mut edges);
+            neighbours(open.number, &mut edges);
             for &(next, edge_cost) in &edges {
-                assert!(edge_cost >= 0.0, "edge {} - {next} costs {edge_cost}", open.node);
+                assert!(edge_cost >= 0.0, "edge {} - {next} costs {edge_cost}", open.number);
                 let cost = open.cost + edge_cost;
-                if self.reach(next, open.node, cost) {
-                    self.queue.push(Open { estimate: cost + heuristic(next), cost, node: next });
+                if self.reach(next, open.number, cost) {
+                    self.queue.push(Rank { estimate: cost + heuristic(next), cost, number: next }, ());
                 }
             }
             self.edges = edges;

@@ -9,6 +9,8 @@ pub mod astar;
 pub mod components;
 /// Nearest neighbours, by looking at all.
 pub mod nearest;
+/// What a best-first search has still to look at.
+pub mod open_list;
 /// Two trees that grow towards each other, in a box of real coordinates.
 pub mod rrt_connect;
 /// Shortcuts.
@@ -20,6 +22,7 @@ pub mod visibility_prm;
 
 pub use astar::{AStar, CheapestPath, Limits, cheapest_path};
 pub use components::Components;
+pub use open_list::{OpenList, Rank};
 pub use rrt_connect::{RrtConnect, RrtSettings};
 pub use smoothing::{shorten_path, shorten_polyline};
 pub use space::Space;

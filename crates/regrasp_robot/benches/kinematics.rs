@@ -6,7 +6,7 @@ use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 use regrasp_robot::kinematics::body_frame::BodyFrame;
 use regrasp_robot::kinematics::finger_ik::{FingerIk, IkSettings, Preference};
 use regrasp_robot::kinematics::motion_bound::MotionBound;
-use regrasp_robot::{Chain, ChainJoint, Coupling, Motion};
+use regrasp_robot::{Chain, ChainJoint, Coupling, JointMotion};
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -14,7 +14,7 @@ fn chain(joints: &[(Vector, Vector, [f64; 2])]) -> Chain {
     let turning = |(i, (origin, axis, _)): (usize, &(Vector, Vector, [f64; 2]))| ChainJoint {
         parent_from_joint: Pose::new(*origin, Vector::zeros()),
         axis: UnitVector::new_normalize(*axis),
-        motion: Motion::Turn,
+        motion: JointMotion::Turn,
         drive: Coupling::independent(i),
     };
     Chain::new(

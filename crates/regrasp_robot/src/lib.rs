@@ -28,7 +28,7 @@ pub use coupling::{Coupling, LinearLimit};
 pub use hand::{Finger, FingerId, FingerShape, Hand};
 pub use import::{LoadOptions, LoadedHand, LoadedInput, LoadedManipulator, LoadedRobot, ResolveOptions};
 pub use import::{load_hand, load_manipulator, load_robot};
-pub use kinematics::chain::{Chain, ChainJoint, Motion};
+pub use kinematics::chain::{Chain, ChainJoint, JointMotion};
 pub use manipulator::layout::{JointLayout, Part};
 pub use manipulator::{Arm, LinkShape, Manipulator, MountedHand};
 pub use robot::{Joint, JointId, JointKind, Limits, Link, LinkId, Robot, Visual, VisualGeometry, VisualMesh};

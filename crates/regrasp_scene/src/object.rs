@@ -1,6 +1,7 @@
 //! The object that is manipulated.
 
 use regrasp_geometry::collision::MeshBody;
+use regrasp_geometry::surface::SurfacePoint;
 use regrasp_geometry::{Point, Shape, Surface};
 
 /// A rigid object. Its frame is the frame of its shape.
@@ -34,5 +35,11 @@ impl Object {
     /// What all but the fingertips keep away from: the shape, or its hull.
     pub fn solid(&self) -> &Shape {
         self.hull.as_ref().unwrap_or(&self.shape)
+    }
+
+    /// True when a contact at `at` keeps its distance from creases.
+    #[inline]
+    pub fn keeps_off_edges(&self, at: &SurfacePoint) -> bool {
+        self.edge_distance <= 0.0 || self.surface.crease_distance(at) >= self.edge_distance
     }
 }

@@ -5,7 +5,7 @@ use regrasp_plan::plan::{ContactMode, Plan, Segment, SegmentKind, Waypoint};
 
 /// One waypoint, with the segment it belongs to. The waypoint that two segments share comes twice, as in the plan.
 #[derive(Debug, Clone, Copy)]
-pub struct Step<'p> {
+pub struct TimelineStep<'p> {
     /// Index of the segment.
     pub segment: usize,
     /// The waypoint.
@@ -13,10 +13,10 @@ pub struct Step<'p> {
 }
 
 /// All waypoints, segment by segment: the order of every series of one number per waypoint.
-pub fn steps(plan: &Plan) -> Vec<Step<'_>> {
+pub fn steps(plan: &Plan) -> Vec<TimelineStep<'_>> {
     let mut steps = Vec::new();
     for (segment, data) in plan.segments.iter().enumerate() {
-        steps.extend(data.waypoints.iter().map(|waypoint| Step { segment, waypoint }));
+        steps.extend(data.waypoints.iter().map(|waypoint| TimelineStep { segment, waypoint }));
     }
     steps
 }
@@ -239,13 +239,13 @@ pub fn nearest_vector(vector: &Vector, to: &Vector) -> Vector {
 /// Angle by which the object turns all along the plan: the sum of those between neighbouring waypoints, in radians.
 pub fn angle_along(plan: &Plan) -> f64 {
     let steps = steps(plan);
-    let rotation = |step: &Step| Pose::from(&step.waypoint.world_from_object).rotation;
+    let rotation = |step: &TimelineStep| Pose::from(&step.waypoint.world_from_object).rotation;
     steps.windows(2).map(|pair| rotation(&pair[0]).angle_to(&rotation(&pair[1]))).sum()
 }
 
 /// Where a finger touches at each of [`steps`]: contact point and outward normal, in the object frame; none while it is free.
 pub fn trace(plan: &Plan, finger: usize) -> Vec<Option<(Point, Vector)>> {
-    let at = |step: &Step| {
+    let at = |step: &TimelineStep| {
         let contact = step.waypoint.contacts.get(finger).filter(|contact| contact.holds())?;
         Some((Point::from(contact.point_in_object?), Vector::from(contact.normal_in_object?)))
     };

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 /// Groups of codes, by their beginning.
-const GROUPS: [(&str, &str); 11] = [
+const GROUPS: [(&str, &str); 12] = [
     ("F0", "Files"),
     ("V0", "Numbers and names"),
     ("U1", "Robot files (URDF, SRDF) and packages"),
@@ -17,6 +17,7 @@ const GROUPS: [(&str, &str); 11] = [
     ("A5", "Arguments of the command line and of Python functions"),
     ("B6", "Suite files"),
     ("R6", "Roadmap files"),
+    ("G7", "Grasp lists"),
 ];
 /// How far behind a code its message is looked for.
 const WINDOW: usize = 420;
@@ -83,7 +84,7 @@ fn described() -> Result<BTreeMap<String, String>, String> {
 fn codes(text: &str) -> Vec<(usize, &str)> {
     let is_code = |word: &str| {
         let (letter, digits) = word.split_at(1);
-        "FVUMSPCABR".contains(letter) && digits.bytes().all(|byte| byte.is_ascii_digit())
+        "FVUMSPCABRG".contains(letter) && digits.bytes().all(|byte| byte.is_ascii_digit())
     };
     let quotes = text.match_indices('"').map(|(at, _)| at);
     let inside = quotes.filter_map(|at| {

@@ -3,17 +3,9 @@
 use crate::bad_input::complains;
 use crate::folder::Folder;
 
-/// A folder with a plan in it.
-fn planned() -> Folder {
-    let folder = Folder::new();
-    let run = folder.run(&["plan", "scene.toml", "-o", "plan.json"]);
-    assert_eq!(run.code, Some(0), "{run:?}");
-    folder
-}
-
 #[test]
 fn formats_asked_for_are_written_and_no_other() {
-    let folder = planned();
+    let folder = Folder::planned();
     let run = folder.run(&["export", "plan.json", "--npz", "plan.npz", "--ros2", "plan.yaml", "--json"]);
     assert_eq!(run.code, Some(0), "{run:?}");
     assert_eq!(run.out.matches("\"event\":\"written\"").count(), 2, "{}", run.out);
@@ -30,7 +22,7 @@ fn formats_asked_for_are_written_and_no_other() {
 
 #[test]
 fn what_the_checker_rejects_is_not_exported_unless_forced() {
-    let folder = planned();
+    let folder = Folder::planned();
     folder.edit("scene.toml", "mass = 0.1", "mass = 0.2");
     let run = folder.run(&["export", "plan.json", "--ros2", "plan.yaml"]);
     assert_eq!(run.code, Some(1), "{run:?}");
@@ -49,7 +41,7 @@ fn without_a_format_there_is_nothing_to_do() {
 
 #[test]
 fn files_that_cannot_be_read_or_written() {
-    let folder = planned();
+    let folder = Folder::planned();
     let export = |arguments: &[&str]| folder.run(&[&["export"], arguments].concat());
     complains(&export(&["missing.json", "--npz", "a.npz"]), "F001", "missing.json", &["cannot be read"]);
     complains(&export(&["scene.toml", "--npz", "a.npz"]), "C401", "scene.toml:1", &["schema"]);

@@ -17,6 +17,14 @@ impl Folder {
         folder
     }
 
+    /// The same, with `plan.json`, an accepted plan of the scene.
+    pub fn planned() -> Self {
+        let folder = Folder::new();
+        let run = folder.run(&["plan", "scene.toml", "-o", "plan.json"]);
+        assert_eq!(run.code, Some(0), "{run:?}");
+        folder
+    }
+
     /// The path of a file in it.
     pub fn path(&self, name: &str) -> PathBuf {
         self.0.path().join(name)

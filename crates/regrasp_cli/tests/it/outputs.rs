@@ -6,17 +6,10 @@ use std::fs;
 use std::os::unix::fs::{PermissionsExt, symlink};
 use std::process::Stdio;
 
-fn planned() -> Folder {
-    let folder = Folder::new();
-    let run = folder.run(&["plan", "scene.toml", "-o", "plan.json"]);
-    assert_eq!(run.code, Some(0), "{run:?}");
-    folder
-}
-
 /// The file of the first argument is the file of the second, in all the ways in which it can be.
 #[test]
 fn two_outputs_to_one_file_are_refused_however_they_are_spelled() {
-    let folder = planned();
+    let folder = Folder::planned();
     fs::write(folder.path("there"), "x").unwrap();
     fs::hard_link(folder.path("there"), folder.path("hard")).unwrap();
     symlink("there", folder.path("soft")).unwrap();
@@ -67,7 +60,7 @@ fn two_outputs_to_one_file_are_refused_however_they_are_spelled() {
 
 #[test]
 fn inputs_are_not_written_over_by_any_of_their_names() {
-    let folder = planned();
+    let folder = Folder::planned();
     fs::hard_link(folder.path("scene.toml"), folder.path("hard")).unwrap();
     symlink("hand.urdf", folder.path("soft")).unwrap();
     fs::write(folder.path("settings.json"), "{}").unwrap();
@@ -112,7 +105,7 @@ fn with_lost_stdout(folder: &Folder, arguments: &[&str]) -> [Run; 2] {
 /// No result that nobody got is a good one.
 #[test]
 fn a_failed_write_to_stdout_is_no_success() {
-    let folder = planned();
+    let folder = Folder::planned();
     let commands: [&[&str]; 9] = [
         &["plan", "scene.toml"],
         &["plan", "scene.toml", "--json"],
@@ -181,7 +174,7 @@ fn one_bad_scene_does_not_end_a_bench() {
 /// Names and times that no format holds are refused with a code, and no file is written.
 #[test]
 fn what_a_format_cannot_hold_is_not_exported() {
-    let folder = planned();
+    let folder = Folder::planned();
     let mut plan: serde_json::Value = serde_json::from_slice(&fs::read(folder.path("plan.json")).unwrap()).unwrap();
     for segment in plan["segments"].as_array_mut().unwrap() {
         for waypoint in segment["waypoints"].as_array_mut().unwrap() {
@@ -201,7 +194,7 @@ fn what_a_format_cannot_hold_is_not_exported() {
 /// `view` has no `--scene`: its advice says how to name one.
 #[test]
 fn a_plan_without_its_scene_is_told_how_to_name_one() {
-    let folder = planned();
+    let folder = Folder::planned();
     fs::create_dir(folder.path("deep")).unwrap();
     fs::rename(folder.path("scene.toml"), folder.path("deep/other.toml")).unwrap();
     let view = folder.run(&["view", "plan.json", "-o", "page.html"]);
@@ -213,7 +206,7 @@ fn a_plan_without_its_scene_is_told_how_to_name_one() {
 /// Advice is about what was short, and words about what they are of.
 #[test]
 fn words_say_what_is_meant() {
-    let folder = planned();
+    let folder = Folder::planned();
     let none = folder.run(&["plan", "scene.toml", "--max-work", "0", "-o", "none.json"]);
     assert_eq!(none.code, Some(1), "{none:?}");
     assert!(none.err.contains("allow more work") && !none.err.contains("more time"), "{}", none.err);

@@ -4,13 +4,6 @@ use crate::bad_input::complains;
 use crate::folder::Folder;
 use crate::places::repository;
 
-fn planned() -> Folder {
-    let folder = Folder::new();
-    let run = folder.run(&["plan", "scene.toml", "-o", "plan.json"]);
-    assert_eq!(run.code, Some(0), "{run:?}");
-    folder
-}
-
 fn bytes(folder: &Folder, name: &str) -> Vec<u8> {
     std::fs::read(folder.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
@@ -26,7 +19,7 @@ fn names(folder: &Folder, name: &str) -> Vec<String> {
 
 #[test]
 fn a_plan_has_a_storyboard_and_charts_and_they_are_the_same_again() {
-    let folder = planned();
+    let folder = Folder::planned();
     let view = |png: &str, svg: &str| {
         let size = ["--frames", "3", "--width", "360", "--columns", "3"];
         let run = folder.run(&[&["view", "plan.json", "--png", png, "--svg", svg], &size[..]].concat());
@@ -46,7 +39,7 @@ fn a_plan_has_a_storyboard_and_charts_and_they_are_the_same_again() {
 
 #[test]
 fn pictures_that_cannot_be_made_are_refused() {
-    let folder = planned();
+    let folder = Folder::planned();
     let plan = bytes(&folder, "plan.json");
     for (arguments, code) in [
         (&["--png", "a.png", "--frames", "1"][..], "A505"),

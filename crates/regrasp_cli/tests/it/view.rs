@@ -5,14 +5,6 @@ use crate::folder::{Folder, Run};
 use crate::places::repository;
 use serde_json::Value;
 
-/// A folder with a plan in it.
-fn planned() -> Folder {
-    let folder = Folder::new();
-    let run = folder.run(&["plan", "scene.toml", "-o", "plan.json"]);
-    assert_eq!(run.code, Some(0), "{run:?}");
-    folder
-}
-
 /// What the page `name` was told.
 fn story(folder: &Folder, name: &str) -> Value {
     let page = std::fs::read_to_string(folder.path(name)).unwrap();
@@ -33,7 +25,7 @@ fn ends_with_page(run: &Run, name: &str) {
 
 #[test]
 fn the_page_of_a_plan_has_the_plan_and_the_verdict() {
-    let folder = planned();
+    let folder = Folder::planned();
     let run = folder.run(&["view", "plan.json", "-o", "plan.html", "--story", "story.json", "--title", "<b>A & B</b>"]);
     assert_eq!(run.code, Some(0), "{run:?}");
     ends_with_page(&run, "plan.html");
@@ -52,7 +44,7 @@ fn the_page_of_a_plan_has_the_plan_and_the_verdict() {
 
 #[test]
 fn a_rejected_plan_has_a_page_that_says_so() {
-    let folder = planned();
+    let folder = Folder::planned();
     folder.edit("scene.toml", "mass = 0.1", "mass = 0.2");
     let run = folder.run(&["view", "plan.json", "-o", "plan.html"]);
     assert_eq!(run.code, Some(0), "{run:?}");
@@ -83,7 +75,7 @@ fn plan_reports_success_and_failure() {
     assert!(!told["failure"]["advice"].as_str().unwrap().is_empty());
     let miss = &told["failure"]["nearest_miss"];
     assert!(miss["distance_left"].as_f64().unwrap() > 0.005, "{miss}");
-    assert_eq!(miss["joints"].as_array().unwrap().len(), told["scene"]["joints"].as_array().unwrap().len());
+    assert_eq!(miss["joints"].as_array().unwrap().len(), told["scene"]["hands"][0]["joints"].as_array().unwrap().len());
     assert_eq!(told["asked"].as_array().unwrap().len(), 2);
     // What was reached, with what hangs together.
     let nodes = told["roadmap"]["nodes"].as_array().unwrap();
@@ -106,7 +98,7 @@ fn the_demo_ends_with_the_path_of_its_page() {
 
 #[test]
 fn over_ssh_there_is_a_hint() {
-    let folder = planned();
+    let folder = Folder::planned();
     let run = |ssh: bool| {
         let mut command = folder.command(&["view", "plan.json", "-o", "plan.html"]);
         match ssh {
@@ -120,7 +112,7 @@ fn over_ssh_there_is_a_hint() {
 
 #[test]
 fn the_graph_of_a_roadmap_is_shown_with_the_way_through_it() {
-    let folder = planned();
+    let folder = Folder::planned();
     let build = ["roadmap", "build", "scene.toml", "-o", "a.roadmap", "--places", "12", "--angle", "30"];
     assert_eq!(folder.run(&build).code, Some(0));
     let run = folder.run(&["view", "plan.json", "-o", "plan.html", "--with-roadmap", "a.roadmap"]);
@@ -147,7 +139,7 @@ fn the_graph_of_a_roadmap_is_shown_with_the_way_through_it() {
 
 #[test]
 fn files_that_cannot_be_read_or_written() {
-    let folder = planned();
+    let folder = Folder::planned();
     let view = |arguments: &[&str]| folder.run(&[&["view"], arguments].concat());
     complains(&view(&["missing.json", "-o", "a.html"]), "F001", "missing.json", &["cannot be read"]);
     complains(&view(&["plan.json", "-o", "none/a.html"]), "F003", "none/a.html", &["cannot be written"]);
@@ -188,11 +180,13 @@ fn markup_in_files_and_their_names_stays_text() {
     assert_eq!(run.code, Some(0), "{run:?}");
     let told = story(&folder, "plan.html");
     assert_eq!(told["title"], "<b onload=x>&");
-    assert_eq!(told["scene"]["links"][0]["name"], link);
-    let names = |list: &str| -> Vec<String> {
-        told["scene"][list].as_array().unwrap().iter().map(|entry| entry["name"].as_str().unwrap().to_owned()).collect()
+    let hand = &told["scene"]["hands"][0];
+    assert_eq!(hand["links"][0]["name"], link);
+    let names = |list: &Value| -> Vec<String> {
+        list.as_array().unwrap().iter().map(|entry| entry["name"].as_str().unwrap().to_owned()).collect()
     };
-    assert!(names("fingers").iter().any(|name| name == finger) && names("pieces").iter().any(|name| name == object));
+    assert!(names(&hand["fingers"]).iter().any(|name| name == finger));
+    assert_eq!(names(&told["scene"]["objects"]), [object]);
     let page = std::fs::read_to_string(folder.path("plan.html")).unwrap();
     // The viewer apart, which is the same in every page.
     let (own, _) = page.rsplit_once("<script>").unwrap();

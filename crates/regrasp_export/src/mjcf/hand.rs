@@ -6,7 +6,7 @@ use super::names::HandNames;
 use super::tip::{own_tip, tip_name};
 use super::xml::{Xml, numbers};
 use regrasp_geometry::{Point, Pose};
-use regrasp_robot::{Coupling, Finger, Hand, JointId, JointKind, Motion};
+use regrasp_robot::{Coupling, Finger, Hand, JointId, JointKind, JointMotion};
 use regrasp_scene::SceneHand;
 
 const PALM_COLOR: &str = "0.55 0.56 0.6 1";
@@ -99,8 +99,8 @@ impl<'a> ModelHand<'a> {
         let mut attributes =
             vec![("name", self.names.joint(self.hand(), id)), ("axis", numbers(joint.axis.iter().copied()))];
         match joint.motion {
-            Motion::Turn => attributes.push(("type", "hinge".into())),
-            Motion::Slide => attributes.extend([("type", "slide".into()), ("class", "slide".into())]),
+            JointMotion::Turn => attributes.push(("type", "hinge".into())),
+            JointMotion::Slide => attributes.extend([("type", "slide".into()), ("class", "slide".into())]),
         }
         let limits = match (&as_read.coupling, joint.drive.single()) {
             // The coupling holds a follower within its limits, which the leader's already respect.
@@ -214,7 +214,7 @@ impl<'a> ModelHand<'a> {
                 match self.drive {
                     Drive::Motors => xml.leaf("motor", &attributes),
                     Drive::Servos => {
-                        let lever = if joint.motion == Motion::Turn { reach } else { 1.0 };
+                        let lever = if joint.motion == JointMotion::Turn { reach } else { 1.0 };
                         let factor = (lever / SERVO_REACH).powi(2);
                         attributes.push(("kp", numbers([SERVO_STIFFNESS * factor])));
                         attributes.push(("kv", numbers([SERVO_DAMPING * factor])));
@@ -262,7 +262,7 @@ fn moving_joints(hand: &Hand, finger: &Finger) -> Vec<JointId> {
 /// Distance from the first turning joint of a finger to its tip along the straight finger, in metres.
 fn reach(finger: &Finger) -> f64 {
     let joints = &finger.chain.joints;
-    let Some(first) = joints.iter().position(|joint| joint.motion == Motion::Turn) else { return SERVO_REACH };
+    let Some(first) = joints.iter().position(|joint| joint.motion == JointMotion::Turn) else { return SERVO_REACH };
     let links = joints[first + 1..].iter().map(|joint| joint.parent_from_joint.translation.vector.norm());
     (links.sum::<f64>() + finger.tip.center_in_body.coords.norm()).max(LEAST_REACH)
 }

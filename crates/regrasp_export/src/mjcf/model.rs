@@ -20,7 +20,7 @@ const SUPPORT_COLOR: &str = "0.62 0.58 0.5 1";
 const ROBOT_COLOR: &str = "0.7 0.71 0.74 1";
 
 /// Everything that stands in the model.
-pub(super) struct Model<'a> {
+pub(super) struct MjcfModel<'a> {
     pub task: &'a Manipulation<'a>,
     pub names: &'a Names,
     /// Links of robots that belong to no hand, where they rest.
@@ -36,7 +36,7 @@ pub(super) fn write(task: &Manipulation, plan: &Plan) -> Mjcf {
     let names = Names::of(scene, &solids, &links);
     let gravity = plan.promises.forces.as_ref().map_or(Some(GRAVITY), |forces| forces.gravity_in_world);
     let gravity = gravity.unwrap_or(GRAVITY);
-    let model = Model::new(task, plan, (&names, &solids, &links), &Vector::from(gravity));
+    let model = MjcfModel::new(task, plan, (&names, &solids, &links), &Vector::from(gravity));
     let mut xml = Xml::default();
     xml.open("mujoco", &[("model", scene.name.clone())]);
     write_settings(&mut xml, gravity);
@@ -86,7 +86,7 @@ fn write_settings(xml: &mut Xml, gravity: [f64; 3]) {
     xml.close();
 }
 
-impl<'a> Model<'a> {
+impl<'a> MjcfModel<'a> {
     fn new(
         task: &'a Manipulation<'a>,
         plan: &Plan,
@@ -109,12 +109,12 @@ impl<'a> Model<'a> {
             };
             ModelObject { object, names, solid: &solids[index], world_from_object, hold }
         });
-        Model { task, names, links, hands: hands.collect(), objects: objects.collect() }
+        MjcfModel { task, names, links, hands: hands.collect(), objects: objects.collect() }
     }
 
     /// Obstacles, supports, then links of robots, each with the name of its geom and its colour.
     fn fixed(&self) -> impl Iterator<Item = (&'a Obstacle, &'a str, &'static str)> {
-        let Model { task, names, links, .. } = *self;
+        let MjcfModel { task, names, links, .. } = *self;
         let obstacles = task.scene.obstacles.iter().zip(&names.obstacles);
         let obstacles = obstacles.map(|(body, name)| (body, name.as_str(), OBSTACLE_COLOR));
         let supports = task.scene.supports.iter().zip(&names.supports);

@@ -5,7 +5,7 @@ use super::inertia;
 use super::names::ObjectNames;
 use super::solid::ObjectSolid;
 use super::xml::Xml;
-use regrasp_geometry::collision::{Answer, Placed, Placement, separation};
+use regrasp_geometry::collision::{Placed, Placement, Separation, separation};
 use regrasp_geometry::{Pose, Shape, Vector};
 use regrasp_scene::{Object, Support};
 
@@ -93,5 +93,5 @@ fn is_apart((object, world_from_object): (&Shape, &Pose), (body, world_from_body
         &mut Vector::zeros(),
         &mut [0; 2],
     );
-    matches!(answer, Answer::SeparatedBy(_))
+    matches!(answer, Separation::SeparatedBy(_))
 }

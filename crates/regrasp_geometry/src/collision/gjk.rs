@@ -8,7 +8,7 @@ use crate::shape::Shape;
 
 /// Answer to a distance question.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Answer {
+pub enum Separation {
     /// The shapes are apart by at least this much, in metres; the direction found proves it.
     SeparatedBy(f64),
     /// The shapes are closer than was asked for: touching, penetrating, or just too near.
@@ -43,7 +43,7 @@ pub fn separation(
     enough: f64,
     direction: &mut Vector,
     hints: &mut [u32; 2],
-) -> Answer {
+) -> Separation {
     let (Placed { shape: a, at: parent_from_a }, Placed { shape: b, at: parent_from_b }) = (first, second);
     if !(direction.norm_squared() > 1e-30) {
         *direction = parent_from_b.translation - parent_from_a.translation;
@@ -60,7 +60,7 @@ pub fn separation(
 }
 
 /// [`separation`] of a placed convex shape from the hull of a few points of the same parent.
-pub fn separation_from_points(a: &Shape, parent_from_a: &Placement, points: &[Point], required: f64) -> Answer {
+pub fn separation_from_points(a: &Shape, parent_from_a: &Placement, points: &[Point], required: f64) -> Separation {
     let mut hint = 0;
     let mut direction = points[0].coords - parent_from_a.translation;
     search(
@@ -85,7 +85,7 @@ fn search(
     required: f64,
     enough: f64,
     direction: &mut Vector,
-) -> Answer {
+) -> Separation {
     let mut simplex = Simplex::default();
     // v is the point of the core difference B - A nearest to the origin found so far; it points from a to b.
     let mut v = if direction.norm_squared() > 1e-30 { *direction } else { Vector::x() };
@@ -94,7 +94,7 @@ fn search(
     for _ in 0..MAX_ITERATIONS {
         let norm = v.norm();
         if !norm.is_finite() {
-            return Answer::Unresolved;
+            return Separation::Unresolved;
         }
         let w = support_b(&-v) - support_a(&v);
         let lower = v.dot(&w) / norm - radii;
@@ -104,10 +104,10 @@ fn search(
         }
         let upper = if is_distance { norm - radii } else { f64::INFINITY };
         if best >= required && (best >= enough || best >= NEARLY_EXACT * upper) {
-            return Answer::SeparatedBy(best);
+            return Separation::SeparatedBy(best);
         }
         if upper < required {
-            return Answer::TooNear;
+            return Separation::TooNear;
         }
         // No progress left: the bound is as good as it gets.
         if is_distance && upper - lower <= 1e-12 * (1.0 + norm) {
@@ -120,11 +120,11 @@ fn search(
         match simplex.nearest_to_origin() {
             Some(nearest) if nearest.norm_squared() > 1e-24 => v = nearest,
             // The origin lies in the core difference: the cores overlap.
-            _ => return Answer::TooNear,
+            _ => return Separation::TooNear,
         }
         is_distance = true;
     }
-    if best >= required { Answer::SeparatedBy(best) } else { Answer::Unresolved }
+    if best >= required { Separation::SeparatedBy(best) } else { Separation::Unresolved }
 }
 
 /// Up to four points whose hull is searched for its point nearest to the origin.
@@ -271,7 +271,7 @@ mod tests {
         Placement::from(&Pose::from_parts(position.into(), rotation))
     }
 
-    fn distance(a: &Shape, at_a: &Placement, b: &Shape, at_b: &Placement) -> Answer {
+    fn distance(a: &Shape, at_a: &Placement, b: &Shape, at_b: &Placement) -> Separation {
         let mut direction = Vector::zeros();
         separation(
             Placed { shape: a, at: at_a },
@@ -338,16 +338,16 @@ mod tests {
             let (at_a, at_b) = (random_placement(&mut rng, 0.02), random_placement(&mut rng, 0.09));
             let reference = brute_force_gap(&a, &at_a, &b, &at_b, &mut rng);
             match distance(&a, &at_a, &b, &at_b) {
-                Answer::SeparatedBy(d) => {
+                Separation::SeparatedBy(d) => {
                     n_apart += 1;
                     assert!(d >= 0.97 * reference - 1e-7, "{a:?} {b:?}: {d} against {reference}");
                     assert!(d <= reference + 1e-6 + 2e-3 * reference, "{a:?} {b:?}: {d} against {reference}");
                 }
-                Answer::TooNear => {
+                Separation::TooNear => {
                     n_near += 1;
                     assert!(reference < 1e-6, "{a:?} {b:?}: gap {reference} not found");
                 }
-                Answer::Unresolved => assert!(reference < 1e-6, "unresolved at gap {reference}"),
+                Separation::Unresolved => assert!(reference < 1e-6, "unresolved at gap {reference}"),
             }
         }
         assert!(n_apart > 100 && n_near > 50, "{n_apart} {n_near}");
@@ -373,7 +373,7 @@ mod tests {
                 &mut [0; 2],
             );
             match answer {
-                Answer::SeparatedBy(d) => assert!(d <= exact + 1e-12 && d >= 0.97 * exact),
+                Separation::SeparatedBy(d) => assert!(d <= exact + 1e-12 && d >= 0.97 * exact),
                 _ => assert!(exact < 2e-9, "{answer:?} at {exact}"),
             }
         }
@@ -386,7 +386,7 @@ mod tests {
             let at_b =
                 Placement { rotation: nalgebra::Matrix3::identity(), translation: Vector::new(0.02 + gap, 0.0, 0.0) };
             match distance(&cube, &Placement::IDENTITY, &cube, &at_b) {
-                Answer::SeparatedBy(d) => assert!((d - gap).abs() <= 1e-15),
+                Separation::SeparatedBy(d) => assert!((d - gap).abs() <= 1e-15),
                 other => assert!(gap <= 1e-9, "{other:?} at {gap}"),
             }
         }

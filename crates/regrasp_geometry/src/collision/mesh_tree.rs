@@ -4,13 +4,15 @@
 //! triangles is wholly inside or wholly outside, so that one point of it is asked. Along a motion that stays apart from
 //! the triangles one moment is enough.
 
-use super::gjk::{Answer, Placed, separation};
+use super::gjk::{Placed, Separation, separation};
 use super::placement::Placement;
+use super::support::support_value;
 use super::winding::{self, Dipole};
 use crate::frame::{Point, Pose, Vector};
 use crate::hull::ConvexHull;
 use crate::mesh::TriangleMesh;
 use crate::shape::{PlacedShape, Shape};
+use crate::surface::nearest_on_triangle;
 use nalgebra::Matrix3;
 use std::sync::Arc;
 
@@ -38,14 +40,6 @@ struct Node {
 }
 
 const LEAF_SIZE: usize = 4;
-
-impl Node {
-    fn corners(&self) -> [Point; 8] {
-        std::array::from_fn(|i| {
-            Point::from(Vector::from_fn(|k, _| if i >> k & 1 == 1 { self.high[k] } else { self.low[k] }))
-        })
-    }
-}
 
 /// A mesh made ready for collision tests, once and for all of them.
 #[derive(Debug, Clone)]
@@ -150,19 +144,6 @@ impl MeshTree {
     /// True when the convex `shape`, placed in the mesh frame, is proved to be apart from every triangle by at least
     /// `required`, whether inside or outside. `smallest` receives a lower bound of the distance when true.
     pub fn is_apart(&self, shape: &Shape, mesh_from_shape: &Placement, required: f64, smallest: &mut f64) -> bool {
-        self.all_near(shape, mesh_from_shape, required, smallest, &mut |_| false)
-    }
-
-    /// As [`MeshTree::is_apart`], but what `excuse` says so of by its corners passes however near it is, and does not count
-    /// for `smallest`: a triangle, or a box of triangles. What excuses points must excuse all that lies between them.
-    pub fn all_near(
-        &self,
-        shape: &Shape,
-        mesh_from_shape: &Placement,
-        required: f64,
-        smallest: &mut f64,
-        excuse: &mut dyn FnMut(&[Point]) -> bool,
-    ) -> bool {
         let (center, radius) = shape.bounding_sphere();
         let center = mesh_from_shape.point(&center);
         *smallest = f64::INFINITY;
@@ -176,27 +157,9 @@ impl MeshTree {
                 *smallest = smallest.min(outside);
                 continue;
             }
-            // Asked first, as it is cheaper than a search.
-            if excuse(&node.corners()) {
-                continue;
-            }
-            let half = (node.high - node.low) / 2.0;
-            let at_box = Placement {
-                rotation: Matrix3::identity(),
-                translation: nalgebra::center(&node.low, &node.high).coords,
-            };
-            let cuboid = Shape::Cuboid { half_extents: half };
-            let mut direction = at_box.translation - mesh_from_shape.translation;
             // Of a ball the distance is known already.
             if !matches!(shape, Shape::Sphere { .. })
-                && let Answer::SeparatedBy(d) = separation(
-                    Placed { shape, at: mesh_from_shape },
-                    Placed { shape: &cuboid, at: &at_box },
-                    required,
-                    required,
-                    &mut direction,
-                    &mut [0; 2],
-                )
+                && let Separation::SeparatedBy(d) = box_separation(shape, mesh_from_shape, node, required)
             {
                 *smallest = smallest.min(d);
                 continue;
@@ -207,19 +170,100 @@ impl MeshTree {
                 n_stack += 2;
                 continue;
             }
-            let first = node.first as usize;
-            for corners in &self.corners[first..first + node.n_triangles as usize] {
-                if excuse(corners) {
-                    continue;
-                }
+            for corners in self.corners_of(node) {
                 match triangle_separation(shape, mesh_from_shape, corners, required) {
-                    Answer::SeparatedBy(d) => *smallest = smallest.min(d),
+                    Separation::SeparatedBy(d) => *smallest = smallest.min(d),
                     _ => return false,
                 }
             }
         }
         true
     }
+
+    /// True when the convex `shape`, placed in the mesh frame, is proved not to meet any triangle above `below`: it may press into
+    /// what lies lower. `ball` bounds the shape, in its own frame.
+    pub fn meets_only_below(
+        &self,
+        shape: &Shape,
+        (center, radius): (&Point, f64),
+        mesh_from_shape: &Placement,
+        below: &HalfSpace,
+    ) -> bool {
+        let center = mesh_from_shape.point(center);
+        let mut hint = 0;
+        // A first guess at a separating direction: from the middle to what is nearest to it. For round tips it is nearly always good.
+        let mut is_beyond = |nearest: &Point, extent: &mut dyn FnMut(&Vector) -> f64| {
+            let Some(direction) = (nearest - center).try_normalize(1e-12) else { return false };
+            let in_shape = mesh_from_shape.vector_to_child(&direction);
+            let reached = direction.dot(&mesh_from_shape.translation) + support_value(shape, &in_shape, &mut hint);
+            extent(&direction) >= reached
+        };
+        let mut stack = [0u32; 64];
+        let mut n_stack = 1;
+        while n_stack > 0 {
+            n_stack -= 1;
+            let node = &self.nodes[stack[n_stack] as usize];
+            let (middle, half) = (nalgebra::center(&node.low, &node.high), (node.high - node.low) / 2.0);
+            let nearest = center.sup(&node.low).inf(&node.high);
+            let along_box = |v: &Vector| v.dot(&middle.coords) - v.abs().dot(&half);
+            // The cheapest test first. What is in a box costs less than the exact distance of the box.
+            if (nearest - center).norm_squared() > radius * radius
+                || -along_box(&-below.normal) <= below.level
+                || is_beyond(&nearest, &mut |v| along_box(v))
+            {
+                continue;
+            }
+            if node.n_triangles == 0 {
+                stack[n_stack] = node.first;
+                stack[n_stack + 1] = node.right;
+                n_stack += 2;
+                continue;
+            }
+            for corners in self.corners_of(node) {
+                let lowest = |v: &Vector| corners.iter().map(|p| v.dot(&p.coords)).fold(f64::INFINITY, f64::min);
+                if -lowest(&-below.normal) <= below.level
+                    || is_beyond(&nearest_on_triangle(corners, &center).0, &mut |v| lowest(v))
+                {
+                    continue;
+                }
+                if !matches!(triangle_separation(shape, mesh_from_shape, corners, 0.0), Separation::SeparatedBy(_)) {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
+    /// Corners of the triangles of a leaf.
+    fn corners_of(&self, leaf: &Node) -> &[[Point; 3]] {
+        let first = leaf.first as usize;
+        &self.corners[first..first + leaf.n_triangles as usize]
+    }
+}
+
+/// The points whose coordinate along a direction is no more than a level.
+#[derive(Debug, Clone, Copy)]
+pub struct HalfSpace {
+    /// The direction, of length one.
+    pub normal: Vector,
+    /// The level.
+    pub level: f64,
+}
+
+/// Separation of a convex shape from the box of a node, both in the mesh frame.
+fn box_separation(shape: &Shape, mesh_from_shape: &Placement, node: &Node, required: f64) -> Separation {
+    let at_box =
+        Placement { rotation: Matrix3::identity(), translation: nalgebra::center(&node.low, &node.high).coords };
+    let cuboid = Shape::Cuboid { half_extents: (node.high - node.low) / 2.0 };
+    let mut direction = at_box.translation - mesh_from_shape.translation;
+    separation(
+        Placed { shape, at: mesh_from_shape },
+        Placed { shape: &cuboid, at: &at_box },
+        required,
+        required,
+        &mut direction,
+        &mut [0; 2],
+    )
 }
 
 /// Distance of a point from an axis-aligned box; zero inside.
@@ -233,7 +277,7 @@ fn box_distance(low: &Point, high: &Point, point: &Point) -> f64 {
 }
 
 /// Separation of a convex shape from one triangle, both in the mesh frame.
-fn triangle_separation(shape: &Shape, mesh_from_shape: &Placement, corners: &[Point; 3], required: f64) -> Answer {
+fn triangle_separation(shape: &Shape, mesh_from_shape: &Placement, corners: &[Point; 3], required: f64) -> Separation {
     super::gjk::separation_from_points(shape, mesh_from_shape, corners, required)
 }
 
@@ -278,29 +322,35 @@ mod tests {
     }
 
     #[test]
-    fn excuses_of_boxes_are_those_of_their_triangles() {
+    fn what_a_tip_meets_above_a_plane_is_what_triangle_by_triangle_says() {
         let mesh = ball(24);
         let tree = MeshTree::new(&mesh);
-        let shape = Shape::Sphere { radius: 0.4 };
         let mut rng = Rng::keyed(1, "mesh_tree", 0);
-        let mut n_of = [0, 0];
-        for _ in 0..2000 {
-            let normal = Vector::from(rng.direction());
-            let at = Placement { translation: normal * rng.uniform(1.2, 1.45), ..Placement::IDENTITY };
-            let lowest = normal.dot(&at.translation) - 0.4;
-            let allowed = rng.uniform(0.0, 0.1);
-            let mut passes = |corners: &[Point]| {
-                let highest = corners.iter().map(|p| normal.dot(&p.coords)).fold(f64::NEG_INFINITY, f64::max);
-                lowest - highest >= -allowed
-            };
-            let expected = tree.corners.iter().all(|corners| {
-                matches!(triangle_separation(&shape, &at, corners, 0.0), Answer::SeparatedBy(_)) || passes(corners)
-            });
-            let found = tree.all_near(&shape, &at, 0.0, &mut 0.0, &mut passes);
-            assert_eq!(found, expected);
-            n_of[usize::from(found)] += 1;
+        let round: Vec<Point> = (0..300).map(|_| Point::from(Vector::from(rng.direction()) * 0.4)).collect();
+        let shapes = [
+            Shape::Sphere { radius: 0.4 },
+            Shape::Convex(Arc::new(ConvexHull::new(&round).unwrap())),
+            Shape::Cuboid { half_extents: Vector::new(0.1, 0.2, 0.3) },
+        ];
+        for shape in shapes {
+            let (center, radius) = shape.bounding_sphere();
+            let mut n_of = [0, 0];
+            for _ in 0..1500 {
+                let normal = Vector::from(rng.direction());
+                let at = Placement { translation: normal * rng.uniform(1.05, 1.45), ..Placement::IDENTITY };
+                let in_shape = at.vector_to_child(&-normal);
+                let lowest = normal.dot(&at.translation) - support_value(&shape, &in_shape, &mut 0);
+                let below = HalfSpace { normal, level: lowest + rng.uniform(0.0, 0.1) };
+                let expected = tree.corners.iter().all(|corners| {
+                    let highest = corners.iter().map(|p| normal.dot(&p.coords)).fold(f64::NEG_INFINITY, f64::max);
+                    matches!(triangle_separation(&shape, &at, corners, 0.0), Separation::SeparatedBy(_))
+                        || highest <= below.level
+                });
+                assert_eq!(tree.meets_only_below(&shape, (&center, radius), &at, &below), expected);
+                n_of[usize::from(expected)] += 1;
+            }
+            assert!(n_of.iter().all(|&n| n > 100), "{} {n_of:?}", shape.kind());
         }
-        assert!(n_of.iter().all(|&n| n > 100), "{n_of:?}");
     }
 
     /// A closed box from `low` to `high`, twelve triangles wound outwards.

@@ -18,7 +18,7 @@ pub mod support;
 mod winding;
 
 pub use ball_tree::{Ball, BallTree};
-pub use gjk::{Answer, Placed, separation};
-pub use mesh_tree::{MeshBody, MeshTree};
+pub use gjk::{Placed, Separation, separation};
+pub use mesh_tree::{HalfSpace, MeshBody, MeshTree};
 pub use placement::Placement;
 pub use support::gap_along;

@@ -108,7 +108,7 @@ fn own_code_finds(a: &Shape, world_from_a: &Pose, b: &Shape, world_from_b: &Pose
         &mut direction,
         &mut [0; 2],
     ) {
-        collision::Answer::SeparatedBy(lower) => {
+        collision::Separation::SeparatedBy(lower) => {
             assert!(lower <= gap + 1e-12, "{} {} {gap} {lower}", a.kind(), b.kind());
             assert!(lower >= 0.98 * gap - 1e-9, "{} {} {gap} {lower}", a.kind(), b.kind());
         }
@@ -148,7 +148,7 @@ fn cross_check(n: usize) -> Seen {
                 seen.n += 1;
                 own_code_finds(&a, &world_from_a, &b, &world_from_b, gap);
                 match answer {
-                    Answer::SeparatedBy(lower) => {
+                    Clearance::SeparatedBy(lower) => {
                         assert!(lower > 0.0 && lower <= gap + 1e-12, "{names:?} {lower}");
                         if gap < max {
                             seen.understated(gap, lower, (a.kind(), b.kind()));
@@ -156,7 +156,7 @@ fn cross_check(n: usize) -> Seen {
                             seen.n_short += usize::from(lower < max);
                         }
                     }
-                    Answer::Penetrating(depth) => {
+                    Clearance::Penetrating(depth) => {
                         let on_b = world_from_a.inverse_transform_point(&nearest_of_b);
                         let inside = -Surface::of(&a).unwrap().signed_distance(&on_b);
                         assert!(
@@ -167,10 +167,10 @@ fn cross_check(n: usize) -> Seen {
                             seen.understated(gap, 0.0, (a.kind(), b.kind()));
                         }
                     }
-                    Answer::Unresolved => seen.n_unresolved += usize::from(gap >= 1e-9),
+                    Clearance::Unresolved => seen.n_unresolved += usize::from(gap >= 1e-9),
                 }
-                if gap.abs() > 2e-6 && answer != Answer::Unresolved && back != Answer::Unresolved {
-                    let is_apart = |answer: Answer| matches!(answer, Answer::SeparatedBy(_));
+                if gap.abs() > 2e-6 && answer != Clearance::Unresolved && back != Clearance::Unresolved {
+                    let is_apart = |answer: Clearance| matches!(answer, Clearance::SeparatedBy(_));
                     assert_eq!(is_apart(answer), is_apart(back), "{names:?}");
                 }
             }
@@ -217,11 +217,11 @@ fn spheres_and_points_agree_with_surfaces() {
             let ball = ReferenceShape::new(&Shape::Sphere { radius }).unwrap();
             let world_from_ball = Pose::translation(point.x, point.y, point.z);
             match distance(&prepared, &pose, &ball, &world_from_ball, f64::MAX) {
-                Answer::SeparatedBy(gap) => assert!((gap - exact + radius).abs() < 1e-8, "{} {gap}", shape.kind()),
-                Answer::Penetrating(depth) => {
+                Clearance::SeparatedBy(gap) => assert!((gap - exact + radius).abs() < 1e-8, "{} {gap}", shape.kind()),
+                Clearance::Penetrating(depth) => {
                     assert!((depth + exact - radius).abs() < 1e-4, "{} {depth} {}", shape.kind(), radius - exact);
                 }
-                Answer::Unresolved => assert!((exact - radius).abs() < 1e-9, "{} {exact} {radius}", shape.kind()),
+                Clearance::Unresolved => assert!((exact - radius).abs() < 1e-9, "{} {exact} {radius}", shape.kind()),
             }
         }
     }
@@ -259,11 +259,11 @@ fn meshes_agree_with_their_hulls() {
             }
             for answer in answers {
                 match (exact, answer) {
-                    (Answer::SeparatedBy(x), Answer::SeparatedBy(y)) => {
+                    (Clearance::SeparatedBy(x), Clearance::SeparatedBy(y)) => {
                         n_apart += 1;
                         assert!((x - y).abs() < 1e-5 * x + 1e-9, "{x} {y}");
                     }
-                    (Answer::Penetrating(_), Answer::Penetrating(_)) => n_inside += 1,
+                    (Clearance::Penetrating(_), Clearance::Penetrating(_)) => n_inside += 1,
                     (x, y) => panic!("{x:?} {y:?}"),
                 }
             }
@@ -282,12 +282,12 @@ fn what_is_wholly_inside_a_mesh_penetrates_and_a_small_hole_is_closed() {
         let mesh = ReferenceShape::new(&Shape::Mesh(Arc::new(mesh.clone()))).unwrap();
         distance(&mesh, &Pose::identity(), &small, &Pose::identity(), 0.0)
     };
-    assert!(matches!(answer(&closed), Answer::Penetrating(depth) if depth > 0.05));
-    assert!(matches!(answer(&closed.as_ref().clone().flipped()), Answer::Penetrating(_)));
-    assert!(matches!(answer(&open), Answer::Penetrating(depth) if depth > 0.05));
+    assert!(matches!(answer(&closed), Clearance::Penetrating(depth) if depth > 0.05));
+    assert!(matches!(answer(&closed.as_ref().clone().flipped()), Clearance::Penetrating(_)));
+    assert!(matches!(answer(&open), Clearance::Penetrating(depth) if depth > 0.05));
     // A few triangles of it hold nothing.
     let sheet = TriangleMesh::new(closed.vertices().to_vec(), closed.triangles()[..40].to_vec()).unwrap();
-    assert!(matches!(answer(&sheet), Answer::SeparatedBy(_)));
+    assert!(matches!(answer(&sheet), Clearance::SeparatedBy(_)));
 }
 
 #[test]
@@ -313,9 +313,9 @@ fn numbers_that_are_not_finite_are_unresolved() {
     let ball = ReferenceShape::new(&Shape::Sphere { radius: 0.1 }).unwrap();
     for bad in [f64::NAN, f64::INFINITY] {
         let pose = Pose::translation(bad, 0.0, 0.0);
-        assert_eq!(distance(&ball, &pose, &ball, &Pose::identity(), 1.0), Answer::Unresolved);
+        assert_eq!(distance(&ball, &pose, &ball, &Pose::identity(), 1.0), Clearance::Unresolved);
         let turned = crate::pose_from([0.0; 3], [bad, 0.0, 0.0, 1.0]);
-        assert_eq!(distance(&ball, &Pose::identity(), &ball, &turned, 1.0), Answer::Unresolved);
+        assert_eq!(distance(&ball, &Pose::identity(), &ball, &turned, 1.0), Clearance::Unresolved);
         assert!(point_distance(&ball, &pose, &Point::origin()).is_nan());
     }
 }

@@ -8,6 +8,8 @@
 mod curvature;
 /// Shortest ways on it.
 mod geodesic;
+/// How long its creases are.
+mod grain;
 
 use super::bvh::{Aabb, Bvh};
 use super::geodesic::Geodesic;
@@ -55,7 +57,7 @@ pub struct MeshSurface {
 
 /// Where on a triangle a point lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Feature {
+pub(crate) enum Feature {
     Inside,
     Edge(usize),
     Corner(usize),
@@ -144,6 +146,12 @@ impl MeshSurface {
     /// Number of triangles, with those that are inside.
     pub fn n_triangles(&self) -> usize {
         self.topology.triangles.len()
+    }
+
+    /// How far its creases run on before they turn, branch or end, in metres: the mean over them, weighed by length. None without
+    /// creases.
+    pub fn crease_grain(&self) -> Option<f64> {
+        grain::grain(&self.crease_edges)
     }
 
     /// Corners of triangle `facet`, counter-clockwise seen from outside.
@@ -479,7 +487,7 @@ fn meet([a, b, c]: &[Point; 3], origin: &Point, direction: &Vector) -> Option<f6
 }
 
 /// Nearest point of a triangle (Ericson 2005, 5.1.5).
-pub(super) fn nearest_on_triangle([a, b, c]: &[Point; 3], p: &Point) -> (Point, Feature) {
+pub(crate) fn nearest_on_triangle([a, b, c]: &[Point; 3], p: &Point) -> (Point, Feature) {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
     if d1 <= 0.0 && d2 <= 0.0 {

@@ -27,6 +27,7 @@ use regrasp_base::Rng;
 use std::sync::Arc;
 
 pub use geodesic::Geodesic;
+pub(crate) use mesh::nearest_on_triangle;
 pub use mesh::{MeshRepairs, MeshSurface};
 
 /// Edges of a mesh whose triangles turn by more than this are creases, in radians; by hand: an icosphere of 162

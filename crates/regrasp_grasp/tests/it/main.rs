@@ -3,5 +3,6 @@
 mod closed_forms;
 mod closure;
 mod forces;
+mod list;
 mod polyhedral;
 mod sample;

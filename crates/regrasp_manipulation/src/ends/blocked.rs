@@ -3,7 +3,7 @@
 use crate::ends::end::End;
 use crate::failure::Failure;
 use crate::model::{Body, Carrier, FingerModel, Model};
-use regrasp_geometry::collision::{Answer, Placed, Placement, separation};
+use regrasp_geometry::collision::{Placed, Placement, Separation, separation};
 use regrasp_geometry::{Pose, Vector};
 use regrasp_grasp::ContactModel;
 use regrasp_grasp::closure::may_close;
@@ -51,7 +51,7 @@ pub fn object_blocked_by<'m>(model: &'m Model, world_from_object: &Pose) -> Opti
             outside(object, &at_object, body, &body.carrier_from_body)
                 || outside(body, &body.carrier_from_body, object, &at_object)
         };
-        !matches!(answer, Answer::SeparatedBy(_)) && !exactly_apart()
+        !matches!(answer, Separation::SeparatedBy(_)) && !exactly_apart()
     })
 }
 

@@ -2,9 +2,9 @@
 
 use crate::failure::{Failure, FailureKind};
 use crate::model::{Body, Carrier, Model};
-use regrasp_geometry::collision::{Answer, Placed, Placement, separation};
+use regrasp_geometry::collision::{Placed, Placement, Separation, separation};
 use regrasp_geometry::{Point, Pose, Shape, Vector};
-use regrasp_robot::kinematics::chain::Motion;
+use regrasp_robot::kinematics::chain::JointMotion;
 
 /// Radius of a ball that stands for a point, in metres.
 const POINT: f64 = 1e-9;
@@ -51,7 +51,7 @@ fn are_apart(part: &Body, other: &Body) -> bool {
         return is_outside && tree.is_apart(&part.shape, &seen, 0.0, &mut 0.0);
     }
     let (first, second) = (Placed { shape: &part.shape, at }, Placed { shape: &other.shape, at: there });
-    matches!(separation(first, second, 0.0, 0.0, &mut Vector::zeros(), &mut [0; 2]), Answer::SeparatedBy(_))
+    matches!(separation(first, second, 0.0, 0.0, &mut Vector::zeros(), &mut [0; 2]), Separation::SeparatedBy(_))
 }
 
 /// The first part of the palm, when all of its parts are inside: a mount may hold one of them.
@@ -71,7 +71,7 @@ fn finger_inside<'m>(model: &'m Model, solid: &Body, at: &Placement) -> Option<&
         let bodies = || model.bodies[finger.bodies.clone()].iter().filter(begins);
         let reach = |body: &Body| body.carrier_from_body.point(&body.center).coords.norm() + body.radius;
         let radius = bodies().map(reach).fold(0.0, f64::max);
-        let slides = matches!(first.motion, Motion::Slide);
+        let slides = matches!(first.motion, JointMotion::Slide);
         let tree = solid.tree.as_ref()?;
         let ball = Placement { translation: base.coords, ..Placement::IDENTITY };
         let seen = at.inverse_then(&ball);
@@ -99,5 +99,5 @@ fn holds(solid: &Body, at: &Placement, point: &Point) -> bool {
         &mut direction,
         &mut [0; 2],
     );
-    !matches!(answer, Answer::SeparatedBy(_))
+    !matches!(answer, Separation::SeparatedBy(_))
 }

@@ -15,7 +15,7 @@ use regrasp_grasp::wrench::{
 };
 use regrasp_grasp::{Contact, ContactForce, Grip};
 use regrasp_robot::kinematics::body_frame::BodyFrame;
-use regrasp_robot::kinematics::chain::Motion;
+use regrasp_robot::kinematics::chain::JointMotion;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use regrasp_scene::{Gravity, STANDARD_GRAVITY};
 
@@ -34,8 +34,10 @@ impl Unbalanced {
             }
             Unbalanced::TooWeak(f, j) => {
                 let chain = &model.view.hand.fingers[f].chain;
-                let slides =
-                    chain.joints.iter().any(|joint| joint.drive.multiplier(j) != 0.0 && joint.motion == Motion::Slide);
+                let slides = chain
+                    .joints
+                    .iter()
+                    .any(|joint| joint.drive.multiplier(j) != 0.0 && joint.motion == JointMotion::Slide);
                 let limit = model.forces.as_ref().map_or(0.0, |forces| forces.torques[f][j]);
                 let unit = if slides { "N" } else { "N m" };
                 format!("joint \"{}\" would need more than {} {unit}", chain.names[j], number(limit))
@@ -177,11 +179,11 @@ fn joint_rows(
         for &(k, multiplier) in &joint.drive.terms {
             let row = &mut rows[k];
             match joint.motion {
-                Motion::Turn => {
+                JointMotion::Turn => {
                     row.per_force += axis.cross(&(touching - frame.translation)) * multiplier;
                     row.per_torsion += axis.dot(&normal) * multiplier;
                 }
-                Motion::Slide => row.per_force += axis * multiplier,
+                JointMotion::Slide => row.per_force += axis * multiplier,
             }
         }
     }

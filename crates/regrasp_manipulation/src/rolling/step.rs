@@ -53,8 +53,7 @@ pub struct Rolled {
 impl Rolled {
     /// True where the contact keeps the distance from edges that the scene asks for.
     pub fn keeps_off_edges(&self, model: &Model) -> bool {
-        let object = &model.view.object;
-        object.surface.crease_distance(&self.foot) >= object.edge_distance
+        model.view.object.keeps_off_edges(&self.foot)
     }
 }
 

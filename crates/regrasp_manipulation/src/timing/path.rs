@@ -7,7 +7,7 @@ use crate::model::Model;
 use crate::timing::step::{Row, StepLimits, TipRow};
 use regrasp_geometry::{Pose, Vector, frame};
 use regrasp_plan::plan::{MotionLimits, Waypoint};
-use regrasp_robot::kinematics::chain::Motion;
+use regrasp_robot::kinematics::chain::JointMotion;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use std::ops::Range;
 
@@ -80,7 +80,7 @@ impl<'m, 'a> Path<'m, 'a> {
             let coordinates = first..first + chain.n_coordinates();
             first = coordinates.end;
             let mut turns = vec![0.0; chain.n_coordinates()];
-            for joint in chain.joints.iter().filter(|joint| joint.motion == Motion::Turn) {
+            for joint in chain.joints.iter().filter(|joint| joint.motion == JointMotion::Turn) {
                 joint.drive.terms.iter().for_each(|&(k, multiplier)| turns[k] += multiplier.abs());
             }
             Finger { coordinates, turns }

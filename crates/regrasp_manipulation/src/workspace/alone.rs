@@ -16,6 +16,16 @@ impl Workspace<'_> {
             })
     }
 
+    /// True when the object is clear of the palm now, whatever the fingers do.
+    pub fn palm_is_clear(&mut self) -> bool {
+        self.stand();
+        let model = self.model;
+        let is_of_palm = |body: usize| matches!(model.bodies[body].carrier, Carrier::World);
+        let pairs =
+            (0..model.pairs.len()).filter(|&k| is_of_palm(model.pairs[k].a) && model.pairs[k].b == model.object);
+        pairs.into_iter().all(|pair| self.pair_is_clear(pair, TipMode::AllHold))
+    }
+
     /// True when two fingers with these joints are clear of each other.
     pub fn fingers_are_clear(&mut self, first: (usize, &Coordinates), second: (usize, &Coordinates)) -> bool {
         let model = self.model;

@@ -8,7 +8,7 @@
 
 use crate::check::Log;
 use crate::check::level::Level;
-use crate::check::model::Model;
+use crate::check::model::CheckedHand;
 use crate::check::violation::{Violation, ViolationKind as Kind};
 use crate::plan::Plan;
 use regrasp_scene::Manipulation;
@@ -21,7 +21,7 @@ const IN_HAND_FRICTION_MARGIN: f64 = 1.5;
 const TRACKING_FRICTION_MARGIN: f64 = 1.0;
 
 /// Judges what the plan allows itself.
-pub fn check_allowance(task: &Manipulation, model: &Model, plan: &Plan, log: &mut Log) {
+pub fn check_allowance(task: &Manipulation, model: &CheckedHand, plan: &Plan, log: &mut Log) {
     check_motion(task, model, plan, log);
     check_friction_margin(task, plan, log);
     let is_tracking = plan.promises.tracking.is_some();
@@ -41,7 +41,7 @@ pub fn check_allowance(task: &Manipulation, model: &Model, plan: &Plan, log: &mu
     }
 }
 
-fn check_motion(task: &Manipulation, model: &Model, plan: &Plan, log: &mut Log) {
+fn check_motion(task: &Manipulation, model: &CheckedHand, plan: &Plan, log: &mut Log) {
     let (motion, limits) = (&plan.promises.motion, &task.scene.limits);
     exceeded(log, "largest_speed", None, (motion.largest_speed, limits.largest_speed), "m/s", Level::Motion);
     for (k, name) in model.joint_names.iter().enumerate() {

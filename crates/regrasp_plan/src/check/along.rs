@@ -1,9 +1,9 @@
 //! Margin and clearance at every waypoint, for charts: the numbers whose smallest the report has.
 
 use crate::check::bodies::{Bodies, Pair};
-use crate::check::closure::{Body, Certificate, certified_margin, margin_by};
-use crate::check::model::Model;
-use crate::check::motion::Step;
+use crate::check::closure::{Certificate, HeldBody, certified_margin, margin_by};
+use crate::check::model::CheckedHand;
+use crate::check::motion::WaypointStep;
 use crate::check::promises::{Holder, grips_of, holders};
 use crate::check::roles::{is_free_throughout, moving_finger};
 use crate::check::{CheckSettings, Log, form_is_sound};
@@ -43,7 +43,7 @@ pub struct Along {
 
 /// Margin and clearance along `plan`. Err with a message when the plan is not of this scene, or its form is broken.
 pub fn along(task: &Manipulation, plan: &Plan) -> Result<Along, String> {
-    let model = Model::new(task)?;
+    let model = CheckedHand::new(task)?;
     let mut log = Log { most_per_kind: CheckSettings::default().most_per_kind, ..Log::default() };
     if !form_is_sound(&model, plan, &mut log) {
         let first = log.found.first().map(ToString::to_string);
@@ -51,7 +51,7 @@ pub fn along(task: &Manipulation, plan: &Plan) -> Result<Along, String> {
     }
     let bodies = Bodies::new(task, &model)?;
     let mut along = Along::default();
-    let mut margins = Margins { body: Body::of(task.object(), plan), known: BTreeMap::new(), last: None };
+    let mut margins = Margins { body: HeldBody::of(task.object(), plan), known: BTreeMap::new(), last: None };
     let mut clearances = Clearances { bodies: &bodies, names: BTreeMap::new(), nearest: 0 };
     for segment in &plan.segments {
         let moving = moving_finger(&model, segment);
@@ -80,14 +80,14 @@ struct Solved {
 }
 
 struct Margins {
-    body: Body,
+    body: HeldBody,
     /// By fingers and contacts that hold.
     known: BTreeMap<Vec<(usize, [u64; 6])>, f64>,
     last: Option<Solved>,
 }
 
 impl Margins {
-    fn of(&mut self, model: &Model, holders: &[Holder]) -> f64 {
+    fn of(&mut self, model: &CheckedHand, holders: &[Holder]) -> f64 {
         let key: Vec<(usize, [u64; 6])> = holders.iter().map(Holder::key).collect();
         if let Some(margin) = self.known.get(&key) {
             return *margin;
@@ -128,7 +128,7 @@ impl Clearances<'_> {
 
     /// Distance of the nearest pair and the index of its names.
     fn at(&mut self, waypoint: &Waypoint, judged: &[usize]) -> Option<(f64, usize)> {
-        let mut step = Step::new(self.bodies, waypoint, waypoint);
+        let mut step = WaypointStep::new(self.bodies, waypoint, waypoint);
         let mut best: Option<(f64, usize)> = None;
         let likely = judged.iter().copied().filter(|&index| index == self.nearest);
         for index in likely.chain(judged.iter().copied().filter(|&index| index != self.nearest)) {

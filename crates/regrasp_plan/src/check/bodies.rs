@@ -2,7 +2,7 @@
 
 use crate::check::carried::{is_of_hand, joints_above_base, links_of_no_hand};
 use crate::check::kinematics::{Path, pose_of};
-use crate::check::model::Model;
+use crate::check::model::CheckedHand;
 use nalgebra::{Rotation3, UnitQuaternion};
 use regrasp_geometry::reference::ReferenceShape;
 use regrasp_geometry::{Point, Pose, Shape};
@@ -100,7 +100,7 @@ const WORLD: usize = 1;
 
 impl Bodies {
     /// Reads all shapes of `scene`. Err with a message when a shape cannot be used for queries.
-    pub fn new(task: &Manipulation, model: &Model) -> Result<Self, String> {
+    pub fn new(task: &Manipulation, model: &CheckedHand) -> Result<Self, String> {
         let mut bodies =
             Bodies { carriers: vec![Carrier::Object, Carrier::World], items: Vec::new(), pairs: Vec::new() };
         bodies.add_hand(task, model)?;
@@ -120,7 +120,8 @@ impl Bodies {
         Ok(bodies)
     }
 
-    fn add(
+    /// Adds a shape that takes part in no pair yet.
+    pub(super) fn add(
         &mut self,
         name: &str,
         owner: Owner,
@@ -148,7 +149,7 @@ impl Bodies {
         Ok(self.items.last_mut().expect("an item was just added"))
     }
 
-    fn add_hand(&mut self, task: &Manipulation, model: &Model) -> Result<(), String> {
+    fn add_hand(&mut self, task: &Manipulation, model: &CheckedHand) -> Result<(), String> {
         let robot = &task.hand().robot;
         // Joints of an arm above the hand are not between bodies of the hand.
         let above = joints_above_base(task);
@@ -202,7 +203,7 @@ impl Bodies {
         for (h, other) in scene.hands.iter().enumerate().filter(|(h, _)| *h != task.hand_index) {
             let (robot, joints) = (&other.hand.robot, &state.hand_joints[h]);
             let of_other = Manipulation { hand_index: h, ..*task };
-            let model = Model::new(&of_other)?;
+            let model = CheckedHand::new(&of_other)?;
             for (l, link) in robot.links.iter().enumerate() {
                 if !is_of_hand(&of_other, LinkId(l)) || is_of_carrier(task, &of_other, LinkId(l)) {
                     continue;

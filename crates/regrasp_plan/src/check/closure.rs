@@ -31,7 +31,7 @@ const SMALLEST_SINGULAR_VALUE: f64 = 1e-6;
 
 /// What the contacts act on.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Body {
+pub struct HeldBody {
     /// Centre of mass, in the object frame.
     pub center_of_mass: Point,
     /// Length by which torques are divided, in metres.
@@ -40,10 +40,10 @@ pub struct Body {
     pub friction: f64,
 }
 
-impl Body {
+impl HeldBody {
     /// The object as the plan may count on it: the promised friction, but no more than the object has.
     pub fn of(object: &Object, plan: &Plan) -> Self {
-        Body {
+        HeldBody {
             center_of_mass: object.center_of_mass,
             torque_scale: object.radius,
             friction: plan.promises.friction.min(object.friction),
@@ -65,12 +65,12 @@ pub struct Certificate {
 /// Margin of the best subset of `grips`, soft fingers taken as such or as points: zero when no closure could be proved.
 ///
 /// Closure can only grow with contacts and with torsion, so the margin of a subset is one of the whole set.
-pub fn margin(grips: &[Grip], body: &Body) -> f64 {
+pub fn margin(grips: &[Grip], body: &HeldBody) -> f64 {
     certified_margin(grips, body).map_or(0.0, |(margin, _)| margin)
 }
 
 /// As [`margin`], with what proves it; none when no closure could be proved.
-pub fn certified_margin(grips: &[Grip], body: &Body) -> Option<(f64, Certificate)> {
+pub fn certified_margin(grips: &[Grip], body: &HeldBody) -> Option<(f64, Certificate)> {
     let mut search = SubsetSearch { grips, body, best: None };
     match grips.len() {
         n if n <= MOST_FOR_ALL_SUBSETS => (0..1 << n).for_each(|subset| _ = search.look(subset)),
@@ -85,7 +85,7 @@ const MOST_FOR_ALL_SUBSETS: usize = 6;
 /// Looks for the subset of contacts with the largest margin.
 struct SubsetSearch<'a> {
     grips: &'a [Grip],
-    body: &'a Body,
+    body: &'a HeldBody,
     best: Option<(f64, Certificate)>,
 }
 
@@ -131,7 +131,7 @@ impl SubsetSearch<'_> {
 
 /// The margin that forces found for other contacts of the same fingers prove for these; mostly a little smaller than
 /// [`margin`], at a hundredth of its cost.
-pub fn margin_by(certificate: &Certificate, grips: &[Grip], body: &Body) -> f64 {
+pub fn margin_by(certificate: &Certificate, grips: &[Grip], body: &HeldBody) -> f64 {
     let chosen = chosen(grips, certificate.subset, certificate.hardened);
     if chosen.len() != certificate.forces.len() {
         return 0.0;
@@ -154,7 +154,7 @@ fn chosen(grips: &[Grip], subset: u64, hardened: bool) -> Vec<Grip> {
 }
 
 /// Solver's forces as forces in the object frame and torsions.
-fn forces_in_object(grips: &[Grip], forces: &DVector<f64>, body: &Body) -> Vec<(Vector, f64)> {
+fn forces_in_object(grips: &[Grip], forces: &DVector<f64>, body: &HeldBody) -> Vec<(Vector, f64)> {
     let (_, cones) = grasp_map(grips, body);
     let in_object = |(grip, cone): (&Grip, &Range<usize>)| {
         let (x, y) = tangents(&grip.contact.normal_in_object);
@@ -182,7 +182,7 @@ fn torsion_radius(grip: &Grip) -> Option<f64> {
 }
 
 /// Margin in which every one of `grips` takes part, with forces that prove it; none when no closure could be proved.
-fn solved_margin(grips: &[Grip], body: &Body) -> Option<(f64, DVector<f64>)> {
+fn solved_margin(grips: &[Grip], body: &HeldBody) -> Option<(f64, DVector<f64>)> {
     let (grasp_map, cones) = grasp_map(grips, body);
     let right_inverse = right_inverse(&grasp_map)?;
     let shares = shares_of(&right_inverse, &cones);
@@ -198,7 +198,7 @@ fn shares_of(right_inverse: &DMatrix<f64>, cones: &[Range<usize>]) -> Vec<f64> {
 
 /// The grasp map and the columns of each contact in it: its pushing direction `-n`; with friction two tangents; for a
 /// soft finger the moment of its torsion radius about the normal.
-pub fn grasp_map(grips: &[Grip], body: &Body) -> (DMatrix<f64>, Vec<Range<usize>>) {
+pub fn grasp_map(grips: &[Grip], body: &HeldBody) -> (DMatrix<f64>, Vec<Range<usize>>) {
     let mut columns: Vec<[Vector; 2]> = Vec::new();
     let mut cones = Vec::new();
     for grip in grips {
@@ -334,7 +334,7 @@ fn substituted_margin(
 
 /// Upper bound of the Ferrari-Canny radius: the smallest support value of the contact wrenches over directions, drawn
 /// at random and then improved by pattern search. Shares nothing with [`margin`]. For tests and reports.
-pub fn ferrari_canny_upper(grips: &[Grip], body: &Body, n_directions: usize, rng: &mut regrasp_base::Rng) -> f64 {
+pub fn ferrari_canny_upper(grips: &[Grip], body: &HeldBody, n_directions: usize, rng: &mut regrasp_base::Rng) -> f64 {
     let arms: Vec<Vector> =
         grips.iter().map(|grip| (grip.contact.point_in_object - body.center_of_mass) / body.torque_scale).collect();
     // Largest work of a force of unit normal component along the wrench direction (force part, torque part).

@@ -3,8 +3,8 @@
 use crate::check::bodies::{Bodies, Owner, Pair};
 use crate::check::far::Looked;
 use crate::check::lift::{FreePart, Relocation, free_part};
-use crate::check::model::Model;
-use crate::check::motion::{Breach, Step, certify};
+use crate::check::model::CheckedHand;
+use crate::check::motion::{Breach, WaypointStep, certify};
 use crate::check::roles::{is_free_throughout, moving_finger};
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Clearance, Log};
@@ -22,7 +22,7 @@ struct Track {
 /// Judges all pairs along the plan. Returns the smallest clearance at a waypoint and the number of distances measured.
 pub fn check_collision(
     bodies: &Bodies,
-    model: &Model,
+    model: &CheckedHand,
     plan: &Plan,
     settings: &CheckSettings,
     log: &mut Log,
@@ -42,7 +42,7 @@ pub fn check_collision(
         });
         let is_free: Vec<bool> = (0..model.fingers.len()).map(|f| is_free_throughout(segment, f)).collect();
         for (w, ends) in segment.waypoints.windows(2).enumerate() {
-            let mut step = Step::new(bodies, &ends[0], &ends[1]);
+            let mut step = WaypointStep::new(bodies, &ends[0], &ends[1]);
             step.most_pieces = log.work.left();
             let known = clearance.as_ref().map_or(f64::INFINITY, |c| c.distance.max(0.0));
             let forget = |index: usize| tracks[index].bound = f64::NEG_INFINITY;
@@ -115,7 +115,7 @@ fn pieces(w: usize, free: Option<FreePart>, may_touch: bool, tolerance: f64, apa
 }
 
 fn note_clearance(
-    step: &mut Step,
+    step: &mut WaypointStep,
     bodies: &Bodies,
     pair: &Pair,
     track: &mut Track,

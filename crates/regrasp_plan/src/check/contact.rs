@@ -3,7 +3,7 @@
 
 use crate::check::between::Between;
 use crate::check::edges::Edges;
-use crate::check::model::{FingerModel, Model};
+use crate::check::model::{CheckedHand, FingerModel};
 use crate::check::roles::{contact_of, moving_finger};
 use crate::check::surface;
 use crate::check::tip_rates::{bounds_in_object, speed_in_object};
@@ -24,7 +24,7 @@ const MOST_SAMPLES: usize = 4096;
 /// Between samples the bound is exact: the centre of a ball in the object frame deviates from the chord between two samples
 /// by at most (largest acceleration) (interval)^2 / 8; what touches of another tip moves by at most (largest speed)
 /// (interval) / 2.
-pub fn check_tips(model: &Model, plan: &Plan, log: &mut Log) -> f64 {
+pub fn check_tips(model: &CheckedHand, plan: &Plan, log: &mut Log) -> f64 {
     let tolerance = plan.promises.contact_tolerance;
     let mut largest: f64 = 0.0;
     // Tips in tracking are judged in `tracking`.
@@ -124,7 +124,7 @@ fn error_between(finger: &FingerModel, from: &Waypoint, to: &Waypoint, f: usize,
 }
 
 /// Every fingertip that holds touches with its pad, at waypoints.
-pub fn check_pads(model: &Model, plan: &Plan, log: &mut Log) {
+pub fn check_pads(model: &CheckedHand, plan: &Plan, log: &mut Log) {
     for (s, segment) in plan.segments.iter().enumerate() {
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
             for (finger, state) in model.fingers.iter().zip(&waypoint.contacts) {
@@ -146,7 +146,7 @@ pub fn check_pads(model: &Model, plan: &Plan, log: &mut Log) {
 
 /// Every contact of the plan lies on the object's surface, with the surface's normal, away from its edges: on an edge any
 /// normal between those of its faces is one. Tracking crosses edges, so contacts there may be near.
-pub fn check_contacts(object: &Object, model: &Model, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
+pub fn check_contacts(object: &Object, model: &CheckedHand, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
     let mut seen = BTreeSet::new();
     let edges = Edges::of(&object.shape, object.crease_angle);
     let least = object.edge_distance - settings.surface_tolerance;

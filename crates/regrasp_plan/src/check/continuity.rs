@@ -2,7 +2,7 @@
 //! which finger may change what.
 
 use crate::check::between::Between;
-use crate::check::model::Model;
+use crate::check::model::CheckedHand;
 use crate::check::pose::pose_difference;
 use crate::check::roles::{contacts_agree, moving_finger};
 use crate::check::tracking;
@@ -17,7 +17,7 @@ use regrasp_scene::query::TRACKING;
 const TASKS: [&str; 2] = ["in_hand", "tracking"];
 
 /// Names, vector lengths and numbers. When this finds something, nothing else can be judged.
-pub fn check_form(model: &Model, plan: &Plan, log: &mut Log) {
+pub fn check_form(model: &CheckedHand, plan: &Plan, log: &mut Log) {
     if plan.format != FORMAT || plan.format_version != FORMAT_VERSION || !TASKS.contains(&plan.task.as_str()) {
         let message = format!(
             "format \"{}\" version {} task \"{}\" is not \"{FORMAT}\" {FORMAT_VERSION} {TASKS:?}",
@@ -195,7 +195,7 @@ pub fn check_meeting(plan: &Plan, settings: &CheckSettings, log: &mut Log) {
 }
 
 /// Limits at every waypoint and between, and steps that are jumps.
-pub fn check_joints(model: &Model, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
+pub fn check_joints(model: &CheckedHand, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
     for (s, segment) in plan.segments.iter().enumerate() {
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
             for row in &model.limits {
@@ -236,7 +236,7 @@ pub fn check_joints(model: &Model, plan: &Plan, settings: &CheckSettings, log: &
 
 /// Limits where the cubic of a joint goes beyond its two waypoints.
 fn check_limits_between(
-    model: &Model,
+    model: &CheckedHand,
     from: &Waypoint,
     to: &Waypoint,
     at: Moment,
@@ -265,7 +265,7 @@ fn check_limits_between(
 
 /// Who may change what: in a transfer every finger keeps its contact, or rolls all along, or stays free; in a regrasp only
 /// the moving finger changes, and none rolls.
-pub fn check_roles(model: &Model, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
+pub fn check_roles(model: &CheckedHand, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
     for (s, segment) in plan.segments.iter().enumerate() {
         match segment.kind {
             SegmentKind::Transfer => {
@@ -305,7 +305,7 @@ fn check_tracking_names_absent(segment: &Segment, s: usize, log: &mut Log) {
 }
 
 /// The joints of finger `f` stay where they are all through the segment.
-fn check_rests(model: &Model, segment: &Segment, s: usize, f: usize, settings: &CheckSettings, log: &mut Log) {
+fn check_rests(model: &CheckedHand, segment: &Segment, s: usize, f: usize, settings: &CheckSettings, log: &mut Log) {
     let (finger, first) = (&model.fingers[f], &segment.waypoints[0]);
     for (w, waypoint) in segment.waypoints.iter().enumerate() {
         let moved = finger.coordinates.clone().map(|k| (waypoint.joints[k] - first.joints[k]).abs());
@@ -320,7 +320,7 @@ fn check_rests(model: &Model, segment: &Segment, s: usize, f: usize, settings: &
     }
 }
 
-fn check_regrasp_roles(model: &Model, segment: &Segment, s: usize, settings: &CheckSettings, log: &mut Log) {
+fn check_regrasp_roles(model: &CheckedHand, segment: &Segment, s: usize, settings: &CheckSettings, log: &mut Log) {
     let first = &segment.waypoints[0];
     let last_index = segment.waypoints.len() - 1;
     let moving = moving_finger(model, segment);
@@ -356,7 +356,7 @@ fn check_regrasp_roles(model: &Model, segment: &Segment, s: usize, settings: &Ch
 }
 
 /// Only balls roll, and only while the object moves.
-fn check_may_roll(model: &Model, segment: &Segment, s: usize, f: usize, log: &mut Log) {
+fn check_may_roll(model: &CheckedHand, segment: &Segment, s: usize, f: usize, log: &mut Log) {
     let finger = &model.fingers[f];
     let rolls = |waypoint: &Waypoint| waypoint.contacts[f].mode == ContactMode::Rolling;
     let Some(w) = segment.waypoints.iter().position(rolls) else { return };
@@ -371,7 +371,7 @@ fn check_may_roll(model: &Model, segment: &Segment, s: usize, f: usize, log: &mu
 }
 
 /// Finger `f` holds the same contact all through the segment, or rolls all through it, or is free all through it.
-fn check_constant(model: &Model, segment: &Segment, s: usize, f: usize, settings: &CheckSettings, log: &mut Log) {
+fn check_constant(model: &CheckedHand, segment: &Segment, s: usize, f: usize, settings: &CheckSettings, log: &mut Log) {
     let name = model.fingers[f].name.as_str();
     let first = &segment.waypoints[0].contacts[f];
     for (w, waypoint) in segment.waypoints.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! Obstacles and resting bodies so far from an item that a whole step cannot matter to the pair: by balls, before anything is measured.
 
 use crate::check::bodies::Bodies;
-use crate::check::motion::Step;
+use crate::check::motion::WaypointStep;
 use regrasp_geometry::Point;
 
 /// A list of obstacles left out reaches this much less far than it might, in metres, so that it holds for some steps.
@@ -55,7 +55,7 @@ impl Looked {
     pub fn in_step(
         &mut self,
         bodies: &Bodies,
-        step: &mut Step,
+        step: &mut WaypointStep,
         keep: f64,
         mut leave_out: impl FnMut(usize),
     ) -> &[usize] {

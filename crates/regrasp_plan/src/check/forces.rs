@@ -23,9 +23,9 @@
 //! Mass, gravity and torque limits of the plan are held against scene and robot.
 
 use crate::check::between::Between;
-use crate::check::closure::Body;
+use crate::check::closure::HeldBody;
 use crate::check::kinematics::DrivenAxis;
-use crate::check::model::{FingerModel, Model};
+use crate::check::model::{CheckedHand, FingerModel};
 use crate::check::roles::{contact_of, moving_finger};
 use crate::check::rolling::Roll;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
@@ -85,7 +85,7 @@ impl Exerted {
 /// Judges forces and torques of the whole plan; none when it promises no forces, and has none.
 pub fn check_forces(
     task: &Manipulation,
-    model: &Model,
+    model: &CheckedHand,
     plan: &Plan,
     settings: &CheckSettings,
     log: &mut Log,
@@ -100,7 +100,7 @@ pub fn check_forces(
         let message = "gravity of any direction in tracking: friction of what slides has but one";
         log.push(Violation::new(Kind::PromiseBroken, message).subjects(["gravity_in_world"]));
     }
-    let judge = Judge { object, body: Body::of(object, plan), model, plan, promises, settings };
+    let judge = Judge { object, body: HeldBody::of(object, plan), model, plan, promises, settings };
     let mut balance = Balance::default();
     for (s, segment) in plan.segments.iter().enumerate() {
         let moving = moving_finger(model, segment);
@@ -145,7 +145,7 @@ fn check_absent(plan: &Plan, log: &mut Log) {
 }
 
 /// Mass, gravity and limits against scene and robot.
-fn check_promises(task: &Manipulation, model: &Model, promises: &ForcePromises, log: &mut Log) {
+pub(super) fn check_promises(task: &Manipulation, model: &CheckedHand, promises: &ForcePromises, log: &mut Log) {
     let object = task.object();
     let mut broken = |name: &str, amount: f64, limit: f64, message: String| {
         log.push(Violation::new(Kind::PromiseBroken, message).subjects([name]).amount(amount, limit));
@@ -193,8 +193,8 @@ fn in_words(gravity_in_world: Option<Vector>) -> String {
 /// What everything is judged by.
 pub(super) struct Judge<'a> {
     pub(super) object: &'a Object,
-    pub(super) body: Body,
-    pub(super) model: &'a Model,
+    pub(super) body: HeldBody,
+    pub(super) model: &'a CheckedHand,
     pub(super) plan: &'a Plan,
     pub(super) promises: &'a ForcePromises,
     pub(super) settings: &'a CheckSettings,
@@ -202,7 +202,7 @@ pub(super) struct Judge<'a> {
 
 impl Judge<'_> {
     /// What every holding finger exerts; none, and a violation, when a force or torque is missing.
-    fn exerted(&self, waypoint: &Waypoint, at: Moment, log: &mut Log) -> Option<Vec<Exerted>> {
+    pub(super) fn exerted(&self, waypoint: &Waypoint, at: Moment, log: &mut Log) -> Option<Vec<Exerted>> {
         let mut missing = |what: String| {
             log.push(Violation::new(Kind::ForceMissing, what).when(at));
             None
@@ -244,7 +244,13 @@ impl Judge<'_> {
         sum
     }
 
-    fn check_balance(&self, waypoint: &Waypoint, exerted: &[Exerted], at: Moment, log: &mut Log) -> (f64, f64) {
+    pub(super) fn check_balance(
+        &self,
+        waypoint: &Waypoint,
+        exerted: &[Exerted],
+        at: Moment,
+        log: &mut Log,
+    ) -> (f64, f64) {
         let (force, moment) = self.residual(&Pose::from(&waypoint.world_from_object), exerted);
         let (force, moment) = (force.norm(), moment.norm());
         let CheckSettings { force_tolerance, moment_tolerance, .. } = *self.settings;
@@ -260,7 +266,7 @@ impl Judge<'_> {
     }
 
     /// The cone of the finger's contact model, and the range of its normal force.
-    fn check_contact(&self, one: &Exerted, moving: Option<usize>, at: Moment, log: &mut Log) {
+    pub(super) fn check_contact(&self, one: &Exerted, moving: Option<usize>, at: Moment, log: &mut Log) {
         let finger = &self.model.fingers[one.finger];
         let tolerance = self.settings.force_tolerance;
         let mut report = |kind: Kind, message: String, amount: f64, limit: f64| {
@@ -352,7 +358,7 @@ impl Judge<'_> {
 
     /// Torques by virtual work: a coordinate's is the work of force and torsion per unit of it, over all joints that it
     /// drives. Joints of free fingers make none.
-    fn check_torques(&self, waypoint: &Waypoint, exerted: &[Exerted], at: Moment, log: &mut Log) {
+    pub(super) fn check_torques(&self, waypoint: &Waypoint, exerted: &[Exerted], at: Moment, log: &mut Log) {
         let mut expected = vec![0.0; waypoint.joint_torques.len()];
         let mut tolerance = vec![TORQUE_ROUNDING; expected.len()];
         for one in exerted {

@@ -1,7 +1,7 @@
 //! Grasps that the query gives: a plan begins and ends with them. A tip or contact that is off the surface may be moved to
 //! touch, by no more than `GRASP_TOLERANCE`; one that touches as it is stays.
 
-use crate::check::model::{FingerModel, Model};
+use crate::check::model::{CheckedHand, FingerModel};
 use crate::check::surface::SortedShape;
 use crate::check::tip_surface::TipSurface;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
@@ -14,7 +14,7 @@ use regrasp_scene::{GRASP_TOLERANCE, GRASP_TURN_TOLERANCE, GraspRequest, Query};
 pub fn check_given(
     shape: &SortedShape,
     query: Option<&Query>,
-    model: &Model,
+    model: &CheckedHand,
     plan: &Plan,
     settings: &CheckSettings,
     log: &mut Log,

@@ -3,7 +3,7 @@
 
 use crate::check::bodies::{Bodies, Owner, Pair};
 use crate::check::model::FingerModel;
-use crate::check::motion::Step;
+use crate::check::motion::WaypointStep;
 use crate::check::roles::contact_of;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
@@ -104,7 +104,7 @@ impl Search<'_> {
         let mut reported = false;
         for (w, direction) in steps {
             let (from, to) = (&self.segment.waypoints[w], &self.segment.waypoints[w + 1]);
-            let mut step = Step::new(bodies, from, to);
+            let mut step = WaypointStep::new(bodies, from, to);
             let speed = pairs.iter().map(|pair| step.speed(pair.a)).fold(0.0, f64::max);
             let n_samples = ((speed / self.settings.resolution).ceil() as usize).clamp(1, MOST_SAMPLES);
             if !self.log.work.spend(n_samples as u64, "how fingertips lift off and land") {

@@ -1,6 +1,6 @@
 //! What is too large to be judged: leaps, which motion bounds would follow for ever, and more work than the checker does.
 
-use crate::check::model::Model;
+use crate::check::model::CheckedHand;
 use crate::check::pose::pose_difference;
 use crate::check::violation::{Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
@@ -8,7 +8,7 @@ use crate::plan::Plan;
 
 /// The first joint that is so far beyond its limits, or first step that is so long, that motion between waypoints is not
 /// judged, in words.
-pub fn leap(model: &Model, plan: &Plan, settings: &CheckSettings) -> Option<String> {
+pub fn leap(model: &CheckedHand, plan: &Plan, settings: &CheckSettings) -> Option<String> {
     for (s, segment) in plan.segments.iter().enumerate() {
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
             for row in &model.limits {

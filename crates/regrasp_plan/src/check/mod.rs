@@ -35,6 +35,8 @@ pub mod find_scene;
 pub mod forces;
 /// Grasps that the query gives.
 pub mod given;
+/// The judge of grasp lists.
+pub mod grasps;
 /// Who holds the object.
 mod holders;
 /// The checker's own forward kinematics and motion bounds.
@@ -87,12 +89,13 @@ pub mod way;
 pub use along::{Along, along};
 pub use files::{CheckedFiles, check_files};
 pub use find_scene::find_scene;
+pub use grasps::{GraspReport, check_grasps};
 pub use level::Level;
 pub use slip::HoldSlip;
 pub use violation::{Moment, Violation, ViolationKind};
 
 use crate::plan::Plan;
-use model::Model;
+use model::CheckedHand;
 use regrasp_geometry::Pose;
 use regrasp_scene::{Manipulation, Query, Scene, State};
 use schemars::JsonSchema;
@@ -333,7 +336,7 @@ pub fn check((scene, state): (&Scene, &State), query: Option<&Query>, plan: &Pla
     let query = started.as_ref().or(query);
     let wrong_scene = |message| Violation::new(ViolationKind::WrongScene, message);
     let found = holders::manipulation(scene, state, query, plan)
-        .and_then(|task| Ok((task, Model::new(&task).map_err(wrong_scene)?)));
+        .and_then(|task| Ok((task, CheckedHand::new(&task).map_err(wrong_scene)?)));
     match found {
         Err(violation) => log.push(violation),
         Ok((task, model)) => {
@@ -353,7 +356,7 @@ pub fn check((scene, state): (&Scene, &State), query: Option<&Query>, plan: &Pla
 }
 
 /// Whether joints, fingers and waypoints of `plan` are those of the scene: everything else indexes by them.
-fn form_is_sound(model: &Model, plan: &Plan, log: &mut Log) -> bool {
+fn form_is_sound(model: &CheckedHand, plan: &Plan, log: &mut Log) -> bool {
     continuity::check_form(model, plan, log);
     !log.found.iter().any(|violation| {
         use ViolationKind::{EmptySegment, NotANumber, WrongScene};
@@ -366,7 +369,7 @@ fn judge(
     query: Option<&Query>,
     plan: &Plan,
     settings: &CheckSettings,
-    model: &Model,
+    model: &CheckedHand,
     log: &mut Log,
     report: &mut Report,
 ) {
@@ -417,7 +420,7 @@ fn judge_tips(
     task: &Manipulation,
     plan: &Plan,
     settings: &CheckSettings,
-    model: &Model,
+    model: &CheckedHand,
     log: &mut Log,
     report: &mut Report,
 ) {

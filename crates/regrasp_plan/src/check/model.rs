@@ -92,7 +92,7 @@ pub struct DriveRow {
 
 /// Everything about the hand that is not a shape.
 #[derive(Debug, Clone)]
-pub struct Model {
+pub struct CheckedHand {
     /// Names of the coordinates of a joint vector.
     pub joint_names: Vec<String>,
     /// True where the coordinate slides.
@@ -109,7 +109,7 @@ pub struct Model {
     pub shape: SortedShape,
 }
 
-impl Model {
+impl CheckedHand {
     /// Reads the hand of `scene`. Err with a message when the hand contradicts itself.
     pub fn new(task: &Manipulation) -> Result<Self, String> {
         let hand = task.hand();
@@ -147,7 +147,7 @@ impl Model {
         }
         let (limits, drives) = joint_rows(task, &joint_names)?;
         let shape = SortedShape::of(&task.object().shape);
-        Ok(Model { slides, limits, drives, joint_names, fingers, world_from_root, shape })
+        Ok(CheckedHand { slides, limits, drives, joint_names, fingers, world_from_root, shape })
     }
 }
 

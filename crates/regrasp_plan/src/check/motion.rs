@@ -6,7 +6,7 @@ use crate::check::kinematics::{Rates, pose_of};
 use crate::check::pose::pose_difference;
 use crate::plan::Waypoint;
 use nalgebra::Translation3;
-use regrasp_geometry::reference::{Answer, distance, point_distance};
+use regrasp_geometry::reference::{Clearance, distance, point_distance};
 use regrasp_geometry::{Point, Pose, Vector};
 
 /// Farther apart than this, pairs are not measured exactly, in metres.
@@ -21,7 +21,7 @@ const NUDGES: [[f64; 3]; 6] =
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
 
 /// A step between two waypoints. Its parameter is the share of its time, from 0 to 1.
-pub struct Step<'a> {
+pub struct WaypointStep<'a> {
     bodies: &'a Bodies,
     motion: Between<'a>,
     object: ObjectRates,
@@ -39,7 +39,7 @@ pub struct Step<'a> {
     pub most_pieces: u64,
 }
 
-impl<'a> Step<'a> {
+impl<'a> WaypointStep<'a> {
     /// The step from one waypoint to the next.
     pub fn new(bodies: &'a Bodies, from: &'a Waypoint, to: &'a Waypoint) -> Self {
         let motion = Between::new(from, to);
@@ -67,7 +67,7 @@ impl<'a> Step<'a> {
                 Carrier::World => Rates::default(),
             })
             .collect();
-        Step {
+        WaypointStep {
             bodies,
             motion,
             object,
@@ -170,9 +170,9 @@ impl<'a> Step<'a> {
             return Some(point_distance(&b.shape, &pose_b, &center) - a.radius).filter(|distance| distance.is_finite());
         }
         let signed = |pose_a: &Pose| match distance(&a.shape, pose_a, &b.shape, &pose_b, SEARCH_DISTANCE) {
-            Answer::SeparatedBy(distance) => Some(distance),
-            Answer::Penetrating(depth) => Some(-depth),
-            Answer::Unresolved => None,
+            Clearance::SeparatedBy(distance) => Some(distance),
+            Clearance::Penetrating(depth) => Some(-depth),
+            Clearance::Unresolved => None,
         };
         // A shift changes the distance by at most its length, and a pair that is hard to tell is easier beside it.
         signed(&pose_a).or_else(|| {
@@ -261,7 +261,7 @@ pub struct Breach {
 /// Ok: a lower bound at `t1`. For any time between, distance at an end minus the way from there bounds the distance;
 /// the two ways together are at most the chord plus twice the stray.
 pub fn certify(
-    step: &mut Step,
+    step: &mut WaypointStep,
     pair: &Pair,
     (t0, t1): (f64, f64),
     bound: f64,
@@ -273,7 +273,7 @@ pub fn certify(
 }
 
 fn certify_piece(
-    step: &mut Step,
+    step: &mut WaypointStep,
     pair: &Pair,
     (t0, t1): (f64, f64),
     (bound, known_end): (f64, Option<f64>),

@@ -11,8 +11,8 @@
 //!
 //! Tolerances, for rounding and two solvers, are the constants below.
 
-use crate::check::closure::{Body, Certificate, certified_margin, margin_by};
-use crate::check::model::Model;
+use crate::check::closure::{Certificate, HeldBody, certified_margin, margin_by};
+use crate::check::model::CheckedHand;
 use crate::check::roles::{contact_of, moving_finger};
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
@@ -91,7 +91,7 @@ impl Holder {
 }
 
 /// The fingers that hold at a waypoint; `moving` is the one that a regrasp moves.
-pub fn holders(model: &Model, moving: Option<usize>, waypoint: &Waypoint) -> Vec<Holder> {
+pub fn holders(model: &CheckedHand, moving: Option<usize>, waypoint: &Waypoint) -> Vec<Holder> {
     (0..model.fingers.len())
         .filter(|&f| Some(f) != moving && waypoint.contacts[f].holds())
         .filter_map(|finger| Some(Holder { finger, contact: contact_of(&waypoint.contacts[finger])? }))
@@ -99,7 +99,7 @@ pub fn holders(model: &Model, moving: Option<usize>, waypoint: &Waypoint) -> Vec
 }
 
 /// Contacts of fingers with what their tips transmit.
-pub fn grips_of(model: &Model, holders: &[Holder]) -> Vec<Grip> {
+pub fn grips_of(model: &CheckedHand, holders: &[Holder]) -> Vec<Grip> {
     let grip = |holder: &Holder| Grip { contact: holder.contact, model: model.fingers[holder.finger].contact };
     holders.iter().map(grip).collect()
 }
@@ -110,12 +110,12 @@ pub fn grips_of(model: &Model, holders: &[Holder]) -> Vec<Grip> {
 /// enough where it is no less than what is required and than the smallest margin found so far.
 pub fn check_closure(
     object: &Object,
-    model: &Model,
+    model: &CheckedHand,
     plan: &Plan,
     settings: &CheckSettings,
     log: &mut Log,
 ) -> Option<f64> {
-    let body = Body::of(object, plan);
+    let body = HeldBody::of(object, plan);
     let required = plan.promises.required_margin.max(settings.smallest_margin);
     let sets = holding_sets(model, plan);
     let mut smallest: Option<f64> = None;
@@ -146,7 +146,7 @@ pub fn check_closure(
 }
 
 /// The different sets of contacts that hold in the plan, in order.
-fn holding_sets(model: &Model, plan: &Plan) -> Vec<Holding> {
+fn holding_sets(model: &CheckedHand, plan: &Plan) -> Vec<Holding> {
     let mut seen = BTreeSet::new();
     let mut sets = Vec::new();
     for (s, segment) in plan.segments.iter().enumerate() {
@@ -167,7 +167,7 @@ fn holding_sets(model: &Model, plan: &Plan) -> Vec<Holding> {
     sets
 }
 
-fn closure_lost(model: &Model, set: &Holding, found: f64, required: f64) -> Violation {
+fn closure_lost(model: &CheckedHand, set: &Holding, found: f64, required: f64) -> Violation {
     let names: Vec<&str> = set.fingers.iter().map(|&f| model.fingers[f].name.as_str()).collect();
     let message = if found > 0.0 {
         format!("fingers {names:?} hold with margin {found:.6}, {required:.6} is required")

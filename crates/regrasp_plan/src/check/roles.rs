@@ -1,6 +1,6 @@
 //! What fingers do in a segment: which one moves, which are free, which contacts are the same.
 
-use crate::check::model::Model;
+use crate::check::model::CheckedHand;
 use crate::plan::{ContactState, Segment, SegmentKind};
 use regrasp_geometry::{UnitVector, Vector};
 
@@ -10,7 +10,7 @@ pub fn is_free_throughout(segment: &Segment, f: usize) -> bool {
 }
 
 /// Index of the finger that moves in a regrasp, where it names one of the hand's; none in a transfer, whatever it names.
-pub fn moving_finger(model: &Model, segment: &Segment) -> Option<usize> {
+pub fn moving_finger(model: &CheckedHand, segment: &Segment) -> Option<usize> {
     let name = segment.moving_finger.as_deref().filter(|_| segment.kind == SegmentKind::Regrasp)?;
     model.fingers.iter().position(|finger| finger.name == name)
 }

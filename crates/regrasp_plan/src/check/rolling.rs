@@ -8,7 +8,7 @@
 
 use crate::check::between::Between;
 use crate::check::contact::error_at;
-use crate::check::model::{FingerModel, Model};
+use crate::check::model::{CheckedHand, FingerModel};
 use crate::check::patch::Patch;
 use crate::check::step_slip::{StepSlip, torsion_radius};
 use crate::check::surface::SortedShape;
@@ -52,7 +52,7 @@ pub struct Rolled {
 /// Judges every step in which a finger rolls.
 pub fn check_rolling(
     shape: &SortedShape,
-    model: &Model,
+    model: &CheckedHand,
     plan: &Plan,
     settings: &CheckSettings,
     log: &mut Log,

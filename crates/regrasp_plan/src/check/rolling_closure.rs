@@ -4,8 +4,8 @@
 //! and pads are judged at moments between which no contact travels farther than `LARGEST_TRAVEL`, and halfway at least. Both
 //! change continuously with the contacts, and waypoints themselves are judged in `promises` and `contact`.
 
-use crate::check::closure::{Body, Certificate, certified_margin, margin_by};
-use crate::check::model::Model;
+use crate::check::closure::{Certificate, HeldBody, certified_margin, margin_by};
+use crate::check::model::CheckedHand;
 use crate::check::promises::MARGIN_TOLERANCE;
 use crate::check::roles::contact_of;
 use crate::check::rolling::Roll;
@@ -24,12 +24,12 @@ const MOST_MOMENTS: usize = 7;
 /// Judges the steps of all transfers in which a finger rolls; the smallest margin between waypoints.
 pub fn check_rolling_closure(
     object: &Object,
-    model: &Model,
+    model: &CheckedHand,
     plan: &Plan,
     settings: &CheckSettings,
     log: &mut Log,
 ) -> Option<f64> {
-    let body = Body::of(object, plan);
+    let body = HeldBody::of(object, plan);
     let required = plan.promises.required_margin.max(settings.smallest_margin);
     let mut smallest: Option<f64> = None;
     let mut proof: Option<Certificate> = None;
@@ -86,7 +86,7 @@ struct Holder<'a> {
 
 impl<'a> Holder<'a> {
     fn new(
-        model: &'a Model,
+        model: &'a CheckedHand,
         from: &'a Waypoint,
         to: &'a Waypoint,
         finger: usize,
@@ -100,7 +100,7 @@ impl<'a> Holder<'a> {
     }
 
     /// What holds at a moment of the step, and a violation where the fingertip touches outside its pad.
-    fn grip(&self, model: &Model, fraction: f64, at: Moment, log: &mut Log) -> Option<Grip> {
+    fn grip(&self, model: &CheckedHand, fraction: f64, at: Moment, log: &mut Log) -> Option<Grip> {
         let finger = &model.fingers[self.finger];
         let contact = match &self.roll {
             None => self.at_start,

@@ -16,7 +16,7 @@
 
 use crate::check::between::Between;
 use crate::check::level::Level;
-use crate::check::model::{FingerModel, Model};
+use crate::check::model::{CheckedHand, FingerModel};
 use crate::check::pose::pose_difference;
 use crate::check::roles::{contact_of, moving_finger};
 use crate::check::rolling::{Roll, UNKNOWN_SHARE};
@@ -47,7 +47,7 @@ pub struct HoldSlip {
 /// `known` is what `rolling` and `tracking` have measured, by finger, segment and waypoint; fixed contacts are measured here.
 pub fn check_slip(
     shape: &SortedShape,
-    model: &Model,
+    model: &CheckedHand,
     plan: &Plan,
     known: &BTreeMap<(usize, usize, usize), StepSlip>,
     settings: &CheckSettings,

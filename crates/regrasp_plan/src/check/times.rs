@@ -14,7 +14,7 @@
 //! `velocity_tolerance` makes as well. Tolerances named here are fields of `CheckSettings`.
 
 use crate::check::between::Between;
-use crate::check::model::{FingerModel, Model};
+use crate::check::model::{CheckedHand, FingerModel};
 use crate::check::pose::pose_difference;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
@@ -40,7 +40,7 @@ pub fn duration(plan: &Plan) -> f64 {
 }
 
 /// Judges times, speeds and velocities of the whole plan.
-pub fn check_times(object: &Object, model: &Model, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
+pub fn check_times(object: &Object, model: &CheckedHand, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
     check_limits(model, plan, log);
     for (s, segment) in plan.segments.iter().enumerate() {
         for (w, pair) in segment.waypoints.windows(2).enumerate() {
@@ -71,7 +71,7 @@ pub fn check_times(object: &Object, model: &Model, plan: &Plan, settings: &Check
 }
 
 /// The promised limits of joints against the robot's.
-fn check_limits(model: &Model, plan: &Plan, log: &mut Log) {
+fn check_limits(model: &CheckedHand, plan: &Plan, log: &mut Log) {
     let motion = &plan.promises.motion;
     for drive in &model.drives {
         let Some(coordinate) = drive.own_coordinate() else { continue };
@@ -92,7 +92,7 @@ fn check_limits(model: &Model, plan: &Plan, log: &mut Log) {
     }
 }
 
-fn check_joint_speeds(model: &Model, plan: &Plan, motion: &Between, span: f64, at: Moment, log: &mut Log) {
+fn check_joint_speeds(model: &CheckedHand, plan: &Plan, motion: &Between, span: f64, at: Moment, log: &mut Log) {
     for drive in &model.drives {
         let promises = &plan.promises.motion.joint_velocities;
         let promised: f64 = drive.drive.terms.iter().map(|&(k, multiplier)| promises[k] * multiplier.abs()).sum();
@@ -122,7 +122,7 @@ fn check_accelerations(plan: &Plan, motion: &Between, span: f64, at: Moment, set
 /// Speeds of fingertips and object at every moment of a step.
 fn check_speeds(
     object: &Object,
-    model: &Model,
+    model: &CheckedHand,
     plan: &Plan,
     (from, to): (&Waypoint, &Waypoint),
     motion: &Between,

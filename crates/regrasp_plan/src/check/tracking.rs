@@ -26,7 +26,7 @@
 
 use crate::check::between::Between;
 use crate::check::contact::error_at;
-use crate::check::model::{FingerModel, Model};
+use crate::check::model::{CheckedHand, FingerModel};
 use crate::check::roles::{contact_of, contacts_agree};
 use crate::check::rolling::{Roll, Rolled, Turning, UNKNOWN_SHARE, off_contact};
 use crate::check::step_slip::StepSlip;
@@ -45,19 +45,19 @@ const UNKNOWN_SLIDE: (f64, f64) = (1e-3, 1e-9);
 const FEWEST_RESTING: usize = 2;
 
 /// True where a tracking segment says that finger `f` moves.
-pub fn may_move(model: &Model, segment: &Segment, f: usize) -> bool {
+pub fn may_move(model: &CheckedHand, segment: &Segment, f: usize) -> bool {
     let name = &model.fingers[f].name;
     segment.moving_fingers().any(|moving| moving == name)
 }
 
 /// Indices of the fingers that a tracking segment names: the (first) moving and the rolling one.
-pub fn named_fingers(model: &Model, segment: &Segment) -> [Option<usize>; 2] {
+pub fn named_fingers(model: &CheckedHand, segment: &Segment) -> [Option<usize>; 2] {
     [&segment.moving_finger, &segment.rolling_finger]
         .map(|name| model.fingers.iter().position(|finger| Some(&finger.name) == name.as_ref()))
 }
 
 /// Who may do what in a tracking segment, from the waypoints alone; that the others rest is judged in `continuity`.
-pub fn check_tracking_roles(model: &Model, segment: &Segment, s: usize, settings: &CheckSettings, log: &mut Log) {
+pub fn check_tracking_roles(model: &CheckedHand, segment: &Segment, s: usize, settings: &CheckSettings, log: &mut Log) {
     let [moving, rolling] = named_fingers(model, segment);
     if moving.is_none() {
         let message = format!("moving finger {:?} is none of the hand's", segment.moving_finger);
@@ -130,7 +130,7 @@ fn wrong_mode(finger: &FingerModel, segment: &Segment, f: usize) -> Option<(usiz
 }
 
 /// Point on the tip, relative velocity and turn are there in tracking, and only there.
-pub fn check_present(model: &Model, segment: &Segment, s: usize, log: &mut Log) {
+pub fn check_present(model: &CheckedHand, segment: &Segment, s: usize, log: &mut Log) {
     let is_tracking = segment.kind == SegmentKind::Tracking;
     for (w, waypoint) in segment.waypoints.iter().enumerate() {
         for (finger, state) in model.fingers.iter().zip(&waypoint.contacts) {
@@ -152,7 +152,7 @@ pub fn check_present(model: &Model, segment: &Segment, s: usize, log: &mut Log) 
 /// Judges every contact of every tracking segment.
 pub fn check_tracking(
     shape: &SortedShape,
-    model: &Model,
+    model: &CheckedHand,
     plan: &Plan,
     settings: &CheckSettings,
     log: &mut Log,
@@ -413,7 +413,7 @@ struct Found {
 ///
 /// Between two moments `h` apart the centre strays from its chord by at most acceleration `h^2 / 8`, and on the chord it is
 /// farthest at an end. Steps are halved until that decides; what it does not decide counts as too far.
-pub fn check_reach(reach: f64, model: &Model, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
+pub fn check_reach(reach: f64, model: &CheckedHand, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
     let limit = reach + settings.limit_tolerance;
     for (s, segment) in plan.segments.iter().enumerate() {
         for finger in &model.fingers {

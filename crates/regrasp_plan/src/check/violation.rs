@@ -135,6 +135,8 @@ pub enum ViolationKind {
     VelocityInconsistent,
     /// The plan asks for more work than the checker does: the rest of it was not judged.
     NotJudged,
+    /// Of a grasp list: the object does not stand in a pose that the list calls stable, or a hand is not above the support there.
+    StablePoseWrong,
 }
 
 /// One thing that is wrong.

@@ -4,10 +4,10 @@
 //! refuses files with more.
 
 use super::caps;
-use super::locate::Step;
 use crate::plan::{
     ContactMode, ContactState, Plan, PlanInput, PoseData, Promises, Segment, SegmentKind, Statistics, WayPose, Waypoint,
 };
+use regrasp_base::json_place::PathStep;
 use schemars::JsonSchema;
 use serde::de::{Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -18,6 +18,7 @@ use std::marker::PhantomData;
 
 /// A hand of the scene that the plan moves.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
 pub(super) struct FileHand<'a> {
     /// Its name in the scene.
@@ -30,7 +31,9 @@ pub(super) struct FileHand<'a> {
 
 /// A finger that touches an object.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
+#[cfg_attr(test, ts(optional_fields))]
 pub(super) struct FileContact<'a> {
     /// The hand.
     pub hand: Cow<'a, str>,
@@ -66,6 +69,7 @@ pub(super) struct FileContact<'a> {
 
 /// The state of hands and objects at one moment.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
 pub(super) struct FileWaypoint<'a> {
     /// When, in seconds from the start.
@@ -78,6 +82,7 @@ pub(super) struct FileWaypoint<'a> {
     #[serde(default, skip_serializing_if = "<[f64]>::is_empty")]
     pub joint_torques: Cow<'a, [f64]>,
     /// Pose of every object of `objects`, in the world.
+    #[cfg_attr(test, ts(type = "PoseData[]"))]
     pub world_from_objects: Vec<PoseData>,
     /// Fingers that touch an object, hand by hand in the order of their fingers.
     pub contacts: Vec<FileContact<'a>>,
@@ -112,6 +117,7 @@ fn each_once<'de, 'a, D: Deserializer<'de>>(deserializer: D) -> Result<Holders<'
 
 /// A piece of motion.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
 pub(super) struct FileSegment<'a> {
     /// Its kind.
@@ -123,6 +129,7 @@ pub(super) struct FileSegment<'a> {
     pub moving: Vec<Cow<'a, str>>,
     /// In tracking, the resting finger that the object rolls on without sliding (Cherif & Gupta 1999, sec. 6.1.2: `F_t`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
     pub rolling_finger: Option<Cow<'a, str>>,
     /// For every object, who holds it: names of hands and supports.
     #[serde(deserialize_with = "each_once")]
@@ -133,6 +140,7 @@ pub(super) struct FileSegment<'a> {
 
 /// A plan file.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
 pub(super) struct FilePlan<'a> {
     /// Always `regrasp-plan`.
@@ -151,8 +159,10 @@ pub(super) struct FilePlan<'a> {
     /// Seed.
     pub seed: u64,
     /// Settings of the planner, as they were used.
+    #[cfg_attr(test, ts(type = "unknown"))]
     pub settings: Cow<'a, serde_json::Value>,
     /// Files it was made from, the scene file first.
+    #[cfg_attr(test, ts(type = "PlanInput[]"))]
     pub inputs: Cow<'a, [PlanInput]>,
     /// What it promises.
     pub promises: Cow<'a, Promises>,
@@ -161,11 +171,13 @@ pub(super) struct FilePlan<'a> {
     /// Names of the objects that it moves. All others of the scene rest.
     pub objects: Vec<Cow<'a, str>>,
     /// Pose of the object asked for at the start.
+    #[cfg_attr(test, ts(type = "PoseData"))]
     pub start: PoseData,
     /// Poses asked for between start and goal, in order; absent where none were.
     #[serde(default, skip_serializing_if = "<[WayPose]>::is_empty")]
     pub way_poses: Cow<'a, [WayPose]>,
     /// Pose of the object asked for at the goal.
+    #[cfg_attr(test, ts(type = "PoseData"))]
     pub goal: PoseData,
     /// Counts of the search.
     pub statistics: Cow<'a, Statistics>,
@@ -178,7 +190,7 @@ pub(super) struct Fault {
     /// Code of the error.
     pub code: &'static str,
     /// Where.
-    pub at: Vec<Step<'static>>,
+    pub at: Vec<PathStep<'static>>,
     /// What.
     pub problem: String,
     /// What was expected.
@@ -213,15 +225,21 @@ impl<'a> FileWaypoint<'a> {
     }
 
     /// As a waypoint of a plan of one hand and one object.
-    fn waypoint(self, names: &Names, at: [Step<'static>; 4]) -> Result<Waypoint, Fault> {
+    fn waypoint(self, names: &Names, at: [PathStep<'static>; 4]) -> Result<Waypoint, Fault> {
         let [world_from_object] = self.world_from_objects[..] else {
             let problem = format!("has {} poses", self.world_from_objects.len());
-            return Err(fault("C404", &at, &[Step::Key("world_from_objects")], problem, "one for each of \"objects\""));
+            return Err(fault(
+                "C404",
+                &at,
+                &[PathStep::Key("world_from_objects")],
+                problem,
+                "one for each of \"objects\"",
+            ));
         };
         let mut contacts = vec![ContactState::FREE; names.fingers.len()];
         let mut next = 0;
         for (index, contact) in self.contacts.into_iter().enumerate() {
-            let step = |key| [Step::Key("contacts"), Step::Index(index), Step::Key(key)];
+            let step = |key| [PathStep::Key("contacts"), PathStep::Index(index), PathStep::Key(key)];
             names.expect_hand(&contact.hand).map_err(|name| unknown(&at, &step("hand"), &contact.hand, name))?;
             names
                 .expect_object(&contact.object)
@@ -261,11 +279,17 @@ impl<'a> FileWaypoint<'a> {
     }
 }
 
-fn fault(code: &'static str, at: &[Step<'static>], inside: &[Step<'static>], problem: String, expected: &str) -> Fault {
+fn fault(
+    code: &'static str,
+    at: &[PathStep<'static>],
+    inside: &[PathStep<'static>],
+    problem: String,
+    expected: &str,
+) -> Fault {
     Fault { code, at: [at, inside].concat(), problem, expected: expected.to_owned() }
 }
 
-fn unknown(at: &[Step<'static>], inside: &[Step<'static>], name: &str, known: &str) -> Fault {
+fn unknown(at: &[PathStep<'static>], inside: &[PathStep<'static>], name: &str, known: &str) -> Fault {
     fault("C408", at, inside, format!("\"{name}\" is not in the plan"), known)
 }
 
@@ -302,16 +326,16 @@ impl<'a> FileSegment<'a> {
         }
     }
 
-    fn segment(self, names: &Names, at: [Step<'static>; 2]) -> Result<Segment, Fault> {
-        names.expect_hand(&self.hand).map_err(|name| unknown(&at, &[Step::Key("hand")], &self.hand, name))?;
+    fn segment(self, names: &Names, at: [PathStep<'static>; 2]) -> Result<Segment, Fault> {
+        names.expect_hand(&self.hand).map_err(|name| unknown(&at, &[PathStep::Key("hand")], &self.hand, name))?;
         let mut held_by = Vec::new();
         for (object, holders) in self.held_by {
-            names.expect_object(&object).map_err(|name| unknown(&at, &[Step::Key("held_by")], &object, name))?;
+            names.expect_object(&object).map_err(|name| unknown(&at, &[PathStep::Key("held_by")], &object, name))?;
             held_by = holders.into_iter().map(Cow::into_owned).collect();
         }
         let mut moving = self.moving.into_iter().map(Cow::into_owned);
         let waypoints = self.waypoints.into_iter().enumerate().map(|(index, waypoint)| {
-            waypoint.waypoint(names, [at[0], at[1], Step::Key("waypoints"), Step::Index(index)])
+            waypoint.waypoint(names, [at[0], at[1], PathStep::Key("waypoints"), PathStep::Index(index)])
         });
         Ok(Segment {
             kind: self.kind,
@@ -333,20 +357,20 @@ impl FilePlan<'_> {
         for (key, n) in [("hands", self.hands.len()), ("objects", self.objects.len())] {
             if n != 1 {
                 let expected = "one; this version judges plans in which one hand moves one object and all else rests";
-                return Err(fault("C411", &[], &[Step::Key(key)], format!("has {n} entries"), expected));
+                return Err(fault("C411", &[], &[PathStep::Key(key)], format!("has {n} entries"), expected));
             }
         }
         let (hand, object) = (self.hands.remove(0), self.objects.remove(0).into_owned());
         // Every waypoint takes memory for every finger: the number of fingers is looked at before.
         if hand.fingers.len() > caps::FINGERS {
             let problem = format!("has {} entries", hand.fingers.len());
-            let at = [Step::Key("hands"), Step::Index(0), Step::Key("fingers")];
+            let at = [PathStep::Key("hands"), PathStep::Index(0), PathStep::Key("fingers")];
             return Err(fault("C410", &at, &[], problem, &format!("at most {}", caps::FINGERS)));
         }
         let names = Names { hand: hand.name.into_owned(), object, fingers: hand.fingers.into_owned() };
         let segments = self.segments.into_iter().enumerate();
-        let segments =
-            segments.map(|(index, segment)| segment.segment(&names, [Step::Key("segments"), Step::Index(index)]));
+        let segments = segments
+            .map(|(index, segment)| segment.segment(&names, [PathStep::Key("segments"), PathStep::Index(index)]));
         let segments = segments.collect::<Result<Vec<_>, _>>()?;
         Ok(Plan {
             format: self.format.into_owned(),

@@ -2,14 +2,15 @@
 
 /// The file as it stands on disk.
 mod file;
-/// Where a value stands in a JSON text.
-mod locate;
+/// `schema/plan.d.ts`.
+#[cfg(test)]
+mod typescript;
 /// What a plan file may not say.
 mod validate;
 
 use crate::plan::{FORMAT, FORMAT_VERSION, ONLY_HAND, Plan, Segment};
 use file::{FileHand, FilePlan, FileSegment, FileWaypoint};
-use locate::{Step, locate};
+use regrasp_base::json_place::{PathStep, diagnostic, locate};
 use regrasp_base::{Diagnostic, InputError, Place};
 use serde::Deserialize;
 use std::borrow::Cow;
@@ -110,7 +111,7 @@ pub fn from_json(path: &Path, bytes: &[u8]) -> Result<Plan, InputError> {
         _ => {
             let file: FilePlan = serde_json::from_str(&text).map_err(|error| syntax_error(path, &error))?;
             file.plan().map_err(|fault| {
-                validate::diagnostic(path, &text, fault.code, &fault.at, fault.problem).expected(fault.expected)
+                diagnostic(path, &text, fault.code, &fault.at, fault.problem).expected(fault.expected)
             })?
         }
     };
@@ -152,7 +153,7 @@ fn version_of(path: &Path, text: &str) -> Result<u32, InputError> {
         format_version: Option<serde_json::Value>,
     }
     let header: Header = serde_json::from_str(text).map_err(|error| syntax_error(path, &error))?;
-    let place = |key| locate(text, &[Step::Key(key)]).unwrap_or(0);
+    let place = |key| locate(text, &[PathStep::Key(key)]).unwrap_or(0);
     if header.format.as_ref().and_then(|value| value.as_str()) != Some(FORMAT) {
         let seen = header.format.map_or("is missing".to_owned(), |value| format!("is {value}"));
         return Err(Diagnostic::new("C402", Place::at_offset(path, text, place("format")), seen)

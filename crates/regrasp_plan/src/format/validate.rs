@@ -1,10 +1,10 @@
 //! What a plan file may not say.
 
 use super::caps;
-use super::locate::{Step, locate};
 use crate::plan::{ContactMode, ContactState, FORMAT_VERSION, ForcePromises, Plan, PoseData, Segment, SegmentKind};
+use regrasp_base::InputError;
 use regrasp_base::diagnostic::{Diagnostics, GOOD_NAME, fault_of_name, number};
-use regrasp_base::{Diagnostic, InputError, Place};
+use regrasp_base::json_place::{PathStep, diagnostic};
 use std::path::Path;
 
 /// How far a quaternion's or a normal's length may be from one.
@@ -18,22 +18,9 @@ pub(super) fn validate(path: &Path, text: &str, version: u32, plan: Plan) -> Res
     found.into_result(plan)
 }
 
-/// A diagnostic about the value that `steps` lead to.
-pub(super) fn diagnostic(path: &Path, text: &str, code: &'static str, steps: &[Step], problem: String) -> Diagnostic {
-    let offset = locate(text, steps).unwrap_or(0);
-    let name: String = steps
-        .iter()
-        .map(|step| match step {
-            Step::Key(key) => format!(".{key}"),
-            Step::Index(index) => format!("[{index}]"),
-        })
-        .collect();
-    Diagnostic::new(code, Place::at_offset(path, text, offset), problem).element("key", name.trim_start_matches('.'))
-}
-
 /// Where a file of version 3 has what the plan has at `steps`.
-fn in_file<'a>(plan: &Plan, steps: &[Step<'a>]) -> Vec<Step<'a>> {
-    use Step::{Index, Key};
+fn in_file<'a>(plan: &Plan, steps: &[PathStep<'a>]) -> Vec<PathStep<'a>> {
+    use PathStep::{Index, Key};
     match steps {
         [Key(key @ ("joint_names" | "fingers")), rest @ ..] => [&[Key("hands"), Index(0), Key(key)], rest].concat(),
         [Key("segments"), Index(s), Key("moving_finger"), rest @ ..] => {
@@ -68,7 +55,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn fail(&mut self, code: &'static str, steps: &[Step], problem: String, expected: String) {
+    fn fail(&mut self, code: &'static str, steps: &[PathStep], problem: String, expected: String) {
         // A broken writer breaks every waypoint in the same way.
         if self.found.counted_only() {
             return;
@@ -78,7 +65,7 @@ impl Reader<'_> {
     }
 
     fn validate(&mut self, plan: &Plan) {
-        use Step::{Index, Key};
+        use PathStep::{Index, Key};
         let n_waypoints: usize = plan.segments.iter().map(|segment| segment.waypoints.len()).sum();
         for (key, seen, limit) in [
             ("joint_names", plan.joint_names.len(), caps::JOINTS),
@@ -173,13 +160,20 @@ impl Reader<'_> {
     }
 
     /// The finger that a segment names, where its kind has one.
-    fn finger_of(&mut self, plan: &Plan, at: &[Step; 2], segment: &Segment, key: &'static str, name: &Option<String>) {
+    fn finger_of(
+        &mut self,
+        plan: &Plan,
+        at: &[PathStep; 2],
+        segment: &Segment,
+        key: &'static str,
+        name: &Option<String>,
+    ) {
         let (kind, is_asked) = match segment.kind {
             SegmentKind::Transfer => ("transfer", false),
             SegmentKind::Regrasp => ("regrasp", key == "moving_finger"),
             SegmentKind::Tracking => ("tracking segment", true),
         };
-        let steps = [at[0], at[1], Step::Key(key)];
+        let steps = [at[0], at[1], PathStep::Key(key)];
         match name {
             Some(finger) if is_asked && !plan.fingers.contains(finger) => {
                 let expected = format!("one of {}", plan.fingers.join(", "));
@@ -195,9 +189,9 @@ impl Reader<'_> {
     }
 
     /// Fingers that a tracking segment names beside its moving finger: of the plan's, each once.
-    fn also_moving(&mut self, plan: &Plan, at: &[Step; 2], segment: &Segment) {
+    fn also_moving(&mut self, plan: &Plan, at: &[PathStep; 2], segment: &Segment) {
         for (i, finger) in segment.also_moving.iter().enumerate() {
-            let steps = [at[0], at[1], Step::Key("also_moving"), Step::Index(i)];
+            let steps = [at[0], at[1], PathStep::Key("also_moving"), PathStep::Index(i)];
             if segment.kind != SegmentKind::Tracking {
                 let expected = "no \"also_moving\": in a tracking segment only".into();
                 self.fail("C408", &steps, format!("names \"{finger}\""), expected);
@@ -211,8 +205,8 @@ impl Reader<'_> {
     }
 
     /// Who holds the object: names that can be shown, each once.
-    fn held_by(&mut self, at: &[Step; 2], segment: &Segment) {
-        let steps = [at[0], at[1], Step::Key("held_by")];
+    fn held_by(&mut self, at: &[PathStep; 2], segment: &Segment) {
+        let steps = [at[0], at[1], PathStep::Key("held_by")];
         if segment.held_by.len() > caps::HOLDERS {
             let problem = format!("has {} names", segment.held_by.len());
             self.fail("C410", &steps, problem, format!("at most {}", caps::HOLDERS));
@@ -227,7 +221,7 @@ impl Reader<'_> {
         }
     }
 
-    fn within(&mut self, steps: &[Step], value: f64, low: f64, high: f64) {
+    fn within(&mut self, steps: &[PathStep], value: f64, low: f64, high: f64) {
         if !(low..=high).contains(&value) {
             let expected = format!("a number from {} to {}", number(low), number(high));
             self.fail("C409", steps, format!("is {}", number(value)), expected);
@@ -235,7 +229,7 @@ impl Reader<'_> {
     }
 
     /// A vector of one value for each joint, none larger than any that makes sense.
-    fn per_joint(&mut self, plan: &Plan, steps: &[Step], values: &[f64], n_expected: usize) {
+    fn per_joint(&mut self, plan: &Plan, steps: &[PathStep], values: &[f64], n_expected: usize) {
         if values.len() != n_expected {
             let expected = match n_expected {
                 0 => "none: \"promises\" has no \"forces\"".into(),
@@ -250,7 +244,7 @@ impl Reader<'_> {
     }
 
     fn motion_limits(&mut self, plan: &Plan) {
-        use Step::Key;
+        use PathStep::Key;
         let motion = &plan.promises.motion;
         let inside = |key| [Key("promises"), Key("motion"), Key(key)];
         self.within(&inside("largest_speed"), motion.largest_speed, 1e-9, caps::SIZE);
@@ -265,7 +259,7 @@ impl Reader<'_> {
     }
 
     fn force_promises(&mut self, plan: &Plan, forces: &ForcePromises) {
-        use Step::Key;
+        use PathStep::Key;
         let inside = |key| [Key("promises"), Key("forces"), Key(key)];
         self.within(&inside("mass"), forces.mass, 0.0, caps::SIZE);
         for component in forces.gravity_in_world.into_iter().flatten() {
@@ -282,8 +276,8 @@ impl Reader<'_> {
         }
     }
 
-    fn waypoint(&mut self, plan: &Plan, at: &[Step; 4], waypoint: &crate::Waypoint) {
-        use Step::{Index, Key};
+    fn waypoint(&mut self, plan: &Plan, at: &[PathStep; 4], waypoint: &crate::Waypoint) {
+        use PathStep::{Index, Key};
         let inside = |key| [at[0], at[1], at[2], at[3], Key(key)];
         if waypoint.joints.len() != plan.joint_names.len() {
             let problem = format!("has {} values", waypoint.joints.len());
@@ -337,7 +331,7 @@ impl Reader<'_> {
         }
     }
 
-    fn contact_force(&mut self, plan: &Plan, steps: &[Step], contact: &ContactState) {
+    fn contact_force(&mut self, plan: &Plan, steps: &[PathStep], contact: &ContactState) {
         let is_loaded = contact.force_in_object.is_some() || contact.torsion.is_some();
         if contact.mode == ContactMode::Free {
             if is_loaded {
@@ -357,7 +351,7 @@ impl Reader<'_> {
         }
     }
 
-    fn pose(&mut self, steps: &[Step], pose: &PoseData) {
+    fn pose(&mut self, steps: &[PathStep], pose: &PoseData) {
         let length = pose.quat_xyzw.iter().map(|x| x * x).sum::<f64>().sqrt();
         if (length - 1.0).abs() > UNIT_TOLERANCE {
             self.fail("C405", steps, format!("has a quaternion of length {length}"), "length 1".into());

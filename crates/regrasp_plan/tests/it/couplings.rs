@@ -2,7 +2,7 @@
 
 use crate::sample;
 use regrasp_base::Rng;
-use regrasp_plan::check::model::Model;
+use regrasp_plan::check::model::CheckedHand;
 use regrasp_plan::check::violation::ViolationKind;
 use regrasp_plan::check::{CheckSettings, check};
 use regrasp_robot::{Chain, Coupling, JointId, LinearLimit};
@@ -37,7 +37,7 @@ fn scene() -> Scene {
 #[test]
 fn tips_velocities_and_limits_agree_with_the_chain() {
     let scene = scene();
-    let model = sample::with_task(&scene, Model::new).unwrap();
+    let model = sample::with_task(&scene, CheckedHand::new).unwrap();
     let (ours, theirs) = (&model.fingers[0], &scene.hands[0].hand.fingers[0]);
     assert_eq!(ours.coordinates, 0..2);
     let row = model.limits.iter().find(|row| row.name == "f0_j2").unwrap();

@@ -2,13 +2,13 @@
 
 use crate::sample;
 use regrasp_base::Rng;
-use regrasp_geometry::reference::{Answer, distance};
+use regrasp_geometry::reference::{Clearance, distance};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Pose, Shape, Vector};
 use regrasp_plan::check::bodies::{Bodies, Owner};
 use regrasp_plan::check::far::Looked;
-use regrasp_plan::check::model::Model;
-use regrasp_plan::check::motion::{Step, certify};
+use regrasp_plan::check::model::CheckedHand;
+use regrasp_plan::check::motion::{WaypointStep, certify};
 use regrasp_plan::plan::PoseData;
 use regrasp_plan::{Plan, Waypoint};
 use regrasp_scene::Scene;
@@ -22,7 +22,7 @@ fn random_joints(scene: &Scene, rng: &mut Rng) -> Vec<f64> {
 #[test]
 fn tips_are_where_the_chains_say() {
     let scene = sample::scene();
-    let model = sample::with_task(&scene, Model::new).unwrap();
+    let model = sample::with_task(&scene, CheckedHand::new).unwrap();
     let mut rng = Rng::keyed(1, "tips", 0);
     for _ in 0..200 {
         let joints = random_joints(&scene, &mut rng);
@@ -52,13 +52,13 @@ fn samples(plan: &Plan) -> Vec<Waypoint> {
 #[test]
 fn chords_and_strays_bound_the_true_motion() {
     let scene = sample::scene();
-    let model = sample::with_task(&scene, Model::new).unwrap();
+    let model = sample::with_task(&scene, CheckedHand::new).unwrap();
     let bodies = sample::with_task(&scene, |task| Bodies::new(task, &model)).unwrap();
     let mut rng = Rng::keyed(2, "motion", 0);
     let mut tightest: f64 = 0.0;
     for waypoint in samples(&sample::plan(&scene)) {
         let other = neighbour(&waypoint, 0.3, &mut rng);
-        let mut step = Step::new(&bodies, &waypoint, &other);
+        let mut step = WaypointStep::new(&bodies, &waypoint, &other);
         for pair in &bodies.pairs {
             let (a, b) = (&bodies.items[pair.a], &bodies.items[pair.b]);
             let stray = step.stray(pair);
@@ -95,7 +95,7 @@ fn what_is_certified_is_clear_and_what_is_clear_is_certified() {
             shape: Shape::Capsule { half_length: 0.02, radius: 0.1e-3 },
         },
     });
-    let model = sample::with_task(&scene, Model::new).unwrap();
+    let model = sample::with_task(&scene, CheckedHand::new).unwrap();
     let bodies = sample::with_task(&scene, |task| Bodies::new(task, &model)).unwrap();
     let mut rng = Rng::keyed(3, "motion", 0);
     let resolution = 0.05e-3;
@@ -104,7 +104,7 @@ fn what_is_certified_is_clear_and_what_is_clear_is_certified() {
     for round in 0..30 {
         let waypoint = &waypoints[round % waypoints.len()];
         let other = neighbour(waypoint, 0.4, &mut rng);
-        let mut step = Step::new(&bodies, waypoint, &other);
+        let mut step = WaypointStep::new(&bodies, waypoint, &other);
         for pair in bodies.pairs.iter().filter(|pair| pair.tip_of.is_none()) {
             let (a, b) = (&bodies.items[pair.a], &bodies.items[pair.b]);
             let mut smallest = f64::INFINITY;
@@ -114,9 +114,9 @@ fn what_is_certified_is_clear_and_what_is_clear_is_certified() {
                 let pose_a = step.pose(a.carrier, t) * a.carrier_from_shape;
                 let pose_b = step.pose(b.carrier, t) * b.carrier_from_shape;
                 let signed = match distance(&a.shape, &pose_a, &b.shape, &pose_b, 0.5) {
-                    Answer::SeparatedBy(d) => d,
-                    Answer::Penetrating(d) => -d,
-                    Answer::Unresolved => panic!("unresolved"),
+                    Clearance::SeparatedBy(d) => d,
+                    Clearance::Penetrating(d) => -d,
+                    Clearance::Unresolved => panic!("unresolved"),
                 };
                 smallest = smallest.min(signed);
                 if k == 0 || k == 400 {
@@ -166,7 +166,7 @@ fn pairs_that_are_left_out_stay_apart_all_the_time() {
     let mut scene = sample::scene();
     let mut rng = Rng::keyed(4, "motion", 0);
     scene.obstacles = obstacles(150, &mut rng);
-    let model = sample::with_task(&scene, Model::new).unwrap();
+    let model = sample::with_task(&scene, CheckedHand::new).unwrap();
     let bodies = sample::with_task(&scene, |task| Bodies::new(task, &model)).unwrap();
     let mut looked = Looked::new(&bodies);
     let waypoints = samples(&sample::plan(&scene));
@@ -176,7 +176,7 @@ fn pairs_that_are_left_out_stay_apart_all_the_time() {
         // Small steps, leaps, and steps of nothing.
         let (from, turn) = (&waypoints[round / 4 % waypoints.len()], [0.02, 0.3, 0.0][round % 3]);
         let to = neighbour(from, turn, &mut rng);
-        let mut step = Step::new(&bodies, from, &to);
+        let mut step = WaypointStep::new(&bodies, from, &to);
         let keep = [0.0, 0.001, 0.02][rng.below(3)];
         let mut told = Vec::new();
         let near = looked.in_step(&bodies, &mut step, keep, |index| told.push(index)).to_vec();
@@ -216,13 +216,13 @@ fn the_smallest_clearance_among_many_obstacles_is_that_of_all_pairs() {
         parent_from_shape: Pose::translation(over.x, over.y, over.z),
         shape: Shape::Sphere { radius: 0.002 },
     };
-    let model = sample::with_task(&scene, Model::new).unwrap();
+    let model = sample::with_task(&scene, CheckedHand::new).unwrap();
     let bodies = sample::with_task(&scene, |task| Bodies::new(task, &model)).unwrap();
     let is_obstacle = |item: usize| bodies.items[item].owner == Owner::Obstacle;
     let mut smallest = f64::INFINITY;
     for segment in &plan.segments {
         for ends in segment.waypoints.windows(2) {
-            let mut step = Step::new(&bodies, &ends[0], &ends[1]);
+            let mut step = WaypointStep::new(&bodies, &ends[0], &ends[1]);
             for pair in bodies.pairs.iter().filter(|pair| is_obstacle(pair.b)) {
                 smallest = smallest.min(step.measure(pair, 0.0).unwrap());
             }

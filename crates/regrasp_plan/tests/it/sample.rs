@@ -9,8 +9,8 @@ use regrasp_plan::plan::{FORMAT, FORMAT_VERSION, MotionLimits, PlanInput, PoseDa
 use regrasp_plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
 use regrasp_robot::hand::PalmShape;
 use regrasp_robot::{
-    Chain, ChainJoint, Coupling, Finger, FingerShape, Hand, Joint, JointId, JointKind, Limits, Link, LinkId, Motion,
-    Robot, Tip, TipShape,
+    Chain, ChainJoint, Coupling, Finger, FingerShape, Hand, Joint, JointId, JointKind, JointMotion, Limits, Link,
+    LinkId, Robot, Tip, TipShape,
 };
 use regrasp_scene::scene::InputFile;
 use regrasp_scene::{GraspRequest, InHandQuery, Manipulation, Object, Query, Scene, SceneHand, State, TrackingQuery};
@@ -107,7 +107,7 @@ fn hand() -> Hand {
                     ChainJoint {
                         parent_from_joint: joint.parent_from_joint,
                         axis: joint.axis,
-                        motion: Motion::Turn,
+                        motion: JointMotion::Turn,
                         drive: Coupling::independent(j),
                     }
                 })

@@ -7,7 +7,7 @@ use crate::tracked::{
 };
 use nalgebra::UnitQuaternion;
 use regrasp_geometry::{Pose, Vector};
-use regrasp_plan::check::model::Model;
+use regrasp_plan::check::model::CheckedHand;
 use regrasp_plan::check::rolling::Roll;
 use regrasp_plan::check::{Report, ViolationKind};
 use regrasp_plan::plan::TrackingPromises;
@@ -153,7 +153,7 @@ fn fixed_fingers_may_begin_to_slide_on_their_way() {
 fn slides_and_turns_are_those_of_the_closed_forms() {
     let mut scene = ball_scene();
     let plan = ball_plan(&mut scene);
-    let model = sample::with_task(&scene, Model::new).unwrap();
+    let model = sample::with_task(&scene, CheckedHand::new).unwrap();
     let sums = |s: usize, f: usize| {
         let mut sums = [0.0; 3];
         for pair in plan.segments[s].waypoints.windows(2) {
@@ -192,7 +192,7 @@ fn slides_and_turns_are_those_of_the_closed_forms() {
 #[test]
 fn points_on_the_tip_are_in_the_frame_of_its_link() {
     let scene = sample::scene();
-    let model = sample::with_task(&scene, Model::new).unwrap();
+    let model = sample::with_task(&scene, CheckedHand::new).unwrap();
     let joints: Vec<f64> = (0..3 * sample::N_FINGERS).map(|k| 0.1 + 0.03 * k as f64).collect();
     for (f, finger) in model.fingers.iter().enumerate() {
         let found = finger.path.world_from_link(&joints) * finger.body_from_tip_link;

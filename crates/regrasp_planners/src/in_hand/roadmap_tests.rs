@@ -12,7 +12,7 @@ use regrasp_grasp::{Contact, Grip};
 use regrasp_manipulation::grasp::sequence::{Motion, Sequence};
 use regrasp_manipulation::grasp::state::{GraspState, HandJoints};
 use regrasp_manipulation::model::Model;
-use regrasp_plan::check::closure::{Body, margin};
+use regrasp_plan::check::closure::{HeldBody, margin};
 use regrasp_robot::import::LoadOptions;
 use regrasp_scene::{LoadedScene, load_scene};
 use std::path::Path;
@@ -70,7 +70,7 @@ fn tip_over(model: &Model, finger: usize, contact: &Contact) -> Point {
 fn paths_on_the_sphere_follow_great_circles_and_stay_closed_without_any_finger() {
     with_search("sphere_90x.toml", |search| {
         let model = search.model();
-        let body = Body {
+        let body = HeldBody {
             center_of_mass: model.view.object.center_of_mass,
             torque_scale: model.frame.torque_scale,
             friction: model.frame.friction,

@@ -108,8 +108,7 @@ pub fn change_grasp(local: &mut Local, from: &TrackingGrasp, goal: &UnitQuaterni
 /// holds on faces only.
 fn may_leave(model: &Model, grasp: &TrackingGrasp) -> u32 {
     let object = &model.view.object;
-    let on_faces =
-        grasp.touches.iter().all(|touch| object.surface.crease_distance(&touch.foot) >= object.edge_distance);
+    let on_faces = grasp.touches.iter().all(|touch| object.keeps_off_edges(&touch.foot));
     if on_faces { releasable(model, &grasp.contacts(), model.all_fingers()) } else { 0 }
 }
 

@@ -13,8 +13,8 @@ use nalgebra::UnitQuaternion;
 use regrasp_base::{Budget, Interrupt, Rng};
 use regrasp_geometry::Vector;
 use regrasp_manipulation::progress::Progress;
-use std::cmp::Ordering;
-use std::collections::{BTreeSet, BinaryHeap};
+use regrasp_roadmap::{OpenList, Rank};
+use std::collections::BTreeSet;
 
 /// How often the grasp of one node is changed through the air. By hand.
 const MOST_CHANGES: usize = 3;
@@ -34,35 +34,10 @@ pub struct Node {
 }
 
 /// A sub-goal that has still to be tried.
-struct Open {
-    /// Length of the way through it plus the distance from it to the goal.
-    estimate: f64,
-    /// Number in the order of making: breaks ties.
-    number: usize,
+struct SubGoal {
     node: usize,
     orientation: UnitQuaternion<f64>,
     is_goal: bool,
-}
-
-impl PartialEq for Open {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Open {}
-
-impl PartialOrd for Open {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Open {
-    /// The least estimate is the greatest.
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.estimate.total_cmp(&self.estimate).then_with(|| other.number.cmp(&self.number))
-    }
 }
 
 /// Counts of a search, as in Cherif 1999, tables 4 and 5.
@@ -113,7 +88,8 @@ struct Graph<'g> {
     taken: BTreeSet<[i32; 3]>,
     /// Cells that a grasp is in or may come into: the nodes of Cherif 1999's graph.
     seen: BTreeSet<[i32; 3]>,
-    open: BinaryHeap<Open>,
+    /// Sub-goals by the length of the way through them plus the distance from them to the goal; of equals, the first made.
+    open: OpenList<SubGoal>,
     /// Sub-goals made.
     n_made: usize,
     /// The node nearest to the goal, and the angle left.
@@ -150,7 +126,7 @@ impl<'g> Graph<'g> {
             nodes: Vec::new(),
             taken: BTreeSet::new(),
             seen: BTreeSet::new(),
-            open: BinaryHeap::new(),
+            open: OpenList::new(),
             n_made: 0,
             nearest: (0, f64::INFINITY),
         };
@@ -207,7 +183,7 @@ impl<'g> Graph<'g> {
         let way = turn_to(from, &orientation).norm();
         let left = turn_to(&orientation, &self.goal).norm();
         let estimate = self.nodes[node].length + way + self.settings.goal_weight * left;
-        self.open.push(Open { estimate, number: self.n_made, node, orientation, is_goal });
+        self.open.push(Rank::of(estimate, self.n_made), SubGoal { node, orientation, is_goal });
         self.n_made += 1;
     }
 
@@ -267,7 +243,7 @@ pub fn search(
         return graph.ended(Ok(0));
     }
     let mut without_gain = 0;
-    while let Some(best) = graph.open.pop() {
+    while let Some((_, best)) = graph.open.pop() {
         if let Err(interrupt) = budget.check(counts.work) {
             return graph.ended(Err(Ended::Interrupted(interrupt)));
         }

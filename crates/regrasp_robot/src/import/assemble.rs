@@ -4,8 +4,9 @@
 //! joint moves is palm; moving joints that belong to no finger are held at the position nearest to zero.
 
 use super::chain::{ChainOwner, make_chain, middle_of_limits, rest_posture};
+use super::fixes;
 use super::hulls::Hulls;
-use super::spec::{Body, Carried, FingerSpec, HandSpec, TipSpec};
+use super::spec::{Carried, FingerSpec, HandSpec, RigidBody, TipSpec};
 use super::tip_split;
 use crate::coupling::Coupling;
 use crate::hand::{Finger, FingerShape, Hand, MAX_FINGERS, PalmShape};
@@ -45,7 +46,7 @@ pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Resu
         fingers.extend(make_finger(robot, index, finger, joints, &carried, &mut hulls, &mut found));
     }
     let mut palm = Vec::new();
-    for (&link, at) in carried.iter().filter(|(_, at)| at.body == Body::Palm) {
+    for (&link, at) in carried.iter().filter(|(_, at)| at.body == RigidBody::Palm) {
         let shapes = hulls.of_link(link, &at.body_from_link, &mut found);
         palm.extend(shapes.into_iter().map(|placed| PalmShape { link, placed }));
     }
@@ -85,14 +86,19 @@ fn moving_joints(robot: &Robot, spec: &HandSpec, found: &mut Diagnostics) -> Vec
         let mut joints = Vec::new();
         if !path.starts_with(&base_path) {
             let problem = format!("tip link \"{tip_name}\" is not carried by base link \"{base_name}\"");
-            found.push(say("U206", problem, "a tip link below the base link", String::new()));
+            found.push(say(
+                "U206",
+                problem,
+                "a tip link below the base link",
+                fixes::tip_elsewhere(robot, spec, index),
+            ));
         } else {
             let below = &path[base_path.len()..];
             let first = finger.first_joint.map(|joint| below.iter().position(|&other| other == joint));
             if let Some(None) = first {
                 let joint = finger.first_joint.map_or("", |joint| &robot.joints[joint.0].name);
                 let problem = format!("first joint \"{joint}\" is not between \"{base_name}\" and \"{tip_name}\"");
-                found.push(say("U206", problem, "a joint of the finger", String::new()));
+                found.push(say("U206", problem, "a joint of the finger", fixes::first_joint(robot, below)));
             }
             let from = first.flatten().unwrap_or(0);
             joints.extend(below[from..].iter().copied().filter(|j| robot.joints[j.0].kind != JointKind::Fixed));
@@ -108,9 +114,7 @@ fn moving_joints(robot: &Robot, spec: &HandSpec, found: &mut Diagnostics) -> Vec
         {
             let problem =
                 format!("joint \"{}\" moves finger \"{}\" too", robot.joints[shared.0].name, spec.fingers[other].name);
-            let last_shared = joints.iter().rev().find(|joint| chains[other].contains(joint)).unwrap_or(&shared);
-            let below = &robot.links[robot.joints[last_shared.0].child.0].name;
-            let fix = format!("base_link = \"{below}\", so that shared joints belong to no finger");
+            let fix = fixes::shared_joint(robot, spec, [other, index], [&chains[other], &joints]);
             found.push(say("U208", problem, "fingers that share no joint", fix));
         }
         chains.push(joints);
@@ -128,7 +132,7 @@ fn carry(
     notes: &mut Vec<String>,
 ) -> BTreeMap<LinkId, Carried> {
     let base = spec.base;
-    let mut carried = BTreeMap::from([(base, Carried { body: Body::Palm, body_from_link: Pose::identity() })]);
+    let mut carried = BTreeMap::from([(base, Carried { body: RigidBody::Palm, body_from_link: Pose::identity() })]);
     let mut waiting = VecDeque::from([base]);
     while let Some(link) = waiting.pop_front() {
         let at = carried[&link];
@@ -148,7 +152,7 @@ fn carry(
             }
             let child = match owner.get(&id) {
                 Some(&(finger, body)) => {
-                    Carried { body: Body::Finger { finger, body }, body_from_link: Pose::identity() }
+                    Carried { body: RigidBody::Finger { finger, body }, body_from_link: Pose::identity() }
                 }
                 None => {
                     let held = held_at(robot, id, owner, file, found, notes);
@@ -187,7 +191,7 @@ fn held_at(
                 Diagnostic::new("U209", Place::file(file), problem)
                     .element("joint", &joint.name)
                     .expected("followers on the chain of the joint they follow")
-                    .fix("make it type=\"fixed\", or leave its link out"),
+                    .fix(fixes::hold_in_urdf(&joint.name)),
             );
             return Pose::identity();
         }
@@ -227,7 +231,7 @@ fn make_finger(
     let own = round.as_ref().and_then(Tip::own_shape);
     let mut shapes = Vec::new();
     for (&link, at) in carried {
-        let Body::Finger { finger, body } = at.body else { continue };
+        let RigidBody::Finger { finger, body } = at.body else { continue };
         if finger != index {
             continue;
         }
@@ -304,7 +308,7 @@ fn adjacent_pairs(
     carried: &BTreeMap<LinkId, Carried>,
     moving: &[Vec<JointId>],
 ) -> BTreeSet<(LinkId, LinkId)> {
-    let mut links_of: BTreeMap<Body, Vec<LinkId>> = BTreeMap::new();
+    let mut links_of: BTreeMap<RigidBody, Vec<LinkId>> = BTreeMap::new();
     for (&link, at) in carried.iter().filter(|(link, _)| !robot.links[link.0].collision.is_empty()) {
         links_of.entry(at.body).or_default().push(link);
     }
@@ -316,9 +320,9 @@ fn adjacent_pairs(
         add(links, links);
     }
     for (finger, joints) in moving.iter().enumerate() {
-        let bodies = (0..joints.len()).map(|body| Body::Finger { finger, body });
+        let bodies = (0..joints.len()).map(|body| RigidBody::Finger { finger, body });
         let with_shapes: Vec<&Vec<LinkId>> =
-            std::iter::once(Body::Palm).chain(bodies).filter_map(|body| links_of.get(&body)).collect();
+            std::iter::once(RigidBody::Palm).chain(bodies).filter_map(|body| links_of.get(&body)).collect();
         for pair in with_shapes.windows(2) {
             add(pair[0], pair[1]);
         }

@@ -1,9 +1,10 @@
 //! The chain of a finger or an arm, and its rest posture.
 
+use super::fixes;
 use super::spec::Carried;
 use crate::coupling::{Coupling, limit_leaders};
 use crate::hand::MAX_FINGER_JOINTS;
-use crate::kinematics::chain::{Chain, ChainJoint, Motion};
+use crate::kinematics::chain::{Chain, ChainJoint, JointMotion};
 use crate::kinematics::finger_ik::MAX_COORDINATES;
 use crate::kinematics::motion_bound::MAX_JOINTS;
 use crate::robot::{JointId, JointKind, LinkId, Robot};
@@ -78,7 +79,8 @@ pub(super) fn make_chain(
             found.push(
                 Diagnostic::new("U209", owner.place.clone(), problem)
                     .element(owner.kind, owner.name)
-                    .expected("followers on the chain of the joint they follow"),
+                    .expected("followers on the chain of the joint they follow")
+                    .fix(fixes::leader_elsewhere(robot, joints, *id, leader, carried)),
             );
             complete = false;
             continue;
@@ -91,7 +93,7 @@ pub(super) fn make_chain(
         chain_joints.push(ChainJoint {
             parent_from_joint: parent.body_from_link * joint.parent_from_joint,
             axis: joint.axis,
-            motion: if joint.kind == JointKind::Prismatic { Motion::Slide } else { Motion::Turn },
+            motion: if joint.kind == JointKind::Prismatic { JointMotion::Slide } else { JointMotion::Turn },
             drive,
         });
     }

@@ -58,7 +58,7 @@ pub(crate) struct PadSpec {
 
 /// A rigid body of a hand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Body {
+pub(super) enum RigidBody {
     /// What no finger joint moves.
     Palm,
     /// What a finger's joint carries.
@@ -73,6 +73,6 @@ pub(super) enum Body {
 /// Where a link is: its body, and its pose in the body's frame (the base frame, for the palm).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Carried {
-    pub(super) body: Body,
+    pub(super) body: RigidBody,
     pub(super) body_from_link: Pose,
 }

@@ -3,7 +3,7 @@
 use crate::hand::Hand;
 use crate::robot::LinkId;
 use regrasp_base::Rng;
-use regrasp_geometry::collision::{Answer, Placed, Placement, separation};
+use regrasp_geometry::collision::{Placed, Placement, Separation, separation};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Point, Pose, Vector};
 use std::collections::BTreeSet;
@@ -142,7 +142,7 @@ impl<'h> Touch<'h> {
         let first = Placed { shape: &a.placed.shape, at: &at[i].0 };
         let second = Placed { shape: &b.placed.shape, at: &at[j].0 };
         let answer = separation(first, second, distance, distance, &mut direction, &mut hints);
-        !matches!(answer, Answer::SeparatedBy(_))
+        !matches!(answer, Separation::SeparatedBy(_))
     }
 
     /// A posture, uniform in the limits of joints and brought within those of sums.

@@ -3,7 +3,7 @@
 //! Composing and applying them takes about half the work of quaternion poses, and a joint's whole motion is three
 //! precomputed matrices (Rodrigues' formula): `R(q) = A + sin(q) B + cos(q) C`.
 
-use super::chain_joint::{ChainJoint, Motion};
+use super::chain_joint::{ChainJoint, JointMotion};
 use super::trig::sin_cos;
 use nalgebra::Matrix3;
 use regrasp_geometry::Vector;
@@ -42,12 +42,12 @@ impl PreparedJoint {
     pub(super) fn new(joint: &ChainJoint) -> Self {
         let rotation = *joint.parent_from_joint.rotation.to_rotation_matrix().matrix();
         let motion = match joint.motion {
-            Motion::Turn if joint.axis.amax() == 1.0 => {
+            JointMotion::Turn if joint.axis.amax() == 1.0 => {
                 let axis = joint.axis.iamax();
                 let rotation = (rotation != Matrix3::identity()).then_some(rotation);
                 PreparedMotion::TurnAligned { rotation, axis, sign: joint.axis[axis] }
             }
-            Motion::Turn => {
+            JointMotion::Turn => {
                 let cross = joint.axis.cross_matrix();
                 let cross_squared = cross * cross;
                 PreparedMotion::Turn {
@@ -56,7 +56,9 @@ impl PreparedJoint {
                     cosine: -(rotation * cross_squared),
                 }
             }
-            Motion::Slide => PreparedMotion::Slide { rotation, axis_in_parent: rotation * joint.axis.into_inner() },
+            JointMotion::Slide => {
+                PreparedMotion::Slide { rotation, axis_in_parent: rotation * joint.axis.into_inner() }
+            }
         };
         let (coordinate, multiplier) = joint.drive.terms[0];
         PreparedJoint {

@@ -1,7 +1,7 @@
 //! Serial chains, forward kinematics and Jacobians.
 
 use super::body_frame::{BodyFrame, PreparedJoint};
-pub use super::chain_joint::{ChainJoint, Motion};
+pub use super::chain_joint::{ChainJoint, JointMotion};
 use crate::coupling::{LinearLimit, bring_within};
 use arrayvec::ArrayVec;
 use nalgebra::{Matrix3xX, Translation3, UnitQuaternion};
@@ -158,8 +158,8 @@ impl Chain {
         for (joint, pose) in self.joints.iter().zip(base_from_body) {
             let axis = pose.rotation * joint.axis.into_inner();
             let column: Vector = match joint.motion {
-                Motion::Turn => axis.cross(&(point_in_base - Point::from(pose.translation.vector))),
-                Motion::Slide => axis,
+                JointMotion::Turn => axis.cross(&(point_in_base - Point::from(pose.translation.vector))),
+                JointMotion::Slide => axis,
             };
             for &(k, multiplier) in &joint.drive.terms {
                 let mut target = jacobian.column_mut(k);
@@ -181,10 +181,10 @@ impl Chain {
 /// Pose of the child frame in the joint frame at `position`.
 fn joint_motion(joint: &ChainJoint, position: f64) -> Pose {
     match joint.motion {
-        Motion::Turn => {
+        JointMotion::Turn => {
             Pose::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&joint.axis, position))
         }
-        Motion::Slide => {
+        JointMotion::Slide => {
             Pose::from_parts(Translation3::from(joint.axis.into_inner() * position), UnitQuaternion::identity())
         }
     }
@@ -205,10 +205,10 @@ mod tests {
         };
         Chain::new(
             vec![
-                joint(0.0, Vector::x(), Motion::Turn, 0, 1.0),
-                joint(0.05, Vector::new(0.0, 1.0, 0.2), Motion::Turn, 1, 1.0),
-                joint(0.04, Vector::z(), Motion::Slide, 2, 1.0),
-                joint(0.03, Vector::y(), Motion::Turn, 1, 0.7),
+                joint(0.0, Vector::x(), JointMotion::Turn, 0, 1.0),
+                joint(0.05, Vector::new(0.0, 1.0, 0.2), JointMotion::Turn, 1, 1.0),
+                joint(0.04, Vector::z(), JointMotion::Slide, 2, 1.0),
+                joint(0.03, Vector::y(), JointMotion::Turn, 1, 0.7),
             ],
             vec!["a".into(), "b".into(), "c".into()],
             vec![-1.0; 3],

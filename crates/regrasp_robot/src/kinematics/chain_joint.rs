@@ -5,7 +5,7 @@ use regrasp_geometry::{Pose, UnitVector};
 
 /// How a chain joint moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Motion {
+pub enum JointMotion {
     /// Turns about the axis, in radians.
     Turn,
     /// Slides along the axis, in metres.
@@ -20,7 +20,7 @@ pub struct ChainJoint {
     /// Axis, in the joint frame.
     pub axis: UnitVector,
     /// How it moves.
-    pub motion: Motion,
+    pub motion: JointMotion,
     /// Coordinates of the chain that drive it.
     pub drive: Coupling<usize>,
 }

@@ -13,7 +13,7 @@
 //! A path with `|p''| <= m` over the unit of time stays within `m / 8` of the chord between its ends, point by point
 //! in time. First-order bounds of this kind are those of Schwarzer, Saha, Latombe 2005.
 
-use super::chain::{Chain, Motion};
+use super::chain::{Chain, JointMotion};
 use arrayvec::ArrayVec;
 use regrasp_geometry::Point;
 
@@ -58,7 +58,7 @@ impl MotionBound {
                 let along = joint.axis.dot(&next);
                 ((next.norm_squared() - along * along).max(0.0).sqrt() + from_origin, next.norm() + from_origin)
             };
-            let turns = joint.motion == Motion::Turn;
+            let turns = joint.motion == JointMotion::Turn;
             // A joint with several leaders moves as several joints about one axis would.
             levers.extend(joint.drive.terms.iter().map(|&(coordinate, multiplier)| Lever {
                 coordinate,
@@ -165,7 +165,7 @@ mod tests {
             let (turning, _) = random_turning(4, 1.5, &mut rng);
             let mut joints = turning.joints.clone();
             let (mut lower, mut upper) = (turning.lower.clone(), turning.upper.clone());
-            joints[i % 4].motion = Motion::Slide;
+            joints[i % 4].motion = JointMotion::Slide;
             (lower[i % 4], upper[i % 4]) = (-0.02, 0.05);
             let follower = (i + 1) % 4;
             joints[follower].drive = Coupling::one((i + 2) % 4, -0.7, 0.1);

@@ -1,6 +1,6 @@
 //! Chains for tests: hands written by their dimensions, random geometries, and real hands read in place.
 
-use super::chain::{Chain, ChainJoint, Motion};
+use super::chain::{Chain, ChainJoint, JointMotion};
 use crate::coupling::Coupling;
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
@@ -13,7 +13,7 @@ pub fn turning(joints: &[(Vector, Vector, Vector, f64, f64)]) -> Chain {
         .map(|(i, (origin, rotation, axis, _, _))| ChainJoint {
             parent_from_joint: Pose::new(*origin, *rotation),
             axis: UnitVector::new_normalize(*axis),
-            motion: Motion::Turn,
+            motion: JointMotion::Turn,
             drive: Coupling::independent(i),
         })
         .collect();
@@ -97,7 +97,7 @@ pub fn urdf_chain(path: &std::path::Path, tip_link: &str, center_in_tip: Point) 
                 ChainJoint {
                     parent_from_joint,
                     axis: UnitVector::new_normalize(axis),
-                    motion: Motion::Turn,
+                    motion: JointMotion::Turn,
                     drive: Coupling::independent(0),
                 },
                 limit("lower"),

@@ -1,7 +1,7 @@
 //! Links of fingers as bodies that move: Jacobians of all six directions, joints for a pose, torques for a force.
 
 use super::body_frame::BodyFrame;
-use super::chain::{Chain, Motion};
+use super::chain::{Chain, JointMotion};
 use super::finger_ik::{Coordinates, MAX_COORDINATES};
 use arrayvec::ArrayVec;
 use nalgebra::{Matrix6, Vector6};
@@ -30,8 +30,8 @@ pub fn twists(chain: &Chain, coordinates: &[f64], point: &Point) -> ArrayVec<[Ve
             let axis = frame.vector(&joint.axis) * multiplier;
             let [linear, angular] = &mut twists[k];
             match joint.motion {
-                Motion::Slide => *linear += axis,
-                Motion::Turn => {
+                JointMotion::Slide => *linear += axis,
+                JointMotion::Turn => {
                     *linear += axis.cross(&(point.coords - frame.translation));
                     *angular += axis;
                 }
@@ -92,7 +92,7 @@ mod tests {
         let joint = |coordinate: usize| ChainJoint {
             parent_from_joint: Pose::new(Vector::from(rng.direction()) * 0.02, Vector::from(rng.direction()) * 0.2),
             axis: UnitVector::new_normalize(Vector::ith(coordinate % 3, 1.0) + Vector::from(rng.direction()) * 0.1),
-            motion: if coordinate < 3 { Motion::Slide } else { Motion::Turn },
+            motion: if coordinate < 3 { JointMotion::Slide } else { JointMotion::Turn },
             drive: Coupling::independent(coordinate),
         };
         let joints = (0..6).map(joint).collect();

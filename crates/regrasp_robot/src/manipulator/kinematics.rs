@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 /// The way from a link's parent to the link.
 #[derive(Debug, Clone)]
-struct Step {
+struct LinkStep {
     parent: usize,
     /// Index in `Robot::joints`.
     joint: usize,
@@ -24,15 +24,15 @@ pub(super) struct TreeKinematics {
     /// Links, each after its parent.
     order: Vec<usize>,
     /// By link; none for the root.
-    steps: Vec<Option<Step>>,
+    steps: Vec<Option<LinkStep>>,
 }
 
 impl TreeKinematics {
     pub(super) fn new(robot: &Arc<Robot>, layout: &JointLayout) -> Self {
-        let mut steps: Vec<Option<Step>> = robot.links.iter().map(|_| None).collect();
+        let mut steps: Vec<Option<LinkStep>> = robot.links.iter().map(|_| None).collect();
         for (joint, of_robot) in robot.joints.iter().enumerate() {
             let drive = layout.drive_of(robot, joint);
-            steps[of_robot.child.0] = Some(Step { parent: of_robot.parent.0, joint, drive });
+            steps[of_robot.child.0] = Some(LinkStep { parent: of_robot.parent.0, joint, drive });
         }
         let mut order = vec![robot.root.0];
         let mut next = 0;
@@ -44,7 +44,7 @@ impl TreeKinematics {
         TreeKinematics { robot: robot.clone(), n_coordinates: layout.coordinates.len(), order, steps }
     }
 
-    fn parent_from_link(&self, step: &Step, state: &[f64]) -> Pose {
+    fn parent_from_link(&self, step: &LinkStep, state: &[f64]) -> Pose {
         let joint = &self.robot.joints[step.joint];
         match &step.drive {
             Some(drive) => joint.parent_from_joint * joint.motion(drive.position(|k| state[k])),

@@ -49,7 +49,9 @@ pub(super) fn check_reach(hand: &SceneHand, object: &Object, task: &Task, root: 
             continue;
         }
         let Some((distance, reach)) = beyond_reach(hand, &pose, object_reach + slack) else { continue };
-        let Some(entry) = root.optional(key) else { continue };
+        // Without a start the object stands where the scene has it.
+        let instead = if key == "start" { "object" } else { key };
+        let Some(entry) = root.optional(key).or_else(|| root.optional(instead)) else { continue };
         let p = pose.translation.vector;
         let mut diagnostic = entry
             .error("P302", found, format!("position {} is {} m from the hand", list(p), shown(distance, 3)))
@@ -117,7 +119,7 @@ fn finger_reach(finger: &regrasp_robot::Finger) -> f64 {
     let slides: f64 = chain
         .joints
         .iter()
-        .filter(|joint| joint.motion == regrasp_robot::Motion::Slide)
+        .filter(|joint| joint.motion == regrasp_robot::JointMotion::Slide)
         .map(|joint| {
             let [lower, upper] = joint.range([&chain.lower, &chain.upper]);
             lower.abs().max(upper.abs())
@@ -127,7 +129,7 @@ fn finger_reach(finger: &regrasp_robot::Finger) -> f64 {
 }
 
 /// Largest distance between two of: finger bases, fingertips at rest, palm shapes; in metres.
-fn size_of(hand: &Hand) -> f64 {
+pub(super) fn size_of(hand: &Hand) -> f64 {
     let mut points = Vec::new();
     for finger in &hand.fingers {
         points.extend(finger.chain.joints.first().map(|joint| Point::from(joint.parent_from_joint.translation.vector)));

@@ -1,7 +1,7 @@
 //! The pairs of a scene against a count by hand.
 
 use crate::support::{Folder, GOOD, repository, shared_models, with_models};
-use regrasp_geometry::collision::{Answer, Placed, Placement, separation};
+use regrasp_geometry::collision::{Placed, Placement, Separation, separation};
 use regrasp_geometry::{Pose, Vector};
 use regrasp_robot::import::LoadOptions;
 use regrasp_scene::{FingerShapeId, LoadedScene, collision_pairs, load_scene};
@@ -88,7 +88,7 @@ fn near_at_rest(loaded: &LoadedScene, required: f64) -> Vec<String> {
             &mut direction,
             &mut [0, 0],
         );
-        if !matches!(answer, Answer::SeparatedBy(distance) if distance >= required) {
+        if !matches!(answer, Separation::SeparatedBy(distance) if distance >= required) {
             near.push(format!("{a_name} and {b_name}"));
         }
     }

@@ -313,7 +313,7 @@ fn an_object_that_no_finger_of_the_hand_reaches_is_refused() {
     let messages =
         Folder::new().messages(&with("hand = \"left\"\nobject = \"box\"", "hand = \"right\"\nobject = \"box\""));
     assert!(
-        messages.starts_with("P302 scene.toml:51:8 key \"tasks[1].goal\": position [0.5, -0.07488, 0.07184]"),
+        messages.starts_with("P302 scene.toml:50:10 key \"tasks[1].object\": position [0.5, -0.07488, 0.07184]"),
         "{messages}"
     );
 }

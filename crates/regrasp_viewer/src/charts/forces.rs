@@ -3,7 +3,7 @@
 use super::svg::{Anchor, LIMIT, SOFT, Scale, Svg, cut};
 use super::time_axis::{self, LEFT, RIGHT, SHEET, TOP};
 use crate::palette;
-use crate::timeline::{self, Step};
+use crate::timeline::{self, TimelineStep};
 use regrasp_geometry::Vector;
 use regrasp_plan::Plan;
 
@@ -34,7 +34,8 @@ pub fn forces(plan: &Plan) -> Option<String> {
         cap(&mut svg, largest);
     }
     for (finger, forces) in series.iter().enumerate() {
-        let point = |(step, force): (&Step, &Option<f64>)| Some([time.at(step.waypoint.time), values.at((*force)?)]);
+        let point =
+            |(step, force): (&TimelineStep, &Option<f64>)| Some([time.at(step.waypoint.time), values.at((*force)?)]);
         let points: Vec<Option<[f64; 2]>> = with_gaps(&steps, forces).into_iter().map(|p| p.and_then(point)).collect();
         svg.path(&points, palette::color(finger), 1.7, "");
     }
@@ -53,8 +54,8 @@ pub fn forces(plan: &Plan) -> Option<String> {
 }
 
 /// Normal force of a finger at every step, in newtons; none while it is free or has no force.
-fn normal_forces(steps: &[Step], finger: usize) -> Vec<Option<f64>> {
-    let force = |step: &Step| {
+fn normal_forces(steps: &[TimelineStep], finger: usize) -> Vec<Option<f64>> {
+    let force = |step: &TimelineStep| {
         let contact = step.waypoint.contacts.get(finger)?;
         let (force, normal) = (Vector::from(contact.force_in_object?), Vector::from(contact.normal_in_object?));
         // It pushes against the outward normal.
@@ -64,6 +65,9 @@ fn normal_forces(steps: &[Step], finger: usize) -> Vec<Option<f64>> {
 }
 
 /// Steps with their forces, broken where the finger is free.
-fn with_gaps<'s, 'p>(steps: &'s [Step<'p>], forces: &'s [Option<f64>]) -> Vec<Option<(&'s Step<'p>, &'s Option<f64>)>> {
+fn with_gaps<'s, 'p>(
+    steps: &'s [TimelineStep<'p>],
+    forces: &'s [Option<f64>],
+) -> Vec<Option<(&'s TimelineStep<'p>, &'s Option<f64>)>> {
     steps.iter().zip(forces).map(|(step, force)| force.is_some().then_some((step, force))).collect()
 }

@@ -2,7 +2,7 @@
 
 use super::svg::{Anchor, INK, SOFT, Svg, cut};
 use crate::palette;
-use crate::story::{Carrier, OtherCarrier, PieceStory, Role, SceneStory, pack};
+use crate::story::{PieceStory, Role, SceneStory, pack};
 use crate::timeline;
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_plan::Plan;
@@ -33,7 +33,7 @@ const VIEWS: [([(usize, f64); 2], &str); 6] = [
 /// Traces of the contacts on the object as in figures 10 to 18 of Cherif 1999, in the object's frame, seen from six sides: what
 /// faces away is left out. None where the object's shape is not known, or no finger touches.
 pub fn traces(plan: &Plan, scene: &SceneStory) -> Option<String> {
-    let body = Body::of(scene)?;
+    let body = ObjectOutline::of(scene)?;
     let center = nalgebra::center(&body.low, &body.high);
     let scale = ROOM / (body.high - body.low).max();
     let traces: Vec<Vec<Option<(Point, Vector)>>> = (0..plan.fingers.len()).map(|f| timeline::trace(plan, f)).collect();
@@ -120,7 +120,7 @@ fn key(svg: &mut Svg, plan: &Plan) {
 }
 
 /// The object's surface, in its frame.
-struct Body {
+struct ObjectOutline {
     corners: Vec<Point>,
     /// Edges between faces: two corners, and the normals of the faces that meet.
     edges: Vec<([usize; 2], [Vector; 2])>,
@@ -128,12 +128,12 @@ struct Body {
     high: Point,
 }
 
-impl Body {
+impl ObjectOutline {
     /// What planner and checker keep apart of the object; none where it cannot be read.
     fn of(scene: &SceneStory) -> Option<Self> {
-        let mut body = Body { corners: Vec::new(), edges: Vec::new(), low: Point::origin(), high: Point::origin() };
-        let is_object =
-            |piece: &&PieceStory| piece.on == Carrier::Other(OtherCarrier::Object) && piece.role == Role::Collision;
+        let mut body =
+            ObjectOutline { corners: Vec::new(), edges: Vec::new(), low: Point::origin(), high: Point::origin() };
+        let is_object = |piece: &&PieceStory| scene.is_moved_object(piece.on) && piece.role == Role::Collision;
         for piece in scene.pieces.iter().filter(is_object) {
             let mesh = scene.meshes.get(piece.mesh)?;
             let (vertices, triangles) = pack::unpack(mesh)?;

@@ -17,5 +17,5 @@ pub mod shade;
 pub mod text;
 
 pub use camera::Camera;
-pub use model::{Model, Paint, Surface};
+pub use model::{Paint, PlacedSurface, Surface};
 pub use shade::{Look, Picture, render};

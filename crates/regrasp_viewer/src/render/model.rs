@@ -84,7 +84,7 @@ impl Paint {
 
 /// A surface at its place.
 #[derive(Debug, Clone)]
-pub struct Model {
+pub struct PlacedSurface {
     /// Pose of the surface's frame in the world.
     pub world_from_surface: Pose,
     /// The surface.
@@ -95,7 +95,7 @@ pub struct Model {
     pub body: u32,
 }
 
-impl Model {
+impl PlacedSurface {
     /// Corners of all triangles in the world.
     pub fn world_corners(&self) -> impl Iterator<Item = [Point; 3]> + '_ {
         let placed = self.world_from_surface.to_homogeneous();

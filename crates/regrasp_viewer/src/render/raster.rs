@@ -4,7 +4,7 @@
 //! that share an edge exactly one owns each sample on it, so that closed surfaces have no holes.
 
 use super::camera::{Camera, Seen};
-use super::model::Model;
+use super::model::PlacedSurface;
 use regrasp_geometry::Point;
 
 /// Steps per sample to which corners are rounded.
@@ -38,7 +38,7 @@ impl Samples {
     }
 
     /// What `camera` sees of `models`, sides and backs of triangles alike.
-    pub fn of(models: &[Model], camera: &Camera, width: usize, height: usize) -> Self {
+    pub fn of(models: &[PlacedSurface], camera: &Camera, width: usize, height: usize) -> Self {
         let mut seen = Samples::empty(width, height);
         let mut number = 0;
         for model in models {

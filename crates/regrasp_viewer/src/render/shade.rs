@@ -1,7 +1,7 @@
 //! Light, shadow, outlines and layers.
 
 use super::camera::Camera;
-use super::model::{Model, mixed};
+use super::model::{PlacedSurface, mixed};
 use super::raster::{NONE, Samples};
 use regrasp_geometry::{Point, Vector};
 use std::f64::consts::{PI, TAU};
@@ -23,7 +23,7 @@ pub struct Look {
 #[derive(Debug, Clone)]
 pub struct Layer {
     /// What is in it; of these only the nearest shows.
-    pub models: Vec<Model>,
+    pub models: Vec<PlacedSurface>,
     /// Opacity where nothing solid is in front.
     pub in_front: f64,
     /// Opacity where it is hidden behind something solid.
@@ -57,7 +57,14 @@ const N_TURNS: usize = 16;
 const OUTLINE_LIGHT: f64 = 0.12;
 
 /// What `camera` sees of `solid`, with `layers` over it, on white. `camera` is for a picture of `width` times `height` pixels.
-pub fn render(solid: &[Model], layers: &[Layer], camera: &Camera, width: usize, height: usize, look: &Look) -> Picture {
+pub fn render(
+    solid: &[PlacedSurface],
+    layers: &[Layer],
+    camera: &Camera,
+    width: usize,
+    height: usize,
+    look: &Look,
+) -> Picture {
     let n = look.supersampling.max(1);
     let fine = camera.scaled(n as f64);
     let light = Light::new(solid, camera, look);
@@ -136,7 +143,7 @@ fn occlusion_directions(turn: usize) -> [[f64; 4]; N_OCCLUSION] {
 }
 
 impl Light {
-    fn new(solid: &[Model], camera: &Camera, look: &Look) -> Self {
+    fn new(solid: &[PlacedSurface], camera: &Camera, look: &Look) -> Self {
         let in_world = |v: Vector| camera.axes.transpose() * v.normalize();
         let key = in_world(Vector::new(-0.45, 0.85, -0.75));
         let shadow = look.shadows_within.map(|(center, radius)| {
@@ -176,14 +183,14 @@ struct WorldTriangle {
 
 /// Models with what is seen of them.
 struct Shaded<'m> {
-    models: &'m [Model],
+    models: &'m [PlacedSurface],
     camera: &'m Camera,
     triangles: Vec<WorldTriangle>,
     seen: Samples,
 }
 
 impl<'m> Shaded<'m> {
-    fn new(models: &'m [Model], camera: &'m Camera, width: usize, height: usize) -> Self {
+    fn new(models: &'m [PlacedSurface], camera: &'m Camera, width: usize, height: usize) -> Self {
         let triangles = models.iter().enumerate().flat_map(|(m, model)| {
             let rotation = *model.world_from_surface.rotation.to_rotation_matrix().matrix();
             model.world_corners().enumerate().map(move |(number, corners)| {

@@ -2,7 +2,7 @@
 
 use super::tips::tip_centers;
 use crate::story::SceneStory;
-use crate::timeline::{self, Step};
+use crate::timeline::{self, TimelineStep};
 use regrasp_geometry::Point;
 use regrasp_plan::plan::{ContactState, Plan, PoseData, SegmentKind};
 
@@ -107,7 +107,7 @@ fn thinned(items: &[usize], n: usize) -> Vec<usize> {
 }
 
 /// The waypoint of a segment at which its moving finger has made half of its way.
-fn half_way(scene: &SceneStory, plan: &Plan, steps: &[Step], segment: usize) -> usize {
+fn half_way(scene: &SceneStory, plan: &Plan, steps: &[TimelineStep], segment: usize) -> usize {
     let first = steps.iter().position(|step| step.segment == segment).unwrap_or(0);
     let path = tip_path(scene, plan, segment);
     let mut lengths = vec![0.0];
@@ -128,7 +128,7 @@ fn tip_path(scene: &SceneStory, plan: &Plan, segment: usize) -> Vec<Point> {
 
 /// The waypoint nearest to the middle of the longest time without a chosen one; none if every waypoint is chosen, or the
 /// rest passes at no other time.
-fn middle_of_longest_gap(steps: &[Step], chosen: &[usize]) -> Option<usize> {
+fn middle_of_longest_gap(steps: &[TimelineStep], chosen: &[usize]) -> Option<usize> {
     let time = |k: usize| steps[k].waypoint.time;
     let gap = |pair: &&[usize]| time(pair[1]) - time(pair[0]);
     let with_room = chosen.windows(2).filter(|pair| pair[1] > pair[0] + 1 && gap(pair) > 0.0);
@@ -142,8 +142,8 @@ fn middle_of_longest_gap(steps: &[Step], chosen: &[usize]) -> Option<usize> {
     (longest[0] + 1..longest[1]).min_by(|&a, &b| off(a).total_cmp(&off(b)))
 }
 
-fn key_frame(scene: &SceneStory, plan: &Plan, steps: &[Step], step: usize) -> KeyFrame {
-    let Step { segment, waypoint } = steps[step];
+fn key_frame(scene: &SceneStory, plan: &Plan, steps: &[TimelineStep], step: usize) -> KeyFrame {
+    let TimelineStep { segment, waypoint } = steps[step];
     let data = &plan.segments[segment];
     let is_end = step == 0 || step + 1 == steps.len();
     let moving = timeline::moving_finger(plan, data).filter(|_| !is_end);

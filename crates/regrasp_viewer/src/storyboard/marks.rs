@@ -1,6 +1,6 @@
 //! Contacts, cones, forces and paths as things in space.
 
-use crate::render::{Model, Paint, Surface};
+use crate::render::{Paint, PlacedSurface, Surface};
 use crate::story::tessellate::tessellate;
 use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_geometry::{Point, Pose, Shape, UnitVector};
@@ -11,7 +11,7 @@ use std::sync::Arc;
 const AROUND: usize = 32;
 
 /// A solid made by turning `profile` (distance from the axis, height) about the line from `base` along `axis`.
-fn turned(profile: &[[f64; 2]], base: &Point, axis: &UnitVector, color: [f64; 3], body: u32) -> Model {
+fn turned(profile: &[[f64; 2]], base: &Point, axis: &UnitVector, color: [f64; 3], body: u32) -> PlacedSurface {
     let (along, across) = regrasp_geometry::frame::tangents(axis);
     let at = |[distance, height]: [f64; 2], k: usize| {
         let angle = TAU * (k % AROUND) as f64 / AROUND as f64;
@@ -37,24 +37,24 @@ fn turned(profile: &[[f64; 2]], base: &Point, axis: &UnitVector, color: [f64; 3]
         }
     }
     let surface = Arc::new(Surface { corners, normals });
-    Model { world_from_surface: Pose::identity(), surface, paint: Paint::Plain(color), body }
+    PlacedSurface { world_from_surface: Pose::identity(), surface, paint: Paint::Plain(color), body }
 }
 
 /// A flat disc at a contact.
-pub fn disc(center: &Point, normal: &UnitVector, radius: f64, color: [f64; 3], body: u32) -> Model {
+pub fn disc(center: &Point, normal: &UnitVector, radius: f64, color: [f64; 3], body: u32) -> PlacedSurface {
     let half = 0.06 * radius;
     turned(&[[0.0, -half], [radius, -half], [radius, half], [0.0, half]], center, normal, color, body)
 }
 
 /// A rod from one point to another; nothing where they coincide.
-pub fn rod(from: &Point, to: &Point, radius: f64, color: [f64; 3], body: u32) -> Option<Model> {
+pub fn rod(from: &Point, to: &Point, radius: f64, color: [f64; 3], body: u32) -> Option<PlacedSurface> {
     let axis = UnitVector::try_new(to - from, 1e-12)?;
     let length = (to - from).norm();
     Some(turned(&[[0.0, 0.0], [radius, 0.0], [radius, length], [0.0, length]], from, &axis, color, body))
 }
 
 /// An arrow from one point to another; nothing where they coincide.
-pub fn arrow(from: &Point, to: &Point, radius: f64, color: [f64; 3], body: u32) -> Option<Model> {
+pub fn arrow(from: &Point, to: &Point, radius: f64, color: [f64; 3], body: u32) -> Option<PlacedSurface> {
     let axis = UnitVector::try_new(to - from, 1e-12)?;
     let length = (to - from).norm();
     let neck = (length - 4.5 * radius).max(0.4 * length);
@@ -63,16 +63,16 @@ pub fn arrow(from: &Point, to: &Point, radius: f64, color: [f64; 3], body: u32) 
 }
 
 /// The mantle of a cone with its apex at a contact, open outward.
-pub fn cone(apex: &Point, axis: &UnitVector, height: f64, radius: f64, color: [f64; 3], body: u32) -> Model {
+pub fn cone(apex: &Point, axis: &UnitVector, height: f64, radius: f64, color: [f64; 3], body: u32) -> PlacedSurface {
     turned(&[[0.0, 0.0], [radius, height]], apex, axis, color, body)
 }
 
 /// A rope along `points`.
-pub fn rope(points: &[Point], radius: f64, color: [f64; 3], body: u32) -> Vec<Model> {
+pub fn rope(points: &[Point], radius: f64, color: [f64; 3], body: u32) -> Vec<PlacedSurface> {
     let ball = Arc::new(Surface::of(&tessellate(&Shape::Sphere { radius })));
-    let mut models: Vec<Model> =
+    let mut models: Vec<PlacedSurface> =
         points.windows(2).filter_map(|pair| rod(&pair[0], &pair[1], radius, color, body)).collect();
-    models.extend(points.iter().map(|point| Model {
+    models.extend(points.iter().map(|point| PlacedSurface {
         world_from_surface: Pose::from_parts(Translation3::from(point.coords), UnitQuaternion::identity()),
         surface: Arc::clone(&ball),
         paint: Paint::Plain(color),

@@ -114,14 +114,14 @@ fn validate(scene: &SceneStory, plan: &Plan, settings: &StoryboardSettings) -> R
     if settings.columns == Some(0) {
         return out_of_range("the number of columns", 0, "at least 1");
     }
-    if !plan.joint_names.iter().eq(scene.joints.iter().map(|joint| &joint.name)) {
+    if !plan.joint_names.iter().eq(scene.hand().joints.iter().map(|joint| &joint.name)) {
         return Err(StoryboardError::Plan("the plan's joints are not those of the hand".into()));
     }
-    if plan.fingers.len() != scene.fingers.len() {
+    if plan.fingers.len() != scene.hand().fingers.len() {
         return Err(StoryboardError::Plan("the plan's fingers are not those of the hand".into()));
     }
     let steps = timeline::steps(plan);
-    let fits = |step: &timeline::Step| {
+    let fits = |step: &timeline::TimelineStep| {
         step.waypoint.joints.len() == plan.joint_names.len() && step.waypoint.contacts.len() == plan.fingers.len()
     };
     if steps.is_empty() || !steps.iter().all(fits) {

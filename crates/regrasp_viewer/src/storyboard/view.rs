@@ -4,7 +4,7 @@ use super::key_frames::KeyFrame;
 use super::stage::Stage;
 use crate::render::raster::{NONE, Samples};
 use crate::render::shade::Layer;
-use crate::render::{Camera, Model};
+use crate::render::{Camera, PlacedSurface};
 use regrasp_geometry::{Point, Vector};
 use std::f64::consts::TAU;
 
@@ -28,14 +28,14 @@ const FOCAL: f64 = 2.2;
 const LEAST_OBJECT: f64 = 0.27;
 
 /// A ball that holds all corners of all models.
-pub fn ball_around(postures: &[Vec<Model>]) -> (Point, f64) {
+pub fn ball_around(postures: &[Vec<PlacedSurface>]) -> (Point, f64) {
     let corners: Vec<Point> = all_corners(postures).collect();
     let (low, high) = corners.iter().fold((corners[0], corners[0]), |(low, high), p| (low.inf(p), high.sup(p)));
     let center = nalgebra::center(&low, &high);
     (center, corners.iter().map(|p| (p - center).norm()).fold(1e-6, f64::max))
 }
 
-fn all_corners(postures: &[Vec<Model>]) -> impl Iterator<Item = Point> + '_ {
+fn all_corners(postures: &[Vec<PlacedSurface>]) -> impl Iterator<Item = Point> + '_ {
     postures.iter().flatten().flat_map(|model| model.world_corners().flatten().collect::<Vec<_>>())
 }
 
@@ -44,7 +44,7 @@ fn all_corners(postures: &[Vec<Model>]) -> impl Iterator<Item = Point> + '_ {
 pub fn best(
     stage: &Stage,
     frames: &[KeyFrame],
-    postures: &[Vec<Model>],
+    postures: &[Vec<PlacedSurface>],
     layers: &[Vec<Layer>],
     width: usize,
     height: usize,
@@ -76,7 +76,7 @@ pub fn best(
 }
 
 /// The corners of a model that reach farthest in some directions: enough to frame it.
-fn extremes(model: &Model) -> Vec<Point> {
+fn extremes(model: &PlacedSurface) -> Vec<Point> {
     let corners: Vec<Point> = model.world_corners().flatten().collect();
     if corners.len() <= N_EXTREMES {
         return corners;
@@ -93,7 +93,13 @@ fn extremes(model: &Model) -> Vec<Point> {
 }
 
 /// How much of the object is seen, as share of the picture, with a bonus for contacts, paths and obstacles that nothing hides.
-fn value_of(stage: &Stage, frames: &[KeyFrame], postures: &[Vec<Model>], camera: &Camera, height: usize) -> f64 {
+fn value_of(
+    stage: &Stage,
+    frames: &[KeyFrame],
+    postures: &[Vec<PlacedSurface>],
+    camera: &Camera,
+    height: usize,
+) -> f64 {
     let mut value = 0.0;
     for (frame, solid) in frames.iter().zip(postures) {
         let n_object = solid[..stage.n_object_pieces()].iter().map(|m| m.surface.corners.len()).sum::<usize>() as u32;

@@ -5,7 +5,7 @@ use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, Shape, Vector};
 use regrasp_viewer::render::raster::{NONE, Samples};
 use regrasp_viewer::render::shade::Layer;
-use regrasp_viewer::render::{Camera, Look, Model, Paint, Picture, Surface, png_file, render};
+use regrasp_viewer::render::{Camera, Look, Paint, Picture, PlacedSurface, Surface, png_file, render};
 use regrasp_viewer::story::tessellate::{Triangles, tessellate};
 use std::sync::Arc;
 
@@ -15,11 +15,16 @@ fn camera() -> Camera {
     Camera::looking(&Vector::new(0.3, 1.0, -0.4), &Point::origin(), 1.0, 500.0, [SIZE as f64 / 2.0; 2])
 }
 
-fn model(triangles: &Triangles, pose: Pose, color: [f64; 3], body: u32) -> Model {
-    Model { world_from_surface: pose, surface: Arc::new(Surface::of(triangles)), paint: Paint::Plain(color), body }
+fn model(triangles: &Triangles, pose: Pose, color: [f64; 3], body: u32) -> PlacedSurface {
+    PlacedSurface {
+        world_from_surface: pose,
+        surface: Arc::new(Surface::of(triangles)),
+        paint: Paint::Plain(color),
+        body,
+    }
 }
 
-fn seen(models: &[Model]) -> Samples {
+fn seen(models: &[PlacedSurface]) -> Samples {
     Samples::of(models, &camera(), SIZE, SIZE)
 }
 
@@ -77,7 +82,7 @@ fn of_two_overlapping_squares_the_nearer_one_shows() {
     let at = |x: f64, y: f64, body: u32| model(&square, Pose::translation(x, y, 0.0), [1.0; 3], body);
     for order in [[0, 1], [1, 0]] {
         let pair = [at(-0.05, 0.1, 0), at(0.05, -0.1, 1)];
-        let models: Vec<Model> = order.iter().map(|&k| pair[k].clone()).collect();
+        let models: Vec<PlacedSurface> = order.iter().map(|&k| pair[k].clone()).collect();
         let samples = Samples::of(&models, &straight, SIZE, SIZE);
         let body = |column: usize| match samples.triangle[SIZE / 2 * SIZE + column] {
             NONE => None,

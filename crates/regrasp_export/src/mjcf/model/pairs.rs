@@ -4,7 +4,7 @@
 //! (`regrasp_scene::collision_pairs`): themselves, each other and everything around them. An object that stands on a support may
 //! touch everything. What is held in place, by a weld or by servos, does not collide with what else is held in place.
 
-use super::Model;
+use super::MjcfModel;
 use crate::mjcf::object::Hold;
 use crate::mjcf::xml::{Xml, numbers};
 use regrasp_robot::{ContactModel, Finger};
@@ -46,7 +46,7 @@ impl Pairs<'_> {
 
 /// Writes the pairs: fingertips with the object as the plan means them, then what should never touch, then what stands on
 /// supports.
-pub(super) fn write(xml: &mut Xml, model: &Model) {
+pub(super) fn write(xml: &mut Xml, model: &MjcfModel) {
     xml.open("contact", &[]);
     let mut pairs = Pairs { xml, written: BTreeSet::new() };
     add_moved(&mut pairs, model);
@@ -64,7 +64,7 @@ pub(super) fn write(xml: &mut Xml, model: &Model) {
 }
 
 /// The pairs of the hand and the object that the plan moves.
-fn add_moved(pairs: &mut Pairs, model: &Model) {
+fn add_moved(pairs: &mut Pairs, model: &MjcfModel) {
     let view = HandView::of(model.task);
     let found = collision_pairs(&view);
     let (hand, object) = (&model.names.hands[view.hand_index], &model.names.objects[view.object_index].geoms);

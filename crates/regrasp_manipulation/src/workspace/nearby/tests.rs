@@ -7,7 +7,7 @@ use crate::settings::PhysicsSettings;
 use crate::workspace::{TipMode, Workspace};
 use regrasp_base::Rng;
 use regrasp_geometry::collision::{Ball, MeshBody};
-use regrasp_geometry::reference::{Answer, ReferenceShape, distance};
+use regrasp_geometry::reference::{Clearance, ReferenceShape, distance};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Point, Pose, Shape, TriangleMesh, Vector, pose_from};
 use regrasp_grasp::Contact;
@@ -253,7 +253,7 @@ fn assert_apart(model: &Model, workspace: &Workspace, shapes: &[Option<Reference
             let (Some(shape_a), Some(shape_b)) = (&shapes[a], &shapes[b]) else { continue };
             let at = [a, b].map(|body| workspace.now.at(model, body).to_pose());
             match distance(shape_a, &at[0], shape_b, &at[1], 0.01) {
-                Answer::SeparatedBy(d) => assert!(d >= clearance - 1e-8, "{d}: {a} and {b}"),
+                Clearance::SeparatedBy(d) => assert!(d >= clearance - 1e-8, "{d}: {a} and {b}"),
                 answer => panic!("{answer:?}: {} and {}", model.bodies[a].name, model.bodies[b].name),
             }
         }
@@ -285,7 +285,7 @@ fn the_first_obstacle_in_the_way_of_the_object_is_named() {
             let gap = |body: usize| {
                 let other = shapes[body].as_ref()?;
                 Some(match distance(object, &pose, other, &model.bodies[body].carrier_from_body.to_pose(), 0.01) {
-                    Answer::SeparatedBy(gap) => gap,
+                    Clearance::SeparatedBy(gap) => gap,
                     _ => 0.0,
                 })
             };

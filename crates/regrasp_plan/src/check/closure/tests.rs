@@ -13,8 +13,8 @@ fn sphere_contact(direction: [f64; 3], radius: f64) -> Grip {
     Grip { contact, model: ContactModel::Point }
 }
 
-fn body(friction: f64) -> Body {
-    Body { center_of_mass: Point::origin(), torque_scale: 0.03, friction }
+fn body(friction: f64) -> HeldBody {
+    HeldBody { center_of_mass: Point::origin(), torque_scale: 0.03, friction }
 }
 
 fn random_contacts(n_contacts: usize, rng: &mut Rng) -> Vec<Grip> {
@@ -37,7 +37,7 @@ fn random_mixed(n_contacts: usize, rng: &mut Rng) -> Vec<Grip> {
 }
 
 /// Smallest sum of normal forces with which `grips` resist `wrench`, by another cone program.
-fn effort_against(grips: &[Grip], body: &Body, wrench: &[f64; 6]) -> Option<f64> {
+fn effort_against(grips: &[Grip], body: &HeldBody, wrench: &[f64; 6]) -> Option<f64> {
     let (map, cones) = grasp_map(grips, body);
     let n_forces = map.ncols();
     let mut constraints = DMatrix::zeros(6 + n_forces, n_forces);
@@ -147,7 +147,7 @@ fn the_margin_does_not_depend_on_the_frame_or_the_unit_of_length() {
                 },
             })
             .collect();
-        let scaled = Body { torque_scale: 0.3, ..body(0.7) };
+        let scaled = HeldBody { torque_scale: 0.3, ..body(0.7) };
         let after = margin(&moved, &scaled);
         assert!((before - after).abs() < 1e-7, "{before} {after}");
         compared += usize::from(before > 0.0);

@@ -161,7 +161,7 @@ impl Way {
                 Some(_) if t >= 1.0 => Some(way.to),
                 Some(path) => {
                     let settled = object.surface.settle(&path.at(t), finger.settle_radius)?;
-                    (object.surface.crease_distance(&settled) >= object.edge_distance).then_some(Contact {
+                    object.keeps_off_edges(&settled).then_some(Contact {
                         point_in_object: settled.point_in_object,
                         normal_in_object: settled.normal_in_object,
                     })

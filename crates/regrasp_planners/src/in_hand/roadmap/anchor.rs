@@ -16,9 +16,8 @@ use regrasp_manipulation::grasp::sequence::{Motion, Sequence};
 use regrasp_manipulation::grasp::state::{GraspState, MAX_FINGERS};
 use regrasp_manipulation::rolling::follow::ik_settings;
 use regrasp_manipulation::workspace::TipMode;
+use regrasp_roadmap::{OpenList, Rank};
 use regrasp_robot::kinematics::finger_ik::IkSettings;
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
 
 /// One end of a query, with the nodes that may be linked to it.
 pub struct QueryEnd {
@@ -28,8 +27,8 @@ pub struct QueryEnd {
     pub given: Option<GraspState>,
     /// Nodes that every finger alone can follow from.
     pub anchors: Vec<Anchor>,
-    /// Nodes not looked at yet, the most promising first.
-    candidates: BinaryHeap<Candidate>,
+    /// Nodes not looked at yet: by the least that a path through them costs, then the smallest.
+    candidates: OpenList<Candidate>,
     near: Vec<Place>,
     /// A proven link that is no single transfer.
     detour: Option<Link>,
@@ -57,32 +56,11 @@ pub struct Link {
     pub can_be_kept: bool,
 }
 
-/// A node, and the least that a path through it costs; the greatest is the one that costs least, then the smallest node.
+/// A node that may become an anchor.
 struct Candidate {
     anchor: Anchor,
     place: usize,
-    estimate: f64,
 }
-
-impl Ord for Candidate {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.estimate.total_cmp(&self.estimate).then(other.anchor.node.cmp(&self.anchor.node))
-    }
-}
-
-impl PartialOrd for Candidate {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Candidate {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Candidate {}
 
 /// What is known of the footholds of one place: whether a finger alone could follow with it to the end's pose.
 struct Place {
@@ -103,14 +81,14 @@ pub enum LinkKind {
 impl QueryEnd {
     /// An end without anchors.
     pub fn new(pose: Pose, given: Option<GraspState>) -> Self {
-        QueryEnd { pose, given, anchors: Vec::new(), candidates: BinaryHeap::new(), near: Vec::new(), detour: None }
+        QueryEnd { pose, given, anchors: Vec::new(), candidates: OpenList::new(), near: Vec::new(), detour: None }
     }
 
     /// Takes the nodes at some places, given with their distances, for candidates; `bounds` tell what the way from there on
     /// costs.
     pub fn look_around(&mut self, roadmap: &GraspRoadmap, places: &[(f64, usize)], bounds: &Bounds) {
         let (graph, costs) = (&roadmap.graph, roadmap.about.costs);
-        let mut candidates = std::mem::take(&mut self.candidates).into_vec();
+        let mut candidates = Vec::new();
         for &(distance, place) in places {
             for &node in roadmap.index.nodes_at(place) {
                 let node = node as usize;
@@ -120,19 +98,20 @@ impl QueryEnd {
                     cost += costs.relocation * (0..graph.n_fingers()).filter(moves).count() as f64;
                 }
                 let estimate = cost + roadmap.landmarks.bound(node, bounds);
-                candidates.push(Candidate { anchor: Anchor { node, cost }, place: self.near.len(), estimate });
+                let candidate = Candidate { anchor: Anchor { node, cost }, place: self.near.len() };
+                candidates.push((Rank::of(estimate, node), candidate));
             }
             let way = LOOKS.map(|share| interpolate_pose(&graph.places[place], &self.pose, share));
             self.near.push(Place { way, follows: Default::default() });
         }
-        self.candidates = candidates.into();
+        self.candidates.extend(candidates);
     }
 
     /// Turns the most promising candidates into anchors until there are `n_wanted`, as far as there are.
     pub fn fill(&mut self, search: &mut Search, roadmap: &GraspRoadmap, n_wanted: usize) -> Result<(), Stop> {
         while self.anchors.len() < n_wanted {
             search.check()?;
-            let Some(candidate) = self.candidates.pop() else { break };
+            let Some((_, candidate)) = self.candidates.pop() else { break };
             if may_follow(search, roadmap, candidate.anchor.node, &mut self.near[candidate.place]) {
                 self.anchors.push(candidate.anchor);
             }

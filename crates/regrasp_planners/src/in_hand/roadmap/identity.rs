@@ -6,7 +6,7 @@
 use regrasp_base::files::sha256_bytes;
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Point, Pose, Shape};
-use regrasp_robot::kinematics::chain::Motion;
+use regrasp_robot::kinematics::chain::JointMotion;
 use regrasp_robot::{ContactModel, Hand, TipShape};
 use regrasp_scene::{HandView, Object};
 
@@ -67,8 +67,8 @@ fn hand(hand: &Hand, reach: Option<f64>) -> Digest {
             feed.pose(&joint.parent_from_joint);
             feed.numbers(joint.axis.iter().copied());
             feed.count(match joint.motion {
-                Motion::Turn => 0,
-                Motion::Slide => 1,
+                JointMotion::Turn => 0,
+                JointMotion::Slide => 1,
             });
             for (at, &(coordinate, multiplier)) in joint.drive.terms.iter().enumerate() {
                 if at > 0 {

@@ -2,7 +2,7 @@
 
 use super::super::chain::{ChainOwner, make_chain, rest_posture};
 use super::super::names::known_link;
-use super::super::spec::{Body, Carried, Positions};
+use super::super::spec::{Carried, Positions, RigidBody};
 use super::read_positions;
 use crate::manipulator::Arm;
 use crate::robot::{JointId, LinkId, Robot};
@@ -82,12 +82,13 @@ fn read_arm(mut table: Table, tree: &Robot, others: &[ArmSpec], found: &mut Foun
 
 /// The arm, without shapes. None where its joints or its posture are refused.
 pub(super) fn make(tree: &Robot, spec: &ArmSpec, found: &mut Found) -> Option<Arm> {
-    let mut carried = BTreeMap::from([(spec.base, Carried { body: Body::Palm, body_from_link: Pose::identity() })]);
-    let (mut body_from_link, mut body) = (Pose::identity(), Body::Palm);
+    let mut carried =
+        BTreeMap::from([(spec.base, Carried { body: RigidBody::Palm, body_from_link: Pose::identity() })]);
+    let (mut body_from_link, mut body) = (Pose::identity(), RigidBody::Palm);
     for id in &tree.joints_to(spec.mount)[tree.joints_to(spec.base).len()..] {
         let joint = &tree.joints[id.0];
         match spec.joints.iter().position(|own| own == id) {
-            Some(index) => (body_from_link, body) = (Pose::identity(), Body::Finger { finger: 0, body: index }),
+            Some(index) => (body_from_link, body) = (Pose::identity(), RigidBody::Finger { finger: 0, body: index }),
             None => body_from_link *= joint.parent_from_joint,
         }
         carried.insert(joint.child, Carried { body, body_from_link });

@@ -12,7 +12,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 /// A URDF that is part of the tree.
-pub(super) struct Model {
+pub(super) struct PlacedUrdf {
     /// Its name, in front of the names of its links and joints where there are several models; may be empty where there is one.
     pub name: String,
     /// Where its links and joints are.
@@ -84,7 +84,7 @@ pub(super) fn read<'a>(
         };
         draft.allow.extend(spec.disabled.iter().map(|&(a, b)| (place.link(a), place.link(b))));
         let sha256 = spec.inputs.first().map_or_else(String::new, |input| input.sha256.clone());
-        draft.models.push(Model { name: spec.name.unwrap_or_default(), place, sha256 });
+        draft.models.push(PlacedUrdf { name: spec.name.unwrap_or_default(), place, sha256 });
         draft.inputs.extend(spec.inputs);
     }
     Some(draft)

@@ -13,7 +13,7 @@ mod reach_map;
 mod three_r;
 
 use super::body_frame::BodyFrame;
-use super::chain::{Chain, JointLine, Motion};
+use super::chain::{Chain, JointLine, JointMotion};
 use arrayvec::ArrayVec;
 use numeric::NumericIk;
 use regrasp_base::Rng;
@@ -246,11 +246,11 @@ impl FingerIk {
             let moved = joint.drive.terms.iter().map(|&(k, multiplier)| multiplier * changes[k]);
             let change = line.axis * moved.reduce(|sum, moved| sum + moved).unwrap_or(0.0);
             match joint.motion {
-                Motion::Turn => {
+                JointMotion::Turn => {
                     turn += change;
                     shift -= change.cross(&line.origin);
                 }
-                Motion::Slide => shift += change,
+                JointMotion::Slide => shift += change,
             }
             let end = lines.get(i + 1).map_or(tip, |next| next.origin);
             let moved = |point: &Vector| (shift + turn.cross(point)).norm();
@@ -267,8 +267,8 @@ impl FingerIk {
             (0..self.chain.n_coordinates()).map(|_| Vector::zeros()).collect();
         for (joint, line) in self.chain.joints.iter().zip(&lines) {
             let column = match joint.motion {
-                Motion::Turn => line.axis.cross(&(tip - line.origin)),
-                Motion::Slide => line.axis,
+                JointMotion::Turn => line.axis.cross(&(tip - line.origin)),
+                JointMotion::Slide => line.axis,
             };
             for &(k, multiplier) in &joint.drive.terms {
                 columns[k] += multiplier * column;

@@ -13,7 +13,7 @@ mod linear;
 use super::reach_map::{ReachMap, halton};
 use super::{Asked, AskedTurn, Coordinates, IkSettings, MAX_COORDINATES, POSITION_TOLERANCE, Preference};
 use crate::kinematics::body_frame::BodyFrame;
-use crate::kinematics::chain::{Chain, JointLine, Motion};
+use crate::kinematics::chain::{Chain, JointLine, JointMotion};
 use arrayvec::ArrayVec;
 use nalgebra::{Matrix3, Matrix4};
 use regrasp_base::Rng;
@@ -84,7 +84,7 @@ impl NumericIk {
         let tip_axis_in_body = tip_axis(center_in_body);
         let length = center_in_body.coords.norm();
         let links = chain.joints.iter().skip(1).map(|joint| joint.parent_from_joint.translation.vector.norm());
-        let slides = chain.joints.iter().any(|joint| joint.motion == Motion::Slide);
+        let slides = chain.joints.iter().any(|joint| joint.motion == JointMotion::Slide);
         let reach = if slides { f64::INFINITY } else { links.sum::<f64>() + length };
         let mut ik = NumericIk {
             chain: chain.clone(),
@@ -336,11 +336,11 @@ fn state_of<const N: usize>(
         for &(k, multiplier) in &joint.drive.terms {
             let axis = line.axis * multiplier;
             match joint.motion {
-                Motion::Turn => {
+                JointMotion::Turn => {
                     state.slides[k] += axis.cross(&(tip - line.origin));
                     state.spins[k] += axis;
                 }
-                Motion::Slide => state.slides[k] += axis,
+                JointMotion::Slide => state.slides[k] += axis,
             }
         }
     }

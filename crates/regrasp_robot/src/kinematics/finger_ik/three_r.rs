@@ -8,7 +8,7 @@
 use super::quartic::roots_in_unit;
 use super::{Coordinates, IkSettings, POSITION_TOLERANCE};
 use crate::kinematics::body_frame::BodyFrame;
-use crate::kinematics::chain::{Chain, ChainJoint, JointLine, Motion};
+use crate::kinematics::chain::{Chain, ChainJoint, JointLine, JointMotion};
 use arrayvec::ArrayVec;
 use nalgebra::Matrix3;
 use regrasp_geometry::{Point, Vector};
@@ -137,7 +137,7 @@ impl ThreeR {
         let mut drives = [(0, 1.0, 0.0); 3];
         for (joint, drive) in joints.iter().zip(&mut drives) {
             let (coordinate, multiplier) = joint.drive.single()?;
-            if joint.motion != Motion::Turn || multiplier == 0.0 || chain.n_coordinates() != 3 {
+            if joint.motion != JointMotion::Turn || multiplier == 0.0 || chain.n_coordinates() != 3 {
                 return None;
             }
             driven[coordinate] = true;

@@ -5,7 +5,7 @@
 
 use super::{Coordinates, Preference, State, free_step};
 use crate::coupling::LinearLimit;
-use crate::kinematics::chain::{Chain, ChainJoint, Motion};
+use crate::kinematics::chain::{Chain, ChainJoint, JointMotion};
 use arrayvec::ArrayVec;
 use regrasp_geometry::Vector;
 
@@ -129,7 +129,7 @@ pub(super) fn opposed_turns(chain: &Chain) -> Option<Coordinates> {
     if chain.joints.iter().all(is_plain) {
         return None;
     }
-    let turns = chain.joints.iter().filter(|joint| joint.motion == Motion::Turn);
+    let turns = chain.joints.iter().filter(|joint| joint.motion == JointMotion::Turn);
     let terms: Vec<(usize, f64)> = turns.flat_map(|joint| joint.drive.terms.iter().copied()).collect();
     let sum = |k: usize| terms.iter().filter(|term| term.0 == k).map(|term| term.1.abs()).sum();
     Some((0..chain.n_coordinates()).map(sum).collect())

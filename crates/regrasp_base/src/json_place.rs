@@ -1,19 +1,37 @@
 //! Where a value stands in a JSON text.
 
+use crate::{Diagnostic, Place};
+use std::path::Path;
+
 /// A step into a JSON document.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Step<'a> {
+pub enum PathStep<'a> {
+    /// The value of this key of an object.
     Key(&'a str),
+    /// The element of this index of an array.
     Index(usize),
 }
 
+/// A diagnostic about the value that `steps` lead to in the JSON `text` of the file at `path`.
+pub fn diagnostic(path: &Path, text: &str, code: &'static str, steps: &[PathStep], problem: String) -> Diagnostic {
+    let offset = locate(text, steps).unwrap_or(0);
+    let name: String = steps
+        .iter()
+        .map(|step| match step {
+            PathStep::Key(key) => format!(".{key}"),
+            PathStep::Index(index) => format!("[{index}]"),
+        })
+        .collect();
+    Diagnostic::new(code, Place::at_offset(path, text, offset), problem).element("key", name.trim_start_matches('.'))
+}
+
 /// Byte offset of the value that `steps` lead to. `text` is valid JSON, or nothing is found.
-pub(super) fn locate(text: &str, steps: &[Step]) -> Option<usize> {
+pub fn locate(text: &str, steps: &[PathStep]) -> Option<usize> {
     let mut cursor = Cursor { bytes: text.as_bytes(), at: 0 };
     cursor.skip_space();
     for step in steps {
         match step {
-            Step::Key(wanted) => {
+            PathStep::Key(wanted) => {
                 cursor.expect(b'{')?;
                 loop {
                     cursor.skip_space();
@@ -29,7 +47,7 @@ pub(super) fn locate(text: &str, steps: &[Step]) -> Option<usize> {
                     cursor.expect(b',')?;
                 }
             }
-            Step::Index(wanted) => {
+            PathStep::Index(wanted) => {
                 cursor.expect(b'[')?;
                 for _ in 0..*wanted {
                     cursor.skip_space();

@@ -1,0 +1,165 @@
+//! Refinement: the wrist moves, then contacts move along the surface, to raise the closure margin. No other term of the score may
+//! get worse, and no contact moves farther than a tip radius.
+
+use crate::found::{Found, WayIn};
+use crate::prepared::Prepared;
+use crate::search::worth::{self, holding};
+use crate::{above, way};
+use nalgebra::{Translation3, UnitQuaternion};
+use regrasp_base::Rng;
+use regrasp_geometry::collision::Placement;
+use regrasp_geometry::{Pose, UnitVector, Vector};
+use regrasp_grasp::Contact;
+use regrasp_grasp::list::score::inverse_curvature;
+use regrasp_manipulation::grasp::state::GraspState;
+use regrasp_manipulation::rolling::follow::ik_settings;
+use regrasp_manipulation::workspace::{TipMode, Workspace};
+
+/// Farthest that the wrist moves in one trial: metres and radians. By hand.
+const WRIST_STEP: (f64, f64) = (0.006, 0.12);
+/// Share of the trials that move the wrist. By hand.
+const WRIST_SHARE: f64 = 0.3;
+/// Terms of the score may fall by this much: rounding.
+const ROUNDING: f64 = 1e-9;
+/// A margin must grow by this share to count.
+const LEAST_GAIN: f64 = 1.002;
+
+/// A grasp on its way uphill.
+struct Climb {
+    state: GraspState,
+    /// Inverse curvature at the contacts of the holding fingers.
+    flatness: Vec<f64>,
+    margin: f64,
+    others: f64,
+    way: WayIn,
+}
+
+/// `found` with its exact margin, refined where that helps and is not `cut` short, with the stable poses in which the hand stays above
+/// the support.
+pub fn finish(prepared: &Prepared, workspace: &mut Workspace, found: &Found, cut: bool) -> Found {
+    let before = worth::margin(prepared, &found.state).max(found.margin);
+    let mut best = Found { margin: before, ..found.clone() };
+    if !cut && let Some(refined) = refined(prepared, workspace, found, before) {
+        best = refined;
+    }
+    best.scores.closure = regrasp_grasp::list::score::closure_term(best.margin);
+    best.score = best.scores.mean(&prepared.settings.weights);
+    best.stable_poses = above::stays_above(prepared, &best.state, &best.way);
+    best
+}
+
+/// A grasp with a larger margin than `before`, complete; none where none was found.
+fn refined(prepared: &Prepared, workspace: &mut Workspace, found: &Found, before: f64) -> Option<Found> {
+    let mut rng = Rng::keyed(prepared.seed, "refinement", found.frame);
+    let flatness: Vec<f64> =
+        holding(&found.state).map(|f| flatness_at(prepared, f, &found.state.contacts[f])).collect();
+    let terms = |state: &GraspState, flatness: &[f64]| {
+        worth::other_terms(prepared, state, flatness).mean(&prepared.settings.weights)
+    };
+    let mut climb = Climb {
+        margin: before,
+        others: terms(&found.state, &flatness),
+        state: found.state.clone(),
+        flatness,
+        way: found.way.clone(),
+    };
+    let first = climb.others;
+    for trial in 0..prepared.settings.refinement_trials {
+        // Large steps first.
+        let size = 1.0 - 0.9 * trial as f64 / prepared.settings.refinement_trials as f64;
+        let Some((state, flatness)) = trial_of(prepared, found, &climb, size, &mut rng) else { continue };
+        let margin = worth::margin(prepared, &state);
+        let others = terms(&state, &flatness);
+        let is_better =
+            margin > climb.margin * LEAST_GAIN || (margin >= climb.margin && others > climb.others + ROUNDING);
+        if !is_better || others < first - ROUNDING {
+            continue;
+        }
+        workspace.set_state(&state);
+        if !workspace.is_clear(TipMode::AllHold) || !worth::is_balanced(prepared, &state) {
+            continue;
+        }
+        // Mostly the way so far still leads there.
+        let way = match way::is_free(prepared, workspace, &state, &climb.way) {
+            true => climb.way.clone(),
+            false => match way::way_in(prepared, workspace, &state) {
+                Ok(way) => way,
+                Err(_) => continue,
+            },
+        };
+        climb = Climb { state, flatness, margin, others, way };
+    }
+    if climb.margin <= before * LEAST_GAIN {
+        return None;
+    }
+    let Climb { state, flatness, margin, way, .. } = climb;
+    let forces = worth::forces(prepared, &state)?;
+    let scores = worth::terms(prepared, &state, &flatness, margin);
+    Some(Found { state, margin, margin_before: Some(before), scores, forces, way, ..found.clone() })
+}
+
+/// A grasp near `climb`: with the wrist moved, or with one contact moved.
+fn trial_of(
+    prepared: &Prepared,
+    found: &Found,
+    climb: &Climb,
+    size: f64,
+    rng: &mut Rng,
+) -> Option<(GraspState, Vec<f64>)> {
+    let mut state = climb.state.clone();
+    let mut flatness = climb.flatness.clone();
+    if rng.chance(WRIST_SHARE) {
+        let shift = Vector::from(rng.direction()) * (WRIST_STEP.0 * size * rng.unit());
+        let turn = Vector::from(rng.direction()) * (WRIST_STEP.1 * size * rng.unit());
+        state.world_from_object = moved(prepared, &state.world_from_object, shift, turn);
+        for f in 0..state.contacts.len() {
+            if state.holds(f) {
+                touch(prepared, &mut state, f)?;
+            }
+        }
+        return Some((state, flatness));
+    }
+    let fingers: Vec<usize> = holding(&state).collect();
+    let which = rng.below(fingers.len());
+    let finger = fingers[which];
+    let radius = prepared.model.fingers[finger].settle_radius.max(0.003);
+    let contact = state.contacts[finger];
+    let (x, y) = regrasp_geometry::frame::tangents(&contact.normal_in_object);
+    let angle = rng.uniform(0.0, std::f64::consts::TAU);
+    let aside = x.into_inner() * angle.cos() + y.into_inner() * angle.sin();
+    let object = prepared.model.view.object;
+    let near = object.surface.project(&(contact.point_in_object + aside * (radius * size * rng.unit())));
+    let at = object.surface.settle(&near, prepared.model.fingers[finger].settle_radius)?;
+    let moved_by = (at.point_in_object - found.state.contacts[finger].point_in_object).norm();
+    if moved_by > radius || object.surface.crease_distance(&at) < object.edge_distance {
+        return None;
+    }
+    state.contacts[finger] = Contact { point_in_object: at.point_in_object, normal_in_object: at.normal_in_object };
+    flatness[which] = inverse_curvature(object.surface.curvature(&at), prepared.model.fingers[finger].tip_radius);
+    touch(prepared, &mut state, finger)?;
+    Some((state, flatness))
+}
+
+/// The object in the hand frame, turned about the place where the fingers meet and shifted.
+fn moved(prepared: &Prepared, hand_from_object: &Pose, shift: Vector, turn: Vector) -> Pose {
+    let meeting = prepared.hand_from_grasp.translation;
+    let motion = Pose::from_parts(Translation3::from(shift), UnitQuaternion::from_scaled_axis(turn));
+    meeting * motion * meeting.inverse() * hand_from_object
+}
+
+/// Joints of `finger` that touch its contact, near those that it has.
+fn touch(prepared: &Prepared, state: &mut GraspState, finger: usize) -> Option<()> {
+    let placement = Placement::from(&state.world_from_object);
+    let contact = state.contacts[finger];
+    let normal = UnitVector::new_unchecked(placement.vector(&contact.normal_in_object));
+    let settings = ik_settings(prepared.model, finger, normal);
+    let joints = prepared.model.fingers[finger].touch_near(&placement, &contact, &state.joints[finger], &settings)?;
+    state.joints[finger] = joints;
+    Some(())
+}
+
+fn flatness_at(prepared: &Prepared, finger: usize, contact: &Contact) -> f64 {
+    let surface = &prepared.model.view.object.surface;
+    let at = surface.project(&contact.point_in_object);
+    inverse_curvature(surface.curvature(&at), prepared.model.fingers[finger].tip_radius)
+}

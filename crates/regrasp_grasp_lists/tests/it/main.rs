@@ -1,0 +1,5 @@
+//! Lists of bundled and real hands: the checker accepts them and none that is broken, and threads change nothing.
+
+mod lists;
+mod mutants;
+mod sample;

@@ -1,0 +1,44 @@
+//! Hands and objects of the tests.
+
+use regrasp_base::Budget;
+use regrasp_grasp::list::GraspList;
+use regrasp_grasp::record::PlanInput;
+use regrasp_grasp_lists::{Failure, GraspSettings, list_grasps};
+use regrasp_plan::check::{CheckSettings, GraspReport, check_grasps};
+use regrasp_robot::import::LoadOptions;
+use regrasp_scene::{GraspScene, ObjectSource, load_grasp_scene};
+use std::path::{Path, PathBuf};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// A bundled hand with the object of a bundled scene.
+pub fn bundled(hand: &str, scene: &str) -> GraspScene {
+    let hand = root().join("assets/hands").join(hand).join("hand.toml");
+    let object = ObjectSource::Scene(root().join("scenes").join(scene));
+    load_grasp_scene(&hand, &object, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Settings for a list of so many grasps.
+pub fn settings(grasps: usize) -> GraspSettings {
+    GraspSettings { grasps, n_threads: 2, ..GraspSettings::default() }
+}
+
+/// The list of a scene, with its files.
+pub fn list(scene: &GraspScene, settings: &GraspSettings, seed: u64) -> Result<GraspList, Failure> {
+    let (hand, object) = (&scene.scene.hands[0].hand, &scene.scene.objects[0]);
+    let mut list = list_grasps(hand, object, settings, seed, &Budget::unlimited())?;
+    let input = |input: &regrasp_scene::scene::InputFile| PlanInput {
+        role: input.role.clone(),
+        name: input.name.clone(),
+        sha256: input.sha256.clone(),
+    };
+    list.inputs = scene.scene.inputs.iter().map(input).collect();
+    Ok(list)
+}
+
+/// What the checker says.
+pub fn check(scene: &GraspScene, list: &GraspList) -> GraspReport {
+    check_grasps(scene, list, &CheckSettings::default(), 2)
+}
