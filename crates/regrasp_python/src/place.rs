@@ -42,7 +42,7 @@ pub fn place(py: Python<'_>, request: Request, options: Options) -> PyResult<(Ve
         let turns = turns
             .map_err(|expected| error::argument(py, "place", "turns", format!("are {:?}", request.turns), &expected))?;
         if turns.is_empty() {
-            return Err(error::argument(py, "place", "turns", "are empty".into(), "at least one turn"));
+            return Err(error::argument(py, "place", "turns", "are empty", "at least one turn"));
         }
         let asked = Asked {
             output: &request.output,
