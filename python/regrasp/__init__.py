@@ -31,7 +31,7 @@ from ._model import (
     load_scene,
 )
 from ._plan import CONTACT_MODES, Plan, Segment
-from ._planning import check, export_mjcf, plan, view
+from ._planning import check, export_mjcf, place, plan, view
 from ._regrasp import __version__
 from ._result import Cause, Clearance, Failure, Moment, NearestMiss, Progress, Report, Violation
 
@@ -70,6 +70,7 @@ __all__ = [
     "export_mjcf",
     "load_hand",
     "load_scene",
+    "place",
     "plan",
     "view",
 ]

@@ -4,8 +4,12 @@
 //! [`scene`] reads files, [`planners`] plans, [`plan`] holds the plan and its checker. Frames, units and the glossary are in
 //! `CONVENTIONS.md`; the tower of crates is in `ARCHITECTURE.md`.
 
+/// What a written file calls another one.
+pub mod file_names;
 /// Failures and roadmaps as the data that pages are made of.
 pub mod pictures;
+/// Scenes in which an object is to be placed.
+pub mod placing;
 /// Scene files as text.
 pub mod scene_text;
 /// Settings from several places.

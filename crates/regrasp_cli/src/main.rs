@@ -8,8 +8,6 @@ mod args;
 mod commands;
 /// Failures for people.
 mod failure_text;
-/// What a written file calls another one.
-mod file_names;
 /// Ctrl-C, SIGTERM, and the promise to stop within 100 ms.
 mod interrupt;
 /// What the checker said, in words and as an event.

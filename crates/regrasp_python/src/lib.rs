@@ -13,6 +13,8 @@ mod error;
 mod guard;
 /// Hands and scenes, read.
 mod model;
+/// Where to hold an object.
+mod place;
 /// Plans.
 mod plan;
 /// Searching and judging.
@@ -32,6 +34,8 @@ mod _regrasp {
     use super::guard::panic_for_tests;
     #[pymodule_export]
     use super::model::{Hand, Scene, hand_file};
+    #[pymodule_export]
+    use super::place::place;
     #[pymodule_export]
     use super::plan::Plan;
     #[pymodule_export]

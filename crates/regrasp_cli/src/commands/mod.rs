@@ -11,6 +11,7 @@ mod pictures;
 mod place;
 pub mod plan;
 mod roadmap;
+mod room;
 mod rows;
 mod simulate;
 mod suite;

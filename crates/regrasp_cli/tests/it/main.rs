@@ -8,6 +8,7 @@ mod growth;
 #[cfg(unix)]
 mod outputs;
 mod pictures;
+mod place;
 #[path = "../../../../tests/support/places.rs"]
 mod places;
 mod roadmap;

@@ -1,5 +1,7 @@
 //! What a robot and a hand are like: joints, limits, meshes, units, fingers and tips, links that always or never touch.
 
+/// Names of fingers.
+mod finger_names;
 /// Fingers and tips guessed from a robot alone.
 pub(crate) mod guess;
 /// A hand as the text of a `hand.toml`.
@@ -8,6 +10,8 @@ pub mod hand_text;
 pub mod reach;
 /// Rest postures.
 pub(crate) mod rest;
+/// Links that move together.
+mod rigid;
 /// Joints and meshes as tables, and what looks like a wrong unit.
 pub mod robot_table;
 /// Tips compared with the geometry of their links.
