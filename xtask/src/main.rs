@@ -3,6 +3,7 @@
 
 mod bench;
 mod campaign;
+mod grasps;
 mod reference;
 mod replay;
 mod run;
@@ -14,7 +15,7 @@ use std::process::ExitCode;
 type Task = (&'static str, &'static str, fn(&[String]) -> Outcome);
 
 /// All tasks, in the order in which `cargo xtask` lists them.
-const TASKS: [Task; 11] = [
+const TASKS: [Task; 12] = [
     (
         "reference",
         "write the generated pages of docs/reference (--check: fail if they are out of date)",
@@ -27,6 +28,7 @@ const TASKS: [Task; 11] = [
         "measure queries on roadmaps of sphere and box, and on one of a million motions",
         bench::roadmaps,
     ),
+    ("bench-grasps", "lists of grasps of real hands and objects, as docs/benchmarks/grasps.md", grasps::bench),
     ("growth", "measure how loading and planning grow with fingers, triangles, obstacles and threads", bench::growth),
     ("benchmark-page", "write docs/benchmarks.md from what was measured", bench::page),
     ("replay", "replay plans in MuJoCo: six scenes, negative controls, and all in-hand scenes", replay::in_hand),

@@ -14,6 +14,8 @@ mod file_names;
 mod interrupt;
 /// What the checker said, in words and as an event.
 mod judge;
+/// What the checker said of a grasp list.
+mod judge_grasps;
 /// Models from disk, with what the environment says about packages.
 mod load;
 /// Files that a command writes.

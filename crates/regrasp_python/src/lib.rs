@@ -7,6 +7,8 @@
 mod describe;
 /// Rust errors as Python exceptions.
 mod error;
+/// Grasp lists.
+mod grasps;
 /// No panic crosses the border.
 mod guard;
 /// Hands and scenes, read.
@@ -24,6 +26,8 @@ use pyo3::prelude::*;
 
 #[pymodule]
 mod _regrasp {
+    #[pymodule_export]
+    use super::grasps::{check_grasps, list_grasps};
     #[pymodule_export]
     use super::guard::panic_for_tests;
     #[pymodule_export]

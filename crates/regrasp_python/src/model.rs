@@ -12,9 +12,9 @@ use regrasp::scene::{Gravity, LoadedScene, Task, load_scene};
 use std::path::{Path, PathBuf};
 
 /// How files are read, as the package passes it: packages by name and folder, folders to search, lenient.
-type Options = (Vec<(String, PathBuf)>, Vec<PathBuf>, bool);
+pub type Options = (Vec<(String, PathBuf)>, Vec<PathBuf>, bool);
 
-fn load_options((packages, search_paths, lenient): Options) -> LoadOptions {
+pub fn load_options((packages, search_paths, lenient): Options) -> LoadOptions {
     LoadOptions { resolve: ResolveOptions { packages, search_paths }, lenient, ..LoadOptions::default() }
 }
 
