@@ -18,9 +18,10 @@ from typing import Any, Literal, cast
 import numpy as np
 import numpy.typing as npt
 
-from . import _regrasp
+from . import _descriptions, _regrasp
 from ._arguments import StrPath, load_options, seed_of
 from ._errors import argument_error
+from ._scene_text import Document, document_of, posed, sections, sized, table_at, toml_of, with_values
 
 FloatArray = npt.NDArray[np.float64]
 """Doubles, C-contiguous. Those that belong to a scene, hand or plan are read-only."""
@@ -304,17 +305,24 @@ class Query:
     """World from object at the goal."""
 
 
-Source = tuple[str, dict[str, str], bool, list[float] | str | None]
+Gravity = list[float] | str | None
+"""Gravity instead of the scene file's."""
+
+Source = tuple[str, dict[str, str], bool, Gravity]
 """What a scene was read from: file, packages, lenient, gravity instead of the file's."""
 
 
 class Scene:
-    """Hands, objects, supports, obstacles and tasks. Made by `load_scene`."""
+    """Hands, objects, supports, obstacles and tasks. Made by `load_scene`, `Scene.from_toml` or `Scene.from_dict`.
 
-    def __init__(self, native: _regrasp.Scene, source: Source) -> None:
+    A scene is pickled by value: with the content of every file that it names, so that another machine needs none of them.
+    """
+
+    def __init__(self, native: _regrasp.Scene, source: Source, *, on_disk: bool = True) -> None:
         fields: dict[str, Any] = json.loads(native.describe())
         self._native = native
         self._source = source
+        self._on_disk = on_disk
         self.name: str = fields["name"]
         self.path: str = fields["path"]
         """The scene file, as it was named."""
@@ -372,9 +380,117 @@ class Scene:
         way = tuple(pose_of(entry) for entry in fields["way"])
         return Query(pose_of(fields["start"]), way, pose_of(fields["goal"]))
 
+    @staticmethod
+    def from_toml(
+        text: str | bytes,
+        *,
+        base: StrPath = "",
+        name: str = "scene",
+        packages: Mapping[str, StrPath] | None = None,
+        lenient: bool = False,
+        gravity: Sequence[float] | Literal["any"] | None = None,
+    ) -> Scene:
+        """The scene with this content of a scene file, without a file.
+
+        base: the folder that file names in `text` are relative to; the current one where nothing is said.
+        name: what the scene is called; its file would be `name.toml` in `base`.
+        packages, lenient, gravity: as in `load_scene`. Raises `InputError`.
+        """
+        content = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else bytes(text)
+        path, named = os.path.join(os.fspath(base), f"{name}.toml"), _named(packages)
+        options = load_options("Scene.from_toml", named, lenient)
+        stated = _stated(gravity)
+        native = _regrasp.Scene.parse(content, path, options, stated)
+        return Scene(native, (path, named, lenient, stated), on_disk=False)
+
+    @staticmethod
+    def from_dict(
+        document: Mapping[str, Any],
+        *,
+        base: StrPath = "",
+        name: str = "scene",
+        packages: Mapping[str, StrPath] | None = None,
+        lenient: bool = False,
+        gravity: Sequence[float] | Literal["any"] | None = None,
+    ) -> Scene:
+        """As `from_toml`, with the keys and values of a scene file as a dictionary; arrays of numpy count as lists."""
+        text = toml_of(document, "Scene.from_dict")
+        return Scene.from_toml(text, base=base, name=name, packages=packages, lenient=lenient, gravity=gravity)
+
+    def to_toml(self) -> str:
+        """The content of the scene file."""
+        return self._native.text().decode("utf-8-sig")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Keys and values of the scene file; yours to change, for `from_dict`."""
+        return document_of(self._native.text(), self.path)
+
+    @cached_property
+    def _document(self) -> Document:
+        return self.to_dict()
+
+    def with_keys(self, values: Mapping[str, Any]) -> Scene:
+        """The scene with other values in its file, by dotted key: `{"object.friction": 0.6, "goal.turn.angle_deg": 45}`.
+
+        In a list of tables an entry is meant by its name or index: `objects.cube.mass`, `tasks.0.goal`. Hands and meshes that
+        both scenes name are not loaded again, so this takes about a millisecond. Raises `InputError`, as `load_scene` would.
+        """
+        text = toml_of(with_values(self._document, values, "Scene.with_keys"), "Scene.with_keys")
+        return Scene(self._native.varied(text.encode()), self._source, on_disk=False)
+
+    def with_(
+        self,
+        *,
+        goal: Pose | Mapping[str, Any] | None = None,
+        start: Pose | Mapping[str, Any] | None = None,
+        friction: float | None = None,
+        mass: float | None = None,
+        size: float | Sequence[float] | None = None,
+        scale: float | Sequence[float] | None = None,
+        object: str | None = None,
+        task: str | None = None,
+    ) -> Scene:
+        """The scene with another goal, start or object; hands and meshes are not loaded again.
+
+        goal, start: world from object, or keys of `[goal]` and `[start]`: `goal={"turn": {"axis": "x", "angle_deg": 45}}`.
+        friction, mass: of the object; the mass in kilograms.
+        size: of a primitive, in metres: radius of a sphere, edges of a box, half axes of an ellipsoid, (radius, length) of
+        cylinders and capsules.
+        scale: factor of a mesh (one, or one per axis, instead of that of the scene), or of the size of a primitive.
+        object, task: by name; the first where nothing is said.
+
+        Raises `InputError`: of arguments (A510), and as `load_scene` would.
+        """
+        document = self._document
+        of_object, of_task = sections(document, object, task)
+        values: dict[str, Any] = {}
+        for key, pose in (("start", start), ("goal", goal)):
+            if pose is not None:
+                fields = (
+                    {"position": pose.position.tolist(), "quat_xyzw": pose.quat_xyzw.tolist()} if isinstance(pose, Pose) else pose
+                )
+                values[of_task + key] = posed(table_at(document, of_task + key, "Scene.with_"), fields)
+        body = table_at(document, of_object[:-1], "Scene.with_")
+        changed: Document = {**body}
+        if friction is not None:
+            changed["friction"] = friction
+        if mass is not None:
+            changed.pop("density", None)
+            changed["mass"] = mass
+        if size is not None or scale is not None:
+            changed.update(sized(body, size, scale))
+        if changed != body:
+            values[of_object[:-1]] = changed
+        return self.with_keys(values)
+
+    def _afresh(self) -> Scene:
+        """The same scene, read again from its file where it has one."""
+        return _load_scene(*self._source) if self._on_disk else self
+
     def __reduce__(self) -> tuple[Any, ...]:
-        # Read again from its files: what a scene is stands there.
-        return (_load_scene, self._source)
+        # By value, with every file that it names: what a scene is stands there.
+        kept = [(name, path, content) for _, name, path, _, content in self._native.files()]
+        return (_restored, (self._native.text(), kept, self._source))
 
     def __repr__(self) -> str:
         hands = [hand.name if len(self.hands) == 1 else f"{hand.name_in_scene} ({hand.name})" for hand in self.hands]
@@ -401,17 +517,51 @@ def load_scene(
 
     Raises `InputError`, with every cause found.
     """
-    named = {name: os.fspath(folder) for name, folder in (packages or {}).items()}
-    stated = gravity if gravity is None or isinstance(gravity, str) else [float(x) for x in gravity]
-    return _load_scene(os.fspath(path), named, lenient, stated)
+    return _load_scene(os.fspath(path), _named(packages), lenient, _stated(gravity))
 
 
-def _load_scene(path: str, packages: dict[str, str], lenient: bool, gravity: list[float] | str | None) -> Scene:
+def _named(packages: Mapping[str, StrPath] | None) -> dict[str, str]:
+    return {name: os.fspath(folder) for name, folder in (packages or {}).items()}
+
+
+def _stated(gravity: Sequence[float] | str | None) -> Gravity:
+    return gravity if gravity is None or isinstance(gravity, str) else [float(x) for x in gravity]
+
+
+def _restored(text: bytes, kept: list[tuple[str, str, bytes]], source: Source) -> Scene:
+    path, _, lenient, gravity = source
+    return Scene(_regrasp.Scene.restore(text, path, kept, lenient, gravity), source, on_disk=False)
+
+
+def _load_scene(path: str, packages: dict[str, str], lenient: bool, gravity: Gravity) -> Scene:
     native = _regrasp.Scene.load(path, load_options("load_scene", packages, lenient), gravity)
     return Scene(native, (path, packages, lenient, gravity))
 
 
 def load_hand(path: StrPath, *, packages: Mapping[str, StrPath] | None = None, lenient: bool = False) -> Hand:
-    """Reads a hand file, or a URDF whose fingers are then guessed. Arguments and errors as `load_scene`."""
+    """Reads a hand file, or a URDF whose fingers are then guessed. Arguments and errors as `load_scene`.
+
+    A name of the package `robot_descriptions`, such as "allegro_hand_description", is a hand as well: its files are fetched once.
+    Raises `ImportError` where that package, or `mujoco` for a MJCF file of it, is not installed.
+    """
+    if isinstance(path, str) and _descriptions.is_description(path):
+        return _load_described(path, packages, lenient)
     native = _regrasp.Hand.load(os.fspath(path), load_options("load_hand", packages, lenient))
+    return Hand(native.tips, json.loads(native.describe()))
+
+
+def _load_described(name: str, packages: Mapping[str, StrPath] | None, lenient: bool) -> Hand:
+    """The hand that `robot_descriptions` calls `name`."""
+    module = _descriptions.fetched(name)
+    file = _descriptions.model_file(module)
+    own, search = _descriptions.packages_of(module)
+    folder = None
+    if file == getattr(module, "MJCF_PATH", None):
+        file, folder = _descriptions.converted(file)
+    try:
+        named, more, is_lenient = load_options("load_hand", {**own, **(packages or {})}, lenient)
+        native = _regrasp.Hand.load(file, (named, [*search, *more], is_lenient))
+    finally:
+        if folder is not None:
+            folder.cleanup()
     return Hand(native.tips, json.loads(native.describe()))

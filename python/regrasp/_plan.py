@@ -19,7 +19,7 @@ import numpy.typing as npt
 from . import _regrasp
 from ._arguments import StrPath
 from ._errors import InputError
-from ._model import FloatArray, Pose, Source, pose_of
+from ._model import FloatArray, Pose, Scene, pose_of
 from ._result import Report
 
 CONTACT_MODES = ("free", "fixed", "rolling", "pure_rolling", "twisting", "pure_sliding", "sliding")
@@ -69,8 +69,8 @@ class Plan:
         self._native = native
         self.path: str | None = path
         """The file it was read from, or last saved to."""
-        # The scene it was planned for, when `plan` made it: path, packages, lenient.
-        self._source: Source | None = None
+        # The scene it was planned for, when `plan` made it.
+        self._source: Scene | None = None
         self.report: Report | None = report
         """What the checker said when `plan` made it."""
         self.query: str = fields["query"]

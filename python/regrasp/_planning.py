@@ -14,7 +14,7 @@ from typing import Any, Literal
 from . import _regrasp
 from ._arguments import StrPath, real, seconds, seed_of, whole
 from ._errors import argument_error
-from ._model import Scene, _load_scene, load_scene
+from ._model import Scene, load_scene
 from ._plan import Plan
 from ._result import Failure, Progress, Report, failure_of, report_of
 
@@ -46,7 +46,7 @@ def plan(
     Not to find a plan is a result, no exception: the answer is a `Plan`, which is true, or a `Failure`, which is false. A plan
     that the checker rejects is a failure of kind "rejected".
 
-    scene: what `load_scene` gave, or a scene file.
+    scene: a scene, or a scene file.
     seed: the same scene, settings and seed give the same plan, byte by byte, on any number of threads.
     threads: threads that search at once.
     time_limit: seconds after which the search is cut; the plan then says so (`statistics["cut_by_time"]`).
@@ -90,7 +90,7 @@ def plan(
     if found is None:
         return failure_of(outcome)
     made = Plan(found, report=report_of(json.loads(outcome)))
-    made._source = scene._source
+    made._source = scene
     return made
 
 
@@ -183,7 +183,7 @@ def _with_scene(
         plan = Plan.from_file(plan)
     if scene is None:
         if plan._source is not None:
-            scene = _load_scene(*plan._source)
+            scene = plan._source._afresh()
         else:
             scene = _regrasp.find_scene(plan._native, plan.path or "plan.json", os.getcwd())
     if not isinstance(scene, Scene):

@@ -105,6 +105,9 @@ pub struct Inspect {
     /// Write a hand file
     #[arg(short, long, value_name = "hand.toml")]
     pub output: Option<PathBuf>,
+    /// Base link of the hand in a URDF: its fingers are those below this link [default: guessed]
+    #[arg(long, value_name = "LINK")]
+    pub base: Option<String>,
     /// Postures sampled for the pairs of links that always or never touch
     #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000), allow_negative_numbers = true)]
     pub samples: u32,
@@ -112,6 +115,9 @@ pub struct Inspect {
     #[arg(long, default_value_t = 0, value_parser = whole_number, allow_negative_numbers = true)]
     pub seed: u64,
 }
+
+/// Work limit where none is given.
+pub const DEFAULT_MAX_WORK: u64 = 20_000_000;
 
 /// How to search.
 #[derive(Debug, Args)]
@@ -125,11 +131,11 @@ pub struct Search {
     /// Force-closure margin that the holding fingers keep, in [0, 1)
     #[arg(long, value_parser = margin, allow_negative_numbers = true)]
     pub margin: Option<f64>,
-    /// Time limit in seconds (in bench: per seed)
+    /// Time limit in seconds (in bench: per seed) [default: 60 in plan, where no other limit is given; else none]
     #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
     pub time_limit: Option<Duration>,
     /// Work limit, in configurations examined: the same on every machine
-    #[arg(long, value_name = "N", default_value_t = 20_000_000, value_parser = whole_number, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_MAX_WORK, value_parser = whole_number, allow_negative_numbers = true)]
     pub max_work: u64,
     /// Improve the first plan for so many seconds
     #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]

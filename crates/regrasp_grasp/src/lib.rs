@@ -12,6 +12,9 @@ pub mod list;
 pub mod margin;
 /// What plan files and grasp lists share.
 pub mod record;
+/// `schema/record.d.ts`.
+#[cfg(test)]
+mod typescript;
 /// Wrenches, and contact forces that balance them.
 pub mod wrench;
 

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// A pose on disk.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
 pub struct PoseData {
     /// Position, in metres.
@@ -35,6 +36,7 @@ impl From<&PoseData> for regrasp_geometry::Pose {
 
 /// A file the plan was made from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
 pub struct PlanInput {
     /// What it is for: `scene`, `hand`, `urdf`, `srdf`, `mesh`.

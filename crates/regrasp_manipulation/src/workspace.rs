@@ -305,7 +305,10 @@ impl<'a> Workspace<'a> {
         self.motion.fill(0.0);
         self.deviation.fill(0.0);
         self.slack[pair] = f64::NEG_INFINITY;
+        // Hollows are narrow beside long steps: there the triangles are asked about the end alone.
+        self.stands = self.model.folds;
         let is_clear = self.pair_is_clear(pair, mode);
+        self.stands = false;
         self.slack[pair] = f64::NEG_INFINITY;
         is_clear
     }
@@ -536,8 +539,12 @@ impl<'a> Workspace<'a> {
         let body = &model.bodies[other];
         let now = self.now.at(model, mesh).inverse_then(self.now.at(model, other));
         let next = self.next.at(model, mesh).inverse_then(self.next.at(model, other));
-        let relative_motion =
-            now.displacement(&next, &body.center, body.radius) + self.deviation_of(mesh) + self.deviation_of(other);
+        let relative_motion = match self.stands {
+            true => 0.0,
+            false => {
+                now.displacement(&next, &body.center, body.radius) + self.deviation_of(mesh) + self.deviation_of(other)
+            }
+        };
         // Whatever the moment, one of the two ends is at most half of the motion away.
         let needed = required + 0.5 * relative_motion;
         let mut smallest = 0.0;

@@ -17,6 +17,7 @@ pub const ONLY_HAND: &str = "hand";
 
 /// What a finger does at a waypoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "snake_case")]
 pub enum ContactMode {
     /// Holds the object; the contact is fixed on the object.
@@ -149,6 +150,7 @@ impl Waypoint {
 
 /// Kind of a segment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "snake_case")]
 pub enum SegmentKind {
     /// The object moves; every finger holds all along, at one contact or rolling, or is free all along (Saut 2011, section
@@ -212,9 +214,11 @@ pub fn relocations(fingers: &[String], segments: &[Segment]) -> u64 {
 
 /// A pose that the object has to pass between start and goal, and when it does.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
 pub struct WayPose {
     /// The pose asked for.
+    #[cfg_attr(test, ts(type = "PoseData"))]
     pub world_from_object: PoseData,
     /// Index of the segment in which it is passed, from 0.
     pub segment: usize,
@@ -224,7 +228,9 @@ pub struct WayPose {
 
 /// What the plan promises; the checker holds it to these numbers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
+#[cfg_attr(test, ts(optional_fields))]
 pub struct Promises {
     /// Largest distance of a holding fingertip from its contact at and between waypoints, in metres.
     pub contact_tolerance: f64,
@@ -277,6 +283,7 @@ impl Promises {
 
 /// What a tracking plan promises beside. The goal of such a task is an orientation; where the object then is, is not asked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
 pub struct TrackingPromises {
     /// Largest angle between the object's last orientation and the goal's, in radians (Cherif 1999, sec. 5: within a cell).
@@ -287,6 +294,7 @@ pub struct TrackingPromises {
 
 /// Limits of the motion in time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
 pub struct MotionLimits {
     /// Largest speed of a fingertip's centre, or of a point of the object no farther from its centre of mass than
@@ -302,7 +310,9 @@ pub struct MotionLimits {
 
 /// What the contact forces balance, and their limits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
+#[cfg_attr(test, ts(optional_fields))]
 pub struct ForcePromises {
     /// Mass of the object, in kilograms.
     pub mass: f64,
@@ -319,7 +329,9 @@ pub struct ForcePromises {
 
 /// Counts of the search.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(default, deny_unknown_fields)]
+#[cfg_attr(test, ts(optional_fields))]
 pub struct Statistics {
     /// Nodes of the roadmap or tree when the search ended; in tracking, cells that sub-goals are in.
     pub nodes: u64,
@@ -346,6 +358,7 @@ pub struct Statistics {
 
 /// Looking for a better plan after the first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
 pub struct Improvement {
     /// The first plan.
@@ -362,6 +375,7 @@ pub struct Improvement {
 
 /// What a plan costs, and why.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
 pub struct PlanFigures {
     /// Relocations: how often a finger lands on a contact ([`relocations`]).

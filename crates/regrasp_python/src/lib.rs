@@ -5,6 +5,8 @@
 
 /// Scenes and hands as JSON.
 mod describe;
+/// TOML documents with the lines of their keys.
+mod document;
 /// Rust errors as Python exceptions.
 mod error;
 /// Grasp lists.
@@ -27,17 +29,19 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _regrasp {
     #[pymodule_export]
+    use super::document::parse_toml;
+    #[pymodule_export]
     use super::grasps::{check_grasps, list_grasps};
     #[pymodule_export]
     use super::guard::panic_for_tests;
     #[pymodule_export]
-    use super::model::{Hand, Scene};
+    use super::model::{Hand, Scene, hand_file};
     #[pymodule_export]
     use super::plan::Plan;
     #[pymodule_export]
     use super::search::{check, find_scene, plan};
     #[pymodule_export]
-    use super::view::page;
+    use super::view::{page, storyboard};
 
     use pyo3::prelude::*;
 

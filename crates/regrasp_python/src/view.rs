@@ -1,34 +1,61 @@
-//! Pages of plans.
+//! Pages and pictures of plans.
 
 use crate::error;
 use crate::guard::guarded;
 use crate::model::Scene;
 use crate::plan::Plan;
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 use regrasp::plan::check::{CheckSettings, check};
 use regrasp::viewer::page::html;
-use regrasp::viewer::story::{Outcome, Telling, tell};
+use regrasp::viewer::story::{Outcome, Story, Telling, tell};
+use regrasp::viewer::storyboard::StoryboardSettings;
 
 /// The page of `plan` in `scene` as it was read, judged by the checker: one HTML file.
 #[pyfunction]
 pub fn page(py: Python<'_>, plan: &Plan, scene: &Scene, title: Option<String>) -> PyResult<String> {
     guarded(py, || {
+        let made = py.detach(|| told(plan, scene, title.as_deref()).map(|story| html(&story)));
+        made.map_err(|problem| error::argument(py, "view", "scene", problem, DRAWABLE))
+    })
+}
+
+/// The storyboard of `plan` in `scene`: key frames in one PNG picture.
+#[pyfunction]
+pub fn storyboard<'py>(
+    py: Python<'py>,
+    plan: &Plan,
+    scene: &Scene,
+    frames: usize,
+    width: usize,
+) -> PyResult<Bound<'py, PyBytes>> {
+    guarded(py, || {
+        let settings = StoryboardSettings { frames, width, ..StoryboardSettings::default() };
         let made = py.detach(|| {
-            let loaded = &scene.loaded;
-            let task = loaded.task_for(&plan.plan.query);
-            let query = task.query(plan.plan.seed);
-            let report = check((&loaded.scene, &loaded.state), Some(&query), &plan.plan, &CheckSettings::default());
-            let telling = Telling {
-                task: loaded.manipulation_of(task),
-                query: None,
-                outcome: Outcome::Planned { plan: &plan.plan, report: &report },
-                title: title.as_deref(),
-                facts: Vec::new(),
-                roadmap: None,
-                packages: scene.packages(),
-            };
-            tell(&telling).map(|story| html(&story))
+            let story = told(plan, scene, None)?;
+            regrasp::viewer::storyboard::storyboard(&story, &settings).map_err(|error| error.to_string())
         });
-        made.map_err(|problem| error::argument(py, "view", "scene", problem, "a scene with a hand that can be drawn"))
+        let picture = made.map_err(|problem| error::argument(py, "storyboard", "plan", problem, DRAWABLE))?;
+        Ok(PyBytes::new(py, &picture))
+    })
+}
+
+/// What pictures need.
+const DRAWABLE: &str = "a scene with a hand that can be drawn";
+
+/// All that a picture of `plan` needs to know.
+fn told(plan: &Plan, scene: &Scene, title: Option<&str>) -> Result<Story, String> {
+    let loaded = &scene.loaded;
+    let task = loaded.task_for(&plan.plan.query);
+    let query = task.query(plan.plan.seed);
+    let report = check((&loaded.scene, &loaded.state), Some(&query), &plan.plan, &CheckSettings::default());
+    tell(&Telling {
+        task: loaded.manipulation_of(task),
+        query: None,
+        outcome: Outcome::Planned { plan: &plan.plan, report: &report },
+        title,
+        facts: Vec::new(),
+        roadmap: None,
+        packages: scene.packages(),
     })
 }

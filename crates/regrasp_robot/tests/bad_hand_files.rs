@@ -72,7 +72,7 @@ refused!(
         "U202 hand.toml:1:1: has no `format`\n  fix: add format = \"regrasp-hand\" as the first line",
         "U202 hand.toml:1:1: has no `format_version`\n  fix: add format_version = 1",
         "U202 hand.toml:1:1: has no `urdf`\n  fix: add urdf = \"hand.urdf\"",
-        "U202 hand.toml:1:1: has no `fingers`\n  fix: add at least one [[fingers]] table"
+        "U202 hand.toml:1:1: has no `fingers`\n  fix: regrasp inspect hand.urdf -o hand.toml    # writes the fingers that it finds"
     ]
 );
 refused!(
@@ -104,11 +104,18 @@ refused!(
   fix: did you mean "a_tip"?"#
     ]
 );
-refused!(no_fingers, HEAD, ["U202 hand.toml:1:1: has no `fingers`\n  fix: add at least one [[fingers]] table"]);
+refused!(
+    no_fingers,
+    HEAD,
+    [
+        "U202 hand.toml:1:1: has no `fingers`\n  fix: regrasp inspect hand.urdf -o hand.toml    # writes the fingers that it finds"
+    ]
+);
 refused!(
     an_empty_list_of_fingers,
     format!("{HEAD}fingers = []\n"),
-    [r#"U202 hand.toml:4:11 key "fingers": is empty; expected at least one [[fingers]] table"#]
+    [r#"U202 hand.toml:4:11 key "fingers": is empty; expected at least one [[fingers]] table
+  fix: regrasp inspect hand.urdf -o hand.toml    # writes the fingers that it finds"#]
 );
 refused!(
     fingers_that_are_numbers,
@@ -231,8 +238,31 @@ refused!(
     a_tip_that_the_base_does_not_carry,
     with_finger(&format!("tip_link = \"arm\"\n{POINT}")),
     [
-        r#"U206 hand.toml:5:1 finger "a": tip link "arm" is not carried by base link "palm"; expected a tip link below the base link"#
+        r#"U206 hand.toml:5:1 finger "a": tip link "arm" is not carried by base link "palm"; expected a tip link below the base link
+  fix: tip_link = "a_tip""#
     ]
+);
+refused!(
+    a_base_on_another_finger,
+    with_finger(&format!("tip_link = \"a_tip\"\n{POINT}")).replace("base_link = \"palm\"", "base_link = \"b1\""),
+    [
+        r#"U206 hand.toml:5:1 finger "a": tip link "a_tip" is not carried by base link "b1"; expected a tip link below the base link
+  fix: base_link = "palm""#
+    ]
+);
+refused!(
+    a_first_joint_of_another_finger,
+    with_finger(&format!("tip_link = \"a_tip\"\nfirst_joint = \"jb1\"\n{POINT}")),
+    [
+        r#"U206 hand.toml:5:1 finger "a": first joint "jb1" is not between "palm" and "a_tip"; expected a joint of the finger
+  fix: first_joint = "ja1""#
+    ]
+);
+refused!(
+    no_tip_link,
+    with_finger(POINT),
+    [r#"U202 hand.toml:5:1 table "fingers[0]": has no `tip_link`
+  fix: add tip_link = "a_tip", or another end: "b2""#]
 );
 refused!(
     a_tip_that_does_not_move,
@@ -243,7 +273,8 @@ refused!(
     a_chain_that_starts_after_its_leader,
     with_finger(&format!("tip_link = \"a_tip\"\n{POINT}")).replace("\"b2\"\n", "\"b2\"\nfirst_joint = \"jb2\"\n"),
     [
-        r#"U209 hand.toml:9:1 finger "b": joint "jb2" follows joint "jb1", which is on another finger or on none; expected followers on the chain of the joint they follow"#
+        r#"U209 hand.toml:9:1 finger "b": joint "jb2" follows joint "jb1", which is on another finger or on none; expected followers on the chain of the joint they follow
+  fix: first_joint = "jb1""#
     ]
 );
 
@@ -314,7 +345,7 @@ fn an_srdf_gives_groups_end_effectors_and_pairs() {
     let link = |name: &str| hand.robot.link_named(name).unwrap();
     assert!(hand.may_touch(link("a1"), link("b1")));
     assert!(!hand.may_touch(link("a2"), link("b1")));
-    let srdf = load_srdf(&folder.path().join("hand.srdf"), &hand.robot, false).unwrap().srdf;
+    let srdf = load_srdf(&folder.path().join("hand.srdf"), &hand.robot, &LoadOptions::default()).unwrap().srdf;
     let names: Vec<&str> =
         joints_of_group(&srdf, &hand.robot, "both").iter().map(|j| hand.robot.joints[j.0].name.as_str()).collect();
     assert_eq!(names, ["jb1", "ja1", "ja2"]);
@@ -332,7 +363,7 @@ fn unknown_names_in_an_srdf_are_errors_or_notes() {
         SRDF.replace("a_tip", "a_tipp").replace("\"jb1\"", "\"jx_9\"").replace("group=\"both\"", "group=\"bohh\"");
     fs::write(&path, bad).unwrap();
     let prefix = format!("{}/", folder.path().display());
-    let error = load_srdf(&path, &robot, false).unwrap_err();
+    let error = load_srdf(&path, &robot, &LoadOptions::default()).unwrap_err();
     let seen: Vec<String> = error.diagnostics.iter().map(|d| d.to_string().replace(&prefix, "")).collect();
     let expected = [
         "U161 hand.srdf:2:41 group \"a\": tip_link \"a_tipp\" is not a link of the robot; expected the name of a link\n  fix: did you mean \"a_tip\"?",
@@ -340,5 +371,8 @@ fn unknown_names_in_an_srdf_are_errors_or_notes() {
         "U163 hand.srdf:4:27 end_effector \"hand\": group \"bohh\" is not a group of the robot; expected the name of a group\n  fix: did you mean \"both\"?",
     ];
     assert_eq!(seen, expected);
-    assert_eq!(load_srdf(&path, &robot, true).unwrap().notes.len(), 3);
+    assert_eq!(
+        load_srdf(&path, &robot, &LoadOptions { lenient: true, ..LoadOptions::default() }).unwrap().notes.len(),
+        3
+    );
 }

@@ -29,7 +29,7 @@ pub use gravity::{Gravity, STANDARD_GRAVITY};
 pub use hand_view::HandView;
 pub use limits::Limits;
 pub use load::{GraspScene, MeshObject, ObjectSource, load_grasp_scene};
-pub use load::{LoadedScene, OpenStart, StartOrientation, Task, load_scene, load_scene_text};
+pub use load::{LoadedScene, OpenStart, StartOrientation, Stock, Task, load_scene, load_scene_text, load_scene_with};
 pub use manipulation::{Manipulation, is_of_hand};
 pub use object::Object;
 pub use query::{GRASP_TOLERANCE, GRASP_TURN_TOLERANCE, GraspRequest, InHandQuery, Query, StartChoice, TrackingQuery};

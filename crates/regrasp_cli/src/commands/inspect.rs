@@ -9,6 +9,7 @@ use crate::stop::Stop;
 use crate::talk::Talk;
 use crate::words::{counted, grouped};
 use regrasp::base::{Rng, files};
+use regrasp::robot::import::LoadOptions;
 use regrasp::robot::inspect::{
     HandInspection, InspectSettings, Inspection, JointRow, RobotInspection, hand_file_text, inspect,
 };
@@ -24,10 +25,15 @@ pub fn run(arguments: &args::Inspect, common: &Common, talk: &Talk) -> Result<()
     if let Some(path) = &arguments.output {
         refuse_unwritable(path)?;
     }
+    let is_hand_file = arguments.urdf.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
+    if arguments.base.is_some() && is_hand_file {
+        return Err(Stop::argument("A505", "--base", "stands beside a hand file", "a URDF; hand files say base_link"));
+    }
     interrupt::flag()?;
     let settings = InspectSettings { n_postures: arguments.samples as usize };
     let mut rng = Rng::keyed(arguments.seed, "inspect", 0);
-    let found = inspect(&arguments.urdf, &load::options(common), &settings, &mut rng)?;
+    let options = LoadOptions { base: arguments.base.clone(), ..load::options(common) };
+    let found = inspect(&arguments.urdf, &options, &settings, &mut rng)?;
     if let Some(path) = &arguments.output {
         refuse_input(path, found.inputs.iter().map(|input| input.path.as_path()))?;
     }

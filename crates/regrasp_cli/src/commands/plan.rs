@@ -29,7 +29,8 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
     let written = outputs(arguments)?;
     let cancelled = interrupt::flag()?;
     // Reading counts too: a mesh of a million triangles takes seconds.
-    let deadline = arguments.search.time_limit.and_then(|limit| Instant::now().checked_add(limit));
+    let time_limit = arguments.search.time_limit.or_else(|| default_time_limit(&arguments.search));
+    let deadline = time_limit.and_then(|limit| Instant::now().checked_add(limit));
     let loaded = arguments.judging.scene(load::scene_by(&arguments.scene, common, deadline, talk)?);
     let read = loaded.scene.inputs.iter().map(|input| input.path.as_path());
     written.refuse_inputs(read.chain(arguments.search.settings.as_deref()))?;
@@ -48,7 +49,11 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
     let page_of =
         |query| arguments.report.as_deref().map(|path| Page::new(path, loaded.manipulation(), query, &packages));
     let plan = match search(&loaded.manipulation(), &query, &settings, arguments.seed, &limits, talk) {
-        Err(Stop::NoPlan(failure)) => {
+        Err(Stop::NoPlan(mut failure)) => {
+            if failure.kind == FailureKind::TimeLimit && arguments.search.time_limit.is_none() {
+                let seconds = DEFAULT_TIME_LIMIT.as_secs();
+                failure.message += &format!("; {seconds} s is the default time limit, --time-limit 300 allows more");
+            }
             if let Some(page) = page_of(&query) {
                 page.write_failure(&failure, talk)?;
             }
@@ -63,6 +68,15 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
     let page = page_of(&query);
     let output = arguments.output.as_deref();
     judge_and_write(&plan, output, &arguments.scene, page.as_ref(), common, &arguments.judging, talk)
+}
+
+/// Time limit where no limit is given, for reading and planning.
+const DEFAULT_TIME_LIMIT: Duration = Duration::from_secs(60);
+
+/// The time limit of a search for which the caller gives no limit of any kind; time for improvement comes on top.
+fn default_time_limit(search: &args::Search) -> Option<Duration> {
+    let is_limited = search.max_work != args::DEFAULT_MAX_WORK || search.improve_work.is_some();
+    (!is_limited).then(|| DEFAULT_TIME_LIMIT.saturating_add(search.improve.unwrap_or_default()))
 }
 
 /// The files that the arguments name, those of a failure too.

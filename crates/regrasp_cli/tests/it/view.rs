@@ -75,7 +75,7 @@ fn plan_reports_success_and_failure() {
     assert!(!told["failure"]["advice"].as_str().unwrap().is_empty());
     let miss = &told["failure"]["nearest_miss"];
     assert!(miss["distance_left"].as_f64().unwrap() > 0.005, "{miss}");
-    assert_eq!(miss["joints"].as_array().unwrap().len(), told["scene"]["joints"].as_array().unwrap().len());
+    assert_eq!(miss["joints"].as_array().unwrap().len(), told["scene"]["hands"][0]["joints"].as_array().unwrap().len());
     assert_eq!(told["asked"].as_array().unwrap().len(), 2);
     // What was reached, with what hangs together.
     let nodes = told["roadmap"]["nodes"].as_array().unwrap();
@@ -180,11 +180,13 @@ fn markup_in_files_and_their_names_stays_text() {
     assert_eq!(run.code, Some(0), "{run:?}");
     let told = story(&folder, "plan.html");
     assert_eq!(told["title"], "<b onload=x>&");
-    assert_eq!(told["scene"]["links"][0]["name"], link);
-    let names = |list: &str| -> Vec<String> {
-        told["scene"][list].as_array().unwrap().iter().map(|entry| entry["name"].as_str().unwrap().to_owned()).collect()
+    let hand = &told["scene"]["hands"][0];
+    assert_eq!(hand["links"][0]["name"], link);
+    let names = |list: &Value| -> Vec<String> {
+        list.as_array().unwrap().iter().map(|entry| entry["name"].as_str().unwrap().to_owned()).collect()
     };
-    assert!(names("fingers").iter().any(|name| name == finger) && names("pieces").iter().any(|name| name == object));
+    assert!(names(&hand["fingers"]).iter().any(|name| name == finger));
+    assert_eq!(names(&told["scene"]["objects"]), [object]);
     let page = std::fs::read_to_string(folder.path("plan.html")).unwrap();
     // The viewer apart, which is the same in every page.
     let (own, _) = page.rsplit_once("<script>").unwrap();

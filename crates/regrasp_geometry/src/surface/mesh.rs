@@ -8,6 +8,8 @@
 mod curvature;
 /// Shortest ways on it.
 mod geodesic;
+/// How long its creases are.
+mod grain;
 
 use super::bvh::{Aabb, Bvh};
 use super::geodesic::Geodesic;
@@ -146,11 +148,10 @@ impl MeshSurface {
         self.topology.triangles.len()
     }
 
-    /// How long its creases are before the next corner, in metres: the mean of their edges, weighed by length. None without creases.
+    /// How far its creases run on before they turn, branch or end, in metres: the mean over them, weighed by length. None without
+    /// creases.
     pub fn crease_grain(&self) -> Option<f64> {
-        let lengths = || self.crease_edges.iter().map(|[a, b]| (b - a).norm());
-        let (sum, squares) = lengths().fold((0.0, 0.0), |(sum, squares), x| (sum + x, squares + x * x));
-        (sum > 0.0).then(|| squares / sum)
+        grain::grain(&self.crease_edges)
     }
 
     /// Corners of triangle `facet`, counter-clockwise seen from outside.

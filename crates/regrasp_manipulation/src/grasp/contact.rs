@@ -6,6 +6,7 @@ use crate::rolling::follow::ik_settings;
 use crate::workspace::{TipMode, Workspace};
 use regrasp_base::Rng;
 use regrasp_geometry::collision::Placement;
+use regrasp_geometry::surface::SurfacePoint;
 use regrasp_geometry::{UnitVector, Vector};
 use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
@@ -54,17 +55,10 @@ fn draw_contact_once(
     n_measured: &mut u64,
 ) -> Option<Contact> {
     let object = &model.view.object;
-    let inner = object.center_of_mass + Vector::from(rng.direction()) * (0.4 * model.frame.torque_scale * rng.unit());
-    let towards = world_from_object.point_to_child(&model.fingers[finger].tip_at_rest) - inner;
-    let direction = towards.normalize() * PULL + Vector::from(rng.direction());
-    let direction = UnitVector::try_new(direction, 1e-9)?;
-    let mut exits = object.surface.exits(&inner, &direction);
-    let chosen = match exits.len() {
-        0 => return None,
-        1 => 0,
-        n => rng.below(n),
+    let hit = match model.folds && rng.chance(BY_AREA) {
+        true => facing(model, finger, world_from_object, rng)?,
+        false => from_within(model, finger, world_from_object, rng)?,
     };
-    let hit = exits.swap_remove(chosen);
     let finger_model = &model.fingers[finger];
     let rough = Contact { point_in_object: hit.point_in_object, normal_in_object: hit.normal_in_object };
     if !finger_model.may_reach(world_from_object, &rough) {
@@ -75,6 +69,32 @@ fn draw_contact_once(
         return None;
     }
     Some(Contact { point_in_object: hit.point_in_object, normal_in_object: hit.normal_in_object })
+}
+
+/// Share of draws by area on objects that fold. By hand.
+const BY_AREA: f64 = 0.5;
+
+/// A point drawn by area that faces `finger`'s working place: what lies behind a hollow, and rays from within leave elsewhere.
+fn facing(model: &Model, finger: usize, world_from_object: &Placement, rng: &mut Rng) -> Option<SurfacePoint> {
+    let hit = model.view.object.surface.sample(rng);
+    let towards = world_from_object.point_to_child(&model.fingers[finger].tip_at_rest) - hit.point_in_object;
+    (towards.dot(&hit.normal_in_object) > 0.0).then_some(hit)
+}
+
+/// A point in which a ray from within the object, drawn towards `finger`'s working place, leaves it.
+fn from_within(model: &Model, finger: usize, world_from_object: &Placement, rng: &mut Rng) -> Option<SurfacePoint> {
+    let object = &model.view.object;
+    let inner = object.center_of_mass + Vector::from(rng.direction()) * (0.4 * model.frame.torque_scale * rng.unit());
+    let towards = world_from_object.point_to_child(&model.fingers[finger].tip_at_rest) - inner;
+    let direction = towards.normalize() * PULL + Vector::from(rng.direction());
+    let direction = UnitVector::try_new(direction, 1e-9)?;
+    let mut exits = object.surface.exits(&inner, &direction);
+    let chosen = match exits.len() {
+        0 => return None,
+        1 => 0,
+        n => rng.below(n),
+    };
+    Some(exits.swap_remove(chosen))
 }
 
 /// Joints of `finger` at `contact` from which it can be lifted again, clear of everything but the other fingers; the

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 /// What a plan has is judged at every level: wrong forces are wrong in a plan that is judged for its geometry only. The levels
 /// say what a plan may leave out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Hash, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "snake_case")]
 pub enum Level {
     /// Poses alone: no collision, fingertips on their contacts, force closure. Fixed contacts may stay where they are on the

@@ -18,6 +18,7 @@ use std::marker::PhantomData;
 
 /// A hand of the scene that the plan moves.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
 pub(super) struct FileHand<'a> {
     /// Its name in the scene.
@@ -30,7 +31,9 @@ pub(super) struct FileHand<'a> {
 
 /// A finger that touches an object.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
+#[cfg_attr(test, ts(optional_fields))]
 pub(super) struct FileContact<'a> {
     /// The hand.
     pub hand: Cow<'a, str>,
@@ -66,6 +69,7 @@ pub(super) struct FileContact<'a> {
 
 /// The state of hands and objects at one moment.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
 pub(super) struct FileWaypoint<'a> {
     /// When, in seconds from the start.
@@ -78,6 +82,7 @@ pub(super) struct FileWaypoint<'a> {
     #[serde(default, skip_serializing_if = "<[f64]>::is_empty")]
     pub joint_torques: Cow<'a, [f64]>,
     /// Pose of every object of `objects`, in the world.
+    #[cfg_attr(test, ts(type = "PoseData[]"))]
     pub world_from_objects: Vec<PoseData>,
     /// Fingers that touch an object, hand by hand in the order of their fingers.
     pub contacts: Vec<FileContact<'a>>,
@@ -112,6 +117,7 @@ fn each_once<'de, 'a, D: Deserializer<'de>>(deserializer: D) -> Result<Holders<'
 
 /// A piece of motion.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
 pub(super) struct FileSegment<'a> {
     /// Its kind.
@@ -123,6 +129,7 @@ pub(super) struct FileSegment<'a> {
     pub moving: Vec<Cow<'a, str>>,
     /// In tracking, the resting finger that the object rolls on without sliding (Cherif & Gupta 1999, sec. 6.1.2: `F_t`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
     pub rolling_finger: Option<Cow<'a, str>>,
     /// For every object, who holds it: names of hands and supports.
     #[serde(deserialize_with = "each_once")]
@@ -133,6 +140,7 @@ pub(super) struct FileSegment<'a> {
 
 /// A plan file.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
 pub(super) struct FilePlan<'a> {
     /// Always `regrasp-plan`.
@@ -151,8 +159,10 @@ pub(super) struct FilePlan<'a> {
     /// Seed.
     pub seed: u64,
     /// Settings of the planner, as they were used.
+    #[cfg_attr(test, ts(type = "unknown"))]
     pub settings: Cow<'a, serde_json::Value>,
     /// Files it was made from, the scene file first.
+    #[cfg_attr(test, ts(type = "PlanInput[]"))]
     pub inputs: Cow<'a, [PlanInput]>,
     /// What it promises.
     pub promises: Cow<'a, Promises>,
@@ -161,11 +171,13 @@ pub(super) struct FilePlan<'a> {
     /// Names of the objects that it moves. All others of the scene rest.
     pub objects: Vec<Cow<'a, str>>,
     /// Pose of the object asked for at the start.
+    #[cfg_attr(test, ts(type = "PoseData"))]
     pub start: PoseData,
     /// Poses asked for between start and goal, in order; absent where none were.
     #[serde(default, skip_serializing_if = "<[WayPose]>::is_empty")]
     pub way_poses: Cow<'a, [WayPose]>,
     /// Pose of the object asked for at the goal.
+    #[cfg_attr(test, ts(type = "PoseData"))]
     pub goal: PoseData,
     /// Counts of the search.
     pub statistics: Cow<'a, Statistics>,

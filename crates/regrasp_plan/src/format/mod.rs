@@ -2,6 +2,9 @@
 
 /// The file as it stands on disk.
 mod file;
+/// `schema/plan.d.ts`.
+#[cfg(test)]
+mod typescript;
 /// What a plan file may not say.
 mod validate;
 

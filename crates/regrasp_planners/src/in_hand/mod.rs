@@ -3,6 +3,8 @@
 
 /// One attempt at a query.
 mod attempt;
+/// Whether friction is what is missing.
+mod friction;
 /// Contacts, and the grasps that they make.
 mod grasps;
 /// Better plans after the first.
@@ -108,6 +110,11 @@ fn plan_in_hand_frame(asked: &Asked, settings: &InHandSettings, budget: &Budget)
     let mut found = plan_with(asked, settings, &left, left.max_work);
     let (Ok(Plan { statistics, .. }) | Err(Failure { statistics, .. })) = &mut found;
     statistics.work += spent;
+    if let Err(failure) = &mut found {
+        let model = Model::new(asked.view, &effective(settings).within(&asked.view.limits).physics);
+        let ends = [&asked.query.world_from_object_start, &asked.query.world_from_object_goal];
+        friction::advise(&model, ends, asked.seed, failure);
+    }
     found
 }
 

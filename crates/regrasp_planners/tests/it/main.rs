@@ -2,6 +2,7 @@
 
 mod carried;
 mod contact_kinematics;
+mod folds;
 mod free_fingers;
 mod improvement;
 mod in_hand_methods;

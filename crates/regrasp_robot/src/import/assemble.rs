@@ -4,6 +4,7 @@
 //! joint moves is palm; moving joints that belong to no finger are held at the position nearest to zero.
 
 use super::chain::{ChainOwner, make_chain, middle_of_limits, rest_posture};
+use super::fixes;
 use super::hulls::Hulls;
 use super::spec::{Carried, FingerSpec, HandSpec, RigidBody, TipSpec};
 use super::tip_split;
@@ -85,14 +86,19 @@ fn moving_joints(robot: &Robot, spec: &HandSpec, found: &mut Diagnostics) -> Vec
         let mut joints = Vec::new();
         if !path.starts_with(&base_path) {
             let problem = format!("tip link \"{tip_name}\" is not carried by base link \"{base_name}\"");
-            found.push(say("U206", problem, "a tip link below the base link", String::new()));
+            found.push(say(
+                "U206",
+                problem,
+                "a tip link below the base link",
+                fixes::tip_elsewhere(robot, spec, index),
+            ));
         } else {
             let below = &path[base_path.len()..];
             let first = finger.first_joint.map(|joint| below.iter().position(|&other| other == joint));
             if let Some(None) = first {
                 let joint = finger.first_joint.map_or("", |joint| &robot.joints[joint.0].name);
                 let problem = format!("first joint \"{joint}\" is not between \"{base_name}\" and \"{tip_name}\"");
-                found.push(say("U206", problem, "a joint of the finger", String::new()));
+                found.push(say("U206", problem, "a joint of the finger", fixes::first_joint(robot, below)));
             }
             let from = first.flatten().unwrap_or(0);
             joints.extend(below[from..].iter().copied().filter(|j| robot.joints[j.0].kind != JointKind::Fixed));
@@ -108,9 +114,7 @@ fn moving_joints(robot: &Robot, spec: &HandSpec, found: &mut Diagnostics) -> Vec
         {
             let problem =
                 format!("joint \"{}\" moves finger \"{}\" too", robot.joints[shared.0].name, spec.fingers[other].name);
-            let last_shared = joints.iter().rev().find(|joint| chains[other].contains(joint)).unwrap_or(&shared);
-            let below = &robot.links[robot.joints[last_shared.0].child.0].name;
-            let fix = format!("base_link = \"{below}\", so that shared joints belong to no finger");
+            let fix = fixes::shared_joint(robot, spec, [other, index], [&chains[other], &joints]);
             found.push(say("U208", problem, "fingers that share no joint", fix));
         }
         chains.push(joints);
@@ -187,7 +191,7 @@ fn held_at(
                 Diagnostic::new("U209", Place::file(file), problem)
                     .element("joint", &joint.name)
                     .expected("followers on the chain of the joint they follow")
-                    .fix("make it type=\"fixed\", or leave its link out"),
+                    .fix(fixes::hold_in_urdf(&joint.name)),
             );
             return Pose::identity();
         }

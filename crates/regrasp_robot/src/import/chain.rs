@@ -1,5 +1,6 @@
 //! The chain of a finger or an arm, and its rest posture.
 
+use super::fixes;
 use super::spec::Carried;
 use crate::coupling::{Coupling, limit_leaders};
 use crate::hand::MAX_FINGER_JOINTS;
@@ -78,7 +79,8 @@ pub(super) fn make_chain(
             found.push(
                 Diagnostic::new("U209", owner.place.clone(), problem)
                     .element(owner.kind, owner.name)
-                    .expected("followers on the chain of the joint they follow"),
+                    .expected("followers on the chain of the joint they follow")
+                    .fix(fixes::leader_elsewhere(robot, joints, *id, leader, carried)),
             );
             complete = false;
             continue;

@@ -4,9 +4,9 @@
 
 use super::assemble::assemble;
 use super::couplings;
+use super::fixes;
 use super::names::{known_joint, known_link};
 use super::options::{LoadOptions, LoadedInput};
-use super::resolve::resolve_own;
 use super::spec::{FingerSpec, HandSpec, PadSpec, TipSpec};
 use super::srdf::{LoadedSrdf, load_srdf};
 use super::urdf::{LoadedRobot, load_robot};
@@ -56,7 +56,8 @@ pub fn load_hand(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Input
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
     match extension.as_str() {
         "toml" => load_hand_file(path, options),
-        "urdf" | "xml" => load_bare_urdf(path, options),
+        // Xacro files and models of MuJoCo are refused by what is in them.
+        "urdf" | "xml" | "xacro" | "mjcf" => load_bare_urdf(path, options),
         _ => Err(Diagnostic::new("U215", Place::file(path), "is neither a hand file nor a URDF")
             .expected("a file that ends in .toml or .urdf")
             .into()),
@@ -75,7 +76,7 @@ fn guessed_parts(path: &Path, options: &LoadOptions) -> Result<HandParts, InputE
     let LoadedRobot { robot, inputs, mut notes } = load_robot(path, options)?;
     options.check_time(path)?;
     let robot = Arc::new(robot);
-    let spec = crate::inspect::guess::guess_hand(&robot, options.contact, path)?;
+    let spec = crate::inspect::guess::guess_hand(&robot, options, path)?;
     notes.push(format!(
         "{}: fingers and tips were guessed; `regrasp inspect -o hand.toml` writes them down",
         path.display()
@@ -92,7 +93,7 @@ fn load_hand_file(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
 
 /// What a hand file says, before a hand is made of it.
 pub(super) fn hand_file_parts(path: &Path, options: &LoadOptions) -> Result<HandParts, InputError> {
-    let bytes = files::read(path)?;
+    let bytes = options.read(path)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let own = LoadedInput { role: "hand".into(), name, path: path.to_owned(), sha256: files::sha256(&bytes) };
     let text = files::text_of(path, bytes)?;
@@ -167,12 +168,13 @@ fn read(mut root: Table, path: &Path, options: &LoadOptions, found: &mut Found) 
     if !root.is_of_format(found, FORMAT, VERSION) {
         return None;
     }
-    let urdf = root.required(found, "urdf", "add urdf = \"hand.urdf\"");
+    let urdf = root.required(found, "urdf", &fixes::add_urdf(path));
     let srdf = root.optional("srdf");
     let base = root.optional("base_link");
     let allow = root.optional("allow");
     let couplings = root.optional("couplings");
-    let fingers = root.required(found, "fingers", "add at least one [[fingers]] table");
+    let inspect = fixes::inspect_command(urdf.as_ref().and_then(Entry::as_text), path);
+    let fingers = root.required(found, "fingers", &inspect);
     root.finish(found);
     // Without a robot no name in the rest of the file can be looked up.
     let (mut robot, mut inputs) = urdf.and_then(|entry| locate_and_load(&entry, path, options, found))?;
@@ -182,7 +184,7 @@ fn read(mut root: Table, path: &Path, options: &LoadOptions, found: &mut Found) 
     let robot = Arc::new(robot);
     let base = base.and_then(|entry| known_link(&entry, &robot, found)).unwrap_or(robot.root);
     let mut allow = allow.map_or_else(BTreeSet::new, |entry| read_pairs(&entry, &robot, found));
-    let fingers = fingers.map_or_else(Vec::new, |entry| read_fingers(&entry, &robot, options.contact, found));
+    let fingers = fingers.map_or_else(Vec::new, |entry| read_fingers(&entry, &robot, options.contact, &inspect, found));
     if let Some(entry) = srdf
         && let Some(loaded) = read_srdf(&entry, path, &robot, options, found)
     {
@@ -195,7 +197,7 @@ fn read(mut root: Table, path: &Path, options: &LoadOptions, found: &mut Found) 
 /// The file that `entry` names.
 pub(super) fn locate(entry: &Entry, path: &Path, options: &LoadOptions, found: &mut Found) -> Option<PathBuf> {
     let name = entry.text(found)?;
-    match resolve_own(name, path, found.place(&entry.span), &options.resolve) {
+    match options.resolve_own(name, path, found.place(&entry.span)) {
         Ok(resolved) => {
             found.notes.extend(resolved.notes);
             Some(resolved.path)
@@ -237,7 +239,7 @@ pub(super) fn read_srdf(
     found: &mut Found,
 ) -> Option<LoadedSrdf> {
     let srdf = locate(entry, path, options, found)?;
-    match load_srdf(&srdf, robot, options.lenient) {
+    match load_srdf(&srdf, robot, options) {
         Ok(mut loaded) => {
             entry.as_text()?.clone_into(&mut loaded.input.name);
             found.notes.append(&mut loaded.notes);
@@ -250,11 +252,17 @@ pub(super) fn read_srdf(
     }
 }
 
-fn read_fingers(entry: &Entry, robot: &Robot, contact: ContactModel, found: &mut Found) -> Vec<FingerSpec> {
+fn read_fingers(
+    entry: &Entry,
+    robot: &Robot,
+    contact: ContactModel,
+    inspect: &str,
+    found: &mut Found,
+) -> Vec<FingerSpec> {
     let items = entry.entries(found, "at least one [[fingers]] table").unwrap_or_default();
     if entry.is_empty_list() {
         let diagnostic = entry.error("U202", found, "is empty").expected("at least one [[fingers]] table");
-        found.diagnostics.push(diagnostic);
+        found.diagnostics.push(diagnostic.fix(inspect));
     }
     if items.len() > MAX_FINGERS {
         let problem = format!("has {} fingers", items.len());
@@ -275,7 +283,7 @@ fn read_finger(
 ) -> Option<FingerSpec> {
     let name = table.required(found, "name", "add name = \"thumb\"").and_then(|entry| entry.name(found));
     let tip_link = table
-        .required(found, "tip_link", "add tip_link = \"...\", the link that touches")
+        .required(found, "tip_link", &fixes::add_tip_link(robot))
         .and_then(|entry| known_link(&entry, robot, found));
     let first_joint = table.optional("first_joint").map(|entry| known_joint(&entry, robot, found));
     let tip = table

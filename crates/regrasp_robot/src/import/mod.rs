@@ -11,12 +11,18 @@
 pub(crate) mod assemble;
 mod chain;
 mod couplings;
+/// What to write where a hand cannot be made.
+mod fixes;
 /// `hand.toml`, and hands guessed from a bare URDF.
 pub mod hand_file;
 mod hulls;
+/// Files held in memory.
+pub mod kept;
 mod names;
 /// How files are read, and which were.
 pub mod options;
+/// Files of other forms where a URDF is expected.
+mod other_form;
 /// `package://` and relative paths, below allowed folders.
 pub mod resolve;
 /// `robot.toml`: models, arms and hands that make one manipulator.
@@ -32,6 +38,7 @@ pub mod urdf;
 pub(crate) mod xml;
 
 pub use hand_file::{LoadedHand, load_hand};
+pub use kept::KeptFiles;
 pub use options::{LoadOptions, LoadedInput, OUT_OF_TIME};
 pub use resolve::ResolveOptions;
 pub use robot_file::{LoadedManipulator, load_manipulator};

@@ -1,6 +1,6 @@
 //! SRDF: groups, end effectors, pairs of links that are never tested. Form: <http://wiki.ros.org/srdf>.
 
-use super::options::LoadedInput;
+use super::options::{LoadOptions, LoadedInput};
 use super::xml::{Named, Reader, children, parse};
 use crate::robot::{JointId, LinkId, Robot};
 use regrasp_base::diagnostic::{Lines, did_you_mean};
@@ -68,13 +68,13 @@ pub struct LoadedSrdf {
 /// Reads the SRDF file at `path`, which belongs to `robot`.
 ///
 /// Errors: as XML in general; unknown links (`U161`), joints (`U162`) and groups (`U163`), skipped with a note when
-/// `lenient`.
-pub fn load_srdf(path: &Path, robot: &Robot, lenient: bool) -> Result<LoadedSrdf, InputError> {
-    let bytes = files::read(path)?;
+/// lenient.
+pub fn load_srdf(path: &Path, robot: &Robot, options: &LoadOptions) -> Result<LoadedSrdf, InputError> {
+    let bytes = options.read(path)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let input = LoadedInput { role: "srdf".into(), name, path: path.to_owned(), sha256: files::sha256(&bytes) };
     let text = files::text_of(path, bytes)?;
-    let (srdf, notes) = parse_srdf(path, &text, robot, lenient)?;
+    let (srdf, notes) = parse_srdf(path, &text, robot, options.lenient)?;
     Ok(LoadedSrdf { srdf, input, notes })
 }
 

@@ -1,5 +1,6 @@
 //! XML elements and attributes with their places, and every problem gathered.
 
+use super::other_form::{self, is_xacro_name};
 use regrasp_base::diagnostic::{Diagnostics, Lines, bad_name};
 use regrasp_base::{Diagnostic, InputError, Place};
 use roxmltree::Node;
@@ -35,10 +36,10 @@ pub(crate) fn parse<'a>(file: &Path, text: &'a str) -> Result<roxmltree::Documen
             }
             other => {
                 // The library's text ends in " at ROW:COL", which the place says already.
-                let text = other.to_string();
-                let problem = text.rsplit_once(" at ").map_or(text.as_str(), |(problem, _)| problem);
-                let xacro =
-                    if file.extension().is_some_and(|e| e == "xacro") { "expand it with xacro first" } else { "" };
+                let message = other.to_string();
+                let problem = message.rsplit_once(" at ").map_or(message.as_str(), |(problem, _)| problem);
+                let is_xacro = is_xacro_name(file) || text.contains("<xacro:");
+                let xacro = if is_xacro { other_form::xacro_command(file) } else { String::new() };
                 Diagnostic::new("U100", place, format!("is not well-formed XML: {problem}")).fix(xacro)
             }
         }
@@ -174,8 +175,11 @@ impl<'a> Reader<'a> {
         self.found.into_result((value, self.notes))
     }
 
-    /// Err when the outermost element is not `<robot>` (`U106`).
+    /// Err when the outermost element is not `<robot>` (`U106`, `U108`), or when xacro has not expanded the file (`U107`).
     pub fn refuse_other_root(&self, root: Node) -> Result<(), InputError> {
+        if let Some(diagnostic) = other_form::recognised(self.file, self.lines, root) {
+            return Err(diagnostic.into());
+        }
         if root.has_tag_name("robot") {
             return Ok(());
         }

@@ -4,26 +4,44 @@
 //! farthest from that joint.
 
 use super::tip_sphere::fit_tip;
-use crate::contact_model::ContactModel;
+use crate::import::options::LoadOptions;
 use crate::import::spec::{FingerSpec, HandSpec, TipSpec};
 use crate::robot::{JointId, JointKind, LinkId, Robot};
 use nalgebra::{Translation3, UnitQuaternion};
+use regrasp_base::diagnostic::did_you_mean;
 use regrasp_base::{Diagnostic, InputError, Place};
 use regrasp_geometry::{Point, Pose};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// The hand that `robot` seems to be, with fingertips of one `contact` model. Errors: nothing in it moves (`U214`).
-pub(crate) fn guess_hand(robot: &Robot, contact: ContactModel, file: &Path) -> Result<HandSpec, InputError> {
-    let last_joints = last_moving_joints(robot);
-    if last_joints.is_empty() {
-        return Err(Diagnostic::new("U214", Place::file(file), "has no joint that moves, so no finger")
-            .expected("a hand with moving fingers")
-            .into());
+/// The hand that `robot` seems to be, on the base link that `options` name or else on the one that all fingers share.
+///
+/// Errors: nothing in it moves (`U214`), an unknown base link (`U205`).
+pub(crate) fn guess_hand(robot: &Robot, options: &LoadOptions, file: &Path) -> Result<HandSpec, InputError> {
+    let mut last_joints = last_moving_joints(robot);
+    let stated = options.base.as_deref().map(|name| stated_base(robot, name, file)).transpose()?;
+    if let Some(base) = stated {
+        let above = robot.joints_to(base);
+        let is_below = |joint: &JointId| robot.joints_to(robot.joints[joint.0].parent).starts_with(&above);
+        last_joints.retain(is_below);
     }
-    let base = base_link(robot, &last_joints);
+    if last_joints.is_empty() {
+        let below = stated.map_or(String::new(), |base| format!(" below link \"{}\"", robot.links[base.0].name));
+        return Err(Diagnostic::new(
+            "U214",
+            Place::file(file),
+            format!("has no joint that moves{below}, so no finger"),
+        )
+        .expected("a hand with moving fingers")
+        .into());
+    }
+    let base = stated.unwrap_or_else(|| base_link(robot, &last_joints));
+    let paths = paths_below(robot, base, &last_joints);
+    if stated.is_none() {
+        refuse_several_hands(robot, base, &paths, file)?;
+    }
     let mut fingers: Vec<FingerSpec> = Vec::new();
-    for &last in &last_joints {
+    for (index, &last) in last_joints.iter().enumerate() {
         let child = robot.joints[last.0].child;
         let (tip_link, tip) = guess_tip(robot, child);
         let link_name = &robot.links[tip_link.0].name;
@@ -34,15 +52,99 @@ pub(crate) fn guess_hand(robot: &Robot, contact: ContactModel, file: &Path) -> R
         fingers.push(FingerSpec {
             name,
             tip_link,
-            first_joint: None,
+            first_joint: first_own_joint(&paths, index),
             tip,
             pad: None,
-            contact,
+            contact: options.contact,
             rest: Vec::new(),
             place: Place::file(file),
         });
     }
     Ok(HandSpec { base, fingers, mount: None, allow: BTreeSet::new() })
+}
+
+/// The moving joints of each finger, from `base` on.
+fn paths_below(robot: &Robot, base: LinkId, last_joints: &[JointId]) -> Vec<Vec<JointId>> {
+    let above = robot.joints_to(base).len();
+    let path = |last: &JointId| -> Vec<JointId> {
+        let joints = robot.joints_to(robot.joints[last.0].child);
+        joints.into_iter().skip(above).filter(|joint| robot.joints[joint.0].moves()).collect()
+    };
+    last_joints.iter().map(path).collect()
+}
+
+/// The first joint of a finger that no other finger has, where others have joints before it: those are held, as folds of the palm.
+fn first_own_joint(paths: &[Vec<JointId>], finger: usize) -> Option<JointId> {
+    let is_shared = |joint: &JointId| paths.iter().enumerate().any(|(k, path)| k != finger && path.contains(joint));
+    let last_shared = paths[finger].iter().rposition(is_shared)?;
+    paths[finger].get(last_shared + 1).copied()
+}
+
+/// Most joints that some fingers of one hand share: folds of a palm. More are an arm.
+const MAX_FOLDS: usize = 2;
+
+/// Refuses a robot of which a part, or several parts, are hands (`U208`).
+fn refuse_several_hands(robot: &Robot, base: LinkId, paths: &[Vec<JointId>], file: &Path) -> Result<(), InputError> {
+    let palms = palms(robot, base, paths.iter().map(Vec::as_slice).collect());
+    if palms == [base] {
+        return Ok(());
+    }
+    let choices: Vec<String> = palms.iter().map(|palm| format!("--base {}", robot.links[palm.0].name)).collect();
+    Err(Diagnostic::new(
+        "U208",
+        Place::file(file),
+        "is a robot with more on it than one hand: fingers share joints with others",
+    )
+    .expected("one hand")
+    .fix(format!("regrasp inspect with {}", choices.join(", or ")))
+    .into())
+}
+
+/// The links that fingers with the joints of `paths` after `base` seem to stand on.
+fn palms(robot: &Robot, base: LinkId, paths: Vec<&[JointId]>) -> Vec<LinkId> {
+    let n_common = paths.iter().skip(1).map(|path| n_shared(path, paths[0])).min().unwrap_or(0);
+    let here = n_common.checked_sub(1).map_or(base, |last| robot.joints[paths[0][last].0].child);
+    let mut groups: BTreeMap<JointId, Vec<&[JointId]>> = BTreeMap::new();
+    for path in &paths {
+        // A finger always has a joint of its own at the end.
+        if let Some(next) = path.get(n_common) {
+            groups.entry(*next).or_default().push(&path[n_common..]);
+        }
+    }
+    let is_on_arm = |group: &&Vec<&[JointId]>| {
+        let longest = |k: usize| group[..k].iter().map(|other| n_shared(other, group[k])).max().unwrap_or(0);
+        (0..group.len()).any(|k| longest(k) > MAX_FOLDS)
+    };
+    let mut hands: Vec<&Vec<&[JointId]>> = groups.values().filter(is_on_arm).collect();
+    if hands.is_empty() {
+        hands = groups.values().filter(|group| group.len() >= 3).collect();
+        if hands.len() < 2 {
+            return vec![here];
+        }
+    }
+    hands.into_iter().flat_map(|group| palms(robot, here, group.clone())).collect()
+}
+
+/// How many joints two paths have in common.
+fn n_shared(a: &[JointId], b: &[JointId]) -> usize {
+    a.iter().zip(b).take_while(|(x, y)| x == y).count()
+}
+
+/// The links that end the fingers which `robot` seems to have.
+pub(crate) fn tip_links(robot: &Robot) -> Vec<LinkId> {
+    last_moving_joints(robot).iter().map(|last| guess_tip(robot, robot.joints[last.0].child).0).collect()
+}
+
+/// The link called `name`.
+fn stated_base(robot: &Robot, name: &str, file: &Path) -> Result<LinkId, InputError> {
+    robot.link_named(name).ok_or_else(|| {
+        let meant = did_you_mean(name, robot.links.iter().map(|link| link.name.as_str()));
+        Diagnostic::new("U205", Place::file(file), format!("the robot has no link \"{name}\""))
+            .element("argument", "--base")
+            .expected("the name of a link of the URDF")
+            .fix(meant.map_or(String::new(), |meant| format!("--base {meant}")))
+            .into()
+    })
 }
 
 /// Moving joints below which nothing moves, in document order.

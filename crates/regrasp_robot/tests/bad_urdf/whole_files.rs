@@ -27,6 +27,33 @@ refused!(
 );
 
 refused!(
+    a_xacro_file,
+    r#"<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">
+<xacro:include filename="finger.xacro"/>
+</robot>"#,
+    [r#"U107 hand.urdf:2:1: is a xacro file that was not expanded: it has <xacro:include>; expected plain XML
+  fix: run xacro first: xacro hand.urdf -o hand.expanded.urdf"#]
+);
+
+refused!(
+    an_expression_of_xacro,
+    r#"<robot name="r">
+<link name="${side}_palm"/>
+</robot>"#,
+    [
+        r#"U107 hand.urdf:2:1: is a xacro file that was not expanded: <link> has an expression in ${} or $(); expected plain XML
+  fix: run xacro first: xacro hand.urdf -o hand.expanded.urdf"#
+    ]
+);
+
+refused!(
+    a_model_of_mujoco,
+    r#"<mujoco model="hand"><worldbody/></mujoco>"#,
+    [r#"U108 hand.urdf:1:1: is a model of MuJoCo (MJCF); expected a URDF
+  fix: python -m regrasp.from_mjcf hand.urdf -o hand    # writes hand.toml into that folder"#]
+);
+
+refused!(
     a_truncated_file,
     r#"<robot name="r">
 <link name="a"/>

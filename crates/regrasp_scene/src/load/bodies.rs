@@ -1,7 +1,7 @@
 //! The bodies and tasks of a scene file, by the two versions of the format.
 
 use super::files::Files;
-use super::object::{self, Names, Tips};
+use super::object::{self, Hands, Names};
 use super::task::{self, Heading, Task, TaskKind};
 use super::{gravity, hand, limits, pose, robot, units};
 use crate::gravity::Gravity;
@@ -39,7 +39,7 @@ pub(super) fn one_hand(root: &mut Table, files: &mut Files, found: &mut Found) -
     let object = object_entry
         .as_ref()
         .and_then(|entry| entry.table(found))
-        .and_then(|table| object::object(table, Tips::of(&hand), files, found));
+        .and_then(|table| object::object(table, Hands::of(&hand), files, found));
     let obstacles = object::fixed_bodies(root, "obstacles", &mut Names::of("body of the scene"), files, found);
     let inner = hand.as_ref().map(|hand| &hand.hand);
     let kind = kind.unwrap_or(TaskKind::InHand);
@@ -73,8 +73,8 @@ pub(super) fn several(root: &mut Table, files: &mut Files, found: &mut Found) ->
     let carried = robot_and_hands(root, &mut names, files, found);
     let gravity = gravity::gravity(root, Some(&Pose::identity()), found);
     let limits = limits::limits(root, found);
-    let tips = Tips::of(carried.iter().flat_map(|(_, hands)| hands));
-    let objects = objects(root, &mut names, tips, files, found);
+    let around = Hands::of(carried.iter().flat_map(|(_, hands)| hands));
+    let objects = objects(root, &mut names, around, files, found);
     let supports = object::fixed_bodies(root, "supports", &mut names, files, found);
     let supports = supports.into_iter().map(|body| Support { body }).collect();
     let obstacles = object::fixed_bodies(root, "obstacles", &mut names, files, found);
@@ -138,7 +138,7 @@ fn robot_and_hands(root: &mut Table, names: &mut Names, files: &mut Files, found
 fn objects(
     root: &mut Table,
     names: &mut Names,
-    tips: Tips,
+    hands: Hands,
     files: &mut Files,
     found: &mut Found,
 ) -> Option<Vec<(Object, Pose)>> {
@@ -151,7 +151,7 @@ fn objects(
             continue;
         }
         let pose = pose::pose(&mut table, found);
-        let Some(object) = object::object(table, tips, files, found) else { continue };
+        let Some(object) = object::object(table, hands, files, found) else { continue };
         names.add(&object.name, entry, found);
         objects.extend(pose.map(|pose| (object, pose)));
     }

@@ -1,19 +1,23 @@
 //! The files that a scene file names: found, read once, hashed.
 
+use super::stock::Stock;
 use crate::scene::InputFile;
 use regrasp_base::Diagnostic;
 use regrasp_base::files;
 use regrasp_base::toml_table::{Entry, Found};
 use regrasp_geometry::TriangleMesh;
 use regrasp_geometry::import::{MAX_TRIANGLES, too_many};
-use regrasp_robot::import::{LoadOptions, resolve};
+use regrasp_robot::import::LoadOptions;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Files found so far, for [`crate::Scene::inputs`].
 pub(super) struct Files<'a> {
     scene: &'a Path,
     /// Where packages are.
     pub options: &'a LoadOptions,
+    /// Hands, robots and meshes read before.
+    pub stock: &'a Stock,
     /// In the order in which they were read, the scene file first.
     pub inputs: Vec<InputFile>,
     /// Triangles of all meshes read so far.
@@ -22,9 +26,9 @@ pub(super) struct Files<'a> {
 
 impl<'a> Files<'a> {
     /// No file yet but the scene file itself, with its bytes.
-    pub fn new(scene: &'a Path, bytes: &[u8], options: &'a LoadOptions) -> Self {
+    pub fn new(scene: &'a Path, bytes: &[u8], options: &'a LoadOptions, stock: &'a Stock) -> Self {
         let name = scene.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-        let mut files = Files { scene, options, inputs: Vec::new(), n_triangles: 0 };
+        let mut files = Files { scene, options, stock, inputs: Vec::new(), n_triangles: 0 };
         files.record("scene", name, scene, bytes);
         files
     }
@@ -51,7 +55,9 @@ impl<'a> Files<'a> {
     fn find(&self, name: &str, entry: &Entry, found: &Found) -> Result<(PathBuf, Vec<String>), Box<Diagnostic>> {
         if name.contains("://") {
             let place = found.place(&entry.span);
-            let resolved = resolve::resolve(name, self.scene, place, &self.options.resolve)
+            let resolved = self
+                .options
+                .resolve(name, self.scene, place)
                 .map_err(|diagnostic| Box::new(diagnostic.element("key", &entry.name)))?;
             return Ok((resolved.path, resolved.notes));
         }
@@ -63,7 +69,7 @@ impl<'a> Files<'a> {
             ));
         }
         let path = self.scene.parent().unwrap_or(Path::new("")).join(name);
-        if path.is_file() {
+        if self.options.is_file(&path) {
             let remark = format!("{} is an absolute path \"{name}\": the scene works on this machine only", entry.name);
             return Ok((path, if Path::new(name).is_absolute() { vec![remark] } else { Vec::new() }));
         }
@@ -87,16 +93,21 @@ impl<'a> Files<'a> {
     }
 
     /// The mesh in the file that `entry` names, in the file's frame and unit.
-    pub fn mesh(&mut self, entry: &Entry, found: &mut Found) -> Option<TriangleMesh> {
+    pub fn mesh(&mut self, entry: &Entry, found: &mut Found) -> Option<Arc<TriangleMesh>> {
         let path = self.locate(entry, found)?;
-        let read = self.options.check_time(&path).and_then(|()| files::read(&path)).and_then(|bytes| {
+        let read = self.stock.mesh(&path, || {
+            self.options.check_time(&path)?;
+            let bytes = self.options.read(&path)?;
             let mesh = regrasp_geometry::import::read_mesh(&path, &bytes)?;
-            self.n_triangles += mesh.triangles().len();
-            if self.n_triangles > MAX_TRIANGLES {
-                return Err(too_many(self.scene, self.n_triangles));
-            }
             // The bytes are not needed any more when the mesh is made ready, which takes several times as many.
-            Ok((files::sha256(&bytes), mesh))
+            Ok((files::sha256(&bytes), Arc::new(mesh)))
+        });
+        let read = read.and_then(|(sha256, mesh)| {
+            self.n_triangles += mesh.triangles().len();
+            match self.n_triangles > MAX_TRIANGLES {
+                true => Err(too_many(self.scene, self.n_triangles)),
+                false => Ok((sha256, mesh)),
+            }
         });
         match read {
             Ok((sha256, mesh)) => {

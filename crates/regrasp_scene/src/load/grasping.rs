@@ -1,7 +1,7 @@
 //! A hand and an object by themselves, without a task: what grasp lists are made of.
 
 use super::files::Files;
-use super::{CODES, hand, load_scene, object, units};
+use super::{CODES, Stock, hand, load_scene, object, units};
 use crate::gravity::Gravity;
 use crate::hand_view::HandView;
 use crate::limits::Limits;
@@ -100,7 +100,8 @@ pub fn load_grasp_scene(
     };
     let text = document(hand_path, source);
     let place = Path::new(ARGUMENTS);
-    let mut files = Files::new(place, text.as_bytes(), options);
+    let stock = Stock::default();
+    let mut files = Files::new(place, text.as_bytes(), options, &stock);
     // The arguments are no file.
     files.inputs.clear();
     let mut found = Found::new(place, &text, CODES);
@@ -119,7 +120,7 @@ pub fn load_grasp_scene(
             }
             (None, Some(entry)) => entry
                 .table(&mut found)
-                .and_then(|table| object::object(table, object::Tips::of(&hand), &mut files, &mut found)),
+                .and_then(|table| object::object(table, object::Hands::of(&hand), &mut files, &mut found)),
             (None, None) => None,
         };
         let (hand, object) = (hand?, object?);

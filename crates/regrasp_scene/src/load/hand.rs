@@ -35,7 +35,7 @@ pub(super) fn hand(mut table: Table, name: String, files: &mut Files, found: &mu
     let file = file?;
     let path = files.locate(&file, found)?;
     let options = LoadOptions { contact: default_contact?, ..files.options.clone() };
-    let loaded = match load_hand(&path, &options) {
+    let loaded = match files.stock.hand(&path, options.contact, || load_hand(&path, &options)) {
         Ok(loaded) => loaded,
         Err(error) => {
             found.diagnostics.extend(error);

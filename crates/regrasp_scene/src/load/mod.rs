@@ -18,10 +18,12 @@ mod object;
 mod pose;
 mod robot;
 mod shape;
+mod stock;
 mod task;
 mod units;
 
 pub use grasping::{GraspScene, MeshObject, ObjectSource, load_grasp_scene};
+pub use stock::Stock;
 pub use task::{OpenStart, StartOrientation, Task};
 
 use crate::hand_view::HandView;
@@ -117,14 +119,27 @@ impl LoadedScene {
 ///
 /// Errors: every cause found, in this file and in those it names.
 pub fn load_scene(path: &Path, options: &LoadOptions) -> Result<LoadedScene, InputError> {
-    load_scene_text(path, regrasp_base::files::read(path)?, options)
+    load_scene_text(path, options.read(path)?, options)
 }
 
 /// As [`load_scene`], of a scene file that is or could be at `path` and has these bytes.
 ///
 /// Errors: as [`load_scene`].
 pub fn load_scene_text(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<LoadedScene, InputError> {
-    let mut files = Files::new(path, &bytes, options);
+    load_scene_with(path, bytes, options, &Stock::default())
+}
+
+/// As [`load_scene_text`]; what `stock` has of hands, robots and meshes is not read again. It must have been filled with the same
+/// options.
+///
+/// Errors: as [`load_scene`].
+pub fn load_scene_with(
+    path: &Path,
+    bytes: Vec<u8>,
+    options: &LoadOptions,
+    stock: &Stock,
+) -> Result<LoadedScene, InputError> {
+    let mut files = Files::new(path, &bytes, options, stock);
     let text = regrasp_base::files::text_of(path, bytes)?;
     let mut found = Found::new(path, &text, CODES);
     let document = found.parse();

@@ -27,7 +27,7 @@ pub(super) fn robot(
         None => Some(Pose::identity()),
     };
     let path = files.locate(entry, found)?;
-    let loaded = match load_manipulator(&path, files.options) {
+    let loaded = match files.stock.robot(&path, || load_manipulator(&path, files.options)) {
         Ok(loaded) => loaded,
         Err(error) => {
             found.diagnostics.extend(error);

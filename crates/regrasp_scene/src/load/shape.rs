@@ -42,7 +42,50 @@ pub(super) struct ReadShape {
     pub hull: Option<Shape>,
     /// Where its frame is to lie.
     pub origin: Origin,
+    /// How the scene file names the mesh, if it is one.
+    pub line: Option<MeshLine>,
 }
+
+/// The line of a scene file that names a mesh, to be written again with another scale.
+#[derive(Debug, Clone)]
+pub(super) struct MeshLine {
+    file: String,
+    scale: Vector,
+    rest: String,
+}
+
+impl MeshLine {
+    /// The line with its scale times `factor`.
+    pub fn scaled(&self, factor: f64) -> String {
+        // Nine digits: what a person would write.
+        let rounded = |x: f64| format!("{x:.8e}").parse().unwrap_or(x);
+        let scale = (self.scale * factor).map(rounded);
+        let scale = match scale.iter().all(|one| *one == scale.x) {
+            true => number(scale.x),
+            false => format!("[{}, {}, {}]", number(scale.x), number(scale.y), number(scale.z)),
+        };
+        format!("mesh = {{ file = \"{}\", scale = {scale}{} }}", self.file, self.rest)
+    }
+}
+
+/// The unit that a mesh is probably in, whose middle extent would be `middle` metres, and the factor that makes it metres: of
+/// the usual ones, that which brings it nearest to `wanted`, by ratio.
+pub(super) fn likely_unit(middle: f64, wanted: f64) -> (&'static str, f64) {
+    const UNITS: [(&str, f64); 7] = [
+        ("millimetres", 0.001),
+        ("centimetres", 0.01),
+        ("inches", 0.0254),
+        ("decimetres", 0.1),
+        ("metres, with a scale of 0.1 too many", 10.0),
+        ("metres, with a scale of 0.01 too many", 100.0),
+        ("kilometres, or a scale of 0.001 was applied twice", 1000.0),
+    ];
+    let off = |(_, factor): &(&str, f64)| (middle * factor / wanted).ln().abs();
+    UNITS.into_iter().min_by(|a, b| off(a).total_cmp(&off(b))).expect("there are units")
+}
+
+/// Middle extent that meshes are expected to have where no hand is known, in metres.
+const USUAL_EXTENT: f64 = 0.05;
 
 /// Reads the shape of `table`. Errors: none or several kinds (`S106`), bad lengths (`S107`), bad meshes (`M2xx`).
 pub(super) fn shape(table: &mut Table, files: &mut Files, found: &mut Found) -> Option<ReadShape> {
@@ -65,7 +108,12 @@ pub(super) fn shape(table: &mut Table, files: &mut Files, found: &mut Found) -> 
     let shape = primitive(kind, &mut inside, found);
     inside.finish(found);
     let shape = shape?;
-    has_likely_size(&shape, kind, found).then_some(ReadShape { shape, hull: None, origin: Origin::File })
+    has_likely_size(&shape, None, kind, found).then_some(ReadShape {
+        shape,
+        hull: None,
+        origin: Origin::File,
+        line: None,
+    })
 }
 
 fn primitive(kind: &Entry, table: &mut Table, found: &mut Found) -> Option<Shape> {
@@ -103,7 +151,7 @@ fn lengths(table: &mut Table, key: &'static str, found: &mut Found) -> Option<Ve
 }
 
 /// Reports a shape whose size can only be a mistake of units (`M201`).
-fn has_likely_size(shape: &Shape, entry: &Entry, found: &mut Found) -> bool {
+fn has_likely_size(shape: &Shape, line: Option<&MeshLine>, entry: &Entry, found: &mut Found) -> bool {
     let (low, high) = shape.bounds();
     let size = high - low;
     let extent = size.max();
@@ -111,12 +159,12 @@ fn has_likely_size(shape: &Shape, entry: &Entry, found: &mut Found) -> bool {
     if !is_large && !is_small {
         return true;
     }
-    let (unit, scale) =
-        if is_large { ("millimetres", "0.001") } else { ("kilometres or a scale applied twice", "1000") };
-    let fix = if matches!(shape, Shape::Mesh(_) | Shape::Convex(_)) {
-        format!("it is probably in {unit}: mesh = {{ file = ..., scale = {scale} }}")
-    } else {
-        format!("lengths are in metres: multiply them by {scale}")
+    let fix = match line {
+        Some(line) => {
+            let (unit, factor) = likely_unit(middle_of(size), USUAL_EXTENT);
+            format!("it is probably in {unit}: {}", line.scaled(factor))
+        }
+        None => format!("lengths are in metres: multiply them by {}", if is_large { "0.001" } else { "1000" }),
     };
     // Four decimals where they say something.
     let shown = |x: f64| if (0.01..1e6).contains(&extent) { format!("{x:.4}") } else { format!("{x:.1e}") };
@@ -131,9 +179,10 @@ fn has_likely_size(shape: &Shape, entry: &Entry, found: &mut Found) -> bool {
 fn mesh(kind: &Entry, files: &mut Files, found: &mut Found) -> Option<ReadShape> {
     let mut table = kind.table(found)?;
     let file = table.required(found, "file", "add file = \"...\", relative to the scene file or package://NAME/PATH");
-    let scale = match table.optional("scale") {
-        Some(entry) => scale(&entry, found),
-        None => Some(Vector::repeat(1.0)),
+    let scale_entry = table.optional("scale");
+    let scale = match &scale_entry {
+        Some(entry) => scale(entry, found),
+        None => Some(Scale::Factors(Vector::repeat(1.0))),
     };
     let solid = match table.optional("solid") {
         Some(entry) => entry.choice(found, &["mesh", "hull"]).map(|word| match word {
@@ -147,8 +196,13 @@ fn mesh(kind: &Entry, files: &mut Files, found: &mut Found) -> Option<ReadShape>
         None => Some(Origin::File),
     };
     table.finish(found);
+    let file_name = file.as_ref().and_then(Entry::as_text).unwrap_or_default().to_owned();
     let read = file.and_then(|entry| files.mesh(&entry, found));
     let (mesh, scale, solid, origin) = (read?, scale?, solid?, origin?);
+    let (scale, fitted) = (scale.factors(&mesh), matches!(scale, Scale::Fit(_)));
+    if let Some(entry) = scale_entry.filter(|_| fitted) {
+        found.note(&entry.span, format!("the mesh is fitted by the factor {}", number(scale.x)));
+    }
     let scaled = match mesh.scaled(scale) {
         Ok(scaled) => oriented(scaled, kind, found),
         Err(error) => {
@@ -170,8 +224,15 @@ fn mesh(kind: &Entry, files: &mut Files, found: &mut Found) -> Option<ReadShape>
         },
     };
     let shape = Shape::Mesh(Arc::new(scaled));
-    let is_good = has_likely_size(&shape, kind, found) && has_likely_place(&shape, origin, kind, found);
-    is_good.then_some(ReadShape { shape, hull, origin })
+    let solid = if solid == Solid::Hull { ", solid = \"hull\"" } else { "" };
+    let origin_text = match origin {
+        Origin::File => String::new(),
+        Origin::Center => ", origin = \"center\"".to_owned(),
+        Origin::Point(p) => format!(", origin = [{}, {}, {}]", number(p.x), number(p.y), number(p.z)),
+    };
+    let line = MeshLine { file: file_name, scale, rest: format!("{solid}{origin_text}") };
+    let is_good = has_likely_size(&shape, Some(&line), kind, found) && has_likely_place(&shape, origin, kind, found);
+    is_good.then_some(ReadShape { shape, hull, origin, line: Some(line) })
 }
 
 /// Reports a mesh that is farther from its own frame than any object is large (`M204`): the object would turn about a
@@ -191,12 +252,49 @@ fn has_likely_place(shape: &Shape, origin: Origin, entry: &Entry, found: &mut Fo
     false
 }
 
-/// One factor, or one per axis; negative mirrors. Errors: zero (`S107`).
-fn scale(entry: &Entry, found: &mut Found) -> Option<Vector> {
-    let scale =
+/// How a mesh file is scaled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Scale {
+    /// By a factor per axis.
+    Factors(Vector),
+    /// So that the middle one of the three extents of the file is this long, in metres.
+    Fit(f64),
+}
+
+impl Scale {
+    /// The factors for `mesh`.
+    fn factors(self, mesh: &TriangleMesh) -> Vector {
+        match self {
+            Scale::Factors(factors) => factors,
+            Scale::Fit(length) => {
+                let (low, high) = mesh.bounds();
+                Vector::repeat(length / middle_of(high - low))
+            }
+        }
+    }
+}
+
+/// The middle one of three lengths.
+pub(super) fn middle_of(lengths: Vector) -> f64 {
+    lengths.sum() - lengths.max() - lengths.min()
+}
+
+/// One factor, one per axis, or "fit:LENGTH"; negative mirrors. Errors: zero (`S107`), a length that is none (`S104`).
+fn scale(entry: &Entry, found: &mut Found) -> Option<Scale> {
+    if let Some(text) = entry.as_text() {
+        let length = text.strip_prefix("fit:").and_then(|length| length.trim().parse::<f64>().ok());
+        if let Some(length) = length.filter(|length| (MIN_EXTENT..=MAX_EXTENT).contains(length)) {
+            return Some(Scale::Fit(length));
+        }
+        let expected =
+            format!("\"fit:0.06\", with the middle extent in metres, {MIN_EXTENT} to {MAX_EXTENT}, or factors");
+        found.diagnostics.push(entry.error("S104", found, format!("is \"{text}\"")).expected(expected));
+        return None;
+    }
+    let scale: Vector =
         if entry.is_number() { Vector::repeat(entry.number(found)?) } else { entry.numbers::<3>(found)?.into() };
     if scale.iter().all(|factor| *factor != 0.0) {
-        return Some(scale);
+        return Some(Scale::Factors(scale));
     }
     let diagnostic =
         entry.error("S107", found, "has a factor of 0, which leaves nothing").expected("factors other than 0");

@@ -129,7 +129,7 @@ fn finger_reach(finger: &regrasp_robot::Finger) -> f64 {
 }
 
 /// Largest distance between two of: finger bases, fingertips at rest, palm shapes; in metres.
-fn size_of(hand: &Hand) -> f64 {
+pub(super) fn size_of(hand: &Hand) -> f64 {
     let mut points = Vec::new();
     for finger in &hand.fingers {
         points.extend(finger.chain.joints.first().map(|joint| Point::from(joint.parent_from_joint.translation.vector)));

@@ -281,7 +281,7 @@ fn a_mesh_in_millimetres() {
     assert_eq!(
         messages,
         "M201 scene.toml:10:8 key \"object.mesh\": is 40.0000 x 40.0000 x 40.0000 m; expected a largest extent between 0.002 m and 3 m\n  \
-         fix: it is probably in millimetres: mesh = { file = ..., scale = 0.001 }"
+         fix: it is probably in millimetres: mesh = { file = \"mm.obj\", scale = 0.001 }"
     );
     let scaled =
         folder.load(&with("sphere = { radius = 0.032 }", "mesh = { file = \"mm.obj\", scale = 0.001 }")).unwrap();

@@ -10,6 +10,7 @@ mod pairs;
 #[path = "../../../../tests/support/places.rs"]
 mod places;
 mod random_files;
+mod scans;
 mod several;
 mod support;
 mod task;

@@ -6,7 +6,7 @@ use crate::wide_scene::copy_hand;
 use regrasp_base::InputError;
 use regrasp_robot::import::{LoadOptions, ResolveOptions};
 use regrasp_scene::{LoadedScene, load_scene};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Options with `models` as the package of that name.
 pub fn with_models(models: &Path) -> LoadOptions {
@@ -33,6 +33,15 @@ impl Folder {
 
     pub fn write(&self, name: &str, content: &str) {
         std::fs::write(self.folder.path().join(name), content).unwrap();
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub fn edit(&self, name: &str, change: impl Fn(&str) -> String) {
+        let text = std::fs::read_to_string(self.path(name)).unwrap();
+        self.write(name, &change(&text));
     }
 
     /// Loads `text` as `scene.toml` of the folder.

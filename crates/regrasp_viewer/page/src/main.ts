@@ -2,6 +2,7 @@
 
 import "./page.css";
 import { Ball } from "./ball";
+import { movingHand } from "./bodies";
 import { ChartStack } from "./charts/stack";
 import { button, el, icon } from "./dom";
 import { keepLink, readLink } from "./link";
@@ -10,8 +11,10 @@ import { OrientationPath } from "./orientation_path";
 import { planOf } from "./plan";
 import { Player } from "./player";
 import type { Story } from "./story";
+import type { Story as StoryFile } from "./story_file";
 import { Theme } from "./theme";
 import { helpPanel, listenToKeys } from "./ui/keys";
+import { Outliner } from "./ui/outliner";
 import * as panels from "./ui/panels";
 import { Transport } from "./ui/transport";
 import { Viewport } from "./ui/viewport";
@@ -21,21 +24,19 @@ import { Stage } from "./view/stage";
 function readStory(): { story: Story; file: unknown } {
   const text = document.getElementById("story")?.textContent;
   if (!text) throw new Error("This page carries no plan.");
-  const story = JSON.parse(text) as Story;
+  const story = JSON.parse(text) as StoryFile;
   if (story.format !== "regrasp-story") throw new Error("What this page carries is not a plan.");
-  if (story.version !== 1) {
-    throw new Error(`This page shows plans of version 1; it carries version ${String(story.version)}. Make it again with one version of regrasp.`);
+  if (story.version !== 2) {
+    throw new Error(`This page shows plans of version 2; it carries version ${String(story.version)}. Make it again with one version of regrasp.`);
   }
-  const file: unknown = story.plan;
-  if (story.plan) story.plan = planOf(story.plan);
-  return { story, file };
+  return { story: { ...story, plan: story.plan && planOf(story.plan) }, file: story.plan };
 }
 
 function stageOf(story: Story, motion: Motion, theme: Theme, onCamera: () => void): Stage | null {
   try {
     return new Stage(story, motion, theme, onCamera);
   } catch (error) {
-    if (story.scene.links.length > 0 && !(error instanceof Error && /webgl/i.test(error.message))) throw error;
+    if (movingHand(story.scene).links.length > 0 && !(error instanceof Error && /webgl/i.test(error.message))) throw error;
     return null;
   }
 }
@@ -78,7 +79,8 @@ function start(): void {
 
   let keep = () => {};
   const stage = stageOf(story, motion, theme, () => keep());
-  const viewport = new Viewport(story, motion, player, stage);
+  const outliner = new Outliner(story, motion, player, stage);
+  const viewport = new Viewport(story, motion, player, stage, (key) => outliner.choose(key));
   const help = helpPanel();
   const moves = story.plan !== null && motion.end > motion.start;
   const transport = moves ? new Transport(motion, player, theme) : null;
@@ -105,6 +107,7 @@ function start(): void {
         panels.components(story),
         path?.element,
         ball.element,
+        outliner.element,
         panels.facts(story),
       ),
     ),

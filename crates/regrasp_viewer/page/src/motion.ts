@@ -1,5 +1,6 @@
 // The plan as functions of time. Everything here is computed from the plan's waypoints.
 
+import { movingHand } from "./bodies";
 import type { Contact, Plan, Segment, Story, Waypoint } from "./story";
 import { clamp, interpolatePose, lerp, norm, poseFrom, sub, unit, type Pose, type Vec3 } from "./math";
 
@@ -246,18 +247,17 @@ export class Motion {
 export function still(story: Story): Plan {
   const miss = story.failure?.nearest_miss ?? null;
   const object = miss?.world_from_object ?? story.asked[0] ?? { position: [0, 0, 0], quat_xyzw: [0, 0, 0, 1] };
-  const middle = (lower: number | null, upper: number | null) => clamp(0, lower ?? -Infinity, upper ?? Infinity);
-  const joints = miss?.joints ?? story.scene.joints.map((j) => middle(j.lower, j.upper));
+  const hand = movingHand(story.scene);
+  const joints = miss?.joints ?? hand.joints.map((joint) => joint.at_rest);
   const goal = story.asked[story.asked.length - 1] ?? object;
   return {
-    format: "regrasp-plan",
     task: "in_hand",
     method: "",
     seed: 0,
-    hand: story.scene.hands[story.scene.moving_hand] ?? "",
-    object: story.scene.objects[story.scene.moved_object] ?? "",
-    joint_names: story.scene.joints.map((j) => j.name),
-    fingers: story.scene.fingers.map((f) => f.name),
+    hand: hand.name,
+    object: story.scene.objects[story.scene.moved_object]?.name ?? "",
+    joint_names: hand.joints.map((j) => j.name),
+    fingers: hand.fingers.map((f) => f.name),
     start: story.asked[0] ?? object,
     goal,
     segments: [{
@@ -267,7 +267,7 @@ export function still(story: Story): Plan {
         joints,
         joint_velocities: joints.map(() => 0),
         world_from_object: object,
-        contacts: story.scene.fingers.map(() => ({ mode: "free" as const })),
+        contacts: hand.fingers.map(() => ({ mode: "free" as const })),
       }],
     }],
     promises: { friction: story.scene.friction, friction_margin: 1, required_margin: 0, kept_margin: 0, torque_scale: 1 },

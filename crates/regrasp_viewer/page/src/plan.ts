@@ -1,28 +1,10 @@
 // Plans as the page reads them: one hand moves one object. Made of plan files of version 3, whose lists have one entry each.
 
-import type { Contact, Plan, PoseData, Segment, Waypoint } from "./story";
-
-interface FileWaypoint extends Omit<Waypoint, "world_from_object" | "contacts"> {
-  world_from_objects: PoseData[];
-  /** Fingers that touch; the others are free. */
-  contacts: (Contact & { finger: string })[];
-}
-
-interface FileSegment extends Omit<Segment, "moving_finger" | "also_moving" | "held_by" | "waypoints"> {
-  moving?: string[];
-  held_by: Record<string, string[]>;
-  waypoints: FileWaypoint[];
-}
-
-/** What is read of a plan file. */
-export interface PlanFile extends Omit<Plan, "hand" | "object" | "joint_names" | "fingers" | "segments"> {
-  hands: { name: string; fingers: string[]; joint_names: string[] }[];
-  objects: string[];
-  segments: FileSegment[];
-}
+import type { FileSegment, FileWaypoint } from "../../../../schema/plan";
+import type { FilePlan, Plan, Segment, Waypoint } from "./story";
 
 /** The plan in a plan file. A plan that is one already stays as it is. */
-export function planOf(file: PlanFile | Plan): Plan {
+export function planOf(file: FilePlan | Plan): Plan {
   if (!("hands" in file)) return file;
   const { hands, objects, segments, ...kept } = file;
   const [hand, object] = [hands[0], objects[0]];

@@ -31,13 +31,14 @@ test("poses of links are those that matrices give", () => {
     const { scene } = synthetic({ shape, fingers, duration: 2, triangles: 400 });
     const unit = (v) => v.map((x) => x / Math.hypot(...v));
     // A sliding joint, a coupled one, and a base that stands askew: what the hand itself lacks.
-    scene.world_from_root = { position: [0.1, -0.2, 0.3], quat_xyzw: unit([0.1, 0.7, -0.3, 0.6]) };
-    Object.assign(scene.links[2], { kind: "prismatic", axis: unit([1, 2, -1]) });
-    Object.assign(scene.links[3], { joint: 0, multiplier: -0.7, offset: 0.2 });
+    const { links, joints } = scene.hands[0];
+    links[0].parent_from_joint = { position: [0.1, -0.2, 0.3], quat_xyzw: unit([0.1, 0.7, -0.3, 0.6]) };
+    Object.assign(links[2], { kind: "prismatic", axis: unit([1, 2, -1]) });
+    Object.assign(links[3], { joint: 0, multiplier: -0.7, offset: 0.2 });
     for (let round = 0; round < 50; round++) {
-      const q = scene.joints.map(() => 2 * next());
-      const expected = matricesOf(scene, q);
-      linkPoses(scene, q).forEach((pose, i) => near(asMatrix(pose), expected[i], 1e-12));
+      const q = joints.map(() => 2 * next());
+      const expected = matricesOf(scene.hands[0], q);
+      linkPoses(links, q).forEach((pose, i) => near(asMatrix(pose), expected[i], 1e-12));
     }
   }
 });
@@ -46,10 +47,10 @@ test("fingertips of a planned motion are on their contacts", () => {
   const motion = new Motion(sphere.plan);
   let seen = 0;
   for (const w of motion.waypoints) {
-    const links = linkPoses(sphere.scene, w.joints);
+    const links = linkPoses(sphere.scene.hands[0].links, w.joints);
     w.contacts.forEach((contact, f) => {
       if (contact.mode === "free") return;
-      const { tip_link, tip_center_in_link, tip_radius } = sphere.scene.fingers[f];
+      const { tip_link, tip_center_in_link, tip_radius } = sphere.scene.hands[0].fingers[f];
       const centre = contact.point_in_object.map((x, k) => x + tip_radius * contact.normal_in_object[k]);
       near(math.apply(links[tip_link], tip_center_in_link), math.apply(math.poseFrom(w.world_from_object), centre), 5e-4);
       seen++;
@@ -186,10 +187,10 @@ test("tracking: all fingers that move are named", () => {
   const segments = story.plan.segments.map((segment, i) => (i === 0 ? { ...segment, moving_finger: second, also_moving: [first] } : segment));
   const motion = new Motion({ ...story.plan, segments });
   assert.deepEqual([motion.stretches[0].moving, motion.stretches[0].allMoving], [1, [1, 0]]);
-  assert.equal(whoMoves(motion.stretches[0], story.scene.fingers), `${second} and ${first} move`);
+  assert.equal(whoMoves(motion.stretches[0], story.scene.hands[0].fingers), `${second} and ${first} move`);
   const alone = motion.stretches[1];
   assert.deepEqual(alone.allMoving, [alone.moving]);
-  assert.equal(whoMoves(alone, story.scene.fingers), `${story.plan.fingers[alone.moving]} moves`);
+  assert.equal(whoMoves(alone, story.scene.hands[0].fingers), `${story.plan.fingers[alone.moving]} moves`);
 });
 
 test("tracking: modes are those of the way to the next waypoint, and nothing holds still but between segments", () => {

@@ -5,7 +5,7 @@ import { readFileSync } from "node:fs";
 import { after, before, test } from "node:test";
 import { wrap } from "../tools/wrap.mjs";
 import { colours, difference, hasChromium, launch, open, pixels, shownTime } from "./support.mjs";
-import { synthetic, tracking } from "./synthetic.mjs";
+import { synthetic, tracking, withOthers } from "./synthetic.mjs";
 
 const options = { skip: hasChromium ? false : "SKIPPED: no Chromium", timeout: 120_000 };
 if (!hasChromium) console.log("SKIPPED: no Chromium: tests of the page in a browser");
@@ -53,6 +53,53 @@ test("a plan that the planner made is shown without its shapes too", options, as
   const opened = await open(browser, story);
   assert.equal(await opened.page.locator(".figures dd").first().innerText(), "2");
   assert.equal(await opened.page.locator(".facts tr").count(), story.facts.length);
+  await finish(opened);
+});
+
+test("all bodies have names, links and joints, and can be hidden", options, async () => {
+  const opened = await open(browser, withOthers(ball));
+  const { page } = opened;
+  await page.waitForTimeout(400);
+  const entries = page.locator(".outliner li");
+  const names = (await entries.locator(".head .name").allTextContents());
+  assert.deepEqual(names, ["hand", "ball", "left", "other object", "robot/arm", "table"]);
+  const kinds = await entries.locator(".head .kind").allTextContents();
+  assert.deepEqual(kinds, ["hand, moves", "object, moves", "hand, at rest", "object, at rest", "robot, at rest", "support"]);
+
+  // An arm's joint rests where the story says; those of the hand that moves follow the time.
+  await entries.nth(4).locator("summary").click();
+  assert.equal(await entries.nth(4).locator("table tr").textContent(), "elbow_joint29\u00b0");
+  assert.match(await entries.nth(4).locator("p").textContent(), /^Links elbow$/);
+  await entries.nth(0).locator("summary").click();
+  const positions = () => entries.nth(0).locator("td").allTextContents();
+  const before = await positions();
+  assert.equal(before.length, ball.scene.hands[0].joints.length);
+  await page.keyboard.press("End");
+  assert.notDeepEqual(await positions(), before);
+
+  // Hiding what moves changes the picture, showing it again brings it back. The mouse stays where no body is pointed out.
+  const away = () => page.mouse.move(2, 2);
+  const settled = async () => {
+    await away();
+    await page.waitForTimeout(700);
+    return picture(page);
+  };
+  const shown = await settled();
+  await entries.nth(0).locator("input").uncheck();
+  const without = await settled();
+  assert.ok(difference(shown, without) > 0.02, `${difference(shown, without)}`);
+  await entries.nth(0).locator("input").check();
+  assert.ok(difference(shown, await settled()) < 0.002);
+
+  // A body that is clicked at in the view is found in the list.
+  const { x, y, width, height } = await canvas(page).boundingBox();
+  let chosen = 0;
+  for (const share of [0.5, 0.45, 0.55, 0.4, 0.6]) {
+    await page.mouse.click(x + width * 0.5, y + height * share);
+    chosen = await page.locator(".outliner li.chosen").count();
+    if (chosen) break;
+  }
+  assert.equal(chosen, 1);
   await finish(opened);
 });
 
@@ -406,7 +453,7 @@ test("a rejected plan says so first", options, async () => {
 
 test("stories of another version, or none, are refused in words", options, async () => {
   for (const [html, words] of [
-    [wrap({ ...ball, version: 2 }), /version 2/],
+    [wrap({ ...ball, version: 3 }), /version 3/],
     [wrap({ format: "something" }), /not a plan/],
     [wrap("{"), /./],
     [wrap(ball).replace('id="story"', 'id="other"'), /no plan/],

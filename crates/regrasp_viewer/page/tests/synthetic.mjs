@@ -42,7 +42,7 @@ function handOf(nFingers, nameOf) {
     const axes = [[1, 0, 0], [0, 1, 0], [0, 1, 0]];
     ["abduction", "proximal", "distal"].forEach((part, k) => {
       const name = nameOf(`finger_${f}_${part}`);
-      joints.push({ name: nameOf(`finger_${f}_${part}_joint`), lower: k === 0 ? -0.8 : -1.9, upper: k === 0 ? 0.8 : 1.9, effort: null });
+      joints.push({ name: nameOf(`finger_${f}_${part}_joint`), at_rest: [0, -0.3, 1.2][k], lower: k === 0 ? -0.8 : -1.9, upper: k === 0 ? 0.8 : 1.9, effort: null });
       links.push({
         name, parent: k === 0 ? 0 : links.length - 1, kind: "revolute", parent_from_joint: bases[k], axis: axes[k], joint: joints.length - 1,
         multiplier: 1, offset: 0, finger: f,
@@ -54,11 +54,11 @@ function handOf(nFingers, nameOf) {
 }
 
 /** World from link of every link, by matrices. */
-export function matricesOf(scene, q) {
+export function matricesOf(hand, q) {
   const found = [];
-  for (const link of scene.links) {
+  for (const link of hand.links) {
     const { position, quat_xyzw } = link.parent_from_joint;
-    const parent = link.parent < 0 ? poseMatrix(scene.world_from_root) : found[link.parent];
+    const parent = link.parent < 0 ? matrix.identity() : found[link.parent];
     let m = matrix.times(parent, matrix.times(matrix.move(position), quatMatrix(quat_xyzw)));
     const at = link.joint < 0 ? link.offset : link.multiplier * q[link.joint] + link.offset;
     if (link.kind === "revolute") m = matrix.times(m, matrix.turn(link.axis, at));
@@ -75,11 +75,11 @@ export function quatMatrix([x, y, z, w]) {
 export const poseMatrix = ({ position, quat_xyzw }) => matrix.times(matrix.move(position), quatMatrix(quat_xyzw));
 
 /** Joints of finger `f` that bring its tip's middle nearest to `target`: damped least squares on finite differences. */
-function reach(scene, q, f, target) {
+function reach(hand, q, f, target) {
   const found = [...q];
   const tip = () => {
-    const m = matricesOf(scene, found)[scene.fingers[f].tip_link];
-    return matrix.point(m, scene.fingers[f].tip_center_in_link);
+    const m = matricesOf(hand, found)[hand.fingers[f].tip_link];
+    return matrix.point(m, hand.fingers[f].tip_center_in_link);
   };
   for (let round = 0; round < 14; round++) {
     const now = tip();
@@ -93,7 +93,7 @@ function reach(scene, q, f, target) {
     });
     const step = solve3(columns, miss, 1e-7);
     step.forEach((s, k) => {
-      const { lower, upper } = scene.joints[3 * f + k];
+      const { lower, upper } = hand.joints[3 * f + k];
       found[3 * f + k] = Math.min(Math.max(found[3 * f + k] + Math.max(-0.4, Math.min(0.4, s)), lower), upper);
     });
   }
@@ -182,16 +182,19 @@ export function synthetic(options = {}) {
     disc(PALM_FROM_AXIS + 0.014, 0.022), round(TIP, perLink, LINKS[1]), round(TIP * 0.95, perLink, LINKS[2]), round(TIP * 1.1, perLink),
     shape === "ball" ? round(radius, rings(triangles / 2)) : box(radius, radius, radius), box(0.02, 0.02, 0.05),
   ];
-  const partOf = (on) => (on === "object" ? "object" : on === "world" ? "obstacle" : "hand");
-  const piece = (on, name, mesh, is_tip = false, from_mesh = still) => ({ on, part: partOf(on), name: nameOf(name), role: "collision", mesh, from_mesh, is_tip });
-  const pieces = [piece(0, "palm", 0, false, { position: [0, 0, 0.012], quat_xyzw: [0, 0, 0, 1] }), piece("object", shape, 4)];
+  const piece = (on, mesh, is_tip = false, from_mesh = still) => ({ on, role: "collision", mesh, from_mesh, is_tip });
+  const pieces = [piece({ hand: [0, 0] }, 0, false, { position: [0, 0, 0.012], quat_xyzw: [0, 0, 0, 1] }), piece({ object: 0 }, 4)];
   links.forEach((link, i) => {
     if (link.joint < 0) return;
     const part = link.joint % 3;
-    pieces.push(piece(i, link.name, [3, 1, 2][part], part === 2));
+    pieces.push(piece({ hand: [0, i] }, [3, 1, 2][part], part === 2));
   });
-  if (obstacle) pieces.push(piece("world", "post", 5, false, { position: [0.13, 0.02, 0.06], quat_xyzw: [0, 0, 0, 1] }));
-  const scene = { hands: ["hand"], moving_hand: 0, objects: [shape], moved_object: 0, links, joints, fingers, world_from_root: still, friction: 0.7, gravity_in_world: [0, 0, -9.80665], meshes, pieces };
+  if (obstacle) pieces.push(piece({ obstacle: 0 }, 5, false, { position: [0.13, 0.02, 0.06], quat_xyzw: [0, 0, 0, 1] }));
+  const hand = { name: nameOf("hand"), links, joints, fingers };
+  const scene = {
+    hands: [hand], moving_hand: 0, robot_parts: [], objects: [{ name: nameOf(shape), world_from_object: { position: [0, 0, 0.085], quat_xyzw: [0, 0, 0, 1] } }],
+    moved_object: 0, supports: [], obstacles: obstacle ? [nameOf("post")] : [], friction: 0.7, gravity_in_world: [0, 0, -9.80665], meshes, pieces,
+  };
 
   const middle = [0, 0, 0.085];
   const poseAt = (angle) => ({ position: [0.004 * Math.sin(angle), 0, middle[2] + 0.004 * Math.sin(2 * angle)], quat_xyzw: quatOf([0.25, 0.1, 1], angle) });
@@ -215,7 +218,7 @@ export function synthetic(options = {}) {
     const m = poseMatrix(pose);
     fingers.forEach((_, f) => {
       const { point, normal, lift = 0 } = state[f];
-      q = reach(scene, q, f, matrix.point(m, point.map((x, k) => x + normal[k] * (TIP + lift))));
+      q = reach(hand, q, f, matrix.point(m, point.map((x, k) => x + normal[k] * (TIP + lift))));
     });
     const sway = 3 + Math.sin(2 * time);
     return {
@@ -301,10 +304,31 @@ export function synthetic(options = {}) {
     nearest_miss: { world_from_object: all[Math.floor(all.length / 2)].world_from_object, joints: all[Math.floor(all.length / 2)].joints, angle_left: 1.06, distance_left: 0.0021 },
   };
   return {
-    format: "regrasp-story", version: 1, title: nameOf(`${shape} turned ${Math.round((total * 180) / Math.PI)} degrees`),
+    format: "regrasp-story", version: 2, title: nameOf(`${shape} turned ${Math.round((total * 180) / Math.PI)} degrees`),
     facts: [["Hand", nameOf("palm with fingers")], ["Object", nameOf(shape)], ["Seed", "7"], ["Duration", `${end.toFixed(2)} s`], ["Scene", "0".repeat(64)]],
     scene, asked: [poseAt(0), poseAt(total)], plan: fails ? null : plan, judged: fails ? null : judged, failure: fails ? failure : null,
     roadmap: roadmap ? graph() : null,
+  };
+}
+
+/** The story with what rests around it: another hand on an arm, another object, a table. */
+export function withOthers(story) {
+  const { scene } = story;
+  const [hand] = scene.hands;
+  const at = (x) => ({ position: [x, 0, 0], quat_xyzw: [0, 0, 0, 1] });
+  const other = { ...hand, name: "left", links: hand.links.map((link) => (link.parent < 0 ? { ...link, parent_from_joint: at(0.3) } : link)) };
+  const elbow = { name: "elbow", parent: -1, kind: "revolute", parent_from_joint: at(0.45), axis: [0, 0, 1], joint: 0, multiplier: 1, offset: 0, finger: -1 };
+  const arm = { name: "robot/arm", links: [elbow], joints: [{ name: "elbow_joint", at_rest: 0.5, lower: -1, upper: 1, effort: null }] };
+  const box = scene.meshes.length - 1;
+  const piece = (on, from_mesh = at(0)) => ({ on, role: "collision", mesh: box, from_mesh, is_tip: false });
+  const copies = scene.pieces.filter((p) => "hand" in p.on).map((p) => ({ ...p, on: { hand: [1, p.on.hand[1]] } }));
+  return {
+    ...story,
+    scene: {
+      ...scene, hands: [hand, other], robot_parts: [arm], supports: ["table"],
+      objects: [...scene.objects, { name: "other object", world_from_object: at(-0.3) }],
+      pieces: [...scene.pieces, ...copies, piece({ robot_part: [0, 0] }), piece({ object: 1 }), piece({ support: 0 }, at(0.15))],
+    },
   };
 }
 

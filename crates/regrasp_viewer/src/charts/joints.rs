@@ -15,7 +15,7 @@ const DASHES: [&str; 4] = ["", "stroke-dasharray=\"7 3\"", "stroke-dasharray=\"2
 /// Joint positions over time as a share of their range, one panel per finger; none when no joint is limited.
 pub fn joints(plan: &Plan, scene: &SceneStory) -> Option<String> {
     let of_finger = |finger: usize| -> Vec<usize> {
-        let driven = scene.links.iter().filter(|link| usize::try_from(link.finger) == Ok(finger));
+        let driven = scene.hand().links.iter().filter(|link| usize::try_from(link.finger) == Ok(finger));
         let mut joints: Vec<usize> = driven.filter_map(|link| usize::try_from(link.joint).ok()).collect();
         joints.sort_unstable();
         joints.dedup();
@@ -43,7 +43,7 @@ pub fn joints(plan: &Plan, scene: &SceneStory) -> Option<String> {
 }
 
 fn range(scene: &SceneStory, joint: usize) -> Option<(f64, f64)> {
-    let joint = scene.joints.get(joint)?;
+    let joint = scene.hand().joints.get(joint)?;
     let (lower, upper) = (joint.lower?, joint.upper?);
     (upper > lower).then_some((lower, upper))
 }
@@ -68,7 +68,7 @@ fn panel(svg: &mut Svg, plan: &Plan, scene: &SceneStory, finger: usize, joints: 
         svg.line([LEFT, y], [RIGHT, y], color, width, if share == 0.5 { "" } else { "stroke-dasharray=\"6 3\"" });
     }
     let color = palette::color(finger);
-    let names: Vec<&str> = joints.iter().map(|&joint| scene.joints[joint].name.as_str()).collect();
+    let names: Vec<&str> = joints.iter().map(|&joint| scene.hand().joints[joint].name.as_str()).collect();
     let prefix = common_prefix(&names);
     let steps = timeline::steps(plan);
     for (k, &joint) in joints.iter().enumerate() {
@@ -83,7 +83,7 @@ fn panel(svg: &mut Svg, plan: &Plan, scene: &SceneStory, finger: usize, joints: 
         if k < 5 {
             svg.line([4.0, y + 14.0], [22.0, y + 14.0], color, 1.7, DASHES[k % DASHES.len()]);
             svg.text(
-                &cut(&scene.joints[joint].name[prefix..], 16),
+                &cut(&scene.hand().joints[joint].name[prefix..], 16),
                 [25.0, y + 17.5],
                 Anchor::Start,
                 SOFT,

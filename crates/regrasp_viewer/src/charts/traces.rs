@@ -2,7 +2,7 @@
 
 use super::svg::{Anchor, INK, SOFT, Svg, cut};
 use crate::palette;
-use crate::story::{Carrier, OtherCarrier, PieceStory, Role, SceneStory, pack};
+use crate::story::{PieceStory, Role, SceneStory, pack};
 use crate::timeline;
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_plan::Plan;
@@ -133,8 +133,7 @@ impl ObjectOutline {
     fn of(scene: &SceneStory) -> Option<Self> {
         let mut body =
             ObjectOutline { corners: Vec::new(), edges: Vec::new(), low: Point::origin(), high: Point::origin() };
-        let is_object =
-            |piece: &&PieceStory| piece.on == Carrier::Other(OtherCarrier::Object) && piece.role == Role::Collision;
+        let is_object = |piece: &&PieceStory| scene.is_moved_object(piece.on) && piece.role == Role::Collision;
         for piece in scene.pieces.iter().filter(is_object) {
             let mesh = scene.meshes.get(piece.mesh)?;
             let (vertices, triangles) = pack::unpack(mesh)?;

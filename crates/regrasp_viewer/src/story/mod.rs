@@ -1,20 +1,22 @@
-//! What a page is told. `page/src/story.ts` is the same contract, seen from the page.
+//! What a page is told. `page/src/story_file.ts` is the same contract in TypeScript, generated from these types.
 //!
 //! SI units, radians. Nothing that follows from the plan is stored beside it.
 
-/// What rests in the scene.
-mod at_rest;
+/// The bodies of a scene and their shapes.
+mod bodies;
 /// Lines of facts about a plan.
 mod facts;
 /// Margin and clearance along a plan.
 mod judged;
-/// The links of a hand.
+/// Trees of links.
 mod links;
 /// Numbers of meshes as text.
 pub mod pack;
+/// Shapes of bodies at their places.
+mod pieces;
 /// Plans in stories as in plan files.
 mod plan_file;
-/// The hand and the object of a plan, and everything around them.
+/// A scene told body by body.
 mod scene;
 /// Shapes as packed meshes.
 mod shapes;
@@ -25,6 +27,15 @@ mod telling;
 /// Triangles of shapes.
 pub mod tessellate;
 
+/// `page/src/story_file.ts`.
+#[cfg(test)]
+mod typescript;
+
+pub use bodies::{
+    Carrier, FingerStory, HandStory, JointStory, LeaderStory, LinkKind, LinkStory, MeshStory, ObjectStory, PieceStory,
+    RobotPartStory, Role, SceneStory,
+};
+pub use links::world_from_links;
 pub use telling::{Outcome, Telling, tell};
 
 pub use regrasp_plan::plan::PoseData;
@@ -36,10 +47,11 @@ use serde::{Deserialize, Serialize};
 /// Value of [`Story::format`].
 pub const FORMAT: &str = "regrasp-story";
 /// Value of [`Story::version`].
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// Everything that a page shows.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Story {
     /// Always `regrasp-story`.
     pub format: String,
@@ -52,9 +64,11 @@ pub struct Story {
     /// Hands, objects, supports and obstacles.
     pub scene: SceneStory,
     /// Poses asked for: start, then way poses, then goal; in the world. Empty when unknown.
+    #[cfg_attr(test, ts(type = "PoseData[]"))]
     pub asked: Vec<PoseData>,
     /// The plan, or none when none was found. In JSON as in a plan file (`docs/reference/plan-format.md`).
     #[serde(with = "plan_file")]
+    #[cfg_attr(test, ts(type = "FilePlan | null"))]
     pub plan: Option<Plan>,
     /// What the checker measured; none when there is no plan.
     pub judged: Option<Judged>,
@@ -64,195 +78,15 @@ pub struct Story {
     pub roadmap: Option<RoadmapStory>,
 }
 
-/// The hand and the object of the plan, and everything around them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SceneStory {
-    /// Names of all hands of the scene.
-    pub hands: Vec<String>,
-    /// Index in `hands` of the one that moves: links, joints and fingers are its own.
-    pub moving_hand: usize,
-    /// Names of all objects of the scene.
-    pub objects: Vec<String>,
-    /// Index in `objects` of the one that is moved.
-    pub moved_object: usize,
-    /// Links of the robot of the hand that moves, every parent before its children.
-    pub links: Vec<LinkStory>,
-    /// Where the root link stands.
-    pub world_from_root: PoseData,
-    /// Same order as `Plan::joint_names`.
-    pub joints: Vec<JointStory>,
-    /// Same order as `Plan::fingers`.
-    pub fingers: Vec<FingerStory>,
-    /// Friction coefficient of the scene.
-    pub friction: f64,
-    /// Gravity in the world, m/s^2; none when any direction must hold.
-    pub gravity_in_world: Option<[f64; 3]>,
-    /// Meshes used by `pieces`, each stored once.
-    pub meshes: Vec<MeshStory>,
-    /// Shapes on links, on the object and in the world.
-    pub pieces: Vec<PieceStory>,
-}
-
-/// A coordinate of the joint vector.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct JointStory {
-    /// Name.
-    pub name: String,
-    /// Lowest value, radians or metres; none for joints without limits.
-    pub lower: Option<f64>,
-    /// Highest value.
-    pub upper: Option<f64>,
-    /// Highest torque or force, N m or N, where the robot says one.
-    pub effort: Option<f64>,
-}
-
-/// A finger and its tip.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct FingerStory {
-    /// Name.
-    pub name: String,
-    /// Index of the link that carries the tip.
-    pub tip_link: usize,
-    /// Centre of the tip, in the frame of that link.
-    pub tip_center_in_link: [f64; 3],
-    /// Radius of the tip; zero for a sharp one.
-    pub tip_radius: f64,
-}
-
-/// How a link moves against its parent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum LinkKind {
-    /// Not at all.
-    Fixed,
-    /// Turns about the axis.
-    Revolute,
-    /// Slides along the axis.
-    Prismatic,
-}
-
-/// A link and the joint that carries it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct LinkStory {
-    /// Name.
-    pub name: String,
-    /// Index in `links`; -1 for the root.
-    pub parent: i32,
-    /// Kind of the joint. A joint that no coordinate drives is fixed, where it is held.
-    pub kind: LinkKind,
-    /// Frame of the joint in the parent link, at joint position 0.
-    pub parent_from_joint: PoseData,
-    /// Axis in that frame.
-    pub axis: [f64; 3],
-    /// Index in `joints` of what drives it, -1 for fixed ones. Position = `multiplier * joints[joint] + offset`, plus the same
-    /// product for each of `others`.
-    pub joint: i32,
-    /// See `joint`.
-    pub multiplier: f64,
-    /// See `joint`.
-    pub offset: f64,
-    /// More joints that drive it; none for nearly all.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub others: Vec<LeaderStory>,
-    /// Index in `fingers` of the finger that it belongs to, -1 for the palm.
-    pub finger: i32,
-}
-
-/// A joint that drives another together with more.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct LeaderStory {
-    /// Index in `joints`.
-    pub joint: usize,
-    /// Its multiplier.
-    pub multiplier: f64,
-}
-
-/// A mesh with quantised vertices; [`pack`] writes and reads it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct MeshStory {
-    /// Base64 of little-endian u16 x y z per vertex: coordinate = lower + (upper - lower) * value / 65535, per axis.
-    pub vertices: String,
-    /// Lowest coordinates.
-    pub lower: [f64; 3],
-    /// Highest coordinates.
-    pub upper: [f64; 3],
-    /// Base64 of little-endian indices, three per triangle, counter-clockwise seen from outside; u16 when there are at most
-    /// 65,536 vertices, else u32.
-    pub triangles: String,
-    /// Angle below which neighbouring faces share a normal, in radians; 0 shades flat.
-    pub smooth_below: f64,
-}
-
-/// What a piece moves with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(untagged)]
-pub enum Carrier {
-    /// A link, by its index.
-    Link(usize),
-    /// Something else.
-    Other(OtherCarrier),
-}
-
-/// What a piece can move with that is no link.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum OtherCarrier {
-    /// The object.
-    Object,
-    /// Nothing: a hand or an object at rest, a support, an obstacle.
-    World,
-}
-
-/// What a piece is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Role {
-    /// What planner and checker keep apart.
-    Collision,
-    /// What it looks like. If there are visual pieces, they are complete: links, object and obstacles.
-    Visual,
-}
-
-/// Which kind of body a piece is of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Part {
-    /// A hand.
-    Hand,
-    /// An object.
-    Object,
-    /// A support.
-    Support,
-    /// An obstacle.
-    Obstacle,
-}
-
-/// A mesh at its place.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PieceStory {
-    /// What it moves with.
-    pub on: Carrier,
-    /// Which kind of body it is of.
-    pub part: Part,
-    /// Name to show: of the object, support or obstacle; of the link, and before it that of a hand at rest and a slash.
-    pub name: String,
-    /// What it is for.
-    pub role: Role,
-    /// Index in `meshes`.
-    pub mesh: usize,
-    /// Frame of the mesh in the link, the object or the world.
-    pub from_mesh: PoseData,
-    /// Fingertip that may touch the object.
-    pub is_tip: bool,
-}
-
 /// What the checker measured: one number per waypoint, all segments joined in order (the waypoint that two segments share
 /// counts twice).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Judged {
     /// Verdict.
     pub accepted: bool,
     /// What the plan was judged for: `geometry`, `forces` or `motion`.
+    #[cfg_attr(test, ts(type = "Level"))]
     pub level: Level,
     /// First violations, as text.
     pub violations: Vec<String>,
@@ -270,6 +104,7 @@ pub struct Judged {
 
 /// Why no plan was found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub struct FailureStory {
     /// Kind, as the planner spells it.
     pub kind: String,
@@ -285,6 +120,7 @@ pub struct FailureStory {
 
 /// One reason for which attempts failed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub struct CauseStory {
     /// In words.
     pub reason: String,
@@ -296,10 +132,12 @@ pub struct CauseStory {
 
 /// The pose nearest to the goal that was reached.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub struct NearestMissStory {
     /// The object there.
+    #[cfg_attr(test, ts(type = "PoseData"))]
     pub world_from_object: PoseData,
-    /// The joints there, in the order of `SceneStory::joints`.
+    /// The joints of the hand that moves, there, in the order of its `joints`.
     pub joints: Vec<f64>,
     /// Angle left, radians.
     pub angle_left: f64,
@@ -309,6 +147,7 @@ pub struct NearestMissStory {
 
 /// A manipulation graph.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub struct RoadmapStory {
     /// Object orientation of each node.
     pub nodes: Vec<RoadmapNode>,
@@ -320,6 +159,7 @@ pub struct RoadmapStory {
 
 /// A node of a manipulation graph.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub struct RoadmapNode {
     /// Orientation of the object in the world.
     pub quat_xyzw: [f64; 4],
@@ -333,6 +173,7 @@ pub struct RoadmapNode {
 
 /// An edge of a manipulation graph.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub struct RoadmapEdge {
     /// Its two nodes.
     pub nodes: [usize; 2],
@@ -342,6 +183,7 @@ pub struct RoadmapEdge {
 
 /// Kind of an edge of a manipulation graph.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "snake_case")]
 pub enum RoadmapEdgeKind {
     /// The object moves, contacts stay.

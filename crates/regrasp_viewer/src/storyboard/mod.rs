@@ -114,10 +114,10 @@ fn validate(scene: &SceneStory, plan: &Plan, settings: &StoryboardSettings) -> R
     if settings.columns == Some(0) {
         return out_of_range("the number of columns", 0, "at least 1");
     }
-    if !plan.joint_names.iter().eq(scene.joints.iter().map(|joint| &joint.name)) {
+    if !plan.joint_names.iter().eq(scene.hand().joints.iter().map(|joint| &joint.name)) {
         return Err(StoryboardError::Plan("the plan's joints are not those of the hand".into()));
     }
-    if plan.fingers.len() != scene.fingers.len() {
+    if plan.fingers.len() != scene.hand().fingers.len() {
         return Err(StoryboardError::Plan("the plan's fingers are not those of the hand".into()));
     }
     let steps = timeline::steps(plan);

@@ -7,7 +7,7 @@ use crate::render::model::{linear, mixed};
 use crate::render::shade::Layer;
 use crate::render::{Paint, PlacedSurface, Surface};
 use crate::story::tessellate::Triangles;
-use crate::story::{Carrier, MeshStory, OtherCarrier, Part, PieceStory, Role, SceneStory, pack};
+use crate::story::{Carrier, JointStory, LinkStory, MeshStory, PieceStory, Role, SceneStory, pack, world_from_links};
 use crate::timeline;
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 use regrasp_plan::Plan;
@@ -53,6 +53,36 @@ impl Prop {
     }
 }
 
+/// Where bodies stand that the plan does not move: poses in the world.
+struct Resting {
+    hands: Vec<Vec<Pose>>,
+    robot_parts: Vec<Vec<Pose>>,
+    objects: Vec<Pose>,
+}
+
+impl Resting {
+    fn of(scene: &SceneStory) -> Self {
+        let posed = |links: &[LinkStory], joints: &[JointStory]| {
+            world_from_links(links, &joints.iter().map(|joint| joint.at_rest).collect::<Vec<_>>())
+        };
+        Resting {
+            hands: scene.hands.iter().map(|hand| posed(&hand.links, &hand.joints)).collect(),
+            robot_parts: scene.robot_parts.iter().map(|part| posed(&part.links, &part.joints)).collect(),
+            objects: scene.objects.iter().map(|object| Pose::from(&object.world_from_object)).collect(),
+        }
+    }
+
+    fn world_from(&self, on: Carrier) -> Pose {
+        let pose = match on {
+            Carrier::Hand(hand, link) => self.hands.get(hand).and_then(|links| links.get(link)),
+            Carrier::RobotPart(part, link) => self.robot_parts.get(part).and_then(|links| links.get(link)),
+            Carrier::Object(object) => self.objects.get(object),
+            Carrier::Support(_) | Carrier::Obstacle(_) => None,
+        };
+        pose.copied().unwrap_or_else(Pose::identity)
+    }
+}
+
 /// Hand, object and obstacles with their surfaces made once.
 pub struct Stage<'s> {
     scene: &'s SceneStory,
@@ -61,8 +91,9 @@ pub struct Stage<'s> {
     is_finger: Vec<bool>,
     object: Vec<Prop>,
     obstacles: Vec<PlacedSurface>,
-    /// Hands, objects and supports that the plan does not move, placed in the world.
+    /// Hands, parts of robots, objects and supports that the plan does not move, placed in the world.
     at_rest: Vec<PlacedSurface>,
+    resting: Resting,
     /// Middle of the object's bounds, in its frame.
     object_center: Point,
     /// Largest distance of a point of the object from there, in metres.
@@ -91,11 +122,11 @@ impl<'s> Stage<'s> {
         let meshes: Vec<Option<Triangles>> = scene.meshes.iter().map(triangles_of).collect();
         let mesh = |piece: &PieceStory| {
             let found = meshes.get(piece.mesh).and_then(Option::as_ref);
-            found.ok_or_else(|| format!("the mesh of {} cannot be read", piece.name))
+            found.ok_or_else(|| format!("the mesh of {} cannot be read", scene.name_of(piece.on).unwrap_or_default()))
         };
         let pieces: Vec<&PieceStory> = scene.pieces.iter().filter(|piece| piece.role == role).collect();
         let mut corners = Vec::new();
-        for piece in pieces.iter().filter(|piece| piece.on == Carrier::Other(OtherCarrier::Object)) {
+        for piece in pieces.iter().filter(|piece| scene.is_moved_object(piece.on)) {
             let from_mesh = Pose::from(&piece.from_mesh);
             corners.extend(mesh(piece)?.vertices.iter().map(|v| from_mesh * v));
         }
@@ -113,6 +144,7 @@ impl<'s> Stage<'s> {
             object: Vec::new(),
             obstacles: Vec::new(),
             at_rest: Vec::new(),
+            resting: Resting::of(scene),
             object_center,
             object_radius,
             object_at_start: Pose::from(&plan.start),
@@ -129,10 +161,11 @@ impl<'s> Stage<'s> {
     }
 
     fn put(&mut self, piece: &PieceStory, surface: Arc<Surface>) {
+        let scene = self.scene;
         let from_mesh = Pose::from(&piece.from_mesh);
         match piece.on {
-            Carrier::Link(link) => {
-                let finger = self.scene.links.get(link).and_then(|link| usize::try_from(link.finger).ok());
+            Carrier::Hand(hand, link) if hand == scene.moving_hand => {
+                let finger = scene.hand().links.get(link).and_then(|link| usize::try_from(link.finger).ok());
                 let is_tip = piece.is_tip && finger.is_some();
                 let color = match finger {
                     Some(finger) if is_tip => palette::color(finger),
@@ -143,7 +176,7 @@ impl<'s> Stage<'s> {
                 let body = FIRST_LINK + 2 * link as u32 + u32::from(is_tip);
                 self.links.push((link, Prop { from_mesh, surface, paint: Paint::Plain(linear(color)), body }));
             }
-            Carrier::Other(OtherCarrier::Object) => {
+            on if scene.is_moved_object(on) => {
                 let paint = Paint::Octants {
                     center: from_mesh.inverse() * self.object_center,
                     axes: from_mesh.rotation,
@@ -153,17 +186,19 @@ impl<'s> Stage<'s> {
                 };
                 self.object.push(Prop { from_mesh, surface, paint, body: OBJECT_BODY });
             }
-            Carrier::Other(OtherCarrier::World) => {
+            on => {
                 let body = OBSTACLE_BODY + (self.obstacles.len() + self.at_rest.len()) as u32 % 90;
-                let (color, models) = match piece.part {
-                    Part::Hand if piece.is_tip => (LINK, &mut self.at_rest),
-                    Part::Hand => (PALM, &mut self.at_rest),
-                    Part::Object => (OBJECT_TONES[0], &mut self.at_rest),
-                    Part::Support => (SUPPORT, &mut self.at_rest),
-                    Part::Obstacle => (OBSTACLE, &mut self.obstacles),
+                let color = match on {
+                    Carrier::Hand(..) if piece.is_tip => LINK,
+                    Carrier::Hand(..) | Carrier::RobotPart(..) => PALM,
+                    Carrier::Object(_) => OBJECT_TONES[0],
+                    Carrier::Support(_) => SUPPORT,
+                    Carrier::Obstacle(_) => OBSTACLE,
                 };
                 let prop = Prop { from_mesh, surface, paint: Paint::Plain(linear(color)), body };
-                models.push(prop.placed(&Pose::identity()));
+                let model = prop.placed(&self.resting.world_from(on));
+                let models = if matches!(on, Carrier::Obstacle(_)) { &mut self.obstacles } else { &mut self.at_rest };
+                models.push(model);
             }
         }
     }
@@ -197,7 +232,7 @@ impl<'s> Stage<'s> {
 
     /// Object and hand at a moment, the object first.
     pub fn solid(&self, frame: &KeyFrame) -> Vec<PlacedSurface> {
-        let world_from_link = self.scene.world_from_links(&frame.joints);
+        let world_from_link = self.scene.hand().world_from_links(&frame.joints);
         let world_from_object = Pose::from(&frame.world_from_object);
         let object = self.object.iter().map(|prop| prop.placed(&world_from_object));
         object.chain(self.links.iter().map(|(link, prop)| prop.placed(&world_from_link[*link]))).collect()

@@ -170,7 +170,7 @@ fn names_stay_names_in_every_chart() {
     for (k, name) in names.iter().enumerate() {
         plan.fingers[k] = (*name).into();
     }
-    for (k, joint) in story.scene.joints.iter_mut().enumerate() {
+    for (k, joint) in story.scene.hands[0].joints.iter_mut().enumerate() {
         joint.name = names[k % names.len()].into();
     }
     let judged = story.judged.as_mut().expect("judged");

@@ -68,9 +68,12 @@ fn a_page_of_hostile_names_has_one_script_and_gives_the_names_back() {
     let mut rng = Rng::keyed(12, "names", 0);
     for _ in 0..20 {
         story.title = hostile(&mut rng);
-        story.scene.links.iter_mut().for_each(|link| link.name = hostile(&mut rng));
-        story.scene.pieces.iter_mut().for_each(|piece| piece.name = hostile(&mut rng));
-        story.scene.joints.iter_mut().for_each(|joint| joint.name = hostile(&mut rng));
+        for hand in &mut story.scene.hands {
+            hand.name = hostile(&mut rng);
+            hand.links.iter_mut().for_each(|link| link.name = hostile(&mut rng));
+            hand.joints.iter_mut().for_each(|joint| joint.name = hostile(&mut rng));
+        }
+        story.scene.objects.iter_mut().for_each(|object| object.name = hostile(&mut rng));
         story.facts.push((hostile(&mut rng), hostile(&mut rng)));
         let page = html(&story);
         let data = between(&page, "<script type=\"application/json\" id=\"story\">", "</script>");

@@ -6,8 +6,8 @@ use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, Report, check};
 use regrasp_planners::{PlannerSettings, plan};
 use regrasp_robot::import::LoadOptions;
-use regrasp_scene::{LoadedScene, Query, load_scene};
-use regrasp_viewer::story::{Outcome, Story, Telling, tell};
+use regrasp_scene::{LoadedScene, Manipulation, Query, load_scene};
+use regrasp_viewer::story::{FailureStory, Outcome, Story, Telling, tell};
 
 /// A scene with a plan that the checker accepts.
 pub struct Sample {
@@ -23,6 +23,27 @@ pub fn options_with_models() -> Option<LoadOptions> {
     let mut options = LoadOptions::default();
     options.resolve.packages.push(("models".into(), shared_models()?));
     Some(options)
+}
+
+/// The story of a task for which there is no plan.
+pub fn story_without_plan(task: Manipulation, options: &LoadOptions) -> Story {
+    let failure = FailureStory {
+        kind: "time_limit".into(),
+        message: String::new(),
+        advice: String::new(),
+        causes: Vec::new(),
+        nearest_miss: None,
+    };
+    let telling = Telling {
+        task,
+        query: None,
+        outcome: Outcome::Failed(failure),
+        title: None,
+        facts: Vec::new(),
+        roadmap: None,
+        packages: &options.resolve,
+    };
+    tell(&telling).expect("a story")
 }
 
 impl Sample {

@@ -1,34 +1,18 @@
 use crate::places::repository;
-use crate::sample::{Sample, options_with_models};
+use crate::sample::{Sample, options_with_models, story_without_plan};
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;
 use regrasp_robot::Hand;
 use regrasp_robot::import::LoadOptions;
 use regrasp_scene::{LoadedScene, load_scene};
-use regrasp_viewer::story::{Carrier, FailureStory, LinkKind, Outcome, Role, SceneStory, Story, Telling, pack, tell};
+use regrasp_viewer::story::{Carrier, HandStory, LinkKind, Role, Story, pack};
 
 fn story_of(loaded: &LoadedScene, options: &LoadOptions) -> Story {
-    let failure = FailureStory {
-        kind: "time_limit".into(),
-        message: String::new(),
-        advice: String::new(),
-        causes: Vec::new(),
-        nearest_miss: None,
-    };
-    let telling = Telling {
-        task: loaded.manipulation(),
-        query: None,
-        outcome: Outcome::Failed(failure),
-        title: None,
-        facts: Vec::new(),
-        roadmap: None,
-        packages: &options.resolve,
-    };
-    tell(&telling).unwrap()
+    story_without_plan(loaded.manipulation(), options)
 }
 
 /// Compares the tree of the story with the chains of the hand at random joints; the largest difference.
-fn assert_same_kinematics(hand: &Hand, story: &SceneStory) {
+fn assert_same_kinematics(hand: &Hand, story: &HandStory) {
     let mut rng = Rng::keyed(3, "story", 0);
     for _ in 0..50 {
         let within = |(lower, upper): (f64, f64), rng: &mut Rng| rng.uniform(lower.max(-3.0), upper.min(3.0));
@@ -79,17 +63,17 @@ fn links_are_where_the_hand_has_them() {
         let loaded = load_scene(&repository().join(path), &options).unwrap();
         let scene = &loaded.scene;
         let story = story_of(&loaded, &options);
-        let names: Vec<&str> = story.scene.joints.iter().map(|joint| joint.name.as_str()).collect();
+        let hand = story.scene.hand();
+        let names: Vec<&str> = hand.joints.iter().map(|joint| joint.name.as_str()).collect();
         assert_eq!(names, scene.hands[0].hand.joint_names());
-        for (place, link) in story.scene.links.iter().enumerate() {
+        for (place, link) in hand.links.iter().enumerate() {
             assert!(link.parent < place as i32 && (link.parent >= 0) == (place > 0), "{path}: {}", link.name);
             assert_eq!(link.joint >= 0, link.kind != LinkKind::Fixed);
         }
-        assert_same_kinematics(&scene.hands[0].hand, &story.scene);
-        let has_mimic =
-            story.scene.links.iter().any(|link| link.joint >= 0 && link.multiplier != 1.0 || link.offset != 0.0);
-        let shares = |link: usize| story.scene.links.iter().filter(|l| l.joint == link as i32).count() > 1;
-        let n_coupled = (0..story.scene.joints.len()).filter(|&k| shares(k)).count();
+        assert_same_kinematics(&scene.hands[0].hand, hand);
+        let has_mimic = hand.links.iter().any(|link| link.joint >= 0 && link.multiplier != 1.0 || link.offset != 0.0);
+        let shares = |link: usize| hand.links.iter().filter(|l| l.joint == link as i32).count() > 1;
+        let n_coupled = (0..hand.joints.len()).filter(|&k| shares(k)).count();
         assert_eq!(has_mimic || n_coupled > 0, path.contains("shadow"), "{path}");
     }
 }
@@ -107,14 +91,18 @@ fn every_shape_is_drawn_once_and_every_piece_has_its_mesh() {
     }
     assert!(story.pieces.iter().all(|piece| piece.mesh < story.meshes.len() && piece.role == Role::Collision));
     let n_link_shapes: usize = scene.hands[0].hand.robot.links.iter().map(|link| link.collision.len()).sum();
-    let on_links = story.pieces.iter().filter(|piece| matches!(piece.on, Carrier::Link(_)));
+    let on_links = story.pieces.iter().filter(|piece| matches!(piece.on, Carrier::Hand(..)));
     assert!(on_links.clone().count() >= n_link_shapes);
     assert_eq!(
-        on_links.filter(|piece| piece.is_tip).map(|piece| &piece.name).collect::<std::collections::BTreeSet<_>>().len(),
+        on_links
+            .filter(|piece| piece.is_tip)
+            .map(|piece| story.name_of(piece.on))
+            .collect::<std::collections::BTreeSet<_>>()
+            .len(),
         4
     );
     assert_eq!(
-        story.pieces.iter().filter(|piece| matches!(piece.on, Carrier::Other(_))).count(),
+        story.pieces.iter().filter(|piece| !matches!(piece.on, Carrier::Hand(..))).count(),
         1 + scene.obstacles.len()
     );
 }
@@ -160,7 +148,13 @@ fn what_cannot_be_read_looks_as_it_collides_and_the_facts_name_it() {
     assert!(looks_of("palm").unwrap().1.contains("palm.dae"), "{:?}", looks_of("palm"));
     assert!(looks_of("east_proximal").is_some() && looks_of("north_proximal").is_none());
     let meshes = |name: &str, role: Role| -> Vec<usize> {
-        story.scene.pieces.iter().filter(|p| p.name == name && p.role == role).map(|p| p.mesh).collect()
+        story
+            .scene
+            .pieces
+            .iter()
+            .filter(|p| story.scene.name_of(p.on).as_deref() == Some(name) && p.role == role)
+            .map(|p| p.mesh)
+            .collect()
     };
     for name in ["palm", "east_proximal", "west_proximal"] {
         assert_eq!(meshes(name, Role::Visual), meshes(name, Role::Collision), "{name}");
@@ -184,8 +178,8 @@ fn fingertips_are_drawn_as_they_touch_whatever_else_their_link_is() {
     let path = repository().join("scenes/oval_sphere_90x.toml");
     let loaded = load_scene(&path, &LoadOptions::default()).unwrap();
     let story = story_of(&loaded, &LoadOptions::default());
-    for finger in &story.scene.fingers {
-        let on_tip = |carrier: &Carrier| *carrier == Carrier::Link(finger.tip_link);
+    for finger in &story.scene.hand().fingers {
+        let on_tip = |carrier: &Carrier| *carrier == Carrier::Hand(0, finger.tip_link);
         let tips = story.scene.pieces.iter().filter(|piece| on_tip(&piece.on) && piece.is_tip);
         let is_ellipsoid = |mesh: usize| {
             let (mesh, sizes) = (&story.scene.meshes[mesh], [0.011, 0.012, 0.015]);

@@ -103,7 +103,7 @@ fn what_cannot_be_drawn_is_refused() {
     other.plan = None;
     assert!(matches!(storyboard(&other, &small(2)), Err(StoryboardError::Plan(_))));
     let mut other = story.clone();
-    other.scene.joints.pop();
+    other.scene.hands[0].joints.pop();
     assert!(matches!(storyboard(&other, &small(2)), Err(StoryboardError::Plan(_))));
     let mut other = story;
     other.scene.meshes[0].vertices = "?".into();

@@ -51,7 +51,7 @@ pub fn load_manipulator(path: &Path, options: &LoadOptions) -> Result<LoadedMani
     if !is_toml {
         return of_hand(load_hand(path, options)?, path);
     }
-    let bytes = files::read(path)?;
+    let bytes = options.read(path)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let own = LoadedInput { role: "robot".into(), name, path: path.to_owned(), sha256: files::sha256(&bytes) };
     let text = files::text_of(path, bytes)?;

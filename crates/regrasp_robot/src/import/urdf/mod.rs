@@ -46,7 +46,7 @@ pub struct LoadedRobot {
 ///
 /// Errors: every problem of the file and its meshes (`U1xx`, `V001`, `M2xx`), or `F00x` when it cannot be read.
 pub fn load_robot(path: &Path, options: &LoadOptions) -> Result<LoadedRobot, InputError> {
-    let bytes = files::read(path)?;
+    let bytes = options.read(path)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let input = LoadedInput { role: "urdf".into(), name, path: path.to_owned(), sha256: files::sha256(&bytes) };
     let text = files::text_of(path, bytes)?;
@@ -131,7 +131,7 @@ impl Meshes {
         reader: &mut Reader,
     ) -> Result<Arc<TriangleMesh>, InputError> {
         let hints = if self.n_missed < MAX_HINTS { Hints::SameNameNear } else { Hints::None };
-        let resolved = super::resolve::resolve_with(name, model, place, &self.options.resolve, hints);
+        let resolved = self.options.resolve_with(name, model, place, hints);
         self.n_missed += usize::from(resolved.is_err());
         let resolved = resolved?;
         resolved.notes.into_iter().for_each(|note| reader.note_once(note));
@@ -139,7 +139,7 @@ impl Meshes {
             return known.clone();
         }
         self.options.check_time(&resolved.path)?;
-        let bytes = files::read(&resolved.path);
+        let bytes = self.options.read(&resolved.path);
         let mesh = bytes.and_then(|bytes| {
             let sha256 = files::sha256(&bytes);
             let input = LoadedInput { role: "mesh".into(), name: name.to_owned(), path: resolved.path.clone(), sha256 };

@@ -2,6 +2,7 @@
 // In tracking, under the bars: ink while the finger is the moving one, grey while the object rolls on it.
 
 import { whoMoves, type Motion } from "../motion";
+import { movingHand } from "../bodies";
 import type { Story } from "../story";
 import { fingerColour } from "../theme";
 import { el, svg } from "../dom";
@@ -13,7 +14,7 @@ const STRIP = 3.5;
 const TOP = 4;
 
 export function gaitChart(story: Story, motion: Motion): ChartSpec {
-  const fingers = story.scene.fingers;
+  const fingers = movingHand(story.scene).fingers;
   const bottom = TOP + ROW * fingers.length;
   const relocations = motion.nRelocations;
   const mostMoving = motion.stretches.some((s) => s.allMoving.length > 1) ? "some move" : "one moves";

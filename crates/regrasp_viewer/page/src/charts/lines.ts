@@ -2,7 +2,8 @@
 
 import { dot, norm } from "../math";
 import type { Motion } from "../motion";
-import type { Story } from "../story";
+import { movingHand } from "../bodies";
+import type { HandStory, Story } from "../story";
 import { fingerColour } from "../theme";
 import { el, setText } from "../dom";
 import { fitted, tickText, ticks, transferBands, type ChartSpec, type Drawing } from "./frame";
@@ -180,7 +181,7 @@ export function clearanceChart(story: Story, motion: Motion): ChartSpec {
 }
 
 export function forceChart(story: Story, motion: Motion): ChartSpec {
-  const fingers = story.scene.fingers;
+  const fingers = movingHand(story.scene).fingers;
   const normalForce = (finger: number, i: number): number | null => {
     const contact = motion.waypoints[i].contacts[finger];
     if (!contact || contact.mode === "free" || !contact.force_in_object) return null;
@@ -211,13 +212,14 @@ const DASHES = [[], [7, 3], [2, 2.5], [9, 3, 2, 3], [4, 2], [1, 3], [12, 3], [6,
 
 /** Joint positions of one finger, each inside its limits: 0 is the lower one, 1 the upper one. */
 export function jointChart(story: Story, motion: Motion, redraw: () => void): ChartSpec {
-  const groups = jointGroups(story);
+  const hand = movingHand(story.scene);
+  const groups = jointGroups(hand);
   let shown = 0;
   const tabs = el("div", { class: "tabs", role: "group", "aria-label": "Finger whose joints are shown" });
   const legend = el("ul", { class: "key values" });
   let items: KeyItem[] = [];
   const bounds = (joint: number): Range => {
-    const { lower, upper } = story.scene.joints[joint];
+    const { lower, upper } = hand.joints[joint];
     if (lower !== null && upper !== null && upper > lower) return { low: lower, high: upper };
     return span(motion.waypoints.map((w) => w.joints[joint]), [motion.waypoints[0].joints[joint]]);
   };
@@ -226,15 +228,15 @@ export function jointChart(story: Story, motion: Motion, redraw: () => void): Ch
     return (q - low) / (high - low || 1);
   };
   const limits = (joint: number): string | null => {
-    const { lower, upper } = story.scene.joints[joint];
-    return lower === null || upper === null ? null : `${jointText(story, joint, lower)} to ${jointText(story, joint, upper)}`;
+    const { lower, upper } = hand.joints[joint];
+    return lower === null || upper === null ? null : `${jointText(hand, joint, lower)} to ${jointText(hand, joint, upper)}`;
   };
   const choose = (group: number): void => {
     shown = group;
     [...tabs.children].forEach((tab, i) => tab.setAttribute("aria-pressed", String(i === shown)));
     items = groups[shown].joints.map((joint, k) => {
       const bounded = limits(joint);
-      const name = story.scene.joints[joint].name + (bounded ? "" : " (no limits: its own range)");
+      const name = hand.joints[joint].name + (bounded ? "" : " (no limits: its own range)");
       return keyItem(name, fingerColour(groups[shown].finger), k, bounded);
     });
     legend.replaceChildren(...items.map((item) => item.element));
@@ -277,18 +279,19 @@ export function jointChart(story: Story, motion: Motion, redraw: () => void): Ch
     },
     show(time) {
       const q = motion.joints(time);
-      items.forEach((item, k) => setText(item.value, jointText(story, groups[shown].joints[k], q[groups[shown].joints[k]])));
+      items.forEach((item, k) => setText(item.value, jointText(hand, groups[shown].joints[k], q[groups[shown].joints[k]])));
     },
   };
 }
 
 /** Joints whose position is a length; all others are angles. */
-function slides(story: Story, joint: number): boolean {
-  return story.scene.links.some((link) => link.joint === joint && link.kind === "prismatic");
+function slides({ links }: Pick<HandStory, "links">, joint: number): boolean {
+  return links.some((link) => link.joint === joint && link.kind === "prismatic");
 }
 
-function jointText(story: Story, joint: number, q: number): string {
-  return slides(story, joint) ? `${(q * 1000).toFixed(1)} mm` : `${((q * 180) / Math.PI).toFixed(0).replace("-", "\u2212")}\u00b0`;
+/** A position of a joint of a body. */
+export function jointText(body: Pick<HandStory, "links">, joint: number, q: number): string {
+  return slides(body, joint) ? `${(q * 1000).toFixed(1)} mm` : `${((q * 180) / Math.PI).toFixed(0).replace("-", "\u2212")}\u00b0`;
 }
 
 interface KeyItem { element: HTMLElement; value: HTMLElement }
@@ -314,9 +317,9 @@ function keyItem(name: string, colour: string, k: number, hint: string | null = 
 interface JointGroup { name: string; finger: number; joints: number[] }
 
 /** Joints by the finger whose links they move; those of no finger come last. */
-export function jointGroups(story: Story): JointGroup[] {
-  const fingerOf = story.scene.joints.map((_, joint) => story.scene.links.find((l) => l.joint === joint)?.finger ?? -1);
-  const groups = story.scene.fingers.map((finger, i) => ({
+export function jointGroups(hand: HandStory): JointGroup[] {
+  const fingerOf = hand.joints.map((_, joint) => hand.links.find((l) => l.joint === joint)?.finger ?? -1);
+  const groups = hand.fingers.map((finger, i) => ({
     name: finger.name,
     finger: i,
     joints: fingerOf.flatMap((f, joint) => (f === i ? [joint] : [])),

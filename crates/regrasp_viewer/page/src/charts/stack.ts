@@ -3,6 +3,7 @@
 import { el } from "../dom";
 import type { Motion } from "../motion";
 import type { Player } from "../player";
+import { movingHand } from "../bodies";
 import type { Story } from "../story";
 import type { Theme } from "../theme";
 import { Chart, RIGHT, type ChartSpec } from "./frame";
@@ -23,7 +24,7 @@ export class ChartStack {
       if (!motion.isTracking || story.judged.margin.some((margin) => margin !== null)) specs.push(marginChart(story, motion));
       specs.push(clearanceChart(story, motion));
     }
-    if (jointGroups(story).length > 0) specs.push(jointChart(story, motion, () => this.draw()));
+    if (jointGroups(movingHand(story.scene)).length > 0) specs.push(jointChart(story, motion, () => this.draw()));
     if (motion.hasForces) specs.push(forceChart(story, motion));
     this.charts = specs.map((spec) => new Chart(spec, motion, theme));
     this.element = el("div", { class: "charts" }, ...this.charts.map((c) => c.element));

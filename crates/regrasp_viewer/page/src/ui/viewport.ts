@@ -3,7 +3,8 @@
 import { button, el, icon, setText } from "../dom";
 import { whoMoves, type Motion } from "../motion";
 import type { Player } from "../player";
-import type { Story } from "../story";
+import { movingHand } from "../bodies";
+import type { FingerStory, Story } from "../story";
 import { fingerColour } from "../theme";
 import type { Layer, Stage } from "../view/stage";
 
@@ -26,9 +27,13 @@ export class Viewport {
   private readonly states: HTMLElement[];
   private readonly boxes = new Map<string, HTMLInputElement>();
 
-  constructor(private readonly story: Story, private readonly motion: Motion, player: Player, private readonly stage: Stage | null) {
-    this.states = story.scene.fingers.map(() => el("span", { class: "state" }));
-    const legend = el("ul", { class: "legend", "aria-label": "Fingers" }, ...story.scene.fingers.map((finger, i) => {
+  private readonly fingers: FingerStory[];
+
+  /** `choose` is told the key of a body that is clicked at. */
+  constructor(private readonly story: Story, private readonly motion: Motion, player: Player, private readonly stage: Stage | null, choose: (key: string) => void) {
+    this.fingers = movingHand(story.scene).fingers;
+    this.states = this.fingers.map(() => el("span", { class: "state" }));
+    const legend = el("ul", { class: "legend", "aria-label": "Fingers" }, ...this.fingers.map((finger, i) => {
       const swatch = el("span", { class: "swatch" });
       swatch.style.background = fingerColour(i);
       return el("li", { title: finger.name }, swatch, el("span", { class: "name" }, finger.name), this.states[i]);
@@ -38,6 +43,7 @@ export class Viewport {
       stage.canvas.setAttribute("role", "img");
       stage.canvas.setAttribute("aria-label", "Hand and object in 3-D; drag to turn");
       this.element.append(stage.canvas, this.tools(stage), this.insets(stage), this.hint(stage));
+      listenToClicks(stage, choose);
     } else {
       this.element.append(el("p", { class: "no-webgl" },
         "The 3-D view needs WebGL 2, which this browser does not offer. Charts and facts are complete without it."));
@@ -96,8 +102,8 @@ export class Viewport {
       waiting = true;
       requestAnimationFrame(() => {
         waiting = false;
-        const { clientWidth, clientHeight } = stage.canvas;
-        const name = stage.nameAt(event.offsetX / clientWidth, event.offsetY / clientHeight);
+        const { clientWidth } = stage.canvas;
+        const name = seenAt(stage, event)?.name ?? null;
         hint.hidden = name === null;
         setText(hint, name ?? "");
         hint.style.transform = `translate(${Math.min(event.offsetX + 14, clientWidth - 180)}px, ${event.offsetY + 16}px)`;
@@ -127,11 +133,11 @@ export class Viewport {
     if (!stretch) return;
     const same = motion.stretches.filter((s) => s.kind === stretch.kind);
     const number = `${same.indexOf(stretch) + 1} of ${same.length}`;
-    const [name, under] = [stretch.moving, stretch.rolling].map((finger) => story.scene.fingers[finger]?.name);
+    const [name, under] = [stretch.moving, stretch.rolling].map((finger) => this.fingers[finger]?.name);
     const said = {
       transfer: `Transfer ${number}`,
       regrasp: `Relocation ${number}${name ? `: ${name} moves` : ""}`,
-      tracking: `${whoMoves(stretch, story.scene.fingers)} (dark rim), the object rolls on ${under} (grey rim)`,
+      tracking: `${whoMoves(stretch, this.fingers)} (dark rim), the object rolls on ${under} (grey rim)`,
     };
     setText(this.caption, said[stretch.kind]);
     motion.contacts(time).forEach((contact, i) => {
@@ -141,4 +147,20 @@ export class Viewport {
       this.states[i].parentElement!.classList.toggle("away", contact.mode === "free");
     });
   }
+}
+
+function seenAt(stage: Stage, event: PointerEvent): { name: string; body: string } | null {
+  return stage.seenAt(event.offsetX / stage.canvas.clientWidth, event.offsetY / stage.canvas.clientHeight);
+}
+
+/** A press and a release at one place: a drag turns the view. */
+function listenToClicks(stage: Stage, choose: (key: string) => void): void {
+  let pressed: [number, number] | null = null;
+  stage.canvas.addEventListener("pointerdown", (event) => { pressed = event.button === 0 ? [event.offsetX, event.offsetY] : null; });
+  stage.canvas.addEventListener("pointerup", (event) => {
+    const moved = pressed ? Math.hypot(event.offsetX - pressed[0], event.offsetY - pressed[1]) : Infinity;
+    pressed = null;
+    const seen = moved < 4 ? seenAt(stage, event) : null;
+    if (seen) choose(seen.body);
+  });
 }

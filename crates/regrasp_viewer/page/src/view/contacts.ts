@@ -7,7 +7,7 @@ import {
 import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import { add, cross, norm, scale, sub, unit, type Vec3 } from "../math";
 import type { Hold, Motion } from "../motion";
-import type { SceneStory } from "../story";
+import type { HandStory } from "../story";
 import { fingerColour } from "../theme";
 
 const Y = new Vector3(0, 1, 0);
@@ -62,10 +62,10 @@ export class Contacts {
   private forcesShown = true;
 
   /** `objectSize`: half the largest side of the object, metres; `largestForce`: newtons, 0 without forces. */
-  constructor(scene: SceneStory, private readonly motion: Motion, objectSize: number, private readonly largestForce: number) {
-    const n = scene.fingers.length;
+  constructor({ fingers }: HandStory, friction: number, private readonly motion: Motion, objectSize: number, private readonly largestForce: number) {
+    const n = fingers.length;
     const size = 0.085 * objectSize;
-    const reaches = scene.fingers.map((finger) => Math.max(2.1 * finger.tip_radius, 0.45 * objectSize));
+    const reaches = fingers.map((finger) => Math.max(2.1 * finger.tip_radius, 0.45 * objectSize));
     const reach = Math.max(...reaches, 0.45 * objectSize);
     this.forceReach = 1.3 * objectSize;
     this.discs = seenThrough(new CircleGeometry(size, 20).translate(0, 0, size * 0.06), n);
@@ -74,7 +74,7 @@ export class Contacts {
     this.brokenRings = seenThrough(mergeGeometries([0, 1, 2].map((k) => arc((k * 2 * Math.PI) / 3)))!, n);
     this.normals = new Part(new CylinderGeometry(size * 0.12, size * 0.12, reach, 6, 1, true).rotateX(Math.PI / 2).translate(0, 0, reach / 2), n, {});
     const veil = { transparent: true, depthWrite: false, vertexColors: true };
-    this.cones = [new Part(coneGeometry(reach, Math.max(scene.friction, 1e-3)), n, veil, 2)];
+    this.cones = [new Part(coneGeometry(reach, Math.max(friction, 1e-3)), n, veil, 2)];
     this.shafts = seenThrough(new CylinderGeometry(size * 0.24, size * 0.24, 1, 8, 1, true).translate(0, -0.5, 0), n);
     this.heads = seenThrough(new ConeGeometry(size * 0.7, size * 1.6, 12).translate(0, -size * 0.8, 0), n);
     for (const part of [...this.discs, ...this.rings, ...this.brokenRings, this.normals, ...this.cones, ...this.shafts, ...this.heads]) this.current.add(part.mesh);

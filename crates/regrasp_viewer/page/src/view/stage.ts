@@ -2,22 +2,26 @@
 
 import {
   BackSide, Box3, Color, CustomBlending, DirectionalLight, EdgesGeometry, Group, HemisphereLight, LineBasicMaterial, LineSegments, MathUtils, Mesh, MeshBasicMaterial,
-  MeshLambertMaterial, NoToneMapping, OneFactor, OneMinusSrcAlphaFactor, PerspectiveCamera, Quaternion, Raycaster, Scene, Sphere, SphereGeometry, SrcAlphaFactor, Vector2, Vector3, WebGLRenderer, type BufferGeometry, type Material,
+  MeshLambertMaterial, NoToneMapping, OneFactor, OneMinusSrcAlphaFactor, PerspectiveCamera, Quaternion, Raycaster, Scene, Sphere, SphereGeometry, SrcAlphaFactor, Vector2, Vector3, WebGLRenderer, type BufferGeometry,
   type MeshLambertMaterialParameters,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { largestForce } from "../charts/lines";
+import { bodiesOf, movedObject, movingHand, placeOf, type Body } from "../bodies";
 import { linkPoses } from "../kinematics";
 import type { CameraPlace } from "../link";
 import { norm, poseFrom, rotationBetween, sub, type Pose } from "../math";
 import type { Motion } from "../motion";
-import type { PieceStory, PoseData, Story } from "../story";
+import type { HandStory, PieceStory, PoseData, Story } from "../story";
 import { fingerColour, type Theme } from "../theme";
 import { Contacts } from "./contacts";
 import { patterned, type PatternColours } from "./materials";
 import { coarse, geometryOf, type Triangles } from "./mesh";
 
 export type Layer = "visual" | "seeThrough" | "ghosts" | "contacts" | "cones" | "forces" | "trace" | "obstacles";
+
+/** Light that a marked body gives off. */
+const MARK = 0x2f5d8a;
 
 interface Ghost { group: Group; pose: Pose }
 
@@ -30,16 +34,22 @@ export class Stage {
   private readonly scene = new Scene();
   private readonly camera: PerspectiveCamera;
   private readonly controls: OrbitControls;
+  private readonly hand: HandStory;
+  /** Of the hand that moves. */
   private readonly links: Group[];
   private readonly object = new Group();
   private readonly obstacles = new Group();
-  /** Hands, objects and supports that the plan does not move. */
+  /** Hands, parts of robots, objects and supports that the plan does not move. */
   private readonly atRest = new Group();
+  private readonly hidden = new Set<string>();
+  private marked: string | null = null;
+  private readonly movingKey: string;
+  private time = 0;
   private readonly contacts: Contacts;
   private readonly ghosts: Ghost[] = [];
   /** In tracking, around every fingertip: dark on the moving finger, grey on the one that the object rolls on. */
   private readonly rims: Mesh[] = [];
-  private readonly shapes: { mesh: Mesh; role: PieceStory["role"]; name: string }[] = [];
+  private readonly shapes: { mesh: Mesh<BufferGeometry, MeshLambertMaterial>; role: PieceStory["role"]; name: string; body: string }[] = [];
   private readonly handMaterials: MeshLambertMaterial[] = [];
   private readonly hasVisual: boolean;
   private readonly repaint: (() => void)[] = [];
@@ -85,11 +95,13 @@ export class Stage {
     });
 
     const decoded = new Map<number, Triangles>();
-    this.links = story.scene.links.map(() => new Group());
+    this.hand = movingHand(story.scene);
+    this.movingKey = placeOf({ hand: [story.scene.moving_hand, 0] }).key;
+    this.links = this.hand.links.map(() => new Group());
     this.scene.add(...this.links, this.object, this.obstacles, this.atRest);
     const body = this.addPieces(decoded);
     const size = body ? Math.max(...body.half.toArray()) : 0.03;
-    this.contacts = new Contacts(story.scene, motion, size, largestForce(motion));
+    this.contacts = new Contacts(this.hand, story.scene.friction, motion, size, largestForce(motion));
     this.object.add(this.contacts.current, this.contacts.trace);
     if (motion.isTracking) this.addRims();
     this.addLights(this.scene);
@@ -106,39 +118,61 @@ export class Stage {
 
   private addPieces(decoded: Map<number, Triangles>): { geometry: BufferGeometry; middle: Vector3; half: Vector3 } | null {
     const { scene } = this.story;
+    const bodies = new Map(bodiesOf(scene).map((body) => [body.key, { body, carriers: this.carriersOf(body) }]));
     const groups = new Map<string, PieceStory[]>();
     for (const piece of scene.pieces) {
-      const key = `${piece.on}/${piece.role}/${piece.is_tip}/${piece.on === "world" ? piece.name : ""}`;
+      const key = JSON.stringify([piece.on, piece.role, piece.is_tip]);
       groups.set(key, [...(groups.get(key) ?? []), piece]);
     }
     let body: { geometry: BufferGeometry; middle: Vector3; half: Vector3 } | null = null;
     for (const pieces of groups.values()) {
-      const { on, role, part, is_tip } = pieces[0];
-      const isObstacle = part === "obstacle";
+      const { on, role, is_tip } = pieces[0];
+      const { kind, key, link } = placeOf(on);
+      const { body: of, carriers } = bodies.get(key)!;
+      const isObstacle = kind === "obstacle";
+      const isRobot = kind === "hand" || kind === "robot_part";
       const geometry = geometryOf(pieces, scene.meshes, decoded);
-      let material: Material;
-      if (on === "object") {
+      let material: MeshLambertMaterial;
+      if (key === movedObject(scene)) {
         geometry.computeBoundingBox();
         const middle = geometry.boundingBox!.getCenter(new Vector3());
         const half = geometry.boundingBox!.getSize(new Vector3()).multiplyScalar(0.5).max(new Vector3(1e-6, 1e-6, 1e-6));
         material = patterned(middle, half, this.pattern);
         if (!body || role === "visual") body = { geometry, middle, half };
-      } else if (part === "hand") material = this.linkMaterial(on === "world" ? -1 : scene.links[on]?.finger ?? -1, is_tip);
-      else material = isObstacle ? this.obstacleMaterial() : this.restingMaterial(part === "object" ? "objectLight" : "faint");
+      } else if (isRobot) material = this.linkMaterial(of.moves ? of.links[link].finger : -1, is_tip);
+      else material = isObstacle ? this.obstacleMaterial() : this.restingMaterial(kind === "object" ? "objectLight" : "faint");
       const mesh = new Mesh(geometry, material);
       if (isObstacle) mesh.renderOrder = 1;
-      const edges = part === "hand" ? null : this.edges(geometry, isObstacle ? 0.5 : 0.35);
+      const edges = isRobot ? null : this.edges(geometry, isObstacle ? 0.5 : 0.35);
       if (edges) mesh.add(edges);
-      const resting = isObstacle ? this.obstacles : this.atRest;
-      (on === "object" ? this.object : on === "world" ? resting : this.links[on] ?? this.scene).add(mesh);
-      this.shapes.push({ mesh, role, name: pieces[0].name });
+      carriers[Math.max(link, 0)].add(mesh);
+      const ofLink = of.links[link]?.name;
+      this.shapes.push({ mesh, role, body: key, name: ofLink === undefined ? of.name : of.moves ? ofLink : `${of.name}/${ofLink}` });
     }
     return body;
   }
 
+  /** What carries the pieces of a body: one group for each of its links, or one for all of it. */
+  private carriersOf({ key, kind, moves, links, joints }: Body): Group[] {
+    if (moves) return kind === "hand" ? this.links : [this.object];
+    if (kind === "obstacle") return [this.obstacles];
+    if (kind === "support") return [this.atRest];
+    const { objects } = this.story.scene;
+    const poses = kind === "object"
+      ? objects.filter((_, index) => placeOf({ object: index }).key === key).map((object) => poseFrom(object.world_from_object))
+      : linkPoses(links, joints.map((joint) => joint.at_rest));
+    const groups = poses.map((pose) => {
+      const group = new Group();
+      place(group, pose);
+      return group;
+    });
+    this.atRest.add(...groups);
+    return groups;
+  }
+
   /** Shells around the tips of which only the far side is drawn: what shows beyond the tip is its outline. */
   private addRims(): void {
-    for (const finger of this.story.scene.fingers) {
+    for (const finger of this.hand.fingers) {
       const rim = new Mesh(new SphereGeometry(1.13 * finger.tip_radius, 32, 20), new MeshBasicMaterial({ side: BackSide }));
       rim.position.set(...finger.tip_center_in_link);
       rim.visible = false;
@@ -151,7 +185,7 @@ export class Stage {
     const stretch = this.motion.stretches[this.motion.stretchAt(time)];
     this.rims.forEach((rim, finger) => {
       const moves = stretch?.allMoving.includes(finger) ?? false;
-      rim.visible = moves || finger === stretch?.rolling;
+      rim.visible = (moves || finger === stretch?.rolling) && !this.hidden.has(this.movingKey);
       (rim.material as MeshBasicMaterial).color.set(moves ? this.theme.colours.ink : this.theme.colours.muted);
     });
   }
@@ -258,7 +292,7 @@ export class Stage {
       this.scene.updateMatrixWorld(true);
       this.links.forEach((link, k) => {
         const box = new Box3().setFromObject(link);
-        if (!box.isEmpty()) (this.story.scene.links[k].finger >= 0 ? near : far).push(box);
+        if (!box.isEmpty()) (this.hand.links[k].finger >= 0 ? near : far).push(box);
       });
       for (const child of this.object.children) if (child instanceof Mesh) near.push(new Box3().setFromObject(child));
     }
@@ -288,7 +322,8 @@ export class Stage {
   }
 
   setTime(time: number): void {
-    linkPoses(this.story.scene, this.motion.joints(time)).forEach((pose, i) => place(this.links[i], pose));
+    this.time = time;
+    linkPoses(this.hand.links, this.motion.joints(time)).forEach((pose, i) => place(this.links[i], pose));
     const now = this.motion.object(time);
     place(this.object, now);
     this.contacts.show(time);
@@ -304,7 +339,7 @@ export class Stage {
     this.layers[layer] = shown;
     // Each role is complete where there is any piece of it.
     const role = this.layers.visual && this.hasVisual ? "visual" : "collision";
-    for (const shape of this.shapes) shape.mesh.visible = shape.role === role;
+    for (const shape of this.shapes) shape.mesh.visible = shape.role === role && !this.hidden.has(shape.body);
     for (const material of this.handMaterials) {
       material.transparent = this.layers.seeThrough;
       material.opacity = this.layers.seeThrough ? 0.35 : 1;
@@ -319,12 +354,28 @@ export class Stage {
     this.dirty = true;
   }
 
+  /** Shows or hides a body. */
+  setShown(key: string, shown: boolean): void {
+    if (shown) this.hidden.delete(key);
+    else this.hidden.add(key);
+    this.setLayer("visual", this.layers.visual);
+    this.showRims(this.time);
+  }
+
+  /** Makes a body stand out; none for null. */
+  mark(key: string | null): void {
+    if (key === this.marked) return;
+    this.marked = key;
+    for (const { mesh, body } of this.shapes) mesh.material.emissive.set(body === key ? MARK : 0);
+    this.dirty = true;
+  }
+
   /** Layers that this story has anything for. */
   has(layer: Layer): boolean {
     const { pieces } = this.story.scene;
     if (layer === "visual") return this.hasVisual && pieces.some((p) => p.role === "collision");
-    if (layer === "seeThrough") return pieces.some((p) => typeof p.on === "number");
-    if (layer === "obstacles") return pieces.some((p) => p.part === "obstacle");
+    if (layer === "seeThrough") return pieces.some((p) => "hand" in p.on);
+    if (layer === "obstacles") return pieces.some((p) => "obstacle" in p.on);
     if (layer === "forces") return this.motion.hasForces;
     if (layer === "contacts" || layer === "cones" || layer === "trace") return this.motion.holds.some((h) => h.length > 0);
     return this.ghosts.length > 0;
@@ -364,13 +415,13 @@ export class Stage {
     this.place({ ...now, azimuth: now.azimuth + azimuth, elevation: now.elevation + elevation, distance });
   }
 
-  /** Name of what is seen at a place of the canvas, given as shares of its width and height. */
-  nameAt(x: number, y: number): string | null {
+  /** Name of what is seen at a place of the canvas, given as shares of its width and height, and the key of its body. */
+  seenAt(x: number, y: number): { name: string; body: string } | null {
     const ray = new Raycaster();
     ray.setFromCamera(new Vector2(2 * x - 1, 1 - 2 * y), this.camera);
     const shown = this.shapes.filter(({ mesh }) => mesh.visible && (mesh.parent?.visible ?? true));
     const hit = ray.intersectObjects(shown.map((shape) => shape.mesh), false)[0];
-    return shown.find((shape) => shape.mesh === hit?.object)?.name ?? null;
+    return shown.find((shape) => shape.mesh === hit?.object) ?? null;
   }
 
   place(camera: CameraPlace): void {

@@ -1,0 +1,113 @@
+//! Is friction what is missing? Grasps are drawn as the search draws them, and judged with more friction than it plans with.
+
+use arrayvec::ArrayVec;
+use regrasp_base::Rng;
+use regrasp_geometry::Pose;
+use regrasp_geometry::collision::Placement;
+use regrasp_grasp::{Contact, GraspFrame, Grip, closure};
+use regrasp_manipulation::failure::{Failure, FailureKind};
+use regrasp_manipulation::grasp::contact::draw_footholds;
+use regrasp_manipulation::grasp::state::MAX_FINGERS;
+use regrasp_manipulation::model::{Model, friction_in_words};
+use regrasp_manipulation::workspace::Workspace;
+
+/// Share of the failures that have to be for want of closure before grasps are drawn. By hand.
+const CLOSURE_SHARE: f64 = 0.15;
+/// Contacts drawn for each finger at each end of the query.
+const CONTACTS: usize = 12;
+/// Grasps that these contacts are combined to, at each end.
+const GRASPS: usize = 250;
+/// Share of the grasps in which every finger must be able to lift before friction counts as enough. By hand: scenes that are solved
+/// at once have more.
+const ENOUGH: f64 = 0.02;
+/// Coefficients that are tried, besides the scene's without its margin: rubber on most things, soft rubber.
+const MORE: [f64; 2] = [1.0, 1.5];
+
+/// In how many of the grasps drawn each finger may lift, with one friction coefficient.
+struct Lifts {
+    friction: f64,
+    of_finger: [usize; MAX_FINGERS],
+}
+
+/// Says in `failure` that more friction would let fingers lift, where the search failed for want of closure and that is so.
+pub fn advise(model: &Model, ends: [&Pose; 2], seed: u64, failure: &mut Failure) {
+    let counts = &failure.statistics.failures;
+    let of = |key: &str| counts.get(key).copied().unwrap_or(0) as f64;
+    let total: f64 = counts.values().map(|&count| count as f64).sum();
+    let is_open = matches!(failure.kind, FailureKind::WorkSpent | FailureKind::TimeLimit);
+    if !is_open || !model.may_release || of("not_closed") + of("not_released") < CLOSURE_SHARE * total.max(1.0) {
+        return;
+    }
+    let Some((n_grasps, lifts)) = lifts(model, ends, seed) else { return };
+    let n_fingers = model.n_fingers();
+    let least = |lifts: &Lifts| (0..n_fingers).map(|f| (lifts.of_finger[f], f)).min().unwrap_or((0, 0));
+    let share = |count: usize| count as f64 / n_grasps as f64;
+    let (n_now, finger) = least(&lifts[0]);
+    if share(n_now) >= ENOUGH {
+        return;
+    }
+    let better: Vec<&Lifts> = lifts[1..].iter().filter(|other| least(other).0 > 2 * n_now.max(2)).collect();
+    let Some(enough) = better.iter().find(|other| share(least(other).0) >= ENOUGH).or(better.last()) else { return };
+    let name = &model.view.hand.fingers[finger].name;
+    let others: Vec<String> = better
+        .iter()
+        .map(|other| format!("in {:.1} % with {}", 100.0 * share(other.of_finger[finger]), other.friction))
+        .collect();
+    failure.message += &format!(
+        "; friction is short: of {n_grasps} grasps drawn at start and goal, the other fingers hold without \"{name}\" in {:.1} % with \
+         friction {:.3} ({}), {}",
+        100.0 * share(n_now),
+        lifts[0].friction,
+        friction_in_words(model),
+        others.join(", ")
+    );
+    failure.advice = format!(
+        "fingertips with more friction (friction = {}), or soft ones (contact = \"soft_finger\"); {}",
+        enough.friction, failure.advice
+    );
+}
+
+/// Number of grasps drawn, and in how many of them each finger may lift: with the friction that is planned with, then with more
+/// and more. None where some finger has no contact at either end.
+fn lifts(model: &Model, ends: [&Pose; 2], seed: u64) -> Option<(usize, Vec<Lifts>)> {
+    let planned = model.frame.friction;
+    let mut levels = vec![planned];
+    let more = std::iter::once(model.view.object.friction).chain(MORE);
+    more.for_each(|friction| levels.extend((friction > 1.05 * levels[levels.len() - 1]).then_some(friction)));
+    let mut lifts: Vec<Lifts> =
+        levels.into_iter().map(|friction| Lifts { friction, of_finger: [0; MAX_FINGERS] }).collect();
+    let mut workspace = Workspace::new(model);
+    let mut n_grasps = 0;
+    for (end, pose) in ends.into_iter().enumerate() {
+        let mut rng = Rng::keyed(seed, "friction", end as u64);
+        let Some(contacts) = contacts_at(&mut workspace, pose, &mut rng) else { continue };
+        for _ in 0..GRASPS {
+            let grips: ArrayVec<Grip, MAX_FINGERS> =
+                contacts.iter().enumerate().map(|(f, found)| model.grip(f, &found[rng.below(found.len())])).collect();
+            n_grasps += 1;
+            for lifts in &mut lifts {
+                let frame = GraspFrame { friction: lifts.friction, ..model.frame };
+                for finger in 0..grips.len() {
+                    let mut others = grips.clone();
+                    others.remove(finger);
+                    let enough = model.settings.closure_margin;
+                    lifts.of_finger[finger] += usize::from(closure::closure_margin(&others, &frame, enough) >= enough);
+                }
+            }
+        }
+    }
+    (n_grasps > 0).then_some((n_grasps, lifts))
+}
+
+/// Contacts that each finger reaches with the object at `pose`. None where one of them finds none.
+fn contacts_at(workspace: &mut Workspace, pose: &Pose, rng: &mut Rng) -> Option<Vec<Vec<Contact>>> {
+    workspace.place_object(pose);
+    let placement = Placement::from(pose);
+    let n_fingers = workspace.model.n_fingers();
+    let of_finger = |finger: usize| {
+        let mut found = Vec::with_capacity(CONTACTS);
+        draw_footholds(workspace, finger, &placement, CONTACTS, rng, |contact, _| found.push(contact));
+        (!found.is_empty()).then_some(found)
+    };
+    (0..n_fingers).map(of_finger).collect()
+}

@@ -1,0 +1,220 @@
+//! Hands guessed from a URDF: where their base is, which joints are held, and fixes that lead on when they are pasted.
+
+use regrasp_robot::import::LoadedHand;
+use regrasp_robot::{LoadOptions, load_hand};
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+
+/// A finger of two joints called `name` on `parent`.
+fn finger(name: &str, parent: &str) -> String {
+    let mut text = String::new();
+    for (joint, from, to, at) in [
+        ("low", parent.to_owned(), format!("{name}_a"), "0.03 0 0"),
+        ("high", format!("{name}_a"), format!("{name}_b"), "0 0 0.04"),
+    ] {
+        let _ = write!(
+            text,
+            r#"<link name="{to}"><collision><origin xyz="0 0 0.02"/><geometry><capsule radius="0.005" length="0.04"/></geometry></collision></link>
+<joint name="{name}_{joint}" type="revolute"><parent link="{from}"/><child link="{to}"/><origin xyz="{at}"/><axis xyz="0 1 0"/><limit lower="-1" upper="1"/></joint>
+"#
+        );
+    }
+    text
+}
+
+/// A link called `name` that joint `{name}_joint` turns on `parent`.
+fn turning(name: &str, parent: &str) -> String {
+    format!(
+        r#"<link name="{name}"/><joint name="{name}_joint" type="revolute"><parent link="{parent}"/><child link="{name}"/><axis xyz="0 0 1"/><limit lower="-1" upper="0.5"/></joint>
+"#
+    )
+}
+
+/// Writes the robot of `parts` and a hand file into `folder`; reads what `name` says.
+fn load(folder: &Path, parts: &str, hand: &str, name: &str, base: Option<&str>) -> Result<LoadedHand, Vec<String>> {
+    fs::write(folder.join("hand.urdf"), format!(r#"<robot name="r"><link name="root"/>{parts}</robot>"#)).unwrap();
+    fs::write(folder.join("hand.toml"), hand).unwrap();
+    let options = LoadOptions { base: base.map(str::to_owned), ..LoadOptions::default() };
+    let prefix = format!("{}/", folder.display());
+    load_hand(&folder.join(name), &options)
+        .map_err(|error| error.diagnostics.iter().map(|d| d.to_string().replace(&prefix, "")).collect())
+}
+
+fn guess(parts: &str, base: Option<&str>) -> Result<LoadedHand, Vec<String>> {
+    load(tempfile::tempdir().unwrap().path(), parts, "", "hand.urdf", base)
+}
+
+/// The hand: its base, and the joints of each finger.
+fn summary(loaded: &LoadedHand) -> (String, Vec<Vec<String>>) {
+    let hand = &loaded.hand;
+    let base = hand.robot.links[hand.base.0].name.clone();
+    (base, hand.fingers.iter().map(|finger| finger.chain.names.clone()).collect())
+}
+
+#[test]
+fn a_fold_of_the_palm_that_two_fingers_share_is_held() {
+    let parts =
+        [finger("i", "root"), finger("m", "root"), turning("fold", "root"), finger("r", "fold"), finger("l", "fold")];
+    let loaded = guess(&parts.concat(), None).unwrap();
+    let (base, fingers) = summary(&loaded);
+    assert_eq!(base, "root");
+    assert_eq!(fingers.concat(), ["i_low", "i_high", "m_low", "m_high", "r_low", "r_high", "l_low", "l_high"]);
+    assert!(
+        loaded.notes.iter().any(|note| note == "joint \"fold_joint\" belongs to no finger; held at 0"),
+        "{:?}",
+        loaded.notes
+    );
+}
+
+#[test]
+fn a_robot_with_two_hands_asks_for_one_and_takes_it() {
+    let hand = |side: &str| {
+        let palm = format!("{side}_palm");
+        let fingers: Vec<String> = ["a", "b", "c"].map(|name| finger(&format!("{side}_{name}"), &palm)).to_vec();
+        turning(&format!("{side}_arm"), "root") + &turning(&palm, &format!("{side}_arm")) + &fingers.concat()
+    };
+    let parts = hand("left") + &hand("right");
+    let messages = guess(&parts, None).unwrap_err();
+    assert_eq!(
+        messages,
+        [
+            "U208 hand.urdf: is a robot with more on it than one hand: fingers share joints with others; expected one hand\n  \
+          fix: regrasp inspect with --base left_palm, or --base right_palm"
+        ]
+    );
+    let (base, fingers) = summary(&guess(&parts, Some("right_palm")).unwrap());
+    assert_eq!(base, "right_palm");
+    assert_eq!(
+        fingers.concat(),
+        ["right_a_low", "right_a_high", "right_b_low", "right_b_high", "right_c_low", "right_c_high"]
+    );
+    // A base above the joints that all fingers share: those are held.
+    let (base, fingers) = summary(&guess(&parts, Some("left_arm")).unwrap());
+    assert_eq!(
+        (base.as_str(), fingers[0].as_slice()),
+        ("left_arm", ["left_a_low".to_owned(), "left_a_high".to_owned()].as_slice())
+    );
+}
+
+#[test]
+fn a_gripper_on_an_arm_beside_wheels_is_named() {
+    let arm = turning("torso", "root")
+        + &turning("shoulder", "torso")
+        + &turning("elbow", "shoulder")
+        + &turning("wrist", "elbow");
+    let parts =
+        turning("wheel", "root") + &arm + &turning("head", "torso") + &finger("l", "wrist") + &finger("r", "wrist");
+    assert_eq!(fix(&guess(&parts, None).unwrap_err()), "regrasp inspect with --base wrist");
+    assert_eq!(summary(&guess(&parts, Some("wrist")).unwrap()).1.concat(), ["l_low", "l_high", "r_low", "r_high"]);
+}
+
+#[test]
+fn a_base_link_that_is_not_there() {
+    let parts = turning("palm", "root") + &finger("a", "palm");
+    assert_eq!(
+        guess(&parts, Some("plam")).unwrap_err(),
+        [
+            "U205 hand.urdf argument \"--base\": the robot has no link \"plam\"; expected the name of a link of the URDF\n  fix: --base palm"
+        ]
+    );
+    assert_eq!(
+        guess(&parts, Some("a_b")).unwrap_err(),
+        [
+            "U214 hand.urdf: has no joint that moves below link \"a_b\", so no finger; expected a hand with moving fingers"
+        ]
+    );
+}
+
+const HEAD: &str = "format = \"regrasp-hand\"\nformat_version = 1\nurdf = \"hand.urdf\"\n";
+
+fn table(name: &str, more: &str) -> String {
+    format!(
+        "[[fingers]]\nname = \"{name}\"\ntip_link = \"{name}_b\"\n{more}tip = {{ shape = \"sphere\", radius = 0.005, center = [0, 0, 0.04] }}\n"
+    )
+}
+
+/// The fix of the first message.
+fn fix(messages: &[String]) -> String {
+    messages[0].split_once("\n  fix: ").unwrap_or_else(|| panic!("{messages:?}")).1.to_owned()
+}
+
+#[test]
+fn first_joints_that_are_printed_hold_what_two_of_three_fingers_share() {
+    let folder = tempfile::tempdir().unwrap();
+    let parts = [finger("i", "root"), turning("fold", "root"), finger("r", "fold"), finger("l", "fold")].concat();
+    let file = |r: &str, l: &str| format!("{HEAD}{}{}{}", table("i", ""), table("r", r), table("l", l));
+    let messages = load(folder.path(), &parts, &file("", ""), "hand.toml", None).unwrap_err();
+    assert_eq!(
+        fix(&messages),
+        "first_joint = \"r_low\" in finger \"r\" and first_joint = \"l_low\" in finger \"l\", so that shared joints are held"
+    );
+    let pasted = file("first_joint = \"r_low\"\n", "first_joint = \"l_low\"\n");
+    assert_eq!(load(folder.path(), &parts, &pasted, "hand.toml", None).unwrap().hand.fingers.len(), 3);
+}
+
+#[test]
+fn base_links_that_are_printed_lead_to_a_hand() {
+    let folder = tempfile::tempdir().unwrap();
+    let parts = turning("palm", "root") + &finger("i", "palm") + &finger("t", "palm");
+    let file = |head: &str| format!("{HEAD}{head}{}{}", table("i", ""), table("t", ""));
+    // Too low, then too high.
+    for head in ["base_link = \"i_a\"\n", "base_link = \"root\"\n"] {
+        let messages = load(folder.path(), &parts, &file(head), "hand.toml", None).unwrap_err();
+        let fix = fix(&messages);
+        assert!(fix.starts_with("base_link = \"palm\""), "{fix}");
+        let pasted = format!("{}\n", fix.split(',').next().unwrap());
+        assert_eq!(load(folder.path(), &parts, &file(&pasted), "hand.toml", None).unwrap().hand.fingers.len(), 2);
+    }
+}
+
+#[test]
+fn a_follower_of_another_finger_can_be_held_as_printed() {
+    let folder = tempfile::tempdir().unwrap();
+    let mimic = |text: &str| text.replace(r#"upper="1"/></joint>"#, r#"upper="1"/><mimic joint="i_high"/></joint>"#);
+    let parts = finger("i", "root")
+        + &finger("t", "root").replacen("upper=\"1\"/></joint>", "@", 1).replace('@', r#"upper="1"/></joint>"#);
+    // Only the last joint of the thumb follows.
+    let at = parts.rfind("<joint name=\"t_high\"").unwrap();
+    let parts = format!("{}{}", &parts[..at], mimic(&parts[at..]));
+    let messages = load(folder.path(), &parts, "", "hand.urdf", None).unwrap_err();
+    assert!(messages[0].starts_with("U209"), "{messages:?}");
+    let fix = fix(&messages);
+    let (_, tag) = fix.split_once("in the URDF: ").unwrap();
+    assert_eq!(tag, r#"<joint name="t_high" type="fixed">"#);
+    let pasted = parts.replace(r#"<joint name="t_high" type="revolute">"#, tag);
+    let loaded = load(folder.path(), &pasted, "", "hand.urdf", None).unwrap();
+    assert_eq!(summary(&loaded).1, [vec!["i_low", "i_high"], vec!["t_low"]]);
+}
+
+#[test]
+fn a_hand_file_without_a_urdf_is_told_the_one_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("left.urdf"), "").unwrap();
+    fs::write(folder.path().join("hand.toml"), "format = \"regrasp-hand\"\nformat_version = 1\n").unwrap();
+    let error = load_hand(&folder.path().join("hand.toml"), &LoadOptions::default()).unwrap_err();
+    assert_eq!(error.diagnostics[0].fix, "add urdf = \"left.urdf\"");
+}
+
+#[test]
+fn xacro_files_are_known_by_their_content() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hand.urdf.xacro");
+    let plain = format!(
+        r#"<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro"><link name="root"/>{}</robot>"#,
+        finger("i", "root")
+    );
+    // Already expanded: the ending alone means nothing.
+    fs::write(&path, &plain).unwrap();
+    assert_eq!(load_hand(&path, &LoadOptions::default()).unwrap().hand.fingers.len(), 1);
+    for (text, code) in [
+        (plain.replace("<link name=\"root\"/>", "<link name=\"root\"/><xacro:macro name=\"m\"/>"), "U107"),
+        // The prefix is not declared.
+        ("<robot name='r'><xacro:macro name='m'/></robot>".to_owned(), "U100"),
+    ] {
+        fs::write(&path, text).unwrap();
+        let diagnostic = load_hand(&path, &LoadOptions::default()).unwrap_err().diagnostics.remove(0);
+        let command = format!("xacro {} -o {}", path.display(), folder.path().join("hand.urdf").display());
+        assert_eq!((diagnostic.code, diagnostic.fix.ends_with(&command)), (code, true), "{diagnostic}");
+    }
+}
