@@ -12,6 +12,7 @@ SI units and radians; rotations are `quat_xyzw`; joint vectors are in the order 
 """
 
 from ._errors import Diagnostic, InputError, InternalError, RegraspError
+from ._grasps import GraspList, NoGrasps, check_grasps, list_grasps
 from ._model import (
     CoupledJoint,
     Finger,
@@ -43,6 +44,7 @@ __all__ = [
     "Diagnostic",
     "Failure",
     "Finger",
+    "GraspList",
     "Hand",
     "InputError",
     "InputFile",
@@ -50,6 +52,7 @@ __all__ = [
     "Joint",
     "Moment",
     "NearestMiss",
+    "NoGrasps",
     "Object",
     "Obstacle",
     "Plan",
@@ -67,7 +70,9 @@ __all__ = [
     "Violation",
     "__version__",
     "check",
+    "check_grasps",
     "export_mjcf",
+    "list_grasps",
     "load_hand",
     "load_scene",
     "place",

@@ -19,6 +19,7 @@ pub use regrasp_base as base;
 pub use regrasp_export as export;
 pub use regrasp_geometry as geometry;
 pub use regrasp_grasp as grasp;
+pub use regrasp_grasp_lists as grasp_lists;
 pub use regrasp_plan as plan;
 pub use regrasp_planners as planners;
 pub use regrasp_roadmap as roadmap;
@@ -27,6 +28,8 @@ pub use regrasp_scene as scene;
 pub use regrasp_viewer as viewer;
 
 pub use regrasp_base::{Budget, InputError};
+pub use regrasp_grasp::GraspList;
+pub use regrasp_grasp_lists::{GraspSettings, list_grasps};
 pub use regrasp_plan::Plan;
 pub use regrasp_planners::{
     Failure, InHandSettings, Method, PlannerSettings, TrackingMethod, TrackingSettings, plan_in_hand, plan_tracking,

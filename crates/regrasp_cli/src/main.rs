@@ -12,6 +12,8 @@ mod failure_text;
 mod interrupt;
 /// What the checker said, in words and as an event.
 mod judge;
+/// What the checker said of a grasp list.
+mod judge_grasps;
 /// Models from disk, with what the environment says about packages.
 mod load;
 /// Files that a command writes.

@@ -9,6 +9,8 @@ mod describe;
 mod document;
 /// Rust errors as Python exceptions.
 mod error;
+/// Grasp lists.
+mod grasps;
 /// No panic crosses the border.
 mod guard;
 /// Hands and scenes, read.
@@ -30,6 +32,8 @@ use pyo3::prelude::*;
 mod _regrasp {
     #[pymodule_export]
     use super::document::parse_toml;
+    #[pymodule_export]
+    use super::grasps::{check_grasps, list_grasps};
     #[pymodule_export]
     use super::guard::panic_for_tests;
     #[pymodule_export]

@@ -4,6 +4,7 @@ mod bad_input;
 mod commands;
 mod export;
 mod folder;
+mod grasps;
 mod growth;
 #[cfg(unix)]
 mod outputs;
