@@ -11,7 +11,7 @@ REGRASP := target/release/regrasp
 OUT ?= out
 PLAIN := --settings docs/benchmarks/plain.json
 
-.PHONY: all bench-grasps demo gallery test test-rust test-python test-page page python docs book reference release
+.PHONY: all bench-grasps demo gallery test test-rust test-python test-ray test-page page python docs book reference release
 
 all: release
 
@@ -72,6 +72,11 @@ python:
 test-python: release python
 	if [ ! -d $(VENV) ]; then echo "SKIPPED: tests of the Python package"; \
 	else REGRASP_CLI=$(CURDIR)/$(REGRASP) $(VENV)/bin/python -m pytest -q; fi
+
+# Data sets on Ray, in an environment that has it: `pip install ray`. Says SKIPPED where Ray is absent.
+test-ray:
+	if [ ! -d $(VENV) ]; then echo "SKIPPED: no environment (make python)"; \
+	else $(VENV)/bin/python -m pytest -q -rs python/tests/test_dataset_ray.py; fi
 
 # The page of `regrasp view`: its script and style are committed, so that cargo needs no npm.
 PAGE := crates/regrasp_viewer/page

@@ -149,7 +149,10 @@ def test_tracking_plans_are_rows_too() -> None:
     scene = regrasp.load_scene(SCENES / "football.toml")
     found = regrasp.plan(scene, seed=1)
     assert isinstance(found, regrasp.Plan)
-    again = regrasp.Plan.from_json(json.dumps(unpack(pack(json.loads(found.to_json())))))
+    content = json.loads(found.to_json())
+    # The checker wants friction of what slides to 1e-9 of it: rounded columns do not hold that, exact ones do.
+    assert not regrasp.check(regrasp.Plan.from_json(json.dumps(unpack(pack(content)))), scene)
+    again = regrasp.Plan.from_json(json.dumps(unpack(pack(content, exact=True))))
     assert regrasp.check(again, scene)
     assert [segment.moving for segment in again.segments] == [segment.moving for segment in found.segments]
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from .. import _regrasp
 from .draws import canonical, key_of
 from .episodes import row_of
-from .schema import SHARD_VERSION, shard_of
+from .schema import SCHEMA, SHARD_VERSION, shard_of
 from .specification import Specification, TaskSpec
 
 #: Blocks in a folder: folders of millions of files are slow.
@@ -47,7 +47,7 @@ def blocks_of(specification: Specification) -> list[Block]:
 
 def _content_key(task: TaskSpec, first: int, count: int) -> str:
     replay = canonical(task.replay.to_json()) if task.replay else ""
-    return key_of("shard", SHARD_VERSION, _regrasp.__version__, task.hash, replay, first, count)
+    return key_of("shard", SHARD_VERSION, " ".join(SCHEMA.names), _regrasp.__version__, task.hash, replay, first, count)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from collections.abc import Iterable, Iterator
 from importlib import import_module
 from typing import Any
@@ -10,6 +11,9 @@ from .blocks import Block, run_block
 from .pool import MAX_DEATHS, Lost, Outcome
 from .specification import TaskSpec
 from .tables import fault
+
+#: How long a cluster may take to answer, in seconds.
+CONNECT_SECONDS = 5.0
 
 
 def run_on_ray(tasks: tuple[TaskSpec, ...], blocks: Iterable[Block], address: str, n_workers: int | None) -> Iterator[Outcome]:
@@ -36,11 +40,15 @@ def run_on_ray(tasks: tuple[TaskSpec, ...], blocks: Iterable[Block], address: st
 
 def _join(ray: Any, address: str, n_workers: int | None) -> None:
     try:
+        host, separator, port = address.removeprefix("ray://").rpartition(":")
+        if separator:
+            # Ray itself would try for minutes.
+            socket.create_connection((host, int(port)), CONNECT_SECONDS).close()
         if address == "local":
             ray.init(address="local", num_cpus=n_workers, include_dashboard=False, log_to_driver=False, logging_level="error")
         else:
             ray.init(address=address, log_to_driver=False, logging_level="error")
-    except (ConnectionError, ValueError, RuntimeError) as error:
+    except (OSError, ValueError, RuntimeError) as error:
         fix = "ray start --head on one machine and ray start --address=HEAD on the others; or --ray local"
         raise fault("D130", f"--ray {address}", f"no cluster of Ray there: {str(error).splitlines()[0]}", fix=fix) from None
 

@@ -30,7 +30,21 @@ DIGITS = {
     "contact_normals": COARSE,
     "contact_forces": PRECISE,
     "contact_torsions": PRECISE,
+    "tip_points": PRECISE,
+    "relative_velocities": PRECISE,
+    "relative_turns": PRECISE,
 }
+#: Vectors that a contact may have, by their columns; those that it must have first.
+VECTORS = {
+    "contact_points": "point_in_object",
+    "contact_normals": "normal_in_object",
+    "contact_forces": "force_in_object",
+    "tip_points": "point_in_tip",
+    "relative_velocities": "relative_velocity_in_object",
+    "relative_turns": "relative_turn_in_object",
+}
+_CONTACT_KEYS = {"hand", "finger", "object", "mode", "torsion", *VECTORS.values()}
+_WAYPOINT_KEYS = {"time", "joints", "joint_velocities", "joint_torques", "world_from_objects", "contacts"}
 MODES = ("free", "fixed", "rolling", "pure_rolling", "twisting", "pure_sliding", "sliding")
 
 
@@ -49,7 +63,7 @@ def rounded(values: Floats, digits: int) -> Floats:
 def pack(plan: Mapping[str, Any], *, exact: bool = False) -> Row:
     """The columns of the content of a plan file: n waypoints, j joints, f fingers; SI units, all in the world or the object frame.
 
-    Raises `Unpackable` for plans that move several hands or objects.
+    Raises `Unpackable` for plans that move several hands or objects, or say something that no column holds.
     """
     hands, objects = plan["hands"], plan["objects"]
     if len(hands) != 1 or len(objects) != 1:
@@ -58,31 +72,30 @@ def pack(plan: Mapping[str, Any], *, exact: bool = False) -> Row:
     index = {finger: k for k, finger in enumerate(fingers)}
     waypoints = [waypoint for segment in plan["segments"] for waypoint in segment["waypoints"]]
     n, f = len(waypoints), len(fingers)
-    shape = (n, f, 3)
-    points, normals, forces = np.full(shape, np.nan), np.full(shape, np.nan), np.full(shape, np.nan)
+    vectors = {name: np.full((n, f, 3), np.nan) for name in VECTORS}
     torsions, modes = np.full((n, f), np.nan), np.zeros((n, f), np.int8)
     for k, waypoint in enumerate(waypoints):
+        _know(waypoint, _WAYPOINT_KEYS)
         for contact in waypoint["contacts"]:
+            _know(contact, _CONTACT_KEYS)
             at = k, index[contact["finger"]]
             modes[at] = MODES.index(contact["mode"])
-            points[at], normals[at] = contact["point_in_object"], contact["normal_in_object"]
-            forces[at] = contact.get("force_in_object", np.nan)
             torsions[at] = contact.get("torsion", np.nan)
+            for name, key in VECTORS.items():
+                vectors[name][at] = contact.get(key, np.nan)
     poses = [each["world_from_objects"][0] for each in waypoints]
     columns: dict[str, Floats] = {
         "time": np.array([each["time"] for each in waypoints], float),
         "joints": np.array([each["joints"] for each in waypoints], float),
         "joint_velocities": np.array([each["joint_velocities"] for each in waypoints], float),
         "object_pose": np.array([[*pose["position"], *pose["quat_xyzw"]] for pose in poses], float),
-        "contact_points": points,
-        "contact_normals": normals,
-        "contact_forces": forces,
         "contact_torsions": torsions,
+        **vectors,
     }
     if "joint_torques" in waypoints[0]:
         columns["joint_torques"] = np.array([each["joint_torques"] for each in waypoints], float)
     row: Row = {name: rounded(array, EXACT if exact else DIGITS[name]).ravel() for name, array in columns.items()}
-    for name in ("contact_forces", "contact_torsions"):
+    for name in ("contact_torsions", *list(VECTORS)[2:]):
         if np.isnan(row[name]).all():
             row[name] = None
     row.setdefault("joint_torques", None)
@@ -92,6 +105,12 @@ def pack(plan: Mapping[str, Any], *, exact: bool = False) -> Row:
     row["digits"] = EXACT if exact else PRECISE
     row["plan"] = _header(plan)
     return row
+
+
+def _know(entry: Mapping[str, Any], keys: set[str]) -> None:
+    unknown = entry.keys() - keys
+    if unknown:
+        raise Unpackable(f"no column holds {', '.join(sorted(unknown))} of the plan")
 
 
 def _header(plan: Mapping[str, Any]) -> str:
@@ -112,9 +131,8 @@ def unpack(row: Mapping[str, Any]) -> dict[str, Any]:
     poses = np.asarray(row["object_pose"], float).reshape(n, 7)
     turns = _unit(poses[:, 3:])
     modes = np.asarray(row["contact_modes"]).reshape(n, f)
-    points = np.asarray(row["contact_points"], float).reshape(n, f, 3)
-    normals = _unit(np.asarray(row["contact_normals"], float).reshape(n, f, 3))
-    forces = None if row["contact_forces"] is None else np.asarray(row["contact_forces"], float).reshape(n, f, 3)
+    vectors = {name: np.asarray(row[name], float).reshape(n, f, 3) for name in VECTORS if row[name] is not None}
+    vectors["contact_normals"] = _unit(vectors["contact_normals"])
     torsions = None if row["contact_torsions"] is None else np.asarray(row["contact_torsions"], float).reshape(n, f)
     waypoints: list[dict[str, Any]] = []
     for k in range(n):
@@ -127,11 +145,10 @@ def unpack(row: Mapping[str, Any]) -> dict[str, Any]:
                 "finger": finger,
                 "object": name,
                 "mode": MODES[modes[k, i]],
-                "point_in_object": points[k, i].tolist(),
-                "normal_in_object": normals[k, i].tolist(),
             }
-            if forces is not None and not np.isnan(forces[k, i]).any():
-                contact["force_in_object"] = forces[k, i].tolist()
+            for column, values in vectors.items():
+                if not np.isnan(values[k, i]).any():
+                    contact[VECTORS[column]] = values[k, i].tolist()
             if torsions is not None and not np.isnan(torsions[k, i]):
                 contact["torsion"] = float(torsions[k, i])
             contacts.append(contact)
