@@ -11,7 +11,7 @@ REGRASP := target/release/regrasp
 OUT ?= out
 PLAIN := --settings docs/benchmarks/plain.json
 
-.PHONY: all demo gallery test test-rust test-python test-ray test-page page python docs book reference release
+.PHONY: all bench-grasps demo gallery test test-rust test-python test-ray test-page page python docs book reference release
 
 all: release
 
@@ -21,6 +21,10 @@ release:
 # Plans a sphere turn, checks it, says what it did, writes $(OUT)/demo.
 demo: release
 	$(REGRASP) demo -o $(OUT)/demo
+
+# Lists of grasps of real hands and objects: docs/benchmarks/grasps.md.
+bench-grasps:
+	cargo xtask bench-grasps
 
 # The pictures of README and docs/gallery.md, which has the same commands; those of the Allegro and Shadow hands want the models. The same
 # bytes every time.

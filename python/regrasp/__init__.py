@@ -12,6 +12,7 @@ SI units and radians; rotations are `quat_xyzw`; joint vectors are in the order 
 """
 
 from ._errors import Diagnostic, InputError, InternalError, RegraspError
+from ._grasps import GraspList, NoGrasps, check_grasps, list_grasps
 from ._model import (
     CoupledJoint,
     Finger,
@@ -31,7 +32,7 @@ from ._model import (
     load_scene,
 )
 from ._plan import CONTACT_MODES, Plan, Segment
-from ._planning import check, export_mjcf, plan, view
+from ._planning import check, export_mjcf, place, plan, view
 from ._regrasp import __version__
 from ._result import Cause, Clearance, Failure, Moment, NearestMiss, Progress, Report, Violation
 
@@ -43,6 +44,7 @@ __all__ = [
     "Diagnostic",
     "Failure",
     "Finger",
+    "GraspList",
     "Hand",
     "InputError",
     "InputFile",
@@ -50,6 +52,7 @@ __all__ = [
     "Joint",
     "Moment",
     "NearestMiss",
+    "NoGrasps",
     "Object",
     "Obstacle",
     "Plan",
@@ -67,9 +70,12 @@ __all__ = [
     "Violation",
     "__version__",
     "check",
+    "check_grasps",
     "export_mjcf",
+    "list_grasps",
     "load_hand",
     "load_scene",
+    "place",
     "plan",
     "view",
 ]

@@ -8,11 +8,11 @@ from __future__ import annotations
 import json
 import os
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
 from . import _regrasp
-from ._arguments import StrPath, real, seconds, seed_of, whole
+from ._arguments import StrPath, load_options, real, seconds, seed_of, whole
 from ._errors import argument_error
 from ._model import Scene, load_scene
 from ._plan import Plan
@@ -92,6 +92,68 @@ def plan(
     made = Plan(found, report=report_of(json.loads(outcome)))
     made._source = scene
     return made
+
+
+def place(
+    hand: StrPath,
+    object: StrPath,
+    output: StrPath,
+    *,
+    turns: Sequence[str] = ("z:90",),
+    mass: float | None = None,
+    friction: float | None = None,
+    scale: float | str | None = None,
+    torsion_radius: float | None = None,
+    alternatives: int = 0,
+    seed: int = 0,
+    time_limit: float | None = None,
+    max_work: int = 1_000_000,
+    packages: Mapping[str, StrPath] | None = None,
+) -> list[Scene] | Failure:
+    """Finds poses of an object in a hand from which it can be turned, and writes a scene for the best of them.
+
+    The answer is the scenes, the best first, each with its start pose (`Scene.start`); or a `Failure`, which is false, with the
+    causes where no pose with a grasp was found.
+
+    hand: hand file or URDF.
+    object: mesh file, scene file whose object is taken, or a primitive such as "sphere:0.032", "box:0.057,0.057,0.057",
+    "cylinder:0.03,0.07", "capsule:0.02,0.05", "ellipsoid:0.03,0.03,0.04", in metres.
+    output: scene file that is written; the alternatives go beside it, as scene.2.toml and on.
+    turns: turns about axes of the world that must look possible; of several, each becomes a task.
+    mass, friction: of the object; 0.1 kg and 0.8 where neither these nor a scene say any.
+    scale: of a mesh, as scene files have it.
+    torsion_radius: soft fingertips, where the hand file names no contact model.
+    alternatives: scenes of the next best poses, up to 5.
+    seed, time_limit, max_work: as in `plan`.
+    packages: folders of package://NAME/...
+
+    Raises `InputError`, and `InternalError` where regrasp has a bug.
+    """
+    if mass is not None:
+        mass = real("place", "mass", mass, lambda value: value >= 0, "a number from 0")
+    if friction is not None:
+        friction = real("place", "friction", friction, lambda value: value >= 0, "a number from 0")
+    if torsion_radius is not None:
+        torsion_radius = real("place", "torsion_radius", torsion_radius, lambda value: 0 <= value <= 1, "metres, 0 to 1")
+    request: dict[str, Any] = {
+        "hand": os.fspath(hand),
+        "object": os.fspath(object),
+        "output": os.fspath(output),
+        "turns": [str(turn) for turn in turns],
+        "mass": mass,
+        "friction": friction,
+        "scale": None if scale is None else str(scale),
+        "torsion_radius": torsion_radius,
+        "alternatives": whole("place", "alternatives", alternatives, 0, 5),
+        "seed": seed_of("place", seed),
+        "time_limit": seconds("place", "time_limit", time_limit),
+        "max_work": whole("place", "max_work", max_work, 0, 2**64 - 1),
+    }
+    options = load_options("place", packages, lenient=False)
+    paths, failure = _regrasp.place(request, options)
+    if failure is not None:
+        return failure_of(failure)
+    return [load_scene(path, packages=packages) for path in paths]
 
 
 def _listener(progress: Callable[[Progress], object]) -> Callable[[dict[str, Any]], None]:

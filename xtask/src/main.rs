@@ -3,6 +3,7 @@
 
 mod bench;
 mod campaign;
+mod grasps;
 mod reference;
 mod replay;
 mod run;
@@ -15,7 +16,7 @@ use std::process::ExitCode;
 type Task = (&'static str, &'static str, fn(&[String]) -> Outcome);
 
 /// All tasks, in the order in which `cargo xtask` lists them.
-const TASKS: [Task; 12] = [
+const TASKS: [Task; 13] = [
     (
         "reference",
         "write the generated pages of docs/reference (--check: fail if they are out of date)",
@@ -28,6 +29,7 @@ const TASKS: [Task; 12] = [
         "measure queries on roadmaps of sphere and box, and on one of a million motions",
         bench::roadmaps,
     ),
+    ("bench-grasps", "lists of grasps of real hands and objects, as docs/benchmarks/grasps.md", grasps::bench),
     ("growth", "measure how loading and planning grow with fingers, triangles, obstacles and threads", bench::growth),
     ("bench-scans", "turn scanned objects that are not convex in the Allegro hand", scans::task),
     ("benchmark-page", "write docs/benchmarks.md from what was measured", bench::page),

@@ -4,8 +4,12 @@
 //! [`scene`] reads files, [`planners`] plans, [`plan`] holds the plan and its checker. Frames, units and the glossary are in
 //! `CONVENTIONS.md`; the tower of crates is in `ARCHITECTURE.md`.
 
+/// What a written file calls another one.
+pub mod file_names;
 /// Failures and roadmaps as the data that pages are made of.
 pub mod pictures;
+/// Scenes in which an object is to be placed.
+pub mod placing;
 /// Scene files as text.
 pub mod scene_text;
 /// Settings from several places.
@@ -15,6 +19,7 @@ pub use regrasp_base as base;
 pub use regrasp_export as export;
 pub use regrasp_geometry as geometry;
 pub use regrasp_grasp as grasp;
+pub use regrasp_grasp_lists as grasp_lists;
 pub use regrasp_plan as plan;
 pub use regrasp_planners as planners;
 pub use regrasp_roadmap as roadmap;
@@ -23,6 +28,8 @@ pub use regrasp_scene as scene;
 pub use regrasp_viewer as viewer;
 
 pub use regrasp_base::{Budget, InputError};
+pub use regrasp_grasp::GraspList;
+pub use regrasp_grasp_lists::{GraspSettings, list_grasps};
 pub use regrasp_plan::Plan;
 pub use regrasp_planners::{
     Failure, InHandSettings, Method, PlannerSettings, TrackingMethod, TrackingSettings, plan_in_hand, plan_tracking,

@@ -45,7 +45,8 @@ fn the_planners_do_not_see_each_other() {
 /// Rooms of the in-hand planner, each with those that it may import from: what comes first knows nothing of what comes later.
 #[test]
 fn rooms_of_the_in_hand_planner_stand_in_order() {
-    let rooms = ["attempt", "moving", "grasps", "regrasping", "searching", "recording", "improving", "roadmap"];
+    let rooms =
+        ["attempt", "moving", "grasps", "regrasping", "searching", "recording", "improving", "roadmap", "placing"];
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../regrasp_planners/src");
     let room_of = |module: &Module| match module.as_slice() {
         [first, room, ..] if first == "in_hand" => rooms.iter().position(|name| name == room),

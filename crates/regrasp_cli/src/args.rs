@@ -1,9 +1,11 @@
 //! Arguments. The spellings are a promise to scripts.
 
+mod grasps;
 mod judging;
 mod place;
 mod values;
 
+pub use grasps::Grasps;
 pub use judging::Judging;
 pub use place::Place;
 use values::{count, degrees, margin, metres, package, seconds, threads, trials, whole_number};
@@ -63,7 +65,9 @@ pub enum Command {
     Place(Place),
     /// Plan a scene, check the plan, then write it
     Plan(Plan),
-    /// Judge a plan from the files alone; exit code 0 accepted, 1 rejected
+    /// Find grasps of an object, check them, then write the list
+    Grasps(Grasps),
+    /// Judge a plan or a grasp list from the files alone; exit code 0 accepted, 1 rejected
     Check(Check),
     /// Show a plan: one page for a browser, with nothing to install and no network
     View(View),
@@ -172,11 +176,17 @@ pub struct Plan {
 /// `regrasp check`
 #[derive(Debug, Args)]
 pub struct Check {
-    /// Plan file
+    /// Plan file, or grasp list
     pub plan: PathBuf,
     /// Scene file [default: the one that the plan names, beside the plan or in the current folder]
     #[arg(long, value_name = "FILE")]
     pub scene: Option<PathBuf>,
+    /// Hand file of a grasp list [default: the one that the list names]
+    #[arg(long, value_name = "FILE", conflicts_with = "scene")]
+    pub hand: Option<PathBuf>,
+    /// Object of a grasp list, a mesh or a scene file [default: the one that the list names]
+    #[arg(long, value_name = "FILE", conflicts_with = "scene")]
+    pub object: Option<PathBuf>,
     /// By what plans are judged.
     #[command(flatten)]
     pub judging: Judging,
@@ -186,7 +196,7 @@ pub struct Check {
 #[derive(Debug, Args)]
 #[command(group(ArgGroup::new("pictures").required(true).multiple(true)))]
 pub struct View {
-    /// Plan file
+    /// Plan file, or grasp list: its page is a gallery
     pub plan: PathBuf,
     /// Scene file [default: the one that the plan names, beside the plan or in the current folder]
     pub scene: Option<PathBuf>,
@@ -229,7 +239,7 @@ pub struct View {
 #[derive(Debug, Args)]
 #[command(group(ArgGroup::new("formats").required(true).multiple(true)))]
 pub struct Export {
-    /// Plan file
+    /// Plan file, or grasp list
     pub plan: PathBuf,
     /// Arrays for numpy, without pickle
     #[arg(long, value_name = "FILE.npz", group = "formats")]
@@ -240,6 +250,12 @@ pub struct Export {
     /// MuJoCo model of the scene, with a keyframe for every waypoint
     #[arg(long, value_name = "FILE.xml", group = "formats")]
     pub mjcf: Option<PathBuf>,
+    /// Grasp list as an Isaac grasp file
+    #[arg(long, value_name = "FILE.yaml", group = "formats")]
+    pub isaac: Option<PathBuf>,
+    /// Grasp list as moveit_msgs/Grasp messages
+    #[arg(long, value_name = "FILE.yaml", group = "formats")]
+    pub moveit: Option<PathBuf>,
     /// Scene file [default: the one that the plan names, beside the plan or in the current folder]
     #[arg(long, value_name = "FILE")]
     pub scene: Option<PathBuf>,

@@ -52,6 +52,18 @@ pub fn failure_text(failure: &Failure) -> String {
     out
 }
 
+/// A failure of a search for grasps, for people.
+pub fn grasp_failure_text(failure: &Failure) -> String {
+    let mut out = format!("NO GRASP\n  {}\n", failure.message);
+    for cause in failure.causes.iter().take(8) {
+        let _ = writeln!(out, "    {:>5.1} %  of the frames: {}", 100.0 * cause.share, cause.reason);
+    }
+    if !failure.advice.is_empty() {
+        let _ = writeln!(out, "  try: {}", failure.advice);
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -21,3 +21,17 @@ pub fn flag() -> Result<Arc<AtomicBool>, Stop> {
     .map_err(|error| Stop::Internal(format!("cannot listen to Ctrl-C: {error}")))?;
     Ok(cancelled)
 }
+
+/// A flag that the first Ctrl-C or SIGTERM sets, for commands that end well with what they have. The second one ends the process
+/// with exit code 130.
+pub fn patient_flag() -> Result<Arc<AtomicBool>, Stop> {
+    let cancelled = Arc::new(AtomicBool::new(false));
+    let seen = Arc::clone(&cancelled);
+    ctrlc::set_handler(move || {
+        if seen.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    })
+    .map_err(|error| Stop::Internal(format!("cannot listen to Ctrl-C: {error}")))?;
+    Ok(cancelled)
+}

@@ -8,12 +8,12 @@ mod args;
 mod commands;
 /// Failures for people.
 mod failure_text;
-/// What a written file calls another one.
-mod file_names;
 /// Ctrl-C, SIGTERM, and the promise to stop within 100 ms.
 mod interrupt;
 /// What the checker said, in words and as an event.
 mod judge;
+/// What the checker said of a grasp list.
+mod judge_grasps;
 /// Models from disk, with what the environment says about packages.
 mod load;
 /// Files that a command writes.

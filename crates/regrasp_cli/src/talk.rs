@@ -81,6 +81,12 @@ impl Talk {
                     self.line_to_stderr(crate::failure_text::failure_text(failure).trim_end());
                 }
             }
+            Stop::NoGrasp(failure) => {
+                self.event("no_grasp", json!({ "failure": failure }));
+                if !self.json {
+                    self.line_to_stderr(crate::failure_text::grasp_failure_text(failure).trim_end());
+                }
+            }
             Stop::Rejected => {}
             Stop::Interrupted => self.line_to_stderr("interrupted"),
             Stop::Internal(message) => {

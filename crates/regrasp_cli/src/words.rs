@@ -23,9 +23,20 @@ pub fn counted(n: usize, noun: &str) -> String {
     format!("{} {noun}{}", grouped(n as u64), if n == 1 { "" } else { "s" })
 }
 
+/// `[0.082, -0.003, 0.005]`, as a scene file takes it. Values that round to zero have no sign.
+pub fn metres(point: &[f64; 3]) -> String {
+    let [x, y, z] = point.map(|value| (value * 1000.0).round() / 1000.0 + 0.0);
+    format!("[{x:.3}, {y:.3}, {z:.3}]")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn positions_are_as_scene_files_take_them() {
+        assert_eq!(metres(&[0.0821, -0.0002, 1.0]), "[0.082, 0.000, 1.000]");
+    }
 
     #[test]
     fn thousands_are_set_apart() {

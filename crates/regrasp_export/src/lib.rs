@@ -1,4 +1,4 @@
-//! Plans in the formats of other tools. Knows no planner; `docs/reference/export-formats.md` describes what is written.
+//! Plans and grasp lists in the formats of other tools. Knows no planner; `docs/reference/export-formats.md` describes what is written.
 //!
 //! Everything written is a function of the plan alone: the same plan gives the same bytes.
 
@@ -6,12 +6,16 @@
 pub mod arrays;
 /// Why a plan cannot be written in a format.
 pub mod error;
+/// Grasp lists in the formats of other tools.
+pub mod grasps;
 /// MuJoCo models of a plan's scene.
 pub mod mjcf;
 /// Arrays for numpy: `.npz` without pickle.
 pub mod npz;
 /// ROS 2 `trajectory_msgs/JointTrajectory` as YAML.
 pub mod ros2;
+/// Texts and numbers as YAML.
+mod yaml;
 
 pub use arrays::PlanArrays;
 pub use error::ExportError;

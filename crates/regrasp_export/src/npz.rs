@@ -57,7 +57,7 @@ pub fn to_npz(plan: &Plan) -> Result<Vec<u8>, ExportError> {
 }
 
 /// Refuses texts whose array would have more characters than [`MOST_CHARACTERS`].
-fn refuse_too_long(what: &'static str, texts: &[String]) -> Result<(), ExportError> {
+pub(crate) fn refuse_too_long(what: &'static str, texts: &[String]) -> Result<(), ExportError> {
     let longest = texts.iter().map(|text| text.chars().count()).max().unwrap_or(0);
     match longest.saturating_mul(texts.len()) {
         characters if characters > MOST_CHARACTERS => Err(ExportError::TextTooLong { what, characters, longest }),
@@ -66,17 +66,17 @@ fn refuse_too_long(what: &'static str, texts: &[String]) -> Result<(), ExportErr
 }
 
 /// An archive being written to memory.
-struct Npz(ZipWriter<Cursor<Vec<u8>>>);
+pub(crate) struct Npz(ZipWriter<Cursor<Vec<u8>>>);
 
 /// What memory cannot refuse.
 const IN_MEMORY: &str = "writing an archive to memory does not fail";
 
 impl Npz {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Npz(ZipWriter::new(Cursor::new(Vec::new())))
     }
 
-    fn add(&mut self, name: &str, npy: &[u8]) {
+    pub(crate) fn add(&mut self, name: &str, npy: &[u8]) {
         // The date is that of the ZIP epoch: bytes must not depend on the clock.
         let options = SimpleFileOptions::default()
             .compression_method(CompressionMethod::Stored)
@@ -86,23 +86,23 @@ impl Npz {
         self.0.write_all(npy).expect(IN_MEMORY);
     }
 
-    fn finish(self) -> Vec<u8> {
+    pub(crate) fn finish(self) -> Vec<u8> {
         self.0.finish().expect(IN_MEMORY).into_inner()
     }
 }
 
-fn names(names: &[String]) -> Vec<u8> {
+pub(crate) fn names(names: &[String]) -> Vec<u8> {
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     texts(&[names.len()], &names)
 }
 
-fn integers(shape: &[usize], values: &[i64]) -> Vec<u8> {
+pub(crate) fn integers(shape: &[usize], values: &[i64]) -> Vec<u8> {
     let values = Numbers::Integers(values);
     npy(values.numpy_type(), shape, values.to_bytes())
 }
 
 /// Text of one width, in UTF-32, filled up with zeros.
-fn texts(shape: &[usize], values: &[&str]) -> Vec<u8> {
+pub(crate) fn texts(shape: &[usize], values: &[&str]) -> Vec<u8> {
     let width = values.iter().map(|text| text.chars().count()).max().unwrap_or(0).max(1);
     let padded = |text: &&str| -> Vec<char> { text.chars().chain(std::iter::repeat('\0')).take(width).collect() };
     let data = values.iter().flat_map(padded).flat_map(|c| u32::from(c).to_le_bytes()).collect();
@@ -110,7 +110,7 @@ fn texts(shape: &[usize], values: &[&str]) -> Vec<u8> {
 }
 
 /// A file of version 1.0 of the NPY format: magic word, header padded to a multiple of 64 bytes, data in C order.
-fn npy(descr: &str, shape: &[usize], data: Vec<u8>) -> Vec<u8> {
+pub(crate) fn npy(descr: &str, shape: &[usize], data: Vec<u8>) -> Vec<u8> {
     const BEFORE_HEADER: usize = 10;
     let lengths: String = shape.iter().map(|length| format!("{length},")).collect();
     let mut header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({lengths}), }}");

@@ -33,6 +33,8 @@ mod stable;
 mod surface;
 /// The way of the hand.
 mod way;
+/// The hand with all that hangs on it.
+mod whole_hand;
 
 pub use regrasp_manipulation::failure::{Cause, Failure, FailureKind};
 pub use run::Progress;
@@ -70,6 +72,10 @@ pub fn list_grasps_telling(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<GraspList, Failure> {
     settings.validate().map_err(|problem| Failure::of_settings(&problem))?;
+    let whole = whole_hand::whole_hand(hand).map_err(|problem| {
+        Failure::bare(FailureKind::Impossible, problem, "give the link a collision shape with an inside")
+    })?;
+    let hand = &whole;
     let view = HandView {
         hand_index: 0,
         object_index: 0,

@@ -27,6 +27,7 @@ pub fn list(prepared: &Prepared, statistics: GraspStatistics, grasps: &[Found]) 
         inputs: Vec::new(),
         hand: HandRecord {
             name: hand.robot.name.clone(),
+            base_link: hand.robot.links[hand.base.0].name.clone(),
             fingers: hand.fingers.iter().map(|finger| finger.name.clone()).collect(),
             joint_names: hand.joint_names(),
         },

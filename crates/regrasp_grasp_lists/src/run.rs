@@ -170,7 +170,7 @@ fn failure(prepared: &Prepared, tally: &Tally, cut: Option<Interrupt>) -> Failur
             share: count as f64 / total.max(1) as f64,
         })
         .collect();
-    causes.sort_by(|a, b| b.count.cmp(&a.count));
+    causes.sort_by_key(|cause| std::cmp::Reverse(cause.count));
     let nearest = match (tally.margin > 0.0, tally.worst_finger()) {
         (true, _) => {
             format!("the best contacts seen have margin {:.4}; {} is asked for", tally.margin, prepared.settings.margin)

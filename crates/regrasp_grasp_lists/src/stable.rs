@@ -44,7 +44,7 @@ pub fn stable_poses(shape: &Shape, center_of_mass: &Point, least_angle: f64) -> 
         Shape::Cylinder { half_length, radius } => {
             let offset = center_of_mass.coords.xy().norm();
             let end = |side: f64| {
-                let above = half_length + side * center_of_mass.z * -1.0;
+                let above = half_length - side * center_of_mass.z;
                 let tipping_angle = (radius - offset).atan2(above);
                 Standing { down: Vector::z() * side, height: *half_length, tipping_angle }
             };

@@ -9,10 +9,14 @@ mod describe;
 mod document;
 /// Rust errors as Python exceptions.
 mod error;
+/// Grasp lists.
+mod grasps;
 /// No panic crosses the border.
 mod guard;
 /// Hands and scenes, read.
 mod model;
+/// Where to hold an object.
+mod place;
 /// Plans.
 mod plan;
 /// Searching and judging.
@@ -29,9 +33,13 @@ mod _regrasp {
     #[pymodule_export]
     use super::document::parse_toml;
     #[pymodule_export]
+    use super::grasps::{check_grasps, list_grasps};
+    #[pymodule_export]
     use super::guard::panic_for_tests;
     #[pymodule_export]
     use super::model::{Hand, Scene, hand_file};
+    #[pymodule_export]
+    use super::place::place;
     #[pymodule_export]
     use super::plan::Plan;
     #[pymodule_export]

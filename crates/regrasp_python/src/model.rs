@@ -15,9 +15,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 /// How files are read, as the package passes it: packages by name and folder, folders to search, lenient.
-type Options = (Vec<(String, PathBuf)>, Vec<PathBuf>, bool);
+pub type Options = (Vec<(String, PathBuf)>, Vec<PathBuf>, bool);
 
-fn load_options((packages, search_paths, lenient): Options) -> LoadOptions {
+/// How files are read.
+pub fn load_options((packages, search_paths, lenient): Options) -> LoadOptions {
     LoadOptions { resolve: ResolveOptions { packages, search_paths }, lenient, ..LoadOptions::default() }
 }
 

@@ -5,6 +5,8 @@
 
 /// Charts of a plan.
 pub mod charts;
+/// The gallery of a grasp list.
+pub mod gallery;
 /// One self-contained HTML file.
 pub mod page;
 /// One colour per finger, the same in every picture.

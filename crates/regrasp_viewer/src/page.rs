@@ -35,13 +35,13 @@ pub fn html(story: &Story) -> String {
 }
 
 /// Source expression of a content security policy for an inline element with this text.
-fn hash(text: &str) -> String {
+pub(crate) fn hash(text: &str) -> String {
     format!("sha256-{}", base64(&files::sha256_bytes(text.as_bytes())))
 }
 
 /// Script or style as it can stand in an element called `tag`: nothing in it ends the element or opens a comment, and no
 /// line end is one that HTML would rewrite. In strings, templates and regular expressions `\/` and `\!` are `/` and `!`.
-fn embedded(text: &str, tag: &str) -> String {
+pub(crate) fn embedded(text: &str, tag: &str) -> String {
     let text = text.replace("\r\n", "\n").replace('\r', "\n").replace("<!--", "<\\!--");
     let mut out = String::with_capacity(text.len());
     let mut rest = text.as_str();

@@ -1,24 +1,59 @@
-//! `regrasp check`: judge a plan from the files alone.
+//! `regrasp check`: judge a plan or a grasp list from the files alone.
 
 use crate::args::{self, Common};
+use crate::commands::plan::available_threads;
 use crate::interrupt;
 use crate::judge;
+use crate::judge_grasps;
 use crate::load;
 use crate::stop::Stop;
 use crate::talk::Talk;
 use regrasp::base::files;
+use regrasp::grasp::GraspList;
+use regrasp::grasp::list::format::{from_json, is_list};
 use regrasp::plan::check::find_scene;
+use regrasp::plan::check::grasps::{GraspPaths, load_grasp_files};
 use regrasp::plan::{Plan, format};
+use regrasp::scene::GraspScene;
 use std::path::{Path, PathBuf};
 
 /// Judges; exit code 1 when the plan is rejected.
 pub fn run(arguments: &args::Check, common: &Common, talk: &Talk) -> Result<(), Stop> {
     // The flag is not asked here: the process ends by itself shortly after Ctrl-C.
     interrupt::flag()?;
-    let plan = format::from_json(&arguments.plan, &files::read(&arguments.plan)?)?;
+    let bytes = files::read(&arguments.plan)?;
+    if is_list(&bytes) {
+        return run_list(arguments, &bytes, common, talk);
+    }
+    if arguments.hand.is_some() || arguments.object.is_some() {
+        let problem = format!("stands beside {}, which is no grasp list", arguments.plan.display());
+        return Err(Stop::argument("A512", "--hand, --object", problem, "a grasp list; plans take --scene"));
+    }
+    let plan = format::from_json(&arguments.plan, &bytes)?;
     let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref(), "--scene FILE")?;
     let loaded = arguments.judging.scene(load::scene_of_plan(&scene_path, &plan, common, talk)?);
     if judge::judge(&loaded, &plan, &arguments.judging, talk)?.accepted() { Ok(()) } else { Err(Stop::Rejected) }
+}
+
+/// Judges a grasp list.
+fn run_list(arguments: &args::Check, bytes: &[u8], common: &Common, talk: &Talk) -> Result<(), Stop> {
+    let path = &arguments.plan;
+    let list = from_json(path, bytes)?;
+    let scene = grasp_scene(path, &list, [&arguments.hand, &arguments.object], common)?;
+    scene.notes.iter().for_each(|note| talk.note(note));
+    if judge_grasps::judge(&scene, &list, available_threads(), talk).accepted() { Ok(()) } else { Err(Stop::Rejected) }
+}
+
+/// Hand and object of a grasp list at `path`: those named, else those that the list names, in its folder or in the current one.
+pub fn grasp_scene(
+    path: &Path,
+    list: &GraspList,
+    [hand, object]: [&Option<PathBuf>; 2],
+    common: &Common,
+) -> Result<GraspScene, Stop> {
+    let own = path.parent().map_or_else(PathBuf::new, Path::to_owned);
+    let paths = GraspPaths { hand: hand.clone(), object: object.clone(), folders: vec![own, PathBuf::new()] };
+    Ok(load_grasp_files(path, list, &paths, &load::options(common))?)
 }
 
 /// The scene file of `plan`, which was read from `plan_path`: `named`, what `--scene` says, whatever the plan says; without

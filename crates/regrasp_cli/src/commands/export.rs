@@ -1,9 +1,10 @@
-//! `regrasp export`: a plan in the formats of other tools.
+//! `regrasp export`: a plan or a grasp list in the formats of other tools.
 //!
 //! What is exported may be sent to a robot: a plan that the checker rejects is refused, unless `--no-check` is given.
 
 use crate::args::{self, Common};
 use crate::commands::check::scene_of;
+use crate::commands::grasp_files;
 use crate::interrupt;
 use crate::judge;
 use crate::load;
@@ -12,6 +13,7 @@ use crate::stop::Stop;
 use crate::talk::Talk;
 use regrasp::base::{Diagnostic, Place, files};
 use regrasp::export;
+use regrasp::grasp::list::format::is_list;
 use regrasp::plan::format;
 use regrasp::{Manipulation, Plan};
 use serde_json::json;
@@ -38,7 +40,17 @@ pub fn run(arguments: &args::Export, common: &Common, talk: &Talk) -> Result<(),
         formats.into_iter().filter_map(|(name, path, write)| Some((name, path?, write))).collect();
     let written = Outputs::new(wanted.iter().map(|&(format, path, _)| Output::new(format, path)))?;
     written.refuse_inputs([arguments.plan.as_path()].into_iter().chain(arguments.scene.as_deref()))?;
-    let plan = format::from_json(&arguments.plan, &files::read(&arguments.plan)?)?;
+    let bytes = files::read(&arguments.plan)?;
+    if is_list(&bytes) {
+        return grasp_files::export(arguments, &bytes, common, talk);
+    }
+    if let Some((flag, _)) =
+        [("--isaac", &arguments.isaac), ("--moveit", &arguments.moveit)].iter().find(|f| f.1.is_some())
+    {
+        let problem = format!("is a format of grasp lists; {} is none", arguments.plan.display());
+        return Err(Stop::argument("A512", flag, problem, "a grasp list, or a format of plans"));
+    }
+    let plan = format::from_json(&arguments.plan, &bytes)?;
     let mut scene = None;
     if !arguments.no_check || arguments.mjcf.is_some() {
         let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref(), "--scene FILE")?;

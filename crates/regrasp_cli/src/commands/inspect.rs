@@ -1,14 +1,15 @@
 //! `regrasp inspect`: what a hand is like, and a hand file for it.
 
+use super::room::Room;
 use crate::args::{self, Common};
-use crate::file_names::name_from;
 use crate::interrupt;
 use crate::load;
 use crate::outputs::{refuse_input, refuse_unwritable};
 use crate::stop::Stop;
 use crate::talk::Talk;
-use crate::words::{counted, grouped};
+use crate::words::{counted, grouped, metres};
 use regrasp::base::{Rng, files};
+use regrasp::file_names::name_from;
 use regrasp::robot::import::LoadOptions;
 use regrasp::robot::inspect::{
     HandInspection, InspectSettings, Inspection, JointRow, RobotInspection, hand_file_text, inspect,
@@ -40,16 +41,18 @@ pub fn run(arguments: &args::Inspect, common: &Common, talk: &Talk) -> Result<()
     for note in &found.notes {
         talk.note(note);
     }
+    let room = found.hand.as_ref().ok().map(|(hand, _)| Room::of(hand, arguments.seed));
     talk.event(
         "inspection",
         json!({
             "robot": found.robot,
             "hand": found.hand.as_ref().ok().map(|(_, table)| table),
+            "room": room,
             "no_hand": found.hand.as_ref().err().map(|error| &error.diagnostics),
         }),
     );
     if !talk.is_json() {
-        talk.data(&report(&found));
+        talk.data(&report(&found, room.as_ref()));
     }
     match (&found.hand, &arguments.output) {
         (Err(error), Some(_)) => Err(Stop::BadInput(error.clone())),
@@ -68,11 +71,15 @@ pub fn run(arguments: &args::Inspect, common: &Common, talk: &Talk) -> Result<()
 }
 
 /// The whole report.
-fn report(found: &Inspection) -> String {
+fn report(found: &Inspection, room: Option<&Room>) -> String {
     let mut out = String::new();
     robot_part(&found.robot, &mut out);
     match &found.hand {
-        Ok((hand, table)) => hand_part(hand, table, &mut out),
+        Ok((hand, table)) => {
+            hand_part(hand, table, &mut out);
+            room.into_iter().for_each(|room| room.write(&mut out));
+            pairs_part(table, &mut out);
+        }
         Err(error) => {
             let _ = writeln!(out, "\nnot a hand as it stands:\n{error}");
         }
@@ -185,16 +192,9 @@ fn hand_part(model: &Hand, hand: &HandInspection, out: &mut String) {
             );
         }
     }
-    if !at_rest.is_empty() {
-        let sum = at_rest.iter().fold([0.0; 3], |sum, tip| std::array::from_fn(|axis| sum[axis] + tip[axis]));
-        let middle = sum.map(|value| value / at_rest.len() as f64);
-        let _ = writeln!(
-            out,
-            "  middle of the fingertips at rest: {} m, in the frame of {}: a first guess for the object's start",
-            metres(&middle),
-            hand.base
-        );
-    }
+}
+
+fn pairs_part(hand: &HandInspection, out: &mut String) {
     let pairs = &hand.pairs;
     let _ = writeln!(
         out,
@@ -226,20 +226,4 @@ fn hand_part(model: &Hand, hand: &HandInspection, out: &mut String) {
 fn tips_at_rest(hand: &Hand) -> Vec<[f64; 3]> {
     let centre = |finger: &Finger| finger.chain.tip(&finger.rest, &finger.tip.center_in_body).coords.into();
     hand.fingers.iter().map(centre).collect()
-}
-
-/// `[0.082, -0.003, 0.005]`, as a scene file takes it. Values that round to zero have no sign.
-fn metres(point: &[f64; 3]) -> String {
-    let [x, y, z] = point.map(|value| (value * 1000.0).round() / 1000.0 + 0.0);
-    format!("[{x:.3}, {y:.3}, {z:.3}]")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn positions_are_as_scene_files_take_them() {
-        assert_eq!(metres(&[0.0821, -0.0002, 1.0]), "[0.082, 0.000, 1.000]");
-    }
 }

@@ -5,12 +5,15 @@ mod campaign;
 pub mod check;
 mod demo;
 mod export;
+mod grasp_files;
+mod grasps;
 mod growth;
 mod inspect;
 mod pictures;
 mod place;
 pub mod plan;
 mod roadmap;
+mod room;
 mod rows;
 mod simulate;
 mod suite;
@@ -28,6 +31,7 @@ pub fn run(arguments: &Arguments, talk: &Talk) -> Result<(), Stop> {
         Command::Inspect(inspect) => inspect::run(inspect, common, talk),
         Command::Place(place) => place::run(place, common, talk),
         Command::Plan(plan) => plan::run(plan, common, talk),
+        Command::Grasps(grasps) => grasps::run(grasps, common, talk),
         Command::Check(check) => check::run(check, common, talk),
         Command::View(view) => view::run(view, common, talk),
         Command::Export(export) => export::run(export, common, talk),

@@ -69,9 +69,10 @@ pub fn write(arguments: &args::View, story: &Story, talk: &Talk) -> Result<(), S
     Ok(())
 }
 
-/// Writes the usual storyboard of a story.
+/// Writes a small storyboard of a story.
 pub fn write_storyboard(path: &Path, story: &Story, talk: &Talk) -> Result<(), Stop> {
-    let bytes = storyboard(story, &StoryboardSettings::default()).map_err(|error| Stop::Internal(error.to_string()))?;
+    let small = StoryboardSettings { frames: 4, width: 1000, supersampling: 2, ..StoryboardSettings::default() };
+    let bytes = storyboard(story, &small).map_err(|error| Stop::Internal(error.to_string()))?;
     put(path, &bytes, talk)
 }
 

@@ -2,7 +2,6 @@
 
 use super::pictures::write_storyboard;
 use crate::args::{self, Common};
-use crate::file_names::name_from;
 use crate::interrupt;
 use crate::load;
 use crate::outputs::{Output, Outputs, refuse_no_folder};
@@ -11,31 +10,41 @@ use crate::stop::Stop;
 use crate::talk::Talk;
 use crate::words::{counted, duration, grouped};
 use regrasp::base::files;
+use regrasp::placing::Asked;
 use regrasp::plan::check::{CheckSettings, check};
 use regrasp::planners::FailureKind;
+use regrasp::planners::in_hand::placing::probe::Probe;
 use regrasp::planners::in_hand::placing::{Place, Places, place};
 use regrasp::robot::ResolveOptions;
 use regrasp::scene::{LoadedScene, load_scene_text};
-use regrasp::scene_text::{SceneText, mesh, object_of_scene, primitive};
+use regrasp::scene_text::Turn;
 use regrasp::viewer::story::{Outcome, Telling};
 use regrasp::{Budget, InHandQuery, InHandSettings, Plan, Query, plan_in_hand};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
-use toml::{Table, Value};
 
 /// Poses that are drawn.
 const DRAWN: usize = 5;
-/// Mass and friction of an object of which nobody says any.
-const USUAL: [(&str, f64); 2] = [("mass", 0.1), ("friction", 0.8)];
 /// Work of the grasp that is drawn for a pose from which no turn was found.
 const HOLD_WORK: u64 = 100_000;
 
 /// Looks for poses, prints what was tried, writes scenes.
 pub fn run(arguments: &args::Place, common: &Common, talk: &Talk) -> Result<(), Stop> {
+    let asked = Asked {
+        output: &arguments.output,
+        hand: &arguments.hand,
+        object: &arguments.object,
+        turns: &arguments.turns,
+        mass: arguments.mass,
+        friction: arguments.friction,
+        scale: arguments.scale.as_deref(),
+        torsion_radius: arguments.torsion_radius,
+        packages: &common.packages,
+    };
     let n_scenes = 1 + usize::from(arguments.alternatives);
-    let scene_paths: Vec<PathBuf> = (0..n_scenes).map(|k| scene_path(&arguments.output, k)).collect();
+    let scene_paths: Vec<PathBuf> = (0..n_scenes).map(|index| asked.path(index)).collect();
     let pictures: Vec<PathBuf> = match &arguments.pictures {
         Some(folder) => (1..=DRAWN).map(|k| folder.join(format!("place-{k}.png"))).collect(),
         None => Vec::new(),
@@ -46,13 +55,7 @@ pub fn run(arguments: &args::Place, common: &Common, talk: &Talk) -> Result<(), 
     let cancelled = interrupt::flag()?;
     let deadline = arguments.time_limit.and_then(|limit| Instant::now().checked_add(limit));
 
-    let scene = SceneText {
-        hand: name_from(&arguments.output, &arguments.hand, &common.packages),
-        torsion_radius: arguments.torsion_radius,
-        object: object(arguments, common)?,
-        turns: arguments.turns.clone(),
-        comment: vec!["Written by `regrasp place`; edit freely. Metres and radians.".into()],
-    };
+    let scene = asked.scene()?;
     let started = Instant::now();
     let draft = scene.text(None).into_bytes();
     let loaded = load_scene_text(&arguments.output, draft, &load::options(common))?;
@@ -90,56 +93,6 @@ pub fn run(arguments: &args::Place, common: &Common, talk: &Talk) -> Result<(), 
     Ok(())
 }
 
-/// The scene of the best pose, of the second best, and so on: `scene.toml`, `scene.2.toml`.
-fn scene_path(output: &Path, index: usize) -> PathBuf {
-    if index == 0 {
-        return output.to_owned();
-    }
-    let stem = output.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-    let extension = output.extension().map_or_else(|| "toml".into(), |extension| extension.to_string_lossy());
-    output.with_file_name(format!("{stem}.{}.{extension}", index + 1))
-}
-
-/// The object as a scene file has it: from a primitive, a scene file or a mesh file.
-fn object(arguments: &args::Place, common: &Common) -> Result<Table, Stop> {
-    let asked = arguments.object.as_str();
-    let path = Path::new(asked);
-    let named = |file: &Path| name_from(&arguments.output, file, &common.packages);
-    let mut object = if let Some(read) = primitive(asked) {
-        read.map_err(|expected| Stop::argument("A505", "OBJECT", format!("is \"{asked}\""), expected))?
-    } else if path.extension().is_some_and(|extension| extension == "toml") {
-        let folder = path.parent().unwrap_or(Path::new(""));
-        let renamed = |file: &str| if file.contains("://") { file.to_owned() } else { named(&folder.join(file)) };
-        object_of_scene(path, &files::read_text(path)?, None, renamed)?
-    } else {
-        let name = path.file_stem().map_or_else(|| "object".into(), |stem| stem.to_string_lossy());
-        mesh(&if asked.contains("://") { asked.to_owned() } else { named(path) }, &name)
-    };
-    if let Some(scale) = &arguments.scale {
-        let Some(inside) = object.get_mut("mesh").and_then(Value::as_table_mut) else {
-            return Err(Stop::argument("A505", "--scale", "is for meshes", "a mesh file as OBJECT"));
-        };
-        let numbers: Option<Vec<f64>> = scale.split(',').map(|part| part.trim().parse().ok()).collect();
-        let value = match numbers.as_deref() {
-            Some([factor]) => Value::Float(*factor),
-            Some(factors) => Value::Array(factors.iter().map(|factor| Value::Float(*factor)).collect()),
-            None => Value::String(scale.clone()),
-        };
-        inside.insert("scale".into(), value);
-    }
-    let given = [arguments.mass, arguments.friction];
-    for ((key, usual), given) in USUAL.into_iter().zip(given) {
-        let is_said = object.contains_key(key) || (key == "mass" && object.contains_key("density"));
-        if given.is_some() && key == "mass" {
-            object.remove("density");
-        }
-        if given.is_some() || !is_said {
-            object.insert(key.into(), Value::Float(given.unwrap_or(usual)));
-        }
-    }
-    Ok(object)
-}
-
 fn place_pose(place: &Place) -> serde_json::Value {
     json!(regrasp::plan::plan::PoseData::from(&place.world_from_object))
 }
@@ -156,7 +109,7 @@ fn say_places(found: &Places, arguments: &args::Place, seconds: f64, talk: &Talk
         tried.solved,
         duration(seconds)
     ));
-    let names: Vec<&str> = arguments.turns.iter().map(regrasp::scene_text::Turn::name).collect();
+    let names: Vec<&str> = arguments.turns.iter().map(Turn::name).collect();
     talk.say(format!("       {:<24}  {:>6}  {:>9}  short searches", "position", "turned", "evidence"));
     for place in &found.places {
         let p = place.world_from_object.translation.vector;
@@ -173,7 +126,7 @@ fn say_places(found: &Places, arguments: &args::Place, seconds: f64, talk: &Talk
         talk.say(format!("       {position:<24}  {angle:>5.1}°  {:>9.4}  {}", place.evidence, searches.join(", ")));
     }
     let of_place = |place: &Place| {
-        let probe = |probe: &regrasp::planners::in_hand::placing::probe::Probe| json!({ "solved": probe.is_solved(), "work": probe.work });
+        let probe = |probe: &Probe| json!({ "solved": probe.n_solved, "work": probe.work });
         json!({
             "start": place_pose(place),
             "outlook": place.outlook,

@@ -4,6 +4,7 @@
 
 use crate::args::{self, Common};
 use crate::commands::check::scene_of;
+use crate::commands::grasp_files;
 use crate::commands::pictures;
 use crate::interrupt;
 use crate::judge;
@@ -13,6 +14,7 @@ use crate::pages;
 use crate::stop::Stop;
 use crate::talk::Talk;
 use regrasp::base::files;
+use regrasp::grasp::list::format::is_list;
 use regrasp::pictures::roadmap_story;
 use regrasp::plan::format;
 use regrasp::planners::in_hand::roadmap::GraspRoadmap;
@@ -29,7 +31,11 @@ pub fn run(arguments: &args::View, common: &Common, talk: &Talk) -> Result<(), S
     let own = [Some(arguments.plan.as_path()), arguments.scene.as_deref(), arguments.with_roadmap.as_deref()];
     written.refuse_inputs(own.into_iter().flatten())?;
     pictures::make_folder(arguments)?;
-    let plan = format::from_json(&arguments.plan, &files::read(&arguments.plan)?)?;
+    let bytes = files::read(&arguments.plan)?;
+    if is_list(&bytes) {
+        return grasp_files::view(arguments, &bytes, common, talk);
+    }
+    let plan = format::from_json(&arguments.plan, &bytes)?;
     let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref(), "regrasp view PLAN SCENE")?;
     let loaded = arguments.judging.scene(load::scene_of_plan(&scene_path, &plan, common, talk)?);
     written.refuse_inputs(loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;

@@ -4,10 +4,12 @@ mod bad_input;
 mod commands;
 mod export;
 mod folder;
+mod grasps;
 mod growth;
 #[cfg(unix)]
 mod outputs;
 mod pictures;
+mod place;
 #[path = "../../../../tests/support/places.rs"]
 mod places;
 mod roadmap;

@@ -1,5 +1,6 @@
 //! Exports, read back by other means than they were written with.
 
+mod grasps;
 mod mjcf;
 mod npz;
 mod ros2;

@@ -115,7 +115,7 @@ fn middle_of(cell: usize) -> ParryVector {
     let (face, row, column) = (cell / (CELLS * CELLS), cell / CELLS % CELLS, cell % CELLS);
     let at = |index: usize| (2 * index + 1) as f64 / CELLS as f64 - 1.0;
     let (axis, mut components) = (face / 2, [0.0; 3]);
-    components[axis] = if face % 2 == 0 { 1.0 } else { -1.0 };
+    components[axis] = if face.is_multiple_of(2) { 1.0 } else { -1.0 };
     components[(axis + 1) % 3] = at(row);
     components[(axis + 2) % 3] = at(column);
     ParryVector::new(components[0], components[1], components[2])

@@ -156,6 +156,9 @@ mod tests {
         SmoothHull::near(&ConvexHull::new(&points).unwrap(), None).unwrap().0
     }
 
+    /// How far a shape reaches towards a direction.
+    type Reach = Box<dyn Fn(&Vector) -> f64>;
+
     fn stance(rng: &mut Rng, distance: f64) -> Stance {
         let turn = Rotation3::new(Vector::from(rng.direction()) * rng.uniform(0.0, 3.0));
         let towards = Vector::from(rng.direction());
@@ -168,7 +171,7 @@ mod tests {
     fn gaps_are_what_separating_planes_say() {
         let tip = bar();
         let cuboid = Vector::new(0.03, 0.02, 0.025);
-        let shapes: [(Shape, Box<dyn Fn(&Vector) -> f64>); 3] = [
+        let shapes: [(Shape, Reach); 3] = [
             (Shape::Sphere { radius: 0.032 }, Box::new(|n: &Vector| 0.032 * n.norm())),
             (Shape::Cuboid { half_extents: cuboid }, Box::new(move |n: &Vector| n.abs().dot(&cuboid))),
             (
@@ -212,7 +215,6 @@ mod tests {
                     assert!((way - at.normal * touch.gap).norm() < 1e-9, "{way}");
                 }
             }
-            println!("{shape:?}: {missed} of 800 missed");
             assert!(missed <= 8, "{shape:?}: {missed}");
         }
     }

@@ -10,6 +10,8 @@ use std::collections::BTreeMap;
 pub struct HandRecord {
     /// Name of the robot file's robot.
     pub name: String,
+    /// The link whose frame is the hand frame.
+    pub base_link: String,
     /// Names of its fingers.
     pub fingers: Vec<String>,
     /// Names of its joints, in the order of every joint vector.

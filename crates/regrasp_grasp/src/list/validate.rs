@@ -57,9 +57,13 @@ impl Reader<'_> {
                 return self.fail("G710", &[Key(key)], format!("has {n_seen} entries"), format!("at most {most}"));
             }
         }
-        for (key, name) in [("hand", &list.hand.name), ("object", &list.object.name)] {
+        for (owner, key, name) in [
+            ("hand", "name", &list.hand.name),
+            ("hand", "base_link", &list.hand.base_link),
+            ("object", "name", &list.object.name),
+        ] {
             if let Some(fault) = fault_of_name(name) {
-                self.fail("V004", &[Key(key), Key("name")], fault, GOOD_NAME);
+                self.fail("V004", &[Key(owner), Key(key)], fault, GOOD_NAME);
             }
         }
         for (key, names) in [("fingers", &list.hand.fingers), ("joint_names", &list.hand.joint_names)] {

@@ -52,6 +52,7 @@ pub fn sample() -> GraspList {
         inputs: vec![PlanInput { role: "mesh".into(), name: "mug.obj".into(), sha256: "0".repeat(64) }],
         hand: HandRecord {
             name: "test".into(),
+            base_link: "palm".into(),
             fingers: vec!["thumb".into(), "index".into()],
             joint_names: vec!["a".into(), "b".into()],
         },

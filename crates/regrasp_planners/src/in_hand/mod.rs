@@ -89,6 +89,7 @@ pub fn plan_in_hand(
     let seen = view.hand_from_world().map(|hand_from_world| query.seen_from(&hand_from_world));
     let asked = Asked { view, query: seen.as_ref().unwrap_or(query), seed, progress };
     let found = plan_in_hand_frame(&asked, settings, budget);
+    let found = found.map_err(|failure| placing::with_hint(view, asked.query, settings, seed, failure));
     found.map(|plan| plan_in_world(view, &query.name, plan)).map_err(|failure| failure_in_world(view, failure))
 }
 

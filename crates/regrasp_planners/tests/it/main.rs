@@ -10,6 +10,7 @@ mod leap;
 mod physics;
 #[path = "../../../../tests/support/places.rs"]
 mod places;
+mod placing;
 mod queries;
 mod reach;
 mod roadmaps;

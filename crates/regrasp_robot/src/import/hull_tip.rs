@@ -159,7 +159,7 @@ pub(crate) fn corners_of(shape: &Shape) -> Vec<Point> {
         Shape::Cylinder { half_length, radius } => (0..2 * RIM)
             .map(|k| {
                 let (sine, cosine) = (std::f64::consts::TAU * (k / 2) as f64 / RIM as f64).sin_cos();
-                let height = if k % 2 == 0 { -half_length } else { *half_length };
+                let height = if k.is_multiple_of(2) { -half_length } else { *half_length };
                 Point::new(radius * cosine, radius * sine, height)
             })
             .collect(),

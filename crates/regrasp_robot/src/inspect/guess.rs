@@ -3,11 +3,12 @@
 //! A finger ends at a moving joint below which nothing moves. Its tip link is the one whose collision geometry reaches
 //! farthest from that joint.
 
+use super::finger_names::{End, finger_names};
+use super::rigid::rigid_links;
 use super::tip_sphere::fit_tip;
 use crate::import::options::LoadOptions;
 use crate::import::spec::{FingerSpec, HandSpec, PadSpec, TipSpec};
 use crate::robot::{JointId, JointKind, LinkId, Robot};
-use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_base::diagnostic::did_you_mean;
 use regrasp_base::{Diagnostic, InputError, Place};
 use regrasp_geometry::{Point, Pose};
@@ -40,26 +41,20 @@ pub(crate) fn guess_hand(robot: &Robot, options: &LoadOptions, file: &Path) -> R
     if stated.is_none() {
         refuse_several_hands(robot, base, &paths, file)?;
     }
-    let mut fingers: Vec<FingerSpec> = Vec::new();
-    for (index, &last) in last_joints.iter().enumerate() {
-        let child = robot.joints[last.0].child;
-        let (tip_link, (tip, pad)) = guess_tip(robot, child);
-        let link_name = &robot.links[tip_link.0].name;
-        let mut name = finger_name(link_name, fingers.len() + 1);
-        if fingers.iter().any(|other| other.name == name) {
-            name.clone_from(link_name);
-        }
-        fingers.push(FingerSpec {
-            name,
-            tip_link,
-            first_joint: first_own_joint(&paths, index),
-            tip,
-            pad,
-            contact: options.contact,
-            rest: Vec::new(),
-            place: Place::file(file),
-        });
-    }
+    let tips: Vec<_> = last_joints.iter().map(|last| guess_tip(robot, robot.joints[last.0].child)).collect();
+    let ends: Vec<End> = last_joints.iter().zip(&tips).map(|(&last, (tip, _))| End { last, tip: *tip }).collect();
+    let names = finger_names(robot, base, &ends);
+    let fingers = tips.into_iter().zip(names).enumerate().map(|(index, ((tip_link, (tip, pad)), name))| FingerSpec {
+        name,
+        tip_link,
+        first_joint: first_own_joint(&paths, index),
+        tip,
+        pad,
+        contact: options.contact,
+        rest: Vec::new(),
+        place: Place::file(file),
+    });
+    let fingers = fingers.collect();
     Ok(HandSpec { base, fingers, mount: None, allow: BTreeSet::new() })
 }
 
@@ -203,29 +198,4 @@ fn guess_tip(robot: &Robot, child: LinkId) -> (LinkId, (TipSpec, Option<PadSpec>
         if best.is_none_or(|(most, _)| reach > most) { Some((reach, *link)) } else { best }
     });
     (far.map_or(child, |(_, link)| link), (TipSpec::Point { position: Point::origin() }, None))
-}
-
-/// Links that move with `link` and hang below it, with their poses in its frame.
-pub(super) fn rigid_links(robot: &Robot, link: LinkId) -> Vec<(LinkId, Pose)> {
-    let identity = Pose::from_parts(Translation3::identity(), UnitQuaternion::identity());
-    let mut links = vec![(link, identity)];
-    let mut next = 0;
-    while next < links.len() {
-        let (current, pose) = links[next];
-        for id in robot.joints_from(current) {
-            let joint = &robot.joints[id.0];
-            if joint.kind == JointKind::Fixed {
-                links.push((joint.child, pose * joint.parent_from_joint));
-            }
-        }
-        next += 1;
-    }
-    links
-}
-
-/// A short name from that of the tip link, or a number where that has no letters left.
-fn finger_name(link: &str, number: usize) -> String {
-    let short = link.replace("link_", "").replace("_link", "").replace("_tip", "").replace("tip_", "");
-    let short = short.trim_matches('_');
-    if short.contains(|c: char| c.is_alphabetic()) { short.to_owned() } else { format!("finger_{number}") }
 }

@@ -1,5 +1,7 @@
 //! What a robot and a hand are like: joints, limits, meshes, units, fingers and tips, links that always or never touch.
 
+/// Names of fingers.
+mod finger_names;
 /// Fingers and tips guessed from a robot alone.
 pub(crate) mod guess;
 /// A hand as the text of a `hand.toml`.
@@ -8,6 +10,8 @@ pub mod hand_text;
 pub mod reach;
 /// Rest postures.
 pub(crate) mod rest;
+/// Links that move together.
+mod rigid;
 /// Joints and meshes as tables, and what looks like a wrong unit.
 pub mod robot_table;
 /// Tips compared with the geometry of their links.
@@ -28,8 +32,8 @@ use std::path::Path;
 
 pub use hand_text::hand_file_text;
 pub use reach::{TipReach, TipRegion};
-pub use tip_report::{StandsOut, TipReport, tip_report};
 pub use robot_table::{Follows, JointRow, MeshRow, RobotInspection, inspect_robot};
+pub use tip_report::{StandsOut, TipReport, tip_report};
 
 /// How a hand is inspected.
 #[derive(Debug, Clone, PartialEq)]

@@ -118,15 +118,30 @@ impl<'h> Touch<'h> {
             .collect()
     }
 
-    fn shapes_touch(&self, at: &[(Placement, Point)], &(i, j): &(usize, usize)) -> bool {
+    /// True where the links of all tips are farther from the palm than `distance`, in metres.
+    pub fn tips_keep_off_the_palm(&self, posture: &[Vec<f64>], distance: f64) -> bool {
+        let at = self.placed(posture);
+        let is_tip = |body: Option<(usize, usize)>| {
+            body.is_some_and(|(finger, body)| body + 1 == self.hand.fingers[finger].chain.joints.len())
+        };
+        let tips = (0..self.shapes.len()).filter(|&i| is_tip(self.shapes[i].body));
+        let palm = || (0..self.shapes.len()).filter(|&j| self.shapes[j].body.is_none());
+        tips.into_iter().all(|i| palm().all(|j| !self.shapes_are_within(&at, &(i, j), distance)))
+    }
+
+    fn shapes_touch(&self, at: &[(Placement, Point)], pair: &(usize, usize)) -> bool {
+        self.shapes_are_within(at, pair, 0.0)
+    }
+
+    fn shapes_are_within(&self, at: &[(Placement, Point)], &(i, j): &(usize, usize), distance: f64) -> bool {
         let (a, b) = (&self.shapes[i], &self.shapes[j]);
-        if (at[i].1 - at[j].1).norm() > a.radius + b.radius {
+        if (at[i].1 - at[j].1).norm() > a.radius + b.radius + distance {
             return false;
         }
         let (mut direction, mut hints) = (Vector::zeros(), [0, 0]);
         let first = Placed { shape: &a.placed.shape, at: &at[i].0 };
         let second = Placed { shape: &b.placed.shape, at: &at[j].0 };
-        let answer = separation(first, second, 0.0, 0.0, &mut direction, &mut hints);
+        let answer = separation(first, second, distance, distance, &mut direction, &mut hints);
         !matches!(answer, Separation::SeparatedBy(_))
     }
 

@@ -142,3 +142,32 @@ fn gravity_is_a_direction_of_the_hand() {
     assert_eq!(load(""), None);
     assert_eq!(Gravity::default().in_world(), Some(Vector::new(0.0, 0.0, -9.80665)));
 }
+
+#[test]
+fn a_start_may_be_left_to_the_planner() {
+    let open = |start: &str| Folder::new().load(&GOOD.replace("position = [0.0, 0.0, 0.078]", start));
+    let code = |start: &str| open(start).unwrap_err().diagnostics.iter().map(|one| one.code).collect::<Vec<_>>();
+    let loaded = open("position = \"auto\"").unwrap_or_else(|error| panic!("{error}"));
+    let query = loaded.task().query(0);
+    assert!(query.has_open_start());
+    let start = regrasp_geometry::pose_from([0.01, 0.02, 0.07], [0.6, 0.0, 0.0, 0.8]);
+    let started = query.started_at(&start);
+    assert!(!started.has_open_start());
+    assert_eq!(*started.start(), start);
+    // The goal of the file is a turn of 90 degrees about x.
+    let turn = started.goal().rotation * start.rotation.inverse();
+    assert!((turn * Vector::y() - Vector::z()).norm() < 1e-12);
+    assert_eq!(started.goal().translation, start.translation);
+    let held = started.held().unwrap();
+    assert_eq!(held.goal(), held.start());
+
+    let turned = open("position = \"auto\"\nrotation_vector = [0.0, 0.0, 0.3]").unwrap();
+    let kept = turned.task().query(0).started_at(&start);
+    assert!((kept.start().rotation.scaled_axis() - Vector::z() * 0.3).norm() < 1e-12);
+    assert_eq!(kept.start().translation, start.translation);
+
+    assert_eq!(code("position = \"anywhere\""), ["S104"]);
+    assert_eq!(code("position = \"auto\"\nposition_within = 0.01"), ["S106"]);
+    let given = "position = \"auto\"\ngrasp = { contacts = { east = [0.032, 0.0, 0.0] } }";
+    assert!(code(given).contains(&"S106"));
+}

@@ -37,9 +37,10 @@ pub fn source_of(hand: &Path, object: &ObjectSource, torsion_radius: Option<f64>
     let (path, mesh) = match object {
         ObjectSource::Scene(path) => (path, None),
         ObjectSource::Mesh(mesh) => {
-            let MeshObject { path, scale, mass, friction, edge_distance, crease_angle_deg } = mesh.clone();
-            let _ = path;
-            (&mesh.path, Some(MeshRecord { scale, mass, friction, edge_distance, crease_angle_deg }))
+            let MeshObject { path, scale, mass, friction, edge_distance, crease_angle_deg } = mesh;
+            let (scale, mass, friction) = (*scale, *mass, *friction);
+            let (edge_distance, crease_angle_deg) = (*edge_distance, *crease_angle_deg);
+            (path, Some(MeshRecord { scale, mass, friction, edge_distance, crease_angle_deg }))
         }
     };
     GraspSource { hand: text(hand), object: text(path), mesh, torsion_radius }

@@ -3,6 +3,8 @@
 
 /// What a hand can really do at a pose.
 pub mod evidence;
+/// What would help where the start has no grasp.
+pub mod hint;
 /// A quick estimate of it.
 pub mod outlook;
 /// Plans whose start pose the planner chooses.
@@ -13,11 +15,14 @@ pub mod probe;
 pub mod proposals;
 /// Contacts spread over the object.
 pub mod samples;
+/// Which sizes of objects fit a hand.
+pub mod sizes;
 
 use crate::in_hand::attempt::search::{Context, Search};
 use crate::in_hand::attempt::tally::{Reason, Tally};
 use crate::in_hand::effective;
 use crate::settings::InHandSettings;
+pub use hint::with_hint;
 pub use planned::plan_placed;
 
 use evidence::Evidence;

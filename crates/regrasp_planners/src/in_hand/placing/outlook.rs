@@ -29,7 +29,12 @@ pub struct Outlook<'m> {
 impl<'m> Outlook<'m> {
     /// For the object and the hand of `model`.
     pub fn new(model: &'m Model<'m>, reach: &'m TipReach, rng: &mut Rng) -> Self {
-        Outlook { model, reach, samples: ContactSamples::draw(model, rng), directions: directions() }
+        Outlook::with(model, reach, ContactSamples::draw(model, rng))
+    }
+
+    /// The same with contacts that are known.
+    pub fn with(model: &'m Model<'m>, reach: &'m TipReach, samples: ContactSamples) -> Self {
+        Outlook { model, reach, samples, directions: directions() }
     }
 
     /// Per finger, the spread contacts that its tip reaches with the object at a pose, as bits.

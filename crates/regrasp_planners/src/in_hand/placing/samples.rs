@@ -68,6 +68,14 @@ impl ContactSamples {
         ContactSamples { contacts, thirds, seconds }
     }
 
+    /// The same for an object that is `factor` times as large: closure does not depend on size.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        let scaled = |contact: &Contact| Contact { point_in_object: contact.point_in_object * factor, ..*contact };
+        let contacts = self.contacts.iter().map(scaled).collect();
+        ContactSamples { contacts, thirds: self.thirds.clone(), seconds: self.seconds.clone() }
+    }
+
     /// Share of the triples, one contact of each of three sets, that close.
     pub fn share_of_triples(&self, [a, b, c]: [u64; 3]) -> f64 {
         let n = self.contacts.len();

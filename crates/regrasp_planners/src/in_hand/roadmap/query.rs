@@ -378,6 +378,12 @@ impl GraspRoadmap {
 
 /// A roadmap is asked leg by leg.
 fn refuse_way_poses(query: &InHandQuery) -> Result<(), Failure> {
+    if query.open_start.is_some() {
+        let message =
+            "the query leaves the start pose open; a roadmap answers queries from a pose that is given".to_owned();
+        let advice = "give a start position, such as the one that regrasp place writes";
+        return Err(Failure::bare(FailureKind::StartInvalid, message, advice));
+    }
     let n_way_poses = query.world_from_object_way.len();
     if n_way_poses == 0 {
         return Ok(());

@@ -68,7 +68,7 @@ impl NormalTable {
 /// The direction through a point of a face of the cube.
 fn direction(face: usize, row: f64, column: f64) -> Vector {
     let axis = face / 2;
-    let (across, sign) = ([(1, 2), (2, 0), (0, 1)][axis], if face % 2 == 0 { 1.0 } else { -1.0 });
+    let (across, sign) = ([(1, 2), (2, 0), (0, 1)][axis], if face.is_multiple_of(2) { 1.0 } else { -1.0 });
     let mut n = Vector::zeros();
     (n[axis], n[across.0], n[across.1]) = (sign, row, column);
     n

@@ -49,9 +49,7 @@ fn farthest(hull: &ConvexHull, n: &Vector) -> f64 {
 fn the_surface_lies_near_the_polyhedron() {
     let mut rng = Rng::keyed(1, "near", 0);
     for (name, hull, allowed) in tips() {
-        let began = std::time::Instant::now();
         let (surface, misfit) = SmoothHull::near(&hull, None).unwrap();
-        let took = began.elapsed();
         let (mut least, mut most, mut largest) = (0.0f64, 0.0f64, 0.0f64);
         let (mut sharpest, mut flattest) = (f64::INFINITY, 0.0f64);
         for _ in 0..4000 {
@@ -64,15 +62,10 @@ fn the_surface_lies_near_the_polyhedron() {
             radii.sort_by(f64::total_cmp);
             (sharpest, flattest) = (sharpest.min(radii[1]), flattest.max(radii[2]));
         }
-        println!(
-            "{name}: {} points, misfit {misfit:.2e}, {least:.2e}..{most:.2e}, radii {sharpest:.2e}..{flattest:.2e}, rounding {:.2e}, {took:?}",
-            surface.points().len(),
-            surface.rounding()
-        );
         assert!(misfit <= allowed, "{name}: {misfit}");
         assert!(most <= 1.1 * misfit && -least <= 1.1 * misfit, "{name}: {least} {most} {misfit}");
         assert!(largest <= 1.001 * surface.reach());
-        assert!(sharpest >= 0.999 * surface.rounding());
+        assert!(sharpest >= 0.999 * surface.rounding() && flattest < 4.0, "{name}: {sharpest} {flattest}");
     }
 }
 

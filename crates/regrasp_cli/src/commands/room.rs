@@ -1,0 +1,85 @@
+//! Where a hand can hold something: where its tips reach, which sizes fit, and where.
+
+use crate::words::metres;
+use regrasp::InHandSettings;
+use regrasp::base::Rng;
+use regrasp::planners::in_hand::placing::sizes::{Size, sizes};
+use regrasp::robot::Hand;
+use regrasp::robot::inspect::{TipReach, TipRegion};
+use serde::Serialize;
+use std::fmt::Write;
+
+/// Postures from which it is known where tips reach.
+const POSTURES: usize = 12_000;
+/// Fingers that hold while one is away.
+const FINGERS: usize = 3;
+
+/// Where a hand can hold something, in its own frame.
+#[derive(Debug, Serialize)]
+pub struct Room {
+    /// What at least three fingertips reach, or two of a hand with two; none where they have no place in common.
+    region: Option<TipRegion>,
+    /// Balls, small ones first.
+    balls: Vec<Size>,
+    /// Why no ball was tried.
+    refusal: Option<String>,
+}
+
+impl Room {
+    /// Measures it.
+    pub fn of(hand: &Hand, seed: u64) -> Self {
+        let mut rng = Rng::keyed(seed, "room", 0);
+        let reach = TipReach::sample(hand, POSTURES, &mut rng);
+        let region = reach.region(FINGERS.min(hand.fingers.len()));
+        match sizes(hand, &reach, &InHandSettings::default(), seed) {
+            Ok(balls) => Room { region, balls, refusal: None },
+            Err(failure) => Room { region, balls: Vec::new(), refusal: Some(failure.message) },
+        }
+    }
+
+    /// Adds it to a report.
+    pub fn write(&self, out: &mut String) {
+        // Writing to a String cannot fail.
+        match &self.region {
+            Some(region) => {
+                let size: [f64; 3] = std::array::from_fn(|axis| 100.0 * (region.high[axis] - region.low[axis]));
+                let _ = writeln!(
+                    out,
+                    "  region that {} fingertips reach: {} to {} m ({:.0} x {:.0} x {:.0} cm, {:.0} cm^3)",
+                    region.n_fingers,
+                    metres(&region.low),
+                    metres(&region.high),
+                    size[0],
+                    size[1],
+                    size[2],
+                    1e6 * region.volume
+                );
+            }
+            None => out.push_str("  the fingertips reach no place in common\n"),
+        }
+        if let Some(refusal) = &self.refusal {
+            let _ = writeln!(out, "  balls: {refusal}");
+            return;
+        }
+        let _ = writeln!(out, "  balls that can be held:         {}", range(&self.balls, |ball| ball.center.is_some()));
+        let _ = writeln!(out, "  balls that every finger can let go of: {}", range(&self.balls, |ball| ball.lets_go));
+        let best = self.balls.iter().max_by(|a, b| a.evidence.total_cmp(&b.evidence));
+        if let Some((ball, center)) = best.and_then(|ball| Some((ball, ball.center?))) {
+            let _ = writeln!(
+                out,
+                "  suggested place: {} m, for a ball of radius {:.0} mm; `regrasp place` finds one for your object",
+                metres(&center),
+                1e3 * ball.radius
+            );
+        }
+    }
+}
+
+/// The radii of the balls that `fits` takes, in words.
+fn range(balls: &[Size], fits: impl Fn(&Size) -> bool) -> String {
+    let radii: Vec<f64> = balls.iter().filter(|ball| fits(ball)).map(|ball| 1e3 * ball.radius).collect();
+    match (radii.first(), radii.last()) {
+        (Some(least), Some(most)) => format!("radius {least:.0} to {most:.0} mm"),
+        _ => "none of those tried".into(),
+    }
+}

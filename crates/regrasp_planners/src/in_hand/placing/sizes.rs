@@ -1,0 +1,129 @@
+//! Which sizes of objects fit a hand: balls, because they look the same from everywhere.
+
+use super::evidence::Evidence;
+use super::outlook::Outlook;
+use super::proposals::Proposals;
+use super::samples::ContactSamples;
+use crate::in_hand::attempt::search::{Context, Search};
+use crate::settings::InHandSettings;
+use regrasp_base::{Budget, Rng};
+use regrasp_geometry::surface::DEFAULT_CREASE_ANGLE;
+use regrasp_geometry::{Point, Pose, Shape, Surface};
+use regrasp_manipulation::ends::blocked::object_blocked_by;
+use regrasp_manipulation::failure::Failure;
+use regrasp_manipulation::model::Model;
+use regrasp_robot::Hand;
+use regrasp_robot::inspect::TipReach;
+use regrasp_scene::{Limits, Manipulation, Object, Scene, SceneHand, State};
+use std::sync::atomic::AtomicUsize;
+
+/// Radii that are tried, in metres.
+const RADII: [f64; 14] = [0.006, 0.01, 0.015, 0.02, 0.025, 0.03, 0.035, 0.04, 0.045, 0.05, 0.06, 0.07, 0.085, 0.1];
+/// Friction and density of the balls.
+const FRICTION: f64 = 0.8;
+const DENSITY: f64 = 500.0;
+/// Poses estimated for each, and how many of the best are looked at with all links.
+const POSES: usize = 1_500;
+const LOOKED_AT: usize = 5;
+
+/// A ball, and whether the hand can hold it.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Size {
+    /// Its radius, in metres.
+    pub radius: f64,
+    /// Where its centre is held best, in the hand's frame; none where no grasp was found.
+    pub center: Option<[f64; 3]>,
+    /// True where every finger may lift from some grasp there, one at a time.
+    pub lets_go: bool,
+    /// Share of grasps that hold without a finger, over the fingers: [`Evidence::worth`] there.
+    pub evidence: f64,
+}
+
+/// Which balls `hand`, whose tips reach `reach`, can hold. Errors: the hand cannot hold anything.
+pub fn sizes(hand: &Hand, reach: &TipReach, settings: &InHandSettings, seed: u64) -> Result<Vec<Size>, Failure> {
+    let mut found = Vec::with_capacity(RADII.len());
+    let mut samples: Option<(f64, ContactSamples)> = None;
+    for (index, &radius) in RADII.iter().enumerate() {
+        let Some(object) = ball(radius) else { continue };
+        let scene = scene_of(hand, object);
+        let state = State::at_rest(&scene, vec![Pose::identity()]);
+        let view = regrasp_scene::HandView::of(&Manipulation::first(&scene, &state));
+        Failure::refuse_many_fingers(&view)?;
+        let model = Model::new(&view, &settings.physics);
+        crate::in_hand::refusals::refuse_holding_nothing(&model)?;
+        let mut rng = Rng::keyed(seed, "sizes", index as u64);
+        // Which contacts of a ball close does not depend on its size.
+        let (known, unit) = samples.get_or_insert_with(|| (radius, ContactSamples::draw(&model, &mut rng)));
+        let outlook = Outlook::with(&model, reach, unit.scaled(radius / *known));
+        let proposals = Proposals::new(&model, reach, None);
+        if proposals.is_empty() {
+            found.push(Size { radius, center: None, lets_go: false, evidence: 0.0 });
+            continue;
+        }
+        let mut poses: Vec<(f64, Pose)> = (0..POSES)
+            .map(|_| {
+                let pose = proposals.draw(&mut rng);
+                (outlook.worth(&pose), pose)
+            })
+            .collect();
+        poses.retain(|(worth, _)| *worth > outlook.nothing());
+        poses.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let (winner, budget) = (AtomicUsize::new(usize::MAX), Budget::unlimited());
+        let context = Context { model: &model, settings, seed, budget: &budget, winner: &winner, progress: &|_| {} };
+        let mut search = Search::new(context, [Pose::identity(); 2], 0, u64::MAX);
+        search.rng = Rng::keyed(seed, "sizes_evidence", index as u64);
+        search.holds_only = !model.may_release;
+        let mut best = Size { radius, center: None, lets_go: false, evidence: 0.0 };
+        let clear = poses.iter().filter(|(_, pose)| object_blocked_by(&model, pose).is_none());
+        for (_, pose) in clear.take(LOOKED_AT) {
+            let evidence = Evidence::gather(&mut search, pose);
+            let worth = evidence.worth(&model);
+            if evidence.grasp.is_some() && worth > best.evidence {
+                let lets_go =
+                    model.may_release && evidence.released[..model.n_fingers()].iter().all(|share| *share > 0.0);
+                let center = Some(pose.translation.vector.into());
+                best = Size { center, lets_go: lets_go || best.lets_go, evidence: worth, ..best };
+            }
+        }
+        found.push(best);
+    }
+    Ok(found)
+}
+
+fn ball(radius: f64) -> Option<Object> {
+    let shape = Shape::Sphere { radius };
+    Some(Object {
+        name: "ball".into(),
+        surface: Surface::of(&shape).ok()?,
+        hull: None,
+        radius,
+        mesh_body: None,
+        mass: DENSITY * 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3),
+        center_of_mass: Point::origin(),
+        friction: FRICTION,
+        edge_distance: 0.0,
+        crease_angle: DEFAULT_CREASE_ANGLE,
+        shape,
+    })
+}
+
+fn scene_of(hand: &Hand, object: Object) -> Scene {
+    let placed = SceneHand {
+        name: "hand".into(),
+        hand: hand.clone(),
+        world_from_hand: Pose::identity(),
+        carrier: None,
+        reach: None,
+    };
+    Scene {
+        name: "sizes".into(),
+        robots: Vec::new(),
+        hands: vec![placed],
+        objects: vec![object],
+        supports: Vec::new(),
+        obstacles: Vec::new(),
+        gravity: None,
+        limits: Limits::default(),
+        inputs: Vec::new(),
+    }
+}

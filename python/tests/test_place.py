@@ -1,0 +1,32 @@
+"""Where to hold an object: scenes that are planned without an edit, the same as those of the command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import regrasp
+from conftest import SCENES
+
+HAND = SCENES.parent / "assets" / "hands" / "wide_four_finger" / "hand.toml"
+
+
+def test_a_place_is_that_of_the_command_line_and_is_planned(regrasp_cli, tmp_path: Path) -> None:
+    scenes = regrasp.place(HAND, "sphere:0.03", tmp_path / "placed.toml", turns=["x:60"], seed=3, alternatives=1)
+    assert scenes and len(scenes) == 2
+    bytes_of_python = (tmp_path / "placed.toml").read_bytes()
+    run = regrasp_cli("place", HAND, "sphere:0.03", "--turn", "x:60", "--seed", "3", "-o", "placed.toml")
+    assert run.returncode == 0, run.stderr
+    assert (tmp_path / "placed.toml").read_bytes() == bytes_of_python
+    assert regrasp.plan(scenes[0], max_work=1_000_000)
+
+
+def test_what_does_not_fit_is_a_failure_and_nonsense_is_refused(tmp_path: Path) -> None:
+    failure = regrasp.place(HAND, "sphere:0.4", tmp_path / "out.toml")
+    assert not failure
+    assert isinstance(failure, regrasp.Failure) and "found no pose" in str(failure)
+    with pytest.raises(regrasp.InputError, match="AXIS:DEGREES"):
+        regrasp.place(HAND, "sphere:0.03", tmp_path / "out.toml", turns=["up"])
+    with pytest.raises(regrasp.InputError):
+        regrasp.place(HAND, "sphere:0.03", tmp_path / "out.toml", mass=-1.0)
+    assert list(tmp_path.iterdir()) == []
