@@ -43,7 +43,7 @@ def test_frames_follow_the_plan(made: Path) -> None:
         assert [len(names[key]) for key in ("state", "action", "contacts", "forces", "goal")] == [j + 7, 2 * j, f, 3 * f, 7]
 
 
-def test_lerobot_files_have_the_layout_of_version_3(made: Path, tmp_path: Path) -> None:
+def test_lerobot_files_have_the_layout_of_version_3(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     count = export_lerobot(read_episodes(made), tmp_path, fps=FPS)
     info = json.loads((tmp_path / "meta/info.json").read_text())
     assert info["codebase_version"] == "v3.0" and info["total_episodes"] == count and info["fps"] == FPS
@@ -62,6 +62,15 @@ def test_lerobot_files_have_the_layout_of_version_3(made: Path, tmp_path: Path) 
     np.testing.assert_allclose(stats["action"]["std"], action.std(axis=0), atol=1e-6)
     np.testing.assert_allclose(stats["action"]["q90"], np.quantile(action, 0.9, axis=0), atol=1e-6)
     assert stats["action"]["count"] == [data.num_rows]
+    # In several files, as large exports are.
+    monkeypatch.setattr("regrasp.dataset.export_lerobot.FRAMES_IN_FILE", 20)
+    export_lerobot(read_episodes(made), tmp_path / "parts", fps=FPS)
+    parts = [pq.read_table(path) for path in sorted((tmp_path / "parts/data").rglob("*.parquet"))]
+    assert len(parts) > 1 and sum(part.num_rows for part in parts) == data.num_rows
+    known = [row for path in sorted((tmp_path / "parts/meta/episodes").rglob("*.parquet")) for row in pq.read_table(path).to_pylist()]
+    for row in known:
+        part = parts[row["data/file_index"]].column("episode_index").to_pylist()
+        assert part.count(row["episode_index"]) == row["length"]
     with pytest.raises(regrasp.InputError, match="D127"):
         export_lerobot(read_episodes(made), tmp_path, fps=FPS)
 

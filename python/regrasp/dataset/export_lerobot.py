@@ -75,6 +75,8 @@ class _Writer:
     fps: int
     tasks: dict[str, int] = field(default_factory=dict[str, int])
     episodes: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
+    """Those whose frames wait."""
+    n_episodes: int = 0
     statistics: dict[str, _Statistics] = field(default_factory=dict[str, _Statistics])
     features: dict[str, Any] = field(default_factory=dict[str, Any])
     n_frames: int = 0
@@ -84,7 +86,7 @@ class _Writer:
 
     def add(self, frames: Frames) -> None:
         """Adds an episode."""
-        n, index = len(frames.time), len(self.episodes)
+        n, index = len(frames.time), self.n_episodes
         task = self.tasks.setdefault(frames.episode.words, len(self.tasks))
         named = {
             "observation.state": frames.state,
@@ -110,8 +112,8 @@ class _Writer:
             "data/file_index": self.n_files % FILES_IN_CHUNK,
             "dataset_from_index": self.n_frames,
             "dataset_to_index": self.n_frames + n,
-            "meta/episodes/chunk_index": 0,
-            "meta/episodes/file_index": 0,
+            "meta/episodes/chunk_index": self.n_files // FILES_IN_CHUNK,
+            "meta/episodes/file_index": self.n_files % FILES_IN_CHUNK,
             "regrasp/task": frames.episode.row["task"],
             "regrasp/episode": frames.episode.row["episode"],
             "regrasp/key": frames.episode.row["key"],
@@ -127,38 +129,40 @@ class _Writer:
         }
         self.waiting.append(pa.table({**columns, **{name: pa.array(column) for name, column in whole.items()}}))
         self.episodes.append(about)
+        self.n_episodes += 1
         self.n_frames += n
         self.n_waiting += n
         if self.n_waiting >= FRAMES_IN_FILE:
             self.flush()
 
     def flush(self) -> None:
-        """Writes the frames that wait to a file of their own."""
+        """Writes the frames that wait to a file of their own, and what is known of their episodes to another."""
         if self.waiting:
-            path = self.folder / f"data/chunk-{self.n_files // FILES_IN_CHUNK:03d}/file-{self.n_files % FILES_IN_CHUNK:03d}.parquet"
-            path.parent.mkdir(parents=True, exist_ok=True)
-            pq.write_table(pa.concat_tables(self.waiting), path, compression="zstd")
+            name = f"chunk-{self.n_files // FILES_IN_CHUNK:03d}/file-{self.n_files % FILES_IN_CHUNK:03d}.parquet"
+            tables = {"data": pa.concat_tables(self.waiting), "meta/episodes": pa.Table.from_pylist(self.episodes)}
+            for place, table in tables.items():
+                (self.folder / place / name).parent.mkdir(parents=True, exist_ok=True)
+                pq.write_table(table, self.folder / place / name, compression="zstd")
             self.n_files += 1
-        self.waiting, self.n_waiting = [], 0
+        self.waiting, self.episodes, self.n_waiting = [], [], 0
 
     def finish(self) -> None:
         """Writes what stands in `meta`."""
         self.flush()
         meta = self.folder / "meta"
-        (meta / "episodes/chunk-000").mkdir(parents=True, exist_ok=True)
-        pq.write_table(pa.Table.from_pylist(self.episodes), meta / "episodes/chunk-000/file-000.parquet")
+        meta.mkdir(parents=True, exist_ok=True)
         pq.write_table(_tasks_table(self.tasks), meta / "tasks.parquet")
         info = {
             "codebase_version": VERSION,
             "robot_type": "hand",
-            "total_episodes": len(self.episodes),
+            "total_episodes": self.n_episodes,
             "total_frames": self.n_frames,
             "total_tasks": len(self.tasks),
             "chunks_size": FILES_IN_CHUNK,
             "data_files_size_in_mb": 100,
             "video_files_size_in_mb": 200,
             "fps": self.fps,
-            "splits": {"train": f"0:{len(self.episodes)}"},
+            "splits": {"train": f"0:{self.n_episodes}"},
             "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
             "video_path": None,
             "features": self.features,
@@ -210,4 +214,4 @@ def export_lerobot(episodes: Iterable[Episode], folder: StrPath, *, fps: int = 3
     for frames in all_frames(episodes, fps):
         writer.add(frames)
     writer.finish()
-    return len(writer.episodes)
+    return writer.n_episodes

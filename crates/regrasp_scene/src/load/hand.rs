@@ -36,7 +36,12 @@ pub(super) fn hand(mut table: Table, name: String, files: &mut Files, found: &mu
     let file = file?;
     let path = files.locate(&file, found)?;
     let options = LoadOptions { contact: default_contact?, ..files.options.clone() };
-    let loaded = match files.stock.hand(&path, options.contact, || load_hand(&path, &options)) {
+    let read = || {
+        let mut loaded = load_hand(&path, &options)?;
+        loaded.notes.extend(notes_on_tips(&loaded.hand, &path.display().to_string()));
+        Ok(loaded)
+    };
+    let loaded = match files.stock.hand(&path, options.contact, read) {
         Ok(loaded) => loaded,
         Err(error) => {
             found.diagnostics.extend(error);
@@ -51,7 +56,6 @@ pub(super) fn hand(mut table: Table, name: String, files: &mut Files, found: &mu
     }
     let mut hand = loaded.hand;
     refuse_rough_tips(&hand, &file, found);
-    found.notes.extend(notes_on_tips(&hand, &path.display().to_string()));
     if let Some(entry) = contacts {
         contact::apply(&entry, &mut hand, found)?;
     }
