@@ -14,8 +14,6 @@ pub mod rolling;
 pub mod rolling_ellipsoid;
 /// Soft finger with elliptic torsion.
 pub mod soft_finger;
-/// Where smooth hulls touch.
-mod touch_smooth;
 
 pub use regrasp_robot::ContactModel;
 

@@ -6,7 +6,10 @@
 //! carried without slip: `T1 p - T0 p` has no part across the normal half-way. A midpoint rule, of second order, the same
 //! both ways.
 
-use super::{Contact, touch_smooth};
+/// Where smooth hulls touch.
+mod touch_smooth;
+
+use super::Contact;
 use nalgebra::Matrix3;
 use regrasp_geometry::surface::{Surface, SurfacePoint};
 use regrasp_geometry::{Point, UnitVector, Vector};

@@ -67,8 +67,6 @@ pub mod rolling;
 pub mod rolling_closure;
 /// How far contacts slip from landing to lifting.
 pub mod slip;
-/// Where smooth hulls touch.
-pub mod smooth_touch;
 /// How far a contact slips in one step.
 pub mod step_slip;
 /// Distance from the object's surface and the normals there.

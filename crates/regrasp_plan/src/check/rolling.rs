@@ -6,11 +6,13 @@
 //! (Sahbani 2007, sec. IV-C; Cherif 1999, sec. 6.2.2). Here slip is judged by segment, against what the plan promises; `slip` judges
 //! it from landing to lifting, with the turn of soft fingertips about `n`.
 
+/// Where smooth hulls touch.
+mod smooth_touch;
+
 use crate::check::between::Between;
 use crate::check::contact::error_at;
 use crate::check::model::{CheckedHand, FingerModel};
 use crate::check::patch::Patch;
-use crate::check::smooth_touch::{self, SEEN_FROM};
 use crate::check::step_slip::{StepSlip, torsion_radius};
 use crate::check::surface::SortedShape;
 use crate::check::tip_rates::{bounds_in_object, speed_in_object};
@@ -20,6 +22,7 @@ use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, Plan, SegmentKind, Waypoint};
 use nalgebra::{Matrix3, Matrix4, Rotation3, UnitQuaternion};
 use regrasp_geometry::{Point, Pose, Vector};
+use smooth_touch::SEEN_FROM;
 use std::cell::Cell;
 use std::collections::BTreeMap;
 

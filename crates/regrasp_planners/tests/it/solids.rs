@@ -140,12 +140,13 @@ fn what_starts_inside_a_mesh_is_refused_before_any_search() {
     // One triangle of twelve is missing: small holes are closed.
     let (vertices, triangles) = cuboid([0.0; 3], [0.5; 3]);
     folder.write_mesh("holed.obj", &(vertices, triangles[1..].to_vec()));
+    folder.write_mesh("wide.obj", &cuboid([0.0; 3], [0.12; 3]));
     // Beneath the object, about the palm and the beginnings of the fingers.
     folder.write_mesh("low.obj", &cuboid([0.0, 0.0, -0.2], [0.4, 0.4, 0.23]));
     let scenes = [
         (folder.load(None, SPHERE, TURN, &obstacle("large.obj")), ["thing", "block"]),
         (folder.load(None, SPHERE, TURN, &obstacle("holed.obj")), ["thing", "block"]),
-        (folder.load(None, "mesh = { file = \"large.obj\" }", TURN, ""), ["thing", "palm"]),
+        (folder.load(None, "mesh = { file = \"wide.obj\" }", TURN, ""), ["thing", "palm"]),
         (folder.load(None, SPHERE, TURN, &obstacle("low.obj")), ["palm", "block"]),
     ];
     for (loaded, names) in &scenes {

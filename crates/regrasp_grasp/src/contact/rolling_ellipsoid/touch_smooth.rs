@@ -5,7 +5,7 @@
 //! radii of curvature say how the point moves over the tip when the normal turns, and two nudges how the nearest point of the
 //! object moves, on faces, edges and corners alike.
 
-use super::rolling_ellipsoid::{Stance, Touch};
+use super::{Stance, Touch};
 use nalgebra::{Matrix2, Vector2};
 use regrasp_geometry::frame::tangents;
 use regrasp_geometry::surface::{Surface, SurfacePoint};
