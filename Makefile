@@ -22,7 +22,7 @@ release:
 demo: release
 	$(REGRASP) demo -o $(OUT)/demo
 
-# Lists of grasps of real hands and objects: docs/benchmarks/grasps.md.
+# Lists of grasps of real hands and objects: out/grasps/grasps.md.
 bench-grasps:
 	cargo xtask bench-grasps
 

@@ -1,4 +1,4 @@
-//! Grasp lists of real hands and objects, as a page of the book.
+//! Grasp lists of real hands and objects, as a page of tables.
 
 use crate::run::{Outcome, models, number, out, package, regrasp, words};
 use serde_json::Value;
@@ -8,7 +8,8 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
-const PAGE: &str = "docs/benchmarks/grasps.md";
+/// Name of the page, in the folder of outputs.
+const PAGE: &str = "grasps.md";
 
 /// Name, hand file and further arguments. `{}` stands for the folder of models.
 const HANDS: [(&str, &str, &str); 4] = [
@@ -76,7 +77,8 @@ pub fn bench(_: &[String]) -> Outcome {
             eprintln!("{hand}, {object}");
         }
     }
-    fs::write(PAGE, page).map_err(|error| format!("{PAGE} cannot be written: {error}"))
+    let path = folder.join(PAGE);
+    fs::write(&path, page).map_err(|error| format!("{} cannot be written: {error}", path.display()))
 }
 
 /// One row: what the program says of one list.

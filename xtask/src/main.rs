@@ -29,7 +29,7 @@ const TASKS: [Task; 13] = [
         "measure queries on roadmaps of sphere and box, and on one of a million motions",
         bench::roadmaps,
     ),
-    ("bench-grasps", "lists of grasps of real hands and objects, as docs/benchmarks/grasps.md", grasps::bench),
+    ("bench-grasps", "lists of grasps of real hands and objects, as out/grasps/grasps.md", grasps::bench),
     ("growth", "measure how loading and planning grow with fingers, triangles, obstacles and threads", bench::growth),
     ("bench-scans", "turn scanned objects that are not convex in the Allegro hand", scans::task),
     ("benchmark-page", "write docs/benchmarks.md from what was measured", bench::page),
