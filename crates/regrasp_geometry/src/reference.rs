@@ -2,7 +2,7 @@
 //!
 //! parry's GJK proposes, a separating plane decides: a pair is called separated only by the width of the slab between
 //! two parallel planes that the support functions of both shapes confirm (Boyd, Vandenberghe 2004, 8.2). GJK stopping
-//! early, a wrong witness or a NaN therefore end as `Answer::Unresolved`, never as a clearance. Balls and capsules are
+//! early, a wrong witness or a NaN therefore end as `Clearance::Unresolved`, never as a clearance. Balls and capsules are
 //! a point and a segment with a margin, so that shallow contact of round fingertips needs no EPA. A mesh is a solid: what
 //! touches no triangle may be inside (`inside.rs`).
 
@@ -220,7 +220,7 @@ impl MeshBody {
 }
 
 /// How far apart the shapes are, where that is less than `max`; beyond it the answer is some lower bound of at least
-/// `max`. Anything that is not finite gives [`Answer::Unresolved`].
+/// `max`. Anything that is not finite gives [`Clearance::Unresolved`].
 pub fn distance(
     a: &ReferenceShape,
     world_from_a: &Pose,
