@@ -2,7 +2,7 @@
 //!
 //! The paper gives the terms and their weights, but neither sign nor scale. Here every term is from 0 to 1, and larger is better:
 //!
-//! - **closure**: the margin over [`GOOD_MARGIN`], at most 1;
+//! - **closure**: the margin over `GOOD_MARGIN`, at most 1;
 //! - **centroid**: 1 less the distance of the contacts' centroid from the centre of mass over the torque scale, at least 0;
 //! - **force axis**: the mean over the contacts of 1 less the angle between normal and major axis of the finger's force
 //!   ellipsoid over a right angle. The major axis is the direction in which unit joint torques push hardest: the

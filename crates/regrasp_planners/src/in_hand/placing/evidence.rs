@@ -24,7 +24,7 @@ const NONE: f64 = 0.002;
 /// What was seen at a pose.
 #[derive(Debug, Clone)]
 pub struct Evidence {
-    /// Contacts found per finger, of [`FOOTHOLDS`].
+    /// Contacts found per finger, of `FOOTHOLDS`.
     pub n_contacts: [usize; MAX_FINGERS],
     /// Without each finger: the sum, over the sets of others that can hold, of the share of their contacts that close clear of each
     /// other.
