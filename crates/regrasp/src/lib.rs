@@ -12,6 +12,8 @@ pub mod pictures;
 pub mod placing;
 /// Scene files as text.
 pub mod scene_text;
+/// Many queries of one scene, from where things really are.
+pub mod session;
 /// Settings from several places.
 pub mod settings;
 
@@ -34,4 +36,5 @@ pub use regrasp_plan::Plan;
 pub use regrasp_planners::{
     Failure, InHandSettings, Method, PlannerSettings, TrackingMethod, TrackingSettings, plan_in_hand, plan_tracking,
 };
+pub use session::Session;
 pub use regrasp_scene::{HandView, InHandQuery, Manipulation, Query, Scene, State, TrackingQuery};
