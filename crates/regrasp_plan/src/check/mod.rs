@@ -89,7 +89,7 @@ pub mod violation;
 pub mod way;
 
 pub use along::{Along, along};
-pub use asked::query_of;
+pub use asked::{OwnQuery, query_of};
 pub use files::{CheckedFiles, check_files};
 pub use find_scene::find_scene;
 pub use grasps::{GraspReport, check_grasps};
@@ -110,6 +110,8 @@ use serde::{Deserialize, Serialize};
 pub struct CheckSettings {
     /// What the plan is judged for.
     pub level: Level,
+    /// Whether a plan may bring the query that it answers.
+    pub own_query: OwnQuery,
     /// Largest contact tolerance that a plan may promise, in metres. Issue 2: 0.5 mm.
     pub largest_contact_tolerance: f64,
     /// Largest slip of a rolling fingertip in a segment that a plan may promise, in metres. Issue 4: 0.1 mm.
@@ -197,6 +199,7 @@ impl Default for CheckSettings {
     fn default() -> Self {
         CheckSettings {
             level: Level::Motion,
+            own_query: OwnQuery::Refused,
             largest_slip: 0.1e-3,
             slip_share: 0.005,
             slip_floor: 0.05e-3,
@@ -333,6 +336,7 @@ pub fn check((scene, state): (&Scene, &State), query: Option<&Query>, plan: &Pla
     let mut log = Log { most_per_kind: settings.most_per_kind, work, ..Log::default() };
     let mut report = Report::default();
     promises::check_inputs(plan, &scene.inputs, &mut log);
+    asked::check_own_query(plan, settings, &mut log);
     // Where the scene leaves the start pose open any is an answer, and the other poses follow from it. That the object may be there
     // is judged as at every other moment.
     let started = query.filter(|query| query.has_open_start()).map(|query| query.started_at(&Pose::from(&plan.start)));
