@@ -2,7 +2,9 @@
 
 use regrasp_plan::plan::PoseData;
 use regrasp_plan::robot_plan::{RobotPlan, RobotSegment, RobotSegmentKind, RobotWaypoint};
-use regrasp_scene::{LoadedScene, MotionQuery, Scene};
+use regrasp_robot::LoadOptions;
+use regrasp_scene::{LoadedScene, MotionQuery, Scene, load_scene_text};
+use std::path::Path;
 
 /// The bundled robot with two arms. The right hand holds a ball; a lamp stands between the arms, a shelf in front of them.
 pub const TWO_ARMS: &str = r#"format = "regrasp-scene"
@@ -59,6 +61,12 @@ pub fn two_arms() -> String {
     TWO_ARMS.replace("ROBOT", robot)
 }
 
+/// The scene that `text` says.
+pub fn load(text: &str) -> LoadedScene {
+    let path = Path::new("scene.toml");
+    load_scene_text(path, text.as_bytes().to_vec(), &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
+}
+
 /// The motion query called `name`.
 pub fn motion(loaded: &LoadedScene, name: &str) -> MotionQuery {
     let task = loaded.task_named(name).unwrap_or_else(|| panic!("no task \"{name}\""));
@@ -111,4 +119,41 @@ pub fn straight(scene: &Scene, query: &MotionQuery, corners: &[Vec<f64>], pieces
     let kind = if query.carried.is_empty() { RobotSegmentKind::Transit } else { RobotSegmentKind::Carry };
     plan.segments = vec![RobotSegment { kind, held_by: RobotPlan::held_by(scene, query), waypoints }];
     plan
+}
+
+/// A robot whose chest stays upright: torso_3 follows two joints.
+pub fn upright() -> (tempfile::TempDir, LoadedScene) {
+    let folder = tempfile::tempdir().unwrap();
+    let joint = |name: &str, parent: &str, child: &str, z: f64| {
+        format!(
+            "<joint name='{name}' type='revolute'><parent link='{parent}'/><child link='{child}'/>\
+             <origin xyz='0 0 {z}'/><axis xyz='0 1 0'/><limit lower='-2' upper='2' velocity='2' effort='9'/></joint>"
+        )
+    };
+    let link = |name: &str| {
+        format!(
+            "<link name='{name}'><collision><origin xyz='0 0 0.1'/><geometry><sphere radius='0.04'/></geometry>\
+             </collision></link>"
+        )
+    };
+    let urdf = format!(
+        "<robot name='upright'>{}{}{}{}{}{}{}</robot>",
+        link("base"),
+        link("lower"),
+        link("upper"),
+        link("chest"),
+        joint("torso_1", "base", "lower", 0.1),
+        joint("torso_2", "lower", "upper", 0.3),
+        joint("torso_3", "upper", "chest", 0.3)
+    );
+    std::fs::write(folder.path().join("body.urdf"), urdf).unwrap();
+    let robot = "format = \"regrasp-robot\"\nformat_version = 1\n[[models]]\nurdf = \"body.urdf\"\n[[couplings]]\njoint = \"torso_3\"\n\
+                 terms = [{ leader = \"torso_1\", multiplier = -1.0 }, { leader = \"torso_2\", multiplier = -1.0 }]\n";
+    std::fs::write(folder.path().join("robot.toml"), robot).unwrap();
+    let scene = "format = \"regrasp-scene\"\nformat_version = 2\n[robot]\nfile = \"robot.toml\"\n[[tasks]]\ntask = \"motion\"\n\
+                 goal = { joints = { torso_1 = 0.9, torso_2 = 0.9 } }\n";
+    let path = folder.path().join("scene.toml");
+    let loaded =
+        load_scene_text(&path, scene.into(), &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    (folder, loaded)
 }

@@ -1,6 +1,6 @@
 //! The checker of plans in which a whole robot moves, on plans that were made without a planner.
 
-use crate::moving_robot::{motion, straight, two_arms};
+use crate::moving_robot::{load, motion, straight, two_arms, upright};
 use crate::places::shared_models;
 use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_base::Rng;
@@ -13,11 +13,6 @@ use regrasp_plan::plan::PoseData;
 use regrasp_robot::LoadOptions;
 use regrasp_scene::{LoadedScene, MotionGoal, MotionQuery, load_scene_text};
 use std::path::Path;
-
-fn load(text: &str) -> LoadedScene {
-    let path = Path::new("scene.toml");
-    load_scene_text(path, text.as_bytes().to_vec(), &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
-}
 
 fn judge(loaded: &LoadedScene, query: &MotionQuery, plan: &RobotPlan) -> Report {
     check_robot((&loaded.scene, &loaded.state), Some(query), plan, &CheckSettings::default())
@@ -177,43 +172,6 @@ fn an_object_that_starts_elsewhere_in_the_hand_is_another_question() {
     plan.segments[0].waypoints[4].world_from_objects[0] = PoseData::from(&turned);
     // A ball looks the same, and has slipped all the same.
     assert_eq!(kinds(&judge(&loaded, &query, &plan)), [Kind::GraspChanges]);
-}
-
-/// A robot whose chest stays upright: torso_3 follows two joints.
-fn upright() -> (tempfile::TempDir, LoadedScene) {
-    let folder = tempfile::tempdir().unwrap();
-    let joint = |name: &str, parent: &str, child: &str, z: f64| {
-        format!(
-            "<joint name='{name}' type='revolute'><parent link='{parent}'/><child link='{child}'/>\
-             <origin xyz='0 0 {z}'/><axis xyz='0 1 0'/><limit lower='-2' upper='2' velocity='2' effort='9'/></joint>"
-        )
-    };
-    let link = |name: &str| {
-        format!(
-            "<link name='{name}'><collision><origin xyz='0 0 0.1'/><geometry><sphere radius='0.04'/></geometry>\
-             </collision></link>"
-        )
-    };
-    let urdf = format!(
-        "<robot name='upright'>{}{}{}{}{}{}{}</robot>",
-        link("base"),
-        link("lower"),
-        link("upper"),
-        link("chest"),
-        joint("torso_1", "base", "lower", 0.1),
-        joint("torso_2", "lower", "upper", 0.3),
-        joint("torso_3", "upper", "chest", 0.3)
-    );
-    std::fs::write(folder.path().join("body.urdf"), urdf).unwrap();
-    let robot = "format = \"regrasp-robot\"\nformat_version = 1\n[[models]]\nurdf = \"body.urdf\"\n[[couplings]]\njoint = \"torso_3\"\n\
-                 terms = [{ leader = \"torso_1\", multiplier = -1.0 }, { leader = \"torso_2\", multiplier = -1.0 }]\n";
-    std::fs::write(folder.path().join("robot.toml"), robot).unwrap();
-    let scene = "format = \"regrasp-scene\"\nformat_version = 2\n[robot]\nfile = \"robot.toml\"\n[[tasks]]\ntask = \"motion\"\n\
-                 goal = { joints = { torso_1 = 0.9, torso_2 = 0.9 } }\n";
-    let path = folder.path().join("scene.toml");
-    let loaded =
-        load_scene_text(&path, scene.into(), &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
-    (folder, loaded)
 }
 
 #[test]
