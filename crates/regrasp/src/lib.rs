@@ -14,6 +14,8 @@ pub mod placing;
 pub mod planning;
 /// Scene files as text.
 pub mod scene_text;
+/// Many queries of one scene, from where things really are.
+pub mod session;
 /// Settings from several places.
 pub mod settings;
 
@@ -38,3 +40,4 @@ pub use regrasp_planners::{
     Failure, InHandSettings, Method, PlannerSettings, TrackingMethod, TrackingSettings, plan_in_hand, plan_tracking,
 };
 pub use regrasp_scene::{HandView, InHandQuery, Manipulation, MotionQuery, Query, Scene, State, TrackingQuery};
+pub use session::Session;

@@ -19,6 +19,13 @@ pub enum GraspRequest {
     Automatic,
     /// Joint positions of all fingers, in the order of `Hand::joint_names`; contacts follow.
     Joints(Vec<f64>),
+    /// As `Joints`, with fingers that are free: they do not touch, and stand as given. At the start only.
+    Posture {
+        /// Joint positions of all fingers, in the order of `Hand::joint_names`.
+        joints: Vec<f64>,
+        /// For every finger, whether it holds.
+        holds: Vec<bool>,
+    },
     /// One contact point per finger, in the object frame; joints follow.
     Contacts(Vec<Point>),
 }

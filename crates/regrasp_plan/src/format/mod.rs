@@ -80,6 +80,9 @@ pub fn to_json(plan: &Plan) -> String {
     field("hands", compact(&[hand]));
     field("objects", compact(&[&plan.object]));
     field("start", compact(&plan.start));
+    if let Some(asked) = &plan.asked {
+        field("asked", compact(asked));
+    }
     if !plan.way_poses.is_empty() {
         let way_poses: Vec<String> = plan.way_poses.iter().map(|pose| format!("    {}", compact(pose))).collect();
         field("way_poses", format!("[\n{}\n  ]", way_poses.join(",\n")));
@@ -193,5 +196,6 @@ fn version_of(path: &Path, text: &str) -> Result<u32, InputError> {
 fn all_numbers(plan: &Plan) -> impl Iterator<Item = f64> + '_ {
     let way = plan.way_poses.iter().flat_map(|way_pose| way_pose.world_from_object.numbers());
     let waypoints = plan.segments.iter().flat_map(|segment| &segment.waypoints).flat_map(crate::Waypoint::numbers);
-    plan.promises.numbers().chain(plan.start.numbers()).chain(way).chain(plan.goal.numbers()).chain(waypoints)
+    let asked = plan.asked.iter().flat_map(crate::plan::Asked::numbers);
+    plan.promises.numbers().chain(plan.start.numbers()).chain(way).chain(plan.goal.numbers()).chain(waypoints).chain(asked)
 }

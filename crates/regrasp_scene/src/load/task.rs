@@ -208,7 +208,7 @@ pub(super) fn start(
         .optional("position_within")
         .and_then(|entry| entry.number_that(found, &expected, |x| (0.0..=MAX_POSITION_WITHIN).contains(&x)));
     let is_random = table.optional("random_orientation").and_then(|entry| entry.boolean(found));
-    let grasp = grasp(&mut table, hand, found);
+    let grasp = grasp(&mut table, hand, GraspEnd::Start, found);
     if open.is_some() {
         refuse_beside_open(&mut table, found);
     }
@@ -360,7 +360,7 @@ pub(super) fn task(
             .diagnostics
             .push(diagnostic.fix("give the last pose by a turn of at most 180 degrees, and the others in [[way]]"));
     }
-    let goal_grasp = grasp(&mut table, hand, found);
+    let goal_grasp = grasp(&mut table, hand, GraspEnd::Goal, found);
     let span = table.span.clone();
     table.finish(found);
     let (start, way, goal) = (start?, way?, goal?);
@@ -412,19 +412,31 @@ fn is_goal_start(task: &Task) -> bool {
         && rotation_between(start, goal).norm() < SAME_ANGLE
 }
 
-/// `grasp = "automatic"`, `{ joints = {...} }` or `{ contacts = {...} }`.
-fn grasp(table: &mut Table, hand: Option<&Hand>, found: &mut Found) -> GraspRequest {
+/// Which grasp of a task it is.
+#[derive(Clone, Copy, PartialEq)]
+enum GraspEnd {
+    /// Fingers may be free.
+    Start,
+    /// All fingers hold.
+    Goal,
+}
+
+/// `grasp = "automatic"`, `{ joints = {...} }`, with `free = [...]` at the start, or `{ contacts = {...} }`.
+fn grasp(table: &mut Table, hand: Option<&Hand>, end: GraspEnd, found: &mut Found) -> GraspRequest {
     let Some(entry) = table.optional("grasp") else { return GraspRequest::Automatic };
     if entry.as_text().is_some() {
         entry.choice(found, &["automatic"]);
         return GraspRequest::Automatic;
     }
-    given_grasp(&entry, hand, found).unwrap_or(GraspRequest::Automatic)
+    given_grasp(&entry, hand, end, found).unwrap_or(GraspRequest::Automatic)
 }
 
-fn given_grasp(entry: &Entry, hand: Option<&Hand>, found: &mut Found) -> Option<GraspRequest> {
+fn given_grasp(entry: &Entry, hand: Option<&Hand>, end: GraspEnd, found: &mut Found) -> Option<GraspRequest> {
     let mut table = entry.table(found)?;
     let kinds = table.present(&["joints", "contacts"]);
+    let has_joints = kinds.iter().any(|kind| kind.name.ends_with("joints"));
+    // Contacts are those of fingers that hold, and so is every finger at the goal: there the key is unknown.
+    let free = if end == GraspEnd::Start && has_joints { table.optional("free") } else { None };
     table.finish(found);
     let [kind] = kinds.as_slice() else {
         let diagnostic = entry
@@ -440,10 +452,34 @@ fn given_grasp(entry: &Entry, hand: Option<&Hand>, found: &mut Found) -> Option<
     let values = kind.table(found)?;
     let hand = hand?;
     if kind.name.ends_with("joints") {
-        joint_values(&values, hand, true, found).map(GraspRequest::Joints)
+        let joints = joint_values(&values, hand, true, found)?;
+        let Some(free) = free else { return Some(GraspRequest::Joints(joints)) };
+        free_fingers(&free, hand, found).map(|holds| GraspRequest::Posture { joints, holds })
     } else {
         contact_points(&values, hand, found).map(GraspRequest::Contacts)
     }
+}
+
+/// For every finger whether it holds, from a list of the names of those that are free.
+fn free_fingers(entry: &Entry, hand: &Hand, found: &mut Found) -> Option<Vec<bool>> {
+    let mut holds = vec![true; hand.fingers.len()];
+    let mut is_good = true;
+    for name in entry.entries(found, "names of fingers")? {
+        let Some(text) = name.text(found) else {
+            is_good = false;
+            continue;
+        };
+        let names = || hand.fingers.iter().map(|finger| finger.name.as_str());
+        if let Some(index) = names().position(|known| known == text) {
+            holds[index] = false;
+            continue;
+        }
+        is_good = false;
+        let problem = format!("\"{text}\" is not a finger of the hand{}", suggestion(text, names()));
+        let diagnostic = name.error("S120", found, problem).expected(names().collect::<Vec<_>>().join(", "));
+        found.diagnostics.push(diagnostic);
+    }
+    is_good.then_some(holds)
 }
 
 /// Joint positions in the order of `Hand::joint_names`, from a table of names.
