@@ -97,7 +97,8 @@ fn every_posture_is_found(n_poses: u64) {
                 for [start, end] in &family.intervals {
                     assert!(*start >= -PI - 1e-12 && *start < PI && end > start && *end <= start + TAU + 1e-12);
                     let free = start + (end - start) * rng.uniform(0.01, 0.99);
-                    let found = ik.posture(family, free, &joints).expect("inside");
+                    let found = ik.posture(family, free, &joints);
+                    let found = found.unwrap_or_else(|| panic!("arm {index} pose {pose}: nothing at {free}"));
                     assert!(chain.within_limits(&found, 0.0));
                     worst = worst.max(miss(&chain, &mount, &found, &target));
                     n_checked += 1;

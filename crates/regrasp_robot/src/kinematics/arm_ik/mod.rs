@@ -12,6 +12,7 @@ use super::body_frame::BodyFrame;
 use super::chain::Chain;
 use super::finger_ik::Coordinates;
 use crate::manipulator::{Arm, Manipulator};
+use numeric::Miss;
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;
 pub use spherical::Family;
@@ -28,6 +29,8 @@ const LIMIT_TOLERANCE: f64 = 1e-10;
 const POLISHED: f64 = 1e-13;
 /// Two postures are one where no joint differs by more, in radians or metres.
 const SAME_POSTURE: f64 = 1e-4;
+/// What no posture has missed yet.
+const NOTHING: Miss = Miss { distance: f64::INFINITY, angle: f64::INFINITY };
 /// Coordinates that an arm needs to reach every pose near by.
 const MIN_COORDINATES: usize = 6;
 
@@ -180,9 +183,16 @@ impl ArmIk {
             Method::ClosedForm(arm) => {
                 let families = arm.families(&target)?;
                 let mut found = arm.spread(&families, near, TAU / budget.free_angles.max(1) as f64);
-                found.retain_mut(|posture| self.polish(&mut posture.joints, &target));
+                let mut best = NOTHING;
+                found.retain_mut(|posture| {
+                    let miss = self.polish(&mut posture.joints, &target);
+                    if miss.largest() < best.largest() {
+                        best = miss;
+                    }
+                    miss.largest() < POSE_TOLERANCE && self.chain.within_limits(&posture.joints, 0.0)
+                });
                 if found.is_empty() {
-                    return Err(Unreachable::NotFound { distance: POSE_TOLERANCE, angle: POSE_TOLERANCE });
+                    return Err(Unreachable::NotFound { distance: best.distance, angle: best.angle });
                 }
                 found
             }
@@ -211,7 +221,11 @@ impl ArmIk {
     /// arms without a closed form.
     pub fn posture(&self, family: &Family, free_angle: f64, near: &[f64]) -> Option<Coordinates> {
         match &self.method {
-            Method::ClosedForm(arm) => arm.posture(family, free_angle, near).ok(),
+            Method::ClosedForm(arm) => {
+                let mut joints = arm.posture(family, free_angle, near).ok()?;
+                let miss = self.polish(&mut joints, &family.base_from_last);
+                (miss.largest() < POSE_TOLERANCE).then_some(joints)
+            }
             Method::Numeric => None,
         }
     }
@@ -228,20 +242,18 @@ impl ArmIk {
         frame_of(base_from_mount).then(&self.mount_from_last)
     }
 
-    /// Brings a posture that is near the pose to it. False where that fails.
-    fn polish(&self, joints: &mut Coordinates, target: &BodyFrame) -> bool {
+    /// Brings a posture that nearly reaches a pose to it: axes of a URDF meet within its digits only.
+    fn polish(&self, joints: &mut Coordinates, target: &BodyFrame) -> Miss {
         let miss = numeric::miss(&self.chain, joints, target);
-        let miss = if miss.largest() < 0.01 * POSE_TOLERANCE {
-            miss
-        } else {
-            numeric::descend(&self.chain, target, joints, POLISHED)
-        };
-        miss.largest() < POSE_TOLERANCE && self.chain.within_limits(joints, 0.0)
+        if miss.largest() < 0.01 * POSE_TOLERANCE {
+            return miss;
+        }
+        numeric::descend(&self.chain, target, joints, POLISHED)
     }
 
     fn search(&self, target: &BodyFrame, near: &[f64], budget: &IkBudget) -> Result<Vec<ArmPosture>, Unreachable> {
         let mut found: Vec<ArmPosture> = Vec::new();
-        let mut best = numeric::Miss { distance: f64::INFINITY, angle: f64::INFINITY };
+        let mut best = NOTHING;
         for start in 0..budget.starts.max(1) {
             let mut joints: Coordinates = match start {
                 0 => near.iter().enumerate().map(|(k, q)| q.clamp(self.chain.lower[k], self.chain.upper[k])).collect(),

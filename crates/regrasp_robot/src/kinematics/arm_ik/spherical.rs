@@ -18,6 +18,10 @@ use std::f64::consts::TAU;
 
 /// Joints of the arm.
 const N_JOINTS: usize = 7;
+/// Distance outside of reach that is rounding, in metres.
+const REACH_TOLERANCE: f64 = 1e-10;
+/// Angle of the elbow outside its limits that may be rounding: near the stretched arm it has half the digits.
+const LIMIT_SLACK: f64 = 1e-7;
 /// Half the difference of the elbow's branches below which they are one, in radians.
 const STRETCHED: f64 = 1e-9;
 /// Borders that are this near are one, in radians.
@@ -42,6 +46,8 @@ pub(super) struct SphericalArm {
     wrist_in_last: Vector,
     /// Rotation of the last body while all joints are at zero.
     zero_rotation: Matrix3<f64>,
+    /// How far outside of its reach a wrist may seem to be: rounding, and axes that nearly meet.
+    looseness: f64,
     names: Vec<String>,
 }
 
@@ -55,6 +61,8 @@ pub struct Family {
     /// Parts of the free angle in which all joints keep their limits: from a first angle in `-pi..pi` to a later one. They end where a
     /// joint comes to a limit or where branches meet.
     pub intervals: Vec<[f64; 2]>,
+    /// The pose of the last body.
+    pub(super) base_from_last: BodyFrame,
     shoulder: FreeRotation,
     wrist: FreeRotation,
 }
@@ -74,7 +82,7 @@ impl SphericalArm {
         let zero = chain.joint_lines(&[0.0; N_JOINTS], &mut lines);
         let range = |k: usize| Range { lower: chain.lower[k], upper: chain.upper[k] };
         let triple = |k: usize| Triple::new([k, k + 1, k + 2].map(|j| lines[j].axis), [k, k + 1, k + 2].map(range));
-        let (shoulder, wrist) = (meeting(&lines[..3])?, meeting(&lines[4..])?);
+        let ((shoulder, off_shoulder), (wrist, off_wrist)) = (meeting(&lines[..3])?, meeting(&lines[4..])?);
         let (axis, point) = (lines[3].axis, lines[3].origin);
         let (to_wrist, to_shoulder) = (wrist - point, shoulder - point);
         let along = axis * axis.dot(&to_wrist);
@@ -98,6 +106,7 @@ impl SphericalArm {
             wrist_joints: triple(4)?,
             wrist_in_last: zero.rotation.transpose() * (wrist - zero.translation),
             zero_rotation: zero.rotation,
+            looseness: REACH_TOLERANCE + 4.0 * (off_shoulder + off_wrist),
             names: chain.names.clone(),
         })
     }
@@ -119,7 +128,8 @@ impl SphericalArm {
             let wrist = shoulder.rest_of(&at_elbow, &turned);
             let borders = self.borders(&shoulder, &wrist);
             for is_upper in [[false, false], [false, true], [true, false], [true, true]] {
-                let mut family = Family { elbow, is_upper, intervals: Vec::new(), shoulder, wrist };
+                let mut family =
+                    Family { elbow, is_upper, intervals: Vec::new(), base_from_last: *base_from_last, shoulder, wrist };
                 self.find_intervals(&mut family, &borders, &mut nearest);
                 if !family.intervals.is_empty() {
                     families.push(family);
@@ -138,18 +148,18 @@ impl SphericalArm {
         let ends = [lower, upper].into_iter().filter(|end| end.is_finite());
         let reached = ends.chain(turning).map(|angle| self.distance.at(angle).max(0.0).sqrt());
         let [least, most] = reached.fold([f64::INFINITY, 0.0], |[least, most], d: f64| [least.min(d), most.max(d)]);
-        if distance > most + MEETING {
+        if distance > most + self.looseness {
             return Err(Unreachable::TooFar { by: distance - most });
         }
-        if distance < least.max(FOLDED) - MEETING {
+        if distance < least.max(FOLDED) - self.looseness {
             return Err(Unreachable::TooNear { by: least.max(FOLDED) - distance });
         }
         // At a limit of the elbow, or stretched, rounding may be on the wrong side.
         let kept = distance.clamp(least, most);
-        let half = self.distance.half_width(kept * kept, MEETING).unwrap_or(0.0);
+        let half = self.distance.half_width(kept * kept, self.looseness).unwrap_or(0.0);
         let branches = if half < STRETCHED { &[0.0][..] } else { &[-1.0, 1.0] };
         let angles = branches.iter().map(|side| crest + side * half);
-        Ok(angles.filter_map(|angle| self.elbow_range.place(angle, 0.0, MEETING).ok()).collect())
+        Ok(angles.filter_map(|angle| self.elbow_range.place(angle, 0.0, LIMIT_SLACK).ok()).collect())
     }
 
     /// In rising order.
@@ -223,7 +233,7 @@ impl SphericalArm {
         let wrist = self.wrist_joints.place(&wrist, &near[4..], LIMIT_TOLERANCE).map_err(|(k, by)| (k + 4, by));
         match (shoulder, wrist) {
             (Ok(shoulder), Ok(wrist)) => {
-                let elbow = self.elbow_range.place(family.elbow, near[3], LIMIT_TOLERANCE).unwrap_or(family.elbow);
+                let elbow = self.elbow_range.place(family.elbow, near[3], LIMIT_SLACK).unwrap_or(family.elbow);
                 Ok(shoulder.into_iter().chain([elbow]).chain(wrist).collect())
             }
             (Err(a), Err(b)) => Err(if a.1 > b.1 { a } else { b }),
@@ -257,8 +267,8 @@ impl SphericalArm {
     }
 }
 
-/// The point in which three lines meet.
-fn meeting(lines: &[JointLine]) -> Option<Vector> {
+/// The point in which three lines meet, and how far it is from the farthest.
+fn meeting(lines: &[JointLine]) -> Option<(Vector, f64)> {
     // The point nearest to all lines: the sum of (1 - a a^T) (p - origin) is zero.
     let (mut matrix, mut right) = (Matrix3::zeros(), Vector::zeros());
     for line in lines {
@@ -268,5 +278,6 @@ fn meeting(lines: &[JointLine]) -> Option<Vector> {
     }
     let point = matrix.try_inverse()? * right;
     let off = |line: &JointLine| (point - line.origin).cross(&line.axis).norm();
-    lines.iter().all(|line| off(line) < MEETING).then_some(point)
+    let farthest = lines.iter().map(off).fold(0.0, f64::max);
+    (farthest < MEETING).then_some((point, farthest))
 }

@@ -11,7 +11,7 @@ const PARALLEL: f64 = 1e-6;
 /// Sine between the first and the third axis below which only the sum of their angles counts.
 const SINGULAR: f64 = 1e-9;
 /// Rounding in products of rotations.
-const ROUNDING: f64 = 1e-11;
+const ROUNDING: f64 = 1e-13;
 /// Borders of one triple, at most: two of the middle joint's reach with two angles each, and two limits of three joints.
 pub(super) const MAX_BORDERS: usize = 16;
 
@@ -59,6 +59,8 @@ pub(super) struct Triple {
     ranges: [Range; 3],
     /// `axes[0] . turn(axes[1], q) axes[2]`.
     middle: Wave,
+    /// Angles between neighbouring axes.
+    between: [f64; 2],
 }
 
 impl Triple {
@@ -72,14 +74,14 @@ impl Triple {
         let across = third - along;
         let middle =
             Wave { constant: first.dot(&along), cosine: first.dot(&across), sine: first.dot(&second.cross(&across)) };
-        Some(Triple { axes, ranges, middle })
+        Some(Triple { axes, ranges, middle, between: [angle_between(&first, &second), angle_between(&second, &third)] })
     }
 
     /// Angles, without whole turns, whose product of rotations is `rotation`, with the middle joint on one side of its crest.
     pub fn angles(&self, rotation: &Matrix3<f64>, is_upper: bool) -> Option<[f64; 3]> {
         let [first, second, third] = self.axes;
         let turned = rotation * third;
-        let half = self.middle.half_width(first.dot(&turned), ROUNDING)?;
+        let half = self.half_angle(angle_between(&first, &turned))?;
         let q1 = self.middle.crest() + if is_upper { half } else { -half };
         let middle = turn(&second, q1);
         let before = middle * third;
@@ -88,6 +90,19 @@ impl Triple {
         let across = third.cross(&Vector::ith(third.iamin(), 1.0));
         let left = (turn(&first, q0) * middle).transpose() * (rotation * across);
         Some([q0, q1, angle_about(&third, &across, &left)])
+    }
+
+    /// Angle of the middle joint from its crest at which the outer axes are at angle `apart`: the cosine rule of spherical triangles in its
+    /// form with half angles, which is exact where the outer axes are nearly parallel.
+    fn half_angle(&self, apart: f64) -> Option<f64> {
+        let [first, second] = self.between;
+        let product = |a: f64, b: f64| (0.5 * a).sin() * (0.5 * b).sin();
+        let sine = product(apart + first - second, apart - first + second);
+        let cosine = product(first + second + apart, first + second - apart);
+        if sine.min(cosine) < -ROUNDING {
+            return None;
+        }
+        Some(2.0 * sine.max(0.0).sqrt().atan2(cosine.max(0.0).sqrt()))
     }
 
     /// The rotation at these angles.
@@ -132,6 +147,10 @@ impl Triple {
     }
 }
 
+fn angle_between(a: &Vector, b: &Vector) -> f64 {
+    a.cross(b).norm().atan2(a.dot(b))
+}
+
 /// The angle about `axis` that turns `from` to `to`; 0 where they are along the axis.
 fn angle_about(axis: &Vector, from: &Vector, to: &Vector) -> f64 {
     let (cosine, sine) = (from.dot(to) - axis.dot(from) * axis.dot(to), axis.dot(&from.cross(to)));
@@ -158,7 +177,8 @@ mod tests {
             let rotation = triple.rotation(&angles);
             let found = [false, true].map(|side| triple.angles(&rotation, side).unwrap());
             for branch in &found {
-                assert!((triple.rotation(branch) - rotation).amax() < 1e-6, "{case}");
+                let error = (triple.rotation(branch) - rotation).amax();
+                assert!(error < 1e-12, "{case}: {error:e}");
             }
             let near =
                 |branch: &[f64; 3]| (0..3).all(|k| super::super::wave::wrapped(branch[k] - angles[k]).abs() < 1e-5);
