@@ -121,6 +121,7 @@ const PRIVATE: &[(&str, &[&str])] = &[
     ("pyo3", &["regrasp_python"]),
     ("zip", &["regrasp_export"]),
     ("clarabel", &["regrasp_grasp", "regrasp_plan"]),
+    ("saphyr-parser", &["regrasp_grasp"]),
 ];
 
 fn root() -> PathBuf {
