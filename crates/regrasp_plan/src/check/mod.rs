@@ -9,6 +9,8 @@ pub mod allowance;
 pub mod along;
 /// Room for the weight in every direction.
 mod any_gravity;
+/// Which query a plan is judged against.
+pub mod asked;
 /// Where joints and object are between two waypoints.
 pub mod between;
 /// Everything that can collide, and which pairs must not.
@@ -87,6 +89,7 @@ pub mod violation;
 pub mod way;
 
 pub use along::{Along, along};
+pub use asked::query_of;
 pub use files::{CheckedFiles, check_files};
 pub use find_scene::find_scene;
 pub use grasps::{GraspReport, check_grasps};

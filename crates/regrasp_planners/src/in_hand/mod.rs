@@ -25,6 +25,8 @@ pub mod roadmap;
 mod roadmap_tests;
 /// The methods.
 mod searching;
+/// Starts from what was observed.
+pub mod starting;
 #[cfg(test)]
 mod sequence_tests;
 
