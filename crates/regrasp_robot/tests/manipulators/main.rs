@@ -8,6 +8,7 @@ mod refused;
 mod shared_robots;
 mod text;
 mod two_arms;
+mod upper_body;
 
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;

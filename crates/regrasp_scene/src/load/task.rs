@@ -2,6 +2,7 @@
 
 use super::pose;
 use crate::goal::{Goal, poses_from};
+use crate::motion::{MOTION, MotionQuery};
 use crate::query::{GraspRequest, IN_HAND, InHandQuery, Query, StartChoice, TRACKING, TrackingQuery};
 use regrasp_base::Rng;
 use regrasp_base::diagnostic::number;
@@ -44,6 +45,8 @@ pub(super) enum TaskKind {
     InHand,
     /// An orientation.
     Tracking,
+    /// Of a whole robot.
+    Motion,
 }
 
 impl TaskKind {
@@ -52,6 +55,7 @@ impl TaskKind {
         match self {
             TaskKind::InHand => IN_HAND,
             TaskKind::Tracking => TRACKING,
+            TaskKind::Motion => MOTION,
         }
     }
 }
@@ -83,11 +87,16 @@ pub struct Task {
     pub goal: Goal,
     /// Grasp at the goal.
     pub goal_grasp: GraspRequest,
+    /// Of a task of kind `motion` what it asks for; all other fields but the name are then empty.
+    pub motion: Option<MotionQuery>,
 }
 
 impl Task {
     /// The query of `seed`: the same on every machine and for every number of threads.
     pub fn query(&self, seed: u64) -> Query {
+        if let Some(motion) = &self.motion {
+            return Query::Motion(motion.clone());
+        }
         let mut start = self.world_from_object_start;
         if self.position_within > 0.0 {
             let mut rng = Rng::keyed(seed, "start_position", 0);
@@ -117,7 +126,7 @@ impl Task {
                     StartChoice { rotation, way: self.way.clone(), goal: self.goal.clone() }
                 }),
             }),
-            TaskKind::Tracking => Query::Tracking(TrackingQuery {
+            TaskKind::Tracking | TaskKind::Motion => Query::Tracking(TrackingQuery {
                 name,
                 hand,
                 object,
@@ -126,6 +135,25 @@ impl Task {
                 start_grasp,
                 goal_grasp,
             }),
+        }
+    }
+
+    /// A task of kind `motion`.
+    pub(super) fn of_motion(motion: MotionQuery) -> Self {
+        Task {
+            name: motion.name.clone(),
+            hand: 0,
+            object: 0,
+            kind: TaskKind::Motion,
+            world_from_object_start: Pose::identity(),
+            open_start: None,
+            position_within: 0.0,
+            start_orientation: StartOrientation::Given,
+            start_grasp: GraspRequest::Automatic,
+            way: Vec::new(),
+            goal: Goal::Pose(Pose::identity()),
+            goal_grasp: GraspRequest::Automatic,
+            motion: Some(motion),
         }
     }
 
@@ -321,7 +349,7 @@ pub(super) fn task(
     let mut table = root.required(found, "goal", fix)?.table(found)?;
     let goal = match kind {
         TaskKind::InHand => pose_or_turn(&mut table, found),
-        TaskKind::Tracking => orientation_or_turn(&mut table, found),
+        TaskKind::Tracking | TaskKind::Motion => orientation_or_turn(&mut table, found),
     };
     if let (Some(way), Some(goal)) = (&way, &goal)
         && !way.is_empty()
@@ -349,6 +377,7 @@ pub(super) fn task(
         way,
         goal,
         goal_grasp,
+        motion: None,
     };
     if is_goal_start(&task) {
         found.note(&span, "the goal pose is the start pose: there is nothing to turn");
