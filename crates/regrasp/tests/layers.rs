@@ -127,6 +127,7 @@ const PRIVATE: &[(&str, &[&str])] = &[
     ("zip", &["regrasp_export"]),
     ("clarabel", &["regrasp_grasp", "regrasp_plan"]),
     ("pulp", &["regrasp_arms"]),
+    ("saphyr-parser", &["regrasp_grasp"]),
 ];
 
 fn root() -> PathBuf {
