@@ -62,7 +62,15 @@ const TOWER: &[Floor] = &[
     },
     floor(
         "regrasp_arms",
-        &["regrasp_base", "regrasp_geometry", "regrasp_robot", "regrasp_scene", "regrasp_plan", "regrasp_manipulation"],
+        &[
+            "regrasp_base",
+            "regrasp_geometry",
+            "regrasp_roadmap",
+            "regrasp_robot",
+            "regrasp_scene",
+            "regrasp_plan",
+            "regrasp_manipulation",
+        ],
     ),
     Floor {
         name: "regrasp_planners",
@@ -110,7 +118,7 @@ const TOWER: &[Floor] = &[
     Floor {
         name: "regrasp_bench",
         ships_with: &["regrasp_base", "regrasp_scene", "regrasp_plan", "regrasp_mutations", "regrasp_planners"],
-        tests_with: &["regrasp_geometry", "regrasp_robot"],
+        tests_with: &["regrasp_arms", "regrasp_geometry", "regrasp_robot"],
     },
     floor("regrasp_cli", &["regrasp", "regrasp_bench"]),
     floor("regrasp_python", &["regrasp"]),
