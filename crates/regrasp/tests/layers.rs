@@ -118,7 +118,7 @@ const TOWER: &[Floor] = &[
     Floor {
         name: "regrasp_bench",
         ships_with: &["regrasp_base", "regrasp_scene", "regrasp_plan", "regrasp_mutations", "regrasp_planners"],
-        tests_with: &["regrasp_arms", "regrasp_geometry", "regrasp_robot"],
+        tests_with: &["regrasp_geometry", "regrasp_robot"],
     },
     floor("regrasp_cli", &["regrasp", "regrasp_bench"]),
     floor("regrasp_python", &["regrasp"]),

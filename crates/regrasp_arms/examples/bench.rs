@@ -1,4 +1,4 @@
-//! Times of motions of whole robots: `arms [--settings FILE] [--seeds N] [--csv FILE] SCENE...`; `arms --roadmap ROBOT` builds super graphs.
+//! Times of motions of whole robots: `arms [--package NAME=DIR] [--settings FILE] [--seeds N] [--csv FILE] SCENE...`; `arms --roadmap ROBOT` builds super graphs.
 //!
 //! `cargo xtask bench-arms` runs it. Processor time of one thread.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
@@ -33,6 +33,8 @@ fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let mut scenes = Vec::new();
     let (mut settings, mut seeds, mut csv) = (String::from("{}"), 1, None);
+    // SRDFs of benchmarks name links that their URDFs lack.
+    let mut options = LoadOptions { lenient: true, ..LoadOptions::default() };
     let mut rest = arguments.iter();
     while let Some(argument) = rest.next() {
         let mut value = || rest.next().expect("a value").clone();
@@ -40,6 +42,11 @@ fn main() {
             "--settings" => settings = std::fs::read_to_string(value()).expect("settings"),
             "--seeds" => seeds = value().parse().expect("a number"),
             "--csv" => csv = Some(value()),
+            "--package" => {
+                let value = value();
+                let (name, folder) = value.split_once('=').expect("NAME=DIR");
+                options.resolve.packages.push((name.to_owned(), PathBuf::from(folder)));
+            }
             "--roadmap" => return roadmaps(Path::new(&value())),
             scene => scenes.push(PathBuf::from(scene)),
         }
@@ -48,7 +55,7 @@ fn main() {
     let mut rows = Vec::new();
     let mut table = String::from("scene,seed,solved,prepare_s,search_s,simplify_s,certify_s,times_s,length,duration\n");
     for path in &scenes {
-        let loaded = load_scene(path, &Default::default()).unwrap_or_else(|error| panic!("{error}"));
+        let loaded = load_scene(path, &options).unwrap_or_else(|error| panic!("{error}"));
         for seed in 0..seeds {
             let asked = loaded.task().query(seed);
             let query = asked.as_motion().expect("a task of kind motion");
