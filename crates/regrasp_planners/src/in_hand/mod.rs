@@ -1,6 +1,8 @@
 //! In-hand manipulation by grasp subspaces. Saut 2011: Saut, Sahbani, Perdereau, Advanced Robotics 25; Sahbani 2007:
 //! Sahbani, Saut, Perdereau (2007).
 
+/// What would have helped.
+mod advice;
 /// One attempt at a query.
 mod attempt;
 /// Whether friction is what is missing.
@@ -115,6 +117,7 @@ fn plan_in_hand_frame(asked: &Asked, settings: &InHandSettings, budget: &Budget)
         let model = Model::new(asked.view, &effective(settings).within(&asked.view.limits).physics);
         let ends = [&asked.query.world_from_object_start, &asked.query.world_from_object_goal];
         friction::advise(&model, ends, asked.seed, failure);
+        advice::advise(asked, settings, budget, failure);
     }
     found
 }
