@@ -192,6 +192,22 @@ export type PlanFigures = {
   cost: number,
 };
 
+/** A hand that holds something or moves its fingers. */
+export type PlanHand = {
+  /** Its name in the scene; of an arm that holds without a hand the name of the arm. */
+  name: string,
+  /** Names of its fingers; none for an arm without a hand. */
+  fingers: Array<string>,
+};
+
+/** A robot that the plan moves. */
+export type PlanRobot = {
+  /** Its name in the scene. */
+  name: string,
+  /** Names of all its independent joints, in the order of its layout: the order of every joint vector. */
+  joint_names: Array<string>,
+};
+
 /** What the plan promises; the checker holds it to these numbers. */
 export type Promises = {
   /** Largest distance of a holding fingertip from its contact at and between waypoints, in metres. */
@@ -214,6 +230,114 @@ export type Promises = {
   motion: MotionLimits,
   /** What the contact forces balance, and their limits; absent in plans without forces. */
   forces?: ForcePromises,
+};
+
+/** A finger that touches an object. */
+export type RobotContact = {
+  /** The hand. */
+  hand: string,
+  /** The finger of that hand. */
+  finger: string,
+  /** The object that it touches. */
+  object: string,
+  /** What the finger does; never `free`: free fingers have no entry. */
+  mode: ContactMode,
+  /** Contact point in the object frame, in metres. */
+  point_in_object: [number, number, number],
+  /** Outward normal of the object there, in the object frame. */
+  normal_in_object: [number, number, number],
+  /** Force of the finger on the object, in newtons, in the object frame; absent in plans without forces. */
+  force_in_object?: [number, number, number],
+  /** Moment of the finger on the object about the outward normal, in newton metres; absent: zero. Soft fingers only. */
+  torsion?: number,
+};
+
+/** A plan of whole robots: how their joints move, and what they hold. All else of the scene rests meanwhile. */
+export type RobotPlan = {
+  /** Always `regrasp-plan`. */
+  format: string,
+  /** Version of the format. */
+  format_version: number,
+  /** Tool and version that wrote it. */
+  tool: string,
+  /** Kind of task: `motion`. */
+  task: string,
+  /** Name of the task in the scene file; absent where the file has only one. */
+  query?: string,
+  /** Method that planned it. */
+  method: string,
+  /** Seed. */
+  seed: number,
+  /** Settings of the planner, as they were used. */
+  settings: unknown,
+  /** Files it was made from, the scene file first. */
+  inputs: PlanInput[],
+  /** What it promises. */
+  promises: RobotPromises,
+  /** The robots that the plan moves. This version: one. */
+  robots: Array<PlanRobot>,
+  /** The hands that hold something; empty in a plan in which nothing is held. */
+  hands: Array<PlanHand>,
+  /** Names of the objects that the plan moves, in the order of every `world_from_objects`. */
+  objects: Array<string>,
+  /** Counts of the search. */
+  statistics: RobotStatistics,
+  /** The motion, in order; never empty. */
+  segments: Array<RobotSegment>,
+};
+
+/** What a plan of whole robots promises; the checker holds it to these numbers. */
+export type RobotPromises = {
+  /** Largest velocity of each joint, in radians or metres per second. */
+  joint_velocities: Array<number>,
+  /** Largest acceleration of each joint, in radians or metres per second squared. */
+  joint_accelerations: Array<number>,
+  /**
+   * Bodies that must not touch are at every moment at least this far apart, in metres; 0 where no more than no collision is
+   * promised.
+   */
+  clearance: number,
+};
+
+/** A piece of motion. */
+export type RobotSegment = {
+  /** Its kind. */
+  kind: RobotSegmentKind,
+  /** For every object of `objects`, who holds it: names of hands and supports. */
+  held_by: { [key in string]: Array<string> },
+  /** At least two; the first is the last of the segment before, but for its time. */
+  waypoints: Array<RobotWaypoint>,
+};
+
+/** Kind of a segment of a [`RobotPlan`]. */
+export type RobotSegmentKind = "transit" | "carry";
+
+/** Counts of the search for a motion. */
+export type RobotStatistics = {
+  /** Nodes of trees and roadmaps when the search ended. */
+  nodes: number,
+  /** Configurations sampled. */
+  samples: number,
+  /** Configurations looked at (kinematics and collision): the unit of the work budget. */
+  work: number,
+  /** True when a wall-clock limit cut something, so that another machine may find another plan. */
+  cut_by_time: boolean,
+  /** Further counts of the method, by name. */
+  counts: { [key in string]: number },
+};
+
+/** The state of robots and objects at one moment. */
+export type RobotWaypoint = {
+  /** When, in seconds from the start. */
+  time: number,
+  /** Positions of all joints, robot by robot, in radians or metres. */
+  joints: Array<number>,
+  /** Velocities of all joints, in radians or metres per second; zero at both ends of every segment. */
+  joint_velocities: Array<number>,
+  /** Pose of every object of `objects`, in the world. */
+  world_from_objects: PoseData[],
+  /** Fingers that touch an object, hand by hand in the order of their fingers. Absent where contacts are not planned. */
+  contacts?: Array<RobotContact>,
 };
 
 /** Kind of a segment. */

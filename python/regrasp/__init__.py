@@ -35,6 +35,7 @@ from ._plan import CONTACT_MODES, Plan, Segment
 from ._planning import check, export_mjcf, place, plan, view
 from ._regrasp import __version__
 from ._result import Cause, Clearance, Failure, Moment, NearestMiss, Progress, Report, Violation
+from ._session import QueryTimes, Session, Start
 
 __all__ = [
     "CONTACT_MODES",
@@ -59,11 +60,14 @@ __all__ = [
     "Pose",
     "Progress",
     "Query",
+    "QueryTimes",
     "RegraspError",
     "Report",
     "Scene",
     "Segment",
+    "Session",
     "Shape",
+    "Start",
     "Support",
     "Task",
     "Tip",

@@ -10,8 +10,12 @@ pub mod file_names;
 pub mod pictures;
 /// Scenes in which an object is to be placed.
 pub mod placing;
+/// One entry for every kind of task.
+pub mod planning;
 /// Scene files as text.
 pub mod scene_text;
+/// Many queries of one scene, from where things really are.
+pub mod session;
 /// Settings from several places.
 pub mod settings;
 
@@ -27,11 +31,13 @@ pub use regrasp_robot as robot;
 pub use regrasp_scene as scene;
 pub use regrasp_viewer as viewer;
 
+pub use planning::plan_any;
 pub use regrasp_base::{Budget, InputError};
 pub use regrasp_grasp::GraspList;
 pub use regrasp_grasp_lists::{GraspSettings, list_grasps};
-pub use regrasp_plan::Plan;
+pub use regrasp_plan::{AnyPlan, Plan, RobotPlan};
 pub use regrasp_planners::{
     Failure, InHandSettings, Method, PlannerSettings, TrackingMethod, TrackingSettings, plan_in_hand, plan_tracking,
 };
-pub use regrasp_scene::{HandView, InHandQuery, Manipulation, Query, Scene, State, TrackingQuery};
+pub use regrasp_scene::{HandView, InHandQuery, Manipulation, MotionQuery, Query, Scene, State, TrackingQuery};
+pub use session::Session;

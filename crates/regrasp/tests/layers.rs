@@ -60,6 +60,7 @@ const TOWER: &[Floor] = &[
         // Its tests check, and break lists.
         tests_with: &["regrasp_plan", "regrasp_mutations"],
     },
+    floor("regrasp_arms", &["regrasp_base", "regrasp_geometry", "regrasp_robot"]),
     Floor {
         name: "regrasp_planners",
         ships_with: &[
@@ -121,6 +122,8 @@ const PRIVATE: &[(&str, &[&str])] = &[
     ("pyo3", &["regrasp_python"]),
     ("zip", &["regrasp_export"]),
     ("clarabel", &["regrasp_grasp", "regrasp_plan"]),
+    ("pulp", &["regrasp_arms"]),
+    ("saphyr-parser", &["regrasp_grasp"]),
 ];
 
 fn root() -> PathBuf {

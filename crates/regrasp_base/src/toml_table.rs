@@ -220,10 +220,16 @@ impl<'a> Entry<'a> {
 
     /// The entries of an array.
     pub fn entries(&self, found: &mut Found, expected: &str) -> Option<Vec<Entry<'a>>> {
-        let DeValue::Array(array) = self.value else {
+        let entries = self.as_list();
+        if entries.is_none() {
             self.wrong_type(found, expected);
-            return None;
-        };
+        }
+        entries
+    }
+
+    /// The entries, if the value is an array.
+    pub fn as_list(&self) -> Option<Vec<Entry<'a>>> {
+        let DeValue::Array(array) = self.value else { return None };
         let entry = |(i, value): (usize, &'a Spanned<DeValue<'a>>)| Entry {
             name: format!("{}[{i}]", self.name),
             span: value.span(),
@@ -249,6 +255,13 @@ impl<'a> Entry<'a> {
             DeValue::String(text) => Some(text),
             _ => None,
         }
+    }
+
+    /// The text of `key` inside, if the value is a table that has one.
+    pub fn text_inside(&self, key: &str) -> Option<&'a str> {
+        let DeValue::Table(table) = self.value else { return None };
+        let (_, value) = table.iter().find(|(name, _)| name.get_ref() == key)?;
+        value.get_ref().as_str()
     }
 
     /// True if the value is a list of nothing.

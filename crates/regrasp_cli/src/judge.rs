@@ -5,7 +5,7 @@ use crate::load;
 use crate::stop::Stop;
 use crate::talk::Talk;
 use crate::words::{counted, duration, grouped};
-use regrasp::plan::check::{CheckSettings, Level, Report, check};
+use regrasp::plan::check::{Level, Report, check, query_of};
 use regrasp::plan::format;
 use regrasp::scene::{LoadedScene, load_scene};
 use serde_json::json;
@@ -33,10 +33,12 @@ pub fn judge_bytes(
 /// Judges a plan in a scene that was read for it, against the query of the plan's seed, and says what came of it.
 pub fn judge(loaded: &LoadedScene, plan: &regrasp::Plan, judging: &Judging, talk: &Talk) -> Result<Report, Stop> {
     let started = Instant::now();
-    let query = judging.query(loaded.task_for(&plan.query).query(plan.seed))?;
-    let settings = CheckSettings { level: judging.level(), ..CheckSettings::default() };
-    let report = check((&loaded.scene, &loaded.state), Some(&query), plan, &settings);
+    let query = judging.query(query_of(&loaded.scene, loaded.task_for(&plan.query), plan))?;
+    let report = check((&loaded.scene, &loaded.state), Some(&query), plan, &judging.settings());
     say(&report, plan.promises.tracking.is_some(), started.elapsed(), talk);
+    if plan.asked.is_some() {
+        talk.say("       start and goal are those that the plan says it was asked; all else is the scene's");
+    }
     if query.has_open_start() {
         let [x, y, z] = plan.start.position;
         talk.say(format!(

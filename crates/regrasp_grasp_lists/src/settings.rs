@@ -133,9 +133,6 @@ impl GraspSettings {
         {
             return Err(format!("{name} is {seen}; it must be between {low} and {high}"));
         }
-        if self.kind != GraspKind::Precision {
-            return Err(format!("kind is {}; this version finds precision grasps", self.kind.name()));
-        }
         self.weights.validate()?;
         self.forces.validate()
     }

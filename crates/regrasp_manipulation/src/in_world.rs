@@ -30,6 +30,10 @@ fn plan_seen_from(frame_from_plan: &Pose, mut plan: Plan) -> Plan {
     carry(&mut plan.start);
     carry(&mut plan.goal);
     plan.way_poses.iter_mut().for_each(|way| carry(&mut way.world_from_object));
+    if let Some(asked) = &mut plan.asked {
+        carry(&mut asked.start);
+        carry(&mut asked.goal);
+    }
     for waypoint in plan.segments.iter_mut().flat_map(|segment| &mut segment.waypoints) {
         carry(&mut waypoint.world_from_object);
     }

@@ -329,11 +329,16 @@ impl<'a> Model<'a> {
 
     /// Closure margin of the fingers whose bit is set in `holding`, each at its contact; the first found that is enough.
     pub fn closure_margin(&self, contacts: &[Contact], holding: u32) -> f64 {
+        self.closure_margin_up_to(contacts, holding, self.settings.closure_margin)
+    }
+
+    /// As [`Self::closure_margin`], with another margin that is enough.
+    pub fn closure_margin_up_to(&self, contacts: &[Contact], holding: u32, enough: f64) -> f64 {
         let grips: ArrayVec<Grip, MAX_FINGERS> = (0..contacts.len())
             .filter(|&finger| holding & (1 << finger) != 0)
             .map(|finger| self.grip(finger, &contacts[finger]))
             .collect();
-        closure::closure_margin(&grips, &self.frame, self.settings.closure_margin)
+        closure::closure_margin(&grips, &self.frame, enough)
     }
 
     /// Distance that the tip of a free finger keeps from the object: at least twice what the checker asks.

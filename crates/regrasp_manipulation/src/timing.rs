@@ -10,6 +10,8 @@
 //!   limits in closed form (`step`): velocities and accelerations of joints, speeds of fingertips and object.
 //! - Last, each step is made as short as the velocities at its ends allow.
 
+/// Closure where joints stray from their chords.
+mod closure;
 /// Directions at the waypoints.
 mod path;
 /// How fast each waypoint is passed.
@@ -19,6 +21,7 @@ mod step;
 
 use crate::model::Model;
 use crate::tolerances::CONTACT_TOLERANCE;
+use closure::is_closed_between;
 use path::{Path, Stray};
 use regrasp_plan::plan::{MotionLimits, Segment, SegmentKind, Waypoint};
 use speeds::Speeds;
@@ -29,6 +32,8 @@ pub const LEAST_SPAN: f64 = 1e-3;
 const ROUNDS: usize = 4;
 /// Share of what the search leaves between it and the checker that the motion may stray from the chords.
 const STRAY_SHARE: f64 = 0.75;
+/// Shares of that for a segment in which a grasp does not close where the motion strays, tried one after the other.
+const SMALLER_STRAYS: [f64; 2] = [0.1, 0.001];
 /// How far links may turn aside of the chords in a segment of tracking, there and back, in radians: a quarter of what checkers
 /// allow to contacts that do not turn.
 const TRACKED_TURN: f64 = 5e-4;
@@ -79,6 +84,13 @@ pub fn assign_times(model: &Model, limits: &MotionLimits, segments: &mut [Segmen
         before = Some(segment.kind);
         let stray = timing.stray(segment);
         timing.assign(&mut segment.waypoints, now, least_span(index), stray);
+        for share in SMALLER_STRAYS {
+            if is_closed_between(model, segment) {
+                break;
+            }
+            let smaller = Stray { way: share * stray.way, ..stray };
+            timing.assign(&mut segment.waypoints, now, least_span(index), smaller);
+        }
         now = segment.waypoints.last().map_or(now, |last| last.time);
     }
 }

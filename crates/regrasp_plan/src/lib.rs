@@ -6,8 +6,12 @@ pub mod check;
 pub mod format;
 /// The plan and its parts.
 pub mod plan;
+/// Plans of whole robots.
+pub mod robot_plan;
 
 /// Grasp lists: their type and file.
 pub use regrasp_grasp::list as grasps;
 
+pub use format::{AnyPlan, read_any};
 pub use plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
+pub use robot_plan::{RobotPlan, RobotPromises, RobotSegment, RobotSegmentKind, RobotStatistics, RobotWaypoint};

@@ -226,6 +226,31 @@ pub struct WayPose {
     pub waypoint: usize,
 }
 
+/// A query that no scene file has: what a session was asked, from where hand and object really were. Hand, object, limits and all
+/// else are the scene's; a plan can only say where it was to begin and to end.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(deny_unknown_fields)]
+pub struct Asked {
+    /// Pose of the object at the start.
+    #[cfg_attr(test, ts(type = "PoseData"))]
+    pub start: PoseData,
+    /// Pose of the object at the goal.
+    #[cfg_attr(test, ts(type = "PoseData"))]
+    pub goal: PoseData,
+    /// Positions of all joints of the hand at the start, in radians or metres.
+    pub joints: Vec<f64>,
+    /// Names of the fingers that are free at the start. The others hold.
+    pub free: Vec<String>,
+}
+
+impl Asked {
+    /// Every number of the query.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
+        self.start.numbers().chain(self.goal.numbers()).chain(self.joints.iter().copied())
+    }
+}
+
 /// What the plan promises; the checker holds it to these numbers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[cfg_attr(test, derive(ts_rs::TS))]
@@ -432,6 +457,9 @@ pub struct Plan {
     pub fingers: Vec<String>,
     /// Object pose asked for at the start.
     pub start: PoseData,
+    /// The query, where the scene file does not have it; see [`Asked`].
+    #[serde(skip)]
+    pub asked: Option<Asked>,
     /// Poses asked for between start and goal, in order; absent where none were.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub way_poses: Vec<WayPose>,

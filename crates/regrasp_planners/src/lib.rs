@@ -42,9 +42,19 @@ pub fn plan(
     budget: &Budget,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Plan, Failure> {
+    if query.as_motion().is_some() {
+        return Err(motion_elsewhere());
+    }
     let view = HandView::of(&Manipulation::of(scene, state, query));
     match query {
         Query::InHand(query) => plan_in_hand(&view, query, &settings.in_hand, seed, budget, progress),
         Query::Tracking(query) => plan_tracking(&view, query, &settings.tracking, seed, budget, progress),
+        Query::Motion(_) => Err(motion_elsewhere()),
     }
+}
+
+/// Motions of whole robots have a planner of their own.
+fn motion_elsewhere() -> Failure {
+    let message = "the task is of kind \"motion\", in which no hand moves an object with its fingers".to_owned();
+    Failure::bare(FailureKind::Impossible, message, "plan it as a motion of the whole robot")
 }

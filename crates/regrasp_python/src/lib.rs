@@ -21,6 +21,8 @@ mod place;
 mod plan;
 /// Searching and judging.
 mod search;
+/// Sessions.
+mod session;
 /// Pages of plans.
 mod view;
 /// Searches that the interpreter watches.
@@ -44,6 +46,8 @@ mod _regrasp {
     use super::plan::Plan;
     #[pymodule_export]
     use super::search::{check, find_scene, plan};
+    #[pymodule_export]
+    use super::session::{Session, Start};
     #[pymodule_export]
     use super::view::{page, storyboard};
 

@@ -7,7 +7,7 @@ use crate::plan::Plan;
 use crate::watch::watched;
 use pyo3::prelude::*;
 use regrasp::base::{Diagnostic, Place};
-use regrasp::plan::check::{CheckSettings, Level, Report};
+use regrasp::plan::check::{CheckSettings, Level, OwnQuery, Report, query_of};
 use regrasp::plan::format;
 use regrasp::scene::Task;
 use regrasp::settings::{Argument, Overrides, SettingsError, settings_for};
@@ -72,12 +72,14 @@ pub fn plan(py: Python<'_>, scene: &Scene, request: Request) -> PyResult<(Option
 
 /// Judges `plan` in `scene` as it was read, against the query of the plan's seed, and returns the report as JSON.
 #[pyfunction]
-pub fn check(py: Python<'_>, plan: &Plan, scene: &Scene, level: &str) -> PyResult<String> {
+pub fn check(py: Python<'_>, plan: &Plan, scene: &Scene, level: &str, own_query: bool) -> PyResult<String> {
     guarded(py, || {
         let level = level_named(level).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
         let judged = py.detach(|| {
-            let query = scene.loaded.task_for(&plan.plan.query).query(plan.plan.seed);
-            let settings = CheckSettings { level, ..CheckSettings::default() };
+            let loaded = &scene.loaded;
+            let query = query_of(&loaded.scene, loaded.task_for(&plan.plan.query), &plan.plan);
+            let own_query = if own_query { OwnQuery::Allowed } else { OwnQuery::Refused };
+            let settings = CheckSettings { level, own_query, ..CheckSettings::default() };
             regrasp::plan::check::check((&scene.loaded.scene, &scene.loaded.state), Some(&query), &plan.plan, &settings)
         });
         Ok(report(&judged))
@@ -108,7 +110,7 @@ fn judged_as_written(
 }
 
 /// The level of this name. Errors: there is none (`A503`).
-fn level_named(name: &str) -> Result<Level, Diagnostic> {
+pub fn level_named(name: &str) -> Result<Level, Diagnostic> {
     Level::named(name).ok_or_else(|| {
         bad("A503", format!("is \"{name}\""))
             .element("argument", "level")
@@ -154,12 +156,13 @@ fn settings(task: &Task, request: &Request) -> Result<PlannerSettings, Diagnosti
     })
 }
 
-fn failed(failure: &Failure) -> String {
+/// Why there is no plan, as JSON.
+pub fn failed(failure: &Failure) -> String {
     json!(failure).to_string()
 }
 
 /// A plan that the checker rejects is a failure, with what a report of the bug needs.
-fn rejected(plan: &regrasp::Plan, report: &Report) -> String {
+pub fn rejected(plan: &regrasp::Plan, report: &Report) -> String {
     json!({
         "kind": "rejected",
         "message": format!("the checker rejects the plan that was found: {}", report.violations.first().map_or_else(String::new, ToString::to_string)),
@@ -174,7 +177,8 @@ fn rejected(plan: &regrasp::Plan, report: &Report) -> String {
     .to_string()
 }
 
-fn report(report: &Report) -> String {
+/// What the checker said, as JSON.
+pub fn report(report: &Report) -> String {
     let mut value = json!(report);
     for (entry, violation) in value["violations"].as_array_mut().into_iter().flatten().zip(&report.violations) {
         entry["text"] = violation.to_string().into();

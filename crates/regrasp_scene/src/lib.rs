@@ -14,6 +14,8 @@ pub mod limits;
 pub mod load;
 /// One hand that manipulates one object.
 pub mod manipulation;
+/// Motions of whole robots.
+pub mod motion;
 /// The object that is manipulated.
 pub mod object;
 /// What is asked: start and goal of an object, and how the grasps are given.
@@ -31,6 +33,7 @@ pub use limits::Limits;
 pub use load::{GraspScene, MeshObject, ObjectSource, load_grasp_scene};
 pub use load::{LoadedScene, OpenStart, StartOrientation, Stock, Task, load_scene, load_scene_text, load_scene_with};
 pub use manipulation::{Manipulation, is_of_hand};
+pub use motion::{CarriedObject, Holder, MotionGoal, MotionQuery, WristGoal};
 pub use object::Object;
 pub use query::{GRASP_TOLERANCE, GRASP_TURN_TOLERANCE, GraspRequest, InHandQuery, Query, StartChoice, TrackingQuery};
 pub use scene::{HandCarrier, InputFile, Obstacle, Scene, SceneHand, Support};

@@ -1,8 +1,10 @@
 //! What is asked: start, way and goal of an object, and how the grasps are given.
 
 use crate::goal::{Goal, poses_from};
+use crate::motion::{MOTION, MotionQuery};
 use nalgebra::UnitQuaternion;
 use regrasp_geometry::{Point, Pose, Vector};
+use std::sync::LazyLock;
 
 /// Given fingertips and contacts may be this far off the object's surface, in metres. They are moved to the nearest contact,
 /// no finger farther than this; where that is not enough the scene is refused. Planner and checker go by this one number.
@@ -17,6 +19,13 @@ pub enum GraspRequest {
     Automatic,
     /// Joint positions of all fingers, in the order of `Hand::joint_names`; contacts follow.
     Joints(Vec<f64>),
+    /// As `Joints`, with fingers that are free: they do not touch, and stand as given. At the start only.
+    Posture {
+        /// Joint positions of all fingers, in the order of `Hand::joint_names`.
+        joints: Vec<f64>,
+        /// For every finger, whether it holds.
+        holds: Vec<bool>,
+    },
     /// One contact point per finger, in the object frame; joints follow.
     Contacts(Vec<Point>),
 }
@@ -158,11 +167,23 @@ pub enum Query {
     InHand(InHandQuery),
     /// See [`TrackingQuery`].
     Tracking(TrackingQuery),
+    /// See [`MotionQuery`]. It asks no hand to move an object: what this type says about hand, object and their poses is then empty
+    /// (index 0, the world's origin, a grasp that the planner chooses).
+    Motion(MotionQuery),
 }
+
+/// The pose of an object that is not asked about.
+static NO_POSE: LazyLock<Pose> = LazyLock::new(Pose::identity);
 
 impl From<InHandQuery> for Query {
     fn from(query: InHandQuery) -> Self {
         Query::InHand(query)
+    }
+}
+
+impl From<MotionQuery> for Query {
+    fn from(query: MotionQuery) -> Self {
+        Query::Motion(query)
     }
 }
 
@@ -178,6 +199,7 @@ impl Query {
         match self {
             Query::InHand(_) => IN_HAND,
             Query::Tracking(_) => TRACKING,
+            Query::Motion(_) => MOTION,
         }
     }
 
@@ -186,7 +208,7 @@ impl Query {
     pub fn started_at(&self, start: &Pose) -> Self {
         match self {
             Query::InHand(query) => Query::InHand(query.started_at(start)),
-            Query::Tracking(_) => self.clone(),
+            Query::Tracking(_) | Query::Motion(_) => self.clone(),
         }
     }
 
@@ -204,7 +226,7 @@ impl Query {
     pub fn as_in_hand(&self) -> Option<&InHandQuery> {
         match self {
             Query::InHand(query) => Some(query),
-            Query::Tracking(_) => None,
+            Query::Tracking(_) | Query::Motion(_) => None,
         }
     }
 
@@ -212,7 +234,15 @@ impl Query {
     pub fn as_tracking(&self) -> Option<&TrackingQuery> {
         match self {
             Query::Tracking(query) => Some(query),
-            Query::InHand(_) => None,
+            Query::InHand(_) | Query::Motion(_) => None,
+        }
+    }
+
+    /// The motion query, if it is one.
+    pub fn as_motion(&self) -> Option<&MotionQuery> {
+        match self {
+            Query::Motion(query) => Some(query),
+            Query::InHand(_) | Query::Tracking(_) => None,
         }
     }
 
@@ -221,6 +251,7 @@ impl Query {
         match self {
             Query::InHand(query) => &query.name,
             Query::Tracking(query) => &query.name,
+            Query::Motion(query) => &query.name,
         }
     }
 
@@ -229,6 +260,7 @@ impl Query {
         match self {
             Query::InHand(query) => query.hand,
             Query::Tracking(query) => query.hand,
+            Query::Motion(_) => 0,
         }
     }
 
@@ -237,6 +269,7 @@ impl Query {
         match self {
             Query::InHand(query) => query.object,
             Query::Tracking(query) => query.object,
+            Query::Motion(_) => 0,
         }
     }
 
@@ -245,6 +278,7 @@ impl Query {
         match self {
             Query::InHand(query) => &query.world_from_object_start,
             Query::Tracking(query) => &query.world_from_object_start,
+            Query::Motion(_) => &NO_POSE,
         }
     }
 
@@ -252,7 +286,7 @@ impl Query {
     pub fn way(&self) -> &[Pose] {
         match self {
             Query::InHand(query) => &query.world_from_object_way,
-            Query::Tracking(_) => &[],
+            Query::Tracking(_) | Query::Motion(_) => &[],
         }
     }
 
@@ -261,6 +295,7 @@ impl Query {
         match self {
             Query::InHand(query) => &query.world_from_object_goal,
             Query::Tracking(query) => &query.world_from_object_goal,
+            Query::Motion(_) => &NO_POSE,
         }
     }
 
@@ -269,6 +304,7 @@ impl Query {
         match self {
             Query::InHand(query) => &query.start_grasp,
             Query::Tracking(query) => &query.start_grasp,
+            Query::Motion(_) => &GraspRequest::Automatic,
         }
     }
 
@@ -277,6 +313,7 @@ impl Query {
         match self {
             Query::InHand(query) => &query.goal_grasp,
             Query::Tracking(query) => &query.goal_grasp,
+            Query::Motion(_) => &GraspRequest::Automatic,
         }
     }
 }

@@ -52,6 +52,11 @@ class Controller:
         """Commands at every tick."""
         self.has_feedback = settings.controller in ("C2", "H")
 
+    @property
+    def contacts(self) -> tuple[Array, Array]:
+        """Jacobians of the contacts, and where they are in the world, at every waypoint: as ``contact_jacobians`` has them."""
+        return self._jacobians, self._contacts
+
     def feedback(self, rig: Rig, ref: Reference, settings: Settings) -> Feedback:
         """A fresh feedback loop over these commands."""
         retreats = _largest_retreats(rig, self._jacobians)
@@ -107,6 +112,15 @@ class Feedback:
         model = rig.model
         joints = [model.jnt_qposadr[model.joint(name).id] for name in rig.joint_names]
         self._joint_qpos = np.array(joints, dtype=np.int64)
+
+    @property
+    def offsets(self) -> Array:
+        """Offsets of the fingertips' targets, in the world; shape (n_fingers, 3)."""
+        return self._offsets
+
+    def carry(self, offsets: Array) -> None:
+        """Begins with these offsets, those of the motion before."""
+        np.copyto(self._offsets, offsets)
 
     def command(self, k: int, qpos: Array) -> Array:
         """The command at tick ``k``, with the object where ``qpos`` has it."""

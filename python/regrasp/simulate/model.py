@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -124,6 +124,8 @@ class Rig:
     """Sensor data of each tip."""
     radius: float
     """Largest distance of the object's surface from its centre of mass: the plan's ``torque_scale``."""
+    configurations: Array
+    """Coordinates of the model at every waypoint; shape (n_waypoints, nq)."""
 
 
 def make_rig(xml: str, plan: Plan, settings: Settings) -> Rig:
@@ -174,9 +176,33 @@ def make_rig(xml: str, plan: Plan, settings: Settings) -> Rig:
         angular_velocity=[_sensor(model, f"{name}:angular_velocity") for name in sensors],
         normal_force=np.array([_sensor(model, f"{name}:normal_force").start for name in sensors[:-1]]),
         radius=float(plan["promises"]["torque_scale"]),
+        configurations=np.array(model.key_qpos),
     )
     _apply(rig, settings)
     return rig
+
+
+def with_plan(rig: Rig, plan: Plan) -> Rig:
+    """The same model with another plan of the same hand and object (``plans.flat``), which needs no keyframes.
+
+    Joints that the plan does not move stay as they are at the first waypoint of the plan before.
+    """
+    points = waypoints_of(plan)
+    configurations = np.repeat(rig.configurations[:1], len(points), axis=0)
+    model = rig.model
+    joints = np.array([point["joints"] for point in points])
+    for j, name in enumerate(rig.joint_names):
+        configurations[:, model.jnt_qposadr[model.joint(name).id]] = joints[:, j]
+    for e in range(model.neq):
+        if model.eq_type[e] == mujoco.mjtEq.mjEQ_JOINT and model.eq_obj2id[e] >= 0:
+            follower, leader = (int(model.jnt_qposadr[k]) for k in (model.eq_obj1id[e], model.eq_obj2id[e]))
+            moved = configurations[:, leader] - model.qpos0[leader]
+            configurations[:, follower] = model.qpos0[follower] + np.polynomial.polynomial.polyval(moved, model.eq_data[e, :5])
+    pose = [point["world_from_object"] for point in points]
+    first = rig.object_qpos
+    configurations[:, first : first + 3] = [entry["position"] for entry in pose]
+    configurations[:, first + 3 : first + 7] = np.array([entry["quat_xyzw"] for entry in pose])[:, [3, 0, 1, 2]]
+    return replace(rig, plan=plan, configurations=configurations)
 
 
 def gravity_of(rig: Rig, gravity: str | tuple[float, float, float]) -> Array:
@@ -203,7 +229,7 @@ def contact_jacobians(rig: Rig) -> tuple[Array, Array]:
     where = np.zeros((len(points), len(rig.fingers), 3))
     full = np.zeros((3, model.nv))
     for k, point in enumerate(points):
-        mujoco.mj_resetDataKeyframe(model, data, k)
+        data.qpos[:] = rig.configurations[k]
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         for f, finger in enumerate(rig.fingers):
@@ -224,10 +250,10 @@ def angular_jacobians(rig: Rig) -> Array:
     model = rig.model
     data = mujoco.MjData(model)
     n_joints = len(rig.plan["joint_names"])
-    jacobians = np.zeros((model.nkey, len(rig.fingers), 3, n_joints))
+    jacobians = np.zeros((len(rig.configurations), len(rig.fingers), 3, n_joints))
     full = np.zeros((3, model.nv))
-    for k in range(model.nkey):
-        mujoco.mj_resetDataKeyframe(model, data, k)
+    for k in range(len(rig.configurations)):
+        data.qpos[:] = rig.configurations[k]
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         for f, finger in enumerate(rig.fingers):

@@ -38,7 +38,7 @@ def spins(rig: Rig) -> Array:
     before = None
     data = mujoco.MjData(rig.model)
     for k in range(len(points)):
-        mujoco.mj_resetDataKeyframe(rig.model, data, k)
+        data.qpos[:] = rig.configurations[k]
         mujoco.mj_kinematics(rig.model, data)
         tips = np.array([data.xmat[finger.body].reshape(3, 3) for finger in rig.fingers])
         over = np.einsum("ji,fjl->fil", world_from_object[k], tips)

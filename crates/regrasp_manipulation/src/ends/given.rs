@@ -96,7 +96,7 @@ fn distances(view: &HandView, asked: &GraspRequest, waypoint: &Waypoint) -> Vec<
             let contacts = waypoint.contacts.iter().map(|contact| contact.point_in_object.map(Point::from));
             points.iter().zip(contacts).map(|(asked, found)| found.map_or(0.0, |at| (at - asked).norm())).collect()
         }
-        GraspRequest::Joints(values) => {
+        GraspRequest::Joints(values) | GraspRequest::Posture { joints: values, .. } => {
             let mut first = 0;
             let tip_moved = |finger: &regrasp_robot::hand::Finger| {
                 let own = first..first + finger.ik.chain().n_coordinates();

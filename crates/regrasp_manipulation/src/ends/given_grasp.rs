@@ -11,6 +11,7 @@ use crate::workspace::{TipMode, Workspace};
 use regrasp_base::Rng;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Point, Pose, UnitVector};
+use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::{Coordinates, IkSettings};
 use regrasp_robot::kinematics::whole_pose::{has_all_directions, joints_of_pose};
 use regrasp_scene::{GRASP_TOLERANCE, GraspRequest};
@@ -36,12 +37,15 @@ pub fn given_grasp_at(
 ) -> Result<Option<GraspState>, Failure> {
     let state = match request {
         GraspRequest::Automatic => return Ok(None),
-        GraspRequest::Joints(values) => from_joints(model, end, world_from_object, values)?,
+        GraspRequest::Joints(values) => from_joints(model, end, world_from_object, values, |_| true)?,
+        GraspRequest::Posture { joints, holds } => {
+            from_joints(model, end, world_from_object, joints, |finger| holds.get(finger).copied().unwrap_or(true))?
+        }
         GraspRequest::Contacts(points) => from_contacts(model, end, world_from_object, points, near)?,
     };
     refuse_out_of_reach(model, end, &state.joints)?;
     let mut workspace = Workspace::new(model);
-    workspace.set(world_from_object, &state.joints, &state.contacts);
+    workspace.set_state(&state);
     if !workspace.is_clear(TipMode::AllHold) {
         let names = workspace
             .blocking_pair
@@ -70,9 +74,15 @@ fn refuse_out_of_reach(model: &Model, end: End, joints: &HandJoints) -> Result<(
     Ok(())
 }
 
-fn from_joints(model: &Model, end: End, world_from_object: &Pose, values: &[f64]) -> Result<GraspState, Failure> {
+fn from_joints(
+    model: &Model,
+    end: End,
+    world_from_object: &Pose,
+    values: &[f64],
+    holds: impl Fn(usize) -> bool,
+) -> Result<GraspState, Failure> {
     let placement = Placement::from(world_from_object);
-    let (mut joints, mut contacts) = (HandJoints::new(), Contacts::new());
+    let mut fingers: Vec<(Option<Contact>, Coordinates)> = Vec::with_capacity(model.n_fingers());
     let mut rest = values;
     for (f, finger) in model.fingers.iter().enumerate() {
         let name = &model.view.hand.fingers[f].name;
@@ -87,6 +97,10 @@ fn from_joints(model: &Model, end: End, world_from_object: &Pose, values: &[f64]
                 format!("at the {} finger \"{name}\" is outside its joint limits", end.name()),
                 "give joint positions within the limits; regrasp inspect prints them",
             ));
+        }
+        if !holds(f) {
+            fingers.push((None, own));
+            continue;
         }
         let (contact, own) =
             given::touching(finger, &model.view.object.surface, &own, &placement).map_err(|no_touch| {
@@ -111,10 +125,9 @@ fn from_joints(model: &Model, end: End, world_from_object: &Pose, values: &[f64]
                 "correct the joints or give contacts",
             ));
         }
-        contacts.push(contact);
-        joints.push(own);
+        fingers.push((Some(contact), own));
     }
-    Ok(GraspState::held_by_all(*world_from_object, contacts, joints))
+    Ok(GraspState::of(*world_from_object, fingers.into_iter()))
 }
 
 fn from_contacts(

@@ -10,3 +10,5 @@ pub mod given;
 pub mod given_grasp;
 /// Hands that are inside something.
 pub mod inside;
+/// The nearest valid start to an observed state.
+pub mod project;

@@ -31,6 +31,7 @@ pub fn plan_of(view: &HandView, task: &str, ends: [&Pose; 2], promises: Promises
         joint_names: view.hand.joint_names(),
         fingers: finger_names(view),
         start: PoseData::from(ends[0]),
+        asked: None,
         way_poses: Vec::new(),
         goal: PoseData::from(ends[1]),
         segments: segments

@@ -1,6 +1,6 @@
 //! `regrasp check plan.json`: everything is read afresh from files.
 
-use crate::check::{CheckSettings, Report, check};
+use crate::check::{CheckSettings, Report, check, query_of};
 use crate::format::from_json;
 use crate::plan::Plan;
 use regrasp_base::{Diagnostic, InputError, Place};
@@ -38,7 +38,7 @@ pub fn check_files(
         None => scene_beside(plan_path, &plan)?,
     };
     let loaded = load_scene(&scene_path, options)?;
-    let query = loaded.task_for(&plan.query).query(plan.seed);
+    let query = query_of(&loaded.scene, loaded.task_for(&plan.query), &plan);
     let report = check((&loaded.scene, &loaded.state), Some(&query), &plan, settings);
     Ok(CheckedFiles { plan, scene_path, report, notes: loaded.notes })
 }

@@ -42,15 +42,30 @@ pub fn check_given(
         };
         match asked {
             GraspRequest::Automatic => {}
-            GraspRequest::Joints(joints) if joints.len() != waypoint.joints.len() => {
+            GraspRequest::Joints(joints) | GraspRequest::Posture { joints, .. }
+                if joints.len() != waypoint.joints.len() =>
+            {
                 tell("?", "number of joints", f64::INFINITY, 0.0);
+            }
+            GraspRequest::Posture { holds, .. } if holds.len() != waypoint.contacts.len() => {
+                tell("?", "number of fingers", f64::INFINITY, 0.0);
             }
             GraspRequest::Contacts(points) if points.len() != waypoint.contacts.len() => {
                 tell("?", "number of contacts", f64::INFINITY, 0.0);
             }
-            GraspRequest::Joints(joints) => {
-                for finger in &model.fingers {
-                    let touches = gap(shape, finger, joints, waypoint).abs() <= settings.pose_tolerance;
+            GraspRequest::Joints(joints) | GraspRequest::Posture { joints, .. } => {
+                for (f, finger) in model.fingers.iter().enumerate() {
+                    // Of a grasp that names free fingers, those and no others are free, and stand as they were given.
+                    let holds = match asked {
+                        GraspRequest::Posture { holds, .. } => Some(holds[f]),
+                        _ => None,
+                    };
+                    if holds.is_some_and(|holds| holds != waypoint.contacts[f].holds()) {
+                        tell(&finger.name, "touch", f64::INFINITY, 0.0);
+                        break;
+                    }
+                    let touches =
+                        holds == Some(false) || gap(shape, finger, joints, waypoint).abs() <= settings.pose_tolerance;
                     let exactly = settings.pose_tolerance;
                     let [reach, turn] = if touches { [exactly; 2] } else { [GRASP_TOLERANCE, GRASP_TURN_TOLERANCE] };
                     let own = finger.coordinates.clone();

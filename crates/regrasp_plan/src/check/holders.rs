@@ -25,6 +25,9 @@ pub fn manipulation<'a>(
         let object_index = object_of(scene, plan).ok_or_else(|| wrong("object", &objects))?;
         return Ok(Manipulation { scene, state, hand_index, object_index });
     };
+    if query.as_motion().is_some() {
+        return Err(wrong("task", &[query.task()]));
+    }
     let task = Manipulation::of(scene, state, query);
     if plan.query != query.name() {
         return Err(wrong("query", &[query.name()]));

@@ -5,7 +5,8 @@
 
 use super::caps;
 use crate::plan::{
-    ContactMode, ContactState, Plan, PlanInput, PoseData, Promises, Segment, SegmentKind, Statistics, WayPose, Waypoint,
+    Asked, ContactMode, ContactState, Plan, PlanInput, PoseData, Promises, Segment, SegmentKind, Statistics, WayPose,
+    Waypoint,
 };
 use regrasp_base::json_place::PathStep;
 use schemars::JsonSchema;
@@ -173,6 +174,10 @@ pub(super) struct FilePlan<'a> {
     /// Pose of the object asked for at the start.
     #[cfg_attr(test, ts(type = "PoseData"))]
     pub start: PoseData,
+    /// The query, where the scene file does not have it: that of a session.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
+    pub asked: Option<Cow<'a, Asked>>,
     /// Poses asked for between start and goal, in order; absent where none were.
     #[serde(default, skip_serializing_if = "<[WayPose]>::is_empty")]
     pub way_poses: Cow<'a, [WayPose]>,
@@ -388,6 +393,7 @@ impl FilePlan<'_> {
             joint_names: hand.joint_names.into_owned(),
             fingers: names.fingers,
             start: self.start,
+            asked: self.asked.map(Cow::into_owned),
             way_poses: self.way_poses.into_owned(),
             goal: self.goal,
             segments,

@@ -2,11 +2,16 @@
 
 /// The file as it stands on disk.
 mod file;
+/// Plans of whole robots, and plans of either kind.
+mod robot;
 /// `schema/plan.d.ts`.
 #[cfg(test)]
 mod typescript;
 /// What a plan file may not say.
 mod validate;
+
+pub(crate) use robot::holders_each_once;
+pub use robot::{AnyPlan, is_robot_plan, read_any, robot_from_json, robot_schema, robot_to_json};
 
 use crate::plan::{FORMAT, FORMAT_VERSION, ONLY_HAND, Plan, Segment};
 use file::{FileHand, FilePlan, FileSegment, FileWaypoint};
@@ -25,6 +30,10 @@ mod caps {
     pub const BYTES: u64 = regrasp_base::files::MAX_FILE_BYTES;
     pub const JOINTS: usize = 1_000;
     pub const FINGERS: usize = 64;
+    /// Robots that move.
+    pub const ROBOTS: usize = 64;
+    /// Objects that move.
+    pub const OBJECTS: usize = 1_000;
     /// Hands and supports that hold an object at once.
     pub const HOLDERS: usize = 64;
     pub const INPUTS: usize = 10_000;
@@ -71,6 +80,9 @@ pub fn to_json(plan: &Plan) -> String {
     field("hands", compact(&[hand]));
     field("objects", compact(&[&plan.object]));
     field("start", compact(&plan.start));
+    if let Some(asked) = &plan.asked {
+        field("asked", compact(asked));
+    }
     if !plan.way_poses.is_empty() {
         let way_poses: Vec<String> = plan.way_poses.iter().map(|pose| format!("    {}", compact(pose))).collect();
         field("way_poses", format!("[\n{}\n  ]", way_poses.join(",\n")));
@@ -106,6 +118,12 @@ pub fn from_json(path: &Path, bytes: &[u8]) -> Result<Plan, InputError> {
     }
     let text = regrasp_base::files::text_of(path, bytes.to_vec())?;
     let version = version_of(path, &text)?;
+    if robot::is_robot_plan(text.as_bytes()) {
+        let at = [PathStep::Key("task")];
+        let problem = "is a plan of a whole robot, which this cannot be done with".into();
+        let expected = "a plan in which one hand moves one object: \"in_hand\" or \"tracking\"";
+        return Err(diagnostic(path, &text, "C412", &at, problem).expected(expected).into());
+    }
     let plan = match version {
         OLD_VERSION => version_2(serde_json::from_str(&text).map_err(|error| syntax_error(path, &error))?),
         _ => {
@@ -178,5 +196,12 @@ fn version_of(path: &Path, text: &str) -> Result<u32, InputError> {
 fn all_numbers(plan: &Plan) -> impl Iterator<Item = f64> + '_ {
     let way = plan.way_poses.iter().flat_map(|way_pose| way_pose.world_from_object.numbers());
     let waypoints = plan.segments.iter().flat_map(|segment| &segment.waypoints).flat_map(crate::Waypoint::numbers);
-    plan.promises.numbers().chain(plan.start.numbers()).chain(way).chain(plan.goal.numbers()).chain(waypoints)
+    let asked = plan.asked.iter().flat_map(crate::plan::Asked::numbers);
+    plan.promises
+        .numbers()
+        .chain(plan.start.numbers())
+        .chain(way)
+        .chain(plan.goal.numbers())
+        .chain(waypoints)
+        .chain(asked)
 }

@@ -3,6 +3,7 @@ mod declarations;
 
 use super::file::FilePlan;
 use crate::check::Level;
+use crate::robot_plan::RobotPlan;
 use declarations::{Declarations, assert_written};
 use std::path::Path;
 
@@ -18,5 +19,5 @@ export type { PlanInput, PoseData };
 #[test]
 fn the_types_in_the_repository_are_those_of_the_format() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../schema/plan.d.ts");
-    assert_written(&path, &Declarations::new().with::<FilePlan>().with::<Level>().text(HEADING));
+    assert_written(&path, &Declarations::new().with::<FilePlan>().with::<RobotPlan>().with::<Level>().text(HEADING));
 }

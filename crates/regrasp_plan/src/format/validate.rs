@@ -1,9 +1,11 @@
 //! What a plan file may not say.
 
 use super::caps;
-use crate::plan::{ContactMode, ContactState, FORMAT_VERSION, ForcePromises, Plan, PoseData, Segment, SegmentKind};
+use crate::plan::{
+    Asked, ContactMode, ContactState, FORMAT_VERSION, ForcePromises, Plan, PoseData, Segment, SegmentKind,
+};
 use regrasp_base::InputError;
-use regrasp_base::diagnostic::{Diagnostics, GOOD_NAME, fault_of_name, number};
+use regrasp_base::diagnostic::{Diagnostics, GOOD_NAME, fault_of_name, number, printable_line};
 use regrasp_base::json_place::{PathStep, diagnostic};
 use std::path::Path;
 
@@ -62,6 +64,27 @@ impl Reader<'_> {
         }
         let steps = if self.version == FORMAT_VERSION { in_file(self.plan, steps) } else { steps.to_vec() };
         self.found.push(diagnostic(self.path, self.text, code, &steps, problem).expected(expected));
+    }
+
+    /// The query of a session: as many joints as the plan has, and names of its fingers.
+    fn asked(&mut self, plan: &Plan, asked: &Asked) {
+        use PathStep::{Index, Key};
+        self.pose(&[Key("asked"), Key("start")], &asked.start);
+        self.pose(&[Key("asked"), Key("goal")], &asked.goal);
+        let n_joints = plan.joint_names.len();
+        if asked.joints.len() != n_joints {
+            let problem = format!("has {} entries", asked.joints.len());
+            self.fail("C404", &[Key("asked"), Key("joints")], problem, format!("{n_joints}, as \"joint_names\""));
+        }
+        for (i, joint) in asked.joints.iter().enumerate() {
+            self.within(&[Key("asked"), Key("joints"), Index(i)], *joint, -caps::POSITION, caps::POSITION);
+        }
+        for (i, name) in asked.free.iter().enumerate() {
+            if !plan.fingers.contains(name) || asked.free[..i].contains(name) {
+                let problem = format!("\"{}\" is no finger of the plan, or is named twice", printable_line(name));
+                self.fail("C408", &[Key("asked"), Key("free"), Index(i)], problem, plan.fingers.join(", "));
+            }
+        }
     }
 
     fn validate(&mut self, plan: &Plan) {
@@ -130,6 +153,9 @@ impl Reader<'_> {
         }
         self.pose(&[Key("start")], &plan.start);
         self.pose(&[Key("goal")], &plan.goal);
+        if let Some(asked) = &plan.asked {
+            self.asked(plan, asked);
+        }
         for (i, way_pose) in plan.way_poses.iter().enumerate() {
             let at = [Key("way_poses"), Index(i)];
             self.pose(&[at[0], at[1], Key("world_from_object")], &way_pose.world_from_object);

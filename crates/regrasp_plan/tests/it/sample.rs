@@ -361,6 +361,7 @@ pub fn plan_of(scene: &Scene, start: &Pose, goal: &Pose, segments: Vec<Segment>)
         joint_names,
         fingers: (0..N_FINGERS).map(|f| format!("f{f}")).collect(),
         start: PoseData::from(&(world_from_hand() * start)),
+        asked: None,
         way_poses: Vec::new(),
         goal: PoseData::from(&(world_from_hand() * goal)),
         segments,

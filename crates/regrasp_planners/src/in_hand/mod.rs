@@ -29,6 +29,8 @@ mod roadmap_tests;
 mod searching;
 #[cfg(test)]
 mod sequence_tests;
+/// Starts from what was observed.
+pub mod starting;
 
 pub use crate::settings::{
     Alpha, BaselineSettings, CostWeights, FirstTry, ImprovementSettings, InHandSettings, Method, ReleaseRule,

@@ -85,7 +85,7 @@ pub fn given_grasp(
     rng: &mut Rng,
 ) -> Result<Option<GraspState>, Failure> {
     let Some(state) = given_grasp_at(model, end, world_from_object, request, Near::Any(rng))? else { return Ok(None) };
-    let margin = model.closure_margin(&state.contacts, model.all_fingers());
+    let margin = model.closure_margin(&state.contacts, state.holding);
     if margin < model.settings.closure_margin {
         return Err(end.failure(
             format!(
@@ -97,7 +97,10 @@ pub fn given_grasp(
             "move the contacts apart, or lower the margin (--margin)",
         ));
     }
-    if end == End::Start && model.may_release && releasable(model, &state.contacts, state.holding) == 0 {
+    // A finger that is free needs no leave to land.
+    let is_stuck =
+        || state.is_held_by_all() && model.may_release && releasable(model, &state.contacts, state.holding) == 0;
+    if end == End::Start && is_stuck() {
         return Err(end.failure(
             "in the start grasp no finger can lift: no set of n-1 fingers has force closure".into(),
             "choose other contacts, or let the planner choose (grasp = \"automatic\")",

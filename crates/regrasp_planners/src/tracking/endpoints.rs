@@ -74,6 +74,10 @@ pub fn start(stepper: &Stepper, query: &TrackingQuery) -> Result<(TrackingGrasp,
         impossible(message, "give [start] grasp = { contacts = { finger = [x, y, z] } }")
     })?;
     let invalid = |message: String, advice: &str| Failure::bare(FailureKind::StartInvalid, message, advice);
+    if !state.is_held_by_all() {
+        let message = "in tracking every finger holds, and the start has a free one".to_owned();
+        return Err(invalid(message, "leave \"free\" out of the start's grasp"));
+    }
     let grasp = TrackingGrasp::of(model, &state)
         .ok_or_else(|| invalid("a fingertip's centre is inside the object at the start".into(), "move it out"))?;
     let Ok(forces) = stepper.balanced_at_rest(&grasp) else {

@@ -5,9 +5,11 @@ mod places;
 
 mod hands_alone;
 mod refused;
+mod robot_file_keys;
 mod shared_robots;
 mod text;
 mod two_arms;
+mod upper_body;
 
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;

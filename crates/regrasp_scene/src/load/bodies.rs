@@ -3,12 +3,12 @@
 use super::files::Files;
 use super::object::{self, Hands, Names};
 use super::task::{self, Heading, Task, TaskKind};
-use super::{gravity, hand, limits, pose, robot, units};
+use super::{gravity, hand, limits, motion, pose, robot, units};
 use crate::gravity::Gravity;
 use crate::limits::Limits;
 use crate::object::Object;
 use crate::scene::{Obstacle, SceneHand, Support};
-use regrasp_base::toml_table::{Entry, Found, Table, suggestion};
+use regrasp_base::toml_table::{Entry, Found, Table, one_of, suggestion};
 use regrasp_geometry::Pose;
 use regrasp_robot::Manipulator;
 
@@ -27,7 +27,7 @@ pub(super) struct Parts {
 
 /// Version 1: `[hand]`, `[object]`, `[[obstacles]]` and one task.
 pub(super) fn one_hand(root: &mut Table, files: &mut Files, found: &mut Found) -> Option<Parts> {
-    let kind = task_kind(root, found);
+    let kind = task_kind(root, &[TaskKind::InHand, TaskKind::Tracking], found);
     let hand = root
         .required(found, "hand", "add [hand] with file = \"hand.toml\"")
         .and_then(|entry| entry.table(found))
@@ -70,11 +70,12 @@ pub(super) fn one_hand(root: &mut Table, files: &mut Files, found: &mut Found) -
 /// Version 2: `[robot]`, `[[objects]]`, `[[supports]]`, `[[obstacles]]`, `[[tasks]]`.
 pub(super) fn several(root: &mut Table, files: &mut Files, found: &mut Found) -> Option<Parts> {
     let mut names = Names::of("body of the scene");
-    let carried = robot_and_hands(root, &mut names, files, found);
+    let needed = Needed::of(root);
+    let carried = robot_and_hands(root, needed, &mut names, files, found);
     let gravity = gravity::gravity(root, Some(&Pose::identity()), found);
     let limits = limits::limits(root, found);
     let around = Hands::of(carried.iter().flat_map(|(_, hands)| hands));
-    let objects = objects(root, &mut names, around, files, found);
+    let objects = objects(root, needed, &mut names, around, files, found);
     let supports = object::fixed_bodies(root, "supports", &mut names, files, found);
     let supports = supports.into_iter().map(|body| Support { body }).collect();
     let obstacles = object::fixed_bodies(root, "obstacles", &mut names, files, found);
@@ -87,7 +88,7 @@ pub(super) fn several(root: &mut Table, files: &mut Files, found: &mut Found) ->
     for (index, entry) in entries.iter().enumerate() {
         let Some(mut table) = entry.table(found) else { continue };
         let default_name = if entries.len() == 1 { String::new() } else { format!("task_{}", index + 1) };
-        let task = task_of(&mut table, default_name, &hands, &objects, found);
+        let task = task_of(&mut table, default_name, (&robots, &hands, &objects), found);
         table.finish(found);
         let Some(task) = task else { continue };
         task_names.add(&task.name, entry, found);
@@ -105,7 +106,13 @@ pub(super) fn several(root: &mut Table, files: &mut Files, found: &mut Found) ->
 type Carried = (Vec<Manipulator>, Vec<SceneHand>);
 
 /// `[robot]`: a robot file with its hands, and hands that stand by themselves. None where one of them could not be read.
-fn robot_and_hands(root: &mut Table, names: &mut Names, files: &mut Files, found: &mut Found) -> Option<Carried> {
+fn robot_and_hands(
+    root: &mut Table,
+    needed: Needed,
+    names: &mut Names,
+    files: &mut Files,
+    found: &mut Found,
+) -> Option<Carried> {
     let fix = "add [[robot.hands]] with name and file = \"hand.toml\", or [robot] with file = \"robot.toml\"";
     let mut table = root.required(found, "robot", fix)?.table(found)?;
     let (mut robots, mut hands) = (Vec::new(), Vec::new());
@@ -127,7 +134,7 @@ fn robot_and_hands(root: &mut Table, names: &mut Names, files: &mut Files, found
         names.add(&hand.name, entry, found);
         hands.push(hand);
     }
-    if hands.is_empty() && found.diagnostics.is_empty() {
+    if hands.is_empty() && (needed == Needed::HandAndObject || robots.is_empty()) && found.diagnostics.is_empty() {
         let diagnostic = root.error("S102", found, "has no hand").fix(fix);
         found.diagnostics.push(diagnostic);
     }
@@ -137,13 +144,19 @@ fn robot_and_hands(root: &mut Table, names: &mut Names, files: &mut Files, found
 /// `[[objects]]`, each with the pose at which it rests. None where one of them could not be read.
 fn objects(
     root: &mut Table,
+    needed: Needed,
     names: &mut Names,
     hands: Hands,
     files: &mut Files,
     found: &mut Found,
 ) -> Option<Vec<(Object, Pose)>> {
     let fix = "add [[objects]] with name, a shape such as sphere = { radius = 0.03 }, mass, friction and position";
-    let entries = root.required(found, "objects", fix)?.entries(found, "tables [[objects]]")?;
+    let entry = match needed {
+        Needed::HandAndObject => Some(root.required(found, "objects", fix)?),
+        Needed::Robot => root.optional("objects"),
+    };
+    let Some(entry) = entry else { return Some(Vec::new()) };
+    let entries = entry.entries(found, "tables [[objects]]")?;
     let mut objects = Vec::new();
     for entry in &entries {
         let Some(mut table) = entry.table(found) else { continue };
@@ -166,13 +179,20 @@ fn objects(
 fn task_of(
     table: &mut Table,
     default_name: String,
-    hands: &[SceneHand],
-    objects: &[(Object, Pose)],
+    (robots, hands, objects): (&[Manipulator], &[SceneHand], &[(Object, Pose)]),
     found: &mut Found,
 ) -> Option<Task> {
-    let known_kind = task_kind(table, found);
+    let known_kind = task_kind(table, &[TaskKind::InHand, TaskKind::Tracking, TaskKind::Motion], found);
     let kind = known_kind.unwrap_or(TaskKind::InHand);
     let name = table.optional("name").map_or(Some(default_name), |entry| entry.name(found).map(str::to_owned));
+    if kind == TaskKind::Motion {
+        let bodies = motion::Bodies { robots, hands, objects };
+        return motion::motion(table, name?, &bodies, found).map(Task::of_motion);
+    }
+    if hands.is_empty() || objects.is_empty() {
+        // Only where the kind of the task is not known: else hands and objects have been asked for.
+        return None;
+    }
     let hand_names: Vec<&str> = hands.iter().map(|hand| hand.name.as_str()).collect();
     let object_names: Vec<&str> = objects.iter().map(|(object, _)| object.name.as_str()).collect();
     let hand = which(table, "hand", &hand_names, found);
@@ -195,8 +215,26 @@ fn task_of(
     Some(task)
 }
 
+/// What the tasks of a scene cannot do without.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Needed {
+    /// A hand and an object.
+    HandAndObject,
+    /// A robot: all tasks are of kind `motion`.
+    Robot,
+}
+
+impl Needed {
+    /// Looks at the tasks without reading them.
+    fn of(root: &mut Table) -> Self {
+        let tasks = root.optional("tasks").and_then(|entry| entry.as_list()).unwrap_or_default();
+        let is_motion = |entry: &Entry| entry.text_inside("task") == Some(TaskKind::Motion.name());
+        if !tasks.is_empty() && tasks.iter().all(is_motion) { Needed::Robot } else { Needed::HandAndObject }
+    }
+}
+
 /// The one of `names` that `key` says; where there is only one it may be left out. Errors: unknown (`S120`), missing (`S102`).
-fn which(table: &mut Table, key: &'static str, names: &[&str], found: &mut Found) -> Option<usize> {
+pub(super) fn which(table: &mut Table, key: &'static str, names: &[&str], found: &mut Found) -> Option<usize> {
     let entry: Entry = match names {
         [_] => match table.optional(key) {
             Some(entry) => entry,
@@ -215,12 +253,13 @@ fn which(table: &mut Table, key: &'static str, names: &[&str], found: &mut Found
 }
 
 /// `task`. Errors: missing (`S102`), another task (`S105`).
-fn task_kind(table: &mut Table, found: &mut Found) -> Option<TaskKind> {
+fn task_kind(table: &mut Table, kinds: &[TaskKind], found: &mut Found) -> Option<TaskKind> {
     let entry = table.required(found, "task", "add task = \"in_hand\"")?;
     let text = entry.text(found)?;
-    let known = [TaskKind::InHand, TaskKind::Tracking].into_iter().find(|kind| kind.name() == text);
+    let known = kinds.iter().copied().find(|kind| kind.name() == text);
     if known.is_none() {
-        let expected = "\"in_hand\" or \"tracking\", the tasks that this version plans";
+        let names: Vec<String> = kinds.iter().map(|kind| format!("\"{}\"", kind.name())).collect();
+        let expected = format!("{}, the tasks that this version plans", one_of(&names));
         let diagnostic = entry.error("S105", found, format!("is \"{text}\"")).expected(expected);
         found.diagnostics.push(diagnostic);
     }

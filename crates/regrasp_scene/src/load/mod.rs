@@ -13,6 +13,7 @@ mod grasping;
 mod gravity;
 mod hand;
 mod limits;
+mod motion;
 mod numbers;
 mod object;
 mod pose;

@@ -2,6 +2,7 @@
 
 use super::pose;
 use crate::goal::{Goal, poses_from};
+use crate::motion::{MOTION, MotionQuery};
 use crate::query::{GraspRequest, IN_HAND, InHandQuery, Query, StartChoice, TRACKING, TrackingQuery};
 use regrasp_base::Rng;
 use regrasp_base::diagnostic::number;
@@ -44,6 +45,8 @@ pub(super) enum TaskKind {
     InHand,
     /// An orientation.
     Tracking,
+    /// Of a whole robot.
+    Motion,
 }
 
 impl TaskKind {
@@ -52,6 +55,7 @@ impl TaskKind {
         match self {
             TaskKind::InHand => IN_HAND,
             TaskKind::Tracking => TRACKING,
+            TaskKind::Motion => MOTION,
         }
     }
 }
@@ -83,11 +87,16 @@ pub struct Task {
     pub goal: Goal,
     /// Grasp at the goal.
     pub goal_grasp: GraspRequest,
+    /// Of a task of kind `motion` what it asks for; all other fields but the name are then empty.
+    pub motion: Option<MotionQuery>,
 }
 
 impl Task {
     /// The query of `seed`: the same on every machine and for every number of threads.
     pub fn query(&self, seed: u64) -> Query {
+        if let Some(motion) = &self.motion {
+            return Query::Motion(motion.clone());
+        }
         let mut start = self.world_from_object_start;
         if self.position_within > 0.0 {
             let mut rng = Rng::keyed(seed, "start_position", 0);
@@ -117,7 +126,7 @@ impl Task {
                     StartChoice { rotation, way: self.way.clone(), goal: self.goal.clone() }
                 }),
             }),
-            TaskKind::Tracking => Query::Tracking(TrackingQuery {
+            TaskKind::Tracking | TaskKind::Motion => Query::Tracking(TrackingQuery {
                 name,
                 hand,
                 object,
@@ -126,6 +135,25 @@ impl Task {
                 start_grasp,
                 goal_grasp,
             }),
+        }
+    }
+
+    /// A task of kind `motion`.
+    pub(super) fn of_motion(motion: MotionQuery) -> Self {
+        Task {
+            name: motion.name.clone(),
+            hand: 0,
+            object: 0,
+            kind: TaskKind::Motion,
+            world_from_object_start: Pose::identity(),
+            open_start: None,
+            position_within: 0.0,
+            start_orientation: StartOrientation::Given,
+            start_grasp: GraspRequest::Automatic,
+            way: Vec::new(),
+            goal: Goal::Pose(Pose::identity()),
+            goal_grasp: GraspRequest::Automatic,
+            motion: Some(motion),
         }
     }
 
@@ -180,7 +208,7 @@ pub(super) fn start(
         .optional("position_within")
         .and_then(|entry| entry.number_that(found, &expected, |x| (0.0..=MAX_POSITION_WITHIN).contains(&x)));
     let is_random = table.optional("random_orientation").and_then(|entry| entry.boolean(found));
-    let grasp = grasp(&mut table, hand, found);
+    let grasp = grasp(&mut table, hand, GraspEnd::Start, found);
     if open.is_some() {
         refuse_beside_open(&mut table, found);
     }
@@ -321,7 +349,7 @@ pub(super) fn task(
     let mut table = root.required(found, "goal", fix)?.table(found)?;
     let goal = match kind {
         TaskKind::InHand => pose_or_turn(&mut table, found),
-        TaskKind::Tracking => orientation_or_turn(&mut table, found),
+        TaskKind::Tracking | TaskKind::Motion => orientation_or_turn(&mut table, found),
     };
     if let (Some(way), Some(goal)) = (&way, &goal)
         && !way.is_empty()
@@ -332,7 +360,7 @@ pub(super) fn task(
             .diagnostics
             .push(diagnostic.fix("give the last pose by a turn of at most 180 degrees, and the others in [[way]]"));
     }
-    let goal_grasp = grasp(&mut table, hand, found);
+    let goal_grasp = grasp(&mut table, hand, GraspEnd::Goal, found);
     let span = table.span.clone();
     table.finish(found);
     let (start, way, goal) = (start?, way?, goal?);
@@ -349,6 +377,7 @@ pub(super) fn task(
         way,
         goal,
         goal_grasp,
+        motion: None,
     };
     if is_goal_start(&task) {
         found.note(&span, "the goal pose is the start pose: there is nothing to turn");
@@ -383,19 +412,31 @@ fn is_goal_start(task: &Task) -> bool {
         && rotation_between(start, goal).norm() < SAME_ANGLE
 }
 
-/// `grasp = "automatic"`, `{ joints = {...} }` or `{ contacts = {...} }`.
-fn grasp(table: &mut Table, hand: Option<&Hand>, found: &mut Found) -> GraspRequest {
+/// Which grasp of a task it is.
+#[derive(Clone, Copy, PartialEq)]
+enum GraspEnd {
+    /// Fingers may be free.
+    Start,
+    /// All fingers hold.
+    Goal,
+}
+
+/// `grasp = "automatic"`, `{ joints = {...} }`, with `free = [...]` at the start, or `{ contacts = {...} }`.
+fn grasp(table: &mut Table, hand: Option<&Hand>, end: GraspEnd, found: &mut Found) -> GraspRequest {
     let Some(entry) = table.optional("grasp") else { return GraspRequest::Automatic };
     if entry.as_text().is_some() {
         entry.choice(found, &["automatic"]);
         return GraspRequest::Automatic;
     }
-    given_grasp(&entry, hand, found).unwrap_or(GraspRequest::Automatic)
+    given_grasp(&entry, hand, end, found).unwrap_or(GraspRequest::Automatic)
 }
 
-fn given_grasp(entry: &Entry, hand: Option<&Hand>, found: &mut Found) -> Option<GraspRequest> {
+fn given_grasp(entry: &Entry, hand: Option<&Hand>, end: GraspEnd, found: &mut Found) -> Option<GraspRequest> {
     let mut table = entry.table(found)?;
     let kinds = table.present(&["joints", "contacts"]);
+    let has_joints = kinds.iter().any(|kind| kind.name.ends_with("joints"));
+    // Contacts are those of fingers that hold, and so is every finger at the goal: there the key is unknown.
+    let free = if end == GraspEnd::Start && has_joints { table.optional("free") } else { None };
     table.finish(found);
     let [kind] = kinds.as_slice() else {
         let diagnostic = entry
@@ -411,10 +452,34 @@ fn given_grasp(entry: &Entry, hand: Option<&Hand>, found: &mut Found) -> Option<
     let values = kind.table(found)?;
     let hand = hand?;
     if kind.name.ends_with("joints") {
-        joint_values(&values, hand, true, found).map(GraspRequest::Joints)
+        let joints = joint_values(&values, hand, true, found)?;
+        let Some(free) = free else { return Some(GraspRequest::Joints(joints)) };
+        free_fingers(&free, hand, found).map(|holds| GraspRequest::Posture { joints, holds })
     } else {
         contact_points(&values, hand, found).map(GraspRequest::Contacts)
     }
+}
+
+/// For every finger whether it holds, from a list of the names of those that are free.
+fn free_fingers(entry: &Entry, hand: &Hand, found: &mut Found) -> Option<Vec<bool>> {
+    let mut holds = vec![true; hand.fingers.len()];
+    let mut is_good = true;
+    for name in entry.entries(found, "names of fingers")? {
+        let Some(text) = name.text(found) else {
+            is_good = false;
+            continue;
+        };
+        let names = || hand.fingers.iter().map(|finger| finger.name.as_str());
+        if let Some(index) = names().position(|known| known == text) {
+            holds[index] = false;
+            continue;
+        }
+        is_good = false;
+        let problem = format!("\"{text}\" is not a finger of the hand{}", suggestion(text, names()));
+        let diagnostic = name.error("S120", found, problem).expected(names().collect::<Vec<_>>().join(", "));
+        found.diagnostics.push(diagnostic);
+    }
+    is_good.then_some(holds)
 }
 
 /// Joint positions in the order of `Hand::joint_names`, from a table of names.

@@ -6,6 +6,7 @@ mod bad_inputs;
 mod bulb_mesh;
 mod bundled;
 mod hostile;
+mod motion;
 mod pairs;
 #[path = "../../../../tests/support/places.rs"]
 mod places;

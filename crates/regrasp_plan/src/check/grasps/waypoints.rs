@@ -48,6 +48,7 @@ pub(super) fn plan_of(list: &GraspList) -> Plan {
         joint_names: list.hand.joint_names.clone(),
         fingers: list.hand.fingers.clone(),
         start: identity,
+        asked: None,
         way_poses: Vec::new(),
         goal: identity,
         segments: vec![Segment::transfer(waypoints)],

@@ -1,0 +1,387 @@
+//! Plan files of whole robots, and files of either kind.
+
+use super::{caps, from_json, syntax_error};
+use crate::plan::{FORMAT, FORMAT_VERSION, Plan, PoseData};
+use crate::robot_plan::{RobotContact, RobotPlan, RobotSegmentKind, RobotWaypoint};
+use regrasp_base::diagnostic::{Diagnostics, GOOD_NAME, fault_of_name, number};
+use regrasp_base::json_place::{PathStep, diagnostic};
+use regrasp_base::{Diagnostic, InputError, Place};
+use regrasp_scene::motion::MOTION;
+use serde::de::{Error, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// How far a quaternion's or a normal's length may be from one.
+const UNIT_TOLERANCE: f64 = 1e-9;
+/// Largest clearance that a plan may promise, in metres.
+const MOST_CLEARANCE: f64 = 10.0;
+
+/// A plan of either kind.
+#[derive(Debug, Clone, PartialEq)]
+pub enum AnyPlan {
+    /// One hand moves one object with its fingers.
+    InHand(Plan),
+    /// Whole robots move.
+    Robot(RobotPlan),
+}
+
+impl AnyPlan {
+    /// Name of the task in the scene file; empty where the file has only one.
+    pub fn query(&self) -> &str {
+        match self {
+            AnyPlan::InHand(plan) => &plan.query,
+            AnyPlan::Robot(plan) => &plan.query,
+        }
+    }
+
+    /// Its seed.
+    pub fn seed(&self) -> u64 {
+        match self {
+            AnyPlan::InHand(plan) => plan.seed,
+            AnyPlan::Robot(plan) => plan.seed,
+        }
+    }
+
+    /// Files it was made from.
+    pub fn inputs(&self) -> &[crate::plan::PlanInput] {
+        match self {
+            AnyPlan::InHand(plan) => &plan.inputs,
+            AnyPlan::Robot(plan) => &plan.inputs,
+        }
+    }
+
+    /// The bytes of its file.
+    ///
+    /// Panics if the plan holds a NaN or an infinity.
+    pub fn to_json(&self) -> String {
+        match self {
+            AnyPlan::InHand(plan) => super::to_json(plan),
+            AnyPlan::Robot(plan) => robot_to_json(plan),
+        }
+    }
+}
+
+/// True if the bytes are a plan file whose task is one of whole robots.
+pub fn is_robot_plan(bytes: &[u8]) -> bool {
+    #[derive(Deserialize)]
+    struct Header {
+        format: String,
+        task: String,
+    }
+    serde_json::from_slice::<Header>(bytes).is_ok_and(|header| header.format == FORMAT && header.task == MOTION)
+}
+
+/// Reads a plan of either kind from `bytes`, which came from `path`.
+///
+/// Errors: as [`from_json`] and [`robot_from_json`].
+pub fn read_any(path: &Path, bytes: &[u8]) -> Result<AnyPlan, InputError> {
+    if bytes.len() as u64 <= caps::BYTES && is_robot_plan(bytes) {
+        return robot_from_json(path, bytes).map(AnyPlan::Robot);
+    }
+    from_json(path, bytes).map(AnyPlan::InHand)
+}
+
+/// `plan` as the bytes of a plan file: the same plan gives the same bytes; numbers are the shortest that read back the same; every
+/// waypoint stands on a line of its own.
+///
+/// Panics if the plan holds a NaN or an infinity, which JSON cannot express.
+pub fn robot_to_json(plan: &RobotPlan) -> String {
+    assert!(plan.numbers().all(f64::is_finite), "a plan with a number that is not finite cannot be written");
+    fn compact<T: serde::Serialize + ?Sized>(value: &T) -> String {
+        serde_json::to_string(value).expect("plan types always serialise")
+    }
+    let mut out = String::from("{\n");
+    let mut field = |name: &str, value: String| {
+        let _ = writeln!(out, "  \"{name}\": {value},");
+    };
+    field("format", compact(FORMAT));
+    field("format_version", FORMAT_VERSION.to_string());
+    field("tool", compact(&plan.tool));
+    field("task", compact(&plan.task));
+    if !plan.query.is_empty() {
+        field("query", compact(&plan.query));
+    }
+    field("method", compact(&plan.method));
+    field("seed", compact(&plan.seed));
+    field("settings", compact(&plan.settings));
+    let inputs: Vec<String> = plan.inputs.iter().map(|input| format!("    {}", compact(input))).collect();
+    field("inputs", if inputs.is_empty() { "[]".into() } else { format!("[\n{}\n  ]", inputs.join(",\n")) });
+    field("promises", compact(&plan.promises));
+    field("robots", compact(&plan.robots));
+    field("hands", compact(&plan.hands));
+    field("objects", compact(&plan.objects));
+    field("statistics", compact(&plan.statistics));
+    out.push_str("  \"segments\": [");
+    for (i, segment) in plan.segments.iter().enumerate() {
+        out.push_str(if i == 0 { "\n" } else { ",\n" });
+        let (kind, held_by) = (compact(&segment.kind), compact(&segment.held_by));
+        let _ = write!(out, "    {{\"kind\":{kind},\"held_by\":{held_by},\"waypoints\":[");
+        for (j, waypoint) in segment.waypoints.iter().enumerate() {
+            out.push_str(if j == 0 { "\n      " } else { ",\n      " });
+            out.push_str(&compact(waypoint));
+        }
+        out.push_str("\n    ]}");
+    }
+    out.push_str("\n  ]\n}\n");
+    out
+}
+
+/// Reads a plan of whole robots from `bytes`, which came from `path`.
+///
+/// Errors, with line and column: codes and meanings as those of [`from_json`], and a plan of another task (`C412`).
+pub fn robot_from_json(path: &Path, bytes: &[u8]) -> Result<RobotPlan, InputError> {
+    if bytes.len() as u64 > caps::BYTES {
+        let problem = format!("has {} bytes, more than the limit of {}", bytes.len(), caps::BYTES);
+        return Err(Diagnostic::new("C410", Place::file(path), problem).into());
+    }
+    let text = regrasp_base::files::text_of(path, bytes.to_vec())?;
+    let version = super::version_of(path, &text)?;
+    if version != FORMAT_VERSION {
+        let at = [PathStep::Key("format_version")];
+        let problem = diagnostic(path, &text, "C403", &at, format!("is {version}, which has no plans of robots"));
+        return Err(problem.expected(FORMAT_VERSION.to_string()).into());
+    }
+    if !is_robot_plan(text.as_bytes()) {
+        let problem = diagnostic(path, &text, "C412", &[PathStep::Key("task")], "is not a task of whole robots".into());
+        return Err(problem.expected(format!("\"{MOTION}\"")).into());
+    }
+    let plan: RobotPlan = serde_json::from_str(&text).map_err(|error| syntax_error(path, &error))?;
+    let mut reader = Reader { path, text: &text, found: Diagnostics::default() };
+    reader.validate(&plan);
+    reader.found.into_result(plan)
+}
+
+/// The JSON Schema of a plan file of whole robots, as pretty JSON: the content of `schema/robot-plan.schema.json`.
+pub fn robot_schema() -> String {
+    let schema = schemars::schema_for!(RobotPlan);
+    let mut text = serde_json::to_string_pretty(&schema).expect("a schema always serialises");
+    text.push('\n');
+    text
+}
+
+/// Reads holders. An object named twice is an error: readers would differ in what they take.
+pub(crate) fn holders_each_once<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<BTreeMap<String, Vec<String>>, D::Error> {
+    struct Entries;
+    impl<'de> Visitor<'de> for Entries {
+        type Value = BTreeMap<String, Vec<String>>;
+
+        fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+            f.write_str("names of objects, each with a list of those that hold it")
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
+            let mut found = BTreeMap::new();
+            while let Some((object, holders)) = map.next_entry::<String, Vec<String>>()? {
+                if found.contains_key(&object) {
+                    return Err(A::Error::custom(format!("duplicate field `{object}`")));
+                }
+                found.insert(object, holders);
+            }
+            Ok(found)
+        }
+    }
+    deserializer.deserialize_map(Entries)
+}
+
+struct Reader<'a> {
+    path: &'a Path,
+    text: &'a str,
+    found: Diagnostics,
+}
+
+impl Reader<'_> {
+    fn fail(&mut self, code: &'static str, steps: &[PathStep], problem: String, expected: impl Into<String>) {
+        if !self.found.counted_only() {
+            self.found.push(diagnostic(self.path, self.text, code, steps, problem).expected(expected.into()));
+        }
+    }
+
+    fn validate(&mut self, plan: &RobotPlan) {
+        use PathStep::{Index, Key};
+        let n_joints: usize = plan.robots.iter().map(|robot| robot.joint_names.len()).sum();
+        let n_waypoints = plan.waypoints().count();
+        for (key, seen, limit) in [
+            ("robots", plan.robots.len(), caps::ROBOTS),
+            ("robots", n_joints, caps::JOINTS),
+            ("hands", plan.hands.len(), caps::HOLDERS),
+            ("objects", plan.objects.len(), caps::OBJECTS),
+            ("inputs", plan.inputs.len(), caps::INPUTS),
+            ("segments", plan.segments.len(), caps::SEGMENTS),
+            ("segments", n_waypoints, caps::WAYPOINTS),
+        ] {
+            if seen > limit {
+                self.fail("C410", &[Key(key)], format!("has {seen} entries"), format!("at most {limit}"));
+                return;
+            }
+        }
+        if plan.robots.len() != 1 {
+            let expected = "one; this version judges plans of one robot";
+            self.fail("C411", &[Key("robots")], format!("has {} entries", plan.robots.len()), expected);
+        }
+        if !plan.query.is_empty() {
+            self.names(&[Key("query")], std::slice::from_ref(&plan.query));
+        }
+        for (i, robot) in plan.robots.iter().enumerate() {
+            self.names(&[Key("robots"), Index(i), Key("name")], std::slice::from_ref(&robot.name));
+            if robot.joint_names.is_empty() {
+                let at = [Key("robots"), Index(i), Key("joint_names")];
+                self.fail("C404", &at, "is empty".into(), "at least one name");
+            }
+            self.names(&[Key("robots"), Index(i), Key("joint_names")], &robot.joint_names);
+        }
+        for (i, hand) in plan.hands.iter().enumerate() {
+            if hand.fingers.len() > caps::FINGERS {
+                let at = [Key("hands"), Index(i), Key("fingers")];
+                let problem = format!("has {} entries", hand.fingers.len());
+                self.fail("C410", &at, problem, format!("at most {}", caps::FINGERS));
+                return;
+            }
+            self.names(&[Key("hands"), Index(i), Key("fingers")], &hand.fingers);
+        }
+        let hands: Vec<String> = plan.hands.iter().map(|hand| hand.name.clone()).collect();
+        self.names(&[Key("hands")], &hands);
+        self.names(&[Key("objects")], &plan.objects);
+        for (i, input) in plan.inputs.iter().enumerate() {
+            if input.sha256.len() != 64
+                || !input.sha256.bytes().all(|b| b.is_ascii_digit() || (b'a'..=b'f').contains(&b))
+            {
+                let steps = [Key("inputs"), Index(i), Key("sha256")];
+                self.fail("C409", &steps, format!("is \"{}\"", input.sha256), "64 lower-case hex digits");
+            }
+        }
+        self.promises(plan, n_joints);
+        if plan.segments.is_empty() {
+            self.fail("C406", &[Key("segments")], "is empty".into(), "at least one segment");
+        }
+        for s in 0..plan.segments.len() {
+            self.segment(plan, n_joints, s);
+        }
+    }
+
+    /// Names that can be shown, each once.
+    fn names(&mut self, at: &[PathStep], names: &[String]) {
+        let mut known = std::collections::BTreeSet::new();
+        for name in names {
+            if let Some(fault) = fault_of_name(name) {
+                self.fail("V004", at, fault, GOOD_NAME);
+            } else if !known.insert(name) {
+                self.fail("C408", at, format!("\"{name}\" is used twice"), "each once");
+            }
+        }
+    }
+
+    fn promises(&mut self, plan: &RobotPlan, n_joints: usize) {
+        use PathStep::Key;
+        let promises = &plan.promises;
+        let limits =
+            [("joint_velocities", &promises.joint_velocities), ("joint_accelerations", &promises.joint_accelerations)];
+        for (key, values) in limits {
+            let at = [Key("promises"), Key(key)];
+            self.per_joint(&at, values, n_joints, caps::SIZE);
+            if let Some(value) = values.iter().find(|value| **value <= 0.0) {
+                self.fail("C409", &at, format!("holds {}", number(*value)), "limits above 0");
+            }
+        }
+        if !(0.0..=MOST_CLEARANCE).contains(&promises.clearance) {
+            let problem = format!("is {}", number(promises.clearance));
+            let expected = format!("a distance from 0 to {MOST_CLEARANCE} metres");
+            self.fail("C409", &[Key("promises"), Key("clearance")], problem, expected);
+        }
+    }
+
+    fn per_joint(&mut self, at: &[PathStep], values: &[f64], n_joints: usize, most: f64) {
+        if values.len() != n_joints {
+            let expected = format!("{n_joints}, one for each of \"joint_names\"");
+            self.fail("C404", at, format!("has {} values", values.len()), expected);
+        }
+        if let Some(value) = values.iter().find(|value| value.abs() > most) {
+            self.fail("C409", at, format!("holds {}", number(*value)), format!("at most {} in size", number(most)));
+        }
+    }
+
+    fn segment(&mut self, plan: &RobotPlan, n_joints: usize, s: usize) {
+        use PathStep::{Index, Key};
+        let (segment, at) = (&plan.segments[s], [Key("segments"), Index(s)]);
+        if segment.waypoints.len() < 2 {
+            let problem = format!("has {} waypoints", segment.waypoints.len());
+            self.fail("C406", &[at[0], at[1], Key("waypoints")], problem, "at least 2");
+        }
+        let held = [at[0], at[1], Key("held_by")];
+        for (object, holders) in &segment.held_by {
+            if !plan.objects.contains(object) {
+                let expected = format!("one of {}", plan.objects.join(", "));
+                self.fail("C408", &held, format!("\"{object}\" is not in \"objects\""), expected);
+            }
+            if holders.len() > caps::HOLDERS {
+                let problem = format!("has {} names", holders.len());
+                self.fail("C410", &held, problem, format!("at most {}", caps::HOLDERS));
+            } else {
+                self.names(&held, holders);
+            }
+        }
+        let is_held = segment.held_by.values().any(|holders| !holders.is_empty());
+        if is_held != (segment.kind == RobotSegmentKind::Carry) {
+            let problem = if is_held { "is a transit in which something is held" } else { "is a carry of nothing" };
+            let expected = "\"carry\" where \"held_by\" names a hand, else \"transit\"";
+            self.fail("C408", &[at[0], at[1], Key("kind")], problem.into(), expected);
+        }
+        for (w, waypoint) in segment.waypoints.iter().enumerate() {
+            self.waypoint(plan, n_joints, [at[0], at[1], Key("waypoints"), Index(w)], waypoint);
+        }
+    }
+
+    fn waypoint(&mut self, plan: &RobotPlan, n_joints: usize, at: [PathStep; 4], waypoint: &RobotWaypoint) {
+        use PathStep::{Index, Key};
+        let inside = |key| [at[0], at[1], at[2], at[3], Key(key)];
+        if !(0.0..=caps::SIZE).contains(&waypoint.time) {
+            let expected = format!("a number from 0 to {}", number(caps::SIZE));
+            self.fail("C409", &inside("time"), format!("is {}", number(waypoint.time)), expected);
+        }
+        self.per_joint(&inside("joints"), &waypoint.joints, n_joints, caps::POSITION);
+        self.per_joint(&inside("joint_velocities"), &waypoint.joint_velocities, n_joints, caps::SIZE);
+        if waypoint.world_from_objects.len() != plan.objects.len() {
+            let problem = format!("has {} poses", waypoint.world_from_objects.len());
+            self.fail("C404", &inside("world_from_objects"), problem, "one for each of \"objects\"");
+        }
+        for (i, pose) in waypoint.world_from_objects.iter().enumerate() {
+            self.pose(&[at[0], at[1], at[2], at[3], Key("world_from_objects"), Index(i)], pose);
+        }
+        for (i, contact) in waypoint.contacts.iter().enumerate() {
+            self.contact(plan, &[at[0], at[1], at[2], at[3], Key("contacts"), Index(i)], contact);
+        }
+    }
+
+    fn contact(&mut self, plan: &RobotPlan, at: &[PathStep], contact: &RobotContact) {
+        let hand = plan.hands.iter().find(|hand| hand.name == contact.hand);
+        let is_known = hand.is_some_and(|hand| hand.fingers.contains(&contact.finger));
+        if !is_known || !plan.objects.contains(&contact.object) {
+            let problem = format!("is of \"{}/{}\" and \"{}\"", contact.hand, contact.finger, contact.object);
+            self.fail("C408", at, problem, "a hand, a finger and an object of the plan");
+        }
+        let length = contact.normal_in_object.iter().map(|x| x * x).sum::<f64>().sqrt();
+        if (length - 1.0).abs() > UNIT_TOLERANCE {
+            self.fail("C405", at, format!("has a normal of length {length}"), "length 1");
+        }
+        let force = contact.force_in_object.into_iter().flatten().chain(contact.torsion);
+        if contact.point_in_object.into_iter().chain(force).any(|x| x.abs() > caps::POSITION) {
+            self.fail("C409", at, "holds a number beyond all sense".into(), "metres and newtons");
+        }
+    }
+
+    fn pose(&mut self, at: &[PathStep], pose: &PoseData) {
+        let length = pose.quat_xyzw.iter().map(|x| x * x).sum::<f64>().sqrt();
+        if (length - 1.0).abs() > UNIT_TOLERANCE {
+            self.fail("C405", at, format!("has a quaternion of length {length}"), "length 1");
+        } else if pose.quat_xyzw[3] < 0.0 {
+            self.fail("C405", at, "has a quaternion with w < 0".into(), "w >= 0");
+        }
+        if pose.position.iter().any(|x| x.abs() > caps::POSITION) {
+            self.fail("C409", at, format!("has position {:?}", pose.position), "metres");
+        }
+    }
+}

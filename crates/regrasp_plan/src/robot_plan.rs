@@ -1,0 +1,285 @@
+//! Plans of whole robots. `docs/reference/plan-format.md` and `schema/robot-plan.schema.json` say the same.
+//!
+//! Between two waypoints every joint follows the cubic through positions, velocities and times. An object that a hand holds follows
+//! that hand: it keeps the pose in the frame of the hand's base that it has at the first waypoint of the segment.
+
+use crate::plan::{ContactMode, FORMAT, FORMAT_VERSION, PlanInput, PoseData};
+use regrasp_robot::Manipulator;
+use regrasp_robot::manipulator::layout::Coordinate;
+use regrasp_scene::motion::MOTION;
+use regrasp_scene::{CarriedObject, Holder, MotionQuery, Scene};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Kind of a segment of a [`RobotPlan`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(rename_all = "snake_case")]
+pub enum RobotSegmentKind {
+    /// The robot moves; no hand holds anything.
+    Transit,
+    /// The robot moves and holds one or several objects. Each follows its hand.
+    Carry,
+}
+
+/// A robot that the plan moves.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(deny_unknown_fields)]
+pub struct PlanRobot {
+    /// Its name in the scene.
+    pub name: String,
+    /// Names of all its independent joints, in the order of its layout: the order of every joint vector.
+    pub joint_names: Vec<String>,
+}
+
+/// A hand that holds something or moves its fingers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(deny_unknown_fields)]
+pub struct PlanHand {
+    /// Its name in the scene; of an arm that holds without a hand the name of the arm.
+    pub name: String,
+    /// Names of its fingers; none for an arm without a hand.
+    pub fingers: Vec<String>,
+}
+
+/// A finger that touches an object.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(deny_unknown_fields)]
+#[cfg_attr(test, ts(optional_fields))]
+pub struct RobotContact {
+    /// The hand.
+    pub hand: String,
+    /// The finger of that hand.
+    pub finger: String,
+    /// The object that it touches.
+    pub object: String,
+    /// What the finger does; never `free`: free fingers have no entry.
+    pub mode: ContactMode,
+    /// Contact point in the object frame, in metres.
+    pub point_in_object: [f64; 3],
+    /// Outward normal of the object there, in the object frame.
+    pub normal_in_object: [f64; 3],
+    /// Force of the finger on the object, in newtons, in the object frame; absent in plans without forces.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force_in_object: Option<[f64; 3]>,
+    /// Moment of the finger on the object about the outward normal, in newton metres; absent: zero. Soft fingers only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub torsion: Option<f64>,
+}
+
+/// The state of robots and objects at one moment.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(deny_unknown_fields)]
+#[cfg_attr(test, ts(optional_fields))]
+pub struct RobotWaypoint {
+    /// When, in seconds from the start.
+    pub time: f64,
+    /// Positions of all joints, robot by robot, in radians or metres.
+    pub joints: Vec<f64>,
+    /// Velocities of all joints, in radians or metres per second; zero at both ends of every segment.
+    pub joint_velocities: Vec<f64>,
+    /// Pose of every object of `objects`, in the world.
+    #[cfg_attr(test, ts(type = "PoseData[]"))]
+    pub world_from_objects: Vec<PoseData>,
+    /// Fingers that touch an object, hand by hand in the order of their fingers. Absent where contacts are not planned.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(test, ts(optional, as = "Option<Vec<RobotContact>>"))]
+    pub contacts: Vec<RobotContact>,
+}
+
+/// A piece of motion.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(deny_unknown_fields)]
+pub struct RobotSegment {
+    /// Its kind.
+    pub kind: RobotSegmentKind,
+    /// For every object of `objects`, who holds it: names of hands and supports.
+    #[serde(deserialize_with = "crate::format::holders_each_once")]
+    pub held_by: BTreeMap<String, Vec<String>>,
+    /// At least two; the first is the last of the segment before, but for its time.
+    pub waypoints: Vec<RobotWaypoint>,
+}
+
+/// What a plan of whole robots promises; the checker holds it to these numbers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(deny_unknown_fields)]
+pub struct RobotPromises {
+    /// Largest velocity of each joint, in radians or metres per second.
+    pub joint_velocities: Vec<f64>,
+    /// Largest acceleration of each joint, in radians or metres per second squared.
+    pub joint_accelerations: Vec<f64>,
+    /// Bodies that must not touch are at every moment at least this far apart, in metres; 0 where no more than no collision is
+    /// promised.
+    pub clearance: f64,
+}
+
+/// Counts of the search for a motion.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(default, deny_unknown_fields)]
+pub struct RobotStatistics {
+    /// Nodes of trees and roadmaps when the search ended.
+    pub nodes: u64,
+    /// Configurations sampled.
+    pub samples: u64,
+    /// Configurations looked at (kinematics and collision): the unit of the work budget.
+    pub work: u64,
+    /// True when a wall-clock limit cut something, so that another machine may find another plan.
+    pub cut_by_time: bool,
+    /// Further counts of the method, by name.
+    pub counts: BTreeMap<String, u64>,
+}
+
+/// A plan of whole robots: how their joints move, and what they hold. All else of the scene rests meanwhile.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(deny_unknown_fields)]
+#[cfg_attr(test, ts(optional_fields))]
+pub struct RobotPlan {
+    /// Always `regrasp-plan`.
+    pub format: String,
+    /// Version of the format.
+    pub format_version: u32,
+    /// Tool and version that wrote it.
+    pub tool: String,
+    /// Kind of task: `motion`.
+    pub task: String,
+    /// Name of the task in the scene file; absent where the file has only one.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    #[cfg_attr(test, ts(optional, as = "Option<String>"))]
+    pub query: String,
+    /// Method that planned it.
+    pub method: String,
+    /// Seed.
+    pub seed: u64,
+    /// Settings of the planner, as they were used.
+    #[cfg_attr(test, ts(type = "unknown"))]
+    pub settings: serde_json::Value,
+    /// Files it was made from, the scene file first.
+    #[cfg_attr(test, ts(type = "PlanInput[]"))]
+    pub inputs: Vec<PlanInput>,
+    /// What it promises.
+    pub promises: RobotPromises,
+    /// The robots that the plan moves. This version: one.
+    pub robots: Vec<PlanRobot>,
+    /// The hands that hold something; empty in a plan in which nothing is held.
+    pub hands: Vec<PlanHand>,
+    /// Names of the objects that the plan moves, in the order of every `world_from_objects`.
+    pub objects: Vec<String>,
+    /// Counts of the search.
+    pub statistics: RobotStatistics,
+    /// The motion, in order; never empty.
+    pub segments: Vec<RobotSegment>,
+}
+
+impl RobotPlan {
+    /// A plan for `query` without segments: names, files, and promises that are the limits of robot and scene. The planner adds method,
+    /// seed, settings, segments and statistics.
+    pub fn answering(scene: &Scene, query: &MotionQuery) -> Self {
+        let robot = &scene.robots[query.robot];
+        let inputs = scene.inputs.iter();
+        let carried = query.carried.iter();
+        let mut hands: Vec<PlanHand> = Vec::new();
+        for holder in carried.clone().map(|carried| carried.holder) {
+            let name = holder.name(scene, query.robot).to_owned();
+            let fingers = match holder {
+                Holder::Hand(hand) => scene.hands[hand].hand.fingers.iter().map(|f| f.name.clone()).collect(),
+                Holder::Arm(_) => Vec::new(),
+            };
+            if hands.iter().all(|known| known.name != name) {
+                hands.push(PlanHand { name, fingers });
+            }
+        }
+        RobotPlan {
+            format: FORMAT.into(),
+            format_version: FORMAT_VERSION,
+            tool: concat!("regrasp ", env!("CARGO_PKG_VERSION")).into(),
+            task: MOTION.into(),
+            query: query.name.clone(),
+            method: String::new(),
+            seed: 0,
+            settings: serde_json::Value::Object(serde_json::Map::new()),
+            inputs: inputs
+                .map(|input| PlanInput {
+                    role: input.role.clone(),
+                    name: input.name.clone(),
+                    sha256: input.sha256.clone(),
+                })
+                .collect(),
+            promises: RobotPromises::of(scene, robot),
+            robots: vec![PlanRobot { name: robot.name.clone(), joint_names: robot.layout.names() }],
+            hands,
+            objects: carried.map(|carried| scene.objects[carried.object].name.clone()).collect(),
+            statistics: RobotStatistics::default(),
+            segments: Vec::new(),
+        }
+    }
+
+    /// Who holds what all through a plan for `query`.
+    pub fn held_by(scene: &Scene, query: &MotionQuery) -> BTreeMap<String, Vec<String>> {
+        let holder = |carried: &CarriedObject| {
+            let object = scene.objects[carried.object].name.clone();
+            (object, vec![carried.holder.name(scene, query.robot).to_owned()])
+        };
+        query.carried.iter().map(holder).collect()
+    }
+
+    /// Names of all joints, in the order of every joint vector.
+    pub fn joint_names(&self) -> Vec<String> {
+        self.robots.iter().flat_map(|robot| robot.joint_names.iter().cloned()).collect()
+    }
+
+    /// All waypoints, in order.
+    pub fn waypoints(&self) -> impl DoubleEndedIterator<Item = &RobotWaypoint> {
+        self.segments.iter().flat_map(|segment| &segment.waypoints)
+    }
+
+    /// Time from the first waypoint to the last, in seconds.
+    pub fn duration(&self) -> f64 {
+        let mut waypoints = self.waypoints();
+        let first = waypoints.next().map_or(0.0, |waypoint| waypoint.time);
+        waypoints.next_back().map_or(0.0, |last| last.time - first)
+    }
+
+    /// Every floating-point number of the plan.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
+        let RobotPromises { joint_velocities, joint_accelerations, clearance } = &self.promises;
+        let promises = joint_velocities.iter().chain(joint_accelerations).copied().chain([*clearance]);
+        promises.chain(self.waypoints().flat_map(RobotWaypoint::numbers))
+    }
+}
+
+impl RobotPromises {
+    /// The largest velocities and accelerations that robot and scene allow, and no clearance.
+    pub fn of(scene: &Scene, robot: &Manipulator) -> Self {
+        let velocity = |coordinate: &Coordinate| {
+            let limits = robot.robot.joints[coordinate.joint.0].limits;
+            limits.and_then(|limits| limits.velocity).unwrap_or(scene.limits.joint_velocity)
+        };
+        RobotPromises {
+            joint_velocities: robot.layout.coordinates.iter().map(velocity).collect(),
+            joint_accelerations: vec![scene.limits.joint_acceleration; robot.layout.len()],
+            clearance: 0.0,
+        }
+    }
+}
+
+impl RobotWaypoint {
+    /// Every number of the waypoint.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
+        let joints = self.joints.iter().chain(&self.joint_velocities).copied();
+        let poses = self.world_from_objects.iter().flat_map(|pose| pose.numbers().collect::<Vec<f64>>());
+        let of_contact = |contact: &RobotContact| {
+            let vectors = [Some(contact.point_in_object), Some(contact.normal_in_object), contact.force_in_object];
+            vectors.into_iter().flatten().flatten().chain(contact.torsion).collect::<Vec<f64>>()
+        };
+        std::iter::once(self.time).chain(joints).chain(poses).chain(self.contacts.iter().flat_map(of_contact))
+    }
+}

@@ -1,0 +1,62 @@
+"""Plans on a robot, real or simulated: observe, plan from there, move, observe again; goal after goal.
+
+    plant = MujocoPlant.of("scene.toml")
+    log = execute(plant, turns(plant.pose, count=5, seed=1))
+    log.page("run.html")
+
+``docs/how-to/execute.md`` leads through it. Needs the extra ``sim``: controllers take kinematics from MuJoCo also where the plant is
+a robot.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .executor import Executor, execute
+    from .faults import FaultyPlant
+    from .goals import turns
+    from .log import Event, GoalResult, RunLog
+    from .mujoco_plant import MujocoPlant, PlantSettings
+    from .plant import Command, Observation, Plant
+    from .settings import ExecutorSettings
+
+__all__ = [
+    "Command",
+    "Event",
+    "Executor",
+    "ExecutorSettings",
+    "FaultyPlant",
+    "GoalResult",
+    "MujocoPlant",
+    "Observation",
+    "Plant",
+    "PlantSettings",
+    "RunLog",
+    "execute",
+    "turns",
+]
+
+_HOMES = {
+    "Command": "plant",
+    "Event": "log",
+    "Executor": "executor",
+    "ExecutorSettings": "settings",
+    "FaultyPlant": "faults",
+    "GoalResult": "log",
+    "MujocoPlant": "mujoco_plant",
+    "Observation": "plant",
+    "Plant": "plant",
+    "PlantSettings": "mujoco_plant",
+    "RunLog": "log",
+    "execute": "executor",
+    "turns": "goals",
+}
+
+
+def __getattr__(name: str) -> Any:
+    # MuJoCo is imported when it is needed.
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f".{_HOMES[name]}", __name__), name)

@@ -1,0 +1,464 @@
+"""The executor: observes, plans from there, moves, and observes again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from .._model import Pose
+from .._plan import Plan
+from .._result import Failure
+from .._session import Session, Start
+from ..simulate.model import Rig, Settings
+from ..simulate.reference import Array
+from .leg import Leg, first_rig
+from .log import Event, GoalResult, LegRecord, RunLog, Sample
+from .monitor import Monitor, Trigger, pose_error
+from .planning import ChargedPlanning, Planning, Prepare, ThreadPlanning, Ticket
+from .plant import Command, Plant
+from .senses import Fault, Senses
+from .settings import PLANNER, ExecutorSettings
+
+#: A sample is kept every so many ticks.
+SAMPLED = 5
+#: Faults that stop the motion until they are over.
+SERIOUS = frozenset({"joints_missing", "stale_pose", "pose_jump"})
+
+
+class _GiveUp(Exception):
+    """Nothing helps; the object is held."""
+
+    def __init__(self, status: str, message: str) -> None:
+        super().__init__(message)
+        self.status = status
+
+
+class Executor:
+    """Brings the object of a session to goal after goal."""
+
+    def __init__(
+        self,
+        session: Session,
+        plant: Plant,
+        settings: ExecutorSettings | None = None,
+        *,
+        control: Settings | None = None,
+        planning: Callable[[Session, ExecutorSettings, Prepare], Planning] | None = None,
+        stiffness: Array | None = None,
+        damping: Array | None = None,
+    ) -> None:
+        """session, plant: of the same hand. control: as the replay's settings, of which tick and speed count.
+
+        planning: ``ThreadPlanning`` for robots; where nothing is said, ``ChargedPlanning`` for plants that know the truth, which are
+        simulations, else ``ThreadPlanning``. stiffness, damping: of the robot's joints, where they are not those of replays.
+        """
+        self._session = session
+        self._plant = plant
+        self._settings = settings or ExecutorSettings()
+        base = control or Settings(hold_time=0.0)
+        self._control = Settings(
+            controller="C2" if self._settings.feedback else "B",
+            tick=plant.tick,
+            speed=base.speed,
+            torsion_told=base.torsion_told,
+            feedback_gain=base.feedback_gain,
+            hold_time=0.0,
+        )
+        self._gains = (stiffness, damping)
+        self._truth: Callable[[], tuple[Array, Array]] | None = getattr(plant, "truth", None)
+        maker = planning or (ChargedPlanning if self._truth is not None else ThreadPlanning)
+        self._planning = maker(session, self._settings, self._prepare)
+        self._rig: Rig | None = None
+        self._senses = Senses(len(plant.joint_names), self._settings)
+        self._leg: Leg | None = None
+        self._k = 0
+        self._servo: Array | None = None
+        self._blend_from: Array | None = None
+        self._blended = 1.0
+        self._last_command: Command | None = None
+        self._goal_index = 0
+        self._n_queries = 0
+        self._n_ticks = 0
+        self._faults: dict[str, float] = {}
+        self.log = RunLog(scene=session.scene.name, settings=asdict(self._settings))
+
+    # ------------------------------------------------------------------------------------------------------------- whole runs
+
+    def run(self, goals: Iterable[Pose]) -> RunLog:
+        """Brings the object to every goal, in order. Ends with the hand holding, whatever happens; Ctrl-C is raised then."""
+        log = self.log
+        try:
+            self._first_pose()
+            upcoming = iter(goals)
+            goal = next(upcoming, None)
+            prepared: Ticket | None = None
+            before = self._senses.quat
+            while goal is not None:
+                following = next(upcoming, None)
+                prepared, before = self._bring_to(goal, following, prepared, before)
+                self._goal_index += 1
+                goal = following
+            log.status = "done"
+        except _GiveUp as end:
+            log.status, log.message = end.status, str(end)
+            self._event("gave_up", str(end), "give_up")
+        except KeyboardInterrupt:
+            log.status = "interrupted"
+            self._event("interrupted", "the caller asked to stop", "hold")
+            raise
+        finally:
+            self._planning.close()
+            if self._last_command is not None:
+                self._plant.apply(self._resting())
+        return log
+
+    def _bring_to(
+        self, goal: Pose, following: Pose | None, prepared: Ticket | None, before: Array
+    ) -> tuple[Ticket | None, Array]:
+        """To one goal; what was planned for the one after, and this goal's orientation."""
+        settings = self._settings
+        started, motion_time, n_legs, why_not = self._senses.time, 0.0, 0, ""
+        quat = np.array(goal.quat_xyzw)[[3, 0, 1, 2]]
+        is_reached = False
+        ahead: Ticket | None = None
+        for attempt in range(settings.attempts if settings.replanning else 1):
+            ticket, was_prepared = prepared, prepared is not None
+            prepared = None
+            if ticket is None:
+                ticket = self._query(goal)
+            self._wait_for(ticket)
+            if not isinstance(ticket.answer, Plan):
+                why_not = f"no plan: {ticket.answer.message if isinstance(ticket.answer, Failure) else 'cancelled'}"
+                self._event("no_plan", why_not, "replan" if attempt + 1 < settings.attempts else "hold")
+                continue
+            if was_prepared and self._is_off_start(ticket):
+                # Too far from where the plan begins: it is made anew, from here.
+                ticket = self._query(goal)
+                was_prepared = False
+                self._wait_for(ticket)
+                if not isinstance(ticket.answer, Plan):
+                    why_not = "no plan from where the object is"
+                    self._event("no_plan", why_not, "replan")
+                    continue
+            n_legs += 1
+            self._begin(ticket, was_prepared)
+            ahead = None
+            if following is not None and settings.anytime and not (settings.replanning and attempt > 0):
+                ahead = self._ask_ahead(ticket.answer, following)
+            begun = self._senses.time
+            trigger = self._run_leg()
+            motion_time += self._senses.time - begun
+            if trigger is not None:
+                why_not = f"{trigger.kind}: {trigger.message}"
+                ahead = None
+                self._event(trigger.kind, trigger.message, "replan" if attempt + 1 < settings.attempts else "hold")
+                continue
+            distance, angle = self._settle(goal, quat)
+            is_reached = distance <= settings.reached_distance and angle <= settings.reached_turn
+            if is_reached or not settings.replanning:
+                why_not = "" if is_reached else f"ended {1e3 * distance:.1f} mm and {np.degrees(angle):.1f} degrees off"
+                break
+            why_not = f"ended {1e3 * distance:.1f} mm and {np.degrees(angle):.1f} degrees off"
+            ahead = None
+            self._event("missed", why_not, "replan" if attempt + 1 < settings.attempts else "hold")
+        self._result(goal, quat, is_reached, started, n_legs, motion_time, before, why_not)
+        return ahead, quat
+
+    def _result(
+        self, goal: Pose, quat: Array, is_reached: bool, started: float, n_legs: int, motion: float, before: Array, why_not: str
+    ) -> None:
+        position = np.array(goal.position)
+        distance = angle = float("inf")
+        true_distance = true_angle = None
+        if self._leg is not None:
+            distance, angle = pose_error(self._leg, self._senses.position, self._senses.quat, position, quat)
+            if self._truth is not None:
+                true_distance, true_angle = pose_error(self._leg, *self._truth(), position, quat)
+        apart = min(float(np.linalg.norm(quat - before)), float(np.linalg.norm(quat + before)))
+        self.log.goals.append(
+            GoalResult(
+                position=position.tolist(),
+                quat_xyzw=np.array(goal.quat_xyzw).tolist(),
+                reached=is_reached,
+                start_time=started,
+                time=self._senses.time,
+                legs=n_legs,
+                motion_time=motion,
+                turn=4.0 * float(np.arcsin(min(1.0, 0.5 * apart))),
+                distance=min(distance, 1e9),
+                angle=min(angle, 1e9),
+                true_distance=true_distance,
+                true_angle=true_angle,
+                why_not=why_not,
+            )
+        )
+
+    # --------------------------------------------------------------------------------------------------------------- queries
+
+    def _query(self, goal: Pose) -> Ticket:
+        """Asks for a plan from where the object really is; without replanning, from where the plan before has it."""
+        if not self._settings.replanning and self._leg is not None:
+            start = self._predicted(self._leg.plan)
+        else:
+            start = self._observed_start()
+        return self._ask(start, goal)
+
+    def _ask(self, start: Start, goal: Pose) -> Ticket:
+        self._n_queries += 1
+        seed = self._settings.seed + 1000 * self._n_queries
+        return self._planning.ask(start, goal, seed, self._senses.time)
+
+    def _ask_ahead(self, plan: Plan, following: Pose) -> Ticket | None:
+        start = self._session.project(Pose(plan.object_positions[-1], plan.object_quat_xyzw[-1]), plan.joints[-1])
+        return self._ask(start, following) if isinstance(start, Start) else None
+
+    def _predicted(self, plan: Plan) -> Start:
+        start = self._session.project(Pose(plan.object_positions[-1], plan.object_quat_xyzw[-1]), plan.joints[-1])
+        if not isinstance(start, Start):
+            raise _GiveUp("gave_up", f"the end of a plan is no start: {start.message}")
+        return start
+
+    def _observed_start(self) -> Start:
+        """The start nearest to what is seen, after a rest; observes again until there is one, or patience ends."""
+        settings = self._settings
+        since = self._senses.time
+        message = ""
+        told = False
+        while True:
+            self._hold_for(settings.rest_time)
+            senses = self._senses
+            pose = Pose(senses.position.copy(), senses.quat[[1, 2, 3, 0]].copy())
+            presses = None if senses.forces is None else (senses.forces > settings.lost_force).tolist()
+            start = self._session.project(
+                pose, senses.joints, presses=presses, distance=settings.project_distance, turn=settings.project_turn
+            )
+            if isinstance(start, Start):
+                return start
+            message = start.message
+            if not told:
+                self._event("no_start", message, "hold")
+                told = True
+            if senses.time - since > settings.patience:
+                lost = senses.forces is not None and not (senses.forces > settings.lost_force).any()
+                raise _GiveUp("lost" if lost or "no finger touches" in message else "gave_up", f"no start: {message}")
+
+    def _prepare(self, plan: Plan) -> Leg:
+        if self._rig is None:
+            self._rig = first_rig(plan, self._control, *self._gains)
+        return Leg(plan, self._rig, self._control)
+
+    def _wait_for(self, ticket: Ticket) -> None:
+        """Holds until the answer is there."""
+        while not self._planning.is_ready(ticket, self._senses.time):
+            self._tick(moves=False, state="hold")
+
+    def _is_off_start(self, ticket: Ticket) -> bool:
+        """True where the object is not where a plan made ahead begins."""
+        leg: Leg = ticket.prepared
+        if not self._settings.replanning:
+            return False
+        senses, settings = self._senses, self._settings
+        distance, angle = pose_error(
+            leg, senses.position, senses.quat, leg.ref.object_position[0], leg.ref.object_quat_wxyz[0]
+        )
+        slips = leg.slips(0, leg.tips(senses.joints), senses.position, senses.quat)
+        slip = float(np.linalg.norm(slips, axis=1).max(initial=0.0))
+        return (
+            distance > settings.settled_distance
+            or angle > settings.settled_turn
+            or slip > 0.5 * settings.slip_distance
+        )
+
+    # ---------------------------------------------------------------------------------------------------------------- motion
+
+    def _first_pose(self) -> None:
+        """Waits for the first pose; the plant does what it did before."""
+        seen = self._plant.observe()
+        since = seen.time
+        self._take(seen)
+        while not self._senses.knows_pose:
+            if self._senses.time - since > self._settings.patience:
+                raise _GiveUp("lost", "no pose of the object was ever seen")
+            self._wait()
+
+    def _wait(self) -> None:
+        """One tick with the command before, or with the joints where they are."""
+        stiffness, damping = self._gains
+        rig = getattr(self._plant, "rig", None)
+        if self._last_command is None:
+            held = getattr(self._plant, "data", None)
+            if held is not None and rig is not None:
+                servo = np.array(held.ctrl[rig.motors])
+            else:
+                servo = self._senses.joints * (1.0 if stiffness is None else stiffness)
+            del damping
+            self._last_command = Command(servo, self._senses.joints.copy(), np.zeros(len(servo)))
+        self._plant.apply(self._last_command)
+        self._take(self._plant.observe())
+
+    def _begin(self, ticket: Ticket, was_prepared: bool) -> None:
+        leg: Leg = ticket.prepared
+        plan = leg.plan
+        offsets = None
+        if was_prepared and self._leg is not None and self._leg.feedback is not None:
+            offsets = self._leg.feedback.offsets.copy()
+        self._leg, self._k = leg, 0
+        if offsets is not None and leg.feedback is not None:
+            leg.feedback.carry(offsets)
+        self._blend_from = None if self._last_command is None else self._last_command.servo.copy()
+        self._blended = 0.0
+        free = [finger for finger, holds in zip(plan.fingers, ticket.start.holds) if not holds]
+        self.log.plans.append(plan)
+        self.log.legs.append(
+            LegRecord(
+                start_time=self._senses.time,
+                goal=self._goal_index,
+                seed=plan.seed,
+                duration=leg.n_ticks * self._plant.tick,
+                search_seconds=ticket.search_seconds,
+                check_seconds=ticket.check_seconds,
+                overhead_seconds=ticket.total_seconds - ticket.search_seconds - ticket.check_seconds,
+                moved=dict(ticket.start.moved),
+                prepared=was_prepared,
+                free=free,
+            )
+        )
+
+    def _run_leg(self) -> Trigger | None:
+        """Runs the leg to its end, or to the first thing that goes wrong."""
+        leg, settings = self._leg, self._settings
+        assert leg is not None
+        monitor = Monitor(leg, settings, self._senses.joints)
+        while self._blended < 1.0:
+            self._tick(moves=False, state="blend")
+        while self._k < leg.n_ticks - 1:
+            faults = self._tick(moves=True, state="run", monitor=monitor)
+            if faults:
+                self._outlast(faults)
+            targets = leg.ref.joints[self._k]
+            trigger = monitor.look(self._k, self._senses, targets)
+            if trigger is not None and settings.replanning:
+                return trigger
+            self._k += 1
+        return None
+
+    def _outlast(self, faults: list[Fault]) -> None:
+        """Holds until observations are good again. Raises where they do not become so."""
+        since = self._senses.time
+        while any(fault.kind in SERIOUS for fault in faults):
+            if self._senses.time - since > self._settings.patience:
+                raise _GiveUp("gave_up", f"{faults[0].kind}: {faults[0].message}")
+            faults = self._tick(moves=False, state="hold")
+
+    def _settle(self, goal: Pose, quat: Array) -> tuple[float, float]:
+        """Waits for feedback to bring the object to its goal; how far it is off then."""
+        leg, settings = self._leg, self._settings
+        assert leg is not None
+        position = np.array(goal.position)
+        since = self._senses.time
+        while True:
+            distance, angle = pose_error(leg, self._senses.position, self._senses.quat, position, quat)
+            waited = self._senses.time - since
+            is_there = distance <= settings.settled_distance and angle <= settings.settled_turn
+            if (is_there and waited >= 0.1) or waited >= settings.settle_time:
+                return distance, angle
+            self._tick(moves=False, state="settle")
+
+    def _hold_for(self, seconds: float) -> None:
+        """Holds, and for as long as observations are bad."""
+        since = self._senses.time
+        while self._senses.time - since < seconds:
+            faults = self._tick(moves=False, state="hold")
+            if faults:
+                self._outlast(faults)
+
+    # ----------------------------------------------------------------------------------------------------------------- ticks
+
+    def _tick(self, *, moves: bool, state: str, monitor: Monitor | None = None) -> list[Fault]:
+        """One command and what is seen after it; what is seriously wrong with that."""
+        leg = self._leg
+        if leg is None:
+            self._wait()
+        else:
+            servo = leg.command(self._k, self._senses.position, self._senses.quat, moves=moves)
+            if self._blended < 1.0 and self._blend_from is not None:
+                self._blended = min(1.0, self._blended + self._plant.tick / self._settings.blend_time)
+                servo = self._blend_from + self._blended * (servo - self._blend_from)
+            else:
+                self._blended = 1.0
+            self._last_command = leg.as_command(self._k, servo, moves=moves)
+            self._plant.apply(self._last_command)
+            self._take(self._plant.observe())
+        self._n_ticks += 1
+        if self._n_ticks % SAMPLED == 0:
+            self._sample(state, monitor)
+        return self._current
+
+    def _resting(self) -> Command:
+        assert self._last_command is not None
+        if self._leg is None:
+            return self._last_command
+        servo = self._leg.command(self._k, self._senses.position, self._senses.quat, moves=False)
+        return self._leg.as_command(self._k, servo, moves=False)
+
+    def _take(self, seen: Any) -> None:
+        leg = self._leg
+        faults = self._senses.take(seen, leg, self._k)
+        now = self._senses.time
+        for fault in faults:
+            # A fault that stays is told once a second.
+            if now - self._faults.get(fault.kind, -np.inf) > 1.0:
+                self._faults[fault.kind] = now
+                self._event(fault.kind, fault.message, "hold" if fault.kind in SERIOUS else "ignore")
+        self._current = [fault for fault in faults if fault.kind in SERIOUS]
+
+    def _sample(self, state: str, monitor: Monitor | None) -> None:
+        leg, senses = self._leg, self._senses
+        if leg is None:
+            return
+        wanted = leg.ref.object_position[self._k], leg.ref.object_quat_wxyz[self._k]
+        distance, angle = pose_error(leg, senses.position, senses.quat, *wanted)
+        true_distance = true_angle = None
+        if self._truth is not None:
+            true_distance, true_angle = pose_error(leg, *self._truth(), *wanted)
+        self.log.samples.append(
+            Sample(
+                time=round(senses.time, 6),
+                leg=len(self.log.legs) - 1,
+                tick=self._k,
+                state=state,
+                distance=distance,
+                angle=angle,
+                true_distance=true_distance,
+                true_angle=true_angle,
+                slip=0.0 if monitor is None else monitor.slip,
+                forces=None if senses.forces is None else [float(force) for force in senses.forces],
+                joint_error=0.0 if monitor is None else monitor.joint_error,
+            )
+        )
+
+    def _event(self, kind: str, message: str, answer: str) -> None:
+        leg = len(self.log.legs) - 1
+        self.log.events.append(Event(round(self._senses.time, 6), kind, message, answer, self._goal_index, leg))
+
+
+def execute(
+    plant: Plant,
+    goals: Iterable[Pose],
+    *,
+    session: Session | None = None,
+    settings: ExecutorSettings | None = None,
+) -> RunLog:
+    """Brings the object of ``plant`` to every goal, in order.
+
+    session: of the plant's scene; a plant in MuJoCo knows its scene. The planner then has the settings of execution.
+    """
+    if session is None:
+        scene = getattr(plant, "scene", None)
+        if scene is None:
+            raise ValueError("the plant does not know its scene: give a session")
+        session = Session(scene, settings=PLANNER)
+    return Executor(session, plant, settings).run(goals)

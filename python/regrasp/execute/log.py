@@ -1,0 +1,164 @@
+"""What happened: samples, events, legs and goals of a run."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from .._plan import Plan
+
+FORMAT = "regrasp-run"
+FORMAT_VERSION = 1
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that was not planned, and what was done about it."""
+
+    time: float
+    kind: str
+    """docs/reference/run-format.md lists the kinds."""
+    message: str
+    answer: str
+    """``hold``, ``replan``, ``ignore``, ``give_up`` or ``none``."""
+    goal: int
+    leg: int
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One moment. Distances in metres, of the centre of mass; angles in radians."""
+
+    time: float
+    leg: int
+    tick: int
+    """Of the leg."""
+    state: str
+    """``run``, ``blend``, ``hold`` or ``settle``."""
+    distance: float
+    """Of the estimated object from where the leg has it."""
+    angle: float
+    true_distance: float | None
+    """The same of the real object, where the plant knows it."""
+    true_angle: float | None
+    slip: float
+    """Of the fingertip that slipped farthest."""
+    forces: list[float] | None
+    """Felt at every fingertip."""
+    joint_error: float
+    """Of the joint that is farthest from what it was told."""
+
+
+@dataclass(frozen=True)
+class LegRecord:
+    """A plan that was executed."""
+
+    start_time: float
+    goal: int
+    seed: int
+    duration: float
+    """Of its motion."""
+    search_seconds: float
+    check_seconds: float
+    overhead_seconds: float
+    moved: Mapping[str, float]
+    """How far its start is from what was observed."""
+    prepared: bool
+    """True where it was planned while the leg before ran."""
+    free: list[str]
+    """Fingers that were free at its start."""
+
+
+@dataclass(frozen=True)
+class GoalResult:
+    """What became of a goal."""
+
+    position: list[float]
+    quat_xyzw: list[float]
+    reached: bool
+    start_time: float
+    time: float
+    legs: int
+    motion_time: float
+    """Time in which the hand moved, in seconds."""
+    turn: float
+    """From the goal before, in radians."""
+    distance: float
+    """Of the estimated object from the goal at the end,"""
+    angle: float
+    true_distance: float | None
+    """and of the real one, where the plant knows it."""
+    true_angle: float | None
+    why_not: str
+    """Empty where it was reached."""
+
+
+@dataclass
+class RunLog:
+    """All of a run."""
+
+    scene: str = ""
+    status: str = "running"
+    """``done``, ``gave_up``, ``lost``, ``interrupted`` or ``running``."""
+    message: str = ""
+    settings: dict[str, Any] = field(default_factory=dict)
+    samples: list[Sample] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+    legs: list[LegRecord] = field(default_factory=list)
+    goals: list[GoalResult] = field(default_factory=list)
+    plans: list[Plan] = field(default_factory=list)
+    """One per leg."""
+
+    @property
+    def n_reached(self) -> int:
+        """Goals that were reached."""
+        return sum(goal.reached for goal in self.goals)
+
+    @property
+    def n_replans(self) -> int:
+        """Legs beyond one per goal."""
+        return sum(max(goal.legs - 1, 0) for goal in self.goals)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data; docs/reference/run-format.md has the keys. Plans are not in it."""
+        content = asdict(self._without_plans())
+        del content["plans"]
+        return {"format": FORMAT, "format_version": FORMAT_VERSION, **content}
+
+    def _without_plans(self) -> RunLog:
+        return RunLog(self.scene, self.status, self.message, self.settings, self.samples, self.events, self.legs, self.goals)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes ``run.json``, and beside it the plan of every leg, as ``run.leg1.json`` and on: each is a plan file that
+        ``regrasp check`` judges."""
+        where = Path(path)
+        where.write_text(json.dumps(self.to_json(), allow_nan=False) + "\n", encoding="utf-8")
+        for number, plan in enumerate(self.plans, start=1):
+            plan.save(where.with_name(f"{where.stem}.leg{number}.json"))
+
+    def page(self, path: str | os.PathLike[str]) -> None:
+        """Writes the page of the run: one HTML file."""
+        from .page import page
+
+        Path(path).write_text(page(self), encoding="utf-8")
+
+    @staticmethod
+    def load(path: str | os.PathLike[str]) -> RunLog:
+        """Reads ``run.json``, without plans. Raises ``ValueError`` for anything else."""
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+        if not isinstance(content, dict) or content.get("format") != FORMAT or content.get("format_version") != FORMAT_VERSION:
+            raise ValueError(f"{path}: is no run of format version {FORMAT_VERSION}")
+        return RunLog(
+            scene=content["scene"],
+            status=content["status"],
+            message=content["message"],
+            settings=content["settings"],
+            samples=[Sample(**entry) for entry in content["samples"]],
+            events=[Event(**entry) for entry in content["events"]],
+            legs=[LegRecord(**entry) for entry in content["legs"]],
+            goals=[GoalResult(**entry) for entry in content["goals"]],
+        )

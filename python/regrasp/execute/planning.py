@@ -1,0 +1,149 @@
+"""Planning beside the motion: on a thread of its own for robots, with time that is charged for simulations."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from .._model import Pose
+from .._plan import Plan
+from .._result import Failure
+from .._session import Session, Start
+from .settings import ExecutorSettings
+
+
+class Cancelled(Exception):
+    """The search is not wanted any more."""
+
+
+@dataclass
+class Ticket:
+    """A query that was asked."""
+
+    start: Start
+    goal: Pose
+    asked_at: float
+    """Time of the plant."""
+    ready_at: float | None = None
+    answer: Plan | Failure | None = None
+    error: BaseException | None = None
+    search_seconds: float = 0.0
+    check_seconds: float = 0.0
+    total_seconds: float = 0.0
+    prepared: Any = None
+    """What was made of the plan, by whoever planned."""
+    cancelled: threading.Event = field(default_factory=threading.Event)
+    done: threading.Event = field(default_factory=threading.Event)
+
+
+Prepare = Callable[[Plan], Any]
+
+
+class Planning(Protocol):
+    """Answers queries while the hand does something else."""
+
+    def ask(self, start: Start, goal: Pose, seed: int, now: float) -> Ticket:
+        """Asks. Does not wait."""
+        ...
+
+    def is_ready(self, ticket: Ticket, now: float) -> bool:
+        """True when the ticket has its answer. Raises what the search raised."""
+        ...
+
+    def close(self) -> None:
+        """Ends every search and thread."""
+        ...
+
+
+def _solve(session: Session, settings: ExecutorSettings, prepare: Prepare, ticket: Ticket, seed: int) -> None:
+    def listen(_: Any) -> None:
+        if ticket.cancelled.is_set():
+            raise Cancelled
+
+    answer: Plan | Failure | None = None
+    for attempt in range(settings.plan_attempts):
+        answer = session.plan(
+            ticket.start,
+            ticket.goal,
+            seed=seed + attempt,
+            max_work=settings.max_work,
+            time_limit=settings.time_limit,
+            progress=listen,
+        )
+        times = session.times
+        if times is not None:
+            ticket.search_seconds += times.search
+            ticket.check_seconds += times.check
+            ticket.total_seconds += times.total
+        if isinstance(answer, Plan):
+            ticket.prepared = prepare(answer)
+            break
+    ticket.answer = answer
+
+
+class ChargedPlanning:
+    """Plans at once and has the answer ready later, by the work that it took: runs of a simulation do not depend on the machine."""
+
+    def __init__(self, session: Session, settings: ExecutorSettings, prepare: Prepare) -> None:
+        self._session = session
+        self._settings = settings
+        self._prepare = prepare
+
+    def ask(self, start: Start, goal: Pose, seed: int, now: float) -> Ticket:
+        ticket = Ticket(start, goal, now)
+        _solve(self._session, self._settings, self._prepare, ticket, seed)
+        answer = ticket.answer
+        work = float(answer.statistics["work"]) if answer is not None else 0.0
+        ticket.ready_at = now + work / self._settings.work_rate + self._settings.planning_overhead
+        return ticket
+
+    def is_ready(self, ticket: Ticket, now: float) -> bool:
+        return ticket.ready_at is not None and now >= ticket.ready_at
+
+    def close(self) -> None:
+        pass
+
+
+class ThreadPlanning:
+    """Plans on a thread. The search stops within some hundredths of a second when nobody wants it any more."""
+
+    def __init__(self, session: Session, settings: ExecutorSettings, prepare: Prepare) -> None:
+        self._session = session
+        self._settings = settings
+        self._prepare = prepare
+        self._running: list[tuple[Ticket, threading.Thread]] = []
+
+    def ask(self, start: Start, goal: Pose, seed: int, now: float) -> Ticket:
+        ticket = Ticket(start, goal, now)
+
+        def work() -> None:
+            try:
+                _solve(self._session, self._settings, self._prepare, ticket, seed)
+            except Cancelled:
+                pass
+            except BaseException as error:
+                ticket.error = error
+            finally:
+                ticket.done.set()
+
+        thread = threading.Thread(target=work, name="regrasp-planning", daemon=True)
+        self._running = [(other, running) for other, running in self._running if running.is_alive()]
+        self._running.append((ticket, thread))
+        thread.start()
+        return ticket
+
+    def is_ready(self, ticket: Ticket, now: float) -> bool:
+        if not ticket.done.is_set():
+            return False
+        if ticket.error is not None:
+            raise ticket.error
+        return True
+
+    def close(self) -> None:
+        for ticket, _ in self._running:
+            ticket.cancelled.set()
+        for _, thread in self._running:
+            thread.join()
+        self._running = []

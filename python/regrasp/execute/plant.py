@@ -1,0 +1,57 @@
+"""What an executor asks of a robot, or of a simulation of one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from ..simulate.reference import Array
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What is known at one control tick."""
+
+    time: float
+    """Of the plant's clock, in seconds."""
+    joints: Array
+    """Positions of the hand's joints, in the order of the plant's ``joint_names``; NaN where one is missing."""
+    pose_stamp: float | None = None
+    """When the newest pose of the object was seen, on the plant's clock; none before the first. A pose is new where its stamp is."""
+    object_position: Array | None = None
+    """Of the object's frame in the world. Shape (3,)."""
+    object_quat_wxyz: Array | None = None
+    """Shape (4,)."""
+    tip_forces: Array | None = None
+    """Normal force of every fingertip, in newtons, where that is felt. Shape (n_fingers,)."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """What the joints are told for one control tick, in the order of ``joint_names``. Take what the drives understand."""
+
+    servo: Array
+    """Stiffness times target, plus damping times velocity, plus torque: for torque drives with the gains of the plan's hand."""
+    positions: Array
+    """For position drives: targets that hold the share of the torque which the stiffness then makes."""
+    velocities: Array
+    """Planned velocities."""
+
+
+class Plant(Protocol):
+    """A hand with an object in it."""
+
+    joint_names: tuple[str, ...]
+    """Joints of the hand, as the scene names them."""
+    fingers: tuple[str, ...]
+    """Fingers of the hand, as the scene names them."""
+    tick: float
+    """Time between two commands, in seconds."""
+
+    def observe(self) -> Observation:
+        """What is known now. Does not wait."""
+        ...
+
+    def apply(self, command: Command) -> None:
+        """Gives a command and waits until the next one is due. The plant keeps the last command that it has."""
+        ...

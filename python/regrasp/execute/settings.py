@@ -1,0 +1,86 @@
+"""How plans are executed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+#: Settings of the planner that execution plans with, where nothing else is said: the speed that scenes allow by default, and short ramps.
+PLANNER: dict[str, Any] = {"speed": {"largest_speed": 0.1, "ramp": 0.06}}
+
+
+@dataclass(frozen=True)
+class ExecutorSettings:
+    """How plans are executed. Metres, radians, seconds. Numbers without an origin are by hand."""
+
+    feedback: bool = True
+    """Controller ``C2``, which feeds the object's pose back; else ``B``."""
+    replanning: bool = True
+    """Observes after every leg, and replans where a leg goes wrong. Else legs follow each other as planned, whatever happens."""
+    slip_trigger: bool = True
+    """Replans where a fingertip has slipped, also if the object is where it should be."""
+    anytime: bool = True
+    """Plans the next leg while the present one runs."""
+
+    reached_distance: float = 0.002
+    """A goal counts as reached within this distance of the centre of mass,"""
+    reached_turn: float = float(np.radians(2.0))
+    """and within this angle."""
+    settled_distance: float = 0.0007
+    """At the end of a leg the executor waits for feedback to bring the object this near,"""
+    settled_turn: float = float(np.radians(0.8))
+    """and as near as this angle, and goes on from there with the next leg as it was planned,"""
+    settle_time: float = 1.0
+    """but for no longer than this."""
+    rest_time: float = 0.25
+    """Rest before a state counts as observed, for noise to average out."""
+    blend_time: float = 0.15
+    """Time in which commands pass from one leg to the next."""
+
+    deviation_distance: float = 0.004
+    """Farther from where it should be than this,"""
+    deviation_turn: float = float(np.radians(7.0))
+    """or by this angle, the object has left the plan."""
+    slip_distance: float = 0.003
+    """A fingertip that has moved so far over the object since it landed, beyond what is planned, slips."""
+    lost_after: float = 0.1
+    """A contact that should hold is lost when it is not felt for so long."""
+    lost_force: float = 0.02
+    """Below this normal force, in newtons, nothing is felt."""
+    stall_error: float = 0.2
+    """A joint this far from its target"""
+    stall_after: float = 0.3
+    """for so long is stalled."""
+
+    pose_time_constant: float = 0.2
+    """Of the complementary filter: slower errors follow the camera, faster motion the fingers."""
+    jump_distance: float = 0.012
+    """A pose estimate that is farther off than this,"""
+    jump_turn: float = float(np.radians(20.0))
+    """or by this angle, is a jump, and not believed"""
+    jump_count: int = 10
+    """until so many in a row agree."""
+    stale_after: float = 0.3
+    """Poses older than this are stale: the hand holds."""
+    patience: float = 2.0
+    """The hand gives up, and holds, when nothing has helped for so long."""
+
+    project_distance: float = 0.002
+    """How far a start may be from what was observed,"""
+    project_turn: float = 0.04
+    """and by which angle, of the object and of any joint."""
+    attempts: int = 4
+    """Legs that are tried for one goal."""
+    plan_attempts: int = 3
+    """Seeds that are tried for one leg."""
+    max_work: int = 400_000
+    """Work of one search, in configurations."""
+    time_limit: float | None = None
+    """Wall-clock limit of one search, in seconds; with one, runs depend on the machine."""
+    work_rate: float = 300_000.0
+    """Configurations per second that a simulation charges for planning: simulated time passes as it would on a robot."""
+    planning_overhead: float = 0.05
+    """Beside these, in seconds: check, preparation."""
+    seed: int = 0
