@@ -29,11 +29,7 @@ impl<'a> Session<'a> {
     /// Opens `loaded` for the hand and the object of the task called `task`, of its first task where none is named.
     ///
     /// Errors (`A510`, `A503`): no task of this name, a task of finger tracking, settings that make no sense.
-    pub fn open(
-        loaded: &'a LoadedScene,
-        task: Option<&str>,
-        settings: InHandSettings,
-    ) -> Result<Self, InputError> {
+    pub fn open(loaded: &'a LoadedScene, task: Option<&str>, settings: InHandSettings) -> Result<Self, InputError> {
         let bad = |code, element: &str, problem: String| {
             Diagnostic::new(code, Place::file("session"), problem).element("argument", element)
         };

@@ -81,7 +81,9 @@ fn states_along_plans_are_starts_that_planning_takes() {
         for seed in 0..3 {
             let plan = own_plan(&loaded, seed);
             let mut rng = Rng::keyed(seed, "noise", 0);
-            for waypoint in plan.segments.iter().flat_map(|segment| [&segment.waypoints[0], segment.waypoints.last().unwrap()]) {
+            for waypoint in
+                plan.segments.iter().flat_map(|segment| [&segment.waypoints[0], segment.waypoints.last().unwrap()])
+            {
                 let exact = session.project(&observation(waypoint), &ProjectionLimits::default()).unwrap();
                 assert!(exact.moved.object < 1e-9 && exact.moved.joint < 1e-3, "{name}: {:?}", exact.moved);
                 let seen = noisy(&observation(waypoint), &mut rng, 1.0);
@@ -184,7 +186,10 @@ fn what_is_no_start_is_refused_with_its_cause() {
         assert_eq!(failure.kind, FailureKind::StartInvalid);
         failure.message
     };
-    let far = Pose::from_parts((seen.world_from_object.translation.vector + Vector::z() * 0.1).into(), seen.world_from_object.rotation);
+    let far = Pose::from_parts(
+        (seen.world_from_object.translation.vector + Vector::z() * 0.1).into(),
+        seen.world_from_object.rotation,
+    );
     assert!(refused(&Observation { world_from_object: far, ..seen.clone() }).contains("no finger touches"));
     let mut joints = seen.joints.clone();
     joints[0] = f64::NAN;
@@ -197,9 +202,15 @@ fn what_is_no_start_is_refused_with_its_cause() {
     let message = refused(&Observation { joints, ..seen.clone() });
     assert!(message.contains("not force closed without") || message.contains("nearer than"), "{message}");
     // Four millimetres deep in the fingers.
-    let deep = Pose::from_parts((seen.world_from_object.translation.vector + Vector::x() * 0.004).into(), seen.world_from_object.rotation);
+    let deep = Pose::from_parts(
+        (seen.world_from_object.translation.vector + Vector::x() * 0.004).into(),
+        seen.world_from_object.rotation,
+    );
     let message = refused(&Observation { world_from_object: deep, ..seen });
-    assert!(message.contains("moves") || message.contains("off the surface") || message.contains("closed"), "{message}");
+    assert!(
+        message.contains("moves") || message.contains("off the surface") || message.contains("closed"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -219,7 +230,9 @@ fn surfaces_that_slide_over_each_other_are_seen() {
 #[test]
 fn a_session_of_what_cannot_be_asked_is_refused() {
     let loaded = loaded("sphere_90x.toml");
-    assert!(Session::open(&loaded, Some("elsewhere"), InHandSettings::default()).unwrap_err().to_string().contains("A510"));
+    assert!(
+        Session::open(&loaded, Some("elsewhere"), InHandSettings::default()).unwrap_err().to_string().contains("A510")
+    );
     let tracked = self::loaded("football.toml");
     assert!(Session::open(&tracked, None, InHandSettings::default()).unwrap_err().to_string().contains("tracking"));
 }

@@ -25,10 +25,10 @@ pub mod roadmap;
 mod roadmap_tests;
 /// The methods.
 mod searching;
-/// Starts from what was observed.
-pub mod starting;
 #[cfg(test)]
 mod sequence_tests;
+/// Starts from what was observed.
+pub mod starting;
 
 pub use crate::settings::{
     Alpha, BaselineSettings, CostWeights, FirstTry, ImprovementSettings, InHandSettings, Method, ReleaseRule,
