@@ -112,7 +112,7 @@ fn with_way(prepared: &Prepared, workspace: &mut Workspace, climb: Climb) -> Opt
     if way::is_free(prepared, workspace, &climb.state, &climb.way) {
         return Some(climb);
     }
-    let way = way::way_in(prepared, workspace, &climb.state).ok()?;
+    let way = way::way_in(prepared, workspace, &climb.state, None).ok()?;
     Some(Climb { way, ..climb })
 }
 
