@@ -5,7 +5,7 @@ use crate::load;
 use crate::stop::Stop;
 use crate::talk::Talk;
 use crate::words::{counted, duration, grouped};
-use regrasp::plan::check::{CheckSettings, Level, Report, check, check_any, query_of};
+use regrasp::plan::check::{Level, Report, check, check_any, query_of};
 use regrasp::plan::format;
 use regrasp::scene::{LoadedScene, load_scene};
 use regrasp::{AnyPlan, RobotPlan};
@@ -35,8 +35,7 @@ pub fn judge_bytes(
 pub fn judge(loaded: &LoadedScene, plan: &regrasp::Plan, judging: &Judging, talk: &Talk) -> Result<Report, Stop> {
     let started = Instant::now();
     let query = judging.query(query_of(&loaded.scene, loaded.task_for(&plan.query), plan))?;
-    let settings = CheckSettings { level: judging.level(), ..CheckSettings::default() };
-    let report = check((&loaded.scene, &loaded.state), Some(&query), plan, &settings);
+    let report = check((&loaded.scene, &loaded.state), Some(&query), plan, &judging.settings());
     say(&report, plan.promises.tracking.is_some(), started.elapsed(), talk);
     if plan.asked.is_some() {
         talk.say("       start and goal are those that the plan says it was asked; all else is the scene's");
@@ -55,7 +54,7 @@ pub fn judge(loaded: &LoadedScene, plan: &regrasp::Plan, judging: &Judging, talk
 pub fn judge_robot(loaded: &LoadedScene, plan: &RobotPlan, judging: &Judging, talk: &Talk) -> Report {
     let started = Instant::now();
     let query = loaded.task_for(&plan.query).query(plan.seed);
-    let settings = CheckSettings { level: judging.level(), ..CheckSettings::default() };
+    let settings = judging.settings();
     let plan = AnyPlan::Robot(plan.clone());
     let report = check_any((&loaded.scene, &loaded.state), Some(&query), &plan, &settings);
     let seconds = started.elapsed().as_secs_f64();

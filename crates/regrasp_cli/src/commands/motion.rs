@@ -9,11 +9,13 @@ use crate::stop::Stop;
 use crate::talk::Talk;
 use crate::words::{counted, duration, grouped};
 use regrasp::base::{Diagnostic, Place, files};
-use regrasp::plan::check::find_scene_among;
+use regrasp::plan::check::{find_scene_among, robot_along};
 use regrasp::plan::format;
 use regrasp::planners::FailureKind;
 use regrasp::scene::{LoadedScene, MotionGoal, MotionQuery};
-use regrasp::{AnyPlan, Budget, PlannerSettings, Query, RobotPlan, export, plan_any};
+use regrasp::viewer::render::png_file;
+use regrasp::viewer::robots::{RobotStoryboard, RobotTelling, robot_charts, robot_page, robot_storyboard};
+use regrasp::{AnyPlan, Budget, Query, RobotPlan, export, plan_any};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -39,7 +41,8 @@ pub fn plan(
     };
     let asked = Query::Motion(query.clone());
     let around = (&loaded.scene, &loaded.state);
-    let plan = match plan_any(around, &asked, &PlannerSettings::default(), arguments.seed, &budget, &|_| {}) {
+    let settings = load::for_task(loaded.task(), &arguments.search, available_threads())?;
+    let plan = match plan_any(around, &asked, &settings, arguments.seed, &budget, &|_| {}) {
         Ok(AnyPlan::Robot(plan)) => plan,
         Ok(AnyPlan::InHand(_)) => return Err(Stop::Internal("a motion was answered by a plan of one hand".into())),
         Err(failure) if failure.kind == FailureKind::Interrupted => return Err(Stop::Interrupted),
@@ -137,6 +140,56 @@ pub fn check(arguments: &args::Check, bytes: &[u8], common: &Common, talk: &Talk
     let loaded = arguments.judging.scene(loaded);
     let report = judge::judge_robot(&loaded, &plan, &arguments.judging, talk);
     if report.accepted() { Ok(()) } else { Err(Stop::Rejected) }
+}
+
+/// Moments of the chart of clearance.
+const MOMENTS: usize = 400;
+
+/// `regrasp view` of such a plan.
+pub fn view(arguments: &args::View, bytes: &[u8], written: &Outputs, common: &Common, talk: &Talk) -> Result<(), Stop> {
+    let given = [
+        ("--story", arguments.story.is_some()),
+        ("--with-roadmap", arguments.with_roadmap.is_some()),
+        ("--collision", arguments.collision),
+    ];
+    if let Some((flag, _)) = given.into_iter().find(|(_, is_given)| *is_given) {
+        let problem = format!("is not for plans of whole robots, and {} is one", arguments.plan.display());
+        return Err(Stop::argument("A507", flag, problem, "--output, --png or --svg"));
+    }
+    let plan = format::robot_from_json(&arguments.plan, bytes)?;
+    let loaded = arguments.judging.scene(scene_of(&arguments.plan, &plan, arguments.scene.as_deref(), common)?);
+    written.refuse_inputs(loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
+    let report = judge::judge_robot(&loaded, &plan, &arguments.judging, talk);
+    let unfit = |problem: String| Stop::BadInput(Diagnostic::new("C408", Place::file(&arguments.plan), problem).into());
+    let along = robot_along((&loaded.scene, &loaded.state), &plan, MOMENTS).map_err(unfit)?;
+    let telling = RobotTelling {
+        scene: &loaded.scene,
+        state: &loaded.state,
+        plan: &plan,
+        report: &report,
+        along: &along,
+        title: arguments.title.as_deref(),
+    };
+    let settings = RobotStoryboard { frames: arguments.frames, width: arguments.width, columns: arguments.columns };
+    let put = |path: &Path, bytes: &[u8]| -> Result<(), Stop> {
+        files::write_atomic(path, bytes).map_err(|error| Stop::unwritable(path, &error))?;
+        talk.event("written", json!({ "path": path }));
+        talk.say(format!("wrote  {}   {} bytes", path.display(), grouped(bytes.len() as u64)));
+        Ok(())
+    };
+    if let Some(path) = &arguments.png {
+        let picture = robot_storyboard(&loaded.scene, &loaded.state, &plan, &settings).map_err(unfit)?;
+        put(path, &png_file::encode(&picture))?;
+    }
+    if let Some(folder) = &arguments.svg {
+        for (name, chart) in robot_charts(&telling) {
+            put(&folder.join(name).with_extension("svg"), chart.as_bytes())?;
+        }
+    }
+    if let Some(path) = &arguments.output {
+        put(path, robot_page(&telling, &settings).map_err(unfit)?.as_bytes())?;
+    }
+    Ok(())
 }
 
 /// `regrasp export` of such a plan.

@@ -91,7 +91,7 @@ pub mod violation;
 pub mod way;
 
 pub use along::{Along, along};
-pub use asked::query_of;
+pub use asked::{OwnQuery, query_of};
 pub use files::{CheckedFiles, check_files};
 pub use find_scene::{find_scene, find_scene_among};
 pub use grasps::{GraspReport, check_grasps};
@@ -115,6 +115,8 @@ use serde::{Deserialize, Serialize};
 pub struct CheckSettings {
     /// What the plan is judged for.
     pub level: Level,
+    /// Whether a plan may bring the query that it answers.
+    pub own_query: OwnQuery,
     /// Largest contact tolerance that a plan may promise, in metres. Issue 2: 0.5 mm.
     pub largest_contact_tolerance: f64,
     /// Largest slip of a rolling fingertip in a segment that a plan may promise, in metres. Issue 4: 0.1 mm.
@@ -174,6 +176,9 @@ pub struct CheckSettings {
     pub lift_clearance: f64,
     /// The tip of a finger that is free all through a segment keeps this far from the object, in metres.
     pub free_clearance: f64,
+    /// The open hand of a listed grasp comes on a line of at least this length, in metres. A shorter one would say of every grasp that
+    /// it can be reached.
+    pub shortest_way_in: f64,
     /// Largest goal tolerance that a tracking plan may promise, in radians. Cherif 1999, table 2: a cell of 2.406 degrees.
     pub largest_goal_tolerance: f64,
     /// In tracking, a fingertip that does not turn, or not about the normal, or not across it, may do so by this much in a
@@ -202,6 +207,7 @@ impl Default for CheckSettings {
     fn default() -> Self {
         CheckSettings {
             level: Level::Motion,
+            own_query: OwnQuery::Refused,
             largest_slip: 0.1e-3,
             slip_share: 0.005,
             slip_floor: 0.05e-3,
@@ -227,6 +233,7 @@ impl Default for CheckSettings {
             resolution: 0.05e-3,
             lift_clearance: 0.1e-3,
             free_clearance: 0.05e-3,
+            shortest_way_in: 0.02,
             largest_goal_tolerance: 0.042,
             turn_tolerance: 2e-3,
             smallest_sliding_speed: 1e-5,
@@ -340,6 +347,7 @@ pub fn check((scene, state): (&Scene, &State), query: Option<&Query>, plan: &Pla
     let work = limits::Work::of(settings.most_work);
     let mut log = Log { most_per_kind: settings.most_per_kind, work, ..Log::default() };
     let mut report = Report::default();
+    asked::check_own_query(plan, settings, &mut log);
     promises::check_input_files(&plan.inputs, &scene.inputs, &mut log);
     // Where the scene leaves the start pose open any is an answer, and the other poses follow from it. That the object may be there
     // is judged as at every other moment.
