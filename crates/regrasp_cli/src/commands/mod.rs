@@ -9,6 +9,7 @@ mod grasp_files;
 mod grasps;
 mod growth;
 mod inspect;
+mod inspect_robot;
 mod pictures;
 mod place;
 pub mod plan;
