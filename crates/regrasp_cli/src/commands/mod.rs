@@ -11,6 +11,7 @@ mod grasps;
 mod growth;
 mod inspect;
 mod motion;
+mod inspect_robot;
 mod pair;
 mod pictures;
 mod place;
