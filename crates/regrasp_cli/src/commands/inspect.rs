@@ -1,5 +1,6 @@
 //! `regrasp inspect`: what a hand is like, and a hand file for it.
 
+use super::inspect_robot;
 use super::room::Room;
 use crate::args::{self, Common};
 use crate::interrupt;
@@ -8,11 +9,12 @@ use crate::outputs::{refuse_input, refuse_unwritable};
 use crate::stop::Stop;
 use crate::talk::Talk;
 use crate::words::{counted, grouped, metres};
-use regrasp::base::{Rng, files};
+use regrasp::base::{Diagnostic, Place, Rng, files};
 use regrasp::file_names::name_from;
 use regrasp::robot::import::LoadOptions;
+use regrasp::robot::inspect::whole::inspect_whole;
 use regrasp::robot::inspect::{
-    HandInspection, InspectSettings, Inspection, JointRow, RobotInspection, hand_file_text, inspect,
+    HandInspection, InspectSettings, Inspection, JointRow, PairTable, RobotInspection, hand_file_text, inspect,
 };
 use regrasp::robot::{Finger, Hand};
 use serde_json::json;
@@ -30,6 +32,10 @@ pub fn run(arguments: &args::Inspect, common: &Common, talk: &Talk) -> Result<()
     if arguments.base.is_some() && is_hand_file {
         return Err(Stop::argument("A505", "--base", "stands beside a hand file", "a URDF; hand files say base_link"));
     }
+    if is_hand_file && (arguments.robot || arguments.srdf.is_some()) {
+        let argument = if arguments.robot { "--robot" } else { "--srdf" };
+        return Err(Stop::argument("A505", argument, "stands beside a hand file", "the URDF of a robot"));
+    }
     interrupt::flag()?;
     let settings = InspectSettings { n_postures: arguments.samples as usize };
     let mut rng = Rng::keyed(arguments.seed, "inspect", 0);
@@ -40,6 +46,20 @@ pub fn run(arguments: &args::Inspect, common: &Common, talk: &Talk) -> Result<()
     }
     for note in &found.notes {
         talk.note(note);
+    }
+    let may_be_robot = !is_hand_file && arguments.base.is_none();
+    if may_be_robot && (found.hand.is_err() || arguments.robot || arguments.srdf.is_some()) {
+        let files = (arguments.urdf.as_path(), arguments.srdf.as_deref());
+        let whole = inspect_whole(found.tree.clone(), files, &options, &settings, &mut rng)?;
+        match whole {
+            Some(whole) => return inspect_robot::run(&found, &whole, arguments, common, talk),
+            None if arguments.robot || arguments.srdf.is_some() => {
+                let diagnostic = Diagnostic::new("U214", Place::file(&arguments.urdf), "has no arm")
+                    .expected("six moving joints that follow each other without a branch");
+                return Err(Stop::BadInput(diagnostic.into()));
+            }
+            None => {}
+        }
     }
     let room = found.hand.as_ref().ok().map(|(hand, _)| Room::of(hand, arguments.seed));
     talk.event(
@@ -78,7 +98,7 @@ fn report(found: &Inspection, room: Option<&Room>) -> String {
         Ok((hand, table)) => {
             hand_part(hand, table, &mut out);
             room.into_iter().for_each(|room| room.write(&mut out));
-            pairs_part(table, &mut out);
+            pairs_part(&table.pairs, "hand file", &mut out);
         }
         Err(error) => {
             let _ = writeln!(out, "\nnot a hand as it stands:\n{error}");
@@ -87,7 +107,7 @@ fn report(found: &Inspection, room: Option<&Room>) -> String {
     regrasp::base::diagnostic::printable(&out)
 }
 
-fn robot_part(robot: &RobotInspection, out: &mut String) {
+pub(super) fn robot_part(robot: &RobotInspection, out: &mut String) {
     let n_mimic = robot.joints.iter().filter(|joint| joint.follows.is_some()).count();
     let n_fixed = robot.joints.iter().filter(|joint| joint.kind == "fixed").count();
     let _ = writeln!(
@@ -194,8 +214,7 @@ fn hand_part(model: &Hand, hand: &HandInspection, out: &mut String) {
     }
 }
 
-fn pairs_part(hand: &HandInspection, out: &mut String) {
-    let pairs = &hand.pairs;
+pub(super) fn pairs_part(pairs: &PairTable, file: &str, out: &mut String) {
     let _ = writeln!(
         out,
         "\nlinks over {} random postures: {} always touch, {} sometimes, {} never",
@@ -205,7 +224,7 @@ fn pairs_part(hand: &HandInspection, out: &mut String) {
         pairs.never.len()
     );
     for [a, b] in pairs.always.iter().take(PAIRS_SHOWN) {
-        let _ = writeln!(out, "  always     {a} and {b}: excused in the hand file");
+        let _ = writeln!(out, "  always     {a} and {b}: excused in the {file}");
     }
     for pair in pairs.sometimes.iter().take(PAIRS_SHOWN) {
         let _ = writeln!(out, "  {:>7.2} %  {} and {}", 100.0 * pair.share, pair.links[0], pair.links[1]);
