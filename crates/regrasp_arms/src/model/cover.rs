@@ -133,7 +133,7 @@ pub fn ball_about(balls: &[CoverBall]) -> (Point, f64) {
     let mut center = Point::from((corner(-1.0) + corner(1.0)) * 0.5);
     let reach = |center: &Point| {
         let far = balls.iter().map(|ball| ((ball.center - center).norm() + ball.radius, ball));
-        far.max_by(|a, b| a.0.total_cmp(&b.0)).map_or((0.0, center - center), |(far, ball)| (far, ball.center - center))
+        far.max_by(|a, b| a.0.total_cmp(&b.0)).map_or((0.0, Vector::zeros()), |(far, ball)| (far, ball.center - center))
     };
     let mut best = (center, reach(&center).0);
     // Towards what is farthest, by smaller and smaller steps (Badoiu, Clarkson 2003).

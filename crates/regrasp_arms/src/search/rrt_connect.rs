@@ -142,7 +142,7 @@ pub fn rrt_connect(
     let (radius, least) = ((settings.radius * spread) as f32, (settings.least_radius * spread) as f32);
     let (mut sample, mut next) = (Vec::with_capacity(dimension), vec![0.0; dimension]);
     while outcome.n_samples < settings.max_samples && !goals.is_empty() {
-        if outcome.n_samples % 16 == 0
+        if outcome.n_samples.is_multiple_of(16)
             && let Err(interrupt) = budget.check(work)
         {
             outcome.interrupt = Some(interrupt);

@@ -47,7 +47,7 @@ impl Tree {
     /// Adds a node below `parent`; a root where that is the node itself.
     pub fn push(&mut self, configuration: &[f64], parent: usize) -> usize {
         let node = self.parents.len();
-        if node % LANES == 0 {
+        if node.is_multiple_of(LANES) {
             self.blocks.extend(std::iter::repeat_n(F8::splat(NOWHERE), self.dimension));
         }
         let first = self.blocks.len() - self.dimension;
