@@ -1,8 +1,9 @@
 //! `regrasp roadmap`: many queries on one saved graph of a hand and an object.
 
 use super::pictures;
-use super::plan::{available_threads, judge_and_write, of_plan, say_plan, say_query};
+use super::plan::{judge_and_write, say_plan, say_query};
 use super::rows::{make_folder_of, of_rows, say_row};
+use super::written::{available_threads, of_plan};
 use crate::args::{self, Common, RoadmapAction};
 use crate::interrupt;
 use crate::judge;
