@@ -5,10 +5,12 @@
 
 use cpu_time::ThreadTime;
 use regrasp_arms::model::cover::covers;
-use regrasp_arms::roadmap::{BuildSettings, build};
+use regrasp_arms::motion::{Collider, ColliderSettings};
+use regrasp_arms::roadmap::{BuildSettings, QuerySettings, build, query};
+use regrasp_arms::search::{Region, RrtSettings, rrt_connect};
 use regrasp_arms::world::{Obstacle, World};
 use regrasp_arms::{ArmModel, Stage, plan_in_stages};
-use regrasp_base::Budget;
+use regrasp_base::{Budget, Rng};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Pose, Shape, Vector};
 use regrasp_robot::manipulator::layout::Part;
@@ -141,4 +143,72 @@ fn roadmaps(robot: &Path) {
             println!("nodes per arm {nodes_per_arm}, seed {seed}: {nodes} nodes, {edges} edges, {seconds:.2} s");
         }
     }
+    queries(&model, &world);
+}
+
+/// Queries among the same obstacles and one that the graph does not know: by the graph, and without it.
+fn queries(model: &ArmModel, known: &World) {
+    const QUERIES: u64 = 100;
+    let settings = BuildSettings { nodes_per_arm: 30, ..BuildSettings::default() };
+    let Some(built) = build(model, known, &settings, 0) else { return };
+    let mut rng = Rng::keyed(0, "queries", 0);
+    let region = Region::of(model, &[&model.configuration_of(&model.state)]);
+    let of_collider = ColliderSettings { clearance: built.clearance, ..ColliderSettings::default() };
+    let (mut lazy, mut single, mut solved) = (Vec::new(), Vec::new(), [0; 2]);
+    let (mut tested, mut added) = (0, 0);
+    for index in 0..QUERIES {
+        let [x, y, z] = [rng.uniform(0.45, 0.9), rng.uniform(-0.6, 0.6), rng.uniform(0.55, 1.3)];
+        let moved = Obstacle {
+            name: "moved".into(),
+            placed: PlacedShape {
+                parent_from_shape: Pose::translation(x, y, z),
+                shape: Shape::Cylinder { half_length: 0.15, radius: 0.05 },
+            },
+        };
+        let whole = World::new(known.obstacles.iter().cloned().chain([moved.clone()]).collect());
+        let unknown = World::new(vec![moved]);
+        let mut collider = Collider::new(model, &whole, of_collider);
+        let mut draw = || {
+            let mut drawn = Vec::new();
+            loop {
+                region.draw(&mut rng, &mut drawn);
+                if collider.contact(&drawn).is_none() {
+                    return drawn.clone();
+                }
+            }
+        };
+        let ends = [draw(), draw()];
+        // The graph as it was saved, for each of them.
+        let mut graph = built.clone();
+        let budget = Budget::unlimited().with_deadline(Instant::now() + LIMIT);
+        let before = ThreadTime::now();
+        let slices = [ends[0].as_slice(), ends[1].as_slice()];
+        let found = query(&mut graph, model, [&whole, &unknown], slices, &QuerySettings::default(), (index, &budget));
+        lazy.push(before.elapsed().as_secs_f64());
+        solved[0] += usize::from(found.path.is_some());
+        tested += found.n_tested;
+        added += found.n_added;
+        let mut sampled =
+            Collider::new(model, &whole, ColliderSettings { clearance: built.clearance, ..Default::default() });
+        let rrt = RrtSettings::for_dimension(model.dimension());
+        let budget = Budget::unlimited().with_deadline(Instant::now() + LIMIT);
+        let mut rng = Rng::keyed(index, "single_query", 0);
+        let before = ThreadTime::now();
+        let found =
+            rrt_connect(&ends[0], &ends[1..], &region, &rrt, &mut rng, &budget, |a, b| sampled.is_sampled_free(a, b));
+        single.push(before.elapsed().as_secs_f64());
+        solved[1] += usize::from(found.path.is_some());
+    }
+    let line = |name: &str, values: &mut Vec<f64>| {
+        values.sort_by(f64::total_cmp);
+        let n = values.len();
+        let mean = values.iter().sum::<f64>() / n as f64;
+        let ms = [values[n / 2], values[n * 3 / 4], values[n * 95 / 100], values[n - 1], mean].map(|s| 1e3 * s);
+        println!("| {name} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} |", ms[0], ms[1], ms[2], ms[3], ms[4]);
+    };
+    println!("{QUERIES} queries with a moved obstacle, solved by the graph {}, without {}", solved[0], solved[1]);
+    println!("motions of the graph tested anew {tested}, nodes added {added}");
+    println!("| ms | median | 75 % | 95 % | largest | mean |\n|---|---|---|---|---|---|");
+    line("by the graph", &mut lazy);
+    line("single query", &mut single);
 }

@@ -67,7 +67,6 @@ pub fn plan_in_stages(
     let mut last = None;
     for free in problem.groups(&goals) {
         let model = problem.model(&free);
-        watch(Stage::Prepared);
         let found = path::find(&problem, &model, &goals, settings, (seed, budget), watch)
             .and_then(|path| execute(&problem, &model, path, settings));
         match found {

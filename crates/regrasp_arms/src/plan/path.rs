@@ -42,6 +42,7 @@ pub fn find(
         let nothing = || Failure::bare(FailureKind::GoalInvalid, "the goal cannot be reached".into(), "");
         return Err(refused.unwrap_or_else(nothing));
     }
+    watch(Stage::Prepared);
     let mut search = Search { model, start, goals: free_goals, settings, statistics: RobotStatistics::default() };
     let mut interrupt = None;
     // With room to certify, then without, then with certified motions only.

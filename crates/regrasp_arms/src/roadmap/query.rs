@@ -265,8 +265,14 @@ impl Lazy {
         let settings =
             RrtSettings { max_samples: settings.max_samples, ..RrtSettings::for_dimension(all.model.dimension()) };
         let goals = [self.nodes[b].clone()];
-        let is_free = |from: &[f64], to: &[f64]| all.is_certified_free(&Track::straight(from, to));
-        let found = rrt_connect(&self.nodes[a], &goals, &region, &settings, rng, budget, is_free);
+        // In samples first; where a motion of that path cannot be certified, with certified motions.
+        let mut found =
+            rrt_connect(&self.nodes[a], &goals, &region, &settings, rng, budget, |p, q| all.is_sampled_free(p, q));
+        let mut is_certified = |p: &[f64], q: &[f64]| all.is_certified_free(&Track::straight(p, q));
+        let is_proved = found.path.iter().flat_map(|path| path.windows(2)).all(|pair| is_certified(&pair[0], &pair[1]));
+        if found.interrupt.is_none() && !is_proved {
+            found = rrt_connect(&self.nodes[a], &goals, &region, &settings, rng, budget, is_certified);
+        }
         outcome.interrupt = found.interrupt;
         let Some(path) = found.path else { return false };
         let mut last = a;
