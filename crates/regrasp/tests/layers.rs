@@ -62,7 +62,15 @@ const TOWER: &[Floor] = &[
     },
     floor(
         "regrasp_arms",
-        &["regrasp_base", "regrasp_geometry", "regrasp_robot", "regrasp_scene", "regrasp_plan", "regrasp_manipulation"],
+        &[
+            "regrasp_base",
+            "regrasp_geometry",
+            "regrasp_roadmap",
+            "regrasp_robot",
+            "regrasp_scene",
+            "regrasp_plan",
+            "regrasp_manipulation",
+        ],
     ),
     Floor {
         name: "regrasp_planners",

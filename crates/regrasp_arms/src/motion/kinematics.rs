@@ -1,10 +1,10 @@
 //! Where bodies are, in eight configurations.
 
 use super::Collider;
+use crate::lanes::{F8, V8, minus, squared};
 use nalgebra::Matrix3;
 use regrasp_geometry::Vector;
 use regrasp_geometry::collision::Placement;
-use crate::lanes::{F8, V8, minus, squared};
 
 /// A moving frame in eight configurations.
 #[derive(Debug, Clone, Copy)]

@@ -60,10 +60,10 @@ impl<'a> Problem<'a> {
     }
 
     /// States that answer the query.
-    pub fn goals(&self) -> Result<Vec<Vec<f64>>, Failure> {
+    pub fn goals(&self, seed: u64) -> Result<Vec<Vec<f64>>, Failure> {
         match &self.query.goal {
             MotionGoal::Joints(joints) => Ok(vec![joints.clone()]),
-            MotionGoal::Wrists(_) => Err(super::ends::no_wrists(self)),
+            MotionGoal::Wrists(wrists) => super::wrists::states(self, wrists, seed),
         }
     }
 

@@ -156,6 +156,15 @@ pub struct Job {
 impl Job {
     /// Errors (`B603`, with the place of the suite at `suite_path`): settings that mean nothing for the task of the scene.
     pub fn refuse_other_task(&self, task: &Task, suite_path: &Path) -> Result<(), InputError> {
+        if task.motion.is_some() {
+            let problem =
+                format!("\"{}\" names {}, which asks for a motion of a robot", self.name, self.scene.display());
+            let diagnostic = Diagnostic::new("B603", Place::file(suite_path), problem);
+            return Err(diagnostic
+                .expected("a scene in which a hand moves an object")
+                .fix("name another scene")
+                .into());
+        }
         let (key, other) = match task.kind_name() {
             IN_HAND if self.tracking.is_some() => ("tracking", "settings"),
             TRACKING if self.settings != InHandSettings::plain() => ("settings", "tracking"),

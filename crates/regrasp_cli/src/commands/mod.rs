@@ -10,6 +10,7 @@ mod grasp_import;
 mod grasps;
 mod growth;
 mod inspect;
+mod motion;
 mod inspect_robot;
 mod pair;
 mod pictures;

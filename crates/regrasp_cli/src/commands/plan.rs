@@ -1,6 +1,7 @@
 //! `regrasp plan`: plan a scene, check the plan, then write it.
 
 use crate::args::{self, Common, Judging};
+use crate::commands::motion;
 use crate::commands::pictures;
 use crate::interrupt;
 use crate::judge;
@@ -34,6 +35,12 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
     let loaded = arguments.judging.scene(load::scene_by(&arguments.scene, common, deadline, talk)?);
     let read = loaded.scene.inputs.iter().map(|input| input.path.as_path());
     written.refuse_inputs(read.chain(arguments.search.settings.as_deref()))?;
+    if let Some(query) = &loaded.task().motion {
+        let time_limit = deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
+        let (max_work, improve_for) = (arguments.search.max_work, arguments.search.improve);
+        let limits = Limits { max_work, time_limit, improve_for, cancelled };
+        return motion::plan(arguments, common, &loaded, query, &limits, talk);
+    }
     let query = arguments.judging.query(loaded.task().query(arguments.seed))?;
     let n_threads = arguments.threads.unwrap_or_else(available_threads);
     let settings = load::for_task(loaded.task(), &arguments.search, n_threads)?;
@@ -115,12 +122,17 @@ pub fn judge_and_write(
     if !report.accepted() {
         return Err(rejected(output, &bytes, talk));
     }
+    write(output, &bytes, talk)
+}
+
+/// Writes a plan file to `output`, or to stdout.
+pub fn write(output: Option<&Path>, bytes: &str, talk: &Talk) -> Result<(), Stop> {
     let Some(path) = output else {
         if talk.is_json() {
-            let as_in_file: serde_json::Value = serde_json::from_str(&bytes).unwrap_or_default();
+            let as_in_file: serde_json::Value = serde_json::from_str(bytes).unwrap_or_default();
             talk.event("written", json!({ "sha256": files::sha256(bytes.as_bytes()), "plan": as_in_file }));
         } else {
-            talk.data(&bytes);
+            talk.data(bytes);
         }
         return Ok(());
     };
@@ -302,7 +314,7 @@ fn held_in_words(plan: &Plan) -> Option<String> {
 }
 
 /// Keeps a rejected plan for a bug report, beside where the plan would have gone: never under its name.
-fn rejected(output: Option<&Path>, bytes: &str, talk: &Talk) -> Stop {
+pub fn rejected(output: Option<&Path>, bytes: &str, talk: &Talk) -> Stop {
     if let Some(path) = output {
         let kept = rejected_path(path);
         match files::write_atomic(&kept, bytes.as_bytes()) {

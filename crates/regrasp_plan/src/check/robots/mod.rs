@@ -3,6 +3,8 @@
 //! Not judged, because such a plan says nothing of it: whether a hand can hold what it carries (contacts, forces), torques of the arms,
 //! and balance of the robot. [`Report::assumed`] says so where something is carried.
 
+/// Clearance over time.
+pub mod along;
 /// No two bodies meet at any moment.
 pub mod apart;
 /// Everything that can collide, and which pairs must not.
