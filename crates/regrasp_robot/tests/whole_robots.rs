@@ -61,9 +61,9 @@ fn row(name: &str, base: &str, mount: &str, joints: usize) -> (String, String, S
 fn shared_robots_are_understood_and_their_files_load() {
     let Some(models) = shared_models() else { return };
     let robots = models.join("robots");
-    let iiwa = |side: &str| row(side, &format!("{side}_iiwa_link_0"), &format!("{side}_iiwa_link_ee"), 7);
+    let iiwa = |side: &str| row(side, &format!("{side}_iiwa_link_0"), &format!("{side}_iiwa_link_7"), 7);
     for (urdf, srdf, expected, common, held) in [
-        ("panda/panda_spherized.urdf", None, vec![row("arm", "panda_link0", "panda_link7", 7)], vec![], None),
+        ("panda/panda_spherized.urdf", None, vec![row("arm", "panda_link0", "panda_hand", 7)], vec![], None),
         (
             "panda/panda_spherized.urdf",
             Some("panda/panda.srdf"),
