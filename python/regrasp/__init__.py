@@ -12,7 +12,7 @@ SI units and radians; rotations are `quat_xyzw`; joint vectors are in the order 
 """
 
 from ._errors import Diagnostic, InputError, InternalError, RegraspError
-from ._grasps import GraspList, NoGrasps, check_grasps, list_grasps
+from ._grasps import GraspList, NoGrasps, check_grasps, grasps_mjcf, list_grasps
 from ._model import (
     CoupledJoint,
     Finger,
@@ -75,6 +75,7 @@ __all__ = [
     "__version__",
     "check",
     "check_grasps",
+    "grasps_mjcf",
     "export_mjcf",
     "list_grasps",
     "load_hand",

@@ -2,7 +2,7 @@
 
 use regrasp::base::{Budget, Rng};
 use regrasp::geometry::{Pose, Vector};
-use regrasp::plan::check::{CheckSettings, ViolationKind, check_files};
+use regrasp::plan::check::{CheckSettings, OwnQuery, ViolationKind, check_files};
 use regrasp::plan::format;
 use regrasp::plan::plan::{Plan, Waypoint};
 use regrasp::planners::FailureKind;
@@ -81,7 +81,9 @@ fn states_along_plans_are_starts_that_planning_takes() {
         for seed in 0..3 {
             let plan = own_plan(&loaded, seed);
             let mut rng = Rng::keyed(seed, "noise", 0);
-            for waypoint in plan.segments.iter().flat_map(|segment| [&segment.waypoints[0], segment.waypoints.last().unwrap()]) {
+            for waypoint in
+                plan.segments.iter().flat_map(|segment| [&segment.waypoints[0], segment.waypoints.last().unwrap()])
+            {
                 let exact = session.project(&observation(waypoint), &ProjectionLimits::default()).unwrap();
                 assert!(exact.moved.object < 1e-9 && exact.moved.joint < 1e-3, "{name}: {:?}", exact.moved);
                 let seen = noisy(&observation(waypoint), &mut rng, 1.0);
@@ -128,11 +130,19 @@ fn the_checker_judges_a_plan_of_a_session_from_its_file() {
     let found = plan_from(&session, &start, 2).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("plan.json");
-    let judge = |plan: &Plan| {
+    let judge_with = |plan: &Plan, own_query: OwnQuery| {
         std::fs::write(&file, format::to_json(plan)).unwrap();
         let scene = path("sphere_90x.toml");
-        check_files(&file, Some(&scene), &LoadOptions::default(), &CheckSettings::default()).unwrap()
+        let settings = CheckSettings { own_query, ..CheckSettings::default() };
+        check_files(&file, Some(&scene), &LoadOptions::default(), &settings).unwrap()
     };
+    let judge = |plan: &Plan| judge_with(plan, OwnQuery::Allowed);
+    // A plan answers its own question whatever that is: whoever judges has to allow it.
+    let refused = judge_with(&found, OwnQuery::Refused).report;
+    assert_eq!(
+        refused.violations.iter().map(|violation| violation.kind).collect::<Vec<_>>(),
+        [ViolationKind::WrongScene]
+    );
     let judged = judge(&found);
     assert_eq!(judged.plan, found, "a file keeps the plan to the last bit");
     assert!(judged.report.accepted() && judged.report == session.check(&found, &CheckSettings::default()));
@@ -184,7 +194,10 @@ fn what_is_no_start_is_refused_with_its_cause() {
         assert_eq!(failure.kind, FailureKind::StartInvalid);
         failure.message
     };
-    let far = Pose::from_parts((seen.world_from_object.translation.vector + Vector::z() * 0.1).into(), seen.world_from_object.rotation);
+    let far = Pose::from_parts(
+        (seen.world_from_object.translation.vector + Vector::z() * 0.1).into(),
+        seen.world_from_object.rotation,
+    );
     assert!(refused(&Observation { world_from_object: far, ..seen.clone() }).contains("no finger touches"));
     let mut joints = seen.joints.clone();
     joints[0] = f64::NAN;
@@ -197,9 +210,15 @@ fn what_is_no_start_is_refused_with_its_cause() {
     let message = refused(&Observation { joints, ..seen.clone() });
     assert!(message.contains("not force closed without") || message.contains("nearer than"), "{message}");
     // Four millimetres deep in the fingers.
-    let deep = Pose::from_parts((seen.world_from_object.translation.vector + Vector::x() * 0.004).into(), seen.world_from_object.rotation);
+    let deep = Pose::from_parts(
+        (seen.world_from_object.translation.vector + Vector::x() * 0.004).into(),
+        seen.world_from_object.rotation,
+    );
     let message = refused(&Observation { world_from_object: deep, ..seen });
-    assert!(message.contains("moves") || message.contains("off the surface") || message.contains("closed"), "{message}");
+    assert!(
+        message.contains("moves") || message.contains("off the surface") || message.contains("closed"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -219,7 +238,9 @@ fn surfaces_that_slide_over_each_other_are_seen() {
 #[test]
 fn a_session_of_what_cannot_be_asked_is_refused() {
     let loaded = loaded("sphere_90x.toml");
-    assert!(Session::open(&loaded, Some("elsewhere"), InHandSettings::default()).unwrap_err().to_string().contains("A510"));
+    assert!(
+        Session::open(&loaded, Some("elsewhere"), InHandSettings::default()).unwrap_err().to_string().contains("A510")
+    );
     let tracked = self::loaded("football.toml");
     assert!(Session::open(&tracked, None, InHandSettings::default()).unwrap_err().to_string().contains("tracking"));
 }

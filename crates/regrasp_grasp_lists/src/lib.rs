@@ -5,14 +5,22 @@
 
 /// Stable poses in which a hand stays above the support.
 mod above;
+/// Fingers that close until they touch.
+mod driven;
 /// What is prepared of the fingers.
 mod fingers;
 /// A grasp that was found.
 mod found;
 /// Grasp frames.
 mod frames;
+/// Grasps of other tools.
+pub mod import;
 /// Points in a tree.
 mod kd_tree;
+/// Which joints of a hand one motor drives.
+mod motors;
+/// Two hands that hold one object.
+pub mod pairs;
 /// What is prepared once.
 mod prepared;
 /// The list of what was found.
@@ -76,7 +84,17 @@ pub fn list_grasps_telling(
         Failure::bare(FailureKind::Impossible, problem, "give the link a collision shape with an inside")
     })?;
     let hand = &whole;
-    let view = HandView {
+    let view = view_of(hand, object);
+    Failure::refuse_many_fingers(&view)?;
+    let model = Model::new(&view, &settings.physics());
+    refuse_few_fingers(&model)?;
+    let prepared = Prepared::new(&model, settings, seed)?;
+    run::run(&prepared, budget, progress)
+}
+
+/// Hand and object by themselves; the hand stands still.
+fn view_of<'a>(hand: &'a Hand, object: &'a Object) -> HandView<'a> {
+    HandView {
         hand_index: 0,
         object_index: 0,
         hand_name: "hand",
@@ -89,12 +107,7 @@ pub fn list_grasps_telling(
         gravity: Gravity::Any,
         limits: Limits::default(),
         inputs: &[],
-    };
-    Failure::refuse_many_fingers(&view)?;
-    let model = Model::new(&view, &settings.physics());
-    refuse_few_fingers(&model)?;
-    let prepared = Prepared::new(&model, settings, seed)?;
-    run::run(&prepared, budget, progress)
+    }
 }
 
 /// Refuses hands that can never close an object with their fingertips.

@@ -2,10 +2,12 @@
 
 use crate::fingers::{SphereLimits, Workspheres, first_finger, meeting_point};
 use crate::frames::Frames;
+use crate::motors::Motors;
 use crate::settings::GraspSettings;
 use crate::stable::{self, Standing};
 use crate::surface::SurfacePoints;
 use regrasp_geometry::Pose;
+use regrasp_grasp::list::GraspKind;
 use regrasp_manipulation::failure::{Failure, FailureKind};
 use regrasp_manipulation::forces::limits::ForceModel;
 use regrasp_manipulation::model::{FingerModel, Model};
@@ -40,6 +42,8 @@ pub struct Prepared<'a> {
     pub hand_from_grasp: Pose,
     /// Poses in which the object stands.
     pub standing: Vec<Standing>,
+    /// What closes the hand; none where contacts come before joints.
+    pub motors: Option<Motors>,
 }
 
 impl<'a> Prepared<'a> {
@@ -51,6 +55,15 @@ impl<'a> Prepared<'a> {
         let forces = model.forces.as_ref().ok_or_else(|| Failure::of_settings("grasps need forces"))?;
         let first =
             first_finger(hand, settings.first_finger.as_deref()).map_err(|problem| Failure::of_settings(&problem))?;
+        let motors = match settings.kind {
+            GraspKind::Precision => None,
+            _ => Some(Motors::new(model, settings).map_err(|problem| {
+                impossible(
+                    problem,
+                    "take kind closing for hands of more fingers, kind precision for fingers of three joints or more",
+                )
+            })?),
+        };
         let mut order = vec![first];
         order.extend((0..hand.fingers.len()).filter(|f| *f != first));
         let limits = SphereLimits { most: settings.most_spheres, least_radius: settings.least_sphere };
@@ -115,12 +128,22 @@ impl<'a> Prepared<'a> {
             surfaces,
             surface_of,
             order,
+            motors,
         })
     }
 
     /// Places that a finger's tip can touch.
     pub fn surface(&self, finger: usize) -> &SurfacePoints {
         &self.surfaces[self.surface_of[finger]]
+    }
+
+    /// Number of frames.
+    pub fn n_frames(&self) -> u64 {
+        match self.settings.kind {
+            // Each frame is an antipodal pair with an approach angle.
+            GraspKind::Gripper => self.settings.frames,
+            _ => self.frames.len(),
+        }
     }
 
     /// The base of the hand in the object frame, at frame `index`.

@@ -1,7 +1,9 @@
 //! Refinement: the wrist moves, then contacts move along the surface, to raise the closure margin. No other term of the score may
 //! get worse, and no contact moves farther than a tip radius.
 
+use crate::driven;
 use crate::found::{Found, WayIn};
+use crate::motors::Motors;
 use crate::prepared::Prepared;
 use crate::search::worth::{self, holding};
 use crate::{above, way};
@@ -19,12 +21,18 @@ use regrasp_manipulation::workspace::{TipMode, Workspace};
 const WRIST_STEP: (f64, f64) = (0.006, 0.12);
 /// Share of the trials that move the wrist. By hand.
 const WRIST_SHARE: f64 = 0.3;
+/// Contacts of sharp tips move by this much at most, in metres.
+const SMALL_TIP: f64 = 0.003;
 /// Terms of the score may fall by this much: rounding.
 const ROUNDING: f64 = 1e-9;
 /// A margin must grow by this share to count.
 const LEAST_GAIN: f64 = 1.002;
 
+/// Steps uphill after which the way in is tested. By hand.
+const CLIMBS_PER_WAY: usize = 4;
+
 /// A grasp on its way uphill.
+#[derive(Clone)]
 struct Climb {
     state: GraspState,
     /// Inverse curvature at the contacts of the holding fingers.
@@ -64,6 +72,8 @@ fn refined(prepared: &Prepared, workspace: &mut Workspace, found: &Found, before
         way: found.way.clone(),
     };
     let first = climb.others;
+    // Mostly the way so far still leads there: it is tested now and then, and at the end.
+    let (mut reached, mut n_untested) = (climb.clone(), 0);
     for trial in 0..prepared.settings.refinement_trials {
         // Large steps first.
         let size = 1.0 - 0.9 * trial as f64 / prepared.settings.refinement_trials as f64;
@@ -79,15 +89,15 @@ fn refined(prepared: &Prepared, workspace: &mut Workspace, found: &Found, before
         if !workspace.is_clear(TipMode::AllHold) || !worth::is_balanced(prepared, &state) {
             continue;
         }
-        // Mostly the way so far still leads there.
-        let way = match way::is_free(prepared, workspace, &state, &climb.way) {
-            true => climb.way.clone(),
-            false => match way::way_in(prepared, workspace, &state) {
-                Ok(way) => way,
-                Err(_) => continue,
-            },
-        };
-        climb = Climb { state, flatness, margin, others, way };
+        climb = Climb { state, flatness, margin, others, way: climb.way };
+        n_untested += 1;
+        if n_untested == CLIMBS_PER_WAY {
+            climb = with_way(prepared, workspace, climb).unwrap_or_else(|| reached.clone());
+            (reached, n_untested) = (climb.clone(), 0);
+        }
+    }
+    if n_untested > 0 {
+        climb = with_way(prepared, workspace, climb).unwrap_or(reached);
     }
     if climb.margin <= before * LEAST_GAIN {
         return None;
@@ -96,6 +106,15 @@ fn refined(prepared: &Prepared, workspace: &mut Workspace, found: &Found, before
     let forces = worth::forces(prepared, &state)?;
     let scores = worth::terms(prepared, &state, &flatness, margin);
     Some(Found { state, margin, margin_before: Some(before), scores, forces, way, ..found.clone() })
+}
+
+/// `climb` with a way that leads there; none where there is none.
+fn with_way(prepared: &Prepared, workspace: &mut Workspace, climb: Climb) -> Option<Climb> {
+    if way::is_free(prepared, workspace, &climb.state, &climb.way) {
+        return Some(climb);
+    }
+    let way = way::way_in(prepared, workspace, &climb.state, None).ok()?;
+    Some(Climb { way, ..climb })
 }
 
 /// A grasp near `climb`: with the wrist moved, or with one contact moved.
@@ -108,10 +127,13 @@ fn trial_of(
 ) -> Option<(GraspState, Vec<f64>)> {
     let mut state = climb.state.clone();
     let mut flatness = climb.flatness.clone();
-    if rng.chance(WRIST_SHARE) {
+    if prepared.motors.is_some() || rng.chance(WRIST_SHARE) {
         let shift = Vector::from(rng.direction()) * (WRIST_STEP.0 * size * rng.unit());
         let turn = Vector::from(rng.direction()) * (WRIST_STEP.1 * size * rng.unit());
         state.world_from_object = moved(prepared, &state.world_from_object, shift, turn);
+        if let Some(motors) = &prepared.motors {
+            return closed_again(prepared, motors, found, &state);
+        }
         for f in 0..state.contacts.len() {
             if state.holds(f) {
                 touch(prepared, &mut state, f)?;
@@ -122,7 +144,7 @@ fn trial_of(
     let fingers: Vec<usize> = holding(&state).collect();
     let which = rng.below(fingers.len());
     let finger = fingers[which];
-    let radius = prepared.model.fingers[finger].settle_radius.max(0.003);
+    let radius = prepared.model.fingers[finger].settle_radius.max(SMALL_TIP);
     let contact = state.contacts[finger];
     let (x, y) = regrasp_geometry::frame::tangents(&contact.normal_in_object);
     let angle = rng.uniform(0.0, std::f64::consts::TAU);
@@ -138,6 +160,25 @@ fn trial_of(
     flatness[which] = inverse_curvature(object.surface.curvature(&at), prepared.model.fingers[finger].tip_radius);
     touch(prepared, &mut state, finger)?;
     Some((state, flatness))
+}
+
+/// The hand closed anew where `state` has the object, if no contact moves farther than contacts may.
+fn closed_again(
+    prepared: &Prepared,
+    motors: &Motors,
+    found: &Found,
+    state: &GraspState,
+) -> Option<(GraspState, Vec<f64>)> {
+    let again = driven::close_again(prepared, motors, state, &state.world_from_object)?;
+    let is_near = |f: usize| {
+        let farthest = prepared.model.fingers[f].settle_radius.max(SMALL_TIP);
+        (again.contacts[f].point_in_object - found.state.contacts[f].point_in_object).norm() <= farthest
+    };
+    if !holding(&again).all(is_near) {
+        return None;
+    }
+    let flatness = driven::flatness(prepared, &again);
+    Some((again, flatness))
 }
 
 /// The object in the hand frame, turned about the place where the fingers meet and shifted.

@@ -83,7 +83,7 @@ fn search(
 ) -> (Vec<Found>, Option<Interrupt>) {
     let settings = prepared.settings;
     let n_enough = (settings.grasps as f64 * settings.found_per_grasp).ceil() as usize;
-    let n_frames = prepared.frames.len();
+    let n_frames = prepared.n_frames();
     let mut found = Vec::new();
     let mut first = 0;
     while first < n_frames {
@@ -148,7 +148,7 @@ fn names<'a>(prepared: &Prepared<'a>) -> Vec<&'a str> {
 fn statistics(prepared: &Prepared, tally: &Tally, n_found: usize, cut: Option<Interrupt>) -> GraspStatistics {
     let names = names(prepared);
     GraspStatistics {
-        frames: prepared.frames.len(),
+        frames: prepared.n_frames(),
         frames_tried: tally.frames_tried,
         rejected: tally.reasons.iter().map(|(reason, count)| (reason.in_words(&names), *count)).collect(),
         found: n_found as u64,
@@ -182,7 +182,7 @@ fn failure(prepared: &Prepared, tally: &Tally, cut: Option<Interrupt>) -> Failur
         "found no grasp of \"{}\" in {} of {} frames; {nearest}",
         prepared.model.view.object.name,
         tally.frames_tried,
-        prepared.frames.len()
+        prepared.n_frames()
     );
     let advice = "more --frames, a smaller --margin, another size of the object (--scale), or more friction";
     let kind = cut.map_or(FailureKind::Impossible, FailureKind::from);

@@ -124,7 +124,7 @@ impl GraspSettings {
             ("least_sphere", self.least_sphere, 1e-5, 1.0),
             ("surface_step", self.surface_step.unwrap_or(0.01), 1e-4, 1.0),
             ("found_per_grasp", self.found_per_grasp, 1.0, 100.0),
-            ("approach_distance", self.approach_distance, 0.001, 1.0),
+            ("approach_distance", self.approach_distance, 0.02, 1.0),
             ("tipping_angle", self.tipping_angle, 0.0, 1.5),
         ];
         let heights = self.open_heights.iter().map(|height| ("open_heights", *height, 0.001, 0.5));
@@ -132,9 +132,6 @@ impl GraspSettings {
             numbers.into_iter().chain(heights).find(|(_, value, low, high)| !(low..=high).contains(&value))
         {
             return Err(format!("{name} is {seen}; it must be between {low} and {high}"));
-        }
-        if self.kind != GraspKind::Precision {
-            return Err(format!("kind is {}; this version finds precision grasps", self.kind.name()));
         }
         self.weights.validate()?;
         self.forces.validate()

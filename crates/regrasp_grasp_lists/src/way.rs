@@ -1,6 +1,7 @@
 //! The way of the hand to a grasp: a straight line of the open hand, then all fingers close on a straight line in joint space.
 //! No moment of it is in collision.
 
+use crate::driven;
 use crate::found::WayIn;
 use crate::prepared::Prepared;
 use crate::search::worth::holding;
@@ -32,11 +33,16 @@ pub enum NoWay {
     Blocked,
 }
 
-/// A way to the grasp `state`. The workspace is left anywhere.
-pub fn way_in(prepared: &Prepared, workspace: &mut Workspace, state: &GraspState) -> Result<WayIn, NoWay> {
+/// A way to the grasp `state`; with the open hand `given`, if it can be. The workspace is left anywhere.
+pub fn way_in(
+    prepared: &Prepared,
+    workspace: &mut Workspace,
+    state: &GraspState,
+    given: Option<&HandJoints>,
+) -> Result<WayIn, NoWay> {
     let mut opened = false;
     let directions = directions(state);
-    for open in openings(prepared, state) {
+    for open in given.cloned().into_iter().chain(openings(prepared, state)) {
         if !opens(workspace, state, &open) {
             continue;
         }
@@ -56,10 +62,14 @@ pub fn is_free(prepared: &Prepared, workspace: &mut Workspace, state: &GraspStat
 }
 
 /// Postures of the open hand: fingertips lift off along their normals, by the heights asked for; then all fingers rest.
-fn openings<'p>(prepared: &'p Prepared, state: &'p GraspState) -> impl Iterator<Item = HandJoints> + 'p {
+/// Hands that close have motors that open them.
+fn openings<'p>(prepared: &'p Prepared, state: &'p GraspState) -> Box<dyn Iterator<Item = HandJoints> + 'p> {
+    if let Some(motors) = &prepared.motors {
+        return Box::new(driven::openings(motors, &state.joints).into_iter());
+    }
     let lifted = prepared.settings.open_heights.iter().filter_map(|height| lifted(prepared, state, *height));
     let rest = prepared.model.view.hand.fingers.iter().map(|finger| finger.rest.iter().copied().collect());
-    lifted.chain(std::iter::once(rest.collect()))
+    Box::new(lifted.chain(std::iter::once(rest.collect())))
 }
 
 /// The posture with every fingertip that holds at `height` over its contact; None where a finger cannot.

@@ -1,8 +1,9 @@
 //! A hand: a palm and serial fingers, with everything the planners ask for prepared once.
 
+use crate::coupling::Coupling;
 use crate::kinematics::chain::Chain;
 use crate::kinematics::finger_ik::FingerIk;
-use crate::robot::{LinkId, Robot};
+use crate::robot::{JointId, LinkId, Robot};
 use crate::tip::Tip;
 use regrasp_geometry::Shape;
 use regrasp_geometry::shape::PlacedShape;
@@ -65,6 +66,16 @@ pub struct PalmShape {
     pub placed: PlacedShape,
 }
 
+/// A joint of one finger that follows joints of other fingers. For its finger it is a coordinate like any other; whoever moves the
+/// hand keeps it where the coupling says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tie {
+    /// The joint.
+    pub follower: JointId,
+    /// What it follows.
+    pub coupling: Coupling,
+}
+
 /// A palm and serial fingers. All poses are in the hand's own frame, that of its base: where the hand stands in the world is
 /// not part of it.
 #[derive(Debug, Clone)]
@@ -79,6 +90,8 @@ pub struct Hand {
     pub palm: Vec<PalmShape>,
     /// Pairs of links (smaller index first) that are never tested against each other.
     pub allowed_pairs: BTreeSet<(LinkId, LinkId)>,
+    /// Joints that follow those of other fingers; empty unless the hand was loaded for that ([`crate::import::LoadOptions::untie`]).
+    pub ties: Vec<Tie>,
 }
 
 impl Hand {

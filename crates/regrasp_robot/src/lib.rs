@@ -25,7 +25,7 @@ pub mod tip;
 
 pub use contact_model::ContactModel;
 pub use coupling::{Coupling, LinearLimit};
-pub use hand::{Finger, FingerId, FingerShape, Hand};
+pub use hand::{Finger, FingerId, FingerShape, Hand, Tie};
 pub use import::{LoadOptions, LoadedHand, LoadedInput, LoadedManipulator, LoadedRobot, ResolveOptions};
 pub use import::{load_hand, load_manipulator, load_robot};
 pub use kinematics::chain::{Chain, ChainJoint, JointMotion};

@@ -9,10 +9,32 @@ use std::time::Duration;
 /// `regrasp grasps`
 #[derive(Debug, Args)]
 pub struct Grasps {
-    /// Hand file, or a URDF whose fingers are then guessed
+    /// Hand file, or a URDF whose fingers are then guessed; with --pair the list of the hand that holds the object first
     pub hand: PathBuf,
-    /// Mesh file, or a scene file whose object is taken
+    /// Mesh file, or a scene file whose object is taken; with --pair the list of the hand that takes the object
     pub object: PathBuf,
+    /// Pair the grasps of two lists: double grasps
+    #[arg(long)]
+    pub pair: bool,
+    /// With --pair: scene file of the place where the first hand takes the object, with its obstacles and supports
+    #[arg(long, value_name = "SCENE.toml", requires = "pair")]
+    pub start: Option<PathBuf>,
+    /// With --pair: scene file of the place where the second hand leaves the object
+    #[arg(long, value_name = "SCENE.toml", requires = "pair")]
+    pub goal: Option<PathBuf>,
+    /// With --pair: the robot's base in the world, in metres; hands that come from there score higher
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        requires = "pair",
+        value_delimiter = ',',
+        num_args = 3,
+        allow_negative_numbers = true
+    )]
+    pub robot_base: Option<Vec<f64>>,
+    /// Read the grasps of an Isaac grasp file, or of a list, and keep those that hold
+    #[arg(long, value_name = "FILE", conflicts_with = "pair")]
+    pub import: Option<PathBuf>,
     /// Grasp list [default: stdout]
     #[arg(short, long, value_name = "grasps.json")]
     pub output: Option<PathBuf>,
@@ -20,7 +42,7 @@ pub struct Grasps {
     #[arg(long, value_name = "PAGE.html")]
     pub report: Option<PathBuf>,
     /// How grasps come about
-    #[arg(long, value_parser = PossibleValuesParser::new(["precision"]))]
+    #[arg(long, value_parser = PossibleValuesParser::new(["precision", "gripper", "closing"]))]
     pub kind: Option<String>,
     /// Grasps that are kept [default: 100]
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]

@@ -1,8 +1,8 @@
 //! `regrasp grasps`: find grasps of an object, check them, then write the list.
 
 use crate::args::{self, Common};
-use crate::commands::grasp_files;
 use crate::commands::plan::available_threads;
+use crate::commands::{grasp_files, grasp_import, pair};
 use crate::interrupt;
 use crate::judge_grasps;
 use crate::load;
@@ -12,7 +12,7 @@ use crate::talk::Talk;
 use crate::words::{counted, duration, grouped};
 use regrasp::base::files;
 use regrasp::grasp::GraspList;
-use regrasp::grasp::list::format;
+use regrasp::grasp::list::{GraspKind, format};
 use regrasp::grasp::record::PlanInput;
 use regrasp::grasp_lists::{GraspSettings, Progress, list_grasps_telling};
 use regrasp::plan::check::grasps::source_of;
@@ -31,6 +31,12 @@ const USUAL: [f64; 2] = [0.1, 0.8];
 
 /// Loads, searches, judges, writes.
 pub fn run(arguments: &args::Grasps, common: &Common, talk: &Talk) -> Result<(), Stop> {
+    if arguments.pair {
+        return pair::run(arguments, common, talk);
+    }
+    if arguments.import.is_some() {
+        grasp_import::refuse_flags(arguments)?;
+    }
     let outputs = arguments.output.iter().map(|path| Output::new("--output", path));
     let pages = arguments.report.iter().map(|path| Output::new("--report", path));
     let written = Outputs::new(outputs.chain(pages))?;
@@ -42,11 +48,14 @@ pub fn run(arguments: &args::Grasps, common: &Common, talk: &Talk) -> Result<(),
     let started = Instant::now();
     let scene = load_grasp_scene(&arguments.hand, &source, &LoadOptions { deadline, ..options.clone() })?;
     let read = scene.scene.inputs.iter().map(|input| input.path.as_path());
-    written.refuse_inputs(read.chain(arguments.settings.as_deref()))?;
+    written.refuse_inputs(read.chain(arguments.settings.as_deref()).chain(arguments.import.as_deref()))?;
     say_scene(&scene, started.elapsed().as_secs_f64(), talk);
 
     let budget = Budget { deadline, cancelled: Arc::clone(&cancelled), ..Budget::work(arguments.max_work) };
-    let list = search(&scene, &settings, arguments.seed, &budget, talk)?;
+    let list = match &arguments.import {
+        Some(path) => grasp_import::import(path, &scene, &settings, talk)?,
+        None => search(&scene, &settings, arguments.seed, &budget, talk)?,
+    };
     let list = GraspList {
         source: Some(source_of(&arguments.hand, &source, arguments.torsion_radius)),
         inputs: scene.scene.inputs.iter().map(input).collect(),
@@ -76,6 +85,9 @@ fn settings(arguments: &args::Grasps) -> Result<GraspSettings, Stop> {
         Some(path) => load::settings_file::<GraspSettings>(path)?,
         None => GraspSettings::default(),
     };
+    if let Some(kind) = arguments.kind.as_deref() {
+        settings.kind = GraspKind::ALL.into_iter().find(|known| known.name() == kind).unwrap_or(settings.kind);
+    }
     settings.grasps = arguments.grasps.map_or(settings.grasps, |n| usize::try_from(n).unwrap_or(usize::MAX));
     settings.frames = arguments.frames.unwrap_or(settings.frames);
     settings.margin = arguments.margin.unwrap_or(settings.margin);

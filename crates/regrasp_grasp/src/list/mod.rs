@@ -3,15 +3,23 @@
 //! `docs/reference/grasp-list-format.md` and `schema/grasps.schema.json` say the same. All poses and points are in the object
 //! frame: a list knows no world. The margin is that of [`crate::margin`] with the friction that the list counts on.
 
+/// Double grasps.
+pub mod double;
+/// Grasps of other tools.
+mod foreign;
 /// The file as bytes.
 pub mod format;
 /// Hand, object and promises of a list.
 mod heading;
+/// Isaac grasp files.
+pub mod isaac;
 /// The terms of a grasp's score.
 pub mod score;
 /// What a grasp list may not say.
 mod validate;
 
+pub use double::{DoubleGrasp, DoubleGraspList, DoubleGraspSide};
+pub use foreign::{ForeignGrasp, ForeignGrasps};
 pub use heading::{GraspPromises, GraspSource, GraspStatistics, HandRecord, MeshRecord, ObjectRecord, StablePose};
 pub use score::{ScoreWeights, Scores};
 

@@ -126,10 +126,12 @@ fn what_is_wrong_is_refused_at_its_place() {
 
 #[test]
 fn the_schema_file_is_the_one_of_the_types() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../schema/grasps.schema.json");
-    if std::env::var_os("REGRASP_WRITE_SCHEMA").is_some() {
-        std::fs::write(&path, schema()).unwrap();
+    for (name, schema) in [("grasps", schema()), ("double-grasps", regrasp_grasp::list::double::schema())] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../schema/{name}.schema.json"));
+        if std::env::var_os("REGRASP_WRITE_SCHEMA").is_some() {
+            std::fs::write(&path, &schema).unwrap();
+        }
+        let stored = std::fs::read_to_string(path).unwrap();
+        assert_eq!(stored, schema, "run with REGRASP_WRITE_SCHEMA=1");
     }
-    let stored = std::fs::read_to_string(path).unwrap();
-    assert_eq!(stored, schema(), "run with REGRASP_WRITE_SCHEMA=1");
 }

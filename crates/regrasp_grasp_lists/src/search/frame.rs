@@ -3,12 +3,13 @@
 use super::combine::{Choice, Options, choices};
 use super::contacts::footholds;
 use super::worth;
+use crate::driven;
 use crate::found::{Found, Reason};
 use crate::prepared::Prepared;
 use crate::way::{self, NoWay};
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;
-use regrasp_manipulation::grasp::state::GraspState;
+use regrasp_manipulation::grasp::state::{GraspState, HandJoints};
 use regrasp_manipulation::workspace::{TipMode, Workspace};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 
@@ -32,6 +33,16 @@ pub fn try_frame(prepared: &Prepared, workspace: &mut Workspace, index: u64) -> 
     let hand_from_object = object_from_hand.inverse();
     let mut rng = Rng::keyed(prepared.seed, "grasp frame", index);
     let mut miss = Miss { reason: Reason::Palm, margin: 0.0, out_of_reach: None };
+    if let Some(motors) = &prepared.motors {
+        let closed = driven::close_in_frame(prepared, motors, workspace, index, &mut rng);
+        let (state, margin) = closed.map_err(|(reason, margin)| Miss { reason, margin, ..miss })?;
+        let flatness = driven::flatness(prepared, &state);
+        return accept(prepared, workspace, index, state, (&flatness, margin), None).map_err(|reason| Miss {
+            reason,
+            margin,
+            ..miss
+        });
+    }
     workspace.place_object(&hand_from_object);
     if !workspace.palm_is_clear() {
         return Err(miss);
@@ -44,15 +55,15 @@ pub fn try_frame(prepared: &Prepared, workspace: &mut Workspace, index: u64) -> 
     let mut n_touching = 0;
     for (done, &finger) in prepared.order.iter().enumerate() {
         options[finger] = footholds(prepared, workspace, finger, &hand_from_object, opposed.as_ref(), &mut rng);
+        // No stable grasp without the first finger (Saut 2010, sec. IV-A.2).
+        if options[finger].is_empty() && done == 0 {
+            return Err(Miss { reason: Reason::TooFewContacts, out_of_reach: Some(finger), ..miss });
+        }
         may_be_free[finger] = rests(prepared, workspace, finger);
         if options[finger].is_empty() {
             miss.out_of_reach = miss.out_of_reach.or(Some(finger));
             if !may_be_free[finger] {
                 return Err(Miss { reason: Reason::FreeFinger(finger), ..miss });
-            }
-            // No stable grasp without the first finger (Saut 2010, sec. IV-A.2).
-            if done == 0 {
-                return Err(Miss { reason: Reason::TooFewContacts, ..miss });
             }
         } else {
             opposed = opposed.or(options[finger].first().map(|foothold| foothold.place));
@@ -74,7 +85,15 @@ pub fn try_frame(prepared: &Prepared, workspace: &mut Workspace, index: u64) -> 
         if !clear.of_each_other(prepared, workspace, &options, choice) {
             continue;
         }
-        match accept(prepared, workspace, index, &hand_from_object, &options, choice) {
+        let state = state_of(prepared, &hand_from_object, &options, choice);
+        workspace.set_state(&state);
+        if !workspace.is_clear(TipMode::AllHold) {
+            reason = reason.max(Reason::Fingers);
+            continue;
+        }
+        let flatness: Vec<f64> =
+            (0..n_fingers).filter_map(|f| choice.chosen[f].map(|k| options[f][k].place.flatness)).collect();
+        match accept(prepared, workspace, index, state, (&flatness, choice.margin), None) {
             Ok(grasp) => return Ok(grasp),
             Err(why) => reason = reason.max(why),
         }
@@ -142,42 +161,31 @@ fn joints_of(prepared: &Prepared, options: &Options, choice: &Choice, finger: us
     choice.chosen[finger].map_or_else(|| rest_of(prepared, finger), |k| options[finger][k].joints.clone())
 }
 
-/// The grasp of a choice with all that belongs to it.
-fn accept(
-    prepared: &Prepared,
-    workspace: &mut Workspace,
-    frame: u64,
-    hand_from_object: &Pose,
-    options: &Options,
-    choice: &Choice,
-) -> Result<Found, Reason> {
+/// The hand at the contacts of a choice.
+fn state_of(prepared: &Prepared, hand_from_object: &Pose, options: &Options, choice: &Choice) -> GraspState {
     let finger = |f: usize| {
         let contact = choice.chosen[f].map(|k| options[f][k].place.contact);
         (contact, joints_of(prepared, options, choice, f))
     };
-    let state = GraspState::of(*hand_from_object, (0..choice.chosen.len()).map(finger));
-    workspace.set_state(&state);
-    if !workspace.is_clear(TipMode::AllHold) {
-        return Err(Reason::Fingers);
-    }
+    GraspState::of(*hand_from_object, (0..choice.chosen.len()).map(finger))
+}
+
+/// The grasp `state`, which hits nothing, with all that belongs to it; `flatness` has the inverse curvature at its contacts, beside the
+/// margin. `open` is the open hand to be tried first.
+pub fn accept(
+    prepared: &Prepared,
+    workspace: &mut Workspace,
+    frame: u64,
+    state: GraspState,
+    (flatness, margin): (&[f64], f64),
+    open: Option<&HandJoints>,
+) -> Result<Found, Reason> {
     let forces = worth::forces(prepared, &state).ok_or(Reason::Forces)?;
-    let way = way::way_in(prepared, workspace, &state).map_err(|why| match why {
+    let way = way::way_in(prepared, workspace, &state, open).map_err(|why| match why {
         NoWay::Closed => Reason::NotOpened,
         NoWay::Blocked => Reason::NoWayIn,
     })?;
-    let flatness: Vec<f64> =
-        (0..choice.chosen.len()).filter_map(|f| choice.chosen[f].map(|k| options[f][k].place.flatness)).collect();
-    let scores = worth::terms(prepared, &state, &flatness, choice.margin);
+    let scores = worth::terms(prepared, &state, flatness, margin);
     let score = scores.mean(&prepared.settings.weights);
-    Ok(Found {
-        frame,
-        state,
-        margin: choice.margin,
-        margin_before: None,
-        scores,
-        score,
-        forces,
-        way,
-        stable_poses: Vec::new(),
-    })
+    Ok(Found { frame, state, margin, margin_before: None, scores, score, forces, way, stable_poses: Vec::new() })
 }

@@ -111,7 +111,8 @@ const PRESSING_REACH: f64 = 2.0;
 pub fn project(model: &Model, observed: &Observed, limits: &ProjectionLimits) -> Result<Projection, Failure> {
     let posture = posture_of(model, observed)?;
     let object = Placement::from(&posture.object);
-    let gaps: Vec<Option<f64>> = (0..model.n_fingers()).map(|f| gap_of(model, f, &posture.joints[f], &object)).collect();
+    let gaps: Vec<Option<f64>> =
+        (0..model.n_fingers()).map(|f| gap_of(model, f, &posture.joints[f], &object)).collect();
     let felt = |finger: usize| observed.presses.as_ref().and_then(|presses| presses.get(finger)).copied();
     let touches = |finger: usize| {
         let reach = if felt(finger) == Some(true) { PRESSING_REACH } else { 1.0 } * limits.distance;
@@ -245,7 +246,8 @@ fn valid(
         }
         let foot = model.view.object.surface.project(&contact.point_in_object);
         if !model.view.object.keeps_off_edges(&foot) {
-            let message = format!("finger \"{name}\" touches nearer to an edge than {} m", model.view.object.edge_distance);
+            let message =
+                format!("finger \"{name}\" touches nearer to an edge than {} m", model.view.object.edge_distance);
             return Err(refusal(message, "grasp anew, or allow a smaller edge_distance"));
         }
         fingers.push((Some(contact), own));
@@ -257,7 +259,10 @@ fn valid(
         let name = |body: usize| model.bodies[body].name.as_str();
         let (a, b) = workspace.blocking_pair.map_or(("?", "?"), |pair| (name(pair.a), name(pair.b)));
         let message = format!("\"{a}\" and \"{b}\" are nearer than {} m", model.settings.clearance);
-        return Err(refusal(message, "move them apart: they are farther in each other than can be an error of the estimate"));
+        return Err(refusal(
+            message,
+            "move them apart: they are farther in each other than can be an error of the estimate",
+        ));
     }
     refuse_buried_object(model, End::Start, &state.world_from_object)?;
     refuse_object_out_of_reach(model, End::Start, &state.world_from_object)?;
@@ -328,7 +333,8 @@ fn refuse_far(moved: &Moved, limits: &ProjectionLimits) -> Result<(), Failure> {
     match measures.into_iter().find(|(_, by, most, _)| !(by <= most)) {
         None => Ok(()),
         Some((what, by, most, unit)) => {
-            let message = format!("the nearest grasp moves {what} by {by:.3} {unit}; at most {most} {unit} are allowed");
+            let message =
+                format!("the nearest grasp moves {what} by {by:.3} {unit}; at most {most} {unit} are allowed");
             Err(refusal(message, "observe again, or allow more"))
         }
     }

@@ -64,8 +64,8 @@ pub fn check_given(
                         tell(&finger.name, "touch", f64::INFINITY, 0.0);
                         break;
                     }
-                    let touches = holds == Some(false)
-                        || gap(shape, finger, joints, waypoint).abs() <= settings.pose_tolerance;
+                    let touches =
+                        holds == Some(false) || gap(shape, finger, joints, waypoint).abs() <= settings.pose_tolerance;
                     let exactly = settings.pose_tolerance;
                     let [reach, turn] = if touches { [exactly; 2] } else { [GRASP_TOLERANCE, GRASP_TURN_TOLERANCE] };
                     let own = finger.coordinates.clone();

@@ -5,7 +5,8 @@
 
 use super::caps;
 use crate::plan::{
-    Asked, ContactMode, ContactState, Plan, PlanInput, PoseData, Promises, Segment, SegmentKind, Statistics, WayPose, Waypoint,
+    Asked, ContactMode, ContactState, Plan, PlanInput, PoseData, Promises, Segment, SegmentKind, Statistics, WayPose,
+    Waypoint,
 };
 use regrasp_base::json_place::PathStep;
 use schemars::JsonSchema;

@@ -1,7 +1,9 @@
 //! What a plan file may not say.
 
 use super::caps;
-use crate::plan::{Asked, ContactMode, ContactState, FORMAT_VERSION, ForcePromises, Plan, PoseData, Segment, SegmentKind};
+use crate::plan::{
+    Asked, ContactMode, ContactState, FORMAT_VERSION, ForcePromises, Plan, PoseData, Segment, SegmentKind,
+};
 use regrasp_base::InputError;
 use regrasp_base::diagnostic::{Diagnostics, GOOD_NAME, fault_of_name, number, printable_line};
 use regrasp_base::json_place::{PathStep, diagnostic};

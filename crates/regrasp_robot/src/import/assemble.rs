@@ -64,7 +64,10 @@ pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Resu
             notes.push(format!("finger \"{}\": tip link \"{}\" has no collision geometry", finger.name, link.name));
         }
     }
-    found.into_result((Hand { robot: robot.clone(), base: spec.base, fingers, palm, allowed_pairs }, notes))
+    found.into_result((
+        Hand { robot: robot.clone(), base: spec.base, fingers, palm, allowed_pairs, ties: Vec::new() },
+        notes,
+    ))
 }
 
 /// The moving joints of each finger, base first.

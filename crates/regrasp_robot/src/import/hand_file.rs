@@ -9,6 +9,7 @@ use super::names::{known_joint, known_link};
 use super::options::{LoadOptions, LoadedInput};
 use super::spec::{FingerSpec, HandSpec, PadSpec, TipSpec};
 use super::srdf::{LoadedSrdf, load_srdf};
+use super::ties;
 use super::urdf::{LoadedRobot, load_robot};
 use crate::contact_model::{self, ContactModel};
 use crate::hand::{Hand, MAX_FINGERS};
@@ -66,8 +67,9 @@ pub fn load_hand(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Input
 
 fn load_bare_urdf(path: &Path, options: &LoadOptions) -> Result<LoadedHand, InputError> {
     let parts = guessed_parts(path, options)?;
-    let (mut hand, more) = assemble(&parts.robot, &parts.spec, path)?;
+    let (mut hand, more) = made(&parts, path, options)?;
     crate::inspect::rest::bend_towards_palm(&mut hand);
+    ties::settle_rest(&mut hand);
     refuse_wrong_unit(&hand, path)?;
     Ok(LoadedHand { hand, inputs: parts.inputs, notes: [parts.notes, more].concat() })
 }
@@ -86,9 +88,23 @@ fn guessed_parts(path: &Path, options: &LoadOptions) -> Result<HandParts, InputE
 
 fn load_hand_file(path: &Path, options: &LoadOptions) -> Result<LoadedHand, InputError> {
     let parts = hand_file_parts(path, options)?;
-    let (hand, more) = assemble(&parts.robot, &parts.spec, path)?;
+    let (hand, more) = made(&parts, path, options)?;
     refuse_wrong_unit(&hand, path)?;
     Ok(LoadedHand { hand, inputs: parts.inputs, notes: [parts.notes, more].concat() })
+}
+
+/// The hand of some parts, and remarks.
+fn made(parts: &HandParts, path: &Path, options: &LoadOptions) -> Result<(Hand, Vec<String>), InputError> {
+    if !options.untie {
+        return assemble(&parts.robot, &parts.spec, path);
+    }
+    let mut notes = Vec::new();
+    let (robot, ties) = ties::untie(&parts.robot, &parts.spec, &mut notes);
+    let (hand, more) = assemble(&Arc::new(robot), &parts.spec, path)?;
+    let mut hand = Hand { ties, ..hand };
+    ties::settle_rest(&mut hand);
+    notes.extend(more);
+    Ok((hand, notes))
 }
 
 /// What a hand file says, before a hand is made of it.

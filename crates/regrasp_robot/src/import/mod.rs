@@ -32,6 +32,8 @@ pub mod robot_file;
 pub(crate) mod spec;
 /// SRDF: groups, end effectors, pairs of links that are not tested.
 pub mod srdf;
+/// Fingers that share a motor.
+mod ties;
 mod tip_split;
 /// URDF.
 pub mod urdf;

@@ -22,6 +22,9 @@ pub struct LoadOptions {
     pub base: Option<String>,
     /// Wall-clock instant after which reading is given up (`F004`). It cuts and never changes what is read.
     pub deadline: Option<Instant>,
+    /// Take fingers of which a joint follows a joint of another finger: see [`crate::hand::Hand::ties`]. Without it they are refused
+    /// (`U209`).
+    pub untie: bool,
     /// Files in memory, in place of all files on disk.
     pub kept: Option<Arc<KeptFiles>>,
 }

@@ -101,6 +101,8 @@ pub fn load_grasp_scene(
     let text = document(hand_path, source);
     let place = Path::new(ARGUMENTS);
     let stock = Stock::default();
+    // Hands whose fingers share a motor grasp as well as others.
+    let options = &LoadOptions { untie: true, ..options.clone() };
     let mut files = Files::new(place, text.as_bytes(), options, &stock);
     // The arguments are no file.
     files.inputs.clear();

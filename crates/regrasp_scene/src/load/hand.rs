@@ -6,7 +6,7 @@ use crate::scene::{InputFile, SceneHand};
 use regrasp_base::toml_table::{Entry, Found, Table};
 use regrasp_geometry::Pose;
 use regrasp_robot::Hand;
-use regrasp_robot::contact_model::{self, ContactModel};
+use regrasp_robot::contact_model;
 use regrasp_robot::import::{LoadOptions, load_hand};
 use regrasp_robot::inspect::tip_report;
 use regrasp_robot::tip::{LARGEST_MISFIT, TipShape};
@@ -26,7 +26,7 @@ pub(super) fn hand(mut table: Table, name: String, files: &mut Files, found: &mu
         None => Some(Pose::identity()),
     };
     let rest = table.optional("rest");
-    let default_contact = contact_model::read(&mut table, "contact", ContactModel::default(), "S106", found);
+    let default_contact = contact_model::read(&mut table, "contact", files.options.contact, "S106", found);
     let contacts = table.optional("contacts");
     let reach = table.optional("reach").and_then(|entry| {
         let expected = format!("a radius from 0 to {MAX_REACH} metres");

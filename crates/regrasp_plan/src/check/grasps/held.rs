@@ -11,6 +11,9 @@ use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 /// How far a margin may be above the one found here: two solvers, one number.
 const CLAIMED_MARGIN_TOLERANCE: f64 = 1e-6;
 
+/// How far a joint may be from where the joints that it follows put it: rounding.
+const TIE_TOLERANCE: f64 = 1e-9;
+
 /// Contacts of all grasps on the surface, away from edges; fingertips that touch with their pads.
 pub(super) fn check_contacts(judged: &Judged, log: &mut Log) {
     let object = judged.scene.manipulation().object();
@@ -22,6 +25,7 @@ pub(super) fn check_contacts(judged: &Judged, log: &mut Log) {
 pub(super) fn check_grasp(judged: &Judged, index: usize, log: &mut Log, measured: &mut Measured) {
     let at = Moment::at(0, index);
     check_limits(judged, index, at, log);
+    check_ties(judged, index, at, log);
     check_tips(judged, index, at, log, measured);
     check_margin(judged, index, at, log, measured);
     check_forces(judged, index, at, log);
@@ -38,6 +42,33 @@ fn check_limits(judged: &Judged, index: usize, at: Moment, log: &mut Log) {
                 let message = format!("joint \"{}\" {what} is {beyond:.3e} beyond its limits", row.name);
                 let violation = Violation::new(Kind::JointLimit, message).when(at);
                 log.push(violation.subjects([row.name.as_str()]).amount(beyond, tolerance));
+            }
+        }
+    }
+}
+
+/// Joints that follow those of other fingers stand where their couplings say, and so they do on every straight line in between.
+fn check_ties(judged: &Judged, index: usize, at: Moment, log: &mut Log) {
+    let grasp = &judged.list.grasps[index];
+    let task = judged.scene.manipulation();
+    let hand = task.hand();
+    let name = |joint: regrasp_robot::JointId| hand.robot.joints[joint.0].name.as_str();
+    for (what, joints) in [("in the grasp", &grasp.joints), ("in the open hand", &grasp.open_joints)] {
+        let position = |joint| {
+            let place = judged.model.joint_names.iter().position(|known| known == name(joint));
+            place.map_or(f64::NAN, |place| joints[place])
+        };
+        for tie in &hand.ties {
+            let mut wanted = tie.coupling.offset;
+            for (leader, factor) in &tie.coupling.terms {
+                wanted += factor * position(*leader);
+            }
+            let off = (position(tie.follower) - wanted).abs();
+            if !(off <= TIE_TOLERANCE) {
+                let follower = name(tie.follower);
+                let message = format!("joint \"{follower}\" {what} is {off:.3e} off the joints that it follows");
+                let violation = Violation::new(Kind::JointLimit, message).when(at).subjects([follower]);
+                log.push(violation.amount(off, TIE_TOLERANCE));
             }
         }
     }

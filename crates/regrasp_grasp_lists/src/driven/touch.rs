@@ -1,0 +1,198 @@
+//! Where a fingertip touches, and how far it is from touching.
+
+use crate::prepared::Prepared;
+use nalgebra::{Matrix2, Vector2};
+use regrasp_geometry::frame::tangents;
+use regrasp_geometry::surface::{Surface, SurfacePoint};
+use regrasp_geometry::{Point, Pose, UnitVector, Vector};
+use regrasp_grasp::Contact;
+use regrasp_robot::kinematics::finger_ik::Coordinates;
+use regrasp_robot::tip::CurvedTip;
+
+/// Gaps below this touch, in metres.
+const TOUCHES: f64 = 1e-8;
+/// Turns of the normal below this are none.
+const SAME_NORMAL: f64 = 1e-11;
+/// Most steps to the point of a fingertip that faces the surface. By hand: most take three.
+const MOST_STEPS: usize = 16;
+/// Tips farther than this from the surface are not looked at closely, in metres.
+const LOOK_CLOSELY: f64 = 0.004;
+/// Turn of the normal by which slopes are measured, in radians.
+const TURN: f64 = 1e-7;
+/// Largest turn of a step, in radians.
+const LARGEST_TURN: f64 = 0.5;
+/// Shortest step, as a share of Newton's.
+const LEAST_SHARE: f64 = 0.02;
+/// A contact is settled when a ball that rests there touches within this distance, in metres.
+const SETTLED: f64 = 1e-6;
+
+/// The point of a fingertip that is nearest to the surface.
+#[derive(Debug, Clone, Copy)]
+pub struct Gap {
+    /// Distance from the surface; negative inside.
+    pub distance: f64,
+    /// The nearest point of the surface.
+    at: SurfacePoint,
+    /// The surface's outward normal there: on an edge one of those between its faces.
+    normal: Vector,
+    /// True unless only a lower bound of the distance is known.
+    is_exact: bool,
+}
+
+/// How far the tip of `finger` is from the object.
+pub fn gap(prepared: &Prepared, finger: usize, hand_from_object: &Pose, joints: &[f64]) -> Gap {
+    let model = &prepared.model.fingers[finger];
+    let surface = &prepared.model.view.object.surface;
+    let center = hand_from_object.inverse_transform_point(&model.ik.tip(joints));
+    let (at, distance) = surface.project_signed(&center);
+    let normal = at.normal_in_object.into_inner();
+    let rough = Gap { distance: distance - model.tip_radius, at, normal, is_exact: model.curved.is_none() };
+    match model.curved {
+        Some(tip) if rough.distance < LOOK_CLOSELY => {
+            let arm = |normal: &Vector| {
+                hand_from_object.inverse_transform_vector(&model.arm_with(joints, &(hand_from_object * normal)))
+            };
+            let away = (center - at.point_in_object).try_normalize(1e-9).unwrap_or(normal) * distance.signum();
+            nearest(surface, &center, arm, least_radius(&tip), away).unwrap_or(rough)
+        }
+        _ => rough,
+    }
+}
+
+/// A ball of this radius rolls on the inside of the whole tip.
+fn least_radius(tip: &CurvedTip) -> f64 {
+    match tip {
+        CurvedTip::Ellipsoid(ellipsoid) => 0.9 * ellipsoid.radii.min().powi(2) / ellipsoid.radii.max(),
+        CurvedTip::Smooth(surface) => 0.8 * surface.rounding(),
+    }
+}
+
+/// The nearest points of a tip and the surface, by Newton's method on the normal: with a ball of radius `inner` rolled off the tip, the
+/// direction from the surface to what is left of it is the surface's normal, on edges and corners too.
+fn nearest(
+    surface: &Surface,
+    center: &Point,
+    arm: impl Fn(&Vector) -> Vector,
+    inner: f64,
+    start: Vector,
+) -> Option<Gap> {
+    let look = |normal: &Vector| {
+        let point = center + arm(normal) + normal * inner;
+        let (at, distance) = surface.project_signed(&point);
+        let away = (point - at.point_in_object).try_normalize(1e-12).map(|away| away * distance.signum());
+        let seen = away.unwrap_or_else(|| at.normal_in_object.into_inner());
+        (Gap { distance: distance - inner, at, normal: seen, is_exact: true }, seen - normal)
+    };
+    let mut normal = start;
+    let (mut gap, mut error) = look(&normal);
+    for _ in 0..MOST_STEPS {
+        if error.norm() < SAME_NORMAL {
+            return Some(gap);
+        }
+        let (x, y) = tangents(&UnitVector::new_unchecked(normal));
+        let turned = |along: &Vector, by: f64| (normal + along * by).normalize();
+        let slope = |along: &Vector| (look(&turned(along, TURN)).1 - error) / TURN;
+        let (dx, dy) = (slope(&x), slope(&y));
+        let across = |v: &Vector| Vector2::new(v.dot(&x), v.dot(&y));
+        let newton = Matrix2::from_columns(&[across(&dx), across(&dy)])
+            .try_inverse()
+            .map(|inverse| -(inverse * across(&error)))
+            .filter(|step| step.norm() < LARGEST_TURN);
+        // Where Newton's method leads nowhere, the direction seen is a better normal often enough.
+        let step = newton.unwrap_or_else(|| across(&error) * 0.5);
+        let mut share = 1.0;
+        let next = loop {
+            let next = turned(&(x.into_inner() * step.x + y.into_inner() * step.y), share);
+            let seen = look(&next);
+            if seen.1.norm() < error.norm() || share < LEAST_SHARE {
+                break (next, seen);
+            }
+            share *= 0.5;
+        };
+        (normal, (gap, error)) = next;
+    }
+    None
+}
+
+/// The contact of a tip that touches, if it may touch there: away from creases, with its pad, and nowhere else.
+pub fn contact(
+    prepared: &Prepared,
+    finger: usize,
+    hand_from_object: &Pose,
+    joints: &[f64],
+    gap: &Gap,
+) -> Option<Contact> {
+    let (model, object) = (&prepared.model.fingers[finger], prepared.model.view.object);
+    let mut normal = UnitVector::new_normalize(gap.normal);
+    if model.curved.is_none() {
+        let settled = object.surface.settle(&gap.at, model.settle_radius)?;
+        normal = settled.normal_in_object;
+        if (settled.point_in_object - gap.at.point_in_object).norm() > SETTLED {
+            return None;
+        }
+    }
+    let may = gap.is_exact
+        && object.surface.crease_distance(&gap.at) >= object.edge_distance
+        && model.pad_faces(joints, &(hand_from_object * normal.into_inner()));
+    may.then_some(Contact { point_in_object: gap.at.point_in_object, normal_in_object: normal })
+}
+
+/// How far beyond the grasp a finger closes on its line, as a share of the line: fingers of other tools press in, or stop before.
+const BEYOND: f64 = 0.3;
+/// Largest way beyond the grasp, in radians or metres.
+const FARTHEST_BEYOND: f64 = 0.15;
+/// Shortest step of a fingertip that is still away, in metres.
+const LEAST_STEP: f64 = 1e-4;
+/// Most steps of a finger.
+const MOST_STEPS_OF_FINGER: usize = 4_000;
+
+/// The contact that a finger makes on the straight line in joint space from `open` to `closed` and a little beyond, with its joints there.
+pub fn touch_on_way(
+    prepared: &Prepared,
+    finger: usize,
+    hand_from_object: &Pose,
+    open: &Coordinates,
+    closed: &Coordinates,
+) -> Option<(Contact, Coordinates)> {
+    let model = &prepared.model.fingers[finger];
+    let chain = model.ik.chain();
+    let largest = open.iter().zip(closed).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
+    let end = 1.0 + BEYOND.min(FARTHEST_BEYOND / largest.max(1e-9));
+    let change: Coordinates = open.iter().zip(closed).map(|(a, b)| b - a).collect();
+    let turn: f64 = change.iter().map(|x| x.abs()).sum();
+    let speed =
+        model.tip_bound.first_order(&change) + if model.curved.is_some() { model.tip_radius * turn } else { 0.0 };
+    let at = |share: f64| -> Coordinates {
+        let position = |k: usize| (open[k] + change[k] * share).clamp(chain.lower[k], chain.upper[k]);
+        // At the grasp itself the joints are those that are given, to the last bit.
+        if share == 1.0 { closed.clone() } else { (0..change.len()).map(position).collect() }
+    };
+    let gap_at = |share: f64| gap(prepared, finger, hand_from_object, &at(share));
+    let touching = |share: f64, gap: &Gap| {
+        let joints = at(share);
+        contact(prepared, finger, hand_from_object, &joints, gap).map(|contact| (contact, joints))
+    };
+    let at_grasp = gap_at(1.0);
+    if at_grasp.distance.abs() <= TOUCHES {
+        return touching(1.0, &at_grasp);
+    }
+    let (mut before, mut share, mut known) = (0.0, 0.0, gap_at(0.0));
+    for _ in 0..MOST_STEPS_OF_FINGER {
+        if known.distance <= 0.0 || share >= end {
+            break;
+        }
+        before = share;
+        share = (share + known.distance.max(LEAST_STEP) / speed.max(1e-9)).min(end);
+        known = gap_at(share);
+    }
+    if known.distance > 0.0 || share == 0.0 {
+        return None;
+    }
+    let (mut outside, mut inside) = (before, share);
+    for _ in 0..60 {
+        let middle = 0.5 * (outside + inside);
+        if gap_at(middle).distance <= 0.0 { inside = middle } else { outside = middle }
+    }
+    let gap = gap_at(outside);
+    if gap.distance.abs() <= TOUCHES { touching(outside, &gap) } else { None }
+}
