@@ -17,8 +17,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let session = Session::open(&loaded, None, settings.clone())?;
     let budget = Budget::work(1_000_000);
     let query = loaded.task().query(0);
-    let mut plan =
-        plan_in_hand(session.view(), query.as_in_hand().unwrap(), &settings, 0, &budget, &|_| {})?;
+    let mut plan = plan_in_hand(session.view(), query.as_in_hand().unwrap(), &settings, 0, &budget, &|_| {})?;
     for (number, goal) in [query.start(), query.goal(), query.start()].into_iter().enumerate() {
         let last = plan.segments.last().unwrap().waypoints.last().unwrap();
         // A camera and encoders would say this.
