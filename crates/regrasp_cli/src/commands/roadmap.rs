@@ -16,6 +16,7 @@ use regrasp::base::files;
 use regrasp::pictures::{roadmap_from_first, roadmap_story};
 use regrasp::plan::check::Level;
 use regrasp::planners::FailureKind;
+use regrasp::planners::in_hand::TransferMode;
 use regrasp::planners::in_hand::roadmap::{
     About, BuildSettings, BuildStage, Census, GraspRoadmap, QueryMemory, Region, RoadmapPlanner, build_roadmap,
 };
@@ -173,9 +174,10 @@ fn run_picture(arguments: &args::RoadmapPicture, common: &Common, talk: &Talk) -
         Err(failure) => return Err(Stop::NoPlan(Box::new(failure))),
     };
     say_plan(&answer.plan, started.elapsed().as_secs_f64(), talk);
-    // The graph's motions are geometry: their contacts stay where they are.
-    let judging =
-        args::Judging { level: Some(Level::Geometry.name().into()), gravity: None, hold: false, own_query: false };
+    // Motions whose contacts stay where they are are geometry.
+    let is_fixed = roadmap.about().settings.physics.transfer == TransferMode::Fixed;
+    let level = is_fixed.then(|| Level::Geometry.name().into());
+    let judging = args::Judging { level, gravity: None, hold: false, own_query: false };
     if !judge::judge(&loaded, &answer.plan, &judging, talk)?.accepted() {
         return Err(Stop::Rejected);
     }
