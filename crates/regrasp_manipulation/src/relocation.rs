@@ -2,6 +2,7 @@
 //! normal (Saut 2011, sec. 4.2.3).
 
 use crate::model::Model;
+use crate::passing::PassingOver;
 use crate::rolling::follow::ik_settings;
 use crate::workspace::{TipMode, Workspace};
 use regrasp_base::Rng;
@@ -47,24 +48,6 @@ pub fn hover(
     let tip = model.fingers[finger].center_touching(world_from_object, contact, joints);
     let settings = free_ik_settings(model, finger, UnitVector::new_unchecked(normal));
     model.fingers[finger].ik.solve_near(&(tip + normal * height), joints, &settings)
-}
-
-/// How a finger passes from above one contact to above another.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PassingOver {
-    /// Over the surface, else straight in the joints, else by RRT-Connect.
-    SurfaceFirst,
-    /// By RRT-Connect alone (Saut 2011, sec. 4.2.3).
-    RrtOnly,
-}
-
-/// Runs of RRT-Connect.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct RrtRuns {
-    /// All of them.
-    pub all: u64,
-    /// Those that found nothing: more iterations might.
-    pub failed: u64,
 }
 
 /// Height that counts as having left, in metres.

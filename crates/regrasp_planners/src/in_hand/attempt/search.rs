@@ -12,8 +12,8 @@ use regrasp_manipulation::failure::FailureKind;
 use regrasp_manipulation::grasp::state::GraspState;
 use regrasp_manipulation::model::Model;
 use regrasp_manipulation::outline::Outline;
+use regrasp_manipulation::passing::PassingOver;
 use regrasp_manipulation::progress::Progress;
-use regrasp_manipulation::relocation::PassingOver;
 use regrasp_manipulation::workspace::Workspace;
 use std::sync::atomic::{AtomicUsize, Ordering};
 

@@ -8,17 +8,13 @@ use crate::in_hand::attempt::search::{Search, Stop};
 use crate::in_hand::regrasping::change::{Arrival, change_grasp, whole_transfer};
 use crate::in_hand::roadmap::anchor::{QueryEnd, grasp_given};
 use crate::in_hand::roadmap::graph::Passage;
-use crate::in_hand::roadmap::query::{ANCHORS, RoadmapPlanner};
+use crate::in_hand::roadmap::query::{ANCHORS, Barred, RoadmapPlanner};
 use regrasp_base::Rng;
 use regrasp_manipulation::grasp::sequence::Sequence;
 use regrasp_roadmap::AStar;
-use std::collections::BTreeSet;
 
 /// Edges and links that may fail before a query is begun from another anchor. By hand.
 const MOST_BARRED: usize = 80;
-
-/// Pairs of nodes between which nothing came off in this query, the smaller first.
-pub type Barred = BTreeSet<(usize, usize)>;
 
 impl RoadmapPlanner<'_> {
     /// Motions from the end of `way`, which is at the grasp of the first node of `path`, to the goal. None when too much does not

@@ -9,7 +9,6 @@ use crate::in_hand::regrasping::change::{Arrival, transfer_regrasp, whole_transf
 use crate::in_hand::roadmap::GraspRoadmap;
 use crate::in_hand::roadmap::anchor::{Link, LinkKind, QueryEnd};
 use crate::in_hand::roadmap::build::{legs_of, with_fixed_contacts};
-use crate::in_hand::roadmap::carry::Barred;
 use crate::in_hand::roadmap::index::Index;
 use crate::in_hand::roadmap::landmarks::{Bounds, Landmarks};
 use crate::in_hand::roadmap::region::nearest_places;
@@ -32,8 +31,12 @@ use regrasp_plan::Plan;
 use regrasp_plan::plan::Statistics;
 use regrasp_roadmap::AStar;
 use regrasp_scene::{GraspRequest, HandView, InHandQuery};
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::atomic::AtomicUsize;
+
+/// Pairs of nodes between which nothing came off in this query, the smaller first.
+pub type Barred = BTreeSet<(usize, usize)>;
 
 /// Places nearest to each end whose grasps are tried: few at first, more where these lead nowhere.
 const RINGS: [usize; 4] = [0, 1, 4, 24];
