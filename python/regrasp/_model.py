@@ -269,15 +269,17 @@ class Support:
 
 @dataclass(frozen=True)
 class Task:
-    """What is asked of one hand and one object of a scene."""
+    """What is asked of one hand and one object of a scene, or of a whole robot."""
 
     name: str
     """Empty in scenes of one task."""
-    kind: Literal["in_hand", "tracking"]
+    kind: Literal["in_hand", "tracking", "motion"]
     hand: str
-    """Name of the hand in the scene."""
+    """Name of the hand in the scene; empty in tasks of kind "motion"."""
     object: str
-    """Name of the object."""
+    """Name of the object; empty in tasks of kind "motion"."""
+    robot: str | None = None
+    """Name of the robot, in tasks of kind "motion"."""
 
 
 @dataclass(frozen=True)

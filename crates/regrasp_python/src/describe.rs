@@ -34,8 +34,9 @@ fn task(scene: &Scene, task: &Task) -> Value {
     json!({
         "name": task.name,
         "kind": task.kind_name(),
-        "hand": scene.hands[task.hand].name,
-        "object": scene.objects[task.object].name,
+        "hand": if task.motion.is_none() { scene.hands[task.hand].name.as_str() } else { "" },
+        "object": if task.motion.is_none() { scene.objects[task.object].name.as_str() } else { "" },
+        "robot": task.motion.as_ref().map(|motion| scene.robots[motion.robot].name.as_str()),
     })
 }
 
