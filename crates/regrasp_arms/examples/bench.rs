@@ -13,6 +13,7 @@ use regrasp_arms::{ArmModel, Stage, plan_in_stages};
 use regrasp_base::{Budget, Rng};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Pose, Shape, Vector};
+use regrasp_plan::check::{CheckSettings, check_robot};
 use regrasp_robot::manipulator::layout::Part;
 use regrasp_robot::{LoadOptions, load_manipulator};
 use regrasp_scene::load_scene;
@@ -27,6 +28,7 @@ struct Row {
     /// Seconds of: preparation, search, simplification, certification, times.
     stages: [f64; 5],
     is_solved: bool,
+    is_accepted: bool,
     length: f64,
     duration: f64,
 }
@@ -55,7 +57,8 @@ fn main() {
     }
     let settings = serde_json::from_str(&settings).expect("settings of motions");
     let mut rows = Vec::new();
-    let mut table = String::from("scene,seed,solved,prepare_s,search_s,simplify_s,certify_s,times_s,length,duration\n");
+    let mut table =
+        String::from("scene,seed,solved,accepted,prepare_s,search_s,simplify_s,certify_s,times_s,length,duration\n");
     for path in &scenes {
         let loaded = load_scene(path, &options).unwrap_or_else(|error| panic!("{error}"));
         for seed in 0..seeds {
@@ -73,6 +76,11 @@ fn main() {
             match plan_in_stages(world, query, &settings, seed, &budget, &mut watch) {
                 Ok(plan) => {
                     row.is_solved = true;
+                    let report = check_robot(world, Some(query), &plan, &CheckSettings::default());
+                    row.is_accepted = report.accepted();
+                    if let Some(violation) = report.violations.first() {
+                        println!("{} seed {seed}: {violation:?}", path.display());
+                    }
                     row.duration = plan.duration();
                     let joints: Vec<&Vec<f64>> = plan.waypoints().map(|waypoint| &waypoint.joints).collect();
                     row.length = joints.windows(2).map(|pair| regrasp_arms::search::distance(pair[0], pair[1])).sum();
@@ -81,7 +89,10 @@ fn main() {
             }
             let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
             let times = row.stages.map(|seconds| format!("{seconds:.9}")).join(",");
-            table += &format!("{name},{seed},{},{times},{:.6},{:.6}\n", row.is_solved, row.length, row.duration);
+            table += &format!(
+                "{name},{seed},{},{},{times},{:.6},{:.6}\n",
+                row.is_solved, row.is_accepted, row.length, row.duration
+            );
             rows.push(row);
         }
     }
@@ -89,7 +100,8 @@ fn main() {
         std::fs::write(csv, table).expect("the table is written");
     }
     let solved: Vec<&Row> = rows.iter().filter(|row| row.is_solved).collect();
-    println!("solved {} of {}", solved.len(), rows.len());
+    let n_accepted = solved.iter().filter(|row| row.is_accepted).count();
+    println!("solved {} of {}, {n_accepted} accepted by the checker", solved.len(), rows.len());
     let line = |name: &str, scale: f64, value: &dyn Fn(&Row) -> f64| {
         let mut values: Vec<f64> = solved.iter().map(|row| scale * value(row)).collect();
         values.sort_by(f64::total_cmp);

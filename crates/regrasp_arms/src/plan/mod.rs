@@ -49,6 +49,9 @@ pub fn plan_motion(
     plan_in_stages((scene, state), query, settings, seed, budget, &mut |_| {})
 }
 
+/// Most samples of a search among a part of the joints.
+const FEW_SAMPLES: u64 = 20_000;
+
 /// As [`plan_motion`]; `watch` is told after each stage.
 ///
 /// Errors: as [`plan_motion`].
@@ -65,8 +68,12 @@ pub fn plan_in_stages(
     problem.refuse_start(settings)?;
     let goals = problem.goals(seed)?;
     let mut last = None;
-    for free in problem.groups(&goals) {
-        let model = problem.model(&free);
+    let groups = problem.groups(&goals);
+    for (index, free) in groups.iter().enumerate() {
+        let model = problem.model(free);
+        // A few joints may not be able to do it at all: the search among all of them gets the samples.
+        let few = if index + 1 < groups.len() { FEW_SAMPLES } else { u64::MAX };
+        let settings = &MotionSettings { max_samples: settings.max_samples.min(few), ..settings.clone() };
         let found = path::find(&problem, &model, &goals, settings, (seed, budget), watch)
             .and_then(|path| execute(&problem, &model, path, settings));
         match found {

@@ -44,7 +44,7 @@ pub fn find(
     }
     watch(Stage::Prepared);
     let mut search = Search { model, start, goals: free_goals, settings, statistics: RobotStatistics::default() };
-    let mut interrupt = None;
+    let (mut interrupt, mut is_hopeless) = (None, false);
     // With room to certify, then without, then with certified motions only.
     let certified = settings.validation == Validation::Certified;
     for (round, margin) in [settings.search_margin, 0.0].into_iter().enumerate() {
@@ -61,6 +61,7 @@ pub fn find(
         let outcome = search.sampled(&mut collider, &mut rng, budget);
         interrupt = outcome.interrupt.or(interrupt);
         watch(Stage::Searched);
+        is_hopeless = outcome.path.is_none();
         let Some(mut path) = outcome.path else { continue };
         let shortcuts = SimplifySettings { n_shortcuts: settings.shortcuts, ..SimplifySettings::default() };
         simplify(&mut path, &shortcuts, &mut rng, |a, b| collider.is_sampled_free(a, b));
@@ -75,7 +76,8 @@ pub fn find(
             return Ok(Found { path, statistics: search.statistics });
         }
     }
-    if certified && interrupt.is_none() {
+    // What samples do not find, certified motions do not either.
+    if certified && interrupt.is_none() && !is_hopeless {
         let mut rng = Rng::keyed(seed, "certified_motion", 0);
         let certified = search.certified_from_nothing(problem, &mut rng, budget);
         watch(Stage::Searched);

@@ -5,6 +5,7 @@ use regrasp_arms::plan_motion;
 use regrasp_base::Budget;
 use regrasp_manipulation::failure::FailureKind;
 use regrasp_manipulation::motion_settings::{MotionMethod, MotionSettings};
+use regrasp_plan::check::{CheckSettings, check_robot};
 use regrasp_scene::{LoadedScene, MotionQuery, load_scene};
 use std::path::PathBuf;
 
@@ -62,6 +63,11 @@ fn plans_go_from_start_to_goal_and_are_the_same_again() {
         assert_eq!(&waypoints[waypoints.len() - 1].joints, goal);
         assert!(waypoints.windows(2).all(|pair| pair[1].time > pair[0].time));
         assert_eq!(plan(3), found);
+        for seed in 0..5 {
+            let world = (&loaded.scene, &loaded.state);
+            let report = check_robot(world, Some(&query), &plan(seed), &CheckSettings::default());
+            assert!(report.accepted(), "{:?}", report.violations);
+        }
     }
 }
 
