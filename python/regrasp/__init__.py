@@ -33,9 +33,10 @@ from ._model import (
     load_scene,
 )
 from ._plan import CONTACT_MODES, Plan, Segment
-from ._planning import check, export_mjcf, place, plan, view
+from ._planning import check, export_mjcf, place, plan, plan_motion, view
 from ._regrasp import __version__
 from ._result import Cause, Clearance, Failure, Moment, NearestMiss, Progress, Report, Violation
+from ._robot_plan import RobotPlan
 from ._session import QueryTimes, Session, Start
 
 __all__ = [
@@ -65,6 +66,7 @@ __all__ = [
     "QueryTimes",
     "RegraspError",
     "Report",
+    "RobotPlan",
     "Scene",
     "Segment",
     "Session",
@@ -85,5 +87,6 @@ __all__ = [
     "load_scene",
     "place",
     "plan",
+    "plan_motion",
     "view",
 ]

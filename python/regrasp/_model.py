@@ -269,15 +269,17 @@ class Support:
 
 @dataclass(frozen=True)
 class Task:
-    """What is asked of one hand and one object of a scene, or of a robot in it."""
+    """What is asked of one hand and one object of a scene, or of a whole robot."""
 
     name: str
     """Empty in scenes of one task."""
     kind: Literal["in_hand", "tracking", "motion"]
     hand: str
-    """Name of the hand in the scene; empty for motions."""
+    """Name of the hand in the scene; empty in tasks of kind "motion"."""
     object: str
-    """Name of the object; empty for motions."""
+    """Name of the object; empty in tasks of kind "motion"."""
+    robot: str | None = None
+    """Name of the robot, in tasks of kind "motion"."""
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from ._arguments import StrPath, load_options, real, seconds, seed_of, whole
 from ._errors import argument_error
 from ._model import Scene, load_scene
 from ._plan import Plan
+from ._robot_plan import RobotPlan
 from ._result import Failure, Progress, Report, failure_of, report_of
 
 METHODS = ("gait", "visibility", "classic", "tracking", "tracking+gaiting")
@@ -44,7 +45,7 @@ def plan(
     """Plans how the hand takes the object from start to goal, and has the plan judged by the independent checker.
 
     Not to find a plan is a result, no exception: the answer is a `Plan`, which is true, or a `Failure`, which is false. A plan
-    that the checker rejects is a failure of kind "rejected".
+    that the checker rejects is a failure of kind "rejected". `plan_motion` plans tasks of kind "motion".
 
     scene: a scene, or a scene file.
     seed: the same scene, settings and seed give the same plan, byte by byte, on any number of threads.
@@ -92,6 +93,50 @@ def plan(
     made = Plan(found, report=report_of(json.loads(outcome)))
     made._source = scene
     return made
+
+
+def plan_motion(
+    scene: Scene | StrPath,
+    *,
+    seed: int = 0,
+    time_limit: float | None = None,
+    max_work: int = 20_000_000,
+    method: str | None = None,
+    settings: Mapping[str, Any] | None = None,
+    level: Level = "motion",
+    task: str | None = None,
+) -> RobotPlan | Failure:
+    """Plans the motion of a whole robot that a task of kind "motion" asks for, and has it judged by the independent checker.
+
+    The answer is a `RobotPlan`, which is true, or a `Failure`, which is false. A plan that the checker rejects is a failure of
+    kind "rejected".
+
+    scene, seed, time_limit, max_work, settings, level, task: as in `plan`.
+    method: "in_turn" or "single_query"; the settings' where nothing is said.
+
+    Raises `InputError` for a task of another kind (A510), and `InternalError` where regrasp has a bug.
+    """
+    if not isinstance(scene, Scene):
+        scene = load_scene(scene)
+    asked = next((one for one in scene.tasks if one.name == task), scene.tasks[0])
+    if asked.kind != "motion":
+        raise argument_error("plan_motion", "task", f'is of kind "{asked.kind}"', 'a task of kind "motion"')
+    request: dict[str, Any] = {
+        "seed": seed_of("plan_motion", seed),
+        "threads": 1,
+        "max_work": whole("plan_motion", "max_work", max_work, 0, 2**64 - 1),
+        "time_limit": seconds("plan_motion", "time_limit", time_limit),
+        "improve": None,
+        "method": method,
+        "margin": None,
+        "improve_work": None,
+        "settings": None if settings is None else _settings_text(settings),
+        "level": level,
+        "task": task,
+        "progress": None,
+    }
+    found, outcome = _regrasp.plan_motion(scene._native, request)
+    return failure_of(outcome) if found is None else RobotPlan(found, report=report_of(json.loads(outcome)))
 
 
 def place(

@@ -3,8 +3,10 @@
 use crate::row::Problem;
 use regrasp_base::Rng;
 use regrasp_mutations::mutants;
-use regrasp_plan::Plan;
-use regrasp_plan::check::{CheckSettings, check};
+use regrasp_mutations::robots::robot_mutants;
+use regrasp_plan::check::{CheckSettings, check, check_robot};
+use regrasp_plan::{Plan, RobotPlan};
+use regrasp_scene::LoadedScene;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -69,6 +71,42 @@ impl Campaign {
             }
             let scene = mutant.scene.as_ref().unwrap_or(problem.task.scene);
             let report = check((scene, problem.task.state), Some(problem.query), &mutant.plan, &settings);
+            count.made += 1;
+            count.rejected += u64::from(!report.accepted());
+            let fits = report.violations.iter().any(|violation| mutant.expected.contains(&violation.kind));
+            count.fitting += u64::from(fits);
+            if report.accepted() {
+                self.escaped.push(misjudged(mutant.name.to_owned()));
+            }
+        }
+    }
+
+    /// As [`Campaign::add`], of a plan of a whole robot for the first task of `loaded`.
+    pub fn add_robot(&mut self, loaded: &LoadedScene, plan: &RobotPlan, seed: u64, per_kind: u64) {
+        let Some(query) = &loaded.task().motion else { return };
+        let settings = CheckSettings::default();
+        let around = (&loaded.scene, &loaded.state);
+        let misjudged = |what: String| Misjudged { scene: loaded.scene.name.clone(), seed, what };
+        self.good += 1;
+        let report = check_robot(around, Some(query), plan, &settings);
+        if !report.accepted() {
+            let first = report.violations.first().map_or(String::new(), ToString::to_string);
+            self.false_alarms.push(misjudged(first));
+            return;
+        }
+        if !self.kinds.is_empty() && self.kinds.values().all(|count| count.made >= per_kind) {
+            return;
+        }
+        let mut rng = Rng::keyed(seed, "mutation campaign", 0);
+        for mutant in robot_mutants(plan, around, query, &mut rng) {
+            let count = self.kinds.entry(mutant.name).or_default();
+            if count.made >= per_kind {
+                continue;
+            }
+            let scene = mutant.scene.as_ref().unwrap_or(&loaded.scene);
+            let state = mutant.state.as_ref().unwrap_or(&loaded.state);
+            let asked = mutant.query.as_ref().unwrap_or(query);
+            let report = check_robot((scene, state), Some(asked), &mutant.plan, &settings);
             count.made += 1;
             count.rejected += u64::from(!report.accepted());
             let fits = report.violations.iter().any(|violation| mutant.expected.contains(&violation.kind));

@@ -19,6 +19,8 @@ pub mod model;
 pub mod motion_settings;
 /// What a graph of grasps looks like.
 pub mod outline;
+/// How a finger that relocates passes over the object.
+pub mod passing;
 /// What a running search tells its caller.
 pub mod progress;
 /// The plan as it is written to a file.

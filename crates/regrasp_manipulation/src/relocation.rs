@@ -2,6 +2,7 @@
 //! normal (Saut 2011, sec. 4.2.3).
 
 use crate::model::Model;
+use crate::passing::PassingOver;
 use crate::rolling::follow::ik_settings;
 use crate::workspace::{TipMode, Workspace};
 use regrasp_base::Rng;
@@ -87,9 +88,16 @@ pub fn relocate(
             Some(above) => (above, Some(to.joints.clone())),
             None => (to.joints.clone(), None),
         };
-        let mut over = pass_over(workspace, &placement, finger, &above_start, &above_goal, height, mode);
+        let mut over = match workspace.passing_over {
+            PassingOver::SurfaceFirst => {
+                pass_over(workspace, &placement, finger, &above_start, &above_goal, height, mode)
+            }
+            PassingOver::RrtOnly => None,
+        };
         if over.is_none() && std::mem::take(&mut may_go_around) {
             over = around(workspace, finger, &above_start, &above_goal, mode, rng);
+            workspace.rrt_runs.all += 1;
+            workspace.rrt_runs.failed += u64::from(over.is_none());
         }
         let Some(over) = over else { continue };
         let mut path = up;

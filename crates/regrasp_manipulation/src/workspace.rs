@@ -15,16 +15,19 @@ mod draws;
 mod nearby;
 /// How far tips may be from where they rest.
 mod reach;
+/// A fingertip in contact keeps to the surface.
+mod tip_clear;
 /// What is in the way of contacts.
 pub mod tried;
 
 use crate::forces::limits::Refusals;
 use crate::grasp::state::{Contacts, GraspState, HandJoints};
 use crate::model::{Carrier, Model, Pair};
+use crate::passing::{PassingOver, RrtRuns};
 use configuration::{Configuration, midway, place_finger, place_object};
 use draws::Draws;
 use nearby::Nearby;
-use regrasp_geometry::collision::{HalfSpace, Placed, Placement, Separation, gap_along, separation};
+use regrasp_geometry::collision::{Placed, Placement, Separation, gap_along, separation};
 use regrasp_geometry::{Pose, Vector, frame};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use tried::Tried;
@@ -97,6 +100,10 @@ pub struct Workspace<'a> {
     free: u32,
     /// Iterations of RRT-Connect that a relocation is worth just now.
     pub rrt_iterations: usize,
+    /// How a finger passes from above one contact to above another.
+    pub passing_over: PassingOver,
+    /// Runs of RRT-Connect so far, and those of them that found nothing.
+    pub rrt_runs: RrtRuns,
     /// Configurations looked at, and what draws of contacts cost beside.
     pub work: u64,
     /// What draws of contacts cost.
@@ -135,6 +142,8 @@ impl<'a> Workspace<'a> {
             contacts: Contacts::new(),
             free: 0,
             rrt_iterations: model.settings.rrt_iterations,
+            passing_over: PassingOver::SurfaceFirst,
+            rrt_runs: RrtRuns::default(),
             work: 0,
             draws: Draws::default(),
             tried: Tried::default(),
@@ -562,39 +571,5 @@ impl<'a> Workspace<'a> {
             return true;
         }
         false
-    }
-
-    /// Proves that a tip in contact presses into the object by no more than the allowance, along the contact normal.
-    fn tip_is_clear(&mut self, index: usize, finger: usize, normal_in_world: Option<Vector>) -> bool {
-        let pair = self.pairs[index];
-        let (tip, object) = (&self.model.bodies[pair.a], &self.model.bodies[pair.b]);
-        self.slack[index] = f64::NEG_INFINITY;
-        let allowed = self.model.settings.contact_allowance - self.deviation[pair.a] - self.deviation[pair.b];
-        for configuration in &[&self.now, &self.next][usize::from(self.stands)..] {
-            let (at_tip, at_object) = (&configuration.placements[pair.a], &configuration.placements[pair.b]);
-            let normal = normal_in_world.unwrap_or_else(|| at_object.vector(&self.contacts[finger].normal_in_object));
-            // The gap along the inward normal, from tip to object.
-            let inward = -normal;
-            let gap = gap_along(&inward, &tip.shape, at_tip, &object.shape, at_object, &mut self.hints[index]);
-            if gap >= -allowed {
-                continue;
-            }
-            let Some(tree) = &object.tree_for_tips else { return false };
-            let object_from_tip = at_object.inverse_then(at_tip);
-            let normal_in_object = at_object.vector_to_child(&normal);
-            let in_tip = object_from_tip.vector_to_child(&-normal_in_object);
-            let lowest = normal_in_object.dot(&object_from_tip.translation)
-                - regrasp_geometry::collision::support::support_value(&tip.shape, &in_tip, &mut self.hints[index][0]);
-            let below = HalfSpace { normal: normal_in_object, level: lowest + allowed };
-            let bounds = (&tip.center, tip.radius);
-            let is_apart = tree.meets_only_below(&tip.shape, bounds, &object_from_tip, &below);
-            // What it may press into lies below; where it is thicker than that, it must not be inside with all of the rest.
-            let middle = object_from_tip.point(&tip.middle);
-            let is_thick = normal_in_object.dot(&middle.coords) - lowest > allowed;
-            if !is_apart || self.stands && is_thick && tree.holds(&middle) {
-                return false;
-            }
-        }
-        true
     }
 }

@@ -9,8 +9,10 @@ use regrasp_robot::manipulator::layout::Coordinate;
 use regrasp_scene::motion::MOTION;
 use regrasp_scene::{CarriedObject, Holder, MotionQuery, Scene};
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::de::{Error, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
+use std::fmt;
 
 /// Kind of a segment of a [`RobotPlan`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -100,7 +102,7 @@ pub struct RobotSegment {
     /// Its kind.
     pub kind: RobotSegmentKind,
     /// For every object of `objects`, who holds it: names of hands and supports.
-    #[serde(deserialize_with = "crate::format::holders_each_once")]
+    #[serde(deserialize_with = "holders_each_once")]
     pub held_by: BTreeMap<String, Vec<String>>,
     /// At least two; the first is the last of the segment before, but for its time.
     pub waypoints: Vec<RobotWaypoint>,
@@ -283,4 +285,28 @@ impl RobotWaypoint {
         };
         std::iter::once(self.time).chain(joints).chain(poses).chain(self.contacts.iter().flat_map(of_contact))
     }
+}
+
+/// Reads holders. An object named twice is an error: readers would differ in what they take.
+fn holders_each_once<'de, D: Deserializer<'de>>(deserializer: D) -> Result<BTreeMap<String, Vec<String>>, D::Error> {
+    struct Entries;
+    impl<'de> Visitor<'de> for Entries {
+        type Value = BTreeMap<String, Vec<String>>;
+
+        fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+            f.write_str("names of objects, each with a list of those that hold it")
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
+            let mut found = BTreeMap::new();
+            while let Some((object, holders)) = map.next_entry::<String, Vec<String>>()? {
+                if found.contains_key(&object) {
+                    return Err(A::Error::custom(format!("duplicate field `{object}`")));
+                }
+                found.insert(object, holders);
+            }
+            Ok(found)
+        }
+    }
+    deserializer.deserialize_map(Entries)
 }

@@ -19,6 +19,8 @@ mod model;
 mod place;
 /// Plans.
 mod plan;
+/// Plans of whole robots.
+mod robot_plan;
 /// Searching and judging.
 mod search;
 /// Sessions.
@@ -45,7 +47,9 @@ mod _regrasp {
     #[pymodule_export]
     use super::plan::Plan;
     #[pymodule_export]
-    use super::search::{check, find_scene, plan};
+    use super::robot_plan::RobotPlan;
+    #[pymodule_export]
+    use super::search::{check, find_scene, plan, plan_motion};
     #[pymodule_export]
     use super::session::{Session, Start};
     #[pymodule_export]

@@ -4,14 +4,15 @@ use crate::error;
 use crate::guard::guarded;
 use crate::model::Scene;
 use crate::plan::Plan;
+use crate::robot_plan::RobotPlan;
 use crate::watch::watched;
 use pyo3::prelude::*;
 use regrasp::base::{Diagnostic, Place};
-use regrasp::plan::check::{CheckSettings, Level, OwnQuery, Report, query_of};
+use regrasp::plan::check::{CheckSettings, Level, OwnQuery, Report, check_robot, query_of};
 use regrasp::plan::format;
 use regrasp::scene::Task;
 use regrasp::settings::{Argument, Overrides, SettingsError, settings_for};
-use regrasp::{Budget, Failure, PlannerSettings};
+use regrasp::{AnyPlan, Budget, Failure, PlannerSettings};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -67,6 +68,48 @@ pub fn plan(py: Python<'_>, scene: &Scene, request: Request) -> PyResult<(Option
             return Ok((Some(Plan { plan }), self::report(&report)));
         }
         Ok((None, rejected(&plan, &report)))
+    })
+}
+
+/// Plans the motion that a task of `scene` asks for, and judges the plan: as [`plan`], for whole robots.
+#[pyfunction]
+pub fn plan_motion(py: Python<'_>, scene: &Scene, request: Request) -> PyResult<(Option<RobotPlan>, String)> {
+    guarded(py, || {
+        let task = scene.task(py, request.task.as_deref())?;
+        let level = level_named(&request.level).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
+        let settings = settings(task, &request).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
+        let query = task.query(request.seed);
+        let started = Instant::now();
+        let deadline = request.time_limit.map(|limit| started + Duration::from_secs_f64(limit));
+        let found = watched(py, request.progress.as_ref(), |cancelled, report| {
+            let budget = Budget { max_work: request.max_work, deadline, improve_for: None, cancelled };
+            let around = (&scene.loaded.scene, &scene.loaded.state);
+            regrasp::plan_any(around, &query, &settings, request.seed, &budget, report)
+        })?;
+        let plan = match found {
+            Ok(AnyPlan::Robot(plan)) => plan,
+            Ok(AnyPlan::InHand(_)) => {
+                let problem = bad("A507", "asks a hand to move an object".into()).element("argument", "task");
+                return Err(error::input(py, &problem.expected("a task of kind \"motion\"").into()));
+            }
+            Err(failure) => return Ok((None, failed(&failure))),
+        };
+        let judged = py.detach(|| {
+            let text = format::robot_to_json(&plan);
+            let plan = format::robot_from_json(Path::new("plan.json"), text.as_bytes())
+                .expect("a plan just made is a plan file");
+            let again = scene.read_again()?;
+            let query = again.task_for(&plan.query).query(plan.seed);
+            let settings = CheckSettings { level, ..CheckSettings::default() };
+            let report = check_robot((&again.scene, &again.state), query.as_motion(), &plan, &settings);
+            Ok((plan, report))
+        });
+        let (plan, report) = judged.map_err(|error: regrasp::InputError| error::input(py, &error))?;
+        if report.accepted() {
+            return Ok((Some(RobotPlan { plan }), self::report(&report)));
+        }
+        let text = format::robot_to_json(&plan);
+        Ok((None, rejected_text(json!(plan.statistics), text, &report)))
     })
 }
 
@@ -163,6 +206,11 @@ pub fn failed(failure: &Failure) -> String {
 
 /// A plan that the checker rejects is a failure, with what a report of the bug needs.
 pub fn rejected(plan: &regrasp::Plan, report: &Report) -> String {
+    rejected_text(json!(plan.statistics), format::to_json(plan), report)
+}
+
+/// As [`rejected`], of a plan of any kind with these statistics and this file.
+fn rejected_text(statistics: serde_json::Value, text: String, report: &Report) -> String {
     json!({
         "kind": "rejected",
         "message": format!("the checker rejects the plan that was found: {}", report.violations.first().map_or_else(String::new, ToString::to_string)),
@@ -170,9 +218,9 @@ pub fn rejected(plan: &regrasp::Plan, report: &Report) -> String {
         "causes": [],
         "leg": null,
         "nearest_miss": null,
-        "statistics": plan.statistics,
+        "statistics": statistics,
         "report": serde_json::from_str::<serde_json::Value>(&self::report(report)).unwrap_or_default(),
-        "rejected_plan": format::to_json(plan),
+        "rejected_plan": text,
     })
     .to_string()
 }

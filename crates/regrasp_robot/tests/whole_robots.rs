@@ -61,9 +61,9 @@ fn row(name: &str, base: &str, mount: &str, joints: usize) -> (String, String, S
 fn shared_robots_are_understood_and_their_files_load() {
     let Some(models) = shared_models() else { return };
     let robots = models.join("robots");
-    let iiwa = |side: &str| row(side, &format!("{side}_iiwa_link_0"), &format!("{side}_iiwa_link_ee"), 7);
+    let iiwa = |side: &str| row(side, &format!("{side}_iiwa_link_0"), &format!("{side}_iiwa_link_7"), 7);
     for (urdf, srdf, expected, common, held) in [
-        ("panda/panda_spherized.urdf", None, vec![row("arm", "panda_link0", "panda_link7", 7)], vec![], None),
+        ("panda/panda_spherized.urdf", None, vec![row("arm", "panda_link0", "panda_hand", 7)], vec![], None),
         (
             "panda/panda_spherized.urdf",
             Some("panda/panda.srdf"),
@@ -84,7 +84,10 @@ fn shared_robots_are_understood_and_their_files_load() {
         (
             "baxter/baxter_spherized.urdf",
             Some("baxter/baxter.srdf"),
-            vec![row("left_arm", "left_arm_mount", "left_gripper", 7), row("right_arm", "right_arm_mount", "right_gripper", 7)],
+            vec![
+                row("left_arm", "left_arm_mount", "left_gripper", 7),
+                row("right_arm", "right_arm_mount", "right_gripper", 7),
+            ],
             vec![],
             None,
         ),
@@ -132,8 +135,7 @@ fn shared_robots_are_understood_and_their_files_load() {
 #[test]
 fn unknown_links_of_an_srdf_are_notes_where_lenient() {
     let Some(models) = shared_models() else { return };
-    let (urdf, srdf) =
-        (models.join("robots/baxter/baxter_spherized.urdf"), models.join("robots/baxter/baxter.srdf"));
+    let (urdf, srdf) = (models.join("robots/baxter/baxter_spherized.urdf"), models.join("robots/baxter/baxter.srdf"));
     let robot = Arc::new(load_robot(&urdf, &options(&models, false)).unwrap().robot);
     let settings = InspectSettings { n_postures: 1 };
     let strict =
@@ -159,8 +161,8 @@ fn the_bundled_body_has_two_arms_and_a_common_torso() {
         let path = repository().join(other);
         let robot = Arc::new(load_robot(&path, &LoadOptions::default()).unwrap().robot);
         let settings = InspectSettings { n_postures: 1 };
-        let whole =
-            inspect_whole(robot, (&path, None), &LoadOptions::default(), &settings, &mut Rng::keyed(1, "i", 0)).unwrap();
+        let whole = inspect_whole(robot, (&path, None), &LoadOptions::default(), &settings, &mut Rng::keyed(1, "i", 0))
+            .unwrap();
         assert!(whole.is_none(), "{other}");
     }
 }

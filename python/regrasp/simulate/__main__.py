@@ -8,7 +8,7 @@ import math
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .measure import Report
@@ -31,12 +31,15 @@ def main(arguments: list[str] | None = None) -> int:
         from . import _mujoco  # noqa: F401  # pyright: ignore[reportUnusedImport]
     except ImportError as error:
         return _bad_input(f"MuJoCo is not there ({error}); pip install 'regrasp[sim]'")
-    from .files import load
+    from .files import load, load_robot
     from .model import Settings
     from .reference import PlanError
     from .run import simulate
 
     try:
+        moved = load_robot(options.plan, scene=options.scene, packages=dict(options.package), mjcf=options.mjcf)
+        if moved is not None:
+            return _replay_robot(*moved, options)
         settings = Settings(
             controller=options.controller,
             gravity=options.gravity,
@@ -77,6 +80,18 @@ def _is_list(path: str) -> bool:
             return '"regrasp-grasps"' in file.read(200)
     except (OSError, ValueError):
         return False
+
+
+def _replay_robot(plan: dict[str, Any], xml: str, options: argparse.Namespace) -> int:
+    """Replays a motion of a whole robot."""
+    from .robot import replay
+
+    report = replay(plan, xml, speed=options.speed)
+    text = json.dumps(report.to_json(), indent=1)
+    if options.output:
+        options.output.write_text(text + "\n")
+    print(text if options.json else report)
+    return 0 if report.followed else 1
 
 
 def summary(report: Report) -> str:

@@ -12,6 +12,35 @@ from .plans import flat
 from .reference import Plan, PlanError
 
 
+def load_robot(
+    path: StrPath,
+    *,
+    scene: StrPath | None = None,
+    packages: Mapping[str, StrPath] | None = None,
+    mjcf: StrPath | None = None,
+) -> tuple[dict[str, Any], str] | None:
+    """The plan of a whole robot in ``path`` and its MuJoCo model; none for plans of another kind.
+
+    Raises ``PlanError`` or ``OSError``.
+    """
+    try:
+        content: Any = json.loads(Path(path).read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise PlanError(f"{path}: not JSON ({error})") from None
+    if not (isinstance(content, dict) and content.get("task") == "motion"):
+        return None
+    if mjcf is not None:
+        return content, Path(mjcf).read_text(encoding="utf-8")
+    import regrasp
+
+    try:
+        plan = regrasp.RobotPlan.from_file(path)
+        found = scene if scene is None else regrasp.load_scene(scene, packages=packages)
+        return content, plan.to_mjcf(found)
+    except regrasp.RegraspError as error:
+        raise PlanError(str(error)) from None
+
+
 def load(
     path: StrPath,
     *,

@@ -8,6 +8,8 @@ mod execute;
 mod path;
 /// The robot and what stands around it.
 mod problem;
+/// The plan of a motion that was found.
+mod record;
 /// Goals that are poses of wrists.
 mod wrists;
 

@@ -6,7 +6,7 @@ use regrasp_geometry::Pose;
 use regrasp_manipulation::failure::{Failure, FailureKind};
 use regrasp_robot::kinematics::arm_ik::{ArmIk, IkBudget, Unreachable};
 use regrasp_robot::manipulator::layout::Part;
-use regrasp_scene::WristGoal;
+use regrasp_scene::{MotionGoal, WristGoal};
 
 /// States that are looked for, at most.
 const GOALS: usize = 32;
@@ -15,10 +15,20 @@ const DRAWS: u64 = 200;
 /// Postures of one arm for one value of the common joints.
 const POSTURES: usize = 8;
 
+impl Problem<'_> {
+    /// States that answer the query.
+    pub fn goals(&self, seed: u64) -> Result<Vec<Vec<f64>>, Failure> {
+        match &self.query.goal {
+            MotionGoal::Joints(joints) => Ok(vec![joints.clone()]),
+            MotionGoal::Wrists(wrists) => states(self, wrists, seed),
+        }
+    }
+}
+
 /// States in which the mount links have the poses asked for: with the common joints of the start first, then with drawn ones.
 ///
 /// Errors: an arm of fewer than six joints, poses out of reach.
-pub fn states(problem: &Problem, wrists: &[WristGoal], seed: u64) -> Result<Vec<Vec<f64>>, Failure> {
+fn states(problem: &Problem, wrists: &[WristGoal], seed: u64) -> Result<Vec<Vec<f64>>, Failure> {
     let robot = problem.robot;
     let prepared: Result<Vec<ArmIk>, _> = wrists.iter().map(|wrist| ArmIk::new(robot, wrist.arm)).collect();
     let prepared = prepared.map_err(|few| {

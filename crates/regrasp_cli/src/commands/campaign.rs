@@ -6,7 +6,7 @@ use crate::load;
 use crate::stop::Stop;
 use crate::talk::Talk;
 use regrasp::scene::LoadedScene;
-use regrasp::{Budget, plan_in_hand};
+use regrasp::{AnyPlan, Budget, PlannerSettings, plan_any};
 use regrasp_bench::Problem;
 use regrasp_bench::determinism::compare;
 use regrasp_bench::mutations::Campaign;
@@ -25,7 +25,9 @@ pub fn run(arguments: &args::Campaign, common: &Common, talk: &Talk) -> Result<(
             determinism(&loaded, *queries, threads, search, &cancelled, talk)
         }
         CampaignKind::Mutations { scenes, mutants, good, search } => {
-            let loaded = load_all(scenes, common, talk)?;
+            let files = load::scene_files(scenes)?;
+            let read = |path: &PathBuf| load::scene_with_mutants(path, common, talk);
+            let loaded = files.iter().map(read).collect::<Result<Vec<_>, Stop>>()?;
             mutations(&loaded, *mutants, *good, search, &cancelled, talk)
         }
     }
@@ -111,9 +113,12 @@ fn mutations(
             improve_for: search.improve,
             cancelled: Arc::clone(cancelled),
         };
-        let asked = query.as_in_hand().expect("scenes of other tasks were refused");
-        match plan_in_hand(&loaded.view(), asked, &settings, seed, &budget, &|_| {}) {
-            Ok(plan) => campaign.add(Problem { task: loaded.manipulation(), query: &query, seed }, &plan, mutants),
+        let settings = PlannerSettings { in_hand: settings.clone(), ..PlannerSettings::default() };
+        match plan_any((&loaded.scene, &loaded.state), &query, &settings, seed, &budget, &|_| {}) {
+            Ok(AnyPlan::Robot(plan)) => campaign.add_robot(loaded, &plan, seed, mutants),
+            Ok(AnyPlan::InHand(plan)) => {
+                campaign.add(Problem { task: loaded.manipulation(), query: &query, seed }, &plan, mutants);
+            }
             Err(_) => unsolved += 1,
         }
         if cancelled.load(Ordering::Relaxed) {

@@ -1,6 +1,6 @@
 //! `regrasp inspect` of a robot with arms: its parts, links that touch, and a robot file with hand files beside it.
 
-use super::inspect::{pairs_part, robot_part};
+use super::inspect_parts::{pairs_part, robot_part};
 use crate::args::{self, Common};
 use crate::outputs::{refuse_input, refuse_unwritable};
 use crate::stop::Stop;

@@ -2,7 +2,7 @@
 
 use crate::args::{self, Common};
 use crate::commands::check::grasp_scene;
-use crate::commands::plan::available_threads;
+use crate::commands::written::available_threads;
 use crate::load;
 use crate::outputs::{Output, Outputs};
 use crate::stop::Stop;

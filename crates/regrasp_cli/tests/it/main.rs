@@ -7,6 +7,7 @@ mod folder;
 mod grasps;
 mod growth;
 #[cfg(unix)]
+mod motion;
 mod outputs;
 mod pictures;
 mod place;

@@ -2,7 +2,10 @@
 
 mod grasps;
 mod mjcf;
+#[path = "../../../../tests/support/moving_robot.rs"]
+mod moving_robot;
 mod npz;
+mod robots;
 mod ros2;
 mod sample;
 mod several;

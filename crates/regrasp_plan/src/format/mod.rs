@@ -10,7 +10,6 @@ mod typescript;
 /// What a plan file may not say.
 mod validate;
 
-pub(crate) use robot::holders_each_once;
 pub use robot::{AnyPlan, is_robot_plan, read_any, robot_from_json, robot_schema, robot_to_json};
 
 use crate::plan::{FORMAT, FORMAT_VERSION, ONLY_HAND, Plan, Segment};

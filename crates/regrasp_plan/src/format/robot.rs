@@ -7,10 +7,7 @@ use regrasp_base::diagnostic::{Diagnostics, GOOD_NAME, fault_of_name, number};
 use regrasp_base::json_place::{PathStep, diagnostic};
 use regrasp_base::{Diagnostic, InputError, Place};
 use regrasp_scene::motion::MOTION;
-use serde::de::{Error, MapAccess, Visitor};
-use serde::{Deserialize, Deserializer};
-use std::collections::BTreeMap;
-use std::fmt;
+use serde::Deserialize;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -160,32 +157,6 @@ pub fn robot_schema() -> String {
     let mut text = serde_json::to_string_pretty(&schema).expect("a schema always serialises");
     text.push('\n');
     text
-}
-
-/// Reads holders. An object named twice is an error: readers would differ in what they take.
-pub(crate) fn holders_each_once<'de, D: Deserializer<'de>>(
-    deserializer: D,
-) -> Result<BTreeMap<String, Vec<String>>, D::Error> {
-    struct Entries;
-    impl<'de> Visitor<'de> for Entries {
-        type Value = BTreeMap<String, Vec<String>>;
-
-        fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-            f.write_str("names of objects, each with a list of those that hold it")
-        }
-
-        fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
-            let mut found = BTreeMap::new();
-            while let Some((object, holders)) = map.next_entry::<String, Vec<String>>()? {
-                if found.contains_key(&object) {
-                    return Err(A::Error::custom(format!("duplicate field `{object}`")));
-                }
-                found.insert(object, holders);
-            }
-            Ok(found)
-        }
-    }
-    deserializer.deserialize_map(Entries)
 }
 
 struct Reader<'a> {

@@ -171,7 +171,7 @@ pub fn robot_storyboard(
         shadows_within: Some((center, radius)),
         outline: (width as f64 / 330.0).max(0.8),
     };
-    let paths = wrist_paths(robot, plan, 0.006 * radius);
+    let paths = wrist_paths(robot, plan, 0.01 * radius);
     for (k, (frame, posture)) in frames.iter().zip(&postures).enumerate() {
         let picture = render(posture, &paths, &camera, width, height, &look);
         let (x, y) = (gap + (k % columns) * (width + gap), gap + (k / columns) * (height + caption + gap));

@@ -2,10 +2,14 @@
 
 mod charts;
 mod judged;
+#[allow(dead_code, reason = "not every test needs every robot")]
+#[path = "../../../../tests/support/moving_robot.rs"]
+mod moving_robot;
 mod page;
 #[path = "../../../../tests/support/places.rs"]
 mod places;
 mod render;
+mod robots;
 mod sample;
 mod scene;
 mod several;

@@ -52,6 +52,9 @@ pub struct RobotGuess {
 /// Guesses the parts of `robot`. Without arms where no six moving joints follow each other without a branch.
 pub fn guess_robot(robot: &Robot, srdf: Option<&Srdf>) -> RobotGuess {
     let mut arms: Vec<ArmGuess> = chains(robot).into_iter().filter_map(|chain| arm_of(robot, chain)).collect();
+    // What is below an arm is its hand, however many joints a finger has.
+    let all: BTreeSet<JointId> = arms.iter().flat_map(|arm| arm.joints.iter().copied()).collect();
+    arms.retain(|arm| !robot.joints_to(arm.base).iter().any(|joint| all.contains(joint)));
     if let Some(srdf) = srdf {
         arms.iter_mut().for_each(|arm| take_group(robot, srdf, arm));
     }

@@ -1,0 +1,102 @@
+"""Plans of whole robots: how their joints move, and what they carry."""
+
+# One package, in parts: what is private to it is not private to a part.
+# pyright: reportPrivateUsage=false, reportUnusedFunction=false
+
+from __future__ import annotations
+
+import json
+import os
+import warnings
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from . import _regrasp
+from ._arguments import StrPath
+from ._model import FloatArray, Scene, load_scene
+from ._result import Report, report_of
+
+
+class RobotPlan:
+    """A motion of a whole robot. True, as opposed to a `Failure`.
+
+    The waypoints of all segments stand in one array each, in order; where two segments meet, the last of one and the first of
+    the next are both there.
+    """
+
+    def __init__(self, native: _regrasp.RobotPlan, report: Report | None = None, path: str | None = None) -> None:
+        self._native = native
+        self.report = report
+        """What the checker said when the plan was made; none for a plan from a file."""
+        self.path = path
+        """The file that it was read from, if it was."""
+
+    @staticmethod
+    def from_file(path: StrPath) -> RobotPlan:
+        """Reads a plan file. Raises `InputError`."""
+        return RobotPlan(_regrasp.RobotPlan.load(os.fspath(path)), path=os.fspath(path))
+
+    @cached_property
+    def document(self) -> Mapping[str, Any]:
+        """The content of the plan file."""
+        return json.loads(self._native.to_json())
+
+    @cached_property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of all joints, in the order of `joints`."""
+        return tuple(name for robot in self.document["robots"] for name in robot["joint_names"])
+
+    @cached_property
+    def _waypoints(self) -> list[dict[str, Any]]:
+        return [waypoint for segment in self.document["segments"] for waypoint in segment["waypoints"]]
+
+    @cached_property
+    def times(self) -> FloatArray:
+        """(n,): seconds from the start."""
+        return np.array([waypoint["time"] for waypoint in self._waypoints], dtype=np.float64)
+
+    @cached_property
+    def joints(self) -> FloatArray:
+        """(n, j): positions of the joints, in radians or metres."""
+        return np.array([waypoint["joints"] for waypoint in self._waypoints], dtype=np.float64)
+
+    @cached_property
+    def joint_velocities(self) -> FloatArray:
+        """(n, j): their velocities."""
+        return np.array([waypoint["joint_velocities"] for waypoint in self._waypoints], dtype=np.float64)
+
+    @property
+    def duration(self) -> float:
+        """Time from the first waypoint to the last, in seconds."""
+        return float(self.times[-1] - self.times[0])
+
+    def save(self, path: StrPath) -> None:
+        """Writes the plan file."""
+        _regrasp.Plan.write(os.fspath(path), self._native.to_json())
+
+    def to_npz(self, path: StrPath) -> None:
+        """Writes the arrays for numpy (`docs/reference/export-formats.md`)."""
+        _regrasp.Plan.write(os.fspath(path), self._native.to_npz())
+
+    def to_ros2(self, path: StrPath, scene: Scene | StrPath | None = None) -> None:
+        """Writes trajectories of ROS 2 controllers: a YAML document for each arm, hand and the common part that moves."""
+        _regrasp.Plan.write(os.fspath(path), self._native.to_ros2(self._scene(scene)._native).encode())
+
+    def to_mjcf(self, scene: Scene | StrPath | None = None) -> str:
+        """The MuJoCo model of the scene with a keyframe for every waypoint. Warns where the model differs from the scene."""
+        xml, notes = self._native.to_mjcf(self._scene(scene)._native)
+        for note in notes:
+            warnings.warn(note, stacklevel=2)
+        return xml
+
+    def check(self, scene: Scene | StrPath | None = None, *, level: str = "motion") -> Report:
+        """Judges the plan in its scene, by the checker that knows no planner."""
+        return report_of(json.loads(self._native.check(self._scene(scene)._native, level)))
+
+    def _scene(self, scene: Scene | StrPath | None) -> Scene:
+        if scene is None:
+            scene = self._native.find_scene(self.path or "plan.json", os.getcwd())
+        return scene if isinstance(scene, Scene) else load_scene(scene)
