@@ -177,6 +177,7 @@ def check(
     packages: Mapping[str, StrPath] | None = None,
     lenient: bool = False,
     level: Level = "motion",
+    own_query: bool = False,
 ) -> Report:
     """Judges a plan in its scene, by the checker that knows no planner.
 
@@ -185,11 +186,13 @@ def check(
     read afresh, or the file that the plan names: beside the plan file, in one of the folders above it, or in the current one.
     packages, lenient: as in `load_scene`, for scene files.
     level: as in `plan`. `Report.reached` says which level the plan reaches.
+    own_query: a plan of a `Session` brings the start and the goal that it was asked. It is rejected unless this is True, because
+    such a plan answers only its own question.
 
     Raises `InputError` for files that cannot be used. What is wrong with the plan is no exception but in the report.
     """
     plan, scene = _with_scene(plan, scene, packages, lenient)
-    return report_of(json.loads(_regrasp.check(plan._native, scene._native, level)))
+    return report_of(json.loads(_regrasp.check(plan._native, scene._native, level, own_query)))
 
 
 def export_mjcf(

@@ -1,4 +1,4 @@
-"""Writes the URDFs and hand files of the robot `upper_body`: a torso, two arms and two four-finger hands, 43 independent joints.
+"""Writes the files of the robot `upper_body`: a torso, two arms and two four-finger hands, 43 independent joints.
 
     python3 make.py
 
@@ -12,14 +12,17 @@ from pathlib import Path
 FOLDER = Path(__file__).parent
 QUARTER = math.pi / 2
 
-# Joint speeds in rad/s and torques in N m.
+# Joint speeds in rad/s, torques in N m, accelerations in rad/s^2.
 #   arm:   KUKA LBR iiwa 14 R820, from its URDF in the package iiwa_stack. The arm of DLR's Justin is of the same class.
 #   torso: no numbers are published; those of the two strongest joints of the same arm.
-#   hand:  Allegro Hand V4: 0.7 N m per joint by its data sheet, 3.14 rad/s by its URDF.
+#   hand:  Allegro Hand V4: 0.7 N m per joint by its data sheet, 3.14 rad/s by its URDF; the acceleration is the scenes' default.
 MOTORS = {
-    "arm": [(1.4835, 320), (1.4835, 320), (1.7453, 176), (1.309, 176), (2.2689, 110), (2.3562, 40), (2.3562, 40)],
-    "torso": [(1.4835, 320)] * 4,
-    "hand": [(3.14, 0.7)],
+    "arm": [
+        (1.4835, 320, 8.57), (1.4835, 320, 8.57), (1.7453, 176, 8.74), (1.309, 176, 11.36), (2.2689, 110, 12.23),
+        (2.3562, 40, 15.72), (2.3562, 40, 15.72),
+    ],
+    "torso": [(1.4835, 320, 8.57)] * 4,
+    "hand": [(3.14, 0.7, 20.0)],
 }
 # Masses in kg. Arm: LBR iiwa 14 R820, the same URDF. Hand: Allegro Hand, its URDF (the palm takes what its fingers leave over).
 # Base, torso and head: estimates.
@@ -84,7 +87,7 @@ def joint(name, parent, child, xyz, rpy, limits=None, motor=None, mimic=None):
     )
     if limits is not None:
         lower, upper = (math.radians(limit) for limit in limits)
-        velocity, effort = motor
+        velocity, effort, _ = motor
         text += (
             f'    <axis xyz="0 0 1"/><limit lower="{number(lower)}" upper="{number(upper)}" '
             f'velocity="{number(velocity)}" effort="{number(effort)}"/>\n'
@@ -229,9 +232,63 @@ def hand_file(side):
     return text
 
 
+ROBOT = """\
+# A torso of three independent joints, two arms of seven and two hands of thirteen: 43 in all. Written by make.py; change that.
+format = "regrasp-robot"
+format_version = 1
+name = "upper_body"
+
+[[models]]
+urdf = "body.urdf"
+
+# The chest stays upright: its joint turns back what the two before it turn. Its limits become 0 <= torso_1 + torso_2 <= 135 degrees.
+[[couplings]]
+joint = "torso_3"
+terms = [{ leader = "torso_1", multiplier = -1.0 }, { leader = "torso_2", multiplier = -1.0 }]
+
+[[arms]]
+name = "right"
+base_link = "right_dock"
+mount_link = "right_flange"
+home = { right_arm_1 = 0.6, right_arm_2 = -1.3, right_arm_3 = 0.3, right_arm_4 = 1.6, right_arm_5 = -0.6 }
+
+[[arms]]
+name = "left"
+base_link = "left_dock"
+mount_link = "left_flange"
+home = { left_arm_1 = 0.6, left_arm_2 = -1.3, left_arm_3 = 0.3, left_arm_4 = 1.6, left_arm_5 = -0.6 }
+
+[[hands]]
+name = "right"
+hand = "right_hand.toml"
+arm = "right"
+
+[[hands]]
+name = "left"
+hand = "left_hand.toml"
+arm = "left"
+
+[rest]
+torso_1 = -0.5
+torso_2 = 1.0
+"""
+
+
+def accelerations():
+    """What URDFs cannot say."""
+    text = f"\n# In rad/s^2. What has no line of its own is a joint of a hand.\n[accelerations]\ndefault = {MOTORS['hand'][0][2]}\n"
+    for name, motor in zip(("torso_yaw", "torso_1", "torso_2"), MOTORS["torso"]):
+        text += f"{name} = {motor[2]}\n"
+    for side in ("right", "left"):
+        for k, motor in enumerate(MOTORS["arm"]):
+            text += f"{side}_arm_{k + 1} = {motor[2]}\n"
+    return text
+
+
 def main():
     about = "Dimensions as published for DLR's Justin (Saut 2010, sec. VI); shapes are our own."
     (FOLDER / "body.urdf").write_text(robot("upper_body", about, torso() + arm("right") + arm("left")))
+    (FOLDER / "robot.toml").write_text(ROBOT + accelerations())
     for side in ("right", "left"):
         (FOLDER / f"{side}_hand.urdf").write_text(robot(f"{side}_hand", about, hand(side)))
         (FOLDER / f"{side}_hand.toml").write_text(hand_file(side))

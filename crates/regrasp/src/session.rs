@@ -7,7 +7,7 @@ use regrasp_base::{Budget, Diagnostic, InputError, Place};
 use regrasp_geometry::Pose;
 use regrasp_grasp::record::PoseData;
 use regrasp_plan::Plan;
-use regrasp_plan::check::{CheckSettings, Report, check, query_of};
+use regrasp_plan::check::{CheckSettings, OwnQuery, Report, check, query_of};
 use regrasp_plan::plan::Asked;
 use regrasp_planners::in_hand::starting::{self, Observation, ProjectionLimits, Start};
 use regrasp_planners::{Failure, InHandSettings, Progress, plan_in_hand};
@@ -102,12 +102,14 @@ impl<'a> Session<'a> {
     /// Judges a plan: against the query that it brings, or, where it brings none, against that of the session's task.
     pub fn check(&self, plan: &Plan, settings: &CheckSettings) -> Report {
         let query = query_of(&self.loaded.scene, self.task, plan);
-        check((&self.loaded.scene, &self.loaded.state), Some(&query), plan, settings)
+        let settings = CheckSettings { own_query: OwnQuery::Allowed, ..settings.clone() };
+        check((&self.loaded.scene, &self.loaded.state), Some(&query), plan, &settings)
     }
 
     /// Judges a plan against what was asked from `start` to `goal`, whatever the plan says.
     pub fn check_asked(&self, plan: &Plan, start: &Start, goal: &Pose, settings: &CheckSettings) -> Report {
         let query = Query::InHand(self.query(start, goal));
-        check((&self.loaded.scene, &self.loaded.state), Some(&query), plan, settings)
+        let settings = CheckSettings { own_query: OwnQuery::Allowed, ..settings.clone() };
+        check((&self.loaded.scene, &self.loaded.state), Some(&query), plan, &settings)
     }
 }

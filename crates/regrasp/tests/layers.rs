@@ -60,6 +60,10 @@ const TOWER: &[Floor] = &[
         // Its tests check, and break lists.
         tests_with: &["regrasp_plan", "regrasp_mutations"],
     },
+    floor(
+        "regrasp_arms",
+        &["regrasp_base", "regrasp_geometry", "regrasp_robot", "regrasp_scene", "regrasp_plan", "regrasp_manipulation"],
+    ),
     Floor {
         name: "regrasp_planners",
         ships_with: &[
@@ -97,6 +101,7 @@ const TOWER: &[Floor] = &[
             "regrasp_grasp",
             "regrasp_plan",
             "regrasp_grasp_lists",
+            "regrasp_arms",
             "regrasp_planners",
             "regrasp_export",
             "regrasp_viewer",
@@ -121,6 +126,7 @@ const PRIVATE: &[(&str, &[&str])] = &[
     ("pyo3", &["regrasp_python"]),
     ("zip", &["regrasp_export"]),
     ("clarabel", &["regrasp_grasp", "regrasp_plan"]),
+    ("pulp", &["regrasp_arms"]),
     ("saphyr-parser", &["regrasp_grasp"]),
 ];
 

@@ -2,7 +2,7 @@
 
 use regrasp::base::{Budget, Rng};
 use regrasp::geometry::{Pose, Vector};
-use regrasp::plan::check::{CheckSettings, ViolationKind, check_files};
+use regrasp::plan::check::{CheckSettings, OwnQuery, ViolationKind, check_files};
 use regrasp::plan::format;
 use regrasp::plan::plan::{Plan, Waypoint};
 use regrasp::planners::FailureKind;
@@ -130,11 +130,19 @@ fn the_checker_judges_a_plan_of_a_session_from_its_file() {
     let found = plan_from(&session, &start, 2).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("plan.json");
-    let judge = |plan: &Plan| {
+    let judge_with = |plan: &Plan, own_query: OwnQuery| {
         std::fs::write(&file, format::to_json(plan)).unwrap();
         let scene = path("sphere_90x.toml");
-        check_files(&file, Some(&scene), &LoadOptions::default(), &CheckSettings::default()).unwrap()
+        let settings = CheckSettings { own_query, ..CheckSettings::default() };
+        check_files(&file, Some(&scene), &LoadOptions::default(), &settings).unwrap()
     };
+    let judge = |plan: &Plan| judge_with(plan, OwnQuery::Allowed);
+    // A plan answers its own question whatever that is: whoever judges has to allow it.
+    let refused = judge_with(&found, OwnQuery::Refused).report;
+    assert_eq!(
+        refused.violations.iter().map(|violation| violation.kind).collect::<Vec<_>>(),
+        [ViolationKind::WrongScene]
+    );
     let judged = judge(&found);
     assert_eq!(judged.plan, found, "a file keeps the plan to the last bit");
     assert!(judged.report.accepted() && judged.report == session.check(&found, &CheckSettings::default()));

@@ -4,6 +4,8 @@
 
 /// Trials side by side.
 pub mod at_once;
+/// Chains of goals.
+pub mod chain;
 /// Curves as SVG.
 mod chart;
 /// Rows as CSV, written whole or appended one by one, and read back.

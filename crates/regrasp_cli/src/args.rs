@@ -304,6 +304,9 @@ pub struct Bench {
     /// Do not judge the plans
     #[arg(long)]
     pub no_check: bool,
+    /// Plan a chain of N random goals per seed, each within 90 degrees of the last and from the grasp in which the last plan ended
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true, conflicts_with_all = ["page", "results", "hold"])]
+    pub chain: Option<u64>,
     /// Make a Markdown page of CSV files that were written before; plans nothing
     #[arg(long, value_name = "FILE")]
     pub page: Option<PathBuf>,

@@ -5,7 +5,7 @@ use crate::load;
 use crate::stop::Stop;
 use crate::talk::Talk;
 use crate::words::{counted, duration, grouped};
-use regrasp::plan::check::{CheckSettings, Level, Report, check, query_of};
+use regrasp::plan::check::{Level, Report, check, query_of};
 use regrasp::plan::format;
 use regrasp::scene::{LoadedScene, load_scene};
 use serde_json::json;
@@ -34,8 +34,7 @@ pub fn judge_bytes(
 pub fn judge(loaded: &LoadedScene, plan: &regrasp::Plan, judging: &Judging, talk: &Talk) -> Result<Report, Stop> {
     let started = Instant::now();
     let query = judging.query(query_of(&loaded.scene, loaded.task_for(&plan.query), plan))?;
-    let settings = CheckSettings { level: judging.level(), ..CheckSettings::default() };
-    let report = check((&loaded.scene, &loaded.state), Some(&query), plan, &settings);
+    let report = check((&loaded.scene, &loaded.state), Some(&query), plan, &judging.settings());
     say(&report, plan.promises.tracking.is_some(), started.elapsed(), talk);
     if plan.asked.is_some() {
         talk.say("       start and goal are those that the plan says it was asked; all else is the scene's");

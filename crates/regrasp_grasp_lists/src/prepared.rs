@@ -1,8 +1,8 @@
 //! What a search prepares once and shares among its threads.
 
-use crate::driven::Motors;
 use crate::fingers::{SphereLimits, Workspheres, first_finger, meeting_point};
 use crate::frames::Frames;
+use crate::motors::Motors;
 use crate::settings::GraspSettings;
 use crate::stable::{self, Standing};
 use crate::surface::SurfacePoints;

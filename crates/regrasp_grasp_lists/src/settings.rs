@@ -51,7 +51,7 @@ pub struct GraspSettings {
     pub approach_distance: f64,
     /// Heights to which fingertips lift off to open the hand, tried in this order.
     pub open_heights: Vec<f64>,
-    /// Least tipping angle of a stable pose. By hand: 2 degrees.
+    /// Least tipping angle of a stable pose. By simulation: 5 degrees. Objects that tip over sooner do so when the first finger touches.
     pub tipping_angle: f64,
     /// Threads. The list does not depend on it.
     #[serde(skip)]
@@ -82,7 +82,7 @@ impl Default for GraspSettings {
             refinement_trials: 150,
             approach_distance: 0.1,
             open_heights: vec![0.03, 0.02, 0.012, 0.006],
-            tipping_angle: 0.035,
+            tipping_angle: 0.0873,
             n_threads: 1,
         }
     }
@@ -124,7 +124,7 @@ impl GraspSettings {
             ("least_sphere", self.least_sphere, 1e-5, 1.0),
             ("surface_step", self.surface_step.unwrap_or(0.01), 1e-4, 1.0),
             ("found_per_grasp", self.found_per_grasp, 1.0, 100.0),
-            ("approach_distance", self.approach_distance, 0.001, 1.0),
+            ("approach_distance", self.approach_distance, 0.02, 1.0),
             ("tipping_angle", self.tipping_angle, 0.0, 1.5),
         ];
         let heights = self.open_heights.iter().map(|height| ("open_heights", *height, 0.001, 0.5));

@@ -29,6 +29,8 @@ mod motion;
 mod order;
 /// Lifting and landing.
 mod relocations;
+/// Plans of whole robots.
+pub mod robots;
 /// Fingertips that roll, and fingertips that are said to.
 mod rolling;
 /// Objects that turn though nothing drives them.

@@ -7,7 +7,7 @@ use crate::plan::Plan;
 use crate::watch::watched;
 use pyo3::prelude::*;
 use regrasp::base::{Diagnostic, Place};
-use regrasp::plan::check::{CheckSettings, Level, Report, query_of};
+use regrasp::plan::check::{CheckSettings, Level, OwnQuery, Report, query_of};
 use regrasp::plan::format;
 use regrasp::scene::Task;
 use regrasp::settings::{Argument, Overrides, SettingsError, settings_for};
@@ -72,13 +72,14 @@ pub fn plan(py: Python<'_>, scene: &Scene, request: Request) -> PyResult<(Option
 
 /// Judges `plan` in `scene` as it was read, against the query of the plan's seed, and returns the report as JSON.
 #[pyfunction]
-pub fn check(py: Python<'_>, plan: &Plan, scene: &Scene, level: &str) -> PyResult<String> {
+pub fn check(py: Python<'_>, plan: &Plan, scene: &Scene, level: &str, own_query: bool) -> PyResult<String> {
     guarded(py, || {
         let level = level_named(level).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
         let judged = py.detach(|| {
             let loaded = &scene.loaded;
             let query = query_of(&loaded.scene, loaded.task_for(&plan.plan.query), &plan.plan);
-            let settings = CheckSettings { level, ..CheckSettings::default() };
+            let own_query = if own_query { OwnQuery::Allowed } else { OwnQuery::Refused };
+            let settings = CheckSettings { level, own_query, ..CheckSettings::default() };
             regrasp::plan::check::check((&scene.loaded.scene, &scene.loaded.state), Some(&query), &plan.plan, &settings)
         });
         Ok(report(&judged))

@@ -6,7 +6,7 @@ use crate::model::Scene;
 use crate::plan::Plan;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use regrasp::plan::check::{CheckSettings, check, query_of};
+use regrasp::plan::check::{CheckSettings, OwnQuery, check, query_of};
 use regrasp::viewer::page::html;
 use regrasp::viewer::story::{Outcome, Story, Telling, tell};
 use regrasp::viewer::storyboard::StoryboardSettings;
@@ -48,7 +48,9 @@ fn told(plan: &Plan, scene: &Scene, title: Option<&str>) -> Result<Story, String
     let loaded = &scene.loaded;
     let task = loaded.task_for(&plan.plan.query);
     let query = query_of(&loaded.scene, task, &plan.plan);
-    let report = check((&loaded.scene, &loaded.state), Some(&query), &plan.plan, &CheckSettings::default());
+    // A picture shows what the plan does, whatever it was asked.
+    let settings = CheckSettings { own_query: OwnQuery::Allowed, ..CheckSettings::default() };
+    let report = check((&loaded.scene, &loaded.state), Some(&query), &plan.plan, &settings);
     tell(&Telling {
         task: loaded.manipulation_of(task),
         query: None,

@@ -218,3 +218,35 @@ fn xacro_files_are_known_by_their_content() {
         assert_eq!((diagnostic.code, diagnostic.fix.ends_with(&command)), (code, true), "{diagnostic}");
     }
 }
+
+#[test]
+fn links_without_geometry_are_no_fingers_beside_others_that_have_some() {
+    let caster = turning("caster", "root");
+    let parts = [finger("i", "root"), caster.clone(), finger("m", "root"), finger("r", "root")].concat();
+    let (_, fingers) = summary(&guess(&parts, None).unwrap());
+    assert_eq!(fingers.len(), 3, "{fingers:?}");
+    // A bare tree still has its ends as fingers.
+    let bare = [caster, turning("other", "root"), turning("third", "root")].concat();
+    assert_eq!(summary(&guess(&bare, None).unwrap()).1.len(), 3);
+}
+
+#[test]
+fn pairs_that_a_hand_file_excuses_stay_excused_in_what_inspect_writes() {
+    let folder = tempfile::tempdir().unwrap();
+    let parts = [finger("i", "root"), finger("m", "root"), finger("r", "root")].concat();
+    let hand = |allow: &str| {
+        let fingers = ["i", "m", "r"].map(|name| {
+            format!("[[fingers]]\nname = \"{name}\"\ntip_link = \"{name}_b\"\ntip = {{ shape = \"sphere\", radius = 0.005, center = [0.0, 0.0, 0.04] }}\n")
+        });
+        format!(
+            "format = \"regrasp-hand\"\nformat_version = 1\nurdf = \"hand.urdf\"\nbase_link = \"root\"\n{allow}\n{}",
+            fingers.concat()
+        )
+    };
+    let loaded = load(folder.path(), &parts, &hand("allow = [[\"i_b\", \"m_b\"]]"), "hand.toml", None).unwrap();
+    let none = Default::default();
+    let text = regrasp_robot::inspect::hand_file_text(&loaded.hand, "hand.urdf", &none);
+    assert!(text.contains("[\"i_b\", \"m_b\"],") && text.matches("_b\"],").count() == 1, "{text}");
+    let plain = load(folder.path(), &parts, &hand(""), "hand.toml", None).unwrap();
+    assert!(!regrasp_robot::inspect::hand_file_text(&plain.hand, "hand.urdf", &none).contains("allow"));
+}

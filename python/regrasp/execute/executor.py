@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -20,7 +20,7 @@ from .monitor import Monitor, Trigger, pose_error
 from .planning import ChargedPlanning, Planning, Prepare, ThreadPlanning, Ticket
 from .plant import Command, Plant
 from .senses import Fault, Senses
-from .settings import PLANNER, ExecutorSettings
+from .settings import CAREFUL, PLANNER, ExecutorSettings
 
 #: A sample is kept every so many ticks.
 SAMPLED = 5
@@ -46,14 +46,15 @@ class Executor:
         settings: ExecutorSettings | None = None,
         *,
         control: Settings | None = None,
-        planning: Callable[[Session, ExecutorSettings, Prepare], Planning] | None = None,
+        planning: Callable[[Sequence[Session], ExecutorSettings, Prepare], Planning] | None = None,
+        careful: Sequence[Session] = (),
         stiffness: Array | None = None,
         damping: Array | None = None,
     ) -> None:
         """session, plant: of the same hand. control: as the replay's settings, of which tick and speed count.
 
         planning: ``ThreadPlanning`` for robots; where nothing is said, ``ChargedPlanning`` for plants that know the truth, which are
-        simulations, else ``ThreadPlanning``. stiffness, damping: of the robot's joints, where they are not those of replays.
+        simulations, else ``ThreadPlanning``. careful: sessions of the same scene that are asked for plans first. stiffness, damping: of the robot's joints, where they are not those of replays.
         """
         self._session = session
         self._plant = plant
@@ -70,7 +71,7 @@ class Executor:
         self._gains = (stiffness, damping)
         self._truth: Callable[[], tuple[Array, Array]] | None = getattr(plant, "truth", None)
         maker = planning or (ChargedPlanning if self._truth is not None else ThreadPlanning)
-        self._planning = maker(session, self._settings, self._prepare)
+        self._planning = maker([*careful, session], self._settings, self._prepare)
         self._rig: Rig | None = None
         self._senses = Senses(len(plant.joint_names), self._settings)
         self._leg: Leg | None = None
@@ -456,9 +457,10 @@ def execute(
 
     session: of the plant's scene; a plant in MuJoCo knows its scene. The planner then has the settings of execution.
     """
+    careful: list[Session] = []
     if session is None:
         scene = getattr(plant, "scene", None)
         if scene is None:
             raise ValueError("the plant does not know its scene: give a session")
-        session = Session(scene, settings=PLANNER)
-    return Executor(session, plant, settings).run(goals)
+        session, careful = Session(scene, settings=PLANNER), [Session(scene, settings=CAREFUL)]
+    return Executor(session, plant, settings, careful=careful).run(goals)

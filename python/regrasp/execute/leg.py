@@ -48,6 +48,10 @@ class Leg:
         self._normals = self.ref.blend(_normals_in_object(self.rig))
         self._qpos = self.rig.configurations[0].copy()
         self._data: Any = mujoco.MjData(self.rig.model)
+        model = self.rig.model
+        simple = [joint for joint in range(model.njnt) if int(model.jnt_type[joint]) >= int(mujoco.mjtJoint.mjJNT_SLIDE)]
+        self._addresses = np.array([model.jnt_qposadr[joint] for joint in simple])
+        self._dofs = np.array([model.jnt_dofadr[joint] for joint in simple])
 
     @property
     def n_ticks(self) -> int:
@@ -80,11 +84,7 @@ class Leg:
         model, data = self.rig.model, self._data
         data.qpos[:] = self._qpos
         moved = self.rig.drives @ (joints - self.ref.joints[0])
-        first = self.rig.configurations[0]
-        for joint in range(model.njnt):
-            if model.jnt_type[joint] in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
-                address = model.jnt_qposadr[joint]
-                data.qpos[address] = first[address] + moved[model.jnt_dofadr[joint]]
+        data.qpos[self._addresses] = self.rig.configurations[0][self._addresses] + moved[self._dofs]
         mujoco.mj_kinematics(model, data)
         return data.site_xpos[[finger.site for finger in self.rig.fingers]].copy()
 

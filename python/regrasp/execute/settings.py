@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
-#: Settings of the planner that execution plans with, where nothing else is said: twice the speed at which plans are made for files.
-PLANNER: dict[str, Any] = {"speed": {"largest_speed": 0.08, "ramp": 0.12}}
+#: Settings of the planner that execution plans with, where nothing else is said: the speed that scenes allow by default, and short ramps.
+PLANNER: dict[str, Any] = {"speed": {"largest_speed": 0.1, "ramp": 0.06}}
+#: The same with more room for friction that is lower than thought. Plans are sought with these first.
+CAREFUL: dict[str, Any] = {**PLANNER, "friction_margin": 2.0}
 
 
 @dataclass(frozen=True)

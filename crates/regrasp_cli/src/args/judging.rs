@@ -4,7 +4,7 @@ use crate::stop::Stop;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use regrasp::Query;
-use regrasp::plan::check::Level;
+use regrasp::plan::check::{CheckSettings, Level, OwnQuery};
 use regrasp::scene::{Gravity, LoadedScene};
 
 /// By what plans are judged, and gravity that they are planned under.
@@ -21,12 +21,22 @@ pub struct Judging {
     /// scene do not count
     #[arg(long)]
     pub hold: bool,
+    /// Judge a plan of a session against the start and the goal that the plan itself says it was asked. Such a plan is rejected
+    /// otherwise
+    #[arg(long)]
+    pub own_query: bool,
 }
 
 impl Judging {
     /// What plans are judged for.
     pub fn level(&self) -> Level {
         self.level.as_deref().and_then(Level::named).unwrap_or_default()
+    }
+
+    /// By what the checker judges.
+    pub fn settings(&self) -> CheckSettings {
+        let own_query = if self.own_query { OwnQuery::Allowed } else { OwnQuery::Refused };
+        CheckSettings { level: self.level(), own_query, ..CheckSettings::default() }
     }
 
     /// What is asked: `query`, or with `--hold` whether its object can be held at the start. Errors: `--hold` for tracking (`A507`).

@@ -14,6 +14,7 @@ use regrasp::scene::LoadedScene;
 use regrasp::scene::query::TRACKING;
 use regrasp::{InHandSettings, InputError, TrackingSettings};
 use regrasp_bench::at_once::in_order;
+use regrasp_bench::chain;
 use regrasp_bench::growth;
 use regrasp_bench::roadmap::GraphFacts;
 use regrasp_bench::row::Judge;
@@ -50,7 +51,11 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
             let read = read.chain(files.iter().map(PathBuf::as_path)).chain(arguments.search.settings.as_deref());
             make_folder_of(path)?;
             Outputs::new(of_rows(path))?.refuse_inputs(read)?;
-            let header = if improves { improvement::header() } else { csv::header() };
+            let header = match arguments.chain {
+                Some(_) => chain::header(),
+                None if improves => improvement::header(),
+                None => csv::header(),
+            };
             Some(csv::Writer::with_text(path, header).map_err(|error| Stop::unwritable(path, &error))?)
         }
         None => None,
@@ -64,6 +69,10 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
         judge: if arguments.no_check { Judge::Skip } else { Judge::Checker(arguments.judging.level()) },
         cancelled: Arc::clone(&cancelled),
     };
+    if let Some(n_links) = arguments.chain {
+        run_chains(&scenes, (n_links as usize, &settings), arguments, writer, talk)?;
+        return end_of(bad, files.len(), talk);
+    }
     let mut rows = Vec::new();
     for loaded in scenes.drain(..) {
         let n_seeds = arguments.seeds.unwrap_or(DEFAULT_SEEDS).min(u64::MAX - arguments.first_seed);
@@ -101,6 +110,49 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
         }
     }
     end_of(bad, files.len(), talk)
+}
+
+/// Plans chains of goals in scenes of in-hand tasks, seed after seed.
+fn run_chains(
+    scenes: &[LoadedScene],
+    (n_links, settings): (usize, &RunSettings),
+    arguments: &args::Bench,
+    mut writer: Option<csv::Writer>,
+    talk: &Talk,
+) -> Result<(), Stop> {
+    let path = arguments.csv.as_deref().unwrap_or(Path::new(""));
+    let mut links = Vec::new();
+    for loaded in scenes {
+        let n_seeds = arguments.seeds.unwrap_or(DEFAULT_SEEDS).min(u64::MAX - arguments.first_seed);
+        for seed in arguments.first_seed..arguments.first_seed + n_seeds {
+            let query = loaded.task().query(seed);
+            if query.as_in_hand().is_none_or(|query| query.open_start.is_some()) {
+                let seen = format!("is for scenes of in-hand tasks with a start; {} has none", loaded.scene.name);
+                return Err(Stop::argument("A505", "--chain", seen, "other scenes, or no --chain"));
+            }
+            let problem = Problem { task: loaded.manipulation(), query: &query, seed };
+            chain::run(problem, n_links, settings, |link| {
+                if settings.cancelled.load(Ordering::Relaxed) {
+                    return Err(Stop::Interrupted);
+                }
+                say_row(&link.row, talk);
+                talk.event(
+                    "link",
+                    json!({ "link": link.link, "angle_deg": link.angle_deg, "motion_s": link.motion_s }),
+                );
+                if let Some(writer) = &mut writer {
+                    writer.push_line(&chain::line(&link)).map_err(|error| Stop::unwritable(path, &error))?;
+                }
+                links.push(link);
+                Ok(())
+            })?;
+        }
+    }
+    if let Some(writer) = writer {
+        writer.finish().map_err(|error| Stop::unwritable(path, &error))?;
+    }
+    talk.data(&chain::table(&links));
+    Ok(())
 }
 
 /// Reads the scenes. One that cannot be read is left out, so that the others are planned; it is told of at the end again.

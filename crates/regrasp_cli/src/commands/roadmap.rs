@@ -173,7 +173,8 @@ fn run_picture(arguments: &args::RoadmapPicture, common: &Common, talk: &Talk) -
     };
     say_plan(&answer.plan, started.elapsed().as_secs_f64(), talk);
     // The graph's motions are geometry: their contacts stay where they are.
-    let judging = args::Judging { level: Some(Level::Geometry.name().into()), gravity: None, hold: false };
+    let judging =
+        args::Judging { level: Some(Level::Geometry.name().into()), gravity: None, hold: false, own_query: false };
     if !judge::judge(&loaded, &answer.plan, &judging, talk)?.accepted() {
         return Err(Stop::Rejected);
     }

@@ -1,7 +1,7 @@
 //! Fingers close along their couplings until their tips touch. A motor stops when the first of its fingertips touches.
 
-use super::motors::{Motor, Motors};
 use super::touch::{Gap, contact, first_touch, gap};
+use crate::motors::{Motor, Motors};
 use crate::prepared::Prepared;
 use regrasp_geometry::Pose;
 use regrasp_manipulation::grasp::state::{GraspState, HandJoints};

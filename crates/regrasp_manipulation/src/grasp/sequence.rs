@@ -4,7 +4,7 @@
 use crate::grasp::state::{GraspState, Moment};
 use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
-use std::ops::RangeInclusive;
+use std::ops::{Range, RangeInclusive};
 
 /// A feasible elementary motion (Saut 2011, sec. 3.2).
 #[derive(Debug, Clone, PartialEq)]
@@ -74,6 +74,11 @@ impl Sequence {
     /// The state in which the motion `index` begins.
     pub fn state_before(&self, index: usize) -> &GraspState {
         if index == 0 { &self.start } else { &self.steps[index - 1].end }
+    }
+
+    /// The motions `range` by themselves.
+    pub fn part(&self, range: Range<usize>) -> Sequence {
+        Sequence { start: self.state_before(range.start).clone(), steps: self.steps[range].to_vec() }
     }
 
     /// Appends a transfer through `moments`, if there are any.

@@ -3,7 +3,10 @@
 
 #[path = "../../../regrasp_plan/tests/it/loaded.rs"]
 mod loaded;
+#[path = "../../../../tests/support/moving_robot.rs"]
+mod moving_robot;
 mod mutation;
+mod robots;
 #[path = "../../../regrasp_plan/tests/it/rolled.rs"]
 mod rolled;
 #[path = "../../../regrasp_plan/tests/it/sample.rs"]

@@ -1,6 +1,6 @@
 //! The scene file of a plan, where nobody says which it is.
 
-use crate::plan::Plan;
+use crate::plan::{Plan, PlanInput};
 use regrasp_base::{Diagnostic, InputError, Place, files};
 use std::path::{Path, PathBuf};
 
@@ -13,13 +13,18 @@ const FOLDERS_ABOVE: usize = 4;
 /// Only the bytes decide: of the files of that name the first with the plan's hash is taken, else the first.
 /// Errors: no scene is named, or none is found (`C420`).
 pub fn find_scene(plan_path: &Path, plan: &Plan, current: Option<&Path>) -> Result<PathBuf, InputError> {
+    find_scene_among(plan_path, &plan.inputs, current)
+}
+
+/// As [`find_scene`], of a plan of any kind that was made from these files.
+pub fn find_scene_among(plan_path: &Path, inputs: &[PlanInput], current: Option<&Path>) -> Result<PathBuf, InputError> {
     let fail = |problem: String| {
         let diagnostic = Diagnostic::new("C420", Place::file(plan_path), problem)
             .element("key", "inputs")
             .fix("name the scene file: --scene FILE");
         Err(diagnostic.into())
     };
-    let Some(input) = plan.inputs.iter().find(|input| input.role == "scene") else {
+    let Some(input) = inputs.iter().find(|input| input.role == "scene") else {
         return fail("names no scene file".into());
     };
     let Some(name) = Path::new(&input.name).file_name() else {

@@ -61,6 +61,8 @@ mod pieces;
 pub mod pose;
 /// What the plan promises, and whether the promises may be made and are kept.
 pub mod promises;
+/// Plans of whole robots.
+pub mod robots;
 /// Which finger moves, and which are free.
 pub mod roles;
 /// Fingertips that roll.
@@ -89,14 +91,16 @@ pub mod violation;
 pub mod way;
 
 pub use along::{Along, along};
-pub use asked::query_of;
+pub use asked::{OwnQuery, query_of};
 pub use files::{CheckedFiles, check_files};
-pub use find_scene::find_scene;
+pub use find_scene::{find_scene, find_scene_among};
 pub use grasps::{GraspReport, check_grasps};
 pub use level::Level;
+pub use robots::check_robot;
 pub use slip::HoldSlip;
 pub use violation::{Moment, Violation, ViolationKind};
 
+use crate::format::AnyPlan;
 use crate::plan::Plan;
 use model::CheckedHand;
 use regrasp_geometry::Pose;
@@ -110,6 +114,8 @@ use serde::{Deserialize, Serialize};
 pub struct CheckSettings {
     /// What the plan is judged for.
     pub level: Level,
+    /// Whether a plan may bring the query that it answers.
+    pub own_query: OwnQuery,
     /// Largest contact tolerance that a plan may promise, in metres. Issue 2: 0.5 mm.
     pub largest_contact_tolerance: f64,
     /// Largest slip of a rolling fingertip in a segment that a plan may promise, in metres. Issue 4: 0.1 mm.
@@ -169,6 +175,9 @@ pub struct CheckSettings {
     pub lift_clearance: f64,
     /// The tip of a finger that is free all through a segment keeps this far from the object, in metres.
     pub free_clearance: f64,
+    /// The open hand of a listed grasp comes on a line of at least this length, in metres. A shorter one would say of every grasp that
+    /// it can be reached.
+    pub shortest_way_in: f64,
     /// Largest goal tolerance that a tracking plan may promise, in radians. Cherif 1999, table 2: a cell of 2.406 degrees.
     pub largest_goal_tolerance: f64,
     /// In tracking, a fingertip that does not turn, or not about the normal, or not across it, may do so by this much in a
@@ -197,6 +206,7 @@ impl Default for CheckSettings {
     fn default() -> Self {
         CheckSettings {
             level: Level::Motion,
+            own_query: OwnQuery::Refused,
             largest_slip: 0.1e-3,
             slip_share: 0.005,
             slip_floor: 0.05e-3,
@@ -222,6 +232,7 @@ impl Default for CheckSettings {
             resolution: 0.05e-3,
             lift_clearance: 0.1e-3,
             free_clearance: 0.05e-3,
+            shortest_way_in: 0.02,
             largest_goal_tolerance: 0.042,
             turn_tolerance: 2e-3,
             smallest_sliding_speed: 1e-5,
@@ -258,6 +269,9 @@ pub struct Report {
     pub violations: Vec<Violation>,
     /// What was not judged, and why; empty when everything was. Such a plan is never accepted.
     pub left_out: Vec<String>,
+    /// What is taken for granted because plans of this kind say nothing of it; empty where nothing is.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub assumed: Vec<String>,
     /// How many violations were found, those not listed included.
     pub n_violations: usize,
     /// Smallest closure margin of a holding set; none when none was judged.
@@ -332,7 +346,8 @@ pub fn check((scene, state): (&Scene, &State), query: Option<&Query>, plan: &Pla
     let work = limits::Work::of(settings.most_work);
     let mut log = Log { most_per_kind: settings.most_per_kind, work, ..Log::default() };
     let mut report = Report::default();
-    promises::check_inputs(plan, &scene.inputs, &mut log);
+    asked::check_own_query(plan, settings, &mut log);
+    promises::check_input_files(&plan.inputs, &scene.inputs, &mut log);
     // Where the scene leaves the start pose open any is an answer, and the other poses follow from it. That the object may be there
     // is judged as at every other moment.
     let started = query.filter(|query| query.has_open_start()).map(|query| query.started_at(&Pose::from(&plan.start)));
@@ -355,6 +370,27 @@ pub fn check((scene, state): (&Scene, &State), query: Option<&Query>, plan: &Pla
     report.n_violations = log.count_at(settings.level);
     report.violations = log.found;
     report.violations.retain(|violation| violation.level <= settings.level);
+    report
+}
+
+/// Judges a plan of either kind: [`check`] or [`check_robot`].
+pub fn check_any(
+    (scene, state): (&Scene, &State),
+    query: Option<&Query>,
+    plan: &AnyPlan,
+    settings: &CheckSettings,
+) -> Report {
+    let plan = match plan {
+        AnyPlan::InHand(plan) => return check((scene, state), query, plan, settings),
+        AnyPlan::Robot(plan) => plan,
+    };
+    let mut report = check_robot((scene, state), query.and_then(Query::as_motion), plan, settings);
+    if let Some(other) = query.filter(|query| query.as_motion().is_none()) {
+        let message = format!("the plan's task is \"{}\", the scene's \"{}\"", plan.task, other.task());
+        report.violations.insert(0, Violation::new(ViolationKind::WrongScene, message));
+        report.n_violations += 1;
+        report.reached = None;
+    }
     report
 }
 

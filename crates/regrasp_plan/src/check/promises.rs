@@ -16,7 +16,7 @@ use crate::check::model::CheckedHand;
 use crate::check::roles::{contact_of, moving_finger};
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
-use crate::plan::{Plan, SegmentKind, Waypoint};
+use crate::plan::{Plan, PlanInput, SegmentKind, Waypoint};
 use regrasp_grasp::{Contact, Grip};
 use regrasp_scene::{InputFile, Object};
 use std::collections::{BTreeMap, BTreeSet};
@@ -33,9 +33,9 @@ const FRICTION_TOLERANCE: f64 = 1e-9;
 /// The files of the plan against those of the scene as loaded now.
 ///
 /// Files of several hands may have the same name, each in a folder of its own: the first in the plan is the first in the scene.
-pub fn check_inputs(plan: &Plan, inputs: &[InputFile], log: &mut Log) {
+pub fn check_input_files(of_plan: &[PlanInput], inputs: &[InputFile], log: &mut Log) {
     let mut n_seen: BTreeMap<(&str, &str), usize> = BTreeMap::new();
-    for input in &plan.inputs {
+    for input in of_plan {
         let n_before = n_seen.entry((&input.role, &input.name)).or_default();
         let mut alike = inputs.iter().filter(|file| file.role == input.role && file.name == input.name);
         match alike.nth(*n_before) {

@@ -7,6 +7,11 @@ mod levels;
 mod loaded;
 mod loaded_tests;
 mod motion;
+#[path = "../../../../tests/support/moving_robot.rs"]
+mod moving_robot;
+#[path = "../../../../tests/support/places.rs"]
+mod places;
+mod robots;
 mod rolled;
 mod rolled_tests;
 mod sample;

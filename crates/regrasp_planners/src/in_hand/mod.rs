@@ -1,6 +1,8 @@
 //! In-hand manipulation by grasp subspaces. Saut 2011: Saut, Sahbani, Perdereau, Advanced Robotics 25; Sahbani 2007:
 //! Sahbani, Saut, Perdereau (2007).
 
+/// What would have helped.
+mod advice;
 /// One attempt at a query.
 mod attempt;
 /// Whether friction is what is missing.
@@ -117,6 +119,7 @@ fn plan_in_hand_frame(asked: &Asked, settings: &InHandSettings, budget: &Budget)
         let model = Model::new(asked.view, &effective(settings).within(&asked.view.limits).physics);
         let ends = [&asked.query.world_from_object_start, &asked.query.world_from_object_goal];
         friction::advise(&model, ends, asked.seed, failure);
+        advice::advise(asked, settings, budget, failure);
     }
     found
 }
@@ -188,11 +191,12 @@ const TRANSFERS_WORK: u64 = 40_000;
 /// leaves no forces.
 fn improved(context: Context, legs: &Legs, query: &InHandQuery, solution: Solution, mut plan: Plan) -> Plan {
     let Context { model, settings, seed, budget, .. } = context;
-    let work = settings.improvement.improve_work.min(budget.max_work.saturating_sub(plan.statistics.work));
-    if settings.improvement.improve_work == 0 {
+    let asked = settings.improvement.improve_work.max(shortening_work(model, settings, legs, &plan));
+    let work = asked.min(budget.max_work.saturating_sub(plan.statistics.work));
+    if asked == 0 {
         return plan;
     }
-    let budget = budget.of_improvement();
+    let budget = if settings.improvement.improve_work == 0 { budget.clone() } else { budget.of_improvement() };
     let ends = [legs.poses[0], legs.poses[legs.n_legs()]];
     let mut search = Search::new(Context { budget: &budget, ..context }, ends, 0, work);
     search.rng = Rng::keyed(seed, "improvement", 0);
@@ -208,6 +212,25 @@ fn improved(context: Context, legs: &Legs, query: &InHandQuery, solution: Soluti
     counts.improvement = Some(Box::new(improvement));
     with_counts(plan, counts)
 }
+
+/// Work after which a long plan is left as it is where nobody asks for a better one; 0 for plans that are not long.
+fn shortening_work(model: &Model, settings: &InHandSettings, legs: &Legs, plan: &Plan) -> u64 {
+    let ImprovementSettings { long_plan, shorten_share, .. } = settings.improvement;
+    let restricts = (0..model.n_fingers()).any(|finger| model.restricts_motion(finger));
+    // A plan that begins with a given grasp pays for it: it seldom is one with which the object can be turned far.
+    let long_plan = if legs.start_grasp.is_some() { LONG_FROM_GIVEN.min(long_plan) } else { long_plan };
+    if settings.method != Method::Gait || !model.any_rolls() || restricts || plan.n_relocations() < long_plan {
+        return 0;
+    }
+    let share = (plan.statistics.work as f64 * shorten_share) as u64;
+    if shorten_share > 0.0 { share.max(LEAST_SHORTENING) } else { 0 }
+}
+
+/// Relocations from which on a plan that begins with a given grasp is long.
+const LONG_FROM_GIVEN: u64 = 2;
+
+/// Least work spent on a shorter plan, in configurations.
+const LEAST_SHORTENING: u64 = 20_000;
 
 /// The plan with the counts of a search beside those of its own motions.
 fn with_counts(mut plan: Plan, counts: Statistics) -> Plan {

@@ -66,6 +66,8 @@ flat! {
         restart_work: u64,
         shortcuts: usize,
         improve_work: u64,
+        long_plan: u64,
+        shorten_share: f64,
         cost: CostWeights,
         forces: Option<ForceSettings>,
         speed: SpeedSettings,
@@ -82,7 +84,7 @@ flat! {
         alpha, guided_share,
     }
     improvement: ImprovementSettings {
-        improve_work, cost,
+        improve_work, long_plan, shorten_share, cost,
     }
 }
 

@@ -40,10 +40,22 @@ impl CostWeights {
 const MAX_WEIGHT: f64 = 1e6;
 
 /// What is done about a plan after the first.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ImprovementSettings {
     /// Work spent on a better plan after the first one; 0 for none.
     pub improve_work: u64,
+    /// Relocations from which on a plan is long: it is shortened although nobody asked for it, where fingertips roll. A plan
+    /// that begins with a given grasp is long from 2 on.
+    pub long_plan: u64,
+    /// Work spent on shortening a long plan, as a share of the work that found it, at least 20,000; 0 for none. By measurement:
+    /// with 0.25 allegro/cube57_x falls from 38 to 8 relocations for a twentieth more time.
+    pub shorten_share: f64,
     /// Weights of the cost that improvement reduces.
     pub cost: CostWeights,
+}
+
+impl Default for ImprovementSettings {
+    fn default() -> Self {
+        ImprovementSettings { improve_work: 0, long_plan: 12, shorten_share: 0.5, cost: CostWeights::default() }
+    }
 }

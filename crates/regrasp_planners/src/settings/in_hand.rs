@@ -88,6 +88,7 @@ impl InHandSettings {
             ("goal_share", self.search.goal_share),
             ("guided_share", self.baselines.guided_share),
             ("free_share", self.search.free_share),
+            ("shorten_share", self.improvement.shorten_share),
         ] {
             if !(0.0..=1.0).contains(&value) {
                 return Err(format!("{name} is {value}; it must be between 0 and 1"));

@@ -125,6 +125,63 @@ fn relocations_of_boxes_fall_by_half() {
     assert!(2 * improved <= first, "{first} relocations, then {improved}");
 }
 
+/// Default settings, in which fingertips roll.
+fn rolling(improve_work: u64) -> InHandSettings {
+    let improvement = ImprovementSettings { improve_work, ..ImprovementSettings::default() };
+    InHandSettings { improvement, ..InHandSettings::default() }
+}
+
+fn plan_rolling(loaded: &LoadedScene, query: &InHandQuery, settings: &InHandSettings, seed: u64) -> Plan {
+    let plan = plan_in_hand(&loaded.view(), query, settings, seed, &Budget::work(5_000_000), &|_| {}).unwrap();
+    let report = loaded.judge(query, &plan, &CheckSettings::default());
+    assert!(report.accepted(), "{} seed {seed}: {:#?}", loaded.scene.name, report.violations);
+    assert_eq!(validate_once(&loaded.view(), &plan, settings), Ok(()));
+    plan
+}
+
+#[test]
+fn rolling_fingertips_keep_their_contacts_longer_in_improved_plans() {
+    let (mut first, mut improved) = (0, 0);
+    for name in ["box_90x.toml", "box_180z.toml", "box_180x.toml"] {
+        let loaded = scene(name);
+        for seed in 0..2 {
+            let plan = plan_rolling(&loaded, &loaded.in_hand(seed), &rolling(300_000), seed);
+            let told = improvement(&plan);
+            assert!(told.improved.cost <= told.first.cost, "{name} seed {seed}: {told:?}");
+            first += told.first.relocations;
+            improved += told.improved.relocations;
+        }
+    }
+    assert!(10 * improved <= 7 * first, "{first} relocations, then {improved}");
+}
+
+#[test]
+fn a_plan_from_a_given_grasp_is_shortened_and_keeps_that_grasp_and_the_way_poses() {
+    let loaded = scene("box_90x.toml");
+    let free = loaded.in_hand(3);
+    let found = plan_rolling(&loaded, &free, &rolling(0), 3);
+    let ends = [&found.segments[0].waypoints[0], found.segments.last().unwrap().waypoints.last().unwrap()];
+    let mut query = free.clone();
+    query.start_grasp = GraspRequest::Joints(ends[1].joints.clone());
+    (query.world_from_object_start, query.world_from_object_goal) =
+        (free.world_from_object_goal, free.world_from_object_start);
+    let mut aside = interpolate_pose(&free.world_from_object_start, &free.world_from_object_goal, 0.5);
+    aside.translation.vector.x += 0.004;
+    for way in [vec![], vec![aside]] {
+        query.world_from_object_way = way;
+        let plan = plan_rolling(&loaded, &query, &rolling(0), 5);
+        assert_eq!(plan.way_poses.len(), query.world_from_object_way.len());
+        assert_eq!(plan.segments[0].waypoints[0].joints, ends[1].joints, "not one bit off");
+        if plan.n_relocations() >= 2 {
+            assert!(improvement(&plan).improved.cost <= improvement(&plan).first.cost);
+        }
+        let mut as_found = rolling(0);
+        as_found.improvement.shorten_share = 0.0;
+        let long = plan_rolling(&loaded, &query, &as_found, 5);
+        assert!(long.statistics.improvement.is_none() && plan.n_relocations() <= long.n_relocations());
+    }
+}
+
 #[test]
 fn given_grasps_and_way_poses_stay() {
     let loaded = scene("box_90x.toml");

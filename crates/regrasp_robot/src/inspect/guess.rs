@@ -142,8 +142,25 @@ fn stated_base(robot: &Robot, name: &str, file: &Path) -> Result<LinkId, InputEr
     })
 }
 
-/// Moving joints below which nothing moves, in document order.
+/// Moving joints below which nothing moves, in document order; not those of fingers without any geometry, unless no finger has any.
 fn last_moving_joints(robot: &Robot) -> Vec<JointId> {
+    let last_joints = all_last_moving_joints(robot);
+    let path = |last: &JointId| robot.joints_to(robot.joints[last.0].child);
+    let paths: Vec<Vec<JointId>> = last_joints.iter().map(path).collect();
+    let has_geometry = |joint: &JointId| {
+        let links = rigid_links(robot, robot.joints[joint.0].child);
+        links.iter().map(|(link, _)| &robot.links[link.0]).any(|l| !l.collision.is_empty() || !l.visual.is_empty())
+    };
+    let is_there = |finger: usize| {
+        let is_own = |joint: &&JointId| !paths.iter().enumerate().any(|(k, path)| k != finger && path.contains(joint));
+        paths[finger].iter().rev().take_while(is_own).any(has_geometry)
+    };
+    let there: Vec<JointId> = (0..paths.len()).filter(|&finger| is_there(finger)).map(|k| last_joints[k]).collect();
+    if there.is_empty() { last_joints } else { there }
+}
+
+/// Moving joints below which nothing moves, in document order.
+fn all_last_moving_joints(robot: &Robot) -> Vec<JointId> {
     let moves = |id: JointId| robot.joints[id.0].kind != JointKind::Fixed;
     let mut above_another: BTreeSet<JointId> = BTreeSet::new();
     for link in 0..robot.links.len() {

@@ -10,13 +10,26 @@ use regrasp_geometry::Point;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
+/// True when at most one joint moves one of two links against the other: such pairs are excused without being named.
+fn are_neighbours(hand: &Hand, &(a, b): &(LinkId, LinkId)) -> bool {
+    let moving = |link: LinkId| -> Vec<JointId> {
+        let path = hand.robot.joints_to(link).into_iter();
+        path.filter(|joint| hand.robot.joints[joint.0].moves()).collect()
+    };
+    let (to_a, to_b) = (moving(a), moving(b));
+    let n_shared = to_a.iter().zip(&to_b).take_while(|(x, y)| x == y).count();
+    to_a.len() + to_b.len() - 2 * n_shared <= 1
+}
+
 /// The text of a hand file that gives `hand` when it is loaded.
 ///
 /// `urdf` is how the file names the URDF: a path relative to the hand file. `allow` are pairs of links to be excused
-/// beyond the adjacent ones, such as those of [`super::PairTable::always`].
+/// beyond the adjacent ones and those that the hand excuses already, such as those of [`super::PairTable::always`].
 pub fn hand_file_text(hand: &Hand, urdf: &str, allow: &BTreeSet<(LinkId, LinkId)>) -> String {
     let robot = &hand.robot;
     let name = |link: LinkId| quoted(&robot.links[link.0].name);
+    let excused = hand.allowed_pairs.iter().filter(|pair| !are_neighbours(hand, pair));
+    let allow: BTreeSet<(LinkId, LinkId)> = excused.chain(allow).copied().collect();
     let mut text = String::new();
     // Writing to a String cannot fail.
     let _ = writeln!(
@@ -31,7 +44,7 @@ pub fn hand_file_text(hand: &Hand, urdf: &str, allow: &BTreeSet<(LinkId, LinkId)
             text,
             "\n# Pairs of links that are never tested against each other, beside adjacent ones.\nallow = ["
         );
-        for &(a, b) in allow {
+        for &(a, b) in &allow {
             let _ = writeln!(text, "    [{}, {}],", name(a), name(b));
         }
         let _ = writeln!(text, "]");

@@ -1,5 +1,7 @@
 //! Forward kinematics, Jacobians, inverse kinematics and motion bounds of serial chains.
 
+/// Inverse kinematics of arms to a pose.
+pub mod arm_ik;
 /// Frames as rotation matrix and translation, for the hottest paths.
 pub mod body_frame;
 /// Serial chains, forward kinematics and Jacobians.

@@ -36,6 +36,8 @@ pub struct Coordinate {
     pub upper: f64,
     /// Value where nothing else is asked: the rest posture of fingers, the home posture of arms.
     pub rest: f64,
+    /// Largest acceleration, in radians or metres per second squared, where the robot file states one.
+    pub acceleration: Option<f64>,
 }
 
 /// The coordinates of a manipulator.
@@ -84,7 +86,15 @@ impl JointLayout {
                 }
                 let [lower, upper] =
                     joint.limits.map_or([f64::NEG_INFINITY, f64::INFINITY], |limits| [limits.lower, limits.upper]);
-                coordinates.push(Coordinate { name: joint.name.clone(), joint: id, part, lower, upper, rest: 0.0 });
+                coordinates.push(Coordinate {
+                    name: joint.name.clone(),
+                    joint: id,
+                    part,
+                    lower,
+                    upper,
+                    rest: 0.0,
+                    acceleration: None,
+                });
             }
         }
         let mut layout = JointLayout { coordinates, linear_limits: Vec::new() };

@@ -110,6 +110,17 @@ pub struct Parts {
     pub allow: BTreeSet<(LinkId, LinkId)>,
     /// Rest positions of joints on no finger and no arm, by name; the allowed position nearest to zero without one.
     pub rest: BTreeMap<String, f64>,
+    /// How fast joints may speed up.
+    pub accelerations: Accelerations,
+}
+
+/// Largest accelerations, in radians or metres per second squared.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Accelerations {
+    /// Of joints that are not named.
+    pub default: Option<f64>,
+    /// By name of joint.
+    pub own: BTreeMap<String, f64>,
 }
 
 /// Limits of joints that cannot be met all at once.
@@ -124,7 +135,7 @@ impl Manipulator {
     ///
     /// Errors: limits of joints that leave no posture.
     pub fn new(name: String, robot: Arc<Robot>, parts: Parts) -> Result<Self, NoPosture> {
-        let Parts { arms, hands, common, allow, rest } = parts;
+        let Parts { arms, hands, common, allow, rest, accelerations } = parts;
         let owners = Owners::of(&robot, &arms, &hands);
         let mut posture = rest;
         for arm in &arms {
@@ -135,7 +146,10 @@ impl Manipulator {
             posture.extend(fingers.flat_map(|f| f.chain.names.iter().cloned().zip(f.rest.iter().copied())));
         }
         let order = layout::order(&arms, &hands);
-        let layout = JointLayout::new(&robot, &owners.of_joints, order, &posture)?;
+        let mut layout = JointLayout::new(&robot, &owners.of_joints, order, &posture)?;
+        for coordinate in &mut layout.coordinates {
+            coordinate.acceleration = accelerations.own.get(&coordinate.name).copied().or(accelerations.default);
+        }
         let mut allowed_pairs = allow;
         allowed_pairs.extend(hands.iter().flat_map(|hand| hand.hand.allowed_pairs.iter().copied()));
         allowed_pairs.extend(adjacent_pairs(&robot, &owners));

@@ -5,6 +5,7 @@ mod places;
 
 mod hands_alone;
 mod refused;
+mod robot_file_keys;
 mod shared_robots;
 mod text;
 mod two_arms;

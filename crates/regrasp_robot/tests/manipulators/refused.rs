@@ -88,6 +88,10 @@ fn bad_robot_files_are_refused() {
             "U211 robot.toml:14:8 key \"hands[1].name\": is \"hand\", the name of another hand",
         ),
         (
+            format!("{MODEL}{ONE_ARM}{ONE_HAND}{}", ONE_HAND.replace("\"hand\"", "\"other\"")),
+            "U226 robot.toml:16:7 key \"hands[1].arm\": link \"flange\" carries hand \"hand\" already; expected one hand on a link",
+        ),
+        (
             format!("{MODEL}name = \"m\"\n{ONE_ARM}{ONE_HAND}model = \"m\"\n"),
             "U225 robot.toml:12:8 key \"hands[0].hand\": is about hand.urdf, which is not the URDF of the model",
         ),

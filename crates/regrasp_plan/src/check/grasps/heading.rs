@@ -38,7 +38,7 @@ pub(super) fn check_heading(
 ) {
     let task = scene.manipulation();
     let object = task.object();
-    promises::check_inputs(plan, &scene.scene.inputs, log);
+    promises::check_input_files(&plan.inputs, &scene.scene.inputs, log);
     // Closure is judged grasp by grasp: here only what is promised of it.
     let margin = Some(plan.promises.required_margin);
     promises::check_promises(object, plan, settings, margin, log);

@@ -6,8 +6,9 @@
 //! ICRA 2000). A track has the same joints whoever passes, so that what is proven once is proven for all paths.
 
 use crate::in_hand::attempt::search::{Search, Stop};
-use crate::in_hand::grasps::candidate::{Candidate, Choice};
-use crate::in_hand::grasps::closure_table::ClosureTable;
+use crate::in_hand::grasps::candidate::Choice;
+use crate::in_hand::grasps::combine::most_free;
+use crate::in_hand::improving::closure::{StationClosure, StationContacts};
 use crate::in_hand::improving::cost::joint_path;
 use crate::in_hand::improving::course::Course;
 use crate::in_hand::improving::track::Track;
@@ -17,7 +18,7 @@ use regrasp_base::Rng;
 use regrasp_geometry::frame;
 use regrasp_manipulation::forces::held::balances;
 use regrasp_manipulation::grasp::sequence::Sequence;
-use regrasp_manipulation::grasp::state::{GraspState, Moment};
+use regrasp_manipulation::grasp::state::{Contacts, GraspState, Moment};
 use regrasp_manipulation::model::{Carrier, Model};
 use regrasp_manipulation::relocation::{Foothold, relocate};
 use regrasp_manipulation::workspace::TipMode;
@@ -28,6 +29,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Units of work that expanding a node is counted as: about the time of so many configurations.
 const WORK_PER_EXPANSION: u64 = 10;
+
+/// Cost that relocations between two tracks have more for each time that one was refuted, as a share of the whole: what was in
+/// the way at one station mostly is at the next too. By hand.
+const REFUTED_FEE: f64 = 0.3;
 
 /// The fingers on their tracks at a station; fewer of them than the hand has while the grasp at the start is put together.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -72,9 +77,13 @@ pub struct Gaits<'g, 'a> {
     relocation_cost: f64,
     joint_weight: f64,
     rule: ReleaseRule,
-    table: ClosureTable<'g>,
+    closure: StationClosure<'g>,
     clashes: BTreeMap<(usize, [usize; 2], [usize; 2]), bool>,
     no_goods: BTreeSet<NoGood>,
+    /// How often relocations of a finger from one track to another were refuted, at any station.
+    refuted: BTreeMap<(usize, usize, usize), u32>,
+    /// Cost that a refuted relocation has more, at all stations.
+    refuted_fee: f64,
     proven_transfers: BTreeSet<Node>,
     proven_relocations: BTreeMap<(Node, usize, usize), Vec<Coordinates>>,
     nodes: Vec<Node>,
@@ -92,7 +101,7 @@ impl<'g, 'a> Gaits<'g, 'a> {
         search: &'g mut Search<'a>,
         course: &'g Course,
         tracks: &'g [Vec<Track>],
-        contacts: &'g [Vec<Candidate>],
+        contacts: &'g StationContacts,
         alone: &'g [Alone],
         goal: Option<&'g Choice>,
         margin: f64,
@@ -108,9 +117,11 @@ impl<'g, 'a> Gaits<'g, 'a> {
             relocation_cost: search.settings.improvement.cost.relocation,
             joint_weight: search.settings.improvement.cost.joint_path,
             rule: search.settings.search.release_rule,
-            table: ClosureTable::with_margin(model, contacts, margin),
+            closure: StationClosure::new(model, contacts, margin),
             clashes: BTreeMap::new(),
             no_goods: BTreeSet::new(),
+            refuted: BTreeMap::new(),
+            refuted_fee: if model.any_rolls() { REFUTED_FEE } else { 0.0 },
             proven_transfers: BTreeSet::new(),
             proven_relocations: BTreeMap::new(),
             nodes: vec![root.clone()],
@@ -175,7 +186,11 @@ impl<'g, 'a> Gaits<'g, 'a> {
     fn put_together(&mut self, node: &Node, out: &mut Vec<(usize, f64)>) {
         let finger = node.choice.len();
         for track in 0..self.tracks[finger].len() {
-            let may_begin = self.alone[finger].start.is_none_or(|start| start == track);
+            // Where the grasp is chosen all fingers begin on the object.
+            let may_begin = match self.alone[finger].start {
+                Some(start) => start == track,
+                None => !self.tracks[finger][track].is_free(),
+            };
             if !may_begin || !self.tracks[finger][track].spans(0) || !self.alone[finger].rest[0][track].is_finite() {
                 continue;
             }
@@ -183,7 +198,7 @@ impl<'g, 'a> Gaits<'g, 'a> {
             next.choice.push(track);
             if !self.is_clear_of_others(&next, finger)
                 || (next.choice.len() == self.n_fingers()
-                    && (!self.is_allowed(&next.choice) || self.no_goods.contains(&NoGood::Start(next.choice.clone()))))
+                    && (!self.is_allowed(&next) || self.no_goods.contains(&NoGood::Start(next.choice.clone()))))
             {
                 continue;
             }
@@ -197,10 +212,15 @@ impl<'g, 'a> Gaits<'g, 'a> {
         if station == self.course.last() || self.cannot_advance(node) {
             return;
         }
+        let next = Node { station: station + 1, choice: node.choice.clone() };
+        // Contacts that roll may not hold any more.
+        if self.closure.changes() && !self.is_held_at_next(&next) {
+            return;
+        }
         let alone: f64 = (0..self.n_fingers()).map(|f| self.alone[f].advance[station][node.choice[f]]).sum();
         if alone.is_finite() {
             let cost = alone + self.object_rest[station] - self.object_rest[station + 1];
-            let next = self.id_of(Node { station: station + 1, choice: node.choice.clone() });
+            let next = self.id_of(next);
             out.push((next, cost));
         }
     }
@@ -223,7 +243,7 @@ impl<'g, 'a> Gaits<'g, 'a> {
         let moment = self.course.stations[station];
         for finger in 0..self.n_fingers() {
             let from = node.choice[finger];
-            if !self.table.is_closed(&node.choice, all & !(1 << finger)) {
+            if !self.closure.is_closed(station, &node.choice, all & !(1 << finger)) {
                 continue;
             }
             for track in 0..self.tracks[finger].len() {
@@ -236,22 +256,40 @@ impl<'g, 'a> Gaits<'g, 'a> {
                 }
                 let mut next = node.clone();
                 next.choice[finger] = track;
-                if !self.is_allowed(&next.choice) || !self.is_clear_of_others(&next, finger) {
+                if !self.is_allowed(&next) || !self.is_clear_of_others(&next, finger) {
                     continue;
                 }
                 let of_finger = &self.tracks[finger];
-                let cost = self.relocation_cost
-                    + self.joint_weight * joint_path(of_finger[from].at(moment), of_finger[track].at(moment));
+                let path = joint_path(of_finger[from].at(moment), of_finger[track].at(moment));
+                // Lifting off to stay free is counted where the finger lands again.
+                let landing = if of_finger[track].is_free() { 0.0 } else { self.relocation_cost };
+                let refuted = self.refuted.get(&(finger, from, track)).copied().unwrap_or(0);
+                let cost = landing + self.joint_weight * path + self.refuted_fee * f64::from(refuted);
                 out.push((self.id_of(next), cost));
             }
         }
     }
 
-    /// True when the release rule lets this grasp be.
-    fn is_allowed(&mut self, choice: &Choice) -> bool {
+    /// Number of fingers that are free.
+    fn n_free(&self, choice: &Choice) -> usize {
+        choice.iter().enumerate().filter(|&(finger, &track)| self.tracks[finger][track].is_free()).count()
+    }
+
+    /// True when the release rule lets this grasp be, with no more free fingers than the settings allow.
+    fn is_allowed(&mut self, node: &Node) -> bool {
         let all = (1u32 << self.n_fingers()) - 1;
-        self.table.is_closed(choice, all)
-            && (self.rule == ReleaseRule::WhereOthersHold || self.table.n_releasable(choice) == self.n_fingers())
+        let most_free = most_free(self.search.model(), &self.search.settings.search);
+        self.n_free(&node.choice) <= most_free
+            && self.closure.is_closed(node.station, &node.choice, all)
+            && (self.rule == ReleaseRule::WhereOthersHold
+                || self.closure.n_releasable(node.station, &node.choice) == self.n_fingers())
+    }
+
+    /// True when all tracks go as far as the node's station and hold the object there.
+    fn is_held_at_next(&mut self, node: &Node) -> bool {
+        let (moment, all) = (self.course.stations[node.station], (1u32 << self.n_fingers()) - 1);
+        let spans = |(finger, &track): (usize, &usize)| self.tracks[finger][track].spans(moment);
+        node.choice.iter().enumerate().all(spans) && self.closure.is_closed(node.station, &node.choice, all)
     }
 
     /// True when `finger` is clear of the other fingers at the node's station.
@@ -273,30 +311,43 @@ impl<'g, 'a> Gaits<'g, 'a> {
         let node = &self.nodes[node];
         node.station == self.course.last()
             && node.choice.len() == self.n_fingers()
-            && self.goal.is_none_or(|goal| *goal == node.choice)
+            && match self.goal {
+                Some(goal) => *goal == node.choice,
+                // Fingers end on the object.
+                None => self.n_free(&node.choice) == 0,
+            }
     }
 
     fn state(&self, node: &Node) -> GraspState {
         let moment = self.course.stations[node.station];
         let on_track = |(finger, &track): (usize, &usize)| &self.tracks[finger][track];
-        GraspState::held_by_all(
-            self.course.poses[moment],
-            node.choice.iter().enumerate().map(|which| on_track(which).contact).collect(),
-            node.choice.iter().enumerate().map(|which| on_track(which).at(moment).clone()).collect(),
-        )
+        let of_track = |track: &Track| (track.foothold(moment).copied(), track.at(moment).clone());
+        GraspState::of(self.course.poses[moment], node.choice.iter().enumerate().map(|which| of_track(on_track(which))))
     }
 
     /// The moments of a transfer from a node's station to the next.
     fn moments(&self, node: &Node) -> Vec<Moment> {
         let range = self.course.stations[node.station] + 1..=self.course.stations[node.station + 1];
-        let contacts = self.state(node).contacts;
+        let on_track = |(finger, &track): (usize, &usize)| &self.tracks[finger][track];
         range
             .map(|moment| Moment {
-                contacts: contacts.clone(),
                 world_from_object: self.course.poses[moment],
-                joints: node.choice.iter().enumerate().map(|(f, &t)| self.tracks[f][t].at(moment).clone()).collect(),
+                joints: node.choice.iter().enumerate().map(|which| on_track(which).at(moment).clone()).collect(),
+                contacts: node.choice.iter().enumerate().map(|which| *on_track(which).contact(moment)).collect(),
             })
             .collect()
+    }
+
+    /// True when contacts that roll hold the object all the way from a node's station to the next.
+    fn holds_throughout(&self, node: &Node, moments: &[Moment]) -> bool {
+        let holding = self.state(node).holding;
+        let first = self.course.stations[node.station];
+        (0..moments.len()).all(|k| {
+            let halfway: Contacts = (node.choice.iter().enumerate())
+                .map(|(finger, &track)| *self.tracks[finger][track].contact_after(first + k))
+                .collect();
+            self.closure.holds(&halfway, holding) && self.closure.holds(&moments[k].contacts, holding)
+        })
     }
 
     /// True when the transfer from the node's station to the next is free.
@@ -309,8 +360,14 @@ impl<'g, 'a> Gaits<'g, 'a> {
             self.no_goods.insert(NoGood::Grasp(node.station, node.choice.clone()));
             return false;
         }
-        self.search.workspace.set(&state.world_from_object, &state.joints, &state.contacts);
-        for moment in self.moments(node) {
+        let moments = self.moments(node);
+        if self.closure.changes() && !self.holds_throughout(node, &moments) {
+            self.no_goods.insert(NoGood::Grasp(node.station, node.choice.clone()));
+            return false;
+        }
+        self.search.workspace.set_state(&state);
+        for moment in moments {
+            self.search.workspace.roll_to(&moment.contacts);
             if !self.search.workspace.step(&moment.world_from_object, &moment.joints, TipMode::AllHold) {
                 let no_good = self.blamed(node);
                 self.no_goods.insert(no_good);
@@ -355,18 +412,18 @@ impl<'g, 'a> Gaits<'g, 'a> {
         }
         let state = self.state(node);
         if !self.is_balanced(&state.moment(), state.holding & !(1 << finger)) {
-            self.no_goods.insert(NoGood::Relocation(node.station, finger, node.choice[finger], track));
+            self.refute_relocation(node, finger, track);
             return false;
         }
-        self.search.workspace.set(&state.world_from_object, &state.joints, &state.contacts);
+        self.search.workspace.set_state(&state);
         let to = &self.tracks[finger][track];
         let moment = self.course.stations[node.station];
         let path = relocate(
             &mut self.search.workspace,
             &state.world_from_object,
             finger,
-            Foothold { contact: Some(&state.contacts[finger]), joints: &state.joints[finger] },
-            Foothold { contact: Some(&to.contact), joints: to.at(moment) },
+            Foothold { contact: state.contact(finger).as_ref(), joints: &state.joints[finger] },
+            Foothold { contact: to.foothold(moment), joints: to.at(moment) },
             rng,
         );
         match path {
@@ -375,16 +432,22 @@ impl<'g, 'a> Gaits<'g, 'a> {
                 true
             }
             None => {
-                self.no_goods.insert(NoGood::Relocation(node.station, finger, node.choice[finger], track));
+                self.refute_relocation(node, finger, track);
                 false
             }
         }
     }
 
+    fn refute_relocation(&mut self, node: &Node, finger: usize, track: usize) {
+        let from = node.choice[finger];
+        self.no_goods.insert(NoGood::Relocation(node.station, finger, from, track));
+        *self.refuted.entry((finger, from, track)).or_default() += 1;
+    }
+
     /// True when every motion along `path` is proven; what is refuted is remembered.
     fn prove(&mut self, path: &[Node], rng: &mut Rng) -> Result<bool, Stop> {
         let state = self.state(&path[0]);
-        self.search.workspace.set(&state.world_from_object, &state.joints, &state.contacts);
+        self.search.workspace.set_state(&state);
         let mut is_proven = self.search.workspace.is_clear(TipMode::AllHold);
         if !is_proven {
             self.no_goods.insert(NoGood::Start(path[0].choice.clone()));
@@ -416,7 +479,8 @@ impl<'g, 'a> Gaits<'g, 'a> {
                 Some((finger, track)) => {
                     way.push_transfer(std::mem::take(&mut moments));
                     let steps = self.proven_relocations[&(node.clone(), finger, track)].clone();
-                    way.push_regrasp(finger, Some(self.tracks[finger][track].contact), steps);
+                    let there = self.course.stations[node.station];
+                    way.push_regrasp(finger, self.tracks[finger][track].foothold(there).copied(), steps);
                 }
             }
         }
@@ -503,7 +567,8 @@ impl Alone {
             for (index, track) in here() {
                 let changes = here().filter(|&(other, _)| other != index).map(|(other, onto)| {
                     let path = joint_path(track.at(moment), onto.at(moment));
-                    weights.relocation + weights.joint_path * path + staying[other]
+                    let landing = if onto.is_free() { 0.0 } else { weights.relocation };
+                    landing + weights.joint_path * path + staying[other]
                 });
                 rest[station][index] = changes.fold(staying[index], f64::min);
             }

@@ -27,8 +27,7 @@ fn with_gaits(name: &str, n_tracks: usize, test: impl FnOnce(&mut Gaits)) {
             tracks.push(covers(&course, drawn, n_tracks));
             alone.push(Alone::new(&course, &tracks[finger], [None; 2], &search.settings.improvement.cost));
         }
-        let foothold = |t: &Track| Candidate { contact: Some(t.contact), joints: t.joints[0].clone(), follow: 0.0 };
-        let contacts: Vec<Vec<Candidate>> = tracks.iter().map(|tracks| tracks.iter().map(foothold).collect()).collect();
+        let contacts = StationContacts::of(search.model(), &course, &tracks);
         let margin = search.model().settings.closure_margin;
         test(&mut Gaits::new(search, &course, &tracks, &contacts, &alone, None, margin));
     });

@@ -68,7 +68,7 @@ pub fn step_joints(model: &Model, holding: u32, here: &Moment, pose: &Pose) -> R
 }
 
 /// How far a tip may stray from its contact half-way, in metres: a share of the tolerance; the rest is for what lies between.
-const HALFWAY_ALLOWED: f64 = 0.7 * CONTACT_TOLERANCE;
+pub const HALFWAY_ALLOWED: f64 = 0.7 * CONTACT_TOLERANCE;
 
 /// True when the tip of `finger` stays on its contact while its joints move linearly: half-way, where it strays most.
 /// `halfway` places the object there.

@@ -45,7 +45,7 @@ pub fn probe(
 ) -> Result<Vec<Probe>, Failure> {
     let search = SearchSettings { first_try: None, shortcuts: 0, ..settings.search.clone() };
     let mut short = InHandSettings { search, n_threads: 1, ..settings.clone() };
-    short.improvement.improve_work = 0;
+    (short.improvement.improve_work, short.improvement.shorten_share) = (0, 0.0);
     let silent = |_: Progress| {};
     let mut probes = Vec::with_capacity(queries.len());
     for query in queries {

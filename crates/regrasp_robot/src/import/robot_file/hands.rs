@@ -36,7 +36,8 @@ enum Source {
 /// Reads `[[hands]]`, and mounts those with URDFs of their own on the tree. None where one of them is bad.
 ///
 /// Errors: names used twice (`U211`), unknown arms and models (`U224`), a hand file about another URDF than the model (`U225`), a
-/// hand that its mount link does not carry (`U206`), couplings that differ (`U219`).
+/// hand that its mount link does not carry (`U206`), couplings that differ (`U219`), two hands on one
+/// mount link (`U226`).
 pub(super) fn read(entry: &Entry, draft: &mut Draft, arms: &[ArmSpec], found: &mut Found) -> Option<Vec<Mount>> {
     let items = entry.entries(found, "[[hands]] tables")?;
     let mut mounts: Vec<Mount> = Vec::new();
@@ -91,6 +92,13 @@ fn read_hand(
             return None;
         }
     };
+    let is_named = mount_entry.is_some() || arm.is_some();
+    if let Some(other) = others.iter().find(|other| is_named && other.spec.mount == Some(mount)) {
+        let link = &draft.tree.links[mount.0].name;
+        let problem = format!("link \"{link}\" carries hand \"{}\" already", other.name);
+        refuse(mount_entry.as_ref().or(arm_entry.as_ref())?, "U226", problem, "one hand on a link", found);
+        return None;
+    }
     let source = match (model, pose?) {
         (Some(model), None) => Source::Model(model),
         (None, pose) => Source::OwnModel(pose.unwrap_or_default()),

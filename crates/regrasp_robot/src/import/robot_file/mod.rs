@@ -6,18 +6,21 @@
 mod arms;
 /// Hands and what carries them.
 mod hands;
+/// Held and common joints, accelerations.
+mod joints;
 /// Several robots as one tree.
 mod merge;
 /// Models: URDFs with their places.
 mod models;
+/// Balls instead of collision geometry.
+mod spheres;
 
 use super::couplings;
 use super::hand_file::{CODES, LoadedHand, load_hand, read_pairs};
 use super::options::{LoadOptions, LoadedInput};
 use super::spec::Positions;
-use crate::coupling::Coupling;
 use crate::manipulator::layout::Part;
-use crate::manipulator::{CommonPart, LinkShape, Manipulator, NoPosture, Owners, Parts};
+use crate::manipulator::{Accelerations, CommonPart, LinkShape, Manipulator, NoPosture, Owners, Parts};
 use crate::robot::{LinkId, Robot};
 use regrasp_base::diagnostic::number;
 use regrasp_base::toml_table::{Entry, Found, Table};
@@ -115,6 +118,7 @@ fn read(
     let name = root.optional("name").map(|entry| entry.name(found).map(str::to_owned));
     let [models, couplings, arms, hands, rest, allow] =
         ["models", "couplings", "arms", "hands", "rest", "allow"].map(|key| root.optional(key));
+    let [common, held, accelerations] = ["common", "held", "accelerations"].map(|key| root.optional(key));
     if models.is_none() && hands.is_none() {
         let diagnostic = root.error("U202", found, "has neither `models` nor `hands`");
         found.diagnostics.push(diagnostic.fix("add at least one [[models]] or [[hands]] table"));
@@ -124,6 +128,9 @@ fn read(
     let mut draft = models::read(models.as_ref(), &name, (path, options), found)?;
     if let Some(entry) = &couplings {
         couplings::read(entry, &mut draft.tree, found);
+    }
+    if let Some(entry) = &held {
+        joints::hold(entry, &mut draft.tree, found);
     }
     // Hands with URDFs of their own join the tree, before arms and hands are made of it.
     let arm_specs = arms.map_or_else(|| Some(Vec::new()), |entry| arms::read(&entry, &draft.tree, found));
@@ -138,6 +145,8 @@ fn read(
     let arms: Vec<_> = arm_specs.iter().filter_map(|spec| arms::make(&tree, spec, found)).collect();
     let hands: Vec<_> = mounts.iter().filter_map(|mount| hands::make(&tree, mount, found)).collect();
     let rest = rest.map_or_else(Positions::new, |entry| read_positions(&entry, found));
+    let accelerations =
+        accelerations.map_or_else(Accelerations::default, |entry| joints::read_accelerations(&entry, &tree, found));
     if !found.diagnostics.is_empty() {
         return None;
     }
@@ -149,11 +158,15 @@ fn read(
         common: CommonPart::default(),
         allow: draft.allow,
         rest: rest.iter().map(|(name, value, _)| (name.clone(), *value)).collect(),
+        accelerations,
     };
     add_shapes(&tree, &owners, &mut parts, path, found);
     let made = Manipulator::new(name, tree, parts);
     let manipulator = made.map_err(|no| found.diagnostics.push(refused_posture(&no, Place::file(path)))).ok()?;
     refuse_bad_rest(&manipulator, &rest, found);
+    if let Some(table) = common.and_then(|entry| entry.table(found)) {
+        joints::refuse_unlisted(table, &manipulator, found);
+    }
     found.diagnostics.is_empty().then_some((manipulator, draft.inputs))
 }
 
@@ -182,17 +195,25 @@ fn refuse_repeated_names(tree: &Robot, path: &Path, found: &mut Found) {
     }
 }
 
-/// Errors: a joint of an arm or a hand that follows one of another part, or the other way round (`U209`).
+/// Errors: a joint of a hand that follows one outside of it, or the other way round (`U209`): a hand plans while the rest of the robot is
+/// at rest.
 fn refuse_couplings_across(tree: &Robot, owners: &Owners, path: &Path, found: &mut Found) {
+    let hand_of = |joint: usize| match owners.of_joints[joint] {
+        part @ Part::Hand(_) => Some(part),
+        Part::Common | Part::Arm(_) => None,
+    };
     for (index, joint) in tree.joints.iter().enumerate() {
-        let own = owners.of_joints[index];
-        let leads_from_elsewhere =
-            |coupling: &&Coupling| coupling.terms.iter().any(|(leader, _)| owners.of_joints[leader.0] != own);
-        if joint.coupling.as_ref().filter(leads_from_elsewhere).is_some() {
-            let problem = "follows a joint of another part of the robot";
-            let diagnostic = Diagnostic::new("U209", Place::file(path), problem).element("joint", &joint.name);
-            found.diagnostics.push(diagnostic.expected("leaders in the same arm, hand or common part"));
-        }
+        let Some(coupling) = &joint.coupling else { continue };
+        let Some((leader, _)) = coupling.terms.iter().find(|(leader, _)| hand_of(leader.0) != hand_of(index)) else {
+            continue;
+        };
+        let name = &tree.joints[leader.0].name;
+        let problem = match hand_of(index) {
+            Some(_) => format!("is on a hand and follows joint \"{name}\", which is not on that hand"),
+            None => format!("follows joint \"{name}\", which is on a hand, but is on none"),
+        };
+        let diagnostic = Diagnostic::new("U209", Place::file(path), problem).element("joint", &joint.name);
+        found.diagnostics.push(diagnostic.expected("leaders on the same hand, or both on no hand"));
     }
 }
 

@@ -4,8 +4,11 @@ use super::super::hand_file::{locate_and_load, read_srdf, unit_quaternion};
 use super::super::options::{LoadOptions, LoadedInput};
 use super::Draft;
 use super::merge::{self, Place};
-use crate::robot::Robot;
+use super::spheres;
+use crate::robot::{LinkId, Robot};
 use nalgebra::{Translation3, UnitQuaternion};
+use regrasp_base::Diagnostic;
+use regrasp_base::diagnostic::did_you_mean;
 use regrasp_base::toml_table::{Entry, Found, Table};
 use regrasp_geometry::Pose;
 use std::collections::BTreeSet;
@@ -25,7 +28,9 @@ pub(super) struct PlacedUrdf {
 struct ModelSpec {
     name: Option<String>,
     robot: Robot,
-    root_from_model: Option<Pose>,
+    /// The link that carries it, and where the file names it; the root without one.
+    parent: Option<(String, regrasp_base::Place)>,
+    parent_from_model: Option<Pose>,
     inputs: Vec<LoadedInput>,
     disabled: BTreeSet<(crate::robot::LinkId, crate::robot::LinkId)>,
 }
@@ -60,7 +65,7 @@ pub(super) fn read<'a>(
         }
     }
     let (is_alone, has_own_root) =
-        (specs.len() == 1, matches!(specs.as_slice(), [spec] if spec.root_from_model.is_none()));
+        (specs.len() == 1, matches!(specs.as_slice(), [spec] if spec.parent_from_model.is_none()));
     let mut draft = Draft {
         path,
         options,
@@ -78,8 +83,9 @@ pub(super) fn read<'a>(
             false => {
                 let prefix =
                     spec.name.as_ref().filter(|_| !is_alone).map_or_else(String::new, |name| format!("{name}/"));
-                let root = draft.tree.root;
-                merge::mount(&mut draft.tree, &spec.robot, &prefix, root, &spec.root_from_model.unwrap_or_default())
+                let parent = parent_of(&spec, &draft.tree, found)?;
+                let parent_from_model = spec.parent_from_model.unwrap_or_default();
+                merge::mount(&mut draft.tree, &spec.robot, &prefix, parent, &parent_from_model)
             }
         };
         draft.allow.extend(spec.disabled.iter().map(|&(a, b)| (place.link(a), place.link(b))));
@@ -90,13 +96,34 @@ pub(super) fn read<'a>(
     Some(draft)
 }
 
+/// The link that carries a model: of a model before it, or the root. Errors: no such link (`U205`).
+fn parent_of(spec: &ModelSpec, tree: &Robot, found: &mut Found) -> Option<LinkId> {
+    let Some((name, place)) = &spec.parent else { return Some(tree.root) };
+    let link = tree.link_named(name);
+    if link.is_none() {
+        let meant = did_you_mean(name, tree.links.iter().map(|link| link.name.as_str()));
+        let problem = format!("the models before this one have no link \"{name}\"");
+        let diagnostic = Diagnostic::new("U205", place.clone(), problem).element("key", "parent");
+        let fix = meant.map_or(String::new(), |meant| format!("did you mean \"{meant}\"?"));
+        found.diagnostics.push(diagnostic.expected("MODEL/LINK of a model above").fix(fix));
+    }
+    link
+}
+
 fn read_model(mut table: Table, path: &Path, options: &LoadOptions, found: &mut Found) -> Option<ModelSpec> {
     let name = table.optional("name").map(|entry| entry.name(found).map(str::to_owned));
     let urdf = table.required(found, "urdf", "add urdf = \"robot.urdf\"");
-    let srdf = table.optional("srdf");
+    let [srdf, spheres, parent] = ["srdf", "spheres", "parent"].map(|key| table.optional(key));
+    let parent = match parent {
+        Some(entry) => Some((entry.text(found)?.to_owned(), found.place(&entry.span))),
+        None => None,
+    };
     let pose = read_pose(&mut table, found);
     table.finish(found);
-    let (robot, mut inputs) = locate_and_load(&urdf?, path, options, found)?;
+    let (mut robot, mut inputs) = locate_and_load(&urdf?, path, options, found)?;
+    if let Some(entry) = &spheres {
+        inputs.extend(spheres::replace(entry, &mut robot, path, options, found));
+    }
     let mut disabled = BTreeSet::new();
     if let Some(entry) = srdf
         && let Some(loaded) = read_srdf(&entry, path, &robot, options, found)
@@ -108,7 +135,7 @@ fn read_model(mut table: Table, path: &Path, options: &LoadOptions, found: &mut 
         Some(name) => Some(name?),
         None => None,
     };
-    Some(ModelSpec { name, robot, root_from_model: pose?, inputs, disabled })
+    Some(ModelSpec { name, robot, parent, parent_from_model: pose?, inputs, disabled })
 }
 
 /// `position` and `quat_xyzw`; Some(None) where neither is there, none where one is bad.

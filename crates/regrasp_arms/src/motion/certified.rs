@@ -1,0 +1,182 @@
+//! Motions that are free at every moment.
+//!
+//! A motion is cut into intervals. In the middle of an interval every ball is grown by how far it can move within half of it:
+//! where the grown balls meet nothing, the whole interval is free. Intervals that meet something are cut in two. The bound is the
+//! speed in the middle times the half, plus half of the largest acceleration times its square. Eight intervals are looked at together.
+
+use super::{Collider, Track};
+use crate::lanes::{F8, LANES};
+use crate::world::{Item, ball_overlap};
+
+/// Single precision: positions are off by less than this, in metres, for robots of a few metres.
+pub const ROUNDING: f32 = 1e-5;
+/// How far bodies move between two first moments, at most, in metres.
+const FIRST_WAY: f32 = 0.3;
+/// First intervals at most.
+const MOST_FIRST: usize = 64;
+
+impl Collider<'_> {
+    #[inline(always)]
+    pub(super) fn certified(&mut self, track: &Track) -> bool {
+        self.counts.motions += 1;
+        if !track.coefficients.iter().flatten().all(|c| c.is_finite()) {
+            return false;
+        }
+        let fastest = self.prepare(track);
+        let n = ((fastest / FIRST_WAY / LANES as f32).ceil() as usize * LANES).clamp(LANES, MOST_FIRST);
+        let half = 0.5 / n as f32;
+        // The last ones are taken first: spread over the whole motion.
+        self.intervals.clear();
+        for offset in 0..n / LANES {
+            self.intervals.extend((0..LANES).map(|l| [(2 * (l * n / LANES + offset) + 1) as f32 * half, half]));
+        }
+        while !self.intervals.is_empty() {
+            let n_lanes = self.intervals.len().min(LANES);
+            let mut lanes = [[0.0; 2]; LANES];
+            for lane in 0..LANES {
+                lanes[lane] = match lane < n_lanes {
+                    true => self.intervals[self.intervals.len() - n_lanes + lane],
+                    false => lanes[0],
+                };
+            }
+            self.intervals.truncate(self.intervals.len() - n_lanes);
+            let Some(undecided) = self.undecided(track, &lanes) else { return false };
+            for lane in (0..n_lanes).filter(|lane| undecided >> lane & 1 == 1) {
+                let [middle, half] = lanes[lane];
+                let is_last = half * fastest < self.settings.least_step as f32 || half < 1e-6;
+                if is_last && !self.is_interval_exactly_free(track, lanes[lane]) {
+                    return false;
+                }
+                if is_last {
+                    continue;
+                }
+                let quarter = 0.5 * half;
+                self.intervals.extend([[middle - quarter, quarter], [middle + quarter, quarter]]);
+            }
+        }
+        true
+    }
+
+    /// How fast bodies move at most; fills in speeds of pairs and bounds of accelerations.
+    #[inline(always)]
+    fn prepare(&mut self, track: &Track) -> f32 {
+        let n = self.model.dimension();
+        let largest: Vec<[f32; 2]> = (0..n).map(|k| track.largest(k)).collect();
+        self.find_speeds(|k| largest[k][0]);
+        // How fast all joints turn together.
+        let mut pace = 0.0;
+        let mut slides = false;
+        for frame in &self.model.frames {
+            pace += frame.terms.iter().map(|&(k, multiplier)| multiplier.abs() * largest[k][0]).sum::<f32>();
+            slides |= frame.slides;
+        }
+        // Where joints slide, each product of two velocities may count twice.
+        let factor = if slides { 2.0 } else { 1.0 };
+        let mut fastest = 0.0f32;
+        for (body, of_model) in self.model.bodies.iter().enumerate() {
+            let [mut speed, mut bend] = [0.0, 0.0];
+            for term in &of_model.speed {
+                speed += term.reach * largest[term.coordinate][0];
+                bend += term.reach * largest[term.coordinate][1];
+            }
+            self.bends[body] = bend + factor * pace * speed;
+            fastest = fastest.max(speed);
+        }
+        fastest
+    }
+
+    /// One bit for each interval that is not proved to be free. None where the middle of one collides.
+    #[inline(always)]
+    fn undecided(&mut self, track: &Track, lanes: &[[f32; 2]; LANES]) -> Option<u8> {
+        let (mut middles, mut halves) = (F8::ZERO, F8::ZERO);
+        for l in 0..LANES {
+            // The middles of intervals are rounded.
+            (middles.0[l], halves.0[l]) = (lanes[l][0], lanes[l][1] + 2e-7);
+        }
+        for k in 0..self.q.len() {
+            (self.q[k], self.rates[k]) = track.lanes(k, middles);
+        }
+        self.place_frames();
+        self.find_velocities();
+        let clearance = self.settings.clearance as f32;
+        let mut undecided = 0u8;
+        for index in 0..self.exposed.len() {
+            let body = self.exposed[index] as usize;
+            let center = self.place_bound(body);
+            let of_model = &self.model.bodies[body];
+            let sway = self.sway(body, halves) + (clearance + ROUNDING);
+            self.sways[body] = sway;
+            let reach = sway + of_model.bound.radius;
+            let is_exact = of_model.is_exact;
+            self.find_near(&center, &reach);
+            for index in 0..self.found.len() {
+                let world = self.world;
+                let item = &world.items[self.found[index] as usize];
+                if !item.overlap(&center, reach).any_positive() {
+                    continue;
+                }
+                self.place_balls(body);
+                let range = self.model.bodies[body].balls.clone();
+                let (mut grown, mut bare) = (F8::splat(-1.0), F8::splat(-1.0));
+                for index in range {
+                    let (radius, center) = (self.model.balls[index].radius, &self.balls[index]);
+                    let reach = sway + radius;
+                    let mut overlap = item.overlap(center, reach);
+                    if let Item::Other { exact, .. } = item
+                        && overlap.any_positive()
+                    {
+                        overlap = Item::refined(exact, center, reach, overlap);
+                    } else {
+                        bare = bare.max(item.overlap(center, F8::splat(radius + clearance - ROUNDING)));
+                    }
+                    grown = grown.max(overlap);
+                }
+                if is_exact && bare.any_positive() {
+                    return None;
+                }
+                let mut bits = grown.positive();
+                if !is_exact && bits != 0 {
+                    bits = self.near_obstacle(body, self.found[index] as usize, bits, sway);
+                }
+                undecided |= bits;
+            }
+        }
+        self.place_other_bounds();
+        for index in 0..self.pairs.len() {
+            let pair = self.pairs[index] as usize;
+            let [a, b] = self.model.pairs[pair].bodies;
+            let bound = self.model.bodies[a].bound.radius + self.model.bodies[b].bound.radius;
+            let sway = halves * self.pair_speeds[pair] + (clearance + 2.0 * ROUNDING);
+            if !ball_overlap(&self.bounds[a], &self.bounds[b], sway + bound).any_positive() {
+                continue;
+            }
+            self.place_balls(a);
+            self.place_balls(b);
+            let (balls_a, balls_b) = (self.model.bodies[a].balls.clone(), self.model.bodies[b].balls.clone());
+            let is_exact = self.model.bodies[a].is_exact && self.model.bodies[b].is_exact;
+            let (mut grown, mut bare) = (F8::splat(-1.0), F8::splat(-1.0));
+            for i in balls_a {
+                let (radius, center) = (self.model.balls[i].radius, self.balls[i]);
+                let whole = sway + (radius + self.model.bodies[b].bound.radius);
+                if !ball_overlap(&center, &self.bounds[b], whole).any_positive() {
+                    continue;
+                }
+                for j in balls_b.clone() {
+                    let radii = radius + self.model.balls[j].radius;
+                    grown = grown.max(ball_overlap(&center, &self.balls[j], sway + radii));
+                    let bare_reach = F8::splat(radii + clearance - 2.0 * ROUNDING);
+                    bare = bare.max(ball_overlap(&center, &self.balls[j], bare_reach));
+                }
+            }
+            if is_exact && bare.any_positive() {
+                return None;
+            }
+            let mut bits = grown.positive();
+            if !is_exact && bits != 0 {
+                bits = self.near_body([a, b], bits, sway);
+            }
+            undecided |= bits;
+        }
+        Some(undecided)
+    }
+}

@@ -1,0 +1,272 @@
+//! No two bodies meet at any moment: distances where they are measured, bounds of motion in between.
+//!
+//! An interval of a step is judged at its middle. Let a point be carried by joints `1 .. n`, of which joint `j` moves by at most `d_j`
+//! from the middle to any moment of the interval. Seen from the body that carries joint 1, the point then moves by at most
+//! `sum_j c_j`, where `c_j` is `d_j` for a sliding joint, and `2 sin(d_j / 2)` times the point's distance from the axis at the middle for
+//! one that turns: undo the joints one after the other, the outermost first; each carries the point from where it is at the middle
+//! along its own arc, and those before it are rigid motions. Two items are therefore apart in the whole interval where their distance at
+//! the middle is more than the two sums up to the body that both stand on. Else the interval is halved.
+
+use crate::check::robots::items::{Item, Items, Pair};
+use crate::check::robots::motion::{RobotStep, largest_change};
+use crate::check::robots::question::Question;
+use crate::check::robots::tree::{Frame, Tree};
+use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
+use crate::check::{CheckSettings, Clearance, Log};
+use crate::robot_plan::RobotPlan;
+use nalgebra::Translation3;
+use regrasp_geometry::reference::{Clearance as Found, distance};
+use regrasp_geometry::{Point, Pose, Vector};
+use std::f64::consts::PI;
+
+/// How far a pair is shifted when its distance is not resolved, in metres, and the directions tried.
+const NUDGE: f64 = 1e-5;
+const NUDGES: [[f64; 3]; 6] =
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
+/// More than any rounding of lengths, in metres.
+const ROUNDING: f64 = 1e-9;
+/// Distances beyond this are not told apart, in metres.
+const FARTHEST: f64 = 1.0;
+
+/// Where a robot and what it carries are at one moment.
+pub struct Placed<'a> {
+    tree: &'a Tree,
+    items: &'a Items,
+    joints: Vec<f64>,
+    frames: Vec<Frame>,
+    axes: Vec<Frame>,
+    centers: Vec<Point>,
+    /// Distances measured so far.
+    pub n_distances: u64,
+}
+
+impl<'a> Placed<'a> {
+    /// Of these items.
+    pub fn new(tree: &'a Tree, items: &'a Items) -> Self {
+        let centers = vec![Point::origin(); items.items.len()];
+        let (joints, frames, axes) = (Vec::new(), Vec::new(), Vec::new());
+        Placed { tree, items, joints, frames, axes, centers, n_distances: 0 }
+    }
+
+    /// Moves everything to `joints`.
+    pub fn place(&mut self, joints: &[f64]) {
+        self.joints.clear();
+        self.joints.extend_from_slice(joints);
+        self.tree.frames(&self.joints, &mut self.frames, &mut self.axes);
+        for (item, center) in self.items.items.iter().zip(&mut self.centers) {
+            *center =
+                if item.body == 0 && stands(item) { item.center } else { self.frames[item.body].point(&item.center) };
+        }
+    }
+
+    fn pose(&self, item: &Item) -> Pose {
+        if stands(item) { item.frame.pose() } else { self.frames[item.body].then(&item.frame).pose() }
+    }
+
+    /// Distance between the balls of a pair.
+    pub fn gap(&self, pair: &Pair) -> f64 {
+        let apart = (self.centers[pair.a] - self.centers[pair.b]).norm();
+        apart - self.items.items[pair.a].radius - self.items.items[pair.b].radius
+    }
+
+    /// Signed distance, negative where they overlap; distances of `most` and more are not told apart. None when unresolved.
+    pub fn measure(&mut self, pair: &Pair, most: f64) -> Option<f64> {
+        let (a, b) = (&self.items.items[pair.a], &self.items.items[pair.b]);
+        let (pose_a, pose_b) = (self.pose(a), self.pose(b));
+        self.n_distances += 1;
+        let signed = |pose_a: &Pose| match distance(&a.shape, pose_a, &b.shape, &pose_b, most) {
+            Found::SeparatedBy(distance) => Some(distance),
+            Found::Penetrating(depth) => Some(-depth),
+            Found::Unresolved => None,
+        };
+        signed(&pose_a).or_else(|| {
+            NUDGES.iter().find_map(|nudge| {
+                let shift = Vector::from(*nudge) * NUDGE;
+                signed(&(Translation3::from(shift) * pose_a)).map(|distance| distance - NUDGE)
+            })
+        })
+    }
+
+    /// For every number of joints from an item towards the root, how far its points move at most while each joint of the tree moves
+    /// by `changes`, by body. The first entry is zero.
+    fn travels(&self, item: usize, changes: &[f64], travels: &mut Vec<f64>) {
+        travels.clear();
+        travels.push(0.0);
+        let (item, center) = (&self.items.items[item], self.centers[item]);
+        if stands(item) {
+            return;
+        }
+        let (mut at, mut sum) = (item.body, 0.0);
+        while let Some(body) = self.tree.body(at) {
+            let change = changes[at];
+            if change > 0.0 {
+                sum += if body.slides {
+                    change
+                } else {
+                    let joint = &self.axes[at];
+                    let axis = joint.rotation * body.axis;
+                    let arm = axis.cross(&(center.coords - joint.origin)).norm();
+                    2.0 * (0.5 * change.min(PI)).sin() * (arm + item.spin_radius)
+                };
+            }
+            travels.push(sum);
+            at = body.parent;
+        }
+    }
+}
+
+/// True for what stands in the world: its frame is the world's.
+fn stands(item: &Item) -> bool {
+    item.owner == crate::check::robots::items::Owner::Still
+}
+
+/// Where a pair comes too close.
+struct Breach {
+    pair: usize,
+    u: f64,
+    distance: Option<f64>,
+}
+
+/// The intervals of one step.
+struct Judge<'a, 'b> {
+    scene: &'b mut Placed<'a>,
+    step: &'b RobotStep<'a>,
+    resolution: f64,
+    most_pieces: u64,
+    n_pieces: u64,
+    breaches: Vec<Breach>,
+    /// By item, its travels in the present interval; empty where nobody has asked.
+    travels: Vec<Vec<f64>>,
+}
+
+impl Judge<'_, '_> {
+    fn interval(&mut self, first: f64, last: f64, active: &[usize]) {
+        self.n_pieces += 1 + active.len() as u64 / 64;
+        if self.n_pieces > self.most_pieces {
+            return;
+        }
+        let middle = 0.5 * (first + last);
+        let mut joints = Vec::new();
+        self.step.joints_at(middle, &mut joints);
+        self.scene.place(&joints);
+        let tree = self.scene.tree;
+        let changes: Vec<f64> = (0..tree.n_bodies())
+            .map(|k| {
+                tree.body(k).map_or(0.0, |body| largest_change(&self.step.of_drive(&body.drive), first, middle, last))
+            })
+            .collect();
+        self.travels.iter_mut().for_each(Vec::clear);
+        let mut left = Vec::new();
+        for &index in active {
+            if self.breaches.iter().any(|breach| breach.pair == index) {
+                continue;
+            }
+            let pair = self.scene.items.pairs[index];
+            for item in [pair.a, pair.b] {
+                if self.travels[item].is_empty() {
+                    let mut travels = std::mem::take(&mut self.travels[item]);
+                    self.scene.travels(item, &changes, &mut travels);
+                    self.travels[item] = travels;
+                }
+            }
+            let travel = self.travels[pair.a][pair.joints_a] + self.travels[pair.b][pair.joints_b];
+            let needed = pair.floor + travel + ROUNDING;
+            if self.scene.gap(&pair) > needed {
+                continue;
+            }
+            self.n_pieces += 1;
+            match self.scene.measure(&pair, needed.max(0.0) + self.resolution) {
+                Some(distance) if distance > needed || (travel == 0.0 && distance > pair.floor) => {}
+                Some(distance) if distance > pair.floor && travel > 0.5 * self.resolution => left.push(index),
+                distance => self.breaches.push(Breach { pair: index, u: middle, distance }),
+            }
+        }
+        if !left.is_empty() {
+            self.interval(first, middle, &left);
+            self.interval(middle, last, &left);
+        }
+    }
+}
+
+/// Judges all pairs along the plan. Returns the smallest clearance at a waypoint and the number of distances measured.
+pub fn check_apart(
+    question: &Question,
+    items: &Items,
+    plan: &RobotPlan,
+    settings: &CheckSettings,
+    log: &mut Log,
+) -> (Option<Clearance>, u64) {
+    let mut scene = Placed::new(&question.tree, items);
+    let mut clearance: Option<Clearance> = None;
+    let mut reported: Vec<Option<usize>> = vec![None; items.pairs.len()];
+    for (s, segment) in plan.segments.iter().enumerate() {
+        for (w, waypoint) in segment.waypoints.iter().enumerate() {
+            note_clearance(&mut scene, &waypoint.joints, Moment::at(s, w), &mut clearance);
+        }
+        for (w, ends) in segment.waypoints.windows(2).enumerate() {
+            let step = RobotStep::new(&ends[0], &ends[1]);
+            let active: Vec<usize> = (0..items.pairs.len()).filter(|&index| reported[index] != Some(s)).collect();
+            let mut judge = Judge {
+                scene: &mut scene,
+                step: &step,
+                resolution: settings.resolution,
+                most_pieces: log.work.left(),
+                n_pieces: 0,
+                breaches: Vec::new(),
+                travels: vec![Vec::new(); items.items.len()],
+            };
+            judge.interval(0.0, 1.0, &active);
+            let (n_pieces, breaches) = (judge.n_pieces, judge.breaches);
+            for breach in breaches {
+                reported[breach.pair] = Some(s);
+                log.push(violation(
+                    items,
+                    &items.pairs[breach.pair],
+                    Moment { segment: s, waypoint: w, fraction: breach.u },
+                    &breach,
+                ));
+            }
+            if !log.work.spend(n_pieces, "collisions") {
+                return (clearance, scene.n_distances);
+            }
+        }
+    }
+    (clearance, scene.n_distances)
+}
+
+/// Takes over the smallest distance of a pair that must be apart, where it is smaller than the one known.
+pub fn note_clearance(scene: &mut Placed, joints: &[f64], at: Moment, clearance: &mut Option<Clearance>) {
+    scene.place(joints);
+    let items = scene.items;
+    let judged = items.pairs.iter().filter(|pair| pair.floor >= 0.0);
+    let known = clearance.as_ref().map_or(FARTHEST, |known| known.distance);
+    let mut near: Vec<(f64, &Pair)> =
+        judged.map(|pair| (scene.gap(pair), pair)).filter(|(gap, _)| *gap < known).collect();
+    near.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut least = known;
+    for (gap, pair) in near {
+        if gap >= least {
+            break;
+        }
+        if let Some(distance) = scene.measure(pair, least.max(1e-3)).filter(|distance| *distance < least) {
+            least = distance;
+            let pair = [pair.a, pair.b].map(|item| items.items[item].name.clone());
+            *clearance = Some(Clearance { distance, pair, at });
+        }
+    }
+}
+
+fn violation(items: &Items, pair: &Pair, at: Moment, breach: &Breach) -> Violation {
+    let names = [pair.a, pair.b].map(|item| items.items[item].name.as_str());
+    let who = format!("\"{}\" and \"{}\"", names[0], names[1]);
+    let message = match breach.distance {
+        Some(distance) if distance <= 0.0 => format!("{who} overlap by {:.3e} m", -distance),
+        Some(distance) if distance <= pair.floor => {
+            format!("{who} are {distance:.3e} m apart, {:.3e} m is promised", pair.floor)
+        }
+        Some(distance) => format!("{who} are only {distance:.3e} m apart, too near to tell in motion"),
+        None => format!("the distance of {who} could not be resolved, which counts as collision"),
+    };
+    let amount = breach.distance.map_or(f64::NAN, |distance| -distance);
+    Violation::new(Kind::Collision, message).when(at).subjects(names).amount(amount, -pair.floor)
+}
