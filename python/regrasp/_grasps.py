@@ -158,8 +158,10 @@ def check_grasps(
 def grasps_mjcf(
     path: StrPath, *, packages: Mapping[str, StrPath] | None = None, lenient: bool = False
 ) -> tuple[str, list[str]]:
-    """The MuJoCo model of hand and object of the list in a file, with two keyframes for every grasp: the open hand and the grasp; and
-    where the model differs from them. Raises `InputError`."""
+    """The MuJoCo model of hand and object of the list in a file, and where the model differs from them.
+
+    Every grasp has two keyframes: the open hand and the grasp. Raises `InputError`.
+    """
     named = {name: os.fspath(folder) for name, folder in (packages or {}).items()}
     options = load_options("grasps_mjcf", named, lenient)
     return _regrasp.grasps_mjcf(os.fspath(path), os.getcwd(), options)

@@ -32,7 +32,7 @@ LIFT_HOLD = 3.0
 CLOSE_TIME = 0.5
 SQUEEZE_TIME = 0.3
 #: What a trial can do to a grasp on purpose, so that it must fail.
-CONTROLS = ("none", "no_forces", "first_finger_open")
+CONTROLS = ("none", "no_forces", "opposing_finger_open")
 #: Half the length and half the thickness of the table, in metres.
 TABLE = (0.5, 0.05)
 
@@ -48,8 +48,8 @@ class GraspSettings:
     squeeze: float = 1.0
     """Factor of the list's joint torques."""
     control: str = "none"
-    """``none``; ``no_forces``: the fingers go to the grasp and press with nothing; ``first_finger_open``: the finger of the first
-    contact stays open, so that what is left has no force closure."""
+    """``none``; ``no_forces``: the fingers go to the grasp and press with nothing; ``opposing_finger_open``: the finger that
+    presses most against the others stays open, so that what is left mostly has no force closure."""
     tick: float = 0.004
     """Time between two commands, in seconds."""
 
@@ -193,8 +193,8 @@ class Trials:
         torques = np.array(one["joint_torques"]) * self.settings.squeeze
         if self.settings.control == "no_forces":
             torques = np.zeros_like(torques)
-        if self.settings.control == "first_finger_open":
-            name = one["contacts"][0]["finger"]
+        if self.settings.control == "opposing_finger_open":
+            name = _opposing_finger(one)
             joints = next(finger.joints for finger in rig.fingers if finger.name == name)
             end[joints], torques[joints] = begin[joints], 0.0
         n_close, n_squeeze = (round(time / self.settings.tick) for time in (CLOSE_TIME, SQUEEZE_TIME))
@@ -214,7 +214,9 @@ class Trials:
         at = slice(self.rig.object_qpos, self.rig.object_qpos + 7)
         distance, angle = pose_errors(self.rig, data.qpos[at].copy()[None], start)
         lost = not np.isfinite(data.qpos).all()
-        return Trial(grasp, test, case, np.inf if lost else float(distance[0]), 180.0 if lost else float(np.degrees(angle[0])))
+        # A simulation that blew up has lost the object; JSON has no infinity.
+        moved = (1e3, 180.0) if lost else (float(distance[0]), float(np.degrees(angle[0])))
+        return Trial(grasp, test, case, *moved)
 
 
 def try_list(
@@ -267,6 +269,13 @@ def _hand_from_object(grasp: dict[str, Any]) -> Array:
     return np.concatenate((position, inverse))
 
 
+def _opposing_finger(grasp: dict[str, Any]) -> str:
+    """The finger whose contact faces those of the others most."""
+    normals = np.array([contact["normal_in_object"] for contact in grasp["contacts"]])
+    faces = [float(normal @ (normals.sum(axis=0) - normal)) for normal in normals]
+    return str(grasp["contacts"][int(np.argmin(faces))]["finger"])
+
+
 def _quaternion_to(down: Array) -> Array:
     """A turn, w first, of -z to ``down``."""
     axis = np.cross([0.0, 0.0, -1.0], down)
@@ -284,7 +293,8 @@ def _with_table(xml: str) -> str:
         f'<body name="regrasp:table" mocap="true" pos="0 0 -10"><geom name="regrasp:table" type="box" '
         f'size="{TABLE[0]} {TABLE[0]} {TABLE[1]}" contype="0" conaffinity="0"/></body></worldbody>'
     )
-    pairs = "".join(f'<pair geom1="regrasp:table" geom2="{part}" condim="3" friction="0.8 0.8 0.005 0.0001 0.0001"/>' for part in parts)
+    friction = 'condim="3" friction="0.8 0.8 0.005 0.0001 0.0001"'
+    pairs = "".join(f'<pair geom1="regrasp:table" geom2="{part}" {friction}/>' for part in parts)
     with_table = xml.replace("</worldbody>", table, 1)
     if "</contact>" in with_table:
         return with_table.replace("</contact>", f"{pairs}</contact>", 1)
