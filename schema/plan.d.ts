@@ -5,6 +5,21 @@ import type { PlanInput, PoseData } from "./record";
 
 export type { PlanInput, PoseData };
 
+/**
+ * A query that no scene file has: what a session was asked, from where hand and object really were. Hand, object, limits and all
+ * else are the scene's; a plan can only say where it was to begin and to end.
+ */
+export type Asked = {
+  /** Pose of the object at the start. */
+  start: PoseData,
+  /** Pose of the object at the goal. */
+  goal: PoseData,
+  /** Positions of all joints of the hand at the start, in radians or metres. */
+  joints: Array<number>,
+  /** Names of the fingers that are free at the start. The others hold. */
+  free: Array<string>,
+};
+
 /** What a finger does at a waypoint. */
 export type ContactMode = "fixed" | "rolling" | "pure_rolling" | "twisting" | "pure_sliding" | "sliding" | "free";
 
@@ -75,6 +90,8 @@ export type FilePlan = {
   objects: Array<string>,
   /** Pose of the object asked for at the start. */
   start: PoseData,
+  /** The query, where the scene file does not have it: that of a session. */
+  asked?: Asked,
   /** Poses asked for between start and goal, in order; absent where none were. */
   way_poses?: Array<WayPose>,
   /** Pose of the object asked for at the goal. */

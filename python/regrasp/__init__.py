@@ -12,7 +12,8 @@ SI units and radians; rotations are `quat_xyzw`; joint vectors are in the order 
 """
 
 from ._errors import Diagnostic, InputError, InternalError, RegraspError
-from ._grasps import GraspList, NoGrasps, check_grasps, list_grasps
+from ._grasps import GraspList, NoGrasps, check_grasps, grasps_mjcf, list_grasps
+from ._mbm import MotionProblem, import_mbm
 from ._model import (
     CoupledJoint,
     Finger,
@@ -52,6 +53,7 @@ __all__ = [
     "InternalError",
     "Joint",
     "Moment",
+    "MotionProblem",
     "NearestMiss",
     "NoGrasps",
     "Object",
@@ -75,7 +77,9 @@ __all__ = [
     "__version__",
     "check",
     "check_grasps",
+    "grasps_mjcf",
     "export_mjcf",
+    "import_mbm",
     "list_grasps",
     "load_hand",
     "load_scene",

@@ -155,4 +155,14 @@ def check_grasps(
     return cast("dict[str, Any]", json.loads(_regrasp.check_grasps(os.fspath(path), os.getcwd(), options)))
 
 
-__all__: Sequence[str] = ["GraspList", "NoGrasps", "check_grasps", "list_grasps"]
+def grasps_mjcf(
+    path: StrPath, *, packages: Mapping[str, StrPath] | None = None, lenient: bool = False
+) -> tuple[str, list[str]]:
+    """The MuJoCo model of hand and object of the list in a file, with two keyframes for every grasp: the open hand and the grasp; and
+    where the model differs from them. Raises `InputError`."""
+    named = {name: os.fspath(folder) for name, folder in (packages or {}).items()}
+    options = load_options("grasps_mjcf", named, lenient)
+    return _regrasp.grasps_mjcf(os.fspath(path), os.getcwd(), options)
+
+
+__all__: Sequence[str] = ["GraspList", "NoGrasps", "check_grasps", "grasps_mjcf", "list_grasps"]

@@ -269,15 +269,15 @@ class Support:
 
 @dataclass(frozen=True)
 class Task:
-    """What is asked of one hand and one object of a scene."""
+    """What is asked of one hand and one object of a scene, or of a robot in it."""
 
     name: str
     """Empty in scenes of one task."""
-    kind: Literal["in_hand", "tracking"]
+    kind: Literal["in_hand", "tracking", "motion"]
     hand: str
-    """Name of the hand in the scene."""
+    """Name of the hand in the scene; empty for motions."""
     object: str
-    """Name of the object."""
+    """Name of the object; empty for motions."""
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ __all__ = [
     "check",
     "check_grasps",
     "find_scene",
+    "grasps_mjcf",
     "hand_file",
     "list_grasps",
     "page",
@@ -77,6 +78,7 @@ def _panic_for_tests(message: str, *, in_search: bool = False) -> None: ...
 
 def list_grasps(request: dict[str, Any], options: _Options) -> tuple[str | None, str | None]: ...
 def check_grasps(path: str, current: str, options: _Options) -> str: ...
+def grasps_mjcf(path: str, current: str, options: _Options) -> tuple[str, list[str]]: ...
 
 @final
 class Start:

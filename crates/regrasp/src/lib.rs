@@ -19,6 +19,7 @@ pub mod session;
 /// Settings from several places.
 pub mod settings;
 
+pub use regrasp_arms as arms;
 pub use regrasp_base as base;
 pub use regrasp_export as export;
 pub use regrasp_geometry as geometry;

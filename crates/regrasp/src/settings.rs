@@ -1,7 +1,8 @@
 //! Settings from several places made one: defaults, then a text of settings, then single arguments. Command line and Python both
 //! ask here.
 
-use regrasp_planners::{InHandSettings, PlannerSettings, TrackingSettings};
+use regrasp_planners::{InHandSettings, MotionSettings, PlannerSettings, TrackingSettings};
+use regrasp_scene::motion::MOTION;
 use regrasp_scene::query::TRACKING;
 use serde::de::DeserializeOwned;
 
@@ -69,6 +70,9 @@ pub fn settings_for(kind: &str, text: Option<&str>, asked: &Overrides) -> Result
     if kind == TRACKING {
         return Ok(PlannerSettings { tracking: tracking(text, asked)?, ..defaults });
     }
+    if kind == MOTION {
+        return Ok(PlannerSettings { motion: motion(text, asked)?, ..defaults });
+    }
     Ok(PlannerSettings { in_hand: in_hand(text, asked)?, ..defaults })
 }
 
@@ -102,6 +106,15 @@ fn tracking(text: Option<&str>, asked: &Overrides) -> Result<TrackingSettings, S
         return Err(SettingsError::NotForTracking { argument, why });
     }
     let mut settings: TrackingSettings = read(text)?;
+    if let Some(name) = &asked.method {
+        settings.method = method_named(name)?;
+    }
+    settings.validate().map_err(SettingsError::Invalid)?;
+    Ok(settings)
+}
+
+fn motion(text: Option<&str>, asked: &Overrides) -> Result<MotionSettings, SettingsError> {
+    let mut settings: MotionSettings = read(text)?;
     if let Some(name) = &asked.method {
         settings.method = method_named(name)?;
     }

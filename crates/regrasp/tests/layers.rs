@@ -60,7 +60,18 @@ const TOWER: &[Floor] = &[
         // Its tests check, and break lists.
         tests_with: &["regrasp_plan", "regrasp_mutations"],
     },
-    floor("regrasp_arms", &["regrasp_base", "regrasp_geometry", "regrasp_robot"]),
+    floor(
+        "regrasp_arms",
+        &[
+            "regrasp_base",
+            "regrasp_geometry",
+            "regrasp_roadmap",
+            "regrasp_robot",
+            "regrasp_scene",
+            "regrasp_plan",
+            "regrasp_manipulation",
+        ],
+    ),
     Floor {
         name: "regrasp_planners",
         ships_with: &[
@@ -98,6 +109,7 @@ const TOWER: &[Floor] = &[
             "regrasp_grasp",
             "regrasp_plan",
             "regrasp_grasp_lists",
+            "regrasp_arms",
             "regrasp_planners",
             "regrasp_export",
             "regrasp_viewer",

@@ -10,15 +10,18 @@ pub mod lanes;
 pub mod model;
 /// Are motions free?
 pub mod motion;
+/// From a query to a plan.
+pub mod plan;
+/// Roadmaps for many queries.
+pub mod roadmap;
 /// Paths from configuration to configuration.
 pub mod search;
+/// Times along paths.
+pub mod times;
 /// What stands around the robot.
 pub mod world;
 
 pub use model::ArmModel;
 pub use motion::Collider;
+pub use plan::{Stage, plan_in_stages, plan_motion};
 pub use world::World;
-
-#[cfg(test)]
-#[path = "../../../tests/support/places.rs"]
-mod places;

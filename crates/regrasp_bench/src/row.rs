@@ -186,7 +186,11 @@ pub(crate) fn plan_only(problem: Problem, settings: &RunSettings) -> (Row, Optio
         cancelled: Arc::clone(&settings.cancelled),
     };
     let silent = |_: Progress| {};
-    let planner = PlannerSettings { in_hand: settings.planner.clone(), tracking: settings.tracking.clone() };
+    let planner = PlannerSettings {
+        in_hand: settings.planner.clone(),
+        tracking: settings.tracking.clone(),
+        ..PlannerSettings::default()
+    };
     let outcome = plan(problem.in_state(), problem.query, &planner, problem.seed, &budget, &silent);
     row.plan_s = started.0.elapsed().as_secs_f64();
     // Other trials may run beside this one: only several threads of one search need the time of all.

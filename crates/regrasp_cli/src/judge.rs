@@ -5,9 +5,10 @@ use crate::load;
 use crate::stop::Stop;
 use crate::talk::Talk;
 use crate::words::{counted, duration, grouped};
-use regrasp::plan::check::{Level, Report, check, query_of};
+use regrasp::plan::check::{Level, Report, check, check_any, query_of};
 use regrasp::plan::format;
 use regrasp::scene::{LoadedScene, load_scene};
+use regrasp::{AnyPlan, RobotPlan};
 use serde_json::json;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -49,6 +50,52 @@ pub fn judge(loaded: &LoadedScene, plan: &regrasp::Plan, judging: &Judging, talk
     Ok(report)
 }
 
+/// Judges a plan of a whole robot in a scene that was read for it, and says what came of it.
+pub fn judge_robot(loaded: &LoadedScene, plan: &RobotPlan, judging: &Judging, talk: &Talk) -> Report {
+    let started = Instant::now();
+    let query = loaded.task_for(&plan.query).query(plan.seed);
+    let settings = judging.settings();
+    let plan = AnyPlan::Robot(plan.clone());
+    let report = check_any((&loaded.scene, &loaded.state), Some(&query), &plan, &settings);
+    let seconds = started.elapsed().as_secs_f64();
+    talk.event("check", json!({ "accepted": report.accepted(), "seconds": seconds, "report": report }));
+    let clearance = clearance_in_words(&report);
+    talk.say(format!(
+        "check  {}   {} waypoints, {} distances   {}",
+        verdict(&report),
+        grouped(report.n_waypoints as u64),
+        grouped(report.n_distances),
+        duration(seconds),
+    ));
+    talk.say(format!("       clearance at waypoints {clearance}, motion takes {:.2} s", report.duration));
+    for what in &report.assumed {
+        talk.say(format!("       taken for granted: {what}"));
+    }
+    say_violations(&report, talk);
+    report
+}
+
+/// The nearest pair at a waypoint.
+fn clearance_in_words(report: &Report) -> String {
+    report.min_clearance.as_ref().map_or("-".into(), |clearance| {
+        format!("{:.2} mm ({} and {})", 1e3 * clearance.distance, clearance.pair[0], clearance.pair[1])
+    })
+}
+
+/// What is wrong and what was not judged.
+fn say_violations(report: &Report, talk: &Talk) {
+    for violation in report.violations.iter().take(SHOWN) {
+        talk.say(format!("  {violation}"));
+    }
+    for what in &report.left_out {
+        talk.say(format!("  not judged: {what}"));
+    }
+    let shown = report.violations.len().min(SHOWN);
+    if report.n_violations > shown {
+        talk.say(format!("  and {}", counted(report.n_violations - shown, "more violation")));
+    }
+}
+
 /// The verdict, with the level that it is for.
 fn verdict(report: &Report) -> String {
     let asked = report.level.name();
@@ -84,9 +131,7 @@ fn say(report: &Report, is_tracking: bool, elapsed: Duration, talk: &Talk) {
         // The plan promises a bound that the planner proves quickly; this one is proven with exact cones, and is no smaller.
         Some(margin) => format!("{margin:.4} (exact cones)"),
     };
-    let clearance = report.min_clearance.as_ref().map_or("-".into(), |clearance| {
-        format!("{:.2} mm ({} and {})", 1e3 * clearance.distance, clearance.pair[0], clearance.pair[1])
-    });
+    let clearance = clearance_in_words(report);
     talk.say(format!(
         "check  {}   {} waypoints, {} distances   {}",
         verdict(report),
@@ -99,14 +144,5 @@ fn say(report: &Report, is_tracking: bool, elapsed: Duration, talk: &Talk) {
         1e3 * report.max_contact_error
     ));
     talk.say(format!("       {}, gravity {}", slip_in_words(report), gravity_in_words(report)));
-    for violation in report.violations.iter().take(SHOWN) {
-        talk.say(format!("  {violation}"));
-    }
-    for what in &report.left_out {
-        talk.say(format!("  not judged: {what}"));
-    }
-    let shown = report.violations.len().min(SHOWN);
-    if report.n_violations > shown {
-        talk.say(format!("  and {}", counted(report.n_violations - shown, "more violation")));
-    }
+    say_violations(report, talk);
 }

@@ -36,6 +36,16 @@ pub fn judge(scene: &GraspScene, list: &GraspList, n_threads: usize, talk: &Talk
         "       closure margin {margin}, clearance {clearance}, fingertips within {:.3} mm of their contacts",
         1e3 * report.max_contact_error
     ));
+    let object = &scene.scene.objects[0];
+    // A list that was made from a mesh says itself how heavy and how rough the object is: whoever reads the verdict has to know.
+    let by_list = list.source.as_ref().is_some_and(|source| source.mesh.is_some());
+    talk.say(format!(
+        "       object of {} kg with friction {}{}, ways in of at least {}",
+        object.mass,
+        object.friction,
+        if by_list { " (as the list says)" } else { "" },
+        report.shortest_way_in.map_or("-".into(), |line| format!("{:.0} mm", 1e3 * line))
+    ));
     for violation in report.violations.iter().take(SHOWN) {
         talk.say(format!("  {violation}"));
     }

@@ -7,9 +7,10 @@ use crate::words::{counted, duration, grouped};
 use regrasp::base::{Diagnostic, Place};
 use regrasp::geometry::Shape;
 use regrasp::planners::FailureKind;
+use regrasp::robot::Manipulator;
 use regrasp::robot::import::{LoadOptions, OUT_OF_TIME, ResolveOptions};
 use regrasp::scene::query::IN_HAND;
-use regrasp::scene::{LoadedScene, Task, load_scene};
+use regrasp::scene::{InputFile, LoadedScene, Task, load_scene};
 use regrasp::settings::{Argument, Overrides, SettingsError, read, settings_for};
 use regrasp::{Failure, InHandSettings, InputError, PlannerSettings};
 use serde_json::json;
@@ -32,14 +33,43 @@ pub fn options(common: &Common) -> LoadOptions {
     }
 }
 
-/// Reads a scene and says what was read.
+/// Reads a scene and says what was read. Errors: its task is of kind `motion` (`A507`).
 pub fn scene(path: &Path, common: &Common, talk: &Talk) -> Result<LoadedScene, Stop> {
-    scene_by(path, common, None, talk)
+    refuse_motion(scene_by(path, common, None, talk)?, path)
+}
+
+/// A scene for what deals with one hand and one object. Errors: its task is of kind `motion` (`A507`).
+fn refuse_motion(loaded: LoadedScene, path: &Path) -> Result<LoadedScene, Stop> {
+    match loaded.task().motion {
+        None => Ok(loaded),
+        Some(_) => {
+            let problem = format!("{} asks for a motion of a whole robot", path.display());
+            let fix = "name another scene or --task; regrasp plan, check, view and export take motions";
+            Err(Stop::argument("A507", "SCENE", problem, fix))
+        }
+    }
+}
+
+/// The scene file at `path` for a plan of a whole robot that answers the task called `query`. Errors: the task is of another kind
+/// (`A507`).
+pub fn motion_scene(path: &Path, query: &str, common: &Common) -> Result<LoadedScene, Stop> {
+    let loaded = load_scene(path, &options(common))?;
+    let loaded = match &common.task {
+        Some(name) => choose(loaded, name, path)?,
+        None => loaded.for_query(query),
+    };
+    match loaded.task().motion {
+        Some(_) => Ok(loaded),
+        None => {
+            let problem = format!("{} asks for a task of kind \"{}\"", path.display(), loaded.task().kind_name());
+            Err(Stop::argument("A507", "SCENE", problem, "a task of kind \"motion\", as the plan's"))
+        }
+    }
 }
 
 /// As [`scene`], with the task that `plan` answers as its first.
 pub fn scene_of_plan(path: &Path, plan: &regrasp::Plan, common: &Common, talk: &Talk) -> Result<LoadedScene, Stop> {
-    read_scene(path, &plan.query, common, None, talk)
+    refuse_motion(read_scene(path, &plan.query, common, None, talk)?, path)
 }
 
 /// As [`scene`], but reading is given up when `deadline` has passed: there is no plan then.
@@ -191,8 +221,55 @@ fn settings_error(path: &Path, line: usize, column: usize, problem: &str) -> Sto
     Stop::BadInput(diagnostic.expected("a JSON object like \"settings\" in a plan file").into())
 }
 
+/// Says what a scene in which a robot moves is made of.
+fn say_motion_scene(loaded: &LoadedScene, robot: &Manipulator, seconds: f64, talk: &Talk) {
+    let scene = &loaded.scene;
+    talk.say(format!(
+        "robot  {}   {}   {}, {}   loaded in {}",
+        robot.name,
+        counted(robot.layout.len(), "joint"),
+        counted(robot.arms.len(), "arm"),
+        counted(robot.hands.len(), "hand"),
+        duration(seconds),
+    ));
+    let around =
+        [(scene.objects.len(), "object"), (scene.supports.len(), "support"), (scene.obstacles.len(), "obstacle")];
+    let around: Vec<String> = around.iter().filter(|(n, _)| *n > 0).map(|&(n, what)| counted(n, what)).collect();
+    if !around.is_empty() {
+        talk.say(format!("world  {}", around.join(", ")));
+    }
+    if loaded.tasks.len() > 1 {
+        talk.say(format!("task   \"{}\", one of {}", loaded.task().name, loaded.tasks.len()));
+    }
+    talk.event(
+        "loaded",
+        json!({
+            "scene": scene.name,
+            "robot": robot.name,
+            "joints": robot.layout.names(),
+            "obstacles": scene.obstacles.len(),
+            "task": loaded.task().name,
+            "tasks": loaded.tasks.iter().map(|task| task.name.as_str()).collect::<Vec<_>>(),
+            "hands": scene.hands.iter().map(|hand| hand.name.as_str()).collect::<Vec<_>>(),
+            "objects": scene.objects.iter().map(|object| object.name.as_str()).collect::<Vec<_>>(),
+            "supports": scene.supports.iter().map(|support| support.body.name.as_str()).collect::<Vec<_>>(),
+            "seconds": seconds,
+            "inputs": inputs(loaded),
+        }),
+    );
+}
+
+/// The files that were read, for an event.
+fn inputs(loaded: &LoadedScene) -> Vec<serde_json::Value> {
+    let input = |input: &InputFile| json!({ "role": input.role, "name": input.name, "path": input.path, "sha256": input.sha256 });
+    loaded.scene.inputs.iter().map(input).collect()
+}
+
 /// Says what a scene is made of.
 fn say_scene(loaded: &LoadedScene, seconds: f64, talk: &Talk) {
+    if let Some(motion) = &loaded.task().motion {
+        return say_motion_scene(loaded, &loaded.scene.robots[motion.robot], seconds, talk);
+    }
     let (scene, task) = (&loaded.scene, loaded.manipulation());
     let hand = task.hand();
     let n_mimic = hand.robot.joints.iter().filter(|joint| joint.coupling.is_some()).count();
@@ -242,9 +319,7 @@ fn say_scene(loaded: &LoadedScene, seconds: f64, talk: &Talk) {
             "objects": scene.objects.iter().map(|object| object.name.as_str()).collect::<Vec<_>>(),
             "supports": scene.supports.iter().map(|support| support.body.name.as_str()).collect::<Vec<_>>(),
             "seconds": seconds,
-            "inputs": scene.inputs.iter().map(|input| json!({
-                "role": input.role, "name": input.name, "path": input.path, "sha256": input.sha256,
-            })).collect::<Vec<_>>(),
+            "inputs": inputs(loaded),
         }),
     );
 }

@@ -12,6 +12,8 @@ pub mod grasps;
 pub mod mjcf;
 /// Arrays for numpy: `.npz` without pickle.
 pub mod npz;
+/// Plans of whole robots.
+pub mod robots;
 /// ROS 2 `trajectory_msgs/JointTrajectory` as YAML.
 pub mod ros2;
 /// Texts and numbers as YAML.
@@ -19,6 +21,7 @@ mod yaml;
 
 pub use arrays::PlanArrays;
 pub use error::ExportError;
-pub use mjcf::{Mjcf, MjcfError, to_mjcf};
+pub use mjcf::{Mjcf, MjcfError, robot_to_mjcf, to_mjcf};
 pub use npz::to_npz;
+pub use robots::{ControllerGroup, controller_groups, robot_to_npz, robot_to_ros2};
 pub use ros2::to_ros2;

@@ -130,7 +130,7 @@ fn judge(prepared: &Prepared, index: u64, given: &Given) -> Result<Found, Reason
         return Err(Reason::NotClosed);
     }
     let flatness = driven::flatness(prepared, &state);
-    let mut found = accept(prepared, &mut workspace, index, state, &flatness, margin)?;
+    let mut found = accept(prepared, &mut workspace, index, state, (&flatness, margin), given.open.as_ref())?;
     found.stable_poses = above::stays_above(prepared, &found.state, &found.way);
     Ok(found)
 }

@@ -17,6 +17,8 @@ mod frames;
 pub mod import;
 /// Points in a tree.
 mod kd_tree;
+/// Which joints of a hand one motor drives.
+mod motors;
 /// Two hands that hold one object.
 pub mod pairs;
 /// What is prepared once.

@@ -1,8 +1,9 @@
 //! Refinement: the wrist moves, then contacts move along the surface, to raise the closure margin. No other term of the score may
 //! get worse, and no contact moves farther than a tip radius.
 
-use crate::driven::{self, Motors};
+use crate::driven;
 use crate::found::{Found, WayIn};
+use crate::motors::Motors;
 use crate::prepared::Prepared;
 use crate::search::worth::{self, holding};
 use crate::{above, way};
@@ -112,7 +113,7 @@ fn with_way(prepared: &Prepared, workspace: &mut Workspace, climb: Climb) -> Opt
     if way::is_free(prepared, workspace, &climb.state, &climb.way) {
         return Some(climb);
     }
-    let way = way::way_in(prepared, workspace, &climb.state).ok()?;
+    let way = way::way_in(prepared, workspace, &climb.state, None).ok()?;
     Some(Climb { way, ..climb })
 }
 

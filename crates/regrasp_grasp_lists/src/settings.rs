@@ -124,7 +124,7 @@ impl GraspSettings {
             ("least_sphere", self.least_sphere, 1e-5, 1.0),
             ("surface_step", self.surface_step.unwrap_or(0.01), 1e-4, 1.0),
             ("found_per_grasp", self.found_per_grasp, 1.0, 100.0),
-            ("approach_distance", self.approach_distance, 0.001, 1.0),
+            ("approach_distance", self.approach_distance, 0.02, 1.0),
             ("tipping_angle", self.tipping_angle, 0.0, 1.5),
         ];
         let heights = self.open_heights.iter().map(|height| ("open_heights", *height, 0.001, 0.5));

@@ -33,11 +33,16 @@ pub enum NoWay {
     Blocked,
 }
 
-/// A way to the grasp `state`. The workspace is left anywhere.
-pub fn way_in(prepared: &Prepared, workspace: &mut Workspace, state: &GraspState) -> Result<WayIn, NoWay> {
+/// A way to the grasp `state`; with the open hand `given`, if it can be. The workspace is left anywhere.
+pub fn way_in(
+    prepared: &Prepared,
+    workspace: &mut Workspace,
+    state: &GraspState,
+    given: Option<&HandJoints>,
+) -> Result<WayIn, NoWay> {
     let mut opened = false;
     let directions = directions(state);
-    for open in openings(prepared, state) {
+    for open in given.cloned().into_iter().chain(openings(prepared, state)) {
         if !opens(workspace, state, &open) {
             continue;
         }

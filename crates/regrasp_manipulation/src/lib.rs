@@ -15,6 +15,8 @@ pub mod grasp;
 pub mod in_world;
 /// The scene prepared for planning.
 pub mod model;
+/// Settings of motions of whole robots.
+pub mod motion_settings;
 /// What a graph of grasps looks like.
 pub mod outline;
 /// What a running search tells its caller.

@@ -23,7 +23,7 @@ pub struct GraspMutant {
 }
 
 /// Names of all kinds of damage.
-pub const KINDS: [&str; 14] = [
+pub const KINDS: [&str; 15] = [
     "joint past its limit",
     "contact 1 mm off",
     "flipped normal",
@@ -34,6 +34,7 @@ pub const KINDS: [&str; 14] = [
     "force 1 % outside its cone",
     "open posture inside the object",
     "way in through the object",
+    "way in of a few millimetres",
     "unstable pose called stable",
     "hand below the support",
     "other mesh",
@@ -105,6 +106,10 @@ pub fn mutant(
             grasp.approach.direction_in_object = away.try_normalize(1e-3)?.into();
             grasp.approach.distance = away.norm().min(0.9);
             vec![Kind::Collision]
+        }
+        "way in of a few millimetres" => {
+            list.grasps[0].approach.distance = rng.uniform(0.0, 0.019);
+            vec![Kind::NoWayIn]
         }
         "unstable pose called stable" => {
             let pose = pick(&mut list.stable_poses, rng)?;

@@ -263,9 +263,10 @@ impl RobotPromises {
             let limits = robot.robot.joints[coordinate.joint.0].limits;
             limits.and_then(|limits| limits.velocity).unwrap_or(scene.limits.joint_velocity)
         };
+        let acceleration = |coordinate: &Coordinate| coordinate.acceleration.unwrap_or(scene.limits.joint_acceleration);
         RobotPromises {
             joint_velocities: robot.layout.coordinates.iter().map(velocity).collect(),
-            joint_accelerations: vec![scene.limits.joint_acceleration; robot.layout.len()],
+            joint_accelerations: robot.layout.coordinates.iter().map(acceleration).collect(),
             clearance: 0.0,
         }
     }

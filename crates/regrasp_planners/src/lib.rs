@@ -11,6 +11,7 @@ pub mod tracking;
 
 pub use in_hand::plan_in_hand;
 pub use regrasp_manipulation::failure::{Cause, Failure, FailureKind, NearestMiss};
+pub use regrasp_manipulation::motion_settings::{MotionMethod, MotionSettings, Validation};
 pub use regrasp_manipulation::outline::{Outline, OutlineEdge, OutlineNode};
 pub use regrasp_manipulation::progress::Progress;
 pub use regrasp_manipulation::{failure, outline};
@@ -28,6 +29,8 @@ pub struct PlannerSettings {
     pub in_hand: InHandSettings,
     /// For tracking tasks.
     pub tracking: TrackingSettings,
+    /// For motions of whole robots, of which `regrasp_arms` is the planner.
+    pub motion: MotionSettings,
 }
 
 /// Plans `query` with the planner of its task: [`plan_in_hand`] or [`plan_tracking`]. All that the query does not name rests in

@@ -29,13 +29,16 @@ pub fn scene(loaded: &LoadedScene, path: &Path) -> Value {
     })
 }
 
-/// What a task is about.
+/// What a task is about. A motion is about a robot: hand and object are empty.
 fn task(scene: &Scene, task: &Task) -> Value {
+    let is_motion = task.kind_name() == "motion";
+    let hand = scene.hands.get(task.hand).filter(|_| !is_motion);
+    let object = scene.objects.get(task.object).filter(|_| !is_motion);
     json!({
         "name": task.name,
         "kind": task.kind_name(),
-        "hand": scene.hands[task.hand].name,
-        "object": scene.objects[task.object].name,
+        "hand": hand.map_or("", |hand| hand.name.as_str()),
+        "object": object.map_or("", |object| object.name.as_str()),
     })
 }
 

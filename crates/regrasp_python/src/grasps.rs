@@ -5,6 +5,7 @@ use crate::guard::guarded;
 use crate::model::{Options, load_options};
 use pyo3::prelude::*;
 use regrasp::base::{Budget, Diagnostic, Place};
+use regrasp::export::grasps::to_mjcf;
 use regrasp::grasp::list::format;
 use regrasp::grasp::record::PlanInput;
 use regrasp::grasp_lists::{GraspSettings, list_grasps as search};
@@ -69,6 +70,30 @@ pub fn check_grasps(py: Python<'_>, path: PathBuf, current: PathBuf, options: Op
             Ok(json!({ "accepted": report.accepted(), "report": report }).to_string())
         });
         judged.map_err(|error| error::input(py, &error))
+    })
+}
+
+/// The MuJoCo model of the list in the file at `path`, and where it differs from hand and object. `current` is the current folder.
+#[pyfunction]
+pub fn grasps_mjcf(
+    py: Python<'_>,
+    path: PathBuf,
+    current: PathBuf,
+    options: Options,
+) -> PyResult<(String, Vec<String>)> {
+    guarded(py, || {
+        let options = load_options(options);
+        let made = py.detach(|| -> Result<_, regrasp::InputError> {
+            let bytes = regrasp::base::files::read_at_most(&path, format::MAX_BYTES)?;
+            let list = format::from_json(&path, &bytes)?;
+            let own = path.parent().map_or_else(PathBuf::new, Path::to_owned);
+            let paths = GraspPaths { folders: vec![own, current], ..GraspPaths::default() };
+            let scene = load_grasp_files(&path, &list, &paths, &options)?;
+            to_mjcf(&scene, &list)
+                .map_err(|wrong| Diagnostic::new("A504", Place::file(&path), wrong.to_string()).into())
+        });
+        let model = made.map_err(|error| error::input(py, &error))?;
+        Ok((model.xml, model.notes))
     })
 }
 

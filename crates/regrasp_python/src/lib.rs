@@ -35,7 +35,7 @@ mod _regrasp {
     #[pymodule_export]
     use super::document::parse_toml;
     #[pymodule_export]
-    use super::grasps::{check_grasps, list_grasps};
+    use super::grasps::{check_grasps, grasps_mjcf, list_grasps};
     #[pymodule_export]
     use super::guard::panic_for_tests;
     #[pymodule_export]

@@ -15,6 +15,8 @@ pub mod palette;
 pub mod render;
 /// A manipulation graph in the plane.
 pub mod roadmap_picture;
+/// Plans of whole robots.
+pub mod robots;
 /// What a page is told.
 pub mod story;
 /// Key frames of a plan in one picture.

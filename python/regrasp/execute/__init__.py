@@ -57,6 +57,8 @@ _HOMES = {
 
 def __getattr__(name: str) -> Any:
     # MuJoCo is imported when it is needed.
+    if name in ("faults", "planning"):
+        return import_module(f".{name}", __name__)
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f".{_HOMES[name]}", __name__), name)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -29,6 +29,8 @@ class Ticket:
     ready_at: float | None = None
     answer: Plan | Failure | None = None
     error: BaseException | None = None
+    work: float = 0.0
+    """Configurations that all searches looked at."""
     search_seconds: float = 0.0
     check_seconds: float = 0.0
     total_seconds: float = 0.0
@@ -57,13 +59,19 @@ class Planning(Protocol):
         ...
 
 
-def _solve(session: Session, settings: ExecutorSettings, prepare: Prepare, ticket: Ticket, seed: int) -> None:
+Sessions = Sequence[Session]
+"""Of one scene, in the order in which they are asked: careful ones first."""
+
+
+def _solve(sessions: Sessions, settings: ExecutorSettings, prepare: Prepare, ticket: Ticket, seed: int) -> None:
     def listen(_: Any) -> None:
         if ticket.cancelled.is_set():
             raise Cancelled
 
     answer: Plan | Failure | None = None
-    for attempt in range(settings.plan_attempts):
+    # One try of each careful session, then all tries of the last.
+    tries = [*sessions[:-1], *[sessions[-1]] * settings.plan_attempts]
+    for attempt, session in enumerate(tries):
         answer = session.plan(
             ticket.start,
             ticket.goal,
@@ -72,6 +80,7 @@ def _solve(session: Session, settings: ExecutorSettings, prepare: Prepare, ticke
             time_limit=settings.time_limit,
             progress=listen,
         )
+        ticket.work += float(answer.statistics["work"])
         times = session.times
         if times is not None:
             ticket.search_seconds += times.search
@@ -86,17 +95,15 @@ def _solve(session: Session, settings: ExecutorSettings, prepare: Prepare, ticke
 class ChargedPlanning:
     """Plans at once and has the answer ready later, by the work that it took: runs of a simulation do not depend on the machine."""
 
-    def __init__(self, session: Session, settings: ExecutorSettings, prepare: Prepare) -> None:
-        self._session = session
+    def __init__(self, sessions: Sessions, settings: ExecutorSettings, prepare: Prepare) -> None:
+        self._sessions = sessions
         self._settings = settings
         self._prepare = prepare
 
     def ask(self, start: Start, goal: Pose, seed: int, now: float) -> Ticket:
         ticket = Ticket(start, goal, now)
-        _solve(self._session, self._settings, self._prepare, ticket, seed)
-        answer = ticket.answer
-        work = float(answer.statistics["work"]) if answer is not None else 0.0
-        ticket.ready_at = now + work / self._settings.work_rate + self._settings.planning_overhead
+        _solve(self._sessions, self._settings, self._prepare, ticket, seed)
+        ticket.ready_at = now + ticket.work / self._settings.work_rate + self._settings.planning_overhead
         return ticket
 
     def is_ready(self, ticket: Ticket, now: float) -> bool:
@@ -109,8 +116,8 @@ class ChargedPlanning:
 class ThreadPlanning:
     """Plans on a thread. The search stops within some hundredths of a second when nobody wants it any more."""
 
-    def __init__(self, session: Session, settings: ExecutorSettings, prepare: Prepare) -> None:
-        self._session = session
+    def __init__(self, sessions: Sessions, settings: ExecutorSettings, prepare: Prepare) -> None:
+        self._sessions = sessions
         self._settings = settings
         self._prepare = prepare
         self._running: list[tuple[Ticket, threading.Thread]] = []
@@ -120,7 +127,7 @@ class ThreadPlanning:
 
         def work() -> None:
             try:
-                _solve(self._session, self._settings, self._prepare, ticket, seed)
+                _solve(self._sessions, self._settings, self._prepare, ticket, seed)
             except Cancelled:
                 pass
             except BaseException as error:

@@ -16,6 +16,13 @@ if TYPE_CHECKING:
 
 def main(arguments: list[str] | None = None) -> int:
     """Runs the command; returns the exit code."""
+    given = sys.argv[1:] if arguments is None else arguments
+    if any(name.endswith(".json") and _is_list(name) for name in given):
+        try:
+            from . import grasp_command
+        except ImportError as error:
+            return _bad_input(f"MuJoCo is not there ({error}); pip install 'regrasp[sim]'")
+        return grasp_command.main(given)
     options = _parser().parse_args(arguments)
     if options.strip and sys.platform == "linux" and not {"MUJOCO_GL", "DISPLAY"} & os.environ.keys():
         # Read by MuJoCo when it is imported.
@@ -62,6 +69,14 @@ def main(arguments: list[str] | None = None) -> int:
         except NoRenderer as error:
             print(f"no picture: {error}", file=sys.stderr)
     return 0 if report.kept else 1
+
+
+def _is_list(path: str) -> bool:
+    try:
+        with Path(path).open(encoding="utf-8") as file:
+            return '"regrasp-grasps"' in file.read(200)
+    except (OSError, ValueError):
+        return False
 
 
 def summary(report: Report) -> str:

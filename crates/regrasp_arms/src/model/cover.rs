@@ -167,18 +167,24 @@ mod tests {
             for ball in &balls {
                 assert!((ball.center - center).norm() + ball.radius <= radius + 1e-12);
             }
-            let (mut n_inside, mut hint) = (0, 0);
+            let mut n_inside = 0;
             let (low, high) = shape.bounds();
             while n_inside < 500 {
                 let p = Point::new(rng.uniform(low.x, high.x), rng.uniform(low.y, high.y), rng.uniform(low.z, high.z));
-                // Inside a convex shape: no direction separates.
-                let is_inside = (0..200).all(|_| {
-                    let u = Vector::from(rng.direction());
-                    u.dot(&p.coords) <= regrasp_geometry::collision::support::support_value(shape, &u, &mut hint)
-                });
+                let point = Shape::Sphere { radius: 1e-9 };
+                let at = Placement { rotation: Matrix3::identity(), translation: p.coords };
+                let found = separation(
+                    Placed { shape: &point, at: &at },
+                    Placed { shape, at: &Placement::IDENTITY },
+                    1e-9,
+                    1e-9,
+                    &mut Vector::zeros(),
+                    &mut [0; 2],
+                );
+                let is_inside = !matches!(found, Separation::SeparatedBy(_));
                 if is_inside {
                     n_inside += 1;
-                    let is_covered = balls.iter().any(|ball| (p - ball.center).norm() <= ball.radius + 1e-3);
+                    let is_covered = balls.iter().any(|ball| (p - ball.center).norm() <= ball.radius + 1e-8);
                     assert!(is_covered, "{shape:?} {p}");
                 }
             }

@@ -13,6 +13,7 @@ use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_robot::coupling::LinearLimit;
 use regrasp_robot::{JointKind, LinkId, Manipulator};
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 pub use pairs::{Pair, SpeedTerm};
@@ -58,8 +59,10 @@ pub struct Ball {
 pub struct Body {
     /// Name of the link.
     pub name: String,
-    /// The link.
+    /// The link; of something attached the link that it goes with.
     pub link: LinkId,
+    /// Which of the attached bodies it is.
+    pub attached: Option<usize>,
     /// The frame that it is fixed to; none for what does not move.
     pub frame: Option<usize>,
     /// A ball about all of its balls.
@@ -72,6 +75,19 @@ pub struct Body {
     pub is_exact: bool,
     /// How fast its balls' centres move at most.
     pub speed: Vec<SpeedTerm>,
+}
+
+/// A body that goes with a link, as an object in a hand does.
+#[derive(Debug, Clone)]
+pub struct Attached {
+    /// Name.
+    pub name: String,
+    /// The link.
+    pub link: LinkId,
+    /// Its balls and shapes, in the frame of the link.
+    pub cover: LinkCover,
+    /// Links that it may touch.
+    pub may_touch: BTreeSet<LinkId>,
 }
 
 /// A coordinate of the group that is planned for.
@@ -119,7 +135,13 @@ impl ArmModel {
     /// has the cover of each link.
     ///
     /// Panics unless the state has one value per coordinate and there is one cover per link.
-    pub fn new(manipulator: &Manipulator, covers: &[LinkCover], state: &[f64], free: &[usize]) -> Self {
+    pub fn new(
+        manipulator: &Manipulator,
+        covers: &[LinkCover],
+        attached: &[Attached],
+        state: &[f64],
+        free: &[usize],
+    ) -> Self {
         let (robot, layout) = (&manipulator.robot, &manipulator.layout);
         assert_eq!(state.len(), layout.len(), "one value per coordinate");
         assert_eq!(covers.len(), robot.links.len(), "one cover per link");
@@ -174,7 +196,21 @@ impl ArmModel {
                 waiting.push(of_robot.child);
             }
         }
-        model.find_speeds_and_pairs(manipulator);
+        for (index, body) in attached.iter().enumerate() {
+            let n_before = model.bodies.len();
+            model.add_body(&body.name, body.link, &body.cover, &places[body.link.0]);
+            model.bodies[n_before..].iter_mut().for_each(|added| added.attached = Some(index));
+        }
+        model.find_speeds_and_pairs(|a: &Body, b: &Body| {
+            let touches = |body: &Body, other: &Body| {
+                body.attached.is_some_and(|index| attached[index].may_touch.contains(&other.link))
+            };
+            match (a.attached, b.attached) {
+                (None, None) => manipulator.may_touch(a.link, b.link),
+                (Some(_), Some(_)) => false,
+                _ => touches(a, b) || touches(b, a),
+            }
+        });
         model
     }
 
@@ -230,6 +266,7 @@ impl ArmModel {
         self.bodies.push(Body {
             name: name.to_owned(),
             link,
+            attached: None,
             frame: *frame,
             bound: ball(&center, radius * (1.0 + 1e-6) + 1e-7),
             balls: first..self.balls.len(),

@@ -1,7 +1,6 @@
 //! Pairs of bodies that are kept apart, and bounds of how far bodies move.
 
 use super::{ArmModel, Body, Frame};
-use regrasp_robot::Manipulator;
 
 /// A share of the speed of a body: metres per unit of a coordinate.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,7 +91,7 @@ impl ArmModel {
     }
 
     /// Fills in how fast bodies move, and which pairs have to be apart.
-    pub(super) fn find_speeds_and_pairs(&mut self, manipulator: &Manipulator) {
+    pub(super) fn find_speeds_and_pairs(&mut self, may_touch: impl Fn(&Body, &Body) -> bool) {
         let levers: Vec<Vec<Lever>> = self.bodies.iter().map(|body| self.levers(body)).collect();
         for (index, own) in levers.iter().enumerate() {
             self.bodies[index].speed = self.speed_terms(own.iter());
@@ -100,8 +99,8 @@ impl ArmModel {
         let mut pairs = Vec::new();
         for b in 0..self.bodies.len() {
             for a in 0..b {
-                let links = [self.bodies[a].link, self.bodies[b].link];
-                if self.bodies[a].frame == self.bodies[b].frame || manipulator.may_touch(links[0], links[1]) {
+                let [first, second] = [&self.bodies[a], &self.bodies[b]];
+                if first.frame == second.frame || may_touch(first, second) {
                     continue;
                 }
                 // Joints that move one of the two only.

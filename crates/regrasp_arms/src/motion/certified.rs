@@ -12,8 +12,6 @@ use crate::world::{Item, ball_overlap};
 pub const ROUNDING: f32 = 1e-5;
 /// How far bodies move between two first moments, at most, in metres.
 const FIRST_WAY: f32 = 0.3;
-/// Shapes are asked where bodies move less than this in an interval, in metres, and balls are not the shapes.
-const EXACT_BELOW: f32 = 0.02;
 /// First intervals at most.
 const MOST_FIRST: usize = 64;
 
@@ -46,12 +44,11 @@ impl Collider<'_> {
             for lane in (0..n_lanes).filter(|lane| undecided >> lane & 1 == 1) {
                 let [middle, half] = lanes[lane];
                 let is_last = half * fastest < self.settings.least_step as f32 || half < 1e-6;
-                let is_near = !self.model.is_exact && half * fastest < EXACT_BELOW;
-                if (is_last || is_near) && self.is_interval_exactly_free(track, lanes[lane]) {
-                    continue;
+                if is_last && !self.is_interval_exactly_free(track, lanes[lane]) {
+                    return false;
                 }
                 if is_last {
-                    return false;
+                    continue;
                 }
                 let quarter = 0.5 * half;
                 self.intervals.extend([[middle - quarter, quarter], [middle + quarter, quarter]]);
@@ -137,7 +134,11 @@ impl Collider<'_> {
                 if is_exact && bare.any_positive() {
                     return None;
                 }
-                undecided |= grown.positive();
+                let mut bits = grown.positive();
+                if !is_exact && bits != 0 {
+                    bits = self.near_obstacle(body, self.found[index] as usize, bits, sway);
+                }
+                undecided |= bits;
             }
         }
         self.place_other_bounds();
@@ -170,7 +171,11 @@ impl Collider<'_> {
             if is_exact && bare.any_positive() {
                 return None;
             }
-            undecided |= grown.positive();
+            let mut bits = grown.positive();
+            if !is_exact && bits != 0 {
+                bits = self.near_body([a, b], bits, sway);
+            }
+            undecided |= bits;
         }
         Some(undecided)
     }

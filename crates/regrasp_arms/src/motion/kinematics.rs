@@ -2,6 +2,9 @@
 
 use super::Collider;
 use crate::lanes::{F8, V8, minus, squared};
+use nalgebra::Matrix3;
+use regrasp_geometry::Vector;
+use regrasp_geometry::collision::Placement;
 
 /// A moving frame in eight configurations.
 #[derive(Debug, Clone, Copy)]
@@ -148,6 +151,15 @@ impl Collider<'_> {
         let speed = squared(&velocity).sqrt() + squared(&moving.turn).sqrt() * of_model.bound.radius;
         // Single precision.
         (speed * half + half * half * (0.5 * self.bends[body])) * 1.00001
+    }
+
+    /// Where a body is in one of the eight configurations, within the rounding of single precision.
+    pub(super) fn placement(&self, body: usize, lane: usize) -> Placement {
+        let Some(frame) = self.model.bodies[body].frame else { return Placement::IDENTITY };
+        let frame = &self.frames[frame];
+        let vector = |v: &V8| Vector::new(f64::from(v[0].0[lane]), f64::from(v[1].0[lane]), f64::from(v[2].0[lane]));
+        let columns = [vector(&frame.axes[0]), vector(&frame.axes[1]), vector(&frame.axes[2])];
+        Placement { rotation: Matrix3::from_columns(&columns), translation: vector(&frame.origin) }
     }
 
     /// Places the balls of a body, once in a block.

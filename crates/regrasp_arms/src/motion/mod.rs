@@ -21,7 +21,7 @@ pub use track::Track;
 
 /// How motions are tested.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MotionSettings {
+pub struct ColliderSettings {
     /// Sampled motions: configurations per unit of the joints' Euclidean distance.
     pub resolution: f64,
     /// Distance that bodies keep from each other and from obstacles, in metres.
@@ -30,9 +30,9 @@ pub struct MotionSettings {
     pub least_step: f64,
 }
 
-impl Default for MotionSettings {
+impl Default for ColliderSettings {
     fn default() -> Self {
-        MotionSettings { resolution: 32.0, clearance: 0.0, least_step: 1e-4 }
+        ColliderSettings { resolution: 32.0, clearance: 0.0, least_step: 1e-4 }
     }
 }
 
@@ -55,7 +55,7 @@ pub struct Collider<'a> {
     /// What stands around it.
     pub world: &'a World,
     /// Settings.
-    pub settings: MotionSettings,
+    pub settings: ColliderSettings,
     /// How much was looked at.
     pub counts: Counts,
     arch: pulp::Arch,
@@ -93,7 +93,7 @@ pub struct Collider<'a> {
 
 impl<'a> Collider<'a> {
     /// All pairs and bodies of `model` in `world`.
-    pub fn new(model: &'a ArmModel, world: &'a World, settings: MotionSettings) -> Self {
+    pub fn new(model: &'a ArmModel, world: &'a World, settings: ColliderSettings) -> Self {
         let n = model.bodies.len();
         let moves = |body: &usize| model.bodies[*body].frame.is_some();
         Collider {

@@ -173,8 +173,9 @@ impl Collider<'_> {
 
     /// True where balls of a body meet an obstacle.
     #[inline(always)]
-    fn body_hits(&mut self, body: usize, item: u32, center: &V8, radius: f32, clearance: f32) -> bool {
-        let item = &self.world.items[item as usize];
+    fn body_hits(&mut self, body: usize, index: u32, center: &V8, radius: f32, clearance: f32) -> bool {
+        let obstacle = index as usize;
+        let item = &self.world.items[obstacle];
         if !item.overlap(center, F8::splat(radius)).any_positive() {
             return false;
         }
@@ -193,6 +194,8 @@ impl Collider<'_> {
             worst = worst.max(overlap);
         }
         worst.any_positive()
+            && (self.model.bodies[body].is_exact
+                || self.near_obstacle(body, obstacle, worst.positive(), F8::splat(clearance)) != 0)
     }
 
     /// True where balls of two bodies meet.
@@ -217,6 +220,7 @@ impl Collider<'_> {
                 worst = worst.max(ball_overlap(&center, &self.balls[j], reach));
             }
         }
-        worst.any_positive()
+        let is_exact = self.model.bodies[a].is_exact && self.model.bodies[b].is_exact;
+        worst.any_positive() && (is_exact || self.near_body([a, b], worst.positive(), F8::splat(clearance)) != 0)
     }
 }

@@ -1,6 +1,7 @@
 //! One configuration, with shapes in double precision.
 
 use super::{Collider, Track};
+use crate::lanes::{F8, LANES};
 use crate::world::ExactShape;
 use nalgebra::Matrix3;
 use regrasp_geometry::collision::{Placed, Placement, Separation, separation};
@@ -81,6 +82,32 @@ impl Collider<'_> {
             }
         }
         None
+    }
+
+    /// Of the configurations in `bits`: those in which a body is not proved to be farther than `reach` from an obstacle, by its shapes.
+    #[inline(never)]
+    pub(super) fn near_obstacle(&mut self, body: usize, obstacle: usize, bits: u8, reach: F8) -> u8 {
+        let mut near = 0;
+        for lane in (0..LANES).filter(|lane| bits >> lane & 1 == 1) {
+            self.counts.exact += 1;
+            let (at, reach) = (self.placement(body, lane), f64::from(reach.0[lane]));
+            let is_apart = self.is_apart_from(body, &at, &self.world.exact[obstacle], reach);
+            near |= u8::from(!is_apart) << lane;
+        }
+        near
+    }
+
+    /// The same for two bodies.
+    #[inline(never)]
+    pub(super) fn near_body(&mut self, bodies: [usize; 2], bits: u8, reach: F8) -> u8 {
+        let mut near = 0;
+        for lane in (0..LANES).filter(|lane| bits >> lane & 1 == 1) {
+            self.counts.exact += 1;
+            let at = bodies.map(|body| self.placement(body, lane));
+            let is_apart = self.are_apart(bodies, [&at[0], &at[1]], f64::from(reach.0[lane]));
+            near |= u8::from(!is_apart) << lane;
+        }
+        near
     }
 
     /// True where a body is proved to be farther than `required` from an obstacle.

@@ -4,6 +4,7 @@ use crate::stop::Stop;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use regrasp::Query;
+use regrasp::geometry::Pose;
 use regrasp::plan::check::{CheckSettings, Level, OwnQuery};
 use regrasp::scene::{Gravity, LoadedScene};
 
@@ -45,7 +46,7 @@ impl Judging {
             return Ok(query);
         }
         query.held().ok_or_else(|| {
-            let problem = "is not for a task of kind \"tracking\", which starts with a given grasp";
+            let problem = "is for tasks of kind \"in_hand\" only: others start with a given grasp, or hold nothing";
             Stop::argument("A507", "--hold", problem, "a task of kind \"in_hand\"")
         })
     }
@@ -55,7 +56,12 @@ impl Judging {
         let Some(asked) = self.gravity else { return loaded };
         let gravity = match asked {
             GravityInHand::Any => Some(Gravity::Any),
-            GravityInHand::Direction(down) => Gravity::along(&loaded.manipulation().world_from_hand(), &down.into()),
+            GravityInHand::Direction(down) => {
+                // A task of a whole robot has no hand to see gravity from: the direction is the world's.
+                let is_motion = loaded.task().motion.is_some();
+                let frame = if is_motion { Pose::identity() } else { loaded.manipulation().world_from_hand() };
+                Gravity::along(&frame, &down.into())
+            }
         };
         // The zero vector is refused where the argument is read.
         LoadedScene { scene: loaded.scene.under_gravity(gravity.unwrap_or_default()), ..loaded }

@@ -1,7 +1,8 @@
 //! `regrasp check`: judge a plan or a grasp list from the files alone.
 
 use crate::args::{self, Common};
-use crate::commands::plan::available_threads;
+use crate::commands::motion;
+use crate::commands::written::available_threads;
 use crate::interrupt;
 use crate::judge;
 use crate::judge_grasps;
@@ -28,6 +29,9 @@ pub fn run(arguments: &args::Check, common: &Common, talk: &Talk) -> Result<(), 
     if arguments.hand.is_some() || arguments.object.is_some() {
         let problem = format!("stands beside {}, which is no grasp list", arguments.plan.display());
         return Err(Stop::argument("A512", "--hand, --object", problem, "a grasp list; plans take --scene"));
+    }
+    if format::is_robot_plan(&bytes) {
+        return motion::check(arguments, &bytes, common, talk);
     }
     let plan = format::from_json(&arguments.plan, &bytes)?;
     let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref(), "--scene FILE")?;

@@ -5,6 +5,7 @@
 use crate::args::{self, Common};
 use crate::commands::check::scene_of;
 use crate::commands::grasp_files;
+use crate::commands::motion;
 use crate::interrupt;
 use crate::judge;
 use crate::load;
@@ -49,6 +50,9 @@ pub fn run(arguments: &args::Export, common: &Common, talk: &Talk) -> Result<(),
     {
         let problem = format!("is a format of grasp lists; {} is none", arguments.plan.display());
         return Err(Stop::argument("A512", flag, problem, "a grasp list, or a format of plans"));
+    }
+    if format::is_robot_plan(&bytes) {
+        return motion::export(arguments, &bytes, &written, common, talk);
     }
     let plan = format::from_json(&arguments.plan, &bytes)?;
     let mut scene = None;

@@ -2,12 +2,12 @@
 
 use crate::args::{self, Common};
 use crate::commands::check::grasp_scene;
-use crate::commands::plan::available_threads;
+use crate::commands::written::available_threads;
 use crate::judge_grasps;
 use crate::stop::Stop;
 use crate::talk::Talk;
 use regrasp::base::{Diagnostic, Place, files};
-use regrasp::export::grasps::{to_isaac, to_moveit, to_npz};
+use regrasp::export::grasps::{to_isaac, to_mjcf, to_moveit, to_npz};
 use regrasp::grasp::GraspList;
 use regrasp::grasp::list::format::from_json;
 use regrasp::plan::check::GraspReport;
@@ -19,13 +19,20 @@ use std::path::Path;
 /// Judges a list, then writes it in the formats asked for.
 pub fn export(arguments: &args::Export, bytes: &[u8], common: &Common, talk: &Talk) -> Result<(), Stop> {
     let path = &arguments.plan;
-    for (flag, asked) in [("--ros2", &arguments.ros2), ("--mjcf", &arguments.mjcf), ("--scene", &arguments.scene)] {
+    for (flag, asked) in [("--ros2", &arguments.ros2), ("--scene", &arguments.scene)] {
         refuse(flag, asked.as_deref(), path)?;
     }
     let list = from_json(path, bytes)?;
-    if !arguments.no_check && !judged(path, &list, common, talk)?.1.accepted() {
-        return Err(Stop::Rejected);
-    }
+    let scene = match arguments.no_check {
+        true => None,
+        false => {
+            let (scene, report) = judged(path, &list, common, talk)?;
+            if !report.accepted() {
+                return Err(Stop::Rejected);
+            }
+            Some(scene)
+        }
+    };
     let mut made: Vec<(&str, &Path, Vec<u8>)> = Vec::new();
     if let Some(to) = &arguments.isaac {
         made.push(("isaac", to, to_isaac(&list).into_bytes()));
@@ -40,6 +47,12 @@ pub fn export(arguments: &args::Export, bytes: &[u8], common: &Common, talk: &Ta
             Stop::BadInput(diagnostic.expected(expected).fix(fix).into())
         })?;
         made.push(("npz", to, arrays));
+    }
+    if let Some(to) = &arguments.mjcf {
+        let scene = scene.map_or_else(|| grasp_scene(path, &list, [&None, &None], common), Ok)?;
+        let model = to_mjcf(&scene, &list).map_err(|wrong| Stop::Internal(wrong.to_string()))?;
+        model.notes.iter().for_each(|note| talk.note(note));
+        made.push(("mjcf", to, model.xml.into_bytes()));
     }
     // All are made before any is written.
     made.into_iter().try_for_each(|(name, to, bytes)| write(name, to, &bytes, talk))
@@ -85,7 +98,7 @@ fn refuse(flag: &str, asked: Option<&Path>, list: &Path) -> Result<(), Stop> {
         None => Ok(()),
         Some(_) => {
             let problem = format!("is for plans; {} is a grasp list", list.display());
-            Err(Stop::argument("A512", flag, problem, "-o of view; --isaac, --moveit or --npz of export"))
+            Err(Stop::argument("A512", flag, problem, "-o of view; --isaac, --moveit, --npz or --mjcf of export"))
         }
     }
 }

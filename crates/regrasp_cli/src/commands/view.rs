@@ -5,6 +5,7 @@
 use crate::args::{self, Common};
 use crate::commands::check::scene_of;
 use crate::commands::grasp_files;
+use crate::commands::motion;
 use crate::commands::pictures;
 use crate::interrupt;
 use crate::judge;
@@ -34,6 +35,9 @@ pub fn run(arguments: &args::View, common: &Common, talk: &Talk) -> Result<(), S
     let bytes = files::read(&arguments.plan)?;
     if is_list(&bytes) {
         return grasp_files::view(arguments, &bytes, common, talk);
+    }
+    if format::is_robot_plan(&bytes) {
+        return motion::view(arguments, &bytes, &written, common, talk);
     }
     let plan = format::from_json(&arguments.plan, &bytes)?;
     let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref(), "regrasp view PLAN SCENE")?;

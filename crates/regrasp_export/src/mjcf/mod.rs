@@ -12,9 +12,12 @@ mod inertia;
 mod model;
 mod names;
 mod object;
+mod robot;
 mod solid;
 mod tip;
 mod xml;
+
+pub use robot::robot_to_mjcf;
 
 use regrasp_plan::Plan;
 use regrasp_scene::Manipulation;

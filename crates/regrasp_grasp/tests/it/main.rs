@@ -3,6 +3,7 @@
 mod closed_forms;
 mod closure;
 mod forces;
+mod isaac_noise;
 mod list;
 mod polyhedral;
 mod sample;

@@ -1,9 +1,9 @@
 //! Two jaws on antipodal points: a line through the object within the friction cones of both its ends, a sweep of approach angles
 //! about it, and the opening of the jaws that fits.
 
-use super::motors::Motors;
 use super::touch::{Gap, contact, gap};
 use crate::frames::radical_inverse;
+use crate::motors::Motors;
 use crate::prepared::Prepared;
 use nalgebra::{Matrix2, Rotation3, Translation3, UnitQuaternion, Vector2};
 use regrasp_base::Rng;

@@ -5,15 +5,13 @@
 mod closing;
 /// Two jaws on antipodal points.
 mod gripper;
-/// What moves when a motor turns.
-mod motors;
 /// Where a fingertip touches that moves.
 mod touch;
 
-pub use motors::Motors;
 pub use touch::touch_on_way;
 
 use crate::found::Reason;
+use crate::motors::Motors;
 use crate::prepared::Prepared;
 use crate::search::worth::{self, holding};
 use regrasp_base::Rng;

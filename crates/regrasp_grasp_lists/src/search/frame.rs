@@ -9,7 +9,7 @@ use crate::prepared::Prepared;
 use crate::way::{self, NoWay};
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;
-use regrasp_manipulation::grasp::state::GraspState;
+use regrasp_manipulation::grasp::state::{GraspState, HandJoints};
 use regrasp_manipulation::workspace::{TipMode, Workspace};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 
@@ -37,7 +37,7 @@ pub fn try_frame(prepared: &Prepared, workspace: &mut Workspace, index: u64) -> 
         let closed = driven::close_in_frame(prepared, motors, workspace, index, &mut rng);
         let (state, margin) = closed.map_err(|(reason, margin)| Miss { reason, margin, ..miss })?;
         let flatness = driven::flatness(prepared, &state);
-        return accept(prepared, workspace, index, state, &flatness, margin).map_err(|reason| Miss {
+        return accept(prepared, workspace, index, state, (&flatness, margin), None).map_err(|reason| Miss {
             reason,
             margin,
             ..miss
@@ -93,7 +93,7 @@ pub fn try_frame(prepared: &Prepared, workspace: &mut Workspace, index: u64) -> 
         }
         let flatness: Vec<f64> =
             (0..n_fingers).filter_map(|f| choice.chosen[f].map(|k| options[f][k].place.flatness)).collect();
-        match accept(prepared, workspace, index, state, &flatness, choice.margin) {
+        match accept(prepared, workspace, index, state, (&flatness, choice.margin), None) {
             Ok(grasp) => return Ok(grasp),
             Err(why) => reason = reason.max(why),
         }
@@ -170,17 +170,18 @@ fn state_of(prepared: &Prepared, hand_from_object: &Pose, options: &Options, cho
     GraspState::of(*hand_from_object, (0..choice.chosen.len()).map(finger))
 }
 
-/// The grasp `state`, which hits nothing, with all that belongs to it; `flatness` has the inverse curvature at its contacts.
+/// The grasp `state`, which hits nothing, with all that belongs to it; `flatness` has the inverse curvature at its contacts, beside the
+/// margin. `open` is the open hand to be tried first.
 pub fn accept(
     prepared: &Prepared,
     workspace: &mut Workspace,
     frame: u64,
     state: GraspState,
-    flatness: &[f64],
-    margin: f64,
+    (flatness, margin): (&[f64], f64),
+    open: Option<&HandJoints>,
 ) -> Result<Found, Reason> {
     let forces = worth::forces(prepared, &state).ok_or(Reason::Forces)?;
-    let way = way::way_in(prepared, workspace, &state).map_err(|why| match why {
+    let way = way::way_in(prepared, workspace, &state, open).map_err(|why| match why {
         NoWay::Closed => Reason::NotOpened,
         NoWay::Blocked => Reason::NoWayIn,
     })?;

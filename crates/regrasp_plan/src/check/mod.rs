@@ -97,6 +97,7 @@ pub use find_scene::{find_scene, find_scene_among};
 pub use grasps::{GraspReport, check_grasps};
 pub use level::Level;
 pub use robots::check_robot;
+pub use robots::{RobotAlong, robot_along};
 pub use slip::HoldSlip;
 pub use violation::{Moment, Violation, ViolationKind};
 
@@ -175,6 +176,9 @@ pub struct CheckSettings {
     pub lift_clearance: f64,
     /// The tip of a finger that is free all through a segment keeps this far from the object, in metres.
     pub free_clearance: f64,
+    /// The open hand of a listed grasp comes on a line of at least this length, in metres. A shorter one would say of every grasp that
+    /// it can be reached.
+    pub shortest_way_in: f64,
     /// Largest goal tolerance that a tracking plan may promise, in radians. Cherif 1999, table 2: a cell of 2.406 degrees.
     pub largest_goal_tolerance: f64,
     /// In tracking, a fingertip that does not turn, or not about the normal, or not across it, may do so by this much in a
@@ -229,6 +233,7 @@ impl Default for CheckSettings {
             resolution: 0.05e-3,
             lift_clearance: 0.1e-3,
             free_clearance: 0.05e-3,
+            shortest_way_in: 0.02,
             largest_goal_tolerance: 0.042,
             turn_tolerance: 2e-3,
             smallest_sliding_speed: 1e-5,

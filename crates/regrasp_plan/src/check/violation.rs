@@ -137,6 +137,8 @@ pub enum ViolationKind {
     NotJudged,
     /// Of a grasp list: the object does not stand in a pose that the list calls stable, or a hand is not above the support there.
     StablePoseWrong,
+    /// Of a grasp list: the line on which the open hand comes is too short to be a way in.
+    NoWayIn,
 }
 
 /// One thing that is wrong.

@@ -1,6 +1,7 @@
 //! The bodies and tasks of a scene file, by the two versions of the format.
 
 use super::files::Files;
+use super::named::which;
 use super::object::{self, Hands, Names};
 use super::task::{self, Heading, Task, TaskKind};
 use super::{gravity, hand, limits, motion, pose, robot, units};
@@ -8,7 +9,7 @@ use crate::gravity::Gravity;
 use crate::limits::Limits;
 use crate::object::Object;
 use crate::scene::{Obstacle, SceneHand, Support};
-use regrasp_base::toml_table::{Entry, Found, Table, one_of, suggestion};
+use regrasp_base::toml_table::{Entry, Found, Table, one_of};
 use regrasp_geometry::Pose;
 use regrasp_robot::Manipulator;
 
@@ -231,25 +232,6 @@ impl Needed {
         let is_motion = |entry: &Entry| entry.text_inside("task") == Some(TaskKind::Motion.name());
         if !tasks.is_empty() && tasks.iter().all(is_motion) { Needed::Robot } else { Needed::HandAndObject }
     }
-}
-
-/// The one of `names` that `key` says; where there is only one it may be left out. Errors: unknown (`S120`), missing (`S102`).
-pub(super) fn which(table: &mut Table, key: &'static str, names: &[&str], found: &mut Found) -> Option<usize> {
-    let entry: Entry = match names {
-        [_] => match table.optional(key) {
-            Some(entry) => entry,
-            None => return Some(0),
-        },
-        _ => table.required(found, key, &format!("add {key} = \"{}\"", names[0]))?,
-    };
-    let name = entry.text(found)?;
-    let known = names.iter().position(|known| *known == name);
-    if known.is_none() {
-        let problem =
-            format!("is \"{name}\", which the scene does not have{}", suggestion(name, names.iter().copied()));
-        found.diagnostics.push(entry.error("S120", found, problem).expected(names.join(", ")));
-    }
-    known
 }
 
 /// `task`. Errors: missing (`S102`), another task (`S105`).

@@ -14,6 +14,7 @@ mod gravity;
 mod hand;
 mod limits;
 mod motion;
+mod named;
 mod numbers;
 mod object;
 mod pose;

@@ -1,6 +1,6 @@
 //! Tasks of kind `motion`: a robot goes from joints to joints, or to poses of its wrists.
 
-use super::bodies::which;
+use super::named::which;
 use super::pose;
 use crate::motion::{CarriedObject, Holder, MotionGoal, MotionQuery, WristGoal};
 use crate::object::Object;

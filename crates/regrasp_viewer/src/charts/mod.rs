@@ -21,7 +21,7 @@ mod orientation_path;
 /// SVG text: elements, escaping, numbers, axes.
 pub mod svg;
 /// The time axis, and a panel over it.
-mod time_axis;
+pub(crate) mod time_axis;
 /// Where fingers touched the object.
 mod traces;
 

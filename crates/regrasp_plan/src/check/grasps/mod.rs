@@ -74,6 +74,8 @@ pub struct GraspReport {
     pub min_margin: Option<f64>,
     /// Smallest distance, in the grasps, of a pair that must not touch; on the ways in it is certified to be positive.
     pub min_clearance: Option<GraspClearance>,
+    /// The shortest line on which an open hand comes, in metres.
+    pub shortest_way_in: Option<f64>,
     /// Largest distance of a fingertip from its contact, in metres.
     pub max_contact_error: f64,
     /// Deepest that a fingertip presses into the object in a grasp, in metres.
@@ -117,6 +119,7 @@ struct Judged<'a> {
 #[derive(Default)]
 struct Measured {
     margin: Option<f64>,
+    shortest_way_in: Option<f64>,
     clearance: Option<GraspClearance>,
     contact_error: f64,
     deepest_tip: f64,
@@ -125,7 +128,9 @@ struct Measured {
 
 impl Measured {
     fn add(&mut self, other: Measured) {
-        self.margin = [self.margin, other.margin].into_iter().flatten().reduce(f64::min);
+        let least = |a: Option<f64>, b: Option<f64>| [a, b].into_iter().flatten().reduce(f64::min);
+        self.margin = least(self.margin, other.margin);
+        self.shortest_way_in = least(self.shortest_way_in, other.shortest_way_in);
         let clearances = [self.clearance.take(), other.clearance].into_iter().flatten();
         self.clearance = clearances.reduce(|a, b| if b.distance < a.distance { b } else { a });
         self.contact_error = self.contact_error.max(other.contact_error);
@@ -221,6 +226,7 @@ fn report(
         n_grasps: n_judged,
         min_margin: measured.margin,
         min_clearance: measured.clearance,
+        shortest_way_in: measured.shortest_way_in,
         max_contact_error: measured.contact_error,
         deepest_tip: measured.deepest_tip,
         n_distances: measured.n_distances,

@@ -14,6 +14,12 @@ const MOST_PIECES: u64 = 200_000;
 pub(super) fn check_way(judged: &Judged, index: usize, log: &mut Log, measured: &mut Measured) {
     let grasp = &judged.list.grasps[index];
     let [before, open, closed] = way_of(grasp);
+    let (line, shortest) = (grasp.approach.distance, judged.settings.shortest_way_in);
+    measured.shortest_way_in = Some(measured.shortest_way_in.map_or(line, |known: f64| known.min(line)));
+    if !(line >= shortest) {
+        let message = format!("the hand comes on a line of {:.1} mm, which is no way in", 1e3 * line);
+        log.push(Violation::new(Kind::NoWayIn, message).when(Moment::at(0, index)).amount(line, shortest));
+    }
     let touches = |pair: &Pair| {
         let finger = pair.tip_of.map(|f| &judged.model.fingers[f].name);
         finger.is_some_and(|name| grasp.contacts.iter().any(|contact| contact.finger == *name))

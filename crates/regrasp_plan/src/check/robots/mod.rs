@@ -3,6 +3,8 @@
 //! Not judged, because such a plan says nothing of it: whether a hand can hold what it carries (contacts, forces), torques of the arms,
 //! and balance of the robot. [`Report::assumed`] says so where something is carried.
 
+/// Clearance over time.
+pub mod along;
 /// No two bodies meet at any moment.
 pub mod apart;
 /// Everything that can collide, and which pairs must not.
@@ -15,6 +17,8 @@ pub mod question;
 pub mod rules;
 /// The robot as the checker sees it.
 pub mod tree;
+
+pub use along::{RobotAlong, robot_along};
 
 use crate::check::promises::check_input_files;
 use crate::check::violation::{Violation, ViolationKind as Kind};

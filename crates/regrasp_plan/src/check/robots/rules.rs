@@ -292,9 +292,11 @@ pub fn check_promises(question: &Question, scene: &Scene, plan: &RobotPlan, log:
         let row = question.tree.rows.iter().find(|row| !row.follows && row.drive.single() == Some(k));
         let of_robot = row.and_then(|row| row.velocity);
         let velocity = of_robot.unwrap_or(scene.limits.joint_velocity);
+        let of_file = question.robot.layout.coordinates.get(k).and_then(|coordinate| coordinate.acceleration);
+        let acceleration = of_file.unwrap_or(scene.limits.joint_acceleration);
         let limits = [
             ("joint_velocities", promises.joint_velocities[k], velocity),
-            ("joint_accelerations", promises.joint_accelerations[k], scene.limits.joint_acceleration),
+            ("joint_accelerations", promises.joint_accelerations[k], acceleration),
         ];
         for (which, promised, limit) in limits {
             if !(promised > 0.0) {

@@ -1,0 +1,196 @@
+//! A path: searched for in samples, then made shorter.
+
+use super::Stage;
+use super::ends::End;
+use super::problem::Problem;
+use crate::model::ArmModel;
+use crate::motion::{Collider, ColliderSettings, Track};
+use crate::search::{
+    InTurnSettings, Region, RrtOutcome, RrtSettings, SimplifySettings, in_turn, rrt_connect, simplify,
+};
+use regrasp_base::{Budget, Rng};
+use regrasp_manipulation::failure::{Failure, FailureKind};
+use regrasp_manipulation::motion_settings::{MotionMethod, MotionSettings, Validation};
+use regrasp_plan::robot_plan::RobotStatistics;
+
+/// A path whose straight motions are free.
+pub struct Found {
+    pub path: Vec<Vec<f64>>,
+    pub statistics: RobotStatistics,
+}
+
+/// Finds a path from the start to one of `goals` (states).
+pub fn find(
+    problem: &Problem,
+    model: &ArmModel,
+    goals: &[Vec<f64>],
+    settings: &MotionSettings,
+    (seed, budget): (u64, &Budget),
+    watch: &mut dyn FnMut(Stage),
+) -> Result<Found, Failure> {
+    let start = model.configuration_of(&problem.query.start);
+    let mut refused = None;
+    let mut free_goals = Vec::new();
+    for goal in goals {
+        let goal = model.configuration_of(goal);
+        match problem.refuse(model, &goal, End::Goal, settings) {
+            Ok(()) => free_goals.push(goal),
+            Err(failure) => refused = refused.or(Some(failure)),
+        }
+    }
+    if free_goals.is_empty() {
+        let nothing = || Failure::bare(FailureKind::GoalInvalid, "the goal cannot be reached".into(), "");
+        return Err(refused.unwrap_or_else(nothing));
+    }
+    watch(Stage::Prepared);
+    let mut search = Search { model, start, goals: free_goals, settings, statistics: RobotStatistics::default() };
+    let mut interrupt = None;
+    // With room to certify, then without, then with certified motions only.
+    let certified = settings.validation == Validation::Certified;
+    for (round, margin) in [settings.search_margin, 0.0].into_iter().enumerate() {
+        if !certified && margin > 0.0 {
+            continue;
+        }
+        let clearance = settings.clearance + margin;
+        let sampled = ColliderSettings { clearance, resolution: settings.resolution, ..ColliderSettings::default() };
+        let mut collider = Collider::new(model, &problem.world, sampled);
+        if !collider.is_sampled_free(&search.start, &search.start) {
+            continue;
+        }
+        let mut rng = Rng::keyed(seed, "motion", round as u64);
+        let outcome = search.sampled(&mut collider, &mut rng, budget);
+        interrupt = outcome.interrupt.or(interrupt);
+        watch(Stage::Searched);
+        let Some(mut path) = outcome.path else { continue };
+        let shortcuts = SimplifySettings { n_shortcuts: settings.shortcuts, ..SimplifySettings::default() };
+        simplify(&mut path, &shortcuts, &mut rng, |a, b| collider.is_sampled_free(a, b));
+        search.count(&collider);
+        watch(Stage::Simplified);
+        if !certified {
+            return Ok(Found { path, statistics: search.statistics });
+        }
+        let certified = search.certified(problem, path, &mut rng, budget);
+        watch(Stage::Certified);
+        if let Some(path) = certified {
+            return Ok(Found { path, statistics: search.statistics });
+        }
+    }
+    if certified && interrupt.is_none() {
+        let mut rng = Rng::keyed(seed, "certified_motion", 0);
+        let certified = search.certified_from_nothing(problem, &mut rng, budget);
+        watch(Stage::Searched);
+        if let Some(path) = certified {
+            return Ok(Found { path, statistics: search.statistics });
+        }
+    }
+    let kind = interrupt.map_or(FailureKind::WorkSpent, FailureKind::from);
+    let message = format!("no free motion was found in {} samples", search.statistics.samples);
+    Err(Failure::bare(kind, message, "try another seed, a larger budget, or a smaller clearance"))
+}
+
+struct Search<'m, 's> {
+    model: &'m ArmModel,
+    start: Vec<f64>,
+    goals: Vec<Vec<f64>>,
+    settings: &'s MotionSettings,
+    statistics: RobotStatistics,
+}
+
+impl Search<'_, '_> {
+    fn count(&mut self, collider: &Collider) {
+        self.statistics.work += 8 * collider.counts.blocks + collider.counts.exact;
+    }
+
+    fn take(&mut self, outcome: &RrtOutcome) {
+        self.statistics.nodes += outcome.n_nodes as u64;
+        self.statistics.samples += outcome.n_samples;
+    }
+
+    fn sampled(&mut self, collider: &mut Collider, rng: &mut Rng, budget: &Budget) -> RrtOutcome {
+        let all = RrtSettings {
+            max_samples: self.settings.max_samples,
+            ..RrtSettings::for_dimension(self.model.dimension())
+        };
+        let goals: Vec<Vec<f64>> =
+            self.goals.iter().filter(|goal| collider.is_sampled_free(goal, goal)).cloned().collect();
+        let outcome = match (self.settings.method, goals.as_slice()) {
+            (_, []) => RrtOutcome { path: None, n_nodes: 0, n_samples: 0, interrupt: None },
+            (MotionMethod::InTurn, [goal]) => {
+                let settings = InTurnSettings { all, ..InTurnSettings::default() };
+                in_turn(collider, &self.start, goal, &settings, rng, budget)
+            }
+            _ => {
+                let region = Region::of(self.model, &[&self.start, &goals[0]]);
+                rrt_connect(&self.start, &goals, &region, &all, rng, budget, |a, b| collider.is_sampled_free(a, b))
+            }
+        };
+        self.take(&outcome);
+        outcome
+    }
+
+    /// The path with certified motions: what is not free is searched for anew between its ends.
+    fn certified(
+        &mut self,
+        problem: &Problem,
+        path: Vec<Vec<f64>>,
+        rng: &mut Rng,
+        budget: &Budget,
+    ) -> Option<Vec<Vec<f64>>> {
+        let mut collider = certifying(self.model, problem, self.settings);
+        let mut is_free = |a: &[f64], b: &[f64]| collider.is_certified_free(&Track::straight(a, b));
+        let mut whole = vec![path[0].clone()];
+        let mut is_repaired = false;
+        let mut found = true;
+        for pair in path.windows(2) {
+            if is_free(&pair[0], &pair[1]) {
+                whole.push(pair[1].clone());
+                continue;
+            }
+            is_repaired = true;
+            let region = Region::of(self.model, &[&pair[0], &pair[1]]);
+            let few = RrtSettings { max_samples: 500, ..RrtSettings::for_dimension(self.model.dimension()) };
+            let goals = [pair[1].clone()];
+            let outcome = rrt_connect(&pair[0], &goals, &region, &few, rng, budget, &mut is_free);
+            self.statistics.nodes += outcome.n_nodes as u64;
+            self.statistics.samples += outcome.n_samples;
+            match outcome.path {
+                Some(detour) => whole.extend(detour.into_iter().skip(1)),
+                None => {
+                    found = false;
+                    break;
+                }
+            }
+        }
+        if found && is_repaired {
+            let shortcuts = SimplifySettings { n_shortcuts: self.settings.shortcuts, ..SimplifySettings::default() };
+            simplify(&mut whole, &shortcuts, rng, &mut is_free);
+            // Places between configurations of certified motions make certified motions.
+        }
+        self.count(&collider);
+        found.then_some(whole)
+    }
+
+    fn certified_from_nothing(&mut self, problem: &Problem, rng: &mut Rng, budget: &Budget) -> Option<Vec<Vec<f64>>> {
+        let mut collider = certifying(self.model, problem, self.settings);
+        let settings = RrtSettings {
+            max_samples: self.settings.max_samples,
+            ..RrtSettings::for_dimension(self.model.dimension())
+        };
+        let region = Region::of(self.model, &[&self.start, &self.goals[0]]);
+        let mut is_free = |a: &[f64], b: &[f64]| collider.is_certified_free(&Track::straight(a, b));
+        let outcome = rrt_connect(&self.start, &self.goals, &region, &settings, rng, budget, &mut is_free);
+        let shortcuts = SimplifySettings { n_shortcuts: self.settings.shortcuts, ..SimplifySettings::default() };
+        let path = outcome.path.clone().map(|mut path| {
+            simplify(&mut path, &shortcuts, rng, &mut is_free);
+            path
+        });
+        self.count(&collider);
+        self.take(&outcome);
+        path
+    }
+}
+
+fn certifying<'c>(model: &'c ArmModel, problem: &'c Problem, settings: &MotionSettings) -> Collider<'c> {
+    let settings = ColliderSettings { clearance: settings.clearance, ..ColliderSettings::default() };
+    Collider::new(model, &problem.world, settings)
+}

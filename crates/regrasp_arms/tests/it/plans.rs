@@ -1,0 +1,79 @@
+//! Plans of scenes.
+
+use crate::places::repository;
+use regrasp_arms::plan_motion;
+use regrasp_base::Budget;
+use regrasp_manipulation::failure::FailureKind;
+use regrasp_manipulation::motion_settings::{MotionMethod, MotionSettings};
+use regrasp_scene::{LoadedScene, MotionQuery, load_scene};
+use std::path::PathBuf;
+
+const SCENE: &str = r#"format = "regrasp-scene"
+format_version = 2
+
+[robot]
+file = "ROBOT"
+
+[[objects]]
+name = "box"
+box = { size = [0.04, 0.04, 0.04] }
+mass = 0.1
+friction = 0.8
+position = [0.9, 0.0, 0.02]
+
+[[obstacles]]
+name = "lamp"
+cylinder = { radius = 0.03, length = 0.6 }
+position = [LAMP]
+
+[[tasks]]
+task = "motion"
+start = { joints = { torso_yaw = -0.6 } }
+goal = { joints = { torso_yaw = 0.6, right_elbow = -0.9 } }
+"#;
+
+fn load(name: &str, lamp: &str) -> LoadedScene {
+    let robot = repository().join("assets/robots/two_arms/robot.toml");
+    let text = SCENE.replace("ROBOT", &robot.display().to_string()).replace("LAMP", lamp);
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
+    let path = folder.join(format!("motion_{name}.toml"));
+    std::fs::write(&path, text).unwrap();
+    load_scene(&path, &Default::default()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn query(loaded: &LoadedScene) -> MotionQuery {
+    loaded.task().query(7).as_motion().expect("a motion").clone()
+}
+
+#[test]
+fn plans_go_from_start_to_goal_and_are_the_same_again() {
+    let loaded = load("free", "0.75, 0.0, 0.45");
+    let query = query(&loaded);
+    for method in [MotionMethod::InTurn, MotionMethod::SingleQuery] {
+        let settings = MotionSettings { method, ..MotionSettings::default() };
+        let plan = |seed| {
+            let world = (&loaded.scene, &loaded.state);
+            plan_motion(world, &query, &settings, seed, &Budget::work(100_000)).unwrap_or_else(|f| panic!("{f}"))
+        };
+        let found = plan(3);
+        let waypoints = &found.segments[0].waypoints;
+        assert_eq!(waypoints[0].joints, query.start);
+        let regrasp_scene::MotionGoal::Joints(goal) = &query.goal else { panic!("joints") };
+        assert_eq!(&waypoints[waypoints.len() - 1].joints, goal);
+        assert!(waypoints.windows(2).all(|pair| pair[1].time > pair[0].time));
+        assert_eq!(plan(3), found);
+    }
+}
+
+#[test]
+fn a_start_in_collision_is_refused_with_the_pair_and_a_free_posture() {
+    let loaded = load("blocked", "0.387, -0.568, 0.58");
+    let query = query(&loaded);
+    let failure =
+        plan_motion((&loaded.scene, &loaded.state), &query, &MotionSettings::default(), 0, &Budget::work(100_000))
+            .err()
+            .expect("no plan");
+    assert_eq!(failure.kind, FailureKind::StartInvalid, "{failure}");
+    assert!(failure.message.contains("\"lamp\"") && failure.message.contains("mm"), "{}", failure.message);
+    assert!(failure.advice.contains("nearest free posture"), "{}", failure.advice);
+}

@@ -1,0 +1,216 @@
+//! Key frames of a plan of a whole robot: robot, what it carries, what stands around, and the paths of its wrists.
+
+use super::charts::joints_at;
+use crate::palette;
+use crate::render::model::linear;
+use crate::render::shade::Layer;
+use crate::render::text::{Anchor, Sheet};
+use crate::render::{Camera, Look, Paint, Picture, PlacedSurface, Surface, render};
+use crate::story::tessellate::tessellate;
+use crate::storyboard::marks::rope;
+use regrasp_geometry::shape::PlacedShape;
+use regrasp_geometry::{Point, Pose, Shape, Vector};
+use regrasp_plan::RobotPlan;
+use regrasp_robot::Manipulator;
+use regrasp_scene::{Scene, State};
+use std::sync::Arc;
+
+/// How a storyboard is drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RobotStoryboard {
+    /// Number of frames, from 2 to 60.
+    pub frames: usize,
+    /// Width of the picture, in pixels, from 200 to 8000.
+    pub width: usize,
+    /// Frames in a row.
+    pub columns: Option<usize>,
+}
+
+impl Default for RobotStoryboard {
+    fn default() -> Self {
+        RobotStoryboard { frames: 6, width: 1500, columns: None }
+    }
+}
+
+/// Height of a frame over its width.
+const ASPECT: f64 = 0.82;
+/// From where frames are seen: from the right, in front and above.
+const TOWARD: [f64; 3] = [-0.75, 0.5, -0.42];
+/// Focal length over the picture's width.
+const FOCAL: f64 = 2.2;
+/// Points of the path of a wrist.
+const PATH_POINTS: usize = 60;
+const LINK: &str = "#9aa3ad";
+const HAND: &str = "#6b7683";
+const OBJECT: &str = "#e69f00";
+const RESTING: &str = "#d8c48a";
+const OBSTACLE: &str = "#b5a492";
+
+/// A shape with its colour, on a link of the robot or in the world.
+struct Part {
+    link: Option<usize>,
+    frame: Pose,
+    surface: Arc<Surface>,
+    color: [f64; 3],
+}
+
+fn part(link: Option<usize>, frame: Pose, shape: &Shape, color: &str) -> Part {
+    Part { link, frame, surface: Arc::new(Surface::of(&tessellate(shape))), color: linear(color) }
+}
+
+/// Everything that is drawn, while the robot is at the plan's first waypoint.
+fn parts(scene: &Scene, state: &State, robot: &Manipulator, plan: &RobotPlan) -> Vec<Part> {
+    let mut parts = Vec::new();
+    for (l, link) in robot.robot.links.iter().enumerate() {
+        let is_hand = matches!(robot.part_of(regrasp_robot::LinkId(l)), regrasp_robot::Part::Hand(_));
+        let color = if is_hand { HAND } else { LINK };
+        let own = |placed: &PlacedShape| part(Some(l), placed.parent_from_shape, &placed.shape, color);
+        parts.extend(link.collision.iter().map(own));
+    }
+    for finger in robot.hands.iter().flat_map(|hand| &hand.hand.fingers) {
+        if let Some(own) = finger.tip.own_shape() {
+            let link_from_body = robot.robot.fixed_pose_in_body(finger.tip.link).inverse();
+            parts.push(part(Some(finger.tip.link.0), link_from_body * own.parent_from_shape, &own.shape, HAND));
+        }
+    }
+    let fixed = scene.obstacles.iter().chain(scene.supports.iter().map(|support| &support.body));
+    parts.extend(fixed.map(|body| part(None, body.placed.parent_from_shape, &body.placed.shape, OBSTACLE)));
+    for (object, pose) in scene.objects.iter().zip(&state.world_from_objects) {
+        if !plan.objects.contains(&object.name) {
+            parts.push(part(None, *pose, &object.shape, RESTING));
+        }
+    }
+    parts
+}
+
+/// A moment of the plan: joints and poses of its objects.
+struct Frame {
+    time: f64,
+    joints: Vec<f64>,
+    world_from_objects: Vec<Pose>,
+}
+
+/// `n` moments, evenly spread over the time of the plan.
+fn moments(plan: &RobotPlan, n: usize) -> Vec<Frame> {
+    let steps: Vec<_> = plan.segments.iter().flat_map(|segment| segment.waypoints.windows(2)).collect();
+    let first = steps[0][0].time;
+    let at = |k: usize| {
+        let time = first + plan.duration() * k as f64 / (n - 1).max(1) as f64;
+        let step = steps.iter().find(|pair| pair[1].time >= time).unwrap_or(&steps[steps.len() - 1]);
+        let span = step[1].time - step[0].time;
+        let u = if span > 0.0 { ((time - step[0].time) / span).clamp(0.0, 1.0) } else { 0.0 };
+        let ends = step[0].world_from_objects.iter().zip(&step[1].world_from_objects);
+        // Where exactly an object is between two waypoints is its hand's matter; for a picture the line will do.
+        let between = ends.map(|(a, b)| regrasp_geometry::interpolate_pose(&Pose::from(a), &Pose::from(b), u));
+        Frame { time, joints: joints_at([&step[0], &step[1]], u), world_from_objects: between.collect() }
+    };
+    (0..n).map(at).collect()
+}
+
+/// A storyboard of `plan`: the same picture for the same input.
+///
+/// Err with a message where the plan has no motion or is of another robot, or the settings make no sense.
+pub fn robot_storyboard(
+    scene: &Scene,
+    state: &State,
+    plan: &RobotPlan,
+    settings: &RobotStoryboard,
+) -> Result<Picture, String> {
+    if !(2..=60).contains(&settings.frames) || !(200..=8000).contains(&settings.width) || settings.columns == Some(0) {
+        return Err("a storyboard has 2 to 60 frames, at least one in a row, and is 200 to 8000 pixels wide".into());
+    }
+    let robot = scene.robots.iter().find(|robot| plan.robots.iter().any(|own| own.name == robot.name));
+    let robot = robot.filter(|robot| robot.layout.names() == plan.joint_names());
+    let robot = robot.ok_or("the plan is of a robot that the scene does not have")?;
+    if plan.segments.iter().all(|segment| segment.waypoints.len() < 2) {
+        return Err("the plan has no motion".into());
+    }
+    let carried: Vec<Arc<Surface>> = (plan.objects.iter())
+        .filter_map(|name| scene.object_named(name))
+        .map(|object| Arc::new(Surface::of(&tessellate(&scene.objects[object].shape))))
+        .collect();
+    let parts = parts(scene, state, robot, plan);
+    let mut poses = Vec::new();
+    let mut solid = |frame: &Frame| -> Vec<PlacedSurface> {
+        robot.link_poses(&frame.joints, &mut poses);
+        let place = |part: &Part| part.link.map_or(part.frame, |link| poses[link] * part.frame);
+        let model = |(body, part): (usize, &Part)| PlacedSurface {
+            world_from_surface: place(part),
+            surface: part.surface.clone(),
+            paint: Paint::Plain(part.color),
+            body: part.link.unwrap_or(1000 + body) as u32,
+        };
+        let objects = carried.iter().zip(&frame.world_from_objects).enumerate();
+        let objects = objects.map(|(k, (surface, pose))| PlacedSurface {
+            world_from_surface: *pose,
+            surface: surface.clone(),
+            paint: Paint::Plain(linear(OBJECT)),
+            body: 100_000 + k as u32,
+        });
+        parts.iter().enumerate().map(model).chain(objects).collect()
+    };
+    let frames = moments(plan, settings.frames);
+    let postures: Vec<Vec<PlacedSurface>> = frames.iter().map(&mut solid).collect();
+    let (center, radius) = robot_ball(robot, &moments(plan, PATH_POINTS), &postures, &parts);
+    let columns = settings.columns.unwrap_or(3.min(settings.frames)).min(settings.frames);
+    let gap = (settings.width / 100).max(2);
+    let width = (settings.width.saturating_sub(gap * (columns + 1)) / columns).max(16);
+    let height = (width as f64 * ASPECT) as usize;
+    let text = (width as f64 / 24.0).max(9.0);
+    let caption = (1.6 * text) as usize;
+    let rows = settings.frames.div_ceil(columns);
+    let whole = gap + rows * (height + caption + gap);
+    let mut sheet = Sheet::new(settings.width, whole).ok_or("the picture would be too large")?;
+    let focal = FOCAL * width as f64;
+    let distance = radius * focal / (0.47 * height as f64);
+    let middle = [width as f64 / 2.0, height as f64 / 2.0];
+    let camera = Camera::looking(&Vector::from(TOWARD), &center, distance, focal, middle);
+    let look = Look {
+        supersampling: 2,
+        occlusion_radius: 0.03 * radius,
+        shadows_within: Some((center, radius)),
+        outline: (width as f64 / 330.0).max(0.8),
+    };
+    let paths = wrist_paths(robot, plan, 0.006 * radius);
+    for (k, (frame, posture)) in frames.iter().zip(&postures).enumerate() {
+        let picture = render(posture, &paths, &camera, width, height, &look);
+        let (x, y) = (gap + (k % columns) * (width + gap), gap + (k / columns) * (height + caption + gap));
+        sheet.lay(&picture, x, y);
+        let line = format!("{:.2} s", frame.time);
+        let at = [x as f64 + width as f64 / 2.0, (y + height) as f64 + 1.1 * text];
+        sheet.write(&line, at[0], at[1], text, "#222222", Anchor::Middle);
+    }
+    Ok(sheet.picture())
+}
+
+/// A ball that holds the robot and what it carries in all frames, and the paths of its wrists.
+fn robot_ball(robot: &Manipulator, moments: &[Frame], postures: &[Vec<PlacedSurface>], parts: &[Part]) -> (Point, f64) {
+    let of_robot = |posture: &Vec<PlacedSurface>| -> Vec<Point> {
+        let own = posture.iter().enumerate().filter(|(k, _)| parts.get(*k).is_none_or(|part| part.link.is_some()));
+        own.flat_map(|(_, model)| model.world_corners().flatten().collect::<Vec<Point>>()).collect()
+    };
+    let mut points: Vec<Point> = postures.iter().flat_map(of_robot).collect();
+    points.extend(moments.iter().flat_map(|frame| wrists(robot, &frame.joints)));
+    let first = points.first().copied().unwrap_or_else(Point::origin);
+    let (low, high) = points.iter().fold((first, first), |(low, high), p| (low.inf(p), high.sup(p)));
+    let center = nalgebra::center(&low, &high);
+    (center, points.iter().map(|p| (p - center).norm()).fold(1e-3, f64::max))
+}
+
+/// Where the mount links of all arms are.
+fn wrists(robot: &Manipulator, joints: &[f64]) -> Vec<Point> {
+    let mut poses = Vec::new();
+    robot.link_poses(joints, &mut poses);
+    robot.arms.iter().map(|arm| Point::from(poses[arm.mount.0].translation.vector)).collect()
+}
+
+/// The swept path of every wrist, over everything else.
+fn wrist_paths(robot: &Manipulator, plan: &RobotPlan, radius: f64) -> Vec<Layer> {
+    let places: Vec<Vec<Point>> = moments(plan, PATH_POINTS).iter().map(|frame| wrists(robot, &frame.joints)).collect();
+    let path = |arm: usize| {
+        let points: Vec<Point> = places.iter().map(|at| at[arm]).collect();
+        let models = rope(&points, radius, linear(palette::color(arm)), 200_000 + arm as u32);
+        Layer { models, in_front: 0.95, hidden: 0.35, is_framed: true }
+    };
+    (0..robot.arms.len()).map(path).collect()
+}
