@@ -63,7 +63,7 @@ pub fn run<E>(
         let angle_deg = frame::rotation_between(&here.0, &goal).norm().to_degrees();
         let motion_s = end.as_ref().map_or(0.0, |end| end.time);
         if let Some(end) = end {
-            here = (end.pose, GraspRequest::Joints(end.joints));
+            here = (end.pose, GraspRequest::Posture { joints: end.joints, holds: end.holds });
         }
         tell(Link { link, angle_deg, motion_s, row })?;
     }
@@ -74,12 +74,14 @@ pub fn run<E>(
 struct End {
     pose: Pose,
     joints: Vec<f64>,
+    holds: Vec<bool>,
     time: f64,
 }
 
 fn end_of(plan: &Plan) -> Option<End> {
     let last = plan.segments.last()?.waypoints.last()?;
-    Some(End { pose: Pose::from(&last.world_from_object), joints: last.joints.clone(), time: last.time })
+    let holds = last.contacts.iter().map(|contact| contact.holds()).collect();
+    Some(End { pose: Pose::from(&last.world_from_object), joints: last.joints.clone(), holds, time: last.time })
 }
 
 /// A turn about any axis by up to [`LARGEST_TURN`], with the centre of mass near `home`.

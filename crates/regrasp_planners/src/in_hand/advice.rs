@@ -20,6 +20,9 @@ const FRICTIONS: [f64; 2] = [1.0, 1.5];
 /// Torsion radius of the soft fingertips that are tried, in metres.
 const SOFT: f64 = 0.005;
 
+/// How advice begins that names a start.
+pub const START_AT: &str = "start at ";
+
 /// Puts first in the advice of `failure` what was tried and led to a plan, if anything did. The query is in the hand's frame.
 pub fn advise(asked: &Asked, settings: &InHandSettings, budget: &Budget, failure: &mut Failure) {
     let is_open = matches!(failure.kind, FailureKind::WorkSpent | FailureKind::TimeLimit);
@@ -32,23 +35,11 @@ pub fn advise(asked: &Asked, settings: &InHandSettings, budget: &Budget, failure
     let mut short = InHandSettings { search, n_threads: 1, ..settings.clone() };
     (short.improvement.improve_work, short.improvement.shorten_share) = (0, 0.0);
     let limits = Budget { max_work: work, deadline: None, ..budget.clone() };
-    let mut spent = 0;
     let mut solves = |view: &HandView, query: &InHandQuery| {
         let changed = Asked { view, query, progress: &|_| {}, ..*asked };
-        match plan_with(&changed, &short, &limits, work) {
-            Ok(plan) => {
-                spent += plan.statistics.work;
-                true
-            }
-            Err(failure) => {
-                spent += failure.statistics.work;
-                false
-            }
-        }
+        plan_with(&changed, &short, &limits, work).is_ok()
     };
-    let found = first_that_helps(asked, &mut solves);
-    failure.statistics.work += spent;
-    if let Some(told) = found {
+    if let Some(told) = first_that_helps(asked, &mut solves) {
         failure.advice =
             format!("{told}: with that a search of {work} configurations found a plan. Or {}", failure.advice);
     }
@@ -64,7 +55,7 @@ fn first_that_helps(asked: &Asked, solves: &mut dyn FnMut(&HandView, &InHandQuer
             if solves(view, &shifted) {
                 let [x, y, z]: [f64; 3] = view.world_from(&shifted.world_from_object_start).translation.vector.into();
                 return Some(format!(
-                    "start at [{x:.4}, {y:.4}, {z:.4}] m, {:.0} mm {word} the palm, with the goal moved alike",
+                    "{START_AT}[{x:.4}, {y:.4}, {z:.4}] m, {:.0} mm {word} the palm, with the goal moved alike",
                     1e3 * SHIFT
                 ));
             }

@@ -191,7 +191,8 @@ const TRANSFERS_WORK: u64 = 40_000;
 /// leaves no forces.
 fn improved(context: Context, legs: &Legs, query: &InHandQuery, solution: Solution, mut plan: Plan) -> Plan {
     let Context { model, settings, seed, budget, .. } = context;
-    let asked = settings.improvement.improve_work.max(shortening_work(model, settings, legs, &plan));
+    let is_stuck = legs.goal_grasp.is_none() && refusals::is_stuck(model, solution.way.end());
+    let asked = settings.improvement.improve_work.max(shortening_work(model, settings, (legs, is_stuck), &plan));
     let work = asked.min(budget.max_work.saturating_sub(plan.statistics.work));
     if asked == 0 {
         return plan;
@@ -213,13 +214,15 @@ fn improved(context: Context, legs: &Legs, query: &InHandQuery, solution: Soluti
     with_counts(plan, counts)
 }
 
-/// Work after which a long plan is left as it is where nobody asks for a better one; 0 for plans that are not long.
-fn shortening_work(model: &Model, settings: &InHandSettings, legs: &Legs, plan: &Plan) -> u64 {
+/// Work after which a long plan is left as it is where nobody asks for a better one; 0 for plans that are not long. A plan that ends
+/// stuck, in a grasp in which no finger may lift, counts as long.
+fn shortening_work(model: &Model, settings: &InHandSettings, (legs, is_stuck): (&Legs, bool), plan: &Plan) -> u64 {
     let ImprovementSettings { long_plan, shorten_share, .. } = settings.improvement;
     let restricts = (0..model.n_fingers()).any(|finger| model.restricts_motion(finger));
     // A plan that begins with a given grasp pays for it: it seldom is one with which the object can be turned far.
     let long_plan = if legs.start_grasp.is_some() { LONG_FROM_GIVEN.min(long_plan) } else { long_plan };
-    if settings.method != Method::Gait || !model.any_rolls() || restricts || plan.n_relocations() < long_plan {
+    let is_long = plan.n_relocations() >= long_plan || is_stuck;
+    if settings.method != Method::Gait || !model.any_rolls() || restricts || !is_long {
         return 0;
     }
     let share = (plan.statistics.work as f64 * shorten_share) as u64;

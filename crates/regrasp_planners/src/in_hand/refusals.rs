@@ -76,6 +76,11 @@ pub fn refuse_after_transfers(model: &Model, failure: Failure) -> Failure {
     }
 }
 
+/// True when all fingers hold and none of them may lift. A finger that is free needs no leave to land.
+pub fn is_stuck(model: &Model, state: &GraspState) -> bool {
+    state.is_held_by_all() && model.may_release && releasable(model, &state.contacts, state.holding) == 0
+}
+
 /// The grasp that the query gives at one end; None where the planner chooses.
 pub fn given_grasp(
     model: &Model,
@@ -97,10 +102,8 @@ pub fn given_grasp(
             "move the contacts apart, or lower the margin (--margin)",
         ));
     }
-    // A finger that is free needs no leave to land.
-    let is_stuck =
-        || state.is_held_by_all() && model.may_release && releasable(model, &state.contacts, state.holding) == 0;
-    if end == End::Start && is_stuck() {
+    // Contacts that roll change while the object moves: a finger may be able to lift elsewhere.
+    if end == End::Start && !model.any_rolls() && is_stuck(model, &state) {
         return Err(end.failure(
             "in the start grasp no finger can lift: no set of n-1 fingers has force closure".into(),
             "choose other contacts, or let the planner choose (grasp = \"automatic\")",

@@ -1,5 +1,6 @@
 //! Tests of the planners through their public functions, on the bundled scenes.
 
+mod advice;
 mod carried;
 mod contact_kinematics;
 mod folds;

@@ -307,14 +307,17 @@ impl<'g, 'a> Gaits<'g, 'a> {
         })
     }
 
-    fn is_goal(&self, node: usize) -> bool {
-        let node = &self.nodes[node];
-        node.station == self.course.last()
-            && node.choice.len() == self.n_fingers()
+    fn is_goal(&mut self, node: usize) -> bool {
+        let Node { station, choice } = self.nodes[node].clone();
+        station == self.course.last()
+            && choice.len() == self.n_fingers()
             && match self.goal {
-                Some(goal) => *goal == node.choice,
-                // Fingers end on the object.
-                None => self.n_free(&node.choice) == 0,
+                Some(goal) => *goal == choice,
+                // Fingers end on the object, and one may lift, so that another plan can go on from there.
+                None => {
+                    self.n_free(&choice) == 0
+                        && (!self.search.model().may_release || self.closure.n_releasable(station, &choice) > 0)
+                }
             }
     }
 
@@ -497,7 +500,7 @@ impl<'g, 'a> Gaits<'g, 'a> {
         AStar::new().cheapest_path_within(
             limits,
             0,
-            |node| shared.borrow().is_goal(node),
+            |node| shared.borrow_mut().is_goal(node),
             |node, out| shared.borrow_mut().neighbours(node, out),
             |node| greed * shared.borrow().bound(node),
         )

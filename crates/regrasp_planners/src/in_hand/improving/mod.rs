@@ -27,6 +27,7 @@ use crate::in_hand::attempt::search::{Search, Stop};
 use crate::in_hand::grasps::candidate::Choice;
 use crate::in_hand::improving::closure::StationContacts;
 use crate::in_hand::improving::cost::{figures, lower_bound, margin_cost};
+use crate::in_hand::refusals::is_stuck;
 use crate::in_hand::regrasping::change::CASUAL;
 use crate::in_hand::searching::legs::{Legs, Solution, plan_legs};
 use crate::settings::CostWeights;
@@ -188,7 +189,8 @@ fn search_beside(search: &mut Search, legs: &Legs, improvement: &Improvement) ->
     search.n_samples += beside.n_samples;
     let solution = solution.ok()?;
     let figures = figures(search.model(), &search.settings.improvement.cost, &solution.way);
-    (figures.cost < improvement.improved.cost).then_some((solution, figures))
+    let is_better = figures.cost < improvement.improved.cost && !is_stuck(search.model(), solution.way.end());
+    is_better.then_some((solution, figures))
 }
 
 /// A part of the best plan between two of its grasps done in a cheaper way, if one is found. Err as of [`round`].
@@ -215,12 +217,17 @@ fn part(
         start_grasp: keeps_start.then_some(&from),
         goal_grasp: keeps_goal.then_some(&to),
     };
+    let mut of_part = figures(model, weights, &own.way);
+    let ends_stuck = is_stuck(model, best.way.end());
+    if ends_stuck && !keeps_goal {
+        of_part.cost += STUCK_COST;
+    }
     let lay = match rng.unit() {
         share if share < STRAIGHT_SHARE => Lay::Straight,
         share if share < STRAIGHT_SHARE + OWN_SHARE => Lay::Own,
         _ => Lay::Bent,
     };
-    let Some((detour, _)) = round(search, &part, &own, &figures(model, weights, &own.way), (lay, PART), rng)? else {
+    let Some((detour, _)) = round(search, &part, &own, &of_part, (lay, PART), rng)? else {
         return Ok(None);
     };
     let n_more = |n: usize| (n + detour.way.steps().len()).saturating_sub(last - first);
@@ -231,8 +238,16 @@ fn part(
     // Way poses are named by the motions before them.
     let way = if best.steps_to_way.is_empty() { way.with_transfers_joined() } else { way };
     let figures = figures(model, weights, &way);
-    Ok((figures.cost < of_best.cost).then_some((Solution { way, steps_to_way }, figures)))
+    let is_better = match [ends_stuck, is_stuck(model, way.end())] {
+        [true, false] => true,
+        [false, true] => false,
+        _ => figures.cost < of_best.cost,
+    };
+    Ok(is_better.then_some((Solution { way, steps_to_way }, figures)))
 }
+
+/// What it may cost more to end with a grasp in which a finger may lift, so that another plan can go on from there.
+const STUCK_COST: f64 = 3.0;
 
 /// Share of the parts that are tried on the straight way, and on their own; the others are on a way bent at random.
 const STRAIGHT_SHARE: f64 = 0.7;

@@ -1,6 +1,7 @@
 //! What would help where the start has no grasp: a pose nearby that has one.
 
 use super::evidence::Evidence;
+use crate::in_hand::advice::START_AT;
 use crate::in_hand::attempt::search::{Context, Search};
 use crate::in_hand::effective;
 use crate::settings::InHandSettings;
@@ -29,7 +30,9 @@ pub fn with_hint(
         && failure.nearest_miss.is_none()
         && failure.leg.is_none_or(|leg| leg == 1);
     let is_about_start = failure.kind == FailureKind::StartInvalid || found_none;
-    if !is_about_start || query.start_grasp != GraspRequest::Automatic {
+    // A start from which a plan was found says more.
+    let is_answered = failure.advice.starts_with(START_AT) && failure.kind != FailureKind::StartInvalid;
+    if !is_about_start || is_answered || query.start_grasp != GraspRequest::Automatic {
         return failure;
     }
     let Some((pose, distance)) = nearest_with_grasp(view, query, settings, seed) else { return failure };

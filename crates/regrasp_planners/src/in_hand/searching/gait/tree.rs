@@ -13,6 +13,7 @@ use crate::in_hand::grasps::pool::Pool;
 use crate::in_hand::moving::spin;
 use crate::in_hand::moving::spin::{Arrival, LOOP_REACH};
 use crate::in_hand::moving::transfer::{is_carried_out, transfer};
+use crate::in_hand::refusals::is_stuck;
 use crate::in_hand::regrasping::regrasp::{Tried, regrasp};
 use crate::in_hand::regrasping::unlock::{draw_bound_finger, unlock};
 use regrasp_base::Rng;
@@ -137,7 +138,9 @@ impl Tree {
                 self.places[place].n_tries += 1;
                 let is_given = self.nodes[node].parent.is_none() && !self.root_is_free;
                 // A given grasp is first taken as far as it goes by itself.
-                if (is_given && self.nodes[node].n_tries == 1) || !search.model().may_release {
+                // Where no finger may lift only the object can move, until one may.
+                let is_stuck = || is_given && is_stuck(search.model(), self.nodes[node].state());
+                if (is_given && self.nodes[node].n_tries == 1) || !search.model().may_release || is_stuck() {
                     let here = Sequence::at(self.nodes[node].state().clone());
                     return advance(search, self, node, target, here);
                 }
