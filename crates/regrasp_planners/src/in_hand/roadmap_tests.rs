@@ -120,33 +120,6 @@ fn paths_on_the_box_cross_no_edge_where_they_may_not() {
     });
 }
 
-#[test]
-fn contacts_jump_over_edges_and_never_come_near_them() {
-    with_search("box_90x.toml", |search| {
-        let model = search.model();
-        let object = &model.view.object;
-        let mut n_crossing = 0;
-        for _ in 0..40 {
-            for (a, b, path) in linked_pairs(search, 1) {
-                let crosses = |f: usize| a.contacts[f].normal_in_object.dot(&b.contacts[f].normal_in_object) < 0.5;
-                n_crossing += (0..model.n_fingers()).filter(|&f| crosses(f)).count();
-                for k in 1..64 {
-                    // Between two steps of which a jump lies there may be no state to go on from.
-                    let Some(state) = path.at(model, f64::from(k) / 64.0) else { continue };
-                    for contact in &state.contacts {
-                        let at = object.surface.project(&contact.point_in_object);
-                        assert!(object.surface.crease_distance(&at) >= object.edge_distance);
-                    }
-                }
-            }
-            if n_crossing > 0 {
-                return;
-            }
-        }
-        panic!("no path of 40 crosses an edge");
-    });
-}
-
 /// Every motion of `way` does what its kind may do: transfers hold all contacts, regrasps move one finger and nothing
 /// else, and each begins where the one before ended.
 fn assert_feasible(model: &Model, way: &Sequence) {
