@@ -1,8 +1,8 @@
 //! How a contact moves over the object on a path in GS_n.
 //!
 //! On an object that is star-shaped about its centre of mass the direction from there turns by a great circle (Saut 2011, sec.
-//! 4.2.2: star-shaped objects); on others the contact follows a geodesic (Sahbani 2007, sec. IV-B). A central projection costs a
-//! hundredth of a geodesic of an ellipsoid or a mesh, and most paths fail.
+//! 4.2.2: star-shaped objects); on others the contact follows a geodesic (Sahbani 2007, sec. IV-B). A central projection costs far
+//! less than a geodesic of an ellipsoid or a mesh, which is iterated, and most paths fail.
 
 use regrasp_geometry::surface::{Geodesic, SurfacePoint};
 use regrasp_geometry::{Point, Surface, UnitVector, Vector};
