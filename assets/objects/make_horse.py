@@ -184,12 +184,18 @@ def without_unused_points(mesh):
     return mesh
 
 
-def main():
+def files():
+    """The text of every file, by name."""
     mesh = checked(without_unused_points(horse()))
     lines = ["# Written by assets/objects/make_horse.py"]
     lines += ["v " + " ".join(f"{value:.6f}" for value in point) for point in mesh.points]
     lines += ["f " + " ".join(str(k + 1) for k in face) for face in mesh.faces]
-    (Path(__file__).parent / "horse.obj").write_text("\n".join(lines) + "\n")
+    return {"horse.obj": "\n".join(lines) + "\n"}
+
+
+def main():
+    for name, text in files().items():
+        (Path(__file__).parent / name).write_text(text)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,6 @@ static FOLDER: LazyLock<Folder> = LazyLock::new(Folder::new);
 fuzz_target!(|bytes: &[u8]| {
     let path = FOLDER.put("scene.toml", bytes);
     if let Ok(loaded) = load_scene(&path, &options(bytes)) {
-        let _ = loaded.task.query(bytes.len() as u64);
+        let _ = loaded.task().query(bytes.len() as u64);
     }
 });

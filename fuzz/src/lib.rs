@@ -9,6 +9,8 @@ pub const URDF: &str = include_str!("../seeds/urdf/hand.urdf");
 pub const HAND: &str = include_str!("../seeds/hand_toml/hand.toml");
 /// A scene for [`HAND`].
 pub const SCENE: &str = include_str!("../seeds/scene_toml/scene.toml");
+/// An arm of seven joints beside a wheel.
+pub const ARM: &str = include_str!("../seeds/robot_toml/arm.urdf");
 /// A tetrahedron.
 pub const OBJ: &str = include_str!("../seeds/obj/tetrahedron.obj");
 
@@ -23,6 +25,7 @@ impl Folder {
         let made = Folder(folder);
         made.put("hand.urdf", URDF.as_bytes());
         made.put("hand.toml", HAND.as_bytes());
+        made.put("arm.urdf", ARM.as_bytes());
         made.put("scene.toml", SCENE.as_bytes());
         made.put("tetrahedron.obj", OBJ.as_bytes());
         made

@@ -13,6 +13,7 @@ SI units and radians; rotations are `quat_xyzw`; joint vectors are in the order 
 
 from ._errors import Diagnostic, InputError, InternalError, RegraspError
 from ._grasps import GraspList, NoGrasps, check_grasps, grasps_mjcf, list_grasps
+from ._mbm import MotionProblem, import_mbm
 from ._model import (
     CoupledJoint,
     Finger,
@@ -53,6 +54,7 @@ __all__ = [
     "InternalError",
     "Joint",
     "Moment",
+    "MotionProblem",
     "NearestMiss",
     "NoGrasps",
     "Object",
@@ -79,6 +81,7 @@ __all__ = [
     "check_grasps",
     "grasps_mjcf",
     "export_mjcf",
+    "import_mbm",
     "list_grasps",
     "load_hand",
     "load_scene",

@@ -235,3 +235,34 @@ def test_a_thousand_queries_take_no_more_memory(scene: regrasp.Scene) -> None:
     first = ask(60)
     # Kilobytes on Linux: the heap may round up, and no more.
     assert ask(200) - first < 6000
+
+
+def test_a_gif_reads_back() -> None:
+    from regrasp.execute import film
+
+    rng = np.random.default_rng(0)
+    values = bytes(rng.integers(0, 40, size=30_000).astype(np.uint8).tolist())
+    assert decoded(film._lzw(values)) == values
+    frame = np.zeros((4, 6, 3), np.uint8)
+    assert film.gif([frame, frame], 0.1)[:6] == b"GIF89a"
+
+
+def decoded(content: bytes) -> bytes:
+    """GIF's LZW, read as the standard says (GIF89a, appendix F)."""
+    bits = int.from_bytes(content, "little")
+    out, size, table, before = bytearray(), 9, [bytes((k,)) for k in range(256)] + [b"", b""], b""
+    while True:
+        code = bits & ((1 << size) - 1)
+        bits >>= size
+        if code == 257:
+            return bytes(out)
+        if code == 256:
+            size, table, before = 9, table[:258], b""
+            continue
+        entry = table[code] if code < len(table) else before + before[:1]
+        if before:
+            table.append(before + entry[:1])
+        out += entry
+        before = entry
+        if len(table) == 1 << size and size < 12:
+            size += 1

@@ -207,3 +207,44 @@ fn folders() -> Result<Vec<String>, String> {
     found.extend(inside.iter().filter(|path| path.is_dir()).map(|path| path.to_string_lossy().into_owned()));
     Ok(found)
 }
+
+/// Motions of whole robots: problems of MotionBenchMaker, and super graphs of the robot with two arms. `SEEDS`: trials per problem.
+pub fn arms(_: &[String]) -> Outcome {
+    let example = |arguments: &str| {
+        let build = "run --profile dist -q -p regrasp_arms --example bench --";
+        run("cargo", &words(&format!("{build} {arguments}")))
+    };
+    let Some(models) = models() else {
+        return example("--roadmap assets/robots/upper_body/robot.toml");
+    };
+    let packages = package(&models);
+    let seeds = number("SEEDS", 3)?;
+    let rows = [
+        ("panda", "mbm_panda", "sampled_32"),
+        ("panda", "mbm_panda", "certified"),
+        ("baxter", "mbm_baxter_both_arms", "sampled_64"),
+        ("baxter", "mbm_baxter_both_arms", "in_turn_64"),
+        ("baxter", "mbm_baxter_both_arms", "certified"),
+    ];
+    for (robot, problems, settings) in rows {
+        let folder = out("arms")?.join(robot);
+        let import = "import sys, regrasp; regrasp.import_mbm(sys.argv[1], sys.argv[2], output=sys.argv[3])";
+        let from = models.join("benchmarks").join(problems);
+        let robot_file = format!("suites/arms/{robot}.toml");
+        let told = [import.to_owned(), from.display().to_string(), robot_file, folder.display().to_string()];
+        let told: Vec<String> = std::iter::once("-c".to_owned()).chain(told).collect();
+        run("python3", &told)?;
+        let mut scenes = Vec::new();
+        let families = fs::read_dir(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+        let mut families: Vec<PathBuf> = families.filter_map(|entry| Some(entry.ok()?.path())).collect();
+        families.sort();
+        for family in families {
+            scenes.extend(files(&family.display().to_string(), ".toml")?);
+        }
+        println!("{robot}, {settings}:");
+        let options = format!("--settings suites/arms/{settings}.json --seeds {seeds}");
+        example(&format!("{packages} {options} --csv {RESULTS}/arms_{robot}_{settings}.csv {}", joined(&scenes)))?;
+    }
+    println!("super graphs of the robot with two arms:");
+    example("--roadmap assets/robots/upper_body/robot.toml")
+}

@@ -16,7 +16,7 @@ use std::process::ExitCode;
 type Task = (&'static str, &'static str, fn(&[String]) -> Outcome);
 
 /// All tasks, in the order in which `cargo xtask` lists them.
-const TASKS: [Task; 13] = [
+const TASKS: [Task; 14] = [
     (
         "reference",
         "write the generated pages of docs/reference (--check: fail if they are out of date)",
@@ -30,6 +30,7 @@ const TASKS: [Task; 13] = [
         bench::roadmaps,
     ),
     ("bench-grasps", "lists of grasps of real hands and objects, as out/grasps/grasps.md", grasps::bench),
+    ("bench-arms", "motions of whole robots: problems of MotionBenchMaker, super graphs; needs PyYAML", bench::arms),
     ("growth", "measure how loading and planning grow with fingers, triangles, obstacles and threads", bench::growth),
     ("bench-scans", "turn scanned objects that are not convex in the Allegro hand", scans::task),
     ("benchmark-page", "write docs/benchmarks.md from what was measured", bench::page),

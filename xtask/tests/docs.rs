@@ -222,3 +222,57 @@ fn papers_are_cited_by_author_and_year() {
     }
     assert!(faults.is_empty(), "write author, year and section (docs/references.md):\n{}", faults.join("\n"));
 }
+
+/// What a row of the table of algorithms names: pairs of a file and what it defines there.
+fn named_code(row: &str) -> Vec<(String, String)> {
+    let spans: Vec<&str> = row.split('`').skip(1).step_by(2).collect();
+    let files = spans.windows(2).filter(|pair| pair[0].ends_with(".rs"));
+    files.map(|pair| (pair[0].to_owned(), pair[1].to_owned())).collect()
+}
+
+/// True where `text` defines a function, type or constant called `name`.
+fn defines(text: &str, name: &str) -> bool {
+    ["fn", "struct", "enum", "trait", "type", "const"].iter().any(|kind| {
+        let whole = format!("{kind} {name}");
+        text.match_indices(&whole).any(|(at, _)| {
+            let next = text[at + whole.len()..].chars().next();
+            next.is_none_or(|c| !(c.is_alphanumeric() || c == '_'))
+        })
+    })
+}
+
+#[test]
+fn algorithms_of_the_papers_are_where_the_references_say() {
+    let page = fs::read_to_string(root().join("docs/references.md")).expect("the page of references");
+    let section = page.split("## Where algorithms").nth(1).and_then(|rest| rest.split("\n## ").next());
+    let rows: Vec<&str> = section.expect("the table").lines().filter(|line| line.starts_with("| ")).collect();
+    let (mut faults, mut n_named) = (Vec::new(), 0);
+    for row in &rows {
+        for (file, name) in named_code(row) {
+            n_named += 1;
+            match fs::read_to_string(root().join("crates").join(&file)) {
+                Ok(text) if defines(&text, &name) => {}
+                Ok(_) => faults.push(format!("{file} defines no {name}")),
+                Err(error) => faults.push(format!("{file}: {error}")),
+            }
+        }
+        for file in row.split('`').filter(|span| span.starts_with("suites/") || span.starts_with("assets/")) {
+            if !root().join(file).is_file() {
+                faults.push(format!("{file} does not exist"));
+            }
+        }
+    }
+    assert!(rows.len() > 35 && n_named > 30, "{} rows, {n_named} names", rows.len());
+    assert!(faults.is_empty(), "the table of references names what is not there:\n{}", faults.join("\n"));
+    for paper in ["Saut 2011", "Sahbani 2007", "Cherif 1999"] {
+        assert!(rows.iter().filter(|row| row.contains(paper)).count() > 8, "{paper}");
+    }
+}
+
+#[test]
+fn what_is_not_defined_is_found() {
+    let text = "pub fn explore(x: u8) {}\nconst MOST: usize = 1;";
+    assert!(defines(text, "explore") && defines(text, "MOST"));
+    assert!(!defines(text, "explor") && !defines(text, "build"));
+    assert_eq!(named_code("| a | `x/y.rs` `go` | `z` |"), [("x/y.rs".to_owned(), "go".to_owned())]);
+}

@@ -285,13 +285,19 @@ def accelerations():
     return text
 
 
-def main():
+def files():
+    """The text of every file, by name."""
     about = "Dimensions as published for DLR's Justin (Saut 2010, sec. VI); shapes are our own."
-    (FOLDER / "body.urdf").write_text(robot("upper_body", about, torso() + arm("right") + arm("left")))
-    (FOLDER / "robot.toml").write_text(ROBOT + accelerations())
+    texts = {"body.urdf": robot("upper_body", about, torso() + arm("right") + arm("left")), "robot.toml": ROBOT + accelerations()}
     for side in ("right", "left"):
-        (FOLDER / f"{side}_hand.urdf").write_text(robot(f"{side}_hand", about, hand(side)))
-        (FOLDER / f"{side}_hand.toml").write_text(hand_file(side))
+        texts[f"{side}_hand.urdf"] = robot(f"{side}_hand", about, hand(side))
+        texts[f"{side}_hand.toml"] = hand_file(side)
+    return texts
+
+
+def main():
+    for name, text in files().items():
+        (FOLDER / name).write_text(text)
 
 
 if __name__ == "__main__":

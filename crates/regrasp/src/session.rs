@@ -79,7 +79,7 @@ impl<'a> Session<'a> {
             joints: start.joints.clone(),
             free: fingers.filter(|(_, holds)| !**holds).map(|(finger, _)| finger.name.clone()).collect(),
         };
-        Ok(Plan { asked: Some(asked), ..plan })
+        Ok(Plan { asked: Some(Box::new(asked)), ..plan })
     }
 
     /// What [`Session::plan`] asks.

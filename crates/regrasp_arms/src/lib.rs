@@ -12,6 +12,8 @@ pub mod model;
 pub mod motion;
 /// From a query to a plan.
 pub mod plan;
+/// Roadmaps for many queries.
+pub mod roadmap;
 /// Paths from configuration to configuration.
 pub mod search;
 /// Times along paths.
@@ -21,5 +23,5 @@ pub mod world;
 
 pub use model::ArmModel;
 pub use motion::Collider;
-pub use plan::plan_motion;
+pub use plan::{Stage, plan_in_stages, plan_motion};
 pub use world::World;

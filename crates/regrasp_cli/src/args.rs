@@ -102,9 +102,15 @@ pub struct Demo {
 pub struct Inspect {
     /// URDF file, or a hand file
     pub urdf: PathBuf,
-    /// Write a hand file
-    #[arg(short, long, value_name = "hand.toml")]
+    /// Write a hand file; for a robot with arms a robot file, with a hand file for each hand beside it
+    #[arg(short, long, value_name = "FILE.toml")]
     pub output: Option<PathBuf>,
+    /// Look for arms too where the URDF is a hand as it stands
+    #[arg(long, conflicts_with = "base")]
+    pub robot: bool,
+    /// SRDF of a robot with arms: names, mount links and pairs of links that are never tested
+    #[arg(long, value_name = "FILE.srdf")]
+    pub srdf: Option<PathBuf>,
     /// Base link of the hand in a URDF: its fingers are those below this link [default: guessed]
     #[arg(long, value_name = "LINK")]
     pub base: Option<String>,

@@ -17,6 +17,9 @@ const FRAMES_PER_TASK: u64 = 16;
 /// Tasks of a batch.
 const TASKS_PER_BATCH: u64 = 32;
 
+/// Frames after which a search for so many grasps is a long one, for each grasp that is kept. By hand.
+const FRAMES_PER_GRASP: u64 = 50;
+
 /// What a running search tells its caller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
@@ -104,7 +107,9 @@ fn search(
                     Ok(grasp) => found.push(grasp),
                     Err(miss) => tally.miss(&miss),
                 }
-                if found.len() >= n_enough {
+                // Where grasps are rare, as many as are kept are enough.
+                let is_long = tally.frames_tried >= FRAMES_PER_GRASP * settings.grasps as u64;
+                if found.len() >= n_enough || (is_long && found.len() >= settings.grasps) {
                     return (found, None);
                 }
             }

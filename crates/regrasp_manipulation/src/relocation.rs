@@ -49,6 +49,24 @@ pub fn hover(
     model.fingers[finger].ik.solve_near(&(tip + normal * height), joints, &settings)
 }
 
+/// How a finger passes from above one contact to above another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PassingOver {
+    /// Over the surface, else straight in the joints, else by RRT-Connect.
+    SurfaceFirst,
+    /// By RRT-Connect alone (Saut 2011, sec. 4.2.3).
+    RrtOnly,
+}
+
+/// Runs of RRT-Connect.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct RrtRuns {
+    /// All of them.
+    pub all: u64,
+    /// Those that found nothing: more iterations might.
+    pub failed: u64,
+}
+
 /// Height that counts as having left, in metres.
 const LEAST_LIFT: f64 = 0.001;
 
@@ -87,9 +105,16 @@ pub fn relocate(
             Some(above) => (above, Some(to.joints.clone())),
             None => (to.joints.clone(), None),
         };
-        let mut over = pass_over(workspace, &placement, finger, &above_start, &above_goal, height, mode);
+        let mut over = match workspace.passing_over {
+            PassingOver::SurfaceFirst => {
+                pass_over(workspace, &placement, finger, &above_start, &above_goal, height, mode)
+            }
+            PassingOver::RrtOnly => None,
+        };
         if over.is_none() && std::mem::take(&mut may_go_around) {
             over = around(workspace, finger, &above_start, &above_goal, mode, rng);
+            workspace.rrt_runs.all += 1;
+            workspace.rrt_runs.failed += u64::from(over.is_none());
         }
         let Some(over) = over else { continue };
         let mut path = up;

@@ -21,6 +21,7 @@ pub mod tried;
 use crate::forces::limits::Refusals;
 use crate::grasp::state::{Contacts, GraspState, HandJoints};
 use crate::model::{Carrier, Model, Pair};
+use crate::relocation::{PassingOver, RrtRuns};
 use configuration::{Configuration, midway, place_finger, place_object};
 use draws::Draws;
 use nearby::Nearby;
@@ -97,6 +98,10 @@ pub struct Workspace<'a> {
     free: u32,
     /// Iterations of RRT-Connect that a relocation is worth just now.
     pub rrt_iterations: usize,
+    /// How a finger passes from above one contact to above another.
+    pub passing_over: PassingOver,
+    /// Runs of RRT-Connect so far, and those of them that found nothing.
+    pub rrt_runs: RrtRuns,
     /// Configurations looked at, and what draws of contacts cost beside.
     pub work: u64,
     /// What draws of contacts cost.
@@ -135,6 +140,8 @@ impl<'a> Workspace<'a> {
             contacts: Contacts::new(),
             free: 0,
             rrt_iterations: model.settings.rrt_iterations,
+            passing_over: PassingOver::SurfaceFirst,
+            rrt_runs: RrtRuns::default(),
             work: 0,
             draws: Draws::default(),
             tried: Tried::default(),

@@ -459,7 +459,7 @@ pub struct Plan {
     pub start: PoseData,
     /// The query, where the scene file does not have it; see [`Asked`].
     #[serde(skip)]
-    pub asked: Option<Asked>,
+    pub asked: Option<Box<Asked>>,
     /// Poses asked for between start and goal, in order; absent where none were.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub way_poses: Vec<WayPose>,

@@ -29,13 +29,16 @@ pub fn scene(loaded: &LoadedScene, path: &Path) -> Value {
     })
 }
 
-/// What a task is about.
+/// What a task is about. A motion is about a robot: hand and object are empty.
 fn task(scene: &Scene, task: &Task) -> Value {
+    let is_motion = task.kind_name() == "motion";
+    let hand = scene.hands.get(task.hand).filter(|_| !is_motion);
+    let object = scene.objects.get(task.object).filter(|_| !is_motion);
     json!({
         "name": task.name,
         "kind": task.kind_name(),
-        "hand": if task.motion.is_none() { scene.hands[task.hand].name.as_str() } else { "" },
-        "object": if task.motion.is_none() { scene.objects[task.object].name.as_str() } else { "" },
+        "hand": hand.map_or("", |hand| hand.name.as_str()),
+        "object": object.map_or("", |object| object.name.as_str()),
         "robot": task.motion.as_ref().map(|motion| scene.robots[motion.robot].name.as_str()),
     })
 }

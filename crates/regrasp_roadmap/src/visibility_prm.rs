@@ -167,9 +167,21 @@ impl<P: Clone, M: Clone> VisibilityPrm<P, M> {
         self.n_redundant_in_row >= max_redundant
     }
 
+    /// For each component with a guard that sees `point`: the nearest such guard, and the motion from the point to it.
+    pub fn guards_seen(&self, space: &mut impl Space<Point = P, Motion = M>, point: &P) -> Vec<(usize, M)> {
+        self.seen_components(space, point, |node| node.is_guard)
+    }
+
+    /// Adds a node that is no guard, with motions from it to others.
+    pub fn add_linked(&mut self, space: &impl Space<Point = P, Motion = M>, point: P, seen: Vec<(usize, M)>) -> usize {
+        let node = self.add(point, false);
+        self.link(space, node, seen);
+        node
+    }
+
     /// Keeps `point` if it sees no guard or guards of several components.
     pub fn consider(&mut self, space: &mut impl Space<Point = P, Motion = M>, point: P) -> Outcome {
-        let seen = self.seen_components(space, &point, |node| node.is_guard);
+        let seen = self.guards_seen(space, &point);
         match seen.len() {
             0 => {
                 self.n_redundant_in_row = 0;

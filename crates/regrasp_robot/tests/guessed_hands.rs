@@ -105,6 +105,11 @@ fn a_gripper_on_an_arm_beside_wheels_is_named() {
         + &turning("wrist", "elbow");
     let parts =
         turning("wheel", "root") + &arm + &turning("head", "torso") + &finger("l", "wrist") + &finger("r", "wrist");
+    // Wheel and head without geometry are no fingers.
+    assert_eq!(summary(&guess(&parts, None).unwrap()).0, "wrist");
+    let ball = r#"<collision><geometry><sphere radius="0.05"/></geometry></collision>"#;
+    let shaped = |name: &str| (format!("<link name=\"{name}\"/>"), format!("<link name=\"{name}\">{ball}</link>"));
+    let parts = [shaped("wheel"), shaped("head")].iter().fold(parts, |text, (bare, full)| text.replace(bare, full));
     assert_eq!(fix(&guess(&parts, None).unwrap_err()), "regrasp inspect with --base wrist");
     assert_eq!(summary(&guess(&parts, Some("wrist")).unwrap()).1.concat(), ["l_low", "l_high", "r_low", "r_high"]);
 }
@@ -221,13 +226,14 @@ fn xacro_files_are_known_by_their_content() {
 
 #[test]
 fn links_without_geometry_are_no_fingers_beside_others_that_have_some() {
-    let caster = turning("caster", "root");
-    let parts = [finger("i", "root"), caster.clone(), finger("m", "root"), finger("r", "root")].concat();
+    let parts = [finger("i", "root"), turning("caster", "root"), finger("m", "root"), finger("r", "root")].concat();
     let (_, fingers) = summary(&guess(&parts, None).unwrap());
     assert_eq!(fingers.len(), 3, "{fingers:?}");
     // A bare tree still has its ends as fingers.
-    let bare = [caster, turning("other", "root"), turning("third", "root")].concat();
-    assert_eq!(summary(&guess(&bare, None).unwrap()).1.len(), 3);
+    let collision = r#"<collision><origin xyz="0 0 0.02"/><geometry><capsule radius="0.005" length="0.04"/></geometry></collision>"#;
+    let bare = parts.replace(collision, "");
+    assert!(!bare.contains("collision"));
+    assert_eq!(summary(&guess(&bare, None).unwrap()).1.len(), 4);
 }
 
 #[test]
@@ -249,4 +255,13 @@ fn pairs_that_a_hand_file_excuses_stay_excused_in_what_inspect_writes() {
     assert!(text.contains("[\"i_b\", \"m_b\"],") && text.matches("_b\"],").count() == 1, "{text}");
     let plain = load(folder.path(), &parts, &hand(""), "hand.toml", None).unwrap();
     assert!(!regrasp_robot::inspect::hand_file_text(&plain.hand, "hand.urdf", &none).contains("allow"));
+}
+
+#[test]
+fn spreads_that_fingers_share_by_a_coupling_are_held() {
+    let mimic = |text: &str| text.replacen(r#"upper="1"/></joint>"#, r#"upper="1"/><mimic joint="i_low"/></joint>"#, 1);
+    let parts = [finger("i", "root"), mimic(&finger("m", "root")), finger("t", "root")].concat();
+    let loaded = guess(&parts, None).unwrap();
+    assert_eq!(summary(&loaded).1, [vec!["i_high"], vec!["m_high"], vec!["t_low", "t_high"]]);
+    assert!(loaded.notes.iter().any(|note| note.contains("\"i_low\" belongs to no finger")), "{:?}", loaded.notes);
 }

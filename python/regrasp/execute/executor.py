@@ -20,7 +20,7 @@ from .monitor import Monitor, Trigger, pose_error
 from .planning import ChargedPlanning, Planning, Prepare, ThreadPlanning, Ticket
 from .plant import Command, Plant
 from .senses import Fault, Senses
-from .settings import CAREFUL, PLANNER, ExecutorSettings
+from .settings import CAREFUL, LOOSE, PLANNER, ExecutorSettings
 
 #: A sample is kept every so many ticks.
 SAMPLED = 5
@@ -48,13 +48,14 @@ class Executor:
         control: Settings | None = None,
         planning: Callable[[Sequence[Session], ExecutorSettings, Prepare], Planning] | None = None,
         careful: Sequence[Session] = (),
+        loose: Sequence[Session] = (),
         stiffness: Array | None = None,
         damping: Array | None = None,
     ) -> None:
         """session, plant: of the same hand. control: as the replay's settings, of which tick and speed count.
 
         planning: ``ThreadPlanning`` for robots; where nothing is said, ``ChargedPlanning`` for plants that know the truth, which are
-        simulations, else ``ThreadPlanning``. careful: sessions of the same scene that are asked for plans first. stiffness, damping: of the robot's joints, where they are not those of replays.
+        simulations, else ``ThreadPlanning``. careful: sessions of the same scene that are asked for plans first; loose: that are asked last, and for starts that the session refuses. stiffness, damping: of the robot's joints, where they are not those of replays.
         """
         self._session = session
         self._plant = plant
@@ -71,7 +72,8 @@ class Executor:
         self._gains = (stiffness, damping)
         self._truth: Callable[[], tuple[Array, Array]] | None = getattr(plant, "truth", None)
         maker = planning or (ChargedPlanning if self._truth is not None else ThreadPlanning)
-        self._planning = maker([*careful, session], self._settings, self._prepare)
+        self._planning = maker([*careful, session, *loose], self._settings, self._prepare)
+        self._for_starts = [session, *loose]
         self._rig: Rig | None = None
         self._senses = Senses(len(plant.joint_names), self._settings)
         self._leg: Leg | None = None
@@ -229,16 +231,18 @@ class Executor:
         message = ""
         told = False
         while True:
+            message = ""
             self._hold_for(settings.rest_time)
             senses = self._senses
             pose = Pose(senses.position.copy(), senses.quat[[1, 2, 3, 0]].copy())
             presses = None if senses.forces is None else (senses.forces > settings.lost_force).tolist()
-            start = self._session.project(
-                pose, senses.joints, presses=presses, distance=settings.project_distance, turn=settings.project_turn
-            )
-            if isinstance(start, Start):
-                return start
-            message = start.message
+            for session in self._for_starts:
+                start = session.project(
+                    pose, senses.joints, presses=presses, distance=settings.project_distance, turn=settings.project_turn
+                )
+                if isinstance(start, Start):
+                    return start
+                message = message or start.message
             if not told:
                 self._event("no_start", message, "hold")
                 told = True
@@ -458,9 +462,11 @@ def execute(
     session: of the plant's scene; a plant in MuJoCo knows its scene. The planner then has the settings of execution.
     """
     careful: list[Session] = []
+    loose: list[Session] = []
     if session is None:
         scene = getattr(plant, "scene", None)
         if scene is None:
             raise ValueError("the plant does not know its scene: give a session")
-        session, careful = Session(scene, settings=PLANNER), [Session(scene, settings=CAREFUL)]
-    return Executor(session, plant, settings, careful=careful).run(goals)
+        session = Session(scene, settings=PLANNER)
+        careful, loose = [Session(scene, settings=CAREFUL)], [Session(scene, settings=LOOSE)]
+    return Executor(session, plant, settings, careful=careful, loose=loose).run(goals)

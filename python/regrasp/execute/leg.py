@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from .. import _planning
 from .._plan import Plan
+from .._planning import export_mjcf
 from ..simulate._mujoco import mujoco
 from ..simulate.controllers import Controller, Feedback
 from ..simulate.model import Rig, Settings, make_rig, normals_in_world, with_plan
@@ -24,7 +24,7 @@ def first_rig(plan: Plan, settings: Settings, stiffness: Array | None = None, da
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        xml = _planning.export_mjcf(plan)
+        xml = export_mjcf(plan)
     rig = make_rig(xml, flat(json.loads(plan.to_json())), settings)
     if stiffness is None:
         return rig

@@ -105,12 +105,12 @@ class RunLog:
     status: str = "running"
     """``done``, ``gave_up``, ``lost``, ``interrupted`` or ``running``."""
     message: str = ""
-    settings: dict[str, Any] = field(default_factory=dict)
-    samples: list[Sample] = field(default_factory=list)
-    events: list[Event] = field(default_factory=list)
-    legs: list[LegRecord] = field(default_factory=list)
-    goals: list[GoalResult] = field(default_factory=list)
-    plans: list[Plan] = field(default_factory=list)
+    settings: dict[str, Any] = field(default_factory=dict[str, Any])
+    samples: list[Sample] = field(default_factory=list[Sample])
+    events: list[Event] = field(default_factory=list[Event])
+    legs: list[LegRecord] = field(default_factory=list[LegRecord])
+    goals: list[GoalResult] = field(default_factory=list[GoalResult])
+    plans: list[Plan] = field(default_factory=list[Plan])
     """One per leg."""
 
     @property
@@ -149,8 +149,9 @@ class RunLog:
     @staticmethod
     def load(path: str | os.PathLike[str]) -> RunLog:
         """Reads ``run.json``, without plans. Raises ``ValueError`` for anything else."""
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
-        if not isinstance(content, dict) or content.get("format") != FORMAT or content.get("format_version") != FORMAT_VERSION:
+        read: Any = json.loads(Path(path).read_text(encoding="utf-8"))
+        content: dict[str, Any] = dict(read) if isinstance(read, dict) else {}  # pyright: ignore[reportUnknownArgumentType]
+        if content.get("format") != FORMAT or content.get("format_version") != FORMAT_VERSION:
             raise ValueError(f"{path}: is no run of format version {FORMAT_VERSION}")
         return RunLog(
             scene=content["scene"],

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from .. import _planning
 from .._arguments import StrPath
 from .._model import Pose, Scene, load_scene
 from .._plan import Plan
+from .._planning import export_mjcf
+from .._planning import plan as plan_scene
 from ..simulate import replay
 from ..simulate._mujoco import mujoco
 from ..simulate.controllers import Controller
@@ -60,7 +61,7 @@ class MujocoPlant:
         self.scene: Scene | None = plan._source  # pyright: ignore[reportPrivateUsage]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            xml = _planning.export_mjcf(plan)
+            xml = export_mjcf(plan)
         simulation = settings.simulation
         content = flat(json.loads(plan.to_json()))
         self.rig: Rig = make_rig(xml, content, simulation)
@@ -86,7 +87,7 @@ class MujocoPlant:
         """The plant of a scene, gripped as a plan for its task begins. Arguments as of ``regrasp.plan``. Raises ``PlanError``
         where there is no such plan."""
         scene = scene if isinstance(scene, Scene) else load_scene(scene)
-        plan = _planning.plan(scene, seed=seed, **arguments)
+        plan = plan_scene(scene, seed=seed, **arguments)
         if not isinstance(plan, Plan):
             raise PlanError(f"no plan to grip by: {plan.message}")
         return MujocoPlant(plan, settings)

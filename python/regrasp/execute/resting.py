@@ -15,15 +15,17 @@ from collections import Counter
 
 import numpy as np
 
-from .. import _planning
 from .._model import Pose, load_scene
 from .._plan import Plan
+from .._planning import export_mjcf
+from .._planning import plan as plan_scene
 from .._session import Session, Start
 from ..simulate import replay
 from ..simulate.controllers import Controller
 from ..simulate.model import Settings, make_rig
 from ..simulate.plans import flat
 from ..simulate.reference import reference
+from .settings import LOOSE
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -39,14 +41,14 @@ def main(arguments: list[str] | None = None) -> int:
     all_states = all_starts = 0
     for path in asked.scenes:
         scene = load_scene(path, packages=packages)
-        session = Session(scene)
+        session = Session(scene, settings=LOOSE)
         n_states, n_starts, n_late = 0, 0, 0
         times: list[float] = []
         moved: list[tuple[float, float, float]] = []
         causes: Counter[str] = Counter()
         seed = 0
         while n_states < asked.states and seed < 400:
-            plan = _planning.plan(scene, seed=seed, max_work=400_000)
+            plan = plan_scene(scene, seed=seed, max_work=400_000)
             seed += 1
             if not isinstance(plan, Plan):
                 continue
@@ -83,7 +85,7 @@ def resting_states(plan: Plan) -> list[tuple[Pose, np.ndarray[tuple[int], np.dty
     settings = Settings(controller="C2", hold_time=0.0)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        xml = _planning.export_mjcf(plan)
+        xml = export_mjcf(plan)
     content = flat(json.loads(plan.to_json()))
     rig = make_rig(xml, content, settings)
     ref = reference(content, tick=settings.tick)

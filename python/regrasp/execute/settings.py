@@ -11,6 +11,8 @@ import numpy as np
 PLANNER: dict[str, Any] = {"speed": {"largest_speed": 0.1, "ramp": 0.06}}
 #: The same with more room for friction that is lower than thought. Plans are sought with these first.
 CAREFUL: dict[str, Any] = {**PLANNER, "friction_margin": 2.0}
+#: The same for starts that are worse than plans may be: links may be nearer to what they must not touch, grasps may hold less.
+LOOSE: dict[str, Any] = {**PLANNER, "clearance": 2e-5, "closure_margin": 0.001}
 
 
 @dataclass(frozen=True)

@@ -176,7 +176,7 @@ class Trials:
     def _closed(self, grasp: int, table: tuple[Array, Array] | None) -> tuple[Array, MjData]:
         """Where the object began, and the moment at which the hand has closed and squeezes."""
         rig = self.rig
-        data = MjData(rig.model)
+        data = mujoco.MjData(rig.model)
         mujoco.mj_resetDataKeyframe(rig.model, data, 2 * grasp)
         data.time = 0.0
         data.eq_active[rig.pin] = 0

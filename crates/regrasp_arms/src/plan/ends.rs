@@ -37,12 +37,6 @@ impl End {
 /// Values outside their limits by less than this count as rounding, in radians or metres.
 const LIMIT_ROUNDING: f64 = 1e-9;
 
-/// Wrists cannot be asked for yet.
-pub fn no_wrists(problem: &Problem) -> Failure {
-    let message = format!("this version plans motions of \"{}\" to joints, not to poses of wrists", problem.robot.name);
-    Failure::bare(FailureKind::Impossible, message, "state goal = { joints = { ... } }")
-}
-
 impl Problem<'_> {
     /// Refuses a start outside limits, or in which something that any joint moves collides.
     pub fn refuse_start(&self, settings: &MotionSettings) -> Result<(), Failure> {

@@ -8,6 +8,10 @@ mod execute;
 mod path;
 /// The robot and what stands around it.
 mod problem;
+/// The plan of a motion that was found.
+mod record;
+/// Goals that are poses of wrists.
+mod wrists;
 
 use execute::execute;
 use problem::Problem;
@@ -16,6 +20,21 @@ use regrasp_manipulation::failure::{Failure, FailureKind};
 use regrasp_manipulation::motion_settings::MotionSettings;
 use regrasp_plan::RobotPlan;
 use regrasp_scene::{MotionQuery, Scene, State};
+
+/// What is done when a caller is told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// Robot, world, start and goals are prepared.
+    Prepared,
+    /// A path was searched for, in samples or with certified motions.
+    Searched,
+    /// The path was made shorter.
+    Simplified,
+    /// Its motions were certified.
+    Certified,
+    /// The motion that is executed has its times.
+    Timed,
+}
 
 /// Plans a motion of a whole robot. All that the query does not name rests in `state`.
 ///
@@ -27,17 +46,34 @@ pub fn plan_motion(
     seed: u64,
     budget: &Budget,
 ) -> Result<RobotPlan, Failure> {
+    plan_in_stages((scene, state), query, settings, seed, budget, &mut |_| {})
+}
+
+/// As [`plan_motion`]; `watch` is told after each stage.
+///
+/// Errors: as [`plan_motion`].
+pub fn plan_in_stages(
+    (scene, state): (&Scene, &State),
+    query: &MotionQuery,
+    settings: &MotionSettings,
+    seed: u64,
+    budget: &Budget,
+    watch: &mut dyn FnMut(Stage),
+) -> Result<RobotPlan, Failure> {
     settings.validate().map_err(|problem| Failure::of_settings(&problem))?;
     let problem = Problem::new((scene, state), query);
     problem.refuse_start(settings)?;
-    let goals = problem.goals()?;
+    let goals = problem.goals(seed)?;
     let mut last = None;
     for free in problem.groups(&goals) {
         let model = problem.model(&free);
-        let found = path::find(&problem, &model, &goals, settings, seed, budget)
+        let found = path::find(&problem, &model, &goals, settings, (seed, budget), watch)
             .and_then(|path| execute(&problem, &model, path, settings));
         match found {
-            Ok(executed) => return Ok(problem.record(&model, executed, settings, seed)),
+            Ok(executed) => {
+                watch(Stage::Timed);
+                return Ok(problem.record(&model, executed, settings, seed));
+            }
             // More joints do not make an end valid.
             Err(failure) if failure.kind != FailureKind::WorkSpent => return Err(failure),
             Err(failure) => last = Some(failure),

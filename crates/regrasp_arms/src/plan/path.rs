@@ -1,5 +1,6 @@
 //! A path: searched for in samples, then made shorter.
 
+use super::Stage;
 use super::ends::End;
 use super::problem::Problem;
 use crate::model::ArmModel;
@@ -24,8 +25,8 @@ pub fn find(
     model: &ArmModel,
     goals: &[Vec<f64>],
     settings: &MotionSettings,
-    seed: u64,
-    budget: &Budget,
+    (seed, budget): (u64, &Budget),
+    watch: &mut dyn FnMut(Stage),
 ) -> Result<Found, Failure> {
     let start = model.configuration_of(&problem.query.start);
     let mut refused = None;
@@ -41,6 +42,7 @@ pub fn find(
         let nothing = || Failure::bare(FailureKind::GoalInvalid, "the goal cannot be reached".into(), "");
         return Err(refused.unwrap_or_else(nothing));
     }
+    watch(Stage::Prepared);
     let mut search = Search { model, start, goals: free_goals, settings, statistics: RobotStatistics::default() };
     let mut interrupt = None;
     // With room to certify, then without, then with certified motions only.
@@ -58,20 +60,26 @@ pub fn find(
         let mut rng = Rng::keyed(seed, "motion", round as u64);
         let outcome = search.sampled(&mut collider, &mut rng, budget);
         interrupt = outcome.interrupt.or(interrupt);
+        watch(Stage::Searched);
         let Some(mut path) = outcome.path else { continue };
         let shortcuts = SimplifySettings { n_shortcuts: settings.shortcuts, ..SimplifySettings::default() };
         simplify(&mut path, &shortcuts, &mut rng, |a, b| collider.is_sampled_free(a, b));
         search.count(&collider);
+        watch(Stage::Simplified);
         if !certified {
             return Ok(Found { path, statistics: search.statistics });
         }
-        if let Some(path) = search.certified(problem, path, &mut rng, budget) {
+        let certified = search.certified(problem, path, &mut rng, budget);
+        watch(Stage::Certified);
+        if let Some(path) = certified {
             return Ok(Found { path, statistics: search.statistics });
         }
     }
     if certified && interrupt.is_none() {
         let mut rng = Rng::keyed(seed, "certified_motion", 0);
-        if let Some(path) = search.certified_from_nothing(problem, &mut rng, budget) {
+        let certified = search.certified_from_nothing(problem, &mut rng, budget);
+        watch(Stage::Searched);
+        if let Some(path) = certified {
             return Ok(Found { path, statistics: search.statistics });
         }
     }

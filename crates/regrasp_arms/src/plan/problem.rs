@@ -1,19 +1,13 @@
 //! The robot and what stands around it.
 
-use super::execute::Executed;
 use crate::model::cover::{LinkCover, cover, covers};
 use crate::model::{ArmModel, Attached};
 use crate::world::{Obstacle, World};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Pose, Shape};
-use regrasp_manipulation::failure::Failure;
-use regrasp_manipulation::motion_settings::MotionSettings;
-use regrasp_plan::RobotPlan;
-use regrasp_plan::plan::PoseData;
-use regrasp_plan::robot_plan::{RobotSegment, RobotSegmentKind, RobotWaypoint};
 use regrasp_robot::Manipulator;
 use regrasp_robot::manipulator::layout::Part;
-use regrasp_scene::{MotionGoal, MotionQuery, Scene, State};
+use regrasp_scene::{MotionQuery, Scene, State};
 use std::collections::BTreeSet;
 
 /// A query with all that planning needs of the scene.
@@ -23,9 +17,10 @@ pub struct Problem<'a> {
     pub robot: &'a Manipulator,
     pub world: World,
     covers: Vec<LinkCover>,
-    attached: Vec<Attached>,
+    /// What the robot carries.
+    pub attached: Vec<Attached>,
     /// By carried object: its pose in the frame of its link.
-    link_from_objects: Vec<Pose>,
+    pub link_from_objects: Vec<Pose>,
 }
 
 impl<'a> Problem<'a> {
@@ -59,14 +54,6 @@ impl<'a> Problem<'a> {
         ArmModel::new(self.robot, &self.covers, &self.attached, &self.query.start, free)
     }
 
-    /// States that answer the query.
-    pub fn goals(&self) -> Result<Vec<Vec<f64>>, Failure> {
-        match &self.query.goal {
-            MotionGoal::Joints(joints) => Ok(vec![joints.clone()]),
-            MotionGoal::Wrists(_) => Err(super::ends::no_wrists(self)),
-        }
-    }
-
     /// Sets of coordinates to plan with, in this order: those of the parts that the goals change, then those of all arms too.
     pub fn groups(&self, goals: &[Vec<f64>]) -> Vec<Vec<usize>> {
         let coordinates = &self.robot.layout.coordinates;
@@ -88,43 +75,6 @@ impl<'a> Problem<'a> {
             groups.push((0..coordinates.len()).collect());
         }
         groups
-    }
-
-    /// The plan of a motion.
-    pub fn record(&self, model: &ArmModel, executed: Executed, settings: &MotionSettings, seed: u64) -> RobotPlan {
-        let mut plan = RobotPlan::answering(self.scene, self.query);
-        let n = self.robot.layout.len();
-        let mut poses = Vec::new();
-        let mut waypoints = Vec::new();
-        for point in &executed.timed.points {
-            let joints = model.state_at(&point.joints);
-            let mut joint_velocities = vec![0.0; n];
-            for (coordinate, velocity) in model.coordinates.iter().zip(&point.velocities) {
-                joint_velocities[coordinate.index] = *velocity;
-            }
-            self.robot.link_poses(&joints, &mut poses);
-            let of_objects = self.attached.iter().zip(&self.link_from_objects);
-            let world_from_objects =
-                of_objects.map(|(body, link_from_object)| PoseData::from(&(poses[body.link.0] * link_from_object)));
-            waypoints.push(RobotWaypoint {
-                time: point.time,
-                joints,
-                joint_velocities,
-                world_from_objects: world_from_objects.collect(),
-                contacts: Vec::new(),
-            });
-        }
-        let kind = if self.attached.is_empty() { RobotSegmentKind::Transit } else { RobotSegmentKind::Carry };
-        plan.segments = vec![RobotSegment { kind, held_by: RobotPlan::held_by(self.scene, self.query), waypoints }];
-        plan.method = serde_json::to_value(settings.method)
-            .ok()
-            .and_then(|name| Some(name.as_str()?.to_owned()))
-            .unwrap_or_default();
-        plan.seed = seed;
-        plan.settings = serde_json::to_value(settings).unwrap_or_default();
-        plan.promises.clearance = executed.clearance;
-        plan.statistics = executed.statistics;
-        plan
     }
 }
 

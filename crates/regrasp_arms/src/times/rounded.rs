@@ -40,16 +40,24 @@ pub struct GridPoint {
 const LINE_STEPS: usize = 24;
 /// Steps of a parabola.
 const CORNER_STEPS: usize = 6;
-/// Shorter pieces are left out, in the path's parameter.
-const LEAST_PIECE: f64 = 1e-9;
+/// Steps of a straight piece are no shorter than this where it is short, in the path's parameter: rounding of joints is no acceleration.
+const LEAST_STEP: f64 = 1e-4;
+/// Corners nearer to the one before are left out, in the path's parameter.
+const LEAST_LINE: f64 = 1e-6;
+/// Share of a line that a parabola takes at most: something is left of each line.
+const ROUNDED_SHARE: f64 = 0.45;
 
 impl RoundedPath {
-    /// The path through `corners`, rounded as much as half of the lines allow, and at most by `longest` on each side. Corners that are
+    /// The path through `corners`, rounded as much as the lines allow, and at most by `longest` on each side. Corners that are
     /// the one before are left out. None of fewer than two corners.
     pub fn new(corners: &[Vec<f64>], longest: f64) -> Option<Self> {
         let mut kept: Vec<Vec<f64>> = Vec::new();
-        for corner in corners {
-            if kept.last().is_none_or(|last| distance(last, corner) > LEAST_PIECE) {
+        for (index, corner) in corners.iter().enumerate() {
+            if kept.last().is_none_or(|last| distance(last, corner) > LEAST_LINE) {
+                kept.push(corner.clone());
+            } else if index + 1 == corners.len() && kept.len() > 1 {
+                // The last one is where the path has to end.
+                kept.pop();
                 kept.push(corner.clone());
             }
         }
@@ -63,7 +71,7 @@ impl RoundedPath {
         }
         let mut roundings = vec![0.0; kept.len()];
         for k in 1..lines.len() {
-            roundings[k] = (0.5 * lines[k - 1].0.min(lines[k].0)).min(longest);
+            roundings[k] = (ROUNDED_SHARE * lines[k - 1].0.min(lines[k].0)).min(longest);
         }
         Some(RoundedPath { corners: kept, roundings, lines })
     }
@@ -120,7 +128,7 @@ impl RoundedPath {
                 let (joints, direction) = (self.corners[0].clone(), direction.clone());
                 grid.push(GridPoint { at, joints, direction, bend: None, corner: None, line: 0, stops: true });
             }
-            let n_steps = if to - from > LEAST_PIECE { LINE_STEPS } else { 0 };
+            let n_steps = LINE_STEPS.min(((to - from) / LEAST_STEP) as usize).max(2);
             for step in 1..=n_steps {
                 let way = from + (to - from) * step as f64 / n_steps as f64;
                 let is_end = step == n_steps;

@@ -61,7 +61,11 @@ pub(super) fn squared_speeds(grid: &[GridPoint], limits: &Limits) -> Vec<f64> {
     let mut most: Vec<f64> = grid.iter().map(cap).collect();
     for k in (0..n - 1).rev() {
         let twice = 2.0 * (grid[k + 1].at - grid[k].at);
-        most[k] = largest_square(&steps[k], twice, most[k], most[k + 1]);
+        most[k] = match grid[k + 1].bend {
+            Some(_) => largest_square(&steps[k], twice, most[k], most[k + 1]),
+            // On a line the squares do not matter: as much as can be braked.
+            None => most[k].min(most[k + 1] - twice * rates(&steps[k], 0.0)[0]),
+        };
     }
     let mut squares = vec![0.0; n];
     for k in 0..n - 1 {
@@ -112,21 +116,36 @@ fn rates(planes: &[HalfPlane], x: f64) -> [f64; 2] {
 
 /// The largest square up to `cap` from which a square between zero and `next` can be reached.
 ///
-/// The squares that can form an interval from zero, as all limits are linear: halving finds its end.
+/// All limits are linear, and zero is possible: where the lowest rate is above the highest one, the two limits that say so meet at a
+/// smaller square, which is tried next.
 fn largest_square(planes: &[HalfPlane], twice: f64, cap: f64, next: f64) -> f64 {
-    let is_possible = |x: f64| {
-        let [low, high] = rates(planes, x);
-        let is_allowed = planes.iter().all(|plane| plane.rate != 0.0 || plane.square * x <= plane.most);
-        let (low, high) = (low.max(-x / twice), high.min((next - x) / twice));
-        is_allowed && low <= high
-    };
-    if is_possible(cap) {
-        return cap;
+    let mut x = cap;
+    for plane in planes.iter().filter(|plane| plane.rate == 0.0 && plane.square > 0.0) {
+        x = x.min(plane.most / plane.square);
     }
-    let (mut low, mut high) = (0.0, cap);
-    for _ in 0..50 {
-        let middle = 0.5 * (low + high);
-        if is_possible(middle) { low = middle } else { high = middle }
+    // Rates at the end: from minus x over twice to (next - x) over twice.
+    for _ in 0..=planes.len() {
+        // As lines over x: value at zero, and slope.
+        let mut low = (-x / twice, [0.0, -1.0 / twice]);
+        let mut high = ((next - x) / twice, [next / twice, -1.0 / twice]);
+        for plane in planes.iter().filter(|plane| plane.rate != 0.0) {
+            let line = [plane.most / plane.rate, -plane.square / plane.rate];
+            let rate = line[0] + line[1] * x;
+            if plane.rate > 0.0 && rate < high.0 {
+                high = (rate, line);
+            } else if plane.rate < 0.0 && rate > low.0 {
+                low = (rate, line);
+            }
+        }
+        if low.0 <= high.0 {
+            return x;
+        }
+        let slope = low.1[1] - high.1[1];
+        if slope <= 0.0 {
+            return 0.0;
+        }
+        // A little less, for rounding.
+        x = (x * (1.0 - 1e-12)).min((high.1[0] - low.1[0]) / slope).max(0.0);
     }
-    low
+    0.0
 }

@@ -14,6 +14,24 @@ fn a_line_is_passed_in_the_least_time() {
 }
 
 #[test]
+fn paths_that_turn_back_take_no_more_than_stopping_there() {
+    let mut rng = Rng::keyed(3, "times", 0);
+    for case in 0..60 {
+        // Out and back again by nearly the same way.
+        let aside = if case % 3 == 0 { 0.0 } else { 10f64.powf(rng.uniform(-9.0, -1.0)) };
+        let out: Vec<f64> = (0..6).map(|_| rng.uniform(-1.0, 1.0)).collect();
+        let back: Vec<f64> = out.iter().map(|value| 0.1 * value + aside * rng.uniform(-1.0, 1.0)).collect();
+        let corners = [vec![0.0; 6], out, back];
+        let limits = Limits::of_joints(&[1.0; 6], &[5.0; 6]);
+        let path = RoundedPath::new(&corners, 0.5).unwrap();
+        let mut sharp = path.clone();
+        sharp.stop(1);
+        let [rounded, stopping] = [path, sharp].map(|path| times(&path, &limits).duration());
+        assert!(rounded <= 1.1 * stopping, "{aside}: {rounded} {stopping}");
+    }
+}
+
+#[test]
 fn limits_are_kept_at_every_moment_and_reached_somewhere() {
     let mut rng = Rng::keyed(1, "times", 0);
     for case in 0..40 {

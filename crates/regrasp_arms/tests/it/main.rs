@@ -7,5 +7,7 @@ mod places;
 mod certified;
 /// Plans of scenes.
 mod plans;
+/// Roadmaps of robots with two arms.
+mod roadmap;
 /// Robots that tests load.
 mod robots;

@@ -7,6 +7,8 @@
 pub mod results;
 /// Rows of a suite as CSV; those of an earlier run are taken over.
 pub mod rows;
+/// What a paper found, and whether our rows confirm it.
+pub mod verdicts;
 
 use regrasp_base::{Diagnostic, InputError, Place};
 use regrasp_planners::in_hand::Alpha;
@@ -16,6 +18,7 @@ use regrasp_scene::query::{IN_HAND, TRACKING};
 use serde::Deserialize;
 use serde::de::Error as _;
 use std::path::{Path, PathBuf};
+use verdicts::Verdict;
 
 /// Value of `format` in a suite file.
 pub const FORMAT: &str = "regrasp-suite";
@@ -66,6 +69,9 @@ pub struct Table {
     pub published: Vec<Published>,
     /// What is measured.
     pub rows: Vec<Entry>,
+    /// What the paper found.
+    #[serde(default)]
+    pub verdicts: Vec<Verdict>,
 }
 
 /// A row of the paper's own table: a mean, or smallest, mean and largest.
@@ -132,6 +138,9 @@ pub struct Figure {
     pub alpha: Vec<f64>,
     /// Curves; `settings.alpha` is replaced by the value of each point.
     pub curves: Vec<Entry>,
+    /// What the paper found.
+    #[serde(default)]
+    pub verdicts: Vec<Verdict>,
 }
 
 /// A row of a table or a point of a figure, to be measured.
@@ -250,6 +259,12 @@ impl Suite {
             if figure.name.is_empty() || !figure.name.bytes().all(|b| b.is_ascii_alphanumeric() || b"_-".contains(&b)) {
                 faults.push(format!("figure \"{}\": a name is made of letters, digits, _ and -", figure.name));
             }
+        }
+        for table in &self.tables {
+            faults.extend(table.verdicts.iter().flat_map(|verdict| verdict.faults_in_table(table)));
+        }
+        for figure in &self.figures {
+            faults.extend(figure.verdicts.iter().flat_map(|verdict| verdict.faults_in_figure(figure)));
         }
         for published in self.tables.iter().flat_map(|table| &table.published) {
             let lists = [&published.time_s, &published.nodes, &published.generated, &published.on_path];

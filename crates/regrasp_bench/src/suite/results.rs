@@ -1,7 +1,7 @@
 //! The results of a suite as Markdown: the paper's numbers beside ours. The same rows give the same bytes.
 
 use super::rows::SuiteRow;
-use super::{Entry, Figure, Published, Suite, Table};
+use super::{Entry, Figure, Published, Suite, Table, verdicts};
 use crate::chart::{Axis, Panel, Scale, svg};
 use crate::page::misses;
 use crate::row::Row;
@@ -73,7 +73,8 @@ fn table_section(table: &Table, rows: &[SuiteRow], out: &mut String) {
         let _ = writeln!(out, "{}\n", table.note.trim());
     }
     if table.is_tracking() {
-        return tracking_table(table, rows, out);
+        tracking_table(table, rows, out);
+        return verdicts::of_table(table, rows, out);
     }
     out.push_str(
         "| | solved | accepted | time min | mean | max | nodes min | mean | max | generated, mean | relocations min | mean | floors | asked |\n\
@@ -85,6 +86,7 @@ fn table_section(table: &Table, rows: &[SuiteRow], out: &mut String) {
     for row in &table.rows {
         measured_row(row, &summary(&table.job_name(row), rows), out);
     }
+    verdicts::of_table(table, rows, out);
 }
 
 fn published_row(published: &Published, out: &mut String) {
@@ -230,6 +232,7 @@ fn figure_section(figure: &Figure, rows: &[SuiteRow], folder: &str, out: &mut St
         }
         out.push('\n');
     }
+    verdicts::of_figure(figure, rows, out);
 }
 
 /// Smallest, mean and largest of a list that may hold only the mean.

@@ -1,6 +1,6 @@
 //! Arguments of `regrasp grasps`.
 
-use super::values::{count, degrees, margin, metres, number_from_zero, seconds, threads, whole_number};
+use super::values::{count, degrees, margin, metres, number_from_zero, place, seconds, threads, whole_number};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use std::path::PathBuf;
@@ -23,15 +23,8 @@ pub struct Grasps {
     #[arg(long, value_name = "SCENE.toml", requires = "pair")]
     pub goal: Option<PathBuf>,
     /// With --pair: the robot's base in the world, in metres; hands that come from there score higher
-    #[arg(
-        long,
-        value_name = "X,Y,Z",
-        requires = "pair",
-        value_delimiter = ',',
-        num_args = 3,
-        allow_negative_numbers = true
-    )]
-    pub robot_base: Option<Vec<f64>>,
+    #[arg(long, value_name = "X,Y,Z", requires = "pair", value_parser = place, allow_hyphen_values = true)]
+    pub robot_base: Option<[f64; 3]>,
     /// Read the grasps of an Isaac grasp file, or of a list, and keep those that hold
     #[arg(long, value_name = "FILE", conflicts_with = "pair")]
     pub import: Option<PathBuf>,

@@ -86,3 +86,12 @@ pub(super) fn threads(text: &str) -> Result<usize, String> {
         _ => Err(format!("expected a number of threads between 1 and {MAX_THREADS}")),
     }
 }
+
+/// Three numbers in metres, with commas between.
+pub fn place(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
+    match numbers.as_slice() {
+        [x, y, z] if text.split(',').count() == 3 && numbers.iter().all(|x| x.is_finite()) => Ok([*x, *y, *z]),
+        _ => Err("three numbers in metres, with commas between".into()),
+    }
+}

@@ -2,7 +2,7 @@
 
 use crate::args::{self, Common};
 use crate::commands::motion;
-use crate::commands::plan::available_threads;
+use crate::commands::written::available_threads;
 use crate::interrupt;
 use crate::judge;
 use crate::judge_grasps;

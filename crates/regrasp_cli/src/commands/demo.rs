@@ -1,6 +1,7 @@
 //! `regrasp demo`: plan and check a turn of a bundled object in a bundled hand; no files needed.
 
-use super::plan::{Limits, available_threads, say_query, search};
+use super::plan::{say_query, search};
+use super::written::{Limits, available_threads};
 use crate::args::{self, Common};
 use crate::interrupt;
 use crate::judge;

@@ -2,7 +2,7 @@
 
 use crate::args::{self, Common};
 use crate::commands::check::grasp_scene;
-use crate::commands::plan::available_threads;
+use crate::commands::written::available_threads;
 use crate::judge_grasps;
 use crate::stop::Stop;
 use crate::talk::Talk;

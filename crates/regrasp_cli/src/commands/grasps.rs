@@ -1,7 +1,7 @@
 //! `regrasp grasps`: find grasps of an object, check them, then write the list.
 
 use crate::args::{self, Common};
-use crate::commands::plan::available_threads;
+use crate::commands::written::available_threads;
 use crate::commands::{grasp_files, grasp_import, pair};
 use crate::interrupt;
 use crate::judge_grasps;

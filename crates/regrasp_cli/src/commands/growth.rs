@@ -1,7 +1,7 @@
 //! `regrasp growth`: how loading and planning grow with fingers, triangles, obstacles and threads.
 
-use super::plan::available_threads;
 use super::rows::{make_folder_of, say_row};
+use super::written::available_threads;
 use crate::args;
 use crate::interrupt;
 use crate::outputs::refuse_unwritable;

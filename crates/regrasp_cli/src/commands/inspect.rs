@@ -1,5 +1,7 @@
 //! `regrasp inspect`: what a hand is like, and a hand file for it.
 
+use super::inspect_parts::{pairs_part, robot_part};
+use super::inspect_robot;
 use super::room::Room;
 use crate::args::{self, Common};
 use crate::interrupt;
@@ -7,19 +9,15 @@ use crate::load;
 use crate::outputs::{refuse_input, refuse_unwritable};
 use crate::stop::Stop;
 use crate::talk::Talk;
-use crate::words::{counted, grouped, metres};
-use regrasp::base::{Rng, files};
+use crate::words::{counted, metres};
+use regrasp::base::{Diagnostic, Place, Rng, files};
 use regrasp::file_names::name_from;
 use regrasp::robot::import::LoadOptions;
-use regrasp::robot::inspect::{
-    HandInspection, InspectSettings, Inspection, JointRow, RobotInspection, hand_file_text, inspect,
-};
+use regrasp::robot::inspect::whole::inspect_whole;
+use regrasp::robot::inspect::{HandInspection, InspectSettings, Inspection, hand_file_text, inspect};
 use regrasp::robot::{Finger, Hand};
 use serde_json::json;
 use std::fmt::Write;
-
-/// Pairs of links that are listed one by one.
-const PAIRS_SHOWN: usize = 24;
 
 /// Prints the report on stdout; writes the hand file when asked.
 pub fn run(arguments: &args::Inspect, common: &Common, talk: &Talk) -> Result<(), Stop> {
@@ -29,6 +27,10 @@ pub fn run(arguments: &args::Inspect, common: &Common, talk: &Talk) -> Result<()
     let is_hand_file = arguments.urdf.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
     if arguments.base.is_some() && is_hand_file {
         return Err(Stop::argument("A505", "--base", "stands beside a hand file", "a URDF; hand files say base_link"));
+    }
+    if is_hand_file && (arguments.robot || arguments.srdf.is_some()) {
+        let argument = if arguments.robot { "--robot" } else { "--srdf" };
+        return Err(Stop::argument("A505", argument, "stands beside a hand file", "the URDF of a robot"));
     }
     interrupt::flag()?;
     let settings = InspectSettings { n_postures: arguments.samples as usize };
@@ -40,6 +42,20 @@ pub fn run(arguments: &args::Inspect, common: &Common, talk: &Talk) -> Result<()
     }
     for note in &found.notes {
         talk.note(note);
+    }
+    let may_be_robot = !is_hand_file && arguments.base.is_none();
+    if may_be_robot && (found.hand.is_err() || arguments.robot || arguments.srdf.is_some()) {
+        let files = (arguments.urdf.as_path(), arguments.srdf.as_deref());
+        let whole = inspect_whole(found.tree.clone(), files, &options, &settings, &mut rng)?;
+        match whole {
+            Some(whole) => return inspect_robot::run(&found, &whole, arguments, common, talk),
+            None if arguments.robot || arguments.srdf.is_some() => {
+                let diagnostic = Diagnostic::new("U214", Place::file(&arguments.urdf), "has no arm")
+                    .expected("six moving joints that follow each other without a branch");
+                return Err(Stop::BadInput(diagnostic.into()));
+            }
+            None => {}
+        }
     }
     let room = found.hand.as_ref().ok().map(|(hand, _)| Room::of(hand, arguments.seed));
     talk.event(
@@ -78,76 +94,13 @@ fn report(found: &Inspection, room: Option<&Room>) -> String {
         Ok((hand, table)) => {
             hand_part(hand, table, &mut out);
             room.into_iter().for_each(|room| room.write(&mut out));
-            pairs_part(table, &mut out);
+            pairs_part(&table.pairs, "hand file", &mut out);
         }
         Err(error) => {
             let _ = writeln!(out, "\nnot a hand as it stands:\n{error}");
         }
     }
     regrasp::base::diagnostic::printable(&out)
-}
-
-fn robot_part(robot: &RobotInspection, out: &mut String) {
-    let n_mimic = robot.joints.iter().filter(|joint| joint.follows.is_some()).count();
-    let n_fixed = robot.joints.iter().filter(|joint| joint.kind == "fixed").count();
-    let _ = writeln!(
-        out,
-        "robot {}: {}, {} ({} independent, {n_mimic} mimic, {n_fixed} fixed), root link {}\n",
-        robot.name,
-        counted(robot.n_links, "link"),
-        counted(robot.joints.len(), "joint"),
-        robot.joints.len() - n_mimic - n_fixed,
-        robot.root
-    );
-    let width = robot.joints.iter().map(|joint| joint.name.chars().count()).max().unwrap_or(0).clamp(5, 40);
-    let _ = writeln!(
-        out,
-        "{:<width$}  {:<10}  {:>9} {:>9}  {:>8} {:>8}  parent -> child",
-        "joint", "type", "lower", "upper", "speed", "effort"
-    );
-    for joint in robot.joints.iter().filter(|joint| joint.kind != "fixed") {
-        joint_line(joint, width, out);
-    }
-    if !robot.meshes.is_empty() {
-        let _ = writeln!(out, "\nmeshes (size in cm)");
-    }
-    for mesh in &robot.meshes {
-        let [x, y, z] = mesh.size.map(|length| 100.0 * length);
-        let _ = writeln!(
-            out,
-            "  {:>7} triangles  {:<14}  {x:.1} x {y:.1} x {z:.1}  {}",
-            grouped(mesh.n_triangles as u64),
-            if mesh.watertight { "watertight" } else { "not watertight" },
-            mesh.links.join(", ")
-        );
-    }
-    for suspicion in &robot.suspicions {
-        let _ = writeln!(out, "\nsuspicious: {suspicion}");
-    }
-}
-
-fn joint_line(joint: &JointRow, width: usize, out: &mut String) {
-    let number = |value: Option<f64>| value.map_or("-".to_owned(), |x| format!("{x:.4}"));
-    let _ = write!(
-        out,
-        "{:<width$}  {:<10}  {:>9} {:>9}  {:>8} {:>8}  {} -> {}",
-        joint.name,
-        joint.kind,
-        number(joint.lower),
-        number(joint.upper),
-        number(joint.velocity),
-        number(joint.effort),
-        joint.parent,
-        joint.child
-    );
-    if let Some(follows) = &joint.follows {
-        let _ = write!(out, "  = {} * {}", follows.multiplier, follows.joint);
-        for leader in &follows.others {
-            let _ = write!(out, " + {} * {}", leader.multiplier, leader.joint);
-        }
-        let _ = write!(out, " + {}", follows.offset);
-    }
-    out.push('\n');
 }
 
 fn hand_part(model: &Hand, hand: &HandInspection, out: &mut String) {
@@ -191,34 +144,6 @@ fn hand_part(model: &Hand, hand: &HandInspection, out: &mut String) {
                 metres(&one.at)
             );
         }
-    }
-}
-
-fn pairs_part(hand: &HandInspection, out: &mut String) {
-    let pairs = &hand.pairs;
-    let _ = writeln!(
-        out,
-        "\nlinks over {} random postures: {} always touch, {} sometimes, {} never",
-        grouped(pairs.n_postures as u64),
-        counted(pairs.always.len(), "pair"),
-        pairs.sometimes.len(),
-        pairs.never.len()
-    );
-    for [a, b] in pairs.always.iter().take(PAIRS_SHOWN) {
-        let _ = writeln!(out, "  always     {a} and {b}: excused in the hand file");
-    }
-    for pair in pairs.sometimes.iter().take(PAIRS_SHOWN) {
-        let _ = writeln!(out, "  {:>7.2} %  {} and {}", 100.0 * pair.share, pair.links[0], pair.links[1]);
-    }
-    if pairs.sometimes.len() > PAIRS_SHOWN {
-        let _ = writeln!(
-            out,
-            "  and {} more that touch sometimes; all of them with --json",
-            pairs.sometimes.len() - PAIRS_SHOWN
-        );
-    }
-    for [a, b] in &pairs.at_rest {
-        let _ = writeln!(out, "  at rest    {a} and {b} touch in the rest posture");
     }
 }
 

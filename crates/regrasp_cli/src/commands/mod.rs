@@ -10,6 +10,8 @@ mod grasp_import;
 mod grasps;
 mod growth;
 mod inspect;
+mod inspect_parts;
+mod inspect_robot;
 mod motion;
 mod pair;
 mod pictures;
@@ -21,6 +23,7 @@ mod rows;
 mod simulate;
 mod suite;
 mod view;
+mod written;
 
 use crate::args::{Arguments, Command};
 use crate::stop::Stop;

@@ -1,7 +1,7 @@
 //! Motions of whole robots: what the commands `plan`, `check` and `export` do with tasks of kind `motion` and their plans.
 
 use crate::args::{self, Common};
-use crate::commands::plan::{Limits, available_threads};
+use crate::commands::written::{self, Limits, available_threads};
 use crate::judge;
 use crate::load;
 use crate::outputs::Outputs;
@@ -88,9 +88,9 @@ fn write(plan: &RobotPlan, arguments: &args::Plan, common: &Common, talk: &Talk)
     let again = load::motion_scene(&arguments.scene, &read.query, common)?;
     let report = judge::judge_robot(&arguments.judging.scene(again), &read, &arguments.judging, talk);
     if !report.accepted() {
-        return Err(crate::commands::plan::rejected(output, &bytes, talk));
+        return Err(written::rejected(output, &bytes, talk));
     }
-    crate::commands::plan::write(output, &bytes, talk)
+    written::write(output, &bytes, talk)
 }
 
 /// Says what is asked.

@@ -2,7 +2,7 @@
 
 use crate::args::{self, Common};
 use crate::commands::check::grasp_scene;
-use crate::commands::plan::available_threads;
+use crate::commands::written::available_threads;
 use crate::load;
 use crate::outputs::{Output, Outputs};
 use crate::stop::Stop;
@@ -89,7 +89,7 @@ fn read(path: &Path, common: &Common) -> Result<Read, Stop> {
 
 /// What is around the object: obstacles and supports of a scene file, with its first object where its first task has it.
 fn context(path: Option<&Path>, arguments: &args::Grasps, common: &Common) -> Result<Context, Stop> {
-    let robot_base = arguments.robot_base.as_deref().map(|at| Point::new(at[0], at[1], at[2]));
+    let robot_base = arguments.robot_base.map(Point::from);
     let Some(path) = path else { return Ok(Context { robot_base, ..Context::default() }) };
     let loaded = load_scene(path, &load::options(common))?;
     let bodies = loaded.scene.obstacles.iter().chain(loaded.scene.supports.iter().map(|support| &support.body));

@@ -1,8 +1,9 @@
 //! `regrasp roadmap`: many queries on one saved graph of a hand and an object.
 
 use super::pictures;
-use super::plan::{available_threads, judge_and_write, of_plan, say_plan, say_query};
+use super::plan::{judge_and_write, say_plan, say_query};
 use super::rows::{make_folder_of, of_rows, say_row};
+use super::written::{available_threads, of_plan};
 use crate::args::{self, Common, RoadmapAction};
 use crate::interrupt;
 use crate::judge;
@@ -15,6 +16,7 @@ use regrasp::base::files;
 use regrasp::pictures::{roadmap_from_first, roadmap_story};
 use regrasp::plan::check::Level;
 use regrasp::planners::FailureKind;
+use regrasp::planners::in_hand::TransferMode;
 use regrasp::planners::in_hand::roadmap::{
     About, BuildSettings, BuildStage, Census, GraspRoadmap, QueryMemory, Region, RoadmapPlanner, build_roadmap,
 };
@@ -172,9 +174,10 @@ fn run_picture(arguments: &args::RoadmapPicture, common: &Common, talk: &Talk) -
         Err(failure) => return Err(Stop::NoPlan(Box::new(failure))),
     };
     say_plan(&answer.plan, started.elapsed().as_secs_f64(), talk);
-    // The graph's motions are geometry: their contacts stay where they are.
-    let judging =
-        args::Judging { level: Some(Level::Geometry.name().into()), gravity: None, hold: false, own_query: false };
+    // Motions whose contacts stay where they are are geometry.
+    let is_fixed = roadmap.about().settings.physics.transfer == TransferMode::Fixed;
+    let level = is_fixed.then(|| Level::Geometry.name().into());
+    let judging = args::Judging { level, gravity: None, hold: false, own_query: false };
     if !judge::judge(&loaded, &answer.plan, &judging, talk)?.accepted() {
         return Err(Stop::Rejected);
     }

@@ -1,6 +1,6 @@
 //! Fingers close along their couplings until their tips touch. A motor stops when the first of its fingertips touches.
 
-use super::touch::{Gap, contact, gap};
+use super::touch::{Gap, contact, first_touch, gap};
 use crate::motors::{Motor, Motors};
 use crate::prepared::Prepared;
 use regrasp_geometry::Pose;
@@ -76,12 +76,12 @@ fn turn(
             break;
         }
     }
-    let (mut outside, mut inside) = (before, share);
-    for _ in 0..60 {
-        let middle = 0.5 * (outside + inside);
-        if at(middle, joints).iter().any(|gap| gap.distance <= 0.0) { inside = middle } else { outside = middle }
-    }
-    let gaps = at(outside, joints);
+    let least = |share: f64| {
+        let mut trial = joints.clone();
+        at(share, &mut trial).iter().map(|gap| gap.distance).fold(f64::INFINITY, f64::min)
+    };
+    let touch = first_touch([before, share], least);
+    let gaps = at(touch, joints);
     let touching = fingers.iter().zip(&gaps).filter(|(_, gap)| gap.distance.abs() <= TOUCHES).map(|(f, _)| *f);
     Some(Some(touching.collect()))
 }

@@ -11,6 +11,10 @@ use regrasp_robot::tip::CurvedTip;
 
 /// Gaps below this touch, in metres.
 const TOUCHES: f64 = 1e-8;
+/// Roots are found to this distance, in metres.
+const AS_GOOD_AS_ZERO: f64 = 1e-11;
+/// Most steps to a root.
+const MOST_ROOT_STEPS: usize = 90;
 /// Turns of the normal below this are none.
 const SAME_NORMAL: f64 = 1e-11;
 /// Most steps to the point of a fingertip that faces the surface. By hand: most take three.
@@ -23,8 +27,8 @@ const TURN: f64 = 1e-7;
 const LARGEST_TURN: f64 = 0.5;
 /// Shortest step, as a share of Newton's.
 const LEAST_SHARE: f64 = 0.02;
-/// A contact is settled when a ball that rests there touches within this distance, in metres.
-const SETTLED: f64 = 1e-6;
+/// Nearer to the surface than this, the direction from it is rounding, in metres.
+const FLAT_BELOW: f64 = 1e-5;
 
 /// The point of a fingertip that is nearest to the surface.
 #[derive(Debug, Clone, Copy)]
@@ -45,15 +49,17 @@ pub fn gap(prepared: &Prepared, finger: usize, hand_from_object: &Pose, joints: 
     let surface = &prepared.model.view.object.surface;
     let center = hand_from_object.inverse_transform_point(&model.ik.tip(joints));
     let (at, distance) = surface.project_signed(&center);
-    let normal = at.normal_in_object.into_inner();
+    let smooth = at.normal_in_object.into_inner();
+    // On edges and corners, too, the normal of a ball points to its centre; that of the surface is smoothed over scans.
+    let away = (center - at.point_in_object).try_normalize(FLAT_BELOW).map(|away| away * distance.signum());
+    let normal = away.unwrap_or(smooth);
     let rough = Gap { distance: distance - model.tip_radius, at, normal, is_exact: model.curved.is_none() };
     match model.curved {
         Some(tip) if rough.distance < LOOK_CLOSELY => {
             let arm = |normal: &Vector| {
                 hand_from_object.inverse_transform_vector(&model.arm_with(joints, &(hand_from_object * normal)))
             };
-            let away = (center - at.point_in_object).try_normalize(1e-9).unwrap_or(normal) * distance.signum();
-            nearest(surface, &center, arm, least_radius(&tip), away).unwrap_or(rough)
+            nearest(surface, &center, arm, least_radius(&tip), normal).unwrap_or(rough)
         }
         _ => rough,
     }
@@ -123,14 +129,7 @@ pub fn contact(
     gap: &Gap,
 ) -> Option<Contact> {
     let (model, object) = (&prepared.model.fingers[finger], prepared.model.view.object);
-    let mut normal = UnitVector::new_normalize(gap.normal);
-    if model.curved.is_none() {
-        let settled = object.surface.settle(&gap.at, model.settle_radius)?;
-        normal = settled.normal_in_object;
-        if (settled.point_in_object - gap.at.point_in_object).norm() > SETTLED {
-            return None;
-        }
-    }
+    let normal = UnitVector::new_normalize(gap.normal);
     let may = gap.is_exact
         && object.surface.crease_distance(&gap.at) >= object.edge_distance
         && model.pad_faces(joints, &(hand_from_object * normal.into_inner()));
@@ -188,11 +187,50 @@ pub fn touch_on_way(
     if known.distance > 0.0 || share == 0.0 {
         return None;
     }
-    let (mut outside, mut inside) = (before, share);
-    for _ in 0..60 {
-        let middle = 0.5 * (outside + inside);
-        if gap_at(middle).distance <= 0.0 { inside = middle } else { outside = middle }
+    let touch = first_touch([before, share], |share| gap_at(share).distance);
+    let gap = gap_at(touch);
+    if gap.distance.abs() <= TOUCHES { touching(touch, &gap) } else { None }
+}
+
+/// Where a distance that is positive at the first of two places and not at the second is as good as zero: by regula falsi, with the
+/// end that stays weighted less every time (Illinois), and by halving where that gains little.
+pub fn first_touch([mut outside, mut inside]: [f64; 2], distance: impl Fn(f64) -> f64) -> f64 {
+    let (mut high, mut low) = (distance(outside), distance(inside));
+    let mut last = 0;
+    for step in 0..MOST_ROOT_STEPS {
+        if high <= AS_GOOD_AS_ZERO {
+            break;
+        }
+        let falsi = outside + (inside - outside) * high / (high - low);
+        let next = if step % 3 == 2 || !falsi.is_finite() { 0.5 * (outside + inside) } else { falsi };
+        let seen = distance(next);
+        if seen > 0.0 {
+            (outside, high) = (next, seen);
+            low *= if last == 1 { 0.5 } else { 1.0 };
+            last = 1;
+        } else {
+            if seen >= -AS_GOOD_AS_ZERO {
+                return next;
+            }
+            (inside, low) = (next, seen);
+            high *= if last == -1 { 0.5 } else { 1.0 };
+            last = -1;
+        }
     }
-    let gap = gap_at(outside);
-    if gap.distance.abs() <= TOUCHES { touching(outside, &gap) } else { None }
+    outside
+}
+
+#[cfg(test)]
+mod tests {
+    use super::first_touch;
+
+    #[test]
+    fn roots_are_found_whatever_the_shape() {
+        let line = first_touch([0.0, 1.0], |x| 0.3 - x);
+        assert!((line - 0.3).abs() < 1e-10, "{line}");
+        let kink = first_touch([0.0, 1.0], |x| if x < 0.7 { 1e-3 * (0.7 - x) } else { 50.0 * (0.7 - x) });
+        assert!((kink - 0.7).abs() < 1e-6, "{kink}");
+        let curve = first_touch([0.0, 2.0], |x: f64| 2.0 - x * x);
+        assert!((curve - 2f64.sqrt()).abs() < 1e-9, "{curve}");
+    }
 }

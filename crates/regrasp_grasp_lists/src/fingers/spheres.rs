@@ -211,7 +211,7 @@ mod tests {
         assert!((0.016..0.028).contains(&largest), "{largest}: the authors' largest has 19.6 mm");
         assert!(found.spheres.len() >= 20, "{}", found.spheres.len());
         let mut rng = Rng::keyed(3, "inside spheres", 0);
-        let (mut out_of_reach, n_points) = (0, 10_000);
+        let (mut out_of_reach, n_points) = (0, 100_000);
         let mut solutions = Vec::new();
         for _ in 0..n_points {
             let sphere = found.spheres[rng.below(found.spheres.len())];

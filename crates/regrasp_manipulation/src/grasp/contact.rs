@@ -97,6 +97,38 @@ fn from_within(model: &Model, finger: usize, world_from_object: &Placement, rng:
     Some(exits.swap_remove(chosen))
 }
 
+/// Draws a contact uniformly by the area of the object's surface that `finger` may reach (Sahbani 2007, sec. IV-B: a facet by
+/// its area, a point on it). None when none of some draws will do, or the work allowed is spent.
+pub fn draw_contact_by_area(
+    workspace: &mut Workspace,
+    finger: usize,
+    world_from_object: &Placement,
+    rng: &mut Rng,
+) -> Option<Contact> {
+    if workspace.is_spent_on_draws() {
+        return None;
+    }
+    let (object, finger_model) = (&workspace.model.view.object, &workspace.model.fingers[finger]);
+    let mut n_measured = 0;
+    let mut found = None;
+    for _ in 0..RAYS {
+        let drawn = object.surface.sample(rng);
+        let rough = Contact { point_in_object: drawn.point_in_object, normal_in_object: drawn.normal_in_object };
+        if !finger_model.may_reach(world_from_object, &rough) {
+            continue;
+        }
+        let settled = object.surface.settle_counted(&drawn, finger_model.settle_radius, &mut n_measured);
+        if let Some(settled) = settled.filter(|settled| object.keeps_off_edges(settled)) {
+            let (point_in_object, normal_in_object) = (settled.point_in_object, settled.normal_in_object);
+            found = Some(Contact { point_in_object, normal_in_object });
+            break;
+        }
+    }
+    let free = if found.is_some() { MEASURED_FREE } else { 0 };
+    workspace.count_draws(n_measured.saturating_sub(free) / MEASURED_PER_WORK);
+    found
+}
+
 /// Joints of `finger` at `contact` from which it can be lifted again, clear of everything but the other fingers; the
 /// workspace has the object in place.
 pub fn reach(

@@ -96,8 +96,8 @@ pub use files::{CheckedFiles, check_files};
 pub use find_scene::{find_scene, find_scene_among};
 pub use grasps::{GraspReport, check_grasps};
 pub use level::Level;
-pub use robots::along::{RobotAlong, robot_along};
 pub use robots::check_robot;
+pub use robots::{RobotAlong, robot_along};
 pub use slip::HoldSlip;
 pub use violation::{Moment, Violation, ViolationKind};
 

@@ -393,7 +393,7 @@ impl FilePlan<'_> {
             joint_names: hand.joint_names.into_owned(),
             fingers: names.fingers,
             start: self.start,
-            asked: self.asked.map(Cow::into_owned),
+            asked: self.asked.map(|asked| Box::new(asked.into_owned())),
             way_poses: self.way_poses.into_owned(),
             goal: self.goal,
             segments,

@@ -195,7 +195,7 @@ fn version_of(path: &Path, text: &str) -> Result<u32, InputError> {
 fn all_numbers(plan: &Plan) -> impl Iterator<Item = f64> + '_ {
     let way = plan.way_poses.iter().flat_map(|way_pose| way_pose.world_from_object.numbers());
     let waypoints = plan.segments.iter().flat_map(|segment| &segment.waypoints).flat_map(crate::Waypoint::numbers);
-    let asked = plan.asked.iter().flat_map(crate::plan::Asked::numbers);
+    let asked = plan.asked.iter().flat_map(|asked| asked.numbers());
     plan.promises
         .numbers()
         .chain(plan.start.numbers())

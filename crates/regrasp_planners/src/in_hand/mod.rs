@@ -33,8 +33,8 @@ mod sequence_tests;
 pub mod starting;
 
 pub use crate::settings::{
-    Alpha, BaselineSettings, CostWeights, FirstTry, ImprovementSettings, InHandSettings, Method, ReleaseRule,
-    SearchSettings,
+    Alpha, BaselineSettings, CostWeights, FingerWays, FirstTry, ImprovementSettings, InHandSettings, Method,
+    ReleaseRule, SearchSettings,
 };
 pub use recording::validate::{NotProven, validate_once};
 pub use regrasp_manipulation::ends::given::{MovedFinger, moved_fingers};

@@ -4,7 +4,7 @@ use crate::in_hand::attempt::search::{Context, Search};
 use crate::in_hand::grasps::sample::draw_state;
 use crate::in_hand::moving::grasp_path::GraspPath;
 use crate::in_hand::searching::visibility::decompose::decompose;
-use crate::settings::{InHandSettings, Method};
+use crate::settings::{BaselineSettings, InHandSettings, Method};
 use regrasp_base::Budget;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Point, Pose};
@@ -96,8 +96,10 @@ fn paths_on_the_sphere_follow_great_circles_and_stay_closed_without_any_finger()
 }
 
 #[test]
-fn paths_on_the_box_cross_no_edge() {
-    with_search("box_90x.toml", |search| {
+fn paths_on_the_box_cross_no_edge_where_they_may_not() {
+    let plain = InHandSettings { method: Method::Visibility, ..InHandSettings::plain() };
+    let baselines = BaselineSettings { edge_crossings: false, ..plain.baselines.clone() };
+    with_settings("box_90x.toml", &InHandSettings { baselines, ..plain }, |search| {
         let model = search.model();
         let object = &model.view.object;
         for (a, b, path) in linked_pairs(search, 3) {
@@ -115,6 +117,33 @@ fn paths_on_the_box_cross_no_edge() {
                 }
             }
         }
+    });
+}
+
+#[test]
+fn contacts_jump_over_edges_and_never_come_near_them() {
+    with_search("box_90x.toml", |search| {
+        let model = search.model();
+        let object = &model.view.object;
+        let mut n_crossing = 0;
+        for _ in 0..40 {
+            for (a, b, path) in linked_pairs(search, 1) {
+                let crosses = |f: usize| a.contacts[f].normal_in_object.dot(&b.contacts[f].normal_in_object) < 0.5;
+                n_crossing += (0..model.n_fingers()).filter(|&f| crosses(f)).count();
+                for k in 1..64 {
+                    // Between two steps of which a jump lies there may be no state to go on from.
+                    let Some(state) = path.at(model, f64::from(k) / 64.0) else { continue };
+                    for contact in &state.contacts {
+                        let at = object.surface.project(&contact.point_in_object);
+                        assert!(object.surface.crease_distance(&at) >= object.edge_distance);
+                    }
+                }
+            }
+            if n_crossing > 0 {
+                return;
+            }
+        }
+        panic!("no path of 40 crosses an edge");
     });
 }
 

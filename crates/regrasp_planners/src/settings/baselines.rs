@@ -71,19 +71,39 @@ impl Alpha {
     }
 }
 
+/// How the methods of Saut 2011 look for the way of a finger that changes its contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FingerWays {
+    /// Over the surface first, then straight in the joints; RRT-Connect where both are blocked. The default.
+    SurfaceFirst,
+    /// RRT-Connect alone, as Saut 2011, sec. 4.2.3 has it.
+    RrtOnly,
+}
+
 /// What the methods of Saut 2011 are asked beside.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BaselineSettings {
     /// Schedule of alpha, for the methods of Saut 2011.
     pub alpha: Alpha,
     /// Share of poses that the methods of Saut 2011 draw near the path from start to goal. The others are drawn
-    /// uniformly, as in Saut 2011, sec. 4.2.2. With 0 both methods take several times as long, `classic` most.
+    /// uniformly where the hand reaches, as in Saut 2011, sec. 4.2.2.
     pub guided_share: f64,
+    /// Whether contacts may cross edges of the object on paths in GS_n. What lies too near an edge is jumped over: the
+    /// finger that holds there changes its contact.
+    pub edge_crossings: bool,
+    /// How the way of a finger that changes its contact is looked for.
+    pub finger_ways: FingerWays,
 }
 
 impl Default for BaselineSettings {
     fn default() -> Self {
-        BaselineSettings { alpha: Alpha::Constant { value: 0.9 }, guided_share: 0.9 }
+        BaselineSettings {
+            alpha: Alpha::Constant { value: 0.9 },
+            guided_share: 0.9,
+            edge_crossings: true,
+            finger_ways: FingerWays::SurfaceFirst,
+        }
     }
 }
 

@@ -1,8 +1,8 @@
 //! In-hand settings as files have them: all keys side by side.
 
 use super::{
-    Alpha, BaselineSettings, CostWeights, FirstTry, ImprovementSettings, InHandSettings, Method, ReleaseRule,
-    SearchSettings,
+    Alpha, BaselineSettings, CostWeights, FingerWays, FirstTry, ImprovementSettings, InHandSettings, Method,
+    ReleaseRule, SearchSettings,
 };
 use regrasp_manipulation::settings::{ForceSettings, PhysicsSettings, SpeedSettings, TransferMode};
 use serde::{Deserialize, Serialize};
@@ -73,6 +73,8 @@ flat! {
         speed: SpeedSettings,
         alpha: Alpha,
         guided_share: f64,
+        edge_crossings: bool,
+        finger_ways: FingerWays,
     }
     physics: PhysicsSettings {
         transfer, friction_margin, closure_margin, step, clearance, contact_allowance, limit_margin, joint_step, lift_heights, rrt_iterations, forces, speed,
@@ -81,7 +83,7 @@ flat! {
         release_rule, first_try, wander_distance, wander_angle, far_share, passage_share, goal_share, try_fee, aimless_share, candidates, candidates_kept, least_holding, transfers_alone, free_after, free_share, restart_work, shortcuts,
     }
     baselines: BaselineSettings {
-        alpha, guided_share,
+        alpha, guided_share, edge_crossings, finger_ways,
     }
     improvement: ImprovementSettings {
         improve_work, long_plan, shorten_share, cost,

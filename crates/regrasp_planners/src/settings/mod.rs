@@ -11,7 +11,7 @@ mod in_hand;
 /// The search.
 mod search;
 
-pub use baselines::{Alpha, BaselineSettings};
+pub use baselines::{Alpha, BaselineSettings, FingerWays};
 pub use improvement::{CostWeights, ImprovementSettings};
 pub use in_hand::InHandSettings;
 pub use search::{FirstTry, Method, ReleaseRule, SearchSettings};

@@ -2,6 +2,7 @@
 
 use crate::tracking::forces::Forces;
 use crate::tracking::grasp::TrackingGrasp;
+use crate::tracking::start_grasp::choose_start;
 use crate::tracking::step::Stepper;
 use regrasp_geometry::{Shape, TriangleMesh};
 use regrasp_manipulation::ends::blocked::refuse_buried_object;
@@ -60,20 +61,22 @@ fn dent(mesh: &TriangleMesh, allowed: f64) -> Option<f64> {
     (deepest > allowed).then_some(deepest)
 }
 
-/// The grasp at the start, and forces that hold it.
+/// The grasp at the start, and forces that hold it; one of the planner's choice by `seed` where none is given.
 ///
-/// Errors: none is given, or it collides, is out of reach, or holds nothing.
-pub fn start(stepper: &Stepper, query: &TrackingQuery) -> Result<(TrackingGrasp, Forces), Failure> {
+/// Errors: it collides, is out of reach, or holds nothing; none is given and none was found.
+pub fn start(stepper: &Stepper, query: &TrackingQuery, seed: u64) -> Result<(TrackingGrasp, Forces), Failure> {
     let model = stepper.model;
     let pose = &query.world_from_object_start;
     refuse_buried_object(model, End::Start, pose)?;
     refuse_palm_overlap(model)?;
     refuse_hand_inside(model, pose)?;
-    let state = given_grasp_at(model, End::Start, pose, &query.start_grasp, Near::Rest)?.ok_or_else(|| {
-        let message = "tracking begins with a given grasp, and the start has none".to_owned();
-        impossible(message, "give [start] grasp = { contacts = { finger = [x, y, z] } }")
-    })?;
     let invalid = |message: String, advice: &str| Failure::bare(FailureKind::StartInvalid, message, advice);
+    let Some(state) = given_grasp_at(model, End::Start, pose, &query.start_grasp, Near::Rest)? else {
+        return choose_start(stepper, pose, seed).ok_or_else(|| {
+            let message = "no grasp was found at the start that closes and whose forces balance the weight".to_owned();
+            invalid(message, "move the start to where the fingers reach, or give [start] grasp = { contacts = ... }")
+        });
+    };
     if !state.is_held_by_all() {
         let message = "in tracking every finger holds, and the start has a free one".to_owned();
         return Err(invalid(message, "leave \"free\" out of the start's grasp"));

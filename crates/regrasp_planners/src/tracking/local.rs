@@ -2,6 +2,7 @@
 
 use crate::tracking::grasp::{PerFinger, TrackingGrasp, turn_to};
 use crate::tracking::object_motion::ObjectMotion;
+use crate::tracking::settings::RoleChoice;
 use crate::tracking::step::{Asked, Controls, Fingers, NoStep, Roles, STEP_WORK, Stepper, TrackingStep, each};
 use arrayvec::ArrayVec;
 use nalgebra::UnitQuaternion;
@@ -11,10 +12,10 @@ use regrasp_manipulation::grasp::state::MAX_FINGERS;
 use regrasp_manipulation::model::Model;
 use regrasp_robot::kinematics::whole_pose::has_all_directions;
 
-/// Time of a local plan in units of that to the sub-goal (Cherif 1999: `bound_1`, twice).
-const MOST_TIME: f64 = 5.0;
 /// Cosine of the angle between the wanted turn and the one that the contacts allow, below which roles are not taken. By hand.
 const LEAST_ALIGNED: f64 = 0.2;
+/// The same where roles are drawn at random: only those that lead away are left out.
+const LEAST_TOWARDS: f64 = 1e-3;
 /// Cosine below which roles are looked for that follow better.
 const WELL_ALIGNED: f64 = 0.5;
 /// The same where the moving finger cannot choose how its tip turns: a change of roles helps its reach nothing. By measurement, the
@@ -132,7 +133,7 @@ impl Local<'_, '_, '_> {
         before: Option<Roles>,
     ) -> LocalPlan {
         let settings = self.stepper.settings;
-        let most_steps = (MOST_TIME * settings.sub_goal_time / settings.time_step).round() as usize;
+        let most_steps = (settings.local_time * settings.sub_goal_time / settings.time_step).round() as usize;
         let mut steps: Vec<TrackingStep> = Vec::new();
         let mut here = start.clone();
         self.stepper.workspace.set(&here.world_from_object.to_pose(), &here.joints, &here.contacts());
@@ -291,6 +292,8 @@ impl Local<'_, '_, '_> {
         let n = model.n_fingers();
         let has_failed = tried.n > 0;
         let chance = if has_failed { 1.0 } else { CHANCE };
+        let is_random = self.stepper.settings.roles == RoleChoice::Random;
+        let least_aligned = if is_random { LEAST_TOWARDS } else { LEAST_ALIGNED };
         let mut best: Option<(f64, Roles, Prospect)> = None;
         for roles in Roles::all(n, self.stepper.settings.resting_fingers)
             .filter(|roles| tried.guilty == 0 || roles.moving & tried.guilty != 0)
@@ -299,9 +302,15 @@ impl Local<'_, '_, '_> {
                 continue;
             }
             let noise = self.rng.uniform(0.0, chance);
-            let Some(prospect) = self.prospect(here, roles, left).filter(|p| p.cosine >= LEAST_ALIGNED) else {
+            let Some(prospect) = self.prospect(here, roles, left).filter(|p| p.cosine >= least_aligned) else {
                 continue;
             };
+            if is_random {
+                if best.as_ref().is_none_or(|(most, _, _)| noise > *most) {
+                    best = Some((noise, roles, prospect));
+                }
+                continue;
+            }
             let share = |finger| self.reach_share(here, finger, &prospect.tip_way(model, here, finger));
             let share = each(roles.moving).map(share).fold(0.0, f64::max);
             if share > 1.0 {

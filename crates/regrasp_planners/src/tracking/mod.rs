@@ -24,10 +24,12 @@ mod record;
 mod search;
 /// Settings.
 pub mod settings;
+/// A start grasp of the planner's own choice.
+mod start_grasp;
 /// One step of time.
 mod step;
 
-pub use settings::{Cones, RollingFinger, TrackingMethod, TrackingSettings};
+pub use settings::{Cones, RoleChoice, RollingFinger, TrackingMethod, TrackingSettings};
 
 use gaiting::Move;
 use grasp::TrackingGrasp;
@@ -79,7 +81,7 @@ fn plan_in_hand_frame(
     endpoints::refuse(&model, &view.gravity)?;
     let forces = model.forces.as_ref().expect("settings without forces do not validate");
     let mut stepper = Stepper { model: &model, settings, forces, workspace: Workspace::new(&model), work: 0 };
-    let first = endpoints::start(&stepper, query)?;
+    let first = endpoints::start(&stepper, query, seed)?;
     let goal = query.world_from_object_goal.rotation;
     let mut counts = Counts::default();
     let mut nearest: Option<(f64, TrackingGrasp)> = None;

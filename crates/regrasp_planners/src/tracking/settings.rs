@@ -42,6 +42,17 @@ pub enum RollingFinger {
     Once,
 }
 
+/// How the local planner chooses which fingers move and on which one the object rolls.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RoleChoice {
+    /// Those that lead best towards the sub-goal and whose moving fingers have reach left, with some chance.
+    #[default]
+    Aligned,
+    /// Any that lead towards it, drawn at random (Cherif 1999, sec. 6.2.4).
+    Random,
+}
+
 /// Where contact forces of fingertips that do not slide are (Cherif 1999, sec. 6.2.3).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -79,6 +90,10 @@ pub struct TrackingSettings {
     pub resting_fingers: usize,
     /// Which finger the object rolls on.
     pub rolling_finger: RollingFinger,
+    /// How the roles of fingers are chosen.
+    pub roles: RoleChoice,
+    /// Longest time of a local plan, in units of `sub_goal_time` (Cherif 1999, sec. 6.2.4, `bound_1`: 2).
+    pub local_time: f64,
     /// Where forces are.
     pub cones: Cones,
     /// Choices tried in a row before a sub-goal is given up (Cherif 1999, sec. 6.2.4, `bound_2`: 50).
@@ -129,6 +144,8 @@ impl Default for TrackingSettings {
             face_changes: true,
             resting_fingers: 3,
             rolling_finger: RollingFinger::Any,
+            roles: RoleChoice::Aligned,
+            local_time: 5.0,
             cones: Cones::Pyramid,
             trials: 50,
             goal_weight: 1.2,
@@ -158,6 +175,7 @@ impl TrackingSettings {
             ("object_velocity", self.object_velocity),
             ("rolling_velocity", self.rolling_velocity),
             ("goal_weight", self.goal_weight),
+            ("local_time", self.local_time),
         ];
         for (name, value) in positive {
             if !(value > 0.0 && value.is_finite()) {

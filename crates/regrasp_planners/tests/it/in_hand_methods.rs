@@ -4,7 +4,7 @@
 use crate::queries::Queries;
 use regrasp_base::Budget;
 use regrasp_plan::Plan;
-use regrasp_plan::check::CheckSettings;
+use regrasp_plan::check::{CheckSettings, Level};
 use regrasp_planners::in_hand::BaselineSettings;
 use regrasp_planners::in_hand::SearchSettings;
 use regrasp_planners::in_hand::{Alpha, InHandSettings, Method, Progress, ReleaseRule, plan_in_hand, validate_once};
@@ -65,6 +65,26 @@ fn plans_for_the_sphere_are_accepted_and_reproducible() {
 #[test]
 fn plans_for_the_box_are_accepted_and_reproducible() {
     is_judged_valid_and_reproducible("box_90x.toml");
+}
+
+/// Saut 2011's own sampling, without poses near the way: the plate asks for long looks for a finger's way, the box for contacts
+/// that change their faces.
+#[test]
+fn the_method_of_the_paper_solves_box_and_plate_with_its_own_sampling() {
+    for name in ["box_90x.toml", "ellipsoid_obstacle.toml"] {
+        let loaded = scene(name);
+        let asked = InHandSettings {
+            baselines: BaselineSettings { guided_share: 0.0, ..settings(Method::Visibility, 1).baselines },
+            ..InHandSettings { method: Method::Visibility, ..InHandSettings::plain() }
+        };
+        for seed in 0..2 {
+            let plan = plan(&loaded, &asked, seed);
+            assert!(plan.statistics.work < 2_000_000, "{name}, seed {seed}: {}", plan.statistics.work);
+            let geometry = CheckSettings { level: Level::Geometry, ..CheckSettings::default() };
+            let report = loaded.judge(&loaded.in_hand(seed), &plan, &geometry);
+            assert!(report.accepted(), "{name}, seed {seed}: {report:#?}");
+        }
+    }
 }
 
 #[test]

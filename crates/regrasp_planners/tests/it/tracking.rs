@@ -130,6 +130,25 @@ fn a_goal_that_is_the_start_is_a_plan_that_holds_still() {
     assert!(report.accepted(), "{:?}", report.violations.first());
 }
 
+/// The start grasp is drawn by the seed and knows nothing of the goal.
+#[test]
+fn tracking_chooses_its_start_grasp_where_none_is_given() {
+    let loaded = scene("football_any_start.toml");
+    let still = |seed: u64| {
+        let mut query = loaded.tracking(0);
+        query.world_from_object_goal = query.world_from_object_start;
+        let plan = plan_with(&loaded, &query, seed).unwrap();
+        let report = loaded.judge(&query, &plan, &CheckSettings::default());
+        assert!(report.accepted(), "seed {seed}: {:?}", report.violations.first());
+        plan.segments[0].waypoints[0].joints.clone()
+    };
+    assert_eq!(still(1), still(1));
+    assert_ne!(still(1), still(2));
+    let query = loaded.tracking(0);
+    let turned = plan_with(&loaded, &query, 1).map(|plan| plan.segments[0].waypoints[0].joints.clone());
+    assert!(turned.is_err() || turned.is_ok_and(|joints| joints == still(1)), "the goal changes the start grasp");
+}
+
 fn refused(loaded: &LoadedScene, query: &TrackingQuery, kind: FailureKind, words: &str) {
     let failure = plan_with(loaded, query, 0).unwrap_err();
     assert_eq!(failure.kind, kind, "{failure}");
@@ -145,8 +164,10 @@ fn what_tracking_is_not_made_for_is_refused_by_name() {
     refused(&loaded, &query, FailureKind::Impossible, "direction of gravity");
 
     let mut loaded = scene("football.toml");
-    let automatic = TrackingQuery { start_grasp: GraspRequest::Automatic, ..query.clone() };
-    refused(&loaded, &automatic, FailureKind::Impossible, "the start has none");
+    let mut off = query.clone();
+    off.start_grasp = GraspRequest::Automatic;
+    off.world_from_object_start.translation.z += 0.5;
+    refused(&loaded, &off, FailureKind::StartInvalid, "no grasp was found at the start");
 
     // Nearly without friction normals alone would have to carry the football and balance its torques.
     loaded.scene.objects[0].friction = 0.01;

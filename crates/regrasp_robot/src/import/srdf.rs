@@ -87,6 +87,8 @@ pub(crate) fn parse_srdf(
 ) -> Result<(Srdf, Vec<String>), InputError> {
     let document = parse(path, text)?;
     let root = document.root_element();
+    // The joint between the robot and the world, of which the URDF knows nothing.
+    let virtual_joints: Vec<&str> = children(root, "virtual_joint").filter_map(|node| node.attribute("name")).collect();
     let lines = Lines::of(text);
     let mut reader = Reader::new(path, &lines, lenient);
     reader.refuse_other_root(root)?;
@@ -94,7 +96,7 @@ pub(crate) fn parse_srdf(
     for node in children(root, "group") {
         // Groups without a name are references inside other groups in old files.
         let Some(name) = reader.required_name(node, "name", "group") else { continue };
-        srdf.groups.push(read_group(&mut reader, node, name, robot));
+        srdf.groups.push(read_group(&mut reader, node, name, (robot, &virtual_joints)));
     }
     let group_names: Vec<String> = srdf.groups.iter().map(|group| group.name.clone()).collect();
     for node in children(root, "end_effector") {
@@ -112,10 +114,17 @@ pub(crate) fn parse_srdf(
     reader.finish(srdf)
 }
 
-fn read_group<'a, 'i: 'a>(reader: &mut Reader<'a>, node: Node<'a, 'i>, name: &str, robot: &Robot) -> Group {
+fn read_group<'a, 'i: 'a>(
+    reader: &mut Reader<'a>,
+    node: Node<'a, 'i>,
+    name: &str,
+    (robot, virtual_joints): (&Robot, &[&str]),
+) -> Group {
     let element = ("group", name);
-    let joints =
-        children(node, "joint").filter_map(|joint| known_joint(reader, joint, "name", element, robot)).collect();
+    let joints = children(node, "joint")
+        .filter(|joint| !joint.attribute("name").is_some_and(|name| virtual_joints.contains(&name)))
+        .filter_map(|joint| known_joint(reader, joint, "name", element, robot))
+        .collect();
     let links = children(node, "link").filter_map(|link| known_link(reader, link, "name", element, robot)).collect();
     let mut chains = Vec::new();
     for chain in children(node, "chain") {

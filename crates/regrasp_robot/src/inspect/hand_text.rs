@@ -154,12 +154,12 @@ fn first_joint_if_needed(hand: &Hand, finger: &Finger) -> Option<String> {
 }
 
 /// A number that TOML reads as a float.
-fn number(value: f64) -> String {
+pub(super) fn number(value: f64) -> String {
     format!("{value:?}")
 }
 
 /// A TOML string.
-fn quoted(text: &str) -> String {
+pub(super) fn quoted(text: &str) -> String {
     let mut quoted = String::from("\"");
     for c in text.chars() {
         match c {
@@ -176,6 +176,6 @@ fn quoted(text: &str) -> String {
 }
 
 /// `text` on one line.
-fn comment(text: &str) -> String {
+pub(super) fn comment(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }

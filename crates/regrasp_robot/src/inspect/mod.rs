@@ -20,15 +20,18 @@ pub mod tip_report;
 mod tip_sphere;
 /// Which links touch.
 mod touch;
+/// Robots with arms, and robot files for them.
+pub mod whole;
 
 use crate::hand::Hand;
 use crate::import::{LoadOptions, LoadedInput, load_hand, load_robot};
-use crate::robot::LinkId;
+use crate::robot::{LinkId, Robot};
 use crate::tip::TipShape;
 use regrasp_base::{InputError, Rng};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::Path;
+use std::sync::Arc;
 
 pub use hand_text::hand_file_text;
 pub use reach::{TipReach, TipRegion};
@@ -114,6 +117,8 @@ pub struct HandInspection {
 /// What a hand, or a robot that may be one, is like.
 #[derive(Debug, Clone)]
 pub struct Inspection {
+    /// Links and joints, as read.
+    pub tree: Arc<Robot>,
     /// The robot.
     pub robot: RobotInspection,
     /// The hand with what is said about it, or why the robot is no hand.
@@ -135,7 +140,8 @@ pub fn inspect(
         Ok(loaded) => {
             let robot = inspect_robot(&loaded.hand.robot, path);
             let table = inspect_hand(&loaded.hand, settings, rng);
-            Ok(Inspection { robot, hand: Ok((loaded.hand, table)), inputs: loaded.inputs, notes: loaded.notes })
+            let tree = loaded.hand.robot.clone();
+            Ok(Inspection { tree, robot, hand: Ok((loaded.hand, table)), inputs: loaded.inputs, notes: loaded.notes })
         }
         Err(no_hand) => {
             // A hand file without a hand has nothing else to show; a URDF may still be a robot.
@@ -144,7 +150,8 @@ pub fn inspect(
             }
             let loaded = load_robot(path, options)?;
             let robot = inspect_robot(&loaded.robot, path);
-            Ok(Inspection { robot, hand: Err(no_hand), inputs: loaded.inputs, notes: loaded.notes })
+            let tree = Arc::new(loaded.robot);
+            Ok(Inspection { tree, robot, hand: Err(no_hand), inputs: loaded.inputs, notes: loaded.notes })
         }
     }
 }

@@ -27,8 +27,11 @@ fn seen(text: &str) -> Result<Manipulator, String> {
     load(text, &files, &LoadOptions::default()).map_err(|errors| errors.join("\n"))
 }
 
+/// The position of a joint by its name, from those of coordinates.
+type Position<'a> = &'a dyn Fn(&str, &dyn Fn(&str) -> f64) -> f64;
+
 /// A tree from the text, and positions of joints: by name, else a coordinate of the state.
-fn compare(robot: &Manipulator, position: &dyn Fn(&str, &dyn Fn(&str) -> f64) -> f64) {
+fn compare(robot: &Manipulator, position: Position) {
     let tree = text::Tree::of(BODY);
     let mut rng = Rng::keyed(1, "keys", 0);
     let mut poses = Vec::new();

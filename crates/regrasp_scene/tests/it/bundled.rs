@@ -24,14 +24,16 @@ fn center_in_world(loaded: &LoadedScene, world_from_object: &Pose) -> Point {
 }
 
 /// Scenes of the papers that are more than a turn in place, and those of tracking, which have a start grasp; and those of several hands.
-const PAPER_SCENES: [&str; 14] = [
+const PAPER_SCENES: [&str; 16] = [
     "bulb",
     "cubic",
     "diamond",
+    "diamond_any_start",
     "ellipsoid_free",
     "ellipsoid_obstacle",
     "five_fingertips",
     "football",
+    "football_any_start",
     "football_pivot",
     "pencil",
     "robot_two_arms",

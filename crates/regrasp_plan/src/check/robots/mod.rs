@@ -18,6 +18,8 @@ pub mod rules;
 /// The robot as the checker sees it.
 pub mod tree;
 
+pub use along::{RobotAlong, robot_along};
+
 use crate::check::promises::check_input_files;
 use crate::check::violation::{Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Level, Log, Report, limits};

@@ -1,9 +1,11 @@
 //! What all methods of the in-hand planner share: scratch memory, random numbers, budget, tally.
 
+use crate::in_hand::attempt::accessible::Accessible;
 use crate::in_hand::attempt::passage::Passages;
+use crate::in_hand::attempt::patience::Patience;
 use crate::in_hand::attempt::poses::draw_pose;
 use crate::in_hand::attempt::tally::{Reason, Tally};
-use crate::settings::InHandSettings;
+use crate::settings::{FingerWays, InHandSettings, Method};
 use regrasp_base::{Budget, Interrupt, Rng};
 use regrasp_geometry::{Pose, frame};
 use regrasp_manipulation::failure::FailureKind;
@@ -11,6 +13,7 @@ use regrasp_manipulation::grasp::state::GraspState;
 use regrasp_manipulation::model::Model;
 use regrasp_manipulation::outline::Outline;
 use regrasp_manipulation::progress::Progress;
+use regrasp_manipulation::relocation::PassingOver;
 use regrasp_manipulation::workspace::Workspace;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -56,6 +59,10 @@ pub struct Search<'a> {
     /// Goal pose of the leg.
     pub goal: Pose,
     passages: Passages,
+    /// Where the hand reaches; measured when it is first asked for.
+    accessible: Option<Accessible>,
+    /// How long the way of a finger is looked for, by the methods of Saut 2011; None for a short time only.
+    pub patience: Option<Patience>,
     /// Index of the attempt.
     pub attempt: usize,
     /// True where the object stays where it is: what is asked is a grasp, not one from which a finger may lift.
@@ -97,6 +104,10 @@ impl<'a> Search<'a> {
     pub fn new(context: Context<'a>, [start, goal]: [Pose; 2], attempt: usize, work_limit: u64) -> Self {
         let mut workspace = Workspace::new(context.model);
         workspace.draws.work_limit = work_limit;
+        let settings = context.settings;
+        if settings.method != Method::Gait && settings.baselines.finger_ways == FingerWays::RrtOnly {
+            workspace.passing_over = PassingOver::RrtOnly;
+        }
         Search {
             settings: context.settings,
             workspace,
@@ -110,6 +121,8 @@ impl<'a> Search<'a> {
             start,
             goal,
             passages: Passages::default(),
+            accessible: None,
+            patience: (settings.method != Method::Gait).then(Patience::default),
             attempt,
             holds_only: false,
             cut_by_time: false,
@@ -134,6 +147,9 @@ impl<'a> Search<'a> {
     pub fn begin_leg(&mut self, leg: usize, start: Pose, goal: Pose) {
         (self.leg, self.start, self.goal) = (leg, start, goal);
         (self.nearest, self.n_nodes) = (None, 0);
+        for pose in [start, goal] {
+            self.learn_reach(&pose);
+        }
         self.passages = Passages::of(self.model(), self.settings.search.wander_distance, [&start, &goal]);
     }
 
@@ -175,6 +191,29 @@ impl<'a> Search<'a> {
         let model = self.model();
         let way_out = self.passages.draw(self.settings.search.passage_share, &mut self.rng);
         way_out.unwrap_or_else(|| draw_pose(model, &self.settings.search, &self.start, &self.goal, &mut self.rng))
+    }
+
+    /// A random pose where the hand reaches the object, anyhow turned (Saut 2011, sec. 4.2.2).
+    pub fn draw_pose_in_reach(&mut self) -> Pose {
+        if let Some(way_out) = self.passages.draw(self.settings.search.passage_share, &mut self.rng) {
+            return way_out;
+        }
+        let model = self.model();
+        let (rng, ends) = (&mut self.rng, [self.start, self.goal]);
+        let accessible = self.accessible.get_or_insert_with(|| {
+            let mut accessible = Accessible::measure(model, rng);
+            ends.iter().for_each(|pose| accessible.learn(model, pose));
+            accessible
+        });
+        accessible.draw(model, rng)
+    }
+
+    /// Takes note of a pose at which a grasp was found, where others are to be drawn.
+    pub fn learn_reach(&mut self, pose: &Pose) {
+        let model = self.model();
+        if let Some(accessible) = &mut self.accessible {
+            accessible.learn(model, pose);
+        }
     }
 
     /// Distance between poses, with angles weighed by the object's radius.

@@ -4,9 +4,9 @@ use crate::in_hand::attempt::search::Search;
 use crate::in_hand::attempt::tally::Reason;
 use crate::in_hand::grasps::candidate::{Candidate, Choice};
 use crate::in_hand::grasps::closure_table::ClosureTable;
+use regrasp_geometry::Pose;
 use regrasp_geometry::collision::Placement;
-use regrasp_geometry::{Pose, Vector, frame, interpolate_pose};
-use regrasp_manipulation::grasp::contact::{draw_contact, reach};
+use regrasp_manipulation::grasp::contact::{draw_contact_by_area, reach};
 use regrasp_manipulation::grasp::state::{Contacts, GraspState, HandJoints};
 use regrasp_manipulation::workspace::TipMode;
 
@@ -15,25 +15,14 @@ const CONTACTS: usize = 3;
 
 /// A grasp with the object at a random pose.
 pub fn draw_state(search: &mut Search) -> Option<GraspState> {
-    let _model = search.model();
-    let (start, goal) = (search.start, search.goal);
     let pose = if search.rng.chance(search.settings.baselines.guided_share) {
         search.draw_pose()
     } else {
-        draw_turned_pose(search, &start, &goal)
+        search.draw_pose_in_reach()
     };
-    draw_state_at(search, &pose)
-}
-
-/// A pose anyhow turned, with its centre of mass near the way from `start` to `goal`.
-fn draw_turned_pose(search: &mut Search, start: &Pose, goal: &Pose) -> Pose {
-    let model = search.model();
-    let center = model.view.object.center_of_mass;
-    let along = interpolate_pose(start, goal, search.rng.unit()) * center;
-    let radius = search.settings.search.wander_distance * search.rng.unit().cbrt();
-    let place = along + Vector::from(search.rng.direction()) * radius;
-    let turned = frame::pose_from([0.0; 3], search.rng.quat_xyzw());
-    Pose::from_parts((place - turned.rotation * center).into(), turned.rotation)
+    let state = draw_state_at(search, &pose)?;
+    search.learn_reach(&pose);
+    Some(state)
 }
 
 /// A grasp with the object at `world_from_object` in which every n-1 fingers are closed: the object is the active part
@@ -88,7 +77,9 @@ fn draw_footholds(
     let mut found = Vec::with_capacity(CONTACTS);
     search.workspace.place_object(world_from_object);
     for _ in 0..4 * CONTACTS {
-        let Some(contact) = draw_contact(&mut search.workspace, finger, placement, &mut search.rng) else { continue };
+        let Some(contact) = draw_contact_by_area(&mut search.workspace, finger, placement, &mut search.rng) else {
+            continue;
+        };
         if let Some(joints) = reach(&mut search.workspace, finger, &contact, placement, &mut search.rng) {
             found.push(Candidate { contact: Some(contact), joints, follow: 1.0 });
             if found.len() == CONTACTS {

@@ -1,5 +1,7 @@
 //! Motions of the object with fingers that keep their contacts, roll, or are free (Saut 2011, sec. 4.2.3).
 
+/// How a contact moves on a path in GS_n.
+mod contact_path;
 /// Linear paths in GS_n.
 pub mod grasp_path;
 #[cfg(test)]

@@ -95,7 +95,7 @@ fn a_transfer_ends_where_the_velocity_constraint_leads() {
         with_settings(scene, &rolling(), |search| {
             let mut n_compared = 0;
             let mut longest: f64 = 0.0;
-            for _ in 0..60 {
+            for _ in 0..200 {
                 let Some(state) = draw_state(search) else { continue };
                 let goal = elsewhere(search, &state.world_from_object, 0.004, 0.2);
                 let Some(way) = whole_transfer(search, &state, &goal) else { continue };
@@ -121,7 +121,7 @@ fn a_transfer_ends_where_the_velocity_constraint_leads() {
 fn tips_stay_one_radius_from_the_surface_and_contacts_under_them() {
     with_settings("box_90x.toml", &rolling(), |search| {
         let mut n_moments = 0;
-        for _ in 0..60 {
+        for _ in 0..200 {
             let Some(state) = draw_state(search) else { continue };
             let goal = elsewhere(search, &state.world_from_object, 0.003, 0.25);
             let Some(way) = whole_transfer(search, &state, &goal) else { continue };

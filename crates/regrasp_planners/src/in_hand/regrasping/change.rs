@@ -1,5 +1,6 @@
 //! One transfer and one change of grasp, in either order.
 
+use crate::in_hand::attempt::patience::Patience;
 use crate::in_hand::attempt::search::Search;
 use crate::in_hand::grasps::candidate::{Candidate, Choice};
 use crate::in_hand::grasps::closure_table::ClosureTable;
@@ -33,6 +34,12 @@ pub enum Arrival {
     Exact,
     /// The object's pose and closed fingers, whatever their postures.
     AnyPosture,
+}
+
+/// Iterations of RRT-Connect that the next way of a finger is worth where others can stand in for it.
+pub fn patience_now(search: &Search) -> usize {
+    let casual = search.model().settings.rrt_iterations / CASUAL;
+    search.patience.as_ref().map_or(casual, Patience::iterations)
 }
 
 /// A transfer that arrives, or nothing.
@@ -187,8 +194,9 @@ fn change(
         return None;
     }
     let way = if is_exact { settle(&mut search.workspace, way.clone(), to)? } else { way.clone() };
-    // One of many ways to the same end: not worth a long search for a finger's way.
-    search.workspace.rrt_iterations = model.settings.rrt_iterations / CASUAL;
+    // One of many ways to the same end: mostly not worth a long search for a finger's way.
+    let n_runs = search.workspace.rrt_runs.all;
+    search.workspace.rrt_iterations = patience_now(search);
     let tried = &mut Tried::default();
     let mut change = regrasp(&mut search.workspace, way.end(), &options, &goal, &mut table, tried, rng);
     if let (None, Some(pool)) = (&change, pool) {
@@ -204,6 +212,9 @@ fn change(
         change = regrasp_over(&mut search.workspace, way.end(), &options, &goal, &mut table, RELOCATIONS, rng);
     }
     search.workspace.rrt_iterations = model.settings.rrt_iterations;
+    if let Some(patience) = search.patience.as_mut().filter(|_| search.workspace.rrt_runs.all > n_runs) {
+        patience.look_taken();
+    }
     let way = way.then(change?)?;
     (!is_exact || way.end() == to).then_some(way)
 }

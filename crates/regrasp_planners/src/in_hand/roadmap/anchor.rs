@@ -187,6 +187,13 @@ impl QueryEnd {
     }
 }
 
+/// `way` with relocations into a grasp given at the pose at which it ends.
+pub fn grasp_given(search: &mut Search, way: &Sequence, given: &GraspState) -> Option<Sequence> {
+    let mut rng = Rng::child(&search.rng, "given_grasp", 0);
+    search.rng.bits();
+    change_grasp(search, way, given, Arrival::Exact, &mut rng)
+}
+
 /// True unless some finger alone cannot follow from the node to the end's pose.
 fn may_follow(search: &mut Search, roadmap: &GraspRoadmap, node: usize, place: &mut Place) -> bool {
     let graph = &roadmap.graph;

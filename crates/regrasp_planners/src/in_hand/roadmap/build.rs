@@ -89,8 +89,8 @@ pub struct BuildStage {
 
 /// Builds a roadmap of `view` over `region`, which is in the hand's frame, with `settings.n_threads` threads.
 ///
-/// Contacts stay where they are while the object moves, whatever the settings say: where a fingertip rolls to depends on the
-/// way that it came, and a graph has many ways to each of its grasps.
+/// Contacts of the graph stay where they are while the object moves, whatever the settings say: where a fingertip rolls to depends
+/// on the way that it came, and a graph has many ways to each of its grasps. Queries carry its paths out as the settings say.
 ///
 /// Failures: a hand that can never do it, a spent budget, an interruption, or no grasp anywhere. Panics if settings or
 /// region are not valid.
@@ -106,9 +106,8 @@ pub fn build_roadmap(
     let valid = settings.validate().and_then(|()| build.validate()).and_then(|()| region.validate());
     valid.map_err(|problem| Failure::of_settings(&problem))?;
     Failure::refuse_many_fingers(view)?;
-    let physics = PhysicsSettings { transfer: TransferMode::Fixed, ..settings.physics.clone() };
-    let settings = InHandSettings { method: Method::Gait, physics, ..settings.clone() };
-    let within = settings.within(&view.limits);
+    let settings = InHandSettings { method: Method::Gait, ..settings.clone() };
+    let within = with_fixed_contacts(&settings).within(&view.limits);
     let model = Model::new(view, &within.physics);
     refuse_impossible(&model)?;
     let mut builder = Builder::new(&model, &within, region, build, seed, budget, progress)?;
@@ -128,6 +127,12 @@ pub fn build_roadmap(
         return Err(Failure::bare(FailureKind::WorkSpent, message, "choose a region within the fingers' reach"));
     }
     Ok(GraspRoadmap::new(about, graph))
+}
+
+/// The settings with contacts that stay where they are.
+pub(super) fn with_fixed_contacts(settings: &InHandSettings) -> InHandSettings {
+    let physics = PhysicsSettings { transfer: TransferMode::Fixed, ..settings.physics.clone() };
+    InHandSettings { physics, ..settings.clone() }
 }
 
 /// The largest component, the first one of equals.

@@ -9,6 +9,8 @@ mod anchor;
 mod build;
 /// Bytes of a file, with nothing believed.
 mod bytes;
+/// Paths carried out with fingertips that roll.
+mod carry;
 /// The file format.
 mod file;
 /// The tables.

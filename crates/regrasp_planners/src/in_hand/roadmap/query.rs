@@ -5,21 +5,24 @@ use crate::in_hand::attempt::search::{Context, Search, Stop};
 use crate::in_hand::attempt::tally::Reason;
 use crate::in_hand::recording::record::settings_of;
 use crate::in_hand::refusals::given_grasp;
-use crate::in_hand::regrasping::change::{Arrival, transfer_regrasp};
+use crate::in_hand::regrasping::change::{Arrival, transfer_regrasp, whole_transfer};
 use crate::in_hand::roadmap::GraspRoadmap;
 use crate::in_hand::roadmap::anchor::{Link, LinkKind, QueryEnd};
-use crate::in_hand::roadmap::build::legs_of;
+use crate::in_hand::roadmap::build::{legs_of, with_fixed_contacts};
+use crate::in_hand::roadmap::carry::Barred;
 use crate::in_hand::roadmap::index::Index;
 use crate::in_hand::roadmap::landmarks::{Bounds, Landmarks};
 use crate::in_hand::roadmap::region::nearest_places;
 use crate::in_hand::roadmap::registry::Registry;
 use crate::in_hand::roadmap::route::Passing;
+use crate::in_hand::searching::shorten::shorten;
 use crate::settings::InHandSettings;
 use regrasp_base::{Budget, InputError, Rng};
 use regrasp_geometry::Pose;
 use regrasp_manipulation::ends::blocked::{object_blocked_by, refuse_buried_object, refuse_object_out_of_reach};
 use regrasp_manipulation::ends::end::End;
 use regrasp_manipulation::failure::{Failure, FailureKind};
+use regrasp_manipulation::forces::limits::Unbalanced;
 use regrasp_manipulation::grasp::sequence::{Motion, Sequence};
 use regrasp_manipulation::grasp::state::GraspState;
 use regrasp_manipulation::in_world::{failure_in_world, plan_in_world};
@@ -39,7 +42,9 @@ const DETOURS: usize = 3;
 /// Configurations that a detour may cost: as many as hard single queries take.
 const DETOUR_WORK: u64 = 50_000;
 /// Anchors at each end from which A* chooses.
-const ANCHORS: usize = 1;
+pub(super) const ANCHORS: usize = 1;
+/// Work of a link that a graph is to keep: one transfer.
+const FIXED_LINK_WORK: u64 = 10_000;
 /// A path costs at most so many times the cheapest one between the anchors (weighted A*, Pohl 1970).
 const GREED: f64 = 2.5;
 
@@ -48,7 +53,9 @@ const GREED: f64 = 2.5;
 pub struct RoadmapPlanner<'a> {
     model: Model<'a>,
     settings: InHandSettings,
-    roadmap: &'a GraspRoadmap,
+    /// The same with contacts that stay where they are, as in the graph, where those of the settings roll.
+    fixed: Option<(Model<'a>, InHandSettings)>,
+    pub(super) roadmap: &'a GraspRoadmap,
     links: LinkKind,
 }
 
@@ -74,7 +81,12 @@ impl<'a> RoadmapPlanner<'a> {
     pub fn new(path: &Path, roadmap: &'a GraspRoadmap, view: &'a HandView<'a>) -> Result<Self, InputError> {
         roadmap.refuse_other_scene(path, view)?;
         let settings = roadmap.about.settings.within(&view.limits);
-        Ok(RoadmapPlanner { model: Model::new(view, &settings.physics), settings, roadmap, links: LinkKind::Shortest })
+        let model = Model::new(view, &settings.physics);
+        let fixed = model.any_rolls().then(|| {
+            let fixed = with_fixed_contacts(&settings);
+            (Model::new(view, &fixed.physics), fixed)
+        });
+        Ok(RoadmapPlanner { model, settings, fixed, roadmap, links: LinkKind::Shortest })
     }
 
     /// With transfers that follow each other with one grasp made one, where that is free: shorter motions, slower answers.
@@ -195,6 +207,25 @@ impl<'a> RoadmapPlanner<'a> {
                 let path = self.route(&start, &goal, &mut memory.a_star);
                 n_expanded += memory.a_star.n_expanded();
                 let Some(path) = path else { break };
+                if self.model.any_rolls() {
+                    let anchor = path[0];
+                    let Some(first) = start.prove(search, roadmap, path.iter().copied(), LinkKind::Shortest) else {
+                        continue;
+                    };
+                    let way = self.carry_out(search, first.way.reversed(), &mut goal, path, &mut memory.a_star)?;
+                    n_expanded += memory.a_star.n_expanded();
+                    let planned = way.map(|way| self.rolled_plan(search, query, seed, way, n_expanded));
+                    match planned {
+                        Some(Ok(plan)) => {
+                            return Ok(Ok(RoadmapAnswer { plan, links: self.links_to_keep(&first, &goal) }));
+                        }
+                        Some(Err(unbalanced)) => search.tally.add(Reason::NoForces(unbalanced)),
+                        None => {}
+                    }
+                    // On from another grasp.
+                    start.anchors.retain(|other| other.node != anchor);
+                    continue;
+                }
                 let Some(first) = start.prove(search, roadmap, path.iter().copied(), self.links) else {
                     continue;
                 };
@@ -213,8 +244,10 @@ impl<'a> RoadmapPlanner<'a> {
                 let mut plan = match recorder.finish(query, seed, &[], statistics) {
                     Ok(plan) => plan,
                     Err(unbalanced) => {
+                        // On from another grasp.
                         search.tally.add(Reason::NoForces(unbalanced));
-                        return Ok(Err(self.failure(unbalanced.in_words(&self.model), search)));
+                        start.anchors.retain(|other| other.node != path[0]);
+                        continue;
                     }
                 };
                 (plan.method, plan.settings) = ("roadmap".into(), settings_of(&self.settings));
@@ -258,20 +291,92 @@ impl<'a> RoadmapPlanner<'a> {
 
     /// A cheap way from an anchor of the start to one of the goal, as nodes.
     fn route(&self, start: &QueryEnd, goal: &QueryEnd, a_star: &mut AStar) -> Option<Vec<usize>> {
+        let from = start.anchors.iter().map(|anchor| (anchor.node, anchor.cost));
+        self.route_among(from.collect(), goal, &Barred::new(), a_star)
+    }
+
+    /// The same from a node, over none of the edges that are barred.
+    pub(super) fn route_from(
+        &self,
+        node: usize,
+        goal: &QueryEnd,
+        barred: &Barred,
+        a_star: &mut AStar,
+    ) -> Option<Vec<usize>> {
+        self.route_among(vec![(node, 0.0)], goal, barred, a_star)
+    }
+
+    /// From any of some nodes, each at a cost.
+    fn route_among(
+        &self,
+        first: Vec<(usize, f64)>,
+        goal: &QueryEnd,
+        barred: &Barred,
+        a_star: &mut AStar,
+    ) -> Option<Vec<usize>> {
         let roadmap = self.roadmap;
         let (from, to) = (roadmap.graph.nodes.len(), roadmap.graph.nodes.len() + 1);
         let neighbours = |node: usize, out: &mut Vec<(usize, f64)>| {
             if node == from {
-                out.extend(start.anchors.iter().map(|anchor| (anchor.node, anchor.cost)));
+                out.extend(&first);
                 return;
             }
+            let n_before = out.len();
             roadmap.index.neighbours(node, out);
+            if !barred.is_empty() {
+                let mut n_seen = 0;
+                out.retain(|&(other, _)| {
+                    n_seen += 1;
+                    n_seen <= n_before || !barred.contains(&(node.min(other), node.max(other)))
+                });
+            }
             out.extend(goal.anchors.iter().filter(|anchor| anchor.node == node).map(|anchor| (to, anchor.cost)));
         };
         let bounds = self.bounds_to(goal);
         let bound = |node: usize| if node < from { GREED * roadmap.landmarks.bound(node, &bounds) } else { 0.0 };
         let path = a_star.cheapest_path(from, |node| node == to, neighbours, bound)?.nodes;
         Some(path[1..path.len() - 1].to_vec())
+    }
+
+    /// The plan of motions that were carried out.
+    fn rolled_plan(
+        &self,
+        search: &mut Search,
+        query: &InHandQuery,
+        seed: u64,
+        mut way: Sequence,
+        n_expanded: usize,
+    ) -> Result<Plan, Unbalanced> {
+        if self.links == LinkKind::Longest {
+            let at_end = match query.goal_grasp {
+                GraspRequest::Automatic => Arrival::AnyPosture,
+                _ => Arrival::Exact,
+            };
+            shorten(search, &mut way, at_end);
+        }
+        let mut recorder = Recorder::at(&self.model, way.start(), Joins::TransfersInARow);
+        recorder.sequence(&way);
+        let statistics = Statistics { nodes: n_expanded as u64, work: search.workspace.work, ..Statistics::default() };
+        let plan = recorder.finish(query, seed, &[], statistics)?;
+        Ok(Plan { method: "roadmap".into(), settings: settings_of(&self.settings), ..plan })
+    }
+
+    /// Links of the ends of an answered query to the graph with contacts that stay, as a graph keeps them; a link that rolls
+    /// where there is none.
+    fn links_to_keep(&self, first: &Link, goal: &QueryEnd) -> [Link; 2] {
+        let fixed_link = |node: usize, pose: &Pose| -> Option<Link> {
+            let (model, settings) = self.fixed.as_ref()?;
+            let (winner, budget) = (AtomicUsize::new(usize::MAX), Budget::work(FIXED_LINK_WORK));
+            let context = Context { model, settings, seed: 0, budget: &budget, winner: &winner, progress: &|_| {} };
+            let state = self.roadmap.graph.state(node);
+            let mut search = Search::new(context, [state.world_from_object, *pose], 0, FIXED_LINK_WORK);
+            let way = whole_transfer(&mut search, &state, pose)?;
+            Some(Link { node, n_skipped: 0, way, can_be_kept: true })
+        };
+        let start_pose = first.way.end().world_from_object;
+        let rolling = Link { can_be_kept: false, ..first.clone() };
+        let last = goal.anchors.first().and_then(|anchor| fixed_link(anchor.node, &goal.pose));
+        [fixed_link(first.node, &start_pose).unwrap_or_else(|| rolling.clone()), last.unwrap_or(rolling)]
     }
 
     /// All motions from the start to the goal along a path. None when what is stored does not fit together.

@@ -2,7 +2,7 @@
 //! or regrasp-transfer.
 
 use crate::in_hand::attempt::search::{Search, Stop};
-use crate::in_hand::searching::visibility::explore::{explore, roadmap_of};
+use crate::in_hand::searching::visibility::explore::{Spares, explore, roadmap_of};
 use crate::in_hand::searching::visibility::link::LocalMethod;
 use crate::in_hand::searching::visibility::{ends, note_nearest, solution};
 use regrasp_manipulation::grasp::sequence::Sequence;
@@ -16,11 +16,13 @@ pub fn build(
 ) -> Result<Sequence, Stop> {
     let (start, goal) = ends(search, start, goal_grasp)?;
     let mut roadmap = roadmap_of(search, &start, &goal, LocalMethod::TransferRegrasp)?;
+    // The baseline joins by new grasps alone.
+    let mut spares = Spares::default();
     loop {
         if let Some(way) = solution(search, &mut roadmap)? {
             return Ok(way);
         }
-        explore(search, &mut roadmap, LocalMethod::TransferRegrasp)?;
+        explore(search, &mut roadmap, LocalMethod::TransferRegrasp, &mut spares)?;
         note_nearest(search, &roadmap);
     }
 }

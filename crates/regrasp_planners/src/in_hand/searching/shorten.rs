@@ -3,9 +3,14 @@
 
 use crate::in_hand::attempt::search::{Search, Stop};
 use crate::in_hand::regrasping::change::{Arrival, regrasp_transfer, transfer_regrasp, whole_transfer};
+use crate::settings::Method;
 use regrasp_base::{Interrupt, Rng};
 use regrasp_manipulation::grasp::sequence::{Motion, Sequence, Step};
 use regrasp_manipulation::grasp::state::GraspState;
+
+/// Shortcuts in a row that did not help, after which a plan of the methods of Saut 2011 counts as smooth; twice as many as it
+/// has motions where that is more.
+const IN_VAIN: usize = 40;
 
 /// What motions cost: relocations first, then transfers.
 fn cost(steps: &[Step]) -> (usize, usize) {
@@ -13,16 +18,31 @@ fn cost(steps: &[Step]) -> (usize, usize) {
     (steps.len() - n_transfers, n_transfers)
 }
 
-/// Tries `settings.shortcuts` random shortcuts on `way`. `at_end` is what is asked of its end.
+/// Tries random shortcuts on `way`: as many as the settings say, with the methods of Saut 2011 until many in a row did not help.
+/// `at_end` is what is asked of its end.
 ///
 /// A plan that is already there is never given up: the caller's limits only end the shortening.
 pub fn shorten(search: &mut Search, way: &mut Sequence, at_end: Arrival) {
+    let patience = search.patience.take();
+    shorten_in_haste(search, way, at_end);
+    search.patience = patience;
+}
+
+/// The same; the ways of fingers are not looked for long.
+fn shorten_in_haste(search: &mut Search, way: &mut Sequence, at_end: Arrival) {
     let end_is_free = at_end == Arrival::AnyPosture;
-    for _ in 0..search.settings.search.shortcuts {
+    let is_baseline = search.settings.method != Method::Gait;
+    let (mut n_tried, mut in_vain) = (0, 0);
+    loop {
         let n_steps = way.steps().len();
-        if n_steps < 2 {
+        let is_enough = match is_baseline {
+            true => in_vain >= IN_VAIN.max(2 * n_steps),
+            false => n_tried >= search.settings.search.shortcuts,
+        };
+        if n_steps < 2 || is_enough {
             return;
         }
+        (n_tried, in_vain) = (n_tried + 1, in_vain + 1);
         if let Err(Stop::Budget(interrupt)) = search.check() {
             search.cut_by_time |= interrupt != Interrupt::WorkSpent;
             return;
@@ -41,6 +61,7 @@ pub fn shorten(search: &mut Search, way: &mut Sequence, at_end: Arrival) {
         {
             let fits = way.replace(first..=last, detour);
             debug_assert!(fits, "a direct way from and to the same states");
+            in_vain = 0;
         }
     }
 }

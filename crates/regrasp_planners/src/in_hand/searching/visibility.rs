@@ -15,7 +15,7 @@ use crate::in_hand::attempt::tally::Reason;
 use crate::in_hand::grasps::sample::draw_state_at;
 use crate::in_hand::searching::visibility::connect::{TriedPairs, connect_components};
 use crate::in_hand::searching::visibility::decompose::decompose;
-use crate::in_hand::searching::visibility::explore::{explore, roadmap_of};
+use crate::in_hand::searching::visibility::explore::{Spares, explore, roadmap_of};
 use crate::in_hand::searching::visibility::link::{Link, LocalMethod, Roadmap};
 use regrasp_geometry::Pose;
 use regrasp_manipulation::grasp::sequence::Sequence;
@@ -34,15 +34,15 @@ pub fn build(
 ) -> Result<Sequence, Stop> {
     let (start, goal) = ends(search, start, goal_grasp)?;
     let mut roadmap = roadmap_of(search, &start, &goal, LocalMethod::GraspPath)?;
-    let mut tried = TriedPairs::new();
+    let (mut tried, mut spares) = (TriedPairs::new(), Spares::default());
     let mut n_merges = 0;
     loop {
         while !roadmap.components().same(START, GOAL) {
             if search.rng.unit() < search.settings.baselines.alpha.value(n_merges, roadmap.nodes().len()) {
-                explore(search, &mut roadmap, LocalMethod::GraspPath)?;
+                explore(search, &mut roadmap, LocalMethod::GraspPath, &mut spares)?;
             } else {
                 n_merges += 1;
-                connect_components(search, &mut roadmap, &mut tried)?;
+                connect_components(search, &mut roadmap, &mut tried, &mut spares)?;
             }
             note_nearest(search, &roadmap);
         }

@@ -1,0 +1,90 @@
+//! Roadmaps of robots with two arms.
+
+use crate::places::repository;
+use regrasp_arms::model::cover::covers;
+use regrasp_arms::motion::{ColliderSettings, Track};
+use regrasp_arms::roadmap::{BuildSettings, QuerySettings, SuperGraph, build, query};
+use regrasp_arms::world::{Obstacle, World};
+use regrasp_arms::{ArmModel, Collider};
+use regrasp_base::Budget;
+use regrasp_geometry::shape::PlacedShape;
+use regrasp_geometry::{Pose, Shape, Vector};
+use regrasp_robot::manipulator::layout::Part;
+use regrasp_robot::{LoadOptions, load_manipulator};
+use std::path::Path;
+
+fn model() -> ArmModel {
+    let path = repository().join("assets/robots/upper_body/robot.toml");
+    let robot = load_manipulator(&path, &LoadOptions::default()).unwrap().manipulator;
+    let coordinates = &robot.layout.coordinates;
+    let free: Vec<usize> = (0..coordinates.len()).filter(|&k| !matches!(coordinates[k].part, Part::Hand(_))).collect();
+    ArmModel::new(&robot, &covers(&robot.robot), &[], &robot.layout.rest(), &free)
+}
+
+fn obstacle(name: &str, size: [f64; 3], position: [f64; 3]) -> Obstacle {
+    let shape = Shape::Cuboid { half_extents: Vector::from(size) * 0.5 };
+    let parent_from_shape = Pose::translation(position[0], position[1], position[2]);
+    Obstacle { name: name.into(), placed: PlacedShape { parent_from_shape, shape } }
+}
+
+fn table() -> Vec<Obstacle> {
+    vec![obstacle("table", [0.7, 1.6, 0.04], [0.85, 0.0, 0.4]), obstacle("vase", [0.1, 0.1, 0.3], [0.7, 0.35, 0.57])]
+}
+
+fn small() -> BuildSettings {
+    BuildSettings { nodes_per_arm: 8, ..BuildSettings::default() }
+}
+
+#[test]
+fn nodes_and_edges_of_a_super_graph_are_free_where_everything_is_tested() {
+    let (model, world) = (model(), World::new(table()));
+    let parts = model.parts();
+    assert_eq!((parts.common.len(), parts.arms.len()), (3, 2), "{parts:?}");
+    let graph = build(&model, &world, &small(), 1).unwrap();
+    assert!(graph.graph.nodes.len() > 20 && graph.graph.edges.len() > 20, "{}", graph.graph.nodes.len());
+    let settings = ColliderSettings { clearance: graph.clearance, ..ColliderSettings::default() };
+    let mut all = Collider::new(&model, &world, settings);
+    for node in &graph.graph.nodes {
+        assert!(all.contact(node).is_none() && model.is_within_limits(node, 0.0));
+    }
+    for &[a, b] in &graph.graph.edges {
+        let track = Track::straight(&graph.graph.nodes[a as usize], &graph.graph.nodes[b as usize]);
+        // What is not decided may differ by the intervals that are looked at: shapes decide then.
+        let is_free =
+            all.is_certified_free(&track) || (0..=50).all(|i| all.contact(&track.at(f64::from(i) / 50.0)).is_none());
+        assert!(is_free, "{a} {b}");
+    }
+    assert_eq!(build(&model, &world, &small(), 1).unwrap(), graph);
+    let again = SuperGraph::from_json(Path::new("graph"), &graph.to_json()).unwrap();
+    assert_eq!(again, graph);
+}
+
+#[test]
+fn queries_go_around_what_the_graph_does_not_know_and_enrich_it() {
+    let (model, known) = (model(), World::new(table()));
+    let mut graph = build(&model, &known, &small(), 2).unwrap();
+    let ends = [graph.graph.nodes[0].clone(), graph.graph.nodes[graph.graph.nodes.len() / 2].clone()];
+    let settings = ColliderSettings { clearance: graph.clearance, ..ColliderSettings::default() };
+    let free_of = |obstacle: &Obstacle| {
+        let world = World::new(vec![obstacle.clone()]);
+        let mut collider = Collider::new(&model, &world, settings);
+        ends.iter().all(|end| collider.contact(end).is_none())
+    };
+    let candidates = [[0.5, 0.0, 1.0], [0.6, -0.3, 0.9], [0.5, 0.3, 1.2], [0.9, 0.0, 0.8]];
+    let new = candidates.into_iter().map(|at| obstacle("lamp", [0.08, 0.08, 0.5], at)).find(free_of).unwrap();
+    let whole = World::new(table().into_iter().chain([new.clone()]).collect());
+    let unknown = World::new(vec![new]);
+    let n_before = graph.graph.nodes.len();
+    let ask = |graph: &mut SuperGraph| {
+        let ends = [ends[0].as_slice(), ends[1].as_slice()];
+        query(graph, &model, [&whole, &unknown], ends, &QuerySettings::default(), (3, &Budget::work(100_000)))
+    };
+    let first = ask(&mut graph);
+    let path = first.path.clone().expect("a path");
+    let mut all = Collider::new(&model, &whole, settings);
+    for pair in path.windows(2) {
+        let track = Track::straight(&pair[0], &pair[1]);
+        assert!((0..=40).all(|i| all.contact(&track.at(f64::from(i) / 40.0)).is_none()));
+    }
+    assert_eq!(graph.graph.nodes.len() as u64, n_before as u64 + first.n_added);
+}

@@ -1,0 +1,86 @@
+//! Robots with arms: their parts guessed, links that always or never touch, and robot files for them.
+
+/// Arms, hands and common joints.
+mod guess;
+/// Robot files.
+mod text;
+/// Links that touch.
+mod touch;
+
+use super::guess::guess_hand;
+use super::{InspectSettings, PairTable};
+use crate::hand::Hand;
+use crate::import::assemble::assemble;
+use crate::import::srdf::LoadedSrdf;
+use crate::import::{LoadOptions, srdf::load_srdf};
+use crate::robot::Robot;
+pub use guess::{ArmGuess, HandGuess, RobotGuess, guess_robot};
+use regrasp_base::{Diagnostic, InputError, Place, Rng};
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::sync::Arc;
+pub use text::{FileNames, robot_file_text};
+
+/// A hand of a robot, and whether a hand file can be written for it.
+#[derive(Debug, Clone)]
+pub struct FoundHand {
+    /// Where it is.
+    pub guess: HandGuess,
+    /// The hand, or why it is none.
+    pub hand: Result<Hand, InputError>,
+}
+
+/// A robot with at least one arm.
+#[derive(Debug, Clone)]
+pub struct WholeRobot {
+    /// The robot.
+    pub robot: Arc<Robot>,
+    /// Its parts.
+    pub guess: RobotGuess,
+    /// Its hands, in the order of [`RobotGuess::hands`].
+    pub hands: Vec<FoundHand>,
+    /// Which links touch, besides neighbours and the pairs of the SRDF.
+    pub pairs: PairTable,
+    /// The SRDF.
+    pub srdf: Option<LoadedSrdf>,
+}
+
+/// The parts of `robot`, which was read from `file`. None for a robot without an arm.
+///
+/// Errors: an SRDF that cannot be read, limits of joints that leave no posture (`U143`).
+pub fn inspect_whole(
+    robot: Arc<Robot>,
+    (file, srdf): (&Path, Option<&Path>),
+    options: &LoadOptions,
+    settings: &InspectSettings,
+    rng: &mut Rng,
+) -> Result<Option<WholeRobot>, InputError> {
+    let srdf = srdf.map(|path| load_srdf(path, &robot, options)).transpose()?;
+    let guess = guess_robot(&robot, srdf.as_ref().map(|loaded| &loaded.srdf));
+    if guess.arms.is_empty() {
+        return Ok(None);
+    }
+    let make = |guess: &HandGuess| {
+        let base = Some(robot.links[guess.base.0].name.clone());
+        let spec = guess_hand(&robot, &LoadOptions { base, ..options.clone() }, file)?;
+        // What the arm's mount link carries rigidly is the arm's.
+        let spec = crate::import::spec::HandSpec { mount: Some(mount_of(&robot, guess)), ..spec };
+        let (mut hand, _) = assemble(&robot, &spec, file)?;
+        super::rest::bend_towards_palm(&mut hand);
+        Ok(hand)
+    };
+    let hands = guess.hands.iter().map(|guess| FoundHand { guess: guess.clone(), hand: make(guess) }).collect();
+    let allowed: BTreeSet<_> =
+        srdf.iter().flat_map(|loaded| loaded.srdf.disabled_pairs.iter().map(|pair| pair.links)).collect();
+    let pairs = touch::count(&robot, &allowed, settings.n_postures, rng).map_err(|no_posture| {
+        Diagnostic::new("U143", Place::file(file), "the limits of joints that follow others leave no posture")
+            .element("joint", &no_posture.joint)
+            .expected("limits that overlap")
+    })?;
+    Ok(Some(WholeRobot { robot, guess, hands, pairs, srdf }))
+}
+
+/// The link above the palm, which the hand does not own.
+fn mount_of(robot: &Robot, hand: &HandGuess) -> crate::robot::LinkId {
+    robot.links[hand.base.0].parent_joint.map_or(robot.root, |joint| robot.joints[joint.0].parent)
+}
