@@ -221,7 +221,19 @@ fn exporters_and_viewer_ship_without_planners() {
 /// The checker shares nothing but its results: only plans that are broken for its tests look at how it works.
 #[test]
 fn nobody_looks_inside_the_checker() {
-    let inside = ["kinematics", "bodies", "between", "motion", "contact", "tip", "model", "surface", "rolling", "slip", "robots"];
+    let inside = [
+        "kinematics",
+        "bodies",
+        "between",
+        "motion",
+        "contact",
+        "tip",
+        "model",
+        "surface",
+        "rolling",
+        "slip",
+        "robots",
+    ];
     for floor in TOWER.iter().filter(|floor| !["regrasp_plan", "regrasp_mutations"].contains(&floor.name)) {
         for file in sources(&root().join("crates").join(floor.name).join("src")) {
             let text = std::fs::read_to_string(&file).expect("a source file is readable");

@@ -224,7 +224,7 @@ fn floor_of(first: &Item, second: &Item, question: &Question, floors: Floors) ->
             let (is_tip, near) = (first.is_tip || second.is_tip, question.tree.body(first.body.max(second.body)));
             let is_near =
                 first.body == second.body || near.is_some_and(|body| body.parent == first.body.min(second.body));
-            (!question.robot.may_touch(p, q) && !(is_tip && is_near)).then_some(floors.apart)
+            (!(question.robot.may_touch(p, q) || is_tip && is_near)).then_some(floors.apart)
         }
         (Owner::Link(link), Owner::Carried(index)) | (Owner::Carried(index), Owner::Link(link)) => {
             Some(held(&question.carried[index], link))
