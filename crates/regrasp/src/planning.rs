@@ -17,11 +17,11 @@ pub fn plan_any(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<AnyPlan, Failure> {
     match query {
-        Query::Motion(query) => {
-            regrasp_arms::plan_motion((scene, state), query, &settings.motion, seed, budget).map(AnyPlan::Robot)
-        }
+        Query::Motion(query) => regrasp_arms::plan_motion((scene, state), query, &settings.motion, seed, budget)
+            .map(|plan| AnyPlan::Robot(Box::new(plan))),
         Query::InHand(_) | Query::Tracking(_) => {
-            regrasp_planners::plan((scene, state), query, settings, seed, budget, progress).map(AnyPlan::InHand)
+            regrasp_planners::plan((scene, state), query, settings, seed, budget, progress)
+                .map(|plan| AnyPlan::InHand(Box::new(plan)))
         }
     }
 }

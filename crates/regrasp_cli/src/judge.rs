@@ -55,7 +55,7 @@ pub fn judge_robot(loaded: &LoadedScene, plan: &RobotPlan, judging: &Judging, ta
     let started = Instant::now();
     let query = loaded.task_for(&plan.query).query(plan.seed);
     let settings = judging.settings();
-    let plan = AnyPlan::Robot(plan.clone());
+    let plan = AnyPlan::Robot(Box::new(plan.clone()));
     let report = check_any((&loaded.scene, &loaded.state), Some(&query), &plan, &settings);
     let seconds = started.elapsed().as_secs_f64();
     talk.event("check", json!({ "accepted": report.accepted(), "seconds": seconds, "report": report }));

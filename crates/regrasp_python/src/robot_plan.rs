@@ -82,7 +82,7 @@ impl RobotPlan {
                 let loaded = &scene.loaded;
                 let query = loaded.task_for(&self.plan.query).query(self.plan.seed);
                 let settings = CheckSettings { level, ..CheckSettings::default() };
-                let plan = AnyPlan::Robot(self.plan.clone());
+                let plan = AnyPlan::Robot(Box::new(self.plan.clone()));
                 check_any((&loaded.scene, &loaded.state), Some(&query), &plan, &settings)
             });
             Ok(report(&judged))

@@ -87,7 +87,7 @@ pub fn plan_motion(py: Python<'_>, scene: &Scene, request: Request) -> PyResult<
             regrasp::plan_any(around, &query, &settings, request.seed, &budget, report)
         })?;
         let plan = match found {
-            Ok(AnyPlan::Robot(plan)) => plan,
+            Ok(AnyPlan::Robot(plan)) => *plan,
             Ok(AnyPlan::InHand(_)) => {
                 let problem = bad("A507", "asks a hand to move an object".into()).element("argument", "task");
                 return Err(error::input(py, &problem.expected("a task of kind \"motion\"").into()));

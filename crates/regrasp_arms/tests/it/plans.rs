@@ -77,8 +77,7 @@ fn a_start_in_collision_is_refused_with_the_pair_and_a_free_posture() {
     let query = query(&loaded);
     let failure =
         plan_motion((&loaded.scene, &loaded.state), &query, &MotionSettings::default(), 0, &Budget::work(100_000))
-            .err()
-            .expect("no plan");
+            .expect_err("no plan");
     assert_eq!(failure.kind, FailureKind::StartInvalid, "{failure}");
     assert!(failure.message.contains("\"lamp\"") && failure.message.contains("mm"), "{}", failure.message);
     assert!(failure.advice.contains("nearest free posture"), "{}", failure.advice);

@@ -85,7 +85,6 @@ fn every_mutant_of_a_robots_plan_is_rejected() {
     let (_folder, upright) = upright();
     add(judge(&upright, &good_plans(&upright, &motion(&upright, ""), 8, 0.49), rounds));
     for (name, count) in &counts {
-        eprintln!("{count:>6} {name}");
         assert!(*count >= n_each, "{name} was only made {count} times");
     }
     assert_eq!(counts.len(), 41, "{counts:#?}");

@@ -20,9 +20,9 @@ const MOST_CLEARANCE: f64 = 10.0;
 #[derive(Debug, Clone, PartialEq)]
 pub enum AnyPlan {
     /// One hand moves one object with its fingers.
-    InHand(Plan),
+    InHand(Box<Plan>),
     /// Whole robots move.
-    Robot(RobotPlan),
+    Robot(Box<RobotPlan>),
 }
 
 impl AnyPlan {
@@ -76,9 +76,9 @@ pub fn is_robot_plan(bytes: &[u8]) -> bool {
 /// Errors: as [`from_json`] and [`robot_from_json`].
 pub fn read_any(path: &Path, bytes: &[u8]) -> Result<AnyPlan, InputError> {
     if bytes.len() as u64 <= caps::BYTES && is_robot_plan(bytes) {
-        return robot_from_json(path, bytes).map(AnyPlan::Robot);
+        return robot_from_json(path, bytes).map(|plan| AnyPlan::Robot(Box::new(plan)));
     }
-    from_json(path, bytes).map(AnyPlan::InHand)
+    from_json(path, bytes).map(|plan| AnyPlan::InHand(Box::new(plan)))
 }
 
 /// `plan` as the bytes of a plan file: the same plan gives the same bytes; numbers are the shortest that read back the same; every
