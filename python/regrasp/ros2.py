@@ -11,7 +11,7 @@
 | out | ``joint_commands`` | ``std_msgs/Float64MultiArray``, torques, for effort drives |
 | out | ``run_events`` | ``std_msgs/String``: events and results, as JSON |
 
-Goals come as a topic and not as an action: actions need types that are built with a workspace. ``docs/how-to/robot.md`` says what drivers
+Goals come as a topic and not as an action: actions need types that are built with a workspace. ``docs/how-to/execute.md`` says what drivers
 of Allegro and LEAP hands need. Everything but `main` works without ROS 2: it is tested against messages and a clock that look alike.
 """
 

@@ -117,8 +117,15 @@ const TOWER: &[Floor] = &[
     ),
     Floor {
         name: "regrasp_bench",
-        ships_with: &["regrasp_base", "regrasp_scene", "regrasp_plan", "regrasp_mutations", "regrasp_planners"],
-        tests_with: &["regrasp_geometry", "regrasp_robot"],
+        ships_with: &[
+            "regrasp_base",
+            "regrasp_geometry",
+            "regrasp_scene",
+            "regrasp_plan",
+            "regrasp_mutations",
+            "regrasp_planners",
+        ],
+        tests_with: &["regrasp_robot"],
     },
     floor("regrasp_cli", &["regrasp", "regrasp_bench"]),
     floor("regrasp_python", &["regrasp"]),

@@ -25,6 +25,8 @@ mod robot_plan;
 mod search;
 /// Sessions.
 mod session;
+/// What judging is asked and what it says.
+mod verdict;
 /// Pages of plans.
 mod view;
 /// Searches that the interpreter watches.

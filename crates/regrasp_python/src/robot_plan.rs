@@ -3,7 +3,7 @@
 use crate::error;
 use crate::guard::guarded;
 use crate::model::Scene;
-use crate::search::{level_named, report};
+use crate::verdict::{level_named, report};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use regrasp::AnyPlan;

@@ -5,9 +5,10 @@ use crate::guard::guarded;
 use crate::model::Scene;
 use crate::plan::Plan;
 use crate::robot_plan::RobotPlan;
+use crate::verdict::{bad, level_named, report};
 use crate::watch::watched;
 use pyo3::prelude::*;
-use regrasp::base::{Diagnostic, Place};
+use regrasp::base::Diagnostic;
 use regrasp::plan::check::{CheckSettings, Level, OwnQuery, Report, check_robot, query_of};
 use regrasp::plan::format;
 use regrasp::scene::Task;
@@ -152,20 +153,6 @@ fn judged_as_written(
     Ok((plan, report))
 }
 
-/// The level of this name. Errors: there is none (`A503`).
-pub fn level_named(name: &str) -> Result<Level, Diagnostic> {
-    Level::named(name).ok_or_else(|| {
-        bad("A503", format!("is \"{name}\""))
-            .element("argument", "level")
-            .expected("\"geometry\", \"forces\" or \"motion\"")
-    })
-}
-
-/// An error of an argument of `regrasp.plan`.
-fn bad(code: &'static str, problem: String) -> Diagnostic {
-    Diagnostic::new(code, Place::file("regrasp.plan"), problem)
-}
-
 /// Settings for a task of this kind: defaults, then the JSON, then what has an argument of its own.
 fn settings(task: &Task, request: &Request) -> Result<PlannerSettings, Diagnostic> {
     let asked = Overrides {
@@ -223,13 +210,4 @@ fn rejected_text(statistics: serde_json::Value, text: String, report: &Report) -
         "rejected_plan": text,
     })
     .to_string()
-}
-
-/// What the checker said, as JSON.
-pub fn report(report: &Report) -> String {
-    let mut value = json!(report);
-    for (entry, violation) in value["violations"].as_array_mut().into_iter().flatten().zip(&report.violations) {
-        entry["text"] = violation.to_string().into();
-    }
-    value.to_string()
 }

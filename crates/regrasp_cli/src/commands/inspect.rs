@@ -44,7 +44,9 @@ pub fn run(arguments: &args::Inspect, common: &Common, talk: &Talk) -> Result<()
         talk.note(note);
     }
     let may_be_robot = !is_hand_file && arguments.base.is_none();
-    if may_be_robot && (found.hand.is_err() || arguments.robot || arguments.srdf.is_some()) {
+    // One finger alone makes no hand: what was taken for it is an arm.
+    let is_no_hand = found.hand.as_ref().map_or(true, |(hand, _)| hand.fingers.len() == 1);
+    if may_be_robot && (is_no_hand || arguments.robot || arguments.srdf.is_some()) {
         let files = (arguments.urdf.as_path(), arguments.srdf.as_deref());
         let whole = inspect_whole(found.tree.clone(), files, &options, &settings, &mut rng)?;
         match whole {

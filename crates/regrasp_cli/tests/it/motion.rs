@@ -45,7 +45,7 @@ fn a_motion_goes_through_every_command() {
         assert_eq!(checked.err.contains("taken for granted"), task == "carry", "{checked:?}");
         let [page, png, charts] = [".html", ".png", ".charts"].map(name);
         fs::create_dir_all(folder.path(&charts)).unwrap();
-        succeeds(folder.run(&["view", &plan, SCENE, "-o", &page, "--frames", "2", "--width", "240"]));
+        succeeds(folder.run(&["view", &plan, SCENE, "-o", &page]));
         succeeds(folder.run(&["view", &plan, SCENE, "--png", &png, "--frames", "2", "--width", "240"]));
         succeeds(folder.run(&["view", &plan, SCENE, "--svg", &charts]));
         assert!(fs::read(folder.path(&png)).unwrap().starts_with(b"\x89PNG"));

@@ -89,7 +89,7 @@ fn bad_robot_files_are_refused() {
         ),
         (
             format!("{MODEL}{ONE_ARM}{ONE_HAND}{}", ONE_HAND.replace("\"hand\"", "\"other\"")),
-            "U226 robot.toml:16:7 key \"hands[1].arm\": link \"flange\" carries hand \"hand\" already; expected one hand on a link",
+            "U226 robot.toml:16:7 key \"hands[1].arm\": link \"flange\" carries hand \"hand\" already; expected one hand on an arm",
         ),
         (
             format!("{MODEL}name = \"m\"\n{ONE_ARM}{ONE_HAND}model = \"m\"\n"),

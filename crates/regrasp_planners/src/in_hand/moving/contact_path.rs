@@ -9,6 +9,10 @@ use regrasp_geometry::{Point, Surface, UnitVector, Vector};
 
 /// Pieces of a projected great circle whose lengths are measured.
 const PIECES: usize = 24;
+/// A chord may be this much shorter than its halves, relatively.
+const CUT: f64 = 1e-3;
+/// How often a piece is halved, at most.
+const HALVINGS: u32 = 5;
 /// How far the ray through a contact may leave the object from it, in metres: elsewhere the object is not star-shaped.
 const SAME_POINT: f64 = 1e-6;
 /// Directions nearer to opposite than this, in radians, have no shortest way between them.
@@ -78,13 +82,30 @@ impl Central {
         for piece in 0..=PIECES {
             let point = central.towards(surface, piece as f64 / PIECES as f64)?.point_in_object;
             if let Some(before) = before {
-                central.lengths[piece] = central.lengths[piece - 1] + (point - before).norm();
+                let shares = [piece - 1, piece].map(|k| k as f64 / PIECES as f64);
+                let length = central.length_of(surface, shares, [&before, &point], HALVINGS)?;
+                central.lengths[piece] = central.lengths[piece - 1] + length;
             } else if (point - a).norm() > SAME_POINT {
                 return None;
             }
             before = Some(point);
         }
         before.is_some_and(|last| (last - b).norm() <= SAME_POINT).then_some(central)
+    }
+
+    /// Length of the projection between two shares of the angle, where it is at `ends`. A chord cuts corners short: a piece is halved
+    /// until its halves are no longer than the chord, or `halvings` times.
+    fn length_of(&self, surface: &Surface, shares: [f64; 2], ends: [&Point; 2], halvings: u32) -> Option<f64> {
+        let chord = (ends[1] - ends[0]).norm();
+        let share = 0.5 * (shares[0] + shares[1]);
+        let middle = self.towards(surface, share)?.point_in_object;
+        let halves = (middle - ends[0]).norm() + (ends[1] - middle).norm();
+        if halvings == 0 || halves <= chord * (1.0 + CUT) {
+            return Some(halves);
+        }
+        let first = self.length_of(surface, [shares[0], share], [ends[0], &middle], halvings - 1)?;
+        let second = self.length_of(surface, [share, shares[1]], [&middle, ends[1]], halvings - 1)?;
+        Some(first + second)
     }
 
     /// The point seen after a share `share` of the angle.

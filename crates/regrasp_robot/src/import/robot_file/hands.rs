@@ -23,6 +23,8 @@ pub(super) struct Mount {
     top: LinkId,
     spec: HandSpec,
     file: PathBuf,
+    /// Where the hand stands on its mount link, as the file says.
+    place: Pose,
 }
 
 /// Where a hand's links come from.
@@ -37,7 +39,7 @@ enum Source {
 ///
 /// Errors: names used twice (`U211`), unknown arms and models (`U224`), a hand file about another URDF than the model (`U225`), a
 /// hand that its mount link does not carry (`U206`), couplings that differ (`U219`), two hands on one
-/// mount link (`U226`).
+/// arm, or at one place of a link (`U226`).
 pub(super) fn read(entry: &Entry, draft: &mut Draft, arms: &[ArmSpec], found: &mut Found) -> Option<Vec<Mount>> {
     let items = entry.entries(found, "[[hands]] tables")?;
     let mut mounts: Vec<Mount> = Vec::new();
@@ -93,13 +95,24 @@ fn read_hand(
         }
     };
     let is_named = mount_entry.is_some() || arm.is_some();
-    if let Some(other) = others.iter().find(|other| is_named && other.spec.mount == Some(mount)) {
+    let pose = pose?;
+    let stands = pose.unwrap_or_default();
+    // A bar of the common part may carry several hands, side by side.
+    let is_in_the_way =
+        |other: &&Mount| is_named && other.spec.mount == Some(mount) && (arm.is_some() || other.place == stands);
+    if let Some(other) = others.iter().find(is_in_the_way) {
         let link = &draft.tree.links[mount.0].name;
         let problem = format!("link \"{link}\" carries hand \"{}\" already", other.name);
-        refuse(mount_entry.as_ref().or(arm_entry.as_ref())?, "U226", problem, "one hand on a link", found);
+        refuse(
+            mount_entry.as_ref().or(arm_entry.as_ref())?,
+            "U226",
+            problem,
+            "one hand on an arm, or another place on the link",
+            found,
+        );
         return None;
     }
-    let source = match (model, pose?) {
+    let source = match (model, pose) {
         (Some(model), None) => Source::Model(model),
         (None, pose) => Source::OwnModel(pose.unwrap_or_default()),
         (Some(_), Some(_)) => {
@@ -133,7 +146,7 @@ fn read_hand(
     };
     let spec = in_tree(&parts.spec, &place, mount);
     let top = top_of(&draft.tree, spec.base, Some(mount));
-    Some(Mount { name, arm, top, spec, file })
+    Some(Mount { name, arm, top, spec, file, place: stands })
 }
 
 /// The index of the one of `names` that `entry` gives. Errors: none of them (`U224`).
