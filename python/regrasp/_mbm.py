@@ -143,7 +143,8 @@ def _read(path: Path) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         raise _error(path, "", f"is not UTF-8 at byte {error.start}", "a YAML file") from error
     try:
-        for event in yaml.parse(text, Loader=yaml.SafeLoader):
+        events: Any = yaml.parse(text, Loader=yaml.SafeLoader)
+        for event in events:
             if isinstance(event, yaml.AliasEvent):
                 raise _error(path, "", f"has an alias in line {event.start_mark.line + 1}", "a file without aliases")
         content = yaml.safe_load(text)
@@ -164,15 +165,16 @@ def _table(path: Path, content: Mapping[str, Any], *keys: str) -> Mapping[str, A
     """The table at nested keys, empty where it is missing."""
     place: Any = content
     for key in keys:
-        place = place.get(key) or {}
-        if not isinstance(place, Mapping):
-            raise _error(path, ".".join(keys), f"is {place!r}", "a table")
+        inside: Any = cast("Mapping[str, Any]", place).get(key) or {}
+        if not isinstance(inside, Mapping):
+            raise _error(path, ".".join(keys), f"is {inside!r}", "a table")
+        place = cast("Any", inside)
     return cast("Mapping[str, Any]", place)
 
 
 def _list(path: Path, content: Mapping[str, Any], *keys: str) -> list[Any]:
     *parents, last = keys
-    value = _table(path, content, *parents).get(last) or []
+    value: Any = _table(path, content, *parents).get(last) or []
     if not isinstance(value, list):
         raise _error(path, ".".join(keys), f"is {value!r}", "a list")
     return cast("list[Any]", value)

@@ -155,7 +155,7 @@ def test_what_is_left_out_is_named(gecko: Conversion, tmp_path: Path, capsys: py
         "cameras": ("eye",),
         "sensors": ("east_touch",),
     }
-    assert 'allow = [\n    ["east_distal", "west_distal"],\n]' in (gecko.hand_file or Path()).read_text()
+    assert '    ["east_distal", "west_distal"],\n]' in (gecko.hand_file or Path()).read_text()
     assert main([str(GECKO), "-o", str(tmp_path / "new")]) == 0
     out = capsys.readouterr().out
     assert "left out: sites: east_touch, north_touch, west_touch, south_touch\n" in out

@@ -49,7 +49,7 @@ def test_the_dictionary_of_dexgraspbench_squeezes_beyond_the_grasp(grasps: regra
 
 def test_no_grasp_says_why() -> None:
     with pytest.raises(regrasp.NoGrasps) as caught:
-        regrasp.list_grasps(HANDS / "parallel_gripper" / "hand.toml", BOX, settings={"kind": "closing", "frames": 10})
+        regrasp.list_grasps(HANDS / "parallel_gripper" / "hand.toml", BOX, settings={"kind": "closing", "frames": 10, "margin": 0.9})
     assert caught.value.why
 
 

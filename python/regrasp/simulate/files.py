@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from .._arguments import StrPath
 from .plans import flat
@@ -27,16 +27,19 @@ def load_robot(
         content: Any = json.loads(Path(path).read_text(encoding="utf-8"))
     except ValueError as error:
         raise PlanError(f"{path}: not JSON ({error})") from None
-    if not (isinstance(content, dict) and content.get("task") == "motion"):
+    if not isinstance(content, dict):
+        return None
+    plan_file = cast("dict[str, Any]", content)
+    if plan_file.get("task") != "motion":
         return None
     if mjcf is not None:
-        return content, Path(mjcf).read_text(encoding="utf-8")
+        return plan_file, Path(mjcf).read_text(encoding="utf-8")
     import regrasp
 
     try:
         plan = regrasp.RobotPlan.from_file(path)
         found = scene if scene is None else regrasp.load_scene(scene, packages=packages)
-        return content, plan.to_mjcf(found)
+        return plan_file, plan.to_mjcf(found)
     except regrasp.RegraspError as error:
         raise PlanError(str(error)) from None
 
