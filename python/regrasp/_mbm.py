@@ -143,7 +143,7 @@ def _read(path: Path) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         raise _error(path, "", f"is not UTF-8 at byte {error.start}", "a YAML file") from error
     try:
-        events: Any = yaml.parse(text, Loader=yaml.SafeLoader)
+        events = cast("Any", yaml.parse(text, Loader=yaml.SafeLoader))
         for event in events:
             if isinstance(event, yaml.AliasEvent):
                 raise _error(path, "", f"has an alias in line {event.start_mark.line + 1}", "a file without aliases")

@@ -93,7 +93,7 @@ def replay(plan: Mapping[str, Any], xml: str, *, speed: float = 1.0) -> RobotRep
     points = [waypoint for segment in plan["segments"] for waypoint in segment["waypoints"]]
     start, duration = points[0]["time"], (points[-1]["time"] - points[0]["time"]) / speed
     n = math.ceil((duration + HOLD_TIME) / model.opt.timestep)
-    times: Any = start + speed * model.opt.timestep * np.arange(1, n + 1)
+    times = np.asarray(start + speed * float(model.opt.timestep) * np.arange(1, n + 1), dtype=np.float64)
     wanted = at(plan, times)
     largest, touched = 0.0, dict[str, None]()
     for tick in range(n):

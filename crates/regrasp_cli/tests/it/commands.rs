@@ -35,8 +35,7 @@ fn help_and_version_say_what_they_should() {
 #[test]
 fn the_readme_names_only_commands_that_exist() {
     let readme = std::fs::read_to_string(repository().join("README.md")).unwrap();
-    let known =
-        ["demo", "inspect", "place", "plan", "grasps", "check", "view", "export", "bench", "growth", "roadmap"];
+    let known = ["demo", "inspect", "place", "plan", "grasps", "check", "view", "export", "bench", "growth", "roadmap"];
     for line in readme.lines().filter_map(|line| line.trim().strip_prefix("regrasp ")) {
         let command = line.split(' ').next().unwrap_or_default();
         assert!(known.contains(&command), "README.md: regrasp {line}");
