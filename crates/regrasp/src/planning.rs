@@ -19,6 +19,7 @@ pub fn plan_any(
     match query {
         Query::Motion(query) => regrasp_arms::plan_motion((scene, state), query, &settings.motion, seed, budget)
             .map(|plan| AnyPlan::Robot(Box::new(plan))),
+        Query::PickAndPlace(_) => todo!("the planner of pick and place"),
         Query::InHand(_) | Query::Tracking(_) => {
             regrasp_planners::plan((scene, state), query, settings, seed, budget, progress)
                 .map(|plan| AnyPlan::InHand(Box::new(plan)))

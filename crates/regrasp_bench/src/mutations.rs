@@ -83,7 +83,7 @@ impl Campaign {
 
     /// As [`Campaign::add`], of a plan of a whole robot for the first task of `loaded`.
     pub fn add_robot(&mut self, loaded: &LoadedScene, plan: &RobotPlan, seed: u64, per_kind: u64) {
-        let Some(query) = &loaded.task().motion else { return };
+        let Some(query) = loaded.task().motion() else { return };
         let settings = CheckSettings::default();
         let around = (&loaded.scene, &loaded.state);
         let misjudged = |what: String| Misjudged { scene: loaded.scene.name.clone(), seed, what };

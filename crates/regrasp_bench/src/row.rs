@@ -173,7 +173,7 @@ pub(crate) fn plan_only(problem: Problem, settings: &RunSettings) -> (Row, Optio
         method: match problem.query {
             Query::InHand(_) => method_name(&settings.planner),
             Query::Tracking(_) => settings.tracking.method.name().into(),
-            Query::Motion(_) => "motion".into(),
+            Query::Motion(_) | Query::PickAndPlace(_) => problem.query.task().into(),
         },
         seed: problem.seed,
         ..Row::default()

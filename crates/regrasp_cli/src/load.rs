@@ -34,18 +34,18 @@ pub fn options(common: &Common) -> LoadOptions {
     }
 }
 
-/// Reads a scene and says what was read. Errors: its task is of kind `motion` (`A507`).
+/// Reads a scene and says what was read. Errors: its task is one of a whole robot (`A507`).
 pub fn scene(path: &Path, common: &Common, talk: &Talk) -> Result<LoadedScene, Stop> {
     refuse_motion(scene_by(path, common, None, talk)?, path)
 }
 
-/// A scene for what deals with one hand and one object. Errors: its task is of kind `motion` (`A507`).
+/// A scene for what deals with one hand and one object. Errors: its task is one of a whole robot (`A507`).
 fn refuse_motion(loaded: LoadedScene, path: &Path) -> Result<LoadedScene, Stop> {
-    match loaded.task().motion {
+    match loaded.task().of_robot {
         None => Ok(loaded),
         Some(_) => {
-            let problem = format!("{} asks for a motion of a whole robot", path.display());
-            let fix = "name another scene or --task; regrasp plan, check, view and export take motions";
+            let problem = format!("{} asks a whole robot to move", path.display());
+            let fix = "name another scene or --task; regrasp plan, check, view and export take tasks of robots";
             Err(Stop::argument("A507", "SCENE", problem, fix))
         }
     }
@@ -59,11 +59,11 @@ pub fn motion_scene(path: &Path, query: &str, common: &Common) -> Result<LoadedS
         Some(name) => choose(loaded, name, path)?,
         None => loaded.for_query(query),
     };
-    match loaded.task().motion {
+    match loaded.task().of_robot {
         Some(_) => Ok(loaded),
         None => {
             let problem = format!("{} asks for a task of kind \"{}\"", path.display(), loaded.task().kind_name());
-            Err(Stop::argument("A507", "SCENE", problem, "a task of kind \"motion\", as the plan's"))
+            Err(Stop::argument("A507", "SCENE", problem, "a task of a whole robot, as the plan's"))
         }
     }
 }
@@ -280,8 +280,8 @@ fn inputs(loaded: &LoadedScene) -> Vec<serde_json::Value> {
 
 /// Says what a scene is made of.
 fn say_scene(loaded: &LoadedScene, seconds: f64, talk: &Talk) {
-    if let Some(motion) = &loaded.task().motion {
-        return say_motion_scene(loaded, &loaded.scene.robots[motion.robot], seconds, talk);
+    if let Some(robot) = loaded.task().of_robot.as_ref().and_then(|query| query.robot()) {
+        return say_motion_scene(loaded, &loaded.scene.robots[robot], seconds, talk);
     }
     let (scene, task) = (&loaded.scene, loaded.manipulation());
     let hand = task.hand();

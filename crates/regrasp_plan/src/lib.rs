@@ -14,4 +14,6 @@ pub use regrasp_grasp::list as grasps;
 
 pub use format::{AnyPlan, read_any};
 pub use plan::{ContactMode, ContactState, Plan, Segment, SegmentKind, Waypoint};
-pub use robot_plan::{RobotPlan, RobotPromises, RobotSegment, RobotSegmentKind, RobotStatistics, RobotWaypoint};
+pub use robot_plan::{
+    HoldingPromises, RobotPlan, RobotPromises, RobotSegment, RobotSegmentKind, RobotStatistics, RobotWaypoint,
+};

@@ -7,7 +7,8 @@ use crate::plan::{ContactMode, FORMAT, FORMAT_VERSION, PlanInput, PoseData};
 use regrasp_robot::Manipulator;
 use regrasp_robot::manipulator::layout::Coordinate;
 use regrasp_scene::motion::MOTION;
-use regrasp_scene::{CarriedObject, Holder, MotionQuery, Scene};
+use regrasp_scene::pick_and_place::PICK_AND_PLACE;
+use regrasp_scene::{CarriedObject, Holder, MotionQuery, PickAndPlaceQuery, Scene, SceneHand};
 use schemars::JsonSchema;
 use serde::de::{Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -21,8 +22,16 @@ use std::fmt;
 pub enum RobotSegmentKind {
     /// The robot moves; no hand holds anything.
     Transit,
-    /// The robot moves and holds one or several objects. Each follows its hand.
+    /// The robot holds one or several objects. Each follows its hand. Also a moment of rest in which a holder joins or leaves.
     Carry,
+    /// A hand comes to an object on the way of its grasp. Who holds the object rests.
+    Approach,
+    /// Fingers of one hand close until they touch the object; everything else rests. At the end the hand is ready to hold.
+    Grasp,
+    /// Fingers of one hand let go and open; everything else rests.
+    Release,
+    /// A hand leaves the object. Who holds the object rests.
+    Retreat,
 }
 
 /// A robot that the plan moves.
@@ -120,6 +129,26 @@ pub struct RobotPromises {
     /// Bodies that must not touch are at every moment at least this far apart, in metres; 0 where no more than no collision is
     /// promised.
     pub clearance: f64,
+    /// What holds for all contacts; absent in plans without contacts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub holding: Option<HoldingPromises>,
+}
+
+/// What a plan promises of the fingers that hold.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(deny_unknown_fields)]
+pub struct HoldingPromises {
+    /// Largest distance of a fingertip from its contact, in metres.
+    pub contact_tolerance: f64,
+    /// What the object's friction coefficient is divided by, at least 1: the quotient is what closure and forces count on.
+    pub friction_margin: f64,
+    /// Closure margin that every hand keeps by itself while it holds (see `regrasp_grasp::margin`); dimensionless.
+    pub required_margin: f64,
+    /// Length by which torques are divided in the margin, in metres.
+    pub torque_scale: f64,
+    /// Least and largest normal force of a contact, in newtons.
+    pub normal_force: [f64; 2],
 }
 
 /// Counts of the search for a motion.
@@ -151,7 +180,7 @@ pub struct RobotPlan {
     pub format_version: u32,
     /// Tool and version that wrote it.
     pub tool: String,
-    /// Kind of task: `motion`.
+    /// Kind of task: `motion` or `pick_and_place`.
     pub task: String,
     /// Name of the task in the scene file; absent where the file has only one.
     #[serde(default, skip_serializing_if = "String::is_empty")]
@@ -185,8 +214,6 @@ impl RobotPlan {
     /// A plan for `query` without segments: names, files, and promises that are the limits of robot and scene. The planner adds method,
     /// seed, settings, segments and statistics.
     pub fn answering(scene: &Scene, query: &MotionQuery) -> Self {
-        let robot = &scene.robots[query.robot];
-        let inputs = scene.inputs.iter();
         let carried = query.carried.iter();
         let mut hands: Vec<PlanHand> = Vec::new();
         for holder in carried.clone().map(|carried| carried.holder) {
@@ -199,12 +226,33 @@ impl RobotPlan {
                 hands.push(PlanHand { name, fingers });
             }
         }
+        let objects = carried.map(|carried| scene.objects[carried.object].name.clone()).collect();
+        RobotPlan { hands, objects, ..RobotPlan::of_task(scene, query.robot, MOTION, &query.name) }
+    }
+
+    /// A plan for a query of pick and place without segments, as [`RobotPlan::answering`]. It names every hand of the robot.
+    pub fn answering_pick_and_place(scene: &Scene, query: &PickAndPlaceQuery) -> Self {
+        let of_robot = |hand: &&SceneHand| hand.carrier.is_some_and(|carrier| carrier.robot == query.robot);
+        let hand = |hand: &SceneHand| PlanHand {
+            name: hand.name.clone(),
+            fingers: hand.hand.fingers.iter().map(|finger| finger.name.clone()).collect(),
+        };
+        RobotPlan {
+            hands: scene.hands.iter().filter(of_robot).map(hand).collect(),
+            objects: vec![scene.objects[query.object].name.clone()],
+            ..RobotPlan::of_task(scene, query.robot, PICK_AND_PLACE, &query.name)
+        }
+    }
+
+    fn of_task(scene: &Scene, robot: usize, task: &str, query: &str) -> Self {
+        let robot = &scene.robots[robot];
+        let inputs = scene.inputs.iter();
         RobotPlan {
             format: FORMAT.into(),
             format_version: FORMAT_VERSION,
             tool: concat!("regrasp ", env!("CARGO_PKG_VERSION")).into(),
-            task: MOTION.into(),
-            query: query.name.clone(),
+            task: task.into(),
+            query: query.into(),
             method: String::new(),
             seed: 0,
             settings: serde_json::Value::Object(serde_json::Map::new()),
@@ -217,8 +265,8 @@ impl RobotPlan {
                 .collect(),
             promises: RobotPromises::of(scene, robot),
             robots: vec![PlanRobot { name: robot.name.clone(), joint_names: robot.layout.names() }],
-            hands,
-            objects: carried.map(|carried| scene.objects[carried.object].name.clone()).collect(),
+            hands: Vec::new(),
+            objects: Vec::new(),
             statistics: RobotStatistics::default(),
             segments: Vec::new(),
         }
@@ -252,8 +300,14 @@ impl RobotPlan {
 
     /// Every floating-point number of the plan.
     pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
-        let RobotPromises { joint_velocities, joint_accelerations, clearance } = &self.promises;
+        let RobotPromises { joint_velocities, joint_accelerations, clearance, holding } = &self.promises;
         let promises = joint_velocities.iter().chain(joint_accelerations).copied().chain([*clearance]);
+        let of_holding = |holding: &HoldingPromises| {
+            let scalars =
+                [holding.contact_tolerance, holding.friction_margin, holding.required_margin, holding.torque_scale];
+            scalars.into_iter().chain(holding.normal_force).collect::<Vec<f64>>()
+        };
+        let promises = promises.chain(holding.iter().flat_map(of_holding));
         promises.chain(self.waypoints().flat_map(RobotWaypoint::numbers))
     }
 }
@@ -270,6 +324,7 @@ impl RobotPromises {
             joint_velocities: robot.layout.coordinates.iter().map(velocity).collect(),
             joint_accelerations: robot.layout.coordinates.iter().map(acceleration).collect(),
             clearance: 0.0,
+            holding: None,
         }
     }
 }

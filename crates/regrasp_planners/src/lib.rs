@@ -45,14 +45,14 @@ pub fn plan(
     budget: &Budget,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Plan, Failure> {
-    if query.as_motion().is_some() {
+    if query.is_of_robot() {
         return Err(motion_elsewhere());
     }
     let view = HandView::of(&Manipulation::of(scene, state, query));
     match query {
         Query::InHand(query) => plan_in_hand(&view, query, &settings.in_hand, seed, budget, progress),
         Query::Tracking(query) => plan_tracking(&view, query, &settings.tracking, seed, budget, progress),
-        Query::Motion(_) => Err(motion_elsewhere()),
+        Query::Motion(_) | Query::PickAndPlace(_) => Err(motion_elsewhere()),
     }
 }
 

@@ -39,7 +39,7 @@ fn task(scene: &Scene, task: &Task) -> Value {
         "kind": task.kind_name(),
         "hand": hand.map_or("", |hand| hand.name.as_str()),
         "object": object.map_or("", |object| object.name.as_str()),
-        "robot": task.motion.as_ref().map(|motion| scene.robots[motion.robot].name.as_str()),
+        "robot": task.of_robot.as_ref().and_then(|query| query.robot()).map(|robot| scene.robots[robot].name.as_str()),
     })
 }
 

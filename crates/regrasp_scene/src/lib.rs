@@ -18,6 +18,8 @@ pub mod manipulation;
 pub mod motion;
 /// The object that is manipulated.
 pub mod object;
+/// Pick and place.
+pub mod pick_and_place;
 /// What is asked: start and goal of an object, and how the grasps are given.
 pub mod query;
 /// The scene: hands, objects, supports, obstacles.
@@ -35,6 +37,7 @@ pub use load::{LoadedScene, OpenStart, StartOrientation, Stock, Task, load_scene
 pub use manipulation::{Manipulation, is_of_hand};
 pub use motion::{CarriedObject, Holder, MotionGoal, MotionQuery, WristGoal};
 pub use object::Object;
+pub use pick_and_place::{GraspFile, PickAndPlaceQuery};
 pub use query::{GRASP_TOLERANCE, GRASP_TURN_TOLERANCE, GraspRequest, InHandQuery, Query, StartChoice, TrackingQuery};
 pub use scene::{HandCarrier, InputFile, Obstacle, Scene, SceneHand, Support};
 pub use state::State;

@@ -2,6 +2,7 @@
 
 use crate::goal::{Goal, poses_from};
 use crate::motion::{MOTION, MotionQuery};
+use crate::pick_and_place::{PICK_AND_PLACE, PickAndPlaceQuery};
 use nalgebra::UnitQuaternion;
 use regrasp_geometry::{Point, Pose, Vector};
 use std::sync::LazyLock;
@@ -170,6 +171,8 @@ pub enum Query {
     /// See [`MotionQuery`]. It asks no hand to move an object: what this type says about hand, object and their poses is then empty
     /// (index 0, the world's origin, a grasp that the planner chooses).
     Motion(MotionQuery),
+    /// See [`PickAndPlaceQuery`]. It names no hand (index 0), and leaves all grasps to the planner.
+    PickAndPlace(PickAndPlaceQuery),
 }
 
 /// The pose of an object that is not asked about.
@@ -187,6 +190,12 @@ impl From<MotionQuery> for Query {
     }
 }
 
+impl From<PickAndPlaceQuery> for Query {
+    fn from(query: PickAndPlaceQuery) -> Self {
+        Query::PickAndPlace(query)
+    }
+}
+
 impl From<TrackingQuery> for Query {
     fn from(query: TrackingQuery) -> Self {
         Query::Tracking(query)
@@ -200,6 +209,7 @@ impl Query {
             Query::InHand(_) => IN_HAND,
             Query::Tracking(_) => TRACKING,
             Query::Motion(_) => MOTION,
+            Query::PickAndPlace(_) => PICK_AND_PLACE,
         }
     }
 
@@ -208,7 +218,7 @@ impl Query {
     pub fn started_at(&self, start: &Pose) -> Self {
         match self {
             Query::InHand(query) => Query::InHand(query.started_at(start)),
-            Query::Tracking(_) | Query::Motion(_) => self.clone(),
+            Query::Tracking(_) | Query::Motion(_) | Query::PickAndPlace(_) => self.clone(),
         }
     }
 
@@ -226,7 +236,7 @@ impl Query {
     pub fn as_in_hand(&self) -> Option<&InHandQuery> {
         match self {
             Query::InHand(query) => Some(query),
-            Query::Tracking(_) | Query::Motion(_) => None,
+            Query::Tracking(_) | Query::Motion(_) | Query::PickAndPlace(_) => None,
         }
     }
 
@@ -234,7 +244,7 @@ impl Query {
     pub fn as_tracking(&self) -> Option<&TrackingQuery> {
         match self {
             Query::Tracking(query) => Some(query),
-            Query::InHand(_) | Query::Motion(_) => None,
+            Query::InHand(_) | Query::Motion(_) | Query::PickAndPlace(_) => None,
         }
     }
 
@@ -242,8 +252,30 @@ impl Query {
     pub fn as_motion(&self) -> Option<&MotionQuery> {
         match self {
             Query::Motion(query) => Some(query),
+            Query::InHand(_) | Query::Tracking(_) | Query::PickAndPlace(_) => None,
+        }
+    }
+
+    /// The query of pick and place, if it is one.
+    pub fn as_pick_and_place(&self) -> Option<&PickAndPlaceQuery> {
+        match self {
+            Query::PickAndPlace(query) => Some(query),
+            Query::InHand(_) | Query::Tracking(_) | Query::Motion(_) => None,
+        }
+    }
+
+    /// The robot that is asked to move, by its index in `Scene::robots`. None where hands stand still.
+    pub fn robot(&self) -> Option<usize> {
+        match self {
+            Query::Motion(query) => Some(query.robot),
+            Query::PickAndPlace(query) => Some(query.robot),
             Query::InHand(_) | Query::Tracking(_) => None,
         }
+    }
+
+    /// True where the robot moves, and a plan is one of whole robots.
+    pub fn is_of_robot(&self) -> bool {
+        matches!(self, Query::Motion(_) | Query::PickAndPlace(_))
     }
 
     /// Name of the task in the scene file; empty where the file has only one.
@@ -252,6 +284,7 @@ impl Query {
             Query::InHand(query) => &query.name,
             Query::Tracking(query) => &query.name,
             Query::Motion(query) => &query.name,
+            Query::PickAndPlace(query) => &query.name,
         }
     }
 
@@ -260,7 +293,7 @@ impl Query {
         match self {
             Query::InHand(query) => query.hand,
             Query::Tracking(query) => query.hand,
-            Query::Motion(_) => 0,
+            Query::Motion(_) | Query::PickAndPlace(_) => 0,
         }
     }
 
@@ -270,6 +303,7 @@ impl Query {
             Query::InHand(query) => query.object,
             Query::Tracking(query) => query.object,
             Query::Motion(_) => 0,
+            Query::PickAndPlace(query) => query.object,
         }
     }
 
@@ -278,6 +312,7 @@ impl Query {
         match self {
             Query::InHand(query) => &query.world_from_object_start,
             Query::Tracking(query) => &query.world_from_object_start,
+            Query::PickAndPlace(query) => &query.world_from_object_start,
             Query::Motion(_) => &NO_POSE,
         }
     }
@@ -286,7 +321,7 @@ impl Query {
     pub fn way(&self) -> &[Pose] {
         match self {
             Query::InHand(query) => &query.world_from_object_way,
-            Query::Tracking(_) | Query::Motion(_) => &[],
+            Query::Tracking(_) | Query::Motion(_) | Query::PickAndPlace(_) => &[],
         }
     }
 
@@ -295,6 +330,7 @@ impl Query {
         match self {
             Query::InHand(query) => &query.world_from_object_goal,
             Query::Tracking(query) => &query.world_from_object_goal,
+            Query::PickAndPlace(query) => &query.world_from_object_goal,
             Query::Motion(_) => &NO_POSE,
         }
     }
@@ -304,7 +340,7 @@ impl Query {
         match self {
             Query::InHand(query) => &query.start_grasp,
             Query::Tracking(query) => &query.start_grasp,
-            Query::Motion(_) => &GraspRequest::Automatic,
+            Query::Motion(_) | Query::PickAndPlace(_) => &GraspRequest::Automatic,
         }
     }
 
@@ -313,7 +349,7 @@ impl Query {
         match self {
             Query::InHand(query) => &query.goal_grasp,
             Query::Tracking(query) => &query.goal_grasp,
-            Query::Motion(_) => &GraspRequest::Automatic,
+            Query::Motion(_) | Query::PickAndPlace(_) => &GraspRequest::Automatic,
         }
     }
 }

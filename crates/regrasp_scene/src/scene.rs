@@ -3,6 +3,7 @@
 use crate::gravity::Gravity;
 use crate::limits::Limits;
 use crate::object::Object;
+use crate::pick_and_place::GraspFile;
 use regrasp_geometry::Pose;
 use regrasp_geometry::collision::MeshBody;
 use regrasp_geometry::shape::PlacedShape;
@@ -76,6 +77,8 @@ pub struct Scene {
     pub hands: Vec<SceneHand>,
     /// The objects that hands can move, in the order of the file. At least one.
     pub objects: Vec<Object>,
+    /// Lists of grasps that the file names, object by object, in the order of the hands.
+    pub grasp_files: Vec<GraspFile>,
     /// What objects may stand on.
     pub supports: Vec<Support>,
     /// What nothing may touch.

@@ -165,7 +165,7 @@ pub struct Job {
 impl Job {
     /// Errors (`B603`, with the place of the suite at `suite_path`): settings that mean nothing for the task of the scene.
     pub fn refuse_other_task(&self, task: &Task, suite_path: &Path) -> Result<(), InputError> {
-        if task.motion.is_some() {
+        if task.of_robot.is_some() {
             let problem =
                 format!("\"{}\" names {}, which asks for a motion of a robot", self.name, self.scene.display());
             let diagnostic = Diagnostic::new("B603", Place::file(suite_path), problem);

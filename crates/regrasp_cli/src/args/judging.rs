@@ -58,8 +58,8 @@ impl Judging {
             GravityInHand::Any => Some(Gravity::Any),
             GravityInHand::Direction(down) => {
                 // A task of a whole robot has no hand to see gravity from: the direction is the world's.
-                let is_motion = loaded.task().motion.is_some();
-                let frame = if is_motion { Pose::identity() } else { loaded.manipulation().world_from_hand() };
+                let is_of_robot = loaded.task().of_robot.is_some();
+                let frame = if is_of_robot { Pose::identity() } else { loaded.manipulation().world_from_hand() };
                 Gravity::along(&frame, &down.into())
             }
         };

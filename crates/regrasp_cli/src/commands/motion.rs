@@ -9,10 +9,11 @@ use crate::stop::Stop;
 use crate::talk::Talk;
 use crate::words::{counted, duration, grouped};
 use regrasp::base::{Diagnostic, Place, files};
+use regrasp::geometry::frame::rotation_between;
 use regrasp::plan::check::{find_scene_among, robot_along};
 use regrasp::plan::format;
 use regrasp::planners::FailureKind;
-use regrasp::scene::{LoadedScene, MotionGoal, MotionQuery};
+use regrasp::scene::{LoadedScene, MotionGoal, MotionQuery, PickAndPlaceQuery};
 use regrasp::viewer::render::png_file;
 use regrasp::viewer::robots::{RobotStoryboard, RobotTelling, robot_charts, robot_page, robot_storyboard};
 use regrasp::{AnyPlan, Budget, Query, RobotPlan, export, plan_any};
@@ -26,7 +27,7 @@ pub fn plan(
     arguments: &args::Plan,
     common: &Common,
     loaded: &LoadedScene,
-    query: &MotionQuery,
+    query: &Query,
     limits: &Limits,
     talk: &Talk,
 ) -> Result<(), Stop> {
@@ -39,10 +40,9 @@ pub fn plan(
         improve_for: limits.improve_for,
         cancelled: Arc::clone(&limits.cancelled),
     };
-    let asked = Query::Motion(query.clone());
     let around = (&loaded.scene, &loaded.state);
     let settings = load::for_task(loaded.task(), &arguments.search, available_threads())?;
-    let plan = match plan_any(around, &asked, &settings, arguments.seed, &budget, &|_| {}) {
+    let plan = match plan_any(around, query, &settings, arguments.seed, &budget, &|_| {}) {
         Ok(AnyPlan::Robot(plan)) => plan,
         Ok(AnyPlan::InHand(_)) => return Err(Stop::Internal("a motion was answered by a plan of one hand".into())),
         Err(failure) if failure.kind == FailureKind::Interrupted => return Err(Stop::Interrupted),
@@ -72,7 +72,7 @@ fn refuse_in_hand_arguments(arguments: &args::Plan) -> Result<(), Stop> {
     ];
     match given.into_iter().find(|(_, is_given)| *is_given) {
         Some((flag, _)) => {
-            Err(Stop::argument("A507", flag, "is not for a task of kind \"motion\"", "a task of kind \"in_hand\""))
+            Err(Stop::argument("A507", flag, "is not for a task of a whole robot", "a task of kind \"in_hand\""))
         }
         None => Ok(()),
     }
@@ -94,7 +94,30 @@ fn write(plan: &RobotPlan, arguments: &args::Plan, common: &Common, talk: &Talk)
 }
 
 /// Says what is asked.
-fn say_query(loaded: &LoadedScene, query: &MotionQuery, seed: u64, talk: &Talk) {
+fn say_query(loaded: &LoadedScene, query: &Query, seed: u64, talk: &Talk) {
+    match query {
+        Query::Motion(query) => say_motion(loaded, query, seed, talk),
+        Query::PickAndPlace(query) => say_pick_and_place(loaded, query, seed, talk),
+        Query::InHand(_) | Query::Tracking(_) => {}
+    }
+}
+
+fn say_pick_and_place(loaded: &LoadedScene, query: &PickAndPlaceQuery, seed: u64, talk: &Talk) {
+    let (robot, object) = (&loaded.scene.robots[query.robot], &loaded.scene.objects[query.object]);
+    let way = query.world_from_object_goal.translation.vector - query.world_from_object_start.translation.vector;
+    let turn = rotation_between(&query.world_from_object_start, &query.world_from_object_goal).norm();
+    talk.say(format!(
+        "query  robot \"{}\" brings \"{}\" {:.2} m away, turned by {:.0} deg, seed {seed}, {}",
+        robot.name,
+        object.name,
+        way.norm(),
+        turn.to_degrees(),
+        counted(available_threads(), "thread")
+    ));
+    talk.event("query", json!({ "robot": robot.name, "object": object.name, "seed": seed }));
+}
+
+fn say_motion(loaded: &LoadedScene, query: &MotionQuery, seed: u64, talk: &Talk) {
     let robot = &loaded.scene.robots[query.robot];
     let goal = match &query.goal {
         MotionGoal::Joints(joints) => {

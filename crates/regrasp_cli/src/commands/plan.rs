@@ -34,7 +34,7 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
     let loaded = arguments.judging.scene(load::scene_by(&arguments.scene, common, deadline, talk)?);
     let read = loaded.scene.inputs.iter().map(|input| input.path.as_path());
     written.refuse_inputs(read.chain(arguments.search.settings.as_deref()))?;
-    if let Some(query) = &loaded.task().motion {
+    if let Some(query) = &loaded.task().of_robot {
         let time_limit = deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
         let (max_work, improve_for) = (arguments.search.max_work, arguments.search.improve);
         let limits = Limits { max_work, time_limit, improve_for, cancelled };

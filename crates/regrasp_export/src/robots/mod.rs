@@ -89,6 +89,10 @@ pub fn kind_name(kind: RobotSegmentKind) -> &'static str {
     match kind {
         RobotSegmentKind::Transit => "transit",
         RobotSegmentKind::Carry => "carry",
+        RobotSegmentKind::Approach => "approach",
+        RobotSegmentKind::Grasp => "grasp",
+        RobotSegmentKind::Release => "release",
+        RobotSegmentKind::Retreat => "retreat",
     }
 }
 

@@ -34,7 +34,7 @@ pub(super) fn check_own_query(plan: &Plan, settings: &CheckSettings, log: &mut L
 /// A plan that brings its query says from where and to where, no more: hand and object are those of `task`, limits, friction and
 /// masses those of the scene. Whoever has asked something else gives that to [`crate::check::check`] instead.
 pub fn query_of(scene: &Scene, task: &Task, plan: &Plan) -> Query {
-    let Some(asked) = plan.asked.as_ref().filter(|_| task.motion.is_none()) else { return task.query(plan.seed) };
+    let Some(asked) = plan.asked.as_ref().filter(|_| task.of_robot.is_none()) else { return task.query(plan.seed) };
     let fingers = scene.hands.get(task.hand).map_or(&[][..], |placed| placed.hand.fingers.as_slice());
     let holds = fingers.iter().map(|finger| !asked.free.contains(&finger.name)).collect();
     Query::InHand(InHandQuery {

@@ -25,7 +25,7 @@ pub fn manipulation<'a>(
         let object_index = object_of(scene, plan).ok_or_else(|| wrong("object", &objects))?;
         return Ok(Manipulation { scene, state, hand_index, object_index });
     };
-    if query.as_motion().is_some() {
+    if query.is_of_robot() {
         return Err(wrong("task", &[query.task()]));
     }
     let task = Manipulation::of(scene, state, query);

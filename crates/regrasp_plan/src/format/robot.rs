@@ -7,6 +7,7 @@ use regrasp_base::diagnostic::{Diagnostics, GOOD_NAME, fault_of_name, number};
 use regrasp_base::json_place::{PathStep, diagnostic};
 use regrasp_base::{Diagnostic, InputError, Place};
 use regrasp_scene::motion::MOTION;
+use regrasp_scene::pick_and_place::PICK_AND_PLACE;
 use serde::Deserialize;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -15,6 +16,9 @@ use std::path::Path;
 const UNIT_TOLERANCE: f64 = 1e-9;
 /// Largest clearance that a plan may promise, in metres.
 const MOST_CLEARANCE: f64 = 10.0;
+
+/// Tasks whose plans are plans of whole robots.
+pub const ROBOT_TASKS: [&str; 2] = [MOTION, PICK_AND_PLACE];
 
 /// A plan of either kind.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,7 +72,8 @@ pub fn is_robot_plan(bytes: &[u8]) -> bool {
         format: String,
         task: String,
     }
-    serde_json::from_slice::<Header>(bytes).is_ok_and(|header| header.format == FORMAT && header.task == MOTION)
+    serde_json::from_slice::<Header>(bytes)
+        .is_ok_and(|header| header.format == FORMAT && ROBOT_TASKS.contains(&header.task.as_str()))
 }
 
 /// Reads a plan of either kind from `bytes`, which came from `path`.
@@ -143,7 +148,7 @@ pub fn robot_from_json(path: &Path, bytes: &[u8]) -> Result<RobotPlan, InputErro
     }
     if !is_robot_plan(text.as_bytes()) {
         let problem = diagnostic(path, &text, "C412", &[PathStep::Key("task")], "is not a task of whole robots".into());
-        return Err(problem.expected(format!("\"{MOTION}\"")).into());
+        return Err(problem.expected(ROBOT_TASKS.join(" or ")).into());
     }
     let plan: RobotPlan = serde_json::from_str(&text).map_err(|error| syntax_error(path, &error))?;
     let mut reader = Reader { path, text: &text, found: Diagnostics::default() };
@@ -296,7 +301,7 @@ impl Reader<'_> {
             }
         }
         let is_held = segment.held_by.values().any(|holders| !holders.is_empty());
-        if is_held != (segment.kind == RobotSegmentKind::Carry) {
+        if plan.task == MOTION && is_held != (segment.kind == RobotSegmentKind::Carry) {
             let problem = if is_held { "is a transit in which something is held" } else { "is a carry of nothing" };
             let expected = "\"carry\" where \"held_by\" names a hand, else \"transit\"";
             self.fail("C408", &[at[0], at[1], Key("kind")], problem.into(), expected);

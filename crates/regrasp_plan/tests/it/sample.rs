@@ -48,6 +48,7 @@ fn robot() -> Robot {
     };
     let mut robot = Robot {
         name: "sample".into(),
+        grasp_files: Vec::new(),
         links: vec![Link { name: "palm".into(), collision: vec![palm], visual: Vec::new(), parent_joint: None }],
         joints: Vec::new(),
         root: LinkId(0),

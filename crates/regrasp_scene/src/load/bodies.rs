@@ -4,10 +4,11 @@ use super::files::Files;
 use super::named::which;
 use super::object::{self, Hands, Names};
 use super::task::{self, Heading, Task, TaskKind};
-use super::{gravity, hand, limits, motion, pose, robot, units};
+use super::{gravity, hand, limits, motion, pick_and_place, pose, robot, units};
 use crate::gravity::Gravity;
 use crate::limits::Limits;
 use crate::object::Object;
+use crate::pick_and_place::GraspFile;
 use crate::scene::{Obstacle, SceneHand, Support};
 use regrasp_base::toml_table::{Entry, Found, Table, one_of};
 use regrasp_geometry::Pose;
@@ -19,6 +20,7 @@ pub(super) struct Parts {
     pub hands: Vec<SceneHand>,
     pub objects: Vec<Object>,
     pub world_from_objects: Vec<Pose>,
+    pub grasp_files: Vec<GraspFile>,
     pub supports: Vec<Support>,
     pub obstacles: Vec<Obstacle>,
     pub gravity: Option<Gravity>,
@@ -60,6 +62,7 @@ pub(super) fn one_hand(root: &mut Table, files: &mut Files, found: &mut Found) -
         hands: vec![hand?],
         objects: vec![object?],
         world_from_objects: vec![task.world_from_object_start],
+        grasp_files: Vec::new(),
         supports: Vec::new(),
         obstacles,
         gravity,
@@ -75,15 +78,15 @@ pub(super) fn several(root: &mut Table, files: &mut Files, found: &mut Found) ->
     let carried = robot_and_hands(root, needed, &mut names, files, found);
     let gravity = gravity::gravity(root, Some(&Pose::identity()), found);
     let limits = limits::limits(root, found);
-    let around = Hands::of(carried.iter().flat_map(|(_, hands)| hands));
-    let objects = objects(root, needed, &mut names, around, files, found);
+    let hands = carried.as_ref().map_or(&[][..], |(_, hands)| hands);
+    let objects = objects(root, needed, &mut names, hands, files, found);
     let supports = object::fixed_bodies(root, "supports", &mut names, files, found);
     let supports = supports.into_iter().map(|body| Support { body }).collect();
     let obstacles = object::fixed_bodies(root, "obstacles", &mut names, files, found);
     let bodies = carried.zip(objects);
     let fix = "add [[tasks]] with task = \"in_hand\", hand, object and goal";
     let entries = root.required(found, "tasks", fix)?.entries(found, "tables [[tasks]]")?;
-    let ((robots, hands), objects) = bodies?;
+    let ((robots, hands), (objects, grasp_files)) = bodies?;
     let mut task_names = Names::of("task");
     let mut tasks = Vec::new();
     for (index, entry) in entries.iter().enumerate() {
@@ -100,7 +103,7 @@ pub(super) fn several(root: &mut Table, files: &mut Files, found: &mut Found) ->
         found.diagnostics.push(diagnostic);
     }
     let (objects, world_from_objects) = objects.into_iter().unzip();
-    Some(Parts { robots, hands, objects, world_from_objects, supports, obstacles, gravity, limits, tasks })
+    Some(Parts { robots, hands, objects, world_from_objects, grasp_files, supports, obstacles, gravity, limits, tasks })
 }
 
 /// Robots, and all hands: those that robots carry first.
@@ -147,25 +150,29 @@ fn objects(
     root: &mut Table,
     needed: Needed,
     names: &mut Names,
-    hands: Hands,
+    hands: &[SceneHand],
     files: &mut Files,
     found: &mut Found,
-) -> Option<Vec<(Object, Pose)>> {
+) -> Option<(Vec<(Object, Pose)>, Vec<GraspFile>)> {
     let fix = "add [[objects]] with name, a shape such as sphere = { radius = 0.03 }, mass, friction and position";
     let entry = match needed {
         Needed::HandAndObject => Some(root.required(found, "objects", fix)?),
         Needed::Robot => root.optional("objects"),
     };
-    let Some(entry) = entry else { return Some(Vec::new()) };
+    let Some(entry) = entry else { return Some((Vec::new(), Vec::new())) };
     let entries = entry.entries(found, "tables [[objects]]")?;
-    let mut objects = Vec::new();
+    let (mut objects, mut grasp_files) = (Vec::new(), Vec::new());
     for entry in &entries {
         let Some(mut table) = entry.table(found) else { continue };
         if table.required(found, "name", "add name = \"cube\"").is_none() {
             continue;
         }
         let pose = pose::pose(&mut table, found);
-        let Some(object) = object::object(table, hands, files, found) else { continue };
+        if let Some(entry) = table.optional("grasps") {
+            let named = pick_and_place::grasp_files(&entry, objects.len(), hands, files, found);
+            grasp_files.extend(named.unwrap_or_default());
+        }
+        let Some(object) = object::object(table, Hands::of(hands), files, found) else { continue };
         names.add(&object.name, entry, found);
         objects.extend(pose.map(|pose| (object, pose)));
     }
@@ -173,8 +180,11 @@ fn objects(
         let diagnostic = root.error("S102", found, "has no object").fix(fix);
         found.diagnostics.push(diagnostic);
     }
-    found.diagnostics.is_empty().then_some(objects)
+    found.diagnostics.is_empty().then_some((objects, grasp_files))
 }
+
+/// Kinds of `[[tasks]]`.
+const KINDS: [TaskKind; 4] = [TaskKind::InHand, TaskKind::Tracking, TaskKind::Motion, TaskKind::PickAndPlace];
 
 /// One of `[[tasks]]`.
 fn task_of(
@@ -183,7 +193,7 @@ fn task_of(
     (robots, hands, objects): (&[Manipulator], &[SceneHand], &[(Object, Pose)]),
     found: &mut Found,
 ) -> Option<Task> {
-    let known_kind = task_kind(table, &[TaskKind::InHand, TaskKind::Tracking, TaskKind::Motion], found);
+    let known_kind = task_kind(table, &KINDS, found);
     let kind = known_kind.unwrap_or(TaskKind::InHand);
     let name = table.optional("name").map_or(Some(default_name), |entry| entry.name(found).map(str::to_owned));
     if kind == TaskKind::Motion {
@@ -193,6 +203,10 @@ fn task_of(
     if hands.is_empty() || objects.is_empty() {
         // Only where the kind of the task is not known: else hands and objects have been asked for.
         return None;
+    }
+    if kind == TaskKind::PickAndPlace {
+        let bodies = motion::Bodies { robots, hands, objects };
+        return pick_and_place::pick_and_place(table, name?, &bodies, found).map(Task::of_pick_and_place);
     }
     let hand_names: Vec<&str> = hands.iter().map(|hand| hand.name.as_str()).collect();
     let object_names: Vec<&str> = objects.iter().map(|(object, _)| object.name.as_str()).collect();

@@ -58,6 +58,7 @@ impl GraspScene {
     /// A scene of `hand` and `object`.
     pub fn of(hand: SceneHand, object: Object, inputs: Vec<InputFile>, notes: Vec<String>) -> Self {
         let scene = Scene {
+            grasp_files: Vec::new(),
             name: object.name.clone(),
             robots: Vec::new(),
             hands: vec![SceneHand { world_from_hand: Pose::identity(), carrier: None, reach: None, ..hand }],

@@ -17,6 +17,7 @@ mod motion;
 mod named;
 mod numbers;
 mod object;
+mod pick_and_place;
 mod pose;
 mod robot;
 mod shape;
@@ -148,10 +149,11 @@ pub fn load_scene_with(
     let parts = document.as_ref().and_then(|document| read(Table::root(document), &mut files, &mut found));
     let (notes, diagnostics) = (found.notes, found.diagnostics);
     let parts = diagnostics.into_result(parts)?;
-    let Parts { robots, hands, objects, world_from_objects, supports, obstacles, gravity, limits, tasks } =
+    let Parts { robots, hands, objects, world_from_objects, grasp_files, supports, obstacles, gravity, limits, tasks } =
         parts.expect("what could not be read has left a diagnostic");
     let name = path.file_stem().map_or_else(String::new, |stem| printable_line(&stem.to_string_lossy()));
-    let scene = Scene { name, robots, hands, objects, supports, obstacles, gravity, limits, inputs: files.inputs };
+    let scene =
+        Scene { name, robots, hands, objects, grasp_files, supports, obstacles, gravity, limits, inputs: files.inputs };
     let state = State::at_rest(&scene, world_from_objects);
     Ok(LoadedScene { scene, state, tasks, notes })
 }

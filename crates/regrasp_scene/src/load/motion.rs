@@ -30,28 +30,10 @@ pub(super) struct Bodies<'a> {
 /// Errors: names that the scene does not have (`S120`), joints outside their limits (`P303`), neither or both of `joints` and `wrists`
 /// (`S106`), an arm named twice (`S112`), an arm that too few joints move (`P305`).
 pub(super) fn motion(table: &mut Table, name: String, bodies: &Bodies, found: &mut Found) -> Option<MotionQuery> {
-    let [robot, start, goal, carried] = ["robot", "start", "goal", "carried"].map(|key| table.optional(key));
-    if bodies.robots.is_empty() {
-        let diagnostic = table.error("S106", found, "needs a robot, and the scene has none");
-        found.diagnostics.push(diagnostic.fix("add [robot] with file = \"robot.toml\""));
-        return None;
-    }
-    let names: Vec<&str> = bodies.robots.iter().map(|robot| robot.name.as_str()).collect();
-    let index = match &robot {
-        Some(_) => which(table, "robot", &names, found)?,
-        None => 0,
-    };
-    let robot = &bodies.robots[index];
+    let [start, goal, carried] = ["start", "goal", "carried"].map(|key| table.optional(key));
+    let (index, robot) = robot_of(table, bodies, found)?;
     let start = match start {
-        Some(entry) => {
-            let mut inside = entry.table(found)?;
-            let joints = inside.optional("joints");
-            inside.finish(found);
-            match joints {
-                Some(entry) => joint_values(&entry, robot, robot.layout.rest(), found),
-                None => Some(robot.layout.rest()),
-            }
-        }
+        Some(entry) => posture(&entry, robot, robot.layout.rest(), found),
         None => Some(robot.layout.rest()),
     };
     let Some(goal) = goal else {
@@ -66,6 +48,37 @@ pub(super) fn motion(table: &mut Table, name: String, bodies: &Bodies, found: &m
         None => Some(Vec::new()),
     };
     Some(MotionQuery { name, robot: index, start: start?, goal: goal?, carried: carried? })
+}
+
+/// The robot that a task is about: the one it names, else the first. Errors: none there (`S106`), unknown (`S120`).
+pub(super) fn robot_of<'a>(
+    table: &mut Table,
+    bodies: &Bodies<'a>,
+    found: &mut Found,
+) -> Option<(usize, &'a Manipulator)> {
+    let named = table.optional("robot");
+    if bodies.robots.is_empty() {
+        let diagnostic = table.error("S106", found, "needs a robot, and the scene has none");
+        found.diagnostics.push(diagnostic.fix("add [robot] with file = \"robot.toml\""));
+        return None;
+    }
+    let names: Vec<&str> = bodies.robots.iter().map(|robot| robot.name.as_str()).collect();
+    let index = match &named {
+        Some(_) => which(table, "robot", &names, found)?,
+        None => 0,
+    };
+    Some((index, &bodies.robots[index]))
+}
+
+/// `{ joints = { joint = value } }`; joints left out keep the value in `before`. Errors: as [`joint_values`].
+pub(super) fn posture(entry: &Entry, robot: &Manipulator, before: Vec<f64>, found: &mut Found) -> Option<Vec<f64>> {
+    let mut inside = entry.table(found)?;
+    let joints = inside.optional("joints");
+    inside.finish(found);
+    match joints {
+        Some(entry) => joint_values(&entry, robot, before, found),
+        None => Some(before),
+    }
 }
 
 /// Values of coordinates by name of joint; those left out keep the value in `posture`.

@@ -3,6 +3,7 @@
 use super::pose;
 use crate::goal::{Goal, poses_from};
 use crate::motion::{MOTION, MotionQuery};
+use crate::pick_and_place::{PICK_AND_PLACE, PickAndPlaceQuery};
 use crate::query::{GraspRequest, IN_HAND, InHandQuery, Query, StartChoice, TRACKING, TrackingQuery};
 use regrasp_base::Rng;
 use regrasp_base::diagnostic::number;
@@ -47,6 +48,8 @@ pub(super) enum TaskKind {
     Tracking,
     /// Of a whole robot.
     Motion,
+    /// Of a whole robot, with an object.
+    PickAndPlace,
 }
 
 impl TaskKind {
@@ -56,6 +59,7 @@ impl TaskKind {
             TaskKind::InHand => IN_HAND,
             TaskKind::Tracking => TRACKING,
             TaskKind::Motion => MOTION,
+            TaskKind::PickAndPlace => PICK_AND_PLACE,
         }
     }
 }
@@ -87,15 +91,20 @@ pub struct Task {
     pub goal: Goal,
     /// Grasp at the goal.
     pub goal_grasp: GraspRequest,
-    /// Of a task of kind `motion` what it asks for; all other fields but the name are then empty.
-    pub motion: Option<MotionQuery>,
+    /// Of a task of a whole robot what it asks for; all other fields but the name are then empty.
+    pub of_robot: Option<Box<Query>>,
 }
 
 impl Task {
+    /// The motion that it asks for, if it is of that kind.
+    pub fn motion(&self) -> Option<&MotionQuery> {
+        self.of_robot.as_ref().and_then(|query| query.as_motion())
+    }
+
     /// The query of `seed`: the same on every machine and for every number of threads.
     pub fn query(&self, seed: u64) -> Query {
-        if let Some(motion) = &self.motion {
-            return Query::Motion(motion.clone());
+        if let Some(query) = &self.of_robot {
+            return (**query).clone();
         }
         let mut start = self.world_from_object_start;
         if self.position_within > 0.0 {
@@ -126,7 +135,7 @@ impl Task {
                     StartChoice { rotation, way: self.way.clone(), goal: self.goal.clone() }
                 }),
             }),
-            TaskKind::Tracking | TaskKind::Motion => Query::Tracking(TrackingQuery {
+            TaskKind::Tracking | TaskKind::Motion | TaskKind::PickAndPlace => Query::Tracking(TrackingQuery {
                 name,
                 hand,
                 object,
@@ -140,11 +149,20 @@ impl Task {
 
     /// A task of kind `motion`.
     pub(super) fn of_motion(motion: MotionQuery) -> Self {
+        Task::of_robot(TaskKind::Motion, Query::Motion(motion))
+    }
+
+    /// A task of kind `pick_and_place`.
+    pub(super) fn of_pick_and_place(query: PickAndPlaceQuery) -> Self {
+        Task::of_robot(TaskKind::PickAndPlace, Query::PickAndPlace(query))
+    }
+
+    fn of_robot(kind: TaskKind, query: Query) -> Self {
         Task {
-            name: motion.name.clone(),
+            name: query.name().to_owned(),
             hand: 0,
-            object: 0,
-            kind: TaskKind::Motion,
+            object: query.object(),
+            kind,
             world_from_object_start: Pose::identity(),
             open_start: None,
             position_within: 0.0,
@@ -153,7 +171,7 @@ impl Task {
             way: Vec::new(),
             goal: Goal::Pose(Pose::identity()),
             goal_grasp: GraspRequest::Automatic,
-            motion: Some(motion),
+            of_robot: Some(Box::new(query)),
         }
     }
 
@@ -275,7 +293,7 @@ fn way(root: &mut Table, found: &mut Found) -> Option<Vec<Goal>> {
 }
 
 /// A pose of the world, or a turn and displacement seen from the start. Errors: both (`S106`), neither (`S102`).
-fn pose_or_turn(table: &mut Table, found: &mut Found) -> Option<Goal> {
+pub(super) fn pose_or_turn(table: &mut Table, found: &mut Found) -> Option<Goal> {
     let absolute = table.present(&["position", "quat_xyzw", "quat_wxyz", "rotation_vector"]);
     let relative = table.present(&["turn", "move"]);
     match (absolute.first(), relative.first()) {
@@ -349,7 +367,7 @@ pub(super) fn task(
     let mut table = root.required(found, "goal", fix)?.table(found)?;
     let goal = match kind {
         TaskKind::InHand => pose_or_turn(&mut table, found),
-        TaskKind::Tracking | TaskKind::Motion => orientation_or_turn(&mut table, found),
+        TaskKind::Tracking | TaskKind::Motion | TaskKind::PickAndPlace => orientation_or_turn(&mut table, found),
     };
     if let (Some(way), Some(goal)) = (&way, &goal)
         && !way.is_empty()
@@ -377,7 +395,7 @@ pub(super) fn task(
         way,
         goal,
         goal_grasp,
-        motion: None,
+        of_robot: None,
     };
     if is_goal_start(&task) {
         found.note(&span, "the goal pose is the start pose: there is nothing to turn");

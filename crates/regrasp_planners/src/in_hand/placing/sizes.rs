@@ -116,6 +116,7 @@ fn scene_of(hand: &Hand, object: Object) -> Scene {
         reach: None,
     };
     Scene {
+        grasp_files: Vec::new(),
         name: "sizes".into(),
         robots: Vec::new(),
         hands: vec![placed],
