@@ -152,6 +152,20 @@ export type ForcePromises = {
   joint_torques: Array<number | null>,
 };
 
+/** What a plan promises of the fingers that hold. */
+export type HoldingPromises = {
+  /** Largest distance of a fingertip from its contact, in metres. */
+  contact_tolerance: number,
+  /** What the object's friction coefficient is divided by, at least 1: the quotient is what closure and forces count on. */
+  friction_margin: number,
+  /** Closure margin that every hand keeps by itself while it holds (see `regrasp_grasp::margin`); dimensionless. */
+  required_margin: number,
+  /** Length by which torques are divided in the margin, in metres. */
+  torque_scale: number,
+  /** Least and largest normal force of a contact, in newtons. */
+  normal_force: [number, number],
+};
+
 /** Looking for a better plan after the first. */
 export type Improvement = {
   /** The first plan. */
@@ -277,7 +291,7 @@ export type RobotPlan = {
   format_version: number,
   /** Tool and version that wrote it. */
   tool: string,
-  /** Kind of task: `motion`. */
+  /** Kind of task: `motion` or `pick_and_place`. */
   task: string,
   /** Name of the task in the scene file; absent where the file has only one. */
   query?: string,
@@ -314,6 +328,8 @@ export type RobotPromises = {
    * promised.
    */
   clearance: number,
+  /** What holds for all contacts; absent in plans without contacts. */
+  holding?: HoldingPromises | null,
 };
 
 /** A piece of motion. */
@@ -327,7 +343,7 @@ export type RobotSegment = {
 };
 
 /** Kind of a segment of a [`RobotPlan`]. */
-export type RobotSegmentKind = "transit" | "carry";
+export type RobotSegmentKind = "transit" | "carry" | "approach" | "grasp" | "release" | "retreat";
 
 /** Counts of the search for a motion. */
 export type RobotStatistics = {

@@ -48,7 +48,6 @@ fn robot() -> Robot {
     };
     let mut robot = Robot {
         name: "sample".into(),
-        grasp_files: Vec::new(),
         links: vec![Link { name: "palm".into(), collision: vec![palm], visual: Vec::new(), parent_joint: None }],
         joints: Vec::new(),
         root: LinkId(0),
@@ -178,6 +177,7 @@ pub fn scene() -> Scene {
         gravity: None,
         // The sample counts on all of its friction.
         limits: regrasp_scene::Limits { friction_margin: Some(1.0), ..Default::default() },
+        grasp_files: Vec::new(),
         name: "sample".into(),
         robots: Vec::new(),
         hands: vec![SceneHand {
