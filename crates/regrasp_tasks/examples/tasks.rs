@@ -6,6 +6,7 @@ use cpu_time::ThreadTime;
 use regrasp_base::Budget;
 use regrasp_grasp::list::GraspList;
 use regrasp_grasp::list::format::from_json;
+use regrasp_plan::check::{CheckSettings, check_any};
 use regrasp_robot::LoadOptions;
 use regrasp_scene::{Query, load_scene};
 use regrasp_tasks::{TaskSettings, plan_pick_and_place};
@@ -33,7 +34,7 @@ fn main() {
     for path in &scenes {
         let loaded = load_scene(Path::new(path), &options).unwrap_or_else(|error| panic!("{error}"));
         for (index, _) in loaded.tasks.iter().enumerate() {
-            let (mut n_solved, mut times, mut durations) = (0, Vec::new(), Vec::new());
+            let (mut n_solved, mut n_accepted, mut times, mut durations) = (0, 0, Vec::new(), Vec::new());
             for seed in 0..seeds {
                 let Query::PickAndPlace(query) = loaded.tasks[index].query(seed) else { continue };
                 let of_object = loaded.scene.grasp_files.iter().filter(|file| file.object == query.object);
@@ -52,6 +53,19 @@ fn main() {
                     Ok(plan) => {
                         n_solved += 1;
                         durations.push(plan.duration());
+                        let plan = regrasp_plan::AnyPlan::Robot(Box::new(plan));
+                        let asked = loaded.tasks[index].query(seed);
+                        let report = check_any(world, Some(&asked), &plan, &CheckSettings::default());
+                        n_accepted += usize::from(report.accepted());
+                        let mut shown = 0;
+                        for violation in report.violations.iter().take(5) {
+                            println!("  seed {seed}: {violation:?}");
+                            shown += 1;
+                        }
+                        if report.violations.len() > shown {
+                            println!("  and {} more", report.violations.len() - shown);
+                        }
+                        let regrasp_plan::AnyPlan::Robot(plan) = plan else { continue };
                         if seed == 0 {
                             for segment in &plan.segments {
                                 let [first, last] = [0, segment.waypoints.len() - 1].map(|k| segment.waypoints[k].time);
@@ -64,7 +78,7 @@ fn main() {
                             }
                             println!("  {:?}", plan.statistics);
                             if let Some(out) = &out {
-                                std::fs::write(out, regrasp_plan::AnyPlan::Robot(Box::new(plan)).to_json()).expect("written");
+                                std::fs::write(out, regrasp_plan::AnyPlan::Robot(plan).to_json()).expect("written");
                             }
                         }
                     }
@@ -74,7 +88,7 @@ fn main() {
             let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
             let most = times.iter().copied().fold(0.0, f64::max);
             println!(
-                "{path} {}: {n_solved} of {seeds} solved, {:.3} s mean, {most:.3} s longest, plans of {:.2} s",
+                "{path} {}: {n_solved} of {seeds} solved, {n_accepted} accepted, {:.3} s mean, {most:.3} s longest, plans of {:.2} s",
                 loaded.tasks[index].name,
                 mean(&times),
                 mean(&durations)
