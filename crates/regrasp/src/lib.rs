@@ -18,6 +18,8 @@ pub mod scene_text;
 pub mod session;
 /// Settings from several places.
 pub mod settings;
+/// Grasp lists of tasks of pick and place.
+pub mod task_grasps;
 
 pub use regrasp_arms as arms;
 pub use regrasp_base as base;
@@ -30,9 +32,10 @@ pub use regrasp_planners as planners;
 pub use regrasp_roadmap as roadmap;
 pub use regrasp_robot as robot;
 pub use regrasp_scene as scene;
+pub use regrasp_tasks as tasks;
 pub use regrasp_viewer as viewer;
 
-pub use planning::plan_any;
+pub use planning::{plan_any, plan_task};
 pub use regrasp_base::{Budget, InputError};
 pub use regrasp_grasp::GraspList;
 pub use regrasp_grasp_lists::{GraspSettings, list_grasps};

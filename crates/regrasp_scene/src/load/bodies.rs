@@ -4,7 +4,7 @@ use super::files::Files;
 use super::named::which;
 use super::object::{self, Hands, Names};
 use super::task::{self, Heading, Task, TaskKind};
-use super::{gravity, hand, limits, motion, pick_and_place, pose, robot, units};
+use super::{gravity, hand, limits, motion, overlap, pick_and_place, pose, robot, units};
 use crate::gravity::Gravity;
 use crate::limits::Limits;
 use crate::object::Object;
@@ -83,6 +83,7 @@ pub(super) fn several(root: &mut Table, files: &mut Files, found: &mut Found) ->
     let supports = object::fixed_bodies(root, "supports", &mut names, files, found);
     let supports: Vec<Support> = supports.into_iter().map(|body| Support { body }).collect();
     let obstacles = object::fixed_bodies(root, "obstacles", &mut names, files, found);
+    let obstacle_entries = root.optional("obstacles").and_then(|entry| entry.as_list()).unwrap_or_default();
     let bodies = carried.zip(objects);
     let fix = "add [[tasks]] with task = \"in_hand\", hand, object and goal";
     let entries = root.required(found, "tasks", fix)?.entries(found, "tables [[tasks]]")?;
@@ -113,6 +114,9 @@ pub(super) fn several(root: &mut Table, files: &mut Files, found: &mut Found) ->
     if tasks.is_empty() && found.diagnostics.is_empty() {
         let diagnostic = root.error("S102", found, "asks for nothing").fix(fix);
         found.diagnostics.push(diagnostic);
+    }
+    if tasks.iter().any(|task| task.of_robot.as_ref().is_some_and(|query| query.as_pick_and_place().is_some())) {
+        overlap::refuse_overlaps(&supports, &obstacles, &obstacle_entries, found);
     }
     let (objects, world_from_objects) = objects.into_iter().unzip();
     Some(Parts { robots, hands, objects, world_from_objects, grasp_files, supports, obstacles, gravity, limits, tasks })

@@ -73,7 +73,7 @@ pub(super) fn pick_and_place(
 
 /// Reads `grasps = { HAND = "grasps.json" }` of an object. Every file that is named has to be there.
 ///
-/// Errors: a hand that the scene does not have (`S120`), a file that is not found (`S110`).
+/// Errors: a hand that the scene does not have or that no robot carries (`S120`), a file that is not found (`S110`).
 pub(super) fn grasp_files(
     entry: &Entry,
     object: usize,
@@ -90,6 +90,14 @@ pub(super) fn grasp_files(
             found.diagnostics.push(diagnostic);
             continue;
         };
+        if hands[hand].carrier.is_none() {
+            let carried = hands.iter().filter(|hand| hand.carrier.is_some()).map(|hand| hand.name.as_str());
+            let diagnostic = value
+                .error("S120", found, "is a hand that no robot carries")
+                .expected(format!("a hand of the robot: {}", carried.collect::<Vec<_>>().join(", ")));
+            found.diagnostics.push(diagnostic);
+            continue;
+        }
         let Some(path) = files.locate(&value, found) else { continue };
         let file = value.text(found)?.to_owned();
         match files.options.read(&path) {

@@ -5,6 +5,7 @@ mod bad_inputs;
 #[path = "../../examples/bulb_mesh.rs"]
 mod bulb_mesh;
 mod bundled;
+mod carried_grasps;
 mod hostile;
 mod motion;
 mod pairs;
