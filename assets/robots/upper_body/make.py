@@ -285,10 +285,20 @@ def accelerations():
     return text
 
 
+def facing(text):
+    """The robot file with the yaw of the torso held at zero: each arm then has a side that the other does not reach."""
+    title, _, rest = text.partition("\n")
+    title = "# The robot of robot.toml with the yaw of the torso held at zero: 42 joints. Written by make.py; change that."
+    rest = rest.replace('name = "upper_body"', 'name = "upper_body_facing"')
+    lines = [line for line in rest.split("\n") if not line.startswith("torso_yaw")]
+    return "\n".join([title, *lines]).rstrip("\n") + "\n\n[held]\ntorso_yaw = 0.0\n"
+
+
 def files():
     """The text of every file, by name."""
     about = "Dimensions as published for DLR's Justin (Saut 2010, sec. VI); shapes are our own."
     texts = {"body.urdf": robot("upper_body", about, torso() + arm("right") + arm("left")), "robot.toml": ROBOT + accelerations()}
+    texts["facing.toml"] = facing(texts["robot.toml"])
     for side in ("right", "left"):
         texts[f"{side}_hand.urdf"] = robot(f"{side}_hand", about, hand(side))
         texts[f"{side}_hand.toml"] = hand_file(side)

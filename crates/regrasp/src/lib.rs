@@ -18,6 +18,8 @@ pub mod scene_text;
 pub mod session;
 /// Settings from several places.
 pub mod settings;
+/// Grasp lists of tasks of pick and place.
+pub mod task_grasps;
 
 pub use regrasp_arms as arms;
 pub use regrasp_base as base;

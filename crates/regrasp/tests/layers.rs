@@ -72,6 +72,20 @@ const TOWER: &[Floor] = &[
             "regrasp_manipulation",
         ],
     ),
+    floor(
+        "regrasp_tasks",
+        &[
+            "regrasp_base",
+            "regrasp_geometry",
+            "regrasp_robot",
+            "regrasp_scene",
+            "regrasp_grasp",
+            "regrasp_plan",
+            "regrasp_manipulation",
+            "regrasp_grasp_lists",
+            "regrasp_arms",
+        ],
+    ),
     Floor {
         name: "regrasp_planners",
         ships_with: &[
@@ -110,6 +124,7 @@ const TOWER: &[Floor] = &[
             "regrasp_plan",
             "regrasp_grasp_lists",
             "regrasp_arms",
+            "regrasp_tasks",
             "regrasp_planners",
             "regrasp_export",
             "regrasp_viewer",

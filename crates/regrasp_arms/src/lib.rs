@@ -23,5 +23,7 @@ pub mod world;
 
 pub use model::ArmModel;
 pub use motion::Collider;
+pub use plan::leg::{Leg, LegTimes, plan_leg};
+pub use plan::problem::{Covers, Problem};
 pub use plan::{Stage, plan_in_stages, plan_motion};
 pub use world::World;

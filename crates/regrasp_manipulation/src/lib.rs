@@ -31,6 +31,8 @@ pub mod relocation;
 pub mod rolling;
 /// Settings of motions, forces and times.
 pub mod settings;
+/// Settings of pick and place.
+pub mod task_settings;
 /// Times of waypoints.
 pub mod timing;
 /// Tolerances that plans promise.

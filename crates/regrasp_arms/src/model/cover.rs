@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 use regrasp_geometry::collision::{MeshTree, Placed, Placement, Separation, separation};
 use regrasp_geometry::shape::PlacedShape;
-use regrasp_geometry::{Point, Shape, Vector};
+use regrasp_geometry::{Point, Pose, Shape, Vector};
 use regrasp_robot::Robot;
 use regrasp_robot::hand::convex_of;
 
@@ -27,6 +27,24 @@ pub struct LinkCover {
     pub shapes: Vec<PlacedShape>,
     /// True where the shapes are the balls.
     pub is_exact: bool,
+}
+
+impl LinkCover {
+    /// The same cover at `parent_from_own`.
+    #[must_use]
+    pub fn moved(&self, parent_from_own: &Pose) -> Self {
+        let ball = |ball: &CoverBall| CoverBall { center: parent_from_own * ball.center, ..*ball };
+        let shape = |placed: &PlacedShape| PlacedShape {
+            parent_from_shape: parent_from_own * placed.parent_from_shape,
+            shape: placed.shape.clone(),
+        };
+        LinkCover {
+            balls: self.balls.iter().map(ball).collect(),
+            bound: (parent_from_own * self.bound.0, self.bound.1),
+            shapes: self.shapes.iter().map(shape).collect(),
+            is_exact: self.is_exact,
+        }
+    }
 }
 
 /// Largest edge of the cells that shapes are cut into, in metres.

@@ -8,6 +8,8 @@ use crate::times::{Limits, RoundedPath, Row, TimedPath, TimedPoint, times};
 use regrasp_manipulation::failure::{Failure, FailureKind};
 use regrasp_manipulation::motion_settings::{MotionSettings, Validation};
 use regrasp_plan::robot_plan::{RobotPromises, RobotStatistics};
+use regrasp_robot::Manipulator;
+use regrasp_scene::Scene;
 
 /// A motion with its times.
 pub struct Executed {
@@ -29,7 +31,8 @@ pub fn execute(
     found: Found,
     settings: &MotionSettings,
 ) -> Result<Executed, Failure> {
-    let limits = limits(problem, model);
+    let free: Vec<usize> = model.coordinates.iter().map(|c| c.index).collect();
+    let limits = limits(problem.scene, problem.robot, &free);
     let is_certified = settings.validation == Validation::Certified;
     let of_collider = ColliderSettings {
         clearance: settings.clearance,
@@ -81,20 +84,20 @@ fn at_rest(configuration: &[f64]) -> TimedPath {
     TimedPath { points: vec![point(0.0), point(REST)], corners: vec![None] }
 }
 
-/// What limits the free joints, and joints that follow them.
-fn limits(problem: &Problem, model: &ArmModel) -> Limits {
-    let promises = RobotPromises::of(problem.scene, problem.robot);
-    let row = |(k, c): (usize, &crate::model::GroupCoordinate)| Row {
+/// What limits the coordinates `free` of a robot, and joints that follow them.
+pub fn limits(scene: &Scene, robot: &Manipulator, free: &[usize]) -> Limits {
+    let promises = RobotPromises::of(scene, robot);
+    let row = |(k, &index): (usize, &usize)| Row {
         terms: vec![(k, 1.0)],
-        velocity: promises.joint_velocities[c.index],
-        acceleration: promises.joint_accelerations[c.index],
+        velocity: promises.joint_velocities[index],
+        acceleration: promises.joint_accelerations[index],
     };
-    let mut rows: Vec<Row> = model.coordinates.iter().enumerate().map(row).collect();
-    let robot = &problem.robot.robot;
-    for (index, joint) in robot.joints.iter().enumerate().filter(|(_, joint)| joint.coupling.is_some()) {
+    let mut rows: Vec<Row> = free.iter().enumerate().map(row).collect();
+    let tree = &robot.robot;
+    for (index, joint) in tree.joints.iter().enumerate().filter(|(_, joint)| joint.coupling.is_some()) {
         let Some(velocity) = joint.limits.and_then(|limits| limits.velocity) else { continue };
-        let Some(drive) = problem.robot.layout.drive_of(robot, index) else { continue };
-        let own = |k: usize| model.coordinates.iter().position(|c| c.index == k);
+        let Some(drive) = robot.layout.drive_of(tree, index) else { continue };
+        let own = |k: usize| free.iter().position(|&index| index == k);
         let terms: Vec<(usize, f64)> = drive.terms.iter().filter_map(|&(k, m)| Some((own(k)?, m))).collect();
         if !terms.is_empty() {
             rows.push(Row { terms, velocity, acceleration: f64::INFINITY });

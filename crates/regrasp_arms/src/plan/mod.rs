@@ -4,16 +4,19 @@
 mod ends;
 /// The motion that is executed: rounded corners, times, proof.
 mod execute;
+/// Motions of a longer task.
+pub mod leg;
 /// A path.
 mod path;
 /// The robot and what stands around it.
-mod problem;
+pub mod problem;
 /// The plan of a motion that was found.
 mod record;
 /// Goals that are poses of wrists.
 mod wrists;
 
 use execute::execute;
+pub use execute::limits;
 use problem::Problem;
 use regrasp_base::Budget;
 use regrasp_manipulation::failure::{Failure, FailureKind};

@@ -8,15 +8,29 @@ use regrasp_geometry::{Pose, Shape};
 use regrasp_robot::Manipulator;
 use regrasp_robot::manipulator::layout::Part;
 use regrasp_scene::{MotionQuery, Scene, State};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// Covers that do not change from motion to motion.
+#[derive(Debug, Clone)]
+pub struct Covers {
+    /// By link of the robot.
+    pub links: Vec<LinkCover>,
+    /// Of the objects that the robot may carry, in the frame of the object, by index in `Scene::objects`.
+    pub objects: BTreeMap<usize, LinkCover>,
+}
 
 /// A query with all that planning needs of the scene.
 pub struct Problem<'a> {
+    /// The scene.
     pub scene: &'a Scene,
+    /// What is asked.
     pub query: &'a MotionQuery,
+    /// The robot that moves.
     pub robot: &'a Manipulator,
-    pub world: World,
-    covers: Vec<LinkCover>,
+    /// What rests around it.
+    pub world: Arc<World>,
+    covers: Arc<Covers>,
     /// What the robot carries.
     pub attached: Vec<Attached>,
     /// By carried object: its pose in the frame of its link.
@@ -24,7 +38,15 @@ pub struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
+    /// All that rests in `state` and is not carried is in the way.
     pub fn new((scene, state): (&'a Scene, &State), query: &'a MotionQuery) -> Self {
+        let links = covers(&scene.robots[query.robot].robot);
+        let covers = Covers { links, objects: BTreeMap::new() };
+        Self::in_world(scene, query, Arc::new(World::new(surroundings(scene, state, query))), &Arc::new(covers))
+    }
+
+    /// In a world that is made already, with covers that are known. Objects without one get theirs.
+    pub fn in_world(scene: &'a Scene, query: &'a MotionQuery, world: Arc<World>, known: &Arc<Covers>) -> Self {
         let robot = &scene.robots[query.robot];
         let mut poses = Vec::new();
         robot.link_poses(&query.start, &mut poses);
@@ -42,16 +64,19 @@ impl<'a> Problem<'a> {
                 let below = robot.robot.joints_from(link).map(|joint| robot.robot.joints[joint.0].child);
                 waiting.extend(below.filter(|&child| may_touch.insert(child)));
             }
-            attached.push(Attached { name: object.name.clone(), link, cover: cover(&[placed]), may_touch });
+            let cover = match known.objects.get(&carried.object) {
+                Some(of_object) => of_object.moved(&link_from_object),
+                None => cover(&[placed]),
+            };
+            attached.push(Attached { name: object.name.clone(), link, cover, may_touch });
             link_from_objects.push(link_from_object);
         }
-        let world = World::new(surroundings(scene, state, query));
-        Problem { scene, query, robot, world, covers: covers(&robot.robot), attached, link_from_objects }
+        Problem { scene, query, robot, world, covers: known.clone(), attached, link_from_objects }
     }
 
     /// The robot with these coordinates free, all others as at the start.
     pub fn model(&self, free: &[usize]) -> ArmModel {
-        ArmModel::new(self.robot, &self.covers, &self.attached, &self.query.start, free)
+        ArmModel::new(self.robot, &self.covers.links, &self.attached, &self.query.start, free)
     }
 
     /// Sets of coordinates to plan with, in this order: those of the parts that the goals change, then those of all arms too.
@@ -79,7 +104,7 @@ impl<'a> Problem<'a> {
 }
 
 /// Everything that rests while the robot moves.
-fn surroundings(scene: &Scene, state: &State, query: &MotionQuery) -> Vec<Obstacle> {
+pub fn surroundings(scene: &Scene, state: &State, query: &MotionQuery) -> Vec<Obstacle> {
     let mut all = Vec::new();
     let fixed = scene.supports.iter().map(|support| &support.body).chain(&scene.obstacles);
     all.extend(fixed.map(|body| Obstacle { name: body.name.clone(), placed: body.placed.clone() }));

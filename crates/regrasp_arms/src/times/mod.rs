@@ -94,7 +94,7 @@ fn point(of_path: &rounded::GridPoint, pace: f64, time: f64) -> TimedPoint {
 }
 
 /// Makes all slower by the factor with which the cubics keep the limits: on parabolas they are no more than near the path.
-fn slow_down(timed: &mut TimedPath, limits: &Limits) {
+pub fn slow_down(timed: &mut TimedPath, limits: &Limits) {
     let mut most: f64 = 1.0;
     for k in 0..timed.corners.len() {
         let (a, b) = (&timed.points[k], &timed.points[k + 1]);

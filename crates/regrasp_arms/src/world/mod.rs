@@ -209,6 +209,19 @@ pub struct World {
 const FEW: usize = 64;
 
 impl World {
+    /// The same world with one obstacle more.
+    #[must_use]
+    pub fn with(&self, obstacle: Obstacle) -> Self {
+        World::new(self.obstacles.iter().cloned().chain([obstacle]).collect())
+    }
+
+    /// The same world without the obstacles with these indices.
+    #[must_use]
+    pub fn without(&self, left_out: &[usize]) -> Self {
+        let kept = self.obstacles.iter().enumerate().filter(|(index, _)| !left_out.contains(index));
+        World::new(kept.map(|(_, obstacle)| obstacle.clone()).collect())
+    }
+
     /// The world of these obstacles.
     pub fn new(obstacles: Vec<Obstacle>) -> Self {
         let items: Vec<Item> = obstacles.iter().map(|obstacle| Item::new(&obstacle.placed)).collect();
@@ -228,6 +241,13 @@ impl World {
         };
         let boxes = corners.chunks(LANES).map(block).collect();
         World { obstacles, items, exact, boxes, tree }
+    }
+
+    /// True where the ball about `center` is proved to meet no obstacle.
+    pub fn is_ball_free(&self, center: &Point, radius: f64) -> bool {
+        let at = Placement { rotation: Matrix3::identity(), translation: center.coords };
+        let ball = Shape::Sphere { radius };
+        self.exact.iter().all(|exact| exact.is_apart(&ball, &at, 0.0))
     }
 
     /// Indices of at least all obstacles that meet the box from `low` to `high`, in rising order, in place of `found`.

@@ -87,6 +87,41 @@ impl Held {
         Held { fingers, grips, joints, load: forces.load(world_from_object), reserves }
     }
 
+    /// The forces under a load in the object frame that the grasp is not made for: `load` alone counts, for no other direction room is
+    /// kept. `warm` are those of the moment before.
+    pub fn forces_under(
+        &self,
+        model: &Model,
+        forces: &ForceModel,
+        load: Wrench,
+        warm: Option<&BalancedForces>,
+    ) -> Result<BalancedForces, NoForces> {
+        let problem = self.problem_under(model, forces, load);
+        distribute(&problem, warm.map(|warm| warm.as_slice()))
+    }
+
+    /// True when there are forces under a load, as [`Held::forces_under`].
+    pub fn is_balanced_under(&self, model: &Model, forces: &ForceModel, load: Wrench) -> bool {
+        can_balance(&self.problem_under(model, forces, load))
+    }
+
+    fn problem_under<'p>(&'p self, model: &'p Model, forces: &ForceModel, load: Wrench) -> ForceProblem<'p> {
+        ForceProblem {
+            grips: &self.grips,
+            joints: &self.joints,
+            reserves: &[],
+            rubbing: &[],
+            frame: &model.frame,
+            load,
+            limits: forces.limits,
+        }
+    }
+
+    /// What the fingers touch, in the order of [`Held::fingers`].
+    pub fn grips(&self) -> &[Grip] {
+        &self.grips
+    }
+
     /// None where no forces whatever will do.
     fn problem<'p>(&'p self, model: &'p Model, forces: &ForceModel) -> Option<ForceProblem<'p>> {
         let reserves = self.reserves.as_ref().filter(|_| !self.grips.is_empty())?;

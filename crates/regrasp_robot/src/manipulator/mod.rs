@@ -18,6 +18,7 @@ use layout::{JointLayout, Part};
 use regrasp_geometry::Pose;
 use regrasp_geometry::shape::PlacedShape;
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 pub(crate) use parts::top_of;
@@ -62,6 +63,8 @@ pub struct MountedHand {
     pub arm: Option<usize>,
     /// The first link of the hand: the one that carries its base without a moving joint between. Every link below is the hand's.
     pub top: LinkId,
+    /// The hand file. None for a hand that is a manipulator by itself.
+    pub file: Option<PathBuf>,
 }
 
 /// The links of a manipulator that belong to neither an arm nor a hand.
@@ -179,7 +182,7 @@ impl Manipulator {
         let robot = hand.robot.clone();
         let top = parts::top_of(&robot, hand.base, None);
         let base = hand.base;
-        let hands = vec![MountedHand { name: name.clone(), hand, arm: None, top }];
+        let hands = vec![MountedHand { name: name.clone(), hand, arm: None, top, file: None }];
         let mut manipulator = Manipulator::new(name, robot, Parts { hands, ..Parts::default() })?;
         let rest = manipulator.layout.rest();
         let root_from_hand = manipulator.tree.root_from_link(base, &rest);

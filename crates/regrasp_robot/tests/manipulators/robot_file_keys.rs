@@ -149,6 +149,20 @@ fn models_stand_on_links_of_models_before_them() {
     assert!(seen.starts_with(expected), "{seen}");
 }
 
+/// A link that a model does without keeps its place in the tree, so that names of sphere models keep their meaning.
+#[test]
+fn links_that_a_model_does_without_have_no_geometry_and_no_joints() {
+    let model = "spheres = \"balls.urdf\"\nwithout = [\"rod\", \"wheel\"]";
+    let file = FILE.replace("\"body.urdf\"", &format!("\"body.urdf\"\n{model}"));
+    let robot = seen(&file).unwrap();
+    assert_eq!(robot.layout.names(), ["lift", "lean", "j1", "j2"]);
+    compare(&robot, &|joint, of_state| if ["jr", "roll"].contains(&joint) { 0.0 } else { of_state(joint) });
+    let arm = "[[models]]\nurdf = \"body.urdf\"\nwithout = [\"a1\"]\n";
+    let robot = seen(arm).unwrap();
+    assert_eq!(robot.layout.names(), ["lift", "lean", "roll"]);
+    assert!(robot.common.shapes.is_empty(), "the box of a1 is gone");
+}
+
 #[test]
 fn bad_keys_are_refused() {
     let common = |joints: &str| format!("{FILE}[common]\njoints = [{joints}]\n");
@@ -188,6 +202,14 @@ fn bad_keys_are_refused() {
                 "{FILE}[[couplings]]\njoint = \"lean\"\nleader = \"lift\"\n[[couplings]]\njoint = \"lift\"\nleader = \"lean\"\n"
             ),
             "U141 robot.toml:10:9 key \"couplings[0].joint\": joint \"lean\" follows itself",
+        ),
+        (
+            FILE.replace("\"body.urdf\"", "\"body.urdf\"\nwithout = [\"rdo\"]"),
+            "U205 robot.toml:5:12 key \"models[0].without[0]\": the robot has no link \"rdo\"",
+        ),
+        (
+            FILE.replace("\"body.urdf\"", "\"body.urdf\"\nwithout = [\"base\"]"),
+            "U206 robot.toml:5:12 key \"models[0].without[0]\": is the root of the model, and the model does without it",
         ),
         (
             FILE.replace("\"body.urdf\"", "\"balls.urdf\"\nspheres = \"body.urdf\""),

@@ -236,7 +236,8 @@ pub(super) fn make(tree: &Arc<Robot>, mount: &Mount, found: &mut Found) -> Optio
     match made {
         Ok((hand, notes)) => {
             found.notes.extend(notes);
-            Some(MountedHand { name: mount.name.clone(), hand, arm: mount.arm, top: mount.top })
+            let file = Some(mount.file.clone());
+            Some(MountedHand { name: mount.name.clone(), hand, arm: mount.arm, top: mount.top, file })
         }
         Err(error) => {
             found.diagnostics.extend(error);

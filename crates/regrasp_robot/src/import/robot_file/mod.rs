@@ -14,6 +14,8 @@ mod merge;
 mod models;
 /// Balls instead of collision geometry.
 mod spheres;
+/// Links that a model does without.
+mod without;
 
 use super::couplings;
 use super::hand_file::{CODES, LoadedHand, load_hand, read_pairs};

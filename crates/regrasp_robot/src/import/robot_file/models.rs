@@ -4,7 +4,7 @@ use super::super::hand_file::{locate_and_load, read_srdf, unit_quaternion};
 use super::super::options::{LoadOptions, LoadedInput};
 use super::Draft;
 use super::merge::{self, Place};
-use super::spheres;
+use super::{spheres, without};
 use crate::robot::{LinkId, Robot};
 use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_base::Diagnostic;
@@ -113,7 +113,7 @@ fn parent_of(spec: &ModelSpec, tree: &Robot, found: &mut Found) -> Option<LinkId
 fn read_model(mut table: Table, path: &Path, options: &LoadOptions, found: &mut Found) -> Option<ModelSpec> {
     let name = table.optional("name").map(|entry| entry.name(found).map(str::to_owned));
     let urdf = table.required(found, "urdf", "add urdf = \"robot.urdf\"");
-    let [srdf, spheres, parent] = ["srdf", "spheres", "parent"].map(|key| table.optional(key));
+    let [srdf, spheres, parent, without] = ["srdf", "spheres", "parent", "without"].map(|key| table.optional(key));
     let parent = match parent {
         Some(entry) => Some((entry.text(found)?.to_owned(), found.place(&entry.span))),
         None => None,
@@ -130,6 +130,9 @@ fn read_model(mut table: Table, path: &Path, options: &LoadOptions, found: &mut 
     {
         disabled.extend(loaded.srdf.disabled_pairs.iter().map(|pair| pair.links));
         inputs.push(loaded.input);
+    }
+    if let Some(entry) = &without {
+        without::take_away(entry, &mut robot, found)?;
     }
     let name = match name {
         Some(name) => Some(name?),

@@ -238,6 +238,17 @@ impl ArmIk {
         }
     }
 
+    /// The posture for a pose near that of the posture `from`, to which it leads without a jump. None where limits or a singularity are
+    /// in the way.
+    ///
+    /// Panics unless `from` has one value per coordinate.
+    pub fn follow(&self, base_from_mount: &Pose, from: &[f64]) -> Option<Coordinates> {
+        assert_eq!(from.len(), self.chain.n_coordinates(), "one value per coordinate");
+        let mut joints: Coordinates = from.iter().copied().collect();
+        let miss = numeric::descend(&self.chain, &self.last_body(base_from_mount), &mut joints, POLISHED);
+        (miss.largest() < POSE_TOLERANCE && self.chain.within_limits(&joints, 0.0)).then_some(joints)
+    }
+
     fn last_body(&self, base_from_mount: &Pose) -> BodyFrame {
         frame_of(base_from_mount).then(&self.mount_from_last)
     }

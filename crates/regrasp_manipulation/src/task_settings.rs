@@ -1,0 +1,114 @@
+//! Settings of pick and place.
+
+use crate::settings::ForceSettings;
+use serde::{Deserialize, Serialize};
+
+/// What a good plan of pick and place is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TaskCost {
+    /// A short time, by estimates of how long each step takes.
+    #[default]
+    Time,
+    /// As few changes of the holder as possible.
+    Changes,
+}
+
+/// Settings of tasks of pick and place. Lengths in metres, times in seconds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TaskSettings {
+    /// What the planner makes small.
+    pub cost: TaskCost,
+    /// Distance that bodies keep. By hand: half of what grasp lists keep between hand and object.
+    pub clearance: f64,
+    /// Distance that searches for motions keep besides.
+    pub search_margin: f64,
+    /// Shortcuts that are tried in each motion.
+    pub shortcuts: usize,
+    /// Most samples of one motion's search.
+    pub max_samples: u64,
+    /// Longest step of the hand on a straight line.
+    pub line_step: f64,
+    /// Height to which a hand lifts an object straight off its support; a third of it where that does not fit.
+    pub lift: f64,
+    /// How long everything rests while a holder joins or leaves.
+    pub rest: f64,
+    /// Postures of the common joints that are drawn for one grasp, besides that of the start.
+    pub common_draws: usize,
+    /// Places of the exchange that are tried for one pair of grasps, the best of the grid first.
+    pub exchange_places: usize,
+    /// Orientations of the object that are tried at one place.
+    pub exchange_turns: usize,
+    /// Poses about the best place that are drawn after those.
+    pub exchange_draws: usize,
+    /// Standard deviation of their positions.
+    pub exchange_spread: f64,
+    /// Distance of the grid's nodes.
+    pub exchange_grid: f64,
+    /// May one hand give the object to another one?
+    pub hand_over: bool,
+    /// May the object be put down on the way?
+    pub put_down: bool,
+    /// Poses on supports at which it may be put down.
+    pub placements: usize,
+    /// Edges of the task graph that are tested, at most.
+    pub max_edges: usize,
+    /// Contact forces. The normal forces are those of the grasp lists where those are narrower.
+    pub forces: ForceSettings,
+}
+
+impl Default for TaskSettings {
+    fn default() -> Self {
+        TaskSettings {
+            cost: TaskCost::default(),
+            clearance: 1e-4,
+            search_margin: 2e-3,
+            shortcuts: 60,
+            max_samples: 20_000,
+            line_step: 0.01,
+            lift: 0.03,
+            rest: 0.2,
+            common_draws: 24,
+            exchange_places: 40,
+            exchange_turns: 4,
+            exchange_draws: 100,
+            exchange_spread: 0.1,
+            exchange_grid: 0.1,
+            hand_over: true,
+            put_down: true,
+            placements: 24,
+            max_edges: 2000,
+            forces: ForceSettings::default(),
+        }
+    }
+}
+
+impl TaskSettings {
+    /// Err with what is wrong.
+    pub fn validate(&self) -> Result<(), String> {
+        let between = |name: &str, value: f64, low: f64, high: f64| match (low..=high).contains(&value) {
+            true => Ok(()),
+            false => Err(format!("{name} is {value}; it must be from {low} to {high}")),
+        };
+        between("clearance", self.clearance, 0.0, 0.1)?;
+        between("search_margin", self.search_margin, 0.0, 0.1)?;
+        between("line_step", self.line_step, 1e-3, 0.1)?;
+        between("lift", self.lift, 1e-3, 1.0)?;
+        between("rest", self.rest, 1e-3, 100.0)?;
+        between("exchange_spread", self.exchange_spread, 0.0, 10.0)?;
+        between("exchange_grid", self.exchange_grid, 0.01, 10.0)?;
+        let at_most = |name: &str, value: usize, most: usize| match value <= most {
+            true => Ok(()),
+            false => Err(format!("{name} is {value}; at most {most}")),
+        };
+        at_most("shortcuts", self.shortcuts, 100_000)?;
+        at_most("common_draws", self.common_draws, 100_000)?;
+        at_most("exchange_places", self.exchange_places, 100_000)?;
+        at_most("exchange_turns", self.exchange_turns, 24)?;
+        at_most("exchange_draws", self.exchange_draws, 1_000_000)?;
+        at_most("placements", self.placements, 1_000)?;
+        at_most("max_edges", self.max_edges, 1_000_000)?;
+        self.forces.validate()
+    }
+}

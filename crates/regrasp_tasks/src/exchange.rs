@@ -1,0 +1,264 @@
+//! Where one hand gives the object to another one (Saut 2010, sec. V-C).
+
+use crate::context::Context;
+use crate::failing::{Stage, Tally};
+use crate::forces;
+use crate::line::{LINE_STEPS, is_motion_free, is_state_free, straight};
+use crate::station::{arm_postures, can_close, common_postures, with_fingers};
+use crate::timing::Smooth;
+use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
+use regrasp_arms::World;
+use regrasp_arms::model::ArmModel;
+use regrasp_base::Rng;
+use regrasp_geometry::{Point, Pose, Vector};
+
+/// Postures of one arm that are looked at.
+const POSTURES: usize = 3;
+/// Standard deviation of drawn orientations about one of the set, in radians. By hand.
+const TURN_SPREAD: f64 = 0.4;
+/// Postures of the common joints that are drawn for one drawn pose.
+const COMMON_DRAWS: usize = 2;
+/// The grid reaches so far beyond shoulders, start and goal, in metres.
+const BEYOND: f64 = 0.3;
+/// Shares of the ways in and out that are tried.
+const WAY_SHARES: [f64; 2] = [1.0, 0.4];
+
+/// One hand gives the object to another one.
+#[derive(Debug, Clone)]
+pub struct Give {
+    /// Hand and index of its grasp: who gives.
+    pub giver: [usize; 2],
+    /// Who takes.
+    pub taker: [usize; 2],
+    /// Both hold the object.
+    pub at: Vec<f64>,
+    /// The open taker from the object to where its way in begins; the giver holds.
+    pub way_in: Smooth,
+    /// The open giver from the object to where its way out ends; the taker holds.
+    pub way_out: Smooth,
+}
+
+/// Positions of the exchange, the best first.
+pub struct Places {
+    positions: Vec<Point>,
+    turns: Vec<UnitQuaternion<f64>>,
+}
+
+/// Where the shoulder of a hand's arm is at the start.
+fn shoulder(context: &Context, hand: usize) -> Point {
+    let mut poses = Vec::new();
+    context.robot.link_poses(&context.query.start, &mut poses);
+    poses[context.robot.arms[context.hands[hand].arm].base.0].translation.vector.into()
+}
+
+impl Places {
+    /// Free nodes of a grid, by the sum of the ways of both wrists: from its start over the object at the start, the exchange and to
+    /// its end for the first hand; over the exchange and the goal for the second one.
+    pub fn new(context: &Context, hands: [usize; 2]) -> Self {
+        let wrists = hands.map(|hand| context.world_from_hand(hand, &context.query.start).translation.vector);
+        let ends = hands.map(|hand| context.world_from_hand(hand, &context.query.end).translation.vector);
+        let object = [&context.query.world_from_object_start, &context.query.world_from_object_goal];
+        let [start, goal] = object.map(|pose| (pose * context.object.center_of_mass).coords);
+        let shoulders = hands.map(|hand| shoulder(context, hand).coords);
+        let corners = [start, goal, shoulders[0], shoulders[1]];
+        let low = corners.iter().fold(corners[0], |low, c| low.inf(c)) - Vector::repeat(BEYOND);
+        let high = corners.iter().fold(corners[0], |high, c| high.sup(c)) + Vector::repeat(BEYOND);
+        // No more nodes than this along a side.
+        let step = context.settings.exchange_grid.max((high - low).max() / 40.0);
+        let n = ((high - low) / step).map(|count| count.floor() as usize);
+        let radius = context.object.radius;
+        let mut nodes: Vec<(f64, Point)> = Vec::new();
+        for i in 0..=n.x {
+            for j in 0..=n.y {
+                for k in 0..=n.z {
+                    let at = low + Vector::new(i as f64, j as f64, k as f64) * step;
+                    let ways = (wrists[0] - start).norm()
+                        + (start - at).norm()
+                        + (at - ends[0]).norm()
+                        + (wrists[1] - at).norm()
+                        + (at - goal).norm()
+                        + (goal - ends[1]).norm();
+                    nodes.push((ways, at.into()));
+                }
+            }
+        }
+        nodes.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let positions = nodes
+            .into_iter()
+            .map(|(_, at)| at)
+            .filter(|at| context.fixed.is_ball_free(at, radius))
+            .take(context.settings.exchange_places);
+        Places { positions: positions.collect(), turns: turns() }
+    }
+
+    /// Where the object comes with one grasp each. Err with a reason.
+    pub fn give(
+        &self,
+        context: &Context,
+        giver: [usize; 2],
+        taker: [usize; 2],
+        tally: &mut Tally,
+    ) -> Result<Give, &'static str> {
+        let mut attempt = Attempt::new(context, giver, taker);
+        let shoulders = [giver, taker].map(|[hand, _]| shoulder(context, hand));
+        let grasps = [giver, taker].map(|[hand, grasp]| &context.hands[hand].grasps[grasp]);
+        // How natural an orientation is at a place: the directions in which the hands come, and from the shoulders to the object.
+        let natural = |at: &Point, turn: &UnitQuaternion<f64>| -> f64 {
+            let of = |k: usize| {
+                let comes = turn * grasps[k].direction;
+                (at - shoulders[k]).try_normalize(1e-9).map_or(0.0, |towards| towards.dot(&comes))
+            };
+            of(0).min(of(1)) + 0.1 * (of(0) + of(1))
+        };
+        let pose = |at: &Point, turn: &UnitQuaternion<f64>| {
+            let position = at.coords - turn * context.object.center_of_mass.coords;
+            Pose::from_parts(Translation3::from(position), *turn)
+        };
+        for at in &self.positions {
+            let mut ranked: Vec<(f64, &UnitQuaternion<f64>)> =
+                self.turns.iter().map(|turn| (natural(at, turn), turn)).collect();
+            ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+            for (_, turn) in ranked.iter().take(context.settings.exchange_turns) {
+                if let Some(give) = attempt.at(&pose(at, turn), &context.query.start, tally) {
+                    return Ok(give);
+                }
+            }
+        }
+        // Drawn about the best places.
+        let index = ((giver[0] * 1009 + giver[1]) * 1009 + taker[0]) * 1009 + taker[1];
+        let mut rng = Rng::keyed(context.seed, "exchange", index as u64);
+        if self.positions.is_empty() {
+            return Err("without a free place");
+        }
+        let hands = [giver[0], taker[0]];
+        for draw in 0..context.settings.exchange_draws {
+            let middle = &self.positions[draw % self.positions.len().min(8)];
+            let spread = context.settings.exchange_spread;
+            let shift = Vector::new(rng.normal(), rng.normal(), rng.normal()) * spread;
+            let at = middle + shift;
+            let best = (0..4)
+                .map(|_| {
+                    let turn = self.turns[rng.below(self.turns.len())];
+                    let bend = Vector::new(rng.normal(), rng.normal(), rng.normal()) * TURN_SPREAD;
+                    let turn = UnitQuaternion::from_scaled_axis(bend) * turn;
+                    (natural(&at, &turn), turn)
+                })
+                .max_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((_, turn)) = best else { continue };
+            let commons = common_postures(context, &hands, &context.query.start, COMMON_DRAWS, &mut rng);
+            for common in &commons {
+                if let Some(give) = attempt.at(&pose(&at, &turn), common, tally) {
+                    return Ok(give);
+                }
+            }
+        }
+        Err(REASONS[attempt.reached])
+    }
+}
+
+/// Why an exchange fails, from far to near.
+const REASONS: [&str; 7] = [
+    "out of reach",
+    "in collision",
+    "without a way of the taker",
+    "with a taker that cannot close",
+    "with a giver that cannot open",
+    "without a way of the giver",
+    "that do not hold the weight",
+];
+
+/// One pair of grasps.
+struct Attempt<'c, 'a> {
+    context: &'c Context<'a>,
+    giver: [usize; 2],
+    taker: [usize; 2],
+    /// Both closed with the object, taker open, giver open; made when they are needed.
+    models: Option<[ArmModel; 3]>,
+    /// Index of the nearest reason.
+    reached: usize,
+}
+
+impl<'c, 'a> Attempt<'c, 'a> {
+    fn new(context: &'c Context<'a>, giver: [usize; 2], taker: [usize; 2]) -> Self {
+        Attempt { context, giver, taker, models: None, reached: 0 }
+    }
+
+    /// The exchange with the object at a pose, with the common joints of `common`.
+    fn at(&mut self, world_from_object: &Pose, common: &[f64], tally: &mut Tally) -> Option<Give> {
+        let context = self.context;
+        let [giver, taker] = [self.giver, self.taker].map(|[hand, grasp]| (hand, &context.hands[hand].grasps[grasp]));
+        tally.work(1);
+        let both = with_fingers(context, &with_fingers(context, common, giver.0, &giver.1.closed), taker.0, &taker.1.closed);
+        let target = |(hand, grasp): (usize, &crate::context::Grasp)| (hand, world_from_object * grasp.object_from_hand);
+        let (hand, pose) = target(giver);
+        let first = arm_postures(context, hand, &both, &pose, POSTURES)
+            .map_err(|(by, words)| tally.miss(Stage::Exchange, by, || words))
+            .ok()?;
+        let (hand, pose) = target(taker);
+        let second = arm_postures(context, hand, &both, &pose, POSTURES)
+            .map_err(|(by, words)| tally.miss(Stage::Exchange, by, || words))
+            .ok()?;
+        let holds = |(hand, grasp)| forces::holds(context, hand, grasp, world_from_object);
+        if !holds(giver) || !holds(taker) {
+            return None;
+        }
+        self.reached = self.reached.max(1);
+        let free = &context.arms_and_torso;
+        let models = self.models.get_or_insert_with(|| {
+            let attached = context.attached(giver.0, &giver.1.object_from_hand.inverse(), &[taker.0]);
+            let of = |state: &[f64], attached: &[regrasp_arms::model::Attached]| {
+                ArmModel::new(context.robot, &context.covers.links, attached, state, free)
+            };
+            let open = |(hand, grasp): (usize, &crate::context::Grasp)| with_fingers(context, &both, hand, &grasp.open);
+            [of(&both, &[attached]), of(&open(taker), &[]), of(&open(giver), &[])]
+        });
+        let arm = context.hands[taker.0].arm_joints.clone();
+        let mut world: Option<World> = None;
+        for first in &first {
+            for second in &second {
+                let mut at = first.clone();
+                at[arm.clone()].copy_from_slice(&second[arm.clone()]);
+                if !is_state_free(context, &models[0], &context.fixed, &at, tally) {
+                    continue;
+                }
+                self.reached = self.reached.max(2);
+                let world = world.get_or_insert_with(|| context.fixed.with(context.obstacle_at(world_from_object)));
+                let way = |(hand, grasp): (usize, &crate::context::Grasp), model: &ArmModel, tally: &mut Tally| {
+                    let open = with_fingers(context, &at, hand, &grasp.open);
+                    let direction = world_from_object.rotation * grasp.direction;
+                    WAY_SHARES.iter().find_map(|share| {
+                        let way = straight(context, hand, &open, &(-direction * grasp.distance * *share))?;
+                        let timed = way.timed(&context.limits, 1.0, LINE_STEPS);
+                        is_motion_free(context, model, world, &timed, tally).then_some(way)
+                    })
+                };
+                let Some(way_in) = way(taker, &models[1], tally) else { continue };
+                self.reached = self.reached.max(3);
+                if !can_close(context, taker.0, [&with_fingers(context, &at, taker.0, &taker.1.open), &at], tally) {
+                    continue;
+                }
+                self.reached = self.reached.max(4);
+                if !can_close(context, giver.0, [&at, &with_fingers(context, &at, giver.0, &giver.1.open)], tally) {
+                    continue;
+                }
+                self.reached = self.reached.max(5);
+                let Some(way_out) = way(giver, &models[2], tally) else { continue };
+                return Some(Give { giver: self.giver, taker: self.taker, at, way_in, way_out });
+            }
+        }
+        None
+    }
+}
+
+/// The 24 turns that bring a cube to itself.
+fn turns() -> Vec<UnitQuaternion<f64>> {
+    let axes: Vec<Vector> = (0..3).flat_map(|k| [Vector::ith(k, 1.0), Vector::ith(k, -1.0)]).collect();
+    let mut found = Vec::new();
+    for x in &axes {
+        for y in axes.iter().filter(|y| y.dot(x) == 0.0) {
+            let matrix = Matrix3::from_columns(&[*x, *y, x.cross(y)]);
+            found.push(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix)));
+        }
+    }
+    found
+}

@@ -1,0 +1,141 @@
+//! Why there is no plan.
+
+use regrasp_manipulation::failure::{Cause, Failure, FailureKind};
+use regrasp_plan::robot_plan::RobotStatistics;
+use std::collections::BTreeMap;
+
+/// A stage of the search, in its order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    /// A grasp where the object stands at the start.
+    Grasp,
+    /// A grasp where it shall stand.
+    Place,
+    /// An intermediate placement.
+    PutDown,
+    /// Two hands.
+    Exchange,
+    /// A motion with nothing in the hands.
+    Transit,
+    /// A motion with the object.
+    Carry,
+}
+
+impl Stage {
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Stage::Grasp => "grasp",
+            Stage::Place => "place",
+            Stage::PutDown => "put down",
+            Stage::Exchange => "exchange",
+            Stage::Transit => "transit",
+            Stage::Carry => "carry",
+        }
+    }
+}
+
+/// Counts of a search.
+#[derive(Debug, Default)]
+pub struct Tally {
+    /// Counts of searches for motions.
+    pub statistics: RobotStatistics,
+    /// What was tried, by stage.
+    pub tried: BTreeMap<Stage, u64>,
+    /// What worked, by stage.
+    pub found: BTreeMap<Stage, u64>,
+    /// Why the rest did not.
+    pub reasons: BTreeMap<(Stage, String), u64>,
+    /// The nearest miss by stage: how far, and in words.
+    pub nearest: BTreeMap<Stage, (f64, String)>,
+}
+
+impl Tally {
+    /// Something was tried at a stage, and came out so.
+    pub fn count(&mut self, stage: Stage, outcome: Result<(), &str>) {
+        *self.tried.entry(stage).or_default() += 1;
+        match outcome {
+            Ok(()) => *self.found.entry(stage).or_default() += 1,
+            Err(reason) => *self.reasons.entry((stage, reason.to_owned())).or_default() += 1,
+        }
+    }
+
+    /// Something missed by so much; the least counts.
+    pub fn miss(&mut self, stage: Stage, by: f64, words: impl FnOnce() -> String) {
+        if self.nearest.get(&stage).is_none_or(|nearest| by < nearest.0) {
+            self.nearest.insert(stage, (by, words()));
+        }
+    }
+
+    /// One configuration was looked at.
+    pub fn work(&mut self, n: u64) {
+        self.statistics.work += n;
+    }
+
+    /// Takes the counts of a search for a motion.
+    pub fn take(&mut self, other: &RobotStatistics) {
+        self.statistics.nodes += other.nodes;
+        self.statistics.samples += other.samples;
+        self.statistics.work += other.work;
+        self.statistics.cut_by_time |= other.cut_by_time;
+    }
+
+    /// The counts as a plan has them.
+    pub fn statistics(&self) -> RobotStatistics {
+        let mut statistics = self.statistics.clone();
+        for (stage, count) in &self.tried {
+            statistics.counts.insert(format!("{}_tried", stage.name().replace(' ', "_")), *count);
+        }
+        statistics
+    }
+
+    /// A stage in words: how many were tried, and why they failed.
+    fn in_words(&self, stage: Stage) -> String {
+        let tried = self.tried.get(&stage).copied().unwrap_or_default();
+        let mut parts: Vec<(u64, String)> = self
+            .reasons
+            .iter()
+            .filter(|((of, _), _)| *of == stage)
+            .map(|((_, reason), count)| (*count, format!("{count} {reason}")))
+            .collect();
+        parts.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
+        let parts: Vec<String> = parts.into_iter().map(|(_, words)| words).collect();
+        let nearest = self.nearest.get(&stage).map_or_else(String::new, |(_, words)| format!(" (nearest: {words})"));
+        format!("{tried} tried, {}{nearest}", parts.join(", "))
+    }
+
+    /// No plan: the first stage at which nothing worked says why.
+    pub fn failure(&self, kind: FailureKind) -> Failure {
+        let order = [Stage::Grasp, Stage::Place, Stage::Exchange, Stage::PutDown, Stage::Transit, Stage::Carry];
+        let is_empty = |stage: &Stage| self.tried.contains_key(stage) && !self.found.contains_key(stage);
+        let last = || order.into_iter().rev().find(|stage| self.reasons.keys().any(|(of, _)| of == stage));
+        let stage = order.into_iter().find(is_empty).or_else(last).unwrap_or(Stage::Grasp);
+        let message = format!("{}: {}", stage.name(), self.in_words(stage));
+        let advice = match stage {
+            Stage::Grasp | Stage::Place => "make longer lists of grasps, or move the object nearer or away from clutter",
+            Stage::Exchange => "make longer lists of grasps, or let the object be put down on the way",
+            Stage::PutDown => "give a support that both hands reach",
+            Stage::Transit | Stage::Carry => "try another seed, more samples, or less clutter",
+        };
+        let mut failure = Failure::bare(kind, message, advice);
+        let all: u64 = self.reasons.values().sum();
+        failure.causes = self
+            .reasons
+            .iter()
+            .map(|((stage, reason), &count)| Cause {
+                reason: format!("{}: {reason}", stage.name()),
+                count,
+                share: count as f64 / all.max(1) as f64,
+            })
+            .collect();
+        failure.causes.sort_by_key(|cause| std::cmp::Reverse(cause.count));
+        failure.statistics.work = self.statistics.work;
+        failure.statistics.samples = self.statistics.samples;
+        failure
+    }
+}
+
+/// A failure before any search.
+pub fn refused(kind: FailureKind, message: String, advice: &str) -> Failure {
+    Failure::bare(kind, message, advice)
+}

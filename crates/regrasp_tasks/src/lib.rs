@@ -1,0 +1,61 @@
+//! Pick and place: an object stands somewhere, and shall stand somewhere else (Saut, Gharbi, Cortes, Sidobre, Simeon 2010, sec. V).
+//!
+//! [`plan_pick_and_place`] searches a graph of who holds the object by which grasp, and where it lies (`graph`). Edges are tested
+//! when a cheap path uses them, the cheapest test first: grasps at places (`station`), exchanges (`exchange`), then motions
+//! (`motions`), which become the segments of the plan (`record`).
+
+/// What is refused before any search.
+mod before;
+/// Scene, robot and grasps, prepared once.
+mod context;
+/// Where one hand gives the object to another one.
+mod exchange;
+/// Why there is no plan.
+mod failing;
+/// Forces while the object moves.
+mod forces;
+/// Who holds the object, and where it lies.
+mod graph;
+/// Straight ways of a hand.
+mod line;
+/// The motions of a plan.
+mod motions;
+/// Where the object may lie.
+mod placements;
+/// Segments and waypoints.
+mod record;
+/// A hand at an object that lies on a support.
+mod station;
+/// Times along smooth paths.
+mod timing;
+
+pub use regrasp_manipulation::failure::{Cause, Failure, FailureKind};
+pub use regrasp_manipulation::task_settings::{TaskCost, TaskSettings};
+
+use context::{Context, Prepared};
+use failing::Tally;
+use regrasp_base::Budget;
+use regrasp_grasp::list::GraspList;
+use regrasp_plan::RobotPlan;
+use regrasp_scene::{PickAndPlaceQuery, Scene, State};
+
+/// Plans a task of pick and place. `lists` has grasps of the object, by index of the hand in `Scene::hands`. All that the query does
+/// not name rests in `state`. The same plan for the same input and seed.
+///
+/// Errors: why there is no plan, with the stage at which it fails.
+pub fn plan_pick_and_place(
+    (scene, state): (&Scene, &State),
+    query: &PickAndPlaceQuery,
+    lists: &[(usize, GraspList)],
+    settings: &TaskSettings,
+    seed: u64,
+    budget: &Budget,
+) -> Result<RobotPlan, Failure> {
+    settings.validate().map_err(|problem| Failure::of_settings(&problem))?;
+    let prepared = Prepared::new(scene, query, lists, settings)?;
+    let models = prepared.models();
+    let context = Context::new((scene, state), query, (&prepared, &models), settings, (seed, budget))?;
+    let mut tally = Tally::default();
+    before::refuse(&context, &mut tally)?;
+    graph::search(&context, &mut tally)
+}

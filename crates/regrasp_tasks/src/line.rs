@@ -1,0 +1,108 @@
+//! Straight ways of a hand, and proofs that motions are free.
+
+use crate::context::Context;
+use crate::failing::Tally;
+use crate::timing::Smooth;
+use regrasp_arms::model::ArmModel;
+use regrasp_arms::motion::{ColliderSettings, Track};
+use regrasp_arms::times::TimedPath;
+use regrasp_arms::{Collider, World};
+use regrasp_geometry::{Pose, Vector};
+
+/// Steps of a straight way in time.
+pub const LINE_STEPS: usize = 16;
+
+/// The way of a hand from the state `from` along `way`, without turning. None where the arm does not follow.
+pub fn straight(context: &Context, hand: usize, from: &[f64], way: &Vector) -> Option<Smooth> {
+    let own = &context.hands[hand];
+    let n_steps = (way.norm() / context.settings.line_step).ceil().max(2.0) as usize;
+    let mut poses = Vec::new();
+    context.robot.link_poses(from, &mut poses);
+    let base = poses[context.robot.arms[own.arm].base.0];
+    let mount = poses[context.robot.arms[own.arm].mount.0];
+    let mut states = vec![from.to_vec()];
+    for step in 1..=n_steps {
+        let shift = nalgebra::Translation3::from(way * (step as f64 / n_steps as f64));
+        let base_from_mount: Pose = base.inverse() * (shift * mount);
+        let last = &states[step - 1];
+        let joints = own.ik.follow(&base_from_mount, &last[own.arm_joints.clone()])?;
+        let mut state = last.clone();
+        let is_jump = joints.iter().zip(&state[own.arm_joints.clone()]).any(|(a, b)| (a - b).abs() > MOST_CHANGE);
+        if is_jump {
+            return None;
+        }
+        state[own.arm_joints.clone()].copy_from_slice(&joints);
+        states.push(state);
+    }
+    Some(Smooth::through(states))
+}
+
+/// Largest change of a joint in one step of a straight way, in radians or metres: more is a singularity.
+const MOST_CHANGE: f64 = 0.25;
+
+/// True where a robot keeps the clearance in a state.
+pub fn is_state_free(context: &Context, model: &ArmModel, world: &World, state: &[f64], tally: &mut Tally) -> bool {
+    let at = model.configuration_of(state);
+    if !model.is_within_limits(&at, 1e-9) {
+        return false;
+    }
+    let mut collider = collider(context, model, world);
+    let is_free = collider.is_certified_free(&Track::straight(&at, &at));
+    count(&collider, tally);
+    is_free
+}
+
+/// True where a robot keeps the clearance at every moment of a motion.
+pub fn is_motion_free(
+    context: &Context,
+    model: &ArmModel,
+    world: &World,
+    timed: &TimedPath,
+    tally: &mut Tally,
+) -> bool {
+    let mut collider = collider(context, model, world);
+    let is_free = is_free(&mut collider, timed);
+    count(&collider, tally);
+    is_free
+}
+
+/// The same where what is carried may touch what stands in `world` but not in `without`.
+pub fn is_lift_free(
+    context: &Context,
+    model: &ArmModel,
+    [world, without]: [&World; 2],
+    timed: &TimedPath,
+    tally: &mut Tally,
+) -> bool {
+    let is_carried = |body: usize| model.bodies[body].attached.is_some();
+    let mut robot = collider(context, model, world);
+    robot.only(|body| !is_carried(body), |_| true);
+    let mut object = collider(context, model, without);
+    object.only(is_carried, |_| false);
+    let is_free = is_free(&mut robot, timed) && is_free(&mut object, timed);
+    count(&robot, tally);
+    count(&object, tally);
+    is_free
+}
+
+fn is_free(collider: &mut Collider, timed: &TimedPath) -> bool {
+    let model = collider.model;
+    let own = |values: &[f64]| model.configuration_of(values);
+    timed.points.iter().all(|point| model.is_within_limits(&own(&point.joints), 1e-9))
+        && timed.points.windows(2).all(|pair| {
+            let [a, b] = pair else { return false };
+            let velocities = [own(&a.velocities), own(&b.velocities)];
+            let ends = [own(&a.joints), own(&b.joints)];
+            let track = Track::cubic(&ends[0], &ends[1], [&velocities[0], &velocities[1]], b.time - a.time);
+            collider.is_certified_free(&track)
+        })
+}
+
+fn collider<'c>(context: &Context, model: &'c ArmModel, world: &'c World) -> Collider<'c> {
+    let settings = ColliderSettings { clearance: context.settings.clearance, ..ColliderSettings::default() };
+    Collider::new(model, world, settings)
+}
+
+fn count(collider: &Collider, tally: &mut Tally) {
+    tally.work(8 * collider.counts.blocks + collider.counts.exact);
+}

@@ -1,0 +1,204 @@
+//! A hand at an object that lies on a support: postures, the way in, and the way up.
+
+use crate::context::{Context, Grasp};
+use crate::failing::{Stage, Tally};
+use crate::forces;
+use crate::line::{LINE_STEPS, is_lift_free, is_motion_free, is_state_free, straight};
+use crate::placements::{Place, stable_pose};
+use crate::timing::Smooth;
+use regrasp_base::Rng;
+use regrasp_geometry::Pose;
+use regrasp_robot::kinematics::arm_ik::{IkBudget, Unreachable};
+
+/// Postures of an arm that are looked at for one posture of the common joints.
+const POSTURES: usize = 4;
+/// Shares of the way in that are tried. A shorter one is planned before.
+const WAY_SHARES: [f64; 2] = [1.0, 0.4];
+/// Shares of the lift that are tried.
+const LIFT_SHARES: [f64; 2] = [1.0, 1.0 / 3.0];
+/// Steps in time of fingers that open or close.
+pub const FINGER_STEPS: usize = 8;
+
+/// A hand at the object. All states have the other arms where they are at the start.
+#[derive(Debug, Clone)]
+pub struct Station {
+    /// The hand.
+    pub hand: usize,
+    /// Index among its grasps.
+    pub grasp: usize,
+    /// The hand holds the object.
+    pub at: Vec<f64>,
+    /// The open hand from the object to where its way in begins.
+    pub way: Smooth,
+    /// The hand with the object, straight off the support.
+    pub lift: Smooth,
+}
+
+/// Tests that need neither kinematics nor collision. Err with a reason.
+pub fn may_hold(context: &Context, place: &Place, hand: usize, grasp: &Grasp) -> Result<(), &'static str> {
+    if stable_pose(context, hand, &place.world_from_object).is_some_and(|pose| !grasp.stable_poses.contains(&pose)) {
+        return Err("hands below the support");
+    }
+    if !forces::holds(context, hand, grasp, &place.world_from_object) {
+        return Err("grasps that do not hold the weight");
+    }
+    Ok(())
+}
+
+/// A state with other joints of one hand's fingers.
+pub fn with_fingers(context: &Context, state: &[f64], hand: usize, joints: &[f64]) -> Vec<f64> {
+    let mut state = state.to_vec();
+    state[context.hands[hand].fingers.clone()].copy_from_slice(joints);
+    state
+}
+
+/// Postures of the common joints: that of `state`, then drawn ones that keep their limits.
+pub fn common_postures(
+    context: &Context,
+    hands: &[usize],
+    state: &[f64],
+    n_draws: usize,
+    rng: &mut Rng,
+) -> Vec<Vec<f64>> {
+    let mut common: Vec<usize> = hands.iter().flat_map(|&hand| context.common_above(hand)).collect();
+    common.sort_unstable();
+    common.dedup();
+    let mut found = vec![state.to_vec()];
+    if common.is_empty() {
+        return found;
+    }
+    let coordinates = &context.robot.layout.coordinates;
+    for _ in 0..n_draws {
+        let mut drawn = state.to_vec();
+        for &k in &common {
+            drawn[k] = rng.uniform(coordinates[k].lower.max(-3.2), coordinates[k].upper.min(3.2));
+        }
+        if context.robot.layout.within_limits(&drawn, 0.0) {
+            found.push(drawn);
+        }
+    }
+    found
+}
+
+/// Joints of the arm of `hand` that bring its base to a pose, the nearest to those of `state` first. Errors: how far it is out of reach.
+pub fn arm_postures(
+    context: &Context,
+    hand: usize,
+    state: &[f64],
+    world_from_hand: &Pose,
+    n_postures: usize,
+) -> Result<Vec<Vec<f64>>, (f64, String)> {
+    let own = &context.hands[hand];
+    let arm = &context.robot.arms[own.arm];
+    let base = context.robot.world_from_root() * root_from(context, arm.base, state);
+    let base_from_mount = base.inverse() * world_from_hand * own.hand_from_mount;
+    let budget = IkBudget { postures: n_postures, starts: 30, free_angles: 24, seed: context.seed };
+    match own.ik.solve(&base_from_mount, &state[own.arm_joints.clone()], &budget) {
+        Ok(postures) => Ok(postures
+            .into_iter()
+            .map(|posture| {
+                let mut state = state.to_vec();
+                state[own.arm_joints.clone()].copy_from_slice(&posture.joints);
+                state
+            })
+            .collect()),
+        Err(unreachable) => {
+            let by = match &unreachable {
+                Unreachable::TooFar { by } | Unreachable::TooNear { by } | Unreachable::Limits { by, .. } => *by,
+                Unreachable::NotFound { distance, angle } => distance + angle,
+            };
+            Err((by, format!("arm \"{}\": {unreachable}", arm.name)))
+        }
+    }
+}
+
+fn root_from(context: &Context, link: regrasp_robot::LinkId, state: &[f64]) -> Pose {
+    let mut poses = Vec::new();
+    context.robot.link_poses(state, &mut poses);
+    context.robot.world_from_root().inverse() * poses[link.0]
+}
+
+/// A station of a grasp at a place. Err with a reason.
+pub fn station(
+    context: &Context,
+    place: &Place,
+    [hand, grasp]: [usize; 2],
+    stage: Stage,
+    tally: &mut Tally,
+) -> Result<Station, &'static str> {
+    let own = &context.hands[hand].grasps[grasp];
+    let park = &context.query.start;
+    let world_from_hand = place.world_from_object * own.object_from_hand;
+    let hand_from_object = own.object_from_hand.inverse();
+    let closed = with_fingers(context, park, hand, &own.closed);
+    let open = with_fingers(context, park, hand, &own.open);
+    let free = &context.arms_and_torso;
+    let (mut models, mut reason) = (None, "out of reach");
+    let mut rng = Rng::keyed(context.seed, "common", 0);
+    let commons = common_postures(context, &[hand], &closed, context.settings.common_draws, &mut rng);
+    for common in &commons {
+        tally.work(1);
+        let postures = match arm_postures(context, hand, common, &world_from_hand, POSTURES) {
+            Ok(postures) => postures,
+            Err((by, words)) => {
+                tally.miss(stage, by, || words);
+                continue;
+            }
+        };
+        let [closed, open, carrying] = models.get_or_insert_with(|| {
+            [
+                context.model(&closed, free, None),
+                context.model(&open, free, None),
+                context.model(&closed, free, Some((hand, &hand_from_object))),
+            ]
+        });
+        for at in postures {
+            reason = worse(reason, "in collision");
+            if !is_state_free(context, closed, &context.fixed, &at, tally) {
+                continue;
+            }
+            reason = worse(reason, "without a way in");
+            let direction = place.world_from_object.rotation * own.direction;
+            let opened = with_fingers(context, &at, hand, &own.open);
+            let way = WAY_SHARES.iter().find_map(|share| {
+                let way = straight(context, hand, &opened, &(-direction * own.distance * *share))?;
+                let timed = way.timed(&context.limits, 1.0, LINE_STEPS);
+                is_motion_free(context, open, &place.with_object, &timed, tally).then_some(way)
+            });
+            let Some(way) = way else { continue };
+            reason = worse(reason, "with fingers that cannot close");
+            if !can_close(context, hand, [&opened, &at], tally) {
+                continue;
+            }
+            reason = worse(reason, "without a way up");
+            let lift = LIFT_SHARES.iter().find_map(|share| {
+                let lift = straight(context, hand, &at, &(context.up() * context.settings.lift * *share))?;
+                let timed = lift.timed(&context.limits, 1.0, LINE_STEPS);
+                let worlds = [&*context.fixed, &*place.without_supports];
+                let is_free = is_lift_free(context, carrying, worlds, &timed, tally)
+                    && is_state_free(context, carrying, &context.fixed, lift.ends()[1], tally);
+                is_free.then_some(lift)
+            });
+            if let Some(lift) = lift {
+                return Ok(Station { hand, grasp, at, way, lift });
+            }
+        }
+    }
+    Err(reason)
+}
+
+/// The reason that is nearer to success.
+fn worse(old: &'static str, new: &'static str) -> &'static str {
+    const ORDER: [&str; 5] =
+        ["out of reach", "in collision", "without a way in", "with fingers that cannot close", "without a way up"];
+    let rank = |reason: &str| ORDER.iter().position(|other| *other == reason).unwrap_or(0);
+    if rank(new) > rank(old) { new } else { old }
+}
+
+/// True where the fingers get from the first state to the second one.
+pub fn can_close(context: &Context, hand: usize, [from, to]: [&[f64]; 2], tally: &mut Tally) -> bool {
+    let fingers: Vec<usize> = context.hands[hand].fingers.clone().collect();
+    let model = context.model(from, &fingers, None);
+    let timed = Smooth::Line([from.to_vec(), to.to_vec()]).timed(&context.limits, 1.0, FINGER_STEPS);
+    is_motion_free(context, &model, &context.fixed, &timed, tally)
+}
