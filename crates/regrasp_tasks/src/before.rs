@@ -25,9 +25,8 @@ pub fn refuse(context: &Context, tally: &mut Tally) -> Result<(), Failure> {
     }
     for (name, kind, pose, _) in ends {
         refuse_reach(context, name, kind, pose, tally)?;
-        let any = |hand: usize| {
-            context.hands[hand].grasps.iter().any(|grasp| forces::holds(context, hand, grasp, pose))
-        };
+        let any =
+            |hand: usize| context.hands[hand].grasps.iter().any(|grasp| forces::holds(context, hand, grasp, pose));
         if !(0..context.hands.len()).any(any) {
             let message = format!(
                 "{name}: \"{}\" weighs {} kg, and no grasp of the lists holds that with normal forces of at most {} N, friction {} over {}, and \

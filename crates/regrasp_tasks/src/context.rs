@@ -365,8 +365,10 @@ fn links_with_tips(robot: &Manipulator) -> Vec<LinkCover> {
             let link = finger.tip.link.0;
             let link_from_body = poses[link].inverse() * world_from_hand * hand_from_body;
             let mut shapes = robot.robot.links[link].collision.clone();
-            shapes
-                .push(PlacedShape { parent_from_shape: link_from_body * tip.parent_from_shape, shape: tip.shape.clone() });
+            shapes.push(PlacedShape {
+                parent_from_shape: link_from_body * tip.parent_from_shape,
+                shape: tip.shape.clone(),
+            });
             links[link] = cover(&shapes);
         }
     }

@@ -112,7 +112,9 @@ impl Tally {
         let stage = order.into_iter().find(is_empty).or_else(last).unwrap_or(Stage::Grasp);
         let message = format!("{}: {}", stage.name(), self.in_words(stage));
         let advice = match stage {
-            Stage::Grasp | Stage::Place => "make longer lists of grasps, or move the object nearer or away from clutter",
+            Stage::Grasp | Stage::Place => {
+                "make longer lists of grasps, or move the object nearer or away from clutter"
+            }
             Stage::Exchange => "make longer lists of grasps, or let the object be put down on the way",
             Stage::PutDown => "give a support that both hands reach",
             Stage::Transit | Stage::Carry => "try another seed, more samples, or less clutter",

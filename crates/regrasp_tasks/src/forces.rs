@@ -116,8 +116,5 @@ pub enum Off {
 }
 
 fn mixed(a: &ContactForce, b: &ContactForce, share: f64) -> ContactForce {
-    ContactForce {
-        force: a.force + (b.force - a.force) * share,
-        torsion: a.torsion + share * (b.torsion - a.torsion),
-    }
+    ContactForce { force: a.force + (b.force - a.force) * share, torsion: a.torsion + share * (b.torsion - a.torsion) }
 }

@@ -167,7 +167,9 @@ impl<'c, 'a> Graph<'c, 'a> {
         let mut gives = BTreeMap::new();
         if context.settings.hand_over {
             for giver in 0..context.hands.len() {
-                for taker in (0..context.hands.len()).filter(|&taker| context.hands[taker].arm != context.hands[giver].arm) {
+                for taker in
+                    (0..context.hands.len()).filter(|&taker| context.hands[taker].arm != context.hands[giver].arm)
+                {
                     for i in 0..n_grasps(giver) {
                         for j in 0..n_grasps(taker) {
                             let score = context.hands[giver].grasps[i].score.min(context.hands[taker].grasps[j].score);

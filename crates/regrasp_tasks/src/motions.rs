@@ -105,9 +105,9 @@ impl<'c, 'a> Maker<'c, 'a> {
     /// A path with the fingers of all hands but those in `own` as they are now.
     fn overlaid(&self, path: &Smooth, own: &[usize]) -> Smooth {
         let mut path = path.clone();
-        for hand in (0..self.context.robot.hands.len()).filter(|mounted| {
-            own.iter().all(|&hand| self.context.hands[hand].mounted != *mounted)
-        }) {
+        for hand in (0..self.context.robot.hands.len())
+            .filter(|mounted| own.iter().all(|&hand| self.context.hands[hand].mounted != *mounted))
+        {
             let range = self.context.robot.layout.range(regrasp_robot::manipulator::layout::Part::Hand(hand));
             path.fix(range.clone(), &self.state[range]);
         }
@@ -272,7 +272,8 @@ impl<'c, 'a> Maker<'c, 'a> {
     }
 
     fn forces(&self, hand: usize, grasp: &Grasp, load: Wrench) -> Result<BalancedForces, Stuck> {
-        under(self.context, hand, grasp, load).ok_or_else(|| self.stuck(Stage::Carry, "grasps that do not hold the weight"))
+        under(self.context, hand, grasp, load)
+            .ok_or_else(|| self.stuck(Stage::Carry, "grasps that do not hold the weight"))
     }
 
     /// A moment of rest in which one holder joins and another one may leave: forces of each go from one load to another.
@@ -315,12 +316,7 @@ impl<'c, 'a> Maker<'c, 'a> {
     }
 
     /// The motion with the object from here to `target`, which ends with `down`, straight onto a support.
-    fn carry(
-        &mut self,
-        target: &[f64],
-        down: Option<(Smooth, Arc<World>)>,
-        tally: &mut Tally,
-    ) -> Result<(), Stuck> {
+    fn carry(&mut self, target: &[f64], down: Option<(Smooth, Arc<World>)>, tally: &mut Tally) -> Result<(), Stuck> {
         let context = self.context;
         let Some(carried) = self.carried.clone() else { return Err(self.stuck(Stage::Carry, "nothing held")) };
         let mut pieces: Vec<(TimedPath, Vec<BalancedForces>)> = Vec::new();

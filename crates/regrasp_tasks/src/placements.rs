@@ -97,7 +97,8 @@ pub fn intermediate(context: &Context) -> Vec<Place> {
         }
         let (down, height) = downs[draw % downs.len()];
         let (top, half) = &tops[(draw / downs.len()) % tops.len()];
-        let at = top * regrasp_geometry::Point::new(rng.uniform(-half[0], half[0]), rng.uniform(-half[1], half[1]), 0.0);
+        let at =
+            top * regrasp_geometry::Point::new(rng.uniform(-half[0], half[0]), rng.uniform(-half[1], half[1]), 0.0);
         let upright = UnitQuaternion::rotation_between(&down, &-up).unwrap_or_else(|| {
             let (aside, _) = regrasp_geometry::frame::tangents(&regrasp_geometry::UnitVector::new_normalize(up));
             UnitQuaternion::from_axis_angle(&aside, std::f64::consts::PI)

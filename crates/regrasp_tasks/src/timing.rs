@@ -60,12 +60,9 @@ impl Spline {
         let (a, b) = (&self.nodes[i], &self.nodes[i + 1]);
         let (p, q) = (&self.bends[i], &self.bends[i + 1]);
         let width = a.len();
-        let value = |k: usize| {
-            s * a[k] + t * b[k] + ((s * s * s - s) * p[k] + (t * t * t - t) * q[k]) / 6.0
-        };
-        let slope = |k: usize| {
-            n as f64 * (b[k] - a[k] + ((1.0 - 3.0 * s * s) * p[k] + (3.0 * t * t - 1.0) * q[k]) / 6.0)
-        };
+        let value = |k: usize| s * a[k] + t * b[k] + ((s * s * s - s) * p[k] + (t * t * t - t) * q[k]) / 6.0;
+        let slope =
+            |k: usize| n as f64 * (b[k] - a[k] + ((1.0 - 3.0 * s * s) * p[k] + (3.0 * t * t - 1.0) * q[k]) / 6.0);
         ((0..width).map(value).collect(), (0..width).map(slope).collect())
     }
 }
@@ -184,8 +181,7 @@ pub fn one_after_the_other(paths: impl IntoIterator<Item = TimedPath>) -> TimedP
 
 /// A moment of rest.
 pub fn at_rest(state: &[f64], seconds: f64) -> TimedPath {
-    let point =
-        |time: f64| TimedPoint { time, joints: state.to_vec(), velocities: vec![0.0; state.len()] };
+    let point = |time: f64| TimedPoint { time, joints: state.to_vec(), velocities: vec![0.0; state.len()] };
     TimedPath { points: vec![point(0.0), point(seconds)], corners: vec![None] }
 }
 

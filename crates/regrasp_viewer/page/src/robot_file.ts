@@ -42,6 +42,14 @@ export type ReplayBody = {
   pose: PoseData,
 };
 
+/** A hand or support that holds an object in some segment. */
+export type ReplayHolder = {
+  /** Its name. */
+  name: string,
+  /** Its colour in all charts. */
+  color: string,
+};
+
 /** What a body is. */
 export type ReplayKind = "link" | "hand" | "tip" | "object" | "resting" | "support" | "obstacle";
 
@@ -85,6 +93,8 @@ export type RobotReplay = {
   bodies: Array<ReplayBody>,
   /** The segments of the plan. */
   segments: Array<ReplaySegment>,
+  /** Hands of the plan, then supports. */
+  holders: Array<ReplayHolder>,
   /** The time axis of all charts. */
   axis: ReplayAxis,
 };

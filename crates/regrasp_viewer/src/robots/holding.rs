@@ -1,5 +1,6 @@
 //! Who holds the object when, in plans of pick and place.
 
+use crate::palette;
 use regrasp_plan::RobotPlan;
 use regrasp_plan::robot_plan::RobotSegment;
 
@@ -12,6 +13,16 @@ pub struct Holding {
     pub is_hand: bool,
     /// From when until when it holds, in seconds.
     pub bars: Vec<[f64; 2]>,
+}
+
+/// Colour of supports.
+const SUPPORT: &str = "#9a8f80";
+
+impl Holding {
+    /// Its colour, as the row with this number.
+    pub fn color(&self, row: usize) -> &'static str {
+        if self.is_hand { palette::color(row) } else { SUPPORT }
+    }
 }
 
 /// What happens between two segments.

@@ -14,7 +14,7 @@ mod task_chart;
 mod typescript;
 
 pub use frames::{RobotStoryboard, robot_storyboard};
-pub use replay::{ReplayAxis, ReplayBody, ReplayKind, ReplayPiece, ReplaySegment, RobotReplay};
+pub use replay::{ReplayAxis, ReplayBody, ReplayHolder, ReplayKind, ReplayPiece, ReplaySegment, RobotReplay};
 
 use crate::page::{embedded, escape_json, escape_text, hash};
 use crate::render::png_file;

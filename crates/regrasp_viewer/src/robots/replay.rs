@@ -83,6 +83,16 @@ pub struct ReplaySegment {
     pub held_by: Vec<String>,
 }
 
+/// A hand or support that holds an object in some segment.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct ReplayHolder {
+    /// Its name.
+    pub name: String,
+    /// Its colour in all charts.
+    pub color: String,
+}
+
 /// A chart of the page, of which the horizontal axis is time.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
@@ -115,6 +125,8 @@ pub struct RobotReplay {
     pub bodies: Vec<ReplayBody>,
     /// The segments of the plan.
     pub segments: Vec<ReplaySegment>,
+    /// Hands of the plan, then supports.
+    pub holders: Vec<ReplayHolder>,
     /// The time axis of all charts.
     pub axis: ReplayAxis,
 }
@@ -238,6 +250,7 @@ impl RobotReplay {
             meshes: shapes.packed(&mut Vec::new()),
             bodies,
             segments: plan.segments.iter().map(segment_of).collect(),
+            holders: holders_of(plan),
             axis: axis_of(plan),
         })
     }
@@ -264,6 +277,13 @@ fn segment_of(segment: &regrasp_plan::robot_plan::RobotSegment) -> ReplaySegment
         end,
         held_by: segment.held_by.values().flatten().cloned().collect(),
     }
+}
+
+fn holders_of(plan: &RobotPlan) -> Vec<ReplayHolder> {
+    let rows = holding::rows(plan);
+    let holder =
+        |(k, row): (usize, &holding::Holding)| ReplayHolder { name: row.name.clone(), color: row.color(k).into() };
+    rows.iter().enumerate().map(holder).collect()
 }
 
 /// As plan files spell it.

@@ -16,7 +16,6 @@ const FINGER_GAP: f64 = 4.0;
 /// Height of the strip with the kinds of segments, and of the line that explains.
 const KINDS: f64 = 22.0;
 const KEY: f64 = 24.0;
-const SUPPORT: &str = "#9a8f80";
 /// Width of a letter in the strip.
 const LETTER: f64 = 5.4;
 
@@ -46,7 +45,7 @@ pub fn task(plan: &RobotPlan) -> String {
     }
     for (k, row) in rows.iter().enumerate() {
         let y = top + ROW * k as f64;
-        let color = if row.is_hand { palette::color(k) } else { SUPPORT };
+        let color = row.color(k);
         svg.text(&cut(&row.name, 16), [LEFT - 8.0, y + ROW / 2.0 + 4.0], Anchor::End, INK, "");
         svg.line([LEFT, y + ROW / 2.0], [RIGHT, y + ROW / 2.0], "#c8c8c8", 1.0, "stroke-dasharray=\"1 4\"");
         for [from, until] in &row.bars {
@@ -94,7 +93,13 @@ fn key(svg: &mut Svg, y: f64) {
         ("release", EventKind::Release),
     ];
     for (name, kind) in kinds {
-        mark(svg, kind, [x + 8.0, y - ROW / 2.0]);
+        // Where a row would begin for the mark to stand on the line of its name.
+        let row = match kind {
+            EventKind::Grasp => y - GAP + 2.0,
+            EventKind::Release => y - ROW + GAP - 1.5,
+            _ => y - ROW / 2.0,
+        };
+        mark(svg, kind, [x + 8.0, row]);
         svg.text(name, [x + 22.0, y + 4.0], Anchor::Start, SOFT, "font-size=\"11\"");
         x += 44.0 + 5.6 * name.len() as f64;
     }

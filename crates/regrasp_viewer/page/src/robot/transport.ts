@@ -3,7 +3,7 @@
 import { button, el, icon } from "../dom";
 import { SPEEDS, type Player } from "../player";
 import type { ReplaySegment, RobotReplay } from "../robot_file";
-import { fingerColour, type Theme } from "../theme";
+import type { Theme } from "../theme";
 
 /** Index of the segment at `time`. */
 export function segmentAt(replay: RobotReplay, time: number): number {
@@ -93,11 +93,11 @@ export class RobotTransport {
     const x = (t: number) => thumb / 2 + ((t - player.start) / length) * (width - thumb);
     context.fillStyle = this.theme.colours.line;
     context.fillRect(x(player.start), 2, width - thumb, 2);
-    const holders = [...new Set(replay.segments.flatMap((segment) => segment.held_by))];
+    const colours = new Map(replay.holders.map(({ name, color }) => [name, color]));
     for (const segment of replay.segments) {
       const height = 6 / Math.max(segment.held_by.length, 1);
       segment.held_by.forEach((holder, k) => {
-        context.fillStyle = fingerColour(holders.indexOf(holder));
+        context.fillStyle = colours.get(holder) ?? this.theme.colours.line;
         context.fillRect(x(segment.start), k * height, x(segment.end) - x(segment.start), height);
       });
     }
