@@ -71,10 +71,30 @@ pub fn margin(grips: &[Grip], body: &HeldBody) -> f64 {
 
 /// As [`margin`], with what proves it; none when no closure could be proved.
 pub fn certified_margin(grips: &[Grip], body: &HeldBody) -> Option<(f64, Certificate)> {
+    certified_margin_up_to(f64::INFINITY, None, grips, body)
+}
+
+/// As [`certified_margin`], but any margin of at least `enough` will do: the search then ends. It begins with the contacts of `near`,
+/// which proves a closure of the same fingers nearby.
+pub fn certified_margin_up_to(
+    enough: f64,
+    near: Option<&Certificate>,
+    grips: &[Grip],
+    body: &HeldBody,
+) -> Option<(f64, Certificate)> {
     let mut search = SubsetSearch { grips, body, best: None };
-    match grips.len() {
-        n if n <= MOST_FOR_ALL_SUBSETS => (0..1 << n).for_each(|subset| _ = search.look(subset)),
-        _ => search.descend(),
+    if grips.len() > MOST_FOR_ALL_SUBSETS {
+        search.descend();
+        return search.best;
+    }
+    let all = 1u64 << grips.len();
+    let first = near.map(|certificate| certificate.subset).filter(|subset| *subset < all);
+    // More contacts mostly hold with more margin.
+    for subset in first.into_iter().chain((0..all).rev().filter(|subset| Some(*subset) != first)) {
+        search.look(subset);
+        if search.best.as_ref().is_some_and(|(margin, _)| *margin >= enough) {
+            break;
+        }
     }
     search.best
 }

@@ -72,7 +72,7 @@ fn holds(waypoint: &Waypoint, finger: usize) -> bool {
 
 /// Distance of the tip from the contact when joints and object are given: for balls, of the centre from where it belongs; for
 /// others, of the point that faces the contact's normal from the contact, and what the hull is off the ellipsoid there.
-fn error(finger: &FingerModel, joints: &[f64], world_from_object: &Pose, contact: &Contact) -> f64 {
+pub fn tip_error(finger: &FingerModel, joints: &[f64], world_from_object: &Pose, contact: &Contact) -> f64 {
     let normal = contact.normal_in_object.into_inner();
     match finger.surface {
         TipSurface::Ball => {
@@ -90,7 +90,7 @@ fn error(finger: &FingerModel, joints: &[f64], world_from_object: &Pose, contact
 /// Distance of the tip from its contact at a waypoint; infinite when the finger has no contact there.
 pub fn error_at(finger: &FingerModel, waypoint: &Waypoint, f: usize) -> f64 {
     let Some(contact) = contact_of(&waypoint.contacts[f]) else { return f64::INFINITY };
-    error(finger, &waypoint.joints, &Pose::from(&waypoint.world_from_object), &contact)
+    tip_error(finger, &waypoint.joints, &Pose::from(&waypoint.world_from_object), &contact)
 }
 
 /// Upper bound of the error over the closed step, where it is largest, and the number of samples taken.
@@ -115,7 +115,7 @@ fn error_between(finger: &FingerModel, from: &Waypoint, to: &Waypoint, f: usize,
     let mut worst = (0.0, 0.0);
     for sample in 0..=n_samples {
         let t = sample as f64 / n_samples as f64;
-        let error = error(finger, &motion.joints_at(t), &motion.object_at(t), &contact);
+        let error = tip_error(finger, &motion.joints_at(t), &motion.object_at(t), &contact);
         if error > worst.0 {
             worst = (error, t);
         }

@@ -3,7 +3,7 @@
 //! Matrices are 4 x 4 and rotations are Rodrigues' formula; nothing here asks `regrasp_robot::Chain`.
 
 use crate::check::between::{Between, Cubic, JointBounds};
-use nalgebra::{Matrix3, Matrix4, Rotation3, Translation3, UnitQuaternion};
+use nalgebra::{Matrix4, Rotation3, Translation3, UnitQuaternion};
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_robot::{Hand, JointKind, LinkId, Robot};
 
@@ -22,6 +22,42 @@ pub struct PathJoint {
     pub drive: Drive,
     /// Largest size of the position, for sliding joints.
     pub largest_slide: f64,
+    /// How the joint moves, with `parent_from_joint`.
+    motion: JointMotion,
+}
+
+/// Pose of the child frame of a joint in the parent's frame, as a function of the position `q`.
+#[derive(Debug, Clone)]
+enum JointMotion {
+    /// `still + q along`.
+    Slides { still: Matrix4<f64>, along: Matrix4<f64> },
+    /// `still + sin q sine + (1 - cos q) rest`: Rodrigues' formula, with the parent's pose multiplied in.
+    Turns { still: Matrix4<f64>, sine: Matrix4<f64>, rest: Matrix4<f64> },
+}
+
+impl JointMotion {
+    fn new(parent_from_joint: &Matrix4<f64>, axis: &Vector, slides: bool) -> Self {
+        let mut part = Matrix4::<f64>::zeros();
+        if slides {
+            part.fixed_view_mut::<3, 1>(0, 3).copy_from(axis);
+            return JointMotion::Slides { still: *parent_from_joint, along: parent_from_joint * part };
+        }
+        let cross = axis.cross_matrix();
+        part.fixed_view_mut::<3, 3>(0, 0).copy_from(&cross);
+        let sine = parent_from_joint * part;
+        part.fixed_view_mut::<3, 3>(0, 0).copy_from(&(cross * cross));
+        JointMotion::Turns { still: *parent_from_joint, sine, rest: parent_from_joint * part }
+    }
+
+    fn at(&self, position: f64) -> Matrix4<f64> {
+        match self {
+            JointMotion::Slides { still, along } => still + along * position,
+            JointMotion::Turns { still, sine, rest } => {
+                let (sin, cos) = position.sin_cos();
+                still + sine * sin + rest * (1.0 - cos)
+            }
+        }
+    }
 }
 
 /// The position of a joint as a function of the joint vector: a sum of multiples of some of its entries, plus a constant.
@@ -163,13 +199,16 @@ impl Path {
             if joint.kind == JointKind::Fixed {
                 continue;
             }
+            let slides = joint.kind == JointKind::Prismatic;
+            let motion = JointMotion::new(&pending, &joint.axis, slides);
             joints.push(PathJoint {
                 joint: id.0,
                 parent_from_joint: pending,
                 axis: joint.axis.into_inner(),
-                slides: joint.kind == JointKind::Prismatic,
+                slides,
                 drive: Drive::of(robot, id.0, joint_names)?,
                 largest_slide: joint.limits.map_or(0.0, |limits| limits.lower.abs().max(limits.upper.abs())),
+                motion,
             });
             pending = Matrix4::identity();
         }
@@ -180,7 +219,7 @@ impl Path {
     pub fn world_from_link(&self, joints: &[f64]) -> Matrix4<f64> {
         let mut frame = Matrix4::<f64>::identity();
         for joint in &self.joints {
-            frame = frame * joint.parent_from_joint * motion(joint, joint.drive.position(joints));
+            frame *= joint.motion.at(joint.drive.position(joints));
         }
         frame * self.last_from_link
     }
@@ -190,13 +229,13 @@ impl Path {
         let mut frame = Matrix4::<f64>::identity();
         let mut axes = Vec::new();
         for joint in &self.joints {
-            frame *= joint.parent_from_joint;
-            let direction = frame.transform_vector(&joint.axis);
-            let origin = frame.transform_point(&Point::origin());
+            let world_from_joint = frame * joint.parent_from_joint;
+            let direction = world_from_joint.transform_vector(&joint.axis);
+            let origin = world_from_joint.transform_point(&Point::origin());
             for &(coordinate, multiplier) in &joint.drive.terms {
                 axes.push(DrivenAxis { coordinate, multiplier, slides: joint.slides, direction, origin });
             }
-            frame *= motion(joint, joint.drive.position(joints));
+            frame *= joint.motion.at(joint.drive.position(joints));
         }
         axes
     }
@@ -248,20 +287,6 @@ impl Path {
         }
         rates
     }
-}
-
-/// Pose of the child frame in the joint frame at `position`.
-fn motion(joint: &PathJoint, position: f64) -> Matrix4<f64> {
-    let mut pose = Matrix4::<f64>::identity();
-    if joint.slides {
-        pose.fixed_view_mut::<3, 1>(0, 3).copy_from(&(joint.axis * position));
-    } else {
-        let cross = joint.axis.cross_matrix();
-        let (sine, cosine) = position.sin_cos();
-        let rotation = Matrix3::identity() + cross * sine + cross * cross * (1.0 - cosine);
-        pose.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
-    }
-    pose
 }
 
 /// `matrix` as a pose; its rotation part must be a rotation up to rounding.

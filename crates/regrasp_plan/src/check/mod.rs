@@ -57,6 +57,8 @@ pub mod motion;
 pub mod patch;
 /// The triangles of a polyhedron in pieces, for questions about what is near.
 mod pieces;
+/// Convex polygons.
+mod polygon;
 /// How far apart poses are, and what lies between.
 pub mod pose;
 /// What the plan promises, and whether the promises may be made and are kept.
@@ -75,6 +77,8 @@ pub mod slip;
 pub mod step_slip;
 /// Distance from the object's surface and the normals there.
 pub mod surface;
+/// Plans of pick and place.
+pub mod tasks;
 /// When waypoints are passed, and how fast.
 pub mod times;
 /// Fingertips: where they touch.
@@ -99,12 +103,14 @@ pub use level::Level;
 pub use robots::check_robot;
 pub use robots::{RobotAlong, robot_along};
 pub use slip::HoldSlip;
+pub use tasks::check_pick_and_place;
 pub use violation::{Moment, Violation, ViolationKind};
 
 use crate::format::AnyPlan;
 use crate::plan::Plan;
 use model::CheckedHand;
 use regrasp_geometry::Pose;
+use regrasp_scene::pick_and_place::PICK_AND_PLACE;
 use regrasp_scene::{Manipulation, Query, Scene, State};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -374,7 +380,7 @@ pub fn check((scene, state): (&Scene, &State), query: Option<&Query>, plan: &Pla
     report
 }
 
-/// Judges a plan of either kind: [`check`] or [`check_robot`].
+/// Judges a plan of any kind: [`check`], [`check_robot`] or [`check_pick_and_place`].
 pub fn check_any(
     (scene, state): (&Scene, &State),
     query: Option<&Query>,
@@ -385,8 +391,12 @@ pub fn check_any(
         AnyPlan::InHand(plan) => return check((scene, state), query, plan, settings),
         AnyPlan::Robot(plan) => plan,
     };
-    let mut report = check_robot((scene, state), query.and_then(Query::as_motion), plan, settings);
-    if let Some(other) = query.filter(|query| query.as_motion().is_none()) {
+    let is_of_task = query.is_none_or(|query| query.task() == plan.task);
+    let mut report = match plan.task == PICK_AND_PLACE {
+        true => check_pick_and_place((scene, state), query.and_then(Query::as_pick_and_place), plan, settings),
+        false => check_robot((scene, state), query.and_then(Query::as_motion), plan, settings),
+    };
+    if let Some(other) = query.filter(|_| !is_of_task) {
         let message = format!("the plan's task is \"{}\", the scene's \"{}\"", plan.task, other.task());
         report.violations.insert(0, Violation::new(ViolationKind::WrongScene, message));
         report.n_violations += 1;

@@ -6,8 +6,9 @@ use crate::check::surface::SortedShape;
 use crate::check::tip_surface::TipSurface;
 use nalgebra::Matrix4;
 use regrasp_geometry::{Point, Pose};
+use regrasp_robot::hand::Finger;
 use regrasp_robot::tip::Pad;
-use regrasp_robot::{ContactModel, JointKind, LinkId, TipShape};
+use regrasp_robot::{ContactModel, JointKind, LinkId, Robot, TipShape};
 use regrasp_scene::Manipulation;
 
 /// A finger with its tip; a sharp tip is a ball of radius zero.
@@ -58,6 +59,40 @@ impl DriveRow {
 }
 
 impl FingerModel {
+    /// A finger of a robot whose root stands at a pose and whose joint vector has these names.
+    ///
+    /// `coordinates`: the finger's own place in the joint vector; `at_rest`: the joint vector at rest. Err with a message when the
+    /// robot contradicts itself.
+    pub fn new(
+        robot: &Robot,
+        finger: &Finger,
+        (world_from_root, joint_names): (&Pose, &[String]),
+        coordinates: std::ops::Range<usize>,
+        at_rest: &[f64],
+    ) -> Result<Self, String> {
+        let mut path = Path::new(robot, finger.tip.link, world_from_root, joint_names)?;
+        let body_from_tip_link = std::mem::replace(&mut path.last_from_link, Matrix4::identity());
+        let center = finger.tip.center_in_body;
+        Ok(FingerModel {
+            name: finger.name.clone(),
+            moving_joints: path.joints.iter().map(|joint| joint.joint).collect(),
+            center_at_rest: path.world_from_link(at_rest).transform_point(&center),
+            path,
+            body_from_tip_link,
+            center,
+            radius: finger.tip.radius(),
+            surface: TipSurface::of(&finger.tip),
+            pad: finger.tip.pad,
+            contact: finger.tip.contact,
+            tip_link: finger.tip.link,
+            tip_elements: match &finger.tip.shape {
+                TipShape::Hull { elements, .. } => elements.clone(),
+                _ => Vec::new(),
+            },
+            coordinates,
+        })
+    }
+
     /// True when the `<collision>` element of the tip link with this index may touch the object.
     pub fn tip_has(&self, element: usize) -> bool {
         self.tip_elements.is_empty() || self.tip_elements.contains(&element)
@@ -127,29 +162,9 @@ impl CheckedHand {
         let mut first = 0;
         let at_rest: Vec<f64> = hand.fingers.iter().flat_map(|finger| finger.rest.iter().copied()).collect();
         for finger in &hand.fingers {
-            let mut path = Path::new(robot, finger.tip.link, &world_from_root, &joint_names)?;
-            let body_from_tip_link = std::mem::replace(&mut path.last_from_link, Matrix4::identity());
-            let center = finger.tip.center_in_body;
             let coordinates = first..first + finger.chain.n_coordinates();
             first = coordinates.end;
-            fingers.push(FingerModel {
-                name: finger.name.clone(),
-                moving_joints: path.joints.iter().map(|joint| joint.joint).collect(),
-                center_at_rest: path.world_from_link(&at_rest).transform_point(&center),
-                path,
-                body_from_tip_link,
-                center,
-                radius: finger.tip.radius(),
-                surface: TipSurface::of(&finger.tip),
-                pad: finger.tip.pad,
-                contact: finger.tip.contact,
-                tip_link: finger.tip.link,
-                tip_elements: match &finger.tip.shape {
-                    TipShape::Hull { elements, .. } => elements.clone(),
-                    _ => Vec::new(),
-                },
-                coordinates,
-            });
+            fingers.push(FingerModel::new(robot, finger, (&world_from_root, &joint_names), coordinates, &at_rest)?);
         }
         let mut slides = Vec::new();
         for name in &joint_names {

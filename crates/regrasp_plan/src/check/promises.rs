@@ -11,7 +11,7 @@
 //!
 //! Tolerances, for rounding and two solvers, are the constants below.
 
-use crate::check::closure::{Certificate, HeldBody, certified_margin, margin_by};
+use crate::check::closure::{Certificate, HeldBody, certified_margin_up_to, margin_by};
 use crate::check::model::CheckedHand;
 use crate::check::roles::{contact_of, moving_finger};
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
@@ -120,14 +120,20 @@ pub fn check_closure(
     let sets = holding_sets(model, plan);
     let mut smallest: Option<f64> = None;
     let mut solved: Vec<Option<(f64, Option<Certificate>)>> = vec![None; sets.len()];
-    let solve = |set: &Holding, smallest: &mut Option<f64>| {
-        let certified = certified_margin(&set.grips, &body);
+    // A set that holds with more than the smallest margin so far cannot be the one with the smallest.
+    let solve = |set: &Holding, near: Option<&Certificate>, smallest: &mut Option<f64>| {
+        let enough = smallest.map_or(f64::INFINITY, |least: f64| least.max(required));
+        let certified = certified_margin_up_to(enough, near, &set.grips, &body);
         let (margin, certificate) = certified.map_or((0.0, None), |(margin, proof)| (margin, Some(proof)));
         *smallest = Some(smallest.map_or(margin, |least: f64| least.min(margin)));
         (margin, certificate)
     };
+    let mut last: Option<(&[usize], Certificate)> = None;
     for (set, solved) in sets.iter().zip(&mut solved).step_by(SOLVED_FIRST) {
-        *solved = Some(solve(set, &mut smallest));
+        let near = last.as_ref().filter(|(fingers, _)| *fingers == set.fingers).map(|(_, proof)| proof);
+        let found = solve(set, near, &mut smallest);
+        last = found.1.clone().map(|proof| (set.fingers.as_slice(), proof));
+        *solved = Some(found);
     }
     let mut before: Option<(&[usize], Certificate)> = None;
     for (set, solved) in sets.iter().zip(solved) {
@@ -136,7 +142,8 @@ pub fn check_closure(
         if enough > 0.0 && tried.is_some_and(|(_, proof)| margin_by(proof, &set.grips, &body) >= enough) {
             continue;
         }
-        let (found, certificate) = solved.unwrap_or_else(|| solve(set, &mut smallest));
+        let near = tried.map(|(_, proof)| proof);
+        let (found, certificate) = solved.unwrap_or_else(|| solve(set, near, &mut smallest));
         before = certificate.map(|proof| (set.fingers.as_slice(), proof));
         if !(found > 0.0 && found >= required - MARGIN_TOLERANCE) {
             log.push(closure_lost(model, set, found, required));

@@ -135,6 +135,12 @@ pub enum ViolationKind {
     VelocityInconsistent,
     /// The plan asks for more work than the checker does: the rest of it was not judged.
     NotJudged,
+    /// In a task of pick and place the object moves where it has to rest.
+    ObjectMovesAtRest,
+    /// In a task of pick and place a joint moves where it has to rest.
+    JointMovesAtRest,
+    /// In a task of pick and place the object does not stand on the support that holds it.
+    Unsupported,
     /// Of a grasp list: the object does not stand in a pose that the list calls stable, or a hand is not above the support there.
     StablePoseWrong,
     /// Of a grasp list: the line on which the open hand comes is too short to be a way in.

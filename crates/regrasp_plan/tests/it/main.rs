@@ -6,6 +6,8 @@ mod format;
 mod levels;
 mod loaded;
 mod loaded_tests;
+#[path = "../../../../tests/support/made_by_hand.rs"]
+mod made_by_hand;
 mod motion;
 #[path = "../../../../tests/support/moving_robot.rs"]
 mod moving_robot;
@@ -16,5 +18,6 @@ mod rolled;
 mod rolled_tests;
 mod sample;
 mod several;
+mod tasks;
 mod tracked;
 mod tracking;

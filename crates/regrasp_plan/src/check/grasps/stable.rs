@@ -5,9 +5,10 @@ use super::{Judged, Measured};
 use crate::check::Log;
 use crate::check::bodies::{Bodies, OBJECT, Owner, Pair};
 use crate::check::motion::{WaypointStep, certify};
+use crate::check::polygon::distance_inside;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use nalgebra::UnitQuaternion;
-use regrasp_geometry::{Point, Pose, Shape, UnitVector, Vector};
+use regrasp_geometry::{Point, Pose, Shape, Vector};
 use regrasp_grasp::list::{GraspList, StablePose};
 use regrasp_scene::Object;
 
@@ -17,10 +18,6 @@ const ON_PLANE: f64 = 0.2e-3;
 const HEIGHT_TOLERANCE: f64 = 1e-6;
 /// Tipping angles may be this much too large, in radians: the rim of a cylinder is taken as a polygon.
 const ANGLE_TOLERANCE: f64 = 1e-4;
-/// Places nearer to each other than this are one, in metres.
-const SAME_PLACE: f64 = 1e-7;
-/// Places nearer to a line than this are on it, in metres.
-const ON_LINE: f64 = 1e-9;
 /// Corners of the polygon that stands for a rim.
 const RIM: usize = 720;
 /// Half the length and half the thickness of the plate that stands for the support, in metres: hands are smaller.
@@ -85,40 +82,6 @@ fn check_pose(corners: &[Point], object: &Object, pose: &StablePose, least: f64)
     ))
 }
 
-/// How far the origin is inside the convex polygon of `points`, seen along `down`; negative outside. By gift wrapping.
-fn distance_inside(points: &[Vector], down: &Vector) -> f64 {
-    let Some(axis) = UnitVector::try_new(*down, 1e-9) else { return f64::NEG_INFINITY };
-    let (x, y) = regrasp_geometry::frame::tangents(&axis);
-    let length = |a: [f64; 2], b: [f64; 2]| (b[0] - a[0]).hypot(b[1] - a[1]);
-    let mut flat: Vec<[f64; 2]> = Vec::new();
-    for p in points {
-        let place = [p.dot(&x), p.dot(&y)];
-        if flat.iter().all(|other| length(*other, place) > SAME_PLACE) {
-            flat.push(place);
-        }
-    }
-    let first = flat.iter().copied().reduce(|a, b| if (b[0], b[1]) < (a[0], a[1]) { b } else { a });
-    let Some(first) = first else { return f64::NEG_INFINITY };
-    let cross = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-    let (mut at, mut least, mut area) = (first, f64::INFINITY, 0.0);
-    for _ in 0..=flat.len() {
-        // All others are on the left of the next side.
-        let next = flat.iter().copied().filter(|p| *p != at).reduce(|best, p| {
-            // How far the point is on the left of the line to the best so far.
-            let left = cross(at, best, p) / length(at, best);
-            if left < -ON_LINE || (left <= ON_LINE && length(at, p) > length(at, best)) { p } else { best }
-        });
-        let Some(next) = next else { return f64::NEG_INFINITY };
-        least = least.min(cross(at, next, [0.0, 0.0]) / length(at, next));
-        area += cross([0.0, 0.0], at, next);
-        at = next;
-        if at == first {
-            break;
-        }
-    }
-    if area > 0.0 { least } else { f64::NEG_INFINITY }
-}
-
 /// Judges that the hand stays above the support in the poses that the grasp names.
 pub(super) fn check_grasp(judged: &Judged, index: usize, log: &mut Log, measured: &mut Measured) {
     let grasp = &judged.list.grasps[index];
@@ -163,31 +126,4 @@ pub(super) fn add_plates(bodies: &mut Bodies, list: &GraspList) -> Result<(), St
         bodies.add("support", Owner::Obstacle, OBJECT, &at, &plate)?;
     }
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_distance_inside_is_that_of_the_nearest_side_whatever_the_points_are_like() {
-        let down = Vector::new(0.0, 0.0, -1.0);
-        // A rectangle with points on its sides, doubled and moved by rounding.
-        let mut points = Vec::new();
-        for k in 0..=20 {
-            let t = f64::from(k) / 20.0;
-            for (x, y) in
-                [(0.02 * t - 0.01, -0.03), (0.02 * t - 0.01, 0.03), (-0.01, 0.06 * t - 0.03), (0.01, 0.06 * t - 0.03)]
-            {
-                points.push(Vector::new(x + 1e-13 * f64::from(k % 3), y - 1e-13 * f64::from(k % 2), 0.0));
-            }
-        }
-        assert!((distance_inside(&points, &down) - 0.01).abs() < 1e-6);
-        let moved: Vec<Vector> = points.iter().map(|p| p + Vector::new(0.004, 0.0, 0.0)).collect();
-        assert!((distance_inside(&moved, &down) - 0.006).abs() < 1e-6);
-        let outside: Vec<Vector> = points.iter().map(|p| p + Vector::new(0.02, 0.0, 0.0)).collect();
-        assert!(distance_inside(&outside, &down) < 0.0);
-        assert_eq!(distance_inside(&points[..1], &down), f64::NEG_INFINITY);
-        assert_eq!(distance_inside(&[], &down), f64::NEG_INFINITY);
-    }
 }

@@ -7,13 +7,13 @@
 //! along its own arc, and those before it are rigid motions. Two items are therefore apart in the whole interval where their distance at
 //! the middle is more than the two sums up to the body that both stand on. Else the interval is halved.
 
-use crate::check::robots::items::{Item, Items, Pair};
+use crate::check::robots::items::{Item, Items, Owner, Pair};
 use crate::check::robots::motion::{RobotStep, largest_change};
 use crate::check::robots::question::Question;
 use crate::check::robots::tree::{Frame, Tree};
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Clearance, Log};
-use crate::robot_plan::RobotPlan;
+use crate::robot_plan::{RobotPlan, RobotSegment};
 use nalgebra::Translation3;
 use regrasp_geometry::reference::{Clearance as Found, distance};
 use regrasp_geometry::{Point, Pose, Vector};
@@ -54,13 +54,40 @@ impl<'a> Placed<'a> {
         self.joints.extend_from_slice(joints);
         self.tree.frames(&self.joints, &mut self.frames, &mut self.axes);
         for (item, center) in self.items.items.iter().zip(&mut self.centers) {
-            *center =
-                if item.body == 0 && stands(item) { item.center } else { self.frames[item.body].point(&item.center) };
+            *center = if item.stands { item.center } else { self.frames[item.body].point(&item.center) };
         }
     }
 
     fn pose(&self, item: &Item) -> Pose {
-        if stands(item) { item.frame.pose() } else { self.frames[item.body].then(&item.frame).pose() }
+        if item.stands { item.frame.pose() } else { self.frames[item.body].then(&item.frame).pose() }
+    }
+
+    /// Pose of an item in the world.
+    pub fn pose_of(&self, item: usize) -> Pose {
+        self.pose(&self.items.items[item])
+    }
+
+    /// Fingertips that are in a pair with a carried object: their items, hands and fingers.
+    pub fn tips_of_object(&self) -> Vec<(usize, (usize, usize))> {
+        let items = self.items.items.iter().enumerate();
+        items.filter_map(|(item, one)| Some((item, one.tip_of?))).collect()
+    }
+
+    /// True where an item is within `tolerance` of the carried object's shape.
+    pub fn is_near_object(&mut self, item: usize, tolerance: f64) -> bool {
+        let items = &self.items.items;
+        let is_object = |b: &usize| matches!(items[*b].owner, Owner::Carried(_)) && !items[*b].is_hull;
+        let Some(object) = (0..items.len()).find(is_object) else { return false };
+        let pair = Pair { a: item, b: object, joints_a: 0, joints_b: 0, floor: 0.0 };
+        self.gap(&pair) <= tolerance
+            && self.measure(&pair, tolerance + ROUNDING).is_some_and(|distance| distance <= tolerance)
+    }
+
+    /// Pairs of carried objects, first, and a support.
+    pub fn pairs_of_support(&self, support: usize) -> Vec<Pair> {
+        let is_of = |pair: &&Pair| self.items.items[pair.b].support == Some(support);
+        let is_carried = |pair: &&Pair| matches!(self.items.items[pair.a].owner, Owner::Carried(_));
+        self.items.pairs.iter().filter(is_of).filter(is_carried).copied().collect()
     }
 
     /// Distance between the balls of a pair.
@@ -93,7 +120,7 @@ impl<'a> Placed<'a> {
         travels.clear();
         travels.push(0.0);
         let (item, center) = (&self.items.items[item], self.centers[item]);
-        if stands(item) {
+        if item.stands {
             return;
         }
         let (mut at, mut sum) = (item.body, 0.0);
@@ -115,11 +142,6 @@ impl<'a> Placed<'a> {
     }
 }
 
-/// True for what stands in the world: its frame is the world's.
-fn stands(item: &Item) -> bool {
-    item.owner == crate::check::robots::items::Owner::Still
-}
-
 /// Where a pair comes too close.
 struct Breach {
     pair: usize,
@@ -128,9 +150,9 @@ struct Breach {
 }
 
 /// The intervals of one step.
-struct Judge<'a, 'b> {
+struct Judge<'a, 'b, 's> {
     scene: &'b mut Placed<'a>,
-    step: &'b RobotStep<'a>,
+    step: &'b RobotStep<'s>,
     resolution: f64,
     most_pieces: u64,
     n_pieces: u64,
@@ -139,7 +161,7 @@ struct Judge<'a, 'b> {
     travels: Vec<Vec<f64>>,
 }
 
-impl Judge<'_, '_> {
+impl Judge<'_, '_, '_> {
     fn interval(&mut self, first: f64, last: f64, active: &[usize]) {
         self.n_pieces += 1 + active.len() as u64 / 64;
         if self.n_pieces > self.most_pieces {
@@ -198,40 +220,53 @@ pub fn check_apart(
 ) -> (Option<Clearance>, u64) {
     let mut scene = Placed::new(&question.tree, items);
     let mut clearance: Option<Clearance> = None;
-    let mut reported: Vec<Option<usize>> = vec![None; items.pairs.len()];
-    for (s, segment) in plan.segments.iter().enumerate() {
-        for (w, waypoint) in segment.waypoints.iter().enumerate() {
-            note_clearance(&mut scene, &waypoint.joints, Moment::at(s, w), &mut clearance);
-        }
-        for (w, ends) in segment.waypoints.windows(2).enumerate() {
-            let step = RobotStep::new(&ends[0], &ends[1]);
-            let active: Vec<usize> = (0..items.pairs.len()).filter(|&index| reported[index] != Some(s)).collect();
-            let mut judge = Judge {
-                scene: &mut scene,
-                step: &step,
-                resolution: settings.resolution,
-                most_pieces: log.work.left(),
-                n_pieces: 0,
-                breaches: Vec::new(),
-                travels: vec![Vec::new(); items.items.len()],
-            };
-            judge.interval(0.0, 1.0, &active);
-            let (n_pieces, breaches) = (judge.n_pieces, judge.breaches);
-            for breach in breaches {
-                reported[breach.pair] = Some(s);
-                log.push(violation(
-                    items,
-                    &items.pairs[breach.pair],
-                    Moment { segment: s, waypoint: w, fraction: breach.u },
-                    &breach,
-                ));
-            }
-            if !log.work.spend(n_pieces, "collisions") {
-                return (clearance, scene.n_distances);
-            }
+    for s in 0..plan.segments.len() {
+        if !check_segment(&mut scene, &plan.segments[s], s, settings, log, &mut clearance) {
+            break;
         }
     }
     (clearance, scene.n_distances)
+}
+
+/// Judges all pairs along segment `s`. Takes over the smallest clearance at a waypoint where it is smaller than the one known. False
+/// when there is no work left.
+pub fn check_segment(
+    scene: &mut Placed,
+    segment: &RobotSegment,
+    s: usize,
+    settings: &CheckSettings,
+    log: &mut Log,
+    clearance: &mut Option<Clearance>,
+) -> bool {
+    let items = scene.items;
+    let mut is_reported = vec![false; items.pairs.len()];
+    for (w, waypoint) in segment.waypoints.iter().enumerate() {
+        note_clearance(scene, &waypoint.joints, Moment::at(s, w), clearance);
+    }
+    for (w, ends) in segment.waypoints.windows(2).enumerate() {
+        let step = RobotStep::new(&ends[0], &ends[1]);
+        let active: Vec<usize> = (0..items.pairs.len()).filter(|&index| !is_reported[index]).collect();
+        let mut judge = Judge {
+            scene,
+            step: &step,
+            resolution: settings.resolution,
+            most_pieces: log.work.left(),
+            n_pieces: 0,
+            breaches: Vec::new(),
+            travels: vec![Vec::new(); items.items.len()],
+        };
+        judge.interval(0.0, 1.0, &active);
+        let (n_pieces, breaches) = (judge.n_pieces, judge.breaches);
+        for breach in breaches {
+            is_reported[breach.pair] = true;
+            let at = Moment { segment: s, waypoint: w, fraction: breach.u };
+            log.push(violation(items, &items.pairs[breach.pair], at, &breach));
+        }
+        if !log.work.spend(n_pieces, "collisions") {
+            return false;
+        }
+    }
+    true
 }
 
 /// Takes over the smallest distance of a pair that must be apart, where it is smaller than the one known.

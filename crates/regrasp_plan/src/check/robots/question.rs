@@ -56,20 +56,34 @@ fn wrong(kind: Kind, message: String) -> Violation {
 impl<'a> Question<'a> {
     /// Err with a violation: the plan is of another task, robot, hand or object than the scene or the query.
     pub fn new(scene: &'a Scene, query: Option<&MotionQuery>, plan: &RobotPlan) -> Result<Self, Violation> {
+        let asked = query.map(|query| (query.robot, query.name.as_str()));
+        let mut question = Question::of_task(MOTION, scene, asked, plan)?;
+        question.read_carried(scene, query, plan)?;
+        Ok(question)
+    }
+
+    /// The robot of a plan for `task`, which carries nothing yet; `asked` has the robot and the name that the query says.
+    ///
+    /// Err with a violation: the plan is of another task or robot than the scene or the query.
+    pub fn of_task(
+        task: &str,
+        scene: &'a Scene,
+        asked: Option<(usize, &str)>,
+        plan: &RobotPlan,
+    ) -> Result<Self, Violation> {
         let of_scene = |message: String| wrong(Kind::WrongScene, message);
-        if plan.task != MOTION {
-            return Err(of_scene(format!("the plan's task is \"{}\", not \"{MOTION}\"", plan.task)));
+        if plan.task != task {
+            return Err(of_scene(format!("the plan's task is \"{}\", not \"{task}\"", plan.task)));
         }
         let [of_plan] = plan.robots.as_slice() else {
             return Err(of_scene(format!("the plan moves {} robots; one is judged", plan.robots.len())));
         };
         let index = scene.robots.iter().position(|robot| robot.name == of_plan.name);
-        let asked = query.map(|query| query.robot);
-        let Some(index) = index.filter(|index| asked.is_none_or(|asked| asked == *index)) else {
+        let Some(index) = index.filter(|index| asked.is_none_or(|(robot, _)| robot == *index)) else {
             return Err(of_scene(format!("the plan's robot \"{}\" is not the one asked for", of_plan.name)));
         };
-        if let Some(query) = query.filter(|query| query.name != plan.query) {
-            return Err(of_scene(format!("the plan answers the task \"{}\", not \"{}\"", plan.query, query.name)));
+        if let Some((_, name)) = asked.filter(|(_, name)| *name != plan.query) {
+            return Err(of_scene(format!("the plan answers the task \"{}\", not \"{name}\"", plan.query)));
         }
         let robot = &scene.robots[index];
         let joint_names = of_plan.joint_names.clone();
@@ -78,9 +92,7 @@ impl<'a> Question<'a> {
             return Err(of_scene(format!("the joints of the plan are not those of the robot: {expected}")));
         }
         let tree = Tree::of(robot, &joint_names).map_err(of_scene)?;
-        let mut question = Question { index, robot, tree, joint_names, carried: Vec::new() };
-        question.read_carried(scene, query, plan)?;
-        Ok(question)
+        Ok(Question { index, robot, tree, joint_names, carried: Vec::new() })
     }
 
     fn read_carried(&mut self, scene: &Scene, query: Option<&MotionQuery>, plan: &RobotPlan) -> Result<(), Violation> {

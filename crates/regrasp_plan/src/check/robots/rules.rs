@@ -18,10 +18,10 @@ use regrasp_geometry::Pose;
 use regrasp_scene::{MotionGoal, MotionQuery, Scene};
 
 /// Speeds and accelerations may be this much above their limits, relatively: rounding of times.
-const ROUNDING: f64 = 1e-6;
+pub const ROUNDING: f64 = 1e-6;
 
 /// Distance and angle between two poses.
-fn difference(a: &Pose, b: &Pose) -> (f64, f64) {
+pub fn difference(a: &Pose, b: &Pose) -> (f64, f64) {
     let (p, q) = (a.rotation.coords, b.rotation.coords);
     let q = if p.dot(&q) < 0.0 { -q } else { q };
     ((a.translation.vector - b.translation.vector).norm(), 4.0 * (p - q).norm().atan2((p + q).norm()))
@@ -367,6 +367,6 @@ pub fn check_carried(question: &Question, plan: &RobotPlan, settings: &CheckSett
 }
 
 /// Coordinates that drive a body's joint.
-fn terms_of(body: &crate::check::robots::tree::Body) -> impl Iterator<Item = usize> + '_ {
+pub fn terms_of(body: &crate::check::robots::tree::Body) -> impl Iterator<Item = usize> + '_ {
     body.drive.terms.iter().map(|(k, _)| *k)
 }

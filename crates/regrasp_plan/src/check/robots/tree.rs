@@ -32,6 +32,11 @@ impl Frame {
         Point::from(self.rotation * point.coords + self.origin)
     }
 
+    /// A point outside in the frame.
+    pub fn inverse_point(&self, point: &Point) -> Point {
+        Point::from(self.rotation.tr_mul(&(point.coords - self.origin)))
+    }
+
     /// As a pose.
     pub fn pose(&self) -> Pose {
         let rotation = Rotation3::from_matrix_unchecked(self.rotation);
