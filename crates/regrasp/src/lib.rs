@@ -32,9 +32,10 @@ pub use regrasp_planners as planners;
 pub use regrasp_roadmap as roadmap;
 pub use regrasp_robot as robot;
 pub use regrasp_scene as scene;
+pub use regrasp_tasks as tasks;
 pub use regrasp_viewer as viewer;
 
-pub use planning::plan_any;
+pub use planning::{plan_any, plan_task};
 pub use regrasp_base::{Budget, InputError};
 pub use regrasp_grasp::GraspList;
 pub use regrasp_grasp_lists::{GraspSettings, list_grasps};

@@ -1,8 +1,9 @@
 //! Settings from several places made one: defaults, then a text of settings, then single arguments. Command line and Python both
 //! ask here.
 
-use regrasp_planners::{InHandSettings, MotionSettings, PlannerSettings, TrackingSettings};
+use regrasp_planners::{InHandSettings, MotionSettings, PlannerSettings, TaskSettings, TrackingSettings};
 use regrasp_scene::motion::MOTION;
+use regrasp_scene::pick_and_place::PICK_AND_PLACE;
 use regrasp_scene::query::TRACKING;
 use serde::de::DeserializeOwned;
 
@@ -73,7 +74,22 @@ pub fn settings_for(kind: &str, text: Option<&str>, asked: &Overrides) -> Result
     if kind == MOTION {
         return Ok(PlannerSettings { motion: motion(text, asked)?, ..defaults });
     }
+    if kind == PICK_AND_PLACE {
+        // Lists that the scene does not name are made on as many threads as planning in the hand has.
+        let in_hand = InHandSettings { n_threads: asked.n_threads.max(1), ..InHandSettings::default() };
+        return Ok(PlannerSettings { task: task(text, asked)?, in_hand, ..defaults });
+    }
     Ok(PlannerSettings { in_hand: in_hand(text, asked)?, ..defaults })
+}
+
+fn task(text: Option<&str>, asked: &Overrides) -> Result<TaskSettings, SettingsError> {
+    if let Some(name) = &asked.method {
+        let problem = "tasks of pick and place have one method".to_owned();
+        return Err(SettingsError::OtherMethod { name: name.clone(), problem });
+    }
+    let settings: TaskSettings = read(text)?;
+    settings.validate().map_err(SettingsError::Invalid)?;
+    Ok(settings)
 }
 
 fn in_hand(text: Option<&str>, asked: &Overrides) -> Result<InHandSettings, SettingsError> {

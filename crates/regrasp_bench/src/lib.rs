@@ -30,6 +30,8 @@ pub mod row;
 pub mod suite;
 /// Smallest, median, mean and largest per scene and method.
 pub mod summary;
+/// Tasks of pick and place.
+pub mod task;
 /// Text for pages.
 mod text;
 

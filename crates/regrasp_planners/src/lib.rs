@@ -14,6 +14,7 @@ pub use regrasp_manipulation::failure::{Cause, Failure, FailureKind, NearestMiss
 pub use regrasp_manipulation::motion_settings::{MotionMethod, MotionSettings, Validation};
 pub use regrasp_manipulation::outline::{Outline, OutlineEdge, OutlineNode};
 pub use regrasp_manipulation::progress::Progress;
+pub use regrasp_manipulation::task_settings::{TaskCost, TaskSettings};
 pub use regrasp_manipulation::{failure, outline};
 pub use settings::{InHandSettings, Method};
 pub use tracking::{TrackingMethod, TrackingSettings, plan_tracking};
@@ -31,6 +32,8 @@ pub struct PlannerSettings {
     pub tracking: TrackingSettings,
     /// For motions of whole robots, of which `regrasp_arms` is the planner.
     pub motion: MotionSettings,
+    /// For tasks of pick and place, of which `regrasp_tasks` is the planner.
+    pub task: TaskSettings,
 }
 
 /// Plans `query` with the planner of its task: [`plan_in_hand`] or [`plan_tracking`]. All that the query does not name rests in

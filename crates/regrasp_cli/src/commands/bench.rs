@@ -2,6 +2,7 @@
 
 use super::rows::{make_folder_of, of_rows, say_row};
 use super::suite;
+use super::task_bench;
 use crate::args::{self, Common};
 use crate::interrupt;
 use crate::load;
@@ -38,6 +39,9 @@ pub fn run(arguments: &args::Bench, common: &Common, talk: &Talk) -> Result<(), 
         return suite::run(path, arguments, common, talk);
     }
     let files = load::scene_files(&arguments.scenes)?;
+    if task_bench::is_for(&files, common) {
+        return task_bench::run(&files, arguments, common, talk);
+    }
     let (mut scenes, bad) = load_scenes(&files, arguments, common, talk)?;
     for loaded in &scenes {
         arguments.judging.query(loaded.task().query(0))?;

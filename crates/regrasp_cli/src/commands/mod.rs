@@ -22,6 +22,8 @@ mod room;
 mod rows;
 mod simulate;
 mod suite;
+mod task_bench;
+mod task_grasps;
 mod view;
 mod written;
 

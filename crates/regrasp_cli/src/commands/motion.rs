@@ -1,6 +1,7 @@
 //! Motions of whole robots: what the commands `plan`, `check` and `export` do with tasks of kind `motion` and their plans.
 
 use crate::args::{self, Common};
+use crate::commands::task_grasps;
 use crate::commands::written::{self, Limits, available_threads};
 use crate::judge;
 use crate::load;
@@ -16,7 +17,7 @@ use regrasp::planners::FailureKind;
 use regrasp::scene::{LoadedScene, MotionGoal, MotionQuery, PickAndPlaceQuery};
 use regrasp::viewer::render::png_file;
 use regrasp::viewer::robots::{RobotStoryboard, RobotTelling, robot_charts, robot_page, robot_storyboard};
-use regrasp::{AnyPlan, Budget, Query, RobotPlan, export, plan_any};
+use regrasp::{AnyPlan, Budget, Query, RobotPlan, export, plan_any, plan_task};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -42,7 +43,18 @@ pub fn plan(
     };
     let around = (&loaded.scene, &loaded.state);
     let settings = load::for_task(loaded.task(), &arguments.search, available_threads())?;
-    let plan = match plan_any(around, query, &settings, arguments.seed, &budget, &|_| {}) {
+    let found = match query {
+        Query::PickAndPlace(query) => {
+            let of_lists = (loaded, query);
+            let lists = task_grasps::lists(&arguments.scene, of_lists, arguments.seed, limits, common, talk)?;
+            let started = Instant::now();
+            let budget = Budget { deadline: limits.time_limit.map(|limit| started + limit), ..budget };
+            plan_task(around, query, &lists, &settings, arguments.seed, &budget)
+                .map(|plan| AnyPlan::Robot(Box::new(plan)))
+        }
+        _ => plan_any(around, query, &settings, arguments.seed, &budget, &|_| {}),
+    };
+    let plan = match found {
         Ok(AnyPlan::Robot(plan)) => plan,
         Ok(AnyPlan::InHand(_)) => return Err(Stop::Internal("a motion was answered by a plan of one hand".into())),
         Err(failure) if failure.kind == FailureKind::Interrupted => return Err(Stop::Interrupted),
