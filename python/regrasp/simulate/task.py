@@ -149,15 +149,16 @@ def replay(plan: Mapping[str, Any], xml: str, settings: TaskSettings | None = No
     mujoco.mj_setConst(model, mujoco.MjData(model))
     tick = STEPS * float(model.opt.timestep)
     ref = task_reference(rig, plan, tick, settings.speed, settings.squeeze_time)
-    commands = ref.targets + (ref.feed_forward if settings.with_forces else 0.0)
+    commands = ref.targets + ref.inertia + (ref.feed_forward if settings.with_forces else 0.0)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     data.time = 0.0
     watch = _Watch(rig, ref, tick)
     n = ref.n_ticks + round(REST_TIME / tick)
     for k in range(n):
-        at = min(k, ref.n_ticks - 1)
-        data.ctrl[rig.servos] = commands[at]
+        # Over a tick, the command is the mean of those at its ends; what is seen after it is compared with its end.
+        before, at = min(k, ref.n_ticks - 1), min(k + 1, ref.n_ticks - 1)
+        data.ctrl[rig.servos] = 0.5 * (commands[before] + commands[at])
         mujoco.mj_step(model, data, STEPS)
         if not watch.look(k, at, data):
             break

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -82,6 +83,8 @@ class TaskReference:
     """Commands of the servos without forces: positions, ahead by what damping holds back."""
     feed_forward: Array
     """What contact forces add to the commands."""
+    inertia: Array
+    """What moving the robot's own links adds to the commands."""
     segment: Indices
     plan_time: Array
     only_hands: NDArray[np.bool_]
@@ -232,6 +235,7 @@ def task_reference(rig: TaskRig, plan: Mapping[str, Any], tick: float, speed: fl
     change = positions[left + 1] - positions[left]
     joints = positions[left] + u * (first + u * (3 * change - 2 * first - last + u * (first + last - 2 * change)))
     velocities = (first + u * (2 * (3 * change - 2 * first - last) + u * (3 * (first + last - 2 * change)))) / span[:, None]
+    accelerations = (2 * (3 * change - 2 * first - last) + 6 * u * (first + last - 2 * change)) / span[:, None] ** 2
     pressed = torques[left] + u * (torques[left + 1] - torques[left])
     segments = np.array([knot.segment for knot in knots])
     # In a pause nothing has moved yet: it counts to the segment that it leads to.
@@ -242,6 +246,7 @@ def task_reference(rig: TaskRig, plan: Mapping[str, Any], tick: float, speed: fl
         joints=joints,
         targets=joints + velocities * rig.damping / rig.stiffness,
         feed_forward=pressed / rig.stiffness,
+        inertia=_dynamics(rig, home, joints, velocities, accelerations) / rig.stiffness,
         segment=of_tick,
         plan_time=plan_times[left] + u[:, 0] * (plan_times[left + 1] - plan_times[left]),
         only_hands=np.array([bool(held) and all(name in rig.hands for name in held) for held in rig.held_by])[of_tick],
@@ -278,6 +283,23 @@ def _torques(rig: TaskRig, points: list[dict[str, Any]]) -> Array:
             body = rig.tips[contact["hand"], contact["finger"]]
             mujoco.mj_jac(model, data, jacobian, None, where, body)
             torques[k] += (jacobian @ rig.drives).T @ (turn @ np.array(contact["force_in_object"]))
+    return torques
+
+
+def _dynamics(rig: TaskRig, home: Array, joints: Array, velocities: Array, accelerations: Array) -> Array:
+    """Torques that move the links of the robot alone, at every tick. Gravity on links is compensated already."""
+    model = copy.copy(rig.model)
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    data = mujoco.MjData(model)
+    torques = np.zeros_like(joints)
+    # Where nothing moves, nothing is needed.
+    for k in np.flatnonzero(np.abs(velocities).max(axis=1) + np.abs(accelerations).max(axis=1)).tolist():
+        data.qpos[:] = home + rig.coordinates(joints[k])
+        data.qpos[rig.object_qpos + 3] = 1.0
+        data.qvel[:] = rig.drives @ velocities[k]
+        data.qacc[:] = rig.drives @ accelerations[k]
+        mujoco.mj_inverse(model, data)
+        torques[k] = rig.drives.T @ data.qfrc_inverse
     return torques
 
 
