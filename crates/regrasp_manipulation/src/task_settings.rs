@@ -54,7 +54,7 @@ pub struct TaskSettings {
     pub placements: usize,
     /// Edges of the task graph that are tested, at most.
     pub max_edges: usize,
-    /// Contact forces. The normal forces are those of the grasp lists where those are narrower.
+    /// Contact forces, as lists of grasps have them. The normal forces are those of the lists where those are narrower.
     pub forces: ForceSettings,
 }
 
@@ -79,7 +79,7 @@ impl Default for TaskSettings {
             put_down: true,
             placements: 24,
             max_edges: 2000,
-            forces: ForceSettings::default(),
+            forces: ForceSettings { normal_force: [0.5, 40.0], ..ForceSettings::default() },
         }
     }
 }

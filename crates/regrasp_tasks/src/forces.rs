@@ -1,7 +1,6 @@
 //! Contact forces while the object rests in a hand, and while it moves.
 
 use crate::context::{Context, Grasp};
-use nalgebra::UnitQuaternion;
 use regrasp_arms::times::TimedPath;
 use regrasp_geometry::{Pose, Vector};
 use regrasp_grasp::ContactForce;
@@ -11,7 +10,7 @@ use regrasp_grasp::wrench::{BalancedForces, Wrench};
 /// (`docs/reference/plan-format.md`, Plans of pick and place).
 const LARGEST_SHARE: f64 = 0.01;
 /// Time between the poses that accelerations are taken from, in seconds.
-const SHORT: f64 = 5e-4;
+const SHORT: f64 = 1e-3;
 /// Places of a step at which forces are compared.
 const LOOKS: usize = 8;
 
@@ -58,14 +57,16 @@ impl Carried<'_> {
         let span = timed.points[step + 1].time - timed.points[step].time;
         let h = SHORT.min(0.1 * span);
         let at = |offset: f64| self.world_from_object(context, &track.at(share + offset / span));
-        let [before, now, after] = [at(-h), at(0.0), at(h)];
-        let center = |pose: &Pose| (pose * context.object.center_of_mass).coords;
-        let acceleration: Vector = (center(&after) - center(&now) * 2.0 + center(&before)) / (h * h);
-        let turn = |from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>| (to * from.inverse()).scaled_axis();
-        let (first, second) = (turn(&before.rotation, &now.rotation), turn(&now.rotation, &after.rotation));
+        let poses = [at(-2.0 * h), at(-h), at(0.0), at(h), at(2.0 * h)];
+        let now = &poses[2];
+        // Differences of fourth order.
+        let first = |x: &[Vector; 5]| (x[0] - x[1] * 8.0 + x[3] * 8.0 - x[4]) / (12.0 * h);
+        let second = |x: &[Vector; 5]| (x[1] * 16.0 - x[0] - x[2] * 30.0 + x[3] * 16.0 - x[4]) / (12.0 * h * h);
+        let acceleration = second(&poses.map(|pose| (pose * context.object.center_of_mass).coords));
+        // Turns are small: their first and second derivative at zero are angular velocity and acceleration.
+        let turns = poses.map(|pose| (pose.rotation * now.rotation.inverse()).scaled_axis());
         let into_object = now.rotation.inverse();
-        let spin = into_object * ((first + second) / (2.0 * h));
-        let spin_up = into_object * ((second - first) / (h * h));
+        let (spin, spin_up) = (into_object * first(&turns), into_object * second(&turns));
         let inertia = &context.inertia;
         Wrench {
             force: into_object * ((context.gravity - acceleration) * context.object.mass),
@@ -82,7 +83,10 @@ impl Carried<'_> {
         for k in 0..=n_steps {
             // Accelerations differ a little before and after a waypoint.
             let mut load = self.load(context, timed, k.min(n_steps - 1), if k < n_steps { 0.0 } else { 1.0 });
-            if k > 0 && k < n_steps {
+            if k == 0 || k == n_steps {
+                // From rest to rest: as in the moments of rest before and behind.
+                load = weight(context, &self.world_from_object(context, &timed.points[k].joints));
+            } else {
                 let before = self.load(context, timed, k - 1, 1.0);
                 load = Wrench { force: (load.force + before.force) * 0.5, torque: (load.torque + before.torque) * 0.5 };
             }

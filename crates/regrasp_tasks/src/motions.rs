@@ -50,6 +50,9 @@ const CARRY_STEPS: usize = 24;
 /// So often.
 const FINER: usize = 3;
 
+/// Why a motion with the object has no forces.
+const TOO_FAST: &str = "motions without forces that hold the object";
+
 /// Makes the segments of the steps. `attempt` tells searches for motions apart.
 pub fn segments(
     context: &Context,
@@ -319,7 +322,7 @@ impl<'c, 'a> Maker<'c, 'a> {
     fn carry(&mut self, target: &[f64], down: Option<(Smooth, Arc<World>)>, tally: &mut Tally) -> Result<(), Stuck> {
         let context = self.context;
         let Some(carried) = self.carried.clone() else { return Err(self.stuck(Stage::Carry, "nothing held")) };
-        let mut pieces: Vec<(TimedPath, Vec<BalancedForces>)> = Vec::new();
+        let mut pieces: Vec<TimedPath> = Vec::new();
         let lift = self.lift.take();
         let from = lift.as_ref().map_or(&self.state, |(lift, _)| lift.ends()[1]).clone();
         let model =
@@ -343,15 +346,10 @@ impl<'c, 'a> Maker<'c, 'a> {
             pieces.push(self.smooth(&carried, down, Some((&model, without)), tally)?);
         }
         if pieces.is_empty() {
-            let timed = at_rest(&self.state, context.settings.rest);
-            let forces = self.forces(carried.hand, carried.grasp, weight(context, &self.object))?;
-            pieces.push((timed, vec![forces; 2]));
+            pieces.push(at_rest(&self.state, context.settings.rest));
         }
-        let mut forces: Vec<BalancedForces> = Vec::new();
-        for (_, own) in &pieces {
-            forces.extend(own.iter().skip(usize::from(!forces.is_empty())).cloned());
-        }
-        let timed = one_after_the_other(pieces.into_iter().map(|(timed, _)| timed));
+        let timed = one_after_the_other(pieces);
+        let forces = carried.along(context, &timed).map_err(|_| self.stuck(Stage::Carry, TOO_FAST))?;
         let holding = [Holding { hand: carried.hand, grasp: carried.grasp, forces }];
         let holders = vec![context.hand_name(carried.hand).to_owned()];
         self.state.clone_from(&timed.points[timed.points.len() - 1].joints);
@@ -367,26 +365,26 @@ impl<'c, 'a> Maker<'c, 'a> {
         path: &Smooth,
         tested: Option<(&regrasp_arms::model::ArmModel, &Arc<World>)>,
         tally: &mut Tally,
-    ) -> Result<(TimedPath, Vec<BalancedForces>), Stuck> {
+    ) -> Result<TimedPath, Stuck> {
         let context = self.context;
         let (mut slower, mut n_steps) = (1.0, CARRY_STEPS);
         for _ in 0..SLOWER + FINER {
             let timed = path.timed(&context.limits, slower, n_steps);
             match carried.along(context, &timed) {
-                Ok(forces) => {
+                Ok(_) => {
                     if let Some((model, without)) = tested
                         && !is_lift_free(context, model, [&context.fixed, without], &timed, tally)
                     {
                         return Err(self.stuck(Stage::Carry, "ways off a support"));
                     }
-                    return Ok((timed, forces));
+                    return Ok(timed);
                 }
                 Err(Off::NotHeld) => slower *= SLOWER_BY,
                 Err(Off::Coarse) if n_steps < CARRY_STEPS << FINER => n_steps *= 2,
                 Err(Off::Coarse) => slower *= SLOWER_BY,
             }
         }
-        Err(self.stuck(Stage::Carry, "motions too fast for the fingers"))
+        Err(self.stuck(Stage::Carry, TOO_FAST))
     }
 
     fn give(&mut self, give: &Give, next: &[Step], tally: &mut Tally) -> Result<(), Stuck> {
