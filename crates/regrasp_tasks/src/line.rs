@@ -8,6 +8,7 @@ use regrasp_arms::motion::{ColliderSettings, Track};
 use regrasp_arms::times::TimedPath;
 use regrasp_arms::{Collider, World};
 use regrasp_geometry::{Pose, Vector};
+use regrasp_robot::manipulator::layout::Part;
 
 /// Steps of a straight way in time.
 pub const LINE_STEPS: usize = 16;
@@ -66,6 +67,26 @@ pub fn is_motion_free(
     is_free
 }
 
+/// The same for the open hand on its way to a grasp of its list: the list has proved that the hand does not hit the object, so that only
+/// the rest of the robot is tested against that. Plans are tested in full.
+pub fn is_way_free(
+    context: &Context,
+    (model, hand): (&ArmModel, usize),
+    world_from_object: &Pose,
+    timed: &TimedPath,
+    tally: &mut Tally,
+) -> bool {
+    let mounted = Part::Hand(context.hands[hand].mounted);
+    let mut robot = collider(context, model, &context.fixed);
+    let alone = World::default().with(&context.alone, world_from_object);
+    let mut others = collider(context, model, &alone);
+    others.only(|body| context.robot.part_of(model.bodies[body].link) != mounted, |_| false);
+    let is_free = is_free(&mut robot, timed) && is_free(&mut others, timed);
+    count(&robot, tally);
+    count(&others, tally);
+    is_free
+}
+
 /// The same where what is carried may touch what stands in `world` but not in `without`.
 pub fn is_lift_free(
     context: &Context,
@@ -88,14 +109,27 @@ pub fn is_lift_free(
 fn is_free(collider: &mut Collider, timed: &TimedPath) -> bool {
     let model = collider.model;
     let own = |values: &[f64]| model.configuration_of(values);
-    timed.points.iter().all(|point| model.is_within_limits(&own(&point.joints), 1e-9))
-        && timed.points.windows(2).all(|pair| {
+    timed.points.windows(2).all(|pair| {
             let [a, b] = pair else { return false };
             let velocities = [own(&a.velocities), own(&b.velocities)];
             let ends = [own(&a.joints), own(&b.joints)];
             let track = Track::cubic(&ends[0], &ends[1], [&velocities[0], &velocities[1]], b.time - a.time);
-            collider.is_certified_free(&track)
+            keeps_limits(model, &track) && collider.is_certified_free(&track)
         })
+}
+
+/// True where a cubic stays within all limits: it lies in the hull of its Bernstein coefficients.
+fn keeps_limits(model: &ArmModel, track: &Track) -> bool {
+    let control = |k: usize| -> Vec<f64> {
+        let of = |c: &[f64; 4]| match k {
+            0 => c[0],
+            1 => c[0] + c[1] / 3.0,
+            2 => c[0] + (2.0 * c[1] + c[2]) / 3.0,
+            _ => c[0] + c[1] + c[2] + c[3],
+        };
+        track.coefficients.iter().map(of).collect()
+    };
+    (0..4).all(|k| model.is_within_limits(&control(k), 1e-9))
 }
 
 fn collider<'c>(context: &Context, model: &'c ArmModel, world: &'c World) -> Collider<'c> {

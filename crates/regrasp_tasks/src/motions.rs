@@ -74,7 +74,7 @@ pub fn segments(
         maker.step = index;
         match step {
             Step::Pick(station, place) => maker.pick(station, place, &steps[index + 1..], tally)?,
-            Step::Give(give) => maker.give(give, &steps[index + 1..], tally)?,
+            Step::Give(give) => maker.give(give, tally)?,
             Step::Place(station, place) => maker.place(station, place, tally)?,
         }
     }
@@ -120,13 +120,7 @@ impl<'c, 'a> Maker<'c, 'a> {
     /// Arms and fingers move, nothing is held: fingers first, or last where that does not fit.
     fn transit(&mut self, target: &[f64], world: &Arc<World>, support: &str, tally: &mut Tally) -> Result<(), Stuck> {
         let context = self.context;
-        let fingers = |from: &[f64], to: &[f64]| {
-            let mut state = from.to_vec();
-            for k in (0..from.len()).filter(|k| !context.arms_and_torso.contains(k)) {
-                state[k] = to[k];
-            }
-            state
-        };
+        let fingers = |from: &[f64], to: &[f64]| self.with_fingers_of(from, to);
         let mut pieces = Vec::new();
         let opened = fingers(&self.state, target);
         let moves = opened != self.state;
@@ -150,6 +144,15 @@ impl<'c, 'a> Maker<'c, 'a> {
         self.record.add(context, RobotSegmentKind::Transit, vec![support.to_owned()], &[], &moves, &timed);
         self.state = target.to_vec();
         Ok(())
+    }
+
+    /// The state `arms` with the fingers of all hands as in `fingers`.
+    fn with_fingers_of(&self, arms: &[f64], fingers: &[f64]) -> Vec<f64> {
+        let mut state = fingers.to_vec();
+        for &k in &self.context.arms_and_torso {
+            state[k] = arms[k];
+        }
+        state
     }
 
     /// All fingers move on a straight line. None where that is not free.
@@ -204,13 +207,13 @@ impl<'c, 'a> Maker<'c, 'a> {
     }
 
     /// Fingers of the hands that will take the object next are opened while nothing is held.
-    fn with_open_takers(&self, target: &[f64], next: &[Step]) -> Vec<f64> {
+    fn with_open_takers(&self, target: &[f64], picker: usize, next: &[Step]) -> Vec<f64> {
         let mut target = target.to_vec();
-        let mut known = Vec::new();
+        let mut known = vec![picker];
         for step in next {
             let Step::Give(give) = step else { break };
             let [hand, _] = give.taker;
-            if !known.contains(&hand) && give.giver[0] != hand {
+            if !known.contains(&hand) {
                 known.push(hand);
                 target = with_fingers(self.context, &target, hand, &self.grasp(give.taker).open);
             }
@@ -295,17 +298,18 @@ impl<'c, 'a> Maker<'c, 'a> {
         Ok(())
     }
 
+    /// The hand comes to the object, closes, and is ready to lift it.
     fn pick(&mut self, station: &Station, place: &Place, next: &[Step], tally: &mut Tally) -> Result<(), Stuck> {
         let context = self.context;
         let which = [station.hand, station.grasp];
         let (grasp, support) = (self.grasp(which), place.support_name(context));
         let world = match self.object == place.world_from_object {
-            true => place.with_object.clone(),
-            false => Arc::new(context.fixed.with(context.obstacle_at(&self.object))),
+            true => place.with_object(context).clone(),
+            false => Arc::new(context.with_object(&self.object)),
         };
         // Hands that are not needed keep their fingers.
         let pre = self.overlaid(&station.way, &[station.hand]);
-        let target = self.with_open_takers(pre.ends()[1], next);
+        let target = self.with_open_takers(pre.ends()[1], station.hand, next);
         self.transit(&target, &world, support, tally)?;
         let way = self.overlaid(&station.way, &[station.hand]).reversed();
         let held = || (vec![support.to_owned()], None);
@@ -316,7 +320,7 @@ impl<'c, 'a> Maker<'c, 'a> {
         let holders = vec![support.to_owned(), context.hand_name(station.hand).to_owned()];
         self.rest(holders, &[(which, loads)])?;
         self.carried = Some(Carried { hand: station.hand, grasp, hand_from_object });
-        self.lift = Some((self.overlaid(&station.lift, &[station.hand]), place.without_supports.clone()));
+        self.lift = Some((self.overlaid(&station.lift, &[station.hand]), place.without_supports(context).clone()));
         Ok(())
     }
 
@@ -339,6 +343,18 @@ impl<'c, 'a> Maker<'c, 'a> {
         if let Some((lift, without)) = &lift {
             pieces.push(self.smooth(&carried, lift, Some((&model, without)), tally)?);
         }
+        // A hand that has held the object before opens for its next grasp.
+        let opened = self.with_fingers_of(&from, target);
+        if opened != from {
+            let fingers: Vec<usize> = (0..from.len()).filter(|&k| from[k] != opened[k]).collect();
+            let model = context.model(&from, &fingers, Some((carried.hand, &carried.hand_from_object)));
+            let timed = Smooth::Line([from, opened.clone()]).timed(&context.limits, 1.0, FINGER_STEPS);
+            if !is_motion_free(context, &model, &context.fixed, &timed, tally) {
+                return Err(self.stuck(Stage::Carry, "fingers that cannot move"));
+            }
+            pieces.push(timed);
+        }
+        let from = opened;
         let leg = self.leg([&from, target], &context.fixed, Some(&carried), LegTimes::Callers, Stage::Carry, tally)?;
         for pair in leg.iter().flat_map(|leg| leg.corners.windows(2)) {
             let line = Smooth::Line([pair[0].clone(), pair[1].clone()]);
@@ -389,13 +405,14 @@ impl<'c, 'a> Maker<'c, 'a> {
         Err(self.stuck(Stage::Carry, TOO_FAST))
     }
 
-    fn give(&mut self, give: &Give, next: &[Step], tally: &mut Tally) -> Result<(), Stuck> {
+    /// The object comes to the exchange, changes hands, and the giver leaves.
+    fn give(&mut self, give: &Give, tally: &mut Tally) -> Result<(), Stuck> {
         let context = self.context;
         let [giver, taker] = [give.giver, give.taker];
         let names = [giver, taker].map(|[hand, _]| context.hand_name(hand).to_owned());
         let way_in = self.overlaid(&give.way_in, &[giver[0], taker[0]]);
         self.carry(way_in.ends()[1], None, tally)?;
-        let world = context.fixed.with(context.obstacle_at(&self.object));
+        let world = context.with_object(&self.object);
         let by_giver = || (vec![names[0].clone()], Some(giver));
         let way = way_in.reversed();
         self.way((&way, taker[0]), RobotSegmentKind::Approach, by_giver(), &world, tally)?;
@@ -409,24 +426,24 @@ impl<'c, 'a> Maker<'c, 'a> {
         self.way((&way_out, giver[0]), RobotSegmentKind::Retreat, by_taker(), &world, tally)?;
         let hand_from_object = context.world_from_hand(taker[0], &self.state).inverse() * self.object;
         self.carried = Some(Carried { hand: taker[0], grasp: grasps[1], hand_from_object });
-        let _ = next;
         Ok(())
     }
 
+    /// The object comes down onto its support, and the hand leaves.
     fn place(&mut self, station: &Station, place: &Place, tally: &mut Tally) -> Result<(), Stuck> {
         let context = self.context;
         let which = [station.hand, station.grasp];
         let (grasp, support) = (self.grasp(which), place.support_name(context).to_owned());
         let down = self.overlaid(&station.lift, &[station.hand]).reversed();
         let target = down.ends()[0].clone();
-        self.carry(&target, Some((down, place.without_supports.clone())), tally)?;
+        self.carry(&target, Some((down, place.without_supports(context).clone())), tally)?;
         self.carried = None;
         let loads = [weight(context, &self.object), Wrench::ZERO];
         let hand = context.hand_name(station.hand).to_owned();
         self.rest(vec![hand, support.clone()], &[(which, loads)])?;
         let held = || (vec![support.clone()], None);
         self.fingers((station.hand, &grasp.open), RobotSegmentKind::Release, held(), tally)?;
-        let world = context.fixed.with(context.obstacle_at(&self.object));
+        let world = context.with_object(&self.object);
         let way = self.overlaid(&station.way, &[station.hand]);
         self.way((&way, station.hand), RobotSegmentKind::Retreat, held(), &world, tally)
     }
@@ -434,7 +451,7 @@ impl<'c, 'a> Maker<'c, 'a> {
     /// To the posture asked for at the end.
     fn end(&mut self, tally: &mut Tally) -> Result<(), Stuck> {
         let context = self.context;
-        let world = Arc::new(context.fixed.with(context.obstacle_at(&self.object)));
+        let world = Arc::new(context.with_object(&self.object));
         let support = self.record.segments.last().and_then(|last| last.held_by.values().next()).cloned();
         let support = support.and_then(|names| names.into_iter().next()).unwrap_or_default();
         self.transit(&context.query.end, &world, &support, tally)
