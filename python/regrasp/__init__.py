@@ -33,10 +33,10 @@ from ._model import (
     load_scene,
 )
 from ._plan import CONTACT_MODES, Plan, Segment
-from ._planning import check, export_mjcf, place, plan, plan_motion, view
+from ._planning import check, export_mjcf, place, plan, plan_motion, plan_pick_and_place, view
 from ._regrasp import __version__
 from ._result import Cause, Clearance, Failure, Moment, NearestMiss, Progress, Report, Violation
-from ._robot_plan import RobotPlan
+from ._robot_plan import RobotPlan, RobotSegment
 from ._session import QueryTimes, Session, Start
 
 __all__ = [
@@ -67,6 +67,7 @@ __all__ = [
     "RegraspError",
     "Report",
     "RobotPlan",
+    "RobotSegment",
     "Scene",
     "Segment",
     "Session",
@@ -88,5 +89,6 @@ __all__ = [
     "place",
     "plan",
     "plan_motion",
+    "plan_pick_and_place",
     "view",
 ]

@@ -45,7 +45,8 @@ def plan(
     """Plans how the hand takes the object from start to goal, and has the plan judged by the independent checker.
 
     Not to find a plan is a result, no exception: the answer is a `Plan`, which is true, or a `Failure`, which is false. A plan
-    that the checker rejects is a failure of kind "rejected". `plan_motion` plans tasks of kind "motion".
+    that the checker rejects is a failure of kind "rejected". `plan_motion` plans tasks of kind "motion", `plan_pick_and_place`
+    those of kind "pick_and_place".
 
     scene: a scene, or a scene file.
     seed: the same scene, settings and seed give the same plan, byte by byte, on any number of threads.
@@ -116,16 +117,52 @@ def plan_motion(
 
     Raises `InputError` for a task of another kind (A510), and `InternalError` where regrasp has a bug.
     """
+    return _plan_robot("plan_motion", "motion", scene, seed, time_limit, max_work, method, settings, level, task)
+
+
+def plan_pick_and_place(
+    scene: Scene | StrPath,
+    *,
+    seed: int = 0,
+    time_limit: float | None = None,
+    max_work: int = 20_000_000,
+    method: str | None = None,
+    settings: Mapping[str, Any] | None = None,
+    level: Level = "motion",
+    task: str | None = None,
+) -> RobotPlan | Failure:
+    """Plans how a robot brings an object to where a task of kind "pick_and_place" asks for it, and has the plan judged by the
+    independent checker. Arguments and result are those of `plan_motion`.
+
+    The plan says who holds the object when (`RobotPlan.segments`), and where fingers touch it (`RobotPlan.contact_points_in_object`).
+
+    Raises `InputError` for a task of another kind (A510), and `InternalError` where regrasp has a bug.
+    """
+    return _plan_robot("plan_pick_and_place", "pick_and_place", scene, seed, time_limit, max_work, method, settings, level, task)
+
+
+def _plan_robot(
+    name: str,
+    kind: str,
+    scene: Scene | StrPath,
+    seed: int,
+    time_limit: float | None,
+    max_work: int,
+    method: str | None,
+    settings: Mapping[str, Any] | None,
+    level: Level,
+    task: str | None,
+) -> RobotPlan | Failure:
     if not isinstance(scene, Scene):
         scene = load_scene(scene)
     asked = next((one for one in scene.tasks if one.name == task), scene.tasks[0])
-    if asked.kind != "motion":
-        raise argument_error("plan_motion", "task", f'is of kind "{asked.kind}"', 'a task of kind "motion"')
+    if asked.kind != kind:
+        raise argument_error(name, "task", f'is of kind "{asked.kind}"', f'a task of kind "{kind}"')
     request: dict[str, Any] = {
-        "seed": seed_of("plan_motion", seed),
+        "seed": seed_of(name, seed),
         "threads": 1,
-        "max_work": whole("plan_motion", "max_work", max_work, 0, 2**64 - 1),
-        "time_limit": seconds("plan_motion", "time_limit", time_limit),
+        "max_work": whole(name, "max_work", max_work, 0, 2**64 - 1),
+        "time_limit": seconds(name, "time_limit", time_limit),
         "improve": None,
         "method": method,
         "margin": None,

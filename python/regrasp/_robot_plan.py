@@ -9,6 +9,7 @@ import json
 import os
 import warnings
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -20,8 +21,26 @@ from ._model import FloatArray, Scene, load_scene
 from ._result import Report, report_of
 
 
+@dataclass(frozen=True)
+class RobotSegment:
+    """A piece of the plan."""
+
+    kind: str
+    """"transit" or "carry"; of pick and place "approach", "grasp", "release" and "retreat" too."""
+    held_by: Mapping[str, tuple[str, ...]]
+    """For every object of the plan, the hands and supports that hold it all through the segment."""
+    first: int
+    """Index of its first waypoint."""
+    last: int
+    """Index of its last waypoint."""
+    start: float
+    """From when, in seconds."""
+    end: float
+    """Until when, in seconds."""
+
+
 class RobotPlan:
-    """A motion of a whole robot. True, as opposed to a `Failure`.
+    """A motion of a whole robot, or pick and place. True, as opposed to a `Failure`.
 
     The waypoints of all segments stand in one array each, in order; where two segments meet, the last of one and the first of
     the next are both there.
@@ -67,6 +86,67 @@ class RobotPlan:
     def joint_velocities(self) -> FloatArray:
         """(n, j): their velocities."""
         return np.array([waypoint["joint_velocities"] for waypoint in self._waypoints], dtype=np.float64)
+
+    @cached_property
+    def objects(self) -> tuple[str, ...]:
+        """Names of the objects that the plan moves."""
+        return tuple(self.document["objects"])
+
+    @cached_property
+    def fingers(self) -> tuple[str, ...]:
+        """HAND/FINGER of all fingers of the plan's hands, in the order of contact arrays."""
+        return tuple(f"{hand['name']}/{finger}" for hand in self.document["hands"] for finger in hand["fingers"])
+
+    @cached_property
+    def segments(self) -> tuple[RobotSegment, ...]:
+        """The segments, in order."""
+        found: list[RobotSegment] = []
+        first = 0
+        for segment in self.document["segments"]:
+            last = first + len(segment["waypoints"]) - 1
+            held_by = {name: tuple(segment["held_by"].get(name, ())) for name in self.objects}
+            start, end = float(self.times[first]), float(self.times[last])
+            found.append(RobotSegment(segment["kind"], held_by, first, last, start, end))
+            first = last + 1
+        return tuple(found)
+
+    @cached_property
+    def object_positions(self) -> FloatArray:
+        """(n, o, 3): positions of the objects in the world."""
+        return self._poses("position", 3)
+
+    @cached_property
+    def object_quat_xyzw(self) -> FloatArray:
+        """(n, o, 4): their orientations."""
+        return self._poses("quat_xyzw", 4)
+
+    def _poses(self, key: str, size: int) -> FloatArray:
+        rows = [[pose[key] for pose in waypoint["world_from_objects"]] for waypoint in self._waypoints]
+        return np.array(rows, dtype=np.float64).reshape(len(rows), len(self.objects), size)
+
+    @cached_property
+    def contact_points_in_object(self) -> FloatArray:
+        """(n, f, 3): where each of `fingers` touches, in the frame of the object; NaN where it does not."""
+        return self._contacts("point_in_object")
+
+    @cached_property
+    def contact_normals_in_object(self) -> FloatArray:
+        """(n, f, 3): outward normals of the object there."""
+        return self._contacts("normal_in_object")
+
+    @cached_property
+    def contact_forces_in_object(self) -> FloatArray:
+        """(n, f, 3): forces of the fingers on the object, in newtons; NaN too where no forces are planned."""
+        return self._contacts("force_in_object")
+
+    def _contacts(self, key: str) -> FloatArray:
+        column = {name: k for k, name in enumerate(self.fingers)}
+        found = np.full((len(self._waypoints), len(column), 3), np.nan)
+        for row, waypoint in zip(found, self._waypoints):
+            for contact in waypoint.get("contacts", []):
+                if contact.get(key) is not None:
+                    row[column[f"{contact['hand']}/{contact['finger']}"]] = contact[key]
+        return found
 
     @property
     def duration(self) -> float:

@@ -157,3 +157,14 @@ pub fn upright() -> (tempfile::TempDir, LoadedScene) {
         load_scene_text(&path, scene.into(), &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
     (folder, loaded)
 }
+
+/// A plan of pick and place that was made by hand, with its scene: `tests/support/pick_and_place/make.py` wrote both.
+pub fn pick_and_place() -> (LoadedScene, RobotPlan) {
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/support/pick_and_place"));
+    let [scene, plan] = ["scene.toml", "plan.json"].map(|name| folder.join(name));
+    let text = std::fs::read(&scene).unwrap();
+    let loaded = load_scene_text(&scene, text, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let bytes = std::fs::read(&plan).unwrap();
+    let plan = regrasp_plan::format::robot_from_json(&plan, &bytes).unwrap_or_else(|error| panic!("{error}"));
+    (loaded, plan)
+}

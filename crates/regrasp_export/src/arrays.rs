@@ -218,7 +218,7 @@ impl PlanArrays {
     }
 }
 
-fn mode_number(mode: ContactMode) -> u8 {
+pub(crate) fn mode_number(mode: ContactMode) -> u8 {
     match mode {
         ContactMode::Free => 0,
         ContactMode::Fixed => 1,

@@ -9,7 +9,7 @@ use crate::verdict::{bad, level_named, report};
 use crate::watch::watched;
 use pyo3::prelude::*;
 use regrasp::base::Diagnostic;
-use regrasp::plan::check::{CheckSettings, Level, OwnQuery, Report, check_robot, query_of};
+use regrasp::plan::check::{CheckSettings, Level, OwnQuery, Report, check_any, query_of};
 use regrasp::plan::format;
 use regrasp::scene::Task;
 use regrasp::settings::{Argument, Overrides, SettingsError, settings_for};
@@ -91,7 +91,10 @@ pub fn plan_motion(py: Python<'_>, scene: &Scene, request: Request) -> PyResult<
             Ok(AnyPlan::Robot(plan)) => *plan,
             Ok(AnyPlan::InHand(_)) => {
                 let problem = bad("A507", "asks a hand to move an object".into()).element("argument", "task");
-                return Err(error::input(py, &problem.expected("a task of kind \"motion\"").into()));
+                return Err(error::input(
+                    py,
+                    &problem.expected("a task of kind \"motion\" or \"pick_and_place\"").into(),
+                ));
             }
             Err(failure) => return Ok((None, failed(&failure))),
         };
@@ -102,7 +105,8 @@ pub fn plan_motion(py: Python<'_>, scene: &Scene, request: Request) -> PyResult<
             let again = scene.read_again()?;
             let query = again.task_for(&plan.query).query(plan.seed);
             let settings = CheckSettings { level, ..CheckSettings::default() };
-            let report = check_robot((&again.scene, &again.state), query.as_motion(), &plan, &settings);
+            let any = AnyPlan::Robot(Box::new(plan.clone()));
+            let report = check_any((&again.scene, &again.state), Some(&query), &any, &settings);
             Ok((plan, report))
         });
         let (plan, report) = judged.map_err(|error: regrasp::InputError| error::input(py, &error))?;

@@ -1,4 +1,4 @@
-// Builds src/ into dist/viewer.js and dist/viewer.css. The same sources and package-lock.json give the same bytes.
+// Builds src/ into dist/viewer.* (plans of hands) and dist/robot.* (plans of robots), each with .js and .css. The same sources and package-lock.json give the same bytes.
 // `--check` builds in memory and fails where dist/ differs.
 
 import { build } from "esbuild";
@@ -14,7 +14,7 @@ const banner = `/*!\nThis page contains three.js (https://threejs.org):\n\n${lic
 
 const result = await build({
   absWorkingDir: here,
-  entryPoints: { viewer: "src/main.ts" },
+  entryPoints: { viewer: "src/main.ts", robot: "src/robot/main.ts" },
   outdir: "dist",
   bundle: true,
   write: false,

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .reference import PlanError
     from .replay import Drift, Track
     from .run import Replay, simulate
+    from .task import TaskReport, TaskSettings
 
 __all__ = [
     "Drift",
@@ -30,6 +31,8 @@ __all__ = [
     "Replay",
     "Report",
     "Settings",
+    "TaskReport",
+    "TaskSettings",
     "Track",
     "UnplannedContact",
     "load",
@@ -44,6 +47,8 @@ _HOMES = {
     "Replay": "run",
     "Report": "measure",
     "Settings": "model",
+    "TaskReport": "task",
+    "TaskSettings": "task",
     "Track": "replay",
     "UnplannedContact": "measure",
     "load": "files",

@@ -46,7 +46,7 @@ def main(arguments: list[str] | None = None) -> int:
             friction_scale=options.friction_scale,
             mass_scale=options.mass_scale,
             torsion=options.torsion,
-        torsion_told=options.torsion_told,
+            torsion_told=options.torsion_told,
             speed=options.speed,
             noslip=not options.no_noslip,
             hold_time=options.hold_time,
@@ -83,7 +83,9 @@ def _is_list(path: str) -> bool:
 
 
 def _replay_robot(plan: dict[str, Any], xml: str, options: argparse.Namespace) -> int:
-    """Replays a motion of a whole robot."""
+    """Replays a motion of a whole robot, or pick and place."""
+    if plan["task"] == "pick_and_place":
+        return _replay_task(plan, xml, options)
     from .robot import replay
 
     report = replay(plan, xml, speed=options.speed)
@@ -92,6 +94,32 @@ def _replay_robot(plan: dict[str, Any], xml: str, options: argparse.Namespace) -
         options.output.write_text(text + "\n")
     print(text if options.json else report)
     return 0 if report.followed else 1
+
+
+def _replay_task(plan: dict[str, Any], xml: str, options: argparse.Namespace) -> int:
+    """Replays pick and place."""
+    from .task import TaskSettings, replay
+
+    settings = TaskSettings(
+        speed=options.speed,
+        squeeze_time=options.squeeze_time,
+        with_forces=not options.no_forces,
+        friction_scale=options.friction_scale,
+        mass_scale=options.mass_scale,
+    )
+    report, track, rig = replay(plan, xml, settings)
+    text = json.dumps(report.to_json(), indent=1)
+    if options.output:
+        options.output.write_text(text + "\n")
+    print(text if options.json else report)
+    if options.strip:
+        from .strip import NoRenderer, task_strip, write_png
+
+        try:
+            write_png(options.strip, task_strip(rig, track))
+        except NoRenderer as error:
+            print(f"no picture: {error}", file=sys.stderr)
+    return 0 if report.kept else 1
 
 
 def summary(report: Report) -> str:
@@ -170,6 +198,16 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--squeeze", type=_positive, default=0.003, metavar="M", help="of controller A, in metres")
     parser.add_argument("--no-noslip", action="store_true", help="without MuJoCo's solver against creep")
     parser.add_argument("--hold-time", type=float, default=10.0, metavar="S", help="of the static hold measured first; 0: none")
+    parser.add_argument(
+        "--no-forces", action="store_true", help="of pick and place: fingers press with nothing, as a control; the object should fall"
+    )
+    parser.add_argument(
+        "--squeeze-time",
+        type=float,
+        default=0.25,
+        metavar="S",
+        help="of pick and place: rest in which forces change where fingers begin or cease to hold [default: 0.25]",
+    )
     parser.add_argument("-o", "--output", type=Path, metavar="FILE.json", help="write the report")
     parser.add_argument("--json", action="store_true", help="the report on stdout")
     parser.add_argument("--strip", type=Path, metavar="FILE.png", help="write a strip of pictures")

@@ -30,7 +30,7 @@ def load_robot(
     if not isinstance(content, dict):
         return None
     plan_file = cast("dict[str, Any]", content)
-    if plan_file.get("task") != "motion":
+    if plan_file.get("task") not in ("motion", "pick_and_place"):
         return None
     if mjcf is not None:
         return plan_file, Path(mjcf).read_text(encoding="utf-8")
@@ -68,4 +68,3 @@ def load(
         return plan, regrasp.export_mjcf(path, scene=scene, packages=packages)
     except regrasp.RegraspError as error:
         raise PlanError(str(error)) from None
-

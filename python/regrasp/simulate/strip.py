@@ -9,9 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ._mujoco import MjvCamera, mujoco
+from ._mujoco import MjModel, MjvCamera, mujoco
 from .model import Rig
 from .replay import Track
+from .task import TaskTrack
+from .task_reference import TaskRig
 
 Image = NDArray[np.uint8]
 
@@ -22,18 +24,31 @@ class NoRenderer(RuntimeError):
 
 def strip(rig: Rig, track: Track, *, pictures: int = 6, width: int = 360, height: int = 320) -> Image:
     """Pictures at even times, side by side; shape (height, pictures * width, 3). Raises ``NoRenderer``."""
-    model = rig.model
+    chosen = np.linspace(0, track.n_ticks - 1, pictures).round().astype(int)
+    return _panels(rig.model, track.qpos[chosen], _camera(rig, track), width, height)
+
+
+def task_strip(rig: TaskRig, track: TaskTrack, *, pictures: int = 8, width: int = 360, height: int = 320) -> Image:
+    """Pictures of pick and place at even times, side by side. Raises ``NoRenderer``."""
+    camera = mujoco.MjvCamera()
+    camera.type = mujoco.mjtCamera.mjCAMERA_FREE
+    camera.lookat[:] = track.qpos[:, rig.object_qpos : rig.object_qpos + 3].mean(axis=0)
+    camera.distance, camera.azimuth, camera.elevation = 1.6, 140.0, -25.0
+    chosen = np.linspace(0, len(track.qpos) - 1, pictures).round().astype(int)
+    return _panels(rig.model, track.qpos[chosen], camera, width, height)
+
+
+def _panels(model: MjModel, postures: NDArray[np.float64], camera: MjvCamera, width: int, height: int) -> Image:
     try:
         renderer = mujoco.Renderer(model, height, width)
     # MuJoCo's back ends fail in their own ways, some while they are imported.
     except Exception as error:
         raise NoRenderer(f"MuJoCo cannot draw offscreen here ({error}); set MUJOCO_GL to egl or osmesa") from error
     data = mujoco.MjData(model)
-    camera = _camera(rig, track)
     panels: list[Image] = []
     try:
-        for k in np.linspace(0, track.n_ticks - 1, pictures).round().astype(int):
-            data.qpos[:] = track.qpos[k]
+        for qpos in postures:
+            data.qpos[:] = qpos
             mujoco.mj_forward(model, data)
             renderer.update_scene(data, camera)
             panels.append(renderer.render().copy())

@@ -15,10 +15,10 @@ const FINGER_COLORS: [&str; 6] =
     ["0.3 0.5 0.8 1", "0.8 0.35 0.3 1", "0.35 0.7 0.4 1", "0.65 0.4 0.75 1", "0.3 0.7 0.75 1", "0.85 0.55 0.25 1"];
 /// Stiffness of servos of a finger of [`SERVO_REACH`], in N m/rad, and damping, in N m s/rad: those of replays
 /// (`docs/reference/replay.md`), so that a hand at rest is as stiff as one that moves.
-const SERVO_STIFFNESS: f64 = 5.0;
-const SERVO_DAMPING: f64 = 0.08;
+pub(super) const SERVO_STIFFNESS: f64 = 5.0;
+pub(super) const SERVO_DAMPING: f64 = 0.08;
 /// Reach of the finger that the servos were set for, in metres.
-const SERVO_REACH: f64 = 0.108;
+pub(super) const SERVO_REACH: f64 = 0.108;
 /// Least reach that servos are set for, in metres: fingers that only turn about their tips.
 const LEAST_REACH: f64 = 0.005;
 
@@ -260,7 +260,7 @@ fn moving_joints(hand: &Hand, finger: &Finger) -> Vec<JointId> {
 }
 
 /// Distance from the first turning joint of a finger to its tip along the straight finger, in metres.
-fn reach(finger: &Finger) -> f64 {
+pub(super) fn reach(finger: &Finger) -> f64 {
     let joints = &finger.chain.joints;
     let Some(first) = joints.iter().position(|joint| joint.motion == JointMotion::Turn) else { return SERVO_REACH };
     let links = joints[first + 1..].iter().map(|joint| joint.parent_from_joint.translation.vector.norm());

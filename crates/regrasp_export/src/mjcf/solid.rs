@@ -1,4 +1,4 @@
-//! Objects as MuJoCo collides with them: a convex shape, or convex parts of a mesh.
+//! Solids as MuJoCo collides with them: a convex shape, or convex parts of a mesh.
 
 use super::geom::{CONVEX_WITHIN, is_hollowed};
 use regrasp_geometry::Shape;
@@ -8,6 +8,8 @@ use std::sync::Arc;
 
 /// How finely an object is cut. By hand: the bulb needs three parts.
 const PARTS: PartSettings = PartSettings { max_parts: 16, excess: CONVEX_WITHIN };
+
+const HULL: &str = "MuJoCo collides with its convex hull";
 
 /// What the object collides with.
 pub(super) struct ObjectSolid {
@@ -20,14 +22,20 @@ pub(super) struct ObjectSolid {
 impl ObjectSolid {
     /// Of `object`: parts of a mesh that is a closed solid and not convex, else the shape itself.
     pub fn of(object: &Object) -> Self {
-        let whole =
-            |note: Option<&str>| ObjectSolid { parts: vec![object.shape.clone()], note: note.map(str::to_owned) };
-        if !is_hollowed(&object.shape) {
-            return whole(None);
-        }
-        let Shape::Mesh(mesh) = &object.shape else { return whole(None) };
         // Where the scene replaces the object by its hull, the planner kept links away from it.
-        match convex_parts(mesh, &PARTS).filter(|_| object.hull.is_none()) {
+        match object.hull {
+            Some(_) if is_hollowed(&object.shape) => ObjectSolid::whole(&object.shape, Some(HULL)),
+            _ => ObjectSolid::of_shape(&object.shape),
+        }
+    }
+
+    /// Of any shape.
+    pub fn of_shape(shape: &Shape) -> Self {
+        if !is_hollowed(shape) {
+            return ObjectSolid::whole(shape, None);
+        }
+        let Shape::Mesh(mesh) = shape else { return ObjectSolid::whole(shape, None) };
+        match convex_parts(mesh, &PARTS) {
             Some(parts) => ObjectSolid {
                 note: Some(format!(
                     "MuJoCo collides with {} convex parts, which exceed it by {:.1} % of its volume",
@@ -36,7 +44,11 @@ impl ObjectSolid {
                 )),
                 parts: parts.hulls.into_iter().map(|hull| Shape::Convex(Arc::new(hull))).collect(),
             },
-            None => whole(Some("MuJoCo collides with its convex hull")),
+            None => ObjectSolid::whole(shape, Some(HULL)),
         }
+    }
+
+    fn whole(shape: &Shape, note: Option<&str>) -> Self {
+        ObjectSolid { parts: vec![shape.clone()], note: note.map(str::to_owned) }
     }
 }

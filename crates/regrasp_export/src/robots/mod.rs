@@ -1,5 +1,7 @@
 //! Plans of whole robots as arrays, and as trajectories of controllers. `crate::mjcf` has their MuJoCo models.
 
+mod contacts;
+
 use crate::arrays::Numbers;
 use crate::error::{ExportError, LATEST_TIME};
 use crate::npz::{Npz, integers, names, npy, refuse_too_long, texts};
@@ -12,7 +14,7 @@ use std::fmt::Write;
 const NANOSECONDS: u64 = 1_000_000_000;
 
 /// The bytes of an `.npz` file with the arrays of `plan`: n waypoints of all segments in order, j joints, o objects, k holders, s
-/// segments.
+/// segments, h hands, f fingers of all hands.
 ///
 /// Errors: a name so long that an array of names would be huge.
 pub fn robot_to_npz(plan: &RobotPlan) -> Result<Vec<u8>, ExportError> {
@@ -24,8 +26,11 @@ pub fn robot_to_npz(plan: &RobotPlan) -> Result<Vec<u8>, ExportError> {
         }
     }
     let robots: Vec<String> = plan.robots.iter().map(|robot| robot.name.clone()).collect();
+    let contacts = contacts::ContactArrays::of(plan);
     for (what, texts) in [
         ("the joint names", joint_names.as_slice()),
+        ("the names of hands", &contacts.hands),
+        ("the names of fingers", &contacts.fingers),
         ("the names of robots", &robots),
         ("the names of objects", &plan.objects),
         ("the names of holders", &holders),
@@ -81,6 +86,7 @@ pub fn robot_to_npz(plan: &RobotPlan) -> Result<Vec<u8>, ExportError> {
     file.add("segment_kinds", &texts(&[s], &kinds));
     file.add("segment_held_by", &integers(&[s, o, holders.len()], &held_by));
     file.add("segment_starts", &integers(&[s + 1], &starts));
+    contacts.add_to(&mut file, n);
     Ok(file.finish())
 }
 

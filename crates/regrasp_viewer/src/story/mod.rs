@@ -19,7 +19,7 @@ mod plan_file;
 /// A scene told body by body.
 mod scene;
 /// Shapes as packed meshes.
-mod shapes;
+pub(crate) mod shapes;
 /// Meshes of fewer triangles.
 mod simplify;
 /// A story from scene, query and plan.

@@ -13,7 +13,7 @@ const MOST_TRIANGLES: usize = 120_000;
 
 /// Shapes, each once.
 #[derive(Default)]
-pub(super) struct Shapes {
+pub(crate) struct Shapes {
     shapes: Vec<Shape>,
     /// Shapes of links and the index of the hull of each.
     hulls: Vec<(Shape, usize)>,
@@ -21,7 +21,7 @@ pub(super) struct Shapes {
 
 impl Shapes {
     /// The index of `shape`.
-    pub(super) fn index_of(&mut self, shape: &Shape) -> usize {
+    pub(crate) fn index_of(&mut self, shape: &Shape) -> usize {
         self.shapes.iter().position(|known| known == shape).unwrap_or_else(|| {
             self.shapes.push(shape.clone());
             self.shapes.len() - 1
@@ -29,7 +29,7 @@ impl Shapes {
     }
 
     /// The convex shape that stands for `shape` in the hand.
-    pub(super) fn hull_of(&mut self, shape: &Shape) -> usize {
+    pub(crate) fn hull_of(&mut self, shape: &Shape) -> usize {
         if let Some((_, index)) = self.hulls.iter().find(|(known, _)| known == shape) {
             return *index;
         }
@@ -41,7 +41,7 @@ impl Shapes {
     }
 
     /// The mesh of what something looks like.
-    pub(super) fn visual(&mut self, geometry: &VisualGeometry, packages: &ResolveOptions) -> Result<usize, String> {
+    pub(crate) fn visual(&mut self, geometry: &VisualGeometry, packages: &ResolveOptions) -> Result<usize, String> {
         let shape = match geometry {
             VisualGeometry::Shape(shape) => shape.clone(),
             VisualGeometry::Unreadable(problem) => return Err(problem.clone()),
@@ -57,7 +57,7 @@ impl Shapes {
     }
 
     /// All of them as packed meshes of no more than [`MOST_TRIANGLES`] in all; a remark when some have fewer than they had.
-    pub(super) fn packed(&self, notes: &mut Vec<(String, String)>) -> Vec<super::MeshStory> {
+    pub(crate) fn packed(&self, notes: &mut Vec<(String, String)>) -> Vec<super::MeshStory> {
         let drawn: Vec<Triangles> = self.shapes.iter().map(tessellate).collect();
         let sizes: Vec<usize> = drawn.iter().map(|triangles| triangles.triangles.len()).collect();
         let most = most_each(&sizes, MOST_TRIANGLES);

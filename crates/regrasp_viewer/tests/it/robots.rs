@@ -1,9 +1,9 @@
 //! Pictures of plans of whole robots.
 
-use crate::moving_robot::{load, motion, straight, two_arms};
-use regrasp_plan::check::{CheckSettings, check_robot, robot_along};
+use crate::moving_robot::{load, motion, pick_and_place, straight, two_arms};
+use regrasp_plan::check::{CheckSettings, RobotAlong, check_robot, robot_along};
 use regrasp_scene::MotionGoal;
-use regrasp_viewer::robots::{RobotStoryboard, RobotTelling, robot_charts, robot_page, robot_storyboard};
+use regrasp_viewer::robots::{RobotReplay, RobotStoryboard, RobotTelling, robot_charts, robot_page, robot_storyboard};
 
 #[test]
 fn pages_of_robots_show_frames_and_charts() {
@@ -33,4 +33,39 @@ fn pages_of_robots_show_frames_and_charts() {
     assert_eq!(picture.width, 240);
     assert!(picture.rgb.iter().any(|byte| *byte < 200));
     assert!(robot_storyboard(scene, state, &plan, &RobotStoryboard { frames: 1, ..settings }).is_err());
+}
+
+#[test]
+fn pick_and_place_has_a_task_chart_and_a_replay() {
+    let (loaded, plan) = pick_and_place();
+    let (scene, state) = (&loaded.scene, &loaded.state);
+    let report = check_robot((scene, state), None, &plan, &CheckSettings::default());
+    // Clearance is the checker's matter, and has its own test above.
+    let along = RobotAlong::default();
+    let telling = RobotTelling { scene, state, plan: &plan, report: &report, along: &along, title: None };
+    let charts = robot_charts(&telling);
+    let names: Vec<&str> = charts.iter().map(|(name, _)| *name).collect();
+    assert_eq!(names[..3], ["task", "fingers", "joints"]);
+    let task = roxmltree::Document::parse(&charts[0].1).unwrap();
+    let text: Vec<&str> = task.descendants().filter_map(|node| node.text()).collect();
+    for name in ["right", "left", "table", "grasp", "carry"] {
+        assert!(text.contains(&name), "{name} in {text:?}");
+    }
+    // A bar of the right hand, two of the table; the left hand has none.
+    let filled = |color: &str| task.descendants().filter(|node| node.attribute("fill") == Some(color)).count();
+    assert_eq!((filled("#0072b2"), filled("#e69f00"), filled("#9a8f80")), (1, 0, 2));
+    let fingers = &charts[1].1;
+    assert!(fingers.contains("right/east") && !fingers.contains("left/east"));
+    let replay = RobotReplay::of(&telling).unwrap();
+    assert!(replay.times.is_sorted() && replay.segments.len() == plan.segments.len());
+    let bytes = regrasp_viewer::story::pack::from_base64(&replay.poses).unwrap();
+    assert_eq!(bytes.len(), 28 * replay.times.len() * replay.n_columns);
+    // The object is the last column; at the last frame it is at the goal.
+    let last = &bytes[bytes.len() - 28..];
+    let x = f32::from_le_bytes(last[..4].try_into().unwrap());
+    let goal = plan.waypoints().last().unwrap().world_from_objects[0].position[0];
+    assert!((f64::from(x) - goal).abs() < 1e-6, "{x} {goal}");
+    let settings = RobotStoryboard { frames: 6, width: 300, columns: None };
+    let page = robot_page(&telling, &settings).unwrap();
+    assert!(page.len() < 8_000_000 && page.contains("<summary>Fingers</summary>"));
 }

@@ -6,15 +6,10 @@
 
 use super::MjcfModel;
 use crate::mjcf::object::Hold;
+use crate::mjcf::tip::{POINT_TORSION, ROLLING, friction_of};
 use crate::mjcf::xml::{Xml, numbers};
-use regrasp_robot::{ContactModel, Finger};
 use regrasp_scene::{FingerShapeId, HandView, collision_pairs};
 use std::collections::BTreeSet;
-
-/// Torsional friction of a fingertip that counts as a point, in metres (physics notes, section 1): none touches at a point.
-const POINT_TORSION: f64 = 0.002;
-/// MuJoCo's own coefficients of rolling friction; without effect where `condim` is below 6.
-const ROLLING: f64 = 0.0001;
 
 /// Writes pairs, each once.
 struct Pairs<'x> {
@@ -95,16 +90,5 @@ fn add_moved(pairs: &mut Pairs, model: &MjcfModel) {
         for geom in around[obstacle] {
             object.iter().for_each(|part| pairs.unplanned(geom, part, friction));
         }
-    }
-}
-
-/// `condim` and MuJoCo's five friction coefficients of a fingertip on the object.
-fn friction_of(finger: &Finger, friction: f64) -> (u8, [f64; 5]) {
-    let with_torsion = |torsion: f64| [friction, friction, torsion, ROLLING, ROLLING];
-    match finger.tip.contact {
-        ContactModel::Frictionless => (1, with_torsion(POINT_TORSION)),
-        _ if friction <= 0.0 => (1, [1.0, 1.0, POINT_TORSION, ROLLING, ROLLING]),
-        ContactModel::Point => (4, with_torsion(POINT_TORSION)),
-        ContactModel::SoftFinger { torsion_radius } => (4, with_torsion(friction * torsion_radius)),
     }
 }
