@@ -92,16 +92,13 @@ fn reach(loaded: &LoadedScene, task: usize) -> Vec<[usize; 2]> {
 fn each_arm_reaches_one_end_of_the_horse_s_way() {
     for name in ["justin_horse", "justin_horse_vases", "justin_horse_crowded"] {
         let seen = reach(&loaded(name), 0);
-        println!("{name}: {seen:?}");
         let [right, left] = seen.as_slice() else { panic!("{name}: {seen:?}") };
         assert!(right[0] >= 4 && right[1] == 0, "{name}: {seen:?}");
         assert!(left[0] == 0 && left[1] >= 4, "{name}: {seen:?}");
     }
     let seen = reach(&loaded("justin_horse_turning"), 0);
-    println!("turning: {seen:?}");
     assert!(seen.iter().flatten().all(|count| *count >= 4), "{seen:?}");
     let seen = reach(&loaded("justin_horse_near"), 0);
-    println!("near: {seen:?}");
     assert!(seen[0].iter().all(|count| *count >= 4), "{seen:?}");
 }
 
@@ -172,7 +169,6 @@ fn scenes_of_shared_models_are_within_reach() {
     }
     for object in ["mustard", "drill", "breyer"] {
         let seen = reach(&loaded(&format!("iiwa_allegro_{object}")), 0);
-        println!("{object}: {seen:?}");
         let [right, left] = seen.as_slice() else { panic!("{object}: {seen:?}") };
         assert!(right[0] >= 3 && right[1] == 0, "{object}: {seen:?}");
         assert!(left[0] == 0 && left[1] >= 3, "{object}: {seen:?}");
@@ -180,7 +176,6 @@ fn scenes_of_shared_models_are_within_reach() {
     let panda = loaded("panda_allegro_table");
     for task in 0..panda.tasks.len() {
         let seen = reach(&panda, task);
-        println!("panda {task}: {seen:?}");
         assert!(seen[0].iter().all(|count| *count >= 2), "{}: {seen:?}", panda.tasks[task].name);
     }
 }
