@@ -1,6 +1,6 @@
 //! Where one hand gives the object to another one (Saut 2010, sec. V-C).
 
-use crate::context::Context;
+use crate::context::{Context, Grasp};
 use crate::failing::{Stage, Tally};
 use crate::forces;
 use crate::line::{LINE_STEPS, is_motion_free, is_state_free, straight};
@@ -11,6 +11,8 @@ use regrasp_arms::World;
 use regrasp_arms::model::ArmModel;
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, Vector};
+use regrasp_grasp_lists::pairs::{Context as Surroundings, Side, pair_grasps};
+use std::collections::BTreeSet;
 
 /// Postures of one arm that are looked at.
 const POSTURES: usize = 3;
@@ -156,6 +158,23 @@ impl Places {
     }
 }
 
+/// Pairs of grasps, by index among the grasps of both hands, in which the hands do not hit each other (Saut 2010, sec. IV-B).
+pub fn double_grasps(context: &Context, hands: [usize; 2]) -> BTreeSet<[usize; 2]> {
+    let anywhere = Surroundings::default();
+    let side = |hand: usize| {
+        let own = &context.hands[hand];
+        Side { hand: &context.scene.hands[own.index].hand, object: context.object, list: own.list, context: &anywhere }
+    };
+    // What cannot be compared is left to the tests of whole robots.
+    let everything = || {
+        let [n, m] = hands.map(|hand| context.hands[hand].grasps.len());
+        (0..n).flat_map(|i| (0..m).map(move |j| [i, j])).collect()
+    };
+    let Ok(pairs) = pair_grasps(&side(hands[0]), &side(hands[1]), 1) else { return everything() };
+    let own = |hand: usize, index: usize| context.hands[hand].grasps.iter().position(|grasp| grasp.index == index);
+    pairs.pairs.iter().filter_map(|pair| Some([own(hands[0], pair.first)?, own(hands[1], pair.second)?])).collect()
+}
+
 /// Why an exchange fails, from far to near.
 const REASONS: [&str; 7] = [
     "out of reach",
@@ -172,15 +191,15 @@ struct Attempt<'c, 'a> {
     context: &'c Context<'a>,
     giver: [usize; 2],
     taker: [usize; 2],
-    /// Both closed with the object, taker open, giver open; made when they are needed.
-    models: Option<[ArmModel; 3]>,
+    /// Both hands closed, with the object; made when it is needed.
+    model: Option<ArmModel>,
     /// Index of the nearest reason.
     reached: usize,
 }
 
 impl<'c, 'a> Attempt<'c, 'a> {
     fn new(context: &'c Context<'a>, giver: [usize; 2], taker: [usize; 2]) -> Self {
-        Attempt { context, giver, taker, models: None, reached: 0 }
+        Attempt { context, giver, taker, model: None, reached: 0 }
     }
 
     /// The exchange with the object at a pose, with the common joints of `common`.
@@ -191,7 +210,7 @@ impl<'c, 'a> Attempt<'c, 'a> {
         let both =
             with_fingers(context, &with_fingers(context, common, giver.0, &giver.1.closed), taker.0, &taker.1.closed);
         let target =
-            |(hand, grasp): (usize, &crate::context::Grasp)| (hand, world_from_object * grasp.object_from_hand);
+            |(hand, grasp): (usize, &Grasp)| (hand, world_from_object * grasp.object_from_hand);
         let (hand, pose) = target(giver);
         let first = arm_postures(context, hand, &both, &pose, POSTURES)
             .map_err(|(by, words)| tally.miss(Stage::Exchange, by, || words))
@@ -206,13 +225,9 @@ impl<'c, 'a> Attempt<'c, 'a> {
         }
         self.reached = self.reached.max(1);
         let free = &context.arms_and_torso;
-        let models = self.models.get_or_insert_with(|| {
+        let model = self.model.get_or_insert_with(|| {
             let attached = context.attached(giver.0, &giver.1.object_from_hand.inverse(), &[taker.0]);
-            let of = |state: &[f64], attached: &[regrasp_arms::model::Attached]| {
-                ArmModel::new(context.robot, &context.covers.links, attached, state, free)
-            };
-            let open = |(hand, grasp): (usize, &crate::context::Grasp)| with_fingers(context, &both, hand, &grasp.open);
-            [of(&both, &[attached]), of(&open(taker), &[]), of(&open(giver), &[])]
+            ArmModel::new(context.robot, &context.covers.links, &[attached], &both, free)
         });
         let arm = context.hands[taker.0].arm_joints.clone();
         let mut world: Option<World> = None;
@@ -220,21 +235,24 @@ impl<'c, 'a> Attempt<'c, 'a> {
             for second in &second {
                 let mut at = first.clone();
                 at[arm.clone()].copy_from_slice(&second[arm.clone()]);
-                if !is_state_free(context, &models[0], &context.fixed, &at, tally) {
+                if !is_state_free(context, model, &context.fixed, &at, tally) {
                     continue;
                 }
                 self.reached = self.reached.max(2);
                 let world = world.get_or_insert_with(|| context.fixed.with(context.obstacle_at(world_from_object)));
-                let way = |(hand, grasp): (usize, &crate::context::Grasp), model: &ArmModel, tally: &mut Tally| {
+                let way = |(hand, grasp): (usize, &Grasp), tally: &mut Tally| {
                     let open = with_fingers(context, &at, hand, &grasp.open);
                     let direction = world_from_object.rotation * grasp.direction;
+                    // The other hand rests, and touches the object.
+                    let arm: Vec<usize> = context.hands[hand].arm_joints.clone().collect();
+                    let model = context.model(&open, &arm, None);
                     WAY_SHARES.iter().find_map(|share| {
                         let way = straight(context, hand, &open, &(-direction * grasp.distance * *share))?;
                         let timed = way.timed(&context.limits, 1.0, LINE_STEPS);
-                        is_motion_free(context, model, world, &timed, tally).then_some(way)
+                        is_motion_free(context, &model, world, &timed, tally).then_some(way)
                     })
                 };
-                let Some(way_in) = way(taker, &models[1], tally) else { continue };
+                let Some(way_in) = way(taker, tally) else { continue };
                 self.reached = self.reached.max(3);
                 if !can_close(context, taker.0, [&with_fingers(context, &at, taker.0, &taker.1.open), &at], tally) {
                     continue;
@@ -244,7 +262,7 @@ impl<'c, 'a> Attempt<'c, 'a> {
                     continue;
                 }
                 self.reached = self.reached.max(5);
-                let Some(way_out) = way(giver, &models[2], tally) else { continue };
+                let Some(way_out) = way(giver, tally) else { continue };
                 return Some(Give { giver: self.giver, taker: self.taker, at, way_in, way_out });
             }
         }

@@ -229,7 +229,9 @@ impl<'c, 'a> Maker<'c, 'a> {
     ) -> Result<(), Stuck> {
         let context = self.context;
         let timed = path.timed(&context.limits, 1.0, LINE_STEPS);
-        let model = context.model(&timed.points[0].joints, &context.arms_and_torso, None);
+        // A hand that holds the object rests, and touches it.
+        let arm: Vec<usize> = context.hands[hand].arm_joints.clone().collect();
+        let model = context.model(&timed.points[0].joints, &arm, None);
         if !is_motion_free(context, &model, world, &timed, tally) {
             let stage = if holding.is_some() { Stage::Exchange } else { Stage::Transit };
             return Err(self.stuck(stage, format!("ways of the hand \"{}\"", context.hand_name(hand))));
