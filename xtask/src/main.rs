@@ -8,6 +8,7 @@ mod reference;
 mod replay;
 mod run;
 mod scans;
+mod tasks;
 
 use run::Outcome;
 use std::process::ExitCode;
@@ -16,7 +17,7 @@ use std::process::ExitCode;
 type Task = (&'static str, &'static str, fn(&[String]) -> Outcome);
 
 /// All tasks, in the order in which `cargo xtask` lists them.
-const TASKS: [Task; 14] = [
+const TASKS: [Task; 15] = [
     (
         "reference",
         "write the generated pages of docs/reference (--check: fail if they are out of date)",
@@ -31,6 +32,7 @@ const TASKS: [Task; 14] = [
     ),
     ("bench-grasps", "lists of grasps of real hands and objects, as out/grasps/grasps.md", grasps::bench),
     ("bench-arms", "motions of whole robots: problems of MotionBenchMaker, super graphs; needs PyYAML", bench::arms),
+    ("bench-tasks", "tasks of pick and place beside the table of Saut 2010, as out/tasks/tasks.md", tasks::bench),
     ("growth", "measure how loading and planning grow with fingers, triangles, obstacles and threads", bench::growth),
     ("bench-scans", "turn scanned objects that are not convex in the Allegro hand", scans::task),
     ("benchmark-page", "write docs/benchmarks.md from what was measured", bench::page),

@@ -1,6 +1,6 @@
 //! One entry for every kind of task.
 
-use crate::task_grasps::{make_list, read_grasps, settings_of_made_lists};
+use crate::task_grasps::{make_list, read_grasps, refuse_too_heavy, settings_of_made_lists};
 use crate::{AnyPlan, Failure, GraspList, PlannerSettings, RobotPlan};
 use regrasp_base::Budget;
 use regrasp_planners::{FailureKind, Progress};
@@ -60,6 +60,9 @@ fn task_lists(
         let advice = "name the lists of these hands and this object in the scene";
         Failure::bare(FailureKind::SettingsInvalid, error.to_string(), advice)
     })?;
+    if !grasps.missing.is_empty() {
+        refuse_too_heavy(scene, query)?;
+    }
     let mut none = None;
     for hand in grasps.missing.clone() {
         let made = settings_of_made_lists(&scene.hands[hand].hand, settings.in_hand.n_threads);

@@ -5,8 +5,10 @@ use regrasp_base::diagnostic::number;
 use regrasp_base::{Budget, Diagnostic, InputError, Place, files};
 use regrasp_geometry::Vector;
 use regrasp_grasp::list::{GraspKind, format};
+use regrasp_planners::FailureKind;
 use regrasp_robot::manipulator::MountedHand;
 use regrasp_robot::{Hand, LinkId, Robot};
+use regrasp_scene::gravity::STANDARD_GRAVITY;
 use regrasp_scene::{GraspFile, Object, PickAndPlaceQuery, Scene};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -155,6 +157,30 @@ pub fn kind_for(hand: &Hand) -> GraspKind {
         (_, 0..=2) => GraspKind::Closing,
         _ => GraspKind::Precision,
     }
+}
+
+/// Refuses an object that is too heavy for every hand of the robot, before any list is made: all fingertips of a hand together, at the largest
+/// normal force, press with less than its weight.
+///
+/// Errors: the weight, and what the strongest hand holds at most.
+pub fn refuse_too_heavy(scene: &Scene, query: &PickAndPlaceQuery) -> Result<(), Failure> {
+    let object = &scene.objects[query.object];
+    let settings = GraspSettings::default();
+    let normal_force = settings.forces.normal_force[1].min(scene.limits.normal_force);
+    let largest_force = normal_force * (object.friction / settings.friction_margin).hypot(1.0);
+    let of_hand = |hand: usize| (scene.hands[hand].hand.fingers.len() as f64 * largest_force, hand);
+    let strongest = hands_of(scene, query).into_iter().map(of_hand).max_by(|a, b| a.0.total_cmp(&b.0));
+    let Some((held, hand)) = strongest else { return Ok(()) };
+    let weight = object.mass * STANDARD_GRAVITY;
+    if weight <= held {
+        return Ok(());
+    }
+    let message = format!(
+        "start: \"{}\" weighs {weight:.0} N, and the fingertips of hand \"{}\" press with at most {held:.0} N together",
+        object.name, scene.hands[hand].name
+    );
+    let advice = "name a lighter object, or a larger normal_force in [limits]";
+    Err(Failure::bare(FailureKind::StartInvalid, message, advice))
 }
 
 /// Makes the list of a hand that a robot carries and of the object of `query`, from what the scene knows: no file is read. Names are

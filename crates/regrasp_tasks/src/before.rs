@@ -20,7 +20,7 @@ pub fn refuse(context: &Context, tally: &mut Tally) -> Result<(), Failure> {
     ];
     for (name, kind, pose, posture) in ends {
         refuse_place(context, name, kind, pose)?;
-        let world = Arc::new(context.fixed.with(context.obstacle_at(pose)));
+        let world = Arc::new(context.with_object(pose));
         refuse_posture(context, name, kind, (posture, world))?;
     }
     for (name, kind, pose, _) in ends {
@@ -47,9 +47,9 @@ pub fn refuse(context: &Context, tally: &mut Tally) -> Result<(), Failure> {
 /// The object overlaps something, or touches no support.
 fn refuse_place(context: &Context, name: &str, kind: FailureKind, pose: &Pose) -> Result<(), Failure> {
     let object = &context.object.name;
-    let others = &context.fixed.obstacles[context.scene.supports.len()..];
-    if let Some(other) = others.iter().find(|other| !is_apart(context, pose, &other.placed, 0.0)) {
-        let message = format!("{name}: \"{object}\" overlaps \"{}\"", other.name);
+    let mut others = context.scene.supports.len()..context.fixed.obstacles.len();
+    if let Some(other) = others.find(|&other| !is_apart(context, pose, other, 0.0)) {
+        let message = format!("{name}: \"{object}\" overlaps \"{}\"", context.fixed.obstacles[other].name);
         return Err(refused(kind, message, "move one of the two"));
     }
     if Place::new(context, pose).is_none() {

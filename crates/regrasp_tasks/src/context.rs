@@ -105,6 +105,8 @@ pub struct Context<'a> {
     pub covers: Arc<Covers>,
     /// Everything that rests, without the object.
     pub fixed: Arc<World>,
+    /// The object alone, in its own frame.
+    pub alone: World,
     /// Hands that can take the object.
     pub hands: Vec<TaskHand<'a>>,
     /// Limits of all coordinates.
@@ -236,7 +238,7 @@ impl<'a> Context<'a> {
         let motion = MotionQuery { carried: vec![carried], ..motion_of(query, query.start.clone(), query.end.clone()) };
         let fixed = Arc::new(World::new(surroundings(scene, state, &motion)));
         let own = PlacedShape { parent_from_shape: Pose::identity(), shape: object.solid().clone() };
-        let covers = Covers { links: links_with_tips(robot), objects: BTreeMap::from([(query.object, cover(&[own]))]) };
+        let covers = Covers { links: links_with_tips(robot), objects: BTreeMap::from([(query.object, cover(std::slice::from_ref(&own)))]) };
         let mut hands = Vec::new();
         for ((view, list), model) in prepared.views.iter().zip(&prepared.lists).zip(models) {
             hands.extend(task_hand(robot, scene, view.hand_index, list, model, &prepared.promises));
@@ -271,6 +273,7 @@ impl<'a> Context<'a> {
             },
             covers: Arc::new(covers),
             fixed,
+            alone: World::new(vec![Obstacle { name: object.name.clone(), placed: own }]),
             hands,
             limits: regrasp_arms::plan::limits(scene, robot, &all),
             gravity: scene.gravity().in_world().unwrap_or_else(Vector::zeros),
@@ -287,10 +290,9 @@ impl<'a> Context<'a> {
         -self.gravity.normalize()
     }
 
-    /// The object as something that stands in the way.
-    pub fn obstacle_at(&self, world_from_object: &Pose) -> Obstacle {
-        let placed = PlacedShape { parent_from_shape: *world_from_object, shape: self.object.solid().clone() };
-        Obstacle { name: self.object.name.clone(), placed }
+    /// Everything that rests, with the object at a pose.
+    pub fn with_object(&self, world_from_object: &Pose) -> World {
+        self.fixed.with(&self.alone, world_from_object)
     }
 
     /// The robot with coordinates `free`, all others as in `state`; carrying the object where `carried` says by which hand and where it

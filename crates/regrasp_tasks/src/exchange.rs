@@ -3,16 +3,14 @@
 use crate::context::{Context, Grasp};
 use crate::failing::{Stage, Tally};
 use crate::forces;
-use crate::line::{LINE_STEPS, is_motion_free, is_state_free, straight};
+use crate::line::{LINE_STEPS, is_state_free, is_way_free, straight};
 use crate::station::{arm_postures, can_close, common_postures, with_fingers};
 use crate::timing::Smooth;
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
-use regrasp_arms::World;
 use regrasp_arms::model::ArmModel;
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, Vector};
-use regrasp_grasp_lists::pairs::{Context as Surroundings, Side, pair_grasps};
-use std::collections::BTreeSet;
+use regrasp_grasp_lists::pairs::are_hands_apart;
 
 /// Postures of one arm that are looked at.
 const POSTURES: usize = 3;
@@ -32,8 +30,6 @@ pub struct Give {
     pub giver: [usize; 2],
     /// Who takes.
     pub taker: [usize; 2],
-    /// Both hold the object.
-    pub at: Vec<f64>,
     /// The open taker from the object to where its way in begins; the giver holds.
     pub way_in: Smooth,
     /// The open giver from the object to where its way out ends; the taker holds.
@@ -158,21 +154,14 @@ impl Places {
     }
 }
 
-/// Pairs of grasps, by index among the grasps of both hands, in which the hands do not hit each other (Saut 2010, sec. IV-B).
-pub fn double_grasps(context: &Context, hands: [usize; 2]) -> BTreeSet<[usize; 2]> {
-    let anywhere = Surroundings::default();
-    let side = |hand: usize| {
+/// True where the hands of two grasps do not hit each other: in the grasps, while the taker comes, and while the giver leaves (Saut
+/// 2010, sec. IV-B).
+pub fn is_double_grasp(context: &Context, giver: [usize; 2], taker: [usize; 2]) -> bool {
+    let one = |[hand, grasp]: [usize; 2]| {
         let own = &context.hands[hand];
-        Side { hand: &context.scene.hands[own.index].hand, object: context.object, list: own.list, context: &anywhere }
+        (own.model, &own.list.grasps[own.grasps[grasp].index])
     };
-    // What cannot be compared is left to the tests of whole robots.
-    let everything = || {
-        let [n, m] = hands.map(|hand| context.hands[hand].grasps.len());
-        (0..n).flat_map(|i| (0..m).map(move |j| [i, j])).collect()
-    };
-    let Ok(pairs) = pair_grasps(&side(hands[0]), &side(hands[1]), 1) else { return everything() };
-    let own = |hand: usize, index: usize| context.hands[hand].grasps.iter().position(|grasp| grasp.index == index);
-    pairs.pairs.iter().filter_map(|pair| Some([own(hands[0], pair.first)?, own(hands[1], pair.second)?])).collect()
+    are_hands_apart(one(giver), one(taker))
 }
 
 /// Why an exchange fails, from far to near.
@@ -230,7 +219,6 @@ impl<'c, 'a> Attempt<'c, 'a> {
             ArmModel::new(context.robot, &context.covers.links, &[attached], &both, free)
         });
         let arm = context.hands[taker.0].arm_joints.clone();
-        let mut world: Option<World> = None;
         for first in &first {
             for second in &second {
                 let mut at = first.clone();
@@ -239,7 +227,6 @@ impl<'c, 'a> Attempt<'c, 'a> {
                     continue;
                 }
                 self.reached = self.reached.max(2);
-                let world = world.get_or_insert_with(|| context.fixed.with(context.obstacle_at(world_from_object)));
                 let way = |(hand, grasp): (usize, &Grasp), tally: &mut Tally| {
                     let open = with_fingers(context, &at, hand, &grasp.open);
                     let direction = world_from_object.rotation * grasp.direction;
@@ -249,7 +236,7 @@ impl<'c, 'a> Attempt<'c, 'a> {
                     WAY_SHARES.iter().find_map(|share| {
                         let way = straight(context, hand, &open, &(-direction * grasp.distance * *share))?;
                         let timed = way.timed(&context.limits, 1.0, LINE_STEPS);
-                        is_motion_free(context, &model, world, &timed, tally).then_some(way)
+                        is_way_free(context, (&model, hand), world_from_object, &timed, tally).then_some(way)
                     })
                 };
                 let Some(way_in) = way(taker, tally) else { continue };
@@ -263,7 +250,7 @@ impl<'c, 'a> Attempt<'c, 'a> {
                 }
                 self.reached = self.reached.max(5);
                 let Some(way_out) = way(giver, tally) else { continue };
-                return Some(Give { giver: self.giver, taker: self.taker, at, way_in, way_out });
+                return Some(Give { giver: self.giver, taker: self.taker, way_in, way_out });
             }
         }
         None

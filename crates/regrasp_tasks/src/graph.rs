@@ -1,7 +1,7 @@
 //! The task graph: who holds the object by which grasp, or where it lies. Edges are tested when the cheapest path uses them.
 
 use crate::context::Context;
-use crate::exchange::{Give, Places, double_grasps};
+use crate::exchange::{Give, Places, is_double_grasp};
 use crate::failing::{Stage, Tally};
 use crate::motions::{self, Step, Stuck};
 use crate::placements::{Place, intermediate};
@@ -10,7 +10,7 @@ use regrasp_geometry::Vector;
 use regrasp_manipulation::failure::{Failure, FailureKind};
 use regrasp_manipulation::task_settings::TaskCost;
 use regrasp_plan::RobotPlan;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// A node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -84,8 +84,6 @@ struct Graph<'c, 'a> {
     gives: BTreeMap<([usize; 2], [usize; 2]), Given>,
     /// Places of the exchange, by both hands.
     exchange: BTreeMap<[usize; 2], Places>,
-    /// Pairs of hands of which the double grasps are known.
-    paired: BTreeSet<[usize; 2]>,
     failed_gives: usize,
     tested: usize,
     /// How often motions to an edge were not found.
@@ -188,7 +186,6 @@ impl<'c, 'a> Graph<'c, 'a> {
             grips,
             gives,
             exchange: BTreeMap::new(),
-            paired: BTreeSet::new(),
             failed_gives: 0,
             tested: 0,
             stuck: BTreeMap::new(),
@@ -263,6 +260,7 @@ impl<'c, 'a> Graph<'c, 'a> {
     fn test(&mut self, path: &[Node], tally: &mut Tally) -> bool {
         path.windows(2).all(|pair| self.test_likely(pair[0], pair[1], tally))
             && path.windows(2).all(|pair| self.test_grip(pair[0], pair[1], tally))
+            && path.windows(2).all(|pair| self.test_pair(pair[0], pair[1], tally))
             && path.windows(2).all(|pair| self.test_give(pair[0], pair[1], tally))
     }
 
@@ -270,30 +268,29 @@ impl<'c, 'a> Graph<'c, 'a> {
         [Stage::Grasp, Stage::Place].get(place).copied().unwrap_or(Stage::PutDown)
     }
 
-    /// Pairs of grasps in which the hands hit each other are dead (Saut 2010, sec. IV-B).
-    fn pair(&mut self, hands: [usize; 2], tally: &mut Tally) {
-        if !self.paired.insert(hands) {
-            return;
+    /// Pairs of grasps in which the hands hit each other are dead.
+    fn test_pair(&mut self, from: Node, to: Node, tally: &mut Tally) -> bool {
+        let (Node::Held(giver), Node::Held(taker)) = (from, to) else { return true };
+        let Some(given) = self.gives.get_mut(&(giver, taker)) else { return false };
+        if matches!(given.known, Known::New) {
+            tally.work(1);
+            given.known = match is_double_grasp(self.context, giver, taker) {
+                true => Known::Likely,
+                false => {
+                    tally.count(Stage::Exchange, Err("hands touch"));
+                    Known::Dead
+                }
+            };
         }
-        let apart = double_grasps(self.context, hands);
-        for ((giver, taker), given) in &mut self.gives {
-            if [giver[0], taker[0]] == hands && !given.known.is_dead() && !apart.contains(&[giver[1], taker[1]]) {
-                given.known = Known::Dead;
-                tally.count(Stage::Exchange, Err("hands touch"));
-            }
-        }
+        !given.known.is_dead()
     }
 
     fn test_likely(&mut self, from: Node, to: Node, tally: &mut Tally) -> bool {
-        if let (Node::Held(giver), Node::Held(taker)) = (from, to) {
-            self.pair([giver[0], taker[0]], tally);
-            return self.gives.get(&(giver, taker)).is_some_and(|given| !given.known.is_dead());
-        }
         let (Node::Lies(place), Node::Held([hand, grasp])) = (from.min(to), from.max(to)) else { return true };
         let stage = self.stage_of(place);
         let grip = &mut self.grips[place][hand][grasp];
         if matches!(grip.known, Known::New) {
-            self.tested += 1;
+            tally.work(1);
             let own = &self.context.hands[hand].grasps[grasp];
             grip.known = match may_hold(self.context, &self.places[place], hand, own) {
                 Ok(()) => Known::Likely,
@@ -322,7 +319,7 @@ impl<'c, 'a> Graph<'c, 'a> {
     fn test_give(&mut self, from: Node, to: Node, tally: &mut Tally) -> bool {
         let (Node::Held(giver), Node::Held(taker)) = (from, to) else { return true };
         let Some(given) = self.gives.get_mut(&(giver, taker)) else { return false };
-        if matches!(given.known, Known::New) {
+        if matches!(given.known, Known::Likely) {
             self.tested += 1;
             let hands = [giver[0], taker[0]];
             let places = self.exchange.entry(hands).or_insert_with(|| Places::new(self.context, hands));

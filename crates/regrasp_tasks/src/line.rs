@@ -8,6 +8,7 @@ use regrasp_arms::motion::{ColliderSettings, Track};
 use regrasp_arms::times::TimedPath;
 use regrasp_arms::{Collider, World};
 use regrasp_geometry::{Pose, Vector};
+use regrasp_robot::manipulator::layout::Part;
 
 /// Steps of a straight way in time.
 pub const LINE_STEPS: usize = 16;
@@ -63,6 +64,26 @@ pub fn is_motion_free(
     let mut collider = collider(context, model, world);
     let is_free = is_free(&mut collider, timed);
     count(&collider, tally);
+    is_free
+}
+
+/// The same for the open hand on its way to a grasp of its list: the list has proved that the hand does not hit the object, so that only
+/// the rest of the robot is tested against that. Plans are tested in full.
+pub fn is_way_free(
+    context: &Context,
+    (model, hand): (&ArmModel, usize),
+    world_from_object: &Pose,
+    timed: &TimedPath,
+    tally: &mut Tally,
+) -> bool {
+    let mounted = Part::Hand(context.hands[hand].mounted);
+    let mut robot = collider(context, model, &context.fixed);
+    let alone = World::default().with(&context.alone, world_from_object);
+    let mut others = collider(context, model, &alone);
+    others.only(|body| context.robot.part_of(model.bodies[body].link) != mounted, |_| false);
+    let is_free = is_free(&mut robot, timed) && is_free(&mut others, timed);
+    count(&robot, tally);
+    count(&others, tally);
     is_free
 }
 

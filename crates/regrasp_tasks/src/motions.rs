@@ -300,8 +300,8 @@ impl<'c, 'a> Maker<'c, 'a> {
         let which = [station.hand, station.grasp];
         let (grasp, support) = (self.grasp(which), place.support_name(context));
         let world = match self.object == place.world_from_object {
-            true => place.with_object.clone(),
-            false => Arc::new(context.fixed.with(context.obstacle_at(&self.object))),
+            true => place.with_object(context).clone(),
+            false => Arc::new(context.with_object(&self.object)),
         };
         // Hands that are not needed keep their fingers.
         let pre = self.overlaid(&station.way, &[station.hand]);
@@ -316,7 +316,7 @@ impl<'c, 'a> Maker<'c, 'a> {
         let holders = vec![support.to_owned(), context.hand_name(station.hand).to_owned()];
         self.rest(holders, &[(which, loads)])?;
         self.carried = Some(Carried { hand: station.hand, grasp, hand_from_object });
-        self.lift = Some((self.overlaid(&station.lift, &[station.hand]), place.without_supports.clone()));
+        self.lift = Some((self.overlaid(&station.lift, &[station.hand]), place.without_supports(context).clone()));
         Ok(())
     }
 
@@ -395,7 +395,7 @@ impl<'c, 'a> Maker<'c, 'a> {
         let names = [giver, taker].map(|[hand, _]| context.hand_name(hand).to_owned());
         let way_in = self.overlaid(&give.way_in, &[giver[0], taker[0]]);
         self.carry(way_in.ends()[1], None, tally)?;
-        let world = context.fixed.with(context.obstacle_at(&self.object));
+        let world = context.with_object(&self.object);
         let by_giver = || (vec![names[0].clone()], Some(giver));
         let way = way_in.reversed();
         self.way((&way, taker[0]), RobotSegmentKind::Approach, by_giver(), &world, tally)?;
@@ -419,14 +419,14 @@ impl<'c, 'a> Maker<'c, 'a> {
         let (grasp, support) = (self.grasp(which), place.support_name(context).to_owned());
         let down = self.overlaid(&station.lift, &[station.hand]).reversed();
         let target = down.ends()[0].clone();
-        self.carry(&target, Some((down, place.without_supports.clone())), tally)?;
+        self.carry(&target, Some((down, place.without_supports(context).clone())), tally)?;
         self.carried = None;
         let loads = [weight(context, &self.object), Wrench::ZERO];
         let hand = context.hand_name(station.hand).to_owned();
         self.rest(vec![hand, support.clone()], &[(which, loads)])?;
         let held = || (vec![support.clone()], None);
         self.fingers((station.hand, &grasp.open), RobotSegmentKind::Release, held(), tally)?;
-        let world = context.fixed.with(context.obstacle_at(&self.object));
+        let world = context.with_object(&self.object);
         let way = self.overlaid(&station.way, &[station.hand]);
         self.way((&way, station.hand), RobotSegmentKind::Retreat, held(), &world, tally)
     }
@@ -434,7 +434,7 @@ impl<'c, 'a> Maker<'c, 'a> {
     /// To the posture asked for at the end.
     fn end(&mut self, tally: &mut Tally) -> Result<(), Stuck> {
         let context = self.context;
-        let world = Arc::new(context.fixed.with(context.obstacle_at(&self.object)));
+        let world = Arc::new(context.with_object(&self.object));
         let support = self.record.segments.last().and_then(|last| last.held_by.values().next()).cloned();
         let support = support.and_then(|names| names.into_iter().next()).unwrap_or_default();
         self.transit(&context.query.end, &world, &support, tally)

@@ -7,6 +7,7 @@ use regrasp_base::Rng;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Pose, Shape, Vector};
+use std::cell::OnceCell;
 use std::sync::Arc;
 
 /// The object touches a support that is no farther than this, in metres.
@@ -18,31 +19,38 @@ const SAME_POSE: f64 = 0.05;
 pub struct Place {
     /// Pose of the object.
     pub world_from_object: Pose,
-    /// Index in `Scene::supports`.
+    /// Index in `Scene::supports`; the first of what rests.
     pub support: usize,
-    /// Everything that rests, the object too.
-    pub with_object: Arc<World>,
-    /// Everything that rests but the supports that the object touches, without the object.
-    pub without_supports: Arc<World>,
+    touching: Vec<usize>,
+    with_object: OnceCell<Arc<World>>,
+    without_supports: OnceCell<Arc<World>>,
 }
 
 impl Place {
     /// None where the object touches no support.
     pub fn new(context: &Context, world_from_object: &Pose) -> Option<Self> {
         let touching: Vec<usize> = (0..context.scene.supports.len())
-            .filter(|&support| {
-                let placed = &context.scene.supports[support].body.placed;
-                !is_apart(context, world_from_object, placed, TOUCHING)
-            })
+            .filter(|&support| !is_apart(context, world_from_object, support, TOUCHING))
             .collect();
         let support = *touching.first()?;
         // Supports come first among what rests.
         Some(Place {
             world_from_object: *world_from_object,
             support,
-            with_object: Arc::new(context.fixed.with(context.obstacle_at(world_from_object))),
-            without_supports: Arc::new(context.fixed.without(&touching)),
+            touching,
+            with_object: OnceCell::new(),
+            without_supports: OnceCell::new(),
         })
+    }
+
+    /// Everything that rests, the object too.
+    pub fn with_object(&self, context: &Context) -> &Arc<World> {
+        self.with_object.get_or_init(|| Arc::new(context.with_object(&self.world_from_object)))
+    }
+
+    /// Everything that rests but the supports that the object touches, without the object.
+    pub fn without_supports(&self, context: &Context) -> &Arc<World> {
+        self.without_supports.get_or_init(|| Arc::new(context.fixed.without(&self.touching)))
     }
 
     /// Name of the support.
@@ -51,15 +59,14 @@ impl Place {
     }
 }
 
-/// True where the object, or its hull, keeps `distance` from a shape in the world.
-pub fn is_apart(context: &Context, world_from_object: &Pose, placed: &PlacedShape, distance: f64) -> bool {
+/// True where the object, or its hull, keeps `distance` from what rests, by its index in [`Context::fixed`].
+pub fn is_apart(context: &Context, world_from_object: &Pose, other: usize, distance: f64) -> bool {
     let at_object = Placement::from(world_from_object);
     let cover = &context.covers.objects[&context.query.object];
     // The shapes of a cover are convex.
-    let exact = regrasp_arms::world::ExactShape::new(placed);
     cover.shapes.iter().all(|own| {
         let at = at_object.then(&Placement::from(&own.parent_from_shape));
-        exact.is_apart(&own.shape, &at, distance)
+        context.fixed.is_apart(other, &own.shape, &at, distance)
     })
 }
 
@@ -110,8 +117,8 @@ pub fn intermediate(context: &Context) -> Vec<Place> {
         let flat = |v: &Vector| v - up * up.dot(v);
         let position = flat(&(at.coords - center)) + up * (up.dot(&at.coords) + height);
         let pose = Pose::from_parts(Translation3::from(position), rotation);
-        let others = &context.fixed.obstacles[context.scene.supports.len()..];
-        let is_clear = others.iter().all(|other| is_apart(context, &pose, &other.placed, ROOM));
+        let mut others = context.scene.supports.len()..context.fixed.obstacles.len();
+        let is_clear = others.all(|other| is_apart(context, &pose, other, ROOM));
         if is_clear && let Some(place) = Place::new(context, &pose) {
             found.push(place);
         }

@@ -3,7 +3,7 @@
 use crate::context::{Context, Grasp};
 use crate::failing::{Stage, Tally};
 use crate::forces;
-use crate::line::{LINE_STEPS, is_lift_free, is_motion_free, is_state_free, straight};
+use crate::line::{LINE_STEPS, is_lift_free, is_motion_free, is_state_free, is_way_free, straight};
 use crate::placements::{Place, stable_pose};
 use crate::timing::Smooth;
 use regrasp_base::Rng;
@@ -26,8 +26,6 @@ pub struct Station {
     pub hand: usize,
     /// Index among its grasps.
     pub grasp: usize,
-    /// The hand holds the object.
-    pub at: Vec<f64>,
     /// The open hand from the object to where its way in begins.
     pub way: Smooth,
     /// The hand with the object, straight off the support.
@@ -163,7 +161,7 @@ pub fn station(
             let way = WAY_SHARES.iter().find_map(|share| {
                 let way = straight(context, hand, &opened, &(-direction * own.distance * *share))?;
                 let timed = way.timed(&context.limits, 1.0, LINE_STEPS);
-                is_motion_free(context, open, &place.with_object, &timed, tally).then_some(way)
+                is_way_free(context, (open, hand), &place.world_from_object, &timed, tally).then_some(way)
             });
             let Some(way) = way else { continue };
             reason = worse(reason, "with fingers that cannot close");
@@ -174,13 +172,13 @@ pub fn station(
             let lift = LIFT_SHARES.iter().find_map(|share| {
                 let lift = straight(context, hand, &at, &(context.up() * context.settings.lift * *share))?;
                 let timed = lift.timed(&context.limits, 1.0, LINE_STEPS);
-                let worlds = [&*context.fixed, &*place.without_supports];
+                let worlds = [&*context.fixed, &**place.without_supports(context)];
                 let is_free = is_lift_free(context, carrying, worlds, &timed, tally)
                     && is_state_free(context, carrying, &context.fixed, lift.ends()[1], tally);
                 is_free.then_some(lift)
             });
             if let Some(lift) = lift {
-                return Ok(Station { hand, grasp, at, way, lift });
+                return Ok(Station { hand, grasp, way, lift });
             }
         }
     }

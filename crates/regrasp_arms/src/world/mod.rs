@@ -7,7 +7,7 @@ use crate::lanes::{F8, LANES, V8, minus, squared};
 use nalgebra::Matrix3;
 use regrasp_geometry::collision::{MeshTree, Placed, Placement, Separation, separation};
 use regrasp_geometry::shape::PlacedShape;
-use regrasp_geometry::{Point, Shape, Vector};
+use regrasp_geometry::{Point, Pose, Shape, Vector};
 use std::sync::Arc;
 
 pub use tree::BoxTree;
@@ -62,14 +62,14 @@ pub struct ExactShape {
     /// Where it is.
     pub world_from_shape: Placement,
     /// The triangles of a mesh.
-    pub tree: Option<MeshTree>,
+    pub tree: Option<Arc<MeshTree>>,
 }
 
 impl ExactShape {
     /// A shape and where it is.
     pub fn new(placed: &PlacedShape) -> Self {
         let tree = match &placed.shape {
-            Shape::Mesh(mesh) => Some(MeshTree::new(mesh)),
+            Shape::Mesh(mesh) => Some(Arc::new(MeshTree::new(mesh))),
             _ => None,
         };
         ExactShape { shape: placed.shape.clone(), world_from_shape: (&placed.parent_from_shape).into(), tree }
@@ -122,7 +122,7 @@ impl TurnedBox {
 }
 
 impl Item {
-    fn new(placed: &PlacedShape) -> Self {
+    fn new(placed: &PlacedShape, exact: &Arc<ExactShape>) -> Self {
         let rotation = *placed.parent_from_shape.rotation.to_rotation_matrix().matrix();
         let single = |v: Vector| [v.x as f32, v.y as f32, v.z as f32];
         let column = |k: usize| single(rotation.column(k).into_owned());
@@ -144,7 +144,7 @@ impl Item {
             other => {
                 let (low, high) = other.bounds();
                 let bound = turned(nalgebra::center(&low, &high).coords, (high - low) * 0.5);
-                Item::Other { bound, exact: Arc::new(ExactShape::new(placed)) }
+                Item::Other { bound, exact: exact.clone() }
             }
         }
     }
@@ -199,7 +199,7 @@ pub struct World {
     pub obstacles: Vec<Obstacle>,
     pub(crate) items: Vec<Item>,
     /// Shapes for the last test, by obstacle.
-    pub(crate) exact: Vec<ExactShape>,
+    pub(crate) exact: Vec<Arc<ExactShape>>,
     /// Boxes about eight obstacles: lowest and highest corners.
     boxes: Vec<[F8; 6]>,
     tree: Option<BoxTree>,
@@ -209,23 +209,48 @@ pub struct World {
 const FEW: usize = 64;
 
 impl World {
-    /// The same world with one obstacle more.
+    /// True where the convex `shape` at `at` is proved to be farther than `required` from an obstacle, by its index.
+    pub fn is_apart(&self, obstacle: usize, shape: &Shape, at: &Placement, required: f64) -> bool {
+        self.exact[obstacle].is_apart(shape, at, required)
+    }
+
+    /// True where the ball about `center` is proved to meet no obstacle.
+    pub fn is_ball_free(&self, center: &Point, radius: f64) -> bool {
+        let at = Placement { rotation: Matrix3::identity(), translation: center.coords };
+        let ball = Shape::Sphere { radius };
+        (0..self.exact.len()).all(|obstacle| self.is_apart(obstacle, &ball, &at, 0.0))
+    }
+
+    /// The same world with the obstacles of another one, whose shapes are given the pose `world_from_shape`.
     #[must_use]
-    pub fn with(&self, obstacle: Obstacle) -> Self {
-        World::new(self.obstacles.iter().cloned().chain([obstacle]).collect())
+    pub fn with(&self, other: &World, world_from_shape: &Pose) -> Self {
+        let mut obstacles = self.obstacles.clone();
+        let mut exact = self.exact.clone();
+        for (obstacle, shape) in other.obstacles.iter().zip(&other.exact) {
+            let placed = PlacedShape { parent_from_shape: *world_from_shape, shape: obstacle.placed.shape.clone() };
+            obstacles.push(Obstacle { name: obstacle.name.clone(), placed });
+            exact.push(Arc::new(ExactShape { world_from_shape: world_from_shape.into(), ..ExactShape::clone(shape) }));
+        }
+        World::of(obstacles, exact)
     }
 
     /// The same world without the obstacles with these indices.
     #[must_use]
     pub fn without(&self, left_out: &[usize]) -> Self {
-        let kept = self.obstacles.iter().enumerate().filter(|(index, _)| !left_out.contains(index));
-        World::new(kept.map(|(_, obstacle)| obstacle.clone()).collect())
+        let kept = || (0..self.obstacles.len()).filter(|index| !left_out.contains(index));
+        let obstacles = kept().map(|index| self.obstacles[index].clone()).collect();
+        World::of(obstacles, kept().map(|index| self.exact[index].clone()).collect())
     }
 
     /// The world of these obstacles.
     pub fn new(obstacles: Vec<Obstacle>) -> Self {
-        let items: Vec<Item> = obstacles.iter().map(|obstacle| Item::new(&obstacle.placed)).collect();
-        let exact = obstacles.iter().map(|obstacle| ExactShape::new(&obstacle.placed)).collect();
+        let exact = obstacles.iter().map(|obstacle| Arc::new(ExactShape::new(&obstacle.placed))).collect();
+        World::of(obstacles, exact)
+    }
+
+    fn of(obstacles: Vec<Obstacle>, exact: Vec<Arc<ExactShape>>) -> Self {
+        let items: Vec<Item> =
+            obstacles.iter().zip(&exact).map(|(obstacle, exact)| Item::new(&obstacle.placed, exact)).collect();
         let corners: Vec<[[f32; 3]; 2]> = obstacles.iter().map(|obstacle| box_about(&obstacle.placed)).collect();
         let tree = (obstacles.len() >= FEW).then(|| BoxTree::new(&corners));
         let block = |of_block: &[[[f32; 3]; 2]]| {
@@ -241,13 +266,6 @@ impl World {
         };
         let boxes = corners.chunks(LANES).map(block).collect();
         World { obstacles, items, exact, boxes, tree }
-    }
-
-    /// True where the ball about `center` is proved to meet no obstacle.
-    pub fn is_ball_free(&self, center: &Point, radius: f64) -> bool {
-        let at = Placement { rotation: Matrix3::identity(), translation: center.coords };
-        let ball = Shape::Sphere { radius };
-        self.exact.iter().all(|exact| exact.is_apart(&ball, &at, 0.0))
     }
 
     /// Indices of at least all obstacles that meet the box from `low` to `high`, in rising order, in place of `found`.

@@ -15,7 +15,7 @@ use regrasp::plan::check::grasps::source_of;
 use regrasp::planners::FailureKind;
 use regrasp::scene::scene::InputFile;
 use regrasp::scene::{LoadedScene, ObjectSource, PickAndPlaceQuery, load_grasp_scene};
-use regrasp::task_grasps::{make_list, read_grasps, read_list, settings_of_made_lists};
+use regrasp::task_grasps::{make_list, read_grasps, read_list, refuse_too_heavy, settings_of_made_lists};
 use regrasp::{Budget, GraspList};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -35,6 +35,9 @@ pub fn lists(
     talk: &Talk,
 ) -> Result<Vec<(usize, GraspList)>, Stop> {
     let mut grasps = read_grasps(&loaded.scene, query)?;
+    if !grasps.missing.is_empty() {
+        refuse_too_heavy(&loaded.scene, query).map_err(|failure| Stop::NoPlan(Box::new(failure)))?;
+    }
     let mut none = None;
     for hand in grasps.missing.clone() {
         let beside = beside(path, loaded, query, hand);

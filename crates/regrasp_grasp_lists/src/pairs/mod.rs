@@ -109,6 +109,14 @@ pub fn pair_grasps(first: &Side, second: &Side, n_threads: usize) -> Result<Pair
     })
 }
 
+/// True where two hands do not hit each other: in the grasps, while the second one comes, and while the first one leaves. Each with the
+/// model of its hand and object.
+pub fn are_hands_apart((first, held): (&Model, &ListedGrasp), (second, taken): (&Model, &ListedGrasp)) -> bool {
+    let ways = [Way::new(first.view.hand, first, held), Way::new(second.view.hand, second, taken)];
+    let [one, other] = [ways[0].bodies(2.0), ways[1].bodies(2.0)];
+    are_apart(&one, &other) && ways[1].avoids(&one) && ways[0].avoids(&other)
+}
+
 /// Shapes around the object, convex.
 fn convex(context: &Context) -> Result<Vec<PlacedShape>, Failure> {
     let one = |placed: &PlacedShape| {
@@ -135,7 +143,7 @@ fn ways_of<'m>(side: &Side, model: &'m Model<'m>, surroundings: &[PlacedShape]) 
         if side.context.stable_pose.is_some_and(|pose| !grasp.stable_poses.contains(&pose)) {
             return None;
         }
-        let way = Way::new(side, model, grasp);
+        let way = Way::new(side.hand, model, grasp);
         (are_apart(&way.bodies(2.0), &standing) && way.avoids(&standing)).then_some((index, way))
     };
     side.list.grasps.iter().enumerate().filter_map(clear).collect()

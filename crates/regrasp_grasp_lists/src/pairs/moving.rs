@@ -1,6 +1,5 @@
 //! A hand on its way to a grasp, in the object frame, and whether it meets something.
 
-use super::Side;
 use crate::way::between;
 use nalgebra::Translation3;
 use regrasp_geometry::collision::Placement;
@@ -9,6 +8,7 @@ use regrasp_geometry::{Point, Pose, Shape, Vector};
 use regrasp_grasp::list::ListedGrasp;
 use regrasp_manipulation::grasp::state::HandJoints;
 use regrasp_manipulation::model::{Carrier, Model};
+use regrasp_robot::Hand;
 
 /// Bodies keep this distance, in metres.
 const CLEARANCE: f64 = 2e-4;
@@ -43,10 +43,10 @@ pub struct Way<'a> {
 
 impl<'a> Way<'a> {
     /// The way to a grasp of a list.
-    pub fn new(side: &Side, model: &'a Model<'a>, grasp: &ListedGrasp) -> Self {
+    pub fn new(hand: &Hand, model: &'a Model<'a>, grasp: &ListedGrasp) -> Self {
         let split = |flat: &[f64]| -> HandJoints {
             let mut rest = flat.iter().copied();
-            side.hand.fingers.iter().map(|finger| rest.by_ref().take(finger.chain.n_coordinates()).collect()).collect()
+            hand.fingers.iter().map(|finger| rest.by_ref().take(finger.chain.n_coordinates()).collect()).collect()
         };
         Way {
             model,

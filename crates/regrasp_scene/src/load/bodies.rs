@@ -4,7 +4,7 @@ use super::files::Files;
 use super::named::which;
 use super::object::{self, Hands, Names};
 use super::task::{self, Heading, Task, TaskKind};
-use super::{gravity, hand, limits, motion, pick_and_place, pose, robot, units};
+use super::{gravity, hand, limits, motion, overlap, pick_and_place, pose, robot, units};
 use crate::gravity::Gravity;
 use crate::limits::Limits;
 use crate::object::Object;
@@ -81,26 +81,42 @@ pub(super) fn several(root: &mut Table, files: &mut Files, found: &mut Found) ->
     let hands = carried.as_ref().map_or(&[][..], |(_, hands)| hands);
     let objects = objects(root, needed, &mut names, hands, files, found);
     let supports = object::fixed_bodies(root, "supports", &mut names, files, found);
-    let supports = supports.into_iter().map(|body| Support { body }).collect();
+    let supports: Vec<Support> = supports.into_iter().map(|body| Support { body }).collect();
     let obstacles = object::fixed_bodies(root, "obstacles", &mut names, files, found);
+    let obstacle_entries = root.optional("obstacles").and_then(|entry| entry.as_list()).unwrap_or_default();
     let bodies = carried.zip(objects);
     let fix = "add [[tasks]] with task = \"in_hand\", hand, object and goal";
     let entries = root.required(found, "tasks", fix)?.entries(found, "tables [[tasks]]")?;
-    let ((robots, hands), (objects, grasp_files)) = bodies?;
+    let ((robots, hands), (mut objects, grasp_files)) = bodies?;
     let mut task_names = Names::of("task");
     let mut tasks = Vec::new();
     for (index, entry) in entries.iter().enumerate() {
         let Some(mut table) = entry.table(found) else { continue };
         let default_name = if entries.len() == 1 { String::new() } else { format!("task_{}", index + 1) };
-        let task = task_of(&mut table, default_name, (&robots, &hands, &objects), found);
+        let bodies = motion::Bodies {
+            robots: &robots,
+            hands: &hands,
+            objects: &objects,
+            supports: &supports,
+            obstacles: &obstacles,
+            gravity: gravity.unwrap_or_default(),
+        };
+        let task = task_of(&mut table, default_name, &bodies, found);
         table.finish(found);
         let Some(task) = task else { continue };
         task_names.add(&task.name, entry, found);
+        if let Some(query) = task.pick_and_place() {
+            // Where the task sets the object down is where it rests.
+            objects[query.object].1 = query.world_from_object_start;
+        }
         tasks.push(task);
     }
     if tasks.is_empty() && found.diagnostics.is_empty() {
         let diagnostic = root.error("S102", found, "asks for nothing").fix(fix);
         found.diagnostics.push(diagnostic);
+    }
+    if tasks.iter().any(|task| task.of_robot.as_ref().is_some_and(|query| query.as_pick_and_place().is_some())) {
+        overlap::refuse_overlaps(&supports, &obstacles, &obstacle_entries, found);
     }
     let (objects, world_from_objects) = objects.into_iter().unzip();
     Some(Parts { robots, hands, objects, world_from_objects, grasp_files, supports, obstacles, gravity, limits, tasks })
@@ -187,26 +203,20 @@ fn objects(
 const KINDS: [TaskKind; 4] = [TaskKind::InHand, TaskKind::Tracking, TaskKind::Motion, TaskKind::PickAndPlace];
 
 /// One of `[[tasks]]`.
-fn task_of(
-    table: &mut Table,
-    default_name: String,
-    (robots, hands, objects): (&[Manipulator], &[SceneHand], &[(Object, Pose)]),
-    found: &mut Found,
-) -> Option<Task> {
+fn task_of(table: &mut Table, default_name: String, bodies: &motion::Bodies, found: &mut Found) -> Option<Task> {
+    let (hands, objects) = (bodies.hands, bodies.objects);
     let known_kind = task_kind(table, &KINDS, found);
     let kind = known_kind.unwrap_or(TaskKind::InHand);
     let name = table.optional("name").map_or(Some(default_name), |entry| entry.name(found).map(str::to_owned));
     if kind == TaskKind::Motion {
-        let bodies = motion::Bodies { robots, hands, objects };
-        return motion::motion(table, name?, &bodies, found).map(Task::of_motion);
+        return motion::motion(table, name?, bodies, found).map(Task::of_motion);
     }
     if hands.is_empty() || objects.is_empty() {
         // Only where the kind of the task is not known: else hands and objects have been asked for.
         return None;
     }
     if kind == TaskKind::PickAndPlace {
-        let bodies = motion::Bodies { robots, hands, objects };
-        return pick_and_place::pick_and_place(table, name?, &bodies, found).map(Task::of_pick_and_place);
+        return pick_and_place::pick_and_place(table, name?, bodies, found).map(Task::of_pick_and_place);
     }
     let hand_names: Vec<&str> = hands.iter().map(|hand| hand.name.as_str()).collect();
     let object_names: Vec<&str> = objects.iter().map(|(object, _)| object.name.as_str()).collect();

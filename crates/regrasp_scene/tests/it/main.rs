@@ -5,6 +5,7 @@ mod bad_inputs;
 #[path = "../../examples/bulb_mesh.rs"]
 mod bulb_mesh;
 mod bundled;
+mod carried_grasps;
 mod hostile;
 mod motion;
 mod pairs;
@@ -13,6 +14,7 @@ mod places;
 mod random_files;
 mod scans;
 mod several;
+mod standing;
 mod support;
 mod task;
 #[path = "../../../../tests/support/two_hands.rs"]
