@@ -7,9 +7,9 @@ use regrasp_scene::Object;
 use std::sync::Arc;
 
 /// How finely an object is cut. By hand: the bulb needs three parts.
-const PARTS: PartSettings = PartSettings { max_parts: 16, excess: CONVEX_WITHIN };
+const PARTS: PartSettings = PartSettings { max_parts: 16, excess: CONVEX_WITHIN, least_gain: 1e-3 };
 /// Of objects that hands take from anywhere: parts that stand out by millimetres where a fingertip touches turn the grasp into another.
-const FINE_PARTS: PartSettings = PartSettings { max_parts: 64, excess: 0.2 * CONVEX_WITHIN };
+const FINE_PARTS: PartSettings = PartSettings { max_parts: 160, excess: 0.2 * CONVEX_WITHIN, least_gain: 1e-4 };
 
 const HULL: &str = "MuJoCo collides with its convex hull";
 
