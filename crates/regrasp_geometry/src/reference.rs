@@ -438,39 +438,45 @@ fn triangles_to_convex(body: &MeshBody, convex: &Convex, mesh_from_convex: &Parr
         ParryVector::new(box_of(x), box_of(y), box_of(z)),
     );
     let unresolved = Cell::new(false);
-    // Axis of the nearest triangle so far, and how far the convex shape reaches against it: most other triangles lie
-    // behind the same plane and need no GJK.
-    let plane = Cell::new((ParryVector::ZERO, f64::NEG_INFINITY));
+    // Two planes, each an axis and how far the convex shape reaches against it: one of the nearest triangle so far, one of the last that
+    // was farther away. Most other triangles, and most boxes about many of them, lie behind one of them and need no GJK.
+    let planes = [(); 2].map(|()| Cell::new((ParryVector::ZERO, f64::NEG_INFINITY)));
+    let measure = |i: u32, best: f64| {
+        let triangle = body.mesh.triangle(i);
+        let corners = [triangle.a, triangle.b, triangle.c];
+        let is_behind = |(axis, from): (ParryVector, f64)| corners.iter().all(|corner| from - corner.dot(axis) >= best);
+        if planes.iter().any(|plane| is_behind(plane.get())) {
+            return None;
+        }
+        let triangle = Convex::new(Core::Triangle(corners), 0.0);
+        match answer_and_axis(&triangle, convex, mesh_from_convex, best.min(max)) {
+            (Clearance::SeparatedBy(gap), axis) => {
+                let axis = axis.normalize_or_zero();
+                if axis != ParryVector::ZERO {
+                    let against = convex.core.support_point(mesh_from_convex, -axis).dot(axis) - convex.margin;
+                    planes[usize::from(gap >= best)].set((axis, against));
+                }
+                Some(gap)
+            }
+            (Clearance::Penetrating(depth), _) => Some(-depth - f64::MIN_POSITIVE),
+            (Clearance::Unresolved, _) => {
+                unresolved.set(true);
+                None
+            }
+        }
+    };
     let nearest = body.mesh.bvh().find_best(
         max,
         |node, _| {
             let gap = (node.mins() - bounds.maxs).max(bounds.mins - node.maxs()).max(ParryVector::ZERO);
-            gap.length()
+            // The corner of the box that lies farthest along the axis.
+            let behind = |plane: &Cell<(ParryVector, f64)>| {
+                let (axis, from) = plane.get();
+                from - (node.mins() * axis).max(node.maxs() * axis).element_sum()
+            };
+            gap.length().max(behind(&planes[0])).max(behind(&planes[1]))
         },
-        |i, best| {
-            let triangle = body.mesh.triangle(i);
-            let corners = [triangle.a, triangle.b, triangle.c];
-            let (axis, from) = plane.get();
-            if corners.iter().all(|corner| from - corner.dot(axis) >= best) {
-                return None;
-            }
-            let triangle = Convex::new(Core::Triangle(corners), 0.0);
-            match answer_and_axis(&triangle, convex, mesh_from_convex, best.min(max)) {
-                (Clearance::SeparatedBy(gap), axis) => {
-                    let axis = axis.normalize_or_zero();
-                    if gap < best && axis != ParryVector::ZERO {
-                        let against = convex.core.support_point(mesh_from_convex, -axis).dot(axis) - convex.margin;
-                        plane.set((axis, against));
-                    }
-                    Some(gap)
-                }
-                (Clearance::Penetrating(depth), _) => Some(-depth - f64::MIN_POSITIVE),
-                (Clearance::Unresolved, _) => {
-                    unresolved.set(true);
-                    None
-                }
-            }
-        },
+        measure,
     );
     match nearest {
         Some((_, gap)) if gap <= 0.0 => Clearance::Penetrating(-gap),

@@ -245,7 +245,10 @@ pub fn check_segment(
     }
     for (w, ends) in segment.waypoints.windows(2).enumerate() {
         let step = RobotStep::new(&ends[0], &ends[1]);
-        let active: Vec<usize> = (0..items.pairs.len()).filter(|&index| !is_reported[index]).collect();
+        // What stands all through the segment is judged once.
+        let is_new = |pair: &Pair| w == 0 || !(items.items[pair.a].stands && items.items[pair.b].stands);
+        let is_active = |&index: &usize| !is_reported[index] && is_new(&items.pairs[index]);
+        let active: Vec<usize> = (0..items.pairs.len()).filter(is_active).collect();
         let mut judge = Judge {
             scene,
             step: &step,
