@@ -15,9 +15,6 @@ use std::sync::Arc;
 const POSITIONS: usize = 15;
 /// Corners from which on candidates are compared by some of the corners only.
 const MANY_CORNERS: usize = 1500;
-/// Least volume that a cut must take off, as a share of the solid's.
-const LEAST_GAIN: f64 = 1e-3;
-
 /// How finely a solid is cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PartSettings {
@@ -25,6 +22,15 @@ pub struct PartSettings {
     pub max_parts: usize,
     /// Volume by which all parts together may exceed the solid, as a share of the solid's.
     pub excess: f64,
+    /// Least volume that a cut takes off, as a share of the solid's.
+    pub least_gain: f64,
+}
+
+impl PartSettings {
+    /// At most so many parts, which exceed the solid by so much, in cuts that take off a thousandth each.
+    pub fn new(max_parts: usize, excess: f64) -> Self {
+        PartSettings { max_parts, excess, least_gain: 1e-3 }
+    }
 }
 
 /// A solid in convex parts.
@@ -62,7 +68,7 @@ pub fn convex_parts(mesh: &TriangleMesh, settings: &PartSettings) -> Option<Part
     while pieces.len() < settings.max_parts && excess(&pieces) > settings.excess {
         let gain = |piece: &Piece| piece.cut.map_or(0.0, |cut| cut.gain);
         let best = (0..pieces.len()).max_by(|&a, &b| gain(&pieces[a]).total_cmp(&gain(&pieces[b])))?;
-        let Some(cut) = pieces[best].cut.filter(|cut| cut.gain > LEAST_GAIN * solid) else { break };
+        let Some(cut) = pieces[best].cut.filter(|cut| cut.gain > settings.least_gain * solid) else { break };
         let [below, above] = divide(&pieces[best].triangles, &cut);
         let (Some(below), Some(above)) = (Piece::new(below), Piece::new(above)) else {
             pieces[best].cut = None;
@@ -203,7 +209,7 @@ mod tests {
     #[test]
     fn a_stepped_shaft_is_two_parts_that_fill_it() {
         let shaft = turned(&[(0.024, 0.0), (0.024, 0.03), (0.009, 0.03), (0.009, 0.05)], 24);
-        let parts = convex_parts(&shaft, &PartSettings { max_parts: 8, excess: 0.02 }).unwrap();
+        let parts = convex_parts(&shaft, &PartSettings::new(8, 0.02)).unwrap();
         assert!(parts.excess < 0.02, "{}", parts.excess);
         assert!((2..=4).contains(&parts.hulls.len()), "{}", parts.hulls.len());
         let whole = ConvexHull::new(shaft.vertices()).unwrap();
@@ -216,7 +222,7 @@ mod tests {
             (0..=12).map(|k| (f64::from(k) - 6.0) / 6.0).map(|t| (0.01 + 0.02 * t * t, 0.04 * t)).collect();
         let glass = turned(&profile, 24);
         let whole = volume_of(&ConvexHull::new(glass.vertices()).unwrap()).unwrap() / glass.signed_volume() - 1.0;
-        let parts = convex_parts(&glass, &PartSettings { max_parts: 16, excess: 0.05 }).unwrap();
+        let parts = convex_parts(&glass, &PartSettings::new(16, 0.05)).unwrap();
         assert!(
             whole > 1.0 && (0.0..0.05).contains(&parts.excess),
             "{whole}: {} in {}",
@@ -245,7 +251,7 @@ mod tests {
     #[test]
     fn every_point_of_the_solid_is_in_a_part_and_a_convex_solid_is_one() {
         let drop = turned(&[(0.002, 0.0), (0.02, 0.02), (0.024, 0.03), (0.02, 0.04), (0.009, 0.05), (0.009, 0.07)], 16);
-        let parts = convex_parts(&drop, &PartSettings { max_parts: 12, excess: 0.01 }).unwrap();
+        let parts = convex_parts(&drop, &PartSettings::new(12, 0.01)).unwrap();
         for index in 0..drop.triangles().len() {
             let [a, b, c] = drop.corners(index);
             let middle = a + ((b - a) + (c - a)) / 3.0;
@@ -264,6 +270,6 @@ mod tests {
             }
         }
         let rod = turned(&[(0.01, 0.0), (0.01, 0.05)], 16);
-        assert_eq!(convex_parts(&rod, &PartSettings { max_parts: 12, excess: 0.01 }).unwrap().hulls.len(), 1);
+        assert_eq!(convex_parts(&rod, &PartSettings::new(12, 0.01)).unwrap().hulls.len(), 1);
     }
 }

@@ -7,7 +7,9 @@ use regrasp_scene::Object;
 use std::sync::Arc;
 
 /// How finely an object is cut. By hand: the bulb needs three parts.
-const PARTS: PartSettings = PartSettings { max_parts: 16, excess: CONVEX_WITHIN };
+const PARTS: PartSettings = PartSettings { max_parts: 16, excess: CONVEX_WITHIN, least_gain: 1e-3 };
+/// Of objects that hands take from anywhere: parts that stand out by millimetres where a fingertip touches turn the grasp into another.
+const FINE_PARTS: PartSettings = PartSettings { max_parts: 160, excess: 0.2 * CONVEX_WITHIN, least_gain: 1e-4 };
 
 const HULL: &str = "MuJoCo collides with its convex hull";
 
@@ -22,20 +24,33 @@ pub(super) struct ObjectSolid {
 impl ObjectSolid {
     /// Of `object`: parts of a mesh that is a closed solid and not convex, else the shape itself.
     pub fn of(object: &Object) -> Self {
+        ObjectSolid::cut(object, &PARTS)
+    }
+
+    /// As [`ObjectSolid::of`], cut finer.
+    pub fn finely(object: &Object) -> Self {
+        ObjectSolid::cut(object, &FINE_PARTS)
+    }
+
+    fn cut(object: &Object, settings: &PartSettings) -> Self {
         // Where the scene replaces the object by its hull, the planner kept links away from it.
         match object.hull {
             Some(_) if is_hollowed(&object.shape) => ObjectSolid::whole(&object.shape, Some(HULL)),
-            _ => ObjectSolid::of_shape(&object.shape),
+            _ => ObjectSolid::cut_shape(&object.shape, settings),
         }
     }
 
     /// Of any shape.
     pub fn of_shape(shape: &Shape) -> Self {
+        ObjectSolid::cut_shape(shape, &PARTS)
+    }
+
+    fn cut_shape(shape: &Shape, settings: &PartSettings) -> Self {
         if !is_hollowed(shape) {
             return ObjectSolid::whole(shape, None);
         }
         let Shape::Mesh(mesh) = shape else { return ObjectSolid::whole(shape, None) };
-        match convex_parts(mesh, &PARTS) {
+        match convex_parts(mesh, settings) {
             Some(parts) => ObjectSolid {
                 note: Some(format!(
                     "MuJoCo collides with {} convex parts, which exceed it by {:.1} % of its volume",

@@ -10,8 +10,6 @@ mod holding;
 mod replay;
 /// The task chart.
 mod task_chart;
-#[cfg(test)]
-mod typescript;
 
 pub use frames::{RobotStoryboard, robot_storyboard};
 pub use replay::{ReplayAxis, ReplayBody, ReplayHolder, ReplayKind, ReplayPiece, ReplaySegment, RobotReplay};

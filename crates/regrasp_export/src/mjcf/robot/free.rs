@@ -52,7 +52,7 @@ impl<'a> FreeObject<'a> {
         let first = plan.waypoints().next().and_then(|waypoint| waypoint.world_from_objects.first());
         let world_from_object = Pose::from(first.ok_or("the plan does not say where the object is")?);
         let object = &scene.objects[index];
-        Ok(FreeObject { object, solid: ObjectSolid::of(object), world_from_object })
+        Ok(FreeObject { object, solid: ObjectSolid::finely(object), world_from_object })
     }
 
     /// Its convex parts with the names of their geoms.
