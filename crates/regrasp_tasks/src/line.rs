@@ -110,12 +110,12 @@ fn is_free(collider: &mut Collider, timed: &TimedPath) -> bool {
     let model = collider.model;
     let own = |values: &[f64]| model.configuration_of(values);
     timed.points.windows(2).all(|pair| {
-            let [a, b] = pair else { return false };
-            let velocities = [own(&a.velocities), own(&b.velocities)];
-            let ends = [own(&a.joints), own(&b.joints)];
-            let track = Track::cubic(&ends[0], &ends[1], [&velocities[0], &velocities[1]], b.time - a.time);
-            keeps_limits(model, &track) && collider.is_certified_free(&track)
-        })
+        let [a, b] = pair else { return false };
+        let velocities = [own(&a.velocities), own(&b.velocities)];
+        let ends = [own(&a.joints), own(&b.joints)];
+        let track = Track::cubic(&ends[0], &ends[1], [&velocities[0], &velocities[1]], b.time - a.time);
+        keeps_limits(model, &track) && collider.is_certified_free(&track)
+    })
 }
 
 /// True where a cubic stays within all limits: it lies in the hull of its Bernstein coefficients.
