@@ -70,7 +70,8 @@ pub fn run(files: &[PathBuf], arguments: &args::Bench, common: &Common, talk: &T
                     let cancelled = Arc::clone(&cancelled);
                     let budget = Budget { deadline, cancelled, ..Budget::work(limits.max_work) };
                     let query = query.as_pick_and_place().expect("the scene asks for pick and place");
-                    plan_task((&loaded.scene, &loaded.state), query, &lists, &settings, seed, &budget)
+                    let lists = lists.as_ref().map_err(Clone::clone)?;
+                    plan_task((&loaded.scene, &loaded.state), query, lists, &settings, seed, &budget)
                 };
                 let row = task::run(&loaded, seed, judge, &plan);
                 if cancelled.load(Ordering::Relaxed) {
@@ -93,22 +94,23 @@ pub fn run(files: &[PathBuf], arguments: &args::Bench, common: &Common, talk: &T
     Ok(())
 }
 
-/// The lists of the first task. A task of which no hand has a grasp fails with every seed, at the stage that its planner names.
+/// The lists of the first task. Where no hand can have a grasp, every seed of the task fails for that reason.
 fn lists_of(
     path: &Path,
     loaded: &LoadedScene,
     limits: &Limits,
     common: &Common,
     talk: &Talk,
-) -> Result<Vec<(usize, GraspList)>, Stop> {
+) -> Result<Result<Vec<(usize, GraspList)>, Failure>, Stop> {
     let query = loaded.task().query(0);
     let Some(query) = query.as_pick_and_place() else {
         let problem = format!("has a task of kind \"{}\" beside others", loaded.task().kind_name());
         return Err(Stop::BadInput(Diagnostic::new("A505", Place::file(path), problem).into()));
     };
     match task_grasps::lists(path, (loaded, query), 0, limits, common, talk) {
-        Err(Stop::NoGrasp(_)) => Ok(Vec::new()),
-        found => found,
+        Ok(lists) => Ok(Ok(lists)),
+        Err(Stop::NoGrasp(failure) | Stop::NoPlan(failure)) => Ok(Err(*failure)),
+        Err(stop) => Err(stop),
     }
 }
 
