@@ -149,6 +149,9 @@ fn robot_and_hands(
     found.diagnostics.is_empty().then_some((robots, hands))
 }
 
+/// Objects with the poses at which they rest, and the lists of grasps that they name.
+type Resting = (Vec<(Object, Pose)>, Vec<GraspFile>);
+
 /// `[[objects]]`, each with the pose at which it rests. None where one of them could not be read.
 fn objects(
     root: &mut Table,
@@ -157,7 +160,7 @@ fn objects(
     hands: &[SceneHand],
     files: &mut Files,
     found: &mut Found,
-) -> Option<(Vec<(Object, Pose)>, Vec<GraspFile>)> {
+) -> Option<Resting> {
     let fix = "add [[objects]] with name, a shape such as sphere = { radius = 0.03 }, mass, friction and position";
     let entry = match needed {
         Needed::HandAndObject => Some(root.required(found, "objects", fix)?),
