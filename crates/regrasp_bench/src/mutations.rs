@@ -4,7 +4,8 @@ use crate::row::Problem;
 use regrasp_base::Rng;
 use regrasp_mutations::mutants;
 use regrasp_mutations::robots::robot_mutants;
-use regrasp_plan::check::{CheckSettings, check, check_robot};
+use regrasp_mutations::tasks::task_mutants;
+use regrasp_plan::check::{CheckSettings, Report, ViolationKind, check, check_pick_and_place, check_robot};
 use regrasp_plan::{Plan, RobotPlan};
 use regrasp_scene::LoadedScene;
 use serde::Serialize;
@@ -81,39 +82,68 @@ impl Campaign {
         }
     }
 
-    /// As [`Campaign::add`], of a plan of a whole robot for the first task of `loaded`.
+    /// As [`Campaign::add`], of a plan of a whole robot for the first task of `loaded`: a motion, or pick and place.
     pub fn add_robot(&mut self, loaded: &LoadedScene, plan: &RobotPlan, seed: u64, per_kind: u64) {
-        let Some(query) = loaded.task().motion() else { return };
         let settings = CheckSettings::default();
         let around = (&loaded.scene, &loaded.state);
-        let misjudged = |what: String| Misjudged { scene: loaded.scene.name.clone(), seed, what };
-        self.good += 1;
-        let report = check_robot(around, Some(query), plan, &settings);
-        if !report.accepted() {
-            let first = report.violations.first().map_or(String::new(), ToString::to_string);
-            self.false_alarms.push(misjudged(first));
-            return;
-        }
-        if !self.kinds.is_empty() && self.kinds.values().all(|count| count.made >= per_kind) {
-            return;
-        }
         let mut rng = Rng::keyed(seed, "mutation campaign", 0);
-        for mutant in robot_mutants(plan, around, query, &mut rng) {
-            let count = self.kinds.entry(mutant.name).or_default();
-            if count.made >= per_kind {
-                continue;
+        if let Some(query) = loaded.task().motion() {
+            let report = check_robot(around, Some(query), plan, &settings);
+            if !self.takes_good(loaded, seed, &report, per_kind) {
+                return;
             }
-            let scene = mutant.scene.as_ref().unwrap_or(&loaded.scene);
-            let state = mutant.state.as_ref().unwrap_or(&loaded.state);
-            let asked = mutant.query.as_ref().unwrap_or(query);
-            let report = check_robot((scene, state), Some(asked), &mutant.plan, &settings);
-            count.made += 1;
-            count.rejected += u64::from(!report.accepted());
-            let fits = report.violations.iter().any(|violation| mutant.expected.contains(&violation.kind));
-            count.fitting += u64::from(fits);
-            if report.accepted() {
-                self.escaped.push(misjudged(mutant.name.to_owned()));
+            for mutant in robot_mutants(plan, around, query, &mut rng) {
+                let scene = mutant.scene.as_ref().unwrap_or(&loaded.scene);
+                let state = mutant.state.as_ref().unwrap_or(&loaded.state);
+                let asked = mutant.query.as_ref().unwrap_or(query);
+                let judge = || check_robot((scene, state), Some(asked), &mutant.plan, &settings);
+                self.count(loaded, seed, per_kind, (mutant.name, &mutant.expected), judge);
             }
+        } else if let Some(query) = loaded.task().pick_and_place() {
+            let report = check_pick_and_place(around, Some(query), plan, &settings);
+            if !self.takes_good(loaded, seed, &report, per_kind) {
+                return;
+            }
+            for mutant in task_mutants(plan, around, query, &mut rng) {
+                let scene = mutant.scene.as_ref().unwrap_or(&loaded.scene);
+                let state = mutant.state.as_ref().unwrap_or(&loaded.state);
+                let asked = mutant.query.as_ref().unwrap_or(query);
+                let judge = || check_pick_and_place((scene, state), Some(asked), &mutant.plan, &settings);
+                self.count(loaded, seed, per_kind, (mutant.name, &mutant.expected), judge);
+            }
+        }
+    }
+
+    /// Counts a good plan; false where it is rejected, or mutants of every kind are judged.
+    fn takes_good(&mut self, loaded: &LoadedScene, seed: u64, report: &Report, per_kind: u64) -> bool {
+        self.good += 1;
+        if !report.accepted() {
+            let what = report.violations.first().map_or(String::new(), ToString::to_string);
+            self.false_alarms.push(Misjudged { scene: loaded.scene.name.clone(), seed, what });
+            return false;
+        }
+        self.kinds.is_empty() || self.kinds.values().any(|count| count.made < per_kind)
+    }
+
+    /// Judges a mutant, where there are fewer than `per_kind` of its kind.
+    fn count(
+        &mut self,
+        loaded: &LoadedScene,
+        seed: u64,
+        per_kind: u64,
+        (name, expected): (&'static str, &[ViolationKind]),
+        judge: impl FnOnce() -> Report,
+    ) {
+        let count = self.kinds.entry(name).or_default();
+        if count.made >= per_kind {
+            return;
+        }
+        let report = judge();
+        count.made += 1;
+        count.rejected += u64::from(!report.accepted());
+        count.fitting += u64::from(report.violations.iter().any(|violation| expected.contains(&violation.kind)));
+        if report.accepted() {
+            self.escaped.push(Misjudged { scene: loaded.scene.name.clone(), seed, what: name.to_owned() });
         }
     }
 

@@ -20,6 +20,8 @@ pub mod parts;
 pub mod reference;
 /// The shapes a link, an object or an obstacle can have.
 pub mod shape;
+/// Poses in which an object stands on a plane.
+pub mod stable;
 /// Surfaces one can sample by area, walk by geodesics, and ask for normals, curvature and creases.
 pub mod surface;
 

@@ -2,10 +2,10 @@
 
 use crate::found::WayIn;
 use crate::prepared::Prepared;
-use crate::stable::Standing;
 use crate::way::between;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::collision::support::support_value;
+use regrasp_geometry::stable::Standing;
 use regrasp_geometry::{Point, Vector};
 use regrasp_manipulation::grasp::state::{GraspState, HandJoints};
 use regrasp_manipulation::model::Carrier;

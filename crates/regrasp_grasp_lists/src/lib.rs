@@ -35,8 +35,6 @@ mod search;
 mod select;
 /// Settings.
 pub mod settings;
-/// Poses in which the object stands.
-mod stable;
 /// Contacts spread over the surface.
 mod surface;
 /// The way of the hand.

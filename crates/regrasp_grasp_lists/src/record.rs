@@ -3,9 +3,10 @@
 use crate::found::Found;
 use crate::prepared::Prepared;
 use crate::search::worth::{held, holding};
+use regrasp_geometry::stable::Standing;
 use regrasp_grasp::list::{
     Approach, FORMAT, FORMAT_VERSION, GraspList, GraspPromises, GraspStatistics, HandRecord, ListedContact,
-    ListedGrasp, ObjectRecord,
+    ListedGrasp, ObjectRecord, StablePose,
 };
 use regrasp_grasp::record::PoseData;
 use regrasp_manipulation::tolerances::CONTACT_TOLERANCE;
@@ -47,7 +48,7 @@ pub fn list(prepared: &Prepared, statistics: GraspStatistics, grasps: &[Found]) 
             joint_torques: promised.joint_torques,
             tipping_angle: settings.tipping_angle,
         },
-        stable_poses: prepared.standing.iter().map(Into::into).collect(),
+        stable_poses: prepared.standing.iter().map(stable_pose).collect(),
         statistics,
         grasps: grasps.iter().map(|found| grasp(prepared, found)).collect(),
     }
@@ -88,4 +89,8 @@ fn grasp(prepared: &Prepared, found: &Found) -> ListedGrasp {
         scores: found.scores,
         stable_poses: found.stable_poses.clone(),
     }
+}
+
+fn stable_pose(standing: &Standing) -> StablePose {
+    StablePose { down_in_object: standing.down.into(), height: standing.height, tipping_angle: standing.tipping_angle }
 }

@@ -35,6 +35,8 @@ pub mod robots;
 mod rolling;
 /// Objects that turn though nothing drives them.
 mod still;
+/// Plans of pick and place.
+pub mod tasks;
 /// Times and velocities.
 mod times;
 /// Tracking: modes, relative velocities, friction of what slides.

@@ -3,6 +3,8 @@
 
 #[path = "../../../regrasp_plan/tests/it/loaded.rs"]
 mod loaded;
+#[path = "../../../../tests/support/made_by_hand.rs"]
+mod made_by_hand;
 #[path = "../../../../tests/support/moving_robot.rs"]
 mod moving_robot;
 mod mutation;
@@ -11,5 +13,6 @@ mod robots;
 mod rolled;
 #[path = "../../../regrasp_plan/tests/it/sample.rs"]
 mod sample;
+mod tasks;
 #[path = "../../../regrasp_plan/tests/it/tracked.rs"]
 mod tracked;

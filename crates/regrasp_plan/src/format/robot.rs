@@ -1,8 +1,8 @@
 //! Plan files of whole robots, and files of either kind.
 
 use super::{caps, from_json, syntax_error};
-use crate::plan::{FORMAT, FORMAT_VERSION, Plan, PoseData};
-use crate::robot_plan::{RobotContact, RobotPlan, RobotSegmentKind, RobotWaypoint};
+use crate::plan::{ContactMode, FORMAT, FORMAT_VERSION, Plan, PoseData};
+use crate::robot_plan::{RobotContact, RobotPlan, RobotSegment, RobotSegmentKind, RobotWaypoint};
 use regrasp_base::diagnostic::{Diagnostics, GOOD_NAME, fault_of_name, number};
 use regrasp_base::json_place::{PathStep, diagnostic};
 use regrasp_base::{Diagnostic, InputError, Place};
@@ -231,6 +231,9 @@ impl Reader<'_> {
             }
         }
         self.promises(plan, n_joints);
+        if plan.task == PICK_AND_PLACE {
+            self.holding(plan);
+        }
         if plan.segments.is_empty() {
             self.fail("C406", &[Key("segments")], "is empty".into(), "at least one segment");
         }
@@ -270,6 +273,42 @@ impl Reader<'_> {
         }
     }
 
+    /// What only plans of pick and place have: one object, hands, promises of holding.
+    fn holding(&mut self, plan: &RobotPlan) {
+        use PathStep::{Index, Key};
+        if plan.objects.len() != 1 {
+            let problem = format!("has {} entries", plan.objects.len());
+            self.fail("C411", &[Key("objects")], problem, "one: the object that is moved");
+        }
+        if plan.hands.is_empty() {
+            self.fail("C411", &[Key("hands")], "is empty".into(), "all hands of the robot");
+        }
+        if let Some(i) = plan.hands.iter().position(|hand| hand.fingers.is_empty()) {
+            let at = [Key("hands"), Index(i), Key("fingers")];
+            self.fail("C404", &at, "is empty".into(), "names of all fingers");
+        }
+        let Some(holding) = &plan.promises.holding else {
+            let expected = "\"holding\" in a plan of pick and place";
+            self.fail("C409", &[Key("promises")], "says nothing of holding".into(), expected);
+            return;
+        };
+        let [least, most] = holding.normal_force;
+        for (key, value, low, high) in [
+            ("contact_tolerance", holding.contact_tolerance, 0.0, caps::POSITION),
+            ("friction_margin", holding.friction_margin, 1.0, caps::SIZE),
+            ("required_margin", holding.required_margin, 0.0, caps::SIZE),
+            ("torque_scale", holding.torque_scale, 0.0, caps::POSITION),
+            ("normal_force", least, 0.0, most),
+            ("normal_force", most, least, caps::SIZE),
+        ] {
+            if !(low..=high).contains(&value) {
+                let at = [Key("promises"), Key("holding"), Key(key)];
+                let expected = format!("a number from {} to {}", number(low), number(high));
+                self.fail("C409", &at, format!("is {}", number(value)), expected);
+            }
+        }
+    }
+
     fn per_joint(&mut self, at: &[PathStep], values: &[f64], n_joints: usize, most: f64) {
         if values.len() != n_joints {
             let expected = format!("{n_joints}, one for each of \"joint_names\"");
@@ -306,6 +345,21 @@ impl Reader<'_> {
             let expected = "\"carry\" where \"held_by\" names a hand, else \"transit\"";
             self.fail("C408", &[at[0], at[1], Key("kind")], problem.into(), expected);
         }
+        let is_of_motion = matches!(segment.kind, RobotSegmentKind::Transit | RobotSegmentKind::Carry);
+        if plan.task == MOTION && !is_of_motion {
+            let expected = "\"transit\" or \"carry\" in a plan of this task";
+            self.fail("C408", &[at[0], at[1], Key("kind")], "is one of pick and place".into(), expected);
+        }
+        if plan.task == PICK_AND_PLACE {
+            let unheld = plan.objects.iter().find(|object| segment.held_by.get(*object).is_none_or(Vec::is_empty));
+            if let Some(object) = unheld {
+                let expected = "at least one hand or support for every object";
+                self.fail("C408", &held, format!("names nobody that holds \"{object}\""), expected);
+            }
+            for (w, waypoint) in segment.waypoints.iter().enumerate() {
+                self.contacts(plan, segment, [at[0], at[1], Key("waypoints"), Index(w), Key("contacts")], waypoint);
+            }
+        }
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
             self.waypoint(plan, n_joints, [at[0], at[1], Key("waypoints"), Index(w)], waypoint);
         }
@@ -329,6 +383,32 @@ impl Reader<'_> {
         }
         for (i, contact) in waypoint.contacts.iter().enumerate() {
             self.contact(plan, &[at[0], at[1], at[2], at[3], Key("contacts"), Index(i)], contact);
+        }
+    }
+
+    /// Contacts of pick and place: each finger once, of hands that hold, and fixed.
+    fn contacts(&mut self, plan: &RobotPlan, segment: &RobotSegment, at: [PathStep; 5], waypoint: &RobotWaypoint) {
+        let n_fingers: usize = plan.hands.iter().map(|hand| hand.fingers.len()).sum();
+        if waypoint.contacts.len() > n_fingers {
+            let problem = format!("has {} entries", waypoint.contacts.len());
+            self.fail("C410", &at, problem, format!("at most {n_fingers}, one for each finger"));
+            return;
+        }
+        let mut known = std::collections::BTreeSet::new();
+        for (i, contact) in waypoint.contacts.iter().enumerate() {
+            let inside = [at[0], at[1], at[2], at[3], at[4], PathStep::Index(i)];
+            let who = format!("\"{}/{}\"", contact.hand, contact.finger);
+            if !known.insert((&contact.hand, &contact.finger)) {
+                self.fail("C408", &inside, format!("is a second entry of {who}"), "each finger once");
+            }
+            let holders = segment.held_by.get(&contact.object);
+            if holders.is_none_or(|holders| !holders.contains(&contact.hand)) {
+                let problem = format!("is of {who}, whose hand does not hold in this segment");
+                self.fail("C407", &inside, problem, "fingers of the hands in \"held_by\" only");
+            }
+            if contact.mode != ContactMode::Fixed {
+                self.fail("C407", &inside, format!("of {who} is not fixed"), "\"fixed\"");
+            }
         }
     }
 

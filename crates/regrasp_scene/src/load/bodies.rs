@@ -87,16 +87,28 @@ pub(super) fn several(root: &mut Table, files: &mut Files, found: &mut Found) ->
     let bodies = carried.zip(objects);
     let fix = "add [[tasks]] with task = \"in_hand\", hand, object and goal";
     let entries = root.required(found, "tasks", fix)?.entries(found, "tables [[tasks]]")?;
-    let ((robots, hands), (objects, grasp_files)) = bodies?;
+    let ((robots, hands), (mut objects, grasp_files)) = bodies?;
     let mut task_names = Names::of("task");
     let mut tasks = Vec::new();
     for (index, entry) in entries.iter().enumerate() {
         let Some(mut table) = entry.table(found) else { continue };
         let default_name = if entries.len() == 1 { String::new() } else { format!("task_{}", index + 1) };
-        let task = task_of(&mut table, default_name, (&robots, &hands, &objects), found);
+        let bodies = motion::Bodies {
+            robots: &robots,
+            hands: &hands,
+            objects: &objects,
+            supports: &supports,
+            obstacles: &obstacles,
+            gravity: gravity.unwrap_or_default(),
+        };
+        let task = task_of(&mut table, default_name, &bodies, found);
         table.finish(found);
         let Some(task) = task else { continue };
         task_names.add(&task.name, entry, found);
+        if let Some(query) = task.pick_and_place() {
+            // Where the task sets the object down is where it rests.
+            objects[query.object].1 = query.world_from_object_start;
+        }
         tasks.push(task);
     }
     if tasks.is_empty() && found.diagnostics.is_empty() {
@@ -149,8 +161,8 @@ fn robot_and_hands(
     found.diagnostics.is_empty().then_some((robots, hands))
 }
 
-/// Objects with the poses at which they rest, and the lists of grasps that they name.
-type Resting = (Vec<(Object, Pose)>, Vec<GraspFile>);
+/// Objects, each with the pose at which it rests, and lists of their grasps.
+type PlacedObjects = (Vec<(Object, Pose)>, Vec<GraspFile>);
 
 /// `[[objects]]`, each with the pose at which it rests. None where one of them could not be read.
 fn objects(
@@ -160,7 +172,7 @@ fn objects(
     hands: &[SceneHand],
     files: &mut Files,
     found: &mut Found,
-) -> Option<Resting> {
+) -> Option<PlacedObjects> {
     let fix = "add [[objects]] with name, a shape such as sphere = { radius = 0.03 }, mass, friction and position";
     let entry = match needed {
         Needed::HandAndObject => Some(root.required(found, "objects", fix)?),
@@ -194,26 +206,20 @@ fn objects(
 const KINDS: [TaskKind; 4] = [TaskKind::InHand, TaskKind::Tracking, TaskKind::Motion, TaskKind::PickAndPlace];
 
 /// One of `[[tasks]]`.
-fn task_of(
-    table: &mut Table,
-    default_name: String,
-    (robots, hands, objects): (&[Manipulator], &[SceneHand], &[(Object, Pose)]),
-    found: &mut Found,
-) -> Option<Task> {
+fn task_of(table: &mut Table, default_name: String, bodies: &motion::Bodies, found: &mut Found) -> Option<Task> {
+    let (hands, objects) = (bodies.hands, bodies.objects);
     let known_kind = task_kind(table, &KINDS, found);
     let kind = known_kind.unwrap_or(TaskKind::InHand);
     let name = table.optional("name").map_or(Some(default_name), |entry| entry.name(found).map(str::to_owned));
     if kind == TaskKind::Motion {
-        let bodies = motion::Bodies { robots, hands, objects };
-        return motion::motion(table, name?, &bodies, found).map(Task::of_motion);
+        return motion::motion(table, name?, bodies, found).map(Task::of_motion);
     }
     if hands.is_empty() || objects.is_empty() {
         // Only where the kind of the task is not known: else hands and objects have been asked for.
         return None;
     }
     if kind == TaskKind::PickAndPlace {
-        let bodies = motion::Bodies { robots, hands, objects };
-        return pick_and_place::pick_and_place(table, name?, &bodies, found).map(Task::of_pick_and_place);
+        return pick_and_place::pick_and_place(table, name?, bodies, found).map(Task::of_pick_and_place);
     }
     let hand_names: Vec<&str> = hands.iter().map(|hand| hand.name.as_str()).collect();
     let object_names: Vec<&str> = objects.iter().map(|(object, _)| object.name.as_str()).collect();

@@ -3,7 +3,8 @@
 //! Codes: S100 not TOML, S101 unknown key, S102 missing key, S103 wrong type, S104 unknown word, S105 another format,
 //! S106 exactly one of several, S107 number out of range, S110 file not found, S112 name used twice, S113 obstacle in a support, S120 unknown joint
 //! or finger, S121 joint or finger missing; M201 units, M204 mesh far from its own origin, M205 to M207 unusable mesh,
-//! M210 no volume; P302 out of reach, P303 joint limit, P304 contact off the surface; V001 not finite, V002 quaternion
+//! M210 no volume; P302 out of reach, P303 joint limit, P304 contact off the surface, P305 wrist of a
+//! short arm, P306 object that does not stand, P307 object in something else; V001 not finite, V002 quaternion
 //! not of length one, V003 zero quaternion.
 
 mod bodies;
@@ -22,6 +23,7 @@ mod pick_and_place;
 mod pose;
 mod robot;
 mod shape;
+mod standing;
 mod stock;
 mod task;
 mod units;

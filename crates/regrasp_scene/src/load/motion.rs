@@ -2,9 +2,10 @@
 
 use super::named::which;
 use super::pose;
+use crate::gravity::Gravity;
 use crate::motion::{CarriedObject, Holder, MotionGoal, MotionQuery, WristGoal};
 use crate::object::Object;
-use crate::scene::SceneHand;
+use crate::scene::{Obstacle, SceneHand, Support};
 use regrasp_base::diagnostic::number;
 use regrasp_base::toml_table::{Entry, Found, Table, suggestion};
 use regrasp_geometry::Pose;
@@ -23,6 +24,12 @@ pub(super) struct Bodies<'a> {
     pub hands: &'a [SceneHand],
     /// Its objects, each with the pose at which it rests.
     pub objects: &'a [(Object, Pose)],
+    /// What objects may stand on.
+    pub supports: &'a [Support],
+    /// What nothing may touch.
+    pub obstacles: &'a [Obstacle],
+    /// Which way things fall.
+    pub gravity: Gravity,
 }
 
 /// Reads `robot`, `start`, `goal` and `carried` of a task.

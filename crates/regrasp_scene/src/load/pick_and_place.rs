@@ -3,6 +3,7 @@
 use super::files::Files;
 use super::motion::{Bodies, posture, robot_of};
 use super::named::which;
+use super::standing::Ground;
 use super::task::pose_or_turn;
 use crate::pick_and_place::{GraspFile, PickAndPlaceQuery};
 use crate::scene::SceneHand;
@@ -11,14 +12,15 @@ use regrasp_base::toml_table::{Entry, Found, Table, suggestion};
 /// Reads `robot`, `object`, `start`, `goal` and `end` of a task.
 ///
 /// Errors: names that the scene does not have (`S120`), joints outside their limits (`P303`), a robot that carries no hand (`S106`), a
-/// turn beyond half a turn (`S107`).
+/// turn beyond half a turn (`S107`), an object that does not stand (`P306`) or stands in something (`P307`).
 pub(super) fn pick_and_place(
     table: &mut Table,
     name: String,
     bodies: &Bodies,
     found: &mut Found,
 ) -> Option<PickAndPlaceQuery> {
-    let [goal, start, end] = ["goal", "start", "end"].map(|key| table.optional(key));
+    let [goal, start, end, set_down] = ["goal", "start", "end", "set_down"].map(|key| table.optional(key));
+    let set_down = set_down.and_then(|entry| entry.boolean(found)).unwrap_or(false);
     let objects: Vec<&str> = bodies.objects.iter().map(|(object, _)| object.name.as_str()).collect();
     let object = which(table, "object", &objects, found);
     let (index, robot) = robot_of(table, bodies, found)?;
@@ -52,8 +54,12 @@ pub(super) fn pick_and_place(
         found.diagnostics.push(diagnostic.expected("a turn of at most 180 degrees as seen from the start"));
         return None;
     }
-    let world_from_object_start = bodies.objects[object].1;
-    let world_from_object_goal = crate::goal::poses_from(&world_from_object_start, &[], &asked).1;
+    let ground = Ground::of(bodies, object, set_down);
+    let world_from_object_start = ground.stand("start", &bodies.objects[object].1, &table.span, found);
+    let seen_from = world_from_object_start.unwrap_or(bodies.objects[object].1);
+    let world_from_object_goal = crate::goal::poses_from(&seen_from, &[], &asked).1;
+    let world_from_object_goal = ground.stand("goal", &world_from_object_goal, &goal.span, found);
+    let (world_from_object_start, world_from_object_goal) = (world_from_object_start?, world_from_object_goal?);
     Some(PickAndPlaceQuery {
         name,
         robot: index,

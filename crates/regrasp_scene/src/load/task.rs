@@ -101,6 +101,11 @@ impl Task {
         self.of_robot.as_ref().and_then(|query| query.as_motion())
     }
 
+    /// The query of a task of kind `pick_and_place`.
+    pub fn pick_and_place(&self) -> Option<&PickAndPlaceQuery> {
+        self.of_robot.as_ref().and_then(|query| query.as_pick_and_place())
+    }
+
     /// The query of `seed`: the same on every machine and for every number of threads.
     pub fn query(&self, seed: u64) -> Query {
         if let Some(query) = &self.of_robot {

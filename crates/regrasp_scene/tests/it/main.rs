@@ -14,6 +14,7 @@ mod places;
 mod random_files;
 mod scans;
 mod several;
+mod standing;
 mod support;
 mod task;
 #[path = "../../../../tests/support/two_hands.rs"]

@@ -1,13 +1,18 @@
-//! Poses in which the object stands on a plane, and whether a hand stays above that plane.
+//! Poses in which an object stands on a plane by itself.
 
+use crate::frame::tangents;
+use crate::{ConvexHull, Point, Shape, UnitVector, Vector};
 use nalgebra::{Matrix3, Vector2};
-use regrasp_geometry::{ConvexHull, Point, Shape, Vector};
-use regrasp_grasp::list::StablePose;
 
 /// Vertices this near to the plane carry the object, in metres.
 const ON_PLANE: f64 = 0.2e-3;
 /// Poses whose directions differ by less than this are one, in radians.
 const SAME_POSE: f64 = 0.05;
+
+/// Corners of the polygon that stands for the rim of a cylinder.
+const RIM: usize = 360;
+/// Cosine of the largest angle between an upright cylinder and gravity.
+const UPRIGHT: f64 = 0.99;
 
 /// A pose in which the object stands.
 #[derive(Debug, Clone, Copy)]
@@ -20,13 +25,10 @@ pub struct Standing {
     pub tipping_angle: f64,
 }
 
-impl From<&Standing> for StablePose {
-    fn from(standing: &Standing) -> Self {
-        StablePose {
-            down_in_object: standing.down.into(),
-            height: standing.height,
-            tipping_angle: standing.tipping_angle,
-        }
+impl Standing {
+    /// How far the centre of mass is inside the polygon of what touches.
+    pub fn margin(&self, center_of_mass: &Point) -> f64 {
+        self.tipping_angle.tan() * (self.height - self.down.dot(&center_of_mass.coords))
     }
 }
 
@@ -63,6 +65,27 @@ pub fn stable_poses(shape: &Shape, center_of_mass: &Point, least_angle: f64) -> 
         }
     }
     kept
+}
+
+/// How `shape` stands with `down` as the direction of gravity, a unit vector in its frame; none where it tips over or rolls.
+pub fn standing_along(shape: &Shape, center_of_mass: &Point, down: &Vector) -> Option<Standing> {
+    match shape {
+        Shape::Sphere { .. } | Shape::Capsule { .. } | Shape::Ellipsoid { .. } => None,
+        Shape::Cuboid { half_extents: h } => {
+            let corner = |k: u8| Point::from(Vector::from_fn(|i, _| if k >> i & 1 == 1 { h[i] } else { -h[i] }));
+            standing(&(0..8).map(corner).collect::<Vec<_>>(), *down, center_of_mass)
+        }
+        Shape::Cylinder { half_length, radius } => {
+            let rim = |k: usize| {
+                let (sine, cosine) = (std::f64::consts::TAU * k as f64 / RIM as f64).sin_cos();
+                Point::new(radius * cosine, radius * sine, half_length * down.z.signum())
+            };
+            let points: Vec<Point> = (0..RIM).map(rim).collect();
+            standing(&points, *down, center_of_mass).filter(|_| down.z.abs() > UPRIGHT)
+        }
+        Shape::Convex(hull) => standing(hull.vertices(), *down, center_of_mass),
+        Shape::Mesh(mesh) => standing(mesh.vertices(), *down, center_of_mass),
+    }
 }
 
 /// Every triangle of the hull as a face to stand on; all vertices of the object count.
@@ -111,12 +134,12 @@ fn standing(vertices: &[Point], down: Vector, center_of_mass: &Point) -> Option<
 
 /// A frame with `down` as its third axis.
 fn frame_of(down: &Vector) -> Matrix3<f64> {
-    let (x, y) = regrasp_geometry::frame::tangents(&regrasp_geometry::UnitVector::new_unchecked(*down));
+    let (x, y) = tangents(&UnitVector::new_unchecked(*down));
     Matrix3::from_columns(&[x.into_inner(), y.into_inner(), *down])
 }
 
 /// The convex polygon around points, counter-clockwise (Andrew's monotone chain).
-fn convex_polygon(mut points: Vec<Vector2<f64>>) -> Vec<Vector2<f64>> {
+pub fn convex_polygon(mut points: Vec<Vector2<f64>>) -> Vec<Vector2<f64>> {
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     points.dedup();
     if points.len() < 3 {
@@ -153,6 +176,14 @@ mod tests {
         assert_eq!(stable_poses(&shape, &Point::origin(), 0.4).len(), 4);
         // The centre of mass stands beside two faces.
         assert_eq!(stable_poses(&shape, &Point::new(0.0, 0.019, 0.0), 0.2).len(), 2);
+        let tilted = |angle: f64| Vector::new(angle.sin(), 0.0, -angle.cos());
+        let upright = standing_along(&shape, &Point::origin(), &tilted(0.001)).unwrap();
+        assert!((upright.margin(&Point::origin()) - 0.01).abs() < 1e-4);
+        assert!(standing_along(&shape, &Point::origin(), &tilted(0.1)).is_none());
+        let cylinder = Shape::Cylinder { half_length: 0.02, radius: 0.03 };
+        let end = standing_along(&cylinder, &Point::origin(), &tilted(0.0)).unwrap();
+        assert!((end.margin(&Point::origin()) - 0.03).abs() < 1e-4);
+        assert!(standing_along(&cylinder, &Point::origin(), &Vector::x()).is_none());
         assert!(stable_poses(&Shape::Sphere { radius: 0.03 }, &Point::origin(), 0.0).is_empty());
         assert_eq!(stable_poses(&Shape::Cylinder { half_length: 0.02, radius: 0.03 }, &Point::origin(), 0.0).len(), 2);
     }
