@@ -66,7 +66,7 @@ impl Default for TaskSettings {
             clearance: 1e-4,
             search_margin: 2e-3,
             shortcuts: 60,
-            max_samples: 20_000,
+            max_samples: 6_000,
             line_step: 0.01,
             lift: 0.03,
             rest: 0.2,

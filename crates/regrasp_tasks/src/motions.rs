@@ -14,6 +14,7 @@ use regrasp_arms::{LegTimes, Problem, World, plan_leg};
 use regrasp_geometry::Pose;
 use regrasp_grasp::wrench::{BalancedForces, Wrench};
 use regrasp_manipulation::failure::FailureKind;
+use regrasp_manipulation::motion_settings::MotionSettings;
 use regrasp_plan::robot_plan::{RobotSegment, RobotSegmentKind};
 use regrasp_scene::motion::{CarriedObject, Holder};
 use std::sync::Arc;
@@ -50,6 +51,8 @@ const CARRY_STEPS: usize = 24;
 /// So often.
 const FINER: usize = 3;
 
+/// Samples of one motion in the first attempt at a plan; the second has twice as many, and so on.
+const FIRST_SAMPLES: u64 = 1000;
 /// Why a motion with the object has no forces.
 const TOO_FAST: &str = "motions without forces that hold the object";
 
@@ -188,7 +191,10 @@ impl<'c, 'a> Maker<'c, 'a> {
         let seed = context.seed.wrapping_mul(31).wrapping_add(self.attempt * 64 + self.step as u64);
         let mut budget = context.budget.clone();
         budget.max_work = budget.max_work.saturating_sub(tally.statistics.work);
-        match plan_leg(&problem, &[to.to_vec()], times, &context.motion, (seed, &budget)) {
+        // Little at first: another pair of grasps may be easier.
+        let max_samples = context.motion.max_samples.min(FIRST_SAMPLES * self.attempt.max(1));
+        let settings = MotionSettings { max_samples, ..context.motion.clone() };
+        match plan_leg(&problem, &[to.to_vec()], times, &settings, (seed, &budget)) {
             Ok(leg) => {
                 tally.take(&leg.statistics);
                 Ok(Some(leg))

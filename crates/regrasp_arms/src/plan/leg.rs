@@ -70,10 +70,10 @@ pub fn plan_leg(
 }
 
 /// Samples with certified motions alone, at most: they are slow.
-const CERTIFIED_SAMPLES: u64 = 200;
+const CERTIFIED_SAMPLES: u64 = 60;
 /// How far a configuration is moved to get room, in radians or metres; so many tries with each.
 const SPREADS: [f64; 4] = [0.03, 0.08, 0.16, 0.3];
-const TRIES: usize = 60;
+const TRIES: usize = 25;
 
 /// A path between ends that have little room: first to places near by that have some, straight and certified.
 fn find(
