@@ -8,8 +8,7 @@ use regrasp_grasp::list::{GraspKind, format};
 use regrasp_planners::FailureKind;
 use regrasp_robot::manipulator::MountedHand;
 use regrasp_robot::{Hand, LinkId, Robot};
-use regrasp_scene::gravity::STANDARD_GRAVITY;
-use regrasp_scene::{GraspFile, Object, PickAndPlaceQuery, Scene};
+use regrasp_scene::{GraspFile, InputFile, Object, PickAndPlaceQuery, STANDARD_GRAVITY, Scene};
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
@@ -69,6 +68,7 @@ pub fn read_list(path: &Path, scene: &Scene, query: &PickAndPlaceQuery, hand: us
     let bytes = files::read(path)?;
     let list = format::from_json(path, &bytes)?;
     refuse_other_hand(path, &list, &scene.hands[hand].name, &scene.hands[hand].hand)?;
+    refuse_other_hand_file(path, &list, scene, hand)?;
     refuse_other_object(path, &list, scene, query)?;
     Ok(list)
 }
@@ -97,6 +97,26 @@ fn refuse_other_hand(path: &Path, list: &GraspList, name: &str, hand: &Hand) -> 
         }
     }
     Ok(())
+}
+
+/// Left and right hands often have the same names: their files tell them apart. Errors: another hand file (`G740`).
+fn refuse_other_hand_file(path: &Path, list: &GraspList, scene: &Scene, hand: usize) -> Result<(), InputError> {
+    let placed = &scene.hands[hand];
+    let carrier = placed.carrier.map(|carrier| &scene.robots[carrier.robot].hands[carrier.hand]);
+    let file = carrier.and_then(|mounted| mounted.file.as_ref());
+    let is_its = |input: &&InputFile| input.role == "hand" && Some(&input.path) == file;
+    let (Some(own), Some(listed)) =
+        (scene.inputs.iter().find(is_its), list.inputs.iter().find(|input| input.role == "hand"))
+    else {
+        return Ok(());
+    };
+    if own.sha256 == listed.sha256 {
+        return Ok(());
+    }
+    let problem = format!("was made with the hand file {} (sha256 {})", listed.name, listed.sha256);
+    let diagnostic = Diagnostic::new("G740", Place::file(path), problem).element("hand", &placed.name);
+    let expected = format!("the hand file {} (sha256 {})", own.name, own.sha256);
+    Err(diagnostic.expected(expected).fix(MAKE_AGAIN).into())
 }
 
 /// What helps against a list that is not for this hand and object.

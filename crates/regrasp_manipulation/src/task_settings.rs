@@ -54,7 +54,8 @@ pub struct TaskSettings {
     pub placements: usize,
     /// Edges of the task graph that are tested, at most.
     pub max_edges: usize,
-    /// Contact forces, as lists of grasps have them. The normal forces are those of the lists where those are narrower.
+    /// Contact forces. The normal forces are those of the lists where those are narrower. Origin of the least one and of the squeeze:
+    /// replays in MuJoCo, where fingers that press with less than 2 N lose a light object.
     pub forces: ForceSettings,
 }
 
@@ -79,7 +80,7 @@ impl Default for TaskSettings {
             put_down: true,
             placements: 24,
             max_edges: 2000,
-            forces: ForceSettings { normal_force: [0.5, 40.0], ..ForceSettings::default() },
+            forces: ForceSettings { normal_force: [2.0, 40.0], squeeze_weight: 1.0, ..ForceSettings::default() },
         }
     }
 }

@@ -238,7 +238,10 @@ impl<'a> Context<'a> {
         let motion = MotionQuery { carried: vec![carried], ..motion_of(query, query.start.clone(), query.end.clone()) };
         let fixed = Arc::new(World::new(surroundings(scene, state, &motion)));
         let own = PlacedShape { parent_from_shape: Pose::identity(), shape: object.solid().clone() };
-        let covers = Covers { links: links_with_tips(robot), objects: BTreeMap::from([(query.object, cover(std::slice::from_ref(&own)))]) };
+        let covers = Covers {
+            links: links_with_tips(robot),
+            objects: BTreeMap::from([(query.object, cover(std::slice::from_ref(&own)))]),
+        };
         let mut hands = Vec::new();
         for ((view, list), model) in prepared.views.iter().zip(&prepared.lists).zip(models) {
             hands.extend(task_hand(robot, scene, view.hand_index, list, model, &prepared.promises));

@@ -198,8 +198,7 @@ impl<'c, 'a> Attempt<'c, 'a> {
         tally.work(1);
         let both =
             with_fingers(context, &with_fingers(context, common, giver.0, &giver.1.closed), taker.0, &taker.1.closed);
-        let target =
-            |(hand, grasp): (usize, &Grasp)| (hand, world_from_object * grasp.object_from_hand);
+        let target = |(hand, grasp): (usize, &Grasp)| (hand, world_from_object * grasp.object_from_hand);
         let (hand, pose) = target(giver);
         let first = arm_postures(context, hand, &both, &pose, POSTURES)
             .map_err(|(by, words)| tally.miss(Stage::Exchange, by, || words))

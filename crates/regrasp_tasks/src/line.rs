@@ -109,14 +109,27 @@ pub fn is_lift_free(
 fn is_free(collider: &mut Collider, timed: &TimedPath) -> bool {
     let model = collider.model;
     let own = |values: &[f64]| model.configuration_of(values);
-    timed.points.iter().all(|point| model.is_within_limits(&own(&point.joints), 1e-9))
-        && timed.points.windows(2).all(|pair| {
-            let [a, b] = pair else { return false };
-            let velocities = [own(&a.velocities), own(&b.velocities)];
-            let ends = [own(&a.joints), own(&b.joints)];
-            let track = Track::cubic(&ends[0], &ends[1], [&velocities[0], &velocities[1]], b.time - a.time);
-            collider.is_certified_free(&track)
-        })
+    timed.points.windows(2).all(|pair| {
+        let [a, b] = pair else { return false };
+        let velocities = [own(&a.velocities), own(&b.velocities)];
+        let ends = [own(&a.joints), own(&b.joints)];
+        let track = Track::cubic(&ends[0], &ends[1], [&velocities[0], &velocities[1]], b.time - a.time);
+        keeps_limits(model, &track) && collider.is_certified_free(&track)
+    })
+}
+
+/// True where a cubic stays within all limits: it lies in the hull of its Bernstein coefficients.
+fn keeps_limits(model: &ArmModel, track: &Track) -> bool {
+    let control = |k: usize| -> Vec<f64> {
+        let of = |c: &[f64; 4]| match k {
+            0 => c[0],
+            1 => c[0] + c[1] / 3.0,
+            2 => c[0] + (2.0 * c[1] + c[2]) / 3.0,
+            _ => c[0] + c[1] + c[2] + c[3],
+        };
+        track.coefficients.iter().map(of).collect()
+    };
+    (0..4).all(|k| model.is_within_limits(&control(k), 1e-9))
 }
 
 fn collider<'c>(context: &Context, model: &'c ArmModel, world: &'c World) -> Collider<'c> {

@@ -74,7 +74,7 @@ pub fn segments(
         maker.step = index;
         match step {
             Step::Pick(station, place) => maker.pick(station, place, &steps[index + 1..], tally)?,
-            Step::Give(give) => maker.give(give, &steps[index + 1..], tally)?,
+            Step::Give(give) => maker.give(give, tally)?,
             Step::Place(station, place) => maker.place(station, place, tally)?,
         }
     }
@@ -120,13 +120,7 @@ impl<'c, 'a> Maker<'c, 'a> {
     /// Arms and fingers move, nothing is held: fingers first, or last where that does not fit.
     fn transit(&mut self, target: &[f64], world: &Arc<World>, support: &str, tally: &mut Tally) -> Result<(), Stuck> {
         let context = self.context;
-        let fingers = |from: &[f64], to: &[f64]| {
-            let mut state = from.to_vec();
-            for k in (0..from.len()).filter(|k| !context.arms_and_torso.contains(k)) {
-                state[k] = to[k];
-            }
-            state
-        };
+        let fingers = |from: &[f64], to: &[f64]| self.with_fingers_of(from, to);
         let mut pieces = Vec::new();
         let opened = fingers(&self.state, target);
         let moves = opened != self.state;
@@ -150,6 +144,15 @@ impl<'c, 'a> Maker<'c, 'a> {
         self.record.add(context, RobotSegmentKind::Transit, vec![support.to_owned()], &[], &moves, &timed);
         self.state = target.to_vec();
         Ok(())
+    }
+
+    /// The state `arms` with the fingers of all hands as in `fingers`.
+    fn with_fingers_of(&self, arms: &[f64], fingers: &[f64]) -> Vec<f64> {
+        let mut state = fingers.to_vec();
+        for &k in &self.context.arms_and_torso {
+            state[k] = arms[k];
+        }
+        state
     }
 
     /// All fingers move on a straight line. None where that is not free.
@@ -204,13 +207,13 @@ impl<'c, 'a> Maker<'c, 'a> {
     }
 
     /// Fingers of the hands that will take the object next are opened while nothing is held.
-    fn with_open_takers(&self, target: &[f64], next: &[Step]) -> Vec<f64> {
+    fn with_open_takers(&self, target: &[f64], picker: usize, next: &[Step]) -> Vec<f64> {
         let mut target = target.to_vec();
-        let mut known = Vec::new();
+        let mut known = vec![picker];
         for step in next {
             let Step::Give(give) = step else { break };
             let [hand, _] = give.taker;
-            if !known.contains(&hand) && give.giver[0] != hand {
+            if !known.contains(&hand) {
                 known.push(hand);
                 target = with_fingers(self.context, &target, hand, &self.grasp(give.taker).open);
             }
@@ -295,6 +298,7 @@ impl<'c, 'a> Maker<'c, 'a> {
         Ok(())
     }
 
+    /// The hand comes to the object, closes, and is ready to lift it.
     fn pick(&mut self, station: &Station, place: &Place, next: &[Step], tally: &mut Tally) -> Result<(), Stuck> {
         let context = self.context;
         let which = [station.hand, station.grasp];
@@ -305,7 +309,7 @@ impl<'c, 'a> Maker<'c, 'a> {
         };
         // Hands that are not needed keep their fingers.
         let pre = self.overlaid(&station.way, &[station.hand]);
-        let target = self.with_open_takers(pre.ends()[1], next);
+        let target = self.with_open_takers(pre.ends()[1], station.hand, next);
         self.transit(&target, &world, support, tally)?;
         let way = self.overlaid(&station.way, &[station.hand]).reversed();
         let held = || (vec![support.to_owned()], None);
@@ -339,6 +343,18 @@ impl<'c, 'a> Maker<'c, 'a> {
         if let Some((lift, without)) = &lift {
             pieces.push(self.smooth(&carried, lift, Some((&model, without)), tally)?);
         }
+        // A hand that has held the object before opens for its next grasp.
+        let opened = self.with_fingers_of(&from, target);
+        if opened != from {
+            let fingers: Vec<usize> = (0..from.len()).filter(|&k| from[k] != opened[k]).collect();
+            let model = context.model(&from, &fingers, Some((carried.hand, &carried.hand_from_object)));
+            let timed = Smooth::Line([from, opened.clone()]).timed(&context.limits, 1.0, FINGER_STEPS);
+            if !is_motion_free(context, &model, &context.fixed, &timed, tally) {
+                return Err(self.stuck(Stage::Carry, "fingers that cannot move"));
+            }
+            pieces.push(timed);
+        }
+        let from = opened;
         let leg = self.leg([&from, target], &context.fixed, Some(&carried), LegTimes::Callers, Stage::Carry, tally)?;
         for pair in leg.iter().flat_map(|leg| leg.corners.windows(2)) {
             let line = Smooth::Line([pair[0].clone(), pair[1].clone()]);
@@ -389,7 +405,8 @@ impl<'c, 'a> Maker<'c, 'a> {
         Err(self.stuck(Stage::Carry, TOO_FAST))
     }
 
-    fn give(&mut self, give: &Give, next: &[Step], tally: &mut Tally) -> Result<(), Stuck> {
+    /// The object comes to the exchange, changes hands, and the giver leaves.
+    fn give(&mut self, give: &Give, tally: &mut Tally) -> Result<(), Stuck> {
         let context = self.context;
         let [giver, taker] = [give.giver, give.taker];
         let names = [giver, taker].map(|[hand, _]| context.hand_name(hand).to_owned());
@@ -409,10 +426,10 @@ impl<'c, 'a> Maker<'c, 'a> {
         self.way((&way_out, giver[0]), RobotSegmentKind::Retreat, by_taker(), &world, tally)?;
         let hand_from_object = context.world_from_hand(taker[0], &self.state).inverse() * self.object;
         self.carried = Some(Carried { hand: taker[0], grasp: grasps[1], hand_from_object });
-        let _ = next;
         Ok(())
     }
 
+    /// The object comes down onto its support, and the hand leaves.
     fn place(&mut self, station: &Station, place: &Place, tally: &mut Tally) -> Result<(), Stuck> {
         let context = self.context;
         let which = [station.hand, station.grasp];

@@ -26,6 +26,7 @@ pub fn page(program: &Path, sources: &[Source]) -> Result<String, String> {
     for (title, scene, kind) in [
         ("In-hand planning", "scenes/sphere_90x.toml", "InHandSettings"),
         ("Finger tracking", "scenes/football.toml", "TrackingSettings"),
+        ("Pick and place", "scenes/two_arms/justin_horse_near.toml", "TaskSettings"),
     ] {
         let plan = folder.join("plan.json");
         run(program, &words(&format!("plan {scene} --quiet --threads 1 -o {}", plan.display())))?;

@@ -77,8 +77,9 @@ pub fn plan_in_stages(
         // A few joints may not be able to do it at all: the search among all of them gets the samples.
         let few = if index + 1 < groups.len() { FEW_SAMPLES } else { u64::MAX };
         let settings = &MotionSettings { max_samples: settings.max_samples.min(few), ..settings.clone() };
-        let found = path::find(&problem, &model, &goals, settings, (seed, budget), watch)
-            .and_then(|path| execute(&problem, &model, path, settings));
+        let found =
+            path::find(&problem, &model, (&query.start, &goals, settings.max_samples), settings, (seed, budget), watch)
+                .and_then(|path| execute(&problem, &model, path, settings));
         match found {
             Ok(executed) => {
                 watch(Stage::Timed);

@@ -19,16 +19,17 @@ pub struct Found {
     pub statistics: RobotStatistics,
 }
 
-/// Finds a path from the start to one of `goals` (states).
+/// Finds a path from `start` to one of `goals` (states). Where samples lead nowhere for want of room, at most `certified_samples` are
+/// tried with certified motions alone.
 pub fn find(
     problem: &Problem,
     model: &ArmModel,
-    goals: &[Vec<f64>],
+    (start, goals, certified_samples): (&[f64], &[Vec<f64>], u64),
     settings: &MotionSettings,
     (seed, budget): (u64, &Budget),
     watch: &mut dyn FnMut(Stage),
 ) -> Result<Found, Failure> {
-    let start = model.configuration_of(&problem.query.start);
+    let start = model.configuration_of(start);
     let mut refused = None;
     let mut free_goals = Vec::new();
     for goal in goals {
@@ -79,7 +80,7 @@ pub fn find(
     // What samples do not find, certified motions do not either.
     if certified && interrupt.is_none() && !is_hopeless {
         let mut rng = Rng::keyed(seed, "certified_motion", 0);
-        let certified = search.certified_from_nothing(problem, &mut rng, budget);
+        let certified = search.certified_from_nothing(problem, certified_samples, &mut rng, budget);
         watch(Stage::Searched);
         if let Some(path) = certified {
             return Ok(Found { path, statistics: search.statistics });
@@ -172,12 +173,15 @@ impl Search<'_, '_> {
         found.then_some(whole)
     }
 
-    fn certified_from_nothing(&mut self, problem: &Problem, rng: &mut Rng, budget: &Budget) -> Option<Vec<Vec<f64>>> {
+    fn certified_from_nothing(
+        &mut self,
+        problem: &Problem,
+        max_samples: u64,
+        rng: &mut Rng,
+        budget: &Budget,
+    ) -> Option<Vec<Vec<f64>>> {
         let mut collider = certifying(self.model, problem, self.settings);
-        let settings = RrtSettings {
-            max_samples: self.settings.max_samples,
-            ..RrtSettings::for_dimension(self.model.dimension())
-        };
+        let settings = RrtSettings { max_samples, ..RrtSettings::for_dimension(self.model.dimension()) };
         let region = Region::of(self.model, &[&self.start, &self.goals[0]]);
         let mut is_free = |a: &[f64], b: &[f64]| collider.is_certified_free(&Track::straight(a, b));
         let outcome = rrt_connect(&self.start, &self.goals, &region, &settings, rng, budget, &mut is_free);
@@ -192,7 +196,7 @@ impl Search<'_, '_> {
     }
 }
 
-fn certifying<'c>(model: &'c ArmModel, problem: &'c Problem, settings: &MotionSettings) -> Collider<'c> {
+pub fn certifying<'c>(model: &'c ArmModel, problem: &'c Problem, settings: &MotionSettings) -> Collider<'c> {
     let settings = ColliderSettings { clearance: settings.clearance, ..ColliderSettings::default() };
     Collider::new(model, &problem.world, settings)
 }

@@ -9,6 +9,7 @@ use crate::stop::Stop;
 use crate::talk::Talk;
 use crate::words::{counted, duration};
 use regrasp::base::files;
+use regrasp::file_names::name_from;
 use regrasp::grasp::list::format;
 use regrasp::grasp::record::PlanInput;
 use regrasp::plan::check::grasps::source_of;
@@ -113,7 +114,11 @@ fn make(
         sha256: input.sha256.clone(),
     };
     let list = GraspList {
-        source: is_first.then(|| source_of(&file, &source, None)),
+        source: is_first.then(|| {
+            let packages = load::options(common).resolve.packages;
+            let [hand, scene] = [file.as_path(), path].map(|file| PathBuf::from(name_from(beside, file, &packages)));
+            source_of(&hand, &ObjectSource::Scene(scene), None)
+        }),
         inputs: afresh.scene.inputs.iter().map(input).collect(),
         ..list
     };

@@ -49,9 +49,9 @@ impl Breeder<'_> {
                 let segment = &mut plan.segments[rng.below(n_segments)];
                 let others: &[RobotSegmentKind] = match segment.kind {
                     // What another arm does meanwhile does not make a carry of a retreat, nor the other way round.
-                Approach | Retreat => &[Grasp, Release],
-                Transit => &[Carry, Grasp, Release],
-                Grasp => &[Carry, Release, Transit],
+                    Approach | Retreat => &[Grasp, Release],
+                    Transit => &[Carry, Grasp, Release],
+                    Grasp => &[Carry, Release, Transit],
                     Release => &[Carry, Grasp, Transit],
                     Carry => &[Grasp, Release],
                 };

@@ -9,6 +9,7 @@ mod loaded_tests;
 #[path = "../../../../tests/support/made_by_hand.rs"]
 mod made_by_hand;
 mod motion;
+#[allow(dead_code)]
 #[path = "../../../../tests/support/moving_robot.rs"]
 mod moving_robot;
 #[path = "../../../../tests/support/places.rs"]

@@ -161,6 +161,9 @@ fn robot_and_hands(
     found.diagnostics.is_empty().then_some((robots, hands))
 }
 
+/// Objects, each with the pose at which it rests, and lists of their grasps.
+type PlacedObjects = (Vec<(Object, Pose)>, Vec<GraspFile>);
+
 /// `[[objects]]`, each with the pose at which it rests. None where one of them could not be read.
 fn objects(
     root: &mut Table,
@@ -169,7 +172,7 @@ fn objects(
     hands: &[SceneHand],
     files: &mut Files,
     found: &mut Found,
-) -> Option<(Vec<(Object, Pose)>, Vec<GraspFile>)> {
+) -> Option<PlacedObjects> {
     let fix = "add [[objects]] with name, a shape such as sphere = { radius = 0.03 }, mass, friction and position";
     let entry = match needed {
         Needed::HandAndObject => Some(root.required(found, "objects", fix)?),

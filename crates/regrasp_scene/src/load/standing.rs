@@ -71,29 +71,33 @@ impl<'a> Ground<'a> {
             "a pose in which it stands on a support within 0.1 mm, its centre of mass 2 mm inside what touches";
         let mut stands = *pose;
         if !self.is_standing(pose, &up, &tops) {
-            let Some(nearest) = self.nearest(pose, &up, &tops) else {
-                let problem = match self.any_pose(pose, &up).is_some() {
-                    true => format!(
-                        "stands on no support at the {which}: below its centre of mass is none with a level top"
-                    ),
-                    false => format!("has no pose in which it stands by itself (at the {which}): it rolls"),
-                };
-                let fix = "move the object over a support, or add [[supports]]".into();
-                return fail(found, "P306", problem, expected, fix);
-            };
-            let text = as_text(&nearest);
-            let off = (nearest.translation.vector - pose.translation.vector).norm();
-            let turn = nearest.rotation.angle_to(&pose.rotation).to_degrees();
-            if !self.set_down {
-                let problem = format!(
-                    "does not stand at the {which}: the nearest stable pose is {:.2} mm and {turn:.3} degrees away",
-                    1e3 * off
-                );
-                let fix = format!("paste {text}, or add set_down = true to the task");
-                return fail(found, "P306", problem, expected, fix);
+            if self.any_pose(pose, &up).is_none() {
+                let problem = format!("has no pose in which it stands by itself (at the {which}): it rolls");
+                return fail(found, "P306", problem, expected, "choose an object that stands".into());
             }
-            found.note(span, format!("object \"{name}\" is set down at the {which}: {text}"));
-            stands = nearest;
+            match self.nearest(pose, &up, &tops) {
+                // Planners say so as the reason of a failure, before any search.
+                None => {
+                    let note =
+                        format!("object \"{name}\" stands on no support at the {which}: no level top is below it");
+                    found.note(span, note);
+                }
+                Some(nearest) => {
+                    let text = as_text(&nearest);
+                    let off = (nearest.translation.vector - pose.translation.vector).norm();
+                    let turn = nearest.rotation.angle_to(&pose.rotation).to_degrees();
+                    if !self.set_down {
+                        let problem = format!(
+                            "does not stand at the {which}: the nearest stable pose is {:.2} mm and {turn:.3} degrees away",
+                            1e3 * off
+                        );
+                        let fix = format!("paste {text}, or add set_down = true to the task");
+                        return fail(found, "P306", problem, expected, fix);
+                    }
+                    found.note(span, format!("object \"{name}\" is set down at the {which}: {text}"));
+                    stands = nearest;
+                }
+            }
         }
         if let Some(other) = self.inside_of(&stands) {
             let problem = format!("is in \"{other}\" at the {which}");

@@ -105,5 +105,8 @@ fn bad_motions_are_refused_with_their_places() {
     refused(&with("object = \"box\", hand", "object = \"ball\", hand"), &["S120", "ball"]);
     let wrist = "goal = { wrists = [{ arm = \"right\", position = [0.4, 0.0, 0.5] }] }";
     refused(&with("goal = { joints = { right_elbow = -0.9 } }", wrist), &["P305", "only"]);
-    refused(&with("task = \"motion\"", "task = \"move\""), &["S105", "\"in_hand\", \"tracking\" or \"motion\""]);
+    refused(
+        &with("task = \"motion\"", "task = \"move\""),
+        &["S105", "\"in_hand\", \"tracking\", \"motion\" or \"pick_and_place\""],
+    );
 }

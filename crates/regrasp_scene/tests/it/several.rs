@@ -264,7 +264,7 @@ fn hands_and_objects_of_tasks_are_known() {
     );
     refused(
         &with("task = \"in_hand\"\nhand = \"left\"", "task = \"dual_arm\"\nhand = \"left\""),
-        "S105 scene.toml:48:8 key \"tasks[1].task\": is \"dual_arm\"; expected \"in_hand\", \"tracking\" or \"motion\", the tasks that \
+        "S105 scene.toml:48:8 key \"tasks[1].task\": is \"dual_arm\"; expected \"in_hand\", \"tracking\", \"motion\" or \"pick_and_place\", the tasks that \
          this version plans",
     );
 }

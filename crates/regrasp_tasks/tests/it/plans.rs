@@ -1,0 +1,49 @@
+//! Tasks with plans.
+
+use crate::{Case, holders};
+use regrasp_plan::robot_plan::RobotSegmentKind;
+use regrasp_tasks::TaskSettings;
+
+#[test]
+fn one_arm_does_it_where_that_suffices() {
+    let case = Case::new("justin_horse_near.toml");
+    for seed in 0..3 {
+        let plan = case.accepted(&TaskSettings::default(), seed);
+        assert_eq!(holders(&plan).len(), 1, "{:?}", holders(&plan));
+        let kinds: Vec<RobotSegmentKind> = plan.segments.iter().map(|segment| segment.kind).collect();
+        use RobotSegmentKind::{Approach, Carry, Grasp, Release, Retreat, Transit};
+        assert_eq!(kinds, [Transit, Approach, Grasp, Carry, Carry, Carry, Release, Retreat, Transit]);
+    }
+}
+
+#[test]
+fn the_object_changes_hands_where_no_arm_reaches_both_places() {
+    let case = Case::new("justin_horse.toml");
+    for seed in 0..2 {
+        let plan = case.accepted(&TaskSettings::default(), seed);
+        assert_eq!(holders(&plan), ["right", "left"]);
+        let is_exchange = |held: &Vec<String>| held.iter().all(|name| name == "right" || name == "left");
+        let both = plan.segments.iter().filter_map(|segment| segment.held_by.values().next());
+        assert!(both.clone().any(|held| held.len() == 2 && is_exchange(held)), "no exchange");
+    }
+}
+
+#[test]
+fn it_is_put_down_and_taken_again_where_hands_may_not_give() {
+    let case = Case::new("justin_horse.toml");
+    let settings = TaskSettings { hand_over: false, ..TaskSettings::default() };
+    let plan = case.accepted(&settings, 0);
+    assert_eq!(holders(&plan), ["right", "left"]);
+    let n_releases = plan.segments.iter().filter(|segment| segment.kind == RobotSegmentKind::Release).count();
+    assert_eq!(n_releases, 2);
+}
+
+#[test]
+fn the_same_seed_gives_the_same_plan() {
+    let case = Case::new("justin_horse_turning.toml");
+    let first = case.accepted(&TaskSettings::default(), 7);
+    let again = std::thread::scope(|scope| {
+        scope.spawn(|| case.plan(&TaskSettings::default(), 7).expect("a plan")).join().expect("no panic")
+    });
+    assert_eq!(first, again);
+}
