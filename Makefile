@@ -35,6 +35,8 @@ gallery: release
 	$(REGRASP) view $(OUT)/gallery/box.json scenes/box_90x.toml --png $(GALLERY)/box.png --width 1200
 	$(REGRASP) plan scenes/ellipsoid_obstacle.toml -o $(OUT)/gallery/obstacle.json
 	$(REGRASP) view $(OUT)/gallery/obstacle.json scenes/ellipsoid_obstacle.toml --png $(GALLERY)/obstacle.png --width 1200
+	$(REGRASP) plan scenes/two_arms/justin_horse.toml --seed 3 -o $(OUT)/gallery/hand_over.json
+	$(REGRASP) view $(OUT)/gallery/hand_over.json scenes/two_arms/justin_horse.toml --png $(GALLERY)/hand-over.png --frames 8 --width 1400
 	$(REGRASP) roadmap build scenes/box_90x.toml $(PLAIN) --places 120 --angle 100 -o $(OUT)/gallery/box.roadmap
 	$(REGRASP) roadmap picture $(OUT)/gallery/box.roadmap scenes/box_90x.toml -o $(GALLERY)/roadmap.svg
 	$(REGRASP) plan scenes/out_of_reach.toml -o $(OUT)/gallery/none.json --max-work 300000 --failure $(GALLERY)/out-of-reach; test $$? -eq 1

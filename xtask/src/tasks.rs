@@ -14,9 +14,15 @@ const OWN: [&str; 2] = ["justin_horse_near", "justin_horse_turning"];
 /// Tasks of shared models.
 const OF_MODELS: [&str; 4] =
     ["iiwa_allegro_mustard", "iiwa_allegro_drill", "iiwa_allegro_breyer", "panda_allegro_table"];
-/// Tasks without a plan. Their rows say at which stage each fails. `impossible_support` is missing: reading refuses it.
-const IMPOSSIBLE: [&str; 5] =
-    ["impossible_start", "impossible_reach", "impossible_weight", "impossible_double_grasp", "impossible_exchange"];
+/// Tasks without a plan. Their rows say at which stage each fails.
+const IMPOSSIBLE: [&str; 6] = [
+    "impossible_start",
+    "impossible_support",
+    "impossible_reach",
+    "impossible_weight",
+    "impossible_place",
+    "impossible_double_grasp",
+];
 
 /// Published figures.
 const PUBLISHED: &str = "| published | figure |\n|---|---|\n\

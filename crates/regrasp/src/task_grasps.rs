@@ -3,12 +3,12 @@
 use crate::{Failure, GraspList, GraspSettings, list_grasps};
 use regrasp_base::diagnostic::number;
 use regrasp_base::{Budget, Diagnostic, InputError, Place, files};
-use regrasp_geometry::Vector;
+use regrasp_geometry::{Point, Vector};
 use regrasp_grasp::list::{GraspKind, format};
 use regrasp_planners::FailureKind;
 use regrasp_robot::manipulator::MountedHand;
 use regrasp_robot::{Hand, LinkId, Robot};
-use regrasp_scene::{GraspFile, InputFile, Object, PickAndPlaceQuery, STANDARD_GRAVITY, Scene};
+use regrasp_scene::{GRASP_TOLERANCE, GraspFile, InputFile, Object, PickAndPlaceQuery, STANDARD_GRAVITY, Scene};
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
@@ -123,7 +123,7 @@ fn refuse_other_hand_file(path: &Path, list: &GraspList, scene: &Scene, hand: us
 const MAKE_AGAIN: &str =
     "name the list of this hand and object, make it with `regrasp grasps`, or leave it out of `grasps`";
 
-/// Errors: another mass, centre of mass, friction or mesh (`G741`).
+/// Errors: another mass, centre of mass, friction, shape or mesh (`G741`).
 fn refuse_other_object(
     path: &Path,
     list: &GraspList,
@@ -152,6 +152,20 @@ fn refuse_other_object(
         let [a, b, c] = own.map(number);
         let problem = format!("has the centre of mass [{x}, {y}, {z}] m");
         return refuse(problem, format!("[{a}, {b}, {c}] m, as the scene's object has"));
+    }
+    for (index, grasp) in list.grasps.iter().enumerate() {
+        for contact in &grasp.contacts {
+            let point = Point::from(contact.point_in_object);
+            let off = (object.surface.project(&point).point_in_object - point).norm();
+            if off > GRASP_TOLERANCE {
+                let problem = format!(
+                    "has a contact of finger \"{}\" in grasp {index} that is {:.2} mm off the object's surface",
+                    contact.finger,
+                    1e3 * off
+                );
+                return refuse(problem, format!("contacts within {:.1} mm of it", 1e3 * GRASP_TOLERANCE));
+            }
+        }
     }
     let mut meshes = list.inputs.iter().filter(|input| input.role == "mesh");
     let known: BTreeSet<&str> = scene.inputs.iter().map(|input| input.sha256.as_str()).collect();

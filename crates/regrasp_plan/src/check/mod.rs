@@ -100,14 +100,15 @@ pub use files::{CheckedFiles, check_files};
 pub use find_scene::{find_scene, find_scene_among};
 pub use grasps::{GraspReport, check_grasps};
 pub use level::Level;
+pub use robots::RobotAlong;
 pub use robots::check_robot;
-pub use robots::{RobotAlong, robot_along};
 pub use slip::HoldSlip;
 pub use tasks::check_pick_and_place;
 pub use violation::{Moment, Violation, ViolationKind};
 
 use crate::format::AnyPlan;
 use crate::plan::Plan;
+use crate::robot_plan::RobotPlan;
 use model::CheckedHand;
 use regrasp_geometry::Pose;
 use regrasp_scene::pick_and_place::PICK_AND_PLACE;
@@ -403,6 +404,16 @@ pub fn check_any(
         report.reached = None;
     }
     report
+}
+
+/// Clearance at every waypoint of a plan of whole robots and at moments between, about `n_moments` in all.
+///
+/// Err with a message when the plan is not of this scene, or its form is broken.
+pub fn robot_along(around: (&Scene, &State), plan: &RobotPlan, n_moments: usize) -> Result<RobotAlong, String> {
+    match plan.task == PICK_AND_PLACE {
+        true => tasks::task_along(around, plan, n_moments),
+        false => robots::motion_along(around, plan, n_moments),
+    }
 }
 
 /// Whether joints, fingers and waypoints of `plan` are those of the scene: everything else indexes by them.

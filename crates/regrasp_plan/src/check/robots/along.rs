@@ -7,9 +7,12 @@ use crate::check::robots::question::Question;
 use crate::check::robots::rules::check_form;
 use crate::check::violation::Moment;
 use crate::check::{CheckSettings, Log};
-use crate::robot_plan::RobotPlan;
+use crate::robot_plan::{RobotPlan, RobotSegment};
 use regrasp_geometry::Pose;
 use regrasp_scene::{Scene, State};
+
+/// Most moments between two waypoints.
+const MOST_PIECES: usize = 10_000;
 
 /// Clearance at moments of a plan, in order of time.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -24,10 +27,40 @@ pub struct RobotAlong {
     pub pairs: Vec<[String; 2]>,
 }
 
-/// Clearance at every waypoint of `plan` and at moments between, about `n_moments` in all.
+impl RobotAlong {
+    /// Adds the waypoints of segment `s` and moments between, about one each `step` seconds.
+    pub fn add_segment(&mut self, placed: &mut Placed, segment: &RobotSegment, s: usize, step: f64) {
+        let mut joints = Vec::new();
+        for (w, pair) in segment.waypoints.windows(2).enumerate() {
+            let motion = RobotStep::new(&pair[0], &pair[1]);
+            let n_pieces = if step > 0.0 { ((motion.span / step).ceil() as usize).clamp(1, MOST_PIECES) } else { 1 };
+            let last = usize::from(w + 2 == segment.waypoints.len());
+            for piece in 0..n_pieces + last {
+                let u = piece as f64 / n_pieces as f64;
+                motion.joints_at(u, &mut joints);
+                let mut clearance = None;
+                note_clearance(placed, &joints, Moment::at(s, w), &mut clearance);
+                self.times.push(pair[0].time + u * motion.span);
+                self.clearance.push(clearance.as_ref().map(|found| found.distance));
+                self.pair.push(clearance.map(|found| {
+                    self.pairs.iter().position(|known| *known == found.pair).unwrap_or_else(|| {
+                        self.pairs.push(found.pair);
+                        self.pairs.len() - 1
+                    })
+                }));
+            }
+        }
+    }
+}
+
+/// Clearance at every waypoint of a plan of a motion and at moments between, about `n_moments` in all.
 ///
 /// Err with a message when the plan is not of this scene, or its form is broken.
-pub fn robot_along((scene, state): (&Scene, &State), plan: &RobotPlan, n_moments: usize) -> Result<RobotAlong, String> {
+pub fn motion_along(
+    (scene, state): (&Scene, &State),
+    plan: &RobotPlan,
+    n_moments: usize,
+) -> Result<RobotAlong, String> {
     let mut question = Question::new(scene, None, plan).map_err(|violation| violation.to_string())?;
     let mut log = Log { most_per_kind: 1, ..Log::default() };
     if !check_form(&question, plan, &mut log) {
@@ -39,29 +72,10 @@ pub fn robot_along((scene, state): (&Scene, &State), plan: &RobotPlan, n_moments
     let floors = Floors { apart: 0.0, held: -CheckSettings::default().largest_contact_tolerance };
     let items = Items::new((scene, state), &question, floors)?;
     let mut placed = Placed::new(&question.tree, &items);
-    let (mut along, mut joints) = (RobotAlong::default(), Vec::new());
-    let duration = plan.duration();
+    let mut along = RobotAlong::default();
+    let step = plan.duration() / n_moments.max(1) as f64;
     for (s, segment) in plan.segments.iter().enumerate() {
-        for (w, pair) in segment.waypoints.windows(2).enumerate() {
-            let step = RobotStep::new(&pair[0], &pair[1]);
-            let share = if duration > 0.0 { (step.span / duration).clamp(0.0, 1.0) } else { 0.0 };
-            let n_pieces = ((share * n_moments as f64).ceil() as usize).max(1);
-            let last = usize::from(w + 2 == segment.waypoints.len());
-            for piece in 0..n_pieces + last {
-                let u = piece as f64 / n_pieces as f64;
-                step.joints_at(u, &mut joints);
-                let mut clearance = None;
-                note_clearance(&mut placed, &joints, Moment::at(s, w), &mut clearance);
-                along.times.push(pair[0].time + u * step.span);
-                along.clearance.push(clearance.as_ref().map(|found| found.distance));
-                along.pair.push(clearance.map(|found| {
-                    along.pairs.iter().position(|known| *known == found.pair).unwrap_or_else(|| {
-                        along.pairs.push(found.pair);
-                        along.pairs.len() - 1
-                    })
-                }));
-            }
-        }
+        along.add_segment(&mut placed, segment, s, step);
     }
     Ok(along)
 }

@@ -18,7 +18,7 @@ pub mod rules;
 /// The robot as the checker sees it.
 pub mod tree;
 
-pub use along::{RobotAlong, robot_along};
+pub use along::{RobotAlong, motion_along};
 
 use crate::check::promises::check_input_files;
 use crate::check::violation::{Violation, ViolationKind as Kind};

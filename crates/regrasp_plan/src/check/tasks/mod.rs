@@ -25,7 +25,7 @@ pub mod standing;
 pub mod task;
 
 use crate::check::promises::check_input_files;
-use crate::check::robots::rules;
+use crate::check::robots::{RobotAlong, rules};
 use crate::check::violation::{Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Level, Log, Report, limits};
 use crate::robot_plan::RobotPlan;
@@ -102,4 +102,21 @@ fn judge(
     room.check_standing(log);
     forces::check_forces((task, &room), (&phases, &holds), plan, settings, (log, report));
     room.check_room(state, (log, report));
+}
+
+/// Clearance at every waypoint of a plan of pick and place and at moments between, about `n_moments` in all.
+///
+/// Err with a message when the plan is not of this scene, or its form is broken.
+pub fn task_along((scene, state): (&Scene, &State), plan: &RobotPlan, n_moments: usize) -> Result<RobotAlong, String> {
+    let task = Task::new(scene, None, plan).map_err(|violation| violation.to_string())?;
+    let mut log = Log { most_per_kind: 1, ..Log::default() };
+    let phases = match rules::check_form(&task.question, plan, &mut log) {
+        true => holders::read_phases(&task, plan, &mut log),
+        false => None,
+    };
+    let Some(phases) = phases else {
+        return Err(log.found.first().map_or_else(String::new, ToString::to_string));
+    };
+    let holds = rest::holds_of(&task, &phases, plan);
+    Room::new(&task, (&phases, &holds), plan, &CheckSettings::default()).along(state, n_moments)
 }

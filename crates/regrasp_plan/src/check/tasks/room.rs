@@ -12,6 +12,7 @@
 //! certified to 0.05 mm.
 
 use crate::check::model::FingerModel;
+use crate::check::robots::along::RobotAlong;
 use crate::check::robots::apart::{Placed, check_segment};
 use crate::check::robots::items::{Item, Items, Owner, are_judged};
 use crate::check::robots::motion::RobotStep;
@@ -114,6 +115,29 @@ impl<'a> Room<'a> {
         }
     }
 
+    /// Clearance along the whole plan, for charts.
+    pub fn along(&self, state: &State, n_moments: usize) -> Result<RobotAlong, String> {
+        let mut items = Items::of_object((self.task.scene, state), &self.task.question, self.task.object_index)?;
+        let mut along = RobotAlong::default();
+        let step = self.plan.duration() / n_moments.max(1) as f64;
+        for (s, segment) in self.plan.segments.iter().enumerate() {
+            self.arrange(&mut items, s, segment);
+            let mut placed = Placed::new(&self.task.question.tree, &items);
+            along.add_segment(&mut placed, segment, s, step);
+        }
+        Ok(along)
+    }
+
+    /// Puts the object where it is in a segment, and makes the segment's pairs. The body that the object goes with.
+    fn arrange(&self, items: &mut Items, s: usize, segment: &RobotSegment) -> Option<usize> {
+        let (body, frame) = self.object_in(s);
+        items.put_object(body, frame);
+        let touching = self.touching_tips(s, segment);
+        items.pairs.clear();
+        items.add_pairs(&self.task.question.tree, |a, b| self.floor(s, &touching, a, b));
+        body
+    }
+
     /// Distances along the whole plan.
     pub fn check_room(&self, state: &State, (log, report): (&mut Log, &mut Report)) {
         let mut items = match Items::of_object((self.task.scene, state), &self.task.question, self.task.object_index) {
@@ -124,11 +148,7 @@ impl<'a> Room<'a> {
             }
         };
         for (s, segment) in self.plan.segments.iter().enumerate() {
-            let (body, frame) = self.object_in(s);
-            items.put_object(body, frame);
-            let touching = self.touching_tips(s, segment);
-            items.pairs.clear();
-            items.add_pairs(&self.task.question.tree, |a, b| self.floor(s, &touching, a, b));
+            let body = self.arrange(&mut items, s, segment);
             let mut placed = Placed::new(&self.task.question.tree, &items);
             let goes_on = check_segment(&mut placed, segment, s, self.settings, log, &mut report.min_clearance);
             self.check_holders(s, segment, &mut placed, log);
