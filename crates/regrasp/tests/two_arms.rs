@@ -128,6 +128,11 @@ fn lists_of_other_hands_and_objects_are_refused() {
         let error = read_grasps(&loaded.scene, &query_of(&loaded, 0)).unwrap_err().to_string();
         assert!(error.contains(code) && error.contains(words), "{error}");
     }
+    let longer =
+        "box = { size = [0.054, 0.05, 0.05] }\ngrasps = { right = \"impossible_double_grasp.right.die.grasps.json\" }";
+    let loaded = changed("impossible_double_grasp", "box = { size = [0.05, 0.05, 0.05] }", longer);
+    let error = read_grasps(&loaded.scene, &query_of(&loaded, 0)).unwrap_err().to_string();
+    assert!(error.contains("G741") && error.contains("off the object's surface"), "{error}");
 }
 
 #[test]
