@@ -30,6 +30,9 @@ const SMALLEST_MAX: f64 = 1e-6;
 /// Penetration, in m, that is looked at a second time.
 const SHALLOW: f64 = 1e-5;
 
+/// Shapes farther apart than this, in m, are as far apart as their bounding balls: squares of larger lengths overflow in GJK.
+const FAR: f64 = 1e6;
+
 /// Steps that widen a slab.
 const MAX_STEPS: usize = 40;
 
@@ -236,7 +239,7 @@ pub fn distance(
     let max = max.max(SMALLEST_MAX);
     // A rounding error of the bounding balls must not look like a clearance.
     let apart = apart - 1e-12 * (a.radius + b.radius + world_from_a.translation.vector.norm());
-    if apart > max {
+    if apart > max.min(FAR) {
         return Clearance::SeparatedBy(apart);
     }
     let a_from_b = parry_pose(&world_from_a.inv_mul(world_from_b));

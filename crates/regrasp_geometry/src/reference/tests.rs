@@ -319,3 +319,15 @@ fn numbers_that_are_not_finite_are_unresolved() {
         assert!(point_distance(&ball, &pose, &Point::origin()).is_nan());
     }
 }
+
+#[test]
+fn shapes_very_far_apart_are_as_far_as_their_balls() {
+    let shape = ReferenceShape::new(&Shape::Cuboid { half_extents: Vector::new(0.1, 0.2, 0.3) }).unwrap();
+    for far in [1e7, 1e100, 1e150] {
+        let moved = Pose::translation(far, 0.0, 0.0);
+        match distance(&shape, &Pose::identity(), &shape, &moved, f64::MAX) {
+            Clearance::SeparatedBy(gap) => assert!(gap <= far && gap >= 0.999 * far, "{far}: {gap}"),
+            other => panic!("{far}: {other:?}"),
+        }
+    }
+}

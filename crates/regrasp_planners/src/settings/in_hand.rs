@@ -6,6 +6,13 @@ use regrasp_manipulation::settings::{PhysicsSettings, TransferMode};
 use regrasp_scene::Limits;
 use serde::{Deserialize, Serialize};
 
+/// Least `step`, in metres: finer steps take longer than any budget of time looks.
+const LEAST_STEP: f64 = 1e-5;
+/// Least `joint_step`, in radians or metres.
+const LEAST_JOINT_STEP: f64 = 1e-4;
+/// Most `candidates` and `candidates_kept`.
+const MOST_CANDIDATES: usize = 10_000;
+
 /// Settings of [`crate::plan_in_hand`]. In files they have no groups: every key stands by itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(from = "FlatSettings", into = "FlatSettings")]
@@ -73,6 +80,19 @@ impl InHandSettings {
                 return Err(format!("{name} is {value}; it must be positive and finite"));
             }
         }
+        for (name, value, least) in
+            [("step", self.physics.step, LEAST_STEP), ("joint_step", self.physics.joint_step, LEAST_JOINT_STEP)]
+        {
+            if value < least {
+                return Err(format!("{name} is {value}; it must be at least {least}"));
+            }
+        }
+        for (name, value) in [("candidates", self.search.candidates), ("candidates_kept", self.search.candidates_kept)]
+        {
+            if value > MOST_CANDIDATES {
+                return Err(format!("{name} is {value}; it must be at most {MOST_CANDIDATES}"));
+            }
+        }
         if let Some(FirstTry { clearance, .. }) = self.search.first_try
             && !(clearance > 0.0 && clearance < 0.1)
         {
@@ -137,6 +157,8 @@ mod tests {
             (r#"{"forces": {"torque_share": 1.5}}"#, "forces.torque_share is 1.5; it must be above 0 and at most 1"),
             (r#"{"forces": {"squeeze_weight": 0}}"#, "forces.squeeze_weight is 0; it must be above 0 and at most 1000"),
             (r#"{"speed": {"largest_speed": 0}}"#, "speed.largest_speed is 0; it must be between 0.000001 and 1000000"),
+            (r#"{"step": 3e-9}"#, "step is 0.000000003; it must be at least 0.00001"),
+            (r#"{"candidates": 2147483647}"#, "candidates is 2147483647; it must be at most 10000"),
             (r#"{"speed": {"ramp": -1}}"#, "speed.ramp is -1; it must be between 0 and 60 seconds"),
         ] {
             assert_eq!(read(text).unwrap().validate(), Err(message.into()), "{text}");
