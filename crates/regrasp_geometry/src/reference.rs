@@ -33,6 +33,9 @@ const SHALLOW: f64 = 1e-5;
 /// Shapes farther apart than this, in m, are as far apart as their bounding balls: squares of larger lengths overflow in GJK.
 const FAR: f64 = 1e6;
 
+/// Lengths, in m, and parts of rotations below this count as zero.
+const TINY: f64 = 1e-100;
+
 /// Steps that widen a slab.
 const MAX_STEPS: usize = 40;
 
@@ -242,7 +245,12 @@ pub fn distance(
     if apart > max.min(FAR) {
         return Clearance::SeparatedBy(apart);
     }
-    let a_from_b = parry_pose(&world_from_a.inv_mul(world_from_b));
+    let mut relative = world_from_a.inv_mul(world_from_b);
+    // Squares of such lengths are zero, and GJK divides by them.
+    relative.translation.vector.apply(|x| *x = if x.abs() < TINY { 0.0 } else { *x });
+    let turn = relative.rotation.coords.map(|x| if x.abs() < TINY { 0.0 } else { x });
+    relative.rotation = nalgebra::UnitQuaternion::new_unchecked(nalgebra::Quaternion::from(turn));
+    let a_from_b = parry_pose(&relative);
     if !a_from_b.is_finite() {
         return Clearance::Unresolved;
     }

@@ -331,3 +331,15 @@ fn shapes_very_far_apart_are_as_far_as_their_balls() {
         }
     }
 }
+
+#[test]
+fn poses_that_differ_by_denormal_numbers_are_told_apart_or_not() {
+    let shape = ReferenceShape::new(&Shape::Cuboid { half_extents: Vector::new(0.1, 0.2, 0.3) }).unwrap();
+    for tiny in [1e-308, 5e-324, 1e-200] {
+        let turned = crate::pose_from([tiny, 0.5, tiny], [tiny, 0.0, tiny, 1.0]);
+        match distance(&shape, &Pose::identity(), &shape, &turned, 1.0) {
+            Clearance::SeparatedBy(gap) => assert!((gap - 0.1).abs() < 1e-9, "{tiny}: {gap}"),
+            other => panic!("{tiny}: {other:?}"),
+        }
+    }
+}
