@@ -11,10 +11,10 @@
 //!   waypoints: any between the one before and the one after will do, and at both ends of a segment, where everything is at rest, also
 //!   any between zero and the one inside. Moments may leave what turns the object itself, of those accelerations.
 //! - Between waypoints of a carry forces are interpolated on straight lines. What they leave of the motion's forces and moments (those that
-//!   turn the object included) is at most the share [`MOST_CORRECTION`] of the sum of normal forces (moments over the torque scale), and
+//!   turn the object included) is at most the share `MOST_CORRECTION` of the sum of normal forces (moments over the torque scale), and
 //!   the contacts take it: the least-norm correction of their forces stays in the cones of the object's own friction, pushes, and keeps
 //!   the scene's limit of normal forces and the torques of the robot. So there are forces at these moments that do exactly what the motion
-//!   asks for. Steps are looked at in [`PIECES`] pieces.
+//!   asks for. Steps are looked at in `PIECES` pieces.
 //!
 //! The weight of the fingers, and friction in their joints, are left out.
 
