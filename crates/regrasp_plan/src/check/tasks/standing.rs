@@ -1,7 +1,7 @@
 //! Objects that stand on supports: where they touch, and whether their centre of mass is over that.
 //!
 //! A support is stood on with its flat top: the face of a box or cylinder that looks up, or the highest triangles of a polyhedron or
-//! mesh. Of the object all that is a vertex, an edge or a triangle within [`NEAR`] above the top touches, where it is over the top. Cylinders
+//! mesh. Of the object all that is a vertex, an edge or a triangle within `NEAR` above the top touches, where it is over the top. Cylinders
 //! stand on their ends. Balls, capsules and ellipsoids roll and stand nowhere.
 
 use crate::check::polygon::distance_inside;
