@@ -8,7 +8,7 @@ mod plans;
 use regrasp_base::Budget;
 use regrasp_grasp::list::GraspList;
 use regrasp_grasp::list::format::from_json;
-use regrasp_plan::check::{CheckSettings, check_any};
+use regrasp_plan::check::{CheckSettings, ViolationKind, check_any};
 use regrasp_plan::{AnyPlan, RobotPlan};
 use regrasp_robot::LoadOptions;
 use regrasp_scene::{LoadedScene, PickAndPlaceQuery, load_scene};
@@ -54,6 +54,14 @@ impl Case {
         let report = check_any(world, Some(&query), &any, &CheckSettings::default());
         assert!(report.accepted(), "seed {seed}: {:?}", report.violations.first());
         plan
+    }
+
+    /// What the checker finds wrong.
+    pub fn violations(&self, plan: &RobotPlan) -> Vec<ViolationKind> {
+        let world = (&self.loaded.scene, &self.loaded.state);
+        let any = AnyPlan::Robot(Box::new(plan.clone()));
+        let report = check_any(world, Some(&self.query.clone().into()), &any, &CheckSettings::default());
+        report.violations.iter().map(|violation| violation.kind).collect()
     }
 }
 
