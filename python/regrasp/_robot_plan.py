@@ -26,7 +26,7 @@ class RobotSegment:
     """A piece of the plan."""
 
     kind: str
-    """"transit" or "carry"; of pick and place "approach", "grasp", "release" and "retreat" too."""
+    """"transit" or "carry"; of pick and place "approach", "grasp", "release", "retreat", "transfer" and "regrasp" too."""
     held_by: Mapping[str, tuple[str, ...]]
     """For every object of the plan, the hands and supports that hold it all through the segment."""
     first: int

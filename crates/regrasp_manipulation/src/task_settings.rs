@@ -48,6 +48,14 @@ pub struct TaskSettings {
     pub exchange_grid: f64,
     /// May one hand give the object to another one?
     pub hand_over: bool,
+    /// May a hand change its grasp while it holds the object?
+    pub in_hand: bool,
+    /// Configurations that the search for one such change may look at.
+    pub in_hand_work: u64,
+    /// Most searches for such changes.
+    pub in_hand_searches: usize,
+    /// Grasps to which a hand may change from one grasp: the nearest ones.
+    pub in_hand_neighbours: usize,
     /// May the object be put down on the way?
     pub put_down: bool,
     /// Poses on supports at which it may be put down.
@@ -77,6 +85,10 @@ impl Default for TaskSettings {
             exchange_spread: 0.1,
             exchange_grid: 0.1,
             hand_over: true,
+            in_hand: true,
+            in_hand_work: 40_000,
+            in_hand_searches: 24,
+            in_hand_neighbours: 8,
             put_down: true,
             placements: 24,
             max_edges: 2000,
@@ -108,6 +120,8 @@ impl TaskSettings {
         at_most("exchange_places", self.exchange_places, 100_000)?;
         at_most("exchange_turns", self.exchange_turns, 24)?;
         at_most("exchange_draws", self.exchange_draws, 1_000_000)?;
+        at_most("in_hand_searches", self.in_hand_searches, 100_000)?;
+        at_most("in_hand_neighbours", self.in_hand_neighbours, 1_000)?;
         at_most("placements", self.placements, 1_000)?;
         at_most("max_edges", self.max_edges, 1_000_000)?;
         self.forces.validate()

@@ -3,7 +3,7 @@
 //! Between two waypoints every joint follows the cubic through positions, velocities and times. An object that a hand holds follows
 //! that hand: it keeps the pose in the frame of the hand's base that it has at the first waypoint of the segment.
 
-use crate::plan::{ContactMode, FORMAT, FORMAT_VERSION, PlanInput, PoseData};
+use crate::plan::{ContactMode, FORMAT, FORMAT_VERSION, PlanInput, PoseData, Promises};
 use regrasp_robot::Manipulator;
 use regrasp_robot::manipulator::layout::Coordinate;
 use regrasp_scene::motion::MOTION;
@@ -32,6 +32,12 @@ pub enum RobotSegmentKind {
     Release,
     /// A hand leaves the object. Who holds the object rests.
     Retreat,
+    /// The object moves in the one hand that holds it: as the kind of that name in plans of motions in the hand. All but the fingers of
+    /// that hand rests.
+    Transfer,
+    /// The object stays and one finger of the one hand that holds it moves: as the kind of that name in plans of motions in the hand. All
+    /// else rests.
+    Regrasp,
 }
 
 /// A robot that the plan moves.
@@ -103,6 +109,20 @@ pub struct RobotWaypoint {
     pub contacts: Vec<RobotContact>,
 }
 
+/// What a `transfer` or a `regrasp` says beside its waypoints.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(deny_unknown_fields)]
+#[cfg_attr(test, ts(optional_fields))]
+pub struct InHandPart {
+    /// The finger that moves, in a regrasp.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub moving_finger: Option<String>,
+    /// For every waypoint, torques of the joints of the hand with which they make the contact forces, in newton metres, or newtons of
+    /// sliding joints.
+    pub joint_torques: Vec<Vec<f64>>,
+}
+
 /// A piece of motion.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[cfg_attr(test, derive(ts_rs::TS))]
@@ -113,6 +133,9 @@ pub struct RobotSegment {
     /// For every object of `objects`, who holds it: names of hands and supports.
     #[serde(deserialize_with = "holders_each_once")]
     pub held_by: BTreeMap<String, Vec<String>>,
+    /// In a `transfer` or `regrasp`: which finger moves, and torques. Absent in all other kinds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub in_hand: Option<Box<InHandPart>>,
     /// At least two; the first is the last of the segment before, but for its time.
     pub waypoints: Vec<RobotWaypoint>,
 }
@@ -132,6 +155,11 @@ pub struct RobotPromises {
     /// What holds for all contacts; absent in plans without contacts.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub holding: Option<HoldingPromises>,
+    /// What holds while an object moves in a hand, by the name of the hand: as in plans of motions in the hand. Absent in plans without
+    /// such segments.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[cfg_attr(test, ts(optional, type = "{ [key in string]: Promises }"))]
+    pub in_hand: BTreeMap<String, Promises>,
 }
 
 /// What a plan promises of the fingers that hold.
@@ -300,7 +328,7 @@ impl RobotPlan {
 
     /// Every floating-point number of the plan.
     pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
-        let RobotPromises { joint_velocities, joint_accelerations, clearance, holding } = &self.promises;
+        let RobotPromises { joint_velocities, joint_accelerations, clearance, holding, in_hand } = &self.promises;
         let promises = joint_velocities.iter().chain(joint_accelerations).copied().chain([*clearance]);
         let of_holding = |holding: &HoldingPromises| {
             let scalars =
@@ -308,7 +336,10 @@ impl RobotPlan {
             scalars.into_iter().chain(holding.normal_force).collect::<Vec<f64>>()
         };
         let promises = promises.chain(holding.iter().flat_map(of_holding));
-        promises.chain(self.waypoints().flat_map(RobotWaypoint::numbers))
+        let promises = promises.chain(in_hand.values().flat_map(Promises::numbers));
+        let parts = self.segments.iter().filter_map(|segment| segment.in_hand.as_ref());
+        let torques = parts.flat_map(|part| part.joint_torques.iter().flatten().copied());
+        promises.chain(torques).chain(self.waypoints().flat_map(RobotWaypoint::numbers))
     }
 }
 
@@ -325,7 +356,15 @@ impl RobotPromises {
             joint_accelerations: robot.layout.coordinates.iter().map(acceleration).collect(),
             clearance: 0.0,
             holding: None,
+            in_hand: BTreeMap::new(),
         }
+    }
+}
+
+impl RobotSegmentKind {
+    /// True where the object moves in a hand, or the hand changes its grasp: kinds of plans of motions in the hand.
+    pub fn is_in_hand(self) -> bool {
+        matches!(self, RobotSegmentKind::Transfer | RobotSegmentKind::Regrasp)
     }
 }
 

@@ -117,6 +117,10 @@ pub struct Context<'a> {
     pub inertia: Matrix3<f64>,
     /// All coordinates that are no finger's.
     pub arms_and_torso: Vec<usize>,
+    /// Where everything rests that the task does not move.
+    pub rest: State,
+    /// What hands count on.
+    pub physics: &'a PhysicsSettings,
     /// What the plan promises about holding.
     pub promises: &'a HoldingPromises,
     /// Seed.
@@ -282,6 +286,8 @@ impl<'a> Context<'a> {
             gravity: scene.gravity().in_world().unwrap_or_else(Vector::zeros),
             inertia,
             arms_and_torso: all.iter().copied().filter(|&k| !is_finger(k)).collect(),
+            rest: state.clone(),
+            physics: &prepared.physics,
             promises: &prepared.promises,
             seed,
             budget,

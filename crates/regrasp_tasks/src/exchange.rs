@@ -89,6 +89,11 @@ impl Places {
         Places { positions: positions.collect(), turns: turns() }
     }
 
+    /// Positions of the object's centre of mass, the best first.
+    pub fn iter(&self) -> impl Iterator<Item = &Point> {
+        self.positions.iter()
+    }
+
     /// Where the object comes with one grasp each. Err with a reason.
     pub fn give(
         &self,
@@ -257,7 +262,7 @@ impl<'c, 'a> Attempt<'c, 'a> {
 }
 
 /// The 24 turns that bring a cube to itself.
-fn turns() -> Vec<UnitQuaternion<f64>> {
+pub fn turns() -> Vec<UnitQuaternion<f64>> {
     let axes: Vec<Vector> = (0..3).flat_map(|k| [Vector::ith(k, 1.0), Vector::ith(k, -1.0)]).collect();
     let mut found = Vec::new();
     for x in &axes {

@@ -15,6 +15,8 @@ pub enum Stage {
     PutDown,
     /// Two hands.
     Exchange,
+    /// Another grasp of the same hand.
+    InHand,
     /// A motion with nothing in the hands.
     Transit,
     /// A motion with the object.
@@ -29,6 +31,7 @@ impl Stage {
             Stage::Place => "place",
             Stage::PutDown => "put down",
             Stage::Exchange => "exchange",
+            Stage::InHand => "in hand",
             Stage::Transit => "transit",
             Stage::Carry => "carry",
         }
@@ -106,7 +109,8 @@ impl Tally {
 
     /// No plan: the first stage at which nothing worked says why.
     pub fn failure(&self, kind: FailureKind) -> Failure {
-        let order = [Stage::Grasp, Stage::Place, Stage::Exchange, Stage::PutDown, Stage::Transit, Stage::Carry];
+        let order =
+            [Stage::Grasp, Stage::Place, Stage::Exchange, Stage::PutDown, Stage::InHand, Stage::Transit, Stage::Carry];
         let is_empty = |stage: &Stage| self.tried.contains_key(stage) && !self.found.contains_key(stage);
         let last = || order.into_iter().rev().find(|stage| self.reasons.keys().any(|(of, _)| of == stage));
         let stage = order.into_iter().find(is_empty).or_else(last).unwrap_or(Stage::Grasp);
@@ -116,6 +120,7 @@ impl Tally {
                 "make longer lists of grasps, or move the object nearer or away from clutter"
             }
             Stage::Exchange => "make longer lists of grasps, or let the object be put down on the way",
+            Stage::InHand => "allow more work in a hand (`in_hand_work`), or let the object be put down on the way",
             Stage::PutDown => "give a support that both hands reach",
             Stage::Transit | Stage::Carry => "try another seed, more samples, or less clutter",
         };

@@ -3,6 +3,7 @@
 use crate::context::Context;
 use crate::exchange::{Give, Places, is_double_grasp};
 use crate::failing::{Stage, Tally};
+use crate::in_hand::{self, Change};
 use crate::motions::{self, Step, Stuck};
 use crate::placements::{Place, intermediate};
 use crate::station::{Station, may_hold, station};
@@ -59,9 +60,18 @@ struct Given {
     cost: f64,
 }
 
+/// A hand changes its grasp.
+struct Changed {
+    known: Known<Change>,
+    cost: f64,
+}
+
 /// Cost of taking or putting down, of giving; in seconds about. By hand: what plans take.
 const GRIP_SECONDS: f64 = 3.0;
 const GIVE_SECONDS: f64 = 4.0;
+/// Cost of a change of grasp in the hand, and of each radian that the object turns; in seconds. By hand: what plans take.
+const CHANGE_SECONDS: f64 = 10.0;
+const SECONDS_PER_RADIAN: f64 = 5.0;
 /// What counts for a change of the holder where few changes are wanted.
 const CHANGE: f64 = 100.0;
 /// Seconds for each metre of the way of an object.
@@ -82,7 +92,10 @@ struct Graph<'c, 'a> {
     grips: Vec<Vec<Vec<Grip>>>,
     /// By giver and taker.
     gives: BTreeMap<([usize; 2], [usize; 2]), Given>,
-    /// Places of the exchange, by both hands.
+    /// By grasp before and grasp after, of one hand.
+    changes: BTreeMap<([usize; 2], [usize; 2]), Changed>,
+    searched_changes: usize,
+    /// Places of the exchange, by both hands; of changes in one hand, by that hand twice.
     exchange: BTreeMap<[usize; 2], Places>,
     failed_gives: usize,
     tested: usize,
@@ -119,6 +132,9 @@ pub fn search(context: &Context, tally: &mut Tally) -> Result<RobotPlan, Failure
                 plan.promises.clearance = context.settings.clearance;
                 plan.promises.holding = Some(context.promises.clone());
                 plan.statistics = tally.statistics();
+                let changes =
+                    steps.iter().filter_map(|step| if let Step::Change(own) = step { Some(*own) } else { None });
+                plan.promises.in_hand = in_hand::promises(context, changes);
                 plan.segments = segments;
                 return Ok(plan);
             }
@@ -185,6 +201,8 @@ impl<'c, 'a> Graph<'c, 'a> {
             places,
             grips,
             gives,
+            changes: changes_of(context),
+            searched_changes: 0,
             exchange: BTreeMap::new(),
             failed_gives: 0,
             tested: 0,
@@ -219,6 +237,9 @@ impl<'c, 'a> Graph<'c, 'a> {
                 let failed = FAILED * self.failed_gives as f64;
                 let alive = gives.filter(|(_, given)| !given.known.is_dead());
                 into.extend(alive.map(|((_, taker), given)| (Node::Held(*taker), given.cost + failed)));
+                let changes = self.changes.range((giver, [0, 0])..=(giver, [usize::MAX, usize::MAX]));
+                let alive = changes.filter(|(_, changed)| !changed.known.is_dead());
+                into.extend(alive.map(|((_, after), changed)| (Node::Held(*after), changed.cost)));
             }
         }
         for (to, cost) in into.iter_mut() {
@@ -262,6 +283,7 @@ impl<'c, 'a> Graph<'c, 'a> {
             && path.windows(2).all(|pair| self.test_grip(pair[0], pair[1], tally))
             && path.windows(2).all(|pair| self.test_pair(pair[0], pair[1], tally))
             && path.windows(2).all(|pair| self.test_give(pair[0], pair[1], tally))
+            && path.windows(2).all(|pair| self.test_change(pair[0], pair[1], tally))
     }
 
     fn stage_of(&self, place: usize) -> Stage {
@@ -271,7 +293,7 @@ impl<'c, 'a> Graph<'c, 'a> {
     /// Pairs of grasps in which the hands hit each other are dead.
     fn test_pair(&mut self, from: Node, to: Node, tally: &mut Tally) -> bool {
         let (Node::Held(giver), Node::Held(taker)) = (from, to) else { return true };
-        let Some(given) = self.gives.get_mut(&(giver, taker)) else { return false };
+        let Some(given) = self.gives.get_mut(&(giver, taker)) else { return giver[0] == taker[0] };
         if matches!(given.known, Known::New) {
             tally.work(1);
             given.known = match is_double_grasp(self.context, giver, taker) {
@@ -318,7 +340,7 @@ impl<'c, 'a> Graph<'c, 'a> {
 
     fn test_give(&mut self, from: Node, to: Node, tally: &mut Tally) -> bool {
         let (Node::Held(giver), Node::Held(taker)) = (from, to) else { return true };
-        let Some(given) = self.gives.get_mut(&(giver, taker)) else { return false };
+        let Some(given) = self.gives.get_mut(&(giver, taker)) else { return giver[0] == taker[0] };
         if matches!(given.known, Known::Likely) {
             self.tested += 1;
             let hands = [giver[0], taker[0]];
@@ -331,6 +353,27 @@ impl<'c, 'a> Graph<'c, 'a> {
         !given.known.is_dead()
     }
 
+    /// Changes of the grasp of one hand, the dearest test of all.
+    fn test_change(&mut self, from: Node, to: Node, tally: &mut Tally) -> bool {
+        let (Node::Held(before), Node::Held(after)) = (from, to) else { return true };
+        let Some(changed) = self.changes.get_mut(&(before, after)) else { return before[0] != after[0] };
+        if matches!(changed.known, Known::New) {
+            self.tested += 1;
+            self.searched_changes += 1;
+            let hand = before[0];
+            let found = match self.searched_changes > self.context.settings.in_hand_searches {
+                true => Err("not searched for (`in_hand_searches`)"),
+                false => {
+                    let places = self.exchange.entry([hand; 2]).or_insert_with(|| Places::new(self.context, [hand; 2]));
+                    in_hand::change(self.context, places, [hand, before[1], after[1]], tally)
+                }
+            };
+            tally.count(Stage::InHand, found.as_ref().map(|_| ()).map_err(|reason| *reason));
+            changed.known = found.map_or(Known::Dead, |found| Known::Found(Box::new(found)));
+        }
+        !changed.known.is_dead()
+    }
+
     /// The steps of a path whose edges are tested.
     fn steps(&self, path: &[Node]) -> Vec<Step<'_>> {
         let step = |pair: &[Node]| match (pair[0], pair[1]) {
@@ -339,6 +382,9 @@ impl<'c, 'a> Graph<'c, 'a> {
             }
             (Node::Held([hand, grasp]), Node::Lies(place)) => {
                 self.grips[place][hand][grasp].known.found().map(|found| Step::Place(found, &self.places[place]))
+            }
+            (Node::Held(before), Node::Held(after)) if before[0] == after[0] => {
+                self.changes.get(&(before, after)).and_then(|changed| changed.known.found()).map(Step::Change)
             }
             (Node::Held(giver), Node::Held(taker)) => {
                 self.gives.get(&(giver, taker)).and_then(|given| given.known.found()).map(Step::Give)
@@ -360,6 +406,11 @@ impl<'c, 'a> Graph<'c, 'a> {
         match (from.min(to), from.max(to)) {
             (Node::Lies(place), Node::Held([hand, grasp])) => self.grips[place][hand][grasp].known = Known::Dead,
             _ => {
+                if let (Node::Held(before), Node::Held(after)) = (from, to)
+                    && let Some(changed) = self.changes.get_mut(&(before, after))
+                {
+                    changed.known = Known::Dead;
+                }
                 if let (Node::Held(giver), Node::Held(taker)) = (from, to)
                     && let Some(given) = self.gives.get_mut(&(giver, taker))
                 {
@@ -368,4 +419,24 @@ impl<'c, 'a> Graph<'c, 'a> {
             }
         }
     }
+}
+
+/// Changes of grasp that are worth a search: from each grasp to the nearest ones.
+fn changes_of(context: &Context) -> BTreeMap<([usize; 2], [usize; 2]), Changed> {
+    let mut found = BTreeMap::new();
+    if !context.settings.in_hand {
+        return found;
+    }
+    for (hand, own) in context.hands.iter().enumerate() {
+        for before in 0..own.grasps.len() {
+            let far = |after: usize| in_hand::distance(context, hand, [before, after]).map(|far| (far, after));
+            let mut near: Vec<(f64, usize)> = (0..own.grasps.len()).filter_map(far).collect();
+            near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            for (far, after) in near.into_iter().take(context.settings.in_hand_neighbours) {
+                let cost = CHANGE_SECONDS + SECONDS_PER_RADIAN * far;
+                found.insert(([hand, before], [hand, after]), Changed { known: Known::New, cost });
+            }
+        }
+    }
+    found
 }

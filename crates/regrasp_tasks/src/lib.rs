@@ -1,7 +1,7 @@
 //! Pick and place: an object stands somewhere, and shall stand somewhere else (Saut, Gharbi, Cortes, Sidobre, Simeon 2010, sec. V).
 //!
 //! [`plan_pick_and_place`] searches a graph of who holds the object by which grasp, and where it lies (`graph`). Edges are tested
-//! when a cheap path uses them, the cheapest test first: grasps at places (`station`), exchanges (`exchange`), then motions
+//! when a cheap path uses them, the cheapest test first: grasps at places (`station`), exchanges (`exchange`), changes of grasp in one hand (`in_hand`), then motions
 //! (`motions`), which become the segments of the plan (`record`).
 
 /// What is refused before any search.
@@ -16,6 +16,8 @@ mod failing;
 mod forces;
 /// Who holds the object, and where it lies.
 mod graph;
+/// A hand changes its grasp while it holds.
+mod in_hand;
 /// Straight ways of a hand.
 mod line;
 /// The motions of a plan.

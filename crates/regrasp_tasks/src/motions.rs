@@ -4,6 +4,7 @@ use crate::context::{Context, Grasp, motion_of};
 use crate::exchange::Give;
 use crate::failing::{Stage, Tally};
 use crate::forces::{Carried, Off, under, weight};
+use crate::in_hand::{self, Change};
 use crate::line::{LINE_STEPS, is_lift_free, is_motion_free};
 use crate::placements::Place;
 use crate::record::{Holding, Moves, Record};
@@ -25,6 +26,8 @@ pub enum Step<'s> {
     Pick(&'s Station, &'s Place),
     /// It gives it to another hand.
     Give(&'s Give),
+    /// The hand changes its grasp.
+    Change(&'s Change),
     /// The hand puts it down.
     Place(&'s Station, &'s Place),
 }
@@ -78,6 +81,7 @@ pub fn segments(
         match step {
             Step::Pick(station, place) => maker.pick(station, place, &steps[index + 1..], tally)?,
             Step::Give(give) => maker.give(give, tally)?,
+            Step::Change(change) => maker.change(change, tally)?,
             Step::Place(station, place) => maker.place(station, place, tally)?,
         }
     }
@@ -217,7 +221,11 @@ impl<'c, 'a> Maker<'c, 'a> {
         let mut target = target.to_vec();
         let mut known = vec![picker];
         for step in next {
-            let Step::Give(give) = step else { break };
+            let give = match step {
+                Step::Give(give) => give,
+                Step::Change(_) => continue,
+                Step::Pick(..) | Step::Place(..) => break,
+            };
             let [hand, _] = give.taker;
             if !known.contains(&hand) {
                 known.push(hand);
@@ -432,6 +440,24 @@ impl<'c, 'a> Maker<'c, 'a> {
         self.way((&way_out, giver[0]), RobotSegmentKind::Retreat, by_taker(), &world, tally)?;
         let hand_from_object = context.world_from_hand(taker[0], &self.state).inverse() * self.object;
         self.carried = Some(Carried { hand: taker[0], grasp: grasps[1], hand_from_object });
+        Ok(())
+    }
+
+    /// The object comes to a free place, and the hand changes its grasp there.
+    fn change(&mut self, change: &Change, tally: &mut Tally) -> Result<(), Stuck> {
+        let context = self.context;
+        let hand = change.from[0];
+        let target = self.overlaid(&Smooth::Line([change.at.clone(), change.at.clone()]), &[hand]);
+        let target = target.ends()[0].clone();
+        self.carry(&target, None, tally)?;
+        let segments = in_hand::segments(context, change, &target);
+        let last = segments.last().and_then(|segment| segment.waypoints.last());
+        let Some(last) = last.cloned() else { return Err(self.stuck(Stage::InHand, "changes without a motion")) };
+        self.record.embed(segments, context.settings.rest);
+        self.state = last.joints;
+        self.object = Pose::from(&last.world_from_objects[0]);
+        let hand_from_object = context.world_from_hand(hand, &self.state).inverse() * self.object;
+        self.carried = Some(Carried { hand, grasp: self.grasp(change.to), hand_from_object });
         Ok(())
     }
 

@@ -37,6 +37,20 @@ pub struct Record {
 }
 
 impl Record {
+    /// Adds segments that have times of their own, with a moment of rest before the first.
+    pub fn embed(&mut self, segments: Vec<RobotSegment>, rest: f64) {
+        let first = segments.first().and_then(|segment| segment.waypoints.first()).map_or(0.0, |first| first.time);
+        let begin = self.now + rest - first;
+        for mut segment in segments {
+            for waypoint in &mut segment.waypoints {
+                waypoint.time += begin;
+                self.now = waypoint.time;
+            }
+            self.segments.push(segment);
+        }
+        self.now += rest;
+    }
+
     /// Adds a segment that begins when the last one ends.
     pub fn add(
         &mut self,
@@ -65,7 +79,7 @@ impl Record {
         let waypoints: Vec<RobotWaypoint> = (0..timed.points.len()).map(waypoint).collect();
         self.now = waypoints.last().map_or(self.now, |last| last.time);
         let held_by = BTreeMap::from([(context.object.name.clone(), held_by)]);
-        self.segments.push(RobotSegment { kind, held_by, waypoints });
+        self.segments.push(RobotSegment { kind, held_by, in_hand: None, waypoints });
     }
 }
 

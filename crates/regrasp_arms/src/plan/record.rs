@@ -34,7 +34,8 @@ impl Problem<'_> {
             });
         }
         let kind = if self.attached.is_empty() { RobotSegmentKind::Transit } else { RobotSegmentKind::Carry };
-        plan.segments = vec![RobotSegment { kind, held_by: RobotPlan::held_by(self.scene, self.query), waypoints }];
+        plan.segments =
+            vec![RobotSegment { kind, held_by: RobotPlan::held_by(self.scene, self.query), in_hand: None, waypoints }];
         plan.method = serde_json::to_value(settings.method)
             .ok()
             .and_then(|name| Some(name.as_str()?.to_owned()))

@@ -99,6 +99,8 @@ pub fn kind_name(kind: RobotSegmentKind) -> &'static str {
         RobotSegmentKind::Grasp => "grasp",
         RobotSegmentKind::Release => "release",
         RobotSegmentKind::Retreat => "retreat",
+        RobotSegmentKind::Transfer => "transfer",
+        RobotSegmentKind::Regrasp => "regrasp",
     }
 }
 

@@ -45,7 +45,7 @@ impl Breeder<'_> {
             "another kind of segment",
             &[Kind::WrongHolder, Kind::JointMovesAtRest, Kind::Collision],
             |plan, rng| {
-                use RobotSegmentKind::{Approach, Carry, Grasp, Release, Retreat, Transit};
+                use RobotSegmentKind::{Approach, Carry, Grasp, Regrasp, Release, Retreat, Transfer, Transit};
                 let segment = &mut plan.segments[rng.below(n_segments)];
                 let others: &[RobotSegmentKind] = match segment.kind {
                     // What another arm does meanwhile does not make a carry of a retreat, nor the other way round.
@@ -54,6 +54,7 @@ impl Breeder<'_> {
                     Grasp => &[Carry, Release, Transit],
                     Release => &[Carry, Grasp, Transit],
                     Carry => &[Grasp, Release],
+                    Transfer | Regrasp => &[Carry, Grasp, Release, Transit],
                 };
                 segment.kind = one_of(rng, others)?;
                 Some(())

@@ -5,6 +5,8 @@
 mod contacts;
 /// Who holds, and in which order.
 mod holders;
+/// Motions in a hand.
+mod in_hand;
 /// What rests, and what goes with a hand.
 mod rest;
 /// Other scenes.
@@ -47,6 +49,7 @@ pub fn task_mutants(
     breeder.break_rest();
     breeder.break_contacts();
     breeder.break_forces();
+    breeder.break_in_hand();
     breeder.break_world();
     breeder.found
 }

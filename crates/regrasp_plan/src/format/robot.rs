@@ -350,6 +350,21 @@ impl Reader<'_> {
             let expected = "\"transit\" or \"carry\" in a plan of this task";
             self.fail("C408", &[at[0], at[1], Key("kind")], "is one of pick and place".into(), expected);
         }
+        if segment.kind.is_in_hand() != segment.in_hand.is_some() {
+            let expected = "\"in_hand\" in every transfer and regrasp, and nowhere else";
+            self.fail("C408", &[at[0], at[1], Key("in_hand")], "does not fit the kind of the segment".into(), expected);
+        }
+        if let Some(part) = &segment.in_hand {
+            let path = [at[0], at[1], Key("in_hand"), Key("joint_torques")];
+            let has_all = part.joint_torques.is_empty() || part.joint_torques.len() == segment.waypoints.len();
+            if !has_all || part.joint_torques.iter().any(|torques| torques.len() > n_joints) {
+                let problem = format!("has {} lists, or too long ones", part.joint_torques.len());
+                self.fail("C404", &path, problem, "one torque for each joint of the hand, waypoint by waypoint");
+            }
+            if part.joint_torques.iter().flatten().any(|torque| torque.abs() > caps::SIZE) {
+                self.fail("C409", &path, "holds a number beyond all sense".into(), "newton metres or newtons");
+            }
+        }
         if plan.task == PICK_AND_PLACE {
             let unheld = plan.objects.iter().find(|object| segment.held_by.get(*object).is_none_or(Vec::is_empty));
             if let Some(object) = unheld {
@@ -406,8 +421,10 @@ impl Reader<'_> {
                 let problem = format!("is of {who}, whose hand does not hold in this segment");
                 self.fail("C407", &inside, problem, "fingers of the hands in \"held_by\" only");
             }
-            if contact.mode != ContactMode::Fixed {
-                self.fail("C407", &inside, format!("of {who} is not fixed"), "\"fixed\"");
+            let may_roll = segment.kind.is_in_hand() && contact.mode == ContactMode::Rolling;
+            if contact.mode != ContactMode::Fixed && !may_roll {
+                let expected = "\"fixed\", or \"rolling\" in a transfer or regrasp";
+                self.fail("C407", &inside, format!("of {who} is not fixed"), expected);
             }
         }
     }

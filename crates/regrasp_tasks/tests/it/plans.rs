@@ -1,8 +1,12 @@
 //! Tasks with plans.
 
 use crate::{Case, holders};
+use regrasp_mutations::tasks::task_mutants;
+use regrasp_plan::AnyPlan;
 use regrasp_plan::check::{CheckSettings, ViolationKind};
+use regrasp_plan::check::{CheckSettings, check_any};
 use regrasp_plan::robot_plan::RobotSegmentKind;
+use regrasp_scene::Query;
 use regrasp_tasks::TaskSettings;
 
 #[test]
@@ -37,6 +41,40 @@ fn it_is_put_down_and_taken_again_where_hands_may_not_give() {
     assert_eq!(holders(&plan), ["right", "left"]);
     let n_releases = plan.segments.iter().filter(|segment| segment.kind == RobotSegmentKind::Release).count();
     assert_eq!(n_releases, 2);
+}
+
+#[test]
+fn a_hand_changes_its_grasp_before_it_gives_where_nothing_else_helps() {
+    let case = Case::new("regrasp_then_give.toml");
+    let plan = case.accepted(&TaskSettings::default(), 0);
+    assert!(plan.segments.iter().any(|segment| segment.kind == RobotSegmentKind::Regrasp), "no change in the hand");
+    assert_eq!(holders(&plan), ["right", "left"]);
+    let without = TaskSettings { in_hand: false, ..TaskSettings::default() };
+    let failure = case.plan(&without, 0).expect_err("a plan without a change in the hand");
+    assert!(failure.message.starts_with("exchange"), "{failure}");
+}
+
+#[test]
+fn broken_plans_with_motions_in_a_hand_are_rejected() {
+    let case = Case::new("regrasp_then_give.toml");
+    let plan = case.accepted(&TaskSettings::default(), 1);
+    let world = (&case.loaded.scene, &case.loaded.state);
+    let query = Query::from(case.query.clone());
+    let mut n_in_hand = 0;
+    for round in 0..3 {
+        let mut rng = regrasp_base::Rng::keyed(round, "mutants", 0);
+        for mutant in task_mutants(&plan, world, &case.query, &mut rng) {
+            n_in_hand += usize::from(mutant.name.contains("hand"));
+            let scene = mutant.scene.as_ref().unwrap_or(world.0);
+            let state = mutant.state.as_ref().unwrap_or(world.1);
+            let asked = mutant.query.clone().map_or_else(|| query.clone(), Query::from);
+            let any = AnyPlan::Robot(Box::new(mutant.plan.clone()));
+            let report = check_any((scene, state), Some(&asked), &any, &CheckSettings::default());
+            let is_named = report.violations.iter().any(|violation| mutant.expected.contains(&violation.kind));
+            assert!(is_named, "{} (round {round}): {:?}", mutant.name, report.violations.first());
+        }
+    }
+    assert!(n_in_hand >= 20, "{n_in_hand} mutants of motions in a hand");
 }
 
 #[test]

@@ -295,6 +295,8 @@ pub(super) fn kind_name(kind: RobotSegmentKind) -> &'static str {
         RobotSegmentKind::Grasp => "grasp",
         RobotSegmentKind::Release => "release",
         RobotSegmentKind::Retreat => "retreat",
+        RobotSegmentKind::Transfer => "transfer",
+        RobotSegmentKind::Regrasp => "regrasp",
     }
 }
 

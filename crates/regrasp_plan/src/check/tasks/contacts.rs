@@ -57,7 +57,7 @@ pub fn check_entries(task: &Task, phases: &[Phase], plan: &RobotPlan, log: &mut 
                     "is of a hand that does not hold in this segment"
                 } else if is_twice {
                     "is there twice"
-                } else if contact.mode != ContactMode::Fixed {
+                } else if contact.mode != ContactMode::Fixed && !phase.kind.is_in_hand() {
                     "is not fixed"
                 } else {
                     continue;
@@ -207,7 +207,7 @@ impl Judge<'_> {
 }
 
 /// True when two lists have the same fingers at the same contacts.
-fn are_same(a: &[RobotContact], b: &[RobotContact], tolerance: f64) -> bool {
+pub fn are_same(a: &[RobotContact], b: &[RobotContact], tolerance: f64) -> bool {
     let near = |p: &[f64; 3], q: &[f64; 3]| (Vector::from(*p) - Vector::from(*q)).norm() <= tolerance;
     let is_in = |one: &RobotContact| {
         b.iter().any(|other| {

@@ -93,7 +93,8 @@ pub fn check_forces(
     let body = held_body(task);
     let judge = Judge { task, room, body, inertia: inertia_of(task), settings };
     for (s, (phase, segment)) in phases.iter().zip(&plan.segments).enumerate() {
-        if phase.hands().next().is_none() {
+        // Those of a transfer or regrasp are judged with it (`in_hand`).
+        if phase.hands().next().is_none() || phase.kind.is_in_hand() {
             continue;
         }
         let mut known: Vec<Option<Vec<Exerted>>> = Vec::new();

@@ -4,7 +4,7 @@
 //! - In every segment somebody holds the object. The first and the last segment are of one support alone.
 //! - Between two segments one holder joins or leaves, never more.
 //! - A hand joins at the end of its `grasp`, and leaves at the begin of its `release`.
-//! - `transit`: one support holds. `carry`: a hand does.
+//! - `transit`: one support holds. `carry`: a hand does. `transfer`, `regrasp`: one hand alone, and the segments beside have the same holder.
 
 use crate::check::Log;
 use crate::check::tasks::task::Task;
@@ -55,6 +55,11 @@ impl Phase {
     /// True where this hand holds.
     pub fn has_hand(&self, hand: usize) -> bool {
         self.holders.contains(&Holder::Hand(hand))
+    }
+
+    /// The hand in which the object moves, or that changes its grasp.
+    pub fn moves_in(&self) -> Option<usize> {
+        self.hands().next().filter(|_| self.kind.is_in_hand() && self.holders.len() == 1)
     }
 
     /// The hand that carries the object, where it may move.
@@ -117,6 +122,9 @@ pub fn check_order(task: &Task, phases: &[Phase], log: &mut Log) {
             RobotSegmentKind::Transit if n_hands > 0 || n_supports != 1 => {
                 Some("in a transit one support holds the object, and no hand")
             }
+            RobotSegmentKind::Transfer | RobotSegmentKind::Regrasp if n_hands != 1 || n_supports > 0 => {
+                Some("in a transfer or regrasp one hand holds the object, and no support")
+            }
             RobotSegmentKind::Carry if n_hands == 0 => Some("in a carry a hand holds the object"),
             RobotSegmentKind::Grasp if phase.closing.is_none() => Some("no hand joins those that hold after the grasp"),
             RobotSegmentKind::Release if phase.closing.is_none() => {
@@ -137,6 +145,11 @@ pub fn check_order(task: &Task, phases: &[Phase], log: &mut Log) {
             let names: Vec<&str> = joins.iter().chain(&leaves).map(|holder| holder.name(task)).collect();
             let message = format!("more than one holder joins or leaves at once: {}", names.join(", "));
             log.push(wrong(message, s + 1).subjects(names));
+        }
+        let is_in_hand = before.kind.is_in_hand() || after.kind.is_in_hand();
+        if is_in_hand && before.holders != after.holders {
+            let message = "a holder joins or leaves beside a transfer or regrasp; a carry has to be between";
+            log.push(wrong(message.into(), s + 1));
         }
         let is_hand = |holder: &&Holder| matches!(holder, Holder::Hand(_));
         if let Some(hand) = joins.iter().find(is_hand).filter(|_| before.kind != RobotSegmentKind::Grasp) {

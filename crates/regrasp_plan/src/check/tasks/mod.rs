@@ -13,6 +13,8 @@ pub mod ends;
 pub mod forces;
 /// Who holds the object, by segment.
 pub mod holders;
+/// Motions in a hand.
+pub mod in_hand;
 /// How an object in a hand moves.
 pub mod motion;
 /// What may not move.
@@ -99,6 +101,7 @@ fn judge(
         report.left_out.push(format!("motion between waypoints: {leap}"));
         return;
     }
+    in_hand::check_in_hand((task, state), &phases, plan, settings, (log, report));
     let room = Room::new(task, (&phases, &holds), plan, settings);
     room.check_standing(log);
     forces::check_forces((task, &room), (&phases, &holds), plan, settings, (log, report));

@@ -1,5 +1,6 @@
 //! What may not move. An object at rest stays where it is. A held object goes with every hand that holds it, and no joint of such a hand
-//! moves. While an object rests, nothing moves that holds it. In a `grasp` or `release` nothing moves but the fingers of one hand.
+//! moves. While an object rests, nothing moves that holds it. In a `grasp` or `release` nothing moves but the fingers of one hand, in a
+//! `transfer` or `regrasp` nothing but the object and the fingers of the hand that holds it.
 
 use crate::check::robots::rules::difference;
 use crate::check::robots::tree::Frame;
@@ -11,7 +12,7 @@ use crate::robot_plan::{RobotPlan, RobotSegmentKind};
 use regrasp_geometry::Pose;
 use std::ops::RangeInclusive;
 
-/// Segments through which a hand holds the object without letting go.
+/// Segments through which a hand holds the object in one grasp.
 pub struct Hold {
     /// Index in [`Task::hands`].
     pub hand: usize,
@@ -38,7 +39,7 @@ pub fn holds_of(task: &Task, phases: &[Phase], plan: &RobotPlan) -> Vec<Hold> {
     let mut holds = Vec::new();
     let (mut frames, mut axes) = (Vec::new(), Vec::new());
     for hand in 0..task.hands.len() {
-        for segments in runs(phases.len(), |s| phases[s].has_hand(hand)) {
+        for segments in runs(phases.len(), |s| phases[s].has_hand(hand) && !phases[s].kind.is_in_hand()) {
             let first = &plan.segments[*segments.start()].waypoints[0];
             task.question.tree.frames(&first.joints, &mut frames, &mut axes);
             let object = Pose::from(&first.world_from_objects[0]);
@@ -106,7 +107,7 @@ fn check_held(task: &Task, holds: &[Hold], plan: &RobotPlan, settings: &CheckSet
 fn check_object_at_rest(phases: &[Phase], plan: &RobotPlan, settings: &CheckSettings, log: &mut Log) {
     let tolerance = settings.meeting_tolerance;
     let object = plan.objects[0].as_str();
-    for run in runs(phases.len(), |s| phases[s].carrier().is_none()) {
+    for run in runs(phases.len(), |s| phases[s].carrier().is_none() && !phases[s].kind.is_in_hand()) {
         let first = Pose::from(&plan.segments[*run.start()].waypoints[0].world_from_objects[0]);
         for s in run {
             for (w, waypoint) in plan.segments[s].waypoints.iter().enumerate() {
@@ -137,6 +138,12 @@ fn check_joints_at_rest(task: &Task, phases: &[Phase], plan: &RobotPlan, setting
         if matches!(phase.kind, RobotSegmentKind::Grasp | RobotSegmentKind::Release) {
             rests.fill(true);
             if let Some(hand) = phase.closing {
+                task.hands[hand].joints.clone().for_each(|k| rests[k] = false);
+            }
+        }
+        if phase.kind.is_in_hand() {
+            rests.fill(true);
+            for hand in phase.hands() {
                 task.hands[hand].joints.clone().for_each(|k| rests[k] = false);
             }
         }

@@ -120,7 +120,7 @@ impl<'a> Room<'a> {
         let mut items = Items::of_object((self.task.scene, state), &self.task.question, self.task.object_index)?;
         let mut along = RobotAlong::default();
         let step = self.plan.duration() / n_moments.max(1) as f64;
-        for (s, segment) in self.plan.segments.iter().enumerate() {
+        for (s, segment) in self.plan.segments.iter().enumerate().filter(|(_, segment)| !segment.kind.is_in_hand()) {
             self.arrange(&mut items, s, segment);
             let mut placed = Placed::new(&self.task.question.tree, &items);
             along.add_segment(&mut placed, segment, s, step);
@@ -147,7 +147,8 @@ impl<'a> Room<'a> {
                 return;
             }
         };
-        for (s, segment) in self.plan.segments.iter().enumerate() {
+        // In a transfer or regrasp nothing moves but one hand's fingers and the object: `in_hand` judges them.
+        for (s, segment) in self.plan.segments.iter().enumerate().filter(|(_, segment)| !segment.kind.is_in_hand()) {
             let body = self.arrange(&mut items, s, segment);
             let mut placed = Placed::new(&self.task.question.tree, &items);
             let goes_on = check_segment(&mut placed, segment, s, self.settings, log, &mut report.min_clearance);
