@@ -11,6 +11,7 @@ use regrasp_arms::model::ArmModel;
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp_lists::pairs::are_hands_apart;
+use std::rc::Rc;
 
 /// Postures of one arm that are looked at.
 const POSTURES: usize = 3;
@@ -181,14 +182,16 @@ struct Attempt<'c, 'a> {
     giver: [usize; 2],
     taker: [usize; 2],
     /// Both hands closed, with the object; made when it is needed.
-    model: Option<ArmModel>,
+    model: Option<Rc<ArmModel>>,
+    /// The taker before the exchange, the giver after it: that hand open.
+    open: [Option<Rc<Open>>; 2],
     /// Index of the nearest reason.
     reached: usize,
 }
 
 impl<'c, 'a> Attempt<'c, 'a> {
     fn new(context: &'c Context<'a>, giver: [usize; 2], taker: [usize; 2]) -> Self {
-        Attempt { context, giver, taker, model: None, reached: 0 }
+        Attempt { context, giver, taker, model: None, open: [None, None], reached: 0 }
     }
 
     /// The exchange with the object at a pose, with the common joints of `common`.
@@ -215,30 +218,19 @@ impl<'c, 'a> Attempt<'c, 'a> {
         let free = &context.arms_and_torso;
         let model = self.model.get_or_insert_with(|| {
             let attached = context.attached(giver.0, &giver.1.object_from_hand.inverse(), &[taker.0]);
-            ArmModel::new(context.robot, &context.covers.links, &[attached], &both, free)
+            Rc::new(ArmModel::new(context.robot, &context.covers.links, &[attached], &both, free))
         });
+        let model = Rc::clone(model);
         let arm = context.hands[taker.0].arm_joints.clone();
         for first in &first {
             for second in &second {
                 let mut at = first.clone();
                 at[arm.clone()].copy_from_slice(&second[arm.clone()]);
-                if !is_state_free(context, model, &context.fixed, &at, tally) {
+                if !is_state_free(context, &model, &context.fixed, &at, tally) {
                     continue;
                 }
                 self.reached = self.reached.max(2);
-                let way = |(hand, grasp): (usize, &Grasp), tally: &mut Tally| {
-                    let open = with_fingers(context, &at, hand, &grasp.open);
-                    let direction = world_from_object.rotation * grasp.direction;
-                    // The other hand rests, and touches the object.
-                    let arm: Vec<usize> = context.hands[hand].arm_joints.clone().collect();
-                    let model = context.model(&open, &arm, None);
-                    WAY_SHARES.iter().find_map(|share| {
-                        let way = straight(context, hand, &open, &(-direction * grasp.distance * *share))?;
-                        let timed = way.timed(&context.limits, 1.0, LINE_STEPS);
-                        is_way_free(context, (&model, hand), world_from_object, &timed, tally).then_some(way)
-                    })
-                };
-                let Some(way_in) = way(taker, tally) else { continue };
+                let Some(way_in) = self.way(taker, giver, &at, world_from_object, tally) else { continue };
                 self.reached = self.reached.max(3);
                 if !can_close(context, taker.0, [&with_fingers(context, &at, taker.0, &taker.1.open), &at], tally) {
                     continue;
@@ -248,12 +240,51 @@ impl<'c, 'a> Attempt<'c, 'a> {
                     continue;
                 }
                 self.reached = self.reached.max(5);
-                let Some(way_out) = way(giver, tally) else { continue };
+                let Some(way_out) = self.way(giver, taker, &at, world_from_object, tally) else { continue };
                 return Some(Give { giver: self.giver, taker: self.taker, way_in, way_out });
             }
         }
         None
     }
+
+    /// The straight way of one open hand from the object, while the other one holds it. It ends where searches for motions may begin.
+    fn way(
+        &mut self,
+        (hand, grasp): (usize, &Grasp),
+        holder: (usize, &Grasp),
+        at: &[f64],
+        world_from_object: &Pose,
+        tally: &mut Tally,
+    ) -> Option<Smooth> {
+        let context = self.context;
+        let opened = with_fingers(context, at, hand, &grasp.open);
+        let open = self.open[usize::from(hand == self.giver[0])].get_or_insert_with(|| {
+            let free = &context.arms_and_torso;
+            let carried = (holder.0, &holder.1.object_from_hand.inverse());
+            Rc::new(Open {
+                alone: context.model(&opened, free, None),
+                holding: context.model(&opened, free, Some(carried)),
+            })
+        });
+        let open = Rc::clone(open);
+        let direction = world_from_object.rotation * grasp.direction;
+        WAY_SHARES.iter().find_map(|share| {
+            let way = straight(context, hand, &opened, &(-direction * grasp.distance * *share))?;
+            if !is_state_free(context, &open.holding, &context.fixed, way.ends()[1], tally) {
+                return None;
+            }
+            let timed = way.timed(&context.limits, 1.0, LINE_STEPS);
+            is_way_free(context, (&open.alone, hand), world_from_object, &timed, tally).then_some(way)
+        })
+    }
+}
+
+/// A robot with one hand open.
+struct Open {
+    /// Without the object.
+    alone: ArmModel,
+    /// The other hand holds the object.
+    holding: ArmModel,
 }
 
 /// The 24 turns that bring a cube to itself.

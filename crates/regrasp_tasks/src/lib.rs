@@ -6,6 +6,8 @@
 
 /// What is refused before any search.
 mod before;
+/// A hand by itself among what rests.
+mod clear;
 /// Scene, robot and grasps, prepared once.
 mod context;
 /// Where one hand gives the object to another one.

@@ -77,10 +77,16 @@ pub fn is_way_free(
     tally: &mut Tally,
 ) -> bool {
     let mounted = Part::Hand(context.hands[hand].mounted);
+    // All else rests, where it was free.
+    let arm: Vec<usize> = (0..model.dimension())
+        .filter(|&k| context.hands[hand].arm_joints.contains(&model.coordinates[k].index))
+        .collect();
+    let moves = |body: usize| model.is_moved_by(body, &arm);
     let mut robot = collider(context, model, &context.fixed);
+    robot.only(moves, |[a, b]| moves(a) || moves(b));
     let alone = World::default().with(&context.alone, world_from_object);
     let mut others = collider(context, model, &alone);
-    others.only(|body| context.robot.part_of(model.bodies[body].link) != mounted, |_| false);
+    others.only(|body| moves(body) && context.robot.part_of(model.bodies[body].link) != mounted, |_| false);
     let is_free = is_free(&mut robot, timed) && is_free(&mut others, timed);
     count(&robot, tally);
     count(&others, tally);

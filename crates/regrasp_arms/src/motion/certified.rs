@@ -125,6 +125,11 @@ impl Collider<'_> {
                     if let Item::Other { exact, .. } = item
                         && overlap.any_positive()
                     {
+                        // The body's shapes decide, below: one distance each instead of one for each ball.
+                        if !is_exact {
+                            grown = grown.max(overlap);
+                            continue;
+                        }
                         overlap = Item::refined(exact, center, reach, overlap);
                     } else {
                         bare = bare.max(item.overlap(center, F8::splat(radius + clearance - ROUNDING)));

@@ -84,6 +84,22 @@ fn find(
     (seed, budget): (u64, &Budget),
 ) -> Result<Found, Failure> {
     let mut rng = Rng::keyed(seed, "room", 0);
+    let mut refused = None;
+    for goal in goals {
+        // Callers have other goals: no time is spent on how deep, and what would be free.
+        match problem.collision(model, &model.configuration_of(goal), settings) {
+            None => {
+                refused = None;
+                break;
+            }
+            Some([first, second]) => {
+                refused = refused.or(Some(format!("the goal collides: \"{first}\" meets \"{second}\"")))
+            }
+        }
+    }
+    if let Some(message) = refused {
+        return Err(Failure::bare(FailureKind::GoalInvalid, message, ""));
+    }
     let start = problem.query.start.clone();
     let near_start = room(problem, model, &start, settings, &mut rng);
     let near_goals: Vec<Vec<f64>> = goals.iter().map(|goal| room(problem, model, goal, settings, &mut rng)).collect();
