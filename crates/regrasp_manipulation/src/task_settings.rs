@@ -1,5 +1,6 @@
 //! Settings of pick and place.
 
+use crate::motion_settings::MotionMethod;
 use crate::settings::ForceSettings;
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +21,8 @@ pub enum TaskCost {
 pub struct TaskSettings {
     /// What the planner makes small.
     pub cost: TaskCost,
+    /// How motions are searched for.
+    pub method: MotionMethod,
     /// Distance that bodies keep. By hand: half of what grasp lists keep between hand and object.
     pub clearance: f64,
     /// Distance that searches for motions keep besides.
@@ -63,6 +66,7 @@ impl Default for TaskSettings {
     fn default() -> Self {
         TaskSettings {
             cost: TaskCost::default(),
+            method: MotionMethod::default(),
             clearance: 1e-4,
             search_margin: 2e-3,
             shortcuts: 60,

@@ -1,6 +1,7 @@
 //! Scene, robot and grasps, prepared once.
 
 use crate::failing::refused;
+use crate::roadmap::TaskRoadmap;
 use nalgebra::{Matrix3, Translation3};
 use regrasp_arms::model::cover::{LinkCover, cover, covers};
 use regrasp_arms::model::{ArmModel, Attached};
@@ -123,6 +124,8 @@ pub struct Context<'a> {
     pub seed: u64,
     /// How much may be looked at.
     pub budget: &'a Budget,
+    /// What was made before.
+    pub roadmap: Option<&'a TaskRoadmap>,
 }
 
 impl<'a> Prepared<'a> {
@@ -269,6 +272,7 @@ impl<'a> Context<'a> {
             settings,
             motion: MotionSettings {
                 clearance: settings.clearance,
+                method: settings.method,
                 search_margin: settings.search_margin,
                 shortcuts: settings.shortcuts,
                 max_samples: settings.max_samples,
@@ -285,6 +289,7 @@ impl<'a> Context<'a> {
             promises: &prepared.promises,
             seed,
             budget,
+            roadmap: None,
         })
     }
 

@@ -74,6 +74,8 @@ const SECONDS_PER_METRE: f64 = 2.0;
 const POOR: f64 = 2.0;
 /// What exchanges cost more for each that failed, in seconds, so that other ways get their turn. By hand.
 const FAILED: f64 = 0.05;
+/// What an exchange costs more that the roadmap does not have, in seconds. By hand.
+const NOT_MADE: f64 = 2.0;
 /// A motion that was not found makes its edge this much dearer, in seconds; it is dead after so many.
 const STUCK: f64 = 1.0;
 const MOST_STUCK: usize = 3;
@@ -118,7 +120,7 @@ pub fn search(context: &Context, tally: &mut Tally) -> Result<RobotPlan, Failure
                     tally.count(stage, Ok(()));
                 }
                 let mut plan = RobotPlan::answering_pick_and_place(context.scene, context.query);
-                plan.method = "task_graph".into();
+                plan.method = if context.roadmap.is_some() { "super_graph" } else { "task_graph" }.into();
                 plan.seed = context.seed;
                 plan.settings = serde_json::to_value(context.settings).unwrap_or_default();
                 plan.promises.clearance = context.settings.clearance;
@@ -169,7 +171,7 @@ impl<'c, 'a> Graph<'c, 'a> {
                     .collect()
             })
             .collect();
-        let mut gives = BTreeMap::new();
+        let mut gives: BTreeMap<[usize; 2], Vec<Given>> = BTreeMap::new();
         for giver in 0..context.hands.len() {
             for taker in 0..context.hands.len() {
                 if !context.settings.hand_over || context.hands[taker].arm == context.hands[giver].arm {
@@ -182,6 +184,16 @@ impl<'c, 'a> Graph<'c, 'a> {
                 };
                 let all = (0..n_grasps(giver)).flat_map(|i| (0..n_grasps(taker)).map(move |j| (i, j)));
                 gives.insert([giver, taker], all.map(|(i, j)| given(i, j)).collect());
+            }
+        }
+        if let Some(roadmap) = context.roadmap {
+            gives.values_mut().flatten().for_each(|given| given.cost += NOT_MADE);
+            for give in &roadmap.exchanges {
+                let n = n_grasps(give.taker[0]);
+                let of_pair = gives.get_mut(&[give.giver[0], give.taker[0]]);
+                if let Some(given) = of_pair.and_then(|of| of.get_mut(give.giver[1] * n + give.taker[1])) {
+                    (given.known, given.cost) = (Known::Found(Box::new(give.clone())), given.cost - NOT_MADE);
+                }
             }
         }
         let mut n_nodes = places.len();
@@ -335,7 +347,11 @@ impl<'c, 'a> Graph<'c, 'a> {
         let Some(given) = self.given(giver, taker) else { return false };
         if matches!(given.known, Known::New) {
             tally.work(1);
-            given.known = match is_double_grasp(context, giver, taker) {
+            let is_apart = match context.roadmap {
+                Some(roadmap) => roadmap.is_apart(giver, taker),
+                None => is_double_grasp(context, giver, taker),
+            };
+            given.known = match is_apart {
                 true => Known::Likely,
                 false => {
                     tally.count(Stage::Exchange, Err("hands touch"));

@@ -2,16 +2,24 @@
 
 use super::Stage;
 use super::ends::End;
-use super::problem::Problem;
+use super::problem::{KnownRoads, Problem};
 use crate::model::ArmModel;
 use crate::motion::{Collider, ColliderSettings, Track};
+use crate::roadmap::{Changes, Counts, SuperGraph, Tests};
 use crate::search::{
     InTurnSettings, Region, RrtOutcome, RrtSettings, SimplifySettings, in_turn, rrt_connect, simplify,
 };
+use crate::world::World;
 use regrasp_base::{Budget, Rng};
 use regrasp_manipulation::failure::{Failure, FailureKind};
 use regrasp_manipulation::motion_settings::{MotionMethod, MotionSettings, Validation};
 use regrasp_plan::robot_plan::RobotStatistics;
+use std::sync::Arc;
+
+/// Samples of a search before the graph is asked.
+const BEFORE_GRAPH: u64 = 150;
+/// Nodes of the graph that an end is joined to, at most.
+const GRAPH_NEIGHBOURS: usize = 30;
 
 /// A path whose straight motions are free.
 pub struct Found {
@@ -44,7 +52,9 @@ pub fn find(
         return Err(refused.unwrap_or_else(nothing));
     }
     watch(Stage::Prepared);
-    let mut search = Search { model, start, goals: free_goals, settings, statistics: RobotStatistics::default() };
+    let world = Arc::clone(&problem.world);
+    let statistics = RobotStatistics::default();
+    let mut search = Search { model, world, start, goals: free_goals, settings, statistics };
     let (mut interrupt, mut is_hopeless) = (None, false);
     // With room to certify, then without, then with certified motions only.
     let certified = settings.validation == Validation::Certified;
@@ -59,7 +69,7 @@ pub fn find(
             continue;
         }
         let mut rng = Rng::keyed(seed, "motion", round as u64);
-        let outcome = search.sampled(&mut collider, &mut rng, budget);
+        let outcome = search.sampled(problem, &mut collider, &mut rng, budget);
         interrupt = outcome.interrupt.or(interrupt);
         watch(Stage::Searched);
         is_hopeless = outcome.path.is_none();
@@ -93,6 +103,7 @@ pub fn find(
 
 struct Search<'m, 's> {
     model: &'m ArmModel,
+    world: Arc<World>,
     start: Vec<f64>,
     goals: Vec<Vec<f64>>,
     settings: &'s MotionSettings,
@@ -109,7 +120,7 @@ impl Search<'_, '_> {
         self.statistics.samples += outcome.n_samples;
     }
 
-    fn sampled(&mut self, collider: &mut Collider, rng: &mut Rng, budget: &Budget) -> RrtOutcome {
+    fn sampled(&mut self, problem: &Problem, collider: &mut Collider, rng: &mut Rng, budget: &Budget) -> RrtOutcome {
         let all = RrtSettings {
             max_samples: self.settings.max_samples,
             ..RrtSettings::for_dimension(self.model.dimension())
@@ -119,8 +130,25 @@ impl Search<'_, '_> {
         let outcome = match (self.settings.method, goals.as_slice()) {
             (_, []) => RrtOutcome { path: None, n_nodes: 0, n_samples: 0, interrupt: None },
             (MotionMethod::InTurn, [goal]) => {
+                let few = RrtSettings { max_samples: all.max_samples.min(BEFORE_GRAPH), ..all };
                 let settings = InTurnSettings { all, ..InTurnSettings::default() };
-                in_turn(collider, &self.start, goal, &settings, rng, budget)
+                match problem.roads.as_ref().filter(|known| self.is_of(&known.roads.graph)) {
+                    None => in_turn(collider, &self.start, goal, &settings, rng, budget),
+                    Some(known) => {
+                        // What is easy needs no graph.
+                        let one = RrtSettings { max_samples: BEFORE_GRAPH, ..settings.one };
+                        let easy = InTurnSettings { one, all: few };
+                        let mut outcome = in_turn(collider, &self.start, goal, &easy, rng, budget);
+                        if outcome.path.is_none() && outcome.interrupt.is_none() {
+                            outcome.path = self.by_graph(known, collider.settings, goal);
+                        }
+                        if outcome.path.is_none() && outcome.interrupt.is_none() {
+                            self.take(&outcome);
+                            outcome = in_turn(collider, &self.start, goal, &settings, rng, budget);
+                        }
+                        outcome
+                    }
+                }
             }
             _ => {
                 let region = Region::of(self.model, &[&self.start, &goals[0]]);
@@ -129,6 +157,26 @@ impl Search<'_, '_> {
         };
         self.take(&outcome);
         outcome
+    }
+
+    /// True where a graph is of these joints.
+    fn is_of(&self, graph: &SuperGraph) -> bool {
+        graph.joints.iter().eq(self.model.coordinates.iter().map(|coordinate| &coordinate.name))
+    }
+
+    /// A path of the graph whose motions are tested against what it does not know.
+    fn by_graph(&mut self, known: &KnownRoads, settings: ColliderSettings, goal: &[f64]) -> Option<Vec<Vec<f64>>> {
+        let model = self.model;
+        let is_changed = |body: usize| known.changed.contains(&model.bodies[body].link);
+        let changes = Changes { whole: &self.world, unknown: &known.unknown, is_changed: &is_changed };
+        let mut tests = Tests::new(model, &changes, settings);
+        let mut counts = Counts::default();
+        let path = known
+            .roads
+            .path([&self.start, goal], GRAPH_NEIGHBOURS, &mut counts, |edge, a, b| tests.is_sampled_free(edge, a, b));
+        self.statistics.nodes += counts.expanded;
+        self.statistics.work += 8 * counts.tested;
+        path
     }
 
     /// The path with certified motions: what is not free is searched for anew between its ends.
