@@ -3,7 +3,7 @@
 use crate::context::{Context, Grasp};
 use crate::failing::{Stage, Tally};
 use crate::forces;
-use crate::line::{LINE_STEPS, is_state_free, is_way_free, straight};
+use crate::line::{LINE_STEPS, are_states_free, is_state_free, is_way_free, straight};
 use crate::station::{arm_postures, can_close, common_postures, with_fingers};
 use crate::timing::Smooth;
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
@@ -23,6 +23,18 @@ const COMMON_DRAWS: usize = 2;
 const BEYOND: f64 = 0.3;
 /// Shares of the ways in and out that are tried.
 const WAY_SHARES: [f64; 2] = [1.0, 0.4];
+
+/// How much is looked at for one pair of grasps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Effort {
+    /// The best places alone: another pair of grasps may be easier.
+    Little,
+    /// All places, then drawn ones.
+    Full,
+}
+
+/// Places that are tried with little effort.
+const LITTLE_PLACES: usize = 8;
 
 /// One hand gives the object to another one.
 #[derive(Debug, Clone)]
@@ -94,8 +106,8 @@ impl Places {
     pub fn give(
         &self,
         context: &Context,
-        giver: [usize; 2],
-        taker: [usize; 2],
+        [giver, taker]: [[usize; 2]; 2],
+        effort: Effort,
         tally: &mut Tally,
     ) -> Result<Give, &'static str> {
         let mut attempt = Attempt::new(context, giver, taker);
@@ -113,7 +125,11 @@ impl Places {
             let position = at.coords - turn * context.object.center_of_mass.coords;
             Pose::from_parts(Translation3::from(position), *turn)
         };
-        for at in &self.positions {
+        let (n_places, n_draws) = match effort {
+            Effort::Little => (LITTLE_PLACES, 0),
+            Effort::Full => (self.positions.len(), context.settings.exchange_draws),
+        };
+        for at in self.positions.iter().take(n_places) {
             let mut ranked: Vec<(f64, &UnitQuaternion<f64>)> =
                 self.turns.iter().map(|turn| (natural(at, turn), turn)).collect();
             ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -130,7 +146,7 @@ impl Places {
             return Err("without a free place");
         }
         let hands = [giver[0], taker[0]];
-        for draw in 0..context.settings.exchange_draws {
+        for draw in 0..n_draws {
             let middle = &self.positions[draw % self.positions.len().min(8)];
             let spread = context.settings.exchange_spread;
             let shift = Vector::new(rng.normal(), rng.normal(), rng.normal()) * spread;
@@ -222,13 +238,16 @@ impl<'c, 'a> Attempt<'c, 'a> {
         });
         let model = Rc::clone(model);
         let arm = context.hands[taker.0].arm_joints.clone();
-        for first in &first {
-            for second in &second {
-                let mut at = first.clone();
-                at[arm.clone()].copy_from_slice(&second[arm.clone()]);
-                if !is_state_free(context, &model, &context.fixed, &at, tally) {
-                    continue;
-                }
+        let with_second = |first: &Vec<f64>, second: &Vec<f64>| {
+            let mut at = first.clone();
+            at[arm.clone()].copy_from_slice(&second[arm.clone()]);
+            at
+        };
+        let all: Vec<Vec<f64>> =
+            first.iter().flat_map(|first| second.iter().map(|second| with_second(first, second))).collect();
+        let free = are_states_free(context, &model, &context.fixed, &all, tally);
+        for at in all.into_iter().zip(free).filter_map(|(at, is_free)| is_free.then_some(at)) {
+            {
                 self.reached = self.reached.max(2);
                 let Some(way_in) = self.way(taker, giver, &at, world_from_object, tally) else { continue };
                 self.reached = self.reached.max(3);

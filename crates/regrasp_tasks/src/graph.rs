@@ -1,7 +1,7 @@
 //! The task graph: who holds the object by which grasp, or where it lies. Edges are tested when the cheapest path uses them.
 
 use crate::context::Context;
-use crate::exchange::{Give, Places, is_double_grasp};
+use crate::exchange::{Effort, Give, Places, is_double_grasp};
 use crate::failing::{Stage, Tally};
 use crate::motions::{self, Step, Stuck};
 use crate::placements::{Place, intermediate};
@@ -61,6 +61,8 @@ struct Given {
     cost: f64,
     /// How often motions to it were not found.
     stuck: usize,
+    /// The best places of the exchange were tried already.
+    is_second_look: bool,
 }
 
 /// Cost of taking or putting down, of giving; in seconds about. By hand: what plans take.
@@ -74,6 +76,8 @@ const SECONDS_PER_METRE: f64 = 2.0;
 const POOR: f64 = 2.0;
 /// What exchanges cost more for each that failed, in seconds, so that other ways get their turn. By hand.
 const FAILED: f64 = 0.05;
+/// What an exchange costs more that was not found at the best places, in seconds. By hand.
+const SECOND_LOOK: f64 = 1.0;
 /// What an exchange costs more that the roadmap does not have, in seconds. By hand.
 const NOT_MADE: f64 = 2.0;
 /// A motion that was not found makes its edge this much dearer, in seconds; it is dead after so many.
@@ -180,7 +184,7 @@ impl<'c, 'a> Graph<'c, 'a> {
                 let score = |hand: usize, grasp: usize| context.hands[hand].grasps[grasp].score;
                 let given = |i: usize, j: usize| {
                     let cost = GIVE_SECONDS + POOR * (1.0 - score(giver, i).min(score(taker, j)));
-                    Given { known: Known::New, cost, stuck: 0 }
+                    Given { known: Known::New, cost, stuck: 0, is_second_look: false }
                 };
                 let all = (0..n_grasps(giver)).flat_map(|i| (0..n_grasps(taker)).map(move |j| (i, j)));
                 gives.insert([giver, taker], all.map(|(i, j)| given(i, j)).collect());
@@ -400,10 +404,20 @@ impl<'c, 'a> Graph<'c, 'a> {
         if !matches!(given.known, Known::Likely) {
             return !given.known.is_dead();
         }
+        let is_second_look = given.is_second_look;
         self.tested += 1;
         let hands = [giver[0], taker[0]];
         let places = self.exchange.entry(hands).or_insert_with(|| Places::new(context, hands));
-        let found = places.give(context, giver, taker, tally);
+        let effort = if is_second_look { Effort::Full } else { Effort::Little };
+        let found = places.give(context, [giver, taker], effort, tally);
+        if let (Err(_), Effort::Little) = (&found, effort) {
+            // Another pair may be easier; this one gets a second look when its turn comes.
+            self.failed_gives += 1;
+            if let Some(given) = self.given(giver, taker) {
+                (given.is_second_look, given.cost) = (true, given.cost + SECOND_LOOK);
+            }
+            return false;
+        }
         tally.count(Stage::Exchange, found.as_ref().map(|_| ()).map_err(|reason| *reason));
         self.failed_gives += usize::from(found.is_err());
         let is_found = found.is_ok();

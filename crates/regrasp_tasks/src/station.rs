@@ -4,7 +4,7 @@ use crate::clear::{is_hand_clear, links_of};
 use crate::context::{Context, Grasp};
 use crate::failing::{Stage, Tally};
 use crate::forces;
-use crate::line::{LINE_STEPS, is_lift_free, is_motion_free, is_state_free, is_way_free, straight};
+use crate::line::{LINE_STEPS, are_states_free, is_lift_free, is_motion_free, is_state_free, is_way_free, straight};
 use crate::placements::{Place, stable_pose};
 use crate::timing::Smooth;
 use regrasp_base::Rng;
@@ -152,11 +152,9 @@ pub fn station(
                 continue;
             }
         };
-        for at in postures {
-            reason = worse(reason, "in collision");
-            if !is_state_free(context, model(0), &context.fixed, &at, tally) {
-                continue;
-            }
+        reason = worse(reason, "in collision");
+        let free = are_states_free(context, model(0), &context.fixed, &postures, tally);
+        for at in postures.into_iter().zip(free).filter_map(|(at, is_free)| is_free.then_some(at)) {
             reason = worse(reason, "without a way in");
             let direction = place.world_from_object.rotation * own.direction;
             let opened = with_fingers(context, &at, hand, &own.open);

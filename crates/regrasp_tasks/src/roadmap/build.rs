@@ -1,9 +1,11 @@
 //! A roadmap is made: graph, pairs of grasps, exchanges.
 
 use super::{DoubleGrasps, TaskRoadmap, graph_model, origin};
-use crate::context::{Context, Prepared};
-use crate::exchange::{Give, Places, is_double_grasp};
+use crate::context::{Context, Grasp, Prepared};
+use crate::exchange::{Effort, Give, Places, is_double_grasp};
 use crate::failing::Tally;
+use crate::placements::Place;
+use crate::station::may_hold;
 use crate::{Failure, FailureKind, TaskSettings};
 use regrasp_arms::roadmap::{BuildSettings, Roads, build};
 use regrasp_base::Budget;
@@ -86,6 +88,9 @@ fn double_grasps(context: &Context) -> Vec<DoubleGrasps> {
     found
 }
 
+/// Rounds among pairs of grasps that fit start and goal, before the others. By hand.
+const ROUNDS_OF_FITTING: usize = 8;
+
 /// Exchanges from each hand to each other one: pairs of good grasps first, each grasp once before any one twice.
 fn exchanges(
     context: &Context,
@@ -103,19 +108,32 @@ fn exchanges(
     let n_directions = directions.len().max(1);
     let share = |n: usize| n.div_ceil(n_directions);
     let mut tally = Tally::default();
+    let ends = [&context.query.world_from_object_start, &context.query.world_from_object_goal];
     for (hands, mut pairs) in directions {
+        // Grasps in which the object can be taken as it stands at the start, and put down as at the goal, come first.
+        let fits: [Vec<bool>; 2] = [0, 1].map(|k| {
+            let place = Place::new(context, ends[k]);
+            let fits =
+                |grasp: &Grasp| place.as_ref().is_some_and(|place| may_hold(context, place, hands[k], grasp).is_ok());
+            context.hands[hands[k]].grasps.iter().map(fits).collect()
+        });
         let score = |pair: &[usize; 2]| {
             let of = |k: usize| context.hands[hands[k]].grasps[pair[k]].score;
-            of(0).min(of(1))
+            let n_fit = (0..2).filter(|&k| fits[k][pair[k]]).count();
+            n_fit as f64 + of(0).min(of(1)).clamp(0.0, 1.0)
         };
         pairs.sort_by(|a, b| score(b).total_cmp(&score(a)).then(a.cmp(b)));
+        let n_fit = pairs.iter().take_while(|pair| (0..2).all(|k| fits[k][pair[k]])).count();
         let places = Places::new(context, hands);
         let mut used = hands.map(|hand| vec![0usize; context.hands[hand].grasps.len()]);
         let (mut n_found, mut n_tried) = (0, 0);
         let mut is_tried = vec![false; pairs.len()];
         for round in 1.. {
             let mut is_any_left = false;
-            for (index, pair) in pairs.iter().enumerate() {
+            // Others get their turn when each grasp of those that fit had some.
+            let n_now = if round <= ROUNDS_OF_FITTING { n_fit } else { pairs.len() };
+            is_any_left |= n_now < pairs.len();
+            for (index, pair) in pairs.iter().take(n_now).enumerate() {
                 if n_found >= share(of_build.exchanges) || n_tried >= share(of_build.tries) {
                     break;
                 }
@@ -132,7 +150,9 @@ fn exchanges(
                 is_tried[index] = true;
                 n_tried += 1;
                 (0..2).for_each(|k| used[k][pair[k]] += 1);
-                if let Ok(give) = places.give(context, [hands[0], pair[0]], [hands[1], pair[1]], &mut tally) {
+                if let Ok(give) =
+                    places.give(context, [[hands[0], pair[0]], [hands[1], pair[1]]], Effort::Little, &mut tally)
+                {
                     n_found += 1;
                     found.push(give);
                 }
