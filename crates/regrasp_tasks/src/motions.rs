@@ -9,7 +9,6 @@ use crate::placements::Place;
 use crate::record::{Holding, Moves, Record};
 use crate::station::{FINGER_STEPS, Station, with_fingers};
 use crate::timing::{Smooth, at_rest, one_after_the_other};
-use regrasp_arms::plan::problem::KnownRoads;
 use regrasp_arms::times::TimedPath;
 use regrasp_arms::{LegTimes, Problem, World, plan_leg};
 use regrasp_geometry::Pose;
@@ -17,10 +16,7 @@ use regrasp_grasp::wrench::{BalancedForces, Wrench};
 use regrasp_manipulation::failure::FailureKind;
 use regrasp_manipulation::motion_settings::MotionSettings;
 use regrasp_plan::robot_plan::{RobotSegment, RobotSegmentKind};
-use regrasp_robot::LinkId;
-use regrasp_robot::manipulator::layout::Part;
 use regrasp_scene::motion::{CarriedObject, Holder};
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// What happens between two motions.
@@ -192,7 +188,13 @@ impl<'c, 'a> Maker<'c, 'a> {
             world_from_object: carried.world_from_object(context, from),
         }));
         let mut problem = Problem::in_world(context.scene, &query, world.clone(), &context.covers);
-        problem.roads = self.known_roads(from, carried);
+        if let Some(roads) = context.roadmap.and_then(|roadmap| roadmap.roads.as_ref()) {
+            let unknown = match carried {
+                Some(_) => World::default(),
+                None => World::default().with(&context.alone, &self.object),
+            };
+            problem.use_graph(roads, unknown);
+        }
         let seed = context.seed.wrapping_mul(31).wrapping_add(self.attempt * 64 + self.step as u64);
         let mut budget = context.budget.clone();
         budget.max_work = budget.max_work.saturating_sub(tally.statistics.work);
@@ -215,27 +217,6 @@ impl<'c, 'a> Maker<'c, 'a> {
                 })
             }
         }
-    }
-
-    /// The graph of the roadmap, and what it does not know: the object where it lies, and hands whose fingers are elsewhere.
-    fn known_roads(&self, from: &[f64], carried: Option<&Carried>) -> Option<KnownRoads<'c>> {
-        let context = self.context;
-        let roads = context.roadmap?.roads.as_ref()?;
-        let robot = context.robot;
-        let rest = robot.layout.rest();
-        let mut changed = BTreeSet::new();
-        for hand in 0..robot.hands.len() {
-            let fingers = robot.layout.range(Part::Hand(hand));
-            if from[fingers.clone()] != rest[fingers] {
-                let links = (0..robot.robot.links.len()).map(LinkId);
-                changed.extend(links.filter(|link| robot.part_of(*link) == Part::Hand(hand)));
-            }
-        }
-        let unknown = match carried {
-            Some(_) => World::default(),
-            None => World::default().with(&context.alone, &self.object),
-        };
-        Some(KnownRoads { roads, unknown: Arc::new(unknown), changed: Arc::new(changed) })
     }
 
     /// Fingers of the hands that will take the object next are opened while nothing is held.

@@ -48,7 +48,7 @@ pub struct KnownRoads<'a> {
     /// What rests and the graph does not know.
     pub unknown: Arc<World>,
     /// Links that are not where the graph has them, besides what is carried: by index.
-    pub changed: Arc<BTreeSet<LinkId>>,
+    pub changed: BTreeSet<LinkId>,
 }
 
 impl<'a> Problem<'a> {
@@ -91,6 +91,11 @@ impl<'a> Problem<'a> {
     /// The robot with these coordinates free, all others as at the start.
     pub fn model(&self, free: &[usize]) -> ArmModel {
         ArmModel::new(self.robot, &self.covers.links, &self.attached, &self.query.start, free)
+    }
+
+    /// The robot without what it carries, with coordinates `free`, all others as in `state`.
+    pub(crate) fn bare_model(&self, state: &[f64], free: &[usize]) -> ArmModel {
+        ArmModel::new(self.robot, &self.covers.links, &[], state, free)
     }
 
     /// Sets of coordinates to plan with, in this order: those of the parts that the goals change, then those of all arms too.

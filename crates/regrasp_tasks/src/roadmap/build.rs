@@ -27,7 +27,7 @@ pub struct RoadmapBuildSettings {
 
 impl Default for RoadmapBuildSettings {
     fn default() -> Self {
-        RoadmapBuildSettings { nodes_per_arm: 30, exchanges: 150, tries: 600 }
+        RoadmapBuildSettings { nodes_per_arm: 30, exchanges: 400, tries: 1600 }
     }
 }
 

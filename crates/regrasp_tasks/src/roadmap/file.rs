@@ -43,9 +43,53 @@ struct PairsData {
 struct GiveData {
     giver: [usize; 2],
     taker: [usize; 2],
-    /// States of the robot.
-    way_in: Vec<Vec<f64>>,
-    way_out: Vec<Vec<f64>>,
+    way_in: WayData,
+    way_out: WayData,
+}
+
+/// A straight way of a hand: its arm moves, all else rests.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WayData {
+    /// The first state of the robot.
+    state: Vec<f64>,
+    /// Index of the arm's first joint in states.
+    first: usize,
+    /// The arm's joints in the states after that.
+    joints: Vec<Vec<f64>>,
+}
+
+impl WayData {
+    fn of(way: &Smooth) -> Self {
+        let nodes = way.nodes();
+        let n = nodes[0].len();
+        let moves = |k: &usize| nodes.iter().any(|node| node[*k] != nodes[0][*k]);
+        let first = (0..n).find(moves).unwrap_or(0);
+        let end = (first..n).rev().find(moves).map_or(first, |last| last + 1);
+        let joints = nodes[1..].iter().map(|node| node[first..end].to_vec()).collect();
+        WayData { state: nodes[0].clone(), first, joints }
+    }
+
+    fn is_whole(&self, width: usize) -> bool {
+        let n = self.joints.first().map_or(0, Vec::len);
+        let is_finite = |values: &Vec<f64>| values.iter().all(|q| q.is_finite());
+        self.state.len() == width
+            && !self.joints.is_empty()
+            && self.first.checked_add(n).is_some_and(|end| end <= width)
+            && is_finite(&self.state)
+            && self.joints.iter().all(|joints| joints.len() == n && is_finite(joints))
+    }
+
+    fn way(self) -> Smooth {
+        let with = |joints: Vec<f64>| {
+            let mut state = self.state.clone();
+            state[self.first..self.first + joints.len()].copy_from_slice(&joints);
+            state
+        };
+        let mut nodes = vec![self.state.clone()];
+        nodes.extend(self.joints.into_iter().map(with));
+        Smooth::through(nodes)
+    }
 }
 
 impl TaskRoadmap {
@@ -71,8 +115,8 @@ impl TaskRoadmap {
                 .map(|give| GiveData {
                     giver: give.giver,
                     taker: give.taker,
-                    way_in: give.way_in.nodes(),
-                    way_out: give.way_out.nodes(),
+                    way_in: WayData::of(&give.way_in),
+                    way_out: WayData::of(&give.way_out),
                 })
                 .collect(),
             graph: self.roads.as_ref().and_then(|roads| serde_json::from_str(&roads.graph.to_json()).ok()),
@@ -106,12 +150,12 @@ impl TaskRoadmap {
         }
         let is_small = |pair: &[usize; 2]| pair[0] < MOST && pair[1] < MOST;
         let is_sorted = |of: &PairsData| of.hands[0] < of.hands[1] && of.pairs.windows(2).all(|pair| pair[0] < pair[1]);
-        let width = data.exchanges.first().map_or(0, |give| give.way_in.first().map_or(0, Vec::len));
-        let is_way = |way: &Vec<Vec<f64>>| {
-            way.len() >= 2 && way.iter().all(|state| state.len() == width && state.iter().all(|q| q.is_finite()))
-        };
+        let width = data.exchanges.first().map_or(0, |give| give.way_in.state.len());
         let is_give = |give: &GiveData| {
-            is_small(&give.giver) && is_small(&give.taker) && is_way(&give.way_in) && is_way(&give.way_out)
+            is_small(&give.giver)
+                && is_small(&give.taker)
+                && give.way_in.is_whole(width)
+                && give.way_out.is_whole(width)
         };
         let is_pairs = |of: &PairsData| is_sorted(of) && is_small(&of.hands) && of.pairs.iter().all(is_small);
         if !data.double_grasps.iter().all(is_pairs) || !data.exchanges.iter().all(is_give) {
@@ -121,8 +165,8 @@ impl TaskRoadmap {
         let exchange = |give: GiveData| Give {
             giver: give.giver,
             taker: give.taker,
-            way_in: Smooth::through(give.way_in),
-            way_out: Smooth::through(give.way_out),
+            way_in: give.way_in.way(),
+            way_out: give.way_out.way(),
         };
         let FileData { robot, world, grasps, settings, seed, double_grasps, exchanges, .. } = data;
         Ok(TaskRoadmap {

@@ -11,11 +11,15 @@ mod file;
 
 pub use build::{RoadmapBuildSettings, build_roadmap};
 
-use crate::context::Context;
+use crate::context::{Context, Prepared};
 use crate::exchange::Give;
+use crate::{Failure, TaskSettings};
 use regrasp_arms::model::ArmModel;
 use regrasp_arms::roadmap::{Roads, fingerprint_of_robot, fingerprint_of_world};
+use regrasp_base::Budget;
 use regrasp_base::files::sha256;
+use regrasp_grasp::list::GraspList;
+use regrasp_scene::{PickAndPlaceQuery, Scene, State};
 use std::fmt::Write as _;
 
 /// What a roadmap was made for.
@@ -62,6 +66,23 @@ impl TaskRoadmap {
     }
 
     /// What differs from what the roadmap was made for, in words. None where nothing does.
+    ///
+    /// Errors: as `plan_pick_and_place` before any search.
+    pub fn differs_from(
+        &self,
+        (scene, state): (&Scene, &State),
+        query: &PickAndPlaceQuery,
+        lists: &[(usize, GraspList)],
+        settings: &TaskSettings,
+    ) -> Result<Option<&'static str>, Failure> {
+        let prepared = Prepared::new(scene, query, lists, settings)?;
+        let models = prepared.models();
+        let budget = Budget::unlimited();
+        let context = Context::new((scene, state), query, (&prepared, &models), settings, (0, &budget))?;
+        Ok(self.differs(&context))
+    }
+
+    /// The same of a prepared task.
     pub(crate) fn differs(&self, context: &Context) -> Option<&'static str> {
         let now = origin(context, &graph_model(context));
         let pairs = [
@@ -70,7 +91,10 @@ impl TaskRoadmap {
             ("the object or a list of its grasps", &self.origin.grasps, &now.grasps),
             ("a setting that exchanges depend on", &self.origin.settings, &now.settings),
         ];
-        pairs.into_iter().find(|(_, own, other)| own != other).map(|(what, _, _)| what)
+        let differs = pairs.into_iter().find(|(_, own, other)| own != other).map(|(what, _, _)| what);
+        let n = context.robot.layout.len();
+        let is_whole = |give: &Give| [&give.way_in, &give.way_out].iter().all(|way| way.ends()[0].len() == n);
+        differs.or_else(|| (!self.exchanges.iter().all(is_whole)).then_some("the number of joints of an exchange"))
     }
 
     /// True where the roadmap knows that two hands do not hit each other.
