@@ -106,11 +106,11 @@ impl RobotRoadmap {
 
     /// Refuses a roadmap that was made for something else; `path` is where it came from.
     ///
-    /// Errors: the robot, what rests around it, a list, the object or a setting differs (`R615`).
+    /// Errors: the robot, what rests around it, a list, the object or a setting differs (`R616`).
     pub fn refuse_other(&self, path: &Path, what: &str) -> InputError {
         let problem = format!("was built with other inputs: {what} differs");
         let fix = "build a roadmap for this scene: regrasp roadmap build SCENE -o FILE";
-        Diagnostic::new("R615", Place::file(path), problem).fix(fix).into()
+        Diagnostic::new("R616", Place::file(path), problem).fix(fix).into()
     }
 
     /// Plans with the roadmap.

@@ -1,10 +1,16 @@
 //! A hand by itself among what rests: where it collides, no posture of its arm helps.
 
 use crate::context::Context;
-use crate::station::with_fingers;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Pose, Shape};
 use regrasp_robot::manipulator::layout::Part;
+
+/// A state with other joints of one hand's fingers.
+pub fn with_fingers(context: &Context, state: &[f64], hand: usize, joints: &[f64]) -> Vec<f64> {
+    let mut state = state.to_vec();
+    state[context.hands[hand].fingers.clone()].copy_from_slice(joints);
+    state
+}
 
 /// Links of a hand: their indices, and where they are in the frame of its base.
 pub type HandLinks = Vec<(usize, Pose)>;

@@ -1,7 +1,6 @@
 //! Scene, robot and grasps, prepared once.
 
 use crate::failing::refused;
-use crate::roadmap::TaskRoadmap;
 use nalgebra::{Matrix3, Translation3};
 use regrasp_arms::model::cover::{LinkCover, cover, covers};
 use regrasp_arms::model::{ArmModel, Attached};
@@ -19,7 +18,7 @@ use regrasp_manipulation::failure::{Failure, FailureKind};
 use regrasp_manipulation::forces::held::Held;
 use regrasp_manipulation::grasp::state::{Contacts, MAX_FINGERS, no_contact};
 use regrasp_manipulation::model::Model;
-use regrasp_manipulation::motion_settings::MotionSettings;
+use regrasp_manipulation::motion_settings::{MotionSettings, PartsMove};
 use regrasp_manipulation::settings::PhysicsSettings;
 use regrasp_manipulation::task_settings::TaskSettings;
 use regrasp_plan::robot_plan::HoldingPromises;
@@ -124,8 +123,6 @@ pub struct Context<'a> {
     pub seed: u64,
     /// How much may be looked at.
     pub budget: &'a Budget,
-    /// What was made before.
-    pub roadmap: Option<&'a TaskRoadmap>,
 }
 
 impl<'a> Prepared<'a> {
@@ -273,6 +270,11 @@ impl<'a> Context<'a> {
             motion: MotionSettings {
                 clearance: settings.clearance,
                 method: settings.method,
+                parts: settings.parts,
+                largest_rounding: match settings.parts {
+                    PartsMove::AtOnce => MotionSettings::default().largest_rounding,
+                    PartsMove::InTurn => 0.0,
+                },
                 search_margin: settings.search_margin,
                 shortcuts: settings.shortcuts,
                 max_samples: settings.max_samples,
@@ -289,7 +291,6 @@ impl<'a> Context<'a> {
             promises: &prepared.promises,
             seed,
             budget,
-            roadmap: None,
         })
     }
 

@@ -5,6 +5,7 @@ use crate::exchange::{Effort, Give, Places, is_double_grasp};
 use crate::failing::{Stage, Tally};
 use crate::motions::{self, Step, Stuck};
 use crate::placements::{Place, intermediate};
+use crate::roadmap::TaskRoadmap;
 use crate::station::{Station, may_hold, station};
 use regrasp_geometry::Vector;
 use regrasp_manipulation::failure::{Failure, FailureKind};
@@ -87,6 +88,8 @@ const MOST_STUCK: usize = 3;
 /// The graph.
 struct Graph<'c, 'a> {
     context: &'c Context<'a>,
+    /// What was made before.
+    roadmap: Option<&'c TaskRoadmap>,
     places: Vec<Place>,
     /// By place, hand and grasp.
     grips: Vec<Vec<Vec<Grip>>>,
@@ -102,8 +105,9 @@ struct Graph<'c, 'a> {
 }
 
 /// The cheapest plan that holds what it promises.
-pub fn search(context: &Context, tally: &mut Tally) -> Result<RobotPlan, Failure> {
-    let mut graph = Graph::new(context);
+pub fn search(context: &Context, roadmap: Option<&TaskRoadmap>, tally: &mut Tally) -> Result<RobotPlan, Failure> {
+    let mut graph = Graph::new(context, roadmap);
+    let roads = roadmap.and_then(|roadmap| roadmap.roads.as_ref());
     let mut attempt = 0;
     loop {
         if let Err(interrupt) = context.budget.check(tally.statistics.work) {
@@ -118,13 +122,13 @@ pub fn search(context: &Context, tally: &mut Tally) -> Result<RobotPlan, Failure
         }
         let steps = graph.steps(&path);
         attempt += 1;
-        match motions::segments(context, &steps, attempt, tally) {
+        match motions::segments(context, &steps, (attempt, roads), tally) {
             Ok(segments) => {
                 for stage in [Stage::Transit, Stage::Carry] {
                     tally.count(stage, Ok(()));
                 }
                 let mut plan = RobotPlan::answering_pick_and_place(context.scene, context.query);
-                plan.method = if context.roadmap.is_some() { "super_graph" } else { "task_graph" }.into();
+                plan.method = if roadmap.is_some() { "super_graph" } else { "task_graph" }.into();
                 plan.seed = context.seed;
                 plan.settings = serde_json::to_value(context.settings).unwrap_or_default();
                 plan.promises.clearance = context.settings.clearance;
@@ -146,7 +150,7 @@ pub fn search(context: &Context, tally: &mut Tally) -> Result<RobotPlan, Failure
 }
 
 impl<'c, 'a> Graph<'c, 'a> {
-    fn new(context: &'c Context<'a>) -> Self {
+    fn new(context: &'c Context<'a>, roadmap: Option<&'c TaskRoadmap>) -> Self {
         let ends = [&context.query.world_from_object_start, &context.query.world_from_object_goal];
         let mut places: Vec<Place> = ends.iter().filter_map(|pose| Place::new(context, pose)).collect();
         if context.settings.put_down {
@@ -190,7 +194,7 @@ impl<'c, 'a> Graph<'c, 'a> {
                 gives.insert([giver, taker], all.map(|(i, j)| given(i, j)).collect());
             }
         }
-        if let Some(roadmap) = context.roadmap {
+        if let Some(roadmap) = roadmap {
             gives.values_mut().flatten().for_each(|given| given.cost += NOT_MADE);
             for give in &roadmap.exchanges {
                 let n = n_grasps(give.taker[0]);
@@ -208,6 +212,7 @@ impl<'c, 'a> Graph<'c, 'a> {
         }
         Graph {
             context,
+            roadmap,
             places,
             grips,
             gives,
@@ -347,11 +352,11 @@ impl<'c, 'a> Graph<'c, 'a> {
     /// Pairs of grasps in which the hands hit each other are dead.
     fn test_pair(&mut self, from: Node, to: Node, tally: &mut Tally) -> bool {
         let (Node::Held(giver), Node::Held(taker)) = (from, to) else { return true };
-        let context = self.context;
+        let (context, roadmap) = (self.context, self.roadmap);
         let Some(given) = self.given(giver, taker) else { return false };
         if matches!(given.known, Known::New) {
             tally.work(1);
-            let is_apart = match context.roadmap {
+            let is_apart = match roadmap {
                 Some(roadmap) => roadmap.is_apart(giver, taker),
                 None => is_double_grasp(context, giver, taker),
             };

@@ -74,15 +74,14 @@ pub fn plan_with_roadmap(
     settings.validate().map_err(|problem| Failure::of_settings(&problem))?;
     let prepared = Prepared::new(scene, query, lists, settings)?;
     let models = prepared.models();
-    let mut context = Context::new((scene, state), query, (&prepared, &models), settings, (seed, budget))?;
+    let context = Context::new((scene, state), query, (&prepared, &models), settings, (seed, budget))?;
     if let Some(roadmap) = roadmap {
         if let Some(what) = roadmap.differs(&context) {
             let message = format!("the roadmap was made with other inputs: {what} differs");
             return Err(failing::refused(FailureKind::SettingsInvalid, message, "build the roadmap again"));
         }
-        context.roadmap = Some(roadmap);
     }
     let mut tally = Tally::default();
     before::refuse(&context, &mut tally)?;
-    graph::search(&context, &mut tally)
+    graph::search(&context, roadmap, &mut tally)
 }

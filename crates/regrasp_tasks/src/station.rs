@@ -1,5 +1,6 @@
 //! A hand at an object that lies on a support: postures, the way in, and the way up.
 
+pub use crate::clear::with_fingers;
 use crate::clear::{is_hand_clear, links_of};
 use crate::context::{Context, Grasp};
 use crate::failing::{Stage, Tally};
@@ -43,13 +44,6 @@ pub fn may_hold(context: &Context, place: &Place, hand: usize, grasp: &Grasp) ->
         return Err("grasps that do not hold the weight");
     }
     Ok(())
-}
-
-/// A state with other joints of one hand's fingers.
-pub fn with_fingers(context: &Context, state: &[f64], hand: usize, joints: &[f64]) -> Vec<f64> {
-    let mut state = state.to_vec();
-    state[context.hands[hand].fingers.clone()].copy_from_slice(joints);
-    state
 }
 
 /// Postures of the common joints: that of `state`, then drawn ones that keep their limits.

@@ -9,7 +9,7 @@ use crate::motion::{Collider, ColliderSettings, Track};
 use crate::times::{TimedPath, TimedPoint};
 use regrasp_base::{Budget, Rng};
 use regrasp_manipulation::failure::{Failure, FailureKind};
-use regrasp_manipulation::motion_settings::MotionSettings;
+use regrasp_manipulation::motion_settings::{MotionSettings, PartsMove};
 use regrasp_plan::robot_plan::RobotStatistics;
 
 /// A motion from state to state.
@@ -121,6 +121,9 @@ fn find(
 /// A state near `end` in which searches have room; `end` itself where it has room, or where none was found.
 fn room(problem: &Problem, model: &ArmModel, end: &[f64], settings: &MotionSettings, rng: &mut Rng) -> Vec<f64> {
     let at = model.configuration_of(end);
+    if settings.parts == PartsMove::InTurn {
+        return end.to_vec();
+    }
     let clearance = settings.clearance + settings.search_margin;
     let sampled = ColliderSettings { clearance, resolution: settings.resolution, ..ColliderSettings::default() };
     let mut sampled = Collider::new(model, &problem.world, sampled);

@@ -12,7 +12,7 @@ use crate::search::{
 use crate::world::World;
 use regrasp_base::{Budget, Rng};
 use regrasp_manipulation::failure::{Failure, FailureKind};
-use regrasp_manipulation::motion_settings::{MotionMethod, MotionSettings, Validation};
+use regrasp_manipulation::motion_settings::{MotionMethod, MotionSettings, PartsMove, Validation};
 use regrasp_plan::robot_plan::RobotStatistics;
 use std::sync::Arc;
 
@@ -73,9 +73,15 @@ pub fn find(
         interrupt = outcome.interrupt.or(interrupt);
         watch(Stage::Searched);
         is_hopeless = outcome.path.is_none();
-        let Some(mut path) = outcome.path else { continue };
+        let Some(path) = outcome.path else { continue };
+        let mut simplified: Vec<Vec<f64>> = Vec::new();
         let shortcuts = SimplifySettings { n_shortcuts: settings.shortcuts, ..SimplifySettings::default() };
-        simplify(&mut path, &shortcuts, &mut rng, |a, b| collider.is_sampled_free(a, b));
+        for run in search.runs(&path) {
+            let mut run = run;
+            simplify(&mut run, &shortcuts, &mut rng, |a, b| collider.is_sampled_free(a, b));
+            simplified.extend(run.into_iter().skip(usize::from(!simplified.is_empty())));
+        }
+        let path = simplified;
         search.count(&collider);
         watch(Stage::Simplified);
         if !certified {
@@ -88,7 +94,7 @@ pub fn find(
         }
     }
     // What samples do not find, certified motions do not either.
-    if certified && interrupt.is_none() && !is_hopeless {
+    if certified && interrupt.is_none() && !is_hopeless && settings.parts == PartsMove::AtOnce {
         let mut rng = Rng::keyed(seed, "certified_motion", 0);
         let certified = search.certified_from_nothing(problem, certified_samples, &mut rng, budget);
         watch(Stage::Searched);
@@ -131,13 +137,15 @@ impl Search<'_, '_> {
             (_, []) => RrtOutcome { path: None, n_nodes: 0, n_samples: 0, interrupt: None },
             (MotionMethod::InTurn, [goal]) => {
                 let few = RrtSettings { max_samples: all.max_samples.min(BEFORE_GRAPH), ..all };
-                let settings = InTurnSettings { all, ..InTurnSettings::default() };
-                match problem.roads.as_ref().filter(|known| self.is_of(&known.roads.graph)) {
+                let parts = self.settings.parts;
+                let settings = InTurnSettings { all, parts, ..InTurnSettings::default() };
+                let may_use = |known: &&KnownRoads| parts == PartsMove::AtOnce && self.is_of(&known.roads.graph);
+                match problem.roads.as_ref().filter(may_use) {
                     None => in_turn(collider, &self.start, goal, &settings, rng, budget),
                     Some(known) => {
                         // What is easy needs no graph.
                         let one = RrtSettings { max_samples: BEFORE_GRAPH, ..settings.one };
-                        let easy = InTurnSettings { one, all: few };
+                        let easy = InTurnSettings { one, all: few, parts };
                         let mut outcome = in_turn(collider, &self.start, goal, &easy, rng, budget);
                         if outcome.path.is_none() && outcome.interrupt.is_none() {
                             outcome.path = self.by_graph(known, collider.settings, goal);
@@ -157,6 +165,27 @@ impl Search<'_, '_> {
         };
         self.take(&outcome);
         outcome
+    }
+
+    /// Pieces of a path that are made shorter by themselves: where parts move in turn, those in which the same one moves.
+    fn runs(&self, path: &[Vec<f64>]) -> Vec<Vec<Vec<f64>>> {
+        if self.settings.parts == PartsMove::AtOnce || path.len() < 2 {
+            return vec![path.to_vec()];
+        }
+        let parts = self.model.parts();
+        let all: Vec<Vec<usize>> = parts.arms.into_iter().chain([parts.common]).collect();
+        let moving = |pair: &[Vec<f64>]| all.iter().position(|own| own.iter().any(|&k| pair[0][k] != pair[1][k]));
+        let mut runs: Vec<Vec<Vec<f64>>> = Vec::new();
+        let mut last = None;
+        for pair in path.windows(2) {
+            let own = moving(pair);
+            if runs.is_empty() || own != last {
+                runs.push(vec![pair[0].clone()]);
+            }
+            last = own;
+            runs.iter_mut().last().into_iter().for_each(|run| run.push(pair[1].clone()));
+        }
+        runs
     }
 
     /// True where a graph is of these joints.
@@ -196,6 +225,10 @@ impl Search<'_, '_> {
             if is_free(&pair[0], &pair[1]) {
                 whole.push(pair[1].clone());
                 continue;
+            }
+            if self.settings.parts == PartsMove::InTurn {
+                found = false;
+                break;
             }
             is_repaired = true;
             let region = Region::of(self.model, &[&pair[0], &pair[1]]);

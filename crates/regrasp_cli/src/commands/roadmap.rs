@@ -51,7 +51,7 @@ fn run_build(arguments: &args::RoadmapBuild, common: &Common, talk: &Talk) -> Re
     written
         .refuse_inputs([&arguments.settings, &arguments.build_settings].into_iter().flatten().map(PathBuf::as_path))?;
     let cancelled = interrupt::flag()?;
-    let loaded = load::scene(&arguments.scene, common, talk)?;
+    let loaded = load::scene_by(&arguments.scene, common, None, talk)?;
     written.refuse_inputs(loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
     if loaded.task().of_robot.is_some() {
         let limits = Limits { max_work: args::DEFAULT_MAX_WORK, time_limit: None, improve_for: None, cancelled };

@@ -86,7 +86,7 @@ pub fn info(path: &Path, talk: &Talk) -> Result<(), Stop> {
 /// The roadmap that a plan uses: the one that was named, or the one beside the scene. One beside the scene that was built with other
 /// inputs is left out, with a note.
 ///
-/// Errors: a file that is no roadmap; one that was named, built with other inputs (`R615`).
+/// Errors: a file that is no roadmap; one that was named, built with other inputs (`R616`).
 pub fn find(
     scene: &Path,
     named: Option<&Path>,
