@@ -55,7 +55,8 @@ fn most_parts_at_once(case: &Case, settings: &TaskSettings) -> usize {
     let plan = case.accepted(settings, 0);
     let coordinates = &case.loaded.scene.robots[case.query.robot].layout.coordinates;
     let parts = |pair: &[regrasp_plan::robot_plan::RobotWaypoint]| {
-        let changes = |k: &usize| pair[0].joints[*k] != pair[1].joints[*k];
+        // More than the rounding of curves.
+        let changes = |k: &usize| (pair[0].joints[*k] - pair[1].joints[*k]).abs() > 1e-9;
         let mut moving: Vec<Part> = (0..coordinates.len()).filter(changes).map(|k| coordinates[k].part).collect();
         moving.retain(|part| !matches!(part, Part::Hand(_)));
         moving.dedup();
