@@ -110,6 +110,8 @@ def test_the_hdf5_file_has_the_layout_of_robomimic(made: Path, tmp_path: Path) -
 @pytest.mark.skipif(find_spec("mujoco") is None, reason="SKIPPED: MuJoCo is not installed")
 def test_replays_are_columns_and_noise_is_keyed(tmp_path: Path) -> None:
     more = '[replay]\ncontroller = "C2"\nkeep = "track"\nfriction_scale = { range = [0.9, 1.0] }\nmass_scale = { range = [0.9, 1.1] }\n'
+    more += "start_offset = { range = [[-0.001, -0.001, -0.001], [0.001, 0.001, 0.001]] }\n"
+    more += "start_turn = { range = [[-0.02, -0.02, -0.02], [0.02, 0.02, 0.02]] }\n"
     specification = specification_of(text_of(episodes=2, block=1, more=more), "dataset.toml")
     one = make(specification, tmp_path / "one", workers=1)
     make(specification, tmp_path / "two", workers=2)
@@ -122,6 +124,9 @@ def test_replays_are_columns_and_noise_is_keyed(tmp_path: Path) -> None:
         joints, poses = row["replay_joints"].reshape(-1, 12), row["replay_object_pose"].reshape(-1, 7)
         assert len(joints) == len(poses) and len(poses) * row["replay_tick"] >= row["duration"]
         np.testing.assert_allclose(np.linalg.norm(poses[:, 3:], axis=1), 1.0, atol=1e-6)
+        # The object starts displaced, up to what the grip did.
+        moved = poses[0, :3] - np.array(row["start_pose"][:3])
+        assert np.abs(moved - row["replay_start_offset"]).max() < 3e-4 and np.abs(row["replay_start_offset"]).max() > 1e-4
         if row["replay_kept"]:
             assert np.abs(joints[0] - row["joints"][:12]).max() < 0.1
             assert np.linalg.norm(poses[-1, :3] - row["goal_pose"][:3]) < 0.01
@@ -129,6 +134,12 @@ def test_replays_are_columns_and_noise_is_keyed(tmp_path: Path) -> None:
     # The plans are those without a replay.
     plain = [row.row for row in _plain(tmp_path)]
     assert [row["joints"].tolist() for row in plain] == [row["joints"].tolist() for row in rows]
+
+
+@pytest.mark.parametrize("noise", ["start_offset = 0.001", "start_turn = { range = [0.0, 0.1] }", 'mass_scale = { direction = "any" }'])
+def test_noise_of_another_shape_is_refused(noise: str) -> None:
+    with pytest.raises(regrasp.InputError, match="D103"):
+        specification_of(text_of(episodes=2, more=f'[replay]\ncontroller = "C2"\n{noise}\n'), "dataset.toml")
 
 
 def _plain(folder: Path) -> list[Episode]:

@@ -10,10 +10,10 @@ const PAGE: &str = "tasks.md";
 /// Variants of clutter of the paper's task.
 const HORSE: [&str; 3] = ["justin_horse", "justin_horse_vases", "justin_horse_crowded"];
 /// The other tasks that need no models.
-const OWN: [&str; 2] = ["justin_horse_near", "justin_horse_turning"];
+const OWN: [&str; 3] = ["justin_horse_near", "justin_horse_turning", "grippers_bar"];
 /// Tasks of shared models.
-const OF_MODELS: [&str; 4] =
-    ["iiwa_allegro_mustard", "iiwa_allegro_drill", "iiwa_allegro_breyer", "panda_allegro_table"];
+const OF_MODELS: [&str; 5] =
+    ["iiwa_allegro_mustard", "iiwa_allegro_drill", "iiwa_allegro_breyer", "panda_allegro_table", "pr2_mug"];
 /// Tasks without a plan. Their rows say at which stage each fails.
 const IMPOSSIBLE: [&str; 6] = [
     "impossible_start",
@@ -69,7 +69,8 @@ pub fn bench(_: &[String]) -> Outcome {
         let files: Vec<PathBuf> =
             scenes.iter().map(|scene| PathBuf::from(format!("scenes/two_arms/{scene}.toml"))).collect();
         let csv = folder.join(format!("tasks_{index}.csv"));
-        let line = format!("bench {packages} {flags} --seeds {seeds} --quiet --csv {} {}", csv.display(), joined(&files));
+        let line =
+            format!("bench {packages} {flags} --seeds {seeds} --quiet --csv {} {}", csv.display(), joined(&files));
         eprintln!("{title}");
         let _ = write!(page, "\n## {title}\n\n{}", output(&program, &words(&line))?);
     }

@@ -113,6 +113,21 @@ impl Failure {
         Err(Failure::bare(FailureKind::Impossible, message, "name fewer of them in the hand file"))
     }
 
+    /// Refuses hands in which a joint of one finger follows a joint of another one: their fingers cannot let go one by one. Robots may carry
+    /// such hands; grasps of lists close them.
+    pub fn refuse_tied_fingers(view: &HandView) -> Result<(), Self> {
+        let Some(tie) = view.hand.ties.first() else { return Ok(()) };
+        let name = |joint: regrasp_robot::JointId| view.hand.robot.joints[joint.0].name.as_str();
+        let leader = tie.coupling.terms.first().map_or("another joint", |(leader, _)| name(*leader));
+        let message = format!(
+            "hand \"{}\" has one motor for several fingers: joint \"{}\" follows joint \"{leader}\", so that no finger can let go alone",
+            view.hand_name,
+            name(tie.follower)
+        );
+        let advice = "pick the object up and put it down again (task = \"pick_and_place\"), or use a hand whose fingers move alone";
+        Err(Failure::bare(FailureKind::Impossible, message, advice))
+    }
+
     /// Of settings that do not validate; `problem` says what is wrong with them.
     pub fn of_settings(problem: &str) -> Self {
         let message = format!("the settings make no sense: {problem}");

@@ -167,6 +167,9 @@ pub struct LinearLimit {
     pub upper: f64,
 }
 
+/// Limits no wider than this leave one coordinate no choice: [`LinearLimit::settle`]. In radians or metres.
+pub const TIE_WIDTH: f64 = 1e-8;
+
 impl LinearLimit {
     /// The limits `lower..=upper` of the joint called `joint`, which follows several coordinates.
     pub fn new(joint: String, coupling: &Coupling<usize>, [lower, upper]: [f64; 2]) -> Self {
@@ -183,6 +186,17 @@ impl LinearLimit {
     pub fn room(&self, coordinates: &[f64]) -> f64 {
         let sum = self.sum(coordinates);
         (sum - self.lower).min(self.upper - sum) / sum_of_sizes(&self.terms)
+    }
+
+    /// Where the limit ties its first coordinate to the others, with no room but rounding: brings that coordinate to where they have it.
+    pub fn settle(&self, coordinates: &mut [f64]) {
+        if self.upper - self.lower > TIE_WIDTH {
+            return;
+        }
+        if let Some(&(first, multiplier)) = self.terms.first() {
+            let others: f64 = self.terms[1..].iter().map(|&(k, multiplier)| multiplier * coordinates[k]).sum();
+            coordinates[first] = (0.5 * (self.lower + self.upper) - others) / multiplier;
+        }
     }
 
     /// The same limit over coordinates that start at `first` in a longer vector.

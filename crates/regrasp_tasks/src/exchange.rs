@@ -247,21 +247,19 @@ impl<'c, 'a> Attempt<'c, 'a> {
             first.iter().flat_map(|first| second.iter().map(|second| with_second(first, second))).collect();
         let free = are_states_free(context, &model, &context.fixed, &all, tally);
         for at in all.into_iter().zip(free).filter_map(|(at, is_free)| is_free.then_some(at)) {
-            {
-                self.reached = self.reached.max(2);
-                let Some(way_in) = self.way(taker, giver, &at, world_from_object, tally) else { continue };
-                self.reached = self.reached.max(3);
-                if !can_close(context, taker.0, [&with_fingers(context, &at, taker.0, &taker.1.open), &at], tally) {
-                    continue;
-                }
-                self.reached = self.reached.max(4);
-                if !can_close(context, giver.0, [&at, &with_fingers(context, &at, giver.0, &giver.1.open)], tally) {
-                    continue;
-                }
-                self.reached = self.reached.max(5);
-                let Some(way_out) = self.way(giver, taker, &at, world_from_object, tally) else { continue };
-                return Some(Give { giver: self.giver, taker: self.taker, way_in, way_out });
+            self.reached = self.reached.max(2);
+            let Some(way_in) = self.way(taker, giver, &at, world_from_object, tally) else { continue };
+            self.reached = self.reached.max(3);
+            if !can_close(context, taker.0, [&with_fingers(context, &at, taker.0, &taker.1.open), &at], tally) {
+                continue;
             }
+            self.reached = self.reached.max(4);
+            if !can_close(context, giver.0, [&at, &with_fingers(context, &at, giver.0, &giver.1.open)], tally) {
+                continue;
+            }
+            self.reached = self.reached.max(5);
+            let Some(way_out) = self.way(giver, taker, &at, world_from_object, tally) else { continue };
+            return Some(Give { giver: self.giver, taker: self.taker, way_in, way_out });
         }
         None
     }

@@ -10,7 +10,7 @@ import numpy as np
 from .._model import Scene
 from .._planning import export_mjcf
 from .packing import Row, rounded, unpack
-from .specification import Replay
+from .specification import NOISE, Replay
 
 
 def replayed(row: Row, settings: Replay, scene: Scene) -> None:
@@ -20,10 +20,9 @@ def replayed(row: Row, settings: Replay, scene: Scene) -> None:
     from ..simulate.run import simulate
     from .episodes import plan_of
 
-    friction = settings.friction_scale.value(row["key"], "replay.friction_scale")
-    mass = settings.mass_scale.value(row["key"], "replay.mass_scale")
-    row.update(replay_controller=settings.controller, replay_friction_scale=friction, replay_mass_scale=mass, replay_kept=False)
-    how = Settings(controller=settings.controller, friction_scale=friction, mass_scale=mass, hold_time=0.0)
+    noise = {key: getattr(settings, key).value(row["key"], f"replay.{key}") for key in NOISE}
+    row.update({f"replay_{key}": value for key, value in noise.items()}, replay_controller=settings.controller, replay_kept=False)
+    how = Settings(controller=settings.controller, **noise, hold_time=0.0)
     try:
         with warnings.catch_warnings():
             # Where the model differs from the scene is said in docs/reference/replay.md.

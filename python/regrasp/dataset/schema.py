@@ -56,6 +56,8 @@ REPLAY_FIELDS: tuple[tuple[str, Any], ...] = (
     ("replay_controller", pa.string()),
     ("replay_friction_scale", pa.float64()),
     ("replay_mass_scale", pa.float64()),
+    ("replay_start_offset", _FLOATS),
+    ("replay_start_turn", _FLOATS),
     ("replay_kept", pa.bool_()),
     ("replay_cause", pa.string()),
     ("replay_final_position_error", pa.float64()),

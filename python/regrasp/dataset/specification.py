@@ -21,13 +21,20 @@ from .._errors import InputError
 from .._model import Scene, load_scene
 from .._planning import METHODS
 from .draws import Draw, canonical, key_of, read_draws
-from .tables import Table, error_of, fault, parse
+from .tables import Table, error_of, fault, parse, short
 
 FORMAT = "regrasp-dataset"
 FORMAT_VERSION = 1
 LEVELS = ("geometry", "forces", "motion")
 CONTROLLERS = ("A", "B", "C2", "H")
 MAX_EPISODES = 10**9
+#: What may vary of a replay, with the values that change nothing.
+NOISE: Mapping[str, Any] = {
+    "friction_scale": 1.0,
+    "mass_scale": 1.0,
+    "start_offset": [0.0, 0.0, 0.0],
+    "start_turn": [0.0, 0.0, 0.0],
+}
 #: Arguments of the planner that may vary, after `plan.`; and everything below `plan.settings.`.
 PLAN_KEYS = ("method", "margin")
 
@@ -41,13 +48,17 @@ class Replay:
     """Friction of the simulation over the scene's."""
     mass_scale: Draw
     """Mass of the simulated object over the scene's."""
+    start_offset: Draw
+    """Where the object is gripped, from the plan's start: a displacement in the world, in metres."""
+    start_turn: Draw
+    """How it is turned there: a rotation vector in the world, in radians."""
     keep: Literal["outcome", "track"]
     """"track" keeps the replayed motion as well."""
 
     def to_json(self) -> Any:
         """Its meaning."""
-        scales = {"friction_scale": self.friction_scale.to_json(), "mass_scale": self.mass_scale.to_json()}
-        return {"controller": self.controller, **scales, "keep": self.keep}
+        noise = {key: getattr(self, key).to_json() for key in NOISE}
+        return {"controller": self.controller, **noise, "keep": self.keep}
 
 
 @dataclass(frozen=True)
@@ -117,7 +128,7 @@ class Specification:
 
     def replayed(self, controller: str) -> Specification:
         """With every plan replayed by `controller`."""
-        plain = Replay(controller, Draw("constant", 1.0), Draw("constant", 1.0), "outcome")
+        plain = Replay(controller, keep="outcome", **{key: Draw("constant", value) for key, value in NOISE.items()})
         replays = (replace(task.replay, controller=controller) if task.replay else plain for task in self.tasks)
         return replace(self, tasks=tuple(replace(task, replay=each) for task, each in zip(self.tasks, replays)))
 
@@ -168,14 +179,31 @@ def _replay(root: Table) -> Replay | None:
     table = root.table("replay")
     controller = table.text("controller", fix='add controller = "C2"', choices=CONTROLLERS)
     keep = table.text("keep", "outcome", choices=("outcome", "track"))
-    scales = {key: table.values[key] for key in ("friction_scale", "mass_scale") if key in table.values}
-    draws = read_draws(Table(table.file, table.path, scales))
-    for key in ("friction_scale", "mass_scale"):
+    given = {key: table.values[key] for key in NOISE if key in table.values}
+    draws = read_draws(Table(table.file, table.path, given))
+    for key, nothing in NOISE.items():
         table.get(key)
+        draw = draws.setdefault(key, Draw("constant", nothing))
+        if not _draws_such(draw, nothing):
+            expected = "numbers" if isinstance(nothing, float) else "lists of three numbers: x, y, z in the world"
+            table.report("D103", key, f"draws {short(draw.to_json())}", expected)
     table.finish()
-    one = Draw("constant", 1.0)
     kept = cast("Literal['outcome', 'track']", keep)
-    return Replay(controller or "C2", draws.get("friction_scale", one), draws.get("mass_scale", one), kept)
+    return Replay(controller or "C2", keep=kept, **{key: draws[key] for key in NOISE})
+
+
+def _draws_such(draw: Draw, nothing: Any) -> bool:
+    """Whether the values of a draw are numbers, or three of them, as `nothing` is."""
+    numbers: list[Any] = [draw.value("", "")]
+    if draw.kind == "choice":
+        numbers = draw.values
+    for value in numbers:
+        parts = cast("list[Any]", value) if isinstance(value, list) else [value]
+        if isinstance(value, list) != isinstance(nothing, list) or (isinstance(nothing, list) and len(parts) != 3):
+            return False
+        if not all(isinstance(part, (int, float)) and not isinstance(part, bool) for part in parts):
+            return False
+    return True
 
 
 def _task(table: Table, base: str, packages: Mapping[str, str], seed: int, replay: Replay | None) -> TaskSpec | None:

@@ -38,6 +38,10 @@ class Settings:
     """Friction of the simulation over the scene's."""
     mass_scale: float = 1.0
     """Mass of the simulated object over the one that the plan counts on."""
+    start_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """How far from the plan's start the object is gripped: a displacement in the world, in metres."""
+    start_turn: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """How the object is turned there from the plan's start: a rotation vector in the world, in radians, about its centre of mass."""
     torsion: float | None = None
     """Torsional friction of all fingertips, in metres, before it is scaled; without it the model's."""
     torsion_told: float | None = None

@@ -67,6 +67,7 @@ def grip(rig: Rig, controller: Controller, settings: Settings) -> MjData:
     mujoco.mj_resetDataKeyframe(model, data, 0)
     data.time = 0.0
     data.ctrl[:] = rig.rest_ctrl
+    _displace(rig, data, settings)
     data.eq_active[rig.pin] = 1
     steps = _steps(rig, settings)
     ticks = max(1, round(settings.grip_time / settings.tick))
@@ -77,6 +78,29 @@ def grip(rig: Rig, controller: Controller, settings: Settings) -> MjData:
         mujoco.mj_step(model, data, steps)
     data.eq_active[rig.pin] = 0
     return data
+
+
+def _displace(rig: Rig, data: MjData, settings: Settings) -> None:
+    """Puts the object, and the pin that holds it, where the settings have it start."""
+    offset, turn = np.array(settings.start_offset), np.array(settings.start_turn)
+    if not (offset.any() or turn.any()):
+        return
+    at = rig.object_qpos
+    mujoco.mj_kinematics(rig.model, data)
+    centre = data.xipos[rig.object_body].copy()
+    angle = float(np.linalg.norm(turn))
+    turned, quat = np.array([1.0, 0.0, 0.0, 0.0]), np.empty(4)
+    if angle > 0.0:
+        mujoco.mju_axisAngle2Quat(turned, turn / angle, angle)
+    arm = np.empty(3)
+    mujoco.mju_rotVecQuat(arm, data.qpos[at : at + 3] - centre, turned)
+    mujoco.mju_mulQuat(quat, turned, data.qpos[at + 3 : at + 7])
+    position = centre + offset + arm
+    data.qpos[at : at + 3], data.qpos[at + 3 : at + 7] = position, quat
+    # The pin welds the world to the object: its pose is that of the world in the object's frame.
+    pinned_position, pinned_quat = np.empty(3), np.empty(4)
+    mujoco.mju_negPose(pinned_position, pinned_quat, position, quat)
+    rig.model.eq_data[rig.pin, 3:6], rig.model.eq_data[rig.pin, 6:10] = pinned_position, pinned_quat
 
 
 def hold(rig: Rig, ref: Reference, controller: Controller, gripped: MjData, settings: Settings) -> Drift:

@@ -191,7 +191,8 @@ fn nearest_free(collider: &mut Collider, from: &[f64]) -> Option<Vec<f64>> {
         let mut best: Option<(f64, Vec<f64>)> = None;
         for _ in 0..40 {
             let drawn = from.iter().zip(&model.coordinates);
-            let drawn: Vec<f64> = drawn.map(|(q, c)| (q + spread * rng.normal()).clamp(c.lower, c.upper)).collect();
+            let mut drawn: Vec<f64> = drawn.map(|(q, c)| (q + spread * rng.normal()).clamp(c.lower, c.upper)).collect();
+            model.linear_limits.iter().for_each(|limit| limit.settle(&mut drawn));
             let distance = crate::search::distance(from, &drawn);
             if best.as_ref().is_none_or(|best| distance < best.0)
                 && model.is_within_limits(&drawn, 0.0)

@@ -134,7 +134,8 @@ fn room(problem: &Problem, model: &ArmModel, end: &[f64], settings: &MotionSetti
     for spread in SPREADS {
         for _ in 0..TRIES {
             let drawn = at.iter().zip(&model.coordinates);
-            let drawn: Vec<f64> = drawn.map(|(q, c)| (q + spread * rng.normal()).clamp(c.lower, c.upper)).collect();
+            let mut drawn: Vec<f64> = drawn.map(|(q, c)| (q + spread * rng.normal()).clamp(c.lower, c.upper)).collect();
+            model.linear_limits.iter().for_each(|limit| limit.settle(&mut drawn));
             if model.is_within_limits(&drawn, 0.0)
                 && sampled.is_sampled_free(&drawn, &drawn)
                 && certified.is_certified_free(&Track::straight(&at, &drawn))

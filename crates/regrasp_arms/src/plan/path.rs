@@ -76,8 +76,7 @@ pub fn find(
         let Some(path) = outcome.path else { continue };
         let mut simplified: Vec<Vec<f64>> = Vec::new();
         let shortcuts = SimplifySettings { n_shortcuts: settings.shortcuts, ..SimplifySettings::default() };
-        for run in search.runs(&path) {
-            let mut run = run;
+        for mut run in search.runs(&path) {
             simplify(&mut run, &shortcuts, &mut rng, |a, b| collider.is_sampled_free(a, b));
             simplified.extend(run.into_iter().skip(usize::from(!simplified.is_empty())));
         }
@@ -183,7 +182,9 @@ impl Search<'_, '_> {
                 runs.push(vec![pair[0].clone()]);
             }
             last = own;
-            runs.iter_mut().last().into_iter().for_each(|run| run.push(pair[1].clone()));
+            if let Some(run) = runs.last_mut() {
+                run.push(pair[1].clone());
+            }
         }
         runs
     }

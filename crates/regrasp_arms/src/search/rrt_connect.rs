@@ -92,6 +92,7 @@ impl Region {
         for _ in 0..TRIES {
             into.clear();
             into.extend(self.lower.iter().zip(&self.upper).map(|(&low, &high)| rng.uniform(low, high)));
+            self.linear_limits.iter().for_each(|limit| limit.settle(into));
             if self.linear_limits.iter().all(|limit| limit.room(into) >= 0.0) {
                 return;
             }

@@ -99,6 +99,20 @@ impl Breeder<'_> {
             waypoints[w].joint_velocities[k] += sign(rng) * log_uniform(rng, 1.1e-9, 1e-2);
             Some(())
         });
+        let ties = robot.layout.ties.clone();
+        self.add("a jaw leaves the motor that it shares", &[Kind::JointLimit], |plan, rng| {
+            let (s, t) = (rng.below(plan.segments.len()), rng.below(ties.len().max(1)));
+            let (follower, _) = ties.get(t)?;
+            let waypoints = &mut plan.segments[s].waypoints;
+            let w = rng.below(waypoints.len());
+            if rng.chance(0.5) {
+                waypoints[w].joints[*follower] += sign(rng) * log_uniform(rng, 1.1e-8, 1e-2);
+            } else {
+                // Over a step of a tenth of a second the joint is off by more than rounding.
+                waypoints[w].joint_velocities[*follower] += sign(rng) * log_uniform(rng, 1e-4, 1e-1);
+            }
+            Some(())
+        });
         let is_finger: Vec<bool> =
             robot.layout.coordinates.iter().map(|coordinate| matches!(coordinate.part, Part::Hand(_))).collect();
         let closing = self.segments(|s| matches!(self.kind(s), RobotSegmentKind::Grasp | RobotSegmentKind::Release));

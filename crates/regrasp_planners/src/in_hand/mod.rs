@@ -87,6 +87,7 @@ pub fn plan_in_hand(
 ) -> Result<Plan, Failure> {
     settings.validate().map_err(|problem| Failure::of_settings(&problem))?;
     Failure::refuse_many_fingers(view)?;
+    Failure::refuse_tied_fingers(view)?;
     if query.open_start.is_some() {
         return placing::plan_placed(view, query, settings, seed, budget, progress);
     }

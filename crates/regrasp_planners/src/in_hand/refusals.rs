@@ -53,8 +53,8 @@ pub fn refuse_holding_nothing(model: &Model) -> Result<(), Failure> {
     Err(Failure::bare(FailureKind::Impossible, message, MORE_FINGERS))
 }
 
-const MORE_FINGERS: &str =
-    "use a hand with at least 4 fingers, or declare soft fingertips, of which two can hold (contact = \"soft_finger\")";
+const MORE_FINGERS: &str = "use a hand with at least 4 fingers, or declare soft fingertips, of which two can hold (contact = \
+     \"soft_finger\" and torsion_radius = 0.005 in the hand file; for `regrasp place`, --torsion-radius 0.005)";
 
 fn never_released(model: &Model) -> String {
     format!(

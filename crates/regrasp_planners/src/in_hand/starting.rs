@@ -67,6 +67,7 @@ pub fn nearest_start(
 ) -> Result<Start, Failure> {
     settings.validate().map_err(|problem| Failure::of_settings(&problem))?;
     Failure::refuse_many_fingers(view)?;
+    Failure::refuse_tied_fingers(view)?;
     let model = Model::new(view, &effective(settings).within(&view.limits).physics);
     let turn = view.world_from_hand.rotation.inverse();
     let seen = project::Observed {

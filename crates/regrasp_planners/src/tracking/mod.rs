@@ -63,6 +63,7 @@ pub fn plan_tracking(
 ) -> Result<Plan, Failure> {
     settings.validate().map_err(|problem| Failure::of_settings(&problem))?;
     Failure::refuse_many_fingers(view)?;
+    Failure::refuse_tied_fingers(view)?;
     let seen = view.hand_from_world().map(|hand_from_world| query.seen_from(&hand_from_world));
     let found = plan_in_hand_frame(view, seen.as_ref().unwrap_or(query), settings, seed, budget, progress);
     found.map(|plan| plan_in_world(view, &query.name, plan)).map_err(|failure| failure_in_world(view, failure))

@@ -1,10 +1,10 @@
 //! Fingers that share a motor: a joint of one finger follows a joint of another one. For grasp lists such a joint becomes a
-//! coordinate of its own finger, and the hand says what it follows ([`Tie`]).
+//! coordinate of its own finger, and the hand says what it follows ([`Tie`]). So it does on a robot that carries the hand.
 
 use super::spec::HandSpec;
 use crate::coupling::{Coupling, Terms};
 use crate::hand::{Hand, Tie};
-use crate::robot::{JointId, LinkId, Robot};
+use crate::robot::{JointId, JointKind, LinkId, Robot};
 
 /// `robot` with the followers of other fingers' joints as joints of their own, and what they follow. Linkages that carry no
 /// collision geometry are held, with a note.
@@ -52,6 +52,19 @@ pub(super) fn untie(robot: &Robot, spec: &HandSpec, notes: &mut Vec<String>) -> 
         }
     }
     (untied, ties)
+}
+
+/// As [`untie`], for a hand on a whole robot: linkages that carry no collision geometry become fixed, so that they are no coordinates.
+pub(super) fn untie_on(robot: &mut Robot, spec: &HandSpec, notes: &mut Vec<String>) -> Vec<Tie> {
+    let (untied, ties) = untie(robot, spec, notes);
+    let before = std::mem::replace(robot, untied);
+    for (index, (joint, was)) in robot.joints.iter_mut().zip(&before.joints).enumerate() {
+        let is_let_go = was.coupling.is_some() && joint.coupling.is_none();
+        if is_let_go && ties.iter().all(|tie| tie.follower != JointId(index)) {
+            joint.kind = JointKind::Fixed;
+        }
+    }
+    ties
 }
 
 /// The coupling to the follower of `tie` that says the same as `coupling` to its one leader.

@@ -5,7 +5,8 @@
 //! in the order of the robot.
 
 use super::{Arm, MountedHand, NoPosture};
-use crate::coupling::{Coupling, LinearLimit, bring_within, limit_leaders};
+use crate::coupling::{Coupling, LinearLimit, TIE_WIDTH, Terms, bring_within, limit_leaders};
+use crate::hand::Tie;
 use crate::robot::{JointId, Robot};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -45,9 +46,15 @@ pub struct Coordinate {
 pub struct JointLayout {
     /// In the order of states.
     pub coordinates: Vec<Coordinate>,
-    /// Limits of joints that follow several coordinates at once.
+    /// Limits of joints that follow several coordinates at once; and of coordinates that follow others, narrow ones
+    /// ([`JointLayout::ties`]).
     pub linear_limits: Vec<LinearLimit>,
+    /// Coordinates that follow others: joints of fingers that share a motor with another finger ([`crate::hand::Tie`]).
+    pub ties: Vec<(usize, Coupling<usize>)>,
 }
+
+/// A coordinate that follows others may be this far off, in radians or metres: rounding.
+pub const TIE_ROUNDING: f64 = 0.5 * TIE_WIDTH;
 
 /// The parts in the order of states, each with the joints that come first in it.
 pub(super) fn order(arms: &[Arm], hands: &[MountedHand]) -> Vec<(Part, Vec<String>)> {
@@ -71,6 +78,7 @@ impl JointLayout {
         robot: &Robot,
         part_of_joint: &[Part],
         order: Vec<(Part, Vec<String>)>,
+        ties: &[&Tie],
         rest: &BTreeMap<String, f64>,
     ) -> Result<Self, NoPosture> {
         let mut coordinates = Vec::new();
@@ -97,8 +105,9 @@ impl JointLayout {
                 });
             }
         }
-        let mut layout = JointLayout { coordinates, linear_limits: Vec::new() };
+        let mut layout = JointLayout { coordinates, linear_limits: Vec::new(), ties: Vec::new() };
         layout.limit(robot);
+        layout.tie(ties);
         layout.set_rest(rest)?;
         Ok(layout)
     }
@@ -120,6 +129,34 @@ impl JointLayout {
         self.linear_limits = linear;
     }
 
+    /// Takes over what follows what. Ties with more leaders than a limit has terms are kept by whoever moves the hand.
+    fn tie(&mut self, ties: &[&Tie]) {
+        let place = |layout: &Self, joint: JointId| layout.coordinates.iter().position(|c| c.joint == joint);
+        for tie in ties {
+            let follower = place(self, tie.follower);
+            let coupling = tie.coupling.renamed(|leader| place(self, leader));
+            let (Some(follower), Some(coupling)) = (follower, coupling) else { continue };
+            let mut terms = Terms::from_iter([(follower, 1.0)]);
+            let leaders = coupling.terms.iter().map(|&(leader, multiplier)| (leader, -multiplier));
+            if leaders.map(|term| terms.try_push(term)).all(|pushed| pushed.is_ok()) {
+                self.linear_limits.push(LinearLimit {
+                    joint: self.coordinates[follower].name.clone(),
+                    terms,
+                    lower: coupling.offset - TIE_ROUNDING,
+                    upper: coupling.offset + TIE_ROUNDING,
+                });
+            }
+            self.ties.push((follower, coupling));
+        }
+    }
+
+    /// Brings the coordinates that follow others to where these have them.
+    pub fn settle_ties(&self, state: &mut [f64]) {
+        for (follower, coupling) in &self.ties {
+            state[*follower] = coupling.position(|leader| state[leader]);
+        }
+    }
+
     fn set_rest(&mut self, rest: &BTreeMap<String, f64>) -> Result<(), NoPosture> {
         for coordinate in &mut self.coordinates {
             if coordinate.lower > coordinate.upper {
@@ -128,7 +165,7 @@ impl JointLayout {
             let stated = rest.get(&coordinate.name).copied();
             coordinate.rest = stated.unwrap_or_else(|| 0f64.clamp(coordinate.lower, coordinate.upper));
         }
-        if self.linear_limits.is_empty() {
+        if self.linear_limits.iter().all(|limit| limit.room(&self.rest()) >= 0.0) {
             return Ok(());
         }
         let [lower, upper] = self.limits();

@@ -10,7 +10,7 @@ pub mod layout;
 /// Which part each link and joint belongs to, and which links never meet.
 mod parts;
 
-use crate::hand::Hand;
+use crate::hand::{Hand, Tie};
 use crate::kinematics::chain::Chain;
 use crate::robot::{LinkId, Robot};
 use kinematics::TreeKinematics;
@@ -149,7 +149,8 @@ impl Manipulator {
             posture.extend(fingers.flat_map(|f| f.chain.names.iter().cloned().zip(f.rest.iter().copied())));
         }
         let order = layout::order(&arms, &hands);
-        let mut layout = JointLayout::new(&robot, &owners.of_joints, order, &posture)?;
+        let ties: Vec<&Tie> = hands.iter().flat_map(|hand| &hand.hand.ties).collect();
+        let mut layout = JointLayout::new(&robot, &owners.of_joints, order, &ties, &posture)?;
         for coordinate in &mut layout.coordinates {
             coordinate.acceleration = accelerations.own.get(&coordinate.name).copied().or(accelerations.default);
         }

@@ -93,7 +93,7 @@ pub(super) fn posture(entry: &Entry, robot: &Manipulator, before: Vec<f64>, foun
 /// Errors: a joint that is no coordinate (`S120`), limits, those of joints that follow too (`P303`).
 fn joint_values(entry: &Entry, robot: &Manipulator, posture: Vec<f64>, found: &mut Found) -> Option<Vec<f64>> {
     let layout = &robot.layout;
-    let (mut values, mut is_good) = (posture, true);
+    let (mut values, mut is_good, mut named) = (posture, true, Vec::new());
     for (name, value) in entry.table(found)?.all() {
         let Some(k) = layout.index_of(name) else {
             is_good = false;
@@ -126,9 +126,16 @@ fn joint_values(entry: &Entry, robot: &Manipulator, posture: Vec<f64>, found: &m
             is_good = false;
         }
         values[k] = position;
+        named.push(k);
     }
     if !is_good {
         return None;
+    }
+    // A joint on another joint's motor goes along, unless it has a value of its own here.
+    for (follower, coupling) in &layout.ties {
+        if !named.contains(follower) {
+            values[*follower] = coupling.position(|leader| values[leader]);
+        }
     }
     for limit in layout.linear_limits.iter().filter(|limit| limit.room(&values) < -LIMIT_ROUNDING) {
         let problem = format!("takes \"{}\", which follows several joints, outside its limits", limit.joint);

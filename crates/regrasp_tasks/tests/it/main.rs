@@ -10,7 +10,7 @@ mod roadmap;
 use regrasp_base::Budget;
 use regrasp_grasp::list::GraspList;
 use regrasp_grasp::list::format::from_json;
-use regrasp_plan::check::{CheckSettings, check_any};
+use regrasp_plan::check::{CheckSettings, ViolationKind, check_any};
 use regrasp_plan::{AnyPlan, RobotPlan};
 use regrasp_robot::LoadOptions;
 use regrasp_scene::{LoadedScene, PickAndPlaceQuery, load_scene};
@@ -52,6 +52,14 @@ impl Case {
         let plan = self.plan(settings, seed).unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
         accepted_by_checker(self, &plan, seed);
         plan
+    }
+
+    /// What the checker finds wrong.
+    pub fn violations(&self, plan: &RobotPlan) -> Vec<ViolationKind> {
+        let world = (&self.loaded.scene, &self.loaded.state);
+        let any = AnyPlan::Robot(Box::new(plan.clone()));
+        let report = check_any(world, Some(&self.query.clone().into()), &any, &CheckSettings::default());
+        report.violations.iter().map(|violation| violation.kind).collect()
     }
 }
 

@@ -15,6 +15,8 @@ pub mod motion;
 pub mod question;
 /// What can be judged without distances.
 pub mod rules;
+/// Joints on the motor of another finger's joint.
+pub mod ties;
 /// The robot as the checker sees it.
 pub mod tree;
 
@@ -86,6 +88,7 @@ fn judge(
     }
     rules::check_meeting(question, plan, settings, log);
     rules::check_joints(question, plan, settings, log);
+    ties::check_ties(question, plan, log);
     rules::check_promises(question, scene, plan, log);
     rules::check_carried(question, plan, settings, log);
     if let Some(leap) = rules::leap(question, plan, settings) {

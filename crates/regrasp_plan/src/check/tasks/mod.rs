@@ -25,7 +25,7 @@ pub mod standing;
 pub mod task;
 
 use crate::check::promises::check_input_files;
-use crate::check::robots::{RobotAlong, rules};
+use crate::check::robots::{RobotAlong, rules, ties};
 use crate::check::violation::{Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Level, Log, Report, limits};
 use crate::robot_plan::RobotPlan;
@@ -84,6 +84,7 @@ fn judge(
     ends::check_promises(task, settings, log);
     rules::check_meeting(question, plan, settings, log);
     rules::check_joints(question, plan, settings, log);
+    ties::check_ties(question, plan, log);
     rules::check_promises(question, task.scene, plan, log);
     let Some(phases) = holders::read_phases(task, plan, log) else { return };
     holders::check_order(task, &phases, log);

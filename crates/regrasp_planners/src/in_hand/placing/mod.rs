@@ -119,6 +119,7 @@ pub fn place(
 ) -> Result<Places, Failure> {
     settings.validate().map_err(|problem| Failure::of_settings(&problem))?;
     Failure::refuse_many_fingers(view)?;
+    Failure::refuse_tied_fingers(view)?;
     let settings = &effective(settings).within(&view.limits);
     let model = &Model::new(view, &settings.physics);
     super::refusals::refuse_holding_nothing(model)?;

@@ -49,6 +49,7 @@ pub fn sizes(hand: &Hand, reach: &TipReach, settings: &InHandSettings, seed: u64
         let state = State::at_rest(&scene, vec![Pose::identity()]);
         let view = regrasp_scene::HandView::of(&Manipulation::first(&scene, &state));
         Failure::refuse_many_fingers(&view)?;
+        Failure::refuse_tied_fingers(&view)?;
         let model = Model::new(&view, &settings.physics);
         crate::in_hand::refusals::refuse_holding_nothing(&model)?;
         let mut rng = Rng::keyed(seed, "sizes", index as u64);

@@ -106,6 +106,7 @@ pub fn build_roadmap(
     let valid = settings.validate().and_then(|()| build.validate()).and_then(|()| region.validate());
     valid.map_err(|problem| Failure::of_settings(&problem))?;
     Failure::refuse_many_fingers(view)?;
+    Failure::refuse_tied_fingers(view)?;
     let settings = InHandSettings { method: Method::Gait, ..settings.clone() };
     let within = with_fixed_contacts(&settings).within(&view.limits);
     let model = Model::new(view, &within.physics);

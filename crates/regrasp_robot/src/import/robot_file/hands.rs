@@ -4,10 +4,12 @@ use super::super::assemble::assemble;
 use super::super::hand_file::{HandParts, hand_file_parts, locate, refuse_wrong_unit};
 use super::super::names::known_link;
 use super::super::spec::{FingerSpec, HandSpec};
+use super::super::ties;
 use super::Draft;
 use super::arms::ArmSpec;
 use super::merge::{self, Place};
 use super::models::read_pose;
+use crate::hand::{Hand, Tie};
 use crate::manipulator::{MountedHand, top_of};
 use crate::robot::{LinkId, Robot};
 use regrasp_base::diagnostic::did_you_mean;
@@ -227,9 +229,18 @@ fn in_tree(spec: &HandSpec, place: &Place, mount: LinkId) -> HandSpec {
     }
 }
 
+impl Mount {
+    /// Makes joints of one finger that follow another finger coordinates of their own, and says what they follow.
+    pub(super) fn untie(&self, tree: &mut Robot, found: &mut Found) -> Vec<Tie> {
+        ties::untie_on(tree, &self.spec, &mut found.notes)
+    }
+}
+
 /// The hand. None where its fingers are refused.
-pub(super) fn make(tree: &Arc<Robot>, mount: &Mount, found: &mut Found) -> Option<MountedHand> {
+pub(super) fn make(tree: &Arc<Robot>, mount: &Mount, ties: Vec<Tie>, found: &mut Found) -> Option<MountedHand> {
     let made = assemble(tree, &mount.spec, &mount.file).and_then(|(hand, notes)| {
+        let mut hand = Hand { ties, ..hand };
+        ties::settle_rest(&mut hand);
         refuse_wrong_unit(&hand, &mount.file)?;
         Ok((hand, notes))
     });

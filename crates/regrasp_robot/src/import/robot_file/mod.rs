@@ -140,12 +140,14 @@ fn read(
     let mounts = hands.map_or_else(|| Some(Vec::new()), |entry| hands::read(&entry, &mut draft, &arm_specs, found));
     let mounts = mounts?;
     refuse_repeated_names(&draft.tree, path, found);
+    let ties: Vec<_> = mounts.iter().map(|mount| mount.untie(&mut draft.tree, found)).collect();
     let tree = Arc::new(draft.tree);
     if let Some(entry) = &allow {
         draft.allow.extend(read_pairs(entry, &tree, found));
     }
     let arms: Vec<_> = arm_specs.iter().filter_map(|spec| arms::make(&tree, spec, found)).collect();
-    let hands: Vec<_> = mounts.iter().filter_map(|mount| hands::make(&tree, mount, found)).collect();
+    let hands: Vec<_> =
+        mounts.iter().zip(ties).filter_map(|(mount, ties)| hands::make(&tree, mount, ties, found)).collect();
     let rest = rest.map_or_else(Positions::new, |entry| read_positions(&entry, found));
     let accelerations =
         accelerations.map_or_else(Accelerations::default, |entry| joints::read_accelerations(&entry, &tree, found));
