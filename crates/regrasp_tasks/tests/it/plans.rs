@@ -1,8 +1,10 @@
 //! Tasks with plans.
 
 use crate::{Case, holders};
+use regrasp_manipulation::motion_settings::PartsMove;
 use regrasp_plan::check::{CheckSettings, ViolationKind};
 use regrasp_plan::robot_plan::RobotSegmentKind;
+use regrasp_robot::manipulator::layout::Part;
 use regrasp_tasks::TaskSettings;
 
 #[test]
@@ -47,6 +49,29 @@ fn the_same_seed_gives_the_same_plan() {
         scope.spawn(|| case.plan(&TaskSettings::default(), 7).expect("a plan")).join().expect("no panic")
     });
     assert_eq!(first, again);
+}
+
+/// Parts whose joints change between two waypoints that follow each other: the most of any two.
+fn most_parts_at_once(case: &Case, settings: &TaskSettings) -> usize {
+    let plan = case.accepted(settings, 0);
+    let coordinates = &case.loaded.scene.robots[case.query.robot].layout.coordinates;
+    let parts = |pair: &[regrasp_plan::robot_plan::RobotWaypoint]| {
+        // More than the rounding of curves.
+        let changes = |k: &usize| (pair[0].joints[*k] - pair[1].joints[*k]).abs() > 1e-9;
+        let mut moving: Vec<Part> = (0..coordinates.len()).filter(changes).map(|k| coordinates[k].part).collect();
+        moving.retain(|part| !matches!(part, Part::Hand(_)));
+        moving.dedup();
+        moving.len()
+    };
+    plan.segments.iter().flat_map(|segment| segment.waypoints.windows(2).map(parts)).max().unwrap_or(0)
+}
+
+#[test]
+fn parts_move_at_once_or_in_turn() {
+    let case = Case::new("justin_horse.toml");
+    assert!(most_parts_at_once(&case, &TaskSettings::default()) >= 2);
+    let settings = TaskSettings { parts: PartsMove::InTurn, ..TaskSettings::default() };
+    assert_eq!(most_parts_at_once(&case, &settings), 1);
 }
 
 #[test]
