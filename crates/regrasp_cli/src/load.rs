@@ -10,6 +10,7 @@ use regrasp::planners::FailureKind;
 use regrasp::robot::Manipulator;
 use regrasp::robot::import::{LoadOptions, OUT_OF_TIME, ResolveOptions};
 use regrasp::scene::motion::MOTION;
+use regrasp::scene::pick_and_place::PICK_AND_PLACE;
 use regrasp::scene::query::IN_HAND;
 use regrasp::scene::{InputFile, LoadedScene, Task, load_scene};
 use regrasp::settings::{Argument, Overrides, SettingsError, read, settings_for};
@@ -210,11 +211,11 @@ pub fn refuse_other_task(loaded: &LoadedScene, path: &Path, what: &str) -> Resul
     }
 }
 
-/// Reads a scene for a campaign of mutations: its task is one of a hand with a goal pose, or a motion of a robot (`A507`).
+/// Reads a scene for a campaign of mutations: its task is one of a hand with a goal pose, or one of a whole robot (`A507`).
 pub fn scene_with_mutants(path: &Path, common: &Common, talk: &Talk) -> Result<LoadedScene, Stop> {
     let loaded = scene_by(path, common, None, talk)?;
     match loaded.task().kind_name() {
-        IN_HAND | MOTION => Ok(loaded),
+        IN_HAND | MOTION | PICK_AND_PLACE => Ok(loaded),
         _ => {
             let why = format!("campaigns make plans of other tasks ({})", path.display());
             Err(not_for_tracking("SCENE", &why, "name another scene; regrasp plan and bench plan this one"))

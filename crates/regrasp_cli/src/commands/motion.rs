@@ -68,7 +68,7 @@ pub fn plan(
         Ok(AnyPlan::Robot(plan)) => plan,
         Ok(AnyPlan::InHand(_)) => return Err(Stop::Internal("a motion was answered by a plan of one hand".into())),
         Err(failure) if failure.kind == FailureKind::Interrupted => return Err(Stop::Interrupted),
-        Err(failure) => return Err(Stop::NoPlan(Box::new(failure))),
+        Err(failure) => return Err(Stop::NoRobotPlan(Box::new(failure))),
     };
     let seconds = started.elapsed().as_secs_f64();
     talk.say(format!(

@@ -140,7 +140,7 @@ fn lists_of(
     };
     match task_grasps::lists(path, (loaded, query), 0, limits, common, talk) {
         Ok(lists) => Ok(Ok(lists)),
-        Err(Stop::NoGrasp(failure) | Stop::NoPlan(failure)) => Ok(Err(*failure)),
+        Err(Stop::NoGrasp(failure) | Stop::NoPlan(failure) | Stop::NoRobotPlan(failure)) => Ok(Err(*failure)),
         Err(stop) => Err(stop),
     }
 }
