@@ -74,6 +74,22 @@ def test_the_hand_keeps_the_object_and_drops_it_without_forces(plan: regrasp.Rob
     assert weak.lost is not None and weak.lost.kind == "carry" and weak.lost.segment == 4, str(weak)
 
 
+def test_feedback_holds_a_heavier_box_closer_to_the_plan(plan: regrasp.RobotPlan, xml: str) -> None:
+    pytest.importorskip("mujoco")
+    from regrasp.simulate.reference import PlanError
+    from regrasp.simulate.task import TaskSettings, replay
+
+    # The box is heavier than planned: fingers sag with it, and feedback takes that back.
+    errors = {}
+    for controller in ("B", "C2"):
+        report, _, _ = replay(plan.document, xml, TaskSettings(controller=controller, mass_scale=1.3))
+        assert report.kept, str(report)
+        errors[controller] = report.largest_position_error
+    assert errors["C2"] < 0.8 * errors["B"], errors
+    with pytest.raises(PlanError, match="no controller 'A' for pick and place; there are B, C2"):
+        replay(plan.document, xml, TaskSettings(controller="A"))
+
+
 def test_a_box_of_ice_is_lost(plan: regrasp.RobotPlan, xml: str) -> None:
     pytest.importorskip("mujoco")
     from regrasp.simulate.reference import PlanError
@@ -102,12 +118,16 @@ def test_the_command_says_kept_and_dropped(tmp_path: Path) -> None:
     assert dropped.returncode == 1 and "LOST (" in dropped.stdout and "segment 4, carry" in dropped.stdout
 
 
-def test_a_campaign_counts_both_replays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_campaign_counts_all_replays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("mujoco")
     from regrasp.simulate.task_campaign import main
 
-    assert main([str(PLAN), "-o", str(tmp_path)]) == 0
-    assert "| `scene` | 1 | 1 | 1 |" in capsys.readouterr().out
+    assert main([str(PLAN), "-o", str(tmp_path), "--controllers", "B,C2"]) == 0
+    printed = capsys.readouterr().out
+    assert "| `scene` | B | 1 | 1 | 1 |" in printed and "| `scene` | C2 | 1 | 1 | 1 |" in printed
     lines = (tmp_path / "task_campaign.csv").read_text().splitlines()
-    assert len(lines) == 3 and ",planned,True," in lines[1] and ",none,False," in lines[2] and ",4,carry," in lines[2]
+    assert [line.split(",")[3:6] for line in lines[1:]] == [["B", "planned", "True"], ["C2", "planned", "True"], ["B", "none", "False"]]
+    assert ",4,carry," in lines[3]
+    with pytest.raises(SystemExit):
+        main([str(PLAN), "--controllers", "A"])
     assert main([str(SCENE)]) == 2

@@ -12,6 +12,8 @@ pub mod pictures;
 pub mod placing;
 /// One entry for every kind of task.
 pub mod planning;
+/// Roadmaps of robots.
+pub mod robot_roadmap;
 /// Scene files as text.
 pub mod scene_text;
 /// Many queries of one scene, from where things really are.

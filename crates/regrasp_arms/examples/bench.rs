@@ -5,8 +5,9 @@
 
 use cpu_time::ThreadTime;
 use regrasp_arms::model::cover::covers;
+use regrasp_arms::motion::Track;
 use regrasp_arms::motion::{Collider, ColliderSettings};
-use regrasp_arms::roadmap::{BuildSettings, QuerySettings, build, query};
+use regrasp_arms::roadmap::{BuildSettings, Changes, QuerySettings, Roads, build, query};
 use regrasp_arms::search::{Region, RrtSettings, rrt_connect};
 use regrasp_arms::world::{Obstacle, World};
 use regrasp_arms::{ArmModel, Stage, plan_in_stages};
@@ -155,61 +156,70 @@ fn roadmaps(robot: &Path) {
             println!("nodes per arm {nodes_per_arm}, seed {seed}: {nodes} nodes, {edges} edges, {seconds:.2} s");
         }
     }
-    queries(&model, &world);
+    for (n_moved, n_nodes) in [(1, 30), (1, 50), (10, 50), (30, 50)] {
+        queries(&model, &world, n_moved, n_nodes);
+    }
 }
 
-/// Queries among the same obstacles and one that the graph does not know: by the graph, and without it.
-fn queries(model: &ArmModel, known: &World) {
+/// Queries among the same obstacles and some that the graph does not know: by the graph, and without it. All paths are certified.
+fn queries(model: &ArmModel, known: &World, n_moved: usize, n_nodes: usize) {
     const QUERIES: u64 = 100;
-    let settings = BuildSettings { nodes_per_arm: 30, ..BuildSettings::default() };
+    let settings = BuildSettings { nodes_per_arm: n_nodes, ..BuildSettings::default() };
     let Some(built) = build(model, known, &settings, 0) else { return };
+    let clearance = built.clearance;
+    let roads = Roads::new(built);
     let mut rng = Rng::keyed(0, "queries", 0);
     let region = Region::of(model, &[&model.configuration_of(&model.state)]);
-    let of_collider = ColliderSettings { clearance: built.clearance, ..ColliderSettings::default() };
+    let of_collider = |clearance: f64| ColliderSettings { clearance, ..ColliderSettings::default() };
     let (mut lazy, mut single, mut solved) = (Vec::new(), Vec::new(), [0; 2]);
     let (mut tested, mut added) = (0, 0);
     for index in 0..QUERIES {
-        let [x, y, z] = [rng.uniform(0.45, 0.9), rng.uniform(-0.6, 0.6), rng.uniform(0.55, 1.3)];
-        let moved = Obstacle {
-            name: "moved".into(),
-            placed: PlacedShape {
-                parent_from_shape: Pose::translation(x, y, z),
-                shape: Shape::Cylinder { half_length: 0.15, radius: 0.05 },
-            },
-        };
-        let whole = World::new(known.obstacles.iter().cloned().chain([moved.clone()]).collect());
-        let unknown = World::new(vec![moved]);
-        let mut collider = Collider::new(model, &whole, of_collider);
+        let mut moved = Vec::new();
+        for _ in 0..n_moved {
+            let [x, y, z] = [rng.uniform(0.45, 0.9), rng.uniform(-0.6, 0.6), rng.uniform(0.55, 1.3)];
+            let shape = Shape::Cylinder { half_length: 0.15, radius: 0.05 };
+            let placed = PlacedShape { parent_from_shape: Pose::translation(x, y, z), shape };
+            moved.push(Obstacle { name: "moved".into(), placed });
+        }
+        let whole = World::new(known.obstacles.iter().chain(&moved).cloned().collect());
+        let unknown = World::new(moved);
+        let mut collider = Collider::new(model, &whole, of_collider(clearance + 2e-3));
         let mut draw = || {
             let mut drawn = Vec::new();
             loop {
                 region.draw(&mut rng, &mut drawn);
-                if collider.contact(&drawn).is_none() {
+                if collider.contact(&drawn).is_none() && collider.is_sampled_free(&drawn, &drawn) {
                     return drawn.clone();
                 }
             }
         };
         let ends = [draw(), draw()];
         // The graph as it was saved, for each of them.
-        let mut graph = built.clone();
+        let mut graph = roads.clone();
         let budget = Budget::unlimited().with_deadline(Instant::now() + LIMIT);
         let before = ThreadTime::now();
         let slices = [ends[0].as_slice(), ends[1].as_slice()];
-        let found = query(&mut graph, model, [&whole, &unknown], slices, &QuerySettings::default(), (index, &budget));
+        let changes = Changes { whole: &whole, unknown: &unknown, is_changed: &|_| false };
+        let found = query(&mut graph, model, &changes, slices, &QuerySettings::default(), (index, &budget));
         lazy.push(before.elapsed().as_secs_f64());
         solved[0] += usize::from(found.path.is_some());
         tested += found.n_tested;
-        added += found.n_added;
-        let mut sampled =
-            Collider::new(model, &whole, ColliderSettings { clearance: built.clearance, ..Default::default() });
+        added += u64::from(found.n_added > 0);
+        // Samples with the same margin, then the path is certified.
+        let before = ThreadTime::now();
+        let mut sampled = Collider::new(model, &whole, of_collider(clearance + 2e-3));
+        let mut exact = Collider::new(model, &whole, of_collider(clearance));
         let rrt = RrtSettings::for_dimension(model.dimension());
         let budget = Budget::unlimited().with_deadline(Instant::now() + LIMIT);
         let mut rng = Rng::keyed(index, "single_query", 0);
-        let before = ThreadTime::now();
         let found =
             rrt_connect(&ends[0], &ends[1..], &region, &rrt, &mut rng, &budget, |a, b| sampled.is_sampled_free(a, b));
+        let proved = |path: &Vec<Vec<f64>>| {
+            path.windows(2).all(|pair| exact.is_certified_free(&Track::straight(&pair[0], &pair[1])))
+        };
+        let is_proved = found.path.as_ref().is_some_and(proved);
         single.push(before.elapsed().as_secs_f64());
-        solved[1] += usize::from(found.path.is_some());
+        solved[1] += usize::from(is_proved);
     }
     let line = |name: &str, values: &mut Vec<f64>| {
         values.sort_by(f64::total_cmp);
@@ -218,8 +228,13 @@ fn queries(model: &ArmModel, known: &World) {
         let ms = [values[n / 2], values[n * 3 / 4], values[n * 95 / 100], values[n - 1], mean].map(|s| 1e3 * s);
         println!("| {name} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} |", ms[0], ms[1], ms[2], ms[3], ms[4]);
     };
-    println!("{QUERIES} queries with a moved obstacle, solved by the graph {}, without {}", solved[0], solved[1]);
-    println!("motions of the graph tested anew {tested}, nodes added {added}");
+    println!(
+        "{QUERIES} queries with {n_moved} moved obstacles, {} nodes; solved and certified by the graph {}, without {}",
+        roads.graph.graph.nodes.len(),
+        solved[0],
+        solved[1]
+    );
+    println!("motions tested {tested}, queries that the graph alone did not answer {added}");
     println!("| ms | median | 75 % | 95 % | largest | mean |\n|---|---|---|---|---|---|");
     line("by the graph", &mut lazy);
     line("single query", &mut single);

@@ -171,6 +171,9 @@ pub struct Plan {
     /// Threads [default: all cores]; the plan does not depend on it
     #[arg(long, value_parser = threads, allow_negative_numbers = true)]
     pub threads: Option<usize>,
+    /// Roadmap of the scene's robot, of `regrasp roadmap build` [default: SCENE.roadmap.json where it lies beside the scene]
+    #[arg(long, value_name = "FILE.json")]
+    pub roadmap: Option<PathBuf>,
     /// How to search.
     #[command(flatten)]
     pub search: Search,
@@ -310,6 +313,9 @@ pub struct Bench {
     /// Do not judge the plans
     #[arg(long)]
     pub no_check: bool,
+    /// Tasks of pick and place: build a roadmap of each scene first, and plan with it
+    #[arg(long, conflicts_with_all = ["page", "results"])]
+    pub prepare: bool,
     /// Plan a chain of N random goals per seed, each within 90 degrees of the last and from the grasp in which the last plan ended
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true, conflicts_with_all = ["page", "results", "hold"])]
     pub chain: Option<u64>,
@@ -361,7 +367,7 @@ pub struct Roadmap {
 /// What can be done with a roadmap.
 #[derive(Debug, Subcommand)]
 pub enum RoadmapAction {
-    /// Build the roadmap of a scene's hand and object
+    /// Build the roadmap of a scene's hand and object, or of its robot
     Build(RoadmapBuild),
     /// Plan the turn of a scene with a roadmap, check the plan, then write it
     Query(RoadmapQuery),
@@ -381,7 +387,7 @@ pub enum RoadmapAction {
 pub struct RoadmapBuild {
     /// Scene file
     pub scene: PathBuf,
-    /// Roadmap file
+    /// Roadmap file; of a robot it is JSON, and plans find SCENE.roadmap.json beside the scene
     #[arg(short, long, value_name = "FILE.roadmap")]
     pub output: PathBuf,
     /// Object poses that the graph is built over [default: 400]

@@ -5,9 +5,24 @@ use regrasp::Failure;
 use regrasp::planners::FailureKind;
 use std::fmt::Write;
 
+/// Heading of a failed task of a robot where nothing is left to try. Other grasps may still have a plan.
+const NOTHING_LEFT: &str = "NO PLAN: found no way for this robot in this scene";
+
+/// A failure of a task of a whole robot, for people.
+pub fn robot_failure_text(failure: &Failure) -> String {
+    match failure.kind {
+        FailureKind::Impossible => text_under(NOTHING_LEFT, failure),
+        _ => failure_text(failure),
+    }
+}
+
 /// A failure for people: what, why most often, how near, what to try.
 pub fn failure_text(failure: &Failure) -> String {
-    let heading = match failure.kind {
+    text_under(heading_of(failure.kind), failure)
+}
+
+fn heading_of(kind: FailureKind) -> &'static str {
+    match kind {
         FailureKind::StartInvalid => "NO PLAN: the start is not valid",
         FailureKind::GoalInvalid => "NO PLAN: the goal is not valid",
         FailureKind::SettingsInvalid => "NO PLAN: the settings make no sense",
@@ -17,7 +32,10 @@ pub fn failure_text(failure: &Failure) -> String {
         FailureKind::WorkSpent => "NO PLAN within the work allowed (not a proof)",
         FailureKind::TimeLimit => "NO PLAN within the time limit (not a proof)",
         FailureKind::Interrupted => "interrupted",
-    };
+    }
+}
+
+fn text_under(heading: &str, failure: &Failure) -> String {
     let mut out = format!("{heading}\n  {}\n", failure.message);
     if let Some(miss) = &failure.nearest_miss {
         let _ = writeln!(
@@ -69,6 +87,17 @@ mod tests {
     use super::*;
     use regrasp::plan::plan::PoseData;
     use regrasp::planners::{Cause, NearestMiss};
+
+    #[test]
+    fn a_failed_task_of_a_robot_does_not_blame_the_hand() {
+        let failure = Failure::bare(FailureKind::Impossible, "exchange: 155 tried, 155 hands touch".into(), "");
+        assert!(failure_text(&failure).contains("impossible with this hand"));
+        let text = robot_failure_text(&failure);
+        assert!(text.starts_with("NO PLAN: found no way for this robot") && text.contains("155 hands touch"), "{text}");
+        assert!(!text.contains("this hand"), "{text}");
+        let late = Failure::bare(FailureKind::TimeLimit, "no way in 2 s".into(), "");
+        assert_eq!(robot_failure_text(&late), failure_text(&late));
+    }
 
     #[test]
     fn a_failure_is_told_with_causes_nearest_miss_and_advice() {

@@ -10,6 +10,7 @@ use regrasp::planners::FailureKind;
 use regrasp::robot::Manipulator;
 use regrasp::robot::import::{LoadOptions, OUT_OF_TIME, ResolveOptions};
 use regrasp::scene::motion::MOTION;
+use regrasp::scene::pick_and_place::PICK_AND_PLACE;
 use regrasp::scene::query::IN_HAND;
 use regrasp::scene::{InputFile, LoadedScene, Task, load_scene};
 use regrasp::settings::{Argument, Overrides, SettingsError, read, settings_for};
@@ -140,6 +141,11 @@ pub fn for_task(task: &Task, search: &Search, n_threads: usize) -> Result<Planne
     merged(task.kind_name(), search.settings.as_deref(), &overrides(search, n_threads))
 }
 
+/// Settings for a task of this kind: defaults, then the file.
+pub fn settings_in(file: Option<&Path>, task: &Task) -> Result<PlannerSettings, Stop> {
+    merged(task.kind_name(), file, &Overrides { n_threads: 1, ..Overrides::default() })
+}
+
 /// Settings of the in-hand planner: defaults, then the file, then the margin.
 pub fn planner_settings(file: Option<&Path>, margin: Option<f64>, n_threads: usize) -> Result<InHandSettings, Stop> {
     Ok(merged(IN_HAND, file, &Overrides { margin, n_threads, ..Overrides::default() })?.in_hand)
@@ -190,8 +196,14 @@ fn not_for_tracking(argument: &str, why: &str, fix: &str) -> Stop {
 /// Reads a scene, as [`scene`], that `what` can do something with in-hand tasks of only (`A507`).
 pub fn in_hand_scene(path: &Path, what: &str, common: &Common, talk: &Talk) -> Result<LoadedScene, Stop> {
     let loaded = scene(path, common, talk)?;
+    refuse_other_task(&loaded, path, what)?;
+    Ok(loaded)
+}
+
+/// Refuses a task that is not of a hand with a goal pose (`A507`).
+pub fn refuse_other_task(loaded: &LoadedScene, path: &Path, what: &str) -> Result<(), Stop> {
     match loaded.task().kind_name() {
-        IN_HAND => Ok(loaded),
+        IN_HAND => Ok(()),
         _ => {
             let why = format!("{what} of in-hand tasks only ({})", path.display());
             Err(not_for_tracking("SCENE", &why, "name another scene; regrasp plan and bench plan this one"))
@@ -199,11 +211,11 @@ pub fn in_hand_scene(path: &Path, what: &str, common: &Common, talk: &Talk) -> R
     }
 }
 
-/// Reads a scene for a campaign of mutations: its task is one of a hand with a goal pose, or a motion of a robot (`A507`).
+/// Reads a scene for a campaign of mutations: its task is one of a hand with a goal pose, or one of a whole robot (`A507`).
 pub fn scene_with_mutants(path: &Path, common: &Common, talk: &Talk) -> Result<LoadedScene, Stop> {
     let loaded = scene_by(path, common, None, talk)?;
     match loaded.task().kind_name() {
-        IN_HAND | MOTION => Ok(loaded),
+        IN_HAND | MOTION | PICK_AND_PLACE => Ok(loaded),
         _ => {
             let why = format!("campaigns make plans of other tasks ({})", path.display());
             Err(not_for_tracking("SCENE", &why, "name another scene; regrasp plan and bench plan this one"))

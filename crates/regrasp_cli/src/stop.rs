@@ -11,6 +11,8 @@ pub enum Stop {
     BadInput(InputError),
     /// The search found no plan, and says why: 1.
     NoPlan(Box<Failure>),
+    /// The search found no plan for a task of a whole robot, and says why: 1.
+    NoRobotPlan(Box<Failure>),
     /// The search found no grasp, and says why: 1.
     NoGrasp(Box<Failure>),
     /// The checker or a campaign said no, and it was printed already: 1.
@@ -25,7 +27,7 @@ impl Stop {
     /// The exit code.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Stop::NoPlan(_) | Stop::NoGrasp(_) | Stop::Rejected => 1,
+            Stop::NoPlan(_) | Stop::NoRobotPlan(_) | Stop::NoGrasp(_) | Stop::Rejected => 1,
             Stop::BadInput(_) => 2,
             Stop::Internal(_) => 3,
             Stop::Interrupted => 130,

@@ -81,6 +81,12 @@ impl Talk {
                     self.line_to_stderr(crate::failure_text::failure_text(failure).trim_end());
                 }
             }
+            Stop::NoRobotPlan(failure) => {
+                self.event("no_plan", json!({ "failure": failure }));
+                if !self.json {
+                    self.line_to_stderr(crate::failure_text::robot_failure_text(failure).trim_end());
+                }
+            }
             Stop::NoGrasp(failure) => {
                 self.event("no_grasp", json!({ "failure": failure }));
                 if !self.json {

@@ -13,8 +13,12 @@ use std::sync::Arc;
 
 /// Positions of cuts tried along each axis of a piece.
 const POSITIONS: usize = 15;
+/// Most points that should be clear through which cuts are looked at, along each axis.
+const THROUGH_CLEAR: usize = 8;
 /// Corners from which on candidates are compared by some of the corners only.
 const MANY_CORNERS: usize = 1500;
+/// Least volume that a cut takes off a part that covers what should be clear, as a share of the solid's. By hand.
+const LEAST_FOR_CLEAR: f64 = 1e-6;
 /// How finely a solid is cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PartSettings {
@@ -49,6 +53,8 @@ struct Piece {
     volume: f64,
     /// The best cut, and the volume that it takes off; None where there is none.
     cut: Option<Cut>,
+    /// Points that should be clear and are in the hull.
+    covered: Vec<Point>,
 }
 
 /// Across an axis, at a coordinate.
@@ -61,17 +67,34 @@ struct Cut {
 
 /// Convex parts of the solid that `mesh` bounds. None where the mesh is no closed solid, or a hull fails.
 pub fn convex_parts(mesh: &TriangleMesh, settings: &PartSettings) -> Option<Parts> {
+    convex_parts_clear_of(mesh, settings, &[])
+}
+
+/// As [`convex_parts`]. Afterwards parts that cover one of the points `clear`, which are outside of the solid, are cut on, up to twice as
+/// many parts, while that takes anything off.
+pub fn convex_parts_clear_of(mesh: &TriangleMesh, settings: &PartSettings, clear: &[Point]) -> Option<Parts> {
     let solid = solid_properties(&Shape::Mesh(Arc::new(mesh.clone()))).ok()?.volume;
     let triangles = (0..mesh.triangles().len()).map(|index| mesh.corners(index)).collect();
-    let mut pieces = vec![Piece::new(triangles)?];
+    let mut pieces = vec![Piece::new(triangles, clear)?];
     let excess = |pieces: &[Piece]| pieces.iter().map(|piece| piece.volume).sum::<f64>() / solid - 1.0;
-    while pieces.len() < settings.max_parts && excess(&pieces) > settings.excess {
-        let gain = |piece: &Piece| piece.cut.map_or(0.0, |cut| cut.gain);
-        let best = (0..pieces.len()).max_by(|&a, &b| gain(&pieces[a]).total_cmp(&gain(&pieces[b])))?;
-        let Some(cut) = pieces[best].cut.filter(|cut| cut.gain > settings.least_gain * solid) else { break };
+    let gain = |piece: &Piece| piece.cut.map_or(0.0, |cut| cut.gain);
+    let covers = |piece: &Piece| !piece.covered.is_empty();
+    loop {
+        let is_fine = pieces.len() >= settings.max_parts || excess(&pieces) <= settings.excess;
+        let may_be_cut =
+            |piece: &Piece| gain(piece) > if is_fine { LEAST_FOR_CLEAR } else { settings.least_gain } * solid;
+        let of_all = |among: &dyn Fn(&Piece) -> bool| {
+            let candidates = (0..pieces.len()).filter(|&k| among(&pieces[k]) && may_be_cut(&pieces[k]));
+            candidates.max_by(|&a, &b| gain(&pieces[a]).total_cmp(&gain(&pieces[b])))
+        };
+        let best = if is_fine { None } else { of_all(&|_| true) };
+        let best = best.or_else(|| of_all(&covers).filter(|_| pieces.len() < 2 * settings.max_parts));
+        let Some(best) = best else { break };
+        let cut = pieces[best].cut?;
         let [below, above] = divide(&pieces[best].triangles, &cut);
-        let (Some(below), Some(above)) = (Piece::new(below), Piece::new(above)) else {
-            pieces[best].cut = None;
+        let covered = std::mem::take(&mut pieces[best].covered);
+        let (Some(below), Some(above)) = (Piece::new(below, &covered), Piece::new(above, &covered)) else {
+            (pieces[best].cut, pieces[best].covered) = (None, covered);
             continue;
         };
         pieces[best] = below;
@@ -82,12 +105,20 @@ pub fn convex_parts(mesh: &TriangleMesh, settings: &PartSettings) -> Option<Part
 }
 
 impl Piece {
-    fn new(triangles: Vec<[Point; 3]>) -> Option<Self> {
+    fn new(triangles: Vec<[Point; 3]>, clear: &[Point]) -> Option<Self> {
         let hull = ConvexHull::new(&corners(&triangles, 1)).ok()?;
         let volume = volume_of(&hull)?;
-        let cut = best_cut(&triangles);
-        Some(Piece { triangles, hull, volume, cut })
+        let covered: Vec<Point> = clear.iter().copied().filter(|point| is_inside(&hull, point)).collect();
+        let cut = best_cut(&triangles, &covered);
+        Some(Piece { triangles, hull, volume, cut, covered })
     }
+}
+
+fn is_inside(hull: &ConvexHull, point: &Point) -> bool {
+    hull.triangles().iter().all(|triangle| {
+        let [a, b, c] = triangle.map(|k| hull.vertices()[k as usize]);
+        (b - a).cross(&(c - a)).dot(&(point - a)) <= 0.0
+    })
 }
 
 fn corners(triangles: &[[Point; 3]], stride: usize) -> Vec<Point> {
@@ -102,8 +133,9 @@ fn volume_of(hull: &ConvexHull) -> Option<f64> {
     solid_properties(&Shape::Convex(Arc::new(hull.clone()))).ok().map(|solid| solid.volume)
 }
 
-/// The cut of a piece after which the two hulls have least volume.
-fn best_cut(triangles: &[[Point; 3]]) -> Option<Cut> {
+/// The cut of a piece after which the two hulls have least volume; of some at equal distances and some through points that should be
+/// clear.
+fn best_cut(triangles: &[[Point; 3]], covered: &[Point]) -> Option<Cut> {
     let n_corners = 3 * triangles.len();
     let stride = n_corners.div_ceil(6 * MANY_CORNERS).max(1);
     let rough = |triangles: &[[Point; 3]]| volume_of(&ConvexHull::new(&corners(triangles, stride)).ok()?);
@@ -112,8 +144,9 @@ fn best_cut(triangles: &[[Point; 3]]) -> Option<Cut> {
     for axis in 0..3 {
         let along = || triangles.iter().flatten().map(|corner| corner[axis]);
         let (low, high) = (along().fold(f64::INFINITY, f64::min), along().fold(f64::NEG_INFINITY, f64::max));
-        for k in 1..=POSITIONS {
-            let at = low + (high - low) * k as f64 / (POSITIONS + 1) as f64;
+        let even = (1..=POSITIONS).map(|k| low + (high - low) * k as f64 / (POSITIONS + 1) as f64);
+        let through = covered.iter().step_by(covered.len().div_ceil(THROUGH_CLEAR).max(1)).map(|point| point[axis]);
+        for at in even.chain(through.filter(|at| low < *at && *at < high)) {
             let cut = Cut { axis, at, gain: 0.0 };
             let [below, above] = divide(triangles, &cut);
             let (Some(a), Some(b)) = (rough(&below), rough(&above)) else { continue };
@@ -214,6 +247,19 @@ mod tests {
         assert!((2..=4).contains(&parts.hulls.len()), "{}", parts.hulls.len());
         let whole = ConvexHull::new(shaft.vertices()).unwrap();
         assert!(volume_of(&whole).unwrap() > 1.2 * shaft.signed_volume());
+    }
+
+    /// A groove of a thousandth of the volume, which volume alone would leave filled.
+    #[test]
+    fn parts_leave_free_what_should_be_clear() {
+        let shaft =
+            turned(&[(0.03, 0.0), (0.03, 0.05), (0.0295, 0.0505), (0.0295, 0.0515), (0.03, 0.052), (0.03, 0.1)], 48);
+        let settings = PartSettings::new(8, 0.02);
+        let clear = [Point::new(0.0297, 0.0, 0.051)];
+        let covered = |parts: &Parts| parts.hulls.iter().any(|hull| is_inside(hull, &clear[0]));
+        assert!(covered(&convex_parts(&shaft, &settings).unwrap()));
+        let parts = convex_parts_clear_of(&shaft, &settings, &clear).unwrap();
+        assert!(!covered(&parts) && parts.hulls.len() <= 16, "{} parts", parts.hulls.len());
     }
 
     #[test]

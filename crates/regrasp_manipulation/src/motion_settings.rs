@@ -13,6 +13,17 @@ pub enum MotionMethod {
     SingleQuery,
 }
 
+/// Which parts of a robot may move at the same time: arms, and the torso that carries them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PartsMove {
+    /// All, where nothing forbids it.
+    #[default]
+    AtOnce,
+    /// One after the other. All others rest meanwhile.
+    InTurn,
+}
+
 /// How motions are tested for collisions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -30,6 +41,8 @@ pub enum Validation {
 pub struct MotionSettings {
     /// The method.
     pub method: MotionMethod,
+    /// Which parts may move at the same time.
+    pub parts: PartsMove,
     /// How the plan's motions are tested.
     pub validation: Validation,
     /// Configurations per radian or metre that the search looks at.
@@ -50,6 +63,7 @@ impl Default for MotionSettings {
     fn default() -> Self {
         MotionSettings {
             method: MotionMethod::default(),
+            parts: PartsMove::default(),
             validation: Validation::default(),
             resolution: 32.0,
             clearance: 5e-4,
@@ -72,6 +86,9 @@ impl MotionSettings {
         between("clearance", self.clearance, 0.0, 0.1)?;
         between("search_margin", self.search_margin, 0.0, 0.1)?;
         between("largest_rounding", self.largest_rounding, 0.0, 10.0)?;
+        if self.parts == PartsMove::InTurn && self.method == MotionMethod::SingleQuery {
+            return Err("parts is in_turn; the method single_query moves all of them at once".into());
+        }
         if self.shortcuts > 100_000 {
             return Err(format!("shortcuts is {}; at most 100000", self.shortcuts));
         }

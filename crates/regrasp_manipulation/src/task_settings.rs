@@ -1,5 +1,6 @@
 //! Settings of pick and place.
 
+use crate::motion_settings::{MotionMethod, PartsMove};
 use crate::settings::ForceSettings;
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +21,10 @@ pub enum TaskCost {
 pub struct TaskSettings {
     /// What the planner makes small.
     pub cost: TaskCost,
+    /// How motions are searched for.
+    pub method: MotionMethod,
+    /// Which parts may move at the same time: at once, the receiver comes while the giver carries.
+    pub parts: PartsMove,
     /// Distance that bodies keep. By hand: half of what grasp lists keep between hand and object.
     pub clearance: f64,
     /// Distance that searches for motions keep besides.
@@ -71,6 +76,8 @@ impl Default for TaskSettings {
     fn default() -> Self {
         TaskSettings {
             cost: TaskCost::default(),
+            method: MotionMethod::default(),
+            parts: PartsMove::default(),
             clearance: 1e-4,
             search_margin: 2e-3,
             shortcuts: 60,
@@ -104,6 +111,9 @@ impl TaskSettings {
             true => Ok(()),
             false => Err(format!("{name} is {value}; it must be from {low} to {high}")),
         };
+        if self.parts == PartsMove::InTurn && self.method == MotionMethod::SingleQuery {
+            return Err("parts is in_turn; the method single_query moves all of them at once".into());
+        }
         between("clearance", self.clearance, 0.0, 0.1)?;
         between("search_margin", self.search_margin, 0.0, 0.1)?;
         between("line_step", self.line_step, 1e-3, 0.1)?;

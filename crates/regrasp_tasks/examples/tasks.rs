@@ -1,4 +1,4 @@
-//! Plans tasks of pick and place: `tasks [--package NAME=DIR] [--settings JSON] [--seeds N] [--out FILE] SCENE...`. Times are
+//! Plans tasks of pick and place: `tasks [--package NAME=DIR] [--settings JSON] [--seeds N] [--roadmap] [--out FILE] SCENE...`. Times are
 //! processor times of one thread. Scenes have to name their grasp lists.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
@@ -9,13 +9,13 @@ use regrasp_grasp::list::format::from_json;
 use regrasp_plan::check::{CheckSettings, check_any};
 use regrasp_robot::LoadOptions;
 use regrasp_scene::{Query, load_scene};
-use regrasp_tasks::{TaskSettings, plan_pick_and_place};
+use regrasp_tasks::{RoadmapBuildSettings, TaskRoadmap, TaskSettings, build_roadmap, plan_with_roadmap};
 use std::path::{Path, PathBuf};
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
     let (mut scenes, mut seeds, mut out) = (Vec::new(), 1, None);
-    let mut settings = TaskSettings::default();
+    let (mut settings, mut prepares) = (TaskSettings::default(), false);
     let mut options = LoadOptions::default();
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().unwrap_or_default();
@@ -26,6 +26,7 @@ fn main() {
                 options.resolve.packages.push((name.to_owned(), PathBuf::from(folder)));
             }
             "--settings" => settings = serde_json::from_str(&value()).expect("settings"),
+            "--roadmap" => prepares = true,
             "--seeds" => seeds = value().parse().expect("a number"),
             "--out" => out = Some(PathBuf::from(value())),
             scene => scenes.push(scene.to_owned()),
@@ -35,6 +36,7 @@ fn main() {
         let loaded = load_scene(Path::new(path), &options).unwrap_or_else(|error| panic!("{error}"));
         for (index, _) in loaded.tasks.iter().enumerate() {
             let (mut n_solved, mut n_accepted, mut times, mut durations) = (0, 0, Vec::new(), Vec::new());
+            let mut roadmap: Option<TaskRoadmap> = None;
             for seed in 0..seeds {
                 let Query::PickAndPlace(query) = loaded.tasks[index].query(seed) else { continue };
                 let of_object = loaded.scene.grasp_files.iter().filter(|file| file.object == query.object);
@@ -44,9 +46,27 @@ fn main() {
                         (file.hand, from_json(&file.path, &bytes).unwrap_or_else(|error| panic!("{error}")))
                     })
                     .collect();
-                let before = ThreadTime::now();
                 let world = (&loaded.scene, &loaded.state);
-                let found = plan_pick_and_place(world, &query, &lists, &settings, seed, &Budget::work(100_000_000));
+                if prepares && roadmap.is_none() {
+                    let before = ThreadTime::now();
+                    let of_build = RoadmapBuildSettings::default();
+                    let (settings, budget) = ((&settings, &of_build), Budget::unlimited());
+                    let built = build_roadmap(world, &query, &lists, settings, (0, &budget));
+                    let built = built.unwrap_or_else(|failure| panic!("{failure}"));
+                    let text = built.to_json();
+                    println!(
+                        "  roadmap: {} nodes, {} double grasps, {} exchanges, {} kB, {:.2} s",
+                        built.roads.as_ref().map_or(0, |roads| roads.graph.graph.nodes.len()),
+                        built.double_grasps.iter().map(|of| of.pairs.len()).sum::<usize>(),
+                        built.n_exchanges(),
+                        text.len() / 1000,
+                        before.elapsed().as_secs_f64()
+                    );
+                    roadmap = Some(TaskRoadmap::from_json(Path::new("roadmap"), &text).expect("a roadmap"));
+                }
+                let before = ThreadTime::now();
+                let budget = Budget::work(100_000_000);
+                let found = plan_with_roadmap(world, &query, &lists, &settings, (seed, &budget), roadmap.as_ref());
                 let seconds = before.elapsed().as_secs_f64();
                 times.push(seconds);
                 match found {

@@ -18,7 +18,7 @@ use regrasp_manipulation::failure::{Failure, FailureKind};
 use regrasp_manipulation::forces::held::Held;
 use regrasp_manipulation::grasp::state::{Contacts, MAX_FINGERS, no_contact};
 use regrasp_manipulation::model::Model;
-use regrasp_manipulation::motion_settings::MotionSettings;
+use regrasp_manipulation::motion_settings::{MotionSettings, PartsMove};
 use regrasp_manipulation::settings::PhysicsSettings;
 use regrasp_manipulation::task_settings::TaskSettings;
 use regrasp_plan::robot_plan::HoldingPromises;
@@ -273,6 +273,12 @@ impl<'a> Context<'a> {
             settings,
             motion: MotionSettings {
                 clearance: settings.clearance,
+                method: settings.method,
+                parts: settings.parts,
+                largest_rounding: match settings.parts {
+                    PartsMove::AtOnce => MotionSettings::default().largest_rounding,
+                    PartsMove::InTurn => 0.0,
+                },
                 search_margin: settings.search_margin,
                 shortcuts: settings.shortcuts,
                 max_samples: settings.max_samples,

@@ -3,7 +3,7 @@
 use crate::context::{Context, Grasp};
 use crate::failing::{Stage, Tally};
 use crate::forces;
-use crate::line::{LINE_STEPS, is_state_free, is_way_free, straight};
+use crate::line::{LINE_STEPS, are_states_free, is_state_free, is_way_free, straight};
 use crate::station::{arm_postures, can_close, common_postures, with_fingers};
 use crate::timing::Smooth;
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
@@ -11,6 +11,7 @@ use regrasp_arms::model::ArmModel;
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp_lists::pairs::are_hands_apart;
+use std::rc::Rc;
 
 /// Postures of one arm that are looked at.
 const POSTURES: usize = 3;
@@ -22,6 +23,18 @@ const COMMON_DRAWS: usize = 2;
 const BEYOND: f64 = 0.3;
 /// Shares of the ways in and out that are tried.
 const WAY_SHARES: [f64; 2] = [1.0, 0.4];
+
+/// How much is looked at for one pair of grasps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Effort {
+    /// The best places alone: another pair of grasps may be easier.
+    Little,
+    /// All places, then drawn ones.
+    Full,
+}
+
+/// Places that are tried with little effort.
+const LITTLE_PLACES: usize = 8;
 
 /// One hand gives the object to another one.
 #[derive(Debug, Clone)]
@@ -98,8 +111,8 @@ impl Places {
     pub fn give(
         &self,
         context: &Context,
-        giver: [usize; 2],
-        taker: [usize; 2],
+        [giver, taker]: [[usize; 2]; 2],
+        effort: Effort,
         tally: &mut Tally,
     ) -> Result<Give, &'static str> {
         let mut attempt = Attempt::new(context, giver, taker);
@@ -117,7 +130,11 @@ impl Places {
             let position = at.coords - turn * context.object.center_of_mass.coords;
             Pose::from_parts(Translation3::from(position), *turn)
         };
-        for at in &self.positions {
+        let (n_places, n_draws) = match effort {
+            Effort::Little => (LITTLE_PLACES, 0),
+            Effort::Full => (self.positions.len(), context.settings.exchange_draws),
+        };
+        for at in self.positions.iter().take(n_places) {
             let mut ranked: Vec<(f64, &UnitQuaternion<f64>)> =
                 self.turns.iter().map(|turn| (natural(at, turn), turn)).collect();
             ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -134,7 +151,7 @@ impl Places {
             return Err("without a free place");
         }
         let hands = [giver[0], taker[0]];
-        for draw in 0..context.settings.exchange_draws {
+        for draw in 0..n_draws {
             let middle = &self.positions[draw % self.positions.len().min(8)];
             let spread = context.settings.exchange_spread;
             let shift = Vector::new(rng.normal(), rng.normal(), rng.normal()) * spread;
@@ -186,14 +203,16 @@ struct Attempt<'c, 'a> {
     giver: [usize; 2],
     taker: [usize; 2],
     /// Both hands closed, with the object; made when it is needed.
-    model: Option<ArmModel>,
+    model: Option<Rc<ArmModel>>,
+    /// The taker before the exchange, the giver after it: that hand open.
+    open: [Option<Rc<Open>>; 2],
     /// Index of the nearest reason.
     reached: usize,
 }
 
 impl<'c, 'a> Attempt<'c, 'a> {
     fn new(context: &'c Context<'a>, giver: [usize; 2], taker: [usize; 2]) -> Self {
-        Attempt { context, giver, taker, model: None, reached: 0 }
+        Attempt { context, giver, taker, model: None, open: [None, None], reached: 0 }
     }
 
     /// The exchange with the object at a pose, with the common joints of `common`.
@@ -220,45 +239,74 @@ impl<'c, 'a> Attempt<'c, 'a> {
         let free = &context.arms_and_torso;
         let model = self.model.get_or_insert_with(|| {
             let attached = context.attached(giver.0, &giver.1.object_from_hand.inverse(), &[taker.0]);
-            ArmModel::new(context.robot, &context.covers.links, &[attached], &both, free)
+            Rc::new(ArmModel::new(context.robot, &context.covers.links, &[attached], &both, free))
         });
+        let model = Rc::clone(model);
         let arm = context.hands[taker.0].arm_joints.clone();
-        for first in &first {
-            for second in &second {
-                let mut at = first.clone();
-                at[arm.clone()].copy_from_slice(&second[arm.clone()]);
-                if !is_state_free(context, model, &context.fixed, &at, tally) {
-                    continue;
-                }
-                self.reached = self.reached.max(2);
-                let way = |(hand, grasp): (usize, &Grasp), tally: &mut Tally| {
-                    let open = with_fingers(context, &at, hand, &grasp.open);
-                    let direction = world_from_object.rotation * grasp.direction;
-                    // The other hand rests, and touches the object.
-                    let arm: Vec<usize> = context.hands[hand].arm_joints.clone().collect();
-                    let model = context.model(&open, &arm, None);
-                    WAY_SHARES.iter().find_map(|share| {
-                        let way = straight(context, hand, &open, &(-direction * grasp.distance * *share))?;
-                        let timed = way.timed(&context.limits, 1.0, LINE_STEPS);
-                        is_way_free(context, (&model, hand), world_from_object, &timed, tally).then_some(way)
-                    })
-                };
-                let Some(way_in) = way(taker, tally) else { continue };
-                self.reached = self.reached.max(3);
-                if !can_close(context, taker.0, [&with_fingers(context, &at, taker.0, &taker.1.open), &at], tally) {
-                    continue;
-                }
-                self.reached = self.reached.max(4);
-                if !can_close(context, giver.0, [&at, &with_fingers(context, &at, giver.0, &giver.1.open)], tally) {
-                    continue;
-                }
-                self.reached = self.reached.max(5);
-                let Some(way_out) = way(giver, tally) else { continue };
-                return Some(Give { giver: self.giver, taker: self.taker, way_in, way_out });
+        let with_second = |first: &Vec<f64>, second: &Vec<f64>| {
+            let mut at = first.clone();
+            at[arm.clone()].copy_from_slice(&second[arm.clone()]);
+            at
+        };
+        let all: Vec<Vec<f64>> =
+            first.iter().flat_map(|first| second.iter().map(|second| with_second(first, second))).collect();
+        let free = are_states_free(context, &model, &context.fixed, &all, tally);
+        for at in all.into_iter().zip(free).filter_map(|(at, is_free)| is_free.then_some(at)) {
+            self.reached = self.reached.max(2);
+            let Some(way_in) = self.way(taker, giver, &at, world_from_object, tally) else { continue };
+            self.reached = self.reached.max(3);
+            if !can_close(context, taker.0, [&with_fingers(context, &at, taker.0, &taker.1.open), &at], tally) {
+                continue;
             }
+            self.reached = self.reached.max(4);
+            if !can_close(context, giver.0, [&at, &with_fingers(context, &at, giver.0, &giver.1.open)], tally) {
+                continue;
+            }
+            self.reached = self.reached.max(5);
+            let Some(way_out) = self.way(giver, taker, &at, world_from_object, tally) else { continue };
+            return Some(Give { giver: self.giver, taker: self.taker, way_in, way_out });
         }
         None
     }
+
+    /// The straight way of one open hand from the object, while the other one holds it. It ends where searches for motions may begin.
+    fn way(
+        &mut self,
+        (hand, grasp): (usize, &Grasp),
+        holder: (usize, &Grasp),
+        at: &[f64],
+        world_from_object: &Pose,
+        tally: &mut Tally,
+    ) -> Option<Smooth> {
+        let context = self.context;
+        let opened = with_fingers(context, at, hand, &grasp.open);
+        let open = self.open[usize::from(hand == self.giver[0])].get_or_insert_with(|| {
+            let free = &context.arms_and_torso;
+            let carried = (holder.0, &holder.1.object_from_hand.inverse());
+            Rc::new(Open {
+                alone: context.model(&opened, free, None),
+                holding: context.model(&opened, free, Some(carried)),
+            })
+        });
+        let open = Rc::clone(open);
+        let direction = world_from_object.rotation * grasp.direction;
+        WAY_SHARES.iter().find_map(|share| {
+            let way = straight(context, hand, &opened, &(-direction * grasp.distance * *share))?;
+            if !is_state_free(context, &open.holding, &context.fixed, way.ends()[1], tally) {
+                return None;
+            }
+            let timed = way.timed(&context.limits, 1.0, LINE_STEPS);
+            is_way_free(context, (&open.alone, hand), world_from_object, &timed, tally).then_some(way)
+        })
+    }
+}
+
+/// A robot with one hand open.
+struct Open {
+    /// Without the object.
+    alone: ArmModel,
+    /// The other hand holds the object.
+    holding: ArmModel,
 }
 
 /// The 24 turns that bring a cube to itself.

@@ -1,11 +1,12 @@
 //! The task graph: who holds the object by which grasp, or where it lies. Edges are tested when the cheapest path uses them.
 
 use crate::context::Context;
-use crate::exchange::{Give, Places, is_double_grasp};
+use crate::exchange::{Effort, Give, Places, is_double_grasp};
 use crate::failing::{Stage, Tally};
 use crate::in_hand::{self, Change};
 use crate::motions::{self, Step, Stuck};
 use crate::placements::{Place, intermediate};
+use crate::roadmap::TaskRoadmap;
 use crate::station::{Station, may_hold, station};
 use regrasp_geometry::Vector;
 use regrasp_manipulation::failure::{Failure, FailureKind};
@@ -52,18 +53,26 @@ impl<T> Known<T> {
 struct Grip {
     known: Known<Station>,
     cost: f64,
+    /// How often motions to it were not found: to take the object, and to put it down.
+    stuck: [usize; 2],
 }
 
 /// One hand gives to another.
 struct Given {
     known: Known<Give>,
     cost: f64,
+    /// How often motions to it were not found.
+    stuck: usize,
+    /// The best places of the exchange were tried already.
+    is_second_look: bool,
 }
 
 /// A hand changes its grasp.
 struct Changed {
     known: Known<Change>,
     cost: f64,
+    /// How often motions to it were not found.
+    stuck: usize,
 }
 
 /// Cost of taking or putting down, of giving; in seconds about. By hand: what plans take.
@@ -80,6 +89,10 @@ const SECONDS_PER_METRE: f64 = 2.0;
 const POOR: f64 = 2.0;
 /// What exchanges cost more for each that failed, in seconds, so that other ways get their turn. By hand.
 const FAILED: f64 = 0.05;
+/// What an exchange costs more that was not found at the best places, in seconds. By hand.
+const SECOND_LOOK: f64 = 1.0;
+/// What an exchange costs more that the roadmap does not have, in seconds. By hand.
+const NOT_MADE: f64 = 2.0;
 /// A motion that was not found makes its edge this much dearer, in seconds; it is dead after so many.
 const STUCK: f64 = 1.0;
 const MOST_STUCK: usize = 3;
@@ -87,25 +100,29 @@ const MOST_STUCK: usize = 3;
 /// The graph.
 struct Graph<'c, 'a> {
     context: &'c Context<'a>,
+    /// What was made before.
+    roadmap: Option<&'c TaskRoadmap>,
     places: Vec<Place>,
     /// By place, hand and grasp.
     grips: Vec<Vec<Vec<Grip>>>,
-    /// By giver and taker.
-    gives: BTreeMap<([usize; 2], [usize; 2]), Given>,
+    /// By the hands of giver and taker: by their grasps, those of the taker in a row.
+    gives: BTreeMap<[usize; 2], Vec<Given>>,
     /// By grasp before and grasp after, of one hand.
     changes: BTreeMap<([usize; 2], [usize; 2]), Changed>,
     searched_changes: usize,
+    /// By hand: the number of its first grasp among the nodes.
+    first_held: Vec<usize>,
+    n_nodes: usize,
     /// Places of the exchange, by both hands; of changes in one hand, by that hand twice.
     exchange: BTreeMap<[usize; 2], Places>,
     failed_gives: usize,
     tested: usize,
-    /// How often motions to an edge were not found.
-    stuck: BTreeMap<(Node, Node), usize>,
 }
 
 /// The cheapest plan that holds what it promises.
-pub fn search(context: &Context, tally: &mut Tally) -> Result<RobotPlan, Failure> {
-    let mut graph = Graph::new(context);
+pub fn search(context: &Context, roadmap: Option<&TaskRoadmap>, tally: &mut Tally) -> Result<RobotPlan, Failure> {
+    let mut graph = Graph::new(context, roadmap);
+    let roads = roadmap.and_then(|roadmap| roadmap.roads.as_ref());
     let mut attempt = 0;
     loop {
         if let Err(interrupt) = context.budget.check(tally.statistics.work) {
@@ -120,13 +137,13 @@ pub fn search(context: &Context, tally: &mut Tally) -> Result<RobotPlan, Failure
         }
         let steps = graph.steps(&path);
         attempt += 1;
-        match motions::segments(context, &steps, attempt, tally) {
+        match motions::segments(context, &steps, (attempt, roads), tally) {
             Ok(segments) => {
                 for stage in [Stage::Transit, Stage::Carry] {
                     tally.count(stage, Ok(()));
                 }
                 let mut plan = RobotPlan::answering_pick_and_place(context.scene, context.query);
-                plan.method = "task_graph".into();
+                plan.method = if roadmap.is_some() { "super_graph" } else { "task_graph" }.into();
                 plan.seed = context.seed;
                 plan.settings = serde_json::to_value(context.settings).unwrap_or_default();
                 plan.promises.clearance = context.settings.clearance;
@@ -151,7 +168,7 @@ pub fn search(context: &Context, tally: &mut Tally) -> Result<RobotPlan, Failure
 }
 
 impl<'c, 'a> Graph<'c, 'a> {
-    fn new(context: &'c Context<'a>) -> Self {
+    fn new(context: &'c Context<'a>, roadmap: Option<&'c TaskRoadmap>) -> Self {
         let ends = [&context.query.world_from_object_start, &context.query.world_from_object_goal];
         let mut places: Vec<Place> = ends.iter().filter_map(|pose| Place::new(context, pose)).collect();
         if context.settings.put_down {
@@ -170,7 +187,7 @@ impl<'c, 'a> Graph<'c, 'a> {
             let base = context.robot.world_from_root().translation.vector;
             let natural = (at - base).try_normalize(1e-9).map_or(0.0, |towards: Vector| towards.dot(&comes));
             let poor = 0.5 * (1.0 - own.score) + 0.25 * (1.0 - natural);
-            Grip { known: Known::New, cost: GRIP_SECONDS + SECONDS_PER_METRE * detour + POOR * poor }
+            Grip { known: Known::New, cost: GRIP_SECONDS + SECONDS_PER_METRE * detour + POOR * poor, stuck: [0; 2] }
         };
         let n_grasps = |hand: usize| context.hands[hand].grasps.len();
         let grips = (0..places.len())
@@ -180,101 +197,169 @@ impl<'c, 'a> Graph<'c, 'a> {
                     .collect()
             })
             .collect();
-        let mut gives = BTreeMap::new();
-        if context.settings.hand_over {
-            for giver in 0..context.hands.len() {
-                for taker in
-                    (0..context.hands.len()).filter(|&taker| context.hands[taker].arm != context.hands[giver].arm)
-                {
-                    for i in 0..n_grasps(giver) {
-                        for j in 0..n_grasps(taker) {
-                            let score = context.hands[giver].grasps[i].score.min(context.hands[taker].grasps[j].score);
-                            let cost = GIVE_SECONDS + POOR * (1.0 - score);
-                            gives.insert(([giver, i], [taker, j]), Given { known: Known::New, cost });
-                        }
-                    }
+        let mut gives: BTreeMap<[usize; 2], Vec<Given>> = BTreeMap::new();
+        for giver in 0..context.hands.len() {
+            for taker in 0..context.hands.len() {
+                if !context.settings.hand_over || context.hands[taker].arm == context.hands[giver].arm {
+                    continue;
+                }
+                let score = |hand: usize, grasp: usize| context.hands[hand].grasps[grasp].score;
+                let given = |i: usize, j: usize| {
+                    let cost = GIVE_SECONDS + POOR * (1.0 - score(giver, i).min(score(taker, j)));
+                    Given { known: Known::New, cost, stuck: 0, is_second_look: false }
+                };
+                let all = (0..n_grasps(giver)).flat_map(|i| (0..n_grasps(taker)).map(move |j| (i, j)));
+                gives.insert([giver, taker], all.map(|(i, j)| given(i, j)).collect());
+            }
+        }
+        if let Some(roadmap) = roadmap {
+            gives.values_mut().flatten().for_each(|given| given.cost += NOT_MADE);
+            for give in &roadmap.exchanges {
+                let n = n_grasps(give.taker[0]);
+                let of_pair = gives.get_mut(&[give.giver[0], give.taker[0]]);
+                if let Some(given) = of_pair.and_then(|of| of.get_mut(give.giver[1] * n + give.taker[1])) {
+                    (given.known, given.cost) = (Known::Found(Box::new(give.clone())), given.cost - NOT_MADE);
                 }
             }
         }
+        let mut n_nodes = places.len();
+        let mut first_held = Vec::new();
+        for hand in 0..context.hands.len() {
+            first_held.push(n_nodes);
+            n_nodes += n_grasps(hand);
+        }
         Graph {
             context,
+            roadmap,
             places,
             grips,
             gives,
             changes: changes_of(context),
             searched_changes: 0,
+            first_held,
+            n_nodes,
             exchange: BTreeMap::new(),
             failed_gives: 0,
             tested: 0,
-            stuck: BTreeMap::new(),
         }
     }
 
-    fn dearer(&self, from: Node, to: Node) -> f64 {
-        let stuck = self.stuck.get(&(from, to)).copied().unwrap_or_default();
-        let change = if self.context.settings.cost == TaskCost::Changes { CHANGE } else { 0.0 };
-        change + STUCK * stuck as f64
+    /// The number of a node: places first, then grasps by hand.
+    fn index(&self, node: Node) -> usize {
+        match node {
+            Node::Lies(place) => place,
+            Node::Held([hand, grasp]) => self.first_held[hand] + grasp,
+        }
     }
 
-    /// Edges from a node: where they lead, and what they cost.
-    fn edges(&self, from: Node, into: &mut Vec<(Node, f64)>) {
+    /// The node of a number.
+    fn node(&self, index: usize) -> Node {
+        if index < self.places.len() {
+            return Node::Lies(index);
+        }
+        let hand = self.first_held.partition_point(|&first| first <= index) - 1;
+        Node::Held([hand, index - self.first_held[hand]])
+    }
+
+    /// The edge of one hand that gives to another one.
+    fn given(&mut self, giver: [usize; 2], taker: [usize; 2]) -> Option<&mut Given> {
+        let n = self.context.hands[taker[0]].grasps.len();
+        self.gives.get_mut(&[giver[0], taker[0]])?.get_mut(giver[1] * n + taker[1])
+    }
+
+    /// Edges from a node: the numbers of the nodes where they lead, and what they cost.
+    fn edges(&self, from: Node, into: &mut Vec<(usize, f64)>) {
         into.clear();
+        let change = if self.context.settings.cost == TaskCost::Changes { CHANGE } else { 0.0 };
         match from {
             Node::Lies(place) => {
                 for (hand, of_hand) in self.grips[place].iter().enumerate() {
                     let alive = of_hand.iter().enumerate().filter(|(_, grip)| !grip.known.is_dead());
-                    into.extend(alive.map(|(grasp, grip)| (Node::Held([hand, grasp]), grip.cost)));
+                    let cost = |grip: &Grip| grip.cost + change + STUCK * grip.stuck[0] as f64;
+                    into.extend(alive.map(|(grasp, grip)| (self.first_held[hand] + grasp, cost(grip))));
                 }
             }
-            Node::Held(giver) => {
+            Node::Held([hand, grasp]) => {
                 for (place, of_place) in self.grips.iter().enumerate().skip(1) {
-                    let grip = &of_place[giver[0]][giver[1]];
+                    let grip = &of_place[hand][grasp];
                     if !grip.known.is_dead() {
-                        into.push((Node::Lies(place), grip.cost));
+                        into.push((place, grip.cost + change + STUCK * grip.stuck[1] as f64));
                     }
                 }
-                let gives = self.gives.range((giver, [0, 0])..=(giver, [usize::MAX, usize::MAX]));
                 let failed = FAILED * self.failed_gives as f64;
-                let alive = gives.filter(|(_, given)| !given.known.is_dead());
-                into.extend(alive.map(|((_, taker), given)| (Node::Held(*taker), given.cost + failed)));
-                let changes = self.changes.range((giver, [0, 0])..=(giver, [usize::MAX, usize::MAX]));
+                for ([_, taker], of_pair) in self.gives.range([hand, 0]..=[hand, usize::MAX]) {
+                    let n = self.context.hands[*taker].grasps.len();
+                    let own = of_pair[grasp * n..(grasp + 1) * n].iter().enumerate();
+                    let alive = own.filter(|(_, given)| !given.known.is_dead());
+                    let cost = |given: &Given| given.cost + failed + change + STUCK * given.stuck as f64;
+                    into.extend(alive.map(|(j, given)| (self.first_held[*taker] + j, cost(given))));
+                }
+                let from = [hand, grasp];
+                let changes = self.changes.range((from, [0, 0])..=(from, [usize::MAX, usize::MAX]));
                 let alive = changes.filter(|(_, changed)| !changed.known.is_dead());
-                into.extend(alive.map(|((_, after), changed)| (Node::Held(*after), changed.cost)));
+                let cost = |changed: &Changed| changed.cost + change + STUCK * changed.stuck as f64;
+                into.extend(alive.map(|((_, [hand, after]), changed)| (self.first_held[*hand] + after, cost(changed))));
             }
-        }
-        for (to, cost) in into.iter_mut() {
-            *cost += self.dearer(from, *to);
         }
     }
 
-    /// The cheapest path from the start to the goal through edges that are not dead (Dijkstra 1959).
+    /// By node: no way from it to the goal costs less.
+    fn least(&self) -> Vec<f64> {
+        let mut least = vec![f64::INFINITY; self.n_nodes];
+        let alive = |grip: &Grip| if grip.known.is_dead() { f64::INFINITY } else { grip.cost };
+        let own = |[hand, grasp]: [usize; 2]| self.grips.get(1).map_or(f64::INFINITY, |of| alive(&of[hand][grasp]));
+        let held = |index: usize| match self.node(index) {
+            Node::Held(held) => own(held),
+            Node::Lies(_) => f64::INFINITY,
+        };
+        let last = (self.places.len()..self.n_nodes).map(held).fold(f64::INFINITY, f64::min);
+        for (index, least) in least.iter_mut().enumerate() {
+            *least = match self.node(index) {
+                Node::Lies(_) => GRIP_SECONDS + last,
+                Node::Held(held) => own(held).min(GRIP_SECONDS.min(GIVE_SECONDS) + last),
+            };
+        }
+        least[self.index(Node::Lies(1))] = 0.0;
+        least
+    }
+
+    /// The cheapest path from the start to the goal through edges that are not dead (A*: Hart, Nilsson, Raphael 1968).
     fn cheapest(&self) -> Option<Vec<Node>> {
-        let goal = Node::Lies(1);
-        let mut costs: BTreeMap<Node, (f64, Option<Node>)> = BTreeMap::from([(Node::Lies(0), (0.0, None))]);
-        let mut waiting: BTreeMap<Node, f64> = BTreeMap::from([(Node::Lies(0), 0.0)]);
+        const NONE: usize = usize::MAX;
+        let goal = self.index(Node::Lies(1));
+        let least = self.least();
+        let mut costs = vec![f64::INFINITY; self.n_nodes];
+        let mut before = vec![NONE; self.n_nodes];
+        let mut is_done = vec![false; self.n_nodes];
+        costs[self.index(Node::Lies(0))] = 0.0;
         let mut edges = Vec::new();
-        while let Some((&node, &cost)) = waiting.iter().min_by(|a, b| a.1.total_cmp(b.1).then(a.0.cmp(b.0))) {
-            waiting.remove(&node);
-            if node == goal {
-                let mut path = vec![goal];
-                let mut at = goal;
-                while let Some((_, Some(before))) = costs.get(&at) {
-                    path.push(*before);
-                    at = *before;
+        loop {
+            let mut nearest = (f64::INFINITY, NONE);
+            for (node, &cost) in costs.iter().enumerate() {
+                if cost + least[node] < nearest.0 && !is_done[node] {
+                    nearest = (cost + least[node], node);
                 }
-                path.reverse();
-                return Some(path);
             }
-            self.edges(node, &mut edges);
+            let (_, node) = nearest;
+            if node == NONE {
+                return None;
+            }
+            is_done[node] = true;
+            if node == goal {
+                let mut path = vec![node];
+                while before[path[path.len() - 1]] != NONE {
+                    path.push(before[path[path.len() - 1]]);
+                }
+                return Some(path.into_iter().rev().map(|index| self.node(index)).collect());
+            }
+            let cost = costs[node];
+            self.edges(self.node(node), &mut edges);
             for &(to, of_edge) in &edges {
-                let whole = cost + of_edge;
-                if costs.get(&to).is_none_or(|known| whole < known.0) {
-                    costs.insert(to, (whole, Some(node)));
-                    waiting.insert(to, whole);
+                if cost + of_edge < costs[to] && !is_done[to] {
+                    (costs[to], before[to]) = (cost + of_edge, node);
                 }
             }
         }
-        None
     }
 
     /// Tests the edges of a path, the cheapest test first. False where one turns out dead.
@@ -293,10 +378,15 @@ impl<'c, 'a> Graph<'c, 'a> {
     /// Pairs of grasps in which the hands hit each other are dead.
     fn test_pair(&mut self, from: Node, to: Node, tally: &mut Tally) -> bool {
         let (Node::Held(giver), Node::Held(taker)) = (from, to) else { return true };
-        let Some(given) = self.gives.get_mut(&(giver, taker)) else { return giver[0] == taker[0] };
+        let (context, roadmap) = (self.context, self.roadmap);
+        let Some(given) = self.given(giver, taker) else { return giver[0] == taker[0] };
         if matches!(given.known, Known::New) {
             tally.work(1);
-            given.known = match is_double_grasp(self.context, giver, taker) {
+            let is_apart = match roadmap {
+                Some(roadmap) => roadmap.is_apart(giver, taker),
+                None => is_double_grasp(context, giver, taker),
+            };
+            given.known = match is_apart {
                 true => Known::Likely,
                 false => {
                     tally.count(Stage::Exchange, Err("hands touch"));
@@ -340,17 +430,32 @@ impl<'c, 'a> Graph<'c, 'a> {
 
     fn test_give(&mut self, from: Node, to: Node, tally: &mut Tally) -> bool {
         let (Node::Held(giver), Node::Held(taker)) = (from, to) else { return true };
-        let Some(given) = self.gives.get_mut(&(giver, taker)) else { return giver[0] == taker[0] };
-        if matches!(given.known, Known::Likely) {
-            self.tested += 1;
-            let hands = [giver[0], taker[0]];
-            let places = self.exchange.entry(hands).or_insert_with(|| Places::new(self.context, hands));
-            let found = places.give(self.context, giver, taker, tally);
-            tally.count(Stage::Exchange, found.as_ref().map(|_| ()).map_err(|reason| *reason));
-            self.failed_gives += usize::from(found.is_err());
+        let context = self.context;
+        let Some(given) = self.given(giver, taker) else { return giver[0] == taker[0] };
+        if !matches!(given.known, Known::Likely) {
+            return !given.known.is_dead();
+        }
+        let is_second_look = given.is_second_look;
+        self.tested += 1;
+        let hands = [giver[0], taker[0]];
+        let places = self.exchange.entry(hands).or_insert_with(|| Places::new(context, hands));
+        let effort = if is_second_look { Effort::Full } else { Effort::Little };
+        let found = places.give(context, [giver, taker], effort, tally);
+        if let (Err(_), Effort::Little) = (&found, effort) {
+            // Another pair may be easier; this one gets a second look when its turn comes.
+            self.failed_gives += 1;
+            if let Some(given) = self.given(giver, taker) {
+                (given.is_second_look, given.cost) = (true, given.cost + SECOND_LOOK);
+            }
+            return false;
+        }
+        tally.count(Stage::Exchange, found.as_ref().map(|_| ()).map_err(|reason| *reason));
+        self.failed_gives += usize::from(found.is_err());
+        let is_found = found.is_ok();
+        if let Some(given) = self.given(giver, taker) {
             given.known = found.map_or(Known::Dead, |found| Known::Found(Box::new(found)));
         }
-        !given.known.is_dead()
+        is_found
     }
 
     /// Changes of the grasp of one hand, the dearest test of all.
@@ -387,7 +492,9 @@ impl<'c, 'a> Graph<'c, 'a> {
                 self.changes.get(&(before, after)).and_then(|changed| changed.known.found()).map(Step::Change)
             }
             (Node::Held(giver), Node::Held(taker)) => {
-                self.gives.get(&(giver, taker)).and_then(|given| given.known.found()).map(Step::Give)
+                let n = self.context.hands[taker[0]].grasps.len();
+                let of_pair = self.gives.get(&[giver[0], taker[0]]);
+                of_pair.and_then(|of_pair| of_pair[giver[1] * n + taker[1]].known.found()).map(Step::Give)
             }
             (Node::Lies(_), Node::Lies(_)) => None,
         };
@@ -397,26 +504,33 @@ impl<'c, 'a> Graph<'c, 'a> {
     /// The motion to a step was not found: its edge becomes dearer, and dead in the end.
     fn blame(&mut self, path: &[Node], step: usize) {
         let step = step.min(path.len() - 2);
-        let (from, to) = (path[step], path[step + 1]);
-        let count = self.stuck.entry((from, to)).or_default();
-        *count += 1;
-        if *count < MOST_STUCK {
-            return;
-        }
-        match (from.min(to), from.max(to)) {
-            (Node::Lies(place), Node::Held([hand, grasp])) => self.grips[place][hand][grasp].known = Known::Dead,
-            _ => {
-                if let (Node::Held(before), Node::Held(after)) = (from, to)
-                    && let Some(changed) = self.changes.get_mut(&(before, after))
-                {
-                    changed.known = Known::Dead;
-                }
-                if let (Node::Held(giver), Node::Held(taker)) = (from, to)
-                    && let Some(given) = self.gives.get_mut(&(giver, taker))
-                {
-                    given.known = Known::Dead;
+        match (path[step], path[step + 1]) {
+            (Node::Lies(place), Node::Held([hand, grasp])) => self.grips[place][hand][grasp].is_stuck(0),
+            (Node::Held([hand, grasp]), Node::Lies(place)) => self.grips[place][hand][grasp].is_stuck(1),
+            (Node::Held(before), Node::Held(after)) => {
+                if let Some(changed) = self.changes.get_mut(&(before, after)) {
+                    changed.stuck += 1;
+                    if changed.stuck >= MOST_STUCK {
+                        changed.known = Known::Dead;
+                    }
+                } else if let Some(given) = self.given(before, after) {
+                    given.stuck += 1;
+                    if given.stuck >= MOST_STUCK {
+                        given.known = Known::Dead;
+                    }
                 }
             }
+            (Node::Lies(_), Node::Lies(_)) => {}
+        }
+    }
+}
+
+impl Grip {
+    /// A motion to take the object, or to put it down, was not found.
+    fn is_stuck(&mut self, way: usize) {
+        self.stuck[way] += 1;
+        if self.stuck[way] >= MOST_STUCK {
+            self.known = Known::Dead;
         }
     }
 }
@@ -434,7 +548,7 @@ fn changes_of(context: &Context) -> BTreeMap<([usize; 2], [usize; 2]), Changed> 
             near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             for (far, after) in near.into_iter().take(context.settings.in_hand_neighbours) {
                 let cost = CHANGE_SECONDS + SECONDS_PER_RADIAN * far;
-                found.insert(([hand, before], [hand, after]), Changed { known: Known::New, cost });
+                found.insert(([hand, before], [hand, after]), Changed { known: Known::New, cost, stuck: 0 });
             }
         }
     }

@@ -6,6 +6,8 @@
 
 /// What is refused before any search.
 mod before;
+/// A hand by itself among what rests.
+mod clear;
 /// Scene, robot and grasps, prepared once.
 mod context;
 /// Where one hand gives the object to another one.
@@ -26,6 +28,8 @@ mod motions;
 mod placements;
 /// Segments and waypoints.
 mod record;
+/// What is made before any query.
+pub mod roadmap;
 /// A hand at an object that lies on a support.
 mod station;
 /// Times along smooth paths.
@@ -33,6 +37,8 @@ mod timing;
 
 pub use regrasp_manipulation::failure::{Cause, Failure, FailureKind};
 pub use regrasp_manipulation::task_settings::{TaskCost, TaskSettings};
+
+pub use roadmap::{RoadmapBuildSettings, TaskRoadmap, build_roadmap};
 
 use context::{Context, Prepared};
 use failing::Tally;
@@ -53,11 +59,31 @@ pub fn plan_pick_and_place(
     seed: u64,
     budget: &Budget,
 ) -> Result<RobotPlan, Failure> {
+    plan_with_roadmap((scene, state), query, lists, settings, (seed, budget), None)
+}
+
+/// As [`plan_pick_and_place`], with what was made before for this robot, what rests around it, and these lists.
+///
+/// Errors: as that, and a roadmap that was made for something else.
+pub fn plan_with_roadmap(
+    (scene, state): (&Scene, &State),
+    query: &PickAndPlaceQuery,
+    lists: &[(usize, GraspList)],
+    settings: &TaskSettings,
+    (seed, budget): (u64, &Budget),
+    roadmap: Option<&TaskRoadmap>,
+) -> Result<RobotPlan, Failure> {
     settings.validate().map_err(|problem| Failure::of_settings(&problem))?;
     let prepared = Prepared::new(scene, query, lists, settings)?;
     let models = prepared.models();
     let context = Context::new((scene, state), query, (&prepared, &models), settings, (seed, budget))?;
+    if let Some(roadmap) = roadmap {
+        if let Some(what) = roadmap.differs(&context) {
+            let message = format!("the roadmap was made with other inputs: {what} differs");
+            return Err(failing::refused(FailureKind::SettingsInvalid, message, "build the roadmap again"));
+        }
+    }
     let mut tally = Tally::default();
     before::refuse(&context, &mut tally)?;
-    graph::search(&context, &mut tally)
+    graph::search(&context, roadmap, &mut tally)
 }

@@ -43,14 +43,23 @@ const MOST_CHANGE: f64 = 0.25;
 
 /// True where a robot keeps the clearance in a state.
 pub fn is_state_free(context: &Context, model: &ArmModel, world: &World, state: &[f64], tally: &mut Tally) -> bool {
-    let at = model.configuration_of(state);
-    if !model.is_within_limits(&at, 1e-9) {
-        return false;
-    }
+    are_states_free(context, model, world, std::slice::from_ref(&state.to_vec()), tally)[0]
+}
+
+/// The same for each of some states.
+pub fn are_states_free(
+    context: &Context,
+    model: &ArmModel,
+    world: &World,
+    states: &[Vec<f64>],
+    tally: &mut Tally,
+) -> Vec<bool> {
+    let all: Vec<Vec<f64>> = states.iter().map(|state| model.configuration_of(state)).collect();
     let mut collider = collider(context, model, world);
-    let is_free = collider.is_certified_free(&Track::straight(&at, &at));
+    let mut free = collider.are_free(&all);
+    free.iter_mut().zip(&all).for_each(|(is_free, at)| *is_free &= model.is_within_limits(at, 1e-9));
     count(&collider, tally);
-    is_free
+    free
 }
 
 /// True where a robot keeps the clearance at every moment of a motion.
@@ -77,10 +86,16 @@ pub fn is_way_free(
     tally: &mut Tally,
 ) -> bool {
     let mounted = Part::Hand(context.hands[hand].mounted);
+    // All else rests, where it was free.
+    let arm: Vec<usize> = (0..model.dimension())
+        .filter(|&k| context.hands[hand].arm_joints.contains(&model.coordinates[k].index))
+        .collect();
+    let moves = |body: usize| model.is_moved_by(body, &arm);
     let mut robot = collider(context, model, &context.fixed);
+    robot.only(moves, |[a, b]| moves(a) || moves(b));
     let alone = World::default().with(&context.alone, world_from_object);
     let mut others = collider(context, model, &alone);
-    others.only(|body| context.robot.part_of(model.bodies[body].link) != mounted, |_| false);
+    others.only(|body| moves(body) && context.robot.part_of(model.bodies[body].link) != mounted, |_| false);
     let is_free = is_free(&mut robot, timed) && is_free(&mut others, timed);
     count(&robot, tally);
     count(&others, tally);

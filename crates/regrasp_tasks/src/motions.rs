@@ -10,6 +10,7 @@ use crate::placements::Place;
 use crate::record::{Holding, Moves, Record};
 use crate::station::{FINGER_STEPS, Station, with_fingers};
 use crate::timing::{Smooth, at_rest, one_after_the_other};
+use regrasp_arms::roadmap::Roads;
 use regrasp_arms::times::TimedPath;
 use regrasp_arms::{LegTimes, Problem, World, plan_leg};
 use regrasp_geometry::Pose;
@@ -59,16 +60,17 @@ const FIRST_SAMPLES: u64 = 1000;
 /// Why a motion with the object has no forces.
 const TOO_FAST: &str = "motions without forces that hold the object";
 
-/// Makes the segments of the steps. `attempt` tells searches for motions apart.
+/// Makes the segments of the steps. `attempt` tells searches for motions apart; `roads` is the graph of the arms, where one is known.
 pub fn segments(
     context: &Context,
     steps: &[Step],
-    attempt: u64,
+    (attempt, roads): (u64, Option<&Roads>),
     tally: &mut Tally,
 ) -> Result<Vec<RobotSegment>, Stuck> {
     let mut maker = Maker {
         context,
         attempt,
+        roads,
         record: Record::default(),
         state: context.query.start.clone(),
         object: context.query.world_from_object_start,
@@ -94,6 +96,8 @@ pub fn segments(
 struct Maker<'c, 'a> {
     context: &'c Context<'a>,
     attempt: u64,
+    /// The graph of the arms among what rests.
+    roads: Option<&'c Roads>,
     record: Record,
     state: Vec<f64>,
     object: Pose,
@@ -191,7 +195,14 @@ impl<'c, 'a> Maker<'c, 'a> {
             holder: Holder::Hand(context.hands[carried.hand].index),
             world_from_object: carried.world_from_object(context, from),
         }));
-        let problem = Problem::in_world(context.scene, &query, world.clone(), &context.covers);
+        let mut problem = Problem::in_world(context.scene, &query, world.clone(), &context.covers);
+        if let Some(roads) = self.roads {
+            let unknown = match carried {
+                Some(_) => World::default(),
+                None => World::default().with(&context.alone, &self.object),
+            };
+            problem.use_graph(roads, unknown);
+        }
         let seed = context.seed.wrapping_mul(31).wrapping_add(self.attempt * 64 + self.step as u64);
         let mut budget = context.budget.clone();
         budget.max_work = budget.max_work.saturating_sub(tally.statistics.work);

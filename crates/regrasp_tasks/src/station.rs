@@ -1,14 +1,17 @@
 //! A hand at an object that lies on a support: postures, the way in, and the way up.
 
+pub use crate::clear::with_fingers;
+use crate::clear::{is_hand_clear, links_of};
 use crate::context::{Context, Grasp};
 use crate::failing::{Stage, Tally};
 use crate::forces;
-use crate::line::{LINE_STEPS, is_lift_free, is_motion_free, is_state_free, is_way_free, straight};
+use crate::line::{LINE_STEPS, are_states_free, is_lift_free, is_motion_free, is_state_free, is_way_free, straight};
 use crate::placements::{Place, stable_pose};
 use crate::timing::Smooth;
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;
 use regrasp_robot::kinematics::arm_ik::{IkBudget, Unreachable};
+use std::cell::OnceCell;
 
 /// Postures of an arm that are looked at for one posture of the common joints.
 const POSTURES: usize = 4;
@@ -41,13 +44,6 @@ pub fn may_hold(context: &Context, place: &Place, hand: usize, grasp: &Grasp) ->
         return Err("grasps that do not hold the weight");
     }
     Ok(())
-}
-
-/// A state with other joints of one hand's fingers.
-pub fn with_fingers(context: &Context, state: &[f64], hand: usize, joints: &[f64]) -> Vec<f64> {
-    let mut state = state.to_vec();
-    state[context.hands[hand].fingers.clone()].copy_from_slice(joints);
-    state
 }
 
 /// Postures of the common joints: that of `state`, then drawn ones that keep their limits.
@@ -131,7 +127,14 @@ pub fn station(
     let closed = with_fingers(context, park, hand, &own.closed);
     let open = with_fingers(context, park, hand, &own.open);
     let free = &context.arms_and_torso;
-    let (mut models, mut reason) = (None, "out of reach");
+    let hands = [&own.closed, &own.open].map(|fingers| links_of(context, hand, fingers));
+    if !hands.iter().all(|links| is_hand_clear(context, links, &world_from_hand)) {
+        return Err("in collision");
+    }
+    let (models, mut reason) = ([const { OnceCell::new() }; 3], "out of reach");
+    let states = [(&closed, None), (&open, None), (&closed, Some((hand, &hand_from_object)))];
+    // Made when they are needed.
+    let model = |k: usize| models[k].get_or_init(|| context.model(states[k].0, free, states[k].1));
     let mut rng = Rng::keyed(context.seed, "common", 0);
     let commons = common_postures(context, &[hand], &closed, context.settings.common_draws, &mut rng);
     for common in &commons {
@@ -143,25 +146,16 @@ pub fn station(
                 continue;
             }
         };
-        let [closed, open, carrying] = models.get_or_insert_with(|| {
-            [
-                context.model(&closed, free, None),
-                context.model(&open, free, None),
-                context.model(&closed, free, Some((hand, &hand_from_object))),
-            ]
-        });
-        for at in postures {
-            reason = worse(reason, "in collision");
-            if !is_state_free(context, closed, &context.fixed, &at, tally) {
-                continue;
-            }
+        reason = worse(reason, "in collision");
+        let free = are_states_free(context, model(0), &context.fixed, &postures, tally);
+        for at in postures.into_iter().zip(free).filter_map(|(at, is_free)| is_free.then_some(at)) {
             reason = worse(reason, "without a way in");
             let direction = place.world_from_object.rotation * own.direction;
             let opened = with_fingers(context, &at, hand, &own.open);
             let way = WAY_SHARES.iter().find_map(|share| {
                 let way = straight(context, hand, &opened, &(-direction * own.distance * *share))?;
                 let timed = way.timed(&context.limits, 1.0, LINE_STEPS);
-                is_way_free(context, (open, hand), &place.world_from_object, &timed, tally).then_some(way)
+                is_way_free(context, (model(1), hand), &place.world_from_object, &timed, tally).then_some(way)
             });
             let Some(way) = way else { continue };
             reason = worse(reason, "with fingers that cannot close");
@@ -173,8 +167,8 @@ pub fn station(
                 let lift = straight(context, hand, &at, &(context.up() * context.settings.lift * *share))?;
                 let timed = lift.timed(&context.limits, 1.0, LINE_STEPS);
                 let worlds = [&*context.fixed, &**place.without_supports(context)];
-                let is_free = is_lift_free(context, carrying, worlds, &timed, tally)
-                    && is_state_free(context, carrying, &context.fixed, lift.ends()[1], tally);
+                let is_free = is_lift_free(context, model(2), worlds, &timed, tally)
+                    && is_state_free(context, model(2), &context.fixed, lift.ends()[1], tally);
                 is_free.then_some(lift)
             });
             if let Some(lift) = lift {

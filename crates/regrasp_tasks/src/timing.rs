@@ -79,6 +79,14 @@ impl Smooth {
         }
     }
 
+    /// The states that the path goes through.
+    pub fn nodes(&self) -> Vec<Vec<f64>> {
+        match self {
+            Smooth::Line(ends) => ends.to_vec(),
+            Smooth::Curve(spline) => spline.nodes.clone(),
+        }
+    }
+
     /// The same path the other way.
     #[must_use]
     pub fn reversed(&self) -> Self {

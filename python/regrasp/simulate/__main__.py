@@ -101,6 +101,7 @@ def _replay_task(plan: dict[str, Any], xml: str, options: argparse.Namespace) ->
     from .task import TaskSettings, replay
 
     settings = TaskSettings(
+        controller=options.controller,
         speed=options.speed,
         squeeze_time=options.squeeze_time,
         with_forces=not options.no_forces,
@@ -175,7 +176,7 @@ def _parser() -> argparse.ArgumentParser:
         choices=("A", "B", "C2", "H"),
         default="B",
         help="A squeezes by position, B feeds forces forward, C2 is B with feedback of the object's pose, "
-        "H is C2 that gives along the normal, for tracking [default: B]",
+        "H is C2 that gives along the normal, for tracking; pick and place: B or C2 [default: B]",
     )
     parser.add_argument("--feedback", action="store_const", const="C2", dest="controller", help="the same as --controller C2")
     parser.add_argument(

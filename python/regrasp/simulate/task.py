@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ._mujoco import mujoco
 from .reference import Array, PlanError, quat_inverse, quat_product, rotation_matrices, rotation_vector
+from .task_feedback import TaskFeedback
 from .task_reference import TaskReference, TaskRig, make_rig, task_reference
 
 #: The object is lost where it is farther from the plan than this, in metres and radians; as in replays of one hand.
@@ -29,10 +30,18 @@ STEPS, LOOKS = 2, 5
 LEAST_DEPTH = 1e-4
 
 
+#: See ``TaskSettings.controller``.
+TASK_CONTROLLERS = ("B", "C2")
+
+
 @dataclass(frozen=True)
 class TaskSettings:
     """How a plan of pick and place is replayed."""
 
+    controller: str = "B"
+    """``B``: servos on the plan, with its forces fed forward. ``C2``: fingers that hold correct the object's pose slowly, too."""
+    feedback_gain: float = 2.0
+    """Of C2, per second."""
     speed: float = 1.0
     """Times faster than planned."""
     squeeze_time: float = 0.25
@@ -140,6 +149,8 @@ def replay(plan: Mapping[str, Any], xml: str, settings: TaskSettings | None = No
     settings = settings or TaskSettings()
     if settings.speed <= 0.0 or settings.squeeze_time < 0.0:
         raise PlanError("the speed has to be above zero, and the time of squeezing not below")
+    if settings.controller not in TASK_CONTROLLERS:
+        raise PlanError(f"no controller {settings.controller!r} for pick and place; there are {', '.join(TASK_CONTROLLERS)}")
     rig = make_rig(plan, xml)
     model = rig.model
     model.pair_friction[:] *= settings.friction_scale
@@ -154,11 +165,14 @@ def replay(plan: Mapping[str, Any], xml: str, settings: TaskSettings | None = No
     mujoco.mj_resetDataKeyframe(model, data, 0)
     data.time = 0.0
     watch = _Watch(rig, ref, tick)
+    feedback = TaskFeedback(rig, ref, plan, tick, (settings.feedback_gain, settings.squeeze_time)) if settings.controller == "C2" else None
     n = ref.n_ticks + round(REST_TIME / tick)
     for k in range(n):
         # Over a tick, the command is the mean of those at its ends; what is seen after it is compared with its end.
         before, at = min(k, ref.n_ticks - 1), min(k + 1, ref.n_ticks - 1)
         data.ctrl[rig.servos] = 0.5 * (commands[before] + commands[at])
+        if feedback is not None:
+            data.ctrl[rig.servos] += feedback.shift(before, data)
         mujoco.mj_step(model, data, STEPS)
         if not watch.look(k, at, data):
             break

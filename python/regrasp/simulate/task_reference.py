@@ -63,6 +63,12 @@ class TaskRig:
         turn = data.xmat[body].reshape(3, 3)
         return np.concatenate((data.xpos[body] + turn @ position, quat_product(data.xquat[body].copy(), quat)))
 
+    def joints_of(self, hand: str) -> Indices:
+        """Joints of the plan that move something of a hand but not its base."""
+        bodies = _below(self.model, self.bases[hand])
+        bodies_of = [int(self.model.jnt_bodyid[self.model.joint(name).id]) for name in self.names]
+        return np.array([k for k, body in enumerate(bodies_of) if self.of_hand[k] and body in bodies], dtype=np.int64)
+
     def coordinates(self, joints: Array) -> Array:
         """What the joints add to the coordinates of the model at joints zero. Couplings are linear."""
         moved = np.zeros(self.model.nq)

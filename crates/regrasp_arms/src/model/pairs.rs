@@ -96,17 +96,21 @@ impl ArmModel {
         for (index, own) in levers.iter().enumerate() {
             self.bodies[index].speed = self.speed_terms(own.iter());
         }
+        let largest_radius =
+            |body: &Body| self.balls[body.balls.clone()].iter().map(|ball| f64::from(ball.radius)).fold(0.0, f64::max);
+        let radii: Vec<f64> = self.bodies.iter().map(largest_radius).collect();
         let mut pairs = Vec::new();
         for b in 0..self.bodies.len() {
             for a in 0..b {
                 let [first, second] = [&self.bodies[a], &self.bodies[b]];
-                if first.frame == second.frame || may_touch(first, second) {
+                if first.frame == second.frame {
                     continue;
                 }
                 // Joints that move one of the two only.
-                let n_common = levers[a].iter().filter(|x| levers[b].iter().any(|y| y.frame == x.frame)).count();
+                let shared = levers[a].iter().rev().zip(levers[b].iter().rev());
+                let n_common = shared.take_while(|(x, y)| x.frame == y.frame).count();
                 let [own_a, own_b] = [a, b].map(|k| &levers[k][..levers[k].len() - n_common]);
-                if self.never_meet([a, b], [own_a, own_b]) {
+                if self.never_meet([a, b], [own_a, own_b], &radii) || may_touch(first, second) {
                     continue;
                 }
                 let speed = self.speed_terms(own_a.iter().chain(own_b));
@@ -117,13 +121,12 @@ impl ArmModel {
     }
 
     /// True where the balls that the two bodies stay in, seen from the frame that carries both, are apart.
-    fn never_meet(&self, bodies: [usize; 2], own: [&[Lever]; 2]) -> bool {
+    fn never_meet(&self, bodies: [usize; 2], own: [&[Lever]; 2], radii: &[f64]) -> bool {
         let stays_in = |k: usize| match own[k].last() {
             Some(lever) => {
                 let frame = &self.frames[lever.frame];
                 let slide = if frame.slides { self.largest_position(frame) } else { 0.0 };
-                let radii = self.balls[self.bodies[bodies[k]].balls.clone()].iter().map(|ball| f64::from(ball.radius));
-                (frame.translation, lever.distance + slide + radii.fold(0.0, f64::max))
+                (frame.translation, lever.distance + slide + radii[bodies[k]])
             }
             None => {
                 let bound = &self.bodies[bodies[k]].bound;

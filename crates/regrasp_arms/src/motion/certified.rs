@@ -40,7 +40,15 @@ impl Collider<'_> {
                 };
             }
             self.intervals.truncate(self.intervals.len() - n_lanes);
-            let Some(undecided) = self.undecided(track, &lanes) else { return false };
+            let (mut middles, mut halves) = (F8::ZERO, F8::ZERO);
+            for l in 0..LANES {
+                // The middles of intervals are rounded.
+                (middles.0[l], halves.0[l]) = (lanes[l][0], lanes[l][1] + 2e-7);
+            }
+            for k in 0..self.q.len() {
+                (self.q[k], self.rates[k]) = track.lanes(k, middles);
+            }
+            let Some(undecided) = self.undecided::<true>(halves, n_lanes) else { return false };
             for lane in (0..n_lanes).filter(|lane| undecided >> lane & 1 == 1) {
                 let [middle, half] = lanes[lane];
                 let is_last = half * fastest < self.settings.least_step as f32 || half < 1e-6;
@@ -85,17 +93,22 @@ impl Collider<'_> {
         fastest
     }
 
-    /// One bit for each interval that is not proved to be free. None where the middle of one collides.
+    /// One bit for each of at most eight configurations that is not proved to be free.
     #[inline(always)]
-    fn undecided(&mut self, track: &Track, lanes: &[[f32; 2]; LANES]) -> Option<u8> {
-        let (mut middles, mut halves) = (F8::ZERO, F8::ZERO);
-        for l in 0..LANES {
-            // The middles of intervals are rounded.
-            (middles.0[l], halves.0[l]) = (lanes[l][0], lanes[l][1] + 2e-7);
-        }
+    pub(super) fn unfree(&mut self, configurations: &[&[f64]]) -> u8 {
         for k in 0..self.q.len() {
-            (self.q[k], self.rates[k]) = track.lanes(k, middles);
+            let value = |l: usize| configurations[if l < configurations.len() { l } else { 0 }][k] as f32;
+            self.q[k] = F8(std::array::from_fn(value));
+            self.rates[k] = F8::ZERO;
         }
+        self.undecided::<false>(F8::ZERO, configurations.len()).unwrap_or(u8::MAX)
+    }
+
+    /// One bit for each of the first `n_lanes` intervals that is not proved to be free, about the joints in `q`. With `STOP` none where
+    /// the middle of one collides.
+    #[inline(always)]
+    fn undecided<const STOP: bool>(&mut self, halves: F8, n_lanes: usize) -> Option<u8> {
+        let asked = if n_lanes >= LANES { u8::MAX } else { (1 << n_lanes) - 1 };
         self.place_frames();
         self.find_velocities();
         let clearance = self.settings.clearance as f32;
@@ -125,16 +138,21 @@ impl Collider<'_> {
                     if let Item::Other { exact, .. } = item
                         && overlap.any_positive()
                     {
+                        // The body's shapes decide, below: one distance each instead of one for each ball.
+                        if !is_exact {
+                            grown = grown.max(overlap);
+                            continue;
+                        }
                         overlap = Item::refined(exact, center, reach, overlap);
                     } else {
                         bare = bare.max(item.overlap(center, F8::splat(radius + clearance - ROUNDING)));
                     }
                     grown = grown.max(overlap);
                 }
-                if is_exact && bare.any_positive() {
+                if STOP && is_exact && bare.any_positive() {
                     return None;
                 }
-                let mut bits = grown.positive();
+                let mut bits = grown.positive() & asked & !undecided;
                 if !is_exact && bits != 0 {
                     bits = self.near_obstacle(body, self.found[index] as usize, bits, sway);
                 }
@@ -168,10 +186,10 @@ impl Collider<'_> {
                     bare = bare.max(ball_overlap(&center, &self.balls[j], bare_reach));
                 }
             }
-            if is_exact && bare.any_positive() {
+            if STOP && is_exact && bare.any_positive() {
                 return None;
             }
-            let mut bits = grown.positive();
+            let mut bits = grown.positive() & asked & !undecided;
             if !is_exact && bits != 0 {
                 bits = self.near_body([a, b], bits, sway);
             }

@@ -138,6 +138,18 @@ impl<'a> Collider<'a> {
         arch.dispatch(Sampled { collider: self, from, to })
     }
 
+    /// For each of the configurations: true where it is proved to keep the clearance.
+    pub fn are_free(&mut self, configurations: &[Vec<f64>]) -> Vec<bool> {
+        let mut free = Vec::with_capacity(configurations.len());
+        for block in configurations.chunks(crate::lanes::LANES) {
+            let arch = self.arch;
+            let bits =
+                arch.dispatch(Unfree { collider: self, configurations: block.iter().map(Vec::as_slice).collect() });
+            free.extend((0..block.len()).map(|l| bits >> l & 1 == 0));
+        }
+        free
+    }
+
     /// True where no body meets another one or an obstacle at any moment of the motion. What is not decided counts as collision.
     pub fn is_certified_free(&mut self, track: &Track) -> bool {
         let arch = self.arch;
@@ -158,6 +170,21 @@ impl pulp::NullaryFnOnce for Sampled<'_, '_, '_> {
     #[inline(always)]
     fn call(self) -> bool {
         self.collider.sampled(self.from, self.to)
+    }
+}
+
+/// As [`Sampled`].
+struct Unfree<'c, 'a, 'q> {
+    collider: &'c mut Collider<'a>,
+    configurations: Vec<&'q [f64]>,
+}
+
+impl pulp::NullaryFnOnce for Unfree<'_, '_, '_> {
+    type Output = u8;
+
+    #[inline(always)]
+    fn call(self) -> u8 {
+        self.collider.unfree(&self.configurations)
     }
 }
 

@@ -182,11 +182,14 @@ impl Collider<'_> {
         self.place_balls(body);
         let range = self.model.bodies[body].balls.clone();
         let mut worst = F8::splat(-1.0);
+        let is_exact = self.model.bodies[body].is_exact;
         for index in range {
             let center = &self.balls[index];
             let reach = F8::splat(self.model.balls[index].radius + clearance);
             let mut overlap = item.overlap(center, reach);
+            // Where the body has shapes, those decide, below: one distance each instead of one for each ball.
             if let Item::Other { exact, .. } = item
+                && is_exact
                 && overlap.any_positive()
             {
                 overlap = Item::refined(exact, center, reach, overlap);
@@ -194,8 +197,7 @@ impl Collider<'_> {
             worst = worst.max(overlap);
         }
         worst.any_positive()
-            && (self.model.bodies[body].is_exact
-                || self.near_obstacle(body, obstacle, worst.positive(), F8::splat(clearance)) != 0)
+            && (is_exact || self.near_obstacle(body, obstacle, worst.positive(), F8::splat(clearance)) != 0)
     }
 
     /// True where balls of two bodies meet.

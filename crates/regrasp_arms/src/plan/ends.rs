@@ -45,6 +45,13 @@ impl Problem<'_> {
         self.refuse(&model, &model.configuration_of(&self.query.start), End::Start, settings)
     }
 
+    /// Names of the first two that are not proved to keep the clearance. None where all do.
+    pub fn collision(&self, model: &ArmModel, configuration: &[f64], settings: &MotionSettings) -> Option<[String; 2]> {
+        let collider = ColliderSettings { clearance: settings.clearance, ..ColliderSettings::default() };
+        let contact = Collider::new(model, &self.world, collider).contact(configuration)?;
+        Some(names(model, &self.world, contact))
+    }
+
     /// Refuses a configuration outside limits or in collision.
     pub fn refuse(
         &self,

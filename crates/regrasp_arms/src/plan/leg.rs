@@ -9,7 +9,7 @@ use crate::motion::{Collider, ColliderSettings, Track};
 use crate::times::{TimedPath, TimedPoint};
 use regrasp_base::{Budget, Rng};
 use regrasp_manipulation::failure::{Failure, FailureKind};
-use regrasp_manipulation::motion_settings::MotionSettings;
+use regrasp_manipulation::motion_settings::{MotionSettings, PartsMove};
 use regrasp_plan::robot_plan::RobotStatistics;
 
 /// A motion from state to state.
@@ -84,6 +84,22 @@ fn find(
     (seed, budget): (u64, &Budget),
 ) -> Result<Found, Failure> {
     let mut rng = Rng::keyed(seed, "room", 0);
+    let mut refused = None;
+    for goal in goals {
+        // Callers have other goals: no time is spent on how deep, and what would be free.
+        match problem.collision(model, &model.configuration_of(goal), settings) {
+            None => {
+                refused = None;
+                break;
+            }
+            Some([first, second]) => {
+                refused = refused.or(Some(format!("the goal collides: \"{first}\" meets \"{second}\"")))
+            }
+        }
+    }
+    if let Some(message) = refused {
+        return Err(Failure::bare(FailureKind::GoalInvalid, message, ""));
+    }
     let start = problem.query.start.clone();
     let near_start = room(problem, model, &start, settings, &mut rng);
     let near_goals: Vec<Vec<f64>> = goals.iter().map(|goal| room(problem, model, goal, settings, &mut rng)).collect();
@@ -105,6 +121,9 @@ fn find(
 /// A state near `end` in which searches have room; `end` itself where it has room, or where none was found.
 fn room(problem: &Problem, model: &ArmModel, end: &[f64], settings: &MotionSettings, rng: &mut Rng) -> Vec<f64> {
     let at = model.configuration_of(end);
+    if settings.parts == PartsMove::InTurn {
+        return end.to_vec();
+    }
     let clearance = settings.clearance + settings.search_margin;
     let sampled = ColliderSettings { clearance, resolution: settings.resolution, ..ColliderSettings::default() };
     let mut sampled = Collider::new(model, &problem.world, sampled);

@@ -4,6 +4,8 @@
 mod ends;
 /// The motion that is executed: rounded corners, times, proof.
 mod execute;
+/// Graphs of a query's robot.
+mod graph;
 /// Motions of a longer task.
 pub mod leg;
 /// A path.
@@ -15,8 +17,11 @@ mod record;
 /// Goals that are poses of wrists.
 mod wrists;
 
+use crate::roadmap::Roads;
+use crate::world::World;
 use execute::execute;
 pub use execute::limits;
+pub use graph::{build_graph, graph_differs};
 use problem::Problem;
 use regrasp_base::Budget;
 use regrasp_manipulation::failure::{Failure, FailureKind};
@@ -66,8 +71,32 @@ pub fn plan_in_stages(
     budget: &Budget,
     watch: &mut dyn FnMut(Stage),
 ) -> Result<RobotPlan, Failure> {
+    plan_problem(Problem::new((scene, state), query), settings, (seed, budget), watch)
+}
+
+/// As [`plan_motion`], with a graph of the robot among what rests (`build_graph`).
+///
+/// Errors: as [`plan_motion`].
+pub fn plan_with_graph(
+    around: (&Scene, &State),
+    query: &MotionQuery,
+    settings: &MotionSettings,
+    (seed, budget): (u64, &Budget),
+    roads: &Roads,
+) -> Result<RobotPlan, Failure> {
+    let mut problem = Problem::new(around, query);
+    problem.use_graph(roads, World::default());
+    plan_problem(problem, settings, (seed, budget), &mut |_| {})
+}
+
+fn plan_problem(
+    problem: Problem,
+    settings: &MotionSettings,
+    (seed, budget): (u64, &Budget),
+    watch: &mut dyn FnMut(Stage),
+) -> Result<RobotPlan, Failure> {
     settings.validate().map_err(|problem| Failure::of_settings(&problem))?;
-    let problem = Problem::new((scene, state), query);
+    let query = problem.query;
     problem.refuse_start(settings)?;
     let goals = problem.goals(seed)?;
     let mut last = None;

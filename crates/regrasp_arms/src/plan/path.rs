@@ -2,16 +2,24 @@
 
 use super::Stage;
 use super::ends::End;
-use super::problem::Problem;
+use super::problem::{KnownRoads, Problem};
 use crate::model::ArmModel;
 use crate::motion::{Collider, ColliderSettings, Track};
+use crate::roadmap::{Changes, Counts, SuperGraph, Tests};
 use crate::search::{
     InTurnSettings, Region, RrtOutcome, RrtSettings, SimplifySettings, in_turn, rrt_connect, simplify,
 };
+use crate::world::World;
 use regrasp_base::{Budget, Rng};
 use regrasp_manipulation::failure::{Failure, FailureKind};
-use regrasp_manipulation::motion_settings::{MotionMethod, MotionSettings, Validation};
+use regrasp_manipulation::motion_settings::{MotionMethod, MotionSettings, PartsMove, Validation};
 use regrasp_plan::robot_plan::RobotStatistics;
+use std::sync::Arc;
+
+/// Samples of a search before the graph is asked.
+const BEFORE_GRAPH: u64 = 150;
+/// Nodes of the graph that an end is joined to, at most.
+const GRAPH_NEIGHBOURS: usize = 30;
 
 /// A path whose straight motions are free.
 pub struct Found {
@@ -44,7 +52,9 @@ pub fn find(
         return Err(refused.unwrap_or_else(nothing));
     }
     watch(Stage::Prepared);
-    let mut search = Search { model, start, goals: free_goals, settings, statistics: RobotStatistics::default() };
+    let world = Arc::clone(&problem.world);
+    let statistics = RobotStatistics::default();
+    let mut search = Search { model, world, start, goals: free_goals, settings, statistics };
     let (mut interrupt, mut is_hopeless) = (None, false);
     // With room to certify, then without, then with certified motions only.
     let certified = settings.validation == Validation::Certified;
@@ -59,13 +69,18 @@ pub fn find(
             continue;
         }
         let mut rng = Rng::keyed(seed, "motion", round as u64);
-        let outcome = search.sampled(&mut collider, &mut rng, budget);
+        let outcome = search.sampled(problem, &mut collider, &mut rng, budget);
         interrupt = outcome.interrupt.or(interrupt);
         watch(Stage::Searched);
         is_hopeless = outcome.path.is_none();
-        let Some(mut path) = outcome.path else { continue };
+        let Some(path) = outcome.path else { continue };
+        let mut simplified: Vec<Vec<f64>> = Vec::new();
         let shortcuts = SimplifySettings { n_shortcuts: settings.shortcuts, ..SimplifySettings::default() };
-        simplify(&mut path, &shortcuts, &mut rng, |a, b| collider.is_sampled_free(a, b));
+        for mut run in search.runs(&path) {
+            simplify(&mut run, &shortcuts, &mut rng, |a, b| collider.is_sampled_free(a, b));
+            simplified.extend(run.into_iter().skip(usize::from(!simplified.is_empty())));
+        }
+        let path = simplified;
         search.count(&collider);
         watch(Stage::Simplified);
         if !certified {
@@ -78,7 +93,7 @@ pub fn find(
         }
     }
     // What samples do not find, certified motions do not either.
-    if certified && interrupt.is_none() && !is_hopeless {
+    if certified && interrupt.is_none() && !is_hopeless && settings.parts == PartsMove::AtOnce {
         let mut rng = Rng::keyed(seed, "certified_motion", 0);
         let certified = search.certified_from_nothing(problem, certified_samples, &mut rng, budget);
         watch(Stage::Searched);
@@ -93,6 +108,7 @@ pub fn find(
 
 struct Search<'m, 's> {
     model: &'m ArmModel,
+    world: Arc<World>,
     start: Vec<f64>,
     goals: Vec<Vec<f64>>,
     settings: &'s MotionSettings,
@@ -109,7 +125,7 @@ impl Search<'_, '_> {
         self.statistics.samples += outcome.n_samples;
     }
 
-    fn sampled(&mut self, collider: &mut Collider, rng: &mut Rng, budget: &Budget) -> RrtOutcome {
+    fn sampled(&mut self, problem: &Problem, collider: &mut Collider, rng: &mut Rng, budget: &Budget) -> RrtOutcome {
         let all = RrtSettings {
             max_samples: self.settings.max_samples,
             ..RrtSettings::for_dimension(self.model.dimension())
@@ -119,8 +135,27 @@ impl Search<'_, '_> {
         let outcome = match (self.settings.method, goals.as_slice()) {
             (_, []) => RrtOutcome { path: None, n_nodes: 0, n_samples: 0, interrupt: None },
             (MotionMethod::InTurn, [goal]) => {
-                let settings = InTurnSettings { all, ..InTurnSettings::default() };
-                in_turn(collider, &self.start, goal, &settings, rng, budget)
+                let few = RrtSettings { max_samples: all.max_samples.min(BEFORE_GRAPH), ..all };
+                let parts = self.settings.parts;
+                let settings = InTurnSettings { all, parts, ..InTurnSettings::default() };
+                let may_use = |known: &&KnownRoads| parts == PartsMove::AtOnce && self.is_of(&known.roads.graph);
+                match problem.roads.as_ref().filter(may_use) {
+                    None => in_turn(collider, &self.start, goal, &settings, rng, budget),
+                    Some(known) => {
+                        // What is easy needs no graph.
+                        let one = RrtSettings { max_samples: BEFORE_GRAPH, ..settings.one };
+                        let easy = InTurnSettings { one, all: few, parts };
+                        let mut outcome = in_turn(collider, &self.start, goal, &easy, rng, budget);
+                        if outcome.path.is_none() && outcome.interrupt.is_none() {
+                            outcome.path = self.by_graph(known, collider.settings, goal);
+                        }
+                        if outcome.path.is_none() && outcome.interrupt.is_none() {
+                            self.take(&outcome);
+                            outcome = in_turn(collider, &self.start, goal, &settings, rng, budget);
+                        }
+                        outcome
+                    }
+                }
             }
             _ => {
                 let region = Region::of(self.model, &[&self.start, &goals[0]]);
@@ -129,6 +164,49 @@ impl Search<'_, '_> {
         };
         self.take(&outcome);
         outcome
+    }
+
+    /// Pieces of a path that are made shorter by themselves: where parts move in turn, those in which the same one moves.
+    fn runs(&self, path: &[Vec<f64>]) -> Vec<Vec<Vec<f64>>> {
+        if self.settings.parts == PartsMove::AtOnce || path.len() < 2 {
+            return vec![path.to_vec()];
+        }
+        let parts = self.model.parts();
+        let all: Vec<Vec<usize>> = parts.arms.into_iter().chain([parts.common]).collect();
+        let moving = |pair: &[Vec<f64>]| all.iter().position(|own| own.iter().any(|&k| pair[0][k] != pair[1][k]));
+        let mut runs: Vec<Vec<Vec<f64>>> = Vec::new();
+        let mut last = None;
+        for pair in path.windows(2) {
+            let own = moving(pair);
+            if runs.is_empty() || own != last {
+                runs.push(vec![pair[0].clone()]);
+            }
+            last = own;
+            if let Some(run) = runs.last_mut() {
+                run.push(pair[1].clone());
+            }
+        }
+        runs
+    }
+
+    /// True where a graph is of these joints.
+    fn is_of(&self, graph: &SuperGraph) -> bool {
+        graph.joints.iter().eq(self.model.coordinates.iter().map(|coordinate| &coordinate.name))
+    }
+
+    /// A path of the graph whose motions are tested against what it does not know.
+    fn by_graph(&mut self, known: &KnownRoads, settings: ColliderSettings, goal: &[f64]) -> Option<Vec<Vec<f64>>> {
+        let model = self.model;
+        let is_changed = |body: usize| known.changed.contains(&model.bodies[body].link);
+        let changes = Changes { whole: &self.world, unknown: &known.unknown, is_changed: &is_changed };
+        let mut tests = Tests::new(model, &changes, settings);
+        let mut counts = Counts::default();
+        let path = known
+            .roads
+            .path([&self.start, goal], GRAPH_NEIGHBOURS, &mut counts, |edge, a, b| tests.is_sampled_free(edge, a, b));
+        self.statistics.nodes += counts.expanded;
+        self.statistics.work += 8 * counts.tested;
+        path
     }
 
     /// The path with certified motions: what is not free is searched for anew between its ends.
@@ -148,6 +226,10 @@ impl Search<'_, '_> {
             if is_free(&pair[0], &pair[1]) {
                 whole.push(pair[1].clone());
                 continue;
+            }
+            if self.settings.parts == PartsMove::InTurn {
+                found = false;
+                break;
             }
             is_repaired = true;
             let region = Region::of(self.model, &[&pair[0], &pair[1]]);

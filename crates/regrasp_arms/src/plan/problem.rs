@@ -2,11 +2,12 @@
 
 use crate::model::cover::{LinkCover, cover, covers};
 use crate::model::{ArmModel, Attached};
+use crate::roadmap::Roads;
 use crate::world::{Obstacle, World};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Pose, Shape};
-use regrasp_robot::Manipulator;
 use regrasp_robot::manipulator::layout::Part;
+use regrasp_robot::{LinkId, Manipulator};
 use regrasp_scene::{MotionQuery, Scene, State};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -35,6 +36,19 @@ pub struct Problem<'a> {
     pub attached: Vec<Attached>,
     /// By carried object: its pose in the frame of its link.
     pub link_from_objects: Vec<Pose>,
+    /// A graph of the robot among obstacles that rest, where one is known.
+    pub roads: Option<KnownRoads<'a>>,
+}
+
+/// A graph of a robot, and what it does not know of a problem.
+#[derive(Clone)]
+pub struct KnownRoads<'a> {
+    /// The graph.
+    pub roads: &'a Roads,
+    /// What rests and the graph does not know.
+    pub unknown: Arc<World>,
+    /// Links that are not where the graph has them, besides what is carried: by index.
+    pub changed: BTreeSet<LinkId>,
 }
 
 impl<'a> Problem<'a> {
@@ -71,12 +85,17 @@ impl<'a> Problem<'a> {
             attached.push(Attached { name: object.name.clone(), link, cover, may_touch });
             link_from_objects.push(link_from_object);
         }
-        Problem { scene, query, robot, world, covers: known.clone(), attached, link_from_objects }
+        Problem { scene, query, robot, world, covers: known.clone(), attached, link_from_objects, roads: None }
     }
 
     /// The robot with these coordinates free, all others as at the start.
     pub fn model(&self, free: &[usize]) -> ArmModel {
         ArmModel::new(self.robot, &self.covers.links, &self.attached, &self.query.start, free)
+    }
+
+    /// The robot without what it carries, with coordinates `free`, all others as in `state`.
+    pub(crate) fn bare_model(&self, state: &[f64], free: &[usize]) -> ArmModel {
+        ArmModel::new(self.robot, &self.covers.links, &[], state, free)
     }
 
     /// Sets of coordinates to plan with, in this order: those of the parts that the goals change, then those of all arms too.

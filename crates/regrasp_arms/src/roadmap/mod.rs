@@ -11,10 +11,13 @@ mod file;
 mod one_arm;
 /// Queries.
 mod query;
+/// Graphs made ready for queries.
+mod roads;
 /// The product of two roadmaps.
 mod super_graph;
 
-pub use query::{QueryOutcome, QuerySettings, query};
+pub use query::{Changes, QueryOutcome, QuerySettings, Tests, query};
+pub use roads::{Counts, Edge, Roads};
 pub use super_graph::build;
 
 use crate::model::ArmModel;

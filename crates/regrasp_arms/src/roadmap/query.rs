@@ -1,14 +1,13 @@
 //! Queries: the graph is searched as if nothing had changed, then the motions of the path are tested against what the graph does not
 //! know (Saut 2010, sec. V-B).
 
-use super::SuperGraph;
+use super::roads::{Counts, Edge, Roads};
 use crate::model::ArmModel;
 use crate::motion::{Collider, ColliderSettings, Track};
-use crate::search::{Region, RrtSettings, distance, rrt_connect};
+use crate::search::{InTurnSettings, Region, RrtOutcome, RrtSettings, in_turn, rrt_connect};
 use crate::world::World;
 use regrasp_base::{Budget, Interrupt, Rng};
-use std::cmp::Ordering;
-use std::collections::{BTreeSet, BinaryHeap};
+use std::collections::BTreeSet;
 
 /// Settings of [`query`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,11 +16,15 @@ pub struct QuerySettings {
     pub n_neighbours: usize,
     /// Most samples of one local search.
     pub max_samples: u64,
+    /// Distance that the search keeps besides the graph's, in metres, so that its motions can be certified.
+    pub search_margin: f64,
+    /// Configurations per radian or metre that the search looks at.
+    pub resolution: f64,
 }
 
 impl Default for QuerySettings {
     fn default() -> Self {
-        QuerySettings { n_neighbours: 30, max_samples: 100_000 }
+        QuerySettings { n_neighbours: 30, max_samples: 100_000, search_margin: 2e-3, resolution: 32.0 }
     }
 }
 
@@ -40,266 +43,173 @@ pub struct QueryOutcome {
     pub interrupt: Option<Interrupt>,
 }
 
-/// A path from `start` to `goal`. `known` is the world that the graph was made in; `unknown` has what it does not know: obstacles that
-/// are new, and `model` may carry something. What a local search finds enriches the graph.
+/// What a graph does not know.
+pub struct Changes<'c> {
+    /// Everything that rests now.
+    pub whole: &'c World,
+    /// What the graph does not know of that.
+    pub unknown: &'c World,
+    /// Bodies of the robot that are not as the graph has them, besides those that are attached.
+    pub is_changed: &'c dyn Fn(usize) -> bool,
+}
+
+/// Tests of what a graph does not know, and of everything.
+pub struct Tests<'c> {
+    /// Everything.
+    pub all: Collider<'c>,
+    /// What rests and is new against the robot, and pairs with bodies that are new.
+    new: Collider<'c>,
+    /// Bodies that are new against what rests.
+    changed: Option<Collider<'c>>,
+}
+
+impl<'c> Tests<'c> {
+    /// Of a robot among what has changed.
+    pub fn new(model: &'c ArmModel, changes: &Changes<'c>, settings: ColliderSettings) -> Self {
+        let is_new = |body: usize| model.bodies[body].attached.is_some() || (changes.is_changed)(body);
+        let mut new = Collider::new(model, changes.unknown, settings);
+        new.only(|_| true, |[a, b]| is_new(a) || is_new(b));
+        let changed = (0..model.bodies.len()).any(is_new).then(|| {
+            let mut changed = Collider::new(model, changes.whole, settings);
+            changed.only(is_new, |_| false);
+            changed
+        });
+        Tests { all: Collider::new(model, changes.whole, settings), new, changed }
+    }
+
+    /// True where samples of a motion are free.
+    pub fn is_sampled_free(&mut self, edge: Edge, from: &[f64], to: &[f64]) -> bool {
+        match edge {
+            Edge::Known(_) => {
+                self.new.is_sampled_free(from, to)
+                    && self.changed.as_mut().is_none_or(|changed| changed.is_sampled_free(from, to))
+            }
+            Edge::FromStart | Edge::ToGoal => self.all.is_sampled_free(from, to),
+        }
+    }
+
+    /// True where a motion is free at every moment.
+    pub fn is_certified_free(&mut self, edge: Edge, from: &[f64], to: &[f64]) -> bool {
+        let track = Track::straight(from, to);
+        match edge {
+            Edge::Known(_) => {
+                self.new.is_certified_free(&track)
+                    && self.changed.as_mut().is_none_or(|changed| changed.is_certified_free(&track))
+            }
+            Edge::FromStart | Edge::ToGoal => self.all.is_certified_free(&track),
+        }
+    }
+}
+
+/// Paths that are looked at where motions of the ones before could not be certified.
+const MOST_PATHS: u64 = 30;
+
+/// A path of certified motions from the first to the second of `ends`. The graph is searched with samples of the motions that it takes,
+/// tested against what it does not know; then the path is certified. Where the graph has no way, a search joins the ends, and its path
+/// enriches the graph.
 pub fn query(
-    graph: &mut SuperGraph,
+    roads: &mut Roads,
     model: &ArmModel,
-    [whole, unknown]: [&World; 2],
+    changes: &Changes,
     ends: [&[f64]; 2],
     settings: &QuerySettings,
     (seed, budget): (u64, &Budget),
 ) -> QueryOutcome {
-    let of_collider = ColliderSettings { clearance: graph.clearance, ..ColliderSettings::default() };
-    let mut all = Collider::new(model, whole, of_collider);
-    let mut new = Collider::new(model, unknown, of_collider);
-    // What is carried is new to everything, and so is what is around to the robot.
-    let is_carried = |body: usize| model.bodies[body].attached.is_some();
-    new.only(|_| true, |[a, b]| is_carried(a) || is_carried(b));
-    let mut carried = Collider::new(model, whole, of_collider);
-    carried.only(is_carried, |_| false);
-    let has_carried = model.bodies.iter().any(|body| body.attached.is_some());
+    let clearance = roads.graph.clearance;
+    let of = |margin: f64| ColliderSettings {
+        clearance: clearance + margin,
+        resolution: settings.resolution,
+        ..ColliderSettings::default()
+    };
+    let mut exact = Tests::new(model, changes, of(0.0));
     let mut outcome = QueryOutcome { path: None, n_paths: 0, n_tested: 0, n_added: 0, interrupt: None };
-    let direct = Track::straight(ends[0], ends[1]);
-    if all.is_certified_free(&direct) {
+    if exact.is_certified_free(Edge::FromStart, ends[0], ends[1]) {
         outcome.path = Some(ends.iter().map(|end| end.to_vec()).collect());
         return outcome;
     }
-    let mut lazy = Lazy::new(graph, ends, settings.n_neighbours);
-    let mut rng = Rng::keyed(seed, "roadmap_query", 0);
-    loop {
-        if let Err(interrupt) = budget.check(outcome.n_tested) {
+    let mut sampled = Tests::new(model, changes, of(settings.search_margin));
+    // By the bits of both ends: motions that could not be certified.
+    let mut refused: BTreeSet<Vec<u64>> = BTreeSet::new();
+    let key = |a: &[f64], b: &[f64]| -> Vec<u64> { a.iter().chain(b).map(|x| x.to_bits()).collect() };
+    let mut counts = Counts::default();
+    while outcome.n_paths < MOST_PATHS {
+        if let Err(interrupt) = budget.check(counts.tested) {
             outcome.interrupt = Some(interrupt);
             break;
         }
-        let Some(nodes) = lazy.path() else {
-            let joined = lazy.reconnect(&mut all, &mut rng, settings, budget, &mut outcome);
-            if joined { continue } else { break }
-        };
+        let found = roads.path(ends, settings.n_neighbours, &mut counts, |edge, a, b| {
+            (refused.is_empty() || !refused.contains(&key(a, b))) && sampled.is_sampled_free(edge, a, b)
+        });
+        let Some(path) = found else { break };
         outcome.n_paths += 1;
-        let mut is_free = true;
-        for pair in nodes.windows(2) {
-            let edge = [pair[0].min(pair[1]), pair[0].max(pair[1])];
-            if lazy.valid.contains(&edge) {
-                continue;
-            }
-            outcome.n_tested += 1;
-            let track = Track::straight(&lazy.nodes[pair[0]], &lazy.nodes[pair[1]]);
-            // Of motions of the graph all else is known; those to start and goal are new.
-            let is_known = edge[1] < lazy.n_graph;
-            let own = match is_known {
-                true => new.is_certified_free(&track) && (!has_carried || carried.is_certified_free(&track)),
-                false => all.is_certified_free(&track),
-            };
-            if own {
-                lazy.valid.insert(edge);
-            } else {
-                lazy.cut(edge);
-                is_free = false;
-                break;
+        let n = path.len() - 1;
+        let edge = |k: usize| match k {
+            0 => Edge::FromStart,
+            k if k + 1 == n => Edge::ToGoal,
+            _ => Edge::Known([0, 0]),
+        };
+        let mut is_proved = true;
+        for (k, pair) in path.windows(2).enumerate() {
+            if !exact.is_certified_free(edge(k), &pair[0], &pair[1]) {
+                refused.insert(key(&pair[0], &pair[1]));
+                is_proved = false;
             }
         }
-        if is_free {
-            outcome.path = Some(nodes.iter().map(|&node| lazy.nodes[node].clone()).collect());
+        if is_proved {
+            outcome.path = Some(path);
             break;
         }
     }
-    let added = lazy.enrich();
-    outcome.n_added = added.0.len() as u64;
-    for node in added.0 {
-        graph.graph.nodes.push(node);
-    }
-    for [a, b] in added.1 {
-        graph.graph.connect(a, b);
+    outcome.n_tested = counts.tested;
+    if outcome.path.is_none() && outcome.interrupt.is_none() {
+        let found = join([&mut exact.all, &mut sampled.all], ends, settings, (seed, budget));
+        outcome.interrupt = found.interrupt;
+        // Bodies that are not as the graph has them may be in the way where it has them.
+        if let Some(path) = &found.path
+            && !(0..model.bodies.len()).any(changes.is_changed)
+        {
+            outcome.n_added = enrich(roads, path, &mut exact.all);
+        }
+        outcome.path = found.path;
     }
     outcome
 }
 
-/// The graph of one query.
-struct Lazy {
-    nodes: Vec<Vec<f64>>,
-    neighbours: Vec<Vec<usize>>,
-    /// Nodes that the graph had before.
-    n_graph: usize,
-    start: usize,
-    goal: usize,
-    /// Edges that were tested.
-    valid: BTreeSet<[usize; 2]>,
-    /// Nodes and edges of local searches.
-    found: Vec<[usize; 2]>,
-    n_tries: u64,
+/// A search between the ends without the graph.
+fn join(
+    [exact, sampled]: [&mut Collider; 2],
+    ends: [&[f64]; 2],
+    settings: &QuerySettings,
+    (seed, budget): (u64, &Budget),
+) -> RrtOutcome {
+    let model = exact.model;
+    let all = RrtSettings { max_samples: settings.max_samples, ..RrtSettings::for_dimension(model.dimension()) };
+    let mut rng = Rng::keyed(seed, "roadmap_query", 0);
+    let parts = InTurnSettings { all, ..InTurnSettings::default() };
+    let found = in_turn(sampled, ends[0], ends[1], &parts, &mut rng, budget);
+    let mut is_certified = |p: &[f64], q: &[f64]| exact.is_certified_free(&Track::straight(p, q));
+    let is_proved =
+        found.path.as_ref().is_some_and(|path| path.windows(2).all(|pair| is_certified(&pair[0], &pair[1])));
+    if is_proved || found.interrupt.is_some() {
+        return found;
+    }
+    let region = Region::of(model, &ends);
+    rrt_connect(ends[0], &[ends[1].to_vec()], &region, &all, &mut rng, budget, is_certified)
 }
 
-/// Local searches of one query.
-const MOST_TRIES: u64 = 8;
+/// Nodes of the graph that the ends of a path are joined to, at most.
+const LINKS: usize = 5;
 
-#[derive(Debug, PartialEq)]
-struct Open {
-    cost: f64,
-    node: usize,
-}
-
-impl Eq for Open {}
-
-impl PartialOrd for Open {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
+/// Makes a path of certified motions part of the graph, and joins its ends to the nearest nodes. The number of its nodes.
+fn enrich(roads: &mut Roads, path: &[Vec<f64>], exact: &mut Collider) -> u64 {
+    let first = roads.graph.graph.nodes.len();
+    let mut edges: Vec<[usize; 2]> = (1..path.len()).map(|k| [first + k - 1, first + k]).collect();
+    for end in [0, path.len() - 1] {
+        let near = roads.nearest(&path[end], LINKS);
+        let is_joined =
+            |&node: &usize| exact.is_certified_free(&Track::straight(&roads.graph.graph.nodes[node], &path[end]));
+        edges.extend(near.into_iter().find(is_joined).map(|node| [node, first + end]));
     }
-}
-
-impl Ord for Open {
-    fn cmp(&self, other: &Self) -> Ordering {
-        // The least cost first, of equals the first node.
-        other.cost.total_cmp(&self.cost).then(other.node.cmp(&self.node))
-    }
-}
-
-impl Lazy {
-    fn new(graph: &SuperGraph, ends: [&[f64]; 2], n_neighbours: usize) -> Self {
-        let n_graph = graph.graph.nodes.len();
-        let mut nodes = graph.graph.nodes.clone();
-        let mut neighbours: Vec<Vec<usize>> = graph
-            .graph
-            .neighbours()
-            .into_iter()
-            .map(|own| own.into_iter().map(|node| node as usize).collect())
-            .collect();
-        for end in ends {
-            let mut near: Vec<(f64, usize)> =
-                nodes[..n_graph].iter().enumerate().map(|(node, other)| (distance(end, other), node)).collect();
-            near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            near.truncate(n_neighbours);
-            let node = nodes.len();
-            nodes.push(end.to_vec());
-            neighbours.push(near.iter().map(|&(_, other)| other).collect());
-            near.iter().for_each(|&(_, other)| neighbours[other].push(node));
-        }
-        let (valid, found) = (BTreeSet::new(), Vec::new());
-        Lazy { nodes, neighbours, n_graph, start: n_graph, goal: n_graph + 1, valid, found, n_tries: 0 }
-    }
-
-    fn cut(&mut self, [a, b]: [usize; 2]) {
-        self.neighbours[a].retain(|&other| other != b);
-        self.neighbours[b].retain(|&other| other != a);
-    }
-
-    /// The shortest path that is not known to collide (A*).
-    fn path(&self) -> Option<Vec<usize>> {
-        let goal = &self.nodes[self.goal];
-        let mut costs = vec![f64::INFINITY; self.nodes.len()];
-        let mut parents = vec![usize::MAX; self.nodes.len()];
-        let mut open = BinaryHeap::from([Open { cost: 0.0, node: self.start }]);
-        let mut is_closed = vec![false; self.nodes.len()];
-        costs[self.start] = 0.0;
-        while let Some(Open { node, .. }) = open.pop() {
-            if std::mem::replace(&mut is_closed[node], true) {
-                continue;
-            }
-            if node == self.goal {
-                let mut path = vec![node];
-                while path[path.len() - 1] != self.start {
-                    path.push(parents[path[path.len() - 1]]);
-                }
-                path.reverse();
-                return Some(path);
-            }
-            for &next in &self.neighbours[node] {
-                let cost = costs[node] + distance(&self.nodes[node], &self.nodes[next]);
-                if cost < costs[next] {
-                    (costs[next], parents[next]) = (cost, node);
-                    open.push(Open { cost: cost + distance(&self.nodes[next], goal), node: next });
-                }
-            }
-        }
-        None
-    }
-
-    /// Nodes that `from` is connected with.
-    fn component(&self, from: usize) -> Vec<bool> {
-        let mut is_reached = vec![false; self.nodes.len()];
-        let mut waiting = vec![from];
-        is_reached[from] = true;
-        while let Some(node) = waiting.pop() {
-            for &next in &self.neighbours[node] {
-                if !std::mem::replace(&mut is_reached[next], true) {
-                    waiting.push(next);
-                }
-            }
-        }
-        is_reached
-    }
-
-    /// Joins what start and goal are connected with by a local search; its path becomes part of the graph.
-    fn reconnect(
-        &mut self,
-        all: &mut Collider,
-        rng: &mut Rng,
-        settings: &QuerySettings,
-        budget: &Budget,
-        outcome: &mut QueryOutcome,
-    ) -> bool {
-        if self.n_tries >= MOST_TRIES {
-            return false;
-        }
-        self.n_tries += 1;
-        let (from_start, from_goal) = (self.component(self.start), self.component(self.goal));
-        // Ends of motions that are known to be free: the two nearest to each other, else start and goal.
-        let tested: BTreeSet<usize> = self.valid.iter().flatten().copied().collect();
-        let side = |is_in: &[bool], end: usize| -> Vec<usize> {
-            tested.iter().copied().filter(|&node| is_in[node]).chain([end]).collect()
-        };
-        let (firsts, lasts) = (side(&from_start, self.start), side(&from_goal, self.goal));
-        let mut best = (f64::INFINITY, self.start, self.goal);
-        if self.n_tries < MOST_TRIES {
-            for &a in &firsts {
-                for &b in &lasts {
-                    let far = distance(&self.nodes[a], &self.nodes[b]);
-                    if far < best.0 && all.contact(&self.nodes[a]).is_none() && all.contact(&self.nodes[b]).is_none() {
-                        best = (far, a, b);
-                    }
-                }
-            }
-        }
-        let (_, a, b) = best;
-        let region = Region::of(all.model, &[&self.nodes[a], &self.nodes[b]]);
-        let settings =
-            RrtSettings { max_samples: settings.max_samples, ..RrtSettings::for_dimension(all.model.dimension()) };
-        let goals = [self.nodes[b].clone()];
-        // In samples first; where a motion of that path cannot be certified, with certified motions.
-        let mut found =
-            rrt_connect(&self.nodes[a], &goals, &region, &settings, rng, budget, |p, q| all.is_sampled_free(p, q));
-        let mut is_certified = |p: &[f64], q: &[f64]| all.is_certified_free(&Track::straight(p, q));
-        let is_proved = found.path.iter().flat_map(|path| path.windows(2)).all(|pair| is_certified(&pair[0], &pair[1]));
-        if found.interrupt.is_none() && !is_proved {
-            found = rrt_connect(&self.nodes[a], &goals, &region, &settings, rng, budget, is_certified);
-        }
-        outcome.interrupt = found.interrupt;
-        let Some(path) = found.path else { return false };
-        let mut last = a;
-        let n = path.len();
-        for (index, point) in path.into_iter().enumerate().skip(1) {
-            let node = if index + 1 == n { b } else { self.nodes.len() };
-            if node == self.nodes.len() {
-                self.nodes.push(point);
-                self.neighbours.push(Vec::new());
-            }
-            self.neighbours[last].push(node);
-            self.neighbours[node].push(last);
-            let edge = [last.min(node), last.max(node)];
-            self.valid.insert(edge);
-            self.found.push(edge);
-            last = node;
-        }
-        true
-    }
-
-    /// Nodes and edges that local searches added, start and goal among them, by the indices that the graph gives them.
-    fn enrich(&self) -> (Vec<Vec<f64>>, Vec<[usize; 2]>) {
-        if self.found.is_empty() {
-            return (Vec::new(), Vec::new());
-        }
-        let nodes = self.nodes[self.n_graph..].to_vec();
-        let edges = self.valid.iter().copied().filter(|[_, b]| *b >= self.n_graph);
-        (nodes, edges.chain(self.found.iter().copied()).collect())
-    }
+    roads.enrich(path.to_vec(), &edges);
+    path.len() as u64
 }

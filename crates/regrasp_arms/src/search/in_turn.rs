@@ -6,6 +6,7 @@
 use super::rrt_connect::{Region, RrtOutcome, RrtSettings, rrt_connect};
 use crate::motion::Collider;
 use regrasp_base::{Budget, Rng};
+use regrasp_manipulation::motion_settings::PartsMove;
 
 /// Settings of [`in_turn`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,12 +15,14 @@ pub struct InTurnSettings {
     pub one: RrtSettings,
     /// The search for all coordinates.
     pub all: RrtSettings,
+    /// Which parts may move at the same time.
+    pub parts: PartsMove,
 }
 
 impl Default for InTurnSettings {
     fn default() -> Self {
         let one = RrtSettings { max_samples: 1500, ..RrtSettings::default() };
-        InTurnSettings { one, all: RrtSettings::for_dimension(14) }
+        InTurnSettings { one, all: RrtSettings::for_dimension(14), parts: PartsMove::AtOnce }
     }
 }
 
@@ -38,8 +41,9 @@ pub fn in_turn(
     let parts = model.parts();
     let all = parts.arms.into_iter().chain([parts.common]);
     let moving: Vec<Vec<usize>> = all.filter(|own| own.iter().any(|&k| start[k] != goal[k])).collect();
-    if (2..=4).contains(&moving.len()) {
-        if collider.is_sampled_free(start, goal) {
+    let only_in_turn = settings.parts == PartsMove::InTurn;
+    if (if only_in_turn { 1 } else { 2 }..=4).contains(&moving.len()) {
+        if !only_in_turn && collider.is_sampled_free(start, goal) {
             outcome.path = Some(vec![start.to_vec(), goal.to_vec()]);
             return outcome;
         }
@@ -67,7 +71,7 @@ pub fn in_turn(
             }
         }
         everything(collider);
-        if outcome.path.is_some() || outcome.interrupt.is_some() {
+        if outcome.path.is_some() || outcome.interrupt.is_some() || only_in_turn {
             return outcome;
         }
     }

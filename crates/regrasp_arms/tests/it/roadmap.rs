@@ -3,7 +3,7 @@
 use crate::places::repository;
 use regrasp_arms::model::cover::covers;
 use regrasp_arms::motion::{ColliderSettings, Track};
-use regrasp_arms::roadmap::{BuildSettings, QuerySettings, SuperGraph, build, query};
+use regrasp_arms::roadmap::{BuildSettings, Changes, QuerySettings, Roads, SuperGraph, build, query};
 use regrasp_arms::world::{Obstacle, World};
 use regrasp_arms::{ArmModel, Collider};
 use regrasp_base::Budget;
@@ -62,7 +62,7 @@ fn nodes_and_edges_of_a_super_graph_are_free_where_everything_is_tested() {
 #[test]
 fn queries_go_around_what_the_graph_does_not_know_and_enrich_it() {
     let (model, known) = (model(), World::new(table()));
-    let mut graph = build(&model, &known, &small(), 2).unwrap();
+    let graph = build(&model, &known, &small(), 2).unwrap();
     let ends = [graph.graph.nodes[0].clone(), graph.graph.nodes[graph.graph.nodes.len() / 2].clone()];
     let settings = ColliderSettings { clearance: graph.clearance, ..ColliderSettings::default() };
     let free_of = |obstacle: &Obstacle| {
@@ -75,9 +75,11 @@ fn queries_go_around_what_the_graph_does_not_know_and_enrich_it() {
     let whole = World::new(table().into_iter().chain([new.clone()]).collect());
     let unknown = World::new(vec![new]);
     let n_before = graph.graph.nodes.len();
-    let ask = |graph: &mut SuperGraph| {
+    let mut graph = Roads::new(graph);
+    let changes = Changes { whole: &whole, unknown: &unknown, is_changed: &|_| false };
+    let ask = |graph: &mut Roads| {
         let ends = [ends[0].as_slice(), ends[1].as_slice()];
-        query(graph, &model, [&whole, &unknown], ends, &QuerySettings::default(), (3, &Budget::work(100_000)))
+        query(graph, &model, &changes, ends, &QuerySettings::default(), (3, &Budget::work(100_000)))
     };
     let first = ask(&mut graph);
     let path = first.path.clone().expect("a path");
@@ -86,5 +88,5 @@ fn queries_go_around_what_the_graph_does_not_know_and_enrich_it() {
         let track = Track::straight(&pair[0], &pair[1]);
         assert!((0..=40).all(|i| all.contact(&track.at(f64::from(i) / 40.0)).is_none()));
     }
-    assert_eq!(graph.graph.nodes.len() as u64, n_before as u64 + first.n_added);
+    assert_eq!(graph.graph.graph.nodes.len() as u64, n_before as u64 + first.n_added);
 }

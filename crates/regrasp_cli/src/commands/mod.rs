@@ -18,6 +18,7 @@ mod pictures;
 mod place;
 pub mod plan;
 mod roadmap;
+mod robot_roadmap;
 mod room;
 mod rows;
 mod simulate;

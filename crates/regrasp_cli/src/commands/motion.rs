@@ -1,8 +1,8 @@
 //! Motions of whole robots: what the commands `plan`, `check` and `export` do with tasks of kind `motion` and their plans.
 
 use crate::args::{self, Common};
-use crate::commands::task_grasps;
 use crate::commands::written::{self, Limits, available_threads};
+use crate::commands::{robot_roadmap, task_grasps};
 use crate::judge;
 use crate::load;
 use crate::outputs::Outputs;
@@ -14,6 +14,7 @@ use regrasp::geometry::frame::rotation_between;
 use regrasp::plan::check::{find_scene_among, robot_along};
 use regrasp::plan::format;
 use regrasp::planners::FailureKind;
+use regrasp::robot_roadmap::Asked;
 use regrasp::scene::{LoadedScene, MotionGoal, MotionQuery, PickAndPlaceQuery};
 use regrasp::viewer::render::png_file;
 use regrasp::viewer::robots::{RobotStoryboard, RobotTelling, robot_charts, robot_page, robot_storyboard};
@@ -43,22 +44,31 @@ pub fn plan(
     };
     let around = (&loaded.scene, &loaded.state);
     let settings = load::for_task(loaded.task(), &arguments.search, available_threads())?;
-    let found = match query {
+    let lists = match query {
         Query::PickAndPlace(query) => {
-            let of_lists = (loaded, query);
-            let lists = task_grasps::lists(&arguments.scene, of_lists, arguments.seed, limits, common, talk)?;
-            let started = Instant::now();
-            let budget = Budget { deadline: limits.time_limit.map(|limit| started + limit), ..budget };
-            plan_task(around, query, &lists, &settings, arguments.seed, &budget)
-                .map(|plan| AnyPlan::Robot(Box::new(plan)))
+            task_grasps::lists(&arguments.scene, (loaded, query), arguments.seed, limits, common, talk)?
         }
-        _ => plan_any(around, query, &settings, arguments.seed, &budget, &|_| {}),
+        _ => Vec::new(),
+    };
+    let asked = Asked { scene: &loaded.scene, state: &loaded.state, query, lists: &lists };
+    let with = (&asked, &settings);
+    let roadmap = robot_roadmap::find(&arguments.scene, arguments.roadmap.as_deref(), with, talk)?;
+    // Lists and roadmaps are no part of the search.
+    let started = Instant::now();
+    let budget = Budget { deadline: limits.time_limit.map(|limit| started + limit), ..budget };
+    let any = |plan: RobotPlan| AnyPlan::Robot(Box::new(plan));
+    let found = match (&roadmap, query) {
+        (Some(roadmap), _) => roadmap.plan(&asked, &settings, arguments.seed, &budget).map(any),
+        (None, Query::PickAndPlace(query)) => {
+            plan_task(around, query, &lists, &settings, arguments.seed, &budget).map(any)
+        }
+        (None, _) => plan_any(around, query, &settings, arguments.seed, &budget, &|_| {}),
     };
     let plan = match found {
         Ok(AnyPlan::Robot(plan)) => plan,
         Ok(AnyPlan::InHand(_)) => return Err(Stop::Internal("a motion was answered by a plan of one hand".into())),
         Err(failure) if failure.kind == FailureKind::Interrupted => return Err(Stop::Interrupted),
-        Err(failure) => return Err(Stop::NoPlan(Box::new(failure))),
+        Err(failure) => return Err(Stop::NoRobotPlan(Box::new(failure))),
     };
     let seconds = started.elapsed().as_secs_f64();
     talk.say(format!(

@@ -2,8 +2,9 @@
 
 use super::pictures;
 use super::plan::{judge_and_write, say_plan, say_query};
+use super::robot_roadmap;
 use super::rows::{make_folder_of, of_rows, say_row};
-use super::written::{available_threads, of_plan};
+use super::written::{Limits, available_threads, of_plan};
 use crate::args::{self, Common, RoadmapAction};
 use crate::interrupt;
 use crate::judge;
@@ -37,6 +38,7 @@ pub fn run(arguments: &args::Roadmap, common: &Common, talk: &Talk) -> Result<()
     match &arguments.action {
         RoadmapAction::Build(build) => run_build(build, common, talk),
         RoadmapAction::Query(query) => run_query(query, common, talk),
+        RoadmapAction::Info { roadmap } if robot_roadmap::is_of_robot(roadmap) => robot_roadmap::info(roadmap, talk),
         RoadmapAction::Info { roadmap } => run_info(roadmap, talk),
         RoadmapAction::Picture(picture) => run_picture(picture, common, talk),
         RoadmapAction::Bench(bench) => run_bench(bench, common, talk),
@@ -49,8 +51,13 @@ fn run_build(arguments: &args::RoadmapBuild, common: &Common, talk: &Talk) -> Re
     written
         .refuse_inputs([&arguments.settings, &arguments.build_settings].into_iter().flatten().map(PathBuf::as_path))?;
     let cancelled = interrupt::flag()?;
-    let loaded = load::in_hand_scene(&arguments.scene, ROADMAPS, common, talk)?;
+    let loaded = load::scene_by(&arguments.scene, common, None, talk)?;
     written.refuse_inputs(loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
+    if loaded.task().of_robot.is_some() {
+        let limits = Limits { max_work: args::DEFAULT_MAX_WORK, time_limit: None, improve_for: None, cancelled };
+        return robot_roadmap::build(arguments, &loaded, &limits, common, talk);
+    }
+    load::refuse_other_task(&loaded, &arguments.scene, ROADMAPS)?;
     let n_threads = arguments.threads.unwrap_or_else(available_threads);
     let settings = load::planner_settings(arguments.settings.as_deref(), arguments.margin, n_threads)?;
     let mut build: BuildSettings =

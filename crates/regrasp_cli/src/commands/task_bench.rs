@@ -11,16 +11,19 @@ use crate::stop::Stop;
 use crate::talk::Talk;
 use regrasp::base::Diagnostic;
 use regrasp::base::Place;
+use regrasp::planners::FailureKind;
+use regrasp::robot_roadmap::{Asked, RobotRoadmap};
 use regrasp::scene::pick_and_place::PICK_AND_PLACE;
 use regrasp::scene::{LoadedScene, Query, load_scene};
-use regrasp::{Budget, Failure, GraspList, RobotPlan, plan_task};
+use regrasp::tasks::RoadmapBuildSettings;
+use regrasp::{Budget, Failure, GraspList, PlannerSettings, RobotPlan, plan_task};
 use regrasp_bench::csv;
 use regrasp_bench::row::Judge;
 use regrasp_bench::task::{self, TaskRow};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// Seeds per task where none are given.
@@ -63,17 +66,26 @@ pub fn run(files: &[PathBuf], arguments: &args::Bench, common: &Common, talk: &T
             let loaded = arguments.judging.scene(loaded.clone().for_query(name));
             let settings = load::for_task(loaded.task(), &arguments.search, arguments.threads)?;
             let lists = lists_of(path, &loaded, &limits, common, talk)?;
+            let prepared = match (arguments.prepare, &lists) {
+                (true, Ok(lists)) => prepare(&loaded, lists, &settings, &cancelled)?,
+                _ => None,
+            };
             let n_seeds = arguments.seeds.unwrap_or(DEFAULT_SEEDS).min(u64::MAX - arguments.first_seed);
             for seed in arguments.first_seed..arguments.first_seed + n_seeds {
                 let plan = |query: &Query| -> Result<RobotPlan, Failure> {
                     let deadline = limits.time_limit.map(|limit| Instant::now() + limit);
                     let cancelled = Arc::clone(&cancelled);
                     let budget = Budget { deadline, cancelled, ..Budget::work(limits.max_work) };
-                    let query = query.as_pick_and_place().expect("the scene asks for pick and place");
                     let lists = lists.as_ref().map_err(Clone::clone)?;
+                    if let Some((roadmap, _)) = &prepared {
+                        let asked = Asked { scene: &loaded.scene, state: &loaded.state, query, lists };
+                        return roadmap.plan(&asked, &settings, seed, &budget);
+                    }
+                    let query = query.as_pick_and_place().expect("the scene asks for pick and place");
                     plan_task((&loaded.scene, &loaded.state), query, lists, &settings, seed, &budget)
                 };
-                let row = task::run(&loaded, seed, judge, &plan);
+                let mut row = task::run(&loaded, seed, judge, &plan);
+                row.offline_cpu_s = prepared.as_ref().map(|(_, seconds)| *seconds);
                 if cancelled.load(Ordering::Relaxed) {
                     return Err(Stop::Interrupted);
                 }
@@ -94,6 +106,25 @@ pub fn run(files: &[PathBuf], arguments: &args::Bench, common: &Common, talk: &T
     Ok(())
 }
 
+/// The roadmap of the first task, with the processor time that it took. None where none can be built, as of tasks without a plan.
+fn prepare(
+    loaded: &LoadedScene,
+    lists: &[(usize, GraspList)],
+    settings: &PlannerSettings,
+    cancelled: &Arc<AtomicBool>,
+) -> Result<Option<(RobotRoadmap, f64)>, Stop> {
+    let query = loaded.task().query(0);
+    let asked = Asked { scene: &loaded.scene, state: &loaded.state, query: &query, lists };
+    let budget = Budget { cancelled: Arc::clone(cancelled), ..Budget::unlimited() };
+    let of_build = RoadmapBuildSettings::default();
+    let (built, seconds) = task::with_cpu_seconds(|| RobotRoadmap::build(&asked, settings, &of_build, 0, &budget));
+    match built {
+        Ok(roadmap) => Ok(Some((roadmap, seconds))),
+        Err(failure) if failure.kind == FailureKind::Interrupted => Err(Stop::Interrupted),
+        Err(_) => Ok(None),
+    }
+}
+
 /// The lists of the first task. Where no hand can have a grasp, every seed of the task fails for that reason.
 fn lists_of(
     path: &Path,
@@ -109,7 +140,7 @@ fn lists_of(
     };
     match task_grasps::lists(path, (loaded, query), 0, limits, common, talk) {
         Ok(lists) => Ok(Ok(lists)),
-        Err(Stop::NoGrasp(failure) | Stop::NoPlan(failure)) => Ok(Err(*failure)),
+        Err(Stop::NoGrasp(failure) | Stop::NoPlan(failure) | Stop::NoRobotPlan(failure)) => Ok(Err(*failure)),
         Err(stop) => Err(stop),
     }
 }

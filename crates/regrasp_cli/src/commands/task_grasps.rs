@@ -37,7 +37,7 @@ pub fn lists(
 ) -> Result<Vec<(usize, GraspList)>, Stop> {
     let mut grasps = read_grasps(&loaded.scene, query)?;
     if !grasps.missing.is_empty() {
-        refuse_too_heavy(&loaded.scene, query).map_err(|failure| Stop::NoPlan(Box::new(failure)))?;
+        refuse_too_heavy(&loaded.scene, query).map_err(|failure| Stop::NoRobotPlan(Box::new(failure)))?;
     }
     let mut none = None;
     for hand in grasps.missing.clone() {

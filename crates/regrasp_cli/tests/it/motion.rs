@@ -72,10 +72,42 @@ fn what_has_no_meaning_for_a_motion_is_refused() {
         (&["plan", SCENE, "--task", "swing", "--margin", "0.01"][..], "A507"),
         (&["plan", SCENE, "--task", "swing", "--hold"], "A507"),
         (&["bench", SCENE, "--seeds", "1"], "A507"),
-        (&["roadmap", "build", SCENE, "-o", "a.roadmap"], "A507"),
     ] {
         let run = folder.run(arguments);
         assert_eq!(run.code, Some(2), "{arguments:?}: {run:?}");
         assert!(run.err.contains(code), "{arguments:?}: {run:?}");
     }
+}
+
+#[test]
+fn a_roadmap_of_a_robot_is_built_used_and_refused_elsewhere() {
+    let folder = folder();
+    folder.write("small.json", r#"{"nodes_per_arm": 5}"#);
+    let build = ["roadmap", "build", SCENE, "--task", "swing", "--build-settings", "small.json", "-o", "a.json"];
+    let built = succeeds(folder.run(&build));
+    assert!(built.err.contains("nodes"), "{built:?}");
+    let info = succeeds(folder.run(&["roadmap", "info", "a.json"]));
+    assert!(info.out.contains("motion") && info.out.contains("nodes"), "{info:?}");
+    let plan = |out: &str| folder.run(&["plan", SCENE, "--task", "swing", "--roadmap", "a.json", "-o", out]);
+    succeeds(plan("plan.json"));
+    succeeds(plan("again.json"));
+    assert_eq!(fs::read(folder.path("plan.json")).unwrap(), fs::read(folder.path("again.json")).unwrap());
+    // Beside the scene it is found.
+    fs::copy(folder.path("a.json"), folder.path("scenes/two_arms/among_lamps.roadmap.json")).unwrap();
+    let beside = succeeds(folder.run(&["plan", SCENE, "--task", "swing", "-o", "beside.json"]));
+    assert!(beside.err.contains("among_lamps.roadmap.json"), "{beside:?}");
+    // Other obstacles: refused where it is named, left out where it is not.
+    let scene = fs::read_to_string(folder.path(SCENE)).unwrap();
+    folder.write(
+        SCENE,
+        scene + "\n[[obstacles]]\nname = \"far\"\nbox = { size = [0.1, 0.1, 0.1] }\nposition = [5, 5, 5]\n",
+    );
+    let run = plan("other.json");
+    assert_eq!(run.code, Some(2), "{run:?}");
+    assert!(run.err.contains("R616") && run.err.contains("what rests around the robot"), "{run:?}");
+    let run = succeeds(folder.run(&["plan", SCENE, "--task", "swing", "-o", "other.json"]));
+    assert!(run.err.contains("is not used"), "{run:?}");
+    folder.write("b.json", "{}");
+    let run = folder.run(&["plan", SCENE, "--task", "swing", "--roadmap", "b.json"]);
+    assert!(run.code == Some(2) && run.err.contains("R601"), "{run:?}");
 }

@@ -1,8 +1,9 @@
 //! Solids as MuJoCo collides with them: a convex shape, or convex parts of a mesh.
 
 use super::geom::{CONVEX_WITHIN, is_hollowed};
+use regrasp_geometry::Point;
 use regrasp_geometry::Shape;
-use regrasp_geometry::parts::{PartSettings, convex_parts};
+use regrasp_geometry::parts::{PartSettings, convex_parts_clear_of};
 use regrasp_scene::Object;
 use std::sync::Arc;
 
@@ -24,33 +25,33 @@ pub(super) struct ObjectSolid {
 impl ObjectSolid {
     /// Of `object`: parts of a mesh that is a closed solid and not convex, else the shape itself.
     pub fn of(object: &Object) -> Self {
-        ObjectSolid::cut(object, &PARTS)
+        ObjectSolid::cut(object, &PARTS, &[])
     }
 
-    /// As [`ObjectSolid::of`], cut finer.
-    pub fn finely(object: &Object) -> Self {
-        ObjectSolid::cut(object, &FINE_PARTS)
+    /// As [`ObjectSolid::of`], cut finer, and more so where a part would cover one of the points `clear` outside of the object.
+    pub fn finely(object: &Object, clear: &[Point]) -> Self {
+        ObjectSolid::cut(object, &FINE_PARTS, clear)
     }
 
-    fn cut(object: &Object, settings: &PartSettings) -> Self {
+    fn cut(object: &Object, settings: &PartSettings, clear: &[Point]) -> Self {
         // Where the scene replaces the object by its hull, the planner kept links away from it.
         match object.hull {
             Some(_) if is_hollowed(&object.shape) => ObjectSolid::whole(&object.shape, Some(HULL)),
-            _ => ObjectSolid::cut_shape(&object.shape, settings),
+            _ => ObjectSolid::cut_shape(&object.shape, settings, clear),
         }
     }
 
     /// Of any shape.
     pub fn of_shape(shape: &Shape) -> Self {
-        ObjectSolid::cut_shape(shape, &PARTS)
+        ObjectSolid::cut_shape(shape, &PARTS, &[])
     }
 
-    fn cut_shape(shape: &Shape, settings: &PartSettings) -> Self {
+    fn cut_shape(shape: &Shape, settings: &PartSettings, clear: &[Point]) -> Self {
         if !is_hollowed(shape) {
             return ObjectSolid::whole(shape, None);
         }
         let Shape::Mesh(mesh) = shape else { return ObjectSolid::whole(shape, None) };
-        match convex_parts(mesh, settings) {
+        match convex_parts_clear_of(mesh, settings, clear) {
             Some(parts) => ObjectSolid {
                 note: Some(format!(
                     "MuJoCo collides with {} convex parts, which exceed it by {:.1} % of its volume",

@@ -33,7 +33,7 @@ fn entries<'p>(plan: &'p mut RobotPlan, rng: &mut Rng) -> Vec<&'p mut RobotConta
 impl Breeder<'_> {
     pub(super) fn break_contacts(&mut self) {
         let held = self.segments(|s| !self.hands_in(s).is_empty());
-        let free = self.segments(|s| self.hands_in(s).is_empty());
+        let free = self.segments(|s| self.hands_in(s).is_empty() && !self.kind(s).is_in_hand());
         self.add("a contact left out at one waypoint", &[Kind::GraspChanges], |plan, rng| {
             let contacts = touching(plan, &held, rng)?;
             contacts.remove(rng.below(contacts.len()));

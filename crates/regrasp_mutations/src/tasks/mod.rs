@@ -110,9 +110,9 @@ impl Breeder<'_> {
         self.plan.hands.iter().any(|hand| hand.name == name)
     }
 
-    /// Hands that hold in a segment.
+    /// Hands that hold in a segment; none in a transfer or regrasp, which is broken in ways of its own (`in_hand`).
     fn hands_in(&self, s: usize) -> Vec<String> {
-        let segment = self.plan.segments.get(s);
+        let segment = self.plan.segments.get(s).filter(|segment| !segment.kind.is_in_hand());
         let names = segment.map_or(Vec::new(), |segment| self.holders(segment));
         names.into_iter().filter(|name| self.is_hand(name)).collect()
     }

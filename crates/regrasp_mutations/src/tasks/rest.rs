@@ -14,9 +14,10 @@ const ELSEWHERE: [Kind; 5] =
 impl Breeder<'_> {
     pub(super) fn break_rest(&mut self) {
         let carries = self.moving_carries();
-        let resting = self.segments(|s| !carries.contains(&s));
+        let outside = self.segments(|s| !self.kind(s).is_in_hand());
+        let resting = self.segments(|s| !carries.contains(&s) && outside.contains(&s));
         self.add("another pose of the object at one waypoint", &ELSEWHERE, |plan, rng| {
-            let s = rng.below(plan.segments.len());
+            let s = one_of(rng, &outside)?;
             let waypoints = &mut plan.segments[s].waypoints;
             let w = rng.below(waypoints.len());
             let shift = Vector::from(rng.direction()) * log_uniform(rng, 2e-9, 1e-2);
@@ -24,7 +25,7 @@ impl Breeder<'_> {
             Some(())
         });
         self.add("the object turned at one waypoint", &ELSEWHERE, |plan, rng| {
-            let s = rng.below(plan.segments.len());
+            let s = one_of(rng, &outside)?;
             let waypoints = &mut plan.segments[s].waypoints;
             let w = rng.below(waypoints.len());
             let pose = &mut waypoints[w].world_from_objects[0];

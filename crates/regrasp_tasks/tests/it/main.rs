@@ -4,6 +4,8 @@
 mod failures;
 /// Tasks with plans.
 mod plans;
+/// Roadmaps that are made before.
+mod roadmap;
 
 use regrasp_base::Budget;
 use regrasp_grasp::list::GraspList;
@@ -48,11 +50,7 @@ impl Case {
     /// A plan that the checker accepts.
     pub fn accepted(&self, settings: &TaskSettings, seed: u64) -> RobotPlan {
         let plan = self.plan(settings, seed).unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
-        let world = (&self.loaded.scene, &self.loaded.state);
-        let query = self.query.clone().into();
-        let any = AnyPlan::Robot(Box::new(plan.clone()));
-        let report = check_any(world, Some(&query), &any, &CheckSettings::default());
-        assert!(report.accepted(), "seed {seed}: {:?}", report.violations.first());
+        accepted_by_checker(self, &plan, seed);
         plan
     }
 
@@ -63,6 +61,15 @@ impl Case {
         let report = check_any(world, Some(&self.query.clone().into()), &any, &CheckSettings::default());
         report.violations.iter().map(|violation| violation.kind).collect()
     }
+}
+
+/// Panics unless the checker accepts a plan.
+pub fn accepted_by_checker(case: &Case, plan: &RobotPlan, seed: u64) {
+    let world = (&case.loaded.scene, &case.loaded.state);
+    let query = case.query.clone().into();
+    let any = AnyPlan::Robot(Box::new(plan.clone()));
+    let report = check_any(world, Some(&query), &any, &CheckSettings::default());
+    assert!(report.accepted(), "seed {seed}: {:?}", report.violations.first());
 }
 
 /// Hands that hold the object, in order.

@@ -1,11 +1,12 @@
 //! Tasks with plans.
 
 use crate::{Case, holders};
+use regrasp_manipulation::motion_settings::PartsMove;
 use regrasp_mutations::tasks::task_mutants;
 use regrasp_plan::AnyPlan;
-use regrasp_plan::check::{CheckSettings, ViolationKind};
-use regrasp_plan::check::{CheckSettings, check_any};
+use regrasp_plan::check::{CheckSettings, ViolationKind, check_any};
 use regrasp_plan::robot_plan::RobotSegmentKind;
+use regrasp_robot::manipulator::layout::Part;
 use regrasp_scene::Query;
 use regrasp_tasks::TaskSettings;
 
@@ -60,8 +61,8 @@ fn broken_plans_with_motions_in_a_hand_are_rejected() {
     let plan = case.accepted(&TaskSettings::default(), 1);
     let world = (&case.loaded.scene, &case.loaded.state);
     let query = Query::from(case.query.clone());
-    let mut n_in_hand = 0;
-    for round in 0..3 {
+    let (mut n_in_hand, mut wrong) = (0, Vec::new());
+    for round in 0..1 {
         let mut rng = regrasp_base::Rng::keyed(round, "mutants", 0);
         for mutant in task_mutants(&plan, world, &case.query, &mut rng) {
             n_in_hand += usize::from(mutant.name.contains("hand"));
@@ -71,10 +72,13 @@ fn broken_plans_with_motions_in_a_hand_are_rejected() {
             let any = AnyPlan::Robot(Box::new(mutant.plan.clone()));
             let report = check_any((scene, state), Some(&asked), &any, &CheckSettings::default());
             let is_named = report.violations.iter().any(|violation| mutant.expected.contains(&violation.kind));
-            assert!(is_named, "{} (round {round}): {:?}", mutant.name, report.violations.first());
+            if !is_named {
+                wrong.push(format!("{} (round {round}): {:?}", mutant.name, report.violations.first()));
+            }
         }
     }
-    assert!(n_in_hand >= 20, "{n_in_hand} mutants of motions in a hand");
+    assert!(wrong.is_empty(), "{wrong:#?}");
+    assert!(n_in_hand >= 12, "{n_in_hand} mutants of motions in a hand");
 }
 
 #[test]
@@ -85,6 +89,29 @@ fn the_same_seed_gives_the_same_plan() {
         scope.spawn(|| case.plan(&TaskSettings::default(), 7).expect("a plan")).join().expect("no panic")
     });
     assert_eq!(first, again);
+}
+
+/// Parts whose joints change between two waypoints that follow each other: the most of any two.
+fn most_parts_at_once(case: &Case, settings: &TaskSettings) -> usize {
+    let plan = case.accepted(settings, 0);
+    let coordinates = &case.loaded.scene.robots[case.query.robot].layout.coordinates;
+    let parts = |pair: &[regrasp_plan::robot_plan::RobotWaypoint]| {
+        // More than the rounding of curves.
+        let changes = |k: &usize| (pair[0].joints[*k] - pair[1].joints[*k]).abs() > 1e-9;
+        let mut moving: Vec<Part> = (0..coordinates.len()).filter(changes).map(|k| coordinates[k].part).collect();
+        moving.retain(|part| !matches!(part, Part::Hand(_)));
+        moving.dedup();
+        moving.len()
+    };
+    plan.segments.iter().flat_map(|segment| segment.waypoints.windows(2).map(parts)).max().unwrap_or(0)
+}
+
+#[test]
+fn parts_move_at_once_or_in_turn() {
+    let case = Case::new("justin_horse.toml");
+    assert!(most_parts_at_once(&case, &TaskSettings::default()) >= 2);
+    let settings = TaskSettings { parts: PartsMove::InTurn, ..TaskSettings::default() };
+    assert_eq!(most_parts_at_once(&case, &settings), 1);
 }
 
 #[test]
