@@ -162,7 +162,9 @@ impl Breeder<'_> {
                 let force = Vector::from(contact.force_in_object?);
                 Some(-force.dot(&Vector::from(contact.normal_in_object)))
             };
-            let waypoints = plan.segments.iter().flat_map(|segment| &segment.waypoints);
+            // Motions in a hand have promises of their own.
+            let outside = plan.segments.iter().filter(|segment| !segment.kind.is_in_hand());
+            let waypoints = outside.flat_map(|segment| &segment.waypoints);
             let most = waypoints.flat_map(|waypoint| &waypoint.contacts).filter_map(pressing).fold(0.0, f64::max);
             let range = &mut plan.promises.holding.as_mut()?.normal_force;
             range[1] = most * rng.uniform(0.5, 0.999);
