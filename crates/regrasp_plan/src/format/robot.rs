@@ -120,7 +120,11 @@ pub fn robot_to_json(plan: &RobotPlan) -> String {
     for (i, segment) in plan.segments.iter().enumerate() {
         out.push_str(if i == 0 { "\n" } else { ",\n" });
         let (kind, held_by) = (compact(&segment.kind), compact(&segment.held_by));
-        let _ = write!(out, "    {{\"kind\":{kind},\"held_by\":{held_by},\"waypoints\":[");
+        let _ = write!(out, "    {{\"kind\":{kind},\"held_by\":{held_by},");
+        if let Some(part) = &segment.in_hand {
+            let _ = write!(out, "\"in_hand\":{},", compact(part));
+        }
+        out.push_str("\"waypoints\":[");
         for (j, waypoint) in segment.waypoints.iter().enumerate() {
             out.push_str(if j == 0 { "\n      " } else { ",\n      " });
             out.push_str(&compact(waypoint));

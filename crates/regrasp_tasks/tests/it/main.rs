@@ -63,11 +63,13 @@ impl Case {
     }
 }
 
-/// Panics unless the checker accepts a plan.
+/// Panics unless a plan is the same after it was written and read, and the checker accepts it.
 pub fn accepted_by_checker(case: &Case, plan: &RobotPlan, seed: u64) {
     let world = (&case.loaded.scene, &case.loaded.state);
     let query = case.query.clone().into();
     let any = AnyPlan::Robot(Box::new(plan.clone()));
+    let read = regrasp_plan::read_any(std::path::Path::new("plan.json"), any.to_json().as_bytes());
+    assert!(read.expect("a plan file") == any, "seed {seed}: reading loses something");
     let report = check_any(world, Some(&query), &any, &CheckSettings::default());
     assert!(report.accepted(), "seed {seed}: {:?}", report.violations.first());
 }
