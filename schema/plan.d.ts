@@ -180,6 +180,17 @@ export type Improvement = {
   work: number,
 };
 
+/** What a `transfer` or a `regrasp` says beside its waypoints. */
+export type InHandPart = {
+  /** The finger that moves, in a regrasp. */
+  moving_finger?: string,
+  /**
+   * For every waypoint, torques of the joints of the hand with which they make the contact forces, in newton metres, or newtons of
+   * sliding joints.
+   */
+  joint_torques: Array<Array<number>>,
+};
+
 /**
  * What a plan is judged for. A higher level asks for all that the lower ones ask for.
  *
@@ -330,6 +341,11 @@ export type RobotPromises = {
   clearance: number,
   /** What holds for all contacts; absent in plans without contacts. */
   holding?: HoldingPromises | null,
+  /**
+   * What holds while an object moves in a hand, by the name of the hand: as in plans of motions in the hand. Absent in plans without
+   * such segments.
+   */
+  in_hand?: { [key in string]: Promises },
 };
 
 /** A piece of motion. */
@@ -338,12 +354,14 @@ export type RobotSegment = {
   kind: RobotSegmentKind,
   /** For every object of `objects`, who holds it: names of hands and supports. */
   held_by: { [key in string]: Array<string> },
+  /** In a `transfer` or `regrasp`: which finger moves, and torques. Absent in all other kinds. */
+  in_hand?: InHandPart | null,
   /** At least two; the first is the last of the segment before, but for its time. */
   waypoints: Array<RobotWaypoint>,
 };
 
 /** Kind of a segment of a [`RobotPlan`]. */
-export type RobotSegmentKind = "transit" | "carry" | "approach" | "grasp" | "release" | "retreat";
+export type RobotSegmentKind = "transit" | "carry" | "approach" | "grasp" | "release" | "retreat" | "transfer" | "regrasp";
 
 /** Counts of the search for a motion. */
 export type RobotStatistics = {

@@ -399,7 +399,7 @@ impl Maker {
         self.joints = at;
         let holders = holders.iter().map(|name| (*name).to_owned()).collect();
         let held_by = BTreeMap::from([("bar".to_owned(), holders)]);
-        self.plan.segments.push(RobotSegment { kind, held_by, waypoints });
+        self.plan.segments.push(RobotSegment { kind, held_by, in_hand: None, waypoints });
     }
 
     fn rest(&mut self, holders: &[&str], shares: [&[(usize, f64)]; 2]) {

@@ -117,7 +117,7 @@ pub fn straight(scene: &Scene, query: &MotionQuery, corners: &[Vec<f64>], pieces
         now += span;
     }
     let kind = if query.carried.is_empty() { RobotSegmentKind::Transit } else { RobotSegmentKind::Carry };
-    plan.segments = vec![RobotSegment { kind, held_by: RobotPlan::held_by(scene, query), waypoints }];
+    plan.segments = vec![RobotSegment { kind, held_by: RobotPlan::held_by(scene, query), in_hand: None, waypoints }];
     plan
 }
 

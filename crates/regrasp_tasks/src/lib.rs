@@ -77,11 +77,11 @@ pub fn plan_with_roadmap(
     let prepared = Prepared::new(scene, query, lists, settings)?;
     let models = prepared.models();
     let context = Context::new((scene, state), query, (&prepared, &models), settings, (seed, budget))?;
-    if let Some(roadmap) = roadmap {
-        if let Some(what) = roadmap.differs(&context) {
-            let message = format!("the roadmap was made with other inputs: {what} differs");
-            return Err(failing::refused(FailureKind::SettingsInvalid, message, "build the roadmap again"));
-        }
+    if let Some(roadmap) = roadmap
+        && let Some(what) = roadmap.differs(&context)
+    {
+        let message = format!("the roadmap was made with other inputs: {what} differs");
+        return Err(failing::refused(FailureKind::SettingsInvalid, message, "build the roadmap again"));
     }
     let mut tally = Tally::default();
     before::refuse(&context, &mut tally)?;
