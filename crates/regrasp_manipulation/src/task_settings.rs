@@ -65,6 +65,8 @@ pub struct TaskSettings {
     pub put_down: bool,
     /// Poses on supports at which it may be put down.
     pub placements: usize,
+    /// How often so many are drawn, each time where those before did not do. Then grasps are changed in the hand.
+    pub placement_rounds: usize,
     /// Edges of the task graph that are tested, at most.
     pub max_edges: usize,
     /// Contact forces. The normal forces are those of the lists where those are narrower. Origin of the least one and of the squeeze:
@@ -98,6 +100,7 @@ impl Default for TaskSettings {
             in_hand_neighbours: 8,
             put_down: true,
             placements: 24,
+            placement_rounds: 4,
             max_edges: 2000,
             forces: ForceSettings { normal_force: [2.0, 40.0], squeeze_weight: 1.0, ..ForceSettings::default() },
         }
@@ -133,6 +136,7 @@ impl TaskSettings {
         at_most("in_hand_searches", self.in_hand_searches, 100_000)?;
         at_most("in_hand_neighbours", self.in_hand_neighbours, 1_000)?;
         at_most("placements", self.placements, 1_000)?;
+        at_most("placement_rounds", self.placement_rounds, 100)?;
         at_most("max_edges", self.max_edges, 1_000_000)?;
         self.forces.validate()
     }

@@ -116,6 +116,8 @@ struct Graph<'c, 'a> {
     /// Places of the exchange, by both hands; of changes in one hand, by that hand twice.
     exchange: BTreeMap<[usize; 2], Places>,
     failed_gives: usize,
+    /// How often places were drawn.
+    rounds: usize,
     tested: usize,
 }
 
@@ -131,7 +133,7 @@ pub fn search(context: &Context, roadmap: Option<&TaskRoadmap>, tally: &mut Tall
         if graph.tested > context.settings.max_edges {
             return Err(tally.failure(FailureKind::WorkSpent));
         }
-        let Some(path) = graph.cheapest() else { return Err(tally.failure(FailureKind::Impossible)) };
+        let Some(path) = graph.path() else { return Err(tally.failure(FailureKind::Impossible)) };
         if !graph.test(&path, tally) {
             continue;
         }
@@ -172,31 +174,10 @@ impl<'c, 'a> Graph<'c, 'a> {
         let ends = [&context.query.world_from_object_start, &context.query.world_from_object_goal];
         let mut places: Vec<Place> = ends.iter().filter_map(|pose| Place::new(context, pose)).collect();
         if context.settings.put_down {
-            places.extend(intermediate(context));
+            places.extend(intermediate(context, 0));
         }
-        let center = |place: &Place| (place.world_from_object * context.object.center_of_mass).coords;
-        let [start, goal] = [center(&places[0]), center(&places[1])];
-        let of_grip = |place: usize, hand: usize, grasp: usize| {
-            let at = center(&places[place]);
-            let detour = match place {
-                0 | 1 => 0.5 * (goal - start).norm(),
-                _ => 0.5 * ((at - start).norm() + (goal - at).norm()),
-            };
-            let own = &context.hands[hand].grasps[grasp];
-            let comes = places[place].world_from_object.rotation * own.direction;
-            let base = context.robot.world_from_root().translation.vector;
-            let natural = (at - base).try_normalize(1e-9).map_or(0.0, |towards: Vector| towards.dot(&comes));
-            let poor = 0.5 * (1.0 - own.score) + 0.25 * (1.0 - natural);
-            Grip { known: Known::New, cost: GRIP_SECONDS + SECONDS_PER_METRE * detour + POOR * poor, stuck: [0; 2] }
-        };
+        let grips = places.iter().enumerate().map(|(index, _)| grips_at(context, &places, index)).collect();
         let n_grasps = |hand: usize| context.hands[hand].grasps.len();
-        let grips = (0..places.len())
-            .map(|place| {
-                (0..context.hands.len())
-                    .map(|hand| (0..n_grasps(hand)).map(|grasp| of_grip(place, hand, grasp)).collect())
-                    .collect()
-            })
-            .collect();
         let mut gives: BTreeMap<[usize; 2], Vec<Given>> = BTreeMap::new();
         for giver in 0..context.hands.len() {
             for taker in 0..context.hands.len() {
@@ -222,12 +203,7 @@ impl<'c, 'a> Graph<'c, 'a> {
                 }
             }
         }
-        let mut n_nodes = places.len();
-        let mut first_held = Vec::new();
-        for hand in 0..context.hands.len() {
-            first_held.push(n_nodes);
-            n_nodes += n_grasps(hand);
-        }
+        let (first_held, n_nodes) = numbers(context, places.len());
         Graph {
             context,
             roadmap,
@@ -240,8 +216,37 @@ impl<'c, 'a> Graph<'c, 'a> {
             n_nodes,
             exchange: BTreeMap::new(),
             failed_gives: 0,
+            rounds: 1,
             tested: 0,
         }
+    }
+
+    /// The cheapest path. More places are drawn where there is none, and before a change of grasp in a hand is searched for.
+    fn path(&mut self) -> Option<Vec<Node>> {
+        loop {
+            let path = self.cheapest();
+            let settings = self.context.settings;
+            if !settings.put_down || self.rounds >= settings.placement_rounds {
+                return path;
+            }
+            if path.as_ref().is_some_and(|path| !self.needs_search_in_hand(path)) {
+                return path;
+            }
+            let known = self.places.len();
+            self.places.extend(intermediate(self.context, self.rounds));
+            self.rounds += 1;
+            let context = self.context;
+            let new = (known..self.places.len()).map(|index| grips_at(context, &self.places, index));
+            self.grips.extend(new);
+            (self.first_held, self.n_nodes) = numbers(context, self.places.len());
+        }
+    }
+
+    fn needs_search_in_hand(&self, path: &[Node]) -> bool {
+        path.windows(2).any(|pair| {
+            let (Node::Held(before), Node::Held(after)) = (pair[0], pair[1]) else { return false };
+            self.changes.get(&(before, after)).is_some_and(|changed| matches!(changed.known, Known::New))
+        })
     }
 
     /// The number of a node: places first, then grasps by hand.
@@ -533,6 +538,37 @@ impl Grip {
             self.known = Known::Dead;
         }
     }
+}
+
+/// Ways to take the object at a place, or to put it down there, by hand and grasp.
+fn grips_at(context: &Context, places: &[Place], index: usize) -> Vec<Vec<Grip>> {
+    let center = |place: &Place| (place.world_from_object * context.object.center_of_mass).coords;
+    let [start, goal, at] = [0, 1, index].map(|k| center(&places[k]));
+    let detour = match index {
+        0 | 1 => 0.5 * (goal - start).norm(),
+        _ => 0.5 * ((at - start).norm() + (goal - at).norm()),
+    };
+    let grip = |hand: usize, grasp: usize| {
+        let own = &context.hands[hand].grasps[grasp];
+        let comes = places[index].world_from_object.rotation * own.direction;
+        let base = context.robot.world_from_root().translation.vector;
+        let natural = (at - base).try_normalize(1e-9).map_or(0.0, |towards: Vector| towards.dot(&comes));
+        let poor = 0.5 * (1.0 - own.score) + 0.25 * (1.0 - natural);
+        Grip { known: Known::New, cost: GRIP_SECONDS + SECONDS_PER_METRE * detour + POOR * poor, stuck: [0; 2] }
+    };
+    let of_hand = |hand: usize| (0..context.hands[hand].grasps.len()).map(|grasp| grip(hand, grasp)).collect();
+    (0..context.hands.len()).map(of_hand).collect()
+}
+
+/// By hand, the number of its first grasp among the nodes, after those of so many places; and the number of nodes.
+fn numbers(context: &Context, n_places: usize) -> (Vec<usize>, usize) {
+    let mut n_nodes = n_places;
+    let mut first_held = Vec::new();
+    for hand in &context.hands {
+        first_held.push(n_nodes);
+        n_nodes += hand.grasps.len();
+    }
+    (first_held, n_nodes)
 }
 
 /// Changes of grasp that are worth a search: from each grasp to the nearest ones.

@@ -169,7 +169,7 @@ fn search(
         open_start: None,
     };
     let physics = PhysicsSettings { closure_margin: context.promises.required_margin, ..context.physics.clone() };
-    let settings = InHandSettings { physics, ..InHandSettings::default() };
+    let settings = InHandSettings { physics, advise: false, ..InHandSettings::default() };
     let left = context.budget.max_work.saturating_sub(tally.statistics.work);
     let budget = Budget { max_work: context.settings.in_hand_work.min(left), ..context.budget.clone() };
     match plan_in_hand(&view, &query, &settings, context.seed, &budget, &|_| {}) {

@@ -80,10 +80,10 @@ pub fn stable_pose(context: &Context, hand: usize, world_from_object: &Pose) -> 
     (best > SAME_POSE.cos()).then_some(index)
 }
 
-/// Poses on supports with flat tops, by any stable pose of the lists.
-pub fn intermediate(context: &Context) -> Vec<Place> {
+/// Poses on supports with flat tops, by any stable pose of the lists. Others in each round.
+pub fn intermediate(context: &Context, round: usize) -> Vec<Place> {
     let mut found: Vec<Place> = Vec::new();
-    let mut rng = Rng::keyed(context.seed, "placements", 0);
+    let mut rng = Rng::keyed(context.seed, "placements", round as u64);
     let mut downs: Vec<(Vector, f64)> = Vec::new();
     for pose in context.hands.iter().flat_map(|hand| &hand.list.stable_poses) {
         let down = Vector::from(pose.down_in_object);

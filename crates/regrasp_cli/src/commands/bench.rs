@@ -202,7 +202,7 @@ fn end_of(bad: Vec<InputError>, n_scenes: usize, talk: &Talk) -> Result<(), Stop
     Err(Stop::BadInput(InputError { diagnostics, n_more }))
 }
 
-/// Settings of both planners. A file of settings is that of the task that all scenes have (`A505` where they differ).
+/// Settings of both planners, whose failures give no advice: it takes time and is not shown. A file of settings is that of the task that all scenes have (`A505` where they differ).
 fn bench_settings(scenes: &[LoadedScene], arguments: &args::Bench) -> Result<(InHandSettings, TrackingSettings), Stop> {
     let is_tracking = |loaded: &&LoadedScene| loaded.task().kind_name() == TRACKING;
     if let Some(first) = scenes.iter().find(is_tracking) {
@@ -211,10 +211,11 @@ fn bench_settings(scenes: &[LoadedScene], arguments: &args::Bench) -> Result<(In
             return Err(Stop::argument("A505", "--settings", problem, "scenes of one kind"));
         }
         let tracking = load::for_task(first.task(), &arguments.search, arguments.threads)?.tracking;
-        let in_hand = InHandSettings { n_threads: arguments.threads, ..InHandSettings::default() };
+        let in_hand = InHandSettings { n_threads: arguments.threads, advise: false, ..InHandSettings::default() };
         return Ok((in_hand, tracking));
     }
-    Ok((load::settings(&arguments.search, arguments.threads)?, TrackingSettings::default()))
+    let in_hand = InHandSettings { advise: false, ..load::settings(&arguments.search, arguments.threads)? };
+    Ok((in_hand, TrackingSettings::default()))
 }
 
 /// Seeds per scene where none are given.

@@ -27,7 +27,12 @@ pub const START_AT: &str = "start at ";
 pub fn advise(asked: &Asked, settings: &InHandSettings, budget: &Budget, failure: &mut Failure) {
     let is_open = matches!(failure.kind, FailureKind::WorkSpent | FailureKind::TimeLimit);
     // A search that was hardly begun says nothing of the scene.
-    if !is_open || settings.method != Method::Gait || failure.statistics.work < WORK[0] || asked.query.stays() {
+    if !settings.advise
+        || !is_open
+        || settings.method != Method::Gait
+        || failure.statistics.work < WORK[0]
+        || asked.query.stays()
+    {
         return;
     }
     let work = (failure.statistics.work / SHARE).clamp(WORK[0], WORK[1]);

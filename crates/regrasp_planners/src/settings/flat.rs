@@ -21,7 +21,7 @@ macro_rules! flat {
 
         impl From<InHandSettings> for FlatSettings {
             fn from(settings: InHandSettings) -> Self {
-                let InHandSettings { method, n_threads: _, $($group,)* } = settings;
+                let InHandSettings { method, n_threads: _, advise: _, $($group,)* } = settings;
                 $(let $group_type { $($field,)* } = $group;)*
                 FlatSettings { method, $($($field,)*)* }
             }
@@ -30,7 +30,7 @@ macro_rules! flat {
         impl From<FlatSettings> for InHandSettings {
             fn from(flat: FlatSettings) -> Self {
                 let FlatSettings { method, $($($field,)*)* } = flat;
-                InHandSettings { method, n_threads: 1, $($group: $group_type { $($field,)* },)* }
+                InHandSettings { method, n_threads: 1, advise: true, $($group: $group_type { $($field,)* },)* }
             }
         }
     };

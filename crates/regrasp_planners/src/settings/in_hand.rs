@@ -21,6 +21,9 @@ pub struct InHandSettings {
     pub method: Method,
     /// Threads that may search at once; the plan does not depend on it, and no file has it. At least 1.
     pub n_threads: usize,
+    /// Whether a search that failed also tries which change of the scene would have helped, by short searches of its own. No part of plan
+    /// files: it changes no plan.
+    pub advise: bool,
     /// What motions keep, and how they are carried out.
     pub physics: PhysicsSettings,
     /// How grasps and motions are looked for.
@@ -36,6 +39,7 @@ impl Default for InHandSettings {
         InHandSettings {
             method: Method::Gait,
             n_threads: 1,
+            advise: true,
             physics: PhysicsSettings::default(),
             search: SearchSettings::default(),
             baselines: BaselineSettings::default(),
