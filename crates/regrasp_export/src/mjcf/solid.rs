@@ -1,9 +1,8 @@
 //! Solids as MuJoCo collides with them: a convex shape, or convex parts of a mesh.
 
 use super::geom::{CONVEX_WITHIN, is_hollowed};
-use regrasp_geometry::Point;
 use regrasp_geometry::Shape;
-use regrasp_geometry::parts::{PartSettings, convex_parts_clear_of};
+use regrasp_geometry::parts::{Clear, PartSettings, convex_parts_clear_of};
 use regrasp_scene::Object;
 use std::sync::Arc;
 
@@ -29,11 +28,11 @@ impl ObjectSolid {
     }
 
     /// As [`ObjectSolid::of`], cut finer, and more so where a part would cover one of the points `clear` outside of the object.
-    pub fn finely(object: &Object, clear: &[Point]) -> Self {
+    pub fn finely(object: &Object, clear: &[Clear]) -> Self {
         ObjectSolid::cut(object, &FINE_PARTS, clear)
     }
 
-    fn cut(object: &Object, settings: &PartSettings, clear: &[Point]) -> Self {
+    fn cut(object: &Object, settings: &PartSettings, clear: &[Clear]) -> Self {
         // Where the scene replaces the object by its hull, the planner kept links away from it.
         match object.hull {
             Some(_) if is_hollowed(&object.shape) => ObjectSolid::whole(&object.shape, Some(HULL)),
@@ -46,7 +45,7 @@ impl ObjectSolid {
         ObjectSolid::cut_shape(shape, &PARTS, &[])
     }
 
-    fn cut_shape(shape: &Shape, settings: &PartSettings, clear: &[Point]) -> Self {
+    fn cut_shape(shape: &Shape, settings: &PartSettings, clear: &[Clear]) -> Self {
         if !is_hollowed(shape) {
             return ObjectSolid::whole(shape, None);
         }
