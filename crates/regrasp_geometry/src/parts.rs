@@ -10,19 +10,22 @@ use crate::hull::{ConvexHull, HullError, convex_hull};
 use crate::mass::solid_properties;
 use crate::mesh::TriangleMesh;
 use crate::shape::Shape;
+use crate::surface::nearest_on_triangle;
 use std::sync::Arc;
 
 /// Positions of cuts tried along each axis of a piece.
 const POSITIONS: usize = 15;
 /// Most places with points that should be clear at which cuts of a piece are tried.
-const PLACES: usize = 8;
+const PLACES: usize = 6;
 /// Directions along the surface in which cuts are tried at such a place.
 const DIRECTIONS: usize = 4;
 /// Corners from which on candidates are compared by some of the corners only.
 const MANY_CORNERS: usize = 500;
-/// Least volume that a cut takes off a part that covers what should be clear, as a share of the solid's, where it clears nothing. By hand.
-const LEAST_FOR_CLEAR: f64 = 1e-6;
-/// Slivers with less volume, as a share of the solid's, are left out.
+/// Where cuts beside the surface pass, from the surface to the ball that should be clear, as a share of that way.
+const NEAR: f64 = 0.3;
+/// Least volume that a cut takes off a part that covers what should be clear, as a share of the part's, where it clears nothing. By hand.
+const LEAST_FOR_CLEAR: f64 = 0.01;
+/// No part has less volume, as a share of the solid's.
 const SLIVER: f64 = 1e-9;
 
 /// How finely a solid is cut.
@@ -43,15 +46,15 @@ impl PartSettings {
     }
 }
 
-/// A point outside of a solid that no part should cover.
+/// A ball beside a solid that no part should reach into.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clear {
-    /// The point.
-    pub point: Point,
-    /// A point between it and the surface nearby.
-    pub between: Point,
-    /// Outward normal of the surface nearby: a cut at `between` across it leaves the surface on one side.
-    pub outward: UnitVector,
+    /// Its centre.
+    pub center: Point,
+    /// Its radius, in metres: less than the way to the surface.
+    pub radius: f64,
+    /// The nearest point of the surface to its centre. A cut between the two, across the way, leaves the solid nearby on one side.
+    pub nearest: Point,
 }
 
 /// A solid in convex parts.
@@ -61,7 +64,7 @@ pub struct Parts {
     pub hulls: Vec<ConvexHull>,
     /// Volume by which they exceed the solid, as a share of the solid's.
     pub excess: f64,
-    /// How many of the points that should be clear a part covers nevertheless.
+    /// How many of the balls that should be clear a part reaches into nevertheless.
     pub covered: usize,
 }
 
@@ -123,33 +126,31 @@ fn leave_clear(pieces: &mut Vec<Piece>, (max_parts, solid): (usize, f64), clear:
     let covered_by = |piece: &Piece| {
         clear
             .iter()
-            .filter(|c| is_inside(piece.hull.vertices(), piece.hull.triangles(), &c.point))
+            .filter(|ball| ball.is_reached(piece.hull.vertices(), piece.hull.triangles()))
             .copied()
             .collect::<Vec<Clear>>()
     };
-    let mut waiting: Vec<usize> = (0..pieces.len()).rev().collect();
+    // The worst first: the number of parts is limited.
+    let mut waiting: Vec<(Vec<Clear>, usize)> = pieces.iter().map(covered_by).zip(0..).collect();
     let mut left = 0;
-    while let Some(k) = waiting.pop() {
-        let covered = covered_by(&pieces[k]);
+    while let Some(worst) = (0..waiting.len()).max_by_key(|&i| (waiting[i].0.len(), i)) {
+        let (covered, k) = waiting.swap_remove(worst);
         if covered.is_empty() {
-            continue;
+            break;
         }
-        let cut = if pieces.len() < max_parts { clearing_cut(&pieces[k], &covered, solid) } else { None };
-        let sides = cut.map(|cut| divide(&pieces[k].triangles, &cut).map(Piece::new));
-        let Some([Ok(below), Ok(above)]) = sides else {
+        let cuts = if pieces.len() < max_parts { clearing_cuts(&pieces[k], &covered) } else { Vec::new() };
+        let is_piece = |piece: &Piece| piece.volume > SLIVER * solid;
+        let sides = cuts.iter().find_map(|cut| match divide(&pieces[k].triangles, cut).map(Piece::new) {
+            [Ok(Some(below)), Ok(Some(above))] => (is_piece(&below) && is_piece(&above)).then_some([below, above]),
+            _ => None,
+        });
+        let Some([below, above]) = sides else {
             left += covered.len();
             continue;
         };
-        let is_piece = |piece: &Piece| piece.volume > SLIVER * solid;
-        let mut sides = [below, above].into_iter().flatten().filter(is_piece);
-        if let Some(side) = sides.next() {
-            pieces[k] = side;
-            waiting.push(k);
-        }
-        for side in sides {
-            pieces.push(side);
-            waiting.push(pieces.len() - 1);
-        }
+        waiting.extend([(covered_by(&below), k), (covered_by(&above), pieces.len())]);
+        pieces[k] = below;
+        pieces.push(above);
     }
     left
 }
@@ -167,11 +168,21 @@ impl Piece {
     }
 }
 
-fn is_inside(vertices: &[Point], triangles: &[[u32; 3]], point: &Point) -> bool {
-    triangles.iter().all(|triangle| {
-        let [a, b, c] = triangle.map(|k| vertices[k as usize]);
-        (b - a).cross(&(c - a)).dot(&(point - a)) <= 0.0
-    })
+impl Clear {
+    /// True where a polyhedron with outward triangles reaches into the ball.
+    fn is_reached(&self, vertices: &[Point], triangles: &[[u32; 3]]) -> bool {
+        let faces = || triangles.iter().map(|triangle| triangle.map(|k| vertices[k as usize]));
+        let mut inside = true;
+        for [a, b, c] in faces() {
+            let normal = (b - a).cross(&(c - a));
+            let height = normal.dot(&(self.center - a));
+            if height > self.radius * normal.norm() {
+                return false;
+            }
+            inside &= height <= 0.0;
+        }
+        inside || faces().any(|face| (nearest_on_triangle(&face, &self.center).0 - self.center).norm() < self.radius)
+    }
 }
 
 fn corners(triangles: &[[Point; 3]], stride: usize) -> Vec<Point> {
@@ -224,45 +235,34 @@ fn best_cut(triangles: &[[Point; 3]]) -> Option<Cut> {
     best
 }
 
-/// The cut of a piece after which fewest of the points are covered, and of those the one that takes most volume off. None where no cut
-/// helps.
-fn clearing_cut(piece: &Piece, covered: &[Clear], solid: f64) -> Option<Cut> {
+/// Cuts of a piece that clear something or take much off, that which takes off most first.
+fn clearing_cuts(piece: &Piece, covered: &[Clear]) -> Vec<Cut> {
     let stride = stride_of(&piece.triangles);
-    let mut places: Vec<Clear> = Vec::new();
-    for clear in covered {
-        if places.iter().all(|known| known.between != clear.between) {
-            places.push(*clear);
-        }
-    }
-    let step = places.len().div_ceil(PLACES).max(1);
-    let mut best: Option<(usize, Cut)> = None;
-    for place in places.into_iter().step_by(step) {
-        let (x, y) = tangents(&place.outward);
+    let mut found: Vec<(usize, Cut)> = Vec::new();
+    for place in covered.iter().step_by(covered.len().div_ceil(PLACES).max(1)) {
+        let Some((outward, way)) = UnitVector::try_new_and_get(place.center - place.nearest, 0.0) else { continue };
+        let between = place.nearest + NEAR * (way - place.radius) * outward.into_inner();
+        let (x, y) = tangents(&outward);
         let turned = |k: usize| {
             let (sin, cos) = (std::f64::consts::PI * k as f64 / DIRECTIONS as f64).sin_cos();
             cos * x.into_inner() + sin * y.into_inner()
         };
-        let normals = (0..DIRECTIONS).map(turned).chain([place.outward.into_inner()]);
+        let normals = (0..DIRECTIONS).map(turned).chain([outward.into_inner()]);
         for normal in normals.chain((0..3).map(|axis| Vector::ith(axis, 1.0))) {
-            let cut = Cut { normal, at: normal.dot(&place.between.coords), gain: 0.0 };
-            let sides = divide(&piece.triangles, &cut).map(|side| match convex_hull(&corners(&side, stride)) {
-                Ok(hull) => Some(Some(hull)),
-                Err(HullError::Flat { .. }) => Some(None),
-                Err(HullError::Failed { .. }) => None,
-            });
-            let [Some(below), Some(above)] = sides else { continue };
-            let hulls: Vec<(Vec<Point>, Vec<[u32; 3]>)> = below.into_iter().chain(above).collect();
-            let is_covered = |c: &&Clear| hulls.iter().any(|(corners, faces)| is_inside(corners, faces, &c.point));
+            let cut = Cut { normal, at: normal.dot(&between.coords), gain: 0.0 };
+            let sides = divide(&piece.triangles, &cut).map(|side| convex_hull(&corners(&side, stride)));
+            let [Ok(below), Ok(above)] = sides else { continue };
+            let hulls = [below, above];
+            let is_covered = |ball: &&Clear| hulls.iter().any(|(corners, faces)| ball.is_reached(corners, faces));
             let n_covered = covered.iter().filter(is_covered).count();
             let gain = piece.volume - hulls.iter().map(|(corners, faces)| enclosed(corners, faces)).sum::<f64>();
-            let is_worth = n_covered < covered.len() || (hulls.len() == 2 && gain > LEAST_FOR_CLEAR * solid);
-            let is_better = best.is_none_or(|(known, cut)| (n_covered, -gain) < (known, -cut.gain));
-            if is_worth && is_better {
-                best = Some((n_covered, Cut { gain, ..cut }));
+            if n_covered < covered.len() || gain > LEAST_FOR_CLEAR * piece.volume {
+                found.push((n_covered, Cut { gain, ..cut }));
             }
         }
     }
-    best.map(|(_, cut)| cut)
+    found.sort_by(|(n, a), (m, b)| b.gain.total_cmp(&a.gain).then(n.cmp(m)));
+    found.into_iter().map(|(_, cut)| cut).collect()
 }
 
 /// The parts of triangles on either side of a cut, with the cut's face on both.
@@ -368,11 +368,13 @@ mod tests {
             let rough = |(k, corner): (usize, &Point)| turn * corner + 1e-6 * Vector::ith(k % 3, (k as f64).sin());
             let vertices = shaft.vertices().iter().enumerate().map(rough).collect();
             let shaft = TriangleMesh::new(vertices, shaft.triangles().to_vec()).unwrap();
-            let (between, outward) = (turn * Point::new(0.0296, 0.0, 0.051), turn * Vector::x_axis());
-            let clear = [Clear { point: turn * Point::new(0.0297, 0.0, 0.051), between, outward }];
-            let covered = |parts: &Parts| {
-                parts.hulls.iter().any(|hull| is_inside(hull.vertices(), hull.triangles(), &clear[0].point))
-            };
+            let clear = [Clear {
+                center: turn * Point::new(0.0298, 0.0, 0.051),
+                radius: 1e-4,
+                nearest: turn * Point::new(0.0295, 0.0, 0.051),
+            }];
+            let covered =
+                |parts: &Parts| parts.hulls.iter().any(|hull| clear[0].is_reached(hull.vertices(), hull.triangles()));
             assert!(covered(&convex_parts(&shaft, &settings).unwrap()));
             let parts = convex_parts_clear_of(&shaft, &settings, &clear).unwrap();
             assert!(!covered(&parts) && parts.covered == 0, "{} covered", parts.covered);

@@ -2,7 +2,7 @@
 
 use super::geom::{CONVEX_WITHIN, is_hollowed};
 use regrasp_geometry::Shape;
-use regrasp_geometry::parts::{Clear, PartSettings, convex_parts_clear_of};
+use regrasp_geometry::parts::{Clear, PartSettings, Parts, convex_parts_clear_of};
 use regrasp_scene::Object;
 use std::sync::Arc;
 
@@ -52,11 +52,7 @@ impl ObjectSolid {
         let Shape::Mesh(mesh) = shape else { return ObjectSolid::whole(shape, None) };
         match convex_parts_clear_of(mesh, settings, clear) {
             Some(parts) => ObjectSolid {
-                note: Some(format!(
-                    "MuJoCo collides with {} convex parts, which exceed it by {:.1} % of its volume",
-                    parts.hulls.len(),
-                    100.0 * parts.excess
-                )),
+                note: Some(note(&parts)),
                 parts: parts.hulls.into_iter().map(|hull| Shape::Convex(Arc::new(hull))).collect(),
             },
             None => ObjectSolid::whole(shape, Some(HULL)),
@@ -66,4 +62,14 @@ impl ObjectSolid {
     fn whole(shape: &Shape, note: Option<&str>) -> Self {
         ObjectSolid { parts: vec![shape.clone()], note: note.map(str::to_owned) }
     }
+}
+
+/// How parts differ from their solid.
+fn note(parts: &Parts) -> String {
+    let (n, excess) = (parts.hulls.len(), 100.0 * parts.excess);
+    let left = match parts.covered {
+        0 => String::new(),
+        k => format!("; in {k} places they reach too near to fingertips or links"),
+    };
+    format!("MuJoCo collides with {n} convex parts, which exceed it by {excess:.1} % of its volume{left}")
 }

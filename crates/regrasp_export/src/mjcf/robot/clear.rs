@@ -1,4 +1,4 @@
-//! Points beside the object that its convex parts should not cover, because fingers and palms are there.
+//! Balls beside the object that its convex parts should not cover, because fingers and palms are there.
 //!
 //! A part that stands out where a fingertip touches makes another grasp of the planned one, and a part that stands out where a link
 //! passes pushes the object away.
@@ -18,8 +18,11 @@ const OUTSTANDING: f64 = 3e-4;
 /// Radius of fingertips that are no balls, in metres.
 const TIP_RADIUS: f64 = 0.008;
 /// Rings of points on a fingertip about its contact, and the angle of the last.
-const RINGS: i32 = 4;
+const RINGS: i32 = 8;
 const LARGEST_ANGLE: f64 = 1.2;
+/// Radius of the balls that are kept clear, as a share of the way to the object, and the largest, in metres.
+const SHARE: f64 = 0.1;
+const LARGEST_BALL: f64 = 5e-4;
 /// Area of the object for each ray towards the links of hands, in m^2, and most rays.
 const AREA: f64 = 4e-6;
 const MOST_RAYS: f64 = 20_000.0;
@@ -55,20 +58,25 @@ fn around_tips(robot: &Manipulator, object: &Object, plan: &RobotPlan) -> Vec<Cl
         let outward = UnitVector::new_normalize(Vector::from(contact.normal_in_object));
         let (x, y) = tangents(&outward);
         let touched = Point::from(contact.point_in_object);
-        let (between, center) = (touched + 0.5 * OUTSTANDING * *outward, touched + radius * *outward);
+        let center = touched + radius * *outward;
         for ring in 0..=RINGS {
             let angle = LARGEST_ANGLE * f64::from(ring) / f64::from(RINGS);
             for k in 0..if ring == 0 { 1 } else { 4 * ring } {
                 let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / f64::from(4 * ring.max(1))).sin_cos();
                 let across = cos * x.into_inner() + sin * y.into_inner();
                 let point = center + (radius - OUTSTANDING) * (angle.sin() * across - angle.cos() * *outward);
-                if object.surface.signed_distance(&point) > 0.5 * OUTSTANDING {
-                    found.push(Clear { point, between, outward });
-                }
+                found.extend(outside(&object.surface, point));
             }
         }
     }
     found
+}
+
+/// A ball about a point, if it is outside of the object.
+fn outside(surface: &Surface, point: Point) -> Option<Clear> {
+    let (nearest, distance) = surface.project_signed(&point);
+    let radius = (SHARE * distance).min(LARGEST_BALL);
+    (distance > 0.5 * OUTSTANDING).then_some(Clear { center: point, radius, nearest: nearest.point_in_object })
 }
 
 /// A collision shape of a link of a hand.
@@ -114,9 +122,7 @@ fn beside_links(robot: &Manipulator, object: &Object, plan: &RobotPlan) -> Vec<C
         // A little nearer than the link: it does not follow the plan exactly.
         let height = (height - OUTSTANDING).max(0.75 * OUTSTANDING);
         let point = from + height * outward.into_inner();
-        let between = from + 0.4 * OUTSTANDING * outward.into_inner();
-        let is_outside = height <= FAR && surface.signed_distance(&point) > 0.5 * OUTSTANDING;
-        is_outside.then_some(Clear { point, between, outward: *outward })
+        if height <= FAR { outside(surface, point) } else { None }
     };
     // What touches is the business of fingertips.
     let pairs = rays.iter().zip(nearest).filter(|(_, height)| *height > OUTSTANDING);
