@@ -90,6 +90,22 @@ def test_feedback_holds_a_heavier_box_closer_to_the_plan(plan: regrasp.RobotPlan
         replay(plan.document, xml, TaskSettings(controller="A"))
 
 
+def test_a_grasp_that_changes_in_the_hand_is_replayed() -> None:
+    pytest.importorskip("mujoco")
+    from regrasp.simulate.task import TaskSettings, replay
+
+    scene = REPOSITORY / "scenes/two_arms/regrasp_then_give.toml"
+    plan = regrasp.plan_pick_and_place(scene)
+    assert isinstance(plan, regrasp.RobotPlan), str(plan)
+    assert {"regrasp", "transfer"} <= {segment.kind for segment in plan.segments}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        xml = plan.to_mjcf(scene)
+    for controller in ("B", "C2"):
+        report, _, _ = replay(plan.document, xml, TaskSettings(controller=controller))
+        assert report.kept and report.largest_angle_error < 0.1, str(report)
+
+
 def test_a_box_of_ice_is_lost(plan: regrasp.RobotPlan, xml: str) -> None:
     pytest.importorskip("mujoco")
     from regrasp.simulate.reference import PlanError

@@ -1,24 +1,33 @@
 //! Solids in convex parts, for programs that collide convex shapes only.
 //!
-//! The surface is cut by planes across the axes of its frame, one cut after the other, and every piece is replaced by its convex
-//! hull. Each cut is the one of some candidates that takes most volume off the hulls. All corners of a part lie on the surface or
-//! inside, so that a part leaves the surface only where the surface curves inwards.
+//! The surface is cut by planes, one cut after the other, and every piece is replaced by its convex hull. Each cut is the one of some
+//! candidates across the axes of the mesh that takes most volume off the hulls. All corners of a part lie on the surface or inside, so
+//! that a part leaves the surface only where the surface curves inwards. Where something has to stay clear there, a second round cuts
+//! along the surface.
 
-use crate::frame::{Point, Vector};
-use crate::hull::ConvexHull;
+use crate::frame::{Point, UnitVector, Vector, tangents};
+use crate::hull::{ConvexHull, HullError, convex_hull};
 use crate::mass::solid_properties;
 use crate::mesh::TriangleMesh;
 use crate::shape::Shape;
+use crate::surface::nearest_on_triangle;
 use std::sync::Arc;
 
 /// Positions of cuts tried along each axis of a piece.
 const POSITIONS: usize = 15;
-/// Most points that should be clear through which cuts are looked at, along each axis.
-const THROUGH_CLEAR: usize = 8;
+/// Most places with points that should be clear at which cuts of a piece are tried.
+const PLACES: usize = 6;
+/// Directions along the surface in which cuts are tried at such a place.
+const DIRECTIONS: usize = 4;
 /// Corners from which on candidates are compared by some of the corners only.
-const MANY_CORNERS: usize = 1500;
-/// Least volume that a cut takes off a part that covers what should be clear, as a share of the solid's. By hand.
-const LEAST_FOR_CLEAR: f64 = 1e-6;
+const MANY_CORNERS: usize = 500;
+/// Where cuts beside the surface pass, from the surface to the ball that should be clear, as a share of that way.
+const NEAR: f64 = 0.3;
+/// Least volume that a cut takes off a part that covers what should be clear, as a share of the part's, where it clears nothing. By hand.
+const LEAST_FOR_CLEAR: f64 = 0.01;
+/// No part has less volume, as a share of the solid's.
+const SLIVER: f64 = 1e-9;
+
 /// How finely a solid is cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PartSettings {
@@ -37,6 +46,17 @@ impl PartSettings {
     }
 }
 
+/// A ball beside a solid that no part should reach into.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clear {
+    /// Its centre.
+    pub center: Point,
+    /// Its radius, in metres: less than the way to the surface.
+    pub radius: f64,
+    /// The nearest point of the surface to its centre. A cut between the two, across the way, leaves the solid nearby on one side.
+    pub nearest: Point,
+}
+
 /// A solid in convex parts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parts {
@@ -44,6 +64,8 @@ pub struct Parts {
     pub hulls: Vec<ConvexHull>,
     /// Volume by which they exceed the solid, as a share of the solid's.
     pub excess: f64,
+    /// How many of the balls that should be clear a part reaches into nevertheless.
+    pub covered: usize,
 }
 
 /// A part of the surface and its hull.
@@ -51,17 +73,14 @@ struct Piece {
     triangles: Vec<[Point; 3]>,
     hull: ConvexHull,
     volume: f64,
-    /// The best cut, and the volume that it takes off; None where there is none.
-    cut: Option<Cut>,
-    /// Points that should be clear and are in the hull.
-    covered: Vec<Point>,
 }
 
-/// Across an axis, at a coordinate.
+/// Across a direction, at a height along it.
 #[derive(Debug, Clone, Copy)]
 struct Cut {
-    axis: usize,
+    normal: Vector,
     at: f64,
+    /// The volume that it takes off.
     gain: f64,
 }
 
@@ -70,55 +89,100 @@ pub fn convex_parts(mesh: &TriangleMesh, settings: &PartSettings) -> Option<Part
     convex_parts_clear_of(mesh, settings, &[])
 }
 
-/// As [`convex_parts`]. Afterwards parts that cover one of the points `clear`, which are outside of the solid, are cut on, up to twice as
-/// many parts, while that takes anything off.
-pub fn convex_parts_clear_of(mesh: &TriangleMesh, settings: &PartSettings, clear: &[Point]) -> Option<Parts> {
+/// As [`convex_parts`]. Afterwards parts that cover one of the points `clear` are cut on, up to twice as many parts, while that helps.
+pub fn convex_parts_clear_of(mesh: &TriangleMesh, settings: &PartSettings, clear: &[Clear]) -> Option<Parts> {
     let solid = solid_properties(&Shape::Mesh(Arc::new(mesh.clone()))).ok()?.volume;
-    let triangles = (0..mesh.triangles().len()).map(|index| mesh.corners(index)).collect();
-    let mut pieces = vec![Piece::new(triangles, clear)?];
-    let excess = |pieces: &[Piece]| pieces.iter().map(|piece| piece.volume).sum::<f64>() / solid - 1.0;
-    let gain = |piece: &Piece| piece.cut.map_or(0.0, |cut| cut.gain);
-    let covers = |piece: &Piece| !piece.covered.is_empty();
+    let triangles: Vec<[Point; 3]> = (0..mesh.triangles().len()).map(|index| mesh.corners(index)).collect();
+    let whole = Piece::new(triangles).ok()??;
+    let mut pieces = by_volume(whole, settings, solid)?;
+    let covered = leave_clear(&mut pieces, (2 * settings.max_parts, solid), clear);
+    let excess = pieces.iter().map(|piece| piece.volume).sum::<f64>() / solid - 1.0;
+    Some(Parts { hulls: pieces.into_iter().map(|piece| piece.hull).collect(), excess, covered })
+}
+
+/// The first round: cuts that take most volume off.
+fn by_volume(whole: Piece, settings: &PartSettings, solid: f64) -> Option<Vec<Piece>> {
+    let mut pieces = vec![(best_cut(&whole.triangles), whole)];
     loop {
-        let is_fine = pieces.len() >= settings.max_parts || excess(&pieces) <= settings.excess;
-        let may_be_cut =
-            |piece: &Piece| gain(piece) > if is_fine { LEAST_FOR_CLEAR } else { settings.least_gain } * solid;
-        let of_all = |among: &dyn Fn(&Piece) -> bool| {
-            let candidates = (0..pieces.len()).filter(|&k| among(&pieces[k]) && may_be_cut(&pieces[k]));
-            candidates.max_by(|&a, &b| gain(&pieces[a]).total_cmp(&gain(&pieces[b])))
-        };
-        let best = if is_fine { None } else { of_all(&|_| true) };
-        let best = best.or_else(|| of_all(&covers).filter(|_| pieces.len() < 2 * settings.max_parts));
-        let Some(best) = best else { break };
-        let cut = pieces[best].cut?;
-        let [below, above] = divide(&pieces[best].triangles, &cut);
-        let covered = std::mem::take(&mut pieces[best].covered);
-        let (Some(below), Some(above)) = (Piece::new(below, &covered), Piece::new(above, &covered)) else {
-            (pieces[best].cut, pieces[best].covered) = (None, covered);
+        let excess = pieces.iter().map(|(_, piece)| piece.volume).sum::<f64>() / solid - 1.0;
+        if pieces.len() >= settings.max_parts || excess <= settings.excess {
+            break;
+        }
+        let gain = |k: usize| pieces[k].0.map_or(0.0, |cut| cut.gain);
+        let worth = (0..pieces.len()).filter(|&k| gain(k) > settings.least_gain * solid);
+        let Some(best) = worth.max_by(|&a, &b| gain(a).total_cmp(&gain(b))) else { break };
+        let cut = pieces[best].0.take()?;
+        let [Ok(Some(below)), Ok(Some(above))] = divide(&pieces[best].1.triangles, &cut).map(Piece::new) else {
             continue;
         };
-        pieces[best] = below;
+        pieces[best] = (best_cut(&below.triangles), below);
+        pieces.push((best_cut(&above.triangles), above));
+    }
+    Some(pieces.into_iter().map(|(_, piece)| piece).collect())
+}
+
+/// The second round: cuts that uncover points. Returns how many points stay covered.
+fn leave_clear(pieces: &mut Vec<Piece>, (max_parts, solid): (usize, f64), clear: &[Clear]) -> usize {
+    let covered_by = |piece: &Piece| {
+        clear
+            .iter()
+            .filter(|ball| ball.is_reached(piece.hull.vertices(), piece.hull.triangles()))
+            .copied()
+            .collect::<Vec<Clear>>()
+    };
+    // The worst first: the number of parts is limited.
+    let mut waiting: Vec<(Vec<Clear>, usize)> = pieces.iter().map(covered_by).zip(0..).collect();
+    let mut left = 0;
+    while let Some(worst) = (0..waiting.len()).max_by_key(|&i| (waiting[i].0.len(), i)) {
+        let (covered, k) = waiting.swap_remove(worst);
+        if covered.is_empty() {
+            break;
+        }
+        let cuts = if pieces.len() < max_parts { clearing_cuts(&pieces[k], &covered) } else { Vec::new() };
+        let is_piece = |piece: &Piece| piece.volume > SLIVER * solid;
+        let sides = cuts.iter().find_map(|cut| match divide(&pieces[k].triangles, cut).map(Piece::new) {
+            [Ok(Some(below)), Ok(Some(above))] => (is_piece(&below) && is_piece(&above)).then_some([below, above]),
+            _ => None,
+        });
+        let Some([below, above]) = sides else {
+            left += covered.len();
+            continue;
+        };
+        waiting.extend([(covered_by(&below), k), (covered_by(&above), pieces.len())]);
+        pieces[k] = below;
         pieces.push(above);
     }
-    let excess = excess(&pieces);
-    Some(Parts { hulls: pieces.into_iter().map(|piece| piece.hull).collect(), excess })
+    left
 }
 
 impl Piece {
-    fn new(triangles: Vec<[Point; 3]>, clear: &[Point]) -> Option<Self> {
-        let hull = ConvexHull::new(&corners(&triangles, 1)).ok()?;
-        let volume = volume_of(&hull)?;
-        let covered: Vec<Point> = clear.iter().copied().filter(|point| is_inside(&hull, point)).collect();
-        let cut = best_cut(&triangles, &covered);
-        Some(Piece { triangles, hull, volume, cut, covered })
+    /// None where it is flat.
+    fn new(triangles: Vec<[Point; 3]>) -> Result<Option<Self>, HullError> {
+        let hull = match ConvexHull::new(&corners(&triangles, 1)) {
+            Ok(hull) => hull,
+            Err(HullError::Flat { .. }) => return Ok(None),
+            Err(failed) => return Err(failed),
+        };
+        let Some(volume) = volume_of(&hull) else { return Ok(None) };
+        Ok(Some(Piece { triangles, hull, volume }))
     }
 }
 
-fn is_inside(hull: &ConvexHull, point: &Point) -> bool {
-    hull.triangles().iter().all(|triangle| {
-        let [a, b, c] = triangle.map(|k| hull.vertices()[k as usize]);
-        (b - a).cross(&(c - a)).dot(&(point - a)) <= 0.0
-    })
+impl Clear {
+    /// True where a polyhedron with outward triangles reaches into the ball.
+    fn is_reached(&self, vertices: &[Point], triangles: &[[u32; 3]]) -> bool {
+        let faces = || triangles.iter().map(|triangle| triangle.map(|k| vertices[k as usize]));
+        let mut inside = true;
+        for [a, b, c] in faces() {
+            let normal = (b - a).cross(&(c - a));
+            let height = normal.dot(&(self.center - a));
+            if height > self.radius * normal.norm() {
+                return false;
+            }
+            inside &= height <= 0.0;
+        }
+        inside || faces().any(|face| (nearest_on_triangle(&face, &self.center).0 - self.center).norm() < self.radius)
+    }
 }
 
 fn corners(triangles: &[[Point; 3]], stride: usize) -> Vec<Point> {
@@ -133,21 +197,33 @@ fn volume_of(hull: &ConvexHull) -> Option<f64> {
     solid_properties(&Shape::Convex(Arc::new(hull.clone()))).ok().map(|solid| solid.volume)
 }
 
-/// The cut of a piece after which the two hulls have least volume; of some at equal distances and some through points that should be
-/// clear.
-fn best_cut(triangles: &[[Point; 3]], covered: &[Point]) -> Option<Cut> {
-    let n_corners = 3 * triangles.len();
-    let stride = n_corners.div_ceil(6 * MANY_CORNERS).max(1);
-    let rough = |triangles: &[[Point; 3]]| volume_of(&ConvexHull::new(&corners(triangles, stride)).ok()?);
+/// The volume that outward triangles enclose.
+fn enclosed(vertices: &[Point], triangles: &[[u32; 3]]) -> f64 {
+    let Some(origin) = vertices.first() else { return 0.0 };
+    let corner = |k: u32| vertices[k as usize] - origin;
+    triangles.iter().map(|&[a, b, c]| corner(a).dot(&corner(b).cross(&corner(c))) / 6.0).sum()
+}
+
+/// Stride through the corners with which candidates are compared.
+fn stride_of(triangles: &[[Point; 3]]) -> usize {
+    (3 * triangles.len()).div_ceil(6 * MANY_CORNERS).max(1)
+}
+
+/// The cut of a piece after which the two hulls have least volume, of some at equal distances across the axes.
+fn best_cut(triangles: &[[Point; 3]]) -> Option<Cut> {
+    let stride = stride_of(triangles);
+    let rough = |triangles: &[[Point; 3]]| {
+        let (vertices, faces) = convex_hull(&corners(triangles, stride)).ok()?;
+        Some(enclosed(&vertices, &faces))
+    };
     let whole = rough(triangles)?;
     let mut best: Option<Cut> = None;
     for axis in 0..3 {
         let along = || triangles.iter().flatten().map(|corner| corner[axis]);
         let (low, high) = (along().fold(f64::INFINITY, f64::min), along().fold(f64::NEG_INFINITY, f64::max));
-        let even = (1..=POSITIONS).map(|k| low + (high - low) * k as f64 / (POSITIONS + 1) as f64);
-        let through = covered.iter().step_by(covered.len().div_ceil(THROUGH_CLEAR).max(1)).map(|point| point[axis]);
-        for at in even.chain(through.filter(|at| low < *at && *at < high)) {
-            let cut = Cut { axis, at, gain: 0.0 };
+        for k in 1..=POSITIONS {
+            let at = low + (high - low) * k as f64 / (POSITIONS + 1) as f64;
+            let cut = Cut { normal: Vector::ith(axis, 1.0), at, gain: 0.0 };
             let [below, above] = divide(triangles, &cut);
             let (Some(a), Some(b)) = (rough(&below), rough(&above)) else { continue };
             let gain = whole - a - b;
@@ -159,6 +235,36 @@ fn best_cut(triangles: &[[Point; 3]], covered: &[Point]) -> Option<Cut> {
     best
 }
 
+/// Cuts of a piece that clear something or take much off, that which takes off most first.
+fn clearing_cuts(piece: &Piece, covered: &[Clear]) -> Vec<Cut> {
+    let stride = stride_of(&piece.triangles);
+    let mut found: Vec<(usize, Cut)> = Vec::new();
+    for place in covered.iter().step_by(covered.len().div_ceil(PLACES).max(1)) {
+        let Some((outward, way)) = UnitVector::try_new_and_get(place.center - place.nearest, 0.0) else { continue };
+        let between = place.nearest + NEAR * (way - place.radius) * outward.into_inner();
+        let (x, y) = tangents(&outward);
+        let turned = |k: usize| {
+            let (sin, cos) = (std::f64::consts::PI * k as f64 / DIRECTIONS as f64).sin_cos();
+            cos * x.into_inner() + sin * y.into_inner()
+        };
+        let normals = (0..DIRECTIONS).map(turned).chain([outward.into_inner()]);
+        for normal in normals.chain((0..3).map(|axis| Vector::ith(axis, 1.0))) {
+            let cut = Cut { normal, at: normal.dot(&between.coords), gain: 0.0 };
+            let sides = divide(&piece.triangles, &cut).map(|side| convex_hull(&corners(&side, stride)));
+            let [Ok(below), Ok(above)] = sides else { continue };
+            let hulls = [below, above];
+            let is_covered = |ball: &&Clear| hulls.iter().any(|(corners, faces)| ball.is_reached(corners, faces));
+            let n_covered = covered.iter().filter(is_covered).count();
+            let gain = piece.volume - hulls.iter().map(|(corners, faces)| enclosed(corners, faces)).sum::<f64>();
+            if n_covered < covered.len() || gain > LEAST_FOR_CLEAR * piece.volume {
+                found.push((n_covered, Cut { gain, ..cut }));
+            }
+        }
+    }
+    found.sort_by(|(n, a), (m, b)| b.gain.total_cmp(&a.gain).then(n.cmp(m)));
+    found.into_iter().map(|(_, cut)| cut).collect()
+}
+
 /// The parts of triangles on either side of a cut, with the cut's face on both.
 ///
 /// The face is a fan of triangles over its edges. Where it is not convex the fan covers dents too, but nothing outside of the
@@ -168,7 +274,7 @@ fn divide(triangles: &[[Point; 3]], cut: &Cut) -> [Vec<[Point; 3]>; 2] {
     let mut edges: Vec<[Point; 2]> = Vec::new();
     for triangle in triangles {
         for (side, sign) in sides.iter_mut().zip([-1.0, 1.0]) {
-            let edge = clip(triangle, |corner| sign * (corner[cut.axis] - cut.at), side);
+            let edge = clip(triangle, |corner| sign * (corner.coords.dot(&cut.normal) - cut.at), side);
             // Both sides have the same edges.
             edges.extend(edge.filter(|_| sign < 0.0));
         }
@@ -212,6 +318,7 @@ fn clip(triangle: &[Point; 3], height: impl Fn(&Point) -> f64, side: &mut Vec<[P
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::UnitQuaternion;
     use std::f64::consts::TAU;
 
     /// A solid of revolution about z through (radius, z), closed at both ends.
@@ -249,17 +356,30 @@ mod tests {
         assert!(volume_of(&whole).unwrap() > 1.2 * shaft.signed_volume());
     }
 
-    /// A groove of a thousandth of the volume, which volume alone would leave filled.
+    /// A groove of a thousandth of the volume, which volume alone would leave filled; and the same with its axis across none of the
+    /// mesh's.
     #[test]
     fn parts_leave_free_what_should_be_clear() {
         let shaft =
             turned(&[(0.03, 0.0), (0.03, 0.05), (0.0295, 0.0505), (0.0295, 0.0515), (0.03, 0.052), (0.03, 0.1)], 48);
         let settings = PartSettings::new(8, 0.02);
-        let clear = [Point::new(0.0297, 0.0, 0.051)];
-        let covered = |parts: &Parts| parts.hulls.iter().any(|hull| is_inside(hull, &clear[0]));
-        assert!(covered(&convex_parts(&shaft, &settings).unwrap()));
-        let parts = convex_parts_clear_of(&shaft, &settings, &clear).unwrap();
-        assert!(!covered(&parts) && parts.hulls.len() <= 16, "{} parts", parts.hulls.len());
+        for turn in [UnitQuaternion::identity(), UnitQuaternion::from_euler_angles(0.7, 0.5, 0.3)] {
+            // Many points in one plane, all but for rounding, have no hull.
+            let rough = |(k, corner): (usize, &Point)| turn * corner + 1e-6 * Vector::ith(k % 3, (k as f64).sin());
+            let vertices = shaft.vertices().iter().enumerate().map(rough).collect();
+            let shaft = TriangleMesh::new(vertices, shaft.triangles().to_vec()).unwrap();
+            let clear = [Clear {
+                center: turn * Point::new(0.0298, 0.0, 0.051),
+                radius: 1e-4,
+                nearest: turn * Point::new(0.0295, 0.0, 0.051),
+            }];
+            let covered =
+                |parts: &Parts| parts.hulls.iter().any(|hull| clear[0].is_reached(hull.vertices(), hull.triangles()));
+            assert!(covered(&convex_parts(&shaft, &settings).unwrap()));
+            let parts = convex_parts_clear_of(&shaft, &settings, &clear).unwrap();
+            assert!(!covered(&parts) && parts.covered == 0, "{} covered", parts.covered);
+            assert!(parts.hulls.len() <= 16, "{} parts", parts.hulls.len());
+        }
     }
 
     #[test]
@@ -287,7 +407,10 @@ mod tests {
         let mut pieces: Vec<Vec<[Point; 3]>> =
             vec![cube.triangles().iter().map(|t| t.map(|k| cube.vertices()[k as usize])).collect()];
         for axis in 0..3 {
-            pieces = pieces.iter().flat_map(|piece| divide(piece, &Cut { axis, at: 0.4, gain: 0.0 })).collect();
+            pieces = pieces
+                .iter()
+                .flat_map(|piece| divide(piece, &Cut { normal: Vector::ith(axis, 1.0), at: 0.4, gain: 0.0 }))
+                .collect();
         }
         let volumes: Vec<f64> =
             pieces.iter().map(|piece| volume_of(&ConvexHull::new(&corners(piece, 1)).unwrap()).unwrap()).collect();

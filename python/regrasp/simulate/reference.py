@@ -97,22 +97,16 @@ def reference(plan: Plan, *, tick: float = 0.004, speed: float = 1.0) -> Referen
     # Of waypoints at the same time the last has passed.
     search: Any = np.searchsorted
     index: NDArray[np.int64] = np.asarray(search(times, at, side="right") - 1).clip(0, len(times) - 2)
-    duration = np.maximum(steps, 1e-12)
-    u = np.clip((at - times[index]) / duration[index], 0.0, 1.0)
+    u = np.clip((at - times[index]) / np.maximum(steps, 1e-12)[index], 0.0, 1.0)
 
     joints = np.array([point["joints"] for point in points], dtype=np.float64)
     velocities = np.array([point["joint_velocities"] for point in points], dtype=np.float64) * speed
     line = np.diff(joints, axis=0)
-    length = np.einsum("ij,ij->i", line, line)
-    # Where the joints rest the parameter is linear in time.
-    moves = length > 1e-18
-    slope = np.where(moves, duration / np.where(moves, length, 1.0), 0.0)
-    start_slope = np.where(moves, np.clip(slope * np.einsum("ij,ij->i", line, velocities[:-1]), 0.0, 3.0), 1.0)
-    end_slope = np.where(moves, np.clip(slope * np.einsum("ij,ij->i", line, velocities[1:]), 0.0, 3.0), 1.0)
-    a, b = start_slope[index], end_slope[index]
-    s = u * (a + u * ((3.0 - 2.0 * a - b) + u * (a + b - 2.0)))
+    duration = np.maximum(steps, 1e-12)
+    span = duration[index]
+    s = chord_parameter(line[index], velocities[:-1][index] * span[:, None], velocities[1:][index] * span[:, None], u)
     # Cubic Hermite polynomials and their derivatives: of the change, and of the velocities at both ends.
-    v, span = 1.0 - u, duration[index]
+    v = 1.0 - u
     polynomials = u * u * (3.0 - 2.0 * u), u * v * v * span, -u * u * v * span
     derivatives = 6.0 * u * v / span, v * (1.0 - 3.0 * u), u * (3.0 * u - 2.0)
     ends = line[index], velocities[:-1][index], velocities[1:][index]
@@ -134,6 +128,20 @@ def reference(plan: Plan, *, tick: float = 0.004, speed: float = 1.0) -> Referen
         holds=held[index] & held[index + 1],
         presses=held[index] | held[index + 1],
     )
+
+
+def chord_parameter(line: Array, first: Array, last: Array, u: Array) -> Array:
+    """Parameter of the object's motion at the share ``u`` of the time of steps (docs/reference/plan-format.md, Time).
+
+    ``line`` is the change of the joints in each step, ``first`` and ``last`` their velocities at its ends times its duration.
+    """
+    length = np.einsum("ij,ij->i", line, line)
+    # Where the joints rest the parameter is linear in time.
+    moves = length > 1e-18
+    slope = np.where(moves, 1.0 / np.where(moves, length, 1.0), 0.0)
+    a = np.where(moves, np.clip(slope * np.einsum("ij,ij->i", line, first), 0.0, 3.0), 1.0)
+    b = np.where(moves, np.clip(slope * np.einsum("ij,ij->i", line, last), 0.0, 3.0), 1.0)
+    return np.asarray(u * (a + u * ((3.0 - 2.0 * a - b) + u * (a + b - 2.0))))
 
 
 def _object_poses(points: list[dict[str, Any]], index: NDArray[np.int64], s: Array) -> tuple[Array, Array]:

@@ -104,6 +104,8 @@ class TaskFeedback:
             after: list[dict[str, Any]] = []
             if segment["kind"] == "grasp" and s + 1 < len(plan["segments"]):
                 after = plan["segments"][s + 1]["waypoints"][0].get("contacts", [])
+            elif segment["kind"] == "regrasp":
+                after = segment["waypoints"][-1].get("contacts", [])
             for point in segment["waypoints"]:
                 self._place(data, index)
                 now = point.get("contacts", [])

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._mujoco import MjModel, mujoco
-from .reference import Array, PlanError, quat_inverse, quat_product
+from .reference import Array, PlanError, chord_parameter, quat_exp, quat_inverse, quat_product, rotation_vector
 
 Indices = NDArray[np.int64]
 
@@ -98,7 +98,7 @@ class TaskReference:
     carrier: list[str | None]
     """The hand that the object goes with."""
     rest_pose: Array
-    """Where the object rests while no hand carries it. Shape (n, 7)."""
+    """Where the object is while no hand carries it: at rest, or on its way in a hand. Shape (n, 7)."""
     hold_pose: Array
     """Its pose in the frame of the carrier's base. Shape (n, 7)."""
     home: Array
@@ -248,6 +248,10 @@ def task_reference(rig: TaskRig, plan: Mapping[str, Any], tick: float, speed: fl
     of_tick = np.where(segments[left] == segments[left + 1], segments[left], segments[left + 1])
     plan_times = np.array([knot.plan_time for knot in knots])
     carrier, rest, hold, home = _poses(rig, plan, points)
+    rest_pose = rest[of_tick]
+    moves: NDArray[np.bool_] = np.array([kind == "transfer" for kind in rig.kinds])[of_tick]
+    along = chord_parameter(change[moves], first[moves], last[moves], u[moves, 0])
+    rest_pose[moves] = _on_the_way(points, left[moves], along)
     return TaskReference(
         joints=joints,
         targets=joints + velocities * rig.damping / rig.stiffness,
@@ -257,11 +261,22 @@ def task_reference(rig: TaskRig, plan: Mapping[str, Any], tick: float, speed: fl
         plan_time=plan_times[left] + u[:, 0] * (plan_times[left + 1] - plan_times[left]),
         only_hands=np.array([bool(held) and all(name in rig.hands for name in held) for held in rig.held_by])[of_tick],
         carrier=[carrier[s] for s in of_tick.tolist()],
-        rest_pose=rest[of_tick],
+        rest_pose=rest_pose,
         hold_pose=hold[of_tick],
         home=home,
         scratch=mujoco.MjData(rig.model),
     )
+
+
+def _on_the_way(points: list[dict[str, Any]], left: Indices, along: Array) -> Array:
+    """Poses of the object between waypoints and those behind them, as the plan moves it in the hand."""
+    poses = [point["world_from_objects"][0] for point in points]
+    position = np.array([pose["position"] for pose in poses], dtype=np.float64)
+    quat = np.array([pose["quat_xyzw"] for pose in poses], dtype=np.float64)[:, [3, 0, 1, 2]]
+    turn = rotation_vector(quat_product(quat[left + 1], quat_inverse(quat[left])))
+    share = along[:, None]
+    place = position[left] + share * (position[left + 1] - position[left])
+    return np.concatenate((place, quat_product(quat_exp(share * turn), quat[left])), axis=1)
 
 
 def _touching(point: Mapping[str, Any]) -> set[tuple[str, str]]:
@@ -322,7 +337,7 @@ def _poses(rig: TaskRig, plan: Mapping[str, Any], points: list[dict[str, Any]]) 
         at = rig.object_qpos
         pose = np.array(model.key_qpos[index][at : at + 7])
         holding = [name for name in rig.held_by[s] if name in rig.hands]
-        rests = len(holding) != 1 or len(holding) != len(rig.held_by[s])
+        rests = len(holding) != 1 or len(holding) != len(rig.held_by[s]) or segment["kind"] == "transfer"
         carrier.append(None if rests else holding[0])
         rest[s] = pose
         hold[s] = [0, 0, 0, 1, 0, 0, 0]

@@ -1,9 +1,8 @@
 //! Solids as MuJoCo collides with them: a convex shape, or convex parts of a mesh.
 
 use super::geom::{CONVEX_WITHIN, is_hollowed};
-use regrasp_geometry::Point;
 use regrasp_geometry::Shape;
-use regrasp_geometry::parts::{PartSettings, convex_parts_clear_of};
+use regrasp_geometry::parts::{Clear, PartSettings, Parts, convex_parts_clear_of};
 use regrasp_scene::Object;
 use std::sync::Arc;
 
@@ -29,11 +28,11 @@ impl ObjectSolid {
     }
 
     /// As [`ObjectSolid::of`], cut finer, and more so where a part would cover one of the points `clear` outside of the object.
-    pub fn finely(object: &Object, clear: &[Point]) -> Self {
+    pub fn finely(object: &Object, clear: &[Clear]) -> Self {
         ObjectSolid::cut(object, &FINE_PARTS, clear)
     }
 
-    fn cut(object: &Object, settings: &PartSettings, clear: &[Point]) -> Self {
+    fn cut(object: &Object, settings: &PartSettings, clear: &[Clear]) -> Self {
         // Where the scene replaces the object by its hull, the planner kept links away from it.
         match object.hull {
             Some(_) if is_hollowed(&object.shape) => ObjectSolid::whole(&object.shape, Some(HULL)),
@@ -46,18 +45,14 @@ impl ObjectSolid {
         ObjectSolid::cut_shape(shape, &PARTS, &[])
     }
 
-    fn cut_shape(shape: &Shape, settings: &PartSettings, clear: &[Point]) -> Self {
+    fn cut_shape(shape: &Shape, settings: &PartSettings, clear: &[Clear]) -> Self {
         if !is_hollowed(shape) {
             return ObjectSolid::whole(shape, None);
         }
         let Shape::Mesh(mesh) = shape else { return ObjectSolid::whole(shape, None) };
         match convex_parts_clear_of(mesh, settings, clear) {
             Some(parts) => ObjectSolid {
-                note: Some(format!(
-                    "MuJoCo collides with {} convex parts, which exceed it by {:.1} % of its volume",
-                    parts.hulls.len(),
-                    100.0 * parts.excess
-                )),
+                note: Some(note(&parts)),
                 parts: parts.hulls.into_iter().map(|hull| Shape::Convex(Arc::new(hull))).collect(),
             },
             None => ObjectSolid::whole(shape, Some(HULL)),
@@ -67,4 +62,14 @@ impl ObjectSolid {
     fn whole(shape: &Shape, note: Option<&str>) -> Self {
         ObjectSolid { parts: vec![shape.clone()], note: note.map(str::to_owned) }
     }
+}
+
+/// How parts differ from their solid.
+fn note(parts: &Parts) -> String {
+    let (n, excess) = (parts.hulls.len(), 100.0 * parts.excess);
+    let left = match parts.covered {
+        0 => String::new(),
+        k => format!("; in {k} places they reach too near to fingertips or links"),
+    };
+    format!("MuJoCo collides with {n} convex parts, which exceed it by {excess:.1} % of its volume{left}")
 }

@@ -3,31 +3,22 @@
 //! Links, supports and obstacles touch it by the bits of their classes, fingertips by pairs with the friction of their contact
 //! models. A round fingertip touches it with its ball, as the plan means it, and everything else with the shapes of its link.
 
-use super::{RobotModel, tip_in_link};
+use super::{RobotModel, clear, tip_in_link};
 use crate::mjcf::geom::{Geom, Look, Weight, open_body, write_geom, write_inertial};
 use crate::mjcf::inertia;
 use crate::mjcf::solid::ObjectSolid;
 use crate::mjcf::tip::{POINT_TORSION, ROLLING, friction_of};
 use crate::mjcf::xml::{Xml, numbers};
-use regrasp_geometry::frame::tangents;
-use regrasp_geometry::{Point, Pose, Shape, UnitVector, Vector};
+use regrasp_geometry::{Pose, Shape};
 use regrasp_plan::robot_plan::RobotPlan;
-use regrasp_robot::tip::{TipShape, is_same_surface};
-use regrasp_robot::{Finger, Manipulator};
+use regrasp_robot::Finger;
+use regrasp_robot::tip::is_same_surface;
 use regrasp_scene::{Object, Scene};
 
 const OBJECT_COLOR: &str = "0.9 0.6 0.25 1";
 /// Solver and contacts as in replays of one hand (`docs/reference/replay.md`).
 pub(super) const SOLVER: [(&str, &str); 3] = [("cone", "elliptic"), ("impratio", "10"), ("noslip_iterations", "60")];
 const STIFF: [(&str, &str); 2] = [("solref", "0.005 1"), ("solimp", "0.95 0.99 0.0005")];
-
-/// How far a convex part may stand out towards a fingertip at its contact, in metres.
-const CLEAR: f64 = 3e-4;
-/// Radius of fingertips that are no balls, for [`around_contacts`], in metres.
-const TIP_RADIUS: f64 = 0.008;
-/// Rings of points on a fingertip about its contact, and the angle of the last.
-const RINGS: i32 = 4;
-const LARGEST_ANGLE: f64 = 1.2;
 
 /// The object that the plan moves.
 pub(super) struct FreeObject<'a> {
@@ -61,7 +52,7 @@ impl<'a> FreeObject<'a> {
         let first = plan.waypoints().next().and_then(|waypoint| waypoint.world_from_objects.first());
         let world_from_object = Pose::from(first.ok_or("the plan does not say where the object is")?);
         let object = &scene.objects[index];
-        let solid = ObjectSolid::finely(object, &around_contacts(&scene.robots[robot], object, plan));
+        let solid = ObjectSolid::finely(object, &clear::for_hands(&scene.robots[robot], object, plan));
         Ok(FreeObject { object, solid, world_from_object })
     }
 
@@ -85,41 +76,6 @@ impl<'a> FreeObject<'a> {
         xml.close();
         xml.close();
     }
-}
-
-/// Points of the fingertips where they touch the object that are outside of it: no convex part may cover them, else the fingertip
-/// touches the part instead of the object.
-fn around_contacts(robot: &Manipulator, object: &Object, plan: &RobotPlan) -> Vec<Point> {
-    let mut points = Vec::new();
-    let mut known: Vec<([f64; 3], &str)> = Vec::new();
-    for contact in plan.waypoints().flat_map(|waypoint| &waypoint.contacts) {
-        if known.contains(&(contact.point_in_object, contact.finger.as_str())) {
-            continue;
-        }
-        known.push((contact.point_in_object, &contact.finger));
-        let mounted = robot.hands.iter().find(|mounted| mounted.name == contact.hand);
-        let Some((_, finger)) = mounted
-            .and_then(|mounted| mounted.hand.finger_named(&contact.finger).map(|id| (id, &mounted.hand.fingers[id.0])))
-        else {
-            continue;
-        };
-        let radius = if let TipShape::Sphere { radius } = finger.tip.shape { radius } else { TIP_RADIUS };
-        let normal = Vector::from(contact.normal_in_object);
-        let (x, y) = tangents(&UnitVector::new_normalize(normal));
-        let center = Point::from(contact.point_in_object) + radius * normal;
-        for ring in 0..=RINGS {
-            let angle = LARGEST_ANGLE * f64::from(ring) / f64::from(RINGS);
-            for k in 0..if ring == 0 { 1 } else { 4 * ring } {
-                let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / f64::from(4 * ring.max(1))).sin_cos();
-                let outward = angle.sin() * (cos * x.into_inner() + sin * y.into_inner()) - angle.cos() * normal;
-                let point = center + (radius - CLEAR) * outward;
-                if object.surface.signed_distance(&point) > 0.5 * CLEAR {
-                    points.push(point);
-                }
-            }
-        }
-    }
-    points
 }
 
 impl RobotModel<'_> {

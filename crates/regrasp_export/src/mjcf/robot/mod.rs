@@ -4,6 +4,8 @@
 //! arms do. The robot and what it carries collide with everything that stands around; links of the robot do not collide with each
 //! other. In a motion, a carried object is a part of what holds it. In pick and place the object is free from the first moment.
 
+/// Where no convex part of the object may stand out.
+mod clear;
 /// Joints, couplings, servos and keyframes.
 mod drives;
 /// The object of pick and place, and what may touch it.
