@@ -5,12 +5,14 @@
 //! that a part leaves the surface only where the surface curves inwards. Where something has to stay clear there, a second round cuts
 //! along the surface.
 
+use crate::collision::MeshTree;
 use crate::frame::{Point, UnitVector, Vector, tangents};
 use crate::hull::{ConvexHull, HullError, convex_hull};
 use crate::mass::solid_properties;
 use crate::mesh::TriangleMesh;
 use crate::shape::Shape;
 use crate::surface::nearest_on_triangle;
+use nalgebra::Matrix3;
 use std::sync::Arc;
 
 /// Positions of cuts tried along each axis of a piece.
@@ -68,9 +70,19 @@ pub struct Parts {
     pub covered: usize,
 }
 
-/// A part of the surface and its hull.
-struct Piece {
+/// What lies between some cuts.
+struct Body {
+    /// The surface of the solid there.
     triangles: Vec<[Point; 3]>,
+    /// The body is where `normal . x >= at`.
+    cuts: Vec<(Vector, f64)>,
+    /// Where three cuts meet inside the solid.
+    inside: Vec<Point>,
+}
+
+/// A body and its hull.
+struct Piece {
+    body: Body,
     hull: ConvexHull,
     volume: f64,
 }
@@ -93,16 +105,17 @@ pub fn convex_parts(mesh: &TriangleMesh, settings: &PartSettings) -> Option<Part
 pub fn convex_parts_clear_of(mesh: &TriangleMesh, settings: &PartSettings, clear: &[Clear]) -> Option<Parts> {
     let solid = solid_properties(&Shape::Mesh(Arc::new(mesh.clone()))).ok()?.volume;
     let triangles: Vec<[Point; 3]> = (0..mesh.triangles().len()).map(|index| mesh.corners(index)).collect();
-    let whole = Piece::new(triangles).ok()??;
-    let mut pieces = by_volume(whole, settings, solid)?;
-    let covered = leave_clear(&mut pieces, (2 * settings.max_parts, solid), clear);
+    let tree = MeshTree::new(mesh);
+    let whole = Piece::new(Body { triangles, cuts: Vec::new(), inside: Vec::new() }).ok()??;
+    let mut pieces = by_volume(&tree, whole, (settings, solid))?;
+    let covered = leave_clear(&tree, &mut pieces, (2 * settings.max_parts, solid), clear);
     let excess = pieces.iter().map(|piece| piece.volume).sum::<f64>() / solid - 1.0;
     Some(Parts { hulls: pieces.into_iter().map(|piece| piece.hull).collect(), excess, covered })
 }
 
 /// The first round: cuts that take most volume off.
-fn by_volume(whole: Piece, settings: &PartSettings, solid: f64) -> Option<Vec<Piece>> {
-    let mut pieces = vec![(best_cut(&whole.triangles), whole)];
+fn by_volume(tree: &MeshTree, whole: Piece, (settings, solid): (&PartSettings, f64)) -> Option<Vec<Piece>> {
+    let mut pieces = vec![(best_cut(tree, &whole.body), whole)];
     loop {
         let excess = pieces.iter().map(|(_, piece)| piece.volume).sum::<f64>() / solid - 1.0;
         if pieces.len() >= settings.max_parts || excess <= settings.excess {
@@ -112,17 +125,17 @@ fn by_volume(whole: Piece, settings: &PartSettings, solid: f64) -> Option<Vec<Pi
         let worth = (0..pieces.len()).filter(|&k| gain(k) > settings.least_gain * solid);
         let Some(best) = worth.max_by(|&a, &b| gain(a).total_cmp(&gain(b))) else { break };
         let cut = pieces[best].0.take()?;
-        let [Ok(Some(below)), Ok(Some(above))] = divide(&pieces[best].1.triangles, &cut).map(Piece::new) else {
+        let [Ok(Some(below)), Ok(Some(above))] = divide(tree, &pieces[best].1.body, &cut).map(Piece::new) else {
             continue;
         };
-        pieces[best] = (best_cut(&below.triangles), below);
-        pieces.push((best_cut(&above.triangles), above));
+        pieces[best] = (best_cut(tree, &below.body), below);
+        pieces.push((best_cut(tree, &above.body), above));
     }
     Some(pieces.into_iter().map(|(_, piece)| piece).collect())
 }
 
 /// The second round: cuts that uncover points. Returns how many points stay covered.
-fn leave_clear(pieces: &mut Vec<Piece>, (max_parts, solid): (usize, f64), clear: &[Clear]) -> usize {
+fn leave_clear(tree: &MeshTree, pieces: &mut Vec<Piece>, (max_parts, solid): (usize, f64), clear: &[Clear]) -> usize {
     let covered_by = |piece: &Piece| {
         clear
             .iter()
@@ -138,9 +151,9 @@ fn leave_clear(pieces: &mut Vec<Piece>, (max_parts, solid): (usize, f64), clear:
         if covered.is_empty() {
             break;
         }
-        let cuts = if pieces.len() < max_parts { clearing_cuts(&pieces[k], &covered) } else { Vec::new() };
+        let cuts = if pieces.len() < max_parts { clearing_cuts(tree, &pieces[k], &covered) } else { Vec::new() };
         let is_piece = |piece: &Piece| piece.volume > SLIVER * solid;
-        let sides = cuts.iter().find_map(|cut| match divide(&pieces[k].triangles, cut).map(Piece::new) {
+        let sides = cuts.iter().find_map(|cut| match divide(tree, &pieces[k].body, cut).map(Piece::new) {
             [Ok(Some(below)), Ok(Some(above))] => (is_piece(&below) && is_piece(&above)).then_some([below, above]),
             _ => None,
         });
@@ -157,14 +170,14 @@ fn leave_clear(pieces: &mut Vec<Piece>, (max_parts, solid): (usize, f64), clear:
 
 impl Piece {
     /// None where it is flat.
-    fn new(triangles: Vec<[Point; 3]>) -> Result<Option<Self>, HullError> {
-        let hull = match ConvexHull::new(&corners(&triangles, 1)) {
+    fn new(body: Body) -> Result<Option<Self>, HullError> {
+        let hull = match ConvexHull::new(&corners(&body, 1)) {
             Ok(hull) => hull,
             Err(HullError::Flat { .. }) => return Ok(None),
             Err(failed) => return Err(failed),
         };
         let Some(volume) = volume_of(&hull) else { return Ok(None) };
-        Ok(Some(Piece { triangles, hull, volume }))
+        Ok(Some(Piece { body, hull, volume }))
     }
 }
 
@@ -185,12 +198,12 @@ impl Clear {
     }
 }
 
-fn corners(triangles: &[[Point; 3]], stride: usize) -> Vec<Point> {
-    let mut points: Vec<Point> = triangles.iter().flatten().copied().collect();
+fn corners(body: &Body, stride: usize) -> Vec<Point> {
+    let mut points: Vec<Point> = body.triangles.iter().flatten().copied().collect();
     let key = |a: &Point, b: &Point| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z));
     points.sort_by(key);
     points.dedup();
-    points.into_iter().step_by(stride).collect()
+    points.into_iter().step_by(stride).chain(body.inside.iter().copied()).collect()
 }
 
 fn volume_of(hull: &ConvexHull) -> Option<f64> {
@@ -210,21 +223,21 @@ fn stride_of(triangles: &[[Point; 3]]) -> usize {
 }
 
 /// The cut of a piece after which the two hulls have least volume, of some at equal distances across the axes.
-fn best_cut(triangles: &[[Point; 3]]) -> Option<Cut> {
-    let stride = stride_of(triangles);
-    let rough = |triangles: &[[Point; 3]]| {
-        let (vertices, faces) = convex_hull(&corners(triangles, stride)).ok()?;
+fn best_cut(tree: &MeshTree, body: &Body) -> Option<Cut> {
+    let stride = stride_of(&body.triangles);
+    let rough = |body: &Body| {
+        let (vertices, faces) = convex_hull(&corners(body, stride)).ok()?;
         Some(enclosed(&vertices, &faces))
     };
-    let whole = rough(triangles)?;
+    let whole = rough(body)?;
     let mut best: Option<Cut> = None;
     for axis in 0..3 {
-        let along = || triangles.iter().flatten().map(|corner| corner[axis]);
+        let along = || body.triangles.iter().flatten().map(|corner| corner[axis]);
         let (low, high) = (along().fold(f64::INFINITY, f64::min), along().fold(f64::NEG_INFINITY, f64::max));
         for k in 1..=POSITIONS {
             let at = low + (high - low) * k as f64 / (POSITIONS + 1) as f64;
             let cut = Cut { normal: Vector::ith(axis, 1.0), at, gain: 0.0 };
-            let [below, above] = divide(triangles, &cut);
+            let [below, above] = divide(tree, body, &cut);
             let (Some(a), Some(b)) = (rough(&below), rough(&above)) else { continue };
             let gain = whole - a - b;
             if best.is_none_or(|known| gain > known.gain) {
@@ -236,8 +249,8 @@ fn best_cut(triangles: &[[Point; 3]]) -> Option<Cut> {
 }
 
 /// Cuts of a piece that clear something or take much off, that which takes off most first.
-fn clearing_cuts(piece: &Piece, covered: &[Clear]) -> Vec<Cut> {
-    let stride = stride_of(&piece.triangles);
+fn clearing_cuts(tree: &MeshTree, piece: &Piece, covered: &[Clear]) -> Vec<Cut> {
+    let stride = stride_of(&piece.body.triangles);
     let mut found: Vec<(usize, Cut)> = Vec::new();
     for place in covered.iter().step_by(covered.len().div_ceil(PLACES).max(1)) {
         let Some((outward, way)) = UnitVector::try_new_and_get(place.center - place.nearest, 0.0) else { continue };
@@ -250,7 +263,7 @@ fn clearing_cuts(piece: &Piece, covered: &[Clear]) -> Vec<Cut> {
         let normals = (0..DIRECTIONS).map(turned).chain([outward.into_inner()]);
         for normal in normals.chain((0..3).map(|axis| Vector::ith(axis, 1.0))) {
             let cut = Cut { normal, at: normal.dot(&between.coords), gain: 0.0 };
-            let sides = divide(&piece.triangles, &cut).map(|side| convex_hull(&corners(&side, stride)));
+            let sides = divide(tree, &piece.body, &cut).map(|side| convex_hull(&corners(&side, stride)));
             let [Ok(below), Ok(above)] = sides else { continue };
             let hulls = [below, above];
             let is_covered = |ball: &&Clear| hulls.iter().any(|(corners, faces)| ball.is_reached(corners, faces));
@@ -265,54 +278,56 @@ fn clearing_cuts(piece: &Piece, covered: &[Clear]) -> Vec<Cut> {
     found.into_iter().map(|(_, cut)| cut).collect()
 }
 
-/// The parts of triangles on either side of a cut, with the cut's face on both.
-///
-/// The face is a fan of triangles over its edges. Where it is not convex the fan covers dents too, but nothing outside of the
-/// hull of its edges.
-fn divide(triangles: &[[Point; 3]], cut: &Cut) -> [Vec<[Point; 3]>; 2] {
-    let mut sides = [Vec::new(), Vec::new()];
-    let mut edges: Vec<[Point; 2]> = Vec::new();
-    for triangle in triangles {
-        for (side, sign) in sides.iter_mut().zip([-1.0, 1.0]) {
-            let edge = clip(triangle, |corner| sign * (corner.coords.dot(&cut.normal) - cut.at), side);
-            // Both sides have the same edges.
-            edges.extend(edge.filter(|_| sign < 0.0));
-        }
-    }
-    if let Some(&[center, _]) = edges.first() {
-        for side in &mut sides {
-            side.extend(edges.iter().skip(1).map(|&[from, to]| [center, from, to]));
-        }
-    }
-    sides
+/// The parts of a body on either side of a cut.
+fn divide(solid: &MeshTree, body: &Body, cut: &Cut) -> [Body; 2] {
+    let fresh = corners_inside(solid, body, cut);
+    [-1.0, 1.0].map(|sign| {
+        let height = |corner: &Point| sign * (corner.coords.dot(&cut.normal) - cut.at);
+        let mut triangles = Vec::new();
+        body.triangles.iter().for_each(|triangle| clip(triangle, height, &mut triangles));
+        let mut inside: Vec<Point> = body.inside.iter().copied().filter(|corner| height(corner) >= 0.0).collect();
+        inside.extend(&fresh);
+        let mut cuts = body.cuts.clone();
+        cuts.push((sign * cut.normal, sign * cut.at));
+        Body { triangles, cuts, inside }
+    })
 }
 
-/// Adds the part of a triangle where `height` is not negative, in triangles (Sutherland and Hodgman 1974). Returns its edge at
-/// height zero.
-fn clip(triangle: &[Point; 3], height: impl Fn(&Point) -> f64, side: &mut Vec<[Point; 3]>) -> Option<[Point; 2]> {
+/// Corners inside the solid that a cut makes with two of the cuts before.
+fn corners_inside(solid: &MeshTree, body: &Body, cut: &Cut) -> Vec<Point> {
+    let mut found = Vec::new();
+    for (k, (a, at_a)) in body.cuts.iter().enumerate() {
+        for (b, at_b) in &body.cuts[..k] {
+            let Some(inverse) =
+                Matrix3::from_rows(&[a.transpose(), b.transpose(), cut.normal.transpose()]).try_inverse()
+            else {
+                continue;
+            };
+            let corner = Point::from(inverse * Vector::new(*at_a, *at_b, cut.at));
+            let is_within = |(normal, at): &(Vector, f64)| normal.dot(&corner.coords) >= at - 1e-9;
+            if body.cuts.iter().all(is_within) && solid.holds(&corner) {
+                found.push(corner);
+            }
+        }
+    }
+    found
+}
+
+/// Adds the part of a triangle where `height` is not negative, in triangles (Sutherland and Hodgman 1974).
+fn clip(triangle: &[Point; 3], height: impl Fn(&Point) -> f64, side: &mut Vec<[Point; 3]>) {
     let mut polygon: Vec<Point> = Vec::with_capacity(4);
-    let mut at_zero: Vec<Point> = Vec::with_capacity(3);
     for k in 0..3 {
         let (from, to) = (triangle[k], triangle[(k + 1) % 3]);
         let (a, b) = (height(&from), height(&to));
         if a >= 0.0 {
             polygon.push(from);
         }
-        if a == 0.0 {
-            at_zero.push(from);
-        }
         if (a > 0.0 && b < 0.0) || (a < 0.0 && b > 0.0) {
             let way: Vector = to - from;
-            let between = from + way * (a / (a - b));
-            polygon.push(between);
-            at_zero.push(between);
+            polygon.push(from + way * (a / (a - b)));
         }
     }
     side.extend((2..polygon.len()).map(|k| [polygon[0], polygon[k - 1], polygon[k]]));
-    match at_zero[..] {
-        [from, to] => Some([from, to]),
-        _ => None,
-    }
 }
 
 #[cfg(test)]
@@ -404,13 +419,13 @@ mod tests {
             &(0..8).map(|k| Point::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2))).collect::<Vec<_>>(),
         );
         let cube = cube.unwrap();
-        let mut pieces: Vec<Vec<[Point; 3]>> =
-            vec![cube.triangles().iter().map(|t| t.map(|k| cube.vertices()[k as usize])).collect()];
+        let mesh = TriangleMesh::new(cube.vertices().to_vec(), cube.triangles().to_vec()).unwrap();
+        let triangles = (0..12).map(|k| mesh.corners(k)).collect();
+        let mut pieces = vec![Body { triangles, cuts: Vec::new(), inside: Vec::new() }];
+        let tree = MeshTree::new(&mesh);
         for axis in 0..3 {
-            pieces = pieces
-                .iter()
-                .flat_map(|piece| divide(piece, &Cut { normal: Vector::ith(axis, 1.0), at: 0.4, gain: 0.0 }))
-                .collect();
+            let cut = Cut { normal: Vector::ith(axis, 1.0), at: 0.4, gain: 0.0 };
+            pieces = pieces.iter().flat_map(|piece| divide(&tree, piece, &cut)).collect();
         }
         let volumes: Vec<f64> =
             pieces.iter().map(|piece| volume_of(&ConvexHull::new(&corners(piece, 1)).unwrap()).unwrap()).collect();
