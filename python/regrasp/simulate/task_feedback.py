@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ._mujoco import MjData, mujoco
-from .controllers import FREE_FOLLOW_TIME, LARGEST_OFFSET, LARGEST_RELIEF, RETURN_SPEED
+from .controllers import FREE_FOLLOW_TIME, LARGEST_OFFSET, RETURN_SPEED
 from .model import INVERSE_DAMPING
 from .reference import Array, rotation_matrices
 from .task_reference import TaskReference, TaskRig
@@ -28,8 +28,6 @@ class _Grip:
     """Contact in the object, from its frame's origin."""
     normal: Array
     """In the frame of the hand's base."""
-    retreat: float
-    """How far the tip's target may go outwards, in metres."""
     joints_from_tip: Array
     """Changes of joint targets for a displacement of the tip in the frame of the hand's base; shape (n_joints, 3)."""
 
@@ -75,7 +73,8 @@ class TaskFeedback:
             if not grip.presses:
                 offset -= self._leak * (lacking + offset)
             elif ref.only_hands[at]:
-                limit = max(grip.retreat, float(offset @ grip.normal) - self._return)
+                # No finger presses less than planned: what it gives way others would have to hold by friction.
+                limit = max(0.0, float(offset @ grip.normal) - self._return)
                 np.clip(offset + self._gain * lacking, -LARGEST_OFFSET, LARGEST_OFFSET, out=offset)
                 offset -= max(float(offset @ grip.normal) - limit, 0.0) * grip.normal
             added += grip.joints_from_tip @ offset
@@ -136,7 +135,4 @@ class TaskFeedback:
         moved = base_from_world @ (jacobian @ rig.drives) * rig.of_hand
         inverse = moved.T @ np.linalg.inv(moved @ moved.T + INVERSE_DAMPING**2 * np.eye(3))
         normal = base_from_world @ turn @ np.array(contact["normal_in_object"], dtype=np.float64)
-        force = contact.get("force_in_object") or [0.0, 0.0, 0.0]
-        push = max(0.0, -float(np.dot(force, contact["normal_in_object"])))
-        compliance = float((((normal @ moved) ** 2) / rig.stiffness).sum())
-        return _Grip(self._keys.index(key), base, presses, point, normal, LARGEST_RELIEF * push * compliance, inverse)
+        return _Grip(self._keys.index(key), base, presses, point, normal, inverse)
