@@ -133,6 +133,7 @@ class TaskFeedback:
         mujoco.mj_jac(rig.model, data, jacobian, None, where, rig.tips[key])
         # The hand's own joints alone.
         moved = base_from_world @ (jacobian @ rig.drives) * rig.of_hand
-        inverse = moved.T @ np.linalg.inv(moved @ moved.T + INVERSE_DAMPING**2 * np.eye(3))
+        invert: Any = np.linalg.inv
+        inverse: Array = moved.T @ invert(moved @ moved.T + INVERSE_DAMPING**2 * np.eye(3))
         normal = base_from_world @ turn @ np.array(contact["normal_in_object"], dtype=np.float64)
         return _Grip(self._keys.index(key), base, presses, point, normal, inverse)
