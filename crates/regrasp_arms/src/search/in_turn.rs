@@ -50,7 +50,8 @@ pub fn in_turn(
         for order in orders(moving.len()) {
             let mut path = vec![start.to_vec()];
             for &part in &order {
-                let leg = leg(collider, &path[path.len() - 1], goal, &moving[part], &region, settings, rng, budget);
+                let asked = Leg { from: &path[path.len() - 1], goal, part: &moving[part] };
+                let leg = leg(collider, &asked, &region, settings, rng, budget);
                 outcome.n_nodes += leg.n_nodes;
                 outcome.n_samples += leg.n_samples;
                 outcome.interrupt = leg.interrupt;
@@ -85,17 +86,22 @@ fn everything(collider: &mut Collider) {
 }
 
 /// One part goes from where it is at `from` to where it is at `goal`; all others stay.
-#[expect(clippy::too_many_arguments)]
+struct Leg<'a> {
+    from: &'a [f64],
+    goal: &'a [f64],
+    /// The part's coordinates.
+    part: &'a [usize],
+}
+
 fn leg(
     collider: &mut Collider,
-    from: &[f64],
-    goal: &[f64],
-    part: &[usize],
+    asked: &Leg,
     region: &Region,
     settings: &InTurnSettings,
     rng: &mut Rng,
     budget: &Budget,
 ) -> RrtOutcome {
+    let Leg { from, goal, part } = *asked;
     let model = collider.model;
     // What no coordinate of the part moves is where it was.
     collider
