@@ -21,6 +21,7 @@ use regrasp::plan::format;
 use regrasp::planners::in_hand::roadmap::GraspRoadmap;
 use regrasp::viewer::story::{Outcome, Telling};
 use serde_json::json;
+use std::path::Path;
 
 /// Reads, judges, writes.
 pub fn run(arguments: &args::View, common: &Common, talk: &Talk) -> Result<(), Stop> {
@@ -31,6 +32,7 @@ pub fn run(arguments: &args::View, common: &Common, talk: &Talk) -> Result<(), S
     let written = Outputs::new(named.chain(pictures::outputs(arguments)))?;
     let own = [Some(arguments.plan.as_path()), arguments.scene.as_deref(), arguments.with_roadmap.as_deref()];
     written.refuse_inputs(own.into_iter().flatten())?;
+    arguments.output.as_deref().map_or(Ok(()), refuse_picture)?;
     pictures::make_folder(arguments)?;
     let bytes = files::read(&arguments.plan)?;
     if is_list(&bytes) {
@@ -72,4 +74,14 @@ pub fn run(arguments: &args::View, common: &Common, talk: &Talk) -> Result<(), S
         pages::write(path, &story, talk)?;
     }
     Ok(())
+}
+
+/// Refuses to write a page into a file that is named as a picture (`A505`).
+fn refuse_picture(page: &Path) -> Result<(), Stop> {
+    let suffix = page.extension().and_then(|suffix| suffix.to_str()).unwrap_or_default().to_ascii_lowercase();
+    if !["png", "svg", "jpg", "jpeg", "gif"].contains(&suffix.as_str()) {
+        return Ok(());
+    }
+    let problem = format!("is {}, but this argument writes a page of HTML", page.display());
+    Err(Stop::argument("A505", "--output", problem, "FILE.html; pictures are written by --png FILE.png and --svg DIR"))
 }

@@ -203,6 +203,14 @@ fn a_plan_without_its_scene_is_told_how_to_name_one() {
     complains(&check, "C420", "plan.json", &["name the scene file: --scene FILE"]);
 }
 
+/// A page in a file that is named as a picture opens in no viewer.
+#[test]
+fn pages_are_not_written_into_pictures() {
+    let folder = Folder::planned();
+    complains(&folder.run(&["view", "plan.json", "-o", "page.PNG"]), "A505", "--output", &["page.PNG", "--png FILE.png"]);
+    assert!(!folder.path("page.PNG").exists());
+}
+
 /// Advice is about what was short, and words about what they are of.
 #[test]
 fn words_say_what_is_meant() {
