@@ -229,6 +229,11 @@ fn links_without_geometry_are_no_fingers_beside_others_that_have_some() {
     let parts = [finger("i", "root"), turning("caster", "root"), finger("m", "root"), finger("r", "root")].concat();
     let (_, fingers) = summary(&guess(&parts, None).unwrap());
     assert_eq!(fingers.len(), 3, "{fingers:?}");
+    // Balls of a millimetre only stand in for geometry.
+    let ball = r#"<link name="motor"><collision><geometry><sphere radius="0.001"/></geometry></collision></link>"#;
+    let motor = turning("motor", "root").replace(r#"<link name="motor"/>"#, ball);
+    let (_, fingers) = summary(&guess(&[finger("i", "root"), motor, finger("m", "root")].concat(), None).unwrap());
+    assert_eq!(fingers.len(), 2, "{fingers:?}");
     // A bare tree still has its ends as fingers.
     let collision = r#"<collision><origin xyz="0 0 0.02"/><geometry><capsule radius="0.005" length="0.04"/></geometry></collision>"#;
     let bare = parts.replace(collision, "");

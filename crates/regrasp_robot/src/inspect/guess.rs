@@ -167,14 +167,22 @@ fn stated_base(robot: &Robot, name: &str, file: &Path) -> Result<LinkId, InputEr
     })
 }
 
-/// Moving joints below which nothing moves, in document order; not those of fingers without any geometry, unless no finger has any.
+/// Radius of the ball around shapes that only stand in for missing geometry, in metres: the motors of the Hey5 hand have links with balls of
+/// a millimetre.
+const STAND_IN: f64 = 0.002;
+
+/// Moving joints below which nothing moves, in document order; not those of fingers without any geometry, or with nothing but stand-ins
+/// for it, unless no finger has any.
 fn last_moving_joints(robot: &Robot) -> Vec<JointId> {
     let last_joints = all_last_moving_joints(robot);
     let path = |last: &JointId| robot.joints_to(robot.joints[last.0].child);
     let paths: Vec<Vec<JointId>> = last_joints.iter().map(path).collect();
     let has_geometry = |joint: &JointId| {
         let links = rigid_links(robot, robot.joints[joint.0].child);
-        links.iter().map(|(link, _)| &robot.links[link.0]).any(|l| !l.collision.is_empty() || !l.visual.is_empty())
+        links.iter().map(|(link, _)| &robot.links[link.0]).any(|link| match link.collision.is_empty() {
+            true => !link.visual.is_empty(),
+            false => link.collision.iter().any(|placed| placed.shape.bounding_sphere().1 > STAND_IN),
+        })
     };
     let is_there = |finger: usize| {
         let is_own = |joint: &&JointId| !paths.iter().enumerate().any(|(k, path)| k != finger && path.contains(joint));

@@ -57,7 +57,7 @@ pub(super) fn farthest_point(shape: &Shape, from: &Point) -> Point {
 
 /// The tip of a link with collision geometry `shapes`, whose distal end `end` is a point of the one of index `element`, seen
 /// from joint origin `joint` (all in the link frame): a sphere where one fits, else the hull of that one. The hull of a whole
-/// phalanx gets a pad.
+/// phalanx gets a pad, and so does one that no smooth surface follows closely all around.
 pub(super) fn fit_tip(
     shapes: &[PlacedShape],
     joint: &Point,
@@ -96,7 +96,8 @@ pub(super) fn fit_tip(
     if let Some((center, radius)) = ball.filter(fits) {
         return (TipSpec::Sphere { radius, center }, None);
     }
-    let pad = axis.filter(|axis| is_long(&shapes[element], axis)).map(|axis| pad_of(&shapes[element], end, axis));
+    let needs_pad = |axis: &UnitVector| is_long(&shapes[element], axis) || !is_followed(&shapes[element], end, None);
+    let pad = axis.filter(needs_pad).map(|axis| pad_of(&shapes[element], end, axis));
     let elements = if shapes.len() > 1 { vec![element] } else { Vec::new() };
     (TipSpec::Hull { center: *end, elements }, pad)
 }
@@ -104,14 +105,17 @@ pub(super) fn fit_tip(
 /// The widest pad about `axis` over which a smooth surface follows the hull of a phalanx as closely as scenes ask.
 fn pad_of(placed: &PlacedShape, end: &Point, axis: UnitVector) -> PadSpec {
     let axis = UnitVector::new_normalize(axis.map(|x| (x * 1e4).round()));
-    let follows = |angle: &f64| {
-        let pad = Pad { axis_in_body: axis, cosine: angle.to_radians().cos() };
-        let convex = convex_of(&placed.shape).map(|shape| PlacedShape { shape, ..placed.clone() });
-        let made = convex.ok().and_then(|convex| HullTips::default().make(&[&convex], end, Some(&pad), &[]).ok());
-        made.is_some_and(|(_, tip)| matches!(tip, TipShape::Hull { misfit, .. } if misfit <= LARGEST_MISFIT))
-    };
+    let follows =
+        |angle: &f64| is_followed(placed, end, Some(&Pad { axis_in_body: axis, cosine: angle.to_radians().cos() }));
     let angle = LONG_PADS.into_iter().find(follows).unwrap_or(LONG_PADS[LONG_PADS.len() - 1]);
     PadSpec { axis, angle: angle.to_radians() }
+}
+
+/// True where a smooth surface about `end` follows the hull of a shape, over a pad or all around, as closely as scenes ask.
+fn is_followed(placed: &PlacedShape, end: &Point, pad: Option<&Pad>) -> bool {
+    let convex = convex_of(&placed.shape).map(|shape| PlacedShape { shape, ..placed.clone() });
+    let made = convex.ok().and_then(|convex| HullTips::default().make(&[&convex], end, pad, &[]).ok());
+    made.is_some_and(|(_, tip)| matches!(tip, TipShape::Hull { misfit, .. } if misfit <= LARGEST_MISFIT))
 }
 
 /// Largest difference of a ball from the outside of `shapes`, whose directions are within 60 degrees of `axis`.
