@@ -12,10 +12,7 @@ from .torsion import Spinning, least_forces, spinning
 
 #: Largest offset of a fingertip by feedback, in metres.
 LARGEST_OFFSET = 0.01
-#: Share of its planned normal force that feedback may take from a finger. A pose error that only a pull could mend, because
-#: friction holds the object where it is, would else end with the contact lost.
-LARGEST_RELIEF = 0.5
-#: Speed at which a tip that retreated too far comes back, in metres per second.
+#: Speed at which a tip that landed with an offset away from the object comes back to where it presses as planned, in metres per second.
 RETURN_SPEED = 0.005
 #: Controller H: share of a tip's stiffness along the normal that is taken away. A tip that slides, or stands where the object
 #: slides over it, must press as planned wherever the object is (hybrid control: Raibert, Craig 1981).
@@ -59,8 +56,7 @@ class Controller:
 
     def feedback(self, rig: Rig, ref: Reference, settings: Settings) -> Feedback:
         """A fresh feedback loop over these commands."""
-        retreats = _largest_retreats(rig, self._jacobians)
-        feedback = Feedback(rig, ref, settings, self.commands, self._inverses, self._contacts, retreats)
+        feedback = Feedback(rig, ref, settings, self.commands, self._inverses, self._contacts)
         if settings.controller == "H":
             feedback.give(NORMAL_GIVE, rig, self._jacobians)
         return feedback
@@ -71,7 +67,8 @@ class Feedback:
 
     A pressing finger's offset grows by gain * (displacement that its contact lacks). A free finger takes up the
     displacement of the real object from the planned one, so that it lands where it should on the real object; offsets are
-    continuous over landing and lifting. A pressing finger retreats from the object no farther than `LARGEST_RELIEF` allows.
+    continuous over landing and lifting. No finger presses less than planned: where friction holds the object in a wrong pose,
+    a finger that retreats would only lose its contact.
 
     H: beside that, targets of pressing tips follow the tips along the normal by the share `give`.
     """
@@ -84,14 +81,13 @@ class Feedback:
         commands: Array,
         inverse: Array,
         contacts: Array,
-        retreats: Array,
     ) -> None:
         self._commands = commands
         n_joints = commands.shape[1]
         self._inverse = (rig.stiffness[:, None] * inverse.reshape(len(inverse), n_joints, -1)).copy()
         self._arms = ref.blend(contacts) - ref.object_position[:, None, :]
         self._normals = ref.blend(normals_in_world(rig.plan))
-        self._retreats = np.where(ref.presses, ref.blend(retreats), np.inf)
+        self._farthest_out = np.where(ref.presses, 0.0, np.inf)
         self._ref = ref
         pressing = ref.presses[:, :, None].astype(np.float64)
         self._leak = (1.0 - pressing) * (settings.tick / FREE_FOLLOW_TIME)
@@ -135,8 +131,8 @@ class Feedback:
         offsets = self._offsets
         change = self._gain[k] * lacking - self._leak[k] * offsets
         normals = self._normals[k]
-        # Where it is beyond the limit, because forces went down or the finger landed so, it comes back without a jump.
-        limits = np.maximum(self._retreats[k], (offsets * normals).sum(axis=1) - self._return)
+        # Where it is beyond the limit, because the finger landed so, it comes back without a jump.
+        limits = np.maximum(self._farthest_out[k], (offsets * normals).sum(axis=1) - self._return)
         np.maximum(-LARGEST_OFFSET, np.minimum(LARGEST_OFFSET, offsets + change), out=offsets)
         too_far = (offsets * normals).sum(axis=1) - limits
         offsets -= np.maximum(too_far, 0.0)[:, None] * normals
@@ -145,20 +141,6 @@ class Feedback:
             given = self._give * self._pressing[k] * ((moved - offsets) * normals).sum(axis=1)
             return self._commands[k] + self._inverse[ref.waypoint[k]] @ (offsets + given[:, None] * normals).ravel()
         return self._commands[k] + self._inverse[ref.waypoint[k]] @ offsets.ravel()
-
-
-def _largest_retreats(rig: Rig, jacobians: Array) -> Array:
-    """How far each tip's target may go outwards, at every waypoint: what takes `LARGEST_RELIEF` of the planned normal force
-    from a tip whose joints are springs. Shape (n_waypoints, n_fingers)."""
-    normals = normals_in_world(rig.plan)
-    across = np.einsum("kfi,kfij->kfj", normals, jacobians)
-    compliance = (across**2 / rig.stiffness).sum(axis=2)
-    pushes = np.zeros(compliance.shape)
-    for k, point in enumerate(waypoints_of(rig.plan)):
-        for f, contact in enumerate(point["contacts"]):
-            if contact.get("force_in_object"):
-                pushes[k, f] = -np.dot(contact["force_in_object"], contact["normal_in_object"])
-    return LARGEST_RELIEF * pushes * compliance
 
 
 def _turn(to: Array, from_: Array) -> tuple[float, float, float]:

@@ -207,7 +207,12 @@ fn a_plan_without_its_scene_is_told_how_to_name_one() {
 #[test]
 fn pages_are_not_written_into_pictures() {
     let folder = Folder::planned();
-    complains(&folder.run(&["view", "plan.json", "-o", "page.PNG"]), "A505", "--output", &["page.PNG", "--png FILE.png"]);
+    complains(
+        &folder.run(&["view", "plan.json", "-o", "page.PNG"]),
+        "A505",
+        "--output",
+        &["page.PNG", "--png FILE.png"],
+    );
     assert!(!folder.path("page.PNG").exists());
 }
 
