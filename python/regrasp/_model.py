@@ -273,7 +273,7 @@ class Task:
 
     name: str
     """Empty in scenes of one task."""
-    kind: Literal["in_hand", "tracking", "motion"]
+    kind: Literal["in_hand", "tracking", "motion", "pick_and_place"]
     hand: str
     """Name of the hand in the scene; empty in tasks of kind "motion"."""
     object: str

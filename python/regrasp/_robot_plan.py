@@ -58,6 +58,15 @@ class RobotPlan:
         """Reads a plan file. Raises `InputError`."""
         return RobotPlan(_regrasp.RobotPlan.load(os.fspath(path)), path=os.fspath(path))
 
+    @staticmethod
+    def from_json(content: str | bytes, *, name: str = "plan.json") -> RobotPlan:
+        """Reads the content of a plan file; errors call it `name`. Raises `InputError`."""
+        return RobotPlan(_regrasp.RobotPlan.parse(content.encode() if isinstance(content, str) else content, name))
+
+    def to_json(self) -> bytes:
+        """The content of its plan file."""
+        return self._native.to_json()
+
     @cached_property
     def document(self) -> Mapping[str, Any]:
         """The content of the plan file."""

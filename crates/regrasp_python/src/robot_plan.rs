@@ -41,6 +41,15 @@ impl RobotPlan {
         })
     }
 
+    /// Reads a plan from the content of a plan file; errors call it `name`.
+    #[staticmethod]
+    fn parse(py: Python<'_>, content: &[u8], name: PathBuf) -> PyResult<Self> {
+        guarded(py, || {
+            let read = || format::robot_from_json(&name, content);
+            Ok(RobotPlan { plan: py.detach(read).map_err(|error| error::input(py, &error))? })
+        })
+    }
+
     /// The bytes of its plan file.
     fn to_json<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         guarded(py, || Ok(PyBytes::new(py, py.detach(|| format::robot_to_json(&self.plan)).as_bytes())))

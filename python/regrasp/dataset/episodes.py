@@ -15,12 +15,13 @@ import numpy as np
 from .._errors import InputError
 from .._model import Pose, Scene
 from .._plan import Plan
-from .._planning import check, plan
+from .._planning import check, plan, plan_pick_and_place
 from .._result import Failure, Report
+from .._robot_plan import RobotPlan
 from .draws import canonical, key_of
 from .packing import Row, Unpackable, pack, unpack
 from .schema import empty_row
-from .specification import TaskSpec
+from .specification import PICK_AND_PLACE, TaskSpec
 
 
 def episode_key(task: TaskSpec, index: int) -> str:
@@ -54,15 +55,16 @@ def row_of(task: TaskSpec, index: int) -> Row:
         _describe(row, task, scene, seed)
         arguments = _arguments(task, key)
         row["method"] = arguments.get("method")
-        found = plan(scene, seed=seed, max_work=task.max_work, level=task.level, task=task.scene_task, **arguments)  # pyright: ignore
+        planned = plan_pick_and_place if task.moves_a_robot else plan
+        found = planned(scene, seed=seed, max_work=task.max_work, level=task.level, task=task.scene_task, **arguments)  # pyright: ignore
         if isinstance(found, Failure):
             _failed(row, found)
         else:
             _planned(row, task, found, scene)
         if row["solved"] and task.replay is not None:
-            from .replaying import replayed
+            from .replaying import replayed, task_replayed
 
-            replayed(row, task.replay, scene)
+            (task_replayed if task.moves_a_robot else replayed)(row, task.replay, scene)
     except InputError as error:
         row.update(outcome="input_refused", message=_first_line(error), causes=canonical([each.code for each in error.diagnostics]))
     except Unpackable as error:
@@ -70,9 +72,21 @@ def row_of(task: TaskSpec, index: int) -> Row:
     return row
 
 
-def plan_of(row: Mapping[str, Any]) -> Plan:
+def plan_of(row: Mapping[str, Any]) -> Plan | RobotPlan:
     """The plan that a row of a solved episode holds."""
-    return Plan.from_json(json.dumps(unpack(row)), name=f"{row['task']}/{row['episode']}")
+    return _plan_in(unpack(row), f"{row['task']}/{row['episode']}")
+
+
+def judged(found: Plan | RobotPlan, scene: Scene, level: str) -> Report:
+    """What the checker says of a plan in its scene."""
+    if isinstance(found, RobotPlan):
+        return found.check(scene, level=level)
+    return check(found, scene, level=level)  # pyright: ignore
+
+
+def _plan_in(content: Mapping[str, Any], name: str = "plan.json") -> Plan | RobotPlan:
+    kind = RobotPlan if content["task"] == PICK_AND_PLACE else Plan
+    return kind.from_json(json.dumps(content), name=name)
 
 
 def _arguments(task: TaskSpec, key: str) -> dict[str, Any]:
@@ -123,28 +137,30 @@ def _failed(row: Row, failure: Failure) -> None:
         row.update(nearest_angle=miss.angle_left, nearest_distance=miss.distance_left, nearest_joints=list(miss.joints))
 
 
-def _planned(row: Row, task: TaskSpec, found: Plan, scene: Scene) -> None:
+def _planned(row: Row, task: TaskSpec, found: Plan | RobotPlan, scene: Scene) -> None:
     content = json.loads(found.to_json())
+    work = content["statistics"]["work"]
     for exact in (False, True):
         packed = pack(content, exact=exact)
-        report = check(Plan.from_json(json.dumps(unpack(packed))), scene, level=task.level)  # pyright: ignore
+        report = judged(_plan_in(unpack(packed)), scene, task.level)
         if report:
             row.update(packed)
-            _judged(row, found, report)
+            _judged(row, content, report)
             return
-    row.update(outcome="rejected", message="the checker rejects the plan as its columns hold it", work=found.statistics["work"])
+    row.update(outcome="rejected", message="the checker rejects the plan as its columns hold it", work=work)
 
 
-def _judged(row: Row, found: Plan, report: Report) -> None:
+def _judged(row: Row, content: Mapping[str, Any], report: Report) -> None:
+    statistics = content["statistics"]
     row.update(
         outcome="planned",
         solved=True,
-        work=found.statistics["work"],
-        method=found.method,
+        work=statistics["work"],
+        method=content["method"],
         duration=float(np.asarray(row["time"])[-1]),
-        n_waypoints=found.n_waypoints,
-        transfers=found.statistics["transfers"],
-        relocations=found.statistics["relocations"],
+        n_waypoints=len(row["time"]),
+        transfers=statistics.get("transfers"),
+        relocations=statistics.get("relocations"),
         margin=report.min_margin,
         clearance=None if report.min_clearance is None else report.min_clearance.distance,
         slip=report.max_hold_slip,

@@ -13,6 +13,7 @@ from ..simulate.plans import flat
 from ..simulate.reference import reference
 from .packing import unpack
 from .reading import Episode
+from .specification import PICK_AND_PLACE
 from .tables import fault
 
 Single = npt.NDArray[np.float32]
@@ -73,8 +74,11 @@ class Frames:
 
 
 def frames_of(episode: Episode, fps: float) -> Frames:
-    """The frames of a solved episode."""
+    """The frames of a solved episode. Raises `InputError` (D132) for plans of a whole robot."""
     content = unpack(episode.row)
+    if content["task"] == PICK_AND_PLACE:
+        problem = "is pick and place: between waypoints its object follows the hand, which only the model of the robot knows"
+        raise fault("D132", episode.row["task"], problem, fix="export npz, or export another task with --task NAME")
     plan = flat(content)
     ref = reference(plan, tick=1.0 / fps)
     points = [waypoint for segment in plan["segments"] for waypoint in segment["waypoints"]]

@@ -20,6 +20,7 @@ from .. import _regrasp
 from .._arguments import StrPath
 from .._errors import InputError
 from .folder import about_of, read_manifest, rows_of, shards_in
+from .._robot_plan import RobotPlan
 from .reading import Episode, read_episodes
 
 #: Columns that `summary` reads.
@@ -223,8 +224,12 @@ def _histogram(title: str, values: Sequence[float]) -> str:
 def _picture(episode: Episode) -> str:
     row = episode.row
     caption = f"{row['task']}, episode {row['episode']}: {np.degrees(row['goal_angle']):.0f} degrees in {row['duration']:.1f} s"
+    plan = episode.plan()
+    if isinstance(plan, RobotPlan):
+        kinds = ", ".join(segment.kind for segment in plan.segments)
+        return f"<p>{escape(caption)}: {escape(kinds)}</p>"
     try:
-        picture = _regrasp.storyboard(episode.plan()._native, episode.scene()._native, 6, 1200)
+        picture = _regrasp.storyboard(plan._native, episode.scene()._native, 6, 1200)
     except InputError as error:
         return f"<p>{escape(caption)}: no picture ({escape(str(error))})</p>"
     data = base64.b64encode(picture).decode()

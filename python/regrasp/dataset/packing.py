@@ -61,14 +61,15 @@ def rounded(values: Floats, digits: int) -> Floats:
 
 
 def pack(plan: Mapping[str, Any], *, exact: bool = False) -> Row:
-    """The columns of the content of a plan file: n waypoints, j joints, f fingers; SI units, all in the world or the object frame.
+    """The columns of the content of a plan file: n waypoints, j joints, f fingers of all hands, in their order; SI units, all in the
+    world or the object frame.
 
-    Raises `Unpackable` for plans that move several hands or objects, or say something that no column holds.
+    Raises `Unpackable` for plans that move several objects, or say something that no column holds.
     """
-    hands, objects = plan["hands"], plan["objects"]
-    if len(hands) != 1 or len(objects) != 1:
-        raise Unpackable(f"the plan moves {len(hands)} hands and {len(objects)} objects; a row holds one of each")
-    fingers: list[str] = hands[0]["fingers"]
+    objects = plan["objects"]
+    if len(objects) != 1:
+        raise Unpackable(f"the plan moves {len(objects)} objects; a row holds one")
+    fingers = fingers_of(plan)
     index = {finger: k for k, finger in enumerate(fingers)}
     waypoints = [waypoint for segment in plan["segments"] for waypoint in segment["waypoints"]]
     n, f = len(waypoints), len(fingers)
@@ -76,9 +77,11 @@ def pack(plan: Mapping[str, Any], *, exact: bool = False) -> Row:
     torsions, modes = np.full((n, f), np.nan), np.zeros((n, f), np.int8)
     for k, waypoint in enumerate(waypoints):
         _know(waypoint, _WAYPOINT_KEYS)
-        for contact in waypoint["contacts"]:
+        for contact in waypoint.get("contacts", ()):
             _know(contact, _CONTACT_KEYS)
-            at = k, index[contact["finger"]]
+            at = k, index[contact["hand"], contact["finger"]]
+            if modes[at] != 0:
+                raise Unpackable(f"two contacts of finger {contact['finger']} at waypoint {k}; a row holds one")
             modes[at] = MODES.index(contact["mode"])
             torsions[at] = contact.get("torsion", np.nan)
             for name, key in VECTORS.items():
@@ -107,6 +110,11 @@ def pack(plan: Mapping[str, Any], *, exact: bool = False) -> Row:
     return row
 
 
+def fingers_of(plan: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Hand and name of every finger of a plan, in the order of the columns."""
+    return [(hand["name"], finger) for hand in plan["hands"] for finger in hand["fingers"]]
+
+
 def _know(entry: Mapping[str, Any], keys: set[str]) -> None:
     unknown = entry.keys() - keys
     if unknown:
@@ -122,8 +130,7 @@ def _header(plan: Mapping[str, Any]) -> str:
 def unpack(row: Mapping[str, Any]) -> dict[str, Any]:
     """The content of the plan file that a row holds; unit vectors are made of length one again."""
     plan: dict[str, Any] = json.loads(row["plan"])
-    hand, name = plan["hands"][0], plan["objects"][0]
-    fingers: list[str] = hand["fingers"]
+    name, fingers = plan["objects"][0], fingers_of(plan)
     time = np.asarray(row["time"], float)
     n, f = len(time), len(fingers)
     joints, velocities = _rows(row, "joints", n), _rows(row, "joint_velocities", n)
@@ -137,11 +144,11 @@ def unpack(row: Mapping[str, Any]) -> dict[str, Any]:
     waypoints: list[dict[str, Any]] = []
     for k in range(n):
         contacts: list[dict[str, Any]] = []
-        for i, finger in enumerate(fingers):
+        for i, (hand, finger) in enumerate(fingers):
             if modes[k, i] == 0:
                 continue
             contact: dict[str, Any] = {
-                "hand": hand["name"],
+                "hand": hand,
                 "finger": finger,
                 "object": name,
                 "mode": MODES[modes[k, i]],

@@ -15,6 +15,7 @@ from typing import Any
 from .._arguments import StrPath
 from .._model import Scene
 from .._plan import Plan
+from .._robot_plan import RobotPlan
 from .episodes import plan_of
 from .folder import about_of, read_manifest, rows_of, scene_in, shards_in
 
@@ -40,8 +41,8 @@ class Episode:
         values = json.loads(self.row["values"])
         return self.base.with_keys(values) if values else self.base
 
-    def plan(self) -> Plan:
-        """The plan of a solved episode."""
+    def plan(self) -> Plan | RobotPlan:
+        """The plan of a solved episode: of a whole robot where the task is pick and place."""
         return plan_of(self.row)
 
 

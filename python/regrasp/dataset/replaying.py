@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import warnings
 from typing import Any
 
@@ -9,16 +10,42 @@ import numpy as np
 
 from .._model import Scene
 from .._planning import export_mjcf
+from .._plan import Plan
+from .._robot_plan import RobotPlan
 from .packing import Row, rounded, unpack
-from .specification import NOISE, Replay
+from .specification import NOISE, TASK_NOISE, Replay
+
+
+def task_replayed(row: Row, settings: Replay, scene: Scene) -> None:
+    """As `replayed`, for plans of pick and place."""
+    from ..simulate.reference import PlanError
+    from ..simulate.task import TaskSettings, replay
+
+    noise = {key: getattr(settings, key).value(row["key"], f"replay.{key}") for key in TASK_NOISE}
+    row.update({f"replay_{key}": value for key, value in noise.items()}, replay_controller=settings.controller, replay_kept=False)
+    content = unpack(row)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            model = RobotPlan.from_json(json.dumps(content)).to_mjcf(scene)
+        report, _, _ = replay(content, model, TaskSettings(controller=settings.controller, **noise))
+    except PlanError as error:
+        row["replay_cause"] = f"not replayed: {error}"
+        return
+    row.update(
+        replay_kept=report.kept,
+        replay_cause=report.lost.cause if report.lost else None,
+        replay_final_position_error=report.final_position_error,
+        replay_final_angle_error=report.final_angle_error,
+        replay_largest_slip=max((hold.slip for hold in report.holds), default=0.0),
+    )
 
 
 def replayed(row: Row, settings: Replay, scene: Scene) -> None:
-    """Replays the plan of a solved row in its scene and adds the outcome, with noise keyed by the episode."""
+    """Replays the in-hand plan of a solved row in its scene and adds the outcome, with noise keyed by the episode."""
     from ..simulate.model import Settings
     from ..simulate.reference import PlanError
     from ..simulate.run import simulate
-    from .episodes import plan_of
 
     noise = {key: getattr(settings, key).value(row["key"], f"replay.{key}") for key in NOISE}
     row.update({f"replay_{key}": value for key, value in noise.items()}, replay_controller=settings.controller, replay_kept=False)
@@ -27,7 +54,7 @@ def replayed(row: Row, settings: Replay, scene: Scene) -> None:
         with warnings.catch_warnings():
             # Where the model differs from the scene is said in docs/reference/replay.md.
             warnings.simplefilter("ignore")
-            model = export_mjcf(plan_of(row), scene)
+            model = export_mjcf(Plan.from_json(json.dumps(unpack(row))), scene)
         result = simulate(unpack(row), model, how)
     except PlanError as error:
         row["replay_cause"] = f"not replayed: {error}"

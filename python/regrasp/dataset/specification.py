@@ -1,6 +1,7 @@
 """`dataset.toml`: what a data set is made of. `docs/reference/dataset-format.md` says what it may contain.
 
-Codes, beside those of `tables`: D110 a scene that cannot be read, D111 a key that cannot be varied.
+Codes, beside those of `tables`: D110 a scene that cannot be read, D111 a key that cannot be varied, D112 a task of a kind that has no
+rows, D113 a replay that such a task does not have.
 """
 
 # One package, in parts: what is private to it is not private to a part.
@@ -27,6 +28,12 @@ FORMAT = "regrasp-dataset"
 FORMAT_VERSION = 1
 LEVELS = ("geometry", "forces", "motion")
 CONTROLLERS = ("A", "B", "C2", "H")
+#: The kind of task that moves a whole robot and has rows.
+PICK_AND_PLACE = "pick_and_place"
+#: Of these, for such tasks.
+TASK_CONTROLLERS = ("B", "C2")
+#: What may vary of their replays.
+TASK_NOISE = ("friction_scale", "mass_scale")
 MAX_EPISODES = 10**9
 #: What may vary of a replay, with the values that change nothing.
 NOISE: Mapping[str, Any] = {
@@ -83,6 +90,16 @@ class TaskSpec:
     replay: Replay | None
 
     @cached_property
+    def kind(self) -> str:
+        """Kind of the scene's task."""
+        return next((each for each in self.scene.tasks if each.name == self.scene_task), self.scene.tasks[0]).kind
+
+    @property
+    def moves_a_robot(self) -> bool:
+        """True for tasks of pick and place."""
+        return self.kind == PICK_AND_PLACE
+
+    @cached_property
     def hash(self) -> str:
         """SHA-256 of what an episode of the task depends on: not of file names, comments, or the number of episodes."""
         meaning = {
@@ -127,7 +144,11 @@ class Specification:
         return replace(self, tasks=tuple(replace(task, episodes=min(task.episodes, episodes)) for task in self.tasks))
 
     def replayed(self, controller: str) -> Specification:
-        """With every plan replayed by `controller`."""
+        """With every plan replayed by `controller`. Raises `InputError` (D113) where a task has no such replay."""
+        for task in self.tasks:
+            if task.moves_a_robot and controller not in TASK_CONTROLLERS:
+                problem = f'task "{task.name}" has no replay with controller "{controller}"'
+                raise fault("D113", self.path, problem, expected=f"{' or '.join(TASK_CONTROLLERS)} for pick and place")
         plain = Replay(controller, keep="outcome", **{key: Draw("constant", value) for key, value in NOISE.items()})
         replays = (replace(task.replay, controller=controller) if task.replay else plain for task in self.tasks)
         return replace(self, tasks=tuple(replace(task, replay=each) for task, each in zip(self.tasks, replays)))
@@ -261,6 +282,11 @@ def _can_vary(task: TaskSpec, table: Table, varied: Table) -> bool:
     if task.scene_task is not None and task.scene_task not in names:
         table.report("D104", "task", f'is "{task.scene_task}"', ", ".join(names))
         return False
+    if task.kind == "motion":
+        table.report("D112", "scene", "asks for a motion of a robot without an object", "in-hand, tracking, or pick and place")
+        return False
+    if task.moves_a_robot and task.replay is not None and not _has_replay(task.replay, table):
+        return False
     good = True
     for name, draw in task.vary.items():
         try:
@@ -274,4 +300,18 @@ def _can_vary(task: TaskSpec, table: Table, varied: Table) -> bool:
     return good
 
 
-__all__ = ["Replay", "Specification", "TaskSpec", "error_of", "read_specification", "specification_of"]
+def _has_replay(replay: Replay, table: Table) -> bool:
+    """Whether plans of pick and place can be replayed so."""
+    if replay.controller not in TASK_CONTROLLERS:
+        expected = f"{' or '.join(TASK_CONTROLLERS)} for pick and place"
+        table.report("D113", "scene", f'is replayed with controller "{replay.controller}"', expected)
+        return False
+    still = [key for key in NOISE if key not in TASK_NOISE and getattr(replay, key) != Draw("constant", NOISE[key])]
+    if still or replay.keep == "track":
+        what = 'keep = "track"' if not still else still[0]
+        table.report("D113", "scene", f"is replayed with {what}", f"of pick and place {' and '.join(TASK_NOISE)} may vary")
+        return False
+    return True
+
+
+__all__ = ["PICK_AND_PLACE", "Replay", "Specification", "TaskSpec", "error_of", "read_specification", "specification_of"]

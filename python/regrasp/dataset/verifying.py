@@ -14,9 +14,8 @@ from typing import Any
 from .._arguments import StrPath
 from .._errors import InputError, RegraspError
 from .._model import Scene
-from .._planning import check
 from .draws import key_of, units
-from .episodes import plan_of, seed_of_key
+from .episodes import judged, plan_of, seed_of_key
 from .folder import about_of, read_manifest, rows_of, scene_in, shards_in
 
 
@@ -130,9 +129,10 @@ def _problem(
     try:
         values = json.loads(row["values"])
         plan = plan_of(row)
-        if plan.seed != row["seed"]:
-            return f"its plan was made with seed {plan.seed}"
-        report = check(plan, scene.with_keys(values) if values else scene, level=task["level"])
+        seed_of_plan = json.loads(row["plan"])["seed"]
+        if seed_of_plan != row["seed"]:
+            return f"its plan was made with seed {seed_of_plan}"
+        report = judged(plan, scene.with_keys(values) if values else scene, task["level"])
     except (RegraspError, ValueError, KeyError, IndexError) as error:
         return f"its plan cannot be judged: {str(error).splitlines()[0]}"
     verdict.accepted += report.ok

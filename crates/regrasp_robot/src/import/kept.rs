@@ -3,7 +3,7 @@
 use super::resolve::Resolved;
 use regrasp_base::{Diagnostic, InputError, Place};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 /// Files by the path at which they were found. While files are kept no other file is read.
@@ -22,17 +22,17 @@ struct KeptFile {
 impl KeptFiles {
     /// Keeps `bytes` as the file at `path`, which another file names `name`.
     pub fn insert(&mut self, path: PathBuf, name: String, bytes: Vec<u8>) {
-        self.files.insert(path, KeptFile { name, bytes: bytes.into() });
+        self.files.insert(without_detours(&path), KeptFile { name, bytes: bytes.into() });
     }
 
     /// True when there is a file at `path`.
     pub fn contains(&self, path: &Path) -> bool {
-        self.files.contains_key(path)
+        self.files.contains_key(&without_detours(path))
     }
 
     /// The bytes of the file at `path`. Errors: it was not kept (`F001`).
     pub fn read(&self, path: &Path) -> Result<Vec<u8>, InputError> {
-        let file = self.files.get(path).ok_or_else(|| {
+        let file = self.files.get(&without_detours(path)).ok_or_else(|| {
             Diagnostic::new("F001", Place::file(path), "is not one of the files that were kept with the scene")
         })?;
         Ok(file.bytes.to_vec())
@@ -44,12 +44,27 @@ impl KeptFiles {
     pub(crate) fn resolve(&self, name: &str, model: &Path, place: Place) -> Result<Resolved, Diagnostic> {
         let beside = model.parent().unwrap_or(Path::new("")).join(name);
         let by_name = || self.files.iter().find(|(_, file)| file.name == name).map(|(path, _)| path.clone());
-        let path = if self.contains(&beside) { Some(beside) } else { by_name() };
+        let path = if self.contains(&beside) { Some(without_detours(&beside)) } else { by_name() };
         path.map(|path| Resolved { path, notes: Vec::new() }).ok_or_else(|| {
             let problem = format!("\"{name}\" is not one of the files that were kept with the scene");
             Diagnostic::new("U101", place, problem).fix("read the scene again from its files")
         })
     }
+}
+
+/// The path without `.`, and without folders that `..` leaves at once. No link can stand in the way: these files are on no disk.
+fn without_detours(path: &Path) -> PathBuf {
+    let mut short = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir if matches!(short.components().next_back(), Some(Component::Normal(_))) => {
+                short.pop();
+            }
+            other => short.push(other),
+        }
+    }
+    short
 }
 
 #[cfg(test)]
@@ -65,6 +80,8 @@ mod tests {
         assert_eq!(find("hand.urdf").unwrap().path, Path::new("a/hand.urdf"));
         assert_eq!(find("package://hand/tip.stl").unwrap().path, Path::new("b/tip.stl"));
         assert_eq!(kept.read(Path::new("b/tip.stl")).unwrap(), b"tip");
+        // A robot may name the hand of another folder.
+        assert_eq!(find("../c/./../b/tip.stl").unwrap().path, Path::new("b/tip.stl"));
         assert_eq!(find("other.urdf").unwrap_err().code, "U101");
         assert_eq!(kept.read(Path::new("Cargo.toml")).unwrap_err().diagnostics[0].code, "F001");
     }
