@@ -131,6 +131,12 @@ def test_motions_without_an_object_are_refused() -> None:
         specification_of(text, "dataset.toml")
 
 
+def test_keys_that_the_scene_rules_out_are_refused_before_any_episode() -> None:
+    text = text_of().replace('"tasks.0.goal.position" = { range = [[0.46, 0.86, 0.54], [0.56, 0.96, 0.54]] }', "")
+    with pytest.raises(regrasp.InputError, match="D111 .*cannot stand beside"):
+        specification_of(text + '"tasks.0.goal.turn" = { choice = [{ axis = "z", angle_deg = 30 }] }\n', "dataset.toml")
+
+
 def test_two_contacts_of_one_finger_are_not_storable(made: Path) -> None:
     content = unpack(next(iter(read_episodes(made))).row)
     touching = next(point for segment in content["segments"] for point in segment["waypoints"] if point["contacts"])

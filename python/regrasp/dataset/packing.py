@@ -1,8 +1,8 @@
 """Plans as columns, and columns as plans again.
 
-Numbers are rounded to 32 binary digits (`PRECISE`) or 24 (`COARSE`, single precision); zeros compress to nothing. The plan that
-the columns give back is the one that the checker judges, before it is written. Where it rejects the rounded plan, the columns
-hold all 53 digits.
+Numbers are rounded to 32 binary digits (`PRECISE`) or 24 (`COARSE`, single precision), in pick and place to 40 (`FINE`); zeros compress
+to nothing. The plan that the columns give back is the one that the checker judges, before it is written. Where it rejects the
+rounded plan, the columns hold all 53 digits.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ Floats = npt.NDArray[np.float64]
 
 #: Binary digits of joints, times, poses, contact points and forces, and of velocities, torques and normals.
 PRECISE, COARSE, EXACT = 32, 24, 53
+#: In pick and place: a carried object follows a hand at the end of an arm to a nanometre, and its forces balance what accelerates it.
+FINE = 40
 #: Columns of numbers, and how many binary digits of them are kept.
 DIGITS = {
     "time": PRECISE,
@@ -97,7 +99,9 @@ def pack(plan: Mapping[str, Any], *, exact: bool = False) -> Row:
     }
     if "joint_torques" in waypoints[0]:
         columns["joint_torques"] = np.array([each["joint_torques"] for each in waypoints], float)
-    row: Row = {name: rounded(array, EXACT if exact else DIGITS[name]).ravel() for name, array in columns.items()}
+    is_of_robot = plan["task"] == "pick_and_place"
+    least = EXACT if exact else FINE if is_of_robot else COARSE
+    row: Row = {name: rounded(array, max(least, DIGITS[name])).ravel() for name, array in columns.items()}
     for name in ("contact_torsions", *list(VECTORS)[2:]):
         if np.isnan(row[name]).all():
             row[name] = None
@@ -105,7 +109,7 @@ def pack(plan: Mapping[str, Any], *, exact: bool = False) -> Row:
     row["contact_modes"] = modes.ravel()
     lengths = [len(segment["waypoints"]) for segment in plan["segments"]]
     row["segment"] = np.repeat(np.arange(len(lengths), dtype=np.int16), lengths)
-    row["digits"] = EXACT if exact else PRECISE
+    row["digits"] = max(least, PRECISE)
     row["plan"] = _header(plan)
     return row
 

@@ -293,8 +293,8 @@ def _can_vary(task: TaskSpec, table: Table, varied: Table) -> bool:
             task.scene.with_keys({name: draw.value("", name)})
         except InputError as error:
             # What a value alone breaks may be right beside others; keys and types never are.
-            codes = {each.code for each in error.diagnostics}
-            if codes & {"S101", "S103", "A510"}:
+            never = {"S101", "S103", "A510"}
+            if any(each.code in never or "cannot stand beside" in each.problem for each in error.diagnostics):
                 varied.report("D111", name, f"cannot be varied: {error}", "a key that scene files have")
                 good = False
     return good
