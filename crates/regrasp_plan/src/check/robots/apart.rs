@@ -7,6 +7,7 @@
 //! along its own arc, and those before it are rigid motions. Two items are therefore apart in the whole interval where their distance at
 //! the middle is more than the two sums up to the body that both stand on. Else the interval is halved.
 
+use crate::check::robots::crowd::Crowd;
 use crate::check::robots::items::{Item, Items, Owner, Pair};
 use crate::check::robots::motion::{RobotStep, largest_change};
 use crate::check::robots::question::Question;
@@ -17,6 +18,8 @@ use crate::robot_plan::{RobotPlan, RobotSegment};
 use nalgebra::Translation3;
 use regrasp_geometry::reference::{Clearance as Found, distance};
 use regrasp_geometry::{Point, Pose, Vector};
+use std::cmp::{Ordering, Reverse};
+use std::collections::BinaryHeap;
 use std::f64::consts::PI;
 
 /// How far a pair is shifted when its distance is not resolved, in metres, and the directions tried.
@@ -36,6 +39,9 @@ pub struct Placed<'a> {
     frames: Vec<Frame>,
     axes: Vec<Frame>,
     centers: Vec<Point>,
+    /// Items that do not stand in the world.
+    moving: Vec<usize>,
+    crowd: Crowd,
     /// Distances measured so far.
     pub n_distances: u64,
 }
@@ -43,9 +49,11 @@ pub struct Placed<'a> {
 impl<'a> Placed<'a> {
     /// Of these items.
     pub fn new(tree: &'a Tree, items: &'a Items) -> Self {
-        let centers = vec![Point::origin(); items.items.len()];
+        let centers = items.items.iter().map(|item| item.center).collect();
+        let moving = (0..items.items.len()).filter(|&item| !items.items[item].stands).collect();
+        let crowd = Crowd::new(items);
         let (joints, frames, axes) = (Vec::new(), Vec::new(), Vec::new());
-        Placed { tree, items, joints, frames, axes, centers, n_distances: 0 }
+        Placed { tree, items, joints, frames, axes, centers, moving, crowd, n_distances: 0 }
     }
 
     /// Moves everything to `joints`.
@@ -53,8 +61,9 @@ impl<'a> Placed<'a> {
         self.joints.clear();
         self.joints.extend_from_slice(joints);
         self.tree.frames(&self.joints, &mut self.frames, &mut self.axes);
-        for (item, center) in self.items.items.iter().zip(&mut self.centers) {
-            *center = if item.stands { item.center } else { self.frames[item.body].point(&item.center) };
+        for &item in &self.moving {
+            let of_body = &self.items.items[item];
+            self.centers[item] = self.frames[of_body.body].point(&of_body.center);
         }
     }
 
@@ -159,39 +168,80 @@ struct Judge<'a, 'b, 's> {
     breaches: Vec<Breach>,
     /// By item, its travels in the present interval; empty where nobody has asked.
     travels: Vec<Vec<f64>>,
+    /// By body, how far its joint moves from the middle of the present interval.
+    changes: Vec<f64>,
+    /// Joints in that middle.
+    joints: Vec<f64>,
 }
 
 impl Judge<'_, '_, '_> {
+    /// The whole step, of all pairs that `is_active`.
+    fn whole(&mut self, is_active: impl Fn(&usize) -> bool) {
+        self.place(0.0, 1.0);
+        let mut active: Vec<usize> = self.scene.crowd.others.iter().copied().filter(&is_active).collect();
+        for index in 0..self.scene.crowd.rows.len() {
+            let row = &self.scene.crowd.rows[index];
+            let (item, joints, floor) = (row.item, row.joints, row.floor);
+            let travel = self.travel(item, joints);
+            let row = &self.scene.crowd.rows[index];
+            let gap = row.gap(&self.scene.centers[item], self.scene.items.items[item].radius);
+            if gap > floor + travel + ROUNDING {
+                continue;
+            }
+            active.extend(row.pairs.iter().copied().filter(&is_active));
+        }
+        active.sort_unstable();
+        self.pairs(0.0, 1.0, &active);
+    }
+
     fn interval(&mut self, first: f64, last: f64, active: &[usize]) {
+        if self.n_pieces > self.most_pieces {
+            return;
+        }
+        self.place(first, last);
+        self.pairs(first, last, active);
+    }
+
+    /// Places everything in the middle of an interval.
+    fn place(&mut self, first: f64, last: f64) {
+        let middle = 0.5 * (first + last);
+        self.step.joints_at(middle, &mut self.joints);
+        self.scene.place(&self.joints);
+        let tree = self.scene.tree;
+        self.changes.clear();
+        self.changes.extend((0..tree.n_bodies()).map(|k| {
+            tree.body(k).map_or(0.0, |body| largest_change(&self.step.of_drive(&body.drive), first, middle, last))
+        }));
+        for &item in &self.scene.moving {
+            self.travels[item].clear();
+        }
+    }
+
+    /// How far points of an item move at most in the present interval, as the body sees it from which `joints` joints lead to it.
+    fn travel(&mut self, item: usize, joints: usize) -> f64 {
+        if self.scene.items.items[item].stands {
+            return 0.0;
+        }
+        if self.travels[item].is_empty() {
+            self.scene.travels(item, &self.changes, &mut self.travels[item]);
+        }
+        self.travels[item][joints]
+    }
+
+    /// Judges pairs in an interval in whose middle everything is placed.
+    fn pairs(&mut self, first: f64, last: f64, active: &[usize]) {
         self.n_pieces += 1 + active.len() as u64 / 64;
         if self.n_pieces > self.most_pieces {
             return;
         }
         let middle = 0.5 * (first + last);
-        let mut joints = Vec::new();
-        self.step.joints_at(middle, &mut joints);
-        self.scene.place(&joints);
-        let tree = self.scene.tree;
-        let changes: Vec<f64> = (0..tree.n_bodies())
-            .map(|k| {
-                tree.body(k).map_or(0.0, |body| largest_change(&self.step.of_drive(&body.drive), first, middle, last))
-            })
-            .collect();
-        self.travels.iter_mut().for_each(Vec::clear);
         let mut left = Vec::new();
         for &index in active {
             if self.breaches.iter().any(|breach| breach.pair == index) {
                 continue;
             }
             let pair = self.scene.items.pairs[index];
-            for item in [pair.a, pair.b] {
-                if self.travels[item].is_empty() {
-                    let mut travels = std::mem::take(&mut self.travels[item]);
-                    self.scene.travels(item, &changes, &mut travels);
-                    self.travels[item] = travels;
-                }
-            }
-            let travel = self.travels[pair.a][pair.joints_a] + self.travels[pair.b][pair.joints_b];
+            let travel = self.travel(pair.a, pair.joints_a) + self.travel(pair.b, pair.joints_b);
             let needed = pair.floor + travel + ROUNDING;
             if self.scene.gap(&pair) > needed {
                 continue;
@@ -248,7 +298,6 @@ pub fn check_segment(
         // What stands all through the segment is judged once.
         let is_new = |pair: &Pair| w == 0 || !(items.items[pair.a].stands && items.items[pair.b].stands);
         let is_active = |&index: &usize| !is_reported[index] && is_new(&items.pairs[index]);
-        let active: Vec<usize> = (0..items.pairs.len()).filter(is_active).collect();
         let mut judge = Judge {
             scene,
             step: &step,
@@ -257,8 +306,10 @@ pub fn check_segment(
             n_pieces: 0,
             breaches: Vec::new(),
             travels: vec![Vec::new(); items.items.len()],
+            changes: Vec::new(),
+            joints: Vec::new(),
         };
-        judge.interval(0.0, 1.0, &active);
+        judge.whole(is_active);
         let (n_pieces, breaches) = (judge.n_pieces, judge.breaches);
         for breach in breaches {
             is_reported[breach.pair] = true;
@@ -276,16 +327,25 @@ pub fn check_segment(
 pub fn note_clearance(scene: &mut Placed, joints: &[f64], at: Moment, clearance: &mut Option<Clearance>) {
     scene.place(joints);
     let items = scene.items;
-    let judged = items.pairs.iter().filter(|pair| pair.floor >= 0.0);
     let known = clearance.as_ref().map_or(FARTHEST, |known| known.distance);
-    let mut near: Vec<(f64, &Pair)> =
-        judged.map(|pair| (scene.gap(pair), pair)).filter(|(gap, _)| *gap < known).collect();
-    near.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let near_rows = scene.crowd.rows.iter().filter(|row| {
+        let gap = row.gap(&scene.centers[row.item], items.items[row.item].radius);
+        gap < known
+    });
+    let judged = scene.crowd.others.iter().chain(near_rows.flat_map(|row| &row.pairs));
+    let judged = judged.filter(|index| items.pairs[**index].floor >= 0.0);
+    let near: Vec<Reverse<Near>> = judged
+        .map(|&index| Reverse(Near { gap: scene.gap(&items.pairs[index]), pair: index }))
+        .filter(|near| near.0.gap < known)
+        .collect();
+    // Only few are taken: no need to sort all.
+    let mut near = BinaryHeap::from(near);
     let mut least = known;
-    for (gap, pair) in near {
+    while let Some(Reverse(Near { gap, pair })) = near.pop() {
         if gap >= least {
             break;
         }
+        let pair = &items.pairs[pair];
         if let Some(distance) = scene.measure(pair, least.max(1e-3)).filter(|distance| *distance < least) {
             least = distance;
             let pair = [pair.a, pair.b].map(|item| items.items[item].name.clone());
@@ -293,6 +353,32 @@ pub fn note_clearance(scene: &mut Placed, joints: &[f64], at: Moment, clearance:
         }
     }
 }
+
+/// A pair and the distance between its balls, in metres; ordered by that, then by index.
+struct Near {
+    gap: f64,
+    pair: usize,
+}
+
+impl Ord for Near {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.gap.total_cmp(&other.gap).then(self.pair.cmp(&other.pair))
+    }
+}
+
+impl PartialOrd for Near {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Near {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Near {}
 
 fn violation(items: &Items, pair: &Pair, at: Moment, breach: &Breach) -> Violation {
     let names = [pair.a, pair.b].map(|item| items.items[item].name.as_str());

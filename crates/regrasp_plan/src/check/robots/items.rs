@@ -49,7 +49,7 @@ pub struct Item {
     /// True for that hull.
     pub is_hull: bool,
     /// True for a fingertip that is no collision geometry of its link.
-    is_own_tip: bool,
+    pub is_own_tip: bool,
 }
 
 /// Two items that must not touch.
@@ -253,13 +253,18 @@ impl Items {
     pub fn add_pairs(&mut self, tree: &Tree, floor: impl Fn(&Item, &Item) -> Option<f64>) {
         let n_moving = self.items.iter().take_while(|item| item.owner != Owner::Still).count();
         let chains: Vec<Vec<usize>> = (0..tree.n_bodies()).map(|body| tree.chain(body)).collect();
+        // By two bodies: joints between each and the last body that they share.
+        let joints = |up: &Vec<usize>, down: &Vec<usize>| {
+            let shared = up.iter().rev().zip(down.iter().rev()).take_while(|(p, q)| p == q).count();
+            (up.len() - shared, down.len() - shared)
+        };
+        let table: Vec<Vec<(usize, usize)>> =
+            chains.iter().map(|up| chains.iter().map(|down| joints(up, down)).collect()).collect();
         for a in 0..n_moving {
             for b in a + 1..self.items.len() {
                 let (first, second) = (&self.items[a], &self.items[b]);
                 let Some(floor) = floor(first, second) else { continue };
-                let (up, down) = (&chains[first.body], &chains[second.body]);
-                let shared = up.iter().rev().zip(down.iter().rev()).take_while(|(p, q)| p == q).count();
-                let (joints_a, joints_b) = (up.len() - shared, down.len() - shared);
+                let (joints_a, joints_b) = table[first.body][second.body];
                 // What stands still and what no joint moves never meet: nothing that a plan does changes it.
                 let is_carried = matches!(first.owner, Owner::Carried(_));
                 if second.owner == Owner::Still && joints_a == 0 && !is_carried {

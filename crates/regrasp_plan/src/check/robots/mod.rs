@@ -7,6 +7,8 @@
 pub mod along;
 /// No two bodies meet at any moment.
 pub mod apart;
+/// Groups of what stands still.
+mod crowd;
 /// Everything that can collide, and which pairs must not.
 pub mod items;
 /// Where joints are between two waypoints.
