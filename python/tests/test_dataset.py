@@ -194,6 +194,30 @@ def test_what_is_there_is_not_made_again_and_more_episodes_keep_it(made: Path, t
     assert any("11 % solved" in line or "solved" in line for line in said)
 
 
+def test_a_last_block_that_grows_takes_the_place_of_the_shorter_one(made: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "grown"
+    make(specification_of(text_of(episodes=6), "dataset.toml"), folder, workers=1)
+    short = shards(folder)
+    result = make(specification_of(text_of(), "dataset.toml"), folder, workers=1)
+    assert (result.done_before, result.made, result.foreign) == (1, 2, [])
+    assert shards(folder) == shards(made)
+    assert summary(folder).episodes == 12 and verify(folder).ok
+    # As if the run had been cut off before it removed the shorter one.
+    name, content = next(item for item in short.items() if item[0] not in shards(made))
+    (folder / name).write_bytes(content)
+    assert make(specification_of(text_of(), "dataset.toml"), folder, workers=1).made == 0
+    assert shards(folder) == shards(made)
+    # Fewer episodes than there are: they stay.
+    fewer = make(specification_of(text_of(episodes=6), "dataset.toml"), folder, workers=1)
+    assert (fewer.done_before, fewer.made) == (2, 0) and len(fewer.foreign) == 1
+    assert shards(folder) == shards(made)
+
+
+def test_a_folder_made_with_another_replay_is_refused(made: Path) -> None:
+    with pytest.raises(regrasp.InputError, match="D120"):
+        make(specification_of(text_of(), "dataset.toml").replayed("C2"), made, workers=1)
+
+
 def test_failures_are_rows_with_cause_and_nearest_miss(tmp_path: Path) -> None:
     # A turn far beyond the budget, a radius that no scene takes, and one beyond the hand's reach.
     hard = text_of(episodes=3, vary='"object.friction" = { choice = [0.3] }\n').replace("[10, 60]", "[170, 175]")

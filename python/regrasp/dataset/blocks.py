@@ -39,13 +39,14 @@ def blocks_of(specification: Specification) -> list[Block]:
     for index, task in enumerate(specification.tasks):
         for number, first in enumerate(range(0, task.episodes, specification.block)):
             count = min(specification.block, task.episodes - first)
-            key = _content_key(task, first, count)
+            key = content_key(task, first, count)
             folder = f"shards/{task.name}/{number // BLOCKS_IN_FOLDER:05d}"
             blocks.append(Block(index, first, count, f"{folder}/{first:09d}-{key[:16]}.parquet", key))
     return blocks
 
 
-def _content_key(task: TaskSpec, first: int, count: int) -> str:
+def content_key(task: TaskSpec, first: int, count: int) -> str:
+    """Of the shard of some episodes of a task."""
     replay = canonical(task.replay.to_json()) if task.replay else ""
     return key_of("shard", SHARD_VERSION, " ".join(SCHEMA.names), _regrasp.__version__, task.hash, replay, first, count)
 

@@ -26,6 +26,7 @@ from .. import _regrasp
 from .._model import Gravity, Scene
 from ._arrow import pa, pq
 from .blocks import Block
+from .draws import canonical
 from .schema import METADATA_KEY, SCHEMA
 from .specification import Specification, TaskSpec
 from .tables import fault
@@ -68,7 +69,9 @@ def begin(folder: Path, specification: Specification) -> None:
     content = _manifest(specification)
     if manifest.exists():
         there = read_manifest(folder)
-        if {task["name"]: task["hash"] for task in there["tasks"]} != {task.name: task.hash for task in specification.tasks}:
+        made_of = {task["name"]: (task["hash"], canonical(task["replay"])) for task in there["tasks"]}
+        replays = {task.name: task.replay.to_json() if task.replay else None for task in specification.tasks}
+        if made_of != {task.name: (task.hash, canonical(replays[task.name])) for task in specification.tasks}:
             fix = "name another folder with -o, or the specification that this one was made from"
             raise fault("D120", str(folder), f"holds the data set {there['name']!r} of another specification", fix=fix)
     for task in specification.tasks:

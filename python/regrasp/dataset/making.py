@@ -14,10 +14,10 @@ from pathlib import Path
 
 from .._arguments import StrPath
 from .._errors import InputError
-from .blocks import Block, Result, blocks_of
-from .folder import begin, problem_of, remove_temporary, shards_in, write_whole
+from .blocks import Block, Result, blocks_of, content_key
+from .folder import about_of, begin, problem_of, remove_temporary, shards_in, write_whole
 from .pool import Lost, Outcome, Pool, Retried
-from .specification import Specification
+from .specification import Specification, TaskSpec
 
 Say = Callable[[str], object]
 
@@ -74,7 +74,8 @@ def make(
         say(f"removed {n_left} unfinished files of a run that was cut off")
     made = Made()
     blocks = blocks_of(specification)
-    missing = list(_missing(place, blocks, made, say))
+    shorter: dict[Block, Path] = {}
+    missing = list(_missing(place, specification, blocks, shorter, made, say))
     if made.done_before:
         say(f"{made.done_before} of {len(blocks)} shards are there already")
     # More workers than blocks would only wait.
@@ -89,6 +90,8 @@ def make(
             say(f"episodes {name} could not be made: {outcome.reason}")
         else:
             write_whole(place / block.path, outcome.shard)
+            if block in shorter:
+                shorter[block].unlink(missing_ok=True)
             _log(place, block, outcome)
             progress.add(block, outcome)
     made.elapsed = time.monotonic() - progress.began
@@ -107,21 +110,57 @@ def _outcomes(
     return Pool(specification.tasks, n_workers or 1, memory).run(missing)
 
 
-def _missing(folder: Path, blocks: list[Block], made: Made, say: Say) -> Iterator[Block]:
-    """Blocks without a whole shard; says what else is wrong."""
+def _missing(
+    folder: Path, specification: Specification, blocks: list[Block], shorter: dict[Block, Path], made: Made, say: Say
+) -> Iterator[Block]:
+    """Blocks without a whole shard; says what else is wrong. Where more episodes were made before, those stay; where fewer
+    were, their shards are noted in `shorter`: the new ones take their place."""
     known = {folder / block.path for block in blocks}
+    others: dict[str, list[Path]] = {}
+    for path in shards_in(folder):
+        if path not in known:
+            others.setdefault(_begin(path), []).append(path)
     for block in blocks:
         problem = problem_of(folder, block)
+        other = _of_other_length(others.get(_begin(folder / block.path), []), specification.tasks[block.task], block)
+        if other is not None:
+            path, count = other
+            known.add(path)
+            if problem is None:
+                # A run was cut off between writing the one and removing the other.
+                (path if count < block.count else folder / block.path).unlink()
+            elif count < block.count:
+                shorter[block] = path
+            else:
+                problem = None
         if problem is None:
             made.done_before += 1
             continue
         if problem:
             say(f"D121 {folder / block.path}: {problem}; it is made again")
         yield block
-    for path in shards_in(folder):
+    for path in (path for paths in others.values() for path in paths):
         if path not in known:
             made.foreign.append(path)
             say(f"D122 {path}: is no shard of this data set; it is left alone and not counted")
+
+
+def _begin(path: Path) -> str:
+    """Folder and first episode of a shard, by its name."""
+    return str(path.parent / path.name.split("-")[0])
+
+
+def _of_other_length(paths: list[Path], task: TaskSpec, block: Block) -> tuple[Path, int] | None:
+    """The one of these shards that holds more or fewer of the episodes that `block` begins with, and how many."""
+    for path in paths:
+        try:
+            about = about_of(path)
+        except ValueError:
+            continue
+        count: int = about["count"]
+        if about["content_key"] == content_key(task, block.first, count):
+            return path, count
+    return None
 
 
 def _log(folder: Path, block: Block, result: Result) -> None:

@@ -9,11 +9,14 @@ use std::sync::Arc;
 /// Files by the path at which they were found. While files are kept no other file is read.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct KeptFiles {
+    /// By paths without detours.
     files: BTreeMap<PathBuf, KeptFile>,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct KeptFile {
+    /// Where it was found.
+    path: PathBuf,
     /// How the file that names it spells it.
     name: String,
     bytes: Arc<[u8]>,
@@ -22,7 +25,7 @@ struct KeptFile {
 impl KeptFiles {
     /// Keeps `bytes` as the file at `path`, which another file names `name`.
     pub fn insert(&mut self, path: PathBuf, name: String, bytes: Vec<u8>) {
-        self.files.insert(without_detours(&path), KeptFile { name, bytes: bytes.into() });
+        self.files.insert(without_detours(&path), KeptFile { path, name, bytes: bytes.into() });
     }
 
     /// True when there is a file at `path`.
@@ -42,10 +45,9 @@ impl KeptFiles {
     ///
     /// Errors: it was not kept (`U101`).
     pub(crate) fn resolve(&self, name: &str, model: &Path, place: Place) -> Result<Resolved, Diagnostic> {
-        let beside = model.parent().unwrap_or(Path::new("")).join(name);
-        let by_name = || self.files.iter().find(|(_, file)| file.name == name).map(|(path, _)| path.clone());
-        let path = if self.contains(&beside) { Some(without_detours(&beside)) } else { by_name() };
-        path.map(|path| Resolved { path, notes: Vec::new() }).ok_or_else(|| {
+        let beside = without_detours(&model.parent().unwrap_or(Path::new("")).join(name));
+        let file = self.files.get(&beside).or_else(|| self.files.values().find(|file| file.name == name));
+        file.map(|file| Resolved { path: file.path.clone(), notes: Vec::new() }).ok_or_else(|| {
             let problem = format!("\"{name}\" is not one of the files that were kept with the scene");
             Diagnostic::new("U101", place, problem).fix("read the scene again from its files")
         })
@@ -80,7 +82,10 @@ mod tests {
         assert_eq!(find("hand.urdf").unwrap().path, Path::new("a/hand.urdf"));
         assert_eq!(find("package://hand/tip.stl").unwrap().path, Path::new("b/tip.stl"));
         assert_eq!(kept.read(Path::new("b/tip.stl")).unwrap(), b"tip");
-        // A robot may name the hand of another folder.
+        // A robot may name the hand of another folder; the path is told as it was found.
+        kept.insert("a/../c/hand.toml".into(), "hand.toml".into(), b"hand".to_vec());
+        let find = |name: &str| kept.resolve(name, Path::new("a/hand.toml"), Place::file("a/hand.toml"));
+        assert_eq!(find("../c/hand.toml").unwrap().path, Path::new("a/../c/hand.toml"));
         assert_eq!(find("../c/./../b/tip.stl").unwrap().path, Path::new("b/tip.stl"));
         assert_eq!(find("other.urdf").unwrap_err().code, "U101");
         assert_eq!(kept.read(Path::new("Cargo.toml")).unwrap_err().diagnostics[0].code, "F001");
