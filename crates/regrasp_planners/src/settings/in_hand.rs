@@ -12,6 +12,8 @@ const LEAST_STEP: f64 = 1e-5;
 const LEAST_JOINT_STEP: f64 = 1e-4;
 /// Most `candidates` and `candidates_kept`.
 const MOST_CANDIDATES: usize = 10_000;
+/// Largest `wander_distance`, in metres: farther than any hand reaches, and steps are tried all along it.
+const MOST_WANDERING: f64 = 1.0;
 
 /// Settings of [`crate::plan_in_hand`]. In files they have no groups: every key stands by itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -97,6 +99,10 @@ impl InHandSettings {
                 return Err(format!("{name} is {value}; it must be at most {MOST_CANDIDATES}"));
             }
         }
+        if self.search.wander_distance > MOST_WANDERING {
+            let value = self.search.wander_distance;
+            return Err(format!("wander_distance is {value}; it must be at most {MOST_WANDERING} m"));
+        }
         if let Some(FirstTry { clearance, .. }) = self.search.first_try
             && !(clearance > 0.0 && clearance < 0.1)
         {
@@ -162,6 +168,7 @@ mod tests {
             (r#"{"forces": {"squeeze_weight": 0}}"#, "forces.squeeze_weight is 0; it must be above 0 and at most 1000"),
             (r#"{"speed": {"largest_speed": 0}}"#, "speed.largest_speed is 0; it must be between 0.000001 and 1000000"),
             (r#"{"step": 3e-9}"#, "step is 0.000000003; it must be at least 0.00001"),
+            (r#"{"wander_distance": 1e10}"#, "wander_distance is 10000000000; it must be at most 1 m"),
             (r#"{"candidates": 2147483647}"#, "candidates is 2147483647; it must be at most 10000"),
             (r#"{"speed": {"ramp": -1}}"#, "speed.ramp is -1; it must be between 0 and 60 seconds"),
         ] {

@@ -70,8 +70,8 @@ pub struct SearchSettings {
     pub release_rule: ReleaseRule,
     /// A first search that asks for more clearance and a larger margin; `null` for none.
     pub first_try: Option<FirstTry>,
-    /// How far the object may deviate from the straight path from start to goal, in metres. By measurement on
-    /// allegro/box_y: 20 mm solves more within a work limit than 12 or 30.
+    /// How far the object may deviate from the straight path from start to goal, in metres; at most 1. By measurement
+    /// on allegro/box_y: 20 mm solves more within a work limit than 12 or 30.
     pub wander_distance: f64,
     /// How far the object may turn away from that path: standard deviation in radians. Origin: measurements on a
     /// prototype.
