@@ -1,5 +1,6 @@
 //! Scene files as text: a hand, an object, turns about axes of the world.
 
+use regrasp_base::toml_table::too_deep;
 use regrasp_base::{Diagnostic, InputError, Place};
 use regrasp_geometry::Pose;
 use std::fmt::Write;
@@ -104,6 +105,9 @@ pub fn object_of_scene(
     renamed: impl Fn(&str) -> String,
 ) -> Result<Table, InputError> {
     let fail = |code, problem: String| InputError::from(Diagnostic::new(code, Place::file(path), problem));
+    if too_deep(text).is_some() {
+        return Err(fail("S100", "opens more brackets than any scene does".into()));
+    }
     let document: Table = toml::from_str(text).map_err(|error| fail("S100", error.message().to_owned()))?;
     let is_called = |table: &&Table| name.is_none_or(|name| table.get("name").and_then(Value::as_str) == Some(name));
     let several = document.get("objects").and_then(Value::as_array);

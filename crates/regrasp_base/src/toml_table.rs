@@ -49,8 +49,9 @@ pub struct Found<'a> {
 /// Most brackets that are open at once. The parser calls itself for each, and takes broken files for deeper than they are.
 const MAX_OPEN: usize = 128;
 
-/// Where more than [`MAX_OPEN`] brackets are open, those in strings and comments among them.
-fn too_deep(text: &str) -> Option<usize> {
+/// Where more than 128 brackets are open, those in strings and comments among them. Whoever gives a text to the parser by itself asks this
+/// first: the parser's own limit does not hold for broken files, and an overflow of the stack ends the whole program.
+pub fn too_deep(text: &str) -> Option<usize> {
     let mut n_open = 0usize;
     text.bytes().position(|byte| {
         match byte {

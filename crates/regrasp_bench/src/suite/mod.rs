@@ -10,6 +10,7 @@ pub mod rows;
 /// What a paper found, and whether our rows confirm it.
 pub mod verdicts;
 
+use regrasp_base::toml_table::too_deep;
 use regrasp_base::{Diagnostic, InputError, Place};
 use regrasp_planners::in_hand::Alpha;
 use regrasp_planners::{InHandSettings, TrackingSettings};
@@ -300,8 +301,10 @@ impl Figure {
 
 /// True when the file at `path` says that it is a suite.
 pub fn is_suite(path: &Path) -> bool {
-    let says_so =
-        |text: String| text.parse::<toml::Table>().ok()?.get("format").map(|format| format.as_str() == Some(FORMAT));
+    let says_so = |text: String| match too_deep(&text) {
+        Some(_) => None,
+        None => text.parse::<toml::Table>().ok()?.get("format").map(|format| format.as_str() == Some(FORMAT)),
+    };
     path.extension().is_some_and(|extension| extension == "toml")
         && regrasp_base::files::read_text(path).ok().and_then(says_so) == Some(true)
 }
@@ -312,6 +315,12 @@ pub fn is_suite(path: &Path) -> bool {
 /// make no sense (`B602`), all of them.
 pub fn read(path: &Path) -> Result<Suite, InputError> {
     let text = regrasp_base::files::read_text(path)?;
+    if let Some(at) = too_deep(&text) {
+        let problem = "opens more brackets than any suite does";
+        return Err(Diagnostic::new("B600", Place::at_offset(path, &text, at), problem)
+            .fix("close every [ and { where its list or table ends")
+            .into());
+    }
     let suite: Suite = toml::from_str(&text).map_err(|error| {
         let place = Place::at_offset(path, &text, error.span().map_or(0, |span| span.start));
         Diagnostic::new("B600", place, error.message().trim().replace('\n', "; "))

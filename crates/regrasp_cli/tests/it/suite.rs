@@ -89,3 +89,16 @@ fn suites_stand_alone_and_their_faults_are_told_with_their_place() {
     assert!(run.code == Some(2) && run.err.contains("missing.toml"), "{run:?}");
     assert!(!folder.path("results/rows.csv.partial").exists(), "nothing was begun");
 }
+
+#[test]
+fn a_file_of_open_brackets_is_refused_whoever_reads_it_first() {
+    // Both ways in: a file that `bench` asks whether it is a suite, and one that says so. The parser overflowed its stack on the first.
+    let folder = Folder::new();
+    let broken =
+        "turn = { axis = \"x\", angle_deg = 90 0.1\n\n[start]\nposition = [0.0, 0.0, 0.078]\n\n[goal]\n".repeat(10_000);
+    for head in ["format = \"regrasp-scene\"\n[goal]\n", "format = \"regrasp-suite\"\n[goal]\n"] {
+        folder.write("deep.toml", &format!("{head}{broken}"));
+        let run = folder.run(&["bench", "deep.toml"]);
+        assert!(run.code == Some(2) && run.err.contains("brackets"), "{run:?}");
+    }
+}
