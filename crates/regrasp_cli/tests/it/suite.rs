@@ -97,7 +97,7 @@ fn a_file_of_open_brackets_is_refused_whoever_reads_it_first() {
     let broken =
         "turn = { axis = \"x\", angle_deg = 90 0.1\n\n[start]\nposition = [0.0, 0.0, 0.078]\n\n[goal]\n".repeat(10_000);
     for head in ["format = \"regrasp-scene\"\n[goal]\n", "format = \"regrasp-suite\"\n[goal]\n"] {
-        folder.write("deep.toml", &format!("{head}{broken}"));
+        folder.write("deep.toml", format!("{head}{broken}"));
         let run = folder.run(&["bench", "deep.toml"]);
         assert!(run.code == Some(2) && run.err.contains("brackets"), "{run:?}");
     }
