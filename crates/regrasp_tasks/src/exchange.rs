@@ -1,16 +1,20 @@
 //! Where one hand gives the object to another one (Saut 2010, sec. V-C).
 
+/// One hand by itself at an exchange.
+mod alone;
+
 use crate::context::{Context, Grasp};
-use crate::failing::{Stage, Tally};
-use crate::forces;
+use crate::failing::Tally;
 use crate::line::{LINE_STEPS, are_states_free, is_state_free, is_way_free, straight};
-use crate::station::{arm_postures, can_close, common_postures, with_fingers};
+use crate::station::{can_close, common_postures, with_fingers};
 use crate::timing::Smooth;
+use alone::{Alone, At};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 use regrasp_arms::model::ArmModel;
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp_lists::pairs::are_hands_apart;
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 /// Postures of one arm that are looked at.
@@ -29,7 +33,7 @@ const WAY_SHARES: [f64; 2] = [1.0, 0.4];
 pub enum Effort {
     /// The best places alone: another pair of grasps may be easier.
     Little,
-    /// All places, then drawn ones.
+    /// All other places, then drawn ones, after a look with little effort.
     Full,
 }
 
@@ -53,6 +57,10 @@ pub struct Give {
 pub struct Places {
     positions: Vec<Point>,
     turns: Vec<UnitQuaternion<f64>>,
+    /// What is known of each hand by itself at these places.
+    alone: Alone,
+    /// How near pairs of grasps came with little effort, by the index of the reason.
+    reached: BTreeMap<[[usize; 2]; 2], usize>,
 }
 
 /// Where the shoulder of a hand's arm is at the start.
@@ -99,7 +107,7 @@ impl Places {
             .map(|(_, at)| at)
             .filter(|at| context.fixed.is_ball_free(at, radius))
             .take(context.settings.exchange_places);
-        Places { positions: positions.collect(), turns: turns() }
+        Places { positions: positions.collect(), turns: turns(), alone: Alone::default(), reached: BTreeMap::new() }
     }
 
     /// Positions of the object's centre of mass, the best first.
@@ -109,13 +117,15 @@ impl Places {
 
     /// Where the object comes with one grasp each. Err with a reason.
     pub fn give(
-        &self,
+        &mut self,
         context: &Context,
         [giver, taker]: [[usize; 2]; 2],
         effort: Effort,
         tally: &mut Tally,
     ) -> Result<Give, &'static str> {
-        let mut attempt = Attempt::new(context, giver, taker);
+        let Places { positions, turns, alone, reached } = self;
+        let mut attempt = Attempt::new(context, giver, taker, alone);
+        attempt.reached = reached.get(&[giver, taker]).copied().unwrap_or(0);
         let shoulders = [giver, taker].map(|[hand, _]| shoulder(context, hand));
         let grasps = [giver, taker].map(|[hand, grasp]| &context.hands[hand].grasps[grasp]);
         // How natural an orientation is at a place: the directions in which the hands come, and from the shoulders to the object.
@@ -130,16 +140,19 @@ impl Places {
             let position = at.coords - turn * context.object.center_of_mass.coords;
             Pose::from_parts(Translation3::from(position), *turn)
         };
-        let (n_places, n_draws) = match effort {
-            Effort::Little => (LITTLE_PLACES, 0),
-            Effort::Full => (self.positions.len(), context.settings.exchange_draws),
+        let n_little = LITTLE_PLACES.min(positions.len());
+        let (places, n_draws) = match effort {
+            Effort::Little => (0..n_little, 0),
+            Effort::Full => (n_little..positions.len(), context.settings.exchange_draws),
         };
-        for at in self.positions.iter().take(n_places) {
-            let mut ranked: Vec<(f64, &UnitQuaternion<f64>)> =
-                self.turns.iter().map(|turn| (natural(at, turn), turn)).collect();
+        for place in places {
+            let at = &positions[place];
+            let mut ranked: Vec<(f64, usize)> =
+                turns.iter().enumerate().map(|(index, turn)| (natural(at, turn), index)).collect();
             ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-            for (_, turn) in ranked.iter().take(context.settings.exchange_turns) {
-                if let Some(give) = attempt.at(&pose(at, turn), &context.query.start, tally) {
+            for &(_, turn) in ranked.iter().take(context.settings.exchange_turns) {
+                let pose = (&pose(at, &turns[turn]), Some([place, turn]));
+                if let Some(give) = attempt.at(pose, &context.query.start, tally) {
                     return Ok(give);
                 }
             }
@@ -147,18 +160,18 @@ impl Places {
         // Drawn about the best places.
         let index = ((giver[0] * 1009 + giver[1]) * 1009 + taker[0]) * 1009 + taker[1];
         let mut rng = Rng::keyed(context.seed, "exchange", index as u64);
-        if self.positions.is_empty() {
+        if positions.is_empty() {
             return Err("without a free place");
         }
         let hands = [giver[0], taker[0]];
         for draw in 0..n_draws {
-            let middle = &self.positions[draw % self.positions.len().min(8)];
+            let middle = &positions[draw % positions.len().min(8)];
             let spread = context.settings.exchange_spread;
             let shift = Vector::new(rng.normal(), rng.normal(), rng.normal()) * spread;
             let at = middle + shift;
             let best = (0..4)
                 .map(|_| {
-                    let turn = self.turns[rng.below(self.turns.len())];
+                    let turn = turns[rng.below(turns.len())];
                     let bend = Vector::new(rng.normal(), rng.normal(), rng.normal()) * TURN_SPREAD;
                     let turn = UnitQuaternion::from_scaled_axis(bend) * turn;
                     (natural(&at, &turn), turn)
@@ -167,12 +180,14 @@ impl Places {
             let Some((_, turn)) = best else { continue };
             let commons = common_postures(context, &hands, &context.query.start, COMMON_DRAWS, &mut rng);
             for common in &commons {
-                if let Some(give) = attempt.at(&pose(&at, &turn), common, tally) {
+                if let Some(give) = attempt.at((&pose(&at, &turn), None), common, tally) {
                     return Ok(give);
                 }
             }
         }
-        Err(REASONS[attempt.reached])
+        let nearest = attempt.reached;
+        reached.insert([giver, taker], nearest);
+        Err(REASONS[nearest])
     }
 }
 
@@ -187,21 +202,22 @@ pub fn is_double_grasp(context: &Context, giver: [usize; 2], taker: [usize; 2]) 
 }
 
 /// Why an exchange fails, from far to near.
-const REASONS: [&str; 7] = [
+const REASONS: [&str; 6] = [
     "out of reach",
     "in collision",
     "without a way of the taker",
     "with a taker that cannot close",
     "with a giver that cannot open",
     "without a way of the giver",
-    "that do not hold the weight",
 ];
 
 /// One pair of grasps.
-struct Attempt<'c, 'a> {
+struct Attempt<'c, 'a, 'p> {
     context: &'c Context<'a>,
     giver: [usize; 2],
     taker: [usize; 2],
+    /// What is known of each hand by itself.
+    alone: &'p mut Alone,
     /// Both hands closed, with the object; made when it is needed.
     model: Option<Rc<ArmModel>>,
     /// The taker before the exchange, the giver after it: that hand open.
@@ -210,31 +226,28 @@ struct Attempt<'c, 'a> {
     reached: usize,
 }
 
-impl<'c, 'a> Attempt<'c, 'a> {
-    fn new(context: &'c Context<'a>, giver: [usize; 2], taker: [usize; 2]) -> Self {
-        Attempt { context, giver, taker, model: None, open: [None, None], reached: 0 }
+impl<'c, 'a, 'p> Attempt<'c, 'a, 'p> {
+    fn new(context: &'c Context<'a>, giver: [usize; 2], taker: [usize; 2], alone: &'p mut Alone) -> Self {
+        Attempt { context, giver, taker, alone, model: None, open: [None, None], reached: 0 }
     }
 
-    /// The exchange with the object at a pose, with the common joints of `common`.
-    fn at(&mut self, world_from_object: &Pose, common: &[f64], tally: &mut Tally) -> Option<Give> {
+    /// The exchange with the object at a pose, with the common joints of `common`. `at` names poses of the set.
+    fn at(&mut self, (world_from_object, at): (&Pose, Option<At>), common: &[f64], tally: &mut Tally) -> Option<Give> {
         let context = self.context;
-        let [giver, taker] = [self.giver, self.taker].map(|[hand, grasp]| (hand, &context.hands[hand].grasps[grasp]));
         tally.work(1);
+        let hands = [self.giver, self.taker];
+        let mut by_itself = |own| {
+            let states = self.alone.states(context, own, (world_from_object, at), common, tally);
+            self.reached = self.reached.max(states.as_ref().as_ref().err().copied().unwrap_or(0));
+            states
+        };
+        let first = by_itself(hands[0]);
+        let first = first.as_ref().as_ref().ok()?;
+        let second = by_itself(hands[1]);
+        let second = second.as_ref().as_ref().ok()?;
+        let [giver, taker] = hands.map(|[hand, grasp]| (hand, &context.hands[hand].grasps[grasp]));
         let both =
             with_fingers(context, &with_fingers(context, common, giver.0, &giver.1.closed), taker.0, &taker.1.closed);
-        let target = |(hand, grasp): (usize, &Grasp)| (hand, world_from_object * grasp.object_from_hand);
-        let (hand, pose) = target(giver);
-        let first = arm_postures(context, hand, &both, &pose, POSTURES)
-            .map_err(|(by, words)| tally.miss(Stage::Exchange, by, || words))
-            .ok()?;
-        let (hand, pose) = target(taker);
-        let second = arm_postures(context, hand, &both, &pose, POSTURES)
-            .map_err(|(by, words)| tally.miss(Stage::Exchange, by, || words))
-            .ok()?;
-        let holds = |(hand, grasp)| forces::holds(context, hand, grasp, world_from_object);
-        if !holds(giver) || !holds(taker) {
-            return None;
-        }
         self.reached = self.reached.max(1);
         let free = &context.arms_and_torso;
         let model = self.model.get_or_insert_with(|| {
@@ -242,10 +255,11 @@ impl<'c, 'a> Attempt<'c, 'a> {
             Rc::new(ArmModel::new(context.robot, &context.covers.links, &[attached], &both, free))
         });
         let model = Rc::clone(model);
-        let arm = context.hands[taker.0].arm_joints.clone();
+        let arms = [giver.0, taker.0].map(|hand| context.hands[hand].arm_joints.clone());
         let with_second = |first: &Vec<f64>, second: &Vec<f64>| {
-            let mut at = first.clone();
-            at[arm.clone()].copy_from_slice(&second[arm.clone()]);
+            let mut at = both.clone();
+            at[arms[0].clone()].copy_from_slice(&first[arms[0].clone()]);
+            at[arms[1].clone()].copy_from_slice(&second[arms[1].clone()]);
             at
         };
         let all: Vec<Vec<f64>> =

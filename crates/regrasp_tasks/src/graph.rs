@@ -1,5 +1,7 @@
 //! The task graph: who holds the object by which grasp, or where it lies. Edges are tested when the cheapest path uses them.
 
+mod cheapest;
+
 use crate::context::Context;
 use crate::exchange::{Effort, Give, Places, is_double_grasp};
 use crate::failing::{Stage, Tally};
@@ -119,6 +121,10 @@ struct Graph<'c, 'a> {
     /// How often places were drawn.
     rounds: usize,
     tested: usize,
+    /// By node, what the cheapest way to the goal costs at least.
+    to_goal: Vec<f64>,
+    /// How many nodes searches looked at since then.
+    n_looked: usize,
 }
 
 /// The cheapest plan that holds what it promises.
@@ -218,6 +224,8 @@ impl<'c, 'a> Graph<'c, 'a> {
             failed_gives: 0,
             rounds: 1,
             tested: 0,
+            to_goal: Vec::new(),
+            n_looked: 0,
         }
     }
 
@@ -304,65 +312,6 @@ impl<'c, 'a> Graph<'c, 'a> {
                 let alive = changes.filter(|(_, changed)| !changed.known.is_dead());
                 let cost = |changed: &Changed| changed.cost + change + STUCK * changed.stuck as f64;
                 into.extend(alive.map(|((_, [hand, after]), changed)| (self.first_held[*hand] + after, cost(changed))));
-            }
-        }
-    }
-
-    /// By node: no way from it to the goal costs less.
-    fn least(&self) -> Vec<f64> {
-        let mut least = vec![f64::INFINITY; self.n_nodes];
-        let alive = |grip: &Grip| if grip.known.is_dead() { f64::INFINITY } else { grip.cost };
-        let own = |[hand, grasp]: [usize; 2]| self.grips.get(1).map_or(f64::INFINITY, |of| alive(&of[hand][grasp]));
-        let held = |index: usize| match self.node(index) {
-            Node::Held(held) => own(held),
-            Node::Lies(_) => f64::INFINITY,
-        };
-        let last = (self.places.len()..self.n_nodes).map(held).fold(f64::INFINITY, f64::min);
-        for (index, least) in least.iter_mut().enumerate() {
-            *least = match self.node(index) {
-                Node::Lies(_) => GRIP_SECONDS + last,
-                Node::Held(held) => own(held).min(GRIP_SECONDS.min(GIVE_SECONDS) + last),
-            };
-        }
-        least[self.index(Node::Lies(1))] = 0.0;
-        least
-    }
-
-    /// The cheapest path from the start to the goal through edges that are not dead (A*: Hart, Nilsson, Raphael 1968).
-    fn cheapest(&self) -> Option<Vec<Node>> {
-        const NONE: usize = usize::MAX;
-        let goal = self.index(Node::Lies(1));
-        let least = self.least();
-        let mut costs = vec![f64::INFINITY; self.n_nodes];
-        let mut before = vec![NONE; self.n_nodes];
-        let mut is_done = vec![false; self.n_nodes];
-        costs[self.index(Node::Lies(0))] = 0.0;
-        let mut edges = Vec::new();
-        loop {
-            let mut nearest = (f64::INFINITY, NONE);
-            for (node, &cost) in costs.iter().enumerate() {
-                if cost + least[node] < nearest.0 && !is_done[node] {
-                    nearest = (cost + least[node], node);
-                }
-            }
-            let (_, node) = nearest;
-            if node == NONE {
-                return None;
-            }
-            is_done[node] = true;
-            if node == goal {
-                let mut path = vec![node];
-                while before[path[path.len() - 1]] != NONE {
-                    path.push(before[path[path.len() - 1]]);
-                }
-                return Some(path.into_iter().rev().map(|index| self.node(index)).collect());
-            }
-            let cost = costs[node];
-            self.edges(self.node(node), &mut edges);
-            for &(to, of_edge) in &edges {
-                if cost + of_edge < costs[to] && !is_done[to] {
-                    (costs[to], before[to]) = (cost + of_edge, node);
-                }
             }
         }
     }

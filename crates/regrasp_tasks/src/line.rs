@@ -147,11 +147,13 @@ fn keeps_limits(model: &ArmModel, track: &Track) -> bool {
     (0..4).all(|k| model.is_within_limits(&control(k), 1e-9))
 }
 
-fn collider<'c>(context: &Context, model: &'c ArmModel, world: &'c World) -> Collider<'c> {
+/// Tests of a robot in a world, with the clearance that the task keeps.
+pub fn collider<'c>(context: &Context, model: &'c ArmModel, world: &'c World) -> Collider<'c> {
     let settings = ColliderSettings { clearance: context.settings.clearance, ..ColliderSettings::default() };
     Collider::new(model, world, settings)
 }
 
-fn count(collider: &Collider, tally: &mut Tally) {
+/// Counts the work of a test.
+pub fn count(collider: &Collider, tally: &mut Tally) {
     tally.work(8 * collider.counts.blocks + collider.counts.exact);
 }

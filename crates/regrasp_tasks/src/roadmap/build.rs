@@ -124,7 +124,7 @@ fn exchanges(
         };
         pairs.sort_by(|a, b| score(b).total_cmp(&score(a)).then(a.cmp(b)));
         let n_fit = pairs.iter().take_while(|pair| (0..2).all(|k| fits[k][pair[k]])).count();
-        let places = Places::new(context, hands);
+        let mut places = Places::new(context, hands);
         let mut used = hands.map(|hand| vec![0usize; context.hands[hand].grasps.len()]);
         let (mut n_found, mut n_tried) = (0, 0);
         let mut is_tried = vec![false; pairs.len()];
