@@ -128,6 +128,10 @@ fn main() {
 }
 
 fn settings_with(direction: Vector) -> IkSettings {
-    let preference = Some(Preference { tip_axis_in_base: UnitVector::new_normalize(direction), weight: 1.0 });
+    let preference = Some(Preference {
+        tip_axis_in_base: UnitVector::new_normalize(direction),
+        weight: 1.0,
+        largest_share: f64::INFINITY,
+    });
     IkSettings { preference, ..IkSettings::default() }
 }

@@ -11,10 +11,11 @@ const PREFERENCE_WEIGHT: f64 = 1.0;
 
 /// What is asked of the inverse kinematics of a finger that touches with `normal_in_world`.
 pub fn ik_settings(model: &Model, finger: usize, normal_in_world: UnitVector) -> IkSettings {
-    let preference = model.fingers[finger]
-        .ik
-        .is_redundant()
-        .then_some(Preference { tip_axis_in_base: -normal_in_world, weight: PREFERENCE_WEIGHT });
+    let preference = model.fingers[finger].ik.is_redundant().then_some(Preference {
+        tip_axis_in_base: -normal_in_world,
+        weight: PREFERENCE_WEIGHT,
+        largest_share: f64::INFINITY,
+    });
     IkSettings { limit_margin: model.settings.limit_margin, preference, max_step: model.settings.joint_step }
 }
 

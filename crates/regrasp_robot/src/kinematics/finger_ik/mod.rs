@@ -38,6 +38,8 @@ pub struct Preference {
     pub tip_axis_in_base: UnitVector,
     /// Share of the full correction made in each step, `0..=1`.
     pub weight: f64,
+    /// Longest way of the joints for it, as a multiple of their way to the target: infinite where it is not bounded.
+    pub largest_share: f64,
 }
 
 /// What is asked of a solution besides reaching the target.

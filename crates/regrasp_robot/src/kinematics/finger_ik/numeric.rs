@@ -576,12 +576,21 @@ fn free_step<const N: usize>(
         if curvature > 1e-12 && gain > 0.0 {
             let length = wish.weight * gain / curvature;
             let length = length.min(LONGEST_STEP / longest_of(&projected));
+            let length = if wish.largest_share.is_finite() {
+                length.min(wish.largest_share * norm_of(&step) / norm_of(&projected))
+            } else {
+                length
+            };
             for k in 0..N {
                 step[k] += length * projected[k];
             }
         }
     }
     Some(step)
+}
+
+fn norm_of<const N: usize>(step: &[f64; N]) -> f64 {
+    step.iter().map(|change| change * change).sum::<f64>().sqrt()
 }
 
 fn longest_of<const N: usize>(step: &[f64; N]) -> f64 {
