@@ -5,12 +5,15 @@ use super::choice::{any_drive, any_waypoint, pick, pick_waypoint, waypoints_mut}
 use regrasp_base::Rng;
 use regrasp_geometry::Vector;
 use regrasp_plan::check::between::Between;
-use regrasp_plan::check::model::CheckedHand;
+use regrasp_plan::check::model::{CheckedHand, FingerModel};
 use regrasp_plan::check::violation::ViolationKind::{
     ContactOffTip, JointAcceleration, JointTooFast, NotANumber, PromiseBroken, TimeOrder, TooFast,
     VelocityInconsistent, WrongScene,
 };
 use regrasp_plan::plan::{ContactMode, Plan, Segment, SegmentKind, Waypoint};
+
+/// A step between waypoints is looked at in so many parts.
+const PARTS: u32 = 64;
 
 impl Breeder<'_> {
     pub(super) fn break_times(&mut self) {
@@ -66,14 +69,16 @@ impl Breeder<'_> {
         self.add("a step too fast", &[TooFast], |plan, rng| {
             let (s, w) = pick_step(plan, rng)?;
             let (from, to) = (&plan.segments[s].waypoints[w], &plan.segments[s].waypoints[w + 1]);
-            let way = longest_way(model, from, to);
+            let way = longest_way(model, &from.joints, &to.joints);
             let span = way / (plan.promises.motion.largest_speed * rng.uniform(1.01, 1.2));
             let gone = to.time - from.time - span;
             shift_after(plan, s, w, -gone);
             (way > 1e-4 && gone > 0.0).then_some(())
         });
         self.add("speed promised below the motion's", &[TooFast], |plan, rng| {
-            let speed = |(from, to): (&Waypoint, &Waypoint)| longest_way(model, from, to) / (to.time - from.time);
+            let speed = |(from, to): (&Waypoint, &Waypoint)| {
+                longest_way(model, &from.joints, &to.joints) / (to.time - from.time)
+            };
             let fastest = steps(plan).map(speed).fold(0.0, f64::max);
             plan.promises.motion.largest_speed = fastest * rng.uniform(0.9, 0.999);
             (fastest > 1e-6).then_some(())
@@ -190,13 +195,18 @@ impl Breeder<'_> {
             (at_waypoints > 1e-6 && between > 1.02 * at_waypoints).then_some(())
         });
         self.add("fingertip too fast between waypoints only", &[TooFast], |plan, rng| {
-            let speed = |(from, to): (&Waypoint, &Waypoint)| longest_way(model, from, to) / (to.time - from.time);
-            let (mean, peak) = steps(plan)
-                .map(|(from, to)| (speed((from, to)), Between::new(from, to).sigma().largest_slope()))
-                .fold((0.0, 0.0), |best: (f64, f64), step| if step.0 > best.0 { step } else { best });
-            // The way along the chord is nearly even.
-            plan.promises.motion.largest_speed = mean * (1.0 + (peak - 1.0) * rng.uniform(0.1, 0.7));
-            (mean > 1e-6 && peak > 1.1).then_some(())
+            let (mut mean, mut peak): (f64, f64) = (0.0, 0.0);
+            for (from, to) in steps(plan) {
+                let motion = Between::new(from, to);
+                let moments: Vec<Vec<f64>> =
+                    (0..=PARTS).map(|i| motion.joints_at(f64::from(i) / f64::from(PARTS))).collect();
+                let span = to.time - from.time;
+                mean = mean.max(longest_way(model, &from.joints, &to.joints) / span);
+                let ways = moments.windows(2).map(|pair| longest_way(model, &pair[0], &pair[1]));
+                peak = peak.max(ways.fold(0.0, f64::max) * f64::from(PARTS) / span);
+            }
+            plan.promises.motion.largest_speed = mean + (peak - mean) * rng.uniform(0.1, 0.9);
+            (mean > 1e-6 && peak > 1.02 * mean).then_some(())
         });
         let expected = [ContactOffTip, JointAcceleration, VelocityInconsistent];
         self.add("velocity with which a fingertip leaves its contact", &expected, |plan, rng| {
@@ -250,12 +260,10 @@ fn shift_from(plan: &mut Plan, s: usize, by: f64) {
     plan.segments[s..].iter_mut().for_each(late);
 }
 
-fn longest_way(model: &CheckedHand, from: &Waypoint, to: &Waypoint) -> f64 {
-    let ways = model
-        .fingers
-        .iter()
-        .map(|finger| (finger.center_in_world(&to.joints) - finger.center_in_world(&from.joints)).norm());
-    ways.fold(0.0, f64::max)
+/// The longest way of a fingertip from one posture to another.
+fn longest_way(model: &CheckedHand, from: &[f64], to: &[f64]) -> f64 {
+    let way = |finger: &FingerModel| (finger.center_in_world(to) - finger.center_in_world(from)).norm();
+    model.fingers.iter().map(way).fold(0.0, f64::max)
 }
 
 fn mean(from: &Waypoint, to: &Waypoint, k: usize) -> f64 {

@@ -37,9 +37,9 @@ const SETTLED: f64 = 1.0;
 /// fixed, as the tip rolls with it.
 const PREFERENCE_WEIGHT: f64 = 0.2;
 /// Longest way of a redundant finger's joints towards that direction, as a multiple of their way to the contact. Unbounded, a finger
-/// whose tip sees the direction poorly swings a joint to and fro by 0.3 rad a step. Measured on 175 motions of an Allegro hand: 0.2,
-/// 0.5 and 1 solve 152, 154 and 157, unbounded 144.
-const PREFERENCE_SHARE: f64 = 0.5;
+/// whose tip sees the direction poorly swings a joint to and fro by 0.3 rad a step. Measured on 175 motions of an Allegro hand: with 2
+/// transfers reverse often, with 1 no more; 0.2, 0.5 and 1 solve 152, 154 and 157, unbounded 144.
+const PREFERENCE_SHARE: f64 = 1.0;
 
 /// Corrections of a step by the slip seen over its halves.
 const CORRECTIONS: usize = 3;
