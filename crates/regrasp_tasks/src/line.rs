@@ -5,7 +5,7 @@ use crate::failing::Tally;
 use crate::timing::Smooth;
 use regrasp_arms::model::ArmModel;
 use regrasp_arms::motion::{ColliderSettings, Track};
-use regrasp_arms::times::TimedPath;
+use regrasp_arms::times::{TimedPath, TimedPoint};
 use regrasp_arms::{Collider, World};
 use regrasp_geometry::{Pose, Vector};
 use regrasp_robot::manipulator::layout::Part;
@@ -124,13 +124,13 @@ pub fn is_lift_free(
 fn is_free(collider: &mut Collider, timed: &TimedPath) -> bool {
     let model = collider.model;
     let own = |values: &[f64]| model.configuration_of(values);
-    timed.points.windows(2).all(|pair| {
-        let [a, b] = pair else { return false };
-        let velocities = [own(&a.velocities), own(&b.velocities)];
-        let ends = [own(&a.joints), own(&b.joints)];
-        let track = Track::cubic(&ends[0], &ends[1], [&velocities[0], &velocities[1]], b.time - a.time);
-        keeps_limits(model, &track) && collider.is_certified_free(&track)
-    })
+    let track = |pair: &[TimedPoint]| {
+        let velocities = [0, 1].map(|end| own(&pair[end].velocities));
+        let ends = [0, 1].map(|end| own(&pair[end].joints));
+        Track::cubic(&ends[0], &ends[1], [&velocities[0], &velocities[1]], pair[1].time - pair[0].time)
+    };
+    let tracks: Vec<Track> = timed.points.windows(2).map(track).collect();
+    tracks.iter().all(|track| keeps_limits(model, track)) && collider.are_certified_free(&tracks)
 }
 
 /// True where a cubic stays within all limits: it lies in the hull of its Bernstein coefficients.

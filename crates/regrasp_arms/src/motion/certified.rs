@@ -2,7 +2,8 @@
 //!
 //! A motion is cut into intervals. In the middle of an interval every ball is grown by how far it can move within half of it:
 //! where the grown balls meet nothing, the whole interval is free. Intervals that meet something are cut in two. The bound is the
-//! speed in the middle times the half, plus half of the largest acceleration times its square. Eight intervals are looked at together.
+//! speed in the middle times the half, plus half of the largest acceleration times its square. Eight intervals are looked at together,
+//! of one motion or of several.
 
 use super::{Collider, Track};
 use crate::lanes::{F8, LANES};
@@ -15,24 +16,26 @@ const FIRST_WAY: f32 = 0.3;
 /// First intervals at most.
 const MOST_FIRST: usize = 64;
 
+/// Part of a track: moments within `half` of `middle`.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Interval {
+    track: u32,
+    middle: f32,
+    half: f32,
+}
+
 impl Collider<'_> {
     #[inline(always)]
-    pub(super) fn certified(&mut self, track: &Track) -> bool {
-        self.counts.motions += 1;
-        if !track.coefficients.iter().flatten().all(|c| c.is_finite()) {
-            return false;
+    pub(super) fn certified(&mut self, tracks: &[Track]) -> bool {
+        self.counts.motions += tracks.len() as u64;
+        if tracks.is_empty() || !tracks.iter().all(Track::is_finite) {
+            return tracks.is_empty();
         }
-        let fastest = self.prepare(track);
-        let n = ((fastest / FIRST_WAY / LANES as f32).ceil() as usize * LANES).clamp(LANES, MOST_FIRST);
-        let half = 0.5 / n as f32;
-        // The last ones are taken first: spread over the whole motion.
-        self.intervals.clear();
-        for offset in 0..n / LANES {
-            self.intervals.extend((0..LANES).map(|l| [(2 * (l * n / LANES + offset) + 1) as f32 * half, half]));
-        }
+        let fastest = self.prepare(tracks);
+        self.first_intervals(tracks.len(), fastest);
         while !self.intervals.is_empty() {
             let n_lanes = self.intervals.len().min(LANES);
-            let mut lanes = [[0.0; 2]; LANES];
+            let mut lanes = [Interval::default(); LANES];
             for lane in 0..LANES {
                 lanes[lane] = match lane < n_lanes {
                     true => self.intervals[self.intervals.len() - n_lanes + lane],
@@ -43,33 +46,56 @@ impl Collider<'_> {
             let (mut middles, mut halves) = (F8::ZERO, F8::ZERO);
             for l in 0..LANES {
                 // The middles of intervals are rounded.
-                (middles.0[l], halves.0[l]) = (lanes[l][0], lanes[l][1] + 2e-7);
+                (middles.0[l], halves.0[l]) = (lanes[l].middle, lanes[l].half + 2e-7);
             }
+            let all = lanes.map(|lane| &tracks[lane.track as usize]);
             for k in 0..self.q.len() {
-                (self.q[k], self.rates[k]) = track.lanes(k, middles);
+                (self.q[k], self.rates[k]) = Track::lanes(all, k, middles);
             }
             let Some(undecided) = self.undecided::<true>(halves, n_lanes) else { return false };
             for lane in (0..n_lanes).filter(|lane| undecided >> lane & 1 == 1) {
-                let [middle, half] = lanes[lane];
+                let Interval { track, middle, half } = lanes[lane];
                 let is_last = half * fastest < self.settings.least_step as f32 || half < 1e-6;
-                if is_last && !self.is_interval_exactly_free(track, lanes[lane]) {
+                if is_last && !self.is_interval_exactly_free(all[lane], [middle, half]) {
                     return false;
                 }
                 if is_last {
                     continue;
                 }
-                let quarter = 0.5 * half;
-                self.intervals.extend([[middle - quarter, quarter], [middle + quarter, quarter]]);
+                let half = 0.5 * half;
+                self.intervals.extend([middle - half, middle + half].map(|middle| Interval { track, middle, half }));
             }
         }
         true
     }
 
-    /// How fast bodies move at most; fills in speeds of pairs and bounds of accelerations.
+    /// The intervals that are looked at first, of so many tracks: whole blocks of them, none in which a body moves far.
+    fn first_intervals(&mut self, n_tracks: usize, fastest: f32) {
+        let of_way = (fastest / FIRST_WAY).ceil() as usize;
+        let n = of_way.max(LANES.div_ceil(n_tracks)).min(MOST_FIRST);
+        let n = if n_tracks == 1 { n.next_multiple_of(LANES) } else { n };
+        let half = 0.5 / n as f32;
+        let of =
+            |index: usize| Interval { track: (index / n) as u32, middle: (2 * (index % n) + 1) as f32 * half, half };
+        // The last ones are taken first: spread over all motions.
+        let stride = (n * n_tracks).div_ceil(LANES);
+        self.intervals.clear();
+        for offset in 0..stride {
+            let spread = (0..LANES).map(|l| l * stride + offset).filter(|&index| index < n * n_tracks);
+            self.intervals.extend(spread.map(of));
+        }
+    }
+
+    /// How fast bodies move at most in any of the tracks; fills in speeds of pairs and bounds of accelerations.
     #[inline(always)]
-    fn prepare(&mut self, track: &Track) -> f32 {
+    fn prepare(&mut self, tracks: &[Track]) -> f32 {
         let n = self.model.dimension();
-        let largest: Vec<[f32; 2]> = (0..n).map(|k| track.largest(k)).collect();
+        let largest: Vec<[f32; 2]> = (0..n)
+            .map(|k| {
+                let larger = |a: [f32; 2], b: [f32; 2]| [a[0].max(b[0]), a[1].max(b[1])];
+                tracks.iter().map(|track| track.largest(k)).fold([0.0; 2], larger)
+            })
+            .collect();
         self.find_speeds(|k| largest[k][0]);
         // How fast all joints turn together.
         let mut pace = 0.0;

@@ -87,7 +87,7 @@ pub struct Collider<'a> {
     pairs: Vec<u32>,
     /// Bodies that are tested against obstacles.
     exposed: Vec<u32>,
-    intervals: Vec<[f32; 2]>,
+    intervals: Vec<certified::Interval>,
     single: single::Memory,
 }
 
@@ -152,8 +152,13 @@ impl<'a> Collider<'a> {
 
     /// True where no body meets another one or an obstacle at any moment of the motion. What is not decided counts as collision.
     pub fn is_certified_free(&mut self, track: &Track) -> bool {
+        self.are_certified_free(std::slice::from_ref(track))
+    }
+
+    /// The same for all of some motions: sooner than one by one where they are short.
+    pub fn are_certified_free(&mut self, tracks: &[Track]) -> bool {
         let arch = self.arch;
-        arch.dispatch(Certified { collider: self, track })
+        arch.dispatch(Certified { collider: self, tracks })
     }
 }
 
@@ -191,7 +196,7 @@ impl pulp::NullaryFnOnce for Unfree<'_, '_, '_> {
 /// As [`Sampled`].
 struct Certified<'c, 'a, 't> {
     collider: &'c mut Collider<'a>,
-    track: &'t Track,
+    tracks: &'t [Track],
 }
 
 impl pulp::NullaryFnOnce for Certified<'_, '_, '_> {
@@ -199,6 +204,6 @@ impl pulp::NullaryFnOnce for Certified<'_, '_, '_> {
 
     #[inline(always)]
     fn call(self) -> bool {
-        self.collider.certified(self.track)
+        self.collider.certified(self.tracks)
     }
 }

@@ -1,6 +1,6 @@
 //! Motions: straight, or cubic.
 
-use crate::lanes::F8;
+use crate::lanes::{F8, LANES};
 
 /// A motion of all coordinates along one parameter from 0 to 1: the cubic `c0 + c1 t + c2 t^2 + c3 t^3` of each.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,12 +40,22 @@ impl Track {
         [most(&first), most(&second)]
     }
 
-    /// Values and derivatives of coordinate `k` at eight moments.
+    /// True where no coefficient is infinite or not a number.
+    pub(crate) fn is_finite(&self) -> bool {
+        self.coefficients.iter().flatten().all(|c| c.is_finite())
+    }
+
+    /// Values and derivatives of coordinate `k` at eight moments, each of its own track.
     #[inline(always)]
-    pub(crate) fn lanes(&self, k: usize, t: F8) -> (F8, F8) {
-        let [c0, c1, c2, c3] = self.coefficients[k].map(|c| c as f32);
-        let value = ((t * c3 + c2) * t + c1) * t + c0;
-        let rate = (t * (3.0 * c3) + 2.0 * c2) * t + c1;
+    pub(crate) fn lanes(tracks: [&Track; LANES], k: usize, t: F8) -> (F8, F8) {
+        let mut c = [F8::ZERO; 4];
+        for l in 0..LANES {
+            for power in 0..4 {
+                c[power].0[l] = tracks[l].coefficients[k][power] as f32;
+            }
+        }
+        let value = ((t * c[3] + c[2]) * t + c[1]) * t + c[0];
+        let rate = (t * (c[3] * 3.0) + c[2] * 2.0) * t + c[1];
         (value, rate)
     }
 }
