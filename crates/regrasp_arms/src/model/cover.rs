@@ -6,6 +6,7 @@ use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Point, Pose, Shape, Vector};
 use regrasp_robot::Robot;
 use regrasp_robot::hand::convex_of;
+use std::ops::Range;
 
 /// A ball in the frame of its link.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,6 +22,8 @@ pub struct CoverBall {
 pub struct LinkCover {
     /// Balls that together contain all shapes.
     pub balls: Vec<CoverBall>,
+    /// Groups of balls that lie together: a ball about each, and which those are.
+    pub groups: Vec<(CoverBall, Range<usize>)>,
     /// A ball about all balls: centre and radius.
     pub bound: (Point, f64),
     /// The shapes.
@@ -40,6 +43,7 @@ impl LinkCover {
         };
         LinkCover {
             balls: self.balls.iter().map(ball).collect(),
+            groups: self.groups.iter().map(|(bound, balls)| (ball(bound), balls.clone())).collect(),
             bound: (parent_from_own * self.bound.0, self.bound.1),
             shapes: self.shapes.iter().map(shape).collect(),
             is_exact: self.is_exact,
@@ -73,7 +77,35 @@ pub fn cover(shapes: &[PlacedShape]) -> LinkCover {
         balls.extend(cover_shape(&placed.shape).into_iter().map(place));
     }
     let is_exact = shapes.iter().all(|placed| matches!(placed.shape, Shape::Sphere { .. }));
-    LinkCover { bound: ball_about(&balls), balls, shapes, is_exact }
+    let bound = ball_about(&balls);
+    let groups = grouped(&mut balls);
+    LinkCover { bound, balls, groups, shapes, is_exact }
+}
+
+/// Balls of one group at most.
+const GROUP: usize = 8;
+
+/// Puts balls in an order in which those that lie together follow each other, halved along the longest side of their centres' box
+/// until groups are small.
+fn grouped(balls: &mut [CoverBall]) -> Vec<(CoverBall, Range<usize>)> {
+    let mut groups = Vec::new();
+    let mut pending = Vec::from_iter((!balls.is_empty()).then_some(0..balls.len()));
+    while let Some(range) = pending.pop() {
+        let own = &mut balls[range.clone()];
+        if own.len() <= GROUP {
+            let (center, radius) = ball_about(own);
+            groups.push((CoverBall { center, radius }, range));
+            continue;
+        }
+        let corner = |of: fn(&Vector, &Vector) -> Vector| {
+            own.iter().map(|ball| ball.center.coords).reduce(|a, b| of(&a, &b)).unwrap_or_else(Vector::zeros)
+        };
+        let axis = (corner(Vector::sup) - corner(Vector::inf)).imax();
+        own.sort_by(|a, b| a.center[axis].total_cmp(&b.center[axis]));
+        let middle = range.start + own.len() / 2;
+        pending.extend([middle..range.end, range.start..middle]);
+    }
+    groups
 }
 
 /// Balls that contain `shape`, in its frame.
@@ -169,6 +201,29 @@ pub fn ball_about(balls: &[CoverBall]) -> (Point, f64) {
 mod tests {
     use super::*;
     use regrasp_base::Rng;
+
+    #[test]
+    fn groups_hold_each_ball_once() {
+        let mut rng = Rng::keyed(4, "groups", 0);
+        for n in [0, 1, 8, 9, 16, 17, 300] {
+            let mut balls: Vec<CoverBall> = (0..n)
+                .map(|_| {
+                    let center = Point::from(Vector::from_fn(|_, _| rng.uniform(-0.3, 0.3)));
+                    CoverBall { center, radius: rng.uniform(0.01, 0.05) }
+                })
+                .collect();
+            let groups = grouped(&mut balls);
+            let mut next = 0;
+            for (bound, range) in &groups {
+                assert_eq!(range.start, next);
+                assert!((1..=GROUP).contains(&range.len()));
+                next = range.end;
+                let far = balls[range.clone()].iter().map(|ball| (ball.center - bound.center).norm() + ball.radius);
+                assert!(far.fold(0.0, f64::max) <= bound.radius + 1e-12);
+            }
+            assert_eq!(next, n);
+        }
+    }
 
     #[test]
     fn covers_contain_their_shapes() {

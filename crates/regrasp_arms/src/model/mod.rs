@@ -54,6 +54,15 @@ pub struct Ball {
     pub radius: f32,
 }
 
+/// Balls of one body that lie together.
+#[derive(Debug, Clone)]
+pub struct BallGroup {
+    /// A ball about them, in the frame of the body.
+    pub bound: Ball,
+    /// Which they are, in [`ArmModel::balls`].
+    pub balls: Range<usize>,
+}
+
 /// A link: rigid, with the balls that cover it.
 #[derive(Debug, Clone)]
 pub struct Body {
@@ -69,6 +78,8 @@ pub struct Body {
     pub bound: Ball,
     /// Its balls, in [`ArmModel::balls`].
     pub balls: Range<usize>,
+    /// Groups of its balls, in [`ArmModel::groups`].
+    pub groups: Range<usize>,
     /// Its shapes, placed in its frame.
     pub shapes: Vec<PlacedShape>,
     /// True where the shapes are the balls.
@@ -116,6 +127,8 @@ pub struct ArmModel {
     pub bodies: Vec<Body>,
     /// Balls of all bodies.
     pub balls: Vec<Ball>,
+    /// Groups of balls of all bodies.
+    pub groups: Vec<BallGroup>,
     /// Pairs of bodies that have to be apart.
     pub pairs: Vec<Pair>,
     /// True where all shapes are balls.
@@ -156,6 +169,7 @@ impl ArmModel {
             frames: Vec::new(),
             bodies: Vec::new(),
             balls: Vec::new(),
+            groups: Vec::new(),
             pairs: Vec::new(),
             is_exact: true,
             state: state.to_vec(),
@@ -259,6 +273,12 @@ impl ArmModel {
         let first = self.balls.len();
         let ball = |center: &Point, radius: f64| Ball { center: single(&center.coords), radius: radius as f32 };
         self.balls.extend(balls.iter().map(|of_body| ball(&of_body.center, of_body.radius)));
+        let about = |center: Point, radius: f64| ball(&center, radius * (1.0 + 1e-6) + 1e-7);
+        let first_group = self.groups.len();
+        self.groups.extend(cover.groups.iter().map(|(bound, balls)| BallGroup {
+            bound: about(frame_from_link * bound.center, bound.radius),
+            balls: first + balls.start..first + balls.end,
+        }));
         let placed = |own: &PlacedShape| PlacedShape {
             parent_from_shape: frame_from_link * own.parent_from_shape,
             shape: own.shape.clone(),
@@ -268,8 +288,9 @@ impl ArmModel {
             link,
             attached: None,
             frame: *frame,
-            bound: ball(&center, radius * (1.0 + 1e-6) + 1e-7),
+            bound: about(center, radius),
             balls: first..self.balls.len(),
+            groups: first_group..self.groups.len(),
             shapes: cover.shapes.iter().map(placed).collect(),
             is_exact: cover.is_exact,
             speed: Vec::new(),

@@ -154,26 +154,33 @@ impl Collider<'_> {
                 if !item.overlap(&center, reach).any_positive() {
                     continue;
                 }
-                self.place_balls(body);
-                let range = self.model.bodies[body].balls.clone();
                 let (mut grown, mut bare) = (F8::splat(-1.0), F8::splat(-1.0));
-                for index in range {
-                    let (radius, center) = (self.model.balls[index].radius, &self.balls[index]);
-                    let reach = sway + radius;
-                    let mut overlap = item.overlap(center, reach);
-                    if let Item::Other { exact, .. } = item
-                        && overlap.any_positive()
-                    {
-                        // The body's shapes decide, below: one distance each instead of one for each ball.
-                        if !is_exact {
-                            grown = grown.max(overlap);
-                            continue;
-                        }
-                        overlap = Item::refined(exact, center, reach, overlap);
-                    } else {
-                        bare = bare.max(item.overlap(center, F8::splat(radius + clearance - ROUNDING)));
+                self.place_groups(body);
+                for group in self.model.bodies[body].groups.clone() {
+                    let of_group = &self.model.groups[group];
+                    let about = sway + of_group.bound.radius;
+                    if !item.overlap(&self.group_bounds[group], about).any_positive() {
+                        continue;
                     }
-                    grown = grown.max(overlap);
+                    self.place_balls(body, group);
+                    for index in of_group.balls.clone() {
+                        let (radius, center) = (self.model.balls[index].radius, &self.balls[index]);
+                        let reach = sway + radius;
+                        let mut overlap = item.overlap(center, reach);
+                        if let Item::Other { exact, .. } = item
+                            && overlap.any_positive()
+                        {
+                            // The body's shapes decide, below: one distance each instead of one for each ball.
+                            if !is_exact {
+                                grown = grown.max(overlap);
+                                continue;
+                            }
+                            overlap = Item::refined(exact, center, reach, overlap);
+                        } else {
+                            bare = bare.max(item.overlap(center, F8::splat(radius + clearance - ROUNDING)));
+                        }
+                        grown = grown.max(overlap);
+                    }
                 }
                 if STOP && is_exact && bare.any_positive() {
                     return None;
@@ -194,22 +201,26 @@ impl Collider<'_> {
             if !ball_overlap(&self.bounds[a], &self.bounds[b], sway + bound).any_positive() {
                 continue;
             }
-            self.place_balls(a);
-            self.place_balls(b);
-            let (balls_a, balls_b) = (self.model.bodies[a].balls.clone(), self.model.bodies[b].balls.clone());
             let is_exact = self.model.bodies[a].is_exact && self.model.bodies[b].is_exact;
             let (mut grown, mut bare) = (F8::splat(-1.0), F8::splat(-1.0));
-            for i in balls_a {
-                let (radius, center) = (self.model.balls[i].radius, self.balls[i]);
-                let whole = sway + (radius + self.model.bodies[b].bound.radius);
-                if !ball_overlap(&center, &self.bounds[b], whole).any_positive() {
-                    continue;
-                }
-                for j in balls_b.clone() {
-                    let radii = radius + self.model.balls[j].radius;
-                    grown = grown.max(ball_overlap(&center, &self.balls[j], sway + radii));
-                    let bare_reach = F8::splat(radii + clearance - 2.0 * ROUNDING);
-                    bare = bare.max(ball_overlap(&center, &self.balls[j], bare_reach));
+            self.find_close_groups([a, b], sway);
+            for index in 0..self.close_groups.len() {
+                let groups = self.close_groups[index];
+                self.place_balls(a, groups[0]);
+                self.place_balls(b, groups[1]);
+                let bound = &self.model.groups[groups[1]].bound;
+                for i in self.model.groups[groups[0]].balls.clone() {
+                    let (radius, center) = (self.model.balls[i].radius, self.balls[i]);
+                    let whole = sway + (radius + bound.radius);
+                    if !ball_overlap(&center, &self.group_bounds[groups[1]], whole).any_positive() {
+                        continue;
+                    }
+                    for j in self.model.groups[groups[1]].balls.clone() {
+                        let radii = radius + self.model.balls[j].radius;
+                        grown = grown.max(ball_overlap(&center, &self.balls[j], sway + radii));
+                        let bare_reach = F8::splat(radii + clearance - 2.0 * ROUNDING);
+                        bare = bare.max(ball_overlap(&center, &self.balls[j], bare_reach));
+                    }
                 }
             }
             if STOP && is_exact && bare.any_positive() {

@@ -162,16 +162,29 @@ impl Collider<'_> {
         Placement { rotation: Matrix3::from_columns(&columns), translation: vector(&frame.origin) }
     }
 
-    /// Places the balls of a body, once in a block.
+    /// Places the middles of the groups of a body's balls, once in a block.
     #[inline(always)]
-    pub(super) fn place_balls(&mut self, body: usize) {
+    pub(super) fn place_groups(&mut self, body: usize) {
         if self.placed[body] == self.block {
             return;
         }
         self.placed[body] = self.block;
         let of_model = &self.model.bodies[body];
         let frame = of_model.frame.map_or(&FrameBlock::WORLD, |frame| &self.frames[frame]);
-        for index in of_model.balls.clone() {
+        for index in of_model.groups.clone() {
+            self.group_bounds[index] = frame.point(&self.model.groups[index].bound.center);
+        }
+    }
+
+    /// Places the balls of a group of a body, once in a block.
+    #[inline(always)]
+    pub(super) fn place_balls(&mut self, body: usize, group: usize) {
+        if self.placed_groups[group] == self.block {
+            return;
+        }
+        self.placed_groups[group] = self.block;
+        let frame = self.model.bodies[body].frame.map_or(&FrameBlock::WORLD, |frame| &self.frames[frame]);
+        for index in self.model.groups[group].balls.clone() {
             self.balls[index] = frame.point(&self.model.balls[index].center);
         }
     }

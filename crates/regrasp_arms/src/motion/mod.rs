@@ -70,12 +70,17 @@ pub struct Collider<'a> {
     /// How far each body may move until the next moment that is looked at.
     sways: Vec<F8>,
     balls: Vec<V8>,
-    /// By body: the block in which its balls were placed last.
+    group_bounds: Vec<V8>,
+    /// By body: the block in which the bounds of its groups were placed last.
     placed: Vec<u64>,
+    /// By group: the block in which its balls were placed last.
+    placed_groups: Vec<u64>,
     block: u64,
     /// By body: obstacles that a motion may meet.
     near: Vec<Vec<u32>>,
     found: Vec<u32>,
+    /// Groups of two bodies that may meet.
+    close_groups: Vec<[usize; 2]>,
     /// Pairs that may meet in a motion.
     close: Vec<u32>,
     /// By body and pair: metres per unit of the motion's parameter.
@@ -109,10 +114,13 @@ impl<'a> Collider<'a> {
             bounds: vec![[F8::ZERO; 3]; n],
             sways: vec![F8::ZERO; n],
             balls: vec![[F8::ZERO; 3]; model.balls.len()],
+            group_bounds: vec![[F8::ZERO; 3]; model.groups.len()],
             placed: vec![0; n],
+            placed_groups: vec![0; model.groups.len()],
             block: 0,
             near: vec![Vec::new(); n],
             found: Vec::new(),
+            close_groups: Vec::new(),
             close: Vec::new(),
             body_speeds: vec![0.0; n],
             pair_speeds: vec![0.0; model.pairs.len()],

@@ -179,22 +179,29 @@ impl Collider<'_> {
         if !item.overlap(center, F8::splat(radius)).any_positive() {
             return false;
         }
-        self.place_balls(body);
-        let range = self.model.bodies[body].balls.clone();
+        self.place_groups(body);
         let mut worst = F8::splat(-1.0);
         let is_exact = self.model.bodies[body].is_exact;
-        for index in range {
-            let center = &self.balls[index];
-            let reach = F8::splat(self.model.balls[index].radius + clearance);
-            let mut overlap = item.overlap(center, reach);
-            // Where the body has shapes, those decide, below: one distance each instead of one for each ball.
-            if let Item::Other { exact, .. } = item
-                && is_exact
-                && overlap.any_positive()
-            {
-                overlap = Item::refined(exact, center, reach, overlap);
+        for group in self.model.bodies[body].groups.clone() {
+            let of_group = &self.model.groups[group];
+            let about = F8::splat(of_group.bound.radius + clearance);
+            if !item.overlap(&self.group_bounds[group], about).any_positive() {
+                continue;
             }
-            worst = worst.max(overlap);
+            self.place_balls(body, group);
+            for index in of_group.balls.clone() {
+                let center = &self.balls[index];
+                let reach = F8::splat(self.model.balls[index].radius + clearance);
+                let mut overlap = item.overlap(center, reach);
+                // Where the body has shapes, those decide, below: one distance each instead of one for each ball.
+                if let Item::Other { exact, .. } = item
+                    && is_exact
+                    && overlap.any_positive()
+                {
+                    overlap = Item::refined(exact, center, reach, overlap);
+                }
+                worst = worst.max(overlap);
+            }
         }
         worst.any_positive()
             && (is_exact || self.near_obstacle(body, obstacle, worst.positive(), F8::splat(clearance)) != 0)
@@ -206,23 +213,52 @@ impl Collider<'_> {
         if !ball_overlap(&self.bounds[a], &self.bounds[b], F8::splat(reach)).any_positive() {
             return false;
         }
-        self.place_balls(a);
-        self.place_balls(b);
-        let (balls_a, balls_b) = (self.model.bodies[a].balls.clone(), self.model.bodies[b].balls.clone());
-        let bound = self.model.bodies[b].bound.radius + clearance;
+        self.find_close_groups([a, b], F8::splat(clearance));
         let mut worst = F8::splat(-1.0);
-        for i in balls_a {
-            let radius = self.model.balls[i].radius;
-            let center = self.balls[i];
-            if !ball_overlap(&center, &self.bounds[b], F8::splat(radius + bound)).any_positive() {
-                continue;
-            }
-            for j in balls_b.clone() {
-                let reach = F8::splat(radius + self.model.balls[j].radius + clearance);
-                worst = worst.max(ball_overlap(&center, &self.balls[j], reach));
+        for index in 0..self.close_groups.len() {
+            let groups = self.close_groups[index];
+            self.place_balls(a, groups[0]);
+            self.place_balls(b, groups[1]);
+            let bound = &self.model.groups[groups[1]].bound;
+            for i in self.model.groups[groups[0]].balls.clone() {
+                let (radius, center) = (self.model.balls[i].radius, self.balls[i]);
+                let whole = F8::splat(radius + bound.radius + clearance);
+                if !ball_overlap(&center, &self.group_bounds[groups[1]], whole).any_positive() {
+                    continue;
+                }
+                for j in self.model.groups[groups[1]].balls.clone() {
+                    let reach = F8::splat(radius + self.model.balls[j].radius + clearance);
+                    worst = worst.max(ball_overlap(&center, &self.balls[j], reach));
+                }
             }
         }
         let is_exact = self.model.bodies[a].is_exact && self.model.bodies[b].is_exact;
         worst.any_positive() && (is_exact || self.near_body([a, b], worst.positive(), F8::splat(clearance)) != 0)
+    }
+
+    /// Pairs of groups of two bodies' balls that are not farther from each other than `sway`.
+    #[inline(always)]
+    pub(super) fn find_close_groups(&mut self, [a, b]: [usize; 2], sway: F8) {
+        self.close_groups.clear();
+        let model = self.model;
+        let groups = [a, b].map(|body| model.bodies[body].groups.clone());
+        self.place_groups(a);
+        self.place_groups(b);
+        let is_one = groups[1].len() == 1;
+        for first in groups[0].clone() {
+            let (radius, center) = (model.groups[first].bound.radius, self.group_bounds[first]);
+            if !is_one {
+                let whole = sway + (radius + model.bodies[b].bound.radius);
+                if !ball_overlap(&center, &self.bounds[b], whole).any_positive() {
+                    continue;
+                }
+            }
+            for second in groups[1].clone() {
+                let reach = sway + (radius + model.groups[second].bound.radius);
+                if ball_overlap(&center, &self.group_bounds[second], reach).any_positive() {
+                    self.close_groups.push([first, second]);
+                }
+            }
+        }
     }
 }
