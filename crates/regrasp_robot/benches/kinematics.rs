@@ -128,10 +128,7 @@ fn main() {
 }
 
 fn settings_with(direction: Vector) -> IkSettings {
-    let preference = Some(Preference {
-        tip_axis_in_base: UnitVector::new_normalize(direction),
-        weight: 1.0,
-        largest_share: f64::INFINITY,
-    });
+    let preference =
+        Some(Preference { tip_axis_in_base: UnitVector::new_normalize(direction), weight: 1.0, damping: 0.0 });
     IkSettings { preference, ..IkSettings::default() }
 }

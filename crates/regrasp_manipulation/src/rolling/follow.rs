@@ -14,7 +14,7 @@ pub fn ik_settings(model: &Model, finger: usize, normal_in_world: UnitVector) ->
     let preference = model.fingers[finger].ik.is_redundant().then_some(Preference {
         tip_axis_in_base: -normal_in_world,
         weight: PREFERENCE_WEIGHT,
-        largest_share: f64::INFINITY,
+        damping: 0.0,
     });
     IkSettings { limit_margin: model.settings.limit_margin, preference, max_step: model.settings.joint_step }
 }

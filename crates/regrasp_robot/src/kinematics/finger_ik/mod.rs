@@ -38,8 +38,9 @@ pub struct Preference {
     pub tip_axis_in_base: UnitVector,
     /// Share of the full correction made in each step, `0..=1`.
     pub weight: f64,
-    /// Longest way of the joints for it, as a multiple of their way to the target: infinite where it is not bounded.
-    pub largest_share: f64,
+    /// What a joint's way for it costs, against what is left of the direction: 0 where only the direction counts. With more, joints stay
+    /// where turning them hardly turns the tip that way (Levenberg 1944).
+    pub damping: f64,
 }
 
 /// What is asked of a solution besides reaching the target.

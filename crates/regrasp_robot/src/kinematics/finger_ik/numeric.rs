@@ -574,23 +574,15 @@ fn free_step<const N: usize>(
         let spin = spins.iter().zip(&projected).fold(Vector::zeros(), |sum, (spin, p)| sum + spin * *p);
         let curvature = spin.cross(tip_axis).norm_squared();
         if curvature > 1e-12 && gain > 0.0 {
-            let length = wish.weight * gain / curvature;
+            let way: f64 = projected.iter().map(|change| change * change).sum();
+            let length = wish.weight * gain / (curvature + wish.damping * way);
             let length = length.min(LONGEST_STEP / longest_of(&projected));
-            let length = if wish.largest_share.is_finite() {
-                length.min(wish.largest_share * norm_of(&step) / norm_of(&projected))
-            } else {
-                length
-            };
             for k in 0..N {
                 step[k] += length * projected[k];
             }
         }
     }
     Some(step)
-}
-
-fn norm_of<const N: usize>(step: &[f64; N]) -> f64 {
-    step.iter().map(|change| change * change).sum::<f64>().sqrt()
 }
 
 fn longest_of<const N: usize>(step: &[f64; N]) -> f64 {

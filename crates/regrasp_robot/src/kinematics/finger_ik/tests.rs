@@ -194,8 +194,7 @@ fn success(ik: &FingerIk, n_targets: usize, preference: bool, rng: &mut Rng) -> 
     for _ in 0..n_targets {
         let target = ik.tip(&random_coordinates(ik.chain(), rng));
         let tip_axis_in_base = UnitVector::new_normalize(Vector::from(rng.direction()));
-        let preference =
-            preference.then_some(Preference { tip_axis_in_base, weight: 1.0, largest_share: f64::INFINITY });
+        let preference = preference.then_some(Preference { tip_axis_in_base, weight: 1.0, damping: 0.0 });
         if let Some(found) = ik.solve_random(&target, &IkSettings { preference, ..IkSettings::default() }, rng) {
             check_solution(ik, &target, &found, 0.0);
             n_solved += 1;
@@ -269,11 +268,8 @@ fn the_null_space_turns_the_tip_to_the_preference() {
         let q = random_coordinates(&chain, &mut rng);
         let target = ik.tip(&q);
         let wish = Vector::from(rng.direction());
-        let preference = Some(Preference {
-            tip_axis_in_base: UnitVector::new_normalize(wish),
-            weight: 1.0,
-            largest_share: f64::INFINITY,
-        });
+        let preference =
+            Some(Preference { tip_axis_in_base: UnitVector::new_normalize(wish), weight: 1.0, damping: 0.0 });
         let settings = IkSettings { preference, ..IkSettings::default() };
         let Some(turned) = ik.solve_random(&target, &settings, &mut rng) else { continue };
         let Some(plain) = ik.solve_random(&target, &IkSettings::default(), &mut rng) else { continue };
