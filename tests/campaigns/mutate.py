@@ -223,6 +223,9 @@ def json_mutant(rng, text):
             old = holder[key]
         except (KeyError, IndexError, TypeError):
             continue
+        # An earlier change may have put a text where a list was.
+        if not isinstance(holder, (dict, list)):
+            continue
         draw = rng.random()
         if isinstance(old, (int, float)) and not isinstance(old, bool) and draw < 0.8:
             holder[key] = Raw(number(rng, repr(old)))

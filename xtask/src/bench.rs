@@ -225,6 +225,7 @@ pub fn arms(_: &[String]) -> Outcome {
         ("baxter", "mbm_baxter_both_arms", "sampled_64"),
         ("baxter", "mbm_baxter_both_arms", "in_turn_64"),
         ("baxter", "mbm_baxter_both_arms", "certified"),
+        ("baxter_exact", "mbm_baxter_both_arms", "certified"),
     ];
     for (robot, problems, settings) in rows {
         let folder = out("arms")?.join(robot);
