@@ -185,7 +185,13 @@ class RobotPlan:
         """Judges the plan in its scene, by the checker that knows no planner."""
         return report_of(json.loads(self._native.check(self._scene(scene)._native, level)))
 
+    def load_scene(
+        self, path: StrPath | None = None, *, packages: Mapping[str, StrPath] | None = None, lenient: bool = False
+    ) -> Scene:
+        """The scene that the plan names, or the one in ``path``; packages and lenient as in `load_scene`. Raises `InputError`."""
+        if path is None:
+            path = self._native.find_scene(self.path or "plan.json", os.getcwd())
+        return load_scene(path, packages=packages, lenient=lenient)
+
     def _scene(self, scene: Scene | StrPath | None) -> Scene:
-        if scene is None:
-            scene = self._native.find_scene(self.path or "plan.json", os.getcwd())
-        return scene if isinstance(scene, Scene) else load_scene(scene)
+        return scene if isinstance(scene, Scene) else self.load_scene(scene)

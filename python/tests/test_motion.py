@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -60,3 +61,28 @@ def test_servos_follow_a_motion(moved: regrasp.RobotPlan) -> None:
     assert np.allclose(at(moved.document, moved.times), moved.joints, atol=1e-12)
     report = replay(moved.document, xml)
     assert report.followed, str(report)
+
+
+def test_a_lenient_plan_is_replayed_leniently(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("mujoco")
+    from regrasp.simulate.__main__ import main
+
+    # Like the SRDF of a real robot that names links which its URDF lacks.
+    shutil.copytree(SCENES.parent / "assets", tmp_path / "assets")
+    robot = tmp_path / "assets/robots/two_arms/robot.toml"
+    robot.write_text(robot.read_text().replace('urdf = "body.urdf"', 'urdf = "body.urdf"\nsrdf = "body.srdf"'))
+    pair = '<disable_collisions link1="ghost" link2="nobody" reason="Never"/>'
+    (robot.parent / "body.srdf").write_text(f'<robot name="two_arms">{pair}</robot>')
+    scene = tmp_path / "scenes/two_arms/scene.toml"
+    scene.parent.mkdir(parents=True)
+    shutil.copy(SCENE, scene)
+
+    plan = regrasp.plan_motion(regrasp.load_scene(scene, lenient=True), task="swing")
+    assert isinstance(plan, regrasp.RobotPlan) and plan.report is not None and plan.report.ok
+    path = scene.parent / "plan.json"
+    plan.save(path)
+    assert main([str(path), "--scene", str(scene)]) == 2
+    assert "--lenient" in capsys.readouterr().err
+    with pytest.warns(UserWarning, match="mass"):
+        assert main([str(path), "--scene", str(scene), "--lenient"]) == 0
+    assert "FOLLOWED" in capsys.readouterr().out

@@ -37,7 +37,9 @@ def main(arguments: list[str] | None = None) -> int:
     from .run import simulate
 
     try:
-        moved = load_robot(options.plan, scene=options.scene, packages=dict(options.package), mjcf=options.mjcf)
+        packages = dict(options.package)
+        given: dict[str, Any] = {"scene": options.scene, "packages": packages, "lenient": options.lenient, "mjcf": options.mjcf}
+        moved = load_robot(options.plan, **given)
         if moved is not None:
             return _replay_robot(*moved, options)
         settings = Settings(
@@ -52,7 +54,7 @@ def main(arguments: list[str] | None = None) -> int:
             hold_time=options.hold_time,
             squeeze=options.squeeze,
         )
-        plan, xml = load(options.plan, scene=options.scene, packages=dict(options.package), mjcf=options.mjcf)
+        plan, xml = load(options.plan, **given)
         result = simulate(plan, xml, settings)
     except (PlanError, OSError) as error:
         return _bad_input(str(error))
@@ -170,6 +172,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("plan", type=Path, help="plan file")
     parser.add_argument("--scene", type=Path, help="scene file [default: the one that the plan names]")
     parser.add_argument("--package", type=package, action="append", default=[], metavar="NAME=DIR")
+    parser.add_argument("--lenient", action="store_true", help="leave out what cannot be read in robot files, as regrasp plan --lenient does")
     parser.add_argument("--mjcf", type=Path, metavar="FILE", help="model to use, as written by regrasp export --mjcf")
     parser.add_argument(
         "--controller",

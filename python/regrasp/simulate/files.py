@@ -17,6 +17,7 @@ def load_robot(
     *,
     scene: StrPath | None = None,
     packages: Mapping[str, StrPath] | None = None,
+    lenient: bool = False,
     mjcf: StrPath | None = None,
 ) -> tuple[dict[str, Any], str] | None:
     """The plan of a whole robot in ``path`` and its MuJoCo model; none for plans of another kind.
@@ -38,8 +39,7 @@ def load_robot(
 
     try:
         plan = regrasp.RobotPlan.from_file(path)
-        found = scene if scene is None else regrasp.load_scene(scene, packages=packages)
-        return plan_file, plan.to_mjcf(found)
+        return plan_file, plan.to_mjcf(plan.load_scene(scene, packages=packages, lenient=lenient))
     except regrasp.RegraspError as error:
         raise PlanError(str(error)) from None
 
@@ -49,6 +49,7 @@ def load(
     *,
     scene: StrPath | None = None,
     packages: Mapping[str, StrPath] | None = None,
+    lenient: bool = False,
     mjcf: StrPath | None = None,
 ) -> tuple[Plan, str]:
     """The plan in ``path``, as ``flat`` gives it, and its MuJoCo model: from ``mjcf``, else made from the scene that the plan names.
@@ -65,6 +66,6 @@ def load(
     import regrasp
 
     try:
-        return plan, regrasp.export_mjcf(path, scene=scene, packages=packages)
+        return plan, regrasp.export_mjcf(path, scene=scene, packages=packages, lenient=lenient)
     except regrasp.RegraspError as error:
         raise PlanError(str(error)) from None
