@@ -38,8 +38,8 @@ def main(arguments: list[str] | None = None) -> int:
 
     try:
         packages = dict(options.package)
-        given: dict[str, Any] = {"scene": options.scene, "packages": packages, "lenient": options.lenient, "mjcf": options.mjcf}
-        moved = load_robot(options.plan, **given)
+        files: dict[str, Any] = {"scene": options.scene, "packages": packages, "lenient": options.lenient, "mjcf": options.mjcf}
+        moved = load_robot(options.plan, **files)
         if moved is not None:
             return _replay_robot(*moved, options)
         settings = Settings(
@@ -54,7 +54,7 @@ def main(arguments: list[str] | None = None) -> int:
             hold_time=options.hold_time,
             squeeze=options.squeeze,
         )
-        plan, xml = load(options.plan, **given)
+        plan, xml = load(options.plan, **files)
         result = simulate(plan, xml, settings)
     except (PlanError, OSError) as error:
         return _bad_input(str(error))
