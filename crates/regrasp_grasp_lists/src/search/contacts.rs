@@ -28,6 +28,9 @@ const WIDER: usize = 3;
 /// Places of one sphere that are looked at: nearby places are alike.
 const PER_SPHERE: usize = 8;
 
+/// Two normals with a larger cosine do not oppose each other. By hand.
+const MOST_ALIKE: f64 = 0.0;
+
 /// A frame: where the object is in the hand.
 pub struct Site {
     /// The object's pose in the hand frame.
@@ -73,6 +76,30 @@ impl Candidates {
     pub fn oppose(&mut self, first: &Place) {
         let facing = |place: &Place| place.contact.normal_in_object.dot(&first.contact.normal_in_object);
         self.places.sort_by(|a, b| facing(a).total_cmp(&facing(b)));
+    }
+
+    /// Puts the places first that face those of two other fingers; drops places that no other finger's face.
+    pub fn oppose_all(&mut self, others: &[Candidates]) {
+        let facing = |place: &Place, candidates: &Candidates| {
+            let normal = place.contact.normal_in_object;
+            candidates.places.iter().map(|other| other.contact.normal_in_object.dot(&normal)).fold(1.0, f64::min)
+        };
+        let score = |place: &Place| {
+            let (mut least, mut second) = (1.0f64, 1.0f64);
+            for candidates in others {
+                let value = facing(place, candidates);
+                if value < least {
+                    (least, second) = (value, least);
+                } else {
+                    second = second.min(value);
+                }
+            }
+            (least < MOST_ALIKE).then_some(least + second)
+        };
+        let mut scored: Vec<(f64, Place)> =
+            self.places.iter().filter_map(|place| Some((score(place)?, *place))).collect();
+        scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+        self.places = scored.into_iter().map(|(_, place)| place).collect();
     }
 
     /// The contact at place `k`, if the finger reaches it. None too when it was asked often enough.

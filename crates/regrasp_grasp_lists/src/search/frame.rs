@@ -78,6 +78,10 @@ fn precision(
         }
         others.push(candidates);
     }
+    firsts.oppose_all(&others);
+    if firsts.places.is_empty() {
+        return Err(Miss { reason: Reason::NotClosed, ..miss });
+    }
     workspace.place_object(&site.hand_from_object);
     if !workspace.palm_is_clear() {
         return Err(Miss { reason: Reason::Palm, ..miss });
