@@ -11,16 +11,21 @@ use std::time::Instant;
 /// Name of the page, in the folder of outputs.
 const PAGE: &str = "grasps.md";
 
-/// Name, hand file and further arguments. `{}` stands for the folder of models.
+/// Name, hand file and further arguments. `{}` stands for the folder of models. Two soft jaws resist turning about their line with little
+/// friction, so that their margins are small.
 const HANDS: [(&str, &str, &str); 9] = [
     ("Allegro, right", "assets/hands/allegro_right/hand.toml", ""),
     ("Allegro, left", "{}/hands/allegro/allegro_left.urdf", ""),
-    ("PR2 gripper, soft", "assets/hands/pr2_gripper/hand.toml", "--kind gripper"),
+    ("PR2 gripper, soft", "assets/hands/pr2_gripper/hand.toml", "--kind gripper --margin 0.002"),
     ("Barrett", "assets/hands/barrett/hand.toml", "--kind closing"),
     ("Shadow, right", "assets/hands/shadow_right/hand.toml", ""),
     ("D'Claw, soft", "assets/hands/dclaw/hand.toml", "--torsion-radius 0.005"),
     ("13 joints, right (Saut 2010)", "assets/robots/upper_body/right_hand.toml", ""),
-    ("parallel gripper, soft, ball fingertips", "assets/hands/parallel_gripper/hand.toml", "--kind gripper"),
+    (
+        "parallel gripper, soft, ball fingertips",
+        "assets/hands/parallel_gripper/hand.toml",
+        "--kind gripper --margin 0.002",
+    ),
     ("three fingers, a motor each", "assets/hands/closing_three/hand.toml", "--kind closing"),
 ];
 

@@ -81,8 +81,7 @@ fn refined(prepared: &Prepared, workspace: &mut Workspace, found: &Found, before
         // Large steps first.
         let size = 1.0 - 0.9 * trial as f64 / prepared.settings.refinement_trials as f64;
         let by = Move::draw(&climb.state, prepared.motors.is_some(), size, &mut rng);
-        let Some((state, flatness)) = trial_of(prepared, found, &climb, &by) else { continue };
-        let margin = worth::margin(prepared, &state);
+        let Some((state, flatness, margin)) = trial_of(prepared, found, &climb, &by) else { continue };
         let others = terms(&state, &flatness);
         let is_better =
             margin > climb.margin * LEAST_GAIN || (margin >= climb.margin && others > climb.others + ROUNDING);
@@ -153,15 +152,17 @@ impl Move {
     }
 }
 
-/// A grasp near `climb`, moved.
-fn trial_of(prepared: &Prepared, found: &Found, climb: &Climb, by: &Move) -> Option<(GraspState, Vec<f64>)> {
+/// A grasp near `climb`, moved, with its inverse curvatures and its margin; none where that is smaller.
+fn trial_of(prepared: &Prepared, found: &Found, climb: &Climb, by: &Move) -> Option<(GraspState, Vec<f64>, f64)> {
     let mut state = climb.state.clone();
     let mut flatness = climb.flatness.clone();
     let moves_wrist = by.wrist[0] != Vector::zeros();
     if moves_wrist {
         state.world_from_object = moved(prepared, &state.world_from_object, by.wrist[0], by.wrist[1]);
         if let Some(motors) = &prepared.motors {
-            return closed_again(prepared, motors, found, &state);
+            let (again, flatness) = closed_again(prepared, motors, found, &state)?;
+            let margin = worth::margin(prepared, &again);
+            return Some((again, flatness, margin));
         }
     }
     let fingers: ArrayVec<usize, MAX_FINGERS> = holding(&state).collect();
@@ -187,12 +188,17 @@ fn trial_of(prepared: &Prepared, found: &Found, climb: &Climb, by: &Move) -> Opt
         }
     }
     // Joints come last: contacts that are no better need none.
+    let moves_contacts = by.carries || by.slides.iter().any(Option::is_some);
+    let margin = if moves_contacts { worth::margin(prepared, &state) } else { climb.margin };
+    if margin < climb.margin {
+        return None;
+    }
     for f in fingers {
         if moves_wrist || by.slides[f].is_some() {
             touch(prepared, &mut state, f)?;
         }
     }
-    Some((state, flatness))
+    Some((state, flatness, margin))
 }
 
 /// How far the contact of a finger may move, in metres: a tip radius.
