@@ -215,13 +215,13 @@ pub struct View {
     /// Data of the page, as JSON
     #[arg(long, value_name = "FILE.json", group = "pictures")]
     pub story: Option<PathBuf>,
-    /// Storyboard: key frames in one picture
+    /// Storyboard: key frames in one picture; of a grasp list: some of its grasps
     #[arg(long, value_name = "FILE.png", group = "pictures")]
     pub png: Option<PathBuf>,
     /// Charts: gait, margin, clearance, joints, forces, orientation, each as a file in this folder
     #[arg(long, value_name = "DIR", group = "pictures")]
     pub svg: Option<PathBuf>,
-    /// Key frames of the storyboard
+    /// Key frames of the storyboard, or grasps
     #[arg(long, value_name = "N", default_value_t = 6, requires = "png")]
     pub frames: usize,
     /// Width of the storyboard, in pixels

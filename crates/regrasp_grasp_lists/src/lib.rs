@@ -27,6 +27,8 @@ mod prepared;
 mod record;
 /// Better margins.
 mod refine;
+/// A rough look at collisions.
+mod rough;
 /// Frames in batches, on several threads.
 mod run;
 /// The search in one frame.
@@ -86,8 +88,8 @@ pub fn list_grasps_telling(
     Failure::refuse_many_fingers(&view)?;
     let model = Model::new(&view, &settings.physics());
     refuse_few_fingers(&model)?;
-    let prepared = Prepared::new(&model, settings, seed)?;
-    run::run(&prepared, budget, progress)
+    let threads = run::threads(settings)?;
+    threads.install(|| run::run(&Prepared::new(&model, settings, seed)?, budget, progress))
 }
 
 /// Hand and object by themselves; the hand stands still.

@@ -3,8 +3,10 @@
 use crate::fingers::{SphereLimits, Workspheres, first_finger, meeting_point};
 use crate::frames::Frames;
 use crate::motors::Motors;
+use crate::rough::Rough;
 use crate::settings::GraspSettings;
 use crate::surface::SurfacePoints;
+use rayon::prelude::*;
 use regrasp_geometry::Pose;
 use regrasp_geometry::stable::{self, Standing};
 use regrasp_grasp::list::GraspKind;
@@ -36,6 +38,8 @@ pub struct Prepared<'a> {
     surfaces: Vec<SurfacePoints>,
     /// Which of these is a finger's.
     surface_of: Vec<usize>,
+    /// A rough look at collisions.
+    pub rough: Rough,
     /// Fingers in the order in which they touch.
     pub order: Vec<usize>,
     /// Pose of the grasp frame in the hand frame.
@@ -68,7 +72,7 @@ impl<'a> Prepared<'a> {
         order.extend((0..hand.fingers.len()).filter(|f| *f != first));
         let limits = SphereLimits { most: settings.most_spheres, least_radius: settings.least_sphere };
         let workspaces: Vec<Workspheres> =
-            model.fingers.iter().map(|finger| Workspheres::new(finger.ik, settings.limit_margin, limits)).collect();
+            model.fingers.par_iter().map(|finger| Workspheres::new(finger.ik, settings.limit_margin, limits)).collect();
         let meeting = meeting_point(&workspaces);
         let radii: Vec<f64> = model.fingers.iter().map(|finger| finger.tip_radius).collect();
         let smallest = radii.iter().copied().fold(f64::INFINITY, f64::min).max(0.004);
@@ -121,6 +125,7 @@ impl<'a> Prepared<'a> {
             frames: Frames::new([&low, &high], settings.frames, settings.least_positions),
             hand_from_grasp: Pose::translation(meeting.x, meeting.y, meeting.z),
             standing: stable::stable_poses(&object.shape, &object.center_of_mass, settings.tipping_angle),
+            rough: Rough::new(model),
             model,
             forces,
             settings,

@@ -7,20 +7,23 @@ use crate::motors::Motors;
 use crate::prepared::Prepared;
 use crate::search::worth::{self, holding};
 use crate::{above, way};
+use arrayvec::ArrayVec;
 use nalgebra::{Translation3, UnitQuaternion};
 use regrasp_base::Rng;
 use regrasp_geometry::collision::Placement;
-use regrasp_geometry::{Pose, UnitVector, Vector};
+use regrasp_geometry::surface::SurfacePoint;
+use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 use regrasp_grasp::Contact;
 use regrasp_grasp::list::score::inverse_curvature;
-use regrasp_manipulation::grasp::state::GraspState;
+use regrasp_manipulation::grasp::state::{GraspState, MAX_FINGERS};
 use regrasp_manipulation::rolling::follow::ik_settings;
 use regrasp_manipulation::workspace::{TipMode, Workspace};
 
 /// Farthest that the wrist moves in one trial: metres and radians. By hand.
 const WRIST_STEP: (f64, f64) = (0.006, 0.12);
-/// Share of the trials that move the wrist. By hand.
-const WRIST_SHARE: f64 = 0.3;
+/// Shares of the trials that move the wrist while contacts stay, the wrist with its contacts, all contacts; the others move one contact.
+/// By hand.
+const SHARES: [f64; 3] = [0.15, 0.05, 0.25];
 /// Contacts of sharp tips move by this much at most, in metres.
 const SMALL_TIP: f64 = 0.003;
 /// Terms of the score may fall by this much: rounding.
@@ -77,8 +80,8 @@ fn refined(prepared: &Prepared, workspace: &mut Workspace, found: &Found, before
     for trial in 0..prepared.settings.refinement_trials {
         // Large steps first.
         let size = 1.0 - 0.9 * trial as f64 / prepared.settings.refinement_trials as f64;
-        let Some((state, flatness)) = trial_of(prepared, found, &climb, size, &mut rng) else { continue };
-        let margin = worth::margin(prepared, &state);
+        let by = Move::draw(&climb.state, prepared.motors.is_some(), size, &mut rng);
+        let Some((state, flatness, margin)) = trial_of(prepared, found, &climb, &by) else { continue };
         let others = terms(&state, &flatness);
         let is_better =
             margin > climb.margin * LEAST_GAIN || (margin >= climb.margin && others > climb.others + ROUNDING);
@@ -117,49 +120,100 @@ fn with_way(prepared: &Prepared, workspace: &mut Workspace, climb: Climb) -> Opt
     Some(Climb { way, ..climb })
 }
 
-/// A grasp near `climb`: with the wrist moved, or with one contact moved.
-fn trial_of(
-    prepared: &Prepared,
-    found: &Found,
-    climb: &Climb,
-    size: f64,
-    rng: &mut Rng,
-) -> Option<(GraspState, Vec<f64>)> {
-    let mut state = climb.state.clone();
-    let mut flatness = climb.flatness.clone();
-    if prepared.motors.is_some() || rng.chance(WRIST_SHARE) {
-        let shift = Vector::from(rng.direction()) * (WRIST_STEP.0 * size * rng.unit());
-        let turn = Vector::from(rng.direction()) * (WRIST_STEP.1 * size * rng.unit());
-        state.world_from_object = moved(prepared, &state.world_from_object, shift, turn);
-        if let Some(motors) = &prepared.motors {
-            return closed_again(prepared, motors, found, &state);
+/// How a trial differs from the grasp so far.
+#[derive(Debug, Clone)]
+struct Move {
+    /// Shift and turn of the object in the hand; zero where the wrist stays.
+    wrist: [Vector; 2],
+    /// True if contacts go with the wrist.
+    carries: bool,
+    /// By finger: the angle about the normal at which the contact moves, and how far, in tip radii.
+    slides: ArrayVec<Option<[f64; 2]>, MAX_FINGERS>,
+}
+
+impl Move {
+    fn draw(state: &GraspState, has_motors: bool, size: f64, rng: &mut Rng) -> Self {
+        let mut slides: ArrayVec<Option<[f64; 2]>, MAX_FINGERS> = (0..state.contacts.len()).map(|_| None).collect();
+        let kind = rng.unit();
+        let [stay, carry, all] = SHARES;
+        if has_motors || kind < stay + carry {
+            let shift = Vector::from(rng.direction()) * (WRIST_STEP.0 * size * rng.unit());
+            let turn = Vector::from(rng.direction()) * (WRIST_STEP.1 * size * rng.unit());
+            return Move { wrist: [shift, turn], carries: kind >= stay, slides };
         }
-        for f in 0..state.contacts.len() {
-            if state.holds(f) {
-                touch(prepared, &mut state, f)?;
+        let fingers: ArrayVec<usize, MAX_FINGERS> = holding(state).collect();
+        let one = fingers[rng.below(fingers.len())];
+        for f in fingers {
+            if kind < stay + carry + all || f == one {
+                slides[f] = Some([rng.uniform(0.0, std::f64::consts::TAU), size * rng.unit()]);
             }
         }
-        return Some((state, flatness));
+        Move { wrist: [Vector::zeros(); 2], carries: false, slides }
     }
-    let fingers: Vec<usize> = holding(&state).collect();
-    let which = rng.below(fingers.len());
-    let finger = fingers[which];
-    let radius = prepared.model.fingers[finger].settle_radius.max(SMALL_TIP);
-    let contact = state.contacts[finger];
-    let (x, y) = regrasp_geometry::frame::tangents(&contact.normal_in_object);
-    let angle = rng.uniform(0.0, std::f64::consts::TAU);
-    let aside = x.into_inner() * angle.cos() + y.into_inner() * angle.sin();
-    let object = prepared.model.view.object;
-    let near = object.surface.project(&(contact.point_in_object + aside * (radius * size * rng.unit())));
-    let at = object.surface.settle(&near, prepared.model.fingers[finger].settle_radius)?;
-    let moved_by = (at.point_in_object - found.state.contacts[finger].point_in_object).norm();
-    if moved_by > radius || object.surface.crease_distance(&at) < object.edge_distance {
+}
+
+/// A grasp near `climb`, moved, with its inverse curvatures and its margin; none where that is smaller.
+fn trial_of(prepared: &Prepared, found: &Found, climb: &Climb, by: &Move) -> Option<(GraspState, Vec<f64>, f64)> {
+    let mut state = climb.state.clone();
+    let mut flatness = climb.flatness.clone();
+    let moves_wrist = by.wrist[0] != Vector::zeros();
+    if moves_wrist {
+        state.world_from_object = moved(prepared, &state.world_from_object, by.wrist[0], by.wrist[1]);
+        if let Some(motors) = &prepared.motors {
+            let (again, flatness) = closed_again(prepared, motors, found, &state)?;
+            let margin = worth::margin(prepared, &again);
+            return Some((again, flatness, margin));
+        }
+    }
+    let fingers: ArrayVec<usize, MAX_FINGERS> = holding(&state).collect();
+    for (which, &f) in fingers.iter().enumerate() {
+        let contact = state.contacts[f];
+        let target = match by.slides[f] {
+            Some([angle, share]) => {
+                let (x, y) = regrasp_geometry::frame::tangents(&contact.normal_in_object);
+                let aside = x.into_inner() * angle.cos() + y.into_inner() * angle.sin();
+                Some(contact.point_in_object + aside * (share * farthest(prepared, f)))
+            }
+            None if by.carries => {
+                let in_hand = climb.state.world_from_object * contact.point_in_object;
+                Some(state.world_from_object.inverse_transform_point(&in_hand))
+            }
+            None => None,
+        };
+        if let Some(target) = target {
+            let at = contact_near(prepared, found, f, &target)?;
+            state.contacts[f] = Contact { point_in_object: at.point_in_object, normal_in_object: at.normal_in_object };
+            let curvature = prepared.model.view.object.surface.curvature(&at);
+            flatness[which] = inverse_curvature(curvature, prepared.model.fingers[f].tip_radius);
+        }
+    }
+    // Joints come last: contacts that are no better need none.
+    let moves_contacts = by.carries || by.slides.iter().any(Option::is_some);
+    let margin = if moves_contacts { worth::margin(prepared, &state) } else { climb.margin };
+    if margin < climb.margin {
         return None;
     }
-    state.contacts[finger] = Contact { point_in_object: at.point_in_object, normal_in_object: at.normal_in_object };
-    flatness[which] = inverse_curvature(object.surface.curvature(&at), prepared.model.fingers[finger].tip_radius);
-    touch(prepared, &mut state, finger)?;
-    Some((state, flatness))
+    for f in fingers {
+        if moves_wrist || by.slides[f].is_some() {
+            touch(prepared, &mut state, f)?;
+        }
+    }
+    Some((state, flatness, margin))
+}
+
+/// How far the contact of a finger may move, in metres: a tip radius.
+fn farthest(prepared: &Prepared, finger: usize) -> f64 {
+    prepared.model.fingers[finger].settle_radius.max(SMALL_TIP)
+}
+
+/// Where the tip of `finger` touches near `target`, if that is near enough to where it touched before refinement.
+fn contact_near(prepared: &Prepared, found: &Found, finger: usize, target: &Point) -> Option<SurfacePoint> {
+    let object = prepared.model.view.object;
+    let near = object.surface.project(target);
+    let at = object.surface.settle(&near, prepared.model.fingers[finger].settle_radius)?;
+    let moved_by = (at.point_in_object - found.state.contacts[finger].point_in_object).norm();
+    let is_near = moved_by <= farthest(prepared, finger);
+    (is_near && object.surface.crease_distance(&at) >= object.edge_distance).then_some(at)
 }
 
 /// The hand closed anew where `state` has the object, if no contact moves farther than contacts may.
@@ -171,8 +225,8 @@ fn closed_again(
 ) -> Option<(GraspState, Vec<f64>)> {
     let again = driven::close_again(prepared, motors, state, &state.world_from_object)?;
     let is_near = |f: usize| {
-        let farthest = prepared.model.fingers[f].settle_radius.max(SMALL_TIP);
-        (again.contacts[f].point_in_object - found.state.contacts[f].point_in_object).norm() <= farthest
+        let moved_by = (again.contacts[f].point_in_object - found.state.contacts[f].point_in_object).norm();
+        moved_by <= farthest(prepared, f)
     };
     if !holding(&again).all(is_near) {
         return None;

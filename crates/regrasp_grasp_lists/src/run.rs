@@ -4,6 +4,7 @@
 use crate::found::{Found, Reason};
 use crate::prepared::Prepared;
 use crate::search::frame::{Miss, try_frame};
+use crate::settings::GraspSettings;
 use crate::{record, refine, select};
 use rayon::prelude::*;
 use regrasp_base::{Budget, Interrupt};
@@ -45,14 +46,18 @@ struct Outcome {
     work: u64,
 }
 
-/// Searches, chooses, refines.
+/// The threads of a search.
+pub fn threads(settings: &GraspSettings) -> Result<rayon::ThreadPool, Failure> {
+    rayon::ThreadPoolBuilder::new().num_threads(settings.n_threads.max(1)).build().map_err(|error| {
+        Failure::bare(FailureKind::SettingsInvalid, format!("no threads: {error}"), "ask for fewer threads")
+    })
+}
+
+/// Searches, chooses, refines, on the threads that this is called on.
 pub fn run(prepared: &Prepared, budget: &Budget, progress: &(dyn Fn(Progress) + Sync)) -> Result<GraspList, Failure> {
     let settings = prepared.settings;
-    let threads = rayon::ThreadPoolBuilder::new().num_threads(settings.n_threads.max(1)).build().map_err(|error| {
-        Failure::bare(FailureKind::SettingsInvalid, format!("no threads: {error}"), "ask for fewer threads")
-    })?;
     let mut tally = Tally::default();
-    let (found, mut cut) = threads.install(|| search(prepared, budget, progress, &mut tally));
+    let (found, mut cut) = search(prepared, budget, progress, &mut tally);
     if found.is_empty() {
         return Err(failure(prepared, &tally, cut));
     }
@@ -63,7 +68,7 @@ pub fn run(prepared: &Prepared, budget: &Budget, progress: &(dyn Fn(Progress) + 
         let mut workspace = Workspace::new(prepared.model);
         (refine::finish(prepared, &mut workspace, &found[*index], is_cut), workspace.work, is_cut)
     };
-    let finished: Vec<_> = threads.install(|| chosen.par_iter().map(finish).collect());
+    let finished: Vec<_> = chosen.par_iter().map(finish).collect();
     let mut grasps = Vec::with_capacity(finished.len());
     for (grasp, work, is_cut) in finished {
         tally.work += work;

@@ -125,6 +125,9 @@ fn leaves(
     direction: &Vector,
 ) -> bool {
     let distance = prepared.settings.approach_distance;
+    if prepared.rough.line_hits(prepared.model, open, &state.world_from_object, &(direction * distance)) {
+        return false;
+    }
     let n_steps = (distance / LINE_STEP).ceil().max(1.0) as usize;
     workspace.set_held(&state.world_from_object, open, &state.contacts, 0);
     workspace.is_clear(TipMode::AllHold)

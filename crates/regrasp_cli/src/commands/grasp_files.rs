@@ -12,7 +12,8 @@ use regrasp::grasp::GraspList;
 use regrasp::grasp::list::format::from_json;
 use regrasp::plan::check::GraspReport;
 use regrasp::scene::GraspScene;
-use regrasp::viewer::gallery;
+use regrasp::viewer::gallery::{self, SheetSettings};
+use regrasp::viewer::storyboard::StoryboardSettings;
 use serde_json::json;
 use std::path::Path;
 
@@ -58,16 +59,27 @@ pub fn export(arguments: &args::Export, bytes: &[u8], common: &Common, talk: &Ta
     made.into_iter().try_for_each(|(name, to, bytes)| write(name, to, &bytes, talk))
 }
 
-/// Judges a list, then writes its gallery; one that is rejected gets its page too: it says so.
+/// Judges a list, then writes its gallery and the picture; one that is rejected gets its page too: it says so.
 pub fn view(arguments: &args::View, bytes: &[u8], common: &Common, talk: &Talk) -> Result<(), Stop> {
     let path = &arguments.plan;
-    let pictures = [("--story", &arguments.story), ("--png", &arguments.png), ("--svg", &arguments.svg)];
+    let pictures = [("--story", &arguments.story), ("--svg", &arguments.svg)];
     for (flag, asked) in pictures.into_iter().chain([("--with-roadmap", &arguments.with_roadmap)]) {
         refuse(flag, asked.as_deref(), path)?;
     }
     refuse("SCENE", arguments.scene.as_deref(), path)?;
     let list = from_json(path, bytes)?;
     let (scene, report) = judged(path, &list, common, talk)?;
+    if let Some(to) = &arguments.png {
+        let settings = SheetSettings {
+            grasps: arguments.frames,
+            width: arguments.width,
+            columns: arguments.columns,
+            supersampling: StoryboardSettings::default().supersampling,
+        };
+        let picture = gallery::png(&scene, &list, &settings);
+        let refused = |problem| Stop::argument("A505", "--png", problem, "a picture that fits");
+        write("png", to, &picture.map_err(refused)?, talk)?;
+    }
     match &arguments.output {
         Some(to) => write_gallery(to, &scene, &list, &report, talk),
         None => Ok(()),
@@ -98,7 +110,12 @@ fn refuse(flag: &str, asked: Option<&Path>, list: &Path) -> Result<(), Stop> {
         None => Ok(()),
         Some(_) => {
             let problem = format!("is for plans; {} is a grasp list", list.display());
-            Err(Stop::argument("A512", flag, problem, "-o of view; --isaac, --moveit, --npz or --mjcf of export"))
+            Err(Stop::argument(
+                "A512",
+                flag,
+                problem,
+                "-o and --png of view; --isaac, --moveit, --npz or --mjcf of export",
+            ))
         }
     }
 }

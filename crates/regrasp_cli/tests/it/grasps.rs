@@ -58,6 +58,12 @@ fn a_list_is_made_judged_shown_and_exported() {
     let page = fs::read_to_string(folder.path("gallery.html")).unwrap();
     assert_eq!(page, fs::read_to_string(folder.path("page.html")).unwrap());
     assert_eq!(page.matches("<figure").count(), 6);
+    let small = ["--frames", "2", "--width", "400"];
+    succeeds(folder.run(&[&["view", "grasps.json", "--png", "two.png"], &small[..]].concat()));
+    succeeds(folder.run(&[&["view", "grasps.json", "--png", "again.png"], &small[..]].concat()));
+    let picture = fs::read(folder.path("two.png")).unwrap();
+    assert!(picture.starts_with(b"\x89PNG") && picture.len() > 4_000, "{} bytes", picture.len());
+    assert_eq!(picture, fs::read(folder.path("again.png")).unwrap());
     succeeds(folder.run(&["export", "grasps.json", "--isaac", "i.yaml", "--moveit", "m.yaml", "--npz", "g.npz"]));
     let isaac = fs::read_to_string(folder.path("i.yaml")).unwrap();
     assert!(isaac.contains("format: isaac_grasp") && isaac.matches("confidence:").count() == 6);
@@ -84,7 +90,8 @@ fn broken_lists_and_senseless_arguments_are_refused() {
     is_refused(&["grasps", HAND, SCENE, "--friction-margin", "0.5"], "A503");
     is_refused(&["grasps", HAND, "missing.obj"], "S110");
     is_refused(&["export", "grasps.json", "--ros2", "r.yaml"], "A512");
-    is_refused(&["view", "grasps.json", "--png", "p.png"], "A512");
+    is_refused(&["view", "grasps.json", "--svg", "charts"], "A512");
+    is_refused(&["view", "grasps.json", "--png", "p.png", "--frames", "0"], "A505");
     is_refused(&["check", SCENE, "--hand", HAND], "A512");
     folder.write(
         "other.json",

@@ -78,7 +78,7 @@ fn is_closed(wrenches: &[[f64; 6]]) -> bool {
 fn inner_and_outer_cones_bracket_the_exact_answer() {
     let mut rng = Rng::keyed(1, "polyhedral", 0);
     let (mut n_closed, mut n_open, mut n_between) = (0, 0, 0);
-    for trial in 0..700 {
+    for trial in 0..1_000 {
         let n = 1 + trial % 7;
         let models = models(n, &mut rng);
         let grips = grips(&models, &mut rng);

@@ -17,8 +17,10 @@ const CONE_SHARE: f64 = 0.8;
 const BELOW: f64 = 1e-4;
 /// Steps of bisection for the opening.
 const HALVINGS: usize = 40;
-/// Most steps of Newton's method.
-const MOST_STEPS: usize = 12;
+/// Most steps to the contacts: most take five.
+const MOST_STEPS: usize = 24;
+/// A step that leaves more than this share of the gaps makes no headway. By hand.
+const LEAST_HEADWAY: f64 = 0.6;
 /// Differences, in metres and in units of the motor.
 const DIFFERENCE: f64 = 1e-6;
 /// Gaps below this touch, in metres.
@@ -35,7 +37,7 @@ pub struct Jaws {
 }
 
 /// Joints with the motor at `position`.
-fn joints_at(motors: &Motors, position: f64) -> HandJoints {
+pub fn joints_at(motors: &Motors, position: f64) -> HandJoints {
     let mut joints = motors.rest().clone();
     motors.closing[0].put(&mut joints, position);
     joints
@@ -107,11 +109,22 @@ pub fn close(prepared: &Prepared, motors: &Motors, jaws: &Jaws) -> Option<GraspS
         let (pose, joints) = (pose_at(at.x), joints_at(motors, at.y));
         [0, 1].map(|f| gap(prepared, f, &pose, &joints[f]))
     };
+    let values = |gaps: &[Gap; 2]| Vector2::new(gaps[0].distance, gaps[1].distance);
+    let slopes_at = |at: &Vector2<f64>, value: &Vector2<f64>| {
+        let column = |k: usize| {
+            let mut other = *at;
+            other[k] += DIFFERENCE;
+            (values(&gaps_at(&other)) - value) / DIFFERENCE
+        };
+        Matrix2::from_columns(&[column(0), column(1)])
+    };
+    let [low, high] = [motor.open.min(motor.closed), motor.open.max(motor.closed)];
     let mut at = Vector2::new(0.0, jaws.position);
+    let mut gaps = gaps_at(&at);
+    let mut slopes = slopes_at(&at, &values(&gaps));
+    let mut are_fresh = true;
     for _ in 0..MOST_STEPS {
-        let gaps = gaps_at(&at);
-        let value = Vector2::new(gaps[0].distance, gaps[1].distance);
-        let [low, high] = [motor.open.min(motor.closed), motor.open.max(motor.closed)];
+        let value = values(&gaps);
         if at.x.abs() > LARGEST_SHIFT || !(low..=high).contains(&at.y) {
             return None;
         }
@@ -122,13 +135,22 @@ pub fn close(prepared: &Prepared, motors: &Motors, jaws: &Jaws) -> Option<GraspS
             let fingers = (0..2).map(|f| (Some(contacts[f]), joints[f].clone()));
             return Some(GraspState::of(pose, fingers));
         }
-        let column = |k: usize| {
-            let mut other = at;
-            other[k] += DIFFERENCE;
-            let moved = gaps_at(&other);
-            (Vector2::new(moved[0].distance, moved[1].distance) - value) / DIFFERENCE
-        };
-        at -= Matrix2::from_columns(&[column(0), column(1)]).try_inverse()? * value;
+        let step = -(slopes.try_inverse()? * value);
+        at += step;
+        gaps = gaps_at(&at);
+        let change = values(&gaps) - value;
+        if values(&gaps).amax() > LEAST_HEADWAY * value.amax() {
+            // Fresh slopes that lead nowhere: there is no contact nearby.
+            if are_fresh {
+                return None;
+            }
+            slopes = slopes_at(&at, &values(&gaps));
+            are_fresh = true;
+        } else {
+            // Broyden's update (1965): slopes that explain the last step.
+            slopes += (change - slopes * step) * step.transpose() / step.norm_squared();
+            are_fresh = false;
+        }
     }
     None
 }

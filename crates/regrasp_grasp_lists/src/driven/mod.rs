@@ -16,6 +16,7 @@ use crate::prepared::Prepared;
 use crate::search::worth::{self, holding};
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;
+use regrasp_geometry::collision::Placement;
 use regrasp_grasp::list::GraspKind;
 use regrasp_grasp::list::score::inverse_curvature;
 use regrasp_manipulation::grasp::state::{GraspState, HandJoints};
@@ -33,6 +34,8 @@ pub fn close_in_frame(
     let state = match prepared.settings.kind {
         GraspKind::Gripper => {
             let jaws = gripper::place(prepared, motors, index, rng).ok_or(fail(Reason::TooFewContacts))?;
+            let joints = gripper::joints_at(motors, jaws.position);
+            refuse_rough_hits(prepared, &joints, &jaws.hand_from_object).map_err(fail)?;
             workspace.place_object(&jaws.hand_from_object);
             if !workspace.palm_is_clear() {
                 return Err(fail(Reason::Palm));
@@ -41,11 +44,12 @@ pub fn close_in_frame(
         }
         _ => {
             let hand_from_object = prepared.object_from_hand(index).inverse();
+            let shape = motors.drawn_shape(rng);
+            refuse_rough_hits(prepared, &shape, &hand_from_object).map_err(fail)?;
             workspace.place_object(&hand_from_object);
             if !workspace.palm_is_clear() {
                 return Err(fail(Reason::Palm));
             }
-            let shape = motors.drawn_shape(rng);
             closing::close(prepared, motors, &hand_from_object, &shape)
         }
     };
@@ -60,6 +64,16 @@ pub fn close_in_frame(
         return Err((Reason::Fingers, margin));
     }
     Ok((state, margin))
+}
+
+/// Refuses a hand of which palm or fingers surely are in the object before it closes.
+fn refuse_rough_hits(prepared: &Prepared, joints: &HandJoints, hand_from_object: &Pose) -> Result<(), Reason> {
+    let object_from_hand = Placement::from(&hand_from_object.inverse());
+    if prepared.rough.palm_hits(&object_from_hand) {
+        return Err(Reason::Palm);
+    }
+    let hits = |finger: usize| prepared.rough.finger_hits(prepared.model, finger, &joints[finger], &object_from_hand);
+    if (0..joints.len()).any(hits) { Err(Reason::Fingers) } else { Ok(()) }
 }
 
 /// The hand of `state` with the object at another pose, closed anew; with the fingers that held before.

@@ -1,12 +1,14 @@
 //! One frame: contacts finger by finger, closure, forces, way in (Saut 2010, sec. IV-A.2 and IV-A.3).
 
+use super::closing::triples;
 use super::combine::{Choice, Options, choices};
-use super::contacts::footholds;
+use super::contacts::{Candidates, Foothold, MOST, Site};
 use super::worth;
 use crate::driven;
 use crate::found::{Found, Reason};
 use crate::prepared::Prepared;
 use crate::way::{self, NoWay};
+use arrayvec::ArrayVec;
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;
 use regrasp_manipulation::grasp::state::{GraspState, HandJoints};
@@ -15,6 +17,8 @@ use regrasp_robot::kinematics::finger_ik::Coordinates;
 
 /// Choices of contacts that are tried in a frame.
 const CHOICES_TRIED: usize = 6;
+/// Triples of contacts in reach that are tried in a frame.
+const TRIPLES_TRIED: usize = 4;
 
 /// A frame without a grasp.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,84 +33,187 @@ pub struct Miss {
 
 /// The grasp of frame `index`, or why there is none. The answer does not depend on what the workspace did before.
 pub fn try_frame(prepared: &Prepared, workspace: &mut Workspace, index: u64) -> Result<Found, Miss> {
-    let object_from_hand = prepared.object_from_hand(index);
-    let hand_from_object = object_from_hand.inverse();
     let mut rng = Rng::keyed(prepared.seed, "grasp frame", index);
-    let mut miss = Miss { reason: Reason::Palm, margin: 0.0, out_of_reach: None };
-    if let Some(motors) = &prepared.motors {
-        let closed = driven::close_in_frame(prepared, motors, workspace, index, &mut rng);
-        let (state, margin) = closed.map_err(|(reason, margin)| Miss { reason, margin, ..miss })?;
-        let flatness = driven::flatness(prepared, &state);
-        return accept(prepared, workspace, index, state, (&flatness, margin), None).map_err(|reason| Miss {
-            reason,
-            margin,
-            ..miss
-        });
-    }
-    workspace.place_object(&hand_from_object);
-    if !workspace.palm_is_clear() {
-        return Err(miss);
-    }
-    let model = prepared.model;
-    let n_fingers = model.n_fingers();
-    let mut options: Options = (0..n_fingers).map(|_| Default::default()).collect();
-    let mut may_be_free = vec![false; n_fingers];
-    let mut opposed = None;
-    let mut n_touching = 0;
-    for (done, &finger) in prepared.order.iter().enumerate() {
-        options[finger] = footholds(prepared, workspace, finger, &hand_from_object, opposed.as_ref(), &mut rng);
-        // No stable grasp without the first finger (Saut 2010, sec. IV-A.2).
-        if options[finger].is_empty() && done == 0 {
-            return Err(Miss { reason: Reason::TooFewContacts, out_of_reach: Some(finger), ..miss });
-        }
-        may_be_free[finger] = rests(prepared, workspace, finger);
-        if options[finger].is_empty() {
-            miss.out_of_reach = miss.out_of_reach.or(Some(finger));
-            if !may_be_free[finger] {
-                return Err(Miss { reason: Reason::FreeFinger(finger), ..miss });
-            }
-        } else {
-            opposed = opposed.or(options[finger].first().map(|foothold| foothold.place));
-            n_touching += 1;
-        }
-        let n_left = n_fingers - done - 1;
-        if n_touching + n_left < prepared.least_contacts() {
-            return Err(Miss { reason: Reason::TooFewContacts, ..miss });
-        }
-    }
-    let (found, best) = choices(prepared, &options, &may_be_free);
-    miss.margin = best;
-    if found.is_empty() {
-        return Err(Miss { reason: Reason::NotClosed, ..miss });
-    }
-    let mut clear = Clear::new(&options);
-    let mut reason = Reason::Fingers;
-    for choice in found.iter().take(CHOICES_TRIED) {
-        if !clear.of_each_other(prepared, workspace, &options, choice) {
-            continue;
-        }
-        let state = state_of(prepared, &hand_from_object, &options, choice);
-        workspace.set_state(&state);
-        if !workspace.is_clear(TipMode::AllHold) {
-            reason = reason.max(Reason::Fingers);
-            continue;
-        }
-        let flatness: Vec<f64> =
-            (0..n_fingers).filter_map(|f| choice.chosen[f].map(|k| options[f][k].place.flatness)).collect();
-        match accept(prepared, workspace, index, state, (&flatness, choice.margin), None) {
-            Ok(grasp) => return Ok(grasp),
-            Err(why) => reason = reason.max(why),
-        }
-    }
-    Err(Miss { reason, ..miss })
+    let Some(motors) = &prepared.motors else {
+        return precision(prepared, workspace, index, &Site::new(&prepared.object_from_hand(index)), &mut rng);
+    };
+    let miss = |reason: Reason, margin: f64| Miss { reason, margin, out_of_reach: None };
+    let closed = driven::close_in_frame(prepared, motors, workspace, index, &mut rng);
+    let (state, margin) = closed.map_err(|(reason, margin)| miss(reason, margin))?;
+    let flatness = driven::flatness(prepared, &state);
+    accept(prepared, workspace, index, state, (&flatness, margin), None).map_err(|reason| miss(reason, margin))
 }
 
-/// True when a finger has room in its rest posture, whatever the others do.
-fn rests(prepared: &Prepared, workspace: &mut Workspace, finger: usize) -> bool {
-    let rest = rest_of(prepared, finger);
-    workspace.set_finger(finger, &rest);
-    let clearance = prepared.model.free_clearance();
-    workspace.finger_alone_is_clear(finger, TipMode::Away { finger, clearance })
+/// A grasp of chosen contacts: first those of the first finger, then places of the others that close the object with it.
+fn precision(
+    prepared: &Prepared,
+    workspace: &mut Workspace,
+    index: u64,
+    site: &Site,
+    rng: &mut Rng,
+) -> Result<Found, Miss> {
+    let mut miss = Miss { reason: Reason::Palm, margin: 0.0, out_of_reach: None };
+    if prepared.rough.palm_hits(&site.object_from_hand) {
+        return Err(miss);
+    }
+    let (first, n_fingers) = (prepared.order[0], prepared.model.n_fingers());
+    let mut firsts = Candidates::new(prepared, first, site, rng);
+    // No stable grasp without the first finger (Saut 2010, sec. IV-A.2).
+    if firsts.places.is_empty() {
+        return Err(Miss { reason: Reason::TooFewContacts, out_of_reach: Some(first), ..miss });
+    }
+    let mut others = Vec::with_capacity(n_fingers - 1);
+    let mut n_left = n_fingers;
+    for &finger in &prepared.order[1..] {
+        let candidates = Candidates::new(prepared, finger, site, rng);
+        if candidates.places.is_empty() {
+            miss.out_of_reach = miss.out_of_reach.or(Some(finger));
+            n_left -= 1;
+            if n_left < prepared.least_contacts() {
+                return Err(Miss { reason: Reason::TooFewContacts, ..miss });
+            }
+            if prepared.rough.finger_hits(prepared.model, finger, &rest_of(prepared, finger), &site.object_from_hand) {
+                return Err(Miss { reason: Reason::FreeFinger(finger), ..miss });
+            }
+        }
+        others.push(candidates);
+    }
+    firsts.oppose_all(&others);
+    if firsts.places.is_empty() {
+        return Err(Miss { reason: Reason::NotClosed, ..miss });
+    }
+    workspace.place_object(&site.hand_from_object);
+    if !workspace.palm_is_clear() {
+        return Err(Miss { reason: Reason::Palm, ..miss });
+    }
+    let footholds = firsts.footholds(prepared, workspace, site, rng);
+    if footholds.is_empty() {
+        return Err(Miss { reason: Reason::TooFewContacts, out_of_reach: Some(first), ..miss });
+    }
+    let mut search = Search { prepared, workspace, index, site, free: vec![None; n_fingers] };
+    if prepared.least_contacts() < 3 {
+        return search.by_contacts(footholds, others, miss, rng);
+    }
+    let (triples, best) = triples(prepared, &footholds, &others);
+    miss = Miss { reason: Reason::NotClosed, margin: best, ..miss };
+    let mut n_tried = 0;
+    for triple in triples {
+        if n_tried == TRIPLES_TRIED {
+            break;
+        }
+        let mut options: Options = (0..n_fingers).map(|_| Default::default()).collect();
+        options[first].push(footholds[triple.first].clone());
+        let reached = triple.others.iter().all(|&(other, place)| {
+            let candidates = &mut others[other];
+            let foothold = candidates.foothold(prepared, search.workspace, site, place, rng);
+            options[candidates.finger].extend(foothold);
+            !options[candidates.finger].is_empty()
+        });
+        if !reached {
+            miss.reason = miss.reason.max(Reason::TooFewContacts);
+            continue;
+        }
+        n_tried += 1;
+        for candidates in &mut others {
+            if options[candidates.finger].is_empty() {
+                options[candidates.finger] = candidates.footholds(prepared, search.workspace, site, rng);
+            }
+        }
+        let needed = [first, others[triple.others[0].0].finger, others[triple.others[1].0].finger];
+        match search.grasp_of(&options, &needed, miss) {
+            Ok(grasp) => return Ok(grasp),
+            Err(why) => miss.reason = miss.reason.max(why.reason),
+        }
+    }
+    Err(miss)
+}
+
+/// The search in one frame.
+struct Search<'s, 'a, 'm> {
+    prepared: &'s Prepared<'a>,
+    workspace: &'s mut Workspace<'m>,
+    index: u64,
+    site: &'s Site,
+    /// Whether each finger has room in its rest posture, once it was asked.
+    free: Vec<Option<bool>>,
+}
+
+impl Search<'_, '_, '_> {
+    /// Contacts finger by finger, then closure: two soft fingertips may be enough.
+    fn by_contacts(
+        &mut self,
+        footholds: ArrayVec<Foothold, MOST>,
+        others: Vec<Candidates>,
+        mut miss: Miss,
+        rng: &mut Rng,
+    ) -> Result<Found, Miss> {
+        let prepared = self.prepared;
+        let mut options: Options = (0..prepared.model.n_fingers()).map(|_| Default::default()).collect();
+        let opposed = footholds[0].place;
+        options[prepared.order[0]] = footholds;
+        for mut candidates in others {
+            let finger = candidates.finger;
+            candidates.oppose(&opposed);
+            options[finger] = candidates.footholds(prepared, self.workspace, self.site, rng);
+            if options[finger].is_empty() {
+                miss.out_of_reach = miss.out_of_reach.or(Some(finger));
+            }
+        }
+        if options.iter().filter(|of_finger| !of_finger.is_empty()).count() < prepared.least_contacts() {
+            return Err(Miss { reason: Reason::TooFewContacts, ..miss });
+        }
+        self.grasp_of(&options, &[], miss)
+    }
+
+    /// The best grasp of these contacts, in which the fingers of `needed` hold.
+    fn grasp_of(&mut self, options: &Options, needed: &[usize], miss: Miss) -> Result<Found, Miss> {
+        let prepared = self.prepared;
+        let n_fingers = options.len();
+        let mut may_be_free = vec![false; n_fingers];
+        for finger in 0..n_fingers {
+            may_be_free[finger] = !needed.contains(&finger) && self.rests(finger);
+            if options[finger].is_empty() && !may_be_free[finger] {
+                return Err(Miss { reason: Reason::FreeFinger(finger), ..miss });
+            }
+        }
+        let (found, best) = choices(prepared, options, &may_be_free);
+        let miss = Miss { margin: miss.margin.max(best), ..miss };
+        let mut reason = if found.is_empty() { Reason::NotClosed } else { Reason::Fingers };
+        let mut clear = Clear::new(options);
+        for choice in found.iter().take(CHOICES_TRIED) {
+            if !clear.of_each_other(prepared, self.workspace, options, choice) {
+                continue;
+            }
+            let state = state_of(prepared, &self.site.hand_from_object, options, choice);
+            self.workspace.set_state(&state);
+            if !self.workspace.is_clear(TipMode::AllHold) {
+                continue;
+            }
+            let flatness: Vec<f64> =
+                (0..n_fingers).filter_map(|f| choice.chosen[f].map(|k| options[f][k].place.flatness)).collect();
+            match accept(prepared, self.workspace, self.index, state, (&flatness, choice.margin), None) {
+                Ok(grasp) => return Ok(grasp),
+                Err(why) => reason = reason.max(why),
+            }
+        }
+        Err(Miss { reason, ..miss })
+    }
+
+    /// True when a finger has room in its rest posture, whatever the others do.
+    fn rests(&mut self, finger: usize) -> bool {
+        let (prepared, site) = (self.prepared, self.site);
+        if let Some(known) = self.free[finger] {
+            return known;
+        }
+        let rest = rest_of(prepared, finger);
+        let clearance = prepared.model.free_clearance();
+        let is_free = !prepared.rough.finger_hits(prepared.model, finger, &rest, &site.object_from_hand) && {
+            self.workspace.set_finger(finger, &rest);
+            self.workspace.finger_alone_is_clear(finger, TipMode::Away { finger, clearance })
+        };
+        self.free[finger] = Some(is_free);
+        is_free
+    }
 }
 
 fn rest_of(prepared: &Prepared, finger: usize) -> Coordinates {

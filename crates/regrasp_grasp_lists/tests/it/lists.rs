@@ -71,3 +71,45 @@ fn a_caller_who_stops_the_search_gets_a_list_that_says_so() {
     let report = check(&scene, &regrasp_grasp::GraspList { grasps: cut.grasps[..5].to_vec(), ..cut });
     assert!(report.accepted(), "{:?}", report.violations.first());
 }
+
+/// Refinement raises margins; the other terms of the score, together, do not fall.
+#[test]
+fn refinement_raises_margins_and_lowers_nothing() {
+    let scene = bundled("wide_four_finger", "box_90x.toml");
+    let with = |refinement_trials: usize| {
+        let settings = GraspSettings { refinement_trials, ..settings(30) };
+        list(&scene, &settings, 2).unwrap()
+    };
+    let (plain, refined) = (with(0), with(GraspSettings::default().refinement_trials));
+    let sorted = |mut values: Vec<f64>| {
+        values.sort_by(f64::total_cmp);
+        values
+    };
+    let before = sorted(refined.grasps.iter().map(|g| g.margin_before_refinement.unwrap_or(g.margin)).collect());
+    let unrefined = sorted(plain.grasps.iter().map(|g| g.margin).collect());
+    assert_eq!(before, unrefined, "the same grasps");
+    let after = sorted(refined.grasps.iter().map(|g| g.margin).collect());
+    let gain = after[15] / before[15];
+    assert!(gain > 1.2, "{gain}");
+    let weights = &GraspSettings::default().weights;
+    let others = |list: &regrasp_grasp::GraspList| {
+        let of = |scores: &regrasp_grasp::list::Scores| {
+            regrasp_grasp::list::Scores { closure: 0.0, ..*scores }.mean(weights)
+        };
+        list.grasps.iter().map(|grasp| of(&grasp.scores)).sum::<f64>()
+    };
+    assert!(others(&refined) >= others(&plain) - 1e-6);
+    assert!(check(&scene, &refined).accepted());
+}
+
+/// More frames show more of what there is.
+#[test]
+fn more_frames_give_more_grasps() {
+    let scene = bundled("wide_four_finger", "pencil.toml");
+    let found = |frames: u64| {
+        let settings = GraspSettings { frames, refinement_trials: 0, ..settings(1_000) };
+        list(&scene, &settings, 0).map_or(0, |list| list.statistics.found)
+    };
+    let counts = [500, 2_000, 8_000].map(found);
+    assert!(counts.windows(2).all(|pair| pair[0] < pair[1]), "{counts:?}");
+}

@@ -3,6 +3,10 @@
 
 /// The pictures.
 mod picture;
+/// Grasps in one picture.
+mod sheet;
+
+pub use sheet::{SheetSettings, png};
 
 use crate::charts::svg::escaped;
 use crate::page::{embedded, escape_text, hash};
