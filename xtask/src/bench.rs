@@ -165,10 +165,10 @@ pub fn page(arguments: &[String]) -> Outcome {
         return pack();
     }
     // Beside the page, so that its links are the same.
-    let again = "docs/.benchmarks-again.md";
-    let written = write_page(&program, again).and_then(|()| pack());
-    let text = fs::read_to_string(again).map_err(|error| format!("{again}: {error}"));
-    let _ = fs::remove_file(again);
+    let again = Path::new("docs").join(".benchmarks-again.md");
+    let written = write_page(&program, &again.to_string_lossy()).and_then(|()| pack());
+    let text = fs::read_to_string(&again).map_err(|error| format!("{}: {error}", again.display()));
+    let _ = fs::remove_file(&again);
     written?;
     compare(&text?)
 }
