@@ -94,7 +94,8 @@ pub fn all(_: &[String]) -> Outcome {
     page(&[])
 }
 
-/// The suites named, or all. A suite that was cut off goes on where it was. `SUITE_SEEDS`: at most so many trials per row.
+/// The suites named, or all, then the page: one command makes all tables and figures of the papers again. A suite that was cut off goes
+/// on where it was. `SUITE_SEEDS`: at most so many trials per row; `AT_ONCE`: trials at a time.
 pub fn suites(names: &[String]) -> Outcome {
     let program = regrasp()?;
     unpack()?;
@@ -103,10 +104,11 @@ pub fn suites(names: &[String]) -> Outcome {
         0 => String::new(),
         seeds => format!("--seeds {seeds}"),
     };
+    let at_once = number("AT_ONCE", 1)?;
     for name in if names.is_empty() { &all } else { names } {
-        regrasp_with(&program, &format!("bench suites/{name}.toml {limit}"))?;
+        regrasp_with(&program, &format!("bench suites/{name}.toml --at-once {at_once} {limit}"))?;
     }
-    pack()
+    page(&[])
 }
 
 /// Random queries on saved graphs, and the same ones without them; `out/roadmaps` keeps the graphs.
@@ -150,10 +152,50 @@ pub fn growth(curves: &[String]) -> Outcome {
     pack()
 }
 
-/// `docs/benchmarks.md` again, from what was measured.
-pub fn page(_: &[String]) -> Outcome {
+/// The page of all tables.
+const PAGE: &str = "docs/benchmarks.md";
+
+/// The page again, from what was measured. With `--check` nothing is written: it fails where the page, or the results of a suite, are not
+/// what the rows say.
+pub fn page(arguments: &[String]) -> Outcome {
     let program = regrasp()?;
     unpack()?;
+    if !arguments.iter().any(|argument| argument == "--check") {
+        write_page(&program, PAGE)?;
+        return pack();
+    }
+    // Beside the page, so that its links are the same.
+    let again = Path::new("docs").join(".benchmarks-again.md");
+    let written = write_page(&program, &again.to_string_lossy()).and_then(|()| pack());
+    let text = fs::read_to_string(&again).map_err(|error| format!("{}: {error}", again.display()));
+    let _ = fs::remove_file(&again);
+    written?;
+    compare(&text?)
+}
+
+/// Fails where the page is not `again`, or where the results of a suite are not in it.
+fn compare(again: &str) -> Outcome {
+    let read = |path: &Path| fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()));
+    if read(Path::new(PAGE))? != again {
+        return Err(format!("{PAGE} is not what the rows say; run `cargo xtask benchmark-page`"));
+    }
+    for suite in files("suites", ".toml")? {
+        let name = suite.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let path = Path::new(RESULTS).join(&name).join("results.md");
+        if !is_section(&read(&path)?, again, &name) {
+            return Err(format!("{} is not what its rows say; run `cargo xtask bench-suite {name}`", path.display()));
+        }
+    }
+    Ok(())
+}
+
+/// True where the results of a suite stand in the page as well, but for where their pictures are.
+fn is_section(results: &str, page: &str, suite: &str) -> bool {
+    let section = results.trim_start_matches("# Results").trim();
+    page.contains(&section.replace("](figure", &format!("](benchmarks/{suite}/figure")))
+}
+
+fn write_page(program: &Path, page: &str) -> Outcome {
     let mut inputs: Vec<String> =
         SECTIONS.iter().chain(&["roadmap_million"]).map(|name| format!("{name}.csv")).collect();
     inputs.extend(["roadmap_sphere", "roadmap_box", "roadmap_million"].map(|name| format!("{name}.json")));
@@ -161,14 +203,13 @@ pub fn page(_: &[String]) -> Outcome {
     let found: Vec<PathBuf> =
         inputs.iter().map(|name| Path::new(RESULTS).join(name)).filter(|path| path.is_file()).collect();
     regrasp_with(
-        &program,
+        program,
         &format!(
-            "bench --page docs/benchmarks.md --limits {RESULTS}/limits.json {} {}",
+            "bench --page {page} --limits {RESULTS}/limits.json {} {}",
             joined(&found),
             joined(&files("suites", ".toml")?)
         ),
-    )?;
-    pack()
+    )
 }
 
 /// Unpacks the compressed rows beside their archives.
@@ -248,4 +289,18 @@ pub fn arms(_: &[String]) -> Outcome {
     }
     println!("super graphs of the robot with two arms:");
     example("--roadmap assets/robots/upper_body/robot.toml")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_that_are_older_than_the_page_are_found() {
+        let page = "# Benchmarks\n\n## T\n\n| a | 2/2 |\n\n![F](benchmarks/saut2011/figure_10.svg)\n\n## U\n";
+        let results = "# Results\n\n## T\n\n| a | 2/2 |\n\n![F](figure_10.svg)\n";
+        assert!(is_section(results, page, "saut2011"));
+        assert!(!is_section(&results.replace("2/2", "1/2"), page, "saut2011"));
+        assert!(!is_section(results, page, "another"));
+    }
 }

@@ -24,7 +24,11 @@ const TASKS: [Task; 15] = [
         reference::task,
     ),
     ("bench", "measure everything in docs/benchmarks.md; hours", bench::all),
-    ("bench-suite", "measure the suites named, or all: saut2011 cherif1999 sahbani2007", bench::suites),
+    (
+        "bench-suite",
+        "measure the suites named, or all, and write the page: saut2011 cherif1999 sahbani2007",
+        bench::suites,
+    ),
     (
         "bench-roadmap",
         "measure queries on roadmaps of sphere and box, and on one of a million motions",
@@ -35,7 +39,11 @@ const TASKS: [Task; 15] = [
     ("bench-tasks", "tasks of pick and place beside the table of Saut 2010, as out/tasks/tasks.md", tasks::bench),
     ("growth", "measure how loading and planning grow with fingers, triangles, obstacles and threads", bench::growth),
     ("bench-scans", "turn scanned objects that are not convex in the Allegro hand", scans::task),
-    ("benchmark-page", "write docs/benchmarks.md from what was measured", bench::page),
+    (
+        "benchmark-page",
+        "write docs/benchmarks.md from what was measured (--check: fail if it, or a suite's results, are older)",
+        bench::page,
+    ),
     ("replay", "replay plans in MuJoCo: six scenes, negative controls, and all in-hand scenes", replay::in_hand),
     ("replay-tracking", "replay tracking plans in MuJoCo", replay::tracking),
     ("campaign", "same bytes on any number of threads; the checker against broken and good plans", campaign::checker),

@@ -10,12 +10,14 @@ pub mod rows;
 /// What a paper found, and whether our rows confirm it.
 pub mod verdicts;
 
+use nalgebra::UnitQuaternion;
 use regrasp_base::toml_table::too_deep;
-use regrasp_base::{Diagnostic, InputError, Place};
+use regrasp_base::{Diagnostic, InputError, Place, Rng};
+use regrasp_geometry::Vector;
 use regrasp_planners::in_hand::Alpha;
 use regrasp_planners::{InHandSettings, TrackingSettings};
-use regrasp_scene::Task;
 use regrasp_scene::query::{IN_HAND, TRACKING};
+use regrasp_scene::{Query, Task};
 use serde::Deserialize;
 use serde::de::Error as _;
 use std::path::{Path, PathBuf};
@@ -116,6 +118,9 @@ pub struct Entry {
     /// Smallest share of trials that is asked to be solved, of 1; where there is none, `mean_at_most_s` asks for all.
     #[serde(default)]
     pub solved_at_least: Option<f64>,
+    /// The goal is the start, turned by so many degrees about an axis that the seed draws, in place of the scene's. Tracking only.
+    #[serde(default)]
+    pub turn_deg: Option<f64>,
     /// Settings of tracking, for scenes with a task of that kind; what is left out has its default.
     #[serde(default)]
     pub tracking: Option<TrackingSettings>,
@@ -161,9 +166,25 @@ pub struct Job {
     pub settings: InHandSettings,
     /// Settings of tracking, where the row has some.
     pub tracking: Option<TrackingSettings>,
+    /// Degrees by which the object is turned about an axis that the seed draws, where the goal is not the scene's.
+    pub turn_deg: Option<f64>,
 }
 
 impl Job {
+    /// What `task` asks for with `seed`, to the goal of this job.
+    pub fn query(&self, task: &Task, seed: u64) -> Query {
+        let query = task.query(seed);
+        match (self.turn_deg, query) {
+            (Some(degrees), Query::Tracking(mut query)) => {
+                let axis = Vector::from(Rng::keyed(seed, "suite_goal_axis", 0).direction());
+                let turn = UnitQuaternion::from_scaled_axis(axis * degrees.to_radians());
+                query.world_from_object_goal.rotation = turn * query.world_from_object_start.rotation;
+                Query::Tracking(query)
+            }
+            (_, query) => query,
+        }
+    }
+
     /// Errors (`B603`, with the place of the suite at `suite_path`): settings that mean nothing for the task of the scene.
     pub fn refuse_other_task(&self, task: &Task, suite_path: &Path) -> Result<(), InputError> {
         if task.of_robot.is_some() {
@@ -177,6 +198,7 @@ impl Job {
         }
         let (key, other) = match task.kind_name() {
             IN_HAND if self.tracking.is_some() => ("tracking", "settings"),
+            IN_HAND if self.turn_deg.is_some() => ("turn_deg", "a [goal]"),
             TRACKING if self.settings != InHandSettings::plain() => ("settings", "tracking"),
             _ => return Ok(()),
         };
@@ -210,6 +232,7 @@ impl Suite {
             max_work: entry.max_work.unwrap_or(self.max_work),
             settings,
             tracking: entry.tracking.clone(),
+            turn_deg: entry.turn_deg,
         };
         let mut jobs = Vec::new();
         for table in &self.tables {
@@ -245,6 +268,9 @@ impl Suite {
             }
             if entry.solved_at_least.is_some_and(|share| !(share > 0.0 && share <= 1.0)) {
                 faults.push(format!("row \"{}\": solved_at_least must be above 0 and at most 1", entry.name));
+            }
+            if entry.turn_deg.is_some_and(|turn| !(turn > 0.0 && turn <= 180.0)) {
+                faults.push(format!("row \"{}\": turn_deg must be above 0 and at most 180", entry.name));
             }
             if entry.trials == 0 || entry.max_work == Some(0) {
                 faults.push(format!("row \"{}\": trials and max_work must be at least 1", entry.name));
@@ -430,6 +456,7 @@ settings = { method = "visibility", guided_share = 0.0 }
             ("name = \"f\"", "name = \"../f\"", "letters, digits"),
             ("[1, 5, 9]", "[1, 5]", "smallest, mean and largest"),
             ("mean_at_most_s = 0.002", "solved_at_least = 99", "solved_at_least must be above 0"),
+            ("mean_at_most_s = 0.002", "turn_deg = 181", "turn_deg must be above 0"),
             ("mean_at_most_s = 0.002", "tracking = { cell = -1 }", "tracking: cell is -1"),
             ("mean_at_most_s = 0.002", "tracking = { rolling_finger = \"twice\" }", "B600"),
         ] {
@@ -522,6 +549,18 @@ tracking = { rolling_finger = "once", face_changes = false }
         assert!(error.contains("B603") && error.contains("T/once") && error.contains("tracking"), "{error}");
         let in_hand = Job { settings: InHandSettings::default(), ..jobs[0].clone() };
         assert!(in_hand.refuse_other_task(track.task(), at).is_err());
+        // Goals that the seed draws: as far from the start as asked, and the same every time.
+        let turned = Job { turn_deg: Some(60.0), ..jobs[0].clone() };
+        assert!(
+            turned.refuse_other_task(turn.task(), at).is_err() && turned.refuse_other_task(track.task(), at).is_ok()
+        );
+        let goal = |job: &Job, seed| {
+            let query = job.query(track.task(), seed).as_tracking().cloned().unwrap();
+            (query.world_from_object_start.rotation, query.world_from_object_goal.rotation)
+        };
+        let (from, to) = goal(&turned, 3);
+        assert!((from.angle_to(&to).to_degrees() - 60.0).abs() < 1e-9 && goal(&turned, 3) == (from, to));
+        assert!(goal(&turned, 4).1.angle_to(&to) > 1e-3 && goal(&jobs[0], 3).1 == goal(&jobs[0], 4).1);
         let row = |job: &str, seed, status: &str| SuiteRow {
             job: job.into(),
             inputs: String::new(),

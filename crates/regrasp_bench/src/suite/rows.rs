@@ -36,7 +36,15 @@ pub fn line(row: &SuiteRow) -> String {
 /// of the scene, settings and limits.
 pub fn inputs_hash(program_sha256: &str, scene: &Scene, job: &Job) -> String {
     let inputs: Vec<_> = scene.inputs.iter().map(|file| (&file.role, &file.name, &file.sha256)).collect();
-    let all = serde_json::json!([program_sha256, inputs, job.settings, job.tracking, job.max_work, job.time_limit_s]);
+    let all = serde_json::json!([
+        program_sha256,
+        inputs,
+        job.settings,
+        job.tracking,
+        job.max_work,
+        job.time_limit_s,
+        job.turn_deg
+    ]);
     files::sha256(all.to_string().as_bytes())
 }
 

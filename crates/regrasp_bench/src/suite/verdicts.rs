@@ -38,6 +38,11 @@ pub enum Finding {
         /// Smallest share.
         at_least: f64,
     },
+    /// No trial of a row is solved.
+    NoneSolved {
+        /// The row.
+        row: String,
+    },
     /// The mean time of a curve changes from one alpha to another.
     Trend {
         /// The curve.
@@ -62,7 +67,7 @@ impl Verdict {
         let names: Vec<&str> = table.rows.iter().map(|row| row.name.as_str()).collect();
         let asked: Vec<&str> = match &self.holds_if {
             Finding::Ratio { slower, faster, .. } => vec![slower, faster],
-            Finding::Solved { row, .. } => vec![row],
+            Finding::Solved { row, .. } | Finding::NoneSolved { row } => vec![row],
             Finding::Trend { .. } | Finding::Unsolved { .. } => {
                 return vec![format!("verdict \"{}\": trend and unsolved are for figures", self.claim)];
             }
@@ -76,7 +81,7 @@ impl Verdict {
         let (curve, alphas) = match &self.holds_if {
             Finding::Trend { curve, alphas, .. } => (curve, alphas.to_vec()),
             Finding::Unsolved { curve, alpha } => (curve, vec![*alpha]),
-            Finding::Ratio { .. } | Finding::Solved { .. } => {
+            Finding::Ratio { .. } | Finding::Solved { .. } | Finding::NoneSolved { .. } => {
                 return vec![format!("verdict \"{}\": ratio and solved are for tables", self.claim)];
             }
         };
@@ -109,6 +114,10 @@ pub(super) fn of_table(table: &Table, rows: &[SuiteRow], out: &mut String) {
             let is_met = runs > 0 && solved as f64 >= at_least * runs as f64;
             (runs > 0).then(|| (is_met, format!("{solved} of {runs} trials")))
         }
+        Finding::NoneSolved { row } => {
+            let Summary { solved, runs, .. } = summary(row);
+            (runs > 0).then(|| (solved == 0, format!("{solved} of {runs} trials")))
+        }
         Finding::Trend { .. } | Finding::Unsolved { .. } => None,
     });
 }
@@ -126,7 +135,7 @@ pub(super) fn of_figure(figure: &Figure, rows: &[SuiteRow], out: &mut String) {
             let Summary { solved, runs, .. } = summary(curve, *alpha);
             (runs > 0).then(|| (solved == 0, format!("{solved} of {runs} trials solved")))
         }
-        Finding::Ratio { .. } | Finding::Solved { .. } => None,
+        Finding::Ratio { .. } | Finding::Solved { .. } | Finding::NoneSolved { .. } => None,
     });
 }
 
@@ -168,6 +177,7 @@ mod tests {
             verdicts = [
                 { claim = "b takes longer", holds_if = { ratio = { slower = "b", faster = "a", at_least = 3 } } },
                 { claim = "b is solved", holds_if = { solved = { row = "b", at_least = 1 } } },
+                { claim = "b is not", holds_if = { none_solved = { row = "b" } } },
             ]
             [[figures]]
             name = "f"
@@ -209,6 +219,7 @@ mod tests {
         let ratio = "- b takes longer: NOT CONFIRMED (2.0 times; 1 of 2 trials were given up and do not count).";
         assert!(told.contains(ratio), "{told}");
         assert!(told.contains("- b is solved: NOT CONFIRMED (1 of 2 trials)."), "{told}");
+        assert!(told.contains("- b is not: NOT CONFIRMED (1 of 2 trials)."), "{told}");
         assert!(told.contains("- it falls: not measured."), "{told}");
         assert!(told.contains("- never at 1: confirmed (0 of 1 trials solved)."), "{told}");
         let rows = [row("T/a", Some(1.0)), row("T/b", Some(3.0)), row("f/c/0.5", Some(2.0)), row("f/c/1", Some(1.0))];

@@ -138,7 +138,7 @@ fn measure(
     let missing: Vec<usize> = (0..part.done.len()).filter(|&seed| part.done[seed].is_none()).collect();
     let run_seed = |index: usize| {
         let seed = missing[index] as u64;
-        let query = part.loaded.task().query(seed);
+        let query = job.query(part.loaded.task(), seed);
         run_one(Problem { task: part.loaded.manipulation(), query: &query, seed }, &settings)
     };
     in_order(missing.len(), n_at_once, run_seed, |index, row| {

@@ -22,7 +22,7 @@ pub struct TrackingGrasp {
     pub world_from_link: PerFinger<Placement>,
     /// Where the tips touch, in the object frame.
     pub touches: PerFinger<Touch>,
-    /// Largest angle by which a moving tip was turned aside half-way to here, where the step was long.
+    /// Largest angle by which a moving tip was turned aside half-way to here.
     pub bent: f64,
 }
 

@@ -69,10 +69,11 @@ pub enum Homes {
 }
 
 impl Homes {
-    /// Of a start grasp: on a polyhedron the fingertips belong to the faces that they are on, elsewhere to places in the world.
-    pub fn of(model: &Model, start: &TrackingGrasp) -> Self {
+    /// Of a start grasp: on a polyhedron the fingertips belong to the faces that they are on if they `keep_faces`, else and elsewhere
+    /// to places in the world. There they roll from face to face as the object turns.
+    pub fn of(model: &Model, start: &TrackingGrasp, keep_faces: bool) -> Self {
         let surface = &model.view.object.surface;
-        match surface.crease_distance(&start.touches[0].foot).is_finite() {
+        match keep_faces && surface.crease_distance(&start.touches[0].foot).is_finite() {
             true => Homes::OnObject(start.touches.iter().map(|touch| touch.ball.center).collect()),
             false => Homes::InWorld(model.fingers.iter().map(|finger| finger.tip_at_rest).collect()),
         }
@@ -295,8 +296,8 @@ impl Local<'_, '_, '_> {
         let is_random = self.stepper.settings.roles == RoleChoice::Random;
         let least_aligned = if is_random { LEAST_TOWARDS } else { LEAST_ALIGNED };
         let mut best: Option<(f64, Roles, Prospect)> = None;
-        for roles in Roles::all(n, self.stepper.settings.resting_fingers)
-            .filter(|roles| tried.guilty == 0 || roles.moving & tried.guilty != 0)
+        for roles in
+            Roles::all(n, self.stepper.resting).filter(|roles| tried.guilty == 0 || roles.moving & tried.guilty != 0)
         {
             if self.rolling.is_some_and(|once| once != roles.rolling) || tried.useless.contains(&roles) {
                 continue;

@@ -41,12 +41,14 @@ use regrasp_manipulation::progress::Progress;
 use regrasp_manipulation::workspace::Workspace;
 use regrasp_plan::Plan;
 use regrasp_plan::plan::{PoseData, Statistics};
-use regrasp_scene::{HandView, TrackingQuery};
+use regrasp_scene::{GraspRequest, HandView, TrackingQuery};
 use search::{Counts, Ended, search};
 use step::Stepper;
 
 /// Searches that are begun before none is begun any more. By hand.
-const MOST_RESTARTS: u64 = 20;
+const MOST_RESTARTS: u64 = 40;
+/// Fingers that rest where fewer may.
+const FEWEST_RESTING: usize = 2;
 
 /// Plans how the fingertips turn the object to the goal's orientation.
 ///
@@ -81,13 +83,25 @@ fn plan_in_hand_frame(
     let model = Model::new(view, &settings.in_hand.physics);
     endpoints::refuse(&model, &view.gravity)?;
     let forces = model.forces.as_ref().expect("settings without forces do not validate");
-    let mut stepper = Stepper { model: &model, settings, forces, workspace: Workspace::new(&model), work: 0 };
+    let mut stepper = Stepper {
+        model: &model,
+        settings,
+        resting: settings.resting_fingers,
+        forces,
+        workspace: Workspace::new(&model),
+        work: 0,
+    };
     let first = endpoints::start(&stepper, query, seed)?;
     let goal = query.world_from_object_goal.rotation;
+    let is_start_chosen = query.start_grasp == GraspRequest::Automatic;
+    let may_rest_fewer = settings.fewer_rest && settings.resting_fingers > FEWEST_RESTING && model.n_fingers() == 4;
     let mut counts = Counts::default();
     let mut nearest: Option<(f64, TrackingGrasp)> = None;
     loop {
         let mut rng = Rng::keyed(seed, "tracking", counts.restarts);
+        let with_three = counts.restarts % 4 == if is_start_chosen { 3 } else { 0 };
+        let with_fewer = may_rest_fewer && !with_three;
+        stepper.resting = if with_fewer { FEWEST_RESTING } else { settings.resting_fingers };
         let found = search(&mut stepper, &first.0, &goal, &mut rng, budget, &mut counts, progress);
         let (index, angle_left) = found.nearest;
         let before = nearest.as_ref().map_or(f64::INFINITY, |(angle_left, _)| *angle_left);

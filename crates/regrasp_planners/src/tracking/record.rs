@@ -4,7 +4,7 @@ use crate::tracking::forces::Forces;
 use crate::tracking::gaiting::{Move, Relocation};
 use crate::tracking::grasp::{PerFinger, TrackingGrasp};
 use crate::tracking::settings::TrackingSettings;
-use crate::tracking::step::{Relative, Roles, Stepper, TrackingStep, each};
+use crate::tracking::step::{MOST_BENT_IN_SEGMENT, Relative, Roles, Stepper, TrackingStep, each};
 use regrasp_geometry::Vector;
 use regrasp_manipulation::model::Model;
 use regrasp_manipulation::recording::plan::plan_of;
@@ -20,9 +20,6 @@ use regrasp_scene::query::TRACKING;
 pub fn settings_of(settings: &TrackingSettings) -> serde_json::Value {
     serde_json::to_value(settings).unwrap_or_default()
 }
-
-/// Turn aside, half-way in long steps, that a segment adds up: there and back it twists by twice as much, and checkers allow 2e-3.
-const MOST_BENT: f64 = 5e-4;
 
 /// What becomes a segment.
 enum Stretch<'s> {
@@ -128,7 +125,7 @@ fn stretches<'s>(start: &'s TrackingGrasp, moves: &[&'s Move]) -> Vec<Stretch<'s
 fn goes_on(steps: &[&TrackingStep], step: &TrackingStep) -> bool {
     let bent: f64 = steps.iter().map(|one| one.end.bent).sum();
     steps.last().is_some_and(|last| {
-        bent + step.end.bent <= MOST_BENT
+        bent + step.end.bent <= MOST_BENT_IN_SEGMENT
             && last.roles == step.roles
             && last.seconds == step.seconds
             && last.relative.iter().zip(&step.relative).all(|(a, b)| a.mode == b.mode)

@@ -11,7 +11,9 @@ use crate::tracking::settings::{RollingFinger, TrackingMethod, TrackingSettings}
 use crate::tracking::step::{Asked, Controls, Roles, Stepper};
 use nalgebra::UnitQuaternion;
 use regrasp_base::{Budget, Interrupt, Rng};
-use regrasp_geometry::Vector;
+use regrasp_geometry::{Pose, Vector};
+use regrasp_grasp::contact::rolling::Touch;
+use regrasp_manipulation::model::{FingerModel, Model};
 use regrasp_manipulation::progress::Progress;
 use regrasp_roadmap::{OpenList, Rank};
 use std::collections::BTreeSet;
@@ -200,7 +202,7 @@ fn rolling_finger(stepper: &mut Stepper, start: &TrackingGrasp, turn: &Vector, r
     let step = turn * (settings.object_velocity * settings.time_step / turn.amax());
     let mut worth = |rolling: usize| {
         let mut along = 0.0;
-        for roles in Roles::all(n, settings.resting_fingers).filter(|roles| roles.rolling == rolling) {
+        for roles in Roles::all(n, stepper.resting).filter(|roles| roles.rolling == rolling) {
             stepper.workspace.set(&start.world_from_object.to_pose(), &start.joints, &start.contacts());
             let asked = Asked { roles, turn: Some(step), rolled: Controls::default(), seconds: settings.time_step };
             if let Ok(made) = stepper.step(start, &asked) {
@@ -217,6 +219,15 @@ fn rolling_finger(stepper: &mut Stepper, start: &TrackingGrasp, turn: &Vector, r
         left < 0.0
     });
     drawn.unwrap_or_else(|| (0..n).max_by(|&a, &b| worths[a].total_cmp(&worths[b])).unwrap_or(0))
+}
+
+/// True where every fingertip reaches its place on the object when that has turned to `goal` where it is. Then fingers first go back to
+/// these places (Cherif 1999, sec. 4.1.2), also in two of four searches that are begun anew; else they first change their faces.
+fn can_follow(model: &Model, start: &TrackingGrasp, goal: &UnitQuaternion<f64>) -> bool {
+    let Some(reach) = model.view.reach else { return true };
+    let turned = Pose::from_parts(start.world_from_object.to_pose().translation, *goal);
+    let away = |(touch, finger): (&Touch, &FingerModel)| (turned * touch.ball.center - finger.tip_at_rest).norm();
+    start.touches.iter().zip(&model.fingers).all(|pair| away(pair) <= reach)
 }
 
 /// Searches from `start` to the orientation `goal`.
@@ -238,7 +249,8 @@ pub fn search(
     };
     let mut graph = Graph::new(settings, start, goal);
     let nodes_before = counts.nodes;
-    let homes = Homes::of(stepper.model, start);
+    let keep_faces = !settings.face_changes || (counts.restarts % 4 < 2) == can_follow(stepper.model, start, goal);
+    let homes = Homes::of(stepper.model, start, keep_faces);
     if graph.nearest.1 <= settings.goal_tolerance {
         return graph.ended(Ok(0));
     }

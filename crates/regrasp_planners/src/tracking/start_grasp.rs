@@ -2,10 +2,11 @@
 
 use crate::tracking::forces::Forces;
 use crate::tracking::grasp::TrackingGrasp;
-use crate::tracking::step::Stepper;
+use crate::tracking::step::{Roles, Stepper};
+use nalgebra::Rotation3;
 use regrasp_base::Rng;
 use regrasp_geometry::collision::Placement;
-use regrasp_geometry::{Point, Pose};
+use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp::Contact;
 use regrasp_manipulation::ends::end::End;
 use regrasp_manipulation::ends::given_grasp::{Near, given_grasp_at};
@@ -19,11 +20,18 @@ const CONTACTS: usize = 24;
 const DRAWS: usize = 400;
 /// Combinations of them that are looked at.
 const COMBINATIONS: usize = 4000;
-/// Grasps that hold, of which the one with the largest closure margin is taken.
-const GRASPS: usize = 8;
+/// Grasps that hold, of which the one is taken from which the object turns most freely. By measurement, diamond and football turned
+/// by 60 to 94 degrees, 40 starts each: 151 of 160 solved with one, 156 with ten, which take 10 ms.
+const GRASPS: usize = 10;
+/// Freedom to turn that is enough: no further grasp is looked at. By hand.
+const ENOUGH: f64 = 0.6;
+/// Angle by which the object is turned to look how freely it turns there, where contacts turn with it.
+const TURNED: f64 = 0.9;
+/// Fingers that rest where the freedom is looked at. With two there is nearly always some, and it tells nothing.
+const MOST_RESTING: usize = 3;
 
 /// A grasp of all fingers with the object at `pose`, clear, closed and with forces that balance the weight: of some drawn by `seed`
-/// the one that closes best.
+/// the one from which the object turns most freely, whatever the direction.
 pub fn choose_start(stepper: &Stepper, pose: &Pose, seed: u64) -> Option<(TrackingGrasp, Forces)> {
     let model = stepper.model;
     let mut rng = Rng::keyed(seed, "tracking_start", 0);
@@ -36,8 +44,7 @@ pub fn choose_start(stepper: &Stepper, pose: &Pose, seed: u64) -> Option<(Tracki
     let mut n_found = 0;
     for _ in 0..COMBINATIONS {
         let contacts: Contacts = of_fingers.iter().map(|contacts| contacts[rng.below(contacts.len())]).collect();
-        let margin = model.closure_margin(&contacts, model.all_fingers());
-        if margin < model.settings.closure_margin || best.as_ref().is_some_and(|(most, _, _)| margin <= *most) {
+        if model.closure_margin(&contacts, model.all_fingers()) < model.settings.closure_margin {
             continue;
         }
         let points: Vec<Point> = contacts.iter().map(|contact| contact.point_in_object).collect();
@@ -45,13 +52,52 @@ pub fn choose_start(stepper: &Stepper, pose: &Pose, seed: u64) -> Option<(Tracki
         let Ok(Some(state)) = given_grasp_at(model, End::Start, pose, &request, Near::Rest) else { continue };
         let Some(grasp) = TrackingGrasp::of(model, &state) else { continue };
         let Ok(forces) = stepper.balanced_at_rest(&grasp) else { continue };
-        best = Some((margin, grasp, forces));
+        let worth = freedom(stepper, &grasp);
         n_found += 1;
-        if n_found == GRASPS {
+        if best.as_ref().is_none_or(|(most, _, _)| worth > *most) {
+            best = Some((worth, grasp, forces));
+        }
+        if n_found == GRASPS || best.as_ref().is_some_and(|(most, _, _)| *most >= ENOUGH) {
             break;
         }
     }
     best.map(|(_, grasp, forces)| (grasp, forces))
+}
+
+/// How freely the object turns: for the direction in which it turns worst, the cosine to the nearest turn for which some roles have
+/// forces. On polyhedra the mean over some orientations about that of the start, as fingers stay on their faces; else of the start's.
+fn freedom(stepper: &Stepper, grasp: &TrackingGrasp) -> f64 {
+    let surface = &stepper.model.view.object.surface;
+    let weight = stepper.forces.weight_in_world();
+    if !surface.crease_distance(&grasp.touches[0].foot).is_finite() {
+        return freedom_under(stepper, grasp, &weight);
+    }
+    let axes = [Vector::x(), Vector::y(), Vector::z()];
+    let turned =
+        axes.iter().flat_map(|axis| [Rotation3::new(axis * TURNED) * weight, Rotation3::new(-axis * TURNED) * weight]);
+    let all: Vec<f64> =
+        std::iter::once(weight).chain(turned).map(|weight| freedom_under(stepper, grasp, &weight)).collect();
+    all.iter().sum::<f64>() / all.len() as f64
+}
+
+/// As [`freedom`], of one orientation: with this weight.
+fn freedom_under(stepper: &Stepper, grasp: &TrackingGrasp, weight: &Vector) -> f64 {
+    let model = stepper.model;
+    // Any will do: three fingers that rest leave one turn, and its direction both ways.
+    let oblique = Vector::new(1.0, 0.9, 0.8);
+    let mut turns: Vec<Vector> = Vec::new();
+    for roles in Roles::all(model.n_fingers(), MOST_RESTING) {
+        for wanted in [oblique, -oblique] {
+            turns.extend(stepper.turn_under(weight, grasp, roles, &wanted).map(|turn| turn.normalize()));
+        }
+    }
+    let mut least = f64::INFINITY;
+    for k in (0..27).filter(|k| *k != 13) {
+        let direction = Vector::new(f64::from(k % 3 - 1), f64::from(k / 3 % 3 - 1), f64::from(k / 9 - 1)).normalize();
+        let nearest = turns.iter().map(|turn| turn.dot(&direction)).fold(0.0, f64::max);
+        least = least.min(nearest);
+    }
+    least
 }
 
 /// Contacts on the side of `finger`, with its tip within the reach that the scene gives it.
@@ -75,4 +121,4 @@ fn draw_contacts(stepper: &Stepper, pose: &Pose, finger: usize, rng: &mut Rng) -
 }
 
 /// Share of its reach that a finger has used up at the start at most: the rest is for the motion.
-const INSIDE: f64 = 0.9;
+const INSIDE: f64 = 0.6;

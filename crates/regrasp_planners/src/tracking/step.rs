@@ -27,6 +27,8 @@ const SLOWEST: f64 = 1e-4;
 
 /// Joints go straight from step to step: half-way the tip of a long step may be turned aside by this angle.
 const MOST_BENT: f64 = 2e-4;
+/// Turn aside, half-way in steps, that a segment adds up: there and back it twists by twice as much, and checkers allow 2e-3.
+pub const MOST_BENT_IN_SEGMENT: f64 = 5e-4;
 
 /// Work of a step, in the unit of in-hand planning: a configuration looked at. By measurement, some 50 against 2 microseconds.
 pub const STEP_WORK: u64 = 25;
@@ -158,6 +160,8 @@ pub struct Stepper<'m, 'a> {
     pub model: &'m Model<'a>,
     /// Settings.
     pub settings: &'m TrackingSettings,
+    /// Fingers that rest while the object moves.
+    pub resting: usize,
     /// Weight, and what joints can exert.
     pub forces: &'m ForceModel,
     /// Where object and fingers are: what collision tests start from.
@@ -237,17 +241,16 @@ impl<'m, 'a> Stepper<'m, 'a> {
             let translation = center.coords - rotation * finger.ik.center_in_body().coords;
             let link = Placement { rotation, translation };
             let joints = joints_of_pose(chain, &grasp.joints[moving], &link).ok_or(NoStep::OutOfReach)?;
-            if is_long {
-                let middle: Coordinates =
-                    grasp.joints[moving].iter().zip(&joints).map(|(a, b)| 0.5 * (a + b)).collect();
-                let from = &grasp.world_from_link[moving].rotation;
-                let whole = turn_between(from, &link.rotation);
-                let half = turn_between(from, &chain.last_frame(&middle).rotation);
-                let bent = (half - 0.5 * whole).norm();
-                if bent > MOST_BENT {
-                    return Err(NoStep::TooLong);
-                }
-                end.bent = end.bent.max(bent);
+            let middle: Coordinates = grasp.joints[moving].iter().zip(&joints).map(|(a, b)| 0.5 * (a + b)).collect();
+            let from = &grasp.world_from_link[moving].rotation;
+            let whole = turn_between(from, &link.rotation);
+            let half = turn_between(from, &chain.last_frame(&middle).rotation);
+            let bent = (half - 0.5 * whole).norm();
+            match is_long {
+                true if bent > MOST_BENT => return Err(NoStep::TooLong),
+                // Near where its wrist is singular.
+                false if bent > MOST_BENT_IN_SEGMENT => return Err(NoStep::OutOfReach),
+                _ => end.bent = end.bent.max(bent),
             }
             end.world_from_link[moving] = chain.last_frame(&joints);
             end.joints[moving] = joints;
@@ -360,8 +363,19 @@ impl<'m, 'a> Stepper<'m, 'a> {
         relative: &PerFinger<Relative>,
         near: Option<&Forces>,
     ) -> Result<Forces, NoStep> {
+        self.balanced_under(&self.forces.weight_in_world(), (here, from, to), relative, near)
+    }
+
+    /// As [`Self::balanced_at`], under a weight in the world that need not be the object's own.
+    fn balanced_under(
+        &self,
+        weight: &Vector,
+        (here, from, to): (&TrackingGrasp, &TrackingGrasp, &TrackingGrasp),
+        relative: &PerFinger<Relative>,
+        near: Option<&Forces>,
+    ) -> Result<Forces, NoStep> {
         let (model, object) = (self.model, &here.world_from_object);
-        let load = self.load(object);
+        let load = self.load(weight, object);
         let seconds = self.settings.time_step;
         let pressing = |finger: usize| {
             let Relative { mode, slid, .. } = &relative[finger];
@@ -385,11 +399,32 @@ impl<'m, 'a> Stepper<'m, 'a> {
         if (0..model.n_fingers()).all(is_strong) { Ok(forces) } else { Err(NoStep::Unbalanced) }
     }
 
-    /// What forces have to do with the object at `object`.
-    fn load(&self, object: &Placement) -> Load {
+    /// How the object would begin to turn in these roles, along `wanted` or against it, were forces under `weight`, in the world, all
+    /// that counts; none where the contacts tell no motion or no forces balance the weight.
+    pub fn turn_under(&self, weight: &Vector, grasp: &TrackingGrasp, roles: Roles, wanted: &Vector) -> Option<Vector> {
+        let model = self.model;
+        let resting: PerFinger<usize> = each(model.all_fingers() & !roles.moving).collect();
+        let motion = ObjectMotion::new(model, grasp, &resting, roles.rolling, wanted)?;
+        let (_, allowed) = motion.twist(wanted);
+        let seconds = self.settings.time_step;
+        let turn = allowed * (self.settings.object_velocity * seconds / allowed.amax());
+        let (object, touches) = motion.step(&turn)?;
+        let mut end = grasp.clone();
+        end.world_from_object = object;
+        for (&finger, touch) in resting.iter().zip(&touches) {
+            end.touches[finger] = *touch;
+        }
+        let asked = Asked { roles, turn: Some(turn), rolled: Controls::default(), seconds };
+        let relative = self.relative(grasp, &end, &asked).ok()?;
+        self.balanced_under(weight, (grasp, grasp, &end), &relative, None).ok()?;
+        Some(turn)
+    }
+
+    /// What forces have to do with the object at `object`; `weight` is in the world.
+    fn load(&self, weight: &Vector, object: &Placement) -> Load {
         let frame = &self.model.frame;
         Load {
-            weight: object.vector_to_child(&self.forces.weight_in_world()),
+            weight: object.vector_to_child(weight),
             center_of_mass: frame.center_of_mass,
             torque_scale: frame.torque_scale,
             friction: frame.friction,

@@ -22,6 +22,7 @@ mod solids;
 mod tips;
 mod tracking;
 mod tracking_gaits;
+mod tracking_starts;
 #[path = "../../../../tests/support/two_hands.rs"]
 mod two_hands;
 mod way_poses;

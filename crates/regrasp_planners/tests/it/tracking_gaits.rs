@@ -70,7 +70,9 @@ fn a_sphere_turns_about_the_contact_of_the_rolling_finger() {
     let loaded = scene("tracking_sphere_wide.toml");
     let mut n_solved = 0;
     for query in small_turns(&loaded) {
-        let Ok(plan) = plan_with(&loaded, &query, TrackingMethod::Tracking, 0, 300_000) else { continue };
+        let settings = TrackingSettings { fewer_rest: false, ..TrackingSettings::default() };
+        let planned = plan_tracking(&loaded.view(), &query, &settings, 0, &Budget::work(300_000), &|_| {});
+        let Ok(plan) = planned else { continue };
         n_solved += 1;
         assert_eq!((plan.method.as_str(), plan.statistics.relocations), ("tracking", 0));
         accepted(&loaded, &query, &plan);

@@ -24,7 +24,7 @@ fn center_in_world(loaded: &LoadedScene, world_from_object: &Pose) -> Point {
 }
 
 /// Scenes of the papers that are more than a turn in place, and those of tracking, which have a start grasp; and those of several hands.
-const PAPER_SCENES: [&str; 16] = [
+const PAPER_SCENES: [&str; 17] = [
     "bulb",
     "cubic",
     "diamond",
@@ -35,6 +35,7 @@ const PAPER_SCENES: [&str; 16] = [
     "football",
     "football_any_start",
     "football_pivot",
+    "icosahedron",
     "pencil",
     "robot_two_arms",
     "three_fingertips",
