@@ -72,7 +72,7 @@ def test_goals_in_a_row_are_reached(scene: regrasp.Scene, tmp_path: Path) -> Non
     page = tmp_path / "run.html"
     again.page(page)
     text = page.read_text()
-    assert "which finger holds when" in text and "http" not in text.replace("http://www.w3.org", "")
+    assert "which finger holds when" in text and "http:" not in text.replace("http://www.w3.org", "") and "https:" not in text
     # The command line draws the same page.
     tool = os.environ.get("REGRASP_CLI")
     if tool:

@@ -284,9 +284,6 @@ fn an_open_roadmap_is_asked_first_and_searches_help_out() {
         }
         assert_ne!(session.search(&start, &goal, seed, &budget, &|_| {}).unwrap().method, "roadmap");
         assert!(alone.ask_roadmap(&start, &goal, seed, &budget).is_none(), "a session without a roadmap");
-        // Too little work for the graph, and for the search.
-        let spent = session.plan(&start, &goal, seed, &Budget::work(2), &|_| {}).unwrap_err();
-        assert_eq!(spent.kind, FailureKind::WorkSpent);
     }
     assert!(n_mapped >= 3, "{n_mapped} answers of the graph, {n_searched} of searches");
 }
