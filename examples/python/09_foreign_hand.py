@@ -25,10 +25,10 @@ asked = parser.parse_args()
 folder: Path = asked.folder
 model = Path(gymnasium_robotics.__file__).parent / "envs/assets/hand/manipulate_block.xml"
 made = convert(model, folder)
-# A tendon with play couples the last two joints of four fingers. Under load it rests at the end of its play: 0.001 m over the 0.00705 m
-# of the last joint.
+PLAY = -0.001 / 0.00705
+# A tendon with play couples the last two joints of four fingers. Under load it rests at the end of its play.
 for file, before, after in ((made.hand_file, "offset = 0.0", "offset = {}"), (made.urdf, 'offset="0.0"', 'offset="{}"')):
-    file.write_text(file.read_text().replace(before, after.format(-0.001 / 0.00705)))
+    file.write_text(file.read_text().replace(before, after.format(PLAY)))
 
 # The palm faces up. The block is that of the model, where fingers reach it.
 SCENE = """format = "regrasp-scene"
@@ -60,6 +60,8 @@ scene = regrasp.load_scene(folder / "scene.toml")
 crept = regrasp.load_scene(folder / "crept.toml")
 plan = regrasp.plan(scene, seed=asked.seed, settings=CAREFUL)
 assert plan, plan
+# Tendons of 0.00705 m and 0.00805 m, with 0.001 m of play.
+followers = {f"robot0:{finger}J0": (f"robot0:{finger}J1", 0.00805 / 0.00705, PLAY) for finger in ("FF", "MF", "RF", "LF")}
 bodies = {"index": "ff", "middle": "mf", "ring": "rf", "little": "lf", "thumb": "th"}
 plant = ForeignPlant(
     str(model),
@@ -68,6 +70,7 @@ plant = ForeignPlant(
     object_body="object",
     world_from_root=regrasp.Pose(np.zeros(3), np.array([-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])),
     tips={finger: f"robot0:{bodies[finger]}distal" for finger in plan.fingers},
+    followers=followers,
     settings=ForeignSettings(seed=asked.seed, impratio=asked.impratio),
 )
 executor = Executor(

@@ -6,7 +6,7 @@ What it needs is in docs/how-to/execute.md, "A hand of another simulation". Gain
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -62,11 +62,13 @@ class ForeignPlant:
         world_from_root: Pose,
         mjcf_name: Callable[[str], str] = str,
         tips: dict[str, str],
+        followers: Mapping[str, tuple[str, float, float]] | None = None,
         settings: ForeignSettings | None = None,
     ) -> None:
         """root, object_body: names of bodies in the model at ``path``. world_from_root: where the scene has the hand's root link.
 
-        mjcf_name: what the model calls a joint of the plan. tips: the body of every fingertip, by finger. Raises ``ValueError`` for
+        mjcf_name: what the model calls a joint of the plan. tips: the body of every fingertip, by finger.
+        followers: joints of the model that follow one of the plan (leader, multiplier, offset); they begin where they belong. Raises ``ValueError`` for
         models that lack any of it, or whose joints of the plan have no position actuators.
         """
         self.settings = settings = settings or ForeignSettings()
@@ -90,6 +92,10 @@ class ForeignPlant:
         self.tick: float = self._steps * float(model.opt.timestep)
         joints = [self._id(mujoco.mjtObj.mjOBJ_JOINT, mjcf_name(name)) for name in self.joint_names]
         self._qpos = np.array([model.jnt_qposadr[joint] for joint in joints])
+        self._followers = [
+            (self._address(follower), self.joint_names.index(leader), multiplier, offset)
+            for follower, (leader, multiplier, offset) in (followers or {}).items()
+        ]
         self._motors, self.stiffness, self.damping = self._gains(joints)
         self._root = self._id(mujoco.mjtObj.mjOBJ_BODY, root)
         self._object = self._id(mujoco.mjtObj.mjOBJ_BODY, object_body)
@@ -105,6 +111,9 @@ class ForeignPlant:
         self._seen: tuple[float, Array, Array] | None = None
         self._next_pose = 0.0
         self.holding: Command = self._grip(plan)
+
+    def _address(self, joint: str) -> int:
+        return int(self.model.jnt_qposadr[self._id(mujoco.mjtObj.mjOBJ_JOINT, joint)])
 
     def _id(self, kind: Any, name: str) -> int:
         found = int(mujoco.mj_name2id(self.model, kind, name))
@@ -212,6 +221,8 @@ class ForeignPlant:
         command = leg.as_command(0, leg.command(0, position, quat, moves=False), moves=False)
         mujoco.mj_resetData(model, data)
         data.qpos[self._qpos] = leg.ref.joints[0]
+        for address, leader, multiplier, offset in self._followers:
+            data.qpos[address] = multiplier * leg.ref.joints[0][leader] + offset
         data.ctrl[self._motors] = leg.ref.joints[0]
         mujoco.mj_forward(model, data)
         closing = Command(command.servo, leg.ref.joints[0], command.velocities)
