@@ -11,7 +11,7 @@ import gymnasium_robotics
 import numpy as np
 
 import regrasp
-from regrasp.execute import Executor, ForeignPlant, ForeignSettings, turns
+from regrasp.execute import Executor, ExecutorSettings, ForeignPlant, ForeignSettings, turns
 from regrasp.execute.settings import CAREFUL, LOOSE, PLANNER
 from regrasp.from_mjcf import convert
 
@@ -76,6 +76,16 @@ plant = ForeignPlant(
 executor = Executor(
     regrasp.Session(scene, settings=PLANNER),
     plant,
+    # With gains of 1 N m/rad fingertips rest millimetres from where they are told to be.
+    ExecutorSettings(
+        project_distance=0.005,
+        project_turn=0.1,
+        slip_distance=0.006,
+        deviation_distance=0.01,
+        deviation_turn=float(np.radians(15.0)),
+        stall_error=0.4,
+        seed=asked.seed,
+    ),
     careful=[regrasp.Session(scene, settings=CAREFUL)],
     loose=[regrasp.Session(scene, settings=LOOSE), regrasp.Session(crept, settings=LOOSE)],
     stiffness=plant.stiffness,

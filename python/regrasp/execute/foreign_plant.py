@@ -74,12 +74,17 @@ class ForeignPlant:
         self.settings = settings = settings or ForeignSettings()
         self.scene = plan._source  # pyright: ignore[reportPrivateUsage]
         spec: Any = mujoco.MjSpec.from_file(path)
+        for name in (root, object_body):
+            if spec.body(name) is None:
+                raise ValueError(f'the model has no body "{name}"')
         if settings.carries_hand:
             pending = [spec.body(root)]
             while pending:
                 body = pending.pop()
                 body.gravcomp = 1.0
                 pending.extend(body.bodies)
+        # So that it can float until the fingers hold it.
+        spec.body(object_body).gravcomp = 1.0
         if settings.impratio is not None:
             spec.option.impratio = settings.impratio
             spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
@@ -100,7 +105,6 @@ class ForeignPlant:
         self._root = self._id(mujoco.mjtObj.mjOBJ_BODY, root)
         self._object = self._id(mujoco.mjtObj.mjOBJ_BODY, object_body)
         self._free = int(model.jnt_qposadr[model.body_jntadr[self._object]])
-        self._free_dof = int(model.jnt_dofadr[model.body_jntadr[self._object]])
         self._tips = np.array([self._id(mujoco.mjtObj.mjOBJ_BODY, tips[finger]) for finger in self.fingers])
         if settings.friction is not None:
             geoms = np.flatnonzero((model.geom_bodyid == self._object) | np.isin(model.geom_bodyid, self._tips))
@@ -213,7 +217,7 @@ class ForeignPlant:
     # ----------------------------------------------------------------------------------------------------------------- grip
 
     def _grip(self, plan: Plan) -> Command:
-        """Lifts the object to where the plan has it, closes the fingers on it, and lets go. The command that holds it."""
+        """Lifts the object to where the plan has it, and closes the fingers on it while it becomes heavy. The command that holds it."""
         model, data = self.model, self.data
         control = Settings(hold_time=0.0, tick=self.tick)
         leg = Leg(plan, first_rig(plan, control, self.stiffness, self.damping), control)
@@ -225,14 +229,15 @@ class ForeignPlant:
             data.qpos[address] = multiplier * leg.ref.joints[0][leader] + offset
         data.ctrl[self._motors] = leg.ref.joints[0]
         mujoco.mj_forward(model, data)
-        closing = Command(command.servo, leg.ref.joints[0], command.velocities)
+        at, turned = self._in_model(position, quat)
+        data.qpos[self._free : self._free + 7] = np.concatenate([at, turned])
         n_steps = max(1, round(self.settings.grip_time / model.opt.timestep))
         for step in range(n_steps):
+            # Planned forces balance the weight: with a share of the forces, a share of the weight.
             share = min(1.0, 2.0 * step / n_steps)
-            self._aim(Command(closing.servo, closing.positions + share * (command.positions - closing.positions), closing.velocities))
-            at, turned = self._in_model(position, quat)
-            data.qpos[self._free : self._free + 7] = np.concatenate([at, turned])
-            data.qvel[self._free_dof : self._free_dof + 6] = 0.0
+            model.body_gravcomp[self._object] = 1.0 - share
+            targets = leg.ref.joints[0] + share * (command.positions - leg.ref.joints[0])
+            self._aim(Command(command.servo, targets, command.velocities))
             mujoco.mj_step(model, data)
         data.time = 0.0
         return command
