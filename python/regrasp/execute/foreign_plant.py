@@ -128,7 +128,9 @@ class ForeignPlant:
     def _gains(self, joints: list[int]) -> tuple[Array, Array, Array]:
         """Actuators of joints, their stiffness, and damping of joints and actuators."""
         model = self.model
-        motors, stiffness, damping = [], [], []
+        motors: list[int] = []
+        stiffness: list[float] = []
+        damping: list[float] = []
         for joint, name in zip(joints, self.joint_names):
             found = [
                 motor

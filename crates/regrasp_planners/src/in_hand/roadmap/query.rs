@@ -90,7 +90,7 @@ impl<'a> RoadmapPlanner<'a> {
     /// Opens a roadmap for a scene that [`GraspRoadmap::refuse_other_scene`] did not refuse; motions have this speed.
     pub fn of_agreed(roadmap: &'a GraspRoadmap, view: &'a HandView<'a>, speed: &SpeedSettings) -> Self {
         let mut settings = roadmap.about.settings.clone();
-        settings.physics.speed = speed.clone();
+        settings.physics.speed = *speed;
         let settings = settings.within(&view.limits);
         let model = Model::new(view, &settings.physics);
         let fixed = model.any_rolls().then(|| {
