@@ -22,11 +22,14 @@ const COLUMNS: usize = 1_000;
 /// Colour of goals that were reached.
 const REACHED: &str = "#00703c";
 
+/// What a curve shows of a sample.
+type CurveValue<'a> = Box<dyn Fn(&Sample) -> Option<f64> + 'a>;
+
 /// A curve: its name, its colour, its values.
 pub(super) struct Curve<'a> {
     pub name: String,
     pub color: &'static str,
-    pub value: Box<dyn Fn(&Sample) -> Option<f64> + 'a>,
+    pub value: CurveValue<'a>,
 }
 
 /// The time axis of a run.
