@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -74,16 +75,19 @@ class Session:
         task: str | None = None,
         settings: Mapping[str, Any] | None = None,
         threads: int = 1,
+        roadmap: StrPath | None = None,
     ) -> None:
         """Opens `scene` for the hand and the object of `task` (the first where nothing is said).
 
-        settings: of the planner, with the keys of "settings" in a plan file. threads: that search at once.
+        settings: of the planner, with the keys of "settings" in a plan file. threads: that search at once. roadmap: a file that
+        `regrasp roadmap build` wrote; queries are asked of it first, and searched where it has no plan that the checker accepts.
         Raises `InputError`, also for tasks of finger tracking.
         """
         self.scene = scene if isinstance(scene, Scene) else load_scene(scene)
         text = None if settings is None else _settings_text(settings)
         n_threads = whole("Session", "threads", threads, 1, MAX_THREADS)
-        self._native = _regrasp.Session.open(self.scene._native, task, text, n_threads)
+        graph = None if roadmap is None else os.fspath(roadmap)
+        self._native = _regrasp.Session.open(self.scene._native, task, text, n_threads, graph)
         self._task = next(entry for entry in self.scene.tasks if task in (None, entry.name))
         self.hand = next(hand for hand in self.scene.hands if hand.name_in_scene == self._task.hand)
         """The hand that moves."""

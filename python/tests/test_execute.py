@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
 import threading
 from pathlib import Path
 from typing import Any
@@ -66,10 +68,24 @@ def test_goals_in_a_row_are_reached(scene: regrasp.Scene, tmp_path: Path) -> Non
     # Every leg is a plan file that the checker judges by itself.
     for number in range(1, len(log.legs) + 1):
         assert regrasp.check(tmp_path / f"run.leg{number}.json", scene, own_query=True)
+    assert len(again.plans) == len(log.plans)
     page = tmp_path / "run.html"
     again.page(page)
     text = page.read_text()
-    assert "<svg" in text and "http" not in text.replace("http://www.w3.org", "")
+    assert "which finger holds when" in text and "http:" not in text.replace("http://www.w3.org", "") and "https:" not in text
+    # The command line draws the same page.
+    tool = os.environ.get("REGRASP_CLI")
+    if tool:
+        subprocess.run([tool, "view", str(tmp_path / "run.json"), "-o", str(tmp_path / "cli.html")], check=True)
+        assert (tmp_path / "cli.html").read_bytes() == page.read_bytes()
+    (tmp_path / "run.leg2.json").unlink()
+    assert len(RunLog.load(tmp_path / "run.json").plans) == 1
+    broken = (tmp_path / "run.json").read_text().replace('"settle"', '"flies"')
+    (tmp_path / "broken.json").write_text(broken)
+    with pytest.raises(regrasp.InputError, match="E801 .*broken.json:1:"):
+        RunLog.load(tmp_path / "broken.json")
+    with pytest.raises(regrasp.InputError, match="F001"):
+        RunLog.load(tmp_path / "nowhere.json")
 
 
 def test_the_same_run_twice_is_the_same(scene: regrasp.Scene) -> None:
@@ -215,6 +231,29 @@ def test_sessions_answer_and_refuse(scene: regrasp.Scene) -> None:
         regrasp.Session(scene, task="elsewhere")
     with pytest.raises(regrasp.InputError):
         regrasp.Session(scene, settings={"no_such_setting": 1})
+
+
+def test_a_session_asks_its_roadmap_first(scene: regrasp.Scene, tmp_path: Path) -> None:
+    tool = os.environ.get("REGRASP_CLI")
+    if not tool:
+        pytest.skip("REGRASP_CLI names no command line tool that builds a roadmap")
+    graph = tmp_path / "graph.roadmap"
+    build = [tool, "roadmap", "build", str(SCENES / "sphere_90x.toml"), "--places", "40", "-o", str(graph)]
+    subprocess.run(build, check=True, capture_output=True)
+    session = regrasp.Session(scene, roadmap=graph)
+    plan = regrasp.plan(scene, seed=1)
+    assert plan
+    start = session.project(regrasp.Pose(plan.object_positions[0], plan.object_quat_xyzw[0]), plan.joints[0])
+    assert start
+    found = [session.plan(start, goal, seed=1) for goal in turns(start.world_from_object, count=5, seed=1)]
+    assert all(plan and session.check(plan) for plan in found)
+    assert "roadmap" in {plan.method for plan in found if plan}
+    with pytest.raises(regrasp.InputError, match="R615.*friction_margin"):
+        regrasp.Session(scene, settings={"friction_margin": 2.0}, roadmap=graph)
+    with pytest.raises(regrasp.InputError, match="R611"):
+        regrasp.Session(SCENES / "box_90x.toml", roadmap=graph)
+    with pytest.raises(regrasp.InputError, match="F001"):
+        regrasp.Session(scene, roadmap=tmp_path / "nowhere.roadmap")
 
 
 def test_a_thousand_queries_take_no_more_memory(scene: regrasp.Scene) -> None:

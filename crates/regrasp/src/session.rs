@@ -2,6 +2,9 @@
 //!
 //! [`Session::project`] makes a start of what was observed, [`Session::plan`] plans from it, [`Session::check`] judges the plan.
 //! Nothing is read meanwhile, and nothing is kept from one query to the next: the same query has the same answer.
+//!
+//! A session may have a roadmap: it is asked first ([`Session::with_roadmap`]), and a search where it has no answer that the checker
+//! accepts.
 
 use regrasp_base::{Budget, Diagnostic, InputError, Place};
 use regrasp_geometry::Pose;
@@ -9,9 +12,11 @@ use regrasp_grasp::record::PoseData;
 use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, OwnQuery, Report, check, query_of};
 use regrasp_plan::plan::Asked;
+use regrasp_planners::in_hand::roadmap::{GraspRoadmap, QueryMemory, RoadmapPlanner};
 use regrasp_planners::in_hand::starting::{self, Observation, ProjectionLimits, Start};
-use regrasp_planners::{Failure, InHandSettings, Progress, plan_in_hand};
+use regrasp_planners::{Failure, FailureKind, InHandSettings, Progress, plan_in_hand};
 use regrasp_scene::{GraspRequest, HandView, InHandQuery, LoadedScene, Query, Task};
+use std::path::Path;
 
 pub use regrasp_planners::in_hand::starting::{Moved, ObservedVelocities, Touching};
 
@@ -23,7 +28,18 @@ pub struct Session<'a> {
     task: &'a Task,
     view: HandView<'a>,
     settings: InHandSettings,
+    roadmap: Option<&'a SessionRoadmap>,
 }
+
+/// A roadmap that agrees with a session in hand, object, friction, obstacles, fingertips, and in the settings that decide what is
+/// feasible.
+#[derive(Debug, Clone)]
+pub struct SessionRoadmap {
+    roadmap: GraspRoadmap,
+}
+
+/// Share of a query's work that its roadmap may take; the search gets what is left. By hand.
+const ROADMAP_SHARE: u64 = 2;
 
 impl<'a> Session<'a> {
     /// Opens `loaded` for the hand and the object of the task called `task`, of its first task where none is named.
@@ -44,7 +60,23 @@ impl<'a> Session<'a> {
             return Err(bad("A510", "task", problem).expected("a task of kind \"in_hand\"").into());
         }
         settings.validate().map_err(|problem| bad("A503", "settings", problem))?;
-        Ok(Session { loaded, task, view: HandView::of(&loaded.manipulation_of(task)), settings })
+        Ok(Session { loaded, task, view: HandView::of(&loaded.manipulation_of(task)), settings, roadmap: None })
+    }
+
+    /// A roadmap, which came from `path`, as this session may ask it.
+    ///
+    /// Errors: it was built for another scene (`R610` to `R614`, `R606`), or with settings that other motions are feasible with
+    /// (`R615`).
+    pub fn agreed_roadmap(&self, path: &Path, roadmap: GraspRoadmap) -> Result<SessionRoadmap, InputError> {
+        roadmap.refuse_other_scene(path, &self.view)?;
+        roadmap.refuse_other_settings(path, &self.settings)?;
+        Ok(SessionRoadmap { roadmap })
+    }
+
+    /// The same session, which asks a roadmap first. `roadmap` is of a session of the same scene, task and settings.
+    #[must_use]
+    pub fn with_roadmap(self, roadmap: &'a SessionRoadmap) -> Self {
+        Session { roadmap: Some(roadmap), ..self }
     }
 
     /// The hand and the object.
@@ -59,7 +91,8 @@ impl<'a> Session<'a> {
         starting::nearest_start(&self.view, &self.settings, observed, limits)
     }
 
-    /// A plan from `start` to `goal`, a pose of the object in the world. The plan says what it was asked ([`Plan::asked`]).
+    /// A plan from `start` to `goal`, a pose of the object in the world. The plan says what it was asked ([`Plan::asked`]). Its method
+    /// is `roadmap` where the session's roadmap had it, and the checker accepts it.
     ///
     /// Errors: as [`plan_in_hand`].
     pub fn plan(
@@ -70,8 +103,52 @@ impl<'a> Session<'a> {
         budget: &Budget,
         progress: &(dyn Fn(Progress) + Sync),
     ) -> Result<Plan, Failure> {
+        let mut left = budget.clone();
+        match self.ask_roadmap(start, goal, seed, budget) {
+            Some(Ok(plan)) => {
+                if self.check_asked(&plan, start, goal, &CheckSettings::default()).accepted() {
+                    return Ok(plan);
+                }
+                left.max_work = left.max_work.saturating_sub(plan.statistics.work);
+            }
+            Some(Err(failure)) if failure.kind == FailureKind::Interrupted => return Err(failure),
+            Some(Err(failure)) => left.max_work = left.max_work.saturating_sub(failure.statistics.work),
+            None => {}
+        }
+        self.search(start, goal, seed, &left, progress)
+    }
+
+    /// What the session's roadmap says to the query of [`Session::plan`], with half of its work at most. None where the session has no
+    /// roadmap, or a finger is free at the start: graphs are of grasps of all fingers.
+    ///
+    /// Errors: the graph does not lead there. A plan of a graph is not judged yet.
+    pub fn ask_roadmap(&self, start: &Start, goal: &Pose, seed: u64, budget: &Budget) -> Option<Result<Plan, Failure>> {
+        let SessionRoadmap { roadmap } = self.roadmap.filter(|_| start.holds.iter().all(|holds| *holds))?;
+        let planner = RoadmapPlanner::of_agreed(roadmap, &self.view, &self.settings.physics.speed);
+        let budget = Budget { max_work: budget.max_work / ROADMAP_SHARE, ..budget.clone() };
+        let query = self.query(start, goal);
+        let answer = planner.plan(&query, seed, &budget, &mut QueryMemory::default());
+        Some(answer.map(|answer| self.asked(start, &query, answer.plan)))
+    }
+
+    /// A plan by search, whatever the session's roadmap says; as [`Session::plan`].
+    ///
+    /// Errors: as [`plan_in_hand`].
+    pub fn search(
+        &self,
+        start: &Start,
+        goal: &Pose,
+        seed: u64,
+        budget: &Budget,
+        progress: &(dyn Fn(Progress) + Sync),
+    ) -> Result<Plan, Failure> {
         let query = self.query(start, goal);
         let plan = plan_in_hand(&self.view, &query, &self.settings, seed, budget, progress)?;
+        Ok(self.asked(start, &query, plan))
+    }
+
+    /// The plan, which says what it was asked.
+    fn asked(&self, start: &Start, query: &InHandQuery, plan: Plan) -> Plan {
         let fingers = self.view.hand.fingers.iter().zip(&start.holds);
         let asked = Asked {
             start: PoseData::from(&query.world_from_object_start),
@@ -79,7 +156,7 @@ impl<'a> Session<'a> {
             joints: start.joints.clone(),
             free: fingers.filter(|(_, holds)| !**holds).map(|(finger, _)| finger.name.clone()).collect(),
         };
-        Ok(Plan { asked: Some(Box::new(asked)), ..plan })
+        Plan { asked: Some(Box::new(asked)), ..plan }
     }
 
     /// What [`Session::plan`] asks.

@@ -6,6 +6,7 @@ use regrasp::plan::check::{CheckSettings, OwnQuery, ViolationKind, check_files};
 use regrasp::plan::format;
 use regrasp::plan::plan::{Plan, Waypoint};
 use regrasp::planners::FailureKind;
+use regrasp::planners::in_hand::roadmap::{BuildSettings, GraspRoadmap, Region, build_roadmap};
 use regrasp::planners::in_hand::starting::{Observation, ProjectionLimits, Start};
 use regrasp::robot::LoadOptions;
 use regrasp::scene::{LoadedScene, load_scene};
@@ -243,4 +244,87 @@ fn a_session_of_what_cannot_be_asked_is_refused() {
     );
     let tracked = self::loaded("football.toml");
     assert!(Session::open(&tracked, None, InHandSettings::default()).unwrap_err().to_string().contains("tracking"));
+}
+
+/// A graph of some places around start and goal of a scene's task.
+fn roadmap_of(session: &Session, loaded: &LoadedScene, settings: &InHandSettings) -> GraspRoadmap {
+    let query = loaded.task().query(0);
+    let poses = [query.start(), query.goal()].map(|pose| session.view().hand_from(pose));
+    let region = Region::around(&poses, &session.view().object.center_of_mass, 0.01, 1.0);
+    let build = BuildSettings { places: 40, ..BuildSettings::default() };
+    build_roadmap(session.view(), &region, &build, settings, 1, &Budget::unlimited(), &|_| {}).unwrap()
+}
+
+#[test]
+fn an_open_roadmap_is_asked_first_and_searches_help_out() {
+    let loaded = loaded("sphere_90x.toml");
+    let alone = session(&loaded);
+    let settings = InHandSettings::default();
+    let agreed = alone.agreed_roadmap(Path::new("graph"), roadmap_of(&alone, &loaded, &settings)).unwrap();
+    let session = alone.clone().with_roadmap(&agreed);
+    let plan = own_plan(&loaded, 0);
+    let (mut n_mapped, mut n_searched) = (0, 0);
+    for seed in 0..6 {
+        let waypoint = plan.segments.last().unwrap().waypoints.last().unwrap();
+        let start = session.project(&observation(waypoint), &ProjectionLimits::default()).unwrap();
+        let goal = turned(&start, 0.2 + 0.15 * seed as f64);
+        let budget = Budget::work(2_000_000);
+        let found = session.plan(&start, &goal, seed, &budget, &|_| {}).unwrap_or_else(|failure| panic!("{failure}"));
+        let asked = session.check_asked(&found, &start, &goal, &CheckSettings::default());
+        assert!(asked.accepted(), "{:#?}", asked.violations);
+        assert!(session.check(&found, &CheckSettings::default()).accepted(), "the plan says what it was asked");
+        assert_eq!(
+            found,
+            session.plan(&start, &goal, seed, &budget, &|_| {}).unwrap(),
+            "the same query, the same plan"
+        );
+        match found.method.as_str() {
+            "roadmap" => n_mapped += 1,
+            _ => n_searched += 1,
+        }
+        assert_ne!(session.search(&start, &goal, seed, &budget, &|_| {}).unwrap().method, "roadmap");
+        assert!(alone.ask_roadmap(&start, &goal, seed, &budget).is_none(), "a session without a roadmap");
+    }
+    assert!(n_mapped >= 3, "{n_mapped} answers of the graph, {n_searched} of searches");
+}
+
+#[test]
+fn a_finger_in_the_air_and_a_failing_graph_lead_to_a_search() {
+    let loaded = loaded("box_90x.toml");
+    let alone = session(&loaded);
+    let settings = InHandSettings::default();
+    let query = loaded.task().query(0);
+    // One place: it leads nowhere.
+    let region =
+        Region::around(&[alone.view().hand_from(query.start())], &alone.view().object.center_of_mass, 0.001, 0.01);
+    let build = BuildSettings { places: 1, ..BuildSettings::default() };
+    let graph = build_roadmap(alone.view(), &region, &build, &settings, 1, &Budget::unlimited(), &|_| {}).unwrap();
+    let agreed = alone.agreed_roadmap(Path::new("graph"), graph).unwrap();
+    let session = alone.clone().with_roadmap(&agreed);
+    let plan = own_plan(&loaded, 0);
+    let regrasp = plan.segments.iter().find(|segment| segment.moving_finger.is_some()).unwrap();
+    let middle = &regrasp.waypoints[regrasp.waypoints.len() / 2];
+    let start = session.project(&observation(middle), &ProjectionLimits::default()).unwrap();
+    assert!(session.ask_roadmap(&start, &turned(&start, 0.3), 1, &Budget::work(1_000_000)).is_none());
+    for waypoint in [middle, &plan.segments[0].waypoints[0]] {
+        let start = session.project(&observation(waypoint), &ProjectionLimits::default()).unwrap();
+        let found = plan_from(&session, &start, 1).unwrap_or_else(|failure| panic!("{failure}"));
+        assert!(session.check(&found, &CheckSettings::default()).accepted());
+    }
+}
+
+#[test]
+fn a_roadmap_of_something_else_is_refused() {
+    let (sphere, other) = (loaded("sphere_90x.toml"), loaded("box_90x.toml"));
+    let own = session(&sphere);
+    let graph = roadmap_of(&own, &sphere, &InHandSettings::default());
+    let path = Path::new("graph.roadmap");
+    let error = session(&other).agreed_roadmap(path, graph.clone()).unwrap_err();
+    assert_eq!(error.diagnostics[0].code, "R611");
+    let mut settings = InHandSettings::default();
+    settings.physics.friction_margin = 2.0;
+    let careful = Session::open(&sphere, None, settings).unwrap();
+    let error = careful.agreed_roadmap(path, graph).unwrap_err();
+    assert_eq!(error.diagnostics[0].code, "R615");
+    assert!(error.to_string().contains("friction_margin"), "{error}");
 }

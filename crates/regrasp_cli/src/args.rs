@@ -205,7 +205,7 @@ pub struct Check {
 #[derive(Debug, Args)]
 #[command(group(ArgGroup::new("pictures").required(true).multiple(true)))]
 pub struct View {
-    /// Plan file, or grasp list: its page is a gallery
+    /// Plan file, grasp list (its page is a gallery), or run of the executor
     pub plan: PathBuf,
     /// Scene file [default: the one that the plan names, beside the plan or in the current folder]
     pub scene: Option<PathBuf>,

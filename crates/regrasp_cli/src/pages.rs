@@ -66,7 +66,11 @@ pub fn story(telling: &Telling) -> Result<Story, Stop> {
 
 /// Writes the page of a story and says where it is.
 pub fn write(path: &Path, story: &Story, talk: &Talk) -> Result<(), Stop> {
-    let html = page::html(story);
+    write_html(path, &page::html(story), talk)
+}
+
+/// Writes a page and says where it is.
+pub fn write_html(path: &Path, html: &str, talk: &Talk) -> Result<(), Stop> {
     files::write_atomic(path, html.as_bytes()).map_err(|error| Stop::unwritable(path, &error))?;
     talk.event("written", json!({ "page": path, "bytes": html.len(), "sha256": files::sha256(html.as_bytes()) }));
     if let Some(host) = ssh_host() {

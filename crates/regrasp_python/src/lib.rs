@@ -55,7 +55,7 @@ mod _regrasp {
     #[pymodule_export]
     use super::session::{Session, Start};
     #[pymodule_export]
-    use super::view::{page, storyboard};
+    use super::view::{page, run_file, run_page, storyboard};
 
     use pyo3::prelude::*;
 

@@ -11,11 +11,13 @@ use pyo3::prelude::*;
 use regrasp::Budget;
 use regrasp::geometry::{Pose, Vector, pose_from};
 use regrasp::plan::check::CheckSettings;
+use regrasp::planners::in_hand::roadmap::GraspRoadmap;
 use regrasp::planners::in_hand::starting::{self, Observation, ProjectionLimits};
 use regrasp::scene::query::IN_HAND;
-use regrasp::session::{ObservedVelocities, Touching};
+use regrasp::session::{ObservedVelocities, SessionRoadmap, Touching};
 use regrasp::settings::{Overrides, settings_for};
 use serde_json::json;
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// A valid start, as `Session.project` found it.
@@ -93,17 +95,23 @@ pub struct Session {
     scene: Py<Scene>,
     task: Option<String>,
     settings: regrasp::InHandSettings,
+    roadmap: Option<SessionRoadmap>,
 }
 
 impl Session {
     fn opened(&self) -> Result<regrasp::Session<'_>, regrasp::InputError> {
-        regrasp::Session::open(&self.scene.get().loaded, self.task.as_deref(), self.settings.clone())
+        let loaded = &self.scene.get().loaded;
+        let session = regrasp::Session::open(loaded, self.task.as_deref(), self.settings.clone())?;
+        Ok(match &self.roadmap {
+            Some(roadmap) => session.with_roadmap(roadmap),
+            None => session,
+        })
     }
 }
 
 #[pymethods]
 impl Session {
-    /// Opens `scene` for the hand and object of `task`; `settings` as JSON.
+    /// Opens `scene` for the hand and object of `task`; `settings` as JSON; `roadmap` is a file.
     #[staticmethod]
     fn open(
         py: Python<'_>,
@@ -111,14 +119,19 @@ impl Session {
         task: Option<String>,
         settings: Option<&str>,
         threads: usize,
+        roadmap: Option<PathBuf>,
     ) -> PyResult<Self> {
         guarded(py, || {
             let asked = Overrides { n_threads: threads, ..Overrides::default() };
             let settings = settings_for(IN_HAND, settings, &asked).map_err(|wrong| {
                 error::argument(py, "Session", "settings", format!("{wrong:?}"), "keys as \"settings\" in a plan file")
             })?;
-            let session = Session { scene, task, settings: settings.in_hand };
-            session.opened().map_err(|error| error::input(py, &error))?;
+            let mut session = Session { scene, task, settings: settings.in_hand, roadmap: None };
+            let agreed = py.detach(|| {
+                let opened = session.opened()?;
+                roadmap.map(|path| opened.agreed_roadmap(&path, GraspRoadmap::read(&path)?)).transpose()
+            });
+            session.roadmap = agreed.map_err(|error: regrasp::InputError| error::input(py, &error))?;
             Ok(session)
         })
     }
@@ -158,21 +171,52 @@ impl Session {
             let session = self.opened().map_err(|error| error::input(py, &error))?;
             let goal: Pose = pose_from(request.goal.0, request.goal.1);
             let deadline = request.time_limit.map(|limit| started + Duration::from_secs_f64(limit));
-            let searched = Instant::now();
-            let found = watched(py, request.progress.as_ref(), |cancelled, progress| {
-                let budget = Budget { max_work: request.max_work, deadline, improve_for: None, cancelled };
-                session.plan(&start.start, &goal, request.seed, &budget, progress)
-            })?;
-            let search = searched.elapsed().as_secs_f64();
-            let plan = match found {
-                Ok(plan) => plan,
-                Err(failure) => {
-                    return Ok((None, failed(&failure), [search, 0.0, started.elapsed().as_secs_f64()]));
+            let mut left = request.max_work;
+            let (mut search, mut check) = (0.0, 0.0);
+            let timed = |sum: &mut f64, since: Instant| *sum += since.elapsed().as_secs_f64();
+            let budget = |max_work, cancelled| Budget { max_work, deadline, improve_for: None, cancelled };
+            // A plan of the roadmap counts where the checker accepts it as the caller wants it.
+            let asked = Instant::now();
+            let mapped = match self.roadmap {
+                None => None,
+                Some(_) => watched(py, request.progress.as_ref(), |cancelled, _| {
+                    session.ask_roadmap(&start.start, &goal, request.seed, &budget(left, cancelled))
+                })?,
+            };
+            timed(&mut search, asked);
+            let judge = |plan: &regrasp::Plan| session.check_asked(plan, &start.start, &goal, &check_settings);
+            let mut found = None;
+            match mapped {
+                Some(Ok(plan)) => {
+                    let judged = Instant::now();
+                    let verdict = py.detach(|| judge(&plan));
+                    timed(&mut check, judged);
+                    left = left.saturating_sub(plan.statistics.work);
+                    found = verdict.accepted().then_some((plan, verdict));
+                }
+                Some(Err(failure)) => left = left.saturating_sub(failure.statistics.work),
+                None => {}
+            }
+            let (plan, verdict) = match found {
+                Some(found) => found,
+                None => {
+                    let searched = Instant::now();
+                    let answer = watched(py, request.progress.as_ref(), |cancelled, progress| {
+                        session.search(&start.start, &goal, request.seed, &budget(left, cancelled), progress)
+                    })?;
+                    timed(&mut search, searched);
+                    let plan = match answer {
+                        Ok(plan) => plan,
+                        Err(failure) => {
+                            return Ok((None, failed(&failure), [search, check, started.elapsed().as_secs_f64()]));
+                        }
+                    };
+                    let judged = Instant::now();
+                    let verdict = py.detach(|| judge(&plan));
+                    timed(&mut check, judged);
+                    (plan, verdict)
                 }
             };
-            let judged = Instant::now();
-            let verdict = py.detach(|| session.check_asked(&plan, &start.start, &goal, &check_settings));
-            let check = judged.elapsed().as_secs_f64();
             let said = if verdict.accepted() { report(&verdict) } else { rejected(&plan, &verdict) };
             let plan = verdict.accepted().then_some(Plan { plan });
             Ok((plan, said, [search, check, started.elapsed().as_secs_f64()]))

@@ -1,4 +1,4 @@
-//! Pages and pictures of plans.
+//! Pages and pictures of plans and runs.
 
 use crate::error;
 use crate::guard::guarded;
@@ -6,10 +6,13 @@ use crate::model::Scene;
 use crate::plan::Plan;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
+use regrasp::base::files;
 use regrasp::plan::check::{CheckSettings, OwnQuery, check, query_of};
 use regrasp::viewer::page::html;
+use regrasp::viewer::runs;
 use regrasp::viewer::story::{Outcome, Story, Telling, tell};
 use regrasp::viewer::storyboard::StoryboardSettings;
+use std::path::{Path, PathBuf};
 
 /// The page of `plan` in `scene` as it was read, judged by the checker: one HTML file.
 #[pyfunction]
@@ -37,6 +40,33 @@ pub fn storyboard<'py>(
         });
         let picture = made.map_err(|problem| error::argument(py, "storyboard", "plan", problem, DRAWABLE))?;
         Ok(PyBytes::new(py, &picture))
+    })
+}
+
+/// The content of the run file at `path`, a run that makes sense.
+#[pyfunction]
+pub fn run_file<'py>(py: Python<'py>, path: PathBuf) -> PyResult<Bound<'py, PyBytes>> {
+    guarded(py, || {
+        let read = || {
+            let bytes = files::read_at_most(&path, runs::format::MAX_BYTES)?;
+            runs::format::from_json(&path, &bytes).map(|_| bytes)
+        };
+        Ok(PyBytes::new(py, &py.detach(read).map_err(|error| error::input(py, &error))?))
+    })
+}
+
+/// The page of a run, of the content of its file; `plans` are those of its first legs.
+#[pyfunction]
+pub fn run_page(py: Python<'_>, content: &[u8], plans: Vec<Py<Plan>>, title: Option<String>) -> PyResult<String> {
+    guarded(py, || {
+        let made = py.detach(|| {
+            let run = runs::format::from_json(Path::new("run"), content)?;
+            let mut plans: Vec<Option<regrasp::Plan>> =
+                plans.iter().map(|plan| Some(plan.get().plan.clone())).collect();
+            plans.resize(run.legs.len(), None);
+            Ok(runs::html(&run, &plans, title.as_deref()))
+        });
+        made.map_err(|error: regrasp::InputError| error::input(py, &error))
     })
 }
 

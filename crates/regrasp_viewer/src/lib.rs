@@ -1,4 +1,4 @@
-//! Pictures of plans: one self-contained page, storyboards and charts. Reads scene and plan only.
+//! Pictures of plans: one self-contained page, storyboards and charts. Reads scene and plan only; [`runs`] reads what became of plans.
 //!
 //! [`story`] gathers everything that a picture needs to know, [`page`] makes one HTML file of it, [`storyboard`] a PNG of key
 //! frames, [`charts`] and [`roadmap_picture`] make SVG pictures.
@@ -17,6 +17,8 @@ pub mod render;
 pub mod roadmap_picture;
 /// Plans of whole robots.
 pub mod robots;
+/// Runs of the executor.
+pub mod runs;
 /// What a page is told.
 pub mod story;
 /// Key frames of a plan in one picture.

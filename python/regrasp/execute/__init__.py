@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .executor import Executor, execute
     from .faults import FaultyPlant
+    from .foreign_plant import ForeignPlant, ForeignSettings
     from .goals import turns
     from .log import Event, GoalResult, RunLog
     from .mujoco_plant import MujocoPlant, PlantSettings
@@ -28,6 +29,8 @@ __all__ = [
     "Executor",
     "ExecutorSettings",
     "FaultyPlant",
+    "ForeignPlant",
+    "ForeignSettings",
     "GoalResult",
     "MujocoPlant",
     "Observation",
@@ -44,6 +47,8 @@ _HOMES = {
     "Executor": "executor",
     "ExecutorSettings": "settings",
     "FaultyPlant": "faults",
+    "ForeignPlant": "foreign_plant",
+    "ForeignSettings": "foreign_plant",
     "GoalResult": "log",
     "MujocoPlant": "mujoco_plant",
     "Observation": "plant",

@@ -14,7 +14,6 @@ from ..simulate.model import Settings
 from ..simulate.reference import PlanError
 from .executor import execute
 from .goals import turns
-from .log import RunLog
 from .mujoco_plant import MujocoPlant, PlantSettings
 from .settings import ExecutorSettings
 
@@ -22,8 +21,7 @@ from .settings import ExecutorSettings
 def main(arguments: list[str] | None = None) -> int:
     """Exit codes: 0 every goal was reached, 1 not, 2 bad input."""
     parser = argparse.ArgumentParser(prog="python -m regrasp.execute", description="Random goals one after the other, in MuJoCo.")
-    parser.add_argument("scene", nargs="?")
-    parser.add_argument("--view", metavar="RUN.json", help="draw the page of a run that was saved")
+    parser.add_argument("scene")
     parser.add_argument("--goals", type=int, default=5)
     parser.add_argument("--largest", type=float, default=90.0, metavar="DEG", help="turn from one goal to the next at most")
     parser.add_argument("--seed", type=int, default=0)
@@ -34,17 +32,10 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--no-replanning", action="store_true")
     parser.add_argument("--no-slip-trigger", action="store_true")
     parser.add_argument("--package", action="append", default=[], metavar="NAME=DIR")
-    parser.add_argument("-o", "--output", metavar="FILE", help="run.json; with --view the page")
+    parser.add_argument("-o", "--output", metavar="FILE", help="run.json; regrasp view draws it")
     parser.add_argument("--page", metavar="FILE.html")
     asked = parser.parse_args(arguments)
     try:
-        if asked.view:
-            if not asked.output:
-                parser.error("--view needs -o FILE.html")
-            RunLog.load(asked.view).page(asked.output)
-            return 0
-        if not asked.scene:
-            parser.error("names no scene")
         scene = load_scene(asked.scene, packages=dict(entry.split("=", 1) for entry in asked.package))
         simulation = Settings(hold_time=0.0, friction_scale=asked.friction_scale, mass_scale=asked.mass_scale)
         plant = MujocoPlant.of(scene, PlantSettings(simulation=simulation, push=asked.push, seed=asked.seed), seed=asked.seed)

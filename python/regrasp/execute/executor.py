@@ -242,7 +242,8 @@ class Executor:
                 )
                 if isinstance(start, Start):
                     return start
-                message = message or start.message
+                # The last session accepts most: its cause is what is left.
+                message = start.message
             if not told:
                 self._event("no_start", message, "hold")
                 told = True
@@ -291,18 +292,23 @@ class Executor:
 
     def _wait(self) -> None:
         """One tick with the command before, or with the joints where they are."""
-        stiffness, damping = self._gains
-        rig = getattr(self._plant, "rig", None)
         if self._last_command is None:
-            held = getattr(self._plant, "data", None)
-            if held is not None and rig is not None:
-                servo = np.array(held.ctrl[rig.motors])
-            else:
-                servo = self._senses.joints * (1.0 if stiffness is None else stiffness)
-            del damping
-            self._last_command = Command(servo, self._senses.joints.copy(), np.zeros(len(servo)))
+            self._last_command = self._first_command()
         self._plant.apply(self._last_command)
         self._take(self._plant.observe())
+
+    def _first_command(self) -> Command:
+        """What the plant holds with as the run begins: what it says, what a simulation is told, else the joints where they are."""
+        holding: Command | None = getattr(self._plant, "holding", None)
+        if holding is not None:
+            return holding
+        stiffness, _ = self._gains
+        rig, data = getattr(self._plant, "rig", None), getattr(self._plant, "data", None)
+        if rig is not None and data is not None:
+            servo = np.array(data.ctrl[rig.motors])
+        else:
+            servo = self._senses.joints * (1.0 if stiffness is None else stiffness)
+        return Command(servo, self._senses.joints.copy(), np.zeros(len(servo)))
 
     def _begin(self, ticket: Ticket, was_prepared: bool) -> None:
         leg: Leg = ticket.prepared

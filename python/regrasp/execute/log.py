@@ -1,5 +1,8 @@
 """What happened: samples, events, legs and goals of a run."""
 
+# One package, in parts: what is private to it is not private to a part.
+# pyright: reportPrivateUsage=false
+
 from __future__ import annotations
 
 import json
@@ -9,6 +12,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from .. import _regrasp
 from .._plan import Plan
 
 FORMAT = "regrasp-run"
@@ -136,23 +140,32 @@ class RunLog:
         """Writes ``run.json``, and beside it the plan of every leg, as ``run.leg1.json`` and on: each is a plan file that
         ``regrasp check`` judges."""
         where = Path(path)
-        where.write_text(json.dumps(self.to_json(), allow_nan=False) + "\n", encoding="utf-8")
+        where.write_bytes(self._bytes())
         for number, plan in enumerate(self.plans, start=1):
             plan.save(where.with_name(f"{where.stem}.leg{number}.json"))
 
-    def page(self, path: str | os.PathLike[str]) -> None:
-        """Writes the page of the run: one HTML file."""
-        from .page import page
+    def page(self, path: str | os.PathLike[str], title: str | None = None) -> None:
+        """Writes the page of the run: one HTML file, the same as ``regrasp view run.json`` makes."""
+        plans = [plan._native for plan in self.plans]
+        Path(path).write_text(_regrasp.run_page(self._bytes(), plans, title), encoding="utf-8")
 
-        Path(path).write_text(page(self), encoding="utf-8")
+    def _bytes(self) -> bytes:
+        return (json.dumps(self.to_json(), allow_nan=False) + "\n").encode()
 
     @staticmethod
     def load(path: str | os.PathLike[str]) -> RunLog:
-        """Reads ``run.json``, without plans. Raises ``ValueError`` for anything else."""
-        read: Any = json.loads(Path(path).read_text(encoding="utf-8"))
-        content: dict[str, Any] = dict(read) if isinstance(read, dict) else {}  # pyright: ignore[reportUnknownArgumentType]
-        if content.get("format") != FORMAT or content.get("format_version") != FORMAT_VERSION:
-            raise ValueError(f"{path}: is no run of format version {FORMAT_VERSION}")
+        """Reads ``run.json``, and the plans of its legs beside it up to the first that is not there.
+
+        Raises ``InputError`` with the codes of docs/reference/run-format.md.
+        """
+        where = Path(path)
+        content: dict[str, Any] = json.loads(_regrasp.run_file(str(where)))
+        found: list[Plan] = []
+        for number in range(1, len(content["legs"]) + 1):
+            leg = where.with_name(f"{where.stem}.leg{number}.json")
+            if not leg.exists():
+                break
+            found.append(Plan.from_file(leg))
         return RunLog(
             scene=content["scene"],
             status=content["status"],
@@ -162,4 +175,5 @@ class RunLog:
             events=[Event(**entry) for entry in content["events"]],
             legs=[LegRecord(**entry) for entry in content["legs"]],
             goals=[GoalResult(**entry) for entry in content["goals"]],
+            plans=found,
         )

@@ -79,6 +79,10 @@ class ExecutorSettings:
     """Legs that are tried for one goal."""
     plan_attempts: int = 3
     """Seeds that are tried for one leg."""
+    choices: int = 10
+    """Plans that are made for one leg: the one whose motion takes the least time is executed."""
+    choice_work: int = 120_000
+    """Another one is made only while all of a leg are likely to stay below this work, in configurations."""
     max_work: int = 400_000
     """Work of one search, in configurations."""
     time_limit: float | None = None

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 /// Groups of codes, by their beginning.
-const GROUPS: [(&str, &str); 12] = [
+const GROUPS: [(&str, &str); 13] = [
     ("F0", "Files"),
     ("V0", "Numbers and names"),
     ("U1", "Robot files (URDF, SRDF) and packages"),
@@ -18,6 +18,7 @@ const GROUPS: [(&str, &str); 12] = [
     ("B6", "Suite files"),
     ("R6", "Roadmap files"),
     ("G7", "Grasp lists"),
+    ("E8", "Runs of the executor"),
 ];
 /// How far behind a code its message is looked for.
 const WINDOW: usize = 420;
@@ -84,7 +85,7 @@ fn described() -> Result<BTreeMap<String, String>, String> {
 fn codes(text: &str) -> Vec<(usize, &str)> {
     let is_code = |word: &str| {
         let (letter, digits) = word.split_at(1);
-        "FVUMSPCABRG".contains(letter) && digits.bytes().all(|byte| byte.is_ascii_digit())
+        "FVUMSPCABRGE".contains(letter) && digits.bytes().all(|byte| byte.is_ascii_digit())
     };
     let quotes = text.match_indices('"').map(|(at, _)| at);
     let inside = quotes.filter_map(|at| {

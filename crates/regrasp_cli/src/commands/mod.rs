@@ -21,6 +21,7 @@ mod roadmap;
 mod robot_roadmap;
 mod room;
 mod rows;
+mod runs;
 mod simulate;
 mod suite;
 mod task_bench;

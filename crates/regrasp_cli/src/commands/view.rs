@@ -1,5 +1,7 @@
 //! `regrasp view`: a page of a plan, and pictures.
 //!
+//! Grasp lists get a gallery, runs of the executor the page of what happened.
+//!
 //! A plan that the checker rejects gets its page too: it says so, and shows where.
 
 use crate::args::{self, Common};
@@ -7,6 +9,7 @@ use crate::commands::check::scene_of;
 use crate::commands::grasp_files;
 use crate::commands::motion;
 use crate::commands::pictures;
+use crate::commands::runs;
 use crate::interrupt;
 use crate::judge;
 use crate::load;
@@ -19,6 +22,7 @@ use regrasp::grasp::list::format::is_list;
 use regrasp::pictures::roadmap_story;
 use regrasp::plan::format;
 use regrasp::planners::in_hand::roadmap::GraspRoadmap;
+use regrasp::viewer::runs::format::is_run;
 use regrasp::viewer::story::{Outcome, Telling};
 use serde_json::json;
 use std::path::Path;
@@ -37,6 +41,9 @@ pub fn run(arguments: &args::View, common: &Common, talk: &Talk) -> Result<(), S
     let bytes = files::read(&arguments.plan)?;
     if is_list(&bytes) {
         return grasp_files::view(arguments, &bytes, common, talk);
+    }
+    if is_run(&bytes) {
+        return runs::view(arguments, &bytes, &written, talk);
     }
     if format::is_robot_plan(&bytes) {
         return motion::view(arguments, &bytes, &written, common, talk);

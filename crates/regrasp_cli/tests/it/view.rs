@@ -195,3 +195,45 @@ fn markup_in_files_and_their_names_stays_text() {
     }
     assert_eq!(own.matches("<script").count(), 1);
 }
+
+/// A folder with a run whose first leg is the plan of the folder.
+fn with_run() -> Folder {
+    let folder = Folder::planned();
+    let run = std::fs::read_to_string(repository().join("fuzz/seeds/run_json/run.json")).unwrap();
+    std::fs::write(folder.path("run.json"), run).unwrap();
+    folder
+}
+
+#[test]
+fn a_run_has_a_page_with_the_plans_of_its_legs() {
+    let folder = with_run();
+    let alone = folder.run(&["view", "run.json", "-o", "alone.html"]);
+    assert_eq!(alone.code, Some(0), "{alone:?}");
+    ends_with_page(&alone, "alone.html");
+    assert!(alone.err.contains("run    1 of 2 goals reached, 1 legs, 2 events"), "{alone:?}");
+    std::fs::copy(folder.path("plan.json"), folder.path("run.leg1.json")).unwrap();
+    let run = folder.run(&["view", "run.json", "-o", "run.html", "--title", "<b>A & B</b>"]);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    let [alone, page] = ["alone.html", "run.html"].map(|name| std::fs::read_to_string(folder.path(name)).unwrap());
+    assert!(alone.contains("Plans of 0 of 1 legs") && !alone.contains("which finger holds when"));
+    assert!(page.contains("which finger holds when") && page.contains("&lt;b&gt;A &amp; B&lt;/b&gt;"));
+}
+
+#[test]
+fn runs_that_cannot_be_shown_are_refused() {
+    let folder = with_run();
+    for arguments in [["--png", "run.png"], ["--svg", "charts"], ["--story", "story.json"]] {
+        let run = folder.run(&[&["view", "run.json"][..], &arguments].concat());
+        complains(&run, "A512", arguments[0], &["is a run"]);
+    }
+    folder.edit("run.json", "\"format_version\": 1", "\"format_version\": 7");
+    complains(&folder.run(&["view", "run.json", "-o", "run.html"]), "E803", "run.json:1:", &["is 7"]);
+    let folder = with_run();
+    std::fs::write(folder.path("run.leg1.json"), "{}").unwrap();
+    complains(&folder.run(&["view", "run.json", "-o", "run.html"]), "C402", "run.leg1.json", &[]);
+    // The page does not go where the plan of a leg is.
+    std::fs::copy(folder.path("plan.json"), folder.path("run.leg1.json")).unwrap();
+    let run = folder.run(&["view", "run.json", "-o", "run.leg1.json"]);
+    assert_eq!(run.code, Some(2), "{run:?}");
+    assert!(!std::fs::read_to_string(folder.path("run.leg1.json")).unwrap().contains("<html"));
+}

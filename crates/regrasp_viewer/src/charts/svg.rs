@@ -100,6 +100,15 @@ impl Svg {
         ));
     }
 
+    /// A straight line that says what it is where a pointer rests on it.
+    pub fn titled_line(&mut self, from: [f64; 2], to: [f64; 2], stroke: &str, width: f64, title: &str) {
+        let [x1, y1, x2, y2] = [from[0], from[1], to[0], to[1]].map(short);
+        let (width, title) = (short(width), escaped(title));
+        self.push(format!(
+            "<line x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\" stroke=\"{stroke}\" stroke-width=\"{width}\"><title>{title}</title></line>"
+        ));
+    }
+
     /// Lines through points, one for each run without a gap; a run of one point becomes a dot.
     pub fn path(&mut self, points: &[Option<[f64; 2]>], stroke: &str, width: f64, more: &str) {
         let mut data = String::new();

@@ -10,6 +10,7 @@ mod page;
 mod places;
 mod render;
 mod robots;
+mod runs;
 mod sample;
 mod scene;
 mod several;

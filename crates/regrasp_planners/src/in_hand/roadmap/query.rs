@@ -27,6 +27,7 @@ use regrasp_manipulation::grasp::state::GraspState;
 use regrasp_manipulation::in_world::{failure_in_world, plan_in_world};
 use regrasp_manipulation::model::Model;
 use regrasp_manipulation::recording::recorder::{Joins, Recorder};
+use regrasp_manipulation::settings::SpeedSettings;
 use regrasp_plan::Plan;
 use regrasp_plan::plan::Statistics;
 use regrasp_roadmap::AStar;
@@ -83,13 +84,20 @@ impl<'a> RoadmapPlanner<'a> {
     /// Errors: it was built for another one (`R610` to `R614`), or its tables are not of the hand it names (`R606`).
     pub fn new(path: &Path, roadmap: &'a GraspRoadmap, view: &'a HandView<'a>) -> Result<Self, InputError> {
         roadmap.refuse_other_scene(path, view)?;
-        let settings = roadmap.about.settings.within(&view.limits);
+        Ok(Self::of_agreed(roadmap, view, &roadmap.about.settings.physics.speed))
+    }
+
+    /// Opens a roadmap for a scene that [`GraspRoadmap::refuse_other_scene`] did not refuse; motions have this speed.
+    pub fn of_agreed(roadmap: &'a GraspRoadmap, view: &'a HandView<'a>, speed: &SpeedSettings) -> Self {
+        let mut settings = roadmap.about.settings.clone();
+        settings.physics.speed = *speed;
+        let settings = settings.within(&view.limits);
         let model = Model::new(view, &settings.physics);
         let fixed = model.any_rolls().then(|| {
             let fixed = with_fixed_contacts(&settings);
             (Model::new(view, &fixed.physics), fixed)
         });
-        Ok(RoadmapPlanner { model, settings, fixed, roadmap, links: LinkKind::Shortest })
+        RoadmapPlanner { model, settings, fixed, roadmap, links: LinkKind::Shortest }
     }
 
     /// With transfers that follow each other with one grasp made one, where that is free: shorter motions, slower answers.
