@@ -112,3 +112,22 @@ fn no_grasp_is_told_with_its_causes() {
         "{none:?}"
     );
 }
+
+/// Also those that the scene names which they are made from: lists are no inputs of a list.
+#[test]
+fn bundled_lists_are_accepted() {
+    let folder = Folder::new();
+    let lists = repository().join("scenes/two_arms");
+    let mut n_judged = 0;
+    for entry in fs::read_dir(lists).unwrap() {
+        let path = entry.unwrap().path();
+        // Lists of shared models are judged in the tests of their scenes.
+        let is_own = |name: &str| ["bar.", "block.", "horse.", "impossible_"].iter().any(|own| name.starts_with(own));
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if name.ends_with(".grasps.json") && is_own(&name) {
+            succeeds(folder.run(&["check", &path.to_string_lossy()]));
+            n_judged += 1;
+        }
+    }
+    assert_eq!(n_judged, 7);
+}

@@ -117,7 +117,8 @@ pub fn load_grasp_scene(
         let mut notes = Vec::new();
         let object = match (&from_scene, &entry) {
             (Some(loaded), _) => {
-                files.inputs.extend(loaded.scene.inputs.iter().cloned());
+                // Not the lists of grasps that the scene names: the one to be made may be among them.
+                files.inputs.extend(loaded.scene.inputs.iter().filter(|input| input.role != "grasps").cloned());
                 notes.clone_from(&loaded.notes);
                 Some(loaded.manipulation().object().clone())
             }
