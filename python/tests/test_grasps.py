@@ -47,6 +47,21 @@ def test_the_dictionary_of_dexgraspbench_squeezes_beyond_the_grasp(grasps: regra
     assert np.allclose(arrays["grasp_qpos"][:, 3], grasps.poses[:, 6])
 
 
+def test_a_yaml_library_reads_isaac_files(grasps: regrasp.GraspList, tmp_path: Path, regrasp_cli) -> None:
+    yaml = pytest.importorskip("yaml")
+    grasps.save(tmp_path / "grasps.json")
+    run = regrasp_cli("export", "grasps.json", "--isaac", "grasps.yaml")
+    assert run.returncode == 0, run.stderr
+    read = yaml.safe_load((tmp_path / "grasps.yaml").read_text())
+    assert read["format"] == "isaac_grasp" and len(read["grasps"]) == len(grasps)
+    for i, grasp in enumerate(read["grasps"].values()):
+        pose = [*grasp["position"], *grasp["orientation"]["xyz"], grasp["orientation"]["w"]]
+        assert np.allclose(pose, grasps.poses[i], atol=1e-6, rtol=0.0)
+        for key, joints in (("cspace_position", grasps.joints), ("pregrasp_cspace_position", grasps.open_joints)):
+            assert list(grasp[key]) == list(grasps.joint_names)
+            assert np.allclose(list(grasp[key].values()), joints[i], atol=1e-6, rtol=0.0)
+
+
 def test_no_grasp_says_why() -> None:
     with pytest.raises(regrasp.NoGrasps) as caught:
         regrasp.list_grasps(HANDS / "parallel_gripper" / "hand.toml", BOX, settings={"kind": "closing", "frames": 10, "margin": 0.9})
