@@ -6,7 +6,7 @@ mod place;
 mod values;
 
 pub use grasps::Grasps;
-pub use judging::Judging;
+pub use judging::{Judging, JudgingLimits};
 pub use place::Place;
 use values::{count, degrees, margin, metres, package, seconds, threads, trials, whole_number};
 
@@ -137,7 +137,8 @@ pub struct Search {
     /// Force-closure margin that the holding fingers keep, in [0, 1)
     #[arg(long, value_parser = margin, allow_negative_numbers = true)]
     pub margin: Option<f64>,
-    /// Time limit in seconds (in bench: per seed) [default: 60 in plan, where no other limit is given; else none]
+    /// Time limit in seconds (in bench: per seed) [default: 60 in plan, where no other limit is given; else none]. The check of the
+    /// plan may take as long again, and at least 30 s
     #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
     pub time_limit: Option<Duration>,
     /// Work limit, in configurations examined: the same on every machine
@@ -196,6 +197,13 @@ pub struct Check {
     /// Object of a grasp list, a mesh or a scene file [default: the one that the list names]
     #[arg(long, value_name = "FILE", conflicts_with = "scene")]
     pub object: Option<PathBuf>,
+    /// Time limit in seconds, for reading and judging a plan. A plan that is not judged whole is rejected [default: none]
+    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
+    pub time_limit: Option<Duration>,
+    /// Work limit for judging a plan: configurations, samples and distances [default: 20000000, a hundred times what plans of the
+    /// planner need]
+    #[arg(long, value_name = "N", value_parser = whole_number, allow_negative_numbers = true)]
+    pub max_work: Option<u64>,
     /// By what plans are judged.
     #[command(flatten)]
     pub judging: Judging,

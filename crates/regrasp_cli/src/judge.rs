@@ -7,6 +7,7 @@ use crate::talk::Talk;
 use crate::words::{counted, duration, grouped};
 use regrasp::plan::check::{Level, Report, check, check_any, query_of};
 use regrasp::plan::format;
+use regrasp::robot::import::LoadOptions;
 use regrasp::scene::{LoadedScene, load_scene};
 use regrasp::{AnyPlan, RobotPlan};
 use serde_json::json;
@@ -27,7 +28,8 @@ pub fn judge_bytes(
 ) -> Result<Report, Stop> {
     let plan = format::from_json(plan_path, bytes)
         .map_err(|error| Stop::Internal(format!("a plan just made is not a plan file: {error}")))?;
-    let loaded = judging.scene(load_scene(scene_path, &load::options(common))?);
+    let options = LoadOptions { deadline: judging.limits.deadline, ..load::options(common) };
+    let loaded = judging.scene(load_scene(scene_path, &options)?);
     judge(&loaded, &plan, judging, talk)
 }
 

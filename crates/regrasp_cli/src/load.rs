@@ -70,24 +70,34 @@ pub fn motion_scene(path: &Path, query: &str, common: &Common) -> Result<LoadedS
 }
 
 /// As [`scene`], with the task that `plan` answers as its first.
-pub fn scene_of_plan(path: &Path, plan: &regrasp::Plan, common: &Common, talk: &Talk) -> Result<LoadedScene, Stop> {
-    refuse_motion(read_scene(path, &plan.query, common, None, talk)?, path)
-}
-
-/// As [`scene`], but reading is given up when `deadline` has passed: there is no plan then.
-pub fn scene_by(path: &Path, common: &Common, deadline: Option<Instant>, talk: &Talk) -> Result<LoadedScene, Stop> {
-    read_scene(path, "", common, deadline, talk)
-}
-
-fn read_scene(
+pub fn scene_of_plan(
     path: &Path,
-    plan_query: &str,
+    plan: &regrasp::Plan,
     common: &Common,
     deadline: Option<Instant>,
     talk: &Talk,
 ) -> Result<LoadedScene, Stop> {
     let started = Instant::now();
+    let loaded = load_scene(path, &LoadOptions { deadline, ..options(common) })?;
+    refuse_motion(asked_for(loaded, path, &plan.query, started, common, talk)?, path)
+}
+
+/// As [`scene`], but reading is given up when `deadline` has passed: there is no plan then.
+pub fn scene_by(path: &Path, common: &Common, deadline: Option<Instant>, talk: &Talk) -> Result<LoadedScene, Stop> {
+    let started = Instant::now();
     let loaded = load_scene(path, &LoadOptions { deadline, ..options(common) }).map_err(in_time_or_no_plan)?;
+    asked_for(loaded, path, "", started, common, talk)
+}
+
+/// The scene, read since `started`, with the task that `--task` names, else the one of `plan_query`. Says what was read.
+fn asked_for(
+    loaded: LoadedScene,
+    path: &Path,
+    plan_query: &str,
+    started: Instant,
+    common: &Common,
+    talk: &Talk,
+) -> Result<LoadedScene, Stop> {
     let loaded = match &common.task {
         Some(name) => choose(loaded, name, path)?,
         None => loaded.for_query(plan_query),

@@ -7,9 +7,10 @@ use regrasp::Query;
 use regrasp::geometry::Pose;
 use regrasp::plan::check::{CheckSettings, Level, OwnQuery};
 use regrasp::scene::{Gravity, LoadedScene};
+use std::time::Instant;
 
 /// By what plans are judged, and gravity that they are planned under.
-#[derive(Debug, Default, Args)]
+#[derive(Debug, Clone, Default, Args)]
 pub struct Judging {
     /// What the checker judges: geometry (poses only), forces (also contact forces), motion (also slip, speeds and
     /// accelerations) [default: motion]
@@ -26,9 +27,26 @@ pub struct Judging {
     /// otherwise
     #[arg(long)]
     pub own_query: bool,
+    /// Where judging ends, by the flags of the command.
+    #[arg(skip)]
+    pub limits: JudgingLimits,
+}
+
+/// How long the checker may judge. A plan that is not judged whole is rejected.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct JudgingLimits {
+    /// Configurations, samples and distances; the checker's own limit without it.
+    pub max_work: Option<u64>,
+    /// When to end.
+    pub deadline: Option<Instant>,
 }
 
 impl Judging {
+    /// The same within `limits`.
+    pub fn within(&self, limits: JudgingLimits) -> Self {
+        Judging { limits, ..self.clone() }
+    }
+
     /// What plans are judged for.
     pub fn level(&self) -> Level {
         self.level.as_deref().and_then(Level::named).unwrap_or_default()
@@ -37,7 +55,9 @@ impl Judging {
     /// By what the checker judges.
     pub fn settings(&self) -> CheckSettings {
         let own_query = if self.own_query { OwnQuery::Allowed } else { OwnQuery::Refused };
-        CheckSettings { level: self.level(), own_query, ..CheckSettings::default() }
+        let usual = CheckSettings::default();
+        let most_work = self.limits.max_work.unwrap_or(usual.most_work);
+        CheckSettings { level: self.level(), own_query, most_work, deadline: self.limits.deadline, ..usual }
     }
 
     /// What is asked: `query`, or with `--hold` whether its object can be held at the start. Errors: `--hold` for tracking (`A507`).

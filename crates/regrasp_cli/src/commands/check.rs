@@ -1,6 +1,6 @@
 //! `regrasp check`: judge a plan or a grasp list from the files alone.
 
-use crate::args::{self, Common};
+use crate::args::{self, Common, JudgingLimits};
 use crate::commands::motion;
 use crate::commands::written::available_threads;
 use crate::interrupt;
@@ -17,13 +17,18 @@ use regrasp::plan::check::grasps::{GraspPaths, load_grasp_files};
 use regrasp::plan::{Plan, format};
 use regrasp::scene::GraspScene;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 /// Judges; exit code 1 when the plan is rejected.
 pub fn run(arguments: &args::Check, common: &Common, talk: &Talk) -> Result<(), Stop> {
     // The flag is not asked here: the process ends by itself shortly after Ctrl-C.
     interrupt::flag()?;
+    // Reading counts too: a mesh of a million triangles takes seconds.
+    let deadline = arguments.time_limit.and_then(|limit| Instant::now().checked_add(limit));
+    let judging = arguments.judging.within(JudgingLimits { max_work: arguments.max_work, deadline });
     let bytes = files::read(&arguments.plan)?;
     if is_list(&bytes) {
+        refuse_limits(arguments)?;
         return run_list(arguments, &bytes, common, talk);
     }
     if arguments.hand.is_some() || arguments.object.is_some() {
@@ -31,12 +36,24 @@ pub fn run(arguments: &args::Check, common: &Common, talk: &Talk) -> Result<(), 
         return Err(Stop::argument("A512", "--hand, --object", problem, "a grasp list; plans take --scene"));
     }
     if format::is_robot_plan(&bytes) {
-        return motion::check(arguments, &bytes, common, talk);
+        return motion::check(arguments, &judging, &bytes, common, talk);
     }
     let plan = format::from_json(&arguments.plan, &bytes)?;
     let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref(), "--scene FILE")?;
-    let loaded = arguments.judging.scene(load::scene_of_plan(&scene_path, &plan, common, talk)?);
-    if judge::judge(&loaded, &plan, &arguments.judging, talk)?.accepted() { Ok(()) } else { Err(Stop::Rejected) }
+    let loaded = judging.scene(load::scene_of_plan(&scene_path, &plan, common, deadline, talk)?);
+    if judge::judge(&loaded, &plan, &judging, talk)?.accepted() { Ok(()) } else { Err(Stop::Rejected) }
+}
+
+/// Refuses limits for a grasp list, whose size bounds the work (`A507`).
+fn refuse_limits(arguments: &args::Check) -> Result<(), Stop> {
+    let given = [("--max-work", arguments.max_work.is_some()), ("--time-limit", arguments.time_limit.is_some())];
+    match given.into_iter().find(|(_, is_given)| *is_given) {
+        Some((flag, _)) => {
+            let problem = format!("is for plans, and {} is a grasp list", arguments.plan.display());
+            Err(Stop::argument("A507", flag, problem, "no such flag"))
+        }
+        None => Ok(()),
+    }
 }
 
 /// Judges a grasp list.

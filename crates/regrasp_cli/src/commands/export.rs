@@ -58,7 +58,7 @@ pub fn run(arguments: &args::Export, common: &Common, talk: &Talk) -> Result<(),
     let mut scene = None;
     if !arguments.no_check || arguments.mjcf.is_some() {
         let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref(), "--scene FILE")?;
-        let loaded = arguments.judging.scene(load::scene_of_plan(&scene_path, &plan, common, talk)?);
+        let loaded = arguments.judging.scene(load::scene_of_plan(&scene_path, &plan, common, None, talk)?);
         written.refuse_inputs(loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
         if !arguments.no_check && !judge::judge(&loaded, &plan, &arguments.judging, talk)?.accepted() {
             return Err(Stop::Rejected);

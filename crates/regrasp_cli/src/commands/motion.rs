@@ -178,12 +178,17 @@ pub fn scene_of(
 }
 
 /// `regrasp check` of such a plan.
-pub fn check(arguments: &args::Check, bytes: &[u8], common: &Common, talk: &Talk) -> Result<(), Stop> {
+pub fn check(
+    arguments: &args::Check,
+    judging: &args::Judging,
+    bytes: &[u8],
+    common: &Common,
+    talk: &Talk,
+) -> Result<(), Stop> {
     let plan = format::robot_from_json(&arguments.plan, bytes)?;
     let loaded = scene_of(&arguments.plan, &plan, arguments.scene.as_deref(), common)?;
     load::say_loaded(&loaded, 0.0, talk);
-    let loaded = arguments.judging.scene(loaded);
-    let report = judge::judge_robot(&loaded, &plan, &arguments.judging, talk);
+    let report = judge::judge_robot(&judging.scene(loaded), &plan, judging, talk);
     if report.accepted() { Ok(()) } else { Err(Stop::Rejected) }
 }
 

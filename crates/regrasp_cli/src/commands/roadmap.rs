@@ -184,7 +184,7 @@ fn run_picture(arguments: &args::RoadmapPicture, common: &Common, talk: &Talk) -
     // Motions whose contacts stay where they are are geometry.
     let is_fixed = roadmap.about().settings.physics.transfer == TransferMode::Fixed;
     let level = is_fixed.then(|| Level::Geometry.name().into());
-    let judging = args::Judging { level, gravity: None, hold: false, own_query: false };
+    let judging = args::Judging { level, ..args::Judging::default() };
     if !judge::judge(&loaded, &answer.plan, &judging, talk)?.accepted() {
         return Err(Stop::Rejected);
     }

@@ -50,7 +50,7 @@ pub fn run(arguments: &args::View, common: &Common, talk: &Talk) -> Result<(), S
     }
     let plan = format::from_json(&arguments.plan, &bytes)?;
     let scene_path = scene_of(&arguments.plan, &plan, arguments.scene.as_deref(), "regrasp view PLAN SCENE")?;
-    let loaded = arguments.judging.scene(load::scene_of_plan(&scene_path, &plan, common, talk)?);
+    let loaded = arguments.judging.scene(load::scene_of_plan(&scene_path, &plan, common, None, talk)?);
     written.refuse_inputs(loaded.scene.inputs.iter().map(|input| input.path.as_path()))?;
     let roadmap = match &arguments.with_roadmap {
         Some(path) => {

@@ -117,6 +117,22 @@ fn no_plan_is_exit_code_1_with_causes_and_nothing_written() {
     assert!(!folder.path("plan.json").exists());
 }
 
+/// A check with limits says what they cut, and does not accept the plan.
+#[test]
+fn limits_of_a_check_cut_it() {
+    let folder = Folder::new();
+    assert_eq!(folder.run(&["plan", "scene.toml", "-o", "plan.json"]).code, Some(0));
+    let cut = folder.run(&["check", "plan.json", "--max-work", "10"]);
+    assert_eq!(cut.code, Some(1), "{cut:?}");
+    assert!(cut.out.contains("REJECTED") && cut.out.contains("after 10 units of work"), "{}", cut.out);
+    // Reading obeys the time limit too: either ends the command.
+    let late = folder.run(&["check", "plan.json", "--time-limit", "0.000001"]);
+    let (said, both) = (late.code, format!("{}{}", late.out, late.err));
+    assert!(matches!(said, Some(1 | 2)) && both.contains("time limit"), "{late:?}");
+    let limits = ["--max-work", "20000000", "--time-limit", "600"];
+    assert_eq!(folder.run(&[&["check", "plan.json"], limits.as_slice()].concat()).code, Some(0));
+}
+
 /// A plan that is broken after it was written is rejected, with kind and place.
 #[test]
 fn a_broken_plan_is_rejected_with_exit_code_1() {

@@ -5,6 +5,7 @@ use crate::check::pose::pose_difference;
 use crate::check::violation::{Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log};
 use crate::plan::Plan;
+use std::time::Instant;
 
 /// The first joint that is so far beyond its limits, or first step that is so long, that motion between waypoints is not
 /// judged, in words.
@@ -51,28 +52,40 @@ impl CheckSettings {
 pub struct Work {
     spent: u64,
     most: u64,
-    /// What was being judged when the work was spent.
-    cut: Option<&'static str>,
+    deadline: Option<Instant>,
+    /// What was being judged when the work was spent, or the time was up.
+    cut: Option<(&'static str, Spent)>,
+}
+
+/// What there was no more of.
+#[derive(Debug, Clone, Copy)]
+enum Spent {
+    Work,
+    Time,
 }
 
 impl Default for Work {
     fn default() -> Self {
-        Work { spent: 0, most: u64::MAX, cut: None }
+        Work { spent: 0, most: u64::MAX, deadline: None, cut: None }
     }
 }
 
 impl Work {
-    /// Work of at most so many units.
-    pub fn of(most: u64) -> Self {
-        Work { most, ..Work::default() }
+    /// As much work as `settings` allow.
+    pub fn of(settings: &CheckSettings) -> Self {
+        Work { most: settings.most_work, deadline: settings.deadline, ..Work::default() }
     }
 
     /// Counts `units` spent on judging `what`. False from when on more is spent than allowed: nothing more is judged then.
     #[must_use]
     pub fn spend(&mut self, units: u64, what: &'static str) -> bool {
         self.spent = self.spent.saturating_add(units);
-        if self.spent > self.most && self.cut.is_none() {
-            self.cut = Some(what);
+        if self.cut.is_none() {
+            let is_late = || self.deadline.is_some_and(|deadline| Instant::now() >= deadline);
+            self.cut = match self.spent > self.most {
+                true => Some((what, Spent::Work)),
+                false => is_late().then_some((what, Spent::Time)),
+            };
         }
         self.cut.is_none()
     }
@@ -84,14 +97,18 @@ impl Work {
 
     /// What was cut, in words.
     pub fn cut(&self) -> Option<String> {
-        self.cut.map(|what| format!("{what}, after {} units of work", self.most))
+        self.cut.map(|(what, spent)| match spent {
+            Spent::Work => format!("{what}, after {} units of work", self.most),
+            Spent::Time => format!("{what}, as the time limit was reached"),
+        })
     }
 }
 
 /// Reports what was left out for want of work: such a plan is not accepted.
 pub fn report_cut(log: &mut Log, left_out: &mut Vec<String>) {
     if let Some(cut) = log.work.cut() {
-        let message = format!("the plan is too large or its steps are too long to be judged whole: not judged {cut}");
+        let message =
+            format!("the plan is too large or its steps are too long for the limits of the check: not judged {cut}");
         log.push(Violation::new(Kind::NotJudged, message));
         left_out.push(cut);
     }

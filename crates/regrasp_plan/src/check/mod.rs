@@ -115,6 +115,7 @@ use regrasp_scene::pick_and_place::PICK_AND_PLACE;
 use regrasp_scene::{Manipulation, Query, Scene, State};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::time::Instant;
 
 /// How strict the checker is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -158,6 +159,9 @@ pub struct CheckSettings {
     /// Configurations, samples and distances that are looked at; what is left then is not judged, and the plan is rejected.
     /// Plans of the planner need less than a hundredth.
     pub most_work: u64,
+    /// When judging ends: what is left then is not judged, and the plan is rejected. No part of files of settings.
+    #[serde(skip)]
+    pub deadline: Option<Instant>,
     /// Contacts may be this far off the object's surface, in metres.
     pub surface_tolerance: f64,
     /// Contact normals may be this far off the surface's, in radians.
@@ -229,6 +233,7 @@ impl Default for CheckSettings {
             followed_turn: 10.0,
             followed_slide: 1.0,
             most_work: 20_000_000,
+            deadline: None,
             surface_tolerance: 1e-5,
             normal_tolerance: 1e-3,
             force_tolerance: 1e-6,
@@ -351,7 +356,7 @@ impl Log {
 /// `scene` must be loaded afresh from the files: the hashes in `scene.inputs` are compared with those of the plan.
 /// All that the plan does not move rests in `state`.
 pub fn check((scene, state): (&Scene, &State), query: Option<&Query>, plan: &Plan, settings: &CheckSettings) -> Report {
-    let work = limits::Work::of(settings.most_work);
+    let work = limits::Work::of(settings);
     let mut log = Log { most_per_kind: settings.most_per_kind, work, ..Log::default() };
     let mut report = Report::default();
     asked::check_own_query(plan, settings, &mut log);

@@ -9,6 +9,7 @@ use regrasp_robot::import::LoadOptions;
 use regrasp_scene::{GraspRequest, InHandQuery};
 use std::path::Path;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 #[test]
 fn a_good_plan_is_accepted() {
@@ -203,6 +204,24 @@ fn what_is_cut_by_the_work_limit_is_not_accepted() {
         assert_eq!(kinds(&report), [ViolationKind::NotJudged], "{report:?}");
         assert!(!report.accepted() && report.left_out.len() == 1, "{:?}", report.left_out);
     }
+}
+
+/// The clock can only cut a check, and the report says so.
+#[test]
+fn what_is_cut_by_the_deadline_is_not_accepted() {
+    let scene = sample::scene();
+    let plan = sample::plan(&scene);
+    let by = |deadline: Instant| {
+        let settings = CheckSettings { level: Level::Geometry, deadline: Some(deadline), ..CheckSettings::default() };
+        check((&scene, &sample::state(&scene)), None, &plan, &settings)
+    };
+    let now = Instant::now();
+    let late = by(now);
+    assert_eq!(kinds(&late), [ViolationKind::NotJudged], "{late:?}");
+    assert!(!late.accepted() && late.left_out[0].contains("time limit"), "{:?}", late.left_out);
+    let in_time = by(now + Duration::from_secs(3600));
+    let settings = CheckSettings { level: Level::Geometry, ..CheckSettings::default() };
+    assert_eq!(in_time, check((&scene, &sample::state(&scene)), None, &plan, &settings));
 }
 
 /// One definition of relocations, counted from the segments: a finger lands. What a file says of itself does not count.

@@ -43,7 +43,7 @@ pub fn check_robot(
     plan: &RobotPlan,
     settings: &CheckSettings,
 ) -> Report {
-    let work = limits::Work::of(settings.most_work);
+    let work = limits::Work::of(settings);
     let mut log = Log { most_per_kind: settings.most_per_kind, work, ..Log::default() };
     let mut report = Report { duration: plan.duration(), n_waypoints: plan.waypoints().count(), ..Report::default() };
     check_input_files(&plan.inputs, &scene.inputs, &mut log);

@@ -45,7 +45,7 @@ pub fn check_pick_and_place(
     plan: &RobotPlan,
     settings: &CheckSettings,
 ) -> Report {
-    let work = limits::Work::of(settings.most_work);
+    let work = limits::Work::of(settings);
     let mut log = Log { most_per_kind: settings.most_per_kind, work, ..Log::default() };
     let mut report = Report { duration: plan.duration(), n_waypoints: plan.waypoints().count(), ..Report::default() };
     report.assumed = vec![
