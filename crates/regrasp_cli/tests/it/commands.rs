@@ -124,7 +124,7 @@ fn limits_of_a_check_cut_it() {
     assert_eq!(folder.run(&["plan", "scene.toml", "-o", "plan.json"]).code, Some(0));
     let cut = folder.run(&["check", "plan.json", "--max-work", "10"]);
     assert_eq!(cut.code, Some(1), "{cut:?}");
-    assert!(cut.out.contains("REJECTED") && cut.out.contains("after 10 units of work"), "{}", cut.out);
+    assert!(cut.err.contains("REJECTED") && cut.err.contains("after 10 units of work"), "{cut:?}");
     // Reading obeys the time limit too: either ends the command.
     let late = folder.run(&["check", "plan.json", "--time-limit", "0.000001"]);
     let (said, both) = (late.code, format!("{}{}", late.out, late.err));
