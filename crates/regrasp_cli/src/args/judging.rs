@@ -7,7 +7,10 @@ use regrasp::Query;
 use regrasp::geometry::Pose;
 use regrasp::plan::check::{CheckSettings, Level, OwnQuery};
 use regrasp::scene::{Gravity, LoadedScene};
-use std::time::Instant;
+use std::time::{Duration, Instant};
+
+/// A plan that was found in time is not lost for a check that takes a little longer.
+const LEAST_CHECK_TIME: Duration = Duration::from_secs(30);
 
 /// By what plans are judged, and gravity that they are planned under.
 #[derive(Debug, Clone, Default, Args)]
@@ -45,6 +48,13 @@ impl Judging {
     /// The same within `limits`.
     pub fn within(&self, limits: JudgingLimits) -> Self {
         Judging { limits, ..self.clone() }
+    }
+
+    /// The same for a plan that was just found: judging may take as long as the search was allowed to, and [`LEAST_CHECK_TIME`] at least.
+    pub fn after_search(&self, time_limit: Option<Duration>) -> Self {
+        let check_time = time_limit.map(|limit| limit.max(LEAST_CHECK_TIME));
+        let deadline = check_time.and_then(|time| Instant::now().checked_add(time));
+        self.within(JudgingLimits { deadline, ..JudgingLimits::default() })
     }
 
     /// What plans are judged for.

@@ -79,7 +79,7 @@ pub fn plan(
         duration(seconds),
     ));
     talk.event("plan", json!({ "seconds": seconds, "statistics": plan.statistics, "duration": plan.duration() }));
-    write(&plan, arguments, common, talk)
+    write(&plan, arguments, &arguments.judging.after_search(limits.time_limit), common, talk)
 }
 
 /// Arguments that have no meaning for a robot that moves (`A507`).
@@ -101,14 +101,20 @@ fn refuse_in_hand_arguments(arguments: &args::Plan) -> Result<(), Stop> {
 }
 
 /// Judges what will be written, in a scene read afresh; writes it where it is accepted.
-fn write(plan: &RobotPlan, arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), Stop> {
+fn write(
+    plan: &RobotPlan,
+    arguments: &args::Plan,
+    judging: &args::Judging,
+    common: &Common,
+    talk: &Talk,
+) -> Result<(), Stop> {
     let bytes = format::robot_to_json(plan);
     let output = arguments.output.as_deref();
     let plan_path = output.unwrap_or(Path::new("plan.json"));
     let read = format::robot_from_json(plan_path, bytes.as_bytes())
         .map_err(|error| Stop::Internal(format!("a plan just made is not a plan file: {error}")))?;
     let again = load::motion_scene(&arguments.scene, &read.query, common)?;
-    let report = judge::judge_robot(&arguments.judging.scene(again), &read, &arguments.judging, talk);
+    let report = judge::judge_robot(&judging.scene(again), &read, judging, talk);
     if !report.accepted() {
         return Err(written::rejected(output, &bytes, talk));
     }

@@ -1,6 +1,6 @@
 //! `regrasp plan`: plan a scene, check the plan, then write it.
 
-use crate::args::{self, Common, Judging, JudgingLimits};
+use crate::args::{self, Common, Judging};
 use crate::commands::motion;
 use crate::commands::pictures;
 use crate::commands::written::{Limits, available_threads, of_plan, rejected, write};
@@ -78,14 +78,9 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
     let query = query.started_at(&Pose::from(&plan.start));
     let page = page_of(&query);
     let output = arguments.output.as_deref();
-    let check_time = time_limit.map(|limit| limit.max(LEAST_CHECK_TIME));
-    let deadline = check_time.and_then(|time| Instant::now().checked_add(time));
-    let judging = arguments.judging.within(JudgingLimits { deadline, ..JudgingLimits::default() });
+    let judging = arguments.judging.after_search(time_limit);
     judge_and_write(&plan, output, &arguments.scene, page.as_ref(), common, &judging, talk)
 }
-
-/// The check of a plan may take as long as the time limit again, and so long at least: a plan that was found in time is not lost for it.
-const LEAST_CHECK_TIME: Duration = Duration::from_secs(30);
 
 /// Time limit where no limit is given, for reading and planning.
 const DEFAULT_TIME_LIMIT: Duration = Duration::from_secs(60);
