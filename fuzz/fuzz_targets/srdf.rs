@@ -17,5 +17,5 @@ static FOLDER: LazyLock<(Folder, Robot)> = LazyLock::new(|| {
 
 fuzz_target!(|bytes: &[u8]| {
     let path = FOLDER.0.put("hand.srdf", bytes);
-    let _ = load_srdf(&path, &FOLDER.1, options(bytes).lenient);
+    let _ = load_srdf(&path, &FOLDER.1, &options(bytes));
 });

@@ -46,7 +46,7 @@ pub fn fuzz(targets: &[String]) -> Outcome {
         }
         let scratch = if Path::new("/dev/shm").is_dir() { "/dev/shm" } else { "/tmp" };
         let line = format!(
-            "TMPDIR={scratch} cargo +nightly fuzz run --sanitizer none {target} -- -runs={runs} -max_len=4096 -timeout=30 \
+            "TMPDIR={scratch} cargo fuzz run --sanitizer none {target} -- -runs={runs} -max_len=4096 -timeout=30 \
              -rss_limit_mb=1024"
         );
         run("env", &words(&line))?;

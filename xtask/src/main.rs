@@ -47,7 +47,7 @@ const TASKS: [Task; 15] = [
     ("replay", "replay plans in MuJoCo: six scenes, negative controls, and all in-hand scenes", replay::in_hand),
     ("replay-tracking", "replay tracking plans in MuJoCo", replay::tracking),
     ("campaign", "same bytes on any number of threads; the checker against broken and good plans", campaign::checker),
-    ("fuzz", "fuzz every reader; needs a nightly toolchain and cargo-fuzz", campaign::fuzz),
+    ("fuzz", "fuzz every reader; needs cargo-fuzz", campaign::fuzz),
     (
         "fuzz-program",
         "broken files of every kind against the whole program (RUNS, default 20000)",

@@ -28,6 +28,8 @@ const LIMIT: Duration = Duration::from_secs(10);
 struct Row {
     /// Seconds of: preparation, search, simplification, certification, times.
     stages: [f64; 5],
+    /// Seconds of the checker.
+    check: f64,
     is_solved: bool,
     is_accepted: bool,
     length: f64,
@@ -58,8 +60,9 @@ fn main() {
     }
     let settings = serde_json::from_str(&settings).expect("settings of motions");
     let mut rows = Vec::new();
-    let mut table =
-        String::from("scene,seed,solved,accepted,prepare_s,search_s,simplify_s,certify_s,times_s,length,duration\n");
+    let mut table = String::from(
+        "scene,seed,solved,accepted,prepare_s,search_s,simplify_s,certify_s,times_s,check_s,length,duration\n",
+    );
     for path in &scenes {
         let loaded = load_scene(path, &options).unwrap_or_else(|error| panic!("{error}"));
         for seed in 0..seeds {
@@ -77,7 +80,9 @@ fn main() {
             match plan_in_stages(world, query, &settings, seed, &budget, &mut watch) {
                 Ok(plan) => {
                     row.is_solved = true;
+                    let before = ThreadTime::now();
                     let report = check_robot(world, Some(query), &plan, &CheckSettings::default());
+                    row.check = before.elapsed().as_secs_f64();
                     row.is_accepted = report.accepted();
                     if let Some(violation) = report.violations.first() {
                         println!("{} seed {seed}: {violation:?}", path.display());
@@ -91,8 +96,8 @@ fn main() {
             let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
             let times = row.stages.map(|seconds| format!("{seconds:.9}")).join(",");
             table += &format!(
-                "{name},{seed},{},{},{times},{:.6},{:.6}\n",
-                row.is_solved, row.is_accepted, row.length, row.duration
+                "{name},{seed},{},{},{times},{:.9},{:.6},{:.6}\n",
+                row.is_solved, row.is_accepted, row.check, row.length, row.duration
             );
             rows.push(row);
         }
@@ -121,6 +126,7 @@ fn main() {
         line(&format!("{name} us"), 1e6, &|row| row.stages[index]);
     }
     line("search to times us", 1e6, &|row| row.stages[1..].iter().sum());
+    line("check us", 1e6, &|row| row.check);
     line("length rad", 1.0, &|row| row.length);
     line("duration s", 1.0, &|row| row.duration);
 }

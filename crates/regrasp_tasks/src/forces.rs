@@ -11,6 +11,8 @@ use regrasp_grasp::wrench::{BalancedForces, Wrench};
 const LARGEST_SHARE: f64 = 0.01;
 /// Time between the poses that accelerations are taken from, in seconds.
 const SHORT: f64 = 1e-3;
+/// The weight that inertia is compared with is that on Earth, in m/s^2.
+const STANDARD_GRAVITY: f64 = 9.80665;
 /// Places of a step at which forces are compared.
 const LOOKS: usize = 8;
 
@@ -32,6 +34,17 @@ pub fn holds(context: &Context, hand: usize, grasp: &Grasp, world_from_object: &
     let model = context.hands[hand].model;
     let Some(forces) = &model.forces else { return false };
     grasp.held.is_balanced_under(model, forces, weight(context, world_from_object))
+}
+
+/// The largest contact force of a hand that holds the object at rest at a pose, over the object's weight. None where it does not hold it.
+///
+/// Two fingers that press against each other while the others hardly touch need large forces, and the object turns between them as soon
+/// as servos give way.
+pub fn strain(context: &Context, hand: usize, grasp: &Grasp, world_from_object: &Pose) -> Option<f64> {
+    let load = weight(context, world_from_object);
+    let forces = under(context, hand, grasp, load)?;
+    let largest = forces.iter().map(|own| own.force.norm()).fold(0.0, f64::max);
+    Some(if largest > 0.0 { largest / load.force.norm() } else { 0.0 })
 }
 
 /// What a hand carries.
@@ -72,6 +85,24 @@ impl Carried<'_> {
             force: into_object * ((context.gravity - acceleration) * context.object.mass),
             torque: -(inertia * spin_up + spin.cross(&(inertia * spin))),
         }
+    }
+
+    /// The largest inertia of the object along a motion, as a share of its weight on Earth ([`TaskSettings::carried_inertia`]).
+    ///
+    /// [`TaskSettings::carried_inertia`]: regrasp_manipulation::task_settings::TaskSettings::carried_inertia
+    pub fn inertia_share(&self, context: &Context, timed: &TimedPath) -> f64 {
+        let frame = &context.hands[self.hand].model.frame;
+        let heavy = context.object.mass * STANDARD_GRAVITY;
+        let share = |step: usize, look: usize| {
+            let share = look as f64 / LOOKS as f64;
+            let state = timed.track(step).at(share);
+            let rests = weight(context, &self.world_from_object(context, &state));
+            let load = self.load(context, timed, step, share);
+            let torque = (load.torque - rests.torque).norm() / frame.torque_scale;
+            (load.force - rests.force).norm().max(torque) / heavy
+        };
+        let looks = (0..timed.corners.len()).flat_map(|step| (0..=LOOKS).map(move |look| (step, look)));
+        looks.map(|(step, look)| share(step, look)).fold(0.0, f64::max)
     }
 
     /// Forces at every point of a motion. Errors: what is wrong.

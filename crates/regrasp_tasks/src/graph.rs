@@ -5,6 +5,7 @@ mod cheapest;
 use crate::context::Context;
 use crate::exchange::{Effort, Give, Places, is_double_grasp};
 use crate::failing::{Stage, Tally};
+use crate::forces;
 use crate::in_hand::{self, Change};
 use crate::motions::{self, Step, Stuck};
 use crate::placements::{Place, intermediate};
@@ -89,6 +90,11 @@ const CHANGE: f64 = 100.0;
 const SECONDS_PER_METRE: f64 = 2.0;
 /// What a poor grasp costs more than a good one, in seconds. By hand.
 const POOR: f64 = 2.0;
+/// What a grasp costs more whose largest contact force is the weight of the object larger than another one's, in seconds; forces up to
+/// [`EASY`] weights cost nothing. By hand.
+const STRAIN: f64 = 2.0;
+/// Forces of three fingers about an object are about as large as its weight.
+const EASY: f64 = 1.0;
 /// What exchanges cost more for each that failed, in seconds, so that other ways get their turn. By hand.
 const FAILED: f64 = 0.05;
 /// What an exchange costs more that was not found at the best places, in seconds. By hand.
@@ -358,13 +364,24 @@ impl<'c, 'a> Graph<'c, 'a> {
         if matches!(grip.known, Known::New) {
             tally.work(1);
             let own = &self.context.hands[hand].grasps[grasp];
-            grip.known = match may_hold(self.context, &self.places[place], hand, own) {
-                Ok(()) => Known::Likely,
+            let at = &self.places[place];
+            let found = may_hold(self.context, at, hand, own).and_then(|()| {
+                forces::strain(self.context, hand, own, &at.world_from_object)
+                    .ok_or("grasps that do not hold the weight")
+            });
+            match found {
+                Ok(strain) => {
+                    let dearer = STRAIN * (strain - EASY).max(0.0);
+                    grip.known = Known::Likely;
+                    grip.cost += dearer;
+                    // Another one may be cheaper now.
+                    return dearer == 0.0;
+                }
                 Err(reason) => {
                     tally.count(stage, Err(reason));
-                    Known::Dead
+                    grip.known = Known::Dead;
                 }
-            };
+            }
         }
         !grip.known.is_dead()
     }

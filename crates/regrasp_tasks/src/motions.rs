@@ -411,6 +411,11 @@ impl<'c, 'a> Maker<'c, 'a> {
     ) -> Result<TimedPath, Stuck> {
         let context = self.context;
         let (mut slower, mut n_steps) = (1.0, CARRY_STEPS);
+        let share = carried.inertia_share(context, &path.timed(&context.limits, slower, n_steps));
+        if share > context.settings.carried_inertia {
+            // On the same path inertia falls with the square of the speed.
+            slower = (share / context.settings.carried_inertia).sqrt();
+        }
         for _ in 0..SLOWER + FINER {
             let timed = path.timed(&context.limits, slower, n_steps);
             match carried.along(context, &timed) {

@@ -30,7 +30,12 @@ pub struct Contact {
 pub struct Memory {
     frames: Vec<Pose>,
     bodies: Vec<Placement>,
+    /// Obstacles near a body.
+    near: Vec<u32>,
 }
+
+/// More than any rounding of single precision near a robot, in metres.
+const SINGLE_ROUNDING: f64 = 1e-4;
 
 impl Collider<'_> {
     /// The first body that is not proved to keep the clearance, in this configuration. None where all do.
@@ -54,14 +59,14 @@ impl Collider<'_> {
         memory.bodies.clear();
         let placement = |frame: Option<usize>| frame.map_or(Placement::IDENTITY, |f| (&memory.frames[f]).into());
         memory.bodies.extend(self.model.bodies.iter().map(|body| placement(body.frame)));
-        let found = self.first_contact(&memory.bodies, sway, pair_sway, clearance);
+        let found = self.first_contact((&memory.bodies, &mut memory.near), sway, pair_sway, clearance);
         self.single = memory;
         found
     }
 
     fn first_contact(
         &self,
-        places: &[Placement],
+        (places, near): (&[Placement], &mut Vec<u32>),
         sway: impl Fn(usize) -> f64,
         pair_sway: impl Fn(usize) -> f64,
         clearance: f64,
@@ -69,8 +74,16 @@ impl Collider<'_> {
         for &body in &self.exposed {
             let body = body as usize;
             let required = sway(body) + clearance;
-            for (obstacle, exact) in self.world.exact.iter().enumerate() {
-                if !self.is_apart_from(body, &places[body], exact, required) {
+            // Obstacles whose box is farther from the body's ball are farther from the body.
+            let bound = &self.model.bodies[body].bound;
+            let (center, reach) = (places[body].point(&bound.center.map(f64::from).into()), f64::from(bound.radius));
+            let corner = |sign: f64| {
+                let room = sign * (reach + required + SINGLE_ROUNDING);
+                [center.x + room, center.y + room, center.z + room].map(|x| x as f32)
+            };
+            self.world.near(corner(-1.0), corner(1.0), near);
+            for obstacle in near.iter().map(|&obstacle| obstacle as usize) {
+                if !self.is_apart_from(body, &places[body], &self.world.exact[obstacle], required) {
                     return Some(Contact { body, partner: Partner::Obstacle(obstacle) });
                 }
             }

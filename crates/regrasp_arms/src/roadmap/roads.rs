@@ -104,8 +104,18 @@ impl Roads {
             node if node == at_goal => goal,
             node => nodes[node].as_slice(),
         };
+        // The search would look at the whole graph before it gave up on a goal that no node reaches.
         let mut is_near_goal = vec![false; nodes.len()];
-        self.nearest(goal, n_neighbours).into_iter().for_each(|node| is_near_goal[node] = true);
+        let mut reaches_goal = None;
+        for node in self.nearest(goal, n_neighbours) {
+            let is_asked = reaches_goal.is_none();
+            if is_asked {
+                counts.tested += 1;
+                reaches_goal = is_free(Edge::ToGoal, &nodes[node], goal).then_some(node);
+            }
+            is_near_goal[node] = !is_asked || reaches_goal.is_some();
+        }
+        reaches_goal?;
         let mut before = vec![usize::MAX; nodes.len() + 2];
         let mut open = BinaryHeap::new();
         let push = |open: &mut BinaryHeap<Open>, from: usize, cost: f64, node: usize| {
@@ -124,9 +134,12 @@ impl Roads {
                 (_, node) if node == at_goal => Edge::ToGoal,
                 _ => Edge::Known([from.min(node), from.max(node)]),
             };
-            counts.tested += 1;
-            if !is_free(edge, configuration(from), configuration(node)) {
-                continue;
+            let is_known = edge == Edge::ToGoal && reaches_goal == Some(from);
+            if !is_known {
+                counts.tested += 1;
+                if !is_free(edge, configuration(from), configuration(node)) {
+                    continue;
+                }
             }
             before[node] = from;
             if node == at_goal {

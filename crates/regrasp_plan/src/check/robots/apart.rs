@@ -7,7 +7,7 @@
 //! along its own arc, and those before it are rigid motions. Two items are therefore apart in the whole interval where their distance at
 //! the middle is more than the two sums up to the body that both stand on. Else the interval is halved.
 
-use crate::check::robots::crowd::Crowd;
+use crate::check::robots::crowd::{Ball, Band, Crowd, Row};
 use crate::check::robots::items::{Item, Items, Owner, Pair};
 use crate::check::robots::motion::{RobotStep, largest_change};
 use crate::check::robots::question::Question;
@@ -179,16 +179,19 @@ impl Judge<'_, '_, '_> {
     fn whole(&mut self, is_active: impl Fn(&usize) -> bool) {
         self.place(0.0, 1.0);
         let mut active: Vec<usize> = self.scene.crowd.others.iter().copied().filter(&is_active).collect();
-        for index in 0..self.scene.crowd.rows.len() {
-            let row = &self.scene.crowd.rows[index];
-            let (item, joints, floor) = (row.item, row.joints, row.floor);
+        for index in 0..self.scene.crowd.bands.len() {
+            let Band { item, joints, .. } = self.scene.crowd.bands[index];
             let travel = self.travel(item, joints);
-            let row = &self.scene.crowd.rows[index];
-            let gap = row.gap(&self.scene.centers[item], self.scene.items.items[item].radius);
-            if gap > floor + travel + ROUNDING {
+            let crowd = &self.scene.crowd;
+            let (center, radius) = (self.scene.centers[item], self.scene.items.items[item].radius);
+            let is_near = |ball: &Ball, floor: f64| ball.gap(&center, radius) <= floor + travel + ROUNDING;
+            let band = &crowd.bands[index];
+            if !is_near(&band.ball, band.floor) {
                 continue;
             }
-            active.extend(row.pairs.iter().copied().filter(&is_active));
+            for row in crowd.rows[band.rows.clone()].iter().filter(|row| is_near(&row.ball, row.floor)) {
+                active.extend(crowd.pairs(row).iter().copied().filter(&is_active));
+            }
         }
         active.sort_unstable();
         self.pairs(0.0, 1.0, &active);
@@ -328,24 +331,41 @@ pub fn note_clearance(scene: &mut Placed, joints: &[f64], at: Moment, clearance:
     scene.place(joints);
     let items = scene.items;
     let known = clearance.as_ref().map_or(FARTHEST, |known| known.distance);
-    let near_rows = scene.crowd.rows.iter().filter(|row| {
-        let gap = row.gap(&scene.centers[row.item], items.items[row.item].radius);
-        gap < known
-    });
-    let judged = scene.crowd.others.iter().chain(near_rows.flat_map(|row| &row.pairs));
-    let judged = judged.filter(|index| items.pairs[**index].floor >= 0.0);
-    let near: Vec<Reverse<Near>> = judged
-        .map(|&index| Reverse(Near { gap: scene.gap(&items.pairs[index]), pair: index }))
-        .filter(|near| near.0.gap < known)
-        .collect();
-    // Only few are taken: no need to sort all.
+    let crowd = &scene.crowd;
+    let gap_of = |ball: &Ball, item: usize| ball.gap(&scene.centers[item], items.items[item].radius);
+    let is_judged = |index: &usize| items.pairs[*index].floor >= 0.0;
+    let of_pair = |&index: &usize| Near { gap: scene.gap(&items.pairs[index]), what: What::Pair(index) };
+    let bands = crowd.bands.iter().enumerate();
+    let bands = bands.map(|(index, band)| Near { gap: gap_of(&band.ball, band.item), what: What::Band(index) });
+    let near = crowd.others.iter().filter(|index| is_judged(index)).map(of_pair).chain(bands);
+    let near: Vec<Reverse<Near>> = near.filter(|near| near.gap < known).map(Reverse).collect();
+    // Only few are taken: no need to sort all. Bands and rows are opened when they are the nearest left.
     let mut near = BinaryHeap::from(near);
     let mut least = known;
-    while let Some(Reverse(Near { gap, pair })) = near.pop() {
+    while let Some(Reverse(Near { gap, what })) = near.pop() {
         if gap >= least {
             break;
         }
-        let pair = &items.pairs[pair];
+        let crowd = &scene.crowd;
+        let index = match what {
+            What::Band(index) => {
+                let band = &crowd.bands[index];
+                let gap_of = |row: &Row| row.ball.gap(&scene.centers[band.item], items.items[band.item].radius);
+                let rows = band.rows.clone();
+                let rows = rows.map(|row| Near { gap: gap_of(&crowd.rows[row]), what: What::Row(row) });
+                near.extend(rows.filter(|near| near.gap < least).map(Reverse));
+                continue;
+            }
+            What::Row(row) => {
+                let pairs = crowd.pairs(&crowd.rows[row]).iter();
+                let of_pair = |&pair: &usize| Near { gap: scene.gap(&items.pairs[pair]), what: What::Pair(pair) };
+                let pairs = pairs.filter(|&&pair| items.pairs[pair].floor >= 0.0).map(of_pair);
+                near.extend(pairs.filter(|near| near.gap < least).map(Reverse));
+                continue;
+            }
+            What::Pair(index) => index,
+        };
+        let pair = &items.pairs[index];
         if let Some(distance) = scene.measure(pair, least.max(1e-3)).filter(|distance| *distance < least) {
             least = distance;
             let pair = [pair.a, pair.b].map(|item| items.items[item].name.clone());
@@ -354,15 +374,26 @@ pub fn note_clearance(scene: &mut Placed, joints: &[f64], at: Moment, clearance:
     }
 }
 
-/// A pair and the distance between its balls, in metres; ordered by that, then by index.
+/// What may be near: all that stands in a band or row may be as near as its ball.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum What {
+    /// A band, by its index.
+    Band(usize),
+    /// A row, by its index.
+    Row(usize),
+    /// A pair, by its index.
+    Pair(usize),
+}
+
+/// What may be near, and the distance between the balls, in metres; ordered by that, then by what it is.
 struct Near {
     gap: f64,
-    pair: usize,
+    what: What,
 }
 
 impl Ord for Near {
     fn cmp(&self, other: &Self) -> Ordering {
-        self.gap.total_cmp(&other.gap).then(self.pair.cmp(&other.pair))
+        self.gap.total_cmp(&other.gap).then(self.what.cmp(&other.what))
     }
 }
 
