@@ -8,12 +8,19 @@ impl Graph<'_, '_> {
     fn costs_to_goal(&self) -> Vec<f64> {
         let mut least = vec![f64::INFINITY; self.n_nodes];
         least[self.index(Node::Lies(1))] = 0.0;
-        let mut edges = Vec::new();
+        // All edges in a row, asked for once; by node, where its edges end.
+        let (mut all, mut ends, mut edges) = (Vec::new(), Vec::with_capacity(self.n_nodes), Vec::new());
+        for index in 0..self.n_nodes {
+            self.edges(self.node(index), &mut edges);
+            all.extend(edges.iter().map(|&(to, cost)| (to as u32, cost)));
+            ends.push(all.len());
+        }
         loop {
-            let mut is_settled = true;
-            for index in 0..self.n_nodes {
-                self.edges(self.node(index), &mut edges);
-                let best = edges.iter().map(|&(to, cost)| cost + least[to]).fold(least[index], f64::min);
+            let (mut is_settled, mut first) = (true, 0);
+            for (index, &end) in ends.iter().enumerate() {
+                let own = &all[first..end];
+                first = end;
+                let best = own.iter().map(|&(to, cost)| cost + least[to as usize]).fold(least[index], f64::min);
                 if best < least[index] {
                     (least[index], is_settled) = (best, false);
                 }
