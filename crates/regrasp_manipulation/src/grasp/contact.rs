@@ -1,5 +1,6 @@
 //! Contacts that a finger can reach, drawn at random.
 
+use crate::grasp::closing::draw_touch;
 use crate::model::Model;
 use crate::relocation::{Foothold, lift_is_within_reach};
 use crate::rolling::follow::ik_settings;
@@ -142,18 +143,32 @@ pub fn reach(
     let normal = UnitVector::new_unchecked(world_from_object.vector(&contact.normal_in_object));
     let settings = ik_settings(model, finger, normal);
     let joints = model.fingers[finger].touch_random(world_from_object, contact, &settings, rng)?;
-    if !lift_is_within_reach(model, world_from_object, finger, &Foothold { contact: Some(contact), joints: &joints }) {
-        return None;
-    }
-    workspace.set_finger(finger, &joints);
-    let mode = TipMode::Near { finger, normal_in_world: normal.into_inner() };
-    let is_clear = workspace.finger_alone_is_clear(finger, mode);
-    let blocked_by = workspace.blocking_pair.filter(|_| !is_clear);
-    workspace.tried.add(finger, blocked_by);
-    is_clear.then_some(joints)
+    is_usable(workspace, finger, contact, &joints, world_from_object).then_some(joints)
 }
 
-/// Draws contacts of `finger` that it can take, with its joints there: up to `n_wanted`, each given to `found`.
+/// True when `finger`, which touches `contact` with `joints`, can be lifted again and is clear of everything but the other fingers; the
+/// workspace has the object in place, and the finger is left there.
+pub(super) fn is_usable(
+    workspace: &mut Workspace,
+    finger: usize,
+    contact: &Contact,
+    joints: &Coordinates,
+    world_from_object: &Placement,
+) -> bool {
+    let foothold = Foothold { contact: Some(contact), joints };
+    if !lift_is_within_reach(workspace.model, world_from_object, finger, &foothold) {
+        return false;
+    }
+    workspace.set_finger(finger, joints);
+    let normal_in_world = world_from_object.vector(&contact.normal_in_object);
+    let is_clear = workspace.finger_alone_is_clear(finger, TipMode::Near { finger, normal_in_world });
+    let blocked_by = workspace.blocking_pair.filter(|_| !is_clear);
+    workspace.tried.add(finger, blocked_by);
+    is_clear
+}
+
+/// Draws contacts of `finger` that it can take, with its joints there: up to `n_wanted`, each given to `found`. Fingers that reach no points
+/// find theirs by closing.
 ///
 /// The workspace has the object at `world_from_object` and keeps it there; the finger is left anywhere.
 pub fn draw_footholds(
@@ -165,6 +180,13 @@ pub fn draw_footholds(
     mut found: impl FnMut(Contact, Coordinates),
 ) {
     let mut n_found = 0;
+    if workspace.model.fingers[finger].closes() {
+        for _ in 0..n_wanted {
+            let Some((contact, joints)) = draw_touch(workspace, finger, world_from_object, rng) else { return };
+            found(contact, joints);
+        }
+        return;
+    }
     for _ in 0..8 * n_wanted {
         if n_found == n_wanted {
             return;

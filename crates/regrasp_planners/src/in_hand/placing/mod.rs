@@ -125,6 +125,9 @@ pub fn place(
     super::refusals::refuse_holding_nothing(model)?;
     // The poses are those of a start at the origin; a query that stays there stays everywhere.
     let moves = queries.iter().any(|query| !query.stays());
+    if moves {
+        super::refusals::refuse_hand_that_cannot_follow(model)?;
+    }
     if moves && model.n_fingers() > 2 && !settings.search.transfers_alone {
         super::refusals::refuse_impossible(model)?;
     }
