@@ -59,6 +59,7 @@ impl Room {
                     1e6 * region.volume
                 );
             }
+            None if self.only_hold.is_some() => {}
             None => out.push_str("  the fingertips reach no place in common\n"),
         }
         if let Some(only_hold) = &self.only_hold {

@@ -51,6 +51,7 @@ pub fn sizes(hand: &Hand, reach: &TipReach, settings: &InHandSettings, seed: u64
         Failure::refuse_many_fingers(&view)?;
         Failure::refuse_tied_fingers(&view)?;
         let model = Model::new(&view, &settings.physics);
+        let reach = &super::reach_of(&model, reach);
         crate::in_hand::refusals::refuse_holding_nothing(&model)?;
         let mut rng = Rng::keyed(seed, "sizes", index as u64);
         // Which contacts of a ball close does not depend on its size.
