@@ -167,6 +167,9 @@ pub(super) fn is_usable(
     is_clear
 }
 
+/// Draws in vain after which a finger that closes is taken to find no more.
+const MISSES: usize = 2;
+
 /// Draws contacts of `finger` that it can take, with its joints there: up to `n_wanted`, each given to `found`. Fingers that reach no points
 /// find theirs by closing.
 ///
@@ -181,9 +184,15 @@ pub fn draw_footholds(
 ) {
     let mut n_found = 0;
     if workspace.model.fingers[finger].closes() {
-        for _ in 0..n_wanted {
-            let Some((contact, joints)) = draw_touch(workspace, finger, world_from_object, rng) else { return };
-            found(contact, joints);
+        let mut n_missed = 0;
+        while n_found < n_wanted && n_missed < MISSES {
+            match draw_touch(workspace, finger, world_from_object, rng) {
+                Some((contact, joints)) => {
+                    found(contact, joints);
+                    n_found += 1;
+                }
+                None => n_missed += 1,
+            }
         }
         return;
     }
