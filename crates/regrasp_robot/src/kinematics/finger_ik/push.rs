@@ -11,8 +11,9 @@ use regrasp_geometry::{Point, Vector};
 const POSTURES: usize = 24;
 /// The third direction counts from this share of the first on.
 const LEAST_DIRECTION: f64 = 1e-4;
-/// Directions below this share of the first are none.
-const NO_DIRECTION: f64 = 1e-5;
+/// Directions in which the tip moves less than this share of what it does along the first are none: near a singularity joints would have to
+/// move far for them.
+const NO_DIRECTION: f64 = 0.03;
 
 /// See `FingerIk::reaches_points`.
 pub(super) fn reaches_points(chain: &Chain, center_in_body: &Point) -> bool {
@@ -104,6 +105,10 @@ mod tests {
             let ik = FingerIk::new(&chain, &center);
             let q = random_coordinates(&chain, &mut rng);
             let direction = Vector::from(rng.direction());
+            let columns = ik.tip_jacobian(&q);
+            if columns[0].cross(&columns[1]).norm() < 0.1 * (columns[0].norm_squared() + columns[1].norm_squared()) {
+                continue;
+            }
             let Some(there) = ik.push(&q, &direction, length, (0.0, 2.0)) else { continue };
             let moved = |to: &[f64]| ik.tip(to) - ik.tip(&q);
             let slope = |way: &Vector| {
