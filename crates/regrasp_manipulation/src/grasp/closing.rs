@@ -1,8 +1,8 @@
 //! Fingers of one or two independent joints, and flat ones: their tips come to no point that is chosen beforehand. They find contacts by
 //! closing: along a straight line in their joints, until the tip touches.
 
-use crate::grasp::contact::is_usable;
 use crate::grasp::touch::touch_on_way;
+use crate::grasp::usable::is_usable;
 use crate::model::Model;
 use crate::workspace::Workspace;
 use nalgebra::{Rotation3, UnitQuaternion};

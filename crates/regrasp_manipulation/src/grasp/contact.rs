@@ -1,10 +1,10 @@
 //! Contacts that a finger can reach, drawn at random.
 
 use crate::grasp::closing::draw_touch;
+use crate::grasp::usable::is_usable;
 use crate::model::Model;
-use crate::relocation::{Foothold, lift_is_within_reach};
 use crate::rolling::follow::ik_settings;
-use crate::workspace::{TipMode, Workspace};
+use crate::workspace::Workspace;
 use regrasp_base::Rng;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::surface::SurfacePoint;
@@ -144,27 +144,6 @@ pub fn reach(
     let settings = ik_settings(model, finger, normal);
     let joints = model.fingers[finger].touch_random(world_from_object, contact, &settings, rng)?;
     is_usable(workspace, finger, contact, &joints, world_from_object).then_some(joints)
-}
-
-/// True when `finger`, which touches `contact` with `joints`, can be lifted again and is clear of everything but the other fingers; the
-/// workspace has the object in place, and the finger is left there.
-pub(super) fn is_usable(
-    workspace: &mut Workspace,
-    finger: usize,
-    contact: &Contact,
-    joints: &Coordinates,
-    world_from_object: &Placement,
-) -> bool {
-    let foothold = Foothold { contact: Some(contact), joints };
-    if !lift_is_within_reach(workspace.model, world_from_object, finger, &foothold) {
-        return false;
-    }
-    workspace.set_finger(finger, joints);
-    let normal_in_world = world_from_object.vector(&contact.normal_in_object);
-    let is_clear = workspace.finger_alone_is_clear(finger, TipMode::Near { finger, normal_in_world });
-    let blocked_by = workspace.blocking_pair.filter(|_| !is_clear);
-    workspace.tried.add(finger, blocked_by);
-    is_clear
 }
 
 /// Draws in vain after which a finger that closes is taken to find no more.

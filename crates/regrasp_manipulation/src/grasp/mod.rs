@@ -10,3 +10,5 @@ pub mod sequence;
 pub mod state;
 /// Where a fingertip touches, and how far it is from touching.
 pub mod touch;
+/// Whether a finger can make use of a contact.
+mod usable;
