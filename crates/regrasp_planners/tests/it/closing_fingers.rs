@@ -16,7 +16,7 @@ use regrasp_planners::FailureKind;
 use regrasp_planners::in_hand::{InHandSettings, Method, plan_in_hand, validate_once};
 use regrasp_robot::import::{LoadOptions, ResolveOptions};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
-use regrasp_scene::{InHandQuery, LoadedScene, load_scene};
+use regrasp_scene::{GraspRequest, InHandQuery, LoadedScene, load_scene};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -163,6 +163,29 @@ fn hands_that_cannot_turn_objects_are_refused_before_any_search() {
     let settings = InHandSettings { method: Method::Visibility, ..settings };
     let failure = plan_in_hand(&loaded.view(), &loaded.in_hand(0), &settings, 0, &budget, &|_| {}).unwrap_err();
     assert!(failure.message.starts_with("all fingers are to hold while the object moves"), "{failure}");
+}
+
+/// A grasp that was observed with encoders that are off by a milliradian: every finger comes to touch nearby.
+#[test]
+fn a_given_grasp_of_closing_fingers_is_taken() {
+    let loaded = scene(&wide_hand(&FINGERS), SPHERE, IN_WIDE_HAND, "x");
+    let (settings, budget) = (InHandSettings::default(), Budget::work(1_000_000));
+    let held = loaded.in_hand(0).held();
+    let plan = plan_in_hand(&loaded.view(), &held, &settings, 0, &budget, &|_| {}).unwrap();
+    let first = &plan.segments[0].waypoints[0];
+    let holds: Vec<bool> = first.contacts.iter().map(|contact| contact.mode != ContactMode::Free).collect();
+    for off in [0.0, 1e-3, -1e-3] {
+        let joints: Vec<f64> = first.joints.iter().map(|joint| joint + off).collect();
+        let given = InHandQuery {
+            start_grasp: GraspRequest::Posture { joints: joints.clone(), holds: holds.clone() },
+            ..held.clone()
+        };
+        let plan = plan_in_hand(&loaded.view(), &given, &settings, 1, &budget, &|_| {})
+            .unwrap_or_else(|failure| panic!("{off}: {failure}"));
+        accepted(&loaded, &given, &plan, &settings, "given grasp");
+        let found = &plan.segments[0].waypoints[0].joints;
+        assert!(found.iter().zip(&joints).all(|(a, b)| (a - b).abs() < 0.02), "{off}: {found:?} {joints:?}");
+    }
 }
 
 /// A hand of nine motors and twenty joints, coupled within and across fingers: spread and opposition are held, the rest closes.
