@@ -199,11 +199,14 @@ fn a_hand_of_nine_motors_holds_and_is_told_that_it_cannot_turn() {
     assert_eq!(held, [("finger_spread", 0.29), ("thumb_opposition", 0.49)]);
     assert_eq!(hand.fingers.iter().map(|finger| finger.chain.n_coordinates()).sum::<usize>(), 7);
     let text = regrasp_robot::inspect::hand_file_text(&hand, path.to_str().unwrap(), &Default::default());
-    let loaded = scene(&text, SPHERE, [0.045, 0.0, 0.115], "z");
+    let loaded = scene(&text, "sphere = { radius = 0.06 }", [0.0821, 0.0279, 0.1264], "z");
     let (query, settings) = (loaded.in_hand(0), InHandSettings::default());
     let failure = plan_in_hand(&loaded.view(), &query, &settings, 0, &Budget::work(1_000_000), &|_| {}).unwrap_err();
     assert_eq!((failure.kind, failure.statistics.work), (FailureKind::Impossible, 0), "{failure}");
     assert!(failure.message.contains("Of its 5 fingers none can"), "{failure}");
+    let held = query.held();
+    let plan = plan_in_hand(&loaded.view(), &held, &settings, 0, &Budget::work(1_000_000), &|_| {}).unwrap();
+    accepted(&loaded, &held, &plan, &settings, "nine motors");
 }
 
 /// The Barrett hand with its couplings: one motor spreads two fingers, one closes each.
@@ -214,9 +217,12 @@ fn a_barrett_hand_holds_a_ball() {
     }
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/hands/barrett/hand.toml");
     let text = std::fs::read_to_string(file).unwrap();
-    let loaded = scene(&text, "sphere = { radius = 0.04 }", [0.0, 0.0, 0.13], "z");
+    let loaded = scene(&text, "sphere = { radius = 0.045 }", [0.0394, 0.009, 0.1639], "z");
     assert_eq!(loaded.view().hand.n_joints(), 3);
     let (query, settings) = (loaded.in_hand(0), InHandSettings::default());
     let failure = plan_in_hand(&loaded.view(), &query, &settings, 0, &Budget::work(1_000_000), &|_| {}).unwrap_err();
     assert_eq!((failure.kind, failure.statistics.work), (FailureKind::Impossible, 0), "{failure}");
+    let held = query.held();
+    let plan = plan_in_hand(&loaded.view(), &held, &settings, 0, &Budget::work(1_000_000), &|_| {}).unwrap();
+    accepted(&loaded, &held, &plan, &settings, "Barrett");
 }

@@ -161,7 +161,7 @@ fn carry(
                     Carried { body: RigidBody::Finger { finger, body }, body_from_link: Pose::identity() }
                 }
                 None => {
-                    let held = held_at(robot, id, (spec, owner), file, found, notes);
+                    let held = held_at(robot, id, owner, file, found, notes);
                     let body_from_link = at.body_from_link * joint.parent_from_joint * held;
                     Carried { body: at.body, body_from_link }
                 }
@@ -177,7 +177,7 @@ fn carry(
 fn held_at(
     robot: &Robot,
     id: JointId,
-    (spec, owner): (&HandSpec, &BTreeMap<JointId, (usize, usize)>),
+    owner: &BTreeMap<JointId, (usize, usize)>,
     file: &Path,
     found: &mut Diagnostics,
     notes: &mut Vec<String>,
@@ -187,7 +187,6 @@ fn held_at(
         return Pose::identity();
     }
     let on_finger = |coupling: &Coupling| coupling.terms.iter().find(|(leader, _)| owner.contains_key(leader)).copied();
-    let at = |joint: JointId| spec.held.get(&joint).copied().unwrap_or_else(|| nearest_to_zero(&robot.joints[joint.0]));
     let position = match &joint.coupling {
         Some(coupling) if let Some((leader, _)) = on_finger(coupling) => {
             let problem = format!(
@@ -202,8 +201,8 @@ fn held_at(
             );
             return Pose::identity();
         }
-        Some(coupling) => coupling.position(at),
-        None => at(id),
+        Some(coupling) => coupling.position(|leader| nearest_to_zero(&robot.joints[leader.0])),
+        None => nearest_to_zero(joint),
     };
     notes.push(format!("joint \"{}\" belongs to no finger; held at {position}", joint.name));
     joint.motion(position)

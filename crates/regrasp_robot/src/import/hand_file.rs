@@ -101,7 +101,11 @@ fn made(parts: &HandParts, path: &Path, options: &LoadOptions) -> Result<(Hand, 
     if !options.untie {
         shared_motors::hold(&parts.robot, &mut spec, &mut notes);
     }
-    let (robot, ties) = ties::untie(&parts.robot, &spec, &mut notes);
+    // Joints of fingers move: a position given to them says nothing.
+    let moving = shared_motors::moving_joints(&parts.robot, &spec);
+    spec.held.retain(|joint, _| !moving.contains(joint));
+    let robot = shared_motors::with_held_at_zero(&parts.robot, &spec, &mut notes);
+    let (robot, ties) = ties::untie(&robot, &spec, &mut notes);
     let (hand, more) = assemble(&Arc::new(robot), &spec, path)?;
     let mut hand = Hand { ties, ..hand };
     ties::settle_rest(&mut hand);

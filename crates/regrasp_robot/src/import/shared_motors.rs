@@ -72,15 +72,42 @@ pub(super) fn hold(robot: &Robot, spec: &mut HandSpec, notes: &mut Vec<String>) 
     }
 }
 
+/// The joints of fingers.
+pub(super) fn moving_joints(robot: &Robot, spec: &HandSpec) -> BTreeSet<JointId> {
+    let mut moving = BTreeSet::new();
+    for (finger, path) in spec.fingers.iter().zip(paths(robot, spec)) {
+        let is_held = |joint: &JointId| finger.first_joint.is_some_and(|first| *joint != first);
+        moving.extend(path.into_iter().skip_while(is_held));
+    }
+    moving
+}
+
+/// `robot` with the joints that `spec` holds somewhere at their zero: whoever holds joints of no finger as near to zero as they go has them
+/// there. Followers stay where their couplings have them.
+pub(super) fn with_held_at_zero(robot: &Robot, spec: &HandSpec, notes: &mut Vec<String>) -> Robot {
+    let mut moved = robot.clone();
+    for (&id, &position) in &spec.held {
+        let joint = &mut moved.joints[id.0];
+        notes.push(format!("joint \"{}\" is held at {position}, which counts as its zero", joint.name));
+        joint.parent_from_joint *= joint.motion(position);
+        if let Some(limits) = &mut joint.limits {
+            limits.lower -= position;
+            limits.upper -= position;
+        }
+        for follower in &mut moved.joints {
+            if let Some(coupling) = &mut follower.coupling {
+                coupling.offset += coupling.multiplier(id) * position;
+            }
+        }
+    }
+    moved
+}
+
 /// Gives joints that are held and lead joints of other fingers a position, where they have none: the middle of what their limits and those
 /// of their followers leave. A thumb is then opposed, and a spread half open.
 pub(crate) fn place_held_leaders(robot: &Robot, spec: &mut HandSpec) {
     let paths = paths(robot, spec);
-    let mut moving = BTreeSet::new();
-    for (finger, path) in spec.fingers.iter().zip(&paths) {
-        let is_held = |joint: &&JointId| finger.first_joint.is_some_and(|first| **joint != first);
-        moving.extend(path.iter().skip_while(is_held).copied());
-    }
+    let moving = moving_joints(robot, spec);
     for path in &paths {
         for &leader in path.iter().filter(|joint| !moving.contains(joint)) {
             let joint = &robot.joints[leader.0];

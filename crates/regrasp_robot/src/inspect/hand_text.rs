@@ -72,7 +72,10 @@ pub fn hand_file_text(hand: &Hand, urdf: &str, allow: &BTreeSet<(LinkId, LinkId)
                 let _ = writeln!(text, "]");
             }
         }
-        let _ = writeln!(text, "offset = {}", number(coupling.offset));
+        // Held joints have their zero where they are held.
+        let held = hand.held.iter().map(|&(joint, position)| coupling.multiplier(joint) * position).sum::<f64>();
+        let offset = ((coupling.offset - held) * 1e12).round() / 1e12 + 0.0;
+        let _ = writeln!(text, "offset = {}", number(offset));
     }
     for finger in &hand.fingers {
         let _ = writeln!(text, "\n[[fingers]]\nname = {}\ntip_link = {}", quoted(&finger.name), name(finger.tip.link));
