@@ -1,7 +1,6 @@
 //! Grasps of other tools become a list: their contacts are found by closing the hand, and what this tool would not find, as it does not
 //! hold, hits something or has no way in, is dropped.
 
-use crate::driven::touch_on_way;
 use crate::found::{Found, Reason};
 use crate::prepared::Prepared;
 use crate::search::frame::accept;
@@ -12,6 +11,7 @@ use rayon::prelude::*;
 use regrasp_geometry::Pose;
 use regrasp_grasp::list::{ForeignGrasp, ForeignGrasps, GraspList, GraspStatistics};
 use regrasp_manipulation::grasp::state::{GraspState, HandJoints};
+use regrasp_manipulation::grasp::touch::touch_on_way;
 use regrasp_manipulation::model::Model;
 use regrasp_manipulation::workspace::{TipMode, Workspace};
 use regrasp_robot::{Hand, JointId};
@@ -114,7 +114,7 @@ fn judge(prepared: &Prepared, index: u64, given: &Given) -> Result<Found, Reason
         None => prepared.model.view.hand.fingers.iter().map(|finger| finger.rest.iter().copied().collect()).collect(),
     });
     let fingers = (0..open.len()).map(|f| {
-        let touch = touch_on_way(prepared, f, &given.hand_from_object, &open[f], &given.joints[f]);
+        let touch = touch_on_way(&prepared.model, f, &given.hand_from_object, &open[f], &given.joints[f]);
         touch.map_or((None, given.joints[f].clone()), |(contact, joints)| (Some(contact), joints))
     });
     let state = GraspState::of(given.hand_from_object, fingers);

@@ -119,12 +119,14 @@ impl Failure {
         let Some(tie) = view.hand.ties.first() else { return Ok(()) };
         let name = |joint: regrasp_robot::JointId| view.hand.robot.joints[joint.0].name.as_str();
         let leader = tie.coupling.terms.first().map_or("another joint", |(leader, _)| name(*leader));
+        let follower = name(tie.follower);
         let message = format!(
-            "hand \"{}\" has one motor for several fingers: joint \"{}\" follows joint \"{leader}\", so that no finger can let go alone",
+            "hand \"{}\" has one motor for several fingers: joint \"{follower}\" follows joint \"{leader}\", and holding both still would \
+             leave a finger without a joint before its tip, so that fingers cannot let go one by one",
             view.hand_name,
-            name(tie.follower)
         );
-        let advice = "pick the object up and put it down again (task = \"pick_and_place\"), or use a hand whose fingers move alone";
+        let advice = "pick the object up and put it down again (task = \"pick_and_place\"), or use a hand whose fingers move alone; to hold \
+                      one joint still, fix it in the URDF (type=\"fixed\")";
         Err(Failure::bare(FailureKind::Impossible, message, advice))
     }
 

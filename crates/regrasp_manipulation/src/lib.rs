@@ -7,6 +7,8 @@
 pub mod ends;
 /// Why no plan was found.
 pub mod failure;
+/// Fingers that cannot follow an object that moves.
+pub mod following;
 /// Contact forces of the fingers.
 pub mod forces;
 /// Grasps and the motions between them.

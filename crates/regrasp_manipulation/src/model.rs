@@ -48,6 +48,15 @@ pub struct FingerModel<'a> {
     pub tip_at_rest: Point,
 }
 
+impl FingerModel<'_> {
+    /// True for a finger that comes to no point that is chosen beforehand: it finds contacts by closing until its tip touches, and holds
+    /// while the object stands still. It follows no motion of the object.
+    #[inline]
+    pub fn closes(&self) -> bool {
+        !self.ik.reaches_points()
+    }
+}
+
 /// What moves a body.
 #[derive(Debug)]
 pub enum Carrier {
@@ -313,6 +322,18 @@ impl<'a> Model<'a> {
     #[inline]
     pub fn restricts_motion(&self, finger: usize) -> bool {
         self.resists_spin(finger) && !self.fingers[finger].ik.is_redundant()
+    }
+
+    /// Fingers that follow no motion of the object, as bits.
+    pub fn closing_fingers(&self) -> u32 {
+        (0..self.n_fingers()).filter(|&f| self.fingers[f].closes()).fold(0, |bits, f| bits | 1 << f)
+    }
+
+    /// True when fingers of the hand that follow the object when it moves can hold it by themselves.
+    pub fn may_move_object(&self) -> bool {
+        let following: Vec<ContactModel> =
+            self.fingers.iter().filter(|finger| !finger.closes()).map(|finger| finger.contact).collect();
+        closure::may_close(&following, self.frame.friction)
     }
 
     /// True when some finger rolls: contacts then travel while the object moves.

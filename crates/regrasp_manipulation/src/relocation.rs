@@ -46,9 +46,28 @@ pub fn hover(
 ) -> Option<Coordinates> {
     let normal = world_from_object.vector(&contact.normal_in_object);
     let tip = model.fingers[finger].center_touching(world_from_object, contact, joints);
+    if model.fingers[finger].closes() {
+        let mut hovering = joints.clone();
+        for _ in 0..HOVER_STEPS {
+            hovering = push(model, finger, &hovering, &normal, height / HOVER_STEPS as f64)?;
+        }
+        return Some(hovering);
+    }
     let settings = free_ik_settings(model, finger, UnitVector::new_unchecked(normal));
     model.fingers[finger].ik.solve_near(&(tip + normal * height), joints, &settings)
 }
+
+/// Joints of a finger that reaches no points after a step of its tip away from a contact with the outward normal `normal`, as straight as it
+/// can.
+fn push(model: &Model, finger: usize, joints: &Coordinates, normal: &Vector, height: f64) -> Option<Coordinates> {
+    model.fingers[finger].ik.push(joints, normal, height, (FREE_LIMIT_MARGIN, STEEPEST_LIFT))
+}
+
+/// Steps in which a finger that reaches no points comes to a height.
+const HOVER_STEPS: usize = 4;
+
+/// Largest way beside the normal per way along it of a lift of such a finger: the tangent of 50 degrees, where checks allow 60.
+const STEEPEST_LIFT: f64 = 1.19;
 
 /// Height that counts as having left, in metres.
 const LEAST_LIFT: f64 = 0.001;
@@ -145,7 +164,10 @@ fn lift(
     let mut joints = foothold.joints.clone();
     for k in 1..=n_steps {
         let target = base + normal * (height * (k as f64 / n_steps as f64).powi(2));
-        joints = model.fingers[finger].ik.solve_near(&target, &joints, &settings)?;
+        joints = match model.fingers[finger].closes() {
+            true => push(model, finger, &joints, &normal, height * (2 * k - 1) as f64 / (n_steps * n_steps) as f64)?,
+            false => model.fingers[finger].ik.solve_near(&target, &joints, &settings)?,
+        };
         if !workspace.step_finger(finger, &joints, mode) {
             return None;
         }
@@ -172,7 +194,7 @@ fn pass_over(
 }
 
 /// Follows the surface at `height`: the tip turns about the object's centre of mass and is pushed out where it comes
-/// too low.
+/// too low. None for fingers that reach no points.
 fn slide(
     workspace: &mut Workspace,
     world_from_object: &Placement,
@@ -183,6 +205,9 @@ fn slide(
     mode: TipMode,
 ) -> Option<Vec<Coordinates>> {
     let model = workspace.model;
+    if model.fingers[finger].closes() {
+        return None;
+    }
     let ik = &model.fingers[finger].ik;
     let away = model.fingers[finger].tip_radius + height;
     let center = model.frame.center_of_mass;

@@ -90,7 +90,10 @@ pub struct Hand {
     pub palm: Vec<PalmShape>,
     /// Pairs of links (smaller index first) that are never tested against each other.
     pub allowed_pairs: BTreeSet<(LinkId, LinkId)>,
-    /// Joints that follow those of other fingers; empty unless the hand was loaded for that ([`crate::import::LoadOptions::untie`]).
+    /// Joints that belong to no finger and were given a position, in radians or metres.
+    pub held: Vec<(JointId, f64)>,
+    /// Joints that follow those of other fingers. Empty where those could be held still, unless the hand was loaded for them
+    /// ([`crate::import::LoadOptions::untie`]).
     pub ties: Vec<Tie>,
 }
 

@@ -106,10 +106,6 @@ fn bad_couplings_are_refused() {
             coupling("a_end", "a_mid", "ratio = 1"),
             r#"U201 hand.toml:7:1 key "couplings[0].ratio": is not a key that exists here"#,
         ),
-        (
-            coupling("a_end", "b_low", ""),
-            "U209 hand.toml:9:1 finger \"a\": joint \"a_end\" follows joint \"b_low\", which is on another finger",
-        ),
         ("couplings = 3".to_owned(), r#"U203 hand.toml:4:13 key "couplings": is 3, an integer"#),
     ] {
         let seen = refusal(more);
@@ -277,4 +273,16 @@ fn what_inspect_writes_has_contacts_and_couplings() {
         let q = &a.rest;
         assert!((a.ik.tip(q) - b.ik.tip(q)).norm() < 1e-12);
     }
+}
+
+/// Where holding a shared motor still would leave a finger without joints, the hand comes in with what its joints follow, and the
+/// file that is written says so again.
+#[test]
+fn a_joint_that_follows_another_finger_is_tied_to_it() {
+    let hand = load(&hand_file(&coupling("a_end", "b_low", ""), ""), &LoadOptions::default()).unwrap();
+    let joint = |name: &str| hand.robot.joint_named(name).unwrap();
+    let ties: Vec<_> = hand.ties.iter().map(|tie| (tie.follower, tie.coupling.single().unwrap())).collect();
+    assert_eq!(ties, [(joint("a_end"), (joint("b_low"), 1.0))]);
+    let written = regrasp_robot::inspect::hand_file_text(&hand, "hand.urdf", &Default::default());
+    assert_eq!(load(&written, &LoadOptions::default()).unwrap().ties, hand.ties);
 }

@@ -174,7 +174,7 @@ fn base_links_that_are_printed_lead_to_a_hand() {
 }
 
 #[test]
-fn a_follower_of_another_finger_can_be_held_as_printed() {
+fn a_follower_of_another_finger_is_tied_and_can_be_held_in_the_urdf() {
     let folder = tempfile::tempdir().unwrap();
     let mimic = |text: &str| text.replace(r#"upper="1"/></joint>"#, r#"upper="1"/><mimic joint="i_high"/></joint>"#);
     let parts = finger("i", "root")
@@ -182,14 +182,13 @@ fn a_follower_of_another_finger_can_be_held_as_printed() {
     // Only the last joint of the thumb follows.
     let at = parts.rfind("<joint name=\"t_high\"").unwrap();
     let parts = format!("{}{}", &parts[..at], mimic(&parts[at..]));
-    let messages = load(folder.path(), &parts, "", "hand.urdf", None).unwrap_err();
-    assert!(messages[0].starts_with("U209"), "{messages:?}");
-    let fix = fix(&messages);
-    let (_, tag) = fix.split_once("in the URDF: ").unwrap();
-    assert_eq!(tag, r#"<joint name="t_high" type="fixed">"#);
+    let loaded = load(folder.path(), &parts, "", "hand.urdf", None).unwrap();
+    assert_eq!(loaded.hand.ties.len(), 1);
+    let tag = r#"<joint name="t_high" type="fixed">"#;
     let pasted = parts.replace(r#"<joint name="t_high" type="revolute">"#, tag);
     let loaded = load(folder.path(), &pasted, "", "hand.urdf", None).unwrap();
     assert_eq!(summary(&loaded).1, [vec!["i_low", "i_high"], vec!["t_low"]]);
+    assert_eq!(loaded.hand.ties, []);
 }
 
 #[test]
@@ -269,4 +268,50 @@ fn spreads_that_fingers_share_by_a_coupling_are_held() {
     let loaded = guess(&parts, None).unwrap();
     assert_eq!(summary(&loaded).1, [vec!["i_high"], vec!["m_high"], vec!["t_low", "t_high"]]);
     assert!(loaded.notes.iter().any(|note| note.contains("\"i_low\" belongs to no finger")), "{:?}", loaded.notes);
+}
+
+/// Where a motor that fingers share is held: in the middle of what it and its followers can do, or where the file says. Joints, tips and
+/// held positions are the same in the file that is written.
+#[test]
+fn motors_that_fingers_share_are_held_where_the_file_says() {
+    let folder = tempfile::tempdir().unwrap();
+    // The follower reaches from -1 to 1 for the leader's -0.25 to 0.75.
+    let mimic = r#"upper="1"/><mimic joint="i_low" multiplier="2" offset="-0.5"/></joint>"#;
+    let follows = finger("m", "root").replacen(r#"upper="1"/></joint>"#, mimic, 1);
+    let parts = [finger("i", "root"), follows, finger("t", "root")].concat();
+    let fingers = |rest: &str| format!("{}{}{}", table("i", rest), table("m", ""), table("t", ""));
+    let held = |loaded: &LoadedHand| -> Vec<(String, f64)> {
+        let robot = &loaded.hand.robot;
+        loaded.hand.held.iter().map(|(joint, at)| (robot.joints[joint.0].name.clone(), *at)).collect()
+    };
+    let tips = |loaded: &LoadedHand| -> Vec<regrasp_geometry::Point> {
+        let fingers = loaded.hand.fingers.iter();
+        fingers.map(|finger| finger.chain.tip(&finger.rest, &finger.tip.center_in_body)).collect()
+    };
+    for (text, expected) in [
+        (format!("{HEAD}{}", fingers("")), 0.25),
+        (format!("{HEAD}{}", fingers("rest = { i_low = 0.5 }\n")), 0.5),
+        (format!("{HEAD}[held]\ni_low = -0.1\n{}", fingers("")), -0.1),
+    ] {
+        let loaded = load(folder.path(), &parts, &text, "hand.toml", None).unwrap();
+        assert_eq!(held(&loaded), [("i_low".to_owned(), expected)]);
+        assert_eq!(summary(&loaded).1, [vec!["i_high"], vec!["m_high"], vec!["t_low", "t_high"]]);
+        // By the two joints alone: the tips of i and m, 0.04 above the second joint, which is 0.04 above the first.
+        let turned = |angle: f64| 0.03 + 0.08 * angle.sin();
+        assert!((tips(&loaded)[0].x - turned(expected)).abs() < 1e-12);
+        assert!((tips(&loaded)[1].x - turned(2.0 * expected - 0.5)).abs() < 1e-12);
+        let written = regrasp_robot::inspect::hand_file_text(&loaded.hand, "hand.urdf", &Default::default());
+        let again = load(folder.path(), &parts, &written, "hand.toml", None).unwrap();
+        assert_eq!((held(&again), summary(&again)), (held(&loaded), summary(&loaded)));
+        assert_eq!(tips(&again), tips(&loaded));
+    }
+    for (line, message) in [
+        ("i_lwo = 0.1", "U205 hand.toml:5:9 key \"held.i_lwo\": the robot has no joint \"i_lwo\""),
+        ("i_low = 3.0", "U212 hand.toml:5:9 key \"held.i_low\": position 3 is outside the limits of joint \"i_low\""),
+        ("m_low = 0.0", "U213 hand.toml:5:9 key \"held.m_low\": joint \"m_low\" does not move by itself"),
+    ] {
+        let text = format!("{HEAD}[held]\n{line}\n{}", fingers(""));
+        let messages = load(folder.path(), &parts, &text, "hand.toml", None).unwrap_err();
+        assert!(messages[0].starts_with(message), "{messages:?}\nexpected {message}");
+    }
 }

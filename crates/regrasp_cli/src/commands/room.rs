@@ -3,7 +3,7 @@
 use crate::words::metres;
 use regrasp::InHandSettings;
 use regrasp::base::Rng;
-use regrasp::planners::in_hand::placing::sizes::{Size, sizes};
+use regrasp::planners::in_hand::placing::sizes::{Size, fingers_that_only_hold, sizes};
 use regrasp::robot::Hand;
 use regrasp::robot::inspect::{TipReach, TipRegion};
 use serde::Serialize;
@@ -23,6 +23,8 @@ pub struct Room {
     balls: Vec<Size>,
     /// Why no ball was tried.
     refusal: Option<String>,
+    /// Which fingers cannot follow an object that moves; none where all of them can.
+    only_hold: Option<String>,
 }
 
 impl Room {
@@ -31,9 +33,11 @@ impl Room {
         let mut rng = Rng::keyed(seed, "room", 0);
         let reach = TipReach::sample(hand, POSTURES, &mut rng);
         let region = reach.region(FINGERS.min(hand.fingers.len()));
-        match sizes(hand, &reach, &InHandSettings::default(), seed) {
-            Ok(balls) => Room { region, balls, refusal: None },
-            Err(failure) => Room { region, balls: Vec::new(), refusal: Some(failure.message) },
+        let settings = InHandSettings::default();
+        let only_hold = fingers_that_only_hold(hand, &settings);
+        match sizes(hand, &reach, &settings, seed) {
+            Ok(balls) => Room { region, balls, refusal: None, only_hold },
+            Err(failure) => Room { region, balls: Vec::new(), refusal: Some(failure.message), only_hold },
         }
     }
 
@@ -55,7 +59,11 @@ impl Room {
                     1e6 * region.volume
                 );
             }
+            None if self.only_hold.is_some() => {}
             None => out.push_str("  the fingertips reach no place in common\n"),
+        }
+        if let Some(only_hold) = &self.only_hold {
+            let _ = writeln!(out, "  {only_hold}");
         }
         if let Some(refusal) = &self.refusal {
             let _ = writeln!(out, "  balls: {refusal}");

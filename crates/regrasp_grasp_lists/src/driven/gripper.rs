@@ -1,7 +1,6 @@
 //! Two jaws on antipodal points: a line through the object within the friction cones of both its ends, a sweep of approach angles
 //! about it, and the opening of the jaws that fits.
 
-use super::touch::{Gap, contact, gap};
 use crate::frames::radical_inverse;
 use crate::motors::Motors;
 use crate::prepared::Prepared;
@@ -10,6 +9,7 @@ use regrasp_base::Rng;
 use regrasp_geometry::frame::tangents;
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 use regrasp_manipulation::grasp::state::{GraspState, HandJoints};
+use regrasp_manipulation::grasp::touch::{Gap, contact, gap};
 
 /// Lines are drawn within this share of the angle of friction about the normal: the second contact needs room, too. By hand.
 const CONE_SHARE: f64 = 0.8;
@@ -107,7 +107,7 @@ pub fn close(prepared: &Prepared, motors: &Motors, jaws: &Jaws) -> Option<GraspS
     let pose_at = |shift: f64| Translation3::from(across * shift) * jaws.hand_from_object;
     let gaps_at = |at: &Vector2<f64>| -> [Gap; 2] {
         let (pose, joints) = (pose_at(at.x), joints_at(motors, at.y));
-        [0, 1].map(|f| gap(prepared, f, &pose, &joints[f]))
+        [0, 1].map(|f| gap(&prepared.model, f, &pose, &joints[f]))
     };
     let values = |gaps: &[Gap; 2]| Vector2::new(gaps[0].distance, gaps[1].distance);
     let slopes_at = |at: &Vector2<f64>, value: &Vector2<f64>| {
@@ -130,7 +130,7 @@ pub fn close(prepared: &Prepared, motors: &Motors, jaws: &Jaws) -> Option<GraspS
         }
         if value.amax() <= TOUCHES {
             let (pose, joints) = (pose_at(at.x), joints_at(motors, at.y));
-            let held = |f: usize| contact(prepared, f, &pose, &joints[f], &gaps[f]);
+            let held = |f: usize| contact(&prepared.model, f, &pose, &joints[f], &gaps[f]);
             let contacts = [held(0)?, held(1)?];
             let fingers = (0..2).map(|f| (Some(contacts[f]), joints[f].clone()));
             return Some(GraspState::of(pose, fingers));

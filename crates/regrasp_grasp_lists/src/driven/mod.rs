@@ -5,10 +5,6 @@
 mod closing;
 /// Two jaws on antipodal points.
 mod gripper;
-/// Where a fingertip touches that moves.
-mod touch;
-
-pub use touch::touch_on_way;
 
 use crate::found::Reason;
 use crate::motors::Motors;

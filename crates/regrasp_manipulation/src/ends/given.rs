@@ -27,6 +27,9 @@ pub enum NoTouch {
     Stuck(f64),
 }
 
+/// Largest way along the surface, per way to it, on which a finger that cannot go straight comes to touch.
+const STEEPEST: f64 = 2.0;
+
 /// The contact of a finger with these joints, and joints with which it touches there: the given ones where they do, else ones
 /// nearby. No finger moves by the rounding of given joints.
 pub fn touching(
@@ -48,7 +51,11 @@ pub fn touching(
         let normal = contact.normal_in_object.into_inner();
         let wanted = Contact { point_in_object: contact.point_in_object - normal * left, ..contact };
         let settings = IkSettings { limit_margin: 0.0, preference: None, max_step: GRASP_TURN_TOLERANCE };
-        joints = finger.touch_near(world_from_object, &wanted, &joints, &settings).ok_or(NoTouch::Stuck(gap))?;
+        let moved = match finger.closes() {
+            true => finger.ik.push(&joints, &world_from_object.vector(&normal), -left, (0.0, STEEPEST)),
+            false => finger.touch_near(world_from_object, &wanted, &joints, &settings),
+        };
+        joints = moved.ok_or(NoTouch::Stuck(gap))?;
         (contact, left) = finger.contact_at(surface, &joints, world_from_object).ok_or(NoTouch::Stuck(gap))?;
     }
     Err(NoTouch::Stuck(gap))

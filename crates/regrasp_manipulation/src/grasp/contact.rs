@@ -1,9 +1,10 @@
 //! Contacts that a finger can reach, drawn at random.
 
+use crate::grasp::closing::draw_touch;
+use crate::grasp::usable::is_usable;
 use crate::model::Model;
-use crate::relocation::{Foothold, lift_is_within_reach};
 use crate::rolling::follow::ik_settings;
-use crate::workspace::{TipMode, Workspace};
+use crate::workspace::Workspace;
 use regrasp_base::Rng;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::surface::SurfacePoint;
@@ -142,18 +143,14 @@ pub fn reach(
     let normal = UnitVector::new_unchecked(world_from_object.vector(&contact.normal_in_object));
     let settings = ik_settings(model, finger, normal);
     let joints = model.fingers[finger].touch_random(world_from_object, contact, &settings, rng)?;
-    if !lift_is_within_reach(model, world_from_object, finger, &Foothold { contact: Some(contact), joints: &joints }) {
-        return None;
-    }
-    workspace.set_finger(finger, &joints);
-    let mode = TipMode::Near { finger, normal_in_world: normal.into_inner() };
-    let is_clear = workspace.finger_alone_is_clear(finger, mode);
-    let blocked_by = workspace.blocking_pair.filter(|_| !is_clear);
-    workspace.tried.add(finger, blocked_by);
-    is_clear.then_some(joints)
+    is_usable(workspace, finger, contact, &joints, world_from_object).then_some(joints)
 }
 
-/// Draws contacts of `finger` that it can take, with its joints there: up to `n_wanted`, each given to `found`.
+/// Draws in vain after which a finger that closes is taken to find no more.
+const MISSES: usize = 2;
+
+/// Draws contacts of `finger` that it can take, with its joints there: up to `n_wanted`, each given to `found`. Fingers that reach no points
+/// find theirs by closing.
 ///
 /// The workspace has the object at `world_from_object` and keeps it there; the finger is left anywhere.
 pub fn draw_footholds(
@@ -165,6 +162,19 @@ pub fn draw_footholds(
     mut found: impl FnMut(Contact, Coordinates),
 ) {
     let mut n_found = 0;
+    if workspace.model.fingers[finger].closes() {
+        let mut n_missed = 0;
+        while n_found < n_wanted && n_missed < MISSES {
+            match draw_touch(workspace, finger, world_from_object, rng) {
+                Some((contact, joints)) => {
+                    found(contact, joints);
+                    n_found += 1;
+                }
+                None => n_missed += 1,
+            }
+        }
+        return;
+    }
     for _ in 0..8 * n_wanted {
         if n_found == n_wanted {
             return;

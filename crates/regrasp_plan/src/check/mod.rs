@@ -371,7 +371,15 @@ pub fn check((scene, state): (&Scene, &State), query: Option<&Query>, plan: &Pla
     match found {
         Err(violation) => log.push(violation),
         Ok((task, model)) => {
-            if form_is_sound(&model, plan, &mut log) {
+            if let Some(tie) = task.hand().ties.first() {
+                let robot = &task.hand().robot;
+                let [follower, leader] =
+                    [tie.follower, tie.coupling.terms[0].0].map(|joint| robot.joints[joint.0].name.as_str());
+                let message = format!(
+                    "joint \"{follower}\" follows joint \"{leader}\" of another finger: plans in such a hand are not judged"
+                );
+                log.push(wrong_scene(message).subjects([follower]));
+            } else if form_is_sound(&model, plan, &mut log) {
                 judge(&task, query, plan, settings, &model, &mut log, &mut report);
             }
         }

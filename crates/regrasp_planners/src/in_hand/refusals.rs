@@ -1,6 +1,6 @@
 //! Start and goal as the query gives them: what is wrong with them is said before any search.
 
-use crate::settings::{InHandSettings, Method};
+use crate::settings::{InHandSettings, Method, ReleaseRule};
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;
 use regrasp_grasp::ContactModel;
@@ -10,6 +10,7 @@ use regrasp_manipulation::ends::end::End;
 use regrasp_manipulation::ends::given_grasp::{Near, given_grasp_at};
 use regrasp_manipulation::ends::inside::{refuse_hand_inside, refuse_palm_overlap};
 use regrasp_manipulation::failure::{Failure, FailureKind};
+use regrasp_manipulation::following::{joints_in_words, refuse_fingers_that_cannot_follow};
 use regrasp_manipulation::grasp::state::GraspState;
 use regrasp_manipulation::model::{Model, fingers_in_words, friction_in_words, releasable};
 use regrasp_scene::{GraspRequest, InHandQuery};
@@ -17,6 +18,10 @@ use regrasp_scene::{GraspRequest, InHandQuery};
 /// Refuses what no search can find: hands that cannot hold or never change their grasp, poses at which the object is buried.
 pub fn refuse_hopeless(model: &Model, settings: &InHandSettings, query: &InHandQuery) -> Result<(), Failure> {
     refuse_holding_nothing(model)?;
+    if !query.stays() {
+        refuse_hand_that_cannot_follow(model)?;
+        refuse_method_without_free_fingers(model, settings)?;
+    }
     let may_try_transfers = model.n_fingers() == 2 || settings.search.transfers_alone;
     if !query.stays() && (settings.method != Method::Gait || !may_try_transfers) {
         refuse_impossible(model)?;
@@ -51,6 +56,29 @@ pub fn refuse_holding_nothing(model: &Model) -> Result<(), Failure> {
         friction_in_words(model)
     );
     Err(Failure::bare(FailureKind::Impossible, message, MORE_FINGERS))
+}
+
+/// Refuses to move the object with hands of which the fingers that could follow it cannot hold it.
+pub fn refuse_hand_that_cannot_follow(model: &Model) -> Result<(), Failure> {
+    if model.closing_fingers() == 0 || model.may_move_object() {
+        return Ok(());
+    }
+    let message = format!(
+        "the hand cannot turn objects: a fingertip needs three independent joints that move it in three directions to follow a turning \
+         object. {}",
+        joints_in_words(model)
+    );
+    let advice = "ask whether the hand can hold the object (plan --hold), or move hand and object together (task = \"pick_and_place\"); \
+                  remove couplings from the hand file if the real joints move one by one";
+    Err(Failure::bare(FailureKind::Impossible, message, advice))
+}
+
+/// Refuses methods in which all fingers hold while the object moves, for hands of which some cannot follow it.
+fn refuse_method_without_free_fingers(model: &Model, settings: &InHandSettings) -> Result<(), Failure> {
+    match settings.method == Method::Gait && settings.search.release_rule == ReleaseRule::WhereOthersHold {
+        true => Ok(()),
+        false => refuse_fingers_that_cannot_follow(model),
+    }
 }
 
 const MORE_FINGERS: &str = "use a hand with at least 4 fingers, or declare soft fingertips, of which two can hold (contact = \

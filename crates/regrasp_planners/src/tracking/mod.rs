@@ -35,6 +35,7 @@ use gaiting::Move;
 use grasp::TrackingGrasp;
 use regrasp_base::{Budget, Rng};
 use regrasp_manipulation::failure::{Cause, Failure, FailureKind, NearestMiss};
+use regrasp_manipulation::following::refuse_fingers_that_cannot_follow;
 use regrasp_manipulation::in_world::{failure_in_world, plan_in_world};
 use regrasp_manipulation::model::Model;
 use regrasp_manipulation::progress::Progress;
@@ -81,6 +82,7 @@ fn plan_in_hand_frame(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Plan, Failure> {
     let model = Model::new(view, &settings.in_hand.physics);
+    refuse_fingers_that_cannot_follow(&model)?;
     endpoints::refuse(&model, &view.gravity)?;
     let forces = model.forces.as_ref().expect("settings without forces do not validate");
     let mut stepper = Stepper {

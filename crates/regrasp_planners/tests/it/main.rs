@@ -2,6 +2,7 @@
 
 mod advice;
 mod carried;
+mod closing_fingers;
 mod contact_kinematics;
 mod folds;
 mod free_fingers;

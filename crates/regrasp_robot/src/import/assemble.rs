@@ -64,8 +64,10 @@ pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Resu
             notes.push(format!("finger \"{}\": tip link \"{}\" has no collision geometry", finger.name, link.name));
         }
     }
+    let held =
+        spec.held.iter().filter(|(joint, _)| !owner.contains_key(joint)).map(|(&joint, &at)| (joint, at)).collect();
     found.into_result((
-        Hand { robot: robot.clone(), base: spec.base, fingers, palm, allowed_pairs, ties: Vec::new() },
+        Hand { robot: robot.clone(), base: spec.base, fingers, palm, allowed_pairs, held, ties: Vec::new() },
         notes,
     ))
 }

@@ -7,20 +7,22 @@ use super::couplings;
 use super::fixes;
 use super::names::{known_joint, known_link};
 use super::options::{LoadOptions, LoadedInput};
+use super::shared_motors;
 use super::spec::{FingerSpec, HandSpec, PadSpec, TipSpec};
 use super::srdf::{LoadedSrdf, load_srdf};
 use super::ties;
 use super::urdf::{LoadedRobot, load_robot};
 use crate::contact_model::{self, ContactModel};
 use crate::hand::{Hand, MAX_FINGERS};
-use crate::robot::{LinkId, Robot};
+use crate::robot::{JointId, LinkId, Robot};
 use nalgebra::{Quaternion, UnitQuaternion};
+use regrasp_base::diagnostic::did_you_mean;
 use regrasp_base::diagnostic::number;
 use regrasp_base::toml_table::{Codes, Entry, Found, Table};
 use regrasp_base::{Diagnostic, InputError, Place, files};
 use regrasp_geometry::frame::direction;
 use regrasp_geometry::{Point, Vector};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -95,12 +97,16 @@ fn load_hand_file(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
 
 /// The hand of some parts, and remarks.
 fn made(parts: &HandParts, path: &Path, options: &LoadOptions) -> Result<(Hand, Vec<String>), InputError> {
+    let (mut spec, mut notes) = (parts.spec.clone(), Vec::new());
     if !options.untie {
-        return assemble(&parts.robot, &parts.spec, path);
+        shared_motors::hold(&parts.robot, &mut spec, &mut notes);
     }
-    let mut notes = Vec::new();
-    let (robot, ties) = ties::untie(&parts.robot, &parts.spec, &mut notes);
-    let (hand, more) = assemble(&Arc::new(robot), &parts.spec, path)?;
+    // Joints of fingers move: a position given to them says nothing.
+    let moving = shared_motors::moving_joints(&parts.robot, &spec);
+    spec.held.retain(|joint, _| !moving.contains(joint));
+    let robot = shared_motors::with_held_at_zero(&parts.robot, &spec, &mut notes);
+    let (robot, ties) = ties::untie(&robot, &spec, &mut notes);
+    let (hand, more) = assemble(&Arc::new(robot), &spec, path)?;
     let mut hand = Hand { ties, ..hand };
     ties::settle_rest(&mut hand);
     notes.extend(more);
@@ -189,6 +195,7 @@ fn read(mut root: Table, path: &Path, options: &LoadOptions, found: &mut Found) 
     let base = root.optional("base_link");
     let allow = root.optional("allow");
     let couplings = root.optional("couplings");
+    let held = root.optional("held");
     let inspect = fixes::inspect_command(urdf.as_ref().and_then(Entry::as_text), path);
     let fingers = root.required(found, "fingers", &inspect);
     root.finish(found);
@@ -207,7 +214,41 @@ fn read(mut root: Table, path: &Path, options: &LoadOptions, found: &mut Found) 
         allow.extend(loaded.srdf.disabled_pairs.iter().map(|pair| pair.links));
         inputs.push(loaded.input);
     }
-    Some(Parts { robot, spec: HandSpec { base, fingers, mount: None, allow }, inputs })
+    let held = held.map_or_else(BTreeMap::new, |entry| read_held(&entry, &robot, found));
+    Some(Parts { robot, spec: HandSpec { base, fingers, mount: None, allow, held }, inputs })
+}
+
+/// Positions of joints that belong to no finger.
+fn read_held(entry: &Entry, robot: &Robot, found: &mut Found) -> BTreeMap<JointId, f64> {
+    let mut held = BTreeMap::new();
+    let table = entry.table(found);
+    for (name, entry) in table.iter().flat_map(Table::all) {
+        let Some(position) = entry.number(found) else { continue };
+        let Some(id) = robot.joint_named(name) else {
+            let names = robot.joints.iter().map(|joint| joint.name.as_str());
+            let meant = did_you_mean(name, names);
+            let diagnostic = entry.error("U205", found, format!("the robot has no joint \"{name}\""));
+            let fix = meant.map_or(String::new(), |meant| format!("did you mean \"{meant}\"?"));
+            found.diagnostics.push(diagnostic.expected("the name of a joint of the URDF").fix(fix));
+            continue;
+        };
+        let joint = &robot.joints[id.0];
+        if joint.coupling.is_some() || !joint.moves() {
+            let problem = format!("joint \"{name}\" does not move by itself");
+            found
+                .diagnostics
+                .push(entry.error("U213", found, problem).expected("a joint that moves and follows no other"));
+            continue;
+        }
+        if let Some(limits) = joint.limits.filter(|limits| position < limits.lower || position > limits.upper) {
+            let problem = format!("position {} is outside the limits of joint \"{name}\"", number(position));
+            let expected = format!("{}..{}", number(limits.lower), number(limits.upper));
+            found.diagnostics.push(entry.error("U212", found, problem).expected(expected));
+            continue;
+        }
+        held.insert(id, position);
+    }
+    held
 }
 
 /// The file that `entry` names.

@@ -28,6 +28,8 @@ mod other_form;
 pub mod resolve;
 /// `robot.toml`: models, arms and hands that make one manipulator.
 pub mod robot_file;
+/// Motors that several fingers share, held still.
+pub(crate) mod shared_motors;
 /// What a hand is to be made of.
 pub(crate) mod spec;
 /// SRDF: groups, end effectors, pairs of links that are not tested.

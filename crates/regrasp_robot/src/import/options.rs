@@ -22,8 +22,8 @@ pub struct LoadOptions {
     pub base: Option<String>,
     /// Wall-clock instant after which reading is given up (`F004`). It cuts and never changes what is read.
     pub deadline: Option<Instant>,
-    /// Take fingers of which a joint follows a joint of another finger: see [`crate::hand::Hand::ties`]. Without it they are refused
-    /// (`U209`).
+    /// Let joints move that follow joints of other fingers: see [`crate::hand::Hand::ties`]. Without it they are held still, where that
+    /// leaves every finger a joint.
     pub untie: bool,
     /// Files in memory, in place of all files on disk.
     pub kept: Option<Arc<KeptFiles>>,

@@ -5,7 +5,7 @@ use crate::robot::{JointId, LinkId};
 use nalgebra::UnitQuaternion;
 use regrasp_base::Place;
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What is a finger of a hand, by the ids of a robot.
 #[derive(Debug, Clone)]
@@ -18,6 +18,8 @@ pub(crate) struct HandSpec {
     pub mount: Option<LinkId>,
     /// Pairs of links that are never tested, smaller id first.
     pub allow: BTreeSet<(LinkId, LinkId)>,
+    /// Positions of joints that belong to no finger, in radians or metres; others are held as near to zero as their limits let them.
+    pub held: BTreeMap<JointId, f64>,
 }
 
 /// Positions by name of joint, each with its place.

@@ -1,5 +1,6 @@
 //! Fingers that share a motor: a joint of one finger follows a joint of another one. For grasp lists such a joint becomes a
-//! coordinate of its own finger, and the hand says what it follows ([`Tie`]). So it does on a robot that carries the hand.
+//! coordinate of its own finger, and the hand says what it follows ([`Tie`]). So it does on a robot that carries the hand, and where
+//! [`super::shared_motors`] cannot hold the motor still.
 
 use super::spec::HandSpec;
 use crate::coupling::{Coupling, Terms};

@@ -7,6 +7,7 @@ use super::finger_names::{End, finger_names};
 use super::rigid::rigid_links;
 use super::tip_sphere::fit_tip;
 use crate::import::options::LoadOptions;
+use crate::import::shared_motors;
 use crate::import::spec::{FingerSpec, HandSpec, PadSpec, TipSpec};
 use crate::robot::{JointId, JointKind, LinkId, Robot};
 use regrasp_base::diagnostic::did_you_mean;
@@ -47,7 +48,7 @@ pub(crate) fn guess_hand(robot: &Robot, options: &LoadOptions, file: &Path) -> R
     let fingers = tips.into_iter().zip(names).enumerate().map(|(index, ((tip_link, (tip, pad)), name))| FingerSpec {
         name,
         tip_link,
-        first_joint: [first_own_joint(&paths, index), first_uncoupled_joint(robot, &paths, index)]
+        first_joint: [first_own_joint(&paths, index), shared_motors::first_uncoupled_joint(robot, &paths, index)]
             .into_iter()
             .flatten()
             .max_by_key(|first| paths[index].iter().position(|joint| joint == first)),
@@ -58,7 +59,9 @@ pub(crate) fn guess_hand(robot: &Robot, options: &LoadOptions, file: &Path) -> R
         place: Place::file(file),
     });
     let fingers = fingers.collect();
-    Ok(HandSpec { base, fingers, mount: None, allow: BTreeSet::new() })
+    let mut spec = HandSpec { base, fingers, mount: None, allow: BTreeSet::new(), held: BTreeMap::new() };
+    shared_motors::place_held_leaders(robot, &mut spec);
+    Ok(spec)
 }
 
 /// The moving joints of each finger, from `base` on.
@@ -76,28 +79,6 @@ fn first_own_joint(paths: &[Vec<JointId>], finger: usize) -> Option<JointId> {
     let is_shared = |joint: &JointId| paths.iter().enumerate().any(|(k, path)| k != finger && path.contains(joint));
     let last_shared = paths[finger].iter().rposition(is_shared)?;
     paths[finger].get(last_shared + 1).copied()
-}
-
-/// The first joint of a finger after those that are coupled with joints of other fingers, such as spreads: those are held. None where
-/// there are none, or where nothing independent is left.
-fn first_uncoupled_joint(robot: &Robot, paths: &[Vec<JointId>], finger: usize) -> Option<JointId> {
-    let path = &paths[finger];
-    let leaders =
-        |joint: JointId| robot.joints[joint.0].coupling.iter().flat_map(|own| own.terms.iter().map(|term| term.0));
-    let leads_away = |joint: JointId| {
-        let others = paths.iter().enumerate().filter(|&(k, _)| k != finger).flat_map(|(_, other)| other);
-        others.filter(|other| !path.contains(other)).any(|&other| leaders(other).any(|leader| leader == joint))
-    };
-    let mut first = 0;
-    // What follows a joint that is held is held too.
-    while let Some(last) = (first..path.len())
-        .rev()
-        .find(|&k| leads_away(path[k]) || leaders(path[k]).any(|leader| !path[first..].contains(&leader)))
-    {
-        first = last + 1;
-    }
-    let is_independent = |joint: &JointId| robot.joints[joint.0].coupling.is_none();
-    (first > 0 && path[first..].iter().any(is_independent)).then(|| path[first])
 }
 
 /// Most joints that some fingers of one hand share: folds of a palm. More are an arm.

@@ -49,8 +49,15 @@ pub fn hand_file_text(hand: &Hand, urdf: &str, allow: &BTreeSet<(LinkId, LinkId)
         }
         let _ = writeln!(text, "]");
     }
-    for joint in &robot.joints {
-        let Some(coupling) = &joint.coupling else { continue };
+    if !hand.held.is_empty() {
+        let _ = writeln!(text, "\n# Joints that belong to no finger, and where they are held.\n[held]");
+        for &(joint, position) in &hand.held {
+            let _ = writeln!(text, "{} = {}", quoted(&robot.joints[joint.0].name), number(position));
+        }
+    }
+    for (index, joint) in robot.joints.iter().enumerate() {
+        let tied = hand.ties.iter().find(|tie| tie.follower == JointId(index)).map(|tie| &tie.coupling);
+        let Some(coupling) = tied.or(joint.coupling.as_ref()) else { continue };
         let _ = writeln!(text, "\n[[couplings]]\njoint = {}", quoted(&joint.name));
         let leader = |id: JointId| quoted(&robot.joints[id.0].name);
         match coupling.single() {
@@ -65,7 +72,10 @@ pub fn hand_file_text(hand: &Hand, urdf: &str, allow: &BTreeSet<(LinkId, LinkId)
                 let _ = writeln!(text, "]");
             }
         }
-        let _ = writeln!(text, "offset = {}", number(coupling.offset));
+        // Held joints have their zero where they are held.
+        let held = hand.held.iter().map(|&(joint, position)| coupling.multiplier(joint) * position).sum::<f64>();
+        let offset = ((coupling.offset - held) * 1e12).round() / 1e12 + 0.0;
+        let _ = writeln!(text, "offset = {}", number(offset));
     }
     for finger in &hand.fingers {
         let _ = writeln!(text, "\n[[fingers]]\nname = {}\ntip_link = {}", quoted(&finger.name), name(finger.tip.link));

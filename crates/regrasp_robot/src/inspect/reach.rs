@@ -88,6 +88,31 @@ impl TipReach {
         reach
     }
 
+    /// The same, where the fingers whose bit is set in `fingers` reach every voxel within `by` voxels of one that they reach too. Tips that
+    /// move on a surface or a line meet few of the places that are asked about.
+    #[must_use]
+    pub fn widened(&self, fingers: u32, by: usize) -> Self {
+        let mut wide = self.clone();
+        let [nx, ny, nz] = self.counts;
+        let around = |at: usize, n: usize| at.saturating_sub(by)..(at + by + 1).min(n);
+        for finger in (0..self.n_fingers).filter(|finger| fingers & (1 << finger) != 0) {
+            for voxel in 0..nx * ny * nz {
+                let from = self.from[voxel * self.n_fingers + finger];
+                if from == 0 {
+                    continue;
+                }
+                for z in around(voxel / (nx * ny), nz) {
+                    for y in around(voxel / nx % ny, ny) {
+                        for x in around(voxel % nx, nx) {
+                            wide.from[((z * ny + y) * nx + x) * self.n_fingers + finger] |= from;
+                        }
+                    }
+                }
+            }
+        }
+        wide
+    }
+
     #[inline]
     fn voxel(&self, point: &Point) -> Option<usize> {
         let at = (point - self.low) / self.pitch;
@@ -116,7 +141,8 @@ impl TipReach {
 
     /// Centres of the voxels that at least `n_fingers` fingers reach.
     pub fn voxels(&self, n_fingers: usize) -> Vec<Point> {
-        let n_voxels: usize = self.counts.iter().product();
+        // Without any posture there is no voxel.
+        let n_voxels = self.from.len() / self.n_fingers.max(1);
         let center = |index: usize| {
             let [nx, ny, _] = self.counts;
             let at = Vector::new((index % nx) as f64, (index / nx % ny) as f64, (index / (nx * ny)) as f64);

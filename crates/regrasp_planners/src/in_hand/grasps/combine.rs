@@ -129,10 +129,11 @@ const RELOCATION_FEE: f64 = 0.08;
 /// Share of the way that a grasp with every finger releasable is worth over one with a single one. By hand.
 const RELEASE_BONUS: f64 = 0.3;
 
-/// Most fingers that may be free at a time.
+/// Most fingers that may be free at a time: those at least that cannot follow the object.
 pub fn most_free(model: &Model, settings: &SearchSettings) -> usize {
+    let n_closing = model.closing_fingers().count_ones() as usize;
     match settings.release_rule {
-        ReleaseRule::WhereOthersHold => model.n_fingers().saturating_sub(settings.least_holding),
+        ReleaseRule::WhereOthersHold => model.n_fingers().saturating_sub(settings.least_holding).max(n_closing),
         ReleaseRule::EverywhereEveryFinger => 0,
     }
 }

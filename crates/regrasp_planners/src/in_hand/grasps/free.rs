@@ -20,8 +20,13 @@ const DRAWN: usize = 3;
 const AT_ONCE: usize = 3;
 
 /// Fingers that the next extension from `state` may leave free, as bits: some now and then where a pose was tried often, or
-/// where a finger is free already.
+/// where a finger is free already; always those that hold and cannot follow the object.
 pub fn draw_leavable(search: &mut Search, state: &GraspState, n_tries: u32) -> u32 {
+    let stay_behind = search.model().closing_fingers() & state.holding;
+    stay_behind | draw_others_leavable(search, state, n_tries)
+}
+
+fn draw_others_leavable(search: &mut Search, state: &GraspState, n_tries: u32) -> u32 {
     let model = search.model();
     // Every soft finger that is free leaves the object one direction more.
     let is_early = n_tries <= search.settings.search.free_after && !spin::is_restricted(model, state.holding);

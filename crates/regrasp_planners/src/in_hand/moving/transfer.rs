@@ -44,7 +44,8 @@ fn holds_weight(workspace: &mut Workspace, there: &Moment, holding: u32) -> bool
 }
 
 /// As [`transfer`], with collisions left to `is_clear`, which is asked about each step to the moment it is given. Without
-/// it the same moments come out: that is how a transfer that was proven once is carried out again.
+/// it the same moments come out: that is how a transfer that was proven once is carried out again. A finger that reaches no points follows
+/// nowhere.
 pub fn follow(
     model: &Model,
     start: &GraspState,
@@ -52,6 +53,9 @@ pub fn follow(
     moments: &mut Vec<Moment>,
     mut is_clear: impl FnMut(&Moment) -> bool,
 ) -> f64 {
+    if model.closing_fingers() & start.holding != 0 && start.world_from_object != *goal {
+        return 0.0;
+    }
     if spin::is_restricted(model, start.holding) {
         return spin::pursue(model, start, goal, moments, is_clear);
     }

@@ -51,8 +51,14 @@ impl Evidence {
                 found.push(Candidate { contact: Some(contact), joints, follow: 1.0 });
             });
             evidence.n_contacts[finger] = found.len();
-            if found.is_empty() {
-                search.tally.add(Reason::NoContact(finger));
+            let stays_free = model.fingers[finger].closes() && !search.holds_only;
+            if found.is_empty() || stays_free {
+                if stays_free {
+                    // It cannot follow: what the others do without it is what counts.
+                    found.clear();
+                } else {
+                    search.tally.add(Reason::NoContact(finger));
+                }
                 let stays = Way::new(hand_from_object, hand_from_object);
                 let Some(free) = free_posture_at(search, finger, hand_from_object, &stays) else { return evidence };
                 found.push(free);

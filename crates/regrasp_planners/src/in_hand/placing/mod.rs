@@ -125,11 +125,14 @@ pub fn place(
     super::refusals::refuse_holding_nothing(model)?;
     // The poses are those of a start at the origin; a query that stays there stays everywhere.
     let moves = queries.iter().any(|query| !query.stays());
+    if moves {
+        super::refusals::refuse_hand_that_cannot_follow(model)?;
+    }
     if moves && model.n_fingers() > 2 && !settings.search.transfers_alone {
         super::refusals::refuse_impossible(model)?;
     }
     let mut rng = Rng::keyed(seed, "place", 0);
-    let reach = TipReach::sample(view.hand, POSTURES, &mut rng);
+    let reach = reach_of(model, &TipReach::sample(view.hand, POSTURES, &mut rng));
     let asked = Turns { view, queries };
     let proposals = Proposals::new(model, &reach, asked.rotation());
     if proposals.is_empty() {
@@ -182,6 +185,15 @@ pub fn place(
     places.truncate(n_wanted.max(1));
     Ok(Places { places, tried })
 }
+
+/// Where the fingertips of `model` reach, as poses are estimated with: fingers that find contacts by closing meet few of the contacts that are
+/// spread over the object, and count for those nearby.
+fn reach_of(model: &Model, reach: &TipReach) -> TipReach {
+    reach.widened(model.closing_fingers(), (NEARBY / reach.pitch()).ceil() as usize)
+}
+
+/// How near a contact is to one of those spread over an object, in metres, about.
+const NEARBY: f64 = 0.008;
 
 /// Makes short searches from places, best first, until some turn out well, and again from the best of these.
 fn search_from(

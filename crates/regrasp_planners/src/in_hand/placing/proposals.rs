@@ -22,6 +22,8 @@ const FINGERS_AROUND: usize = 2;
 pub struct Proposals<'m> {
     model: &'m Model<'m>,
     around: Vec<Point>,
+    /// Largest distance of the centre of mass from such a place, in metres.
+    farthest: f64,
     /// Orientation in the hand's frame, where the query gives it.
     rotation: Option<UnitQuaternion<f64>>,
 }
@@ -30,7 +32,13 @@ impl<'m> Proposals<'m> {
     /// For the object of `model`, in the orientation given in the hand's frame.
     pub fn new(model: &'m Model<'m>, reach: &TipReach, rotation: Option<UnitQuaternion<f64>>) -> Self {
         let fingers = FINGERS_AROUND.min(model.n_fingers());
-        Proposals { model, around: reach.voxels(fingers), rotation }
+        let (mut around, mut farthest) = (reach.voxels(fingers), model.frame.torque_scale);
+        if around.is_empty() && model.closing_fingers() != 0 {
+            // Jaws come from both sides of the object, and never to the same place.
+            around = reach.voxels(1);
+            farthest += model.fingers.iter().map(|finger| finger.tip_radius).fold(0.0, f64::max);
+        }
+        Proposals { model, around, farthest, rotation }
     }
 
     /// True when the fingertips have no place in common.
@@ -42,7 +50,7 @@ impl<'m> Proposals<'m> {
     pub fn draw(&self, rng: &mut Rng) -> Pose {
         let rotation = self.rotation.unwrap_or_else(|| self.draw_rotation(rng));
         let near = self.around[rng.below(self.around.len())];
-        let away = self.model.frame.torque_scale * rng.unit();
+        let away = self.farthest * rng.unit();
         let center = near + Vector::from(rng.direction()) * away;
         self.pose_about(&center, rotation)
     }

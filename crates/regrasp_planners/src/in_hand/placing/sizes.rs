@@ -51,6 +51,7 @@ pub fn sizes(hand: &Hand, reach: &TipReach, settings: &InHandSettings, seed: u64
         Failure::refuse_many_fingers(&view)?;
         Failure::refuse_tied_fingers(&view)?;
         let model = Model::new(&view, &settings.physics);
+        let reach = &super::reach_of(&model, reach);
         crate::in_hand::refusals::refuse_holding_nothing(&model)?;
         let mut rng = Rng::keyed(seed, "sizes", index as u64);
         // Which contacts of a ball close does not depend on its size.
@@ -73,7 +74,7 @@ pub fn sizes(hand: &Hand, reach: &TipReach, settings: &InHandSettings, seed: u64
         let context = Context { model: &model, settings, seed, budget: &budget, winner: &winner, progress: &|_| {} };
         let mut search = Search::new(context, [Pose::identity(); 2], 0, u64::MAX);
         search.rng = Rng::keyed(seed, "sizes_evidence", index as u64);
-        search.holds_only = !model.may_release;
+        search.holds_only = !model.may_release || !model.may_move_object();
         let mut best = Size { radius, center: None, lets_go: false, evidence: 0.0 };
         let clear = poses.iter().filter(|(_, pose)| object_blocked_by(&model, pose).is_none());
         for (_, pose) in clear.take(LOOKED_AT) {
@@ -89,6 +90,28 @@ pub fn sizes(hand: &Hand, reach: &TipReach, settings: &InHandSettings, seed: u64
         found.push(best);
     }
     Ok(found)
+}
+
+/// Which fingers of `hand` cannot follow an object that moves, and whether the hand can turn objects all the same, in words. None where
+/// all of them follow.
+pub fn fingers_that_only_hold(hand: &Hand, settings: &InHandSettings) -> Option<String> {
+    let scene = scene_of(hand, ball(RADII[0])?);
+    let state = State::at_rest(&scene, vec![Pose::identity()]);
+    let view = regrasp_scene::HandView::of(&Manipulation::first(&scene, &state));
+    Failure::refuse_many_fingers(&view).ok()?;
+    let model = Model::new(&view, &settings.physics);
+    if model.closing_fingers() == 0 {
+        return None;
+    }
+    if let Err(failure) = crate::in_hand::refusals::refuse_hand_that_cannot_follow(&model) {
+        return Some(failure.message);
+    }
+    let names: Vec<&str> =
+        (0..model.n_fingers()).filter(|&f| model.fingers[f].closes()).map(|f| hand.fingers[f].name.as_str()).collect();
+    Some(format!(
+        "fingers that hold an object only while it stands still, as their tips move in fewer than three directions: {}",
+        names.join(", ")
+    ))
 }
 
 fn ball(radius: f64) -> Option<Object> {

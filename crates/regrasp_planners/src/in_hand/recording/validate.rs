@@ -169,6 +169,8 @@ struct End {
     /// Where the tip's centre is in contact.
     foot: Point,
     normal: Vector,
+    /// How far from the line it may be, per height: a finger that cannot go straight up leaves at a slant.
+    slant: f64,
 }
 
 impl End {
@@ -177,16 +179,20 @@ impl End {
         let placement = Placement::from(pose);
         let normal: Vector = placement.vector(&contact.normal_in_object);
         let foot = placement.point(&contact.point_in_object) - model.fingers[finger].arm_with(joints, &normal);
-        End { foot, normal }
+        let slant = if model.fingers[finger].closes() { STEEPEST_LIFT } else { 0.0 };
+        End { foot, normal, slant }
     }
 
-    /// True when the centre of a tip is straight over the contact.
+    /// True when the centre of a tip is over the contact: straight, or as slanted as it may be.
     fn is_under(&self, tip: &Point) -> bool {
         let arm = tip - self.foot;
         let height = arm.dot(&self.normal);
-        (arm - self.normal * height).norm() < STRAIGHT && height > -STRAIGHT
+        (arm - self.normal * height).norm() < STRAIGHT + self.slant * height.max(0.0) && height > -STRAIGHT
     }
 }
+
+/// Slant that checks allow a lift: the tangent of 60 degrees.
+const STEEPEST_LIFT: f64 = 1.732;
 
 /// Distance from the normal that still counts as on it, in metres: far above what solvers leave.
 const STRAIGHT: f64 = 1e-5;

@@ -22,6 +22,7 @@ use regrasp_base::{Budget, Interrupt, Rng};
 use regrasp_geometry::Pose;
 use regrasp_grasp::Contact;
 use regrasp_manipulation::failure::{Failure, FailureKind};
+use regrasp_manipulation::following::refuse_fingers_that_cannot_follow;
 use regrasp_manipulation::grasp::sequence::{Motion, Sequence, Step};
 use regrasp_manipulation::grasp::state::GraspState;
 use regrasp_manipulation::model::{Model, releasable};
@@ -111,6 +112,7 @@ pub fn build_roadmap(
     let within = with_fixed_contacts(&settings).within(&view.limits);
     let model = Model::new(view, &within.physics);
     refuse_impossible(&model)?;
+    refuse_fingers_that_cannot_follow(&model)?;
     let mut builder = Builder::new(&model, &within, region, build, seed, budget, progress)?;
     builder.run()?;
     let about = About {

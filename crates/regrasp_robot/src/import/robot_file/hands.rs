@@ -15,6 +15,7 @@ use crate::robot::{LinkId, Robot};
 use regrasp_base::diagnostic::did_you_mean;
 use regrasp_base::toml_table::{Entry, Found, Table};
 use regrasp_geometry::Pose;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -226,6 +227,8 @@ fn in_tree(spec: &HandSpec, place: &Place, mount: LinkId) -> HandSpec {
         fingers: spec.fingers.iter().map(finger).collect(),
         mount: Some(mount),
         allow: spec.allow.iter().map(|&(a, b)| (place.link(a), place.link(b))).collect(),
+        // On a robot they are coordinates like others.
+        held: BTreeMap::new(),
     }
 }
 

@@ -5,6 +5,8 @@
 
 /// Damped Newton steps from a table of seeds, with a preferred direction of the last body in the null space.
 mod numeric;
+/// Motions of the tip of fingers that cannot go in every direction.
+mod push;
 /// Real roots of polynomials of degree four and less.
 mod quartic;
 /// Cells of space that a tip can reach.
@@ -99,6 +101,7 @@ pub struct FingerIk {
     chain: Chain,
     center_in_body: Point,
     method: Method,
+    reaches_points: bool,
 }
 
 #[derive(Debug, Clone)]
@@ -118,7 +121,8 @@ impl FingerIk {
             Some(closed_form) => Method::ClosedForm(Box::new(closed_form)),
             None => Method::Numeric(Box::new(NumericIk::new(chain, center_in_body))),
         };
-        FingerIk { chain: chain.clone(), center_in_body: *center_in_body, method }
+        let reaches_points = push::reaches_points(chain, center_in_body);
+        FingerIk { chain: chain.clone(), center_in_body: *center_in_body, method, reaches_points }
     }
 
     /// The chain solved.
@@ -138,6 +142,27 @@ impl FingerIk {
             Method::ClosedForm(_) => true,
             Method::Numeric(ik) => ik.may_reach(target_in_base),
         }
+    }
+
+    /// True when the tip's centre can move in three independent directions, at some posture at least. Without that it moves on a surface or
+    /// a line: it comes to no point that is chosen beforehand, and can follow no motion that is.
+    #[inline]
+    pub fn reaches_points(&self) -> bool {
+        self.reaches_points
+    }
+
+    /// Coordinates with which the tip's centre has moved by `length` metres along `direction` (a unit vector in the base frame), to first
+    /// order, and beside it as little as the finger can. None where that leaves the limits by less than `limit_margin`, or the tip would
+    /// move by more than `largest_slope` beside the direction per metre along it.
+    pub fn push(
+        &self,
+        coordinates: &[f64],
+        direction: &Vector,
+        length: f64,
+        (limit_margin, largest_slope): (f64, f64),
+    ) -> Option<Coordinates> {
+        let there = push::step(&self.tip_jacobian(coordinates), coordinates, direction, (length, largest_slope))?;
+        self.chain.within_limits(&there, limit_margin).then_some(there)
     }
 
     /// True when a target leaves freedom: more than three coordinates.

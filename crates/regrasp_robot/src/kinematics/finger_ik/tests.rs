@@ -240,6 +240,7 @@ fn numeric_finds_the_branches_of_the_closed_form() {
             method: Method::Numeric(Box::new(NumericIk::new(&chain, &center))),
             chain,
             center_in_body: center,
+            reaches_points: true,
         };
         for _ in 0..20 {
             let target = closed.tip(&random_coordinates(closed.chain(), &mut rng));

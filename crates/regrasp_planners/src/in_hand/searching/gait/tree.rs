@@ -427,6 +427,10 @@ fn sow(search: &mut Search, tree: &mut Tree) -> Option<usize> {
     for finger in 0..model.n_fingers() {
         let mut candidates =
             tree.places[0].pool.towards_aim(search, finger, search.settings.search.candidates_kept + 1);
+        if model.fingers[finger].closes() && !search.holds_only {
+            // It may hold here, but to move the object it has to be free.
+            candidates.extend(free_posture_at(search, finger, &pose, tree.places[0].pool.way()));
+        }
         if candidates.is_empty() {
             search.tally.add(Reason::NoContact(finger));
             // A finger that reaches nothing is left free, once grasps of all fingers were looked for in vain.

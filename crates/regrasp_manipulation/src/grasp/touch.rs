@@ -1,6 +1,6 @@
 //! Where a fingertip touches, and how far it is from touching.
 
-use crate::prepared::Prepared;
+use crate::model::Model;
 use nalgebra::{Matrix2, Vector2};
 use regrasp_geometry::frame::tangents;
 use regrasp_geometry::surface::{Surface, SurfacePoint};
@@ -44,20 +44,20 @@ pub struct Gap {
 }
 
 /// How far the tip of `finger` is from the object.
-pub fn gap(prepared: &Prepared, finger: usize, hand_from_object: &Pose, joints: &[f64]) -> Gap {
-    let model = &prepared.model.fingers[finger];
-    let surface = &prepared.model.view.object.surface;
-    let center = hand_from_object.inverse_transform_point(&model.ik.tip(joints));
+pub fn gap(model: &Model, finger: usize, hand_from_object: &Pose, joints: &[f64]) -> Gap {
+    let surface = &model.view.object.surface;
+    let of_hand = &model.fingers[finger];
+    let center = hand_from_object.inverse_transform_point(&of_hand.ik.tip(joints));
     let (at, distance) = surface.project_signed(&center);
     let smooth = at.normal_in_object.into_inner();
     // On edges and corners, too, the normal of a ball points to its centre; that of the surface is smoothed over scans.
     let away = (center - at.point_in_object).try_normalize(FLAT_BELOW).map(|away| away * distance.signum());
     let normal = away.unwrap_or(smooth);
-    let rough = Gap { distance: distance - model.tip_radius, at, normal, is_exact: model.curved.is_none() };
-    match model.curved {
+    let rough = Gap { distance: distance - of_hand.tip_radius, at, normal, is_exact: of_hand.curved.is_none() };
+    match of_hand.curved {
         Some(tip) if rough.distance < LOOK_CLOSELY => {
             let arm = |normal: &Vector| {
-                hand_from_object.inverse_transform_vector(&model.arm_with(joints, &(hand_from_object * normal)))
+                hand_from_object.inverse_transform_vector(&of_hand.arm_with(joints, &(hand_from_object * normal)))
             };
             nearest(surface, &center, arm, least_radius(&tip), normal).unwrap_or(rough)
         }
@@ -121,18 +121,12 @@ fn nearest(
 }
 
 /// The contact of a tip that touches, if it may touch there: away from creases, with its pad, and nowhere else.
-pub fn contact(
-    prepared: &Prepared,
-    finger: usize,
-    hand_from_object: &Pose,
-    joints: &[f64],
-    gap: &Gap,
-) -> Option<Contact> {
-    let (model, object) = (&prepared.model.fingers[finger], prepared.model.view.object);
+pub fn contact(model: &Model, finger: usize, hand_from_object: &Pose, joints: &[f64], gap: &Gap) -> Option<Contact> {
+    let object = model.view.object;
     let normal = UnitVector::new_normalize(gap.normal);
     let may = gap.is_exact
         && object.surface.crease_distance(&gap.at) >= object.edge_distance
-        && model.pad_faces(joints, &(hand_from_object * normal.into_inner()));
+        && model.fingers[finger].pad_faces(joints, &(hand_from_object * normal.into_inner()));
     may.then_some(Contact { point_in_object: gap.at.point_in_object, normal_in_object: normal })
 }
 
@@ -147,29 +141,29 @@ const MOST_STEPS_OF_FINGER: usize = 4_000;
 
 /// The contact that a finger makes on the straight line in joint space from `open` to `closed` and a little beyond, with its joints there.
 pub fn touch_on_way(
-    prepared: &Prepared,
+    model: &Model,
     finger: usize,
     hand_from_object: &Pose,
     open: &Coordinates,
     closed: &Coordinates,
 ) -> Option<(Contact, Coordinates)> {
-    let model = &prepared.model.fingers[finger];
-    let chain = model.ik.chain();
+    let of_hand = &model.fingers[finger];
+    let chain = of_hand.ik.chain();
     let largest = open.iter().zip(closed).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
     let end = 1.0 + BEYOND.min(FARTHEST_BEYOND / largest.max(1e-9));
     let change: Coordinates = open.iter().zip(closed).map(|(a, b)| b - a).collect();
     let turn: f64 = change.iter().map(|x| x.abs()).sum();
     let speed =
-        model.tip_bound.first_order(&change) + if model.curved.is_some() { model.tip_radius * turn } else { 0.0 };
+        of_hand.tip_bound.first_order(&change) + if of_hand.curved.is_some() { of_hand.tip_radius * turn } else { 0.0 };
     let at = |share: f64| -> Coordinates {
         let position = |k: usize| (open[k] + change[k] * share).clamp(chain.lower[k], chain.upper[k]);
         // At the grasp itself the joints are those that are given, to the last bit.
         if share == 1.0 { closed.clone() } else { (0..change.len()).map(position).collect() }
     };
-    let gap_at = |share: f64| gap(prepared, finger, hand_from_object, &at(share));
+    let gap_at = |share: f64| gap(model, finger, hand_from_object, &at(share));
     let touching = |share: f64, gap: &Gap| {
         let joints = at(share);
-        contact(prepared, finger, hand_from_object, &joints, gap).map(|contact| (contact, joints))
+        contact(model, finger, hand_from_object, &joints, gap).map(|contact| (contact, joints))
     };
     let at_grasp = gap_at(1.0);
     if at_grasp.distance.abs() <= TOUCHES {
