@@ -16,6 +16,7 @@ use crate::in_hand::roadmap::region::{Region, nearest_places, spread_places};
 use crate::in_hand::roadmap::registry::Registry;
 use crate::in_hand::roadmap::rolling;
 use crate::in_hand::roadmap::route::evenly;
+use crate::in_hand::roadmap::stage::{AtPlace, Found, Origin};
 use crate::in_hand::roadmap::{About, GraspRoadmap};
 use crate::settings::{InHandSettings, Method};
 use rayon::prelude::*;
@@ -140,21 +141,6 @@ fn largest_component(graph: &Graph) -> Graph {
     let components = components(graph);
     let largest = component_sizes(&components).first().map(|&(node, _)| node);
     graph.only(|node| Some(components.representative(node)) == largest)
-}
-
-/// Where a sequence begins.
-#[expect(clippy::large_enum_variant, reason = "a few at a time, short-lived")]
-pub(super) enum Origin {
-    /// At a node.
-    Node(u32),
-    /// At a new grasp, at the place that was worked on.
-    New(GraspState),
-}
-
-/// A sequence of motions that was found.
-pub(super) struct Found {
-    pub(super) origin: Origin,
-    pub(super) legs: Vec<Leg>,
 }
 
 struct Builder<'b> {
@@ -421,20 +407,6 @@ impl Ways {
         let path = relocate(&mut search.workspace, &at.pose, finger, leave, arrive, &mut rng)?;
         known.push(std::iter::once(joints_a).chain(path.iter().cloned()).collect());
         Some(path)
-    }
-}
-
-/// What a stage may look at of one place.
-pub(super) struct AtPlace<'g> {
-    pub(super) graph: &'g Graph,
-    pub(super) place: usize,
-    pub(super) pose: Pose,
-    pub(super) nodes_at: &'g Lists,
-}
-
-impl AtPlace<'_> {
-    pub(super) fn nodes(&self) -> &[u32] {
-        self.nodes_at.of(self.place)
     }
 }
 

@@ -7,7 +7,6 @@
 //! fingertips roll, contacts travel in a transfer, so that its ends are different grasps. Such graphs store motions with contacts, contact forces
 //! and times, see [`super::track`].
 
-use crate::in_hand::roadmap::track::{Track, track_length};
 use arrayvec::ArrayVec;
 use regrasp_geometry::Pose;
 use regrasp_grasp::Contact;
@@ -369,6 +368,37 @@ impl Graph {
             return Err("has a way that does not exist".into());
         }
         Ok(())
+    }
+}
+
+/// A motion with contacts, forces and times as numbers: see [`super::track`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Track {
+    /// The finger that moves; None where all hold and the object moves.
+    pub finger: Option<u8>,
+    /// Waypoints between its ends.
+    pub n_between: u16,
+    /// The numbers.
+    pub numbers: Vec<f64>,
+}
+
+/// Numbers of a contact: point, normal, force and torsion.
+const CONTACT: usize = 10;
+/// Numbers of what a contact transmits: force and torsion.
+pub const EXERTED: usize = 4;
+/// Numbers of a pose.
+const POSE: usize = 7;
+
+/// How many numbers a track has; more than any table has for one of no finger of the graph.
+fn track_length(graph: &Graph, finger: Option<u8>, n_between: u16) -> usize {
+    let n_waypoints = usize::from(n_between) + 2;
+    let n_joints: usize = graph.footholds.iter().map(|table| table.n_coordinates).sum();
+    match finger {
+        None => 1 + n_waypoints * (1 + POSE + 3 * n_joints + CONTACT * graph.n_fingers()),
+        Some(finger) => match graph.footholds.get(usize::from(finger)) {
+            Some(own) => 1 + n_joints + EXERTED * graph.n_fingers() + n_waypoints * (1 + 2 * own.n_coordinates),
+            None => usize::MAX / 2,
+        },
     }
 }
 

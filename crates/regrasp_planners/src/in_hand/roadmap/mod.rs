@@ -31,6 +31,8 @@ mod registry;
 mod rolling;
 /// Motions along a path in the graph.
 mod route;
+/// What stages of building look at and find.
+mod stage;
 /// Motions with contacts, forces and times, as numbers.
 mod track;
 

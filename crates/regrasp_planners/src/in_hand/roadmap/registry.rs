@@ -1,7 +1,6 @@
 //! A graph that grows: what is added is looked up first, so that the same grasp is one node whichever way led to it.
 
-use crate::in_hand::roadmap::graph::{Edge, FootholdIds, Graph, Leg, NOT_STORED, Node, Passage};
-use crate::in_hand::roadmap::track::Track;
+use crate::in_hand::roadmap::graph::{Edge, FootholdIds, Graph, Leg, NOT_STORED, Node, Passage, Track};
 use arrayvec::ArrayVec;
 use regrasp_geometry::Pose;
 use regrasp_grasp::Contact;

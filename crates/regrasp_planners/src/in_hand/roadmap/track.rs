@@ -5,7 +5,7 @@
 //! rest: the torques of all joints and the forces and torsions of all contacts stand once before the waypoints, and a waypoint is time, joints and
 //! velocities of the finger that moves.
 
-use crate::in_hand::roadmap::graph::{Footholds, Graph, Leg, Passage};
+use crate::in_hand::roadmap::graph::{EXERTED, Footholds, Graph, Leg, Passage, Track};
 use regrasp_geometry::{Point, Pose, UnitVector, Vector, pose_from};
 use regrasp_grasp::{Contact, ContactModel};
 use regrasp_manipulation::forces::limits::Unbalanced;
@@ -16,37 +16,6 @@ use regrasp_manipulation::recording::pieces::Piece;
 use regrasp_manipulation::recording::recorder::{Joins, Recorder, moving, resting};
 use regrasp_plan::plan::{ContactState, PoseData, Segment, SegmentKind, Waypoint};
 use std::ops::Range;
-
-/// A motion as numbers.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Track {
-    /// The finger that moves; None where all hold and the object moves.
-    pub finger: Option<u8>,
-    /// Waypoints between its ends.
-    pub n_between: u16,
-    /// The numbers.
-    pub numbers: Vec<f64>,
-}
-
-/// Numbers of a contact: point, normal, force and torsion.
-const CONTACT: usize = 10;
-/// Numbers of what a contact transmits: force and torsion.
-const EXERTED: usize = 4;
-/// Numbers of a pose.
-const POSE: usize = 7;
-
-/// How many numbers a track has; more than any table has for one of no finger of the graph.
-pub fn track_length(graph: &Graph, finger: Option<u8>, n_between: u16) -> usize {
-    let n_waypoints = usize::from(n_between) + 2;
-    let n_joints: usize = graph.footholds.iter().map(|table| table.n_coordinates).sum();
-    match finger {
-        None => 1 + n_waypoints * (1 + POSE + 3 * n_joints + CONTACT * graph.n_fingers()),
-        Some(finger) => match graph.footholds.get(usize::from(finger)) {
-            Some(own) => 1 + n_joints + EXERTED * graph.n_fingers() + n_waypoints * (1 + 2 * own.n_coordinates),
-            None => usize::MAX / 2,
-        },
-    }
-}
 
 /// The motions of `way` with forces and times, each by itself.
 ///
