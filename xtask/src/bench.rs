@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 const RESULTS: &str = "docs/benchmarks";
 /// Sections of the page, in this order; those without a CSV file are left out.
-const SECTIONS: [&str; 14] = [
+const SECTIONS: [&str; 17] = [
     "rolling_wide",
     "rolling_allegro",
     "wide",
@@ -22,6 +22,9 @@ const SECTIONS: [&str; 14] = [
     "shadow",
     "roadmap_sphere",
     "roadmap_box",
+    "roadmap_rolling_sphere",
+    "roadmap_rolling_box",
+    "roadmap_rolling_allegro_sphere",
 ];
 const GROWTH: &str = "fingers triangles obstacles threads";
 /// Raw rows above this size are kept compressed.
@@ -117,20 +120,28 @@ pub fn roadmaps(_: &[String]) -> Outcome {
     unpack()?;
     let folder = out("roadmaps")?;
     let queries = number("QUERIES", 1000)?;
-    for (name, scene, build, single) in [
-        ("roadmap_sphere", "sphere_90x", "", true),
-        ("roadmap_box", "box_90x", "", true),
-        ("roadmap_million", "box_90x", "--places 1700", false),
-    ] {
+    let plain = "--settings docs/benchmarks/plain.json";
+    // Defaults: fingertips roll. Few single queries, which take far longer.
+    let packages = models().map(|models| package(&models));
+    let rolling = ["sphere_90x", "box_90x"].map(|scene| (scene, ""));
+    let allegro = packages.as_deref().map(|packages| ("allegro/sphere32_x", packages));
+    let mut runs = vec![
+        ("roadmap_sphere", "sphere_90x", "", plain, "", queries),
+        ("roadmap_box", "box_90x", "", plain, "", queries),
+        ("roadmap_million", "box_90x", "", plain, "--places 1700", 0),
+    ];
+    let names = ["roadmap_rolling_sphere", "roadmap_rolling_box", "roadmap_rolling_allegro_sphere"];
+    let of_name = |(name, (scene, packages))| (name, scene, packages, "", "", queries / 10);
+    runs.extend(names.into_iter().zip(rolling.into_iter().chain(allegro)).map(of_name));
+    for (name, scene, packages, settings, build, single) in runs {
         let graph = folder.join(format!("{name}.roadmap"));
         let graph = graph.display();
-        let settings = "--settings docs/benchmarks/plain.json";
-        regrasp_with(&program, &format!("roadmap build scenes/{scene}.toml {settings} -o {graph} {build}"))?;
-        let single = if single { format!("--single {queries}") } else { String::new() };
+        regrasp_with(&program, &format!("roadmap build scenes/{scene}.toml {packages} {settings} -o {graph} {build}"))?;
+        let level = if settings.is_empty() { "motion" } else { "geometry" };
         regrasp_with(
             &program,
             &format!(
-                "roadmap bench {graph} scenes/{scene}.toml {single} --level geometry --queries {queries} \
+                "roadmap bench {graph} scenes/{scene}.toml {packages} --single {single} --level {level} --queries {queries} \
                  --csv {RESULTS}/{name}.csv --graph {RESULTS}/{name}.json"
             ),
         )?;
@@ -198,7 +209,8 @@ fn is_section(results: &str, page: &str, suite: &str) -> bool {
 fn write_page(program: &Path, page: &str) -> Outcome {
     let mut inputs: Vec<String> =
         SECTIONS.iter().chain(&["roadmap_million"]).map(|name| format!("{name}.csv")).collect();
-    inputs.extend(["roadmap_sphere", "roadmap_box", "roadmap_million"].map(|name| format!("{name}.json")));
+    let graphs = SECTIONS.iter().filter(|name| name.starts_with("roadmap_")).chain(&["roadmap_million"]);
+    inputs.extend(graphs.map(|name| format!("{name}.json")));
     inputs.extend(words(GROWTH).iter().map(|name| format!("growth/{name}.csv")));
     let found: Vec<PathBuf> =
         inputs.iter().map(|name| Path::new(RESULTS).join(name)).filter(|path| path.is_file()).collect();

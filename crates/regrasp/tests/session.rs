@@ -294,10 +294,10 @@ fn a_finger_in_the_air_and_a_failing_graph_lead_to_a_search() {
     let alone = session(&loaded);
     let settings = InHandSettings::default();
     let query = loaded.task().query(0);
-    // One place: it leads nowhere.
+    // A few places close together: fingertips roll from one to the other, and it leads nowhere else.
     let region =
         Region::around(&[alone.view().hand_from(query.start())], &alone.view().object.center_of_mass, 0.001, 0.01);
-    let build = BuildSettings { places: 1, ..BuildSettings::default() };
+    let build = BuildSettings { places: 4, ..BuildSettings::default() };
     let graph = build_roadmap(alone.view(), &region, &build, &settings, 1, &Budget::unlimited(), &|_| {}).unwrap();
     let agreed = alone.agreed_roadmap(Path::new("graph"), graph).unwrap();
     let session = alone.clone().with_roadmap(&agreed);

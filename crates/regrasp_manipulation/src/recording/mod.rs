@@ -1,5 +1,7 @@
 //! The plan as it is written to a file.
 
+/// Pieces of plans with forces and times.
+pub mod pieces;
 /// A plan of given segments.
 pub mod plan;
 /// A plan in the making.

@@ -5,14 +5,13 @@ use crate::forces::limits::Unbalanced;
 use crate::grasp::sequence::{Motion, Sequence};
 use crate::grasp::state::{Contacts, GraspState, Moment, no_contact};
 use crate::model::Model;
+use crate::recording::pieces::{Piece, promises};
 use crate::recording::plan::{finger_names, plan_of};
 use crate::timing;
-use crate::tolerances::{CONTACT_TOLERANCE, SLIP_TOLERANCE};
 use regrasp_geometry::Pose;
 use regrasp_grasp::Contact;
 use regrasp_plan::plan::{
-    ContactMode, ContactState, Plan, PoseData, Promises, Segment, SegmentKind, Statistics, WayPose, Waypoint,
-    relocations,
+    ContactMode, ContactState, Plan, PoseData, Segment, SegmentKind, Statistics, WayPose, Waypoint, relocations,
 };
 use regrasp_scene::InHandQuery;
 use regrasp_scene::query::IN_HAND;
@@ -167,6 +166,17 @@ impl<'m, 'a> Recorder<'m, 'a> {
         self.kept_margin = self.kept_margin.min(self.model.closure_margin(&self.contacts, holding));
     }
 
+    /// What has been written down, with contact forces and times.
+    ///
+    /// Errors: a moment at which no contact forces balance the weight.
+    pub fn into_piece(mut self) -> Result<Piece, Unbalanced> {
+        self.keep(self.holding);
+        add_forces(self.model, &mut self.segments)?;
+        let motion = timing::limits(self.model);
+        timing::assign_times(self.model, &motion, &mut self.segments, |_| timing::LEAST_SPAN);
+        Ok(Piece { segments: self.segments, kept_margin: self.kept_margin })
+    }
+
     /// The plan.
     ///
     /// Errors: a moment at which no contact forces balance the weight: a plan without them is none.
@@ -177,45 +187,25 @@ impl<'m, 'a> Recorder<'m, 'a> {
         steps_to_way: &[usize],
         statistics: Statistics,
     ) -> Result<Plan, Unbalanced> {
-        self.keep(self.holding);
         if self.segments.is_empty() {
             // Start and goal are the same and any grasp will do: hold still.
-            let waypoints = vec![self.here.clone(), self.here];
+            let waypoints = vec![self.here.clone(), self.here.clone()];
             self.segments.push(Segment::transfer(waypoints));
         }
+        let model = self.model;
         let statistics = Statistics {
             transfers: self.transfers,
             transfers_with_free_fingers: self.transfers_with_free_fingers,
-            relocations: relocations(&finger_names(self.model.view), &self.segments),
+            relocations: relocations(&finger_names(model.view), &self.segments),
             ..statistics
         };
-        let model = self.model;
-        let forces = add_forces(model, &mut self.segments)?;
-        let motion = timing::limits(model);
-        timing::assign_times(model, &motion, &mut self.segments, |_| timing::LEAST_SPAN);
-        let promises = Promises {
-            contact_tolerance: CONTACT_TOLERANCE,
-            friction: model.frame.friction,
-            required_margin: model.settings.closure_margin,
-            kept_margin: self.kept_margin,
-            torque_scale: model.frame.torque_scale,
-            friction_margin: model.settings.friction_margin,
-            slip_tolerance: SLIP_TOLERANCE,
-            tracking: None,
-            motion,
-            forces,
-        };
+        let Piece { segments, kept_margin } = self.into_piece()?;
+        let ends = [&query.world_from_object_start, &query.world_from_object_goal];
         Ok(Plan {
             seed,
-            way_poses: way_poses(query, &self.segments, steps_to_way),
+            way_poses: way_poses(query, &segments, steps_to_way),
             statistics,
-            ..plan_of(
-                model.view,
-                IN_HAND,
-                [&query.world_from_object_start, &query.world_from_object_goal],
-                promises,
-                self.segments,
-            )
+            ..plan_of(model.view, IN_HAND, ends, promises(model, kept_margin), segments)
         })
     }
 }
@@ -233,12 +223,12 @@ fn way_poses(query: &InHandQuery, segments: &[Segment], steps_to_way: &[usize]) 
 }
 
 /// Contacts while the object stands still.
-fn resting(contacts: &Contacts, holding: u32) -> Vec<ContactState> {
+pub fn resting(contacts: &Contacts, holding: u32) -> Vec<ContactState> {
     contact_states(contacts, holding, |_| ContactMode::Fixed)
 }
 
 /// Contacts while the object moves.
-fn moving(model: &Model, contacts: &Contacts, holding: u32) -> Vec<ContactState> {
+pub fn moving(model: &Model, contacts: &Contacts, holding: u32) -> Vec<ContactState> {
     contact_states(contacts, holding, |finger| match model.rolls(finger) {
         true => ContactMode::Rolling,
         false => ContactMode::Fixed,

@@ -7,6 +7,7 @@ use regrasp_base::Budget;
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Pose, Shape, Vector};
 use regrasp_plan::check::{CheckSettings, Level};
+use regrasp_plan::plan::{Plan, SegmentKind, Waypoint};
 use regrasp_planners::in_hand::SearchSettings;
 use regrasp_planners::in_hand::roadmap::{
     BuildSettings, GraspRoadmap, QueryMemory, Region, RoadmapPlanner, build_roadmap, seal,
@@ -169,7 +170,11 @@ fn whatever_decides_what_is_feasible_is_refused_when_it_changed() {
         assert!(text.contains(part), "{part} in {text}");
     }
     // The torsion radius counts, and comes back from the file.
-    let built = GraspRoadmap::from_bytes(path, &small_roadmap(&soft, 1).to_bytes()).expect("its own bytes");
+    // A soft fingertip that rolls reaches no place of this small graph exactly: contacts stay.
+    let defaults = InHandSettings::default();
+    let physics = PhysicsSettings { transfer: TransferMode::Fixed, ..defaults.physics.clone() };
+    let of_soft = roadmap_with(&soft, InHandSettings { physics, n_threads: 1, ..defaults });
+    let built = GraspRoadmap::from_bytes(path, &of_soft.to_bytes()).expect("its own bytes");
     assert!(built.refuse_other_scene(path, &soft.view()).is_ok());
     let mut softer = soft.clone();
     tip(&mut softer.scene).contact = ContactModel::SoftFinger { torsion_radius: 0.006 };
@@ -215,6 +220,93 @@ fn settings_that_decide_what_is_feasible_are_refused_when_they_changed() {
         ..roadmap.about().settings.clone()
     };
     assert!(roadmap.refuse_other_settings(path, &searching).is_ok());
+}
+
+/// The graph's forces and times are those that are computed anew where they may not be used: with other speeds the positions of
+/// the same motions come out, and all that does not depend on speed.
+#[test]
+fn stored_forces_are_those_that_are_computed_anew() {
+    let loaded = scene("box_90x.toml");
+    let path = Path::new("box.roadmap");
+    let roadmap = small_roadmap(&loaded, 2);
+    let view = loaded.view();
+    let speed = roadmap.about().settings.physics.speed;
+    let stored = RoadmapPlanner::new(path, &roadmap, &view).expect("built for this scene");
+    let slower = regrasp_planners::in_hand::SpeedSettings { largest_speed: 0.5 * speed.largest_speed, ..speed };
+    let anew = RoadmapPlanner::of_agreed(&roadmap, &view, &slower);
+    let (mut memory, mut n_waypoints, mut n_joined) = (QueryMemory::default(), 0, 0);
+    for seed in 0..12 {
+        let query = stored.random_query(seed);
+        let budget = Budget::work(5_000_000);
+        let [quick, slow] = [&stored, &anew].map(|planner| {
+            let answer = planner.plan(&query, seed, &budget, &mut memory);
+            answer.unwrap_or_else(|failure| panic!("seed {seed}: {failure}")).plan
+        });
+        for plan in [&quick, &slow] {
+            let settings = CheckSettings { level: Level::Motion, ..CheckSettings::default() };
+            let report = loaded.judge(&query, plan, &settings);
+            assert!(report.accepted(), "seed {seed}: {report:#?}");
+        }
+        assert!((quick.promises.kept_margin - slow.promises.kept_margin).abs() < 1e-12, "seed {seed}");
+        assert_eq!(quick.statistics.relocations, slow.statistics.relocations);
+        let last_time = |plan: &Plan| plan.segments.last().unwrap().waypoints.last().unwrap().time;
+        assert!(last_time(&slow) > last_time(&quick), "half the speed takes longer");
+        // Transfers in a row are one segment in the one, several in the other: its first waypoints are there once.
+        let waypoints = |plan: &Plan| -> Vec<Waypoint> {
+            let mut all: Vec<Waypoint> = Vec::new();
+            let mut before = None;
+            for segment in &plan.segments {
+                let goes_on = before == Some(SegmentKind::Transfer) && segment.kind == SegmentKind::Transfer;
+                all.extend(segment.waypoints.iter().skip(usize::from(goes_on)).cloned());
+                before = Some(segment.kind);
+            }
+            all
+        };
+        n_joined += quick.segments.len() - slow.segments.len();
+        let (quick, slow) = (waypoints(&quick), waypoints(&slow));
+        assert_eq!(quick.len(), slow.len(), "seed {seed}");
+        for (a, b) in quick.iter().zip(&slow) {
+            assert!(a.joints == b.joints, "the same motion");
+            for (own, other) in a.contacts.iter().zip(&b.contacts) {
+                assert!(own.mode == other.mode && own.point_in_object == other.point_in_object);
+                let forces = [own, other].map(|state| Vector::from(state.force_in_object.unwrap_or_default()));
+                assert!((forces[0] - forces[1]).norm() < 1e-3, "seed {seed}: {forces:?}");
+            }
+            n_waypoints += 1;
+        }
+    }
+    assert!(n_waypoints > 500 && n_joined > 0, "{n_waypoints} {n_joined}: the test asks too little");
+}
+
+/// Rolling motions that a query found are kept with forces and times, and used by the next one.
+#[test]
+fn rolling_links_are_kept_and_used_again() {
+    let loaded = scene("sphere_90x.toml");
+    let path = Path::new("sphere.roadmap");
+    let mut roadmap = small_roadmap(&loaded, 1);
+    let view = loaded.view();
+    let mut memory = QueryMemory::default();
+    let mut ask = |roadmap: &GraspRoadmap, seed: u64| {
+        let planner = RoadmapPlanner::new(path, roadmap, &view).expect("built for this scene");
+        let query = planner.random_query(seed);
+        let answer = planner.plan(&query, seed, &Budget::work(1_000_000), &mut memory).expect("answered");
+        let settings = CheckSettings { level: Level::Motion, ..CheckSettings::default() };
+        let report = loaded.judge(&query, &answer.plan, &settings);
+        assert!(report.accepted(), "seed {seed}: {report:#?}");
+        answer
+    };
+    let (mut first, mut later) = (0, 0);
+    for seed in 0..15 {
+        let answer = ask(&roadmap, seed);
+        first += answer.plan.statistics.work;
+        let before = roadmap.census();
+        roadmap = roadmap.grown_by(&answer);
+        assert!(roadmap.census().transfers >= before.transfers + 2, "both links are kept");
+    }
+    for seed in 0..15 {
+        later += ask(&roadmap, seed).plan.statistics.work;
+    }
+    assert!(2 * later < first, "{first} {later}");
 }
 
 /// Each answer is added; asked again, the graph has it. Hard queries, which take a detour at first, most of all.

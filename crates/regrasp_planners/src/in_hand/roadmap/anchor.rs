@@ -2,11 +2,13 @@
 //! by a detour of transfers and relocations.
 
 use crate::in_hand::attempt::search::{Search, Stop};
+use crate::in_hand::attempt::tally::Reason;
 use crate::in_hand::regrasping::change::{Arrival, change_grasp, whole_transfer};
 use crate::in_hand::roadmap::GraspRoadmap;
 use crate::in_hand::roadmap::graph::contact_ids;
 use crate::in_hand::roadmap::landmarks::Bounds;
 use crate::in_hand::roadmap::route::same_posture;
+use crate::in_hand::roadmap::track::pieces_of;
 use crate::in_hand::searching::gait;
 use crate::in_hand::searching::shorten::shorten;
 use regrasp_base::Rng;
@@ -14,6 +16,7 @@ use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Pose, UnitVector, interpolate_pose};
 use regrasp_manipulation::grasp::sequence::{Motion, Sequence};
 use regrasp_manipulation::grasp::state::{GraspState, MAX_FINGERS};
+use regrasp_manipulation::recording::pieces::Piece;
 use regrasp_manipulation::rolling::follow::ik_settings;
 use regrasp_manipulation::workspace::TipMode;
 use regrasp_roadmap::{OpenList, Rank};
@@ -30,8 +33,8 @@ pub struct QueryEnd {
     /// Nodes not looked at yet: by the least that a path through them costs, then the smallest.
     candidates: OpenList<Candidate>,
     near: Vec<Place>,
-    /// A proven link that is no single transfer.
-    detour: Option<Link>,
+    /// A proven link to one of the anchors.
+    known: Option<Link>,
 }
 
 /// A node that may be linked to an end.
@@ -52,7 +55,9 @@ pub struct Link {
     pub n_skipped: usize,
     /// From the node to the end's pose, and there into the grasp given, if one is.
     pub way: Sequence,
-    /// True when every transfer of the way comes out again from its two ends, so that a graph can keep it.
+    /// The same with forces and times, motion by motion; where fingertips roll, and empty before they are asked for.
+    pub pieces: Vec<Piece>,
+    /// True when every transfer of the way comes out again from its two ends, so that a graph of contacts that stay can keep it.
     pub can_be_kept: bool,
 }
 
@@ -81,7 +86,7 @@ pub enum LinkKind {
 impl QueryEnd {
     /// An end without anchors.
     pub fn new(pose: Pose, given: Option<GraspState>) -> Self {
-        QueryEnd { pose, given, anchors: Vec::new(), candidates: OpenList::new(), near: Vec::new(), detour: None }
+        QueryEnd { pose, given, anchors: Vec::new(), candidates: OpenList::new(), near: Vec::new(), known: None }
     }
 
     /// Takes the nodes at some places, given with their distances, for candidates; `bounds` tell what the way from there on
@@ -129,8 +134,8 @@ impl QueryEnd {
         kind: LinkKind,
     ) -> Option<Link> {
         let anchor = path.clone().next()?;
-        if let Some(detour) = self.detour.as_ref().filter(|detour| detour.node == anchor) {
-            return Some(detour.clone());
+        if let Some(known) = self.known.as_ref().filter(|known| known.node == anchor) {
+            return Some(known.clone());
         }
         let link = if kind == LinkKind::Longest { self.longest_link(search, roadmap, path) } else { None };
         let link = link.or_else(|| self.link(search, roadmap, anchor, 0));
@@ -138,6 +143,36 @@ impl QueryEnd {
             self.anchors.retain(|other| other.node != anchor);
         }
         link
+    }
+
+    /// The motions between the end and its first anchor that has any, with forces and times where fingertips roll. Anchors that
+    /// have none are given up, and others taken for them as long as there are any.
+    pub fn linked(&mut self, search: &mut Search, roadmap: &GraspRoadmap) -> Result<Option<Link>, Stop> {
+        loop {
+            self.fill(search, roadmap, 1)?;
+            let Some(anchor) = self.anchors.first().map(|anchor| anchor.node) else { return Ok(None) };
+            let Some(link) = self.prove(search, roadmap, std::iter::once(anchor), LinkKind::Shortest) else { continue };
+            if !link.pieces.is_empty() {
+                return Ok(Some(link));
+            }
+            match pieces_of(search.model(), &link.way) {
+                Ok(pieces) => {
+                    let link = Link { pieces, ..link };
+                    self.known = Some(link.clone());
+                    return Ok(Some(link));
+                }
+                Err(unbalanced) => {
+                    search.tally.add(Reason::NoForces(unbalanced));
+                    self.give_up(anchor);
+                }
+            }
+        }
+    }
+
+    /// Takes a node for no anchor any more.
+    pub fn give_up(&mut self, node: usize) {
+        self.anchors.retain(|anchor| anchor.node != node);
+        self.known = self.known.take().filter(|known| known.node != node);
     }
 
     /// From the last of the first nodes of `path` that have one grasp, where that is not the first.
@@ -165,9 +200,9 @@ impl QueryEnd {
         };
         shorten(search, &mut way, Arrival::Exact);
         let way = way.reversed();
-        let can_be_kept = comes_out_again(search, &way);
+        let can_be_kept = search.model().any_rolls() || comes_out_again(search, &way);
         self.anchors.push(Anchor { node, cost: 0.0 });
-        self.detour = Some(Link { node, n_skipped: 0, way, can_be_kept });
+        self.known = Some(Link { node, n_skipped: 0, way, pieces: Vec::new(), can_be_kept });
         Ok(true)
     }
 
@@ -183,15 +218,8 @@ impl QueryEnd {
                 transfer.then(changes.reversed())?
             }
         };
-        Some(Link { node, n_skipped, way, can_be_kept: true })
+        Some(Link { node, n_skipped, way, pieces: Vec::new(), can_be_kept: true })
     }
-}
-
-/// `way` with relocations into a grasp given at the pose at which it ends.
-pub fn grasp_given(search: &mut Search, way: &Sequence, given: &GraspState) -> Option<Sequence> {
-    let mut rng = Rng::child(&search.rng, "given_grasp", 0);
-    search.rng.bits();
-    change_grasp(search, way, given, Arrival::Exact, &mut rng)
 }
 
 /// True unless some finger alone cannot follow from the node to the end's pose.

@@ -14,7 +14,9 @@ use crate::in_hand::roadmap::identity::Identity;
 use crate::in_hand::roadmap::index::{Costs, component_sizes, components};
 use crate::in_hand::roadmap::region::{Region, nearest_places, spread_places};
 use crate::in_hand::roadmap::registry::Registry;
+use crate::in_hand::roadmap::rolling;
 use crate::in_hand::roadmap::route::evenly;
+use crate::in_hand::roadmap::stage::{AtPlace, Found, Origin};
 use crate::in_hand::roadmap::{About, GraspRoadmap};
 use crate::settings::{InHandSettings, Method};
 use rayon::prelude::*;
@@ -26,8 +28,8 @@ use regrasp_manipulation::following::refuse_fingers_that_cannot_follow;
 use regrasp_manipulation::grasp::sequence::{Motion, Sequence, Step};
 use regrasp_manipulation::grasp::state::GraspState;
 use regrasp_manipulation::model::{Model, releasable};
+use regrasp_manipulation::recording::pieces::dynamics;
 use regrasp_manipulation::relocation::{Foothold, relocate};
-use regrasp_manipulation::settings::{PhysicsSettings, TransferMode};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use regrasp_scene::HandView;
 use serde::{Deserialize, Serialize};
@@ -44,15 +46,17 @@ pub struct BuildSettings {
     pub grasps: usize,
     /// Places nearby that a grasp is taken to.
     pub neighbours: usize,
-    /// Most grasps that are taken from one place to another.
+    /// Most grasps that are taken from one place to another, where contacts stay where they are.
     pub transfers: usize,
+    /// Grasps of each place that are taken to the places nearby, where fingertips roll.
+    pub hubs: usize,
     /// What a relocation costs, as an angle of the object in radians.
     pub relocation_cost: f64,
 }
 
 impl Default for BuildSettings {
     fn default() -> Self {
-        BuildSettings { places: 400, grasps: 200, neighbours: 40, transfers: 20, relocation_cost: 0.7 }
+        BuildSettings { places: 400, grasps: 200, neighbours: 40, transfers: 20, hubs: 2, relocation_cost: 0.7 }
     }
 }
 
@@ -62,8 +66,8 @@ impl BuildSettings {
         if !(1..=MAX_PLACES).contains(&self.places) {
             return Err(format!("places is {}; it must be from 1 to {MAX_PLACES}", self.places));
         }
-        if self.grasps == 0 || self.neighbours == 0 || self.transfers == 0 {
-            return Err("grasps, neighbours and transfers must be at least 1".into());
+        if self.grasps == 0 || self.neighbours == 0 || self.transfers == 0 || self.hubs == 0 {
+            return Err("grasps, neighbours, transfers and hubs must be at least 1".into());
         }
         if !(self.relocation_cost > 0.0 && self.relocation_cost <= 100.0) {
             return Err(format!("relocation_cost is {}; it must be above 0 and at most 100", self.relocation_cost));
@@ -90,8 +94,7 @@ pub struct BuildStage {
 
 /// Builds a roadmap of `view` over `region`, which is in the hand's frame, with `settings.n_threads` threads.
 ///
-/// Contacts of the graph stay where they are while the object moves, whatever the settings say: where a fingertip rolls to depends
-/// on the way that it came, and a graph has many ways to each of its grasps. Queries carry its paths out as the settings say.
+/// Where the settings say that fingertips roll, they roll in the transfers of the graph, and its motions have contact forces and times.
 ///
 /// Failures: a hand that can never do it, a spent budget, an interruption, or no grasp anywhere. Panics if settings or
 /// region are not valid.
@@ -109,7 +112,9 @@ pub fn build_roadmap(
     Failure::refuse_many_fingers(view)?;
     Failure::refuse_tied_fingers(view)?;
     let settings = InHandSettings { method: Method::Gait, ..settings.clone() };
-    let within = with_fixed_contacts(&settings).within(&view.limits);
+    let mut within = settings.within(&view.limits);
+    // Grasps of the graph are held by all fingers.
+    within.search.least_holding = view.hand.fingers.len();
     let model = Model::new(view, &within.physics);
     refuse_impossible(&model)?;
     refuse_fingers_that_cannot_follow(&model)?;
@@ -123,6 +128,7 @@ pub fn build_roadmap(
         seed,
         n_grown: 0,
         costs: Costs { turn_length: model.turn_length(), relocation: build.relocation_cost * model.turn_length() },
+        dynamics: if model.any_rolls() { dynamics(&model) } else { Vec::new() },
     };
     let graph = largest_component(&builder.registry.into_graph());
     if graph.edges.is_empty() {
@@ -132,32 +138,11 @@ pub fn build_roadmap(
     Ok(GraspRoadmap::new(about, graph))
 }
 
-/// The settings with contacts that stay where they are.
-pub(super) fn with_fixed_contacts(settings: &InHandSettings) -> InHandSettings {
-    let physics = PhysicsSettings { transfer: TransferMode::Fixed, ..settings.physics.clone() };
-    InHandSettings { physics, ..settings.clone() }
-}
-
 /// The largest component, the first one of equals.
 fn largest_component(graph: &Graph) -> Graph {
     let components = components(graph);
     let largest = component_sizes(&components).first().map(|&(node, _)| node);
     graph.only(|node| Some(components.representative(node)) == largest)
-}
-
-/// Where a sequence begins.
-#[expect(clippy::large_enum_variant, reason = "a few at a time, short-lived")]
-enum Origin {
-    /// At a node.
-    Node(u32),
-    /// At a new grasp, at the place that was worked on.
-    New(GraspState),
-}
-
-/// A sequence of motions that was found.
-struct Found {
-    origin: Origin,
-    legs: Vec<Leg>,
 }
 
 struct Builder<'b> {
@@ -213,6 +198,13 @@ impl<'b> Builder<'b> {
     fn run(&mut self) -> Result<(), Failure> {
         let contacts = self.choose_contacts()?;
         self.stage("grasps", |builder, search, at| builder.grasps(search, at, &contacts))?;
+        if self.model.any_rolls() {
+            self.stage("transfers", |builder, search, at| {
+                rolling::rolled(search, at, &builder.near[at.place], builder.build.hubs)
+            })?;
+            return self
+                .stage("relocations", |builder, search, at| rolling::joined(search, at, &builder.near[at.place]));
+        }
         self.stage("transfers", |builder, search, at| builder.transfers(search, at))?;
         self.stage("relocations", |builder, search, at| builder.relocations(search, at))
     }
@@ -417,20 +409,6 @@ impl Ways {
         let path = relocate(&mut search.workspace, &at.pose, finger, leave, arrive, &mut rng)?;
         known.push(std::iter::once(joints_a).chain(path.iter().cloned()).collect());
         Some(path)
-    }
-}
-
-/// What a stage may look at of one place.
-struct AtPlace<'g> {
-    graph: &'g Graph,
-    place: usize,
-    pose: Pose,
-    nodes_at: &'g Lists,
-}
-
-impl AtPlace<'_> {
-    fn nodes(&self) -> &[u32] {
-        self.nodes_at.of(self.place)
     }
 }
 

@@ -22,7 +22,7 @@ use std::path::Path;
 /// First bytes of every roadmap file.
 const MAGIC: [u8; 8] = *b"regrasp\x1a";
 /// Version that this program reads and writes.
-const FORMAT_VERSION: u32 = 4;
+const FORMAT_VERSION: u32 = 5;
 /// Largest file that is read: more nodes than indices can tell apart need more.
 const MAX_FILE_BYTES: u64 = 8 << 30;
 /// Where the bytes begin that the checksum is of: after magic, version, number of fingers, length and checksum.
@@ -31,6 +31,8 @@ const CHECKED_FROM: usize = 32;
 const MAX_COORDINATES: usize = finger_ik::MAX_COORDINATES;
 /// Finger of an edge that is a transfer.
 const NO_FINGER: u8 = 255;
+/// Last byte of the record of an edge with forces and times.
+const TIMED: u8 = 1;
 
 /// [`About`] on disk.
 #[derive(Debug, Serialize, Deserialize)]
@@ -52,6 +54,7 @@ struct AboutData {
     n_grown: u64,
     turn_length: f64,
     relocation_cost: f64,
+    dynamics: Vec<f64>,
 }
 
 /// [`ContactModel`] on disk, with the words of hand files.
@@ -72,6 +75,7 @@ struct Sizes {
     edges: usize,
     strands: usize,
     ways: usize,
+    tracks: usize,
     /// Joints and footholds of every finger.
     fingers: Vec<(usize, usize)>,
 }
@@ -107,6 +111,7 @@ impl GraspRoadmap {
             graph.edges.len(),
             graph.strands.len(),
             graph.ways.len(),
+            graph.tracks.len(),
         ];
         counts.iter().for_each(|&count| out.u64(count as u64));
         for footholds in &graph.footholds {
@@ -132,18 +137,20 @@ impl GraspRoadmap {
         }
         out.pad();
         for edge in &graph.edges {
-            let (first, n_between, finger) = match edge.passage {
-                Passage::Transfer { first, n_between } => (first, n_between, NO_FINGER),
-                Passage::Relocation { finger, first, n_between } => (first, n_between, finger),
+            let (first, n_between, finger, kind) = match edge.passage {
+                Passage::Transfer { first, n_between } => (first, n_between, NO_FINGER, 0),
+                Passage::Relocation { finger, first, n_between } => (first, n_between, finger, 0),
+                Passage::Timed { finger, first, n_between } => (first, n_between, finger.unwrap_or(NO_FINGER), TIMED),
             };
             out.u32s([edge.from, edge.to, first]);
             out.bytes.extend(n_between.to_le_bytes());
-            out.bytes.extend([finger, 0]);
+            out.bytes.extend([finger, kind]);
         }
         out.u32s(graph.strands.iter().copied());
         out.pad();
         out.f32s(&graph.ways);
         out.pad();
+        out.f64s(graph.tracks.iter().copied());
         out.f64s([self.landmarks.step]);
         self.landmarks.rows.iter().for_each(|row| out.bytes.extend(row.0));
         seal(&mut out.bytes);
@@ -235,6 +242,7 @@ fn sizes(reader: &mut Reader, n_fingers: u32, n_bytes: usize) -> Result<Sizes, S
         edges: count("edges")?,
         strands: count("ways of fingers")?,
         ways: count("joint values of motions")?,
+        tracks: count("numbers of motions with times")?,
         fingers: Vec::new(),
     };
     for index in 0..n_fingers {
@@ -258,7 +266,7 @@ impl Sizes {
     /// Number of bytes of the whole file.
     fn total(&self) -> Option<usize> {
         let padded = |n: usize, size: usize| n.checked_mul(size)?.checked_next_multiple_of(8);
-        let mut total = CHECKED_FROM + 8 * 7 + 16 * self.fingers.len();
+        let mut total = CHECKED_FROM + 8 * 8 + 16 * self.fingers.len();
         let mut sections = vec![
             padded(self.about, 1)?,
             padded(self.places, 7 * 8)?,
@@ -267,6 +275,7 @@ impl Sizes {
             padded(self.edges, 16)?,
             padded(self.strands, 4)?,
             padded(self.ways, 4)?,
+            padded(self.tracks, 8)?,
             8,
             padded(self.nodes, ROW_BYTES)?,
         ];
@@ -307,6 +316,7 @@ fn tables(reader: &mut Reader, sizes: &Sizes) -> Option<(Graph, Landmarks)> {
     graph.edges = edges.as_chunks::<16>().0.iter().map(edge_of).collect();
     graph.strands = reader.u32s(sizes.strands)?;
     graph.ways = reader.f32s(sizes.ways)?;
+    graph.tracks = reader.f64s(sizes.tracks)?;
     let step = *reader.f64s(1)?.first()?;
     let rows = reader.take(sizes.nodes.checked_mul(ROW_BYTES)?)?;
     let rows = rows.as_chunks::<ROW_BYTES>().0.iter().map(|row| Row(*row)).collect();
@@ -332,9 +342,12 @@ fn contact_of(numbers: &[f64; 6]) -> Contact {
 fn edge_of(record: &[u8; 16]) -> Edge {
     let words = record.as_chunks::<4>().0;
     let word = |k: usize| u32::from_le_bytes(words[k]);
-    let [low, high, finger, _] = words[3];
+    let [low, high, finger, kind] = words[3];
     let (first, n_between) = (word(2), u16::from_le_bytes([low, high]));
     let passage = match finger {
+        finger if kind == TIMED => {
+            Passage::Timed { finger: Some(finger).filter(|&finger| finger != NO_FINGER), first, n_between }
+        }
         NO_FINGER => Passage::Transfer { first, n_between },
         finger => Passage::Relocation { finger, first, n_between },
     };
@@ -364,6 +377,7 @@ fn data_of(about: &About) -> AboutData {
         n_grown: about.n_grown,
         turn_length: about.costs.turn_length,
         relocation_cost: about.costs.relocation,
+        dynamics: about.dynamics.clone(),
     }
 }
 
@@ -403,6 +417,7 @@ fn about(reader: &mut Reader, sizes: &Sizes) -> Result<About, String> {
         seed: data.seed,
         n_grown: data.n_grown,
         costs: Costs { turn_length: data.turn_length, relocation: data.relocation_cost },
+        dynamics: data.dynamics,
     })
 }
 

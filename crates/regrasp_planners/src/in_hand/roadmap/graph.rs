@@ -1,8 +1,11 @@
 //! The graph of grasps and proven motions, as numbers in flat tables.
 //!
 //! A node is a grasp: a place (object pose) and a foothold (contact and joints) of every finger. An edge is a transfer
-//! (same contacts, other place) or the relocation of one finger (same place); both can be gone both ways. Both store their
-//! joints between the ends; the object's poses follow from the ends.
+//! (other place) or the relocation of one finger (same place); both can be gone both ways.
+//!
+//! Where contacts stay where they are, both store their joints between the ends; the object's poses follow from the ends. Where
+//! fingertips roll, contacts travel in a transfer, so that its ends are different grasps. Such graphs store motions with contacts, contact forces
+//! and times, see [`super::track`].
 
 use arrayvec::ArrayVec;
 use regrasp_geometry::Pose;
@@ -42,6 +45,22 @@ pub enum Passage {
         /// Joint vectors of its way, those at both ends left out.
         n_between: u16,
     },
+    /// A motion with contacts, forces and times.
+    Timed {
+        /// The finger that moves; None where all hold and the object moves.
+        finger: Option<u8>,
+        /// Index of the first of its numbers in [`Graph::tracks`].
+        first: u32,
+        /// Waypoints between its ends.
+        n_between: u16,
+    },
+}
+
+impl Passage {
+    /// True when the object moves.
+    pub fn is_transfer(&self) -> bool {
+        matches!(self, Passage::Transfer { .. } | Passage::Timed { finger: None, .. })
+    }
 }
 
 /// In place of a number of moments: they are not at equal shares of the way, and not stored.
@@ -92,6 +111,8 @@ pub struct Graph {
     pub edges: Vec<Edge>,
     /// For each transfer the index of the first number of every finger's way in [`Graph::ways`].
     pub strands: Vec<u32>,
+    /// Numbers of motions with forces and times, one motion after the other.
+    pub tracks: Vec<f64>,
     /// Joints of single fingers between the ends of motions, in single precision: the rounding moves a fingertip by some
     /// ten nanometres, far below every clearance. Motions in which a finger does the same share its way.
     pub ways: Vec<f32>,
@@ -158,11 +179,17 @@ impl Graph {
         &self.ways[first as usize..first as usize + n]
     }
 
+    /// Numbers of a motion with forces and times.
+    pub fn track(&self, finger: Option<u8>, first: u32, n_between: u16) -> &[f64] {
+        let n = track_length(self, finger, n_between);
+        &self.tracks[first as usize..first as usize + n]
+    }
+
     /// The ways that an edge has in [`Graph::ways`]: finger and first number of each, all of so many joint vectors. What
     /// lies outside of the tables is left out.
     fn ways_of(&self, passage: &Passage) -> (ArrayVec<(usize, u32), MAX_FINGERS>, u16) {
         match *passage {
-            Passage::Transfer { n_between: NOT_STORED, .. } => (ArrayVec::new(), 0),
+            Passage::Transfer { n_between: NOT_STORED, .. } | Passage::Timed { .. } => (ArrayVec::new(), 0),
             Passage::Transfer { first, n_between } => {
                 let strands = self.strands.get(first as usize..).unwrap_or_default();
                 (strands.iter().copied().enumerate().take(self.n_fingers()).collect(), n_between)
@@ -225,6 +252,12 @@ impl Graph {
                 Passage::Relocation { finger, n_between, .. } => {
                     Passage::Relocation { finger, first: firsts[0], n_between }
                 }
+                Passage::Timed { finger, first, n_between } => {
+                    let track = self.track(finger, first, n_between);
+                    let first = kept.tracks.len() as u32;
+                    kept.tracks.extend_from_slice(track);
+                    Passage::Timed { finger, first, n_between }
+                }
             };
             kept.edges.push(Edge { from, to, passage });
         }
@@ -239,8 +272,11 @@ impl Graph {
         for (index, edge) in self.edges.iter().enumerate() {
             self.validate_edge(edge).map_err(|problem| format!("edge {index} {problem}"))?;
         }
-        match self.ways.iter().position(|q| !q.is_finite()) {
-            Some(index) => Err(format!("joint value {index} of its motions is not finite")),
+        if let Some(index) = self.ways.iter().position(|q| !q.is_finite()) {
+            return Err(format!("joint value {index} of its motions is not finite"));
+        }
+        match self.tracks.iter().position(|number| !number.is_finite()) {
+            Some(index) => Err(format!("number {index} of its motions with times is not finite")),
             None => Ok(()),
         }
     }
@@ -290,14 +326,20 @@ impl Graph {
             return Err("joins nodes that do not exist, or a node to itself".into());
         }
         let (start, end) = (&self.nodes[from], &self.nodes[to]);
-        match edge.passage {
-            Passage::Transfer { .. } => {
-                let same_grasp = (0..self.n_fingers()).all(|f| self.contact_id(from, f) == self.contact_id(to, f));
+        let moving = match edge.passage {
+            Passage::Relocation { finger, .. } | Passage::Timed { finger: Some(finger), .. } => Some(finger),
+            Passage::Transfer { .. } | Passage::Timed { finger: None, .. } => None,
+        };
+        match moving {
+            None => {
+                let rolls = matches!(edge.passage, Passage::Timed { .. });
+                let same_grasp =
+                    rolls || (0..self.n_fingers()).all(|f| self.contact_id(from, f) == self.contact_id(to, f));
                 if !same_grasp || start.place == end.place {
                     return Err("is a transfer that changes the grasp or does not move the object".into());
                 }
             }
-            Passage::Relocation { finger, .. } => {
+            Some(finger) => {
                 let moving = usize::from(finger);
                 if moving >= self.n_fingers() || start.place != end.place {
                     return Err("is a relocation of no finger, or moves the object".into());
@@ -309,9 +351,13 @@ impl Graph {
                 }
             }
         }
+        if let Passage::Timed { finger, first, n_between } = edge.passage {
+            let end = first as usize + track_length(self, finger, n_between);
+            return if end <= self.tracks.len() { Ok(()) } else { Err("has a motion that does not exist".into()) };
+        }
         let (ways, n_between) = self.ways_of(&edge.passage);
         let n_ways = match edge.passage {
-            Passage::Transfer { n_between: NOT_STORED, .. } => 0,
+            Passage::Transfer { n_between: NOT_STORED, .. } | Passage::Timed { .. } => 0,
             Passage::Transfer { .. } => self.n_fingers(),
             Passage::Relocation { .. } => 1,
         };
@@ -322,6 +368,37 @@ impl Graph {
             return Err("has a way that does not exist".into());
         }
         Ok(())
+    }
+}
+
+/// A motion with contacts, forces and times as numbers: see [`super::track`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Track {
+    /// The finger that moves; None where all hold and the object moves.
+    pub finger: Option<u8>,
+    /// Waypoints between its ends.
+    pub n_between: u16,
+    /// The numbers.
+    pub numbers: Vec<f64>,
+}
+
+/// Numbers of a contact: point, normal, force and torsion.
+const CONTACT: usize = 10;
+/// Numbers of what a contact transmits: force and torsion.
+pub const EXERTED: usize = 4;
+/// Numbers of a pose.
+const POSE: usize = 7;
+
+/// How many numbers a track has; more than any table has for one of no finger of the graph.
+fn track_length(graph: &Graph, finger: Option<u8>, n_between: u16) -> usize {
+    let n_waypoints = usize::from(n_between) + 2;
+    let n_joints: usize = graph.footholds.iter().map(|table| table.n_coordinates).sum();
+    match finger {
+        None => 1 + n_waypoints * (1 + POSE + 3 * n_joints + CONTACT * graph.n_fingers()),
+        Some(finger) => match graph.footholds.get(usize::from(finger)) {
+            Some(own) => 1 + n_joints + EXERTED * graph.n_fingers() + n_waypoints * (1 + 2 * own.n_coordinates),
+            None => usize::MAX / 2,
+        },
     }
 }
 
@@ -383,6 +460,15 @@ pub enum Leg {
         path: Vec<Coordinates>,
         /// Its contact at the end.
         contact: Contact,
+    },
+    /// A motion with contacts, forces and times.
+    Timed {
+        /// Index of the place where a transfer ends; None for a new one.
+        place: Option<u32>,
+        /// The grasp there.
+        end: GraspState,
+        /// Its numbers.
+        track: Track,
     },
 }
 

@@ -60,7 +60,7 @@ fn draw(model: &Model, finger: usize, rng: &mut Rng) -> Option<Contact> {
 }
 
 /// How different two contacts are: in place, and in direction so that the two sides of a thin object are far apart.
-fn apart(model: &Model, a: &Contact, b: &Contact) -> f64 {
+pub fn apart(model: &Model, a: &Contact, b: &Contact) -> f64 {
     let turned = (a.normal_in_object.into_inner() - b.normal_in_object.into_inner()).norm();
     (a.point_in_object - b.point_in_object).norm() + 0.3 * model.turn_length() * turned
 }

@@ -1,6 +1,6 @@
 //! What a graph is searched with: links by node with their costs, nodes by place, components.
 
-use crate::in_hand::roadmap::graph::{Graph, Lists, Passage};
+use crate::in_hand::roadmap::graph::{Graph, Lists};
 use crate::in_hand::roadmap::region::near_distance;
 use regrasp_roadmap::Components;
 use std::collections::BTreeMap;
@@ -45,11 +45,10 @@ impl Index {
             for &index in edges_of.of(node) {
                 let edge = &graph.edges[index as usize];
                 let other = if edge.from as usize == node { edge.to } else { edge.from };
-                let cost = match edge.passage {
-                    Passage::Transfer { .. } => {
-                        near_distance(graph.pose(node), graph.pose(other as usize), costs.turn_length)
-                    }
-                    Passage::Relocation { .. } => costs.relocation,
+                let cost = if edge.passage.is_transfer() {
+                    near_distance(graph.pose(node), graph.pose(other as usize), costs.turn_length)
+                } else {
+                    costs.relocation
                 };
                 links.push(Link { node: other, cost: cost as f32 });
             }

@@ -9,8 +9,6 @@ mod anchor;
 mod build;
 /// Bytes of a file, with nothing believed.
 mod bytes;
-/// Paths carried out with fingertips that roll.
-mod carry;
 /// The file format.
 mod file;
 /// The tables.
@@ -29,8 +27,14 @@ mod query;
 mod region;
 /// A graph that grows.
 mod registry;
+/// Transfers in which fingertips roll.
+mod rolling;
 /// Motions along a path in the graph.
 mod route;
+/// What stages of building look at and find.
+mod stage;
+/// Motions with contacts, forces and times, as numbers.
+mod track;
 
 pub use build::{BuildSettings, BuildStage, build_roadmap};
 pub use file::seal;
@@ -67,6 +71,8 @@ pub struct About {
     pub n_grown: u64,
     /// What motions cost.
     costs: Costs,
+    /// What forces and times of its motions depend on; empty where it has none.
+    dynamics: Vec<f64>,
 }
 
 impl About {
@@ -120,8 +126,7 @@ impl GraspRoadmap {
 
     /// Counts it.
     pub fn census(&self) -> Census {
-        let n_transfers =
-            self.graph.edges.iter().filter(|edge| matches!(edge.passage, graph::Passage::Transfer { .. })).count();
+        let n_transfers = self.graph.edges.iter().filter(|edge| edge.passage.is_transfer()).count();
         let components = index::components(&self.graph);
         let sizes = index::component_sizes(&components);
         let largest = sizes.first().map(|&(node, _)| node);

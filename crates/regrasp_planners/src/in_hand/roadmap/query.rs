@@ -5,15 +5,16 @@ use crate::in_hand::attempt::search::{Context, Search, Stop};
 use crate::in_hand::attempt::tally::Reason;
 use crate::in_hand::recording::record::settings_of;
 use crate::in_hand::refusals::given_grasp;
-use crate::in_hand::regrasping::change::{Arrival, transfer_regrasp, whole_transfer};
+use crate::in_hand::regrasping::change::{Arrival, transfer_regrasp};
 use crate::in_hand::roadmap::GraspRoadmap;
 use crate::in_hand::roadmap::anchor::{Link, LinkKind, QueryEnd};
-use crate::in_hand::roadmap::build::{legs_of, with_fixed_contacts};
+use crate::in_hand::roadmap::build::legs_of;
 use crate::in_hand::roadmap::index::Index;
 use crate::in_hand::roadmap::landmarks::{Bounds, Landmarks};
 use crate::in_hand::roadmap::region::nearest_places;
 use crate::in_hand::roadmap::registry::Registry;
 use crate::in_hand::roadmap::route::Passing;
+use crate::in_hand::roadmap::track::{TimedEdge, legs_of_pieces};
 use crate::in_hand::searching::shorten::shorten;
 use crate::settings::InHandSettings;
 use regrasp_base::{Budget, InputError, Rng};
@@ -26,29 +27,24 @@ use regrasp_manipulation::grasp::sequence::{Motion, Sequence};
 use regrasp_manipulation::grasp::state::GraspState;
 use regrasp_manipulation::in_world::{failure_in_world, plan_in_world};
 use regrasp_manipulation::model::Model;
+use regrasp_manipulation::recording::pieces::{Piece, dynamics, joined, plan_of_piece};
 use regrasp_manipulation::recording::recorder::{Joins, Recorder};
 use regrasp_manipulation::settings::SpeedSettings;
 use regrasp_plan::Plan;
 use regrasp_plan::plan::Statistics;
 use regrasp_roadmap::AStar;
 use regrasp_scene::{GraspRequest, HandView, InHandQuery};
-use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::atomic::AtomicUsize;
-
-/// Pairs of nodes between which nothing came off in this query, the smaller first.
-pub type Barred = BTreeSet<(usize, usize)>;
 
 /// Places nearest to each end whose grasps are tried: few at first, more where these lead nowhere.
 const RINGS: [usize; 4] = [0, 1, 4, 24];
 /// Places nearest to an end that a detour may lead to, where nothing else links it.
-const DETOURS: usize = 3;
+const DETOURS: usize = 16;
 /// Configurations that a detour may cost: as many as hard single queries take.
 const DETOUR_WORK: u64 = 50_000;
 /// Anchors at each end from which A* chooses.
-pub(super) const ANCHORS: usize = 1;
-/// Work of a link that a graph is to keep: one transfer.
-const FIXED_LINK_WORK: u64 = 10_000;
+const ANCHORS: usize = 1;
 /// A path costs at most so many times the cheapest one between the anchors (weighted A*, Pohl 1970).
 const GREED: f64 = 2.5;
 
@@ -57,9 +53,9 @@ const GREED: f64 = 2.5;
 pub struct RoadmapPlanner<'a> {
     model: Model<'a>,
     settings: InHandSettings,
-    /// The same with contacts that stay where they are, as in the graph, where those of the settings roll.
-    fixed: Option<(Model<'a>, InHandSettings)>,
-    pub(super) roadmap: &'a GraspRoadmap,
+    /// True when forces and times of the graph are those of this scene and these settings.
+    knows_dynamics: bool,
+    roadmap: &'a GraspRoadmap,
     links: LinkKind,
 }
 
@@ -93,11 +89,8 @@ impl<'a> RoadmapPlanner<'a> {
         settings.physics.speed = *speed;
         let settings = settings.within(&view.limits);
         let model = Model::new(view, &settings.physics);
-        let fixed = model.any_rolls().then(|| {
-            let fixed = with_fixed_contacts(&settings);
-            (Model::new(view, &fixed.physics), fixed)
-        });
-        RoadmapPlanner { model, settings, fixed, roadmap, links: LinkKind::Shortest }
+        let knows_dynamics = is_same(&roadmap.about.dynamics, &dynamics(&model));
+        RoadmapPlanner { model, settings, knows_dynamics, roadmap, links: LinkKind::Shortest }
     }
 
     /// With transfers that follow each other with one grasp made one, where that is free: shorter motions, slower answers.
@@ -203,7 +196,7 @@ impl<'a> RoadmapPlanner<'a> {
                 goal.look_around(roadmap, &around_goal, &self.bounds_to(&start));
             } else {
                 for (end, which) in [(&mut start, 0), (&mut goal, 1)] {
-                    if end.anchors.is_empty() {
+                    if !self.is_linked(search, end)? {
                         self.detour(search, end, which)?;
                     }
                 }
@@ -215,28 +208,26 @@ impl<'a> RoadmapPlanner<'a> {
                 if start.anchors.is_empty() || goal.anchors.is_empty() {
                     break;
                 }
+                if self.model.any_rolls() {
+                    let Some(first) = start.linked(search, roadmap)? else { continue };
+                    let Some(last) = goal.linked(search, roadmap)? else { continue };
+                    let path = self.route(&start, &goal, &mut memory.a_star);
+                    n_expanded += memory.a_star.n_expanded();
+                    let Some(path) = path else { break };
+                    match self.rolled_plan(search, query, seed, [&first, &last], &path, n_expanded) {
+                        Some(Ok(plan)) => return Ok(Ok(RoadmapAnswer { plan, links: [first, last] })),
+                        // On from another grasp.
+                        Some(Err(unbalanced)) => {
+                            search.tally.add(Reason::NoForces(unbalanced));
+                            start.give_up(first.node);
+                            continue;
+                        }
+                        None => return Ok(Err(self.does_not_fit(search))),
+                    }
+                }
                 let path = self.route(&start, &goal, &mut memory.a_star);
                 n_expanded += memory.a_star.n_expanded();
                 let Some(path) = path else { break };
-                if self.model.any_rolls() {
-                    let anchor = path[0];
-                    let Some(first) = start.prove(search, roadmap, path.iter().copied(), LinkKind::Shortest) else {
-                        continue;
-                    };
-                    let way = self.carry_out(search, first.way.reversed(), &mut goal, path, &mut memory.a_star)?;
-                    n_expanded += memory.a_star.n_expanded();
-                    let planned = way.map(|way| self.rolled_plan(search, query, seed, way, n_expanded));
-                    match planned {
-                        Some(Ok(plan)) => {
-                            return Ok(Ok(RoadmapAnswer { plan, links: self.links_to_keep(&first, &goal) }));
-                        }
-                        Some(Err(unbalanced)) => search.tally.add(Reason::NoForces(unbalanced)),
-                        None => {}
-                    }
-                    // On from another grasp.
-                    start.anchors.retain(|other| other.node != anchor);
-                    continue;
-                }
                 let Some(first) = start.prove(search, roadmap, path.iter().copied(), self.links) else {
                     continue;
                 };
@@ -246,9 +237,7 @@ impl<'a> RoadmapPlanner<'a> {
                 };
                 let between = &path[first.n_skipped..path.len() - last.n_skipped];
                 let Some(recorder) = self.motions(search, [&first, &last], between) else {
-                    let message = "a stored transfer does not come out as it was proven: the roadmap is of another \
-                                   version of the program, or was made by hand";
-                    return Ok(Err(self.failure(message.into(), search)));
+                    return Ok(Err(self.does_not_fit(search)));
                 };
                 let statistics =
                     Statistics { nodes: n_expanded as u64, work: search.workspace.work, ..Statistics::default() };
@@ -272,6 +261,14 @@ impl<'a> RoadmapPlanner<'a> {
         }))
     }
 
+    /// True when an end has an anchor, where fingertips roll one with motions that have forces.
+    fn is_linked(&self, search: &mut Search, end: &mut QueryEnd) -> Result<bool, Stop> {
+        if self.model.any_rolls() {
+            return Ok(end.linked(search, self.roadmap)?.is_some());
+        }
+        Ok(!end.anchors.is_empty())
+    }
+
     /// Links an end by a search of its own.
     fn detour(&self, search: &mut Search, end: &mut QueryEnd, which: usize) -> Result<(), Stop> {
         for (index, (_, place)) in self.places_around(&end.pose, 0..DETOURS).into_iter().enumerate() {
@@ -279,7 +276,7 @@ impl<'a> RoadmapPlanner<'a> {
             let mut own = search.for_detour(which * DETOURS + index, DETOUR_WORK.min(search.work_left()));
             let found = end.detour(&mut own, self.roadmap, node as usize);
             search.workspace.work += own.workspace.work;
-            if found? {
+            if found? && self.is_linked(search, end)? {
                 break;
             }
         }
@@ -302,45 +299,14 @@ impl<'a> RoadmapPlanner<'a> {
 
     /// A cheap way from an anchor of the start to one of the goal, as nodes.
     fn route(&self, start: &QueryEnd, goal: &QueryEnd, a_star: &mut AStar) -> Option<Vec<usize>> {
-        let from = start.anchors.iter().map(|anchor| (anchor.node, anchor.cost));
-        self.route_among(from.collect(), goal, &Barred::new(), a_star)
-    }
-
-    /// The same from a node, over none of the edges that are barred.
-    pub(super) fn route_from(
-        &self,
-        node: usize,
-        goal: &QueryEnd,
-        barred: &Barred,
-        a_star: &mut AStar,
-    ) -> Option<Vec<usize>> {
-        self.route_among(vec![(node, 0.0)], goal, barred, a_star)
-    }
-
-    /// From any of some nodes, each at a cost.
-    fn route_among(
-        &self,
-        first: Vec<(usize, f64)>,
-        goal: &QueryEnd,
-        barred: &Barred,
-        a_star: &mut AStar,
-    ) -> Option<Vec<usize>> {
         let roadmap = self.roadmap;
         let (from, to) = (roadmap.graph.nodes.len(), roadmap.graph.nodes.len() + 1);
         let neighbours = |node: usize, out: &mut Vec<(usize, f64)>| {
             if node == from {
-                out.extend(&first);
+                out.extend(start.anchors.iter().map(|anchor| (anchor.node, anchor.cost)));
                 return;
             }
-            let n_before = out.len();
             roadmap.index.neighbours(node, out);
-            if !barred.is_empty() {
-                let mut n_seen = 0;
-                out.retain(|&(other, _)| {
-                    n_seen += 1;
-                    n_seen <= n_before || !barred.contains(&(node.min(other), node.max(other)))
-                });
-            }
             out.extend(goal.anchors.iter().filter(|anchor| anchor.node == node).map(|anchor| (to, anchor.cost)));
         };
         let bounds = self.bounds_to(goal);
@@ -349,45 +315,55 @@ impl<'a> RoadmapPlanner<'a> {
         Some(path[1..path.len() - 1].to_vec())
     }
 
-    /// The plan of motions that were carried out.
+    /// The plan of rolling motions along a path, with the forces and times that the graph has where those are of this scene and the
+    /// motions stay as they are. None when what is stored does not fit together.
     fn rolled_plan(
         &self,
         search: &mut Search,
         query: &InHandQuery,
         seed: u64,
-        mut way: Sequence,
+        [first, last]: [&Link; 2],
+        path: &[usize],
         n_expanded: usize,
-    ) -> Result<Plan, Unbalanced> {
-        if self.links == LinkKind::Longest {
-            let at_end = match query.goal_grasp {
-                GraspRequest::Automatic => Arrival::AnyPosture,
-                _ => Arrival::Exact,
-            };
-            shorten(search, &mut way, at_end);
-        }
-        let mut recorder = Recorder::at(&self.model, way.start(), Joins::TransfersInARow);
-        recorder.sequence(&way);
-        let statistics = Statistics { nodes: n_expanded as u64, work: search.workspace.work, ..Statistics::default() };
-        let plan = recorder.finish(query, seed, &[], statistics)?;
-        Ok(Plan { method: "roadmap".into(), settings: settings_of(&self.settings), ..plan })
+    ) -> Option<Result<Plan, Unbalanced>> {
+        let graph = &self.roadmap.graph;
+        let edges = path.windows(2).map(|pair| {
+            let edge = self.roadmap.index.edge_between(pair[0], pair[1])?;
+            TimedEdge::along(graph, edge, pair[0])
+        });
+        let statistics = |search: &Search| Statistics {
+            nodes: n_expanded as u64,
+            work: search.workspace.work,
+            ..Statistics::default()
+        };
+        let plan = if self.knows_dynamics && self.links == LinkKind::Shortest {
+            let mut pieces: Vec<Piece> = first.pieces.iter().rev().map(|piece| piece.clone().reversed()).collect();
+            for edge in edges {
+                pieces.push(edge?.piece(&self.model));
+            }
+            pieces.extend(last.pieces.iter().cloned());
+            Ok(plan_of_piece(&self.model, query, seed, joined(&self.model, pieces), statistics(search)))
+        } else {
+            let mut way = first.way.reversed();
+            for edge in edges {
+                edge?.push_to(&self.model, &mut way);
+            }
+            way = way.then(last.way.clone())?;
+            if self.links == LinkKind::Longest {
+                let is_open = query.goal_grasp == GraspRequest::Automatic;
+                shorten(search, &mut way, if is_open { Arrival::AnyPosture } else { Arrival::Exact });
+            }
+            let mut recorder = Recorder::at(&self.model, way.start(), Joins::TransfersInARow);
+            recorder.sequence(&way);
+            recorder.finish(query, seed, &[], statistics(search))
+        };
+        Some(plan.map(|plan| Plan { method: "roadmap".into(), settings: settings_of(&self.settings), ..plan }))
     }
 
-    /// Links of the ends of an answered query to the graph with contacts that stay, as a graph keeps them; a link that rolls
-    /// where there is none.
-    fn links_to_keep(&self, first: &Link, goal: &QueryEnd) -> [Link; 2] {
-        let fixed_link = |node: usize, pose: &Pose| -> Option<Link> {
-            let (model, settings) = self.fixed.as_ref()?;
-            let (winner, budget) = (AtomicUsize::new(usize::MAX), Budget::work(FIXED_LINK_WORK));
-            let context = Context { model, settings, seed: 0, budget: &budget, winner: &winner, progress: &|_| {} };
-            let state = self.roadmap.graph.state(node);
-            let mut search = Search::new(context, [state.world_from_object, *pose], 0, FIXED_LINK_WORK);
-            let way = whole_transfer(&mut search, &state, pose)?;
-            Some(Link { node, n_skipped: 0, way, can_be_kept: true })
-        };
-        let start_pose = first.way.end().world_from_object;
-        let rolling = Link { can_be_kept: false, ..first.clone() };
-        let last = goal.anchors.first().and_then(|anchor| fixed_link(anchor.node, &goal.pose));
-        [fixed_link(first.node, &start_pose).unwrap_or_else(|| rolling.clone()), last.unwrap_or(rolling)]
+    fn does_not_fit(&self, search: &Search) -> Failure {
+        let message = "a stored transfer does not come out as it was proven: the roadmap is of another version of the program, \
+                       or was made by hand";
+        self.failure(message.into(), search)
     }
 
     /// All motions from the start to the goal along a path. None when what is stored does not fit together.
@@ -405,7 +381,7 @@ impl<'a> RoadmapPlanner<'a> {
         if self.links == LinkKind::Longest {
             let mut way = to_first;
             for edge in edges {
-                edge?.push_to(&mut way);
+                edge?.push_to(&self.model, &mut way);
             }
             way = way.then(last.way.clone())?;
             straighten(search, &mut way);
@@ -449,6 +425,11 @@ impl<'a> RoadmapPlanner<'a> {
     }
 }
 
+/// True when forces and times that depend on `built` are those that `asked` gives; files keep numbers but for rounding.
+fn is_same(built: &[f64], asked: &[f64]) -> bool {
+    built.len() == asked.len() && built.iter().zip(asked).all(|(a, b)| (a - b).abs() <= 1e-12 * a.abs().max(b.abs()))
+}
+
 /// Transfers that follow each other with one grasp become one, where that is free.
 fn straighten(search: &mut Search, way: &mut Sequence) {
     let mut first = 0;
@@ -475,9 +456,14 @@ impl GraspRoadmap {
         let GraspRoadmap { mut about, graph, mut landmarks, .. } = self;
         let mut registry = Registry::new(graph);
         let before = (registry.graph().nodes.len(), registry.graph().edges.len());
+        let fingers = registry.graph().footholds.clone();
         for link in answer.links.iter().filter(|link| link.can_be_kept) {
-            let legs = legs_of(&link.way, |pose| registry.add_place(*pose));
-            registry.add_legs(link.node as u32, &legs);
+            let legs = if link.pieces.is_empty() {
+                Some(legs_of(&link.way, |pose| registry.add_place(*pose)))
+            } else {
+                legs_of_pieces(&fingers, &link.way, &link.pieces, |_| None)
+            };
+            legs.and_then(|legs| registry.add_legs(link.node as u32, &legs));
         }
         about.n_grown += 1;
         let graph = registry.into_graph();

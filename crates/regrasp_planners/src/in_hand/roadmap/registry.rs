@@ -1,6 +1,6 @@
 //! A graph that grows: what is added is looked up first, so that the same grasp is one node whichever way led to it.
 
-use crate::in_hand::roadmap::graph::{Edge, FootholdIds, Graph, Leg, NOT_STORED, Node, Passage};
+use crate::in_hand::roadmap::graph::{Edge, FootholdIds, Graph, Leg, NOT_STORED, Node, Passage, Track};
 use arrayvec::ArrayVec;
 use regrasp_geometry::Pose;
 use regrasp_grasp::Contact;
@@ -79,6 +79,7 @@ impl Registry {
                     self.add_transfer(here, *place, joints, between.as_deref())?
                 }
                 Leg::Relocation { finger, path, contact } => self.add_relocation(here, *finger, path, contact)?,
+                Leg::Timed { place, end, track } => self.add_timed(here, *place, end, track)?,
             };
         }
         Some(here)
@@ -112,6 +113,22 @@ impl Registry {
             }
             self.graph.strands.extend(strands);
             self.add_edge(Edge { from, to, passage: Passage::Transfer { first, n_between } });
+        }
+        Some(to)
+    }
+
+    fn add_timed(&mut self, from: u32, place: Option<u32>, end: &GraspState, track: &Track) -> Option<u32> {
+        let place = match (track.finger, place) {
+            (Some(_), _) => self.graph.nodes[from as usize].place,
+            (None, Some(place)) => place,
+            (None, None) => self.add_place(end.world_from_object),
+        };
+        let to = self.node_of(place, end);
+        if !self.is_joined(from, to) {
+            let first = u32::try_from(self.graph.tracks.len()).ok()?;
+            let Track { finger, n_between, ref numbers } = *track;
+            self.graph.tracks.extend_from_slice(numbers);
+            self.add_edge(Edge { from, to, passage: Passage::Timed { finger, first, n_between } });
         }
         Some(to)
     }
