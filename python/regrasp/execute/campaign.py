@@ -20,7 +20,7 @@ from ..simulate.reference import PlanError
 from .executor import Executor
 from .goals import turns
 from .mujoco_plant import MujocoPlant, PlantSettings
-from .settings import CAREFUL, LOOSE, PLANNER, ExecutorSettings
+from .settings import CAREFUL, FIRM, LOOSE, PLANNER, ExecutorSettings
 
 #: How the plant differs from the plan.
 DISTURBANCES: dict[str, dict[str, Any]] = {
@@ -111,7 +111,7 @@ def run_case(case: Case) -> Row:
     axis = None if not case.axis else np.eye(3)["xyz".index(case.axis)]
     goals = turns(plant.pose, count=case.goals, seed=case.run, largest=case.largest, axis=axis)
     session = Session(scene, settings=PLANNER)
-    executor = Executor(session, plant, settings, careful=[Session(scene, settings=CAREFUL)], loose=[Session(scene, settings=LOOSE)])
+    executor = Executor(session, plant, settings, careful=[Session(scene, settings=CAREFUL)], loose=[Session(scene, settings=LOOSE)], firm=[Session(scene, settings=FIRM)])
     log = executor.run(goals)
     position, _ = plant.truth()
     away = float(np.linalg.norm(position - np.array(log.goals[-1].position))) if log.goals else 0.0

@@ -13,6 +13,8 @@ PLANNER: dict[str, Any] = {"speed": {"largest_speed": 0.1, "ramp": 0.06}}
 CAREFUL: dict[str, Any] = {**PLANNER, "friction_margin": 2.0}
 #: The same for starts that are worse than plans may be: links may be nearer to what they must not touch, grasps may hold less.
 LOOSE: dict[str, Any] = {**PLANNER, "clearance": 2e-5, "closure_margin": 0.001}
+#: The same with a firmer grip: legs are planned with these first once something has gone wrong. Origin: pushes of 4 N on the bundled box.
+FIRM: dict[str, Any] = {**CAREFUL, "forces": {"squeeze": 12.0, "normal_force": [2.0, 30.0]}}
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,15 @@ class ExecutorSettings:
     """Poses older than this are stale: the hand holds."""
     patience: float = 2.0
     """The hand gives up, and holds, when nothing has helped for so long."""
+
+    grips_firmer: bool = True
+    """Plans with a firmer grip from the first slip, deviation, lost contact or missed goal on."""
+    back_off_time: float = 0.3
+    """Where there is no start, the hand goes back on its way for so long, and looks again."""
+    gone_distance: float = 0.02
+    """An object that is seen at least so far from every fingertip, and not felt by two fingers,"""
+    gone_after: float = 0.2
+    """for so long, is gone. So is one that is not seen for ``patience``, and not felt."""
 
     project_distance: float = 0.002
     """How far a start may be from what was observed,"""
