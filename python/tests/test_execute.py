@@ -29,7 +29,7 @@ from regrasp.execute import (  # noqa: E402
     turns,
 )
 from regrasp.execute.planning import ThreadPlanning  # noqa: E402
-from regrasp.execute.settings import PLANNER  # noqa: E402
+from regrasp.execute.settings import FIRM, PLANNER  # noqa: E402
 
 SCENES = Path(__file__).parents[2] / "scenes"
 
@@ -175,6 +175,40 @@ def test_a_finger_that_does_not_move_is_found(scene: regrasp.Scene) -> None:
     log = execute(plant, turns(inner.pose, count=8, seed=4))
     assert kinds(log) & {"stalled_joint", "deviation", "slip", "lost_contact", "missed", "no_start"}
     assert inner.touching() >= 2, "the object fell"
+
+
+def test_a_link_in_the_way_makes_the_hand_go_back(scene: regrasp.Scene) -> None:
+    plant = plant_of(scene)
+    executor = Executor(regrasp.Session(scene, settings=PLANNER), plant)
+    executor.run(turns(plant.pose, count=1, seed=4))
+    leg, last = executor._leg, executor._k
+    assert leg is not None and last == leg.n_ticks - 1
+    assert executor._go_back()
+    k = executor._k
+    assert last - round(0.3 / plant.tick) <= k < last
+    # No finger lands or lifts on the way back, and the object is where the leg had it then.
+    assert (leg.ref.holds[k] == leg.ref.holds[last]).all()
+    executor._hold_for(0.5)
+    now, _ = plant.truth()
+    assert np.linalg.norm(now - leg.ref.object_position[k]) < 0.001
+    assert held(plant)
+    # Never farther than its own segment.
+    while executor._go_back():
+        assert (leg.ref.holds[executor._k] == leg.ref.holds[last]).all()
+    assert executor._k == 0 or (leg.ref.holds[executor._k - 1] != leg.ref.holds[last]).any()
+
+
+def test_trouble_makes_the_grip_firmer(scene: regrasp.Scene) -> None:
+    plant = plant_of(scene)
+    firm = regrasp.Session(scene, settings=FIRM)
+    executor = Executor(regrasp.Session(scene, settings=PLANNER), plant, firm=[firm])
+
+    executor.run(turns(plant.pose, count=1, seed=4))
+    usual = executor.log.plans[-1]
+    executor._event("slip", "as if", "none")
+    ticket = executor._query(next(iter(turns(plant.pose, count=1, seed=5))))
+    assert isinstance(ticket.answer, regrasp.Plan)
+    assert ticket.answer.settings["forces"]["squeeze"] == 12.0 and usual.settings["forces"]["squeeze"] == 4.0
 
 
 def test_a_planner_out_of_budget_leaves_the_hand_holding() -> None:

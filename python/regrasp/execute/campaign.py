@@ -42,6 +42,9 @@ ABLATIONS: dict[str, dict[str, Any]] = {
     "replanning alone": {"feedback": False},
     "feedback alone": {"replanning": False},
     "open loop": {"replanning": False, "feedback": False},
+    "both, usual grip": {"grip": "usual"},
+    "both, firm grip": {"grip": "firm"},
+    "feedback alone, firm grip": {"replanning": False, "grip": "firm"},
 }
 
 
@@ -177,7 +180,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--processes", type=int, default=1)
     asked = parser.parse_args(arguments)
     packages = tuple(tuple(entry.split("=", 1)) for entry in asked.package)
-    separator = ";" if ";" in asked.disturbances else ","
+    # One name may have a comma in it.
+    separator = ";" if ";" in asked.disturbances or asked.disturbances in DISTURBANCES else ","
     disturbances = asked.disturbances.split(separator)
     ablations = asked.ablations.split(";")
     unknown = [name for name in disturbances if name not in DISTURBANCES] + [name for name in ablations if name not in ABLATIONS]

@@ -81,7 +81,7 @@ class Executor:
         self._planning = maker([*careful, session, *loose], self._settings, self._prepare)
         self._for_starts = [session, *loose]
         self._firm = firm
-        self._grips_firmer = False
+        self._grips_firmer = self._settings.grip == "firm"
         self._rig: Rig | None = None
         self._senses = Senses(len(plant.joint_names), self._settings)
         self._leg: Leg | None = None
@@ -267,9 +267,14 @@ class Executor:
                 raise _GiveUp("lost" if lost else "gave_up", f"no start: {message}")
 
     def _go_back(self) -> bool:
-        """Goes back on the leg for ``back_off_time``, no farther than to where another finger landed or lifted. False where that is here."""
-        leg, settings = self._leg, self._settings
+        """Goes back on the leg for ``back_off_time``, no farther than to where another finger landed or lifted. False where that is
+        here, and where the object is not as the leg has it: fingers that move would drag it farther off."""
+        leg, senses, settings = self._leg, self._senses, self._settings
         if leg is None or settings.back_off_time <= 0.0:
+            return False
+        wanted = leg.ref.object_position[self._k], leg.ref.object_quat_wxyz[self._k]
+        distance, angle = pose_error(leg, senses.position, senses.quat, *wanted)
+        if distance > settings.project_distance or angle > settings.project_turn:
             return False
         holds, last = leg.ref.holds[self._k], self._k
         goal = max(0, self._k - round(settings.back_off_time / self._plant.tick))
@@ -504,7 +509,7 @@ class Executor:
 
     def _event(self, kind: str, message: str, answer: str) -> None:
         leg = len(self.log.legs) - 1
-        if kind in LOSING and self._settings.grips_firmer:
+        if kind in LOSING and self._settings.grip == "firm after trouble":
             self._grips_firmer = True
         self.log.events.append(Event(round(self._senses.time, 6), kind, message, answer, self._goal_index, leg))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -78,8 +78,8 @@ class ExecutorSettings:
     patience: float = 2.0
     """The hand gives up, and holds, when nothing has helped for so long."""
 
-    grips_firmer: bool = True
-    """Plans with a firmer grip from the first slip, deviation, lost contact or missed goal on."""
+    grip: Literal["usual", "firm after trouble", "firm"] = "firm after trouble"
+    """When plans are sought with a firmer grip first: never; from the first slip, deviation, lost contact or missed goal on; always."""
     back_off_time: float = 0.3
     """Where there is no start, the hand goes back on its way for so long, and looks again."""
     gone_distance: float = 0.02

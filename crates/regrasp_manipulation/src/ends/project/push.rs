@@ -89,3 +89,53 @@ fn moved(model: &Model, posture: &Posture, coordinate: Coordinate, share: f64, l
     }
     aside
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::PhysicsSettings;
+    use regrasp_robot::LoadOptions;
+    use regrasp_scene::load_scene;
+
+    fn with_model(name: &str, look: impl FnOnce(&Model)) {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes").join(name);
+        let loaded = load_scene(&path, &LoadOptions::default()).unwrap();
+        let view = loaded.view();
+        look(&Model::new(&view, &PhysicsSettings::default()));
+    }
+
+    #[test]
+    fn everything_that_moves_the_pair_goes_aside_by_no_more_than_it_may() {
+        with_model("sphere_90x.toml", |model| {
+            let object = model.bodies.iter().position(|body| matches!(body.carrier, Carrier::Object)).unwrap();
+            let of_first = |body: &crate::model::Body| matches!(body.carrier, Carrier::Finger { finger: 0, .. });
+            let link = model.bodies.iter().position(of_first).unwrap();
+            let pair = Pair { a: link.min(object), b: link.max(object), tip_of: None };
+            let middle = |finger: &crate::model::FingerModel| {
+                let chain = finger.ik.chain();
+                chain.lower.iter().zip(&chain.upper).map(|(low, high)| 0.5 * (low + high)).collect()
+            };
+            let posture = Posture {
+                object: regrasp_geometry::pose_from([0.0, 0.0, 0.08], [0.0, 0.0, 0.0, 1.0]),
+                joints: model.fingers.iter().map(middle).collect(),
+            };
+            let limits = ProjectionLimits::default();
+            // No finger holds, so that nothing is brought back.
+            let all: Vec<Posture> = pushed(model, &posture, pair, 0, &limits).collect();
+            let n_joints = posture.joints[0].len();
+            assert_eq!(all.len(), 2 * SHARES.len() * (6 + n_joints));
+            let center = model.view.object.center_of_mass;
+            for aside in &all {
+                assert_eq!(aside.joints[1..], posture.joints[1..], "only the first finger is in the way");
+                let shift = (aside.object * center - posture.object * center).norm();
+                let turn = regrasp_geometry::frame::rotation_between(&aside.object, &posture.object).norm();
+                let joint = aside.joints[0].iter().zip(&posture.joints[0]).map(|(a, b)| (a - b).abs());
+                let joint = joint.fold(0.0, f64::max);
+                let moved = [shift / limits.distance, turn / limits.turn, joint / limits.turn];
+                assert!(moved.iter().all(|share| *share <= 0.9 + 1e-9), "{moved:?}");
+                let n_moved = moved.iter().filter(|share| **share > 1e-9).count();
+                assert_eq!(n_moved, 1, "one coordinate at a time: {moved:?}");
+            }
+        });
+    }
+}
