@@ -211,6 +211,18 @@ def test_trouble_makes_the_grip_firmer(scene: regrasp.Scene) -> None:
     assert ticket.answer.settings["forces"]["squeeze"] == 12.0 and usual.settings["forces"]["squeeze"] == 4.0
 
 
+def test_a_motion_that_is_as_short_as_can_be_is_planned_once(scene: regrasp.Scene) -> None:
+    plant = plant_of(scene)
+    executor = Executor(regrasp.Session(scene, settings=PLANNER), plant)
+    executor._first_pose()
+    near, far = (next(iter(turns(plant.pose, count=1, seed=5, largest=largest, axis=np.eye(3)[2]))) for largest in (0.02, 1.5))
+    short, long = executor._query(near), executor._query(far)
+    assert isinstance(short.answer, regrasp.Plan) and short.answer.statistics["relocations"] == 0
+    assert short.work == short.answer.statistics["work"], "more plans were made"
+    assert isinstance(long.answer, regrasp.Plan) and long.answer.statistics["relocations"] > 0
+    assert long.work > long.answer.statistics["work"], "only one plan was made"
+
+
 def test_a_planner_out_of_budget_leaves_the_hand_holding() -> None:
     plant = plant_of(regrasp.load_scene(SCENES / "box_180x.toml"))
     settings = ExecutorSettings(max_work=1, plan_attempts=1, attempts=2)

@@ -101,8 +101,8 @@ def _shortest(plan: Plan, ask: Callable[[int], Plan | Failure], ticket: Ticket, 
     """The plan whose motion takes the least time, of this one and of others while the work that may be spent on them lasts."""
     best, each = plan, ticket.work
     for number in range(settings.choices - 1):
-        # What one more is likely to take.
-        if ticket.work + each > settings.choice_work:
+        # What one more is likely to take; a motion of the object alone is as short as can be.
+        if ticket.work + each > settings.choice_work or best.statistics["relocations"] == 0:
             break
         before = ticket.work
         other = ask(number)
