@@ -35,7 +35,7 @@ from ._session import Session
 from .execute.executor import Executor
 from .execute.planning import ThreadPlanning
 from .execute.plant import Command, Observation
-from .execute.settings import CAREFUL, LOOSE, PLANNER, ExecutorSettings
+from .execute.settings import CAREFUL, FIRM, LOOSE, PLANNER, ExecutorSettings
 from .simulate.reference import Array
 
 #: How long a driver may take to reach the next point of a trajectory, in ticks.
@@ -210,6 +210,7 @@ def main(arguments: list[str] | None = None) -> int:
         planning=ThreadPlanning,
         careful=[Session(scene, settings=CAREFUL)],
         loose=[Session(scene, settings=LOOSE)],
+        firm=[Session(scene, settings=FIRM)],
         stiffness=stiffness,
         damping=damping,
     )

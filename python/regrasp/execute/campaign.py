@@ -20,7 +20,7 @@ from ..simulate.reference import PlanError
 from .executor import Executor
 from .goals import turns
 from .mujoco_plant import MujocoPlant, PlantSettings
-from .settings import CAREFUL, LOOSE, PLANNER, ExecutorSettings
+from .settings import CAREFUL, FIRM, LOOSE, PLANNER, ExecutorSettings
 
 #: How the plant differs from the plan.
 DISTURBANCES: dict[str, dict[str, Any]] = {
@@ -42,6 +42,9 @@ ABLATIONS: dict[str, dict[str, Any]] = {
     "replanning alone": {"feedback": False},
     "feedback alone": {"replanning": False},
     "open loop": {"replanning": False, "feedback": False},
+    "both, usual grip": {"grip": "usual"},
+    "both, firm grip": {"grip": "firm"},
+    "feedback alone, firm grip": {"replanning": False, "grip": "firm"},
 }
 
 
@@ -111,7 +114,7 @@ def run_case(case: Case) -> Row:
     axis = None if not case.axis else np.eye(3)["xyz".index(case.axis)]
     goals = turns(plant.pose, count=case.goals, seed=case.run, largest=case.largest, axis=axis)
     session = Session(scene, settings=PLANNER)
-    executor = Executor(session, plant, settings, careful=[Session(scene, settings=CAREFUL)], loose=[Session(scene, settings=LOOSE)])
+    executor = Executor(session, plant, settings, careful=[Session(scene, settings=CAREFUL)], loose=[Session(scene, settings=LOOSE)], firm=[Session(scene, settings=FIRM)])
     log = executor.run(goals)
     position, _ = plant.truth()
     away = float(np.linalg.norm(position - np.array(log.goals[-1].position))) if log.goals else 0.0
@@ -177,7 +180,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--processes", type=int, default=1)
     asked = parser.parse_args(arguments)
     packages = tuple(tuple(entry.split("=", 1)) for entry in asked.package)
-    separator = ";" if ";" in asked.disturbances else ","
+    # One name may have a comma in it.
+    separator = ";" if ";" in asked.disturbances or asked.disturbances in DISTURBANCES else ","
     disturbances = asked.disturbances.split(separator)
     ablations = asked.ablations.split(";")
     unknown = [name for name in disturbances if name not in DISTURBANCES] + [name for name in ablations if name not in ABLATIONS]

@@ -13,19 +13,23 @@ from .._plan import Plan
 from .._result import Failure
 from .._session import Session, Start
 from ..simulate.model import Rig, Settings
-from ..simulate.reference import Array
+from ..simulate.reference import Array, rotation_matrices
 from .leg import Leg, first_rig
 from .log import Event, GoalResult, LegRecord, RunLog, Sample
 from .monitor import Monitor, Trigger, pose_error
 from .planning import ChargedPlanning, Planning, Prepare, ThreadPlanning, Ticket
 from .plant import Command, Plant
 from .senses import Fault, Senses
-from .settings import CAREFUL, LOOSE, PLANNER, ExecutorSettings
+from .settings import CAREFUL, FIRM, LOOSE, PLANNER, ExecutorSettings
 
 #: A sample is kept every so many ticks.
 SAMPLED = 5
 #: Faults that stop the motion until they are over.
 SERIOUS = frozenset({"joints_missing", "stale_pose", "pose_jump"})
+#: Fewer fingers than these hold nothing.
+HOLDING = 2
+#: Events that a firmer grip may prevent.
+LOSING = frozenset({"deviation", "slip", "lost_contact", "missed"})
 
 
 class _GiveUp(Exception):
@@ -49,13 +53,15 @@ class Executor:
         planning: Callable[[Sequence[Session], ExecutorSettings, Prepare], Planning] | None = None,
         careful: Sequence[Session] = (),
         loose: Sequence[Session] = (),
+        firm: Sequence[Session] = (),
         stiffness: Array | None = None,
         damping: Array | None = None,
     ) -> None:
         """session, plant: of the same hand. control: as the replay's settings, of which tick and speed count.
 
         planning: ``ThreadPlanning`` for robots; where nothing is said, ``ChargedPlanning`` for plants that know the truth, which are
-        simulations, else ``ThreadPlanning``. careful: sessions of the same scene that are asked for plans first; loose: that are asked last, and for starts that the session refuses. stiffness, damping: of the robot's joints, where they are not those of replays.
+        simulations, else ``ThreadPlanning``. careful: sessions of the same scene that are asked for plans first; loose: that are asked last, and for starts that the session refuses; firm: that are asked before all
+        others once something has gone wrong. stiffness, damping: of the robot's joints, where they are not those of replays.
         """
         self._session = session
         self._plant = plant
@@ -74,6 +80,8 @@ class Executor:
         maker = planning or (ChargedPlanning if self._truth is not None else ThreadPlanning)
         self._planning = maker([*careful, session, *loose], self._settings, self._prepare)
         self._for_starts = [session, *loose]
+        self._firm = firm
+        self._grips_firmer = self._settings.grip == "firm"
         self._rig: Rig | None = None
         self._senses = Senses(len(plant.joint_names), self._settings)
         self._leg: Leg | None = None
@@ -107,7 +115,7 @@ class Executor:
             log.status = "done"
         except _GiveUp as end:
             log.status, log.message = end.status, str(end)
-            self._event("gave_up", str(end), "give_up")
+            self._event("object_gone" if end.status == "lost" else "gave_up", str(end), "give_up")
         except KeyboardInterrupt:
             log.status = "interrupted"
             self._event("interrupted", "the caller asked to stop", "hold")
@@ -212,7 +220,7 @@ class Executor:
     def _ask(self, start: Start, goal: Pose) -> Ticket:
         self._n_queries += 1
         seed = self._settings.seed + 1000 * self._n_queries
-        return self._planning.ask(start, goal, seed, self._senses.time)
+        return self._planning.ask(start, goal, seed, self._senses.time, self._firm if self._grips_firmer else ())
 
     def _ask_ahead(self, plan: Plan, following: Pose) -> Ticket | None:
         start = self._session.project(Pose(plan.object_positions[-1], plan.object_quat_xyzw[-1]), plan.joints[-1])
@@ -225,10 +233,12 @@ class Executor:
         return start
 
     def _observed_start(self) -> Start:
-        """The start nearest to what is seen, after a rest; observes again until there is one, or patience ends."""
+        """The start nearest to what is seen, after a rest; observes again until there is one, or patience ends.
+
+        Where there is none, the hand goes back a little on the way that it came: what is in the way there was not before.
+        """
         settings = self._settings
         since = self._senses.time
-        message = ""
         told = False
         while True:
             message = ""
@@ -244,12 +254,53 @@ class Executor:
                     return start
                 # The last session accepts most: its cause is what is left.
                 message = start.message
+            gone = self._is_gone()
+            if gone:
+                raise _GiveUp("lost", f"{gone}; no start: {message}")
             if not told:
                 self._event("no_start", message, "hold")
                 told = True
+            if self._go_back():
+                continue
             if senses.time - since > settings.patience:
-                lost = senses.forces is not None and not (senses.forces > settings.lost_force).any()
-                raise _GiveUp("lost" if lost or "no finger touches" in message else "gave_up", f"no start: {message}")
+                lost = "no finger touches" in message if presses is None else sum(presses) < HOLDING
+                raise _GiveUp("lost" if lost else "gave_up", f"no start: {message}")
+
+    def _go_back(self) -> bool:
+        """Goes back on the leg for ``back_off_time``, no farther than to where another finger landed or lifted. False where that is
+        here, and where the object is not as the leg has it: fingers that move would drag it farther off."""
+        leg, senses, settings = self._leg, self._senses, self._settings
+        if leg is None or settings.back_off_time <= 0.0:
+            return False
+        wanted = leg.ref.object_position[self._k], leg.ref.object_quat_wxyz[self._k]
+        distance, angle = pose_error(leg, senses.position, senses.quat, *wanted)
+        if distance > settings.project_distance or angle > settings.project_turn:
+            return False
+        holds, last = leg.ref.holds[self._k], self._k
+        goal = max(0, self._k - round(settings.back_off_time / self._plant.tick))
+        while self._k > goal and bool((leg.ref.holds[self._k - 1] == holds).all()):
+            self._k -= 1
+            faults = self._tick(moves=False, state="hold")
+            if faults:
+                self._outlast(faults)
+        return self._k < last
+
+    def _is_gone(self) -> str:
+        """Why the object is not in the hand any more; empty where it may be. A camera that errs while fingers feel the object is not
+        believed."""
+        leg, senses, settings = self._leg, self._senses, self._settings
+        n_felt = None if senses.forces is None else int((senses.forces > settings.lost_force).sum())
+        if leg is None or senses.seen is None or (n_felt is not None and n_felt >= HOLDING):
+            return ""
+        felt = "" if n_felt is None else f", and {n_felt} fingers feel something"
+        if senses.time - senses.good_stamp > settings.patience:
+            return f"the object is out of sight{felt}" if n_felt is not None else ""
+        position, quat = senses.seen
+        center = position + rotation_matrices(quat) @ np.array(leg.rig.model.body_ipos[leg.rig.object_body])
+        away = float(np.linalg.norm(leg.tips(senses.joints) - center, axis=1).min()) - leg.rig.radius
+        if away > settings.gone_distance:
+            return f"the object is {1e3 * away:.0f} mm away from all fingertips{felt}"
+        return ""
 
     def _prepare(self, plan: Plan) -> Leg:
         if self._rig is None:
@@ -357,10 +408,15 @@ class Executor:
         return None
 
     def _outlast(self, faults: list[Fault]) -> None:
-        """Holds until observations are good again. Raises where they do not become so."""
-        since = self._senses.time
+        """Holds until observations are good again. Raises where they do not become so, and where the object is gone."""
+        settings, since = self._settings, self._senses.time
+        gone_since: float | None = None
         while any(fault.kind in SERIOUS for fault in faults):
-            if self._senses.time - since > self._settings.patience:
+            now, gone = self._senses.time, self._is_gone()
+            gone_since = None if not gone else now if gone_since is None else gone_since
+            if gone_since is not None and now - gone_since >= settings.gone_after:
+                raise _GiveUp("lost", gone)
+            if now - since > settings.patience:
                 raise _GiveUp("gave_up", f"{faults[0].kind}: {faults[0].message}")
             faults = self._tick(moves=False, state="hold")
 
@@ -453,6 +509,8 @@ class Executor:
 
     def _event(self, kind: str, message: str, answer: str) -> None:
         leg = len(self.log.legs) - 1
+        if kind in LOSING and self._settings.grip == "firm after trouble":
+            self._grips_firmer = True
         self.log.events.append(Event(round(self._senses.time, 6), kind, message, answer, self._goal_index, leg))
 
 
@@ -469,10 +527,12 @@ def execute(
     """
     careful: list[Session] = []
     loose: list[Session] = []
+    firm: list[Session] = []
     if session is None:
         scene = getattr(plant, "scene", None)
         if scene is None:
             raise ValueError("the plant does not know its scene: give a session")
         session = Session(scene, settings=PLANNER)
         careful, loose = [Session(scene, settings=CAREFUL)], [Session(scene, settings=LOOSE)]
-    return Executor(session, plant, settings, careful=careful, loose=loose).run(goals)
+        firm = [Session(scene, settings=FIRM)]
+    return Executor(session, plant, settings, careful=careful, loose=loose, firm=firm).run(goals)

@@ -21,7 +21,7 @@ from ..from_mjcf import convert
 from .executor import Executor
 from .foreign_plant import ForeignPlant, ForeignSettings
 from .goals import turns
-from .settings import CAREFUL, LOOSE, PLANNER, ExecutorSettings
+from .settings import CAREFUL, FIRM, LOOSE, PLANNER, ExecutorSettings
 
 MODEL = "envs/assets/hand/manipulate_block.xml"
 #: A tendon with 0.001 m of play couples the last two joints of four fingers. Under load it rests at one end; in radians of the last joint.
@@ -107,6 +107,7 @@ def main(arguments: list[str] | None = None) -> int:
         SETTINGS,
         careful=[Session(scene, settings=CAREFUL)],
         loose=[Session(scene, settings=LOOSE), Session(crept, settings=LOOSE)],
+        firm=[Session(scene, settings=FIRM)],
         stiffness=plant.stiffness,
         damping=plant.damping,
     )

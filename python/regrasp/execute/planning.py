@@ -43,11 +43,15 @@ class Ticket:
 Prepare = Callable[[Plan], Any]
 
 
+Sessions = Sequence[Session]
+"""Of one scene, in the order in which they are asked: careful ones first."""
+
+
 class Planning(Protocol):
     """Answers queries while the hand does something else."""
 
-    def ask(self, start: Start, goal: Pose, seed: int, now: float) -> Ticket:
-        """Asks. Does not wait."""
+    def ask(self, start: Start, goal: Pose, seed: int, now: float, first: Sessions = ()) -> Ticket:
+        """Asks. Does not wait. first: sessions that are asked before the usual ones."""
         ...
 
     def is_ready(self, ticket: Ticket, now: float) -> bool:
@@ -57,10 +61,6 @@ class Planning(Protocol):
     def close(self) -> None:
         """Ends every search and thread."""
         ...
-
-
-Sessions = Sequence[Session]
-"""Of one scene, in the order in which they are asked: careful ones first."""
 
 
 def _solve(sessions: Sessions, settings: ExecutorSettings, prepare: Prepare, ticket: Ticket, seed: int) -> None:
@@ -101,8 +101,8 @@ def _shortest(plan: Plan, ask: Callable[[int], Plan | Failure], ticket: Ticket, 
     """The plan whose motion takes the least time, of this one and of others while the work that may be spent on them lasts."""
     best, each = plan, ticket.work
     for number in range(settings.choices - 1):
-        # What one more is likely to take.
-        if ticket.work + each > settings.choice_work:
+        # What one more is likely to take; a motion of the object alone is as short as can be.
+        if ticket.work + each > settings.choice_work or best.statistics["relocations"] == 0:
             break
         before = ticket.work
         other = ask(number)
@@ -120,9 +120,9 @@ class ChargedPlanning:
         self._settings = settings
         self._prepare = prepare
 
-    def ask(self, start: Start, goal: Pose, seed: int, now: float) -> Ticket:
+    def ask(self, start: Start, goal: Pose, seed: int, now: float, first: Sessions = ()) -> Ticket:
         ticket = Ticket(start, goal, now)
-        _solve(self._sessions, self._settings, self._prepare, ticket, seed)
+        _solve([*first, *self._sessions], self._settings, self._prepare, ticket, seed)
         ticket.ready_at = now + ticket.work / self._settings.work_rate + self._settings.planning_overhead
         return ticket
 
@@ -142,12 +142,12 @@ class ThreadPlanning:
         self._prepare = prepare
         self._running: list[tuple[Ticket, threading.Thread]] = []
 
-    def ask(self, start: Start, goal: Pose, seed: int, now: float) -> Ticket:
+    def ask(self, start: Start, goal: Pose, seed: int, now: float, first: Sessions = ()) -> Ticket:
         ticket = Ticket(start, goal, now)
 
         def work() -> None:
             try:
-                _solve(self._sessions, self._settings, self._prepare, ticket, seed)
+                _solve([*first, *self._sessions], self._settings, self._prepare, ticket, seed)
             except Cancelled:
                 pass
             except BaseException as error:

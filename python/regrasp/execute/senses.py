@@ -39,6 +39,8 @@ class Senses:
         self.forces: Array | None = None
         self.good_stamp = -np.inf
         """Of the last pose that was believed."""
+        self.seen: tuple[Array, Array] | None = None
+        """The last pose that was seen, believed or not: position, and orientation w x y z."""
         self._seen_stamp = -np.inf
         self._has_joints = False
 
@@ -109,6 +111,7 @@ class Senses:
             faults.append(Fault("bad_stamp", f"a pose is of {stamp:.3f} s, at {self.time:.3f} s"))
             return
         self._seen_stamp = stamp
+        self.seen = position, quat / length
         if stamp < self.time - settings.stale_after:
             return
         if self._filter is None:

@@ -1,10 +1,12 @@
 //! The nearest valid start to a state that was observed: what cameras and encoders say is never exactly a grasp.
 //!
-//! Damped least squares move object and joints so that the fingers that hold touch; small draws about that take links out of
-//! collision. What comes out is a start that planning does not refuse, or the reason why there is none nearby.
+//! Damped least squares move object and joints so that the fingers that hold touch. Small draws about that take links out of
+//! collision, and where they do not, object and fingers go aside one coordinate at a time, as far as the limits let them. What comes out is a start that planning does not refuse, or the reason why there is none nearby.
 
 /// Where the fingers that hold touch.
 mod fit;
+/// Links pushed out of what they are in.
+mod push;
 
 use crate::ends::blocked::{refuse_buried_object, refuse_object_out_of_reach};
 use crate::ends::end::End;
@@ -15,6 +17,7 @@ use crate::grasp::state::GraspState;
 use crate::model::{Model, friction_in_words, releasable};
 use crate::workspace::{TipMode, Workspace};
 use fit::{Posture, fit, gap_of, relative_velocity};
+use push::pushed;
 use regrasp_base::Rng;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Pose, Vector, frame};
@@ -184,7 +187,7 @@ fn start_with(
     refuse_open(model, posture, holding)?;
     let fitted = fit(model, posture, holding);
     let mut workspace = Workspace::new(model);
-    let mut first = None;
+    let (mut first, mut in_the_way) = (None, None);
     let mut rng = Rng::keyed(0, "projection", 0);
     for draw in 0..=DRAWS {
         let share = DRAWN_SHARE * draw as f64 / DRAWS as f64;
@@ -193,6 +196,16 @@ fn start_with(
             Ok(state) => return Ok(state),
             Err(failure) => first.get_or_insert(failure),
         };
+        if draw == 0 {
+            in_the_way = workspace.blocking_pair.take();
+        }
+    }
+    if let Some(pair) = in_the_way {
+        let mut aside = pushed(model, &fitted, pair, holding, limits);
+        if let Some(state) = aside.find_map(|near| valid(model, &mut workspace, observed, &near, holding, limits).ok())
+        {
+            return Ok(state);
+        }
     }
     Err(first.expect("there is at least one draw"))
 }
