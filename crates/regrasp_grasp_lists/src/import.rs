@@ -114,7 +114,7 @@ fn judge(prepared: &Prepared, index: u64, given: &Given) -> Result<Found, Reason
         None => prepared.model.view.hand.fingers.iter().map(|finger| finger.rest.iter().copied().collect()).collect(),
     });
     let fingers = (0..open.len()).map(|f| {
-        let touch = touch_on_way(&prepared.model, f, &given.hand_from_object, &open[f], &given.joints[f]);
+        let touch = touch_on_way(prepared.model, f, &given.hand_from_object, &open[f], &given.joints[f]);
         touch.map_or((None, given.joints[f].clone()), |(contact, joints)| (Some(contact), joints))
     });
     let state = GraspState::of(given.hand_from_object, fingers);

@@ -27,8 +27,8 @@ pub fn close(prepared: &Prepared, motors: &Motors, hand_from_object: &Pose, shap
     for finger in 0..n {
         let mut held = None;
         if touching[finger] {
-            let gap = gap(&prepared.model, finger, hand_from_object, &joints[finger]);
-            held = Some(contact(&prepared.model, finger, hand_from_object, &joints[finger], &gap)?);
+            let gap = gap(prepared.model, finger, hand_from_object, &joints[finger]);
+            held = Some(contact(prepared.model, finger, hand_from_object, &joints[finger], &gap)?);
         }
         of_fingers.push((held, joints[finger].clone()));
     }
@@ -57,7 +57,7 @@ fn turn(
     let (range, mut share) = (motor.closed - motor.open, 0.0);
     let at = |share: f64, joints: &mut HandJoints| -> Vec<Gap> {
         motor.put(joints, motor.open + range * share);
-        fingers.iter().map(|&f| gap(&prepared.model, f, hand_from_object, &joints[f])).collect()
+        fingers.iter().map(|&f| gap(prepared.model, f, hand_from_object, &joints[f])).collect()
     };
     let (mut before, mut gaps) = (0.0, at(0.0, joints));
     if gaps.iter().any(|gap| gap.distance <= 0.0) {

@@ -107,7 +107,7 @@ pub fn close(prepared: &Prepared, motors: &Motors, jaws: &Jaws) -> Option<GraspS
     let pose_at = |shift: f64| Translation3::from(across * shift) * jaws.hand_from_object;
     let gaps_at = |at: &Vector2<f64>| -> [Gap; 2] {
         let (pose, joints) = (pose_at(at.x), joints_at(motors, at.y));
-        [0, 1].map(|f| gap(&prepared.model, f, &pose, &joints[f]))
+        [0, 1].map(|f| gap(prepared.model, f, &pose, &joints[f]))
     };
     let values = |gaps: &[Gap; 2]| Vector2::new(gaps[0].distance, gaps[1].distance);
     let slopes_at = |at: &Vector2<f64>, value: &Vector2<f64>| {
@@ -130,7 +130,7 @@ pub fn close(prepared: &Prepared, motors: &Motors, jaws: &Jaws) -> Option<GraspS
         }
         if value.amax() <= TOUCHES {
             let (pose, joints) = (pose_at(at.x), joints_at(motors, at.y));
-            let held = |f: usize| contact(&prepared.model, f, &pose, &joints[f], &gaps[f]);
+            let held = |f: usize| contact(prepared.model, f, &pose, &joints[f], &gaps[f]);
             let contacts = [held(0)?, held(1)?];
             let fingers = (0..2).map(|f| (Some(contacts[f]), joints[f].clone()));
             return Some(GraspState::of(pose, fingers));
