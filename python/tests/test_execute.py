@@ -201,7 +201,8 @@ def test_a_link_in_the_way_makes_the_hand_go_back(scene: regrasp.Scene) -> None:
 def test_trouble_makes_the_grip_firmer(scene: regrasp.Scene) -> None:
     plant = plant_of(scene)
     firm = regrasp.Session(scene, settings=FIRM)
-    executor = Executor(regrasp.Session(scene, settings=PLANNER), plant, firm=[firm])
+    settings = ExecutorSettings(grip="firm after trouble")
+    executor = Executor(regrasp.Session(scene, settings=PLANNER), plant, settings, firm=[firm])
 
     executor.run(turns(plant.pose, count=1, seed=4))
     usual = executor.log.plans[-1]

@@ -78,7 +78,7 @@ class ExecutorSettings:
     patience: float = 2.0
     """The hand gives up, and holds, when nothing has helped for so long."""
 
-    grip: Literal["usual", "firm after trouble", "firm"] = "firm after trouble"
+    grip: Literal["usual", "firm after trouble", "firm"] = "usual"
     """When plans are sought with a firmer grip first: never; from the first slip, deviation, lost contact or missed goal on; always."""
     back_off_time: float = 0.3
     """Where there is no start, the hand goes back on its way for so long, and looks again."""
