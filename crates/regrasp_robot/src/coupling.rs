@@ -51,6 +51,49 @@ impl<L: Copy + PartialEq> Coupling<L> {
         products.fold(first, |sum, product| sum + product) + self.offset
     }
 
+    /// The same coupling with leaders that follow others themselves replaced by those: `of` says what a leader follows. Leaders beyond
+    /// [`MAX_TERMS`] stay as they are.
+    pub fn through<'c>(&self, of: impl Fn(L) -> Option<&'c Coupling<L>>) -> Self
+    where
+        L: 'c,
+    {
+        let mut found = Coupling { terms: Terms::new(), offset: self.offset };
+        let mut add = |leader: L, multiplier: f64| match found.terms.iter_mut().find(|(other, _)| *other == leader) {
+            Some((_, known)) => {
+                *known += multiplier;
+                true
+            }
+            None => found.terms.try_push((leader, multiplier)).is_ok(),
+        };
+        let (mut offset, mut is_complete) = (self.offset, true);
+        for &(leader, multiplier) in &self.terms {
+            match of(leader) {
+                Some(above) => {
+                    offset += multiplier * above.offset;
+                    is_complete &= above.terms.iter().all(|&(first, factor)| add(first, multiplier * factor));
+                }
+                None => is_complete &= add(leader, multiplier),
+            }
+        }
+        if !is_complete {
+            return self.clone();
+        }
+        found.offset = offset;
+        found
+    }
+
+    /// True where both say the same but for rounding, whatever the order of their leaders.
+    pub fn is_like(&self, other: &Self) -> bool {
+        /// More than the rounding of a few products.
+        const ROUNDING: f64 = 1e-9;
+        let alike = |a: f64, b: f64| (a - b).abs() <= ROUNDING * a.abs().max(b.abs()).max(1.0);
+        self.terms.len() == other.terms.len()
+            && alike(self.offset, other.offset)
+            && self.terms.iter().all(|&(leader, multiplier)| {
+                other.terms.iter().any(|&(own, factor)| own == leader && alike(multiplier, factor))
+            })
+    }
+
     /// Lowest and highest position of the follower while each leader stays between its own two limits.
     pub fn range(&self, of: impl Fn(L) -> [f64; 2]) -> [f64; 2] {
         let end = |pick: fn(f64, f64) -> f64| {

@@ -315,3 +315,34 @@ fn motors_that_fingers_share_are_held_where_the_file_says() {
         assert!(messages[0].starts_with(message), "{messages:?}\nexpected {message}");
     }
 }
+
+/// Two fingers on one motor, of which the second one's far joint follows its own near one, which follows the motor: what is written is
+/// read, and says the same.
+#[test]
+fn fingers_on_one_motor_are_read_as_they_are_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let follow = |text: String, joint: &str, multiplier: &str| {
+        let (before, after) = text.split_once(&format!("<joint name=\"{joint}\"")).unwrap();
+        let mimic = format!(r#"<mimic joint="i_low" multiplier="{multiplier}" offset="0.01"/></joint>"#);
+        format!("{before}<joint name=\"{joint}\"{}", after.replacen("</joint>", &mimic, 1))
+    };
+    let mut second = follow(finger("m", "root"), "m_low", "0.7");
+    second = follow(second, "m_high", "0.333333333333333");
+    let parts = [follow(finger("i", "root"), "i_high", "0.9"), second].concat();
+    let loaded = guess(&parts, None).unwrap();
+    assert!(!loaded.hand.ties.is_empty(), "the second finger follows the first one");
+    let written = regrasp_robot::inspect::hand_file_text(&loaded.hand, "hand.urdf", &Default::default());
+    let again = load(folder.path(), &parts, &written, "hand.toml", None)
+        .unwrap_or_else(|messages| panic!("{messages:?}\n{written}"));
+    assert_eq!(summary(&again), summary(&loaded));
+    let limits = |loaded: &LoadedHand| -> Vec<f64> {
+        loaded
+            .hand
+            .fingers
+            .iter()
+            .flat_map(|finger| finger.chain.lower.iter().chain(&finger.chain.upper))
+            .copied()
+            .collect()
+    };
+    assert_eq!(limits(&again), limits(&loaded));
+}

@@ -8,7 +8,7 @@ use regrasp_base::toml_table::{Entry, Found, Table};
 
 /// Reads `[[couplings]]` into the joints of `robot`; followers of followers come to follow independent joints.
 ///
-/// A coupling that the URDF has is taken as it is. Errors: a joint coupled in another way already (`U219`), a joint or
+/// A coupling that says the same as that of the URDF, but for rounding, changes nothing. Errors: a joint coupled in another way already (`U219`), a joint or
 /// leader that is fixed (`U220`), multiplier 0 (`U213`), a cycle or more leaders than a joint may have (`U141`), limits that
 /// leave no position (`U143`).
 pub(super) fn read(entry: &Entry, robot: &mut Robot, found: &mut Found) {
@@ -19,7 +19,7 @@ pub(super) fn read(entry: &Entry, robot: &mut Robot, found: &mut Found) {
         let Some((joint, coupling, place)) = item.table(found).and_then(|table| read_one(table, robot, found)) else {
             continue;
         };
-        if direct[joint.0].as_ref() == Some(&coupling) {
+        if direct[joint.0].as_ref().is_some_and(|known| known.is_like(&coupling)) {
             continue;
         }
         if direct[joint.0].is_some() {

@@ -58,6 +58,9 @@ pub fn hand_file_text(hand: &Hand, urdf: &str, allow: &BTreeSet<(LinkId, LinkId)
     for (index, joint) in robot.joints.iter().enumerate() {
         let tied = hand.ties.iter().find(|tie| tie.follower == JointId(index)).map(|tie| &tie.coupling);
         let Some(coupling) = tied.or(joint.coupling.as_ref()) else { continue };
+        let coupling = &coupling.through(|leader| {
+            hand.ties.iter().find(|tie| tie.follower == leader && leader != JointId(index)).map(|tie| &tie.coupling)
+        });
         let _ = writeln!(text, "\n[[couplings]]\njoint = {}", quoted(&joint.name));
         let leader = |id: JointId| quoted(&robot.joints[id.0].name);
         match coupling.single() {

@@ -50,7 +50,7 @@ fn roadmap_that_is_cut_off() {
 fn roadmap_of_another_version() {
     let mut bytes = ROADMAP.to_vec();
     bytes[8] = 99;
-    roadmap_is_refused(&bytes, "R602", &["99", "expected 4", "fix: "]);
+    roadmap_is_refused(&bytes, "R602", &["99", "expected 5", "fix: "]);
 }
 
 #[test]
@@ -70,10 +70,18 @@ fn roadmap_with_a_wrong_checksum() {
 
 #[test]
 fn roadmap_with_huge_counts() {
-    for (index, what) in
-        ["bytes about itself", "places", "contacts", "nodes", "edges", "ways of fingers", "joint values"]
-            .into_iter()
-            .enumerate()
+    for (index, what) in [
+        "bytes about itself",
+        "places",
+        "contacts",
+        "nodes",
+        "edges",
+        "ways of fingers",
+        "joint values",
+        "numbers of motions",
+    ]
+    .into_iter()
+    .enumerate()
     {
         let at = 32 + 8 * index;
         let place = format!("byte {at}");
@@ -83,7 +91,7 @@ fn roadmap_with_huge_counts() {
         // Not more than the file has bytes, and yet not what it holds.
         roadmap_is_refused(&with_number(at, ROADMAP.len() as u64), "R606", &["tables of", "fix: "]);
     }
-    roadmap_is_refused(&with_number(32 + 7 * 8, 13), "R606", &["finger 0", "13 joints", "fix: "]);
+    roadmap_is_refused(&with_number(32 + 8 * 8, 13), "R606", &["finger 0", "13 joints", "fix: "]);
     let mut bytes = ROADMAP.to_vec();
     bytes[12] = 200;
     seal(&mut bytes);
