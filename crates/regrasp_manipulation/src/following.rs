@@ -16,6 +16,7 @@ pub fn joints_in_words(model: &Model) -> String {
     let n_following = fingers().filter(|(prepared, _)| !prepared.closes()).count();
     let following = match n_following {
         0 => "none can".to_owned(),
+        n if model.may_move_object() => format!("{n} can"),
         n => format!("{n} can, and cannot hold an object without the others"),
     };
     format!("Of its {} fingers {following}: {}", counts.len(), counts.join(", "))

@@ -51,8 +51,8 @@ impl<L: Copy + PartialEq> Coupling<L> {
         products.fold(first, |sum, product| sum + product) + self.offset
     }
 
-    /// The same coupling with leaders that follow others themselves replaced by those: `of` says what a leader follows. Leaders beyond
-    /// [`MAX_TERMS`] stay as they are.
+    /// The same coupling with leaders that follow others themselves replaced by those: `of` says what a leader follows. Unchanged
+    /// where more than [`MAX_TERMS`] would lead.
     pub fn through<'c>(&self, of: impl Fn(L) -> Option<&'c Coupling<L>>) -> Self
     where
         L: 'c,

@@ -42,7 +42,7 @@ ABLATIONS: dict[str, dict[str, Any]] = {
     "replanning alone": {"feedback": False},
     "feedback alone": {"replanning": False},
     "open loop": {"replanning": False, "feedback": False},
-    "both, usual grip": {"grip": "usual"},
+    "both, firm after trouble": {"grip": "firm after trouble"},
     "both, firm grip": {"grip": "firm"},
     "feedback alone, firm grip": {"replanning": False, "grip": "firm"},
 }

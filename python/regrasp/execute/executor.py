@@ -61,7 +61,7 @@ class Executor:
 
         planning: ``ThreadPlanning`` for robots; where nothing is said, ``ChargedPlanning`` for plants that know the truth, which are
         simulations, else ``ThreadPlanning``. careful: sessions of the same scene that are asked for plans first; loose: that are asked last, and for starts that the session refuses; firm: that are asked before all
-        others once something has gone wrong. stiffness, damping: of the robot's joints, where they are not those of replays.
+        others where ``grip`` says so. stiffness, damping: of the robot's joints, where they are not those of replays.
         """
         self._session = session
         self._plant = plant

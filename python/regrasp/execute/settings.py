@@ -18,7 +18,7 @@ PLANNER: dict[str, Any] = {
 CAREFUL: dict[str, Any] = {**PLANNER, "friction_margin": 2.0}
 #: The same for starts that are worse than plans may be: links may be nearer to what they must not touch, grasps may hold less.
 LOOSE: dict[str, Any] = {**PLANNER, "clearance": 2e-5, "closure_margin": 0.001}
-#: The same with a firmer grip: legs are planned with these first once something has gone wrong. Origin: pushes of 4 N on the bundled box.
+#: The same with a firmer grip: legs are planned with these first where ``grip`` says so. Origin: pushes of 4 N on the bundled box.
 FIRM: dict[str, Any] = {**CAREFUL, "forces": {"squeeze": 12.0, "normal_force": [2.0, 30.0]}}
 
 

@@ -1,7 +1,8 @@
 //! The nearest valid start to a state that was observed: what cameras and encoders say is never exactly a grasp.
 //!
 //! Damped least squares move object and joints so that the fingers that hold touch. Small draws about that take links out of
-//! collision, and where they do not, object and fingers go aside one coordinate at a time, as far as the limits let them. What comes out is a start that planning does not refuse, or the reason why there is none nearby.
+//! collision, and where they do not, object and fingers go aside one coordinate at a time, as far as the limits let them. What comes out
+//! is a start that planning does not refuse, or the reason why there is none nearby.
 
 /// Where the fingers that hold touch.
 mod fit;

@@ -8,9 +8,9 @@ use regrasp_base::toml_table::{Entry, Found, Table};
 
 /// Reads `[[couplings]]` into the joints of `robot`; followers of followers come to follow independent joints.
 ///
-/// A coupling that says the same as that of the URDF, but for rounding, changes nothing. Errors: a joint coupled in another way already (`U219`), a joint or
-/// leader that is fixed (`U220`), multiplier 0 (`U213`), a cycle or more leaders than a joint may have (`U141`), limits that
-/// leave no position (`U143`).
+/// A coupling that says the same as that of the URDF, but for rounding, changes nothing. Errors: a joint coupled in another way already
+/// (`U219`), a joint or leader that is fixed (`U220`), multiplier 0 (`U213`), a cycle or more leaders than a joint may have (`U141`),
+/// limits that leave no position (`U143`).
 pub(super) fn read(entry: &Entry, robot: &mut Robot, found: &mut Found) {
     let items = entry.entries(found, "[[couplings]] tables").unwrap_or_default();
     let mut direct: Vec<Option<Coupling>> = robot.joints.iter().map(|joint| joint.coupling.clone()).collect();

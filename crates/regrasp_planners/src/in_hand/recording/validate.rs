@@ -179,7 +179,7 @@ impl End {
         let placement = Placement::from(pose);
         let normal: Vector = placement.vector(&contact.normal_in_object);
         let foot = placement.point(&contact.point_in_object) - model.fingers[finger].arm_with(joints, &normal);
-        let slant = if model.fingers[finger].closes() { STEEPEST_LIFT } else { 0.0 };
+        let slant = if model.fingers[finger].closes() { LARGEST_SLANT } else { 0.0 };
         End { foot, normal, slant }
     }
 
@@ -192,7 +192,7 @@ impl End {
 }
 
 /// Slant that checks allow a lift: the tangent of 60 degrees.
-const STEEPEST_LIFT: f64 = 1.732;
+const LARGEST_SLANT: f64 = 1.732;
 
 /// Distance from the normal that still counts as on it, in metres: far above what solvers leave.
 const STRAIGHT: f64 = 1e-5;

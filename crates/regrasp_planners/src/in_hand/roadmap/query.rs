@@ -381,7 +381,7 @@ impl<'a> RoadmapPlanner<'a> {
         if self.links == LinkKind::Longest {
             let mut way = to_first;
             for edge in edges {
-                edge?.push_to(&self.model, &mut way);
+                edge?.push_to(&mut way);
             }
             way = way.then(last.way.clone())?;
             straighten(search, &mut way);

@@ -2,7 +2,6 @@
 
 use crate::in_hand::moving::transfer::follow;
 use crate::in_hand::roadmap::graph::{Graph, NOT_STORED, Passage};
-use crate::in_hand::roadmap::track::TimedEdge;
 use arrayvec::ArrayVec;
 use regrasp_geometry::Pose;
 use regrasp_geometry::frame::PoseLine;
@@ -30,16 +29,14 @@ enum Stored<'g> {
     Again(Vec<Moment>),
     /// One finger moves; its joints between the ends.
     Relocation(usize, &'g [f32]),
-    /// With contacts, forces and times.
-    Timed(TimedEdge<'g>),
 }
 
 impl<'g> Passing<'g> {
     /// Along edge `edge` from node `from`, which is one of its ends.
     ///
-    /// None when the stored ends of a transfer do not fit each other: it was proven by another version of the kinematics.
+    /// None when the stored ends of a transfer do not fit each other: it was proven by another version of the kinematics. None for motions
+    /// with forces and times, which a graph of contacts that stay does not have.
     pub fn along(model: &Model, graph: &'g Graph, edge: u32, from: usize) -> Option<Self> {
-        let timed = TimedEdge::along(graph, edge, from);
         let edge = &graph.edges[edge as usize];
         let (proven_from, proven_to) = (edge.from as usize, edge.to as usize);
         let is_forwards = proven_from == from;
@@ -58,7 +55,7 @@ impl<'g> Passing<'g> {
                 let finger = usize::from(finger);
                 Stored::Relocation(finger, graph.numbers_of(finger, first, n_between))
             }
-            Passage::Timed { .. } => Stored::Timed(timed?),
+            Passage::Timed { .. } => return None,
         };
         Some(Passing { graph, to: if is_forwards { proven_to } else { proven_from }, is_forwards, motion })
     }
@@ -70,7 +67,7 @@ impl<'g> Passing<'g> {
     }
 
     /// Appends it to a sequence that ends where it begins.
-    pub fn push_to(self, model: &Model, way: &mut Sequence) {
+    pub fn push_to(self, way: &mut Sequence) {
         let (graph, to) = (self.graph, self.to);
         match &self.motion {
             Stored::Transfer(line, strands, n) => {
@@ -92,7 +89,6 @@ impl<'g> Passing<'g> {
                 way.push_transfer(self.order(*n).map(moment).chain([end]).collect());
             }
             Stored::Again(moments) => way.push_transfer(moments.clone()),
-            Stored::Timed(edge) => edge.push_to(model, way),
             Stored::Relocation(finger, strand) => {
                 let stride = graph.footholds[*finger].n_coordinates;
                 let between = self.order(strand.len() / stride).map(|k| numbers_at(strand, stride, k).collect());
@@ -102,8 +98,7 @@ impl<'g> Passing<'g> {
         }
     }
 
-    /// Records it after what leads to where it begins: the same as of a sequence. Not for motions with forces and times, which
-    /// [`TimedEdge::piece`] has.
+    /// Records it after what leads to where it begins: the same as of a sequence.
     pub fn record_to(self, recorder: &mut Recorder) {
         let (graph, to) = (self.graph, self.to);
         match &self.motion {
@@ -118,7 +113,6 @@ impl<'g> Passing<'g> {
                 recorder.moment(graph.pose(to), at_end);
             }
             Stored::Again(moments) => recorder.transfer(moments),
-            Stored::Timed(_) => {}
             Stored::Relocation(finger, strand) => {
                 let stride = graph.footholds[*finger].n_coordinates;
                 let n = strand.len() / stride;

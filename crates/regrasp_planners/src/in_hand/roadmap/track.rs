@@ -30,8 +30,7 @@ pub fn pieces_of(model: &Model, way: &Sequence) -> Result<Vec<Piece>, Unbalanced
 }
 
 /// The motions of `way`, whose `pieces` are given, as a graph keeps them; `place_of` says which place a transfer leads to, None for
-/// a new one. None where
-/// a finger is free, a transfer ends where it begins, or a motion has too many waypoints: such motions are not kept.
+/// a new one. None where a finger is free, a transfer ends where it begins, or a motion has too many waypoints: such motions are not kept.
 pub fn legs_of_pieces(
     fingers: &[Footholds],
     way: &Sequence,
