@@ -81,12 +81,19 @@ impl RobotRoadmap {
     ///
     /// Errors: not such a file (`R601`), another version (`R602`), what contradicts itself (`R606`).
     pub fn load(path: &Path) -> Result<Self, InputError> {
-        let text = files::read_text(path)?;
-        // The names of the formats stand near the beginning.
-        let begin: String = text.chars().take(200).collect();
-        match begin.contains("regrasp-task-roadmap") {
-            true => TaskRoadmap::from_json(path, &text).map(|roadmap| RobotRoadmap::Task(Box::new(roadmap))),
-            false => SuperGraph::from_json(path, &text).map(|graph| RobotRoadmap::Motion(Box::new(Roads::new(graph)))),
+        Self::from_json(path, &files::read_text(path)?)
+    }
+
+    /// As [`RobotRoadmap::load`], of `text`.
+    pub fn from_json(path: &Path, text: &str) -> Result<Self, InputError> {
+        #[derive(serde::Deserialize)]
+        struct Named {
+            format: String,
+        }
+        let named = serde_json::from_str::<Named>(text);
+        match named.is_ok_and(|named| named.format == regrasp_tasks::roadmap::FORMAT) {
+            true => TaskRoadmap::from_json(path, text).map(|roadmap| RobotRoadmap::Task(Box::new(roadmap))),
+            false => SuperGraph::from_json(path, text).map(|graph| RobotRoadmap::Motion(Box::new(Roads::new(graph)))),
         }
     }
 

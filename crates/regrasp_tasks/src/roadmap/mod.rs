@@ -10,6 +10,7 @@ mod build;
 mod file;
 
 pub use build::{RoadmapBuildSettings, build_roadmap};
+pub use file::FORMAT;
 
 use crate::context::{Context, Prepared};
 use crate::exchange::Give;
