@@ -114,7 +114,14 @@ impl Tally {
         let is_empty = |stage: &Stage| self.tried.contains_key(stage) && !self.found.contains_key(stage);
         let last = || order.into_iter().rev().find(|stage| self.reasons.keys().any(|(of, _)| of == stage));
         let stage = order.into_iter().find(is_empty).or_else(last).unwrap_or(Stage::Grasp);
-        let message = format!("{}: {}", stage.name(), self.in_words(stage));
+        // A change of grasp in a hand is tried only because exchanges failed.
+        let failed = |stage: Stage| self.reasons.keys().any(|(of, _)| *of == stage);
+        let aid = (stage == Stage::InHand && failed(Stage::Exchange)).then_some(stage);
+        let stage = if aid.is_some() { Stage::Exchange } else { stage };
+        let mut message = format!("{}: {}", stage.name(), self.in_words(stage));
+        if let Some(aid) = aid {
+            message += &format!("; {}: {}", aid.name(), self.in_words(aid));
+        }
         let advice = match stage {
             Stage::Grasp | Stage::Place => {
                 "make longer lists of grasps, or move the object nearer or away from clutter"

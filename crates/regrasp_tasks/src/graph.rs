@@ -10,7 +10,7 @@ use crate::in_hand::{self, Change};
 use crate::motions::{self, Step, Stuck};
 use crate::placements::{Place, intermediate};
 use crate::roadmap::TaskRoadmap;
-use crate::station::{Station, may_hold, station};
+use crate::station::{FINAL, Station, may_hold, station};
 use regrasp_geometry::Vector;
 use regrasp_manipulation::failure::{Failure, FailureKind};
 use regrasp_manipulation::task_settings::TaskCost;
@@ -58,6 +58,8 @@ struct Grip {
     cost: f64,
     /// How often motions to it were not found: to take the object, and to put it down.
     stuck: [usize; 2],
+    /// Few postures were tried already.
+    is_second_look: bool,
 }
 
 /// One hand gives to another.
@@ -99,6 +101,8 @@ const EASY: f64 = 1.0;
 const FAILED: f64 = 0.05;
 /// What an exchange costs more that was not found at the best places, in seconds. By hand.
 const SECOND_LOOK: f64 = 1.0;
+/// What a grasp costs more at start or goal that was not found with few postures of the arm, in seconds: more than any plan. By hand.
+const MORE_POSTURES: f64 = 1000.0;
 /// What an exchange costs more that the roadmap does not have, in seconds. By hand.
 const NOT_MADE: f64 = 2.0;
 /// A motion that was not found makes its edge this much dearer, in seconds; it is dead after so many.
@@ -392,8 +396,19 @@ impl<'c, 'a> Graph<'c, 'a> {
         let grip = &mut self.grips[place][hand][grasp];
         if matches!(grip.known, Known::Likely) {
             self.tested += 1;
-            let found = station(self.context, &self.places[place], [hand, grasp], stage, tally);
-            tally.count(stage, found.as_ref().map(|_| ()).map_err(|reason| *reason));
+            let effort = if grip.is_second_look { Effort::Full } else { Effort::Little };
+            let found = station(self.context, &self.places[place], [hand, grasp], (stage, effort), tally);
+            if found.is_ok() || effort == Effort::Little {
+                tally.count(stage, found.as_ref().map(|_| ()).map_err(|reason| *reason));
+            }
+            if let (Err(reason), Effort::Little) = (&found, effort)
+                && place < 2
+                && !FINAL.contains(reason)
+            {
+                // Its turn comes again if nothing else is left.
+                (grip.is_second_look, grip.cost) = (true, grip.cost + MORE_POSTURES);
+                return false;
+            }
             grip.known = found.map_or(Known::Dead, |found| Known::Found(Box::new(found)));
         }
         !grip.known.is_dead()
@@ -520,7 +535,12 @@ fn grips_at(context: &Context, places: &[Place], index: usize) -> Vec<Vec<Grip>>
         let base = context.robot.world_from_root().translation.vector;
         let natural = (at - base).try_normalize(1e-9).map_or(0.0, |towards: Vector| towards.dot(&comes));
         let poor = 0.5 * (1.0 - own.score) + 0.25 * (1.0 - natural);
-        Grip { known: Known::New, cost: GRIP_SECONDS + SECONDS_PER_METRE * detour + POOR * poor, stuck: [0; 2] }
+        Grip {
+            known: Known::New,
+            cost: GRIP_SECONDS + SECONDS_PER_METRE * detour + POOR * poor,
+            stuck: [0; 2],
+            is_second_look: false,
+        }
     };
     let of_hand = |hand: usize| (0..context.hands[hand].grasps.len()).map(|grasp| grip(hand, grasp)).collect();
     (0..context.hands.len()).map(of_hand).collect()

@@ -3,6 +3,7 @@
 pub use crate::clear::with_fingers;
 use crate::clear::{is_hand_clear, links_of};
 use crate::context::{Context, Grasp};
+use crate::exchange::Effort;
 use crate::failing::{Stage, Tally};
 use crate::forces;
 use crate::line::{LINE_STEPS, are_states_free, is_lift_free, is_motion_free, is_state_free, is_way_free, straight};
@@ -13,8 +14,13 @@ use regrasp_geometry::Pose;
 use regrasp_robot::kinematics::arm_ik::{IkBudget, Unreachable};
 use std::cell::OnceCell;
 
-/// Postures of an arm that are looked at for one posture of the common joints.
+/// Postures of an arm that are looked at for one posture of the common joints: at first, and where nothing else is left.
 const POSTURES: usize = 4;
+const MORE_POSTURES: usize = 24;
+/// So many times as many postures of the common joints are drawn where nothing else is left.
+const MORE_DRAWS: usize = 8;
+/// Reasons that more postures do not change.
+pub const FINAL: [&str; 1] = ["hands in collision"];
 /// Shares of the way in that are tried. A shorter one is planned before.
 const WAY_SHARES: [f64; 2] = [1.0, 0.4];
 /// Shares of the lift that are tried.
@@ -117,7 +123,7 @@ pub fn station(
     context: &Context,
     place: &Place,
     [hand, grasp]: [usize; 2],
-    stage: Stage,
+    (stage, effort): (Stage, Effort),
     tally: &mut Tally,
 ) -> Result<Station, &'static str> {
     let own = &context.hands[hand].grasps[grasp];
@@ -129,17 +135,21 @@ pub fn station(
     let free = &context.arms_and_torso;
     let hands = [&own.closed, &own.open].map(|fingers| links_of(context, hand, fingers));
     if !hands.iter().all(|links| is_hand_clear(context, links, &world_from_hand)) {
-        return Err("in collision");
+        return Err(FINAL[0]);
     }
+    let (n_postures, n_draws) = match effort {
+        Effort::Little => (POSTURES, context.settings.common_draws),
+        Effort::Full => (MORE_POSTURES, context.settings.common_draws * MORE_DRAWS),
+    };
     let (models, mut reason) = ([const { OnceCell::new() }; 3], "out of reach");
     let states = [(&closed, None), (&open, None), (&closed, Some((hand, &hand_from_object)))];
     // Made when they are needed.
     let model = |k: usize| models[k].get_or_init(|| context.model(states[k].0, free, states[k].1));
     let mut rng = Rng::keyed(context.seed, "common", 0);
-    let commons = common_postures(context, &[hand], &closed, context.settings.common_draws, &mut rng);
+    let commons = common_postures(context, &[hand], &closed, n_draws, &mut rng);
     for common in &commons {
         tally.work(1);
-        let postures = match arm_postures(context, hand, common, &world_from_hand, POSTURES) {
+        let postures = match arm_postures(context, hand, common, &world_from_hand, n_postures) {
             Ok(postures) => postures,
             Err((by, words)) => {
                 tally.miss(stage, by, || words);

@@ -3,32 +3,42 @@
 use super::{Graph, Node};
 
 impl Graph<'_, '_> {
-    /// By node, what the cheapest way from it to the goal costs (Bellman 1958). Costs only grow while edges are tested, so that later no way
-    /// costs less.
+    /// By node, what the cheapest way from it to the goal costs (Dijkstra 1959, from the goal). Costs only grow while edges are tested, so
+    /// that later no way costs less.
     fn costs_to_goal(&self) -> Vec<f64> {
+        // All edges, then sorted by where they end: `into[first[to]..first[to + 1]]`.
+        let (mut all, mut edges) = (Vec::new(), Vec::new());
+        let mut first = vec![0; self.n_nodes + 1];
+        for from in 0..self.n_nodes {
+            self.edges(self.node(from), &mut edges);
+            for &(to, cost) in &edges {
+                all.push((from as u32, to as u32, cost));
+                first[to + 1] += 1;
+            }
+        }
+        for node in 0..self.n_nodes {
+            first[node + 1] += first[node];
+        }
+        let mut next = first.clone();
+        let mut into = vec![(0, 0.0); all.len()];
+        for (from, to, cost) in all {
+            let place = &mut next[to as usize];
+            into[*place] = (from, cost);
+            *place += 1;
+        }
         let mut least = vec![f64::INFINITY; self.n_nodes];
         least[self.index(Node::Lies(1))] = 0.0;
-        // All edges in a row, asked for once; by node, where its edges end.
-        let (mut all, mut ends, mut edges) = (Vec::new(), Vec::with_capacity(self.n_nodes), Vec::new());
-        for index in 0..self.n_nodes {
-            self.edges(self.node(index), &mut edges);
-            all.extend(edges.iter().map(|&(to, cost)| (to as u32, cost)));
-            ends.push(all.len());
-        }
-        loop {
-            let (mut is_settled, mut first) = (true, 0);
-            for (index, &end) in ends.iter().enumerate() {
-                let own = &all[first..end];
-                first = end;
-                let best = own.iter().map(|&(to, cost)| cost + least[to as usize]).fold(least[index], f64::min);
-                if best < least[index] {
-                    (least[index], is_settled) = (best, false);
-                }
+        let mut open: Vec<usize> = (0..self.n_nodes).collect();
+        while let Some(place) = (0..open.len()).min_by(|&a, &b| least[open[a]].total_cmp(&least[open[b]])) {
+            let to = open.swap_remove(place);
+            if least[to] == f64::INFINITY {
+                break;
             }
-            if is_settled {
-                return least;
+            for &(from, cost) in &into[first[to]..first[to + 1]] {
+                least[from as usize] = least[from as usize].min(cost + least[to]);
             }
         }
+        least
     }
 
     /// The cheapest path from the start to the goal through edges that are not dead (A*: Hart, Nilsson, Raphael 1968).
