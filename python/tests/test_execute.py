@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import threading
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -175,6 +176,27 @@ def test_a_finger_that_does_not_move_is_found(scene: regrasp.Scene) -> None:
     log = execute(plant, turns(inner.pose, count=8, seed=4))
     assert kinds(log) & {"stalled_joint", "deviation", "slip", "lost_contact", "missed", "no_start"}
     assert inner.touching() >= 2, "the object fell"
+
+
+def test_trouble_that_passes_does_not_stop_the_leg(scene: regrasp.Scene) -> None:
+    inner = plant_of(scene)
+
+    def numb(seen: Observation) -> Observation:
+        assert seen.tip_forces is not None
+        return replace(seen, tip_forces=np.zeros_like(seen.tip_forces))
+
+    # Longer than a contact may be away (0.1 s), shorter than the hand waits (0.6 s).
+    plant = FaultyPlant(inner, observe=numb, begin=0.5, end=0.8)
+    log = execute(plant, turns(inner.pose, count=2, seed=4))
+    assert log.status == "done" and log.n_reached == 2, log.message
+    assert [(event.kind, event.answer) for event in log.events] == [("lost_contact", "resume")]
+    assert [goal.legs for goal in log.goals] == [1, 1]
+    # What lasts longer ends the leg.
+    inner = plant_of(scene)
+    plant = FaultyPlant(inner, observe=numb, begin=0.5, end=1.5)
+    log = execute(plant, turns(inner.pose, count=2, seed=4))
+    assert ("lost_contact", "replan") in [(event.kind, event.answer) for event in log.events]
+    assert held(inner)
 
 
 def test_a_link_in_the_way_makes_the_hand_go_back(scene: regrasp.Scene) -> None:

@@ -28,6 +28,8 @@ SAMPLED = 5
 SERIOUS = frozenset({"joints_missing", "stale_pose", "pose_jump"})
 #: Fewer fingers than these hold nothing.
 HOLDING = 2
+#: Trouble that may pass while the hand holds: a push moves the object, and the fingers bring it back.
+PASSING = frozenset({"deviation", "lost_contact", "slip"})
 #: Events that a firmer grip may prevent.
 LOSING = frozenset({"deviation", "slip", "lost_contact", "missed"})
 
@@ -38,6 +40,10 @@ class _GiveUp(Exception):
     def __init__(self, status: str, message: str) -> None:
         super().__init__(message)
         self.status = status
+
+
+class _GoOn(Exception):
+    """There is no start here, and the leg that was stopped may go on."""
 
 
 class Executor:
@@ -86,6 +92,7 @@ class Executor:
         self._senses = Senses(len(plant.joint_names), self._settings)
         self._leg: Leg | None = None
         self._k = 0
+        self._is_stopped = False
         self._servo: Array | None = None
         self._blend_from: Array | None = None
         self._blended = 1.0
@@ -139,7 +146,24 @@ class Executor:
             ticket, was_prepared = prepared, prepared is not None
             prepared = None
             if ticket is None:
-                ticket = self._query(goal)
+                try:
+                    ticket = self._query(goal)
+                except _GoOn as cause:
+                    why_not = str(cause)
+                    self._event("no_start", why_not, "resume")
+            if ticket is None:
+                begun = self._senses.time
+                trigger = self._run_leg(self._k)
+                motion_time += self._senses.time - begun
+                if trigger is not None:
+                    why_not = f"{trigger.kind}: {trigger.message}"
+                    self._event(trigger.kind, trigger.message, "replan" if attempt + 1 < settings.attempts else "hold")
+                    continue
+                is_reached, why_not = self._ends_at(goal, quat)
+                if is_reached:
+                    break
+                self._event("missed", why_not, "replan" if attempt + 1 < settings.attempts else "hold")
+                continue
             self._wait_for(ticket)
             if not isinstance(ticket.answer, Plan):
                 why_not = f"no plan: {ticket.answer.message if isinstance(ticket.answer, Failure) else 'cancelled'}"
@@ -167,16 +191,19 @@ class Executor:
                 ahead = None
                 self._event(trigger.kind, trigger.message, "replan" if attempt + 1 < settings.attempts else "hold")
                 continue
-            distance, angle = self._settle(goal, quat)
-            is_reached = distance <= settings.reached_distance and angle <= settings.reached_turn
+            is_reached, why_not = self._ends_at(goal, quat)
             if is_reached or not settings.replanning:
-                why_not = "" if is_reached else f"ended {1e3 * distance:.1f} mm and {np.degrees(angle):.1f} degrees off"
                 break
-            why_not = f"ended {1e3 * distance:.1f} mm and {np.degrees(angle):.1f} degrees off"
             ahead = None
             self._event("missed", why_not, "replan" if attempt + 1 < settings.attempts else "hold")
         self._result(goal, quat, is_reached, started, n_legs, motion_time, before, why_not)
         return ahead, quat
+
+    def _ends_at(self, goal: Pose, quat: Array) -> tuple[bool, str]:
+        """Waits for feedback to bring the object to its goal. Whether it is there, and how far it is off."""
+        distance, angle = self._settle(goal, quat)
+        is_reached = distance <= self._settings.reached_distance and angle <= self._settings.reached_turn
+        return is_reached, "" if is_reached else f"ended {1e3 * distance:.1f} mm and {np.degrees(angle):.1f} degrees off"
 
     def _result(
         self, goal: Pose, quat: Array, is_reached: bool, started: float, n_legs: int, motion: float, before: Array, why_not: str
@@ -260,11 +287,23 @@ class Executor:
             if not told:
                 self._event("no_start", message, "hold")
                 told = True
+            if self._may_go_on():
+                raise _GoOn(message)
             if self._go_back():
                 continue
             if senses.time - since > settings.patience:
                 lost = "no finger touches" in message if presses is None else sum(presses) < HOLDING
                 raise _GiveUp("lost" if lost else "gave_up", f"no start: {message}")
+
+    def _may_go_on(self) -> bool:
+        """True where a leg was stopped on its way, and the object is where that leg has it, felt by every finger that holds."""
+        leg, senses, settings = self._leg, self._senses, self._settings
+        if leg is None or not self._is_stopped:
+            return False
+        wanted = leg.ref.object_position[self._k], leg.ref.object_quat_wxyz[self._k]
+        distance, angle = pose_error(leg, senses.position, senses.quat, *wanted)
+        is_felt = senses.forces is None or bool((senses.forces >= settings.lost_force)[leg.ref.holds[self._k]].all())
+        return distance <= settings.deviation_distance and angle <= settings.deviation_turn and is_felt
 
     def _go_back(self) -> bool:
         """Goes back on the leg for ``back_off_time``, no farther than to where another finger landed or lifted. False where that is
@@ -389,11 +428,13 @@ class Executor:
             )
         )
 
-    def _run_leg(self) -> Trigger | None:
-        """Runs the leg to its end, or to the first thing that goes wrong."""
+    def _run_leg(self, first: int = 0) -> Trigger | None:
+        """Runs the leg from tick ``first`` to its end, or to the first thing that goes wrong and does not pass."""
         leg, settings = self._leg, self._settings
         assert leg is not None
-        monitor = Monitor(leg, settings, self._senses.joints)
+        monitor = Monitor(leg, settings, self._senses.joints, first)
+        resumed = 0
+        self._is_stopped = False
         while self._blended < 1.0:
             self._tick(moves=False, state="blend")
         while self._k < leg.n_ticks - 1:
@@ -403,9 +444,31 @@ class Executor:
             targets = leg.ref.joints[self._k]
             trigger = monitor.look(self._k, self._senses, targets)
             if trigger is not None and settings.replanning:
-                return trigger
+                if trigger.kind not in PASSING or resumed >= settings.most_resumes or not self._comes_back(monitor):
+                    self._is_stopped = True
+                    return trigger
+                resumed += 1
+                self._event(trigger.kind, trigger.message, "resume")
             self._k += 1
         return None
+
+    def _comes_back(self, monitor: Monitor) -> bool:
+        """Holds; true as soon as the leg may go on, false where ``resume_within`` is over."""
+        leg, settings, senses = self._leg, self._settings, self._senses
+        assert leg is not None
+        since, good_since = senses.time, np.inf
+        while senses.time - since < settings.resume_within:
+            faults = self._tick(moves=False, state="hold", monitor=monitor)
+            if faults:
+                self._outlast(faults)
+            trigger = monitor.look(self._k, senses, leg.ref.joints[self._k])
+            if trigger is not None and trigger.kind not in PASSING:
+                return False
+            is_good = trigger is None and monitor.is_near(self._k, senses, settings.resume_share)
+            good_since = min(good_since, senses.time) if is_good else np.inf
+            if senses.time - good_since >= settings.resume_after:
+                return True
+        return False
 
     def _outlast(self, faults: list[Fault]) -> None:
         """Holds until observations are good again. Raises where they do not become so, and where the object is gone."""

@@ -34,7 +34,8 @@ class Monitor:
     #: Ticks between two looks at fingertips.
     EVERY = 5
 
-    def __init__(self, leg: Leg, settings: ExecutorSettings, joints_at_start: Array) -> None:
+    def __init__(self, leg: Leg, settings: ExecutorSettings, joints_at_start: Array, start: int = 0) -> None:
+        """start: the tick of ``joints_at_start``."""
         self._leg = leg
         self._settings = settings
         n = len(leg.rig.fingers)
@@ -42,7 +43,7 @@ class Monitor:
         self._stalled_since = np.full(len(leg.rig.joint_names), np.nan)
         self._baseline = np.full((n, 3), np.nan)
         # A position drive never ends exactly where it was told: what was off at the start does not count.
-        self._usual_error = np.abs(joints_at_start - leg.ref.joints[0])
+        self._usual_error = np.abs(joints_at_start - leg.ref.joints[start])
         self.slip = 0.0
         self.distance = 0.0
         self.angle = 0.0
@@ -64,6 +65,15 @@ class Monitor:
         if self._count % Monitor.EVERY == 0:
             found = self._slipped(k, senses) or found
         return found
+
+    def is_near(self, k: int, senses: Senses, share: float) -> bool:
+        """True where the object was within this share of what counts as a deviation at the last look, no fingertip of what counts
+        as a slip, and every holding finger feels it."""
+        settings = self._settings
+        is_felt = senses.forces is None or bool((senses.forces >= settings.lost_force)[self._leg.ref.holds[k]].all())
+        distance, turn = share * settings.deviation_distance, share * settings.deviation_turn
+        is_back = self.slip <= share * settings.slip_distance or not settings.slip_trigger
+        return self.distance <= distance and self.angle <= turn and is_back and is_felt
 
     def _lost(self, k: int, senses: Senses) -> Trigger | None:
         if senses.forces is None:

@@ -54,6 +54,14 @@ class ExecutorSettings:
     """Farther from where it should be than this,"""
     deviation_turn: float = float(np.radians(7.0))
     """or by this angle, the object has left the plan."""
+    resume_within: float = 0.6
+    """Where the object is off, a fingertip slips or a contact is lost, the hand holds for so long. The leg goes on if all comes back."""
+    resume_after: float = 0.1
+    """It has come back when it has been for so long"""
+    resume_share: float = 0.5
+    """within this share of the distances and angles at which it counts as off, with every contact felt."""
+    most_resumes: int = 5
+    """A leg goes on again so often."""
     slip_distance: float = 0.003
     """A fingertip that has moved so far over the object since it landed, beyond what is planned, slips."""
     lost_after: float = 0.1

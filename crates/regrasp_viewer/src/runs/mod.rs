@@ -82,6 +82,8 @@ pub enum Doing {
 pub enum Answer {
     /// The hand held.
     Hold,
+    /// The hand held until the object had come back, and the leg went on.
+    Resume,
     /// A new plan was made.
     Replan,
     /// The observation was left out.
@@ -252,6 +254,7 @@ impl Answer {
     fn words(self) -> &'static str {
         match self {
             Answer::Hold => "hold",
+            Answer::Resume => "hold, then go on",
             Answer::Replan => "replan",
             Answer::Ignore => "ignore",
             Answer::GiveUp => "give up",
@@ -265,7 +268,7 @@ impl Answer {
             Answer::Replan => "#d55e00",
             Answer::Hold => "#e69f00",
             Answer::GiveUp => "#c1121f",
-            Answer::Ignore | Answer::None => "#888888",
+            Answer::Resume | Answer::Ignore | Answer::None => "#888888",
         }
     }
 }
