@@ -51,7 +51,8 @@ const MEASURED: usize = 3001;
 const SMALLEST_TERM: f64 = 1e-17;
 
 impl Smooth {
-    fn of(surface: &SmoothHull, hull: &Arc<ConvexHull>, pad: Option<&Pad>) -> Self {
+    /// The surface near `hull`, measured over `pad`.
+    pub fn of(surface: &SmoothHull, hull: &Arc<ConvexHull>, pad: Option<&Pad>) -> Self {
         let mut smooth = Smooth {
             points: surface.points().to_vec(),
             exponent: f64::from(surface.exponent()),

@@ -24,7 +24,7 @@ const ROUNDING: f64 = 1e-11;
 const MOST_CUTS: usize = 40;
 /// Steps of Newton's method to a point's distance, halvings of a step, the longest step and the gradient that is none.
 const MOST_STEPS: usize = 60;
-const MOST_HALVINGS: usize = 12;
+const MOST_HALVINGS: i32 = 16;
 const LONGEST_STEP: f64 = 0.3;
 const FLAT: f64 = 1e-13;
 /// Halvings of a range in the search on a triangle.
@@ -132,7 +132,7 @@ impl Place<'_> {
         let mut cuts = vec![self.best_cut(corners)];
         // The planes of the corners keep the first steps from going astray.
         for corner in corners {
-            let found = self.distance_of(corner, &cuts[0].m);
+            let found = self.distance_of(corner);
             cuts.push(self.cut(found.m, corners));
         }
         let mut best: Option<Found> = None;
@@ -141,9 +141,7 @@ impl Place<'_> {
             let (shares, least) = lowest(&cuts);
             low = least.max(low);
             let at: Vector = (0..3).map(|k| corners[k] * shares[k]).sum();
-            let steepest =
-                cuts.iter().max_by(|a, b| a.at(&shares).total_cmp(&b.at(&shares))).map_or(cuts[0].m, |cut| cut.m);
-            let found = self.distance_of(&at, &steepest);
+            let found = self.distance_of(&at);
             let m = found.m;
             if best.as_ref().is_none_or(|best| found.distance < best.distance) {
                 best = Some(found);
@@ -161,13 +159,16 @@ impl Place<'_> {
         Cut::new(m, self.smooth.point(&m).dot(&m), corners)
     }
 
-    /// Distance of a point from the hull, both in its link: by Newton's method on the direction, near `m`.
-    fn distance_of(&self, at: &Vector, m: &Vector) -> Found {
+    /// Distance of a point from the hull, both in its link: by Newton's method on the direction. Inside the hull there may be several
+    /// directions that nothing near them beats, so the search begins with the best of many.
+    fn distance_of(&self, at: &Vector) -> Found {
         let value = |m: &Vector| {
             let point = self.smooth.point(m);
             (at.dot(m) - point.dot(m), point)
         };
-        let mut m = *m;
+        let beyond = |(m, reach): &(Vector, f64)| at.dot(m) - reach;
+        let first = self.smooth.planes().iter().max_by(|a, b| beyond(a).total_cmp(&beyond(b)));
+        let mut m = first.expect("a hull has planes").0;
         let (mut distance, mut point) = value(&m);
         for _ in 0..MOST_STEPS {
             let away = at - point;
@@ -183,19 +184,17 @@ impl Place<'_> {
             let bend = Matrix2::from_columns(&across.map(|t| flat(&(radii * t + t * distance))));
             let newton =
                 bend.try_inverse().map(|inverse| inverse * flat(&slope)).filter(|step| step.dot(&flat(&slope)) > 0.0);
-            let step = newton.unwrap_or_else(|| flat(&slope).normalize() * LONGEST_STEP);
-            let step = across[0] * step.x + across[1] * step.y;
-            let mut share = (LONGEST_STEP / step.norm()).min(1.0);
-            let mut better = None;
-            for _ in 0..MOST_HALVINGS {
-                let next = (m + step * share).normalize();
-                let seen = value(&next);
-                if seen.0 > distance {
-                    better = Some((next, seen));
-                    break;
-                }
-                share *= 0.5;
-            }
+            // Deep inside, where the hull bends more than it is deep, Newton's method may lead astray: then straight up.
+            let straight = flat(&slope).normalize() * LONGEST_STEP;
+            let better = newton.into_iter().chain([straight]).find_map(|step| {
+                let step = across[0] * step.x + across[1] * step.y;
+                let longest = (LONGEST_STEP / step.norm()).min(1.0);
+                let shares = (0..MOST_HALVINGS).map(|halvings| longest * 0.5f64.powi(halvings));
+                shares
+                    .map(|share| (m + step * share).normalize())
+                    .map(|next| (next, value(&next)))
+                    .find(|(_, seen)| seen.0 > distance)
+            });
             let Some((next, seen)) = better else { break };
             m = next;
             (distance, point) = seen;
@@ -243,4 +242,182 @@ fn narrow(value: impl Fn(f64) -> f64) -> (f64, f64) {
     let ends = [0.0, 1.0].map(|at| (at, value(at)));
     let middle = if seen[0] <= seen[1] { (inner[0], seen[0]) } else { (inner[1], seen[1]) };
     ends.into_iter().fold(middle, |best, end| if end.1 < best.1 { end } else { best })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::check::surface::SortedShape;
+    use nalgebra::Rotation3;
+    use regrasp_base::Rng;
+    use regrasp_geometry::{ConvexHull, Shape, TriangleMesh};
+    use regrasp_robot::tip::smooth_hull::SmoothHull;
+    use std::sync::Arc;
+
+    /// A bar with flat faces, sharp rims and a rounded end.
+    fn bar() -> Smooth {
+        let mut points = Vec::new();
+        for k in 0..25 {
+            let (up, out) = (std::f64::consts::PI * f64::from(k) / 24.0).sin_cos();
+            points.extend([-0.010, 0.010].map(|x| Point::new(x, 0.012 * out, 0.012 * up)));
+        }
+        points.extend(
+            (0..4).map(|k| Point::new(f64::from(k % 2) * 0.02 - 0.01, f64::from(k / 2) * 0.024 - 0.012, -0.015)),
+        );
+        let hull = Arc::new(ConvexHull::new(&points).unwrap());
+        Smooth::of(&SmoothHull::near(&hull, None).unwrap().0, &hull, None)
+    }
+
+    /// Deeper than the hull's rims are round, a point is as near to two sides of a rim: what is found may be a little deeper than what is
+    /// there, which rejects.
+    const DEEP: f64 = -0.3e-3;
+    const CELL: f64 = 1.0e-3;
+    const N_CELLS: u32 = 40;
+
+    /// A sheet of small triangles that folds everywhere, as scans do, over a hill.
+    fn folded(rng: &mut Rng, folds: f64) -> TriangleMesh {
+        let half = 0.5 * f64::from(N_CELLS) * CELL;
+        let mut vertices = Vec::new();
+        for i in 0..=N_CELLS {
+            for j in 0..=N_CELLS {
+                let at = [i, j].map(|k| f64::from(k) * CELL - half + rng.uniform(-0.3, 0.3) * CELL);
+                let hill = (0.04f64.powi(2) - at[0] * at[0] - at[1] * at[1]).sqrt() - 0.04;
+                vertices.push(Point::new(at[0], at[1], hill + rng.uniform(-folds, folds)));
+            }
+        }
+        let corner = |i: u32, j: u32| i * (N_CELLS + 1) + j;
+        let cells = (0..N_CELLS).flat_map(|i| (0..N_CELLS).map(move |j| (i, j)));
+        let triangles = cells.flat_map(|(i, j)| {
+            let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+            [[a, b, c], [a, c, d]]
+        });
+        TriangleMesh::new(vertices, triangles.collect()).unwrap()
+    }
+
+    /// Distance of a point from the hull: the farthest that it is beyond any of many planes.
+    fn brute_distance(planes: &[(Vector, f64)], at: &Vector) -> f64 {
+        planes.iter().map(|(m, reach)| at.dot(m) - reach).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    fn many_planes(smooth: &Smooth) -> Vec<(Vector, f64)> {
+        let n = 40_000;
+        let direction = |k: usize| {
+            let z = (2 * k + 1) as f64 / n as f64 - 1.0;
+            let (sine, cosine) = (2.399963229728653 * k as f64).sin_cos();
+            Vector::new((1.0 - z * z).sqrt() * cosine, (1.0 - z * z).sqrt() * sine, z)
+        };
+        (0..n).map(direction).map(|m| (m, smooth.point(&m).dot(&m))).collect()
+    }
+
+    /// The nearest of all triangles is as near as the nearest of many points on them, whichever guess the search begins with; and what
+    /// touches is a touch: the tip's point is the gap off the foot, along the normal.
+    #[test]
+    fn touches_on_folds_are_where_the_surface_is_nearest() {
+        let tip = bar();
+        let planes = many_planes(&tip);
+        let mut rng = Rng::keyed(1, "folds", 0);
+        let (mut n_lost, mut n_wrong) = (0, 0);
+        for k in 0..60 {
+            let mesh = folded(&mut rng, [0.02e-3, 0.1e-3, 0.3e-3][k % 3]);
+            let triangles: Vec<[Point; 3]> = (0..mesh.triangles().len()).map(|i| mesh.corners(i)).collect();
+            let sorted = SortedShape::of(&Shape::Mesh(Arc::new(mesh)));
+            let turn = *Rotation3::new(Vector::from(rng.direction()) * rng.uniform(0.0, 3.0)).matrix();
+            let facing = -turn.tr_mul(&Vector::z());
+            let aside = Vector::new(rng.uniform(-3e-3, 3e-3), rng.uniform(-3e-3, 3e-3), rng.uniform(-0.6e-3, 0.2e-3));
+            let center = Point::from(aside - turn * tip.point(&facing));
+            let in_link = |point: &Point| turn.tr_mul(&(point - center));
+            let patch = Patch::near(&sorted, &center, 0.03).only(|facet| may_be_near(&tip, in_link, facet, 2e-3));
+            let place = Place { patch: &patch, smooth: &tip, center, turn };
+
+            let sampled = nearest_of_samples(&triangles, &planes, in_link);
+            let nearest = place.nearest().unwrap();
+            let deeper = if sampled < DEEP { 5e-5 } else { 8e-6 };
+            assert!(nearest.gap < sampled + 8e-6 && nearest.gap > sampled - deeper, "{} {sampled}", nearest.gap);
+            for _ in 0..4 {
+                let guess = (Vector::z() + Vector::from(rng.direction()) * 0.4).normalize();
+                let touch = place.touch(&[guess], 1e-5).unwrap();
+                assert!(touch.gap < nearest.gap + 1e-5 + 1e-9, "{} {}", touch.gap, nearest.gap);
+                let facing = center + turn * tip.point(&-turn.tr_mul(&touch.normal));
+                let off = facing - touch.foot - touch.normal * touch.gap;
+                assert!(off.norm() < 1e-5 || touch.gap < DEEP, "{off} {}", touch.gap);
+                match place.settle(&guess) {
+                    None => n_lost += 1,
+                    Some(found) if found.gap > nearest.gap + 1e-4 => n_wrong += 1,
+                    Some(_) => {}
+                }
+            }
+        }
+        // Guesses alone do not tell: this is what the proof is for.
+        assert!(n_lost >= 10 && n_wrong >= 10, "{n_lost} {n_wrong}");
+    }
+
+    /// Least distance of points on triangles: of a coarse grid first, then of a fine one where that is near.
+    fn nearest_of_samples(
+        triangles: &[[Point; 3]],
+        planes: &[(Vector, f64)],
+        in_link: impl Fn(&Point) -> Vector,
+    ) -> f64 {
+        let coarse: Vec<(Vector, f64)> = planes.iter().step_by(40).copied().collect();
+        let mut near: Vec<(f64, &[Point; 3])> = triangles
+            .iter()
+            .map(|corners| {
+                let middle = in_link(&Point::from((corners[0].coords + corners[1].coords + corners[2].coords) / 3.0));
+                (brute_distance(&coarse, &middle), corners)
+            })
+            .collect();
+        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut least = f64::INFINITY;
+        for (bound, corners) in near {
+            // No point is farther than 1.5 mm from the middle.
+            if bound - 1.5e-3 > least {
+                break;
+            }
+            let n = 24;
+            for i in 0..=n {
+                for j in 0..=n - i {
+                    let [u, v] = [i, j].map(|k| f64::from(k) / f64::from(n));
+                    let at = in_link(&(corners[0] + (corners[1] - corners[0]) * u + (corners[2] - corners[0]) * v));
+                    if brute_distance(&coarse, &at) < least {
+                        least = least.min(brute_distance(planes, &at));
+                    }
+                }
+            }
+        }
+        least
+    }
+
+    #[test]
+    fn radii_are_how_points_move() {
+        let tip = bar();
+        let mut rng = Rng::keyed(2, "folds", 0);
+        for _ in 0..200 {
+            let n = Vector::from(rng.direction());
+            let along = n.cross(&Vector::from(rng.direction())).normalize();
+            let step = 1e-6;
+            let at = |by: f64| tip.point(&(n + along * by).normalize());
+            let moved = (at(step) - at(-step)) / (2.0 * step);
+            let told = tip.radii(&n) * along;
+            assert!((moved - told).norm() < 1e-4 * told.norm() + 1e-7, "{moved} {told}");
+        }
+    }
+
+    #[test]
+    fn planes_of_a_triangle_are_lowest_where_points_say() {
+        let mut rng = Rng::keyed(3, "folds", 0);
+        for _ in 0..40 {
+            let n_cuts = 1 + (rng.uniform(0.0, 8.0) as usize);
+            let cut = |rng: &mut Rng| Cut { m: Vector::z(), corners: std::array::from_fn(|_| rng.uniform(-1.0, 1.0)) };
+            let cuts: Vec<Cut> = (0..n_cuts).map(|_| cut(&mut rng)).collect();
+            let (shares, least) = lowest(&cuts);
+            assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12 && shares.iter().all(|share| *share > -1e-12));
+            let n = 60;
+            for i in 0..=n {
+                for j in 0..=n - i {
+                    let [u, v] = [i, j].map(|k| f64::from(k) / f64::from(n));
+                    let largest = cuts.iter().map(|cut| cut.at(&[1.0 - u - v, u, v])).fold(f64::NEG_INFINITY, f64::max);
+                    assert!(largest >= least - 1e-7, "{largest} {least}");
+                }
+            }
+        }
+    }
 }

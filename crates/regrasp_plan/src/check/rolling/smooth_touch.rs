@@ -71,7 +71,7 @@ impl Place<'_> {
     }
 
     /// A touch with a normal near `first`; none where none is found.
-    fn settle(&self, first: &Vector) -> Option<Touch> {
+    pub(super) fn settle(&self, first: &Vector) -> Option<Touch> {
         let (mut off, mut touch) = self.look(first)?;
         let mut kept: Option<Slopes> = None;
         for _ in 0..MOST_STEPS {
