@@ -33,9 +33,10 @@ const MOST_PIECES: usize = 128;
 /// Share of the slip allowed that may stay unknown in a step. What is unknown counts as slip: of the slip allowed to a
 /// segment of fifty steps it takes at most a tenth.
 pub(super) const UNKNOWN_SHARE: f64 = 0.002;
-/// Share of the contact tolerance by which some other place of the surface may be nearer than the one that counts as touching: hulls
-/// touch in several places where surfaces fold.
-const UNKNOWN_DEPTH: f64 = 0.05;
+/// Share of the contact tolerance by which some other place of the surface may be nearer than the one that counts as touching. Where
+/// surfaces fold, hulls touch in several places: which of them does is not known better than the hull itself, whose smooth surface
+/// may be 0.2 mm off it. A touch that jumped between them would count as slip of a tip that rests.
+const UNKNOWN_DEPTH: f64 = 0.2;
 /// Pieces of a step in which turns are measured: the error falls with their square.
 const TURN_PIECES: usize = 8;
 /// Motion that is too small to be divided further when it cannot be told whether the tip is on the surface, as a share
