@@ -40,13 +40,12 @@ pub fn may_be_near(smooth: &Smooth, in_link: impl Fn(&Point) -> Vector, facet: &
 /// A plane that touches the hull: where it is for the three corners of a triangle.
 #[derive(Debug, Clone, Copy)]
 struct Cut {
-    m: Vector,
     corners: [f64; 3],
 }
 
 impl Cut {
     fn new(m: Vector, reach: f64, corners: &[Vector; 3]) -> Self {
-        Cut { m, corners: corners.each_ref().map(|corner| corner.dot(&m) - reach) }
+        Cut { corners: corners.each_ref().map(|corner| corner.dot(&m) - reach) }
     }
 
     /// No point of the triangle is nearer.
@@ -406,7 +405,7 @@ mod tests {
         let mut rng = Rng::keyed(3, "folds", 0);
         for _ in 0..40 {
             let n_cuts = 1 + (rng.uniform(0.0, 8.0) as usize);
-            let cut = |rng: &mut Rng| Cut { m: Vector::z(), corners: std::array::from_fn(|_| rng.uniform(-1.0, 1.0)) };
+            let cut = |rng: &mut Rng| Cut { corners: std::array::from_fn(|_| rng.uniform(-1.0, 1.0)) };
             let cuts: Vec<Cut> = (0..n_cuts).map(|_| cut(&mut rng)).collect();
             let (shares, least) = lowest(&cuts);
             assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12 && shares.iter().all(|share| *share > -1e-12));
