@@ -49,7 +49,8 @@ impl Breeder<'_> {
         let shape = &self.model.shape;
         let of = |segment: &Segment| -> f64 {
             let pairs = segment.waypoints.windows(2).filter(|pair| pair[0].contacts[f].mode == ContactMode::Rolling);
-            let roll = |pair: &[Waypoint]| Roll::new(&self.model.fingers[f], &pair[0], &pair[1], shape, 1e-3).turning();
+            let roll =
+                |pair: &[Waypoint]| Roll::new((f, &self.model.fingers[f]), &pair[0], &pair[1], shape, 1e-3).turning();
             pairs.filter_map(roll).map(|turning| turning.twist).sum()
         };
         let transfers = self.plan.segments.iter().filter(|segment| segment.kind == SegmentKind::Transfer);

@@ -1,6 +1,7 @@
 //! `regrasp place`: where to hold an object, as a scene that `regrasp plan` takes.
 
 use super::pictures::write_storyboard;
+use super::written::available_threads;
 use crate::args::{self, Common};
 use crate::interrupt;
 use crate::load;
@@ -66,7 +67,7 @@ pub fn run(arguments: &args::Place, common: &Common, talk: &Talk) -> Result<(), 
 
     let queries: Vec<InHandQuery> =
         loaded.tasks.iter().filter_map(|task| task.query(arguments.seed).as_in_hand().cloned()).collect();
-    let settings = InHandSettings { n_threads: 1, ..InHandSettings::default() };
+    let settings = InHandSettings { n_threads: available_threads(), ..InHandSettings::default() };
     let budget = Budget { deadline, cancelled: Arc::clone(&cancelled), ..Budget::work(arguments.max_work) };
     let started = Instant::now();
     let wanted = if pictures.is_empty() { n_scenes } else { n_scenes.max(DRAWN) };

@@ -5,6 +5,7 @@ use crate::check::between::Between;
 use crate::check::edges::Edges;
 use crate::check::model::{CheckedHand, FingerModel};
 use crate::check::roles::{contact_of, moving_finger};
+use crate::check::rolling::off_contact;
 use crate::check::surface;
 use crate::check::tip_rates::{bounds_in_object, speed_in_object};
 use crate::check::tip_surface::TipSurface;
@@ -35,9 +36,7 @@ pub fn check_tips(model: &CheckedHand, plan: &Plan, log: &mut Log) -> f64 {
             let mut report = |error: f64, at: Moment| {
                 largest = largest.max(error);
                 if error > tolerance {
-                    let message = format!("the tip of finger \"{}\" is {error:.3e} m off its contact", finger.name);
-                    let violation = Violation::new(Kind::ContactOffTip, message).when(at);
-                    log.push(violation.subjects([finger.name.as_str()]).amount(error, tolerance));
+                    log.push(off_contact(finger, error, tolerance).when(at));
                     return true;
                 }
                 false

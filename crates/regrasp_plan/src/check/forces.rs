@@ -400,7 +400,7 @@ impl Judge<'_> {
                 (first.point_in_object, first.normal_in_object.into_inner())
             } else {
                 let tolerance = self.plan.promises.contact_tolerance;
-                let roll = Roll::new(&self.model.fingers[f], from, to, &self.model.shape, tolerance);
+                let roll = Roll::new((f, &self.model.fingers[f]), from, to, &self.model.shape, tolerance);
                 let Some(contact) = roll.contact(half_way) else { continue };
                 contact
             };

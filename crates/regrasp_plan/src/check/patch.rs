@@ -21,8 +21,10 @@ pub enum Patch<'a> {
 /// A triangle, and how far from its first corner it reaches.
 #[derive(Debug, Clone, Copy)]
 pub struct Facet {
-    corners: [Point; 3],
-    reach: f64,
+    /// Its corners.
+    pub corners: [Point; 3],
+    /// No point of it is farther from the first corner, in metres.
+    pub reach: f64,
 }
 
 impl<'a> Patch<'a> {
@@ -38,6 +40,19 @@ impl<'a> Patch<'a> {
             Facet { reach: (b - a).norm_squared().max((c - a).norm_squared()).sqrt(), corners }
         });
         Patch::Triangles(facets.filter(|facet| (facet.corners[0] - center).norm() <= reach + facet.reach).collect())
+    }
+
+    /// The patch without the triangles that `keep` does not keep.
+    pub fn only(self, mut keep: impl FnMut(&Facet) -> bool) -> Self {
+        match self {
+            Patch::Primitive(_) => self,
+            Patch::Triangles(facets) => Patch::Triangles(facets.into_iter().filter(|facet| keep(facet)).collect()),
+        }
+    }
+
+    /// True when nothing of the surface is in the patch.
+    pub fn is_empty(&self) -> bool {
+        matches!(self, Patch::Triangles(facets) if facets.is_empty())
     }
 
     /// The point of the patch that is nearest to `point`; none when the patch is empty.

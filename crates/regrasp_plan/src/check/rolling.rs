@@ -6,6 +6,8 @@
 //! (Sahbani 2007, sec. IV-C; Cherif 1999, sec. 6.2.2). Here slip is judged by segment, against what the plan promises; `slip` judges
 //! it from landing to lifting, with the turn of soft fingertips about `n`.
 
+/// How near smooth hulls are to triangles.
+mod smooth_reach;
 /// Where smooth hulls touch.
 mod smooth_touch;
 
@@ -31,6 +33,10 @@ const MOST_PIECES: usize = 128;
 /// Share of the slip allowed that may stay unknown in a step. What is unknown counts as slip: of the slip allowed to a
 /// segment of fifty steps it takes at most a tenth.
 pub(super) const UNKNOWN_SHARE: f64 = 0.002;
+/// Share of the contact tolerance by which some other place of the surface may be nearer than the one that counts as touching. Where
+/// surfaces fold, hulls touch in several places: which of them does is not known better than the hull itself, whose smooth surface
+/// may be 0.2 mm off it. A touch that jumped between them would count as slip of a tip that rests.
+const UNKNOWN_DEPTH: f64 = 0.2;
 /// Pieces of a step in which turns are measured: the error falls with their square.
 const TURN_PIECES: usize = 8;
 /// Motion that is too small to be divided further when it cannot be told whether the tip is on the surface, as a share
@@ -76,7 +82,7 @@ pub fn check_rolling(
                 let next = segment.waypoints.get(w + 1).filter(|next| rolls(next));
                 let (mut error, mut fraction) = (error_at(finger, waypoint, f), 0.0);
                 if let Some(next) = next {
-                    let roll = Roll::new(finger, waypoint, next, shape, tolerance);
+                    let roll = Roll::new((f, finger), waypoint, next, shape, tolerance);
                     let (between, at) = roll.off_surface(tolerance);
                     if between > error {
                         (error, fraction) = (between, at);
@@ -115,7 +121,14 @@ pub fn check_rolling(
 }
 
 pub(super) fn off_contact(finger: &FingerModel, error: f64, tolerance: f64) -> Violation {
-    let message = format!("the tip of finger \"{}\" is {error:.3e} m off its contact", finger.name);
+    let name = &finger.name;
+    let message = if error.is_finite() {
+        format!("the tip of finger \"{name}\" is {error:.3e} m off its contact")
+    } else {
+        format!(
+            "the tip of finger \"{name}\" has no contact that is defined: no nearest point of the surface was found"
+        )
+    };
     Violation::new(Kind::ContactOffTip, message).subjects([finger.name.as_str()]).amount(error, tolerance)
 }
 
@@ -132,6 +145,12 @@ pub struct Roll<'a> {
     looked: Cell<u64>,
     /// Normal where a smooth hull last touched: the next is near.
     last_normal: Cell<Option<Vector>>,
+    /// Normals that the plan says a smooth hull touches with, where the search for others begins.
+    planned: [Option<Vector>; 2],
+    /// Where the surface is nearer by less than this in some other place, the hull touches in both, in metres.
+    slack: f64,
+    /// The tip is at least so far from what of the surface is not in the patch, in metres.
+    least_gap_off_patch: f64,
 }
 
 /// A tip over the surface, in the object frame.
@@ -149,10 +168,10 @@ pub(super) struct Touch {
 const MOST_TOUCH_STEPS: usize = 100;
 
 impl<'a> Roll<'a> {
-    /// The step of `finger` over an object of this shape. The surface is looked at as far from the tip as it can come in
-    /// this step, and `tolerance` farther.
+    /// The step of `finger`, whose index is `f`, over an object of this shape. The surface is looked at as far from the tip as it
+    /// can come in this step, and `tolerance` farther.
     pub fn new(
-        finger: &'a FingerModel,
+        (f, finger): (usize, &'a FingerModel),
         from: &'a Waypoint,
         to: &'a Waypoint,
         shape: &'a SortedShape,
@@ -166,9 +185,28 @@ impl<'a> Roll<'a> {
             TipSurface::Smooth(_) => SEEN_FROM,
             _ => finger.surface.curvature_radii().map_or(0.0, |[_, flattest]| 2.0 * flattest),
         };
-        let patch = Patch::near(shape, &start, finger.radius + inside + 2.0 * tolerance + speed);
+        let mut patch = Patch::near(shape, &start, finger.radius + inside + 2.0 * tolerance + speed);
         let speed = speed_in_object(finger, &motion, from, to);
-        Roll { finger, motion, patch, speed, acceleration, looked: Cell::new(0), last_normal: Cell::new(None) }
+        if let TipSurface::Smooth(smooth) = &finger.surface {
+            let object = Pose::from(&from.world_from_object).inverse().to_homogeneous();
+            let link =
+                (object * finger.path.world_from_link(&from.joints)).try_inverse().unwrap_or_else(Matrix4::zeros);
+            let in_link = |point: &Point| link.transform_point(point) - finger.center;
+            let far = inside + 2.0 * tolerance + speed;
+            patch = patch.only(|facet| smooth_reach::may_be_near(smooth, in_link, facet, far));
+        }
+        Roll {
+            finger,
+            motion,
+            patch,
+            speed,
+            acceleration,
+            looked: Cell::new(0),
+            last_normal: Cell::new(None),
+            planned: [from, to].map(|waypoint| waypoint.contacts[f].normal_in_object.map(Vector::from)),
+            slack: UNKNOWN_DEPTH * tolerance,
+            least_gap_off_patch: 2.0 * tolerance,
+        }
     }
 
     /// Configurations looked at so far.
@@ -197,9 +235,11 @@ impl<'a> Roll<'a> {
         let mut touch = Touch { foot, normal: (center - foot).try_normalize(1e-9)?, gap: f64::INFINITY };
         if let TipSurface::Smooth(smooth) = &self.finger.surface {
             let turn: Matrix3<f64> = object_from_link.fixed_view::<3, 3>(0, 0).into();
-            let first = self.last_normal.get().unwrap_or(touch.normal);
+            let [from, to] = self.planned;
+            let guesses: Vec<Vector> =
+                self.last_normal.get().into_iter().chain(from).chain(to).chain([touch.normal]).collect();
             let place = smooth_touch::Place { patch: &self.patch, smooth, center, turn };
-            let found = place.touch(&first).or_else(|| place.touch(&touch.normal))?;
+            let found = place.touch(&guesses, self.slack)?;
             self.last_normal.set(Some(found.normal));
             return found.gap.is_finite().then_some(found);
         }
@@ -223,6 +263,11 @@ impl<'a> Roll<'a> {
         None
     }
 
+    /// The gap where no touch is found: the least there can be where no surface is near, else infinite.
+    fn gap_without_touch(&self) -> f64 {
+        if self.patch.is_empty() { self.least_gap_off_patch } else { f64::INFINITY }
+    }
+
     /// The largest distance of the tip from the surface, either side, and when. When it is below `tolerance`, it is so at every
     /// moment: a ball's distance changes no faster than its centre moves, and that strays from the chord of an interval `h` by
     /// at most acceleration `h^2 / 8`; an ellipsoid's no faster than any of its points moves. Where this cannot be shown, the
@@ -232,7 +277,7 @@ impl<'a> Roll<'a> {
         let mut known = |t: f64| {
             let link = self.object_from_link(t);
             let center = link.transform_point(&self.finger.center);
-            let gap = self.touch(&link).map_or(f64::INFINITY, |touch| touch.gap);
+            let gap = self.touch(&link).map_or(self.gap_without_touch(), |touch| touch.gap);
             if gap.abs() > worst.0 {
                 worst = (gap.abs(), t);
             }

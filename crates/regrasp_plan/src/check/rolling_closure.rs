@@ -95,7 +95,7 @@ impl<'a> Holder<'a> {
         let at_start = contact_of(&from.contacts[finger]).filter(|_| to.contacts[finger].holds())?;
         let rolls = from.contacts[finger].mode == ContactMode::Rolling && model.fingers[finger].radius > 0.0;
         let tolerance = settings.largest_contact_tolerance;
-        let roll = rolls.then(|| Roll::new(&model.fingers[finger], from, to, &model.shape, tolerance));
+        let roll = rolls.then(|| Roll::new((finger, &model.fingers[finger]), from, to, &model.shape, tolerance));
         Some(Holder { finger, at_start, roll })
     }
 

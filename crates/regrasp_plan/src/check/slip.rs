@@ -150,7 +150,7 @@ fn fixed_slip(
     if shift == 0.0 && turn == 0.0 && !finger.path.moves(&Between::new(from, to).joint_bounds()) {
         return None;
     }
-    let roll = Roll::new(finger, from, to, shape, settings.largest_contact_tolerance);
+    let roll = Roll::new((f, finger), from, to, shape, settings.largest_contact_tolerance);
     let step = if finger.radius == 0.0 {
         // A sharp tip stays on its contact within the contact tolerance, which `contact` judges.
         let normal = contact_of(&from.contacts[f])?.normal_in_object.into_inner();

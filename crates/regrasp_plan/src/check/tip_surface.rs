@@ -40,6 +40,8 @@ pub struct Smooth {
     misfit: f64,
     /// Least distance from the centre to a plane that touches.
     inner_radius: f64,
+    /// Planes that touch, in many directions: normal, and distance from the centre. All of the surface is behind each.
+    planes: Vec<(Vector, f64)>,
 }
 
 /// Directions in which a smooth surface is measured against its hull.
@@ -49,7 +51,8 @@ const MEASURED: usize = 3001;
 const SMALLEST_TERM: f64 = 1e-17;
 
 impl Smooth {
-    fn of(surface: &SmoothHull, hull: &Arc<ConvexHull>, pad: Option<&Pad>) -> Self {
+    /// The surface near `hull`, measured over `pad`.
+    pub fn of(surface: &SmoothHull, hull: &Arc<ConvexHull>, pad: Option<&Pad>) -> Self {
         let mut smooth = Smooth {
             points: surface.points().to_vec(),
             exponent: f64::from(surface.exponent()),
@@ -58,6 +61,7 @@ impl Smooth {
             hull: hull.clone(),
             misfit: 0.0,
             inner_radius: f64::INFINITY,
+            planes: Vec::with_capacity(MEASURED),
         };
         let mut hint = 0;
         for k in 0..MEASURED {
@@ -65,7 +69,9 @@ impl Smooth {
             let z = (2 * k + 1) as f64 / MEASURED as f64 - 1.0;
             let (sine, cosine) = (2.399963229728653 * k as f64).sin_cos();
             let n = Vector::new((1.0 - z * z).sqrt() * cosine, (1.0 - z * z).sqrt() * sine, z);
-            smooth.inner_radius = smooth.inner_radius.min(smooth.point(&n).dot(&n));
+            let reach = smooth.point(&n).dot(&n);
+            smooth.planes.push((n, reach));
+            smooth.inner_radius = smooth.inner_radius.min(reach);
             if pad.is_none_or(|pad| pad.axis_in_body.dot(&n) >= pad.cosine) {
                 smooth.misfit = smooth.misfit.max(smooth.apart(&n, &mut hint));
             }
@@ -87,6 +93,34 @@ impl Smooth {
             }
         }
         weighted * sum.powf(1.0 / self.exponent - 1.0) + n * self.rounding
+    }
+
+    /// How the point with the outward normal `n` moves when the normal turns: radii of curvature across `n`, as a matrix.
+    pub fn radii(&self, n: &Vector) -> Matrix3<f64> {
+        let farthest = self.points.iter().map(|point| point.dot(n)).fold(0.0, f64::max);
+        let least = farthest * self.least_share;
+        // Shares of the points, and the points moved along their rays to the plane that touches.
+        let (mut sum, mut mean, mut squares) = (0.0, Vector::zeros(), Matrix3::zeros());
+        for point in &self.points {
+            let along = point.dot(n);
+            if along > least {
+                let term = (self.exponent * (along / farthest).ln()).exp();
+                let across = point / along - n;
+                sum += term;
+                mean += across * term;
+                squares += across * across.transpose() * term;
+            }
+        }
+        let smoothed = farthest * sum.powf(1.0 / self.exponent);
+        mean /= sum;
+        let covariance = squares / sum - mean * mean.transpose();
+        let across = Matrix3::identity() - n * n.transpose();
+        covariance * ((self.exponent - 1.0) * smoothed) + across * self.rounding
+    }
+
+    /// Planes that touch in many directions, as outward normal and distance from the centre.
+    pub fn planes(&self) -> &[(Vector, f64)] {
+        &self.planes
     }
 
     /// How far surface and hull are apart towards `n`.

@@ -252,7 +252,7 @@ impl Track<'_> {
                 note(error_at(self.finger, waypoint, self.f), 0.0);
             }
             if let Some(next) = self.segment.waypoints.get(w + 1) {
-                let roll = Roll::new(self.finger, waypoint, next, shape, self.tolerance);
+                let roll = Roll::new((self.f, self.finger), waypoint, next, shape, self.tolerance);
                 let (between, fraction) = roll.off_surface(self.tolerance);
                 if !self.log.work.spend(roll.looked(), "fingertips in tracking") {
                     break;
@@ -290,7 +290,7 @@ impl Track<'_> {
         for w in 0..n_steps {
             let (from, to) = (&self.segment.waypoints[w], &self.segment.waypoints[w + 1]);
             let mode = self.state(w).mode;
-            let roll = Roll::new(self.finger, from, to, shape, self.tolerance);
+            let roll = Roll::new((self.f, self.finger), from, to, shape, self.tolerance);
             let unknown = UNKNOWN_SHARE * self.slip_tolerance;
             let allowed = |slide: &Vector| match mode.slides() {
                 true => (UNKNOWN_SLIDE.0 * slide.norm()).max(UNKNOWN_SLIDE.1),

@@ -157,7 +157,7 @@ fn slides_and_turns_are_those_of_the_closed_forms() {
     let sums = |s: usize, f: usize| {
         let mut sums = [0.0; 3];
         for pair in plan.segments[s].waypoints.windows(2) {
-            let roll = Roll::new(&model.fingers[f], &pair[0], &pair[1], &model.shape, 1e-4);
+            let roll = Roll::new((f, &model.fingers[f]), &pair[0], &pair[1], &model.shape, 1e-4);
             let turning = roll.turning().unwrap();
             sums[0] += roll.sliding(|_| 1e-10).unwrap().0.norm();
             sums[1] += turning.twist;

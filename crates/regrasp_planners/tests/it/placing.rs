@@ -46,6 +46,15 @@ fn a_place_depends_on_the_seed_alone_and_plans_start_there() {
     assert_eq!(poses(&found), poses(&again));
     assert_ne!(poses(&found), poses(&places(&loaded, 4, &Budget::unlimited())));
     assert!(found.places[0].is_solved(), "{:?}", found.tried);
+    // Several threads search together what one does after the other, also where work runs out on the way.
+    for max_work in [u64::MAX, found.tried.work - 20_000, found.tried.work / 2] {
+        let [one, three] = [1, 3].map(|n_threads| {
+            let settings = InHandSettings { n_threads, ..InHandSettings::default() };
+            let queries = [loaded.in_hand(3)];
+            place(&loaded.view(), &queries, &settings, (3, 3), &Budget::work(max_work), &|_| {}).unwrap()
+        });
+        assert_eq!((poses(&one), &one.tried), (poses(&three), &three.tried));
+    }
     // From the place that was found, plans with other seeds are found with little work, and accepted.
     let start = found.places[0].world_from_object;
     for seed in 10..13 {

@@ -3,6 +3,9 @@
 //! The normal is sought at which the tip's touching point and the nearest point of the surface face each other. The surface is
 //! seen from a little inside the tip, so that a tip that presses in has a nearest point too. Differences of what is sought give
 //! the steps: no curvature of either body is asked for.
+//!
+//! On surfaces that fold there are many such normals, and that search finds none at some sharp rims. So what it finds counts only
+//! where it is proven that nothing of the surface is nearer (`smooth_reach`); otherwise the nearest point of all triangles is sought.
 
 use crate::check::patch::Patch;
 use crate::check::rolling::Touch;
@@ -20,6 +23,9 @@ const AGREED: f64 = 1e-12;
 const NEARLY_AGREED: f64 = 1e-9;
 /// Slopes are kept for the next step when a step leaves less than this share of the difference.
 const KEEP_BELOW: f64 = 0.2;
+/// Gaps and feet, in metres, between which the nearest point found in two ways may differ.
+const SAME_GAP: f64 = 1e-6;
+const SAME_FOOT: f64 = 5e-5;
 /// Steps, halvings of a step, and the longest step, in radians.
 const MOST_STEPS: usize = 60;
 const MOST_HALVINGS: usize = 12;
@@ -48,8 +54,24 @@ impl Place<'_> {
         Some((seen - normal, Touch { foot, normal: *normal, gap: (facing - foot).dot(normal) }))
     }
 
-    /// The touch with a normal near `first`; none where none is found.
-    pub(super) fn touch(&self, first: &Vector) -> Option<Touch> {
+    /// The touch: that with a normal near one of the guesses, where nothing is nearer by more than `slack`, else where the surface is
+    /// nearest. None where no surface is near, and on primitives where no guess leads to one.
+    pub(super) fn touch(&self, guesses: &[Vector], slack: f64) -> Option<Touch> {
+        let settled = guesses.iter().filter_map(|guess| self.settle(guess));
+        let is_nearest = |touch: &Touch| self.is_nothing_nearer(touch, touch.gap - slack);
+        if let Some(touch) = settled.into_iter().find(is_nearest) {
+            return Some(touch);
+        }
+        let nearest = self.nearest()?;
+        // The same point, to rounding.
+        let same = |touch: &Touch| {
+            (touch.gap - nearest.gap).abs() < SAME_GAP && (touch.foot - nearest.foot).norm() < SAME_FOOT
+        };
+        Some(self.settle(&nearest.normal).filter(same).unwrap_or(nearest))
+    }
+
+    /// A touch with a normal near `first`; none where none is found.
+    pub(super) fn settle(&self, first: &Vector) -> Option<Touch> {
         let (mut off, mut touch) = self.look(first)?;
         let mut kept: Option<Slopes> = None;
         for _ in 0..MOST_STEPS {

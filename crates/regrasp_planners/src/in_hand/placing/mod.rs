@@ -195,7 +195,8 @@ fn reach_of(model: &Model, reach: &TipReach) -> TipReach {
 /// How near a contact is to one of those spread over an object, in metres, about.
 const NEARBY: f64 = 0.008;
 
-/// Makes short searches from places, best first, until some turn out well, and again from the best of these.
+/// Makes short searches from places, best first, until some turn out well, and again from the best of these. The answer does not depend
+/// on the number of threads.
 fn search_from(
     places: &mut [Place],
     view: &HandView,
@@ -203,38 +204,59 @@ fn search_from(
     (settings, seed, budget): (&InHandSettings, u64, &Budget),
     tried: &mut Tried,
 ) -> Result<(), Failure> {
-    let search = |place: &mut Place, round: usize, tried: &mut Tried| -> Result<bool, Failure> {
-        if budget.check(tried.work).is_err() {
-            return Ok(false);
-        }
-        let start = place.world_from_object;
+    // Several places at the same time. What one thread would not have come to, because the work is spent, does not count.
+    let mut search = |places: &mut [&mut Place], round: usize| -> Result<usize, Failure> {
         // Another seed than that of the plan: what is asked is how often a plan is found.
         let seed = seed.wrapping_add(1 + round as u64);
-        let probes = probe(view, queries, &start, (settings, seed, budget), PROBE_WORK[round])?;
-        tried.work += probes.iter().map(|probe| probe.work).sum::<u64>();
-        match place.probes.is_empty() {
-            true => place.probes = probes,
-            false => place.probes.iter_mut().zip(probes).for_each(|(known, new)| known.add(new)),
-        }
-        Ok(true)
-    };
-    for batch in places.chunks_mut(BATCH).take(PROBED / BATCH) {
-        for place in batch.iter_mut() {
-            if !search(place, 0, tried)? {
+        let probe_all =
+            |place: &Place| probe(view, queries, &place.world_from_object, (settings, seed, budget), PROBE_WORK[round]);
+        let mut n_searched = 0;
+        for together in places.chunks_mut(settings.n_threads.max(1)) {
+            if budget.check(tried.work).is_err() {
                 break;
             }
-            tried.probed += 1;
-            tried.solved += u64::from(place.is_solved());
+            let seen = at_once(together, probe_all);
+            for (place, probes) in together.iter_mut().zip(seen) {
+                if budget.check(tried.work).is_err() {
+                    return Ok(n_searched);
+                }
+                let probes = probes?;
+                tried.work += probes.iter().map(|probe| probe.work).sum::<u64>();
+                match place.probes.is_empty() {
+                    true => place.probes = probes,
+                    false => place.probes.iter_mut().zip(probes).for_each(|(known, new)| known.add(new)),
+                }
+                n_searched += 1;
+            }
         }
+        Ok(n_searched)
+    };
+    for batch in places.chunks_mut(BATCH).take(PROBED / BATCH) {
+        let mut batch: Vec<&mut Place> = batch.iter_mut().collect();
+        let n_searched = search(&mut batch, 0)?;
+        tried.probed += n_searched as u64;
+        tried.solved += batch[..n_searched].iter().filter(|place| place.is_solved()).count() as u64;
         if tried.solved >= ENOUGH as u64 {
             break;
         }
     }
     places.sort_by(|a, b| b.rate().total_cmp(&a.rate()));
-    for place in places.iter_mut().take(AGAIN).filter(|place| !place.probes.is_empty()) {
-        search(place, 1, tried)?;
-    }
+    let mut again: Vec<&mut Place> = places.iter_mut().take(AGAIN).filter(|place| !place.probes.is_empty()).collect();
+    search(&mut again, 1)?;
     Ok(())
+}
+
+/// What `look` says of every place, in their order; each is looked at by a thread of its own.
+fn at_once<T: Send>(places: &[&mut Place], look: impl Fn(&Place) -> T + Sync) -> Vec<T> {
+    let [first, others @ ..] = places else { return Vec::new() };
+    std::thread::scope(|scope| {
+        let others: Vec<_> = others.iter().map(|place| scope.spawn(|| look(place))).collect();
+        let mut seen = vec![look(first)];
+        for other in others {
+            seen.push(other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+        }
+        seen
+    })
 }
 
 impl Place {
