@@ -11,7 +11,7 @@ const PARTS: PartSettings = PartSettings { max_parts: 16, excess: CONVEX_WITHIN,
 /// Of objects that hands take from anywhere: parts that stand out by millimetres where a fingertip touches turn the grasp into another.
 const FINE_PARTS: PartSettings = PartSettings { max_parts: 160, excess: 0.2 * CONVEX_WITHIN, least_gain: 1e-4 };
 /// Of lists of grasps: what matters is where the grasps are, and that is cut on (`ObjectSolid::of_list`).
-const LIST_PARTS: PartSettings = PartSettings { max_parts: 160, excess: CONVEX_WITHIN, least_gain: 1e-3 };
+const LIST_PARTS: PartSettings = PartSettings { max_parts: 160, excess: CONVEX_WITHIN, least_gain: 1e-4 };
 
 const HULL: &str = "MuJoCo collides with its convex hull";
 
