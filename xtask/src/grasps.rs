@@ -157,7 +157,7 @@ fn row(program: &Path, line: &str, packages: &str, list: &Path) -> Result<String
 }
 
 /// Processor time of all programs that were run and have ended, in seconds; zero where the system does not tell.
-fn processor_time() -> f64 {
+pub fn processor_time() -> f64 {
     // Fields 16 and 17 of this file, after the name of the program in brackets, in hundredths of a second.
     let text = fs::read_to_string("/proc/self/stat").unwrap_or_default();
     let rest = text.rsplit_once(')').map_or("", |(_, rest)| rest);

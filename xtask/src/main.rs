@@ -3,6 +3,8 @@
 
 mod bench;
 mod campaign;
+mod grasp_growth;
+mod grasp_replay;
 mod grasps;
 mod reference;
 mod replay;
@@ -17,7 +19,7 @@ use std::process::ExitCode;
 type Task = (&'static str, &'static str, fn(&[String]) -> Outcome);
 
 /// All tasks, in the order in which `cargo xtask` lists them.
-const TASKS: [Task; 15] = [
+const TASKS: [Task; 17] = [
     (
         "reference",
         "write the generated pages of docs/reference (--check: fail if they are out of date)",
@@ -35,6 +37,16 @@ const TASKS: [Task; 15] = [
         bench::roadmaps,
     ),
     ("bench-grasps", "lists of grasps of real hands and objects, as out/grasps/grasps.md", grasps::bench),
+    (
+        "grasp-growth",
+        "how lists of grasps grow with frames, triangles, fingers and threads: out/grasps/growth.md",
+        grasp_growth::growth,
+    ),
+    (
+        "replay-grasps",
+        "shake and lift grasps of six hands in MuJoCo, as out/grasps/replay.md; hours",
+        grasp_replay::replay,
+    ),
     ("bench-arms", "motions of whole robots: problems of MotionBenchMaker, super graphs; needs PyYAML", bench::arms),
     ("bench-tasks", "tasks of pick and place beside the table of Saut 2010, as out/tasks/tasks.md", tasks::bench),
     ("growth", "measure how loading and planning grow with fingers, triangles, obstacles and threads", bench::growth),

@@ -1,5 +1,5 @@
-//! Refinement: the wrist moves, then contacts move along the surface, to raise the closure margin. No other term of the score may
-//! get worse, and no contact moves farther than a tip radius.
+//! Refinement: contacts move along the surface and the hand follows, then wrist and contacts move at random, to raise the closure margin.
+//! The other terms of the score do not fall together, and no contact moves farther than a tip radius.
 
 use crate::driven;
 use crate::found::{Found, WayIn};
@@ -8,7 +8,7 @@ use crate::prepared::Prepared;
 use crate::search::worth::{self, holding};
 use crate::{above, way};
 use arrayvec::ArrayVec;
-use nalgebra::{Translation3, UnitQuaternion};
+use nalgebra::{Matrix3, Translation3, UnitQuaternion};
 use regrasp_base::Rng;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::surface::SurfacePoint;
@@ -31,6 +31,10 @@ const ROUNDING: f64 = 1e-9;
 /// A margin must grow by this share to count.
 const LEAST_GAIN: f64 = 1.002;
 
+/// One trial of contacts alone for so many trials of the whole grasp. By measurement: with 2 or 4 margins grow no more, and it takes longer.
+const CONTACT_TRIALS: usize = 8;
+/// How much of the way to the best contacts the hand is asked to follow, in this order.
+const SHARES_OF_WAY: [f64; 4] = [1.0, 0.75, 0.5, 0.25];
 /// Steps uphill after which the way in is tested. By hand.
 const CLIMBS_PER_WAY: usize = 4;
 
@@ -77,6 +81,9 @@ fn refined(prepared: &Prepared, workspace: &mut Workspace, found: &Found, before
     let first = climb.others;
     // Mostly the way so far still leads there: it is tested now and then, and at the end.
     let (mut reached, mut n_untested) = (climb.clone(), 0);
+    if let Some(led) = led_by_contacts(prepared, workspace, found, &climb, &mut rng) {
+        (climb, n_untested) = (led, 1);
+    }
     for trial in 0..prepared.settings.refinement_trials {
         // Large steps first.
         let size = 1.0 - 0.9 * trial as f64 / prepared.settings.refinement_trials as f64;
@@ -111,6 +118,118 @@ fn refined(prepared: &Prepared, workspace: &mut Workspace, found: &Found, before
     Some(Found { state, margin, margin_before: Some(before), scores, forces, way, ..found.clone() })
 }
 
+/// The grasp nearest to the contacts of largest margin that the hand can follow to; none where it follows to none.
+fn led_by_contacts(
+    prepared: &Prepared,
+    workspace: &mut Workspace,
+    found: &Found,
+    climb: &Climb,
+    rng: &mut Rng,
+) -> Option<Climb> {
+    if prepared.motors.is_some() {
+        return None;
+    }
+    let goal = best_contacts(prepared, found, climb, rng)?;
+    for share in SHARES_OF_WAY {
+        for wrist_follows in [true, false] {
+            let Some((state, flatness, margin)) = following(prepared, found, climb, &goal, (share, wrist_follows))
+            else {
+                continue;
+            };
+            let others = worth::other_terms(prepared, &state, &flatness).mean(&prepared.settings.weights);
+            if margin <= climb.margin * LEAST_GAIN || others < climb.others - ROUNDING {
+                continue;
+            }
+            workspace.set_state(&state);
+            if workspace.is_clear(TipMode::AllHold) && worth::is_balanced(prepared, &state) {
+                return Some(Climb { state, flatness, margin, others, way: climb.way.clone() });
+            }
+        }
+    }
+    None
+}
+
+/// Contacts of large margin near those of `climb`, wherever the hand can be; none where there are no better ones.
+fn best_contacts(prepared: &Prepared, found: &Found, climb: &Climb, rng: &mut Rng) -> Option<GraspState> {
+    let mut best = climb.state.clone();
+    let mut margin = climb.margin;
+    for trial in 0..prepared.settings.refinement_trials / CONTACT_TRIALS {
+        let size = 1.0 - 0.9 * (trial * CONTACT_TRIALS) as f64 / prepared.settings.refinement_trials as f64;
+        let by = Move::slide(&best, size, rng);
+        let mut state = best.clone();
+        let places: Option<()> = holding(&best).try_for_each(|f| {
+            if let Some(target) = by.target(prepared, &state, f) {
+                let at = contact_near(prepared, found, f, &target)?;
+                state.contacts[f] =
+                    Contact { point_in_object: at.point_in_object, normal_in_object: at.normal_in_object };
+            }
+            Some(())
+        });
+        if places.is_none() {
+            continue;
+        }
+        let reached = worth::margin(prepared, &state);
+        if reached > margin {
+            (best, margin) = (state, reached);
+        }
+    }
+    (margin > climb.margin * LEAST_GAIN).then_some(best)
+}
+
+/// `climb` with its contacts moved by a share of the way to those of `goal`, and the hand where it touches them.
+fn following(
+    prepared: &Prepared,
+    found: &Found,
+    climb: &Climb,
+    goal: &GraspState,
+    (share, wrist_follows): (f64, bool),
+) -> Option<(GraspState, Vec<f64>, f64)> {
+    let mut state = climb.state.clone();
+    let mut flatness = climb.flatness.clone();
+    let fingers: ArrayVec<usize, MAX_FINGERS> = holding(&state).collect();
+    for (which, &f) in fingers.iter().enumerate() {
+        let (from, to) = (climb.state.contacts[f].point_in_object, goal.contacts[f].point_in_object);
+        let at = contact_near(prepared, found, f, &(from + share * (to - from)))?;
+        state.contacts[f] = Contact { point_in_object: at.point_in_object, normal_in_object: at.normal_in_object };
+        let curvature = prepared.model.view.object.surface.curvature(&at);
+        flatness[which] = inverse_curvature(curvature, prepared.model.fingers[f].tip_radius);
+    }
+    let margin = worth::margin(prepared, &state);
+    if margin <= climb.margin {
+        return None;
+    }
+    if wrist_follows {
+        let center = |state: &GraspState, f: usize| {
+            let contact = &state.contacts[f];
+            contact.point_in_object + prepared.model.fingers[f].settle_radius * contact.normal_in_object.into_inner()
+        };
+        let pairs: ArrayVec<(Point, Point), MAX_FINGERS> = fingers
+            .iter()
+            .map(|&f| (center(&state, f), climb.state.world_from_object * center(&climb.state, f)))
+            .collect();
+        state.world_from_object = aligned(&pairs)?;
+    }
+    for &f in &fingers {
+        touch(prepared, &mut state, f)?;
+    }
+    Some((state, flatness, margin))
+}
+
+/// The pose that brings the first point of every pair nearest to the second (Kabsch 1976).
+fn aligned(pairs: &[(Point, Point)]) -> Option<Pose> {
+    let mean = |of: &dyn Fn(&(Point, Point)) -> Vector| -> Vector {
+        pairs.iter().map(of).sum::<Vector>() / pairs.len().max(1) as f64
+    };
+    let (from, to) = (mean(&|pair| pair.0.coords), mean(&|pair| pair.1.coords));
+    let covariance: Matrix3<f64> = pairs.iter().map(|(a, b)| (b.coords - to) * (a.coords - from).transpose()).sum();
+    let svd = covariance.svd(true, true);
+    let (u, v_t) = (svd.u?, svd.v_t?);
+    let mut signs = Matrix3::identity();
+    signs[(2, 2)] = (u * v_t).determinant().signum();
+    let rotation = UnitQuaternion::from_matrix(&(u * signs * v_t));
+    Some(Pose::from_parts(Translation3::from(to - rotation * from), rotation))
+}
+
 /// `climb` with a way that leads there; none where there is none.
 fn with_way(prepared: &Prepared, workspace: &mut Workspace, climb: Climb) -> Option<Climb> {
     if way::is_free(prepared, workspace, &climb.state, &climb.way) {
@@ -133,7 +252,7 @@ struct Move {
 
 impl Move {
     fn draw(state: &GraspState, has_motors: bool, size: f64, rng: &mut Rng) -> Self {
-        let mut slides: ArrayVec<Option<[f64; 2]>, MAX_FINGERS> = (0..state.contacts.len()).map(|_| None).collect();
+        let slides: ArrayVec<Option<[f64; 2]>, MAX_FINGERS> = (0..state.contacts.len()).map(|_| None).collect();
         let kind = rng.unit();
         let [stay, carry, all] = SHARES;
         if has_motors || kind < stay + carry {
@@ -141,14 +260,35 @@ impl Move {
             let turn = Vector::from(rng.direction()) * (WRIST_STEP.1 * size * rng.unit());
             return Move { wrist: [shift, turn], carries: kind >= stay, slides };
         }
+        Move::of_contacts(state, size, kind < stay + carry + all, rng)
+    }
+
+    /// Contacts move, one or all, as often as in [`Move::draw`].
+    fn slide(state: &GraspState, size: f64, rng: &mut Rng) -> Self {
+        let [stay, carry, all] = SHARES;
+        let is_all = rng.unit() * (1.0 - stay - carry) < all;
+        Move::of_contacts(state, size, is_all, rng)
+    }
+
+    fn of_contacts(state: &GraspState, size: f64, is_all: bool, rng: &mut Rng) -> Self {
+        let mut slides: ArrayVec<Option<[f64; 2]>, MAX_FINGERS> = (0..state.contacts.len()).map(|_| None).collect();
         let fingers: ArrayVec<usize, MAX_FINGERS> = holding(state).collect();
         let one = fingers[rng.below(fingers.len())];
         for f in fingers {
-            if kind < stay + carry + all || f == one {
+            if is_all || f == one {
                 slides[f] = Some([rng.uniform(0.0, std::f64::consts::TAU), size * rng.unit()]);
             }
         }
         Move { wrist: [Vector::zeros(); 2], carries: false, slides }
+    }
+
+    /// Where the contact of a finger slides to, in the object's frame and beside its surface.
+    fn target(&self, prepared: &Prepared, state: &GraspState, finger: usize) -> Option<Point> {
+        let [angle, share] = self.slides[finger]?;
+        let contact = &state.contacts[finger];
+        let (x, y) = regrasp_geometry::frame::tangents(&contact.normal_in_object);
+        let aside = x.into_inner() * angle.cos() + y.into_inner() * angle.sin();
+        Some(contact.point_in_object + aside * (share * farthest(prepared, finger)))
     }
 }
 
@@ -168,12 +308,8 @@ fn trial_of(prepared: &Prepared, found: &Found, climb: &Climb, by: &Move) -> Opt
     let fingers: ArrayVec<usize, MAX_FINGERS> = holding(&state).collect();
     for (which, &f) in fingers.iter().enumerate() {
         let contact = state.contacts[f];
-        let target = match by.slides[f] {
-            Some([angle, share]) => {
-                let (x, y) = regrasp_geometry::frame::tangents(&contact.normal_in_object);
-                let aside = x.into_inner() * angle.cos() + y.into_inner() * angle.sin();
-                Some(contact.point_in_object + aside * (share * farthest(prepared, f)))
-            }
+        let target = match by.target(prepared, &state, f) {
+            Some(target) => Some(target),
             None if by.carries => {
                 let in_hand = climb.state.world_from_object * contact.point_in_object;
                 Some(state.world_from_object.inverse_transform_point(&in_hand))

@@ -2,14 +2,12 @@
 
 /// Isaac grasp files.
 mod isaac;
-/// Models for MuJoCo.
-mod mjcf;
 /// `moveit_msgs/Grasp` messages.
 mod moveit;
 /// Arrays for numpy.
 mod npz;
 
+pub use crate::mjcf::grasps::to_mjcf;
 pub use isaac::to_isaac;
-pub use mjcf::to_mjcf;
 pub use moveit::to_moveit;
 pub use npz::to_npz;

@@ -6,7 +6,9 @@
 //! with the shapes of its link. MuJoCo collides with convex shapes only: an object that is not convex is cut into
 //! convex parts, and a note says by how much they exceed it. `docs/reference/replay.md` has the settings and where they come from.
 
+mod clear;
 mod geom;
+pub(crate) mod grasps;
 mod hand;
 mod inertia;
 mod model;
@@ -21,6 +23,7 @@ pub use robot::robot_to_mjcf;
 
 use regrasp_plan::Plan;
 use regrasp_scene::Manipulation;
+use solid::ObjectSolid;
 
 /// A model, ready to be written to a file or loaded from memory.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -56,13 +59,20 @@ pub enum MjcfError {
 ///
 /// Errors: the plan is not for this scene's hand.
 pub fn to_mjcf(task: &Manipulation, plan: &Plan) -> Result<Mjcf, MjcfError> {
+    must_be_of_hand(task, &plan.joint_names, &plan.fingers)?;
+    let solids: Vec<ObjectSolid> = task.scene.objects.iter().map(ObjectSolid::of).collect();
+    Ok(model::write(task, plan, &solids))
+}
+
+/// Joints and fingers have the names of the hand's.
+fn must_be_of_hand(task: &Manipulation, joint_names: &[String], fingers_named: &[String]) -> Result<(), MjcfError> {
     let fingers: Vec<String> = task.hand().fingers.iter().map(|finger| finger.name.clone()).collect();
     for (what, in_plan, in_scene) in
-        [("joints", &plan.joint_names, &task.hand().joint_names()), ("fingers", &plan.fingers, &fingers)]
+        [("joints", joint_names, task.hand().joint_names()), ("fingers", fingers_named, fingers)]
     {
         if in_plan != in_scene {
             return Err(MjcfError::AnotherHand { what, plan: in_plan.join(", "), scene: in_scene.join(", ") });
         }
     }
-    Ok(model::write(task, plan))
+    Ok(())
 }

@@ -29,14 +29,14 @@ pub(super) struct MjcfModel<'a> {
     pub objects: Vec<ModelObject<'a>>,
 }
 
-pub(super) fn write(task: &Manipulation, plan: &Plan) -> Mjcf {
+/// The model in which the objects of the scene have these `solids`.
+pub(super) fn write(task: &Manipulation, plan: &Plan, solids: &[ObjectSolid]) -> Mjcf {
     let scene = task.scene;
-    let solids: Vec<ObjectSolid> = scene.objects.iter().map(ObjectSolid::of).collect();
     let links = task.robot_bodies();
-    let names = Names::of(scene, &solids, &links);
+    let names = Names::of(scene, solids, &links);
     let gravity = plan.promises.forces.as_ref().map_or(Some(GRAVITY), |forces| forces.gravity_in_world);
     let gravity = gravity.unwrap_or(GRAVITY);
-    let model = MjcfModel::new(task, plan, (&names, &solids, &links), &Vector::from(gravity));
+    let model = MjcfModel::new(task, plan, (&names, solids, &links), &Vector::from(gravity));
     let mut xml = Xml::default();
     xml.open("mujoco", &[("model", scene.name.clone())]);
     write_settings(&mut xml, gravity);

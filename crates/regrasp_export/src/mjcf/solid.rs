@@ -10,6 +10,8 @@ use std::sync::Arc;
 const PARTS: PartSettings = PartSettings { max_parts: 16, excess: CONVEX_WITHIN, least_gain: 1e-3 };
 /// Of objects that hands take from anywhere: parts that stand out by millimetres where a fingertip touches turn the grasp into another.
 const FINE_PARTS: PartSettings = PartSettings { max_parts: 160, excess: 0.2 * CONVEX_WITHIN, least_gain: 1e-4 };
+/// Of lists of grasps: what matters is where the grasps are, and that is cut on (`ObjectSolid::of_list`).
+const LIST_PARTS: PartSettings = PartSettings { max_parts: 160, excess: CONVEX_WITHIN, least_gain: 1e-4 };
 
 const HULL: &str = "MuJoCo collides with its convex hull";
 
@@ -30,6 +32,11 @@ impl ObjectSolid {
     /// As [`ObjectSolid::of`], cut finer, and more so where a part would cover one of the points `clear` outside of the object.
     pub fn finely(object: &Object, clear: &[Clear]) -> Self {
         ObjectSolid::cut(object, &FINE_PARTS, clear)
+    }
+
+    /// As [`ObjectSolid::finely`], where many grasps are tried and every part costs time: coarse away from the points `clear`.
+    pub fn of_list(object: &Object, clear: &[Clear]) -> Self {
+        ObjectSolid::cut(object, &LIST_PARTS, clear)
     }
 
     fn cut(object: &Object, settings: &PartSettings, clear: &[Clear]) -> Self {
