@@ -31,7 +31,8 @@ const ROUNDING: f64 = 1e-9;
 /// A margin must grow by this share to count.
 const LEAST_GAIN: f64 = 1.002;
 
-/// One trial of contacts alone for so many trials of the whole grasp. By measurement: with 2 or 4 margins grow no more, and it takes longer.
+/// One trial of contacts alone for so many trials of the whole grasp. By measurement on apple, mug, horse and cube: with 4 margins grow about as
+/// much, and it takes longer.
 const CONTACT_TRIALS: usize = 8;
 /// How much of the way to the best contacts the hand is asked to follow, in this order.
 const SHARES_OF_WAY: [f64; 4] = [1.0, 0.75, 0.5, 0.25];
