@@ -6,7 +6,7 @@ mod alone;
 use crate::context::{Context, Grasp};
 use crate::failing::Tally;
 use crate::line::{LINE_STEPS, are_states_free, is_state_free, is_way_free, straight};
-use crate::station::{can_close, common_postures, with_fingers};
+use crate::station::{Effort, can_close, common_postures, with_fingers};
 use crate::timing::Smooth;
 use alone::{Alone, At};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
@@ -27,15 +27,6 @@ const COMMON_DRAWS: usize = 2;
 const BEYOND: f64 = 0.3;
 /// Shares of the ways in and out that are tried.
 const WAY_SHARES: [f64; 2] = [1.0, 0.4];
-
-/// How much is looked at for one pair of grasps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Effort {
-    /// The best places alone: another pair of grasps may be easier.
-    Little,
-    /// All other places, then drawn ones, after a look with little effort.
-    Full,
-}
 
 /// Places that are tried with little effort.
 const LITTLE_PLACES: usize = 8;

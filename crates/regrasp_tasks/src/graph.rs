@@ -3,14 +3,14 @@
 mod cheapest;
 
 use crate::context::Context;
-use crate::exchange::{Effort, Give, Places, is_double_grasp};
+use crate::exchange::{Give, Places, is_double_grasp};
 use crate::failing::{Stage, Tally};
 use crate::forces;
 use crate::in_hand::{self, Change};
 use crate::motions::{self, Step, Stuck};
 use crate::placements::{Place, intermediate};
 use crate::roadmap::TaskRoadmap;
-use crate::station::{FINAL, Station, may_hold, station};
+use crate::station::{Effort, FINAL, Station, may_hold, station};
 use regrasp_geometry::Vector;
 use regrasp_manipulation::failure::{Failure, FailureKind};
 use regrasp_manipulation::task_settings::TaskCost;

@@ -3,7 +3,6 @@
 pub use crate::clear::with_fingers;
 use crate::clear::{is_hand_clear, links_of};
 use crate::context::{Context, Grasp};
-use crate::exchange::Effort;
 use crate::failing::{Stage, Tally};
 use crate::forces;
 use crate::line::{LINE_STEPS, are_states_free, is_lift_free, is_motion_free, is_state_free, is_way_free, straight};
@@ -27,6 +26,15 @@ const WAY_SHARES: [f64; 2] = [1.0, 0.4];
 const LIFT_SHARES: [f64; 2] = [1.0, 1.0 / 3.0];
 /// Steps in time of fingers that open or close.
 pub const FINGER_STEPS: usize = 8;
+
+/// How much is looked at for one grasp, or one pair of grasps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Effort {
+    /// What is likely alone: another grasp may be easier.
+    Little,
+    /// All the rest, after a look with little effort.
+    Full,
+}
 
 /// A hand at the object. All states have the other arms where they are at the start.
 #[derive(Debug, Clone)]

@@ -5,7 +5,6 @@ use crate::check::between::Between;
 use crate::check::edges::Edges;
 use crate::check::model::{CheckedHand, FingerModel};
 use crate::check::roles::{contact_of, moving_finger};
-use crate::check::rolling::off_contact;
 use crate::check::surface;
 use crate::check::tip_rates::{bounds_in_object, speed_in_object};
 use crate::check::tip_surface::TipSurface;
@@ -187,4 +186,16 @@ pub fn check_contacts(object: &Object, model: &CheckedHand, plan: &Plan, setting
             }
         }
     }
+}
+
+pub(super) fn off_contact(finger: &FingerModel, error: f64, tolerance: f64) -> Violation {
+    let name = &finger.name;
+    let message = if error.is_finite() {
+        format!("the tip of finger \"{name}\" is {error:.3e} m off its contact")
+    } else {
+        format!(
+            "the tip of finger \"{name}\" has no contact that is defined: no nearest point of the surface was found"
+        )
+    };
+    Violation::new(Kind::ContactOffTip, message).subjects([finger.name.as_str()]).amount(error, tolerance)
 }

@@ -12,7 +12,7 @@ mod smooth_reach;
 mod smooth_touch;
 
 use crate::check::between::Between;
-use crate::check::contact::error_at;
+use crate::check::contact::{error_at, off_contact};
 use crate::check::model::{CheckedHand, FingerModel};
 use crate::check::patch::Patch;
 use crate::check::step_slip::{StepSlip, torsion_radius};
@@ -118,18 +118,6 @@ pub fn check_rolling(
         }
     }
     rolled
-}
-
-pub(super) fn off_contact(finger: &FingerModel, error: f64, tolerance: f64) -> Violation {
-    let name = &finger.name;
-    let message = if error.is_finite() {
-        format!("the tip of finger \"{name}\" is {error:.3e} m off its contact")
-    } else {
-        format!(
-            "the tip of finger \"{name}\" has no contact that is defined: no nearest point of the surface was found"
-        )
-    };
-    Violation::new(Kind::ContactOffTip, message).subjects([finger.name.as_str()]).amount(error, tolerance)
 }
 
 /// A rolling fingertip between two waypoints; the parameter runs from 0 to 1.

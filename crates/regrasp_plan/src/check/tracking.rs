@@ -25,10 +25,10 @@
 //! than `smallest_sliding_speed`. Relative velocities are means: slide and turn over the time of the step.
 
 use crate::check::between::Between;
-use crate::check::contact::error_at;
+use crate::check::contact::{error_at, off_contact};
 use crate::check::model::{CheckedHand, FingerModel};
 use crate::check::roles::{contact_of, contacts_agree};
-use crate::check::rolling::{Roll, Rolled, Turning, UNKNOWN_SHARE, off_contact};
+use crate::check::rolling::{Roll, Rolled, Turning, UNKNOWN_SHARE};
 use crate::check::step_slip::StepSlip;
 use crate::check::surface::SortedShape;
 use crate::check::violation::{Moment, Violation, ViolationKind as Kind};

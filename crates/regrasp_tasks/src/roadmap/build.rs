@@ -2,10 +2,10 @@
 
 use super::{DoubleGrasps, TaskRoadmap, graph_model, origin};
 use crate::context::{Context, Grasp, Prepared};
-use crate::exchange::{Effort, Give, Places, is_double_grasp};
+use crate::exchange::{Give, Places, is_double_grasp};
 use crate::failing::Tally;
 use crate::placements::Place;
-use crate::station::may_hold;
+use crate::station::{Effort, may_hold};
 use crate::{Failure, FailureKind, TaskSettings};
 use regrasp_arms::roadmap::{BuildSettings, Roads, build};
 use regrasp_base::Budget;
