@@ -2,12 +2,14 @@
 //!
 //! The viewer knows no planner: what only planners know is converted here.
 
-use regrasp_geometry::Pose;
+use crate::robot_roadmap::RobotRoadmap;
 use regrasp_geometry::frame::{parts_of, pose_distance, rotation_between};
+use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_plan::Plan;
 use regrasp_planners::in_hand::roadmap::GraspRoadmap;
 use regrasp_planners::{Failure, Outline, OutlineEdge, OutlineNode};
-use regrasp_scene::HandView;
+use regrasp_scene::{HandView, Query, Scene};
+use regrasp_viewer::robots::{WristGraph, corners};
 use regrasp_viewer::story::{
     CauseStory, FailureStory, NearestMissStory, RoadmapEdge, RoadmapEdgeKind, RoadmapNode, RoadmapStory,
 };
@@ -17,6 +19,50 @@ const MOST_NODES: usize = 10_000;
 const MOST_EDGES: usize = 20_000;
 /// Poses that differ by less, in metres and radians, are one.
 const SAME_POSE: f64 = 1e-9;
+
+/// A robot's roadmap in the scene of `query`: where it brings the wrists, exchanges, and what rests. Joints that the roadmap does not
+/// plan stand as at the query's start. None for a query of a single hand, and where the robot lacks a joint of the roadmap.
+pub fn wrist_graph_of(roadmap: &RobotRoadmap, scene: &Scene, query: &Query) -> Option<WristGraph> {
+    let (robot, start) = match query {
+        Query::Motion(of) => (&scene.robots[of.robot], &of.start),
+        Query::PickAndPlace(of) => (&scene.robots[of.robot], &of.start),
+        Query::InHand(_) | Query::Tracking(_) => return None,
+    };
+    let (graph, exchanges) = match roadmap {
+        RobotRoadmap::Motion(roads) => (Some(&roads.graph), Vec::new()),
+        RobotRoadmap::Task(of) => (of.roads.as_ref().map(|roads| &roads.graph), of.exchange_states().collect()),
+    };
+    let mut poses = Vec::new();
+    let mut wrists = |state: &[f64]| -> Vec<Point> {
+        robot.link_poses(state, &mut poses);
+        robot.arms.iter().map(|arm| poses[arm.mount.0].translation.vector.into()).collect()
+    };
+    let mut arms: Vec<(String, Vec<Point>)> = robot.arms.iter().map(|arm| (arm.name.clone(), Vec::new())).collect();
+    let mut edges = Vec::new();
+    if let Some(graph) = graph {
+        let places: Vec<usize> = graph.joints.iter().map(|name| robot.layout.index_of(name)).collect::<Option<_>>()?;
+        for node in &graph.graph.nodes {
+            let mut state = start.clone();
+            places.iter().zip(node).for_each(|(place, value)| state[*place] = *value);
+            arms.iter_mut().zip(wrists(&state)).for_each(|((_, points), point)| points.push(point));
+        }
+        edges = graph.graph.edges.iter().map(|edge| edge.map(|node| node as usize)).collect();
+    }
+    let middle = |state: &[f64]| {
+        let points = wrists(state);
+        Point::from(points.iter().map(|point| point.coords).sum::<Vector>() / points.len().max(1) as f64)
+    };
+    // States of another robot are left out.
+    let exchanges = exchanges.into_iter().filter(|state| state.len() == start.len()).map(middle).collect();
+    let supports = scene.supports.iter().map(|support| &support.body);
+    let still = scene
+        .obstacles
+        .iter()
+        .chain(supports)
+        .map(|body| corners(&body.placed.shape, &body.placed.parent_from_shape))
+        .collect();
+    Some(WristGraph { arms, edges, exchanges, still })
+}
 
 /// Why no plan was found.
 pub fn failure_story(failure: &Failure) -> FailureStory {

@@ -429,7 +429,7 @@ pub struct RoadmapBuild {
 pub struct RoadmapPicture {
     /// Roadmap file
     pub roadmap: PathBuf,
-    /// Scene file, of the same hand and object, whose turn is planned on the graph
+    /// Scene file, of the same hand and object, whose turn is planned on the graph. Needed for a robot's roadmap: the one it was built for
     pub scene: Option<PathBuf>,
     /// Picture
     #[arg(short, long, value_name = "FILE.svg")]

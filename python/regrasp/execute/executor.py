@@ -92,7 +92,7 @@ class Executor:
         self._senses = Senses(len(plant.joint_names), self._settings)
         self._leg: Leg | None = None
         self._k = 0
-        self._is_stopped = False
+        self._stopped: Monitor | None = None
         self._servo: Array | None = None
         self._blend_from: Array | None = None
         self._blended = 1.0
@@ -296,9 +296,10 @@ class Executor:
                 raise _GiveUp("lost" if lost else "gave_up", f"no start: {message}")
 
     def _may_go_on(self) -> bool:
-        """True where a leg was stopped on its way, and the object is where that leg has it, felt by every finger that holds."""
+        """True where a leg was stopped on its way, once, the object is where that leg has it, felt by every finger that holds, and
+        every joint where it was told to be."""
         leg, senses, settings = self._leg, self._senses, self._settings
-        if leg is None or not self._is_stopped:
+        if leg is None or self._stopped is None or not self._stopped.follows(self._k, senses, settings.resume_share):
             return False
         wanted = leg.ref.object_position[self._k], leg.ref.object_quat_wxyz[self._k]
         distance, angle = pose_error(leg, senses.position, senses.quat, *wanted)
@@ -434,7 +435,7 @@ class Executor:
         assert leg is not None
         monitor = Monitor(leg, settings, self._senses.joints, first)
         resumed = 0
-        self._is_stopped = False
+        self._stopped = None
         while self._blended < 1.0:
             self._tick(moves=False, state="blend")
         while self._k < leg.n_ticks - 1:
@@ -444,8 +445,11 @@ class Executor:
             targets = leg.ref.joints[self._k]
             trigger = monitor.look(self._k, self._senses, targets)
             if trigger is not None and settings.replanning:
-                if trigger.kind not in PASSING or resumed >= settings.most_resumes or not self._comes_back(monitor):
-                    self._is_stopped = True
+                may_pass = trigger.kind in PASSING and resumed < settings.most_resumes
+                may_pass = may_pass and (trigger.kind != "deviation" or monitor.is_sudden)
+                if not (may_pass and self._comes_back(monitor)):
+                    # A leg that goes wrong again after it went on is not to be trusted.
+                    self._stopped = monitor if first == 0 else None
                     return trigger
                 resumed += 1
                 self._event(trigger.kind, trigger.message, "resume")

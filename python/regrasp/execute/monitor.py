@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,13 +50,18 @@ class Monitor:
         self.angle = 0.0
         self.joint_error = 0.0
         self._count = 0
+        self._shares: deque[tuple[float, float]] = deque()
 
     def look(self, k: int, senses: Senses, targets: Array) -> Trigger | None:
         """At tick ``k``. ``targets`` are where the joints were told to be, without the share of torques."""
         leg, settings = self._leg, self._settings
         wanted = leg.ref.object_position[k], leg.ref.object_quat_wxyz[k]
         self.distance, self.angle = pose_error(leg, senses.position, senses.quat, *wanted)
-        if self.distance > settings.deviation_distance or self.angle > settings.deviation_turn:
+        share = max(self.distance / settings.deviation_distance, self.angle / settings.deviation_turn)
+        self._shares.append((senses.time, share))
+        while self._shares[0][0] < senses.time - settings.sudden_within:
+            self._shares.popleft()
+        if share > 1.0:
             return Trigger(
                 "deviation",
                 f"the object is {1e3 * self.distance:.1f} mm and {np.degrees(self.angle):.1f} degrees off",
@@ -66,14 +72,25 @@ class Monitor:
             found = self._slipped(k, senses) or found
         return found
 
+    @property
+    def is_sudden(self) -> bool:
+        """True where the object was near where it should be a short time before the last look: a push, not a drift."""
+        return bool(self._shares) and self._shares[0][1] <= self._settings.resume_share
+
     def is_near(self, k: int, senses: Senses, share: float) -> bool:
-        """True where the object was within this share of what counts as a deviation at the last look, no fingertip of what counts
-        as a slip, and every holding finger feels it."""
+        """True where the object was within this share of what counts as a deviation at the last look, no fingertip beyond it of what
+        counts as a slip, no joint of what counts as stalled, and every holding finger feels it."""
         settings = self._settings
         is_felt = senses.forces is None or bool((senses.forces >= settings.lost_force)[self._leg.ref.holds[k]].all())
         distance, turn = share * settings.deviation_distance, share * settings.deviation_turn
         is_back = self.slip <= share * settings.slip_distance or not settings.slip_trigger
+        is_back = is_back and self.follows(k, senses, share)
         return self.distance <= distance and self.angle <= turn and is_back and is_felt
+
+    def follows(self, k: int, senses: Senses, share: float) -> bool:
+        """True where every joint is within this share of what counts as stalled from where it was told to be."""
+        error = np.abs(senses.joints - self._leg.ref.joints[k])
+        return bool((error <= share * self._settings.stall_error + self._usual_error).all())
 
     def _lost(self, k: int, senses: Senses) -> Trigger | None:
         if senses.forces is None:

@@ -60,6 +60,8 @@ class ExecutorSettings:
     """It has come back when it has been for so long"""
     resume_share: float = 0.5
     """within this share of the distances and angles at which it counts as off, with every contact felt."""
+    sudden_within: float = 0.25
+    """Where an object drifts off for longer than this, nothing comes back by itself: the hand does not wait."""
     most_resumes: int = 5
     """A leg goes on again so often."""
     slip_distance: float = 0.003

@@ -96,7 +96,7 @@ pub fn write_roadmap(path: &Path, roadmap: &RoadmapStory, title: &str, talk: &Ta
 }
 
 /// Writes a file and says where it is.
-fn put(path: &Path, bytes: &[u8], talk: &Talk) -> Result<(), Stop> {
+pub fn put(path: &Path, bytes: &[u8], talk: &Talk) -> Result<(), Stop> {
     files::write_atomic(path, bytes).map_err(|error| Stop::unwritable(path, &error))?;
     let sha256 = files::sha256(bytes);
     talk.event("written", json!({ "picture": path, "bytes": bytes.len(), "sha256": sha256 }));

@@ -40,6 +40,9 @@ pub fn run(arguments: &args::Roadmap, common: &Common, talk: &Talk) -> Result<()
         RoadmapAction::Query(query) => run_query(query, common, talk),
         RoadmapAction::Info { roadmap } if robot_roadmap::is_of_robot(roadmap) => robot_roadmap::info(roadmap, talk),
         RoadmapAction::Info { roadmap } => run_info(roadmap, talk),
+        RoadmapAction::Picture(picture) if robot_roadmap::is_of_robot(&picture.roadmap) => {
+            robot_roadmap::picture(picture, common, talk)
+        }
         RoadmapAction::Picture(picture) => run_picture(picture, common, talk),
         RoadmapAction::Bench(bench) => run_bench(bench, common, talk),
     }

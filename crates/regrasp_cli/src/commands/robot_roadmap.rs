@@ -1,17 +1,19 @@
 //! Roadmaps of robots: what `roadmap build`, `roadmap info` and `plan` do with them.
 
 use crate::args::{self, Common};
-use crate::commands::task_grasps;
 use crate::commands::written::Limits;
+use crate::commands::{pictures, task_grasps};
 use crate::load;
 use crate::stop::Stop;
 use crate::talk::Talk;
 use crate::words::{duration, grouped};
-use regrasp::base::files;
+use regrasp::base::{Diagnostic, Place, files};
+use regrasp::pictures::wrist_graph_of;
 use regrasp::planners::FailureKind;
 use regrasp::robot_roadmap::{Asked, RobotRoadmap};
 use regrasp::scene::LoadedScene;
 use regrasp::tasks::RoadmapBuildSettings;
+use regrasp::viewer::robots::wrist_graph;
 use regrasp::{Budget, PlannerSettings, Query};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -81,6 +83,26 @@ pub fn info(path: &Path, talk: &Talk) -> Result<(), Stop> {
         talk.data(&format!("file        {}\ntask        {kind}\nholds       {}\n", path.display(), roadmap.in_words()));
     }
     Ok(())
+}
+
+/// Draws such a roadmap in the scene that it was built for.
+///
+/// Errors: no scene (`A507`); a scene of a single hand, or whose robot lacks a joint of the roadmap (`R616`).
+pub fn picture(arguments: &args::RoadmapPicture, common: &Common, talk: &Talk) -> Result<(), Stop> {
+    let path = &arguments.roadmap;
+    let Some(scene) = &arguments.scene else {
+        let problem = "is the roadmap of a robot, and no scene is named";
+        let fix = "name the scene that it was built for: regrasp roadmap picture ROADMAP SCENE -o FILE.svg";
+        return Err(Stop::BadInput(Diagnostic::new("A507", Place::file(path), problem).fix(fix).into()));
+    };
+    let roadmap = RobotRoadmap::load(path)?;
+    let loaded = load::scene_by(scene, common, None, talk)?;
+    let query = loaded.task().query(arguments.seed);
+    let Some(graph) = wrist_graph_of(&roadmap, &loaded.scene, &query) else {
+        return Err(Stop::BadInput(roadmap.refuse_other(path, "the robot")));
+    };
+    let title = format!("Roadmap of {}: {}", loaded.scene.name, roadmap.in_words());
+    pictures::put(&arguments.output, wrist_graph(&graph, &title).as_bytes(), talk)
 }
 
 /// The roadmap that a plan uses: the one that was named, or the one beside the scene. One beside the scene that was built with other

@@ -66,6 +66,11 @@ impl TaskRoadmap {
         self.exchanges.len()
     }
 
+    /// The state of the robot at each exchange: both hands are at the object.
+    pub fn exchange_states(&self) -> impl Iterator<Item = &[f64]> {
+        self.exchanges.iter().map(|give| give.way_in.ends()[0].as_slice())
+    }
+
     /// What differs from what the roadmap was made for, in words. None where nothing does.
     ///
     /// Errors: as `plan_pick_and_place` before any search.

@@ -4,6 +4,8 @@
 mod charts;
 /// Key frames in one picture.
 mod frames;
+/// Super graphs.
+mod graph;
 /// Who holds the object when.
 mod holding;
 /// What the interactive page is told.
@@ -12,6 +14,7 @@ mod replay;
 mod task_chart;
 
 pub use frames::{RobotStoryboard, robot_storyboard};
+pub use graph::{WristGraph, corners, wrist_graph};
 pub use replay::{ReplayAxis, ReplayBody, ReplayHolder, ReplayKind, ReplayPiece, ReplaySegment, RobotReplay};
 
 use crate::page::{embedded, escape_json, escape_text, hash};

@@ -69,3 +69,28 @@ fn pick_and_place_has_a_task_chart_and_a_replay() {
     let page = robot_page(&telling, &settings).unwrap();
     assert!(page.len() < 8_000_000 && page.contains("<summary>Fingers</summary>"));
 }
+
+/// Every node and exchange is a mark, every motion a line; bodies that rest are outlined.
+#[test]
+fn wrist_graphs_show_what_they_hold() {
+    use regrasp_geometry::{Point, Pose, Shape, Vector};
+    use regrasp_viewer::robots::{WristGraph, corners, wrist_graph};
+
+    let table = Shape::Cuboid { half_extents: Vector::new(0.25, 0.5, 0.01) };
+    let graph = WristGraph {
+        arms: vec![
+            ("right".into(), vec![Point::new(0.5, -0.4, 0.6), Point::new(0.6, -0.2, 0.9), Point::new(0.6, -0.2, 0.9)]),
+            ("left".into(), vec![Point::new(0.5, 0.4, 0.6), Point::new(0.5, 0.4, 0.6), Point::new(0.4, 0.3, 0.7)]),
+        ],
+        edges: vec![[0, 1], [1, 2]],
+        exchanges: vec![Point::new(0.6, 0.0, 0.8)],
+        still: vec![corners(&table, &Pose::translation(0.6, 0.0, 0.3))],
+    };
+    let svg = wrist_graph(&graph, "graph");
+    // Two views of six nodes and an exchange, and their marks in the key.
+    assert_eq!(svg.matches("<circle").count(), 2 * 7 + 3);
+    for words in ["wrist of right, 3 nodes", "2 motions", "1 exchanges", "from above", "0.5 m"] {
+        assert!(svg.contains(words), "{words}");
+    }
+    assert!(!wrist_graph(&WristGraph::default(), "empty").contains("NaN"));
+}
