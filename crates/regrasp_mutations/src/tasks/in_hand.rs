@@ -66,6 +66,10 @@ impl Breeder<'_> {
                 let contacts = &mut segment.waypoints[w].contacts;
                 let k = rng.below(contacts.len());
                 let force = contacts.get_mut(k)?.force_in_object.as_mut()?;
+                // A finger that has just landed presses with nothing yet.
+                if force.iter().all(|x| *x == 0.0) {
+                    return None;
+                }
                 force.iter_mut().for_each(|x| *x *= 0.5);
                 Some(())
             },
