@@ -13,7 +13,7 @@ const PAGE: &str = "grasps.md";
 
 /// Name, hand file and further arguments. `{}` stands for the folder of models. Two soft jaws resist turning about their line with little
 /// friction, so that their margins are small.
-const HANDS: [(&str, &str, &str); 9] = [
+pub const HANDS: [(&str, &str, &str); 9] = [
     ("Allegro, right", "assets/hands/allegro_right/hand.toml", ""),
     ("Allegro, left", "{}/hands/allegro/allegro_left.urdf", ""),
     ("PR2 gripper, soft", "assets/hands/pr2_gripper/hand.toml", "--kind gripper --margin 0.002"),
@@ -33,7 +33,7 @@ const HANDS: [(&str, &str, &str); 9] = [
 const ENOUGH: u64 = 20;
 
 /// Name, mesh below `objects` and further arguments.
-const OBJECTS: [(&str, &str, &str); 20] = [
+pub const OBJECTS: [(&str, &str, &str); 20] = [
     ("cracker box", "ycb_003_cracker_box/mesh.obj", ""),
     ("mustard bottle", "ycb_006_mustard_bottle/mesh.obj", ""),
     ("banana", "ycb_011_banana/mesh.obj", ""),

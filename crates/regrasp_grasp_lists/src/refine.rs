@@ -1,5 +1,5 @@
 //! Refinement: contacts move along the surface and the hand follows, then wrist and contacts move at random, to raise the closure margin.
-//! The other terms of the score do not fall together, and no contact moves farther than a tip radius.
+//! The weighted sum of the other terms of the score does not fall, and no contact moves farther than a tip radius.
 
 use crate::driven;
 use crate::found::{Found, WayIn};

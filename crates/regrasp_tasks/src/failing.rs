@@ -114,14 +114,14 @@ impl Tally {
         let is_empty = |stage: &Stage| self.tried.contains_key(stage) && !self.found.contains_key(stage);
         let last = || order.into_iter().rev().find(|stage| self.reasons.keys().any(|(of, _)| of == stage));
         let stage = order.into_iter().find(is_empty).or_else(last).unwrap_or(Stage::Grasp);
-        // A change of grasp in a hand is tried only because exchanges failed.
-        let failed = |stage: Stage| self.reasons.keys().any(|(of, _)| *of == stage);
-        let aid = (stage == Stage::InHand && failed(Stage::Exchange)).then_some(stage);
-        let stage = if aid.is_some() { Stage::Exchange } else { stage };
-        let mut message = format!("{}: {}", stage.name(), self.in_words(stage));
-        if let Some(aid) = aid {
-            message += &format!("; {}: {}", aid.name(), self.in_words(aid));
-        }
+        // A change of grasp in a hand is tried only because exchanges failed: those come first.
+        let have_exchanges_failed = self.reasons.keys().any(|(of, _)| *of == Stage::Exchange);
+        let stages = match stage {
+            Stage::InHand if have_exchanges_failed => vec![Stage::Exchange, Stage::InHand],
+            stage => vec![stage],
+        };
+        let parts = stages.iter().map(|stage| format!("{}: {}", stage.name(), self.in_words(*stage)));
+        let (stage, message) = (stages[0], parts.collect::<Vec<_>>().join("; "));
         let advice = match stage {
             Stage::Grasp | Stage::Place => {
                 "make longer lists of grasps, or move the object nearer or away from clutter"

@@ -10,7 +10,7 @@ use crate::in_hand::{self, Change};
 use crate::motions::{self, Step, Stuck};
 use crate::placements::{Place, intermediate};
 use crate::roadmap::TaskRoadmap;
-use crate::station::{Effort, FINAL, Station, may_hold, station};
+use crate::station::{Effort, HAND_COLLIDES, Station, may_hold, station};
 use regrasp_geometry::Vector;
 use regrasp_manipulation::failure::{Failure, FailureKind};
 use regrasp_manipulation::task_settings::TaskCost;
@@ -102,7 +102,7 @@ const FAILED: f64 = 0.05;
 /// What an exchange costs more that was not found at the best places, in seconds. By hand.
 const SECOND_LOOK: f64 = 1.0;
 /// What a grasp costs more at start or goal that was not found with few postures of the arm, in seconds: more than any plan. By hand.
-const MORE_POSTURES: f64 = 1000.0;
+const LAST_RESORT: f64 = 1000.0;
 /// What an exchange costs more that the roadmap does not have, in seconds. By hand.
 const NOT_MADE: f64 = 2.0;
 /// A motion that was not found makes its edge this much dearer, in seconds; it is dead after so many.
@@ -403,10 +403,10 @@ impl<'c, 'a> Graph<'c, 'a> {
             }
             if let (Err(reason), Effort::Little) = (&found, effort)
                 && place < 2
-                && !FINAL.contains(reason)
+                && *reason != HAND_COLLIDES
             {
                 // Its turn comes again if nothing else is left.
-                (grip.is_second_look, grip.cost) = (true, grip.cost + MORE_POSTURES);
+                (grip.is_second_look, grip.cost) = (true, grip.cost + LAST_RESORT);
                 return false;
             }
             grip.known = found.map_or(Known::Dead, |found| Known::Found(Box::new(found)));

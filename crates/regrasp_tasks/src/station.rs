@@ -18,8 +18,8 @@ const POSTURES: usize = 4;
 const MORE_POSTURES: usize = 24;
 /// So many times as many postures of the common joints are drawn where nothing else is left.
 const MORE_DRAWS: usize = 8;
-/// Reasons that more postures do not change.
-pub const FINAL: [&str; 1] = ["hands in collision"];
+/// A reason that more postures do not change.
+pub const HAND_COLLIDES: &str = "hands in collision";
 /// Shares of the way in that are tried. A shorter one is planned before.
 const WAY_SHARES: [f64; 2] = [1.0, 0.4];
 /// Shares of the lift that are tried.
@@ -143,7 +143,7 @@ pub fn station(
     let free = &context.arms_and_torso;
     let hands = [&own.closed, &own.open].map(|fingers| links_of(context, hand, fingers));
     if !hands.iter().all(|links| is_hand_clear(context, links, &world_from_hand)) {
-        return Err(FINAL[0]);
+        return Err(HAND_COLLIDES);
     }
     let (n_postures, n_draws) = match effort {
         Effort::Little => (POSTURES, context.settings.common_draws),

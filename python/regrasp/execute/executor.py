@@ -13,10 +13,10 @@ from .._plan import Plan
 from .._result import Failure
 from .._session import Session, Start
 from ..simulate.model import Rig, Settings
-from ..simulate.reference import Array, rotation_matrices
+from ..simulate.reference import Array
 from .leg import Leg, first_rig
 from .log import Event, GoalResult, LegRecord, RunLog, Sample
-from .monitor import Monitor, Trigger, pose_error
+from .monitor import HOLDING, Monitor, Trigger, pose_error, why_gone
 from .planning import ChargedPlanning, Planning, Prepare, ThreadPlanning, Ticket
 from .plant import Command, Plant
 from .senses import Fault, Senses
@@ -26,8 +26,6 @@ from .settings import CAREFUL, FIRM, LOOSE, PLANNER, ExecutorSettings
 SAMPLED = 5
 #: Faults that stop the motion until they are over.
 SERIOUS = frozenset({"joints_missing", "stale_pose", "pose_jump"})
-#: Fewer fingers than these hold nothing.
-HOLDING = 2
 #: Trouble that may pass while the hand holds: a push moves the object, and the fingers bring it back.
 PASSING = frozenset({"deviation", "lost_contact", "slip"})
 #: Events that a firmer grip may prevent.
@@ -142,6 +140,8 @@ class Executor:
         quat = np.array(goal.quat_xyzw)[[3, 0, 1, 2]]
         is_reached = False
         ahead: Ticket | None = None
+        # A leg to another goal does not go on.
+        self._stopped = None
         for attempt in range(settings.attempts if settings.replanning else 1):
             ticket, was_prepared = prepared, prepared is not None
             prepared = None
@@ -149,40 +149,27 @@ class Executor:
                 try:
                     ticket = self._query(goal)
                 except _GoOn as cause:
-                    why_not = str(cause)
-                    self._event("no_start", why_not, "resume")
-            if ticket is None:
-                begun = self._senses.time
-                trigger = self._run_leg(self._k)
-                motion_time += self._senses.time - begun
-                if trigger is not None:
-                    why_not = f"{trigger.kind}: {trigger.message}"
-                    self._event(trigger.kind, trigger.message, "replan" if attempt + 1 < settings.attempts else "hold")
-                    continue
-                is_reached, why_not = self._ends_at(goal, quat)
-                if is_reached:
-                    break
-                self._event("missed", why_not, "replan" if attempt + 1 < settings.attempts else "hold")
-                continue
-            self._wait_for(ticket)
-            if not isinstance(ticket.answer, Plan):
-                why_not = f"no plan: {ticket.answer.message if isinstance(ticket.answer, Failure) else 'cancelled'}"
-                self._event("no_plan", why_not, "replan" if attempt + 1 < settings.attempts else "hold")
-                continue
-            if was_prepared and self._is_off_start(ticket):
-                # Too far from where the plan begins: it is made anew, from here.
-                ticket = self._query(goal)
-                was_prepared = False
+                    self._event("no_start", str(cause), "resume")
+            if ticket is not None:
                 self._wait_for(ticket)
                 if not isinstance(ticket.answer, Plan):
-                    why_not = "no plan from where the object is"
-                    self._event("no_plan", why_not, "replan")
+                    why_not = f"no plan: {ticket.answer.message if isinstance(ticket.answer, Failure) else 'cancelled'}"
+                    self._event("no_plan", why_not, "replan" if attempt + 1 < settings.attempts else "hold")
                     continue
-            n_legs += 1
-            self._begin(ticket, was_prepared)
-            ahead = None
-            if following is not None and settings.anytime and not (settings.replanning and attempt > 0):
-                ahead = self._ask_ahead(ticket.answer, following)
+                if was_prepared and self._is_off_start(ticket):
+                    # Too far from where the plan begins: it is made anew, from here.
+                    ticket = self._query(goal)
+                    was_prepared = False
+                    self._wait_for(ticket)
+                    if not isinstance(ticket.answer, Plan):
+                        why_not = "no plan from where the object is"
+                        self._event("no_plan", why_not, "replan")
+                        continue
+                n_legs += 1
+                self._begin(ticket, was_prepared)
+                ahead = None
+                if following is not None and settings.anytime and not (settings.replanning and attempt > 0):
+                    ahead = self._ask_ahead(ticket.answer, following)
             begun = self._senses.time
             trigger = self._run_leg()
             motion_time += self._senses.time - begun
@@ -281,7 +268,7 @@ class Executor:
                     return start
                 # The last session accepts most: its cause is what is left.
                 message = start.message
-            gone = self._is_gone()
+            gone = why_gone(self._leg, self._senses, self._settings)
             if gone:
                 raise _GiveUp("lost", f"{gone}; no start: {message}")
             if not told:
@@ -296,15 +283,9 @@ class Executor:
                 raise _GiveUp("lost" if lost else "gave_up", f"no start: {message}")
 
     def _may_go_on(self) -> bool:
-        """True where a leg was stopped on its way, once, the object is where that leg has it, felt by every finger that holds, and
-        every joint where it was told to be."""
-        leg, senses, settings = self._leg, self._senses, self._settings
-        if leg is None or self._stopped is None or not self._stopped.follows(self._k, senses, settings.resume_share):
-            return False
-        wanted = leg.ref.object_position[self._k], leg.ref.object_quat_wxyz[self._k]
-        distance, angle = pose_error(leg, senses.position, senses.quat, *wanted)
-        is_felt = senses.forces is None or bool((senses.forces >= settings.lost_force)[leg.ref.holds[self._k]].all())
-        return distance <= settings.deviation_distance and angle <= settings.deviation_turn and is_felt
+        """True where a leg was stopped on its way, once, and all but slipped fingertips are where that leg has them."""
+        monitor = self._stopped
+        return monitor is not None and monitor.is_back(self._k, self._senses, 1.0, slips=False)
 
     def _go_back(self) -> bool:
         """Goes back on the leg for ``back_off_time``, no farther than to where another finger landed or lifted. False where that is
@@ -324,23 +305,6 @@ class Executor:
             if faults:
                 self._outlast(faults)
         return self._k < last
-
-    def _is_gone(self) -> str:
-        """Why the object is not in the hand any more; empty where it may be. A camera that errs while fingers feel the object is not
-        believed."""
-        leg, senses, settings = self._leg, self._senses, self._settings
-        n_felt = None if senses.forces is None else int((senses.forces > settings.lost_force).sum())
-        if leg is None or senses.seen is None or (n_felt is not None and n_felt >= HOLDING):
-            return ""
-        felt = "" if n_felt is None else f", and {n_felt} fingers feel something"
-        if senses.time - senses.good_stamp > settings.patience:
-            return f"the object is out of sight{felt}" if n_felt is not None else ""
-        position, quat = senses.seen
-        center = position + rotation_matrices(quat) @ np.array(leg.rig.model.body_ipos[leg.rig.object_body])
-        away = float(np.linalg.norm(leg.tips(senses.joints) - center, axis=1).min()) - leg.rig.radius
-        if away > settings.gone_distance:
-            return f"the object is {1e3 * away:.0f} mm away from all fingertips{felt}"
-        return ""
 
     def _prepare(self, plan: Plan) -> Leg:
         if self._rig is None:
@@ -429,9 +393,9 @@ class Executor:
             )
         )
 
-    def _run_leg(self, first: int = 0) -> Trigger | None:
-        """Runs the leg from tick ``first`` to its end, or to the first thing that goes wrong and does not pass."""
-        leg, settings = self._leg, self._settings
+    def _run_leg(self) -> Trigger | None:
+        """Runs the leg to its end, or to the first thing that goes wrong and does not pass."""
+        leg, settings, first = self._leg, self._settings, self._k
         assert leg is not None
         monitor = Monitor(leg, settings, self._senses.joints, first)
         resumed = 0
@@ -468,7 +432,7 @@ class Executor:
             trigger = monitor.look(self._k, senses, leg.ref.joints[self._k])
             if trigger is not None and trigger.kind not in PASSING:
                 return False
-            is_good = trigger is None and monitor.is_near(self._k, senses, settings.resume_share)
+            is_good = trigger is None and monitor.is_back(self._k, senses, settings.resume_share)
             good_since = min(good_since, senses.time) if is_good else np.inf
             if senses.time - good_since >= settings.resume_after:
                 return True
@@ -479,7 +443,7 @@ class Executor:
         settings, since = self._settings, self._senses.time
         gone_since: float | None = None
         while any(fault.kind in SERIOUS for fault in faults):
-            now, gone = self._senses.time, self._is_gone()
+            now, gone = self._senses.time, why_gone(self._leg, self._senses, self._settings)
             gone_since = None if not gone else now if gone_since is None else gone_since
             if gone_since is not None and now - gone_since >= settings.gone_after:
                 raise _GiveUp("lost", gone)

@@ -13,6 +13,10 @@ from .senses import Senses
 from .settings import ExecutorSettings
 
 
+#: Fewer fingers than these hold nothing.
+HOLDING = 2
+
+
 @dataclass(frozen=True)
 class Trigger:
     """Why a leg does not go on."""
@@ -77,20 +81,21 @@ class Monitor:
         """True where the object was near where it should be a short time before the last look: a push, not a drift."""
         return bool(self._shares) and self._shares[0][1] <= self._settings.resume_share
 
-    def is_near(self, k: int, senses: Senses, share: float) -> bool:
-        """True where the object was within this share of what counts as a deviation at the last look, no fingertip beyond it of what
-        counts as a slip, no joint of what counts as stalled, and every holding finger feels it."""
-        settings = self._settings
-        is_felt = senses.forces is None or bool((senses.forces >= settings.lost_force)[self._leg.ref.holds[k]].all())
-        distance, turn = share * settings.deviation_distance, share * settings.deviation_turn
-        is_back = self.slip <= share * settings.slip_distance or not settings.slip_trigger
-        is_back = is_back and self.follows(k, senses, share)
-        return self.distance <= distance and self.angle <= turn and is_back and is_felt
-
-    def follows(self, k: int, senses: Senses, share: float) -> bool:
-        """True where every joint is within this share of what counts as stalled from where it was told to be."""
-        error = np.abs(senses.joints - self._leg.ref.joints[k])
-        return bool((error <= share * self._settings.stall_error + self._usual_error).all())
+    def is_back(self, k: int, senses: Senses, share: float, *, slips: bool = True) -> bool:
+        """True where the leg may go on: the object is within ``share`` of what counts as a deviation, every joint near where it was
+        told to be, every holding finger feels the object, and, with ``slips``, no fingertip is beyond ``share`` of what counts as a
+        slip."""
+        leg, settings = self._leg, self._settings
+        wanted = leg.ref.object_position[k], leg.ref.object_quat_wxyz[k]
+        distance, angle = pose_error(leg, senses.position, senses.quat, *wanted)
+        error = np.abs(senses.joints - leg.ref.joints[k])
+        return bool(
+            distance <= share * settings.deviation_distance
+            and angle <= share * settings.deviation_turn
+            and (error <= settings.resume_share * settings.stall_error + self._usual_error).all()
+            and (senses.forces is None or (senses.forces >= settings.lost_force)[leg.ref.holds[k]].all())
+            and not (slips and settings.slip_trigger and self.slip > share * settings.slip_distance)
+        )
 
     def _lost(self, k: int, senses: Senses) -> Trigger | None:
         if senses.forces is None:
@@ -124,3 +129,20 @@ class Monitor:
             finger = leg.rig.fingers[int(np.nanargmax(moved))].name
             return Trigger("slip", f'finger "{finger}" has slipped by {1e3 * self.slip:.1f} mm')
         return None
+
+
+def why_gone(leg: Leg | None, senses: Senses, settings: ExecutorSettings) -> str:
+    """Why the object is not in the hand any more; empty where it may be. A camera that errs while fingers feel the object is not
+    believed."""
+    n_felt = None if senses.forces is None else int((senses.forces > settings.lost_force).sum())
+    if leg is None or senses.seen is None or (n_felt is not None and n_felt >= HOLDING):
+        return ""
+    felt = "" if n_felt is None else f", and {n_felt} fingers feel something"
+    if senses.time - senses.good_stamp > settings.patience:
+        return f"the object is out of sight{felt}" if n_felt is not None else ""
+    position, quat = senses.seen
+    center = position + rotation_matrices(quat) @ np.array(leg.rig.model.body_ipos[leg.rig.object_body])
+    away = float(np.linalg.norm(leg.tips(senses.joints) - center, axis=1).min()) - leg.rig.radius
+    if away > settings.gone_distance:
+        return f"the object is {1e3 * away:.0f} mm away from all fingertips{felt}"
+    return ""

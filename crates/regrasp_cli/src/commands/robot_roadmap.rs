@@ -1,4 +1,4 @@
-//! Roadmaps of robots: what `roadmap build`, `roadmap info` and `plan` do with them.
+//! Roadmaps of robots: what `roadmap build`, `roadmap info`, `roadmap picture` and `plan` do with them.
 
 use crate::args::{self, Common};
 use crate::commands::written::Limits;

@@ -50,6 +50,15 @@ const MEASURED: usize = 3001;
 /// Terms smaller than this share of the largest are left out: less than rounding.
 const SMALLEST_TERM: f64 = 1e-17;
 
+/// Unit vectors spread evenly over the sphere: even in height and, by the golden angle, around.
+pub fn spread(n: usize) -> impl Iterator<Item = Vector> {
+    (0..n).map(move |k| {
+        let z = (2 * k + 1) as f64 / n as f64 - 1.0;
+        let (sine, cosine) = (2.399963229728653 * k as f64).sin_cos();
+        Vector::new((1.0 - z * z).sqrt() * cosine, (1.0 - z * z).sqrt() * sine, z)
+    })
+}
+
 impl Smooth {
     /// The surface near `hull`, measured over `pad`.
     pub fn of(surface: &SmoothHull, hull: &Arc<ConvexHull>, pad: Option<&Pad>) -> Self {
@@ -64,11 +73,7 @@ impl Smooth {
             planes: Vec::with_capacity(MEASURED),
         };
         let mut hint = 0;
-        for k in 0..MEASURED {
-            // Even in height and, by the golden angle, around.
-            let z = (2 * k + 1) as f64 / MEASURED as f64 - 1.0;
-            let (sine, cosine) = (2.399963229728653 * k as f64).sin_cos();
-            let n = Vector::new((1.0 - z * z).sqrt() * cosine, (1.0 - z * z).sqrt() * sine, z);
+        for n in spread(MEASURED) {
             let reach = smooth.point(&n).dot(&n);
             smooth.planes.push((n, reach));
             smooth.inner_radius = smooth.inner_radius.min(reach);

@@ -1,4 +1,4 @@
-//! A super graph in its scene: where it brings the wrists, from behind the robot and from above.
+//! A super graph (Saut 2010, sec. V-A) in its scene: where it brings the wrists, from behind the robot and from above.
 
 use crate::charts::svg::{Anchor, INK, SOFT, Svg, fixed};
 use crate::palette;
@@ -142,14 +142,14 @@ fn key(svg: &mut Svg, graph: &WristGraph, scale: f64, y: f64) {
     };
     for (index, (name, points)) in graph.arms.iter().enumerate() {
         let color = palette::color(index);
-        tell(svg, format!("wrist of {name}, {} nodes", points.len()), &|svg, at| svg.disc(at, 4.5, color, ""));
+        tell(svg, format!("wrist of {name} (nodes: {})", points.len()), &|svg, at| svg.disc(at, 4.5, color, ""));
     }
-    tell(svg, format!("{} motions", graph.edges.len()), &|svg, [x, y]| {
+    tell(svg, format!("motions: {}", graph.edges.len()), &|svg, [x, y]| {
         svg.line([x - 5.0, y], [x + 5.0, y], SOFT, 1.0, "")
     });
     if !graph.exchanges.is_empty() {
         let ring = format!("stroke=\"{EXCHANGE}\" stroke-width=\"1.2\"");
-        tell(svg, format!("{} exchanges", graph.exchanges.len()), &|svg, at| svg.disc(at, 3.0, "none", &ring));
+        tell(svg, format!("exchanges: {}", graph.exchanges.len()), &|svg, at| svg.disc(at, 3.0, "none", &ring));
     }
     let length = 0.5;
     svg.line([LEFT, y + 18.0], [LEFT + length * scale, y + 18.0], INK, 1.5, "");

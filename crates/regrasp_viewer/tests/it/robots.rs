@@ -89,7 +89,7 @@ fn wrist_graphs_show_what_they_hold() {
     let svg = wrist_graph(&graph, "graph");
     // Two views of six nodes and an exchange, and their marks in the key.
     assert_eq!(svg.matches("<circle").count(), 2 * 7 + 3);
-    for words in ["wrist of right, 3 nodes", "2 motions", "1 exchanges", "from above", "0.5 m"] {
+    for words in ["wrist of right (nodes: 3)", "motions: 2", "exchanges: 1", "from above", "0.5 m"] {
         assert!(svg.contains(words), "{words}");
     }
     assert!(!wrist_graph(&WristGraph::default(), "empty").contains("NaN"));

@@ -247,6 +247,7 @@ fn narrow(value: impl Fn(f64) -> f64) -> (f64, f64) {
 mod tests {
     use super::*;
     use crate::check::surface::SortedShape;
+    use crate::check::tip_surface::spread;
     use nalgebra::Rotation3;
     use regrasp_base::Rng;
     use regrasp_geometry::{ConvexHull, Shape, TriangleMesh};
@@ -299,13 +300,7 @@ mod tests {
     }
 
     fn many_planes(smooth: &Smooth) -> Vec<(Vector, f64)> {
-        let n = 40_000;
-        let direction = |k: usize| {
-            let z = (2 * k + 1) as f64 / n as f64 - 1.0;
-            let (sine, cosine) = (2.399963229728653 * k as f64).sin_cos();
-            Vector::new((1.0 - z * z).sqrt() * cosine, (1.0 - z * z).sqrt() * sine, z)
-        };
-        (0..n).map(direction).map(|m| (m, smooth.point(&m).dot(&m))).collect()
+        spread(40_000).map(|m| (m, smooth.point(&m).dot(&m))).collect()
     }
 
     /// The nearest of all triangles is as near as the nearest of many points on them, whichever guess the search begins with; and what

@@ -57,9 +57,8 @@ impl Place<'_> {
     /// The touch: that with a normal near one of the guesses, where nothing is nearer by more than `slack`, else where the surface is
     /// nearest. None where no surface is near, and on primitives where no guess leads to one.
     pub(super) fn touch(&self, guesses: &[Vector], slack: f64) -> Option<Touch> {
-        let settled = guesses.iter().filter_map(|guess| self.settle(guess));
-        let is_nearest = |touch: &Touch| self.is_nothing_nearer(touch, touch.gap - slack);
-        if let Some(touch) = settled.into_iter().find(is_nearest) {
+        let mut settled = guesses.iter().filter_map(|guess| self.settle(guess));
+        if let Some(touch) = settled.find(|touch| self.is_nothing_nearer(touch, touch.gap - slack)) {
             return Some(touch);
         }
         let nearest = self.nearest()?;
