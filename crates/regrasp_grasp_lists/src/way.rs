@@ -15,6 +15,9 @@ use regrasp_robot::kinematics::finger_ik::Coordinates;
 
 /// Largest step of a joint while the hand opens, in radians or metres.
 const JOINT_STEP: f64 = 0.08;
+/// Longest step of a fingertip that leaves its contact, in metres. How deep such a tip presses in is proven at the ends of a step:
+/// between them a ball of radius `r` may sink deeper by `step^2 / (8 r)`, 0.06 mm for 8 mm.
+const TIP_STEP: f64 = 0.002;
 /// Longest step of the hand on its line, in metres.
 const LINE_STEP: f64 = 0.02;
 /// Longest step of a fingertip that lifts off, in metres.
@@ -97,9 +100,12 @@ fn lifted(prepared: &Prepared, state: &GraspState, height: f64) -> Option<HandJo
 /// True when the hand opens without a collision; fingertips that hold press in no deeper than allowed.
 fn opens(workspace: &mut Workspace, state: &GraspState, open: &HandJoints) -> bool {
     workspace.set_state(state);
-    let change = |(from, to): (&f64, &f64)| (to - from).abs();
-    let changes = state.joints.iter().zip(open).flat_map(|(from, to)| from.iter().zip(to).map(change));
-    let n_steps = (changes.fold(0.0, f64::max) / JOINT_STEP).ceil().max(1.0) as usize;
+    let changes =
+        |f: usize| -> Coordinates { state.joints[f].iter().zip(&open[f]).map(|(from, to)| to - from).collect() };
+    let turn = (0..open.len()).flat_map(changes).map(f64::abs).fold(0.0, f64::max);
+    let travel = |f: usize| workspace.model.fingers[f].tip_bound.first_order(&changes(f));
+    let travel = holding(state).map(travel).fold(0.0, f64::max);
+    let n_steps = (turn / JOINT_STEP).max(travel / TIP_STEP).ceil().max(1.0) as usize;
     (1..=n_steps).all(|k| {
         let joints = between(&state.joints, open, k as f64 / n_steps as f64);
         workspace.step(&state.world_from_object, &joints, TipMode::AllHold)

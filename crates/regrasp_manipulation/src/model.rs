@@ -382,13 +382,13 @@ impl<'a> Model<'a> {
 
 /// A body that nothing moves; `mesh_body` is that of a mesh, where it is known.
 fn fixed_body(shape: &Shape, mesh_body: Option<&MeshBody>, world_from_shape: &Pose, name: &str) -> Body {
-    let body = |shape: &Shape, tree, place: &Pose| {
+    let body = |shape: &Shape, tree| {
         let (center, radius) = shape.bounding_sphere();
         Body {
             shape: shape.clone(),
             tree_for_tips: Option::clone(&tree),
             tree,
-            carrier_from_body: Placement::from(place),
+            carrier_from_body: Placement::from(world_from_shape),
             center,
             radius,
             middle: shape.middle(),
@@ -398,8 +398,8 @@ fn fixed_body(shape: &Shape, mesh_body: Option<&MeshBody>, world_from_shape: &Po
     };
     match mesh_body.cloned().or_else(|| MeshBody::of(shape)) {
         // The bound is only a first test; the triangles decide.
-        Some(MeshBody { bound, tree }) => body(&bound.shape, Some(tree), &(world_from_shape * bound.parent_from_shape)),
-        None => body(shape, None, world_from_shape),
+        Some(MeshBody { bound, tree }) => body(&bound, Some(tree)),
+        None => body(shape, None),
     }
 }
 
@@ -417,7 +417,7 @@ const FOLDED: f64 = 0.8;
 /// True where the mesh of `object` fills clearly less than its hull.
 fn folds(object: &Object) -> bool {
     let (Shape::Mesh(mesh), None, Some(body)) = (&object.shape, &object.hull, &object.mesh_body) else { return false };
-    let hull = solid_properties(&body.bound.shape).map(|solid| solid.volume);
+    let hull = solid_properties(&body.bound).map(|solid| solid.volume);
     let solid = solid_properties(&Shape::Mesh(mesh.clone())).map(|solid| solid.volume);
     matches!((solid, hull), (Ok(solid), Ok(hull)) if solid < FOLDED * hull)
 }

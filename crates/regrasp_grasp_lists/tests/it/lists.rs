@@ -1,6 +1,6 @@
 //! Lists are accepted, the same on any number of threads, and end with a reason where there is no grasp.
 
-use crate::sample::{bundled, check, list, settings};
+use crate::sample::{bundled, check, list, settings, with_horse};
 use regrasp_base::Budget;
 use regrasp_grasp::list::format::to_json;
 use regrasp_grasp_lists::{FailureKind, GraspSettings, list_grasps};
@@ -22,6 +22,16 @@ fn the_checker_accepts_every_grasp() {
         assert!(list.grasps.windows(2).all(|pair| pair[0].score >= pair[1].score), "best score first");
         assert!(list.grasps.iter().all(|grasp| grasp.margin >= list.promises.required_margin));
     }
+}
+
+/// Large fingertips that slide open by centimetres swept through the folds of the horse between looks.
+#[test]
+fn large_fingertips_open_beside_folds() {
+    let scene = with_horse("four_fingertips");
+    let list = list(&scene, &settings(100), 0).unwrap();
+    let report = check(&scene, &list);
+    assert!(report.accepted(), "{:?}", report.violations.first());
+    assert_eq!(list.grasps.len(), 100);
 }
 
 #[test]

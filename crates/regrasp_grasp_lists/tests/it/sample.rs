@@ -6,7 +6,7 @@ use regrasp_grasp::record::PlanInput;
 use regrasp_grasp_lists::{Failure, GraspSettings, list_grasps};
 use regrasp_plan::check::{CheckSettings, GraspReport, check_grasps};
 use regrasp_robot::import::LoadOptions;
-use regrasp_scene::{GraspScene, ObjectSource, load_grasp_scene};
+use regrasp_scene::{GraspScene, MeshObject, ObjectSource, load_grasp_scene};
 use std::path::{Path, PathBuf};
 
 fn root() -> PathBuf {
@@ -17,6 +17,20 @@ fn root() -> PathBuf {
 pub fn bundled(hand: &str, scene: &str) -> GraspScene {
     let hand = root().join("assets/hands").join(hand).join("hand.toml");
     let object = ObjectSource::Scene(root().join("scenes").join(scene));
+    load_grasp_scene(&hand, &object, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A bundled hand with the bundled horse, which folds.
+pub fn with_horse(hand: &str) -> GraspScene {
+    let hand = root().join("assets/hands").join(hand).join("hand.toml");
+    let object = ObjectSource::Mesh(MeshObject {
+        path: root().join("assets/objects/horse.obj"),
+        scale: 1.0,
+        mass: 0.1,
+        friction: 0.8,
+        edge_distance: Some(0.002),
+        crease_angle_deg: Some(80.0),
+    });
     load_grasp_scene(&hand, &object, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
 }
 
